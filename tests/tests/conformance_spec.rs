@@ -1,6 +1,6 @@
 //! The specification agrees with the code: byte tables, kinds, invariants and the worked hexdump.
 
-use bth_format::error::kind_name;
+use bth_format::layout::kind;
 use bth_format::layout::*;
 use std::collections::BTreeMap;
 use std::mem::offset_of;
@@ -128,10 +128,10 @@ fn kinds_have_the_names_and_strides_of_the_table() {
         .filter(|l| l.starts_with("| ") && !l.starts_with("| kind"))
         .map(|l| l.trim_matches('|').split('|').map(str::trim).collect())
         .collect();
-    assert_eq!(rows.len(), (0..1000).filter(|k| kind_name(*k) != "unknown").count());
+    assert_eq!(rows.len(), (0..1000).filter(|k| kind::name(*k) != "unknown").count());
     for row in rows {
         let kind = row[0].parse().unwrap();
-        assert_eq!(kind_name(kind), row[1]);
+        assert_eq!(kind::name(kind), row[1]);
         let stride = bth_format::file::kind_stride(kind).unwrap();
         assert!(stride == 0 && kind == kind::TETS || stride.to_string() == row[3], "stride of {}", row[1]);
         assert_eq!(row[5] == "yes", kind::is_required(kind), "{}", row[1]);

@@ -22,8 +22,10 @@
 // `Text` is `&str` with the feature, which `into` leaves as it is.
 #![cfg_attr(feature = "brief", allow(clippy::useless_conversion))]
 
-/// Text that is made for an error: as `format!`, and empty with the feature `brief`.
+/// Text that is made for an error: as `format!`, and empty with the feature `brief`. For the runtime, too.
 #[cfg(not(feature = "brief"))]
+#[doc(hidden)]
+#[macro_export]
 macro_rules! text {
     ($($arguments:tt)*) => {
         format!($($arguments)*)
@@ -31,6 +33,8 @@ macro_rules! text {
 }
 
 #[cfg(feature = "brief")]
+#[doc(hidden)]
+#[macro_export]
 macro_rules! text {
     ($($arguments:tt)*) => {{
         // The arguments count as used, and are not evaluated.
@@ -42,6 +46,7 @@ macro_rules! text {
 }
 
 mod check;
+mod code;
 mod deformation_view;
 pub mod error;
 pub mod exact;
@@ -56,8 +61,9 @@ mod sequence_view;
 mod unpack;
 pub mod verify;
 
+pub use code::Code;
 pub use deformation_view::{DeformationView, MorphDeltas};
-pub use error::{Code, Error};
+pub use error::Error;
 pub use file::{File, FileMemory};
 pub use materials_view::{ImagesView, MaterialsView};
 pub use object::ObjectView;

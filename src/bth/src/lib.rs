@@ -19,25 +19,6 @@
 /// Whether the feature `small` is on.
 const SMALL: bool = cfg!(feature = "small");
 
-/// Text that is made for an error: as `format!`, and empty with the feature `small`.
-#[cfg(not(feature = "small"))]
-macro_rules! text {
-    ($($arguments:tt)*) => {
-        format!($($arguments)*)
-    };
-}
-
-#[cfg(feature = "small")]
-macro_rules! text {
-    ($($arguments:tt)*) => {{
-        // The arguments count as used, and are not evaluated.
-        if false {
-            let _ = format_args!($($arguments)*);
-        }
-        ""
-    }};
-}
-
 mod batch;
 mod builder;
 mod bvh;
@@ -47,6 +28,7 @@ mod crossing;
 mod deform;
 mod deformers;
 mod enumerate;
+mod first_hits;
 mod free;
 mod hits;
 mod instances;

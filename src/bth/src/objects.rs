@@ -3,6 +3,7 @@
 use crate::deform::Deforming;
 use bth_format::layout::Object;
 use bth_format::object::ObjectView;
+use bth_format::text;
 use bth_format::{Code, Error, File};
 
 /// The objects of a scene, by their index.

@@ -1,6 +1,5 @@
 //! Flat models: the default scene's meshes in world space, in node traversal order, or single meshes in their own space.
 
-use bth_scene::JointSet;
 use glam::DAffine3;
 use std::collections::HashMap;
 
@@ -11,6 +10,7 @@ use crate::gltf::buffer::Buffers;
 use crate::gltf::document::{self, GRAPH};
 use crate::gltf::extensions::SUPPORTED;
 use crate::gltf::materials::{self, SharedMaterials};
+use crate::gltf::placed_mesh::{GltfPart, PlacedMesh, placed_meshes};
 use crate::gltf::primitive::{PrimitiveReader, Triangles};
 use crate::gltf::rest_pose::RestPose;
 use crate::gltf::rigid_parts::{KeptTriangles, Selection};
@@ -19,66 +19,6 @@ use crate::gltf::transform;
 use crate::mesh::{Keep, Wanted};
 use crate::raw::{NONE, Raw, RowKind, check_triangles};
 use crate::source::Source;
-
-/// A mesh at a place of the flat model.
-pub(super) struct PlacedMesh {
-    /// `None` when the mesh is read in its own space.
-    node: Option<usize>,
-    pub(super) mesh: usize,
-    pub(super) world: DAffine3,
-    pub(super) kept: KeptTriangles,
-}
-
-/// A part of a glTF document that is read as a model of its own.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum GltfPart {
-    /// A mesh by its number, in its own space.
-    Mesh(u32),
-    /// A mesh in its own space, with what moves its vertices.
-    Deforming {
-        /// Number of the mesh.
-        mesh: u32,
-        /// Joints whose rigid parts ([`GltfPart::Rigid`]) are left out.
-        without: JointSet,
-    },
-    /// The connected components of a mesh that one joint alone moves, in the space of the mesh.
-    Rigid {
-        /// Number of the mesh.
-        mesh: u32,
-        /// Number of the joint.
-        joint: u32,
-    },
-    /// The mesh of a node, by the node's number, at rest: with its default morph weights, and with its joints where the nodes
-    /// place them. With a skin it is in world space, else in that of the node.
-    AtRest(u32),
-}
-
-impl GltfPart {
-    /// The mesh of the part.
-    ///
-    /// # Errors
-    /// `BTH-I012` where the node does not exist or has no mesh.
-    pub(super) fn placed(self, source: &Source<'_>, document: &GltfDocument) -> Result<PlacedMesh> {
-        let kept = match self {
-            GltfPart::Mesh(_) | GltfPart::AtRest(_) => KeptTriangles::All,
-            GltfPart::Deforming { without, .. } => KeptTriangles::without(without),
-            GltfPart::Rigid { joint, .. } => KeptTriangles::Part(joint),
-        };
-        let (node, mesh) = match self {
-            GltfPart::Mesh(mesh) | GltfPart::Deforming { mesh, .. } | GltfPart::Rigid { mesh, .. } => {
-                (None, mesh as usize)
-            }
-            GltfPart::AtRest(node) => {
-                let mesh = document.nodes.get(node as usize).and_then(|node| node.mesh);
-                let message = "it does not exist or has no mesh";
-                let part = format!("node {node}");
-                let error = || source.error_in_part(GRAPH, part, message, "name a node that has a mesh");
-                (Some(node as usize), mesh.ok_or_else(error)?)
-            }
-        };
-        Ok(PlacedMesh { node, mesh, world: DAffine3::IDENTITY, kept })
-    }
-}
 
 /// Where the rows of one primitive of one node begin.
 struct Span {
@@ -188,35 +128,6 @@ fn locate(source: &Source<'_>, spans: &[Span], kind: RowKind, row: usize) -> Pla
     let node = span.node.map_or(String::new(), |node| format!("node {node} "));
     let part = format!("{node}mesh {} primitive {}{accessor}", span.mesh, span.primitive);
     Place::Part(source.path.to_owned(), part)
-}
-
-/// The scene's nodes that have a mesh, in depth-first order, with their world transforms.
-pub(super) fn placed_meshes(source: &Source<'_>, document: &GltfDocument) -> Result<Vec<PlacedMesh>> {
-    let error =
-        |part: String, message: &str| source.error_in_part(GRAPH, part, message, "export the model again");
-    let roots = match document.scenes.get(document.scene.unwrap_or(0)) {
-        Some(scene) => scene.nodes.clone(),
-        None if document.scene.is_some() => {
-            return Err(error(format!("scene {}", document.scene.unwrap_or(0)), "it does not exist"));
-        }
-        None => document.parentless_nodes(),
-    };
-    let mut placed = Vec::new();
-    let mut visited = vec![false; document.nodes.len()];
-    let mut stack: Vec<_> = roots.into_iter().rev().map(|node| (node, DAffine3::IDENTITY)).collect();
-    while let Some((index, parent)) = stack.pop() {
-        let part = || format!("node {index}");
-        let node = document.nodes.get(index).ok_or_else(|| error(part(), "it does not exist"))?;
-        if std::mem::replace(&mut visited[index], true) {
-            return Err(error(part(), "expected a node with one parent, found it twice in the scene"));
-        }
-        let world = parent * transform::local(node);
-        if let Some(mesh) = node.mesh {
-            placed.push(PlacedMesh { node: Some(index), mesh, world, kept: KeptTriangles::All });
-        }
-        stack.extend(node.children.iter().rev().map(|&child| (child, world)));
-    }
-    Ok(placed)
 }
 
 impl Flattener<'_, '_> {

@@ -1,6 +1,7 @@
 //! glTF and GLB, in the order of the data: `container` splits a GLB, `document` reads its JSON into `schema`, `buffer`
 //! gives the bytes of views (`meshopt` decompresses them), `accessor` their rows, `primitive` triangles (`draco`
-//! decompresses them, `texture` chooses texture coordinates), `rigid_parts` what of them a joint moves alone, and `flatten` a model. `cutout` reads which materials make
+//! decompresses them, `texture` chooses texture coordinates), `rigid_parts` what of them a joint moves alone, `placed_mesh` which meshes there are and
+//! where, and `flatten` a model. `cutout` reads which materials make
 //! holes. [`scene`] makes a manifest instead.
 
 pub(crate) mod accessor;
@@ -14,6 +15,7 @@ pub(crate) mod extensions;
 pub(crate) mod flatten;
 pub(crate) mod materials;
 mod meshopt;
+mod placed_mesh;
 mod primitive;
 mod rest_pose;
 mod rigid_parts;
@@ -25,6 +27,6 @@ mod texture_parts;
 mod transform;
 pub(crate) mod uri;
 
-pub use flatten::GltfPart;
+pub use placed_mesh::GltfPart;
 pub use scene::options::Chosen;
 pub use source_files::external_files;

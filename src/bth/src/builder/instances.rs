@@ -5,6 +5,7 @@ use super::{MAX_INSTANCES, SceneBuilder};
 use crate::instances::{Affine, InstanceRow, NewInstance};
 use crate::objects::Objects;
 use bth_format::layout::NONE;
+use bth_format::text;
 use bth_format::{Code, Error};
 use std::collections::HashSet;
 

@@ -15,6 +15,7 @@ use self::instances::StagedInstance;
 use self::subscene::Subscene;
 use crate::instances::Update;
 use crate::scene::Scene;
+use bth_format::text;
 use bth_format::{Code, Error};
 
 /// Greatest number of instances: their indices are stored beside kinds of nodes in 32 bits.

@@ -3,6 +3,7 @@
 use super::SceneBuilder;
 use super::instances::StagedInstance;
 use super::subscene::{Pose, Subscene};
+use bth_format::text;
 use bth_format::{Code, Error};
 
 /// Subscenes: files that are placed as a whole.

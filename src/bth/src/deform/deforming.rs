@@ -7,6 +7,7 @@ use super::tets::{TetPlan, TetUse};
 use crate::SMALL;
 use bth_format::file::{DeformedObject, Normals};
 use bth_format::object::ObjectView;
+use bth_format::text;
 use bth_format::{Code, Error, File};
 
 /// An object with positions, boxes and leaves of its own.

@@ -5,6 +5,7 @@ use crate::clock;
 use crate::instances::Update;
 use crate::scene::Scene;
 use bth_format::Error;
+use bth_format::text;
 
 impl Scene {
     /// Number of vertices that [`Self::set_positions`] expects; `None` if the object was not compiled with `--deformable`.

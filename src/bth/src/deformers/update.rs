@@ -11,6 +11,7 @@ use crate::objects::Objects;
 use bth_format::File;
 use bth_format::error::{Code, Error, Result};
 use bth_format::layout::*;
+use bth_format::text;
 use std::collections::HashSet;
 use std::time::Duration;
 

@@ -10,6 +10,7 @@ use bth_format::SceneView;
 use bth_format::error::{Code, Error, Result};
 use bth_format::file::File;
 use bth_format::layout::*;
+use bth_format::text;
 
 /// The scene sections of a scene that is a file with such sections.
 pub(super) fn scene_of(objects: &Objects) -> SceneView<'_> {

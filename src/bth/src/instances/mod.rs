@@ -10,6 +10,8 @@
 //! hits goes through the top level alone ([`enumerate`]).
 
 mod affine;
+#[cfg(test)]
+mod affine_tests;
 mod batch;
 mod caller;
 mod deformed;

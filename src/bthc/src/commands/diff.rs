@@ -49,7 +49,7 @@ struct Difference {
 
 impl Difference {
     fn name(&self) -> String {
-        let kind = bth_format::error::kind_name(self.kind).to_owned();
+        let kind = bth_format::layout::kind::name(self.kind).to_owned();
         if self.object == NONE { kind } else { format!("object {}, {kind}", self.object) }
     }
 

@@ -8,7 +8,7 @@ use crate::output;
 use crate::table::{Table, bytes, count};
 use bth::Isa;
 use bth_format::File;
-use bth_format::error::kind_name;
+use bth_format::layout::kind;
 use bth_format::layout::{FREE_BINS, FreeBins, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE, RecordKind};
 use bth_format::object::ObjectView;
 use bth_import::gltf::scene::{self, ImportOptions};
@@ -67,7 +67,7 @@ fn describe(file: &File) -> Result<Value, Failure> {
     let section = |s: bth_format::file::SectionView<'_>| {
         let e = s.entry;
         let object = (e.object != NONE).then_some(e.object);
-        json!({"kind": kind_name(e.kind), "object": object, "offset": e.offset, "bytes": e.length,
+        json!({"kind": kind::name(e.kind), "object": object, "offset": e.offset, "bytes": e.length,
             "stride": e.stride, "count": e.count, "hash": hex(&e.hash)})
     };
     let object = |i: u32| -> Result<Value, Failure> {
@@ -259,7 +259,7 @@ fn summary(file: &File) -> Result<String, Failure> {
     sections.row(["section", "rows", "size"]);
     for section in file.sections() {
         let e = section.entry;
-        sections.row([kind_name(e.kind), &count(e.count), &bytes(e.length)]);
+        sections.row([kind::name(e.kind), &count(e.count), &bytes(e.length)]);
     }
     let made = file.provenance().map_or(String::new(), |text| format!("\n{text}\n"));
     Ok(format!("{}\n{}{}{made}", facts.render(), groups_table(file)?, sections.render()))

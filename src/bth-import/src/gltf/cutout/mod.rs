@@ -11,7 +11,7 @@ use crate::gltf::accessor::Accessors;
 use crate::gltf::buffer::Buffers;
 use crate::gltf::document;
 use crate::gltf::extensions::{SCENE_EXTENSIONS, SUPPORTED};
-use crate::gltf::flatten::{GltfPart, PlacedMesh, placed_meshes};
+use crate::gltf::placed_mesh::{GltfPart, PlacedMesh, placed_meshes};
 use crate::gltf::primitive::{KeptAttributes, PrimitiveReader, Triangles};
 use crate::gltf::rigid_parts::Selection;
 use crate::gltf::schema::GltfDocument;

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use bth_scene::{Deformer, JointSet, Node, Skin, Source, Transform};
 
 use crate::error::{Error, Result};
-use crate::gltf::flatten::GltfPart;
+use crate::gltf::placed_mesh::GltfPart;
 use crate::gltf::scene::importer::{Importer, unique};
 use crate::gltf::schema::{Animation, GltfNode};
 use crate::gltf::transform;

@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 use crate::error::{Error, Result};
 use crate::gltf::accessor::Accessors;
 use crate::gltf::document::GRAPH;
-use crate::gltf::flatten::GltfPart;
+use crate::gltf::placed_mesh::GltfPart;
 use crate::gltf::scene::deformers::{Animated, Deforming};
 use crate::gltf::scene::options::ImportReport;
 use crate::gltf::schema::GltfDocument;

@@ -3,7 +3,7 @@
 use bth_scene::{Node, Transform};
 
 use crate::error::Result;
-use crate::gltf::flatten::GltfPart;
+use crate::gltf::placed_mesh::GltfPart;
 use crate::gltf::scene::importer::{Importer, unique};
 use crate::gltf::scene::options::ImportOptions;
 use crate::gltf::schema::{GltfNode, Instancing, LightReference, Visibility};

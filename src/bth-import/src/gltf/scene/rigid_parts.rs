@@ -5,7 +5,7 @@ use bth_scene::{Deformer, Interpolation, JointSet, Node, Object, Property, Sourc
 use glam::{DMat3, DVec3};
 
 use crate::error::Result;
-use crate::gltf::flatten::GltfPart;
+use crate::gltf::placed_mesh::GltfPart;
 use crate::gltf::rigid_parts::RigidParts;
 use crate::gltf::scene::importer::{Importer, unique};
 

@@ -2,70 +2,27 @@
 //! are left, one ray at a time ([`super::single_rays`]).
 //!
 //! Points are projected once for a group of sixteen rays or, if all rays of the packet have the same origin, for each tested triangle.
-//! Most triangles are excluded by the error bound of [`crate::intersect::filter`] for the greatest corner of the whole leaf; only for
+//! Most triangles are excluded by the error bound of [`crate::intersect::edge_functions`] for the greatest corner of the whole leaf; only for
 //! the others the bound of the triangle itself is computed.
 
 use super::bounds::PacketBounds;
-use super::hit_cache::{HitCache, UNCACHED};
+use super::hit_cache::UNCACHED;
 use super::leaf_mesh::{Leaf, LeafMesh, Outside};
+use super::packet_rays::PacketRays;
 use super::points::{
     CornerSource, POINTS, ProjectedMaxima, ProjectedOnDemand, ProjectedPoints, RelativePoints,
 };
 use super::ray_group::{RayGroup, RayLimits};
-use super::single_rays::{FEW_OF_GROUP, SingleRays};
-use crate::bvh::candidate::{Candidate, settle};
-use crate::intersect::filter::{self, Corners, FilteredTriangles};
+use super::single_rays::FEW_OF_GROUP;
+use crate::bvh::candidate::Candidate;
+use crate::intersect::edge_functions::{self, Corners, FilteredTriangles};
 use crate::intersect::prepare::{Axes, CommonAxis};
 use crate::query::Query;
-use crate::rays::Ray;
 use crate::simd::{LANES, Lanewise, Part, Simd, lanes_of_piece};
-use bth_format::layout::{NONE, WIDTH};
-use bth_format::object::ObjectView;
+use bth_format::layout::WIDTH;
 
 /// In place of a triangle's index in the hit cache: no ray has hit it certainly so far.
 const NOT_CACHED_YET: u8 = u8::MAX;
-
-/// The rays of a packet with their queries and decided hits.
-pub(crate) struct PacketRays<'a, Q: Query> {
-    pub(crate) object: &'a ObjectView<'a>,
-    pub(crate) rays: &'a [Ray],
-    pub(crate) goal: Q::Goal,
-    /// Queries of the rays whose bit is set in `queried`.
-    pub(crate) queries: &'a mut [Q],
-    /// A bit for each ray with a decision in f64.
-    pub(crate) queried: u64,
-    /// The rays as prepared single rays.
-    pub(crate) single_rays: &'a mut SingleRays,
-    pub(crate) hit_cache: &'a mut HitCache,
-    /// A bit for each ray whose query is not complete.
-    pub(crate) alive: u64,
-}
-
-/// The uncached pending hits of a group; see [`RayGroup::leaf`] and [`RayGroup::triangle`].
-struct UncachedHits {
-    leaf: [u32; LANES],
-    triangle: [u32; LANES],
-}
-
-impl UncachedHits {
-    #[inline(always)]
-    fn of<S: Simd>(s: S, group: &RayGroup<S>) -> Self {
-        let mut hits = UncachedHits { leaf: [0; LANES], triangle: [0; LANES] };
-        s.store_u(group.leaf, &mut hits.leaf);
-        s.store_u(group.triangle, &mut hits.triangle);
-        hits
-    }
-
-    /// The pending hit of a lane as a candidate; `pending` is the lane's [`RayGroup::pending`].
-    #[inline(always)]
-    fn candidate(&self, hit_cache: &HitCache, pending: u32, lane: usize) -> Candidate {
-        match pending {
-            NONE => Candidate::NONE,
-            UNCACHED => Candidate { leaf: self.leaf[lane], triangle: self.triangle[lane] },
-            cached => hit_cache.candidate(cached),
-        }
-    }
-}
 
 /// The rays of a group that may hit a triangle, a bit each.
 struct RayTest<S: Simd> {
@@ -82,7 +39,11 @@ struct RayTest<S: Simd> {
 /// Rays that certainly miss a triangle; `error` bounds the errors of its weights.
 #[inline(always)]
 fn missed<S: Lanewise>(s: S, [a, b, c]: &Corners<S>, error: S::F) -> S::M {
-    let weight = [filter::cross(s, *b, *c), filter::cross(s, *c, *a), filter::cross(s, *a, *b)];
+    let weight = [
+        edge_functions::cross(s, *b, *c),
+        edge_functions::cross(s, *c, *a),
+        edge_functions::cross(s, *a, *b),
+    ];
     let least = s.min(s.min(weight[0], weight[1]), weight[2]);
     let greatest = s.max(s.max(weight[0], weight[1]), weight[2]);
     s.and(s.lt(least, s.sub(s.splat(0.0), error)), s.lt(error, greatest))
@@ -92,10 +53,13 @@ impl<S: Lanewise> RayLimits<S> {
     /// Tests rays against a triangle, with the error bound of the triangle itself.
     #[inline(always)]
     fn test(&self, s: S, [a, b, c]: Corners<S>) -> FilteredTriangles<S> {
-        let norm = s.max(s.max(filter::l1_norm(s, a), filter::l1_norm(s, b)), filter::l1_norm(s, c));
+        let norm = s.max(
+            s.max(edge_functions::l1_norm(s, a), edge_functions::l1_norm(s, b)),
+            edge_functions::l1_norm(s, c),
+        );
         let depth = s.max_abs(s.max_abs(a[2], b[2]), c[2]);
-        let error = filter::error(s, norm, depth, s.splat(f32::MIN_POSITIVE));
-        let tested = filter::test_triangles(s, [a, b, c], error, self.first, self.limit);
+        let error = edge_functions::error(s, norm, depth, s.splat(f32::MIN_POSITIVE));
+        let tested = edge_functions::test_triangles(s, [a, b, c], error, self.first, self.limit);
         let in_range = s.and(s.le(self.certain[0], tested.nearest), s.le(tested.farthest, self.certain[1]));
         FilteredTriangles { certain: s.and(tested.certain, in_range), ..tested }
     }
@@ -244,7 +208,7 @@ impl<Q: Query> PacketRays<'_, Q> {
             debug_assert_eq!(group.common, Some(along), "see `Span::is_from_point`");
             let rows = along.order().map(|axis| relative.row(axis));
             let [size, depth] = spread;
-            let error = filter::error(s, s.splat(size + size), s.splat(depth), floor);
+            let error = edge_functions::error(s, s.splat(size + size), s.splat(depth), floor);
             let corners = ProjectedOnDemand { rows, projection: group.projection.relative(s) };
             return self.test_triangles::<S, H, B>(
                 s,
@@ -272,7 +236,7 @@ impl<Q: Query> PacketRays<'_, Q> {
             points.put(s, i, greatest.including(s, point));
         }
         let size = s.add(greatest.coordinate, greatest.coordinate);
-        let error = filter::error(s, size, greatest.depth, floor);
+        let error = edge_functions::error(s, size, greatest.depth, floor);
         self.test_triangles::<S, H, B>(s, group, at, &*points, error, leaf, cache_indices, triangles, active)
     }
 
@@ -347,65 +311,5 @@ impl<Q: Query> PacketRays<'_, Q> {
             }
         }
         nearer
-    }
-
-    /// Decides a candidate for the rays of lanes, and before it their pending hits.
-    #[inline(always)]
-    fn settle_lanes<S: Simd>(
-        &mut self,
-        s: S,
-        group: &mut RayGroup<S>,
-        at: usize,
-        candidate: Candidate,
-        mut lanes: u32,
-    ) {
-        let mut pending = [0; LANES];
-        s.store_u(group.pending, &mut pending);
-        let uncached = UncachedHits::of(s, group);
-        let (mut scale, mut limit, mut nearest) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-        s.store(group.scale, &mut scale);
-        s.store(group.limit, &mut limit);
-        s.store(group.nearest, &mut nearest);
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize % LANES;
-            lanes &= lanes - 1;
-            let ray = at * LANES + lane;
-            let pending_hit = uncached.candidate(self.hit_cache, pending[lane], lane);
-            if self.settle_one(ray, pending_hit, (candidate.leaf, 1 << candidate.triangle)) {
-                self.alive &= !(1 << ray);
-            } else if let Some(t) = self.queries[ray].found_bounds() {
-                let [near, far] = t.map(|t| t * f64::from(scale[lane]));
-                nearest[lane] = (near as f32).next_down();
-                limit[lane] = limit[lane].min((far as f32).next_up());
-            }
-            pending[lane] = NONE;
-        }
-        group.pending = s.load_u(&pending);
-        group.limit = s.load(&limit);
-        group.nearest = s.load(&nearest);
-    }
-
-    /// Decides the pending hits of the rays of lanes.
-    #[inline(always)]
-    pub(crate) fn settle_last<S: Simd>(&mut self, s: S, group: &RayGroup<S>, at: usize, mut lanes: u32) {
-        let mut pending = [0; LANES];
-        s.store_u(group.pending, &mut pending);
-        let uncached = UncachedHits::of(s, group);
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize % LANES;
-            lanes &= lanes - 1;
-            let pending_hit = uncached.candidate(self.hit_cache, pending[lane], lane);
-            self.settle_one(at * LANES + lane, pending_hit, (NONE, 0));
-        }
-    }
-
-    /// Offers candidates of a ray to its query; see [`settle`].
-    #[inline(always)]
-    fn settle_one(&mut self, ray: usize, pending: Candidate, of_leaf: (u32, u32)) -> bool {
-        if self.queried >> ray & 1 == 0 {
-            self.queries[ray] = Q::new(self.goal, &self.rays[ray]);
-            self.queried |= 1 << ray;
-        }
-        settle(self.object, &self.rays[ray], pending, of_leaf, &mut self.queries[ray])
     }
 }

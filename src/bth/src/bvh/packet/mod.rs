@@ -7,13 +7,17 @@
 //! the direction are computed once for each triangle ([`hit_cache`]).
 
 pub(crate) mod bounds;
+mod buffers;
+pub(crate) mod children;
 pub(crate) mod coherence;
 pub(crate) mod entry;
 pub(crate) mod frustum;
 pub(crate) mod hit_cache;
 pub(crate) mod leaf;
 pub(crate) mod leaf_mesh;
+mod packet_rays;
 pub(crate) mod points;
+pub(crate) mod prepare_group;
 pub(crate) mod projection;
 pub(crate) mod ray_group;
 pub(crate) mod runs;

@@ -8,14 +8,11 @@ use super::bounds::PacketBounds;
 use super::hit_cache::{CachedHits, UNCACHED};
 use super::leaf_mesh::Leaf;
 use super::projection::Projection;
-use crate::SMALL;
 use crate::intersect::exact_lanes::{Intersections, Pairs};
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::prepare::{self, Axes, CommonAxis, MixedAxes};
-use crate::rays::Ray;
-use crate::simd::{LANES, Lanewise, Part, Simd, lanes_of_piece};
+use crate::simd::{LANES, Lanewise, Part, Simd};
 use bth_format::layout::NONE;
-use bth_format::object::ObjectBounds;
 use std::marker::PhantomData;
 
 /// Sixteen rays and their hits so far. Fields whose names occur in [`prepare::PreparedLanes`] have the meaning documented there.
@@ -24,10 +21,10 @@ pub(crate) struct RayGroup<S: Simd> {
     pub(crate) origin: [S::F; 3],
     pub(crate) direction: [S::F; 3],
     pub(crate) reciprocal: [S::F; 3],
-    near_addend: [S::F; 3],
-    far_addend: [S::F; 3],
+    pub(super) near_addend: [S::F; 3],
+    pub(super) far_addend: [S::F; 3],
     /// For each axis the rays with a negative direction.
-    negative: [S::M; 3],
+    pub(super) negative: [S::M; 3],
     /// Depth of t = 1.
     pub(crate) scale: S::F,
     /// Least depth of hits in the ray's range.
@@ -108,14 +105,6 @@ fn pick3<S: Simd>(p: S::Piece, [x, y, z]: &[S::F; 3]) -> [<S::Piece as Lanewise>
     [S::pick(p, x), S::pick(p, y), S::pick(p, z)]
 }
 
-/// [`Simd::put`] of three vectors.
-#[inline(always)]
-fn put3<S: Simd>(p: S::Piece, to: &mut [S::F; 3], from: [<S::Piece as Lanewise>::F; 3]) {
-    for k in 0..3 {
-        S::put(p, &mut to[k], from[k]);
-    }
-}
-
 impl<S: Simd> RayGroup<S> {
     /// A group without rays.
     #[inline(always)]
@@ -172,91 +161,6 @@ impl<S: Simd> RayGroup<S> {
                 self.corner[c][k] = s.select(m, x, self.corner[c][k]);
             }
         }
-    }
-
-    /// Prepares the first sixteen of the rays; unused lanes repeat the last ray. Returns false if a ray cannot be prepared in f32.
-    #[inline(always)]
-    fn prepare<H: PacketBounds<S>>(
-        &mut self,
-        s: S,
-        bounds: &ObjectBounds,
-        rays: &[Ray],
-        keeps_lines: bool,
-    ) -> bool {
-        let mut field = match rays.first_chunk() {
-            Some(rays) => prepare::load_rays(s, rays),
-            None => {
-                let mut all = [rays[rays.len() - 1]; LANES];
-                all[..rays.len()].copy_from_slice(rays);
-                prepare::load_rays(s, &all)
-            }
-        };
-        self.mixed = MixedAxes::of(s, [field[4], field[5], field[6]]);
-        self.common = self.mixed.common(s);
-        // Only the needed fields are stored, because stores limit the speed of preparation.
-        if H::COMMON_ORIGIN {
-            for k in 0..3 {
-                field[k] = s.splat(rays[0].origin[k]);
-            }
-        }
-        let keeps_lines = keeps_lines && !H::MIXED_OCTANTS;
-        if keeps_lines && (SMALL || !H::COMMON_ORIGIN) {
-            self.origin = [field[0], field[1], field[2]];
-        }
-        if keeps_lines {
-            self.direction = [field[4], field[5], field[6]];
-        }
-        // Groups are kept from one batch to the next, so hits of an earlier batch are removed here.
-        self.nearest = s.splat(f32::INFINITY);
-        self.pending = s.splat_u(NONE);
-        // `set_prepared` is called in both branches: joining the results first would pass them through memory.
-        let mut ready = true;
-        for i in 0..S::PIECES {
-            let p = s.piece(i);
-            let field = prepare::pick_rays::<S>(p, &field);
-            let usable = match self.common {
-                Some(common) => self.set_prepared::<H>(p, prepare::prepare_lanes(p, bounds, field, &common)),
-                None => {
-                    let axes = self.mixed.pick(p);
-                    self.set_prepared::<H>(p, prepare::prepare_lanes(p, bounds, field, &axes))
-                }
-            };
-            ready &= usable == lanes_of_piece::<S>(i);
-        }
-        ready
-    }
-
-    /// Stores prepared rays of a piece; returns those that are usable, a bit each.
-    #[inline(always)]
-    fn set_prepared<H: PacketBounds<S>>(
-        &mut self,
-        p: S::Piece,
-        lanes: prepare::PreparedLanes<S::Piece>,
-    ) -> u32 {
-        put3::<S>(p, &mut self.reciprocal, lanes.reciprocal);
-        if !H::COMMON_ORIGIN {
-            S::put(p, &mut self.reach, lanes.reach);
-            for k in 0..3 {
-                S::put_mask(p, &mut self.negative[k], lanes.negative[k]);
-            }
-            put3::<S>(p, &mut self.near_addend, lanes.near_addend);
-            put3::<S>(p, &mut self.far_addend, lanes.far_addend);
-        }
-        S::put(p, &mut self.scale, lanes.scale);
-        S::put(p, &mut self.first, lanes.depths[0]);
-        S::put(p, &mut self.limit, lanes.depths[1]);
-        for k in 0..2 {
-            S::put(p, &mut self.certain[k], lanes.certain[k]);
-            S::put(p, &mut self.projection.shear[k], lanes.shear[k]);
-        }
-        S::put(p, &mut self.projection.forward, lanes.forward);
-        if !H::COMMON_ORIGIN {
-            for k in 0..2 {
-                S::put(p, &mut self.projection.origin[k], lanes.origin[k]);
-            }
-            S::put(p, &mut self.projection.start, lanes.start);
-        }
-        p.mask_bits(lanes.usable)
     }
 
     /// The prepared rays of a piece, for groups whose rays do not have the same origin.
@@ -380,36 +284,6 @@ impl<S: Simd> RayGroup<S> {
         let index = s.select_u(uncached, self.index, s.lookup_u(s.load_u(&hit_cache.index), self.pending));
         s.store_u(s.gather_u(s.mask(lanes), ids, index), &mut intersections.triangle);
         intersections.compute(s, lanes, &pairs);
-    }
-}
-
-/// [`RayGroup::prepare`] as a part of kernels.
-pub(crate) struct PrepareGroup<'a, S: Simd, H> {
-    group: &'a mut RayGroup<S>,
-    bounds: &'a ObjectBounds,
-    rays: &'a [Ray],
-    /// Whether origins and directions are needed later on.
-    keeps_lines: bool,
-    packet: PhantomData<H>,
-}
-
-impl<'a, S: Simd, H> PrepareGroup<'a, S, H> {
-    #[inline(always)]
-    pub(crate) fn of(
-        group: &'a mut RayGroup<S>,
-        bounds: &'a ObjectBounds,
-        rays: &'a [Ray],
-        keeps_lines: bool,
-    ) -> Self {
-        PrepareGroup { group, bounds, rays, keeps_lines, packet: PhantomData }
-    }
-}
-
-impl<S: Simd, H: PacketBounds<S>> Part<S> for PrepareGroup<'_, S, H> {
-    type Output = bool;
-    #[inline(always)]
-    fn run(self, s: S) -> bool {
-        self.group.prepare::<H>(s, self.bounds, self.rays, self.keeps_lines)
     }
 }
 

@@ -2,12 +2,13 @@
 //! part in each step.
 
 use super::bounds::PacketBounds;
+use super::buffers::{GroupStorage, PacketBuffers};
 use super::coherence::{PacketBackoff, Span, is_same_octant};
 use super::entry::{MIN_RAYS, PACKET};
 use super::frustum::{Frustum, FrustumOf};
-use super::ray_group::PrepareGroup;
+use super::prepare_group::PrepareGroup;
 use super::segment_box::SegmentBox;
-use super::traverse::{GroupStorage, PacketBuffers, PacketOutcome, PacketTracer};
+use super::traverse::{PacketOutcome, PacketTracer, TracePacket};
 use crate::SMALL;
 use crate::query::sink::Sink;
 use crate::query::{Goal, Query};
@@ -135,7 +136,8 @@ fn trace<S: Simd, Q: Query>(
                     prepare::<S, Q, SegmentBox<S>>(s, &bounds, &mut packets, rays, false)
                 };
                 let outcome = if ready {
-                    packets.trace(s, object, &SegmentBox::new(s, segments), rays, sink)
+                    let bounds = &SegmentBox::new(s, segments);
+                    TracePacket { packets: &mut packets, object, bounds, rays, sink }.inline_or_call(s)
                 } else {
                     PacketOutcome::Refused
                 };
@@ -251,7 +253,7 @@ fn frustum<S: Simd, Q: Query, const POINT: bool>(
     let groups = &packets.groups[..rays.len().div_ceil(LANES)];
     let frustum = FrustumOf::<S, POINT> { bounds, span, groups }.inline_or_call(s);
     packets.buffers.hit_cache.clear(s, POINT);
-    packets.trace(s, object, &frustum, rays, sink)
+    TracePacket { packets, object, bounds: &frustum, rays, sink }.inline_or_call(s)
 }
 
 /// Prepares the groups of a packet, with the lines of their rays where these are needed later on; false if a ray cannot be prepared in f32.

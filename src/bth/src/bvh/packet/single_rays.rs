@@ -142,7 +142,7 @@ impl SingleRays {
 mod tests {
     use super::*;
     use crate::bvh::packet::entry::PACKET;
-    use crate::bvh::packet::ray_group::PrepareGroup;
+    use crate::bvh::packet::prepare_group::PrepareGroup;
     use crate::bvh::packet::segment_box::SegmentBox;
     use crate::rays::Ray;
     use crate::simd::{Isa, Kernel};

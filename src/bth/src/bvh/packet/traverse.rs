@@ -6,70 +6,27 @@
 //! decided at once ([`crate::bvh::candidate`]).
 
 use super::bounds::PacketBounds;
+use super::buffers::PacketBuffers;
+use super::children::{Children, meeting};
 use super::entry::{GROUPS, PACKET, StackEntry};
 use super::frustum::Frustum;
-use super::hit_cache::{CachedHits, HitCache};
-use super::leaf::PacketRays;
+use super::hit_cache::CachedHits;
 use super::leaf_mesh::Leaf;
-use super::points::{ProjectedPoints, RelativePoints};
+use super::packet_rays::PacketRays;
 use super::ray_group::{IntersectGroup, RayGroup};
-use super::single_rays::{FEW_OF_PACKET, SingleRays};
+use super::single_rays::FEW_OF_PACKET;
 use crate::SMALL;
 use crate::bvh::nodes::{self, prefetch};
 use crate::bvh::ray_state::KEY_SLACK;
 use crate::intersect::exact_lanes::{Intersections, OriginTermsLanes};
+use crate::query::Query;
 use crate::query::sink::Sink;
-use crate::query::{Goal, Query};
 use crate::rays::Ray;
-use crate::simd::{LANES, Part, Simd, lanes_of_piece};
-use bth_format::layout::{Child, NONE, WIDTH, WideNode};
+use crate::simd::{LANES, Part, Simd};
+use bth_format::layout::{Child, NONE, WIDTH};
 use bth_format::limits::MAX_DEPTH;
 use bth_format::object::ObjectView;
-use std::any::Any;
 use std::marker::PhantomData;
-
-/// Memory of packets, kept from one batch to the next.
-#[derive(Debug)]
-pub(crate) struct PacketBuffers {
-    stack: Vec<StackEntry>,
-    points: ProjectedPoints,
-    relative: RelativePoints,
-    single_rays: SingleRays,
-    pub(crate) hit_cache: HitCache,
-    /// Terms of the cached triangles for the packet's origin.
-    origin_terms: OriginTermsLanes,
-    intersections: [Intersections; GROUPS],
-}
-
-impl Default for PacketBuffers {
-    fn default() -> Self {
-        PacketBuffers {
-            stack: Vec::new(),
-            points: ProjectedPoints::NONE,
-            relative: RelativePoints::NONE,
-            single_rays: SingleRays::NONE,
-            hit_cache: HitCache::NONE,
-            origin_terms: OriginTermsLanes::NONE,
-            intersections: [Intersections::NONE; GROUPS],
-        }
-    }
-}
-
-/// Groups for the instruction set that was used last. They are kept, because initializing them for every batch would take as long as
-/// tracing a few rays.
-#[derive(Debug, Default)]
-pub(crate) struct GroupStorage(Option<Box<dyn Any>>);
-
-impl GroupStorage {
-    /// The groups for an instruction set.
-    #[inline(always)]
-    pub(crate) fn of<S: Simd>(&mut self, s: S) -> &mut [RayGroup<S>; GROUPS] {
-        if !self.0.as_ref().is_some_and(|groups| groups.is::<[RayGroup<S>; GROUPS]>()) {
-            self.0 = Some(Box::new([RayGroup::vacant(s); GROUPS]));
-        }
-        self.0.as_mut().and_then(|groups| groups.downcast_mut()).expect("the groups have just been made")
-    }
-}
 
 /// The state of a packet: its prepared rays, their queries and its memory. One value serves all packets of a batch.
 pub(crate) struct PacketTracer<'a, S: Simd, Q> {
@@ -102,33 +59,25 @@ impl<'a, S: Simd, Q: Query> PacketTracer<'a, S, Q> {
         }
         PacketTracer { groups, queries: [query; PACKET], buffers }
     }
+}
 
-    /// Traces the rays for which the groups have been prepared, and stores the answers of those that hit something.
-    #[inline(always)]
-    pub(crate) fn trace<H: PacketBounds<S>>(
-        &mut self,
-        s: S,
-        object: &ObjectView<'_>,
-        bounds: &H,
-        rays: &[Ray],
-        sink: &mut Sink<'_, Q>,
-    ) -> PacketOutcome {
-        TracePacket { packets: self, object, bounds, rays, sink }.inline_or_call(s)
-    }
+/// Traces the rays for which the groups have been prepared, and stores the answers of those that hit something. It is a part of kernels,
+/// so that the variables of packets with one kind of bounds are not in the way of others.
+pub(super) struct TracePacket<'p, 'a, 's, S: Simd, Q: Query, H> {
+    pub(super) packets: &'p mut PacketTracer<'a, S, Q>,
+    pub(super) object: &'p ObjectView<'p>,
+    pub(super) bounds: &'p H,
+    pub(super) rays: &'p [Ray],
+    pub(super) sink: &'p mut Sink<'s, Q>,
+}
 
-    /// Implements [`Self::trace`].
-    ///
-    /// This is one kernel, longer than other functions: all steps share code, mask, limit and the top of the stack.
+impl<S: Simd, Q: Query, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, S, Q, H> {
+    type Output = PacketOutcome;
+    /// This is longer than other functions: all steps share code, mask, limit and the top of the stack.
     #[inline(always)]
-    fn steps<H: PacketBounds<S>>(
-        &mut self,
-        s: S,
-        object: &ObjectView<'_>,
-        bounds: &H,
-        rays: &[Ray],
-        sink: &mut Sink<'_, Q>,
-    ) -> PacketOutcome {
-        let PacketTracer { groups, queries, buffers } = self;
+    fn run(self, s: S) -> PacketOutcome {
+        let TracePacket { packets, object, bounds, rays, sink } = self;
+        let PacketTracer { groups, queries, buffers } = packets;
         let goal = sink.goal();
         let PacketBuffers { stack, points, relative, single_rays, hit_cache, origin_terms, intersections } =
             &mut **buffers;
@@ -215,130 +164,6 @@ impl<'a, S: Simd, Q: Query> PacketTracer<'a, S, Q> {
         let steps = u64::from(steps);
         PacketOutcome::Lanes((u64::from(used) * 100 / (steps * rays.rays.len() as u64)) as u32)
     }
-}
-
-/// [`PacketTracer::trace`] as a part of kernels, so that the variables of packets with one kind of bounds are not in the way of others.
-struct TracePacket<'p, 'a, 's, S: Simd, Q: Query, H> {
-    packets: &'p mut PacketTracer<'a, S, Q>,
-    object: &'p ObjectView<'p>,
-    bounds: &'p H,
-    rays: &'p [Ray],
-    sink: &'p mut Sink<'s, Q>,
-}
-
-impl<S: Simd, Q: Query, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, S, Q, H> {
-    type Output = PacketOutcome;
-    #[inline(always)]
-    fn run(self, s: S) -> PacketOutcome {
-        let TracePacket { packets, object, bounds, rays, sink } = self;
-        packets.steps(s, object, bounds, rays, sink)
-    }
-}
-
-/// Writes the stack entries of the children of a node that the bounds of the packet meet before the depth `limit`, the nearest last;
-/// returns their number. Where directions lie in different octants, each entry gets only the rays that may meet its box. The
-/// parameters are separate, because this is a part of the kernel [`PacketTracer::trace`].
-#[inline(always)]
-fn children<S: Simd, H: PacketBounds<S>, G: Goal>(
-    s: S,
-    (bounds, goal): (&H, G),
-    groups: &[RayGroup<S>],
-    rays: u64,
-    (parent, node): (u32, &WideNode),
-    limit: f32,
-    entries: &mut [StackEntry; WIDTH],
-) -> usize {
-    let slots = s.load_u(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
-    let (bits, keys) = bounds.children(s, node, limit);
-    let (mut slot, mut key) = ([0; LANES], [0.0; LANES]);
-    let count = if H::is_any(goal) {
-        s.compress(bits, slots, &mut slot)
-    } else {
-        s.compress_far_to_near(bits, keys, slots, &mut slot, &mut key)
-    };
-    let mut written = 0;
-    for i in 0..count {
-        let slot = slot[i];
-        let rays = if H::MIXED_OCTANTS { rays & meeting(s, bounds, groups, rays, node, slot) } else { rays };
-        entries[written % WIDTH] = StackEntry { rays, parent, slot, key: key[i] };
-        written += usize::from(rays != 0);
-    }
-    written
-}
-
-/// [`children`] as a part of kernels.
-struct Children<'a, S: Simd, H, G> {
-    bounds: &'a H,
-    groups: &'a [RayGroup<S>],
-    rays: u64,
-    node: (u32, &'a WideNode),
-    limit: f32,
-    entries: &'a mut [StackEntry; WIDTH],
-    goal: G,
-}
-
-impl<S: Simd, H: PacketBounds<S>, G: Goal> Part<S> for Children<'_, S, H, G> {
-    type Output = usize;
-    #[inline(always)]
-    fn run(self, s: S) -> usize {
-        let Children { bounds, groups, rays, node, limit, entries, goal } = self;
-        children::<S, H, G>(s, (bounds, goal), groups, rays, node, limit, entries)
-    }
-}
-
-/// [`meeting`] as a part of kernels: the corners of the child's box, the groups, and the rays that are tested.
-struct Meeting<'a, S: Simd, H>([[f32; 3]; 2], &'a [RayGroup<S>], u64, PhantomData<H>);
-
-impl<S: Simd, H: PacketBounds<S>> Part<S> for Meeting<'_, S, H> {
-    type Output = u64;
-    #[inline(always)]
-    fn run(self, s: S) -> u64 {
-        let Meeting(corners, groups, rays, _) = self;
-        let mut meets = 0;
-        for (g, group) in groups.iter().enumerate() {
-            for i in 0..S::PIECES {
-                if rays >> (g * LANES) & u64::from(lanes_of_piece::<S>(i)) != 0 {
-                    let bits = group.piece_may_enter::<H>(s.piece(i), corners);
-                    meets |= u64::from(bits) << (g * LANES);
-                }
-            }
-        }
-        meets
-    }
-}
-
-/// The rays that may meet the box of a child, a bit each. Only groups with a bit in `rays` are tested.
-#[inline(always)]
-fn meeting<S: Simd, H: PacketBounds<S>>(
-    s: S,
-    bounds: &H,
-    groups: &[RayGroup<S>],
-    rays: u64,
-    node: &WideNode,
-    slot: u32,
-) -> u64 {
-    rays_meeting::<S, H>(s, groups, rays, bounds.corners(node, slot as usize % WIDTH))
-}
-
-/// As [`meeting`], given the corners of the box ([`PacketBounds::corners`]).
-#[inline(always)]
-pub(crate) fn rays_meeting<S: Simd, H: PacketBounds<S>>(
-    s: S,
-    groups: &[RayGroup<S>],
-    rays: u64,
-    corners: [[f32; 3]; 2],
-) -> u64 {
-    if !S::INLINES_PARTS {
-        return s.call(Meeting(corners, groups, rays, PhantomData::<H>));
-    }
-    let mut meets = 0;
-    for (i, group) in groups.iter().enumerate() {
-        if rays >> (i * LANES) & 0xffff != 0 {
-            let bits = group.may_enter::<H>(s, corners);
-            meets |= u64::from(bits) << (i * LANES);
-        }
-    }
-    meets
 }
 
 /// Computes the pending hits, and stores the answers of all rays that hit something.

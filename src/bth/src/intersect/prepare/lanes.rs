@@ -3,7 +3,7 @@
 use super::axes::Axes;
 use super::{HitProgress, LARGEST, PreparedRay, ROUND_UP, SMALLEST};
 use crate::intersect::boxes;
-use crate::intersect::filter;
+use crate::intersect::edge_functions;
 use crate::rays::Ray;
 use crate::simd::{LANES, Lanewise, Simd};
 use bth_format::object::ObjectBounds;
@@ -167,7 +167,7 @@ impl<S: Lanewise> PreparedLanes<S> {
         rows[row!(filter.forward)] = self.forward;
         rows[row!(filter.start)] = self.start;
         [rows[row!(filter.first)], rows[row!(filter.last)]] = self.certain;
-        let slope = s.mul(self.reach, s.splat(filter::ERROR_SLOPE));
+        let slope = s.mul(self.reach, s.splat(edge_functions::ERROR_SLOPE));
         rows[row!(filter.error_slope)] = slope;
         rows[row!(filter.error_floor)] = s.fma(slope, slope, s.splat(f32::MIN_POSITIVE));
         let nothing: [u32; 3] = zerocopy::transmute!(HitProgress::NOTHING);

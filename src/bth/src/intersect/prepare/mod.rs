@@ -12,7 +12,8 @@ mod tests;
 pub(crate) use self::axes::{Axes, CommonAxis, MixedAxes};
 pub(crate) use self::lanes::{PreparedLanes, gather_rays, load_rays, pick_rays, prepare_lanes};
 use crate::intersect::boxes::{self, RaySlabs};
-use crate::intersect::filter::{self, TriangleFilter};
+use crate::intersect::edge_functions;
+use crate::intersect::filter::TriangleFilter;
 use crate::intersect::line::Line;
 use crate::rays::Ray;
 use crate::simd::{LANES, Lanewise, Part, Simd};
@@ -134,7 +135,7 @@ impl PreparedRay {
         let slack = depths.abs() * (4.0 / (1 << 24) as f32) + (greatest + 1.0) * f32::MIN_POSITIVE;
         let [first, last, certain_first, certain_last] =
             (depths + slack * Vec4::new(-1.0, 1.0, 1.0, -1.0)).to_array();
-        let [error_slope, error_floor] = filter::error_coefficients(reach);
+        let [error_slope, error_floor] = edge_functions::error_coefficients(reach);
         let row = |d: f32| f32::from_bits((d.to_bits() >> 31) * boxes::FAR);
         // Assembled as rows of four, so that whole vectors are stored.
         let slabs: [[f32; 4]; 4] = [

@@ -1,6 +1,7 @@
 //! Transposition of rows of a few words to vectors of sixteen lanes, and back.
 
 use super::Avx512;
+use super::transpose::transpose4;
 use crate::simd::{LANES, Lanewise};
 use std::arch::x86_64::*;
 
@@ -11,25 +12,6 @@ pub(super) fn concat_quarters(_simd: Avx512, [a, b, c, d]: [__m128; 4]) -> __m51
     unsafe {
         let four = _mm512_insertf32x4::<1>(_mm512_castps128_ps512(a), b);
         _mm512_insertf32x4::<3>(_mm512_insertf32x4::<2>(four, c), d)
-    }
-}
-
-/// Transposes four by four lanes within each quarter.
-///
-/// # Safety
-/// As [`super::sort::sort4`].
-#[inline(always)]
-pub(super) unsafe fn transpose4([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
-    // SAFETY: see `super::sort::sort4`.
-    unsafe {
-        let (a, b) = (_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
-        let (c, d) = (_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
-        [
-            _mm512_shuffle_ps::<0b01_00_01_00>(a, c),
-            _mm512_shuffle_ps::<0b11_10_11_10>(a, c),
-            _mm512_shuffle_ps::<0b01_00_01_00>(b, d),
-            _mm512_shuffle_ps::<0b11_10_11_10>(b, d),
-        ]
     }
 }
 

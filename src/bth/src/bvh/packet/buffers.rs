@@ -1,0 +1,53 @@
+//! Memory of packets, kept from one batch to the next.
+
+use super::entry::{GROUPS, StackEntry};
+use super::hit_cache::HitCache;
+use super::points::{ProjectedPoints, RelativePoints};
+use super::ray_group::RayGroup;
+use super::single_rays::SingleRays;
+use crate::intersect::exact_lanes::{Intersections, OriginTermsLanes};
+use crate::simd::Simd;
+use std::any::Any;
+
+/// Memory of packets, kept from one batch to the next.
+#[derive(Debug)]
+pub(crate) struct PacketBuffers {
+    pub(super) stack: Vec<StackEntry>,
+    pub(super) points: ProjectedPoints,
+    pub(super) relative: RelativePoints,
+    pub(super) single_rays: SingleRays,
+    pub(crate) hit_cache: HitCache,
+    /// Terms of the cached triangles for the packet's origin.
+    pub(super) origin_terms: OriginTermsLanes,
+    pub(super) intersections: [Intersections; GROUPS],
+}
+
+impl Default for PacketBuffers {
+    fn default() -> Self {
+        PacketBuffers {
+            stack: Vec::new(),
+            points: ProjectedPoints::NONE,
+            relative: RelativePoints::NONE,
+            single_rays: SingleRays::NONE,
+            hit_cache: HitCache::NONE,
+            origin_terms: OriginTermsLanes::NONE,
+            intersections: [Intersections::NONE; GROUPS],
+        }
+    }
+}
+
+/// Groups for the instruction set that was used last. They are kept, because initializing them for every batch would take as long as
+/// tracing a few rays.
+#[derive(Debug, Default)]
+pub(crate) struct GroupStorage(Option<Box<dyn Any>>);
+
+impl GroupStorage {
+    /// The groups for an instruction set.
+    #[inline(always)]
+    pub(crate) fn of<S: Simd>(&mut self, s: S) -> &mut [RayGroup<S>; GROUPS] {
+        if !self.0.as_ref().is_some_and(|groups| groups.is::<[RayGroup<S>; GROUPS]>()) {
+            self.0 = Some(Box::new([RayGroup::vacant(s); GROUPS]));
+        }
+        self.0.as_mut().and_then(|groups| groups.downcast_mut()).expect("the groups have just been made")
+    }
+}

@@ -1,0 +1,115 @@
+//! The rays of a packet with their queries, and the decisions in f64 about what the f32 tests of a packet leave open.
+
+use super::hit_cache::{HitCache, UNCACHED};
+use super::ray_group::RayGroup;
+use super::single_rays::SingleRays;
+use crate::bvh::candidate::{Candidate, settle};
+use crate::query::Query;
+use crate::rays::Ray;
+use crate::simd::{LANES, Simd};
+use bth_format::layout::NONE;
+use bth_format::object::ObjectView;
+
+/// The rays of a packet with their queries and decided hits.
+pub(crate) struct PacketRays<'a, Q: Query> {
+    pub(crate) object: &'a ObjectView<'a>,
+    pub(crate) rays: &'a [Ray],
+    pub(crate) goal: Q::Goal,
+    /// Queries of the rays whose bit is set in `queried`.
+    pub(crate) queries: &'a mut [Q],
+    /// A bit for each ray with a decision in f64.
+    pub(crate) queried: u64,
+    /// The rays as prepared single rays.
+    pub(crate) single_rays: &'a mut SingleRays,
+    pub(crate) hit_cache: &'a mut HitCache,
+    /// A bit for each ray whose query is not complete.
+    pub(crate) alive: u64,
+}
+
+/// The uncached pending hits of a group; see [`RayGroup::leaf`] and [`RayGroup::triangle`].
+struct UncachedHits {
+    leaf: [u32; LANES],
+    triangle: [u32; LANES],
+}
+
+impl UncachedHits {
+    #[inline(always)]
+    fn of<S: Simd>(s: S, group: &RayGroup<S>) -> Self {
+        let mut hits = UncachedHits { leaf: [0; LANES], triangle: [0; LANES] };
+        s.store_u(group.leaf, &mut hits.leaf);
+        s.store_u(group.triangle, &mut hits.triangle);
+        hits
+    }
+
+    /// The pending hit of a lane as a candidate; `pending` is the lane's [`RayGroup::pending`].
+    #[inline(always)]
+    fn candidate(&self, hit_cache: &HitCache, pending: u32, lane: usize) -> Candidate {
+        match pending {
+            NONE => Candidate::NONE,
+            UNCACHED => Candidate { leaf: self.leaf[lane], triangle: self.triangle[lane] },
+            cached => hit_cache.candidate(cached),
+        }
+    }
+}
+
+impl<Q: Query> PacketRays<'_, Q> {
+    /// Decides a candidate for the rays of lanes, and before it their pending hits.
+    #[inline(always)]
+    pub(super) fn settle_lanes<S: Simd>(
+        &mut self,
+        s: S,
+        group: &mut RayGroup<S>,
+        at: usize,
+        candidate: Candidate,
+        mut lanes: u32,
+    ) {
+        let mut pending = [0; LANES];
+        s.store_u(group.pending, &mut pending);
+        let uncached = UncachedHits::of(s, group);
+        let (mut scale, mut limit, mut nearest) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        s.store(group.scale, &mut scale);
+        s.store(group.limit, &mut limit);
+        s.store(group.nearest, &mut nearest);
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize % LANES;
+            lanes &= lanes - 1;
+            let ray = at * LANES + lane;
+            let pending_hit = uncached.candidate(self.hit_cache, pending[lane], lane);
+            if self.settle_one(ray, pending_hit, (candidate.leaf, 1 << candidate.triangle)) {
+                self.alive &= !(1 << ray);
+            } else if let Some(t) = self.queries[ray].found_bounds() {
+                let [near, far] = t.map(|t| t * f64::from(scale[lane]));
+                nearest[lane] = (near as f32).next_down();
+                limit[lane] = limit[lane].min((far as f32).next_up());
+            }
+            pending[lane] = NONE;
+        }
+        group.pending = s.load_u(&pending);
+        group.limit = s.load(&limit);
+        group.nearest = s.load(&nearest);
+    }
+
+    /// Decides the pending hits of the rays of lanes.
+    #[inline(always)]
+    pub(super) fn settle_last<S: Simd>(&mut self, s: S, group: &RayGroup<S>, at: usize, mut lanes: u32) {
+        let mut pending = [0; LANES];
+        s.store_u(group.pending, &mut pending);
+        let uncached = UncachedHits::of(s, group);
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize % LANES;
+            lanes &= lanes - 1;
+            let pending_hit = uncached.candidate(self.hit_cache, pending[lane], lane);
+            self.settle_one(at * LANES + lane, pending_hit, (NONE, 0));
+        }
+    }
+
+    /// Offers candidates of a ray to its query; see [`settle`].
+    #[inline(always)]
+    pub(super) fn settle_one(&mut self, ray: usize, pending: Candidate, of_leaf: (u32, u32)) -> bool {
+        if self.queried >> ray & 1 == 0 {
+            self.queries[ray] = Q::new(self.goal, &self.rays[ray]);
+            self.queried |= 1 << ray;
+        }
+        settle(self.object, &self.rays[ray], pending, of_leaf, &mut self.queries[ray])
+    }
+}

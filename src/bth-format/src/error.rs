@@ -18,7 +18,7 @@ pub(crate) type Text = &'static str;
 /// The section that an error is about. Specification: "Kinds".
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Section {
-    /// One of [`kind`](crate::layout::kind), or the kind of an unknown section.
+    /// One of [`kind`], or the kind of an unknown section.
     pub kind: u32,
     /// The object, or [`NONE`] for sections of the whole file.
     pub object: u32,

@@ -1,12 +1,14 @@
 //! What the fuzz targets share.
 
+pub mod write;
+
+use bth_import::error;
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth::{Hinted, Isa, Scene};
-use bth_compile::Silent;
 use bth_import::gltf::Chosen;
 use bth_import::gltf::scene::{self, ImportOptions};
 use bth_import::{
-    AlphaMode, GltfPart, Keep, Mesh, Timing, Wanted, import_bytes, import_cutouts_bytes,
+    AlphaMode, GltfPart, Keep, Mesh, Silent, Timing, Wanted, import_bytes, import_cutouts_bytes,
     import_gltf_parts_bytes, import_sequence_bytes, import_vertex_cache_bytes, read_vertex_cache,
 };
 use bth_random::Rng;

@@ -1,7 +1,7 @@
 //! A file that opens is written again section by section: reading that and writing once more gives equal bytes,
 //! and each section is what it was.
 #![no_main]
-use bth_compile::write::FileBuilder;
+use bth_fuzz::write::FileBuilder;
 
 fn write(file: &bth_format::File) -> Vec<u8> {
     let mut builder = FileBuilder::new();

@@ -2,6 +2,7 @@
 
 use bth_random::Rng;
 use serde_json::json;
+use std::sync::LazyLock;
 
 /// Columns and rows of the texture.
 pub const TEXELS: u32 = 96;
@@ -10,15 +11,18 @@ pub const TEXELS: u32 = 96;
 pub const CUTOFF: f64 = 0.4;
 
 /// Alpha of the texture: a leaf that points along v, with notches and a soft edge.
-pub fn alpha() -> Vec<u8> {
-    let texel = |k: u32| {
-        let at = |i: u32| (f64::from(i) + 0.5) / f64::from(TEXELS);
-        let (x, y) = (at(k % TEXELS) - 0.5, at(k / TEXELS));
-        let outline = 0.46 * (std::f64::consts::PI * y.powf(0.75)).sin() * (0.85 + 0.15 * (50.0 * y).sin());
-        let stem = if y > 0.8 { 0.025 } else { 0.0 };
-        ((outline.max(stem) - x.abs()) * 20.0 * 255.0 + 128.0).clamp(0.0, 255.0) as u8
-    };
-    (0..TEXELS * TEXELS).map(texel).collect()
+pub fn alpha() -> &'static [u8] {
+    static TEXTURE: LazyLock<Vec<u8>> = LazyLock::new(|| (0..TEXELS * TEXELS).map(texel).collect());
+    &TEXTURE
+}
+
+/// A texel of the texture, row by row.
+fn texel(k: u32) -> u8 {
+    let at = |i: u32| (f64::from(i) + 0.5) / f64::from(TEXELS);
+    let (x, y) = (at(k % TEXELS) - 0.5, at(k / TEXELS));
+    let outline = 0.46 * (std::f64::consts::PI * y.powf(0.75)).sin() * (0.85 + 0.15 * (50.0 * y).sin());
+    let stem = if y > 0.8 { 0.025 } else { 0.0 };
+    ((outline.max(stem) - x.abs()) * 20.0 * 255.0 + 128.0).clamp(0.0, 255.0) as u8
 }
 
 /// A tree with this number of leaves.
@@ -102,7 +106,7 @@ fn image() -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, TEXELS, TEXELS);
     encoder.set_color(png::ColorType::GrayscaleAlpha);
-    let data: Vec<u8> = alpha().into_iter().flat_map(|a| [90, a]).collect();
+    let data: Vec<u8> = alpha().iter().flat_map(|a| [90, *a]).collect();
     let mut writer = encoder.write_header().expect("a header in memory");
     writer.write_image_data(&data).expect("an image in memory");
     drop(writer);

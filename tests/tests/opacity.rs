@@ -112,7 +112,7 @@ fn judged(scene: &Scene, all: &[Hit], flat: bool) -> Vec<Hit> {
     let keep = |hit: &&Hit| {
         let mirrored = flat && hit.primitive.triangle as usize >= 2 * LEAVES + 2;
         let state = scene.opacity(hit);
-        match alpha(&texture, hit, mirrored) {
+        match alpha(texture, hit, mirrored) {
             None => assert_eq!(state, Opacity::Opaque),
             Some(alpha) => match state {
                 Opacity::Opaque => assert!(alpha >= leaves::CUTOFF, "{hit:?}: {alpha}"),

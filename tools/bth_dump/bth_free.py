@@ -69,19 +69,25 @@ def _minus(p, q):
 
 
 def _dot(p, q):
-    return sum(x * y for x, y in zip(p, q))
+    return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 
 
 def _cross(p, q):
     return [p[(k + 1) % 3] * q[(k + 2) % 3] - p[(k + 2) % 3] * q[(k + 1) % 3] for k in range(3)]
 
 
-def axes(corners):
-    """The axes of a triangle, exactly; None if it has none."""
-    a, b, last = ([Fraction(x) for x in p] for p in corners)
+def in_integers(points):
+    """Points times a power of two, so that all coordinates are integers; and that power."""
+    scale = max((x.as_integer_ratio()[1] for p in points for x in p), default=1)
+    return [[int(x * scale) for x in p] for p in points], scale
+
+
+def axes(corners, scale):
+    """The axes of a triangle with integer corners, exactly but for their lengths; None if it has none."""
+    a, b, last = corners
     first, second = _minus(b, a), _minus(last, a)
     normal, edges = _cross(first, second), [_dot(e, e) for e in (first, second)]
-    if not all(Fraction(1, 1 << 40) <= e <= 1 << 40 for e in edges):
+    if not all(scale**2 <= e << 40 and e <= scale**2 << 40 for e in edges):
         return None
     if _dot(normal, normal) * (1 << 14) < edges[0] * edges[1]:
         return None
@@ -89,17 +95,18 @@ def axes(corners):
 
 
 def bin_of(axes_, direction):
-    """The bin of a direction and whether it points to the back; None if it is too steep."""
+    """The bin of a direction of integers and whether it points to the back; None if it is too steep."""
     x, y, z = (_dot(direction, axis) for axis in axes_)
     if z == 0:
         return None
-    height = z * z / _dot(axes_[2], axes_[2])
+    # The square of a slope is (part^2 / axis^2) / (z^2 / normal^2).
+    normal = _dot(axes_[2], axes_[2])
     columns = []
     for part, axis in ((x, axes_[0]), (y, axes_[1])):
-        square = part * part / _dot(axis, axis) / height
-        if square > STEEPEST:
+        over, under = part * part * normal, _dot(axis, axis) * z * z
+        if over > STEEPEST * under:
             return None
-        beyond = sum(square > border for border in BORDERS)
+        beyond = sum(over * border.denominator > border.numerator * under for border in BORDERS)
         columns.append(SIDE // 2 - beyond if part < 0 else SIDE // 2 + beyond)
     return SIDE * columns[1] + columns[0], z < 0
 
@@ -133,20 +140,24 @@ def check_met(view, corners, side):
     """
     if not view.free:
         return
+    points, scale = in_integers([p for triangle in corners.values() for p in triangle])
+    integers = {triangle: points[3 * k : 3 * k + 3] for k, triangle in enumerate(corners)}
     starts = {}
     for triangle, row in enumerate(view.free):
         if row[0] != NONE:
-            starts[triangle] = axes(corners[triangle])
+            starts[triangle] = axes(integers[triangle], scale)
             if starts[triangle] is None:
                 raise view.invalid("F210", f"{corners[triangle]}", c.FREE_DIRECTIONS, ROW * triangle)
-    reach = Fraction(view.free_reach[0][0])
+    # Of three times a direction of integers.
+    reach = 3 * scale * Fraction(view.free_reach[0][0])
     for start in range(0, len(view.free), max(1, -(-len(view.free) // STARTS))):
         if start not in starts:
             continue
-        quick = [[float(x) for x in axis] for axis in starts[start]]
-        known = starts[start], quick, bits(view.free[start]), reach
+        quick = [[x / scale**power for x in axis] for axis, power in zip(starts[start], (1, 3, 2))]
+        known = starts[start], quick, bits(view.free[start]), reach * reach
+        origins = list(zip(corners[start], integers[start]))
         for other, target in corners.items():
-            if other != start and any(_is_met(known, p, target, side) for p in corners[start]):
+            if other != start and any(_is_met(known, p, (target, integers[other]), side) for p in origins):
                 raise view.invalid("F209", f"triangle {start} meets {other}", c.FREE_DIRECTIONS, ROW * start)
 
 
@@ -156,18 +167,21 @@ def _is_free(found, free):
 
 
 def _is_met(known, origin, target, side):
-    """Whether the ray from a point through the middle of a triangle meets it in a direction that is called free."""
-    axes_, quick, free, reach = known
-    near = [sum(p[k] for p in target) / 3 - origin[k] for k in range(3)]
+    """Whether the ray from a point through the middle of a triangle meets it in a direction that is called free.
+
+    Point and triangle are given as they are and in integers.
+    """
+    axes_, quick, free, reach_squared = known
+    (start, exact_start), (corners, (a, b, last)) = origin, target
+    near = [(corners[0][k] + corners[1][k] + corners[2][k]) / 3 - start[k] for k in range(3)]
     found = quick_bin(quick, near)
     if found is None or found is not ... and not _is_free(found, free):
         return False
-    middle = [sum(Fraction(p[k]) for p in target) / 3 for k in range(3)]
-    direction = [m - Fraction(x) for m, x in zip(middle, origin)]
+    direction = [a[k] + b[k] + last[k] - 3 * exact_start[k] for k in range(3)]
     found = bin_of(axes_, direction) if any(direction) else None
     if found is None or not _is_free(found, free):
         return False
-    if free & NEARBY and _dot(direction, direction) > reach * reach:
+    if free & NEARBY and _dot(direction, direction) > reach_squared:
         return False
     # The middle is met, unless the ray lies in the plane.
-    return side(*target, origin) != 0
+    return side(*corners, start) != 0

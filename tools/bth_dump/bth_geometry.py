@@ -1,4 +1,4 @@
-"""Geometry (format-spec/README.md, "Verifying"): F201 to F210, with exact rational arithmetic."""
+"""Geometry (format-spec/README.md, "Verifying"): F201 to F210, with exact arithmetic."""
 
 import struct
 from fractions import Fraction
@@ -19,11 +19,9 @@ def bits(points):
 
 def side(a, b, c_, d):
     """Sign of the volume: 1 where d lies on the side of the triangle that (b-a)x(c-a) points to."""
-    a, b, c_, d = ([Fraction(x) for x in p] for p in (a, b, c_, d))
+    (a, b, c_, d), _ = bth_free.in_integers((a, b, c_, d))
     u, v, w = ([p[k] - a[k] for k in range(3)] for p in (b, c_, d))
-    volume = sum(
-        (u[i] * v[j] - u[j] * v[i]) * w[k] for i, j, k in ((1, 2, 0), (2, 0, 1), (0, 1, 2))
-    )
+    volume = sum((u[i] * v[j] - u[j] * v[i]) * w[k] for i, j, k in ((1, 2, 0), (2, 0, 1), (0, 1, 2)))
     return (volume > 0) - (volume < 0)
 
 

@@ -7,6 +7,7 @@ mod data;
 mod gltf;
 mod groups;
 mod materials;
+mod memory;
 mod obj;
 mod off;
 mod ply;

@@ -8,6 +8,7 @@ the default scene are null. All animations play together; of two that move the s
 from the glTF 2.0 specification alone (§3.11 and appendix C). Needs nothing but Python 3.9.
 """
 
+import bisect
 import json
 import math
 import struct
@@ -71,7 +72,7 @@ def sample(times, values, interpolation, path, time):
         return value(0)
     if time >= times[-1]:
         return value(len(times) - 1)
-    k = max(i for i, t in enumerate(times) if t <= time)
+    k = bisect.bisect_right(times, time) - 1
     if interpolation == "STEP":
         return value(k)
     d = times[k + 1] - times[k]
@@ -102,7 +103,8 @@ def local(node, moved):
 
 
 def times_matrix(a, b):
-    return [[sum(a[i][k] * b[k][j] for k in range(4)) for j in range(4)] for i in range(4)]
+    columns = list(zip(*b))
+    return [[p * c[0] + q * c[1] + r * c[2] + s * c[3] for c in columns] for p, q, r, s in a]
 
 
 def main():
@@ -136,7 +138,7 @@ def main():
             world[index] = matrix[:3]
             stack.extend((child, matrix) for child in nodes[index].get("children", []))
         answer[text] = world
-    json.dump(answer, sys.stdout)
+    sys.stdout.write(json.dumps(answer))
 
 
 if __name__ == "__main__":

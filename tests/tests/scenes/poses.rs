@@ -29,9 +29,9 @@ fn world_matrices_are_those_of_an_independent_reader() {
         let (mut moved, mut first) = (false, Vec::new());
         for time in &times {
             scene.set_seconds(*time).unwrap();
-            let mut all = Vec::new();
+            let (mut all, said) = (Vec::new(), &said[time.to_string()]);
             for (node, row) in report.node_rows.iter().enumerate() {
-                let expected = &said[time.to_string()][node];
+                let expected = &said[node];
                 let Some(row) = row else {
                     assert!(expected.is_null(), "{}: node {node} is not in the scene", path.display());
                     continue;
@@ -40,8 +40,8 @@ fn world_matrices_are_those_of_an_independent_reader() {
                 let expected: Vec<f64> = (0..12).map(|i| expected[i / 4][i % 4].as_f64().unwrap()).collect();
                 let size = expected.iter().fold(0.0f64, |m, x| m.max(x.abs()));
                 for (a, b) in found.as_flattened().iter().zip(&expected) {
-                    let place = format!("{} node {node} at {time}", path.display());
-                    assert!((a - b).abs() <= 1e-6 * size, "{place}: {found:?}, {expected:?}");
+                    let place = || format!("{} node {node} at {time}", path.display());
+                    assert!((a - b).abs() <= 1e-6 * size, "{}: {found:?}, {expected:?}", place());
                 }
                 all.push(found);
                 compared += 1;

@@ -6,7 +6,6 @@ use crate::query::Steps;
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::scene::Scene;
 use bth_format::layout::NONE;
-use bth_format::object::ObjectView;
 
 impl Scene {
     /// Nearest hit of a ray in world space.
@@ -63,28 +62,27 @@ impl Scene {
     /// Not inlined: every crate that traces single rays would hold kernels of its own.
     #[inline(never)]
     pub(crate) fn nearest_of_ray(&self, ray: &Ray, from: PrimitiveRef, hit: &mut Hit) {
-        match self.opaque_model() {
-            Some(object) => object::trace_nearest(object, ray, hint(from, 0), 0, hit),
-            None => self.nearest_hits_of(std::slice::from_ref(ray), Some(&[from]), std::slice::from_mut(hit)),
+        match self.sole() {
+            Some((object, instance)) if !self.has_opacity() => {
+                object::trace_nearest(object, ray, hint(from, instance), instance, hit);
+            }
+            _ => self.nearest_hits_of(std::slice::from_ref(ray), Some(&[from]), std::slice::from_mut(hit)),
         }
     }
 
     /// Whether a ray hits anything; `from` as for [`Self::nearest_of_ray`].
     #[inline(never)]
     pub(crate) fn any_of_ray(&self, ray: &Ray, from: PrimitiveRef) -> bool {
-        if let Some(object) = self.opaque_model() {
-            return object::trace_any(object, ray, hint(from, 0));
+        match self.sole() {
+            Some((object, instance)) if !self.has_opacity() => {
+                object::trace_any(object, ray, hint(from, instance))
+            }
+            _ => {
+                let mut found = [false];
+                self.any_hits_of(std::slice::from_ref(ray), Some(&[from]), &mut found);
+                found[0]
+            }
         }
-        let mut found = [false];
-        self.any_hits_of(std::slice::from_ref(ray), Some(&[from]), &mut found);
-        found[0]
-    }
-
-    /// The object of a scene that is a model: a file of one opaque object without scene sections. A single ray in it needs no more
-    /// than this test.
-    #[inline(always)]
-    fn opaque_model(&self) -> Option<&ObjectView<'_>> {
-        if self.world().is_some() || self.has_opacity() { None } else { self.objects().sole_view() }
     }
 
     /// Stores the nearest hit of each ray, or [`Hit::MISS`]. `hits`, and `from` if it is given, are as long as `rays`.

@@ -221,6 +221,16 @@ impl Scene {
     /// are then traced directly in the object, without the top level.
     #[inline(always)]
     pub(crate) fn sole(&self) -> Option<(&ObjectView<'_>, u32)> {
+        // For a single ray in a model every instruction on the way to its kernel counts.
+        match (&self.world, self.objects.sole_view()) {
+            (None, Some(object)) => Some((object, 0)),
+            _ => self.sole_elsewhere(),
+        }
+    }
+
+    /// As [`Self::sole`], where instances are placed, an object has new positions, or nothing was traced before.
+    #[inline(never)]
+    fn sole_elsewhere(&self) -> Option<(&ObjectView<'_>, u32)> {
         let Some(world) = &self.world else {
             return (self.object_count() == 1).then(|| (self.view(0), 0));
         };

@@ -2,9 +2,10 @@
 
 pub mod write;
 
-use bth_import::error;
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth::{Hinted, Isa, Scene};
+// Sources of `bth-compile` in `write` name it as their crate's.
+use bth_import::error;
 use bth_import::gltf::Chosen;
 use bth_import::gltf::scene::{self, ImportOptions};
 use bth_import::{

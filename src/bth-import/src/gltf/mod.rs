@@ -1,8 +1,7 @@
 //! glTF and GLB, in the order of the data: `container` splits a GLB, `document` reads its JSON into `schema`, `buffer`
 //! gives the bytes of views (`meshopt` decompresses them), `accessor` their rows, `primitive` triangles (`draco`
-//! decompresses them, `texture` chooses texture coordinates), `rigid_parts` what of them a joint moves alone, `placed_mesh` which meshes there are and
-//! where, and `flatten` a model. `cutout` reads which materials make
-//! holes. [`scene`] makes a manifest instead.
+//! decompresses them, `texture` chooses texture coordinates), `rigid_parts` what of them a joint moves alone, `placed_mesh` which
+//! meshes there are and where, and `flatten` a model. `cutout` reads which materials make holes. [`scene`] makes a manifest instead.
 
 pub(crate) mod accessor;
 pub(crate) mod buffer;

@@ -4,7 +4,8 @@
 use super::hints::Hinted;
 use super::scratch::Scratch;
 use super::single;
-use super::strategy::{HintUse, MIN_MEASURED_RAYS, QueryKind, Strategy, is_short};
+use super::strategy::{HintUse, MIN_MEASURED_RAYS, QueryKind, Strategy, size_of};
+use super::walked_batch::{RAYS_PER_PART, has_subtrees, may_gain_by_walk, sole_tet_leaf, walk};
 use crate::SMALL;
 use crate::bvh::interleaved::{Interleaved, RemainingRays};
 use crate::bvh::packet::{self, Packets};
@@ -12,26 +13,15 @@ use crate::bvh::single::TetOutcome;
 use crate::clock;
 use crate::intersect::exact_lanes::Intersections;
 use crate::query::sink::Sink;
-use crate::query::{Answer, AnswerLanes, Goal, Nearest, Query, Uncounted};
+use crate::query::{Answer, AnswerLanes, EitherGoal, Goal, Nearest, Query, Uncounted};
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
-use crate::tets::batch::{WalkBatch, WalkRays, WalkState};
-use crate::tets::records::LaneRecords;
-use crate::tets::{enter_tets, leaf_of_face};
-use bth_format::layout::{Child, NONE};
+use crate::tets::enter_tets;
+use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 
 /// Least number of rays of a batch; fewer rays are traced one after the other.
 pub(crate) const MIN_BATCH: usize = 4;
-/// Greatest number of rays that walk through tetrahedra together. It is large, because lanes are idle at the end of each part.
-const RAYS_PER_PART: usize = 2048;
-
-/// The longest side of the object's box.
-#[inline]
-pub(super) fn size_of(object: &ObjectView<'_>) -> f32 {
-    let header = object.header;
-    (0..3).fold(0f32, |size, k| size.max(header.upper[k] - header.lower[k]))
-}
 
 /// What measurements of an object are stored under.
 pub(super) fn address_of(object: &ObjectView<'_>) -> usize {
@@ -151,19 +141,6 @@ fn trace_with<Q: Query>(
     }
 }
 
-/// Whether the triangles of tet leaves are also in a BVH.
-fn has_subtrees(object: &ObjectView<'_>) -> bool {
-    object.tet_leaves.first().is_some_and(|leaf| leaf.subtree != NONE)
-}
-
-/// Index of the tet leaf that is the whole object, if its triangles are not also in a BVH; else `NONE`.
-fn sole_tet_leaf(object: &ObjectView<'_>) -> u32 {
-    match Child::from_code(object.header.root) {
-        Some(Child::Tets(leaf)) if object.tet_leaves[leaf as usize].subtree == NONE => leaf,
-        _ => NONE,
-    }
-}
-
 /// Traces at most [`RAYS_PER_PART`] rays, some of which start on known triangles, or all of which enter the same tet leaf.
 fn trace_hinted<Q: Query>(
     object: &ObjectView<'_>,
@@ -174,76 +151,21 @@ fn trace_hinted<Q: Query>(
 ) {
     // For coherent rays packets are the fastest, with hints or without.
     let packet_rays = in_packets(object, rays, scratch, sink);
-    let mut faces = vec![NONE; rays.len()];
-    let face_of = |ray: usize| {
-        let triangle = from.map_or(NONE, |from| from[ray]);
-        object.triangle_faces.get(triangle as usize).copied().unwrap_or(NONE)
-    };
-    let mut order: Vec<u32> = match packet_rays {
+    let order: Vec<u32> = match packet_rays {
         0 => (0..rays.len() as u32).collect(),
         _ => scratch.packets.rest.clone(),
     };
-    for &ray in &order {
-        if may_gain_by_walk(object, &rays[ray as usize], sink.goal()) {
-            faces[ray as usize] = face_of(ray as usize);
-        }
-    }
-    let mut queries: Vec<Q> = rays.iter().map(|ray| Q::new(sink.goal(), ray)).collect();
-    let mut walks = vec![WalkState::NotWalked; rays.len()];
-    walk_tets(object, rays, &faces, &mut queries, &mut walks);
-    let is_whole_object = matches!(Child::from_code(object.header.root), Some(Child::Tets(_)));
-    let mut walked = vec![NONE; rays.len()];
-    order.retain(|&ray| {
+    let goal = sink.goal();
+    let walks = walk(object, rays, from, order, EitherGoal { is_any: goal.is_any() });
+    for ray in walks.done {
         let ray = ray as usize;
-        let done = walks[ray] == WalkState::Done || walks[ray] == WalkState::Left && is_whole_object;
-        if done {
-            sink.query(ray, &queries[ray]);
-        } else if walks[ray] == WalkState::Left {
-            walked[ray] = leaf_of_face(object, faces[ray]);
-        }
-        !done
-    });
-    if !order.is_empty() {
-        let remaining = RemainingRays { order: Some(&order), queries: Some(&queries), walked: Some(&walked) };
+        sink.query(ray, &Q::from_either(goal, &walks.queries[ray]));
+    }
+    if !walks.rest.is_empty() {
+        let queries: Vec<_> = walks.queries.iter().map(|query| Q::from_either(goal, query)).collect();
+        let (order, walked) = (Some(&walks.rest[..]), Some(&walks.walked[..]));
+        let remaining = RemainingRays { order, queries: Some(&queries), walked };
         through_bvh(object, rays, remaining, scratch, sink);
-    }
-}
-
-/// Whether a ray that starts on a known triangle may be faster through tetrahedra than through the BVH, if there is one.
-///
-/// By measurement (docs/notes/tets.md), long any-hit rays and all rays in scalar code are not, and with 128 bits no walk is compiled;
-/// for other rays [`super::strategy`] chooses by measured time. No answer depends on this.
-fn may_gain_by_walk(object: &ObjectView<'_>, ray: &Ray, goal: impl Goal) -> bool {
-    if !has_subtrees(object) {
-        return true;
-    }
-    if !Isa::chosen().walks_tets() {
-        return false;
-    }
-    if !goal.is_any() {
-        return true;
-    }
-    is_short(ray, size_of(object))
-}
-
-/// Walks the rays through tetrahedra: those that have a face in `faces`, or all if a tet leaf is the whole object. `walks`
-/// receives the state of each ray's walk. All slices have one element per ray.
-fn walk_tets<Q: Query>(
-    object: &ObjectView<'_>,
-    rays: &[Ray],
-    faces: &[u32],
-    queries: &mut [Q],
-    walks: &mut [WalkState],
-) {
-    let sole_leaf = sole_tet_leaf(object);
-    let has_walks = sole_leaf != NONE || faces.iter().any(|&face| face != NONE);
-    let records = LaneRecords::new(object.records).filter(|_| has_walks && WalkBatch::<Q>::fits(object));
-    if let Some(records) = records {
-        let leaves = vec![sole_leaf; rays.len()];
-        let mut batch =
-            WalkBatch::new(object, records, WalkRays { rays, faces, leaves: &leaves }, queries, walks);
-        // Where no walks are compiled, no ray is walked here, and `walks` stays `NotWalked`: rays are faster through the BVH.
-        let _ = Isa::chosen().run_wide(&mut batch);
     }
 }
 

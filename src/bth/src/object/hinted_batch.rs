@@ -1,9 +1,9 @@
 //! Tracing of one object by batches of rays that may start on known triangles: what the hints are used for, and what is traced then.
 
-use super::batch::{address_of, by_hint, size_of, through_bvh, trace_batch};
+use super::batch::{address_of, by_hint, through_bvh, trace_batch};
 use super::hints::Hinted;
 use super::scratch::Scratch;
-use super::strategy::{HintUse, QueryKind, Strategy};
+use super::strategy::{HintUse, QueryKind, Strategy, size_of};
 use crate::SMALL;
 use crate::bvh::interleaved::RemainingRays;
 use crate::free;

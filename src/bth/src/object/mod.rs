@@ -6,6 +6,7 @@ pub(crate) mod hints;
 mod scratch;
 pub(crate) mod single;
 mod strategy;
+mod walked_batch;
 
 pub(crate) use batch::{MIN_BATCH, by_hint, fill_misses, trace_batch};
 pub(crate) use hinted_batch::{any_batch, nearest_batch};

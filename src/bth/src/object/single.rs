@@ -86,7 +86,10 @@ fn from_tets<Q: Query, C: Count>(
     query: &mut Q,
     count: &mut C,
 ) -> (bool, u32) {
-    match start_in_tets(object, ray, from, query, count) {
+    let mut either = query.to_either();
+    let start = start_in_tets(object, ray, from, &mut either, count);
+    *query = Q::from_either(query.goal(), &either);
+    match start {
         TetStart::Done => (true, NONE),
         TetStart::Walked(leaf) => {
             let root = object.header.root;

@@ -6,6 +6,7 @@
 //! that grow while it remains the slower one; in the long run it gets one batch in 256.
 
 use crate::rays::Ray;
+use bth_format::object::ObjectView;
 
 /// How rays that start on known triangles are traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,6 +43,13 @@ impl QueryKind {
     pub(crate) fn of(any: bool, rays: &[Ray], size: f32) -> QueryKind {
         QueryKind { any, short: rays.get(rays.len() / 2).is_some_and(|ray| is_short(ray, size)) }
     }
+}
+
+/// The longest side of the object's box.
+#[inline]
+pub(super) fn size_of(object: &ObjectView<'_>) -> f32 {
+    let header = object.header;
+    (0..3).fold(0f32, |size, k| size.max(header.upper[k] - header.lower[k]))
 }
 
 /// Whether a ray is short for something of the given size.

@@ -72,14 +72,16 @@ impl Answers for &mut [bool] {
 }
 
 /// Answers of either goal.
-#[cfg(any(test, feature = "small"))]
+#[cfg_attr(
+    not(any(test, feature = "small")),
+    expect(dead_code, reason = "only queries have either goal there")
+)]
 pub(crate) enum EitherAnswers<'a> {
     Nearest(&'a mut [Hit]),
     /// Whether rays hit anything. Of the answers that are stored here nothing else is kept.
     Any(&'a mut [bool]),
 }
 
-#[cfg(any(test, feature = "small"))]
 impl EitherAnswers<'_> {
     #[inline(always)]
     pub(crate) fn reborrow(&mut self) -> EitherAnswers<'_> {
@@ -90,7 +92,6 @@ impl EitherAnswers<'_> {
     }
 }
 
-#[cfg(any(test, feature = "small"))]
 impl Answers for EitherAnswers<'_> {
     type Goal = super::goal::EitherGoal;
     type Answer = Hit;

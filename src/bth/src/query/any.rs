@@ -1,10 +1,11 @@
 //! Queries for any hit, with a type of their own.
 
-use super::goal::AnyHit;
-use super::{AnswerLanes, Query, TriangleRef, in_range, may_be_in_range, widened};
+use super::goal::{AnyHit, EitherGoal};
+use super::{AnswerLanes, EitherQuery, Query, TriangleRef, in_range, may_be_in_range, widened};
 use crate::intersect::exact::Intersection;
 use crate::rays::{PrimitiveRef, Ray};
 use crate::simd::{LANES, Simd};
+use bth_format::layout::NONE;
 
 /// Query for any hit: it is complete at the first intersection in the ray's range.
 #[derive(Clone, Copy, Debug)]
@@ -35,14 +36,19 @@ impl Query for Any {
     fn new(_goal: AnyHit, ray: &Ray) -> Self {
         Any { tmin: ray.tmin, tmax: ray.tmax, found: false }
     }
-    const KEEPS_DEPTHS: bool = true;
+    fn to_either(&self) -> EitherQuery {
+        let mut query = EitherQuery::of_range(EitherGoal { is_any: true }, self.tmin, self.tmax);
+        if self.found {
+            query.accept();
+        }
+        query
+    }
+    fn from_either(_goal: AnyHit, query: &EitherQuery) -> Self {
+        Any { tmin: query.tmin, tmax: query.tmax, found: query.triangle != NONE }
+    }
     #[inline(always)]
     fn offer(&mut self, _triangle: TriangleRef<'_>, intersection: Intersection) -> bool {
         self.found |= in_range(intersection.t as f32, self.tmin, self.tmax);
-        self.found
-    }
-    fn offer_bounds(&mut self, t: (f64, f64)) -> bool {
-        self.found |= f64::from(self.tmin) <= t.0 && t.1 <= f64::from(self.tmax.min(f32::MAX));
         self.found
     }
     #[inline(always)]

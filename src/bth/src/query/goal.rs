@@ -1,5 +1,5 @@
-//! What queries look for. A goal is a value, which kernels ask for at run time: with the feature `small` one kernel serves both goals,
-//! otherwise the goals are types of no size, and each has a kernel of its own.
+//! What queries look for. A goal is a value, which kernels ask for at run time. Goals that are types of no size have kernels of their
+//! own; walks through tetrahedra, and with the feature `small` all kernels, serve both by [`EitherGoal`].
 
 #[cfg(not(feature = "small"))]
 use super::Any;
@@ -78,13 +78,11 @@ impl Goal for AnyHit {
 }
 
 /// One of both, known at run time only.
-#[cfg(any(test, feature = "small"))]
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EitherGoal {
     pub(crate) is_any: bool,
 }
 
-#[cfg(any(test, feature = "small"))]
 impl Goal for EitherGoal {
     type Answer = Hit;
     type Answers<'a> = super::answers::EitherAnswers<'a>;

@@ -11,10 +11,9 @@ pub(crate) use self::answers::Answers;
 pub(crate) use self::answers::EitherAnswers;
 #[cfg(any(test, not(feature = "small")))]
 use self::any::Any;
-#[cfg(test)]
-pub(crate) use self::goal::EitherGoal;
 pub(crate) use self::goal::{
-    ANY, Answer, AnyHit, AnyQuery, Goal, NEAREST, NearestHit, NearestQuery, any_answers, nearest_answers,
+    ANY, Answer, AnyHit, AnyQuery, EitherGoal, Goal, NEAREST, NearestHit, NearestQuery, any_answers,
+    nearest_answers,
 };
 
 use crate::intersect::exact::{Intersection, reported};
@@ -77,16 +76,12 @@ pub(crate) trait Query: Copy {
     fn new(goal: Self::Goal, ray: &Ray) -> Self;
     /// What it looks for.
     fn goal(&self) -> Self::Goal;
-    /// Whether walks through tetrahedra keep track of depths, for queries whose rays are often short and that can be ended by
-    /// [`Self::offer_bounds`].
-    const KEEPS_DEPTHS: bool = false;
+    /// The same query, with a goal that is known at run time only.
+    fn to_either(&self) -> EitherQuery;
+    /// The query with the range and the hits of another one, whose goal is the same.
+    fn from_either(goal: Self::Goal, query: &EitherQuery) -> Self;
     /// Offers an intersection with a triangle of the object. Returns whether the query is complete.
     fn offer(&mut self, triangle: TriangleRef<'_>, intersection: Intersection) -> bool;
-    /// Offers a certain intersection of which only bounds of t are known, which include all roundings. Returns whether the
-    /// query is complete.
-    fn offer_bounds(&mut self, _t: (f64, f64)) -> bool {
-        false
-    }
     /// Upper bound of the exact t of intersections that can still change the result.
     fn limit(&self) -> f64;
     /// Whether an intersection with a t between two values can change the result. It seldom can for the triangle on which a ray
@@ -132,7 +127,32 @@ pub(crate) struct Nearest<G = NearestHit> {
     best: Intersection,
 }
 
+/// The query of walks through tetrahedra, which are compiled once for both goals.
+pub(crate) type EitherQuery = Nearest<EitherGoal>;
+
+impl EitherQuery {
+    /// For any hits: offers a certain intersection of which only bounds of t are known, which include all roundings. Returns whether
+    /// the query is complete.
+    pub(crate) fn offer_bounds(&mut self, t: (f64, f64)) -> bool {
+        if f64::from(self.tmin) <= t.0 && t.1 <= f64::from(self.tmax.min(f32::MAX)) {
+            self.accept();
+        }
+        self.goal.is_any() && self.triangle != NONE
+    }
+}
+
 impl<G: Goal> Nearest<G> {
+    /// A query without hits.
+    #[inline(always)]
+    fn of_range(goal: G, tmin: f32, tmax: f32) -> Self {
+        let best = Intersection { t: f64::from(tmax), weight: [0.0, 0.0, 1.0] };
+        Nearest { tmin, tmax, triangle: NONE, is_index: false, goal, best }
+    }
+    /// The same query with another type of goal.
+    fn with_goal<H>(&self, goal: H) -> Nearest<H> {
+        let &Nearest { tmin, tmax, triangle, is_index, best, .. } = self;
+        Nearest { tmin, tmax, triangle, is_index, goal, best }
+    }
     /// The nearest triangle so far.
     fn best_triangle<'a>(&self, ids: &'a [u32]) -> TriangleRef<'a> {
         TriangleRef { value: self.triangle, is_index: self.is_index, ids }
@@ -177,8 +197,13 @@ impl<G: Goal<Answer = Hit>> Query for Nearest<G> {
         );
     }
     fn new(goal: G, ray: &Ray) -> Self {
-        let best = Intersection { t: f64::from(ray.tmax), weight: [0.0, 0.0, 1.0] };
-        Nearest { tmin: ray.tmin, tmax: ray.tmax, triangle: NONE, is_index: false, goal, best }
+        Nearest::of_range(goal, ray.tmin, ray.tmax)
+    }
+    fn to_either(&self) -> EitherQuery {
+        self.with_goal(EitherGoal { is_any: self.goal.is_any() })
+    }
+    fn from_either(goal: G, query: &EitherQuery) -> Self {
+        query.with_goal(goal)
     }
     #[inline(always)]
     fn offer(&mut self, triangle: TriangleRef<'_>, intersection: Intersection) -> bool {

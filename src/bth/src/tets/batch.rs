@@ -7,7 +7,7 @@ use super::queue::PreparedQueue;
 use super::records::{Entered, LaneRecords};
 use super::starts::Fill;
 use super::walk::TetPosition;
-use crate::query::Query;
+use crate::query::EitherQuery;
 use crate::rays::Ray;
 use crate::simd::Simd;
 use bth_format::object::ObjectView;
@@ -78,19 +78,19 @@ pub(super) struct Walks<'a> {
 }
 
 /// A batch of rays that walk through tetrahedra, with their queries.
-pub(crate) struct WalkBatch<'a, Q> {
+pub(crate) struct WalkBatch<'a> {
     pub(super) walks: Walks<'a>,
     /// For each ray its query, which receives the hits.
-    pub(super) queries: &'a mut [Q],
+    pub(super) queries: &'a mut [EitherQuery],
 }
 
-impl<'a, Q: Query + Copy> WalkBatch<'a, Q> {
+impl<'a> WalkBatch<'a> {
     /// A batch of which no ray has been walked. All slices have one element per ray.
     pub(crate) fn new(
         object: &'a ObjectView<'a>,
         records: LaneRecords<'a>,
         WalkRays { rays, faces, leaves }: WalkRays<'a>,
-        queries: &'a mut [Q],
+        queries: &'a mut [EitherQuery],
         states: &'a mut [WalkState],
     ) -> Self {
         states.fill(WalkState::NotWalked);

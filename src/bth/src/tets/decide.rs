@@ -10,7 +10,7 @@ use super::leaf_of_face;
 use super::records::{Entered, ReadRecords};
 use super::walk::{TetPosition, TetWalker, WalkOutcome};
 use crate::intersect::line::Line;
-use crate::query::Query;
+use crate::query::{Goal, Query};
 use bth_format::layout::{FACE_BIT, NONE, TetFace};
 
 /// Greatest number of times that a ray returns to the lanes; after it, the ray is walked to its end in f64.
@@ -41,7 +41,7 @@ impl Walks<'_> {
     }
 }
 
-impl<Q: Query + Copy> WalkBatch<'_, Q> {
+impl WalkBatch<'_> {
     /// Walks the rays that cannot be walked in lanes.
     #[inline(never)]
     pub(super) fn walk_without_lanes(&mut self) {
@@ -153,7 +153,7 @@ impl<Q: Query + Copy> WalkBatch<'_, Q> {
     }
 
     /// Evaluates a lane that has stopped. `start` holds its words, with `tet` as described at `word::TET`; `depth` holds the
-    /// depths of the corners of its face if [`Query::KEEPS_DEPTHS`].
+    /// depths of the corners of its face.
     #[inline]
     pub(super) fn evaluate(&mut self, start: WalkStart, depth: [f32; 3]) {
         let WalkStart { ray, tet, .. } = start;
@@ -163,8 +163,10 @@ impl<Q: Query + Copy> WalkBatch<'_, Q> {
         if tet & UNCERTAIN == UNCERTAIN {
             return self.step_in_f64(WalkStart { tet: tet & !UNCERTAIN, ..start });
         }
-        if !Q::KEEPS_DEPTHS {
-            return self.walks.reached.push(Reached { ray, face: tet & !FACE_BIT });
+        let reached = Reached { ray, face: tet & !FACE_BIT };
+        let query = &mut self.queries[ray as usize];
+        if !query.goal().is_any() {
+            return self.walks.reached.push(reached);
         }
         let [a, b, c] = depth;
         let (least, greatest) = (f64::from(a.min(b).min(c)), f64::from(a.max(b).max(c)));
@@ -174,9 +176,9 @@ impl<Q: Query + Copy> WalkBatch<'_, Q> {
             least * (1.0 - T_BOUND_SLACK.copysign(least)),
             greatest * (1.0 + T_BOUND_SLACK.copysign(greatest)),
         );
-        if self.queries[ray as usize].offer_bounds((low / f64::from(per_t), high / f64::from(per_t))) {
+        if query.offer_bounds((low / f64::from(per_t), high / f64::from(per_t))) {
             return self.walks.finish(ray, WalkOutcome::Done);
         }
-        self.walks.reached.push(Reached { ray, face: tet & !FACE_BIT });
+        self.walks.reached.push(reached);
     }
 }

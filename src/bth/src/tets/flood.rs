@@ -9,7 +9,7 @@
 use super::records::{Entered, ReadRecords};
 use super::walk::{TetWalker, WalkOutcome};
 use crate::intersect::line::{Projected, Sign};
-use crate::query::{Count, Query};
+use crate::query::{Count, EitherQuery, Query};
 use bth_format::layout::{FACE_BIT, NONE, TetFace};
 use std::collections::BTreeSet;
 
@@ -52,17 +52,15 @@ pub(crate) trait FaceReceiver {
 }
 
 /// Offers the faces to a query.
-struct Offering<'a, 'w, Q> {
+struct Offering<'a, 'w> {
     walker: &'a TetWalker<'w>,
-    query: &'a mut Q,
+    query: &'a mut EitherQuery,
 }
 
-impl<Q: Query> FaceReceiver for Offering<'_, '_, Q> {
-    #[inline(always)]
+impl FaceReceiver for Offering<'_, '_> {
     fn receive(&mut self, face: &TetFace) -> bool {
         self.walker.offer(face, self.query)
     }
-    #[inline(always)]
     fn limit(&self) -> f64 {
         self.query.limit()
     }
@@ -71,8 +69,7 @@ impl<Q: Query> FaceReceiver for Offering<'_, '_, Q> {
 impl TetWalker<'_> {
     /// Offers to the query all constrained faces of the leaf that the line can touch up to the query's limit. Returns `Done` if
     /// the query is complete, else `Left`.
-    #[inline(never)]
-    pub(crate) fn flood<Q: Query, C: Count>(&self, query: &mut Q, count: &mut C) -> WalkOutcome {
+    pub(crate) fn flood<C: Count>(&self, query: &mut EitherQuery, count: &mut C) -> WalkOutcome {
         if self.flood_faces(&mut Offering { walker: self, query }, count) {
             WalkOutcome::Done
         } else {
@@ -82,8 +79,8 @@ impl TetWalker<'_> {
 
     /// Passes all constrained faces of the leaf that the line can touch up to the receiver's limit. Returns whether the query is
     /// complete.
-    #[inline(always)]
-    pub(crate) fn flood_faces(&self, receiver: &mut impl FaceReceiver, count: &mut impl Count) -> bool {
+    #[inline(never)]
+    pub(crate) fn flood_faces<C: Count>(&self, receiver: &mut dyn FaceReceiver, count: &mut C) -> bool {
         count.flood();
         let mut visited = VisitedSet::new();
         let mut stack: Vec<(u32, Entered)> = Vec::new();

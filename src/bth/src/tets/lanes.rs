@@ -252,9 +252,9 @@ impl<S: Simd> Lanes<S> {
     }
 
     /// Second part of a step: finds the face through which the line leaves the tetrahedron, and stores it as the entered face of
-    /// the next. The depths of its corners are stored only with `DEPTHS`.
+    /// the next.
     #[inline(always)]
-    pub(super) fn choose_exit<const DEPTHS: bool>(&mut self, s: S, step: &mut Step<S>) {
+    pub(super) fn choose_exit(&mut self, s: S, step: &mut Step<S>) {
         let apex = self.project(s, step.position);
         let extent = Extent { reach: self.floats[float::REACH], size: self.floats[float::SIZE] };
         let (extent, size) = extent.with(s, &apex);
@@ -281,31 +281,21 @@ impl<S: Simd> Lanes<S> {
             let corner = self.corner(i);
             self.floats[float::X + i] = s.select(out, apex.x, corner.x);
             self.floats[float::Y + i] = s.select(out, apex.y, corner.y);
-            if DEPTHS {
-                self.floats[float::DEPTH + i] = s.select(out, apex.depth, corner.depth);
-            }
+            self.floats[float::DEPTH + i] = s.select(out, apex.depth, corner.depth);
         }
     }
 
     /// Third part of a step: moves to the tetrahedron behind the face of exit. A walk stops where it reaches a constrained face,
-    /// leaves the hull or, with `DEPTHS`, passes its limit; `TET` is then a link with [`FACE_BIT`]. A walk with an uncertain sign
+    /// leaves the hull or passes its limit; `TET` is then a link with [`FACE_BIT`]. A walk with an uncertain sign
     /// stops with [`UNCERTAIN`] in `TET` and is otherwise unchanged.
     #[inline(always)]
-    pub(super) fn follow_link<const DEPTHS: bool>(
-        &mut self,
-        s: S,
-        one: S::U,
-        step: &Step<S>,
-        records: &LaneRecords<'_>,
-    ) {
+    pub(super) fn follow_link(&mut self, s: S, one: S::U, step: &Step<S>, records: &LaneRecords<'_>) {
         let (tet, behind) = (self.words[word::TET], self.words[word::BEHIND]);
         let entered = EnteredLanes { tet, face: step.face, apex: step.apex, behind, one };
         let (mut next, opposite) = records.link(s, step.certain, &entered, step.opposite_vertex);
-        if DEPTHS {
-            let f = &self.floats;
-            let nearest = s.min(s.min(f[float::DEPTH], f[float::DEPTH + 1]), f[float::DEPTH + 2]);
-            next = s.select_u(s.lt(f[float::LIMIT], nearest), s.splat_u(NONE), next);
-        }
+        let f = &self.floats;
+        let nearest = s.min(s.min(f[float::DEPTH], f[float::DEPTH + 1]), f[float::DEPTH + 2]);
+        next = s.select_u(s.lt(f[float::LIMIT], nearest), s.splat_u(NONE), next);
         if records.needs_behind() {
             self.words[word::BEHIND] = s.select_u(step.certain, tet, behind);
         }

@@ -17,7 +17,7 @@ pub(crate) mod walk;
 use self::walk::{TetWalker, WalkOutcome};
 use crate::bvh::single::TetOutcome;
 use crate::intersect::line::Line;
-use crate::query::{Count, Query};
+use crate::query::{Count, EitherQuery, Query};
 use crate::rays::Ray;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
@@ -33,11 +33,12 @@ pub(crate) enum TetStart {
 
 /// Walks through the tet leaf of the triangle on which a ray starts, from the constrained face of that triangle. The traversal of
 /// the BVH then skips the leaf, so the hint affects where the search begins, never the result.
-pub(crate) fn start_in_tets<Q: Query, C: Count>(
+#[inline(never)]
+pub(crate) fn start_in_tets<C: Count>(
     object: &ObjectView<'_>,
     ray: &Ray,
     triangle: u32,
-    query: &mut Q,
+    query: &mut EitherQuery,
     count: &mut C,
 ) -> TetStart {
     let face = object.triangle_faces.get(triangle as usize).copied().unwrap_or(NONE);
@@ -60,12 +61,12 @@ pub(crate) fn start_in_tets<Q: Query, C: Count>(
 }
 
 /// Walks from the constrained face with index `face`. `None` if the tetrahedron that holds the origin was not found.
-fn walk_from_face<Q: Query, C: Count>(
+fn walk_from_face<C: Count>(
     object: &ObjectView<'_>,
     leaf: u32,
     face: u32,
     line: &Line,
-    query: &mut Q,
+    query: &mut EitherQuery,
     count: &mut C,
 ) -> Option<WalkOutcome> {
     let walker = TetWalker::new(object, leaf, line);
@@ -84,6 +85,21 @@ pub(crate) fn enter_tets<Q: Query, C: Count>(
     leaf: u32,
     ray: &Ray,
     query: &mut Q,
+    count: &mut C,
+) -> TetOutcome {
+    let mut either = query.to_either();
+    let outcome = enter(object, leaf, ray, &mut either, count);
+    *query = Q::from_either(query.goal(), &either);
+    outcome
+}
+
+/// Implements [`enter_tets`].
+#[inline(never)]
+fn enter<C: Count>(
+    object: &ObjectView<'_>,
+    leaf: u32,
+    ray: &Ray,
+    query: &mut EitherQuery,
     count: &mut C,
 ) -> TetOutcome {
     let Some(line) = Line::new(ray) else { return TetOutcome::Done };

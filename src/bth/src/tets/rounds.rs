@@ -6,7 +6,6 @@ use super::batch::{WalkBatch, WalkStart, vertices};
 use super::lanes::{Lanes, Step, float, word};
 use super::queue::PreparedQueue;
 use super::records::Entered;
-use crate::query::Query;
 use crate::simd::{Kernel, LANES, Simd};
 use bth_format::layout::NONE;
 
@@ -32,7 +31,7 @@ struct RefillState {
     rays_left: bool,
 }
 
-impl<Q: Query + Copy> WalkBatch<'_, Q> {
+impl WalkBatch<'_> {
     /// Evaluates stopped lanes and fills idle lanes from the queue, if enough lanes are idle.
     #[inline(always)]
     fn refill<S: Simd>(
@@ -95,11 +94,9 @@ impl<Q: Query + Copy> WalkBatch<'_, Q> {
         }
         store!(0 1 2 3 4 5);
         s.store_u(lanes.words[word::RAY], &mut rays);
-        if Q::KEEPS_DEPTHS {
-            s.store(lanes.floats[float::DEPTH], &mut depth[0]);
-            s.store(lanes.floats[float::DEPTH + 1], &mut depth[1]);
-            s.store(lanes.floats[float::DEPTH + 2], &mut depth[2]);
-        }
+        s.store(lanes.floats[float::DEPTH], &mut depth[0]);
+        s.store(lanes.floats[float::DEPTH + 1], &mut depth[1]);
+        s.store(lanes.floats[float::DEPTH + 2], &mut depth[2]);
         while stopped != 0 {
             let lane = stopped.trailing_zeros() as usize % LANES;
             stopped &= stopped - 1;
@@ -115,7 +112,7 @@ impl<Q: Query + Copy> WalkBatch<'_, Q> {
     }
 }
 
-impl<Q: Query + Copy> Kernel for &mut WalkBatch<'_, Q> {
+impl Kernel for &mut WalkBatch<'_> {
     type Output = ();
 
     /// Walks all rays of the batch.
@@ -150,17 +147,12 @@ impl<Q: Query + Copy> Kernel for &mut WalkBatch<'_, Q> {
             a.lanes.fetch_apex(s, one, &mut a.step, &records, vertices);
             b.lanes.fetch_apex(s, one, &mut b.step, &records, vertices);
             c.lanes.fetch_apex(s, one, &mut c.step, &records, vertices);
-            macro_rules! advance {
-                ($depths:literal $($group:ident)*) => {
-                    $($group.lanes.choose_exit::<$depths>(s, &mut $group.step);)*
-                    $($group.lanes.follow_link::<$depths>(s, one, &$group.step, &records);)*
-                };
-            }
-            if Q::KEEPS_DEPTHS {
-                advance!(true a b c);
-            } else {
-                advance!(false a b c);
-            }
+            a.lanes.choose_exit(s, &mut a.step);
+            b.lanes.choose_exit(s, &mut b.step);
+            c.lanes.choose_exit(s, &mut c.step);
+            a.lanes.follow_link(s, one, &a.step, &records);
+            b.lanes.follow_link(s, one, &b.step, &records);
+            c.lanes.follow_link(s, one, &c.step, &records);
             steps += 1;
             if steps == steps_per_round {
                 (state.round, steps) = (state.round + 1, 0);

@@ -8,7 +8,7 @@
 
 use super::records::{Entered, ReadRecords};
 use crate::intersect::line::{Line, Projected, Sign};
-use crate::query::{Count, Query, TriangleRef};
+use crate::query::{Count, EitherQuery, Query, TriangleRef};
 use bth_format::layout::{FACE_BIT, HullFace, Link, NONE, TetFace, TetLeaf, TetVertex};
 use bth_format::object::{ObjectView, Records};
 
@@ -85,7 +85,7 @@ impl<'a> TetWalker<'a> {
 
     /// Tests a constrained face exactly, as the triangles of BVH leaves are, and offers a hit to the query. Returns whether the
     /// query is complete.
-    pub(crate) fn offer<Q: Query>(&self, face: &TetFace, query: &mut Q) -> bool {
+    pub(crate) fn offer(&self, face: &TetFace, query: &mut EitherQuery) -> bool {
         let corners = face.vertex.map(|v| self.position(v));
         match self.line.intersection(corners) {
             Some(intersection) => query.offer(TriangleRef::id(face.triangle, self.ids), intersection),
@@ -130,10 +130,10 @@ impl<'a> TetWalker<'a> {
 
     /// Walks from a position until the query is complete, the line leaves the hull or passes the query's limit, or a sign is
     /// uncertain.
-    pub(crate) fn walk<Q: Query, C: Count>(
+    pub(crate) fn walk<C: Count>(
         &self,
         mut position: TetPosition,
-        query: &mut Q,
+        query: &mut EitherQuery,
         count: &mut C,
     ) -> WalkOutcome {
         // A line passes each tetrahedron at most once, so a walk has more steps only if the data are inconsistent.

@@ -5,6 +5,8 @@ mod answers;
 mod any;
 mod goal;
 pub(crate) mod sink;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use self::answers::Answers;
 #[cfg(test)]
@@ -134,7 +136,7 @@ impl EitherQuery {
     /// For any hits: offers a certain intersection of which only bounds of t are known, which include all roundings. Returns whether
     /// the query is complete.
     pub(crate) fn offer_bounds(&mut self, t: (f64, f64)) -> bool {
-        if f64::from(self.tmin) <= t.0 && t.1 <= f64::from(self.tmax.min(f32::MAX)) {
+        if f64::from(self.tmin) <= t.0 && t.1 <= f64::from(self.tmax) && t.1 <= f64::from(f32::MAX) {
             self.accept();
         }
         self.goal.is_any() && self.triangle != NONE

@@ -7,7 +7,7 @@ use super::queue::PreparedQueue;
 use super::records::{Entered, LaneRecords};
 use super::starts::Fill;
 use super::walk::TetPosition;
-use crate::query::EitherQuery;
+use crate::query::{EitherQuery, Goal, Query};
 use crate::rays::Ray;
 use crate::simd::Simd;
 use bth_format::object::ObjectView;
@@ -63,6 +63,8 @@ pub(super) struct Walks<'a> {
     pub(super) faces: &'a [u32],
     /// For each ray the tet leaf that it enters from outside if it does not start near a face, or `NONE`.
     pub(super) leaves: &'a [u32],
+    /// Whether the walks keep track of depths: they can end any-hit queries, whose rays are often short.
+    pub(super) keeps_depths: bool,
     /// For each ray the state of its walk.
     pub(super) states: &'a mut [WalkState],
     /// Index of the first ray that is not yet prepared.
@@ -100,6 +102,7 @@ impl<'a> WalkBatch<'a> {
             rays,
             faces,
             leaves,
+            keeps_depths: queries.first().is_some_and(|query| query.goal().is_any()),
             states,
             next: 0,
             starts: Vec::new(),

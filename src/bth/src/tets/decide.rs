@@ -10,7 +10,7 @@ use super::leaf_of_face;
 use super::records::{Entered, ReadRecords};
 use super::walk::{TetPosition, TetWalker, WalkOutcome};
 use crate::intersect::line::Line;
-use crate::query::{Goal, Query};
+use crate::query::Query;
 use bth_format::layout::{FACE_BIT, NONE, TetFace};
 
 /// Greatest number of times that a ray returns to the lanes; after it, the ray is walked to its end in f64.
@@ -153,8 +153,8 @@ impl WalkBatch<'_> {
     }
 
     /// Evaluates a lane that has stopped. `start` holds its words, with `tet` as described at `word::TET`; `depth` holds the
-    /// depths of the corners of its face.
-    #[inline]
+    /// depths of the corners of its face, if these are kept.
+    #[inline(always)]
     pub(super) fn evaluate(&mut self, start: WalkStart, depth: [f32; 3]) {
         let WalkStart { ray, tet, .. } = start;
         if tet == NONE {
@@ -163,12 +163,14 @@ impl WalkBatch<'_> {
         if tet & UNCERTAIN == UNCERTAIN {
             return self.step_in_f64(WalkStart { tet: tet & !UNCERTAIN, ..start });
         }
-        let reached = Reached { ray, face: tet & !FACE_BIT };
-        let query = &mut self.queries[ray as usize];
-        if !query.goal().is_any() {
-            return self.walks.reached.push(reached);
+        if self.walks.keeps_depths && self.is_certainly_hit(ray, depth) {
+            return self.walks.finish(ray, WalkOutcome::Done);
         }
-        let [a, b, c] = depth;
+        self.walks.reached.push(Reached { ray, face: tet & !FACE_BIT });
+    }
+
+    /// Whether the depths of the corners of a face that the line of a ray certainly crosses complete the ray's query.
+    fn is_certainly_hit(&mut self, ray: u32, [a, b, c]: [f32; 3]) -> bool {
         let (least, greatest) = (f64::from(a.min(b).min(c)), f64::from(a.max(b).max(c)));
         let per_t = self.walks.rays[ray as usize].direction.iter().fold(0.0_f32, |m, d| m.max(d.abs()));
         // Depths have a relative error of 2^-24, and the t of a hit is rounded once more.
@@ -176,9 +178,6 @@ impl WalkBatch<'_> {
             least * (1.0 - T_BOUND_SLACK.copysign(least)),
             greatest * (1.0 + T_BOUND_SLACK.copysign(greatest)),
         );
-        if query.offer_bounds((low / f64::from(per_t), high / f64::from(per_t))) {
-            return self.walks.finish(ray, WalkOutcome::Done);
-        }
-        self.walks.reached.push(reached);
+        self.queries[ray as usize].offer_bounds((low / f64::from(per_t), high / f64::from(per_t)))
     }
 }

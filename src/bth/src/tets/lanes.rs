@@ -212,13 +212,16 @@ pub(super) struct Step<S: Simd> {
     opposite_vertex: S::U,
     /// The vertices of the face through which the tetrahedron was entered.
     face: [S::U; 3],
+    /// The lanes whose face of exit lies beyond their limit; none if no depths are kept.
+    passed: S::M,
 }
 
 impl<S: Simd> Step<S> {
     #[inline(always)]
     pub(super) fn empty(s: S) -> Self {
         let (u, f) = (s.splat_u(0), s.splat(0.0));
-        Step { apex: u, position: [f; 3], certain: s.mask(0), opposite_vertex: u, face: [u; 3] }
+        let none = s.mask(0);
+        Step { apex: u, position: [f; 3], certain: none, opposite_vertex: u, face: [u; 3], passed: none }
     }
 }
 
@@ -252,9 +255,9 @@ impl<S: Simd> Lanes<S> {
     }
 
     /// Second part of a step: finds the face through which the line leaves the tetrahedron, and stores it as the entered face of
-    /// the next.
+    /// the next. The depths of its corners are stored only if `keeps_depths` is set.
     #[inline(always)]
-    pub(super) fn choose_exit(&mut self, s: S, step: &mut Step<S>) {
+    pub(super) fn choose_exit(&mut self, s: S, keeps_depths: bool, step: &mut Step<S>) {
         let apex = self.project(s, step.position);
         let extent = Extent { reach: self.floats[float::REACH], size: self.floats[float::SIZE] };
         let (extent, size) = extent.with(s, &apex);
@@ -281,21 +284,26 @@ impl<S: Simd> Lanes<S> {
             let corner = self.corner(i);
             self.floats[float::X + i] = s.select(out, apex.x, corner.x);
             self.floats[float::Y + i] = s.select(out, apex.y, corner.y);
-            self.floats[float::DEPTH + i] = s.select(out, apex.depth, corner.depth);
+        }
+        if keeps_depths {
+            let f = &mut self.floats;
+            for (i, &out) in out.iter().enumerate() {
+                f[float::DEPTH + i] = s.select(out, apex.depth, f[float::DEPTH + i]);
+            }
+            let nearest = s.min(s.min(f[float::DEPTH], f[float::DEPTH + 1]), f[float::DEPTH + 2]);
+            step.passed = s.lt(f[float::LIMIT], nearest);
         }
     }
 
     /// Third part of a step: moves to the tetrahedron behind the face of exit. A walk stops where it reaches a constrained face,
-    /// leaves the hull or passes its limit; `TET` is then a link with [`FACE_BIT`]. A walk with an uncertain sign
+    /// leaves the hull or, where depths are kept, passes its limit; `TET` is then a link with [`FACE_BIT`]. A walk with an uncertain sign
     /// stops with [`UNCERTAIN`] in `TET` and is otherwise unchanged.
     #[inline(always)]
     pub(super) fn follow_link(&mut self, s: S, one: S::U, step: &Step<S>, records: &LaneRecords<'_>) {
         let (tet, behind) = (self.words[word::TET], self.words[word::BEHIND]);
         let entered = EnteredLanes { tet, face: step.face, apex: step.apex, behind, one };
         let (mut next, opposite) = records.link(s, step.certain, &entered, step.opposite_vertex);
-        let f = &self.floats;
-        let nearest = s.min(s.min(f[float::DEPTH], f[float::DEPTH + 1]), f[float::DEPTH + 2]);
-        next = s.select_u(s.lt(f[float::LIMIT], nearest), s.splat_u(NONE), next);
+        next = s.select_u(step.passed, s.splat_u(NONE), next);
         if records.needs_behind() {
             self.words[word::BEHIND] = s.select_u(step.certain, tet, behind);
         }

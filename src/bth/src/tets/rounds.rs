@@ -2,7 +2,7 @@
 //!
 //! When several lanes of a group have stopped, their results are evaluated and the lanes are refilled from the queue.
 
-use super::batch::{WalkBatch, WalkStart, vertices};
+use super::batch::{WalkBatch, WalkStart, Walks, vertices};
 use super::lanes::{Lanes, Step, float, word};
 use super::queue::PreparedQueue;
 use super::records::Entered;
@@ -94,9 +94,11 @@ impl WalkBatch<'_> {
         }
         store!(0 1 2 3 4 5);
         s.store_u(lanes.words[word::RAY], &mut rays);
-        s.store(lanes.floats[float::DEPTH], &mut depth[0]);
-        s.store(lanes.floats[float::DEPTH + 1], &mut depth[1]);
-        s.store(lanes.floats[float::DEPTH + 2], &mut depth[2]);
+        if self.walks.keeps_depths {
+            s.store(lanes.floats[float::DEPTH], &mut depth[0]);
+            s.store(lanes.floats[float::DEPTH + 1], &mut depth[1]);
+            s.store(lanes.floats[float::DEPTH + 2], &mut depth[2]);
+        }
         while stopped != 0 {
             let lane = stopped.trailing_zeros() as usize % LANES;
             stopped &= stopped - 1;
@@ -122,7 +124,7 @@ impl Kernel for &mut WalkBatch<'_> {
         if !S::INLINES_PARTS {
             return;
         }
-        let records = self.walks.records;
+        let Walks { records, keeps_depths, .. } = self.walks;
         let vertices = vertices(self.walks.object);
         let mut queue = PreparedQueue::new();
         let idle =
@@ -147,9 +149,9 @@ impl Kernel for &mut WalkBatch<'_> {
             a.lanes.fetch_apex(s, one, &mut a.step, &records, vertices);
             b.lanes.fetch_apex(s, one, &mut b.step, &records, vertices);
             c.lanes.fetch_apex(s, one, &mut c.step, &records, vertices);
-            a.lanes.choose_exit(s, &mut a.step);
-            b.lanes.choose_exit(s, &mut b.step);
-            c.lanes.choose_exit(s, &mut c.step);
+            a.lanes.choose_exit(s, keeps_depths, &mut a.step);
+            b.lanes.choose_exit(s, keeps_depths, &mut b.step);
+            c.lanes.choose_exit(s, keeps_depths, &mut c.step);
             a.lanes.follow_link(s, one, &a.step, &records);
             b.lanes.follow_link(s, one, &b.step, &records);
             c.lanes.follow_link(s, one, &c.step, &records);

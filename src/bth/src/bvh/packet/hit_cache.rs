@@ -3,10 +3,9 @@
 //! The terms of an intersection that do not depend on the direction ([`crate::intersect::exact::OriginTerms`]) are then computed in f64
 //! once for each triangle, and only the others for each ray.
 
-use super::leaf_mesh::Leaf;
+use super::leaf_mesh::LeafPoints;
 use crate::bvh::candidate::Candidate;
 use crate::intersect::exact_lanes::{F32Lanes, OriginTermsLanes};
-use crate::intersect::filter::TriangleBlock;
 use crate::simd::{LANES, Simd};
 
 /// Greatest number of cached triangles.
@@ -74,18 +73,19 @@ impl HitCache {
 
     /// Adds a triangle of a leaf; returns its index, or [`UNCACHED`] if the cache is full.
     #[inline(always)]
-    pub(crate) fn add<B: TriangleBlock>(&mut self, leaf: &Leaf<'_, B>, triangle: u32) -> u32 {
+    pub(crate) fn add(&mut self, leaf: &LeafPoints<'_>, triangle: u32) -> u32 {
         let at = self.count;
         self.count += 1;
         if at >= self.capacity.min(CACHED_TRIANGLES) {
             return UNCACHED;
         }
-        for c in 0..3 {
+        for (corner, point) in self.corner.iter_mut().zip(leaf.points_of(triangle as usize)) {
+            let point = leaf.point(point);
             for k in 0..3 {
-                self.corner[c][k][at] = leaf.block.coordinate(triangle as usize, c, k);
+                corner[k][at] = point[k];
             }
         }
-        self.index[at] = leaf.block.first() + triangle;
+        self.index[at] = leaf.first + triangle;
         (self.leaf[at], self.triangle[at]) = (leaf.code, triangle);
         at as u32
     }

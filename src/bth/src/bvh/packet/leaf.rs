@@ -7,11 +7,9 @@
 
 use super::bounds::PacketBounds;
 use super::hit_cache::UNCACHED;
-use super::leaf_mesh::{Leaf, LeafMesh, Outside};
+use super::leaf_mesh::{LeafMesh, LeafPoints, Outside};
 use super::packet_rays::PacketRays;
-use super::points::{
-    CornerSource, POINTS, ProjectedMaxima, ProjectedOnDemand, ProjectedPoints, RelativePoints,
-};
+use super::points::{CornerSource, ProjectedMaxima, ProjectedOnDemand, ProjectedPoints, RelativePoints};
 use super::ray_group::{RayGroup, RayLimits};
 use super::single_rays::FEW_OF_GROUP;
 use crate::bvh::candidate::Candidate;
@@ -102,48 +100,67 @@ impl<S: Simd, C: CornerSource<S>> Part<S> for TestRays<'_, S, C> {
     }
 }
 
+/// Triangles of a leaf that rays of a packet may hit.
+pub(super) struct ReachedTriangles<'a> {
+    leaf: LeafPoints<'a>,
+    /// A bit each.
+    triangles: u32,
+    /// The rays that are to be tested, a bit each.
+    rays: u64,
+}
+
 impl<Q: Query> PacketRays<'_, Q> {
-    /// Intersects the rays whose bit is set with the triangles of a leaf. Returns whether any has a nearer hit than before. It is a
-    /// part of the kernel of packets and inlined into it: the parameters are variables of its caller.
+    /// Finds the triangles of a leaf that the rays whose bit is set may hit, if there are any. Where few rays of an any-hit group are left,
+    /// it intersects them with the leaf. This is a part of the kernel of packets and inlined into it, once for each format of leaves.
     #[inline(always)]
-    pub(crate) fn enter_leaf<S: Simd, H: PacketBounds<S>, B: LeafMesh>(
+    pub(super) fn reached<'b, S: Simd, H: PacketBounds<S>, B: LeafMesh>(
         &mut self,
         s: S,
         bounds: &H,
-        groups: &mut [RayGroup<S>],
-        (points, relative): (&mut ProjectedPoints, &mut RelativePoints),
-        leaf: &Leaf<'_, B>,
+        groups: &[RayGroup<S>],
+        (block, code): (&'b B, u32),
         mut rays: u64,
-    ) -> bool {
+    ) -> Option<ReachedTriangles<'b>> {
         // In packets for nearest hits, whose rays are coherent, few rays are rarely left.
         if H::is_any(self.goal) {
             for (i, group) in groups.iter().enumerate() {
                 let active = (rays >> (i * LANES)) as u32 & 0xffff;
                 if active.count_ones() <= FEW_OF_GROUP {
                     rays &= !(0xffff << (i * LANES));
-                    self.enter_leaf_singly::<S, H, B>(s, group, i, leaf, active);
+                    self.enter_leaf_singly::<S, H, B>(s, group, i, (block, code), active);
                 }
             }
             if rays == 0 {
-                return false;
+                return None;
             }
         }
-        let count = leaf.block.triangles().min(WIDTH as u32);
-        let outside = Outside { bounds, block: leaf.block }.inline_or_call(s);
+        let count = block.triangles().min(WIDTH as u32);
+        let outside = Outside { bounds, block }.inline_or_call(s);
         let triangles = !outside & ((1 << count) - 1);
+        (triangles != 0).then(|| ReachedTriangles { leaf: block.points(code), triangles, rays })
+    }
+
+    /// Intersects rays with triangles of a leaf. Returns whether any has a nearer hit than before. As [`Self::reached`], it is a part of
+    /// the kernel, but serves both formats of leaves.
+    #[inline(always)]
+    pub(super) fn enter_triangles<S: Simd, H: PacketBounds<S>>(
+        &mut self,
+        s: S,
+        bounds: &H,
+        groups: &mut [RayGroup<S>],
+        (points, relative): (&mut ProjectedPoints, &mut RelativePoints),
+        ReachedTriangles { leaf, triangles, rays }: ReachedTriangles<'_>,
+    ) -> bool {
         let (mut used, mut remaining) = (0u64, triangles);
         while remaining != 0 {
-            let [a, b, c] = leaf.block.points_of(remaining.trailing_zeros() as usize);
+            let [a, b, c] = leaf.points_of(remaining.trailing_zeros() as usize);
             used |= 1 << a | 1 << b | 1 << c;
             remaining &= remaining - 1;
         }
-        if triangles == 0 {
-            return false;
-        }
         let mut spread = [0.0; 2];
         if let Some(view) = bounds.view() {
-            leaf.block.relative(s, view.origin, relative);
-            spread = relative.spread(s, view, B::PARTS, used);
+            leaf.relative(s, view.origin, relative);
+            spread = relative.spread(s, view, leaf.parts.len(), used);
         }
         let (mut nearer, mut cache_indices) = (false, [NOT_CACHED_YET; WIDTH]);
         for (i, group) in groups.iter_mut().enumerate() {
@@ -155,7 +172,7 @@ impl<Q: Query> PacketRays<'_, Q> {
                     group,
                     i,
                     (points, relative, spread),
-                    leaf,
+                    &leaf,
                     &mut cache_indices,
                     (triangles, used),
                     active,
@@ -172,16 +189,16 @@ impl<Q: Query> PacketRays<'_, Q> {
         s: S,
         group: &RayGroup<S>,
         at: usize,
-        leaf: &Leaf<'_, B>,
+        (block, code): (&B, u32),
         mut active: u32,
     ) {
         while active != 0 {
             let lane = active.trailing_zeros() as usize;
             active &= active - 1;
-            let found = self.single_rays.candidates::<S, H>(s, group, (at, lane), leaf.block);
+            let found = self.single_rays.candidates::<S, H>(s, group, (at, lane), block);
             let ray = at * LANES + lane;
             let hit = found.sure != 0
-                || found.maybe != 0 && self.settle_one(ray, Candidate::NONE, (leaf.code, found.maybe));
+                || found.maybe != 0 && self.settle_one(ray, Candidate::NONE, (code, found.maybe));
             self.alive &= !(u64::from(hit) << ray);
         }
     }
@@ -190,16 +207,16 @@ impl<Q: Query> PacketRays<'_, Q> {
     /// has a nearer hit than before. This is a part of a kernel and inlined into it: the parameters are variables of its caller.
     #[inline(always)]
     #[expect(clippy::too_many_arguments)]
-    fn enter_group<S: Simd, H: PacketBounds<S>, B: LeafMesh>(
+    fn enter_group<S: Simd, H: PacketBounds<S>>(
         &mut self,
         s: S,
         bounds: &H,
         group: &mut RayGroup<S>,
         at: usize,
         (points, relative, spread): (&mut ProjectedPoints, &RelativePoints, [f32; 2]),
-        leaf: &Leaf<'_, B>,
+        leaf: &LeafPoints<'_>,
         cache_indices: &mut [u8; WIDTH],
-        (triangles, mut used): (u32, u64),
+        (triangles, used): (u32, u64),
         active: u32,
     ) -> bool {
         let floor = s.splat(f32::MIN_POSITIVE);
@@ -210,7 +227,7 @@ impl<Q: Query> PacketRays<'_, Q> {
             let [size, depth] = spread;
             let error = edge_functions::error(s, s.splat(size + size), s.splat(depth), floor);
             let corners = ProjectedOnDemand { rows, projection: group.projection.relative(s) };
-            return self.test_triangles::<S, H, B>(
+            return self.test_triangles::<S, H>(
                 s,
                 group,
                 at,
@@ -226,18 +243,21 @@ impl<Q: Query> PacketRays<'_, Q> {
         // Copies stay in registers; fields of `group` would be loaded for each point.
         let (projection, mixed, is_common) = (group.projection, group.mixed, group.common.is_some());
         let mut greatest = ProjectedMaxima { coordinate: s.splat(0.0), depth: s.splat(0.0) };
-        let rows = [leaf.block.row(order[0]), leaf.block.row(order[1]), leaf.block.row(order[2])];
-        while used != 0 {
-            let i = used.trailing_zeros() as usize % POINTS;
-            used &= used - 1;
-            let point = [s.splat(B::at(rows[0], i)), s.splat(B::at(rows[1], i)), s.splat(B::at(rows[2], i))];
-            let point = if is_common { point } else { mixed.permute(s, point) };
-            let point = projection.of(s, point);
-            points.put(s, i, greatest.including(s, point));
+        for (part, rows) in leaf.parts.iter().enumerate() {
+            let rows = order.map(|axis| &rows[axis]);
+            let mut used = (used >> (part * LANES)) as u32 & 0xffff;
+            while used != 0 {
+                let i = used.trailing_zeros() as usize % WIDTH;
+                used &= used - 1;
+                let point = rows.map(|row| s.splat(row[i]));
+                let point = if is_common { point } else { mixed.permute(s, point) };
+                let point = projection.of(s, point);
+                points.put(s, part * WIDTH + i, greatest.including(s, point));
+            }
         }
         let size = s.add(greatest.coordinate, greatest.coordinate);
         let error = edge_functions::error(s, size, greatest.depth, floor);
-        self.test_triangles::<S, H, B>(s, group, at, &*points, error, leaf, cache_indices, triangles, active)
+        self.test_triangles::<S, H>(s, group, at, &*points, error, leaf, cache_indices, triangles, active)
     }
 
     /// Intersects the active rays of a group with triangles, a bit each, given the projections of their corners. `error` bounds the errors
@@ -245,14 +265,14 @@ impl<Q: Query> PacketRays<'_, Q> {
     /// separate.
     #[inline(always)]
     #[expect(clippy::too_many_arguments)]
-    fn test_triangles<S: Simd, H: PacketBounds<S>, B: LeafMesh>(
+    fn test_triangles<S: Simd, H: PacketBounds<S>>(
         &mut self,
         s: S,
         group: &mut RayGroup<S>,
         at: usize,
         corners: &impl CornerSource<S>,
         error: S::F,
-        leaf: &Leaf<'_, B>,
+        leaf: &LeafPoints<'_>,
         cache_indices: &mut [u8; WIDTH],
         mut triangles: u32,
         mut active: u32,
@@ -261,7 +281,7 @@ impl<Q: Query> PacketRays<'_, Q> {
         while triangles != 0 {
             let triangle = triangles.trailing_zeros();
             triangles &= triangles - 1;
-            let [a, b, c] = leaf.block.points_of(triangle as usize);
+            let [a, b, c] = leaf.points_of(triangle as usize);
             let RayTest { maybe, sure, nearest, farthest } = if S::INLINES_PARTS {
                 let corners = [corners.corner(s, a), corners.corner(s, b), corners.corner(s, c)];
                 if active & !s.mask_bits(missed(s, &corners, error)) == 0 {
@@ -288,7 +308,7 @@ impl<Q: Query> PacketRays<'_, Q> {
                 if clear != 0 {
                     let cache_index = &mut cache_indices[triangle as usize % WIDTH];
                     if *cache_index == NOT_CACHED_YET {
-                        let index = (leaf.block.first() + triangle) as usize;
+                        let index = (leaf.first + triangle) as usize;
                         s.prefetch(self.object.triangle_ids.as_ptr().wrapping_add(index));
                         *cache_index = self.hit_cache.add(leaf, triangle) as u8;
                     }

@@ -1,33 +1,64 @@
 //! Leaves of both record formats as points and triangles between them.
 
 use super::bounds::PacketBounds;
-use super::points::RelativePoints;
+use super::points::{POINTS, RelativePoints};
 use crate::intersect::filter::TriangleBlock;
 use crate::simd::{Part, Simd};
 use bth_format::layout::{IndexedLeaf, RawLeaf, WIDTH};
+use std::slice;
 
-/// A leaf's record and its child code.
-pub(crate) struct Leaf<'a, B> {
-    pub(crate) block: &'a B,
+/// The corners of the triangles of a [`RawLeaf`], which have points of their own.
+static OWN_POINTS: [[u8; WIDTH]; 3] = {
+    let mut corner = [[0; WIDTH]; 3];
+    let mut point = 0;
+    while point < 3 * WIDTH {
+        corner[point / WIDTH][point % WIDTH] = point as u8;
+        point += 1;
+    }
+    corner
+};
+
+/// A leaf as points and triangles between them, so that what tests triangles is compiled once for both formats.
+#[derive(Clone, Copy)]
+pub(crate) struct LeafPoints<'a> {
+    /// For sixteen points a row of x, y and z each, then for the next sixteen.
+    pub(crate) parts: &'a [[[f32; WIDTH]; 3]],
+    /// Indices of the points of each triangle: `[corner][triangle]`.
+    corner: &'a [[u8; WIDTH]; 3],
+    /// Index of the leaf's first triangle in the object's leaf order.
+    pub(crate) first: u32,
+    /// The leaf's child code.
     pub(crate) code: u32,
 }
 
-/// A leaf as points and triangles between them.
-pub(crate) trait LeafMesh: TriangleBlock {
-    /// Number of rows of sixteen points.
-    const PARTS: usize;
-    /// One coordinate of all points, as stored in the leaf.
-    type Row<'a>: Copy
-    where
-        Self: 'a;
-    /// The coordinates of all points along an axis.
-    fn row(&self, axis: usize) -> Self::Row<'_>;
-    /// The coordinate of a point, whose index is below [`super::points::POINTS`].
-    fn at(row: Self::Row<'_>, point: usize) -> f32;
-    /// Indices of a triangle's points, below [`super::points::POINTS`].
-    fn points_of(&self, triangle: usize) -> [usize; 3];
+impl LeafPoints<'_> {
+    /// Indices of a triangle's points, below [`POINTS`].
+    #[inline(always)]
+    pub(crate) fn points_of(&self, triangle: usize) -> [usize; 3] {
+        let at = triangle % WIDTH;
+        let [a, b, c] = self.corner;
+        [usize::from(a[at]) % POINTS, usize::from(b[at]) % POINTS, usize::from(c[at]) % POINTS]
+    }
+
+    /// A point, object space.
+    #[inline(always)]
+    pub(crate) fn point(&self, point: usize) -> [f32; 3] {
+        self.parts[point / WIDTH].each_ref().map(|row| row[point % WIDTH])
+    }
+
     /// Computes all points relative to an origin.
-    fn relative<S: Simd>(&self, s: S, origin: [f32; 3], points: &mut RelativePoints);
+    #[inline(always)]
+    pub(crate) fn relative<S: Simd>(&self, s: S, origin: [f32; 3], points: &mut RelativePoints) {
+        for (part, rows) in self.parts.iter().enumerate() {
+            points.put(s, part, load(s, rows), origin);
+        }
+    }
+}
+
+/// A leaf's record.
+pub(crate) trait LeafMesh: TriangleBlock {
+    /// The leaf as points and triangles; `code` is its child code.
+    fn points(&self, code: u32) -> LeafPoints<'_>;
     /// The triangles whose corners all lie beyond the same side of the bounds, a bit each: all rays miss them.
     fn outside<S: Simd, H: PacketBounds<S>>(&self, s: S, bounds: &H) -> u32;
 }
@@ -58,29 +89,11 @@ fn load<S: Simd>(s: S, rows: &[[f32; WIDTH]; 3]) -> [S::F; 3] {
     [s.load(&rows[0]), s.load(&rows[1]), s.load(&rows[2])]
 }
 
-/// Floats from the begin of the first corner's row of an axis to the end of the third corner's row of that axis.
-const RAW_ROW: usize = 7 * WIDTH;
-
 impl LeafMesh for IndexedLeaf {
-    const PARTS: usize = 1;
-    type Row<'a> = &'a [f32; WIDTH];
     #[inline(always)]
-    fn row(&self, axis: usize) -> &[f32; WIDTH] {
-        &self.vertex[axis]
-    }
-    #[inline(always)]
-    fn at(row: &[f32; WIDTH], point: usize) -> f32 {
-        row[point % WIDTH]
-    }
-    #[inline(always)]
-    fn points_of(&self, triangle: usize) -> [usize; 3] {
-        let at = triangle % WIDTH;
-        let [a, b, c] = &self.corner;
-        [usize::from(a[at]) % WIDTH, usize::from(b[at]) % WIDTH, usize::from(c[at]) % WIDTH]
-    }
-    #[inline(always)]
-    fn relative<S: Simd>(&self, s: S, origin: [f32; 3], points: &mut RelativePoints) {
-        points.put(s, 0, load(s, &self.vertex), origin);
+    fn points(&self, code: u32) -> LeafPoints<'_> {
+        let IndexedLeaf { vertex, corner, first, .. } = self;
+        LeafPoints { parts: slice::from_ref(vertex), corner, first: *first, code }
     }
     #[inline(always)]
     fn outside<S: Simd, H: PacketBounds<S>>(&self, s: S, bounds: &H) -> u32 {
@@ -92,29 +105,9 @@ impl LeafMesh for IndexedLeaf {
 }
 
 impl LeafMesh for RawLeaf {
-    const PARTS: usize = 3;
-    type Row<'a> = &'a [f32; RAW_ROW];
     #[inline(always)]
-    fn row(&self, axis: usize) -> &[f32; RAW_ROW] {
-        self.corner.as_flattened().as_flattened()[axis * WIDTH..]
-            .first_chunk()
-            .expect("up to the last corner")
-    }
-    #[inline(always)]
-    fn at(row: &[f32; RAW_ROW], point: usize) -> f32 {
-        // Between the rows of two corners lie the rows of the other two axes.
-        row[(point + point / WIDTH * (2 * WIDTH)).min(RAW_ROW - 1)]
-    }
-    #[inline(always)]
-    fn points_of(&self, triangle: usize) -> [usize; 3] {
-        let at = triangle % WIDTH;
-        [at, WIDTH + at, 2 * WIDTH + at]
-    }
-    #[inline(always)]
-    fn relative<S: Simd>(&self, s: S, origin: [f32; 3], points: &mut RelativePoints) {
-        for c in 0..3 {
-            points.put(s, c, load(s, &self.corner[c]), origin);
-        }
+    fn points(&self, code: u32) -> LeafPoints<'_> {
+        LeafPoints { parts: &self.corner, corner: &OWN_POINTS, first: self.first, code }
     }
     #[inline(always)]
     fn outside<S: Simd, H: PacketBounds<S>>(&self, s: S, bounds: &H) -> u32 {

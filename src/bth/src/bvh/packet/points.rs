@@ -6,8 +6,8 @@ use crate::intersect::exact_lanes::F32Lanes;
 use crate::simd::{LANES, Lanewise, Simd};
 use bth_format::layout::WIDTH;
 
-/// Greatest number of points of a leaf.
-pub(crate) const POINTS: usize = 3 * WIDTH;
+/// Upper bound on the number of points of a leaf, three for each triangle: a power of two, to which indices are easily limited.
+pub(crate) const POINTS: usize = 4 * WIDTH;
 
 /// Projected points of a leaf: for each point x, y and depth in the projections along sixteen rays.
 #[derive(Clone, Copy, Debug)]
@@ -32,13 +32,13 @@ impl ProjectedPoints {
     }
 }
 
-/// Points of a leaf relative to the common origin of the rays: for each axis three rows of sixteen coordinates.
+/// Points of a leaf relative to the common origin of the rays: for each axis rows of sixteen coordinates.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(crate) struct RelativePoints([[F32Lanes; 3]; 3]);
+pub(crate) struct RelativePoints([[F32Lanes; POINTS / LANES]; 3]);
 
 impl RelativePoints {
-    pub(crate) const NONE: RelativePoints = RelativePoints([[[0.0; LANES]; 3]; 3]);
+    pub(crate) const NONE: RelativePoints = RelativePoints([[[0.0; LANES]; POINTS / LANES]; 3]);
 
     /// Stores sixteen points, given as rows of x, y and z, relative to `origin`.
     #[inline(always)]
@@ -54,8 +54,8 @@ impl RelativePoints {
         self.0[axis].as_flattened().first_chunk().expect("a row holds all points")
     }
 
-    /// Upper bounds of |x| or |y| and of |depth| in the projection along any ray, over the points whose bit is set in `used`. `parts` is
-    /// [`LeafMesh::PARTS`](super::leaf_mesh::LeafMesh::PARTS).
+    /// Upper bounds of |x| or |y| and of |depth| in the projection along any ray, over the points whose bit is set in `used`, which
+    /// lie in the first `parts` rows.
     #[inline(always)]
     pub(crate) fn spread<S: Simd>(&self, s: S, view: &FrustumView, parts: usize, used: u64) -> [f32; 2] {
         let (mut size, mut depth) = (s.splat(0.0), s.splat(0.0));

@@ -6,10 +6,9 @@
 
 use super::bounds::PacketBounds;
 use super::hit_cache::{CachedHits, UNCACHED};
-use super::leaf_mesh::Leaf;
+use super::leaf_mesh::LeafPoints;
 use super::projection::Projection;
 use crate::intersect::exact_lanes::{Intersections, Pairs};
-use crate::intersect::filter::TriangleBlock;
 use crate::intersect::prepare::{self, Axes, CommonAxis, MixedAxes};
 use crate::simd::{LANES, Lanewise, Part, Simd};
 use bth_format::layout::NONE;
@@ -144,21 +143,15 @@ impl<S: Simd> RayGroup<S> {
 
     /// Stores an uncached pending hit of lanes.
     #[inline(always)]
-    pub(crate) fn store_uncached<B: TriangleBlock>(
-        &mut self,
-        s: S,
-        m: S::M,
-        leaf: &Leaf<'_, B>,
-        triangle: u32,
-    ) {
+    pub(crate) fn store_uncached(&mut self, s: S, m: S::M, leaf: &LeafPoints<'_>, triangle: u32) {
         self.leaf = s.select_u(m, s.splat_u(leaf.code), self.leaf);
         self.triangle = s.select_u(m, s.splat_u(triangle), self.triangle);
-        self.index = s.select_u(m, s.splat_u(leaf.block.first() + triangle), self.index);
-        for c in 0..3 {
+        self.index = s.select_u(m, s.splat_u(leaf.first + triangle), self.index);
+        for (corner, point) in self.corner.iter_mut().zip(leaf.points_of(triangle as usize)) {
+            // Each is loaded directly from the leaf: loading vectors from an array that was just written by words would stall.
+            let point = leaf.point(point);
             for k in 0..3 {
-                // Each is loaded directly from the leaf: loading vectors from an array that was just written by words would stall.
-                let x = s.splat(leaf.block.coordinate(triangle as usize, c, k));
-                self.corner[c][k] = s.select(m, x, self.corner[c][k]);
+                corner[k] = s.select(m, s.splat(point[k]), corner[k]);
             }
         }
     }

@@ -11,7 +11,6 @@ use super::children::{Children, meeting};
 use super::entry::{GROUPS, PACKET, StackEntry};
 use super::frustum::Frustum;
 use super::hit_cache::CachedHits;
-use super::leaf_mesh::Leaf;
 use super::packet_rays::PacketRays;
 use super::ray_group::{IntersectGroup, RayGroup};
 use super::single_rays::FEW_OF_PACKET;
@@ -97,7 +96,8 @@ impl<S: Simd, Q: Query, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, 
         'steps: loop {
             steps += 1;
             used += mask.count_ones();
-            match Child::from_code(code) {
+            let (mut indexed, mut raw) = (None, None);
+            let reached = match Child::from_code(code) {
                 Some(Child::Node(line)) => {
                     let node = object.node(line);
                     let entries =
@@ -108,22 +108,15 @@ impl<S: Simd, Q: Query, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, 
                         let (rays, node) = (mask, (line, node));
                         Children { bounds, groups, rays, node, limit, entries, goal }.inline_or_call(s)
                     };
+                    None
                 }
                 Some(Child::Indexed(line)) => {
-                    let mut unpacked = None;
-                    let leaf = Leaf { block: nodes::indexed(s, object, line, &mut unpacked), code };
-                    if rays.enter_leaf(s, bounds, groups, (points, relative), &leaf, mask) && !H::is_any(goal)
-                    {
-                        limit = farthest_limit(s, groups);
-                    }
+                    let block = nodes::indexed(s, object, line, &mut indexed);
+                    rays.reached(s, bounds, groups, (block, code), mask)
                 }
                 Some(Child::Raw(line)) => {
-                    let mut unpacked = None;
-                    let leaf = Leaf { block: nodes::raw(s, object, line, &mut unpacked), code };
-                    if rays.enter_leaf(s, bounds, groups, (points, relative), &leaf, mask) && !H::is_any(goal)
-                    {
-                        limit = farthest_limit(s, groups);
-                    }
+                    let block = nodes::raw(s, object, line, &mut raw);
+                    rays.reached(s, bounds, groups, (block, code), mask)
                 }
                 Some(Child::Tets(row)) => {
                     code = object.tet_leaves[row as usize].subtree;
@@ -133,7 +126,13 @@ impl<S: Simd, Q: Query, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, 
                     continue;
                 }
                 Some(Child::Packed(_)) => return PacketOutcome::Refused,
-                None => {}
+                None => None,
+            };
+            if let Some(reached) = reached
+                && rays.enter_triangles(s, bounds, groups, (points, relative), reached)
+                && !H::is_any(goal)
+            {
+                limit = farthest_limit(s, groups);
             }
             if rays.alive == 0 {
                 break;

@@ -8,7 +8,7 @@
 use super::bounds::PacketBounds;
 use super::hit_cache::UNCACHED;
 use super::leaf_mesh::{LeafMesh, LeafPoints, Outside};
-use super::packet_rays::PacketRays;
+use super::packet_rays::{PacketRays, SettleLanes};
 use super::points::{CornerSource, ProjectedMaxima, ProjectedOnDemand, ProjectedPoints, RelativePoints};
 use super::ray_group::{RayGroup, RayLimits};
 use super::single_rays::FEW_OF_GROUP;
@@ -322,7 +322,7 @@ impl<Q: Query> PacketRays<'_, Q> {
                 clear
             };
             if maybe & !clear != 0 {
-                self.settle_lanes(s, group, at, candidate, maybe & !clear);
+                s.call(SettleLanes { rays: self, group, at, candidate, lanes: maybe & !clear });
                 nearer = true;
                 active &= (self.alive >> (at * LANES)) as u32;
             }

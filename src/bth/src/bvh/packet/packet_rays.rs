@@ -6,7 +6,7 @@ use super::single_rays::SingleRays;
 use crate::bvh::candidate::{Candidate, settle};
 use crate::query::Query;
 use crate::rays::Ray;
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Part, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 
@@ -52,10 +52,29 @@ impl UncachedHits {
     }
 }
 
+/// [`PacketRays::settle_lanes`] as a part of kernels: it is rare, so they call it on every instruction set.
+pub(super) struct SettleLanes<'p, 'a, S: Simd, Q: Query> {
+    pub(super) rays: &'p mut PacketRays<'a, Q>,
+    pub(super) group: &'p mut RayGroup<S>,
+    /// Index of the group.
+    pub(super) at: usize,
+    pub(super) candidate: Candidate,
+    /// A bit each.
+    pub(super) lanes: u32,
+}
+
+impl<S: Simd, Q: Query> Part<S> for SettleLanes<'_, '_, S, Q> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self, s: S) {
+        self.rays.settle_lanes(s, self.group, self.at, self.candidate, self.lanes);
+    }
+}
+
 impl<Q: Query> PacketRays<'_, Q> {
     /// Decides a candidate for the rays of lanes, and before it their pending hits.
     #[inline(always)]
-    pub(super) fn settle_lanes<S: Simd>(
+    fn settle_lanes<S: Simd>(
         &mut self,
         s: S,
         group: &mut RayGroup<S>,

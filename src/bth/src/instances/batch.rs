@@ -28,7 +28,7 @@ const CHUNK: usize = 2048;
 /// the cost of a further batch is small. Fewer rays are joined with those through other instances of the same object.
 const MIN_RAYS_PER_INSTANCE: usize = 256;
 
-/// A query over the rays of a batch.
+/// A query over the rays of a batch. The kernels are compiled once for all.
 trait SceneQuery {
     /// The greatest t of hits that can still change the result of a ray; `None` if its query is complete.
     fn tmax(&self, ray: usize) -> Option<f32>;
@@ -96,15 +96,15 @@ impl Kernel for StartKernel<'_> {
 }
 
 /// Kernel that advances each active ray to its next instance, and removes the rays that have ended.
-struct AdvanceKernel<'a, Q: ?Sized> {
+struct AdvanceKernel<'a> {
     batch: &'a SceneBatch<'a>,
-    query: &'a Q,
+    query: &'a dyn SceneQuery,
     /// Index of the first ray of the chunk.
     first: usize,
     active_rays: &'a mut ActiveRays,
 }
 
-impl<Q: SceneQuery + ?Sized> Kernel for AdvanceKernel<'_, Q> {
+impl Kernel for AdvanceKernel<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -198,26 +198,12 @@ impl World {
             .any(|from| starts.instance(*from).is_some() && (starts.is_of_use || self.has_single_visible()))
     }
 
-    fn run<Q: SceneQuery>(
+    fn run(
         &self,
         objects: &Objects,
         rays: &[Ray],
         from: Option<&[PrimitiveRef]>,
-        query: &mut Q,
-    ) {
-        if SMALL {
-            // One kernel for all queries.
-            return self.run_query::<dyn SceneQuery + '_>(objects, rays, from, query);
-        }
-        self.run_query(objects, rays, from, query);
-    }
-
-    fn run_query<Q: SceneQuery + ?Sized>(
-        &self,
-        objects: &Objects,
-        rays: &[Ray],
-        from: Option<&[PrimitiveRef]>,
-        query: &mut Q,
+        query: &mut dyn SceneQuery,
     ) {
         let batch = SceneBatch { world: self, objects, rays, from };
         // They are taken out while they are in use, so that after a panic the next batch begins with new memory.
@@ -249,7 +235,7 @@ impl World {
     }
 
     /// Traces all queued visits, object by object, and empties the queue.
-    fn trace(&self, batch: &SceneBatch<'_>, query: &mut (impl SceneQuery + ?Sized), visits: &mut VisitQueue) {
+    fn trace(&self, batch: &SceneBatch<'_>, query: &mut dyn SceneQuery, visits: &mut VisitQueue) {
         self.by_object(visits, |object, visits| {
             self.mark_traced(object);
             let object = batch.objects.view(object);

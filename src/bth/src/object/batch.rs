@@ -19,6 +19,7 @@ use crate::simd::{Isa, Kernel, Simd};
 use crate::tets::enter_tets;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
+use std::time::Instant;
 
 /// Least number of rays of a batch; fewer rays are traced one after the other.
 pub(crate) const MIN_BATCH: usize = 4;
@@ -29,15 +30,30 @@ pub(super) fn address_of(object: &ObjectView<'_>) -> usize {
 }
 
 /// Traces a batch by the strategy that was measured to be faster for such rays on this thread, and measures it. The measurements are
-/// those of an address, of an object or a scene, and of a kind of rays ([`HintUse::kind`]). `unmeasured` is the strategy of small
+/// those of a `key`: the address of an object or a scene, and a kind of rays ([`HintUse::kind`]). `unmeasured` is the strategy of small
 /// batches before there are measurements.
 pub(crate) fn by_hint(
-    (address, kind): (usize, usize),
+    key: (usize, usize),
     rays: usize,
     unmeasured: Strategy,
     scratch: &mut Scratch,
     trace: impl FnOnce(Strategy, &mut Scratch),
 ) {
+    let (strategy, start) = choose(key, rays, unmeasured, scratch);
+    trace(strategy, scratch);
+    if let Some(start) = start {
+        record(key, rays, strategy, start, scratch);
+    }
+}
+
+/// The strategy of a batch, and the time if it is to be measured. The parameters are those of [`by_hint`].
+#[inline(never)]
+fn choose(
+    (address, kind): (usize, usize),
+    rays: usize,
+    unmeasured: Strategy,
+    scratch: &mut Scratch,
+) -> (Strategy, Option<Instant>) {
     let hinted = Hinted::chosen();
     let choice = scratch.choices.of(address, kind);
     let measured = rays >= MIN_MEASURED_RAYS && hinted == Hinted::Measured;
@@ -47,12 +63,20 @@ pub(crate) fn by_hint(
         Hinted::Measured if measured => choice.next(),
         Hinted::Measured => choice.best_or(unmeasured),
     };
-    let start = if measured { clock::now() } else { None };
-    trace(strategy, scratch);
-    if let Some(start) = start {
-        let seconds_per_ray = start.elapsed().as_secs_f64() / rays as f64;
-        scratch.choices.of(address, kind).record(strategy, seconds_per_ray);
-    }
+    (strategy, if measured { clock::now() } else { None })
+}
+
+/// Records the time since `start`, in which a strategy traced a batch.
+#[inline(never)]
+fn record(
+    (address, kind): (usize, usize),
+    rays: usize,
+    strategy: Strategy,
+    start: Instant,
+    scratch: &mut Scratch,
+) {
+    let seconds_per_ray = start.elapsed().as_secs_f64() / rays as f64;
+    scratch.choices.of(address, kind).record(strategy, seconds_per_ray);
 }
 
 /// Fills `hits` with [`Hit::MISS`].

@@ -94,11 +94,18 @@ fn with_hints(
     scratch: &mut Scratch,
     work: impl FnOnce(&[u32], &mut Scratch),
 ) {
+    let hints = take_hints(from, instance, scratch);
+    work(&hints, scratch);
+    scratch.hints = hints;
+}
+
+/// The hints of [`with_hints`], in the memory of `scratch`.
+#[inline(never)]
+fn take_hints(from: &[PrimitiveRef], instance: u32, scratch: &mut Scratch) -> Vec<u32> {
     let mut hints = std::mem::take(&mut scratch.hints);
     hints.clear();
     hints.extend(from.iter().map(|from| from.triangle_of(instance)));
-    work(&hints, scratch);
-    scratch.hints = hints;
+    hints
 }
 
 /// Stores the answers of those of the rays `rest`, by their ascending indices, that hit anything, from a copy of these rays. All answers

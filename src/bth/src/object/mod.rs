@@ -21,6 +21,7 @@ use bth_format::object::ObjectView;
 
 /// Nearest hit of a ray in object space; `from` is the triangle on which it starts, or `NONE`, and `instance` is reported with a
 /// hit.
+#[inline(never)]
 pub(crate) fn nearest(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> Hit {
     let mut hit = Hit::MISS;
     trace_nearest(object, ray, from, instance, &mut hit);
@@ -41,6 +42,7 @@ pub(crate) fn nearest_counted(object: &ObjectView<'_>, ray: &Ray, from: u32, ins
 }
 
 /// Whether a ray in object space hits anything; `from` as for [`nearest`].
+#[inline(never)]
 pub(crate) fn any(object: &ObjectView<'_>, ray: &Ray, from: u32) -> bool {
     trace_any(object, ray, from)
 }

@@ -20,6 +20,13 @@ pub(crate) struct Scratch {
     pub(super) gathered: Vec<Ray>,
 }
 
+/// The first scratch memory of a thread.
+#[cold]
+#[inline(never)]
+fn new_scratch() -> Box<Scratch> {
+    Box::default()
+}
+
 /// Calls `work` with the thread's scratch memory.
 #[inline(always)]
 pub(crate) fn with_scratch<R>(work: impl FnOnce(&mut Scratch) -> R) -> R {
@@ -28,7 +35,7 @@ pub(crate) fn with_scratch<R>(work: impl FnOnce(&mut Scratch) -> R) -> R {
     }
     // The memory is taken out of the cell while it is in use, so that after a panic the next batch begins with new memory.
     SCRATCH.with(|cell| {
-        let mut scratch = cell.take().unwrap_or_default();
+        let mut scratch = cell.take().unwrap_or_else(new_scratch);
         let result = work(&mut scratch);
         cell.set(Some(scratch));
         result

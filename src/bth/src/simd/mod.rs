@@ -15,6 +15,8 @@
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+#[cfg(target_arch = "x86_64")]
+mod detected;
 mod isa;
 #[cfg(any(
     target_arch = "x86_64",

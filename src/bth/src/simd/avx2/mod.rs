@@ -9,9 +9,9 @@ mod rows;
 
 use self::packing::{compression, expansion};
 use self::rows::{IN_ORDER, columns8, transpose4, transpose8};
+use super::detected::Detected;
 use super::{Kernel, LANES, Lanewise, Part, Simd, assert_indices, one_piece, scalar, valid_indices};
 use std::arch::x86_64::*;
-use std::sync::LazyLock;
 
 /// Proof that this machine has AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT.
 #[derive(Clone, Copy, Debug)]
@@ -25,7 +25,7 @@ type M = [__m256i; 2];
 impl Avx2 {
     #[inline]
     pub(super) fn detect() -> Option<Self> {
-        static AVX2_FOUND: LazyLock<bool> = LazyLock::new(|| {
+        static AVX2_FOUND: Detected = Detected::new(|| {
             is_x86_feature_detected!("avx2")
                 && is_x86_feature_detected!("fma")
                 && is_x86_feature_detected!("bmi1")
@@ -33,7 +33,7 @@ impl Avx2 {
                 && is_x86_feature_detected!("lzcnt")
                 && is_x86_feature_detected!("popcnt")
         });
-        AVX2_FOUND.then_some(Avx2(()))
+        AVX2_FOUND.get().then_some(Avx2(()))
     }
 
     /// Runs a kernel compiled for these features.

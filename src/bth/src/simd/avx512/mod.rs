@@ -11,9 +11,9 @@ mod transpose;
 use self::rows::{COLUMNS5, ROWS5, columns8, concat_quarters};
 use self::sort::{keys_with_lanes, nearest_of_four, store_far_to_near};
 use self::transpose::{transpose4, transpose16};
+use super::detected::Detected;
 use super::{Kernel, LANES, Lanewise, Part, Simd, assert_indices, one_piece, valid_indices};
 use std::arch::x86_64::*;
-use std::sync::LazyLock;
 
 /// Proof that this machine has AVX-512 F, BW, CD, DQ and VL, AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT.
 #[derive(Clone, Copy, Debug)]
@@ -22,7 +22,7 @@ pub(super) struct Avx512(());
 impl Avx512 {
     #[inline]
     pub(super) fn detect() -> Option<Self> {
-        static AVX512_FOUND: LazyLock<bool> = LazyLock::new(|| {
+        static AVX512_FOUND: Detected = Detected::new(|| {
             is_x86_feature_detected!("avx512f")
                 && is_x86_feature_detected!("avx512bw")
                 && is_x86_feature_detected!("avx512cd")
@@ -35,7 +35,7 @@ impl Avx512 {
                 && is_x86_feature_detected!("lzcnt")
                 && is_x86_feature_detected!("popcnt")
         });
-        AVX512_FOUND.then_some(Avx512(()))
+        AVX512_FOUND.get().then_some(Avx512(()))
     }
 
     /// Runs a kernel compiled for these features.

@@ -5,9 +5,9 @@
 #![allow(unsafe_code)]
 
 use super::{LANES, QUAD, QUADS, Quad, Quads};
+use crate::simd::detected::Detected;
 use crate::simd::{Kernel, Part};
 use std::arch::x86_64::*;
-use std::sync::LazyLock;
 
 /// Proof that this machine has SSE4.1, SSSE3 and POPCNT.
 #[derive(Clone, Copy, Debug)]
@@ -16,12 +16,12 @@ pub(in crate::simd) struct Sse4(());
 impl Sse4 {
     #[inline]
     pub(in crate::simd) fn detect() -> Option<Self> {
-        static SSE4_FOUND: LazyLock<bool> = LazyLock::new(|| {
+        static SSE4_FOUND: Detected = Detected::new(|| {
             is_x86_feature_detected!("sse4.1")
                 && is_x86_feature_detected!("ssse3")
                 && is_x86_feature_detected!("popcnt")
         });
-        SSE4_FOUND.then_some(Sse4(()))
+        SSE4_FOUND.get().then_some(Sse4(()))
     }
 
     /// Runs a kernel compiled for these features.

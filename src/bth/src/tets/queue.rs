@@ -135,6 +135,33 @@ impl<S: Simd> Part<S> for OfRays<'_, S> {
     }
 }
 
+/// [`PreparedWalks::set_face`] as a part of kernels, of which there are four calls.
+struct SetFace<'a, S: Simd> {
+    lanes: &'a mut Lanes<S>,
+    m: S::M,
+    vertices: &'a [[f32; 4]],
+    face: [S::U; 3],
+}
+
+impl<S: Simd> Part<S> for SetFace<'_, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self, s: S) {
+        let SetFace { lanes, m, vertices, face } = self;
+        let mut extent = Extent::least(s);
+        for (i, vertex) in face.into_iter().enumerate() {
+            let corner = lanes.project(s, lanes.gather_positions(s, m, vertices, vertex));
+            extent = extent.with(s, &corner).0;
+            lanes.words[word::FACE + i] = vertex;
+            lanes.floats[float::X + i] = corner.x;
+            lanes.floats[float::Y + i] = corner.y;
+            lanes.floats[float::DEPTH + i] = corner.depth;
+        }
+        lanes.floats[float::REACH] = extent.reach;
+        lanes.floats[float::SIZE] = extent.size;
+    }
+}
+
 /// Slack of comparisons of `depth` with bounds of t.
 #[inline(always)]
 fn slack<S: Simd>(s: S, depth: S::F) -> S::F {
@@ -194,18 +221,7 @@ impl<S: Simd> PreparedWalks<S> {
     /// Projects faces with these vertices and sets them as the entered faces.
     #[inline(always)]
     fn set_face(&mut self, s: S, m: S::M, vertices: &[[f32; 4]], face: [S::U; 3]) {
-        let lanes = &mut self.lanes;
-        let mut extent = Extent::least(s);
-        for (i, vertex) in face.into_iter().enumerate() {
-            let corner = lanes.project(s, lanes.gather_positions(s, m, vertices, vertex));
-            extent = extent.with(s, &corner).0;
-            lanes.words[word::FACE + i] = vertex;
-            lanes.floats[float::X + i] = corner.x;
-            lanes.floats[float::Y + i] = corner.y;
-            lanes.floats[float::DEPTH + i] = corner.depth;
-        }
-        lanes.floats[float::REACH] = extent.reach;
-        lanes.floats[float::SIZE] = extent.size;
+        s.call(SetFace { lanes: &mut self.lanes, m, vertices, face });
     }
 
     /// Prepares the rays with indices `ray` in `rays`, whose walks begin at the faces with the vertices `face`.

@@ -139,11 +139,11 @@ impl TopLevelPackets {
         for (i, group) in groups.iter_mut().enumerate() {
             let end = rays.len().min((i + 1) * LANES);
             let rays = &rays[i * LANES..end];
-            if !PrepareGroup::<S, Frustum<S, false>>::of(group, bounds, rays, true).inline_or_call(s) {
+            if !PrepareGroup::<S, Frustum<S, false>>::of(group, bounds, rays, true).inline_or_share(s) {
                 return Listed::Incoherent;
             }
         }
-        let frustum = FrustumOf::<S, false> { bounds, span: &span, groups }.inline_or_call(s);
+        let frustum = FrustumOf::<S, false> { bounds, span: &span, groups }.inline_or_share(s);
         let all = u64::MAX >> (PACKET - rays.len());
         let begin = self.items.len();
         let mut stack = [0; MAX_STACKED_NODES];

@@ -55,6 +55,15 @@ pub trait Part<S> {
     {
         if S::INLINES_PARTS { self.run(simd) } else { simd.call(self) }
     }
+    /// As [`Self::inline_or_call`], for parts that several kernels have in common: see [`Simd::INLINES_SHARED_PARTS`].
+    #[inline(always)]
+    fn inline_or_share(self, simd: S) -> Self::Output
+    where
+        Self: Sized,
+        S: Simd,
+    {
+        if S::INLINES_SHARED_PARTS { self.run(simd) } else { simd.call(self) }
+    }
 }
 
 /// Operations on vectors that treat each lane alone. A vector has sixteen lanes or, in a [piece](Simd::Piece), some of the sixteen;
@@ -152,6 +161,8 @@ pub trait Simd: Lanewise {
     /// Whether kernels contain their larger parts. Otherwise they call them ([`Self::call`]), because unrolled in every kernel, with
     /// several registers for each vector, these would be the largest part of the library.
     const INLINES_PARTS: bool = true;
+    /// Whether kernels contain parts that other kernels contain, too.
+    const INLINES_SHARED_PARTS: bool = Self::INLINES_PARTS;
     /// The lanes of one register, where a vector fills several. Parts that are called treat one piece after the other where they can:
     /// all their variables are then in registers, and pieces without work are left out.
     type Piece: Lanewise;

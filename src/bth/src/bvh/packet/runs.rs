@@ -251,7 +251,9 @@ fn frustum<S: Simd, Q: Query, const POINT: bool>(
         return PacketOutcome::Refused;
     }
     let groups = &packets.groups[..rays.len().div_ceil(LANES)];
-    let frustum = FrustumOf::<S, POINT> { bounds, span, groups }.inline_or_call(s);
+    let frustum = FrustumOf::<S, POINT> { bounds, span, groups };
+    // Only one kernel has packets from a point.
+    let frustum = if POINT { frustum.inline_or_call(s) } else { frustum.inline_or_share(s) };
     packets.buffers.hit_cache.clear(s, POINT);
     TracePacket { packets, object, bounds: &frustum, rays, sink }.inline_or_call(s)
 }
@@ -267,7 +269,8 @@ fn prepare<S: Simd, Q: Query, H: PacketBounds<S>>(
 ) -> bool {
     let mut ready = true;
     for (group, rays) in packets.groups.iter_mut().zip(rays.chunks(LANES)) {
-        ready &= PrepareGroup::<S, H>::of(group, bounds, rays, keeps_lines).inline_or_call(s);
+        let group = PrepareGroup::<S, H>::of(group, bounds, rays, keeps_lines);
+        ready &= if H::COMMON_ORIGIN { group.inline_or_call(s) } else { group.inline_or_share(s) };
     }
     ready
 }

@@ -234,6 +234,9 @@ impl Lanewise for Avx2 {
 impl Simd for Avx2 {
     one_piece!();
 
+    // With two registers for each vector, these parts are long, and calls take no measurable time.
+    const INLINES_SHARED_PARTS: bool = false;
+
     #[inline(always)]
     fn call<P: Part<Self>>(self, part: P) -> P::Output {
         // SAFETY: self proves that the machine has the features that `part_entry` enables.

@@ -203,9 +203,34 @@ impl<'a> Runs<'a, '_> {
         None
     }
 
-    /// Adds rays to `rest`.
+    /// Adds rays to `rest`. Not inlined into every kernel.
+    #[inline(never)]
     fn skip(&mut self, first: usize, count: usize) {
         self.rest.extend(first as u32..(first + count) as u32);
+    }
+}
+
+/// The choice of the kind of packet that rays may make, if any, as a part of kernels.
+struct Choose<'a> {
+    bounds: &'a ObjectBounds,
+    rays: &'a [Ray],
+    /// Whether the rays may make a packet of coherent rays, or one of short rays.
+    try_coherent: bool,
+    try_short: bool,
+}
+
+impl<S: Simd> Part<S> for Choose<'_> {
+    type Output = Option<Kind>;
+    #[inline(always)]
+    fn run(self, s: S) -> Option<Kind> {
+        let span = Span::of(s, self.rays);
+        if self.try_coherent && span.is_coherent() {
+            return Some(Kind::Coherent(span));
+        }
+        if self.try_short {
+            return span.segments(s, self.bounds, self.rays).map(Kind::Short);
+        }
+        None
     }
 }
 
@@ -226,14 +251,7 @@ fn choose(
     if !try_coherent && !try_short {
         return None;
     }
-    let span = Span::of(s, rays);
-    if try_coherent && span.is_coherent() {
-        return Some(Kind::Coherent(span));
-    }
-    if try_short {
-        return span.segments(s, bounds, rays).map(Kind::Short);
-    }
-    None
+    Choose { bounds, rays, try_coherent, try_short }.inline_or_share(s)
 }
 
 /// Traces a run of coherent rays. The parameters are separate, because this is a part of the kernel [`trace`].

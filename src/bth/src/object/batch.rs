@@ -194,18 +194,26 @@ fn trace_hinted<Q: Query>(
 }
 
 /// Traces coherent rays in packets and returns their number. If it is not 0, the indices of the other rays are stored in
-/// `scratch.packets.rest`. In scalar code there are no packets, and the number is 0.
+/// `scratch.packets.rest`. In scalar code there are no packets, and the number is 0. With vectors of 128 bits, with which kernels are
+/// long, one kernel serves both goals.
 fn in_packets<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     scratch: &mut Scratch,
     sink: &mut Sink<'_, Q>,
 ) -> usize {
-    let (scratch, least) = (&mut scratch.packets, packet::MINIMUM_USE);
-    Isa::chosen().run_wide(Packets { object, rays, scratch, least, sink }).map_or(0, |count| count.rays)
+    let (isa, scratch, least) = (Isa::chosen(), &mut scratch.packets, packet::MINIMUM_USE);
+    let count = match isa.run_long_vectors(Packets { object, rays, scratch, least, sink }) {
+        Ok(count) => count,
+        Err(Packets { scratch, sink, .. }) => {
+            let sink = &mut sink.either();
+            isa.run_quads(Packets { object, rays, scratch, least, sink }).unwrap_or_default()
+        }
+    };
+    count.rays
 }
 
-/// Traces rays through the BVH: interleaved, or in scalar code one after the other.
+/// Traces rays through the BVH: interleaved, or in scalar code one after the other. Kernels are those of [`in_packets`].
 pub(super) fn through_bvh<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
@@ -213,11 +221,18 @@ pub(super) fn through_bvh<Q: Query>(
     scratch: &mut Scratch,
     sink: &mut Sink<'_, Q>,
 ) {
-    if Isa::chosen() == Isa::Scalar {
+    let isa = Isa::chosen();
+    if isa == Isa::Scalar {
         return one_by_one(object, rays, &remaining, sink);
     }
-    // `run_wide` runs nothing in scalar code, which has returned above.
-    let _ = Isa::chosen().run_wide(InterleavedKernel { object, rays, remaining, scratch, sink });
+    let kernel = InterleavedKernel { object, rays, remaining, scratch, sink };
+    if let Err(InterleavedKernel { remaining, scratch, sink, .. }) = isa.run_long_vectors(kernel) {
+        // With 128 bits no walk is compiled, so no ray has been walked before.
+        let remaining = RemainingRays { order: remaining.order, queries: None, walked: None };
+        let sink = &mut sink.either();
+        // This always runs, since scalar code has returned above.
+        let _ = isa.run_quads(InterleavedKernel { object, rays, remaining, scratch, sink });
+    }
 }
 
 /// Implements [`through_bvh`] in scalar code, one ray after the other. Interleaved and packet kernels are not compiled for scalar

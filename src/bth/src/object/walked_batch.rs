@@ -110,6 +110,6 @@ fn walk_tets(
         let mut batch =
             WalkBatch::new(object, records, WalkRays { rays, faces, leaves: &leaves }, queries, walks);
         // Where no walks are compiled, no ray is walked here, and `walks` stays `NotWalked`: rays are faster through the BVH.
-        let _ = Isa::chosen().run_wide(&mut batch);
+        let _ = Isa::chosen().run_long_vectors(&mut batch);
     }
 }

@@ -20,6 +20,8 @@ pub(crate) trait Answers {
     fn lanes(&mut self, ray: usize) -> Option<&mut [Self::Answer; LANES]>;
     /// Exchanges the answers of two rays.
     fn swap(&mut self, a: usize, b: usize);
+    /// These answers, as those of either goal.
+    fn either(&mut self) -> EitherAnswers<'_>;
 }
 
 impl Answers for &mut [Hit] {
@@ -45,6 +47,9 @@ impl Answers for &mut [Hit] {
     fn swap(&mut self, a: usize, b: usize) {
         <[Hit]>::swap(self, a, b);
     }
+    fn either(&mut self) -> EitherAnswers<'_> {
+        EitherAnswers::Nearest(self)
+    }
 }
 
 impl Answers for &mut [bool] {
@@ -69,13 +74,12 @@ impl Answers for &mut [bool] {
     fn swap(&mut self, a: usize, b: usize) {
         <[bool]>::swap(self, a, b);
     }
+    fn either(&mut self) -> EitherAnswers<'_> {
+        EitherAnswers::Any(self)
+    }
 }
 
 /// Answers of either goal.
-#[cfg_attr(
-    not(any(test, feature = "small")),
-    expect(dead_code, reason = "only queries have either goal there")
-)]
 pub(crate) enum EitherAnswers<'a> {
     Nearest(&'a mut [Hit]),
     /// Whether rays hit anything. Of the answers that are stored here nothing else is kept.
@@ -125,5 +129,8 @@ impl Answers for EitherAnswers<'_> {
             EitherAnswers::Nearest(hits) => hits.swap(a, b),
             EitherAnswers::Any(found) => found.swap(a, b),
         }
+    }
+    fn either(&mut self) -> EitherAnswers<'_> {
+        self.reborrow()
     }
 }

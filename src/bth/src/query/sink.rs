@@ -1,6 +1,6 @@
 //! Destination of the answers of a batch: one type for models and for scenes, so that every kernel is compiled once for both.
 
-use super::{AnswerLanes, Answers, AnswersOf, Goal, Query};
+use super::{AnswerLanes, Answers, AnswersOf, EitherQuery, Goal, Query};
 use crate::intersect::exact_lanes::Intersections;
 use crate::rays::{PrimitiveRef, Ray};
 use crate::simd::{LANES, Simd};
@@ -60,6 +60,12 @@ impl<'a, Q: Query> Sink<'a, Q> {
         let (ids, instance, scene) = (self.ids, self.instance, self.scene);
         let answers = Q::Goal::reborrow(&mut self.answers);
         Sink { ids, answers, instance, scene, first: self.first + first }
+    }
+
+    /// A sink for the same rays, to which queries of either goal report.
+    pub(crate) fn either(&mut self) -> Sink<'_, EitherQuery> {
+        let Sink { ids, instance, scene, first, .. } = *self;
+        Sink { ids, answers: self.answers.either(), instance, scene, first }
     }
 
     /// The instance that is reported with a hit of a ray.

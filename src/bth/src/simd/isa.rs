@@ -83,26 +83,14 @@ const NEON: u8 = Isa::Neon as u8 + 1;
 const SIMD128: u8 = Isa::Simd128 as u8 + 1;
 const AVX2: u8 = Isa::Avx2 as u8 + 1;
 
-/// Evaluates the expression with the token of an instruction set with vectors, if it is compiled for this target and this machine has
-/// it.
-macro_rules! with_vectors {
+/// Evaluates the expression with the token of an instruction set with 128-bit vectors, if it is compiled for this target and this
+/// machine has it.
+macro_rules! with_quads {
     ($isa:expr, $simd:ident => $do:expr) => {
         match $isa {
             #[cfg(target_arch = "x86_64")]
             Isa::Sse4 => {
                 if let Some($simd) = super::quads::sse4::Sse4::detect() {
-                    $do;
-                }
-            }
-            #[cfg(target_arch = "x86_64")]
-            Isa::Avx2 => {
-                if let Some($simd) = super::avx2::Avx2::detect() {
-                    $do;
-                }
-            }
-            #[cfg(target_arch = "x86_64")]
-            Isa::Avx512 => {
-                if let Some($simd) = super::avx512::Avx512::detect() {
                     $do;
                 }
             }
@@ -115,6 +103,27 @@ macro_rules! with_vectors {
             Isa::Simd128 => {
                 let $simd = super::quads::simd128::Simd128::new();
                 $do;
+            }
+            _ => {}
+        }
+    };
+}
+
+/// As [`with_quads`], for an instruction set with longer vectors.
+macro_rules! with_long_vectors {
+    ($isa:expr, $simd:ident => $do:expr) => {
+        match $isa {
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx2 => {
+                if let Some($simd) = super::avx2::Avx2::detect() {
+                    $do;
+                }
+            }
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx512 => {
+                if let Some($simd) = super::avx512::Avx512::detect() {
+                    $do;
+                }
             }
             _ => {}
         }
@@ -220,7 +229,8 @@ impl Isa {
     #[inline(always)]
     pub fn run<K: Kernel>(self, kernel: K) -> K::Output {
         // This repeats `run_wide`, because its `Result` would cost one more copy of the output.
-        with_vectors!(self, simd => return simd.run(kernel));
+        with_long_vectors!(self, simd => return simd.run(kernel));
+        with_quads!(self, simd => return simd.run(kernel));
         run_scalar(kernel)
     }
 
@@ -228,7 +238,23 @@ impl Isa {
     /// are no faster than other code without vectors: they are not compiled to scalar code.
     #[inline(always)]
     pub(crate) fn run_wide<K: Kernel>(self, kernel: K) -> Result<K::Output, K> {
-        with_vectors!(self, simd => return Ok(simd.run(kernel)));
+        with_long_vectors!(self, simd => return Ok(simd.run(kernel)));
+        with_quads!(self, simd => return Ok(simd.run(kernel)));
+        Err(kernel)
+    }
+
+    /// As [`Self::run_wide`], only with vectors of more than 128 bits. With [`Self::run_quads`] it serves kernels that are compiled for
+    /// another type where code is long.
+    #[inline(always)]
+    pub(crate) fn run_long_vectors<K: Kernel>(self, kernel: K) -> Result<K::Output, K> {
+        with_long_vectors!(self, simd => return Ok(simd.run(kernel)));
+        Err(kernel)
+    }
+
+    /// As [`Self::run_wide`], only with vectors of 128 bits.
+    #[inline(always)]
+    pub(crate) fn run_quads<K: Kernel>(self, kernel: K) -> Result<K::Output, K> {
+        with_quads!(self, simd => return Ok(simd.run(kernel)));
         Err(kernel)
     }
 }

@@ -76,7 +76,7 @@ impl SingleRays {
                 depths: &mut self.depths[at % GROUPS],
                 for_boxes,
             };
-            convert.inline_or_call(s);
+            if for_boxes { convert.inline_or_share(s) } else { convert.inline_or_call(s) }
         }
     }
 

@@ -102,7 +102,7 @@ impl Kernel for WalkKernel<'_> {
                             code = leaf.subtree;
                             continue;
                         }
-                        walk.faces(s, &point, leaf, search);
+                        s.call(Faces { walk, point: &point, leaf, search });
                     }
                     // An empty slot, or the bottom of the stack.
                     _ if stack.is_empty() => break,
@@ -132,9 +132,42 @@ impl<S: Simd, B: CornerLanes> Part<S> for Candidates<'_, S, B> {
         if block.is_beyond(s, point, limit) {
             return 0;
         }
-        let bounds = TriangleLanes::new(s, &block.relative(s, point));
+        CandidatesOf { corners: &block.relative(s, point), valid, limit, is_offered }.inline_or_share(s)
+    }
+}
+
+/// [`Candidates`], given the corners of the triangles relative to the point: the same for leaves of both record formats.
+struct CandidatesOf<'a, S: Simd> {
+    corners: &'a [[S::F; 3]; 3],
+    valid: u32,
+    limit: f32,
+    is_offered: bool,
+}
+
+impl<S: Simd> Part<S> for CandidatesOf<'_, S> {
+    type Output = u32;
+    #[inline(always)]
+    fn run(self, s: S) -> u32 {
+        let CandidatesOf { corners, valid, limit, is_offered } = self;
+        let bounds = TriangleLanes::new(s, corners);
         let least = if is_offered { bounds.least_upper_bound(s, valid) } else { limit };
         bounds.candidates(s, valid, least.min(limit))
+    }
+}
+
+/// The constrained faces of a tet leaf without a subtree, as a part that kernels call: such leaves are rare.
+struct Faces<'a, 'w, S: Simd> {
+    walk: &'a ObjectWalk<'w>,
+    point: &'a PointLanes<S>,
+    leaf: &'a TetLeaf,
+    search: &'a mut Search,
+}
+
+impl<S: Simd> Part<S> for Faces<'_, '_, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self, s: S) {
+        self.walk.faces(s, self.point, self.leaf, self.search);
     }
 }
 

@@ -2,7 +2,6 @@
 
 use super::bounds::PacketBounds;
 use super::ray_group::RayGroup;
-use crate::SMALL;
 use crate::intersect::prepare::{self, MixedAxes};
 use crate::rays::Ray;
 use crate::simd::{LANES, Lanewise, Part, Simd, lanes_of_piece};
@@ -45,7 +44,7 @@ impl<S: Simd> RayGroup<S> {
             }
         }
         let keeps_lines = keeps_lines && !H::MIXED_OCTANTS;
-        if keeps_lines && (SMALL || !H::COMMON_ORIGIN) {
+        if keeps_lines && (!S::INLINES_PARTS || !H::COMMON_ORIGIN) {
             self.origin = [field[0], field[1], field[2]];
         }
         if keeps_lines {

@@ -9,7 +9,6 @@ use super::frustum::{Frustum, FrustumOf};
 use super::prepare_group::PrepareGroup;
 use super::segment_box::SegmentBox;
 use super::traverse::{PacketOutcome, PacketTracer, TracePacket};
-use crate::SMALL;
 use crate::query::sink::Sink;
 use crate::query::{Goal, Query};
 use crate::rays::Ray;
@@ -129,7 +128,7 @@ fn trace<S: Simd, Q: Query>(
                 (PacketOutcome::Refused, &mut runs.short, least.short, &mut count.short)
             }
             Kind::Short(segments) => {
-                let ready = if SMALL {
+                let ready = if !S::INLINES_PARTS {
                     // One part prepares both kinds.
                     prepare::<S, Q, Frustum<S, false>>(s, &bounds, &mut packets, rays, false)
                 } else {

@@ -14,7 +14,6 @@ use super::hit_cache::CachedHits;
 use super::packet_rays::PacketRays;
 use super::ray_group::{IntersectGroup, RayGroup};
 use super::single_rays::FEW_OF_PACKET;
-use crate::SMALL;
 use crate::bvh::nodes::{self, prefetch};
 use crate::bvh::ray_state::KEY_SLACK;
 use crate::intersect::exact_lanes::{Intersections, OriginTermsLanes};
@@ -192,7 +191,7 @@ fn finish<S: Simd, H: PacketBounds<S>, Q: Query>(
     };
     for (group, intersections) in groups.iter().zip(&mut *intersections) {
         let cached = &mut cached;
-        if SMALL {
+        if !S::INLINES_PARTS {
             // Every ray has its origin, so one part serves all packets.
             let packet = PhantomData::<Frustum<S, false>>;
             IntersectGroup { group, cached, intersections, packet }.inline_or_call(s);

@@ -132,7 +132,7 @@ impl<S: Simd, B: CornerLanes> Part<S> for Candidates<'_, S, B> {
         if block.is_beyond(s, point, limit) {
             return 0;
         }
-        CandidatesOf { corners: &block.relative(s, point), valid, limit, is_offered }.inline_or_share(s)
+        CandidatesOf { corners: &block.relative(s, point), valid, limit, is_offered }.inline_or_call(s)
     }
 }
 

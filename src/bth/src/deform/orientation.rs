@@ -60,6 +60,9 @@ impl Kernel for Positive<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> bool {
         let Positive { blocks, vertices, least } = self;
+        if !S::HAS_VECTORS {
+            return blocks.iter().all(|block| rest_is_positive(block, 0, vertices));
+        }
         let rows = <[[f32; 4]]>::ref_from_bytes(vertices.as_bytes()).ok().expect("a vertex is four words");
         let (all, least, error) = (s.mask(0xffff), s.splat(least), s.splat(ERROR));
         for block in blocks {

@@ -3,7 +3,7 @@
 use super::corners_at;
 use crate::intersect::prepare::load_rays;
 use crate::rays::Ray;
-use crate::simd::{Kernel, LANES, Simd};
+use crate::simd::{Kernel, LANES, Lanewise, Simd};
 use bth_format::layout::{FREE_BINS, FREE_BORDERS, FREE_SIDE, FREE_STEEPEST, FreePlace, NONE};
 use bth_format::object::ObjectView;
 use std::ops::Range;
@@ -89,8 +89,8 @@ struct Block {
     index: [u32; LANES],
 }
 
-/// What follows from the triangles of sixteen rays.
-struct Crossings<S: Simd> {
+/// What follows from the triangles of the rays of a piece.
+struct Crossings<S: Lanewise> {
     /// Bits of the rays whose line certainly crosses the triangle before `tmin` to its front, and to its back.
     front: u32,
     back: u32,
@@ -133,8 +133,15 @@ impl Block {
         if known == 0 {
             return 0;
         }
-        let crossings = self.crossings(s, fields);
-        s.store_u(crossings.bins, &mut self.bins);
+        let (mut to_front, mut to_back, mut start) = (0, 0, s.splat(0.0));
+        for i in 0..S::PIECES {
+            let p = s.piece(i);
+            let crossings = self.crossings(p, fields.map(|field| S::pick(p, &field)));
+            to_front |= crossings.front;
+            to_back |= crossings.back;
+            S::put(p, &mut start, crossings.start);
+            p.store_u(crossings.bins, &mut self.bins);
+        }
         let (mut free, mut back, mut near) = (0, 0, 0);
         for lane in 0..LANES {
             let row = &rows[if known >> lane & 1 == 1 { from[lane] as usize } else { 0 }];
@@ -143,10 +150,10 @@ impl Block {
             back |= (row.bins[3] >> 30 & 1) << lane;
             near |= (row.bins[3] >> 31) << lane;
         }
-        free &= known & (crossings.front & !back | crossings.back & back);
+        free &= known & (to_front & !back | to_back & back);
         near &= free;
         if near != 0 {
-            free &= !near | self.ends_within(s, fields, crossings.start, reach);
+            free &= !near | self.ends_within(s, fields, start, reach);
         }
         free
     }
@@ -168,8 +175,8 @@ impl Block {
     /// Where the lines of the rays cross the triangles. Derivation: as in the f64 decision about one ray, whose bounds these are with
     /// the unit of f32; terms with `MIN_POSITIVE` bound what underflows.
     #[inline(always)]
-    fn crossings<S: Simd>(&self, s: S, fields: &[S::F; 8]) -> Crossings<S> {
-        let &[ox, oy, oz, tmin, dx, dy, dz, _] = fields;
+    fn crossings<S: Lanewise>(&self, s: S, fields: [S::F; 8]) -> Crossings<S> {
+        let [ox, oy, oz, tmin, dx, dy, dz, _] = fields;
         let (o, d) = ([ox, oy, oz], [dx, dy, dz]);
         let zero = s.splat(0.0);
         let mut p = [[zero; 3]; 3];
@@ -219,12 +226,12 @@ impl Block {
 }
 
 #[inline(always)]
-fn dot<S: Simd>(s: S, a: [S::F; 3], b: [S::F; 3]) -> S::F {
+fn dot<S: Lanewise>(s: S, a: [S::F; 3], b: [S::F; 3]) -> S::F {
     s.fma(a[2], b[2], s.fma(a[1], b[1], s.mul(a[0], b[0])))
 }
 
 #[inline(always)]
-fn cross<S: Simd>(s: S, a: [S::F; 3], b: [S::F; 3]) -> [S::F; 3] {
+fn cross<S: Lanewise>(s: S, a: [S::F; 3], b: [S::F; 3]) -> [S::F; 3] {
     [
         s.fnma(a[2], b[1], s.mul(a[1], b[2])),
         s.fnma(a[0], b[2], s.mul(a[2], b[0])),
@@ -238,7 +245,7 @@ fn cross<S: Simd>(s: S, a: [S::F; 3], b: [S::F; 3]) -> [S::F; 3] {
 /// the normal, which is at least 1/128 of the product of the edges, less than 2^-13, a sixteenth of the margin. For edges and
 /// directions in their ranges nothing overflows, and what underflows is less than that.
 #[inline(always)]
-fn bins<S: Simd>(s: S, corners: &[[S::F; 3]; 3], d: [S::F; 3]) -> S::U {
+fn bins<S: Lanewise>(s: S, corners: &[[S::F; 3]; 3], d: [S::F; 3]) -> S::U {
     let zero = s.splat(0.0);
     let (mut e, mut f) = ([zero; 3], [zero; 3]);
     for k in 0..3 {
@@ -265,7 +272,7 @@ fn bins<S: Simd>(s: S, corners: &[[S::F; 3]; 3], d: [S::F; 3]) -> S::U {
 
 /// Whether a component is negative, given the slope and its square, and its columns beyond the middle times a unit.
 #[inline(always)]
-fn column<S: Simd>(s: S, (slope, square): (S::F, S::F), upwards: S::M, unit: u32) -> (S::M, S::U) {
+fn column<S: Lanewise>(s: S, (slope, square): (S::F, S::F), upwards: S::M, unit: u32) -> (S::M, S::U) {
     let zero = s.splat(0.0);
     let mut beyond = s.splat_u(0);
     for border in FREE_BORDERS {
@@ -280,7 +287,7 @@ const STEEPEST: f32 = (FREE_STEEPEST * FREE_STEEPEST) as f32;
 
 /// a ± b, the latter where the mask is set.
 #[inline(always)]
-fn add_signed<S: Simd>(s: S, a: S::U, negative: S::M, b: S::U) -> S::U {
+fn add_signed<S: Lanewise>(s: S, a: S::U, negative: S::M, b: S::U) -> S::U {
     let ones = s.select_u(negative, s.splat_u(u32::MAX), s.splat_u(0));
     s.add_u(a, s.add_where(s.xor_u(b, ones), negative, s.splat_u(1)))
 }

@@ -1,6 +1,6 @@
 //! Transformation of rays into the space of an object.
 
-use super::affine::{ObjectRay, RayLanes};
+use super::affine::{RayLanes};
 use super::scene_batch::SceneBatch;
 use crate::SMALL;
 use crate::query::sink::Visit;
@@ -63,6 +63,16 @@ impl Kernel for EnterKernel<'_> {
         let EnterKernel { object_rays: ObjectRays { rays, t_scale, tmax, .. }, batch, visits } = self;
         rays.resize(visits.len(), NO_RAY);
         t_scale.resize(visits.len(), 1.0);
+        let by_itself = |visit: Visit, tmax: f32, ray: &mut Ray, t_scale: &mut f32| {
+            let of_object = batch.object_ray(visit, tmax);
+            (*ray, *t_scale) = (of_object.ray, of_object.t_scale);
+        };
+        if !S::HAS_VECTORS {
+            for (i, &visit) in visits.iter().enumerate() {
+                by_itself(visit, tmax[i], &mut rays[i], &mut t_scale[i]);
+            }
+            return;
+        }
         let mut lanes = RayLanes::NONE;
         let mut start = 0;
         while start < visits.len() {
@@ -97,9 +107,8 @@ impl Kernel for EnterKernel<'_> {
             for lane in 0..count {
                 // Rays whose direction leaves the range of f32 are transformed one by one.
                 if lanes.unscaled[lane % LANES] == 0 {
-                    let visit = visits[start + lane];
-                    let ObjectRay { ray, t_scale: scale } = batch.object_ray(visit, last[lane % LANES]);
-                    (rays[start + lane], t_scale[start + lane]) = (ray, scale);
+                    let at = start + lane;
+                    by_itself(visits[at], last[lane % LANES], &mut rays[at], &mut t_scale[at]);
                 }
             }
             start += count;

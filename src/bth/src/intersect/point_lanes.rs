@@ -11,7 +11,7 @@
 //! the triangle, |q| is an upper bound.
 
 use super::boxes::{ChildBoxes, FAR};
-use crate::simd::{LANES, Part, Simd};
+use crate::simd::{LANES, Lanewise, Part, Simd};
 use bth_format::layout::{IndexedLeaf, RawLeaf, WIDTH, WideNode};
 
 const _: () = assert!(WIDTH == LANES);
@@ -200,7 +200,7 @@ impl CornerLanes for RawLeaf {
 }
 
 /// Bounds of the distances of sixteen triangles, scaled.
-pub(crate) struct TriangleLanes<S: Simd> {
+pub(crate) struct TriangleLanes<S: Lanewise> {
     /// The vector q of the module's documentation, squared.
     square: S::F,
     /// min(q·A, q·B, q·C).
@@ -210,14 +210,14 @@ pub(crate) struct TriangleLanes<S: Simd> {
 }
 
 #[inline(always)]
-fn dot<S: Simd>(s: S, a: [S::F; 3], b: [S::F; 3]) -> S::F {
+fn dot<S: Lanewise>(s: S, a: [S::F; 3], b: [S::F; 3]) -> S::F {
     s.fma(a[2], b[2], s.fma(a[1], b[1], s.mul(a[0], b[0])))
 }
 
-impl<S: Simd> TriangleLanes<S> {
-    /// Computes the bounds of triangles, given their corners relative to the point.
+impl<L: Lanewise> TriangleLanes<L> {
+    /// [`TriangleLanes::new`] for the triangles of a piece.
     #[inline(always)]
-    pub(crate) fn new(s: S, corners: &[[S::F; 3]; 3]) -> Self {
+    fn of_piece(s: L, corners: &[[L::F; 3]; 3]) -> Self {
         let [a, b, c] = *corners;
         let zero = s.splat(0.0);
         let (mut ab, mut ac, mut reach) = ([zero; 3], [zero; 3], zero);
@@ -229,6 +229,24 @@ impl<S: Simd> TriangleLanes<S> {
         let q = closest(s, corners, ab, ac);
         let support = s.min(s.min(dot(s, q, a), dot(s, q, b)), dot(s, q, c));
         TriangleLanes { square: dot(s, q, q), support, reach }
+    }
+}
+
+impl<S: Simd> TriangleLanes<S> {
+    /// Computes the bounds of triangles, given their corners relative to the point.
+    #[inline(always)]
+    pub(crate) fn new(s: S, corners: &[[S::F; 3]; 3]) -> Self {
+        let zero = s.splat(0.0);
+        let mut all = TriangleLanes { square: zero, support: zero, reach: zero };
+        for i in 0..S::PIECES {
+            let p = s.piece(i);
+            let corners = corners.each_ref().map(|corner| corner.each_ref().map(|row| S::pick(p, row)));
+            let bounds = TriangleLanes::of_piece(p, &corners);
+            S::put(p, &mut all.square, bounds.square);
+            S::put(p, &mut all.support, bounds.support);
+            S::put(p, &mut all.reach, bounds.reach);
+        }
+        all
     }
 
     /// Upper bound of the least squared distance of the triangles of `lanes`, at most `f32::MAX`. The point to which q leads is
@@ -260,7 +278,7 @@ impl<S: Simd> TriangleLanes<S> {
 
 /// For each triangle a vector from the point to a point of the triangle, which is near the closest one unless rounding prevails.
 #[inline(always)]
-fn closest<S: Simd>(s: S, corners: &[[S::F; 3]; 3], ab: [S::F; 3], ac: [S::F; 3]) -> [S::F; 3] {
+fn closest<S: Lanewise>(s: S, corners: &[[S::F; 3]; 3], ab: [S::F; 3], ac: [S::F; 3]) -> [S::F; 3] {
     let [a, b, c] = *corners;
     let (zero, one) = (s.splat(0.0), s.splat(1.0));
     // Scalar products of the edges with the vectors from the corners to the point, with the sign changed.

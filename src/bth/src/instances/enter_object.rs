@@ -1,6 +1,6 @@
 //! Transformation of rays into the space of an object.
 
-use super::affine::{RayLanes};
+use super::affine::RayLanes;
 use super::scene_batch::SceneBatch;
 use crate::SMALL;
 use crate::query::sink::Visit;

@@ -1,5 +1,6 @@
 //! What queries look for. A goal is a value, which kernels ask for at run time. Goals that are types of no size have kernels of their
-//! own; walks through tetrahedra, and with the feature `small` all kernels, serve both by [`EitherGoal`].
+//! own; walks through tetrahedra, batches with vectors of 128 bits, and with the feature `small` all kernels, serve both by
+//! [`EitherGoal`].
 
 #[cfg(not(feature = "small"))]
 use super::Any;

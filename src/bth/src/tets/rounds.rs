@@ -120,10 +120,6 @@ impl Kernel for &mut WalkBatch<'_> {
     /// Walks all rays of the batch.
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        // See `Isa::walks_tets`.
-        if !S::INLINES_PARTS {
-            return;
-        }
         let Walks { records, keeps_depths, .. } = self.walks;
         let vertices = vertices(self.walks.object);
         let mut queue = PreparedQueue::new();

@@ -4,7 +4,7 @@
 use super::deferred::DeferredHits;
 use super::leaf::{LeafOutcome, Progress, decide};
 use super::nodes::{UnpackedNode, Wide, children, node};
-use super::ray_pool::{PackedSteps, RayPool};
+use super::ray_pool::{POOL_SIZE, PackedSteps, RayPool, Slot};
 use super::ray_state::RayState;
 use super::stack::{StackPosition, Stacks};
 use crate::intersect::prepare::Prepared;
@@ -83,7 +83,9 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
             taken: 0,
         };
         let mut deferred = DeferredHits::new();
-        let mut pool = RayPool::new(object, stacks, sink.goal());
+        let goal = sink.goal();
+        let mut slots = [Slot::vacant(goal); POOL_SIZE];
+        let mut pool = RayPool::new(object, &mut slots, stacks, goal);
         let has_packed_nodes = object.has_packed_nodes();
         while !pool.is_empty() {
             if has_packed_nodes {

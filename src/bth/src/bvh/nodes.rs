@@ -153,9 +153,11 @@ pub(crate) fn indexed_leaf<'r, S: Simd>(
     code: u32,
     unpacked: &'r mut Option<Unpacked<IndexedLeaf>>,
 ) -> Option<&'r IndexedLeaf> {
-    match (node_base.indexed_leaf(code), Child::from_code(code)) {
-        (Some(leaf), _) => Some(leaf),
-        (None, Some(Child::Indexed(index))) => Some(indexed(s, object, index, unpacked)),
+    if let Some(leaf) = node_base.indexed_leaf(code) {
+        return Some(leaf);
+    }
+    match Child::from_code(code) {
+        Some(Child::Indexed(index)) => Some(indexed(s, object, index, unpacked)),
         _ => None,
     }
 }

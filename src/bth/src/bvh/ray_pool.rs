@@ -12,7 +12,7 @@ use bth_format::layout::{Child, WIDTH};
 use bth_format::object::ObjectView;
 
 /// Number of rays in the pool.
-const POOL_SIZE: usize = 32;
+pub(super) const POOL_SIZE: usize = 32;
 /// Steps through inner nodes continue while at least this many rays have one as their next step.
 const MIN_INNER: u8 = (POOL_SIZE / 4) as u8;
 
@@ -84,7 +84,16 @@ impl StepLists {
 /// State of a ray, aligned to cache lines.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
-struct Slot<Q>(RayState<Q>);
+pub(super) struct Slot<Q>(RayState<Q>);
+
+impl<Q: Query> Slot<Q> {
+    /// A slot without a ray.
+    #[inline(always)]
+    pub(super) fn vacant(goal: Q::Goal) -> Self {
+        let ray = Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 };
+        Slot(RayState::vacant(Q::new(goal, &ray)))
+    }
+}
 
 /// Position and code of the top of each slot's stack. They are separate from the slots, because every step begins with them and they
 /// fill few cache lines.
@@ -93,9 +102,9 @@ struct StackTops {
     code: [u32; POOL_SIZE],
 }
 
-/// The pool: a slot for each ray.
+/// The pool: a slot for each ray. The caller makes the slots in their final place; as a part of this value they would be copied to it.
 pub(super) struct RayPool<'a, Q: Query> {
-    slots: [Slot<Q>; POOL_SIZE],
+    slots: &'a mut [Slot<Q>; POOL_SIZE],
     tops: StackTops,
     lists: StepLists,
     counts: StepCounts,
@@ -106,10 +115,14 @@ pub(super) struct RayPool<'a, Q: Query> {
 }
 
 impl<'a, Q: Query> RayPool<'a, Q> {
-    /// Vacant slots, for the BVH of an object.
+    /// A pool of vacant slots, for the BVH of an object.
     #[inline(always)]
-    pub(super) fn new(object: &ObjectView<'_>, stacks: &'a mut Stacks, goal: Q::Goal) -> Self {
-        let vacant = Q::new(goal, &Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 });
+    pub(super) fn new(
+        object: &ObjectView<'_>,
+        slots: &'a mut [Slot<Q>; POOL_SIZE],
+        stacks: &'a mut Stacks,
+        goal: Q::Goal,
+    ) -> Self {
         stacks.reserve(object, POOL_SIZE);
         let mut bottoms = [StackPosition::FIRST; POOL_SIZE];
         for (stack, bottom) in bottoms.iter_mut().enumerate() {
@@ -121,7 +134,7 @@ impl<'a, Q: Query> RayPool<'a, Q> {
             bottom[slot] = slot as u8;
         }
         RayPool {
-            slots: [Slot(RayState::vacant(vacant)); POOL_SIZE],
+            slots,
             tops: StackTops { position: bottoms, code: [BOTTOM; POOL_SIZE] },
             lists: StepLists { inner: [0; 256], leaf: [0; 256], bottom },
             counts: StepCounts((POOL_SIZE as u32) << StepCounts::BOTTOM),

@@ -5,8 +5,11 @@ use super::hit_cache::HitCache;
 use super::points::{ProjectedPoints, RelativePoints};
 use super::ray_group::RayGroup;
 use super::single_rays::SingleRays;
-use crate::intersect::exact_lanes::{Intersections, OriginTermsLanes};
+use crate::intersect::exact_lanes::{Intersections, OriginTermsLanes, Pairs};
 use crate::simd::Simd;
+use bth_format::layout::WIDTH;
+use bth_format::limits::MAX_DEPTH;
+use bth_format::object::ObjectView;
 use std::any::Any;
 
 /// Memory of packets, kept from one batch to the next.
@@ -19,7 +22,20 @@ pub(crate) struct PacketBuffers {
     pub(crate) hit_cache: HitCache,
     /// Terms of the cached triangles for the packet's origin.
     pub(super) origin_terms: OriginTermsLanes,
+    /// Rays and triangles of the hits that are computed. They are kept, because clearing them takes longer than the computation.
+    pub(super) pairs: Pairs,
     pub(super) intersections: [Intersections; GROUPS],
+}
+
+impl PacketBuffers {
+    /// Makes the stack as long as packets through an object may need.
+    pub(super) fn reserve(&mut self, object: &ObjectView<'_>) {
+        // At every level all children but the entered one are stacked.
+        let entries = (object.header.depth as usize).min(MAX_DEPTH) * (WIDTH - 1) + 1 + WIDTH;
+        if self.stack.len() < entries {
+            self.stack.resize(entries, StackEntry::default());
+        }
+    }
 }
 
 impl Default for PacketBuffers {
@@ -31,6 +47,7 @@ impl Default for PacketBuffers {
             single_rays: SingleRays::NONE,
             hit_cache: HitCache::NONE,
             origin_terms: OriginTermsLanes::NONE,
+            pairs: Pairs::NONE,
             intersections: [Intersections::NONE; GROUPS],
         }
     }

@@ -5,7 +5,7 @@
 
 use super::leaf_mesh::LeafPoints;
 use crate::bvh::candidate::Candidate;
-use crate::intersect::exact_lanes::{F32Lanes, OriginTermsLanes};
+use crate::intersect::exact_lanes::{F32Lanes, OriginTermsLanes, Pairs};
 use crate::simd::{LANES, Simd};
 
 /// Greatest number of cached triangles.
@@ -105,6 +105,8 @@ pub(crate) struct CachedHits<'a> {
     pub(crate) ids: &'a [u32],
     pub(crate) hit_cache: &'a mut HitCache,
     pub(crate) origin_terms: &'a mut OriginTermsLanes,
+    /// Overwritten by each group.
+    pub(crate) pairs: &'a mut Pairs,
 }
 
 impl CachedHits<'_> {

@@ -8,7 +8,7 @@ use super::bounds::PacketBounds;
 use super::hit_cache::{CachedHits, UNCACHED};
 use super::leaf_mesh::LeafPoints;
 use super::projection::Projection;
-use crate::intersect::exact_lanes::{Intersections, Pairs};
+use crate::intersect::exact_lanes::Intersections;
 use crate::intersect::prepare::{self, Axes, CommonAxis, MixedAxes};
 use crate::simd::{LANES, Lanewise, Part, Simd};
 use bth_format::layout::NONE;
@@ -259,8 +259,7 @@ impl<S: Simd> RayGroup<S> {
                 intersections.compute_from_point::<S, false>(s, lanes, &direction, &size, terms, pending)
             };
         }
-        let (hit_cache, ids) = (&*cached.hit_cache, cached.ids);
-        let mut pairs = Pairs::NONE;
+        let (hit_cache, ids, pairs) = (&*cached.hit_cache, cached.ids, &mut *cached.pairs);
         for k in 0..3 {
             let origin = if H::COMMON_ORIGIN { s.splat(cached.origin[k]) } else { self.origin[k] };
             s.store(origin, &mut pairs.origin[k]);
@@ -276,7 +275,7 @@ impl<S: Simd> RayGroup<S> {
         }
         let index = s.select_u(uncached, self.index, s.lookup_u(s.load_u(&hit_cache.index), self.pending));
         s.store_u(s.gather_u(s.mask(lanes), ids, index), &mut intersections.triangle);
-        intersections.compute(s, lanes, &pairs);
+        intersections.compute(s, lanes, pairs);
     }
 }
 

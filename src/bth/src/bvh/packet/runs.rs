@@ -104,7 +104,9 @@ fn trace<S: Simd, Q: Query>(
     };
     // The first run is found before the loop, so that `packets` is made in its final place, and only if there are any.
     let Some(mut run) = runs.next(s, goal) else { return count };
-    let mut packets = PacketTracer::<S, Q>::new(object, groups.of(s), buffers, Q::new(goal, &rays[0]));
+    buffers.reserve(object);
+    let mut packets =
+        PacketTracer { groups: groups.of(s), queries: [Q::new(goal, &rays[0]); PACKET], buffers };
     loop {
         let (first, rays) = (run.first, run.rays);
         // The next rays are in the cache when this packet is done.
@@ -250,7 +252,7 @@ fn choose(
     if !try_coherent && !try_short {
         return None;
     }
-    Choose { bounds, rays, try_coherent, try_short }.inline_or_share(s)
+    Choose { bounds, rays, try_coherent, try_short }.inline_or_call(s)
 }
 
 /// Traces a run of coherent rays. The parameters are separate, because this is a part of the kernel [`trace`].

@@ -8,7 +8,7 @@
 use super::bounds::PacketBounds;
 use super::buffers::PacketBuffers;
 use super::children::{Children, meeting};
-use super::entry::{GROUPS, PACKET, StackEntry};
+use super::entry::{GROUPS, PACKET};
 use super::frustum::Frustum;
 use super::hit_cache::CachedHits;
 use super::packet_rays::PacketRays;
@@ -16,20 +16,19 @@ use super::ray_group::{IntersectGroup, RayGroup};
 use super::single_rays::FEW_OF_PACKET;
 use crate::bvh::nodes::{self, prefetch};
 use crate::bvh::ray_state::KEY_SLACK;
-use crate::intersect::exact_lanes::{Intersections, OriginTermsLanes};
+use crate::intersect::exact_lanes::{Intersections, OriginTermsLanes, Pairs};
 use crate::query::Query;
 use crate::query::sink::Sink;
 use crate::rays::Ray;
 use crate::simd::{LANES, Part, Simd};
 use bth_format::layout::{Child, NONE, WIDTH};
-use bth_format::limits::MAX_DEPTH;
 use bth_format::object::ObjectView;
 use std::marker::PhantomData;
 
 /// The state of a packet: its prepared rays, their queries and its memory. One value serves all packets of a batch.
 pub(crate) struct PacketTracer<'a, S: Simd, Q> {
     pub(crate) groups: &'a mut [RayGroup<S>; GROUPS],
-    queries: [Q; PACKET],
+    pub(super) queries: [Q; PACKET],
     pub(crate) buffers: &'a mut PacketBuffers,
 }
 
@@ -40,23 +39,6 @@ pub(crate) enum PacketOutcome {
     Lanes(u32),
     /// The packet met something that only single rays support. No answer has been stored.
     Refused,
-}
-
-impl<'a, S: Simd, Q: Query> PacketTracer<'a, S, Q> {
-    #[inline(always)]
-    pub(crate) fn new(
-        object: &ObjectView<'_>,
-        groups: &'a mut [RayGroup<S>; GROUPS],
-        buffers: &'a mut PacketBuffers,
-        query: Q,
-    ) -> Self {
-        // At every level all children but the entered one are stacked.
-        let entries = (object.header.depth as usize).min(MAX_DEPTH) * (WIDTH - 1) + 1 + WIDTH;
-        if buffers.stack.len() < entries {
-            buffers.stack.resize(entries, StackEntry::default());
-        }
-        PacketTracer { groups, queries: [query; PACKET], buffers }
-    }
 }
 
 /// Traces the rays for which the groups have been prepared, and stores the answers of those that hit something. It is a part of kernels,
@@ -77,8 +59,16 @@ impl<S: Simd, Q: Query, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, 
         let TracePacket { packets, object, bounds, rays, sink } = self;
         let PacketTracer { groups, queries, buffers } = packets;
         let goal = sink.goal();
-        let PacketBuffers { stack, points, relative, single_rays, hit_cache, origin_terms, intersections } =
-            &mut **buffers;
+        let PacketBuffers {
+            stack,
+            points,
+            relative,
+            single_rays,
+            hit_cache,
+            origin_terms,
+            pairs,
+            intersections,
+        } = &mut **buffers;
         let groups = &mut groups[..rays.len().div_ceil(LANES)];
         let all = u64::MAX >> (PACKET - rays.len());
         single_rays.clear();
@@ -158,7 +148,7 @@ impl<S: Simd, Q: Query, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, 
                 }
             }
         }
-        finish::<S, H, Q>(s, groups, (origin_terms, intersections), &mut rays, all, sink);
+        finish::<S, H, Q>(s, groups, (origin_terms, pairs, intersections), &mut rays, all, sink);
         let steps = u64::from(steps);
         PacketOutcome::Lanes((u64::from(used) * 100 / (steps * rays.rays.len() as u64)) as u32)
     }
@@ -169,7 +159,7 @@ impl<S: Simd, Q: Query, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, 
 fn finish<S: Simd, H: PacketBounds<S>, Q: Query>(
     s: S,
     groups: &[RayGroup<S>],
-    (origin_terms, intersections): (&mut OriginTermsLanes, &mut [Intersections; GROUPS]),
+    (origin_terms, pairs, intersections): (&mut OriginTermsLanes, &mut Pairs, &mut [Intersections; GROUPS]),
     rays: &mut PacketRays<'_, Q>,
     all: u64,
     sink: &mut Sink<'_, Q>,
@@ -188,6 +178,7 @@ fn finish<S: Simd, H: PacketBounds<S>, Q: Query>(
         ids: rays.object.triangle_ids,
         hit_cache: rays.hit_cache,
         origin_terms,
+        pairs,
     };
     for (group, intersections) in groups.iter().zip(&mut *intersections) {
         let cached = &mut cached;

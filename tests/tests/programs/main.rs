@@ -8,6 +8,7 @@ mod costs;
 mod errors;
 mod inspect;
 mod interrupt;
+mod made_models;
 mod materials;
 mod mistakes;
 mod pipelines;

@@ -6,6 +6,8 @@ mod deform;
 mod deformers;
 mod flattened;
 mod import;
+mod made_gltf;
+mod morphs;
 mod motion;
 mod moving_tets;
 mod poses;

@@ -1,6 +1,6 @@
 //! Parts of skinned meshes that joints move rigidly, as instances: they answer as the undivided mesh does.
 
-use crate::deformers::{Document, push};
+use crate::made_gltf::{Document, push};
 use crate::support::options;
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_compile::Silent;

@@ -1,23 +1,29 @@
 //! Batches of rays, with and without hints, give the bits of the same rays traced one at a time, on every instruction set.
 
+mod free_directions;
+
 use bth::rays::{Hit, PrimitiveRef, Ray};
-use bth::{Accept, Hinted, HitStreams, Isa, RayStreams, Scene, SceneBuilder};
+use bth::{Accept, Hinted, HitStreams, Isa, RayStreams, Scene};
 use bth_compile::Silent;
-use bth_compile::free::{FreeOptions, KeepFree};
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
-use bth_format::layout::{GridBits, RecordKind};
+use bth_format::layout::RecordKind;
 use bth_random::Rng;
 use bth_scenes::{Model, gyroid::gyroid, knot::torus_knot};
 use bth_tests::rays::{assorted, onward};
 use std::sync::{Mutex, MutexGuard};
 
 /// The instruction set is a setting of the whole process, so tests that set it run one after the other.
-fn turn() -> MutexGuard<'static, ()> {
+pub(crate) fn turn() -> MutexGuard<'static, ()> {
     static TURN: Mutex<()> = Mutex::new(());
     TURN.lock().unwrap_or_else(|e| e.into_inner())
 }
 
-fn compiled(model: &Model, structure: Structure, record: RecordKind, keep_subtrees: bool) -> Scene {
+pub(crate) fn compiled(
+    model: &Model,
+    structure: Structure,
+    record: RecordKind,
+    keep_subtrees: bool,
+) -> Scene {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("model.ply");
     bth_scenes::write::file(model, &path).expect("a model file");
@@ -30,13 +36,13 @@ fn compiled(model: &Model, structure: Structure, record: RecordKind, keep_subtre
     bth::from_bytes(&compiled.bytes).expect("a file that opens")
 }
 
-fn bits(hit: &Hit) -> [u32; 5] {
+pub(crate) fn bits(hit: &Hit) -> [u32; 5] {
     [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.primitive.instance, hit.primitive.triangle]
 }
 
 /// Rays as programs send them on: off the surface a little, or exactly on it, or cut right about a hit; and the rays
 /// of [`onward`], from wrong triangles too.
-fn hinted_rays(
+pub(crate) fn hinted_rays(
     plain: &Scene,
     corners: &[[[f32; 3]; 3]],
     count: usize,
@@ -121,184 +127,7 @@ fn check(model: &Model, structure: Structure, rays: usize, seed: u64) {
     Isa::best().choose().expect("the best is available");
 }
 
-/// Compiled with all free directions, on a grid or not.
-fn with_free_directions(model: &Model, options: CompileOptions) -> Scene {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let path = folder.path().join("model.ply");
-    bth_scenes::write::file(model, &path).expect("a model file");
-    let free = FreeOptions { keep: KeepFree::All, ..FreeOptions::default() };
-    let options = CompileOptions { structure: Structure::Bvh, free, ..options };
-    let (compiled, report) = compile(&path, &options, &Silent).expect("a model that compiles");
-    assert!(report.free.is_some_and(|free| free.kept && free.free + free.free_nearby > 0.1));
-    bth::from_bytes(&compiled.bytes).expect("a file that opens")
-}
-
-/// Rays from points just above or below triangles, from their edges and corners, in all directions, some of which end early.
-fn rays_off_the_surface(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<(Ray, PrimitiveRef)> {
-    let mut rng = Rng::new(seed);
-    let of_ray = |i: usize, rng: &mut Rng| {
-        let triangle = rng.below(corners.len() as u64) as usize;
-        let [a, b, c] = corners[triangle];
-        let (u, v) = match i % 4 {
-            0 => (0.0, 0.0),
-            1 => (rng.unit_f64() as f32, 0.0),
-            _ => (0.5 * rng.unit_f64() as f32, 0.5 * rng.unit_f64() as f32),
-        };
-        let d = rng.unit_vector().map(|x| x as f32);
-        let length = |p: [f32; 3]| p.iter().map(|x| x * x).sum::<f32>().sqrt();
-        let edge = length([0, 1, 2].map(|k| b[k] - a[k]));
-        let off = edge * [1e-2, 1e-4, 1e-6, 0.0][i / 4 % 4];
-        let origin = [0, 1, 2].map(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]) + off * d[k]);
-        // Lengths of directions and ranges vary.
-        let scale = [1.0, 1e-3, 3e5, 1e-30][i / 16 % 4];
-        let tmax = [f32::INFINITY, 10.0 * edge / scale, 0.5 * edge / scale][i % 3];
-        let ray = Ray { origin, tmin: 0.0, direction: d.map(|x| x * scale), tmax };
-        let triangle = if rng.below(8) == 0 { rng.below(2 * corners.len() as u64) } else { triangle as u64 };
-        (ray, PrimitiveRef { instance: 0, triangle: triangle as u32 })
-    };
-    (0..count).map(|i| of_ray(i, &mut rng)).collect()
-}
-
-/// Whether a ray points to the side of a triangle from which its corners go around counterclockwise.
-fn is_outward(ray: &Ray, [a, b, c]: &[[f32; 3]; 3]) -> bool {
-    let [p, q] = [b, c].map(|corner| [0, 1, 2].map(|k| corner[k] - a[k]));
-    let normal = [0, 1, 2].map(|k| p[(k + 1) % 3] * q[(k + 2) % 3] - p[(k + 2) % 3] * q[(k + 1) % 3]);
-    (0..3).map(|k| f64::from(normal[k]) * f64::from(ray.direction[k])).sum::<f64>() > 0.0
-}
-
-/// Of [`rays_off_the_surface`], 250,000 of them, those that leave the outside of a triangle, and some of all: where few rays end, batches are
-/// traced without look-ups.
-fn rays_of_which_many_end(corners: &[[[f32; 3]; 3]], seed: u64) -> Vec<(Ray, PrimitiveRef)> {
-    let leaves = |i: usize, ray: &Ray, start: &PrimitiveRef| {
-        let off_the_middle = i % 4 >= 2 && (i / 4).is_multiple_of(4);
-        off_the_middle && corners.get(start.triangle as usize).is_some_and(|corners| is_outward(ray, corners))
-    };
-    let all = rays_off_the_surface(corners, 250_000, seed).into_iter().enumerate();
-    all.filter(|(i, (ray, start))| i % 36 == 5 || leaves(*i, ray, start)).map(|(_, ray)| ray).collect()
-}
-
-/// Free directions change no bit.
-fn check_free_directions(model: &Model, options: CompileOptions) {
-    let _turn = turn();
-    let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
-    let scene = with_free_directions(model, options);
-    let mut all = hinted_rays(&scene, &corners, 3000, 11);
-    all.extend(rays_off_the_surface(&corners, 30_000, 12));
-    all.extend(rays_of_which_many_end(&corners, 13));
-    let (rays, from): (Vec<Ray>, Vec<PrimitiveRef>) = all.into_iter().unzip();
-    let expected: Vec<Hit> = rays.iter().map(|ray| scene.nearest(ray).unwrap_or(Hit::MISS)).collect();
-    let ways = Isa::ALL.into_iter().flat_map(|isa| [(isa, Hinted::Tets), (isa, Hinted::Measured)]);
-    for (isa, hinted) in ways.filter(|(isa, _)| isa.is_available()) {
-        isa.choose().expect("an instruction set that is available");
-        hinted.choose();
-        let mut hits = vec![Hit::MISS; rays.len()];
-        let mut any = vec![false; rays.len()];
-        for first in (0..rays.len()).step_by(1000) {
-            let part = first..rays.len().min(first + 1000);
-            scene.batch(&rays[part.clone()]).from(&from[part.clone()]).nearest(&mut hits[part.clone()]);
-            scene.batch(&rays[part.clone()]).from(&from[part.clone()]).any(&mut any[part]);
-        }
-        for (i, (ray, from)) in rays.iter().zip(&from).enumerate() {
-            assert_eq!(bits(&hits[i]), bits(&expected[i]), "{isa}, {hinted:?}: {ray:?} from {from:?}");
-            assert_eq!(any[i], expected[i].is_hit(), "any hit, {isa}, {hinted:?}: {ray:?} from {from:?}");
-        }
-    }
-    Isa::best().choose().expect("the best is available");
-}
-
-#[test]
-fn free_directions_change_no_answer() {
-    check_free_directions(&torus_knot(2000), CompileOptions::default());
-    check_free_directions(&gyroid(3000), CompileOptions::default());
-}
-
-#[test]
-fn free_directions_on_a_grid_and_far_from_the_origin_change_no_answer() {
-    let mut on_grid = CompileOptions::default();
-    on_grid.coordinates.bits = Some(GridBits::B16);
-    check_free_directions(&torus_knot(800), on_grid);
-    let far = scaled(torus_knot(800), 1.0, [300.0, -700.0, 1100.0]);
-    check_free_directions(&far, CompileOptions::default());
-}
-
-/// A scene of some instances of an object with free directions, moved, turned, mirrored, scaled and sheared, of which several overlap; and
-/// their transforms.
-fn instances_of(object: &Scene, count: usize, seed: u64) -> (Scene, Vec<[f32; 12]>) {
-    let mut rng = Rng::new(seed);
-    let mut number = |size: f32| (2.0 * rng.unit_f64() as f32 - 1.0) * size;
-    let transforms: Vec<[f32; 12]> = (0..count)
-        .map(|i| {
-            let scale = [1.0, -0.3, 40.0, 1e-25][i % 4];
-            let mut rows = [0.0; 12];
-            for k in 0..3 {
-                (0..3).for_each(|j| {
-                    rows[4 * k + j] = scale * (number(0.4) + if j == (k + i) % 3 { 1.0 } else { 0.0 })
-                });
-                rows[4 * k + 3] = number([3.0, 3.0, 60.0, 1e-24][i % 4]);
-            }
-            rows
-        })
-        .collect();
-    let mut builder = SceneBuilder::new();
-    let object = builder.add(object);
-    for transform in &transforms {
-        builder.instance(object, transform).expect("an object");
-    }
-    builder.commit().expect("transforms that can be inverted");
-    (builder.into_scene(), transforms)
-}
-
-/// The ray in world space whose transform is about this ray of an object.
-fn placed(ray: &Ray, rows: &[f32; 12]) -> Ray {
-    let times =
-        |v: [f32; 3], k: usize| (0..3).map(|j| f64::from(rows[4 * k + j]) * f64::from(v[j])).sum::<f64>();
-    let origin = [0, 1, 2].map(|k| (times(ray.origin, k) + f64::from(rows[4 * k + 3])) as f32);
-    Ray { origin, direction: [0, 1, 2].map(|k| times(ray.direction, k) as f32), ..*ray }
-}
-
-/// Rays that start on instances have the same bits with and without hints, right ones and wrong ones.
-#[test]
-fn free_directions_of_instances_change_no_answer() {
-    let _turn = turn();
-    let model = torus_knot(2000);
-    let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
-    let object = with_free_directions(&model, CompileOptions::default());
-    let mut rng = Rng::new(5);
-    // One visible instance has a way of its own.
-    for count in [1, 3, 24] {
-        let (scene, transforms) = instances_of(&object, count, 21 + count as u64);
-        let (mut rays, mut from) = (Vec::new(), Vec::new());
-        for (ray, start) in rays_of_which_many_end(&corners, 22) {
-            let instance = rng.below(count as u64) as u32;
-            rays.push(placed(&ray, &transforms[instance as usize]));
-            let wrong = rng.below(12) == 0;
-            let hint = if wrong { rng.below(count as u64 + 2) as u32 } else { instance };
-            from.push(PrimitiveRef { instance: hint, ..start });
-        }
-        let expected: Vec<Hit> = rays.iter().map(|ray| scene.nearest(ray).unwrap_or(Hit::MISS)).collect();
-        assert!(expected.iter().filter(|hit| hit.is_hit()).count() > 1000);
-        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
-            isa.choose().expect("an instruction set that is available");
-            // Hints are used although they may be slower.
-            Hinted::Tets.choose();
-            let mut hits = vec![Hit::MISS; rays.len()];
-            let mut any = vec![false; rays.len()];
-            for first in (0..rays.len()).step_by(5000) {
-                let part = first..rays.len().min(first + 5000);
-                scene.batch(&rays[part.clone()]).from(&from[part.clone()]).nearest(&mut hits[part.clone()]);
-                scene.batch(&rays[part.clone()]).from(&from[part.clone()]).any(&mut any[part]);
-            }
-            for (i, (ray, from)) in rays.iter().zip(&from).enumerate() {
-                assert_eq!(bits(&hits[i]), bits(&expected[i]), "{isa}, {count}: {ray:?} from {from:?}");
-                assert_eq!(any[i], expected[i].is_hit(), "any hit, {isa}, {count}: {ray:?} from {from:?}");
-            }
-        }
-    }
-    Hinted::Measured.choose();
-    Isa::best().choose().expect("the best is available");
-}
-
-fn scaled(mut model: Model, scale: f32, offset: [f32; 3]) -> Model {
+pub(crate) fn scaled(mut model: Model, scale: f32, offset: [f32; 3]) -> Model {
     for p in &mut model.positions {
         *p = [0, 1, 2].map(|k| p[k] * scale + offset[k]);
     }

@@ -1,109 +1,20 @@
 //! What hits lead to: surfaces against an independent evaluation, groups, materials, names and bounds, through models, scenes, grids,
 //! files without attributes, and the cache.
 
+mod model;
+
+use crate::model::{
+    IDENTITY, Model, Rows, assert_close, compiled, cross, dot, number, options, through, unit, wide,
+};
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth::{Accept, Scene, SurfacePoint};
 use bth_compile::Silent;
 use bth_compile::coordinates::CoordinateOptions;
-use bth_compile::pipeline::{CompileOptions, Structure, compile};
+use bth_compile::pipeline::{CompileOptions, compile};
 use bth_format::layout::{GridBits, kind};
 use bth_import::Keep;
 use bth_random::Rng;
 use std::path::Path;
-
-/// A model of separate triangles with all that a file can keep.
-struct Model {
-    triangles: Vec<[[f32; 3]; 3]>,
-    normals: Vec<[[f32; 3]; 3]>,
-    uvs: Vec<[[f32; 2]; 3]>,
-    /// Group and material of each triangle.
-    parts: Vec<(String, String)>,
-}
-
-fn number(rng: &mut Rng, scale: f32) -> f32 {
-    (rng.below(1 << 20) as f32 / (1u32 << 19) as f32 - 1.0) * scale
-}
-
-impl Model {
-    /// Triangles of all sizes and shapes, some of which have normals of zeros at some corners or at all.
-    fn random(count: usize, seed: u64) -> Self {
-        let mut rng = Rng::new(seed);
-        let mut model = Self { triangles: vec![], normals: vec![], uvs: vec![], parts: vec![] };
-        for i in 0..count {
-            let centre = [0; 3].map(|_| number(&mut rng, 8.0));
-            let size = [1.0, 0.01, 3.0][i % 3];
-            model.triangles.push([0; 3].map(|_| centre.map(|c| c + number(&mut rng, size))));
-            let zero = |corner: usize| i % 5 == 0 && corner < i % 4;
-            let normal = |corner: usize| match zero(corner) {
-                true => [0.0; 3],
-                false => [0; 3].map(|_| number(&mut rng, 2.0)),
-            };
-            model.normals.push([0, 1, 2].map(normal));
-            model.uvs.push([0; 3].map(|_| [number(&mut rng, 4.0), number(&mut rng, 4.0)]));
-            model.parts.push((format!("part {}", i / 7 % 11), format!("material {}", i / 3 % 4)));
-        }
-        model
-    }
-
-    fn obj(&self) -> String {
-        let mut text = String::new();
-        for i in 0..self.triangles.len() {
-            for k in 0..3 {
-                let [x, y, z] = self.triangles[i][k];
-                let [a, b, c] = self.normals[i][k];
-                let [u, v] = self.uvs[i][k];
-                text += &format!("v {x} {y} {z}\nvn {a} {b} {c}\nvt {u} {v}\n");
-            }
-            text +=
-                &format!("g {}\nusemtl {}\nf -3/-3/-3 -2/-2/-2 -1/-1/-1\n", self.parts[i].0, self.parts[i].1);
-        }
-        text
-    }
-}
-
-fn options() -> CompileOptions {
-    let attributes = Keep::All;
-    CompileOptions { structure: Structure::Bvh, attributes, names: true, ..CompileOptions::default() }
-}
-
-fn compiled(model: &Model, options: &CompileOptions) -> Vec<u8> {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("model.obj");
-    std::fs::write(&path, model.obj()).unwrap();
-    let (compiled, _) = compile(&path, options, &Silent).unwrap();
-    bth_format::verify::verify(&bth_format::File::from_bytes(&compiled.bytes).unwrap()).unwrap();
-    compiled.bytes
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    (0..3).map(|k| a[k] * b[k]).sum()
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn unit(a: [f64; 3]) -> [f64; 3] {
-    let length = dot(a, a).sqrt();
-    a.map(|x| x / length)
-}
-
-fn wide(p: [f32; 3]) -> [f64; 3] {
-    p.map(f64::from)
-}
-
-#[track_caller]
-fn assert_close(a: [f64; 3], b: [f64; 3], error: f64) {
-    let size = dot(b, b).sqrt();
-    assert!((0..3).all(|k| (a[k] - b[k]).abs() <= error * size), "{a:?} is not {b:?}");
-}
-
-/// The rows of a transform as the manifest's matrix, and the model's points through it.
-type Rows = [[f64; 4]; 3];
-
-fn through(rows: &Rows, p: [f64; 3]) -> [f64; 3] {
-    rows.map(|r| r[0] * p[0] + r[1] * p[1] + r[2] * p[2] + r[3])
-}
 
 /// The normal of the object at three weights, evaluated independently: by the adjoint of the transform instead of its inverse.
 fn expected_normals(model: &Model, rows: &Rows, hit: &Hit) -> ([f64; 3], [f64; 3]) {
@@ -162,8 +73,6 @@ fn check_surface(model: &Model, rows: &Rows, scene: &Scene, hit: &Hit) -> Surfac
     assert_eq!(scene.group_of(found.object, id as u32), found.group);
     found
 }
-
-const IDENTITY: Rows = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
 #[test]
 fn surfaces_of_a_model_are_those_of_its_source() {

@@ -197,7 +197,7 @@ mod tests {
         let mut rng = Rng::new(31);
         let mut unit = || rng.below(1 << 20) as f32 / (1 << 19) as f32 - 1.0;
         let (mut met, mut missed) = (0, 0);
-        for round in 0..120 {
+        for round in 0..200 {
             // Some packets have a last group that is not full, or only one group.
             let rays: Vec<Ray> = (0..PACKET - round % 60)
                 .map(|_| {

@@ -242,7 +242,9 @@ fn packets_through_the_top_level_do_not_change_results() {
         refused += usize::from(active_rays.packets.is_empty() && count == 150);
         ray_count += rays.len();
     }
-    assert!(in_packets > 60, "{in_packets} of 200 cases in packets");
+    // There are no packets in scalar code.
+    let expected = if Isa::chosen() == Isa::Scalar { 0..=0 } else { 61..=200 };
+    assert!(expected.contains(&in_packets), "{in_packets} of 200 cases in packets");
     assert!(hit_count > ray_count / 5 && refused > 2, "{hit_count} of {ray_count} hit, {refused} refused");
 }
 

@@ -1,12 +1,12 @@
 //! Instances that the caller of a scene builder places: all changes of a commit at once, or none of them.
 
+use super::caller_instances::InstanceRow;
 use super::placement::{PartBoxes, Placement, PlacementError};
-use super::world::{InstanceRow, TransformSource, Update, World};
+use super::world::{TransformSource, Update, World};
 use crate::clock;
 use crate::objects::Objects;
 use crate::simd::{Isa, Kernel, Simd};
 use bth_format::layout::NONE;
-use std::sync::OnceLock;
 
 /// From this number of changed instances on, they are placed by several threads.
 #[cfg(feature = "rayon")]
@@ -18,38 +18,6 @@ const TASK: usize = 256;
 /// The top level is built anew where its expected cost would exceed this multiple of that when it was built. See
 /// `docs/decisions.md`.
 pub(crate) const MAX_COST_RATIO: f64 = 1.5;
-
-/// The instances as the caller has placed them in the last commit.
-#[derive(Debug, Default)]
-pub(super) struct CallerInstances {
-    pub(super) rows: Vec<InstanceRow>,
-    /// Number of visible instances.
-    visible: usize,
-    /// For each object the boxes from which the world boxes of its instances are computed, once they were needed.
-    parts: Vec<OnceLock<Box<PartBoxes>>>,
-    /// Memory for the placements of a commit.
-    placed: Vec<Result<Option<Placement>, PlacementError>>,
-}
-
-impl CallerInstances {
-    /// Forgets the boxes of an object, which has got others.
-    pub(super) fn forget_parts(&mut self, object: u32) {
-        self.parts[object as usize].take();
-    }
-
-    pub(super) fn add_objects(&mut self, count: u32) {
-        self.parts.resize_with(count as usize, OnceLock::new);
-    }
-
-    /// Bytes on the heap.
-    pub(super) fn bytes(&self) -> usize {
-        let parts = self.parts.iter().filter(|parts| parts.get().is_some()).count();
-        self.rows.capacity() * size_of::<InstanceRow>()
-            + self.placed.capacity() * size_of::<Result<Option<Placement>, PlacementError>>()
-            + self.parts.capacity() * size_of::<OnceLock<Box<PartBoxes>>>()
-            + parts * size_of::<PartBoxes>()
-    }
-}
 
 /// An instance as it is to be.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,8 @@
 //! Enumeration of the instances whose boxes one ray may enter.
 
 use super::World;
-use super::top_level::{INSTANCE, TopLevel};
+use super::top_level::TopLevel;
+use super::top_nodes::INSTANCE;
 use super::traverse::{limit, widened_slabs};
 use crate::bvh::ray_state::key_limit;
 use crate::bvh::stack::BOTTOM;

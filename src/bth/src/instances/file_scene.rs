@@ -3,19 +3,12 @@
 use super::affine::Affine;
 use super::hierarchy::NodeHierarchy;
 use super::placement::{PartBoxes, Placement, PlacementError};
-use super::world::{TransformSource, Update, World};
+use super::world::{TransformSource, Update, World, scene_of};
 use crate::clock;
 use crate::objects::Objects;
-use bth_format::SceneView;
 use bth_format::error::{Code, Error, Result};
-use bth_format::file::File;
 use bth_format::layout::*;
 use bth_format::text;
-
-/// The scene sections of a scene that is a file with such sections.
-pub(super) fn scene_of(objects: &Objects) -> SceneView<'_> {
-    objects.sole_file().and_then(File::scene).expect("a file with scene sections, checked when it was opened")
-}
 
 impl World {
     /// The instances of a file at the first frame of its scene; `None` if the objects are not those of a file with scene sections.

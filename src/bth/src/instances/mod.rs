@@ -14,6 +14,7 @@ mod affine;
 mod affine_tests;
 mod batch;
 mod caller;
+mod caller_instances;
 mod deformed;
 mod enter_object;
 mod enumerate;
@@ -27,6 +28,7 @@ mod placement;
 mod refit;
 mod scene_batch;
 mod top_level;
+mod top_nodes;
 pub(crate) mod tracks;
 mod traverse;
 mod visit_queue;
@@ -34,12 +36,13 @@ mod world;
 
 pub(crate) use affine::{Affine, ObjectRay};
 pub(crate) use caller::NewInstance;
+pub(crate) use caller_instances::InstanceRow;
 pub(crate) use hierarchy::NodeHierarchy;
 #[cfg(test)]
 pub(crate) use placement::PartBoxes;
 pub(crate) use placement::Placement;
-pub(crate) use top_level::INSTANCE;
 #[cfg(test)]
 pub(crate) use top_level::TopLevel;
+pub(crate) use top_nodes::INSTANCE;
 pub use world::Update;
-pub(crate) use world::{InstanceRow, Placed, World};
+pub(crate) use world::{Placed, World};

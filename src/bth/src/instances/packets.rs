@@ -4,7 +4,8 @@
 //! visited one after the other. If the list exceeds its limit, the rays are traversed one by one, because most of the listed
 //! instances would be occluded by others.
 
-use super::top_level::{INSTANCE, TopLevel};
+use super::top_level::TopLevel;
+use super::top_nodes::INSTANCE;
 use super::traverse::limit;
 use crate::SMALL;
 use crate::bvh::packet::bounds::PacketBounds;

@@ -1,9 +1,10 @@
 //! Refitting of the top level: instances have moved, and the boxes of the same nodes are computed again, from the leaves up. A refit
-//! costs a fraction of a build, but nodes grow where instances that share one move apart. [`CostRatio`] tells how much.
+//! costs a fraction of a build, but nodes grow where instances that share one move apart. [`CostRatio`](super::top_nodes::CostRatio) tells how much.
 
 use super::placement::Placement;
-use super::top_level::{Bounds, INSTANCE, TopLevel, node_mut, put_bounds};
-use bth_format::layout::{CacheLine, NODE_LINES, NONE, WIDTH, WideNode};
+use super::top_level::TopLevel;
+use super::top_nodes::{Bounds, INSTANCE, node_mut, put_bounds, used};
+use bth_format::layout::{CacheLine, NODE_LINES, WIDTH, WideNode};
 use glam::Vec4;
 
 /// From this number of nodes on, the boxes of instances are stored by several threads.
@@ -12,49 +13,6 @@ const MIN_PARALLEL: usize = 512;
 /// Number of nodes of one task.
 #[cfg(feature = "rayon")]
 const TASK: usize = 64;
-
-/// The expected cost of rays through the top level, now and when it was built.
-///
-/// A line that meets a box meets a box within with the probability of the ratio of their surface areas. So the area of all nodes
-/// relative to that of all instances is the expected number of nodes that a random line visits for each instance that it visits.
-/// Unlike a cost relative to the area of the root, it does not become less when an instance moves far away.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct CostRatio {
-    built: f64,
-    now: f64,
-}
-
-impl CostRatio {
-    /// For a top level that has just been built.
-    pub(super) fn of_new(top: &TopLevel) -> CostRatio {
-        let cost = cost(top);
-        CostRatio { built: cost, now: cost }
-    }
-}
-
-/// The area of all nodes but the root relative to that of all instances.
-fn cost(top: &TopLevel) -> f64 {
-    let (mut nodes, mut instances) = (0.0, 0.0);
-    for code in (0..top.lines.len()).step_by(NODE_LINES) {
-        let node = top.node(code as u32);
-        for slot in 0..used(node) {
-            let area = slot_bounds(node, slot).area();
-            *(if node.child[slot] & INSTANCE == 0 { &mut nodes } else { &mut instances }) += area;
-        }
-    }
-    nodes / instances
-}
-
-/// Number of children of a node, which come first.
-fn used(node: &WideNode) -> usize {
-    node.child.iter().position(|code| *code == NONE).unwrap_or(WIDTH)
-}
-
-fn slot_bounds(node: &WideNode, slot: usize) -> Bounds {
-    let end = |end: usize| [0, 1, 2].map(|k| node.bounds[k][end][slot]);
-    let ([a, b, c], [d, e, f]) = (end(0), end(1));
-    Bounds { lower: Vec4::new(-a, -b, -c, 0.0), upper: Vec4::new(d, e, f, 0.0) }
-}
 
 impl TopLevel {
     /// Computes all boxes again after instances have moved. The visible instances are those for which the BVH was built.
@@ -76,7 +34,7 @@ impl TopLevel {
             }
         }
         self.lines = lines;
-        self.cost.now = cost(self);
+        self.cost.update(&self.lines);
     }
 
     /// Stores the boxes of all instances.
@@ -108,8 +66,7 @@ impl TopLevel {
 
     /// The expected cost relative to that when the BVH was built. It is 1 where there is only one node, or none.
     pub(super) fn cost_ratio(&self) -> f64 {
-        let ratio = self.cost.now / self.cost.built;
-        if ratio.is_nan() { 1.0 } else { ratio }
+        self.cost.ratio()
     }
 }
 

@@ -5,17 +5,13 @@
 //! children, whose empty slots cost memory and time.
 
 use super::placement::Placement;
-use super::refit::CostRatio;
-use bth_format::layout::{CacheLine, Child, NODE_LINES, NONE, WIDTH, WideNode};
+use super::top_nodes::{Bounds, CostRatio, INSTANCE, node, node_mut, put_bounds};
+use bth_format::layout::{CacheLine, NODE_LINES, NONE, WIDTH, WideNode};
 use glam::Vec4;
-use zerocopy::{FromBytes, IntoBytes};
 
 /// The boxes are built for rays whose origin has at most this factor times the greatest |coordinate| of the instances' boxes. For
 /// rays from farther away they are widened during traversal, see [`TopLevel::origin_slack`].
 const REACH: f32 = 4.0;
-
-/// Bit of the child codes of instances; the other bits are the index of the instance.
-pub(crate) const INSTANCE: u32 = Child::LEAF_BIT;
 
 /// The top-level BVH.
 #[derive(Debug, Default)]
@@ -57,25 +53,6 @@ impl BuildItem {
     }
     fn instance(&self) -> u32 {
         self.bounds.lower.w.to_bits() - LEAST_NORMAL
-    }
-}
-
-/// A box: the three lower ends, negated so that a union is a maximum of all values, and the three upper ends. The fourth numbers have
-/// no meaning; they fill vector registers.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Bounds {
-    pub(super) lower: Vec4,
-    pub(super) upper: Vec4,
-}
-
-impl Bounds {
-    pub(super) const EMPTY: Bounds = Bounds { lower: Vec4::NEG_INFINITY, upper: Vec4::NEG_INFINITY };
-
-    /// Half the surface area, in f64 because f32 could overflow.
-    pub(super) fn area(&self) -> f64 {
-        let (lower, upper) = (self.lower.to_array(), self.upper.to_array());
-        let [x, y, z] = [0, 1, 2].map(|k| f64::from(upper[k]) + f64::from(lower[k]));
-        x * y + y * z + z * x
     }
 }
 
@@ -144,7 +121,7 @@ impl TopLevel {
         let mut items = Vec::with_capacity(placements.len());
         items.extend(visible.filter_map(item));
         self.build_from(&mut items);
-        self.cost = CostRatio::of_new(self);
+        self.cost = CostRatio::of_new(&self.lines);
     }
 
     /// Sets what rays need to know about all boxes.
@@ -224,8 +201,7 @@ impl TopLevel {
     /// The node with a child code.
     #[inline(always)]
     pub(crate) fn node(&self, code: u32) -> &WideNode {
-        let lines = &self.lines[code as usize..][..NODE_LINES];
-        WideNode::ref_from_bytes(lines.as_bytes()).ok().expect("a node is as long as its lines")
+        node(&self.lines[code as usize..][..NODE_LINES])
     }
 
     /// Whether no instance is visible.
@@ -275,25 +251,11 @@ fn add_node(lines: &mut Vec<CacheLine>) -> u32 {
     code as u32
 }
 
-/// The node in the lines of one.
-pub(super) fn node_mut(lines: &mut [CacheLine]) -> &mut WideNode {
-    WideNode::mut_from_bytes(lines.as_mut_bytes()).ok().expect("a node is as long as its lines")
-}
-
 /// Stores a child in a slot of a node.
 fn put(lines: &mut [CacheLine], node: u32, slot: usize, code: u32, bounds: &Bounds) {
     let node = node_mut(&mut lines[node as usize..][..NODE_LINES]);
     node.child[slot] = code;
     put_bounds(node, slot, bounds);
-}
-
-/// Stores the box of a child in a slot of a node.
-pub(super) fn put_bounds(node: &mut WideNode, slot: usize, bounds: &Bounds) {
-    let (lower, upper) = (bounds.lower.to_array(), bounds.upper.to_array());
-    for k in 0..3 {
-        node.bounds[k][0][slot] = -lower[k];
-        node.bounds[k][1][slot] = upper[k];
-    }
 }
 
 /// Splits the first range into up to 16, always the one of greatest area among those with more items than a node has children.

@@ -3,7 +3,8 @@
 //! The rays of a block advance alternately, one step each, so that their memory latencies overlap. A ray stops at each instance
 //! until it has been traced in it.
 
-use super::top_level::{INSTANCE, TopLevel};
+use super::top_level::TopLevel;
+use super::top_nodes::INSTANCE;
 use crate::bvh::ray_state::KEY_SLACK;
 use crate::bvh::stack::{BOTTOM, StackPosition, Stacks};
 use crate::intersect::boxes::RaySlabs;

@@ -2,12 +2,14 @@
 //! of a scene builder ([`super::caller`]).
 
 use super::affine::{Affine, Inverse};
-use super::caller::CallerInstances;
+use super::caller_instances::{CallerInstances, InstanceRow};
 use super::hierarchy::NodeHierarchy;
 use super::placement::{PartBoxes, Placement};
 use super::top_level::TopLevel;
 use crate::deformers::Deformers;
 use crate::objects::Objects;
+use bth_format::SceneView;
+use bth_format::file::File;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -77,14 +79,9 @@ pub(crate) struct Placed {
     pub(crate) upper: [f32; 3],
 }
 
-/// An instance: its object, its node, and its transform to world space.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct InstanceRow {
-    /// Index of the object; `NONE` if the instance was removed.
-    pub(crate) object: u32,
-    /// Index of the node in the file of the object, or `NONE`.
-    pub(crate) node: u32,
-    pub(crate) to_world: Affine,
+/// The scene sections of a scene that is a file with such sections.
+pub(super) fn scene_of(objects: &Objects) -> SceneView<'_> {
+    objects.sole_file().and_then(File::scene).expect("a file with scene sections, checked when it was opened")
 }
 
 /// Where the transforms of instances come from.
@@ -170,7 +167,7 @@ impl World {
     pub(crate) fn row(&self, objects: &Objects, instance: u32) -> InstanceRow {
         match &self.source {
             TransformSource::File(hierarchy) => {
-                let view = super::file_scene::scene_of(objects);
+                let view = scene_of(objects);
                 let row = view.instances[instance as usize];
                 let to_world = match self.deformers.is_skinned(row.object) {
                     true => Affine::IDENTITY,
@@ -185,9 +182,7 @@ impl World {
     /// Index of an instance's object; `NONE` if the instance was removed.
     pub(crate) fn object_of(&self, objects: &Objects, instance: u32) -> u32 {
         match &self.source {
-            TransformSource::File(_) => {
-                super::file_scene::scene_of(objects).instances[instance as usize].object
-            }
+            TransformSource::File(_) => scene_of(objects).instances[instance as usize].object,
             TransformSource::Caller(caller) => caller.rows[instance as usize].object,
         }
     }

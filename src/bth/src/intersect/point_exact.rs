@@ -1,7 +1,6 @@
 //! Terms of the distance of a point to a triangle as exact sums of products of f32 coordinates, for the few points and triangles
 //! for which f64 loses too many digits ([`super::point_triangle`]).
 
-use super::point_triangle::dot;
 use bth_format::exact::{Expansion, VOLUME_PARTS};
 
 /// Parts of a component of a vector product: six products of two numbers, each exact in f64.
@@ -88,4 +87,8 @@ impl ExactTriangle {
             weight.value() > 0.0
         })
     }
+}
+
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

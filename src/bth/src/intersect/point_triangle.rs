@@ -16,7 +16,7 @@
 //!
 //! The range of f64 holds all these products of f32 coordinates, whose exponents lie between -149 and 128.
 
-use super::point_exact::{ExactTriangle, exact_edge_cross};
+use super::point_exact::{ExactTriangle, dot, exact_edge_cross};
 use std::cmp::Ordering;
 
 /// Bound of the relative error of computed squared distances.
@@ -76,10 +76,6 @@ fn difference(a: [f32; 3], b: [f32; 3]) -> [f64; 3] {
         out[k] = f64::from(a[k]) - f64::from(b[k]);
     }
     out
-}
-
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

@@ -4,9 +4,10 @@ use super::strategy::{is_short, size_of};
 use crate::query::{EitherGoal, EitherQuery, Goal, Query};
 use crate::rays::Ray;
 use crate::simd::Isa;
-use crate::tets::batch::{WalkBatch, WalkRays, WalkState};
+use crate::tets::batch::{WalkBatch, WalkRays};
 use crate::tets::leaf_of_face;
 use crate::tets::records::LaneRecords;
+use crate::tets::walks::WalkState;
 use bth_format::layout::{Child, NONE};
 use bth_format::object::ObjectView;
 

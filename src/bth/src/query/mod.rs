@@ -1,6 +1,5 @@
 //! Queries over rays, nearest hit and any hit, and the statistics of their traversal.
 
-mod answers;
 #[cfg(any(test, not(feature = "small")))]
 mod any;
 mod goal;
@@ -8,13 +7,12 @@ pub(crate) mod sink;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use self::answers::Answers;
-#[cfg(test)]
-pub(crate) use self::answers::EitherAnswers;
 #[cfg(any(test, not(feature = "small")))]
 use self::any::Any;
+#[cfg(test)]
+pub(crate) use self::goal::EitherAnswers;
 pub(crate) use self::goal::{
-    ANY, Answer, AnyHit, AnyQuery, EitherGoal, Goal, NEAREST, NearestHit, NearestQuery, any_answers,
+    ANY, Answer, Answers, AnyHit, AnyQuery, EitherGoal, Goal, NEAREST, NearestHit, NearestQuery, any_answers,
     nearest_answers,
 };
 

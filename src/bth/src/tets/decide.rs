@@ -4,11 +4,12 @@
 //! after which the ray returns to the lanes; and the flood, where a sign is uncertain in f64, too. Therefore the answers have the
 //! same bits as those of walks of single rays.
 
-use super::batch::{Reached, WalkBatch, WalkStart, WalkState, Walks};
+use super::batch::WalkBatch;
 use super::lanes::UNCERTAIN;
 use super::leaf_of_face;
 use super::records::{Entered, ReadRecords};
 use super::walk::{TetPosition, TetWalker, WalkOutcome};
+use super::walks::{Reached, WalkStart, WalkState, Walks};
 use crate::intersect::line::Line;
 use crate::query::Query;
 use bth_format::layout::{FACE_BIT, NONE, TetFace};

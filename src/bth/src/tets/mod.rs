@@ -13,6 +13,7 @@ pub(crate) mod records;
 pub(crate) mod rounds;
 mod starts;
 pub(crate) mod walk;
+pub(crate) mod walks;
 
 use self::walk::{TetWalker, WalkOutcome};
 use crate::bvh::single::TetOutcome;

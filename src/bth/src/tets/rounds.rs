@@ -2,10 +2,11 @@
 //!
 //! When several lanes of a group have stopped, their results are evaluated and the lanes are refilled from the queue.
 
-use super::batch::{WalkBatch, WalkStart, Walks, vertices};
+use super::batch::WalkBatch;
 use super::lanes::{Lanes, Step, float, word};
 use super::queue::PreparedQueue;
 use super::records::Entered;
+use super::walks::{WalkStart, Walks, vertices};
 use crate::simd::{Kernel, LANES, Simd};
 use bth_format::layout::NONE;
 

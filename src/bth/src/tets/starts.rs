@@ -1,11 +1,11 @@
 //! Which rays of a batch are prepared next for the lanes: walks that return to them, or the next rays of the batch, whose starts
 //! are located.
 
-use super::batch::{WalkStart, Walks, vertices};
 use super::lanes::{three, word};
 use super::queue::{PreparedQueue, PreparedWalks};
 use super::records::Entered;
 use super::walk::{TetPosition, WalkOutcome};
+use super::walks::{WalkStart, Walks, vertices};
 use crate::intersect::line::Line;
 use crate::simd::{LANES, Part, Simd};
 use bth_format::layout::NONE;

@@ -1,0 +1,68 @@
+//! The state of the walks of a batch of rays, without their queries.
+
+use super::records::{Entered, LaneRecords};
+use super::walk::TetPosition;
+use crate::rays::Ray;
+use bth_format::object::ObjectView;
+use zerocopy::{FromBytes, IntoBytes};
+
+/// State of a ray's walk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum WalkState {
+    /// The ray was not walked.
+    NotWalked,
+    /// The query holds all hits of the ray in the tet leaf that can change its result.
+    Left,
+    /// The query is complete.
+    Done,
+}
+
+/// The tetrahedron in which a ray's walk begins or continues.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WalkStart {
+    /// Index of the ray in the batch.
+    pub(super) ray: u32,
+    pub(super) tet: u32,
+    /// The line certainly crosses the entered face, whose corners are counterclockwise as seen along the ray.
+    pub(super) entered: Entered,
+}
+
+/// A constrained face that a ray's line certainly crosses.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reached {
+    /// Index of the ray in the batch.
+    pub(super) ray: u32,
+    /// Index of the face in the object's constrained faces.
+    pub(super) face: u32,
+}
+
+/// The walks of a batch of rays, but for the queries. All slices have one element per ray.
+pub(super) struct Walks<'a> {
+    pub(super) object: &'a ObjectView<'a>,
+    pub(super) records: LaneRecords<'a>,
+    /// The rays, in object space.
+    pub(super) rays: &'a [Ray],
+    /// For each ray the constrained face near which it starts, or `NONE`.
+    pub(super) faces: &'a [u32],
+    /// For each ray the tet leaf that it enters from outside if it does not start near a face, or `NONE`.
+    pub(super) leaves: &'a [u32],
+    /// Whether the walks keep track of depths: they can end any-hit queries, whose rays are often short.
+    pub(super) keeps_depths: bool,
+    /// For each ray the state of its walk.
+    pub(super) states: &'a mut [WalkState],
+    /// Index of the first ray that is not yet prepared.
+    pub(super) next: usize,
+    /// Located starts of walks, and walks that return to the lanes, which are not yet prepared.
+    pub(super) starts: Vec<WalkStart>,
+    /// Faces that lanes have reached and that are not yet tested.
+    pub(super) reached: Vec<Reached>,
+    /// For each ray the number of times that it has returned to the lanes.
+    pub(super) returns: Vec<u8>,
+    /// Rays whose walks are to be made without lanes: from a position, or where that is uncertain as a flood.
+    pub(super) without_lanes: Vec<(u32, Option<TetPosition>)>,
+}
+
+/// The object's tet vertices as rows of four words: x, y, z and an unused word.
+pub(super) fn vertices<'a>(object: &ObjectView<'a>) -> &'a [[f32; 4]] {
+    <[[f32; 4]]>::ref_from_bytes(object.tet_vertices.as_bytes()).ok().expect("a vertex is four words")
+}

@@ -1,7 +1,8 @@
 //! Enumeration of the instances of a scene that a ray may hit. That of the triangles of an object is
 //! [`bvh::enumerate`](crate::bvh::enumerate).
 
-use crate::instances::{ObjectRay, Placement};
+use crate::instances::Placement;
+use crate::nodes::ObjectRay;
 use crate::rays::Ray;
 use crate::scene::Scene;
 use bth_format::object::ObjectView;

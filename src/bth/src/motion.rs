@@ -1,8 +1,9 @@
 //! The part of [`Scene`] that sets the time and returns the transforms of instances and nodes at that time.
 
-use crate::instances::{Update, World};
+use crate::instances::World;
 use crate::objects::Objects;
 use crate::scene::Scene;
+use crate::update::Update;
 use bth_format::{Error, File, SceneView};
 
 /// An instance at the scene's time.

@@ -4,7 +4,7 @@ use super::SceneBuilder;
 use crate::clock;
 use crate::deform::{Deforming, TetUse};
 use crate::deformers::Posed;
-use crate::instances::Update;
+use crate::update::Update;
 use bth_format::Error;
 use std::collections::HashSet;
 

@@ -2,7 +2,8 @@
 
 use super::subscene::Subscene;
 use super::{MAX_INSTANCES, SceneBuilder};
-use crate::instances::{Affine, InstanceRow, NewInstance};
+use crate::instances::{InstanceRow, NewInstance};
+use crate::nodes::Affine;
 use crate::objects::Objects;
 use bth_format::layout::NONE;
 use bth_format::text;

@@ -13,8 +13,8 @@ mod subscenes;
 use self::ids::FreeIds;
 use self::instances::StagedInstance;
 use self::subscene::Subscene;
-use crate::instances::Update;
 use crate::scene::Scene;
+use crate::update::Update;
 use bth_format::text;
 use bth_format::{Code, Error};
 

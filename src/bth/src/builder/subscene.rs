@@ -1,6 +1,6 @@
 //! A file whose instances are placed as a whole.
 
-use crate::instances::{Affine, NodeHierarchy};
+use crate::nodes::{Affine, NodeHierarchy};
 use crate::objects::Objects;
 use bth_format::SceneView;
 use bth_format::layout::NONE;

@@ -14,18 +14,10 @@ use crate::intersect::prepare::PreparedRay;
 use crate::query::{Count, Goal, Query};
 use crate::rays::Ray;
 use crate::simd::{Part, Simd};
+use crate::tets::TetOutcome;
 use bth_format::layout::{Child, NONE, WIDTH};
 use bth_format::object::{NodeBase, ObjectView};
 use std::hint::black_box;
-
-/// Result of a tet leaf for a ray.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum TetOutcome {
-    /// The query is complete.
-    Done,
-    /// The traversal continues with the stack.
-    Continue,
-}
 
 /// State of the ray. All fields but the query stay in registers.
 struct SingleState<'a, Q> {

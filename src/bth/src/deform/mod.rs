@@ -11,7 +11,6 @@ mod deforming;
 mod orientation;
 mod plan;
 mod refit;
-mod scene;
 mod tets;
 
 pub(crate) use deforming::Deforming;

@@ -17,7 +17,7 @@
 
 use super::bound_vertices::{BoundVertices, VertexKind};
 use super::orientation::Tetrahedra;
-use crate::instances::Update;
+use crate::update::Update;
 use bth_format::file::TetParts;
 use bth_format::layout::{NONE, TetFace, TetLeaf, TetVertex};
 use bth_format::object::ObjectView;

@@ -11,7 +11,6 @@ mod evaluate;
 pub(crate) mod normals;
 pub(crate) mod pose;
 mod poses;
-mod scene;
 mod sequences;
 #[cfg(test)]
 mod tests;

@@ -1,7 +1,7 @@
 //! The pose of an object at a time: matrices of its joints, weights of its morph targets.
 
 use super::JointMatrix;
-use crate::instances::{Affine, NodeHierarchy, tracks};
+use crate::nodes::{Affine, NodeHierarchy, tracks};
 use bth_format::SceneView;
 use bth_format::layout::*;
 

@@ -2,7 +2,7 @@
 
 use super::evaluate::{self, Vertices};
 use super::pose::Pose;
-use crate::instances::NodeHierarchy;
+use crate::nodes::NodeHierarchy;
 use bth_format::layout::*;
 use bth_format::{DeformationView, SceneView};
 

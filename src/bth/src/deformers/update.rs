@@ -6,7 +6,7 @@ use super::pose::Pose;
 use super::sequences::{Moved, Sequences};
 use crate::clock;
 use crate::deform::TetUse;
-use crate::instances::NodeHierarchy;
+use crate::nodes::NodeHierarchy;
 use crate::objects::Objects;
 use bth_format::File;
 use bth_format::error::{Code, Error, Result};

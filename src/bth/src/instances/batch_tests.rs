@@ -1,10 +1,10 @@
 //! Tests of batches through instances. The oracle is a loop over all instances.
 
-use super::super::affine::Affine;
 use super::super::exact_loop;
 use super::super::placement::PartBoxes;
 use super::*;
 use crate::hits::Accept;
+use crate::nodes::affine::Affine;
 use crate::scene::Scene;
 use bth_format::File;
 use bth_random::Rng;

@@ -2,10 +2,11 @@
 
 use super::caller_instances::InstanceRow;
 use super::placement::{PartBoxes, Placement, PlacementError};
-use super::world::{TransformSource, Update, World};
+use super::world::{TransformSource, World};
 use crate::clock;
 use crate::objects::Objects;
 use crate::simd::{Isa, Kernel, Simd};
+use crate::update::Update;
 use bth_format::layout::NONE;
 
 /// From this number of changed instances on, they are placed by several threads.
@@ -74,7 +75,8 @@ impl World {
         placed: &[Result<Option<Placement>, PlacementError>],
     ) -> Update {
         let TransformSource::Caller(caller) = &mut self.source else { return Update::default() };
-        let vacant = InstanceRow { object: NONE, node: NONE, to_world: super::affine::Affine::IDENTITY };
+        let vacant =
+            InstanceRow { object: NONE, node: NONE, to_world: crate::nodes::affine::Affine::IDENTITY };
         caller.rows.resize(count, vacant);
         self.placements.resize(count, None);
         let mut same_visible = true;

@@ -1,7 +1,7 @@
 //! The instances of a scene builder, as its caller has placed them in the last commit.
 
-use super::affine::Affine;
 use super::placement::{PartBoxes, Placement, PlacementError};
+use crate::nodes::affine::Affine;
 use std::sync::OnceLock;
 
 /// An instance: its object, its node, and its transform to world space.

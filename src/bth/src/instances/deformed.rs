@@ -2,8 +2,9 @@
 
 use super::caller::Unplaceable;
 use super::placement::Placement;
-use super::world::{TransformSource, Update, World};
+use super::world::{TransformSource, World};
 use crate::objects::Objects;
+use crate::update::Update;
 
 impl World {
     /// Computes the world boxes of all visible instances of some objects anew, and refits or rebuilds the top level.

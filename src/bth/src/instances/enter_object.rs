@@ -1,8 +1,8 @@
 //! Transformation of rays into the space of an object.
 
-use super::affine::RayLanes;
 use super::scene_batch::SceneBatch;
 use crate::SMALL;
+use crate::nodes::affine::RayLanes;
 use crate::query::sink::Visit;
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, LANES, Simd};

@@ -1,9 +1,9 @@
 //! The oracle of tests of instances: a loop over all triangles, without any box.
 
-use super::affine::Inverse;
 use crate::bvh::candidate::{Candidate, ReadCorners};
 use crate::intersect::exact::reported;
 use crate::intersect::line::Line;
+use crate::nodes::affine::Inverse;
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use bth_format::layout::{Child, Opacity};
 use bth_format::object::ObjectView;

@@ -1,11 +1,12 @@
 //! The instances of a file with scene sections at a time.
 
-use super::affine::Affine;
-use super::hierarchy::NodeHierarchy;
 use super::placement::{PartBoxes, Placement, PlacementError};
-use super::world::{TransformSource, Update, World, scene_of};
+use super::world::{TransformSource, World, scene_of};
 use crate::clock;
+use crate::nodes::affine::Affine;
+use crate::nodes::hierarchy::NodeHierarchy;
 use crate::objects::Objects;
+use crate::update::Update;
 use bth_format::error::{Code, Error, Result};
 use bth_format::layout::*;
 use bth_format::text;

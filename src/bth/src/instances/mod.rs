@@ -1,7 +1,7 @@
 //! Instances of a scene at a time, and rays through them.
 //!
-//! An update of the time ([`file_scene`]) evaluates the tracks ([`tracks`]) and the hierarchy of nodes ([`hierarchy`]), computes
-//! the inverse transform and the world box of each instance that moved ([`placement`], [`affine`]), and rebuilds the BVH over the
+//! An update of the time ([`file_scene`]) evaluates the nodes of the scene ([`crate::nodes`]), computes the inverse
+//! transform and the world box of each instance that moved ([`placement`]), and rebuilds the BVH over the
 //! boxes ([`top_level`]). In a scene that the caller builds, a commit ([`caller`]) does the same for the instances that the caller
 //! has changed, and may refit the BVH instead. Rays meet the result ([`world`]) in the same way. A batch of rays ([`batch`]) traverses that BVH, coherent rays as packets ([`packets`]) and the others
 //! one by one ([`traverse`]). Rays that certainly do not meet the instance on which they start ([`free_starts`]) do not enter it.
@@ -9,9 +9,6 @@
 //! transformed into its space ([`enter_object`]) and traced there together, with t unchanged. A ray whose query reports several
 //! hits goes through the top level alone ([`enumerate`]).
 
-mod affine;
-#[cfg(test)]
-mod affine_tests;
 mod batch;
 mod caller;
 mod caller_instances;
@@ -22,27 +19,22 @@ mod enumerate;
 pub(crate) mod exact_loop;
 mod file_scene;
 mod free_starts;
-mod hierarchy;
 mod packets;
 mod placement;
 mod refit;
 mod scene_batch;
 mod top_level;
 mod top_nodes;
-pub(crate) mod tracks;
 mod traverse;
 mod visit_queue;
 mod world;
 
-pub(crate) use affine::{Affine, ObjectRay};
 pub(crate) use caller::NewInstance;
 pub(crate) use caller_instances::InstanceRow;
-pub(crate) use hierarchy::NodeHierarchy;
 #[cfg(test)]
 pub(crate) use placement::PartBoxes;
 pub(crate) use placement::Placement;
 #[cfg(test)]
 pub(crate) use top_level::TopLevel;
 pub(crate) use top_nodes::INSTANCE;
-pub use world::Update;
 pub(crate) use world::{Placed, World};

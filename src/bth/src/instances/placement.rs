@@ -1,6 +1,6 @@
 //! An instance in the world: its inverse transform and a conservative world box.
 
-use super::affine::{Affine, Inverse};
+use crate::nodes::affine::{Affine, Inverse};
 use bth_format::layout::{NONE, Object, WIDTH};
 use bth_format::object::ObjectView;
 use std::num::NonZeroU32;

@@ -1,8 +1,8 @@
 //! The parameters of a batch of rays through the instances of a scene.
 
 use super::World;
-use super::affine::ObjectRay;
 use crate::SMALL;
+use crate::nodes::affine::ObjectRay;
 use crate::objects::Objects;
 use crate::query::sink::Visit;
 use crate::rays::{PrimitiveRef, Ray};

@@ -1,68 +1,16 @@
 //! The instances of a scene, as rays meet them. They come from a file with scene sections ([`super::file_scene`]) or from the caller
 //! of a scene builder ([`super::caller`]).
 
-use super::affine::{Affine, Inverse};
 use super::caller_instances::{CallerInstances, InstanceRow};
-use super::hierarchy::NodeHierarchy;
 use super::placement::{PartBoxes, Placement};
 use super::top_level::TopLevel;
 use crate::deformers::Deformers;
+use crate::nodes::affine::{Affine, Inverse};
+use crate::nodes::hierarchy::NodeHierarchy;
 use crate::objects::Objects;
 use bth_format::SceneView;
 use bth_format::file::File;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
-
-/// Statistics of an update: of a scene's time, or of a [`commit`](crate::SceneBuilder::commit).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Update {
-    /// Nodes of files that moved, were hidden or became visible, including all their descendants.
-    pub nodes: usize,
-    /// Instances that were placed again.
-    pub placed: usize,
-    /// Visible instances of the whole scene.
-    pub visible: usize,
-    /// Whether the top level was built anew. If instances only moved, a commit refits it, that is, keeps its nodes and computes
-    /// their boxes again, as long as [`Self::cost_ratio`] permits.
-    pub rebuilt: bool,
-    /// Expected cost of rays through the top level relative to when it was last built: 1 after it was, greater where instances
-    /// that share a node have moved apart since. It is the surface area of the boxes of all nodes, relative to that of the boxes
-    /// of all instances. A commit builds the top level anew where this would exceed 1.5.
-    pub cost_ratio: f64,
-    /// Time to rebuild or refit the top level.
-    pub top_level: Duration,
-    /// Objects that got new positions ([`Scene::set_positions`](crate::Scene::set_positions)).
-    pub deformed: usize,
-    /// Expected cost of rays through a deformed object relative to that in the pose for which it was compiled, of several objects the
-    /// greatest: the sum of the areas of the boxes of all nodes and leaves, relative to the area of the object's box (SAH). 1 if
-    /// no object was deformed. Where it grows far beyond 1, compile the object anew in a pose nearer to the new one.
-    pub deformed_cost_ratio: f64,
-    /// Tet leaves of the objects that got new positions in which rays may start: none of their tetrahedra is turned over or flat.
-    pub tet_leaves_in_use: usize,
-    /// Tet leaves of these objects for which the BVH beside them answers.
-    pub tet_leaves_aside: usize,
-    /// Time to check the new positions and refit the objects.
-    pub refit: Duration,
-}
-
-impl Default for Update {
-    /// An update in which nothing changed.
-    fn default() -> Update {
-        Update {
-            nodes: 0,
-            placed: 0,
-            visible: 0,
-            rebuilt: false,
-            cost_ratio: 1.0,
-            top_level: Duration::ZERO,
-            deformed: 0,
-            deformed_cost_ratio: 1.0,
-            tet_leaves_in_use: 0,
-            tet_leaves_aside: 0,
-            refit: Duration::ZERO,
-        }
-    }
-}
 
 /// The transforms of a visible instance.
 #[derive(Clone, Copy, Debug)]

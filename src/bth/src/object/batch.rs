@@ -9,13 +9,13 @@ use super::walked_batch::{RAYS_PER_PART, has_subtrees, may_gain_by_walk, sole_te
 use crate::SMALL;
 use crate::bvh::interleaved::{Interleaved, RemainingRays};
 use crate::bvh::packet::{self, Packets};
-use crate::bvh::single::TetOutcome;
 use crate::clock;
 use crate::intersect::exact_lanes::Intersections;
 use crate::query::sink::Sink;
 use crate::query::{Answer, AnswerLanes, EitherGoal, Goal, Nearest, Query, Uncounted};
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
+use crate::tets::TetOutcome;
 use crate::tets::enter_tets;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;

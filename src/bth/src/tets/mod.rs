@@ -16,12 +16,20 @@ pub(crate) mod walk;
 pub(crate) mod walks;
 
 use self::walk::{TetWalker, WalkOutcome};
-use crate::bvh::single::TetOutcome;
 use crate::intersect::line::Line;
 use crate::query::{Count, EitherQuery, Query};
 use crate::rays::Ray;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
+
+/// Result of a tet leaf for a ray.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum TetOutcome {
+    /// The query is complete.
+    Done,
+    /// The traversal continues with the stack.
+    Continue,
+}
 
 /// Result of the walk of a ray from the face on which it starts.
 pub(crate) enum TetStart {

@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::instances::exact_loop::{add_hits, in_order};
-use crate::instances::{Affine, PartBoxes, Placement};
+use crate::instances::{PartBoxes, Placement};
+use crate::nodes::Affine;
 use bth_format::layout::NONE;
 
 /// An instance that the caller wants.

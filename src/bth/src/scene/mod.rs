@@ -1,4 +1,7 @@
-//! Scenes: opening of compiled files, and what they hold.
+//! Scenes: opening of compiled files, what they hold, and new positions of their objects.
+
+mod deform;
+mod deformers;
 
 use crate::instances::World;
 use crate::masks::Masks;

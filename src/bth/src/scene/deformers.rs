@@ -1,7 +1,7 @@
 //! The part of [`Scene`] that gives the vertices of objects at the scene's time.
 
-use super::normals::corner_normal;
-use crate::scene::Scene;
+use super::Scene;
+use crate::deformers::normals::corner_normal;
 
 impl Scene {
     /// The positions of an object's vertices at the scene's time: those of the file, or those that skins and morph targets or

@@ -17,7 +17,7 @@ pub(crate) struct Affine {
 }
 
 #[inline(always)]
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
@@ -194,15 +194,15 @@ const LEAST_SCALED: f64 = (1u128 << (MAX_EXPONENT + 1)) as f64;
 
 /// Sixteen rays, one in each lane.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct RayLanes {
-    pub(super) origin: [[f32; LANES]; 3],
-    pub(super) direction: [[f32; LANES]; 3],
+pub(crate) struct RayLanes {
+    pub(crate) origin: [[f32; LANES]; 3],
+    pub(crate) direction: [[f32; LANES]; 3],
     /// Not 0 for rays whose direction is not scaled: their t in object space is t in world space.
-    pub(super) unscaled: [u32; LANES],
+    pub(crate) unscaled: [u32; LANES],
 }
 
 impl RayLanes {
-    pub(super) const NONE: RayLanes =
+    pub(crate) const NONE: RayLanes =
         RayLanes { origin: [[0.0; LANES]; 3], direction: [[0.0; LANES]; 3], unscaled: [0; LANES] };
 }
 
@@ -250,7 +250,7 @@ impl Inverse {
 
     /// As [`Self::ray`] for sixteen rays, with the same bits. The results of lanes that are not `unscaled` are not valid.
     #[inline(always)]
-    pub(super) fn transform(&self, lanes: &mut RayLanes) {
+    pub(crate) fn transform(&self, lanes: &mut RayLanes) {
         let RayLanes { origin, direction, unscaled } = lanes;
         let Inverse { linear, origin: object_origin } = *self;
         // There are no branches, so that the loop is vectorized.

@@ -1,9 +1,9 @@
 //! New positions of the objects of a [`Scene`].
 
-use super::Deforming;
+use super::Scene;
 use crate::clock;
-use crate::instances::Update;
-use crate::scene::Scene;
+use crate::deform::Deforming;
+use crate::update::Update;
 use bth_format::Error;
 use bth_format::text;
 

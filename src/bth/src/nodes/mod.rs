@@ -1,0 +1,11 @@
+//! The nodes of a file's scene at a time: tracks ([`tracks`]), the hierarchy with its transforms to world space ([`hierarchy`]), and
+//! affine transforms ([`affine`]).
+
+pub(crate) mod affine;
+#[cfg(test)]
+mod affine_tests;
+pub(crate) mod hierarchy;
+pub(crate) mod tracks;
+
+pub(crate) use affine::{Affine, ObjectRay};
+pub(crate) use hierarchy::NodeHierarchy;

@@ -15,7 +15,7 @@ impl World {
     /// The instances of a file at the first frame of its scene; `None` if the objects are not those of a file with scene sections.
     ///
     /// # Errors
-    /// Those of [`File::check_scene`] and of [`Self::update`].
+    /// Those of [`File::check_scene`](bth_format::file::File::check_scene) and of [`Self::update`].
     pub(crate) fn new(objects: &Objects) -> Result<Option<World>> {
         let Some(file) = objects.sole_file() else { return Ok(None) };
         let Some(view) = file.check_scene()? else { return Ok(None) };

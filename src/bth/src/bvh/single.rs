@@ -165,8 +165,9 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
     }
 }
 
-/// Steps through inner nodes of a format down to the next leaf, the bottom of the stack or a wide node that is none; returns its code. `limits` are those of depths of hits
-/// and of keys of stack entries that can still change the result.
+/// Steps through inner nodes of a format down to the next leaf, the bottom of the stack or a wide node that is none; returns its code.
+/// `limits` are those of depths of hits and of keys of stack entries that can still change the result. The parameters are separate,
+/// because they stay in registers.
 #[inline(always)]
 fn descend<S: Simd, N: Nodes, G: Goal, C: Count>(
     s: S,

@@ -84,11 +84,7 @@ fn trace<S: Simd, Q: Query>(
     sink: &mut Sink<'_, Q>,
 ) -> PacketCount {
     let mut count = PacketCount::default();
-    // Packets do not support tet leaves without a subtree, nor packed nodes.
-    if rays.len() < MIN_RAYS
-        || object.has_packed_nodes()
-        || object.tet_leaves.first().is_some_and(|leaf| leaf.subtree == NONE)
-    {
+    if rays.len() < MIN_RAYS || !is_supported(object) {
         return count;
     }
     let (bounds, goal) = (object.bounds, sink.goal());
@@ -158,6 +154,12 @@ fn trace<S: Simd, Q: Query>(
         run = next;
     }
     count
+}
+
+/// Whether packets support an object: no tet leaves without a subtree, and no packed nodes.
+#[inline(always)]
+fn is_supported(object: &ObjectView<'_>) -> bool {
+    !object.has_packed_nodes() && object.tet_leaves.first().is_none_or(|leaf| leaf.subtree != NONE)
 }
 
 /// Consecutive rays that make a packet.

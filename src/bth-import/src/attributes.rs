@@ -4,7 +4,8 @@ use std::collections::HashMap;
 
 use crate::error::Result;
 use crate::mesh::{Attributes, Keep};
-use crate::raw::{NONE, Raw, RowKind};
+use crate::raw::{Raw, RowKind};
+use crate::rows::NONE;
 use crate::source::input_error;
 
 /// Shading attributes with one row for each used pair of normal and texture coordinate, in order of first use. A corner

@@ -25,6 +25,7 @@ mod obj;
 mod off;
 mod ply;
 mod raw;
+mod rows;
 mod sequence;
 mod source;
 mod stl;

@@ -10,7 +10,8 @@ use crate::groups::NamedGroups;
 use crate::mesh::{Keep, Wanted};
 use crate::mtl::{self, Library};
 use crate::number::{Lines, float, integer, shown, words};
-use crate::raw::{NONE, Raw, RowKind, check_rows};
+use crate::raw::{Raw, RowKind, check_rows};
+use crate::rows::NONE;
 use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, UNSUPPORTED};
 
 const ATTRIBUTE_HINT: &str = "correct the file, or compile without attributes (--attributes none)";

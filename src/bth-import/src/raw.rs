@@ -4,10 +4,8 @@ use crate::deformation::RawDeformation;
 use crate::error::{Error, Place, Result};
 use crate::groups::GroupRecorder;
 use crate::materials::MaterialRecorder;
+use crate::rows::NONE;
 use bth_format::limits::MAX_TRIANGLES;
-
-/// Row of an attribute that a corner does not have.
-pub(super) const NONE: u32 = u32::MAX;
 
 /// The three kinds of rows of a [`Raw`] mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! Merges bit-equal positions.
 
-use crate::raw::NONE;
+use crate::rows::NONE;
 
 /// The result of [`weld`].
 #[derive(Debug, PartialEq)]

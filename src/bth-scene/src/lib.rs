@@ -12,6 +12,7 @@ mod model;
 mod names;
 mod read;
 mod read_deformers;
+mod read_path;
 mod read_sequence;
 mod read_tracks;
 mod read_transform;

@@ -2,10 +2,11 @@
 
 use crate::error::{Error, Result, code};
 use crate::joint_set::JointSet;
-use crate::limits::{MAX_MANIFEST, MAX_PATH};
+use crate::limits::MAX_MANIFEST;
 use crate::model::*;
 use crate::names::Names;
 use crate::read_deformers::{DEFORMER_KEYS, SKIN_KEYS, deformers, skin};
+use crate::read_path::path;
 use crate::read_sequence::{OBJECT_KEYS, sequence, vertex_cache};
 use crate::read_tracks::{TRACK_KEYS, tracks};
 use crate::read_transform::transform;
@@ -184,23 +185,6 @@ fn joint(value: &Value<'_>) -> Result<u32> {
 fn without_joints(table: &Table<'_>) -> Result<JointSet> {
     let Some(value) = table.get("without_joints") else { return Ok(JointSet::default()) };
     value.array()?.iter().map(joint).collect()
-}
-
-/// A path that stays within the manifest's folder on every system.
-pub(crate) fn path(value: &Value<'_>) -> Result<String> {
-    let text = value.string()?;
-    if text.len() > MAX_PATH {
-        let message = format!("expected a path of at most {MAX_PATH} bytes, found {}", text.len());
-        return Err(value.error(code::PATH, message, "use shorter names of folders"));
-    }
-    let inside = |part: &str| !part.is_empty() && part != "." && part != "..";
-    if text.split('/').all(inside) && !text.contains(['\\', ':', '\0']) {
-        return Ok(text.to_owned());
-    }
-    let message = format!("expected a path within the manifest's folder, found \"{text}\"");
-    let hint =
-        "write a relative path with `/` between folders, without `..`; put the file below the manifest";
-    Err(value.error(code::PATH, message, hint))
 }
 
 fn node(table: &Table<'_>, nodes: &Names<'_>, objects: &Names<'_>) -> Result<Node> {

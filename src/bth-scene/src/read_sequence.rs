@@ -2,7 +2,7 @@
 
 use crate::error::{Result, code};
 use crate::model::{SequenceFrames, SequenceTiming, Source};
-use crate::read::path;
+use crate::read_path::path;
 use crate::table::Table;
 
 /// Keys of an object.

@@ -6,6 +6,7 @@
 mod clock;
 mod deformable;
 mod limit;
+mod motion;
 mod moving;
 pub(crate) mod object;
 pub(crate) mod provenance;
@@ -18,7 +19,7 @@ pub use clock::StageTime;
 pub(crate) use clock::{Clock, timed};
 pub use limit::storage;
 pub(crate) use limit::warn_over_limit;
-pub use moving::{MotionOptions, MotionReport, SegmentReport};
+pub use motion::{MotionOptions, MotionReport, SegmentReport};
 pub(crate) use moving::{PoseSource, compile_moving, warn_of_options};
 pub(crate) use object::{Checked, Object, TracedMesh};
 pub use object::{Compiled, assemble};

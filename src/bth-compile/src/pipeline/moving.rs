@@ -1,6 +1,7 @@
 //! Objects whose vertices move by themselves: one BVH for all poses, or several for ranges of time where one would cost too much.
 
 use super::clock::timed;
+use super::motion::{MotionReport, SegmentReport};
 use super::object::{self, Object, TracedMesh};
 use super::report::TetReports;
 use super::{Clock, Direct, StageReports, tet_leaves};
@@ -12,49 +13,7 @@ use crate::options::{CompileOptions, Structure};
 use bth_format::SequenceView;
 use bth_format::layout::Segment;
 use bth_import::{Mesh, Sequence};
-use serde::{Deserialize, Serialize};
 use std::path::Path;
-
-/// How objects whose vertices move by themselves are compiled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct MotionOptions {
-    /// Poses over which the cost of a tree is summed, 1 to [`bvh::MAX_POSES`]. 1 builds the tree for the first pose.
-    pub poses: u32,
-    /// Most ranges of time that get a tree of their own.
-    pub segments: u32,
-}
-
-impl Default for MotionOptions {
-    fn default() -> Self {
-        Self { poses: 8, segments: 4 }
-    }
-}
-
-/// What the trees of an object whose vertices move cost.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct MotionReport {
-    /// Frames of the sequence.
-    pub frames: u64,
-    /// Poses over which the cost of each tree is summed.
-    pub poses: u32,
-    /// Expected cost of a ray, relative to trees that are built for each pose alone: the mean over some times.
-    pub cost_ratio: f64,
-    /// The greatest of these ratios.
-    pub worst_cost_ratio: f64,
-    /// The ranges of time that have a tree of their own.
-    pub segments: Vec<SegmentReport>,
-    /// Bytes of the positions of all frames.
-    pub position_bytes: u64,
-}
-
-/// A range of time with a tree of its own.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct SegmentReport {
-    /// Seconds from which it applies.
-    pub first: f64,
-    /// As [`MotionReport::cost_ratio`], over the times in this range.
-    pub cost_ratio: f64,
-}
 
 /// A range is divided if its tree costs more than this on average, relative to trees that are built for each pose alone.
 const TOO_DEAR: f64 = 1.05;

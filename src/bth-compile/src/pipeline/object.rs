@@ -1,7 +1,7 @@
 //! Assembles an object from the results of the stages, and the file with one object.
 
 use super::clock::timed;
-use super::moving::MotionReport;
+use super::motion::MotionReport;
 use super::{CompileOptions, FileReport};
 use crate::coordinates::{Boxes, OnGrid};
 use crate::error::Result;

@@ -1,7 +1,7 @@
 //! The meshes of a source file, from the cache or imported.
 
 use super::context::Context;
-use super::object;
+use super::object_key::object_key;
 use super::sources::{File, SourcePart};
 use crate::cached::{self, MeshSummary, Miss};
 use crate::error::Result;
@@ -78,7 +78,7 @@ pub(super) fn missing(file: &File<'_>, context: &Context<'_>) -> Vec<Miss> {
         let part = file.name_of(source_part);
         let mesh = key(file, source_part, context);
         let summary = known(&mesh, context);
-        let object = summary.as_ref().and_then(|summary| object::key(summary, source_part, context));
+        let object = summary.as_ref().and_then(|summary| object_key(summary, source_part, context));
         let (Some(summary), Some(object)) = (summary, object) else {
             let because = context.cache.reasons(&mesh, &part);
             return Some(Miss { stage: mesh.stage().to_owned(), part, because });
@@ -151,7 +151,7 @@ fn import(file: &File<'_>, parts: &[SourcePart], context: &Context<'_>) -> Resul
         return Ok(vec![MeshSummary::of(read)]);
     }
     if let Some(moving) = &file.moving {
-        let read = moving.import(file, context)?;
+        let read = moving.import(&file.digest, context)?;
         return Ok(vec![keep_mesh(file, SourcePart::Whole, read, context)]);
     }
     let single: Vec<GltfPart> = parts.iter().filter_map(|part| part.gltf()).collect();

@@ -15,6 +15,7 @@ mod in_memory;
 mod meshes;
 mod moving;
 mod object;
+mod object_key;
 mod objects;
 mod parallel;
 mod places;

@@ -1,7 +1,6 @@
 //! Sources of meshes whose vertices move: numbered files, and models with a vertex cache.
 
 use super::context::Context;
-use super::sources::File;
 use crate::cached;
 use crate::error::Result;
 use crate::source::{SourceDigest, changed};
@@ -75,17 +74,21 @@ impl Moving {
         format!("{kind} rate {rate:?} of {usual_rate:?} start {start:?} motion {}", cached::MOTION)
     }
 
-    /// Reads the mesh with its frames.
+    /// Reads the mesh with its frames. `digest` is what [`Self::digest`] gave before.
     ///
     /// # Errors
     /// Those of the import; `BTH-O002` when a file has changed since it was hashed.
-    pub(super) fn import(&self, file: &File<'_>, context: &Context<'_>) -> Result<(Mesh, mesh::Report)> {
+    pub(super) fn import(
+        &self,
+        digest: &SourceDigest,
+        context: &Context<'_>,
+    ) -> Result<(Mesh, mesh::Report)> {
         let (wanted, monitor) = (context.options.wanted(), context.monitor);
         let read = match (self.is_cache, &self.files[..]) {
             (true, [model, cache]) => mesh::import_vertex_cache(model, cache, &self.timing, wanted, monitor)?,
             _ => mesh::import_sequence(&self.files, &self.timing, wanted, monitor)?,
         };
-        let same = self.digest(file.digest.looks)? == file.digest;
+        let same = self.digest(digest.looks)? == *digest;
         if same { Ok(read) } else { Err(changed(self.first())) }
     }
 

@@ -2,9 +2,10 @@
 
 use super::context::Context;
 use super::meshes::SourceMesh;
+use super::object_key::object_key;
 use super::report::ObjectReport;
-use super::sources::{File, SourcePart};
-use crate::cached::{CachedStages, MeshSummary, ObjectKeys};
+use super::sources::File;
+use crate::cached::{CachedStages, ObjectKeys};
 use crate::costs;
 use crate::error::{Error, Result};
 use crate::options::CompileOptions;
@@ -49,7 +50,7 @@ pub(super) fn build(
     let rays = context.weights.as_ref().and_then(|weights| weights.get(number));
     let deforms = mesh.summary.deformation.is_some();
     let Some(rays) = rays.filter(|_| !deforms) else {
-        let key = key(&mesh.summary, mesh.part, context);
+        let key = object_key(&mesh.summary, mesh.part, context);
         let of_deforming = deforms.then(|| context.options.of_deforming());
         let options = of_deforming.as_ref().unwrap_or(context.options);
         return build_or_fetch(file, mesh, (key, &part), options, context, clock);
@@ -58,16 +59,6 @@ pub(super) fn build(
     let options = CompileOptions { costs, ..context.options.clone() };
     let key = context.tetgen.as_ref().map(|tetgen| ObjectKeys::new(&options, tetgen).of(&mesh.summary, None));
     build_or_fetch(file, mesh, (key, &part), &options, context, clock)
-}
-
-/// The key of an object, if it may be kept, whose costs the scene's rays do not weight.
-pub(super) fn key(mesh: &MeshSummary, part: SourcePart, context: &Context<'_>) -> Option<Key> {
-    if mesh.deformation.is_none() {
-        return context.keys.as_ref().map(|keys| keys.of(mesh, None));
-    }
-    let options = context.options.of_deforming();
-    let clip = part.clip();
-    context.tetgen.as_ref().map(|tetgen| ObjectKeys::new(&options, tetgen).of(mesh, clip.as_ref()))
 }
 
 /// The object of a key: from the cache, else built and kept.

@@ -17,7 +17,8 @@ use crate::gltf::rigid_parts::{KeptTriangles, Selection};
 use crate::gltf::schema::{GltfDocument, GltfMesh, Primitive};
 use crate::gltf::transform;
 use crate::mesh::{Keep, Wanted};
-use crate::raw::{NONE, Raw, RowKind, check_triangles};
+use crate::raw::{Raw, RowKind, check_triangles};
+use crate::rows::NONE;
 use crate::source::Source;
 
 /// Where the rows of one primitive of one node begin.

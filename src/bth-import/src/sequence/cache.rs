@@ -1,6 +1,7 @@
 //! A model whose vertices are moved by a vertex cache.
 
 use super::frames::finish;
+use super::vertex_cache::VertexCache;
 use super::{MISMATCH, Timing, check_times, mdd, pc2};
 use crate::error::Result;
 use crate::import::{Format, format, read_raw};
@@ -8,19 +9,6 @@ use crate::mesh::{Mesh, Report, Wanted};
 use crate::monitor::Monitor;
 use crate::source::{Source, UNSUPPORTED, read_file};
 use std::path::Path;
-
-/// The positions of a vertex cache.
-#[derive(Clone, Debug, PartialEq)]
-pub struct VertexCache {
-    /// Name of the format.
-    pub format: &'static str,
-    /// Vertices of a frame.
-    pub points: usize,
-    /// Seconds of the frames, strictly ascending.
-    pub times: Vec<f64>,
-    /// Positions by frame, then by vertex; they may not be finite.
-    pub positions: Vec<[f32; 3]>,
-}
 
 /// Reads a PC2 or MDD file from its bytes; `name` is for messages. A PC2 file is known by its first bytes.
 ///

@@ -1,7 +1,7 @@
 //! Reads MDD files, the motion designer data of LightWave and Blender: the numbers of frames and points, the time of each frame in
 //! seconds, then the positions of each frame; all numbers are big-endian.
 
-use super::cache::VertexCache;
+use super::vertex_cache::VertexCache;
 use super::{MAX_FRAMES, MISMATCH, Timing};
 use crate::error::Result;
 use crate::source::{MALFORMED, Source, TRUNCATED, TRUNCATED_HINT};

@@ -8,11 +8,13 @@ mod files;
 mod frames;
 mod mdd;
 mod pc2;
+mod vertex_cache;
 mod weld;
 
-pub use cache::{VertexCache, import_vertex_cache, import_vertex_cache_bytes, read_vertex_cache};
+pub use cache::{import_vertex_cache, import_vertex_cache_bytes, read_vertex_cache};
 pub use files::sequence_files;
 pub use frames::{import_sequence, import_sequence_bytes};
+pub use vertex_cache::VertexCache;
 
 use crate::error::Result;
 use crate::source::Source;

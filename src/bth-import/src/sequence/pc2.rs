@@ -1,7 +1,7 @@
 //! Reads PC2 files, the point caches of 3ds Max and Blender: a header of 32 bytes, then the positions of each sample; all numbers
 //! are little-endian.
 
-use super::cache::VertexCache;
+use super::vertex_cache::VertexCache;
 use super::{MAX_FRAMES, Timing};
 use crate::error::Result;
 use crate::source::{MALFORMED, Source, TRUNCATED, TRUNCATED_HINT, UNSUPPORTED};

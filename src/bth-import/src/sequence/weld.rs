@@ -1,6 +1,6 @@
 //! Merges vertices that coincide in every frame.
 
-use crate::raw::NONE;
+use crate::rows::NONE;
 use std::collections::HashMap;
 
 /// Replaces the rows of `triangles` by those of vertices that differ in some frame, in order of first use; returns for each such

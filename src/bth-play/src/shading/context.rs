@@ -1,8 +1,8 @@
 //! What all samples of a frame share, and what is counted while they are shaded.
 
+use super::chance::Chance;
 use super::environment::Environment;
 use super::geometry::ShadingGeometry;
-use super::visibility::Chance;
 use crate::args::{Args, Mode};
 use crate::camera::{Camera, CameraRay, SceneBounds, SceneSetup};
 use crate::failure::Failure;

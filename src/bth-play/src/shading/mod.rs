@@ -1,6 +1,7 @@
 //! Shading: camera rays of a batch of samples become colours, by the mode of the program.
 
 mod ambient_occlusion;
+mod chance;
 mod context;
 mod environment;
 mod geometry;

@@ -1,8 +1,9 @@
 //! Shadow and ambient-occlusion rays: any-hit rays of a batch of samples, traced together, each with the primitive on which
 //! it starts.
 
+use super::chance::Chance;
 use super::context::FrameContext;
-use super::visibility::{self, Chance};
+use super::visibility;
 use bth::rays::{PrimitiveRef, Ray};
 use glam::DVec3;
 

@@ -6,44 +6,13 @@ use bth_scene::{Deformer, JointSet, Node, Skin, Source, Transform};
 
 use crate::error::{Error, Result};
 use crate::gltf::placed_mesh::GltfPart;
+use crate::gltf::scene::animated::Deforming;
 use crate::gltf::scene::importer::{Importer, unique};
-use crate::gltf::schema::{Animation, GltfNode};
+use crate::gltf::schema::GltfNode;
 use crate::gltf::transform;
 
 /// A code for weights of joints or of morph targets that mean nothing.
 const WEIGHTS: &str = "BTH-I017";
-
-/// A node whose mesh deforms; its deformer is added when all nodes are there.
-pub(super) struct Deforming {
-    /// Number of the node in the document.
-    node: usize,
-    /// Row of the node and of its object in the manifest.
-    row: usize,
-    object: usize,
-    weights: Vec<f64>,
-}
-
-/// Which nodes the chosen animations change.
-#[derive(Default)]
-pub(super) struct Animated {
-    /// For each node of the document whether its transform changes.
-    transforms: Vec<bool>,
-    /// For each node of the document whether its morph weights change.
-    weights: Vec<bool>,
-}
-
-impl Animated {
-    /// The nodes that animations change.
-    pub(super) fn of(animations: &[(usize, Animation)], nodes: usize) -> Animated {
-        let mut animated = Animated { transforms: vec![false; nodes], weights: vec![false; nodes] };
-        for channel in animations.iter().flat_map(|(_, animation)| &animation.channels) {
-            let is_weights = channel.target.path == "weights";
-            let list = if is_weights { &mut animated.weights } else { &mut animated.transforms };
-            channel.target.node.and_then(|node| list.get_mut(node)).into_iter().for_each(|x| *x = true);
-        }
-        animated
-    }
-}
 
 impl Importer<'_> {
     /// Places the mesh of a node that has morph targets or a skin: as an object that deforms if an animation moves it, else

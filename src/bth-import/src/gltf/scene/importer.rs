@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::gltf::accessor::Accessors;
 use crate::gltf::document::GRAPH;
 use crate::gltf::placed_mesh::GltfPart;
-use crate::gltf::scene::deformers::{Animated, Deforming};
+use crate::gltf::scene::animated::{Animated, Deforming};
 use crate::gltf::scene::options::ImportReport;
 use crate::gltf::schema::GltfDocument;
 use crate::source::{MALFORMED, Source};

@@ -1,5 +1,6 @@
 //! A manifest from a glTF scene: nodes, animations, cameras, lights, instancing.
 
+mod animated;
 mod cameras;
 mod deformers;
 mod importer;
@@ -14,7 +15,7 @@ use std::path::Path;
 
 use bth_scene::{Frames, Manifest};
 
-use self::deformers::Animated;
+use self::animated::Animated;
 use self::importer::Importer;
 pub use self::options::{ImportOptions, ImportReport};
 use crate::error::Result;

@@ -1,6 +1,5 @@
 //! The options of a compilation: those of all stages.
 
-use crate::pipeline::MotionOptions;
 use crate::{bvh, coordinates, costs, free, tets};
 use bth_format::layout::RecordKind;
 use bth_import as mesh;
@@ -156,5 +155,20 @@ impl CompileOptions {
     /// How tetrahedra will be stored; the size of the object without them is not set.
     pub fn storage(&self) -> costs::Storage {
         costs::Storage { record: self.record, keep_subtrees: self.keep_subtrees, plain_bytes: None }
+    }
+}
+
+/// How objects whose vertices move by themselves are compiled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct MotionOptions {
+    /// Poses over which the cost of a tree is summed, 1 to [`MAX_POSES`](crate::bvh::MAX_POSES). 1 builds the tree for the first pose.
+    pub poses: u32,
+    /// Most ranges of time that get a tree of their own.
+    pub segments: u32,
+}
+
+impl Default for MotionOptions {
+    fn default() -> Self {
+        Self { poses: 8, segments: 4 }
     }
 }

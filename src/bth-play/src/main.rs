@@ -6,6 +6,7 @@
 mod args;
 mod camera;
 mod compile_source;
+mod environment;
 mod failure;
 mod materials;
 mod messages;

@@ -14,12 +14,12 @@ mod report;
 mod select;
 mod stages;
 
-pub use crate::options::{CompileOptions, Structure};
+pub use crate::options::{CompileOptions, MotionOptions, Structure};
 pub use clock::StageTime;
 pub(crate) use clock::{Clock, timed};
 pub use limit::storage;
 pub(crate) use limit::warn_over_limit;
-pub use motion::{MotionOptions, MotionReport, SegmentReport};
+pub use motion::{MotionReport, SegmentReport};
 pub(crate) use moving::{PoseSource, compile_moving, warn_of_options};
 pub(crate) use object::{Checked, Object, TracedMesh};
 pub use object::{Compiled, assemble};

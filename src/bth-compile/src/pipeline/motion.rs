@@ -1,21 +1,6 @@
-//! Options and reports of objects whose vertices move by themselves.
+//! Reports of objects whose vertices move by themselves.
 
 use serde::{Deserialize, Serialize};
-
-/// How objects whose vertices move by themselves are compiled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct MotionOptions {
-    /// Poses over which the cost of a tree is summed, 1 to [`MAX_POSES`](crate::bvh::MAX_POSES). 1 builds the tree for the first pose.
-    pub poses: u32,
-    /// Most ranges of time that get a tree of their own.
-    pub segments: u32,
-}
-
-impl Default for MotionOptions {
-    fn default() -> Self {
-        Self { poses: 8, segments: 4 }
-    }
-}
 
 /// What the trees of an object whose vertices move cost.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -1,10 +1,10 @@
 //! What all samples of a frame share, and what is counted while they are shaded.
 
 use super::chance::Chance;
-use super::environment::Environment;
 use super::geometry::ShadingGeometry;
 use crate::args::{Args, Mode};
 use crate::camera::{Camera, CameraRay, SceneBounds, SceneSetup};
+use crate::environment::Environment;
 use crate::failure::Failure;
 use crate::materials::SceneMaterials;
 use crate::sampling::Sampler;

@@ -2,8 +2,8 @@
 //! to the brightest light and to the size of the scene, so that no exposure is needed and frames do not flicker.
 
 use super::context::FrameContext;
-use super::environment::{Environment, EnvironmentSample};
 use crate::camera::SceneBounds;
+use crate::environment::{Environment, EnvironmentSample};
 use crate::sampling::uniform_disc;
 use bth::Scene;
 use bth_format::layout;

@@ -3,7 +3,6 @@
 mod ambient_occlusion;
 mod chance;
 mod context;
-mod environment;
 mod geometry;
 mod lights;
 mod occlusion_rays;
@@ -16,5 +15,4 @@ mod surface_colors;
 mod visibility;
 
 pub(crate) use context::{Counters, FrameContext, Sample, Steps};
-pub(crate) use environment::Environment;
 pub(crate) use shader::Shader;

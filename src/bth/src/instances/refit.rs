@@ -1,5 +1,6 @@
 //! Refitting of the top level: instances have moved, and the boxes of the same nodes are computed again, from the leaves up. A refit
-//! costs a fraction of a build, but nodes grow where instances that share one move apart. [`CostRatio`](super::top_nodes::CostRatio) tells how much.
+//! costs a fraction of a build, but nodes grow where instances that share one move apart.
+//! [`CostRatio`](super::top_nodes::CostRatio) tells how much.
 
 use super::placement::Placement;
 use super::top_level::TopLevel;

@@ -98,7 +98,7 @@ fn trace<S: Simd, Q: Query>(
         short: PacketBackoff::new(),
         rest,
     };
-    // The first run is found before the loop, so that `packets` is made in its final place, and only if there are any.
+    // The first run is found before the loop, so that `packets` is made only if there are any.
     let Some(mut run) = runs.next(s, goal) else { return count };
     buffers.reserve(object);
     let mut packets =

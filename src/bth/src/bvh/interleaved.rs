@@ -1,9 +1,11 @@
 //! Traversal of an object's BVH by the rays of a batch, interleaved: rays are prepared sixteen at a time, enter the pool as slots
 //! become free, and their answers are stored as they finish.
 
+use super::coherence::is_same_octant;
 use super::deferred::DeferredHits;
+use super::entry_node::{ENTRY_RAYS, FindEntryNode};
 use super::leaf::{LeafOutcome, Progress, decide};
-use super::nodes::{UnpackedNode, Wide, children, node};
+use super::nodes::{UnpackedNode, Wide, node};
 use super::ray_pool::{POOL_SIZE, PackedSteps, RayPool, Slot};
 use super::ray_state::RayState;
 use super::stack::{StackPosition, Stacks};
@@ -12,7 +14,7 @@ use crate::query::Query;
 use crate::query::sink::Sink;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
-use bth_format::layout::{Child, NONE};
+use bth_format::layout::{Child, NONE, WIDTH, WideNode};
 use bth_format::object::ObjectBounds;
 use bth_format::object::ObjectView;
 
@@ -35,14 +37,20 @@ pub(crate) struct Interleaved<'a, 's, Q: Query> {
     pub(crate) sink: &'a mut Sink<'s, Q>,
 }
 
-/// Supplies rays to the pool. Sixteen at a time are prepared and tested against the boxes of the root's children.
+/// Supplies rays to the pool. Sixteen at a time are prepared and tested against the boxes of the root's children or, if they are
+/// coherent, of their entry node's.
 #[repr(C, align(64))]
 struct RaySource<'a, Q> {
     prepared: Prepared,
-    /// For each lane the depths at which its ray enters the children of the root.
+    /// For each lane the depths at which its ray enters the children.
     enter: [[f32; LANES]; LANES],
-    /// For each lane a bit for each child of the root that its ray may meet.
+    /// For each lane a bit for each child that its ray may meet.
     children: [u32; LANES],
+    /// Codes of the children, unless the root is a leaf.
+    codes: [u32; LANES],
+    /// The entry node of the next rays, as long as fewer than this many of the batch have been prepared.
+    entered: usize,
+    entry_node: WideNode,
     /// For each lane the index of its ray in the batch.
     ray: [u32; LANES],
     object: &'a ObjectView<'a>,
@@ -76,6 +84,9 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
             prepared: Prepared::new(),
             ray: [0; LANES],
             children: [0; LANES],
+            codes: [NONE; LANES],
+            entry_node: WideNode { bounds: [[[0.0; WIDTH]; 2]; 3], child: [NONE; WIDTH] },
+            entered: 0,
             enter: [[0.0; LANES]; LANES],
             lane: [0; LANES],
             filled: 0,
@@ -139,8 +150,7 @@ impl<Q: Query> RaySource<'_, Q> {
                 state.update_from_query(&self.rays[index as usize]);
             }
             if prepared.is_some() && self.root & Child::LEAF_BIT == 0 {
-                let root = children(self.object.node_base(), self.root);
-                pool.start_among(s, slot, root, (self.children[lane], s.load(&self.enter[lane])));
+                pool.start_among(s, slot, &self.codes, (self.children[lane], s.load(&self.enter[lane])));
             } else {
                 pool.start(slot, self.root);
             }
@@ -158,18 +168,24 @@ impl<Q: Query> RaySource<'_, Q> {
             let next = self.taken + i;
             self.ray[i] = order.map_or(next as u32, |order| order[next]);
         }
+        self.find_entry_node(s);
         self.taken += count;
         (self.used, self.filled) = (0, 0);
         if count == 0 {
             return false;
         }
         self.prepared.fill(s, &self.bounds, self.rays, &self.ray, count);
-        let mut unpacked = UnpackedNode::NONE;
-        let root = if self.root & Child::LEAF_BIT == 0 {
-            Some(node(s, self.object.node_base(), self.root, &mut unpacked))
-        } else {
+        let (mut unpacked, node_base) = (UnpackedNode::NONE, self.object.node_base());
+        let root = if self.root & Child::LEAF_BIT != 0 {
             None
+        } else if self.taken <= self.entered {
+            Some(&self.entry_node)
+        } else {
+            Some(node(s, node_base, self.root, &mut unpacked))
         };
+        if let Some(root) = root {
+            self.codes = root.child;
+        }
         for lane in 0..count {
             let mut may_hit = true;
             if let (Some(prepared), Some(root)) = (self.prepared.prepared(lane), root) {
@@ -183,6 +199,28 @@ impl<Q: Query> RaySource<'_, Q> {
             self.filled += usize::from(may_hit);
         }
         true
+    }
+
+    /// Searches the entry node of the next rays, where those before had another. They must follow one another in the batch.
+    #[inline(always)]
+    fn find_entry_node<S: Simd>(&mut self, s: S) {
+        // With 128 bits there is a kernel less, because their code is long.
+        if !S::INLINES_PARTS || !S::HAS_VECTORS || self.taken % ENTRY_RAYS != 0 {
+            return;
+        }
+        let (first, last) = (self.ray[0] as usize, self.taken + ENTRY_RAYS - 1);
+        let Some(rays) = self.rays.get(first..first + ENTRY_RAYS) else { return };
+        let is_run = self
+            .remaining
+            .order
+            .is_none_or(|order| order.get(last) == Some(&((first + ENTRY_RAYS - 1) as u32)));
+        if !is_run || !is_same_octant(&rays[0], &rays[ENTRY_RAYS - 1]) {
+            return;
+        }
+        let (node_base, root, bounds) = (self.object.node_base(), self.root, &self.bounds);
+        if s.call(FindEntryNode { node_base, root, bounds, rays, node: &mut self.entry_node }) {
+            self.entered = self.taken + ENTRY_RAYS;
+        }
     }
 }
 

@@ -10,14 +10,19 @@
 //! A fourth one, [`enumerate`], passes every triangle that a ray may hit to a receiver, for queries that report more than one hit.
 
 pub(crate) mod candidate;
+pub(crate) mod coherence;
 pub(crate) mod deferred;
+mod entry_node;
 pub(crate) mod enumerate;
+#[cfg(test)]
+pub(crate) mod height_field;
 pub(crate) mod interleaved;
 pub(crate) mod leaf;
 pub(crate) mod nodes;
 pub(crate) mod packet;
 mod ray_pool;
 pub(crate) mod ray_state;
+pub(crate) mod shaft;
 pub(crate) mod single;
 pub(crate) mod single_stack;
 pub(crate) mod stack;

@@ -3,7 +3,7 @@
 //! even a well predicted branch in every step costs some per cent.
 
 use crate::intersect::boxes::{ChildBoxes, FAR};
-use crate::simd::{Part, Simd};
+use crate::simd::{CacheLevel, Part, Simd};
 use bth_format::layout::{
     Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, PackedNode, RawLeaf, WIDTH, WideNode,
 };
@@ -47,15 +47,6 @@ impl Nodes for Packed {
     #[inline(always)]
     fn node_if(node_base: NodeBase<'_>, code: u32) -> Option<&PackedNode> {
         Some(Self::node(node_base, code))
-    }
-}
-
-/// The child codes of the node with this code.
-#[inline(always)]
-pub(crate) fn children(node_base: NodeBase<'_>, code: u32) -> &[u32; WIDTH] {
-    match node_base.wide_node(code) {
-        Some(node) => &node.child,
-        None => &Packed::node(node_base, code).child,
     }
 }
 
@@ -162,12 +153,20 @@ pub(crate) fn indexed_leaf<'r, S: Simd>(
     }
 }
 
-/// Prefetches the cache lines of a node or of an indexed leaf.
+/// Cache lines of the larger of a node and an indexed leaf.
+const LINES: usize = if NODE_LINES > INDEXED_LINES { NODE_LINES } else { INDEXED_LINES };
+
+/// Prefetches the cache lines of a node or of an indexed leaf that is needed soon.
 #[inline(always)]
 pub(crate) fn prefetch<S: Simd>(s: S, node_base: NodeBase<'_>, code: u32) {
-    const LINES: usize = if NODE_LINES > INDEXED_LINES { NODE_LINES } else { INDEXED_LINES };
     let first = node_base.block_address(code);
     for i in 0..LINES {
         s.prefetch(first.wrapping_add(i));
     }
+}
+
+/// As [`prefetch`], for a node or leaf that is needed only after many other steps.
+#[inline(always)]
+pub(crate) fn prefetch_into<S: Simd>(s: S, level: CacheLevel, node_base: NodeBase<'_>, code: u32) {
+    s.prefetch_into::<LINES, _>(level, node_base.block_address(code));
 }

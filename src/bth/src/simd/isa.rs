@@ -182,7 +182,7 @@ impl Isa {
         if !self.is_available() {
             return Err(IsaError::Missing(self));
         }
-        CHOSEN_ISA.store(self as u8 + 1, Ordering::Relaxed);
+        self.store();
         Ok(())
     }
 
@@ -207,8 +207,14 @@ impl Isa {
         let named = if crate::SMALL { None } else { Isa::from_environment().ok().flatten() };
         let isa = named.unwrap_or_else(Isa::best);
         // Threads that run this concurrently store the same value.
-        CHOSEN_ISA.store(isa as u8 + 1, Ordering::Relaxed);
+        isa.store();
         isa
+    }
+
+    fn store(self) {
+        #[cfg(target_arch = "x86_64")]
+        super::caches::find();
+        CHOSEN_ISA.store(self as u8 + 1, Ordering::Relaxed);
     }
 
     /// The instruction set named by the environment variable `BTH_ISA`; None if it is not set or empty. Programs report the

@@ -15,6 +15,7 @@
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+mod caches;
 #[cfg(target_arch = "x86_64")]
 mod detected;
 mod isa;
@@ -28,6 +29,7 @@ mod scalar;
 #[cfg(test)]
 mod tests;
 
+pub use caches::CacheLevel;
 pub use isa::{Isa, IsaError};
 pub(crate) use scalar::Scalar;
 
@@ -304,6 +306,13 @@ pub trait Simd: Lanewise {
     }
     /// Prefetches a cache line; any address is allowed.
     fn prefetch<T>(self, address: *const T);
+    /// Prefetches `LINES` elements of a cache line each. Any address is allowed. Where there is no choice, they go to the first level.
+    #[inline(always)]
+    fn prefetch_into<const LINES: usize, T>(self, _: CacheLevel, first: *const T) {
+        for i in 0..LINES {
+            self.prefetch(first.wrapping_add(i));
+        }
+    }
 }
 
 /// The lanes of a [piece](Simd::Piece), a bit each.

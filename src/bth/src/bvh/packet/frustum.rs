@@ -1,24 +1,18 @@
 //! Packet bounds of coherent rays: a frustum, by interval arithmetic.
 
 use super::bounds::{FrustumView, PacketBounds};
-use super::coherence::Span;
 use super::ray_group::RayGroup;
+use crate::bvh::coherence::Span;
+use crate::bvh::shaft::Shaft;
 use crate::intersect::boxes::{self, PAD};
 use crate::intersect::prepare;
 use crate::simd::{LANES, Part, Simd};
 use bth_format::layout::{WIDTH, WideNode};
 use bth_format::object::ObjectBounds;
 
-/// Bounds of rays whose directions lie in one octant, by interval arithmetic over their origins and directions, as for the boxes of
-/// Wald, Boulos and Shirley, "Ray Tracing Deformable Scenes Using Dynamic Bounding Volume Hierarchies", TOG 2007.
+/// Bounds of coherent rays: a [`Shaft`] for boxes, and for triangles what follows.
 ///
-/// **Boxes.** The depth at which ray l meets a plane is (plane - o)·r: an interval of o, widened by a pad on both sides, and
-/// one of r bound it. As all operations round monotonically, only roundings need the pad. With u = 2^-24 and E the sum of the
-/// greatest coordinate of the object and that of all origins, they come to at most uE|r| for the reciprocal, 2uE|r| for the
-/// padded end, uE|r| for the difference and uE|r| for the product: with the half [`PAD`] = 8uE|r| of [`crate::intersect::boxes`] for
-/// clamped components less than 14uE|r|; the pad is 2 · PAD = 32uE.
-///
-/// **Triangles.** With s = d_x/d_z along one axis z for all, a point's sheared x is
+/// With s = d_x/d_z along one axis z for all, a point's sheared x is
 /// (x - c_x) - s₀(z - c_z) + (s₀ - s)(z - c_z) + a with a = (c_x - o_x) - s(c_z - o_z): the middle of the interval of s,
 /// its half width, and an interval of a. Coherent rays have |s| <= 1.25, rounded at most twice. Roundings: 6uE for the first two
 /// terms, 8uE for s in the third, 20uE for a, 8uE for the sums; the pad is 64uE.
@@ -26,16 +20,7 @@ use bth_format::object::ObjectBounds;
 /// ([`RayGroup::may_enter`]), and the interval of a is zero.
 pub(crate) struct Frustum<S: Simd, const POINT: bool> {
     view: FrustumView,
-    /// For each axis the end of the origins' interval that is nearest to the planes at which rays enter boxes.
-    near_origin: [f32; 3],
-    /// For each axis the end that is nearest to the planes at which rays leave boxes.
-    far_origin: [f32; 3],
-    /// For each axis the least and the greatest reciprocal of the directions' components.
-    reciprocal: [[S::F; 2]; 3],
-    /// For each axis the offset of the row of a node with the planes at which rays enter boxes.
-    near: [u32; 3],
-    /// Least depth of the rays' ranges.
-    first: S::F,
+    shaft: Shaft<S>,
     /// Padded bound of the sheared coordinates of points within the upper sides.
     upper: [f32; 2],
     /// The same for the lower sides, negated.
@@ -92,26 +77,8 @@ impl<S: Simd, const POINT: bool> Frustum<S, POINT> {
         let ends = least;
         let both = |of: usize| [ends[of], -ends[8 + of]];
         let view = FrustumView { origin: center, axis, shear: [0.0; 2], shear_width: [0.0; 2] };
-        let mut frustum = Frustum {
-            view,
-            near_origin: [0.0; 3],
-            far_origin: [0.0; 3],
-            reciprocal: [[zero; 2]; 3],
-            near: [0; 3],
-            first: s.splat(ends[7]),
-            upper: [0.0; 2],
-            lower: [0.0; 2],
-        };
-        let pad = 2.0 * PAD as f32 * extent;
-        for k in 0..3 {
-            let [least, greatest] = both(k);
-            frustum.reciprocal[k] = [s.splat(least), s.splat(greatest)];
-            let [low, high] = [span.origin[k][0] - pad, span.origin[k][1] + pad];
-            let is_negative = span.direction[k][0] < 0.0;
-            [frustum.near_origin[k], frustum.far_origin[k]] =
-                if is_negative { [low, high] } else { [high, low] };
-            frustum.near[k] = if is_negative { boxes::FAR } else { 0 };
-        }
+        let shaft = Shaft::new(s, span, [both(0), both(1), both(2)], ends[7], extent);
+        let mut frustum = Frustum { view, shaft, upper: [0.0; 2], lower: [0.0; 2] };
         let pad = 4.0 * PAD as f32 * extent;
         for j in 0..2 {
             let (shear, addend) = (both(3 + j), both(5 + j));
@@ -152,17 +119,7 @@ impl<S: Simd, const POINT: bool> PacketBounds<S> for Frustum<S, POINT> {
 
     #[inline(always)]
     fn children(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
-        let (mut enter, mut leave) = (self.first, s.splat(limit));
-        for k in 0..3 {
-            let [least, greatest] = self.reciprocal[k];
-            let near = s.load(boxes::row(&node.bounds[k], self.near[k]));
-            let far = s.load(boxes::row(&node.bounds[k], self.near[k] ^ boxes::FAR));
-            let (near, far) =
-                (s.sub(near, s.splat(self.near_origin[k])), s.sub(far, s.splat(self.far_origin[k])));
-            enter = s.max(s.min(s.mul(near, least), s.mul(near, greatest)), enter);
-            leave = s.min(s.max(s.mul(far, least), s.mul(far, greatest)), leave);
-        }
-        (s.mask_bits(s.le(enter, leave)), enter)
+        self.shaft.children(s, node, limit)
     }
 
     #[inline(always)]
@@ -187,11 +144,11 @@ impl<S: Simd, const POINT: bool> PacketBounds<S> for Frustum<S, POINT> {
     fn corners(&self, node: &WideNode, slot: usize) -> [[f32; 3]; 2] {
         let mut out = [[0.0; 3]; 2];
         for k in 0..3 {
-            out[0][k] = boxes::row(&node.bounds[k], self.near[k])[slot % WIDTH];
-            out[1][k] = boxes::row(&node.bounds[k], self.near[k] ^ boxes::FAR)[slot % WIDTH];
+            out[0][k] = boxes::row(&node.bounds[k], self.shaft.near[k])[slot % WIDTH];
+            out[1][k] = boxes::row(&node.bounds[k], self.shaft.near[k] ^ boxes::FAR)[slot % WIDTH];
             if POINT {
-                out[0][k] -= self.near_origin[k];
-                out[1][k] -= self.far_origin[k];
+                out[0][k] -= self.shaft.near_origin[k];
+                out[1][k] -= self.shaft.far_origin[k];
             }
         }
         out

@@ -7,10 +7,10 @@
 //! ([`single_rays`]). Hits are computed at the end; for rays from one point the terms that do not depend on the direction are computed
 //! once for each triangle ([`hit_cache`]). [`buffers`] is the memory for all of it.
 
+pub(crate) mod backoff;
 pub(crate) mod bounds;
 mod buffers;
 pub(crate) mod children;
-pub(crate) mod coherence;
 pub(crate) mod entry;
 pub(crate) mod frustum;
 pub(crate) mod hit_cache;

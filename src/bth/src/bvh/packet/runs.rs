@@ -1,18 +1,19 @@
 //! Selection of the rays of a batch that are traced in packets: runs of consecutive coherent rays, as long as enough of their rays take
 //! part in each step.
 
+use super::backoff::{Backoffs, KindBackoffs};
 use super::bounds::PacketBounds;
 use super::buffers::{GroupStorage, PacketBuffers};
-use super::coherence::{PacketBackoff, Span, is_same_octant};
 use super::entry::{MIN_RAYS, PACKET};
 use super::frustum::{Frustum, FrustumOf};
 use super::prepare_group::PrepareGroup;
 use super::segment_box::SegmentBox;
 use super::traverse::{PacketOutcome, PacketTracer, TracePacket};
+use crate::bvh::coherence::{Span, is_same_octant};
 use crate::query::sink::Sink;
 use crate::query::{Goal, Query};
 use crate::rays::Ray;
-use crate::simd::{Kernel, LANES, Part, Simd};
+use crate::simd::{CacheLevel, Kernel, LANES, Part, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectBounds;
 use bth_format::object::ObjectView;
@@ -30,13 +31,14 @@ pub(crate) struct MinimumUse {
 }
 
 /// The shares that were measured to be the fastest (docs/notes/packets.md).
-pub(crate) const MINIMUM_USE: MinimumUse = MinimumUse { coherent: 10, short: 8 };
+pub(crate) const MINIMUM_USE: MinimumUse = MinimumUse { coherent: 20, short: 8 };
 
 /// Memory kept from one batch to the next.
 #[derive(Debug, Default)]
 pub(crate) struct PacketScratch {
     groups: GroupStorage,
     buffers: PacketBuffers,
+    backoffs: Backoffs,
     /// Indices of the rays that were not traced in packets.
     pub(crate) rest: Vec<u32>,
 }
@@ -88,18 +90,15 @@ fn trace<S: Simd, Q: Query>(
         return count;
     }
     let (bounds, goal) = (object.bounds, sink.goal());
-    let PacketScratch { groups, buffers, rest } = scratch;
+    let PacketScratch { groups, buffers, backoffs, rest } = scratch;
     rest.clear();
-    let mut runs = Runs {
-        bounds: &bounds,
-        rays,
-        next: 0,
-        coherent: PacketBackoff::new(),
-        short: PacketBackoff::new(),
-        rest,
-    };
+    let backoffs = backoffs.of(std::ptr::from_ref(object.header).addr(), goal.is_any());
+    let mut runs = Runs { bounds: &bounds, rays, next: 0, backoffs: *backoffs, rest };
     // The first run is found before the loop, so that `packets` is made only if there are any.
-    let Some(mut run) = runs.next(s, goal) else { return count };
+    let Some(mut run) = runs.next(s, goal) else {
+        *backoffs = runs.backoffs;
+        return count;
+    };
     buffers.reserve(object);
     let mut packets =
         PacketTracer { groups: groups.of(s), queries: [Q::new(goal, &rays[0]); PACKET], buffers };
@@ -107,9 +106,8 @@ fn trace<S: Simd, Q: Query>(
         let (first, rays) = (run.first, run.rays);
         // The next rays are in the cache when this packet is done.
         let next = rays.as_ptr().wrapping_add(PACKET);
-        for line in 0..PACKET / RAYS_PER_CACHE_LINE {
-            s.prefetch(next.wrapping_add(line * RAYS_PER_CACHE_LINE));
-        }
+        let next = next.cast::<[Ray; RAYS_PER_CACHE_LINE]>();
+        s.prefetch_into::<{ PACKET / RAYS_PER_CACHE_LINE }, _>(CacheLevel::waiting(), next);
         let sink = &mut sink.part(first);
         let (outcome, backoff, least_use, kind) = match run.kind {
             Kind::Coherent(span) => {
@@ -119,11 +117,11 @@ fn trace<S: Simd, Q: Query>(
                 } else {
                     frustum::<S, Q, false>(s, object, &bounds, &span, &mut packets, rays, sink)
                 };
-                (outcome, &mut runs.coherent, least.coherent, &mut count.coherent)
+                (outcome, &mut runs.backoffs.coherent, least.coherent, &mut count.coherent)
             }
             // Runs of short rays are found for any-hit queries only, so no kernel is compiled for others.
             Kind::Short(_) if !goal.is_any() => {
-                (PacketOutcome::Refused, &mut runs.short, least.short, &mut count.short)
+                (PacketOutcome::Refused, &mut runs.backoffs.short, least.short, &mut count.short)
             }
             Kind::Short(segments) => {
                 let ready = if !S::INLINES_PARTS {
@@ -138,7 +136,7 @@ fn trace<S: Simd, Q: Query>(
                 } else {
                     PacketOutcome::Refused
                 };
-                (outcome, &mut runs.short, least.short, &mut count.short)
+                (outcome, &mut runs.backoffs.short, least.short, &mut count.short)
             }
         };
         match outcome {
@@ -153,6 +151,7 @@ fn trace<S: Simd, Q: Query>(
         let Some(next) = runs.next(s, goal) else { break };
         run = next;
     }
+    *backoffs = runs.backoffs;
     count
 }
 
@@ -184,8 +183,7 @@ struct Runs<'a, 'b> {
     rays: &'a [Ray],
     /// Index of the next ray.
     next: usize,
-    coherent: PacketBackoff,
-    short: PacketBackoff,
+    backoffs: KindBackoffs,
     /// Indices of the rays that are not in a packet.
     rest: &'b mut Vec<u32>,
 }
@@ -198,7 +196,7 @@ impl<'a> Runs<'a, '_> {
             let first = self.next;
             let rays = &self.rays[first..self.rays.len().min(first + PACKET)];
             self.next = first + PACKET;
-            if let Some(kind) = choose(s, goal, self.bounds, rays, [&mut self.coherent, &mut self.short]) {
+            if let Some(kind) = choose(s, goal, self.bounds, rays, &mut self.backoffs) {
                 return Some(Run { first, rays, kind });
             }
             self.skip(first, rays.len());
@@ -244,7 +242,7 @@ fn choose(
     goal: impl Goal,
     bounds: &ObjectBounds,
     rays: &[Ray],
-    [coherent, short]: [&mut PacketBackoff; 2],
+    KindBackoffs { coherent, short }: &mut KindBackoffs,
 ) -> Option<Kind> {
     if rays.len() < MIN_RAYS {
         return None;

@@ -1,8 +1,6 @@
 //! Tests that packets give the same bits as single rays with every instruction set, over a surface of triangles with shared edges.
 
-mod height_field;
-
-use self::height_field::HeightField;
+use crate::bvh::height_field::HeightField;
 use crate::bvh::packet::runs::{MINIMUM_USE, MinimumUse, PacketCount, PacketScratch, Packets};
 use crate::object::{self, Scratch, single};
 use crate::query::sink::Sink;
@@ -275,9 +273,16 @@ fn rays_that_f32_cannot_prepare_are_left_to_single_rays() {
 
 #[test]
 fn packets_with_few_active_rays_are_followed_by_single_rays() {
-    // Every other ray of a run passes far from the others, so in few steps half of them take part.
     let surface = HeightField::new(1.0, 0.0);
-    let mut rays = bundles(&surface, 1.0, false, 8);
+    let rays = poor_bundles(&surface);
+    for (count, _) in check(&surface, &rays, MINIMUM_USE) {
+        assert!(count.poor > 0 && count.rays < rays.len() / 2, "{count:?}");
+    }
+}
+
+/// Runs of coherent rays that pass the surface far from one another, so that few take part in a step.
+fn poor_bundles(surface: &HeightField) -> Vec<Ray> {
+    let mut rays = bundles(surface, 1.0, false, 8);
     let mut rng = Rng::new(9);
     for ray in &mut rays {
         let point = surface.points[rng.below(surface.points.len() as u64) as usize];
@@ -285,8 +290,24 @@ fn packets_with_few_active_rays_are_followed_by_single_rays() {
         ray.direction = [400.0, 300.0, -500.0];
         ray.tmax = f32::INFINITY;
     }
-    for (count, _) in check(&surface, &rays, MINIMUM_USE) {
-        assert!(count.poor > 0 && count.rays < rays.len() / 2, "{count:?}");
+    rays
+}
+
+#[test]
+fn what_is_known_of_packets_is_kept_for_the_next_batch_through_the_same_object() {
+    let [surface, other] = [HeightField::new(1.0, 0.0), HeightField::new(1.0, 0.0)];
+    let rays = poor_bundles(&surface);
+    for isa in isas() {
+        let mut scratch = PacketScratch::default();
+        let mut poor = |surface: &HeightField| {
+            let mut hits = vec![Hit::MISS; rays.len()];
+            let (object, answers) = (surface.view(), nearest_answers(&mut hits));
+            packed_in::<NearestQuery>(isa, &mut scratch, &object, &rays, MINIMUM_USE, answers).poor
+        };
+        let first = poor(&surface);
+        assert!(first > 2, "{isa}: {first}");
+        assert!(poor(&surface) < first, "{isa}");
+        assert_eq!(poor(&other), first, "{isa}");
     }
 }
 

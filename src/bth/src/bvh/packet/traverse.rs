@@ -14,13 +14,13 @@ use super::hit_cache::CachedHits;
 use super::packet_rays::PacketRays;
 use super::ray_group::{IntersectGroup, RayGroup};
 use super::single_rays::FEW_OF_PACKET;
-use crate::bvh::nodes::{self, prefetch};
+use crate::bvh::nodes::{self, prefetch_into};
 use crate::bvh::ray_state::KEY_SLACK;
 use crate::intersect::exact_lanes::{Intersections, OriginTermsLanes, Pairs};
 use crate::query::Query;
 use crate::query::sink::Sink;
 use crate::rays::Ray;
-use crate::simd::{LANES, Part, Simd};
+use crate::simd::{CacheLevel, LANES, Part, Simd};
 use bth_format::layout::{Child, NONE, WIDTH};
 use bth_format::object::ObjectView;
 use std::marker::PhantomData;
@@ -138,7 +138,7 @@ impl<S: Simd, Q: Query, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, 
                 }
                 let node = object.node(entry.parent);
                 code = node.child[entry.slot as usize % WIDTH];
-                prefetch(s, object.node_base(), code);
+                prefetch_into(s, CacheLevel::waiting(), object.node_base(), code);
                 // The rays are tested against the box only here, because hits since the parent was entered may have shortened them.
                 if !H::MIXED_OCTANTS {
                     mask &= meeting(s, bounds, groups, mask, node, entry.slot);

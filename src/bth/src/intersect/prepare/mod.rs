@@ -26,9 +26,9 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// f32 prepares rays whose |coordinates| are below this and whose greatest |component| of the direction lies between 1 /
 /// `LARGEST` and `LARGEST`.
-const LARGEST: f32 = (1u64 << 40) as f32;
+pub(crate) const LARGEST: f32 = (1u64 << 40) as f32;
 /// Where the sum of the greatest |coordinates| of box and origin is not above this, pads could underflow.
-const SMALLEST: f32 = boxes::SMALLEST_EXTENT as f32;
+pub(crate) const SMALLEST: f32 = boxes::SMALLEST_EXTENT as f32;
 /// Factor that turns a result of a few f32 roundings into an upper bound.
 const ROUND_UP: f32 = 1.0 + 1.0 / (1 << 20) as f32;
 

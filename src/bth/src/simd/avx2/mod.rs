@@ -10,7 +10,9 @@ mod rows;
 use self::packing::{compression, expansion};
 use self::rows::{IN_ORDER, columns8, transpose4, transpose8};
 use super::detected::Detected;
-use super::{Kernel, LANES, Lanewise, Part, Simd, assert_indices, one_piece, scalar, valid_indices};
+use super::{
+    CacheLevel, Kernel, LANES, Lanewise, Part, Simd, assert_indices, one_piece, scalar, valid_indices,
+};
 use std::arch::x86_64::*;
 
 /// Proof that this machine has AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT.
@@ -388,5 +390,18 @@ impl Simd for Avx2 {
     fn prefetch<T>(self, address: *const T) {
         // SAFETY: a hint that never faults, whatever the address.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(address.cast()) }
+    }
+    #[inline(always)]
+    fn prefetch_into<const LINES: usize, T>(self, level: CacheLevel, first: *const T) {
+        if level == CacheLevel::First {
+            for i in 0..LINES {
+                self.prefetch(first.wrapping_add(i));
+            }
+            return;
+        }
+        for i in 0..LINES {
+            // SAFETY: as `prefetch`.
+            unsafe { _mm_prefetch::<_MM_HINT_T1>(first.wrapping_add(i).cast()) }
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! The object of the packet tests: a height field whose triangles share their edges and vertices.
+//! An object for tests: a height field whose triangles share their edges and vertices.
 
 use bth_format::layout::{
     CacheLine, Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, NONE, Object, RAW_LINES, RawLeaf, WIDTH,
@@ -13,12 +13,12 @@ const QUADS: [usize; 2] = [32, 64];
 const LEAF_QUADS: [usize; 2] = [2, 4];
 
 /// A surface over a grid, in 256 leaves of 16 triangles, some of them raw, below two levels of nodes.
-pub(super) struct HeightField {
-    pub(super) header: Object,
+pub(crate) struct HeightField {
+    pub(crate) header: Object,
     lines: Vec<CacheLine>,
     ids: Vec<u32>,
     /// Points of the surface.
-    pub(super) points: Vec<[f32; 3]>,
+    pub(crate) points: Vec<[f32; 3]>,
 }
 
 /// Appends a block to the lines; returns the index of its first line.
@@ -47,7 +47,7 @@ fn node(children: &[([[f32; 3]; 2], u32)]) -> WideNode {
 
 impl HeightField {
     /// A surface whose heights are small integers, scaled and then moved along x.
-    pub(super) fn new(scale: f32, away: f32) -> HeightField {
+    pub(crate) fn new(scale: f32, away: f32) -> HeightField {
         let mut rng = Rng::new(5);
         let height: Vec<f32> = (0..(QUADS[0] + 1) * (QUADS[1] + 1)).map(|_| rng.below(5) as f32).collect();
         let point = |x: usize, y: usize| {
@@ -123,7 +123,7 @@ impl HeightField {
     }
 
     /// An object that consists of one of the indexed leaves.
-    pub(super) fn one_leaf(&self) -> HeightField {
+    pub(crate) fn one_leaf(&self) -> HeightField {
         let line = NODE_LINES * (1 + WIDTH) + RAW_LINES;
         let lines = self.lines[line..line + INDEXED_LINES].to_vec();
         let points = self.points[15..30].to_vec();
@@ -132,7 +132,7 @@ impl HeightField {
         HeightField { header, lines, ids: self.ids.clone(), points }
     }
 
-    pub(super) fn view(&self) -> ObjectView<'_> {
+    pub(crate) fn view(&self) -> ObjectView<'_> {
         ObjectView {
             header: &self.header,
             bounds: ObjectBounds::new(&self.header),

@@ -1,4 +1,4 @@
-//! Coherence of rays: the ranges of their origins and directions, and whether packets have been worthwhile so far.
+//! Coherence of rays: the ranges of their origins and directions.
 
 use crate::intersect::boxes::PAD;
 use crate::rays::Ray;
@@ -25,7 +25,7 @@ pub(crate) struct Span {
     /// For each axis the least and the greatest component of the directions.
     pub(crate) direction: [[f32; 2]; 3],
     /// Least tmin and greatest tmax.
-    range: [f32; 2],
+    pub(crate) range: [f32; 2],
 }
 
 /// The floats of the two rays from `at` on; the last ray is repeated if it has no successor.
@@ -193,49 +193,5 @@ impl Span {
             segments[1][k] += pad;
         }
         Some(segments)
-    }
-}
-
-/// Exponential back-off of a kind of packets: after a packet that was not worthwhile some groups of rays are not tried as packets, and
-/// twice as many after the next.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct PacketBackoff {
-    /// Number of groups of rays still to be skipped.
-    skip: u32,
-    /// Number of groups that are skipped after the next packet that is not worthwhile.
-    back: u32,
-}
-
-impl Default for PacketBackoff {
-    fn default() -> Self {
-        PacketBackoff::new()
-    }
-}
-
-impl PacketBackoff {
-    /// Greatest number of skipped groups.
-    const MAX_SKIP: u32 = 64;
-
-    pub(crate) fn new() -> PacketBackoff {
-        PacketBackoff { skip: 0, back: 4 }
-    }
-
-    /// Whether the next group of rays may be tried as a packet.
-    #[inline(always)]
-    pub(crate) fn may_try(&mut self) -> bool {
-        let open = self.skip == 0;
-        self.skip = self.skip.saturating_sub(1);
-        open
-    }
-
-    /// Records whether a packet was worthwhile.
-    #[inline(always)]
-    pub(crate) fn record(&mut self, worthwhile: bool) {
-        if worthwhile {
-            self.back = (self.back / 2).max(1);
-        } else {
-            self.skip = self.back;
-            self.back = (self.back * 2).min(Self::MAX_SKIP);
-        }
     }
 }

@@ -204,8 +204,8 @@ impl<Q: Query> RaySource<'_, Q> {
     /// Searches the entry node of the next rays, where those before had another. They must follow one another in the batch.
     #[inline(always)]
     fn find_entry_node<S: Simd>(&mut self, s: S) {
-        // With 128 bits there is a kernel less, because their code is long.
-        if !S::INLINES_PARTS || !S::HAS_VECTORS || self.taken % ENTRY_RAYS != 0 {
+        // Not with 128 bits, whose code is long, nor in scalar code.
+        if !S::INLINES_PARTS || !self.taken.is_multiple_of(ENTRY_RAYS) {
             return;
         }
         let (first, last) = (self.ray[0] as usize, self.taken + ENTRY_RAYS - 1);

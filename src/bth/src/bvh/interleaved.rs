@@ -6,14 +6,14 @@ use super::deferred::DeferredHits;
 use super::entry_node::{ENTRY_RAYS, FindEntryNode};
 use super::leaf::{LeafOutcome, Progress, decide};
 use super::nodes::{UnpackedNode, Wide, node};
-use super::ray_pool::{POOL_SIZE, PackedSteps, RayPool, Slot};
+use super::ray_pool::{POOL_SIZE, PackedSteps, RayPool, Slot, waiting_level};
 use super::ray_state::RayState;
 use super::stack::{StackPosition, Stacks};
 use crate::intersect::prepare::Prepared;
 use crate::query::Query;
 use crate::query::sink::Sink;
 use crate::rays::Ray;
-use crate::simd::{LANES, Simd};
+use crate::simd::{CacheLevel, LANES, Simd};
 use bth_format::layout::{Child, NONE, WIDTH, WideNode};
 use bth_format::object::ObjectBounds;
 use bth_format::object::ObjectView;
@@ -97,12 +97,15 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
         let goal = sink.goal();
         let mut slots = [Slot::vacant(goal); POOL_SIZE];
         let mut pool = RayPool::new(object, &mut slots, stacks, goal);
-        let has_packed_nodes = object.has_packed_nodes();
+        let (has_packed_nodes, level) = (object.has_packed_nodes(), waiting_level(object));
         while !pool.is_empty() {
             if has_packed_nodes {
                 s.call(PackedSteps(&mut pool, object));
+            } else if level == CacheLevel::Second {
+                // Apart, because a branch in every step takes longer.
+                pool.inner_steps::<S, Wide>(s, object, CacheLevel::Second);
             } else {
-                pool.inner_steps::<S, Wide>(s, object);
+                pool.inner_steps::<S, Wide>(s, object, CacheLevel::First);
             }
             for i in 0..pool.take_bottom() {
                 if let Some(slot) = pool.finished(i) {

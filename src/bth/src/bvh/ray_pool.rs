@@ -2,12 +2,12 @@
 //! with the work of the others. [`super::interleaved`] starts the rays and stores their answers.
 
 use super::leaf::{LeafOutcome, enter_leaf};
-use super::nodes::{Nodes, Packed, indexed_leaf, prefetch, raw as raw_leaf};
+use super::nodes::{Nodes, Packed, indexed_leaf, prefetch, prefetch_into, raw as raw_leaf};
 use super::ray_state::{RayState, write_children};
 use super::stack::{BOTTOM, StackPosition, Stacks};
 use crate::query::{Goal, Query};
 use crate::rays::Ray;
-use crate::simd::{Part, Simd};
+use crate::simd::{CacheLevel, Part, Simd};
 use bth_format::layout::{Child, WIDTH};
 use bth_format::object::ObjectView;
 
@@ -15,6 +15,16 @@ use bth_format::object::ObjectView;
 pub(super) const POOL_SIZE: usize = 32;
 /// Steps through inner nodes continue while at least this many rays have one as their next step.
 const MIN_INNER: u8 = (POOL_SIZE / 4) as u8;
+
+/// Least number of cache lines of an object whose nodes and leaves wait in [`CacheLevel::waiting`]: 16 MiB. In smaller ones, most of which
+/// the second level holds already, diffuse rays are faster with them in the first.
+const MANY_LINES: usize = 1 << 18;
+
+/// The level in which the nodes and leaves of an object wait for their step.
+#[inline(always)]
+pub(super) fn waiting_level(object: &ObjectView<'_>) -> CacheLevel {
+    if object.lines.len() < MANY_LINES { CacheLevel::First } else { CacheLevel::waiting() }
+}
 
 /// Slots of rays with the same kind of next step. Indices are `u8`, so the length 256 makes bounds checks unnecessary; at most
 /// POOL_SIZE + 1 entries are used.
@@ -208,7 +218,7 @@ impl<'a, Q: Query> RayPool<'a, Q> {
 
     /// Steps through inner nodes until few rays have one as their next step.
     #[inline(always)]
-    pub(super) fn inner_steps<S: Simd, N: Nodes>(&mut self, s: S, object: &ObjectView<'_>) {
+    pub(super) fn inner_steps<S: Simd, N: Nodes>(&mut self, s: S, object: &ObjectView<'_>, level: CacheLevel) {
         let RayPool { slots, tops, lists, stacks, goal, .. } = self;
         let (mut counts, mut stacks, node_base) = (self.counts, stacks.open(), object.node_base());
         while counts.inner() > 0 {
@@ -219,7 +229,7 @@ impl<'a, Q: Query> RayPool<'a, Q> {
                 let top = stacks.replaced(top, count);
                 let code = stacks.code(top);
                 (tops.position[slot], tops.code[slot]) = (top, code);
-                prefetch(s, node_base, code);
+                prefetch_into(s, level, node_base, code);
                 lists.push(&mut counts, slot, code);
             }
             if counts.inner() < MIN_INNER && counts.leaf() | counts.bottom() > 0 {
@@ -287,6 +297,6 @@ impl<S: Simd, Q: Query> Part<S> for PackedSteps<'_, '_, '_, Q> {
     type Output = ();
     #[inline(always)]
     fn run(self, s: S) {
-        self.0.inner_steps::<S, Packed>(s, self.1);
+        self.0.inner_steps::<S, Packed>(s, self.1, CacheLevel::First);
     }
 }

@@ -218,7 +218,12 @@ impl<'a, Q: Query> RayPool<'a, Q> {
 
     /// Steps through inner nodes until few rays have one as their next step.
     #[inline(always)]
-    pub(super) fn inner_steps<S: Simd, N: Nodes>(&mut self, s: S, object: &ObjectView<'_>, level: CacheLevel) {
+    pub(super) fn inner_steps<S: Simd, N: Nodes>(
+        &mut self,
+        s: S,
+        object: &ObjectView<'_>,
+        level: CacheLevel,
+    ) {
         let RayPool { slots, tops, lists, stacks, goal, .. } = self;
         let (mut counts, mut stacks, node_base) = (self.counts, stacks.open(), object.node_base());
         while counts.inner() > 0 {

@@ -284,6 +284,7 @@ mod tests {
                         remaining: remaining(order),
                         stacks: &mut stacks,
                         sink,
+                        entry_nodes: true,
                     };
                     if isa.run_wide(ThroughPool(pool)).is_err() {
                         continue;
@@ -296,6 +297,7 @@ mod tests {
                         remaining: remaining(order),
                         stacks: &mut stacks,
                         sink,
+                        entry_nodes: true,
                     };
                     assert!(isa.run_wide(ThroughPool(pool)).is_ok());
                     let traced = |i: usize| order.is_none_or(|order| order.contains(&(i as u32)));

@@ -6,7 +6,7 @@ use super::deferred::DeferredHits;
 use super::entry_node::{ENTRY_RAYS, FindEntryNode};
 use super::leaf::{LeafOutcome, Progress, decide};
 use super::nodes::{UnpackedNode, Wide, node};
-use super::ray_pool::{POOL_SIZE, PackedSteps, RayPool, Slot, waiting_level};
+use super::ray_pool::{POOL_SIZE, RareSteps, RayPool, Slot, has_rare_steps};
 use super::ray_state::RayState;
 use super::stack::{StackPosition, Stacks};
 use crate::intersect::prepare::Prepared;
@@ -35,6 +35,8 @@ pub(crate) struct Interleaved<'a, 's, Q: Query> {
     pub(crate) remaining: RemainingRays<'a, Q>,
     pub(crate) stacks: &'a mut Stacks,
     pub(crate) sink: &'a mut Sink<'s, Q>,
+    /// Whether runs of coherent rays begin at entry nodes. It pays in [large](super::nodes::is_large) objects only.
+    pub(crate) entry_nodes: bool,
 }
 
 /// Supplies rays to the pool. Sixteen at a time are prepared and tested against the boxes of the root's children or, if they are
@@ -50,6 +52,8 @@ struct RaySource<'a, Q> {
     codes: [u32; LANES],
     /// The entry node of the next rays, as long as fewer than this many of the batch have been prepared.
     entered: usize,
+    /// Whether entry nodes are searched.
+    searches: bool,
     entry_node: WideNode,
     /// For each lane the index of its ray in the batch.
     ray: [u32; LANES],
@@ -73,7 +77,7 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
     /// query is complete.
     #[inline(always)]
     pub(crate) fn run<S: Simd>(self, s: S, mut tets: impl FnMut(u32, &Ray, &mut Q) -> bool) {
-        let Interleaved { object, rays, remaining, stacks, sink } = self;
+        let Interleaved { object, rays, remaining, stacks, sink, entry_nodes } = self;
         let walked = remaining.walked;
         let mut source = RaySource {
             object,
@@ -87,6 +91,7 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
             codes: [NONE; LANES],
             entry_node: WideNode { bounds: [[[0.0; WIDTH]; 2]; 3], child: [NONE; WIDTH] },
             entered: 0,
+            searches: entry_nodes,
             enter: [[0.0; LANES]; LANES],
             lane: [0; LANES],
             filled: 0,
@@ -97,13 +102,10 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
         let goal = sink.goal();
         let mut slots = [Slot::vacant(goal); POOL_SIZE];
         let mut pool = RayPool::new(object, &mut slots, stacks, goal);
-        let (has_packed_nodes, level) = (object.has_packed_nodes(), waiting_level(object));
+        let has_rare_steps = has_rare_steps(object);
         while !pool.is_empty() {
-            if has_packed_nodes {
-                s.call(PackedSteps(&mut pool, object));
-            } else if level == CacheLevel::Second {
-                // Apart, because a branch in every step takes longer.
-                pool.inner_steps::<S, Wide>(s, object, CacheLevel::Second);
+            if has_rare_steps {
+                s.call(RareSteps(&mut pool, object));
             } else {
                 pool.inner_steps::<S, Wide>(s, object, CacheLevel::First);
             }
@@ -208,7 +210,7 @@ impl<Q: Query> RaySource<'_, Q> {
     #[inline(always)]
     fn find_entry_node<S: Simd>(&mut self, s: S) {
         // Not with 128 bits, whose code is long, nor in scalar code.
-        if !S::INLINES_PARTS || !self.taken.is_multiple_of(ENTRY_RAYS) {
+        if !S::INLINES_PARTS || !self.taken.is_multiple_of(ENTRY_RAYS) || !self.searches {
             return;
         }
         let (first, last) = (self.ray[0] as usize, self.taken + ENTRY_RAYS - 1);

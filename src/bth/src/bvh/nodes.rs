@@ -153,6 +153,13 @@ pub(crate) fn indexed_leaf<'r, S: Simd>(
     }
 }
 
+/// Whether nodes and leaves of an object take at least 16 MiB, so that most of them are in no cache near the processor.
+#[inline(always)]
+pub(crate) fn is_large(object: &ObjectView<'_>) -> bool {
+    const LINES: usize = 1 << 18;
+    object.lines.len() >= LINES
+}
+
 /// Cache lines of the larger of a node and an indexed leaf.
 const LINES: usize = if NODE_LINES > INDEXED_LINES { NODE_LINES } else { INDEXED_LINES };
 

@@ -2,7 +2,7 @@
 //! with the work of the others. [`super::interleaved`] starts the rays and stores their answers.
 
 use super::leaf::{LeafOutcome, enter_leaf};
-use super::nodes::{Nodes, Packed, indexed_leaf, prefetch, prefetch_into, raw as raw_leaf};
+use super::nodes::{Nodes, Packed, Wide, indexed_leaf, is_large, prefetch, prefetch_into, raw as raw_leaf};
 use super::ray_state::{RayState, write_children};
 use super::stack::{BOTTOM, StackPosition, Stacks};
 use crate::query::{Goal, Query};
@@ -16,14 +16,11 @@ pub(super) const POOL_SIZE: usize = 32;
 /// Steps through inner nodes continue while at least this many rays have one as their next step.
 const MIN_INNER: u8 = (POOL_SIZE / 4) as u8;
 
-/// Least number of cache lines of an object whose nodes and leaves wait in [`CacheLevel::waiting`]: 16 MiB. In smaller ones, most of which
-/// the second level holds already, diffuse rays are faster with them in the first.
-const MANY_LINES: usize = 1 << 18;
-
-/// The level in which the nodes and leaves of an object wait for their step.
+/// Whether the steps through the inner nodes of an object are [`RareSteps`]. Nodes of smaller objects, most of which the second level holds
+/// already, wait in the first: with them in the second, diffuse rays are slower.
 #[inline(always)]
-pub(super) fn waiting_level(object: &ObjectView<'_>) -> CacheLevel {
-    if object.lines.len() < MANY_LINES { CacheLevel::First } else { CacheLevel::waiting() }
+pub(super) fn has_rare_steps(object: &ObjectView<'_>) -> bool {
+    object.has_packed_nodes() || is_large(object) && CacheLevel::waiting() == CacheLevel::Second
 }
 
 /// Slots of rays with the same kind of next step. Indices are `u8`, so the length 256 makes bounds checks unnecessary; at most
@@ -291,17 +288,22 @@ impl<'a, Q: Query> RayPool<'a, Q> {
     }
 }
 
-/// [`RayPool::inner_steps`] through packed nodes, as a part of kernels: apart from the loop for wide nodes, whose constants then stay in
-/// registers.
-pub(super) struct PackedSteps<'p, 'a, 'o, Q: Query>(
+/// [`RayPool::inner_steps`] through packed nodes, or through an object whose nodes wait in another level of caches, as a part of kernels:
+/// apart from the loop for all other objects, whose constants then stay in registers.
+pub(super) struct RareSteps<'p, 'a, 'o, Q: Query>(
     pub(super) &'p mut RayPool<'a, Q>,
     pub(super) &'p ObjectView<'o>,
 );
 
-impl<S: Simd, Q: Query> Part<S> for PackedSteps<'_, '_, '_, Q> {
+impl<S: Simd, Q: Query> Part<S> for RareSteps<'_, '_, '_, Q> {
     type Output = ();
     #[inline(always)]
     fn run(self, s: S) {
-        self.0.inner_steps::<S, Packed>(s, self.1, CacheLevel::First);
+        let RareSteps(pool, object) = self;
+        if object.has_packed_nodes() {
+            pool.inner_steps::<S, Packed>(s, object, CacheLevel::First);
+        } else {
+            pool.inner_steps::<S, Wide>(s, object, CacheLevel::Second);
+        }
     }
 }

@@ -8,7 +8,8 @@ use super::strategy::{HintUse, MIN_MEASURED_RAYS, QueryKind, Strategy, size_of};
 use super::walked_batch::{RAYS_PER_PART, has_subtrees, may_gain_by_walk, sole_tet_leaf, walk};
 use crate::SMALL;
 use crate::bvh::interleaved::{Interleaved, RemainingRays};
-use crate::bvh::packet::{self, Packets};
+use crate::bvh::nodes::is_large;
+use crate::bvh::packet::{MinimumUse, Packets};
 use crate::clock;
 use crate::intersect::exact_lanes::Intersections;
 use crate::query::sink::Sink;
@@ -202,7 +203,7 @@ fn in_packets<Q: Query>(
     scratch: &mut Scratch,
     sink: &mut Sink<'_, Q>,
 ) -> usize {
-    let (isa, scratch, least) = (Isa::chosen(), &mut scratch.packets, packet::MINIMUM_USE);
+    let (isa, scratch, least) = (Isa::chosen(), &mut scratch.packets, MinimumUse::of(object));
     let count = match isa.run_long_vectors(Packets { object, rays, scratch, least, sink }) {
         Ok(count) => count,
         Err(Packets { scratch, sink, .. }) => {
@@ -270,7 +271,8 @@ impl<Q: Query> Kernel for InterleavedKernel<'_, '_, Q> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let InterleavedKernel { object, rays, remaining, scratch, sink } = self;
-        let traversal = Interleaved { object, rays, remaining, stacks: &mut scratch.stacks, sink };
+        let (stacks, entry_nodes) = (&mut scratch.stacks, is_large(object));
+        let traversal = Interleaved { object, rays, remaining, stacks, sink, entry_nodes };
         traversal.run(s, |leaf, ray, query| {
             enter_tets(object, leaf, ray, query, &mut Uncounted::default()) == TetOutcome::Done
         });

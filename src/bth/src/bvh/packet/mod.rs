@@ -28,4 +28,4 @@ pub(crate) mod single_rays;
 mod tests;
 pub(crate) mod traverse;
 
-pub(crate) use runs::{MINIMUM_USE, PacketScratch, Packets};
+pub(crate) use runs::{MinimumUse, PacketScratch, Packets};

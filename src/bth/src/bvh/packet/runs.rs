@@ -10,6 +10,7 @@ use super::prepare_group::PrepareGroup;
 use super::segment_box::SegmentBox;
 use super::traverse::{PacketOutcome, PacketTracer, TracePacket};
 use crate::bvh::coherence::{Span, is_same_octant};
+use crate::bvh::nodes::is_large;
 use crate::query::sink::Sink;
 use crate::query::{Goal, Query};
 use crate::rays::Ray;
@@ -31,7 +32,16 @@ pub(crate) struct MinimumUse {
 }
 
 /// The shares that were measured to be the fastest (docs/notes/packets.md).
-pub(crate) const MINIMUM_USE: MinimumUse = MinimumUse { coherent: 20, short: 8 };
+pub(crate) const MINIMUM_USE: MinimumUse = MinimumUse { coherent: 10, short: 8 };
+/// The same for [large](is_large) objects: single rays wait less for memory, because many are interleaved.
+const MINIMUM_USE_OF_LARGE: MinimumUse = MinimumUse { coherent: 20, ..MINIMUM_USE };
+
+impl MinimumUse {
+    /// The shares for an object.
+    pub(crate) fn of(object: &ObjectView<'_>) -> MinimumUse {
+        if is_large(object) { MINIMUM_USE_OF_LARGE } else { MINIMUM_USE }
+    }
+}
 
 /// Memory kept from one batch to the next.
 #[derive(Debug, Default)]

@@ -271,7 +271,12 @@ mod tests {
             rays.truncate(rays.len() - 9);
             (rays[70].direction, rays[3].origin[0]) = ([-1.0, 1.0, 1.0].map(|x| x * scale), f32::NAN);
             let order: Vec<u32> = (0..rays.len() as u32).filter(|i| i % 97 != 5).collect();
-            for order in [None, Some(&order[..])] {
+            // Rays of one run in the middle of another.
+            let mut swapped: Vec<u32> = (0..rays.len() as u32).collect();
+            for run in 0..rays.len() / (2 * ENTRY_RAYS) {
+                swapped.swap(2 * run * ENTRY_RAYS + 20, (2 * run + 1) * ENTRY_RAYS + 30);
+            }
+            for order in [None, Some(&order[..]), Some(&swapped[..])] {
                 for isa in Isa::ALL {
                     let mut hits = vec![Hit::MISS; rays.len()];
                     let mut found = vec![false; rays.len()];

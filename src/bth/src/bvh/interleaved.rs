@@ -213,13 +213,11 @@ impl<Q: Query> RaySource<'_, Q> {
         if !S::INLINES_PARTS || !self.taken.is_multiple_of(ENTRY_RAYS) || !self.searches {
             return;
         }
-        let (first, last) = (self.ray[0] as usize, self.taken + ENTRY_RAYS - 1);
+        let first = self.ray[0] as usize;
         let Some(rays) = self.rays.get(first..first + ENTRY_RAYS) else { return };
-        let is_run = self
-            .remaining
-            .order
-            .is_none_or(|order| order.get(last) == Some(&((first + ENTRY_RAYS - 1) as u32)));
-        if !is_run || !is_same_octant(&rays[0], &rays[ENTRY_RAYS - 1]) {
+        if !is_same_octant(&rays[0], &rays[ENTRY_RAYS - 1])
+            || !is_run(self.remaining.order, self.taken, first)
+        {
             return;
         }
         let (node_base, root, bounds) = (self.object.node_base(), self.root, &self.bounds);
@@ -227,6 +225,15 @@ impl<Q: Query> RaySource<'_, Q> {
             self.entered = self.taken + ENTRY_RAYS;
         }
     }
+}
+
+/// Whether the rays from `taken` on in an order are as many as have an entry node in common, and those of the batch from `first` on.
+#[inline(never)]
+fn is_run(order: Option<&[u32]>, taken: usize, first: usize) -> bool {
+    order.is_none_or(|order| {
+        let run = order.get(taken..taken + ENTRY_RAYS);
+        run.is_some_and(|run| run.iter().zip(first..).all(|(&ray, next)| ray as usize == next))
+    })
 }
 
 /// The child code at which rays start: the root, or its subtree if the root is a tet leaf that has one.

@@ -133,6 +133,7 @@ impl<S: Simd> Part<S> for FindEntryNode<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bvh::box_oracle;
     use crate::bvh::height_field::HeightField;
     use crate::bvh::interleaved::{Interleaved, RemainingRays};
     use crate::bvh::stack::Stacks;
@@ -164,8 +165,17 @@ mod tests {
         }
     }
 
-    fn remaining<Q>(order: Option<&[u32]>) -> RemainingRays<'_, Q> {
-        RemainingRays { order, queries: None, walked: None }
+    /// Traces rays by the pool alone; false if it is not compiled for the instruction set.
+    fn through_pool<Q: Query>(
+        isa: Isa,
+        object: &ObjectView<'_>,
+        (rays, order): (&[Ray], Option<&[u32]>),
+        stacks: &mut Stacks,
+        sink: &mut Sink<'_, Q>,
+    ) -> bool {
+        let remaining = RemainingRays { order, queries: None, walked: None };
+        let pool = Interleaved { object, rays, remaining, stacks, sink, entry_nodes: true };
+        isa.run_wide(ThroughPool(pool)).is_ok()
     }
 
     /// A run of rays from near a point above the surface to a small part of it.
@@ -194,13 +204,8 @@ mod tests {
     }
 
     fn meets(ray: &Ray, node: &WideNode, slot: usize) -> bool {
-        let (mut enter, mut leave) = (f64::from(ray.tmin), f64::from(ray.tmax));
-        for k in 0..3 {
-            let (o, d) = (f64::from(ray.origin[k]), f64::from(ray.direction[k]));
-            let [a, b] = [0, 1].map(|end| (f64::from(node.bounds[k][end][slot]) - o) / d);
-            (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));
-        }
-        enter <= leave
+        let [lower, upper] = [0, 1].map(|end| [0, 1, 2].map(|k| node.bounds[k][end][slot]));
+        box_oracle::meets(ray, lower, upper, 0.0)
     }
 
     /// All boxes of the tree with their child codes, by their bits.
@@ -281,30 +286,13 @@ mod tests {
                     let mut hits = vec![Hit::MISS; rays.len()];
                     let mut found = vec![false; rays.len()];
                     let (mut stacks, object) = (Stacks::default(), &object);
-                    let answers = nearest_answers(&mut hits);
-                    let sink = &mut Sink::<NearestQuery>::new(object.triangle_ids, answers, 0);
-                    let pool = Interleaved {
-                        object,
-                        rays: &rays,
-                        remaining: remaining(order),
-                        stacks: &mut stacks,
-                        sink,
-                        entry_nodes: true,
-                    };
-                    if isa.run_wide(ThroughPool(pool)).is_err() {
+                    let (answers, sink_ids) = (nearest_answers(&mut hits), object.triangle_ids);
+                    let mut sink = Sink::<NearestQuery>::new(sink_ids, answers, 0);
+                    if !through_pool(isa, object, (&rays, order), &mut stacks, &mut sink) {
                         continue;
                     }
-                    let answers = any_answers(&mut found);
-                    let sink = &mut Sink::<AnyQuery>::new(object.triangle_ids, answers, 0);
-                    let pool = Interleaved {
-                        object,
-                        rays: &rays,
-                        remaining: remaining(order),
-                        stacks: &mut stacks,
-                        sink,
-                        entry_nodes: true,
-                    };
-                    assert!(isa.run_wide(ThroughPool(pool)).is_ok());
+                    let mut sink = Sink::<AnyQuery>::new(sink_ids, any_answers(&mut found), 0);
+                    assert!(through_pool(isa, object, (&rays, order), &mut stacks, &mut sink));
                     let traced = |i: usize| order.is_none_or(|order| order.contains(&(i as u32)));
                     for (i, ray) in rays.iter().enumerate().filter(|&(i, _)| traced(i)) {
                         let (mut hit, mut is_hit) = (Hit::MISS, false);

@@ -7,8 +7,13 @@
 //!   that are computed for sixteen rays at a time ([`deferred`]);
 //! - [`packet`]: coherent rays that enter nodes together.
 //!
+//! Which rays are coherent is told by [`coherence`]; a [`shaft`] bounds them. In large objects those that are interleaved begin below the
+//! root ([`entry_node`]).
+//!
 //! A fourth one, [`enumerate`], passes every triangle that a ray may hit to a receiver, for queries that report more than one hit.
 
+#[cfg(test)]
+pub(crate) mod box_oracle;
 pub(crate) mod candidate;
 pub(crate) mod coherence;
 pub(crate) mod deferred;

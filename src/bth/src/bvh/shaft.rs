@@ -99,6 +99,7 @@ impl<S: Simd> Shaft<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bvh::box_oracle::meets;
     use crate::rays::Ray;
     use crate::simd::{Isa, Kernel};
     use bth_format::layout::{NONE, WIDTH};
@@ -115,17 +116,6 @@ mod tests {
             let (shaft, limit) = Shaft::of(s, &ObjectBounds::around(greatest), &Span::of(s, rays))?;
             Some(shaft.children(s, node, limit).0)
         }
-    }
-
-    /// Whether a hit of a ray may lie in a box that is enlarged by `more` on all sides, in f64.
-    fn meets(ray: &Ray, lower: [f32; 3], upper: [f32; 3], more: f64) -> bool {
-        let (mut enter, mut leave) = (f64::from(ray.tmin.next_down()), f64::from(ray.tmax.next_up()));
-        for k in 0..3 {
-            let (o, d) = (f64::from(ray.origin[k]), f64::from(ray.direction[k]));
-            let [a, b] = [f64::from(lower[k]) - more, f64::from(upper[k]) + more].map(|x| (x - o) / d);
-            (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));
-        }
-        enter <= leave
     }
 
     #[test]
@@ -169,7 +159,10 @@ mod tests {
                 for slot in 0..used {
                     let [lower, upper] = [0, 1].map(|end| [0, 1, 2].map(|k| node.bounds[k][end][slot]));
                     let is_reached = reached >> slot & 1 != 0;
-                    if rays.iter().any(|ray| meets(ray, lower, upper, 0.0)) {
+                    // A hit's t is rounded before it is compared with the ends of the range.
+                    let wider =
+                        |ray: &Ray| Ray { tmin: ray.tmin.next_down(), tmax: ray.tmax.next_up(), ..*ray };
+                    if rays.iter().any(|ray| meets(&wider(ray), lower, upper, 0.0)) {
                         assert!(is_reached, "{isa}, round {round}: {lower:?}, {upper:?}, {rays:?}");
                         met += 1;
                     } else {

@@ -306,11 +306,26 @@ pub trait Simd: Lanewise {
     }
     /// Prefetches a cache line; any address is allowed.
     fn prefetch<T>(self, address: *const T);
-    /// Prefetches `LINES` elements of a cache line each. Any address is allowed. Where there is no choice, they go to the first level.
+    /// As [`Self::prefetch`], into the second-level cache only, where the machine can.
     #[inline(always)]
-    fn prefetch_into<const LINES: usize, T>(self, _: CacheLevel, first: *const T) {
-        for i in 0..LINES {
-            self.prefetch(first.wrapping_add(i));
+    fn prefetch_second<T>(self, address: *const T) {
+        self.prefetch(address);
+    }
+    /// Prefetches `LINES` elements of a cache line each; any address is allowed.
+    #[inline(always)]
+    fn prefetch_into<const LINES: usize, T>(self, level: CacheLevel, first: *const T) {
+        // The level is asked once, not for each line.
+        match level {
+            CacheLevel::First => {
+                for i in 0..LINES {
+                    self.prefetch(first.wrapping_add(i));
+                }
+            }
+            CacheLevel::Second => {
+                for i in 0..LINES {
+                    self.prefetch_second(first.wrapping_add(i));
+                }
+            }
         }
     }
 }

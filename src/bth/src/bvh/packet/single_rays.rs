@@ -141,6 +141,7 @@ impl SingleRays {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bvh::box_oracle::meets;
     use crate::bvh::packet::entry::PACKET;
     use crate::bvh::packet::prepare_group::PrepareGroup;
     use crate::bvh::packet::segment_box::SegmentBox;
@@ -176,20 +177,6 @@ mod tests {
             }
             out
         }
-    }
-
-    /// Whether a ray meets a box that is enlarged by `more` on all sides, in f64.
-    fn meets(ray: &Ray, lower: [f32; 3], upper: [f32; 3], more: f64) -> bool {
-        if lower[0] > upper[0] {
-            return false;
-        }
-        let (mut enter, mut leave) = (f64::from(ray.tmin), f64::from(ray.tmax));
-        for k in 0..3 {
-            let (o, d) = (f64::from(ray.origin[k]), f64::from(ray.direction[k]));
-            let [a, b] = [f64::from(lower[k]) - more, f64::from(upper[k]) + more].map(|x| (x - o) / d);
-            (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));
-        }
-        enter <= leave
     }
 
     #[test]

@@ -10,9 +10,7 @@ mod rows;
 use self::packing::{compression, expansion};
 use self::rows::{IN_ORDER, columns8, transpose4, transpose8};
 use super::detected::Detected;
-use super::{
-    CacheLevel, Kernel, LANES, Lanewise, Part, Simd, assert_indices, one_piece, scalar, valid_indices,
-};
+use super::{Kernel, LANES, Lanewise, Part, Simd, assert_indices, one_piece, scalar, valid_indices};
 use std::arch::x86_64::*;
 
 /// Proof that this machine has AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT.
@@ -392,16 +390,8 @@ impl Simd for Avx2 {
         unsafe { _mm_prefetch::<_MM_HINT_T0>(address.cast()) }
     }
     #[inline(always)]
-    fn prefetch_into<const LINES: usize, T>(self, level: CacheLevel, first: *const T) {
-        if level == CacheLevel::First {
-            for i in 0..LINES {
-                self.prefetch(first.wrapping_add(i));
-            }
-            return;
-        }
-        for i in 0..LINES {
-            // SAFETY: as `prefetch`.
-            unsafe { _mm_prefetch::<_MM_HINT_T1>(first.wrapping_add(i).cast()) }
-        }
+    fn prefetch_second<T>(self, address: *const T) {
+        // SAFETY: as `prefetch`.
+        unsafe { _mm_prefetch::<_MM_HINT_T1>(address.cast()) }
     }
 }

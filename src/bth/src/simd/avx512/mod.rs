@@ -12,7 +12,7 @@ use self::rows::{COLUMNS5, ROWS5, columns8, concat_quarters};
 use self::sort::{keys_with_lanes, nearest_of_four, store_far_to_near};
 use self::transpose::{transpose4, transpose16};
 use super::detected::Detected;
-use super::{CacheLevel, Kernel, LANES, Lanewise, Part, Simd, assert_indices, one_piece, valid_indices};
+use super::{Kernel, LANES, Lanewise, Part, Simd, assert_indices, one_piece, valid_indices};
 use std::arch::x86_64::*;
 
 /// Proof that this machine has AVX-512 F, BW, CD, DQ and VL, AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT.
@@ -363,16 +363,8 @@ impl Simd for Avx512 {
         unsafe { _mm_prefetch::<_MM_HINT_T0>(address.cast()) }
     }
     #[inline(always)]
-    fn prefetch_into<const LINES: usize, T>(self, level: CacheLevel, first: *const T) {
-        if level == CacheLevel::First {
-            for i in 0..LINES {
-                self.prefetch(first.wrapping_add(i));
-            }
-            return;
-        }
-        for i in 0..LINES {
-            // SAFETY: as `prefetch`.
-            unsafe { _mm_prefetch::<_MM_HINT_T1>(first.wrapping_add(i).cast()) }
-        }
+    fn prefetch_second<T>(self, address: *const T) {
+        // SAFETY: as `prefetch`.
+        unsafe { _mm_prefetch::<_MM_HINT_T1>(address.cast()) }
     }
 }

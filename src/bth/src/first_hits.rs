@@ -59,24 +59,41 @@ impl Scene {
 
     /// Stores the nearest hit of a ray, or [`Hit::MISS`]. `from` is the triangle on which it starts, or [`PrimitiveRef::NONE`].
     ///
-    /// Not inlined: every crate that traces single rays would hold kernels of its own.
-    #[inline(never)]
+    /// Inlined up to the kernel, which is not: every crate that traces single rays would hold kernels of its own. For a single ray in a
+    /// model every instruction on the way there counts.
+    #[inline(always)]
     pub(crate) fn nearest_of_ray(&self, ray: &Ray, from: PrimitiveRef, hit: &mut Hit) {
+        match self.sole_opaque() {
+            Some(object) => object::store_nearest(object, ray, hint(from, 0), 0, hit),
+            None => self.nearest_of_ray_elsewhere(ray, from, hit),
+        }
+    }
+
+    /// As [`Self::nearest_of_ray`], in any scene.
+    #[inline(never)]
+    fn nearest_of_ray_elsewhere(&self, ray: &Ray, from: PrimitiveRef, hit: &mut Hit) {
         match self.sole() {
             Some((object, instance)) if !self.has_opacity() => {
-                object::trace_nearest(object, ray, hint(from, instance), instance, hit);
+                object::store_nearest(object, ray, hint(from, instance), instance, hit);
             }
             _ => self.nearest_hits_of(std::slice::from_ref(ray), Some(&[from]), std::slice::from_mut(hit)),
         }
     }
 
     /// Whether a ray hits anything; `from` as for [`Self::nearest_of_ray`].
-    #[inline(never)]
+    #[inline(always)]
     pub(crate) fn any_of_ray(&self, ray: &Ray, from: PrimitiveRef) -> bool {
+        match self.sole_opaque() {
+            Some(object) => object::any(object, ray, hint(from, 0)),
+            None => self.any_of_ray_elsewhere(ray, from),
+        }
+    }
+
+    /// As [`Self::any_of_ray`], in any scene.
+    #[inline(never)]
+    fn any_of_ray_elsewhere(&self, ray: &Ray, from: PrimitiveRef) -> bool {
         match self.sole() {
-            Some((object, instance)) if !self.has_opacity() => {
-                object::trace_any(object, ray, hint(from, instance))
-            }
+            Some((object, instance)) if !self.has_opacity() => object::any(object, ray, hint(from, instance)),
             _ => {
                 let mut found = [false];
                 self.any_hits_of(std::slice::from_ref(ray), Some(&[from]), &mut found);

@@ -2,7 +2,7 @@
 //!
 //! Three traversals share the node formats ([`nodes`]) and the decisions about triangles ([`leaf`], [`candidate`]):
 //!
-//! - [`single`]: one ray, with a stack of its own ([`single_stack`]);
+//! - [`single`]: one ray, with a stack of its own ([`single_stack`]), and its certain hit ([`certain_hit`]);
 //! - [`interleaved`]: a pool of rays ([`ray_pool`], [`ray_state`]) that step in turn, with their stacks ([`stack`]) and with hits
 //!   that are computed for sixteen rays at a time ([`deferred`]);
 //! - [`packet`]: coherent rays that enter nodes together.
@@ -15,6 +15,7 @@
 #[cfg(test)]
 pub(crate) mod box_oracle;
 pub(crate) mod candidate;
+pub(crate) mod certain_hit;
 pub(crate) mod coherence;
 pub(crate) mod deferred;
 mod entry_node;

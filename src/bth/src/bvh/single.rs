@@ -2,13 +2,13 @@
 //!
 //! There are no other rays whose work could hide latencies, so the length of the dependency chain from step to step decides the
 //! speed. The nearest certain hit is therefore kept with f32 bounds of its depth, and its t, u and v are computed in f64 once, at
-//! the end.
+//! the end ([`super::certain_hit`]).
 
 use super::leaf::{LeafOutcome, Progress, decide, enter_leaf};
 use super::nodes::{Nodes, Packed, Wide, indexed_leaf, prefetch, raw as raw_leaf};
 use super::ray_state::key_limit;
 use super::single_stack::{OpenSingleStack, SingleStack};
-use crate::bvh::candidate::{Candidate, settle_one};
+use crate::bvh::candidate::Candidate;
 use crate::intersect::boxes::{ChildBoxes, RaySlabLanes};
 use crate::intersect::prepare::PreparedRay;
 use crate::query::{Count, Goal, Query};
@@ -19,10 +19,24 @@ use bth_format::layout::{Child, NONE, WIDTH};
 use bth_format::object::{NodeBase, ObjectView};
 use std::hint::black_box;
 
+/// What a single ray has found.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum SingleResult {
+    /// What its query holds; nothing if it was not constructed.
+    OfQuery,
+    /// A triangle that is certainly the nearest hit, whose t, u and v are not yet computed, and the direction's greatest |component|.
+    Certain(Candidate, f32),
+    /// A triangle that is certainly hit, which completes an any-hit query.
+    Accepted,
+}
+
 /// State of the ray. All fields but the query stay in registers.
-struct SingleState<'a, Q> {
+struct SingleState<'a, Q: Query> {
     prepared: &'a PreparedRay,
-    query: &'a mut Q,
+    goal: Q::Goal,
+    /// Constructed by the first decision in f64, which most rays never need.
+    query: &'a mut Option<Q>,
+    accepted: bool,
     /// Upper limit of the depths of hits that can still change the result.
     last: f32,
     /// Lower bound of the depth of the nearest hit so far.
@@ -34,7 +48,7 @@ struct SingleState<'a, Q> {
 impl<Q: Query> Progress<Q> for SingleState<'_, Q> {
     #[inline(always)]
     fn goal(&self) -> Q::Goal {
-        self.query.goal()
+        self.goal
     }
     #[inline(always)]
     fn prepared(&self) -> &PreparedRay {
@@ -65,17 +79,17 @@ impl<Q: Query> Progress<Q> for SingleState<'_, Q> {
         self.pending = pending;
     }
     #[inline(always)]
-    fn query(&mut self, _ray: &Ray) -> &mut Q {
-        self.query
+    fn query(&mut self, ray: &Ray) -> &mut Q {
+        self.query.get_or_insert_with(|| Q::new(self.goal, ray))
     }
     #[inline(always)]
     fn accept(&mut self) {
-        self.query.accept();
+        self.accepted = true;
     }
 }
 
 /// Traverses the BVH of an object from its root. `tets` intersects a tet leaf without a subtree, given its row. `walked` is the row
-/// of a tet leaf that is skipped, because the query already holds the ray's hits in it, or `NONE`.
+/// of a tet leaf that is skipped, because the query, which is then constructed, already holds the ray's hits in it, or `NONE`.
 ///
 /// This is one kernel, longer than other functions and with more parameters: its variables must stay in registers across all steps,
 /// and a function boundary or a struct of parameters between the steps was measured to be slower.
@@ -86,17 +100,18 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
     (object, ray): (&ObjectView<'_>, &Ray),
     prepared: &PreparedRay,
     walked: u32,
-    query: &mut Q,
+    (goal, query): (Q::Goal, &mut Option<Q>),
     stack: &mut SingleStack,
     count: &mut C,
     mut tets: impl FnMut(u32, &mut Q, &mut C) -> TetOutcome,
-) {
+) -> SingleResult {
     // Kept in memory: the compiler would otherwise broadcast each number to sixteen lanes before the loop and spill the vectors.
     let prepared = black_box(prepared);
-    let goal = query.goal();
     let mut state = SingleState {
         prepared,
+        goal,
         query,
+        accepted: false,
         last: prepared.slabs.last,
         nearest: f32::INFINITY,
         pending: Candidate::NONE,
@@ -139,7 +154,7 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
                     }
                     count.leaf();
                     decide(object, ray, &mut state, NONE, 0);
-                    let done = tets(row, state.query, count) == TetOutcome::Done;
+                    let done = tets(row, state.query(ray), count) == TetOutcome::Done;
                     state.update_from_query(ray);
                     done
                 }
@@ -160,8 +175,12 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
         limit = key_limit(state.last);
         code = stack.pop(limit, goal);
     }
-    if state.pending.leaf != NONE {
-        settle_one(object, ray, state.pending, state.query);
+    if state.accepted {
+        SingleResult::Accepted
+    } else if state.pending.leaf != NONE {
+        SingleResult::Certain(state.pending, prepared.slabs.scale)
+    } else {
+        SingleResult::OfQuery
     }
 }
 

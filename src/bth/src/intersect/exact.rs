@@ -19,7 +19,9 @@ pub(crate) use crate::intersect::line::RATIO_ERROR;
 use bth_format::exact::{EDGE_PARTS, Expansion, VOLUME_PARTS};
 
 /// 128u, more than the 98u above: bounds the error of weights relative to Dm(m+r) and that of the volume relative to rm².
-const WEIGHT_ERROR: f64 = 128.0 / (1u64 << 53) as f64;
+pub(super) const WEIGHT_ERROR: f64 = 128.0 / (1u64 << 53) as f64;
+/// Factor from the bound of an error to the least value of which it is at most [`RATIO_ERROR`].
+pub(super) const INVERSE_RATIO_ERROR: f64 = 1.0 / RATIO_ERROR;
 
 /// Intersection of a line and a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -145,7 +147,6 @@ impl OriginTerms {
         let volume = unordered_scalar_product(offset, normal);
         let (distance, edge) = (max_norm(offset), greater(max_norm(second), max_norm(third)));
         let error = [WEIGHT_ERROR * (edge * (edge + distance)), WEIGHT_ERROR * (distance * (edge * edge))];
-        const INVERSE_RATIO_ERROR: f64 = 1.0 / RATIO_ERROR;
         let is_accurate = INVERSE_RATIO_ERROR * error[1] < volume.abs();
         let terms = OriginTerms {
             normal,

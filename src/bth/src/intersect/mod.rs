@@ -14,6 +14,7 @@ pub(crate) mod crossing;
 pub(crate) mod edge_functions;
 pub(crate) mod exact;
 pub(crate) mod exact_lanes;
+pub(crate) mod exact_quad;
 pub(crate) mod filter;
 pub(crate) mod line;
 pub(crate) mod point_exact;

@@ -24,13 +24,13 @@ use bth_format::object::ObjectView;
 #[inline(never)]
 pub(crate) fn nearest(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> Hit {
     let mut hit = Hit::MISS;
-    trace_nearest(object, ray, from, instance, &mut hit);
+    store_nearest(object, ray, from, instance, &mut hit);
     hit
 }
 
 /// As [`nearest`], but stores the hit in `hit`, which avoids a copy.
-#[inline(always)]
-pub(crate) fn trace_nearest(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32, hit: &mut Hit) {
+#[inline(never)]
+pub(crate) fn store_nearest(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32, hit: &mut Hit) {
     trace::<NearestQuery, Uncounted>((object, NEAREST), ray, from, instance, &mut Uncounted::default(), hit);
 }
 
@@ -44,12 +44,6 @@ pub(crate) fn nearest_counted(object: &ObjectView<'_>, ray: &Ray, from: u32, ins
 /// Whether a ray in object space hits anything; `from` as for [`nearest`].
 #[inline(never)]
 pub(crate) fn any(object: &ObjectView<'_>, ray: &Ray, from: u32) -> bool {
-    trace_any(object, ray, from)
-}
-
-/// As [`any`], inlined.
-#[inline(always)]
-pub(crate) fn trace_any(object: &ObjectView<'_>, ray: &Ray, from: u32) -> bool {
     let mut found = Answer::MISS;
     trace::<AnyQuery, Uncounted>((object, ANY), ray, from, 0, &mut Uncounted::default(), &mut found);
     Answer::is_hit(&found)

@@ -1,10 +1,11 @@
 //! Tracing of one object by a single ray.
 
 use crate::SMALL;
-use crate::bvh::single::trace_single;
+use crate::bvh::certain_hit::store_certain_hit;
+use crate::bvh::single::{SingleResult, trace_single};
 use crate::bvh::single_stack::SingleStack;
 use crate::intersect::prepare::PreparedRay;
-use crate::query::{Count, Query};
+use crate::query::{Answer, Count, Query};
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, Simd};
 use crate::tets::{TetStart, enter_tets, start_in_tets};
@@ -22,7 +23,25 @@ pub(crate) fn trace<Q: Query, C: Count>(
     count: &mut C,
     answer: &mut Q::Answer,
 ) {
+    // Where nothing but the kernel is called, the registers need not be saved a second time.
+    let Some(isa) = Isa::already_chosen() else {
+        return trace_first::<Q, C>((object, goal), ray, from, instance, count, answer);
+    };
     // The kernel is passed by reference, because a copy of fields that were just written would stall.
+    isa.run_found(&mut SingleKernel::<Q, C> { object, goal, ray, from, instance, count, answer });
+}
+
+/// As [`trace`], where no instruction set is chosen.
+#[cold]
+#[inline(never)]
+fn trace_first<Q: Query, C: Count>(
+    (object, goal): (&ObjectView<'_>, Q::Goal),
+    ray: &Ray,
+    from: u32,
+    instance: u32,
+    count: &mut C,
+    answer: &mut Q::Answer,
+) {
     Isa::chosen().run(&mut SingleKernel::<Q, C> { object, goal, ray, from, instance, count, answer });
 }
 
@@ -43,16 +62,31 @@ impl<Q: Query, C: Count> Kernel for &mut SingleKernel<'_, Q, C> {
     fn run<S: Simd>(self, s: S) {
         let SingleKernel { object, goal, ray, from, instance, count, answer } = self;
         let (object, ray) = (*object, *ray);
-        let mut query = Q::new(*goal, ray);
+        let mut query = None;
         let (from_tets, walked) = if SMALL || *from == NONE || object.tet_leaves.is_empty() {
             (object.header.root == NONE, NONE)
         } else {
-            from_tets(object, ray, *from, &mut query, *count)
+            from_tets(object, ray, *from, query.insert(Q::new(*goal, ray)), *count)
         };
-        if !from_tets {
-            through_bvh(s, (object, ray), walked, &mut query, *count);
+        let result = if from_tets {
+            SingleResult::OfQuery
+        } else {
+            through_bvh(s, (object, ray), walked, (*goal, &mut query), *count)
+        };
+        // The answer is written in place: a copy of what was just written word by word would stall.
+        match result {
+            SingleResult::Accepted => **answer = Q::ACCEPTED,
+            SingleResult::Certain(candidate, norm) => {
+                let place = (&mut **answer, *instance);
+                store_certain_hit::<S, Q>(s, object, ray, (candidate, norm), *goal, place);
+            }
+            SingleResult::OfQuery => {
+                **answer = match &query {
+                    Some(query) => query.answer(object.triangle_ids, *instance),
+                    None => Answer::MISS,
+                };
+            }
         }
-        **answer = query.answer(object.triangle_ids, *instance);
     }
 }
 
@@ -62,18 +96,18 @@ fn through_bvh<S: Simd, Q: Query, C: Count>(
     s: S,
     (object, ray): (&ObjectView<'_>, &Ray),
     walked: u32,
-    query: &mut Q,
+    query: (Q::Goal, &mut Option<Q>),
     count: &mut C,
-) {
+) -> SingleResult {
     let prepared = match PreparedRay::of(&object.bounds, ray) {
         Some(prepared) => prepared,
         None => match PreparedRay::in_f64(object.header, ray) {
             Some(prepared) => prepared,
-            None => return,
+            None => return SingleResult::OfQuery,
         },
     };
     let tets = |leaf, query: &mut Q, count: &mut C| enter_tets(object, leaf, ray, query, count);
-    trace_single(s, (object, ray), &prepared, walked, query, &mut SingleStack::new(), count, tets);
+    trace_single(s, (object, ray), &prepared, walked, query, &mut SingleStack::new(), count, tets)
 }
 
 /// Walks the ray from a triangle through the tetrahedra of which that is a face. Returns whether the query is complete, and the tet

@@ -220,20 +220,17 @@ impl Scene {
         }
     }
 
-    /// The object and the index of the only visible instance, if there is exactly one and its object space is world space. Rays
-    /// are then traced directly in the object, without the top level.
+    /// The object of a model whose only object was given no new positions and is opaque; `None` elsewhere, and before something was
+    /// traced.
     #[inline(always)]
-    pub(crate) fn sole(&self) -> Option<(&ObjectView<'_>, u32)> {
-        // For a single ray in a model every instruction on the way to its kernel counts.
-        match (&self.world, self.objects.sole_view()) {
-            (None, Some(object)) => Some((object, 0)),
-            _ => self.sole_elsewhere(),
-        }
+    pub(crate) fn sole_opaque(&self) -> Option<&ObjectView<'_>> {
+        if self.world.is_none() && !self.has_opacity { self.objects.sole_view() } else { None }
     }
 
-    /// As [`Self::sole`], where instances are placed, an object has new positions, or nothing was traced before.
+    /// The object and the index of the only visible instance, if there is exactly one and its object space is world space. Rays
+    /// are then traced directly in the object, without the top level.
     #[inline(never)]
-    fn sole_elsewhere(&self) -> Option<(&ObjectView<'_>, u32)> {
+    pub(crate) fn sole(&self) -> Option<(&ObjectView<'_>, u32)> {
         let Some(world) = &self.world else {
             return (self.object_count() == 1).then(|| (self.view(0), 0));
         };

@@ -26,6 +26,12 @@ impl Detected {
         }
     }
 
+    /// As [`Self::get`]; false before it was found out.
+    #[inline(always)]
+    pub(in crate::simd) fn is_found(&self) -> bool {
+        self.state.load(Ordering::Relaxed) == Detected::PRESENT
+    }
+
     /// Calls `find`. Threads that run this concurrently store the same value.
     #[cold]
     #[inline(never)]

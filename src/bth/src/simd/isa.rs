@@ -84,13 +84,13 @@ const SIMD128: u8 = Isa::Simd128 as u8 + 1;
 const AVX2: u8 = Isa::Avx2 as u8 + 1;
 
 /// Evaluates the expression with the token of an instruction set with 128-bit vectors, if it is compiled for this target and this
-/// machine has it.
+/// machine has it. `$detect` is the function that returns the token: `detect` or, where it is known which instruction sets there are, `found`.
 macro_rules! with_quads {
-    ($isa:expr, $simd:ident => $do:expr) => {
+    ($isa:expr, $detect:ident, $simd:ident => $do:expr) => {
         match $isa {
             #[cfg(target_arch = "x86_64")]
             Isa::Sse4 => {
-                if let Some($simd) = super::quads::sse4::Sse4::detect() {
+                if let Some($simd) = super::quads::sse4::Sse4::$detect() {
                     $do;
                 }
             }
@@ -111,17 +111,17 @@ macro_rules! with_quads {
 
 /// As [`with_quads`], for an instruction set with longer vectors.
 macro_rules! with_long_vectors {
-    ($isa:expr, $simd:ident => $do:expr) => {
+    ($isa:expr, $detect:ident, $simd:ident => $do:expr) => {
         match $isa {
             #[cfg(target_arch = "x86_64")]
             Isa::Avx2 => {
-                if let Some($simd) = super::avx2::Avx2::detect() {
+                if let Some($simd) = super::avx2::Avx2::$detect() {
                     $do;
                 }
             }
             #[cfg(target_arch = "x86_64")]
             Isa::Avx512 => {
-                if let Some($simd) = super::avx512::Avx512::detect() {
+                if let Some($simd) = super::avx512::Avx512::$detect() {
                     $do;
                 }
             }
@@ -190,15 +190,21 @@ impl Isa {
     /// variable `BTH_ISA` if this machine has it, else the best.
     #[inline]
     pub fn chosen() -> Isa {
-        match CHOSEN_ISA.load(Ordering::Relaxed) {
-            0 => Isa::choose_first(),
+        Isa::already_chosen().unwrap_or_else(Isa::choose_first)
+    }
+
+    /// As [`Self::chosen`]; `None` where none is chosen, as before the first trace.
+    #[inline(always)]
+    pub(crate) fn already_chosen() -> Option<Isa> {
+        Some(match CHOSEN_ISA.load(Ordering::Relaxed) {
+            0 => return None,
             SCALAR => Isa::Scalar,
             SSE4 => Isa::Sse4,
             NEON => Isa::Neon,
             SIMD128 => Isa::Simd128,
             AVX2 => Isa::Avx2,
             _ => Isa::Avx512,
-        }
+        })
     }
 
     #[cold]
@@ -235,8 +241,17 @@ impl Isa {
     #[inline(always)]
     pub fn run<K: Kernel>(self, kernel: K) -> K::Output {
         // This repeats `run_wide`, because its `Result` would cost one more copy of the output.
-        with_long_vectors!(self, simd => return simd.run(kernel));
-        with_quads!(self, simd => return simd.run(kernel));
+        with_long_vectors!(self, detect, simd => return simd.run(kernel));
+        with_quads!(self, detect, simd => return simd.run(kernel));
+        run_scalar(kernel)
+    }
+
+    /// As [`Self::run`], for the chosen instruction set, which is known to be available. There is then no call but that of the
+    /// kernel, so that callers save no registers.
+    #[inline(always)]
+    pub(crate) fn run_found<K: Kernel>(self, kernel: K) -> K::Output {
+        with_long_vectors!(self, found, simd => return simd.run(kernel));
+        with_quads!(self, found, simd => return simd.run(kernel));
         run_scalar(kernel)
     }
 
@@ -244,8 +259,8 @@ impl Isa {
     /// are no faster than other code without vectors: they are not compiled to scalar code.
     #[inline(always)]
     pub(crate) fn run_wide<K: Kernel>(self, kernel: K) -> Result<K::Output, K> {
-        with_long_vectors!(self, simd => return Ok(simd.run(kernel)));
-        with_quads!(self, simd => return Ok(simd.run(kernel)));
+        with_long_vectors!(self, detect, simd => return Ok(simd.run(kernel)));
+        with_quads!(self, detect, simd => return Ok(simd.run(kernel)));
         Err(kernel)
     }
 
@@ -253,14 +268,14 @@ impl Isa {
     /// another type where code is long.
     #[inline(always)]
     pub(crate) fn run_long_vectors<K: Kernel>(self, kernel: K) -> Result<K::Output, K> {
-        with_long_vectors!(self, simd => return Ok(simd.run(kernel)));
+        with_long_vectors!(self, detect, simd => return Ok(simd.run(kernel)));
         Err(kernel)
     }
 
     /// As [`Self::run_wide`], only with vectors of 128 bits.
     #[inline(always)]
     pub(crate) fn run_quads<K: Kernel>(self, kernel: K) -> Result<K::Output, K> {
-        with_quads!(self, simd => return Ok(simd.run(kernel)));
+        with_quads!(self, detect, simd => return Ok(simd.run(kernel)));
         Err(kernel)
     }
 }

@@ -18,6 +18,7 @@ mod avx512;
 mod caches;
 #[cfg(target_arch = "x86_64")]
 mod detected;
+mod doubles;
 mod isa;
 #[cfg(any(
     target_arch = "x86_64",
@@ -30,6 +31,7 @@ mod scalar;
 mod tests;
 
 pub use caches::CacheLevel;
+pub use doubles::{Doubles, PlainDoubles};
 pub use isa::{Isa, IsaError};
 pub(crate) use scalar::Scalar;
 
@@ -168,6 +170,9 @@ pub trait Simd: Lanewise {
     /// The lanes of one register, where a vector fills several. Parts that are called treat one piece after the other where they can:
     /// all their variables are then in registers, and pieces without work are left out.
     type Piece: Lanewise;
+    /// Vectors of four f64.
+    type Doubles: Doubles;
+    fn doubles(self) -> Self::Doubles;
     /// Number of pieces. Piece i holds the i-th of as many equal parts of the lanes.
     const PIECES: usize;
     fn piece(self, i: usize) -> Self::Piece;
@@ -377,6 +382,18 @@ macro_rules! one_piece {
     };
 }
 use one_piece;
+
+/// Vectors of four f64 in plain code.
+macro_rules! plain_doubles {
+    () => {
+        type Doubles = $crate::simd::PlainDoubles;
+        #[inline(always)]
+        fn doubles(self) -> Self::Doubles {
+            $crate::simd::PlainDoubles
+        }
+    };
+}
+use plain_doubles;
 
 /// Panics unless the indices of all lanes of the mask are below `len` and below 2^31, because gathers have signed 32-bit indices.
 #[inline(always)]

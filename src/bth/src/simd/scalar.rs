@@ -4,7 +4,7 @@
 //! that are faster only with vectors are not compiled for it ([`Simd::HAS_VECTORS`]): unrolled, they would be the largest part
 //! of the library.
 
-use super::{LANES, Lanewise, Part, Simd, one_piece};
+use super::{LANES, Lanewise, Part, Simd, one_piece, plain_doubles};
 use std::array::from_fn;
 
 /// The token of scalar code, which runs on every machine.
@@ -302,6 +302,7 @@ impl Lanewise for Scalar {
 
 impl Simd for Scalar {
     one_piece!();
+    plain_doubles!();
 
     const HAS_VECTORS: bool = false;
     const INLINES_PARTS: bool = false;

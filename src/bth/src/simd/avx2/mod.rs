@@ -4,9 +4,11 @@
 //! features that they need. The comments at the blocks prove the accesses through pointers.
 #![allow(unsafe_code)]
 
+pub(super) mod doubles;
 mod packing;
 mod rows;
 
+use self::doubles::AvxDoubles;
 use self::packing::{compression, expansion};
 use self::rows::{IN_ORDER, columns8, transpose4, transpose8};
 use super::detected::Detected;
@@ -22,18 +24,26 @@ type U = [__m256i; 2];
 /// All bits of a lane are set, or none.
 type M = [__m256i; 2];
 
+/// Whether this machine has the features.
+static AVX2_FOUND: Detected = Detected::new(|| {
+    is_x86_feature_detected!("avx2")
+        && is_x86_feature_detected!("fma")
+        && is_x86_feature_detected!("bmi1")
+        && is_x86_feature_detected!("bmi2")
+        && is_x86_feature_detected!("lzcnt")
+        && is_x86_feature_detected!("popcnt")
+});
+
 impl Avx2 {
     #[inline]
     pub(super) fn detect() -> Option<Self> {
-        static AVX2_FOUND: Detected = Detected::new(|| {
-            is_x86_feature_detected!("avx2")
-                && is_x86_feature_detected!("fma")
-                && is_x86_feature_detected!("bmi1")
-                && is_x86_feature_detected!("bmi2")
-                && is_x86_feature_detected!("lzcnt")
-                && is_x86_feature_detected!("popcnt")
-        });
         AVX2_FOUND.get().then_some(Avx2(()))
+    }
+
+    /// As [`Self::detect`]; `None` before that was called.
+    #[inline(always)]
+    pub(super) fn found() -> Option<Self> {
+        AVX2_FOUND.is_found().then_some(Avx2(()))
     }
 
     /// Runs a kernel compiled for these features.
@@ -233,6 +243,12 @@ impl Lanewise for Avx2 {
 
 impl Simd for Avx2 {
     one_piece!();
+    type Doubles = AvxDoubles;
+    #[inline(always)]
+    fn doubles(self) -> AvxDoubles {
+        // SAFETY: self proves AVX2.
+        unsafe { AvxDoubles::new() }
+    }
 
     // With two registers for each vector, these parts are long, and calls take no measurable time.
     const INLINES_SHARED_PARTS: bool = false;

@@ -11,6 +11,7 @@ mod transpose;
 use self::rows::{COLUMNS5, ROWS5, columns8, concat_quarters};
 use self::sort::{keys_with_lanes, nearest_of_four, store_far_to_near};
 use self::transpose::{transpose4, transpose16};
+use super::avx2::doubles::AvxDoubles;
 use super::detected::Detected;
 use super::{Kernel, LANES, Lanewise, Part, Simd, assert_indices, one_piece, valid_indices};
 use std::arch::x86_64::*;
@@ -19,23 +20,31 @@ use std::arch::x86_64::*;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Avx512(());
 
+/// Whether this machine has the features.
+static AVX512_FOUND: Detected = Detected::new(|| {
+    is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512bw")
+        && is_x86_feature_detected!("avx512cd")
+        && is_x86_feature_detected!("avx512dq")
+        && is_x86_feature_detected!("avx512vl")
+        && is_x86_feature_detected!("avx2")
+        && is_x86_feature_detected!("fma")
+        && is_x86_feature_detected!("bmi1")
+        && is_x86_feature_detected!("bmi2")
+        && is_x86_feature_detected!("lzcnt")
+        && is_x86_feature_detected!("popcnt")
+});
+
 impl Avx512 {
     #[inline]
     pub(super) fn detect() -> Option<Self> {
-        static AVX512_FOUND: Detected = Detected::new(|| {
-            is_x86_feature_detected!("avx512f")
-                && is_x86_feature_detected!("avx512bw")
-                && is_x86_feature_detected!("avx512cd")
-                && is_x86_feature_detected!("avx512dq")
-                && is_x86_feature_detected!("avx512vl")
-                && is_x86_feature_detected!("avx2")
-                && is_x86_feature_detected!("fma")
-                && is_x86_feature_detected!("bmi1")
-                && is_x86_feature_detected!("bmi2")
-                && is_x86_feature_detected!("lzcnt")
-                && is_x86_feature_detected!("popcnt")
-        });
         AVX512_FOUND.get().then_some(Avx512(()))
+    }
+
+    /// As [`Self::detect`]; `None` before that was called.
+    #[inline(always)]
+    pub(super) fn found() -> Option<Self> {
+        AVX512_FOUND.is_found().then_some(Avx512(()))
     }
 
     /// Runs a kernel compiled for these features.
@@ -156,6 +165,12 @@ impl Lanewise for Avx512 {
 
 impl Simd for Avx512 {
     one_piece!();
+    type Doubles = AvxDoubles;
+    #[inline(always)]
+    fn doubles(self) -> AvxDoubles {
+        // SAFETY: self proves AVX2.
+        unsafe { AvxDoubles::new() }
+    }
 
     intrinsics! {
         lookup(table: __m512, at: __m512i) -> __m512 = _mm512_permutexvar_ps(at, table);

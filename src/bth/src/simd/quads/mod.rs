@@ -15,7 +15,7 @@ pub(super) mod simd128;
 pub(super) mod sse4;
 
 use self::register::Register;
-use super::{LANES, Lanewise, Part, Simd, assert_indices, scalar, valid_indices};
+use super::{LANES, Lanewise, Part, Simd, assert_indices, plain_doubles, scalar, valid_indices};
 
 /// Lanes of a register.
 const QUAD: usize = 4;
@@ -254,6 +254,7 @@ impl<Q: Quad> Lanewise for Quads<Q> {
 
 impl<Q: Quad> Simd for Quads<Q> {
     const INLINES_PARTS: bool = false;
+    plain_doubles!();
     type Piece = Register<Q>;
     const PIECES: usize = QUADS;
 

@@ -13,15 +13,23 @@ use std::arch::x86_64::*;
 #[derive(Clone, Copy, Debug)]
 pub(in crate::simd) struct Sse4(());
 
+/// Whether this machine has the features.
+static SSE4_FOUND: Detected = Detected::new(|| {
+    is_x86_feature_detected!("sse4.1")
+        && is_x86_feature_detected!("ssse3")
+        && is_x86_feature_detected!("popcnt")
+});
+
 impl Sse4 {
     #[inline]
     pub(in crate::simd) fn detect() -> Option<Self> {
-        static SSE4_FOUND: Detected = Detected::new(|| {
-            is_x86_feature_detected!("sse4.1")
-                && is_x86_feature_detected!("ssse3")
-                && is_x86_feature_detected!("popcnt")
-        });
         SSE4_FOUND.get().then_some(Sse4(()))
+    }
+
+    /// As [`Self::detect`]; `None` before that was called.
+    #[inline(always)]
+    pub(in crate::simd) fn found() -> Option<Self> {
+        SSE4_FOUND.is_found().then_some(Sse4(()))
     }
 
     /// Runs a kernel compiled for these features.

@@ -1,0 +1,50 @@
+//! The answer of a single ray whose nearest hit is certain: t, u and v in f64, as [`super::deferred`] computes them for sixteen rays.
+
+use super::candidate::{Candidate, settle};
+use crate::intersect::exact::{reported, reported_barycentric};
+use crate::intersect::exact_quad::rounded_intersection;
+use crate::intersect::filter::TriangleBlock;
+use crate::query::Query;
+use crate::rays::{PrimitiveRef, Ray};
+use crate::simd::Simd;
+use bth_format::layout::NONE;
+use bth_format::object::ObjectView;
+
+/// Stores the answer of a ray of which the filter is sure that its nearest hit is this candidate, within the ray's range. `norm` is
+/// the greatest |component| of its direction, and `instance` is reported with the hit.
+#[inline(always)]
+pub(crate) fn store_certain_hit<S: Simd, Q: Query>(
+    s: S,
+    object: &ObjectView<'_>,
+    ray: &Ray,
+    (candidate, norm): (Candidate, f32),
+    goal: Q::Goal,
+    (answer, instance): (&mut Q::Answer, u32),
+) {
+    if let Some(leaf) = object.node_base().indexed_leaf(candidate.leaf) {
+        let corners = leaf.corners(candidate.triangle as usize);
+        let rounded = rounded_intersection(s.doubles(), (ray.origin, ray.direction), corners, norm);
+        if rounded.is_accurate {
+            let index = leaf.first.wrapping_add(candidate.triangle);
+            let primitive = PrimitiveRef { instance, triangle: object.triangle_ids[index as usize] };
+            let [second, third, _] = rounded.weight;
+            let [u, v] = [second, third].map(|w| reported_barycentric(w * rounded.inverse));
+            *answer = Q::answer_of(primitive, reported(rounded.t), u, v);
+            return;
+        }
+    }
+    *answer = decided_hit::<Q>(object, ray, candidate, (goal, instance));
+}
+
+/// The answer, for leaves of other formats, and where f64 leaves t, u or v inaccurate.
+#[inline(never)]
+fn decided_hit<Q: Query>(
+    object: &ObjectView<'_>,
+    ray: &Ray,
+    candidate: Candidate,
+    (goal, instance): (Q::Goal, u32),
+) -> Q::Answer {
+    let mut query = Q::new(goal, ray);
+    settle(object, ray, candidate, (NONE, 0), &mut query);
+    query.answer(object.triangle_ids, instance)
+}

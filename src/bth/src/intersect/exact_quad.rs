@@ -1,0 +1,97 @@
+//! The arithmetic of [`super::exact`] in vectors of four f64, for one pair of a ray and a triangle: its three vector products are one
+//! operation, and so are its four scalar products.
+
+use crate::intersect::exact::{INVERSE_RATIO_ERROR, RoundedIntersection, WEIGHT_ERROR};
+use crate::simd::Doubles;
+
+/// As [`RoundedIntersection::new`] with the terms of an origin and a triangle, with the same bits.
+#[inline(always)]
+pub(crate) fn rounded_intersection<D: Doubles>(
+    s: D,
+    (origin, direction): ([f32; 3], [f32; 3]),
+    [a, b, c]: [[f32; 3]; 3],
+    norm: f32,
+) -> RoundedIntersection {
+    // By axis, four factors of vector products: the edges to b and c, the offset of a from the origin, and the first edge again.
+    let factor = |k: usize| s.sub(s.widen([b[k], c[k], a[k], b[k]]), s.widen([a[k], a[k], origin[k], a[k]]));
+    let left = [factor(0), factor(1), factor(2)];
+    // The other factors, so that the products are `normal`, `second`, `third` and `normal` again.
+    let right = [s.rotate(left[0]), s.rotate(left[1]), s.rotate(left[2])];
+    let product = |i: usize, j: usize| s.sub(s.mul(left[i], right[j]), s.mul(left[j], right[i]));
+    // Scalar products with the direction, and the last with the offset.
+    let term = |k: usize, product: D::V| s.mul(product, s.with_last(s.widen([direction[k]; 4]), left[k]));
+    let [x, y, z] = [term(0, product(1, 2)), term(1, product(2, 0)), term(2, product(0, 1))];
+    let sum = s.add(s.add(x, y), z);
+    let greatest = s.max(s.max(sum, s.add(s.add(y, z), x)), s.add(s.add(z, x), y));
+    let ([_, second, third, _], [determinant, _, _, volume]) = (s.array(sum), s.array(greatest));
+    let [edge_b, edge_c, distance, _] = s.array(s.max(s.max(s.abs(left[0]), s.abs(left[1])), s.abs(left[2])));
+    let edge = if edge_b > edge_c { edge_b } else { edge_c };
+    let error = [WEIGHT_ERROR * (edge * (edge + distance)), WEIGHT_ERROR * (distance * (edge * edge))];
+    let inverse = 1.0 / determinant;
+    RoundedIntersection {
+        weight: [second, third, determinant],
+        inverse,
+        t: volume * inverse,
+        is_accurate: (INVERSE_RATIO_ERROR * error[1] < volume.abs())
+            & (INVERSE_RATIO_ERROR * error[0] * f64::from(norm) < determinant.abs()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::intersect::exact::{OriginTerms, max_norm, wide};
+    use crate::simd::{Isa, Kernel, Simd};
+    use bth_random::Rng;
+
+    /// The numbers of an intersection on an instruction set, as bits.
+    struct OnIsa([f32; 3], [f32; 3], [[f32; 3]; 3], f32);
+
+    impl Kernel for OnIsa {
+        type Output = [u64; 6];
+        #[inline(always)]
+        fn run<S: Simd>(self, s: S) -> Self::Output {
+            let OnIsa(origin, direction, corners, norm) = self;
+            bits(&rounded_intersection(s.doubles(), (origin, direction), corners, norm))
+        }
+    }
+
+    /// Sign and payload of NaN are unspecified.
+    fn bits(found: &RoundedIntersection) -> [u64; 6] {
+        let [second, third, determinant] = found.weight;
+        let numbers =
+            [second, third, determinant, found.inverse, found.t, f64::from(u8::from(found.is_accurate))];
+        numbers.map(|x| if x.is_nan() { f64::NAN.to_bits() } else { x.to_bits() })
+    }
+
+    #[test]
+    fn all_instruction_sets_give_the_bits_of_plain_code() {
+        let mut rng = Rng::new(11);
+        let mut accurate = 0;
+        let rounds = if cfg!(miri) { 50 } else { 20_000 };
+        for round in 0..rounds {
+            let scale = [1.0, 1e-30, 3e37, 1e-42, 1e12][round % 5];
+            let mut point = |size: f32| {
+                [(); 3].map(|()| (rng.below(1 << 24) as f32 / (1 << 23) as f32 - 1.0) * size * scale)
+            };
+            let (origin, mut direction) = (point(1.0), point(1.0));
+            let mut corners = [point(1.0), point(1.0), point(1.0)];
+            match round / 5 % 4 {
+                // A direction along an axis, a triangle of no area, and an origin at a corner.
+                1 => direction[round % 3] = 0.0,
+                2 => corners[2] = corners[1],
+                3 => corners[round % 3] = origin,
+                _ => {}
+            }
+            let terms = OriginTerms::new(wide(origin), corners.map(wide));
+            let norm = max_norm(wide(direction));
+            let expected = RoundedIntersection::new(&terms, wide(direction), norm);
+            accurate += usize::from(expected.is_accurate);
+            for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+                let found = isa.run(OnIsa(origin, direction, corners, norm as f32));
+                assert_eq!(found, bits(&expected), "{isa} {origin:?} {direction:?} {corners:?}");
+            }
+        }
+        assert!(accurate > rounds / 4, "{accurate} of {rounds}");
+    }
+}

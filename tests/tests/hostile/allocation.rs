@@ -47,7 +47,7 @@ unsafe impl GlobalAlloc for Measuring {
 static ALLOCATOR: Measuring = Measuring;
 
 /// The largest single allocation that some work makes on this thread.
-fn largest(work: impl FnOnce()) -> usize {
+pub(crate) fn largest(work: impl FnOnce()) -> usize {
     LARGEST.set(0);
     work();
     LARGEST.get()

@@ -3,3 +3,4 @@
 
 mod allocation;
 mod shrinking;
+mod tracing_allocates;

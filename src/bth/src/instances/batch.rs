@@ -32,8 +32,14 @@ const MIN_RAYS_PER_INSTANCE: usize = 256;
 trait SceneQuery {
     /// The greatest t of hits that can still change the result of a ray; `None` if its query is complete.
     fn tmax(&self, ray: usize) -> Option<f32>;
-    /// Traces the visits of one object.
-    fn trace(&mut self, batch: &SceneBatch<'_>, object: &ObjectView<'_>, visits: &[Visit]);
+    /// Traces the visits of one object. `object_rays` is memory for their rays in its space.
+    fn trace(
+        &mut self,
+        batch: &SceneBatch<'_>,
+        object: &ObjectView<'_>,
+        visits: &[Visit],
+        object_rays: &mut ObjectRays,
+    );
 }
 
 /// The rays of a chunk. A thread keeps their memory from one batch to the next.
@@ -47,6 +53,8 @@ struct ActiveRays {
     active: Vec<u32>,
     /// The visits to be traced before the rays advance.
     visits: VisitQueue,
+    /// The rays of visits in the space of their object.
+    object_rays: ObjectRays,
     /// The instances that rays do not meet although they start there.
     free_starts: FreeStarts,
 }
@@ -74,7 +82,7 @@ impl Kernel for StartKernel<'_> {
             batch,
             first,
             count,
-            active_rays: ActiveRays { packets, traversals, active, visits, free_starts },
+            active_rays: ActiveRays { packets, traversals, active, visits, free_starts, .. },
         } = self;
         let (world, rays) = (batch.world, &batch.rays[first..first + count]);
         let top = &world.top;
@@ -113,7 +121,7 @@ impl Kernel for AdvanceKernel<'_> {
             batch,
             query,
             first,
-            active_rays: ActiveRays { packets, traversals, active, visits, free_starts },
+            active_rays: ActiveRays { packets, traversals, active, visits, free_starts, .. },
         } = self;
         let world = batch.world;
         let tmax = |index: usize| query.tmax(first + index);
@@ -139,7 +147,7 @@ impl World {
     ) {
         hits.fill(Hit::MISS);
         self.by_hints(objects, (rays, from), false, |from, scratch| {
-            let mut query = SceneNearest { rays, hits, scratch, object_rays: ObjectRays::default() };
+            let mut query = SceneNearest { rays, hits, scratch };
             self.run(objects, rays, from, &mut query);
         });
     }
@@ -154,7 +162,7 @@ impl World {
     ) {
         found.fill(false);
         self.by_hints(objects, (rays, from), true, |from, scratch| {
-            let mut query = SceneAny { rays, found, scratch, object_rays: ObjectRays::default() };
+            let mut query = SceneAny { rays, found, scratch };
             self.run(objects, rays, from, &mut query);
         });
     }
@@ -214,10 +222,10 @@ impl World {
             active_rays.visits.all.clear();
             active_rays.free_starts.find(&batch, first..end);
             isa.run(StartKernel { batch: &batch, first, count: end - first, active_rays: &mut active_rays });
-            self.trace(&batch, query, &mut active_rays.visits);
+            self.trace(&batch, query, &mut active_rays);
             while !active_rays.active.is_empty() || !active_rays.packets.is_empty() {
                 isa.run(AdvanceKernel { batch: &batch, query, first, active_rays: &mut active_rays });
-                self.trace(&batch, query, &mut active_rays.visits);
+                self.trace(&batch, query, &mut active_rays);
             }
         }
         ACTIVE_RAYS.set(active_rays);
@@ -235,11 +243,12 @@ impl World {
     }
 
     /// Traces all queued visits, object by object, and empties the queue.
-    fn trace(&self, batch: &SceneBatch<'_>, query: &mut dyn SceneQuery, visits: &mut VisitQueue) {
+    fn trace(&self, batch: &SceneBatch<'_>, query: &mut dyn SceneQuery, active_rays: &mut ActiveRays) {
+        let ActiveRays { visits, object_rays, .. } = active_rays;
         self.by_object(visits, |object, visits| {
             self.mark_traced(object);
             let object = batch.objects.view(object);
-            query.trace(batch, object, visits);
+            query.trace(batch, object, visits, object_rays);
         });
         visits.all.clear();
     }
@@ -289,14 +298,19 @@ struct SceneNearest<'a> {
     rays: &'a [Ray],
     hits: &'a mut [Hit],
     scratch: &'a mut Scratch,
-    object_rays: ObjectRays,
 }
 
 impl SceneQuery for SceneNearest<'_> {
     fn tmax(&self, ray: usize) -> Option<f32> {
         Some(self.rays[ray].tmax.min(self.hits[ray].t))
     }
-    fn trace(&mut self, batch: &SceneBatch<'_>, object: &ObjectView<'_>, visits: &[Visit]) {
+    fn trace(
+        &mut self,
+        batch: &SceneBatch<'_>,
+        object: &ObjectView<'_>,
+        visits: &[Visit],
+        object_rays: &mut ObjectRays,
+    ) {
         if visits.len() < object::MIN_BATCH {
             for &visit in visits {
                 let i = visit.ray as usize;
@@ -309,9 +323,9 @@ impl SceneQuery for SceneNearest<'_> {
             return;
         }
         let tmax = |ray: usize| batch.rays[ray].tmax.min(self.hits[ray].t);
-        self.object_rays.fill(batch, !object.tet_leaves.is_empty(), visits, tmax);
+        object_rays.fill(batch, !object.tet_leaves.is_empty(), visits, tmax);
         let answers = nearest_answers(self.hits);
-        trace_visits::<NearestQuery>(batch, object, (visits, &self.object_rays), self.scratch, answers);
+        trace_visits::<NearestQuery>(batch, object, (visits, object_rays), self.scratch, answers);
     }
 }
 
@@ -319,14 +333,19 @@ struct SceneAny<'a> {
     rays: &'a [Ray],
     found: &'a mut [bool],
     scratch: &'a mut Scratch,
-    object_rays: ObjectRays,
 }
 
 impl SceneQuery for SceneAny<'_> {
     fn tmax(&self, ray: usize) -> Option<f32> {
         (!self.found[ray]).then(|| self.rays[ray].tmax)
     }
-    fn trace(&mut self, batch: &SceneBatch<'_>, object: &ObjectView<'_>, visits: &[Visit]) {
+    fn trace(
+        &mut self,
+        batch: &SceneBatch<'_>,
+        object: &ObjectView<'_>,
+        visits: &[Visit],
+        object_rays: &mut ObjectRays,
+    ) {
         if visits.len() < object::MIN_BATCH {
             for &visit in visits {
                 let i = visit.ray as usize;
@@ -336,9 +355,9 @@ impl SceneQuery for SceneAny<'_> {
             return;
         }
         let hinted = !object.tet_leaves.is_empty();
-        self.object_rays.fill(batch, hinted, visits, |ray| batch.rays[ray].tmax);
+        object_rays.fill(batch, hinted, visits, |ray| batch.rays[ray].tmax);
         let answers = any_answers(self.found);
-        trace_visits::<AnyQuery>(batch, object, (visits, &self.object_rays), self.scratch, answers);
+        trace_visits::<AnyQuery>(batch, object, (visits, object_rays), self.scratch, answers);
     }
 }
 
@@ -352,7 +371,13 @@ impl SceneQuery for SceneCounted<'_> {
     fn tmax(&self, _: usize) -> Option<f32> {
         Some(self.ray.tmax.min(self.best.t))
     }
-    fn trace(&mut self, batch: &SceneBatch<'_>, object: &ObjectView<'_>, visits: &[Visit]) {
+    fn trace(
+        &mut self,
+        batch: &SceneBatch<'_>,
+        object: &ObjectView<'_>,
+        visits: &[Visit],
+        _: &mut ObjectRays,
+    ) {
         for &visit in visits {
             let object_ray = batch.object_ray(visit, self.ray.tmax.min(self.best.t));
             let from = batch.hint(visit.ray as usize, visit.instance);

@@ -102,10 +102,8 @@ fn traced(
 ) -> (Vec<Hit>, Vec<bool>) {
     let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
     object::with_scratch(|scratch| {
-        let object_rays = ObjectRays::default();
-        world.run(objects, rays, from, &mut SceneNearest { rays, hits: &mut hits, scratch, object_rays });
-        let object_rays = ObjectRays::default();
-        world.run(objects, rays, from, &mut SceneAny { rays, found: &mut found, scratch, object_rays });
+        world.run(objects, rays, from, &mut SceneNearest { rays, hits: &mut hits, scratch });
+        world.run(objects, rays, from, &mut SceneAny { rays, found: &mut found, scratch });
     });
     (hits, found)
 }

@@ -4,7 +4,7 @@
 use super::hints::Hinted;
 use super::scratch::Scratch;
 use super::single;
-use super::strategy::{HintUse, MIN_MEASURED_RAYS, QueryKind, Strategy, size_of};
+use super::strategy::{HintUse, MIN_MEASURED_RAYS, Plan, QueryKind, Strategy, size_of};
 use super::walked_batch::{RAYS_PER_PART, has_subtrees, may_gain_by_walk, sole_tet_leaf, walk};
 use crate::SMALL;
 use crate::bvh::interleaved::{Interleaved, RemainingRays};
@@ -58,11 +58,11 @@ fn choose(
     let hinted = Hinted::chosen();
     let choice = scratch.choices.of(address, kind);
     let measured = rays >= MIN_MEASURED_RAYS && hinted == Hinted::Measured;
-    let strategy = match hinted {
-        Hinted::Bvh => Strategy::Bvh,
-        Hinted::Tets => Strategy::Hinted,
+    let Plan { strategy, measured } = match hinted {
+        Hinted::Bvh => Plan { strategy: Strategy::Bvh, measured },
+        Hinted::Tets => Plan { strategy: Strategy::Hinted, measured },
         Hinted::Measured if measured => choice.next(),
-        Hinted::Measured => choice.best_or(unmeasured),
+        Hinted::Measured => Plan { strategy: choice.best_or(unmeasured), measured },
     };
     (strategy, if measured { clock::now() } else { None })
 }

@@ -4,6 +4,9 @@
 //! the caches and the speed of gathers on the machine: ratios from 0.5 to 1.3 have been measured (docs/notes/tets.md). Answers
 //! have the same bits with either strategy, so the choice can depend on time. The slower strategy is measured again at intervals
 //! that grow while it remains the slower one; in the long run it gets one batch in 256.
+//!
+//! What a ray costs differs more between the parts of a picture than between the strategies. Therefore only batches that follow each
+//! other are compared, and the clock is read for no others.
 
 use crate::rays::Ray;
 use bth_format::object::ObjectView;
@@ -71,23 +74,40 @@ impl HintUse {
 /// Least number of rays of a batch that is measured. Smaller batches take the strategy that is faster by the measurements so far.
 pub(crate) const MIN_MEASURED_RAYS: usize = 256;
 /// Number of batches before the first choice, in which the two strategies alternate.
-const TRIALS: u32 = 8;
-/// Number of these batches, from the first on, that warm the caches and whose times are ignored.
+const TRIALS: u32 = 12;
+/// Number of these batches, from the first on, that warm the caches and are not measured.
 const WARM_UP: u32 = 2;
-/// Number of batches until the slower strategy is measured again, after the first choice or after the other strategy became the
-/// faster.
+/// Least number of batches until the slower strategy is measured again.
 const FIRST_INTERVAL: u32 = 32;
 /// Greatest number of batches until the slower strategy is measured again.
 const LAST_INTERVAL: u32 = 256;
+/// Number of the last comparisons that count.
+const COMPARISONS: usize = 8;
+
+/// How the next batch is traced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Plan {
+    pub(crate) strategy: Strategy,
+    /// Whether its time is to be recorded.
+    pub(crate) measured: bool,
+}
 
 /// The measurements for one kind of rays through one object or scene.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StrategyChoice {
-    /// Seconds per ray of each strategy, in the order of [`Strategy`]; `None` before the first measurement.
-    cost: [Option<f64>; 2],
-    /// Number of batches that were recorded.
+    /// The last costs of [`Strategy::Hinted`] relative to those of [`Strategy::Bvh`], in no order.
+    ratios: [f64; COMPARISONS],
+    /// Number of comparisons so far.
+    comparisons: usize,
+    /// Median of the ratios: the thread may be interrupted in any batch, which spoils two comparisons.
+    ratio: f64,
+    /// The strategy and the seconds per ray of the batch before, if it was measured.
+    last: Option<(Strategy, f64)>,
+    /// Whether the last comparison agrees with the median.
+    is_confirmed: bool,
+    /// Number of batches that were planned.
     batches: u32,
-    /// Number of batches until the slower strategy is measured again.
+    /// Number of batches until the slower strategy is measured again, and one after it.
     remaining: u32,
     /// Number of batches between that measurement and the following one.
     interval: u32,
@@ -95,58 +115,76 @@ pub(crate) struct StrategyChoice {
 
 impl StrategyChoice {
     pub(crate) fn new() -> StrategyChoice {
-        StrategyChoice { cost: [None; 2], batches: 0, remaining: FIRST_INTERVAL, interval: FIRST_INTERVAL }
+        StrategyChoice {
+            ratios: [1.0; COMPARISONS],
+            comparisons: 0,
+            ratio: 1.0,
+            last: None,
+            is_confirmed: true,
+            batches: 0,
+            remaining: FIRST_INTERVAL,
+            interval: FIRST_INTERVAL,
+        }
     }
 
-    /// The strategy that is faster by the measurements so far; [`Strategy::Bvh`] without measurements of both.
+    /// The strategy that is faster by the measurements so far; [`Strategy::Bvh`] without any.
     pub(crate) fn best(&self) -> Strategy {
-        self.best_or(Strategy::Bvh)
+        if self.ratio < 1.0 { Strategy::Hinted } else { Strategy::Bvh }
     }
 
     /// As [`Self::best`], with the strategy for batches that come before there are measurements.
     pub(crate) fn best_or(&self, unmeasured: Strategy) -> Strategy {
-        match self.cost {
-            [Some(bvh), Some(hinted)] if hinted < bvh => Strategy::Hinted,
-            [Some(_), Some(_)] => Strategy::Bvh,
-            _ => unmeasured,
-        }
+        if self.comparisons == 0 { unmeasured } else { self.best() }
     }
 
-    /// The strategy for the next batch.
-    pub(crate) fn next(&mut self) -> Strategy {
-        let best = self.best();
-        if self.batches < TRIALS {
-            return if self.batches.is_multiple_of(2) { Strategy::Bvh } else { Strategy::Hinted };
+    /// The plan for the next batch.
+    pub(crate) fn next(&mut self) -> Plan {
+        let (batch, best) = (self.batches, self.best());
+        self.batches = batch.saturating_add(1);
+        let other = if best == Strategy::Bvh { Strategy::Hinted } else { Strategy::Bvh };
+        let plan = if batch < TRIALS {
+            let strategy = if batch.is_multiple_of(2) { Strategy::Bvh } else { Strategy::Hinted };
+            Plan { strategy, measured: batch >= WARM_UP }
+        } else {
+            // The slower strategy is measured between two batches of the faster one.
+            let plan = match self.remaining {
+                1 => Plan { strategy: other, measured: true },
+                remaining => Plan { strategy: best, measured: remaining <= 2 },
+            };
+            if self.remaining == 0 {
+                let interval = if self.is_confirmed { 2 * self.interval } else { FIRST_INTERVAL };
+                self.interval = interval.clamp(FIRST_INTERVAL, LAST_INTERVAL);
+                self.remaining = self.interval;
+            } else {
+                self.remaining -= 1;
+            }
+            plan
+        };
+        if !plan.measured {
+            self.last = None;
         }
-        if self.remaining > 0 {
-            self.remaining -= 1;
-            return best;
-        }
-        self.remaining = self.interval;
-        if best == Strategy::Bvh { Strategy::Hinted } else { Strategy::Bvh }
+        plan
     }
 
-    /// Records the time of a batch.
+    /// Records the time of a batch whose plan says so.
     pub(crate) fn record(&mut self, strategy: Strategy, seconds_per_ray: f64) {
-        self.batches = self.batches.saturating_add(1);
-        if self.batches <= WARM_UP {
+        let before = self.last.replace((strategy, seconds_per_ray));
+        let Some((_, before)) = before.filter(|(before, _)| *before != strategy) else { return };
+        let ratio = match strategy {
+            Strategy::Hinted => seconds_per_ray / before,
+            Strategy::Bvh => before / seconds_per_ray,
+        };
+        // A clock that stood still tells nothing.
+        if !(ratio > 0.0 && ratio.is_finite()) {
             return;
         }
-        let before = self.best();
-        let cost = &mut self.cost[strategy as usize];
-        // The thread may have been interrupted. Therefore the least of the first measurements counts. A later measurement counts
-        // as at most twice the expected time, and changes that less if it is greater than if it is smaller.
-        *cost = Some(match *cost {
-            None => seconds_per_ray,
-            Some(cost) if self.batches <= TRIALS => cost.min(seconds_per_ray),
-            Some(cost) if seconds_per_ray < cost => (cost + seconds_per_ray) / 2.0,
-            Some(cost) => cost + (seconds_per_ray.min(2.0 * cost) - cost) / 8.0,
-        });
-        if self.batches > TRIALS && self.best() != before {
-            (self.remaining, self.interval) = (FIRST_INTERVAL, FIRST_INTERVAL);
-        } else if strategy != before {
-            self.interval = (self.interval * 2).min(LAST_INTERVAL);
-        }
+        self.ratios[self.comparisons % COMPARISONS] = ratio;
+        self.comparisons = self.comparisons.wrapping_add(1).max(1);
+        let mut sorted = self.ratios;
+        let sorted = &mut sorted[..self.comparisons.min(COMPARISONS)];
+        sorted.sort_unstable_by(f64::total_cmp);
+        self.ratio = 0.5 * (sorted[(sorted.len() - 1) / 2] + sorted[sorted.len() / 2]);
+        self.is_confirmed = (ratio < 1.0) == (self.ratio < 1.0);
     }
 }
 
@@ -188,11 +226,13 @@ mod tests {
     fn tets_taken(choice: &mut StrategyChoice, rng: &mut Rng, batches: u32, cost: [f64; 2]) -> u32 {
         let mut taken = 0;
         for _ in 0..batches {
-            let strategy = choice.next();
+            let Plan { strategy, measured } = choice.next();
             taken += u32::from(strategy == Strategy::Hinted);
             let noise = 0.95 + 0.1 * f64::from(rng.below(1000) as u32) / 1000.0;
             let interruption = if rng.below(20) == 0 { 30.0 } else { 1.0 };
-            choice.record(strategy, cost[strategy as usize] * noise * interruption);
+            if measured {
+                choice.record(strategy, cost[strategy as usize] * noise * interruption);
+            }
         }
         taken
     }
@@ -218,6 +258,21 @@ mod tests {
         assert_eq!(choice.best(), Strategy::Bvh);
         tets_taken(&mut choice, &mut rng, 4000, [100e-9, 50e-9]);
         assert_eq!(choice.best(), Strategy::Hinted);
+    }
+
+    #[test]
+    fn batches_that_cost_four_times_as_much_as_others_do_not_hide_which_strategy_is_faster() {
+        for (cost, least, most) in [([100e-9, 80e-9], 3500, 4000), ([80e-9, 100e-9], 0, 100)] {
+            for seed in 0..20 {
+                let (mut rng, mut choice, mut taken) = (Rng::new(seed), StrategyChoice::new(), 0);
+                // Twenty batches through each part of a picture.
+                for _ in 0..200 {
+                    let part = 1.0 + rng.below(4) as f64;
+                    taken += tets_taken(&mut choice, &mut rng, 20, cost.map(|x| x * part));
+                }
+                assert!((least..=most).contains(&taken), "{cost:?}: hinted take {taken} of 4000");
+            }
+        }
     }
 
     #[test]

@@ -23,26 +23,20 @@ pub(crate) fn trace<Q: Query, C: Count>(
     count: &mut C,
     answer: &mut Q::Answer,
 ) {
-    // Where nothing but the kernel is called, the registers need not be saved a second time.
-    let Some(isa) = Isa::already_chosen() else {
-        return trace_first::<Q, C>((object, goal), ray, from, instance, count, answer);
-    };
     // The kernel is passed by reference, because a copy of fields that were just written would stall.
-    isa.run_found(&mut SingleKernel::<Q, C> { object, goal, ray, from, instance, count, answer });
+    let kernel = &mut SingleKernel::<Q, C> { object, goal, ray, from, instance, count, answer };
+    // Where nothing but the kernel is called, the registers need not be saved a second time.
+    match Isa::already_chosen() {
+        Some(isa) => isa.run_found(kernel),
+        None => run_first(kernel),
+    }
 }
 
-/// As [`trace`], where no instruction set is chosen.
+/// Runs the kernel where no instruction set is chosen.
 #[cold]
 #[inline(never)]
-fn trace_first<Q: Query, C: Count>(
-    (object, goal): (&ObjectView<'_>, Q::Goal),
-    ray: &Ray,
-    from: u32,
-    instance: u32,
-    count: &mut C,
-    answer: &mut Q::Answer,
-) {
-    Isa::chosen().run(&mut SingleKernel::<Q, C> { object, goal, ray, from, instance, count, answer });
+fn run_first<Q: Query, C: Count>(kernel: &mut SingleKernel<'_, Q, C>) {
+    Isa::chosen().run(kernel);
 }
 
 /// The kernel of [`trace`]: all that is done for a ray, so that little is passed through memory.

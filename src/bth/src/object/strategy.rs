@@ -3,7 +3,7 @@
 //! Whether rays that start on a known triangle are faster through tetrahedra or through the BVH depends on the model, the rays,
 //! the caches and the speed of gathers on the machine: ratios from 0.5 to 1.3 have been measured (docs/notes/tets.md). Answers
 //! have the same bits with either strategy, so the choice can depend on time. The slower strategy is measured again at intervals
-//! that grow while it remains the slower one; in the long run it gets one batch in 256.
+//! that grow while it remains the slower one; in the long run it gets one batch in 257.
 //!
 //! What a ray costs differs more between the parts of a picture than between the strategies. Therefore only batches that follow each
 //! other are compared, and the clock is read for no others.
@@ -179,7 +179,7 @@ impl StrategyChoice {
             return;
         }
         self.ratios[self.comparisons % COMPARISONS] = ratio;
-        self.comparisons = self.comparisons.wrapping_add(1).max(1);
+        self.comparisons += 1;
         let mut sorted = self.ratios;
         let sorted = &mut sorted[..self.comparisons.min(COMPARISONS)];
         sorted.sort_unstable_by(f64::total_cmp);

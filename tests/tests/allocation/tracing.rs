@@ -1,7 +1,7 @@
 //! Rays that are traced again allocate nothing: threads that trace at the same time do not meet in the allocator. Batches that walk through
 //! tetrahedra are excepted; they make a few lists for thousands of rays.
 
-use crate::allocation::largest;
+use crate::measure::largest;
 use bth::Isa;
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_tests::rays::{assorted, onward};

@@ -1,4 +1,5 @@
 //! A file that is truncated while it is in use gives an error.
+#![cfg(target_os = "linux")]
 
 use bth::Scene;
 use bth::rays::{Hit, Ray};
@@ -61,7 +62,7 @@ fn truncating_a_mapped_file_ends_the_process_that_traces_it_with_sigbus() {
         std::process::exit(0);
     }
     let (_folder, path) = model();
-    let name = "shrinking::truncating_a_mapped_file_ends_the_process_that_traces_it_with_sigbus";
+    let name = "truncating_a_mapped_file_ends_the_process_that_traces_it_with_sigbus";
     let child = std::process::Command::new(std::env::current_exe().unwrap())
         .args(["--exact", name, "--test-threads", "1"])
         .env(CHILD, &path)

@@ -10,8 +10,8 @@ use super::ray_pool::{POOL_SIZE, RareSteps, RayPool, Slot, has_rare_steps};
 use super::ray_state::RayState;
 use super::stack::{StackPosition, Stacks};
 use crate::intersect::prepare::Prepared;
-use crate::query::Query;
 use crate::query::sink::Sink;
+use crate::query::{EitherQuery, Query};
 use crate::rays::Ray;
 use crate::simd::{CacheLevel, LANES, Simd};
 use bth_format::layout::{Child, NONE, WIDTH, WideNode};
@@ -19,11 +19,11 @@ use bth_format::object::ObjectBounds;
 use bth_format::object::ObjectView;
 
 /// The rays of a batch that are to be traced, with what is known of them.
-pub(crate) struct RemainingRays<'a, Q> {
+pub(crate) struct RemainingRays<'a> {
     /// Indices in the batch of the rays to trace, in this order; all rays if absent.
     pub(crate) order: Option<&'a [u32]>,
     /// Queries of all rays of the batch, if another structure has been traversed before.
-    pub(crate) queries: Option<&'a [Q]>,
+    pub(crate) queries: Option<&'a [EitherQuery]>,
     /// For each ray of the batch the row of the tet leaf whose hits its query already holds, or `NONE`.
     pub(crate) walked: Option<&'a [u32]>,
 }
@@ -32,7 +32,7 @@ pub(crate) struct RemainingRays<'a, Q> {
 pub(crate) struct Interleaved<'a, 's, Q: Query> {
     pub(crate) object: &'a ObjectView<'a>,
     pub(crate) rays: &'a [Ray],
-    pub(crate) remaining: RemainingRays<'a, Q>,
+    pub(crate) remaining: RemainingRays<'a>,
     pub(crate) stacks: &'a mut Stacks,
     pub(crate) sink: &'a mut Sink<'s, Q>,
     /// Whether runs of coherent rays begin at entry nodes. It pays in [large](super::nodes::is_large) objects only.
@@ -42,7 +42,7 @@ pub(crate) struct Interleaved<'a, 's, Q: Query> {
 /// Supplies rays to the pool. Sixteen at a time are prepared and tested against the boxes of the root's children or, if they are
 /// coherent, of their entry node's.
 #[repr(C, align(64))]
-struct RaySource<'a, Q> {
+struct RaySource<'a> {
     prepared: Prepared,
     /// For each lane the depths at which its ray enters the children.
     enter: [[f32; LANES]; LANES],
@@ -59,7 +59,7 @@ struct RaySource<'a, Q> {
     ray: [u32; LANES],
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
-    remaining: RemainingRays<'a, Q>,
+    remaining: RemainingRays<'a>,
     /// Child code at which rays start.
     root: u32,
     bounds: ObjectBounds,
@@ -112,7 +112,7 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
             for i in 0..pool.take_bottom() {
                 if let Some(slot) = pool.finished(i) {
                     deferred.add(s, object, rays, pool.state(slot), sink);
-                    source.start(s, slot, &mut pool);
+                    source.start(s, goal, slot, &mut pool);
                 }
             }
             pool.leaf_steps(s, (object, rays), |row, state, top, stacks| {
@@ -127,10 +127,10 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
     }
 }
 
-impl<Q: Query> RaySource<'_, Q> {
+impl RaySource<'_> {
     /// Starts the next ray that can hit anything in a slot, if there is one.
     #[inline(always)]
-    fn start<S: Simd>(&mut self, s: S, slot: usize, pool: &mut RayPool<'_, Q>) {
+    fn start<S: Simd, Q: Query>(&mut self, s: S, goal: Q::Goal, slot: usize, pool: &mut RayPool<'_, Q>) {
         loop {
             while self.used == self.filled {
                 if !self.refill(s) {
@@ -140,7 +140,7 @@ impl<Q: Query> RaySource<'_, Q> {
             let lane = usize::from(self.lane[self.used]) % LANES;
             self.used += 1;
             let index = self.ray[lane];
-            let query = self.remaining.queries.map(|queries| queries[index as usize]);
+            let query = self.remaining.queries.map(|queries| walked::<Q>(goal, &queries[index as usize]));
             let prepared = self.prepared.prepared(lane);
             let state = pool.state(slot);
             if let Some(prepared) = prepared {
@@ -225,6 +225,13 @@ impl<Q: Query> RaySource<'_, Q> {
             self.entered = self.taken + ENTRY_RAYS;
         }
     }
+}
+
+/// The query of a ray that has been walked before.
+#[cold]
+#[inline(never)]
+fn walked<Q: Query>(goal: Q::Goal, query: &EitherQuery) -> Q {
+    Q::from_either(goal, query)
 }
 
 /// Whether the rays from `taken` on in an order are as many as have an entry node in common, and those of the batch from `first` on.

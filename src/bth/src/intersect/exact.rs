@@ -83,7 +83,7 @@ fn lesser(a: f64, b: f64) -> f64 {
 
 /// The greater of two numbers; see [`lesser`].
 #[inline(always)]
-fn greater(a: f64, b: f64) -> f64 {
+pub(crate) fn greater(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
@@ -193,31 +193,68 @@ impl RoundedIntersection {
     }
 }
 
+/// A line and a triangle in f64: its intersection with the triangle's plane, and on which sides of the edges it passes.
+struct Sides {
+    rounded: RoundedIntersection,
+    /// Weights of the three corners.
+    weight: [f64; 3],
+    /// Bounds of the errors of `weight` and of the volume.
+    error: [f64; 2],
+    /// The line certainly crosses the triangle, or certainly misses it.
+    is_inside: bool,
+    is_outside: bool,
+}
+
+impl Sides {
+    /// There are no branches, so that the compiler can vectorize a loop of it.
+    #[inline(always)]
+    fn new(origin: [f64; 3], direction: [f64; 3], corners: [[f64; 3]; 3]) -> Sides {
+        let (terms, error) = OriginTerms::with_errors(origin, corners);
+        let norm = max_norm(direction);
+        let rounded = RoundedIntersection::new(&terms, direction, norm);
+        let [second, third, determinant] = rounded.weight;
+        let first = determinant - second - third;
+        let least = lesser(lesser(first, second), third);
+        let greatest = greater(greater(first, second), third);
+        let bound = error[0] * norm;
+        Sides {
+            rounded,
+            weight: [first, second, third],
+            error: [bound, error[1]],
+            is_inside: (least > bound) | (greatest < -bound),
+            is_outside: (least < -bound) & (greatest > bound),
+        }
+    }
+}
+
 /// Decides in f64 whether a line crosses a triangle and computes t, u and v, or returns [`Estimate::Open`] where the error bounds
 /// do not allow it.
 #[inline(always)]
 pub(crate) fn estimate(origin: [f64; 3], direction: [f64; 3], corners: [[f64; 3]; 3]) -> Estimate {
-    let (terms, error) = OriginTerms::with_errors(origin, corners);
-    let norm = max_norm(direction);
-    let rounded = RoundedIntersection::new(&terms, direction, norm);
-    let [second, third, determinant] = rounded.weight;
-    let first = determinant - second - third;
-    let least = lesser(lesser(first, second), third);
-    let greatest = greater(greater(first, second), third);
-    let bound = error[0] * norm;
-    if least < -bound && greatest > bound {
+    let Sides { rounded, weight, error, is_inside, is_outside } = Sides::new(origin, direction, corners);
+    if is_outside {
         return Estimate::Missed;
     }
-    let inside = least > bound || greatest < -bound;
-    if inside && rounded.is_accurate {
+    if is_inside && rounded.is_accurate {
         return Estimate::Intersects(rounded.intersection());
     }
-    let t = if inside {
-        t_range(rounded.t, determinant, [bound, error[1]])
+    let t = if is_inside {
+        t_range(rounded.t, rounded.weight[2], error)
     } else {
         [f64::NEG_INFINITY, f64::INFINITY]
     };
-    Estimate::Open(UncertainWeights { rounded, weight: [first, second, third], bound }, t)
+    Estimate::Open(UncertainWeights { rounded, weight, bound: error[0] }, t)
+}
+
+/// The intersection of a line and a triangle, and whether it is that of [`Estimate::Intersects`]; else it means nothing.
+#[inline(always)]
+pub(crate) fn certain_intersection(
+    origin: [f64; 3],
+    direction: [f64; 3],
+    corners: [[f64; 3]; 3],
+) -> (Intersection, bool) {
+    let Sides { rounded, is_inside, .. } = Sides::new(origin, direction, corners);
+    (rounded.intersection(), is_inside & rounded.is_accurate)
 }
 
 /// Bounds of the t at which a line crosses a triangle, given t in f64, the determinant W, whose sign is certain, and bounds of

@@ -1,7 +1,8 @@
 //! The arithmetic of [`super::exact`] in f64 for sixteen pairs of a ray and a triangle that the f32 filter is sure the ray hits.
 
 use crate::intersect::exact::{
-    OriginTerms, RoundedIntersection, max_norm, reported, reported_barycentric, wide,
+    Intersection, OriginTerms, RoundedIntersection, certain_intersection, max_norm, reported,
+    reported_barycentric, wide,
 };
 use crate::simd::{LANES, Simd};
 
@@ -160,5 +161,49 @@ impl Intersections {
     fn set_masks<S: Simd>(&mut self, s: S, lanes: u32, accurate: &[u32; LANES]) {
         self.certain = s.mask_bits(s.lt_u(s.splat_u(0), s.load_u(accurate))) & lanes;
         self.open = lanes & !self.certain;
+    }
+}
+
+/// What [`super::exact::estimate`] decides of sixteen pairs.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Estimates {
+    /// By lane: t, then the weights of [`Intersection`].
+    rows: [[f64; LANES]; 4],
+    /// Bits of the lanes whose line certainly crosses the triangle, with accurate t, u and v.
+    pub(crate) certain: u32,
+}
+
+impl Estimates {
+    /// The estimates of all lanes.
+    #[inline(always)]
+    pub(crate) fn new<S: Simd>(s: S, pairs: &Pairs) -> Estimates {
+        let Pairs { origin, direction, corner } = pairs;
+        let (mut rows, mut certain) = ([[0.0; LANES]; 4], [0; LANES]);
+        // There are no branches in this loop, so that the compiler vectorizes it.
+        for i in 0..LANES {
+            let corners = [lane(&corner[0], i), lane(&corner[1], i), lane(&corner[2], i)];
+            let (Intersection { t, weight }, is_certain) =
+                certain_intersection(lane(origin, i), lane(direction, i), corners);
+            certain[i] = u32::from(is_certain);
+            rows[0][i] = t;
+            (rows[1][i], rows[2][i], rows[3][i]) = (weight[0], weight[1], weight[2]);
+        }
+        Estimates { rows, certain: s.mask_bits(s.lt_u(s.splat_u(0), s.load_u(&certain))) }
+    }
+
+    /// The intersection of a lane that is certain.
+    pub(crate) fn intersection(&self, lane: usize) -> Intersection {
+        let [t, u, v, determinant] = [0, 1, 2, 3].map(|row: usize| self.rows[row][lane]);
+        Intersection { t, weight: [u, v, determinant] }
+    }
+
+    /// Bits of the lanes whose line passes against the triangle's normal.
+    #[inline(always)]
+    pub(crate) fn against_normal(&self) -> u32 {
+        let mut bits = 0;
+        for i in 0..LANES {
+            bits |= u32::from(self.rows[3][i] < 0.0) << i;
+        }
+        bits
     }
 }

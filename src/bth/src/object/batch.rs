@@ -141,7 +141,7 @@ pub(crate) fn trace_batch<Q: Query>(
 }
 
 /// Traces rays with the hints `from` if they are given or the object is a single tet leaf, else in packets and through the BVH.
-fn trace_with<Q: Query>(
+pub(super) fn trace_with<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     from: Option<&[u32]>,
@@ -176,22 +176,24 @@ fn trace_hinted<Q: Query>(
 ) {
     // For coherent rays packets are the fastest, with hints or without.
     let packet_rays = in_packets(object, rays, scratch, sink);
-    let order: Vec<u32> = match packet_rays {
-        0 => (0..rays.len() as u32).collect(),
-        _ => scratch.packets.rest.clone(),
-    };
+    let mut walks = std::mem::take(&mut scratch.walks);
+    walks.rest.clear();
+    match packet_rays {
+        0 => walks.rest.extend(0..rays.len() as u32),
+        _ => walks.rest.extend_from_slice(&scratch.packets.rest),
+    }
     let goal = sink.goal();
-    let walks = walk(object, rays, from, order, EitherGoal { is_any: goal.is_any() });
-    for ray in walks.done {
+    walk(object, rays, from, EitherGoal { is_any: goal.is_any() }, &mut walks);
+    for &ray in &walks.done {
         let ray = ray as usize;
         sink.query(ray, &Q::from_either(goal, &walks.queries[ray]));
     }
     if !walks.rest.is_empty() {
-        let queries: Vec<_> = walks.queries.iter().map(|query| Q::from_either(goal, query)).collect();
         let (order, walked) = (Some(&walks.rest[..]), Some(&walks.walked[..]));
-        let remaining = RemainingRays { order, queries: Some(&queries), walked };
+        let remaining = RemainingRays { order, queries: Some(&walks.queries), walked };
         through_bvh(object, rays, remaining, scratch, sink);
     }
+    scratch.walks = walks;
 }
 
 /// Traces coherent rays in packets and returns their number. If it is not 0, the indices of the other rays are stored in
@@ -218,7 +220,7 @@ fn in_packets<Q: Query>(
 pub(super) fn through_bvh<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
-    remaining: RemainingRays<'_, Q>,
+    remaining: RemainingRays<'_>,
     scratch: &mut Scratch,
     sink: &mut Sink<'_, Q>,
 ) {
@@ -241,7 +243,7 @@ pub(super) fn through_bvh<Q: Query>(
 fn one_by_one<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
-    remaining: &RemainingRays<'_, Q>,
+    remaining: &RemainingRays<'_>,
     sink: &mut Sink<'_, Q>,
 ) {
     // Without vectors no walk is compiled, so no ray has been walked before.
@@ -261,7 +263,7 @@ fn one_by_one<Q: Query>(
 struct InterleavedKernel<'a, 's, Q: Query> {
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
-    remaining: RemainingRays<'a, Q>,
+    remaining: RemainingRays<'a>,
     scratch: &'a mut Scratch,
     sink: &'a mut Sink<'s, Q>,
 }

@@ -1,9 +1,10 @@
 //! Tracing of one object by batches of rays that may start on known triangles: what the hints are used for, and what is traced then.
 
-use super::batch::{address_of, by_hint, through_bvh, trace_batch};
+use super::batch::{address_of, by_hint, through_bvh, trace_batch, trace_with};
 use super::hints::Hinted;
 use super::scratch::Scratch;
 use super::strategy::{HintUse, QueryKind, Strategy, size_of};
+use super::walked_batch::{has_subtrees, may_gain_by_walks};
 use crate::SMALL;
 use crate::bvh::interleaved::RemainingRays;
 use crate::free;
@@ -58,12 +59,30 @@ fn trace_from<Q: Query>(
     let Some(from) = from.filter(|_| !SMALL && (has_tets || free::is_known(object))) else {
         return trace(None, scratch, answers);
     };
-    if !free::is_known(object) {
-        return with_hints(from, instance, scratch, |hints, scratch| trace(Some(hints), scratch, answers));
-    }
     let is_any = answers.goal().is_any();
+    let kind = QueryKind::of(is_any, rays, size_of(object));
+    if !free::is_known(object) {
+        if !may_walk(object, kind, from, instance) {
+            return trace(None, scratch, answers);
+        }
+        let walk = |scratch: &mut Scratch, mut answers: AnswersOf<'_, Q>| {
+            with_hints(from, instance, scratch, |hints, scratch| {
+                let answers = Q::Goal::reborrow(&mut answers);
+                let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
+                trace_with(object, rays, Some(hints), scratch, &mut sink);
+            });
+        };
+        if !has_subtrees(object) {
+            return walk(scratch, answers);
+        }
+        let key = (address_of(object), HintUse::Tets.kind(kind));
+        return by_hint(key, rays.len(), Strategy::Bvh, scratch, |strategy, scratch| match strategy {
+            Strategy::Bvh => trace(None, scratch, answers),
+            Strategy::Hinted => walk(scratch, answers),
+        });
+    }
     // Small batches come before measurements: then the look-up decides by how many of the first rays end.
-    let key = (address_of(object), HintUse::Free.kind(QueryKind::of(is_any, rays, size_of(object))));
+    let key = (address_of(object), HintUse::Free.kind(kind));
     by_hint(key, rays.len(), Strategy::Hinted, scratch, |strategy, scratch| {
         if strategy == Strategy::Bvh && !has_tets {
             return trace(None, scratch, answers);
@@ -85,6 +104,14 @@ fn trace_from<Q: Query>(
             scratch.rest = rest;
         });
     });
+}
+
+/// Whether a batch may be faster if its rays walk through tetrahedra: by the kind of its rays, and by whether those that are sampled
+/// start on the instance.
+fn may_walk(object: &ObjectView<'_>, kind: QueryKind, from: &[PrimitiveRef], instance: u32) -> bool {
+    const SAMPLES: usize = 8;
+    let starts = (0..SAMPLES).filter_map(|sample| from.get(sample * from.len() / SAMPLES));
+    may_gain_by_walks(object, kind) && starts.into_iter().any(|from| from.triangle_of(instance) != NONE)
 }
 
 /// Calls `work` with the triangle of an instance on which each ray starts, or `NONE`.

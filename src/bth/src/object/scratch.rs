@@ -1,6 +1,7 @@
 //! Scratch memory of a thread, which is reused from one batch to the next.
 
 use super::strategy::StrategyTable;
+use super::walked_batch::WalkScratch;
 use crate::bvh::packet::PacketScratch;
 use crate::bvh::stack::Stacks;
 use crate::rays::Ray;
@@ -18,6 +19,7 @@ pub(crate) struct Scratch {
     pub(crate) rest: Vec<u32>,
     /// Copies of these rays, where they are traced like a batch of their own.
     pub(super) gathered: Vec<Ray>,
+    pub(super) walks: WalkScratch,
 }
 
 /// The first scratch memory of a thread.

@@ -1,67 +1,83 @@
 //! Walks of the rays of a batch through tetrahedra, before those that remain go through the BVH. They are compiled once for all queries.
 
-use super::strategy::{is_short, size_of};
+use super::strategy::{QueryKind, is_short, size_of};
 use crate::query::{EitherGoal, EitherQuery, Goal, Query};
 use crate::rays::Ray;
 use crate::simd::Isa;
-use crate::tets::batch::{WalkBatch, WalkRays};
+use crate::tets::batch::WalkBatch;
 use crate::tets::leaf_of_face;
 use crate::tets::records::LaneRecords;
-use crate::tets::walks::WalkState;
+use crate::tets::walks::{WalkLists, WalkRays, WalkState};
 use bth_format::layout::{Child, NONE};
 use bth_format::object::ObjectView;
 
 /// Greatest number of rays that walk through tetrahedra together. It is large, because lanes are idle at the end of each part.
 pub(super) const RAYS_PER_PART: usize = 2048;
 
-/// The rays of a batch after their walks. All but `done` and `rest` have one element per ray.
-pub(super) struct WalkedRays {
-    /// What is known of each ray.
-    pub(super) queries: Vec<EitherQuery>,
+/// The rays of a batch after their walks, and memory of the walks, which is reused from one batch to the next. Lists with one element
+/// per ray say so.
+#[derive(Debug, Default)]
+pub(super) struct WalkScratch {
+    /// Indices of the rays that are to be walked, then of those that go through the BVH.
+    pub(super) rest: Vec<u32>,
     /// Indices of the rays whose query is complete.
     pub(super) done: Vec<u32>,
-    /// Indices of the rays that go through the BVH.
-    pub(super) rest: Vec<u32>,
-    /// The tet leaf whose hits the query of a ray already holds, or `NONE`.
+    /// What is known of each ray.
+    pub(super) queries: Vec<EitherQuery>,
+    /// For each ray the tet leaf whose hits its query already holds, or `NONE`.
     pub(super) walked: Vec<u32>,
+    /// For each ray the constrained face on which it starts, or `NONE`.
+    faces: Vec<u32>,
+    /// For each ray the state of its walk.
+    states: Vec<WalkState>,
+    lists: WalkLists,
 }
 
-/// Walks the rays with the indices `order`, at most [`RAYS_PER_PART`], some of which start on known triangles, or all of which enter
-/// the same tet leaf.
+/// The elements of a list, as many as there are rays, all with one value.
+fn filled<T: Clone>(list: &mut Vec<T>, rays: usize, value: T) -> &mut [T] {
+    list.clear();
+    list.resize(rays, value);
+    list
+}
+
+/// Walks those of at most [`RAYS_PER_PART`] rays whose indices are in `scratch.rest`: some of them start on known triangles, or all
+/// enter the same tet leaf.
 #[inline(never)]
 pub(super) fn walk(
     object: &ObjectView<'_>,
     rays: &[Ray],
     from: Option<&[u32]>,
-    mut order: Vec<u32>,
     goal: EitherGoal,
-) -> WalkedRays {
-    let mut faces = vec![NONE; rays.len()];
+    scratch: &mut WalkScratch,
+) {
+    let WalkScratch { rest, done, queries, walked, faces, states, lists } = scratch;
     let face_of = |ray: usize| {
         let triangle = from.map_or(NONE, |from| from[ray]);
         object.triangle_faces.get(triangle as usize).copied().unwrap_or(NONE)
     };
-    for &ray in &order {
+    let faces = filled(faces, rays.len(), NONE);
+    for &ray in &*rest {
         if may_gain_by_walk(object, &rays[ray as usize], goal) {
             faces[ray as usize] = face_of(ray as usize);
         }
     }
-    let mut queries: Vec<_> = rays.iter().map(|ray| EitherQuery::new(goal, ray)).collect();
-    let mut walks = vec![WalkState::NotWalked; rays.len()];
-    walk_tets(object, rays, &faces, &mut queries, &mut walks);
+    queries.clear();
+    queries.extend(rays.iter().map(|ray| EitherQuery::new(goal, ray)));
+    let states = filled(states, rays.len(), WalkState::NotWalked);
+    walk_tets(object, rays, faces, queries, states, lists);
     let is_whole_object = matches!(Child::from_code(object.header.root), Some(Child::Tets(_)));
-    let (mut done, mut walked) = (Vec::new(), vec![NONE; rays.len()]);
-    order.retain(|&index| {
+    let walked = filled(walked, rays.len(), NONE);
+    done.clear();
+    rest.retain(|&index| {
         let ray = index as usize;
-        let is_done = walks[ray] == WalkState::Done || walks[ray] == WalkState::Left && is_whole_object;
+        let is_done = states[ray] == WalkState::Done || states[ray] == WalkState::Left && is_whole_object;
         if is_done {
             done.push(index);
-        } else if walks[ray] == WalkState::Left {
+        } else if states[ray] == WalkState::Left {
             walked[ray] = leaf_of_face(object, faces[ray]);
         }
         !is_done
     });
-    WalkedRays { queries, done, rest: order, walked }
 }
 
 /// Whether the triangles of tet leaves are also in a BVH.
@@ -77,40 +93,37 @@ pub(super) fn sole_tet_leaf(object: &ObjectView<'_>) -> u32 {
     }
 }
 
-/// Whether a ray that starts on a known triangle may be faster through tetrahedra than through the BVH, if there is one.
+/// Whether rays of a kind that start on known triangles may be faster through tetrahedra than through the BVH, if there is one.
 ///
 /// By measurement (docs/notes/tets.md), long any-hit rays and all rays in scalar code are not, and with 128 bits no walk is compiled;
 /// for other rays [`super::strategy`] chooses by measured time. No answer depends on this.
-pub(super) fn may_gain_by_walk(object: &ObjectView<'_>, ray: &Ray, goal: impl Goal) -> bool {
-    if !has_subtrees(object) {
-        return true;
-    }
-    if !Isa::chosen().walks_tets() {
-        return false;
-    }
-    if !goal.is_any() {
-        return true;
-    }
-    is_short(ray, size_of(object))
+pub(super) fn may_gain_by_walks(object: &ObjectView<'_>, kind: QueryKind) -> bool {
+    !has_subtrees(object) || Isa::chosen().walks_tets() && (!kind.any || kind.short)
 }
 
-/// Walks the rays through tetrahedra: those that have a face in `faces`, or all if a tet leaf is the whole object. `walks`
+/// As [`may_gain_by_walks`], of one ray.
+pub(super) fn may_gain_by_walk(object: &ObjectView<'_>, ray: &Ray, goal: impl Goal) -> bool {
+    let any = goal.is_any();
+    may_gain_by_walks(object, QueryKind { any, short: any && is_short(ray, size_of(object)) })
+}
+
+/// Walks the rays through tetrahedra: those that have a face in `faces`, or all if a tet leaf is the whole object. `states`
 /// receives the state of each ray's walk. All slices have one element per ray.
 fn walk_tets(
     object: &ObjectView<'_>,
     rays: &[Ray],
     faces: &[u32],
     queries: &mut [EitherQuery],
-    walks: &mut [WalkState],
+    states: &mut [WalkState],
+    lists: &mut WalkLists,
 ) {
     let sole_leaf = sole_tet_leaf(object);
     let has_walks = sole_leaf != NONE || faces.iter().any(|&face| face != NONE);
     let records = LaneRecords::new(object.records).filter(|_| has_walks && WalkBatch::fits(object));
     if let Some(records) = records {
-        let leaves = vec![sole_leaf; rays.len()];
-        let mut batch =
-            WalkBatch::new(object, records, WalkRays { rays, faces, leaves: &leaves }, queries, walks);
-        // Where no walks are compiled, no ray is walked here, and `walks` stays `NotWalked`: rays are faster through the BVH.
+        let rays = WalkRays { rays, faces, sole_leaf };
+        let mut batch = WalkBatch::new(object, records, rays, queries, states, lists);
+        // Where no walks are compiled, no ray is walked here, and `states` stay `NotWalked`: rays are faster through the BVH.
         let _ = Isa::chosen().run_long_vectors(&mut batch);
     }
 }

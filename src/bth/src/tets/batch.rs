@@ -6,21 +6,13 @@
 use super::queue::PreparedQueue;
 use super::records::LaneRecords;
 use super::starts::Fill;
-use super::walks::{WalkState, Walks};
+use super::walks::{WalkLists, WalkRays, WalkState, Walks};
 use crate::query::{EitherQuery, Goal, Query};
-use crate::rays::Ray;
 use crate::simd::Simd;
 use bth_format::object::ObjectView;
 
 /// When this many faces have been reached, they are tested together in f64.
 const PENDING: usize = 64;
-
-/// The rays of a batch and where their walks begin, as in the fields of [`WalkBatch`].
-pub(crate) struct WalkRays<'a> {
-    pub(crate) rays: &'a [Ray],
-    pub(crate) faces: &'a [u32],
-    pub(crate) leaves: &'a [u32],
-}
 
 /// A batch of rays that walk through tetrahedra, with their queries.
 pub(crate) struct WalkBatch<'a> {
@@ -34,25 +26,13 @@ impl<'a> WalkBatch<'a> {
     pub(crate) fn new(
         object: &'a ObjectView<'a>,
         records: LaneRecords<'a>,
-        WalkRays { rays, faces, leaves }: WalkRays<'a>,
+        rays: WalkRays<'a>,
         queries: &'a mut [EitherQuery],
         states: &'a mut [WalkState],
+        lists: &'a mut WalkLists,
     ) -> Self {
-        states.fill(WalkState::NotWalked);
-        let walks = Walks {
-            object,
-            records,
-            rays,
-            faces,
-            leaves,
-            keeps_depths: queries.first().is_some_and(|query| query.goal().is_any()),
-            states,
-            next: 0,
-            starts: Vec::new(),
-            reached: Vec::new(),
-            returns: vec![0; rays.len()],
-            without_lanes: Vec::new(),
-        };
+        let keeps_depths = queries.first().is_some_and(|query| query.goal().is_any());
+        let walks = Walks::new(object, records, rays, keeps_depths, states, lists);
         WalkBatch { walks, queries }
     }
 
@@ -68,7 +48,7 @@ impl<'a> WalkBatch<'a> {
     #[inline(always)]
     pub(super) fn fill<S: Simd>(&mut self, s: S, queue: &mut PreparedQueue) {
         if self.walks.reached.len() >= PENDING {
-            self.test_reached_faces();
+            self.test_reached_faces(s);
         }
         loop {
             s.call(Fill { walks: &mut self.walks, queue });
@@ -77,7 +57,7 @@ impl<'a> WalkBatch<'a> {
                 return;
             }
             // Behind the faces that are tested, walks may go on.
-            self.test_reached_faces();
+            self.test_reached_faces(s);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The decisions that the f32 lanes of a batch of tet walks leave open, made in f64 for one ray at a time.
 //!
-//! There are three: the exact test of a constrained face that a line crosses; the step of a line that passes close to an edge,
+//! There are three: the exact test of a constrained face that a line crosses, where [`super::reached`] does not decide it; the step of a line that passes close to an edge,
 //! after which the ray returns to the lanes; and the flood, where a sign is uncertain in f64, too. Therefore the answers have the
 //! same bits as those of walks of single rays.
 
@@ -27,7 +27,7 @@ impl Walks<'_> {
 
     /// The walker for the tet leaf through which a ray walks.
     pub(super) fn walker<'b>(&'b self, ray: u32, line: &'b Line) -> TetWalker<'b> {
-        let leaf = match (self.object.tet_leaves, self.leaves[ray as usize]) {
+        let leaf = match (self.object.tet_leaves, self.sole_leaf) {
             ([_], _) => 0,
             (_, NONE) => leaf_of_face(self.object, self.faces[ray as usize]),
             (_, leaf) => leaf,
@@ -46,7 +46,7 @@ impl WalkBatch<'_> {
     /// Walks the rays that cannot be walked in lanes.
     #[inline(never)]
     pub(super) fn walk_without_lanes(&mut self) {
-        for (ray, position) in std::mem::take(&mut self.walks.without_lanes) {
+        while let Some((ray, position)) = self.walks.without_lanes.pop() {
             match position {
                 Some(position) => self.walk_in_f64(ray, position),
                 None => self.flood(ray),
@@ -77,13 +77,16 @@ impl WalkBatch<'_> {
     }
 
     /// Returns a ray to the lanes, or walks it to its end if it has returned too often.
-    fn return_to_lanes(&mut self, ray: u32, position: TetPosition) {
-        let returns = &mut self.walks.returns[ray as usize];
+    pub(super) fn return_to_lanes(&mut self, start: WalkStart) {
+        let returns = &mut self.walks.returns[start.ray as usize];
         *returns += 1;
         if *returns > MAX_RETURNS {
-            self.walk_in_f64(ray, position);
+            let WalkStart { ray, tet, entered } = start;
+            let line = self.walks.line(ray);
+            let corner = entered.face.map(|v| self.walks.walker(ray, &line).project(v));
+            self.walk_in_f64(ray, TetPosition { tet, entered, corner });
         } else {
-            self.walks.starts.push(WalkStart { ray, tet: position.tet, entered: position.entered });
+            self.walks.starts.push(start);
         }
     }
 
@@ -105,15 +108,16 @@ impl WalkBatch<'_> {
         match walker.beyond(position.tet, link, position.entered.face) {
             None => self.walks.finish(ray, WalkOutcome::Left),
             Some((tet, apex, behind)) => {
-                (position.tet, position.entered.apex, position.entered.behind) = (tet, apex, behind);
-                self.return_to_lanes(ray, position);
+                let entered = Entered { apex, behind, ..position.entered };
+                self.return_to_lanes(WalkStart { ray, tet, entered });
             }
         }
     }
 
     /// Tests exactly a constrained face that the line of a ray certainly crosses, and ends the walk or returns the ray to the
     /// lanes in the tetrahedron behind the face.
-    fn test_face(&mut self, Reached { ray, face }: Reached) {
+    #[inline(never)]
+    pub(super) fn test_face(&mut self, Reached { ray, face }: Reached) {
         let line = self.walks.line(ray);
         let walker = self.walks.walker(ray, &line);
         let constrained: &TetFace = &self.walks.object.tet_faces[face as usize];
@@ -138,19 +142,8 @@ impl WalkBatch<'_> {
         match (done, left) {
             (true, _) => self.walks.finish(ray, WalkOutcome::Done),
             (_, true) => self.walks.finish(ray, WalkOutcome::Left),
-            _ => self.return_to_lanes(ray, position),
+            _ => self.return_to_lanes(WalkStart { ray, tet: position.tet, entered }),
         }
-    }
-
-    /// Tests the faces in `reached`.
-    pub(super) fn test_reached_faces(&mut self) {
-        let mut reached = std::mem::take(&mut self.walks.reached);
-        for face in reached.drain(..) {
-            self.test_face(face);
-        }
-        // Faces that were added to `self.walks.reached` during the tests are kept.
-        reached.append(&mut self.walks.reached);
-        self.walks.reached = reached;
     }
 
     /// Evaluates a lane that has stopped. `start` holds its words, with `tet` as described at `word::TET`; `depth` holds the

@@ -11,13 +11,14 @@ use super::walk::{TetWalker, WalkOutcome};
 use crate::intersect::line::{Projected, Sign};
 use crate::query::{Count, EitherQuery, Query};
 use bth_format::layout::{FACE_BIT, NONE, TetFace};
+use smallvec::SmallVec;
 use std::collections::BTreeSet;
 
 /// The tetrahedra that a flood has visited, or the faces. Around most vertices these are about ten, around the center of a fan as
 /// many as the leaf holds.
 pub(crate) struct VisitedSet {
     /// The elements that were inserted first. An array needs no allocation.
-    first: [u32; 48],
+    first: [u32; VisitedSet::FIRST],
     /// Number of elements of `first` that are set.
     len: usize,
     /// The elements that were inserted after `first` was full.
@@ -25,8 +26,11 @@ pub(crate) struct VisitedSet {
 }
 
 impl VisitedSet {
+    /// More than lines visit in most models, few enough to be searched one by one.
+    const FIRST: usize = 256;
+
     pub(crate) fn new() -> Self {
-        VisitedSet { first: [0; 48], len: 0, rest: BTreeSet::new() }
+        VisitedSet { first: [0; VisitedSet::FIRST], len: 0, rest: BTreeSet::new() }
     }
 
     /// Adds an element; returns false if it was already in the set.
@@ -83,7 +87,7 @@ impl TetWalker<'_> {
     pub(crate) fn flood_faces<C: Count>(&self, receiver: &mut dyn FaceReceiver, count: &mut C) -> bool {
         count.flood();
         let mut visited = VisitedSet::new();
-        let mut stack: Vec<(u32, Entered)> = Vec::new();
+        let mut stack = SmallVec::<[(u32, Entered); 64]>::new();
         for face in self.hull {
             if self.touches(&face.vertex.map(|v| self.project(v))) && visited.insert(face.tet) {
                 stack.push((face.tet, Entered { face: face.vertex, apex: face.opposite, behind: NONE }));

@@ -5,10 +5,12 @@
 
 pub(crate) mod batch;
 pub(crate) mod decide;
+mod exit_lanes;
 pub(crate) mod flood;
 pub(crate) mod lanes;
 pub(crate) mod locate;
 pub(crate) mod queue;
+mod reached;
 pub(crate) mod records;
 pub(crate) mod rounds;
 mod starts;

@@ -180,7 +180,7 @@ pub(super) struct PreparedWalks<S: Simd> {
 impl<S: Simd> PreparedWalks<S> {
     /// Computes the constants of projection of the rays with indices `ray` in `rays`.
     #[inline(always)]
-    fn of_rays(s: S, m: S::M, rays: &[Ray], ray: S::U) -> Self {
+    pub(super) fn of_rays(s: S, m: S::M, rays: &[Ray], ray: S::U) -> Self {
         s.call(OfRays(m, rays, ray))
     }
 

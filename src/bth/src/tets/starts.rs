@@ -59,12 +59,8 @@ impl Walks<'_> {
         let representable = s.mask_bits(prepared.representable);
         queue.push(s, representable, &prepared.lanes);
         let mut rest = valid & !representable;
-        if rest == 0 {
-            return self.starts.truncate(first);
-        }
-        let starts = self.starts.split_off(first);
         while rest != 0 {
-            let start = starts[rest.trailing_zeros() as usize];
+            let start = self.starts[first + rest.trailing_zeros() as usize];
             rest &= rest - 1;
             let line = self.line(start.ray);
             let corner =
@@ -72,6 +68,7 @@ impl Walks<'_> {
             let position = TetPosition { tet: start.tet, entered: start.entered, corner };
             self.without_lanes.push((start.ray, Some(position)));
         }
+        self.starts.truncate(first);
     }
 
     /// Prepares the next sixteen rays of the batch, or the last ones. Starts that f32 does not decide are located in f64.
@@ -87,9 +84,8 @@ impl Walks<'_> {
         let mut rest = (1u32 << part.len()) - 1;
         let ray = s.load_u(&std::array::from_fn(|i| (first + i) as u32));
         if s.mask_bits(valid) == 0 {
-            let leaf = self.leaves[first];
-            if leaf != NONE && self.leaves[first..][..part.len()].iter().all(|&l| l == leaf) {
-                rest = self.fill_from_outside(s, queue, s.mask(rest), ray, leaf);
+            if self.sole_leaf != NONE {
+                rest = self.fill_from_outside(s, queue, s.mask(rest), ray);
             }
             return self.locate_all(first as u32, rest);
         }
@@ -102,17 +98,10 @@ impl Walks<'_> {
         self.locate_all(first as u32, rest);
     }
 
-    /// Prepares rays that all enter the same tet leaf from outside. Returns the bits of the rays that f32 does not decide.
+    /// Prepares rays that enter the sole tet leaf from outside. Returns the bits of the rays that f32 does not decide.
     #[inline(always)]
-    fn fill_from_outside<S: Simd>(
-        &mut self,
-        s: S,
-        queue: &mut PreparedQueue,
-        m: S::M,
-        ray: S::U,
-        leaf: u32,
-    ) -> u32 {
-        let leaf = &self.object.tet_leaves[leaf as usize];
+    fn fill_from_outside<S: Simd>(&mut self, s: S, queue: &mut PreparedQueue, m: S::M, ray: S::U) -> u32 {
+        let leaf = &self.object.tet_leaves[self.sole_leaf as usize];
         let hull = &self.object.hull_faces[leaf.first_hull as usize..][..leaf.hulls as usize];
         let (prepared, entered, missed) =
             PreparedWalks::from_hull(s, m, self.rays, vertices(self.object), hull, ray);
@@ -133,7 +122,7 @@ impl Walks<'_> {
         while bits != 0 {
             let ray = first + bits.trailing_zeros();
             bits &= bits - 1;
-            if (self.faces[ray as usize] & self.leaves[ray as usize]) != NONE {
+            if (self.faces[ray as usize] & self.sole_leaf) != NONE {
                 self.locate(ray);
             }
         }
@@ -150,7 +139,7 @@ impl Walks<'_> {
         let located = if face != NONE && object_ray.tmin >= 0.0 { walker.locate(face) } else { None };
         let position = match located {
             Some(position) => Ok(position),
-            None if self.leaves[ray as usize] == NONE => return,
+            None if self.sole_leaf == NONE => return,
             None => walker.enter_hull(),
         };
         match position {

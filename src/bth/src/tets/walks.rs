@@ -6,6 +6,13 @@ use crate::rays::Ray;
 use bth_format::object::ObjectView;
 use zerocopy::{FromBytes, IntoBytes};
 
+/// The rays of a batch and where their walks begin, as in the fields of [`Walks`].
+pub(crate) struct WalkRays<'a> {
+    pub(crate) rays: &'a [Ray],
+    pub(crate) faces: &'a [u32],
+    pub(crate) sole_leaf: u32,
+}
+
 /// State of a ray's walk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum WalkState {
@@ -36,6 +43,15 @@ pub(super) struct Reached {
     pub(super) face: u32,
 }
 
+/// Memory of the walks of a batch, which is reused from one batch to the next.
+#[derive(Debug, Default)]
+pub(crate) struct WalkLists {
+    starts: Vec<WalkStart>,
+    reached: Vec<Reached>,
+    returns: Vec<u8>,
+    without_lanes: Vec<(u32, Option<TetPosition>)>,
+}
+
 /// The walks of a batch of rays, but for the queries. All slices have one element per ray.
 pub(super) struct Walks<'a> {
     pub(super) object: &'a ObjectView<'a>,
@@ -44,8 +60,8 @@ pub(super) struct Walks<'a> {
     pub(super) rays: &'a [Ray],
     /// For each ray the constrained face near which it starts, or `NONE`.
     pub(super) faces: &'a [u32],
-    /// For each ray the tet leaf that it enters from outside if it does not start near a face, or `NONE`.
-    pub(super) leaves: &'a [u32],
+    /// The tet leaf that rays enter from outside if they do not start near a face, or `NONE`.
+    pub(super) sole_leaf: u32,
     /// Whether the walks keep track of depths: they can end any-hit queries, whose rays are often short.
     pub(super) keeps_depths: bool,
     /// For each ray the state of its walk.
@@ -53,13 +69,47 @@ pub(super) struct Walks<'a> {
     /// Index of the first ray that is not yet prepared.
     pub(super) next: usize,
     /// Located starts of walks, and walks that return to the lanes, which are not yet prepared.
-    pub(super) starts: Vec<WalkStart>,
+    pub(super) starts: &'a mut Vec<WalkStart>,
     /// Faces that lanes have reached and that are not yet tested.
-    pub(super) reached: Vec<Reached>,
+    pub(super) reached: &'a mut Vec<Reached>,
     /// For each ray the number of times that it has returned to the lanes.
-    pub(super) returns: Vec<u8>,
+    pub(super) returns: &'a mut [u8],
     /// Rays whose walks are to be made without lanes: from a position, or where that is uncertain as a flood.
-    pub(super) without_lanes: Vec<(u32, Option<TetPosition>)>,
+    pub(super) without_lanes: &'a mut Vec<(u32, Option<TetPosition>)>,
+}
+
+impl<'a> Walks<'a> {
+    /// Walks none of which has begun. All slices have one element per ray.
+    pub(super) fn new(
+        object: &'a ObjectView<'a>,
+        records: LaneRecords<'a>,
+        WalkRays { rays, faces, sole_leaf }: WalkRays<'a>,
+        keeps_depths: bool,
+        states: &'a mut [WalkState],
+        WalkLists { starts, reached, returns, without_lanes }: &'a mut WalkLists,
+    ) -> Self {
+        states.fill(WalkState::NotWalked);
+        returns.clear();
+        returns.resize(rays.len(), 0);
+        // Anything may be left after a panic.
+        starts.clear();
+        reached.clear();
+        without_lanes.clear();
+        Walks {
+            object,
+            records,
+            rays,
+            faces,
+            sole_leaf,
+            keeps_depths,
+            states,
+            next: 0,
+            starts,
+            reached,
+            returns,
+            without_lanes,
+        }
+    }
 }
 
 /// The object's tet vertices as rows of four words: x, y, z and an unused word.

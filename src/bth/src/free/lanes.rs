@@ -29,49 +29,73 @@ impl Kernel for FreeKernel<'_, '_> {
     fn run<S: Simd>(self, s: S) {
         let FreeKernel { object, rays, from, range, rest } = self;
         let reach = object.free_reach.first().map_or(0.0, |row| row.reach);
-        let mut block = Block::new();
-        let mut first = range.start;
+        // What is stored lane by lane and loaded at once waits until the stores are done, so sixteen rays are fetched before the sixteen
+        // before them are decided.
+        let mut starts = [Starts::NONE; 2];
+        let mut index = [0; LANES];
         rest.reserve(range.len() + LANES);
-        let hints = &from[..range.end];
-        prefetch_rows(s, object, hints, first);
-        prefetch_rows(s, object, hints, first + LANES);
-        prefetch_leaves(s, object, hints, first);
-        while let Some(chunk) = rays[first..range.end].first_chunk() {
-            prefetch_rows(s, object, hints, first + 2 * LANES);
-            prefetch_leaves(s, object, hints, first + LANES);
-            let fields = load_rays(s, chunk);
-            let free = block.free_lanes(s, object, &fields, &from[first..][..LANES], reach);
+        let (blocks, _) = from[range.clone()].as_chunks::<LANES>();
+        let block = |i: usize| Hints::new(s, blocks.get(i).unwrap_or(&[NONE; LANES]));
+        let mut ahead = [block(0), block(1)];
+        ahead[0].prefetch_rows(s, object);
+        ahead[1].prefetch_rows(s, object);
+        ahead[0].prefetch_leaves(s, object);
+        for i in 0..=blocks.len() {
+            let next = block(i + 2);
+            next.prefetch_rows(s, object);
+            ahead[1].prefetch_leaves(s, object);
+            starts[i % 2].fetch(object, &ahead[0]);
+            ahead = [ahead[1], next];
+            let Some(before) = i.checked_sub(1) else { continue };
+            let first = range.start + before * LANES;
+            let Some(chunk) = rays[first..].first_chunk() else { break };
+            let free = starts[before % 2].free_lanes(s, &load_rays(s, chunk), reach);
             for lane in 0..LANES {
-                block.index[lane] = (first + lane) as u32;
+                index[lane] = (first + lane) as u32;
             }
             let mut left = [0; LANES];
-            let count = s.compress(!free & 0xffff, s.load_u(&block.index), &mut left);
+            let count = s.compress(!free & 0xffff, s.load_u(&index), &mut left);
             rest.extend_from_slice(&left[..count]);
-            first += LANES;
         }
-        rest.extend(first as u32..range.end as u32);
+        rest.extend((range.start + blocks.len() * LANES) as u32..range.end as u32);
     }
 }
 
-/// Prefetches the rows of sixteen triangles.
-#[inline(always)]
-fn prefetch_rows<S: Simd>(s: S, object: &ObjectView<'_>, from: &[u32], first: usize) {
-    for &triangle in from[first.min(from.len())..].iter().take(LANES) {
-        s.prefetch(object.free.as_ptr().wrapping_add(triangle as usize));
-    }
+/// The triangles on which sixteen rays start.
+#[derive(Clone, Copy)]
+struct Hints<'a> {
+    triangle: &'a [u32; LANES],
+    /// Bits of the rays that start on another triangle than the one before. Neighbouring rays often start on the same one.
+    new: u32,
 }
 
-/// Prefetches the leaves in which sixteen triangles lie, whose rows are there. Those on a grid, and what is beyond the lines of an
-/// indexed leaf, are not.
-#[inline(always)]
-fn prefetch_leaves<S: Simd>(s: S, object: &ObjectView<'_>, from: &[u32], first: usize) {
-    let mut last = NONE;
-    for &triangle in from[first.min(from.len())..].iter().take(LANES) {
-        let Some(row) = object.free.get(triangle as usize) else { continue };
-        let line = row.place >> 4 & FreePlace::INDEX_LIMIT;
-        if line != last {
-            last = line;
-            let leaf = object.lines.as_ptr().wrapping_add(line as usize);
+impl<'a> Hints<'a> {
+    #[inline(always)]
+    fn new<S: Simd>(s: S, triangle: &'a [u32; LANES]) -> Self {
+        static BEFORE: [u32; LANES] = [0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14];
+        let of = s.load_u(triangle);
+        let same = s.mask_bits(s.eq_u(of, s.lookup_u(of, s.load_u(&BEFORE))));
+        Hints { triangle, new: !same & 0xffff | 1 }
+    }
+
+    /// Prefetches the rows of the triangles.
+    #[inline(always)]
+    fn prefetch_rows<S: Simd>(&self, s: S, object: &ObjectView<'_>) {
+        for &triangle in self.triangle {
+            s.prefetch(object.free.as_ptr().wrapping_add(triangle as usize));
+        }
+    }
+
+    /// Prefetches the leaves in which the triangles lie, whose rows are there. Those on a grid, and what is beyond the lines of an
+    /// indexed leaf, are not.
+    #[inline(always)]
+    fn prefetch_leaves<S: Simd>(&self, s: S, object: &ObjectView<'_>) {
+        let mut new = self.new;
+        while new != 0 {
+            let lane = new.trailing_zeros() as usize % LANES;
+            new &= new - 1;
+            let Some(row) = object.free.get(self.triangle[lane] as usize) else { continue };
+            let leaf = object.lines.as_ptr().wrapping_add((row.place >> 4 & FreePlace::INDEX_LIMIT) as usize);
             for k in 0..4 {
                 s.prefetch(leaf.wrapping_add(k));
             }
@@ -79,14 +103,18 @@ fn prefetch_leaves<S: Simd>(s: S, object: &ObjectView<'_>, from: &[u32], first: 
     }
 }
 
-/// What is looked up for sixteen rays.
+/// What the file knows of the triangles on which sixteen rays start.
+#[derive(Clone, Copy)]
 #[repr(C, align(64))]
-struct Block {
-    /// The bins of the directions.
-    bins: [u32; LANES],
-    /// Corners of the triangles, by corner and axis. Lanes whose triangle is not looked up hold any numbers.
+struct Starts {
+    /// For each ray the column of its triangle: the first ray that starts there.
+    column: [u32; LANES],
+    /// Whether all rays have columns of their own.
+    is_expanded: bool,
+    /// Corners of the triangles, by corner and axis. Triangles of which nothing is known have no area.
     corners: [[[f32; LANES]; 3]; 3],
-    index: [u32; LANES],
+    /// The words of their bins.
+    bins: [[u32; LANES]; 4],
 }
 
 /// What follows from the triangles of the rays of a piece.
@@ -100,58 +128,119 @@ struct Crossings<S: Lanewise> {
     bins: S::U,
 }
 
-impl Block {
-    fn new() -> Self {
-        Block { bins: [0; LANES], corners: [[[0.0; LANES]; 3]; 3], index: [0; LANES] }
+/// 2^i for lane i.
+static POWERS: [u32; LANES] = [
+    1,
+    1 << 1,
+    1 << 2,
+    1 << 3,
+    1 << 4,
+    1 << 5,
+    1 << 6,
+    1 << 7,
+    1 << 8,
+    1 << 9,
+    1 << 10,
+    1 << 11,
+    1 << 12,
+    1 << 13,
+    1 << 14,
+    1 << 15,
+];
+
+impl Starts {
+    const NONE: Starts = Starts {
+        column: [0; LANES],
+        is_expanded: false,
+        corners: [[[0.0; LANES]; 3]; 3],
+        bins: [[0; LANES]; 4],
+    };
+
+    /// Reads the triangles.
+    #[inline(always)]
+    fn fetch(&mut self, object: &ObjectView<'_>, hints: &Hints<'_>) {
+        let mut new = hints.new;
+        self.is_expanded = new == 0xffff;
+        while new != 0 {
+            let lane = new.trailing_zeros() as usize % LANES;
+            new &= new - 1;
+            self.set(object, hints.triangle[lane], lane);
+        }
+        let mut column = 0;
+        for lane in 0..LANES as u32 {
+            column = if hints.new >> lane & 1 != 0 { lane } else { column };
+            self.column[lane as usize] = column;
+        }
     }
 
-    /// Bits of the rays that certainly meet nothing, given the floats of the rays and the triangles on which they start.
     #[inline(always)]
-    fn free_lanes<S: Simd>(
-        &mut self,
-        s: S,
-        object: &ObjectView<'_>,
-        fields: &[S::F; 8],
-        from: &[u32],
-        reach: f32,
-    ) -> u32 {
-        let rows = object.free;
-        let mut known = 0;
-        for lane in 0..LANES {
-            // A triangle that does not exist has no row, nor has NONE.
-            let Some(corners) = rows.get(from[lane] as usize).and_then(|row| corners_at(object, row.place))
-            else {
-                continue;
-            };
-            known |= 1 << lane;
-            for corner in 0..3 {
-                for axis in 0..3 {
-                    self.corners[corner][axis][lane] = corners[corner][axis];
-                }
+    fn set(&mut self, object: &ObjectView<'_>, triangle: u32, column: usize) {
+        // A triangle that does not exist has no row, nor has NONE.
+        let known = match object.free.get(triangle as usize) {
+            Some(row) => corners_at(object, row.place).map(|corners| (row, corners)),
+            None => None,
+        };
+        let (bins, corners) = match known {
+            Some((row, corners)) => (row.bins, corners),
+            None => ([0; 4], [[0.0; 3]; 3]),
+        };
+        for corner in 0..3 {
+            for axis in 0..3 {
+                self.corners[corner][axis][column] = corners[corner][axis];
             }
         }
-        if known == 0 {
-            return 0;
+        for word in 0..4 {
+            self.bins[word][column] = bins[word];
         }
+    }
+
+    /// Copies each triangle to the lanes of its rays.
+    #[inline(always)]
+    fn expand<S: Simd>(&mut self, s: S) {
+        if self.is_expanded {
+            return;
+        }
+        let column = s.load_u(&self.column);
+        for corner in &mut self.corners {
+            for row in corner {
+                s.store(s.lookup(s.load(row), column), row);
+            }
+        }
+        for row in &mut self.bins {
+            s.store_u(s.lookup_u(s.load_u(row), column), row);
+        }
+    }
+
+    /// Bits of the rays that certainly meet nothing, given the floats of the rays.
+    #[inline(always)]
+    fn free_lanes<S: Simd>(&mut self, s: S, fields: &[S::F; 8], reach: f32) -> u32 {
+        self.expand(s);
         let (mut to_front, mut to_back, mut start) = (0, 0, s.splat(0.0));
+        let mut bins = [0; LANES];
         for i in 0..S::PIECES {
             let p = s.piece(i);
             let crossings = self.crossings(p, fields.map(|field| S::pick(p, &field)));
             to_front |= crossings.front;
             to_back |= crossings.back;
             S::put(p, &mut start, crossings.start);
-            p.store_u(crossings.bins, &mut self.bins);
+            p.store_u(crossings.bins, &mut bins);
         }
-        let (mut free, mut back, mut near) = (0, 0, 0);
-        for lane in 0..LANES {
-            let row = &rows[if known >> lane & 1 == 1 { from[lane] as usize } else { 0 }];
-            let bin = self.bins[lane];
-            free |= (row.bins[bin as usize / 32 % 4] >> (bin % 32) & 1) << lane;
-            back |= (row.bins[3] >> 30 & 1) << lane;
-            near |= (row.bins[3] >> 31) << lane;
+        let bin = s.load_u(&bins);
+        let mut words = [s.splat_u(0); 4];
+        for word in 0..4 {
+            words[word] = s.load_u(&self.bins[word]);
         }
-        free &= known & (to_front & !back | to_back & back);
-        near &= free;
+        let mut word = words[3];
+        for k in [2, 1, 0] {
+            word = s.select_u(s.lt_u(bin, s.splat_u(32 * (k + 1))), words[k as usize], word);
+        }
+        let power = s.lookup_u(s.load_u(&POWERS), bin);
+        let in_lower_half = s.eq_u(s.and_u(bin, s.splat_u(16)), s.splat_u(0));
+        let bit = s.select_u(in_lower_half, power, s.shl_u::<16>(power));
+        let back = lanes_with(s, words[3], 1 << 30);
+        let blocked = s.mask_bits(s.eq_u(s.and_u(word, bit), s.splat_u(0)));
+        let mut free = !blocked & (to_front & !back | to_back & back);
+        let near = lanes_with(s, words[3], 1 << 31) & free;
         if near != 0 {
             free &= !near | self.ends_within(s, fields, start, reach);
         }
@@ -237,6 +326,12 @@ fn cross<S: Lanewise>(s: S, a: [S::F; 3], b: [S::F; 3]) -> [S::F; 3] {
         s.fnma(a[0], b[2], s.mul(a[2], b[0])),
         s.fnma(a[1], b[0], s.mul(a[0], b[1])),
     ]
+}
+
+/// Bits of the lanes whose word has a bit in common with `bits`.
+#[inline(always)]
+fn lanes_with<S: Simd>(s: S, word: S::U, bits: u32) -> u32 {
+    !s.mask_bits(s.eq_u(s.and_u(word, s.splat_u(bits)), s.splat_u(0))) & 0xffff
 }
 
 /// The bins of directions ([`bth_format::layout::free_bin`]), or [`FREE_BINS`], whose bit is never set.

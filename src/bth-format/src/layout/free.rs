@@ -153,7 +153,8 @@ pub struct FreePlace {
 impl FreePlace {
     /// Leaf indices are below this.
     pub const INDEX_LIMIT: u32 = (1 << 27) - 1;
-    const RAW: u32 = 1 << 31;
+    /// Bit of a code that is set for raw leaves.
+    pub const RAW: u32 = 1 << 31;
 
     /// The number that encodes it; [`NONE`] for leaves whose index does not fit and what is no triangle leaf.
     pub fn code(self) -> u32 {

@@ -4,8 +4,8 @@ use super::corners_at;
 use crate::intersect::prepare::load_rays;
 use crate::rays::Ray;
 use crate::simd::{Kernel, LANES, Lanewise, Simd};
-use bth_format::layout::{FREE_BINS, FREE_BORDERS, FREE_SIDE, FREE_STEEPEST, FreePlace, NONE};
-use bth_format::object::ObjectView;
+use bth_format::layout::{Child, FREE_BINS, FREE_BORDERS, FREE_SIDE, FREE_STEEPEST, FreePlace, NONE};
+use bth_format::object::{NodeBase, ObjectView};
 use std::ops::Range;
 
 /// Directions are looked up whose greatest component in absolute value is between these, so that no product underflows or overflows.
@@ -159,12 +159,12 @@ impl Starts {
     /// Reads the triangles.
     #[inline(always)]
     fn fetch(&mut self, object: &ObjectView<'_>, hints: &Hints<'_>) {
-        let mut new = hints.new;
+        let (mut new, base) = (hints.new, object.node_base());
         self.is_expanded = new == 0xffff;
         while new != 0 {
             let lane = new.trailing_zeros() as usize % LANES;
             new &= new - 1;
-            self.set(object, hints.triangle[lane], lane);
+            self.set(object, base, hints.triangle[lane], lane);
         }
         let mut column = 0;
         for lane in 0..LANES as u32 {
@@ -174,23 +174,39 @@ impl Starts {
     }
 
     #[inline(always)]
-    fn set(&mut self, object: &ObjectView<'_>, triangle: u32, column: usize) {
+    fn set(&mut self, object: &ObjectView<'_>, base: NodeBase<'_>, triangle: u32, column: usize) {
         // A triangle that does not exist has no row, nor has NONE.
-        let known = match object.free.get(triangle as usize) {
-            Some(row) => corners_at(object, row.place).map(|corners| (row, corners)),
-            None => None,
+        let Some(row) = object.free.get(triangle as usize) else {
+            return self.set_corners([[0.0; 3]; 3], column);
         };
-        let (bins, corners) = match known {
-            Some((row, corners)) => (row.bins, corners),
-            None => ([0; 4], [[0.0; 3]; 3]),
+        for word in 0..4 {
+            self.bins[word][column] = row.bins[word];
+        }
+        // Most triangles lie in indexed leaves of f32.
+        let leaf = if row.place & FreePlace::RAW == 0 {
+            base.indexed_leaf(Child::LEAF_BIT | row.place >> 4)
+        } else {
+            None
         };
+        let Some(leaf) = leaf else {
+            return self.set_corners(corners_at(object, row.place).unwrap_or_default(), column);
+        };
+        let slot = row.place as usize % LANES;
+        for corner in 0..3 {
+            let vertex = usize::from(leaf.corner[corner][slot]) % LANES;
+            for axis in 0..3 {
+                self.corners[corner][axis][column] = leaf.vertex[axis][vertex];
+            }
+        }
+    }
+
+    /// Sets the corners of a triangle. Nothing is known of one that has no area.
+    #[inline(never)]
+    fn set_corners(&mut self, corners: [[f32; 3]; 3], column: usize) {
         for corner in 0..3 {
             for axis in 0..3 {
                 self.corners[corner][axis][column] = corners[corner][axis];
             }
-        }
-        for word in 0..4 {
-            self.bins[word][column] = bins[word];
         }
     }
 

@@ -4,12 +4,16 @@ use super::corners_at;
 use crate::intersect::prepare::load_rays;
 use crate::rays::Ray;
 use crate::simd::{Kernel, LANES, Lanewise, Simd};
-use bth_format::layout::{Child, FREE_BINS, FREE_BORDERS, FREE_SIDE, FREE_STEEPEST, FreePlace, NONE};
+use bth_format::layout::{
+    CacheLine, Child, FREE_BINS, FREE_BORDERS, FREE_SIDE, FREE_STEEPEST, FreePlace, NONE,
+};
 use bth_format::object::{NodeBase, ObjectView};
 use std::ops::Range;
 
 /// Directions are looked up whose greatest component in absolute value is between these, so that no product underflows or overflows.
 pub(super) const DIRECTIONS: [f32; 2] = [1.0 / (1 << 20) as f32, (1 << 20) as f32];
+/// Rays in a cache line.
+const RAYS_PER_LINE: usize = size_of::<CacheLine>() / size_of::<Ray>();
 /// Unit of rounding.
 const U: f32 = f32::EPSILON / 2.0;
 
@@ -44,6 +48,9 @@ impl Kernel for FreeKernel<'_, '_> {
             let next = block(i + 2);
             next.prefetch_rows(s, object);
             ahead[1].prefetch_leaves(s, object);
+            for line in 0..LANES / RAYS_PER_LINE {
+                s.prefetch(rays.as_ptr().wrapping_add(range.start + (i + 1) * LANES + line * RAYS_PER_LINE));
+            }
             starts[i % 2].fetch(object, &ahead[0]);
             ahead = [ahead[1], next];
             let Some(before) = i.checked_sub(1) else { continue };

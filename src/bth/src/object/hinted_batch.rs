@@ -11,6 +11,7 @@ use crate::free;
 use crate::query::sink::Sink;
 use crate::query::{Answers, AnswersOf, AnyQuery, Goal, NearestQuery, Query, any_answers, nearest_answers};
 use crate::rays::{Hit, PrimitiveRef, Ray};
+use crate::simd::{Isa, Kernel, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 
@@ -130,9 +131,28 @@ fn with_hints(
 #[inline(never)]
 fn take_hints(from: &[PrimitiveRef], instance: u32, scratch: &mut Scratch) -> Vec<u32> {
     let mut hints = std::mem::take(&mut scratch.hints);
-    hints.clear();
-    hints.extend(from.iter().map(|from| from.triangle_of(instance)));
+    hints.resize(from.len(), NONE);
+    Isa::chosen().run(TrianglesOf { from, instance, hints: &mut hints });
     hints
+}
+
+/// Sets hints to the triangles of an instance on which rays start, or `NONE`.
+struct TrianglesOf<'a> {
+    from: &'a [PrimitiveRef],
+    instance: u32,
+    hints: &'a mut [u32],
+}
+
+impl Kernel for TrianglesOf<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let TrianglesOf { from, instance, hints } = self;
+        // The compiler vectorizes this loop.
+        for (hint, from) in hints.iter_mut().zip(from) {
+            *hint = from.triangle_of(instance);
+        }
+    }
 }
 
 /// Stores the answers of those of the rays `rest`, by their ascending indices, that hit anything, from a copy of these rays. All answers

@@ -11,8 +11,10 @@
 //!
 //! Only batches look directions up: for a single ray that takes as long as tracing it (docs/notes/free-directions.md).
 
+mod crossings;
 mod lanes;
 mod single;
+mod starts;
 
 use single::certainly_misses;
 

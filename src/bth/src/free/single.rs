@@ -1,7 +1,7 @@
 //! The decision about one ray, in f64.
 
 use super::corners_at;
-use super::lanes::DIRECTIONS;
+use super::crossings::DIRECTIONS;
 use crate::rays::Ray;
 use bth_format::layout::{free_axes, free_bin};
 use bth_format::object::ObjectView;

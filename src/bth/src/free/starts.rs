@@ -1,0 +1,142 @@
+//! The triangles on which sixteen rays start: what must be read of them, without waiting for it.
+
+use super::corners_at;
+use crate::simd::{LANES, Simd};
+use bth_format::layout::{Child, FreePlace};
+use bth_format::object::{NodeBase, ObjectView};
+
+/// The triangles on which sixteen rays start.
+#[derive(Clone, Copy)]
+pub(super) struct Hints<'a> {
+    triangle: &'a [u32; LANES],
+    /// Bits of the rays that start on another triangle than the one before. Neighbouring rays often start on the same one.
+    new: u32,
+}
+
+impl<'a> Hints<'a> {
+    #[inline(always)]
+    pub(super) fn new<S: Simd>(s: S, triangle: &'a [u32; LANES]) -> Self {
+        static BEFORE: [u32; LANES] = [0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14];
+        let of = s.load_u(triangle);
+        let same = s.mask_bits(s.eq_u(of, s.lookup_u(of, s.load_u(&BEFORE))));
+        Hints { triangle, new: !same & 0xffff | 1 }
+    }
+
+    /// Prefetches the rows of the triangles.
+    #[inline(always)]
+    pub(super) fn prefetch_rows<S: Simd>(&self, s: S, object: &ObjectView<'_>) {
+        for &triangle in self.triangle {
+            s.prefetch(object.free.as_ptr().wrapping_add(triangle as usize));
+        }
+    }
+
+    /// Prefetches the leaves in which the triangles lie, whose rows are there. Those on a grid, and what is beyond the lines of an
+    /// indexed leaf, are not.
+    #[inline(always)]
+    pub(super) fn prefetch_leaves<S: Simd>(&self, s: S, object: &ObjectView<'_>) {
+        let mut new = self.new;
+        while new != 0 {
+            let lane = new.trailing_zeros() as usize % LANES;
+            new &= new - 1;
+            let Some(row) = object.free.get(self.triangle[lane] as usize) else { continue };
+            let leaf = object.lines.as_ptr().wrapping_add((row.place >> 4 & FreePlace::INDEX_LIMIT) as usize);
+            for k in 0..4 {
+                s.prefetch(leaf.wrapping_add(k));
+            }
+        }
+    }
+}
+
+/// What the file knows of the triangles on which sixteen rays start.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+pub(super) struct Starts {
+    /// For each ray the column of its triangle: the first ray that starts there.
+    column: [u32; LANES],
+    /// Whether all rays have columns of their own.
+    is_expanded: bool,
+    /// Corners of the triangles, by corner and axis. Triangles of which nothing is known have no area.
+    pub(super) corners: [[[f32; LANES]; 3]; 3],
+    /// The words of their bins.
+    pub(super) bins: [[u32; LANES]; 4],
+}
+
+impl Starts {
+    pub(super) const NONE: Starts = Starts {
+        column: [0; LANES],
+        is_expanded: false,
+        corners: [[[0.0; LANES]; 3]; 3],
+        bins: [[0; LANES]; 4],
+    };
+
+    /// Reads the triangles.
+    #[inline(always)]
+    pub(super) fn fetch(&mut self, object: &ObjectView<'_>, hints: &Hints<'_>) {
+        let (mut new, base) = (hints.new, object.node_base());
+        self.is_expanded = new == 0xffff;
+        while new != 0 {
+            let lane = new.trailing_zeros() as usize % LANES;
+            new &= new - 1;
+            self.set(object, base, hints.triangle[lane], lane);
+        }
+        let mut column = 0;
+        for lane in 0..LANES as u32 {
+            column = if hints.new >> lane & 1 != 0 { lane } else { column };
+            self.column[lane as usize] = column;
+        }
+    }
+
+    #[inline(always)]
+    fn set(&mut self, object: &ObjectView<'_>, base: NodeBase<'_>, triangle: u32, column: usize) {
+        // A triangle that does not exist has no row, nor has NONE.
+        let Some(row) = object.free.get(triangle as usize) else {
+            return self.set_corners([[0.0; 3]; 3], column);
+        };
+        for word in 0..4 {
+            self.bins[word][column] = row.bins[word];
+        }
+        // Most triangles lie in indexed leaves of f32.
+        let leaf = if row.place & FreePlace::RAW == 0 {
+            base.indexed_leaf(Child::LEAF_BIT | row.place >> 4)
+        } else {
+            None
+        };
+        let Some(leaf) = leaf else {
+            return self.set_corners(corners_at(object, row.place).unwrap_or_default(), column);
+        };
+        let slot = row.place as usize % LANES;
+        for corner in 0..3 {
+            let vertex = usize::from(leaf.corner[corner][slot]) % LANES;
+            for axis in 0..3 {
+                self.corners[corner][axis][column] = leaf.vertex[axis][vertex];
+            }
+        }
+    }
+
+    /// Sets the corners of a triangle. Nothing is known of one that has no area.
+    #[inline(never)]
+    fn set_corners(&mut self, corners: [[f32; 3]; 3], column: usize) {
+        for corner in 0..3 {
+            for axis in 0..3 {
+                self.corners[corner][axis][column] = corners[corner][axis];
+            }
+        }
+    }
+
+    /// Copies each triangle to the lanes of its rays.
+    #[inline(always)]
+    pub(super) fn expand<S: Simd>(&mut self, s: S) {
+        if self.is_expanded {
+            return;
+        }
+        let column = s.load_u(&self.column);
+        for corner in &mut self.corners {
+            for row in corner {
+                s.store(s.lookup(s.load(row), column), row);
+            }
+        }
+        for row in &mut self.bins {
+            s.store_u(s.lookup_u(s.load_u(row), column), row);
+        }
+    }
+}

@@ -21,7 +21,7 @@ pub(crate) fn unit(v: DVec3) -> DVec3 {
     v / v.length()
 }
 
-/// A direction that is uniform on the sphere. The length divides, as in [`unit`]: compiled files depend on the last bits of
+/// A direction that is uniform on the sphere. The length divides, as in [`unit()`]: compiled files depend on the last bits of
 /// sampled rays, in which `Rng::unit_vector` differs.
 pub(crate) fn uniform_direction(random: &mut Rng) -> DVec3 {
     unit(random.point_in_ball().into())

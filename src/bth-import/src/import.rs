@@ -30,7 +30,7 @@ pub(crate) enum Format {
 /// # Errors
 /// `BTH-O001` when the file cannot be read, `BTH-I…` with the place when it does not follow its
 /// format or uses a coordinate that is not finite, `BTH-L…` beyond the limits, and
-/// [`Error::Cancelled`](crate::Error::Cancelled).
+/// [`Error::Cancelled`].
 pub fn import(path: &Path, wanted: impl Into<Wanted>, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
     import_bytes(path, &read_file(path)?, wanted, monitor)
 }

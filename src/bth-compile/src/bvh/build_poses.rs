@@ -29,7 +29,7 @@ pub struct PoseOptions {
 /// [`build_with`](super::build_with).
 ///
 /// # Errors
-/// As [`build`](super::build).
+/// As [`build()`](super::build()).
 pub fn build_poses(
     mesh: &Mesh,
     poses: &Poses<'_>,

@@ -1,9 +1,9 @@
 //! The binary BVH, input of the stages marks, costs and tets, and its collapse to the wide BVH.
 //!
-//! [`build`] splits top-down (binned or full-sweep SAH), then moves subtrees to positions of lower cost.
-//! [`collapse`] plans the wide tree by dynamic programming and writes its lines.
+//! [`build()`] splits top-down (binned or full-sweep SAH), then moves subtrees to positions of lower cost.
+//! [`collapse()`] plans the wide tree by dynamic programming and writes its lines.
 //!
-//! [`build_poses`] builds one tree for several poses of a mesh that deforms, with the cost summed over them.
+//! [`build_poses()`] builds one tree for several poses of a mesh that deforms, with the cost summed over them.
 //!
 //! `bth-bench quality` measures the gain of each step. Spatial splits are not made: with nodes of 16 children the few large
 //! triangles of much overlap end up in one leaf near the root, and splitting them gained nothing.

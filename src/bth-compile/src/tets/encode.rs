@@ -26,7 +26,7 @@ pub struct Encoded {
     pub face_of_triangle: Vec<u32>,
 }
 
-/// Encodes meshes as [`super::build`] returned them, which holds their sum within the format's limits.
+/// Encodes meshes as [`super::build()`] returned them, which holds their sum within the format's limits.
 /// `subtrees` are the child codes of the BVHs over the same triangles, one per mesh, `NONE` where
 /// pruned; `triangles` is the number in the source.
 ///

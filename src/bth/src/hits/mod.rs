@@ -1,6 +1,6 @@
 //! Queries that report hits under conditions ([`Accept`]): the nearest, any, the k nearest, all in order, and their number.
 //!
-//! Each query enumerates the instances and the triangles that the conservative f32 tests do not exclude ([`search`]), nearer boxes
+//! Each query enumerates the instances and the triangles that the conservative f32 tests do not exclude ([`mod@search`]), nearer boxes
 //! first, decides each exactly as the other queries do, and keeps what its collector wants ([`collect`]). Results therefore depend
 //! neither on the instruction set nor on the acceleration structures, and t, u and v have the same bits in all queries.
 //!
@@ -134,14 +134,14 @@ impl Scene {
         self.masks().is_empty() && *mask != 0 && *cull == Cull::None && filter.is_none()
     }
 
-    /// As [`Self::nearest_accepted`], always by [`search`].
+    /// As [`Self::nearest_accepted`], always by [`mod@search`].
     pub(crate) fn search_nearest(&self, ray: &Ray, accept: &Accept<'_>) -> Option<Hit> {
         let mut first = First::default();
         search(self, ray, accept, &mut first);
         first.0.map(|found| found.hit)
     }
 
-    /// As [`Self::any_accepted`], always by [`search`].
+    /// As [`Self::any_accepted`], always by [`mod@search`].
     pub(crate) fn search_any(&self, ray: &Ray, accept: &Accept<'_>) -> bool {
         let mut any = Any::default();
         search(self, ray, accept, &mut any);

@@ -23,7 +23,7 @@ pub(crate) struct Line {
     pub(crate) axis: [usize; 3],
     /// Change of the plane's coordinates along the line per unit of depth.
     pub(crate) shear: [f64; 2],
-    /// 1 / direction[axis[2]], the factor from depth to t.
+    /// `1 / direction[axis[2]]`, the factor from depth to t.
     pub(crate) inverse_depth: f64,
 }
 

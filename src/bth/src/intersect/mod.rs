@@ -3,7 +3,7 @@
 //! The f32 tests [`boxes`] and [`filter`], by the [`edge_functions`] of triangles, are conservative: they exclude only boxes and
 //! triangles that are certainly missed. The remaining triangles are decided in f64, and in exact arithmetic where the error bounds of f64 leave a sign or a digit
 //! uncertain: [`exact`] computes one ray and triangle, [`exact_lanes`] sixteen pairs at a time with the same bits, and
-//! [`crossing`] decides by a rule of its own whether a ray passes through a surface. [`line`] projects points along a ray in f64,
+//! [`crossing`] decides by a rule of its own whether a ray passes through a surface. [`mod@line`] projects points along a ray in f64,
 //! and [`prepare`] computes the per-ray constants of the box test and of the filter.
 //!
 //! The distance of a point to boxes and triangles is bounded in f32 in the same way ([`point_lanes`]) and decided in f64

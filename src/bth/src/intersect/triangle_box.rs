@@ -45,7 +45,7 @@ fn is_separated_along(axis: usize, bounds: [[f32; 3]; 2], corners: [[f32; 3]; 3]
     })
 }
 
-/// The sign of the vector product of two differences, (u[1] - u[0]) × (v[1] - v[0]); exact.
+/// The sign of the vector product of two differences, `(u[1] - u[0]) × (v[1] - v[0])`; exact.
 fn cross_sign(u: [[f32; 2]; 2], v: [[f32; 2]; 2]) -> Ordering {
     let wide = |p: [[f32; 2]; 2]| p.map(|x| x.map(f64::from));
     let ([p, q], [r, s]) = (wide(u), wide(v));

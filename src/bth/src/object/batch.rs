@@ -110,7 +110,8 @@ impl Kernel for MissKernel<'_> {
     }
 }
 
-/// Stores in `sink` the answers of those rays in object space that hit anything; `from` as for [`nearest_batch`].
+/// Stores in `sink` the answers of those rays in object space that hit anything; `from` as for
+/// [`nearest_batch`](super::nearest_batch).
 pub(crate) fn trace_batch<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],

@@ -21,7 +21,7 @@ use crate::mesh::Keep;
 use crate::source::Source;
 use material::Materials;
 
-/// The cut-outs of a document's default scene, as [`crate::import`] reads it.
+/// The cut-outs of a document's default scene, as [`crate::import()`] reads it.
 pub(crate) fn flat(source: &Source<'_>, mode: AlphaMode) -> Result<Cutouts> {
     let (document, binary) = document::read(source, &SUPPORTED)?;
     let placed = placed_meshes(source, &document)?;

@@ -15,7 +15,7 @@ pub(super) fn concat_quarters(_simd: Avx512, [a, b, c, d]: [__m128; 4]) -> __m51
     }
 }
 
-/// Loads the rows with the indices `row` and transposes them, see [`Simd::rows8`].
+/// Loads the rows with the indices `row` and transposes them, see [`crate::simd::Simd::rows8`].
 ///
 /// # Safety
 /// `from` must point to rows that include all of these indices.

@@ -37,7 +37,7 @@ fn bits_of(bits: u32, register: usize) -> usize {
     (bits >> (QUAD * register)) as usize % (1 << QUAD)
 }
 
-/// Implements [`Simd::compress`].
+/// Implements [`crate::simd::Simd::compress`].
 #[inline(always)]
 pub(super) fn compress<Q: Quad>(s: Quads<Q>, bits: u32, a: U<Q>, to: &mut [u32; LANES]) -> usize {
     let mut count = 0;
@@ -51,7 +51,7 @@ pub(super) fn compress<Q: Quad>(s: Quads<Q>, bits: u32, a: U<Q>, to: &mut [u32; 
     count
 }
 
-/// Implements [`Simd::expand_u`].
+/// Implements [`crate::simd::Simd::expand_u`].
 #[inline(always)]
 pub(super) fn expand<Q: Quad>(s: Quads<Q>, a: U<Q>, m: U<Q>, from: &[u32; LANES]) -> U<Q> {
     let (bits, mut out, mut first) = (s.mask_bits(m), a, 0);

@@ -7,7 +7,7 @@ use crate::simd::Lanewise;
 /// Row indices of sixteen consecutive rows.
 pub(super) const IN_ORDER: [u32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
-/// Implements [`Simd::rows4`] for indices of all lanes.
+/// Implements [`crate::simd::Simd::rows4`] for indices of all lanes.
 #[inline(always)]
 pub(super) fn rows4<Q: Quad>(s: Quads<Q>, from: &[[f32; 4]], row: [u32; LANES]) -> [F<Q>; 4] {
     let mut out = [s.splat(0.0); 4];
@@ -24,7 +24,7 @@ pub(super) fn rows4<Q: Quad>(s: Quads<Q>, from: &[[f32; 4]], row: [u32; LANES]) 
     out
 }
 
-/// Implements [`Simd::rows8`] for indices of all lanes.
+/// Implements [`crate::simd::Simd::rows8`] for indices of all lanes.
 #[inline(always)]
 pub(super) fn rows8<Q: Quad>(s: Quads<Q>, from: &[[u32; 8]], row: [u32; LANES]) -> [U<Q>; 8] {
     let mut out = [s.splat_u(0); 8];
@@ -45,7 +45,7 @@ pub(super) fn rows8<Q: Quad>(s: Quads<Q>, from: &[[u32; 8]], row: [u32; LANES]) 
     out
 }
 
-/// Implements [`Simd::store_rows5`].
+/// Implements [`crate::simd::Simd::store_rows5`].
 #[inline(always)]
 pub(super) fn store_rows5<Q: Quad>(s: Quads<Q>, columns: [U<Q>; 5], to: &mut [[u32; 5]; LANES]) {
     let mut last = [0; LANES];
@@ -85,7 +85,7 @@ pub(super) fn store_transposed<Q: Quad, const N: usize>(
     }
 }
 
-/// Implements [`Simd::transpose`].
+/// Implements [`crate::simd::Simd::transpose`].
 #[inline(always)]
 pub(super) fn transpose<Q: Quad>(s: Quads<Q>, rows: [F<Q>; LANES]) -> [F<Q>; LANES] {
     let mut out = rows;
@@ -104,7 +104,7 @@ pub(super) fn transpose<Q: Quad>(s: Quads<Q>, rows: [F<Q>; LANES]) -> [F<Q>; LAN
     out
 }
 
-/// Implements [`Simd::least_of_each`]: each row is reduced to one register before four of them are transposed.
+/// Implements [`crate::simd::Simd::least_of_each`]: each row is reduced to one register before four of them are transposed.
 #[inline(always)]
 pub(super) fn least_of_each<Q: Quad>(s: Quads<Q>, rows: [F<Q>; LANES]) -> F<Q> {
     let mut out = rows[0];

@@ -207,3 +207,74 @@ impl Estimates {
         bits
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::intersect::exact::{Estimate, estimate};
+    use crate::simd::{Isa, Kernel};
+    use bth_random::Rng;
+
+    struct EstimatesOf<'a>(&'a Pairs);
+
+    impl Kernel for EstimatesOf<'_> {
+        type Output = (Estimates, u32);
+        #[inline(always)]
+        fn run<S: Simd>(self, s: S) -> (Estimates, u32) {
+            let estimates = Estimates::new(s, self.0);
+            (estimates, estimates.against_normal())
+        }
+    }
+
+    #[test]
+    fn estimates_in_lanes_have_the_bits_of_those_of_one_pair() {
+        let mut rng = Rng::new(71);
+        let (mut certain, mut open, mut against) = (0, 0, 0);
+        for round in 0..if cfg!(miri) { 20 } else { 2_000 } {
+            let scale = [1.0, 1e-20, 1e20][round % 3];
+            let mut number = || (rng.below(1 << 24) as f32 / (1 << 23) as f32 - 1.0) * scale;
+            let mut pairs = Pairs::NONE;
+            for i in 0..LANES {
+                for k in 0..3 {
+                    let corners = [number(), number(), number()];
+                    // Rays that aim into the triangle, at an edge of it or past it.
+                    let target = match i % 4 {
+                        0 => 0.5 * corners[0] + 0.5 * corners[1],
+                        3 => number(),
+                        _ => 0.25 * corners[0] + 0.25 * corners[1] + 0.5 * corners[2],
+                    };
+                    pairs.origin[k][i] = number();
+                    pairs.direction[k][i] = target - pairs.origin[k][i];
+                    for corner in 0..3 {
+                        pairs.corner[corner][k][i] = corners[corner];
+                    }
+                }
+            }
+            for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+                let (estimates, against_normal) = isa.run(EstimatesOf(&pairs));
+                for i in 0..LANES {
+                    let corners = [0, 1, 2].map(|corner: usize| lane(&pairs.corner[corner], i));
+                    let one = estimate(lane(&pairs.origin, i), lane(&pairs.direction, i), corners);
+                    let is_certain = estimates.certain >> i & 1 == 1;
+                    match one {
+                        Estimate::Intersects(intersection) => {
+                            assert!(is_certain, "{isa}, lane {i} of {pairs:?}");
+                            assert_eq!(estimates.intersection(i), intersection, "{isa}");
+                            let is_against = intersection.weight[2] < 0.0;
+                            assert_eq!(against_normal >> i & 1 == 1, is_against, "{isa}");
+                            (certain, against) = (certain + 1, against + u32::from(is_against));
+                        }
+                        Estimate::Missed | Estimate::Open(..) => {
+                            assert!(!is_certain, "{isa}, lane {i} of {pairs:?}");
+                            open += 1;
+                        }
+                    }
+                }
+            }
+        }
+        assert!(
+            certain > open / 4 && open > certain / 4 && against > certain / 4,
+            "{certain}, {open}, {against}"
+        );
+    }
+}

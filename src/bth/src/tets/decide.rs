@@ -1,8 +1,8 @@
 //! The decisions that the f32 lanes of a batch of tet walks leave open, made in f64 for one ray at a time.
 //!
-//! There are three: the exact test of a constrained face that a line crosses, where [`super::reached`] does not decide it; the step of a line that passes close to an edge,
-//! after which the ray returns to the lanes; and the flood, where a sign is uncertain in f64, too. Therefore the answers have the
-//! same bits as those of walks of single rays.
+//! There are three: the exact test of a constrained face that a line crosses, where [`super::reached`] does not decide it; the step
+//! of a line that passes close to an edge, after which the ray returns to the lanes; and the flood, where a sign is uncertain in f64,
+//! too. Therefore the answers have the same bits as those of walks of single rays.
 
 use super::batch::WalkBatch;
 use super::lanes::UNCERTAIN;

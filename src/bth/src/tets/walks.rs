@@ -79,7 +79,7 @@ pub(super) struct Walks<'a> {
 }
 
 impl<'a> Walks<'a> {
-    /// Walks none of which has begun. All slices have one element per ray.
+    /// Walks none of which has begun, as `states` say. All slices have one element per ray.
     pub(super) fn new(
         object: &'a ObjectView<'a>,
         records: LaneRecords<'a>,
@@ -88,7 +88,6 @@ impl<'a> Walks<'a> {
         states: &'a mut [WalkState],
         WalkLists { starts, reached, returns, without_lanes }: &'a mut WalkLists,
     ) -> Self {
-        states.fill(WalkState::NotWalked);
         returns.clear();
         returns.resize(rays.len(), 0);
         // Anything may be left after a panic.

@@ -1,16 +1,22 @@
 //! Opening a file: what damage is found, and where errors say that it is.
 
+use bth_format::file::DeformedObject;
 use bth_format::layout::{Header, NONE, SectionEntry, kind};
 use bth_format::verify::verify;
 use bth_format::{Code, Error, File};
 use std::path::PathBuf;
 
-/// One triangle with its positions and a provenance.
-fn triangle() -> (PathBuf, Vec<u8>) {
-    let path =
-        PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../format-spec/conformance/valid/triangle.bth");
+/// A file of the conformance suite.
+fn valid(name: &str) -> (PathBuf, Vec<u8>) {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../format-spec/conformance/valid");
+    let path = folder.join(name);
     let bytes = std::fs::read(&path).unwrap();
     (path, bytes)
+}
+
+/// One triangle with its positions and a provenance.
+fn triangle() -> (PathBuf, Vec<u8>) {
+    valid("triangle.bth")
 }
 
 fn opened(bytes: &[u8]) -> Error {
@@ -97,4 +103,30 @@ fn an_object_that_does_not_exist_is_an_error() {
     let file = File::from_bytes(&bytes).unwrap();
     assert_eq!(file.check(0).unwrap().header.triangles, 1);
     assert_eq!(file.object(1).unwrap_err().code(), Code::NoSuchObject);
+}
+
+#[test]
+fn an_object_is_told_apart_from_all_that_were_opened_before() {
+    let (_, bytes) = triangle();
+    let mut seen = Vec::new();
+    for _ in 0..4 {
+        // The memory of the file before is free again, so its objects may lie at the same addresses.
+        let file = File::from_bytes(&bytes).unwrap();
+        let identity = file.view(0).unwrap().identity;
+        assert_eq!(file.clone().view(0).unwrap().identity, identity);
+        assert!(!seen.contains(&identity), "{identity:?} in {seen:?}");
+        seen.push(identity);
+    }
+}
+
+#[test]
+fn an_object_that_deforms_keeps_its_identity() {
+    let (_, bytes) = valid("deformable.bth");
+    let file = File::from_bytes(&bytes).unwrap();
+    let mut object = DeformedObject::new(&file, 0).unwrap();
+    let identity = object.view().identity;
+    assert_ne!(identity, file.view(0).unwrap().identity);
+    let mut positions = object.view().positions.to_vec();
+    object.refit(&mut positions, &mut None, |_| ([[0.0; 3]; 2], ())).unwrap();
+    assert_eq!(object.view().identity, identity);
 }

@@ -2,6 +2,7 @@
 
 use super::buffer::Owned;
 use super::{File, no_memory};
+use crate::Identity;
 use crate::error::{Code, Error, Result};
 use crate::layout::{CacheLine, Object, TetFace, TetLeaf, TetVertex, WIDTH};
 use crate::object::{ObjectBounds, ObjectView};
@@ -101,7 +102,7 @@ impl DeformedObject {
         let (tets, positions) = (OwnTets::of(&view)?, copy_of(view.positions)?);
         let header = Arc::new(*view.header);
         // SAFETY: `file`, which the view borrows from, is held beside it; see `extended`.
-        let view = unsafe { extended(view) };
+        let view = unsafe { extended(ObjectView { identity: Identity::new(), ..view }) };
         let mut deformed =
             Self { view, lines, tets, positions, normals: None, header, file: file.clone(), object, segment };
         deformed.set_view(true)?;
@@ -151,7 +152,6 @@ impl DeformedObject {
         let leaf_vertices = view.leaf_vertices;
         let ([lower, upper], result) =
             refit(RefitParts { lines, leaf_vertices, positions: &self.positions, tets });
-        // In place, since measurements of tracing are kept for the address.
         if let Some(header) = Arc::get_mut(&mut self.header) {
             (header.lower, header.upper) = (lower, upper);
         }
@@ -165,6 +165,7 @@ impl DeformedObject {
         let object = self.file.object(self.object)?;
         let tree = self.file.object(self.segment)?;
         let mut view = ObjectView {
+            identity: self.view.identity,
             header: tree.header,
             bounds: tree.bounds,
             lines: tree.lines,

@@ -11,6 +11,7 @@ mod table;
 pub use deformed::{DeformedObject, Normals, RefitParts, TetParts};
 pub use table::{content_id, hash128, kind_stride};
 
+use crate::Identity;
 use crate::check;
 use crate::error::{Code, Error, Result, Text};
 use crate::layout::*;
@@ -260,6 +261,7 @@ impl File {
         };
         let grid = self.grid(header).map_err(|e| self.locate(e, object))?;
         Ok(ObjectView {
+            identity: Identity::new(),
             header,
             bounds: ObjectBounds::new(header),
             grid,

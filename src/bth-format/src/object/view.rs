@@ -2,11 +2,14 @@
 
 use super::bounds::ObjectBounds;
 use super::records::Records;
+use crate::Identity;
 use crate::layout::*;
 
 /// The sections of one object. Sections that the file lacks are empty. Specification: "Kinds" and "Objects".
 #[derive(Clone, Copy, Debug)]
 pub struct ObjectView<'a> {
+    /// What measurements of tracing are kept under: no two objects have the same, copies of a view do.
+    pub identity: Identity,
     /// The OBJECT row: bounds, root and counts.
     pub header: &'a Object,
     /// The bounds of `header`, in the shape that tracing reads. Object space.

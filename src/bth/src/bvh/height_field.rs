@@ -1,5 +1,6 @@
 //! An object for tests: a height field whose triangles share their edges and vertices.
 
+use bth_format::Identity;
 use bth_format::layout::{
     CacheLine, Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, NONE, Object, RAW_LINES, RawLeaf, WIDTH,
     WideNode,
@@ -134,6 +135,7 @@ impl HeightField {
 
     pub(crate) fn view(&self) -> ObjectView<'_> {
         ObjectView {
+            identity: Identity::new(),
             header: &self.header,
             bounds: ObjectBounds::new(&self.header),
             grid: None,

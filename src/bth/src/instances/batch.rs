@@ -186,10 +186,7 @@ impl World {
         let hints = from.filter(|from| !SMALL && self.has_use_for(objects, from));
         object::with_scratch(|scratch| {
             let Some(from) = hints else { return trace(None, scratch) };
-            let key = (
-                std::ptr::from_ref(self).addr(),
-                HintUse::StartInstance.kind(QueryKind::of(any, rays, self.top.extent)),
-            );
+            let key = (self.identity, HintUse::StartInstance.kind(QueryKind::of(any, rays, self.top.extent)));
             object::by_hint(key, from.len(), Strategy::Bvh, scratch, |strategy, scratch| {
                 trace(hints.filter(|_| strategy == Strategy::Hinted), scratch);
             });

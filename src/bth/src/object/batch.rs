@@ -18,6 +18,7 @@ use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use crate::tets::TetOutcome;
 use crate::tets::enter_tets;
+use bth_format::Identity;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 use std::time::Instant;
@@ -25,16 +26,11 @@ use std::time::Instant;
 /// Least number of rays of a batch; fewer rays are traced one after the other.
 pub(crate) const MIN_BATCH: usize = 4;
 
-/// What measurements of an object are stored under.
-pub(super) fn address_of(object: &ObjectView<'_>) -> usize {
-    std::ptr::from_ref(object.header).addr()
-}
-
 /// Traces a batch by the strategy that was measured to be faster for such rays on this thread, and measures it. The measurements are
-/// those of a `key`: the address of an object or a scene, and a kind of rays ([`HintUse::kind`]). `unmeasured` is the strategy of small
+/// those of a `key`: an object or a scene, and a kind of rays ([`HintUse::kind`]). `unmeasured` is the strategy of small
 /// batches before there are measurements.
 pub(crate) fn by_hint(
-    key: (usize, usize),
+    key: (Identity, usize),
     rays: usize,
     unmeasured: Strategy,
     scratch: &mut Scratch,
@@ -50,13 +46,13 @@ pub(crate) fn by_hint(
 /// The strategy of a batch, and the time if it is to be measured. The parameters are those of [`by_hint`].
 #[inline(never)]
 fn choose(
-    (address, kind): (usize, usize),
+    (traced, kind): (Identity, usize),
     rays: usize,
     unmeasured: Strategy,
     scratch: &mut Scratch,
 ) -> (Strategy, Option<Instant>) {
     let hinted = Hinted::chosen();
-    let choice = scratch.choices.of(address, kind);
+    let choice = scratch.choices.of(traced, kind);
     let measured = rays >= MIN_MEASURED_RAYS && hinted == Hinted::Measured;
     let Plan { strategy, measured } = match hinted {
         Hinted::Bvh => Plan { strategy: Strategy::Bvh, measured },
@@ -70,14 +66,14 @@ fn choose(
 /// Records the time since `start`, in which a strategy traced a batch.
 #[inline(never)]
 fn record(
-    (address, kind): (usize, usize),
+    (traced, kind): (Identity, usize),
     rays: usize,
     strategy: Strategy,
     start: Instant,
     scratch: &mut Scratch,
 ) {
     let seconds_per_ray = start.elapsed().as_secs_f64() / rays as f64;
-    scratch.choices.of(address, kind).record(strategy, seconds_per_ray);
+    scratch.choices.of(traced, kind).record(strategy, seconds_per_ray);
 }
 
 /// Fills `hits` with [`Hit::MISS`].
@@ -135,7 +131,7 @@ pub(crate) fn trace_batch<Q: Query>(
         return trace_with(object, rays, from, scratch, sink);
     }
     let key =
-        (address_of(object), HintUse::Tets.kind(QueryKind::of(sink.goal().is_any(), rays, size_of(object))));
+        (object.identity, HintUse::Tets.kind(QueryKind::of(sink.goal().is_any(), rays, size_of(object))));
     by_hint(key, rays.len(), Strategy::Bvh, scratch, |strategy, scratch| {
         trace_with(object, rays, from.filter(|_| strategy == Strategy::Hinted), scratch, sink);
     });

@@ -1,6 +1,6 @@
 //! Tracing of one object by batches of rays that may start on known triangles: what the hints are used for, and what is traced then.
 
-use super::batch::{address_of, by_hint, through_bvh, trace_batch, trace_with};
+use super::batch::{by_hint, through_bvh, trace_batch, trace_with};
 use super::hints::Hinted;
 use super::scratch::Scratch;
 use super::strategy::{HintUse, QueryKind, Strategy, size_of};
@@ -76,14 +76,14 @@ fn trace_from<Q: Query>(
         if !has_subtrees(object) {
             return walk(scratch, answers);
         }
-        let key = (address_of(object), HintUse::Tets.kind(kind));
+        let key = (object.identity, HintUse::Tets.kind(kind));
         return by_hint(key, rays.len(), Strategy::Bvh, scratch, |strategy, scratch| match strategy {
             Strategy::Bvh => trace(None, scratch, answers),
             Strategy::Hinted => walk(scratch, answers),
         });
     }
     // Small batches come before measurements: then the look-up decides by how many of the first rays end.
-    let key = (address_of(object), HintUse::Free.kind(kind));
+    let key = (object.identity, HintUse::Free.kind(kind));
     by_hint(key, rays.len(), Strategy::Hinted, scratch, |strategy, scratch| {
         if strategy == Strategy::Bvh && !has_tets {
             return trace(None, scratch, answers);

@@ -9,6 +9,7 @@
 //! other are compared, and the clock is read for no others.
 
 use crate::rays::Ray;
+use bth_format::Identity;
 use bth_format::object::ObjectView;
 
 /// How rays that start on known triangles are traced.
@@ -199,13 +200,12 @@ pub(crate) struct StrategyTable([(usize, StrategyChoice); StrategyTable::ROWS]);
 
 impl StrategyTable {
     const ROWS: usize = 64;
-    /// An upper bound on the kinds of rays. No two objects or scenes lie as close to each other, so keys are distinct.
+    /// An upper bound on the kinds of rays.
     const KINDS: usize = 16;
 
-    /// The choice for a kind of rays ([`HintUse::kind`]) through the object or scene with the given address. If another one had this
-    /// address before, a few batches may take the slower strategy.
-    pub(crate) fn of(&mut self, address: usize, kind: usize) -> &mut StrategyChoice {
-        let key = (address / Self::KINDS).wrapping_mul(Self::KINDS).wrapping_add(kind);
+    /// The choice for a kind of rays ([`HintUse::kind`]) through an object or a scene.
+    pub(crate) fn of(&mut self, traced: Identity, kind: usize) -> &mut StrategyChoice {
+        let key = traced.number().wrapping_mul(Self::KINDS).wrapping_add(kind);
         let row = (key.wrapping_mul(0x9e37_79b9) >> 16) % Self::ROWS;
         let (stored_key, choice) = &mut self.0[row];
         if *stored_key != key {
@@ -314,12 +314,14 @@ mod tests {
     #[test]
     fn objects_and_kinds_of_rays_have_separate_choices() {
         let mut choices = StrategyTable::default();
+        let [object, other] = [Identity::new(), Identity::new()];
         for _ in 0..TRIALS {
-            choices.of(4096, 0).record(Strategy::Bvh, 2.0);
-            choices.of(4096, 0).record(Strategy::Hinted, 1.0);
+            choices.of(object, 0).record(Strategy::Bvh, 2.0);
+            choices.of(object, 0).record(Strategy::Hinted, 1.0);
         }
-        assert_eq!(choices.of(4096, 0).best(), Strategy::Hinted);
-        assert_eq!(choices.of(4096, 1).best(), Strategy::Bvh);
-        assert_eq!(choices.of(4096, 0).best(), Strategy::Hinted);
+        assert_eq!(choices.of(object, 0).best(), Strategy::Hinted);
+        assert_eq!(choices.of(object, 1).best(), Strategy::Bvh);
+        assert_eq!(choices.of(other, 0).best(), Strategy::Bvh);
+        assert_eq!(choices.of(object, 0).best(), Strategy::Hinted);
     }
 }

@@ -1,5 +1,7 @@
 //! Whether packets have been worthwhile so far.
 
+use bth_format::Identity;
+
 /// Exponential back-off of a kind of packets: after a packet that was not worthwhile some groups of rays are not tried as packets, and
 /// twice as many after the next.
 #[derive(Clone, Copy, Debug)]
@@ -52,20 +54,20 @@ pub(crate) struct KindBackoffs {
 }
 
 /// The back-offs of a thread, kept from one batch to the next: batches of a few hundred rays would otherwise try packets anew each time.
-/// They are those of one object, whose address is compared, for each goal of queries.
+/// They are those of one object, for each goal of queries.
 #[derive(Debug, Default)]
 pub(crate) struct Backoffs {
-    object: usize,
+    object: Option<Identity>,
     nearest: KindBackoffs,
     any: KindBackoffs,
 }
 
 impl Backoffs {
-    /// The back-offs for rays through the object at an address; new ones if the last batch went through another object.
+    /// The back-offs for rays through an object; new ones if the last batch went through another object.
     #[inline(always)]
-    pub(crate) fn of(&mut self, object: usize, is_any: bool) -> &mut KindBackoffs {
-        if self.object != object {
-            *self = Backoffs { object, ..Backoffs::default() };
+    pub(crate) fn of(&mut self, object: Identity, is_any: bool) -> &mut KindBackoffs {
+        if self.object != Some(object) {
+            *self = Backoffs { object: Some(object), ..Backoffs::default() };
         }
         if is_any { &mut self.any } else { &mut self.nearest }
     }

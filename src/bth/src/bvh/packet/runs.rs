@@ -102,7 +102,7 @@ fn trace<S: Simd, Q: Query>(
     let (bounds, goal) = (object.bounds, sink.goal());
     let PacketScratch { groups, buffers, backoffs, rest } = scratch;
     rest.clear();
-    let backoffs = backoffs.of(std::ptr::from_ref(object.header).addr(), goal.is_any());
+    let backoffs = backoffs.of(object.identity, goal.is_any());
     let mut runs = Runs { bounds: &bounds, rays, next: 0, backoffs: *backoffs, rest };
     // The first run is found before the loop, so that `packets` is made only if there are any.
     let Some(mut run) = runs.next(s, goal) else {

@@ -87,6 +87,9 @@ impl Kernel for StartKernel<'_> {
         let (world, rays) = (batch.world, &batch.rays[first..first + count]);
         let top = &world.top;
         packets.start(s, top, rays, active);
+        if free_starts.any_meets_nothing() {
+            active.retain(|&index| !free_starts.meets_nothing(index as usize));
+        }
         if let (Some(from), true) = (batch.hints(), world.has_single_visible()) {
             // No other instance is visible, so a ray that starts on it needs no traversal.
             active.retain(|&index| {

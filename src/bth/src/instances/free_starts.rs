@@ -5,6 +5,7 @@
 //! rounding, so the answer is the same.
 
 use super::World;
+use super::box_misses::MarkBoxMisses;
 use super::enter_object::ObjectRays;
 use super::scene_batch::SceneBatch;
 use super::visit_queue::VisitQueue;
@@ -13,6 +14,7 @@ use crate::object::Hinted;
 use crate::objects::Objects;
 use crate::query::sink::Visit;
 use crate::rays::PrimitiveRef;
+use crate::simd::Isa;
 use bth_format::layout::{Child, NONE};
 use std::ops::Range;
 
@@ -22,6 +24,10 @@ use std::ops::Range;
 pub(super) struct FreeStarts {
     /// By index in the chunk; `NONE` if the ray may meet all instances. Empty if that is so for all rays.
     not_met: Vec<u32>,
+    /// The rays of `not_met` and their instances, by object.
+    starts: Vec<Visit>,
+    /// By index in the chunk, whether a ray meets nothing at all. Empty if that is known of none.
+    meets_nothing: Vec<bool>,
     visits: VisitQueue,
     object_rays: ObjectRays,
     rest: Vec<u32>,
@@ -34,10 +40,22 @@ impl FreeStarts {
         self.not_met.get(index).copied().unwrap_or(NONE)
     }
 
+    /// Whether it is known of any ray that it meets nothing at all.
+    pub(super) fn any_meets_nothing(&self) -> bool {
+        !self.meets_nothing.is_empty()
+    }
+
+    /// Whether it is known of a ray of the chunk that it meets nothing at all.
+    #[inline(always)]
+    pub(super) fn meets_nothing(&self, index: usize) -> bool {
+        self.meets_nothing.get(index).copied().unwrap_or(false)
+    }
+
     /// Decides the rays of a chunk.
     pub(super) fn find(&mut self, batch: &SceneBatch<'_>, chunk: Range<usize>) {
-        let FreeStarts { not_met, visits, object_rays, rest } = self;
+        let FreeStarts { not_met, starts: free, meets_nothing, visits, object_rays, rest } = self;
         not_met.clear();
+        meets_nothing.clear();
         let Some(from) = batch.hints() else { return };
         visits.all.clear();
         let mut starts = Starts::new(batch.world, batch.objects);
@@ -50,6 +68,7 @@ impl FreeStarts {
             return;
         }
         not_met.resize(chunk.len(), NONE);
+        free.clear();
         batch.world.by_object(visits, |object, visits| {
             let object = batch.objects.view(object);
             object_rays.fill(batch, true, visits, |ray| batch.rays[ray].tmax);
@@ -58,10 +77,17 @@ impl FreeStarts {
                 for (index, visit) in visits.iter().enumerate() {
                     if rest.next_if_eq(&index).is_none() {
                         not_met[visit.ray as usize - chunk.start] = visit.instance;
+                        free.push(*visit);
                     }
                 }
             }
         });
+        if MarkBoxMisses::is_applicable(&batch.world.top) && !free.is_empty() {
+            meets_nothing.resize(chunk.len(), false);
+            let marks = &mut meets_nothing[..];
+            // Without vectors, rays go through the top level one by one.
+            let _ = Isa::chosen().run_wide(MarkBoxMisses { batch, starts: free, first: chunk.start, marks });
+        }
     }
 }
 

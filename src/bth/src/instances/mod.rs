@@ -10,6 +10,7 @@
 //! several hits goes through the top level alone ([`enumerate`]).
 
 mod batch;
+mod box_misses;
 mod caller;
 mod caller_instances;
 mod deformed;

@@ -9,7 +9,7 @@ use super::hit_cache::{CachedHits, UNCACHED};
 use super::leaf_mesh::LeafPoints;
 use super::projection::Projection;
 use crate::intersect::exact_lanes::Intersections;
-use crate::intersect::prepare::{self, Axes, CommonAxis, MixedAxes};
+use crate::intersect::prepare::{self, Axes, CommonAxis, MixedAxes, PreparedLanes};
 use crate::simd::{LANES, Lanewise, Part, Simd};
 use bth_format::layout::NONE;
 use std::marker::PhantomData;
@@ -64,7 +64,7 @@ pub(crate) struct RayLimits<S: Lanewise> {
 }
 
 /// What the box test needs of rays, one in each lane.
-struct GroupSlabs<S: Lanewise> {
+pub(crate) struct GroupSlabs<S: Lanewise> {
     reciprocal: [S::F; 3],
     near_addend: [S::F; 3],
     far_addend: [S::F; 3],
@@ -74,9 +74,26 @@ struct GroupSlabs<S: Lanewise> {
 }
 
 impl<S: Lanewise> GroupSlabs<S> {
+    /// Those of prepared rays.
+    #[inline(always)]
+    pub(crate) fn of(lanes: &PreparedLanes<S>) -> Self {
+        GroupSlabs {
+            reciprocal: lanes.reciprocal,
+            near_addend: lanes.near_addend,
+            far_addend: lanes.far_addend,
+            negative: lanes.negative,
+            depths: lanes.depths,
+        }
+    }
+
     /// Implements [`RayGroup::may_enter`].
     #[inline(always)]
-    fn may_enter(&self, s: S, corners: [[f32; 3]; 2], (mixed_octants, common_origin): (bool, bool)) -> u32 {
+    pub(crate) fn may_enter(
+        &self,
+        s: S,
+        corners: [[f32; 3]; 2],
+        (mixed_octants, common_origin): (bool, bool),
+    ) -> u32 {
         let [mut enter, mut leave] = self.depths;
         for k in 0..3 {
             let (mut near, mut far) = (s.splat(corners[0][k]), s.splat(corners[1][k]));

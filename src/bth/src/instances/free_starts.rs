@@ -73,13 +73,21 @@ impl FreeStarts {
             let object = batch.objects.view(object);
             object_rays.fill(batch, true, visits, |ray| batch.rays[ray].tmax);
             if free::find_rest(object, &object_rays.rays, &object_rays.from, Hinted::are_forced(), rest) {
-                let mut rest = rest.iter().map(|index| *index as usize).peekable();
-                for (index, visit) in visits.iter().enumerate() {
-                    if rest.next_if_eq(&index).is_none() {
-                        not_met[visit.ray as usize - chunk.start] = visit.instance;
-                        free.push(*visit);
-                    }
+                let place = |visit: &Visit| visit.ray as usize - chunk.start;
+                for visit in visits {
+                    not_met[place(visit)] = visit.instance;
                 }
+                for index in &*rest {
+                    not_met[place(&visits[*index as usize])] = NONE;
+                }
+                // Which rays are left is not predictable, so there is no branch.
+                let mut count = free.len();
+                free.resize(count + visits.len(), Visit { ray: NONE, instance: NONE });
+                for visit in visits {
+                    free[count] = *visit;
+                    count += usize::from(not_met[place(visit)] != NONE);
+                }
+                free.truncate(count);
             }
         });
         if MarkBoxMisses::is_applicable(&batch.world.top) && !free.is_empty() {

@@ -24,6 +24,11 @@ impl VisitQueue {
     pub(super) fn sort(&mut self, instances: usize) {
         let VisitQueue { all, sorted, next, keys, .. } = self;
         sorted.clear();
+        // Often all rays start on one instance, or few instances are left.
+        if all.iter().all(|visit| visit.instance == all[0].instance) {
+            sorted.extend_from_slice(all);
+            return;
+        }
         if instances > 4 * all.len() {
             keys.clear();
             keys.extend(all.iter().map(|v| u64::from(v.instance) << 32 | u64::from(v.ray)));

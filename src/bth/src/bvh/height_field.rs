@@ -15,6 +15,7 @@ const LEAF_QUADS: [usize; 2] = [2, 4];
 
 /// A surface over a grid, in 256 leaves of 16 triangles, some of them raw, below two levels of nodes.
 pub(crate) struct HeightField {
+    identity: Identity,
     pub(crate) header: Object,
     lines: Vec<CacheLine>,
     ids: Vec<u32>,
@@ -120,7 +121,7 @@ impl HeightField {
             grid_origin: [0.0; 3],
             displacement: 0.0,
         };
-        HeightField { header, lines, ids, points }
+        HeightField { identity: Identity::new(), header, lines, ids, points }
     }
 
     /// An object that consists of one of the indexed leaves.
@@ -130,12 +131,12 @@ impl HeightField {
         let points = self.points[15..30].to_vec();
         let [lower, upper] = bounds(&points);
         let header = Object { lower, upper, root: Child::Indexed(0).code(), depth: 0, ..self.header };
-        HeightField { header, lines, ids: self.ids.clone(), points }
+        HeightField { identity: Identity::new(), header, lines, ids: self.ids.clone(), points }
     }
 
     pub(crate) fn view(&self) -> ObjectView<'_> {
         ObjectView {
-            identity: Identity::new(),
+            identity: self.identity,
             header: &self.header,
             bounds: ObjectBounds::new(&self.header),
             grid: None,

@@ -24,8 +24,8 @@ use std::ops::Range;
 pub(super) struct FreeStarts {
     /// By index in the chunk; `NONE` if the ray may meet all instances. Empty if that is so for all rays.
     not_met: Vec<u32>,
-    /// The rays of `not_met` and their instances, by object.
-    starts: Vec<Visit>,
+    /// The rays that do not meet the instance on which they start, with that instance, by object.
+    free: Vec<Visit>,
     /// By index in the chunk, whether a ray meets nothing at all. Empty if that is known of none.
     meets_nothing: Vec<bool>,
     visits: VisitQueue,
@@ -53,7 +53,7 @@ impl FreeStarts {
 
     /// Decides the rays of a chunk.
     pub(super) fn find(&mut self, batch: &SceneBatch<'_>, chunk: Range<usize>) {
-        let FreeStarts { not_met, starts: free, meets_nothing, visits, object_rays, rest } = self;
+        let FreeStarts { not_met, free, meets_nothing, visits, object_rays, rest } = self;
         not_met.clear();
         meets_nothing.clear();
         let Some(from) = batch.hints() else { return };

@@ -5,7 +5,7 @@
 //! the caller builds, a commit ([`caller`]) does the same for the instances that the caller has changed, and may refit the BVH
 //! instead. Rays meet the result ([`world`]) in the same way. A batch of rays ([`batch`]) traverses that BVH, coherent rays as
 //! packets ([`packets`]) and the others one by one ([`traverse`]). Rays that certainly do not meet the instance on which they start
-//! ([`free_starts`]) do not enter it. Each visit of an instance by a ray is queued ([`visit_queue`]); the rays of an object's
+//! ([`free_starts`]) do not enter it, and those that meet no other instance's box end at once ([`box_misses`]). Each visit of an instance by a ray is queued ([`visit_queue`]); the rays of an object's
 //! visits are transformed into its space ([`enter_object`]) and traced there together, with t unchanged. A ray whose query reports
 //! several hits goes through the top level alone ([`enumerate`]).
 

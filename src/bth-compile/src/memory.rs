@@ -22,7 +22,7 @@ use crate::cached::{self, Cache, CachedCompilation};
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
 use crate::pipeline::{
-    Checked, Clock, CompileOptions, CompileReport, Compiled, Direct, compile_imported, warn_over_limit,
+    Clock, CompileOptions, CompileReport, Compiled, Direct, compile_imported, warn_over_limit,
 };
 use crate::scene::{self, SceneReport};
 use crate::source::{MESH_NAME, Model, SourceDigest};
@@ -40,8 +40,8 @@ pub fn compile(
     options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<(Compiled, CompileReport)> {
-    let (checked, report) = compile_checked(mesh, options, monitor)?;
-    Ok((checked.compiled, report))
+    let (file, report) = compile_checked(mesh, options, monitor)?;
+    Ok((file.into(), report))
 }
 
 /// Compiles a mesh and opens the result. The bytes are not copied.
@@ -49,9 +49,8 @@ pub fn compile(
 /// # Errors
 /// As [`compile`].
 pub fn open(mesh: TriangleMesh<'_>, options: &CompileOptions, monitor: &dyn Monitor) -> Result<bth::Scene> {
-    let (checked, _) = compile_checked(mesh, options, monitor)?;
-    drop(checked.compiled);
-    opened(bth::from_file(checked.file))
+    let (file, _) = compile_checked(mesh, options, monitor)?;
+    opened(bth::from_file(file))
 }
 
 /// Compiles a mesh through a cache. `needed` decides whether the bytes of a file in the cache are read; with
@@ -105,15 +104,15 @@ fn compile_checked(
     mesh: TriangleMesh<'_>,
     options: &CompileOptions,
     monitor: &dyn Monitor,
-) -> Result<(Checked, CompileReport)> {
+) -> Result<(bth_format::File, CompileReport)> {
     let mut clock = Clock::default();
     let digest = clock.time("hash", || SourceDigest::of_triangles(mesh));
     let model = Model { path: Path::new(MESH_NAME), digest: &digest };
     let import = || import_triangles(model.path, mesh.positions, mesh.triangles, options.wanted(), monitor);
     let imported = clock.time("mesh", import)?;
-    let (checked, report) = compile_imported(&model, imported, options, &mut Direct, clock, monitor)?;
+    let (file, report) = compile_imported(&model, imported, options, &mut Direct, clock, monitor)?;
     warn_over_limit(&report.file, options, monitor);
-    Ok((checked, report))
+    Ok((file, report))
 }
 
 fn opened(scene: std::result::Result<bth::Scene, bth::Error>) -> Result<bth::Scene> {

@@ -1,6 +1,9 @@
 //! Merges bit-equal positions.
 
 use crate::rows::NONE;
+use rayon::prelude::*;
+use std::sync::atomic::AtomicU32;
+use std::sync::atomic::Ordering::Relaxed;
 
 /// The result of [`weld`].
 #[derive(Debug, PartialEq)]
@@ -17,67 +20,81 @@ pub(super) struct Welded {
 /// # Errors
 /// The row of the first used position that is not finite.
 pub(super) fn weld(positions: &[[f32; 3]], triangles: &mut [[u32; 3]]) -> Result<Welded, usize> {
-    let mut welded_rows = vec![NONE; positions.len()];
-    let mut table = Table::with_capacity(positions.len().min(triangles.len().saturating_mul(3)));
-    let mut distinct = Vec::new();
-    for corner in triangles.as_flattened_mut() {
-        let row = *corner as usize;
-        if welded_rows[row] == NONE {
-            let position = positions[row].map(|x| x + 0.0);
-            if !position.iter().all(|x| x.is_finite()) {
-                return Err(row);
-            }
-            welded_rows[row] = table.find_or_insert(position, &mut distinct);
+    let corners = triangles.as_flattened_mut();
+    let finite = |row: u32| positions[row as usize].iter().all(|x| x.is_finite());
+    let non_finite = (0..positions.len() as u32).into_par_iter().filter(|row| !finite(*row)).count() as u64;
+    if non_finite > 0
+        && let Some(row) = corners.par_iter().find_first(|row| !finite(**row))
+    {
+        return Err(*row as usize);
+    }
+    let same_as = first_equal_rows(positions);
+    let first_uses = first_uses(corners, &same_as);
+    let same_as = |row: u32| same_as[row as usize].load(Relaxed);
+    let first_use = |row: u32| first_uses[row as usize].load(Relaxed);
+
+    // A distinct position is first used at one corner; counting these corners in order numbers the positions.
+    let uses = |part: usize, corners: &[u32]| {
+        let first = part * CORNERS_AT_ONCE;
+        let rows = corners.iter().map(|corner| same_as(*corner)).enumerate();
+        rows.filter(move |(at, row)| first_use(*row) == (first + at) as u32)
+            .map(|(_, row)| row)
+            .collect::<Vec<_>>()
+    };
+    let parts: Vec<Vec<u32>> =
+        corners.par_chunks(CORNERS_AT_ONCE).enumerate().map(|(part, corners)| uses(part, corners)).collect();
+    let used: Vec<u32> = parts.concat();
+    let welded_rows = atomics(positions.len());
+    used.par_iter()
+        .enumerate()
+        .for_each(|(welded, row)| welded_rows[*row as usize].store(welded as u32, Relaxed));
+    corners.par_iter_mut().for_each(|corner| *corner = welded_rows[same_as(*corner) as usize].load(Relaxed));
+    let positions = used.par_iter().map(|row| positive_zeros(positions[*row as usize])).collect();
+    Ok(Welded { positions, non_finite_unused: non_finite })
+}
+
+/// Corners that one task numbers.
+const CORNERS_AT_ONCE: usize = 1 << 16;
+
+/// The position with +0 in the place of -0.
+fn positive_zeros(position: [f32; 3]) -> [f32; 3] {
+    position.map(|x| x + 0.0)
+}
+
+/// For each position the first row of one that is equal to it.
+fn first_equal_rows(positions: &[[f32; 3]]) -> Vec<AtomicU32> {
+    let key = |position: &[f32; 3]| positive_zeros(*position).map(f32::to_bits);
+    let mut keys: Vec<([u32; 3], u32)> = positions
+        .par_iter()
+        .zip(0..positions.len() as u32)
+        .map(|(position, row)| (key(position), row))
+        .collect();
+    keys.par_sort_unstable();
+    let first_equal = atomics(positions.len());
+    keys.par_chunk_by(|a, b| a.0 == b.0).for_each(|equal| {
+        for (_, row) in equal {
+            first_equal[*row as usize].store(equal[0].1, Relaxed);
         }
-        *corner = welded_rows[row];
-    }
-    let unused = positions.iter().zip(&welded_rows).filter(|(_, row)| **row == NONE);
-    let non_finite_unused = unused.filter(|(p, _)| !p.iter().all(|x| x.is_finite())).count() as u64;
-    distinct.shrink_to_fit();
-    Ok(Welded { positions: distinct, non_finite_unused })
+    });
+    first_equal
 }
 
-/// A hash table with open addressing whose slots are rows of the distinct positions. It needs a quarter of the memory of
-/// a map that holds the keys, and its order does not depend on a random seed.
-struct Table {
-    slots: Vec<u32>,
-    shift: u32,
-}
-
-impl Table {
-    /// A table for `count` entries at a load of at most one half.
-    fn with_capacity(count: usize) -> Table {
-        let size = (count.max(4) * 2).next_power_of_two();
-        Table { slots: vec![NONE; size], shift: 64 - size.trailing_zeros() }
-    }
-
-    #[inline]
-    fn find_or_insert(&mut self, position: [f32; 3], distinct: &mut Vec<[f32; 3]>) -> u32 {
-        let key = position.map(f32::to_bits);
-        let mask = self.slots.len() - 1;
-        let mut slot = (hash(key) >> self.shift) as usize;
-        loop {
-            match self.slots[slot] {
-                NONE => {
-                    let row = distinct.len() as u32;
-                    self.slots[slot] = row;
-                    distinct.push(position);
-                    return row;
-                }
-                row if distinct[row as usize].map(f32::to_bits) == key => return row,
-                _ => slot = (slot + 1) & mask,
-            }
+/// For each first row of equal positions the first corner that has one of them, or `NONE`.
+fn first_uses(corners: &[u32], same_as: &[AtomicU32]) -> Vec<AtomicU32> {
+    let first_uses = atomics(same_as.len());
+    corners.par_iter().zip(0..corners.len() as u32).for_each(|(row, at)| {
+        let first_use = &first_uses[same_as[*row as usize].load(Relaxed) as usize];
+        // Most corners are not the first; to look is cheaper than to write.
+        if at < first_use.load(Relaxed) {
+            first_use.fetch_min(at, Relaxed);
         }
-    }
+    });
+    first_uses
 }
 
-/// Mixes all bits into the upper ones: multiply and fold (as in Wang Yi's wyhash), then Fibonacci hashing.
-#[inline]
-fn hash([x, y, z]: [u32; 3]) -> u64 {
-    let a = (u64::from(x) | u64::from(y) << 32) ^ 0xa076_1d64_78bd_642f;
-    let b = u64::from(z) ^ 0xe703_7ed1_a0b4_28db;
-    let product = u128::from(a) * u128::from(b);
-    ((product as u64) ^ (product >> 64) as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+/// `NONE` for each row.
+fn atomics(count: usize) -> Vec<AtomicU32> {
+    (0..count).into_par_iter().map(|_| AtomicU32::new(NONE)).collect()
 }
 
 #[cfg(test)]
@@ -116,6 +133,31 @@ mod tests {
             prop_assert_eq!(welded.positions, expected);
             prop_assert_eq!(fast, slow);
         }
+    }
+
+    #[test]
+    fn weld_agrees_with_a_map_across_parts() {
+        let mut random = bth_random::Rng::new(7);
+        let positions: Vec<[f32; 3]> =
+            (0..50_000).map(|_| [(); 3].map(|()| random.below(30) as f32 - 15.0)).collect();
+        let mut triangles: Vec<[u32; 3]> = (0..CORNERS_AT_ONCE)
+            .map(|_| [(); 3].map(|()| random.below(positions.len() as u64) as u32))
+            .collect();
+        let (mut rows, mut expected) = (std::collections::HashMap::new(), Vec::new());
+        let slow: Vec<u32> = triangles
+            .as_flattened()
+            .iter()
+            .map(|&corner| {
+                let position = positions[corner as usize].map(|x| x + 0.0);
+                *rows.entry(position.map(f32::to_bits)).or_insert_with(|| {
+                    expected.push(position);
+                    expected.len() as u32 - 1
+                })
+            })
+            .collect();
+        let welded = weld(&positions, &mut triangles).unwrap();
+        assert_eq!(welded.positions, expected);
+        assert_eq!(triangles.as_flattened(), slow);
     }
 
     #[test]

@@ -109,14 +109,12 @@ fn build_tree(
     monitor: &dyn Monitor,
 ) -> Result<(BinaryBvh, BvhReport)> {
     check_mesh(mesh)?;
-    let references: Vec<Reference<Bounds>> = (0..mesh.triangles.len() as u32)
-        .into_par_iter()
-        .filter_map(|id| {
-            let corners = mesh.corners(id);
-            (keep_zero_area || !is_zero_area(corners))
-                .then(|| Reference { bounds: Bounds::of_points(&corners), id })
-        })
-        .collect();
+    let ids = 0..mesh.triangles.len() as u32;
+    let kept: Vec<u32> =
+        ids.into_par_iter().filter(|&id| keep_zero_area || !is_zero_area(mesh.corners(id))).collect();
+    let reference = |&id: &u32| Reference { bounds: Bounds::of_points(&mesh.corners(id)), id };
+    let references: Vec<Reference<Bounds>> = kept.par_iter().map(reference).collect();
+    drop(kept);
     let mut report = BvhReport {
         triangles: references.len() as u64,
         dropped: (mesh.triangles.len() - references.len()) as u64,
@@ -142,11 +140,10 @@ pub(super) fn split_all<E: Extent>(
     monitor: &dyn Monitor,
 ) -> Result<BinaryBvh> {
     monitor.stage("build", Some(references.len() as u64));
-    let blank = Node { lower: [0.0; 3], upper: [0.0; 3], first: 0, count: 0, right: 0 };
-    let mut nodes = vec![blank; 2 * references.len() - 1];
+    let mut nodes = super::zeroed(2 * references.len() - 1);
     let builder = Builder { effort, monitor };
     builder.subtree(&mut references, &mut nodes, Destination::ROOT, &mut sweep_split::Scratch::default())?;
-    let order = references.iter().map(|r| r.id).collect();
+    let order = references.par_iter().map(|r| r.id).collect();
     Ok(BinaryBvh { nodes, order })
 }
 
@@ -196,10 +193,10 @@ pub(super) fn check_mesh(mesh: &Mesh) -> Result<()> {
         });
     }
     let rows = mesh.positions.len();
-    if let Some(t) = mesh.triangles.iter().position(|t| t.iter().any(|&v| v as usize >= rows)) {
+    if let Some(t) = mesh.triangles.par_iter().position_first(|t| t.iter().any(|&v| v as usize >= rows)) {
         return internal(format!("triangle {t} refers to a position beyond the last ({rows} positions)"));
     }
-    if let Some(v) = mesh.positions.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+    if let Some(v) = mesh.positions.par_iter().position_first(|p| p.iter().any(|x| !x.is_finite())) {
         return internal(format!("position {v} is not finite"));
     }
     Ok(())
@@ -331,22 +328,27 @@ pub fn visits(bvh: &BinaryBvh) -> f64 {
     let area = |node: &Node| Bounds::of_node(node).half_area();
     let root = area(&bvh.nodes[0]);
     // A deformable mesh may lie on one line.
-    if root > 0.0 { bvh.nodes.iter().map(area).sum::<f64>() / root } else { 0.0 }
+    if root > 0.0 { super::sum_of_all(bvh, |at| area(&bvh.nodes[at as usize])) / root } else { 0.0 }
 }
 
 /// Edges on the longest path.
 pub(super) fn levels(bvh: &BinaryBvh) -> u32 {
-    let mut deepest = 0;
-    let mut stack = vec![(0u32, 0u32)];
-    while let Some((at, level)) = stack.pop() {
-        let node = &bvh.nodes[at as usize];
-        deepest = deepest.max(level);
-        if !node.is_leaf() {
-            stack.push((node.right, level + 1));
-            stack.push((at + 1, level + 1));
-        }
+    levels_below(bvh, 0)
+}
+
+/// Edges on the longest path from a node.
+fn levels_below(bvh: &BinaryBvh, at: u32) -> u32 {
+    let node = &bvh.nodes[at as usize];
+    if node.is_leaf() {
+        return 0;
     }
-    deepest
+    let [left, right] = [at + 1, node.right];
+    let (left, right) = if node.count as usize > BUILD_TASK {
+        rayon::join(|| levels_below(bvh, left), || levels_below(bvh, right))
+    } else {
+        (levels_below(bvh, left), levels_below(bvh, right))
+    };
+    1 + left.max(right)
 }
 
 #[cfg(test)]

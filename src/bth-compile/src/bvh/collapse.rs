@@ -1,12 +1,12 @@
-//! The collapse of a binary BVH to the wide BVH: plans the nodes and leaves and writes their lines.
+//! The collapse of a binary BVH to the wide BVH: plans the nodes and leaves, and has their lines written.
 
-use super::plan::{Costs, Decision, Plan, Planner, Role, children};
+use super::plan::{Costs, Decision, Plan, Planner};
 use super::poses::Weighed;
-use super::wide_lines::{indexed_leaf, put, raw_leaf, wide_node};
+use super::wide_tree::Writer;
 use super::{BinaryBvh, MAX_LEVELS};
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
-use bth_format::layout::{CacheLine, Child, INDEXED_LINES, NODE_LINES, NONE, RAW_LINES, WIDTH};
+use bth_format::layout::{CacheLine, NONE, WIDTH};
 use bth_import::Mesh;
 use serde::Serialize;
 
@@ -190,178 +190,6 @@ fn check_depth(depth: u32) -> Result<()> {
         code: "BTH-L203",
         message: format!("the BVH is {depth} nodes deep; {} can be traversed", bth_format::limits::MAX_DEPTH),
     })
-}
-
-fn check_lines(lines: usize) -> Result<()> {
-    if lines <= Child::INDEX_LIMIT as usize {
-        return Ok(());
-    }
-    Err(Error::Limit {
-        code: "BTH-L202",
-        message: format!(
-            "the BVH needs {lines} lines of 64 bytes; an object can have {}",
-            Child::INDEX_LIMIT
-        ),
-    })
-}
-
-/// A wide node before its lines are written.
-struct Inner {
-    /// Its slots in `Writer::tree`'s list.
-    first: usize,
-    count: usize,
-}
-
-/// A slot that is not decided yet.
-struct Pending {
-    slot: usize,
-    /// Wide nodes above it.
-    level: u32,
-    /// Whether it lies in no subtree of a tet leaf.
-    outer: bool,
-}
-
-/// A slot of a wide node.
-struct Slot {
-    /// Node of the binary BVH.
-    node: u32,
-    /// Child code, once it is assigned.
-    code: u32,
-}
-
-struct Writer<'a> {
-    mesh: &'a Mesh,
-    bvh: &'a BinaryBvh,
-    weighed: Weighed<'a>,
-    cut: &'a [u32],
-    decisions: &'a [Decision],
-    plan: Plan,
-    leaf_vertices: bool,
-    monitor: &'a dyn Monitor,
-    wide: &'a mut Wide,
-    report: &'a mut CollapseReport,
-}
-
-impl Writer<'_> {
-    /// Appends the tree below a node, nodes before leaves. `level` wide nodes lie above; `outer` is
-    /// false for the subtree of a tet leaf. Returns the root's code and the tet leaves with the wide nodes above each. Where the vertices
-    /// of leaves are recorded, the subtrees of tet leaves are part of the tree.
-    fn tree(&mut self, root: u32, level: u32, outer: bool) -> Result<(u32, Vec<(u32, u32)>)> {
-        let base = self.wide.lines.len();
-        // First the shape is determined: slot 0 holds the root, every other slot belongs to a node.
-        let mut slots = vec![Slot { node: root, code: NONE }];
-        let mut inner: Vec<Inner> = Vec::new();
-        let mut leaves: Vec<(usize, bool)> = Vec::new();
-        let mut tets = Vec::new();
-        // Slots of the roots of subtrees, which belong to no node, and the tet leaves.
-        let mut subtrees: Vec<(usize, usize)> = Vec::new();
-        let mut pending = vec![Pending { slot: 0, level, outer }];
-        while let Some(Pending { slot, level, outer }) = pending.pop() {
-            let at = slots[slot].node;
-            let decision = self.decisions[at as usize];
-            if outer && decision.is_cut() {
-                let row = self.cut.binary_search(&at).expect("only cut nodes are marked so");
-                slots[slot].code = Child::Tets(row as u32).code();
-                self.report.tet_leaves += 1;
-                tets.push((at, level));
-                if self.leaf_vertices {
-                    subtrees.push((slots.len(), row));
-                    pending.push(Pending { slot: slots.len(), level, outer: false });
-                    slots.push(Slot { node: at, code: NONE });
-                }
-                continue;
-            }
-            if decision.role() != Role::Node {
-                leaves.push((slot, outer));
-                continue;
-            }
-            slots[slot].code = Child::Node((base + inner.len() * NODE_LINES) as u32).code();
-            let first = slots.len();
-            slots.extend(
-                children(self.bvh, self.decisions, at, self.plan.children)
-                    .into_iter()
-                    .map(|node| Slot { node, code: NONE }),
-            );
-            inner.push(Inner { first, count: slots.len() - first });
-            self.wide.depth = self.wide.depth.max(level + 1);
-            if outer {
-                self.report.node_visits += self.area(at);
-            }
-            pending.extend((first..slots.len()).rev().map(|slot| Pending { slot, level: level + 1, outer }));
-        }
-
-        // Leaves follow the nodes.
-        let mut next = base + inner.len() * NODE_LINES;
-        for &(slot, _) in &leaves {
-            let role = self.decisions[slots[slot].node as usize].role();
-            let (child, lines) = match role {
-                Role::Raw => (Child::Raw(next as u32), RAW_LINES),
-                _ => (Child::Indexed(next as u32), INDEXED_LINES),
-            };
-            slots[slot].code = child.code();
-            next += lines;
-            check_lines(next)?;
-        }
-        check_lines(next)?;
-
-        self.wide.lines.resize(next, CacheLine([0; 16]));
-        for (i, Inner { first, count }) in inner.iter().enumerate() {
-            let slots =
-                slots[*first..first + count].iter().map(|s| (&self.bvh.nodes[s.node as usize], s.code));
-            put(&mut self.wide.lines, base + i * NODE_LINES, &wide_node(slots));
-        }
-        for (done, &(slot, outer)) in leaves.iter().enumerate() {
-            if done % 4096 == 0 {
-                self.monitor.check()?;
-            }
-            self.leaf(&slots[slot], outer);
-        }
-        for &(slot, row) in &subtrees {
-            self.wide.subtrees[row] = slots[slot].code;
-        }
-        self.report.nodes += inner.len() as u64;
-        self.report.children += (slots.len() - subtrees.len()) as u64 - 1;
-        Ok((slots[0].code, tets))
-    }
-
-    /// Writes a triangle leaf at the line of its code.
-    fn leaf(&mut self, slot: &Slot, outer: bool) {
-        let node = &self.bvh.nodes[slot.node as usize];
-        let ids = &self.bvh.order[node.first as usize..][..node.count as usize];
-        let first = self.wide.triangle_ids.len() as u32;
-        self.wide.triangle_ids.extend_from_slice(ids);
-        match Child::from_code(slot.code) {
-            Some(Child::Raw(line)) => {
-                let (leaf, rows) = raw_leaf(self.mesh, ids, first);
-                put(&mut self.wide.lines, line as usize, &leaf);
-                self.record(&rows);
-                self.report.raw_leaves += 1;
-                self.report.raw_triangles += u64::from(node.count);
-            }
-            Some(Child::Indexed(line)) => {
-                let (leaf, rows) = indexed_leaf(self.mesh, ids, first);
-                put(&mut self.wide.lines, line as usize, &leaf);
-                self.record(&[rows]);
-                self.report.indexed_leaves += 1;
-                self.report.indexed_triangles += u64::from(node.count);
-            }
-            _ => unreachable!("leaf slots have leaf codes"),
-        }
-        if outer {
-            self.report.leaf_visits += self.area(slot.node);
-        }
-    }
-
-    /// Records the rows of a leaf's vertices, if they are wanted.
-    fn record(&mut self, rows: &[[u32; WIDTH]]) {
-        if self.leaf_vertices {
-            self.wide.leaf_vertices.extend_from_slice(rows);
-        }
-    }
-
-    fn area(&self, at: u32) -> f64 {
-        self.weighed.area(at)
-    }
 }
 
 #[cfg(test)]

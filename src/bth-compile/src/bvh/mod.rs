@@ -23,6 +23,7 @@ mod reinsertion;
 mod split;
 mod sweep_split;
 mod wide_lines;
+mod wide_tree;
 
 #[cfg(test)]
 mod samples;
@@ -36,11 +37,14 @@ pub use plan::{Costs, Decision, Plan, Planner, Role, Vertices};
 pub use pose_costs::{PoseCost, pose_costs};
 pub use poses::{Poses, Weighed};
 
+use rayon::prelude::*;
+use zerocopy::FromZeros;
+
 /// Greatest number of poses over which the cost of a tree is summed.
 pub const MAX_POSES: usize = 16;
 
 /// Node of a [`BinaryBvh`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, FromZeros)]
 pub struct Node {
     /// Box, object space: exactly the bounds of the corners of the node's triangles.
     pub lower: [f32; 3],
@@ -71,4 +75,23 @@ pub struct BinaryBvh {
     /// Triangle ids; each node covers `order[first..first + count]`. Triangles of exactly zero
     /// area are left out. A leaf of the tree holds one triangle.
     pub order: Vec<u32>,
+}
+
+/// Nodes that one task sums; a constant, so that the rounding does not depend on the number of threads.
+const SUMMED_AT_ONCE: usize = 1 << 16;
+
+/// The sum of a value over all nodes.
+fn sum_of_all(bvh: &BinaryBvh, value: impl Fn(u32) -> f64 + Sync) -> f64 {
+    let parts = (0..bvh.nodes.len().div_ceil(SUMMED_AT_ONCE)).into_par_iter();
+    let part = |k: usize| {
+        let end = bvh.nodes.len().min((k + 1) * SUMMED_AT_ONCE);
+        (k * SUMMED_AT_ONCE..end).map(|at| value(at as u32)).sum::<f64>()
+    };
+    parts.map(part).collect::<Vec<f64>>().into_iter().sum()
+}
+
+/// So many zero elements. The system makes their pages when they are first written, which several threads may do.
+fn zeroed<T: FromZeros>(count: usize) -> Vec<T> {
+    let no_memory = |_| std::alloc::handle_alloc_error(std::alloc::Layout::new::<T>());
+    T::new_vec_zeroed(count).unwrap_or_else(no_memory)
 }

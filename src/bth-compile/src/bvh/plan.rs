@@ -10,6 +10,7 @@ use crate::error::Result;
 use crate::monitor::Monitor;
 use bth_format::layout::{INDEXED_LINES, NODE_LINES, RAW_LINES, WIDTH};
 use bth_import::Mesh;
+use zerocopy::FromZeros;
 
 /// Costs of a ray's visits, relative to that of a wide node. A visit's probability is the node's area over the root's.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,7 +63,7 @@ pub enum Role {
 
 /// A node's decisions in 4 bits each: at bit 4 k for k in 2..16, the number of k slots that its left child takes, 0 for the
 /// same as with k - 1; at bit 0, the number of 16 slots when it is itself a wide node; at bit 4, its role.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, FromZeros)]
 pub struct Decision(u64);
 
 impl Decision {
@@ -194,7 +195,7 @@ impl<'a> Planner<'a> {
 
     /// Decisions for all nodes, and the cost of the tree without its tet leaves; `cut` holds these, ascending.
     pub(super) fn run(&self, cut: &[u32]) -> Result<(Vec<Decision>, f32)> {
-        let mut decisions = vec![Decision::default(); self.bvh.nodes.len()];
+        let mut decisions: Vec<Decision> = super::zeroed(self.bvh.nodes.len());
         let summary = self.subtree(0, cut, &mut decisions)?;
         Ok((decisions, summary.cost[1]))
     }

@@ -106,7 +106,7 @@ impl Weighed<'_> {
 
     /// The sum of [`Self::area`] over all nodes.
     pub(super) fn total(&self) -> f64 {
-        (0..self.bvh.nodes.len() as u32).map(|at| self.area(at)).sum()
+        super::sum_of_all(self.bvh, |at| self.area(at))
     }
 }
 

@@ -85,8 +85,8 @@ pub fn compile(
     let model = Model { path: source, digest: &digest };
     let outcome = compile_or_fetch(cache, key.as_ref(), needed, monitor, || {
         let stages = &mut CachedStages::of_model(cache);
-        let (compiled, report) = compile_model(&model, options, stages, clock, monitor)?;
-        Ok((compiled.bytes.into(), report, true))
+        let (file, report) = compile_model(&model, options, stages, clock, monitor)?;
+        Ok((file.into(), report, true))
     })?;
     warn_if_over_limit(&outcome.report, options, monitor);
     Ok(outcome)
@@ -113,8 +113,8 @@ pub(crate) fn compile_triangles(
             || import_triangles(model.path, mesh.positions, mesh.triangles, options.wanted(), monitor);
         let imported = clock.time("mesh", import)?;
         let stages = &mut CachedStages::of_model(cache);
-        let (checked, report) = compile_imported(&model, imported, options, stages, clock, monitor)?;
-        Ok((checked.compiled.bytes.into(), report, true))
+        let (file, report) = compile_imported(&model, imported, options, stages, clock, monitor)?;
+        Ok((file.into(), report, true))
     })?;
     warn_if_over_limit(&outcome.report, options, monitor);
     Ok(outcome)

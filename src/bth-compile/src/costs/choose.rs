@@ -5,7 +5,7 @@ use super::gains::{Gain, Sampled, sample};
 use super::least_useful::{Weighed, least_useful};
 use super::options::{Choice, CostOptions, CostReport, Select, SelectionOutcome, Verdict};
 use super::prices::Prices;
-use super::subtree_sums::subtree_sums;
+use super::subtree_sums::depths;
 use super::{Weighting, top_down};
 use crate::bvh::BinaryBvh;
 use crate::error::{Error, Result};
@@ -168,8 +168,8 @@ fn best(
     let weights = scene.map_or(options.optimize_for.weights(), Weighting::shares);
     let sampled: Sampled = sample(mesh, bvh, options, scene);
     monitor.check()?;
-    let sums = subtree_sums(bvh);
-    let gains = sampled.gains(bvh, &sums, &nodes, limits.prices, weights);
+    let depths = depths(bvh, &top, &nodes);
+    let gains = sampled.gains(bvh, &depths, &nodes, limits.prices, weights);
     let count = |i: u32| bvh.nodes[i as usize].count;
     let takes: Vec<[f64; 2]> = nodes.iter().map(|&i| limits.takes(count(i))).collect();
     let candidates = Candidates { bvh, nodes: &nodes, gains: &gains, takes: &takes };
@@ -202,7 +202,7 @@ fn best(
 const BVH_BYTES: f64 = 36.0;
 
 /// The nodes of at least this many triangles and their smaller children, ascending.
-fn nodes_from(bvh: &BinaryBvh, triangles: u32) -> Vec<u32> {
+pub(super) fn nodes_from(bvh: &BinaryBvh, triangles: u32) -> Vec<u32> {
     let (mut nodes, mut i) = (Vec::new(), 0);
     while i < bvh.nodes.len() {
         nodes.push(i as u32);

@@ -8,10 +8,11 @@ use super::bvh_walk::{Traced, walk};
 use super::options::CostOptions;
 use super::prices::{LINES_THAT_HIT, Prices};
 use super::rays::{self, SampleRay, along};
-use super::subtree_sums::Sums;
 use super::{Start, Weighting};
 use crate::bvh::BinaryBvh;
 use bth_import::Mesh;
+use rayon::prelude::*;
+use std::collections::HashMap;
 
 /// Steps of a ray as short as those for ambient occlusion, as a share of those of a bounce: 19 of 32 on the bunny.
 const SHORT_STEPS: f64 = 0.6;
@@ -35,11 +36,9 @@ pub(super) struct Gain {
 pub(super) struct Sampled {
     /// Rays from surfaces, with the row that each starts on and its result.
     surface: Vec<(SampleRay, u32, Traced)>,
-    /// How many rays from outside there were, and for each node how many entered it and how many visits its
-    /// subtree had of them.
+    /// How many rays from outside there were, and the nodes that they entered, ascending, once for each ray.
     outside: usize,
     entered: Vec<u32>,
-    visits: Vec<u64>,
     /// Nanoseconds of a ray through the BVH alone, all kinds.
     pub(super) cost_bvh: f64,
 }
@@ -52,7 +51,7 @@ pub(super) fn sample(
     options: &CostOptions,
     scene: Option<&Weighting>,
 ) -> Sampled {
-    let [camera, surface] = scene.map_or(options.optimize_for.weights(), |s| s.shares());
+    let [camera, surface_share] = scene.map_or(options.optimize_for.weights(), |s| s.shares());
     let drawn;
     let (from_outside, from_surface): (&[SampleRay], &[SampleRay]) = match scene {
         Some(scene) => (&scene.outside, &scene.surface),
@@ -65,53 +64,50 @@ pub(super) fn sample(
         }
     };
     let costs = options.profile.bvh;
-    let mut sampled = Sampled {
-        surface: Vec::with_capacity(from_surface.len()),
-        outside: from_outside.len(),
-        entered: vec![0; bvh.nodes.len()],
-        visits: vec![0; bvh.nodes.len()],
-        cost_bvh: 0.0,
+    let nodes_of = |ray: &SampleRay| {
+        let mut nodes = Vec::new();
+        walk(mesh, bvh, ray, |node| nodes.push(node));
+        nodes
     };
-    let mut total = 0;
-    for ray in from_outside {
-        total += walk(mesh, bvh, ray, |node| sampled.entered[node as usize] += 1).visits;
-    }
-    for i in (0..bvh.nodes.len()).rev() {
-        let node = &bvh.nodes[i];
-        let below =
-            if node.is_leaf() { 0 } else { sampled.visits[i + 1] + sampled.visits[node.right as usize] };
-        sampled.visits[i] = below + u64::from(sampled.entered[i]);
-    }
-    let row_of = rows(bvh, mesh.triangles.len());
-    let mut surface_total = 0;
-    for ray in from_surface {
-        let traced = walk(mesh, bvh, ray, |_| {});
-        surface_total += traced.visits;
-        let row = ray.from.map_or(u32::MAX, |triangle| row_of[triangle as usize]);
-        sampled.surface.push((*ray, row, traced));
-    }
-    let mean = |visits: u32, rays: usize| f64::from(visits) / rays.max(1) as f64;
-    sampled.cost_bvh = costs.ray
-        + camera * costs.outside * mean(total, from_outside.len())
-        + surface * costs.surface * mean(surface_total, from_surface.len());
-    sampled
+    let mut entered: Vec<u32> = from_outside.par_iter().flat_map_iter(nodes_of).collect();
+    entered.par_sort_unstable();
+    let rows = rows(bvh, mesh.triangles.len(), from_surface.iter().filter_map(|ray| ray.from));
+    let row = |triangle: u32| rows.get(&triangle).copied();
+    let surface: Vec<(SampleRay, u32, Traced)> = from_surface
+        .par_iter()
+        .map(|ray| (*ray, ray.from.and_then(row).unwrap_or(u32::MAX), walk(mesh, bvh, ray, |_| {})))
+        .collect();
+    let surface_visits = surface.iter().map(|(_, _, traced)| traced.visits as usize).sum();
+    let mean = |visits: usize, rays: usize| visits as f64 / rays.max(1) as f64;
+    let cost_bvh = costs.ray
+        + camera * costs.outside * mean(entered.len(), from_outside.len())
+        + surface_share * costs.surface * mean(surface_visits, from_surface.len());
+    Sampled { surface, outside: from_outside.len(), entered, cost_bvh }
 }
 
-/// Row of the BVH's order of each triangle, or `u32::MAX`.
-fn rows(bvh: &BinaryBvh, triangles: usize) -> Vec<u32> {
-    let mut rows = vec![u32::MAX; triangles];
-    for (row, &triangle) in bvh.order.iter().enumerate() {
-        rows[triangle as usize] = row as u32;
-    }
-    rows
+/// Rows of the BVH's order of some of so many triangles; those that are in no leaf are left out.
+fn rows(bvh: &BinaryBvh, triangles: usize, of: impl Iterator<Item = u32>) -> HashMap<u32, u32> {
+    let mut wanted = vec![false; triangles];
+    of.for_each(|triangle| wanted[triangle as usize] = true);
+    let order = bvh.order.par_iter().zip(0..bvh.order.len() as u32);
+    order
+        .filter(|(triangle, _)| wanted[**triangle as usize])
+        .map(|(triangle, row)| (*triangle, row))
+        .collect()
 }
 
 impl Sampled {
-    /// The gains of these nodes, which are ascending. `weights` are those of rays from outside and from surfaces.
+    /// How often rays from outside entered these nodes.
+    fn entered(&self, nodes: std::ops::Range<u32>) -> usize {
+        let before = |node: u32| self.entered.partition_point(|entered| *entered < node);
+        before(nodes.end) - before(nodes.start)
+    }
+
+    /// The gains of these nodes, which are ascending; `depths` are the sums of the depths of their leaves. `weights` are those of rays from outside and from surfaces.
     pub(super) fn gains(
         &self,
         bvh: &BinaryBvh,
-        sums: &[Sums],
+        depths: &[u64],
         nodes: &[u32],
         prices: &Prices<'_>,
         weights: [f64; 2],
@@ -119,8 +115,10 @@ impl Sampled {
         let costs = prices.bvh();
         let mut gains: Vec<Gain> = Vec::with_capacity(nodes.len());
         let mut started = vec![0u32; nodes.len()];
-        let depth = |i: u32| sums[i as usize].depth as f64 / f64::from(bvh.nodes[i as usize].count);
-        let steps = |start: Start, i: u32| prices.steps(start, bvh.nodes[i as usize].count, depth(i));
+        let steps = |start: Start, k: usize| {
+            let count = bvh.nodes[nodes[k] as usize].count;
+            prices.steps(start, count, depths[k] as f64 / f64::from(count))
+        };
         gains.resize(nodes.len(), Gain::default());
         for (ray, row, traced) in &self.surface {
             let bvh_time = costs.ray + costs.surface * f64::from(traced.visits);
@@ -129,7 +127,7 @@ impl Sampled {
                 let node = &bvh.nodes[at as usize];
                 let share = if ray.tmax.is_finite() { SHORT_STEPS } else { 1.0 };
                 let mut time =
-                    prices.surface(node.count, share * steps(Start::Surface, at), hits(traced, node));
+                    prices.surface(node.count, share * steps(Start::Surface, k), hits(traced, node));
                 if at != 0 && leaves(ray, traced, node) {
                     time += bvh_time;
                 }
@@ -138,22 +136,22 @@ impl Sampled {
                 gains[k].bvh += bvh_time;
             }
         }
-        for ((gain, &at), &started) in gains.iter_mut().zip(nodes).zip(&started) {
+        for (k, ((gain, &at), &started)) in gains.iter_mut().zip(nodes).zip(&started).enumerate() {
             let node = &bvh.nodes[at as usize];
-            gain.steps = steps(Start::Surface, at);
+            gain.steps = steps(Start::Surface, k);
             if prices.hints() {
                 gain.saved += weights[1] * (gain.bvh - gain.tets) / self.surface.len().max(1) as f64;
             }
             if !prices.keep_subtrees {
-                let n = steps(Start::Outside, at);
+                let n = steps(Start::Outside, k);
                 let walked = match at {
                     0 => prices.outside(node.count, n, LINES_THAT_HIT),
                     _ => prices.alone(node.count, n, LINES_THAT_HIT),
                 };
                 // A ray that enters the root's tetrahedra is not prepared for the BVH.
                 let prepared = if at == 0 { costs.ray } else { 0.0 };
-                let through = costs.outside * self.visits[at as usize] as f64
-                    + (prepared - walked) * f64::from(self.entered[at as usize]);
+                let through = costs.outside * self.entered(at..at + 2 * node.count - 1) as f64
+                    + (prepared - walked) * self.entered(at..at + 1) as f64;
                 gain.saved += weights[0] * through / self.outside.max(1) as f64;
             }
             let started = f64::from(started.max(1));

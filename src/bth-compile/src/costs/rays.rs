@@ -5,6 +5,7 @@ use crate::vectors::{corners, double_area, uniform_direction, unit};
 use bth_import::Mesh;
 use bth_random::Rng;
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// A sampled ray, object space.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,14 +73,12 @@ pub fn from_surface(
     let (mut random, diagonal) = (Rng::new(seed), diagonal(root));
     let triangles = &bvh.order[rows];
     let normal = |triangle: u32| double_area(corners(mesh, triangle));
+    let mut sums: Vec<f64> = triangles.par_iter().map(|&t| normal(t).length()).collect();
     let mut total = 0.0;
-    let sums: Vec<f64> = triangles
-        .iter()
-        .map(|&t| {
-            total += normal(t).length();
-            total
-        })
-        .collect();
+    for sum in &mut sums {
+        total += *sum;
+        *sum = total;
+    }
     if !(total > 0.0 && total.is_finite()) {
         return Vec::new();
     }

@@ -1,6 +1,7 @@
 //! Areas and depths of every subtree, the inputs of the cost model, summed in one pass from the leaves to the root.
 
 use crate::bvh::{BinaryBvh, Node};
+use rayon::prelude::*;
 
 /// Sums over the subtree of a node, the node included.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -18,6 +19,27 @@ pub(super) struct Sums {
 pub(super) fn half_area(node: &Node) -> f64 {
     let side = |k: usize| f64::from(node.upper[k]) - f64::from(node.lower[k]);
     side(0) * side(1) + side(1) * side(2) + side(2) * side(0)
+}
+
+/// [`Sums::depth`] of each of `nodes`. These and `top` are ascending; `top` holds the root, and with a node all nodes above it.
+pub(super) fn depths(bvh: &BinaryBvh, top: &[u32], nodes: &[u32]) -> Vec<u64> {
+    // A leaf is as deep below a node as there are inner nodes above it, so each inner node adds its leaves. In preorder
+    // the nodes of a subtree are a range, which those of `top` divide into parts.
+    let end = |k: usize| top.get(k + 1).map_or(bvh.nodes.len(), |next| *next as usize);
+    let inner = |part: &[Node]| part.iter().filter(|n| !n.is_leaf()).map(|n| u64::from(n.count)).sum();
+    let parts: Vec<u64> =
+        top.par_iter().enumerate().map(|(k, &i)| inner(&bvh.nodes[i as usize..end(k)])).collect();
+    let mut before = Vec::with_capacity(top.len() + 1);
+    before.push(0);
+    for part in parts {
+        before.push(before[before.len() - 1] + part);
+    }
+    let depth = |&i: &u32| {
+        let behind = i + 2 * bvh.nodes[i as usize].count - 1;
+        let [first, last] = [i, behind].map(|node| top.partition_point(|t| *t < node));
+        before[last] - before[first]
+    };
+    nodes.iter().map(depth).collect()
 }
 
 /// The sums of every node.

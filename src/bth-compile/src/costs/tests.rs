@@ -241,3 +241,18 @@ fn walks_end_at_triangles_the_hull_or_the_rays_end() {
     assert_eq!(walker.walk(&ray(0.0, 1.0, 0.01, Some(9))), walked(false, false));
     assert_eq!(walker.walk(&ray(5.0, 1.0, f64::INFINITY, None)), None);
 }
+
+#[test]
+fn depths_of_some_nodes_are_those_of_all() {
+    for seed in 0..50 {
+        let bvh = tree(seed, 1 + 17 * seed as u32);
+        let all = subtree_sums::subtree_sums(&bvh);
+        for least in [1, 2, 7, 40, 5000] {
+            let top = choose::nodes_from(&bvh, least);
+            let large: Vec<u32> =
+                top.iter().copied().filter(|&i| bvh.nodes[i as usize].count >= least).collect();
+            let expected: Vec<u64> = large.iter().map(|&i| all[i as usize].depth).collect();
+            assert_eq!(subtree_sums::depths(&bvh, &top, &large), expected, "seed {seed}, {least}");
+        }
+    }
+}

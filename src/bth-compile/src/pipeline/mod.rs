@@ -21,8 +21,8 @@ pub use limit::storage;
 pub(crate) use limit::warn_over_limit;
 pub use motion::{MotionReport, SegmentReport};
 pub(crate) use moving::{PoseSource, compile_moving, warn_of_options};
-pub(crate) use object::{Checked, Object, TracedMesh};
 pub use object::{Compiled, assemble};
+pub(crate) use object::{Object, TracedMesh};
 pub(crate) use report::StageReports;
 pub use report::{CompileReport, FileReport};
 pub(crate) use stages::{Direct, Stages};
@@ -49,9 +49,9 @@ pub fn compile(
     let mut clock = Clock::default();
     let digest = clock.time("hash", || SourceDigest::of(source, options.looks()))?;
     let model = Model { path: source, digest: &digest };
-    let (compiled, report) = compile_model(&model, options, &mut Direct, clock, monitor)?;
+    let (file, report) = compile_model(&model, options, &mut Direct, clock, monitor)?;
     warn_over_limit(&report.file, options, monitor);
-    Ok((compiled, report))
+    Ok((file.into(), report))
 }
 
 /// Compiles a model whose files have been hashed; `clock` has the time of that.
@@ -61,10 +61,9 @@ pub(crate) fn compile_model(
     stages: &mut dyn Stages,
     mut clock: Clock,
     monitor: &dyn Monitor,
-) -> Result<(Compiled, CompileReport)> {
+) -> Result<(bth_format::File, CompileReport)> {
     let imported = clock.time("mesh", || stages.import(model, options.wanted(), monitor))?;
-    let (checked, report) = compile_imported(model, imported, options, stages, clock, monitor)?;
-    Ok((checked.compiled, report))
+    compile_imported(model, imported, options, stages, clock, monitor)
 }
 
 /// Compiles a model that has been imported.
@@ -75,14 +74,14 @@ pub(crate) fn compile_imported(
     stages: &mut dyn Stages,
     mut clock: Clock,
     monitor: &dyn Monitor,
-) -> Result<(Checked, CompileReport)> {
+) -> Result<(bth_format::File, CompileReport)> {
     let (object, reports) = compile_mesh(model.path, mesh, options, stages, &mut clock, monitor)?;
     let source_blake3 = model.digest.file.hex();
     let tetgen = provenance::tetgen(reports.tets.as_ref());
     let provenance = provenance::of_model(&source_blake3, &import.format, tetgen, options)?;
     let images = images(model, object.image_names(), monitor)?;
-    let (checked, file) = clock.time("file", || object.file(provenance, &images, options))?;
-    Ok((checked, CompileReport::new(source_blake3, clock, import, reports, file)))
+    let (file, report) = clock.time("file", || object.file(provenance, &images, options))?;
+    Ok((file, CompileReport::new(source_blake3, clock, import, reports, report)))
 }
 
 /// The images of a model that have these names.

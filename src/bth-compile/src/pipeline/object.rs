@@ -18,10 +18,10 @@ pub struct Compiled {
     pub bytes: Vec<u8>,
 }
 
-/// A compiled file, also as a reader has it who has checked every index.
-pub(crate) struct Checked {
-    pub(crate) compiled: Compiled,
-    pub(crate) file: bth_format::File,
+impl From<bth_format::File> for Compiled {
+    fn from(file: bth_format::File) -> Self {
+        Compiled { bytes: file.bytes().to_vec() }
+    }
 }
 
 /// A mesh with the vertices that are traced, and its binary BVH.
@@ -150,7 +150,7 @@ pub fn assemble(
 ) -> Result<Compiled> {
     let traced = TracedMesh { mesh: mesh.clone(), on_grid: None, tree: tree.clone(), probabilities: None };
     let (object, _) = join(traced, built.to_vec(), None, options, monitor)?;
-    Ok(object.file("{}".to_owned(), &[], options)?.0.compiled)
+    Ok(object.file("{}".to_owned(), &[], options)?.0.into())
 }
 
 impl Object {
@@ -160,25 +160,24 @@ impl Object {
         provenance: String,
         images: &[ImageFile],
         options: &CompileOptions,
-    ) -> Result<(Checked, FileReport)> {
+    ) -> Result<(bth_format::File, FileReport)> {
         let parts = self.parts(options);
         let mut builder = write::FileBuilder::new();
         write::object(&mut builder, 0, &parts)?;
         write::images(&mut builder, images.iter().map(|image| (image.name, image.bytes.as_slice())))?;
         builder.provenance(provenance)?;
-        let bytes = builder.finish();
-        let file = write::checked(&bytes)?;
+        let file = builder.open()?;
         file.check_images().map_err(write::defect)?;
         let resident_bytes = resident_bytes(&parts);
         let triangles = self.traced.mesh.triangles.len();
         let report = FileReport {
-            bytes: bytes.len() as u64,
+            bytes: file.bytes().len() as u64,
             tet_leaves: self.tet_leaves,
             tet_triangles: self.tet_triangles,
             resident_bytes,
             resident_bytes_per_triangle: resident_bytes as f64 / triangles.max(1) as f64,
         };
-        Ok((Checked { compiled: Compiled { bytes }, file }, report))
+        Ok((file, report))
     }
 
     /// Names of the images that its textures refer to.

@@ -7,11 +7,11 @@ use super::report::ObjectReport;
 use super::sources::File;
 use crate::cached::{CachedStages, ObjectKeys};
 use crate::costs;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::options::CompileOptions;
 use crate::pipeline::{self, Clock};
 use crate::tets;
-use crate::write::{self, FileBuilder, object};
+use crate::write::{FileBuilder, object};
 use bth_cache::Key;
 use serde::{Deserialize, Serialize};
 
@@ -99,18 +99,17 @@ fn build_or_fetch(
     };
     let worker = reports.tets.map(|r| r.worker).filter(|w| *w != tets::WorkerStatus::NotNeeded);
     let record = ObjectRecord { object: report, worker };
-    let bytes = clock.time("file", || {
+    let file = clock.time("file", || {
         let mut builder = FileBuilder::new();
         object(&mut builder, 0, &built.parts(options))?;
         for (number, segment) in (1..).zip(&built.segment_objects) {
             object(&mut builder, number, &segment.parts(options))?;
         }
-        Ok::<_, Error>(builder.finish())
+        builder.open()
     })?;
     drop(built);
-    let file = clock.time("file", || write::checked(&bytes))?;
     if let Some(key) = key {
-        cache.put(&key, part, &bytes, &record, *monitor);
+        cache.put(&key, part, file.bytes(), &record, *monitor);
     }
     Ok(BuiltObject { file, record })
 }

@@ -3,11 +3,16 @@
 
 use super::content::{Bytes, Content};
 use crate::error::{Error, Result};
+use bth_format::FileMemory;
 use bth_format::file::{content_id, hash128};
 use bth_format::layout::*;
+use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use zerocopy::IntoBytes;
+
+/// Bytes that one task copies.
+const COPIED_AT_ONCE: usize = 4 << 20;
 
 /// Collects the sections of a file.
 #[derive(Clone, Debug, Default)]
@@ -129,17 +134,43 @@ impl<'a> FileBuilder<'a> {
     /// # Panics
     /// When a section is still in another file.
     pub fn finish(&self) -> Vec<u8> {
-        let mut bytes = Vec::with_capacity(self.file_length() as usize);
-        let entries = self.entries();
-        bytes.extend(self.head(&entries));
-        for (entry, section) in entries.iter().zip(self.sections.values()) {
-            bytes.resize(entry.offset as usize, 0);
-            bytes.extend_from_slice(
-                section.bytes.in_memory().expect("the bytes of all sections are in memory"),
-            );
-        }
-        bytes.resize(self.file_length() as usize, 0);
+        let mut bytes = vec![0; self.file_length() as usize];
+        self.write_into(&mut bytes);
         bytes
+    }
+
+    /// The whole file in memory, after the checks of a reader ([`super::checked`]).
+    ///
+    /// # Errors
+    /// `BTH-L034` when there is not enough memory; `BTH-X030` when the bytes violate the format, which is a defect of the
+    /// compiler.
+    ///
+    /// # Panics
+    /// When a section is still in another file.
+    pub(crate) fn open(&self) -> Result<bth_format::File> {
+        let length = self.file_length();
+        let mut memory = FileMemory::zeroed(length as usize).map_err(|_| no_memory(length))?;
+        self.write_into(memory.bytes_mut());
+        super::checked(bth_format::File::from_memory(memory).map_err(super::defect)?)
+    }
+
+    /// Writes the file into as many zero bytes, several sections at a time.
+    fn write_into(&self, bytes: &mut [u8]) {
+        let entries = self.entries();
+        let head = self.head(&entries);
+        let (front, mut rest) = bytes.split_at_mut(head.len());
+        front.copy_from_slice(&head);
+        let mut end = head.len();
+        let mut copies = Vec::with_capacity(entries.len());
+        for (entry, section) in entries.iter().zip(self.sections.values()) {
+            let from = section.bytes.in_memory().expect("the bytes of all sections are in memory");
+            let (_, section_and_rest) = rest.split_at_mut(entry.offset as usize - end);
+            let (to, behind) = section_and_rest.split_at_mut(from.len());
+            copies.extend(to.chunks_mut(COPIED_AT_ONCE).zip(from.chunks(COPIED_AT_ONCE)));
+            rest = behind;
+            end = entry.offset as usize + from.len();
+        }
+        copies.into_par_iter().for_each(|(to, from)| to.copy_from_slice(from));
     }
 
     /// The file, ready to be written, and its section table.
@@ -230,6 +261,11 @@ fn coordinates_of(kind: u32, bytes: &[u8]) -> Option<u32> {
 fn features(coordinates: u32) -> u64 {
     let grid = if coordinates & !PACKED_NODES != 0 { FEATURE_GRID } else { 0 };
     grid | if coordinates & PACKED_NODES != 0 { FEATURE_PACKED_NODES } else { 0 }
+}
+
+fn no_memory(length: u64) -> Error {
+    let message = format!("not enough memory for a file of {length} bytes");
+    Error::Limit { code: "BTH-L034", message }
 }
 
 pub(super) fn defect(message: String) -> Error {

@@ -53,6 +53,13 @@ impl From<Vec<u8>> for Content {
     }
 }
 
+impl From<bth_format::File> for Content {
+    fn from(file: bth_format::File) -> Self {
+        let length = file.bytes().len();
+        Self { pieces: vec![Bytes::InFile(Arc::new(file), 0..length)], length: length as u64, pad: 0 }
+    }
+}
+
 impl Content {
     /// A content that starts with these bytes.
     pub(super) fn new(bytes: Vec<u8>) -> Self {
@@ -158,7 +165,9 @@ impl Content {
     /// # Errors
     /// As [`Self::write_to`].
     pub fn bytes(&self) -> Result<Cow<'_, [u8]>> {
-        if let ([Bytes::Owned(bytes)], 0) = (&self.pieces[..], self.pad) {
+        if let ([piece], 0) = (&self.pieces[..], self.pad)
+            && let Some(bytes) = piece.in_memory()
+        {
             return Ok(Cow::Borrowed(bytes));
         }
         let mut bytes = Vec::with_capacity(self.length as usize);

@@ -24,12 +24,11 @@ pub(crate) use whole::{HEADER, are_zeros, name};
 
 use crate::error::{Error, Result};
 
-/// The file in newly encoded bytes, after the checks of a reader: header, table and every index.
+/// A newly encoded file, after the checks of a reader: every index.
 ///
 /// # Errors
 /// `BTH-X030` when the bytes violate the format, which is a defect of the compiler.
-pub fn checked(bytes: &[u8]) -> Result<bth_format::File> {
-    let file = bth_format::File::from_bytes(bytes).map_err(defect)?;
+pub fn checked(file: bth_format::File) -> Result<bth_format::File> {
     (0..file.object_count()).try_for_each(|i| file.check(i).map(drop).map_err(defect))?;
     file.check_object_names().map_err(defect)?;
     file.check_scene().map_err(defect)?;
@@ -42,7 +41,7 @@ pub fn checked(bytes: &[u8]) -> Result<bth_format::File> {
 /// # Errors
 /// As [`checked`].
 pub fn self_check(bytes: &[u8], deep: bool) -> Result<()> {
-    let file = checked(bytes)?;
+    let file = checked(bth_format::File::from_bytes(bytes).map_err(defect)?)?;
     if deep {
         return bth_format::verify::verify(&file).map(drop).map_err(|mut all| defect(all.swap_remove(0)));
     }

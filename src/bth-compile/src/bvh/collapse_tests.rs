@@ -1,9 +1,11 @@
 use super::super::bounds::Bounds;
 use super::super::samples::{clutter, exponential, grid, model, soup};
 use super::super::validate::validate_wide;
+use super::super::wide_tree::check_lines;
 use super::super::{BvhOptions, Plan, Quality, build};
 use super::*;
 use crate::monitor::Silent;
+use bth_format::layout::{Child, INDEXED_LINES, NODE_LINES, RAW_LINES};
 use bth_format::layout::{IndexedLeaf, RawLeaf, WideNode};
 use bth_random::Rng;
 use proptest::prelude::*;

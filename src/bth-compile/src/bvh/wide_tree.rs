@@ -228,7 +228,7 @@ impl Writer<'_> {
     }
 }
 
-fn check_lines(lines: usize) -> Result<()> {
+pub(super) fn check_lines(lines: usize) -> Result<()> {
     if lines <= Child::INDEX_LIMIT as usize {
         return Ok(());
     }

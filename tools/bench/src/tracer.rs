@@ -2,6 +2,7 @@
 
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Rays to trace, and hints that a tracer may use.
 #[derive(Clone, Copy, Debug)]
@@ -51,14 +52,14 @@ pub struct Contender {
 }
 
 impl Contender {
-    /// Nearest hits, on so many threads.
-    pub fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit], threads: usize) {
-        spread(batch, hits, threads, BLOCK, |batch, hits| self.tracer.nearest(batch, hits));
+    /// Nearest hits, so many times over on so many threads.
+    pub fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit], threads: usize, passes: usize) {
+        spread_passes(batch, hits, threads, passes, |batch, hits| self.tracer.nearest(batch, hits));
     }
 
-    /// Any hits, on so many threads.
-    pub fn any(&self, batch: Batch<'_>, found: &mut [bool], threads: usize) {
-        spread(batch, found, threads, BLOCK, |batch, found| self.tracer.any(batch, found));
+    /// Any hits, so many times over on so many threads.
+    pub fn any(&self, batch: Batch<'_>, found: &mut [bool], threads: usize, passes: usize) {
+        spread_passes(batch, found, threads, passes, |batch, found| self.tracer.any(batch, found));
     }
 }
 
@@ -83,6 +84,36 @@ pub fn spread<T: Send>(
             scope.spawn(|| {
                 while let Some((batch, answers)) = next() {
                     trace(batch, answers);
+                }
+            });
+        }
+    });
+}
+
+/// Calls `trace` for blocks of [`BLOCK`] rays, so many times over the whole batch, from so many threads, each of which takes
+/// the next block. The threads start once: starting them takes as long as thousands of rays.
+fn spread_passes<T: Send>(
+    batch: Batch<'_>,
+    answers: &mut [T],
+    threads: usize,
+    passes: usize,
+    trace: impl Fn(Batch<'_>, &mut [T]) + Sync,
+) {
+    if threads <= 1 {
+        return (0..passes).for_each(|_| trace(batch, answers));
+    }
+    let blocks: Vec<_> = batch.chunks(BLOCK).zip(answers.chunks_mut(BLOCK).map(Mutex::new)).collect();
+    let taken = AtomicUsize::new(0);
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                loop {
+                    let next = taken.fetch_add(1, Ordering::Relaxed);
+                    if next >= passes * blocks.len() {
+                        break;
+                    }
+                    let (batch, answers) = &blocks[next % blocks.len()];
+                    trace(*batch, &mut answers.lock().expect("no thread panics while it holds the lock"));
                 }
             });
         }

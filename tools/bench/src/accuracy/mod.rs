@@ -165,7 +165,7 @@ fn time(tracers: &[MeasuredTracer], set: &RaySet, rounds: usize) -> Vec<Option<f
     let mut hits = vec![Hit::MISS; set.rays.len()];
     medians(tracers, rounds, |_, tracer| {
         tracer.isa.map_or(Ok(()), Isa::choose).ok()?;
-        Some(clock.time(|| tracer.contender.nearest(set.batch(), &mut hits, 1)))
+        Some(clock.time(|| tracer.contender.nearest(set.batch(), &mut hits, 1, 1)))
     })
 }
 
@@ -183,7 +183,7 @@ fn errors(
     for answered_set in answered_sets {
         let rays = &answered_set.set.rays;
         let mut hits = vec![Hit::MISS; rays.len()];
-        tracer.contender.nearest(answered_set.set.batch(), &mut hits, 1);
+        tracer.contender.nearest(answered_set.set.batch(), &mut hits, 1, 1);
         let geometry = &all.geometries[tracer.geometry];
         let truth = &answered_set.exact_answers[tracer.geometry];
         let found = defects::defects(geometry, &neighbours, rays, truth, &hits);

@@ -113,6 +113,9 @@ fn measure_model(which: &str, arguments: &Speed, rounds: usize, progress: &Progr
     })
 }
 
+/// Least seconds of a round on several threads, so that starting them takes little of it.
+const LEAST_SECONDS: f64 = 0.1;
+
 fn measure_set(
     set: &RaySet,
     expected: &Answers,
@@ -124,21 +127,27 @@ fn measure_set(
     let mut hits = vec![Hit::MISS; set.rays.len()];
     let mut found = vec![false; set.rays.len()];
     let mut differ: BTreeMap<String, usize> = BTreeMap::new();
+    // The first round, which is not counted, tells how often the rays are traced in the others.
+    let mut passes: BTreeMap<String, usize> = BTreeMap::new();
     let times = medians(contenders, rounds, |round, contender| {
         if contender.tracer.needs_hints() && set.from.is_none() {
             return None;
         }
+        let again = passes.get(&contender.name).copied().unwrap_or(1);
         let seconds = clock.time(|| {
             if set.any {
-                contender.any(set.batch(), &mut found, run.threads);
+                contender.any(set.batch(), &mut found, run.threads, again);
             } else {
-                contender.nearest(set.batch(), &mut hits, run.threads);
+                contender.nearest(set.batch(), &mut hits, run.threads, again);
             }
         });
         if round == 0 {
             differ.insert(contender.name.clone(), expected.differ(contender.ours, &hits, &found));
+            if run.threads > 1 && rounds > 1 {
+                passes.insert(contender.name.clone(), (LEAST_SECONDS / seconds).ceil().max(1.0) as usize);
+            }
         }
-        Some(seconds)
+        Some(seconds / again as f64)
     });
     for (row, seconds) in run.tracers.iter_mut().zip(times) {
         if let Some(seconds) = seconds {

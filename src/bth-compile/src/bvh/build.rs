@@ -328,7 +328,7 @@ pub fn visits(bvh: &BinaryBvh) -> f64 {
     let area = |node: &Node| Bounds::of_node(node).half_area();
     let root = area(&bvh.nodes[0]);
     // A deformable mesh may lie on one line.
-    if root > 0.0 { super::sum_of_all(bvh, |at| area(&bvh.nodes[at as usize])) / root } else { 0.0 }
+    if root > 0.0 { super::sum(bvh.nodes.len(), |at| area(&bvh.nodes[at as usize])) / root } else { 0.0 }
 }
 
 /// Edges on the longest path.

@@ -2,8 +2,11 @@
 
 use super::bounds::Bounds;
 use super::extent::Extent;
-use super::{BinaryBvh, MAX_LEVELS, Node};
+use super::{BinaryBvh, MAX_LEVELS, Node, sum};
 use bth_format::layout::NONE;
+use rayon::prelude::*;
+use std::sync::atomic::AtomicU32;
+use std::sync::atomic::Ordering::Relaxed;
 
 /// Node of a [`LinkedTree`].
 #[derive(Clone, Copy)]
@@ -32,51 +35,41 @@ pub(super) struct LinkedTree<E> {
     root: u32,
 }
 
+/// Subtrees of more nodes are linked and laid out as separate tasks.
+const LINK_TASK: usize = 1 << 13;
+
 impl LinkedTree<Bounds> {
     /// The tree of a BVH, with the BVH's boxes.
     pub(super) fn new(bvh: &BinaryBvh) -> Self {
-        Self::linked(bvh, |node, _| Bounds::of_node(node))
+        Self::linked(bvh, |node, _| Bounds::of_node(node), |node, _, _| *node)
     }
 }
 
 impl<E: Extent> LinkedTree<E> {
     /// The tree of a BVH, with bounds that `leaf` gives for a triangle.
-    pub(super) fn of_leaves(bvh: &BinaryBvh, leaf: impl Fn(u32) -> E) -> Self {
+    pub(super) fn of_leaves(bvh: &BinaryBvh, leaf: impl Fn(u32) -> E + Sync) -> Self {
         let bounds = |node: &Node, triangle: u32| if node.is_leaf() { leaf(triangle) } else { E::EMPTY };
-        let mut tree = Self::linked(bvh, bounds);
-        for at in (0..tree.nodes.len()).rev() {
-            let LinkedNode { left, right, .. } = tree.nodes[at];
-            if left != NONE {
-                tree.nodes[at].bounds = tree.node(left).bounds.union(&tree.node(right).bounds);
-            }
-        }
-        tree
+        Self::linked(bvh, bounds, |_, left, right| left.union(right))
     }
 
-    /// The tree of a BVH; `bounds` gives those of a node, which for a leaf is told its triangle.
-    fn linked(bvh: &BinaryBvh, bounds: impl Fn(&Node, u32) -> E) -> Self {
-        let mut nodes: Vec<LinkedNode<E>> = bvh
-            .nodes
-            .iter()
-            .zip(0u32..)
-            .map(|(node, at)| {
-                let (left, right) = if node.is_leaf() {
-                    (NONE, bvh.order[node.first as usize])
-                } else {
-                    (at + 1, node.right)
-                };
-                LinkedNode { bounds: bounds(node, right), parent: NONE, left, right }
-            })
-            .collect();
+    /// The tree of a BVH. `bounds` gives those of a node, which for a leaf is told its triangle; `inner` those of an inner
+    /// node from these and the ones of its children.
+    fn linked(
+        bvh: &BinaryBvh,
+        bounds: impl Fn(&Node, u32) -> E + Sync,
+        inner: impl Fn(&E, &E, &E) -> E + Sync,
+    ) -> Self {
+        let node = |(node, at): (&Node, u32)| {
+            let (left, right) = match node.is_leaf() {
+                true => (NONE, bvh.order[node.first as usize]),
+                false => (at + 1, node.right),
+            };
+            LinkedNode { bounds: bounds(node, right), parent: NONE, left, right }
+        };
+        let all = 0..bvh.nodes.len() as u32;
+        let mut nodes: Vec<LinkedNode<E>> = bvh.nodes.par_iter().zip(all).map(node).collect();
         let mut heights = vec![0u8; nodes.len()];
-        for at in (0..nodes.len()).rev() {
-            let LinkedNode { left, right, .. } = nodes[at];
-            if left != NONE {
-                nodes[left as usize].parent = at as u32;
-                nodes[right as usize].parent = at as u32;
-                heights[at] = 1 + heights[left as usize].max(heights[right as usize]);
-            }
-        }
+        link(&mut nodes, &mut heights, 0, &inner);
         LinkedTree { nodes, heights, root: 0 }
     }
 
@@ -98,7 +91,7 @@ impl<E: Extent> LinkedTree<E> {
 
     /// Sum of all nodes' areas over the root's.
     pub(super) fn visits(&self) -> f64 {
-        self.nodes.iter().map(|n| n.bounds.half_area()).sum::<f64>() / self.node(self.root).bounds.half_area()
+        sum(self.nodes.len(), |at| self.node(at).bounds.half_area()) / self.node(self.root).bounds.half_area()
     }
 
     /// Whether `moved`, which has a grandparent, may become the sibling of `target`: the move must change the tree, must
@@ -178,32 +171,96 @@ impl<E: Extent> LinkedTree<E> {
 
     /// Writes the tree in preorder, into the memory of the tree that it was made from.
     pub(super) fn into_preorder(self, mut bvh: BinaryBvh) -> BinaryBvh {
-        let mut visited = Vec::with_capacity(self.nodes.len());
-        let mut stack = vec![self.root];
-        bvh.order.clear();
-        while let Some(at) = stack.pop() {
-            let node = self.node(at);
-            let first = bvh.order.len() as u32;
-            let out = &mut bvh.nodes[visited.len()];
-            let Bounds { lower, upper } = node.bounds.node_box();
-            *out = Node { lower, upper, first, count: 1, right: 0 };
-            visited.push(at);
-            if node.is_leaf() {
-                bvh.order.push(node.right);
-            } else {
-                stack.push(node.right);
-                stack.push(node.left);
-            }
-        }
-        // A subtree of n triangles takes 2 n - 1 nodes, so the left child's count gives the right child's place.
-        for at in (0..visited.len()).rev() {
-            if !self.node(visited[at]).is_leaf() {
-                let left = bvh.nodes[at + 1].count;
-                let right = at + 2 * left as usize;
-                bvh.nodes[at].right = right as u32;
-                bvh.nodes[at].count = left + bvh.nodes[right].count;
-            }
-        }
+        let counts: Vec<AtomicU32> =
+            (0..self.nodes.len()).into_par_iter().map(|_| AtomicU32::new(1)).collect();
+        self.count(self.root, 0, &counts);
+        let place = Place { node: 0, first: 0 };
+        self.write(self.root, place, &counts, &mut bvh.nodes, &mut bvh.order);
         bvh
     }
+
+    /// Counts the triangles below a node and below each node of its subtree. `level` edges lie above it.
+    fn count(&self, at: u32, level: u32, counts: &[AtomicU32]) -> u32 {
+        let node = self.node(at);
+        if node.is_leaf() {
+            return 1;
+        }
+        let [left, right] = [node.left, node.right];
+        let (left, right) = if level < COUNT_TASK_LEVELS && self.nodes.len() > LINK_TASK {
+            rayon::join(|| self.count(left, level + 1, counts), || self.count(right, level + 1, counts))
+        } else {
+            (self.count(left, level + 1, counts), self.count(right, level + 1, counts))
+        };
+        counts[at as usize].store(left + right, Relaxed);
+        left + right
+    }
+
+    /// Writes a subtree into as many nodes and rows of the order as it takes.
+    fn write(&self, at: u32, to: Place, counts: &[AtomicU32], nodes: &mut [Node], order: &mut [u32]) {
+        let node = self.node(at);
+        let Bounds { lower, upper } = node.bounds.node_box();
+        let Place { node: place, first } = to;
+        nodes[0] = Node { lower, upper, first, count: order.len() as u32, right: 0 };
+        if node.is_leaf() {
+            order[0] = node.right;
+            return;
+        }
+        // A subtree of n triangles takes 2 n - 1 nodes.
+        let left = counts[node.left as usize].load(Relaxed);
+        nodes[0].right = place + 2 * left;
+        let (left_nodes, right_nodes) = nodes[1..].split_at_mut(2 * left as usize - 1);
+        let (left_order, right_order) = order.split_at_mut(left as usize);
+        let right_to = Place { node: place + 2 * left, first: first + left };
+        let left_to = Place { node: place + 1, first };
+        let write_left = |nodes, order| self.write(node.left, left_to, counts, nodes, order);
+        if left_nodes.len() + right_nodes.len() > LINK_TASK {
+            rayon::join(
+                || write_left(left_nodes, left_order),
+                || self.write(node.right, right_to, counts, right_nodes, right_order),
+            );
+        } else {
+            write_left(left_nodes, left_order);
+            self.write(node.right, right_to, counts, right_nodes, right_order);
+        }
+    }
+}
+
+/// Levels from the root above which subtrees are counted as separate tasks.
+const COUNT_TASK_LEVELS: u32 = 12;
+
+/// Where the nodes and rows of a subtree go.
+#[derive(Clone, Copy)]
+struct Place {
+    /// Index of its root.
+    node: u32,
+    /// First row of `order`.
+    first: u32,
+}
+
+/// Sets the parents, heights and bounds of a subtree, given its nodes in preorder of which the first has index `at`. The
+/// parent of that one is left as it is. Returns its height.
+fn link<E: Extent>(
+    nodes: &mut [LinkedNode<E>],
+    heights: &mut [u8],
+    at: u32,
+    inner: &(impl Fn(&E, &E, &E) -> E + Sync),
+) -> u8 {
+    let Some((node, below)) = nodes.split_first_mut().filter(|(node, _)| !node.is_leaf()) else { return 0 };
+    let left_size = (node.right - at - 1) as usize;
+    let (left, right) = below.split_at_mut(left_size);
+    let (left_heights, right_heights) = heights[1..].split_at_mut(left_size);
+    let (left_at, right_at) = (node.left, node.right);
+    let (a, b) = if left.len() + right.len() > LINK_TASK {
+        rayon::join(
+            || link(left, left_heights, left_at, inner),
+            || link(right, right_heights, right_at, inner),
+        )
+    } else {
+        (link(left, left_heights, left_at, inner), link(right, right_heights, right_at, inner))
+    };
+    left[0].parent = at;
+    right[0].parent = at;
+    node.bounds = inner(&node.bounds, &left[0].bounds, &right[0].bounds);
+    heights[0] = 1 + a.max(b);
+    heights[0]
 }

@@ -80,11 +80,11 @@ pub struct BinaryBvh {
 /// Nodes that one task sums; a constant, so that the rounding does not depend on the number of threads.
 const SUMMED_AT_ONCE: usize = 1 << 16;
 
-/// The sum of a value over all nodes.
-fn sum_of_all(bvh: &BinaryBvh, value: impl Fn(u32) -> f64 + Sync) -> f64 {
-    let parts = (0..bvh.nodes.len().div_ceil(SUMMED_AT_ONCE)).into_par_iter();
+/// The sum of a value over so many nodes.
+fn sum(nodes: usize, value: impl Fn(u32) -> f64 + Sync) -> f64 {
+    let parts = (0..nodes.div_ceil(SUMMED_AT_ONCE)).into_par_iter();
     let part = |k: usize| {
-        let end = bvh.nodes.len().min((k + 1) * SUMMED_AT_ONCE);
+        let end = nodes.min((k + 1) * SUMMED_AT_ONCE);
         (k * SUMMED_AT_ONCE..end).map(|at| value(at as u32)).sum::<f64>()
     };
     parts.map(part).collect::<Vec<f64>>().into_iter().sum()

@@ -106,7 +106,7 @@ impl Weighed<'_> {
 
     /// The sum of [`Self::area`] over all nodes.
     pub(super) fn total(&self) -> f64 {
-        super::sum_of_all(self.bvh, |at| self.area(at))
+        super::sum(self.bvh.nodes.len(), |at| self.area(at))
     }
 }
 

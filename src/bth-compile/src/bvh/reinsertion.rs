@@ -49,23 +49,41 @@ pub(super) fn pass<E: Extent>(tree: &mut LinkedTree<E>, share: f64, monitor: &dy
     Ok(moved)
 }
 
+/// Least nodes whose areas one task counts.
+const COUNTED_AT_ONCE: usize = 1 << 14;
+/// Bits of an area that do not count where areas are counted.
+const LESS_BITS: u32 = 20;
+
 /// The nodes with a grandparent of the largest areas.
 fn largest<E: Extent>(tree: &LinkedTree<E>, share: f64) -> Vec<u32> {
-    let mut keyed: Vec<(f32, u32)> = (0..tree.len() as u32)
-        .filter(|&at| {
-            let parent = tree.node(at).parent;
-            parent != NONE && tree.node(parent).parent != NONE
-        })
-        .map(|at| (tree.node(at).bounds.half_area() as f32, at))
-        .collect();
-    let by_area = |a: &(f32, u32), b: &(f32, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
-    let wanted = (keyed.len() as f64 * share).ceil() as usize;
-    if wanted < keyed.len() {
-        keyed.select_nth_unstable_by(wanted, by_area);
-        keyed.truncate(wanted);
+    let keyed = (0..tree.len() as u32).into_par_iter().with_min_len(COUNTED_AT_ONCE).filter_map(|at| {
+        let node = tree.node(at);
+        let may_move = node.parent != NONE && tree.node(node.parent).parent != NONE;
+        may_move.then(|| (node.bounds.half_area() as f32, at))
+    });
+    // Areas are counted by their leading bits, which are ordered as they are, so that not all of them need be sorted.
+    let leading = |area: f32| (area.to_bits() >> LESS_BITS) as usize;
+    let none = || vec![0u32; 1 << (u32::BITS - LESS_BITS)];
+    let add = |mut counts: Vec<u32>, (area, _): (f32, u32)| {
+        counts[leading(area)] += 1;
+        counts
+    };
+    let join = |mut a: Vec<u32>, b: Vec<u32>| {
+        a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+        a
+    };
+    let counts = keyed.clone().fold(none, add).reduce(none, join);
+    let all: usize = counts.iter().map(|count| *count as usize).sum();
+    let wanted = ((all as f64 * share).ceil() as usize).min(all);
+    let (mut least, mut from_there) = (counts.len(), 0);
+    while from_there < wanted {
+        least -= 1;
+        from_there += counts[least] as usize;
     }
-    keyed.par_sort_unstable_by(by_area);
-    keyed.into_iter().map(|(_, at)| at).collect()
+    let mut large: Vec<(f32, u32)> = keyed.filter(|(area, _)| leading(*area) >= least).collect();
+    large.par_sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    large.truncate(wanted);
+    large.into_iter().map(|(_, at)| at).collect()
 }
 
 /// A move that lowers the sum of all areas by `gain`.

@@ -63,20 +63,69 @@ fn positive_zeros(position: [f32; 3]) -> [f32; 3] {
 
 /// For each position the first row of one that is equal to it.
 fn first_equal_rows(positions: &[[f32; 3]]) -> Vec<AtomicU32> {
-    let key = |position: &[f32; 3]| positive_zeros(*position).map(f32::to_bits);
-    let mut keys: Vec<([u32; 3], u32)> = positions
-        .par_iter()
-        .zip(0..positions.len() as u32)
-        .map(|(position, row)| (key(position), row))
-        .collect();
-    keys.par_sort_unstable();
+    let key = |row: u32| positive_zeros(positions[row as usize]).map(f32::to_bits);
+    // Equal positions are in the same share, and a share's table stays in a cache.
+    let shares = (positions.len() / ROWS_OF_A_SHARE).next_power_of_two().min(MOST_SHARES);
+    let share_of = |row: u32| (hash(key(row)) as usize) & (shares - 1);
+    let sort_in = |mut parts: Vec<Vec<u32>>, row: u32| {
+        parts[share_of(row)].push(row);
+        parts
+    };
+    let rows = (0..positions.len() as u32).into_par_iter().with_min_len(ROWS_OF_A_SHARE);
+    let sorted: Vec<Vec<Vec<u32>>> = rows.fold(|| vec![Vec::new(); shares], sort_in).collect();
     let first_equal = atomics(positions.len());
-    keys.par_chunk_by(|a, b| a.0 == b.0).for_each(|equal| {
-        for (_, row) in equal {
-            first_equal[*row as usize].store(equal[0].1, Relaxed);
+    (0..shares).into_par_iter().for_each(|share| {
+        let parts = || sorted.iter().map(|parts| &parts[share]);
+        let mut table = Table::with_capacity(parts().map(Vec::len).sum());
+        for &row in parts().flatten() {
+            first_equal[row as usize].store(table.find_or_insert(row, key), Relaxed);
         }
     });
     first_equal
+}
+
+/// About how many rows one table holds, and the greatest number of tables.
+const ROWS_OF_A_SHARE: usize = 1 << 14;
+const MOST_SHARES: usize = 1 << 10;
+
+/// A hash table with open addressing whose slots are rows. Its order does not depend on a random seed.
+struct Table {
+    slots: Vec<u32>,
+    shift: u32,
+}
+
+impl Table {
+    /// A table for `count` entries at a load of at most one half.
+    fn with_capacity(count: usize) -> Table {
+        let size = (count.max(4) * 2).next_power_of_two();
+        Table { slots: vec![NONE; size], shift: 64 - size.trailing_zeros() }
+    }
+
+    /// The row of that key that was inserted first.
+    #[inline]
+    fn find_or_insert(&mut self, row: u32, key: impl Fn(u32) -> [u32; 3]) -> u32 {
+        let mask = self.slots.len() - 1;
+        let mut slot = (hash(key(row)) >> self.shift) as usize;
+        loop {
+            match self.slots[slot] {
+                NONE => {
+                    self.slots[slot] = row;
+                    return row;
+                }
+                other if key(other) == key(row) => return other,
+                _ => slot = (slot + 1) & mask,
+            }
+        }
+    }
+}
+
+/// Mixes all bits into the upper and lower ones: multiply and fold (as in Wang Yi's wyhash), then Fibonacci hashing.
+#[inline]
+fn hash([x, y, z]: [u32; 3]) -> u64 {
+    let a = (u64::from(x) | u64::from(y) << 32) ^ 0xa076_1d64_78bd_642f;
+    let b = u64::from(z) ^ 0xe703_7ed1_a0b4_28db;
+    let product = u128::from(a) * u128::from(b);
+    ((product as u64) ^ (product >> 64) as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)
 }
 
 /// For each first row of equal positions the first corner that has one of them, or `NONE`.

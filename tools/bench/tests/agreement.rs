@@ -112,8 +112,8 @@ fn our_structures_answer_with_the_same_bits_in_every_use() {
 
 fn traced(contender: &Contender, set: &RaySet, threads: usize) -> (Vec<Hit>, Vec<bool>) {
     let (mut hits, mut found) = (vec![Hit::MISS; set.rays.len()], vec![false; set.rays.len()]);
-    contender.nearest(set.batch(), &mut hits, threads);
-    contender.any(set.batch(), &mut found, threads);
+    contender.nearest(set.batch(), &mut hits, threads, 1);
+    contender.any(set.batch(), &mut found, threads, 1);
     (hits, found)
 }
 

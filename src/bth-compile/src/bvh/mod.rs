@@ -22,6 +22,7 @@ mod poses;
 mod reinsertion;
 mod split;
 mod sweep_split;
+mod wide;
 mod wide_lines;
 mod wide_tree;
 
@@ -32,10 +33,11 @@ mod validate;
 
 pub use build::{BvhOptions, BvhReport, Effort, MAX_LEVELS, Quality, build, build_with, reinsert, visits};
 pub use build_poses::{PoseOptions, build_poses};
-pub use collapse::{CollapseOptions, CollapseReport, Decide, Wide, collapse, collapse_by};
+pub use collapse::{CollapseOptions, Decide, collapse, collapse_by};
 pub use plan::{Costs, Decision, Plan, Planner, Role, Vertices};
 pub use pose_costs::{PoseCost, pose_costs};
 pub use poses::{Poses, Weighed};
+pub use wide::{CollapseReport, Wide};
 
 use rayon::prelude::*;
 use zerocopy::FromZeros;

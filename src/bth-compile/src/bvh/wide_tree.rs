@@ -1,8 +1,8 @@
 //! Writes the lines of wide trees as planned.
 
-use super::collapse::{CollapseReport, Wide};
 use super::plan::{Decision, Plan, Role, children};
 use super::poses::Weighed;
+use super::wide::{CollapseReport, Wide};
 use super::wide_lines::{indexed_leaf, put, raw_leaf, wide_node};
 use super::{BinaryBvh, zeroed};
 use crate::error::{Error, Result};

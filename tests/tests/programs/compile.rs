@@ -14,8 +14,15 @@ fn writes_a_file_beside_the_model_that_verifies() {
 #[test]
 fn json_holds_the_reports_of_all_stages() {
     let folder = folder(&[("ball.obj", &sphere(12))]);
-    let run = bthc(folder.path(), &["compile", "ball.obj", "-o", "out.bth", "--json"]).expect(0);
-    let json = run.json();
+    let compile = |more: &[&str]| {
+        let all = [&["compile", "ball.obj", "-o", "out.bth", "--json"], more].concat();
+        bthc(folder.path(), &all).expect(0).json()
+    };
+    // Where tetrahedra cannot pay no node is marked.
+    let dear = compile(&["--min-tet-triangles", "64", "--c-tet", "1000"]);
+    assert!(dear["report"]["marks"].is_null() && !dear["report"]["costs"].is_null(), "{dear:#}");
+
+    let json = compile(&["--min-tet-triangles", "64", "--c-tet", "0.001"]);
     assert_eq!(json["output"], "out.bth");
     assert_eq!(json["report"]["mesh"]["triangles"], 4 * 12 * 11);
     for stage in ["mesh", "bvh", "marks", "costs", "tets", "collapse", "file", "seconds"] {

@@ -84,6 +84,22 @@ pub fn choose(
     Ok((choice, report))
 }
 
+/// As [`choose`], were all nodes suitable. If no node is chosen then, none is whatever the marks, where
+/// [`CostOptions::more_suitable_gain_more`].
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub fn choose_of_all(
+    mesh: &Mesh,
+    bvh: &BinaryBvh,
+    options: &CostOptions,
+    storage: Storage,
+    monitor: &dyn Monitor,
+) -> Result<(Choice, CostReport)> {
+    let all = Marks { suitable: vec![true; bvh.nodes.len()] };
+    choose(mesh, bvh, &all, options, storage, monitor)
+}
+
 /// Limits on the bytes of tetrahedra and on the seconds to make them.
 struct Limits<'a> {
     prices: &'a Prices<'a>,

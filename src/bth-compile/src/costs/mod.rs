@@ -30,7 +30,7 @@ mod tests;
 
 pub use area::area_steps;
 pub use bvh_walk::{Traced, walk};
-pub use choose::{Storage, choose};
+pub use choose::{Storage, choose, choose_of_all};
 pub use estimate::{Estimator, Start};
 pub use least_squares::fit;
 pub use least_useful::{Weighed, least_useful};

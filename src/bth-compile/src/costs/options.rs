@@ -101,6 +101,15 @@ fn by_hash<S: Serializer>(profile: &Profile, to: S) -> Result<S::Ok, S::Error> {
     to.serialize_str(&profile.hash())
 }
 
+impl CostOptions {
+    /// Whether the gain of the selection cannot become less where more nodes are suitable. Without limits the selection of
+    /// greatest gain is found exactly; limits and the paper's rule promise nothing of the kind.
+    pub fn more_suitable_gain_more(&self) -> bool {
+        let limited = self.max_bytes_per_triangle.is_some() || self.budget.is_some();
+        !limited && matches!(self.select, Select::Best)
+    }
+}
+
 impl Default for CostOptions {
     fn default() -> Self {
         CostOptions {

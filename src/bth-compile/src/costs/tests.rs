@@ -206,6 +206,34 @@ fn rays_of_a_scene_decide_which_nodes_count() {
     assert!(found.iter().all(|&n| bvh.nodes[n as usize].first as usize >= rows.start || n == 0), "{found:?}");
 }
 
+#[test]
+fn what_all_nodes_cannot_gain_no_marks_can() {
+    let (mesh, bvh, _) = blob();
+    let (mut none, mut some) = (0, 0);
+    for (c_tet, minimum_gain) in
+        (0..12).flat_map(|k| [0.0, 0.02, 0.2].map(|gain| (0.5 * 1.3f64.powi(k), gain)))
+    {
+        let options =
+            CostOptions { c_tet: Some(c_tet), minimum_triangles: 64, minimum_gain, ..CostOptions::default() };
+        assert!(options.more_suitable_gain_more());
+        let (of_all, report) = choose_of_all(&mesh, &bvh, &options, KEPT, &Silent).unwrap();
+        let gain = report.cost_bvh - report.cost_with_tets;
+        for row in [0, 1, 100, bvh.order.len() as u32 / 2, bvh.order.len() as u32 - 300] {
+            let marks = marks_beyond(&bvh, row);
+            let (choice, report) = choose(&mesh, &bvh, &marks, &options, KEPT, &Silent).unwrap();
+            assert!(
+                report.cost_bvh - report.cost_with_tets <= gain + 1e-9 * report.cost_bvh,
+                "{c_tet}, {row}"
+            );
+            assert!(!of_all.chosen.is_empty() || choice.chosen.is_empty(), "{c_tet}, {row}");
+        }
+        *if of_all.chosen.is_empty() { &mut none } else { &mut some } += 1;
+    }
+    assert!(none > 5 && some > 5, "{none}, {some}");
+    let limited = CostOptions { budget: Some(1.0), ..CostOptions::default() };
+    assert!(!limited.more_suitable_gain_more() && !paper().more_suitable_gain_more());
+}
+
 /// Two tetrahedra over the triangle (0, 1, 2), which is a constrained face; the hull is not a box, which walks do not
 /// require.
 fn two_tets() -> TetMesh {

@@ -154,7 +154,8 @@ fn free_directions(
     Ok((report.kept.then_some(free), Some(report)))
 }
 
-/// Tetrahedralizes the nodes for which that saves time: marks → costs → tets → probe → limit.
+/// Tetrahedralizes the nodes for which that saves time: marks → costs → tets → probe → limit. Where the costs rule out all nodes
+/// none is marked.
 fn tet_leaves(
     source: &Path,
     traced: &TracedMesh,
@@ -168,12 +169,19 @@ fn tet_leaves(
         if options.deformable { deformable::welded(&traced.mesh) } else { Cow::Borrowed(&traced.mesh) };
     let mesh: &Mesh = &welded;
     let bvh_options = bvh::BvhOptions { keep_zero_area: options.deformable, ..options.bvh };
-    let (marks, marks_report) = clock.time("marks", || stages.marks(mesh, tree, &bvh_options, monitor))?;
     if options.deformable {
         select::check_flat(source, deformable::flat_triangles(mesh, tree), options)?;
     }
-    let (choice, costs) =
-        clock.time("costs", || select::choose(source, (traced, mesh), &marks, options, monitor))?;
+    let without_marks = || select::choose_without_marks((traced, mesh), options, monitor);
+    let (choice, costs, marks) = match clock.time("costs", without_marks)? {
+        Some((choice, costs)) => (choice, Some(costs), None),
+        None => {
+            let (marks, report) = clock.time("marks", || stages.marks(mesh, tree, &bvh_options, monitor))?;
+            let choose = || select::choose(source, (traced, mesh), &marks, options, monitor);
+            let (choice, costs) = clock.time("costs", choose)?;
+            (choice, costs, Some(report))
+        }
+    };
     let (built, tets) =
         clock.time("tets", || stages.tets(mesh, tree, &choice.chosen, &options.tets, monitor))?;
     select::check_built(source, tree, &built, options)?;
@@ -183,5 +191,5 @@ fn tet_leaves(
         let within = || limit::fit(traced, most, leaves, (&choice, probe.as_mut()), options, monitor);
         leaves = clock.time("limit", within)?;
     }
-    Ok((leaves, TetReports { marks: Some(marks_report), costs, tets: Some(tets), probe }))
+    Ok((leaves, TetReports { marks, costs, tets: Some(tets), probe }))
 }

@@ -10,6 +10,22 @@ use crate::{bvh, costs, marks, tets};
 use bth_import::Mesh;
 use std::path::Path;
 
+/// The choice where no node would be chosen even if all were free of bad contacts, as it is with most models and profiles; `None`
+/// where the marks are needed.
+pub(super) fn choose_without_marks(
+    (traced, mesh): (&TracedMesh, &Mesh),
+    options: &CompileOptions,
+    monitor: &dyn Monitor,
+) -> Result<Option<(costs::Choice, costs::CostReport)>> {
+    if options.structure != Structure::Bth || !options.costs.more_suitable_gain_more() {
+        return Ok(None);
+    }
+    let storage = limit::storage_of(traced.by_ref(), options, monitor)?;
+    let choose = || costs::choose_of_all(mesh, &traced.tree, &options.costs, storage, monitor);
+    let (choice, report) = timed(choose)?;
+    Ok(choice.chosen.is_empty().then_some((choice, report)))
+}
+
 /// The nodes to tetrahedralize, in ascending order. `mesh` is what is tetrahedralized of the traced mesh.
 pub(super) fn choose(
     source: &Path,

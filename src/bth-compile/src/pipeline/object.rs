@@ -166,7 +166,7 @@ impl Object {
         write::object(&mut builder, 0, &parts)?;
         write::images(&mut builder, images.iter().map(|image| (image.name, image.bytes.as_slice())))?;
         builder.provenance(provenance)?;
-        let file = builder.open()?;
+        let file = write::open(&builder)?;
         file.check_images().map_err(write::defect)?;
         let resident_bytes = resident_bytes(&parts);
         let triangles = self.traced.mesh.triangles.len();

@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::options::CompileOptions;
 use crate::pipeline::{self, Clock};
 use crate::tets;
-use crate::write::{FileBuilder, object};
+use crate::write::{self, FileBuilder, object};
 use bth_cache::Key;
 use serde::{Deserialize, Serialize};
 
@@ -105,7 +105,7 @@ fn build_or_fetch(
         for (number, segment) in (1..).zip(&built.segment_objects) {
             object(&mut builder, number, &segment.parts(options))?;
         }
-        builder.open()
+        write::open(&builder)
     })?;
     drop(built);
     if let Some(key) = key {

@@ -3,10 +3,8 @@
 
 use super::content::{Bytes, Content};
 use crate::error::{Error, Result};
-use bth_format::FileMemory;
 use bth_format::file::{content_id, hash128};
 use bth_format::layout::*;
-use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use zerocopy::IntoBytes;
@@ -135,27 +133,16 @@ impl<'a> FileBuilder<'a> {
     /// When a section is still in another file.
     pub fn finish(&self) -> Vec<u8> {
         let mut bytes = vec![0; self.file_length() as usize];
-        self.write_into(&mut bytes);
+        self.copies(&mut bytes).into_iter().for_each(|(to, from)| to.copy_from_slice(from));
         bytes
     }
 
-    /// The whole file in memory, after the checks of a reader ([`super::checked`]).
-    ///
-    /// # Errors
-    /// `BTH-L034` when there is not enough memory; `BTH-X030` when the bytes violate the format, which is a defect of the
-    /// compiler.
+    /// Writes header and table into as many zero bytes as the file has. Returns where which bytes of the sections are to be
+    /// copied.
     ///
     /// # Panics
     /// When a section is still in another file.
-    pub(crate) fn open(&self) -> Result<bth_format::File> {
-        let length = self.file_length();
-        let mut memory = FileMemory::zeroed(length as usize).map_err(|_| no_memory(length))?;
-        self.write_into(memory.bytes_mut());
-        super::checked(bth_format::File::from_memory(memory).map_err(super::defect)?)
-    }
-
-    /// Writes the file into as many zero bytes, several sections at a time.
-    fn write_into(&self, bytes: &mut [u8]) {
+    pub(super) fn copies<'b>(&'b self, bytes: &'b mut [u8]) -> Vec<(&'b mut [u8], &'b [u8])> {
         let entries = self.entries();
         let head = self.head(&entries);
         let (front, mut rest) = bytes.split_at_mut(head.len());
@@ -170,7 +157,7 @@ impl<'a> FileBuilder<'a> {
             rest = behind;
             end = entry.offset as usize + from.len();
         }
-        copies.into_par_iter().for_each(|(to, from)| to.copy_from_slice(from));
+        copies
     }
 
     /// The file, ready to be written, and its section table.
@@ -261,11 +248,6 @@ fn coordinates_of(kind: u32, bytes: &[u8]) -> Option<u32> {
 fn features(coordinates: u32) -> u64 {
     let grid = if coordinates & !PACKED_NODES != 0 { FEATURE_GRID } else { 0 };
     grid | if coordinates & PACKED_NODES != 0 { FEATURE_PACKED_NODES } else { 0 }
-}
-
-fn no_memory(length: u64) -> Error {
-    let message = format!("not enough memory for a file of {length} bytes");
-    Error::Limit { code: "BTH-L034", message }
 }
 
 pub(super) fn defect(message: String) -> Error {

@@ -6,6 +6,7 @@ mod content;
 mod groups;
 mod images;
 mod object;
+mod open;
 mod scene;
 mod whole;
 
@@ -18,6 +19,7 @@ pub use groups::{GroupParts, object_names};
 pub use images::images;
 pub(crate) use images::named_images;
 pub use object::{ObjectParts, Source, object};
+pub(crate) use open::open;
 pub use scene::{DeformerParts, SceneParts, scene};
 pub use whole::name_if_whole;
 pub(crate) use whole::{HEADER, are_zeros, name};

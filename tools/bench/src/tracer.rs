@@ -54,12 +54,12 @@ pub struct Contender {
 impl Contender {
     /// Nearest hits, so many times over on so many threads.
     pub fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit], threads: usize, passes: usize) {
-        spread_passes(batch, hits, threads, passes, |batch, hits| self.tracer.nearest(batch, hits));
+        spread_passes(batch, hits, (threads, passes), BLOCK, |batch, hits| self.tracer.nearest(batch, hits));
     }
 
     /// Any hits, so many times over on so many threads.
     pub fn any(&self, batch: Batch<'_>, found: &mut [bool], threads: usize, passes: usize) {
-        spread_passes(batch, found, threads, passes, |batch, found| self.tracer.any(batch, found));
+        spread_passes(batch, found, (threads, passes), BLOCK, |batch, found| self.tracer.any(batch, found));
     }
 }
 
@@ -74,45 +74,30 @@ pub fn spread<T: Send>(
     block: usize,
     trace: impl Fn(Batch<'_>, &mut [T]) + Sync,
 ) {
-    if threads <= 1 {
-        return trace(batch, answers);
-    }
-    let blocks = Mutex::new(batch.chunks(block).zip(answers.chunks_mut(block)));
-    let next = || blocks.lock().expect("no thread panics while it holds the lock").next();
-    std::thread::scope(|scope| {
-        for _ in 0..threads {
-            scope.spawn(|| {
-                while let Some((batch, answers)) = next() {
-                    trace(batch, answers);
-                }
-            });
-        }
-    });
+    spread_passes(batch, answers, (threads, 1), block, trace);
 }
 
-/// Calls `trace` for blocks of [`BLOCK`] rays, so many times over the whole batch, from so many threads, each of which takes
-/// the next block. The threads start once: starting them takes as long as thousands of rays.
+/// As [`spread`], so many times over the whole batch. The threads start once: starting them takes as long as thousands of rays.
 fn spread_passes<T: Send>(
     batch: Batch<'_>,
     answers: &mut [T],
-    threads: usize,
-    passes: usize,
+    (threads, passes): (usize, usize),
+    block: usize,
     trace: impl Fn(Batch<'_>, &mut [T]) + Sync,
 ) {
     if threads <= 1 {
         return (0..passes).for_each(|_| trace(batch, answers));
     }
-    let blocks: Vec<_> = batch.chunks(BLOCK).zip(answers.chunks_mut(BLOCK).map(Mutex::new)).collect();
+    let blocks: Vec<_> = batch.chunks(block).zip(answers.chunks_mut(block).map(Mutex::new)).collect();
     let taken = AtomicUsize::new(0);
+    let next = || {
+        let k = taken.fetch_add(1, Ordering::Relaxed);
+        (k < passes * blocks.len()).then(|| &blocks[k % blocks.len()])
+    };
     std::thread::scope(|scope| {
         for _ in 0..threads {
             scope.spawn(|| {
-                loop {
-                    let next = taken.fetch_add(1, Ordering::Relaxed);
-                    if next >= passes * blocks.len() {
-                        break;
-                    }
-                    let (batch, answers) = &blocks[next % blocks.len()];
+                while let Some((batch, answers)) = next() {
                     trace(*batch, &mut answers.lock().expect("no thread panics while it holds the lock"));
                 }
             });

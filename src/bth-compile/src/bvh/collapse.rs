@@ -10,7 +10,7 @@ use crate::monitor::Monitor;
 use bth_format::layout::NONE;
 use bth_import::Mesh;
 
-/// BvhOptions of [`collapse`].
+/// Options of [`collapse`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CollapseOptions {
     /// Whether the BVH below each tet leaf is kept beside it.

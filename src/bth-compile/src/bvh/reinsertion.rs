@@ -138,3 +138,32 @@ fn search<E: Extent>(tree: &LinkedTree<E>, subtree: u32, stack: &mut Vec<(u32, f
     // At the present position the gain is nothing but rounding.
     (best.target != NONE && best.target != tree.sibling(subtree)).then_some(best)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::samples::{grid, soup};
+    use super::super::{BvhOptions, build};
+    use super::*;
+    use crate::monitor::Silent;
+
+    #[test]
+    fn the_largest_nodes_are_those_of_sorting_all() {
+        for mesh in [soup(1, 1), soup(2, 1), soup(400, 2), grid(30, 0.0, 3), grid(150, 5.0, 4)] {
+            let (bvh, _) = build(&mesh, &BvhOptions::default(), &Silent).unwrap();
+            let tree = LinkedTree::new(&bvh);
+            let mut all: Vec<(f32, u32)> = Vec::new();
+            for at in 0..tree.len() as u32 {
+                let parent = tree.node(at).parent;
+                if parent != NONE && tree.node(parent).parent != NONE {
+                    all.push((tree.node(at).bounds.half_area() as f32, at));
+                }
+            }
+            all.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+            for share in [0.0, 1e-4, 0.01, 0.3, 0.999, 1.0] {
+                let wanted = (all.len() as f64 * share).ceil() as usize;
+                let expected: Vec<u32> = all[..wanted].iter().map(|(_, at)| *at).collect();
+                assert_eq!(largest(&tree, share), expected, "{} nodes, {share}", tree.len());
+            }
+        }
+    }
+}

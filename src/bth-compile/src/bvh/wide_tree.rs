@@ -36,7 +36,7 @@ struct Slot {
 }
 
 /// Leaves that one task writes.
-const LEAVES_AT_ONCE: usize = 1 << 12;
+const LEAVES_AT_ONCE: usize = 1 << 10;
 
 /// A triangle leaf.
 #[derive(Clone, Copy)]

@@ -103,7 +103,8 @@ impl Sampled {
         before(nodes.end) - before(nodes.start)
     }
 
-    /// The gains of these nodes, which are ascending; `depths` are the sums of the depths of their leaves. `weights` are those of rays from outside and from surfaces.
+    /// The gains of these nodes, which are ascending; `depths` are the sums of the depths of their leaves. `weights` are those
+    /// of rays from outside and from surfaces.
     pub(super) fn gains(
         &self,
         bvh: &BinaryBvh,

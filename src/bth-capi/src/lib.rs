@@ -17,6 +17,7 @@ use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use std::slice::{from_mut, from_ref};
 
 // Flags of `bth_open`.
 const READ: u32 = 0;
@@ -163,6 +164,36 @@ pub unsafe extern "C" fn bth_nearest(
     hits: *mut Hit,
     count: usize,
 ) {
+    if count == 1 {
+        // SAFETY: by contract each pointer is null or points to one element, and `hits` is valid for writes. `Ray`, `PrimitiveRef` and
+        // `Hit` have the layout of the C structs, and all bit patterns are valid for them.
+        let (one, from) = unsafe { ((scene.as_ref(), rays.as_ref(), hits.as_mut()), from.as_ref()) };
+        if let (Some(scene), Some(ray), Some(hit)) = one {
+            // With nothing but the kernel behind it, no registers are saved for what only batches need.
+            let (ray, from, hits) = (from_ref(ray), from.map(from_ref), from_mut(hit));
+            if catch_unwind(AssertUnwindSafe(|| scene.batch(ray).from(from).nearest(hits))).is_err() {
+                hits.fill(Hit::MISS);
+                defect();
+            }
+            return;
+        }
+    }
+    // SAFETY: the contract is the same.
+    unsafe { nearest_of_batch(scene, rays, from, hits, count) }
+}
+
+/// [`bth_nearest`] for any number of rays.
+///
+/// # Safety
+/// As for [`bth_nearest`].
+#[inline(never)]
+unsafe fn nearest_of_batch(
+    scene: *const Scene,
+    rays: *const Ray,
+    from: *const PrimitiveRef,
+    hits: *mut Hit,
+    count: usize,
+) {
     // SAFETY: the contract of `batch` is part of that of this function.
     let Ok((scene, rays, from)) = (unsafe { batch(scene, rays, from, count) }) else { return };
     if hits.is_null() {
@@ -191,6 +222,35 @@ pub unsafe extern "C" fn bth_any(
     hit: *mut u8,
     count: usize,
 ) {
+    if count == 1 {
+        // SAFETY: as in `bth_nearest`; `hit` is null or points to a byte that is valid for writes.
+        let (one, from) = unsafe { ((scene.as_ref(), rays.as_ref(), hit.as_mut()), from.as_ref()) };
+        if let (Some(scene), Some(ray), Some(hit)) = one {
+            let (ray, from, mut found) = (from_ref(ray), from.map(from_ref), [false]);
+            let traced = catch_unwind(AssertUnwindSafe(|| scene.batch(ray).from(from).any(&mut found)));
+            *hit = (traced.is_ok() && found[0]).into();
+            if traced.is_err() {
+                defect();
+            }
+            return;
+        }
+    }
+    // SAFETY: the contract is the same.
+    unsafe { any_of_batch(scene, rays, from, hit, count) }
+}
+
+/// [`bth_any`] for any number of rays.
+///
+/// # Safety
+/// As for [`bth_any`].
+#[inline(never)]
+unsafe fn any_of_batch(
+    scene: *const Scene,
+    rays: *const Ray,
+    from: *const PrimitiveRef,
+    hit: *mut u8,
+    count: usize,
+) {
     // SAFETY: the contract of `batch` is part of that of this function.
     let Ok((scene, rays, from)) = (unsafe { batch(scene, rays, from, count) }) else { return };
     if hit.is_null() {
@@ -198,20 +258,8 @@ pub unsafe extern "C" fn bth_any(
         return;
     }
     // SAFETY: it is not null, so by contract it points to `count` bytes, which are valid for writes and do not overlap the slices
-    // above.
-    let hit = unsafe { std::slice::from_raw_parts_mut(hit, count) };
-    // The caller's bytes are not used as a slice of `bool`, because `bool` has invalid bit patterns. A single ray does not need
-    // the buffer of [`any_in_chunks`].
-    if let [hit] = hit {
-        let mut found = [false];
-        let traced = catch_unwind(AssertUnwindSafe(|| scene.batch(rays).from(from).any(&mut found)));
-        *hit = (traced.is_ok() && found[0]).into();
-        if traced.is_err() {
-            defect();
-        }
-    } else {
-        any_in_chunks(scene, rays, from, hit);
-    }
+    // above. The caller's bytes are not used as a slice of `bool`, because `bool` has invalid bit patterns.
+    any_in_chunks(scene, rays, from, unsafe { std::slice::from_raw_parts_mut(hit, count) });
 }
 
 /// Number of rays that [`any_in_chunks`] traces together.

@@ -15,7 +15,7 @@ use crate::Identity;
 use crate::check;
 use crate::error::{Code, Error, Result, Text};
 use crate::layout::*;
-use crate::object::{ObjectBounds, ObjectView, Records};
+use crate::object::{MAX_LINES, ObjectBounds, ObjectView, Records};
 use buffer::{Buffer, no_memory};
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
@@ -260,12 +260,13 @@ impl File {
             }
         };
         let grid = self.grid(header).map_err(|e| self.locate(e, object))?;
+        let lines: &[CacheLine] = self.slice(object, kind::LINES);
         Ok(ObjectView {
             identity: Identity::new(),
             header,
             bounds: ObjectBounds::new(header),
             grid,
-            lines: self.slice(object, kind::LINES),
+            lines: lines.get(..MAX_LINES).unwrap_or(lines),
             triangle_ids: self.slice(object, kind::TRIANGLE_IDS),
             tet_leaves: self.slice(object, kind::TET_LEAVES),
             records,

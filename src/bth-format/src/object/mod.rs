@@ -13,6 +13,7 @@ mod view;
 
 pub use bounds::ObjectBounds;
 pub use leaves::Unpacked;
+pub(crate) use nodes::MAX_LINES;
 pub use nodes::NodeBase;
 pub use records::Records;
 pub use view::ObjectView;

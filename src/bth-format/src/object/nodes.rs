@@ -4,6 +4,10 @@ use super::view::ObjectView;
 use crate::layout::*;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
+/// An object has at most as many lines as child codes can be indices of, so that [`NodeBase::wide_node`] needs no test of the kind of a
+/// node. Further lines of a file, which nothing can lead to, are left out when it is opened.
+pub(crate) const MAX_LINES: usize = Child::PACKED_BIT as usize + NODE_LINES - 1;
+
 /// The lines of an object and how child codes index them: what a traversal loop keeps at hand.
 ///
 /// Methods that return a node or leaf panic when the lines end before it does; after [`crate::File::check`] they never do.
@@ -58,10 +62,8 @@ impl<'a> ObjectView<'a> {
     /// The object's lines, for a traversal loop.
     #[inline(always)]
     pub fn node_base(&self) -> NodeBase<'a> {
-        // All lines but those of which no child code can be an index, for `NodeBase::wide_node`.
-        const LINES: usize = Child::PACKED_BIT as usize + NODE_LINES - 1;
-        let lines = self.lines.get(..LINES).unwrap_or(self.lines);
-        NodeBase { lines, halved: if self.grid.is_some() { Child::LEAF_BIT } else { 0 } }
+        debug_assert!(self.lines.len() <= MAX_LINES, "see `MAX_LINES`");
+        NodeBase { lines: self.lines, halved: if self.grid.is_some() { Child::LEAF_BIT } else { 0 } }
     }
     /// The node at a line. Panics when the lines end before the node does; after [`crate::File::check`] they never do.
     #[inline(always)]

@@ -16,7 +16,7 @@ use crate::intersect::line::Line;
 use crate::intersect::prepare::PreparedRay;
 use crate::query::{NearestHit, TriangleRef};
 use crate::rays::Ray;
-use crate::simd::{Isa, Kernel, Simd};
+use crate::simd::{Isa, Kernel, Scalar, Simd};
 use crate::tets::flood::{FaceReceiver, VisitedSet};
 use crate::tets::walk::TetWalker;
 use bth_format::layout::{Child, NONE, TetFace, WIDTH};
@@ -40,7 +40,7 @@ pub(crate) fn enumerate(object: &ObjectView<'_>, ray: &Ray, receiver: &mut dyn R
     if object.header.root == NONE {
         return false;
     }
-    let prepared = match PreparedRay::of(&object.bounds, ray) {
+    let prepared = match PreparedRay::of(Scalar, &object.bounds, ray) {
         Some(prepared) => prepared,
         None => match PreparedRay::in_f64(object.header, ray) {
             Some(prepared) => prepared,

@@ -8,7 +8,7 @@ use crate::intersect::prepare::{HitProgress, PreparedRay};
 use crate::query::sink::Sink;
 use crate::query::{Goal, Query};
 use crate::rays::Ray;
-use crate::simd::Simd;
+use crate::simd::{Scalar, Simd};
 use bth_format::layout::WIDTH;
 use bth_format::object::ObjectView;
 use zerocopy::FromZeros;
@@ -45,7 +45,7 @@ impl<Q: Query> RayState<Q> {
         query: Option<Q>,
     ) -> bool {
         let prepared =
-            PreparedRay::of(&object.bounds, ray).or_else(|| PreparedRay::in_f64(object.header, ray));
+            PreparedRay::of(Scalar, &object.bounds, ray).or_else(|| PreparedRay::in_f64(object.header, ray));
         prepared.map(|prepared| self.start(&PreparedRay { ray: index, ..prepared }, query)).is_some()
     }
 

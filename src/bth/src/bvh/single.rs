@@ -169,7 +169,7 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
                 _ => false,
             }
         };
-        if done {
+        if done || stack.is_last() {
             break;
         }
         limit = key_limit(state.last);

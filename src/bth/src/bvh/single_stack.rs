@@ -51,6 +51,12 @@ impl OpenSingleStack<'_> {
         self.top == 0
     }
 
+    /// Whether only [`BOTTOM`] lies below the top, so that nothing is left once the top is done.
+    #[inline(always)]
+    pub(crate) fn is_last(&self) -> bool {
+        self.top <= 1
+    }
+
     #[inline(always)]
     fn code(&self, at: usize) -> u32 {
         debug_assert!(at <= self.top);
@@ -150,6 +156,7 @@ mod tests {
                 assert_eq!(stack.pop(limit, goal), expected.last().expect("the bottom stays").0);
             }
             assert_eq!(stack.is_empty(), expected.len() == 1);
+            assert_eq!(stack.is_last(), expected.len() <= 2);
         }
         assert_eq!(stack.pop(0.0, goal), BOTTOM);
     }

@@ -45,7 +45,9 @@ impl<S: Lanewise> Crossings<S> {
         let size = s.add(s.add(s.abs(dx), s.abs(dy)), s.abs(dz));
         let least = s.splat(f32::MIN_POSITIVE);
         let square = s.mul(far, far);
-        let side_error = s.fma(s.mul(square, size), s.splat(20.0 * U), s.fma(size, least, least));
+        // One is added before products with `least`, which would be denormal.
+        let one = s.splat(1.0);
+        let side_error = s.fma(s.mul(square, size), s.splat(20.0 * U), s.mul(s.add(size, one), least));
         let normal = cross(s, r[1], r[2]);
         let a = dot(s, d, normal);
         let b = dot(s, d, cross(s, r[2], r[0]));
@@ -57,7 +59,7 @@ impl<S: Lanewise> Crossings<S> {
         let volume = dot(s, r[0], normal);
         let volume = s.select(above, volume, s.sub(zero, volume));
         let volume_error =
-            s.fma(s.mul(square, far), s.splat(64.0 * U), s.fma(s.mul(far, s.splat(3.0)), least, least));
+            s.fma(s.mul(square, far), s.splat(64.0 * U), s.mul(s.fma(far, s.splat(3.0), one), least));
         let sum = s.abs(s.add(s.add(a, b), c));
         let sum_error = s.fma(side_error, s.splat(4.0), s.mul(sum, s.splat(8.0 * U)));
         let first = s.sub(tmin, s.fma(s.abs(tmin), s.splat(1.0 / (1 << 20) as f32), s.splat(LEAST_T)));

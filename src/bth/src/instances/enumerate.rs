@@ -9,7 +9,7 @@ use crate::bvh::stack::BOTTOM;
 use crate::intersect::boxes::RaySlabs;
 use crate::intersect::prepare::PreparedRay;
 use crate::rays::Ray;
-use crate::simd::{Isa, Kernel, LANES, Simd};
+use crate::simd::{Isa, Kernel, LANES, Scalar, Simd};
 use bth_format::layout::WideNode;
 use bth_format::object::ObjectBounds;
 
@@ -54,7 +54,7 @@ impl World {
 /// The constants of a ray for tests of the boxes in the top level; `None` for rays that cannot hit anything.
 fn slabs(ray: &Ray, top: &TopLevel) -> Option<RaySlabs> {
     if ray.origin.iter().all(|x| x.abs() <= top.reach)
-        && let Some(prepared) = PreparedRay::of(&ObjectBounds::around(top.greatest_coordinate()), ray)
+        && let Some(prepared) = PreparedRay::of(Scalar, &ObjectBounds::around(top.greatest_coordinate()), ray)
     {
         return Some(prepared.slabs);
     }

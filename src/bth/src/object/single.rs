@@ -93,7 +93,7 @@ fn through_bvh<S: Simd, Q: Query, C: Count>(
     query: (Q::Goal, &mut Option<Q>),
     count: &mut C,
 ) -> SingleResult {
-    let prepared = match PreparedRay::of(&object.bounds, ray) {
+    let prepared = match PreparedRay::of(s, &object.bounds, ray) {
         Some(prepared) => prepared,
         None => match PreparedRay::in_f64(object.header, ray) {
             Some(prepared) => prepared,

@@ -173,6 +173,12 @@ pub trait Simd: Lanewise {
     /// Vectors of four f64.
     type Doubles: Doubles;
     fn doubles(self) -> Self::Doubles;
+    /// The greatest of the first three elements, none of which is negative, in all four. It is compared by its bits, which takes less time
+    /// and finds NaN, which is greater than all numbers.
+    #[inline(always)]
+    fn greatest_of_three(self, a: [f32; 4]) -> [f32; 4] {
+        scalar::greatest_of_three(a)
+    }
     /// Number of pieces. Piece i holds the i-th of as many equal parts of the lanes.
     const PIECES: usize;
     fn piece(self, i: usize) -> Self::Piece;

@@ -210,6 +210,13 @@ fn floats(a: U) -> F {
     zerocopy::transmute!(a)
 }
 
+/// [`Simd::greatest_of_three`].
+#[inline(always)]
+pub(super) fn greatest_of_three(a: [f32; 4]) -> [f32; 4] {
+    let [x, y, z, _] = a.map(f32::to_bits);
+    [f32::from_bits(x.max(y).max(z)); 4]
+}
+
 impl Lanewise for Scalar {
     type F = F;
     type U = U;

@@ -19,7 +19,7 @@ use crate::rays::Ray;
 use crate::simd::{LANES, Lanewise, Part, Simd};
 use bth_format::layout::{NONE, Object};
 use bth_format::object::ObjectBounds;
-use glam::{Vec3A, Vec4};
+use glam::{Vec3A, Vec4, Vec4Swizzles};
 use std::mem::offset_of;
 use std::ops::Range;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
@@ -36,6 +36,14 @@ const ROUND_UP: f32 = 1.0 + 1.0 / (1 << 20) as f32;
 #[inline(always)]
 fn lesser(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
+}
+
+/// Whether `x` is greater than `lower` and less than `upper`, which are positive numbers. One comparison of bits decides, and tells NaN,
+/// infinity and negative numbers from numbers between both.
+#[inline(always)]
+fn lies_between(x: f32, lower: f32, upper: f32) -> bool {
+    let first = lower.to_bits() + 1;
+    x.to_bits().wrapping_sub(first) < upper.to_bits() - first
 }
 
 /// Upper bound of |coordinate of the object's box| + |coordinate of the origin|, for origins whose |coordinates| do not exceed
@@ -102,27 +110,32 @@ impl PreparedRay {
     /// Prepares a single ray, with the same error bounds as [`Prepared::fill`]. None if f32 cannot prepare it or if its range
     /// of t is empty.
     #[inline(always)]
-    pub(crate) fn of(bounds: &ObjectBounds, ray: &Ray) -> Option<PreparedRay> {
+    pub(crate) fn of<S: Simd>(s: S, bounds: &ObjectBounds, ray: &Ray) -> Option<PreparedRay> {
         let [start, end]: [[f32; 4]; 2] = zerocopy::transmute!(*ray);
         let ([.., tmin], [dx, dy, dz, tmax]) = (start, end);
-        let (o, d) = (Vec3A::from_vec4(Vec4::from_array(start)), Vec3A::from_vec4(Vec4::from_array(end)));
-        let (size, start) = (d.abs(), o.abs());
+        let [start, end] = [start, end].map(Vec4::from_array);
+        let (o, d) = (Vec3A::from_vec4(start), Vec3A::from_vec4(end));
+        // The fourth lane is not tmax, which as f32::MAX would make the reciprocal denormal, and so take hundreds of cycles.
+        let size = Vec3A::from_vec4(end.abs().xyzz());
         let [lower, upper] = [bounds.lower, bounds.upper].map(|p| Vec3A::from_vec4(Vec4::from_array(p)));
-        let farthest = (lower - o).abs().max((upper - o).abs());
-        let (greatest, reach) = (size.max_element(), farthest.max_element());
-        let extent = extent(bounds, start.max_element());
-        // Components are compared one by one to detect NaN, because the greater of NaN and a number may be the number.
-        let finite = size.cmplt(Vec3A::splat(LARGEST)) & start.cmplt(Vec3A::splat(LARGEST));
-        let in_range = (greatest > 1.0 / LARGEST) & (SMALLEST < extent) & (extent < LARGEST);
-        if !(finite.all() & in_range & (tmin <= tmax)) {
+        let reach = (lower - o).abs().max((upper - o).abs()).max_element();
+        let greatest = s.greatest_of_three(end.abs().to_array());
+        let [greatest_origin, ..] = s.greatest_of_three(start.abs().to_array());
+        let (greatest, greatest_lanes) = (greatest[0], Vec3A::from_vec4(Vec4::from_array(greatest)));
+        let extent = extent(bounds, greatest_origin);
+        // NaN and infinity among the components make these the greatest.
+        if !(lies_between(greatest, 1.0 / LARGEST, LARGEST)
+            & lies_between(extent, SMALLEST, LARGEST)
+            & (tmin <= tmax))
+        {
             return None;
         }
-        let least = Vec3A::splat(greatest * boxes::LEAST_COMPONENT as f32);
-        let magnitude = Vec3A::splat(greatest) / size.max(least);
+        let least = greatest_lanes * boxes::LEAST_COMPONENT as f32;
+        let magnitude = greatest_lanes / size.max(least);
         let reciprocal = magnitude.copysign(d);
         let (scaled_origin, pad) = (o * reciprocal, magnitude * (extent * boxes::PAD as f32));
         // Branches here would be mispredicted for rays of varying directions.
-        let z = (size.cmpeq(Vec3A::splat(greatest)).bitmask().trailing_zeros() as usize).min(2);
+        let z = (size.cmpeq(greatest_lanes).bitmask().trailing_zeros() as usize).min(2);
         let [x, y, _] = CommonAxis(z).order();
         let (inverse, forward) = (1.0 / greatest, 1f32.copysign(ray.direction[z]));
         // Depths of tmin and tmax: first those that are widened to bound all hits in range, then those that are narrowed so that

@@ -1,7 +1,7 @@
 //! For every way to prepare a ray and every instruction set, box test and filter exclude nothing that exact arithmetic accepts,
 //! and the filter is sure of nothing that exact arithmetic rejects.
 
-use super::{Prepared, PreparedRay};
+use super::{LARGEST, Prepared, PreparedRay, SMALLEST, lies_between};
 use crate::intersect::boxes::RaySlabs;
 use crate::intersect::exact::Intersection;
 use crate::intersect::filter::TriangleFilter;
@@ -81,15 +81,26 @@ impl Kernel for PrepareKernel<'_> {
     }
 }
 
-/// The ray prepared in all ways: in f64, alone in f32, and in a lane among others on every instruction set.
+/// Kernel that prepares one ray alone.
+struct PrepareOneKernel<'a>(&'a Ray, &'a Object);
+
+impl Kernel for PrepareOneKernel<'_> {
+    type Output = Option<PreparedRay>;
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> Option<PreparedRay> {
+        PreparedRay::of(s, &ObjectBounds::new(self.1), self.0)
+    }
+}
+
+/// The ray prepared in all ways: in f64, and on every instruction set alone and in a lane among others.
 fn all_preparations(ray: &Ray, line: &Line, object: &Object, lane: usize) -> Vec<PreparedRay> {
     let slabs = RaySlabs::new(ray, line, object);
     let mut all = vec![PreparedRay::new(slabs, TriangleFilter::new(ray, line, &slabs, object))];
-    all.extend(PreparedRay::of(&ObjectBounds::new(object), ray));
     all.extend(PreparedRay::in_f64(object, ray));
     let mut others = [Ray { origin: [f32::NAN; 3], ..*ray }; LANES];
     others[lane] = *ray;
     for isa in Isa::ALL {
+        all.extend(isa.run(PrepareOneKernel(ray, object)));
         let prepared = isa.run(PrepareKernel(&others, object));
         all.extend(prepared.prepared(lane));
         assert!(prepared.prepared((lane + 1) % LANES).is_none(), "a ray without a line is not prepared");
@@ -176,4 +187,52 @@ fn boxes_and_triangles_that_the_line_crosses_are_kept_and_sure_hits_are_hits() {
     }
     assert!(intersections > 2_000 && missed > 10_000, "{intersections} intersections, {missed} boxes missed");
     assert!(sure > 10_000 && prepared > 100_000, "{sure} sure, {prepared} prepared in f32");
+}
+
+#[test]
+fn rays_that_f32_cannot_prepare_are_left_to_f64() {
+    let object = Object { lower: [-1.0; 3], upper: [1.0; 3], ..Object::new_zeroed() };
+    let usual = Ray::new([0.5, -3.0, 0.25], [0.3, 0.9, -0.1]);
+    let is_prepared = |ray: Ray| {
+        let all = Isa::ALL.map(|isa| isa.run(PrepareOneKernel(&ray, &object)).is_some());
+        assert!(all.iter().all(|of| *of == all[0]), "{ray:?}: {all:?}");
+        all[0]
+    };
+    assert!(is_prepared(usual));
+    assert!(is_prepared(Ray { tmin: -2.0, tmax: f32::MAX, ..usual }));
+    assert!(!is_prepared(Ray { tmin: 2.0, tmax: 1.0, ..usual }));
+    for bad in [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY, LARGEST, -f32::MAX] {
+        for k in 0..3 {
+            let put = |mut of: [f32; 3]| {
+                of[k] = bad;
+                of
+            };
+            assert!(!is_prepared(Ray { origin: put(usual.origin), ..usual }), "origin {bad} along {k}");
+            assert!(
+                !is_prepared(Ray { direction: put(usual.direction), ..usual }),
+                "direction {bad} along {k}"
+            );
+        }
+        if bad.is_nan() {
+            assert!(!is_prepared(Ray { tmin: bad, ..usual }) && !is_prepared(Ray { tmax: bad, ..usual }));
+        }
+    }
+    let scaled = |by: f32| Ray { direction: usual.direction.map(|d| d / 0.9 * by), ..usual };
+    assert!(
+        !is_prepared(scaled(0.0)) && !is_prepared(scaled(1.0 / LARGEST)) && !is_prepared(scaled(LARGEST))
+    );
+    assert!(is_prepared(scaled(1.001 / LARGEST)) && is_prepared(scaled(LARGEST * 0.999)));
+}
+
+#[test]
+fn one_comparison_of_bits_tells_what_lies_between() {
+    let (lower, upper) = (SMALLEST, LARGEST);
+    let about = [lower, upper, 1.0].map(|x| [x.next_down(), x, x.next_up()]);
+    let others =
+        [0.0, -0.0, f32::NAN, -f32::NAN, f32::INFINITY, f32::MAX, f32::from_bits(1), f32::MIN_POSITIVE];
+    for x in about.into_iter().flatten().chain(others) {
+        for x in [x, -x] {
+            assert_eq!(lies_between(x, lower, upper), lower < x && x < upper, "{x}");
+        }
+    }
 }

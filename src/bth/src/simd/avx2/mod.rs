@@ -12,6 +12,7 @@ use self::doubles::AvxDoubles;
 use self::packing::{compression, expansion};
 use self::rows::{IN_ORDER, columns8, transpose4, transpose8};
 use super::detected::Detected;
+use super::quads::sse4;
 use super::{Kernel, LANES, Lanewise, Part, Simd, assert_indices, one_piece, scalar, valid_indices};
 use std::arch::x86_64::*;
 
@@ -248,6 +249,11 @@ impl Simd for Avx2 {
     fn doubles(self) -> AvxDoubles {
         // SAFETY: self proves AVX2.
         unsafe { AvxDoubles::new() }
+    }
+    #[inline(always)]
+    fn greatest_of_three(self, a: [f32; 4]) -> [f32; 4] {
+        // SAFETY: self proves AVX2, and so SSE4.1.
+        unsafe { sse4::greatest_of_three(a) }
     }
 
     // With two registers for each vector, these parts are long, and calls take no measurable time.

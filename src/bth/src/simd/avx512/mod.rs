@@ -13,6 +13,7 @@ use self::sort::{keys_with_lanes, nearest_of_four, store_far_to_near};
 use self::transpose::{transpose4, transpose16};
 use super::avx2::doubles::AvxDoubles;
 use super::detected::Detected;
+use super::quads::sse4;
 use super::{Kernel, LANES, Lanewise, Part, Simd, assert_indices, one_piece, valid_indices};
 use std::arch::x86_64::*;
 
@@ -170,6 +171,11 @@ impl Simd for Avx512 {
     fn doubles(self) -> AvxDoubles {
         // SAFETY: self proves AVX2.
         unsafe { AvxDoubles::new() }
+    }
+    #[inline(always)]
+    fn greatest_of_three(self, a: [f32; 4]) -> [f32; 4] {
+        // SAFETY: self proves AVX2, and so SSE4.1.
+        unsafe { sse4::greatest_of_three(a) }
     }
 
     intrinsics! {

@@ -52,6 +52,9 @@ pub(super) trait Quad: Copy + 'static {
     fn least(self, a: Self::F) -> f32;
     /// Transposes: lane k of row i becomes lane i of row k.
     fn transpose(self, rows: [Self::F; QUAD]) -> [Self::F; QUAD];
+    fn greatest_of_three(self, a: [f32; QUAD]) -> [f32; QUAD] {
+        scalar::greatest_of_three(a)
+    }
 
     fn splat_u(self, x: u32) -> Self::U;
     fn load_u(self, from: &[u32; QUAD]) -> Self::U;
@@ -257,6 +260,10 @@ impl<Q: Quad> Simd for Quads<Q> {
     plain_doubles!();
     type Piece = Register<Q>;
     const PIECES: usize = QUADS;
+    #[inline(always)]
+    fn greatest_of_three(self, a: [f32; QUAD]) -> [f32; QUAD] {
+        self.0.greatest_of_three(a)
+    }
 
     #[inline(always)]
     fn piece(self, i: usize) -> Register<Q> {

@@ -55,6 +55,27 @@ fn part_entry<P: Part<Quads<Sse4>>>(simd: Quads<Sse4>, part: P) -> P::Output {
 type F = __m128;
 type U = __m128i;
 
+/// [`Simd::greatest_of_three`](crate::simd::Simd::greatest_of_three).
+///
+/// # Safety
+/// The machine must have SSE4.1.
+#[inline(always)]
+pub(in crate::simd) unsafe fn greatest_of_three(a: [f32; QUAD]) -> [f32; QUAD] {
+    // SAFETY: the caller proves the feature; four floats are loaded from an array of four, and stored to one.
+    unsafe {
+        let a = _mm_castps_si128(_mm_loadu_ps(a.as_ptr()));
+        // Lanes 0, 1, 2 and 2; 1, 2, 0 and 0; 2, 0, 1 and 1.
+        let [x, y, z] = [
+            _mm_shuffle_epi32::<0b10_10_01_00>(a),
+            _mm_shuffle_epi32::<0b00_00_10_01>(a),
+            _mm_shuffle_epi32::<0b01_01_00_10>(a),
+        ];
+        let mut out = [0.0; QUAD];
+        _mm_storeu_ps(out.as_mut_ptr(), _mm_castsi128_ps(_mm_max_epu32(_mm_max_epu32(x, y), z)));
+        out
+    }
+}
+
 /// Methods of registers alone.
 macro_rules! registers {
     ($($name:ident($($arg:ident: $of:ty),*) -> $out:ty = $do:expr;)*) => { $(
@@ -157,6 +178,11 @@ impl Quad for Sse4 {
     fn bytes(self, a: U, at: &[u8; LANES]) -> U {
         // SAFETY: sixteen readable bytes; unaligned load.
         unsafe { _mm_shuffle_epi8(a, _mm_loadu_si128(at.as_ptr().cast())) }
+    }
+    #[inline(always)]
+    fn greatest_of_three(self, a: [f32; QUAD]) -> [f32; QUAD] {
+        // SAFETY: self proves the feature.
+        unsafe { greatest_of_three(a) }
     }
     #[inline(always)]
     fn prefetch<T>(self, address: *const T) {

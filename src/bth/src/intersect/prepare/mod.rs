@@ -32,12 +32,6 @@ pub(crate) const SMALLEST: f32 = boxes::SMALLEST_EXTENT as f32;
 /// Factor that turns a result of a few f32 roundings into an upper bound.
 const ROUND_UP: f32 = 1.0 + 1.0 / (1 << 20) as f32;
 
-/// The lesser; `b` where either is NaN.
-#[inline(always)]
-fn lesser(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
 /// Whether `x` is greater than `lower` and less than `upper`, which are positive numbers. One comparison of bits decides, and tells NaN,
 /// infinity and negative numbers from numbers between both.
 #[inline(always)]
@@ -63,14 +57,6 @@ pub(crate) struct PreparedRay {
     pub(crate) ray: u32,
     pub(crate) filter: TriangleFilter,
     pub(crate) progress: HitProgress,
-}
-
-/// The first cache line of a [`PreparedRay`].
-#[derive(FromBytes)]
-#[repr(C)]
-struct FirstCacheLine {
-    slabs: RaySlabs,
-    _ray: u32,
 }
 
 const _: () = assert!(offset_of!(PreparedRay, filter) == 64 && size_of::<PreparedRay>() == 128);
@@ -112,7 +98,7 @@ impl PreparedRay {
     #[inline(always)]
     pub(crate) fn of<S: Simd>(s: S, bounds: &ObjectBounds, ray: &Ray) -> Option<PreparedRay> {
         let [start, end]: [[f32; 4]; 2] = zerocopy::transmute!(*ray);
-        let ([.., tmin], [dx, dy, dz, tmax]) = (start, end);
+        let ([.., tmin], [.., tmax]) = (start, end);
         let [start, end] = [start, end].map(Vec4::from_array);
         let (o, d) = (Vec3A::from_vec4(start), Vec3A::from_vec4(end));
         // The fourth lane is not tmax, which as f32::MAX would make the reciprocal denormal, and so take hundreds of cycles.
@@ -139,37 +125,34 @@ impl PreparedRay {
         let [x, y, _] = CommonAxis(z).order();
         let (inverse, forward) = (1.0 / greatest, 1f32.copysign(ray.direction[z]));
         // Depths of tmin and tmax: first those that are widened to bound all hits in range, then those that are narrowed so that
-        // hits between them are certainly in range.
+        // hits between them are certainly in range. Of rays that f32 prepares, no hit is so far away that its t is not finite.
         const LEAST: Vec4 = Vec4::splat(-f32::MAX);
         const GREATEST: Vec4 = Vec4::new(f32::MAX, f32::INFINITY, f32::MAX, f32::MAX);
-        let depths = Vec4::new(tmin, tmax, tmin, lesser(tmax, f32::MAX)) * greatest;
+        let depths = Vec4::new(tmin, tmax, tmin, tmax) * greatest;
         let depths = depths.max(LEAST).min(GREATEST);
         // No intermediate result is denormal, which would cost a hundred cycles.
         let slack = depths.abs() * (4.0 / (1 << 24) as f32) + (greatest + 1.0) * f32::MIN_POSITIVE;
         let [first, last, certain_first, certain_last] =
             (depths + slack * Vec4::new(-1.0, 1.0, 1.0, -1.0)).to_array();
         let [error_slope, error_floor] = edge_functions::error_coefficients(reach);
-        let row = |d: f32| f32::from_bits((d.to_bits() >> 31) * boxes::FAR);
+        let near = end.to_array().map(|d| f32::from_bits((d.to_bits() >> 31) * boxes::FAR));
+        let [x_word, y_word, z_word] = [x, y, z].map(|k| f32::from_bits(k as u32));
+        let nothing = HitProgress::NOTHING;
+        let [nearest, leaf, triangle]: [f32; 3] = zerocopy::transmute!(nothing);
+        let (o, d) = (&ray.origin, &ray.direction);
+        let plane = Vec4::new(o[x], o[y], d[x], d[y]) * Vec4::new(1.0, 1.0, inverse, inverse);
         // Assembled as rows of four, so that whole vectors are stored.
-        let slabs: [[f32; 4]; 4] = [
+        let rows: [[f32; 4]; 8] = [
             reciprocal.extend(greatest).to_array(),
             (-(scaled_origin + pad)).extend(first).to_array(),
             (pad - scaled_origin).extend(last).to_array(),
-            [row(dx), row(dy), row(dz), 0.0],
+            near,
+            [x_word, y_word, z_word, error_floor],
+            plane.to_array(),
+            [forward, -o[z] * forward, certain_first, certain_last],
+            [error_slope, nearest, leaf, triangle],
         ];
-        let FirstCacheLine { slabs, .. } = zerocopy::transmute!(slabs);
-        let filter = TriangleFilter {
-            axis: [x as u32, y as u32, z as u32],
-            error_floor,
-            origin: [ray.origin[x], ray.origin[y]],
-            shear: [ray.direction[x] * inverse, ray.direction[y] * inverse],
-            forward,
-            start: -ray.origin[z] * forward,
-            first: certain_first,
-            last: certain_last,
-            error_slope,
-        };
-        Some(PreparedRay::new(slabs, filter))
+        Some(zerocopy::transmute!(rows))
     }
 
     /// Prepares any ray, in f64. None if the ray cannot hit anything, because it has no line ([`Line::new`]) or an empty range

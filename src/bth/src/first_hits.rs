@@ -1,6 +1,7 @@
 //! Queries for the nearest hit of rays in world space, and for any hit.
 
 use crate::SMALL;
+use crate::instances;
 use crate::object;
 use crate::query::Steps;
 use crate::rays::{Hit, PrimitiveRef, Ray};
@@ -72,12 +73,15 @@ impl Scene {
     /// As [`Self::nearest_of_ray`], in any scene.
     #[inline(never)]
     fn nearest_of_ray_elsewhere(&self, ray: &Ray, from: PrimitiveRef, hit: &mut Hit) {
-        match self.sole() {
-            Some((object, instance)) if !self.has_opacity() => {
-                object::store_nearest(object, ray, hint(from, instance), instance, hit);
+        if !self.has_opacity() {
+            if let Some((object, instance)) = self.sole() {
+                return object::store_nearest(object, ray, hint(from, instance), instance, hit);
             }
-            _ => self.nearest_hits_of(std::slice::from_ref(ray), Some(&[from]), std::slice::from_mut(hit)),
+            if let Some(world) = self.world() {
+                return world.store_nearest_of_ray(self.objects(), ray, from, hit);
+            }
         }
+        self.nearest_hits_of(std::slice::from_ref(ray), Some(&[from]), std::slice::from_mut(hit));
     }
 
     /// Whether a ray hits anything; `from` as for [`Self::nearest_of_ray`].
@@ -92,14 +96,17 @@ impl Scene {
     /// As [`Self::any_of_ray`], in any scene.
     #[inline(never)]
     fn any_of_ray_elsewhere(&self, ray: &Ray, from: PrimitiveRef) -> bool {
-        match self.sole() {
-            Some((object, instance)) if !self.has_opacity() => object::any(object, ray, hint(from, instance)),
-            _ => {
-                let mut found = [false];
-                self.any_hits_of(std::slice::from_ref(ray), Some(&[from]), &mut found);
-                found[0]
+        if !self.has_opacity() {
+            if let Some((object, instance)) = self.sole() {
+                return object::any(object, ray, hint(from, instance));
+            }
+            if let Some(world) = self.world() {
+                return world.any_of_ray(self.objects(), ray, from);
             }
         }
+        let mut found = [false];
+        self.any_hits_of(std::slice::from_ref(ray), Some(&[from]), &mut found);
+        found[0]
     }
 
     /// Stores the nearest hit of each ray, or [`Hit::MISS`]. `hits`, and `from` if it is given, are as long as `rays`.
@@ -126,7 +133,13 @@ impl Scene {
             });
         }
         if let Some(world) = self.world() {
-            return world.nearest(self.objects(), rays, from, hits);
+            if rays.len() >= instances::MIN_BATCH {
+                return world.nearest(self.objects(), rays, from, hits);
+            }
+            for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
+                world.store_nearest_of_ray(self.objects(), ray, start_primitive(from, i), hit);
+            }
+            return;
         }
         for instance in 0..self.object_count() {
             let object = self.view(instance);
@@ -166,7 +179,13 @@ impl Scene {
             });
         }
         if let Some(world) = self.world() {
-            return world.any(self.objects(), rays, from, found);
+            if rays.len() >= instances::MIN_BATCH {
+                return world.any(self.objects(), rays, from, found);
+            }
+            for (i, (ray, found)) in rays.iter().zip(found).enumerate() {
+                *found = world.any_of_ray(self.objects(), ray, start_primitive(from, i));
+            }
+            return;
         }
         for instance in 0..self.object_count() {
             let object = self.view(instance);

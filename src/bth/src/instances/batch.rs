@@ -13,9 +13,7 @@ use crate::SMALL;
 use crate::object::{self, HintUse, QueryKind, Scratch, Strategy};
 use crate::objects::Objects;
 use crate::query::sink::{SceneRays, Sink, Visit};
-use crate::query::{
-    AnswersOf, AnyQuery, Goal, NearestQuery, Query, Steps, any_answers, better, nearest_answers,
-};
+use crate::query::{AnswersOf, AnyQuery, Goal, NearestQuery, Query, any_answers, better, nearest_answers};
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use bth_format::layout::NONE;
@@ -175,13 +173,6 @@ impl World {
             let mut query = SceneAny { rays, found, scratch };
             self.run(objects, rays, from, &mut query);
         });
-    }
-
-    /// As [`Self::nearest`] for one ray, with the statistics of the traversal of objects.
-    pub(crate) fn nearest_counted(&self, objects: &Objects, ray: &Ray, from: PrimitiveRef) -> (Hit, Steps) {
-        let mut query = SceneCounted { ray, best: Hit::MISS, steps: Steps::default() };
-        self.run(objects, std::slice::from_ref(ray), Some(&[from]), &mut query);
-        (query.best, query.steps)
     }
 
     /// Calls `trace` with the hints of a batch, or with none where they are of no use to it or it was measured to be faster so through
@@ -365,33 +356,6 @@ impl SceneQuery for SceneAny<'_> {
         object_rays.fill(batch, hinted, visits, |ray| batch.rays[ray].tmax);
         let answers = any_answers(self.found);
         trace_visits::<AnyQuery>(batch, object, (visits, object_rays), self.scratch, answers);
-    }
-}
-
-struct SceneCounted<'a> {
-    ray: &'a Ray,
-    best: Hit,
-    steps: Steps,
-}
-
-impl SceneQuery for SceneCounted<'_> {
-    fn tmax(&self, _: usize) -> Option<f32> {
-        Some(self.ray.tmax.min(self.best.t))
-    }
-    fn trace(
-        &mut self,
-        batch: &SceneBatch<'_>,
-        object: &ObjectView<'_>,
-        visits: &[Visit],
-        _: &mut ObjectRays,
-    ) {
-        for &visit in visits {
-            let object_ray = batch.object_ray(visit, self.ray.tmax.min(self.best.t));
-            let from = batch.hint(visit.ray as usize, visit.instance);
-            let (hit, object_steps) = object::nearest_counted(object, &object_ray.ray, from, visit.instance);
-            self.steps += object_steps;
-            self.best = better(self.ray, &self.best, &hit, object_ray.t_scale).unwrap_or(self.best);
-        }
     }
 }
 

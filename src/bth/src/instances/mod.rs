@@ -6,8 +6,8 @@
 //! instead. Rays meet the result ([`world`]) in the same way. A batch of rays ([`batch`]) traverses that BVH, coherent rays as
 //! packets ([`packets`]) and the others one by one ([`traverse`]). Rays that certainly do not meet the instance on which they start
 //! ([`free_starts`]) do not enter it, and those that meet no other instance's box end at once ([`box_misses`]). Each visit of an instance by a ray is queued ([`visit_queue`]); the rays of an object's
-//! visits are transformed into its space ([`enter_object`]) and traced there together, with t unchanged. A ray whose query reports
-//! several hits goes through the top level alone ([`enumerate`]).
+//! visits are transformed into its space ([`enter_object`]) and traced there together, with t unchanged. A single ray ([`one_ray`]), and
+//! one whose query reports several hits, goes through the top level alone ([`enumerate`]).
 
 mod batch;
 mod box_misses;
@@ -20,10 +20,13 @@ mod enumerate;
 pub(crate) mod exact_loop;
 mod file_scene;
 mod free_starts;
+mod one_ray;
 mod packets;
 mod placement;
 mod refit;
 mod scene_batch;
+#[cfg(test)]
+mod test_worlds;
 mod top_level;
 mod top_nodes;
 mod traverse;
@@ -32,6 +35,7 @@ mod world;
 
 pub(crate) use caller::NewInstance;
 pub(crate) use caller_instances::InstanceRow;
+pub(crate) use one_ray::MIN_BATCH;
 #[cfg(test)]
 pub(crate) use placement::PartBoxes;
 pub(crate) use placement::Placement;

@@ -3,7 +3,7 @@
 use crate::layout::Object;
 
 /// An axis-aligned box in object space, padded so that each corner is one load of four lanes.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(16))]
 pub struct ObjectBounds {
     /// Least x, y and z; the fourth number is 0.

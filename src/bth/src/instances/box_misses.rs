@@ -46,7 +46,7 @@ impl Kernel for MarkBoxMisses<'_> {
     fn run<S: Simd>(self, s: S) {
         let MarkBoxMisses { batch, starts, first, marks } = self;
         let top = &batch.world.top;
-        let bounds = ObjectBounds::around(top.greatest_coordinate());
+        let bounds = top.cube;
         let mut marked = 0;
         for (group, starts) in starts.chunks(LANES).enumerate() {
             if group * LANES == PROBE && marked * LEAST < PROBE {

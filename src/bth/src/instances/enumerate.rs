@@ -14,7 +14,7 @@ use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, LANES, Scalar, Simd};
 use bth_format::layout::{WIDTH, WideNode};
 use bth_format::limits::MAX_DEPTH;
-use bth_format::object::ObjectBounds;
+use std::hint::black_box;
 
 /// Receiver of instances: it returns the greatest t, rounded to f32, of hits that can still change the result, or `None` to end.
 type Visit<'a> = &'a mut dyn FnMut(u32) -> Option<f32>;
@@ -41,7 +41,7 @@ impl World {
 #[inline(always)]
 fn slabs<S: Simd>(s: S, ray: &Ray, top: &TopLevel) -> Option<RaySlabs> {
     if ray.origin.iter().all(|x| x.abs() <= top.reach)
-        && let Some(prepared) = PreparedRay::of(s, &ObjectBounds::around(top.greatest_coordinate()), ray)
+        && let Some(prepared) = PreparedRay::of(s, &top.cube, ray)
     {
         return Some(prepared.slabs);
     }
@@ -70,6 +70,8 @@ impl Kernel for EnumerateKernel<'_> {
     fn run<S: Simd>(self, s: S) -> bool {
         let EnumerateKernel { top, ray, visit } = self;
         let Some(slabs) = slabs(s, ray, top) else { return false };
+        // Kept in memory: vectors of its numbers would be stored before each visit and loaded after it.
+        let slabs = black_box(&slabs);
         let (mut tmax, mut last) = (ray.tmax, limit(slabs.scale, ray.tmax));
         // Stack entries with a greater key are dropped.
         let mut keys = key_limit(last);
@@ -77,7 +79,7 @@ impl Kernel for EnumerateKernel<'_> {
         let mut stack = stack.start(0);
         let mut code = 0;
         loop {
-            let planes = RaySlabLanes::new(s, &slabs);
+            let planes = RaySlabLanes::new(s, slabs);
             // Neither instances nor the bottom of the stack are nodes.
             while code & INSTANCE == 0 {
                 let node = top.node(code);

@@ -97,7 +97,7 @@ impl TopLevelPackets {
         self.items.clear();
         self.packets.clear();
         rest.clear();
-        let bounds = ObjectBounds::around(top.greatest_coordinate());
+        let bounds = top.cube;
         let mut groups = None;
         for (i, rays) in rays.chunks(PACKET).enumerate() {
             let first = (i * PACKET) as u32;

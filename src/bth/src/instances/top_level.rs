@@ -7,6 +7,7 @@
 use super::placement::Placement;
 use super::top_nodes::{Bounds, CostRatio, INSTANCE, node, node_mut, put_bounds};
 use bth_format::layout::{CacheLine, NODE_LINES, NONE, WIDTH, WideNode};
+use bth_format::object::ObjectBounds;
 use glam::Vec4;
 
 /// The boxes are built for rays whose origin has at most this factor times the greatest |coordinate| of the instances' boxes. For
@@ -26,6 +27,8 @@ pub(crate) struct TopLevel {
     pub(crate) reach: f32,
     /// Greatest [`Placement::origin_slack`] of the instances.
     pub(crate) origin_slack: f32,
+    /// The cube that holds all boxes in the nodes, for the preparation of rays.
+    pub(super) cube: ObjectBounds,
     /// Number of levels of nodes.
     pub(crate) depth: u32,
     pub(super) cost: CostRatio,
@@ -135,6 +138,7 @@ impl TopLevel {
             }
         }
         self.reach = REACH * self.extent;
+        self.cube = ObjectBounds::around(self.greatest_coordinate());
     }
 
     /// The world box of an instance, widened for rays from within the reach.

@@ -13,7 +13,6 @@ use crate::query::sink::Visit;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use bth_format::layout::NONE;
-use bth_format::object::ObjectBounds;
 
 /// Number of rays that advance alternately; their states fit in the first-level cache.
 const BLOCK: usize = 64;
@@ -85,7 +84,6 @@ impl RayTraversals {
         if self.states.len() < rays.len() {
             self.states.resize(rays.len(), vacant);
         }
-        let bounds = ObjectBounds::around(top.greatest_coordinate());
         let mut prepared = Prepared::new();
         let mut index = [0; LANES];
         let mut kept = 0;
@@ -94,7 +92,7 @@ impl RayTraversals {
             index[..count].copy_from_slice(&active[first..first + count]);
             // Without vectors, preparation in lanes takes as long as one ray after the other, and much code.
             if S::HAS_VECTORS {
-                prepared.fill(s, &bounds, rays, &index, count);
+                prepared.fill(s, &top.cube, rays, &index, count);
             }
             for (lane, &ray_index) in index[..count].iter().enumerate() {
                 let ray_index = ray_index as usize;

@@ -19,16 +19,17 @@ pub(super) struct ContenderKind {
 }
 
 enum How {
-    /// CompiledScene like this, traced in batches with hints.
-    Ours(fn(&mut CompileOptions)),
+    /// Compiled like this, traced with hints in batches of so many rays.
+    Ours(fn(&mut CompileOptions), usize),
     Embree(Variant),
 }
 
 /// All contenders. The second is the plain BVH: its hits are what later rays start from, and others are compared with it.
-pub(super) const CONTENDERS: [ContenderKind; 6] = [
-    ContenderKind { name: "bth", how: How::Ours(|_| {}) },
-    ContenderKind { name: "bvh", how: How::Ours(|options| options.structure = Structure::Bvh) },
-    ContenderKind { name: "bth, paper's rule", how: How::Ours(by_the_paper) },
+pub(super) const CONTENDERS: [ContenderKind; 7] = [
+    ContenderKind { name: "bth", how: How::Ours(|_| {}, BATCH) },
+    ContenderKind { name: "bvh", how: How::Ours(|options| options.structure = Structure::Bvh, BATCH) },
+    ContenderKind { name: "bth, paper's rule", how: How::Ours(by_the_paper, BATCH) },
+    ContenderKind { name: "bth single", how: How::Ours(|_| {}, 1) },
     ContenderKind { name: "embree", how: How::Embree(embree::DEFAULT) },
     ContenderKind { name: "embree robust", how: How::Embree(embree::ROBUST) },
     ContenderKind { name: "embree hq packet16", how: How::Embree(embree::PACKETS) },
@@ -84,7 +85,7 @@ pub(super) struct CompiledScene {
 
 /// Compiles a scene.
 pub(super) fn compile(source: &Source, kind: &ContenderKind) -> Result<CompiledScene> {
-    let How::Ours(set) = kind.how else { return Err(anyhow!("not one of ours")) };
+    let How::Ours(set, _) = kind.how else { return Err(anyhow!("not one of ours")) };
     let mut options = CompileOptions::default();
     set(&mut options);
     let start = Instant::now();
@@ -103,24 +104,37 @@ pub(super) fn compile(source: &Source, kind: &ContenderKind) -> Result<CompiledS
 
 /// Builds a contender; Embree takes the geometry of the objects from `shown`.
 pub(super) fn build(source: &Source, kind: &ContenderKind, shown: &Scene) -> Result<MovingContender> {
-    let start = Instant::now();
-    if let How::Embree(variant) = &kind.how {
-        let objects = (0..shown.object_count()).map(|i| {
-            let view = shown.object(i);
-            (embree::padded(view.positions), view.triangles.to_vec())
-        });
-        let object_of: Vec<u32> = (0..shown.instance_count()).map(|i| shown.object_of(i)).collect();
-        let instances = embree::build_instances(objects.collect(), &object_of, variant, 1)?;
-        let (build_s, moving) = (start.elapsed().as_secs_f64(), Box::new(instances));
-        return Ok(MovingContender { name: kind.name, ours: false, moving, build_s, in_tets: 0.0 });
-    }
+    let batch = match &kind.how {
+        How::Ours(_, batch) => *batch,
+        How::Embree(variant) => return build_embree(variant, kind.name, shown),
+    };
     let compiled = compile(source, kind)?;
     let scene = bth::from_bytes(&compiled.bytes).context("a file that was just compiled")?;
     let (build_s, in_tets) = (compiled.seconds, compiled.in_tets);
-    Ok(MovingContender { name: kind.name, ours: true, moving: Box::new(OurScene(scene)), build_s, in_tets })
+    Ok(MovingContender {
+        name: kind.name,
+        ours: true,
+        moving: Box::new(OurScene(scene, batch)),
+        build_s,
+        in_tets,
+    })
 }
 
-struct OurScene(Scene);
+/// Builds Embree's instances of the same objects.
+fn build_embree(variant: &Variant, name: &'static str, shown: &Scene) -> Result<MovingContender> {
+    let start = Instant::now();
+    let objects = (0..shown.object_count()).map(|i| {
+        let view = shown.object(i);
+        (embree::padded(view.positions), view.triangles.to_vec())
+    });
+    let object_of: Vec<u32> = (0..shown.instance_count()).map(|i| shown.object_of(i)).collect();
+    let instances = embree::build_instances(objects.collect(), &object_of, variant, 1)?;
+    let (build_s, moving) = (start.elapsed().as_secs_f64(), Box::new(instances));
+    Ok(MovingContender { name, ours: false, moving, build_s, in_tets: 0.0 })
+}
+
+/// One of our scenes, and how many rays are traced together.
+struct OurScene(Scene, usize);
 
 impl Moving for OurScene {
     fn hide(&mut self) -> Result<()> {
@@ -135,7 +149,7 @@ impl Moving for OurScene {
     }
 
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
-        for (batch, hits) in batch.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
+        for (batch, hits) in batch.chunks(self.1).zip(hits.chunks_mut(self.1)) {
             self.0.batch(batch.rays).from(batch.from).nearest(hits);
         }
     }

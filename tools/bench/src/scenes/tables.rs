@@ -10,11 +10,16 @@ pub fn markdown(record: &ScenesRecord) -> String {
          for Embree the transforms, which are given to it, and the commit) and its rays: `camera`; `diffuse`: one cosine-weighted bounce; `later`: \
          the bounces after it; `path`: all of these. Rays are the same for all, and ours know where they start. `bth` is compiled \
          with the defaults, `bvh` with `--structure bvh`, so `bth`/`bvh` is the paper's BVH-BTH over BVH-BVH; `bth, paper's rule` takes \
-         tetrahedra as the paper does. `differ`: answers other than those of `bvh`, for ours in any bit, for Embree in whether or, by \
+         tetrahedra as the paper does; `bth single` is one ray a call, as `embree` is. `differ`: answers other than those of `bvh`, for ours in any bit, for Embree in whether or, by \
          more than 1e-4 of t, where they hit. Ratios above 1: the first is faster.\n\n## Ratios\n\n",
     );
-    let pairs =
-        [("bth", "bvh"), ("bth, paper's rule", "bvh"), ("bth", "embree"), ("bth", "embree hq packet16")];
+    let pairs = [
+        ("bth", "bvh"),
+        ("bth, paper's rule", "bvh"),
+        ("bth", "embree"),
+        ("bth", "embree hq packet16"),
+        ("bth single", "embree"),
+    ];
     let head: Vec<String> = std::iter::once("scene".to_owned())
         .chain(pairs.iter().flat_map(|(of, over)| PARTS.map(|part| format!("{of} / {over}: {part}"))))
         .collect();

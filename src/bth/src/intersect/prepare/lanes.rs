@@ -118,7 +118,9 @@ pub(crate) fn prepare_lanes<S: Lanewise>(
     let least = s.mul(s.add(greatest, s.splat(1.0)), s.splat(f32::MIN_POSITIVE));
     let ulps = s.splat(4.0 / (1 << 24) as f32);
     let slack = |depth: S::F| s.fma(s.abs(depth), ulps, least);
-    let first = s.max(s.mul(tmin, greatest), s.splat(-f32::MAX));
+    // For the least normal number and denormal ones, whose products would be denormal, 0 stands: that moves them by less than the slack.
+    let start = s.select(s.le(s.abs(tmin), s.splat(f32::MIN_POSITIVE)), zero, tmin);
+    let first = s.max(s.mul(start, greatest), s.splat(-f32::MAX));
     let limit = s.mul(tmax, greatest);
     let last = s.min(s.mul(s.min(tmax, s.splat(f32::MAX)), greatest), s.splat(f32::MAX));
     PreparedLanes {

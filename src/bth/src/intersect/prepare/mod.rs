@@ -16,7 +16,7 @@ use crate::intersect::edge_functions;
 use crate::intersect::filter::TriangleFilter;
 use crate::intersect::line::Line;
 use crate::rays::Ray;
-use crate::simd::{LANES, Lanewise, Part, Simd};
+use crate::simd::{LANES, Lanewise, Part, Scalar, Simd};
 use bth_format::layout::{NONE, Object};
 use bth_format::object::ObjectBounds;
 use glam::{Vec3A, Vec4, Vec4Swizzles};
@@ -38,6 +38,13 @@ const ROUND_UP: f32 = 1.0 + 1.0 / (1 << 20) as f32;
 fn lies_between(x: f32, lower: f32, upper: f32) -> bool {
     let first = lower.to_bits() + 1;
     x.to_bits().wrapping_sub(first) < upper.to_bits() - first
+}
+
+/// Whether `tmin` is `f32::MIN_POSITIVE` or a denormal number, of either sign: products would be denormal. The slack of depths makes 0 stand
+/// for it.
+#[inline(always)]
+fn is_tiny(tmin: f32) -> bool {
+    tmin.abs().to_bits().wrapping_sub(1) < f32::MIN_POSITIVE.to_bits()
 }
 
 /// Upper bound of |coordinate of the object's box| + |coordinate of the origin|, for origins whose |coordinates| do not exceed
@@ -112,7 +119,8 @@ impl PreparedRay {
         // NaN and infinity among the components make these the greatest.
         if !(lies_between(greatest, 1.0 / LARGEST, LARGEST)
             & lies_between(extent, SMALLEST, LARGEST)
-            & (tmin <= tmax))
+            & (tmin <= tmax)
+            & !is_tiny(tmin))
         {
             return None;
         }
@@ -155,11 +163,17 @@ impl PreparedRay {
         Some(zerocopy::transmute!(rows))
     }
 
-    /// Prepares any ray, in f64. None if the ray cannot hit anything, because it has no line ([`Line::new`]) or an empty range
+    /// Prepares any ray, in f64 where [`Self::of`] cannot. None if the ray cannot hit anything, because it has no line ([`Line::new`]) or an empty range
     /// of t.
     #[cold]
     #[inline(never)]
     pub(crate) fn in_f64(object: &Object, ray: &Ray) -> Option<PreparedRay> {
+        if is_tiny(ray.tmin) && 0.0 <= ray.tmax {
+            let prepared = PreparedRay::of(Scalar, &ObjectBounds::new(object), &Ray { tmin: 0.0, ..*ray });
+            if prepared.is_some() {
+                return prepared;
+            }
+        }
         let line = Line::new(ray)?;
         let slabs = RaySlabs::new(ray, &line, object);
         let filter = TriangleFilter::new(ray, &line, &slabs, object);

@@ -32,35 +32,45 @@ impl World {
         from: PrimitiveRef,
         best: &mut Hit,
     ) {
-        *best = Hit::MISS;
-        self.enumerate(ray, &mut |instance| {
-            // Neither is NaN: for a ray whose `tmax` is, nothing is enumerated.
-            let tmax = if best.t < ray.tmax { best.t } else { ray.tmax };
-            let entered = self.enter(objects, instance, &Ray { tmax, ..*ray }, from);
-            let mut hit = Hit::MISS;
-            object::store_nearest(entered.object, &entered.ray.ray, entered.from, instance, &mut hit);
-            let Some(nearer) = better(ray, best, &hit, entered.ray.t_scale) else { return Some(tmax) };
-            *best = nearer;
-            Some(nearer.t)
+        self.nearest_by((objects, ray, from), best, |entered, instance, hit| {
+            object::store_nearest(entered.object, &entered.ray.ray, entered.from, instance, hit);
         });
     }
 
     /// As [`Self::store_nearest_of_ray`], with the statistics of the traversal of objects.
     pub(crate) fn nearest_counted(&self, objects: &Objects, ray: &Ray, from: PrimitiveRef) -> (Hit, Steps) {
         let (mut best, mut steps) = (Hit::MISS, Steps::default());
-        self.enumerate(ray, &mut |instance| {
-            let tmax = if best.t < ray.tmax { best.t } else { ray.tmax };
-            let entered = self.enter(objects, instance, &Ray { tmax, ..*ray }, from);
-            let (hit, of_object) =
+        self.nearest_by((objects, ray, from), &mut best, |entered, instance, hit| {
+            let of_object;
+            (*hit, of_object) =
                 object::nearest_counted(entered.object, &entered.ray.ray, entered.from, instance);
             steps += of_object;
-            best = better(ray, &best, &hit, entered.ray.t_scale).unwrap_or(best);
-            Some(if best.t < ray.tmax { best.t } else { ray.tmax })
         });
         (best, steps)
     }
 
-    /// Whether a ray hits anything, as [`Self::any`] computes it for many; `from` as for [`Self::nearest_of_ray`].
+    /// Stores the nearest hit of a ray in all instances; `trace` stores that in one.
+    #[inline(always)]
+    fn nearest_by(
+        &self,
+        (objects, ray, from): (&Objects, &Ray, PrimitiveRef),
+        best: &mut Hit,
+        mut trace: impl FnMut(&Entered<'_>, u32, &mut Hit),
+    ) {
+        *best = Hit::MISS;
+        self.enumerate(ray, &mut |instance| {
+            // Neither is NaN: for a ray whose `tmax` is, nothing is enumerated.
+            let tmax = if best.t < ray.tmax { best.t } else { ray.tmax };
+            let entered = self.enter(objects, instance, &Ray { tmax, ..*ray }, from);
+            let mut hit = Hit::MISS;
+            trace(&entered, instance, &mut hit);
+            let Some(nearer) = better(ray, best, &hit, entered.ray.t_scale) else { return Some(tmax) };
+            *best = nearer;
+            Some(nearer.t)
+        });
+    }
+
+    /// Whether a ray hits anything, as [`Self::any`] computes it for many; `from` as for [`Self::store_nearest_of_ray`].
     #[inline(never)]
     pub(crate) fn any_of_ray(&self, objects: &Objects, ray: &Ray, from: PrimitiveRef) -> bool {
         self.enumerate(ray, &mut |instance| {

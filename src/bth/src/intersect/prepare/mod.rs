@@ -143,6 +143,7 @@ impl PreparedRay {
         let [first, last, certain_first, certain_last] =
             (depths + slack * Vec4::new(-1.0, 1.0, 1.0, -1.0)).to_array();
         let [error_slope, error_floor] = edge_functions::error_coefficients(reach);
+        // The fourth word is the index of the ray, which is set where there are several.
         let near = end.to_array().map(|d| f32::from_bits((d.to_bits() >> 31) * boxes::FAR));
         let [x_word, y_word, z_word] = [x, y, z].map(|k| f32::from_bits(k as u32));
         let nothing = HitProgress::NOTHING;
@@ -168,7 +169,7 @@ impl PreparedRay {
     #[cold]
     #[inline(never)]
     pub(crate) fn in_f64(object: &Object, ray: &Ray) -> Option<PreparedRay> {
-        if is_tiny(ray.tmin) && 0.0 <= ray.tmax {
+        if is_tiny(ray.tmin) && ray.tmin <= ray.tmax && 0.0 <= ray.tmax {
             let prepared = PreparedRay::of(Scalar, &ObjectBounds::new(object), &Ray { tmin: 0.0, ..*ray });
             if prepared.is_some() {
                 return prepared;

@@ -201,6 +201,10 @@ fn rays_that_f32_cannot_prepare_are_left_to_f64() {
     assert!(is_prepared(usual));
     assert!(is_prepared(Ray { tmin: -2.0, tmax: f32::MAX, ..usual }));
     assert!(!is_prepared(Ray { tmin: 2.0, tmax: 1.0, ..usual }));
+    for tmax in [-0.0, 0.0, 1e-41] {
+        let empty = Ray { tmin: 1e-40, tmax, ..usual };
+        assert!(PreparedRay::in_f64(&object, &empty).is_none(), "an empty range up to {tmax}");
+    }
     // Products of these are denormal; 0 stands for them.
     for tmin in [f32::MIN_POSITIVE, -f32::MIN_POSITIVE, 1e-40, f32::from_bits(1)] {
         let (ray, zero) = (Ray { tmin, ..usual }, Ray { tmin: 0.0, ..usual });

@@ -19,6 +19,9 @@ pub struct Ray {
     pub tmax: f32,
 }
 
+/// Rays in a cache line.
+pub(crate) const RAYS_PER_CACHE_LINE: usize = 64 / size_of::<Ray>();
+
 impl Ray {
     /// A ray from `origin` without an end: `tmin` is 0 and `tmax` infinite.
     pub const fn new(origin: [f32; 3], direction: [f32; 3]) -> Ray {

@@ -66,6 +66,29 @@ fn rays_of_which_many_end(corners: &[[[f32; 3]; 3]], seed: u64) -> Vec<(Ray, Pri
     all.filter(|(i, (ray, start))| i % 36 == 5 || leaves(*i, ray, start)).map(|(_, ray)| ray).collect()
 }
 
+/// Groups of 64 rays in almost the same direction, each from the outside of a triangle near the one before: such rays go in packets.
+fn parallel_rays(corners: &[[[f32; 3]; 3]], groups: usize, seed: u64) -> Vec<(Ray, PrimitiveRef)> {
+    const GROUP: usize = 64;
+    let mut rng = Rng::new(seed);
+    let mut all = Vec::new();
+    while all.len() < groups * GROUP {
+        let d = rng.unit_vector().map(|x| x as f32);
+        let first = rng.below(corners.len() as u64) as usize;
+        let of_triangle = |i: usize| {
+            let triangle = (first + i) % corners.len();
+            let origin =
+                [0, 1, 2].map(|k| corners[triangle].iter().map(|corner| corner[k]).sum::<f32>() / 3.0);
+            let direction = d.map(|x| x * (1.0 + 1e-4 * (i % 7) as f32));
+            let ray = Ray { origin, tmin: 1e-4, direction, tmax: f32::INFINITY };
+            (ray, PrimitiveRef { instance: 0, triangle: triangle as u32 })
+        };
+        let facing = (0..corners.len()).map(of_triangle);
+        let facing = facing.filter(|(ray, start)| is_outward(ray, &corners[start.triangle as usize]));
+        all.extend(facing.take(GROUP));
+    }
+    all
+}
+
 /// Free directions change no bit.
 fn check_free_directions(model: &Model, options: CompileOptions) {
     let _turn = turn();
@@ -157,8 +180,14 @@ fn free_directions_of_instances_change_no_answer() {
     for count in [1, 3, 24] {
         let (scene, transforms) = instances_of(&object, count, 21 + count as u64);
         let (mut rays, mut from) = (Vec::new(), Vec::new());
-        for (ray, start) in rays_of_which_many_end(&corners, 22) {
-            let instance = rng.below(count as u64) as u32;
+        let single = rays_of_which_many_end(&corners, 22);
+        let parallel = parallel_rays(&corners, 300, 23);
+        let mut packet = 0;
+        for (i, (ray, start)) in parallel.into_iter().chain(single).enumerate() {
+            if i % 64 == 0 {
+                packet = rng.below(count as u64) as u32;
+            }
+            let instance = if i < 300 * 64 { packet } else { rng.below(count as u64) as u32 };
             rays.push(placed(&ray, &transforms[instance as usize]));
             let wrong = rng.below(12) == 0;
             let hint = if wrong { rng.below(count as u64 + 2) as u32 } else { instance };

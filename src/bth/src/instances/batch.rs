@@ -4,9 +4,12 @@
 use super::World;
 use super::enter_object::ObjectRays;
 use super::free_starts::{FreeStarts, Starts};
+use super::listed_rays::ListedRays;
 use super::packets::TopLevelPackets;
 use super::placement::Placement;
+use super::progress::Progress;
 use super::scene_batch::SceneBatch;
+use super::top_level::TopLevel;
 use super::traverse::RayTraversals;
 use super::visit_queue::VisitQueue;
 use crate::SMALL;
@@ -28,8 +31,8 @@ const MIN_RAYS_PER_INSTANCE: usize = 256;
 
 /// A query over the rays of a batch. The kernels are compiled once for all.
 trait SceneQuery {
-    /// The greatest t of hits that can still change the result of a ray; `None` if its query is complete.
-    fn tmax(&self, ray: usize) -> Option<f32>;
+    /// The answers so far.
+    fn progress(&self) -> Progress<'_>;
     /// Traces the visits of one object. `object_rays` is memory for their rays in its space.
     fn trace(
         &mut self,
@@ -45,9 +48,11 @@ trait SceneQuery {
 struct ActiveRays {
     /// The coherent rays.
     packets: TopLevelPackets,
-    /// The other rays.
+    /// Of the other rays those that meet few instances' boxes.
+    lists: ListedRays,
+    /// The rest.
     traversals: RayTraversals,
-    /// Indices within the chunk of the other rays that have not ended.
+    /// Indices within the chunk of the rays in `traversals` that have not ended.
     active: Vec<u32>,
     /// The visits to be traced before the rays advance.
     visits: VisitQueue,
@@ -55,6 +60,12 @@ struct ActiveRays {
     object_rays: ObjectRays,
     /// The instances that rays do not meet although they start there.
     free_starts: FreeStarts,
+}
+
+impl ActiveRays {
+    fn is_any_active(&self) -> bool {
+        !(self.active.is_empty() && self.lists.active.is_empty() && self.packets.is_empty())
+    }
 }
 
 thread_local! {
@@ -80,7 +91,7 @@ impl Kernel for StartKernel<'_> {
             batch,
             first,
             count,
-            active_rays: ActiveRays { packets, traversals, active, visits, free_starts, .. },
+            active_rays: ActiveRays { packets, lists, traversals, active, visits, free_starts, .. },
         } = self;
         let (world, rays) = (batch.world, &batch.rays[first..first + count]);
         let top = &world.top;
@@ -107,16 +118,18 @@ impl Kernel for StartKernel<'_> {
                 instance.is_none()
             });
         }
-        traversals.start(s, top, rays, active, |index| free_starts.not_met(index));
+        let queue = (lists, first as u32, &mut visits.all);
+        traversals.start(s, top, rays, active, queue, |index| free_starts.not_met(index));
     }
 }
 
 /// Kernel that advances each active ray to its next instance, and removes the rays that have ended.
 struct AdvanceKernel<'a> {
-    batch: &'a SceneBatch<'a>,
-    query: &'a dyn SceneQuery,
+    top: &'a TopLevel,
+    /// The answers so far of the rays of the chunk.
+    progress: Progress<'a>,
     /// Index of the first ray of the chunk.
-    first: usize,
+    first: u32,
     active_rays: &'a mut ActiveRays,
 }
 
@@ -126,26 +139,19 @@ impl Kernel for AdvanceKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let AdvanceKernel {
-            batch,
-            query,
+            top,
+            progress,
             first,
-            active_rays: ActiveRays { packets, traversals, active, visits, free_starts, .. },
+            active_rays: ActiveRays { packets, lists, traversals, active, visits, free_starts, .. },
         } = self;
-        let world = batch.world;
-        let tmax = |index: usize| query.tmax(first + index);
-        packets.advance(&batch.rays[first..], tmax, |index, instance| {
-            let enters = free_starts.not_met(index) != instance;
-            if enters {
-                visits.all.push(Visit { ray: (first + index) as u32, instance });
-            }
-            enters
-        });
-        traversals.advance(s, &world.top, active, tmax, (first as u32, &mut visits.all));
+        packets.advance(s, progress, free_starts, (first, visits));
+        lists.advance(progress, (first, &mut visits.all));
+        traversals.advance(s, top, active, progress, (first, &mut visits.all));
     }
 }
 
 impl World {
-    /// Computes the nearest hits; among hits of equal t that in the instance of least index.
+    /// Stores the nearest hits; among hits of equal t that in the instance of least index. All are [`Hit::MISS`] before.
     pub(crate) fn nearest(
         &self,
         objects: &Objects,
@@ -153,14 +159,13 @@ impl World {
         from: Option<&[PrimitiveRef]>,
         hits: &mut [Hit],
     ) {
-        hits.fill(Hit::MISS);
         self.by_hints(objects, (rays, from), false, |from, scratch| {
-            let mut query = SceneNearest { rays, hits, scratch };
+            let mut query = SceneNearest { hits, scratch };
             self.run(objects, rays, from, &mut query);
         });
     }
 
-    /// Computes whether rays hit anything.
+    /// Stores whether rays hit anything; false before.
     pub(crate) fn any(
         &self,
         objects: &Objects,
@@ -168,7 +173,6 @@ impl World {
         from: Option<&[PrimitiveRef]>,
         found: &mut [bool],
     ) {
-        found.fill(false);
         self.by_hints(objects, (rays, from), true, |from, scratch| {
             let mut query = SceneAny { rays, found, scratch };
             self.run(objects, rays, from, &mut query);
@@ -217,13 +221,15 @@ impl World {
         let isa = Isa::chosen();
         for first in (0..rays.len()).step_by(CHUNK) {
             let end = (first + CHUNK).min(rays.len());
-            active_rays.visits.all.clear();
+            active_rays.visits.clear();
             active_rays.free_starts.find(&batch, first..end);
             isa.run(StartKernel { batch: &batch, first, count: end - first, active_rays: &mut active_rays });
             self.trace(&batch, query, &mut active_rays);
-            while !active_rays.active.is_empty() || !active_rays.packets.is_empty() {
-                isa.run(AdvanceKernel { batch: &batch, query, first, active_rays: &mut active_rays });
-                self.trace(&batch, query, &mut active_rays);
+            while active_rays.is_any_active() {
+                let progress = query.progress().from(first);
+                let (top, first, active_rays) = (&self.top, first as u32, &mut active_rays);
+                isa.run(AdvanceKernel { top, progress, first, active_rays });
+                self.trace(&batch, query, active_rays);
             }
         }
         ACTIVE_RAYS.set(active_rays);
@@ -248,7 +254,7 @@ impl World {
             let object = batch.objects.view(object);
             query.trace(batch, object, visits, object_rays);
         });
-        visits.all.clear();
+        visits.clear();
     }
 
     /// Calls `work` with objects and all queued visits of their instances, sorted by instance. An object may come several times.
@@ -293,14 +299,13 @@ fn trace_visits<Q: Query>(
 }
 
 struct SceneNearest<'a> {
-    rays: &'a [Ray],
     hits: &'a mut [Hit],
     scratch: &'a mut Scratch,
 }
 
 impl SceneQuery for SceneNearest<'_> {
-    fn tmax(&self, ray: usize) -> Option<f32> {
-        Some(self.rays[ray].tmax.min(self.hits[ray].t))
+    fn progress(&self) -> Progress<'_> {
+        Progress::Nearest(self.hits)
     }
     fn trace(
         &mut self,
@@ -320,8 +325,7 @@ impl SceneQuery for SceneNearest<'_> {
             }
             return;
         }
-        let tmax = |ray: usize| batch.rays[ray].tmax.min(self.hits[ray].t);
-        object_rays.fill(batch, !object.tet_leaves.is_empty(), visits, tmax);
+        object_rays.fill(batch, !object.tet_leaves.is_empty(), visits, self.progress());
         let answers = nearest_answers(self.hits);
         trace_visits::<NearestQuery>(batch, object, (visits, object_rays), self.scratch, answers);
     }
@@ -334,8 +338,8 @@ struct SceneAny<'a> {
 }
 
 impl SceneQuery for SceneAny<'_> {
-    fn tmax(&self, ray: usize) -> Option<f32> {
-        (!self.found[ray]).then(|| self.rays[ray].tmax)
+    fn progress(&self) -> Progress<'_> {
+        Progress::Any(self.found)
     }
     fn trace(
         &mut self,
@@ -352,8 +356,7 @@ impl SceneQuery for SceneAny<'_> {
             }
             return;
         }
-        let hinted = !object.tet_leaves.is_empty();
-        object_rays.fill(batch, hinted, visits, |ray| batch.rays[ray].tmax);
+        object_rays.fill(batch, !object.tet_leaves.is_empty(), visits, self.progress());
         let answers = any_answers(self.found);
         trace_visits::<AnyQuery>(batch, object, (visits, object_rays), self.scratch, answers);
     }

@@ -33,7 +33,7 @@ fn traced(
 ) -> (Vec<Hit>, Vec<bool>) {
     let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
     object::with_scratch(|scratch| {
-        world.run(objects, rays, from, &mut SceneNearest { rays, hits: &mut hits, scratch });
+        world.run(objects, rays, from, &mut SceneNearest { hits: &mut hits, scratch });
         world.run(objects, rays, from, &mut SceneAny { rays, found: &mut found, scratch });
     });
     (hits, found)
@@ -142,7 +142,7 @@ fn batches_that_are_measured_with_and_without_hints_have_the_same_answers() {
     let from: Vec<PrimitiveRef> = (0..rays.len()).map(start).collect();
     let expected = traced(&world, &objects, &rays, None);
     for batch in 0..12 {
-        let mut answers = (vec![Hit::MISS; rays.len()], vec![true; rays.len()]);
+        let mut answers = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
         world.nearest(&objects, &rays, Some(&from), &mut answers.0);
         world.any(&objects, &rays, Some(&from), &mut answers.1);
         assert_eq!(answers, expected, "batch {batch}");
@@ -164,7 +164,7 @@ fn rays_that_are_not_finite_or_have_an_empty_range_hit_nothing() {
         Ray { tmax: f32::NAN, ..good },
         Ray { tmin: f32::NAN, ..good },
     ] {
-        let (mut hit, mut found) = ([Hit::MISS], [true]);
+        let (mut hit, mut found) = ([Hit::MISS], [false]);
         world.nearest(&objects, &[ray], None, &mut hit);
         world.any(&objects, &[ray], None, &mut found);
         assert_eq!((hit[0], found[0]), (Hit::MISS, false), "{ray:?}");

@@ -1,5 +1,6 @@
 //! Transformation of rays into the space of an object.
 
+use super::progress::Progress;
 use super::scene_batch::SceneBatch;
 use crate::SMALL;
 use crate::nodes::affine::RayLanes;
@@ -16,29 +17,29 @@ pub(super) struct ObjectRays {
     pub(super) t_scale: Vec<f32>,
     /// For each ray the triangle on which it starts, or `NONE`; empty where hints are of no use.
     pub(super) from: Vec<u32>,
-    /// For each ray its greatest t in world space.
-    tmax: Vec<f32>,
+    /// For each visit the index of its ray in the batch.
+    index: Vec<u32>,
+    /// For each ray the greatest t, in world space, of hits that can still change the result.
+    so_far: Vec<f32>,
 }
 
 impl ObjectRays {
-    /// Transforms the rays of visits into the space of the object. `hinted` says whether hints are of use there; `tmax` returns the greatest t
-    /// of a ray, given its index.
+    /// Transforms the rays of visits into the space of the object. `hinted` says whether hints are of use there; `progress` are the
+    /// answers so far, beyond which they end.
     pub(super) fn fill(
         &mut self,
         batch: &SceneBatch<'_>,
         hinted: bool,
         visits: &[Visit],
-        tmax: impl Fn(usize) -> f32,
+        progress: Progress<'_>,
     ) {
         self.rays.clear();
         self.t_scale.clear();
         self.from.clear();
-        self.tmax.clear();
-        self.tmax.extend(visits.iter().map(|visit| tmax(visit.ray as usize)));
         if hinted && batch.hints().is_some() {
             self.from.extend(visits.iter().map(|visit| batch.hint(visit.ray as usize, visit.instance)));
         }
-        Isa::chosen().run(EnterKernel { object_rays: self, batch, visits });
+        Isa::chosen().run(EnterKernel { object_rays: self, batch, visits, progress });
     }
 
     /// The triangles on which rays start, if there are any.
@@ -53,6 +54,7 @@ struct EnterKernel<'a> {
     object_rays: &'a mut ObjectRays,
     batch: &'a SceneBatch<'a>,
     visits: &'a [Visit],
+    progress: Progress<'a>,
 }
 
 impl Kernel for EnterKernel<'_> {
@@ -60,33 +62,50 @@ impl Kernel for EnterKernel<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let EnterKernel { object_rays: ObjectRays { rays, t_scale, tmax, .. }, batch, visits } = self;
+        let EnterKernel {
+            object_rays: ObjectRays { rays, t_scale, index, so_far, .. },
+            batch,
+            visits,
+            progress,
+        } = self;
         rays.resize(visits.len(), NO_RAY);
         t_scale.resize(visits.len(), 1.0);
-        let by_itself = |visit: Visit, tmax: f32, ray: &mut Ray, t_scale: &mut f32| {
+        let by_itself = |visit: Visit, ray: &mut Ray, t_scale: &mut f32| {
+            let index = visit.ray as usize;
+            let (own, so_far) = (batch.rays[index].tmax, progress.tmax(index));
+            // Not `f32::min`, which would replace a `tmax` of NaN by a number.
+            let tmax = if so_far < own { so_far } else { own };
             let of_object = batch.object_ray(visit, tmax);
             (*ray, *t_scale) = (of_object.ray, of_object.t_scale);
         };
         if !S::HAS_VECTORS {
             for (i, &visit) in visits.iter().enumerate() {
-                by_itself(visit, tmax[i], &mut rays[i], &mut t_scale[i]);
+                by_itself(visit, &mut rays[i], &mut t_scale[i]);
             }
             return;
         }
+        index.clear();
+        so_far.clear();
+        for visit in visits {
+            index.push(visit.ray);
+            so_far.push(progress.tmax(visit.ray as usize));
+        }
+        index.resize(visits.len() + LANES, 0);
+        so_far.resize(visits.len() + LANES, 0.0);
         let mut lanes = RayLanes::NONE;
         let mut start = 0;
         while start < visits.len() {
             let instance = visits[start].instance;
-            let (mut index, mut last) = ([0; LANES], [0.0; LANES]);
-            let mut count = 0;
+            let mut count = 1;
             while count < LANES && start + count < visits.len() && visits[start + count].instance == instance
             {
-                (index[count], last[count]) = (visits[start + count].ray, tmax[start + count]);
                 count += 1;
             }
             let used = s.mask(((1u64 << count) - 1) as u32);
+            let index = index[start..].first_chunk().expect("there is room for sixteen");
+            let so_far = so_far[start..].first_chunk().expect("there is room for sixteen");
             let mut rows = [s.splat(0.0); LANES];
-            let words = s.rows8(used, Ray::rows(batch.rays), s.load_u(&index));
+            let words = s.rows8(used, Ray::rows(batch.rays), s.load_u(index));
             for k in 0..3 {
                 s.store(s.floats(words[k]), &mut lanes.origin[k]);
                 s.store(s.floats(words[4 + k]), &mut lanes.direction[k]);
@@ -96,7 +115,7 @@ impl Kernel for EnterKernel<'_> {
                 rows[k] = s.load(&lanes.origin[k]);
                 rows[4 + k] = s.load(&lanes.direction[k]);
             }
-            (rows[3], rows[7]) = (s.floats(words[3]), s.load(&last));
+            (rows[3], rows[7]) = (s.floats(words[3]), s.min(s.load(so_far), s.floats(words[7])));
             let rows = s.transpose(rows);
             let mut row = [0.0; LANES];
             for lane in 0..count {
@@ -108,7 +127,7 @@ impl Kernel for EnterKernel<'_> {
                 // Rays whose direction leaves the range of f32 are transformed one by one.
                 if lanes.unscaled[lane % LANES] == 0 {
                     let at = start + lane;
-                    by_itself(visits[at], last[lane % LANES], &mut rays[at], &mut t_scale[at]);
+                    by_itself(visits[at], &mut rays[at], &mut t_scale[at]);
                 }
             }
             start += count;

@@ -1,12 +1,12 @@
 //! Enumeration of the instances whose boxes one ray may enter.
 
 use super::World;
+use super::box_tests::{entered, limit, widened_slabs};
+use super::instance_list::{InstanceList, Visit};
 use super::top_level::TopLevel;
 use super::top_nodes::INSTANCE;
-use super::traverse::{limit, widened_slabs};
 use crate::bvh::ray_state::key_limit;
 use crate::bvh::single_stack::SingleStack;
-use crate::bvh::stack::BOTTOM;
 use crate::intersect::boxes::{RaySlabLanes, RaySlabs};
 use crate::intersect::prepare::PreparedRay;
 use crate::query::NEAREST;
@@ -15,9 +15,6 @@ use crate::simd::{Isa, Kernel, LANES, Scalar, Simd};
 use bth_format::layout::{WIDTH, WideNode};
 use bth_format::limits::MAX_DEPTH;
 use std::hint::black_box;
-
-/// Receiver of instances: it returns the greatest t, rounded to f32, of hits that can still change the result, or `None` to end.
-type Visit<'a> = &'a mut dyn FnMut(u32) -> Option<f32>;
 
 impl World {
     /// Calls `visit` with each visible instance whose box a ray in world space may enter within its range of t, nearer boxes
@@ -48,14 +45,6 @@ fn slabs<S: Simd>(s: S, ray: &Ray, top: &TopLevel) -> Option<RaySlabs> {
     widened_slabs(ray, top)
 }
 
-/// Bits of the children of a node that the ray may enter before the depth `last`, and the depths at which it enters all.
-#[inline(always)]
-fn entered<S: Simd>(s: S, planes: &RaySlabLanes<S>, node: &WideNode, last: f32) -> (u32, S::F) {
-    let (bits, enter) = planes.children_soon(s, node, last);
-    // With coordinates near the limit of f32 the test accepts all boxes, also of empty slots, so these are excluded here.
-    (bits & s.mask_bits(s.lt_u(s.load_u(&node.child), s.splat_u(BOTTOM))), enter)
-}
-
 /// The kernel of [`World::enumerate`]. The receiver is called through a table, so that there is one kernel per instruction set.
 struct EnumerateKernel<'a> {
     top: &'a TopLevel,
@@ -73,6 +62,13 @@ impl Kernel for EnumerateKernel<'_> {
         // Kept in memory: vectors of its numbers would be stored before each visit and loaded after it.
         let slabs = black_box(&slabs);
         let (mut tmax, mut last) = (ray.tmax, limit(slabs.scale, ray.tmax));
+        // Lists save visits, but elsewhere they take longer than that.
+        if S::HAS_FAST_COMPRESS
+            && ray.tmin >= 0.0
+            && let Some(list) = InstanceList::of(s, top, slabs, last)
+        {
+            return list.visit(slabs.scale, tmax, visit);
+        }
         // Stack entries with a greater key are dropped.
         let mut keys = key_limit(last);
         let mut stack = SingleStack::new();

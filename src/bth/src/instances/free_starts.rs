@@ -7,6 +7,7 @@
 use super::World;
 use super::box_misses::MarkBoxMisses;
 use super::enter_object::ObjectRays;
+use super::progress::Progress;
 use super::scene_batch::SceneBatch;
 use super::visit_queue::VisitQueue;
 use crate::free;
@@ -40,6 +41,23 @@ impl FreeStarts {
         self.not_met.get(index).copied().unwrap_or(NONE)
     }
 
+    /// Of some rays, a bit each from the index `first` on, those that may meet an instance.
+    #[inline(always)]
+    pub(super) fn that_may_meet(&self, instance: u32, first: usize, rays: u64) -> u64 {
+        if self.not_met.is_empty() {
+            return rays;
+        }
+        let (mut rest, mut may_meet) = (rays, rays);
+        while rest != 0 {
+            let bit = rest & rest.wrapping_neg();
+            rest ^= bit;
+            if self.not_met[first + bit.trailing_zeros() as usize] == instance {
+                may_meet ^= bit;
+            }
+        }
+        may_meet
+    }
+
     /// Whether it is known of any ray that it meets nothing at all.
     pub(super) fn any_meets_nothing(&self) -> bool {
         !self.meets_nothing.is_empty()
@@ -57,7 +75,7 @@ impl FreeStarts {
         not_met.clear();
         meets_nothing.clear();
         let Some(from) = batch.hints() else { return };
-        visits.all.clear();
+        visits.clear();
         let mut starts = Starts::new(batch.world, batch.objects);
         for ray in chunk.clone() {
             if let Some(instance) = starts.instance(from[ray]).filter(|_| starts.is_looked_up) {
@@ -71,7 +89,7 @@ impl FreeStarts {
         free.clear();
         batch.world.by_object(visits, |object, visits| {
             let object = batch.objects.view(object);
-            object_rays.fill(batch, true, visits, |ray| batch.rays[ray].tmax);
+            object_rays.fill(batch, true, visits, Progress::None);
             if free::find_rest(object, &object_rays.rays, &object_rays.from, Hinted::are_forced(), rest) {
                 let place = |visit: &Visit| visit.ray as usize - chunk.start;
                 for visit in visits {

@@ -11,6 +11,7 @@
 
 mod batch;
 mod box_misses;
+mod box_tests;
 mod caller;
 mod caller_instances;
 mod deformed;
@@ -20,9 +21,12 @@ mod enumerate;
 pub(crate) mod exact_loop;
 mod file_scene;
 mod free_starts;
+mod instance_list;
+mod listed_rays;
 mod one_ray;
 mod packets;
 mod placement;
+mod progress;
 mod refit;
 mod scene_batch;
 #[cfg(test)]

@@ -4,9 +4,12 @@
 //! visited one after the other. If the list exceeds its limit, the rays are traversed one by one, because most of the listed
 //! instances would be occluded by others.
 
+use super::box_tests::limit_lanes;
+use super::free_starts::FreeStarts;
+use super::progress::Progress;
 use super::top_level::TopLevel;
 use super::top_nodes::INSTANCE;
-use super::traverse::limit;
+use super::visit_queue::VisitQueue;
 use crate::SMALL;
 use crate::bvh::coherence::{Span, is_same_octant};
 use crate::bvh::packet::backoff::PacketBackoff;
@@ -17,8 +20,8 @@ use crate::bvh::packet::frustum::{Frustum, FrustumOf};
 use crate::bvh::packet::prepare_group::PrepareGroup;
 use crate::bvh::packet::ray_group::RayGroup;
 use crate::bvh::stack::BOTTOM;
-use crate::rays::Ray;
-use crate::simd::{LANES, Part, Simd};
+use crate::rays::{RAYS_PER_CACHE_LINE, Ray};
+use crate::simd::{CacheLevel, LANES, Part, Simd};
 use bth_format::layout::WIDTH;
 use bth_format::object::ObjectBounds;
 
@@ -63,6 +66,10 @@ struct TopLevelPacket {
     next: u32,
     /// The end of its instances in `items`.
     end: u32,
+    /// Number of its rays.
+    count: u32,
+    /// For each ray the depth of t = 1.
+    scale: [[f32; LANES]; GROUPS],
 }
 
 /// The packets of a chunk.
@@ -100,6 +107,9 @@ impl TopLevelPackets {
         let bounds = top.cube;
         let mut groups = None;
         for (i, rays) in rays.chunks(PACKET).enumerate() {
+            // The next rays are in the cache when this packet is done.
+            let next = rays.as_ptr().wrapping_add(PACKET).cast::<[Ray; RAYS_PER_CACHE_LINE]>();
+            s.prefetch_into::<{ PACKET / RAYS_PER_CACHE_LINE }, _>(CacheLevel::waiting(), next);
             let first = (i * PACKET) as u32;
             let begin = self.items.len() as u32;
             let mut listed = Listed::Incoherent;
@@ -115,7 +125,12 @@ impl TopLevelPackets {
                 }
             }
             if listed == Listed::All {
-                self.packets.push(TopLevelPacket { first, next: begin, end: self.items.len() as u32 });
+                let mut scale = [[0.0; LANES]; GROUPS];
+                for (scale, group) in scale.iter_mut().zip(groups.iter().flatten()) {
+                    s.store(group.scale, scale);
+                }
+                let (count, end) = (rays.len() as u32, self.items.len() as u32);
+                self.packets.push(TopLevelPacket { first, next: begin, end, count, scale });
             } else {
                 self.items.truncate(begin as usize);
                 rest.extend(first..first + rays.len() as u32);
@@ -186,34 +201,47 @@ impl TopLevelPackets {
         Listed::All
     }
 
-    /// Advances each packet to the next instance whose box any of its rays may still intersect, and calls `visit` with the index
-    /// of each such ray and the instance; it returns whether the ray enters it. `tmax` is as for [`RayTraversals::advance`](super::traverse::RayTraversals::advance).
-    /// Packets without a further instance are removed.
+    /// Advances each packet to the next instance whose box any of its rays may still intersect, and queues the visits. Packets without a
+    /// further instance are removed. `first_ray` is added to the index of the ray of a visit.
     #[inline(always)]
-    pub(super) fn advance(
+    pub(super) fn advance<S: Simd>(
         &mut self,
-        rays: &[Ray],
-        tmax: impl Fn(usize) -> Option<f32>,
-        mut visit: impl FnMut(usize, u32) -> bool,
+        s: S,
+        progress: Progress<'_>,
+        free_starts: &FreeStarts,
+        (first_ray, visits): (u32, &mut VisitQueue),
     ) {
-        let items = &self.items;
-        self.packets.retain_mut(|packet| {
-            let mut visited = false;
-            while !visited && packet.next < packet.end {
+        let TopLevelPackets { items, packets, .. } = self;
+        let mut kept = 0;
+        for i in 0..packets.len() {
+            let packet = &mut packets[i];
+            let first = packet.first as usize;
+            // All are stored before any is loaded, because a vector waits for what was just stored in parts.
+            let mut tmax = [[f32::NEG_INFINITY; LANES]; GROUPS];
+            for (ray, tmax) in tmax.as_flattened_mut()[..packet.count as usize].iter_mut().enumerate() {
+                *tmax = progress.tmax(first + ray);
+            }
+            let mut limits = [s.splat(0.0); GROUPS];
+            for (group, limits) in limits.iter_mut().enumerate() {
+                *limits = limit_lanes(s, s.load(&packet.scale[group]), s.load(&tmax[group]));
+            }
+            while packet.next < packet.end {
                 let item = items[packet.next as usize];
                 packet.next += 1;
-                let mut bits = item.rays;
-                while bits != 0 {
-                    let ray = packet.first as usize + bits.trailing_zeros() as usize;
-                    bits &= bits - 1;
-                    let Some(tmax) = tmax(ray) else { continue };
-                    let [x, y, z] = rays[ray].direction;
-                    if item.depth <= limit(x.abs().max(y.abs()).max(z.abs()), tmax) {
-                        visited |= visit(ray, item.instance);
-                    }
+                let depth = s.splat(item.depth);
+                let mut entering = 0;
+                for (group, limits) in limits.iter().enumerate() {
+                    entering |= u64::from(s.mask_bits(s.le(depth, *limits))) << (group * LANES);
+                }
+                entering = free_starts.that_may_meet(item.instance, first, entering & item.rays);
+                if entering != 0 {
+                    visits.push_run(s, first_ray + packet.first, entering, item.instance);
+                    packets[kept] = packets[i];
+                    kept += 1;
+                    break;
                 }
             }
-            visited
-        });
+        }
+        packets.truncate(kept);
     }
 }

@@ -3,12 +3,15 @@
 //! The rays of a block advance alternately, one step each, so that their memory latencies overlap. A ray stops at each instance
 //! until it has been traced in it.
 
+use super::box_tests::{limit, widened_slabs};
+use super::listed_rays::{ListedRays, RayToList};
+use super::progress::Progress;
 use super::top_level::TopLevel;
 use super::top_nodes::INSTANCE;
 use crate::bvh::ray_state::KEY_SLACK;
 use crate::bvh::stack::{BOTTOM, StackPosition, Stacks};
 use crate::intersect::boxes::RaySlabs;
-use crate::intersect::prepare::Prepared;
+use crate::intersect::prepare::{Prepared, PreparedRay};
 use crate::query::sink::Visit;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
@@ -40,24 +43,6 @@ struct TopLevelRay {
     top: StackPosition,
 }
 
-/// The constants of a ray for box tests, computed in f64. For rays from beyond [`TopLevel::reach`] they widen the boxes. `None`
-/// for rays that cannot hit anything.
-pub(super) fn widened_slabs(ray: &Ray, top: &TopLevel) -> Option<RaySlabs> {
-    RaySlabs::widened(ray, top.greatest_coordinate(), |start| {
-        if start > f64::from(top.reach) { f64::from(top.origin_slack) * start } else { 0.0 }
-    })
-}
-
-/// Upper bound of the depths of hits whose t, rounded to f32, is at most `tmax`; `scale` is the depth of t = 1.
-#[inline(always)]
-pub(super) fn limit(scale: f32, tmax: f32) -> f32 {
-    const SLACK: f64 = 1.0 / (1 << 22) as f64;
-    let tmax = f64::from(tmax);
-    let limit = ((tmax + tmax.abs() * SLACK + f64::from(f32::from_bits(1))) * f64::from(scale)) as f32;
-    // This adds at least one unit in the last place. There is no branch, because a batch may mix finite and infinite values.
-    limit + (limit.abs() * f32::EPSILON + f32::MIN_POSITIVE)
-}
-
 impl RayTraversals {
     /// Starts the rays whose indices are in `active`, and removes those that cannot hit anything. `skip` returns for the index of
     /// a ray an instance that it is not to enter, or `NONE`.
@@ -68,8 +53,10 @@ impl RayTraversals {
         top: &TopLevel,
         rays: &[Ray],
         active: &mut Vec<u32>,
+        (lists, first_ray, visits): (&mut ListedRays, u32, &mut Vec<Visit>),
         skip: impl Fn(usize) -> u32,
     ) {
+        lists.clear(rays.len());
         if top.is_empty() || active.is_empty() {
             return active.clear();
         }
@@ -94,32 +81,53 @@ impl RayTraversals {
             if S::HAS_VECTORS {
                 prepared.fill(s, &top.cube, rays, &index, count);
             }
+            let lists_rays = S::HAS_VECTORS && lists.may_list();
+            let mut listed = [RayToList::NONE; LANES];
+            let mut listed_count = 0;
             for (lane, &ray_index) in index[..count].iter().enumerate() {
-                let ray_index = ray_index as usize;
-                let ray = &rays[ray_index];
+                let ray = &rays[ray_index as usize];
                 let [x, y, z] = ray.origin;
                 let is_near = x.abs() <= top.reach && y.abs() <= top.reach && z.abs() <= top.reach;
-                let state = &mut self.states[ray_index];
-                match prepared.prepared(lane).filter(|_| S::HAS_VECTORS && is_near) {
-                    Some(prepared) => state.slabs = prepared.slabs,
+                let skip = INSTANCE | skip(ray_index as usize);
+                let slabs = match prepared.prepared(lane).filter(|_| S::HAS_VECTORS && is_near) {
+                    Some(PreparedRay { slabs, .. }) if lists_rays && ray.tmin >= 0.0 => {
+                        let last = limit(slabs.scale, ray.tmax);
+                        listed[listed_count] = RayToList { index: ray_index, slabs, last, skip };
+                        listed_count += 1;
+                        continue;
+                    }
+                    Some(prepared) => prepared.slabs,
                     None => match widened_slabs(ray, top) {
-                        Some(slabs) => state.slabs = slabs,
+                        Some(slabs) => slabs,
                         None => continue,
                     },
-                }
-                (state.tmax, state.limit) = (ray.tmax, limit(state.slabs.scale, ray.tmax));
-                state.skip = INSTANCE | skip(ray_index);
-                state.top = self.stacks.start(ray_index, 0);
-                active[kept] = index[lane];
+                };
+                self.start_ray(ray_index, &slabs, ray.tmax, skip);
+                active[kept] = ray_index;
+                kept += 1;
+            }
+            let listed = &listed[..listed_count];
+            let mut failed = if lists_rays { lists.list(s, top, listed, (first_ray, visits)) } else { 0 };
+            while failed != 0 {
+                let RayToList { index, slabs, skip, .. } = listed[failed.trailing_zeros() as usize % LANES];
+                failed &= failed - 1;
+                self.start_ray(index, slabs, rays[index as usize].tmax, skip);
+                active[kept] = index;
                 kept += 1;
             }
         }
         active.truncate(kept);
     }
 
+    /// Starts a ray at the root; `skip` is the code of an instance that it is not to enter.
+    #[inline(always)]
+    fn start_ray(&mut self, index: u32, slabs: &RaySlabs, tmax: f32, skip: u32) {
+        let (limit, top) = (limit(slabs.scale, tmax), self.stacks.start(index as usize, 0));
+        self.states[index as usize] = TopLevelRay { slabs: *slabs, tmax, limit, skip, top };
+    }
+
     /// Advances each ray of `active` to the next instance whose box it may intersect, and appends the visit to `visits` in the
-    /// order of `active`. `tmax` returns for the index of a ray the greatest t, rounded to f32, of hits that can change its
-    /// result, or None if its query is complete. Rays that are complete or have no further instance are removed from `active`.
+    /// order of `active`. Rays that are complete or have no further instance are removed from `active`.
     /// `first_ray` is added to the index of the ray of a visit.
     #[inline(always)]
     pub(super) fn advance<S: Simd>(
@@ -127,7 +135,7 @@ impl RayTraversals {
         s: S,
         top: &TopLevel,
         active: &mut Vec<u32>,
-        tmax: impl Fn(usize) -> Option<f32>,
+        progress: Progress<'_>,
         (first_ray, visits): (u32, &mut Vec<Visit>),
     ) {
         let mut kept = 0;
@@ -137,9 +145,9 @@ impl RayTraversals {
             block.inner.len = 0;
             for (slot, &ray_index) in active[first..end].iter().enumerate() {
                 let ray = ray_index as usize;
-                let code = match tmax(ray) {
-                    Some(tmax) => self.resume(s, ray, tmax),
-                    None => BOTTOM,
+                let code = match progress.tmax(ray) {
+                    f32::NEG_INFINITY => BOTTOM,
+                    tmax => self.resume(s, ray, tmax),
                 };
                 block.push(slot, code);
             }

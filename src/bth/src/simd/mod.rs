@@ -270,6 +270,8 @@ pub trait Simd: Lanewise {
     fn gather_pair(self, m: Self::M, from: &[[u32; 2]], at: Self::U) -> (Self::U, Self::U);
     /// As [`Self::expand`].
     fn expand_u(self, a: Self::U, m: Self::M, from: &[u32; LANES]) -> Self::U;
+    /// Whether [`Self::compress`] compiles to a few instructions.
+    const HAS_FAST_COMPRESS: bool = false;
     /// Stores the lanes whose bit is set, in order, from `to[0]` on, and returns their number. The rest of `to` is undefined.
     fn compress(self, bits: u32, a: Self::U, to: &mut [u32; LANES]) -> usize;
     /// As [`Self::compress`].

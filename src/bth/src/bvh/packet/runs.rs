@@ -13,14 +13,11 @@ use crate::bvh::coherence::{Span, is_same_octant};
 use crate::bvh::nodes::is_large;
 use crate::query::sink::Sink;
 use crate::query::{Goal, Query};
-use crate::rays::Ray;
+use crate::rays::{RAYS_PER_CACHE_LINE, Ray};
 use crate::simd::{CacheLevel, Kernel, LANES, Part, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectBounds;
 use bth_format::object::ObjectView;
-
-/// Rays in a cache line.
-const RAYS_PER_CACHE_LINE: usize = 64 / size_of::<Ray>();
 
 /// The least average share of a packet's rays, in per cent, that must take part in a step. Below it single rays are faster.
 #[derive(Clone, Copy, Debug)]
@@ -204,8 +201,13 @@ impl<'a> Runs<'a, '_> {
     fn next(&mut self, s: impl Simd, goal: impl Goal) -> Option<Run<'a>> {
         while self.next < self.rays.len() {
             let first = self.next;
-            let rays = &self.rays[first..self.rays.len().min(first + PACKET)];
-            self.next = first + PACKET;
+            let count = match self.rays.len() - first {
+                // The rays behind a full packet would be too few for one.
+                count if count > PACKET && count < PACKET + MIN_RAYS => count - MIN_RAYS,
+                count => count.min(PACKET),
+            };
+            let rays = &self.rays[first..first + count];
+            self.next = first + count;
             if let Some(kind) = choose(s, goal, self.bounds, rays, &mut self.backoffs) {
                 return Some(Run { first, rays, kind });
             }

@@ -294,6 +294,7 @@ impl Simd for Avx512 {
         // SAFETY: as `expand`.
         unsafe { _mm512_mask_expand_epi32(a, m, self.load_u(from)) }
     }
+    const HAS_FAST_COMPRESS: bool = true;
     #[inline(always)]
     fn compress(self, bits: u32, a: __m512i, to: &mut [u32; LANES]) -> usize {
         // SAFETY: all sixteen lanes are stored to an array of sixteen.

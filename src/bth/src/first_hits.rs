@@ -1,7 +1,6 @@
 //! Queries for the nearest hit of rays in world space, and for any hit.
 
 use crate::SMALL;
-use crate::instances;
 use crate::object;
 use crate::query::Steps;
 use crate::rays::{Hit, PrimitiveRef, Ray};
@@ -133,7 +132,7 @@ impl Scene {
             });
         }
         if let Some(world) = self.world() {
-            if rays.len() >= instances::MIN_BATCH {
+            if !world.go_one_by_one(rays) {
                 return world.nearest(self.objects(), rays, from, hits);
             }
             for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
@@ -179,7 +178,7 @@ impl Scene {
             });
         }
         if let Some(world) = self.world() {
-            if rays.len() >= instances::MIN_BATCH {
+            if !world.go_one_by_one(rays) {
                 return world.any(self.objects(), rays, from, found);
             }
             for (i, (ray, found)) in rays.iter().zip(found).enumerate() {

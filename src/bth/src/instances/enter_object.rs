@@ -86,10 +86,8 @@ impl Kernel for EnterKernel<'_> {
         }
         index.clear();
         so_far.clear();
-        for visit in visits {
-            index.push(visit.ray);
-            so_far.push(progress.tmax(visit.ray as usize));
-        }
+        index.extend(visits.iter().map(|visit| visit.ray));
+        so_far.extend(visits.iter().map(|visit| progress.tmax(visit.ray as usize)));
         index.resize(visits.len() + LANES, 0);
         so_far.resize(visits.len() + LANES, 0.0);
         let mut lanes = RayLanes::NONE;

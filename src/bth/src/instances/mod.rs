@@ -40,7 +40,6 @@ mod world;
 
 pub(crate) use caller::NewInstance;
 pub(crate) use caller_instances::InstanceRow;
-pub(crate) use one_ray::MIN_BATCH;
 #[cfg(test)]
 pub(crate) use placement::PartBoxes;
 pub(crate) use placement::Placement;

@@ -2,15 +2,31 @@
 
 use super::World;
 use crate::SMALL;
+use crate::bvh::coherence::is_same_octant;
+use crate::bvh::packet;
 use crate::nodes::affine::ObjectRay;
 use crate::object;
 use crate::objects::Objects;
 use crate::query::{Steps, better};
 use crate::rays::{Hit, PrimitiveRef, Ray};
+use crate::simd::Isa;
 use bth_format::object::ObjectView;
 
-/// Fewer rays go through the instances one by one: sixteen coherent rays take 0.9 of that time as a batch, sixteen others 1.25.
-pub(crate) const MIN_BATCH: usize = 16;
+/// Fewer rays go one by one if a single instance is visible.
+const MIN_RAYS_OF_ONE_INSTANCE: usize = 16;
+/// Fewer rays go one by one through several instances.
+const MIN_RAYS: usize = packet::entry::MIN_RAYS;
+
+/// Fewer rays in different directions go one by one through several instances.
+fn min_incoherent_rays() -> usize {
+    match Isa::chosen() {
+        Isa::Avx512 => 48,
+        Isa::Avx2 => 128,
+        Isa::Scalar => MIN_RAYS,
+        // With vectors of 128 bits.
+        _ => 256,
+    }
+}
 
 /// An instance that a ray enters.
 struct Entered<'a> {
@@ -22,6 +38,17 @@ struct Entered<'a> {
 }
 
 impl World {
+    /// Whether the rays of a batch are so few that they are faster one by one; measured, see docs/notes/scenes.md.
+    pub(crate) fn go_one_by_one(&self, rays: &[Ray]) -> bool {
+        if self.has_single_visible() {
+            return rays.len() < MIN_RAYS_OF_ONE_INSTANCE;
+        }
+        let is_same_octant = |i: usize| is_same_octant(&rays[0], &rays[i]);
+        rays.len() < MIN_RAYS
+            || rays.len() < min_incoherent_rays()
+                && !(is_same_octant(rays.len() / 2) && is_same_octant(rays.len() - 1))
+    }
+
     /// Stores the nearest hit of a ray, or [`Hit::MISS`], as [`Self::nearest`] does for many. `from` is the triangle on which it starts, or
     /// [`PrimitiveRef::NONE`].
     #[inline(never)]

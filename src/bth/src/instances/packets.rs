@@ -105,11 +105,13 @@ impl TopLevelPackets {
         self.packets.clear();
         rest.clear();
         let bounds = top.cube;
-        let mut groups = None;
+        let (mut groups, count) = (None, rays.len());
         for (i, rays) in rays.chunks(PACKET).enumerate() {
-            // The next rays are in the cache when this packet is done.
-            let next = rays.as_ptr().wrapping_add(PACKET).cast::<[Ray; RAYS_PER_CACHE_LINE]>();
-            s.prefetch_into::<{ PACKET / RAYS_PER_CACHE_LINE }, _>(CacheLevel::waiting(), next);
+            if (i + 1) * PACKET < count {
+                // The next rays are in the cache when this packet is done.
+                let next = rays.as_ptr().wrapping_add(PACKET).cast::<[Ray; RAYS_PER_CACHE_LINE]>();
+                s.prefetch_into::<{ PACKET / RAYS_PER_CACHE_LINE }, _>(CacheLevel::waiting(), next);
+            }
             let first = (i * PACKET) as u32;
             let begin = self.items.len() as u32;
             let mut listed = Listed::Incoherent;
@@ -215,14 +217,18 @@ impl TopLevelPackets {
         let mut kept = 0;
         for i in 0..packets.len() {
             let packet = &mut packets[i];
-            let first = packet.first as usize;
+            if packet.next == packet.end {
+                continue;
+            }
+            let (first, groups) =
+                (packet.first as usize, (packet.count as usize).div_ceil(LANES).min(GROUPS));
             // All are stored before any is loaded, because a vector waits for what was just stored in parts.
             let mut tmax = [[f32::NEG_INFINITY; LANES]; GROUPS];
             for (ray, tmax) in tmax.as_flattened_mut()[..packet.count as usize].iter_mut().enumerate() {
                 *tmax = progress.tmax(first + ray);
             }
             let mut limits = [s.splat(0.0); GROUPS];
-            for (group, limits) in limits.iter_mut().enumerate() {
+            for (group, limits) in limits[..groups].iter_mut().enumerate() {
                 *limits = limit_lanes(s, s.load(&packet.scale[group]), s.load(&tmax[group]));
             }
             while packet.next < packet.end {
@@ -230,7 +236,7 @@ impl TopLevelPackets {
                 packet.next += 1;
                 let depth = s.splat(item.depth);
                 let mut entering = 0;
-                for (group, limits) in limits.iter().enumerate() {
+                for (group, limits) in limits[..groups].iter().enumerate() {
                     entering |= u64::from(s.mask_bits(s.le(depth, *limits))) << (group * LANES);
                 }
                 entering = free_starts.that_may_meet(item.instance, first, entering & item.rays);

@@ -145,7 +145,9 @@ impl Kernel for AdvanceKernel<'_> {
             active_rays: ActiveRays { packets, lists, traversals, active, visits, free_starts, .. },
         } = self;
         packets.advance(s, progress, free_starts, (first, visits));
-        lists.advance(progress, (first, &mut visits.all));
+        if !SMALL {
+            lists.advance(progress, (first, &mut visits.all));
+        }
         traversals.advance(s, top, active, progress, (first, &mut visits.all));
     }
 }

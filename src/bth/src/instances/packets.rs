@@ -4,7 +4,7 @@
 //! visited one after the other. If the list exceeds its limit, the rays are traversed one by one, because most of the listed
 //! instances would be occluded by others.
 
-use super::box_tests::limit_lanes;
+use super::box_tests::{limit, limit_lanes};
 use super::free_starts::FreeStarts;
 use super::progress::Progress;
 use super::top_level::TopLevel;
@@ -70,6 +70,38 @@ struct TopLevelPacket {
     count: u32,
     /// For each ray the depth of t = 1.
     scale: [[f32; LANES]; GROUPS],
+}
+
+impl TopLevelPacket {
+    /// For each ray the greatest depth of hits that can still change its result, given the answers so far from its first ray on.
+    #[inline(always)]
+    fn limits<S: Simd>(&self, s: S, progress: Progress<'_>) -> [S::F; GROUPS] {
+        // All are stored before any is loaded, because a vector waits for what was just stored in parts.
+        let mut tmax = [[f32::NEG_INFINITY; LANES]; GROUPS];
+        for (ray, tmax) in tmax.as_flattened_mut()[..self.count as usize].iter_mut().enumerate() {
+            *tmax = progress.tmax(ray);
+        }
+        let mut limits = [s.splat(0.0); GROUPS];
+        for (group, limits) in limits[..self.groups()].iter_mut().enumerate() {
+            *limits = limit_lanes(s, s.load(&self.scale[group]), s.load(&tmax[group]));
+        }
+        limits
+    }
+
+    /// The rays, a bit each, that may still enter an instance, in few instructions.
+    #[inline(never)]
+    fn entering_one_by_one(&self, item: &ListedInstance, progress: Progress<'_>) -> u64 {
+        let scale = self.scale.as_flattened();
+        let enters = |ray: &usize| item.depth <= limit(scale[*ray], progress.tmax(*ray));
+        let rays = (0..self.count as usize).filter(|ray| item.rays >> ray & 1 != 0);
+        rays.filter(enters).fold(0, |bits, ray| bits | 1 << ray)
+    }
+
+    /// Number of groups of sixteen rays.
+    #[inline(always)]
+    fn groups(&self) -> usize {
+        (self.count as usize).div_ceil(LANES).min(GROUPS)
+    }
 }
 
 /// The packets of a chunk.
@@ -220,24 +252,19 @@ impl TopLevelPackets {
             if packet.next == packet.end {
                 continue;
             }
-            let (first, groups) =
-                (packet.first as usize, (packet.count as usize).div_ceil(LANES).min(GROUPS));
-            // All are stored before any is loaded, because a vector waits for what was just stored in parts.
-            let mut tmax = [[f32::NEG_INFINITY; LANES]; GROUPS];
-            for (ray, tmax) in tmax.as_flattened_mut()[..packet.count as usize].iter_mut().enumerate() {
-                *tmax = progress.tmax(first + ray);
-            }
-            let mut limits = [s.splat(0.0); GROUPS];
-            for (group, limits) in limits[..groups].iter_mut().enumerate() {
-                *limits = limit_lanes(s, s.load(&packet.scale[group]), s.load(&tmax[group]));
-            }
+            let (first, groups) = (packet.first as usize, packet.groups());
+            let limits = if SMALL { [s.splat(0.0); GROUPS] } else { packet.limits(s, progress.from(first)) };
             while packet.next < packet.end {
                 let item = items[packet.next as usize];
                 packet.next += 1;
-                let depth = s.splat(item.depth);
                 let mut entering = 0;
-                for (group, limits) in limits[..groups].iter().enumerate() {
-                    entering |= u64::from(s.mask_bits(s.le(depth, *limits))) << (group * LANES);
+                if SMALL {
+                    entering = packet.entering_one_by_one(&item, progress.from(first));
+                } else {
+                    for (group, limits) in limits[..groups].iter().enumerate() {
+                        let bits = s.mask_bits(s.le(s.splat(item.depth), *limits));
+                        entering |= u64::from(bits) << (group * LANES);
+                    }
                 }
                 entering = free_starts.that_may_meet(item.instance, first, entering & item.rays);
                 if entering != 0 {

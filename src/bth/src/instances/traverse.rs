@@ -8,6 +8,7 @@ use super::listed_rays::{ListedRays, RayToList};
 use super::progress::Progress;
 use super::top_level::TopLevel;
 use super::top_nodes::INSTANCE;
+use crate::SMALL;
 use crate::bvh::ray_state::KEY_SLACK;
 use crate::bvh::stack::{BOTTOM, StackPosition, Stacks};
 use crate::intersect::boxes::RaySlabs;
@@ -81,7 +82,7 @@ impl RayTraversals {
             if S::HAS_VECTORS {
                 prepared.fill(s, &top.cube, rays, &index, count);
             }
-            let lists_rays = S::HAS_VECTORS && lists.may_list();
+            let lists_rays = S::HAS_VECTORS && !SMALL && lists.may_list();
             let mut listed = [RayToList::NONE; LANES];
             let mut listed_count = 0;
             for (lane, &ray_index) in index[..count].iter().enumerate() {

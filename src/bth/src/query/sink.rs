@@ -125,34 +125,17 @@ impl<'a, Q: Query> Sink<'a, Q> {
     /// Stores the hits of up to sixteen consecutive rays from `ray` on. Bit i of `lanes` is set if ray i hits; nothing may have
     /// been reported for these rays before.
     #[inline(always)]
-    pub(crate) fn hits<S: Simd>(&mut self, s: S, ray: usize, lanes: u32, found: &Intersections) {
+    pub(crate) fn hits<S: Simd>(&mut self, s: S, ray: usize, mut lanes: u32, found: &Intersections) {
         if self.scene.is_none()
             && let Some(answers) = self.answers.lanes(self.first + ray)
         {
             let hits = AnswerLanes { lanes, intersections: found, instance: self.instance };
             return Q::answers_of(s, &hits, answers);
         }
-        self.hits_one_by_one(ray, lanes, found);
-    }
-
-    /// Implements [`Self::hits`] where the answers of sixteen rays are not one after the other.
-    #[inline(never)]
-    fn hits_one_by_one(&mut self, ray: usize, mut lanes: u32, found: &Intersections) {
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize % LANES;
             lanes &= lanes - 1;
-            let (index, triangle) = (self.first + ray + lane, found.triangle[lane]);
-            let primitive = |instance| PrimitiveRef { instance, triangle };
-            let answer =
-                |instance| Q::answer_of(primitive(instance), found.t[lane], found.u[lane], found.v[lane]);
-            match &self.scene {
-                None => self.answers.put(index, answer(self.instance)),
-                Some(SceneRays { rays, visits, t_scale }) => {
-                    let Visit { ray, instance } = visits[index];
-                    let (ray, t_scale) = (ray as usize, t_scale[index]);
-                    self.answers.merge(ray, answer(instance), &rays[ray], t_scale);
-                }
-            }
+            self.hit(ray + lane, found.triangle[lane], found.t[lane], found.u[lane], found.v[lane]);
         }
     }
 

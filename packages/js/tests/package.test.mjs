@@ -45,6 +45,20 @@ function raysInto(bounds, count, seed) {
     return rays;
 }
 
+/** Rays from one point through the pixels of a square picture of a box, in tiles of four by four. */
+function cameraRays({ lower, upper }, size) {
+    const rays = new Float32Array(8 * size * size), tiles = size / 4;
+    const eye = upper.map((x, k) => x + [0.4, 0.5, 0.6][k] * (x - lower[k]));
+    const middle = lower.map((x, k) => (x + upper[k]) / 2);
+    for (let i = 0; i < size * size; i++) {
+        const tile = i >> 4, x = 4 * (tile % tiles) + (i & 3), y = 4 * Math.floor(tile / tiles) + ((i >> 2) & 3);
+        const across = (x + 0.5) / size - 0.5, down = (y + 0.5) / size - 0.5;
+        const side = upper[0] - lower[0], to = [middle[0] + across * side, middle[1] - down * side, middle[2] - across * side];
+        rays.set([...eye, 0, ...to.map((p, k) => p - eye[k]), Infinity], 8 * i);
+    }
+    return rays;
+}
+
 /** The answers of bthc to rays, from a file of rays in a file of hits: columns of the bits of t, u and v, and of triangles. */
 function native(file, rays, any) {
     const [from, to] = [join(folder, "rays"), join(folder, "hits")];
@@ -62,9 +76,10 @@ function native(file, rays, any) {
 
 const bits = (array) => new Uint32Array(array.buffer);
 
-function sameAnswers(file, count, seed) {
+/** Compares answers to rays with those of bthc; `raysOf` makes rays for the bounds of the scene. */
+function sameAnswers(file, raysOf) {
     const scene = bth.open(readFileSync(file));
-    const rays = raysInto(scene.bounds, count, seed);
+    const rays = raysOf(scene.bounds), count = rays.length / 8;
     const hits = scene.nearest(rays), expected = native(file, rays, false);
     for (const name of ["t", "u", "v", "triangle"]) {
         assert.deepEqual(bits(hits[name]), expected[name], `${file}: ${name}`);
@@ -80,7 +95,7 @@ test("vector instructions are used", () => assert.equal(bth.simd, true));
 
 test("answers to conformance files have the bits of bthc", () => {
     let hits = 0;
-    for (const name of readdirSync(join(conformance, "valid"))) hits += sameAnswers(join(conformance, "valid", name), 300, 1);
+    for (const name of readdirSync(join(conformance, "valid"))) hits += sameAnswers(join(conformance, "valid", name), (bounds) => raysInto(bounds, 300, 1));
     assert.ok(hits > 1000, `${hits} hits`);
 });
 
@@ -88,7 +103,15 @@ test("answers to a model of 20,000 triangles have the bits of bthc, over several
     const [model, file] = [join(folder, "gyroid.ply"), join(folder, "gyroid.bth")];
     execFileSync(BTH_SCENES, ["make", "gyroid", "--faces", "20000", "-o", model]);
     execFileSync(BTHC, ["compile", model, "-o", file, "--quality", "fast", "--quiet"]);
-    assert.ok(sameAnswers(file, 10_000, 2) > 3000);
+    assert.ok(sameAnswers(file, (bounds) => raysInto(bounds, 10_000, 2)) > 3000);
+});
+
+test("answers of camera rays to a scene of 18 instances have the bits of bthc", () => {
+    const [made, file] = [join(folder, "carousel"), join(folder, "carousel.bth")];
+    execFileSync(BTH_SCENES, ["scene", "carousel", "-o", made]);
+    execFileSync(BTHC, ["compile", join(made, "carousel.manifest"), "-o", file, "--quality", "fast", "--quiet"]);
+    assert.ok(sameAnswers(file, (bounds) => cameraRays(bounds, 64)) > 1000);
+    assert.ok(sameAnswers(file, (bounds) => raysInto(bounds, 3000, 3)) > 500);
 });
 
 test("damaged files are refused with the code of the specification", () => {

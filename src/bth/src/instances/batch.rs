@@ -228,7 +228,7 @@ impl World {
             isa.run(StartKernel { batch: &batch, first, count: end - first, active_rays: &mut active_rays });
             self.trace(&batch, query, &mut active_rays);
             while active_rays.is_any_active() {
-                let progress = query.progress().from(first);
+                let progress = query.progress().of_rays_from(first);
                 let (top, first, active_rays) = (&self.top, first as u32, &mut active_rays);
                 isa.run(AdvanceKernel { top, progress, first, active_rays });
                 self.trace(&batch, query, active_rays);

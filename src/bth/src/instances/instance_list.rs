@@ -11,7 +11,7 @@ use crate::intersect::boxes::{RaySlabLanes, RaySlabs};
 use crate::simd::{LANES, Simd};
 
 /// The least key of a list. Negative depths, which rounding makes of zero, would not be sorted, and keys near zero would be denormal, since
-/// their lowest bits are overwritten. What limits are compared with keys allows for the least normal number ([`key_limit`]).
+/// their lowest bits are overwritten. It is still a lower bound for the comparison with a limit, to which [`key_limit`] adds as much.
 pub(super) const LEAST_KEY: f32 = f32::MIN_POSITIVE;
 
 /// Greatest number of nodes that a ray is tested against.

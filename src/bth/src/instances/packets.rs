@@ -253,13 +253,14 @@ impl TopLevelPackets {
                 continue;
             }
             let (first, groups) = (packet.first as usize, packet.groups());
-            let limits = if SMALL { [s.splat(0.0); GROUPS] } else { packet.limits(s, progress.from(first)) };
+            let limits =
+                if SMALL { [s.splat(0.0); GROUPS] } else { packet.limits(s, progress.of_rays_from(first)) };
             while packet.next < packet.end {
                 let item = items[packet.next as usize];
                 packet.next += 1;
                 let mut entering = 0;
                 if SMALL {
-                    entering = packet.entering_one_by_one(&item, progress.from(first));
+                    entering = packet.entering_one_by_one(&item, progress.of_rays_from(first));
                 } else {
                     for (group, limits) in limits[..groups].iter().enumerate() {
                         let bits = s.mask_bits(s.le(s.splat(item.depth), *limits));

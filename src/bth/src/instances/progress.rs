@@ -15,7 +15,7 @@ pub(super) enum Progress<'a> {
 
 impl<'a> Progress<'a> {
     /// The rays from an index on.
-    pub(super) fn from(self, first: usize) -> Progress<'a> {
+    pub(super) fn of_rays_from(self, first: usize) -> Progress<'a> {
         match self {
             Progress::None => Progress::None,
             Progress::Nearest(hits) => Progress::Nearest(&hits[first..]),

@@ -57,7 +57,9 @@ impl RayTraversals {
         (lists, first_ray, visits): (&mut ListedRays, u32, &mut Vec<Visit>),
         skip: impl Fn(usize) -> u32,
     ) {
-        lists.clear(rays.len());
+        if S::HAS_VECTORS && !SMALL {
+            lists.clear(rays.len());
+        }
         if top.is_empty() || active.is_empty() {
             return active.clear();
         }

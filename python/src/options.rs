@@ -136,7 +136,12 @@ fn motion_and_free(keywords: &Keywords<'_, '_>, options: &mut CompileOptions) ->
     if let Some(segments) = keywords.within("segments", 1..=64)? {
         options.motion.segments = segments as u32;
     }
-    let keep = [("none", free::KeepFree::None), ("auto", free::KeepFree::Auto), ("all", free::KeepFree::All)];
+    let keep = [
+        ("none", free::KeepFree::None),
+        ("auto", free::KeepFree::Auto),
+        ("distances", free::KeepFree::Distances),
+        ("all", free::KeepFree::All),
+    ];
     if let Some(keep) = keywords.choice("free_directions", &keep)? {
         options.free.keep = keep;
     }

@@ -1,4 +1,4 @@
-"""Free directions (format-spec/README.md, "Free directions"): F168 to F171 and F209."""
+"""Free directions and distances (format-spec/README.md, "Free directions"): F168 to F171, F209 and F210."""
 
 import math
 from fractions import Fraction
@@ -8,9 +8,10 @@ import bth_leaves
 from bth_container import NONE
 from bth_leaves import INDEXED, RAW
 
-ROW = 20
 SIDE, BINS = 11, 121
-BACK, NEARBY = 1 << 126, 1 << 127
+BACK = 1 << 126
+# For each column of bins that of its sector, and the same for rows.
+SECTOR_OF = (None, 0, 0, 1, 1, 1, 2, 2, 3, 3, None)
 # Squares of the slopes at which columns meet, and of the greatest slope.
 BORDERS = tuple(
     Fraction(x)
@@ -24,22 +25,41 @@ STARTS = 64
 
 def check(view):
     """F168, F170 and F171."""
-    rows, reach = view.free, view.free_reach
-    if len(rows) not in (0, 0 if view.leaf_vertices else view.triangles):
-        raise view.invalid("F168", f"{len(rows)} rows", c.FREE_DIRECTIONS)
-    if len(reach) != (1 if rows else 0):
-        raise view.invalid("F168", f"{len(reach)} rows", c.FREE_REACH)
-    for distance, *reserved in reach:
-        if any(reserved) or not (distance == 0 or 2.0**-50 <= distance <= 2.0**50):
-            raise view.invalid("F171", f"reach {distance}, {reserved}", c.FREE_REACH)
-    for triangle, row in enumerate(rows):
-        if bits(row) & ~((1 << BINS) - 1 | BACK | NEARBY):
-            raise view.invalid("F170", f"{bits(row):#034x}", c.FREE_DIRECTIONS, ROW * triangle + 4)
+    directions, distances, levels = view.free, view.free_distances, view.free_levels
+    rows = 0 if view.leaf_vertices else view.triangles
+    if len(directions) not in (0, rows):
+        raise view.invalid("F168", f"{len(directions)} rows", c.FREE_DIRECTIONS)
+    if len(distances) not in (0, 0 if directions else rows):
+        raise view.invalid("F168", f"{len(distances)} rows", c.FREE_DISTANCES)
+    if len(levels) != (1 if directions or distances else 0):
+        raise view.invalid("F168", f"{len(levels)} rows", c.FREE_LEVELS)
+    for *of, reserved in levels:
+        is_ascending = 2.0**-50 <= of[0] < of[1] < of[2] <= 2.0**50
+        if reserved or not (is_ascending or of == [0, 0, 0]):
+            raise view.invalid("F171", f"levels {of}, {reserved}", c.FREE_LEVELS)
+    for triangle, row in enumerate(directions):
+        if _bits(row) & ~((1 << BINS) - 1 | BACK):
+            raise view.invalid("F170", f"{_bits(row):#034x}", c.FREE_DIRECTIONS, 24 * triangle + 8)
 
 
-def bits(row):
-    """The 128 bits of a row."""
-    return sum(word << 32 * k for k, word in enumerate(row[1:]))
+def _bits(row):
+    """The 128 bits of the bins of a row of FREE_DIRECTIONS."""
+    return sum(word << 32 * k for k, word in enumerate(row[2:]))
+
+
+def _known(view):
+    """For each triangle its place, the sectors of its front and its back, and the bits of its bins."""
+    for row in view.free:
+        bits = _bits(row)
+        yield row[0], (0, row[1]) if bits & BACK else (row[1], 0), bits
+    for place, front, back in view.free_distances:
+        yield place, (front, back), 0
+
+
+def _invalid(view, code, found, triangle):
+    """An error in the row of a triangle."""
+    kind, row = (c.FREE_DIRECTIONS, 24) if view.free else (c.FREE_DISTANCES, 12)
+    return view.invalid(code, found, kind, row * triangle)
 
 
 def _code(kind, index, slot):
@@ -49,19 +69,20 @@ def _code(kind, index, slot):
 
 def placed(view, kind, index):
     """Triangles of a leaf that lie where their rows say."""
-    if view.free:
+    rows = view.free or view.free_distances
+    if rows:
         found = bth_leaves.leaf(view, kind, index)
         for slot in range(found.triangles):
             triangle, place = view.triangle_ids[found.first + slot], _code(kind, index, slot)
-            if place != NONE and triangle < len(view.free) and view.free[triangle][0] == place:
+            if place != NONE and triangle < len(rows) and rows[triangle][0] == place:
                 yield triangle
 
 
 def check_places(view, found):
     """F169; `found` holds the triangles that lie where their rows say."""
-    for triangle, row in enumerate(view.free):
-        if bits(row) if row[0] == NONE else triangle not in found:
-            raise view.invalid("F169", f"place {row[0]:#x}", c.FREE_DIRECTIONS, ROW * triangle)
+    for triangle, (place, sectors, bins) in enumerate(_known(view)):
+        if any(sectors) or bins if place == NONE else triangle not in found:
+            raise _invalid(view, "F169", f"place {place:#x}", triangle)
 
 
 def _minus(p, q):
@@ -138,50 +159,60 @@ def check_met(view, corners, side):
 
     `corners` are those of all triangles in leaves, `side` is the sign of a volume.
     """
-    if not view.free:
+    known = list(_known(view))
+    if not known:
         return
     points, scale = in_integers([p for triangle in corners.values() for p in triangle])
     integers = {triangle: points[3 * k : 3 * k + 3] for k, triangle in enumerate(corners)}
     starts = {}
-    for triangle, row in enumerate(view.free):
-        if row[0] != NONE:
+    for triangle, (place, _, _) in enumerate(known):
+        if place != NONE:
             starts[triangle] = axes(integers[triangle], scale)
             if starts[triangle] is None:
-                raise view.invalid("F210", f"{corners[triangle]}", c.FREE_DIRECTIONS, ROW * triangle)
-    # Of three times a direction of integers.
-    reach = 3 * scale * Fraction(view.free_reach[0][0])
-    for start in range(0, len(view.free), max(1, -(-len(view.free) // STARTS))):
+                raise _invalid(view, "F210", f"{corners[triangle]}", triangle)
+    # Squares of three times a direction of integers; of no level, and of the others.
+    squares = [Fraction(0)] + [(3 * scale * Fraction(distance)) ** 2 for distance in view.free_levels[0][:3]]
+    for start in range(0, len(known), max(1, -(-len(known) // STARTS))):
         if start not in starts:
             continue
         quick = [[x / scale**power for x in axis] for axis, power in zip(starts[start], (1, 3, 2))]
-        known = starts[start], quick, bits(view.free[start]), reach * reach
+        of_start = starts[start], quick, known[start][1:], squares
         origins = list(zip(corners[start], integers[start]))
         for other, target in corners.items():
-            if other != start and any(_is_met(known, p, (target, integers[other]), side) for p in origins):
-                raise view.invalid("F209", f"triangle {start} meets {other}", c.FREE_DIRECTIONS, ROW * start)
+            if other != start and any(_is_met(of_start, p, (target, integers[other]), side) for p in origins):
+                raise _invalid(view, "F209", f"triangle {start} meets {other}", start)
 
 
-def _is_free(found, free):
-    """Whether a bin, and the side that it is on, is called free."""
-    return bool(free >> found[0] & 1) and found[1] == bool(free & BACK)
+def _level(found, sectors):
+    """The level of a bin and the side that it is on."""
+    row, column = SECTOR_OF[found[0] // SIDE], SECTOR_OF[found[0] % SIDE]
+    if row is None or column is None:
+        return 0
+    bits = sectors[found[1]] >> 4 * row + column
+    return bits & 1 | (bits >> 16 & 1) << 1
+
+
+def _squared_distance(found, known, squares):
+    """The squared distance within which nothing is met in a bin, and on the side that it is on; infinite where it is free."""
+    sectors, bins = known
+    is_free = bins >> found[0] & 1 and found[1] == bool(bins & BACK)
+    return math.inf if is_free else squares[_level(found, sectors)]
 
 
 def _is_met(known, origin, target, side):
-    """Whether the ray from a point through the middle of a triangle meets it in a direction that is called free.
+    """Whether the ray from a point through the middle of a triangle meets it though its direction is called free, or free as far as that.
 
     Point and triangle are given as they are and in integers.
     """
-    axes_, quick, free, reach_squared = known
+    axes_, quick, of_start, squares = known
     (start, exact_start), (corners, (a, b, last)) = origin, target
     near = [(corners[0][k] + corners[1][k] + corners[2][k]) / 3 - start[k] for k in range(3)]
     found = quick_bin(quick, near)
-    if found is None or found is not ... and not _is_free(found, free):
+    if found is None or found is not ... and not _squared_distance(found, of_start, squares):
         return False
     direction = [a[k] + b[k] + last[k] - 3 * exact_start[k] for k in range(3)]
     found = bin_of(axes_, direction) if any(direction) else None
-    if found is None or not _is_free(found, free):
-        return False
-    if free & NEARBY and _dot(direction, direction) > reach_squared:
+    if found is None or _dot(direction, direction) >= _squared_distance(found, of_start, squares):
         return False
     # The middle is met, unless the ray lies in the plane.
     return side(*corners, start) != 0

@@ -9,12 +9,13 @@ macro_rules! files {
     };
 }
 
-const VALID: [(&str, &[u8]); 28] = files![
+const VALID: [(&str, &[u8]); 29] = files![
     "deformable",
     "deformable-tets-link32",
     "deformable-tets-tet16",
     "deformers",
     "free-directions",
+    "free-distances",
     "grid-16",
     "grid-21",
     "groups",

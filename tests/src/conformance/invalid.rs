@@ -306,7 +306,7 @@ fn tree() -> Vec<Case> {
 /// Faults of free directions.
 fn free_directions() -> Vec<Case> {
     let base = "free-directions";
-    let (directions, reach) = (kind::FREE_DIRECTIONS, kind::FREE_REACH);
+    let (directions, levels) = (kind::FREE_DIRECTIONS, kind::FREE_LEVELS);
     let rows = |name: &str, kind: u32, [stride, before, count]: [usize; 3]| {
         broken(name, base, Seal::Sections, |e| {
             let end = e.section_at(kind) + stride * count;
@@ -318,20 +318,25 @@ fn free_directions() -> Vec<Case> {
     };
     let place = |leaf, slot| FreePlace { leaf, slot }.code();
     vec![
-        rows("F168-rows", directions, [20, 2, 1]),
-        rows("F168-reach-alone", directions, [20, 2, 0]),
+        rows("F168-rows", directions, [24, 2, 1]),
+        rows("F168-levels-alone", directions, [24, 2, 0]),
+        Case::new("F168-both-sections", super::valid::free_directions_and_distances()),
         field("F169-place-of-another", base, directions, 0, place(Child::Indexed(0), 0)),
         field("F169-other-leaf", base, directions, 0, place(Child::Raw(0), 1)),
-        field("F169-beyond", base, directions, 20, place(Child::Indexed(1 << 20), 0)),
-        field("F169-bins-without-a-place", base, directions, 0, NONE),
-        field("F170-reserved", base, directions, 16, (FreeBins::NEARBY >> 96) as u32 | 1 << 25),
-        field("F171-infinite", base, reach, 0, f32::INFINITY.to_bits()),
-        field("F171-negative", base, reach, 0, (-1f32).to_bits()),
-        field("F171-reserved", base, reach, 12, 1),
-        // Without the bit of NEARBY, nothing is met at all straight up.
-        field("F209-met", base, directions, 16, 0),
-        // With a longer reach the triangle above is met.
-        field("F209-met-within-the-reach", base, reach, 0, 20f32.to_bits()),
+        field("F169-beyond", base, directions, 24, place(Child::Indexed(1 << 20), 0)),
+        field("F169-sectors-without-a-place", base, directions, 0, NONE),
+        field("F169-distances-without-a-place", "free-distances", kind::FREE_DISTANCES, 12, NONE),
+        field("F170-reserved", base, directions, 20, (FreeBins::BACK >> 96) as u32 | 1 << 25),
+        field("F170-last-bit", base, directions, 20, 1 << 31),
+        field("F171-infinite", base, levels, 8, f32::INFINITY.to_bits()),
+        field("F171-negative", base, levels, 0, (-1f32).to_bits()),
+        field("F171-not-ascending", base, levels, 0, 1f32.to_bits()),
+        field("F171-reserved", base, levels, 12, 1),
+        // The bin in the middle is free, though the triangle above lies there.
+        field("F209-met", base, directions, 8 + 4 * (FREE_BINS / 2 / 32), 1 << (FREE_BINS / 2 % 32)),
+        // With a greater distance of the level, the triangle above lies within it.
+        field("F209-met-within-a-level", base, levels, 8, 20f32.to_bits()),
+        field("F209-met-within-a-level-of-distances", "free-distances", levels, 8, 20f32.to_bits()),
         broken("F210-sliver", base, Seal::Sections, |e| {
             // The third corner of the first triangle, vertex 5, comes close to the first edge.
             let lines = e.section_at(kind::LINES);

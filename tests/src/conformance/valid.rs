@@ -21,6 +21,7 @@ pub fn valid() -> Vec<Case> {
         Case::new("packed-nodes-grid-16", two_levels(Some(GridBits::B16), true)),
         Case::new("opacity", opacity()),
         Case::new("free-directions", free_directions()),
+        Case::new("free-distances", free_distances()),
         Case::new("two-objects", two_objects()),
         Case::new("groups", groups()),
         Case::new("deformable", super::deformable::deformable()),
@@ -129,24 +130,68 @@ fn triangle() -> Vec<u8> {
     builder.finish()
 }
 
-/// Two parallel triangles, one high above the other. Straight up from the lower one there is nothing within the reach, and from the
-/// upper one nothing at all.
-fn free_directions() -> Vec<u8> {
+/// Levels of free directions.
+const LEVELS: FreeLevels = FreeLevels { distance: [0.25, 1.0, 4.0], reserved: 0 };
+
+/// Two parallel triangles, one high above the other, with what is known of free directions of them.
+fn one_above_the_other(free: &[FreeDirections], free_distances: &[FreeDistances]) -> Vec<u8> {
     let above = CORNERS.map(|[x, y, _]| [x, y, 10.0]);
     let lines = lines(indexed(&[above, CORNERS], 0).as_bytes());
-    let row =
-        |slot, bits| FreeDirections::new(FreePlace { leaf: Child::Indexed(0), slot }.code(), FreeBins(bits));
-    let middle = 1u128 << (FREE_BINS / 2);
     file(&ObjectParts {
         bounds: Some(bounds(CORNERS.iter().chain(&above))),
         root: Child::Indexed(0).code(),
         triangles: 2,
         lines: &lines,
         triangle_ids: &[1, 0],
-        free: &[row(1, middle | FreeBins::NEARBY), row(0, FreeBins::ALL)],
-        free_reach: &[FreeReach { reach: 1.0, reserved: [0; 3] }],
+        free,
+        free_distances,
+        free_levels: &[LEVELS],
         ..ObjectParts::default()
     })
+}
+
+/// The place of the lower triangle, and of the upper one.
+fn places() -> [u32; 2] {
+    [1, 0].map(|slot| FreePlace { leaf: Child::Indexed(0), slot }.code())
+}
+
+/// Sectors of which that of steep directions has a level.
+fn steep(level: usize) -> FreeSectors {
+    FreeSectors(0)
+        .with(FreeSectors::of_bin(FREE_BINS / 2).expect("the bin in the middle has a sector"), level)
+}
+
+/// Rows of [`one_above_the_other`]: straight up from the lower triangle there is nothing within the third level, and from the upper one nothing at
+/// all.
+fn directions() -> [FreeDirections; 2] {
+    let [lower, upper] = places();
+    let all = FreeSectors(u32::MAX);
+    [
+        FreeDirections::new(lower, steep(3), FreeBins(0)),
+        FreeDirections::new(upper, all, FreeBins(FreeBins::ALL)),
+    ]
+}
+
+/// As [`directions`], of both sides: there is nothing within the second level below the upper triangle, either.
+fn distances() -> [FreeDistances; 2] {
+    let [lower, upper] = places();
+    [
+        FreeDistances { place: lower, sectors: [steep(3).0, u32::MAX] },
+        FreeDistances { place: upper, sectors: [u32::MAX, steep(2).0] },
+    ]
+}
+
+fn free_directions() -> Vec<u8> {
+    one_above_the_other(&directions(), &[])
+}
+
+fn free_distances() -> Vec<u8> {
+    one_above_the_other(&[], &distances())
+}
+
+/// An invalid file: it has both sections.
+pub(super) fn free_directions_and_distances() -> Vec<u8> {
+    one_above_the_other(&directions(), &distances())
 }
 
 /// Six triangles side by side: opaque, transparent, unknown, and divided at levels 1 and 2 and once more at level 1 by the

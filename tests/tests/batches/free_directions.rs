@@ -4,21 +4,21 @@ use crate::{bits, hinted_rays, scaled, turn};
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth::{Hinted, Isa, Scene, SceneBuilder};
 use bth_compile::Silent;
-use bth_compile::free::{FreeOptions, KeepFree};
+use bth_compile::free::{FreeOptions, KeepFree, Kept};
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_format::layout::GridBits;
 use bth_random::Rng;
 use bth_scenes::{Model, gyroid::gyroid, knot::torus_knot};
 
-/// Compiled with all free directions, on a grid or not.
-fn with_free_directions(model: &Model, options: CompileOptions) -> Scene {
+/// Compiled with free directions or distances of all triangles, on a grid or not.
+fn with_free_directions(model: &Model, options: CompileOptions, keep: KeepFree) -> Scene {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("model.ply");
     bth_scenes::write::file(model, &path).expect("a model file");
-    let free = FreeOptions { keep: KeepFree::All, ..FreeOptions::default() };
+    let free = FreeOptions { keep, ..FreeOptions::default() };
     let options = CompileOptions { structure: Structure::Bvh, free, ..options };
     let (compiled, report) = compile(&path, &options, &Silent).expect("a model that compiles");
-    assert!(report.free.is_some_and(|free| free.kept && free.free + free.free_nearby > 0.1));
+    assert!(report.free.is_some_and(|free| free.kept != Kept::None && free.beyond[0] > 0.1));
     bth::from_bytes(&compiled.bytes).expect("a file that opens")
 }
 
@@ -89,14 +89,20 @@ fn parallel_rays(corners: &[[[f32; 3]; 3]], groups: usize, seed: u64) -> Vec<(Ra
     all
 }
 
-/// Free directions change no bit.
+/// Free directions and distances change no bit.
 fn check_free_directions(model: &Model, options: CompileOptions) {
     let _turn = turn();
     let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
-    let scene = with_free_directions(model, options);
-    let mut all = hinted_rays(&scene, &corners, 3000, 11);
-    all.extend(rays_off_the_surface(&corners, 30_000, 12));
-    all.extend(rays_of_which_many_end(&corners, 13));
+    for keep in [KeepFree::All, KeepFree::Distances] {
+        check_hinted_rays(&with_free_directions(model, options.clone(), keep), &corners);
+    }
+}
+
+/// Hinted rays in batches, with all instruction sets, against rays that are traced one by one without hints.
+fn check_hinted_rays(scene: &Scene, corners: &[[[f32; 3]; 3]]) {
+    let mut all = hinted_rays(scene, corners, 3000, 11);
+    all.extend(rays_off_the_surface(corners, 30_000, 12));
+    all.extend(rays_of_which_many_end(corners, 13));
     let (rays, from): (Vec<Ray>, Vec<PrimitiveRef>) = all.into_iter().unzip();
     let expected: Vec<Hit> = rays.iter().map(|ray| scene.nearest(ray).unwrap_or(Hit::MISS)).collect();
     let ways = Isa::ALL.into_iter().flat_map(|isa| [(isa, Hinted::Tets), (isa, Hinted::Measured)]);
@@ -174,7 +180,7 @@ fn free_directions_of_instances_change_no_answer() {
     let _turn = turn();
     let model = torus_knot(2000);
     let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
-    let object = with_free_directions(&model, CompileOptions::default());
+    let object = with_free_directions(&model, CompileOptions::default(), KeepFree::All);
     let mut rng = Rng::new(5);
     // One visible instance has a way of its own.
     for count in [1, 3, 24] {

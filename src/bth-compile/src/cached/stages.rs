@@ -107,7 +107,7 @@ impl Stages for CachedStages<'_> {
         self.cache.get_or_build(
             (keys::free(&geometry, bvh, options), self.part),
             monitor,
-            |bytes| decode(bytes).filter(|f: &free::Free| f.bins.len() == mesh.triangles.len()),
+            |bytes| decode(bytes).filter(|found: &free::Free| found.is_of(mesh.triangles.len())),
             encode,
             || Direct.free(mesh, tree, (bvh, options), monitor),
         )

@@ -1,7 +1,7 @@
 //! The frame of a start triangle, in which its direction bins are cones around its normal.
 
 use bth::simd::LANES;
-use bth_format::layout::{FREE_BINS, FREE_SIDE, free_axes, free_column};
+use bth_format::layout::{FREE_BINS, FREE_SECTORS, FREE_SIDE, FreeSectors, free_axes, free_column};
 use std::sync::LazyLock;
 
 /// A set of bins: bit i stands for bin i.
@@ -9,6 +9,29 @@ pub(super) type BinSet = u128;
 
 /// All columns, or rows, as bits.
 pub(super) const ALL_COLUMNS: u32 = (1 << FREE_SIDE) - 1;
+
+/// The bins that have a sector.
+pub(super) const IN_SECTORS: BinSet = {
+    let (mut all, mut sector) = (0, 0);
+    while sector < FREE_SECTORS {
+        all |= SECTORS[sector];
+        sector += 1;
+    }
+    all
+};
+
+/// The bins of each sector.
+pub(super) const SECTORS: [BinSet; FREE_SECTORS] = {
+    let mut sectors = [0; FREE_SECTORS];
+    let mut bin = 0;
+    while bin < FREE_BINS {
+        if let Some(sector) = FreeSectors::of_bin(bin) {
+            sectors[sector] |= 1 << bin;
+        }
+        bin += 1;
+    }
+    sectors
+};
 
 /// Least and greatest slopes of columns, in f32: those of the promise, and a 2^-19 (1 + s²) beyond, which is more than the rounding
 /// errors of sums of two products with them. Lanes from the eleventh on are empty.

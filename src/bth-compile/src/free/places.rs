@@ -9,13 +9,15 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 #[derive(Clone, Debug)]
 pub(crate) struct FreeRows {
     pub(crate) directions: Vec<FreeDirections>,
-    pub(crate) reach: [FreeReach; 1],
+    pub(crate) distances: Vec<FreeDistances>,
+    pub(crate) levels: [FreeLevels; 1],
 }
 
 impl FreeRows {
     /// The rows of all triangles. Those that lie in no triangle leaf, or beyond what a place can address, know nothing.
     pub(crate) fn new(free: &Free, wide: &Wide, grid: Option<&Grid>) -> Self {
-        let mut directions = vec![FreeDirections::UNKNOWN; free.bins.len()];
+        let mut directions = vec![FreeDirections::UNKNOWN; free.directions.len()];
+        let mut distances = vec![FreeDistances::UNKNOWN; free.distances.len()];
         for leaf in leaves(wide) {
             let (first, triangles) = match (leaf, grid.map(|grid| grid.bits)) {
                 (Child::Indexed(at), None) => {
@@ -39,12 +41,20 @@ impl FreeRows {
             for slot in 0..triangles {
                 let triangle = wide.triangle_ids[(first + slot) as usize] as usize;
                 let place = FreePlace { leaf, slot }.code();
-                if place != NONE && free.bins[triangle] != [0; 4] {
-                    directions[triangle] = FreeDirections { place, bins: free.bins[triangle] };
+                if place == NONE {
+                    continue;
+                }
+                let found = free.directions.get(triangle).filter(|row| **row != FreeDirections::UNKNOWN);
+                if let Some(found) = found {
+                    directions[triangle] = FreeDirections { place, ..*found };
+                }
+                let found = free.distances.get(triangle).filter(|row| **row != FreeDistances::UNKNOWN);
+                if let Some(found) = found {
+                    distances[triangle] = FreeDistances { place, ..*found };
                 }
             }
         }
-        FreeRows { directions, reach: [FreeReach { reach: free.reach, reserved: [0; 3] }] }
+        FreeRows { directions, distances, levels: [FreeLevels { distance: free.levels, reserved: 0 }] }
     }
 }
 

@@ -1,12 +1,13 @@
-//! The free bins of a triangle: a traversal of the BVH that stops at what no open bin may see.
+//! What is known of the directions of a triangle: a traversal of the BVH that stops at what no open bin may see.
 
-use super::frame::{BinSet, Frame, share};
+use super::Kept;
+use super::frame::{BinSet, Frame, IN_SECTORS, SECTORS, share};
 use super::meet::meet;
 use super::see::see;
 use super::start::Start;
 use super::tree::{BLOCK, Block, Tree};
 use bth::simd::{Kernel, Simd};
-use bth_format::layout::FreeBins;
+use bth_format::layout::{FREE_SECTORS, FreeBins, FreeSectors};
 use bth_import::Mesh;
 
 /// What all searches of a mesh share.
@@ -15,29 +16,36 @@ pub(super) struct Surroundings<'a> {
     /// Triangles in the order of the BVH.
     pub(super) order: &'a [u32],
     pub(super) tree: Tree,
-    /// Distance within which [`FreeBins::NEARBY`] promises that nothing is met.
-    pub(super) reach: f32,
+    /// Distances of the levels of sectors; ascending, or zeros.
+    pub(super) levels: [f32; FreeSectors::LEVELS],
+    /// What is decided.
+    pub(super) kept: Kept,
+}
+
+/// What is known of a triangle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Found {
+    /// Free bins of one side.
+    pub(super) bins: FreeBins,
+    /// Sectors of the front and of the back; of one side only where there are bins.
+    pub(super) sectors: [FreeSectors; 2],
 }
 
 /// Share of the directions of the front from which on the back is not searched.
 const ENOUGH: f64 = 1.0 / 8.0;
-/// What is free at all is kept unless this many times as much is free nearby.
-const GAIN_OF_NEARBY: f64 = 2.0;
+/// What a direction counts that is not free, but beyond all levels, where a side is chosen.
+const WORTH_OF_DISTANCE: f64 = 0.25;
 
-/// Index of `open` within the reach, and for all distances.
-const NEAR: usize = 0;
-const ALL: usize = 1;
-
-/// Decides the bins of some triangles, by rows of the order of the BVH.
+/// Decides the directions of some triangles, by rows of the order of the BVH.
 pub(super) struct Decide<'a> {
     pub(super) around: &'a Surroundings<'a>,
     pub(super) rows: std::ops::Range<usize>,
 }
 
 impl Kernel for Decide<'_> {
-    type Output = Vec<FreeBins>;
+    type Output = Vec<Found>;
     #[inline(always)]
-    fn run<S: Simd>(self, s: S) -> Vec<FreeBins> {
+    fn run<S: Simd>(self, s: S) -> Vec<Found> {
         let mut search = Search { around: self.around, stack: Vec::new() };
         let mut decided = Vec::with_capacity(self.rows.len());
         for row in self.rows {
@@ -46,6 +54,9 @@ impl Kernel for Decide<'_> {
         decided
     }
 }
+
+/// [`SECTORS`] in memory.
+static BINS_OF: [BinSet; FREE_SECTORS] = SECTORS;
 
 /// A child that is still to be visited.
 #[derive(Clone, Copy)]
@@ -66,36 +77,69 @@ struct State {
     /// Row of the triangle in the order of the BVH.
     row: usize,
     start: Start,
-    open: [BinSet; 2],
-    /// Squared distance below which something may lie within the reach.
-    near: f32,
+    /// Bins in which nothing is met at all.
+    free: BinSet,
+    /// For each level the bins of the sectors in which nothing is met within its distance.
+    open: [BinSet; FreeSectors::LEVELS],
+    /// Squared distances below which something may lie within a level.
+    near: [f32; FreeSectors::LEVELS],
 }
 
 impl State {
     /// Bins that something at this distance can still block.
     #[inline(always)]
     fn blockable(&self, squared_gap: f32) -> BinSet {
-        self.open[if squared_gap < self.near { NEAR } else { ALL }]
+        let mut bins = self.free;
+        for level in 0..FreeSectors::LEVELS {
+            bins |= if squared_gap < self.near[level] { self.open[level] } else { 0 };
+        }
+        bins
     }
 
     #[inline(always)]
     fn block(&mut self, bins: BinSet, squared_gap: f32) {
-        self.open[ALL] &= !bins;
-        if squared_gap < self.near {
-            self.open[NEAR] &= !bins;
+        self.free &= !bins;
+        for level in 0..FreeSectors::LEVELS {
+            if squared_gap < self.near[level] {
+                let mut hit = self.open[level] & bins;
+                while hit != 0 {
+                    let sector = FreeSectors::of_bin(hit.trailing_zeros() as usize);
+                    let sector = BINS_OF[sector.expect("open bins have sectors")];
+                    self.open[level] &= !sector;
+                    hit &= !sector;
+                }
+            }
         }
+    }
+
+    /// The levels of all sectors.
+    fn sectors(&self) -> FreeSectors {
+        (0..FREE_SECTORS).fold(FreeSectors(0), |all, sector| {
+            let level = self.open.iter().rposition(|open| open & SECTORS[sector] != 0);
+            all.with(sector, level.map_or(0, |level| level + 1))
+        })
     }
 }
 
 impl Search<'_> {
-    /// The free bins of a triangle, on its front unless its back is far more open.
     #[inline(always)]
-    fn decide<S: Simd>(&mut self, s: S, row: usize) -> FreeBins {
-        let mut best = (FreeBins(0), 0.0);
+    fn decide<S: Simd>(&mut self, s: S, row: usize) -> Found {
+        if self.around.kept == Kept::Directions { self.one_side(s, row) } else { self.both_sides(s, row) }
+    }
+
+    /// The free bins and the sectors of a triangle's front, unless its back is far more open.
+    #[inline(always)]
+    fn one_side<S: Simd>(&mut self, s: S, row: usize) -> Found {
+        let mut best = (Found::default(), 0.0);
         for is_back in [false, true] {
-            let found = self.decide_side(s, row, is_back);
-            if found.1 > best.1 {
-                best = found;
+            let Some(state) = self.search(s, row, (is_back, FreeBins::ALL)) else { break };
+            let beyond: f64 = state.open.iter().map(|open| share(*open)).sum();
+            let value = share(state.free) + WORTH_OF_DISTANCE * beyond / FreeSectors::LEVELS as f64;
+            if value > best.1 {
+                let mut found = Found { bins: FreeBins(state.free), ..Found::default() };
+                found.bins.0 |= if is_back { FreeBins::BACK } else { 0 };
+                found.sectors[usize::from(is_back)] = state.sectors();
+                best = (found, value);
             }
             if best.1 >= ENOUGH {
                 break;
@@ -104,30 +148,38 @@ impl Search<'_> {
         best.0
     }
 
-    /// The free bins of a side and their share.
+    /// The sectors of both sides of a triangle.
     #[inline(always)]
-    fn decide_side<S: Simd>(&mut self, s: S, row: usize, is_back: bool) -> (FreeBins, f64) {
-        let corners = self.around.mesh.corners(self.around.order[row]);
-        let Some(frame) = Frame::new(corners, is_back) else { return (FreeBins(0), 0.0) };
-        let reach = self.around.reach;
-        let near = reach * reach * (1.0 + 1e-4);
-        let start = Start::new(corners, &frame, is_back);
-        let mut state = State { row, start, open: [FreeBins::ALL; 2], near };
-        self.search(s, &mut state);
-        let [near, all] = [share(state.open[NEAR]), share(state.open[ALL])];
-        let side = if is_back { FreeBins::BACK } else { 0 };
-        if reach > 0.0 && all * GAIN_OF_NEARBY < near {
-            (FreeBins(state.open[NEAR] | side | FreeBins::NEARBY), near)
-        } else if state.open[ALL] != 0 {
-            (FreeBins(state.open[ALL] | side), all)
-        } else {
-            (FreeBins(0), 0.0)
+    fn both_sides<S: Simd>(&mut self, s: S, row: usize) -> Found {
+        let mut found = Found::default();
+        for is_back in [false, true] {
+            if let Some(state) = self.search(s, row, (is_back, 0)) {
+                found.sectors[usize::from(is_back)] = state.sectors();
+            }
         }
+        found
+    }
+
+    /// What is known of one side of a triangle, given the bins of which it is asked whether they are free; `None` without axes.
+    #[inline(always)]
+    fn search<S: Simd>(&mut self, s: S, row: usize, (is_back, free): (bool, BinSet)) -> Option<State> {
+        let corners = self.around.mesh.corners(self.around.order[row]);
+        let frame = Frame::new(corners, is_back)?;
+        let levels = self.around.levels;
+        let mut state = State {
+            row,
+            start: Start::new(corners, &frame, is_back),
+            free,
+            open: levels.map(|distance| if distance > 0.0 { IN_SECTORS } else { 0 }),
+            near: levels.map(|distance| distance * distance * (1.0 + 1e-4)),
+        };
+        self.block_all(s, &mut state);
+        Some(state)
     }
 
     /// Blocks the bins in which a triangle of the mesh may be met.
     #[inline(always)]
-    fn search<S: Simd>(&mut self, s: S, state: &mut State) {
+    fn block_all<S: Simd>(&mut self, s: S, state: &mut State) {
         let tree = &self.around.tree;
         self.stack.clear();
         self.stack.push(Entry { child: 0, squared_gap: 0.0, bins: FreeBins::ALL });

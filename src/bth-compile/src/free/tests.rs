@@ -4,19 +4,39 @@ use super::*;
 use crate::bvh::{self, BvhOptions};
 use crate::marks::testing::{patch, sphere, weld};
 use bth::rays::Ray;
-use bth_format::layout::{FREE_MARGIN, FreeBins, free_axes, free_bin};
+use bth_format::layout::{FREE_MARGIN, FreeBins, FreeLevels, KnownFree, free_axes, free_bin};
 use bth_import::Silent;
 use bth_oracle::{intersection, to_f64};
 use bth_random::Rng;
 
-fn free_of(mesh: &Mesh) -> Free {
+fn found(mesh: &Mesh, keep: KeepFree) -> (Free, FreeReport) {
     let (tree, _) = bvh::build(mesh, &BvhOptions::default(), &Silent).unwrap();
-    find(mesh, &tree, &FreeOptions::default(), &Silent).unwrap().0
+    find(mesh, &tree, &FreeOptions { keep, ..FreeOptions::default() }, &Silent).unwrap()
+}
+
+fn free_of(mesh: &Mesh) -> Free {
+    found(mesh, KeepFree::All).0
 }
 
 impl Free {
+    fn known(&self, triangle: usize) -> KnownFree {
+        let directions = self.directions.get(triangle).map(KnownFree::from);
+        let distances = || self.distances.get(triangle).map(KnownFree::from);
+        directions.or_else(distances).unwrap_or(KnownFree::from(&FreeDistances::UNKNOWN))
+    }
+
     fn bins(&self, triangle: usize) -> FreeBins {
-        FreeDirections { place: NONE, bins: self.bins[triangle] }.bins()
+        self.directions[triangle].bins()
+    }
+
+    /// The distance within which nothing is met in a bin of a side, infinite where it is free.
+    fn distance(&self, triangle: usize, (bin, is_back): (usize, bool)) -> f64 {
+        let known = self.known(triangle);
+        if known.bins.is_free(bin) && known.bins.is_back() == is_back {
+            return f64::INFINITY;
+        }
+        let level = known.sectors[usize::from(is_back)].level_of_bin(bin);
+        f64::from(FreeLevels { distance: self.levels, reserved: 0 }.within(level))
     }
 }
 
@@ -65,18 +85,20 @@ fn start(random: &mut Rng, corners: [[f32; 3]; 3], direction: [f32; 3]) -> [f32;
     })
 }
 
-/// Traces rays through the triangles of a mesh in directions that are called free, and returns how many were.
+/// Traces rays through the triangles of a mesh in directions that are called free, at all or up to a distance, and returns how many were.
 fn check(mesh: &Mesh, rays: usize, seed: u64) -> usize {
-    let free = free_of(mesh);
-    let reach = f64::from(free.reach);
+    let both = [KeepFree::All, KeepFree::Distances];
+    both.map(|keep| check_found(mesh, &found(mesh, keep).0, rays, seed)).into_iter().sum()
+}
+
+fn check_found(mesh: &Mesh, free: &Free, rays: usize, seed: u64) -> usize {
     let mut random = Rng::new(seed);
     let mut used = 0;
     for _ in 0..rays {
         let triangle = random.below(mesh.triangles.len() as u64) as usize;
-        let bins = free.bins(triangle);
         let corners = mesh.corners(triangle as u32);
         let Some(axes) = free_axes(corners) else {
-            assert_eq!(bins.0, 0);
+            assert!(free.known(triangle).is_nothing());
             continue;
         };
         let direction: [f64; 3] = match random.below(4) {
@@ -96,11 +118,10 @@ fn check(mesh: &Mesh, rays: usize, seed: u64) -> usize {
         let jitter = random.unit_vector();
         let within = 0.9 * FREE_MARGIN * random.unit_f64();
         let other = std::array::from_fn(|k| direction[k] / length + within * jitter[k]);
-        let is_free = free_bin(&axes, other)
-            .is_some_and(|(bin, is_back)| bins.is_free(bin) && bins.is_back() == is_back);
+        let within = free_bin(&axes, other).map_or(0.0, |found| free.distance(triangle, found));
         let direction = direction.map(|x| (x / length) as f32);
         let ray = Ray::new(start(&mut random, corners, direction), direction);
-        let Some(from) = intersection(&ray, corners).filter(|_| is_free) else { continue };
+        let Some(from) = intersection(&ray, corners).filter(|_| within > 0.0) else { continue };
         used += 1;
         for other in 0..mesh.triangles.len() as u32 {
             let Some(hit) = intersection(&ray, mesh.corners(other)).filter(|hit| hit.t > from.t) else {
@@ -108,8 +129,7 @@ fn check(mesh: &Mesh, rays: usize, seed: u64) -> usize {
             };
             let distance = to_f64(&(hit.t - &from.t));
             let found = format!("{triangle} {corners:?} to {other} {:?}: {ray:?}", mesh.corners(other));
-            assert!(bins.is_nearby(), "{found}");
-            assert!(distance > reach * (1.0 - 1e-6), "{distance} below {reach}: {found}");
+            assert!(distance > within * (1.0 - 1e-6), "{distance} below {within}: {found}");
         }
     }
     used
@@ -125,13 +145,13 @@ fn rays_in_free_directions_meet_nothing() {
     }
     used += check(&sphere(10, [0.0; 3]), 4000, 1);
     used += check(&sphere(9, [1000.0, -50.0, 3.0]), 4000, 2);
-    assert!(used > 10_000, "{used}");
+    assert!(used > 25_000, "{used}");
 }
 
 #[test]
 fn a_convex_solid_is_free_outside() {
     let free = free_of(&sphere(12, [0.0; 3]));
-    let open: Vec<u32> = (0..free.bins.len())
+    let open: Vec<u32> = (0..free.directions.len())
         .map(|triangle| {
             let bins = free.bins(triangle).0;
             assert_eq!(bins & !FreeBins::ALL, 0, "{triangle}: of the front, and at any distance");
@@ -149,10 +169,12 @@ fn a_solid_that_is_inside_out_is_free_on_the_back() {
     let mut mesh = sphere(8, [0.0; 3]);
     mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
     let free = free_of(&mesh);
-    // Before the front there is nothing within the reach of most triangles, but on the back nothing at all.
-    let back = (0..free.bins.len()).filter(|t| free.bins(*t).is_back()).count();
-    let near = (0..free.bins.len()).filter(|t| free.bins(*t).is_nearby()).count();
-    assert_eq!(back + near, free.bins.len());
+    // Before the front there is much within the distances of the levels, but on the back nothing at all.
+    let triangles = free.directions.len();
+    assert!((0..triangles).all(|t| free.bins(t).is_back() && free.directions[t].sectors == u32::MAX));
+    let distances = found(&mesh, KeepFree::Distances).0.distances;
+    assert!(distances.iter().all(|row| row.sectors[1] == u32::MAX && row.sectors[0] != u32::MAX));
+    assert!(distances.iter().any(|row| row.sectors[0] != 0));
 }
 
 #[test]
@@ -160,7 +182,7 @@ fn a_plane_is_free_though_its_triangles_touch() {
     let mut mesh = terraces(5, 1);
     mesh.positions.iter_mut().for_each(|p| p[2] = 0.1);
     let free = free_of(&mesh);
-    assert!((0..free.bins.len()).all(|triangle| free.bins(triangle).0 == FreeBins::ALL));
+    assert!((0..free.directions.len()).all(|triangle| free.bins(triangle).0 == FreeBins::ALL));
 }
 
 #[test]
@@ -170,20 +192,26 @@ fn duplicates_and_triangles_without_area_block_nothing() {
         weld(&[[a, b, c], [c, b, a], [a, b, c], [a, a, [0.2, 0.2, 9.0]], [[0.25; 3], [0.5; 3], [0.75; 3]]]);
     let free = free_of(&mesh);
     assert!((0..3).all(|triangle| free.bins(triangle).0 == FreeBins::ALL));
-    assert!((3..5).all(|triangle| free.bins(triangle).0 == 0));
+    assert!((3..5).all(|triangle| free.known(triangle).is_nothing()));
 }
 
 #[test]
-fn distant_triangles_block_beyond_the_reach_only() {
+fn distant_triangles_block_beyond_their_distance_only() {
     let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    let above = |height: f32, half: f32| [[-half, -half, height], [half, -half, height], [0.0, half, height]];
-    let (up, is_back) = free_bin(&free_axes(corners).unwrap(), [0.1, 0.1, 1.0]).unwrap();
-    assert!(!is_back);
-    let bins = |height: f32, half: f32| free_of(&weld(&[corners, above(height, half)])).bins(0);
-    let distant = bins(10.0, 40.0);
-    assert!(distant.is_nearby() && distant.is_free(up) && !distant.is_back(), "{distant:?}");
-    let close = bins(1.0, 40.0);
-    assert!(close.is_back() && !close.is_nearby(), "{close:?}");
+    let above = |height: f32| [[-40.0, -40.0, height], [40.0, -40.0, height], [0.0, 40.0, height]];
+    let up = free_bin(&free_axes(corners).unwrap(), [0.1, 0.1, 1.0]).unwrap();
+    assert!(!up.1);
+    for height in [0.01, 0.5, 1.0, 3.0, 10.0, 25.0, 50.0] {
+        let mesh = weld(&[corners, above(height)]);
+        let free = found(&mesh, KeepFree::Distances).0;
+        // The greatest level below the height, since nothing else is there.
+        let levels = free.levels.map(f64::from);
+        let expected =
+            levels.into_iter().filter(|level| *level < f64::from(height) * 0.999).fold(0.0, f64::max);
+        assert_eq!(free.distance(0, up), expected, "{height}: {levels:?}");
+        let downwards = free.known(0).sectors[1];
+        assert_eq!(downwards.0, u32::MAX, "nothing is below");
+    }
 }
 
 #[test]
@@ -201,34 +229,47 @@ fn results_do_not_depend_on_the_instruction_set() {
     for mesh in [terraces(12, 3), soup(200, 4), patch(5, 14), sphere(10, [7.0, 1e4, 0.0])] {
         let (binary, _) = bvh::build(&mesh, &BvhOptions::default(), &Silent).unwrap();
         let wide = Tree::new(&mesh, &binary).unwrap();
-        let around = Surroundings { mesh: &mesh, order: &binary.order, tree: wide, reach: 0.5 };
-        let of = |isa: Isa| isa.run(Decide { around: &around, rows: 0..binary.order.len() });
-        let scalar = of(Isa::Scalar);
-        assert!(scalar.iter().any(|bins| bins.0 != 0));
-        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
-            assert_eq!(of(isa), scalar, "{isa}");
+        let levels = [0.1, 0.5, 2.0];
+        let kept = Kept::Directions;
+        let mut around = Surroundings { mesh: &mesh, order: &binary.order, tree: wide, levels, kept };
+        for kept in [Kept::Directions, Kept::Distances] {
+            around.kept = kept;
+            let of = |isa: Isa| isa.run(Decide { around: &around, rows: 0..binary.order.len() });
+            let scalar = of(Isa::Scalar);
+            assert!(scalar.iter().any(|found| *found != Found::default()));
+            for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+                assert_eq!(of(isa), scalar, "{isa}");
+            }
         }
     }
 }
 
 #[test]
-fn closed_rooms_are_given_up_after_a_sample() {
-    // Seen from inside, and so much of both sides that neither is free.
-    let mut mesh = soup(4000, 9);
-    mesh.positions.iter_mut().flatten().for_each(|x| *x *= 0.5);
-    let (tree, _) = bvh::build(&mesh, &BvhOptions::default(), &Silent).unwrap();
-    let options = |keep| FreeOptions { keep, ..FreeOptions::default() };
-    let (free, report) = find(&mesh, &tree, &options(KeepFree::Auto), &Silent).unwrap();
-    assert!(free.bins.iter().all(|bins| *bins == [0; 4]) && !report.is_worthwhile(KeepFree::Auto));
-    let (free, all) = find(&mesh, &tree, &options(KeepFree::All), &Silent).unwrap();
-    assert!(free.bins.iter().any(|bins| *bins != [0; 4]));
-    let difference = report.free + report.free_nearby - all.free - all.free_nearby;
-    assert!(difference.abs() < 0.1, "{report:?} {all:?}");
+fn what_is_kept_is_decided_by_a_sample() {
+    // So much of both sides that neither is free, but far from what is next to it, or not.
+    for (scale, expected) in [(0.05, Kept::Distances), (0.5, Kept::None)] {
+        let mut mesh = soup(4000, 9);
+        for corners in mesh.triangles.clone() {
+            let [a, b, c] = corners.map(|corner| mesh.positions[corner as usize]);
+            let middle: [f32; 3] = std::array::from_fn(|k| (a[k] + b[k] + c[k]) / 3.0);
+            for corner in corners {
+                let p = &mut mesh.positions[corner as usize];
+                *p = std::array::from_fn(|k| middle[k] + scale * (p[k] - middle[k]));
+            }
+        }
+        let (free, report) = found(&mesh, KeepFree::Auto);
+        assert_eq!(report.kept, expected, "{report:?}");
+        assert_eq!(free.distances.is_empty(), expected == Kept::None);
+        assert!(free.directions.is_empty());
+        let (_, all) = found(&mesh, KeepFree::Distances);
+        assert!(
+            (0..3).all(|level| (report.beyond[level] - all.beyond[level]).abs() < 0.1),
+            "{report:?} {all:?}"
+        );
+    }
     // Where most is free, all of it is found.
     let mesh = sphere(24, [0.0; 3]);
-    let (tree, _) = bvh::build(&mesh, &BvhOptions::default(), &Silent).unwrap();
-    let of = |keep| find(&mesh, &tree, &options(keep), &Silent).unwrap();
-    assert_eq!(of(KeepFree::Auto), of(KeepFree::All));
+    assert_eq!(found(&mesh, KeepFree::Auto), found(&mesh, KeepFree::All));
 }
 
 #[test]
@@ -237,9 +278,9 @@ fn huge_and_tiny_meshes_have_no_free_directions() {
         let mut mesh = soup(20, 5);
         mesh.positions.iter_mut().flatten().for_each(|x| *x *= scale);
         let free = free_of(&mesh);
-        assert_eq!(free.reach, 0.0);
-        assert!(free.bins.iter().all(|bins| *bins == [0; 4]));
+        assert_eq!(free.levels, [0.0; 3]);
+        assert!((0..mesh.triangles.len()).all(|triangle| free.known(triangle).is_nothing()));
     }
     let free = free_of(&Mesh::default());
-    assert_eq!((free.reach, free.bins.len()), (0.0, 0));
+    assert_eq!((free.levels, free.directions.len()), ([0.0; 3], 0));
 }

@@ -149,9 +149,8 @@ fn free_directions(
     }
     let TracedMesh { mesh, tree, .. } = traced;
     let find = || stages.free(mesh, tree, (&options.bvh, &options.free), monitor);
-    let (free, mut report) = clock.time("free directions", find)?;
-    report.kept = report.is_worthwhile(options.free.keep);
-    Ok((report.kept.then_some(free), Some(report)))
+    let (free, report) = clock.time("free directions", find)?;
+    Ok(((report.kept != free::Kept::None).then_some(free), Some(report)))
 }
 
 /// Tetrahedralizes the nodes for which that saves time: marks → costs → tets → probe → limit. Where the costs rule out all nodes

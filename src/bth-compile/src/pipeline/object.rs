@@ -212,7 +212,8 @@ impl Object {
         };
         if let Some(free) = &self.free {
             parts.free = &free.directions;
-            parts.free_reach = &free.reach;
+            parts.free_distances = &free.distances;
+            parts.free_levels = &free.levels;
         }
         if let Some(sequence) = mesh.sequence.as_ref().filter(|_| !self.wide.leaf_vertices.is_empty()) {
             parts.sequence_times = &sequence.times;
@@ -263,7 +264,8 @@ fn resident_bytes(parts: &write::ObjectParts<'_>) -> u64 {
         + size_of_val(parts.hull_faces)
         + size_of_val(parts.triangle_faces)
         + size_of_val(parts.free)
-        + size_of_val(parts.free_reach)
+        + size_of_val(parts.free_distances)
+        + size_of_val(parts.free_levels)
         + size_of_val(parts.opacity)
         + size_of_val(parts.opacity_micro);
     bytes as u64

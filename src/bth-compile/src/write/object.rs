@@ -43,10 +43,12 @@ pub struct ObjectParts<'a> {
     pub hull_faces: &'a [HullFace],
     /// Row of `tet_faces` per source triangle; left out without tet leaves.
     pub triangle_faces: &'a [u32],
-    /// What rays that start on each triangle cannot meet; empty where nothing is known.
+    /// In which directions rays that start on each triangle meet nothing; empty where nothing is known.
     pub free: &'a [FreeDirections],
-    /// The reach of the free directions, one row if there are any.
-    pub free_reach: &'a [FreeReach],
+    /// Within which distances they meet nothing, in place of `free`.
+    pub free_distances: &'a [FreeDistances],
+    /// The levels of these distances, one row if there are any.
+    pub free_levels: &'a [FreeLevels],
     /// Opacity of each triangle; empty where all are opaque.
     pub opacity: &'a [u32],
     /// States of micro-triangles.
@@ -127,9 +129,10 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
         builder.rows(kind::TRIANGLE_FACES, index, parts.triangle_faces)?;
     }
     builder.rows(kind::FREE_DIRECTIONS, index, parts.free)?;
-    if !parts.free.is_empty() {
-        builder.rows(kind::FREE_REACH, index, parts.free_reach)?;
+    if !parts.free.is_empty() || !parts.free_distances.is_empty() {
+        builder.rows(kind::FREE_LEVELS, index, parts.free_levels)?;
     }
+    builder.rows(kind::FREE_DISTANCES, index, parts.free_distances)?;
     if let Some(source) = &parts.source {
         builder.rows(kind::POSITIONS, index, source.positions)?;
         builder.rows(kind::TRIANGLES, index, source.triangles)?;

@@ -45,7 +45,7 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
         view,
         claimed: BitSet::new(2 * view.lines.len()),
         referenced: BitSet::new(view.tet_leaves.len()),
-        placed: BitSet::new(view.free.len()),
+        placed: BitSet::new(view.free.len().max(view.free_distances.len())),
         stack: Vec::new(),
     };
     let at = offset_of!(Object, root) as u64;
@@ -67,7 +67,7 @@ struct Tree<'a> {
     claimed: BitSet,
     /// Tet leaves that a code leads to.
     referenced: BitSet,
-    /// Triangles that lie where FREE_DIRECTIONS says.
+    /// Triangles that lie where FREE_DIRECTIONS or FREE_DISTANCES says.
     placed: BitSet,
     stack: Vec<Reference>,
 }

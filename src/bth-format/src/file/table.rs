@@ -50,7 +50,8 @@ pub fn kind_stride(kind: u32) -> Option<usize> {
         kind::TET_FACES => size_of::<TetFace>(),
         kind::HULL_FACES => size_of::<HullFace>(),
         kind::FREE_DIRECTIONS => size_of::<FreeDirections>(),
-        kind::FREE_REACH => size_of::<FreeReach>(),
+        kind::FREE_LEVELS => size_of::<FreeLevels>(),
+        kind::FREE_DISTANCES => size_of::<FreeDistances>(),
         kind::POSITIONS | kind::TRIANGLES | kind::CORNERS | kind::NORMALS => 12,
         kind::UVS => 8,
         kind::GROUPS => size_of::<Group>(),
@@ -98,8 +99,8 @@ fn max_count(kind: u32) -> u64 {
         kind::TRIANGLE_IDS | kind::TRIANGLE_FACES | kind::TRIANGLES | kind::CORNERS | kind::OPACITY => {
             limits::MAX_TRIANGLES as u64
         }
-        kind::FREE_DIRECTIONS => limits::MAX_TRIANGLES as u64,
-        kind::FREE_REACH => 1,
+        kind::FREE_DIRECTIONS | kind::FREE_DISTANCES => limits::MAX_TRIANGLES as u64,
+        kind::FREE_LEVELS => 1,
         kind::OPACITY_MICRO => limits::MAX_OPACITY_WORDS as u64,
         kind::LEAF_VERTICES => limits::MAX_LEAF_VERTICES as u64,
         kind::TET_LEAVES => Child::INDEX_LIMIT as u64,

@@ -20,8 +20,14 @@ pub const FREE_MARGIN: f64 = 1.0 / 512.0;
 pub const FREE_EDGES: [f64; 2] = [1.0 / (1u64 << 20) as f64, (1u64 << 20) as f64];
 /// Least sine of the angle between these edges: rounding errors in f32 stay below the margin.
 pub const FREE_LEAST_SINE: f64 = 1.0 / 128.0;
-/// The least and greatest reach that is stored: squares of it neither vanish nor overflow.
-pub const FREE_REACH_RANGE: [f32; 2] = [1.0 / (1u64 << 50) as f32, (1u64 << 50) as f32];
+/// Sectors of directions, into which columns and rows of bins are joined: four by four.
+pub const FREE_SECTORS: usize = 16;
+/// For each column of bins that of its sector, and the same for rows. The outermost ones, in which directions are nearly always blocked
+/// at once, have none.
+pub const FREE_SECTOR_OF: [Option<usize>; FREE_SIDE] =
+    [None, Some(0), Some(0), Some(1), Some(1), Some(1), Some(2), Some(2), Some(3), Some(3), None];
+/// The least and greatest distance of a level: squares of them neither vanish nor overflow.
+pub const FREE_DISTANCE_RANGE: [f32; 2] = [1.0 / (1u64 << 50) as f32, (1u64 << 50) as f32];
 
 /// A row of `FREE_DIRECTIONS`, by triangle id.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, FromBytes, IntoBytes, KnownLayout, Immutable)]
@@ -29,26 +35,39 @@ pub const FREE_REACH_RANGE: [f32; 2] = [1.0 / (1u64 << 50) as f32, (1u64 << 50) 
 pub struct FreeDirections {
     /// Where the triangle lies ([`FreePlace`]); [`NONE`] if nothing is known.
     pub place: u32,
+    /// [`FreeSectors`] of the side that `bins` are of.
+    pub sectors: u32,
     /// [`FreeBins`], the lowest bits first.
     pub bins: [u32; 4],
 }
 
-/// The row of `FREE_REACH`.
-#[derive(Clone, Copy, Debug, PartialEq, FromBytes, IntoBytes, KnownLayout, Immutable)]
+/// A row of `FREE_DISTANCES`, by triangle id.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
-pub struct FreeReach {
-    /// Distance in object space within which rays meet nothing in free directions of rows with [`FreeBins::NEARBY`].
-    pub reach: f32,
-    /// Zeros.
-    pub reserved: [u32; 3],
+pub struct FreeDistances {
+    /// As of [`FreeDirections`].
+    pub place: u32,
+    /// [`FreeSectors`] of the front, and of the back.
+    pub sectors: [u32; 2],
+}
+
+/// The row of `FREE_LEVELS`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct FreeLevels {
+    /// Distances in object space of the levels 1, 2 and 3 of [`FreeSectors`], ascending.
+    pub distance: [f32; 3],
+    /// Zero.
+    pub reserved: u32,
 }
 
 assert_layout! {
-    FreeDirections 20 { bins 4 }
-    FreeReach 16 { reserved 4 }
+    FreeDirections 24 { sectors 4, bins 8 }
+    FreeDistances 12 { sectors 4 }
+    FreeLevels 16 { reserved 12 }
 }
 
-/// Bit i tells whether bin i is free. Bits from 121 to 125 are zero.
+/// Bit i tells whether bin i is free. Bits from 121 to 125, and 127, are zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FreeBins(pub u128);
 
@@ -57,17 +76,10 @@ impl FreeBins {
     pub const ALL: u128 = (1 << FREE_BINS) - 1;
     /// Set where directions are those on the back of the triangle, from which its corners are seen clockwise.
     pub const BACK: u128 = 1 << 126;
-    /// Set where free directions meet nothing within the reach, and nothing is known of what is beyond.
-    pub const NEARBY: u128 = 1 << 127;
 
     /// Whether directions are those on the back.
     pub const fn is_back(self) -> bool {
         self.0 & Self::BACK != 0
-    }
-
-    /// Whether only what is within the reach is known.
-    pub const fn is_nearby(self) -> bool {
-        self.0 & Self::NEARBY != 0
     }
 
     /// Whether a bin is free.
@@ -76,18 +88,100 @@ impl FreeBins {
     }
 }
 
+/// A level for each sector, from 0 to 3: nothing is met within the distance of the level; of level 0 nothing is known. Bits 0 to 15 are
+/// the low bits of the levels, bits 16 to 31 the high ones.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FreeSectors(pub u32);
+
+impl FreeSectors {
+    /// The greatest level.
+    pub const LEVELS: usize = 3;
+
+    /// The sector of a bin, if it has one.
+    pub const fn of_bin(bin: usize) -> Option<usize> {
+        match (FREE_SECTOR_OF[bin / FREE_SIDE], FREE_SECTOR_OF[bin % FREE_SIDE]) {
+            (Some(row), Some(column)) => Some(4 * row + column),
+            _ => None,
+        }
+    }
+
+    /// The level of a bin: that of its sector, 0 without one.
+    pub const fn level_of_bin(self, bin: usize) -> usize {
+        match Self::of_bin(bin) {
+            Some(sector) => self.level(sector),
+            None => 0,
+        }
+    }
+
+    /// The level of a sector.
+    pub const fn level(self, sector: usize) -> usize {
+        (self.0 >> sector & 1 | (self.0 >> (sector + 16) & 1) << 1) as usize
+    }
+
+    /// With the level of a sector, which is 0 before.
+    pub const fn with(self, sector: usize, level: usize) -> Self {
+        let level = level as u32;
+        FreeSectors(self.0 | (level & 1) << sector | (level >> 1 & 1) << (sector + 16))
+    }
+}
+
+impl FreeLevels {
+    /// The distance within which nothing is met in a sector of a level.
+    pub fn within(&self, level: usize) -> f32 {
+        level.checked_sub(1).map_or(0.0, |above| self.distance[above])
+    }
+}
+
 impl FreeDirections {
     /// A row that knows nothing.
-    pub const UNKNOWN: Self = FreeDirections { place: NONE, bins: [0; 4] };
+    pub const UNKNOWN: Self = FreeDirections { place: NONE, sectors: 0, bins: [0; 4] };
 
     /// The row of a triangle.
-    pub fn new(place: u32, bins: FreeBins) -> Self {
-        FreeDirections { place, bins: std::array::from_fn(|k| (bins.0 >> (32 * k)) as u32) }
+    pub fn new(place: u32, sectors: FreeSectors, bins: FreeBins) -> Self {
+        let bins = std::array::from_fn(|k| (bins.0 >> (32 * k)) as u32);
+        FreeDirections { place, sectors: sectors.0, bins }
     }
 
     /// The bins.
     pub fn bins(&self) -> FreeBins {
         FreeBins(self.bins.iter().rev().fold(0, |bits, word| bits << 32 | u128::from(*word)))
+    }
+}
+
+impl FreeDistances {
+    /// A row that knows nothing.
+    pub const UNKNOWN: Self = FreeDistances { place: NONE, sectors: [0; 2] };
+}
+
+/// What an object knows of the directions of a triangle, from whichever section it has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct KnownFree {
+    /// Where the triangle lies ([`FreePlace`]).
+    pub place: u32,
+    /// The sectors of the front, and of the back.
+    pub sectors: [FreeSectors; 2],
+    /// The free bins; none where the section has none.
+    pub bins: FreeBins,
+}
+
+impl KnownFree {
+    /// Whether nothing is known.
+    pub fn is_nothing(&self) -> bool {
+        self.sectors == [FreeSectors(0); 2] && self.bins == FreeBins(0)
+    }
+}
+
+impl From<&FreeDirections> for KnownFree {
+    fn from(row: &FreeDirections) -> Self {
+        let (bins, mut sectors) = (row.bins(), [FreeSectors(0); 2]);
+        sectors[usize::from(bins.is_back())] = FreeSectors(row.sectors);
+        KnownFree { place: row.place, sectors, bins }
+    }
+}
+
+impl From<&FreeDistances> for KnownFree {
+    fn from(row: &FreeDistances) -> Self {
+        KnownFree { place: row.place, sectors: row.sectors.map(FreeSectors), bins: FreeBins(0) }
     }
 }
 
@@ -187,7 +281,13 @@ mod tests {
         let mut random = Rng::new(3);
         for _ in 0..100 {
             let bits = (0..4).fold(0u128, |bits, _| bits << 32 | u128::from(random.below(1 << 32)));
-            assert_eq!(FreeDirections::new(7, FreeBins(bits)).bins().0, bits);
+            let sectors = (0..FREE_SECTORS)
+                .fold(FreeSectors(0), |all, sector| all.with(sector, (bits >> (2 * sector) & 3) as usize));
+            let row = FreeDirections::new(7, sectors, FreeBins(bits));
+            assert_eq!(row.bins().0, bits);
+            for sector in 0..FREE_SECTORS {
+                assert_eq!(FreeSectors(row.sectors).level(sector), (bits >> (2 * sector) & 3) as usize);
+            }
         }
     }
 

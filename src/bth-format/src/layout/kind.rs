@@ -39,8 +39,10 @@ kinds! {
     LEAF_VERTICES = 10;
     /// [`super::FreeDirections`] per source triangle: what rays that start on it cannot meet.
     FREE_DIRECTIONS = 12;
-    /// One [`super::FreeReach`], if there are free directions.
-    FREE_REACH = 13;
+    /// One [`super::FreeLevels`], if there are free directions or distances.
+    FREE_LEVELS = 13;
+    /// [`super::FreeDistances`] per source triangle, in place of free directions.
+    FREE_DISTANCES = 14;
     /// `[f32; 3]`: positions of the source, object space; distinct ones but in deformable objects.
     POSITIONS = 16;
     /// `[u32; 3]` per source triangle: rows of `POSITIONS`.
@@ -147,7 +149,8 @@ pub const fn is_sequence(kind: u32) -> bool {
 pub const fn is_traced(kind: u32) -> bool {
     is_required(kind) && kind != LEAF_VERTICES && !is_sequence(kind) && !is_of_file(kind)
         || kind == FREE_DIRECTIONS
-        || kind == FREE_REACH
+        || kind == FREE_LEVELS
+        || kind == FREE_DISTANCES
 }
 /// Whether sections of this kind carry [`super::SECTION_REQUIRED`]: a reader that does not know the kind must refuse the file.
 pub const fn is_required(kind: u32) -> bool {

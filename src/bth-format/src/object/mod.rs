@@ -4,6 +4,7 @@
 //! may panic; it never reads out of bounds.
 
 mod bounds;
+mod free;
 mod groups;
 mod leaves;
 mod nodes;

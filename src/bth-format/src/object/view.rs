@@ -35,10 +35,12 @@ pub struct ObjectView<'a> {
     /// Per leaf its rows of `positions`, in the order of the leaves: one row for an indexed leaf, one for each corner of a raw
     /// one. Empty but in deformable objects.
     pub leaf_vertices: &'a [[u32; WIDTH]],
-    /// Per source triangle what rays that start on it cannot meet; empty where nothing is known.
+    /// Per source triangle in which directions rays that start on it meet nothing; empty where nothing is known.
     pub free: &'a [FreeDirections],
-    /// The row of FREE_REACH, if there is one.
-    pub free_reach: &'a [FreeReach],
+    /// Per source triangle within which distances such rays meet nothing, in place of `free`.
+    pub free_distances: &'a [FreeDistances],
+    /// The row of FREE_LEVELS, if there is one.
+    pub free_levels: &'a [FreeLevels],
     /// Positions of the source, object space, if kept; distinct ones but in deformable objects.
     pub positions: &'a [[f32; 3]],
     /// Per source triangle its rows of `positions`, if kept.

@@ -5,7 +5,7 @@
 
 use crate::error::{Code, Error, Result, Text};
 use crate::exact::side;
-use crate::layout::{Child, FreeBins, FreeDirections, FreePlace, free_axes, free_bin, kind};
+use crate::layout::{Child, FreeLevels, FreePlace, KnownFree, free_axes, free_bin};
 use crate::object::ObjectView;
 use std::cmp::Ordering;
 
@@ -16,29 +16,34 @@ type Corners = [[f32; 3]; 3];
 
 /// Checks an object whose index check has passed.
 pub(super) fn check(view: &ObjectView) -> Result<()> {
-    let placed = |row: &FreeDirections| corners(view, row);
-    let triangles: Vec<Option<Corners>> = view.free.iter().map(placed).collect();
-    let reach = view.free_reach.first().map_or(0.0, |row| f64::from(row.reach));
+    if !view.has_free_directions() {
+        return Ok(());
+    }
+    let known: Vec<KnownFree> =
+        (0..view.header.triangles as usize).map_while(|triangle| view.known_free(triangle)).collect();
+    let triangles: Vec<Option<Corners>> = known.iter().map(|known| corners(view, known.place)).collect();
+    let levels = view.free_levels.first().copied().unwrap_or_default();
+    let (kind, stride) = view.free_kind();
     let step = triangles.len().div_ceil(STARTS).max(1);
-    let at = |triangle: usize| (triangle * size_of::<FreeDirections>()) as u64;
+    let at = |triangle: usize| (triangle * stride) as u64;
     for (triangle, corners) in triangles.iter().enumerate() {
         let Some(corners) = corners else { continue };
         if free_axes(*corners).is_none() {
-            let expected = "no free bins of a triangle without axes";
+            let expected = "nothing known of a triangle without axes";
             let found = text!("{corners:?}");
-            return Err(Error::within(Code::FreeAxes, kind::FREE_DIRECTIONS, at(triangle), expected, found));
+            return Err(Error::within(Code::FreeAxes, kind, at(triangle), expected, found));
         }
     }
-    let all = if triangles.is_empty() { Vec::new() } else { all_corners(view) };
+    let all = all_corners(view);
     for start in (0..triangles.len()).step_by(step) {
         let Some(start_corners) = triangles[start] else { continue };
         let Some(axes) = free_axes(start_corners) else { continue };
-        let of_start = Start { axes, bins: view.free[start].bins(), reach };
+        let of_start = Start { axes, known: known[start], levels };
         for &(other, target) in all.iter().filter(|(other, _)| *other != start as u32) {
             if let Some(corner) = start_corners.iter().find(|corner| of_start.meets(**corner, target)) {
-                let expected = Text::from("nothing in free directions");
+                let expected = Text::from("nothing in free directions, nor within the distances of levels");
                 let found = text!("triangle {other} from {corner:?}");
-                return Err(Error::within(Code::FreeMet, kind::FREE_DIRECTIONS, at(start), expected, found));
+                return Err(Error::within(Code::FreeMet, kind, at(start), expected, found));
             }
         }
     }
@@ -72,9 +77,9 @@ fn all_corners(view: &ObjectView) -> Vec<(u32, Corners)> {
     found
 }
 
-/// The corners of the triangle of a row, if it has a place.
-fn corners(view: &ObjectView, row: &FreeDirections) -> Option<Corners> {
-    let FreePlace { leaf, slot } = FreePlace::from_code(row.place)?;
+/// The corners of the triangle at a place, if it is one.
+fn corners(view: &ObjectView, place: u32) -> Option<Corners> {
+    let FreePlace { leaf, slot } = FreePlace::from_code(place)?;
     let (mut indexed, mut raw) = (None, None);
     match leaf {
         Child::Indexed(index) => Some(view.indexed(index, &mut indexed).triangle(slot as usize)),
@@ -86,12 +91,13 @@ fn corners(view: &ObjectView, row: &FreeDirections) -> Option<Corners> {
 /// A triangle from which rays are sent.
 struct Start {
     axes: [[f64; 3]; 3],
-    bins: FreeBins,
-    reach: f64,
+    known: KnownFree,
+    levels: FreeLevels,
 }
 
 impl Start {
-    /// Whether the ray from a corner through the middle of another triangle meets it though its direction is called free.
+    /// Whether the ray from a corner through the middle of another triangle meets it though its direction is called free, or free as far
+    /// as that.
     fn meets(&self, from: [f32; 3], target: Corners) -> bool {
         let middle: [f32; 3] = std::array::from_fn(|k| {
             let sum: f64 = target.iter().map(|p| f64::from(p[k])).sum();
@@ -100,8 +106,10 @@ impl Start {
         let d: [f64; 3] = std::array::from_fn(|k| f64::from(middle[k]) - f64::from(from[k]));
         // Rounding errors of the bin are far below its margin.
         let Some((bin, is_back)) = free_bin(&self.axes, d) else { return false };
-        let is_free = self.bins.is_free(bin) && self.bins.is_back() == is_back;
-        if !is_free || self.bins.is_nearby() && beyond(from, target, self.reach) {
+        let KnownFree { bins, sectors, .. } = self.known;
+        let is_free = bins.is_free(bin) && bins.is_back() == is_back;
+        let level = sectors[usize::from(is_back)].level_of_bin(bin);
+        if !is_free && beyond(from, target, f64::from(self.levels.within(level))) {
             return false;
         }
         // The triangle is met beyond the start if the line passes its edges on the same side, and the start lies on the side of the
@@ -115,9 +123,9 @@ impl Start {
     }
 }
 
-/// Whether all of a triangle may be farther from a point than the reach.
-fn beyond(from: [f32; 3], target: Corners, reach: f64) -> bool {
+/// Whether all of a triangle may be at least as far from a point as a distance.
+fn beyond(from: [f32; 3], target: Corners, distance: f64) -> bool {
     let square = |p: &[f32; 3]| (0..3).map(|k| (f64::from(p[k]) - f64::from(from[k])).powi(2)).sum::<f64>();
     // Points of a triangle are no farther than its farthest corner.
-    target.iter().map(square).fold(0.0, f64::max) >= reach * reach
+    target.iter().map(square).fold(0.0, f64::max) >= distance * distance
 }

@@ -1,13 +1,17 @@
 //! Where the lines of rays cross the triangles on which they start, and the bins of their directions, in f32.
 
 use crate::simd::{LANES, Lanewise};
-use bth_format::layout::{FREE_BINS, FREE_BORDERS, FREE_SIDE, FREE_STEEPEST};
+use bth_format::layout::{FREE_BORDERS, FREE_SIDE, FREE_STEEPEST};
 
 /// Directions are looked up whose greatest component in absolute value is between these, so that no product underflows or overflows.
 pub(super) const DIRECTIONS: [f32; 2] = [1.0 / (1 << 20) as f32, (1 << 20) as f32];
 /// Slack of `tmin` beside that which is relative to it. Any that is at least `f32::MIN_POSITIVE` is correct; the product of this one with
 /// an area is rarely denormal, where `tmin` is 0, which would take Intel processors hundreds of cycles for every sixteen rays.
 const LEAST_T: f32 = 1.0 / (1u128 << 80) as f32;
+/// Relative slack of where ranges begin, for the rounding of t and of what is computed here.
+pub(super) const SLACK: f32 = 1.0 / (1 << 20) as f32;
+/// Column of directions that are too steep.
+pub(super) const NO_COLUMN: u32 = LANES as u32 - 1;
 /// Unit of rounding.
 const U: f32 = f32::EPSILON / 2.0;
 
@@ -18,8 +22,8 @@ pub(super) struct Crossings<S: Lanewise> {
     pub(super) back: u32,
     /// Lower bounds of t there.
     pub(super) start: S::F,
-    /// The bins of the directions.
-    pub(super) bins: S::U,
+    /// The columns and the rows of the directions.
+    pub(super) columns: [S::U; 2],
 }
 
 impl<S: Lanewise> Crossings<S> {
@@ -62,7 +66,7 @@ impl<S: Lanewise> Crossings<S> {
             s.fma(s.mul(square, far), s.splat(64.0 * U), s.mul(s.fma(far, s.splat(3.0), one), least));
         let sum = s.abs(s.add(s.add(a, b), c));
         let sum_error = s.fma(side_error, s.splat(4.0), s.mul(sum, s.splat(8.0 * U)));
-        let first = s.sub(tmin, s.fma(s.abs(tmin), s.splat(1.0 / (1 << 20) as f32), s.splat(LEAST_T)));
+        let first = s.sub(tmin, s.fma(s.abs(tmin), s.splat(SLACK), s.splat(LEAST_T)));
         let bound = s.sub(s.fnma(s.abs(first), sum_error, s.mul(first, sum)), least);
         let before = s.lt(s.add(volume, volume_error), bound);
 
@@ -75,7 +79,7 @@ impl<S: Lanewise> Crossings<S> {
             front: s.mask_bits(s.and(above, usable)),
             back: s.mask_bits(s.and(below, usable)),
             start,
-            bins: bins(s, &p, d),
+            columns: columns(s, &p, d),
         }
     }
 }
@@ -94,13 +98,13 @@ fn cross<S: Lanewise>(s: S, a: [S::F; 3], b: [S::F; 3]) -> [S::F; 3] {
     ]
 }
 
-/// The bins of directions ([`bth_format::layout::free_bin`]), or [`FREE_BINS`], whose bit is never set.
+/// The columns and rows of the bins of directions ([`bth_format::layout::free_bin`]), or [`NO_COLUMN`] for both.
 ///
 /// The errors of the axes are 5 units of the lengths of the edges, those of their products with a direction a few more: relative to
 /// the normal, which is at least 1/128 of the product of the edges, less than 2^-13, a sixteenth of the margin. For edges and
 /// directions in their ranges nothing overflows, and what underflows is less than that.
 #[inline(always)]
-fn bins<S: Lanewise>(s: S, corners: &[[S::F; 3]; 3], d: [S::F; 3]) -> S::U {
+fn columns<S: Lanewise>(s: S, corners: &[[S::F; 3]; 3], d: [S::F; 3]) -> [S::U; 2] {
     let zero = s.splat(0.0);
     let (mut e, mut f) = ([zero; 3], [zero; 3]);
     for k in 0..3 {
@@ -116,25 +120,24 @@ fn bins<S: Lanewise>(s: S, corners: &[[S::F; 3]; 3], d: [S::F; 3]) -> S::U {
     let x_square = s.mul(s.mul(s.mul(x, x), per_square), dot(s, normal, normal));
     let y_square = s.mul(s.mul(y, y), per_square);
     let upwards = s.lt(zero, per_height);
-    let (x_negative, x_beyond) = column(s, (x, x_square), upwards, 1);
-    let (y_negative, y_beyond) = column(s, (y, y_square), upwards, FREE_SIDE as u32);
-    let middle = s.splat_u((FREE_BINS / 2) as u32);
     let flat = s.and(s.lt(x_square, s.splat(STEEPEST)), s.lt(y_square, s.splat(STEEPEST)));
-    let bin = add_signed(s, middle, x_negative, x_beyond);
-    let bin = add_signed(s, bin, y_negative, y_beyond);
-    s.select_u(flat, bin, s.splat_u(FREE_BINS as u32))
+    let none = s.splat_u(NO_COLUMN);
+    [
+        s.select_u(flat, column(s, (x, x_square), upwards), none),
+        s.select_u(flat, column(s, (y, y_square), upwards), none),
+    ]
 }
 
-/// Whether a component is negative, given the slope and its square, and its columns beyond the middle times a unit.
+/// The column of a direction, given its slope along the axis and the square of that.
 #[inline(always)]
-fn column<S: Lanewise>(s: S, (slope, square): (S::F, S::F), upwards: S::M, unit: u32) -> (S::M, S::U) {
+fn column<S: Lanewise>(s: S, (slope, square): (S::F, S::F), upwards: S::M) -> S::U {
     let zero = s.splat(0.0);
     let mut beyond = s.splat_u(0);
     for border in FREE_BORDERS {
-        beyond = s.add_where(beyond, s.lt(s.splat(border as f32), square), s.splat_u(unit));
+        beyond = s.add_where(beyond, s.lt(s.splat(border as f32), square), s.splat_u(1));
     }
     let negative = s.or(s.and(upwards, s.lt(slope, zero)), s.and_not(s.lt(zero, slope), upwards));
-    (negative, beyond)
+    add_signed(s, s.splat_u((FREE_SIDE / 2) as u32), negative, beyond)
 }
 
 /// Square of the greatest slope.

@@ -1,77 +1,144 @@
-//! Rays that meet nothing, by what the file knows of the triangle on which they start.
+//! What rays certainly do not meet, by what the file knows of the triangle on which they start.
 //!
 //! For directions in bins, a file may say that rays that leave a triangle meet nothing else, at all or within a distance (specification,
-//! "Free directions"). A ray ends at once if its line certainly crosses the triangle before the ray's range begins and the bin of its
-//! direction is free. All of that is proved from the ray and the triangle's corners, with bounds of all rounding errors: the caller's
-//! hint only says which triangle to look at. Whatever is in doubt is traced.
+//! "Free directions"). If the line of a ray certainly crosses the triangle before the ray's range begins, and the bin of its direction
+//! is free, the ray ends at once; else its range can begin at that distance from the crossing. No hit is lost, so no answer changes,
+//! but traversals leave out all boxes that lie before the range: much of what a ray passes lies around its start. All of that is
+//! proved from the ray and the triangle's corners, with bounds of all rounding errors: the caller's hint only says which triangle to
+//! look at. Whatever is in doubt is traced as it is.
 //!
 //! Why the range must begin behind the crossing: the file speaks of points beyond the triangle, not of the triangle itself and what
 //! lies before it. Since t is rounded to f32 before it is compared with the range, the crossing must lie before `tmin` by more than
-//! that.
+//! that, and what is met must lie behind a later beginning by more than that.
 //!
 //! Only batches look directions up: for a single ray that takes as long as tracing it (docs/notes/free-directions.md).
 
 mod crossings;
 mod lanes;
+mod rows;
 mod single;
 mod starts;
-
-use single::certainly_misses;
 
 use crate::rays::Ray;
 use crate::simd::{Isa, LANES};
 use bth_format::layout::{Child, FreePlace};
 use bth_format::object::ObjectView;
 use lanes::FreeKernel;
+use rows::Row;
+use std::ops::Range;
 
 /// Whether the file knows of free directions of an object.
 #[inline(always)]
 pub(crate) fn is_known(object: &ObjectView<'_>) -> bool {
-    !object.free.is_empty()
+    object.has_free_directions()
 }
 
 /// Rays that are decided before it is known whether to go on.
 const PROBE: usize = 4 * LANES;
 /// The least share of the rays, one in this many, that must end for the look-up to cost less than it saves.
 const LEAST: usize = 6;
+/// What a ray that begins later counts, as a part of one that ends.
+const LATER: usize = 3;
 
-/// Finds the rays in object space that may meet something, and stores their indices in `rest`. `from` holds for each ray the triangle
-/// on which it starts, or `NONE`. False if so few rays would end that all of them are to be traced, unless the look-up is `forced`.
+/// The rays of a batch that may meet something.
+#[derive(Debug, Default)]
+pub(crate) struct Rest {
+    /// Their indices, ascending.
+    pub(crate) order: Vec<u32>,
+    /// Copies of all rays of the batch, whose ranges begin later where nothing is hit before.
+    pub(crate) rays: Vec<Ray>,
+}
+
+/// Finds the rays in object space that may meet something, and from where on where that is `later`. `from` holds for each ray the triangle
+/// on which it starts, or `NONE`. False if so little would be saved that all of them are to be traced as they are, unless the look-up is
+/// `forced`.
 pub(crate) fn find_rest(
     object: &ObjectView<'_>,
     rays: &[Ray],
     from: &[u32],
-    forced: bool,
-    rest: &mut Vec<u32>,
+    (forced, later): (bool, bool),
+    rest: &mut Rest,
 ) -> bool {
-    rest.clear();
-    if forced {
-        decide(object, rays, from, 0..rays.len(), rest);
-        return true;
+    rest.order.clear();
+    if later {
+        // What was there before is overwritten.
+        rest.rays.resize(rays.len(), Ray::new([0.0; 3], [0.0; 3]));
+        rest.rays.truncate(rays.len());
+    } else {
+        rest.rays.clear();
     }
-    let probe = PROBE.min(rays.len());
-    decide(object, rays, from, 0..probe, rest);
-    if (probe - rest.len()) * LEAST < probe {
-        return false;
+    let saves =
+        |rays: usize, rest: usize, later: usize| (LATER * (rays - rest) + later) * LEAST >= LATER * rays;
+    let (probe, mut later) = (if forced { 0 } else { PROBE.min(rays.len()) }, 0);
+    if probe > 0 {
+        later = decide(object, rays, from, 0..probe, rest);
+        if !saves(probe, rest.order.len(), later) {
+            return false;
+        }
     }
-    decide(object, rays, from, probe..rays.len(), rest);
-    (rays.len() - rest.len()) * LEAST >= rays.len()
+    later += decide(object, rays, from, probe..rays.len(), rest);
+    forced || saves(rays.len(), rest.order.len(), later)
 }
 
-/// Appends to `rest` the indices of the rays of a range that may meet something.
+/// Decides the rays of a range. Returns the number of those that may meet something, but only later than at `tmin`.
 fn decide(
     object: &ObjectView<'_>,
     rays: &[Ray],
     from: &[u32],
-    range: std::ops::Range<usize>,
-    rest: &mut Vec<u32>,
-) {
-    let kernel = FreeKernel { object, rays, from, range, rest };
-    // `run_wide` returns the kernel in scalar code.
-    if let Err(FreeKernel { range, rest, .. }) = Isa::chosen().run_wide(kernel) {
-        let may_hit = |ray: &usize| !certainly_misses(object, &rays[*ray], from[*ray]);
-        rest.extend(range.filter(may_hit).map(|ray| ray as u32));
+    range: Range<usize>,
+    rest: &mut Rest,
+) -> usize {
+    if object.free.is_empty() {
+        decide_by(object, object.free_distances, (rays, from), range, rest)
+    } else {
+        decide_by(object, object.free, (rays, from), range, rest)
     }
+}
+
+/// As [`decide`], by the rows of a section.
+fn decide_by<R: Row>(
+    object: &ObjectView<'_>,
+    rows: &[R],
+    (rays, from): (&[Ray], &[u32]),
+    range: Range<usize>,
+    rest: &mut Rest,
+) -> usize {
+    let (later, rest) = (&mut rest.rays[..], &mut rest.order);
+    // The last rays that are less than a group are copied as they are.
+    if !later.is_empty() {
+        let lanes = range.start + range.len() / LANES * LANES;
+        later[lanes..range.end].copy_from_slice(&rays[lanes..range.end]);
+    }
+    let kernel = FreeKernel { object, rows, rays, from, range, rest, later };
+    // `run_wide` returns the kernel in scalar code.
+    match Isa::chosen().run_wide(kernel) {
+        Ok(count) => count,
+        Err(FreeKernel { range, rest, later, .. }) => one_by_one(object, (rays, from), range, rest, later),
+    }
+}
+
+/// As [`decide`], one ray after the other.
+fn one_by_one(
+    object: &ObjectView<'_>,
+    (rays, from): (&[Ray], &[u32]),
+    range: Range<usize>,
+    rest: &mut Vec<u32>,
+    later: &mut [Ray],
+) -> usize {
+    let mut count = 0;
+    for index in range {
+        let ray = rays[index];
+        let begin = single::begin(object, &ray, from[index]);
+        let may_hit = !(begin == f32::INFINITY || ray.tmax < begin);
+        if may_hit {
+            rest.push(index as u32);
+            count += usize::from(begin > ray.tmin);
+        }
+        if let Some(to) = later.get_mut(index) {
+            *to = if begin.is_finite() { Ray { tmin: begin, ..ray } } else { ray };
+        }
+    }
+    count
 }
 
 /// The corners of the triangle at a place.

@@ -1,46 +1,47 @@
 //! The decision about one ray, in f64.
 
 use super::corners_at;
-use super::crossings::DIRECTIONS;
+use super::crossings::{DIRECTIONS, SLACK as SLACK_F32};
 use crate::rays::Ray;
 use bth_format::layout::{free_axes, free_bin};
 use bth_format::object::ObjectView;
 
 /// Unit of rounding.
 const U: f64 = f64::EPSILON / 2.0;
+const SLACK: f64 = SLACK_F32 as f64;
 
-/// Whether a ray in object space certainly meets no triangle of the object, because it leaves `triangle` in a free direction. The
-/// triangle may be anything, also none of the object.
+/// Where the range of a ray in object space can begin, because the ray leaves `triangle` in a direction of which that is known: no triangle
+/// of the object is hit before. At least `tmin`, infinite in a free direction. The triangle may be anything, also none of the object.
 #[inline(never)]
-pub(crate) fn certainly_misses(object: &ObjectView<'_>, ray: &Ray, triangle: u32) -> bool {
-    let Some(row) = object.free.get(triangle as usize) else { return false };
-    let Some(corners) = corners_at(object, row.place) else { return false };
+pub(super) fn begin(object: &ObjectView<'_>, ray: &Ray, triangle: u32) -> f32 {
+    match known_begin(object, ray, triangle) {
+        Some(begin) => ray.tmin.max(begin),
+        None => ray.tmin,
+    }
+}
+
+fn known_begin(object: &ObjectView<'_>, ray: &Ray, triangle: u32) -> Option<f32> {
+    let known = object.known_free(triangle as usize)?;
+    let corners = corners_at(object, known.place)?;
     let direction = ray.direction;
     let greatest = direction[0].abs().max(direction[1].abs()).max(direction[2].abs());
     if !(greatest > DIRECTIONS[0] && greatest < DIRECTIONS[1]) {
-        return false;
-    }
-    let bins = row.bins();
-    if bins.is_nearby() && ray.tmax == f32::INFINITY {
-        return false;
+        return None;
     }
     // The file may lie about which triangles have axes; then nothing is known.
-    let bin = free_axes(corners).and_then(|axes| free_bin(&axes, direction.map(f64::from)));
-    let Some((bin, is_back)) = bin else { return false };
-    if !bins.is_free(bin) {
-        return false;
+    let (bin, is_back) = free_bin(&free_axes(corners)?, direction.map(f64::from))?;
+    let (crossing, leaves_to_back) = crossing(ray, corners)?;
+    if is_back != leaves_to_back {
+        return None;
     }
-    let Some((before, leaves_to_back)) = crossing(ray, corners) else { return false };
-    if leaves_to_back != bins.is_back() || is_back != leaves_to_back {
-        return false;
+    if known.bins.is_free(bin) && known.bins.is_back() == is_back {
+        return Some(f32::INFINITY);
     }
-    if !bins.is_nearby() {
-        return true;
-    }
-    let Some(reach) = object.free_reach.first() else { return false };
-    let length = f64::from(ray.tmax) + f64::from(ray.tmax).abs() * (1.0 / f64::from(1 << 20)) - before;
-    let square: f64 = direction.iter().map(|x| (f64::from(*x) * length).powi(2)).sum();
-    square < f64::from(reach.reach).powi(2) * (1.0 - 1e-6)
+    let level = known.sectors[usize::from(is_back)].level_of_bin(bin);
+    let within = f64::from(object.free_levels.first()?.within(level));
+    let length = direction.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
+    let step = within / length;
+    Some((crossing + step - (step - crossing) * SLACK) as f32)
 }
 
 /// Lower bound of the t at which the line of a ray crosses a triangle, if it certainly does before the ray's range begins, and

@@ -1,6 +1,7 @@
 //! The triangles on which sixteen rays start: what must be read of them, without waiting for it.
 
 use super::corners_at;
+use super::rows::Row;
 use crate::simd::{LANES, Simd};
 use bth_format::layout::{Child, FreePlace};
 use bth_format::object::{NodeBase, ObjectView};
@@ -24,22 +25,23 @@ impl<'a> Hints<'a> {
 
     /// Prefetches the rows of the triangles.
     #[inline(always)]
-    pub(super) fn prefetch_rows<S: Simd>(&self, s: S, object: &ObjectView<'_>) {
+    pub(super) fn prefetch_rows<S: Simd, R: Row>(&self, s: S, rows: &[R]) {
         for &triangle in self.triangle {
-            s.prefetch(object.free.as_ptr().wrapping_add(triangle as usize));
+            s.prefetch(rows.as_ptr().wrapping_add(triangle as usize));
         }
     }
 
     /// Prefetches the leaves in which the triangles lie, whose rows are there. Those on a grid, and what is beyond the lines of an
     /// indexed leaf, are not.
     #[inline(always)]
-    pub(super) fn prefetch_leaves<S: Simd>(&self, s: S, object: &ObjectView<'_>) {
+    pub(super) fn prefetch_leaves<S: Simd, R: Row>(&self, s: S, object: &ObjectView<'_>, rows: &[R]) {
         let mut new = self.new;
         while new != 0 {
             let lane = new.trailing_zeros() as usize % LANES;
             new &= new - 1;
-            let Some(row) = object.free.get(self.triangle[lane] as usize) else { continue };
-            let leaf = object.lines.as_ptr().wrapping_add((row.place >> 4 & FreePlace::INDEX_LIMIT) as usize);
+            let Some(row) = rows.get(self.triangle[lane] as usize) else { continue };
+            let leaf =
+                object.lines.as_ptr().wrapping_add((row.place() >> 4 & FreePlace::INDEX_LIMIT) as usize);
             for k in 0..4 {
                 s.prefetch(leaf.wrapping_add(k));
             }
@@ -59,6 +61,8 @@ pub(super) struct Starts {
     pub(super) corners: [[[f32; LANES]; 3]; 3],
     /// The words of their bins.
     pub(super) bins: [[u32; LANES]; 4],
+    /// The sectors of their fronts and backs.
+    pub(super) sectors: [[u32; LANES]; 2],
 }
 
 impl Starts {
@@ -67,17 +71,18 @@ impl Starts {
         is_expanded: false,
         corners: [[[0.0; LANES]; 3]; 3],
         bins: [[0; LANES]; 4],
+        sectors: [[0; LANES]; 2],
     };
 
     /// Reads the triangles.
     #[inline(always)]
-    pub(super) fn fetch(&mut self, object: &ObjectView<'_>, hints: &Hints<'_>) {
+    pub(super) fn fetch<R: Row>(&mut self, object: &ObjectView<'_>, rows: &[R], hints: &Hints<'_>) {
         let (mut new, base) = (hints.new, object.node_base());
         self.is_expanded = new == 0xffff;
         while new != 0 {
             let lane = new.trailing_zeros() as usize % LANES;
             new &= new - 1;
-            self.set(object, base, hints.triangle[lane], lane);
+            self.set((object, base), rows.get(hints.triangle[lane] as usize), lane);
         }
         let mut column = 0;
         for lane in 0..LANES as u32 {
@@ -87,24 +92,21 @@ impl Starts {
     }
 
     #[inline(always)]
-    fn set(&mut self, object: &ObjectView<'_>, base: NodeBase<'_>, triangle: u32, column: usize) {
+    fn set<R: Row>(&mut self, of: (&ObjectView<'_>, NodeBase<'_>), row: Option<&R>, column: usize) {
+        let (object, base) = of;
         // A triangle that does not exist has no row, nor has NONE.
-        let Some(row) = object.free.get(triangle as usize) else {
+        let Some(row) = row else {
             return self.set_corners([[0.0; 3]; 3], column);
         };
-        for word in 0..4 {
-            self.bins[word][column] = row.bins[word];
-        }
+        row.copy(self, column);
+        let place = row.place();
         // Most triangles lie in indexed leaves of f32.
-        let leaf = if row.place & FreePlace::RAW == 0 {
-            base.indexed_leaf(Child::LEAF_BIT | row.place >> 4)
-        } else {
-            None
-        };
+        let leaf =
+            if place & FreePlace::RAW == 0 { base.indexed_leaf(Child::LEAF_BIT | place >> 4) } else { None };
         let Some(leaf) = leaf else {
-            return self.set_corners(corners_at(object, row.place).unwrap_or_default(), column);
+            return self.set_corners(corners_at(object, place).unwrap_or_default(), column);
         };
-        let slot = row.place as usize % LANES;
+        let slot = place as usize % LANES;
         for corner in 0..3 {
             let vertex = usize::from(leaf.corner[corner][slot]) % LANES;
             for axis in 0..3 {
@@ -125,7 +127,7 @@ impl Starts {
 
     /// Copies each triangle to the lanes of its rays.
     #[inline(always)]
-    pub(super) fn expand<S: Simd>(&mut self, s: S) {
+    pub(super) fn expand<S: Simd, R: Row>(&mut self, s: S) {
         if self.is_expanded {
             return;
         }
@@ -135,7 +137,10 @@ impl Starts {
                 s.store(s.lookup(s.load(row), column), row);
             }
         }
-        for row in &mut self.bins {
+        for row in if R::HAS_BINS { &mut self.bins[..] } else { &mut [] } {
+            s.store_u(s.lookup_u(s.load_u(row), column), row);
+        }
+        for row in &mut self.sectors {
             s.store_u(s.lookup_u(s.load_u(row), column), row);
         }
     }

@@ -10,7 +10,7 @@ use super::enter_object::ObjectRays;
 use super::progress::Progress;
 use super::scene_batch::SceneBatch;
 use super::visit_queue::VisitQueue;
-use crate::free;
+use crate::free::{self, Rest};
 use crate::object::Hinted;
 use crate::objects::Objects;
 use crate::query::sink::Visit;
@@ -31,7 +31,7 @@ pub(super) struct FreeStarts {
     meets_nothing: Vec<bool>,
     visits: VisitQueue,
     object_rays: ObjectRays,
-    rest: Vec<u32>,
+    rest: Rest,
 }
 
 impl FreeStarts {
@@ -90,12 +90,18 @@ impl FreeStarts {
         batch.world.by_object(visits, |object, visits| {
             let object = batch.objects.view(object);
             object_rays.fill(batch, true, visits, Progress::None);
-            if free::find_rest(object, &object_rays.rays, &object_rays.from, Hinted::are_forced(), rest) {
+            if free::find_rest(
+                object,
+                &object_rays.rays,
+                &object_rays.from,
+                (Hinted::are_forced(), false),
+                rest,
+            ) {
                 let place = |visit: &Visit| visit.ray as usize - chunk.start;
                 for visit in visits {
                     not_met[place(visit)] = visit.instance;
                 }
-                for index in &*rest {
+                for index in &rest.order {
                     not_met[place(&visits[*index as usize])] = NONE;
                 }
                 // Which rays are left is not predictable, so there is no branch.

@@ -7,13 +7,16 @@ use super::strategy::{HintUse, QueryKind, Strategy, size_of};
 use super::walked_batch::{has_subtrees, may_gain_by_walks};
 use crate::SMALL;
 use crate::bvh::interleaved::RemainingRays;
-use crate::free;
+use crate::free::{self, Rest};
 use crate::query::sink::Sink;
 use crate::query::{Answers, AnswersOf, AnyQuery, Goal, NearestQuery, Query, any_answers, nearest_answers};
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
+
+/// Where at most one in this many rays has ended, all are traced: those that have ended take little time, since their ranges are empty.
+const FEW_ENDED: usize = 8;
 
 /// Computes the nearest hits of rays in object space, through the instance with the given index. `from` holds for each ray where it
 /// starts, on this instance or elsewhere; it affects where the search begins, never the result.
@@ -50,7 +53,7 @@ fn trace_from<Q: Query>(
     scratch: &mut Scratch,
     mut answers: AnswersOf<'_, Q>,
 ) {
-    let trace = |from: Option<&[u32]>, scratch: &mut Scratch, mut answers: AnswersOf<'_, Q>| {
+    let trace = |rays: &[Ray], from: Option<&[u32]>, scratch: &mut Scratch, mut answers: AnswersOf<'_, Q>| {
         let answers = Q::Goal::reborrow(&mut answers);
         let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
         trace_batch(object, rays, from, scratch, &mut sink);
@@ -58,13 +61,13 @@ fn trace_from<Q: Query>(
     // Only objects with tetrahedra or free directions use hints.
     let has_tets = !object.tet_leaves.is_empty();
     let Some(from) = from.filter(|_| !SMALL && (has_tets || free::is_known(object))) else {
-        return trace(None, scratch, answers);
+        return trace(rays, None, scratch, answers);
     };
     let is_any = answers.goal().is_any();
     let kind = QueryKind::of(is_any, rays, size_of(object));
     if !free::is_known(object) {
         if !may_walk(object, kind, from, instance) {
-            return trace(None, scratch, answers);
+            return trace(rays, None, scratch, answers);
         }
         let walk = |scratch: &mut Scratch, mut answers: AnswersOf<'_, Q>| {
             with_hints(from, instance, scratch, |hints, scratch| {
@@ -78,7 +81,7 @@ fn trace_from<Q: Query>(
         }
         let key = (object.identity, HintUse::Tets.kind(kind));
         return by_hint(key, rays.len(), Strategy::Bvh, scratch, |strategy, scratch| match strategy {
-            Strategy::Bvh => trace(None, scratch, answers),
+            Strategy::Bvh => trace(rays, None, scratch, answers),
             Strategy::Hinted => walk(scratch, answers),
         });
     }
@@ -86,21 +89,23 @@ fn trace_from<Q: Query>(
     let key = (object.identity, HintUse::Free.kind(kind));
     by_hint(key, rays.len(), Strategy::Hinted, scratch, |strategy, scratch| {
         if strategy == Strategy::Bvh && !has_tets {
-            return trace(None, scratch, answers);
+            return trace(rays, None, scratch, answers);
         }
         with_hints(from, instance, scratch, |hints, scratch| {
             let mut rest = std::mem::take(&mut scratch.rest);
             if strategy == Strategy::Bvh
-                || !free::find_rest(object, rays, hints, Hinted::are_forced(), &mut rest)
+                || !free::find_rest(object, rays, hints, (Hinted::are_forced(), true), &mut rest)
             {
-                trace(Some(hints), scratch, answers);
+                trace(rays, Some(hints), scratch, answers);
+            } else if (rays.len() - rest.order.len()) * FEW_ENDED <= rays.len() {
+                trace(&rest.rays, None, scratch, answers);
             } else if is_any {
                 // Most shorter rays go in packets, also those that are left. Others are faster without moving them.
-                trace_gathered::<Q>(object, (rays, &rest), instance, scratch, answers);
+                trace_gathered::<Q>(object, &mut rest, instance, scratch, answers);
             } else {
                 let answers = Q::Goal::reborrow(&mut answers);
                 let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
-                trace_rest(object, rays, &rest, scratch, &mut sink);
+                trace_rest(object, &rest, scratch, &mut sink);
             }
             scratch.rest = rest;
         });
@@ -155,41 +160,35 @@ impl Kernel for TrianglesOf<'_> {
     }
 }
 
-/// Stores the answers of those of the rays `rest`, by their ascending indices, that hit anything, from a copy of these rays. All answers
-/// are misses before.
+/// Stores the answers of those of the rays `rest` that hit anything, after moving these rays together. All answers are misses before.
 fn trace_gathered<Q: Query>(
     object: &ObjectView<'_>,
-    (rays, rest): (&[Ray], &[u32]),
+    rest: &mut Rest,
     instance: u32,
     scratch: &mut Scratch,
     mut answers: AnswersOf<'_, Q>,
 ) {
-    let mut gathered = std::mem::take(&mut scratch.gathered);
-    gathered.clear();
-    gathered.extend(rest.iter().map(|ray| rays[*ray as usize]));
+    let Rest { order, rays } = rest;
+    // No ray is before its place among those that are left.
+    for (i, &ray) in order.iter().enumerate() {
+        rays[i] = rays[ray as usize];
+    }
     {
         let answers = Q::Goal::reborrow(&mut answers);
         let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
-        trace_batch(object, &gathered, None, scratch, &mut sink);
+        trace_batch(object, &rays[..order.len()], None, scratch, &mut sink);
     }
-    // No ray is before its place among those that are left, so the last answers can move first.
-    for (i, &ray) in rest.iter().enumerate().rev() {
+    // For the same reason the last answers can move first.
+    for (i, &ray) in order.iter().enumerate().rev() {
         answers.swap(i, ray as usize);
     }
-    scratch.gathered = gathered;
 }
 
-/// Stores in `sink` the answers of those of the rays `rest`, by their indices, that hit anything.
-fn trace_rest<Q: Query>(
-    object: &ObjectView<'_>,
-    rays: &[Ray],
-    rest: &[u32],
-    scratch: &mut Scratch,
-    sink: &mut Sink<'_, Q>,
-) {
-    if object.header.root != NONE && !rest.is_empty() {
+/// Stores in `sink` the answers of those of the rays `rest` that hit anything.
+fn trace_rest<Q: Query>(object: &ObjectView<'_>, rest: &Rest, scratch: &mut Scratch, sink: &mut Sink<'_, Q>) {
+    if object.header.root != NONE && !rest.order.is_empty() {
         // Too few rays are left of most packets.
-        let remaining = RemainingRays { order: Some(rest), queries: None, walked: None };
-        through_bvh(object, rays, remaining, scratch, sink);
+        let remaining = RemainingRays { order: Some(&rest.order), queries: None, walked: None };
+        through_bvh(object, &rest.rays, remaining, scratch, sink);
     }
 }

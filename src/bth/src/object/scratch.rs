@@ -4,7 +4,7 @@ use super::strategy::StrategyTable;
 use super::walked_batch::WalkScratch;
 use crate::bvh::packet::PacketScratch;
 use crate::bvh::stack::Stacks;
-use crate::rays::Ray;
+use crate::free::Rest;
 use std::cell::Cell;
 
 /// Memory that the traversals of batches use, and the measured costs of strategies.
@@ -15,10 +15,8 @@ pub(crate) struct Scratch {
     pub(super) choices: StrategyTable,
     /// For each ray of a batch the triangle on which it starts, or `NONE`.
     pub(super) hints: Vec<u32>,
-    /// Indices of the rays that remain after those in free directions have ended.
-    pub(crate) rest: Vec<u32>,
-    /// Copies of these rays, where they are traced like a batch of their own.
-    pub(super) gathered: Vec<Ray>,
+    /// The rays that remain after those that meet nothing have ended.
+    pub(crate) rest: Rest,
     pub(super) walks: WalkScratch,
 }
 

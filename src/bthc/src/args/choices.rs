@@ -206,14 +206,16 @@ impl From<Structure> for bth_compile::pipeline::Structure {
     }
 }
 
-/// Where free directions are kept.
+/// Where free directions and distances are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Free {
     /// Nowhere.
     None,
-    /// Where enough directions are free.
+    /// Directions and distances where enough directions are free, else distances where they save enough.
     Auto,
-    /// Everywhere.
+    /// Distances alone.
+    Distances,
+    /// Directions and distances.
     All,
 }
 
@@ -222,6 +224,7 @@ impl From<Free> for bth_compile::free::KeepFree {
         match free {
             Free::None => Self::None,
             Free::Auto => Self::Auto,
+            Free::Distances => Self::Distances,
             Free::All => Self::All,
         }
     }

@@ -49,12 +49,13 @@ pub(crate) struct Compile {
     /// (0.01%). The fewest bits that honour it are taken; with --coordinates, more is refused.
     #[arg(long, value_name = "DISTANCE", value_parser = str::parse::<bth_compile::coordinates::MaxError>)]
     pub(crate) max_error: Option<bth_compile::coordinates::MaxError>,
-    /// Directions in which rays that start on a triangle meet nothing, so that they end at once where a caller says on which triangle
-    /// they start: 20 bytes a triangle. With `auto` where enough directions are free.
+    /// Directions in which rays that start on a triangle meet nothing, and distances within which they do not, so that rays end at once
+    /// or begin later where a caller says on which triangle they start: 24 bytes a triangle, or 12 for `distances` alone. With `auto` what
+    /// is worth its bytes.
     #[arg(long, value_enum, default_value_t = Free::None, value_name = "WHERE", conflicts_with = "deformable")]
     pub(crate) free_directions: Free,
-    /// Distance within which free directions tell what is nearby, where too few are free altogether, as a share of the diagonal of
-    /// the object's box.
+    /// The second of three distances that are told apart, an eighth of it, it and four times it, as a share of the diagonal of the
+    /// object's box.
     #[arg(long, value_name = "SHARE", value_parser = positive, default_value_t = 0.0625)]
     pub(crate) free_reach: f64,
     /// Shading attributes to keep.

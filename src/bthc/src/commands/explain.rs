@@ -8,9 +8,9 @@ use crate::output;
 use crate::progress::Progress;
 use crate::table::{Table, count};
 use bth_compile::costs::{self, Verdict};
-use bth_compile::free::{self, FreeOptions, FreeReport, KeepFree};
+use bth_compile::free::{self, FreeOptions, FreeReport, KeepFree, Kept};
 use bth_compile::{Error, Monitor, bvh, marks, pipeline, tets, write};
-use bth_format::layout::FreeDirections;
+use bth_format::layout::{FreeDirections, FreeDistances};
 use bth_import::{Keep, Mesh};
 use serde_json::{Value, json};
 use std::cmp::Reverse;
@@ -143,7 +143,7 @@ fn free_directions(
     let all = FreeOptions { keep: KeepFree::All, ..FreeOptions::default() };
     let (free, mut report) = free::find(mesh, tree, &all, progress)?;
     report.seconds = start.elapsed().as_secs_f64();
-    report.kept = report.is_worthwhile(KeepFree::Auto);
+    report.kept = report.worthwhile();
     progress.stage("picture", None);
     let scene = bth::from_bytes(&pipeline::assemble(mesh, tree, &[], options, progress)?.bytes)?;
     write::write_atomically(path, &free_picture((mesh, tree), &scene, &free)?)?;
@@ -152,15 +152,23 @@ fn free_directions(
 
 /// What free directions bring and cost.
 fn free_line(path: &Path, free: &FreeReport) -> String {
+    let bytes = |row: usize| count(free.triangles * row as u64);
     format!(
-        "wrote {}: from dark, where rays of no direction are known to meet nothing, to yellow, where all are; half as bright where only \
-         what is nearby is known\n{:.0} % of directions free, {:.0} % nearby; {} bytes, {:.1} s; {} by --free-directions auto\n",
+        "wrote {}: from dark, where rays of no direction are known to meet nothing, to yellow, where all are; directions that are free up to a \
+         distance count in part\n{:.0} % of directions free; up to the distances {} {:.0} %, {:.0} %, {:.0} %; {:.1} s; {} by \
+         --free-directions auto\n",
         path.display(),
         100.0 * free.free,
-        100.0 * free.free_nearby,
-        count(free.triangles * size_of::<FreeDirections>() as u64),
+        free.levels.map(|distance| format!("{distance:.3}")).join(", "),
+        100.0 * free.beyond[0],
+        100.0 * free.beyond[1],
+        100.0 * free.beyond[2],
         free.seconds,
-        if free.kept { "kept" } else { "not kept" },
+        match free.kept {
+            Kept::None => "not kept".to_owned(),
+            Kept::Distances => format!("distances kept, {} bytes,", bytes(size_of::<FreeDistances>())),
+            Kept::Directions => format!("kept, {} bytes,", bytes(size_of::<FreeDirections>())),
+        },
     )
 }
 

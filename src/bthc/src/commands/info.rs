@@ -9,7 +9,9 @@ use crate::table::{Table, bytes, count};
 use bth::Isa;
 use bth_format::File;
 use bth_format::layout::kind;
-use bth_format::layout::{FREE_BINS, FreeBins, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE, RecordKind};
+use bth_format::layout::{
+    FREE_BINS, FREE_SECTORS, FreeBins, FreeSectors, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE, RecordKind,
+};
 use bth_format::object::ObjectView;
 use bth_import::gltf::scene::{self, ImportOptions};
 use serde_json::{Value, json};
@@ -101,23 +103,26 @@ fn describe(file: &File) -> Result<Value, Failure> {
     }))
 }
 
-/// Shares of the triangles of an object with free directions, and of these directions among their bins; null where none are known.
+/// Share of the triangles of an object of whose directions anything is known, of their bins those that are free, and of the sectors of the
+/// sides that are told those of each level or a greater one; null where nothing is known.
 fn free_directions(view: &ObjectView<'_>) -> Value {
-    if view.free.is_empty() {
-        return Value::Null;
+    let Some(levels) = view.free_levels.first() else { return Value::Null };
+    let (mut rows, mut known, mut bins, mut beyond) = (0u64, 0u64, 0u64, [0u64; FreeSectors::LEVELS]);
+    while let Some(of_row) = view.known_free(rows as usize) {
+        rows += 1;
+        known += u64::from(!of_row.is_nothing());
+        bins += u64::from((of_row.bins.0 & FreeBins::ALL).count_ones());
+        for (sectors, sector) in
+            of_row.sectors.iter().flat_map(|side| (0..FREE_SECTORS).map(move |i| (side, i)))
+        {
+            let level = sectors.level(sector);
+            beyond[..level].iter_mut().for_each(|count| *count += 1);
+        }
     }
-    let (mut known, mut nearby, mut bins) = (0u64, 0u64, 0u64);
-    for row in view.free {
-        let of_row = row.bins();
-        let free = (of_row.0 & FreeBins::ALL).count_ones();
-        known += u64::from(free != 0);
-        nearby += u64::from(free != 0 && of_row.is_nearby());
-        bins += u64::from(free);
-    }
-    let rows = view.free.len() as f64;
-    json!({"triangles": known as f64 / rows, "nearby_only": nearby as f64 / rows,
-        "bins": bins as f64 / (rows * FREE_BINS as f64),
-        "reach": view.free_reach.first().map(|row| row.reach), "bytes": size_of_val(view.free)})
+    let (triangles, sides) = (rows as f64, if view.free.is_empty() { 2.0 } else { 1.0 });
+    json!({"triangles": known as f64 / triangles, "bins": bins as f64 / (triangles * FREE_BINS as f64),
+        "beyond": beyond.map(|count| count as f64 / (sides * triangles * FREE_SECTORS as f64)),
+        "levels": levels.distance, "bytes": rows as usize * view.free_kind().1})
 }
 
 /// Seconds from which the hierarchies of an object apply, and the objects that hold them; empty where one applies always.

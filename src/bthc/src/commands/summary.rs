@@ -1,6 +1,7 @@
 //! The report of a compiled model for people.
 
 use crate::table::{Table, bytes, count, seconds};
+use bth_compile::free::Kept;
 use bth_compile::pipeline::CompileReport;
 use bth_compile::tets::WorkerStatus;
 
@@ -27,10 +28,15 @@ pub(super) fn summary(report: &CompileReport) -> String {
         facts.row(["opaque, transparent, unknown", &format!("{opaque}, {transparent}, {unknown}")]);
     }
     if let Some(free) = &report.free {
-        let [all, near] = [free.free, free.free_nearby].map(|share| 100.0 * share);
-        let kept = if free.kept { "kept" } else { "not worth their bytes" };
-        let seconds = free.seconds;
-        facts.row(["free directions", &format!("{all:.0} %, {near:.0} % nearby, {kept}, {seconds:.1} s")]);
+        let kept = match free.kept {
+            Kept::None => "not worth their bytes",
+            Kept::Distances => "distances kept",
+            Kept::Directions => "kept",
+        };
+        let [near, middle, far] = free.beyond.map(|share| 100.0 * share);
+        let (all, seconds) = (100.0 * free.free, free.seconds);
+        let shares = format!("{all:.0} %, up to distances {near:.0} %, {middle:.0} %, {far:.0} %");
+        facts.row(["free directions", &format!("{shares}; {kept}, {seconds:.1} s")]);
     }
     if let Some(found) = &report.coordinates {
         facts.row(["coordinates", &format!("{} bits", found.bits)]);

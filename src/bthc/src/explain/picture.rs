@@ -7,7 +7,7 @@ use bth_compile::Result;
 use bth_compile::bvh::BinaryBvh;
 use bth_compile::costs::SelectionOutcome;
 use bth_compile::free::Free;
-use bth_format::layout::{FREE_BINS, FreeBins, FreeDirections, NONE};
+use bth_format::layout::{FREE_BINS, FreeSectors, KnownFree};
 use bth_import::Mesh;
 use glam::Vec3;
 
@@ -51,7 +51,7 @@ pub(crate) fn picture(of: &Explained<'_>) -> Result<(Vec<u8>, f64)> {
 }
 
 /// The bytes of a PNG file that shows in how many of its directions rays from each triangle meet nothing: from dark where in none to
-/// yellow where in all. What is only free nearby is half as bright.
+/// yellow where in all. Directions that are free up to a distance count in part.
 ///
 /// # Errors
 /// An internal error of the encoder.
@@ -64,13 +64,21 @@ pub(crate) fn free_picture(
     let hits = nearest(scene, &rays);
     let mut pixels = vec![255u8; (SIZE * SIZE * 3) as usize];
     for (i, (ray, hit)) in rays.iter().zip(&hits).enumerate().filter(|(_, (_, hit))| hit.is_hit()) {
-        let row = FreeDirections { place: NONE, bins: free.bins[hit.primitive.triangle as usize] };
-        let bins = row.bins();
-        let share = (bins.0 & FreeBins::ALL).count_ones() as f32 / FREE_BINS as f32;
-        let brightness = if bins.is_nearby() { 0.5 } else { 1.0 };
-        paint(&mut pixels, i as u32, brightness * light(mesh, ray, hit) * heat(share));
+        let known = free.directions.get(hit.primitive.triangle as usize).map(KnownFree::from);
+        let openness = known.map_or(0.0, |known| openness(&known));
+        paint(&mut pixels, i as u32, light(mesh, ray, hit) * heat(openness));
     }
     encode(&pixels, SIZE)
+}
+
+/// Mean over the bins of a triangle: 1 where a bin is free, and a quarter for each level of its sector where it is not.
+fn openness(known: &KnownFree) -> f32 {
+    let sectors = known.sectors[usize::from(known.bins.is_back())];
+    let of_bin = |bin: usize| match known.bins.is_free(bin) {
+        true => 1.0,
+        false => sectors.level_of_bin(bin) as f32 / (FreeSectors::LEVELS + 1) as f32,
+    };
+    (0..FREE_BINS).map(of_bin).sum::<f32>() / FREE_BINS as f32
 }
 
 fn nearest(scene: &bth::Scene, rays: &[Ray]) -> Vec<Hit> {

@@ -46,11 +46,12 @@ impl Codec for Marks {
 
 impl Codec for Free {
     fn write(&self, to: &mut RowWriter) {
-        to.add(&[self.reach]);
-        to.add(&self.bins);
+        to.add(&[self.levels]);
+        to.add(&self.directions);
+        to.add(&self.distances);
     }
 
     fn read(from: &mut RowReader<'_>) -> Option<Self> {
-        Some(Free { reach: from.one()?, bins: from.take()? })
+        Some(Free { levels: from.one()?, directions: from.take()?, distances: from.take()? })
     }
 }

@@ -65,6 +65,9 @@ static SHARES: LazyLock<[f64; FREE_BINS]> = LazyLock::new(|| {
     })
 });
 
+/// Share of the cosine-weighted directions of a side that lie in each sector.
+pub(super) static SECTOR_SHARES: LazyLock<[f64; FREE_SECTORS]> = LazyLock::new(|| SECTORS.map(share));
+
 /// Share of the cosine-weighted directions of a side that some bins hold.
 pub(super) fn share(mut bins: BinSet) -> f64 {
     let shares = &*SHARES;

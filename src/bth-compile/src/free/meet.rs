@@ -1,7 +1,7 @@
 //! In which bins rays from a start triangle may meet the triangles of a block.
 
 use super::frame::{ALL_COLUMNS, BinSet, COLUMNS, bins};
-use super::see::{ERROR, SMALL, dot, squared_gap, sum_abs};
+use super::see::{ERROR, dot, squared_gap, sum_abs};
 use super::start::{BY_BOTH, BY_COLUMN, BY_ROW, LINES, Line, Start};
 use super::tree::Block;
 use bth::simd::{LANES, Simd};
@@ -22,7 +22,7 @@ pub(super) struct Met {
     /// Bits of the triangles that may have a point on the side from which rays start, and of those that certainly have.
     pub(super) above: u32,
     pub(super) certainly_above: u32,
-    /// Bits of those that are [`SMALL`].
+    /// Bits of those that are [small](super::see::SMALL).
     small: u32,
 }
 
@@ -144,7 +144,7 @@ fn distances<S: Simd, const TOUCHES: bool>(
     }
     let gap = squared_gap(s, &ranges);
     s.store(gap, &mut met.squared_gap);
-    met.small = s.mask_bits(s.le(diagonal, s.mul(gap, s.splat(SMALL * SMALL))));
+    met.small = s.mask_bits(s.le(diagonal, s.mul(gap, s.splat(start.small * start.small))));
 }
 
 /// Factors of the heights of corners above a line in its plane, whose products bound w, by corner.

@@ -1,9 +1,9 @@
 //! How many directions are free, and whether they are worth their bytes.
 
-use super::frame::share;
+use super::frame::{SECTOR_SHARES, share};
 use super::search::Found;
 use crate::bvh::BinaryBvh;
-use bth_format::layout::{FREE_BINS, FreeBins, FreeSectors};
+use bth_format::layout::{FREE_SECTORS, FreeBins, FreeSectors};
 use bth_import::Mesh;
 use serde::{Deserialize, Serialize};
 
@@ -23,7 +23,7 @@ pub enum Kept {
 /// Least share of free directions for which [`super::KeepFree::Auto`] keeps them.
 const LEAST_SHARE: f64 = 0.5;
 /// Least share of directions beyond the first level for which it keeps distances.
-const LEAST_BEYOND: f64 = 0.3;
+const LEAST_BEYOND: f64 = 0.5;
 
 /// Report of [`super::find`]. Shares are those of cosine-weighted rays from triangles, by area. They are estimates from a sixteenth
 /// of the triangles where nothing is kept.
@@ -98,6 +98,8 @@ impl FreeReport {
 
 /// Share of the cosine-weighted directions of a side that lie in sectors of a level or a greater one.
 fn beyond(sectors: FreeSectors, level: usize) -> f64 {
-    let in_level = |bin: &usize| sectors.level_of_bin(*bin) >= level;
-    share((0..FREE_BINS).filter(in_level).fold(0, |bins, bin| bins | 1 << bin))
+    (0..FREE_SECTORS)
+        .filter(|sector| sectors.level(*sector) >= level)
+        .map(|sector| SECTOR_SHARES[sector])
+        .sum()
 }

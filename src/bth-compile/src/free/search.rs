@@ -3,7 +3,7 @@
 use super::Kept;
 use super::frame::{BinSet, Frame, IN_SECTORS, SECTORS, share};
 use super::meet::meet;
-use super::see::see;
+use super::see::{SMALL, SMALL_FOR_SECTORS, see};
 use super::start::Start;
 use super::tree::{BLOCK, Block, Tree};
 use bth::simd::{Kernel, Simd};
@@ -31,10 +31,8 @@ pub(super) struct Found {
     pub(super) sectors: [FreeSectors; 2],
 }
 
-/// Share of the directions of the front from which on the back is not searched.
+/// Share of the directions of the front that are free, or beyond a level, in the mean of the levels, from which on the back is not searched.
 const ENOUGH: f64 = 1.0 / 8.0;
-/// What a direction counts that is not free, but beyond all levels, where a side is chosen.
-const WORTH_OF_DISTANCE: f64 = 0.25;
 
 /// Decides the directions of some triangles, by rows of the order of the BVH.
 pub(super) struct Decide<'a> {
@@ -89,26 +87,32 @@ impl State {
     /// Bins that something at this distance can still block.
     #[inline(always)]
     fn blockable(&self, squared_gap: f32) -> BinSet {
-        let mut bins = self.free;
+        // What is open for a level is open for those below it.
+        self.free | self.open.get(self.levels_below(squared_gap)).copied().unwrap_or_default()
+    }
+
+    /// Number of levels beyond whose distance something is.
+    #[inline(always)]
+    fn levels_below(&self, squared_gap: f32) -> usize {
+        let mut levels = 0;
         for level in 0..FreeSectors::LEVELS {
-            bins |= if squared_gap < self.near[level] { self.open[level] } else { 0 };
+            levels += usize::from(squared_gap >= self.near[level]);
         }
-        bins
+        levels
     }
 
     #[inline(always)]
     fn block(&mut self, bins: BinSet, squared_gap: f32) {
         self.free &= !bins;
-        for level in 0..FreeSectors::LEVELS {
-            if squared_gap < self.near[level] {
-                let mut hit = self.open[level] & bins;
-                while hit != 0 {
-                    let sector = FreeSectors::of_bin(hit.trailing_zeros() as usize);
-                    let sector = BINS_OF[sector.expect("open bins have sectors")];
-                    self.open[level] &= !sector;
-                    hit &= !sector;
-                }
+        let first = self.levels_below(squared_gap);
+        let mut met = self.open.get(first).map_or(0, |open| open & bins);
+        while met != 0 {
+            let sector = FreeSectors::of_bin(met.trailing_zeros() as usize);
+            let sector = BINS_OF[sector.expect("open bins have sectors")];
+            for level in first..FreeSectors::LEVELS {
+                self.open[level] &= !sector;
             }
+            met &= !sector;
         }
     }
 
@@ -134,7 +138,7 @@ impl Search<'_> {
         for is_back in [false, true] {
             let Some(state) = self.search(s, row, (is_back, FreeBins::ALL)) else { break };
             let beyond: f64 = state.open.iter().map(|open| share(*open)).sum();
-            let value = share(state.free) + WORTH_OF_DISTANCE * beyond / FreeSectors::LEVELS as f64;
+            let value = share(state.free).max(beyond / FreeSectors::LEVELS as f64);
             if value > best.1 {
                 let mut found = Found { bins: FreeBins(state.free), ..Found::default() };
                 found.bins.0 |= if is_back { FreeBins::BACK } else { 0 };
@@ -168,7 +172,7 @@ impl Search<'_> {
         let levels = self.around.levels;
         let mut state = State {
             row,
-            start: Start::new(corners, &frame, is_back),
+            start: Start::new(corners, &frame, is_back, if free == 0 { SMALL_FOR_SECTORS } else { SMALL }),
             free,
             open: levels.map(|distance| if distance > 0.0 { IN_SECTORS } else { 0 }),
             near: levels.map(|distance| distance * distance * (1.0 + 1e-4)),

@@ -11,6 +11,8 @@ pub(super) const ERROR: f32 = 1.0 / (1 << 20) as f32;
 /// Boxes and triangles whose size, relative to their distance, is at most this block the bins in which they may be seen, without proof
 /// that they are met: six degrees.
 pub(super) const SMALL: f32 = 1.0 / 10.0;
+/// As [`SMALL`], where only sectors are decided, which are wider than bins.
+pub(super) const SMALL_FOR_SECTORS: f32 = 1.0 / 6.0;
 
 /// What may be seen of children.
 pub(super) struct Seen {
@@ -84,7 +86,7 @@ pub(super) fn see<S: Simd>(s: S, start: &Start, node: &Node) -> Seen {
     }
     let gap = squared_gap(s, &ranges);
     let diagonal = s.add(s.add(s.mul(side[0], side[0]), s.mul(side[1], side[1])), s.mul(side[2], side[2]));
-    let small = s.le(diagonal, s.mul(gap, s.splat(SMALL * SMALL)));
+    let small = s.le(diagonal, s.mul(gap, s.splat(start.small * start.small)));
     let (range, seen) = columns_and_rows(s, &ranges);
     let mut out = Seen {
         squared_gap: [0.0; LANES],

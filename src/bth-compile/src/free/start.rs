@@ -47,11 +47,13 @@ pub(super) struct Start {
     pub(super) extent: [[f32; 2]; 2],
     /// The greatest in absolute value.
     pub(super) size: f32,
+    /// What is small, relative to its distance ([`super::see::SMALL`]).
+    pub(super) small: f32,
     pub(super) lines: [Line; LINES],
 }
 
 impl Start {
-    pub(super) fn new(corners: [[f32; 3]; 3], frame: &Frame, is_back: bool) -> Self {
+    pub(super) fn new(corners: [[f32; 3]; 3], frame: &Frame, is_back: bool, small: f32) -> Self {
         let local = corners.map(|p| frame.local(p));
         let size = local.iter().flatten().fold(0f64, |size, x| size.max(x.abs()));
         let slack = size / f64::from(1 << 20);
@@ -71,6 +73,7 @@ impl Start {
             local: local.map(|p| p.map(|x| x as f32)),
             extent,
             size: size as f32,
+            small,
             lines: [
                 outermost([1.0, 0.0]),
                 outermost([-1.0, 0.0]),

@@ -168,13 +168,13 @@ fn a_convex_solid_is_free_outside() {
 fn a_solid_that_is_inside_out_is_free_on_the_back() {
     let mut mesh = sphere(8, [0.0; 3]);
     mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+    // On the back nothing is met at all; where before the front nothing is met up to some distance, that may be told instead.
     let free = free_of(&mesh);
-    // Before the front there is much within the distances of the levels, but on the back nothing at all.
-    let triangles = free.directions.len();
-    assert!((0..triangles).all(|t| free.bins(t).is_back() && free.directions[t].sectors == u32::MAX));
+    let is_open = |t: usize| free.bins(t).0 & FreeBins::ALL == FreeBins::ALL;
+    let is_told = |t: usize| if free.bins(t).is_back() { is_open(t) } else { free.directions[t].sectors != 0 };
+    assert!((0..free.directions.len()).all(is_told));
     let distances = found(&mesh, KeepFree::Distances).0.distances;
     assert!(distances.iter().all(|row| row.sectors[1] == u32::MAX && row.sectors[0] != u32::MAX));
-    assert!(distances.iter().any(|row| row.sectors[0] != 0));
 }
 
 #[test]
@@ -211,6 +211,10 @@ fn distant_triangles_block_beyond_their_distance_only() {
         assert_eq!(free.distance(0, up), expected, "{height}: {levels:?}");
         let downwards = free.known(0).sectors[1];
         assert_eq!(downwards.0, u32::MAX, "nothing is below");
+        // Where one side is told, it is the back if nothing is known of the front.
+        let bins = free_of(&mesh).bins(0);
+        assert_eq!(bins.is_back(), expected == 0.0, "{height}");
+        assert!(!bins.is_back() || bins.0 & FreeBins::ALL == FreeBins::ALL, "{height}");
     }
 }
 

@@ -35,7 +35,10 @@ fn begin(file: &[u8], ray: Ray, from: u32) -> Option<f32> {
             let begin = of.tmin;
             assert_eq!(bits(&Ray { tmin: ray.tmin, ..*of }), bits(&ray), "{isa}");
             let is_close = begin <= alone && alone - begin <= 1e-2 * (alone - ray.tmin);
-            assert!(ends || i >= groups || begin.to_bits() == alone.to_bits() || is_close, "{isa}: {begin} {alone} {ray:?}");
+            assert!(
+                ends || i >= groups || begin.to_bits() == alone.to_bits() || is_close,
+                "{isa}: {begin} {alone} {ray:?}"
+            );
         }
     }
     Isa::best().choose().unwrap();

@@ -130,6 +130,58 @@ fn free_directions_change_no_answer() {
     check_free_directions(&gyroid(3000), CompileOptions::default());
 }
 
+/// What is hit lies just behind the distance of a level, so that ranges begin just before it, or just before that distance.
+#[test]
+fn what_lies_just_behind_a_distance_is_hit() {
+    let _turn = turn();
+    let start = [[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.01, 0.0]];
+    let far = [[0.0, 0.0, -8.0], [9.0, 0.0, -8.0], [0.0, 9.0, -8.0]];
+    let diagonal = |height: f32| (18.0f64 * 18.0 * 2.0 + (8.0 + f64::from(height)).powi(2)).sqrt();
+    let mut later = 0;
+    for level in [1.0 / 128.0, 1.0 / 16.0, 1.0 / 4.0] {
+        for beyond in [0.96, 0.999, 1.0001, 1.001, 1.02] {
+            // The diagonal grows with the height.
+            let height = (0..50).fold(0.0f32, |height, _| (level * diagonal(height) * beyond) as f32);
+            let above = [[-9.0, -9.0, height], [9.0, -9.0, height], [0.0, 9.0, height]];
+            let positions = [start, far, above].concat();
+            let model = Model { positions, triangles: vec![[0, 1, 2], [3, 4, 5], [6, 7, 8]] };
+            let scene = with_free_directions(&model, CompileOptions::default(), KeepFree::Distances);
+            let mut rng = Rng::new(3);
+            let rays: Vec<Ray> = (0..4096)
+                .map(|_| {
+                    let mut number = |size: f32| rng.unit_f64() as f32 * size;
+                    let [u, v, along, scale] =
+                        [number(0.004), number(0.004), number(0.1), number(30.0) + 0.03];
+                    let direction = [scale * (0.1 * along - 0.005), scale * 0.3 * along, scale];
+                    Ray {
+                        origin: [u, v, 1e-4 * height * (along - 0.05)],
+                        tmin: 1e-5 * height / scale,
+                        direction,
+                        tmax: 1e30,
+                    }
+                })
+                .collect();
+            let from = vec![PrimitiveRef { instance: 0, triangle: 0 }; rays.len()];
+            later += usize::from(scene.nearest(&rays[0]).is_some_and(|hit| hit.primitive.triangle == 2));
+            for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+                isa.choose().expect("an instruction set that is available");
+                Hinted::Tets.choose();
+                let (mut hits, mut any) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+                scene.batch(&rays).from(&from[..]).nearest(&mut hits);
+                scene.batch(&rays).from(&from[..]).any(&mut any);
+                for (i, ray) in rays.iter().enumerate() {
+                    let expected = scene.nearest(ray).unwrap_or(Hit::MISS);
+                    assert_eq!(bits(&hits[i]), bits(&expected), "{isa}, {level} {beyond}: {ray:?}");
+                    assert_eq!(any[i], expected.is_hit(), "{isa}, {level} {beyond}: {ray:?}");
+                }
+            }
+        }
+    }
+    assert_eq!(later, 15, "the triangle above is hit");
+    Hinted::Measured.choose();
+    Isa::best().choose().expect("the best is available");
+}
+
 #[test]
 fn free_directions_on_a_grid_and_far_from_the_origin_change_no_answer() {
     let mut on_grid = CompileOptions::default();
@@ -180,11 +232,13 @@ fn free_directions_of_instances_change_no_answer() {
     let _turn = turn();
     let model = torus_knot(2000);
     let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
-    let object = with_free_directions(&model, CompileOptions::default(), KeepFree::All);
+    let objects = [KeepFree::All, KeepFree::Distances]
+        .map(|keep| with_free_directions(&model, CompileOptions::default(), keep));
     let mut rng = Rng::new(5);
     // One visible instance has a way of its own.
-    for count in [1, 3, 24] {
-        let (scene, transforms) = instances_of(&object, count, 21 + count as u64);
+    for (i, count) in [1, 3, 24, 1, 3, 24].into_iter().enumerate() {
+        let object = &objects[i / 3];
+        let (scene, transforms) = instances_of(object, count, 21 + count as u64);
         let (mut rays, mut from) = (Vec::new(), Vec::new());
         let single = rays_of_which_many_end(&corners, 22);
         let parallel = parallel_rays(&corners, 300, 23);

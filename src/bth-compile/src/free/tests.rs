@@ -171,7 +171,8 @@ fn a_solid_that_is_inside_out_is_free_on_the_back() {
     // On the back nothing is met at all; where before the front nothing is met up to some distance, that may be told instead.
     let free = free_of(&mesh);
     let is_open = |t: usize| free.bins(t).0 & FreeBins::ALL == FreeBins::ALL;
-    let is_told = |t: usize| if free.bins(t).is_back() { is_open(t) } else { free.directions[t].sectors != 0 };
+    let is_told =
+        |t: usize| if free.bins(t).is_back() { is_open(t) } else { free.directions[t].sectors != 0 };
     assert!((0..free.directions.len()).all(is_told));
     let distances = found(&mesh, KeepFree::Distances).0.distances;
     assert!(distances.iter().all(|row| row.sectors[1] == u32::MAX && row.sectors[0] != u32::MAX));

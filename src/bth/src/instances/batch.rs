@@ -33,13 +33,13 @@ const MIN_RAYS_PER_INSTANCE: usize = 256;
 trait SceneQuery {
     /// The answers so far.
     fn progress(&self) -> Progress<'_>;
-    /// Traces the visits of one object. `object_rays` is memory for their rays in its space.
+    /// Traces the visits of one object, given memory for their rays in its space, and what is known of where they start.
     fn trace(
         &mut self,
         batch: &SceneBatch<'_>,
         object: &ObjectView<'_>,
         visits: &[Visit],
-        object_rays: &mut ObjectRays,
+        memory: (&mut ObjectRays, &FreeStarts),
     );
 }
 
@@ -250,11 +250,11 @@ impl World {
 
     /// Traces all queued visits, object by object, and empties the queue.
     fn trace(&self, batch: &SceneBatch<'_>, query: &mut dyn SceneQuery, active_rays: &mut ActiveRays) {
-        let ActiveRays { visits, object_rays, .. } = active_rays;
+        let ActiveRays { visits, object_rays, free_starts, .. } = active_rays;
         self.by_object(visits, |object, visits| {
             self.mark_traced(object);
             let object = batch.objects.view(object);
-            query.trace(batch, object, visits, object_rays);
+            query.trace(batch, object, visits, (object_rays, free_starts));
         });
         visits.clear();
     }
@@ -314,7 +314,7 @@ impl SceneQuery for SceneNearest<'_> {
         batch: &SceneBatch<'_>,
         object: &ObjectView<'_>,
         visits: &[Visit],
-        object_rays: &mut ObjectRays,
+        (object_rays, free_starts): (&mut ObjectRays, &FreeStarts),
     ) {
         if visits.len() < object::MIN_BATCH {
             for &visit in visits {
@@ -328,6 +328,7 @@ impl SceneQuery for SceneNearest<'_> {
             return;
         }
         object_rays.fill(batch, !object.tet_leaves.is_empty(), visits, self.progress());
+        free_starts.begin_later(visits, &mut object_rays.rays);
         let answers = nearest_answers(self.hits);
         trace_visits::<NearestQuery>(batch, object, (visits, object_rays), self.scratch, answers);
     }
@@ -348,7 +349,7 @@ impl SceneQuery for SceneAny<'_> {
         batch: &SceneBatch<'_>,
         object: &ObjectView<'_>,
         visits: &[Visit],
-        object_rays: &mut ObjectRays,
+        (object_rays, free_starts): (&mut ObjectRays, &FreeStarts),
     ) {
         if visits.len() < object::MIN_BATCH {
             for &visit in visits {
@@ -359,6 +360,7 @@ impl SceneQuery for SceneAny<'_> {
             return;
         }
         object_rays.fill(batch, !object.tet_leaves.is_empty(), visits, self.progress());
+        free_starts.begin_later(visits, &mut object_rays.rays);
         let answers = any_answers(self.found);
         trace_visits::<AnyQuery>(batch, object, (visits, object_rays), self.scratch, answers);
     }

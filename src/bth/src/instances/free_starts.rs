@@ -14,7 +14,7 @@ use crate::free::{self, Rest};
 use crate::object::Hinted;
 use crate::objects::Objects;
 use crate::query::sink::Visit;
-use crate::rays::PrimitiveRef;
+use crate::rays::{PrimitiveRef, Ray};
 use crate::simd::Isa;
 use bth_format::layout::{Child, NONE};
 use std::ops::Range;
@@ -29,6 +29,11 @@ pub(super) struct FreeStarts {
     free: Vec<Visit>,
     /// By index in the chunk, whether a ray meets nothing at all. Empty if that is known of none.
     meets_nothing: Vec<bool>,
+    /// Rays that hit the instance on which they start only behind their `tmin`: by index in the chunk that instance, or `NONE`, and the t
+    /// in its space from which on. Empty if that is known of none.
+    later: Vec<(u32, f32)>,
+    /// Index in the batch of the first ray of the chunk.
+    first: usize,
     visits: VisitQueue,
     object_rays: ObjectRays,
     rest: Rest,
@@ -69,11 +74,25 @@ impl FreeStarts {
         self.meets_nothing.get(index).copied().unwrap_or(false)
     }
 
+    /// Lets the ranges of rays in the space of an object, given with their visits, begin where they can hit anything.
+    pub(super) fn begin_later(&self, visits: &[Visit], rays: &mut [Ray]) {
+        if self.later.is_empty() {
+            return;
+        }
+        for (visit, ray) in visits.iter().zip(rays) {
+            let (instance, begin) = self.later[visit.ray as usize - self.first];
+            let is_later = instance == visit.instance && begin > ray.tmin;
+            ray.tmin = if is_later { begin } else { ray.tmin };
+        }
+    }
+
     /// Decides the rays of a chunk.
     pub(super) fn find(&mut self, batch: &SceneBatch<'_>, chunk: Range<usize>) {
-        let FreeStarts { not_met, free, meets_nothing, visits, object_rays, rest } = self;
+        let FreeStarts { not_met, free, meets_nothing, later, first, visits, object_rays, rest } = self;
         not_met.clear();
         meets_nothing.clear();
+        later.clear();
+        *first = chunk.start;
         let Some(from) = batch.hints() else { return };
         visits.clear();
         let mut starts = Starts::new(batch.world, batch.objects);
@@ -94,15 +113,20 @@ impl FreeStarts {
                 object,
                 &object_rays.rays,
                 &object_rays.from,
-                (Hinted::are_forced(), false),
+                (Hinted::are_forced(), true),
                 rest,
             ) {
                 let place = |visit: &Visit| visit.ray as usize - chunk.start;
                 for visit in visits {
                     not_met[place(visit)] = visit.instance;
                 }
+                if later.is_empty() {
+                    later.resize(chunk.len(), (NONE, 0.0));
+                }
                 for index in &rest.order {
-                    not_met[place(&visits[*index as usize])] = NONE;
+                    let visit = &visits[*index as usize];
+                    not_met[place(visit)] = NONE;
+                    later[place(visit)] = (visit.instance, rest.rays[*index as usize].tmin);
                 }
                 // Which rays are left is not predictable, so there is no branch.
                 let mut count = free.len();

@@ -38,7 +38,7 @@ const LINK32: Kind = Kind {
 
 /// The structures. The default file comes first, then the plain BVH, which also finds the hits that secondary rays start
 /// from.
-pub const KINDS: [Kind; 8] = [
+pub const KINDS: [Kind; 9] = [
     Kind { name: "bth", structure: Structure::Bth, ..LINK32 },
     Kind { name: "bvh", structure: Structure::Bvh, ..LINK32 },
     Kind { name: "tets link32", ..LINK32 },
@@ -47,6 +47,7 @@ pub const KINDS: [Kind; 8] = [
     Kind { name: "tets tet16", record: RecordKind::Tet16, ..LINK32 },
     Kind { name: "bvh 8-bit boxes", structure: Structure::Bvh, boxes: Boxes::Bytes, ..LINK32 },
     Kind { name: "bvh free", structure: Structure::Bvh, free: KeepFree::All, ..LINK32 },
+    Kind { name: "bvh distances", structure: Structure::Bvh, free: KeepFree::Distances, ..LINK32 },
 ];
 
 /// The default file.

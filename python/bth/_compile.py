@@ -30,7 +30,8 @@ def compile(
 
     All other options are those of `bthc compile`. `structure` is 'bvh' by default, since the package has no worker for tetrahedra.
     attributes ('normals', 'all'), alpha ('mask', 'blend'), names and materials (True) keep what models in files have of these.
-    deformable: keeps what `Scene.set_positions` needs. free_directions ('auto', 'all') keeps in which directions rays from a triangle meet nothing.
+    deformable: keeps what `Scene.set_positions` needs. free_directions ('auto', 'distances', 'all') keeps in which directions rays from a
+    triangle meet nothing, and up to which distance.
     """
     options = {name: value for name, value in locals().items() if name != "model" and value is not None}
     if isinstance(model, (str, os.PathLike)):

@@ -41,7 +41,7 @@ def path(tmp_path):
 @pytest.mark.parametrize("options", [
     {}, {"names": True, "attributes": "all"}, {"attributes": "normals", "geometry": False}, {"coordinates": 16, "boxes": 8},
     {"max_error": "0.01%"}, {"quality": "best", "threads": 1}, {"alpha": "blend"}, {"deformable": True, "poses": 2, "segments": 1},
-    {"free_directions": "all", "free_reach": 0.25}, {"max_bytes_per_triangle": 500.0, "memory": 100},
+    {"free_directions": "all", "free_reach": 0.25}, {"free_directions": "distances"}, {"max_bytes_per_triangle": 500.0, "memory": 100},
 ])
 def test_bytes_of_the_program(path, options):
     command = [BTHC, "compile", path, "-o", path.with_suffix(".bth"), "--structure", "bvh", "--no-cache", "--quiet"]

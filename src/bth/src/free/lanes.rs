@@ -73,7 +73,9 @@ impl<R: Row> Kernel for FreeKernel<'_, '_, R> {
         let mut starts = [Starts::NONE; 2];
         let mut index = [0; LANES];
         let mut count_later = 0;
-        rest.reserve(range.len() + LANES);
+        // Sixteen indices are stored at once, of which those that are left count.
+        let mut end = rest.len();
+        rest.resize(end + range.len() + LANES, 0);
         let (blocks, _) = from[range.clone()].as_chunks::<LANES>();
         let mut ahead = [hints(s, blocks, 0), hints(s, blocks, 1)];
         ahead[0].prefetch_rows(s, rows);
@@ -87,7 +89,7 @@ impl<R: Row> Kernel for FreeKernel<'_, '_, R> {
                 let ray = range.start + (i + 1) * LANES + line * RAYS_PER_CACHE_LINE;
                 s.prefetch(rays.as_ptr().wrapping_add(ray));
             }
-            starts[i % 2].fetch(object, rows, &ahead[0]);
+            starts[i % 2].fetch(s, object, rows, &ahead[0]);
             ahead = [ahead[1], next];
             let Some(before) = i.checked_sub(1) else { continue };
             let first = range.start + before * LANES;
@@ -101,17 +103,22 @@ impl<R: Row> Kernel for FreeKernel<'_, '_, R> {
             }
             let mut left = [0; LANES];
             let count = s.compress(!ended & 0xffff, s.load_u(&index), &mut left);
-            rest.extend_from_slice(&left[..count]);
+            if let Some(to) = rest[end..].first_chunk_mut() {
+                *to = left;
+            }
+            end += count;
             if let Some(to) = later.get_mut(first..).and_then(<[Ray]>::first_chunk_mut::<LANES>) {
                 let mut begins = [0.0; LANES];
                 s.store(begin, &mut begins);
+                *to = *chunk;
                 for lane in 0..LANES {
-                    to[lane] = Ray { tmin: begins[lane], ..chunk[lane] };
+                    to[lane].tmin = begins[lane];
                 }
             }
             let is_later = s.mask_bits(s.lt(fields[3], begin)) & !ended;
             count_later += is_later.count_ones() as usize;
         }
+        rest.truncate(end);
         rest.extend((range.start + blocks.len() * LANES) as u32..range.end as u32);
         count_later
     }

@@ -6,6 +6,21 @@ use crate::simd::{LANES, Simd};
 use bth_format::layout::{Child, FreePlace};
 use bth_format::object::{NodeBase, ObjectView};
 
+/// The lanes.
+static LANE: [u32; LANES] = before(0);
+/// For each lane the one that is 1, 2, 4 and 8 lanes before it, or the first.
+static BEFORE: [[u32; LANES]; 4] = [before(1), before(2), before(4), before(8)];
+
+const fn before(distance: usize) -> [u32; LANES] {
+    let mut lanes = [0; LANES];
+    let mut lane = distance;
+    while lane < LANES {
+        lanes[lane] = (lane - distance) as u32;
+        lane += 1;
+    }
+    lanes
+}
+
 /// The triangles on which sixteen rays start.
 #[derive(Clone, Copy)]
 pub(super) struct Hints<'a> {
@@ -17,9 +32,8 @@ pub(super) struct Hints<'a> {
 impl<'a> Hints<'a> {
     #[inline(always)]
     pub(super) fn new<S: Simd>(s: S, triangle: &'a [u32; LANES]) -> Self {
-        static BEFORE: [u32; LANES] = [0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14];
         let of = s.load_u(triangle);
-        let same = s.mask_bits(s.eq_u(of, s.lookup_u(of, s.load_u(&BEFORE))));
+        let same = s.mask_bits(s.eq_u(of, s.lookup_u(of, s.load_u(&BEFORE[0]))));
         Hints { triangle, new: !same & 0xffff | 1 }
     }
 
@@ -76,19 +90,32 @@ impl Starts {
 
     /// Reads the triangles.
     #[inline(always)]
-    pub(super) fn fetch<R: Row>(&mut self, object: &ObjectView<'_>, rows: &[R], hints: &Hints<'_>) {
+    pub(super) fn fetch<S: Simd, R: Row>(
+        &mut self,
+        s: S,
+        object: &ObjectView<'_>,
+        rows: &[R],
+        hints: &Hints<'_>,
+    ) {
         let (mut new, base) = (hints.new, object.node_base());
         self.is_expanded = new == 0xffff;
+        self.set_columns(s, new);
         while new != 0 {
             let lane = new.trailing_zeros() as usize % LANES;
             new &= new - 1;
             self.set((object, base), rows.get(hints.triangle[lane] as usize), lane);
         }
-        let mut column = 0;
-        for lane in 0..LANES as u32 {
-            column = if hints.new >> lane & 1 != 0 { lane } else { column };
-            self.column[lane as usize] = column;
+    }
+
+    /// Sets the columns: the last lane up to each whose bit is set.
+    #[inline(always)]
+    fn set_columns<S: Simd>(&mut self, s: S, new: u32) {
+        let mut column = s.select_u(s.mask(new), s.load_u(&LANE), s.splat_u(0));
+        for before in &BEFORE {
+            let other = s.lookup_u(column, s.load_u(before));
+            column = s.select_u(s.lt_u(column, other), other, column);
         }
+        s.store_u(column, &mut self.column);
     }
 
     #[inline(always)]

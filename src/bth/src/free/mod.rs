@@ -135,7 +135,7 @@ fn one_by_one(
             count += usize::from(begin > ray.tmin);
         }
         if let Some(to) = later.get_mut(index) {
-            *to = if begin.is_finite() { Ray { tmin: begin, ..ray } } else { ray };
+            *to = Ray { tmin: if may_hit { begin } else { f32::INFINITY }, ..ray };
         }
     }
     count

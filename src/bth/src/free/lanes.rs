@@ -1,8 +1,7 @@
 //! The decision about sixteen rays at a time, in f32.
 
 use super::crossings::{Crossings, SLACK};
-use super::rows::Row;
-use super::starts::{Hints, Starts};
+use super::starts::{Hints, Row, Starts};
 use crate::intersect::prepare::{load_rays, pick_rays};
 use crate::rays::{RAYS_PER_CACHE_LINE, Ray};
 use crate::simd::{Kernel, LANES, Lanewise, Simd};

@@ -15,7 +15,6 @@
 
 mod crossings;
 mod lanes;
-mod rows;
 mod single;
 mod starts;
 
@@ -24,7 +23,7 @@ use crate::simd::{Isa, LANES};
 use bth_format::layout::{Child, FreePlace};
 use bth_format::object::ObjectView;
 use lanes::FreeKernel;
-use rows::Row;
+use starts::Row;
 use std::ops::Range;
 
 /// Whether the file knows of free directions of an object.

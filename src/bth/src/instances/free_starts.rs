@@ -10,6 +10,7 @@ use super::enter_object::ObjectRays;
 use super::progress::Progress;
 use super::scene_batch::SceneBatch;
 use super::visit_queue::VisitQueue;
+use crate::SMALL;
 use crate::free::{self, Rest};
 use crate::object::Hinted;
 use crate::objects::Objects;
@@ -43,13 +44,13 @@ impl FreeStarts {
     /// The instance that a ray of the chunk does not meet, or `NONE`.
     #[inline(always)]
     pub(super) fn not_met(&self, index: usize) -> u32 {
-        self.not_met.get(index).copied().unwrap_or(NONE)
+        if SMALL { NONE } else { self.not_met.get(index).copied().unwrap_or(NONE) }
     }
 
     /// Of some rays, a bit each from the index `first` on, those that may meet an instance.
     #[inline(always)]
     pub(super) fn that_may_meet(&self, instance: u32, first: usize, rays: u64) -> u64 {
-        if self.not_met.is_empty() {
+        if SMALL || self.not_met.is_empty() {
             return rays;
         }
         let (mut rest, mut may_meet) = (rays, rays);
@@ -65,7 +66,7 @@ impl FreeStarts {
 
     /// Whether it is known of any ray that it meets nothing at all.
     pub(super) fn any_meets_nothing(&self) -> bool {
-        !self.meets_nothing.is_empty()
+        !SMALL && !self.meets_nothing.is_empty()
     }
 
     /// Whether it is known of a ray of the chunk that it meets nothing at all.
@@ -76,7 +77,7 @@ impl FreeStarts {
 
     /// Lets the ranges of rays in the space of an object, given with their visits, begin where they can hit anything.
     pub(super) fn begin_later(&self, visits: &[Visit], rays: &mut [Ray]) {
-        if self.later.is_empty() {
+        if SMALL || self.later.is_empty() {
             return;
         }
         for (visit, ray) in visits.iter().zip(rays) {
@@ -88,6 +89,9 @@ impl FreeStarts {
 
     /// Decides the rays of a chunk.
     pub(super) fn find(&mut self, batch: &SceneBatch<'_>, chunk: Range<usize>) {
+        if SMALL {
+            return;
+        }
         let FreeStarts { not_met, free, meets_nothing, later, first, visits, object_rays, rest } = self;
         not_met.clear();
         meets_nothing.clear();

@@ -47,10 +47,13 @@ pub fn every_structure(model: &Model, whole: bool) -> Vec<Traced> {
     packed.coordinates.boxes = Boxes::Bytes;
     let mut free = bvh.clone();
     free.free.keep = KeepFree::All;
+    let mut distances = bvh.clone();
+    distances.free.keep = KeepFree::Distances;
     let mut wanted = vec![
         ("bvh".to_string(), bvh),
         ("bvh of packed nodes".to_string(), packed),
         ("bvh with free directions".to_string(), free),
+        ("bvh with free distances".to_string(), distances),
     ];
     if crate::worker().is_some() {
         for record in RecordKind::ALL {

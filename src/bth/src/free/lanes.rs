@@ -56,7 +56,7 @@ pub(super) struct FreeKernel<'a, 'r, R> {
     pub(super) range: Range<usize>,
     /// Receives the indices of the rays that may meet something.
     pub(super) rest: &'r mut Vec<u32>,
-    /// If not empty: copies of all rays, whose ranges the kernel lets begin later where nothing is hit before.
+    /// Receives copies of the rays, at the same indices, whose ranges begin later where nothing is hit before.
     pub(super) later: &'r mut [Ray],
 }
 

@@ -36,7 +36,7 @@ pub(crate) fn is_known(object: &ObjectView<'_>) -> bool {
 const PROBE: usize = 4 * LANES;
 /// The least share of the rays, one in this many, that must end for the look-up to cost less than it saves.
 const LEAST: usize = 6;
-/// What a ray that begins later counts, as a part of one that ends.
+/// So many rays that begin later save as much as one that ends.
 const LATER: usize = 3;
 
 /// The rays of a batch that may meet something.
@@ -48,24 +48,18 @@ pub(crate) struct Rest {
     pub(crate) rays: Vec<Ray>,
 }
 
-/// Finds the rays in object space that may meet something, and from where on where that is `later`. `from` holds for each ray the triangle
-/// on which it starts, or `NONE`. False if so little would be saved that all of them are to be traced as they are, unless the look-up is
-/// `forced`.
+/// Finds the rays in object space that may meet something, and from where on. `from` holds for each ray the triangle on which it starts,
+/// or `NONE`. False if so little would be saved that all of them are to be traced as they are, unless the look-up is `forced`.
 pub(crate) fn find_rest(
     object: &ObjectView<'_>,
     rays: &[Ray],
     from: &[u32],
-    (forced, later): (bool, bool),
+    forced: bool,
     rest: &mut Rest,
 ) -> bool {
     rest.order.clear();
-    if later {
-        // What was there before is overwritten.
-        rest.rays.resize(rays.len(), Ray::new([0.0; 3], [0.0; 3]));
-        rest.rays.truncate(rays.len());
-    } else {
-        rest.rays.clear();
-    }
+    // What was there before is overwritten.
+    rest.rays.resize(rays.len(), Ray::new([0.0; 3], [0.0; 3]));
     let saves =
         |rays: usize, rest: usize, later: usize| (LATER * (rays - rest) + later) * LEAST >= LATER * rays;
     let (probe, mut later) = (if forced { 0 } else { PROBE.min(rays.len()) }, 0);
@@ -104,10 +98,8 @@ fn decide_by<R: Row>(
 ) -> usize {
     let (later, rest) = (&mut rest.rays[..], &mut rest.order);
     // The last rays that are less than a group are copied as they are.
-    if !later.is_empty() {
-        let lanes = range.start + range.len() / LANES * LANES;
-        later[lanes..range.end].copy_from_slice(&rays[lanes..range.end]);
-    }
+    let groups_end = range.start + range.len() / LANES * LANES;
+    later[groups_end..range.end].copy_from_slice(&rays[groups_end..range.end]);
     let kernel = FreeKernel { object, rows, rays, from, range, rest, later };
     // `run_wide` returns the kernel in scalar code.
     match Isa::chosen().run_wide(kernel) {
@@ -133,9 +125,7 @@ fn one_by_one(
             rest.push(index as u32);
             count += usize::from(begin > ray.tmin);
         }
-        if let Some(to) = later.get_mut(index) {
-            *to = Ray { tmin: if may_hit { begin } else { f32::INFINITY }, ..ray };
-        }
+        later[index] = Ray { tmin: if may_hit { begin } else { f32::INFINITY }, ..ray };
     }
     count
 }

@@ -113,13 +113,7 @@ impl FreeStarts {
         batch.world.by_object(visits, |object, visits| {
             let object = batch.objects.view(object);
             object_rays.fill(batch, true, visits, Progress::None);
-            if free::find_rest(
-                object,
-                &object_rays.rays,
-                &object_rays.from,
-                (Hinted::are_forced(), true),
-                rest,
-            ) {
+            if free::find_rest(object, &object_rays.rays, &object_rays.from, Hinted::are_forced(), rest) {
                 let place = |visit: &Visit| visit.ray as usize - chunk.start;
                 for visit in visits {
                     not_met[place(visit)] = visit.instance;

@@ -94,7 +94,7 @@ fn trace_from<Q: Query>(
         with_hints(from, instance, scratch, |hints, scratch| {
             let mut rest = std::mem::take(&mut scratch.rest);
             if strategy == Strategy::Bvh
-                || !free::find_rest(object, rays, hints, (Hinted::are_forced(), true), &mut rest)
+                || !free::find_rest(object, rays, hints, Hinted::are_forced(), &mut rest)
             {
                 trace(rays, Some(hints), scratch, answers);
             } else if (rays.len() - rest.order.len()) * FEW_ENDED <= rays.len() {

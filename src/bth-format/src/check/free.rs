@@ -14,7 +14,7 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
     // Where both are not 0, the sum is too great.
     if !is_right(directions) || !is_right(directions + distances) {
         let expected = text!("{triangles} rows in one section, or none");
-        let (kind, found) = (kind::FREE_DIRECTIONS, text!("{}", directions + distances));
+        let (kind, found) = (view.free_kind().0, text!("{}", directions + distances));
         return Err(Error::within(Code::FreeRows, kind, 0, expected, found));
     }
     let levels = view.free_levels;

@@ -12,6 +12,10 @@ const LEAST_T: f32 = 1.0 / (1u128 << 80) as f32;
 pub(super) const SLACK: f32 = 1.0 / (1 << 20) as f32;
 /// Column of directions that are too steep.
 pub(super) const NO_COLUMN: u32 = LANES as u32 - 1;
+/// What is lost where the products of a term underflow, also if the caller has denormal numbers flushed to zero: that of eight.
+const UNDERFLOW: f32 = 8.0 * f32::MIN_POSITIVE;
+/// The bit of the sign of an f32.
+const SIGN: u32 = 1 << 31;
 /// Unit of rounding.
 const U: f32 = f32::EPSILON / 2.0;
 
@@ -29,59 +33,76 @@ pub(super) struct Crossings<S: Lanewise> {
 impl<S: Lanewise> Crossings<S> {
     /// The crossings of rays, whose floats are `fields`, with triangles, whose corners are by corner and axis.
     ///
-    /// Derivation: as in the f64 decision about one ray ([`super::single`]), whose bounds these are with the unit of f32; terms with
-    /// `MIN_POSITIVE` bound what underflows. Triangles without an area are not certainly crossed, whatever the rounding errors.
+    /// With the first corner r relative to the origin, the edges e and f at it and the moment m = r×d, the line of direction d crosses the plane
+    /// at t = r·(e×f) / d·(e×f), and passes each edge on the side that the sign of one of b = f·m, c = -e·m and a = d·(e×f) - b - c says. These
+    /// have the same sign if it crosses the triangle.
+    ///
+    /// Errors, in units of rounding u, where no component of r, e and f is greater than `far` and `size` is the sum of those of d: r, e and f
+    /// are rounded once. A component of m is off by 3.1u of its terms, so b and c by 3.1 + 1 + 4 of theirs, which are at most 2·far²·size
+    /// together: 17u·far²·size. A component of e×f is off by 4.1u of its terms, 8.2u·far², so d·(e×f) by 17u·far²·size, too, and a, for two more
+    /// roundings of at most 4 and 6 far²·size, by 61u·far²·size. The volume is off by (25 + 30)u·far³. Terms with `UNDERFLOW` bound
+    /// what underflows. Triangles without an area are not certainly crossed, whatever the rounding errors.
     #[inline(always)]
     pub(super) fn new(s: S, corners: &[[[f32; LANES]; 3]; 3], fields: [S::F; 8]) -> Self {
         let [ox, oy, oz, tmin, dx, dy, dz, _] = fields;
         let (o, d) = ([ox, oy, oz], [dx, dy, dz]);
         let zero = s.splat(0.0);
-        let mut p = [[zero; 3]; 3];
-        let mut r = [[zero; 3]; 3];
-        let mut far = zero;
-        for corner in 0..3 {
-            for k in 0..3 {
-                p[corner][k] = s.load(&corners[corner][k]);
-                r[corner][k] = s.sub(p[corner][k], o[k]);
-                far = s.max_abs(far, r[corner][k]);
-            }
+        let (mut r, mut e, mut f, mut far) = ([zero; 3], [zero; 3], [zero; 3], zero);
+        for k in 0..3 {
+            let first = s.load(&corners[0][k]);
+            r[k] = s.sub(first, o[k]);
+            e[k] = s.sub(s.load(&corners[1][k]), first);
+            f[k] = s.sub(s.load(&corners[2][k]), first);
+            far = s.max_abs(s.max_abs(far, r[k]), s.max_abs(e[k], f[k]));
         }
-        let size = s.add(s.add(s.abs(dx), s.abs(dy)), s.abs(dz));
-        let least = s.splat(f32::MIN_POSITIVE);
+        let sizes = [s.abs(dx), s.abs(dy), s.abs(dz)];
+        let size = s.add(s.add(sizes[0], sizes[1]), sizes[2]);
+        let normal = cross(s, e, f);
+        let height = dot(s, d, normal);
+        let moment = cross(s, r, d);
+        let b = dot(s, f, moment);
+        let minus_c = dot(s, e, moment);
+        let a = s.add(s.sub(height, b), minus_c);
+
+        let least = s.splat(UNDERFLOW);
         let square = s.mul(far, far);
         // One is added before products with `least`, which would be denormal.
         let one = s.splat(1.0);
-        let side_error = s.fma(s.mul(square, size), s.splat(20.0 * U), s.mul(s.add(size, one), least));
-        let normal = cross(s, r[1], r[2]);
-        let a = dot(s, d, normal);
-        let b = dot(s, d, cross(s, r[2], r[0]));
-        let c = dot(s, d, cross(s, r[0], r[1]));
-        let above = s.and(s.and(s.lt(side_error, a), s.lt(side_error, b)), s.lt(side_error, c));
-        let minus = s.sub(zero, side_error);
-        let below = s.and(s.and(s.lt(a, minus), s.lt(b, minus)), s.lt(c, minus));
+        let underflow = s.mul(s.add(s.add(size, far), one), least);
+        let side_error = s.fma(s.mul(square, size), s.splat(64.0 * U), underflow);
+        let sign = s.and_u(s.bits(height), s.splat_u(SIGN));
+        let opposite = s.xor_u(sign, s.splat_u(SIGN));
+        let others = s.min(negate(s, b, sign), negate(s, minus_c, opposite));
+        // `a` is NaN where any of the three is.
+        let crosses = s.lt(side_error, s.min(others, negate(s, a, sign)));
 
-        let volume = dot(s, r[0], normal);
-        let volume = s.select(above, volume, s.sub(zero, volume));
+        let volume = negate(s, dot(s, r, normal), sign);
         let volume_error =
             s.fma(s.mul(square, far), s.splat(64.0 * U), s.mul(s.fma(far, s.splat(3.0), one), least));
-        let sum = s.abs(s.add(s.add(a, b), c));
-        let sum_error = s.fma(side_error, s.splat(4.0), s.mul(sum, s.splat(8.0 * U)));
+        let height_size = s.abs(height);
         let first = s.sub(tmin, s.fma(s.abs(tmin), s.splat(SLACK), s.splat(LEAST_T)));
-        let bound = s.sub(s.fnma(s.abs(first), sum_error, s.mul(first, sum)), least);
+        let bound = s.sub(s.fnma(s.abs(first), side_error, s.mul(first, height_size)), least);
         let before = s.lt(s.add(volume, volume_error), bound);
 
-        let least_sum = s.sub(sum, sum_error);
-        let start = s.div(s.min(s.sub(volume, volume_error), zero), least_sum);
-        let greatest = s.max_abs(s.max_abs(dx, dy), dz);
+        let least_height = s.sub(height_size, side_error);
+        let start = s.div(s.min(s.sub(volume, volume_error), zero), least_height);
+        let greatest = s.max(s.max(sizes[0], sizes[1]), sizes[2]);
         let is_usual = s.and(s.lt(s.splat(DIRECTIONS[0]), greatest), s.lt(greatest, s.splat(DIRECTIONS[1])));
-        let usable = s.and(s.and(s.lt(zero, least_sum), before), is_usual);
+        let usable = s.and(s.and(s.lt(zero, least_height), before), s.and(is_usual, crosses));
+        let upwards = s.lt(zero, height);
         Crossings {
-            front: s.mask_bits(s.and(above, usable)),
-            back: s.mask_bits(s.and(below, usable)),
+            front: s.mask_bits(s.and(usable, upwards)),
+            back: s.mask_bits(s.and_not(usable, upwards)),
             start,
-            columns: columns(s, &p, d),
+            columns: columns(s, [e, normal], d, height),
         }
     }
+}
+
+/// The negative where the bit of the sign is set in `sign`, which has no other bits.
+#[inline(always)]
+fn negate<S: Lanewise>(s: S, a: S::F, sign: S::U) -> S::F {
+    s.floats(s.xor_u(s.bits(a), sign))
 }
 
 #[inline(always)]
@@ -98,28 +119,22 @@ fn cross<S: Lanewise>(s: S, a: [S::F; 3], b: [S::F; 3]) -> [S::F; 3] {
     ]
 }
 
-/// The columns and rows of the bins of directions ([`bth_format::layout::free_bin`]), or [`NO_COLUMN`] for both.
+/// The columns and rows of the bins of directions d ([`bth_format::layout::free_bin`]), or [`NO_COLUMN`] for both, given the first edge, the
+/// normal and their product with d.
 ///
 /// The errors of the axes are 5 units of the lengths of the edges, those of their products with a direction a few more: relative to
 /// the normal, which is at least 1/128 of the product of the edges, less than 2^-13, a sixteenth of the margin. For edges and
 /// directions in their ranges nothing overflows, and what underflows is less than that.
 #[inline(always)]
-fn columns<S: Lanewise>(s: S, corners: &[[S::F; 3]; 3], d: [S::F; 3]) -> [S::U; 2] {
-    let zero = s.splat(0.0);
-    let (mut e, mut f) = ([zero; 3], [zero; 3]);
-    for k in 0..3 {
-        e[k] = s.sub(corners[1][k], corners[0][k]);
-        f[k] = s.sub(corners[2][k], corners[0][k]);
-    }
-    let normal = cross(s, e, f);
-    let per_height = s.div(s.splat(1.0), dot(s, d, normal));
+fn columns<S: Lanewise>(s: S, [e, normal]: [[S::F; 3]; 2], d: [S::F; 3], height: S::F) -> [S::U; 2] {
+    let per_height = s.div(s.splat(1.0), height);
     let per_square = s.div(s.splat(1.0), dot(s, e, e));
     let x = s.mul(dot(s, d, e), per_height);
     let y = s.mul(dot(s, d, cross(s, normal, e)), per_height);
     // Squares of the slopes. Signs are those of the components, not of the slopes, which are negated on the back.
     let x_square = s.mul(s.mul(s.mul(x, x), per_square), dot(s, normal, normal));
     let y_square = s.mul(s.mul(y, y), per_square);
-    let upwards = s.lt(zero, per_height);
+    let upwards = s.lt(s.splat(0.0), height);
     let flat = s.and(s.lt(x_square, s.splat(STEEPEST)), s.lt(y_square, s.splat(STEEPEST)));
     let none = s.splat_u(NO_COLUMN);
     [

@@ -108,8 +108,7 @@ impl<R: Row> Kernel for FreeKernel<'_, '_, R> {
             end += count;
             if let Some(to) = later.get_mut(first..).and_then(<[Ray]>::first_chunk_mut::<LANES>) {
                 let mut begins = [0.0; LANES];
-                // What has ended has no range.
-                s.store(s.select(s.mask(ended), s.splat(f32::INFINITY), begin), &mut begins);
+                s.store(begin, &mut begins);
                 *to = *chunk;
                 for lane in 0..LANES {
                     to[lane].tmin = begins[lane];

@@ -13,6 +13,8 @@
 //!
 //! Only batches look directions up: for a single ray that takes as long as tracing it (docs/notes/free-directions.md).
 
+#[cfg(test)]
+mod crossing_tests;
 mod crossings;
 mod lanes;
 mod single;
@@ -44,7 +46,7 @@ const LATER: usize = 3;
 pub(crate) struct Rest {
     /// Their indices, ascending.
     pub(crate) order: Vec<u32>,
-    /// Copies of all rays of the batch, whose ranges begin later where nothing is hit before.
+    /// Copies of all rays of the batch, whose ranges begin later where nothing is hit before. Those that have ended hit nothing, either.
     pub(crate) rays: Vec<Ray>,
 }
 
@@ -125,7 +127,7 @@ fn one_by_one(
             rest.push(index as u32);
             count += usize::from(begin > ray.tmin);
         }
-        later[index] = Ray { tmin: if may_hit { begin } else { f32::INFINITY }, ..ray };
+        later[index] = Ray { tmin: if begin == f32::INFINITY { ray.tmin } else { begin }, ..ray };
     }
     count
 }

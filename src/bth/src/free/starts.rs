@@ -109,29 +109,29 @@ impl<'a> Hints<'a> {
     }
 }
 
-/// What the file knows of the triangles on which sixteen rays start.
+/// What the file knows of the triangles on which sixteen rays start. Each vector is a cache line, so what is shorter comes last.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub(super) struct Starts {
     /// For each ray the column of its triangle: the first ray that starts there.
     column: [u32; LANES],
-    /// Whether all rays have columns of their own.
-    is_expanded: bool,
     /// Corners of the triangles, by corner and axis. Triangles of which nothing is known have no area.
     pub(super) corners: [[[f32; LANES]; 3]; 3],
     /// The words of their bins.
     pub(super) bins: [[u32; LANES]; 4],
     /// The sectors of their fronts and backs.
     pub(super) sectors: [[u32; LANES]; 2],
+    /// Whether all rays have columns of their own.
+    is_expanded: bool,
 }
 
 impl Starts {
     pub(super) const NONE: Starts = Starts {
         column: [0; LANES],
-        is_expanded: false,
         corners: [[[0.0; LANES]; 3]; 3],
         bins: [[0; LANES]; 4],
         sectors: [[0; LANES]; 2],
+        is_expanded: false,
     };
 
     /// Reads the triangles.

@@ -15,7 +15,7 @@ use crate::simd::{Isa, Kernel, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 
-/// Where at most one in this many rays has ended, all are traced: those that have ended take little time, since their ranges are empty.
+/// Where at most one in this many rays has ended, all are traced: packets without gaps save more.
 const FEW_ENDED: usize = 8;
 
 /// Computes the nearest hits of rays in object space, through the instance with the given index. `from` holds for each ray where it

@@ -28,7 +28,8 @@ def compile(
     progress: is called with the name of the stage, the units done and the units in all or None; an exception from it cancels.
     threads: by default one for each processor; the result does not depend on it.
 
-    All other options are those of `bthc compile`. `structure` is 'bvh' by default, since the package has no worker for tetrahedra.
+    All other options are those of `bthc compile`. `structure` is 'bvh' by default, since the package has no worker for tetrahedra, and
+    free_directions is 'none'.
     attributes ('normals', 'all'), alpha ('mask', 'blend'), names and materials (True) keep what models in files have of these.
     deformable: keeps what `Scene.set_positions` needs. free_directions ('auto', 'distances', 'all') keeps in which directions rays from a
     triangle meet nothing, and up to which distance.

@@ -86,7 +86,8 @@ fn one_option_redoes_what_depends_on_it_and_says_so() {
     let (hits, misses) = found(&compile(folder.path(), &["a.obj"]));
     assert!(hits.is_empty(), "{hits:?}");
     let tets = misses.contains(&"tets".to_owned());
-    let all: Vec<&str> = ["file", "mesh", "bvh", "marks"].into_iter().chain(tets.then_some("tets")).collect();
+    let all = ["file", "mesh", "bvh", "marks"].into_iter().chain(tets.then_some("tets"));
+    let all: Vec<&str> = all.chain(["free directions"]).collect();
     assert_eq!(misses, all);
 
     let json = compile(folder.path(), &["a.obj", "--tets", "tet16"]);

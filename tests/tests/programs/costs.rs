@@ -45,7 +45,7 @@ fn tracing_reads_no_more_bytes_than_the_limit_and_what_cannot_be_held_is_said() 
     };
     let file = |more: &[&str]| compile(&[&["--json"], more].concat()).json()["report"]["file"].clone();
     let each = |file: &serde_json::Value| file["resident_bytes_per_triangle"].as_f64().unwrap();
-    let plain = each(&file(&["--structure", "bvh"]));
+    let plain = each(&file(&["--structure", "bvh", "--free-directions", "none"]));
     for select in ["best", "paper"] {
         for more in
             [&["--c-tet", "0.001"][..], &["--c-tet", "0.001", "--subtrees", "prune", "--probe", "off"]]
@@ -77,6 +77,32 @@ fn tracing_reads_no_more_bytes_than_the_limit_and_what_cannot_be_held_is_said() 
     let figure = format!("{plain:.1} bytes a triangle");
     assert!(run.stderr.contains("warning") && run.stderr.contains(&figure), "{run:?}");
     assert!(!compile(&["--max-bytes-per-triangle", "1e4"]).stderr.contains("warning"));
+}
+
+#[test]
+fn free_directions_are_kept_by_default_where_they_pay_and_fit() {
+    let folder = folder(&[("ball.obj", &sphere(24))]);
+    let kept = |more: &[&str]| {
+        let args = ["compile", "ball.obj", "-o", "out.bth", "--no-cache", "--json", "--structure", "bvh"];
+        let run = bthc(folder.path(), &[&args[..], more].concat()).expect(0);
+        let report = run.json()["report"].clone();
+        let each = report["file"]["resident_bytes_per_triangle"].as_f64().unwrap();
+        (report["free"]["kept"].as_str().unwrap_or("none").to_owned(), each)
+    };
+    let (none, plain) = kept(&["--free-directions", "none"]);
+    let (all, with) = kept(&[]);
+    assert_eq!([&none[..], &all[..]], ["none", "directions"]);
+    assert!(with > plain + 23.9 && with < plain + 24.1, "{plain} {with}");
+    for small in [&["--quality", "fast"][..], &["--coordinates", "16"], &["--boxes", "8"]] {
+        assert_eq!(kept(small).0, none, "{small:?}");
+        assert_eq!(kept(&[small, &["--free-directions", "auto"]].concat()).0, all, "{small:?}");
+    }
+    for (more, expected) in [(24.5, "directions"), (23.5, "distances"), (12.5, "distances"), (11.5, "none")] {
+        let limit = plain + more;
+        let (kept, each) = kept(&["--max-bytes-per-triangle", &limit.to_string()]);
+        assert_eq!(kept, expected, "{more}");
+        assert!(each <= limit, "{each} {limit}");
+    }
 }
 
 #[test]

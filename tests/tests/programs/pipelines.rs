@@ -106,7 +106,7 @@ fn a_dry_run_says_what_would_be_done_and_does_nothing() {
     run(&["compile", "a.obj"]).expect(0);
     assert_eq!(dry(&[]), "a.bth: nothing to do\n");
     assert_eq!(dry(&["--structure", "bvh", "-o", "b.bth"]).split('(').next(), Some("b.bth: compile "));
-    assert_eq!(dry(&["--quality", "fast"]), "a.bth: compile (quality: balanced -> fast)\n");
+    assert_eq!(dry(&["--quality", "best"]), "a.bth: compile (quality: balanced -> best)\n");
     std::fs::remove_file(path.join("a.bth")).unwrap();
     assert_eq!(dry(&[]), "a.bth: take from the cache\n");
     std::fs::write(path.join("a.obj"), sphere(9)).unwrap();

@@ -19,7 +19,7 @@ use std::path::Path;
 const MESH: &str = "3";
 const COORDINATES: &str = "1";
 const BVH: &str = "1";
-const FREE: &str = "3";
+const FREE: &str = "4";
 const MARKS: &str = "1";
 const COSTS: &str = "3";
 const TETS: &str = "1";
@@ -78,6 +78,7 @@ pub(crate) fn free(geometry: &Digest, bvh: &bvh::BvhOptions, options: &free::Fre
         .with_all(self::bvh(geometry, bvh).components().iter().cloned())
         .with("keep", text(&options.keep))
         .with("reach", text(&options.reach))
+        .with("row bytes", text(&options.row_bytes))
         .with("free directions version", FREE)
 }
 

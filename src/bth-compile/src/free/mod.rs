@@ -53,9 +53,11 @@ pub enum KeepFree {
     All,
 }
 
-/// [`KeepFree::Auto`] decides the first `SAMPLED` of `EVERY` consecutive triangles, and by what it finds what to keep of all.
+/// [`KeepFree::Auto`] decides the first `SAMPLED` of `EVERY` consecutive triangles, or of more so that at most `RUNS` are sampled, and by what it
+/// finds what to keep of all.
 const SAMPLED: usize = 32;
 const EVERY: usize = 512;
+const RUNS: usize = 128;
 
 /// Options of [`find`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -65,11 +67,13 @@ pub struct FreeOptions {
     /// The second of three distances that are told apart, an eighth of it, it and four times it, relative to the diagonal of the object's
     /// box.
     pub reach: f64,
+    /// Greatest size of a row in bytes: [`KeepFree::Auto`] keeps nothing that takes more for each triangle.
+    pub row_bytes: usize,
 }
 
 impl Default for FreeOptions {
     fn default() -> Self {
-        FreeOptions { keep: KeepFree::default(), reach: 1.0 / 16.0 }
+        FreeOptions { keep: KeepFree::default(), reach: 1.0 / 16.0, row_bytes: size_of::<FreeDirections>() }
     }
 }
 
@@ -115,13 +119,15 @@ pub fn find(
     };
     let mut around = Surroundings { mesh, order: &tree.order, tree: wide, levels, kept: Kept::None };
     let mut report = None;
+    let fits = |bytes: usize| bytes <= options.row_bytes;
     around.kept = match options.keep {
         KeepFree::None => Kept::None,
         KeepFree::All => Kept::Directions,
         KeepFree::Distances => Kept::Distances,
         KeepFree::Auto => {
+            let every = EVERY.max(rows.div_ceil(RUNS));
             let samples: Vec<Range<usize>> =
-                (0..rows).step_by(EVERY).map(|first| first..rows.min(first + SAMPLED)).collect();
+                (0..rows).step_by(every).map(|first| first..rows.min(first + SAMPLED)).collect();
             let mut sample = |kept: Kept| {
                 around.kept = kept;
                 let decided = decide(&around, &samples, monitor, |_| ())?;
@@ -129,9 +135,12 @@ pub fn find(
                     report.insert(FreeReport::new((mesh, tree), &decided, levels, kept)).worthwhile(),
                 )
             };
-            match sample(Kept::Directions)? {
-                Kept::Directions => Kept::Directions,
-                _ => sample(Kept::Distances)?,
+            if fits(size_of::<FreeDirections>()) && sample(Kept::Directions)? == Kept::Directions {
+                Kept::Directions
+            } else if fits(size_of::<FreeDistances>()) {
+                sample(Kept::Distances)?
+            } else {
+                Kept::None
             }
         }
     };

@@ -25,7 +25,7 @@ const LEAST_SHARE: f64 = 0.5;
 /// Least share of directions beyond the first level for which it keeps distances.
 const LEAST_BEYOND: f64 = 0.5;
 
-/// Report of [`super::find`]. Shares are those of cosine-weighted rays from triangles, by area. They are estimates from a sixteenth
+/// Report of [`super::find`]. Shares are those of cosine-weighted rays from triangles, by area. They are estimates from a sample
 /// of the triangles where nothing is kept.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FreeReport {

@@ -7,7 +7,7 @@ use crate::costs::{self, Choice, ProbeReport, Weighed, least_useful};
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::{bvh, tets};
-use bth_format::layout::Object as Header;
+use bth_format::layout::{FreeLevels, Object as Header};
 use bth_import::Mesh;
 
 /// How the tetrahedra of a mesh will be stored; under a limit on bytes also the size of the object without them.
@@ -89,6 +89,20 @@ fn follow(probe: &mut ProbeReport, leaves: &mut Vec<tets::Leaf>, costs: &costs::
     }
 }
 
+/// Bytes for each triangle that the limit leaves to rows of free directions.
+pub(super) fn row_bytes(
+    traced: &TracedMesh,
+    leaves: &[tets::Leaf],
+    options: &CompileOptions,
+    monitor: &dyn Monitor,
+) -> Result<usize> {
+    let Some(most) = options.costs.max_bytes_per_triangle else { return Ok(usize::MAX) };
+    let of_levels = size_of::<FreeLevels>();
+    let others = bytes(traced.by_ref(), leaves, options, monitor)? as usize + of_levels;
+    let triangles = traced.mesh.triangles.len().max(1);
+    Ok(((most * triangles as f64) as usize).saturating_sub(others) / triangles)
+}
+
 /// Bytes that tracing reads of the object with these tet leaves.
 fn bytes(
     traced: TracedRef<'_>,
@@ -121,7 +135,7 @@ pub(crate) fn warn_over_limit(file: &FileReport, options: &CompileOptions, monit
     let Some(most) = options.costs.max_bytes_per_triangle else { return };
     let each = file.resident_bytes_per_triangle;
     if each > most {
-        let what = if file.tet_leaves == 0 { "the BVH alone" } else { "the tetrahedralization" };
+        let what = if file.tet_leaves == 0 { "what tracing reads" } else { "the tetrahedralization" };
         monitor
             .warn(&format!("{what} takes {each:.1} bytes a triangle, more than the limit of {most} allows"));
     }

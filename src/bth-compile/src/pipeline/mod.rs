@@ -127,7 +127,7 @@ pub(crate) fn compile_mesh(
         Structure::Bvh => (Vec::new(), TetReports::default()),
         Structure::Bth | Structure::Tets => tet_leaves(source, &traced, options, stages, clock, monitor)?,
     };
-    let (free, free_report) = free_directions(&traced, options, stages, clock, monitor)?;
+    let (free, free_report) = free_directions(&traced, &leaves, options, (stages, clock), monitor)?;
     let (object, collapse) =
         clock.time("collapse", || object::join(traced, leaves, free, options, monitor))?;
     let coordinates = object.coordinates_report();
@@ -135,20 +135,25 @@ pub(crate) fn compile_mesh(
 }
 
 /// Decides in which directions rays from a triangle meet nothing, and whether that is kept. A tetrahedralization of the whole model
-/// has no leaves in which its triangles could be found, and of an object that deforms nothing is known.
+/// has no leaves in which its triangles could be found, and of an object that deforms nothing is known. What is kept where it is worth its
+/// bytes stays within the limit on them.
 fn free_directions(
     traced: &TracedMesh,
+    leaves: &[tets::Leaf],
     options: &CompileOptions,
-    stages: &mut dyn Stages,
-    clock: &mut Clock,
+    (stages, clock): (&mut dyn Stages, &mut Clock),
     monitor: &dyn Monitor,
 ) -> Result<(Option<free::Free>, Option<free::FreeReport>)> {
     let is_wanted = options.free.keep != free::KeepFree::None;
-    if !is_wanted || options.structure == Structure::Tets {
+    if !is_wanted || options.structure == Structure::Tets || options.deformable {
         return Ok((None, None));
     }
+    let mut free = options.free;
+    if free.keep == free::KeepFree::Auto {
+        free.row_bytes = limit::row_bytes(traced, leaves, options, monitor)?.min(free.row_bytes);
+    }
     let TracedMesh { mesh, tree, .. } = traced;
-    let find = || stages.free(mesh, tree, (&options.bvh, &options.free), monitor);
+    let find = || stages.free(mesh, tree, (&options.bvh, &free), monitor);
     let (free, report) = clock.time("free directions", find)?;
     Ok(((report.kept != free::Kept::None).then_some(free), Some(report)))
 }

@@ -53,7 +53,10 @@ pub(crate) fn warn_of_options(name: &str, options: &CompileOptions, monitor: &dy
         ),
         (options.coordinates != Default::default(), "coordinates and boxes stay f32"),
         (!options.geometry, "the geometry of the source stays"),
-        (options.free.keep != free::KeepFree::None, "no free directions are kept"),
+        (
+            ![free::KeepFree::None, free::KeepFree::Auto].contains(&options.free.keep),
+            "no free directions are kept",
+        ),
     ];
     let set_aside: Vec<_> =
         without_effect.into_iter().filter_map(|(differs, what)| differs.then_some(what)).collect();

@@ -51,9 +51,10 @@ pub(crate) struct Compile {
     pub(crate) max_error: Option<bth_compile::coordinates::MaxError>,
     /// Directions in which rays that start on a triangle meet nothing, and distances within which they do not, so that rays end at once
     /// or begin later where a caller says on which triangle they start: 24 bytes a triangle, or 12 for `distances` alone. With `auto` what
-    /// is worth its bytes.
-    #[arg(long, value_enum, default_value_t = Free::None, value_name = "WHERE", conflicts_with = "deformable")]
-    pub(crate) free_directions: Free,
+    /// is worth its bytes. By default auto, but none where fast compiling (--quality fast) or small files (--coordinates, --max-error,
+    /// --boxes, --compact) are asked for.
+    #[arg(long, value_enum, value_name = "WHERE", conflicts_with = "deformable")]
+    pub(crate) free_directions: Option<Free>,
     /// The second of three distances that are told apart, an eighth of it, it and four times it, as a share of the diagonal of the
     /// object's box.
     #[arg(long, value_name = "SHARE", value_parser = positive, default_value_t = 0.0625)]
@@ -75,7 +76,8 @@ pub(crate) struct Compile {
     /// By default kept with `--structure bth` and `--deformable`, and pruned with `tets`.
     #[arg(long, value_enum)]
     pub(crate) subtrees: Option<Subtrees>,
-    /// The smallest tetrahedralizations: short for `--tets tet16 --subtrees prune`. Some 100 bytes a triangle where all
+    /// The smallest tetrahedralizations: short for `--tets tet16 --subtrees prune
+    /// --free-directions none`. Some 100 bytes a triangle where all
     /// triangles are in tetrahedra, in place of 180 to 200.
     #[arg(long, conflicts_with_all = ["tets", "subtrees"])]
     pub(crate) compact: bool,
@@ -226,8 +228,9 @@ impl Compile {
             record: if self.compact { Record::Tet16 } else { self.tets }.into(),
             coordinates: self.coordinates(),
             free: bth_compile::free::FreeOptions {
-                keep: self.free_directions.into(),
+                keep: self.free_directions().into(),
                 reach: self.free_reach,
+                ..Default::default()
             },
             keep_subtrees: match self.subtrees {
                 Some(subtrees) => subtrees == Subtrees::Keep,
@@ -249,6 +252,13 @@ impl Compile {
             options.tets.memory = mib << 20;
         }
         Ok(options)
+    }
+
+    /// Who asks for fast compiling or small files gets nothing that only hinted rays use without asking for it.
+    fn free_directions(&self) -> Free {
+        let is_fast = self.selection.quality == Quality::Fast;
+        let is_small = self.compact || self.coordinates() != Default::default();
+        self.free_directions.unwrap_or(if is_fast || is_small { Free::None } else { Free::Auto })
     }
 
     fn coordinates(&self) -> bth_compile::coordinates::CoordinateOptions {

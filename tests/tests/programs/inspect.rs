@@ -49,6 +49,22 @@ fn marks_lists_crossing_triangles() {
 }
 
 #[test]
+fn explain_says_what_of_free_directions_compiling_keeps() {
+    let folder = folder(&[("ball.obj", &sphere(16)), ("crossing.obj", &crossing())]);
+    let mut all = Vec::new();
+    for model in ["ball.obj", "crossing.obj"] {
+        let json =
+            bthc(folder.path(), &["explain", model, "--json", "--free-picture", "free.png"]).expect(0).json();
+        let png = std::fs::read(folder.path().join("free.png")).unwrap();
+        assert!(png.starts_with(b"\x89PNG") && png.len() > 1000);
+        let compiled = bthc(folder.path(), &["compile", model, "--json"]).expect(0).json();
+        assert_eq!(json["free_directions"]["kept"], compiled["report"]["free"]["kept"], "{json:#}");
+        all.push(json["free_directions"]["kept"].clone());
+    }
+    assert_eq!(all[0], "directions");
+}
+
+#[test]
 fn explain_tells_why_nodes_were_chosen_or_refused() {
     let folder = folder(&[("ball.obj", &sphere(32)), ("crossing.obj", &crossing())]);
     let json = bthc(folder.path(), &["explain", "ball.obj", "--json"]).expect(0).json();

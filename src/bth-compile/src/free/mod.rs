@@ -27,7 +27,7 @@ pub(crate) use places::FreeRows;
 pub use report::{FreeReport, Kept};
 
 use crate::bvh::BinaryBvh;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::monitor::Monitor;
 use bth::Isa;
 use bth_format::layout::{FREE_DISTANCE_RANGE, FreeDirections, FreeDistances, FreeSectors, NONE};
@@ -119,29 +119,14 @@ pub fn find(
     };
     let mut around = Surroundings { mesh, order: &tree.order, tree: wide, levels, kept: Kept::None };
     let mut report = None;
-    let fits = |bytes: usize| bytes <= options.row_bytes;
     around.kept = match options.keep {
         KeepFree::None => Kept::None,
         KeepFree::All => Kept::Directions,
         KeepFree::Distances => Kept::Distances,
         KeepFree::Auto => {
-            let every = EVERY.max(rows.div_ceil(RUNS));
-            let samples: Vec<Range<usize>> =
-                (0..rows).step_by(every).map(|first| first..rows.min(first + SAMPLED)).collect();
-            let mut sample = |kept: Kept| {
-                around.kept = kept;
-                let decided = decide(&around, &samples, monitor, |_| ())?;
-                Ok::<_, Error>(
-                    report.insert(FreeReport::new((mesh, tree), &decided, levels, kept)).worthwhile(),
-                )
-            };
-            if fits(size_of::<FreeDirections>()) && sample(Kept::Directions)? == Kept::Directions {
-                Kept::Directions
-            } else if fits(size_of::<FreeDistances>()) {
-                sample(Kept::Distances)?
-            } else {
-                Kept::None
-            }
+            let kept;
+            (kept, report) = sample(&mut around, tree, options, monitor)?;
+            kept
         }
     };
     if around.kept == Kept::None {
@@ -167,6 +152,50 @@ pub fn find(
     }
     let report = FreeReport::new((mesh, tree), &decided, levels, around.kept);
     Ok((free, report))
+}
+
+/// What [`KeepFree::Auto`] keeps of a mesh.
+///
+/// # Errors
+/// Only [`crate::Error::Cancelled`].
+pub fn worthwhile(
+    mesh: &Mesh,
+    tree: &BinaryBvh,
+    options: &FreeOptions,
+    monitor: &dyn Monitor,
+) -> Result<Kept> {
+    let levels = levels(tree, options.reach);
+    let Some(wide) = Tree::new(mesh, tree) else { return Ok(Kept::None) };
+    let mut around = Surroundings { mesh, order: &tree.order, tree: wide, levels, kept: Kept::None };
+    Ok(sample(&mut around, tree, options, monitor)?.0)
+}
+
+/// What is worth keeping by a sample of the triangles, and the last report about it.
+fn sample(
+    around: &mut Surroundings<'_>,
+    tree: &BinaryBvh,
+    options: &FreeOptions,
+    monitor: &dyn Monitor,
+) -> Result<(Kept, Option<FreeReport>)> {
+    let rows = tree.order.len();
+    let every = EVERY.max(rows.div_ceil(RUNS));
+    let samples: Vec<Range<usize>> =
+        (0..rows).step_by(every).map(|first| first..rows.min(first + SAMPLED)).collect();
+    let mut report = None;
+    for (kept, bytes) in
+        [(Kept::Directions, size_of::<FreeDirections>()), (Kept::Distances, size_of::<FreeDistances>())]
+    {
+        if bytes > options.row_bytes {
+            continue;
+        }
+        around.kept = kept;
+        let decided = decide(around, &samples, monitor, |_| ())?;
+        let of_kind = report.insert(FreeReport::new((around.mesh, tree), &decided, around.levels, kept));
+        if of_kind.worthwhile() == kept {
+            return Ok((kept, report));
+        }
+    }
+    Ok((Kept::None, report))
 }
 
 /// Decides rows of the order of the BVH, in parallel by tasks.

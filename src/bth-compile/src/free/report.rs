@@ -85,7 +85,7 @@ impl FreeReport {
     }
 
     /// What is worth its bytes by these shares ([`super::KeepFree::Auto`]), from whatever triangles rays start.
-    pub fn worthwhile(&self) -> Kept {
+    pub(super) fn worthwhile(&self) -> Kept {
         if self.free.min(self.free_by_triangle) >= LEAST_SHARE {
             Kept::Directions
         } else if self.beyond[0].min(self.beyond_by_triangle[0]) >= LEAST_BEYOND {

@@ -143,7 +143,7 @@ fn free_directions(
     let all = FreeOptions { keep: KeepFree::All, ..FreeOptions::default() };
     let (free, mut report) = free::find(mesh, tree, &all, progress)?;
     report.seconds = start.elapsed().as_secs_f64();
-    report.kept = report.worthwhile();
+    report.kept = free::worthwhile(mesh, tree, &all, progress)?;
     progress.stage("picture", None);
     let scene = bth::from_bytes(&pipeline::assemble(mesh, tree, &[], options, progress)?.bytes)?;
     write::write_atomically(path, &free_picture((mesh, tree), &scene, &free)?)?;

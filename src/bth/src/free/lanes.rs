@@ -207,8 +207,9 @@ fn begins<S: Simd>(s: S, fields: &[S::F; 8], start: S::F, within: S::F) -> S::F 
     let sum = s.add(s.add(s.abs(dx), s.abs(dy)), s.abs(dz));
     let guess = s.fma(s.sub(sum, greatest), s.splat(0.35), greatest);
     let square = s.fma(dz, dz, s.fma(dy, dy, s.mul(dx, dx)));
-    let numerator = s.mul(within, s.add(guess, guess));
-    let step = s.div(numerator, s.fma(guess, guess, square));
+    // The division does not wait for the distance.
+    let per_length = s.div(s.add(guess, guess), s.fma(guess, guess, square));
+    let step = s.mul(within, per_length);
     let begin = s.fnma(s.sub(step, start), s.splat(4.0 * SLACK), s.add(start, step));
     let is_later = s.and(s.lt(s.splat(0.0), within), s.lt(tmin, begin));
     s.select(is_later, begin, tmin)

@@ -1,7 +1,7 @@
 //! In which bins rays from a start triangle may meet the triangles of a block.
 
 use super::frame::{ALL_COLUMNS, BinSet, COLUMNS, bins};
-use super::see::{ERROR, dot, squared_gap, sum_abs};
+use super::see::{ERROR, bins_of, columns_and_rows, dot, squared_gap, sum_abs};
 use super::start::{BY_BOTH, BY_COLUMN, BY_ROW, LINES, Line, Start};
 use super::tree::Block;
 use bth::simd::{LANES, Simd};
@@ -83,10 +83,10 @@ impl<S: Simd, const TOUCHES: bool> Corners<S, TOUCHES> {
     }
 }
 
-/// What a start triangle sees of the triangles of a block, given whether the block's box `TOUCHES` that triangle, so that corners may be
-/// shared. There are no fused operations, so that all instruction sets agree.
+/// What a start triangle sees of those triangles of a block that may be seen in some `bins`, given whether the block's box `TOUCHES` that
+/// triangle, so that corners may be shared. There are no fused operations, so that all instruction sets agree.
 #[inline(always)]
-pub(super) fn meet<S: Simd, const TOUCHES: bool>(s: S, start: &Start, block: &Block) -> Met {
+pub(super) fn meet<S: Simd, const TOUCHES: bool>(s: S, start: &Start, block: &Block, bins: BinSet) -> Met {
     let corners = Corners::<S, TOUCHES>::new(s, start, block);
     let zero = s.splat(0.0);
     let mut met = Met {
@@ -111,7 +111,14 @@ pub(super) fn meet<S: Simd, const TOUCHES: bool>(s: S, start: &Start, block: &Bl
     if met.above == 0 {
         return met;
     }
-    distances(s, start, &corners, &mut met);
+    let ranges = distances(s, start, &corners, &mut met);
+    // Triangles that touch the start triangle's box are seen in all bins.
+    if !TOUCHES {
+        met.above &= seen_in(s, bins, &ranges);
+        if met.above == 0 {
+            return met;
+        }
+    }
     let factors = Factors::new(s, &corners);
     for line in 0..LINES {
         s.store(factors.most(s, start, &corners, &start.lines[line]), &mut met.most[line]);
@@ -120,14 +127,29 @@ pub(super) fn meet<S: Simd, const TOUCHES: bool>(s: S, start: &Start, block: &Bl
     met
 }
 
-/// Distances, and what is small for them.
+/// Bits of the lanes whose points, with coordinates in ranges, may be seen in some bins.
+#[inline(always)]
+fn seen_in<S: Simd>(s: S, bins: BinSet, ranges: &[[S::F; 2]; 3]) -> u32 {
+    let (range, seen) = columns_and_rows(s, ranges);
+    let mut of = [0; LANES];
+    s.store_u(range, &mut of);
+    let (mut lanes, mut found) = (s.mask_bits(seen), 0);
+    while lanes != 0 {
+        let lane = lanes.trailing_zeros() as usize % LANES;
+        lanes &= lanes - 1;
+        found |= u32::from(bins_of(of[lane]) & bins != 0) << lane;
+    }
+    found
+}
+
+/// Ranges of the coordinates of triangles relative to points of the start triangle. Stores distances, and what is small for them.
 #[inline(always)]
 fn distances<S: Simd, const TOUCHES: bool>(
     s: S,
     start: &Start,
     corners: &Corners<S, TOUCHES>,
     met: &mut Met,
-) {
+) -> [[S::F; 2]; 3] {
     let zero = s.splat(0.0);
     let half = s.splat(0.5);
     let error = s.max(s.max(corners.error[0], corners.error[1]), corners.error[2]);
@@ -145,6 +167,7 @@ fn distances<S: Simd, const TOUCHES: bool>(
     let gap = squared_gap(s, &ranges);
     s.store(gap, &mut met.squared_gap);
     met.small = s.mask_bits(s.le(diagonal, s.mul(gap, s.splat(start.small * start.small))));
+    ranges
 }
 
 /// Factors of the heights of corners above a line in its plane, whose products bound w, by corner.

@@ -181,7 +181,8 @@ impl Search<'_> {
         Some(state)
     }
 
-    /// Blocks the bins in which a triangle of the mesh may be met.
+    /// Blocks the bins in which a triangle of the mesh may be met. What is found does not depend on the order of the visits: children are
+    /// sorted by distance where distances alone are open, since near ones block these, but not where all in a free bin must be visited.
     #[inline(always)]
     fn block_all<S: Simd>(&mut self, s: S, state: &mut State) {
         let tree = &self.around.tree;
@@ -219,7 +220,9 @@ impl Search<'_> {
                 }
                 self.stack.push(Entry { child: node.child[lane], squared_gap, bins: of_child });
             }
-            nearest_last(&mut self.stack[first..]);
+            if state.free == 0 {
+                nearest_last(&mut self.stack[first..]);
+            }
         }
     }
 }
@@ -241,7 +244,7 @@ fn nearest_last(entries: &mut [Entry]) {
 /// Blocks those of the bins of a block's box in which its triangles may be met.
 #[inline(always)]
 fn search_block<S: Simd, const TOUCHES: bool>(s: S, block: &Block, bins: BinSet, state: &mut State) {
-    let met = meet::<S, TOUCHES>(s, &state.start, block);
+    let met = meet::<S, TOUCHES>(s, &state.start, block, bins);
     let mut lanes = met.above;
     while lanes != 0 {
         let lane = lanes.trailing_zeros() as usize;

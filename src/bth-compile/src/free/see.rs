@@ -30,9 +30,15 @@ impl Seen {
     /// The bins in which a child may be seen, which is one of `lanes`.
     #[inline(always)]
     pub(super) fn bins(&self, lane: usize) -> BinSet {
-        let [first, end, first_row, end_row] = self.range[lane].to_le_bytes().map(usize::from);
-        bins([first, end], [first_row, end_row])
+        bins_of(self.range[lane])
     }
+}
+
+/// The bins of a range of columns and one of rows, as [`Seen`] stores them.
+#[inline(always)]
+pub(super) fn bins_of(range: u32) -> BinSet {
+    let [first, end, first_row, end_row] = range.to_le_bytes();
+    bins([first.into(), end.into()], [first_row.into(), end_row.into()])
 }
 
 #[inline(always)]
@@ -101,7 +107,7 @@ pub(super) fn see<S: Simd>(s: S, start: &Start, node: &Node) -> Seen {
 
 /// Columns and rows in which points with coordinates in ranges may be seen, as [`Seen`] stores them, and where there are any.
 #[inline(always)]
-fn columns_and_rows<S: Simd>(s: S, ranges: &[[S::F; 2]; 3]) -> (S::U, S::M) {
+pub(super) fn columns_and_rows<S: Simd>(s: S, ranges: &[[S::F; 2]; 3]) -> (S::U, S::M) {
     let zero_u = s.splat_u(0);
     let floor = s.splat(1e-30);
     let near = s.div(s.splat(1.0), s.max(ranges[2][0], floor));

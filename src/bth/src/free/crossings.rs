@@ -40,8 +40,8 @@ impl<S: Lanewise> Crossings<S> {
     /// Errors, in units of rounding u, where no component of r, e and f is greater than `far` and `size` is the sum of those of d: r, e and f
     /// are rounded once. A component of m is off by 3.1u of its terms, so b and c by 3.1 + 1 + 4 of theirs, which are at most 2·far²·size
     /// together: 17u·far²·size. A component of e×f is off by 4.1u of its terms, 8.2u·far², so d·(e×f) by 17u·far²·size, too, and a, for two more
-    /// roundings of at most 4 and 6 far²·size, by 61u·far²·size. The volume is off by (25 + 30)u·far³. Terms with `UNDERFLOW` bound
-    /// what underflows. Triangles without an area are not certainly crossed, whatever the rounding errors.
+    /// roundings of at most 4 and 6 far²·size, by 61u·far²·size. The volume is off by (25 + 30)u·far³. Bounds of 64u hold
+    /// the roundings of products with these, too, and terms with `UNDERFLOW` what underflows. Triangles without an area are not certainly crossed, whatever the rounding errors.
     #[inline(always)]
     pub(super) fn new(s: S, corners: &[[[f32; LANES]; 3]; 3], fields: [S::F; 8]) -> Self {
         let [ox, oy, oz, tmin, dx, dy, dz, _] = fields;

@@ -79,6 +79,7 @@ pub(crate) fn free(geometry: &Digest, bvh: &bvh::BvhOptions, options: &free::Fre
         .with("keep", text(&options.keep))
         .with("reach", text(&options.reach))
         .with("row bytes", text(&options.row_bytes))
+        .with("most triangles", text(&options.most_triangles))
         .with("free directions version", FREE)
 }
 
@@ -229,6 +230,7 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
         all.extend([
             ("free directions", text(&options.free.keep)),
             ("reach", text(&options.free.reach)),
+            ("most triangles", text(&options.free.most_triangles)),
             ("free directions version", FREE.to_owned()),
         ]);
     }

@@ -43,6 +43,8 @@ pub struct FreeReport {
     pub levels: [f32; FreeSectors::LEVELS],
     /// What is kept.
     pub kept: Kept,
+    /// Whether nothing was decided, since there are too many triangles ([`super::FreeOptions::most_triangles`]).
+    pub undecided: bool,
     /// Wall-clock time of the stage as the pipeline measures it, seconds; 0 where the stage is called on its own.
     pub seconds: f64,
 }

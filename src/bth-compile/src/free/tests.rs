@@ -289,3 +289,27 @@ fn huge_and_tiny_meshes_have_no_free_directions() {
     let free = free_of(&Mesh::default());
     assert_eq!((free.levels, free.directions.len()), ([0.0; 3], 0));
 }
+
+#[test]
+fn what_is_too_large_or_has_no_room_is_left_out() {
+    let mesh = sphere(24, [0.0; 3]);
+    let (tree, _) = bvh::build(&mesh, &BvhOptions::default(), &Silent).unwrap();
+    let of = |keep: KeepFree, most_triangles: usize, row_bytes: usize| {
+        let options = FreeOptions { keep, most_triangles, row_bytes, ..FreeOptions::default() };
+        let (free, report) = find(&mesh, &tree, &options, &Silent).unwrap();
+        let rows = [free.directions.len(), free.distances.len()];
+        assert_eq!(
+            rows,
+            [Kept::Directions, Kept::Distances]
+                .map(|kept| { usize::from(report.kept == kept) * mesh.triangles.len() })
+        );
+        (report.kept, report.undecided)
+    };
+    let count = mesh.triangles.len();
+    assert_eq!(of(KeepFree::Auto, count, 24), (Kept::Directions, false));
+    assert_eq!(of(KeepFree::Auto, count, 23), (Kept::Distances, false));
+    assert_eq!(of(KeepFree::Auto, count, 11), (Kept::None, false));
+    assert_eq!(of(KeepFree::Auto, count - 1, 24), (Kept::None, true));
+    // Who asks for it gets it.
+    assert_eq!(of(KeepFree::All, 0, 0), (Kept::Directions, false));
+}

@@ -52,7 +52,7 @@ pub(crate) struct Compile {
     /// Directions in which rays that start on a triangle meet nothing, and distances within which they do not, so that rays end at once
     /// or begin later where a caller says on which triangle they start: 24 bytes a triangle, or 12 for `distances` alone. With `auto` what
     /// is worth its bytes. By default auto, but none where fast compiling (--quality fast) or small files (--coordinates, --max-error,
-    /// --boxes, --compact) are asked for.
+    /// --boxes, --compact) are asked for, or for objects of more than a million triangles.
     #[arg(long, value_enum, value_name = "WHERE", conflicts_with = "deformable")]
     pub(crate) free_directions: Option<Free>,
     /// The second of three distances that are told apart, an eighth of it, it and four times it, as a share of the diagonal of the
@@ -201,6 +201,9 @@ pub(crate) struct Selection {
     pub(crate) c_tet: Option<f64>,
 }
 
+/// Triangles of the largest objects of which free directions are found unless that is asked for: some ten seconds on two cores.
+pub(crate) const DEFAULT_MOST_TRIANGLES: usize = 1_000_000;
+
 /// A finite positive number.
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -230,6 +233,7 @@ impl Compile {
             free: bth_compile::free::FreeOptions {
                 keep: self.free_directions().into(),
                 reach: self.free_reach,
+                most_triangles: self.free_directions.map_or(DEFAULT_MOST_TRIANGLES, |_| usize::MAX),
                 ..Default::default()
             },
             keep_subtrees: match self.subtrees {

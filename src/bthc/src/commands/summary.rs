@@ -36,7 +36,13 @@ pub(super) fn summary(report: &CompileReport) -> String {
         let [near, middle, far] = free.beyond.map(|share| 100.0 * share);
         let (all, seconds) = (100.0 * free.free, free.seconds);
         let shares = format!("{all:.0} %, up to distances {near:.0} %, {middle:.0} %, {far:.0} %");
-        facts.row(["free directions", &format!("{shares}; {kept}, {seconds:.1} s")]);
+        facts.row([
+            "free directions",
+            &match free.undecided {
+                true => "left out of objects so large; --free-directions auto finds them".to_owned(),
+                false => format!("{shares}; {kept}, {seconds:.1} s"),
+            },
+        ]);
     }
     if let Some(found) = &report.coordinates {
         facts.row(["coordinates", &format!("{} bits", found.bits)]);

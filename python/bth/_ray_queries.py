@@ -61,7 +61,8 @@ class RayQueries:
     ):
         """The nearest hits of rays, as Hits.
 
-        start: the triangles on which rays start, as Hits or a pair (instance, triangle): a hint for files with tetrahedra.
+        start: the triangles on which rays start, as Hits or a pair (instance, triangle). It is a hint, which never changes an
+        answer: see free_directions of `compile`.
         """
         rays, shape = _rays(origins, directions, tmin, tmax)
         columns = hit_columns(len(rays[0]))

@@ -3,6 +3,7 @@
 use super::crossings::Crossings;
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, LANES, Simd};
+use bth_random::Rng;
 
 type Integers = [i128; 3];
 
@@ -31,21 +32,13 @@ impl Kernel for CrossingsKernel<'_> {
     }
 }
 
-/// An xorshift generator.
-struct Random(u64);
+/// An integer from -limit to limit.
+fn integer(random: &mut Rng, limit: u64) -> i128 {
+    i128::from(random.below(2 * limit + 1)) - i128::from(limit)
+}
 
-impl Random {
-    /// An integer from -limit to limit.
-    fn integer(&mut self, limit: i128) -> i128 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        i128::from(self.0 >> 1) % (2 * limit + 1) - limit
-    }
-
-    fn integers(&mut self, limit: i128) -> Integers {
-        [0; 3].map(|_: i128| self.integer(limit))
-    }
+fn integers(random: &mut Rng, limit: u64) -> Integers {
+    [0; 3].map(|_: i128| integer(random, limit))
 }
 
 fn minus(a: Integers, b: Integers) -> Integers {
@@ -69,34 +62,34 @@ fn exact(corners: [Integers; 3], origin: Integers, direction: Integers) -> Optio
 }
 
 /// A triangle and a ray that starts close to it, or to one of its edges or corners, by less than `off`.
-fn close_start(random: &mut Random, off: i128) -> ([Integers; 3], Integers, Integers) {
-    let center = random.integers(1 << 19);
-    let size = 1 << (random.integer(6) + 10);
+fn close_start(random: &mut Rng, off: u64) -> ([Integers; 3], Integers, Integers) {
+    let center = integers(random, 1 << 19);
+    let size = 1 << (integer(random, 6) + 10);
     let corners = [0; 3].map(|_| {
-        let from = random.integers(size);
+        let from = integers(random, size);
         [0, 1, 2].map(|k| center[k] + from[k])
     });
     // Weights of zero are those of edges and corners.
-    let weights = [0; 3].map(|_: i128| (random.integer(8) - 1).max(0));
+    let weights = [0; 3].map(|_: i128| (integer(random, 8) - 1).max(0));
     let sum = weights.iter().sum::<i128>().max(1);
-    let near = random.integers(off);
+    let near = integers(random, off);
     let origin = [0, 1, 2].map(|k| (0..3).map(|c| weights[c] * corners[c][k]).sum::<i128>() / sum + near[k]);
-    (corners, origin, random.integers(1 << 12))
+    (corners, origin, integers(random, 1 << 12))
 }
 
 #[test]
 fn what_is_said_of_crossings_is_true() {
-    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    let mut random = Rng::new(31);
     for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
         let (mut said, mut true_ones) = (0, 0);
         for round in 0..4000 {
-            let scale = 2f32.powi((random.integer(20) - 10) as i32);
+            let scale = 2f32.powi((integer(&mut random, 20) - 10) as i32);
             let (mut corners, mut rays) = ([[[0.0; LANES]; 3]; 3], [Ray::new([0.0; 3], [0.0; 3]); LANES]);
             let mut starts = [Default::default(); LANES];
             for lane in 0..LANES {
                 let off = [0, 1, 16, 1 << 10][round % 4];
                 let (triangle, origin, direction) = close_start(&mut random, off);
-                let tmin = random.integer(1 << 10) as f32 / 1024.0;
+                let tmin = integer(&mut random, 1 << 10) as f32 / 1024.0;
                 starts[lane] = (triangle, origin, direction, tmin);
                 for c in 0..3 {
                     for k in 0..3 {

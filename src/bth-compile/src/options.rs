@@ -143,7 +143,7 @@ impl CompileOptions {
             "leaving out the geometry of the source"
         } else if self.built_structure() != Structure::Bvh && !self.keep_subtrees {
             "tetrahedralizations without a BVH beside them"
-        } else if ![free::KeepFree::None, free::KeepFree::Auto].contains(&self.free.keep) {
+        } else if self.free.keep.always() {
             "free directions"
         } else {
             return Ok(());

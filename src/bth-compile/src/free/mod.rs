@@ -53,6 +53,13 @@ pub enum KeepFree {
     All,
 }
 
+impl KeepFree {
+    /// Whether they are to be kept whatever they are worth.
+    pub(crate) fn always(self) -> bool {
+        matches!(self, KeepFree::Distances | KeepFree::All)
+    }
+}
+
 /// [`KeepFree::Auto`] decides the first `SAMPLED` of `EVERY` consecutive triangles, or of more so that at most `RUNS` are sampled, and by what it
 /// finds what to keep of all.
 const SAMPLED: usize = 32;

@@ -7,7 +7,6 @@ use super::report::TetReports;
 use super::{Clock, Direct, StageReports, tet_leaves};
 use crate::bvh::{self, Costs, PoseOptions, Poses};
 use crate::error::Result;
-use crate::free;
 use crate::monitor::Monitor;
 use crate::options::{CompileOptions, Structure};
 use bth_format::SequenceView;
@@ -53,10 +52,7 @@ pub(crate) fn warn_of_options(name: &str, options: &CompileOptions, monitor: &dy
         ),
         (options.coordinates != Default::default(), "coordinates and boxes stay f32"),
         (!options.geometry, "the geometry of the source stays"),
-        (
-            ![free::KeepFree::None, free::KeepFree::Auto].contains(&options.free.keep),
-            "no free directions are kept",
-        ),
+        (options.free.keep.always(), "no free directions are kept"),
     ];
     let set_aside: Vec<_> =
         without_effect.into_iter().filter_map(|(differs, what)| differs.then_some(what)).collect();

@@ -5,7 +5,7 @@
 //!
 //! | modules | |
 //! |---|---|
-//! | [`opacity`], [`coordinates`], [`bvh`], [`marks`], [`costs`], [`tets`], [`mod@write`] | the stages |
+//! | [`opacity`], [`coordinates`], [`bvh`], [`marks`], [`costs`], [`tets`], [`free`], [`mod@write`] | the stages |
 //! | [`pipeline`] | calls the stages in order, from a model to a file |
 //! | [`cached`] | the same through a cache of results, which wraps the stages from outside |
 //! | [`memory`] | the pipeline and the scenes for triangles that are in memory |

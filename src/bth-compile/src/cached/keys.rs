@@ -19,7 +19,7 @@ use std::path::Path;
 const MESH: &str = "3";
 const COORDINATES: &str = "1";
 const BVH: &str = "1";
-const FREE: &str = "4";
+const FREE: &str = "5";
 const MARKS: &str = "1";
 const COSTS: &str = "3";
 const TETS: &str = "1";

@@ -66,7 +66,7 @@ static SHARES: LazyLock<[f64; FREE_BINS]> = LazyLock::new(|| {
 });
 
 /// Share of the cosine-weighted directions of a side that lie in each sector.
-pub(super) static SECTOR_SHARES: LazyLock<[f64; FREE_SECTORS]> = LazyLock::new(|| SECTORS.map(share));
+static SECTOR_SHARES: LazyLock<[f64; FREE_SECTORS]> = LazyLock::new(|| SECTORS.map(share));
 
 /// Share of the cosine-weighted directions of a side that some bins hold.
 pub(super) fn share(mut bins: BinSet) -> f64 {
@@ -77,6 +77,14 @@ pub(super) fn share(mut bins: BinSet) -> f64 {
         bins &= bins - 1;
     }
     sum
+}
+
+/// Share of the cosine-weighted directions of a side that lie in sectors of a level or a greater one.
+pub(super) fn beyond(sectors: FreeSectors, level: usize) -> f64 {
+    (0..FREE_SECTORS)
+        .filter(|sector| sectors.level(*sector) >= level)
+        .map(|sector| SECTOR_SHARES[sector])
+        .sum()
 }
 
 /// Unit axes at the first corner of a triangle: along its first edge, across, and along the normal of the side from which rays start.

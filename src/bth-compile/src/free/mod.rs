@@ -19,12 +19,14 @@ mod search;
 mod see;
 mod start;
 mod tree;
+mod worth;
 
 #[cfg(test)]
 mod tests;
 
 pub(crate) use places::FreeRows;
 pub use report::{FreeReport, Kept};
+pub use worth::{Seen, Worth};
 
 use crate::bvh::BinaryBvh;
 use crate::error::Result;
@@ -45,7 +47,7 @@ pub enum KeepFree {
     /// Not at all.
     #[default]
     None,
-    /// Directions and distances where enough directions are free, else distances alone where they save enough, else nothing.
+    /// Directions and distances where they pay, else distances alone where those do, else nothing.
     Auto,
     /// Distances alone, always.
     Distances,
@@ -59,12 +61,6 @@ impl KeepFree {
         matches!(self, KeepFree::Distances | KeepFree::All)
     }
 }
-
-/// [`KeepFree::Auto`] decides the first `SAMPLED` of `EVERY` consecutive triangles, or of more so that at most `RUNS` are sampled, and by what it
-/// finds what to keep of all.
-const SAMPLED: usize = 32;
-const EVERY: usize = 512;
-const RUNS: usize = 128;
 
 /// Options of [`find`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -136,20 +132,20 @@ pub fn find(
         return Ok((free, FreeReport::new((mesh, tree), &[], levels, Kept::None)));
     };
     let mut around = Surroundings { mesh, order: &tree.order, tree: wide, levels, kept: Kept::None };
-    let mut report = None;
+    let mut of_auto = None;
     around.kept = match options.keep {
         KeepFree::None => Kept::None,
         KeepFree::All => Kept::Directions,
         KeepFree::Distances => Kept::Distances,
         KeepFree::Auto => {
-            let kept;
-            (kept, report) = sample(&mut around, tree, options, monitor)?;
+            let (kept, known) = worth::worth(&mut around, tree, options, monitor)?;
+            of_auto = Some(known);
             kept
         }
     };
     if around.kept == Kept::None {
-        let report = report.unwrap_or_else(|| FreeReport::new((mesh, tree), &[], levels, Kept::None));
-        return Ok((free, FreeReport { kept: Kept::None, ..report }));
+        let report = FreeReport::new((mesh, tree), &[], levels, Kept::None);
+        return Ok((free, FreeReport { worth: of_auto, ..report }));
     }
     let tasks: Vec<Range<usize>> =
         (0..rows).step_by(TASK).map(|first| first..rows.min(first + TASK)).collect();
@@ -169,10 +165,10 @@ pub fn find(
         }
     }
     let report = FreeReport::new((mesh, tree), &decided, levels, around.kept);
-    Ok((free, report))
+    Ok((free, FreeReport { worth: of_auto, ..report }))
 }
 
-/// What [`KeepFree::Auto`] keeps of a mesh.
+/// What [`KeepFree::Auto`] keeps of a mesh, and what it decides by.
 ///
 /// # Errors
 /// Only [`crate::Error::Cancelled`].
@@ -181,39 +177,11 @@ pub fn worthwhile(
     tree: &BinaryBvh,
     options: &FreeOptions,
     monitor: &dyn Monitor,
-) -> Result<Kept> {
+) -> Result<(Kept, Worth)> {
     let levels = levels(tree, options.reach);
-    let Some(wide) = Tree::new(mesh, tree) else { return Ok(Kept::None) };
+    let Some(wide) = Tree::new(mesh, tree) else { return Ok((Kept::None, Worth::default())) };
     let mut around = Surroundings { mesh, order: &tree.order, tree: wide, levels, kept: Kept::None };
-    Ok(sample(&mut around, tree, options, monitor)?.0)
-}
-
-/// What is worth keeping by a sample of the triangles, and the last report about it.
-fn sample(
-    around: &mut Surroundings<'_>,
-    tree: &BinaryBvh,
-    options: &FreeOptions,
-    monitor: &dyn Monitor,
-) -> Result<(Kept, Option<FreeReport>)> {
-    let rows = tree.order.len();
-    let every = EVERY.max(rows.div_ceil(RUNS));
-    let samples: Vec<Range<usize>> =
-        (0..rows).step_by(every).map(|first| first..rows.min(first + SAMPLED)).collect();
-    let mut report = None;
-    for (kept, bytes) in
-        [(Kept::Directions, size_of::<FreeDirections>()), (Kept::Distances, size_of::<FreeDistances>())]
-    {
-        if bytes > options.row_bytes {
-            continue;
-        }
-        around.kept = kept;
-        let decided = decide(around, &samples, monitor, |_| ())?;
-        let of_kind = report.insert(FreeReport::new((around.mesh, tree), &decided, around.levels, kept));
-        if of_kind.worthwhile() == kept {
-            return Ok((kept, report));
-        }
-    }
-    Ok((Kept::None, report))
+    worth::worth(&mut around, tree, options, monitor)
 }
 
 /// Decides rows of the order of the BVH, in parallel by tasks.

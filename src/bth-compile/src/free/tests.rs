@@ -250,7 +250,7 @@ fn results_do_not_depend_on_the_instruction_set() {
 }
 
 #[test]
-fn what_is_kept_is_decided_by_a_sample() {
+fn what_is_kept_is_decided_by_rays() {
     // So much of both sides that neither is free, but far from what is next to it, or not.
     for (scale, expected) in [(0.05, Kept::Distances), (0.5, Kept::None)] {
         let mut mesh = soup(4000, 9);
@@ -267,14 +267,70 @@ fn what_is_kept_is_decided_by_a_sample() {
         assert_eq!(free.distances.is_empty(), expected == Kept::None);
         assert!(free.directions.is_empty());
         let (_, all) = found(&mesh, KeepFree::Distances);
-        assert!(
-            (0..3).all(|level| (report.beyond[level] - all.beyond[level]).abs() < 0.1),
-            "{report:?} {all:?}"
-        );
+        let worth = report.worth.unwrap();
+        for seen in [worth.from_outside, worth.from_within] {
+            assert!((seen.open - all.beyond[0]).abs() < 0.1, "{worth:?} {all:?}");
+        }
+        assert!(worth.free < 0.3, "{worth:?}");
     }
     // Where most is free, all of it is found.
     let mesh = sphere(24, [0.0; 3]);
-    assert_eq!(found(&mesh, KeepFree::Auto), found(&mesh, KeepFree::All));
+    let (free, report) = found(&mesh, KeepFree::Auto);
+    assert!(report.worth.unwrap().free > 0.9, "{report:?}");
+    assert_eq!((free, FreeReport { worth: None, ..report }), found(&mesh, KeepFree::All));
+}
+
+/// Many small triangles in a ball, of radius 1 before it is scaled.
+fn dense(count: usize, radius: f64) -> Mesh {
+    let mut mesh = soup(count, 11);
+    let length = |p: &[f32; 3]| p.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
+    let greatest = mesh.positions.iter().map(length).fold(0.0, f64::max);
+    mesh.positions.iter_mut().flatten().for_each(|x| *x *= (radius / greatest) as f32);
+    mesh
+}
+
+#[test]
+fn what_no_ray_sees_does_not_count() {
+    // In a solid that is free from outside most triangles are small and crowded.
+    for (radius, expected) in [(0.05, Kept::Directions), (0.9, Kept::None)] {
+        let mut mesh = sphere(24, [0.0; 3]);
+        let (first, inner) = (mesh.positions.len() as u32, dense(20_000, radius));
+        mesh.triangles.extend(inner.triangles.iter().map(|corners| corners.map(|corner| first + corner)));
+        mesh.positions.extend(&inner.positions);
+        let (_, report) = found(&mesh, KeepFree::Auto);
+        let worth = report.worth.unwrap();
+        assert_eq!(report.kept, expected, "{report:?}");
+        assert!(worth.from_outside.open > 0.9, "{worth:?}");
+        assert_eq!(worth.from_within.open > 0.5, expected == Kept::Directions, "{worth:?}");
+    }
+}
+
+#[test]
+fn solids_are_seen_from_outside_and_rooms_from_within() {
+    // Large triangles that touch others are closed to the other side. Four corners of a tetrahedron, each face turned outwards.
+    let [a, b, c, d] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let outwards = [[a, c, b], [a, b, d], [a, d, c], [b, c, d]];
+    assert_eq!(found(&weld(&outwards), KeepFree::Auto).1.kept, Kept::Directions);
+    let (_, report) = found(&weld(&outwards.map(|[a, b, c]| [a, c, b])), KeepFree::Auto);
+    let worth = report.worth.unwrap();
+    assert_eq!(report.kept, Kept::None, "{report:?}");
+    assert!(worth.from_outside.open > 0.9 && worth.from_within.open < 0.1, "{worth:?}");
+    assert!(worth.from_within.rays > 0, "{worth:?}");
+}
+
+#[test]
+fn what_no_ray_meets_is_not_worthwhile() {
+    // A ray that lies in a plane meets no triangle of it, so no ray from within counts.
+    let mut mesh = terraces(5, 1);
+    mesh.positions.iter_mut().for_each(|p| p[2] = 0.1);
+    let (_, report) = found(&mesh, KeepFree::Auto);
+    let worth = report.worth.unwrap();
+    assert_eq!((report.kept, worth.from_within.rays), (Kept::Directions, 0), "{report:?}");
+    assert!(worth.from_outside.rays > 100, "{report:?}");
+    // Nothing can be met at all.
+    let a = [0.5; 3];
+    let (_, report) = found(&weld(&[[a, a, a]]), KeepFree::Auto);
+    assert_eq!((report.kept, report.worth.unwrap_or_default()), (Kept::None, Worth::default()), "{report:?}");
 }
 
 #[test]

@@ -143,7 +143,8 @@ fn free_directions(
     let all = FreeOptions { keep: KeepFree::All, ..FreeOptions::default() };
     let (free, mut report) = free::find(mesh, tree, &all, progress)?;
     report.seconds = start.elapsed().as_secs_f64();
-    report.kept = free::worthwhile(mesh, tree, &all, progress)?;
+    let (kept, worth) = free::worthwhile(mesh, tree, &all, progress)?;
+    (report.kept, report.worth) = (kept, Some(worth));
     progress.stage("picture", None);
     let scene = bth::from_bytes(&pipeline::assemble(mesh, tree, &[], options, progress)?.bytes)?;
     write::write_atomically(path, &free_picture((mesh, tree), &scene, &free)?)?;
@@ -155,8 +156,8 @@ fn free_line(path: &Path, free: &FreeReport) -> String {
     let bytes = |row: usize| count(free.triangles * row as u64);
     format!(
         "wrote {}: from dark, where rays of no direction are known to meet nothing, to yellow, where all are; directions that are free up to a \
-         distance count in part\n{:.0} % of directions free; up to the distances {} {:.0} %, {:.0} %, {:.0} %; {:.1} s; {} by \
-         --free-directions auto\n",
+         distance count in part\n{:.0} % of directions free; up to the distances {} {:.0} %, {:.0} %, {:.0} %; {:.1} s\n\
+         {}: {} by --free-directions auto\n",
         path.display(),
         100.0 * free.free,
         free.levels.map(|distance| format!("{distance:.3}")).join(", "),
@@ -164,6 +165,7 @@ fn free_line(path: &Path, free: &FreeReport) -> String {
         100.0 * free.beyond[1],
         100.0 * free.beyond[2],
         free.seconds,
+        free.worth.unwrap_or_default(),
         match free.kept {
             Kept::None => "not kept".to_owned(),
             Kept::Distances => format!("distances kept, {} bytes,", bytes(size_of::<FreeDistances>())),

@@ -28,21 +28,20 @@ pub(super) fn summary(report: &CompileReport) -> String {
         facts.row(["opaque, transparent, unknown", &format!("{opaque}, {transparent}, {unknown}")]);
     }
     if let Some(free) = &report.free {
-        let kept = match free.kept {
-            Kept::None => "not worth their bytes",
-            Kept::Distances => "distances kept",
-            Kept::Directions => "kept",
-        };
         let [near, middle, far] = free.beyond.map(|share| 100.0 * share);
         let (all, seconds) = (100.0 * free.free, free.seconds);
         let shares = format!("{all:.0} %, up to distances {near:.0} %, {middle:.0} %, {far:.0} %");
-        facts.row([
-            "free directions",
-            &match free.undecided {
-                true => "left out of objects so large; --free-directions auto finds them".to_owned(),
-                false => format!("{shares}; {kept}, {seconds:.1} s"),
-            },
-        ]);
+        let told = match free.kept {
+            Kept::None if free.undecided => {
+                "left out of objects so large; --free-directions auto finds them".to_owned()
+            }
+            Kept::None => {
+                format!("not worth their bytes, {seconds:.1} s: {}", free.worth.unwrap_or_default())
+            }
+            Kept::Distances => format!("{shares}; distances kept, {seconds:.1} s"),
+            Kept::Directions => format!("{shares}; kept, {seconds:.1} s"),
+        };
+        facts.row(["free directions", &told]);
     }
     if let Some(found) = &report.coordinates {
         facts.row(["coordinates", &format!("{} bits", found.bits)]);

@@ -1,0 +1,166 @@
+//! Whether free directions are worth their bytes: by what rays that meet the mesh from everywhere would know where they start again.
+//!
+//! Many triangles of a mesh may be where no ray comes, as the inner ones of parts that stand in each other, and a room's walls are seen
+//! from one side. So triangles are not sampled by themselves, but by rays: from outside, as an object is seen, and from points within its
+//! box, as a room is.
+
+use super::frame::{beyond, share};
+use super::search::{Found, Surroundings};
+use super::{FreeOptions, Kept, decide};
+use crate::bvh::BinaryBvh;
+use crate::costs::{SampleRay, outside, walk};
+use crate::error::Result;
+use crate::monitor::Monitor;
+use crate::vectors::{corners, double_area, uniform_direction};
+use bth_format::layout::{FreeBins, FreeDirections, FreeDistances};
+use bth_import::Mesh;
+use bth_random::Rng;
+use glam::DVec3;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeSet, HashMap};
+use std::fmt;
+
+/// Least share of directions beyond the first level, from outside and from within, for which [`super::KeepFree::Auto`] keeps anything.
+const LEAST_OPEN: f64 = 0.5;
+/// Least share of free directions from outside for which it keeps them, and not distances alone. Terrain is met on its back by half of
+/// the lines, of which rows then tell nothing.
+const LEAST_FREE: f64 = 1.0 / 3.0;
+/// Rays of each kind: one for so many triangles, but at least and at most so many.
+const TRIANGLES_A_RAY: usize = 16;
+const RAYS: [usize; 2] = [256, 2048];
+/// Rays from each point within the box.
+const RAYS_A_POINT: usize = 8;
+
+/// What is known, in the mean, of the directions from where rays meet the mesh, on the side that they meet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Seen {
+    /// Rays that meet the mesh.
+    pub rays: u64,
+    /// Share of cosine-weighted directions in which certainly nothing is met within the distance of the first level.
+    pub open: f64,
+}
+
+/// What [`super::KeepFree::Auto`] decides by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Worth {
+    /// By lines that are uniform in space.
+    pub from_outside: Seen,
+    /// By rays in uniform directions from uniform points of the box that are not in solids.
+    pub from_within: Seen,
+    /// Share of cosine-weighted directions in which certainly nothing is met, where lines from outside meet the mesh; 0 where too few
+    /// are open, or where there is no room for free directions.
+    pub free: f64,
+}
+
+impl Worth {
+    /// Whether anything is worth its bytes.
+    fn is_open(&self) -> bool {
+        let kinds = [self.from_outside, self.from_within];
+        kinds.iter().all(|seen| seen.rays == 0 || seen.open >= LEAST_OPEN)
+            && kinds.iter().any(|seen| seen.rays > 0)
+    }
+}
+
+impl fmt::Display for Worth {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [outside, within, free] =
+            [self.from_outside.open, self.from_within.open, self.free].map(|share| 100.0 * share);
+        write!(
+            f,
+            "where rays from outside meet it {outside:.0} % of directions are open up to the first distance and {free:.0} % free, where rays from \
+             within do {within:.0} %"
+        )
+    }
+}
+
+/// A triangle that a ray meets.
+#[derive(Clone, Copy)]
+struct Met {
+    /// Row of the BVH's order.
+    row: usize,
+    is_back: bool,
+}
+
+/// What is worth keeping, and what that was decided by.
+///
+/// # Errors
+/// Only [`crate::Error::Cancelled`].
+pub(super) fn worth(
+    around: &mut Surroundings<'_>,
+    tree: &BinaryBvh,
+    options: &FreeOptions,
+    monitor: &dyn Monitor,
+) -> Result<(Kept, Worth)> {
+    let mut worth = Worth::default();
+    if options.row_bytes < size_of::<FreeDistances>() {
+        return Ok((Kept::None, worth));
+    }
+    let count = (tree.order.len() / TRIANGLES_A_RAY).clamp(RAYS[0], RAYS[1]);
+    let root = &tree.nodes[0];
+    let lines = outside(root.lower, root.upper, count, 1);
+    let from_outside: Vec<Met> = lines.par_iter().filter_map(|line| meet(around.mesh, tree, line)).collect();
+    let from_within = met_from_within(around.mesh, tree, count);
+    around.kept = Kept::Distances;
+    let of_row = decide_met(around, from_outside.iter().chain(&from_within), monitor)?;
+    let open = |met: &Met| beyond(of_row[&met.row].sectors[usize::from(met.is_back)], 1);
+    let seen = |met: &[Met]| Seen { rays: met.len() as u64, open: mean(met, open) };
+    (worth.from_outside, worth.from_within) = (seen(&from_outside), seen(&from_within));
+    if !worth.is_open() {
+        return Ok((Kept::None, worth));
+    }
+    if options.row_bytes < size_of::<FreeDirections>() {
+        return Ok((Kept::Distances, worth));
+    }
+    around.kept = Kept::Directions;
+    let of_row = decide_met(around, &from_outside, monitor)?;
+    worth.free = mean(&from_outside, |met| {
+        let bins = of_row[&met.row].bins;
+        if bins.is_back() == met.is_back { share(bins.0 & FreeBins::ALL) } else { 0.0 }
+    });
+    Ok((if worth.free >= LEAST_FREE { Kept::Directions } else { Kept::Distances }, worth))
+}
+
+/// The triangles that rays in uniform directions meet from uniform points of the box, but not from points in solids, from which only backs
+/// are seen: what is in a room shows its front.
+fn met_from_within(mesh: &Mesh, tree: &BinaryBvh, count: usize) -> Vec<Met> {
+    let (root, mut random) = (&tree.nodes[0], Rng::new(2));
+    let mut from_point = || {
+        let end = |k: usize| (f64::from(root.lower[k]), f64::from(root.upper[k]));
+        let origin = [0, 1, 2].map(|k| random.between(end(k).0, end(k).1));
+        [(); RAYS_A_POINT].map(|()| {
+            let direction = uniform_direction(&mut random).into();
+            SampleRay { origin, direction, tmax: f64::INFINITY, from: None }
+        })
+    };
+    let points: Vec<_> = (0..count.div_ceil(RAYS_A_POINT)).map(|_| from_point()).collect();
+    let of_point = |rays: &[SampleRay; RAYS_A_POINT]| {
+        let met: Vec<Met> = rays.iter().filter_map(|ray| meet(mesh, tree, ray)).collect();
+        if met.iter().all(|met| met.is_back) { Vec::new() } else { met }
+    };
+    points.par_iter().flat_map_iter(of_point).collect()
+}
+
+/// The first triangle that a ray meets.
+fn meet(mesh: &Mesh, tree: &BinaryBvh, ray: &SampleRay) -> Option<Met> {
+    let (row, _) = walk(mesh, tree, ray, |_| ()).hit?;
+    let normal = double_area(corners(mesh, tree.order[row as usize]));
+    Some(Met { row: row as usize, is_back: normal.dot(DVec3::from(ray.direction)) > 0.0 })
+}
+
+/// What is known of the triangles that are met, by rows.
+fn decide_met<'a>(
+    around: &Surroundings<'_>,
+    met: impl IntoIterator<Item = &'a Met>,
+    monitor: &dyn Monitor,
+) -> Result<HashMap<usize, Found>> {
+    let rows: BTreeSet<usize> = met.into_iter().map(|met| met.row).collect();
+    let tasks: Vec<_> = rows.into_iter().map(|row| row..row + 1).collect();
+    Ok(decide(around, &tasks, monitor, |_| ())?.into_iter().collect())
+}
+
+/// The mean of a share over what is met; 0 where nothing is.
+fn mean(met: &[Met], share: impl Fn(&Met) -> f64) -> f64 {
+    let sum = met.iter().fold(0.0, |sum, met| sum + share(met));
+    (sum / (met.len() as f64).max(1.0)).min(1.0)
+}

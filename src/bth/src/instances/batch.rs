@@ -96,16 +96,6 @@ impl Kernel for StartKernel<'_> {
         let (world, rays) = (batch.world, &batch.rays[first..first + count]);
         let top = &world.top;
         packets.start(s, top, rays, active);
-        if free_starts.any_meets_nothing() {
-            // Which rays are removed is not predictable, so there is no branch.
-            let mut kept = 0;
-            for i in 0..active.len() {
-                let index = active[i];
-                active[kept] = index;
-                kept += usize::from(!free_starts.meets_nothing(index as usize));
-            }
-            active.truncate(kept);
-        }
         if let (Some(from), true) = (batch.hints(), world.has_single_visible()) {
             // No other instance is visible, so a ray that starts on it needs no traversal.
             active.retain(|&index| {

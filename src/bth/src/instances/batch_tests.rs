@@ -1,6 +1,5 @@
 //! Tests of batches through instances. The oracle is a loop over all instances.
 
-use super::super::box_misses::MarkBoxMisses;
 use super::super::exact_loop;
 use super::super::placement::PartBoxes;
 use super::super::test_worlds::{FILES, rays, unit, world};
@@ -89,48 +88,6 @@ fn top_level_and_hints_do_not_change_results() {
 }
 
 /// The first batches of a scene take turns with and without their hints, whatever is measured.
-#[test]
-fn a_ray_that_is_marked_meets_no_instance_but_that_of_its_start() {
-    let mut rng = Rng::new(13);
-    let (mut marked, mut tested) = (0, 0);
-    for case in 0..600 {
-        let file = File::from_bytes(FILES[case % 2]).unwrap();
-        let objects = Objects::of_file(file.clone());
-        let count = [1, 2, 7, 16, 17, 40, 90][case % 7];
-        let (world, transforms) = world(&file, &mut rng, count);
-        if !MarkBoxMisses::is_applicable(&world.top) {
-            continue;
-        }
-        let rays = rays(&mut rng, &transforms, 40);
-        let batch = SceneBatch { world: &world, objects: &objects, rays: &rays, from: None };
-        let visible: Vec<u32> =
-            (0..count as u32).filter(|i| world.placements[*i as usize].is_some()).collect();
-        let start = |ray: usize| Visit {
-            ray: ray as u32,
-            instance: visible[rng.below(visible.len() as u64) as usize],
-        };
-        let starts: Vec<Visit> = (0..rays.len()).map(start).collect();
-        let mut marks = vec![false; rays.len()];
-        if Isa::chosen()
-            .run_wide(MarkBoxMisses { batch: &batch, starts: &starts, first: 0, marks: &mut marks })
-            .is_err()
-        {
-            return;
-        }
-        for (start, ray) in starts.iter().zip(&rays).filter(|(start, _)| marks[start.ray as usize]) {
-            let mut others = world.placements.clone();
-            others[start.instance as usize] = None;
-            let others = World::with_placements(others, file.object_count());
-            assert_eq!(nearest_by_loop(&others, &file, ray), Hit::MISS, "case {case}, {start:?}");
-            let reach = ray.origin.iter().fold(0f32, |reach, x| reach.max(x.abs()));
-            assert!(reach <= world.top.reach, "case {case}: boxes are not wide enough for {ray:?}");
-            marked += 1;
-        }
-        tested += rays.len();
-    }
-    assert!(marked * 20 > tested && tested > 10_000, "{marked} of {tested} rays are marked");
-}
-
 #[test]
 fn batches_that_are_measured_with_and_without_hints_have_the_same_answers() {
     let mut rng = Rng::new(13);

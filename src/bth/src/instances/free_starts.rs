@@ -5,7 +5,6 @@
 //! rounding, so the answer is the same.
 
 use super::World;
-use super::box_misses::MarkBoxMisses;
 use super::enter_object::ObjectRays;
 use super::progress::Progress;
 use super::scene_batch::SceneBatch;
@@ -16,7 +15,6 @@ use crate::object::Hinted;
 use crate::objects::Objects;
 use crate::query::sink::Visit;
 use crate::rays::{PrimitiveRef, Ray};
-use crate::simd::Isa;
 use bth_format::layout::{Child, NONE};
 use std::ops::Range;
 
@@ -26,10 +24,6 @@ use std::ops::Range;
 pub(super) struct FreeStarts {
     /// By index in the chunk; `NONE` if the ray may meet all instances. Empty if that is so for all rays.
     not_met: Vec<u32>,
-    /// The rays that do not meet the instance on which they start, with that instance, by object.
-    free: Vec<Visit>,
-    /// By index in the chunk, whether a ray meets nothing at all. Empty if that is known of none.
-    meets_nothing: Vec<bool>,
     /// Rays that hit the instance on which they start only behind their `tmin`: by index in the chunk that instance, or `NONE`, and the t
     /// in its space from which on. Empty if that is known of none.
     later: Vec<(u32, f32)>,
@@ -64,17 +58,6 @@ impl FreeStarts {
         may_meet
     }
 
-    /// Whether it is known of any ray that it meets nothing at all.
-    pub(super) fn any_meets_nothing(&self) -> bool {
-        !SMALL && !self.meets_nothing.is_empty()
-    }
-
-    /// Whether it is known of a ray of the chunk that it meets nothing at all.
-    #[inline(always)]
-    pub(super) fn meets_nothing(&self, index: usize) -> bool {
-        self.meets_nothing.get(index).copied().unwrap_or(false)
-    }
-
     /// Lets the ranges of rays in the space of an object, given with their visits, begin where they can hit anything.
     pub(super) fn begin_later(&self, visits: &[Visit], rays: &mut [Ray]) {
         if SMALL || self.later.is_empty() {
@@ -92,9 +75,8 @@ impl FreeStarts {
         if SMALL {
             return;
         }
-        let FreeStarts { not_met, free, meets_nothing, later, first, visits, object_rays, rest } = self;
+        let FreeStarts { not_met, later, first, visits, object_rays, rest } = self;
         not_met.clear();
-        meets_nothing.clear();
         later.clear();
         *first = chunk.start;
         let Some(from) = batch.hints() else { return };
@@ -109,7 +91,6 @@ impl FreeStarts {
             return;
         }
         not_met.resize(chunk.len(), NONE);
-        free.clear();
         batch.world.by_object(visits, |object, visits| {
             let object = batch.objects.view(object);
             object_rays.fill(batch, true, visits, Progress::None);
@@ -126,22 +107,8 @@ impl FreeStarts {
                     not_met[place(visit)] = NONE;
                     later[place(visit)] = (visit.instance, rest.rays[*index as usize].tmin);
                 }
-                // Which rays are left is not predictable, so there is no branch.
-                let mut count = free.len();
-                free.resize(count + visits.len(), Visit { ray: NONE, instance: NONE });
-                for visit in visits {
-                    free[count] = *visit;
-                    count += usize::from(not_met[place(visit)] != NONE);
-                }
-                free.truncate(count);
             }
         });
-        if MarkBoxMisses::is_applicable(&batch.world.top) && !free.is_empty() {
-            meets_nothing.resize(chunk.len(), false);
-            let marks = &mut meets_nothing[..];
-            // Without vectors, rays go through the top level one by one.
-            let _ = Isa::chosen().run_wide(MarkBoxMisses { batch, starts: free, first: chunk.start, marks });
-        }
     }
 }
 

@@ -7,6 +7,7 @@
 
 use super::box_tests::limit;
 use super::instance_list::LEAST_KEY;
+use super::met_by_lanes::MetByLanes;
 use super::progress::Progress;
 use super::top_level::TopLevel;
 use super::top_nodes::INSTANCE;
@@ -41,6 +42,8 @@ pub(super) struct ListedRays {
     tests: Tests,
     /// Decides after rays that met too many boxes that the next ones are not listed.
     backoff: PacketBackoff,
+    /// As `backoff`, for rays that are tested together.
+    backoff_together: PacketBackoff,
 }
 
 /// A ray that is to be listed. Its tmin is not negative.
@@ -105,6 +108,16 @@ impl ListedRays {
         self.backoff.may_try()
     }
 
+    /// Whether the next sixteen rays are to be tested together.
+    pub(super) fn may_list_together(&mut self) -> bool {
+        self.backoff_together.may_try()
+    }
+
+    /// Records whether rays that were tested together met so few instances that they are listed.
+    pub(super) fn record_together(&mut self, are_listed: bool) {
+        self.backoff_together.record(are_listed);
+    }
+
     /// Lists up to sixteen rays, and appends the visits of the nearest instances to `visits`. Returns those that meet too many boxes, a bit
     /// each. `first_ray` is added to the index of the ray of a visit.
     #[inline(always)]
@@ -116,33 +129,87 @@ impl ListedRays {
         (first_ray, visits): (u32, &mut Vec<Visit>),
     ) -> u32 {
         let failed = self.tests.run(s, top, rays);
-        for (lane, (list, ray)) in self.tests.lists.iter().zip(rays).enumerate() {
+        for (lane, ray) in rays.iter().enumerate() {
             if failed >> lane & 1 != 0 {
                 continue;
             }
-            let count = usize::from(self.tests.counts[lane]);
-            self.keys[self.len] = f32::NAN;
-            let first = self.len + 1;
-            let codes = self.codes[first..].first_chunk_mut().expect("there is room for all lists");
-            let keys = self.keys[first..].first_chunk_mut().expect("there is room for all lists");
-            let bits = ((1u64 << count) - 1) as u32;
+            let list = &self.tests.lists[lane];
+            let bits = ((1u64 << self.tests.counts[lane]) - 1) as u32;
             let depths = s.load(list.keys.first_chunk().expect("of this length"));
-            let instances = s.load_u(list.codes.first_chunk().expect("of this length"));
-            s.compress_far_to_near(bits, depths, instances, codes, keys);
-            let nearest = self.len + count;
-            self.len = nearest + 1;
-            if count > 0 {
+            let codes = s.load_u(list.codes.first_chunk().expect("of this length"));
+            let nearest = self.push(s, (ray.index, ray.slabs.scale), (bits, depths, codes));
+            if bits != 0 {
                 let instance = self.codes[nearest] & !INSTANCE;
                 visits.push(Visit { ray: first_ray + ray.index, instance });
-            }
-            if count > 1 {
-                let next = (nearest - 1) as u32;
-                self.rays[ray.index as usize] = ListedRay { scale: ray.slabs.scale, next };
-                self.active.push(ray.index);
             }
         }
         self.backoff.record(failed.count_ones() as usize <= MAX_FAILED);
         failed
+    }
+
+    /// As [`Self::list`], for rays that were tested together; `at` holds their indices.
+    #[inline(always)]
+    pub(super) fn list_together<S: Simd>(
+        &mut self,
+        s: S,
+        met: &MetByLanes<S>,
+        at: &[u32; LANES],
+        (first_ray, visits): (u32, &mut Vec<Visit>),
+    ) {
+        let mut code = [0; LANES];
+        s.store_u(met.code, &mut code);
+        if met.several != 0 {
+            let codes = s.load_u(&met.codes);
+            let (mut of_ray, mut scale) = ([[0.0; LANES]; LANES], [0.0; LANES]);
+            for (to, depths) in of_ray.iter_mut().zip(s.transpose(met.depths)) {
+                s.store(depths, to);
+            }
+            s.store(met.scale, &mut scale);
+            let mut rays = met.several;
+            while rays != 0 {
+                let lane = rays.trailing_zeros() as usize % LANES;
+                rays &= rays - 1;
+                let depths = s.load(&of_ray[lane]);
+                let bits = s.mask_bits(s.lt(depths, s.splat(f32::INFINITY)));
+                // What is not met is not stored, but may be sorted.
+                let depths = s.min(s.max(depths, s.splat(LEAST_KEY)), s.splat(f32::MAX));
+                let nearest = self.push(s, (at[lane], scale[lane]), (bits, depths, codes));
+                code[lane] = self.codes[nearest];
+            }
+        }
+        let mut count = visits.len();
+        visits.resize(count + LANES, Visit { ray: 0, instance: 0 });
+        let (mut rays, mut instances) = ([0; LANES], [0; LANES]);
+        s.compress(met.any, s.load_u(at), &mut rays);
+        s.compress(met.any, s.load_u(&code), &mut instances);
+        for (to, (ray, code)) in visits[count..].iter_mut().zip(rays.iter().zip(instances)) {
+            *to = Visit { ray: first_ray + ray, instance: code & !INSTANCE };
+        }
+        count += met.any.count_ones() as usize;
+        visits.truncate(count);
+    }
+
+    /// Stores the list of a ray, given its index in the chunk and the depth of t = 1, and the instances that it meets: their bits, and depths and
+    /// codes in the lanes. Returns the index of the nearest, to be visited at once; the list has no others.
+    #[inline(always)]
+    fn push<S: Simd>(
+        &mut self,
+        s: S,
+        (ray, scale): (u32, f32),
+        (bits, depths, instances): (u32, S::F, S::U),
+    ) -> usize {
+        self.keys[self.len] = f32::NAN;
+        let first = self.len + 1;
+        let codes = self.codes[first..].first_chunk_mut().expect("there is room for all lists");
+        let keys = self.keys[first..].first_chunk_mut().expect("there is room for all lists");
+        let count = s.compress_far_to_near(bits, depths, instances, codes, keys);
+        let nearest = self.len + count;
+        self.len = nearest + 1;
+        if count > 1 {
+            self.rays[ray as usize] = ListedRay { scale, next: (nearest - 1) as u32 };
+            self.active.push(ray);
+        }
+        nearest
     }
 
     /// Advances each active ray to the next instance whose box it may intersect, as

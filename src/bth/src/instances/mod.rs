@@ -4,14 +4,14 @@
 //! the world box of each instance that moved ([`placement`]), and rebuilds the BVH over the boxes ([`top_level`]). In a scene that
 //! the caller builds, a commit ([`caller`]) does the same for the instances that the caller has changed, and may refit the BVH
 //! instead. Rays meet the result ([`world`]) in the same way. A batch of rays ([`batch`]) traverses that BVH, coherent rays as
-//! packets ([`packets`]), of the others those that meet few boxes by lists ([`listed_rays`]) and the rest with stacks ([`traverse`]); the answers so far
-//! end them ([`progress`]). Rays that certainly do not meet the instance on which they start
-//! ([`free_starts`]) do not enter it, and those that meet no other instance's box end at once ([`box_misses`]). Each visit of an instance by a ray is queued ([`visit_queue`]); the rays of an object's
-//! visits are transformed into its space ([`enter_object`]) and traced there together, with t unchanged. A single ray ([`one_ray`]), and
+//! packets ([`packets`]), of the others those that meet few boxes by lists ([`listed_rays`], through few boxes sixteen rays together:
+//! [`met_by_lanes`]) and the rest with stacks ([`traverse`]); the answers so far end them ([`progress`]). Rays that certainly do not meet
+//! the instance on which they start ([`free_starts`]) do not enter it. Each visit of an instance by a ray is queued ([`visit_queue`]); the
+//! rays of an object's visits are transformed into its space ([`enter_object`]) and traced there together, with t unchanged. A single ray
+//! ([`one_ray`]), and
 //! one whose query reports several hits, goes through the top level alone ([`enumerate`], [`instance_list`]).
 
 mod batch;
-mod box_misses;
 mod box_tests;
 mod caller;
 mod caller_instances;
@@ -24,6 +24,7 @@ mod file_scene;
 mod free_starts;
 mod instance_list;
 mod listed_rays;
+mod met_by_lanes;
 mod one_ray;
 mod packets;
 mod placement;

@@ -5,6 +5,7 @@
 
 use super::box_tests::{limit, widened_slabs};
 use super::listed_rays::{ListedRays, RayToList};
+use super::met_by_lanes::MetByLanes;
 use super::progress::Progress;
 use super::top_level::TopLevel;
 use super::top_nodes::INSTANCE;
@@ -80,6 +81,22 @@ impl RayTraversals {
         for first in (0..active.len()).step_by(LANES) {
             let count = LANES.min(active.len() - first);
             index[..count].copy_from_slice(&active[first..first + count]);
+            let mut done = 0;
+            if S::HAS_VECTORS && !SMALL && lists.may_list_together() {
+                let mut skips = [NONE; LANES];
+                for (skips, ray) in skips.iter_mut().zip(&index[..count]) {
+                    *skips = INSTANCE | skip(*ray as usize);
+                }
+                let met = MetByLanes::of(s, top, rays, (&index, count), &skips);
+                lists.record_together(met.is_some());
+                if let Some(met) = met {
+                    lists.list_together(s, &met, &index, (first_ray, visits));
+                    done = met.tested;
+                }
+                if done.count_ones() as usize == count {
+                    continue;
+                }
+            }
             // Without vectors, preparation in lanes takes as long as one ray after the other, and much code.
             if S::HAS_VECTORS {
                 prepared.fill(s, &top.cube, rays, &index, count);
@@ -88,6 +105,9 @@ impl RayTraversals {
             let mut listed = [RayToList::NONE; LANES];
             let mut listed_count = 0;
             for (lane, &ray_index) in index[..count].iter().enumerate() {
+                if done >> lane & 1 != 0 {
+                    continue;
+                }
                 let ray = &rays[ray_index as usize];
                 let [x, y, z] = ray.origin;
                 let is_near = x.abs() <= top.reach && y.abs() <= top.reach && z.abs() <= top.reach;
@@ -110,7 +130,8 @@ impl RayTraversals {
                 kept += 1;
             }
             let listed = &listed[..listed_count];
-            let mut failed = if lists_rays { lists.list(s, top, listed, (first_ray, visits)) } else { 0 };
+            let mut failed =
+                if listed_count > 0 { lists.list(s, top, listed, (first_ray, visits)) } else { 0 };
             while failed != 0 {
                 let RayToList { index, slabs, skip, .. } = listed[failed.trailing_zeros() as usize % LANES];
                 failed &= failed - 1;

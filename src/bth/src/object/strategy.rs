@@ -85,8 +85,9 @@ const LAST_INTERVAL: u32 = 256;
 /// Number of the last comparisons that count.
 const COMPARISONS: usize = 16;
 
-/// What is a clear difference of costs, and counts as no more: an interrupted batch costs many times as much as others.
-const CLEAR: f64 = 2.0;
+/// What is a clear difference of costs, relative to their sum, and counts as no more: an interrupted batch costs many times as much as
+/// others.
+const CLEAR: f64 = 1.0 / 3.0;
 
 /// How the next batch is traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,13 +100,14 @@ pub(crate) struct Plan {
 /// The measurements for one kind of rays through one object or scene.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StrategyChoice {
-    /// The last costs of [`Strategy::Hinted`] relative to those of [`Strategy::Bvh`], in no order.
-    ratios: [f64; COMPARISONS],
+    /// By how much [`Strategy::Hinted`] took longer than [`Strategy::Bvh`], relative to the sum of both, in no order. Ratios would have a
+    /// greater mean than their reciprocals, and so would never agree on what is faster where parts of a picture differ much.
+    differences: [f64; COMPARISONS],
     /// Number of comparisons so far.
     comparisons: usize,
-    /// Mean of the ratios without the least and the greatest quarter: the thread may be interrupted in any batch, which spoils two
+    /// Mean of the differences without the least and the greatest quarter: the thread may be interrupted in any batch, which spoils two
     /// comparisons, and the strategies may differ in few batches only, which a median would not see.
-    ratio: f64,
+    difference: f64,
     /// The strategy and the seconds per ray of the batch before, if it was measured.
     last: Option<(Strategy, f64)>,
     /// Whether the last comparison agrees with the mean.
@@ -121,9 +123,9 @@ pub(crate) struct StrategyChoice {
 impl StrategyChoice {
     pub(crate) fn new() -> StrategyChoice {
         StrategyChoice {
-            ratios: [1.0; COMPARISONS],
+            differences: [0.0; COMPARISONS],
             comparisons: 0,
-            ratio: 1.0,
+            difference: 0.0,
             last: None,
             is_confirmed: true,
             batches: 0,
@@ -134,7 +136,7 @@ impl StrategyChoice {
 
     /// The strategy that is faster by the measurements so far; [`Strategy::Bvh`] without any.
     pub(crate) fn best(&self) -> Strategy {
-        if self.ratio < 1.0 { Strategy::Hinted } else { Strategy::Bvh }
+        if self.difference < 0.0 { Strategy::Hinted } else { Strategy::Bvh }
     }
 
     /// As [`Self::best`], with the strategy for batches that come before there are measurements.
@@ -175,22 +177,20 @@ impl StrategyChoice {
     pub(crate) fn record(&mut self, strategy: Strategy, seconds_per_ray: f64) {
         let before = self.last.replace((strategy, seconds_per_ray));
         let Some((_, before)) = before.filter(|(before, _)| *before != strategy) else { return };
-        let ratio = match strategy {
-            Strategy::Hinted => seconds_per_ray / before,
-            Strategy::Bvh => before / seconds_per_ray,
-        };
+        let difference = (seconds_per_ray - before) / (seconds_per_ray + before);
+        let difference = if strategy == Strategy::Hinted { difference } else { -difference };
         // A clock that stood still tells nothing.
-        if !(ratio > 0.0 && ratio.is_finite()) {
+        if !difference.is_finite() || seconds_per_ray.min(before) <= 0.0 {
             return;
         }
-        self.ratios[self.comparisons % COMPARISONS] = ratio.clamp(1.0 / CLEAR, CLEAR);
+        self.differences[self.comparisons % COMPARISONS] = difference.clamp(-CLEAR, CLEAR);
         self.comparisons += 1;
-        let mut sorted = self.ratios;
+        let mut sorted = self.differences;
         let sorted = &mut sorted[..self.comparisons.min(COMPARISONS)];
         sorted.sort_unstable_by(f64::total_cmp);
         let middle = &sorted[sorted.len() / 4..sorted.len() - sorted.len() / 4];
-        self.ratio = middle.iter().sum::<f64>() / middle.len() as f64;
-        self.is_confirmed = (ratio < 1.0) == (self.ratio < 1.0);
+        self.difference = middle.iter().sum::<f64>() / middle.len() as f64;
+        self.is_confirmed = (difference < 0.0) == (self.difference < 0.0);
     }
 }
 

@@ -88,12 +88,19 @@ impl<S: Lanewise> GroupSlabs<S> {
 
     /// Implements [`RayGroup::may_enter`].
     #[inline(always)]
-    pub(crate) fn may_enter(
+    pub(crate) fn may_enter(&self, s: S, corners: [[f32; 3]; 2], kind: (bool, bool)) -> u32 {
+        s.mask_bits(self.enter(s, corners, kind).1)
+    }
+
+    /// The depths at which the rays enter a box, and the rays that may meet it within their range. The parameters are those of
+    /// [`Self::may_enter`].
+    #[inline(always)]
+    pub(crate) fn enter(
         &self,
         s: S,
         corners: [[f32; 3]; 2],
         (mixed_octants, common_origin): (bool, bool),
-    ) -> u32 {
+    ) -> (S::F, S::M) {
         let [mut enter, mut leave] = self.depths;
         for k in 0..3 {
             let (mut near, mut far) = (s.splat(corners[0][k]), s.splat(corners[1][k]));
@@ -111,7 +118,7 @@ impl<S: Lanewise> GroupSlabs<S> {
             enter = s.max(near, enter);
             leave = s.min(far, leave);
         }
-        s.mask_bits(s.le(enter, leave))
+        (enter, s.le(enter, leave))
     }
 }
 

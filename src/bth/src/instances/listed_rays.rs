@@ -7,7 +7,7 @@
 
 use super::box_tests::limit;
 use super::instance_list::LEAST_KEY;
-use super::met_by_lanes::MetByLanes;
+use super::met_by_lanes::{MetByLanes, RaysTogether};
 use super::progress::Progress;
 use super::top_level::TopLevel;
 use super::top_nodes::INSTANCE;
@@ -16,7 +16,7 @@ use crate::bvh::ray_state::key_limit;
 use crate::bvh::stack::BOTTOM;
 use crate::intersect::boxes::RaySlabs;
 use crate::query::sink::Visit;
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Part, Simd};
 use bth_format::layout::NONE;
 
 /// Greatest number of instances in a list.
@@ -42,7 +42,7 @@ pub(super) struct ListedRays {
     tests: Tests,
     /// Decides after rays that met too many boxes that the next ones are not listed.
     backoff: PacketBackoff,
-    /// As `backoff`, for rays that are tested together.
+    /// Decides after rays that were tested together against many boxes that the next ones are not.
     backoff_together: PacketBackoff,
 }
 
@@ -113,11 +113,6 @@ impl ListedRays {
         self.backoff_together.may_try()
     }
 
-    /// Records whether rays that were tested together met so few instances that they are listed.
-    pub(super) fn record_together(&mut self, are_listed: bool) {
-        self.backoff_together.record(are_listed);
-    }
-
     /// Lists up to sixteen rays, and appends the visits of the nearest instances to `visits`. Returns those that meet too many boxes, a bit
     /// each. `first_ray` is added to the index of the ray of a visit.
     #[inline(always)]
@@ -147,9 +142,21 @@ impl ListedRays {
         failed
     }
 
-    /// As [`Self::list`], for rays that were tested together; `at` holds their indices.
+    /// Lists those of up to sixteen rays that f32 prepares, as [`Self::list`]. Returns them, a bit each: none if they reach too many boxes to be
+    /// tested together.
     #[inline(always)]
     pub(super) fn list_together<S: Simd>(
+        &mut self,
+        s: S,
+        rays: &RaysTogether<'_>,
+        (first_ray, visits): (u32, &mut Vec<Visit>),
+    ) -> u32 {
+        s.call(ListTogether { lists: self, rays, first_ray, visits })
+    }
+
+    /// Stores the lists of rays that were tested together; `at` holds their indices.
+    #[inline(always)]
+    fn store_together<S: Simd>(
         &mut self,
         s: S,
         met: &MetByLanes<S>,
@@ -235,6 +242,28 @@ impl ListedRays {
         }
         visits.truncate(count);
         active.truncate(kept);
+    }
+}
+
+/// [`ListedRays::list_together`] with its arguments. A function of its own, so that the kernel has room for rays that are listed one by one.
+struct ListTogether<'a> {
+    lists: &'a mut ListedRays,
+    rays: &'a RaysTogether<'a>,
+    first_ray: u32,
+    visits: &'a mut Vec<Visit>,
+}
+
+impl<S: Simd> Part<S> for ListTogether<'_> {
+    type Output = u32;
+    #[inline(always)]
+    fn run(self, s: S) -> u32 {
+        let ListTogether { lists, rays, first_ray, visits } = self;
+        let met = MetByLanes::of(s, rays);
+        lists.backoff_together.record(met.as_ref().is_some_and(|met| met.is_worthwhile));
+        met.map_or(0, |met| {
+            lists.store_together(s, &met, rays.at, (first_ray, visits));
+            met.tested
+        })
     }
 }
 

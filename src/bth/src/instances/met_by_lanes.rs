@@ -15,6 +15,18 @@ use crate::simd::{LANES, Simd};
 /// hundred boxes.
 const MAX_TESTS: usize = 4 * LANES;
 
+/// Up to sixteen rays that are to be tested together.
+pub(super) struct RaysTogether<'a> {
+    pub(super) top: &'a TopLevel,
+    /// The rays of a chunk.
+    pub(super) rays: &'a [Ray],
+    /// The indices of the rays, and their number.
+    pub(super) at: &'a [u32; LANES],
+    pub(super) count: usize,
+    /// For each the code of an instance that it does not enter, or `NONE`.
+    pub(super) skip: &'a [u32; LANES],
+}
+
 /// Sixteen rays, and the instances that any of them may enter. Each is a row with a lane for each ray.
 pub(super) struct MetByLanes<S: Simd> {
     /// The codes of the instances, one for each row.
@@ -31,19 +43,16 @@ pub(super) struct MetByLanes<S: Simd> {
     pub(super) several: u32,
     /// For each ray the code of an instance that it may enter.
     pub(super) code: S::U,
+    /// Whether no more boxes were tested than nodes are reached by the rays, each counted for itself: a test of all rays against one box takes
+    /// as long as one of a ray against a node.
+    pub(super) is_worthwhile: bool,
 }
 
 impl<S: Simd> MetByLanes<S> {
-    /// Tests the first `count` of the rays with the indices `at`; none enters the instance whose code is in its lane of `skip`. `None` if they
-    /// enter more instances than there are rows, or if there are too many boxes to be tested.
+    /// Tests rays. `None` if they enter more instances than there are rows, or if there are too many boxes to be tested.
     #[inline(always)]
-    pub(super) fn of(
-        s: S,
-        top: &TopLevel,
-        rays: &[Ray],
-        (at, count): (&[u32; LANES], usize),
-        skip: &[u32; LANES],
-    ) -> Option<MetByLanes<S>> {
+    pub(super) fn of(s: S, rays: &RaysTogether<'_>) -> Option<MetByLanes<S>> {
+        let RaysTogether { top, rays, at, count, skip } = *rays;
         let used = s.mask(((1u64 << count) - 1) as u32);
         let field = gather_rays(s, used, rays, s.load_u(at));
         // Boxes do not need to know the greatest axis.
@@ -61,9 +70,10 @@ impl<S: Simd> MetByLanes<S> {
             any: 0,
             several: 0,
             code: s.splat_u(0),
+            is_worthwhile: false,
         };
         let (mut stack, mut height) = ([0; MAX_TESTS], 1);
-        let (mut tests, mut rows) = (0, 0);
+        let (mut tests, mut rows, mut reached) = (0, 0, count);
         while height > 0 {
             height -= 1;
             let node = top.node(stack[height % MAX_TESTS]);
@@ -86,6 +96,7 @@ impl<S: Simd> MetByLanes<S> {
                     // There is room for all boxes that are tested.
                     stack[height % MAX_TESTS] = code;
                     height += 1;
+                    reached += enters.count_ones() as usize;
                     continue;
                 }
                 if rows == LANES {
@@ -100,6 +111,7 @@ impl<S: Simd> MetByLanes<S> {
                 rows += 1;
             }
         }
+        met.is_worthwhile = tests <= reached;
         Some(met)
     }
 }

@@ -5,7 +5,7 @@
 
 use super::box_tests::{limit, widened_slabs};
 use super::listed_rays::{ListedRays, RayToList};
-use super::met_by_lanes::MetByLanes;
+use super::met_by_lanes::RaysTogether;
 use super::progress::Progress;
 use super::top_level::TopLevel;
 use super::top_nodes::INSTANCE;
@@ -87,12 +87,8 @@ impl RayTraversals {
                 for (skips, ray) in skips.iter_mut().zip(&index[..count]) {
                     *skips = INSTANCE | skip(*ray as usize);
                 }
-                let met = MetByLanes::of(s, top, rays, (&index, count), &skips);
-                lists.record_together(met.is_some());
-                if let Some(met) = met {
-                    lists.list_together(s, &met, &index, (first_ray, visits));
-                    done = met.tested;
-                }
+                let together = RaysTogether { top, rays, at: &index, count, skip: &skips };
+                done = lists.list_together(s, &together, (first_ray, visits));
                 if done.count_ones() as usize == count {
                     continue;
                 }

@@ -22,6 +22,7 @@ use crate::simd::{Isa, Kernel, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 use std::cell::RefCell;
+use std::ops::Range;
 
 /// Number of rays that advance together.
 const CHUNK: usize = 2048;
@@ -151,9 +152,9 @@ impl World {
         from: Option<&[PrimitiveRef]>,
         hits: &mut [Hit],
     ) {
-        self.by_hints(objects, (rays, from), false, |from, scratch| {
-            let mut query = SceneNearest { hits, scratch };
-            self.run(objects, rays, from, &mut query);
+        self.by_hints(objects, (rays, from), false, |range, from, scratch| {
+            let mut query = SceneNearest { hits: &mut hits[range.clone()], scratch };
+            self.run(objects, &rays[range], from, &mut query);
         });
     }
 
@@ -165,27 +166,29 @@ impl World {
         from: Option<&[PrimitiveRef]>,
         found: &mut [bool],
     ) {
-        self.by_hints(objects, (rays, from), true, |from, scratch| {
-            let mut query = SceneAny { rays, found, scratch };
+        self.by_hints(objects, (rays, from), true, |range, from, scratch| {
+            let rays = &rays[range.clone()];
+            let mut query = SceneAny { rays, found: &mut found[range], scratch };
             self.run(objects, rays, from, &mut query);
         });
     }
 
-    /// Calls `trace` with the hints of a batch, or with none where they are of no use to it or it was measured to be faster so through
+    /// Calls `trace` with ranges of a batch and their hints, or with none where they are of no use to it or it was measured to be faster so through
     /// this scene: most rays may leave in directions that are not free, or meet nothing of their instance anyway.
     fn by_hints(
         &self,
         objects: &Objects,
         (rays, from): (&[Ray], Option<&[PrimitiveRef]>),
         any: bool,
-        trace: impl FnOnce(Option<&[PrimitiveRef]>, &mut Scratch),
+        mut trace: impl FnMut(Range<usize>, Option<&[PrimitiveRef]>, &mut Scratch),
     ) {
         let hints = from.filter(|from| !SMALL && self.has_use_for(objects, from));
         object::with_scratch(|scratch| {
-            let Some(from) = hints else { return trace(None, scratch) };
+            let Some(from) = hints else { return trace(0..rays.len(), None, scratch) };
             let key = (self.identity, HintUse::StartInstance.kind(QueryKind::of(any, rays, self.top.extent)));
-            object::by_hint(key, from.len(), Strategy::Bvh, scratch, |strategy, scratch| {
-                trace(hints.filter(|_| strategy == Strategy::Hinted), scratch);
+            object::by_hint(key, from.len(), Strategy::Bvh, scratch, |range, strategy, scratch| {
+                let hints = (strategy == Strategy::Hinted).then(|| &from[range.clone()]);
+                trace(range, hints, scratch);
             });
         });
     }

@@ -4,7 +4,7 @@
 use super::hints::Hinted;
 use super::scratch::Scratch;
 use super::single;
-use super::strategy::{HintUse, MIN_MEASURED_RAYS, Plan, QueryKind, Strategy, size_of};
+use super::strategy::{HintUse, MIN_COMPARED_RAYS, PARTS, Plan, QueryKind, Strategy, size_of};
 use super::walked_batch::{RAYS_PER_PART, has_subtrees, may_gain_by_walk, sole_tet_leaf, walk};
 use crate::SMALL;
 use crate::bvh::interleaved::{Interleaved, RemainingRays};
@@ -15,65 +15,57 @@ use crate::intersect::exact_lanes::Intersections;
 use crate::query::sink::Sink;
 use crate::query::{Answer, AnswerLanes, EitherGoal, Goal, Nearest, Query, Uncounted};
 use crate::rays::{Hit, Ray};
-use crate::simd::{Isa, Kernel, Simd};
+use crate::simd::{Isa, Kernel, LANES, Simd};
 use crate::tets::TetOutcome;
 use crate::tets::enter_tets;
 use bth_format::Identity;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
-use std::time::Instant;
+use std::ops::Range;
 
 /// Least number of rays of a batch; fewer rays are traced one after the other.
 pub(crate) const MIN_BATCH: usize = 4;
 
-/// Traces a batch by the strategy that was measured to be faster for such rays on this thread, and measures it. The measurements are
-/// those of a `key`: an object or a scene, and a kind of rays ([`HintUse::kind`]). `unmeasured` is the strategy of small
-/// batches before there are measurements.
+/// Traces a batch by the strategy that was measured to be faster for such rays on this thread, or parts of it by both to measure them. The
+/// measurements are those of a `key`: an object or a scene, and a kind of rays ([`HintUse::kind`]). `unmeasured` is the strategy of small
+/// batches before there are measurements. `trace` traces a range of the rays.
 pub(crate) fn by_hint(
     key: (Identity, usize),
     rays: usize,
     unmeasured: Strategy,
     scratch: &mut Scratch,
-    trace: impl FnOnce(Strategy, &mut Scratch),
+    mut trace: impl FnMut(Range<usize>, Strategy, &mut Scratch),
 ) {
-    let (strategy, start) = choose(key, rays, unmeasured, scratch);
-    trace(strategy, scratch);
-    if let Some(start) = start {
-        record(key, rays, strategy, start, scratch);
+    let (strategies, parts) = match plan(key, rays, unmeasured, scratch) {
+        Plan::Whole(strategy) => ([strategy; PARTS], 1),
+        Plan::Compare(strategies) => (strategies, PARTS),
+    };
+    // All but the last part have whole vectors of rays.
+    let size = if parts == 1 { rays } else { rays.div_ceil(parts).next_multiple_of(LANES) };
+    let (mut seconds, mut counts) = ([0.0; 2], [0; 2]);
+    for (part, &strategy) in strategies[..parts].iter().enumerate() {
+        let range = rays.min(part * size)..rays.min((part + 1) * size);
+        counts[strategy as usize] += range.len();
+        let start = if parts > 1 { clock::now() } else { None };
+        trace(range, strategy, scratch);
+        seconds[strategy as usize] += clock::elapsed(start).as_secs_f64();
+    }
+    if parts > 1 {
+        let seconds_per_ray = [0, 1].map(|i| seconds[i] / counts[i] as f64);
+        scratch.choices.of(key.0, key.1).record(seconds_per_ray);
     }
 }
 
-/// The strategy of a batch, and the time if it is to be measured. The parameters are those of [`by_hint`].
+/// How a batch is traced. The parameters are those of [`by_hint`].
 #[inline(never)]
-fn choose(
-    (traced, kind): (Identity, usize),
-    rays: usize,
-    unmeasured: Strategy,
-    scratch: &mut Scratch,
-) -> (Strategy, Option<Instant>) {
-    let hinted = Hinted::chosen();
+fn plan((traced, kind): (Identity, usize), rays: usize, unmeasured: Strategy, scratch: &mut Scratch) -> Plan {
     let choice = scratch.choices.of(traced, kind);
-    let measured = rays >= MIN_MEASURED_RAYS && hinted == Hinted::Measured;
-    let Plan { strategy, measured } = match hinted {
-        Hinted::Bvh => Plan { strategy: Strategy::Bvh, measured },
-        Hinted::Tets => Plan { strategy: Strategy::Hinted, measured },
-        Hinted::Measured if measured => choice.next(),
-        Hinted::Measured => Plan { strategy: choice.best_or(unmeasured), measured },
-    };
-    (strategy, if measured { clock::now() } else { None })
-}
-
-/// Records the time since `start`, in which a strategy traced a batch.
-#[inline(never)]
-fn record(
-    (traced, kind): (Identity, usize),
-    rays: usize,
-    strategy: Strategy,
-    start: Instant,
-    scratch: &mut Scratch,
-) {
-    let seconds_per_ray = start.elapsed().as_secs_f64() / rays as f64;
-    scratch.choices.of(traced, kind).record(strategy, seconds_per_ray);
+    match Hinted::chosen() {
+        Hinted::Bvh => Plan::Whole(Strategy::Bvh),
+        Hinted::Tets => Plan::Whole(Strategy::Hinted),
+        Hinted::Measured if rays >= MIN_COMPARED_RAYS => choice.next(),
+        Hinted::Measured => Plan::Whole(choice.best_or(unmeasured)),
+    }
 }
 
 /// Fills `hits` with [`Hit::MISS`].
@@ -132,8 +124,9 @@ pub(crate) fn trace_batch<Q: Query>(
     }
     let key =
         (object.identity, HintUse::Tets.kind(QueryKind::of(sink.goal().is_any(), rays, size_of(object))));
-    by_hint(key, rays.len(), Strategy::Bvh, scratch, |strategy, scratch| {
-        trace_with(object, rays, from.filter(|_| strategy == Strategy::Hinted), scratch, sink);
+    by_hint(key, rays.len(), Strategy::Bvh, scratch, |range, strategy, scratch| {
+        let from = from.filter(|_| strategy == Strategy::Hinted).map(|from| &from[range.clone()]);
+        trace_with(object, &rays[range.clone()], from, scratch, &mut sink.part(range.start));
     });
 }
 

@@ -14,6 +14,7 @@ use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
+use std::ops::Range;
 
 /// Where at most one in this many rays has ended, all are traced: packets without gaps save more.
 const FEW_ENDED: usize = 8;
@@ -69,25 +70,30 @@ fn trace_from<Q: Query>(
         if !may_walk(object, kind, from, instance) {
             return trace(rays, None, scratch, answers);
         }
-        let walk = |scratch: &mut Scratch, mut answers: AnswersOf<'_, Q>| {
-            with_hints(from, instance, scratch, |hints, scratch| {
+        let walk = |range: Range<usize>, scratch: &mut Scratch, mut answers: AnswersOf<'_, Q>| {
+            with_hints(&from[range.clone()], instance, scratch, |hints, scratch| {
                 let answers = Q::Goal::reborrow(&mut answers);
                 let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
-                trace_with(object, rays, Some(hints), scratch, &mut sink);
+                trace_with(object, &rays[range], Some(hints), scratch, &mut sink);
             });
         };
         if !has_subtrees(object) {
-            return walk(scratch, answers);
+            return walk(0..rays.len(), scratch, answers);
         }
         let key = (object.identity, HintUse::Tets.kind(kind));
-        return by_hint(key, rays.len(), Strategy::Bvh, scratch, |strategy, scratch| match strategy {
-            Strategy::Bvh => trace(rays, None, scratch, answers),
-            Strategy::Hinted => walk(scratch, answers),
+        return by_hint(key, rays.len(), Strategy::Bvh, scratch, |range, strategy, scratch| {
+            let answers = Q::Goal::part(&mut answers, range.clone());
+            match strategy {
+                Strategy::Bvh => trace(&rays[range], None, scratch, answers),
+                Strategy::Hinted => walk(range, scratch, answers),
+            }
         });
     }
     // Small batches come before measurements: then the look-up decides by how many of the first rays end.
     let key = (object.identity, HintUse::Free.kind(kind));
-    by_hint(key, rays.len(), Strategy::Hinted, scratch, |strategy, scratch| {
+    by_hint(key, rays.len(), Strategy::Hinted, scratch, |range, strategy, scratch| {
+        let (rays, from) = (&rays[range.clone()], &from[range.clone()]);
+        let mut answers = Q::Goal::part(&mut answers, range);
         if strategy == Strategy::Bvh && !has_tets {
             return trace(rays, None, scratch, answers);
         }

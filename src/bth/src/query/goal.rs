@@ -2,12 +2,13 @@
 //! are types of no size have kernels of their own; walks through tetrahedra, batches with vectors of 128 bits, and with the feature
 //! `small` all kernels, serve both by [`EitherGoal`].
 
-#[cfg(not(feature = "small"))]
 use super::Any;
 use super::Nearest;
 use super::better;
 use crate::rays::{Hit, Ray};
 use crate::simd::LANES;
+#[cfg(not(feature = "small"))]
+use std::ops::Range;
 
 /// What a query looks for: the nearest hit, or any.
 pub(crate) trait Goal: Copy {
@@ -19,6 +20,8 @@ pub(crate) trait Goal: Copy {
     fn is_any(self) -> bool;
     /// The same answers for a shorter time.
     fn reborrow<'s>(answers: &'s mut Self::Answers<'_>) -> Self::Answers<'s>;
+    /// The answers of a range of the rays.
+    fn part<'s>(answers: &'s mut Self::Answers<'_>, rays: Range<usize>) -> Self::Answers<'s>;
 }
 
 /// The result of a ray.
@@ -60,6 +63,9 @@ impl Goal for NearestHit {
     fn reborrow<'s>(answers: &'s mut Self::Answers<'_>) -> Self::Answers<'s> {
         answers
     }
+    fn part<'s>(answers: &'s mut Self::Answers<'_>, rays: Range<usize>) -> Self::Answers<'s> {
+        &mut answers[rays]
+    }
 }
 
 /// Any hit.
@@ -76,6 +82,9 @@ impl Goal for AnyHit {
     #[inline(always)]
     fn reborrow<'s>(answers: &'s mut Self::Answers<'_>) -> Self::Answers<'s> {
         answers
+    }
+    fn part<'s>(answers: &'s mut Self::Answers<'_>, rays: Range<usize>) -> Self::Answers<'s> {
+        &mut answers[rays]
     }
 }
 
@@ -95,6 +104,12 @@ impl Goal for EitherGoal {
     #[inline(always)]
     fn reborrow<'s>(answers: &'s mut Self::Answers<'_>) -> Self::Answers<'s> {
         answers.reborrow()
+    }
+    fn part<'s>(answers: &'s mut Self::Answers<'_>, rays: Range<usize>) -> Self::Answers<'s> {
+        match answers {
+            EitherAnswers::Nearest(hits) => EitherAnswers::Nearest(&mut hits[rays]),
+            EitherAnswers::Any(found) => EitherAnswers::Any(&mut found[rays]),
+        }
     }
 }
 

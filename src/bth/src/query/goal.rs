@@ -2,12 +2,12 @@
 //! are types of no size have kernels of their own; walks through tetrahedra, batches with vectors of 128 bits, and with the feature
 //! `small` all kernels, serve both by [`EitherGoal`].
 
+#[cfg(not(feature = "small"))]
 use super::Any;
 use super::Nearest;
 use super::better;
 use crate::rays::{Hit, Ray};
 use crate::simd::LANES;
-#[cfg(not(feature = "small"))]
 use std::ops::Range;
 
 /// What a query looks for: the nearest hit, or any.

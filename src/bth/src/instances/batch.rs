@@ -173,8 +173,8 @@ impl World {
         });
     }
 
-    /// Calls `trace` with ranges of a batch and their hints, or with none where they are of no use to it or it was measured to be faster so through
-    /// this scene: most rays may leave in directions that are not free, or meet nothing of their instance anyway.
+    /// Calls `trace` with ranges of a batch and their hints, or with none where they are of no use to it or it was measured to be faster so
+    /// through this scene: most rays may leave in directions that are not free, or meet nothing of their instance anyway.
     fn by_hints(
         &self,
         objects: &Objects,

@@ -196,8 +196,8 @@ impl ListedRays {
         visits.truncate(count);
     }
 
-    /// Stores the list of a ray, given its index in the chunk and the depth of t = 1, and the instances that it meets: their bits, and depths and
-    /// codes in the lanes. Returns the index of the nearest, to be visited at once; the list has no others.
+    /// Stores the list of a ray, given its index in the chunk and the depth of t = 1, and the instances that it meets: their bits, and depths
+    /// and codes in the lanes. Returns the index of the nearest, to be visited at once; the list has no others.
     #[inline(always)]
     fn push<S: Simd>(
         &mut self,

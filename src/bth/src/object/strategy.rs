@@ -110,16 +110,14 @@ pub(crate) struct StrategyChoice {
     differences: [f64; COMPARISONS],
     /// Number of comparisons so far.
     comparisons: usize,
-    /// Mean of the differences without the least and the greatest quarter: the thread may be interrupted in any batch, which spoils two
-    /// comparisons, and the strategies may differ in few batches only, which a median would not see.
+    /// Mean of the differences without the least and the greatest quarter: the thread may be interrupted in any batch, and the strategies may
+    /// differ in few batches only, which a median would not see.
     difference: f64,
-    /// Whether the last comparison agrees with the mean.
-    is_confirmed: bool,
     /// Number of batches that were planned.
     batches: u32,
     /// Number of batches until the strategies are compared again.
     remaining: u32,
-    /// Number of batches between that comparison and the one before.
+    /// Number of batches between that comparison and the one before. It grows while comparisons agree with the mean.
     interval: u32,
 }
 
@@ -129,7 +127,6 @@ impl StrategyChoice {
             differences: [0.0; COMPARISONS],
             comparisons: 0,
             difference: 0.0,
-            is_confirmed: true,
             batches: 0,
             remaining: FIRST_INTERVAL,
             interval: FIRST_INTERVAL,
@@ -155,8 +152,6 @@ impl StrategyChoice {
                 self.remaining -= 1;
                 return Plan::Whole(self.best());
             }
-            let interval = if self.is_confirmed { 2 * self.interval } else { FIRST_INTERVAL };
-            self.interval = interval.clamp(FIRST_INTERVAL, LAST_INTERVAL);
             self.remaining = self.interval;
         }
         let [a, b] = match self.comparisons % 2 {
@@ -180,7 +175,11 @@ impl StrategyChoice {
         sorted.sort_unstable_by(f64::total_cmp);
         let middle = &sorted[sorted.len() / 4..sorted.len() - sorted.len() / 4];
         self.difference = middle.iter().sum::<f64>() / middle.len() as f64;
-        self.is_confirmed = (difference < 0.0) == (self.difference < 0.0);
+        if self.batches > TRIALS {
+            let is_confirmed = (difference < 0.0) == (self.difference < 0.0);
+            self.interval = if is_confirmed { LAST_INTERVAL.min(2 * self.interval) } else { FIRST_INTERVAL };
+            self.remaining = self.interval;
+        }
     }
 }
 
@@ -216,8 +215,8 @@ mod tests {
     use super::*;
     use bth_random::Rng;
 
-    /// Number of batches that take [`Strategy::Hinted`] as a whole, of `batches` with the given seconds per ray. One in twenty is interrupted, so one in eighty parts of those in
-    /// which the strategies are compared.
+    /// Number of batches that take [`Strategy::Hinted`] as a whole, of `batches` with the given seconds per ray. One in twenty is interrupted, so
+    /// one in eighty parts of those in which the strategies are compared.
     fn tets_taken(choice: &mut StrategyChoice, rng: &mut Rng, batches: u32, cost: [f64; 2]) -> u32 {
         let mut taken = 0;
         for _ in 0..batches {

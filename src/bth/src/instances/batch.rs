@@ -9,6 +9,7 @@ use super::packets::TopLevelPackets;
 use super::placement::Placement;
 use super::progress::Progress;
 use super::scene_batch::SceneBatch;
+use super::scene_query::SceneQuery;
 use super::top_level::TopLevel;
 use super::traverse::RayTraversals;
 use super::visit_queue::VisitQueue;
@@ -29,20 +30,6 @@ const CHUNK: usize = 2048;
 /// From this number of rays on, the rays through one instance are a batch of their own: they are as many as four packets hold, so
 /// the cost of a further batch is small. Fewer rays are joined with those through other instances of the same object.
 const MIN_RAYS_PER_INSTANCE: usize = 256;
-
-/// A query over the rays of a batch. The kernels are compiled once for all.
-trait SceneQuery {
-    /// The answers so far.
-    fn progress(&self) -> Progress<'_>;
-    /// Traces the visits of one object, given memory for their rays in its space, and what is known of where they start.
-    fn trace(
-        &mut self,
-        batch: &SceneBatch<'_>,
-        object: &ObjectView<'_>,
-        visits: &[Visit],
-        memory: (&mut ObjectRays, &FreeStarts),
-    );
-}
 
 /// The rays of a chunk. A thread keeps their memory from one batch to the next.
 #[derive(Default)]
@@ -80,6 +67,8 @@ struct StartKernel<'a> {
     first: usize,
     /// Number of its rays.
     count: usize,
+    /// The answers so far of the rays of the chunk.
+    progress: Progress<'a>,
     active_rays: &'a mut ActiveRays,
 }
 
@@ -92,11 +81,22 @@ impl Kernel for StartKernel<'_> {
             batch,
             first,
             count,
+            progress,
             active_rays: ActiveRays { packets, lists, traversals, active, visits, free_starts, .. },
         } = self;
         let (world, rays) = (batch.world, &batch.rays[first..first + count]);
         let top = &world.top;
         packets.start(s, top, rays, active);
+        if free_starts.are_any_traced() {
+            // Which rays have ended is not predictable, so there is no branch.
+            let mut kept = 0;
+            for i in 0..active.len() {
+                let index = active[i];
+                active[kept] = index;
+                kept += usize::from(progress.tmax(index as usize) > f32::NEG_INFINITY);
+            }
+            active.truncate(kept);
+        }
         if let (Some(from), true) = (batch.hints(), world.has_single_visible()) {
             // No other instance is visible, so a ray that starts on it needs no traversal.
             active.retain(|&index| {
@@ -110,7 +110,8 @@ impl Kernel for StartKernel<'_> {
             });
         }
         let queue = (lists, first as u32, &mut visits.all);
-        traversals.start(s, top, rays, active, queue, |index| free_starts.not_met(index));
+        let (rays, not_met) = free_starts.ended(rays, progress);
+        traversals.start(s, top, rays, active, queue, |index| not_met.get(index).copied().unwrap_or(NONE));
     }
 }
 
@@ -217,12 +218,14 @@ impl World {
         for first in (0..rays.len()).step_by(CHUNK) {
             let end = (first + CHUNK).min(rays.len());
             active_rays.visits.clear();
-            active_rays.free_starts.find(&batch, first..end);
-            isa.run(StartKernel { batch: &batch, first, count: end - first, active_rays: &mut active_rays });
-            self.trace(&batch, query, &mut active_rays);
+            active_rays.free_starts.find(&batch, first..end, query);
+            let (count, progress) = (end - first, query.progress().of_rays_from(first));
+            let active_rays = &mut active_rays;
+            isa.run(StartKernel { batch: &batch, first, count, progress, active_rays });
+            self.trace(&batch, query, active_rays);
             while active_rays.is_any_active() {
                 let progress = query.progress().of_rays_from(first);
-                let (top, first, active_rays) = (&self.top, first as u32, &mut active_rays);
+                let (top, first, active_rays) = (&self.top, first as u32, &mut *active_rays);
                 isa.run(AdvanceKernel { top, progress, first, active_rays });
                 self.trace(&batch, query, active_rays);
             }
@@ -243,11 +246,11 @@ impl World {
 
     /// Traces all queued visits, object by object, and empties the queue.
     fn trace(&self, batch: &SceneBatch<'_>, query: &mut dyn SceneQuery, active_rays: &mut ActiveRays) {
-        let ActiveRays { visits, object_rays, free_starts, .. } = active_rays;
+        let ActiveRays { visits, object_rays, .. } = active_rays;
         self.by_object(visits, |object, visits| {
             self.mark_traced(object);
             let object = batch.objects.view(object);
-            query.trace(batch, object, visits, (object_rays, free_starts));
+            query.trace(batch, object, visits, object_rays);
         });
         visits.clear();
     }
@@ -307,7 +310,7 @@ impl SceneQuery for SceneNearest<'_> {
         batch: &SceneBatch<'_>,
         object: &ObjectView<'_>,
         visits: &[Visit],
-        (object_rays, free_starts): (&mut ObjectRays, &FreeStarts),
+        object_rays: &mut ObjectRays,
     ) {
         if visits.len() < object::MIN_BATCH {
             for &visit in visits {
@@ -321,7 +324,15 @@ impl SceneQuery for SceneNearest<'_> {
             return;
         }
         object_rays.fill(batch, !object.tet_leaves.is_empty(), visits, self.progress());
-        free_starts.begin_later(visits, &mut object_rays.rays);
+        self.trace_placed(batch, object, visits, object_rays);
+    }
+    fn trace_placed(
+        &mut self,
+        batch: &SceneBatch<'_>,
+        object: &ObjectView<'_>,
+        visits: &[Visit],
+        object_rays: &ObjectRays,
+    ) {
         let answers = nearest_answers(self.hits);
         trace_visits::<NearestQuery>(batch, object, (visits, object_rays), self.scratch, answers);
     }
@@ -342,7 +353,7 @@ impl SceneQuery for SceneAny<'_> {
         batch: &SceneBatch<'_>,
         object: &ObjectView<'_>,
         visits: &[Visit],
-        (object_rays, free_starts): (&mut ObjectRays, &FreeStarts),
+        object_rays: &mut ObjectRays,
     ) {
         if visits.len() < object::MIN_BATCH {
             for &visit in visits {
@@ -353,7 +364,15 @@ impl SceneQuery for SceneAny<'_> {
             return;
         }
         object_rays.fill(batch, !object.tet_leaves.is_empty(), visits, self.progress());
-        free_starts.begin_later(visits, &mut object_rays.rays);
+        self.trace_placed(batch, object, visits, object_rays);
+    }
+    fn trace_placed(
+        &mut self,
+        batch: &SceneBatch<'_>,
+        object: &ObjectView<'_>,
+        visits: &[Visit],
+        object_rays: &ObjectRays,
+    ) {
         let answers = any_answers(self.found);
         trace_visits::<AnyQuery>(batch, object, (visits, object_rays), self.scratch, answers);
     }

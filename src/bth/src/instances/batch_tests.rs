@@ -178,6 +178,7 @@ fn packets_through_the_top_level_do_not_change_results() {
             batch: &batch,
             first: 0,
             count: rays.len(),
+            progress: Progress::None,
             active_rays: &mut active_rays,
         });
         in_packets += usize::from(!active_rays.packets.is_empty());

@@ -42,6 +42,20 @@ impl ObjectRays {
         Isa::chosen().run(EnterKernel { object_rays: self, batch, visits, progress });
     }
 
+    /// Keeps those of the visits whose indices are in `order`, ascending, with the rays at these indices of `rays`.
+    pub(super) fn keep(&mut self, order: &[u32], rays: &[Ray], hinted: bool) {
+        let ObjectRays { rays: kept, t_scale, from, .. } = self;
+        kept.clear();
+        kept.extend(order.iter().map(|index| rays[*index as usize]));
+        // No visit is before its place among those that are left.
+        for (i, index) in order.iter().enumerate() {
+            t_scale[i] = t_scale[*index as usize];
+            from[i] = from[*index as usize];
+        }
+        t_scale.truncate(order.len());
+        from.truncate(if hinted { order.len() } else { 0 });
+    }
+
     /// The triangles on which rays start, if there are any.
     pub(super) fn hints(&self) -> Option<&[u32]> {
         (!SMALL && self.from.iter().any(|from| *from != NONE)).then_some(&self.from)

@@ -1,13 +1,15 @@
-//! Rays that certainly do not meet the instance on which they start, decided before they go through the top level.
+//! Rays that start on a known triangle of an instance, before they go through the top level.
 //!
-//! Such a ray leaves its triangle in a direction that is free for the instance's object ([`crate::free`]). It never enters that instance,
-//! and it ends where it meets no other instance's box. The ray that is looked up is the one that would be traced in the instance, with all its
-//! rounding, so the answer is the same.
+//! Those that leave it in a direction that is free for the instance's object ([`crate::free`]) certainly do not meet the instance. The
+//! others are traced in it at once, from where on they can hit anything: it comes first anyway, since its box holds their start, and their hits
+//! end them before they meet the boxes of others. So no ray enters the instance on which it starts later on. The ray that is looked up is the
+//! one that would be traced in the instance, with all its rounding, so the answer is the same.
 
 use super::World;
 use super::enter_object::ObjectRays;
 use super::progress::Progress;
 use super::scene_batch::SceneBatch;
+use super::scene_query::SceneQuery;
 use super::visit_queue::VisitQueue;
 use crate::SMALL;
 use crate::free::{self, Rest};
@@ -18,30 +20,29 @@ use crate::rays::{PrimitiveRef, Ray};
 use bth_format::layout::{Child, NONE};
 use std::ops::Range;
 
-/// For each ray of a chunk the instance on which it starts and which it certainly does not meet. A thread keeps this memory from one
-/// batch to the next.
+/// For each ray of a chunk the instance on which it starts, if it has been traced there or certainly does not meet it. A thread keeps this
+/// memory from one batch to the next.
 #[derive(Default)]
 pub(super) struct FreeStarts {
-    /// By index in the chunk; `NONE` if the ray may meet all instances. Empty if that is so for all rays.
+    /// By index in the chunk that instance; `NONE` if the ray may still meet all. Empty if that is so for all rays.
     not_met: Vec<u32>,
-    /// Rays that hit the instance on which they start only behind their `tmin`: by index in the chunk that instance, or `NONE`, and the t
-    /// in its space from which on. Empty if that is known of none.
-    later: Vec<(u32, f32)>,
-    /// Index in the batch of the first ray of the chunk.
-    first: usize,
+    /// The rays of a chunk, ending at their hits so far, where any are traced before they go through the top level.
+    ended: Vec<Ray>,
+    /// Visits of an object that are left.
+    left: Vec<Visit>,
     visits: VisitQueue,
     object_rays: ObjectRays,
     rest: Rest,
 }
 
 impl FreeStarts {
-    /// The instance that a ray of the chunk does not meet, or `NONE`.
+    /// The instance that a ray of the chunk does not meet any more, or `NONE`.
     #[inline(always)]
     pub(super) fn not_met(&self, index: usize) -> u32 {
         if SMALL { NONE } else { self.not_met.get(index).copied().unwrap_or(NONE) }
     }
 
-    /// Of some rays, a bit each from the index `first` on, those that may meet an instance.
+    /// Of some rays, a bit each from the index `first` on, those that may still meet an instance.
     #[inline(always)]
     pub(super) fn that_may_meet(&self, instance: u32, first: usize, rays: u64) -> u64 {
         if SMALL || self.not_met.is_empty() {
@@ -58,27 +59,37 @@ impl FreeStarts {
         may_meet
     }
 
-    /// Lets the ranges of rays in the space of an object, given with their visits, begin where they can hit anything.
-    pub(super) fn begin_later(&self, visits: &[Visit], rays: &mut [Ray]) {
-        if SMALL || self.later.is_empty() {
-            return;
-        }
-        for (visit, ray) in visits.iter().zip(rays) {
-            let (instance, begin) = self.later[visit.ray as usize - self.first];
-            let is_later = instance == visit.instance && begin > ray.tmin;
-            ray.tmin = if is_later { begin } else { ray.tmin };
-        }
+    /// Whether any rays may have been traced before they go through the top level.
+    pub(super) fn are_any_traced(&self) -> bool {
+        !SMALL && !self.not_met.is_empty()
     }
 
-    /// Decides the rays of a chunk.
-    pub(super) fn find(&mut self, batch: &SceneBatch<'_>, chunk: Range<usize>) {
+    /// The rays of a chunk, ending at their hits so far, and by index the instances that they do not meet.
+    pub(super) fn ended<'a>(&'a mut self, rays: &'a [Ray], progress: Progress<'_>) -> (&'a [Ray], &'a [u32]) {
+        if !self.are_any_traced() {
+            return (rays, &[]);
+        }
+        // Rays that any hit ends are not among those that go on.
+        if let Progress::Any(_) = progress {
+            return (rays, &self.not_met);
+        }
+        self.ended.clear();
+        // Not `f32::min`, which would replace a `tmax` of NaN by a number.
+        let ended = rays.iter().enumerate().map(|(i, ray)| {
+            let so_far = progress.tmax(i);
+            Ray { tmax: if so_far < ray.tmax { so_far } else { ray.tmax }, ..*ray }
+        });
+        self.ended.extend(ended);
+        (&self.ended, &self.not_met)
+    }
+
+    /// Decides the rays of a chunk, and traces those that may meet the instance on which they start.
+    pub(super) fn find(&mut self, batch: &SceneBatch<'_>, chunk: Range<usize>, query: &mut dyn SceneQuery) {
         if SMALL {
             return;
         }
-        let FreeStarts { not_met, later, first, visits, object_rays, rest } = self;
+        let FreeStarts { not_met, left, visits, object_rays, rest, .. } = self;
         not_met.clear();
-        later.clear();
-        *first = chunk.start;
         let Some(from) = batch.hints() else { return };
         visits.clear();
         let mut starts = Starts::new(batch.world, batch.objects);
@@ -90,24 +101,24 @@ impl FreeStarts {
         if visits.all.is_empty() {
             return;
         }
-        not_met.resize(chunk.len(), NONE);
         batch.world.by_object(visits, |object, visits| {
-            let object = batch.objects.view(object);
+            let view = batch.objects.view(object);
             object_rays.fill(batch, true, visits, Progress::None);
-            if free::find_rest(object, &object_rays.rays, &object_rays.from, Hinted::are_forced(), rest) {
-                let place = |visit: &Visit| visit.ray as usize - chunk.start;
-                for visit in visits {
-                    not_met[place(visit)] = visit.instance;
-                }
-                if later.is_empty() {
-                    later.resize(chunk.len(), (NONE, 0.0));
-                }
-                for index in &rest.order {
-                    let visit = &visits[*index as usize];
-                    not_met[place(visit)] = NONE;
-                    later[place(visit)] = (visit.instance, rest.rays[*index as usize].tmin);
-                }
+            if !free::find_rest(view, &object_rays.rays, &object_rays.from, Hinted::are_forced(), rest) {
+                return;
             }
+            not_met.resize(chunk.len(), NONE);
+            for visit in visits {
+                not_met[visit.ray as usize - chunk.start] = visit.instance;
+            }
+            if rest.order.is_empty() {
+                return;
+            }
+            left.clear();
+            left.extend(rest.order.iter().map(|index| visits[*index as usize]));
+            object_rays.keep(&rest.order, &rest.rays, !view.tet_leaves.is_empty());
+            batch.world.mark_traced(object);
+            query.trace_placed(batch, view, left, object_rays);
         });
     }
 }

@@ -187,10 +187,10 @@ impl ListedRays {
         let mut count = visits.len();
         visits.resize(count + LANES, Visit { ray: 0, instance: 0 });
         let (mut rays, mut instances) = ([0; LANES], [0; LANES]);
-        s.compress(met.any, s.load_u(at), &mut rays);
+        s.compress(met.any, s.add_u(s.load_u(at), s.splat_u(first_ray)), &mut rays);
         s.compress(met.any, s.load_u(&code), &mut instances);
         for (to, (ray, code)) in visits[count..].iter_mut().zip(rays.iter().zip(instances)) {
-            *to = Visit { ray: first_ray + ray, instance: code & !INSTANCE };
+            *to = Visit { ray: *ray, instance: code & !INSTANCE };
         }
         count += met.any.count_ones() as usize;
         visits.truncate(count);

@@ -9,7 +9,7 @@ use super::packets::TopLevelPackets;
 use super::placement::Placement;
 use super::progress::Progress;
 use super::scene_batch::SceneBatch;
-use super::scene_query::SceneQuery;
+use super::scene_query::{ObjectVisits, SceneQuery};
 use super::top_level::TopLevel;
 use super::traverse::RayTraversals;
 use super::visit_queue::VisitQueue;
@@ -21,7 +21,6 @@ use crate::query::{AnswersOf, AnyQuery, Goal, NearestQuery, Query, any_answers, 
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use bth_format::layout::NONE;
-use bth_format::object::ObjectView;
 use std::cell::RefCell;
 use std::ops::Range;
 
@@ -250,7 +249,7 @@ impl World {
         self.by_object(visits, |object, visits| {
             self.mark_traced(object);
             let object = batch.objects.view(object);
-            query.trace(batch, object, visits, object_rays);
+            query.trace(ObjectVisits { batch, object, visits }, object_rays);
         });
         visits.clear();
     }
@@ -285,9 +284,8 @@ impl World {
 
 /// Traces visits of one object, given with their rays in its space, and merges the answers into those of the rays of the scene.
 fn trace_visits<Q: Query>(
-    batch: &SceneBatch<'_>,
-    object: &ObjectView<'_>,
-    (visits, object_rays): (&[Visit], &ObjectRays),
+    ObjectVisits { batch, object, visits }: ObjectVisits<'_>,
+    object_rays: &ObjectRays,
     scratch: &mut Scratch,
     mut answers: AnswersOf<'_, Q>,
 ) {
@@ -305,36 +303,18 @@ impl SceneQuery for SceneNearest<'_> {
     fn progress(&self) -> Progress<'_> {
         Progress::Nearest(self.hits)
     }
-    fn trace(
-        &mut self,
-        batch: &SceneBatch<'_>,
-        object: &ObjectView<'_>,
-        visits: &[Visit],
-        object_rays: &mut ObjectRays,
-    ) {
-        if visits.len() < object::MIN_BATCH {
-            for &visit in visits {
-                let i = visit.ray as usize;
-                let ray = batch.object_ray(visit, batch.rays[i].tmax.min(self.hits[i].t));
-                let from = batch.hint(i, visit.instance);
-                let hit = object::nearest(object, &ray.ray, from, visit.instance);
-                self.hits[i] =
-                    better(&batch.rays[i], &self.hits[i], &hit, ray.t_scale).unwrap_or(self.hits[i]);
-            }
-            return;
+    fn trace_one_by_one(&mut self, ObjectVisits { batch, object, visits }: ObjectVisits<'_>) {
+        for &visit in visits {
+            let i = visit.ray as usize;
+            let ray = batch.object_ray(visit, batch.rays[i].tmax.min(self.hits[i].t));
+            let from = batch.hint(i, visit.instance);
+            let hit = object::nearest(object, &ray.ray, from, visit.instance);
+            self.hits[i] = better(&batch.rays[i], &self.hits[i], &hit, ray.t_scale).unwrap_or(self.hits[i]);
         }
-        object_rays.fill(batch, !object.tet_leaves.is_empty(), visits, self.progress());
-        self.trace_placed(batch, object, visits, object_rays);
     }
-    fn trace_placed(
-        &mut self,
-        batch: &SceneBatch<'_>,
-        object: &ObjectView<'_>,
-        visits: &[Visit],
-        object_rays: &ObjectRays,
-    ) {
+    fn trace_placed(&mut self, of_object: ObjectVisits<'_>, object_rays: &ObjectRays) {
         let answers = nearest_answers(self.hits);
-        trace_visits::<NearestQuery>(batch, object, (visits, object_rays), self.scratch, answers);
+        trace_visits::<NearestQuery>(of_object, object_rays, self.scratch, answers);
     }
 }
 
@@ -348,33 +328,16 @@ impl SceneQuery for SceneAny<'_> {
     fn progress(&self) -> Progress<'_> {
         Progress::Any(self.found)
     }
-    fn trace(
-        &mut self,
-        batch: &SceneBatch<'_>,
-        object: &ObjectView<'_>,
-        visits: &[Visit],
-        object_rays: &mut ObjectRays,
-    ) {
-        if visits.len() < object::MIN_BATCH {
-            for &visit in visits {
-                let i = visit.ray as usize;
-                let (ray, from) = (batch.object_ray(visit, self.rays[i].tmax), batch.hint(i, visit.instance));
-                self.found[i] |= object::any(object, &ray.ray, from);
-            }
-            return;
+    fn trace_one_by_one(&mut self, ObjectVisits { batch, object, visits }: ObjectVisits<'_>) {
+        for &visit in visits {
+            let i = visit.ray as usize;
+            let (ray, from) = (batch.object_ray(visit, self.rays[i].tmax), batch.hint(i, visit.instance));
+            self.found[i] |= object::any(object, &ray.ray, from);
         }
-        object_rays.fill(batch, !object.tet_leaves.is_empty(), visits, self.progress());
-        self.trace_placed(batch, object, visits, object_rays);
     }
-    fn trace_placed(
-        &mut self,
-        batch: &SceneBatch<'_>,
-        object: &ObjectView<'_>,
-        visits: &[Visit],
-        object_rays: &ObjectRays,
-    ) {
+    fn trace_placed(&mut self, of_object: ObjectVisits<'_>, object_rays: &ObjectRays) {
         let answers = any_answers(self.found);
-        trace_visits::<AnyQuery>(batch, object, (visits, object_rays), self.scratch, answers);
+        trace_visits::<AnyQuery>(of_object, object_rays, self.scratch, answers);
     }
 }
 

@@ -9,7 +9,7 @@ use super::World;
 use super::enter_object::ObjectRays;
 use super::progress::Progress;
 use super::scene_batch::SceneBatch;
-use super::scene_query::SceneQuery;
+use super::scene_query::{ObjectVisits, SceneQuery};
 use super::visit_queue::VisitQueue;
 use crate::SMALL;
 use crate::free::{self, Rest};
@@ -118,7 +118,7 @@ impl FreeStarts {
             left.extend(rest.order.iter().map(|index| visits[*index as usize]));
             object_rays.keep(&rest.order, &rest.rays, !view.tet_leaves.is_empty());
             batch.world.mark_traced(object);
-            query.trace_placed(batch, view, left, object_rays);
+            query.trace_placed(ObjectVisits { batch, object: view, visits: left }, object_rays);
         });
     }
 }

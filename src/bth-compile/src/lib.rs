@@ -5,6 +5,7 @@
 //!
 //! | modules | |
 //! |---|---|
+//! | [`sampling`] | sample rays and what they meet, by which stages decide |
 //! | [`opacity`], [`coordinates`], [`bvh`], [`marks`], [`costs`], [`tets`], [`free`], [`mod@write`] | the stages |
 //! | [`pipeline`] | calls the stages in order, from a model to a file |
 //! | [`cached`] | the same through a cache of results, which wraps the stages from outside |
@@ -24,6 +25,7 @@ pub mod memory;
 pub mod opacity;
 mod options;
 pub mod pipeline;
+pub mod sampling;
 pub mod scene;
 pub mod source;
 pub mod tets;

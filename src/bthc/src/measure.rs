@@ -2,7 +2,7 @@
 
 use bth::Scene;
 use bth::rays::{Hit, PrimitiveRef, Ray};
-use bth_compile::costs::SampleRay;
+use bth_compile::sampling::SampleRay;
 
 /// Rays in one call of a batch.
 const BATCH: usize = 1024;

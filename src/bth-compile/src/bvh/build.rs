@@ -24,10 +24,12 @@ const BUILD_TASK: usize = 1 << 12;
 pub enum Quality {
     /// Binned SAH with 16 bins.
     Fast,
-    /// Binned SAH with 32 bins, full sweep in small nodes, two passes of reinsertion of the largest nodes.
+    /// Binned SAH with 32 bins, full sweep in small nodes, two passes of reinsertion of the largest nodes, three rounds in which
+    /// treelets are rebuilt; the wide nodes are chosen by what sample rays enter.
     #[default]
     Balanced,
-    /// Full-sweep SAH except in the topmost nodes, where 32 bins give trees as good; three passes of reinsertion.
+    /// Full-sweep SAH except in the topmost nodes, where 32 bins give trees as good; three passes of reinsertion, five rounds of
+    /// treelets.
     Best,
 }
 
@@ -41,17 +43,20 @@ pub struct Effort {
     /// Share of the nodes, largest first, that each pass of reinsertion tries to move. Two short passes reduce the cost
     /// more than a long one (measured on rooms and a car).
     pub reinsertion: Vec<f64>,
+    /// Rounds in which treelets are rebuilt ([`rebuild_treelets`](super::rebuild_treelets)); with none the wide tree is chosen by areas
+    /// alone.
+    pub treelets: usize,
 }
 
 impl Quality {
     /// The parameters of this quality.
     pub fn effort(self) -> Effort {
-        let (bins, sweep_count, reinsertion): (_, _, &[f64]) = match self {
-            Quality::Fast => (16, 8, &[]),
-            Quality::Balanced => (32, 64, &[0.05, 0.1]),
-            Quality::Best => (32, 1 << 14, &[0.1, 0.5, 0.5]),
+        let (bins, sweep_count, reinsertion, treelets): (_, _, &[f64], _) = match self {
+            Quality::Fast => (16, 8, &[], 0),
+            Quality::Balanced => (32, 64, &[0.05, 0.1], 3),
+            Quality::Best => (32, 1 << 14, &[0.1, 0.5, 0.5], 5),
         };
-        Effort { bins, sweep_count, reinsertion: reinsertion.to_vec() }
+        Effort { bins, sweep_count, reinsertion: reinsertion.to_vec(), treelets }
     }
 }
 
@@ -80,6 +85,8 @@ pub struct BvhReport {
     pub visits: Vec<f64>,
     /// Subtrees that each pass of reinsertion moved.
     pub moved: Vec<u64>,
+    /// Treelets that each round rebuilt.
+    pub treelets: Vec<u64>,
     /// Wall-clock time of the stage as the pipeline measures it, seconds; 0 where the stage is called on its own.
     pub seconds: f64,
 }
@@ -140,11 +147,20 @@ pub(super) fn split_all<E: Extent>(
     monitor: &dyn Monitor,
 ) -> Result<BinaryBvh> {
     monitor.stage("build", Some(references.len() as u64));
+    split_with(&mut references, effort, &mut sweep_split::Scratch::default(), monitor)
+}
+
+/// As [`split_all`], within another stage.
+pub(super) fn split_with<E: Extent>(
+    references: &mut [Reference<E>],
+    effort: &Effort,
+    scratch: &mut sweep_split::Scratch<E>,
+    monitor: &dyn Monitor,
+) -> Result<BinaryBvh> {
     let mut nodes = super::zeroed(2 * references.len() - 1);
     let builder = Builder { effort, monitor };
-    builder.subtree(&mut references, &mut nodes, Destination::ROOT, &mut sweep_split::Scratch::default())?;
-    let order = references.par_iter().map(|r| r.id).collect();
-    Ok(BinaryBvh { nodes, order })
+    builder.subtree(references, &mut nodes, Destination::ROOT, scratch)?;
+    Ok(BinaryBvh { nodes, order: references.iter().map(|r| r.id).collect() })
 }
 
 /// Moves subtrees to positions of lower cost, in passes that each try a share of the nodes. Boxes of leaves do not change.

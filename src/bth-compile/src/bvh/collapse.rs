@@ -2,6 +2,7 @@
 
 use super::plan::{Costs, Decision, Plan, Planner};
 use super::poses::Weighed;
+use super::slot_order::SlotOrder;
 use super::wide::{CollapseReport, Wide};
 use super::wide_tree::Writer;
 use super::{BinaryBvh, MAX_LEVELS};
@@ -78,6 +79,7 @@ pub fn collapse_by<'a>(
         weighed,
         cut,
         decisions: &decisions,
+        slot_order: SlotOrder::new(mesh, bvh),
         plan: options.plan,
         leaf_vertices: options.leaf_vertices,
         monitor,

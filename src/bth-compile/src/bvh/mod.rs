@@ -1,6 +1,7 @@
 //! The binary BVH, input of the stages marks, costs and tets, and its collapse to the wide BVH.
 //!
 //! [`build()`] splits top-down (binned or full-sweep SAH), then moves subtrees to positions of lower cost.
+//! [`rebuild_treelets()`] rebuilds small parts of the tree where the wide tree then costs less.
 //! [`collapse()`] plans the wide tree by dynamic programming and writes its lines.
 //!
 //! [`build_poses()`] builds one tree for several poses of a mesh that deforms, with the cost summed over them.
@@ -20,8 +21,10 @@ mod pose_bounds;
 mod pose_costs;
 mod poses;
 mod reinsertion;
+mod slot_order;
 mod split;
 mod sweep_split;
+mod treelets;
 mod wide;
 mod wide_lines;
 mod wide_tree;
@@ -37,8 +40,10 @@ pub use collapse::{CollapseOptions, Decide, collapse, collapse_by};
 pub use plan::{Costs, Decision, Plan, Planner, Role, Vertices};
 pub use pose_costs::{PoseCost, pose_costs};
 pub use poses::{Poses, Weighed};
+pub use treelets::rebuild_treelets;
 pub use wide::{CollapseReport, Wide};
 
+use bounds::Bounds;
 use rayon::prelude::*;
 use zerocopy::FromZeros;
 
@@ -65,6 +70,12 @@ impl Node {
     #[inline]
     pub fn is_leaf(&self) -> bool {
         self.right == 0
+    }
+
+    /// Half the surface area of the box. A triangle of non-zero area extends along two axes, and f64 holds the product of any two
+    /// extents, so this is zero only if all triangles below have no area.
+    pub fn half_area(&self) -> f64 {
+        Bounds::of_node(self).half_area()
     }
 }
 

@@ -152,6 +152,7 @@ impl Vertices {
 }
 
 /// Input of the planning.
+#[derive(Clone, Copy)]
 pub struct Planner<'a> {
     /// The mesh.
     pub mesh: &'a Mesh,
@@ -205,6 +206,12 @@ impl<'a> Planner<'a> {
         (self.weighed.area(at) * self.inverse_area) as f32
     }
 
+    /// The least cost of a small BVH of some triangles of the mesh as one child of a wide node. Probabilities are areas times `scale`.
+    pub(super) fn cost_of_part(&self, part: &BinaryBvh, scale: f64) -> Result<f32> {
+        let planner = Planner { bvh: part, weighed: part.into(), inverse_area: scale, ..*self };
+        Ok(planner.subtree(0, &[], &mut vec![Decision::default(); part.nodes.len()])?.cost[1])
+    }
+
     fn subtree(&self, at: u32, cut: &[u32], decisions: &mut [Decision]) -> Result<Summary> {
         if cut.first() != Some(&at) {
             return self.plain(at, cut, decisions);
@@ -245,17 +252,7 @@ impl<'a> Planner<'a> {
 
         let decision = &mut own[0];
         *decision = Decision::default();
-        let distribute = |slots: usize| {
-            let mut best = (f32::INFINITY, 1);
-            for j in 1..slots {
-                let cost = left.cost[j] + right.cost[slots - j];
-                if cost < best.0 {
-                    best = (cost, j);
-                }
-            }
-            best
-        };
-        let (children, share) = distribute(self.plan.children);
+        let (children, share) = distribute(&left.cost, &right.cost, self.plan.children);
         decision.set_share(WIDTH, share);
         let mut summary = Summary { cost: [f32::INFINITY; WIDTH], vertices: None };
         let mut role = (area * self.costs.node + self.line * NODE_LINES as f32 + children, Role::Node);
@@ -278,15 +275,40 @@ impl<'a> Planner<'a> {
         }
         decision.set_role(role.1);
         summary.cost[1] = role.0;
-        for slots in 2..self.plan.children.min(WIDTH) {
-            let (cost, share) = distribute(slots);
-            summary.cost[slots] = summary.cost[slots - 1];
-            if cost < summary.cost[slots] {
-                summary.cost[slots] = cost;
-                decision.set_share(slots, share);
-            }
-        }
+        in_several_slots(decision, &mut summary.cost, &left.cost, &right.cost, self.plan.children);
         Ok(summary)
+    }
+}
+
+/// The least cost of two subtrees in so many slots, and how many of these the left one takes, given their costs in 1 to 15 slots.
+#[inline(always)]
+pub(super) fn distribute(left: &[f32; WIDTH], right: &[f32; WIDTH], slots: usize) -> (f32, usize) {
+    let mut best = (f32::INFINITY, 1);
+    for j in 1..slots {
+        let cost = left[j] + right[slots - j];
+        if cost < best.0 {
+            best = (cost, j);
+        }
+    }
+    best
+}
+
+/// Decides how a node whose cost in one slot is known shares more slots, fewer than `most`, between its children.
+#[inline(always)]
+pub(super) fn in_several_slots(
+    decision: &mut Decision,
+    cost: &mut [f32; WIDTH],
+    left: &[f32; WIDTH],
+    right: &[f32; WIDTH],
+    most: usize,
+) {
+    for slots in 2..most.min(WIDTH) {
+        let (shared, share) = distribute(left, right, slots);
+        cost[slots] = cost[slots - 1];
+        if shared < cost[slots] {
+            cost[slots] = shared;
+            decision.set_share(slots, share);
+        }
     }
 }
 

@@ -85,7 +85,8 @@ impl<'a> Poses<'a> {
 pub struct Weighed<'a> {
     /// The BVH.
     pub bvh: &'a BinaryBvh,
-    /// For each node the mean of its probability over poses ([`Poses::probabilities`]); `None` for those of the boxes.
+    /// For each node the probability that a sample ray enters it ([`crate::sampling::visits`]), or the mean of that of lines over poses
+    /// ([`Poses::probabilities`]); `None` for those of the boxes.
     pub probabilities: Option<&'a [f64]>,
 }
 

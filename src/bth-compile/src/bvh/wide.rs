@@ -46,7 +46,8 @@ pub struct CollapseReport {
     pub depth: u32,
     /// Cost of the tree without its tet leaves, which the choice of the tree minimizes; see [`Costs`](super::Costs).
     pub cost: f64,
-    /// Wide nodes that a random line through the root's box meets on average, kept subtrees not counted.
+    /// Wide nodes that a sample ray enters on average, or a random line through the root's box where the tree was chosen by areas; kept
+    /// subtrees not counted.
     pub node_visits: f64,
     /// The same for triangle leaves.
     pub leaf_visits: f64,

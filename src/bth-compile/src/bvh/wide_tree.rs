@@ -2,6 +2,7 @@
 
 use super::plan::{Decision, Plan, Role, children};
 use super::poses::Weighed;
+use super::slot_order::SlotOrder;
 use super::wide::{CollapseReport, Wide};
 use super::wide_lines::{indexed_leaf, put, raw_leaf, wide_node};
 use super::{BinaryBvh, zeroed};
@@ -73,6 +74,7 @@ pub(super) struct Writer<'a> {
     pub(super) weighed: Weighed<'a>,
     pub(super) cut: &'a [u32],
     pub(super) decisions: &'a [Decision],
+    pub(super) slot_order: SlotOrder<'a>,
     pub(super) plan: Plan,
     pub(super) leaf_vertices: bool,
     pub(super) monitor: &'a dyn Monitor,
@@ -115,11 +117,9 @@ impl Writer<'_> {
             }
             slots[slot].code = Child::Node((base + inner.len() * NODE_LINES) as u32).code();
             let first = slots.len();
-            slots.extend(
-                children(self.bvh, self.decisions, at, self.plan.children)
-                    .into_iter()
-                    .map(|node| Slot { node, code: NONE }),
-            );
+            let mut children = children(self.bvh, self.decisions, at, self.plan.children);
+            self.slot_order.sort(&mut children);
+            slots.extend(children.into_iter().map(|node| Slot { node, code: NONE }));
             inner.push(Inner { first, count: slots.len() - first });
             self.wide.depth = self.wide.depth.max(level + 1);
             if outer {

@@ -4,12 +4,12 @@
 //! leaf's box without a hit. Rays from outside take the BVH that is kept beside the tetrahedra; where none is kept they
 //! walk through the tetrahedra too. So the saving of a node is a sum over rays, and the savings of disjoint nodes add up.
 
-use super::bvh_walk::{Traced, walk};
 use super::options::CostOptions;
 use super::prices::{LINES_THAT_HIT, Prices};
-use super::rays::{self, SampleRay, along};
 use super::{Start, Weighting};
 use crate::bvh::BinaryBvh;
+use crate::sampling::{self, SampleRay, along};
+use crate::sampling::{Traced, walk};
 use bth_import::Mesh;
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -58,8 +58,8 @@ pub(super) fn sample(
         None => {
             let count = (bvh.order.len() / TRIANGLES_PER_RAY).clamp(RAYS_OF_KIND[0], RAYS_OF_KIND[1]);
             let root = bvh.nodes.first();
-            let lines = root.map_or(Vec::new(), |root| rays::outside(root.lower, root.upper, count, 1));
-            drawn = (lines, rays::from_surface(mesh, bvh, 0..bvh.order.len(), count, 2));
+            let lines = root.map_or(Vec::new(), |root| sampling::outside(root.lower, root.upper, count, 1));
+            drawn = (lines, sampling::from_surface(mesh, bvh, 0..bvh.order.len(), count, 2));
             (&drawn.0, &drawn.1)
         }
     };

@@ -1,13 +1,12 @@
 //! Selection of the suitable nodes to tetrahedralize, by the expected cost of rays.
 //!
-//! `profile` holds the measured costs of tracing on a machine. `rays`, `bvh_walk` and `tet_walk` sample rays and count
-//! their steps; `estimate` and `area` predict the steps without tracing. `choose` selects nodes, by the paper's rule
+//! `profile` holds the measured costs of tracing on a machine. `tet_walk` counts steps of
+//! [sample rays](crate::sampling); `estimate` and `area` predict the steps without tracing. `choose` selects nodes, by the paper's rule
 //! (`top_down`) or by greatest saving (`gains`, `bottom_up`). `probe` decides again with sampled rays when the tetrahedra
 //! are built.
 
 mod area;
 mod bottom_up;
-mod bvh_walk;
 mod choose;
 mod estimate;
 mod gains;
@@ -17,7 +16,6 @@ mod options;
 mod prices;
 mod probe;
 mod profile;
-mod rays;
 mod subtree_sums;
 mod tet_walk;
 mod top_down;
@@ -29,7 +27,6 @@ mod testing;
 mod tests;
 
 pub use area::area_steps;
-pub use bvh_walk::{Traced, walk};
 pub use choose::{Storage, choose, choose_of_all};
 pub use estimate::{Estimator, Start};
 pub use least_squares::fit;
@@ -37,6 +34,5 @@ pub use least_useful::{Weighed, least_useful};
 pub use options::{Choice, CostOptions, CostReport, OptimizeFor, Probe, Select, SelectionOutcome, Verdict};
 pub use probe::{ProbeReport, ProbedLeaf, probe};
 pub use profile::{BvhCosts, Profile, TetCosts, Walk};
-pub use rays::{SampleRay, from_surface, outside};
 pub use tet_walk::{TetWalker, Walked, mean_steps};
 pub use weighting::Weighting;

@@ -4,17 +4,17 @@
 //! Steps are counted in double precision and priced by the profile, so that the outcome, and with it the file, is
 //! the same on every machine.
 
-use super::bvh_walk::walk;
+use super::Weighting;
 use super::choose::Storage;
 use super::gains::leaves;
 use super::options::{CostOptions, Probe, Select};
 use super::prices::Prices;
-use super::rays::{SampleRay, from_surface, outside};
 use super::tet_walk::TetWalker;
-use super::{Weighting, subtree_sums::half_area};
 use crate::bvh::BinaryBvh;
 use crate::error::Result;
 use crate::monitor::Monitor;
+use crate::sampling::walk;
+use crate::sampling::{SampleRay, from_surface, outside};
 use crate::tets::{Leaf, TetMesh};
 use crate::vectors::{corners, double_area};
 use bth_import::Mesh;
@@ -202,6 +202,6 @@ impl Prober<'_> {
             };
             traced += 1.0;
         }
-        half_area(at) / half_area(&bvh.nodes[0]) * saved / traced.max(1.0)
+        at.half_area() / bvh.nodes[0].half_area() * saved / traced.max(1.0)
     }
 }

@@ -14,13 +14,6 @@ pub(super) struct Sums {
     pub(super) depth: u64,
 }
 
-/// Half the surface area of a node's box; the sums above are of half areas too. Never zero: a triangle of non-zero area
-/// extends along two axes, and f64 holds the product of any two extents.
-pub(super) fn half_area(node: &Node) -> f64 {
-    let side = |k: usize| f64::from(node.upper[k]) - f64::from(node.lower[k]);
-    side(0) * side(1) + side(1) * side(2) + side(2) * side(0)
-}
-
 /// [`Sums::depth`] of each of `nodes`. These and `top` are ascending; `top` holds the root, and with a node all nodes above it.
 pub(super) fn depths(bvh: &BinaryBvh, top: &[u32], nodes: &[u32]) -> Vec<u64> {
     // A leaf is as deep below a node as there are inner nodes above it, so each inner node adds its leaves. In preorder
@@ -46,7 +39,7 @@ pub(super) fn depths(bvh: &BinaryBvh, top: &[u32], nodes: &[u32]) -> Vec<u64> {
 pub(super) fn subtree_sums(bvh: &BinaryBvh) -> Vec<Sums> {
     let mut sums = vec![Sums::default(); bvh.nodes.len()];
     for (i, node) in bvh.nodes.iter().enumerate().rev() {
-        let area = half_area(node);
+        let area = node.half_area();
         sums[i] = if node.is_leaf() {
             Sums { inner_area: 0.0, leaf_area: area, depth: 0 }
         } else {

@@ -5,6 +5,7 @@ use super::*;
 use crate::bvh::{self, BinaryBvh};
 use crate::marks::Marks;
 use crate::monitor::Silent;
+use crate::sampling::{SampleRay, from_surface, outside, walk};
 use crate::tets::{Behind, TetMesh};
 use bth_format::layout::RecordKind;
 use bth_import::Mesh;
@@ -26,7 +27,7 @@ fn cost_and_depths(bvh: &BinaryBvh, i: usize, depth: u32, visit: f64) -> (f64, u
     if node.is_leaf() {
         return (visit, depth);
     }
-    let share = |child: usize| subtree_sums::half_area(&bvh.nodes[child]) / subtree_sums::half_area(node);
+    let share = |child: usize| bvh.nodes[child].half_area() / node.half_area();
     let (l, r) = (i + 1, node.right as usize);
     let (a, b) = (cost_and_depths(bvh, l, depth + 1, visit), cost_and_depths(bvh, r, depth + 1, visit));
     (visit + share(l) * a.0 + share(r) * b.0, a.1 + b.1)
@@ -133,7 +134,7 @@ fn a_ray_meets_what_trying_all_triangles_meets_and_enters_the_nodes_above() {
         let met = walk(&mesh, &bvh, &ray, |node| entered[node as usize] = true);
         let all = bvh.order.iter().enumerate().filter_map(|(row, &triangle)| {
             Some((
-                bvh_walk::crosses(&ray, crate::vectors::corners(&mesh, triangle), f64::INFINITY)?,
+                crate::sampling::crosses(&ray, crate::vectors::corners(&mesh, triangle), f64::INFINITY)?,
                 row as u32,
             ))
         });

@@ -3,8 +3,8 @@
 //! Sampling is the first of the paper's three ways to find N_avg (§3.3), the only one that needs the
 //! tetrahedra. A ray through an edge may take one step more or less than in the runtime.
 
-use super::bvh_walk::crosses;
-use super::rays::SampleRay;
+use crate::sampling::SampleRay;
+use crate::sampling::crosses;
 use crate::tets::{Behind, TetMesh};
 use crate::vectors::double_area;
 use glam::DVec3;

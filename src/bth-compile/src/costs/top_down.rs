@@ -3,7 +3,7 @@
 
 use super::options::{Choice, CostOptions, SelectionOutcome, Verdict};
 use super::prices::{LINES_THAT_HIT, Prices};
-use super::subtree_sums::{half_area, subtree_sums};
+use super::subtree_sums::subtree_sums;
 use super::{Estimator, Start};
 use crate::bvh::BinaryBvh;
 use crate::error::Result;
@@ -48,7 +48,7 @@ pub(super) fn choose(
         let depth = sum.depth as f64 / f64::from(node.count);
         let n_avg = paper.estimator.steps(Start::Outside, node.count, depth);
         let cost_tet = prices.outside(node.count, n_avg, LINES_THAT_HIT);
-        let cost_bvh = paper.visit * (sum.inner_area + sum.leaf_area) / half_area(node);
+        let cost_bvh = paper.visit * (sum.inner_area + sum.leaf_area) / node.half_area();
         let decision = if node.count < options.minimum_triangles {
             SelectionOutcome::RefusedSmall
         } else if !suitable {
@@ -62,7 +62,7 @@ pub(super) fn choose(
         } else {
             SelectionOutcome::RefusedCost
         };
-        let gain = half_area(node) / half_area(root) * (cost_bvh - cost_tet);
+        let gain = node.half_area() / root.half_area() * (cost_bvh - cost_tet);
         let verdict = Verdict {
             node: i as u32,
             count: node.count,

@@ -1,6 +1,6 @@
 //! Rays of a scene in the space of one of its objects; they weight the nodes of the object.
 
-use super::rays::SampleRay;
+use crate::sampling::SampleRay;
 
 /// The rays of a scene's cameras, lights and frames that concern an object.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,4 +1,5 @@
-//! The compilation of a model: import → coordinates → BVH → marks → costs → tets → probe → limit → collapse → file.
+//! The compilation of a model: import → coordinates → BVH → visits → marks → costs → tets → probe →
+//! limit → collapse → file.
 //!
 //! Each stage is a function of its input and its options. The stages whose results can come from elsewhere are called
 //! through the trait `Stages`, which a cache implements outside of this module.
@@ -13,6 +14,7 @@ pub(crate) mod provenance;
 mod report;
 mod select;
 mod stages;
+mod tree;
 
 pub use crate::options::{CompileOptions, MotionOptions, Structure};
 pub use clock::StageTime;
@@ -122,7 +124,8 @@ pub(crate) fn compile_mesh(
     let options = &CompileOptions { structure: options.built_structure(), ..options.clone() };
     let bvh_options = bvh::BvhOptions { keep_zero_area: options.deformable, ..options.bvh };
     let (tree, bvh) = clock.time("bvh", || stages.bvh(&mesh, &bvh_options, monitor))?;
-    let traced = TracedMesh { mesh, on_grid, tree, probabilities: None };
+    let probabilities = clock.time("visits", || tree::probabilities(&mesh, &tree, &bvh_options));
+    let traced = TracedMesh { mesh, on_grid, tree, probabilities };
     let (leaves, tets) = match options.structure {
         Structure::Bvh => (Vec::new(), TetReports::default()),
         Structure::Bth | Structure::Tets => tet_leaves(source, &traced, options, stages, clock, monitor)?,

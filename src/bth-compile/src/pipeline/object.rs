@@ -31,7 +31,7 @@ pub(crate) struct TracedMesh {
     /// The grid and the original positions, if vertices were moved.
     pub(crate) on_grid: Option<OnGrid>,
     pub(crate) tree: bvh::BinaryBvh,
-    /// For each node the probability that a ray meets it, if that is a mean over poses.
+    /// For each node the probability that a ray enters it, if that is not by its area: counted, or a mean over poses.
     pub(crate) probabilities: Option<Vec<f64>>,
 }
 

@@ -1,6 +1,7 @@
 //! The stages that a decorator may wrap, timed.
 
 use super::clock::timed;
+use super::tree;
 use crate::coordinates::OnGrid;
 use crate::error::Result;
 use crate::monitor::Monitor;
@@ -46,7 +47,7 @@ pub(crate) trait Stages {
         Ok((mesh, on_grid))
     }
 
-    /// Builds the binary BVH.
+    /// Builds the binary BVH and rebuilds its treelets.
     ///
     /// # Errors
     /// As [`bvh::build`].
@@ -56,7 +57,7 @@ pub(crate) trait Stages {
         options: &bvh::BvhOptions,
         monitor: &dyn Monitor,
     ) -> Result<(bvh::BinaryBvh, bvh::BvhReport)> {
-        timed(|| bvh::build(mesh, options, monitor))
+        timed(|| tree::build(mesh, options, monitor))
     }
 
     /// Decides in which directions rays from a triangle meet nothing. The result does not depend on how the BVH was built, by

@@ -1,8 +1,9 @@
 //! The objects and triangles that the rays of a scene hit (`--for-scene`): rays from its cameras at some of its frames,
 //! bounces from what they hit, and rays from there to its lights.
 
-use crate::costs::{SampleRay, Weighting};
+use crate::costs::Weighting;
 use crate::error::{Error, Place, Result};
+use crate::sampling::SampleRay;
 use crate::vectors::{double_area, uniform_direction, unit};
 use bth::Scene;
 use bth::rays::{Hit, PrimitiveRef, Ray};

@@ -215,8 +215,10 @@ fn descend<S: Simd, N: Nodes, G: Goal, C: Count>(
         let free = stack.free_entries();
         let children = s.load_u(node.child());
         if goal.is_any() {
-            code = node.child()[bits.trailing_zeros() as usize % WIDTH];
-            let others = s.compress(bits & (bits - 1), children, free.codes);
+            // The last slot is entered first, as from the stack: compiled files hold the child there in which a hit is most likely.
+            let last = u32::BITS - 1 - bits.leading_zeros();
+            code = node.child()[last as usize % WIDTH];
+            let others = s.compress(bits ^ 1 << last, children, free.codes);
             free.push(others + 1);
         } else {
             let (count, nearest) = s.sort_far_to_near(bits, enter, children, free.codes, free.keys);

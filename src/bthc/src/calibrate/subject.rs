@@ -3,8 +3,9 @@
 use crate::failure::Failure;
 use crate::measure::{QueryKind, Rays, TimedRun, nanoseconds};
 use bth::Scene;
-use bth_compile::costs::{self, SampleRay, TetWalker, Walked};
+use bth_compile::costs::{TetWalker, Walked};
 use bth_compile::pipeline::{self, CompileOptions, Structure};
+use bth_compile::sampling::{self, SampleRay};
 use bth_compile::tets::WorkerStatus;
 use bth_compile::{Error, Monitor, bvh, tets};
 use bth_format::layout::RecordKind;
@@ -43,7 +44,8 @@ impl Kind {
     /// Counts the steps of the first [`COUNTED`] rays.
     fn new(samples: &[SampleRay], mesh: &Mesh, tree: &bvh::BinaryBvh, walker: &TetWalker<'_>) -> Kind {
         let counted = &samples[..samples.len().min(COUNTED)];
-        let visits: f64 = counted.iter().map(|r| f64::from(costs::walk(mesh, tree, r, |_| {}).visits)).sum();
+        let visits: f64 =
+            counted.iter().map(|r| f64::from(sampling::walk(mesh, tree, r, |_| {}).visits)).sum();
         let walked: Vec<Walked> = counted.iter().filter_map(|r| walker.walk(r)).collect();
         let mean = |of: fn(&Walked) -> u32| {
             walked.iter().map(|w| f64::from(of(w))).sum::<f64>() / counted.len().max(1) as f64
@@ -146,11 +148,11 @@ impl Subject {
         let plain = bth::from_bytes(&files[0])?;
         let root = &tree.nodes[0];
         let count = if small { RAYS_TO_SMALL } else { RAYS_TO_LARGE };
-        let lines = costs::outside(root.lower, root.upper, count, 11);
+        let lines = sampling::outside(root.lower, root.upper, count, 11);
         // The opposite half of each line leads away from the model.
         let away = |ray: &SampleRay| SampleRay { direction: ray.direction.map(|x| -x), ..*ray };
         let nothing: Vec<SampleRay> = lines.iter().map(away).collect();
-        let surface = costs::from_surface(mesh, &tree, 0..tree.order.len(), 6 * count, 12);
+        let surface = sampling::from_surface(mesh, &tree, 0..tree.order.len(), 6 * count, 12);
         let (bounce, mut short): (Vec<SampleRay>, Vec<SampleRay>) =
             surface.into_iter().partition(|ray| ray.tmax.is_infinite());
         short.truncate(count);

@@ -10,7 +10,7 @@ use crate::table::{Table, bytes};
 use bth::Scene;
 use bth_compile::costs::Profile;
 use bth_compile::pipeline::{self, CompileOptions};
-use bth_compile::{Monitor, bvh, costs, write};
+use bth_compile::{Monitor, bvh, sampling, write};
 use bth_import::{self, Keep, Mesh};
 use bth_scenes::{Model, blob, gyroid};
 use serde_json::json;
@@ -87,7 +87,7 @@ fn leaf(progress: &Progress) -> Result<(Scene, Rays), Failure> {
     let file = pipeline::assemble(&mesh, &tree, &[], &CompileOptions::default(), progress)?;
     let scene = bth::from_bytes(&file.bytes)?;
     let root = &tree.nodes[0];
-    let rays = Rays::new(&costs::outside(root.lower, root.upper, 4096, 13));
+    let rays = Rays::new(&sampling::outside(root.lower, root.upper, 4096, 13));
     Ok((scene, rays))
 }
 

@@ -2,7 +2,8 @@
 
 use super::Explained;
 use crate::measure::{QueryKind, Rays, TimedRun, nanoseconds};
-use bth_compile::costs::{SampleRay, TetWalker, from_surface};
+use bth_compile::costs::TetWalker;
+use bth_compile::sampling::{SampleRay, from_surface};
 use serde::Serialize;
 
 /// Rays that start on each node.

@@ -10,8 +10,9 @@ use crate::structures::{self, Use};
 use crate::tracer::{Batch, Tracer};
 use anyhow::Result;
 use bth::rays::{Hit, PrimitiveRef, Ray};
-use bth_compile::costs::{self, Estimator, SampleRay, Start, TetWalker};
+use bth_compile::costs::{Estimator, Start, TetWalker};
 use bth_compile::pipeline::{self, CompileOptions, Structure};
+use bth_compile::sampling::{self, SampleRay};
 use bth_compile::{Silent, bvh, marks, tets};
 use bth_format::layout::RecordKind;
 use bth_import::Mesh;
@@ -100,8 +101,8 @@ fn candidate(model: &str, node: u32, mesh: &Mesh) -> Result<Option<Candidate>> {
     let file = pipeline::assemble(mesh, &tree, &built, &options, &Silent)?;
     let tracer = structures::tracer(&file.bytes, Use::Hinted)?;
     let root = &tree.nodes[0];
-    let outside = costs::outside(root.lower, root.upper, RAYS, 21);
-    let surface = costs::from_surface(mesh, &tree, 0..tree.order.len(), 2 * RAYS, 22);
+    let outside = sampling::outside(root.lower, root.upper, RAYS, 21);
+    let surface = sampling::from_surface(mesh, &tree, 0..tree.order.len(), 2 * RAYS, 22);
     let surface: Vec<SampleRay> = surface.into_iter().filter(|r| r.tmax.is_infinite()).collect();
     let walker = TetWalker::new(tets);
     let counted = [&outside, &surface].map(|rays| count(&walker, rays));
@@ -121,8 +122,8 @@ fn candidate(model: &str, node: u32, mesh: &Mesh) -> Result<Option<Candidate>> {
             }
             _ => {
                 // Rays of other seeds than those that are measured.
-                let outside = costs::outside(root.lower, root.upper, SAMPLED_RAYS, 23);
-                let surface = costs::from_surface(mesh, &tree, 0..tree.order.len(), 2 * SAMPLED_RAYS, 24);
+                let outside = sampling::outside(root.lower, root.upper, SAMPLED_RAYS, 23);
+                let surface = sampling::from_surface(mesh, &tree, 0..tree.order.len(), 2 * SAMPLED_RAYS, 24);
                 let surface: Vec<SampleRay> = surface.into_iter().filter(|r| r.tmax.is_infinite()).collect();
                 // Making the walker belongs to the time of sampling.
                 let walker = TetWalker::new(tets);

@@ -10,7 +10,8 @@ use crate::structures;
 use crate::tracer::{Batch, Tracer};
 use anyhow::{Result, bail};
 use bth::rays::{Hit, Ray};
-use bth_compile::costs::{Profile, SampleRay, TetCosts, TetWalker, Walk};
+use bth_compile::costs::{Profile, TetCosts, TetWalker, Walk};
+use bth_compile::sampling::SampleRay;
 use bth_compile::{Silent, bvh, tets};
 
 /// A model whose tetrahedra fit the caches, and one whose tetrahedra do not.

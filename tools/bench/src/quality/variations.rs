@@ -7,6 +7,7 @@ use anyhow::Result;
 use bth_compile::Silent;
 use bth_compile::bvh::{self, CollapseOptions, CollapseReport, Costs, Effort, Plan, Quality};
 use bth_compile::comparison::collapse_by;
+use bth_compile::sampling;
 use bth_compile::write::{self, FileBuilder, ObjectParts};
 use bth_import::Mesh;
 use std::collections::HashSet;
@@ -27,6 +28,8 @@ pub(super) struct Variation {
     greedy: bool,
     costs: Costs,
     order: BlockOrder,
+    /// Whether the wide tree is chosen by what sample rays enter, not by areas.
+    by_visits: bool,
 }
 
 /// The name of the builder that compiled files are made with: all variations are compared with it.
@@ -35,6 +38,7 @@ pub(super) const AS_IN_FILES: &str = "as in files";
 /// All variations.
 pub(super) fn all() -> Vec<Variation> {
     let effort = Quality::Balanced.effort();
+    let treelets = |treelets| Effort { treelets, ..effort.clone() };
     let built = |effort: Effort| Variation {
         name: "",
         tree: BinaryTree::BuiltVariation(effort),
@@ -42,9 +46,10 @@ pub(super) fn all() -> Vec<Variation> {
         greedy: false,
         costs: Costs::default(),
         order: BlockOrder::DepthFirst,
+        by_visits: true,
     };
     let with = |bins, sweep_count, reinsertion: &[f64]| {
-        built(Effort { bins, sweep_count, reinsertion: reinsertion.to_vec() })
+        built(Effort { bins, sweep_count, reinsertion: reinsertion.to_vec(), ..effort.clone() })
     };
     let planned = |greedy, children, triangles| Variation {
         plan: Plan { children, triangles },
@@ -60,7 +65,7 @@ pub(super) fn all() -> Vec<Variation> {
     let sweep = effort.sweep_count;
     let named = |name, variation| Variation { name, ..variation };
     vec![
-        named(AS_IN_FILES, built(effort)),
+        named(AS_IN_FILES, built(effort.clone())),
         named("the same again", built(Quality::Balanced.effort())),
         named("16 bins", with(16, 0, &[])),
         named("32 bins", with(32, 0, &[])),
@@ -68,6 +73,9 @@ pub(super) fn all() -> Vec<Variation> {
         named("full sweep", with(32, usize::MAX, &[])),
         named("one pass of reinsertion", with(32, sweep, &[0.05])),
         named("`best`", built(Quality::Best.effort())),
+        named("no treelets", built(treelets(0))),
+        named("treelets of few triangles only", built(treelets(1))),
+        named("by areas, no treelets", Variation { by_visits: false, ..built(treelets(0)) }),
         named("greedy collapse", planned(true, 16, 16)),
         named("lines for nothing", priced(Costs { line: 0.0, ..costs })),
         named("leaves at 0.7 of their cost", leaves(0.7)),
@@ -127,17 +135,23 @@ impl Variation {
 
     fn make(&self, mesh: &Mesh) -> Result<(bvh::BinaryBvh, bvh::Wide, CollapseReport)> {
         let tree = match &self.tree {
-            BinaryTree::BuiltVariation(effort) => bvh::build_with(mesh, effort, &Silent)?.0,
+            BinaryTree::BuiltVariation(effort) => {
+                let (tree, mut report) = bvh::build_with(mesh, effort, &Silent)?;
+                let visits = |tree: &bvh::BinaryBvh| sampling::visits(mesh, tree);
+                bvh::rebuild_treelets(mesh, tree, effort.treelets, &visits, &mut report, &Silent)?
+            }
             BinaryTree::Spatial(exponent) => {
                 let tree = spatial_splits::build(mesh, *exponent);
                 let passes = Quality::Balanced.effort().reinsertion;
                 bvh::reinsert(tree, &passes, &mut bvh::BvhReport::default(), &Silent)?
             }
         };
+        let probabilities = self.by_visits.then(|| sampling::visits(mesh, &tree));
+        let weighed = bvh::Weighed { bvh: &tree, probabilities: probabilities.as_deref() };
         let options = CollapseOptions { plan: self.plan, costs: self.costs, ..CollapseOptions::default() };
         let (wide, report) = match self.greedy {
-            true => collapse_by(mesh, &tree, &[], &options, &greedy_collapse::decide, &Silent)?,
-            false => bvh::collapse(mesh, &tree, &[], &options, &Silent)?,
+            true => collapse_by(mesh, weighed, &[], &options, &greedy_collapse::decide, &Silent)?,
+            false => bvh::collapse(mesh, weighed, &[], &options, &Silent)?,
         };
         Ok((tree, wide, report))
     }

@@ -56,7 +56,7 @@ pub fn walk(mesh: &Mesh, bvh: &BinaryBvh, ray: &SampleRay, mut entered: impl FnM
 
 /// t of the intersection of a ray and a triangle within (0, best] (Möller and Trumbore 1997, "Fast, Minimum Storage
 /// Ray-Triangle Intersection").
-pub(super) fn crosses(ray: &SampleRay, [a, b, c]: [DVec3; 3], best: f64) -> Option<f64> {
+pub(crate) fn crosses(ray: &SampleRay, [a, b, c]: [DVec3; 3], best: f64) -> Option<f64> {
     let (e1, e2) = (b - a, c - a);
     let direction = DVec3::from(ray.direction);
     let p = direction.cross(e2);

@@ -26,12 +26,12 @@ const SHORT: f64 = 0.05;
 const BOUNCE_LIFT: f64 = 2e-5;
 
 /// The point at `t` on a ray.
-pub(super) fn along(ray: &SampleRay, t: f64) -> [f64; 3] {
+pub(crate) fn along(ray: &SampleRay, t: f64) -> [f64; 3] {
     (DVec3::from(ray.origin) + t * DVec3::from(ray.direction)).into()
 }
 
 /// Length of a box's diagonal.
-pub(super) fn diagonal(node: &Node) -> f64 {
+fn diagonal(node: &Node) -> f64 {
     (DVec3::from(node.upper.map(f64::from)) - DVec3::from(node.lower.map(f64::from))).length()
 }
 
@@ -56,6 +56,17 @@ pub fn outside(lower: [f32; 3], upper: [f32; 3], count: usize, seed: u64) -> Vec
         }
     }
     rays
+}
+
+/// Rays in uniform directions from uniform points of a box.
+pub fn within(lower: [f32; 3], upper: [f32; 3], count: usize, seed: u64) -> Vec<SampleRay> {
+    let mut random = Rng::new(seed);
+    let mut ray = || {
+        let origin = [0, 1, 2].map(|k| random.between(f64::from(lower[k]), f64::from(upper[k])));
+        let direction = uniform_direction(&mut random).into();
+        SampleRay { origin, direction, tmax: f64::INFINITY, from: None }
+    };
+    (0..count).map(|_| ray()).collect()
 }
 
 /// Rays from the fronts of triangles of these rows of the BVH's order, chosen by area, cosine-weighted

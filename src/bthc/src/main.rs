@@ -3,6 +3,7 @@
 mod args;
 mod calibrate;
 mod commands;
+mod deep;
 mod explain;
 mod failure;
 mod measure;

@@ -1,6 +1,9 @@
 //! `bthc info`, `verify`, `marks` and `diff`: what they report about files and models.
 
 use crate::support::{bthc, crossing, folder, run, sphere};
+use bth_format::layout::{FreeBins, kind};
+use bth_scenes::knot::torus_knot;
+use bth_tests::conformance::{Editor, Seal};
 
 #[test]
 fn info_shows_sections_and_provenance_without_paths() {
@@ -34,6 +37,40 @@ fn verify_finds_a_damaged_byte() {
     let json = bthc(folder.path(), &["verify", "ball.bth", "--json"]).expect(1).json();
     assert_eq!(json["verified"], false);
     assert!(json["errors"][0]["code"].as_str().is_some_and(|c| c.starts_with("BTH-F")), "{json:#}");
+}
+
+#[test]
+fn verify_deep_finds_what_a_file_knows_wrongly() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("knot.ply");
+    bth_scenes::write::file(&torus_knot(3000), &path).unwrap();
+    bthc(folder.path(), &["compile", "knot.ply", "--free-directions", "all"]).expect(0);
+    let right =
+        bthc(folder.path(), &["verify", "--deep", "--rays", "2000", "knot.bth", "--json"]).expect(0).json();
+    assert_eq!((&right["verified"], &right["deep"]["wrong"]), (&true.into(), &0.into()));
+    let count = |name: &str| right["deep"][name].as_u64().unwrap();
+    assert!(count("rays") > 1900 && count("hits") > 600 && count("known_directions") > 200, "{right:#}");
+
+    // All bins of the triangles that the geometric check passes over are called free.
+    let path = folder.path().join("knot.bth");
+    let mut editor = Editor::new(&std::fs::read(&path).unwrap());
+    let triangles = bthc(folder.path(), &["info", "knot.bth", "--json"]).expect(0).json();
+    let triangles = triangles["objects"][0]["triangles"].as_u64().unwrap() as usize;
+    let step = triangles.div_ceil(64);
+    let bins = FreeBins::ALL.to_le_bytes();
+    for triangle in (0..triangles).filter(|triangle| !triangle.is_multiple_of(step)) {
+        let at = editor.section_at(kind::FREE_DIRECTIONS) + 24 * triangle + 8;
+        editor.put(at, &bins);
+    }
+    std::fs::write(&path, editor.seal(Seal::Sections)).unwrap();
+    bthc(folder.path(), &["verify", "knot.bth"]).expect(0);
+    let run = bthc(folder.path(), &["verify", "--deep", "--rays", "2000", "knot.bth"]).expect(1);
+    assert!(run.stderr.contains("BTH-V002") && run.stderr.contains("BTH-F209"), "{run:?}");
+    assert!(run.stdout.is_empty(), "{run:?}");
+    let wrong =
+        bthc(folder.path(), &["verify", "--deep", "--rays", "2000", "knot.bth", "--json"]).expect(1).json();
+    assert_eq!(wrong["verified"], false);
+    assert!(wrong["deep"]["wrong"].as_u64().is_some_and(|wrong| wrong > 100), "{wrong:#}");
 }
 
 #[test]

@@ -83,12 +83,19 @@ pub(crate) struct Info {
     pub(crate) json: bool,
 }
 
-/// Check a BTH file completely: hashes, indices and geometry.
+/// Check a BTH file completely: hashes, indices and geometry, and with --deep the answers to sample rays.
 #[derive(Debug, Group)]
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Verify {
     /// The compiled file.
     pub(crate) file: PathBuf,
+    /// Trace sample rays through each object, too, in all ways, and compare them, and what is known of the directions in which they
+    /// start, with every triangle in exact arithmetic
+    #[arg(long)]
+    pub(crate) deep: bool,
+    /// Rays of each object with --deep. By default as many as take some seconds
+    #[arg(long, value_name = "N", requires = "deep")]
+    pub(crate) rays: Option<usize>,
     /// Print one JSON object.
     #[arg(long)]
     pub(crate) json: bool,

@@ -1,8 +1,10 @@
 //! `bthc verify`: checks a compiled file completely.
 
 use crate::args::Verify;
+use crate::deep;
 use crate::failure::{Failure, runtime_json};
 use crate::output;
+use crate::progress::{self, Progress};
 use crate::table::{Table, bytes, count};
 use bth_format::verify::Report;
 use serde_json::json;
@@ -14,8 +16,16 @@ pub(crate) fn run(args: &Verify) -> Result<(), Failure> {
         Err(error) => Err(vec![error]),
     };
     match result {
-        Ok(report) if args.json => Ok(output::json(&passed(&report))?),
-        Ok(report) => Ok(output::text(&summary(&report))?),
+        Ok(report) => {
+            let deep = if args.deep { Some(deeply(args)?) } else { None };
+            let is_right = deep.is_none_or(|deep| deep.wrong == 0);
+            if args.json {
+                output::json(&found(&report, deep, is_right))?;
+            } else if is_right {
+                output::text(&summary(&report, deep))?;
+            }
+            if is_right { Ok(()) } else { Err(Failure::Check) }
+        }
         Err(errors) => {
             if args.json {
                 let errors: Vec<_> = errors.iter().map(runtime_json).collect();
@@ -28,9 +38,16 @@ pub(crate) fn run(args: &Verify) -> Result<(), Failure> {
     }
 }
 
-fn passed(report: &Report) -> serde_json::Value {
+/// Traces sample rays through each object.
+fn deeply(args: &Verify) -> Result<deep::Report, Failure> {
+    progress::listen_for_interrupts();
+    deep::check(&args.file, args.rays, &Progress::new(args.json))
+}
+
+fn found(report: &Report, deep: Option<deep::Report>, is_right: bool) -> serde_json::Value {
     json!({
-        "verified": true,
+        "verified": is_right,
+        "deep": deep.map(|deep| deep.json()),
         "objects": report.objects,
         "sections": report.sections,
         "bytes": report.bytes,
@@ -42,7 +59,7 @@ fn passed(report: &Report) -> serde_json::Value {
     })
 }
 
-fn summary(report: &Report) -> String {
+fn summary(report: &Report, deep: Option<deep::Report>) -> String {
     let mut table = Table::default();
     table.row(["objects", &count(report.objects.into())]);
     table.row(["sections", &count(report.sections)]);
@@ -51,6 +68,11 @@ fn summary(report: &Report) -> String {
     table.row(["dropped", &count(report.dropped)]);
     table.row(["tet leaves", &count(report.tet_leaves)]);
     table.row(["tetrahedra", &count(report.tets)]);
+    if let Some(deep) = deep {
+        table.row(["rays compared", &count(deep.rays)]);
+        table.row(["hits", &count(deep.hits)]);
+        table.row(["known directions", &count(deep.known)]);
+    }
     let compared = report.compared_with_source == report.objects;
     let source = if compared {
         "compared with the source's triangles"

@@ -1,0 +1,205 @@
+//! `bthc verify --deep`: sample rays through each object, traced in all ways and decided in exact arithmetic.
+//!
+//! A file that passes every check may still answer wrongly, where it tells something of its triangles that is not so: free directions and
+//! distances, boxes that were damaged together with their hashes, or a defect of this program. So rays are traced in a batch, with and
+//! without hints, and one at a time, and compared with every triangle in exact arithmetic; and what is known of the directions of the
+//! triangles on which rays start is compared with that, too.
+
+mod bounds;
+mod rays;
+
+use crate::failure::Failure;
+use crate::output;
+use bth::rays::{Hit, Ray};
+use bth::{Hinted, Scene, SceneBuilder};
+use bth_compile::{Error, Monitor};
+use bth_oracle::{World, intersection, to_f64, triangles};
+use rayon::prelude::*;
+use rays::Start;
+use serde_json::json;
+use std::path::Path;
+
+/// Tests of a ray against a triangle for each object, by which the number of its rays is chosen: some seconds on two cores.
+const TESTS: usize = 200_000_000;
+/// Least and most rays of an object where their number is not given.
+const RAYS: [usize; 2] = [64, 20_000];
+/// What may be wrong: the answer, that ways of tracing differ, what is known of directions.
+const CODES: [&str; 3] = ["BTH-V001", "BTH-V002", "BTH-F209"];
+/// Differences of each kind that are printed of an object; all are counted.
+const PRINTED: usize = 10;
+/// Rays of a batch.
+const BATCH: usize = 256;
+const IDENTITY: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+
+/// What was compared.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Report {
+    /// Rays that were traced.
+    pub(crate) rays: u64,
+    /// Those that hit something.
+    pub(crate) hits: u64,
+    /// Those in whose direction something is known of the triangle on which they start.
+    pub(crate) known: u64,
+    /// Those for which something differs.
+    pub(crate) wrong: u64,
+}
+
+impl Report {
+    /// The figures as JSON.
+    pub(crate) fn json(&self) -> serde_json::Value {
+        json!({"rays": self.rays, "hits": self.hits, "known_directions": self.known, "wrong": self.wrong})
+    }
+}
+
+/// Compares so many rays of each object of a file, or a number that its triangles determine. Differences are printed on standard error.
+///
+/// # Errors
+/// A file that cannot be opened; cancellation.
+pub(crate) fn check(file: &Path, count: Option<usize>, monitor: &dyn Monitor) -> Result<Report, Failure> {
+    let scene = bth::open(file)?;
+    // The answers with hints are those of the look-ups, whether or not these pay.
+    Hinted::Tets.choose();
+    let mut report = Report::default();
+    for object in 0..scene.object_count() {
+        let findings = check_object(&scene, object, count, &mut report, monitor)?;
+        for code in CODES {
+            let of_code: Vec<&String> = findings.iter().filter(|finding| finding.starts_with(code)).collect();
+            for finding in of_code.iter().take(PRINTED) {
+                output::error(&format!("{}: object {object}: {finding}", file.display()));
+            }
+            if of_code.len() > PRINTED {
+                let more = of_code.len() - PRINTED;
+                output::error(&format!("{}: object {object}: {more} more rays with {code}", file.display()));
+            }
+        }
+        report.wrong += findings.len() as u64;
+    }
+    Ok(report)
+}
+
+/// What differs, a line for each ray.
+fn check_object(
+    scene: &Scene,
+    object: u32,
+    count: Option<usize>,
+    report: &mut Report,
+    monitor: &dyn Monitor,
+) -> Result<Vec<String>, Failure> {
+    let view = scene.object(object);
+    let all = triangles(&view);
+    if all.is_empty() {
+        return Ok(Vec::new());
+    }
+    let count = count.unwrap_or((TESTS / all.len()).clamp(RAYS[0], RAYS[1]));
+    let starts = rays::sample(&all, count, u64::from(object));
+    // The object by itself and at its place, where the runtime rounds no ray.
+    let mut builder = SceneBuilder::new();
+    let first = builder.add(scene);
+    let instance = builder.instance(first + object, &IDENTITY)?;
+    builder.commit()?;
+    let alone = builder.into_scene();
+
+    monitor.stage("trace exactly", Some(starts.len() as u64));
+    let traced = trace(&alone, &starts, instance);
+    let world = World::new(&alone);
+    let corners_of = |id: u32| all.binary_search_by_key(&id, |t| t.id).ok().map(|row| all[row].corners);
+    let one = |(start, ways): (&Start, &Traced)| {
+        if monitor.cancelled() {
+            return Err(Failure::Compile(Error::Cancelled));
+        }
+        let truth = world.nearest(&start.ray);
+        let t = truth.as_ref().map(bth_oracle::ExactHit::t_f64);
+        let known = bounds::known(&view, start);
+        let found = ways
+            .differing(&start.ray)
+            .or_else(|| {
+                let hit = &ways.plain;
+                let right = match &truth {
+                    None => !hit.is_hit(),
+                    Some(truth) => {
+                        hit.is_hit()
+                            && is_rounded(hit.t, truth.t_f64())
+                            && (truth.triangles.contains(&hit.primitive)
+                                || is_as_near(&start.ray, hit, truth.t_f64(), &corners_of))
+                    }
+                };
+                (!right).then(|| format!("BTH-V001: {:?}: expected t = {t:?}, found {hit:?}", start.ray))
+            })
+            .or_else(|| {
+                let bound = known.filter(|bound| t.is_some_and(|t| bound.is_broken(t)))?;
+                let expected = format!("nothing nearer than {}", bound.distance);
+                Some(format!("BTH-F209: {:?}: expected {expected}, found t = {t:?}", start.ray))
+            });
+        monitor.advance(1);
+        Ok((found, t.is_some(), known.is_some()))
+    };
+    let results = starts.par_iter().zip(&traced).map(one).collect::<Result<Vec<_>, _>>()?;
+    report.rays += results.len() as u64;
+    report.hits += results.iter().filter(|(_, hit, _)| *hit).count() as u64;
+    report.known += results.iter().filter(|(_, _, known)| *known).count() as u64;
+    Ok(results.into_iter().filter_map(|(found, _, _)| found).collect())
+}
+
+/// The answers for a ray.
+struct Traced {
+    plain: Hit,
+    hinted: Hit,
+    single: Hit,
+    any: bool,
+    any_hinted: bool,
+}
+
+impl Traced {
+    /// What differs between the ways of tracing, if anything does.
+    fn differing(&self, ray: &Ray) -> Option<String> {
+        let Traced { plain, hinted, single, any, any_hinted } = self;
+        let bits = |hit: &Hit| ([hit.t, hit.u, hit.v].map(f32::to_bits), hit.primitive);
+        if [hinted, single].iter().any(|hit| bits(hit) != bits(plain)) {
+            return Some(format!(
+                "BTH-V002: {ray:?}: expected {plain:?} in every way, found {hinted:?} with a hint, {single:?} alone"
+            ));
+        }
+        if [*any, *any_hinted].iter().any(|found| *found != plain.is_hit()) {
+            return Some(format!(
+                "BTH-V002: {ray:?}: expected {plain:?} in every way, found any hit {any}, with a hint {any_hinted}"
+            ));
+        }
+        None
+    }
+}
+
+/// Traces rays through the only instance in all ways.
+fn trace(alone: &Scene, starts: &[Start], instance: u32) -> Vec<Traced> {
+    let rays: Vec<Ray> = starts.iter().map(|start| start.ray).collect();
+    let hints: Vec<_> = starts.iter().map(|start| start.hint(instance)).collect();
+    let (mut plain, mut hinted) = (vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]);
+    let (mut any, mut any_hinted) = (vec![false; rays.len()], vec![false; rays.len()]);
+    for from in (0..rays.len()).step_by(BATCH) {
+        let part = from..rays.len().min(from + BATCH);
+        let (rays, hints) = (&rays[part.clone()], &hints[part.clone()]);
+        alone.batch(rays).nearest(&mut plain[part.clone()]);
+        alone.batch(rays).from(hints).nearest(&mut hinted[part.clone()]);
+        alone.batch(rays).any(&mut any[part.clone()]);
+        alone.batch(rays).from(hints).any(&mut any_hinted[part]);
+    }
+    let one = |i: usize| Traced {
+        plain: plain[i],
+        hinted: hinted[i],
+        single: alone.nearest(&rays[i]).unwrap_or(Hit::MISS),
+        any: any[i],
+        any_hinted: any_hinted[i],
+    };
+    (0..rays.len()).map(one).collect()
+}
+
+/// Whether t is the exact one, rounded to f32, or the next number to that, since it is rounded to f64 before.
+fn is_rounded(t: f32, exact: f64) -> bool {
+    let exact = exact as f32;
+    t == exact || t.to_bits().abs_diff(exact.to_bits()) <= 1
+}
+
+/// Whether another triangle is hit at a distance that differs by less than its rounding to f64.
+fn is_as_near(ray: &Ray, hit: &Hit, exact: f64, corners_of: &impl Fn(u32) -> Option<[[f32; 3]; 3]>) -> bool {
+    let at = corners_of(hit.primitive.triangle).and_then(|corners| intersection(ray, corners));
+    at.is_some_and(|at| (to_f64(&at.t) - exact).abs() <= 1e-12 * exact.abs())
+}

@@ -252,7 +252,11 @@ impl<'a> Planner<'a> {
 
         let decision = &mut own[0];
         *decision = Decision::default();
-        let (children, share) = distribute(&left.cost, &right.cost, self.plan.children);
+        // In more than 15 slots no subtree is needed.
+        let leaves =
+            [at + 1, node.right].map(|at| (self.bvh.nodes[at as usize].count as usize).min(WIDTH - 1));
+        let pair = Pair { costs: [&left.cost, &right.cost], leaves };
+        let (children, share) = pair.distribute(self.plan.children);
         decision.set_share(WIDTH, share);
         let mut summary = Summary { cost: [f32::INFINITY; WIDTH], vertices: None };
         let mut role = (area * self.costs.node + self.line * NODE_LINES as f32 + children, Role::Node);
@@ -275,39 +279,49 @@ impl<'a> Planner<'a> {
         }
         decision.set_role(role.1);
         summary.cost[1] = role.0;
-        in_several_slots(decision, &mut summary.cost, &left.cost, &right.cost, self.plan.children);
+        pair.in_several_slots(decision, &mut summary.cost, self.plan.children);
         Ok(summary)
     }
 }
 
-/// The least cost of two subtrees in so many slots, and how many of these the left one takes, given their costs in 1 to 15 slots.
-#[inline(always)]
-pub(super) fn distribute(left: &[f32; WIDTH], right: &[f32; WIDTH], slots: usize) -> (f32, usize) {
-    let mut best = (f32::INFINITY, 1);
-    for j in 1..slots {
-        let cost = left[j] + right[slots - j];
-        if cost < best.0 {
-            best = (cost, j);
-        }
-    }
-    best
+/// The least costs of the two subtrees of a node in 1 to 15 slots each, and the numbers of their leaves, in more slots than which they
+/// cost no less.
+pub(super) struct Pair<'a> {
+    pub(super) costs: [&'a [f32; WIDTH]; 2],
+    pub(super) leaves: [usize; 2],
 }
 
-/// Decides how a node whose cost in one slot is known shares more slots, fewer than `most`, between its children.
-#[inline(always)]
-pub(super) fn in_several_slots(
-    decision: &mut Decision,
-    cost: &mut [f32; WIDTH],
-    left: &[f32; WIDTH],
-    right: &[f32; WIDTH],
-    most: usize,
-) {
-    for slots in 2..most.min(WIDTH) {
-        let (shared, share) = distribute(left, right, slots);
-        cost[slots] = cost[slots - 1];
-        if shared < cost[slots] {
-            cost[slots] = shared;
-            decision.set_share(slots, share);
+impl Pair<'_> {
+    /// The least cost of both in so many slots, and how many of these the left one takes.
+    #[inline(always)]
+    pub(super) fn distribute(&self, slots: usize) -> (f32, usize) {
+        let [left, right] = self.leaves;
+        let first = slots.saturating_sub(right).max(1).min(left);
+        let mut best = (f32::INFINITY, first);
+        for j in first..=left.min(slots - 1) {
+            let cost = self.costs[0][j] + self.costs[1][right.min(slots - j)];
+            if cost < best.0 {
+                best = (cost, j);
+            }
+        }
+        best
+    }
+
+    /// Decides how a node whose cost in one slot is known shares more slots, fewer than `most`, between its children.
+    #[inline(always)]
+    pub(super) fn in_several_slots(&self, decision: &mut Decision, cost: &mut [f32; WIDTH], most: usize) {
+        let end = most.min(WIDTH);
+        let leaves = self.leaves[0] + self.leaves[1];
+        for slots in 2..end.min(leaves + 1) {
+            let (shared, share) = self.distribute(slots);
+            cost[slots] = cost[slots - 1];
+            if shared < cost[slots] {
+                cost[slots] = shared;
+                decision.set_share(slots, share);
+            }
+        }
+        for slots in (leaves + 1)..end {
+            cost[slots] = cost[leaves];
         }
     }
 }

@@ -8,7 +8,7 @@ use bth_random::Rng;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Start {
     pub(super) ray: Ray,
-    /// The triangle on which it starts; that of the hint, unless `is_hint_wrong`.
+    /// The triangle on which it starts.
     pub(super) triangle: Triangle,
     /// Whether it starts exactly at a corner of the triangle, and behind what it touches there.
     pub(super) is_at_corner: bool,
@@ -71,6 +71,6 @@ fn start(triangles: &[Triangle], kind: Kind, i: usize, random: &mut Rng) -> Opti
     let ray = Ray { origin, tmin, direction, tmax };
     let numbers = origin.iter().chain(&direction);
     let is_usable = numbers.clone().all(|x| x.is_finite()) && direction != [0.0; 3];
-    let wrong_hint = (i % 32 == 31).then(|| target.id);
+    let wrong_hint = (i % 32 == 31).then_some(target.id);
     is_usable.then_some(Start { ray, triangle, is_at_corner, wrong_hint })
 }

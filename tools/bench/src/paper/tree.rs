@@ -240,7 +240,7 @@ mod tests {
     use super::super::tet_records::{Tet20, Tet32};
     use super::*;
     use crate::costs::rays;
-    use bth_compile::{Silent, bvh, costs, tets};
+    use bth_compile::{Silent, bvh, sampling, tets};
 
     /// Hits of a structure against those of trying all triangles; `eye`: rays from one point within.
     fn agrees<R: TetRecord>(mesh: &Mesh, tree: &PaperTree<R>, rays: &[Ray]) {

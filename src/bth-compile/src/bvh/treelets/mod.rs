@@ -46,15 +46,20 @@ pub fn rebuild_treelets(
         let weighed = Weighed { bvh: &bvh, probabilities: Some(&probabilities) };
         let planner = Planner::new(mesh, weighed, Costs::default(), Plan::default(), false, monitor);
         let (decisions, _) = planner.run(&[])?;
-        let (rebuilt, count) = match round {
-            0 => small::rebuild(&planner, &decisions)?,
-            _ => wide::rebuild(&bvh, &decisions, monitor)?,
+        let count = if round == 0 {
+            let found = small::find(&planner, &decisions)?;
+            drop((decisions, probabilities));
+            found.iter().for_each(|(at, part)| small::replace(&mut bvh, *at, part));
+            found.len() as u64
+        } else {
+            let (rebuilt, count) = wide::rebuild(&bvh, &decisions, monitor)?;
+            // A deeper tree could not be traversed.
+            if levels(&rebuilt) > MAX_LEVELS {
+                break;
+            }
+            bvh = rebuilt;
+            count
         };
-        // A deeper tree could not be traversed.
-        if levels(&rebuilt) > MAX_LEVELS {
-            break;
-        }
-        bvh = rebuilt;
         report.treelets.push(count);
         monitor.advance(1);
     }

@@ -2,7 +2,7 @@
 
 use super::super::bounds::Bounds;
 use super::super::build::{Effort, split_with};
-use super::super::plan::{Decision, Role, children, distribute, in_several_slots};
+use super::super::plan::{Decision, Pair, Role, children};
 use super::super::split::Reference;
 use super::super::sweep_split::Scratch;
 use super::super::{BinaryBvh, Node, Quality};
@@ -199,11 +199,14 @@ impl<'a> TreeletPlan<'a> {
         let mut below_root = 0.0;
         for (at, node) in treelet.nodes.iter().enumerate().rev().filter(|(_, node)| !node.is_leaf()) {
             let (left, right) = (costs[at + 1], costs[node.right as usize]);
-            let (below, share) = distribute(&left, &right, WIDTH);
+            let leaves =
+                [at + 1, node.right as usize].map(|at| (treelet.nodes[at].count as usize).min(WIDTH - 1));
+            let pair = Pair { costs: [&left, &right], leaves };
+            let (below, share) = pair.distribute(WIDTH);
             let (decision, cost) = (&mut decisions[at], &mut costs[at]);
             decision.set_share(WIDTH, share);
             cost[1] = (node.half_area() / root) as f32 + below;
-            in_several_slots(decision, cost, &left, &right, WIDTH);
+            pair.in_several_slots(decision, cost, WIDTH);
             below_root = below;
         }
         Self { treelet, decisions, area: f64::from(below_root) * root }

@@ -80,8 +80,9 @@ pub struct BvhReport {
     pub nodes: u64,
     /// Edges on the longest path from the root.
     pub levels: u32,
-    /// Nodes that a random line through the root's box meets, on average, after the top-down build
-    /// and then after each pass of reinsertion: the sum of the nodes' areas over the root's.
+    /// Nodes that a random line through the root's box meets, on average, after the top-down build, then after each pass of reinsertion,
+    /// and at last after treelets were rebuilt, which lowers the cost of the wide tree and may raise this: the sum of the nodes' areas over
+    /// the root's.
     pub visits: Vec<f64>,
     /// Subtrees that each pass of reinsertion moved.
     pub moved: Vec<u64>,

@@ -139,7 +139,7 @@ mod tests {
     use crate::bvh::stack::Stacks;
     use crate::object::single;
     use crate::query::sink::Sink;
-    use crate::query::{ANY, AnyQuery, NEAREST, NearestQuery, Query, any_answers, nearest_answers};
+    use crate::query::{AnyQuery, NEAREST, NearestQuery, Query, any_answers, nearest_answers};
     use crate::rays::Hit;
     use crate::simd::{Isa, Kernel, Simd};
     use bth_format::layout::Child;
@@ -295,9 +295,9 @@ mod tests {
                     assert!(through_pool(isa, object, (&rays, order), &mut stacks, &mut sink));
                     let traced = |i: usize| order.is_none_or(|order| order.contains(&(i as u32)));
                     for (i, ray) in rays.iter().enumerate().filter(|&(i, _)| traced(i)) {
-                        let (mut hit, mut is_hit) = (Hit::MISS, false);
+                        let mut hit = Hit::MISS;
                         single::trace::<NearestQuery, ()>((object, NEAREST), ray, NONE, 0, &mut (), &mut hit);
-                        single::trace::<AnyQuery, ()>((object, ANY), ray, NONE, 0, &mut (), &mut is_hit);
+                        let is_hit = crate::object::any(object, ray, NONE);
                         assert_eq!(format!("{:?}", hits[i]), format!("{hit:?}"), "{isa}, {scale}: {ray:?}");
                         assert_eq!(found[i], is_hit, "{isa}, {scale}: {ray:?}");
                     }

@@ -10,11 +10,10 @@ use super::{FreeOptions, Kept, decide};
 use crate::bvh::BinaryBvh;
 use crate::error::Result;
 use crate::monitor::Monitor;
-use crate::sampling::{SampleRay, outside, walk};
-use crate::vectors::{corners, double_area, uniform_direction};
+use crate::sampling::{SampleRay, outside, walk, within};
+use crate::vectors::{corners, double_area};
 use bth_format::layout::{FreeBins, FreeDirections, FreeDistances};
 use bth_import::Mesh;
-use bth_random::Rng;
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -124,21 +123,13 @@ pub(super) fn worth(
 /// The triangles that rays in uniform directions meet from uniform points of the box, but not from points in solids, from which only backs
 /// are seen: what is in a room shows its front.
 fn met_from_within(mesh: &Mesh, tree: &BinaryBvh, count: usize) -> Vec<Met> {
-    let (root, mut random) = (&tree.nodes[0], Rng::new(2));
-    let mut from_point = || {
-        let end = |k: usize| (f64::from(root.lower[k]), f64::from(root.upper[k]));
-        let origin = [0, 1, 2].map(|k| random.between(end(k).0, end(k).1));
-        [(); RAYS_A_POINT].map(|()| {
-            let direction = uniform_direction(&mut random).into();
-            SampleRay { origin, direction, tmax: f64::INFINITY, from: None }
-        })
-    };
-    let points: Vec<_> = (0..count.div_ceil(RAYS_A_POINT)).map(|_| from_point()).collect();
-    let of_point = |rays: &[SampleRay; RAYS_A_POINT]| {
+    let root = &tree.nodes[0];
+    let rays = within(root.lower, root.upper, [count.div_ceil(RAYS_A_POINT), RAYS_A_POINT], 2);
+    let of_point = |rays: &[SampleRay]| {
         let met: Vec<Met> = rays.iter().filter_map(|ray| meet(mesh, tree, ray)).collect();
         if met.iter().all(|met| met.is_back) { Vec::new() } else { met }
     };
-    points.par_iter().flat_map_iter(of_point).collect()
+    rays.par_chunks(RAYS_A_POINT).flat_map_iter(of_point).collect()
 }
 
 /// The first triangle that a ray meets.

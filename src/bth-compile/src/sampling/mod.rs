@@ -12,4 +12,6 @@ pub use visits::visits;
 pub use walk::{Traced, walk};
 
 pub(crate) use rays::along;
+#[cfg(test)]
+pub(crate) use visits::entered;
 pub(crate) use walk::crosses;

@@ -1,4 +1,4 @@
-//! Sample rays that stand in for those of a renderer: uniform lines from outside, and rays from surfaces.
+//! Sample rays that stand in for those of a renderer: uniform lines from outside, rays from surfaces, and rays from points within.
 
 use crate::bvh::{BinaryBvh, Node};
 use crate::vectors::{corners, double_area, uniform_direction, unit};
@@ -58,15 +58,23 @@ pub fn outside(lower: [f32; 3], upper: [f32; 3], count: usize, seed: u64) -> Vec
     rays
 }
 
-/// Rays in uniform directions from uniform points of a box.
-pub fn within(lower: [f32; 3], upper: [f32; 3], count: usize, seed: u64) -> Vec<SampleRay> {
+/// Rays in uniform directions from uniform points of a box, so many from each point one after the other.
+pub fn within(
+    lower: [f32; 3],
+    upper: [f32; 3],
+    [points, rays_a_point]: [usize; 2],
+    seed: u64,
+) -> Vec<SampleRay> {
     let mut random = Rng::new(seed);
-    let mut ray = || {
+    let mut rays = Vec::with_capacity(points * rays_a_point);
+    for _ in 0..points {
         let origin = [0, 1, 2].map(|k| random.between(f64::from(lower[k]), f64::from(upper[k])));
-        let direction = uniform_direction(&mut random).into();
-        SampleRay { origin, direction, tmax: f64::INFINITY, from: None }
-    };
-    (0..count).map(|_| ray()).collect()
+        rays.extend((0..rays_a_point).map(|_| {
+            let direction = uniform_direction(&mut random).into();
+            SampleRay { origin, direction, tmax: f64::INFINITY, from: None }
+        }));
+    }
+    rays
 }
 
 /// Rays from the fronts of triangles of these rows of the BVH's order, chosen by area, cosine-weighted

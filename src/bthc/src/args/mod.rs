@@ -11,6 +11,7 @@ pub(crate) use compile::*;
 
 use clap::{Args as Group, Parser, Subcommand};
 use common::{EXIT_CODES, threads};
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 /// Compiles triangle models into BTH files, for tracing rays without building anything at the start.
@@ -95,7 +96,7 @@ pub(crate) struct Verify {
     pub(crate) deep: bool,
     /// Rays of each object with --deep. By default as many as take some seconds
     #[arg(long, value_name = "N", requires = "deep")]
-    pub(crate) rays: Option<usize>,
+    pub(crate) rays: Option<NonZeroUsize>,
     /// Print one JSON object.
     #[arg(long)]
     pub(crate) json: bool,

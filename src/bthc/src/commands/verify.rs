@@ -8,6 +8,7 @@ use crate::progress::{self, Progress};
 use crate::table::{Table, bytes, count};
 use bth_format::verify::Report;
 use serde_json::json;
+use std::num::NonZeroUsize;
 
 pub(crate) fn run(args: &Verify) -> Result<(), Failure> {
     let result = match bth_format::File::read(&args.file) {
@@ -41,7 +42,7 @@ pub(crate) fn run(args: &Verify) -> Result<(), Failure> {
 /// Traces sample rays through each object.
 fn deeply(args: &Verify) -> Result<deep::Report, Failure> {
     progress::listen_for_interrupts();
-    deep::check(&args.file, args.rays, &Progress::new(args.json))
+    deep::check(&args.file, args.rays.map(NonZeroUsize::get), &Progress::new(args.json))
 }
 
 fn found(report: &Report, deep: Option<deep::Report>, is_right: bool) -> serde_json::Value {

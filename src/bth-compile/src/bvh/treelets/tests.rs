@@ -1,11 +1,12 @@
 use super::super::bounds::Bounds;
-use super::super::samples::{clutter, exponential, grid, soup};
+use super::super::samples::{clutter, exponential, grid, model, soup};
 use super::super::validate::validate_binary;
-use super::super::{Quality, build};
+use super::super::{CollapseOptions, Quality, build, collapse_by};
 use super::agglomerate::agglomerate;
 use super::wide::TreeletPlan;
 use super::*;
 use crate::monitor::Silent;
+use crate::sampling::{entered, from_surface, visits};
 use bth_format::layout::WIDTH;
 use bth_random::Rng;
 use proptest::prelude::*;
@@ -64,6 +65,45 @@ fn wide_trees_cost_less_and_never_more() {
             assert!(is <= was * (1.0 + 1e-5), "{rounds} rounds: {was} {is}");
             last = next;
         }
+    }
+}
+
+/// Wide nodes and leaves that rays from surfaces enter, in the mean, if the tree is planned by these probabilities or by areas. The rays
+/// are others than those that plans follow.
+fn entered_by_others(mesh: &Mesh, bvh: &BinaryBvh, probabilities: Option<&[f64]>) -> f64 {
+    let mut rays = from_surface(mesh, bvh, 0..bvh.order.len(), 60_000, 97);
+    rays.retain(|ray| ray.tmax == f64::INFINITY);
+    let counts = entered(mesh, bvh, &rays);
+    let judge: Vec<f64> = counts.into_iter().map(|count| f64::from(count) / rays.len() as f64).collect();
+    let planned_by = Weighed { bvh, probabilities };
+    let decide = |planner: &Planner<'_>, cut: &[u32]| {
+        let (mesh, costs) = (planner.mesh, Costs::default());
+        Planner::new(mesh, planned_by, costs, Plan::default(), false, &Silent).run(cut)
+    };
+    let judged = Weighed { bvh, probabilities: Some(&judge) };
+    let options = CollapseOptions::default();
+    let (_, report) = collapse_by(mesh, judged, &[], &options, &decide, &Silent).unwrap();
+    // Visits are told relative to those of the root.
+    (report.node_visits + report.leaf_visits) * judge[0]
+}
+
+#[test]
+#[allow(clippy::print_stdout, reason = "says what was skipped")]
+fn rays_in_rooms_enter_fewer_nodes_than_of_trees_by_areas() {
+    for (name, most) in [("living-room.ply", 0.95), ("sponza_dabrovic.ply", 0.965)] {
+        let Some(mesh) = model(name) else {
+            println!("skipped: {name} is not there");
+            continue;
+        };
+        let (before, mut report) = built(&mesh, Quality::Balanced);
+        let by_areas = entered_by_others(&mesh, &before, None);
+        let plan = visits(&mesh, &before);
+        let by_visits = entered_by_others(&mesh, &before, Some(&plan));
+        let count = |bvh: &BinaryBvh| visits(&mesh, bvh);
+        let after = rebuild_treelets(&mesh, before, 3, &count, &mut report, &Silent).unwrap();
+        let rebuilt = entered_by_others(&mesh, &after, Some(&visits(&mesh, &after)));
+        assert!(by_visits < 0.985 * by_areas, "{name}: {by_areas}, by visits {by_visits}");
+        assert!(rebuilt < most * by_areas, "{name}: {by_areas}, by visits {by_visits}, rebuilt {rebuilt}");
     }
 }
 

@@ -113,6 +113,7 @@ impl CompileOptions {
             coordinates: coordinates::CoordinateOptions::default(),
             geometry: true,
             free: free::FreeOptions::default(),
+            costs: costs::CostOptions { rays: None, ..self.costs.clone() },
             ..self.clone()
         }
     }
@@ -145,6 +146,8 @@ impl CompileOptions {
             "tetrahedralizations without a BVH beside them"
         } else if self.free.keep.always() {
             "free directions"
+        } else if self.costs.rays.is_some() {
+            "known rays"
         } else {
             return Ok(());
         };

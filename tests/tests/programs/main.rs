@@ -8,6 +8,7 @@ mod costs;
 mod errors;
 mod inspect;
 mod interrupt;
+mod known_rays;
 mod made_models;
 mod materials;
 mod mistakes;

@@ -5,10 +5,11 @@
 
 use super::codec::MeshSummary;
 use super::rows::HashedRows;
+use crate::free;
 use crate::options::{CompileOptions, Structure};
+use crate::pipeline::TreeOptions;
 use crate::source::SourceDigest;
 use crate::write::SceneParts;
-use crate::{bvh, free};
 use bth_cache::Key;
 use bth_files::Digest;
 use bth_import::{AlphaMode, Wanted};
@@ -64,18 +65,24 @@ pub(crate) fn extension(path: &Path) -> String {
 }
 
 /// The binary BVH of a mesh.
-pub(crate) fn bvh(geometry: &Digest, options: &bvh::BvhOptions) -> Key {
-    let key = Key::new("bvh")
+pub(crate) fn bvh(geometry: &Digest, options: &TreeOptions<'_>) -> Key {
+    let mut key = Key::new("bvh")
         .with("geometry", geometry.hex())
-        .with("quality", text(&options.quality))
+        .with("quality", text(&options.bvh.quality))
         .with("bvh version", BVH);
-    if options.keep_zero_area { key.with("zero area", "kept") } else { key }
+    if options.bvh.keep_zero_area {
+        key = key.with("zero area", "kept");
+    }
+    match options.rays {
+        Some(rays) => key.with("rays", rays.hash()),
+        None => key,
+    }
 }
 
 /// The free directions of its triangles. What is too close to decide may depend on the BVH.
-pub(crate) fn free(geometry: &Digest, bvh: &bvh::BvhOptions, options: &free::FreeOptions) -> Key {
+pub(crate) fn free(geometry: &Digest, tree: &TreeOptions<'_>, options: &free::FreeOptions) -> Key {
     Key::new("free directions")
-        .with_all(self::bvh(geometry, bvh).components().iter().cloned())
+        .with_all(bvh(geometry, tree).components().iter().cloned())
         .with("keep", text(&options.keep))
         .with("reach", text(&options.reach))
         .with("row bytes", text(&options.row_bytes))
@@ -84,7 +91,7 @@ pub(crate) fn free(geometry: &Digest, bvh: &bvh::BvhOptions, options: &free::Fre
 }
 
 /// The marks of its nodes.
-pub(crate) fn marks(geometry: &Digest, options: &bvh::BvhOptions) -> Key {
+pub(crate) fn marks(geometry: &Digest, options: &TreeOptions<'_>) -> Key {
     Key::new("marks")
         .with_all(bvh(geometry, options).components().iter().cloned())
         .with("marks version", MARKS)
@@ -254,6 +261,11 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
             ("costs version", COSTS.to_owned()),
             ("tets version", TETS.to_owned()),
         ]);
+    }
+    // Where nodes may be tetrahedralized, the options of the selection contain both.
+    if options.built_structure() == Structure::Bvh {
+        all.extend(options.costs.for_scene.then(|| ("for scene", "true".to_owned())));
+        all.extend(options.costs.rays.iter().map(|rays| ("rays", rays.hash())));
     }
     let mut all: Vec<_> = all.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
     if options.built_structure() != Structure::Bvh {

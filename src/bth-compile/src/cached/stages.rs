@@ -7,7 +7,7 @@ use super::{Cache, decode, encode, keys};
 use crate::coordinates::{self, OnGrid};
 use crate::error::Result;
 use crate::monitor::Monitor;
-use crate::pipeline::{Direct, Stages, timed};
+use crate::pipeline::{Direct, Stages, TreeOptions, timed};
 use crate::source::Model;
 use crate::{bvh, free, marks, tets};
 use bth_files::Digest;
@@ -77,7 +77,7 @@ impl Stages for CachedStages<'_> {
     fn bvh(
         &mut self,
         mesh: &Mesh,
-        options: &bvh::BvhOptions,
+        options: &TreeOptions<'_>,
         monitor: &dyn Monitor,
     ) -> Result<(bvh::BinaryBvh, bvh::BvhReport)> {
         if self.cache.store().is_none() {
@@ -97,19 +97,19 @@ impl Stages for CachedStages<'_> {
         &mut self,
         mesh: &Mesh,
         tree: &bvh::BinaryBvh,
-        (bvh, options): (&bvh::BvhOptions, &free::FreeOptions),
+        (built, options): (&TreeOptions<'_>, &free::FreeOptions),
         monitor: &dyn Monitor,
     ) -> Result<(free::Free, free::FreeReport)> {
         if self.cache.store().is_none() {
-            return Direct.free(mesh, tree, (bvh, options), monitor);
+            return Direct.free(mesh, tree, (built, options), monitor);
         }
         let geometry = hash_once(&mut self.geometry, mesh);
         self.cache.get_or_build(
-            (keys::free(&geometry, bvh, options), self.part),
+            (keys::free(&geometry, built, options), self.part),
             monitor,
             |bytes| decode(bytes).filter(|found: &free::Free| found.is_of(mesh.triangles.len())),
             encode,
-            || Direct.free(mesh, tree, (bvh, options), monitor),
+            || Direct.free(mesh, tree, (built, options), monitor),
         )
     }
 
@@ -117,7 +117,7 @@ impl Stages for CachedStages<'_> {
         &mut self,
         mesh: &Mesh,
         tree: &bvh::BinaryBvh,
-        options: &bvh::BvhOptions,
+        options: &TreeOptions<'_>,
         monitor: &dyn Monitor,
     ) -> Result<(marks::Marks, marks::MarkReport)> {
         if self.cache.store().is_none() {

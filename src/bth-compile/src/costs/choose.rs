@@ -6,11 +6,12 @@ use super::least_useful::{Weighed, least_useful};
 use super::options::{Choice, CostOptions, CostReport, Select, SelectionOutcome, Verdict};
 use super::prices::Prices;
 use super::subtree_sums::depths;
-use super::{Weighting, top_down};
+use super::top_down;
 use crate::bvh::BinaryBvh;
 use crate::error::{Error, Result};
 use crate::marks::Marks;
 use crate::monitor::Monitor;
+use crate::sampling::KnownRays;
 use bth_format::layout::RecordKind;
 use bth_import::Mesh;
 
@@ -180,9 +181,8 @@ fn best(
         let verdicts = top.iter().map(|&i| verdict(bvh, marks, options, i, None)).collect();
         return Ok((Choice { chosen: Vec::new(), verdicts }, 0.0, 0.0));
     }
-    let scene = options.scene.as_deref();
-    let weights = scene.map_or(options.optimize_for.weights(), Weighting::shares);
-    let sampled: Sampled = sample(mesh, bvh, options, scene);
+    let weights = options.rays.as_deref().map_or(options.optimize_for.weights(), KnownRays::shares);
+    let sampled: Sampled = sample(mesh, bvh, options);
     monitor.check()?;
     let depths = depths(bvh, &top, &nodes);
     let gains = sampled.gains(bvh, &depths, &nodes, limits.prices, weights);

@@ -4,11 +4,11 @@
 //! leaf's box without a hit. Rays from outside take the BVH that is kept beside the tetrahedra; where none is kept they
 //! walk through the tetrahedra too. So the saving of a node is a sum over rays, and the savings of disjoint nodes add up.
 
+use super::Start;
 use super::options::CostOptions;
 use super::prices::{LINES_THAT_HIT, Prices};
-use super::{Start, Weighting};
 use crate::bvh::BinaryBvh;
-use crate::sampling::{self, SampleRay, along};
+use crate::sampling::{self, KnownRays, SampleRay, along};
 use crate::sampling::{Traced, walk};
 use bth_import::Mesh;
 use rayon::prelude::*;
@@ -43,18 +43,13 @@ pub(super) struct Sampled {
     pub(super) cost_bvh: f64,
 }
 
-/// Draws and traces the rays: those of the scene if there is one, else uniform lines and rays from the fronts of all
-/// triangles.
-pub(super) fn sample(
-    mesh: &Mesh,
-    bvh: &BinaryBvh,
-    options: &CostOptions,
-    scene: Option<&Weighting>,
-) -> Sampled {
-    let [camera, surface_share] = scene.map_or(options.optimize_for.weights(), |s| s.shares());
+/// Draws and traces the rays: those that are known, else uniform lines and rays from the fronts of all triangles.
+pub(super) fn sample(mesh: &Mesh, bvh: &BinaryBvh, options: &CostOptions) -> Sampled {
+    let known = options.rays.as_deref();
+    let [camera, surface_share] = known.map_or(options.optimize_for.weights(), KnownRays::shares);
     let drawn;
-    let (from_outside, from_surface): (&[SampleRay], &[SampleRay]) = match scene {
-        Some(scene) => (&scene.outside, &scene.surface),
+    let (from_outside, from_surface): (&[SampleRay], &[SampleRay]) = match known {
+        Some(known) => (&known.outside, &known.surface),
         None => {
             let count = (bvh.order.len() / TRIANGLES_PER_RAY).clamp(RAYS_OF_KIND[0], RAYS_OF_KIND[1]);
             let root = bvh.nodes.first();

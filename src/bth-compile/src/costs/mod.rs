@@ -19,7 +19,6 @@ mod profile;
 mod subtree_sums;
 mod tet_walk;
 mod top_down;
-mod weighting;
 
 #[cfg(test)]
 mod testing;
@@ -35,4 +34,3 @@ pub use options::{Choice, CostOptions, CostReport, OptimizeFor, Probe, Select, S
 pub use probe::{ProbeReport, ProbedLeaf, probe};
 pub use profile::{BvhCosts, Profile, TetCosts, Walk};
 pub use tet_walk::{TetWalker, Walked, mean_steps};
-pub use weighting::Weighting;

@@ -1,6 +1,7 @@
 //! CostOptions of the selection, and the verdict on each node.
 
-use super::{Estimator, Profile, Weighting};
+use super::{Estimator, Profile};
+use crate::sampling::KnownRays;
 use serde::{Serialize, Serializer};
 use std::sync::Arc;
 
@@ -85,14 +86,15 @@ pub struct CostOptions {
     pub probe: Probe,
     /// For objects of a scene: whether the rays of its cameras, lights and frames weight the nodes.
     pub for_scene: bool,
-    /// The rays of a scene that reach the object, in place of sampled ones. Cache keys contain their hash.
+    /// Rays that weight the nodes of the object, those of the BVH beside and those of tetrahedra in place of sampled ones. Cache keys
+    /// contain their hash.
     #[serde(serialize_with = "rays_by_hash")]
-    pub scene: Option<Arc<Weighting>>,
+    pub rays: Option<Arc<KnownRays>>,
 }
 
-fn rays_by_hash<S: Serializer>(scene: &Option<Arc<Weighting>>, to: S) -> Result<S::Ok, S::Error> {
-    match scene {
-        Some(scene) => to.serialize_str(&scene.hash()),
+fn rays_by_hash<S: Serializer>(rays: &Option<Arc<KnownRays>>, to: S) -> Result<S::Ok, S::Error> {
+    match rays {
+        Some(rays) => to.serialize_str(&rays.hash()),
         None => to.serialize_none(),
     }
 }
@@ -125,7 +127,7 @@ impl Default for CostOptions {
             budget: None,
             probe: Probe::default(),
             for_scene: false,
-            scene: None,
+            rays: None,
         }
     }
 }

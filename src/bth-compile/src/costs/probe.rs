@@ -4,7 +4,6 @@
 //! Steps are counted in double precision and priced by the profile, so that the outcome, and with it the file, is
 //! the same on every machine.
 
-use super::Weighting;
 use super::choose::Storage;
 use super::gains::leaves;
 use super::options::{CostOptions, Probe, Select};
@@ -14,7 +13,7 @@ use crate::bvh::BinaryBvh;
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::sampling::walk;
-use crate::sampling::{SampleRay, from_surface, outside};
+use crate::sampling::{KnownRays, SampleRay, from_surface, outside};
 use crate::tets::{Leaf, TetMesh};
 use crate::vectors::{corners, double_area};
 use bth_import::Mesh;
@@ -72,9 +71,9 @@ pub fn probe(
     }
     monitor.stage("probe", Some(built.len() as u64));
     let prices = Prices::new(options, storage.record, storage.keep_subtrees);
-    let scene = options.scene.as_deref();
-    let weights = scene.map_or(options.optimize_for.weights(), Weighting::shares);
-    let all = super::gains::sample(mesh, bvh, options, scene);
+    let known = options.rays.as_deref();
+    let weights = known.map_or(options.optimize_for.weights(), KnownRays::shares);
+    let all = super::gains::sample(mesh, bvh, options);
     let count = (RAYS_OF_ALL_LEAVES / built.len()).clamp(RAYS_OF_LEAF[0], RAYS_OF_LEAF[1]);
     let prober = Prober { mesh, bvh, options, prices: &prices, count };
     let areas = surface_areas(mesh, bvh);
@@ -82,11 +81,11 @@ pub fn probe(
         ProbeReport { cost_bvh: all.cost_bvh, cost_with_tets: all.cost_bvh, ..Default::default() };
     for (node, tets) in &built {
         monitor.check()?;
-        let mut leaf = prober.surface(*node, tets, scene);
+        let mut leaf = prober.surface(*node, tets);
         let rows = rows(bvh, *node);
         // The share of the rays from surfaces that start on this leaf.
-        let share = match scene {
-            Some(scene) => share_of(scene, bvh, &rows),
+        let share = match known {
+            Some(known) => share_of(known, bvh, &rows),
             None => (areas[rows.end] - areas[rows.start]) / areas[bvh.order.len()],
         };
         if prices.hints() {
@@ -125,12 +124,12 @@ fn surface_areas(mesh: &Mesh, bvh: &BinaryBvh) -> Vec<f64> {
     sums
 }
 
-/// Share of the scene's rays from surfaces that start on the triangles of these rows.
-fn share_of(scene: &Weighting, bvh: &BinaryBvh, rows: &std::ops::Range<usize>) -> f64 {
+/// Share of the known rays from surfaces that start on the triangles of these rows.
+fn share_of(known: &KnownRays, bvh: &BinaryBvh, rows: &std::ops::Range<usize>) -> f64 {
     let mut ids: Vec<u32> = bvh.order[rows.clone()].to_vec();
     ids.sort_unstable();
-    let here = scene.surface.iter().filter(|r| r.from.is_some_and(|t| ids.binary_search(&t).is_ok()));
-    here.count() as f64 / scene.surface.len().max(1) as f64
+    let here = known.surface.iter().filter(|r| r.from.is_some_and(|t| ids.binary_search(&t).is_ok()));
+    here.count() as f64 / known.surface.len().max(1) as f64
 }
 
 /// Traces rays through the tetrahedra and the BVH of single leaves, and compares their costs.
@@ -144,18 +143,19 @@ struct Prober<'a> {
 }
 
 impl Prober<'_> {
-    /// Traces rays that start on the leaf's triangles: rays of the scene where there are any, else sampled rays.
-    fn surface(&self, node: u32, tets: &TetMesh, scene: Option<&Weighting>) -> ProbedLeaf {
+    /// Traces rays that start on the leaf's triangles: known rays if there are any, else sampled rays.
+    fn surface(&self, node: u32, tets: &TetMesh) -> ProbedLeaf {
         let Self { mesh, bvh, options, prices, count } = *self;
         let (costs, at) = (options.profile.bvh, &bvh.nodes[node as usize]);
         let rows = rows(bvh, node);
-        let of_scene: Option<Vec<SampleRay>> = scene.map(|scene| {
+        let known = options.rays.as_deref();
+        let known: Option<Vec<SampleRay>> = known.map(|known| {
             let mut ids: Vec<u32> = bvh.order[rows.clone()].to_vec();
             ids.sort_unstable();
-            let here = scene.surface.iter().filter(|r| r.from.is_some_and(|t| ids.binary_search(&t).is_ok()));
+            let here = known.surface.iter().filter(|r| r.from.is_some_and(|t| ids.binary_search(&t).is_ok()));
             here.copied().take(count).collect()
         });
-        let rays = of_scene.unwrap_or_else(|| from_surface(mesh, bvh, rows, count, 3 + u64::from(node)));
+        let rays = known.unwrap_or_else(|| from_surface(mesh, bvh, rows, count, 3 + u64::from(node)));
         let walker = TetWalker::new(tets);
         let (mut steps, mut through_tets, mut through_bvh, mut traced) = (0.0, 0.0, 0.0, 0.0f64);
         for ray in &rays {

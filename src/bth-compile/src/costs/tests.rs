@@ -5,7 +5,7 @@ use super::*;
 use crate::bvh::{self, BinaryBvh};
 use crate::marks::Marks;
 use crate::monitor::Silent;
-use crate::sampling::{SampleRay, from_surface, outside, walk};
+use crate::sampling::{KnownRays, SampleRay, from_surface, outside, walk};
 use crate::tets::{Behind, TetMesh};
 use bth_format::layout::RecordKind;
 use bth_import::Mesh;
@@ -190,19 +190,19 @@ fn limits_on_bytes_and_time_leave_fewer_triangles_to_tetrahedra() {
 #[test]
 fn rays_of_a_scene_decide_which_nodes_count() {
     let (mesh, bvh, marks) = blob();
-    let nodes = |scene: Weighting| {
-        let scene = Some(std::sync::Arc::new(scene));
+    let nodes = |rays: KnownRays| {
+        let rays = Some(std::sync::Arc::new(rays));
         let options =
-            CostOptions { c_tet: Some(1e-3), minimum_triangles: 64, scene, ..CostOptions::default() };
+            CostOptions { c_tet: Some(1e-3), minimum_triangles: 64, rays, ..CostOptions::default() };
         choose(&mesh, &bvh, &marks, &options, KEPT, &Silent).unwrap().0.chosen
     };
-    assert!(nodes(Weighting::default()).is_empty());
+    assert!(nodes(KnownRays::default()).is_empty());
     // Rays that all start below one child of the root and end there.
     let right = bvh.nodes[0].right;
     let rows = bvh.nodes[right as usize].first as usize..bvh.order.len();
     let surface = from_surface(&mesh, &bvh, rows.clone(), 400, 5);
     let surface: Vec<SampleRay> = surface.into_iter().filter(|r| r.tmax.is_finite()).collect();
-    let found = nodes(Weighting { outside: Vec::new(), surface });
+    let found = nodes(KnownRays { outside: Vec::new(), surface });
     assert!(!found.is_empty());
     assert!(found.iter().all(|&n| bvh.nodes[n as usize].first as usize >= rows.start || n == 0), "{found:?}");
 }

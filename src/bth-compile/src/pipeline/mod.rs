@@ -28,11 +28,13 @@ pub(crate) use object::{Object, TracedMesh};
 pub(crate) use report::StageReports;
 pub use report::{CompileReport, FileReport};
 pub(crate) use stages::{Direct, Stages};
+pub(crate) use tree::TreeOptions;
+pub use tree::build_tree;
 
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::source::{Model, SourceDigest, changed};
-use crate::{bvh, coordinates, free, tets};
+use crate::{coordinates, free, tets};
 use bth_import::{self as mesh, Mesh};
 use report::TetReports;
 use std::borrow::Cow;
@@ -122,9 +124,9 @@ pub(crate) fn compile_mesh(
         false => clock.time("coordinates", || stages.coordinates(source, mesh, &options.coordinates))?,
     };
     let options = &CompileOptions { structure: options.built_structure(), ..options.clone() };
-    let bvh_options = bvh::BvhOptions { keep_zero_area: options.deformable, ..options.bvh };
-    let (tree, bvh) = clock.time("bvh", || stages.bvh(&mesh, &bvh_options, monitor))?;
-    let probabilities = clock.time("visits", || tree::probabilities(&mesh, &tree, &bvh_options));
+    let tree_options = TreeOptions::of(options);
+    let (tree, bvh) = clock.time("bvh", || stages.bvh(&mesh, &tree_options, monitor))?;
+    let probabilities = clock.time("visits", || tree::probabilities(&mesh, &tree, &tree_options));
     let traced = TracedMesh { mesh, on_grid, tree, probabilities };
     let (leaves, tets) = match options.structure {
         Structure::Bvh => (Vec::new(), TetReports::default()),
@@ -156,7 +158,7 @@ fn free_directions(
         free.row_bytes = limit::row_bytes(traced, leaves, options, monitor)?.min(free.row_bytes);
     }
     let TracedMesh { mesh, tree, .. } = traced;
-    let find = || stages.free(mesh, tree, (&options.bvh, &free), monitor);
+    let find = || stages.free(mesh, tree, (&TreeOptions::of(options), &free), monitor);
     let (free, report) = clock.time("free directions", find)?;
     Ok(((report.kept != free::Kept::None).then_some(free), Some(report)))
 }
@@ -175,7 +177,6 @@ fn tet_leaves(
     let welded =
         if options.deformable { deformable::welded(&traced.mesh) } else { Cow::Borrowed(&traced.mesh) };
     let mesh: &Mesh = &welded;
-    let bvh_options = bvh::BvhOptions { keep_zero_area: options.deformable, ..options.bvh };
     if options.deformable {
         select::check_flat(source, deformable::flat_triangles(mesh, tree), options)?;
     }
@@ -183,7 +184,8 @@ fn tet_leaves(
     let (choice, costs, marks) = match clock.time("costs", without_marks)? {
         Some((choice, costs)) => (choice, Some(costs), None),
         None => {
-            let (marks, report) = clock.time("marks", || stages.marks(mesh, tree, &bvh_options, monitor))?;
+            let (marks, report) =
+                clock.time("marks", || stages.marks(mesh, tree, &TreeOptions::of(options), monitor))?;
             let choose = || select::choose(source, (traced, mesh), &marks, options, monitor);
             let (choice, costs) = clock.time("costs", choose)?;
             (choice, costs, Some(report))

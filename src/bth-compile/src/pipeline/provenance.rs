@@ -71,6 +71,14 @@ fn options_json(options: &CompileOptions) -> serde_json::Value {
     if options.coordinates != Default::default() {
         json["coordinates"] = json!(options.coordinates);
     }
+    if options.structure != Structure::Bth {
+        if options.costs.for_scene {
+            json["for_scene"] = json!(true);
+        }
+        if let Some(rays) = &options.costs.rays {
+            json["rays"] = json!(rays.hash());
+        }
+    }
     if options.alpha != Default::default() {
         json["alpha"] = json!(options.alpha);
     }

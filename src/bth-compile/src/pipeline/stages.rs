@@ -1,7 +1,7 @@
 //! The stages that a decorator may wrap, timed.
 
 use super::clock::timed;
-use super::tree;
+use super::tree::{self, TreeOptions};
 use crate::coordinates::OnGrid;
 use crate::error::Result;
 use crate::monitor::Monitor;
@@ -54,14 +54,14 @@ pub(crate) trait Stages {
     fn bvh(
         &mut self,
         mesh: &Mesh,
-        options: &bvh::BvhOptions,
+        options: &TreeOptions<'_>,
         monitor: &dyn Monitor,
     ) -> Result<(bvh::BinaryBvh, bvh::BvhReport)> {
         timed(|| tree::build(mesh, options, monitor))
     }
 
     /// Decides in which directions rays from a triangle meet nothing. The result does not depend on how the BVH was built, by
-    /// `_bvh`, but for what is too close to decide.
+    /// `_tree`, but for what is too close to decide.
     ///
     /// # Errors
     /// As [`free::find`].
@@ -69,7 +69,7 @@ pub(crate) trait Stages {
         &mut self,
         mesh: &Mesh,
         tree: &bvh::BinaryBvh,
-        (_bvh, options): (&bvh::BvhOptions, &free::FreeOptions),
+        (_tree, options): (&TreeOptions<'_>, &free::FreeOptions),
         monitor: &dyn Monitor,
     ) -> Result<(free::Free, free::FreeReport)> {
         timed(|| free::find(mesh, tree, options, monitor))
@@ -83,7 +83,7 @@ pub(crate) trait Stages {
         &mut self,
         mesh: &Mesh,
         tree: &bvh::BinaryBvh,
-        _options: &bvh::BvhOptions,
+        _options: &TreeOptions<'_>,
         monitor: &dyn Monitor,
     ) -> Result<(marks::Marks, marks::MarkReport)> {
         timed(|| marks::mark(mesh, tree, monitor))

@@ -41,7 +41,7 @@ fn open_and_enclosed() -> Mesh {
 fn nodes_behind_walls_are_entered_less_than_by_their_area() {
     let mesh = open_and_enclosed();
     let (bvh, _) = build(&mesh, &BvhOptions::default(), &Silent).unwrap();
-    let probabilities = visits(&mesh, &bvh);
+    let probabilities = visits(&mesh, &bvh, None);
     // What small triangles of either cluster are entered, relative to their area.
     let relative = |enclosed: bool| {
         let leaves = (0..bvh.nodes.len()).filter(|&at| {
@@ -62,7 +62,7 @@ fn nodes_behind_walls_are_entered_less_than_by_their_area() {
 fn probabilities_fall_from_the_root_down_and_follow_areas_where_no_ray_comes() {
     let mesh = open_and_enclosed();
     let (bvh, _) = build(&mesh, &BvhOptions::default(), &Silent).unwrap();
-    let probabilities = visits(&mesh, &bvh);
+    let probabilities = visits(&mesh, &bvh, None);
     assert_eq!(probabilities[0], 1.0);
     for (at, node) in bvh.nodes.iter().enumerate().filter(|(_, node)| !node.is_leaf()) {
         for child in [at + 1, node.right as usize] {
@@ -70,14 +70,38 @@ fn probabilities_fall_from_the_root_down_and_follow_areas_where_no_ray_comes() {
             assert!(0.0 < below && below <= above * (1.0 + 1e-12), "{below} below {above}");
         }
     }
-    assert_eq!(visits(&Mesh::default(), &BinaryBvh::default()), Vec::<f64>::new());
+    assert_eq!(visits(&Mesh::default(), &BinaryBvh::default(), None), Vec::<f64>::new());
+}
+
+#[test]
+fn known_rays_raise_the_probabilities_of_what_they_enter() {
+    let mesh = open_and_enclosed();
+    let (bvh, _) = build(&mesh, &BvhOptions::default(), &Silent).unwrap();
+    // Rays between the walls, through the enclosed cluster.
+    let known = KnownRays {
+        outside: within([0.0; 3], [1.0; 3], [1 << 14, 1], 7),
+        surface: within([0.0; 3], [1.0; 3], [100, 1], 8),
+    };
+    let drawn = visits(&mesh, &bvh, None);
+    let weighted = visits(&mesh, &bvh, Some(&known));
+    assert_eq!(weighted[0], 1.0);
+    let sum = |probabilities: &[f64], enclosed: bool| -> f64 {
+        let leaves = bvh.nodes.iter().zip(probabilities).filter(|(node, _)| node.is_leaf());
+        let of_cluster =
+            |node: &Node| bvh.order[node.first as usize] < 800 && (node.upper[0] < 2.0) == enclosed;
+        leaves.filter(|(node, _)| of_cluster(node)).map(|(_, probability)| probability).sum()
+    };
+    assert!(sum(&weighted, true) > 2.0 * sum(&drawn, true), "{} {}", sum(&weighted, true), sum(&drawn, true));
+    // The other cluster is still entered by the rays that are drawn.
+    assert!(sum(&weighted, false) > 0.0 && sum(&weighted, false) < 0.5 * sum(&drawn, false));
+    assert_eq!(visits(&mesh, &bvh, Some(&KnownRays::default())), drawn);
 }
 
 #[test]
 fn rays_are_counted_at_each_box_that_they_enter_before_their_hits() {
     let mesh = open_and_enclosed();
     let (bvh, _) = build(&mesh, &BvhOptions::default(), &Silent).unwrap();
-    let rays: Vec<SampleRay> = sample(&mesh, &bvh).into_iter().step_by(16).collect();
+    let rays: Vec<SampleRay> = sample(&mesh, &bvh, 0).into_iter().step_by(16).collect();
     let mut expected = vec![0; bvh.nodes.len()];
     for ray in &rays {
         // The nearest hit of all triangles.

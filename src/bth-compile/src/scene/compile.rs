@@ -6,13 +6,16 @@ use super::objects::{self, Objects};
 use super::plan::ScenePlan;
 use super::previous::Previous;
 use super::report::{ObjectReport, SceneReport};
-use super::{deformers, encode, meshes, sources, weights};
+use super::{deformers, encode, known_rays, meshes, sources};
+use crate::bvh::{BvhOptions, Quality};
 use crate::cached::{self, Cache, CachedCompilation, DryRun};
 use crate::costs;
 use crate::error::{self, Error, Result};
+use crate::free::FreeOptions;
 use crate::monitor::Monitor;
 use crate::options::{CompileOptions, Structure};
 use crate::pipeline::{Clock, Compiled, provenance};
+use crate::sampling::KnownRays;
 use crate::tets::WorkerStatus;
 use crate::write::{self, Content, FileBuilder, SceneParts};
 use bth_cache::{Key, Record};
@@ -205,10 +208,10 @@ pub(super) fn build(
 ) -> Result<(Content, SceneReport, FileIndex)> {
     let options = context.options;
     let weighed;
-    let context = match options.costs.for_scene && options.structure == Structure::Bth {
+    let context = match options.costs.for_scene && options.structure != Structure::Tets {
         true => {
-            let weights = Some(clock.time("rays", || rays(manifest, plan, name, context))?);
-            weighed = Context { weights, ..context.with_monitor(context.monitor) };
+            let known_rays = Some(clock.time("rays", || rays(manifest, plan, name, context))?);
+            weighed = Context { known_rays, ..context.with_monitor(context.monitor) };
             &weighed
         }
         false => context,
@@ -288,18 +291,20 @@ fn check(objects: &Objects, parts: &SceneParts, content: &Content, name: &Path) 
     first_frame(&rows_only.finish()).map_err(|e| refused(name, &whole(e)))
 }
 
-/// The rays of the scene that reach each object of the file, traced through a file with BVHs only.
+/// The rays of the scene that reach each object of the file, traced through a file that is compiled for that: with BVHs that are quickly built.
 fn rays(
     manifest: &Manifest,
     plan: &ScenePlan<'_>,
     name: &Path,
     context: &Context<'_>,
-) -> Result<Vec<Arc<costs::Weighting>>> {
+) -> Result<Vec<Arc<KnownRays>>> {
     let Context { cache, monitor, .. } = *context;
     let costs = costs::CostOptions { for_scene: false, ..context.options.costs.clone() };
     let coordinates = Default::default();
     let options = CompileOptions {
         structure: Structure::Bvh,
+        bvh: BvhOptions { quality: Quality::Fast, ..context.options.bvh },
+        free: FreeOptions::default(),
         geometry: true,
         costs,
         coordinates,
@@ -309,7 +314,7 @@ fn rays(
     let plain = Context::of(&options, cache, tetgen, monitor);
     let (content, ..) = build(manifest, plan, name, &plain, Clock::default())?;
     let mut scene = bth::from_bytes(&cached::joined(&content)?).map_err(|e| refused(name, &e))?;
-    Ok(weights::weights(&mut scene, name)?.into_iter().map(Arc::new).collect())
+    Ok(known_rays::known_rays(&mut scene, name)?.into_iter().map(Arc::new).collect())
 }
 
 /// The error for a file that fails the reader's check: an input error when the first frame cannot be shown, else a defect

@@ -2,10 +2,10 @@
 
 use super::previous::Previous;
 use crate::cached::{self, Cache, ObjectKeys};
-use crate::costs;
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::options::CompileOptions;
+use crate::sampling::KnownRays;
 use std::sync::Arc;
 
 /// What all parts of a scene's compilation share.
@@ -18,7 +18,7 @@ pub(super) struct Context<'a> {
     pub(super) keys: Option<Arc<ObjectKeys>>,
     pub(super) monitor: &'a dyn Monitor,
     /// The scene's rays for each object of the file, if they weight the costs.
-    pub(super) weights: Option<Vec<Arc<costs::Weighting>>>,
+    pub(super) known_rays: Option<Vec<Arc<KnownRays>>>,
     /// The file of an earlier compilation at the path of this one's output.
     pub(super) previous: Option<Arc<Previous>>,
 }
@@ -44,19 +44,19 @@ impl<'a> Context<'a> {
         monitor: &'a dyn Monitor,
     ) -> Self {
         let keys = tetgen.as_ref().map(|tetgen| Arc::new(ObjectKeys::new(options, tetgen)));
-        Self { options, cache, tetgen, keys, monitor, weights: None, previous: None }
+        Self { options, cache, tetgen, keys, monitor, known_rays: None, previous: None }
     }
 
     /// The same context with another monitor.
     pub(super) fn with_monitor<'b>(&'b self, monitor: &'b dyn Monitor) -> Context<'b> {
-        let Self { options, cache, ref tetgen, ref keys, ref weights, ref previous, .. } = *self;
+        let Self { options, cache, ref tetgen, ref keys, ref known_rays, ref previous, .. } = *self;
         Context {
             options,
             cache,
             tetgen: tetgen.clone(),
             keys: keys.clone(),
             monitor,
-            weights: weights.clone(),
+            known_rays: known_rays.clone(),
             previous: previous.clone(),
         }
     }

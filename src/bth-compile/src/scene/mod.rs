@@ -12,6 +12,7 @@ mod encode;
 mod file_index;
 mod images;
 mod in_memory;
+mod known_rays;
 mod meshes;
 mod moving;
 mod object;
@@ -25,7 +26,6 @@ mod report;
 mod sections;
 mod sources;
 mod visible;
-mod weights;
 
 pub use compile::{CachePolicy, SceneSource, compile, compile_cached, compile_objects, dry_run};
 pub use in_memory::Instance;

@@ -47,7 +47,7 @@ pub(super) fn build(
     clock: &mut Clock,
 ) -> Result<BuiltObject> {
     let part = file.name_of(mesh.part);
-    let rays = context.weights.as_ref().and_then(|weights| weights.get(number));
+    let rays = context.known_rays.as_ref().and_then(|rays| rays.get(number));
     let deforms = mesh.summary.deformation.is_some();
     let Some(rays) = rays.filter(|_| !deforms) else {
         let key = object_key(&mesh.summary, mesh.part, context);
@@ -55,7 +55,7 @@ pub(super) fn build(
         let options = of_deforming.as_ref().unwrap_or(context.options);
         return build_or_fetch(file, mesh, (key, &part), options, context, clock);
     };
-    let costs = costs::CostOptions { scene: Some(rays.clone()), ..context.options.costs.clone() };
+    let costs = costs::CostOptions { rays: Some(rays.clone()), ..context.options.costs.clone() };
     let options = CompileOptions { costs, ..context.options.clone() };
     let key = context.tetgen.as_ref().map(|tetgen| ObjectKeys::new(&options, tetgen).of(&mesh.summary, None));
     build_or_fetch(file, mesh, (key, &part), &options, context, clock)

@@ -4,10 +4,15 @@ use super::cache::Keeping;
 use super::choices::*;
 use super::common::{EXIT_CODES, threads};
 use super::jobs::Jobs;
+use crate::failure::Failure;
+use crate::ray_files;
+use bth_compile::Monitor;
+use bth_compile::sampling::KnownRays;
 use bth_format::layout::GridBits;
 use bth_import::Keep;
 use clap::Args as Group;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Compile a model (OBJ, PLY, STL, OFF) or a scene (glTF, GLB, scene manifest) into a BTH file.
 #[derive(Debug, Group)]
@@ -186,10 +191,14 @@ pub(crate) struct Selection {
     /// stays BVH.
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     pub(crate) budget: Option<f64>,
-    /// For scenes: let the rays of their cameras, lights and frames decide, instead of rays from everywhere. What none of
-    /// them meets is not tetrahedralized.
+    /// For scenes: let the rays of their cameras, lights and frames decide how trees are built and what is tetrahedralized, more than
+    /// rays from everywhere. What none of them meets is not tetrahedralized.
     #[arg(long)]
     pub(crate) for_scene: bool,
+    /// Rays that will be traced through the model, such as those of a light baker or of a view, in a .rays file (see `bthc trace`). The
+    /// tree is built for them more than for rays from everywhere, so that they take fewer steps. Answers do not depend on it.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) rays: Option<PathBuf>,
     /// What decides, when the tetrahedra are there, whether they stay.
     #[arg(long, value_enum, default_value_t = Probe::Steps)]
     pub(crate) probe: Probe,
@@ -204,6 +213,25 @@ pub(crate) struct Selection {
 /// Triangles of the largest objects of which free directions are found unless that is asked for: some ten seconds on two cores.
 pub(crate) const DEFAULT_MOST_TRIANGLES: usize = 1_000_000;
 
+/// The rays of a file. Those that cannot be traced are left out, with a warning.
+///
+/// # Errors
+/// If the file cannot be read, or none can be traced.
+fn known_rays(path: &Path, monitor: &dyn Monitor) -> Result<KnownRays, Failure> {
+    let rays = ray_files::read_rays(path)?;
+    let (known, left_out) = KnownRays::of(&rays);
+    if known.count() == 0 {
+        let message = format!("expected rays that can be traced, found none of {}", rays.len());
+        let hint = "rays need finite numbers, a direction, and a tmin of at most tmax, which may be infinite";
+        return Err(Failure::ray_file(path, 16, message, hint));
+    }
+    if left_out > 0 {
+        let path = path.display();
+        monitor.warn(&format!("{path}: {left_out} of {} rays cannot be traced and do not count", rays.len()));
+    }
+    Ok(known)
+}
+
 /// A finite positive number.
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -216,8 +244,11 @@ impl Compile {
     /// The options of the compiler.
     ///
     /// # Errors
-    /// If the profile cannot be used.
-    pub(crate) fn options(&self) -> bth_compile::Result<bth_compile::pipeline::CompileOptions> {
+    /// If the profile or the known rays cannot be used.
+    pub(crate) fn options(
+        &self,
+        monitor: &dyn Monitor,
+    ) -> Result<bth_compile::pipeline::CompileOptions, Failure> {
         let structure = self.structure.unwrap_or(match self.deformable {
             true => Structure::Bvh,
             false => Structure::Bth,
@@ -247,7 +278,7 @@ impl Compile {
             motion: bth_compile::pipeline::MotionOptions { poses: self.poses, segments: self.segments },
             ..Default::default()
         };
-        self.selection.apply(&mut options)?;
+        self.selection.apply(&mut options, monitor)?;
         if let Some(seconds) = self.tet_deadline {
             options.tets.deadline = std::time::Duration::from_secs(seconds);
             options.tets.deadline_per_triangle = std::time::Duration::ZERO;
@@ -282,14 +313,20 @@ impl Compile {
 }
 
 impl Selection {
+    /// The file that holds the profile.
+    pub(crate) fn profile_file(&self) -> Option<&PathBuf> {
+        Some(&self.profile).filter(|profile| profile.as_os_str() != "default")
+    }
+
     /// Sets the options that concern the selection.
     ///
     /// # Errors
-    /// If the profile cannot be used.
+    /// If the profile or the known rays cannot be used.
     pub(crate) fn apply(
         &self,
         options: &mut bth_compile::pipeline::CompileOptions,
-    ) -> bth_compile::Result<()> {
+        monitor: &dyn Monitor,
+    ) -> Result<(), Failure> {
         options.bvh.quality = self.quality.into();
         let costs = &mut options.costs;
         costs.estimator = self.estimator.into();
@@ -300,8 +337,11 @@ impl Selection {
         costs.max_bytes_per_triangle = self.max_bytes_per_triangle;
         costs.budget = self.budget;
         costs.c_tet = self.c_tet;
-        if self.profile.as_os_str() != "default" {
-            costs.profile = bth_compile::costs::Profile::read(&self.profile)?;
+        if let Some(profile) = self.profile_file() {
+            costs.profile = bth_compile::costs::Profile::read(profile)?;
+        }
+        if let Some(path) = &self.rays {
+            costs.rays = Some(Arc::new(known_rays(path, monitor)?));
         }
         if let Some(triangles) = self.min_tet_triangles {
             costs.minimum_triangles = triangles;

@@ -26,10 +26,13 @@ pub(crate) fn run(args: &Compile) -> Result<(), Failure> {
         }
     }
     let mut jobs = plan(args, &models)?;
+    check_rays(args, &jobs)?;
     let progress = Progress::new(args.quiet || args.json);
     let store = args.keeping.store(&|text| progress.warn(text))?;
-    let options =
-        CompileOptions { objects_memory: jobs::memory_of_objects(args, jobs.len()), ..args.options()? };
+    let options = CompileOptions {
+        objects_memory: jobs::memory_of_objects(args, jobs.len()),
+        ..args.options(&progress)?
+    };
     let context = JobContext { args, options, store };
     if let Some((part, parts)) = args.jobs.shard
         && !(jobs.len() == 1 && scene::is_scene(&jobs[0].model, args))
@@ -88,6 +91,25 @@ fn all(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -> Result<(),
         output::json(&json!({ "jobs": reports }))?;
     }
     failed.map_or(Ok(()), |code| Err(Failure::Reported(code)))
+}
+
+/// Fails if known rays are given for anything but one model.
+fn check_rays(args: &Compile, jobs: &[Job]) -> Result<(), Failure> {
+    if args.selection.rays.is_none() {
+        return Ok(());
+    }
+    let usage = |message: String, hint| Err(Failure::Usage { message, hint });
+    match jobs {
+        [job] if scene::is_scene(&job.model, args) => usage(
+            format!("--rays are rays through one model, and {} is a scene", job.model.display()),
+            "let the rays of its cameras and lights decide with --for-scene, or make one model of a glTF file with --flatten",
+        ),
+        [_] => Ok(()),
+        _ => usage(
+            format!("--rays are rays through one model, and there are {}", jobs.len()),
+            "compile them one by one",
+        ),
+    }
 }
 
 /// A job for each model; fails if outputs coincide with each other or with a model.

@@ -25,7 +25,8 @@ pub(super) fn compile_one(
     let mut report = deliver::deliver(context, job, &outcome, &cache, &files)?;
     report.json["report"] = outcome.report;
     if let Some(built) = &outcome.built {
-        report.text = format!("{}{}", summary(built), report.text);
+        let known_rays = context.options.costs.rays.as_ref().map_or(0, |rays| rays.count() as u64);
+        report.text = format!("{}{}", summary(built, known_rays), report.text);
     }
     Ok(report)
 }

@@ -15,7 +15,10 @@ pub(super) fn write(path: &Path, context: &JobContext<'_>, jobs: &[Job]) -> Resu
     let mut text = String::new();
     for job in jobs {
         if let Target::File(output) = &job.target {
-            text.push_str(&rule(output, &inputs(context, job)?));
+            let selection = &context.args.selection;
+            let mut inputs = inputs(context, job)?;
+            inputs.extend(selection.rays.iter().chain(selection.profile_file()).cloned());
+            text.push_str(&rule(output, &inputs));
         }
     }
     Ok(write::write_atomically(path, text.as_bytes())?)

@@ -19,11 +19,11 @@ use std::time::Instant;
 
 pub(crate) fn run(args: &Explain) -> Result<(), Failure> {
     let mut options = pipeline::CompileOptions { geometry: false, ..pipeline::CompileOptions::default() };
-    args.selection.apply(&mut options)?;
     let progress = Progress::new(args.json);
+    args.selection.apply(&mut options, &progress)?;
     let ((mesh, tree), (choice, report)) = with_threads(args.threads, || -> bth_compile::Result<_> {
         let (mesh, _) = bth_import::import(&args.model, Keep::None, &progress)?;
-        let (tree, _) = bvh::build(&mesh, &options.bvh, &progress)?;
+        let (tree, _) = pipeline::build_tree(&mesh, &options, &progress)?;
         let (marks, _) = marks::mark(&mesh, &tree, &progress)?;
         let storage = pipeline::storage(&mesh, &tree, &options, &progress)?;
         let chosen = costs::choose(&mesh, &tree, &marks, &options.costs, storage, &progress)?;

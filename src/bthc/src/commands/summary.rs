@@ -5,8 +5,8 @@ use bth_compile::free::Kept;
 use bth_compile::pipeline::CompileReport;
 use bth_compile::tets::WorkerStatus;
 
-/// The stages with their seconds, then counts.
-pub(super) fn summary(report: &CompileReport) -> String {
+/// The stages with their seconds, then counts. `known_rays` are those for which the tree was built.
+pub(super) fn summary(report: &CompileReport, known_rays: u64) -> String {
     let mut stages = Table::default();
     for stage in &report.seconds {
         stages.row([stage.name, &seconds(stage.seconds)]);
@@ -27,6 +27,7 @@ pub(super) fn summary(report: &CompileReport) -> String {
             .map(|share| format!("{:.1} %", 100.0 * share));
         facts.row(["opaque, transparent, unknown", &format!("{opaque}, {transparent}, {unknown}")]);
     }
+    row_unless_zero(&mut facts, "known rays", known_rays);
     if let Some(free) = &report.free {
         let [near, middle, far] = free.beyond.map(|share| 100.0 * share);
         let (all, seconds) = (100.0 * free.free, free.seconds);

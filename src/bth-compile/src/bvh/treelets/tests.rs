@@ -97,11 +97,11 @@ fn rays_in_rooms_enter_fewer_nodes_than_of_trees_by_areas() {
         };
         let (before, mut report) = built(&mesh, Quality::Balanced);
         let by_areas = entered_by_others(&mesh, &before, None);
-        let plan = visits(&mesh, &before);
+        let plan = visits(&mesh, &before, None);
         let by_visits = entered_by_others(&mesh, &before, Some(&plan));
-        let count = |bvh: &BinaryBvh| visits(&mesh, bvh);
+        let count = |bvh: &BinaryBvh| visits(&mesh, bvh, None);
         let after = rebuild_treelets(&mesh, before, 3, &count, &mut report, &Silent).unwrap();
-        let rebuilt = entered_by_others(&mesh, &after, Some(&visits(&mesh, &after)));
+        let rebuilt = entered_by_others(&mesh, &after, Some(&visits(&mesh, &after, None)));
         assert!(by_visits < 0.985 * by_areas, "{name}: {by_areas}, by visits {by_visits}");
         assert!(rebuilt < most * by_areas, "{name}: {by_areas}, by visits {by_visits}, rebuilt {rebuilt}");
     }

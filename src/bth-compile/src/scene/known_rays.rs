@@ -1,9 +1,8 @@
 //! The objects and triangles that the rays of a scene hit (`--for-scene`): rays from its cameras at some of its frames,
 //! bounces from what they hit, and rays from there to its lights.
 
-use crate::costs::Weighting;
 use crate::error::{Error, Place, Result};
-use crate::sampling::SampleRay;
+use crate::sampling::{KnownRays, SampleRay};
 use crate::vectors::{double_area, uniform_direction, unit};
 use bth::Scene;
 use bth::rays::{Hit, PrimitiveRef, Ray};
@@ -27,9 +26,9 @@ type Rows = [[f64; 4]; 3];
 ///
 /// # Errors
 /// `BTH-I062` when the scene has no camera.
-pub(super) fn weights(scene: &mut Scene, name: &Path) -> Result<Vec<Weighting>> {
-    let mut weights = vec![Weighting::default(); scene.object_count() as usize];
-    let Some(view) = scene.description() else { return Ok(weights) };
+pub(super) fn known_rays(scene: &mut Scene, name: &Path) -> Result<Vec<KnownRays>> {
+    let mut known = vec![KnownRays::default(); scene.object_count() as usize];
+    let Some(view) = scene.description() else { return Ok(known) };
     let (first, last) = (view.scene[0].first_frame, view.scene[0].last_frame);
     let (cameras, lights) = (view.cameras.to_vec(), view.lights.to_vec());
     let count = (i64::from(last) - i64::from(first)).clamp(0, FRAMES - 1);
@@ -41,7 +40,7 @@ pub(super) fn weights(scene: &mut Scene, name: &Path) -> Result<Vec<Weighting>> 
             continue;
         }
         for camera in &cameras {
-            follow(scene, camera_rays(scene, camera, &mut random), &lights, &mut random, &mut weights);
+            follow(scene, camera_rays(scene, camera, &mut random), &lights, &mut random, &mut known);
         }
     }
     if cameras.is_empty() {
@@ -52,7 +51,7 @@ pub(super) fn weights(scene: &mut Scene, name: &Path) -> Result<Vec<Weighting>> 
             hint: "add one to the manifest, or leave out --for-scene".to_owned(),
         });
     }
-    Ok(weights)
+    Ok(known)
 }
 
 /// The linear part of a row.
@@ -115,13 +114,7 @@ fn ray(origin: DVec3, direction: DVec3, tmax: f64) -> Option<Ray> {
 }
 
 /// Traces camera rays, their bounces and the shadow rays, and records each at the objects that it starts on and hits.
-fn follow(
-    scene: &Scene,
-    camera_rays: Vec<Ray>,
-    lights: &[Light],
-    random: &mut Rng,
-    weights: &mut [Weighting],
-) {
+fn follow(scene: &Scene, camera_rays: Vec<Ray>, lights: &[Light], random: &mut Rng, known: &mut [KnownRays]) {
     let mut rays: Vec<(Ray, PrimitiveRef)> =
         camera_rays.into_iter().map(|ray| (ray, PrimitiveRef::NONE)).collect();
     for bounce in 0..=BOUNCES {
@@ -130,7 +123,7 @@ fn follow(
         scene.batch(&only).nearest(&mut hits);
         let mut next = Vec::new();
         for ((ray, from), hit) in rays.iter().zip(&hits) {
-            record(scene, ray, *from, hit, weights);
+            record(scene, ray, *from, hit, known);
             let Some((start, normal)) = start(scene, ray, hit) else { continue };
             for light in lights {
                 let (rows, shines) = scene.node(light.node);
@@ -141,7 +134,7 @@ fn follow(
                 let far = if light.kind == 0 { f64::INFINITY } else { towards.length() };
                 if shines && towards.dot(normal) > 0.0 {
                     let shadow = self::ray(start, towards, far);
-                    shadow.iter().for_each(|ray| record(scene, ray, hit.primitive, &Hit::MISS, weights));
+                    shadow.iter().for_each(|ray| record(scene, ray, hit.primitive, &Hit::MISS, known));
                 }
             }
             if bounce < BOUNCES {
@@ -172,18 +165,18 @@ fn start(scene: &Scene, ray: &Ray, hit: &Hit) -> Option<(DVec3, DVec3)> {
 }
 
 /// Records a ray at the object that it starts on and at the one that it hits.
-fn record(scene: &Scene, ray: &Ray, from: PrimitiveRef, hit: &Hit, weights: &mut [Weighting]) {
+fn record(scene: &Scene, ray: &Ray, from: PrimitiveRef, hit: &Hit, known: &mut [KnownRays]) {
     if from != PrimitiveRef::NONE
         && let Some(sample) = local(scene, ray, from.instance, Some(from.triangle))
     {
-        weights[scene.object_of(from.instance) as usize].surface.push(sample);
+        known[scene.object_of(from.instance) as usize].surface.push(sample);
     }
     // A ray from elsewhere is recorded only at the object that it hits, not at objects that it misses.
     if hit.is_hit()
         && hit.primitive.instance != from.instance
         && let Some(sample) = local(scene, ray, hit.primitive.instance, None)
     {
-        weights[scene.object_of(hit.primitive.instance) as usize].outside.push(sample);
+        known[scene.object_of(hit.primitive.instance) as usize].outside.push(sample);
     }
 }
 

@@ -1,0 +1,151 @@
+//! Trees for rays that are known when a model is compiled: `--rays` and `--for-scene`.
+
+use crate::support::{bthc, command, folder, run_with, sphere};
+use bth::rays::{PrimitiveRef, Ray};
+use bth_random::Rng;
+use bth_scenes::knot::torus_knot;
+use std::path::Path;
+
+/// Rays at the middle of a model from one side of it, a point and a direction apart for each seed.
+fn view(count: usize, seed: u64) -> Vec<Ray> {
+    let mut random = Rng::new(seed);
+    let mut near = |x: f32, spread: f32| x + spread * (random.unit_f32() - 0.5);
+    let ray = |_| {
+        Ray::new([near(10.0, 0.2), near(0.0, 0.2), near(1.0, 0.2)], [-1.0, near(0.0, 0.7), near(-0.1, 0.7)])
+    };
+    (0..count).map(ray).collect()
+}
+
+fn write(path: &Path, rays: &[Ray]) {
+    let header = [&b"RAYS"[..], &1u32.to_le_bytes(), &(rays.len() as u64).to_le_bytes()].concat();
+    let rows = rays.iter().flat_map(|ray| {
+        let ([ox, oy, oz], [dx, dy, dz]) = (ray.origin, ray.direction);
+        [ox, oy, oz, ray.tmin, dx, dy, dz, ray.tmax].into_iter().flat_map(f32::to_le_bytes)
+    });
+    std::fs::write(path, header.into_iter().chain(rows).collect::<Vec<u8>>()).unwrap();
+}
+
+/// Steps of these rays through a compiled file, and their hits.
+fn traced(path: &Path, rays: &[Ray]) -> (u64, Vec<bth::rays::Hit>) {
+    let scene = bth::open(path).unwrap();
+    let mut total = 0;
+    let hits = rays.iter().map(|ray| {
+        let (hit, steps) = scene.nearest_counted(ray, PrimitiveRef::NONE);
+        total += u64::from(steps.nodes + steps.leaves);
+        hit
+    });
+    let hits = hits.collect();
+    (total, hits)
+}
+
+#[test]
+fn rays_take_fewer_steps_through_a_tree_that_is_made_for_such_rays() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    bth_scenes::write::file(&torus_knot(30_000), &at("knot.ply")).unwrap();
+    write(&at("view.rays"), &view(20_000, 1));
+    let compile = |output: &str, more: &[&str]| {
+        let args = ["compile", "knot.ply", "--free-directions", "none", "-o", output];
+        bthc(folder.path(), &[&args, more].concat()).expect(0)
+    };
+    compile("any.bth", &[]);
+    let report = compile("view.bth", &["--rays", "view.rays"]).stdout;
+    assert!(
+        report.lines().any(|line| line.starts_with("known rays") && line.ends_with("20,000")),
+        "{report}"
+    );
+    compile("again.bth", &["--rays", "view.rays", "--threads", "1"]);
+    assert_eq!(std::fs::read(at("view.bth")).unwrap(), std::fs::read(at("again.bth")).unwrap());
+
+    // Other rays of the same view.
+    let others = view(20_000, 2);
+    let ((steps, hits), (known_steps, known_hits)) =
+        (traced(&at("any.bth"), &others), traced(&at("view.bth"), &others));
+    assert_eq!(known_hits, hits);
+    assert!(hits.iter().filter(|hit| hit.is_hit()).count() > 2000);
+    assert!((known_steps as f64) < 0.97 * steps as f64, "{known_steps} of {steps}");
+}
+
+#[test]
+fn the_cache_and_dependencies_tell_files_for_other_rays_apart() {
+    let folder = folder(&[("ball.obj", &sphere(16))]);
+    let path = folder.path();
+    write(&path.join("a.rays"), &view(100, 1));
+    write(&path.join("b.rays"), &view(100, 2));
+    let run = |args: &[&str]| {
+        let mut command = command("bthc", path, &[&["compile", "ball.obj"], args].concat());
+        command.env("BTH_CACHE_DIR", path.join("cache")).env_remove("BTH_NO_CACHE");
+        run_with(command).expect(0).stdout
+    };
+    for structure in ["bth", "bvh"] {
+        let dry = |rays: &str| run(&["--structure", structure, "--rays", rays, "--dry-run"]);
+        run(&["--structure", structure, "--rays", "a.rays", "--depfile", "ball.d"]);
+        assert_eq!(dry("a.rays"), "ball.bth: nothing to do\n");
+        assert!(dry("b.rays").starts_with("ball.bth: compile "), "{structure}");
+        assert!(run(&["--structure", structure, "--dry-run"]).starts_with("ball.bth: compile "));
+    }
+    let dependencies = std::fs::read_to_string(path.join("ball.d")).unwrap();
+    assert_eq!(dependencies, "ball.bth: \\\n  ball.obj \\\n  a.rays\n");
+}
+
+#[test]
+fn rays_that_cannot_be_traced_are_reported_and_none_are_refused() {
+    let folder = folder(&[("ball.obj", &sphere(8)), ("a.manifest", "version = 1\n")]);
+    let path = folder.path();
+    let bad = Ray { direction: [0.0; 3], ..view(1, 1)[0] };
+    write(&path.join("some.rays"), &[view(3, 1), vec![bad]].concat());
+    write(&path.join("none.rays"), &[bad]);
+    let some = bthc(path, &["compile", "ball.obj", "--rays", "some.rays"]).expect(0);
+    assert!(some.stderr.contains("some.rays: 1 of 4 rays cannot be traced"), "{some:?}");
+    let none = bthc(path, &["compile", "ball.obj", "--rays", "none.rays"]).expect(3);
+    assert!(none.stderr.contains("BTH-I090") && none.stderr.contains("found none of 1"), "{none:?}");
+    bthc(path, &["compile", "ball.obj", "--rays", "ball.obj"]).expect(3);
+    let scene = bthc(path, &["compile", "a.manifest", "--rays", "some.rays"]).expect(2);
+    assert!(scene.stderr.contains("--for-scene"), "{scene:?}");
+    bthc(path, &["compile", "ball.obj", "ball.obj", "--rays", "some.rays", "-o", "."]).expect(2);
+    let deformable = bthc(path, &["compile", "ball.obj", "--rays", "some.rays", "--deformable"]);
+    assert!(deformable.stderr.contains("BTH-L033"), "{deformable:?}");
+}
+
+#[test]
+fn the_rays_of_a_scene_decide_on_its_trees() {
+    let scene = r#"version = 1
+objects = [{ name = "knot", model = "knot.ply" }]
+nodes = [
+    { name = "knot", object = "knot", scale = [2, 2, 2], translation = [0, 1, 0] },
+    { name = "eye", look = { from = [20, 1, 2], to = [0, 1, 0] } },
+]
+cameras = [{ name = "eye", node = "eye", fov = 25 }]
+"#;
+    let folder = folder(&[("a.manifest", scene)]);
+    let at = |name: &str| folder.path().join(name);
+    bth_scenes::write::file(&torus_knot(30_000), &at("knot.ply")).unwrap();
+    // The same view in the space of the scene.
+    let placed = |ray: Ray| Ray {
+        origin: std::array::from_fn(|k| 2.0 * ray.origin[k] + [0.0, 1.0, 0.0][k]),
+        direction: ray.direction.map(|x| 2.0 * x),
+        ..ray
+    };
+    let rays: Vec<Ray> = view(20_000, 3).into_iter().map(placed).collect();
+    for structure in ["bth", "bvh"] {
+        let compile = |output: &str, more: &[&str]| {
+            let args = [
+                "compile",
+                "a.manifest",
+                "--structure",
+                structure,
+                "--free-directions",
+                "none",
+                "-o",
+                output,
+            ];
+            bthc(folder.path(), &[&args, more].concat()).expect(0);
+        };
+        compile("any.bth", &[]);
+        compile("known.bth", &["--for-scene"]);
+        let ((steps, hits), (known_steps, known_hits)) =
+            (traced(&at("any.bth"), &rays), traced(&at("known.bth"), &rays));
+        assert_eq!(known_hits, hits);
+        assert!((known_steps as f64) < 0.99 * steps as f64, "{structure}: {known_steps} of {steps}");
+    }
+}

@@ -1,9 +1,11 @@
 """Compilation of models."""
 
 import inspect
+import math
 import os
 
 from . import _meshes, _native
+from ._ray_queries import rays_and_shape
 from ._scene import Scene
 
 #: Options that only files of glTF have a use for.
@@ -14,7 +16,7 @@ def compile(
     model, *, output=None, quality=None, structure=None, coordinates=None, max_error=None, boxes=None, attributes=None, alpha=None,
     tets=None, subtrees=None, compact=None, geometry=None, names=None, materials=None, estimator=None, select=None, optimize_for=None,
     profile=None, max_bytes_per_triangle=None, budget=None, probe=None, min_tet_triangles=None, c_tet=None, for_scene=None,
-    tet_deadline=None, tet_memory=None, flatten=None, scene=None, animation=None, rate=None, at_rest=None,
+    rays=None, tet_deadline=None, tet_memory=None, flatten=None, scene=None, animation=None, rate=None, at_rest=None,
     rigid_parts=None, strict=None, deformable=None, poses=None, segments=None, free_directions=None, free_reach=None,
     cache=None, cache_size=None, shared_cache=None, memory=None, threads=None, progress=None,
 ):
@@ -25,6 +27,8 @@ def compile(
     output: also writes the compiled file to this path.
     cache: True, False or a folder; by default files go through the cache as those of the program, and arrays do not. cache_size and
     shared_cache are as those of the program; the latter is a folder.
+    rays: rays that will be traced through a model, a pair (origins, directions) or with tmin and tmax behind, as those of `Scene.nearest`. The tree is
+    built for them more than for rays from everywhere; answers do not depend on it.
     progress: is called with the name of the stage, the units done and the units in all or None; an exception from it cancels.
     threads: by default one for each processor; the result does not depend on it.
 
@@ -43,6 +47,8 @@ def compile(
         if name in options:
             raise ValueError(f"{name}: an option for files, got a {type(model).__name__}")
     if _meshes.is_scene(model):
+        if "rays" in options:
+            raise ValueError("rays: an option for one model, got a scene")
         return compile_scene(*_meshes.parts_of_scene(model), **options)
     vertices, faces = _meshes.triangles_of(model)
     return Scene(_native.compile_mesh(vertices, faces, _checked(options)))
@@ -73,7 +79,7 @@ def compile_scene(meshes, instances=None, transforms=None, **options):
     return Scene(_native.compile_scene(parts, instances, transforms, _checked(options)))
 
 
-_OPTIONS = frozenset(inspect.signature(compile).parameters) - {"model", *_GLTF}
+_OPTIONS = frozenset(inspect.signature(compile).parameters) - {"model", "rays", *_GLTF}
 
 
 def _checked(options):
@@ -84,4 +90,13 @@ def _checked(options):
     for name in ("output", "profile", "shared_cache"):
         if name in options:
             options[name] = os.fspath(options[name])
+    # Numbers of scenes and animations are spelled as in the program.
+    for name in ("scene", "animation"):
+        if isinstance(options.get(name), int):
+            options[name] = str(options[name])
+    if "rays" in options:
+        if not isinstance(options["rays"], (tuple, list)) or not 2 <= len(options["rays"]) <= 4:
+            raise TypeError("rays: expected (origins, directions), perhaps with tmin and tmax behind")
+        origins, directions, tmin, tmax = (*options["rays"], *(0.0, math.inf)[len(options["rays"]) - 2:])
+        options["rays"], _ = rays_and_shape(origins, directions, tmin, tmax)
     return options

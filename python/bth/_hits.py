@@ -116,11 +116,11 @@ class Hits(_OnTriangles):
     triangle, instance: indices; bth.NONE for a miss.
     """
 
-    __slots__ = ("t", "u", "v", "instance", "triangle", "_scene", "_rays")
+    __slots__ = ("t", "u", "v", "instance", "triangle", "_scene", "_rays", "_position")
 
     def __init__(self, columns, scene, rays):
         self.t, self.u, self.v, self.instance, self.triangle = columns
-        self._scene, self._rays = scene, rays
+        self._scene, self._rays, self._position = scene, rays, None
 
     @property
     def hit(self):
@@ -129,11 +129,17 @@ class Hits(_OnTriangles):
 
     @property
     def position(self):
-        """The points hit in world space, in float64, computed from t; NaN for a miss. `surface().position` is nearer to the triangle."""
+        """The points hit in world space, in float64, computed from t; NaN for a miss. `surface().position` is nearer to the triangle.
+
+        They are computed once, when they are first asked for, from the arrays of origins and directions that the query was given.
+        """
+        if self._position is not None:
+            return self._position
         origins, directions = self._rays
         t = np.where(self.hit, self.t, np.nan).astype(np.float64)
         points = np.asarray(origins, np.float64) + t.reshape(-1)[:, None] * np.asarray(directions, np.float64)
-        return points.reshape(*t.shape, 3)
+        self._position, self._rays = points.reshape(*t.shape, 3), None
+        return self._position
 
     def __len__(self):
         return len(self.t)

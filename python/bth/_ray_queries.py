@@ -1,6 +1,7 @@
 """Queries of scenes by rays."""
 
 import math
+import operator
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from ._hits import NONE, AllHits, Hits, hit_columns, offsets_of
 
 def mask_bits(mask):
     """A mask of 32 bits."""
-    mask = int(mask)
+    mask = operator.index(mask)
     if not 0 <= mask <= NONE:
         raise ValueError(f"mask: expected 32 bits, got {mask}")
     return mask
@@ -37,7 +38,7 @@ def _start(start, shape):
         raise ValueError(f"start: the shapes do not fit {shape}, that of the rays") from None
 
 
-def _rays(origins, directions, tmin, tmax):
+def rays_and_shape(origins, directions, tmin, tmax):
     """Origins, directions and ranges as the native module takes them, and the leading shape."""
     origins, directions, shape = _arrays.together(origins, "origins", directions, "directions")
     return (origins, directions, _arrays.numbers(tmin, "tmin", shape), _arrays.numbers(tmax, "tmax", shape)), shape
@@ -64,7 +65,7 @@ class RayQueries:
         start: the triangles on which rays start, as Hits or a pair (instance, triangle). It is a hint, which never changes an
         answer: see free_directions of `compile`.
         """
-        rays, shape = _rays(origins, directions, tmin, tmax)
+        rays, shape = rays_and_shape(origins, directions, tmin, tmax)
         columns = hit_columns(len(rays[0]))
         conditions = _conditions(mask, cull, filter)
         _native.nearest(self._native, rays, _start(start, shape), conditions, _threads.count(threads), columns)
@@ -74,7 +75,7 @@ class RayQueries:
         self, origins, directions, tmin=0.0, tmax=math.inf, start=None, *, mask=NONE, cull=None, filter=None, threads=None,
     ):
         """Whether rays hit anything: an array of bool. start: see `nearest`."""
-        rays, shape = _rays(origins, directions, tmin, tmax)
+        rays, shape = rays_and_shape(origins, directions, tmin, tmax)
         found = np.empty(len(rays[0]), bool)
         conditions = _conditions(mask, cull, filter)
         _native.any(self._native, rays, _start(start, shape), conditions, _threads.count(threads), found)
@@ -84,25 +85,27 @@ class RayQueries:
         self, origins, directions, tmin=0.0, tmax=math.inf, *, most=None, mask=NONE, cull=None, filter=None, threads=None,
     ):
         """All hits of rays in order, or the nearest `most` of each, as AllHits. A ray through an edge hits both triangles at it."""
-        if most is not None and int(most) < 0:
-            raise ValueError(f"most: expected a number from 0, got {most}")
-        rays, _ = _rays(origins, directions, tmin, tmax)
+        if most is not None:
+            # No ray has more hits than indices can count.
+            most = min(operator.index(most), 2**63 - 1)
+            if most < 0:
+                raise ValueError(f"most: expected a number from 0, got {most}")
+        rays, _ = rays_and_shape(origins, directions, tmin, tmax)
         counts = np.empty(len(rays[0]), np.uint64)
-        most = None if most is None else int(most)
         conditions = _conditions(mask, cull, filter)
         columns = _native.all_hits(self._native, rays, most, conditions, _threads.count(threads), counts)
         return AllHits(offsets_of(counts), columns, self)
 
     def count(self, origins, directions, tmin=0.0, tmax=math.inf, *, mask=NONE, cull=None, filter=None, threads=None):
         """Number of hits of rays, int64. See `crossings` for passages of closed surfaces."""
-        rays, shape = _rays(origins, directions, tmin, tmax)
+        rays, shape = rays_and_shape(origins, directions, tmin, tmax)
         counts = np.empty(len(rays[0]), np.uint64)
         _native.count(self._native, rays, _conditions(mask, cull, filter), _threads.count(threads), counts)
         return counts.astype(np.int64).reshape(shape)
 
     def crossings(self, origins, directions, tmin=0.0, tmax=math.inf, *, threads=None):
         """How often rays pass through surfaces, each passage of a closed one counted once; and the passages outwards minus those inwards."""
-        rays, shape = _rays(origins, directions, tmin, tmax)
+        rays, shape = rays_and_shape(origins, directions, tmin, tmax)
         count, winding = np.empty(len(rays[0]), np.uint32), np.empty(len(rays[0]), np.int32)
         _native.crossings(self._native, rays, _threads.count(threads), count, winding)
         return count.reshape(shape), winding.reshape(shape)

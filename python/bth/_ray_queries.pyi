@@ -12,6 +12,9 @@ _Filter: TypeAlias = Callable[[Candidate], bool | np.bool_] | None
 _Start: TypeAlias = Hits | Closest | tuple[ArrayLike, ArrayLike] | None
 
 def mask_bits(mask: int) -> int: ...
+def rays_and_shape(
+    origins: ArrayLike, directions: ArrayLike, tmin: ArrayLike, tmax: ArrayLike,
+) -> tuple[tuple[object, object, object, object], tuple[int, ...]]: ...
 
 class RayQueries:
     def nearest(

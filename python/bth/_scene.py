@@ -1,8 +1,10 @@
 """Scenes: opening, time, and what becomes of them."""
 
+import contextlib
 import io
 import math
 import os
+import secrets
 
 import numpy as np
 
@@ -146,11 +148,16 @@ class Scene(RayQueries, PointQueries, Contents):
 
     def save(self, path):
         """Writes the compiled file; it appears whole or not at all. Time, new positions and masks are not part of it."""
-        path = os.fspath(path)
-        part = f"{path}.{os.getpid()}.part"
-        with io.open(part, "xb") as file:
-            file.write(self.to_bytes())
-        os.replace(part, path)
+        path, content = os.fsdecode(path), self.to_bytes()
+        part = f"{path}.{os.getpid()}-{secrets.token_hex(8)}.part"
+        try:
+            with io.open(part, "xb") as file:
+                file.write(content)
+            os.replace(part, path)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                os.remove(part)
+            raise
 
     def close(self):
         """Frees the scene as soon as no query of another thread uses it. Queries then raise ValueError."""

@@ -5,6 +5,9 @@ import os
 
 from . import _native
 
+# More than any machine has.
+_MOST = 65535
+
 _default = None
 
 
@@ -18,13 +21,13 @@ def count(threads):
     """The number of threads of a call."""
     if threads is not None:
         threads = operator.index(threads)
-        if threads < 0:
-            raise ValueError(f"threads: expected a number from 0 (one for each processor), got {threads}")
+        if not 0 <= threads <= _MOST:
+            raise ValueError(f"threads: expected a number from 0 (one for each processor) to {_MOST}, got {threads}")
         return threads or _native.processors()
     if _default is not None:
         return _default
     text = os.environ.get("BTH_THREADS", "")
     try:
-        return int(text) if int(text) > 0 else _native.processors()
+        return min(int(text), _MOST) if int(text) > 0 else _native.processors()
     except ValueError:
         return _native.processors()

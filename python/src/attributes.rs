@@ -15,8 +15,9 @@ pub(crate) fn texture_coordinates<'py>(
     object: u32,
 ) -> PyResult<Option<Bound<'py, PyArray3<f32>>>> {
     let scene = scene.get()?;
+    crate::work::look_for_signals(py);
     let corners = py.detach(|| {
-        let scene = scene.read();
+        let scene = scene.read()?;
         if object >= scene.object_count() {
             return Err(PyIndexError::new_err(format!("object {object} of {}", scene.object_count())));
         }

@@ -131,6 +131,11 @@ pub(crate) fn compile_path(
     let gltf = gltf_options(&keywords)?;
     let flatten = keywords.value("flatten")?.unwrap_or(false);
     let output: Option<PathBuf> = keywords.value("output")?;
+    if options.costs.rays.is_some() && is_scene(&path, flatten) {
+        let message =
+            format!("rays: an option for one model, and {} is a scene: see for_scene", path.display());
+        return Err(PyValueError::new_err(message));
+    }
     let bytes = monitored(py, &keywords, |monitor| {
         let content = compile_file(&path, flatten, &gltf, &options, store.as_ref(), monitor)?;
         deliver(&content, output.as_deref())
@@ -239,6 +244,11 @@ fn triangle_mesh<'a>(
     Ok(TriangleMesh { positions, triangles })
 }
 
+/// Whether a file is compiled as a scene.
+fn is_scene(path: &Path, flatten: bool) -> bool {
+    has_extension(path, &["manifest", "toml"]) || has_extension(path, &["gltf", "glb"]) && !flatten
+}
+
 /// Compiles a file as the program does: glTF files and manifests are scenes.
 fn compile_file(
     path: &Path,
@@ -249,21 +259,20 @@ fn compile_file(
     monitor: &dyn Monitor,
 ) -> bth_compile::Result<write::Content> {
     let cache = cache(store, path);
-    let content =
-        if has_extension(path, &["manifest", "toml"]) || has_extension(path, &["gltf", "glb"]) && !flatten {
-            let manifest = match has_extension(path, &["manifest", "toml"]) {
-                true => bth_scene::read(path).map_err(manifest_error)?,
-                false => {
-                    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-                    bth_import::gltf::scene::import(path, &name, gltf, monitor)?.0
-                }
-            };
-            let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            let source = SceneSource { folder, name: path };
-            let policy = CachePolicy { whole: false, needed: &|_| true, target: None };
-            bth_compile::scene::compile_cached(&manifest, source, options, &cache, policy, monitor)?.content
-        } else {
-            bth_compile::cached::compile(path, options, &cache, &|_| true, monitor)?.content
+    let content = if is_scene(path, flatten) {
+        let manifest = match has_extension(path, &["manifest", "toml"]) {
+            true => bth_scene::read(path).map_err(manifest_error)?,
+            false => {
+                let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+                bth_import::gltf::scene::import(path, &name, gltf, monitor)?.0
+            }
         };
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let source = SceneSource { folder, name: path };
+        let policy = CachePolicy { whole: false, needed: &|_| true, target: None };
+        bth_compile::scene::compile_cached(&manifest, source, options, &cache, policy, monitor)?.content
+    } else {
+        bth_compile::cached::compile(path, options, &cache, &|_| true, monitor)?.content
+    };
     content.ok_or_else(no_content)
 }

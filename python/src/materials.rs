@@ -54,7 +54,7 @@ pub(crate) fn textures<'py>(
     object: u32,
 ) -> PyResult<Vec<TextureRow<'py>>> {
     let scene = scene.get()?;
-    let scene = scene.read();
+    let scene = scene.read_attached(py)?;
     check_index("object", object, scene.object_count())?;
     let wrap = |wrap: Wrap| match wrap {
         Wrap::Repeat => "repeat",

@@ -1,6 +1,8 @@
 //! The options of a compilation, as keywords of Python.
 
+use crate::rays::RayArrays;
 use bth_compile::pipeline::{CompileOptions, Structure};
+use bth_compile::sampling::KnownRays;
 use bth_compile::{bvh, coordinates, costs, free};
 use bth_format::layout::{GridBits, RecordKind};
 use bth_import::{AlphaMode, Keep};
@@ -9,6 +11,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyAny, PyDict};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// The keywords of a call; those that are missing or `None` have their defaults.
 pub(crate) struct Keywords<'a, 'py>(pub(crate) &'a Bound<'py, PyDict>);
@@ -180,6 +183,18 @@ enum MaxError {
     Text(String),
 }
 
+/// The rays that will be traced. Some may be such that they cannot, but not all.
+fn known_rays(arrays: &RayArrays<'_>) -> PyResult<KnownRays> {
+    let (rays, mut read) = (arrays.rays()?, Vec::new());
+    rays.read(0..rays.len(), &mut read);
+    let (known, _) = KnownRays::of(&read);
+    if known.count() == 0 {
+        let message = format!("rays: expected rays that can be traced, got none of {}", read.len());
+        return Err(PyValueError::new_err(message));
+    }
+    Ok(known)
+}
+
 fn selection(keywords: &Keywords<'_, '_>, options: &mut CompileOptions) -> PyResult<()> {
     let quality =
         [("fast", bvh::Quality::Fast), ("balanced", bvh::Quality::Balanced), ("best", bvh::Quality::Best)];
@@ -217,7 +232,11 @@ fn selection(keywords: &Keywords<'_, '_>, options: &mut CompileOptions) -> PyRes
     costs.max_bytes_per_triangle = keywords.positive("max_bytes_per_triangle")?;
     costs.budget = keywords.positive("budget")?;
     costs.c_tet = keywords.positive("c_tet")?;
-    if let Some(profile) = keywords.value::<PathBuf>("profile")? {
+    if let Some(arrays) = keywords.value::<RayArrays<'_>>("rays")? {
+        costs.rays = Some(Arc::new(known_rays(&arrays)?));
+    }
+    if let Some(profile) = keywords.value::<PathBuf>("profile")?.filter(|path| path.as_os_str() != "default")
+    {
         costs.profile = costs::Profile::read(&profile).map_err(crate::errors::compile_error)?;
     }
     Ok(())

@@ -46,7 +46,8 @@ impl NativeScene {
         read: impl FnOnce(&bth::Scene) -> T + Send,
     ) -> PyResult<T> {
         let scene = self.0.get()?;
-        Ok(py.detach(|| read(&scene.read())))
+        crate::work::look_for_signals(py);
+        py.detach(|| Ok(read(&*scene.read()?)))
     }
 
     pub(crate) fn get(&self) -> PyResult<Arc<OpenScene>> {
@@ -74,7 +75,7 @@ impl NativeScene {
     /// The bytes of the compiled file.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let scene = self.get()?;
-        let read = scene.read_attached(py);
+        let read = scene.read_attached(py)?;
         Ok(PyBytes::new(py, read.file().bytes()))
     }
 

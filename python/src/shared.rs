@@ -1,11 +1,10 @@
 //! A scene that several threads use: many trace it, one at a time changes it, and any may close it.
 
-use crate::work;
+use crate::work::{self, Pauses};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, RwLock, RwLockReadGuard, TryLockError};
-use std::time::Duration;
 
 /// A scene that is open. It is freed when it has been closed and no call uses it any more.
 pub(crate) struct OpenScene {
@@ -14,27 +13,26 @@ pub(crate) struct OpenScene {
     changing: AtomicU32,
 }
 
-/// How long a thread waits before it looks again whether it may read or change the scene.
-const PAUSE: Duration = Duration::from_micros(100);
-
 impl OpenScene {
     pub(crate) fn new(scene: bth::Scene) -> Arc<OpenScene> {
         Arc::new(OpenScene { scene: RwLock::new(scene), changing: AtomicU32::new(0) })
     }
 
     /// The scene for queries. Not for threads that hold the interpreter's lock: whoever changes the scene needs it.
-    pub(crate) fn read(&self) -> RwLockReadGuard<'_, bth::Scene> {
+    /// Fails with the exception that the handler of a signal raises while others change the scene.
+    pub(crate) fn read(&self) -> PyResult<RwLockReadGuard<'_, bth::Scene>> {
+        let mut pauses = Pauses::new();
         // A filter or the handler of a signal is inside of a call, perhaps of this scene: it must not wait for whom that call
         // keeps waiting.
         while self.changing.load(Ordering::Relaxed) > 0 && !work::is_inside_call() {
-            std::thread::sleep(PAUSE);
+            pauses.pause()?;
         }
         loop {
             // Not `read`, which may panic or wait for ever on a thread that has the lock already, as that of a filter.
             if let Some(scene) = self.try_read() {
-                return scene;
+                return Ok(scene);
             }
-            std::thread::sleep(PAUSE);
+            pauses.pause()?;
         }
     }
 
@@ -47,12 +45,13 @@ impl OpenScene {
     }
 
     /// As [`Self::read`], for a thread that holds the interpreter's lock.
-    pub(crate) fn read_attached(&self, py: Python<'_>) -> RwLockReadGuard<'_, bth::Scene> {
+    pub(crate) fn read_attached(&self, py: Python<'_>) -> PyResult<RwLockReadGuard<'_, bth::Scene>> {
+        work::look_for_signals(py);
         loop {
             if let Some(scene) = self.try_read() {
-                return scene;
+                return Ok(scene);
             }
-            py.detach(|| drop(self.read()));
+            py.detach(|| self.read().map(drop))?;
         }
     }
 
@@ -65,8 +64,9 @@ impl OpenScene {
         jobs: Vec<J>,
         work: impl Fn(&bth::Scene, J) + Sync + Send,
     ) -> PyResult<()> {
+        work::look_for_signals(py);
         py.detach(|| {
-            let guard = self.read();
+            let guard = self.read()?;
             let scene: &bth::Scene = &guard;
             work::run(threads, jobs, |job| work(scene, job))
         })
@@ -82,16 +82,17 @@ impl OpenScene {
             let message = "a scene cannot be changed by a filter, nor by the handler of a signal that interrupts a call of this package";
             return Err(PyRuntimeError::new_err(message));
         }
+        work::look_for_signals(py);
         self.changing.fetch_add(1, Ordering::Relaxed);
         let result = py.detach(|| {
             // Not `write`, after whose call readers would wait, the handlers of signals too.
+            let mut pauses = Pauses::new();
             loop {
                 match self.scene.try_write() {
                     Ok(mut scene) => return Ok(change(&mut scene)),
                     Err(TryLockError::Poisoned(scene)) => return Ok(change(&mut scene.into_inner())),
-                    Err(TryLockError::WouldBlock) => work::check_signals()?,
+                    Err(TryLockError::WouldBlock) => pauses.pause()?,
                 }
-                std::thread::sleep(PAUSE);
             }
         });
         self.changing.fetch_sub(1, Ordering::Relaxed);

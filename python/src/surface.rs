@@ -243,7 +243,8 @@ pub(crate) fn surface(
     let (scene, points) = (scene.get()?, points.points()?);
     let mut columns = out.columns(points.len())?;
     let with_surface = columns.needs_surface();
-    py.detach(|| points.check(&scene.read(), with_surface))?;
+    crate::work::look_for_signals(py);
+    py.detach(|| points.check(&*scene.read()?, with_surface))?;
     let jobs = crate::output::chunks(points.len(), |rows| columns.split_off(rows));
     scene.run(py, threads, jobs, |scene, (range, mut columns): (Range<usize>, Columns<'_>)| {
         for (row, point) in range.enumerate() {
@@ -264,7 +265,8 @@ pub(crate) fn triangle_positions(
     threads: usize,
 ) -> PyResult<()> {
     let (scene, points) = (scene.get()?, points.points()?);
-    py.detach(|| points.check(&scene.read(), true))?;
+    crate::work::look_for_signals(py);
+    py.detach(|| points.check(&*scene.read()?, true))?;
     let (rows, _) = numbers(&mut out, points.len() * 9)?.as_chunks_mut::<9>();
     let jobs: Vec<_> = rows.chunks_mut(CHUNK).zip((0..).step_by(CHUNK)).collect();
     scene.run(py, threads, jobs, |scene, (rows, first)| {

@@ -11,6 +11,8 @@ use std::time::{Duration, Instant};
 const SIGNALS_EVERY: Duration = Duration::from_millis(50);
 
 thread_local! {
+    /// Whether this thread is the one on which handlers of signals run, as it was found out in the process of this number.
+    static HANDLES_SIGNALS: Cell<Option<(u32, bool)>> = const { Cell::new(None) };
     /// How many calls this thread is in: more than one where a filter or the handler of a signal uses a scene.
     static DEPTH: Cell<u32> = const { Cell::new(0) };
 }
@@ -64,9 +66,54 @@ pub(crate) fn pool() -> Arc<ThreadPool> {
     new
 }
 
-/// Lets the handlers of signals run. Fails with the exception that one raises.
+/// Finds out whether handlers of signals run on this thread: on Python's main thread, which after a fork is the one that forked. To be
+/// called before [`check_signals`] by a thread that has the interpreter's lock.
+pub(crate) fn look_for_signals(py: Python<'_>) {
+    let process = std::process::id();
+    if HANDLES_SIGNALS.get().is_none_or(|(of, _)| of != process) {
+        // Without the answer signals are looked for.
+        let is_main = is_main_thread(py).unwrap_or(true);
+        HANDLES_SIGNALS.set(Some((process, is_main)));
+    }
+}
+
+fn is_main_thread(py: Python<'_>) -> PyResult<bool> {
+    let threading = py.import("threading")?;
+    let main = threading.call_method0("main_thread")?.getattr("ident")?;
+    main.eq(threading.call_method0("get_ident")?)
+}
+
+/// Lets the handlers of signals run, if this is the thread on which they do. Fails with the exception that one raises. Other threads
+/// stay away from the interpreter, which may have ended by now.
 pub(crate) fn check_signals() -> PyResult<()> {
-    Python::attach(|py| py.check_signals())
+    match HANDLES_SIGNALS.get() {
+        Some((_, false)) => Ok(()),
+        _ => Python::try_attach(|py| py.check_signals()).unwrap_or(Ok(())),
+    }
+}
+
+/// Waiting for what another thread does, with a look for signals every now and then.
+pub(crate) struct Pauses {
+    looked: Instant,
+}
+
+impl Pauses {
+    /// How long a pause is.
+    const LENGTH: Duration = Duration::from_micros(100);
+
+    pub(crate) fn new() -> Pauses {
+        Pauses { looked: Instant::now() }
+    }
+
+    /// Waits. Fails with the exception that the handler of a signal raises.
+    pub(crate) fn pause(&mut self) -> PyResult<()> {
+        std::thread::sleep(Self::LENGTH);
+        if self.looked.elapsed() > SIGNALS_EVERY {
+            check_signals()?;
+            self.looked = Instant::now();
+        }
+        Ok(())
+    }
 }
 
 /// Calls `work` with each of the jobs, on up to so many threads, none of which has the interpreter's lock. One thread is the caller's
@@ -165,6 +212,7 @@ pub(crate) fn run_cancellable<T: Send>(
     look: impl Fn(Python<'_>) -> PyResult<()> + Sync + Send,
 ) -> PyResult<T> {
     let _inside = Inside::new();
+    look_for_signals(py);
     py.detach(|| {
         std::thread::scope(|scope| {
             let worker = scope.spawn(work);
@@ -175,7 +223,8 @@ pub(crate) fn run_cancellable<T: Send>(
                 pause = (pause * 2).min(SIGNALS_EVERY);
                 if failure.is_none()
                     && pause == SIGNALS_EVERY
-                    && let Err(error) = Python::attach(|py| py.check_signals().and_then(|()| look(py)))
+                    && let Some(Err(error)) =
+                        Python::try_attach(|py| py.check_signals().and_then(|()| look(py)))
                 {
                     failure = Some(error);
                     cancelled.store(true, Ordering::Relaxed);

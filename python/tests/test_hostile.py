@@ -5,6 +5,9 @@ import gc
 import os
 import pickle
 import signal
+import subprocess
+import sys
+import textwrap
 import threading
 import time
 
@@ -353,3 +356,107 @@ def test_fork(scene):
     if child == 0:
         os._exit(0 if scene.any(*rays, threads=2).all() else 1)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+
+
+def _exits(code, *arguments):
+    return subprocess.run([sys.executable, "-c", textwrap.dedent(code), *arguments], timeout=120).returncode
+
+
+@pytest.mark.parametrize("threads", [None, 1])
+def test_exit_while_daemons_trace(threads):
+    """A thread that still traces must not reach for an interpreter that has ended."""
+    code = """
+        import sys, threading, time
+        import numpy as np, bth
+        random = np.random.default_rng(0)
+        scene = bth.compile((random.normal(size=(300, 3)), random.integers(0, 300, (600, 3))), quality="fast")
+        rays = random.normal(size=(100000, 3)).astype(np.float32)
+        threads = int(sys.argv[2]) if sys.argv[2] != "None" else None
+        def trace():
+            while True:
+                scene.nearest(rays, rays, threads=threads)
+        for _ in range(4):
+            threading.Thread(target=trace, daemon=True).start()
+        time.sleep(0.2 + float(sys.argv[1]))
+    """
+    assert [_exits(code, str(0.01 * i), str(threads)) for i in range(8)] == [0] * 8
+
+
+def test_positions_stay_when_the_rays_are_moved_there(scene):
+    origins, directions = np.array([[0.2, 0.2, 5.0]], np.float32), np.array([[0.0, 0.0, -1.0]], np.float32)
+    hits = scene.nearest(origins, directions)
+    expected = origins + hits.t[:, None] * directions
+    origins[:] = hits.position
+    assert np.array_equal(hits.position, expected, equal_nan=True)
+
+
+def test_failed_saves_leave_nothing(scene, tmp_path):
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    closed = copy.copy(scene)
+    closed.close()
+    with pytest.raises(ValueError, match="closed"):
+        closed.save(tmp_path / "a.bth")
+    with pytest.raises(OSError):
+        scene.save(folder)
+    assert list(tmp_path.iterdir()) == [folder] and not list(folder.iterdir())
+    scene.save(os.fsencode(tmp_path / "a.bth"))
+    threads = [threading.Thread(target=scene.save, args=(tmp_path / "a.bth",)) for _ in range(8)]
+    failed = []
+    before, threading.excepthook = threading.excepthook, failed.append
+    try:
+        [thread.start() for thread in threads]
+        [thread.join() for thread in threads]
+    finally:
+        threading.excepthook = before
+    assert not failed and sorted(tmp_path.iterdir()) == [tmp_path / "a.bth", folder]
+
+
+def test_numbers_out_of_range(scene):
+    rays = np.zeros((4, 3)), np.ones((4, 3))
+    for threads in (2**70, 65536):
+        with pytest.raises(ValueError, match="threads"):
+            scene.nearest(*rays, threads=threads)
+        with pytest.raises(ValueError, match="threads"):
+            bth.set_threads(threads)
+    assert len(scene.all_hits(*rays, most=2**70)) == len(scene.all_hits(*rays))
+    for mask in (1.5, "5", float("inf")):
+        with pytest.raises(TypeError):
+            scene.nearest(*rays, mask=mask)
+    for most in (2.7, "2"):
+        with pytest.raises(TypeError):
+            scene.all_hits(*rays, most=most)
+
+
+def test_ctrl_c_while_waiting_for_a_change(scene, rays):
+    """A query that waits until another thread has changed the scene heeds signals, too."""
+    tracing = threading.Event()
+
+    def slow(_):
+        tracing.set()
+        time.sleep(3)
+        return True
+
+    def handler(*_):
+        raise KeyboardInterrupt
+
+    origins, directions = rays
+    tracer = threading.Thread(target=lambda: scene.nearest([[0, 0, 5]], [[0, 0, -1]], filter=slow))
+    changer = threading.Thread(target=lambda: scene.set_instance_mask(0, 0xFFFFFFFF))
+    before = signal.signal(signal.SIGALRM, handler)
+    try:
+        tracer.start()
+        assert tracing.wait(10)
+        changer.start()
+        time.sleep(0.2)
+        signal.setitimer(signal.ITIMER_REAL, 0.3)
+        start = time.monotonic()
+        with pytest.raises(KeyboardInterrupt):
+            scene.nearest(origins, directions)
+            scene.any(origins, directions)
+        assert time.monotonic() - start < 1.5
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+        tracer.join()
+        changer.join()

@@ -5,9 +5,11 @@ import inspect
 import os
 import pathlib
 import re
+import struct
 import subprocess
 
 import models
+import numpy as np
 import pytest
 from test_bits import BTHC
 
@@ -50,6 +52,35 @@ def test_bytes_of_the_program(path, options):
         command += ["--no-geometry"] if name == "--geometry" else [name] if value is True else [name, str(value)]
     subprocess.run(command, check=True)
     assert bth.compile(path, cache=False, **options).to_bytes() == path.with_suffix(".bth").read_bytes()
+
+
+@pytest.mark.skipif(not BTHC.exists(), reason=f"there is no {BTHC}")
+def test_known_rays(path):
+    random = np.random.default_rng(3)
+    origins, directions = random.normal(size=(2, 500, 3)).astype(np.float32)
+    rows = np.hstack([origins, np.full((500, 1), 0.5), directions, np.full((500, 1), 9)]).astype("<f4")
+    file = path.with_suffix(".rays")
+    file.write_bytes(b"RAYS" + struct.pack("<IQ", 1, 500) + rows.tobytes())
+    command = [BTHC, "compile", path, "-o", path.with_suffix(".bth"), "--structure", "bvh", "--free-directions", "none", "--no-cache"]
+    subprocess.run([*command, "--quiet", "--rays", file], check=True)
+    scene = bth.compile(path, cache=False, rays=(origins, directions, 0.5, np.full(500, 9)))
+    assert scene.to_bytes() == path.with_suffix(".bth").read_bytes()
+    assert scene.to_bytes() != bth.compile(path, cache=False).to_bytes()
+
+
+def test_wrong_known_rays(path, tmp_path):
+    with pytest.raises(ValueError, match="none of 1"):
+        bth.compile(path, rays=([[0, 0, 0]], [[0, 0, 0]]))
+    for wrong in (3, ([0, 0, 0],), "ab"):
+        with pytest.raises(TypeError, match="rays"):
+            bth.compile(path, rays=wrong)
+    (tmp_path / "a.manifest").write_text("version = 1\n")
+    with pytest.raises(ValueError, match="for_scene"):
+        bth.compile(tmp_path / "a.manifest", rays=([[0, 0, 0]], [[0, 0, 1]]))
+
+
+def test_the_default_profile_has_a_name(path):
+    assert bth.compile(path, profile="default").to_bytes() == bth.compile(path).to_bytes()
 
 
 @pytest.mark.parametrize("options, error", [
@@ -110,4 +141,4 @@ def test_stubs_have_the_options():
     functions = {f.name: {a.arg for a in f.args.kwonlyargs} for f in ast.parse(stub.read_text()).body if isinstance(f, ast.FunctionDef)}
     parameters = set(inspect.signature(bth.compile).parameters) - {"model"}
     assert functions["compile"] == parameters
-    assert functions["compile_scene"] == parameters - {"flatten", "scene", "animation", "rate", "at_rest", "rigid_parts", "strict"}
+    assert functions["compile_scene"] == parameters - {"flatten", "scene", "animation", "rate", "at_rest", "rigid_parts", "strict", "rays"}

@@ -69,6 +69,11 @@ int main(int argc, char **argv) {
     uint64_t counts[MOST];
     even.cull = 3;
     if (bth_count_hits(scene, ray, &even, counts, n) != BTH_ERROR_ARGUMENT || !strstr(bth_last_error(), "cull")) return 102;
+    uint64_t none = 7;
+    bth_hit_list empty = {&none, NULL, 0, 7};
+    if (bth_count_hits(NULL, NULL, NULL, NULL, 0) != BTH_OK || bth_nearest_accepted(NULL, NULL, NULL, NULL, 0) != BTH_OK) return 111;
+    if (bth_all_hits(scene, NULL, NULL, 1, NULL, 0) != BTH_OK || bth_all_hits(scene, NULL, NULL, 1, &empty, 0) != BTH_OK) return 112;
+    if (none != 0 || empty.needed != 0) return 113;
     if (bth_count_hits(NULL, ray, NULL, counts, n) != BTH_ERROR_ARGUMENT) return 103;
     if (bth_count_hits(scene, NULL, NULL, counts, n) != BTH_ERROR_ARGUMENT) return 104;
     if (bth_count_hits(scene, ray, NULL, NULL, n) != BTH_ERROR_ARGUMENT) return 105;

@@ -41,6 +41,13 @@ int main(int argc, char **argv) {
         bth_texture_coordinates(scene, NULL, 0, uv) != BTH_ERROR_ARGUMENT)
         return 9;
     if (bth_vertex_color(scene, &miss, color) != BTH_ERROR_ARGUMENT || bth_vertex_color(scene, NULL, color) != BTH_ERROR_ARGUMENT) return 3;
+    bth_hit beyond = hit;
+    beyond.surface.triangle = 1000000;
+    if (bth_vertex_color(scene, &beyond, color) != BTH_ERROR_ARGUMENT || !strstr(bth_last_error(), "1000000")) return 11;
+    if (bth_texture_coordinates(scene, &beyond, 0, uv) != BTH_ERROR_ARGUMENT) return 12;
+    beyond.surface.instance = 0;
+    beyond.surface.triangle = BTH_NONE;
+    if (bth_vertex_color(scene, &beyond, color) != BTH_ERROR_ARGUMENT) return 13;
     if (bth_material(scene, 0, 1000, &look) != BTH_ERROR_ARGUMENT || !strstr(bth_last_error(), "1000")) return 4;
     if (bth_material(scene, BTH_NONE, 0, &look) != BTH_ERROR_ARGUMENT || bth_material(NULL, 0, 0, &look) != BTH_ERROR_ARGUMENT) return 5;
     if (bth_material(scene, 0, 0, NULL) != BTH_ERROR_ARGUMENT || bth_texture(scene, 0, 0, NULL) != BTH_ERROR_ARGUMENT) return 6;

@@ -118,6 +118,12 @@ int main(int argc, char **argv) {
     } catch (const bth::error &e) {
         caught += e.code() == BTH_ERROR_ARGUMENT;
     }
-    CHECK(caught == 3 && scene.any(down));
+    try {
+        scene.nearest(nullptr, nullptr, 3);
+    } catch (const bth::error &e) {
+        caught += e.code() == BTH_ERROR_ARGUMENT;
+    }
+    scene.nearest(nullptr, nullptr, 0);
+    CHECK(caught == 4 && scene.any(down));
     return 0;
 }

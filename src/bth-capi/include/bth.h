@@ -7,8 +7,8 @@
  * space is world space.
  *
  * Every pointer must be null or valid. Functions that return a code return BTH_ERROR_ARGUMENT for a null pointer that is not
- * documented as allowed, and a query of no rays does nothing and returns BTH_OK. Functions that return no code treat a null scene
- * as one without instances. From C++, bth.hpp closes scenes and throws errors.
+ * documented as allowed, and a query of no rays does nothing and returns BTH_OK (bth_all_hits still stores its one offset).
+ * Functions that return no code treat a null scene as one without instances. From C++, bth.hpp closes scenes and throws errors.
  */
 #ifndef BTH_H
 #define BTH_H

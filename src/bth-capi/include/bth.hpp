@@ -37,6 +37,12 @@ inline void check(std::int32_t code) {
     if (code != BTH_OK) throw error(code, bth_last_error());
 }
 
+/* Throws if a query of some rays has no rays or no room for results. */
+inline void check_arrays(const void *rays, const void *results, std::size_t count) {
+    if (count > 0 && (rays == nullptr || results == nullptr))
+        throw error(BTH_ERROR_ARGUMENT, "rays and results of a query must not be null");
+}
+
 /* Whether a hit is none. */
 inline bool is_miss(const bth_hit &hit) noexcept { return hit.surface.triangle == BTH_NONE; }
 
@@ -65,7 +71,7 @@ public:
 
     /* The nearest hit of a ray, or a miss. `from` is the triangle on which the ray starts, a hint, or null. */
     bth_hit nearest(const bth_ray &ray, const bth_surface *from = nullptr) const {
-        bth_hit hit;
+        bth_hit hit{};
         bth_nearest(opened(), &ray, from, &hit, 1);
         return hit;
     }
@@ -79,11 +85,13 @@ public:
 
     /* As bth_nearest. */
     void nearest(const bth_ray *rays, bth_hit *hits, std::size_t count, const bth_surface *from = nullptr) const {
+        check_arrays(rays, hits, count);
         bth_nearest(opened(), rays, from, hits, count);
     }
 
     /* As bth_any. */
     void any(const bth_ray *rays, std::uint8_t *hit, std::size_t count, const bth_surface *from = nullptr) const {
+        check_arrays(rays, hit, count);
         bth_any(opened(), rays, from, hit, count);
     }
 

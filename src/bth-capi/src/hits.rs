@@ -69,18 +69,18 @@ impl Arguments {
     /// They are not written to during the call.
     unsafe fn run(&self, query: impl FnOnce(&Scene, &[Ray], &Accept<'_>)) -> i32 {
         let name = self.name;
+        if self.count == 0 {
+            return OK;
+        }
         // SAFETY: by contract `scene` is null or open, hence valid for reads.
         let Some(scene) = (unsafe { self.scene.as_ref() }) else {
             return fail(ERROR_ARGUMENT, format!("{name}: scene must not be null"));
         };
-        if (self.rays.is_null() || self.no_results) && self.count > 0 {
+        if self.rays.is_null() || self.no_results {
             return fail(ERROR_ARGUMENT, format!("{name}: rays and results must not be null"));
         }
-        let rays = match self.count {
-            0 => &[],
-            // SAFETY: it is not null, so by contract it points to `count` elements, and all bit patterns are valid for `Ray`.
-            count => unsafe { std::slice::from_raw_parts(self.rays, count) },
-        };
+        // SAFETY: it is not null, so by contract it points to `count` elements, and all bit patterns are valid for `Ray`.
+        let rays = unsafe { std::slice::from_raw_parts(self.rays, self.count) };
         // SAFETY: by contract it is null or points to a valid struct.
         let conditions = unsafe { self.accept.as_ref() };
         let (mask, cull) = conditions.map_or((u32::MAX, 0), |accept| (accept.mask, accept.cull));
@@ -118,11 +118,9 @@ pub unsafe extern "C" fn bth_nearest_accepted(
     let name = "bth_nearest_accepted";
     let arguments = Arguments { name, scene, rays, accept, no_results: hits.is_null(), count };
     let store = |scene: &Scene, rays: &[Ray], accept: &Accept<'_>| {
-        if !rays.is_empty() {
-            // SAFETY: `run` has checked that it is not null, so by contract it points to as many elements as rays.
-            let hits = unsafe { std::slice::from_raw_parts_mut(hits, rays.len()) };
-            scene.nearest_accepted_batch(rays, accept, hits);
-        }
+        // SAFETY: `run` has checked that it is not null, so by contract it points to as many elements as rays.
+        let hits = unsafe { std::slice::from_raw_parts_mut(hits, rays.len()) };
+        scene.nearest_accepted_batch(rays, accept, hits);
     };
     // SAFETY: the contract of `run` is part of that of this function.
     unsafe { arguments.run(store) }
@@ -191,7 +189,18 @@ pub unsafe extern "C" fn bth_all_hits(
     count: usize,
 ) -> i32 {
     // SAFETY: by contract it is null or valid for reads and writes.
-    let Some(list) = (unsafe { list.as_mut() }) else {
+    let list = unsafe { list.as_mut() };
+    if count == 0 {
+        if let Some(list) = list {
+            list.needed = 0;
+            if !list.offsets.is_null() {
+                // SAFETY: it is not null, so by contract it points to one number.
+                unsafe { list.offsets.write(0) };
+            }
+        }
+        return OK;
+    }
+    let Some(list) = list else {
         return fail(ERROR_ARGUMENT, "bth_all_hits: list must not be null".into());
     };
     let no_results = list.offsets.is_null() || list.hits.is_null() && list.capacity > 0;

@@ -89,7 +89,7 @@ pub unsafe extern "C" fn bth_open(path: *const c_char, flags: u32, scene: *mut *
             unsafe { *scene = Box::into_raw(Box::new(opened)) };
             OK
         }
-        Ok(Some(Err(error))) => fail(code_of(&error), format!("{path}: {error}")),
+        Ok(Some(Err(error))) => fail(code_of(&error), error.to_string()),
         Ok(None) => fail(ERROR_ARGUMENT, format!("bth_open: unknown flags {flags:#x}")),
         Err(_) => fail(ERROR_INTERNAL, format!("{path}: internal error")),
     }

@@ -1,6 +1,6 @@
 //! The part of the C interface that tells how surfaces look: materials, textures and vertex colours.
 
-use crate::surface::store;
+use crate::surface::{check_triangle, store};
 use crate::{ERROR_ARGUMENT, ERROR_MISSING, fail};
 use runtime::rays::Hit;
 use runtime::{Alpha, Scene, Wrap};
@@ -155,9 +155,12 @@ pub unsafe extern "C" fn bth_texture_coordinates(
         return fail(ERROR_ARGUMENT, "bth_texture_coordinates: hit must not be null".into());
     };
     let find = |scene: &Scene| {
-        let instance = hit.primitive.instance;
-        if instance >= scene.instance_count() || uv_set > 1 {
-            return Err((ERROR_ARGUMENT, format!("there is no instance {instance} or no set {uv_set}")));
+        check_triangle(scene, hit.primitive)?;
+        if uv_set > 1 {
+            return Err((
+                ERROR_ARGUMENT,
+                format!("there is no set {uv_set} of texture coordinates: sets are 0 and 1"),
+            ));
         }
         let nothing = || (ERROR_MISSING, format!("the file keeps no set {uv_set} for the triangle"));
         scene.texture_coordinates(hit, uv_set).ok_or_else(nothing)
@@ -177,10 +180,7 @@ pub unsafe extern "C" fn bth_vertex_color(scene: *const Scene, hit: *const Hit, 
         return fail(ERROR_ARGUMENT, "bth_vertex_color: hit must not be null".into());
     };
     let find = |scene: &Scene| {
-        let instance = hit.primitive.instance;
-        if instance >= scene.instance_count() {
-            return Err((ERROR_ARGUMENT, format!("there is no instance {instance}")));
-        }
+        check_triangle(scene, hit.primitive)?;
         let nothing = || (ERROR_MISSING, "the file keeps no vertex colors of the triangle".to_owned());
         scene.vertex_color(hit).ok_or_else(nothing)
     };

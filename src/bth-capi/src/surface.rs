@@ -55,21 +55,29 @@ pub(crate) unsafe fn store<T>(
     }
 }
 
-/// Why a scene has no vertices of a triangle.
-fn no_triangle(scene: &Scene, primitive: PrimitiveRef) -> (i32, String) {
+/// The error for a triangle that does not exist.
+pub(crate) fn check_triangle(scene: &Scene, primitive: PrimitiveRef) -> Result<(), (i32, String)> {
     let PrimitiveRef { instance, triangle } = primitive;
     if instance >= scene.instance_count() {
-        return (ERROR_ARGUMENT, format!("there is no instance {instance}"));
+        return Err((ERROR_ARGUMENT, format!("there is no instance {instance}")));
     }
     let object = scene.object_of(instance);
     if object >= scene.object_count() {
-        return (ERROR_ARGUMENT, format!("instance {instance} was removed"));
+        return Err((ERROR_ARGUMENT, format!("instance {instance} was removed")));
     }
-    let view = scene.object(object);
-    if triangle >= view.header.triangles {
-        return (ERROR_ARGUMENT, format!("there is no triangle {triangle} of instance {instance}"));
+    if triangle >= scene.object(object).header.triangles {
+        return Err((ERROR_ARGUMENT, format!("there is no triangle {triangle} of instance {instance}")));
     }
-    if view.triangles.is_empty() {
+    Ok(())
+}
+
+/// Why a scene has no vertices of a triangle.
+fn no_triangle(scene: &Scene, primitive: PrimitiveRef) -> (i32, String) {
+    if let Err(error) = check_triangle(scene, primitive) {
+        return error;
+    }
+    let PrimitiveRef { instance, triangle } = primitive;
+    if scene.object(scene.object_of(instance)).triangles.is_empty() {
         let text = "the file has no positions of triangles; compile it without --no-geometry".to_owned();
         return (ERROR_MISSING, text);
     }

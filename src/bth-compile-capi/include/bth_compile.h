@@ -33,6 +33,13 @@ extern "C" {
 #define BTH_QUALITY_FAST 1u
 #define BTH_QUALITY_BEST 2u
 
+/* Values of bth_compile_options.free_directions: which directions are kept in which rays from a triangle meet nothing, and up to which
+ * distance they do not, for rays that say where they start. */
+#define BTH_FREE_NONE 0u
+#define BTH_FREE_AUTO 1u      /* where that is worth its bytes, as the program bthc does by default */
+#define BTH_FREE_DISTANCES 2u /* distances alone, 12 bytes a triangle */
+#define BTH_FREE_ALL 3u       /* 24 bytes a triangle */
+
 /* Bits of bth_compile_options.flags. */
 #define BTH_COMPILE_NO_GEOMETRY 1u /* leaves out the positions and triangles of the source, which tracing does not need */
 #define BTH_COMPILE_BYTE_BOXES 2u  /* nodes of 192 bytes in place of 448; no answer changes */
@@ -47,7 +54,7 @@ typedef int32_t (*bth_progress)(void *user, const char *stage, uint64_t done, ui
 /* Called with each warning, as bth_progress is. */
 typedef void (*bth_warning)(void *user, const char *message);
 
-/* Options. All zeros are the defaults of the program bthc. */
+/* Options. All zeros are the defaults of the program bthc, but for free directions, which it keeps where they are worth it. */
 typedef struct {
     uint32_t structure;        /* BTH_STRUCTURE_... */
     uint32_t quality;          /* BTH_QUALITY_... */
@@ -57,7 +64,7 @@ typedef struct {
     double max_error;          /* greatest distance that a vertex may move; 0 for no such limit. With coordinate_bits 0 the fewest
                                   bits are taken that honour it */
     uint32_t threads;          /* 0 for one per processor; the result does not depend on it */
-    uint32_t reserved;         /* 0 */
+    uint32_t free_directions;  /* BTH_FREE_...; BTH_FREE_NONE for a deformable mesh */
     const char *cache;         /* folder of a cache of results, UTF-8; null for none */
     const char *tetgen;        /* path of the program bth-tetgen, UTF-8; null to search for it */
     bth_progress progress;     /* null for none */
@@ -89,8 +96,8 @@ typedef struct {
 
 /* Compiles a mesh; `options` may be null. On success stores the bytes of the file in *bytes and returns BTH_COMPILE_OK. On failure
  * stores null and 0, unless `bytes` is null, and returns a negative code; bth_compile_last_error then describes what is wrong,
- * where ("triangle 17"), and what can be done. Equal input gives equal bytes, the content that bthc makes of a file with the same
- * vertices and faces. */
+ * where ("triangle 17"), and what can be done. Equal input and options give equal bytes, the content that bthc makes of a file
+ * with the same vertices and faces. */
 int32_t bth_compile_mesh(const bth_mesh *mesh, const bth_compile_options *options, bth_bytes *bytes);
 
 /* As bth_compile_mesh, for a scene of meshes. Row i of `instances` is instance i of the scene. Meshes without an instance are left

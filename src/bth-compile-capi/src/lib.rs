@@ -142,6 +142,12 @@ unsafe fn scene<'a>(
         let meshes = slice(meshes, mesh_count, "meshes")?.iter().map(|mesh| mesh.view());
         (meshes.collect::<Result<_, _>>()?, slice(instances, instance_count, "instances")?)
     };
+    if let Some(row) = instances.iter().position(|i| i.reserved != 0) {
+        return Err(argument(format!(
+            "reserved of instance {row} must be 0, found {}",
+            instances[row].reserved
+        )));
+    }
     let instance = |i: &MeshInstance| Instance { mesh: i.mesh, to_world: i.to_world };
     Ok((meshes, instances.iter().map(instance).collect()))
 }

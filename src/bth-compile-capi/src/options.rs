@@ -4,6 +4,7 @@ use crate::{Failure, argument};
 use bth_format::layout::GridBits;
 use compiler::bvh::Quality;
 use compiler::coordinates::{Boxes, MaxError};
+use compiler::free::KeepFree;
 use compiler::pipeline::{CompileOptions, Structure};
 use std::ffi::{CStr, c_char, c_void};
 use std::path::PathBuf;
@@ -23,7 +24,7 @@ pub struct Options {
     coordinate_bits: u32,
     max_error: f64,
     pub(crate) threads: u32,
-    reserved: u32,
+    free_directions: u32,
     cache: *const c_char,
     tetgen: *const c_char,
     pub(crate) progress: Option<Progress>,
@@ -40,7 +41,7 @@ impl Default for Options {
             coordinate_bits: 0,
             max_error: 0.0,
             threads: 0,
-            reserved: 0,
+            free_directions: 0,
             cache: std::ptr::null(),
             tetgen: std::ptr::null(),
             progress: None,
@@ -98,9 +99,16 @@ impl Options {
         if self.flags & BYTE_BOXES != 0 {
             options.coordinates.boxes = Boxes::Bytes;
         }
-        if self.flags & !(NO_GEOMETRY | BYTE_BOXES | DEFORMABLE) != 0 || self.reserved != 0 {
+        if self.flags & !(NO_GEOMETRY | BYTE_BOXES | DEFORMABLE) != 0 {
             return unknown("flags", self.flags);
         }
+        options.free.keep = match self.free_directions {
+            0 => KeepFree::None,
+            1 => KeepFree::Auto,
+            2 => KeepFree::Distances,
+            3 => KeepFree::All,
+            other => return unknown("choice of free directions:", other),
+        };
         if self.threads > MOST_THREADS {
             return unknown("number of threads", self.threads);
         }

@@ -81,7 +81,8 @@ impl Failure {
         match self {
             Self::Check => 1,
             Self::Reported(code) => *code,
-            Self::Usage { .. } => 2,
+            // Options that exclude each other.
+            Self::Usage { .. } | Self::Compile(Error::Limit { code: "BTH-L033", .. }) => 2,
             Self::Compile(Error::Input { .. }) => 3,
             Self::Compile(Error::File { .. }) => 4,
             Self::Compile(Error::Limit { .. }) => 5,

@@ -87,7 +87,7 @@ fn one_option_redoes_what_depends_on_it_and_says_so() {
     assert!(hits.is_empty(), "{hits:?}");
     let tets = misses.contains(&"tets".to_owned());
     let all = ["file", "mesh", "bvh", "marks"].into_iter().chain(tets.then_some("tets"));
-    let all: Vec<&str> = all.chain(["free directions"]).collect();
+    let all: Vec<&str> = all.chain(["free-directions"]).collect();
     assert_eq!(misses, all);
 
     let json = compile(folder.path(), &["a.obj", "--tets", "tet16"]);

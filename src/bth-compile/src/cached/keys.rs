@@ -81,7 +81,7 @@ pub(crate) fn bvh(geometry: &Digest, options: &TreeOptions<'_>) -> Key {
 
 /// The free directions of its triangles. What is too close to decide may depend on the BVH.
 pub(crate) fn free(geometry: &Digest, tree: &TreeOptions<'_>, options: &free::FreeOptions) -> Key {
-    Key::new("free directions")
+    Key::new("free-directions")
         .with_all(bvh(geometry, tree).components().iter().cloned())
         .with("keep", text(&options.keep))
         .with("reach", text(&options.reach))

@@ -207,6 +207,11 @@ pub(super) fn build(
     mut clock: Clock,
 ) -> Result<(Content, SceneReport, FileIndex)> {
     let options = context.options;
+    if options.costs.rays.is_some() {
+        let message =
+            "rays are known of one model; those of a scene are those of its cameras and lights".to_owned();
+        return Err(Error::Limit { code: "BTH-L033", message });
+    }
     let weighed;
     let context = match options.costs.for_scene && options.structure != Structure::Tets {
         true => {

@@ -56,8 +56,8 @@ pub(crate) enum CacheCommand {
     Stats,
     /// All entries, by stage and time of use.
     List {
-        /// Only this stage: mesh, bvh, marks, tets, object, file or scene.
-        #[arg(long)]
+        /// Only this stage.
+        #[arg(long, value_parser = ["mesh", "bvh", "free-directions", "marks", "tets", "object", "file", "scene", "outline"])]
         stage: Option<String>,
     },
     /// Remove what was used longest ago until the size is kept, and what killed processes left.

@@ -39,6 +39,10 @@ pub(crate) struct Compile {
     pub(crate) structure: Option<Structure>,
     #[command(flatten)]
     pub(crate) selection: Selection,
+    /// For scenes: let the rays of their cameras, lights and frames decide how trees are built and what is tetrahedralized, more than
+    /// rays from everywhere. What none of them meets is not tetrahedralized.
+    #[arg(long)]
+    pub(crate) for_scene: bool,
     /// Record that stores a tetrahedron.
     #[arg(long, value_enum, default_value_t = Record::Link32, value_name = "RECORD")]
     pub(crate) tets: Record,
@@ -191,10 +195,6 @@ pub(crate) struct Selection {
     /// stays BVH.
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     pub(crate) budget: Option<f64>,
-    /// For scenes: let the rays of their cameras, lights and frames decide how trees are built and what is tetrahedralized, more than
-    /// rays from everywhere. What none of them meets is not tetrahedralized.
-    #[arg(long)]
-    pub(crate) for_scene: bool,
     /// Rays that will be traced through the model, such as those of a light baker or of a view, in a .rays file (see `bthc trace`). The
     /// tree is built for them more than for rays from everywhere, so that they take fewer steps. Answers do not depend on it.
     #[arg(long, value_name = "FILE")]
@@ -279,6 +279,7 @@ impl Compile {
             ..Default::default()
         };
         self.selection.apply(&mut options, monitor)?;
+        options.costs.for_scene = self.for_scene;
         if let Some(seconds) = self.tet_deadline {
             options.tets.deadline = std::time::Duration::from_secs(seconds);
             options.tets.deadline_per_triangle = std::time::Duration::ZERO;
@@ -333,7 +334,6 @@ impl Selection {
         costs.select = self.select.into();
         costs.optimize_for = self.optimize_for.into();
         costs.probe = self.probe.into();
-        costs.for_scene = self.for_scene;
         costs.max_bytes_per_triangle = self.max_bytes_per_triangle;
         costs.budget = self.budget;
         costs.c_tet = self.c_tet;

@@ -78,7 +78,7 @@ fn list(store: &Store, stage: Option<&str>) -> (Value, String) {
     let mut table = Table::default();
     for entry in &entries {
         let used = entry.idle_seconds.map_or("not kept".to_owned(), |s| format!("{} s ago", count(s)));
-        table.row([&format!("{:<6} {}", entry.stage, entry.id.hex()), &bytes(entry.bytes), &used]);
+        table.row([&format!("{:<15} {}", entry.stage, entry.id.hex()), &bytes(entry.bytes), &used]);
     }
     (json!({ "entries": entries }), table.render())
 }

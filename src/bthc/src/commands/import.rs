@@ -64,16 +64,25 @@ fn summary(path: &Path, report: &ImportReport) -> String {
     format!("{}\nwrote {}\n", facts(report).render(), path.display())
 }
 
+/// The name of a scene or animation of a glTF file. One without a name is called by its number, which would look like a count.
+fn name_or_number(name: &str) -> String {
+    match name.parse::<u32>() {
+        Ok(number) => format!("number {number} (without a name)"),
+        Err(_) => name.to_owned(),
+    }
+}
+
 /// What was found in a scene.
 pub(super) fn facts(report: &ImportReport) -> Table {
     let mut table = Table::default();
-    table.row(["scene", &report.scene]);
+    table.row(["scene", &name_or_number(&report.scene)]);
     table.row(["nodes", &count(report.nodes)]);
     table.row(["instances", &count(report.instances)]);
     table.row(["objects", &count(report.objects)]);
-    table.row(["animations", &report.animations.join(", ")]);
+    let all = |names: &[String]| names.iter().map(|name| name_or_number(name)).collect::<Vec<_>>().join(", ");
+    table.row(["animations", &all(&report.animations)]);
     if !report.animations_left_out.is_empty() {
-        table.row(["animations left out", &report.animations_left_out.join(", ")]);
+        table.row(["animations left out", &all(&report.animations_left_out)]);
     }
     table.row(["objects that deform", &count(report.deformers)]);
     row_unless_zero(&mut table, "instances of parts that move rigidly", report.rigid_parts);

@@ -32,7 +32,13 @@ pub(crate) fn run(args: &Verify) -> Result<(), Failure> {
                 let errors: Vec<_> = errors.iter().map(runtime_json).collect();
                 output::json(&json!({"verified": false, "errors": errors}))?;
             } else {
-                errors.iter().for_each(|error| output::error(&format!("{}: {error}", args.file.display())));
+                for error in &errors {
+                    // Errors of opening the file name it already.
+                    match error.path() {
+                        Some(_) => output::error(&error.to_string()),
+                        None => output::error(&format!("{}: {error}", args.file.display())),
+                    }
+                }
             }
             Err(Failure::Check)
         }

@@ -8,6 +8,7 @@ mod camera;
 mod compile_source;
 mod environment;
 mod failure;
+mod interrupt;
 mod materials;
 mod messages;
 mod output;
@@ -51,7 +52,9 @@ fn run(args: &args::Args) -> Result<(), Failure> {
         None => bth::Isa::from_environment().map(|_| ()),
     };
     isa.map_err(|error| Failure::Usage(error.to_string()))?;
+    interrupt::listen(args.json);
     let file = args.file()?;
+    check_output(args, file)?;
     // Keeps the entry from being evicted from the cache until the end of the program.
     let pinned;
     let (file, mut scene) = if compile_source::is_source(file) {
@@ -75,6 +78,19 @@ fn run(args: &args::Args) -> Result<(), Failure> {
     let output = args.output()?;
     let (report, quiet) = pool.install(|| render::render_sequence(&mut scene, file, output, args))?;
     report::show(args, &scene, file, &report, threads, quiet)
+}
+
+/// Fails if the output would replace the file that is played, whatever its path is spelled like.
+fn check_output(args: &args::Args, file: &Path) -> Result<(), Failure> {
+    let Some(output) = args.output().ok().filter(|output| output.is_file()) else { return Ok(()) };
+    match (output.canonicalize(), file.canonicalize()) {
+        (Ok(output), Ok(file)) if output == file => {
+            let message =
+                format!("{} would replace the file that is played: name another output", output.display());
+            Err(Failure::Usage(message))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn show_window(

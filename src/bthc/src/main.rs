@@ -8,6 +8,7 @@ mod explain;
 mod failure;
 mod measure;
 mod output;
+mod overwrite;
 mod progress;
 mod ray_files;
 mod table;

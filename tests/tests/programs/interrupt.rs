@@ -2,6 +2,7 @@
 
 use crate::support::{bthc, command, folder, sphere, wait};
 use std::path::Path;
+use std::process::Stdio;
 use std::time::Duration;
 
 /// Files of a folder other than these.
@@ -41,7 +42,7 @@ fn interrupted_compilation_exits_130_and_leaves_nothing() {
     for milliseconds in [40, 80, 120, 160, 200, 300] {
         let mut child =
             command("bthc", folder.path(), &["compile", "ball.obj", "--quiet", "--quality", "best"]);
-        let mut child = child.stderr(std::process::Stdio::null()).spawn().unwrap();
+        let mut child = child.stderr(Stdio::null()).spawn().unwrap();
         std::thread::sleep(Duration::from_millis(milliseconds));
         let pid = child.id().to_string();
         let sent = std::process::Command::new("kill").args(["-INT", &pid]).status().unwrap();
@@ -58,4 +59,32 @@ fn interrupted_compilation_exits_130_and_leaves_nothing() {
         }
     }
     assert!(interrupted > 0, "no interrupt met the compiler at work");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_player_exits_130_and_leaves_nothing() {
+    let folder = folder(&[("ball.obj", &sphere(32))]);
+    bthc(folder.path(), &["compile", "ball.obj", "--quiet"]).expect(0);
+    let mut interrupted = 0;
+    for milliseconds in [50, 100, 200, 300, 400, 600, 800] {
+        let args = ["ball.bth", "-o", "a.png", "--size", "3000x3000", "--spp", "1", "--json"];
+        let mut child = command("bth-play", folder.path(), &args);
+        let mut child = child.stderr(Stdio::null()).stdout(Stdio::piped()).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(milliseconds));
+        let sent =
+            std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        let output = child.wait_with_output().unwrap();
+        if output.status.code() == Some(130) {
+            interrupted += 1;
+            let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+            assert_eq!(json["error"]["code"], "BTH-C000");
+            assert_eq!(litter(folder.path(), &["ball.obj", "ball.bth", "a.png"]), [""; 0]);
+        } else {
+            let unheard = std::os::unix::process::ExitStatusExt::signal(&output.status) == Some(2);
+            assert!(output.status.success() || unheard || !sent.success(), "{output:?}");
+        }
+        let _ = std::fs::remove_file(folder.path().join("a.png"));
+    }
+    assert!(interrupted > 0, "no interrupt met the player at work");
 }

@@ -1,7 +1,7 @@
 //! Mistakes that users make: every program answers with an error that can be acted on and the documented exit code, and
 //! never with a panic or a backtrace, even where the environment enables backtraces.
 
-use crate::support::{Run, command, folder, run_with, sphere};
+use crate::support::{Run, bthc, command, folder, run, run_with, sphere};
 use std::path::Path;
 
 /// Runs a program with backtraces enabled in its environment.
@@ -98,4 +98,39 @@ fn a_closed_standard_output_is_no_error() {
         assert_eq!(output.status.code(), Some(0), "{program}: {output:?}");
         assert!(output.stderr.is_empty(), "{program}: {output:?}");
     }
+}
+
+#[test]
+fn outputs_never_replace_what_is_read() {
+    let scene = "version = 1\nobjects = [{ name = \"o\", model = \"a.obj\" }]\nnodes = [{ name = \"n\", object = \"o\" }]\n";
+    let library = format!("mtllib a.mtl\n{}", sphere(8));
+    let folder = folder(&[("a.obj", &library), ("a.mtl", "newmtl m\n"), ("s.manifest", scene)]);
+    let path = folder.path();
+    std::fs::create_dir(path.join("d")).unwrap();
+    let contents = || ["a.obj", "a.mtl", "s.manifest"].map(|name| std::fs::read(path.join(name)).unwrap());
+    let before = contents();
+    let whole = path.join("a.obj").to_string_lossy().into_owned();
+    bthc(path, &["compile", "a.obj", "-o", "a.bth"]).expect(0);
+    for args in [
+        &["compile", "a.obj", "-o", "a.obj"][..],
+        &["compile", "a.obj", "-o", "./a.obj"],
+        &["compile", "a.obj", "-o", "d/../a.obj"],
+        &["compile", "a.obj", "-o", &whole],
+        &["compile", "a.obj", "--materials", "-o", "a.mtl"],
+        &["compile", "s.manifest", "-o", "a.obj"],
+        &["compile", "s.manifest", "-o", "s.manifest"],
+        &["compile", "a.obj", "--depfile", "a.obj"],
+        &["compile", "a.obj", "-o", "b.bth", "--depfile", "b.bth"],
+        &["explain", "a.obj", "--picture", "./a.obj"],
+        &["explain", "a.obj", "--free-picture", "./a.obj"],
+        &["marks", "a.obj", "--tris", "./a.obj"],
+    ] {
+        let run = bthc(path, args).expect(2);
+        assert!(run.stderr.contains("BTH-U001"), "{args:?}: {run:?}");
+    }
+    assert_eq!(contents(), before);
+    let compiled = std::fs::read(path.join("a.bth")).unwrap();
+    run("bth-play", path, &["a.bth", "-o", "./a.bth"]).expect(2);
+    bthc(path, &["trace", "a.bth", "a.obj", "-o", "./a.bth"]).expect(2);
+    assert_eq!(std::fs::read(path.join("a.bth")).unwrap(), compiled);
 }

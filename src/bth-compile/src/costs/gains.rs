@@ -47,17 +47,17 @@ pub(super) struct Sampled {
 pub(super) fn sample(mesh: &Mesh, bvh: &BinaryBvh, options: &CostOptions) -> Sampled {
     let known = options.rays.as_deref();
     let [camera, surface_share] = known.map_or(options.optimize_for.weights(), KnownRays::shares);
-    let drawn;
-    let (from_outside, from_surface): (&[SampleRay], &[SampleRay]) = match known {
-        Some(known) => (&known.outside, &known.surface),
+    let (from_outside, from_surface) = match known {
+        Some(known) => (known.outside.clone(), known.surface.clone()),
         None => {
             let count = (bvh.order.len() / TRIANGLES_PER_RAY).clamp(RAYS_OF_KIND[0], RAYS_OF_KIND[1]);
             let root = bvh.nodes.first();
             let lines = root.map_or(Vec::new(), |root| sampling::outside(root.lower, root.upper, count, 1));
-            drawn = (lines, sampling::from_surface(mesh, bvh, 0..bvh.order.len(), count, 2));
-            (&drawn.0, &drawn.1)
+            (lines, sampling::from_surface(mesh, bvh, 0..bvh.order.len(), count, 2))
         }
     };
+    let [from_outside, from_surface] =
+        [from_outside, from_surface].map(|rays| sampling::affordable(mesh, bvh, rays));
     let costs = options.profile.bvh;
     let nodes_of = |ray: &SampleRay| {
         let mut nodes = Vec::new();

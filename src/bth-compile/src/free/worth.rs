@@ -10,7 +10,7 @@ use super::{FreeOptions, Kept, decide};
 use crate::bvh::BinaryBvh;
 use crate::error::Result;
 use crate::monitor::Monitor;
-use crate::sampling::{SampleRay, outside, walk, within};
+use crate::sampling::{SampleRay, affordable, outside, walk, within};
 use crate::vectors::{corners, double_area};
 use bth_format::layout::{FreeBins, FreeDirections, FreeDistances};
 use bth_import::Mesh;
@@ -97,7 +97,10 @@ pub(super) fn worth(
     }
     let count = (tree.order.len() / TRIANGLES_A_RAY).clamp(RAYS[0], RAYS[1]);
     let root = &tree.nodes[0];
-    let lines = outside(root.lower, root.upper, count, 1);
+    let all = outside(root.lower, root.upper, count, 1);
+    let drawn = all.len();
+    let lines = affordable(around.mesh, tree, all);
+    let count = if drawn == 0 { count } else { (count * lines.len()).div_ceil(drawn) };
     let from_outside: Vec<Met> = lines.par_iter().filter_map(|line| meet(around.mesh, tree, line)).collect();
     let from_within = met_from_within(around.mesh, tree, count);
     around.kept = Kept::Distances;

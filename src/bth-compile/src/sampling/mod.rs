@@ -16,4 +16,4 @@ pub use walk::{Traced, walk};
 pub(crate) use rays::along;
 #[cfg(test)]
 pub(crate) use visits::entered;
-pub(crate) use walk::crosses;
+pub(crate) use walk::{affordable, crosses};

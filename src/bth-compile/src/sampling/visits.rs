@@ -7,7 +7,7 @@
 
 use super::known::KnownRays;
 use super::rays::{SampleRay, enters, from_surface, outside, within};
-use super::walk::walk;
+use super::walk::{affordable, walk};
 use crate::bvh::{BinaryBvh, Node};
 use bth_import::Mesh;
 use rayon::prelude::*;
@@ -29,7 +29,7 @@ const PRIOR: f64 = 64.0;
 pub fn visits(mesh: &Mesh, bvh: &BinaryBvh, known: Option<&KnownRays>) -> Vec<f64> {
     let mut rays = known.map_or(Vec::new(), KnownRays::some);
     rays.extend(sample(mesh, bvh, rays.len()));
-    let counts = entered(mesh, bvh, &rays);
+    let counts = entered(mesh, bvh, &affordable(mesh, bvh, rays));
     let mut probabilities = vec![0.0; bvh.nodes.len()];
     if let Some(root) = probabilities.first_mut() {
         *root = 1.0;

@@ -116,3 +116,21 @@ fn rays_are_counted_at_each_box_that_they_enter_before_their_hits() {
     }
     assert_eq!(entered(&mesh, &bvh, &rays), expected);
 }
+
+#[test]
+fn where_triangles_coincide_fewer_rays_are_taken() {
+    let mut mesh = Mesh { positions: vec![[0.0; 3], [1.0, 0.0, 0.3], [0.0, 1.0, 0.1]], ..Mesh::default() };
+    mesh.triangles = vec![[0, 1, 2]; 20_000];
+    let (bvh, _) = build(&mesh, &BvhOptions::default(), &Silent).unwrap();
+    let rays = sample(&mesh, &bvh, 0);
+    let taken = affordable(&mesh, &bvh, rays.clone());
+    let enters = |rays: &[SampleRay]| {
+        rays.iter().map(|ray| u64::from(walk(&mesh, &bvh, ray, |_| ()).visits)).sum::<u64>()
+    };
+    assert!(enters(&taken) < 1 << 25 && 4 * taken.len() < rays.len() && taken.len() > 100, "{}", taken.len());
+    // Of ordinary meshes all are.
+    let mesh = open_and_enclosed();
+    let (bvh, _) = build(&mesh, &BvhOptions::default(), &Silent).unwrap();
+    let rays = sample(&mesh, &bvh, 0);
+    assert_eq!(affordable(&mesh, &bvh, rays.clone()), rays);
+}

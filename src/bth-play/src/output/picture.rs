@@ -1,6 +1,7 @@
 //! The finished picture and its PNG file.
 
 use crate::failure::Failure;
+use crate::interrupt::Part;
 use std::io::Write;
 use std::path::Path;
 
@@ -99,6 +100,8 @@ pub(super) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), Failure>
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
     let mut file = builder.tempfile_in(folder).map_err(|e| failed(&e))?;
+    let name = file.path().to_owned();
+    let _part = Part::new(&name);
     file.write_all(bytes).map_err(|e| failed(&e))?;
     file.persist(path).map_err(|e| failed(&e.error))?;
     Ok(())

@@ -7,12 +7,13 @@ use super::{deliver, depfile, dry_run, jobs, scene, watch};
 use crate::args::Compile;
 use crate::failure::Failure;
 use crate::output;
+use crate::overwrite;
 use crate::progress::{Progress, Quiet};
 use bth_compile::Monitor;
 use bth_compile::pipeline::CompileOptions;
 use serde_json::json;
 use std::collections::HashMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 pub(crate) fn run(args: &Compile) -> Result<(), Failure> {
     let _stdin;
@@ -34,6 +35,7 @@ pub(crate) fn run(args: &Compile) -> Result<(), Failure> {
         ..args.options(&progress)?
     };
     let context = JobContext { args, options, store };
+    check_outputs(&context, &jobs)?;
     if let Some((part, parts)) = args.jobs.shard
         && !(jobs.len() == 1 && scene::is_scene(&jobs[0].model, args))
     {
@@ -93,6 +95,35 @@ fn all(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -> Result<(),
     failed.map_or(Ok(()), |code| Err(Failure::Reported(code)))
 }
 
+/// Fails if an output would replace a file that is read, or the dependency file an output.
+fn check_outputs(context: &JobContext<'_>, jobs: &[Job]) -> Result<(), Failure> {
+    let depfile = context.args.jobs.depfile.as_deref();
+    let outputs: Vec<&Path> = jobs.iter().filter_map(|job| job.target.path()).collect();
+    if let Some(depfile) = depfile {
+        let same = |output: &&Path| **output == *depfile;
+        if let Some(output) = outputs.iter().find(|output| same(output)) {
+            let message =
+                format!("{} would be both the compiled file and the dependency file", output.display());
+            return Err(Failure::Usage { message, hint: "name another file with --depfile" });
+        }
+        overwrite::check(depfile, &outputs)?;
+    }
+    // What refers to other files is read only where an output is there already.
+    if !outputs.iter().copied().chain(depfile).any(Path::is_file) {
+        return Ok(());
+    }
+    for job in jobs {
+        // A source that cannot be read is reported when it is compiled.
+        let mut inputs = depfile::inputs(context, job).unwrap_or_else(|_| vec![job.model.clone()]);
+        let selection = &context.args.selection;
+        inputs.extend(selection.rays.iter().chain(selection.profile_file()).cloned());
+        for output in outputs.iter().copied().chain(depfile) {
+            overwrite::check(output, &inputs)?;
+        }
+    }
+    Ok(())
+}
+
 /// Fails if known rays are given for anything but one model.
 fn check_rays(args: &Compile, jobs: &[Job]) -> Result<(), Failure> {
     if args.selection.rays.is_none() {
@@ -141,10 +172,6 @@ fn plan(args: &Compile, models: &[PathBuf]) -> Result<Vec<Job>, Failure> {
     let mut of_output = HashMap::new();
     for job in &jobs {
         let Target::File(path) = &job.target else { continue };
-        if *path == job.model {
-            let message = "the output would replace the model".to_owned();
-            return usage(message, "name another output with -o");
-        }
         if let Some(other) = of_output.insert(path, &job.model) {
             let (one, two) = (other.display(), job.model.display());
             let message = format!("{one} and {two} would both be written to {}", path.display());

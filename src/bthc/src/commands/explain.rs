@@ -5,6 +5,7 @@ use crate::args::Explain;
 use crate::explain::{Explained, MeasuredNode, free_picture, measure, picture};
 use crate::failure::Failure;
 use crate::output;
+use crate::overwrite;
 use crate::progress::Progress;
 use crate::table::{Table, count};
 use bth_compile::costs::{self, Verdict};
@@ -19,6 +20,9 @@ use std::time::Instant;
 
 pub(crate) fn run(args: &Explain) -> Result<(), Failure> {
     let mut options = pipeline::CompileOptions { geometry: false, ..pipeline::CompileOptions::default() };
+    for picture in args.picture.iter().chain(&args.free_picture) {
+        overwrite::check(picture, [&args.model])?;
+    }
     let progress = Progress::new(args.json);
     args.selection.apply(&mut options, &progress)?;
     let ((mesh, tree), (choice, report)) = with_threads(args.threads, || -> bth_compile::Result<_> {

@@ -5,6 +5,7 @@ use super::summary::row_unless_zero;
 use crate::args::Import;
 use crate::failure::Failure;
 use crate::output;
+use crate::overwrite;
 use crate::progress::Progress;
 use crate::table::{Table, count};
 use bth_compile::write;
@@ -18,6 +19,7 @@ pub(crate) fn run(args: &Import) -> Result<(), Failure> {
         return Err(Failure::Usage { message, hint: "manifests of other models are written by hand" });
     }
     let path = args.output.clone().unwrap_or_else(|| args.model.with_extension("manifest"));
+    overwrite::check(&path, [&args.model])?;
     let name = name_from(folder(&path), &args.model)?;
     let progress = Progress::new(args.quiet || args.json);
     let (manifest, report) = scene::import(&args.model, &name, &args.gltf.options(), &progress)?;

@@ -5,12 +5,15 @@ use crate::args::Marks;
 use crate::failure::Failure;
 use crate::progress::Progress;
 use crate::table::count;
-use crate::{output, ray_files};
+use crate::{output, overwrite, ray_files};
 use bth_compile::{bvh, marks, write};
 use bth_import::Keep;
 use serde_json::json;
 
 pub(crate) fn run(args: &Marks) -> Result<(), Failure> {
+    if let Some(path) = &args.tris {
+        overwrite::check(path, [&args.model])?;
+    }
     let progress = Progress::new(args.json);
     let (mesh, contacts) = with_threads(args.threads, || -> bth_compile::Result<_> {
         let (mesh, _) = bth_import::import(&args.model, Keep::None, &progress)?;

@@ -5,7 +5,7 @@ use crate::args::Trace;
 use crate::failure::Failure;
 use crate::progress::{self, Progress};
 use crate::table::count;
-use crate::{output, ray_files};
+use crate::{output, overwrite, ray_files};
 use bth::Scene;
 use bth::rays::{Hit, Ray};
 use bth_compile::{Error, Monitor};
@@ -18,6 +18,7 @@ use std::time::Instant;
 const CHUNK: usize = 4096;
 
 pub(crate) fn run(args: &Trace) -> Result<(), Failure> {
+    overwrite::check(&args.output, [&args.file, &args.rays].into_iter().chain(&args.from))?;
     let rays = ray_files::read_rays(&args.rays)?;
     let from = args.from.as_ref().map(|path| ray_files::read_from(path, rays.len())).transpose()?;
     let scene = bth::open(&args.file)?;

@@ -1,0 +1,47 @@
+//! Ctrl-C ends the program, and no part of a file that is being written stays.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Exit code of a program that was cancelled.
+const CANCELLED: i32 = 130;
+
+/// The temporary files that are being written.
+static PARTS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn parts() -> MutexGuard<'static, Vec<PathBuf>> {
+    PARTS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Listens for Ctrl-C from now on. With `json` the end is reported on standard output.
+pub(crate) fn listen(json: bool) {
+    // Fails only when a handler is there already, and then Ctrl-C ends the program anyway.
+    let _ = ctrlc::set_handler(move || {
+        // Kept locked, so that no other file begins.
+        let parts = parts();
+        parts.iter().for_each(|part| drop(std::fs::remove_file(part)));
+        if json {
+            let error =
+                serde_json::json!({"code": "BTH-C000", "message": "cancelled", "exit_code": CANCELLED});
+            // Where standard output is closed, the exit code is all that can be reported.
+            let _ = crate::messages::print(&format!("{}\n", serde_json::json!({ "error": error })));
+        }
+        std::process::exit(CANCELLED);
+    });
+}
+
+/// A temporary file that is removed when the program is interrupted while this lives.
+pub(crate) struct Part<'a>(&'a Path);
+
+impl<'a> Part<'a> {
+    pub(crate) fn new(path: &'a Path) -> Self {
+        parts().push(path.to_owned());
+        Part(path)
+    }
+}
+
+impl Drop for Part<'_> {
+    fn drop(&mut self) {
+        parts().retain(|part| part != self.0);
+    }
+}

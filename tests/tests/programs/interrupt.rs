@@ -70,7 +70,7 @@ fn an_interrupted_player_exits_130_and_leaves_nothing() {
     for milliseconds in [50, 100, 200, 300, 400, 600, 800] {
         let args = ["ball.bth", "-o", "a.png", "--size", "3000x3000", "--spp", "1", "--json"];
         let mut child = command("bth-play", folder.path(), &args);
-        let mut child = child.stderr(Stdio::null()).stdout(Stdio::piped()).spawn().unwrap();
+        let child = child.stderr(Stdio::null()).stdout(Stdio::piped()).spawn().unwrap();
         std::thread::sleep(Duration::from_millis(milliseconds));
         let sent =
             std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();

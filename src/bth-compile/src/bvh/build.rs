@@ -44,7 +44,7 @@ pub struct Effort {
     /// more than a long one (measured on rooms and a car).
     pub reinsertion: Vec<f64>,
     /// Rounds in which treelets are rebuilt ([`rebuild_treelets`](super::rebuild_treelets)); with none the wide tree is chosen by areas
-    /// alone.
+    /// alone, unless rays are known.
     pub treelets: usize,
 }
 

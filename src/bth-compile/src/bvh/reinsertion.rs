@@ -54,12 +54,24 @@ const COUNTED_AT_ONCE: usize = 1 << 14;
 /// Bits of an area that do not count where areas are counted.
 const LESS_BITS: u32 = 20;
 
+/// The power of two by which areas are multiplied, exactly, so that f32 holds those of meshes of any size.
+fn scale<E: Extent>(tree: &LinkedTree<E>) -> f64 {
+    let greatest = (0..tree.len() as u32)
+        .find(|&at| tree.node(at).parent == NONE)
+        .map(|at| tree.node(at).bounds.half_area());
+    match greatest.unwrap_or(0.0) {
+        area if area > 0.0 && area.is_finite() => (-area.log2().floor()).exp2(),
+        _ => 1.0,
+    }
+}
+
 /// The nodes with a grandparent of the largest areas.
 fn largest<E: Extent>(tree: &LinkedTree<E>, share: f64) -> Vec<u32> {
+    let scale = scale(tree);
     let keyed = (0..tree.len() as u32).into_par_iter().with_min_len(COUNTED_AT_ONCE).filter_map(|at| {
         let node = tree.node(at);
         let may_move = node.parent != NONE && tree.node(node.parent).parent != NONE;
-        may_move.then(|| (node.bounds.half_area() as f32, at))
+        may_move.then(|| ((node.bounds.half_area() * scale) as f32, at))
     });
     // Areas are counted by their leading bits, which are ordered as they are, so that not all of them need be sorted.
     let leading = |area: f32| (area.to_bits() >> LESS_BITS) as usize;
@@ -147,6 +159,22 @@ mod tests {
     use crate::monitor::Silent;
 
     #[test]
+    fn the_largest_nodes_do_not_depend_on_the_scale() {
+        let mesh = soup(400, 2);
+        let (bvh, _) = build(&mesh, &BvhOptions::default(), &Silent).unwrap();
+        let at = |scale: f32| {
+            let mut bvh = bvh.clone();
+            for node in &mut bvh.nodes {
+                (node.lower, node.upper) = (node.lower.map(|x| x * scale), node.upper.map(|x| x * scale));
+            }
+            largest(&LinkedTree::new(&bvh), 0.3)
+        };
+        for exponent in [-100, -70, 70, 100] {
+            assert_eq!(at(f32::powi(2.0, exponent)), at(1.0), "{exponent}");
+        }
+    }
+
+    #[test]
     fn the_largest_nodes_are_those_of_sorting_all() {
         for mesh in [soup(1, 1), soup(2, 1), soup(400, 2), grid(30, 0.0, 3), grid(150, 5.0, 4)] {
             let (bvh, _) = build(&mesh, &BvhOptions::default(), &Silent).unwrap();
@@ -155,7 +183,7 @@ mod tests {
             for at in 0..tree.len() as u32 {
                 let parent = tree.node(at).parent;
                 if parent != NONE && tree.node(parent).parent != NONE {
-                    all.push((tree.node(at).bounds.half_area() as f32, at));
+                    all.push(((tree.node(at).bounds.half_area() * scale(&tree)) as f32, at));
                 }
             }
             all.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));

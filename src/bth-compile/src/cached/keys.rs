@@ -238,6 +238,7 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
             ("free directions", text(&options.free.keep)),
             ("reach", text(&options.free.reach)),
             ("most triangles", text(&options.free.most_triangles)),
+            ("row bytes", text(&options.free.row_bytes)),
             ("free directions version", FREE.to_owned()),
         ]);
     }
@@ -266,6 +267,10 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
     if options.built_structure() == Structure::Bvh {
         all.extend(options.costs.for_scene.then(|| ("for scene", "true".to_owned())));
         all.extend(options.costs.rays.iter().map(|rays| ("rays", rays.hash())));
+        // Free directions are kept within the limit.
+        let limit =
+            options.costs.max_bytes_per_triangle.filter(|_| options.free.keep == free::KeepFree::Auto);
+        all.extend(limit.map(|limit| ("most bytes a triangle", text(&limit))));
     }
     let mut all: Vec<_> = all.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
     if options.built_structure() != Structure::Bvh {

@@ -61,6 +61,13 @@ impl Worth {
     }
 }
 
+impl Worth {
+    /// Whether no ray was judged.
+    pub fn is_unmeasured(&self) -> bool {
+        self.from_outside.rays == 0 && self.from_within.rays == 0
+    }
+}
+
 impl fmt::Display for Worth {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [outside, within, free] =

@@ -319,6 +319,11 @@ impl Selection {
         Some(&self.profile).filter(|profile| profile.as_os_str() != "default")
     }
 
+    /// The files that options name.
+    pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.rays.iter().chain(self.profile_file())
+    }
+
     /// Sets the options that concern the selection.
     ///
     /// # Errors

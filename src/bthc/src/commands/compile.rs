@@ -34,7 +34,7 @@ pub(crate) fn run(args: &Compile) -> Result<(), Failure> {
         objects_memory: jobs::memory_of_objects(args, jobs.len()),
         ..args.options(&progress)?
     };
-    let context = JobContext { args, options, store };
+    let mut context = JobContext { args, options, store };
     check_outputs(&context, &jobs)?;
     if let Some((part, parts)) = args.jobs.shard
         && !(jobs.len() == 1 && scene::is_scene(&jobs[0].model, args))
@@ -46,7 +46,7 @@ pub(crate) fn run(args: &Compile) -> Result<(), Failure> {
         return dry_run::show(&context, &jobs, progress);
     }
     if args.jobs.watch {
-        return watch::run(&context, &jobs, &progress);
+        return watch::run(&mut context, &jobs, &progress);
     }
     all(&context, &jobs, progress)?;
     match &args.jobs.depfile {
@@ -114,9 +114,7 @@ fn check_outputs(context: &JobContext<'_>, jobs: &[Job]) -> Result<(), Failure> 
     }
     for job in jobs {
         // A source that cannot be read is reported when it is compiled.
-        let mut inputs = depfile::inputs(context, job).unwrap_or_else(|_| vec![job.model.clone()]);
-        let selection = &context.args.selection;
-        inputs.extend(selection.rays.iter().chain(selection.profile_file()).cloned());
+        let inputs = depfile::inputs(context, job).unwrap_or_else(|_| vec![job.model.clone()]);
         for output in outputs.iter().copied().chain(depfile) {
             overwrite::check(output, &inputs)?;
         }

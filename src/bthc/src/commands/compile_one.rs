@@ -21,7 +21,11 @@ pub(super) fn compile_one(
     let cache = cache(context, &job.model);
     let needed = |record: &_| job.target.needs(record, context.store.as_ref());
     let outcome = bth_compile::cached::compile(&job.model, &context.options, &cache, &needed, monitor)?;
-    let files = || bth_compile::source::files(&job.model, context.options.looks());
+    let files = || {
+        let mut files = bth_compile::source::files(&job.model, context.options.looks())?;
+        files.extend(context.args.selection.files().cloned());
+        Ok(files)
+    };
     let mut report = deliver::deliver(context, job, &outcome, &cache, &files)?;
     report.json["report"] = outcome.report;
     if let Some(built) = &outcome.built {

@@ -15,24 +15,23 @@ pub(super) fn write(path: &Path, context: &JobContext<'_>, jobs: &[Job]) -> Resu
     let mut text = String::new();
     for job in jobs {
         if let Target::File(output) = &job.target {
-            let selection = &context.args.selection;
-            let mut inputs = inputs(context, job)?;
-            inputs.extend(selection.rays.iter().chain(selection.profile_file()).cloned());
-            text.push_str(&rule(output, &inputs));
+            text.push_str(&rule(output, &inputs(context, job)?));
         }
     }
     Ok(write::write_atomically(path, text.as_bytes())?)
 }
 
-/// All files that a job reads.
+/// All files that a job reads, those of its options included.
 ///
 /// # Errors
 /// When a file that refers to others cannot be read.
 pub(super) fn inputs(context: &JobContext<'_>, job: &Job) -> Result<Vec<PathBuf>, Failure> {
-    match scene::is_scene(&job.model, context.args) {
-        true => scene::inputs(&job.model, context.options.looks()),
-        false => Ok(source::files(&job.model, context.options.looks())?),
-    }
+    let mut files = match scene::is_scene(&job.model, context.args) {
+        true => scene::inputs(&job.model, context.options.looks())?,
+        false => source::files(&job.model, context.options.looks())?,
+    };
+    files.extend(context.args.selection.files().cloned());
+    Ok(files)
 }
 
 fn rule(output: &Path, inputs: &[PathBuf]) -> String {

@@ -72,8 +72,11 @@ pub(super) fn compile(
         target: job.target.path(),
     };
     let outcome = scene::compile_cached(&manifest, source, &context.options, &cache, policy, monitor)?;
-    let mut report =
-        deliver(context, job, &outcome, &cache, &|| files(&manifest, &job.model, context.options.looks()))?;
+    let mut report = deliver(context, job, &outcome, &cache, &|| {
+        let mut files = files(&manifest, &job.model, context.options.looks())?;
+        files.extend(context.args.selection.files().cloned());
+        Ok(files)
+    })?;
     report.json["scene"] = outcome.report;
     report.json["import"] = json!(import);
     if let Some(built) = &outcome.built {

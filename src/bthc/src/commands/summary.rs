@@ -36,6 +36,11 @@ pub(super) fn summary(report: &CompileReport, known_rays: u64) -> String {
             Kept::None if free.undecided => {
                 "left out of objects so large; --free-directions auto finds them".to_owned()
             }
+            Kept::None if free.worth.is_none_or(|worth| worth.is_unmeasured()) => {
+                format!(
+                    "none kept: no ray met the model, or the limit on bytes leaves no room, {seconds:.1} s"
+                )
+            }
             Kept::None => {
                 format!("not worth their bytes, {seconds:.1} s: {}", free.worth.unwrap_or_default())
             }

@@ -8,6 +8,7 @@ use crate::failure::Failure;
 use crate::output;
 use crate::progress::Progress;
 use bth_compile::Monitor;
+use bth_compile::pipeline::CompileOptions;
 use std::path::PathBuf;
 use std::time::{Duration, SystemTime};
 
@@ -22,7 +23,7 @@ type Fingerprint = Vec<(PathBuf, Option<(SystemTime, u64)>)>;
 ///
 /// # Errors
 /// Cancelled, or standard output closed.
-pub(super) fn run(context: &JobContext<'_>, jobs: &[Job], progress: &Progress) -> Result<(), Failure> {
+pub(super) fn run(context: &mut JobContext<'_>, jobs: &[Job], progress: &Progress) -> Result<(), Failure> {
     let mut seen: Vec<Option<Fingerprint>> = jobs.iter().map(|_| None).collect();
     loop {
         for (job, seen) in jobs.iter().zip(&mut seen) {
@@ -35,6 +36,17 @@ pub(super) fn run(context: &JobContext<'_>, jobs: &[Job], progress: &Progress) -
                 std::thread::sleep(PAUSE / 4);
             }
             *seen = Some(fingerprint(context, job));
+            // The profile and known rays are files, too.
+            match context.args.options(progress) {
+                Ok(options) => {
+                    let objects_memory = context.options.objects_memory;
+                    context.options = CompileOptions { objects_memory, ..options };
+                }
+                Err(failure) => {
+                    failure.print();
+                    continue;
+                }
+            }
             match with_threads(context.args.threads, || compile_one(context, job, progress))? {
                 Ok(done) => output::text(&format!("{}\n", done.line))?,
                 Err(Failure::Compile(bth_compile::Error::Cancelled)) => break,

@@ -100,7 +100,7 @@ fn check_object(
     let alone = builder.into_scene();
 
     monitor.stage("trace exactly", Some(starts.len() as u64));
-    let traced = trace(&alone, &starts, instance);
+    let traced = trace(&alone, &starts, instance, monitor)?;
     let world = World::new(&alone);
     let corners_of = |id: u32| all.binary_search_by_key(&id, |t| t.id).ok().map(|row| all[row].corners);
     let one = |(start, ways): (&Start, &Traced)| {
@@ -169,7 +169,16 @@ impl Traced {
 }
 
 /// Traces rays through the only instance in all ways.
-fn trace(alone: &Scene, starts: &[Start], instance: u32) -> Vec<Traced> {
+///
+/// # Errors
+/// Cancellation.
+fn trace(
+    alone: &Scene,
+    starts: &[Start],
+    instance: u32,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Traced>, Failure> {
+    let mut singles = Vec::with_capacity(starts.len());
     let rays: Vec<Ray> = starts.iter().map(|start| start.ray).collect();
     let hints: Vec<_> = starts.iter().map(|start| start.hint(instance)).collect();
     let (mut plain, mut hinted) = (vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]);
@@ -181,15 +190,19 @@ fn trace(alone: &Scene, starts: &[Start], instance: u32) -> Vec<Traced> {
         alone.batch(rays).from(hints).nearest(&mut hinted[part.clone()]);
         alone.batch(rays).any(&mut any[part.clone()]);
         alone.batch(rays).from(hints).any(&mut any_hinted[part]);
+        singles.extend(rays.iter().map(|ray| alone.nearest(ray).unwrap_or(Hit::MISS)));
+        if monitor.cancelled() {
+            return Err(Failure::Compile(Error::Cancelled));
+        }
     }
     let one = |i: usize| Traced {
         plain: plain[i],
         hinted: hinted[i],
-        single: alone.nearest(&rays[i]).unwrap_or(Hit::MISS),
+        single: singles[i],
         any: any[i],
         any_hinted: any_hinted[i],
     };
-    (0..rays.len()).map(one).collect()
+    Ok((0..rays.len()).map(one).collect())
 }
 
 /// Whether t is the exact one, rounded to f32, or the next number to that, since it is rounded to f64 before.

@@ -137,7 +137,7 @@ impl Variation {
         let tree = match &self.tree {
             BinaryTree::BuiltVariation(effort) => {
                 let (tree, mut report) = bvh::build_with(mesh, effort, &Silent)?;
-                let visits = |tree: &bvh::BinaryBvh| sampling::visits(mesh, tree);
+                let visits = |tree: &bvh::BinaryBvh| sampling::visits(mesh, tree, None);
                 bvh::rebuild_treelets(mesh, tree, effort.treelets, &visits, &mut report, &Silent)?
             }
             BinaryTree::Spatial(exponent) => {
@@ -146,7 +146,7 @@ impl Variation {
                 bvh::reinsert(tree, &passes, &mut bvh::BvhReport::default(), &Silent)?
             }
         };
-        let probabilities = self.by_visits.then(|| sampling::visits(mesh, &tree));
+        let probabilities = self.by_visits.then(|| sampling::visits(mesh, &tree, None));
         let weighed = bvh::Weighed { bvh: &tree, probabilities: probabilities.as_deref() };
         let options = CollapseOptions { plan: self.plan, costs: self.costs, ..CollapseOptions::default() };
         let (wide, report) = match self.greedy {

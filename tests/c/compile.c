@@ -103,6 +103,18 @@ int main(int argc, char **argv) {
     bth_close(scene);
     bth_free_bytes(&bytes);
 
+    /* Free directions. */
+    options.free_directions = 9;
+    CHECK(bth_compile_mesh(&mesh, &options, &bytes) == BTH_COMPILE_ERROR_ARGUMENT && strstr(bth_compile_last_error(), "9"));
+    bth_bytes plain;
+    options.free_directions = BTH_FREE_NONE;
+    CHECK(bth_compile_mesh(&mesh, &options, &plain) == BTH_COMPILE_OK);
+    options.free_directions = BTH_FREE_ALL;
+    CHECK(bth_compile_mesh(&mesh, &options, &bytes) == BTH_COMPILE_OK && bytes.length > plain.length + 12 * mesh.triangle_count);
+    bth_free_bytes(&bytes);
+    bth_free_bytes(&plain);
+    options.free_directions = BTH_FREE_NONE;
+
     /* Errors. */
     seen.cancel = 1;
     CHECK(bth_compile_mesh(&mesh, &options, &bytes) == BTH_COMPILE_ERROR_CANCELLED && !bytes.data);
@@ -117,16 +129,6 @@ int main(int argc, char **argv) {
     instances[1].mesh = 1;
     CHECK(bth_compile_scene(&mesh, 1, instances, 2, &options, &bytes) == BTH_COMPILE_ERROR_INPUT);
     CHECK(strstr(bth_compile_last_error(), "instance 1"));
-    options.free_directions = 9;
-    CHECK(bth_compile_mesh(&mesh, &options, &bytes) == BTH_COMPILE_ERROR_ARGUMENT && strstr(bth_compile_last_error(), "9"));
-    bth_bytes plain;
-    options.free_directions = BTH_FREE_NONE;
-    CHECK(bth_compile_mesh(&mesh, &options, &plain) == BTH_COMPILE_OK);
-    options.free_directions = BTH_FREE_ALL;
-    CHECK(bth_compile_mesh(&mesh, &options, &bytes) == BTH_COMPILE_OK && bytes.length > plain.length + 12 * mesh.triangle_count);
-    bth_free_bytes(&bytes);
-    bth_free_bytes(&plain);
-    options.free_directions = BTH_FREE_NONE;
     options.quality = 9;
     CHECK(bth_compile_mesh(&mesh, &options, &bytes) == BTH_COMPILE_ERROR_ARGUMENT);
     CHECK(bth_compile_mesh(NULL, NULL, &bytes) == BTH_COMPILE_ERROR_ARGUMENT);

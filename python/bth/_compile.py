@@ -92,7 +92,7 @@ def _checked(options):
             options[name] = os.fspath(options[name])
     # Numbers of scenes and animations are spelled as in the program.
     for name in ("scene", "animation"):
-        if isinstance(options.get(name), int):
+        if isinstance(options.get(name), int) and not isinstance(options[name], bool):
             options[name] = str(options[name])
     if "rays" in options:
         if not isinstance(options["rays"], (tuple, list)) or not 2 <= len(options["rays"]) <= 4:

@@ -134,12 +134,12 @@ class Hits(_OnTriangles):
         They are computed once, when they are first asked for, from the arrays of origins and directions that the query was given.
         """
         if self._position is not None:
-            return self._position
+            return self._position.copy()
         origins, directions = self._rays
         t = np.where(self.hit, self.t, np.nan).astype(np.float64)
         points = np.asarray(origins, np.float64) + t.reshape(-1)[:, None] * np.asarray(directions, np.float64)
         self._position, self._rays = points.reshape(*t.shape, 3), None
-        return self._position
+        return self._position.copy()
 
     def __len__(self):
         return len(self.t)

@@ -15,7 +15,7 @@ pub(crate) fn texture_coordinates<'py>(
     object: u32,
 ) -> PyResult<Option<Bound<'py, PyArray3<f32>>>> {
     let scene = scene.get()?;
-    crate::work::look_for_signals(py);
+    crate::work::note_thread(py);
     let corners = py.detach(|| {
         let scene = scene.read()?;
         if object >= scene.object_count() {

@@ -46,7 +46,7 @@ impl NativeScene {
         read: impl FnOnce(&bth::Scene) -> T + Send,
     ) -> PyResult<T> {
         let scene = self.0.get()?;
-        crate::work::look_for_signals(py);
+        crate::work::note_thread(py);
         py.detach(|| Ok(read(&*scene.read()?)))
     }
 

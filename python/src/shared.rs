@@ -46,7 +46,7 @@ impl OpenScene {
 
     /// As [`Self::read`], for a thread that holds the interpreter's lock.
     pub(crate) fn read_attached(&self, py: Python<'_>) -> PyResult<RwLockReadGuard<'_, bth::Scene>> {
-        work::look_for_signals(py);
+        work::note_thread(py);
         loop {
             if let Some(scene) = self.try_read() {
                 return Ok(scene);
@@ -64,7 +64,7 @@ impl OpenScene {
         jobs: Vec<J>,
         work: impl Fn(&bth::Scene, J) + Sync + Send,
     ) -> PyResult<()> {
-        work::look_for_signals(py);
+        work::note_thread(py);
         py.detach(|| {
             let guard = self.read()?;
             let scene: &bth::Scene = &guard;
@@ -82,7 +82,7 @@ impl OpenScene {
             let message = "a scene cannot be changed by a filter, nor by the handler of a signal that interrupts a call of this package";
             return Err(PyRuntimeError::new_err(message));
         }
-        work::look_for_signals(py);
+        work::note_thread(py);
         self.changing.fetch_add(1, Ordering::Relaxed);
         let result = py.detach(|| {
             // Not `write`, after whose call readers would wait, the handlers of signals too.

@@ -243,7 +243,7 @@ pub(crate) fn surface(
     let (scene, points) = (scene.get()?, points.points()?);
     let mut columns = out.columns(points.len())?;
     let with_surface = columns.needs_surface();
-    crate::work::look_for_signals(py);
+    crate::work::note_thread(py);
     py.detach(|| points.check(&*scene.read()?, with_surface))?;
     let jobs = crate::output::chunks(points.len(), |rows| columns.split_off(rows));
     scene.run(py, threads, jobs, |scene, (range, mut columns): (Range<usize>, Columns<'_>)| {
@@ -265,7 +265,7 @@ pub(crate) fn triangle_positions(
     threads: usize,
 ) -> PyResult<()> {
     let (scene, points) = (scene.get()?, points.points()?);
-    crate::work::look_for_signals(py);
+    crate::work::note_thread(py);
     py.detach(|| points.check(&*scene.read()?, true))?;
     let (rows, _) = numbers(&mut out, points.len() * 9)?.as_chunks_mut::<9>();
     let jobs: Vec<_> = rows.chunks_mut(CHUNK).zip((0..).step_by(CHUNK)).collect();

@@ -66,9 +66,9 @@ pub(crate) fn pool() -> Arc<ThreadPool> {
     new
 }
 
-/// Finds out whether handlers of signals run on this thread: on Python's main thread, which after a fork is the one that forked. To be
-/// called before [`check_signals`] by a thread that has the interpreter's lock.
-pub(crate) fn look_for_signals(py: Python<'_>) {
+/// Notes whether handlers of signals run on this thread: on Python's main thread, which after a fork is the one that forked. To be
+/// called before [`check_signals`], while the thread has the interpreter's lock.
+pub(crate) fn note_thread(py: Python<'_>) {
     let process = std::process::id();
     if HANDLES_SIGNALS.get().is_none_or(|(of, _)| of != process) {
         // Without the answer signals are looked for.
@@ -212,7 +212,7 @@ pub(crate) fn run_cancellable<T: Send>(
     look: impl Fn(Python<'_>) -> PyResult<()> + Sync + Send,
 ) -> PyResult<T> {
     let _inside = Inside::new();
-    look_for_signals(py);
+    note_thread(py);
     py.detach(|| {
         std::thread::scope(|scope| {
             let worker = scope.spawn(work);

@@ -388,6 +388,10 @@ def test_positions_stay_when_the_rays_are_moved_there(scene):
     expected = origins + hits.t[:, None] * directions
     origins[:] = hits.position
     assert np.array_equal(hits.position, expected, equal_nan=True)
+    # What is returned is the caller's own.
+    moved = hits.position
+    moved += 1
+    assert np.array_equal(hits.position, expected, equal_nan=True)
 
 
 def test_failed_saves_leave_nothing(scene, tmp_path):

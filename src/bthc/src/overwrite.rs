@@ -1,7 +1,41 @@
 //! Outputs must not replace inputs, whatever their paths are spelled like.
 
 use crate::failure::Failure;
-use std::path::Path;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// Outputs that are files already, by their real paths.
+pub(crate) struct Outputs<'a>(HashMap<PathBuf, &'a Path>);
+
+impl<'a> Outputs<'a> {
+    pub(crate) fn new(outputs: impl IntoIterator<Item = &'a Path>) -> Self {
+        // What is not there yet replaces nothing, and of devices and pipes nothing is lost.
+        let files = outputs.into_iter().filter(|output| output.is_file());
+        Self(files.filter_map(|output| Some((output.canonicalize().ok()?, output))).collect())
+    }
+
+    /// Whether there is none.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Fails if one of them would replace one of these files.
+    ///
+    /// # Errors
+    /// Wrong usage (exit code 2).
+    pub(crate) fn check<P: AsRef<Path>>(&self, inputs: impl IntoIterator<Item = P>) -> Result<(), Failure> {
+        for input in inputs {
+            let input = input.as_ref();
+            if let Some(output) = input.canonicalize().ok().and_then(|real| self.0.get(&real)) {
+                return Err(Failure::Usage {
+                    message: format!("{} would replace {}, which is read", output.display(), input.display()),
+                    hint: "name another output",
+                });
+            }
+        }
+        Ok(())
+    }
+}
 
 /// Fails if an output would replace one of these files.
 ///
@@ -11,23 +45,7 @@ pub(crate) fn check<P: AsRef<Path>>(
     output: &Path,
     inputs: impl IntoIterator<Item = P>,
 ) -> Result<(), Failure> {
-    // What is not there yet replaces nothing, and of devices and pipes nothing is lost.
-    if !std::fs::metadata(output).is_ok_and(|found| found.is_file()) {
-        return Ok(());
-    }
-    let Ok(real) = output.canonicalize() else { return Ok(()) };
-    let same = |input: &P| input.as_ref().canonicalize().is_ok_and(|input| input == real);
-    match inputs.into_iter().find(same) {
-        Some(input) => Err(Failure::Usage {
-            message: format!(
-                "{} would replace {}, which is read",
-                output.display(),
-                input.as_ref().display()
-            ),
-            hint: "name another output",
-        }),
-        None => Ok(()),
-    }
+    Outputs::new([output]).check(inputs)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Trees for rays that are known when a model is compiled: `--rays` and `--for-scene`.
 
-use crate::support::{bthc, command, folder, run_with, sphere};
+use crate::support::{bthc, command, data, folder, run_with, sphere};
 use bth::rays::{PrimitiveRef, Ray};
 use bth_random::Rng;
 use bth_scenes::knot::torus_knot;
@@ -64,6 +64,44 @@ fn rays_take_fewer_steps_through_a_tree_that_is_made_for_such_rays() {
     assert_eq!(known_hits, hits);
     assert!(hits.iter().filter(|hit| hit.is_hit()).count() > 2000);
     assert!((known_steps as f64) < 0.97 * steps as f64, "{known_steps} of {steps}");
+}
+
+/// On a scan and a room: rays from everywhere in the box towards one corner of it.
+#[test]
+fn rays_take_fewer_steps_through_real_models() {
+    let Some(data) = data() else { return };
+    for (name, most) in [("nefertiti.ply", 0.98), ("living-room.ply", 0.98)] {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let model = data.join("static").join(name).to_string_lossy().into_owned();
+        let compile = |output: &str, more: &[&str]| {
+            let args = ["compile", &model, "--free-directions", "none", "-o", output];
+            bthc(folder.path(), &[&args, more].concat()).expect(0);
+        };
+        compile("any.bth", &[]);
+        let (lower, upper) = bth::open(at("any.bth")).unwrap().bounds().unwrap();
+        let view = |seed| {
+            let mut random = Rng::new(seed);
+            let mut between = |share: [f32; 2]| -> [f32; 3] {
+                std::array::from_fn(|k| {
+                    let share = share[0] + (share[1] - share[0]) * random.unit_f32();
+                    lower[k] + share * (upper[k] - lower[k])
+                })
+            };
+            let ray = |_| {
+                let (from, to) = (between([0.6, 1.0]), between([0.3, 0.7]));
+                Ray::new(from, std::array::from_fn(|k| to[k] - from[k]))
+            };
+            (0..20_000).map(ray).collect::<Vec<Ray>>()
+        };
+        write(&at("view.rays"), &view(1));
+        compile("known.bth", &["--rays", "view.rays"]);
+        let others = view(2);
+        let ((steps, hits), (known_steps, known_hits)) =
+            (traced(&at("any.bth"), &others), traced(&at("known.bth"), &others));
+        assert_eq!(known_hits, hits, "{name}");
+        assert!((known_steps as f64) < most * steps as f64, "{name}: {known_steps} of {steps}");
+    }
 }
 
 #[test]

@@ -19,12 +19,12 @@ use std::path::Path;
 /// Versions of the results of the stages.
 const MESH: &str = "3";
 const COORDINATES: &str = "1";
-const BVH: &str = "2";
-const FREE: &str = "5";
+const BVH: &str = "3";
+const FREE: &str = "6";
 const MARKS: &str = "1";
-const COSTS: &str = "3";
+const COSTS: &str = "4";
 const TETS: &str = "1";
-const COLLAPSE: &str = "2";
+const COLLAPSE: &str = "3";
 const OPACITY: &str = "1";
 const NAMES: &str = "1";
 const MATERIALS: &str = "2";

@@ -61,21 +61,16 @@ const ESTIMATED_BY: usize = 64;
 
 /// The rays, or so many of them, evenly spaced, as enter no more nodes than a stage has time for. Where many triangles lie in one place,
 /// each ray enters the nodes of all.
-pub(crate) fn affordable(mesh: &Mesh, bvh: &BinaryBvh, mut rays: Vec<SampleRay>) -> Vec<SampleRay> {
+pub(crate) fn affordable(mesh: &Mesh, bvh: &BinaryBvh, rays: Vec<SampleRay>) -> Vec<SampleRay> {
     let spaced = rays.iter().step_by(rays.len().div_ceil(ESTIMATED_BY).max(1));
     let (count, entered) = spaced.fold((0u64, 0u64), |(count, entered), ray| {
         (count + 1, entered + u64::from(walk(mesh, bvh, ray, |_| ()).visits))
     });
     let all = entered / count.max(1) * rays.len() as u64;
-    if all > MOST_ENTERED {
-        let step = usize::try_from(all.div_ceil(MOST_ENTERED)).unwrap_or(usize::MAX);
-        let mut at = 0;
-        rays.retain(|_| {
-            at += 1;
-            (at - 1) % step == 0
-        });
+    match usize::try_from(all.div_ceil(MOST_ENTERED)).unwrap_or(usize::MAX) {
+        0 | 1 => rays,
+        step => rays.into_iter().step_by(step).collect(),
     }
-    rays
 }
 
 /// t of the intersection of a ray and a triangle within (0, best] (Möller and Trumbore 1997, "Fast, Minimum Storage

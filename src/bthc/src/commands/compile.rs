@@ -7,7 +7,7 @@ use super::{deliver, depfile, dry_run, jobs, scene, watch};
 use crate::args::Compile;
 use crate::failure::Failure;
 use crate::output;
-use crate::overwrite;
+use crate::overwrite::{self, Outputs};
 use crate::progress::{Progress, Quiet};
 use bth_compile::Monitor;
 use bth_compile::pipeline::CompileOptions;
@@ -109,15 +109,14 @@ fn check_outputs(context: &JobContext<'_>, jobs: &[Job]) -> Result<(), Failure> 
         overwrite::check(depfile, &outputs)?;
     }
     // What refers to other files is read only where an output is there already.
-    if !outputs.iter().copied().chain(depfile).any(Path::is_file) {
+    let there = Outputs::new(outputs.iter().copied().chain(depfile));
+    if there.is_empty() {
         return Ok(());
     }
     for job in jobs {
         // A source that cannot be read is reported when it is compiled.
         let inputs = depfile::inputs(context, job).unwrap_or_else(|_| vec![job.model.clone()]);
-        for output in outputs.iter().copied().chain(depfile) {
-            overwrite::check(output, &inputs)?;
-        }
+        there.check(&inputs)?;
     }
     Ok(())
 }

@@ -1,10 +1,13 @@
 //! Trees for rays that are known when a model is compiled: `--rays` and `--for-scene`.
 
-use crate::support::{bthc, command, data, folder, run_with, sphere};
+use crate::support::{bthc, command, data, folder, run_with, sphere, wait};
 use bth::rays::{PrimitiveRef, Ray};
 use bth_random::Rng;
 use bth_scenes::knot::torus_knot;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
+use std::process::Stdio;
+use std::time::Duration;
 
 /// Rays at the middle of a model from one side of it, a point and a direction apart for each seed.
 fn view(count: usize, seed: u64) -> Vec<Ray> {
@@ -124,6 +127,28 @@ fn the_cache_and_dependencies_tell_files_for_other_rays_apart() {
     }
     let dependencies = std::fs::read_to_string(path.join("ball.d")).unwrap();
     assert_eq!(dependencies, "ball.bth: \\\n  ball.obj \\\n  a.rays\n");
+}
+
+#[cfg(unix)]
+#[test]
+fn watching_heeds_new_rays() {
+    let folder = folder(&[("ball.obj", &sphere(48))]);
+    let path = folder.path();
+    write(&path.join("a.rays"), &view(2000, 1));
+    let args = ["compile", "ball.obj", "--rays", "a.rays", "--free-directions", "none"];
+    let mut child = command("bthc", path, &[&args[..], &["--watch"]].concat());
+    let mut child = child.stdout(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    assert!(lines.next().unwrap().unwrap().starts_with("ball.bth  compiled"));
+    let others: Vec<Ray> = view(3000, 2).into_iter().map(|ray| Ray { tmax: 9.0, ..ray }).collect();
+    write(&path.join("a.rays"), &others);
+    assert!(lines.next().unwrap().unwrap().starts_with("ball.bth  compiled"));
+    let sent = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(sent.unwrap().success());
+    assert_eq!(wait(&mut child, Duration::from_secs(20)).expect("Ctrl-C ends it").code(), Some(130));
+    bthc(path, &[&args[..], &["-o", "expected.bth"]].concat()).expect(0);
+    let read = |name: &str| std::fs::read(path.join(name)).unwrap();
+    assert!(read("ball.bth") == read("expected.bth"));
 }
 
 #[test]

@@ -276,3 +276,9 @@ fn conditions_of_a_batch_are_those_of_its_rays() {
     }
     assert!(some_hits > rays.len() / 4 && some_hits < rays.len(), "{some_hits}");
 }
+
+/// A hit a little behind the origin is rounded to t = 0 where coordinates are tiny beside directions.
+#[test]
+fn hits_that_are_rounded_to_the_origin_are_found_through_tetrahedra() {
+    check(&scaled(torus_knot(360), 1e-40, [0.0; 3]), Structure::Tets, 500, 6);
+}

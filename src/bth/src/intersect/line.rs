@@ -146,7 +146,20 @@ impl Line {
 
     /// Lower bound of the t at which the line crosses a triangle that it certainly crosses, given the error of the projected
     /// coordinates.
-    pub(crate) fn t_before(&self, [a, b, c]: [&Projected; 3], error: f64) -> f64 {
+    pub(crate) fn t_before(&self, corners: [&Projected; 3], error: f64) -> f64 {
+        let (depth, shift) = Self::depth_of_crossing(corners, error);
+        depth * self.inverse_depth - shift * self.inverse_depth.abs()
+    }
+
+    /// Upper bound of that t.
+    pub(crate) fn t_after(&self, corners: [&Projected; 3], error: f64) -> f64 {
+        let (depth, shift) = Self::depth_of_crossing(corners, error);
+        depth * self.inverse_depth + shift * self.inverse_depth.abs()
+    }
+
+    /// The depth at which the line crosses a triangle that it certainly crosses, and a bound of its error.
+    #[inline(always)]
+    fn depth_of_crossing([a, b, c]: [&Projected; 3], error: f64) -> (f64, f64) {
         let weight = [cross(b, c), cross(c, a), cross(a, b)];
         let bound = 4.0 * error * (a.size() + b.size() + c.size() + error);
         let sum = weight[0] + weight[1] + weight[2];
@@ -156,6 +169,6 @@ impl Line {
         // than 2^-48 of the greatest |depth|.
         let shift =
             2.0 * farthest * (4.0 * bound / (sum.abs() - 4.0 * bound).max(0.0)) + farthest * RATIO_ERROR;
-        depth * self.inverse_depth - shift * self.inverse_depth.abs()
+        (depth, shift)
     }
 }

@@ -12,6 +12,9 @@ use bth_format::layout::{FACE_BIT, TetFace};
 const MAX_STEPS: u32 = 64;
 /// Bound of the error of [`side_of_plane`] relative to the sum of the absolute products: 8 roundings of 2^-53, doubled.
 const PLANE_ERROR: f64 = 16.0 / (1u64 << 53) as f64;
+/// A triangle that is crossed at a t between this and 0 behind the origin may count as hit at t = 0, to which f32 rounds it. Any value from 2^-150
+/// on is correct.
+const LEAST_T: f64 = f32::MIN_POSITIVE as f64;
 
 /// The side of the plane through a, b and c on which `point` lies, in object space; positive in the direction of (b-a)×(c-a).
 fn side_of_plane([a, b, c]: [[f32; 3]; 3], point: [f64; 3]) -> Sign {
@@ -79,7 +82,7 @@ impl TetWalker<'_> {
     }
 
     /// The position in `tet` at the face through which the line enters it: the face whose three edges the line passes on the
-    /// positive side. `None` if no face certainly is that one.
+    /// positive side. `None` if no face certainly is that one, or if a triangle before the face might be hit at a t that is rounded to 0.
     fn entry_of_line(&self, tet: u32, vertex: [u32; 4], entered: &Entered) -> Option<TetPosition> {
         let projected: [Projected; 4] = vertex.map(|v| self.project(v));
         for (apex, indices) in FACES.iter().enumerate() {
@@ -91,6 +94,9 @@ impl TetWalker<'_> {
                 true => entered.behind,
                 false => self.records.link(tet, entered, vertex[apex]).next,
             };
+            if !(self.line.t_after(corner.each_ref(), self.error) < -LEAST_T) {
+                return None;
+            }
             let entered = Entered { face: indices.map(|i| vertex[i]), apex: vertex[apex], behind };
             return Some(TetPosition { tet, entered, corner });
         }

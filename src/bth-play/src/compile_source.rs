@@ -2,8 +2,12 @@
 //! are mapped.
 
 use crate::failure::Failure;
+use crate::interrupt::Part;
+use crate::messages;
 use bth_cache::{DEFAULT_CAP, Digest, Pin, Store};
-use std::path::Path;
+use serde_json::Value;
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// Extensions of the files that `bthc` compiles.
@@ -15,76 +19,150 @@ pub(crate) fn is_source(path: &Path) -> bool {
     extension.is_some_and(|e| SOURCES.contains(&e.as_str()))
 }
 
-/// The compiled file of a scene or model in the cache, checked; compiled now if the cache lacks it. The cache does not evict it
-/// while the returned pin lives. With `materials` it is compiled with these and with holes by alpha, or without where its
-/// materials cannot be read.
-///
-/// # Errors
-/// If the manifest is malformed, the source cannot be compiled, or the cache cannot be used.
-pub(crate) fn compiled(source: &Path, cache: Option<&Path>, materials: bool) -> Result<Pin, Failure> {
-    // Read here, too, since the errors of this reader have their own codes, with line and column.
-    if source
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("manifest") || e.eq_ignore_ascii_case("toml"))
-    {
-        bth_scene::read(source)?;
-    }
-    let failed = |(message, exit): (String, u8)| Failure::Source {
-        path: source.into(),
-        message,
-        exit,
-        hint: format!("run: bthc compile {} -o scene.bth, then play scene.bth", source.display()),
-    };
-    let folder = cache.map(Path::to_owned).or_else(bth_cache::folder);
-    let folder = folder.ok_or_else(|| {
-        failed(("there is no folder for the cache; BTH_CACHE_DIR or --cache-dir names one".to_owned(), 3))
-    })?;
-    let store = Store::open(&folder, DEFAULT_CAP)
-        .map_err(|e| Failure::File { path: folder.clone(), message: format!("cannot be the cache: {e}") })?;
-    // An entry that is damaged, or evicted before it is pinned, is compiled again.
-    for _ in 0..3 {
-        let key = match compile(source, &folder, materials) {
-            Err((_, 3 | 4)) if materials => {
-                let plain = compile(source, &folder, false).map_err(&failed)?;
-                let what = "its materials cannot be read, as above; it is shown without them";
-                crate::messages::warn(&format!("{}: {what}", source.display()));
-                plain
-            }
-            key => key.map_err(&failed)?,
-        };
-        let pin = store.find_id(&key).and_then(|record| store.pin(&record));
-        store.take_notes().iter().for_each(|note| crate::messages::warn(note));
-        if let Some(pin) = pin {
-            return Ok(pin);
-        }
-    }
-    Err(failed(("the compiled file does not stay in the cache".to_owned(), 3)))
+/// A compiled source.
+pub(crate) struct Compiled {
+    /// The compiled file, which the cache does not evict while this lives.
+    pub(crate) pin: Pin,
+    /// All files that were read for it.
+    pub(crate) inputs: Vec<PathBuf>,
+    /// The cache where there is none that stays; it is removed with this.
+    _folder: Option<TemporaryCache>,
 }
 
-/// Runs `bthc` to compile into the cache. Returns the key of the entry, or what failed and the exit code for it.
-fn compile(source: &Path, cache: &Path, materials: bool) -> Result<Digest, (String, u8)> {
+/// A cache that is removed at the end, also when the program is interrupted.
+struct TemporaryCache {
+    _part: Part,
+    folder: tempfile::TempDir,
+}
+
+impl TemporaryCache {
+    fn new() -> Result<Self, Failure> {
+        let folder = tempfile::Builder::new().prefix("bth-play-").tempdir();
+        let folder = folder.map_err(|e| Failure::file(&std::env::temp_dir(), &e))?;
+        Ok(TemporaryCache { _part: Part::new(folder.path()), folder })
+    }
+}
+
+/// The compiled file of a scene or model in the cache, checked; compiled now if the cache lacks it. With `materials` it is compiled with
+/// these and with holes by alpha, or without where its materials cannot be read. Where `BTH_NO_CACHE` is set and no folder is given, the cache
+/// is a temporary one.
+///
+/// # Errors
+/// If the source cannot be compiled, or the cache cannot be used.
+pub(crate) fn compiled(source: &Path, cache: Option<&Path>, materials: bool) -> Result<Compiled, Failure> {
+    let failed = |message: &str| Failure::Source { path: source.into(), message: message.to_owned() };
+    let is_off = std::env::var_os("BTH_NO_CACHE").is_some_and(|value| !value.is_empty());
+    let temporary = if is_off && cache.is_none() { Some(TemporaryCache::new()?) } else { None };
+    let folder = match &temporary {
+        Some(temporary) => Some(temporary.folder.path().to_owned()),
+        None => cache.map(Path::to_owned).or_else(bth_cache::folder),
+    };
+    let folder = folder
+        .ok_or_else(|| failed("there is no folder for the cache; BTH_CACHE_DIR or --cache-dir names one"))?;
+    let store = Store::open(&folder, DEFAULT_CAP)
+        .map_err(|e| Failure::file(&folder, &format!("cannot be the cache: {e}")))?;
+    // An entry that is damaged, or evicted before it is pinned, is compiled again.
+    for _ in 0..3 {
+        let done = match compile(source, &folder, materials) {
+            Err(with) if materials && with.is_of_source() => {
+                let done = compile(source, &folder, false)?;
+                let what = "its materials cannot be read, so it is shown without them";
+                messages::warn(&format!("{}: {what}: {with}", source.display()));
+                done
+            }
+            done => done?,
+        };
+        let pin = store.find_id(&done.key).and_then(|record| store.pin(&record));
+        store.take_notes().iter().for_each(|note| messages::warn(note));
+        if let Some(pin) = pin {
+            return Ok(Compiled { pin, inputs: done.inputs, _folder: temporary });
+        }
+    }
+    Err(failed("the compiled file does not stay in the cache"))
+}
+
+/// What `bthc` made.
+struct Done {
+    /// Key of the entry.
+    key: Digest,
+    /// All files that it read.
+    inputs: Vec<PathBuf>,
+}
+
+/// Why `bthc` made nothing.
+enum CompileError {
+    /// It could not be run.
+    Started(Failure),
+    /// What it reported as JSON, and its exit code.
+    Reported(Value, u8),
+}
+
+impl CompileError {
+    /// Whether something that is read is at fault.
+    fn is_of_source(&self) -> bool {
+        matches!(self, CompileError::Reported(_, 3 | 4))
+    }
+}
+
+impl From<CompileError> for Failure {
+    fn from(error: CompileError) -> Failure {
+        match error {
+            CompileError::Started(failure) => failure,
+            CompileError::Reported(error, exit) => Failure::Compiler { error, exit },
+        }
+    }
+}
+
+impl std::fmt::Display for CompileError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            CompileError::Started(_) => Ok(()),
+            CompileError::Reported(error, _) => write!(f, "{}", crate::failure::text_of(error)),
+        }
+    }
+}
+
+/// Runs `bthc` to compile into the cache. It ends when this program does, however that ends, since its standard input is closed then.
+fn compile(source: &Path, cache: &Path, materials: bool) -> Result<Done, CompileError> {
+    let failed = |message: String| CompileError::Started(Failure::Source { path: source.into(), message });
     let bthc = std::env::current_exe()
         .ok()
         .map(|exe| exe.with_file_name(format!("bthc{}", std::env::consts::EXE_SUFFIX)))
         .filter(|bthc| bthc.is_file());
     let Some(bthc) = bthc else {
-        return Err(("it is not compiled yet, and there is no bthc beside this program".to_owned(), 3));
+        return Err(failed("it is not compiled yet, and there is no bthc beside this program".to_owned()));
     };
+    if std::io::stderr().is_terminal() {
+        messages::note(&format!("compiling {}", source.display()));
+    }
     let mut command = Command::new(&bthc);
-    command.arg("compile").arg(source).arg("--in-cache").arg("--cache-dir").arg(cache).arg("--json");
+    command.arg("compile").args(["--in-cache", "--json", "--end-with-input", "--cache-dir"]).arg(cache);
     if materials {
         command.args(["--materials", "--alpha", "mask"]);
     }
-    let output = command.stdin(Stdio::null()).stderr(Stdio::inherit()).output();
-    let output = match output {
-        Ok(output) => output,
-        Err(e) => return Err((format!("{} cannot be started: {e}", bthc.display()), 3)),
-    };
-    if !output.status.success() {
-        let exit = if output.status.code() == Some(4) { 4 } else { 3 };
-        return Err((format!("{} ended with {}", bthc.display(), output.status), exit));
+    command.arg("--").arg(source).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let started = command.spawn().and_then(|mut child| {
+        let _open_until_it_ends = child.stdin.take();
+        child.wait_with_output()
+    });
+    let output = started.map_err(|e| failed(format!("{} cannot be started: {e}", bthc.display())))?;
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    let mut json: Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
+    let reported = json["error"].take();
+    // An error that is reported as JSON is not printed twice.
+    let is_new = |line: &&str| reported.is_null() || !line.starts_with("error: ");
+    stderr.lines().filter(is_new).for_each(messages::note);
+    match (reported, output.status.code().and_then(|code| u8::try_from(code).ok())) {
+        (error @ Value::Object(_), Some(exit)) => return Err(CompileError::Reported(error, exit)),
+        _ if !output.status.success() => {
+            return Err(failed(format!("{} ended with {}", bthc.display(), output.status)));
+        }
+        _ => {}
     }
-    let json: Option<serde_json::Value> = serde_json::from_slice(&output.stdout).ok();
-    let key = json.as_ref().and_then(|json| Digest::parse(json["cache"]["key"].as_str()?));
-    key.ok_or_else(|| (format!("{} did not name the entry of the compiled file", bthc.display()), 3))
+    let key = json["cache"]["key"].as_str().and_then(Digest::parse);
+    let inputs = json["inputs"].as_array().into_iter().flatten().filter_map(|path| path.as_str());
+    match key {
+        Some(key) => Ok(Done { key, inputs: inputs.map(PathBuf::from).collect() }),
+        None => Err(failed(format!("{} did not name the entry of the compiled file", bthc.display()))),
+    }
 }

@@ -1,8 +1,9 @@
 //! Errors: messages, codes, and exit codes.
 
-use serde_json::json;
+use serde_json::{Value, json};
+use std::fmt::Display;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Why there is no picture.
@@ -14,10 +15,10 @@ pub(crate) enum Failure {
     Runtime(bth::Error),
     /// A compiled file that lacks what the mode needs (exit code 3).
     Lacks { file: PathBuf, what: &'static str, hint: &'static str },
-    /// A scene manifest that does not follow the format (exit code 3, or 4 when it could not be read).
-    BadManifest(bth_scene::Error),
-    /// A scene or model that could not be compiled (exit code 3, or 4 when it could not be read).
-    Source { path: PathBuf, message: String, hint: String, exit: u8 },
+    /// What `bthc` reported as JSON of a scene or model that it could not compile, and its exit code.
+    Compiler { error: Value, exit: u8 },
+    /// A scene or model for which `bthc` could not be run (exit code 3).
+    Source { path: PathBuf, message: String },
     /// A picture of the surroundings that cannot be used (exit code 3) or read (exit code 4).
     Environment { path: PathBuf, message: String, exit: u8 },
     /// The picture could not be written (exit code 4).
@@ -33,7 +34,7 @@ impl From<std::io::Error> for Failure {
     fn from(error: std::io::Error) -> Self {
         match error.kind() {
             std::io::ErrorKind::BrokenPipe => Self::ClosedOutput,
-            _ => Self::File { path: "standard output".into(), message: error.to_string() },
+            _ => Self::file(Path::new("standard output"), &error),
         }
     }
 }
@@ -44,59 +45,92 @@ impl From<bth::Error> for Failure {
     }
 }
 
-impl From<bth_scene::Error> for Failure {
-    fn from(error: bth_scene::Error) -> Self {
-        Self::BadManifest(error)
-    }
-}
-
 impl Failure {
-    fn parts(&self) -> (&str, u8, String) {
-        match self {
-            Self::Usage(message) => ("BTH-U001", 2, format!("BTH-U001: {message}")),
-            Self::Runtime(error) => (
-                error.code().as_str(),
-                if error.code() == bth::Code::Read { 4 } else { 3 },
-                error.to_string(),
-            ),
-            Self::BadManifest(error) => {
-                let exit = if error.code == bth_scene::error::code::READ { 4 } else { 3 };
-                (error.code, exit, error.to_string())
+    /// A file or folder that could not be written.
+    pub(crate) fn file(path: &Path, message: &dyn Display) -> Self {
+        Self::File { path: path.into(), message: message.to_string() }
+    }
+
+    /// The error as JSON, with `code`, `message` and where known `place` and `hint`, as those of `bthc`; and the exit code. `None` if it is no
+    /// error.
+    fn json(&self) -> Option<(Value, u8)> {
+        let found = match self {
+            Self::Usage(message) => {
+                (json!({"code": "BTH-U001", "message": message, "hint": "see bth-play --help"}), 2)
             }
-            Self::Source { path, message, hint, exit } => {
-                ("BTH-P003", *exit, format!("{}: BTH-P003: {message} (hint: {hint})", path.display()))
+            Self::Runtime(error) => {
+                let error_json = json!({
+                    "code": error.code().as_str(),
+                    "place": error.path().map(|p| p.to_string_lossy()),
+                    "byte": error.offset(),
+                    "message": error.to_string(),
+                    "expected": error.expected(),
+                    "found": error.found(),
+                    "hint": error.hint(),
+                });
+                (error_json, if error.code() == bth::Code::Read { 4 } else { 3 })
+            }
+            Self::Compiler { error, exit } => (error.clone(), *exit),
+            Self::Source { path, message } => {
+                let hint = "compile it with bthc compile, and play the compiled file";
+                (located("BTH-P003", path, message, hint), 3)
             }
             Self::Environment { path, message, exit } => {
                 let hint = "--env takes a picture in Radiance format (.hdr) over longitude and latitude; without it there is a sky";
-                ("BTH-P006", *exit, format!("{}: BTH-P006: {message} (hint: {hint})", path.display()))
+                (located("BTH-P006", path, message, hint), *exit)
             }
-            Self::Lacks { file, what, hint } => {
-                ("BTH-P001", 3, format!("{}: BTH-P001: {what} (hint: {hint})", file.display()))
-            }
+            Self::Lacks { file, what, hint } => (located("BTH-P001", file, what, hint), 3),
             Self::File { path, message } => {
-                ("BTH-P002", 4, format!("{}: BTH-P002: {message}", path.display()))
+                let hint = "name a place where files can be written and that has room";
+                (located("BTH-P002", path, message, hint), 4)
             }
             Self::Window(message) => {
                 let hint = "a window needs a display (DISPLAY or WAYLAND_DISPLAY) and the libraries libX11, libXcursor, libXi and libxkbcommon-x11; -o writes pictures without";
-                ("BTH-P004", 4, format!("BTH-P004: {message} (hint: {hint})"))
+                (json!({"code": "BTH-P004", "message": message, "hint": hint}), 4)
             }
-            Self::ClosedOutput => ("", 0, String::new()),
-        }
+            Self::ClosedOutput => return None,
+        };
+        Some(found)
     }
 
     /// Prints the error, with `--json` as an object too, and returns the exit code.
     pub(crate) fn report(&self, wants_json: bool) -> ExitCode {
-        let (code, exit_code, message) = self.parts();
-        if exit_code != 0 {
-            // Where the outputs are closed, the exit code is all that can be reported.
-            let _ = writeln!(std::io::stderr().lock(), "error: {message}");
-            if wants_json {
-                let error = json!({"error": {"code": code, "message": message, "exit_code": exit_code}});
-                let _ = writeln!(std::io::stdout().lock(), "{error:#}");
-            }
+        let Some((mut error, exit_code)) = self.json() else { return ExitCode::SUCCESS };
+        // Where the outputs are closed, the exit code is all that can be reported.
+        let _ = writeln!(std::io::stderr().lock(), "error: {}", text_of(&error));
+        if wants_json {
+            error["exit_code"] = exit_code.into();
+            let _ = writeln!(std::io::stdout().lock(), "{:#}", json!({ "error": error }));
         }
         ExitCode::from(exit_code)
     }
+}
+
+fn located(code: &str, path: &Path, message: &str, hint: &str) -> Value {
+    json!({"code": code, "place": path.to_string_lossy(), "message": message, "hint": hint})
+}
+
+/// An error as a line of text: place, code, message and hint.
+pub(crate) fn text_of(error: &Value) -> String {
+    let field = |name: &str| error[name].as_str().unwrap_or_default();
+    let (code, message) = (field("code"), field("message"));
+    // The messages of the runtime name everything.
+    if message.contains(code) {
+        return message.to_owned();
+    }
+    let mut text = String::new();
+    if !field("place").is_empty() {
+        text += field("place");
+        for part in [&error["line"], &error["column"]].iter().filter_map(|part| part.as_u64()) {
+            text += &format!(":{part}");
+        }
+        text += ": ";
+    }
+    text += &format!("{code}: {message}");
+    if !field("hint").is_empty() {
+        text += &format!(" (hint: {})", field("hint"));
+    }
+    text
 }
 
 /// Reports a wrong command line, or shows help or the version.

@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Exit code of a program that was cancelled.
 const CANCELLED: i32 = 130;
 
-/// The temporary files that are being written.
+/// The temporary files that are being written, and temporary folders.
 static PARTS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 fn parts() -> MutexGuard<'static, Vec<PathBuf>> {
@@ -19,7 +19,7 @@ pub(crate) fn listen(json: bool) {
     let _ = ctrlc::set_handler(move || {
         // Kept locked, so that no other file begins.
         let parts = parts();
-        parts.iter().for_each(|part| drop(std::fs::remove_file(part)));
+        parts.iter().for_each(|part| remove(part));
         if json {
             let error =
                 serde_json::json!({"code": "BTH-C000", "message": "cancelled", "exit_code": CANCELLED});
@@ -30,18 +30,26 @@ pub(crate) fn listen(json: bool) {
     });
 }
 
-/// A temporary file that is removed when the program is interrupted while this lives.
-pub(crate) struct Part<'a>(&'a Path);
+fn remove(part: &Path) {
+    // What cannot be removed stays; there is nobody to tell.
+    let _ = match part.is_dir() {
+        true => std::fs::remove_dir_all(part),
+        false => std::fs::remove_file(part),
+    };
+}
 
-impl<'a> Part<'a> {
-    pub(crate) fn new(path: &'a Path) -> Self {
+/// A temporary file or folder that is removed when the program is interrupted while this lives.
+pub(crate) struct Part(PathBuf);
+
+impl Part {
+    pub(crate) fn new(path: &Path) -> Self {
         parts().push(path.to_owned());
-        Part(path)
+        Part(path.to_owned())
     }
 }
 
-impl Drop for Part<'_> {
+impl Drop for Part {
     fn drop(&mut self) {
-        parts().retain(|part| part != self.0);
+        parts().retain(|part| *part != self.0);
     }
 }

@@ -21,7 +21,7 @@ mod window;
 
 use clap::{CommandFactory, Parser};
 use failure::Failure;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -54,16 +54,17 @@ fn run(args: &args::Args) -> Result<(), Failure> {
     isa.map_err(|error| Failure::Usage(error.to_string()))?;
     interrupt::listen(args.json);
     let file = args.file()?;
-    check_output(args, file)?;
     // Keeps the entry from being evicted from the cache until the end of the program.
-    let pinned;
+    let compiled;
+    let mut inputs: Vec<PathBuf> = [file.to_owned()].into_iter().chain(args.env.clone()).collect();
     let (file, mut scene) = if compile_source::is_source(file) {
-        pinned = compile_source::compiled(
+        compiled = compile_source::compiled(
             file,
             args.cache_dir.as_deref(),
             args.window || args.mode.shows_materials(),
         )?;
-        (pinned.path.as_path(), open(&pinned.path, true)?)
+        inputs.extend(compiled.inputs.iter().cloned());
+        (compiled.pin.path.as_path(), open(&compiled.pin.path, true)?)
     } else {
         (file, open(file, args.map)?)
     };
@@ -76,21 +77,9 @@ fn run(args: &args::Args) -> Result<(), Failure> {
         return show_window(&mut scene, file, args, &pool);
     }
     let output = args.output()?;
-    let (report, quiet) = pool.install(|| render::render_sequence(&mut scene, file, output, args))?;
+    let (report, quiet) =
+        pool.install(|| render::render_sequence(&mut scene, file, output, &inputs, args))?;
     report::show(args, &scene, file, &report, threads, quiet)
-}
-
-/// Fails if the output would replace the file that is played, whatever its path is spelled like.
-fn check_output(args: &args::Args, file: &Path) -> Result<(), Failure> {
-    let Some(output) = args.output().ok().filter(|output| output.is_file()) else { return Ok(()) };
-    match (output.canonicalize(), file.canonicalize()) {
-        (Ok(output), Ok(file)) if output == file => {
-            let message =
-                format!("{} would replace the file that is played: name another output", output.display());
-            Err(Failure::Usage(message))
-        }
-        _ => Ok(()),
-    }
 }
 
 fn show_window(

@@ -87,7 +87,8 @@ pub(crate) fn show(
 
 /// Seconds and rays of all frames.
 fn totals(report: &Report) -> (f64, f64) {
-    let sum = |field: fn(&FrameReport) -> f64| report.frames.iter().map(field).sum::<f64>();
+    let sum =
+        |field: fn(&FrameReport) -> f64| report.frames.iter().map(field).fold(0.0, |sum, value| sum + value);
     (sum(|f| f.summary.seconds), sum(|f| (f.summary.nearest_rays + f.summary.any_rays) as f64))
 }
 

@@ -21,3 +21,8 @@ pub(crate) fn json(value: &impl Serialize) -> Result<()> {
 pub(crate) fn error(message: &str) {
     let _ = writeln!(std::io::stderr().lock(), "error: {message}");
 }
+
+/// Prints a warning.
+pub(crate) fn warning(message: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "warning: {message}");
+}

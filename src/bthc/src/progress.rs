@@ -19,6 +19,15 @@ pub(crate) fn listen_for_interrupts() {
     });
 }
 
+/// Stops the compilation cleanly when standard input ends.
+pub(crate) fn end_with_input() {
+    std::thread::spawn(|| {
+        // An error is an end, too.
+        let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+        CANCELLED.store(true, Ordering::Relaxed);
+    });
+}
+
 /// Units per second, without decimals.
 fn whole_rate(state: &ProgressState, out: &mut dyn std::fmt::Write) {
     // An error of the writer does not stop the bar.

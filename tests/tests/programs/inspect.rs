@@ -1,6 +1,6 @@
 //! `bthc info`, `verify`, `marks` and `diff`: what they report about files and models.
 
-use crate::support::{bthc, crossing, folder, run, sphere};
+use crate::support::{bthc, crossing, folder, obj, run, sphere, sphere_mesh};
 use bth_format::layout::{FreeBins, kind};
 use bth_scenes::knot::torus_knot;
 use bth_tests::conformance::{Editor, Seal};
@@ -71,6 +71,38 @@ fn verify_deep_finds_what_a_file_knows_wrongly() {
         bthc(folder.path(), &["verify", "--deep", "--rays", "2000", "knot.bth", "--json"]).expect(1).json();
     assert_eq!(wrong["verified"], false);
     assert!(wrong["deep"]["wrong"].as_u64().is_some_and(|wrong| wrong > 100), "{wrong:#}");
+}
+
+/// Rays must be sampled from the triangles that are traced: those of the poses, which here are far apart.
+#[test]
+fn verify_deep_traces_objects_that_deform_in_their_poses() {
+    let (positions, faces) = sphere_mesh(8);
+    let moved: Vec<_> = positions.iter().map(|[x, y, z]| [x + 100.0, 3.0 * y, *z]).collect();
+    let manifest = r#"version = 1
+frames = { first = 0, last = 1, rate = 1 }
+objects = [{ name = "o", sequence = "f_#.obj" }]
+nodes = [{ name = "o", object = "o" }]
+"#;
+    let folder = folder(&[
+        ("f_0.obj", &obj(&positions, &faces)),
+        ("f_1.obj", &obj(&moved, &faces)),
+        ("s.manifest", manifest),
+    ]);
+    bthc(folder.path(), &["compile", "s.manifest"]).expect(0);
+    let deep =
+        bthc(folder.path(), &["verify", "--deep", "--rays", "900", "s.bth", "--json"]).expect(0).json();
+    let count = |name: &str| deep["deep"][name].as_u64().unwrap();
+    assert!(count("hits") > 250 && count("rays") >= 900 && count("wrong") == 0, "{deep:#}");
+}
+
+#[test]
+fn verify_deep_says_what_reaches_too_far_for_an_instance() {
+    let far = f32::MAX;
+    let model = obj(&[[far, far, far], [-far, 0.0, far], [0.0, -far, -far]], &[[0, 1, 2]]);
+    let folder = folder(&[("far.obj", &model)]);
+    bthc(folder.path(), &["compile", "far.obj"]).expect(0);
+    let run = bthc(folder.path(), &["verify", "--deep", "far.bth"]).expect(0);
+    assert!(run.stderr.contains("object 0 is not traced") && run.stderr.contains("BTH-S002"), "{run:?}");
 }
 
 #[test]

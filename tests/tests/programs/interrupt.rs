@@ -61,6 +61,29 @@ fn interrupted_compilation_exits_130_and_leaves_nothing() {
     assert!(interrupted > 0, "no interrupt met the compiler at work");
 }
 
+#[test]
+fn compilation_ends_with_its_input_where_that_is_asked_for() {
+    let folder = folder(&[("ball.obj", &sphere(160))]);
+    let mut ended = 0;
+    for milliseconds in [0, 40, 80, 120, 160, 200] {
+        let args = ["compile", "ball.obj", "--quiet", "--quality", "best", "--end-with-input"];
+        let mut child = command("bthc", folder.path(), &args);
+        let mut child = child.stdin(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(milliseconds));
+        drop(child.stdin.take());
+        let status = wait(&mut child, Duration::from_secs(60)).expect("ends soon after its input");
+        if status.code() == Some(130) {
+            ended += 1;
+            assert_eq!(litter(folder.path(), &["ball.obj"]), [""; 0]);
+        } else {
+            assert!(status.success(), "{status:?}");
+            check_output(folder.path());
+            let _ = std::fs::remove_file(folder.path().join("ball.bth"));
+        }
+    }
+    assert!(ended > 0, "no end of the input met the compiler at work");
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupted_player_exits_130_and_leaves_nothing() {

@@ -14,6 +14,7 @@ mod materials;
 mod mistakes;
 mod pipelines;
 mod play;
+mod play_files;
 mod previous;
 #[cfg(unix)]
 mod recipes;

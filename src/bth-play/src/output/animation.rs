@@ -15,8 +15,8 @@ pub(crate) struct Animation {
 
 enum Encoder {
     Apng(Box<png::Writer<SharedBytes>>, SharedBytes),
-    /// With the duration of a frame in hundredths of a second.
-    Gif(Box<gif::Encoder<Vec<u8>>>, u16),
+    /// With the number of the next frame and the rate in frames per second.
+    Gif(Box<gif::Encoder<Vec<u8>>>, u32, f64),
     Y4m(Box<y4m::Y4mEncoder<Vec<u8>>>),
 }
 
@@ -56,16 +56,22 @@ impl Animation {
         Ok(Some(Animation { path: path.into(), size, encoder }))
     }
 
+    /// Where it is written.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Adds the next frame.
     pub(super) fn add(&mut self, picture: &Picture) -> Result<(), Failure> {
         let result = match &mut self.encoder {
             Encoder::Apng(writer, _) => {
                 writer.write_image_data(picture.pixels.as_flattened()).map_err(|e| e.to_string())
             }
-            Encoder::Gif(encoder, delay) => {
+            Encoder::Gif(encoder, number, rate) => {
                 let (width, height) = (self.size.0 as u16, self.size.1 as u16);
                 let mut frame = gif::Frame::from_rgb_speed(width, height, picture.pixels.as_flattened(), 10);
-                frame.delay = *delay;
+                frame.delay = gif_delay(*number, *rate);
+                *number += 1;
                 encoder.write_frame(&frame).map_err(|e| e.to_string())
             }
             Encoder::Y4m(encoder) => encoder.add(picture).map_err(|e| e.to_string()),
@@ -81,7 +87,7 @@ impl Animation {
                 writer.finish().map_err(|e| failed(&path, &e))?;
                 bytes.0.take()
             }
-            Encoder::Gif(encoder, _) => encoder.into_inner().map_err(|e| failed(&path, &e))?,
+            Encoder::Gif(encoder, ..) => encoder.into_inner().map_err(|e| failed(&path, &e))?,
             Encoder::Y4m(encoder) => encoder.finish()?,
         };
         write_atomically(&path, &bytes)
@@ -89,7 +95,7 @@ impl Animation {
 }
 
 fn failed(path: &Path, error: &dyn std::fmt::Display) -> Failure {
-    Failure::File { path: path.into(), message: error.to_string() }
+    Failure::file(path, error)
 }
 
 fn apng(size: (u32, u32), frames: usize, rate: f64) -> Result<Encoder, png::EncodingError> {
@@ -97,7 +103,7 @@ fn apng(size: (u32, u32), frames: usize, rate: f64) -> Result<Encoder, png::Enco
     let mut encoder = png::Encoder::new(bytes.clone(), size.0, size.1);
     set_format(&mut encoder);
     encoder.set_animated(frames as u32, 0)?;
-    let (numerator, denominator) = frame_delay(rate, 1000);
+    let (numerator, denominator) = apng_delay(rate);
     encoder.set_frame_delay(numerator, denominator)?;
     Ok(Encoder::Apng(Box::new(encoder.write_header()?), bytes))
 }
@@ -108,10 +114,49 @@ fn gif(path: &Path, size: (u32, u32), rate: f64) -> Result<Encoder, Failure> {
     };
     let mut encoder = gif::Encoder::new(Vec::new(), width, height, &[]).map_err(|e| failed(path, &e))?;
     encoder.set_repeat(gif::Repeat::Infinite).map_err(|e| failed(path, &e))?;
-    Ok(Encoder::Gif(Box::new(encoder), frame_delay(rate, 100).0))
+    Ok(Encoder::Gif(Box::new(encoder), 0, rate))
 }
 
-/// The duration of a frame as a fraction of a second with the denominator `parts`; the numerator is at least 1.
-fn frame_delay(rate: f64, parts: u16) -> (u16, u16) {
-    ((f64::from(parts) / rate).round().clamp(1.0, f64::from(u16::MAX)) as u16, parts)
+/// The duration of a frame of a GIF, in hundredths of a second: the difference of the rounded times at which it and the next one begin, so that
+/// the animation as a whole is as long as it should be. At least 1.
+fn gif_delay(number: u32, rate: f64) -> u16 {
+    let begin = |number: u32| (100.0 * f64::from(number) / rate).round();
+    (begin(number + 1) - begin(number)).clamp(1.0, f64::from(u16::MAX)) as u16
+}
+
+/// The duration of a frame of an animated PNG as a fraction of a second: exact for whole rates, else the nearest one with a large numerator or
+/// denominator.
+fn apng_delay(rate: f64) -> (u16, u16) {
+    let limit = f64::from(u16::MAX);
+    if rate.fract() == 0.0 && (1.0..=limit).contains(&rate) {
+        return (1, rate as u16);
+    }
+    let (numerator, denominator) = match rate < 1.0 {
+        true => (limit, (limit * rate).round()),
+        false => ((limit / rate).round(), limit),
+    };
+    (numerator.clamp(1.0, limit) as u16, denominator.clamp(1.0, limit) as u16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_animation_is_as_long_as_its_frames() {
+        for (rate, frames, hundredths) in
+            [(24.0, 24, 100), (30.0, 30, 100), (60.0, 60, 100), (29.97, 300, 1001)]
+        {
+            let sum: u32 = (0..frames).map(|number| u32::from(gif_delay(number, rate))).sum();
+            assert_eq!(sum, hundredths, "{rate}");
+        }
+        for rate in [24.0, 23.976, 0.3, 1000.0, 1e-3, 65535.0] {
+            let (numerator, denominator) = apng_delay(rate);
+            let found = f64::from(denominator) / f64::from(numerator);
+            assert!((found / rate - 1.0).abs() < 1e-2, "{rate}: {found}");
+        }
+        assert_eq!(apng_delay(24.0), (1, 24));
+        assert_eq!((gif_delay(0, 1e-9), apng_delay(1e-9)), (u16::MAX, (u16::MAX, 1)));
+        assert_eq!((gif_delay(0, 1e9), apng_delay(1e9)), (1, (1, u16::MAX)));
+    }
 }

@@ -51,8 +51,7 @@ impl Picture {
     /// # Errors
     /// `BTH-P002` if it cannot be written.
     pub(crate) fn write(&self, path: &Path) -> Result<(), Failure> {
-        let bytes =
-            self.encoded().map_err(|e| Failure::File { path: path.into(), message: e.to_string() })?;
+        let bytes = self.encoded().map_err(|e| Failure::file(path, &e))?;
         write_atomically(path, &bytes)
     }
 }
@@ -72,25 +71,26 @@ pub(super) fn is_complete(path: &Path, (width, height): (u32, u32)) -> bool {
     bytes.starts_with(b"\x89PNG\r\n\x1a\n") && bytes.get(16..24) == Some(&size) && bytes.ends_with(&end)
 }
 
-/// The text of an error number of the system.
-fn system_message(number: i32) -> String {
-    std::io::Error::from_raw_os_error(number).to_string()
+/// The folder of a file.
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
 }
 
-/// Writes a file by renaming a finished temporary one, so that it is never seen in part.
+/// Creates the folder of a file where it is missing, and fails if no file can be written there: before hours of rendering, not after them.
 ///
 /// # Errors
 /// `BTH-P002` if it cannot be written.
-pub(super) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    // The message of the system alone: errors of temporary files also name these.
-    let failed = |e: &std::io::Error| {
-        let reason = e.raw_os_error().map_or_else(|| e.to_string(), system_message);
-        Failure::File { path: path.into(), message: format!("cannot write: {reason}") }
-    };
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
+pub(super) fn prepare_folder(path: &Path) -> Result<(), Failure> {
+    let folder = folder_of(path);
+    std::fs::create_dir_all(folder).map_err(|e| Failure::file(folder, &e))?;
+    temporary_in(path).map(drop)
+}
+
+/// A temporary file in the folder of a file.
+fn temporary_in(path: &Path) -> Result<tempfile::NamedTempFile, Failure> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".bth-play-").suffix(".tmp");
     #[cfg(unix)]
@@ -99,10 +99,27 @@ pub(super) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), Failure>
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let mut file = builder.tempfile_in(folder).map_err(|e| failed(&e))?;
+    builder.tempfile_in(folder_of(path)).map_err(|e| cannot_write(path, &e))
+}
+
+/// The message has the kind alone where the system gives no number: errors of temporary files name these.
+fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
+    let reason = match error.raw_os_error() {
+        Some(number) => std::io::Error::from_raw_os_error(number).to_string(),
+        None => error.kind().to_string(),
+    };
+    Failure::file(path, &format!("cannot write: {reason}"))
+}
+
+/// Writes a file by renaming a finished temporary one, so that it is never seen in part.
+///
+/// # Errors
+/// `BTH-P002` if it cannot be written.
+pub(super) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let mut file = temporary_in(path)?;
     let name = file.path().to_owned();
     let _part = Part::new(&name);
-    file.write_all(bytes).map_err(|e| failed(&e))?;
-    file.persist(path).map_err(|e| failed(&e.error))?;
+    file.write_all(bytes).map_err(|e| cannot_write(path, &e))?;
+    file.persist(path).map_err(|e| cannot_write(path, &e.error))?;
     Ok(())
 }

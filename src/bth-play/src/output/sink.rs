@@ -5,6 +5,7 @@ use super::numbered::Pattern;
 use super::picture::{self, Picture};
 use super::y4m;
 use crate::failure::Failure;
+use std::collections::HashSet;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -49,6 +50,33 @@ impl Sink {
         }
     }
 
+    /// The files that frames are written to; none for standard output.
+    pub(crate) fn files(&self, frames: &[i32]) -> Vec<PathBuf> {
+        match self {
+            Sink::One(path) => vec![path.clone()],
+            Sink::Numbered(pattern) => frames.iter().map(|frame| pattern.path(*frame)).collect(),
+            Sink::Animation(animation) => vec![animation.path().to_owned()],
+            Sink::Stream(_) => Vec::new(),
+        }
+    }
+
+    /// Fails if the files of these frames cannot be written, or would replace one of the files that are read.
+    ///
+    /// # Errors
+    /// `BTH-P002` and wrong usage (exit code 2).
+    pub(crate) fn prepare(&self, frames: &[i32], inputs: &[PathBuf]) -> Result<(), Failure> {
+        let inputs: HashSet<PathBuf> = inputs.iter().filter_map(|input| input.canonicalize().ok()).collect();
+        let files = self.files(frames);
+        for file in &files {
+            if file.canonicalize().is_ok_and(|real| inputs.contains(&real)) {
+                let message =
+                    format!("{} would replace a file that is read: name another output", file.display());
+                return Err(Failure::Usage(message));
+            }
+        }
+        files.first().map_or(Ok(()), |file| picture::prepare_folder(file))
+    }
+
     /// Whether the pictures go to standard output.
     pub(crate) fn takes_stdout(&self) -> bool {
         matches!(self, Sink::Stream(_))
@@ -70,10 +98,8 @@ impl Sink {
             Sink::One(path) => picture.write(path),
             Sink::Numbered(pattern) => {
                 let path = pattern.path(frame);
-                if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
-                    std::fs::create_dir_all(folder)
-                        .map_err(|e| Failure::File { path: folder.into(), message: e.to_string() })?;
-                }
+                // The number may be in the name of the folder.
+                picture::prepare_folder(&path)?;
                 picture.write(&path)
             }
             Sink::Animation(animation) => animation.add(picture),

@@ -9,7 +9,7 @@ use crate::failure::Failure;
 use crate::output::Sink;
 use bth::Scene;
 use serde::Serialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Time and work of a frame.
 #[derive(Clone, Debug, Serialize)]
@@ -96,7 +96,7 @@ fn is_one_picture(output: &Path) -> bool {
         && !output.to_string_lossy().contains('#')
 }
 
-/// Renders the frames that the options choose. The second value tells whether the pictures went to standard output, so that
+/// Renders the frames that the options choose; `inputs` are the files that no picture may replace. The second value tells whether the pictures went to standard output, so that
 /// the report must not.
 ///
 /// # Errors
@@ -105,6 +105,7 @@ pub(crate) fn render_sequence(
     scene: &mut Scene,
     file: &Path,
     output: &Path,
+    inputs: &[PathBuf],
     args: &Args,
 ) -> Result<(Report, bool), Failure> {
     let (whole, rate) = frame_range(scene);
@@ -123,14 +124,16 @@ pub(crate) fn render_sequence(
         });
     }
     let quiet = sink.takes_stdout();
+    sink.prepare(&frames, inputs)?;
     let mut report = Report::default();
     let before = frames.len();
     if !args.force {
         frames.retain(|frame| !sink.has(*frame, args.size));
     }
     report.skipped = before - frames.len();
+    // Made also where no frame is left, since it checks the options.
+    let setup = SceneSetup::new(scene, file, args, whole)?;
     if !frames.is_empty() {
-        let setup = SceneSetup::new(scene, file, args, whole)?;
         let shutter = shutter(scene, args);
         let times = shutter.exposures().len();
         let progress = Progress::new(frames.len(), times, args);

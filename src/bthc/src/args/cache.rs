@@ -32,7 +32,7 @@ pub(crate) struct Keeping {
     /// Neither look into the cache nor keep anything; so does setting BTH_NO_CACHE, unless --cache-dir is given.
     #[arg(long, conflicts_with_all = ["cache_dir", "shared_cache", "in_cache"])]
     pub(crate) no_cache: bool,
-    /// Keep the compiled file in the cache only; --json says where. For programs that map it there.
+    /// Keep the compiled file in the cache only; --json says where, and which files were read. For programs that map it there.
     #[arg(long, conflicts_with_all = ["output", "depfile"])]
     pub(crate) in_cache: bool,
 }

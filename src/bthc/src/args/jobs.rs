@@ -26,6 +26,9 @@ pub(crate) struct Jobs {
     /// Go on: compile again whenever one of the files changes, until Ctrl-C.
     #[arg(long, conflicts_with_all = ["json", "in_cache"])]
     pub(crate) watch: bool,
+    /// Stop, as on Ctrl-C, when standard input ends: for programs that start this one and may themselves be ended.
+    #[arg(long)]
+    pub(crate) end_with_input: bool,
     /// Compile only part I of N of the models (from 1), or of a scene's objects into the cache: for many machines.
     #[arg(long, value_name = "I/N", value_parser = shard, conflicts_with_all = ["watch", "depfile"])]
     pub(crate) shard: Option<(u32, u32)>,

@@ -8,7 +8,7 @@ use crate::args::Compile;
 use crate::failure::Failure;
 use crate::output;
 use crate::overwrite::{self, Outputs};
-use crate::progress::{Progress, Quiet};
+use crate::progress::{self, Progress, Quiet};
 use bth_compile::Monitor;
 use bth_compile::pipeline::CompileOptions;
 use serde_json::json;
@@ -18,7 +18,15 @@ use std::path::{Path, PathBuf};
 pub(crate) fn run(args: &Compile) -> Result<(), Failure> {
     let _stdin;
     let mut models = args.models.clone();
-    if let Some(i) = models.iter().position(|m| m.as_os_str() == "-") {
+    let from_input = models.iter().position(|m| m.as_os_str() == "-");
+    if args.jobs.end_with_input {
+        if from_input.is_some() {
+            let message = "a model from standard input ends with it".to_owned();
+            return Err(Failure::Usage { message, hint: "leave --end-with-input out" });
+        }
+        progress::end_with_input();
+    }
+    if let Some(i) = from_input {
         let (folder, path) = deliver::standard_input(args.jobs.format.as_deref())?;
         (_stdin, models[i]) = (folder, path);
         if args.output.is_none() && !args.keeping.in_cache {

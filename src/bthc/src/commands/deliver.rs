@@ -72,13 +72,18 @@ pub(super) fn deliver<R>(
     let took = if outcome.content.is_some() { seconds(start.elapsed().as_secs_f64()) } else { String::new() };
     let mut text = if outcome.built.is_none() { format!("{from}\n") } else { String::new() };
     text.push_str(&format!("{wrote} {name}\n"));
+    let mut json = json!({
+        "model": job.model.to_string_lossy(),
+        "output": name,
+        "written": outcome.content.is_some(),
+        "cache": state,
+    });
+    if job.target == Target::Cache {
+        // For programs that must not replace them.
+        json["inputs"] = inputs()?.iter().map(|input| input.to_string_lossy()).collect();
+    }
     Ok(JobReport {
-        json: json!({
-            "model": job.model.to_string_lossy(),
-            "output": name,
-            "written": outcome.content.is_some(),
-            "cache": state,
-        }),
+        json,
         text,
         line: format!("{name}  {from}  {}  {took}", bytes(size.unwrap_or(0))).trim_end().to_owned(),
     })

@@ -120,7 +120,11 @@ pub(super) fn inputs(model: &Path, looks: Looks) -> Result<Vec<PathBuf>, Failure
     Ok(files(&bth_scene::read(model)?, model, looks)?)
 }
 
+/// All files that a scene with this manifest, or the glTF file that it was read from, is made from.
 fn files(manifest: &Manifest, model: &Path, looks: Looks) -> bth_compile::Result<Vec<PathBuf>> {
+    if is_gltf(model) {
+        return source::files(model, looks);
+    }
     let mut files = vec![model.to_owned()];
     let folder = model.parent().unwrap_or(Path::new(""));
     for object in &manifest.objects {

@@ -6,14 +6,15 @@
 //! triangles on which rays start is compared with that, too.
 
 mod bounds;
+mod poses;
 mod rays;
 
 use crate::failure::Failure;
 use crate::output;
 use bth::rays::{Hit, Ray};
-use bth::{Hinted, Scene, SceneBuilder};
+use bth::{Hinted, Scene};
 use bth_compile::{Error, Monitor};
-use bth_oracle::{World, intersection, to_f64, triangles};
+use bth_oracle::{Triangle, World, intersection, to_f64, triangles};
 use rayon::prelude::*;
 use rays::Start;
 use serde_json::json;
@@ -29,7 +30,6 @@ const CODES: [&str; 3] = ["BTH-V001", "BTH-V002", "BTH-F209"];
 const PRINTED: usize = 10;
 /// Rays of a batch.
 const BATCH: usize = 256;
-const IDENTITY: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
 /// What was compared.
 #[derive(Clone, Copy, Debug, Default)]
@@ -85,23 +85,37 @@ fn check_object(
     report: &mut Report,
     monitor: &dyn Monitor,
 ) -> Result<Vec<String>, Failure> {
-    let view = scene.object(object);
-    let all = triangles(&view);
-    if all.is_empty() {
-        return Ok(Vec::new());
+    let triangles = scene.object(object).triangle_ids.len();
+    let count = count.unwrap_or((TESTS / triangles.max(1)).clamp(RAYS[0], RAYS[1]));
+    let poses = poses::of(scene, object);
+    let mut findings = Vec::new();
+    for pose in &poses {
+        let Some((alone, instance)) = poses::alone(scene, object, *pose)? else { continue };
+        let starts =
+            rays::sample(&triangles_of(&alone, instance), count.div_ceil(poses.len()), u64::from(object));
+        findings.extend(check_pose(&alone, instance, &starts, report, monitor)?);
     }
-    let count = count.unwrap_or((TESTS / all.len()).clamp(RAYS[0], RAYS[1]));
-    let starts = rays::sample(&all, count, u64::from(object));
-    // The object by itself and at its place, where the runtime rounds no ray.
-    let mut builder = SceneBuilder::new();
-    let first = builder.add(scene);
-    let instance = builder.instance(first + object, &IDENTITY)?;
-    builder.commit()?;
-    let alone = builder.into_scene();
+    Ok(findings)
+}
 
+/// The triangles of an instance, in the space of its object.
+fn triangles_of(alone: &Scene, instance: u32) -> Vec<Triangle> {
+    triangles(&alone.object(alone.instance(instance).object))
+}
+
+/// What differs in a scene of one visible instance, a line for each ray.
+fn check_pose(
+    alone: &Scene,
+    instance: u32,
+    starts: &[Start],
+    report: &mut Report,
+    monitor: &dyn Monitor,
+) -> Result<Vec<String>, Failure> {
+    let view = alone.object(alone.instance(instance).object);
+    let all = triangles_of(alone, instance);
     monitor.stage("trace exactly", Some(starts.len() as u64));
-    let traced = trace(&alone, &starts, instance, monitor)?;
-    let world = World::new(&alone);
+    let traced = trace(alone, starts, instance, monitor)?;
+    let world = World::new(alone);
     let corners_of = |id: u32| all.binary_search_by_key(&id, |t| t.id).ok().map(|row| all[row].corners);
     let one = |(start, ways): (&Start, &Traced)| {
         if monitor.cancelled() {

@@ -112,7 +112,8 @@ class Deformers:
             need(row and before < d.node, "F180", f"{d}", c.DEFORMERS)
             before = d.node
             root = self.object_row(d.object, c.OBJECT, "<24xI")[0]
-            can_move = root == NONE or len(scene.container.section(d.object, c.LEAF_VERTICES)) > 0
+            has = {kind for kind in (c.LEAF_VERTICES, c.SEQUENCE_TIMES) if len(scene.container.section(d.object, kind))}
+            can_move = (root == NONE or c.LEAF_VERTICES in has) and c.SEQUENCE_TIMES not in has
             need(can_move, "F186", f"{d}", c.DEFORMERS)
             if d.skin != NONE:
                 joints = self.skins[d.skin].joints if d.skin < len(self.skins) else 0

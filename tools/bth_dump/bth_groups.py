@@ -12,6 +12,16 @@ Material = namedtuple("Material", "name name_length reserved")
 ObjectName = namedtuple("ObjectName", "name name_length")
 
 
+def checked(text):
+    """The part of a section of text in which names can lie: all before the first byte that is not UTF-8."""
+    text = bytes(text)
+    try:
+        text.decode()
+    except UnicodeDecodeError as error:
+        return text[: error.start]
+    return text
+
+
 def label(text, row):
     """The name of a row; None where it does not lie within the text, is too long or is not UTF-8."""
     raw = text[row.name : row.name + row.name_length]
@@ -31,7 +41,7 @@ class GroupsView:
         self.groups = [Group(*r) for r in view.rows(c.GROUPS, "<4I")]
         self.runs = [Run(*r) for r in view.rows(c.GROUP_RUNS, "<2I")]
         self.materials = [Material(*r[:2], r[2:]) for r in view.rows(c.MATERIALS, "<4I")]
-        self.labels = view.bytes(c.LABELS)
+        self.labels = checked(view.bytes(c.LABELS))
 
     def describe(self):
         """Groups with their numbers of triangles, as a JSON-able value."""
@@ -78,7 +88,8 @@ def object_names(container):
     """The names of the objects, after F148; an empty list if the file has none."""
     entry = container.by_key.get((NONE, c.OBJECT_NAMES))
     rows = [ObjectName(*r) for r in struct.iter_unpack("<2I", container.section(NONE, c.OBJECT_NAMES))]
-    names = [label(container.section(NONE, c.OBJECT_LABELS), row) for row in rows]
+    labels = checked(container.section(NONE, c.OBJECT_LABELS))
+    names = [label(labels, row) for row in rows]
     if rows and (len(rows) != container.objects or None in names):
         raise Invalid("F148", f"names {names}", kind_name(c.OBJECT_NAMES), entry.offset)
     return names

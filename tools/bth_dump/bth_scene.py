@@ -7,6 +7,7 @@ from collections import namedtuple
 import bth_container as c
 from bth_container import NONE, Invalid, kind_name
 from bth_deformation import Deformers
+from bth_groups import checked
 
 Scene = namedtuple("Scene", "rate first_frame last_frame camera reserved")
 Node = namedtuple("Node", "transform parent flags name name_length reserved")
@@ -36,7 +37,7 @@ class SceneView:
         self.values = [r[0] for r in self.rows(c.VALUES, "<d")]
         self.cameras = [Camera(*r[:8], r[8:]) for r in self.rows(c.CAMERAS, "<4I4d4I")]
         self.lights = [Light(*r[:4], r[4:7], *r[7:11], r[11:]) for r in self.rows(c.LIGHTS, "<4I7d2I")]
-        self.names = bytes(container.section(NONE, c.NAMES))
+        self.names = checked(container.section(NONE, c.NAMES))
         self.deformers = Deformers(self)
 
     def rows(self, kind, form):

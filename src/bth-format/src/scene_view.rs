@@ -51,11 +51,6 @@ impl<'a> SceneView<'a> {
         self.lights.get(light as usize).and_then(|l| self.name(l.name, l.name_length)).unwrap_or_default()
     }
 
-    /// BTH-F153: whether the bytes from `first` on are a name of an allowed length.
-    pub(crate) fn is_name(&self, first: u32, length: u32) -> bool {
-        names::is_name(self.names, first, length)
-    }
-
     /// The deformer whose weights a node's track of weights gives.
     pub fn deformer_of(&self, node: u32) -> Option<&'a Deformer> {
         let row = self.deformers.binary_search_by_key(&node, |deformer| deformer.node).ok()?;

@@ -32,7 +32,11 @@ impl<'a> SequenceView<'a> {
         };
         // Halves, so that no difference of finite times overflows.
         let share = (0.5 * seconds - 0.5 * from) / (0.5 * to - 0.5 * from);
-        FramePosition { frame, share: if share > 0.0 && share < 1.0 { share } else { 0.0 } }
+        // Just before a frame the share may be rounded to 1.
+        match share >= 1.0 {
+            true => FramePosition { frame: frame + 1, share: 0.0 },
+            false => FramePosition { frame, share: if share > 0.0 { share } else { 0.0 } },
+        }
     }
 
     /// The positions of a frame; `rows` is the number of rows of `POSITIONS`.
@@ -85,6 +89,8 @@ mod tests {
             assert_eq!(view.locate(seconds), FramePosition { frame, share }, "{seconds}");
         }
         assert_eq!(view.locate(f64::NAN), FramePosition { frame: 0, share: 0.0 });
+        let view = SequenceView { times: &[-2.0, 1.0], ..SequenceView::default() };
+        assert_eq!(view.locate(1f64.next_down()), FramePosition { frame: 1, share: 0.0 });
         let view = SequenceView { times: &[-f64::MAX, f64::MAX], ..SequenceView::default() };
         assert_eq!(view.locate(0.0), FramePosition { frame: 0, share: 0.5 });
     }

@@ -86,6 +86,11 @@ fn scene_parts() -> SceneParts {
 
 /// The valid file.
 pub(super) fn deforming() -> Vec<u8> {
+    deforming_with(&[])
+}
+
+/// The valid file, but for the times of frames of the first object.
+fn deforming_with(times: &[f64]) -> Vec<u8> {
     let corners = TRIANGLES.map(|triangle| triangle.map(|row| POSITIONS[row as usize]));
     // A vertex for each row of POSITIONS, the two equal ones apart.
     let mut leaf = indexed(&corners, 0);
@@ -97,6 +102,7 @@ pub(super) fn deforming() -> Vec<u8> {
     (leaf.vertices, leaf.vertex) = (5, [0, 1, 2].map(|axis| slots.map(|row| POSITIONS[row as usize][axis])));
     let lines = lines(leaf.as_bytes());
     let (skinned, morphed) = (skinned(), morphed());
+    let frames = POSITIONS.repeat(times.len());
     let source = Source {
         positions: &POSITIONS,
         triangles: &TRIANGLES,
@@ -116,7 +122,13 @@ pub(super) fn deforming() -> Vec<u8> {
     };
     let mut builder = FileBuilder::new();
     for (number, deformation) in [&skinned, &morphed].into_iter().enumerate() {
-        let parts = ObjectParts { deformation: Some(deformation), ..parts };
+        let (times, frames) = if number == 0 { (times, &frames[..]) } else { (&[][..], &[][..]) };
+        let parts = ObjectParts {
+            deformation: Some(deformation),
+            sequence_times: times,
+            sequence_positions: frames,
+            ..parts
+        };
         object(&mut builder, number as u32, &parts).expect("the parts fit together");
     }
     let scene_parts = scene_parts();
@@ -206,5 +218,6 @@ fn of_scene() -> Vec<Case> {
         word("F184-reserved", kind::SKIN_JOINTS, offset_of!(SkinJoint, reserved), 1),
         word("F185-no-deformer", kind::TRACKS, offset_of!(Track, property), Property::Weights as u32),
         shortened("F186-leaf-vertices", 1, kind::LEAF_VERTICES, 0),
+        Case::new("F186-frames", deforming_with(&[0.0, 1.0])),
     ]
 }

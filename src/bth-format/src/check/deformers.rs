@@ -6,8 +6,8 @@ use crate::layout::*;
 use crate::scene_view::SceneView;
 use std::mem::offset_of;
 
-/// What a scene's check asks of an object: its row of `DEFORMATION`, if it has one, and whether it can be given new positions or
-/// has nothing that can be hit.
+/// What a scene's check asks of an object: its row of `DEFORMATION`, if it has one, and whether a deformer can move it: it can be given new
+/// positions or has nothing that can be hit, and no frames move it.
 pub(crate) type DeformationOf<'a> = &'a dyn Fn(u32) -> (Option<Deformation>, bool);
 
 /// Checks the deformers and skins of a scene whose nodes have been checked; `objects` is the number of objects.
@@ -68,7 +68,8 @@ fn deformers(view: &SceneView<'_>, objects: u32, deformation: DeformationOf<'_>)
         };
         if !can_move {
             let at = offset_of!(Deformer, object);
-            return violation(Code::DeformerObject, at, "an object with LEAF_VERTICES", deformer.object);
+            let expected = "an object with LEAF_VERTICES and without SEQUENCE_TIMES";
+            return violation(Code::DeformerObject, at, expected, deformer.object);
         }
         let joints = view.skins.get(deformer.skin as usize).map(|skin| skin.joints);
         let fits = |joints: u32| counts.joints > 0 && counts.joints <= joints;

@@ -2,12 +2,13 @@
 
 use crate::error::{Code, Error, Result, Text};
 use crate::layout::{Group, GroupRun, Material, NONE, kind};
-use crate::names::is_name;
+use crate::names::{checked, is_name};
 use crate::object::ObjectView;
 use std::mem::offset_of;
 
 pub(super) fn check(view: &ObjectView) -> Result<()> {
     runs(view)?;
+    let labels = checked(view.labels);
     for (row, group) in view.groups.iter().enumerate() {
         let at = size_of::<Group>() * row;
         if group.material != NONE && group.material as usize >= view.materials.len() {
@@ -16,12 +17,12 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
             return error(Code::Group, kind::GROUPS, at, expected, text!("{}", group.material));
         }
         zero(kind::GROUPS, at + offset_of!(Group, reserved), group.reserved == 0)?;
-        label(view, kind::GROUPS, at, (group.name, group.name_length))?;
+        label(labels, kind::GROUPS, at, (group.name, group.name_length))?;
     }
     for (row, material) in view.materials.iter().enumerate() {
         let at = size_of::<Material>() * row;
         zero(kind::MATERIALS, at + offset_of!(Material, reserved), material.reserved == [0; 2])?;
-        label(view, kind::MATERIALS, at, (material.name, material.name_length))?;
+        label(labels, kind::MATERIALS, at, (material.name, material.name_length))?;
     }
     Ok(())
 }
@@ -66,8 +67,8 @@ fn zero(kind: u32, at: usize, is_zero: bool) -> Result<()> {
 }
 
 /// BTH-F144.
-fn label(view: &ObjectView, kind: u32, at: usize, (first, length): (u32, u32)) -> Result<()> {
-    if is_name(view.labels, first, length) {
+fn label(labels: &str, kind: u32, at: usize, (first, length): (u32, u32)) -> Result<()> {
+    if is_name(labels, first, length) {
         return Ok(());
     }
     let expected = Text::from("a name of at most 4096 bytes within LABELS");

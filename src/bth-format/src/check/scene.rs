@@ -5,6 +5,7 @@ use super::rows::{RowResult, check_rows, violation};
 use super::tracks;
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
+use crate::names::{self, is_name};
 use crate::scene_view::SceneView;
 use std::mem::offset_of;
 
@@ -18,12 +19,13 @@ const NAME_EXPECTED: &str = "a name of at most 4096 bytes within NAMES";
 /// The first violation of `BTH-F150` to `BTH-F159` and `BTH-F180` to `BTH-F186`, with an offset from the start of its section.
 pub(crate) fn check(view: &SceneView<'_>, objects: u32, deformation: DeformationOf<'_>) -> Result<()> {
     scene_row(view)?;
-    check_rows(kind::NODES, view.nodes, |row, node| self::node(view, row, node))?;
+    let names = names::checked(view.names);
+    check_rows(kind::NODES, view.nodes, |row, node| self::node(names, row, node))?;
     check_rows(kind::INSTANCES, view.instances, |_, instance| self::instance(view, instance, objects))?;
     deformers::check(view, objects, deformation)?;
     tracks::check(view)?;
-    check_rows(kind::CAMERAS, view.cameras, |_, camera| self::camera(view, camera))?;
-    check_rows(kind::LIGHTS, view.lights, |_, light| self::light(view, light))
+    check_rows(kind::CAMERAS, view.cameras, |_, camera| self::camera(view, names, camera))?;
+    check_rows(kind::LIGHTS, view.lights, |_, light| self::light(view, names, light))
 }
 
 /// BTH-F150: the SCENE row.
@@ -52,7 +54,7 @@ fn scene_row(view: &SceneView<'_>) -> Result<()> {
 }
 
 /// BTH-F151 to BTH-F153 of a node.
-fn node(view: &SceneView<'_>, row: usize, node: &Node) -> RowResult<()> {
+fn node(names: &str, row: usize, node: &Node) -> RowResult<()> {
     if node.parent != NONE && node.parent as usize >= row {
         return violation(Code::Node, offset_of!(Node, parent), "a lesser row or NONE", node.parent);
     }
@@ -68,7 +70,7 @@ fn node(view: &SceneView<'_>, row: usize, node: &Node) -> RowResult<()> {
     {
         return violation(Code::NodeTransform, 0, "a finite transform with a quaternion that is not zero", t);
     }
-    if !view.is_name(node.name, node.name_length) {
+    if !is_name(names, node.name, node.name_length) {
         let found = (node.name, node.name_length);
         return violation(Code::Name, offset_of!(Node, name), NAME_EXPECTED, found);
     }
@@ -91,7 +93,7 @@ fn instance(view: &SceneView<'_>, instance: &Instance, objects: u32) -> RowResul
 }
 
 /// BTH-F158 and BTH-F153 of a camera.
-fn camera(view: &SceneView<'_>, camera: &Camera) -> RowResult<()> {
+fn camera(view: &SceneView<'_>, names: &str, camera: &Camera) -> RowResult<()> {
     if camera.node as usize >= view.nodes.len() || camera.projection > 1 {
         let found = (camera.node, camera.projection);
         return violation(Code::Camera, 0, "a row of NODES and a known projection", found);
@@ -108,11 +110,11 @@ fn camera(view: &SceneView<'_>, camera: &Camera) -> RowResult<()> {
     if camera.reserved != [0; 4] {
         return violation(Code::Camera, offset_of!(Camera, reserved), "zeros", camera.reserved);
     }
-    named(view, camera.name, camera.name_length)
+    named(names, camera.name, camera.name_length)
 }
 
 /// BTH-F159 and BTH-F153 of a light.
-fn light(view: &SceneView<'_>, light: &Light) -> RowResult<()> {
+fn light(view: &SceneView<'_>, names: &str, light: &Light) -> RowResult<()> {
     if light.node as usize >= view.nodes.len() || light.kind > 2 {
         return violation(Code::Light, 0, "a row of NODES and a known kind", (light.node, light.kind));
     }
@@ -129,13 +131,13 @@ fn light(view: &SceneView<'_>, light: &Light) -> RowResult<()> {
     if light.reserved != [0; 2] {
         return violation(Code::Light, offset_of!(Light, reserved), "zeros", light.reserved);
     }
-    named(view, light.name, light.name_length)
+    named(names, light.name, light.name_length)
 }
 
 /// BTH-F153 of a camera or light, whose name fields have the same offset.
-fn named(view: &SceneView<'_>, first: u32, length: u32) -> RowResult<()> {
+fn named(names: &str, first: u32, length: u32) -> RowResult<()> {
     const _: () = assert!(offset_of!(Camera, name) == offset_of!(Light, name));
-    if view.is_name(first, length) {
+    if is_name(names, first, length) {
         return Ok(());
     }
     violation(Code::Name, offset_of!(Camera, name), NAME_EXPECTED, (first, length))

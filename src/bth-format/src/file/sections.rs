@@ -104,6 +104,7 @@ impl File {
         if !rows.is_empty() && rows.len() != self.object_count() as usize {
             return error(0, text!("{} rows or none", self.object_count()), text!("{}", rows.len()));
         }
+        let text = names::checked(text);
         match rows.iter().position(|n| !names::is_name(text, n.name, n.name_length)) {
             None => Ok(()),
             Some(row) => {
@@ -115,9 +116,10 @@ impl File {
 
     /// The scene sections, whose **indices are not checked**; `None` when the file has none of them.
     pub fn scene(&self) -> Option<SceneView<'_>> {
-        // Sections of the whole file come last.
-        let of_file = self.table().iter().rev().take_while(|e| e.object == NONE);
-        of_file.map(|e| e.kind).find(|kind| kind::is_scene(*kind))?;
+        // The table is sorted, and may have any number of sections of unknown kinds.
+        let table = self.table();
+        let first = table.partition_point(|e| (e.object, e.kind) < (NONE, kind::SCENE));
+        table.get(first).filter(|e| kind::is_scene(e.kind))?;
         Some(SceneView {
             scene: self.slice(NONE, kind::SCENE),
             nodes: self.slice(NONE, kind::NODES),
@@ -143,9 +145,10 @@ impl File {
     pub fn check_scene(&self) -> Result<Option<SceneView<'_>>> {
         let Some(view) = self.scene() else { return Ok(None) };
         let deformation = |object| {
-            let can_move = self.section(object, kind::LEAF_VERTICES).is_some_and(|s| s.entry.count != 0);
+            let has = |kind: u32| self.section(object, kind).is_some_and(|s| s.entry.count != 0);
+            let can_move = has(kind::LEAF_VERTICES) || self.object_header(object).root == NONE;
             let row = self.deformation(object).rows.first().copied();
-            (row, can_move || self.object_header(object).root == NONE)
+            (row, can_move && !has(kind::SEQUENCE_TIMES))
         };
         check::scene(&view, self.object_count(), &deformation).map_err(|e| self.locate(e, NONE))?;
         Ok(Some(view))

@@ -1,12 +1,13 @@
 //! Positions of the vertices of an object that deforms.
 
 use super::JointMatrix;
+use super::morph_runs::MorphRuns;
 use super::pose::Pose;
 use crate::simd::{Isa, Kernel, Simd};
 use bth_format::DeformationView;
 
 /// Vertices that are computed together, in memory that stays in the first-level cache.
-const CHUNK: usize = 256;
+pub(super) const CHUNK: usize = 256;
 /// Vertices that one task computes.
 #[cfg(feature = "rayon")]
 const TASK: usize = 16 * CHUNK;
@@ -22,20 +23,23 @@ pub(crate) struct Vertices<'a> {
 /// Computes the positions of all vertices in a pose. `out` is as long as the base. They may be infinite or NaN.
 pub(crate) fn positions(vertices: Vertices<'_>, pose: &Pose, out: &mut [[f32; 3]]) {
     let isa = Isa::chosen();
+    let runs = &MorphRuns::new(&vertices.deformation, &pose.weights, out.len());
     #[cfg(feature = "rayon")]
     if out.len() > TASK {
         use rayon::iter::{IndexedParallelIterator, ParallelIterator};
         use rayon::slice::ParallelSliceMut;
         let tasks = out.par_chunks_mut(TASK).enumerate();
-        return tasks.for_each(|(task, out)| isa.run(Range { vertices, pose, first: task * TASK, out }));
+        return tasks
+            .for_each(|(task, out)| isa.run(Range { vertices, pose, runs, first: task * TASK, out }));
     }
-    isa.run(Range { vertices, pose, first: 0, out });
+    isa.run(Range { vertices, pose, runs, first: 0, out });
 }
 
-/// The positions of successive vertices, from `first` on.
+/// The positions of successive vertices, from `first` on, which is a multiple of [`CHUNK`].
 pub(super) struct Range<'a> {
     pub(super) vertices: Vertices<'a>,
     pub(super) pose: &'a Pose,
+    pub(super) runs: &'a MorphRuns<'a>,
     pub(super) first: usize,
     pub(super) out: &'a mut [[f32; 3]],
 }
@@ -45,14 +49,14 @@ impl Kernel for Range<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Range { vertices, pose, mut first, out } = self;
+        let Range { vertices, pose, runs, mut first, out } = self;
         let mut moved = [[0.0f64; 4]; CHUNK];
         for out in out.chunks_mut(CHUNK) {
             let moved = &mut moved[..out.len()];
             for (moved, base) in moved.iter_mut().zip(&vertices.base[first..]) {
                 *moved = [f64::from(base[0]), f64::from(base[1]), f64::from(base[2]), 0.0];
             }
-            morph(&vertices.deformation, &pose.weights, first, moved);
+            runs.of_chunk(first / CHUNK).iter().for_each(|run| run.add_to(moved));
             if let Some(joints) = &pose.joints {
                 skin(&vertices.deformation, joints, first, moved);
             }
@@ -62,41 +66,6 @@ impl Kernel for Range<'_> {
             }
             first += out.len();
         }
-    }
-}
-
-/// Adds to positions what the targets do by their weights, in the order of the targets.
-#[inline(always)]
-fn morph(deformation: &DeformationView<'_>, weights: &[f64], first: usize, positions: &mut [[f64; 4]]) {
-    for (target, weight) in weights.iter().enumerate() {
-        if *weight == 0.0 {
-            continue;
-        }
-        let morph = deformation.morph(target);
-        match morph.rows {
-            None => {
-                for (position, delta) in positions.iter_mut().zip(&morph.deltas[first..]) {
-                    add(position, *weight, delta);
-                }
-            }
-            Some(rows) => {
-                let start = rows.partition_point(|row| (*row as usize) < first);
-                let end = first + positions.len();
-                for (row, delta) in rows[start..].iter().zip(&morph.deltas[start..]) {
-                    if *row as usize >= end {
-                        break;
-                    }
-                    add(&mut positions[*row as usize - first], *weight, delta);
-                }
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn add(position: &mut [f64; 4], weight: f64, delta: &[f32; 3]) {
-    for k in 0..3 {
-        position[k] += weight * f64::from(delta[k]);
     }
 }
 

@@ -8,6 +8,7 @@
 
 pub(crate) mod by_object;
 mod evaluate;
+mod morph_runs;
 pub(crate) mod normals;
 pub(crate) mod pose;
 mod poses;

@@ -4,39 +4,53 @@ use super::JointMatrix;
 use crate::nodes::{Affine, NodeHierarchy, tracks};
 use bth_format::SceneView;
 use bth_format::layout::*;
+use std::sync::Arc;
 
 /// What deforms an object at a time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Pose {
     /// Weights of the morph targets.
     pub(crate) weights: Vec<f64>,
-    /// For each joint of the skin its matrix; `None` without a skin.
-    pub(crate) joints: Option<Vec<JointMatrix>>,
+    /// For each joint of the skin its matrix, which all objects of the skin share; `None` without a skin.
+    pub(crate) joints: Option<Arc<[JointMatrix]>>,
 }
 
-impl Pose {
-    /// The pose that a deformer of a checked scene gives its object, with the nodes where the hierarchy has them.
-    pub(crate) fn of(
-        view: &SceneView<'_>,
-        deformer: &Deformer,
-        hierarchy: &NodeHierarchy,
-        seconds: f64,
-    ) -> Pose {
-        let skin = view.skins.get(deformer.skin as usize);
-        let joints = skin.map(|skin| {
-            let first = skin.first_joint as usize;
-            let joints = &view.skin_joints[first..first + skin.joints as usize];
-            joints.iter().map(|joint| joint_matrix(joint, &hierarchy.to_world(view, joint.node))).collect()
-        });
-        Pose { weights: weights(view, deformer, seconds), joints }
+/// The matrices of the joints of skins at a time, each skin computed when it is asked for.
+pub(crate) struct SkinMatrices<'a> {
+    view: &'a SceneView<'a>,
+    hierarchy: &'a NodeHierarchy,
+    /// By the row of the skin.
+    skins: Vec<Option<Arc<[JointMatrix]>>>,
+}
+
+impl<'a> SkinMatrices<'a> {
+    /// Those of a checked scene, with the nodes where the hierarchy has them.
+    pub(crate) fn new(view: &'a SceneView<'a>, hierarchy: &'a NodeHierarchy) -> Self {
+        SkinMatrices { view, hierarchy, skins: vec![None; view.skins.len()] }
+    }
+
+    /// The matrices of a skin; `None` if there is none of that row.
+    fn of(&mut self, row: u32) -> Option<Arc<[JointMatrix]>> {
+        let SkinMatrices { view, hierarchy, skins } = self;
+        let (skin, matrices) = (view.skins.get(row as usize)?, &mut skins[row as usize]);
+        let joints = &view.skin_joints[skin.first_joint as usize..][..skin.joints as usize];
+        let matrix = |joint: &SkinJoint| joint_matrix(joint, &hierarchy.to_world(view, joint.node));
+        Some(matrices.get_or_insert_with(|| joints.iter().map(matrix).collect()).clone())
     }
 }
 
 impl Pose {
-    /// Bytes on the heap.
+    /// The pose that a deformer gives its object at the time of the matrices, which is given in seconds.
+    pub(crate) fn of(matrices: &mut SkinMatrices<'_>, deformer: &Deformer, seconds: f64) -> Pose {
+        Pose { weights: weights(matrices.view, deformer, seconds), joints: matrices.of(deformer.skin) }
+    }
+}
+
+impl Pose {
+    /// Bytes on the heap, those of shared matrices included.
     pub(crate) fn bytes(&self) -> usize {
         size_of_val(self.weights.as_slice())
-            + self.joints.as_ref().map_or(0, |joints| size_of_val(joints.as_slice()))
+            + self.joints.as_ref().map_or(0, |joints| size_of_val(&joints[..]))
     }
 }
 

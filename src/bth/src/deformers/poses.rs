@@ -1,7 +1,7 @@
 //! The poses of an object outside of a scene: for compilers, which choose hierarchies by all poses of an animation.
 
 use super::evaluate::{self, Vertices};
-use super::pose::Pose;
+use super::pose::{Pose, SkinMatrices};
 use crate::nodes::NodeHierarchy;
 use bth_format::layout::*;
 use bth_format::{DeformationView, SceneView};
@@ -28,7 +28,7 @@ impl DeformerPoses<'_> {
     pub fn positions_at(&self, seconds: f64) -> Vec<[f32; 3]> {
         let mut hierarchy = NodeHierarchy::new(&self.view);
         hierarchy.update(&self.view, seconds, true);
-        let pose = Pose::of(&self.view, &self.deformer, &hierarchy, seconds);
+        let pose = Pose::of(&mut SkinMatrices::new(&self.view, &hierarchy), &self.deformer, seconds);
         let vertices = Vertices { base: self.base, deformation: self.deformation };
         let mut positions = vec![[0.0; 3]; self.base.len()];
         evaluate::positions(vertices, &pose, &mut positions);

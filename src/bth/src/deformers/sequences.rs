@@ -7,6 +7,7 @@ use crate::deform::Deforming;
 use crate::objects::Objects;
 use bth_format::error::Result;
 use bth_format::{File, FramePosition};
+use std::collections::HashSet;
 
 /// From this number of positions on, several threads compute them.
 #[cfg(feature = "rayon")]
@@ -56,9 +57,9 @@ impl Moved {
         self.states.iter().map(|(object, _)| *object)
     }
 
-    /// Whether an object has got another hierarchy.
-    pub(super) fn is_replaced(&self, object: u32) -> bool {
-        self.replaced.iter().any(|(replaced, _)| *replaced == object)
+    /// The objects that have got another hierarchy.
+    pub(super) fn replaced(&self) -> HashSet<u32> {
+        self.replaced.iter().map(|(object, _)| *object).collect()
     }
 
     /// Adds the objects of others.

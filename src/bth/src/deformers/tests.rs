@@ -2,6 +2,7 @@
 
 use super::JointMatrix;
 use super::evaluate::{Vertices, positions};
+use super::morph_runs::MorphRuns;
 use super::normals::corner_normal;
 use super::pose::Pose;
 use crate::simd::Isa;
@@ -75,7 +76,7 @@ impl Sample {
             morphs,
             rows,
             deltas,
-            pose: Pose { weights: pose_weights, joints: (sets > 0).then_some(matrices) },
+            pose: Pose { weights: pose_weights, joints: (sets > 0).then_some(matrices.into()) },
         }
     }
 
@@ -143,12 +144,14 @@ fn positions_are_those_of_the_formula_and_the_same_bits_everywhere() {
                 assert!(error <= 1e-7 * (1.0 + expected.abs()), "{found} is not {expected} at {row}");
             }
         }
+        let runs = MorphRuns::new(&sample.view(), &sample.pose.weights, vertices);
         let bits = |rows: &[[f32; 3]]| rows.as_flattened().iter().map(|x| x.to_bits()).collect::<Vec<_>>();
         for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
             let mut out = vec![[f32::NAN; 3]; vertices];
             isa.run(super::evaluate::Range {
                 vertices: Vertices { base: &sample.base, deformation: sample.view() },
                 pose: &sample.pose,
+                runs: &runs,
                 first: 0,
                 out: &mut out,
             });

@@ -2,7 +2,7 @@
 
 use super::by_object::ByObject;
 use super::evaluate::{self, Vertices};
-use super::pose::Pose;
+use super::pose::{Pose, SkinMatrices};
 use super::sequences::{Moved, Sequences};
 use crate::clock;
 use crate::deform::TetUse;
@@ -113,12 +113,16 @@ impl Deformers {
         let moved = self.sequences.stage(objects, (file, first_object), seconds, skips)?;
         let mut posed = Posed { objects: moved.objects().collect(), poses: Vec::new(), moved };
         let Some(view) = file.scene() else { return Ok(posed) };
+        let mut matrices = SkinMatrices::new(&view, hierarchy);
+        let (moves, replaced): (HashSet<u32>, _) = (posed.moved.objects().collect(), posed.moved.replaced());
         for (row, deformer) in view.deformers.iter().enumerate() {
             let object = first_object + deformer.object;
-            let pose = Pose::of(&view, deformer, hierarchy, seconds);
-            let differs = self.poses.get(object) != Some(&pose) || posed.moved.is_replaced(object);
             let can_be_hit = file.object_header(deformer.object).root != NONE;
-            if !differs || !can_be_hit || skips(object) {
+            if !can_be_hit || skips(object) {
+                continue;
+            }
+            let pose = Pose::of(&mut matrices, deformer, seconds);
+            if self.poses.get(object) == Some(&pose) && !replaced.contains(&object) {
                 continue;
             }
             if let Err(error) = stage_pose(objects, (file, deformer.object), object, &pose) {
@@ -134,7 +138,8 @@ impl Deformers {
                 return Err(file.locate(error, NONE));
             }
             posed.poses.push((object, pose));
-            if !posed.objects.contains(&object) {
+            // No other deformer has the object (BTH-F180).
+            if !moves.contains(&object) {
                 posed.objects.push(object);
             }
         }
@@ -192,8 +197,9 @@ fn stage_pose(objects: &mut Objects, (file, row): (&File, u32), object: u32, pos
 impl Deformed {
     /// Gives the objects the positions and hierarchies that they had before the update.
     pub(crate) fn undo(mut self, objects: &mut Objects) {
+        let replaced = self.posed.moved.replaced();
         for object in &self.posed.objects {
-            if !self.posed.moved.is_replaced(*object)
+            if !replaced.contains(object)
                 && let Ok(deforming) = objects.deforming(*object)
             {
                 deforming.undo();

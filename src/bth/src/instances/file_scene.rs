@@ -10,6 +10,7 @@ use crate::update::Update;
 use bth_format::error::{Code, Error, Result};
 use bth_format::layout::*;
 use bth_format::text;
+use std::collections::HashSet;
 
 impl World {
     /// The instances of a file at the first frame of its scene; `None` if the objects are not those of a file with scene sections.
@@ -97,6 +98,7 @@ impl World {
         all: bool,
     ) -> Result<Update> {
         let view = scene_of(objects);
+        let deformed: HashSet<u32> = deformed.iter().copied().collect();
         let mut update = Update::default();
         for (row, instance) in view.instances.iter().enumerate() {
             let TransformSource::File(hierarchy) = &self.source else { break };

@@ -22,8 +22,7 @@ pub(crate) fn value(view: &SceneView<'_>, track: &Track, seconds: f64) -> [f64; 
         return row(next.saturating_sub(1), value_row);
     }
     let (from, to) = (next - 1, next);
-    let duration = times[to] - times[from];
-    let part = (seconds - times[from]) / duration;
+    let (part, duration) = between(times[from], times[to], seconds);
     let (a, b) = (row(from, value_row), row(to, value_row));
     if interpolation == Interpolation::Cubic {
         return hermite(a, row(from, 2), b, row(to, 0), part, duration);
@@ -43,8 +42,7 @@ pub(crate) fn values(view: &SceneView<'_>, track: &Track, width: usize, seconds:
         return (0..width).map(|i| row(next.saturating_sub(1), value_row, i)).collect();
     }
     let (from, to) = (next - 1, next);
-    let duration = times[to] - times[from];
-    let part = (seconds - times[from]) / duration;
+    let (part, duration) = between(times[from], times[to], seconds);
     let one = |i: usize| {
         let (a, b) = (row(from, value_row, i), row(to, value_row, i));
         if interpolation == Interpolation::Cubic {
@@ -53,6 +51,13 @@ pub(crate) fn values(view: &SceneView<'_>, track: &Track, width: usize, seconds:
         a + part * (b - a)
     };
     (0..width).map(one).collect()
+}
+
+/// The part of the time between two keys that has passed, and that time in seconds, at most the greatest number. Halves do not overflow, and
+/// have the same quotient.
+fn between(from: f64, to: f64, seconds: f64) -> (f64, f64) {
+    let part = (0.5 * seconds - 0.5 * from) / (0.5 * to - 0.5 * from);
+    (part, (to - from).min(f64::MAX))
 }
 
 /// Whether the value of a checked track differs between two times. The track is evaluated only if the keys around the times do
@@ -185,6 +190,17 @@ mod tests {
             assert_eq!(differs(&view, &track, a, b), differ, "{interpolation:?} {a} {b}");
             assert_eq!(differs(&view, &track, b, a), differ, "{interpolation:?} {b} {a}");
         }
+    }
+
+    #[test]
+    fn the_time_between_keys_may_exceed_the_greatest_number() {
+        let times = [-1.5e308, 1.5e308];
+        for (t, expected) in [(0.0, 2.0), (0.75e308, 3.0), (1.5e308, 4.0)] {
+            let keys = [0.0, 0.0, 0.0, 4.0, 4.0, 4.0];
+            assert_eq!(sample(Property::Scale, Interpolation::Linear, &times, &keys, t), [expected; 3]);
+        }
+        let keys = [[0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3], [4.0; 3], [0.0; 3]].concat();
+        assert_eq!(sample(Property::Scale, Interpolation::Cubic, &times, &keys, 0.0), [2.0; 3]);
     }
 
     #[test]

@@ -266,8 +266,17 @@ fn summary(file: &File) -> Result<String, Failure> {
         let e = section.entry;
         sections.row([kind::name(e.kind), &count(e.count), &bytes(e.length)]);
     }
-    let made = file.provenance().map_or(String::new(), |text| format!("\n{text}\n"));
+    let made = file.provenance().map_or(String::new(), |text| format!("\n{}\n", printable(text)));
     Ok(format!("{}\n{}{}{made}", facts.render(), groups_table(file)?, sections.render()))
+}
+
+/// JSON without characters that would change the state of a terminal.
+fn printable(json: &str) -> String {
+    let escaped = |c: char| match c {
+        '"' | '\\' | '\'' => c.to_string(),
+        _ => c.escape_debug().to_string(),
+    };
+    json.chars().map(escaped).collect()
 }
 
 /// The processor's features that kernels may use.

@@ -1,0 +1,102 @@
+//! What morph targets add to positions, by chunks of vertices.
+//!
+//! A target may move few vertices, and a file may have any number of targets that move none. The deltas are therefore divided among the chunks
+//! once for each pose, so that a chunk visits only targets that move some of its vertices: the time is linear in the number of deltas.
+
+use super::evaluate::CHUNK;
+use bth_format::DeformationView;
+
+/// The deltas of a target within a chunk; at least one.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MorphRun<'a> {
+    weight: f64,
+    /// The rows of positions, ascending; `None` where there is a delta for each row of the chunk.
+    rows: Option<&'a [u32]>,
+    deltas: &'a [[f32; 3]],
+}
+
+impl MorphRun<'_> {
+    /// Adds the deltas by their weight to the positions of the chunk.
+    #[inline(always)]
+    pub(super) fn add_to(&self, positions: &mut [[f64; 4]]) {
+        match self.rows {
+            None => {
+                for (position, delta) in positions.iter_mut().zip(self.deltas) {
+                    add(position, self.weight, delta);
+                }
+            }
+            Some(rows) => {
+                for (row, delta) in rows.iter().zip(self.deltas) {
+                    add(&mut positions[*row as usize % CHUNK], self.weight, delta);
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn add(position: &mut [f64; 4], weight: f64, delta: &[f32; 3]) {
+    for k in 0..3 {
+        position[k] += weight * f64::from(delta[k]);
+    }
+}
+
+/// The runs of all chunks of an object in a pose.
+#[derive(Debug)]
+pub(super) struct MorphRuns<'a> {
+    /// Chunk after chunk, of each in the order of the targets.
+    runs: Vec<MorphRun<'a>>,
+    /// For each chunk where its runs end.
+    ends: Vec<u32>,
+}
+
+impl<'a> MorphRuns<'a> {
+    /// The runs of the targets of an object of so many vertices by their weights. Targets of weight 0 have none.
+    pub(super) fn new(deformation: &DeformationView<'a>, weights: &[f64], vertices: usize) -> Self {
+        // How many runs chunks have, then where they begin, then, as they are filled, where they end.
+        let mut ends = vec![0u32; vertices.div_ceil(CHUNK)];
+        each_run(deformation, weights, &mut |chunk, _| ends[chunk] += 1);
+        let mut count = 0;
+        for end in &mut ends {
+            (*end, count) = (count, count + *end);
+        }
+        let mut runs = vec![MorphRun { weight: 0.0, rows: None, deltas: &[] }; count as usize];
+        each_run(deformation, weights, &mut |chunk, run| {
+            runs[ends[chunk] as usize] = run;
+            ends[chunk] += 1;
+        });
+        MorphRuns { runs, ends }
+    }
+
+    /// The runs of a chunk.
+    #[inline(always)]
+    pub(super) fn of_chunk(&self, chunk: usize) -> &[MorphRun<'a>] {
+        let Some(end) = self.ends.get(chunk) else { return &[] };
+        let first = chunk.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.runs[first as usize..*end as usize]
+    }
+}
+
+/// Gives each run with its chunk, those of a chunk in the order of the targets, in which sums are rounded.
+fn each_run<'a>(
+    deformation: &DeformationView<'a>,
+    weights: &[f64],
+    give: &mut dyn FnMut(usize, MorphRun<'a>),
+) {
+    for (target, &weight) in weights.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
+        let morph = deformation.morph(target);
+        let Some(mut rows) = morph.rows else {
+            let chunks = morph.deltas.chunks(CHUNK).enumerate();
+            chunks.for_each(|(chunk, deltas)| give(chunk, MorphRun { weight, rows: None, deltas }));
+            continue;
+        };
+        let mut deltas = morph.deltas;
+        while let Some(row) = rows.first() {
+            let chunk = row / CHUNK as u32;
+            let count = rows.partition_point(|row| row / CHUNK as u32 == chunk);
+            let (of_chunk, later) = rows.split_at(count);
+            give(chunk as usize, MorphRun { weight, rows: Some(of_chunk), deltas: &deltas[..count] });
+            (rows, deltas) = (later, &deltas[count..]);
+        }
+    }
+}

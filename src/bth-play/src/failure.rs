@@ -72,8 +72,11 @@ impl Failure {
             }
             Self::Compiler { error, exit } => (error.clone(), *exit),
             Self::Source { path, message } => {
-                let hint = "compile it with bthc compile, and play the compiled file";
-                (located("BTH-P003", path, message, hint), 3)
+                let name = path.to_string_lossy();
+                let quote = if name.contains(char::is_whitespace) { "\"" } else { "" };
+                let hint =
+                    format!("run: bthc compile {quote}{name}{quote} -o scene.bth, then play scene.bth");
+                (located("BTH-P003", path, message, &hint), 3)
             }
             Self::Environment { path, message, exit } => {
                 let hint = "--env takes a picture in Radiance format (.hdr) over longitude and latitude; without it there is a sky";

@@ -204,11 +204,15 @@ fn every_mode_shows_the_scene_whatever_the_number_of_threads() {
 #[test]
 fn manifests_are_played_through_the_cache() {
     let folder = scene();
-    let args = ["scene.manifest", "-o", "x.png", "--size", "48x27", "--spp", "1", "--stats", "--json"];
+    let args = [
+        &["scene.manifest", "-o", "x.png", "--size", "48x27", "--spp", "1", "--stats", "--json"][..],
+        &["--cache-dir", "cache"],
+    ]
+    .concat();
     let json = run("bth-play", folder.path(), &args).expect(0).json();
     assert_eq!((&json["stats"]["objects"], &json["stats"]["objects_touched"]), (&2.into(), &2.into()));
     let kept = || {
-        let list = ["cache", "list", "--stage", "scene", "--json"];
+        let list = ["cache", "list", "--stage", "scene", "--json", "--cache-dir", "cache"];
         run("bthc", folder.path(), &list).expect(0).json()["entries"].as_array().unwrap().len()
     };
     assert_eq!(kept(), 1);

@@ -151,6 +151,17 @@ impl Error {
     }
 }
 
+impl Error {
+    /// The text of the error without its hint, for messages that give a hint apart.
+    pub fn without_hint(&self) -> String {
+        let mut text = self.to_string();
+        if let Some(at) = text.rfind(" (hint: ") {
+            text.truncate(at);
+        }
+        text
+    }
+}
+
 impl std::fmt::Display for Error {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Details { code, section, offset, expected, found, path, .. } = &*self.0;

@@ -14,6 +14,10 @@ pub trait Monitor: Sync {
     }
     /// A message for the user about something that is not an error.
     fn warn(&self, _message: &str) {}
+    /// As [`Self::warn`], about this machine or this run and not about what is compiled, so that it is not kept with results.
+    fn notice(&self, message: &str) {
+        self.warn(message);
+    }
 }
 
 impl dyn Monitor + '_ {

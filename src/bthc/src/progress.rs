@@ -5,6 +5,7 @@ use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressState, Prog
 use std::io::IsTerminal;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// Set by Ctrl-C; stages poll it a few times a second.
 static CANCELLED: AtomicBool = AtomicBool::new(false);
@@ -38,14 +39,21 @@ fn whole_rate(state: &ProgressState, out: &mut dyn std::fmt::Write) {
 #[derive(Debug)]
 pub(crate) struct Progress {
     bar: ProgressBar,
-    quiet: bool,
+    /// Whether warnings are printed.
+    warns: bool,
 }
 
 impl Progress {
+    /// Without stages and warnings if `quiet`.
     pub(crate) fn new(quiet: bool) -> Self {
+        Self::with_warnings(quiet, !quiet)
+    }
+
+    /// Without stages if `quiet`; whether warnings are printed is said apart.
+    pub(crate) fn with_warnings(quiet: bool, warns: bool) -> Self {
         let visible = !quiet && std::io::stderr().is_terminal();
         let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        Self { bar: ProgressBar::with_draw_target(None, target), quiet }
+        Self { bar: ProgressBar::with_draw_target(None, target), warns }
     }
 }
 
@@ -91,6 +99,38 @@ impl Monitor for Quiet<'_> {
     }
 }
 
+/// A monitor that also collects the warnings that it passes on.
+pub(crate) struct Collecting<'a> {
+    to: &'a dyn Monitor,
+    warnings: Mutex<Vec<String>>,
+}
+
+impl<'a> Collecting<'a> {
+    pub(crate) fn new(to: &'a dyn Monitor) -> Self {
+        Self { to, warnings: Mutex::default() }
+    }
+
+    pub(crate) fn into_warnings(self) -> Vec<String> {
+        self.warnings.into_inner().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Monitor for Collecting<'_> {
+    fn stage(&self, name: &'static str, total: Option<u64>) {
+        self.to.stage(name, total);
+    }
+    fn advance(&self, units: u64) {
+        self.to.advance(units);
+    }
+    fn cancelled(&self) -> bool {
+        self.to.cancelled()
+    }
+    fn warn(&self, message: &str) {
+        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).push(message.to_owned());
+        self.to.warn(message);
+    }
+}
+
 impl Drop for Progress {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
@@ -120,7 +160,7 @@ impl Monitor for Progress {
         CANCELLED.load(Ordering::Relaxed)
     }
     fn warn(&self, message: &str) {
-        if !self.quiet {
+        if self.warns {
             self.bar.suspend(|| {
                 use std::io::Write;
                 // Nothing can be done when standard error is closed.

@@ -276,3 +276,45 @@ fn objects_that_are_compiled_at_once_come_to_the_same_file() {
         assert!(run.stderr.contains("1.obj:1"), "{run:?}");
     }
 }
+
+/// What was said about a model is said again when its results come from the cache.
+#[test]
+fn warnings_are_those_of_the_first_compilation() {
+    let folder = folder(&[
+        ("a.obj", "v 9 9 nan\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n"),
+        (
+            "s.manifest",
+            "version = 1\nobjects = [{ name = \"a\", model = \"a.obj\" }]\nnodes = [{ name = \"a\", object = \"a\" }]\n",
+        ),
+    ]);
+    let path = folder.path();
+    for model in ["a.obj", "s.manifest"] {
+        // The second run takes the file, the third the mesh, the last nothing from the cache.
+        for args in [&[][..], &[], &["--quality", "fast"], &["--no-cache"]] {
+            let args = [&["compile", model, "-o", "a.bth"], args].concat();
+            let run = cached(path, &args).expect(0);
+            assert_eq!(
+                run.stderr.matches("warning: 1 positions are not finite").count(),
+                1,
+                "{args:?}: {run:?}"
+            );
+            let json = cached(path, &[&args[..], &["--json"]].concat()).expect(0).json();
+            let warnings = json["warnings"].as_array().unwrap();
+            assert_eq!(warnings.len(), 1, "{args:?}: {json:#}");
+            assert_eq!(cached(path, &[&args[..], &["--quiet"]].concat()).expect(0).stderr, "");
+        }
+    }
+}
+
+#[test]
+fn options_for_gltf_files_need_one() {
+    let folder = folder(&[("a.obj", &sphere(4)), ("s.manifest", "version = 1\n")]);
+    for model in ["a.obj", "s.manifest"] {
+        for option in
+            [&["--flatten"][..], &["--rate", "30"], &["--scene", "0"], &["--at-rest"], &["--strict"]]
+        {
+            let run = cached(folder.path(), &[&["compile", model], option].concat()).expect(2);
+            assert!(run.stderr.contains("glTF"), "{run:?}");
+        }
+    }
+}

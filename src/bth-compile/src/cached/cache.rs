@@ -1,6 +1,7 @@
 //! Access to the store: lookups and additions of results, and the log of hits and misses.
 
 use super::log::{Log, Miss};
+use super::warnings::{Recording, replay};
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::tets;
@@ -100,18 +101,18 @@ impl<'a> Cache<'a> {
         found
     }
 
-    /// Keeps a content; a failure is a warning.
+    /// Keeps a content, with the warnings that were given while it was made; a failure is a warning.
     pub(crate) fn put(
         &self,
         key: &Key,
         part: &str,
         bytes: &[u8],
         report: &impl Serialize,
-        monitor: &dyn Monitor,
+        recording: &Recording<'_>,
     ) -> Option<Record> {
         let store = self.store?;
-        let report = serde_json::to_value(report).map_err(std::io::Error::from);
-        self.note_put(key, part, report.and_then(|report| store.put(key, bytes, report)), monitor)
+        let report = recording.with_report(report).map_err(std::io::Error::from);
+        self.note_put(key, part, report.and_then(|report| store.put(key, bytes, report)), recording)
     }
 
     /// Keeps only the name of a content; see [`Store::put_name`].
@@ -153,7 +154,7 @@ impl<'a> Cache<'a> {
             Err(e) => {
                 let first = !std::mem::replace(&mut self.lock_log().failed, true);
                 if first {
-                    monitor.warn(&format!("cache: {} cannot be written: {e}", store.folder().display()));
+                    monitor.notice(&format!("cache: {} cannot be written: {e}", store.folder().display()));
                 }
                 None
             }
@@ -176,16 +177,18 @@ impl<'a> Cache<'a> {
         monitor: &dyn Monitor,
         decode: impl FnOnce(&[u8]) -> Option<T>,
         encode: impl FnOnce(&T) -> Vec<u8>,
-        build: impl FnOnce() -> Result<(T, R)>,
+        build: impl FnOnce(&dyn Monitor) -> Result<(T, R)>,
     ) -> Result<(T, R)> {
         if let Some((record, bytes)) = self.fetch(&key, part, monitor)
             && let Some(value) = decode(&bytes)
-            && let Ok(report) = serde_json::from_value(record.report)
+            && let Ok(report) = R::deserialize(&record.report)
         {
+            replay(&record.report, monitor);
             return Ok((value, report));
         }
-        let (value, report) = build()?;
-        self.put(&key, part, &encode(&value), &report, monitor);
+        let recording = Recording::new(monitor);
+        let (value, report) = build(&recording)?;
+        self.put(&key, part, &encode(&value), &report, &recording);
         Ok((value, report))
     }
 
@@ -253,5 +256,5 @@ impl<'a> Cache<'a> {
 
 /// Passes the notes of the store to the monitor.
 fn pass_notes(store: &Store, monitor: &dyn Monitor) {
-    store.take_notes().iter().for_each(|note| monitor.warn(note));
+    store.take_notes().iter().for_each(|note| monitor.notice(note));
 }

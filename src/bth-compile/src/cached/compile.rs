@@ -1,6 +1,6 @@
 //! The compilation of a model through the cache.
 
-use super::{Cache, CachedStages, Miss, keys};
+use super::{Cache, CachedStages, Miss, Recording, keys, replay};
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
 use crate::options::{CompileOptions, Structure};
@@ -83,7 +83,7 @@ pub fn compile(
     let mut clock = Clock::default();
     let (digest, key) = identify(source, options, cache, monitor, &mut clock)?;
     let model = Model { path: source, digest: &digest };
-    let outcome = compile_or_fetch(cache, key.as_ref(), needed, monitor, || {
+    let outcome = compile_or_fetch(cache, key.as_ref(), needed, monitor, |monitor| {
         let stages = &mut CachedStages::of_model(cache);
         let (file, report) = compile_model(&model, options, stages, clock, monitor)?;
         Ok((file.into(), report, true))
@@ -108,7 +108,7 @@ pub(crate) fn compile_triangles(
     let model = Model { path: Path::new(MESH_NAME), digest: &digest };
     let tetgen = tetgen_in_keys(options, cache, monitor)?;
     let key = tetgen.map(|tetgen| keys::file(&digest, model.path, options, &tetgen));
-    let outcome = compile_or_fetch(cache, key.as_ref(), needed, monitor, || {
+    let outcome = compile_or_fetch(cache, key.as_ref(), needed, monitor, |monitor| {
         let import =
             || import_triangles(model.path, mesh.positions, mesh.triangles, options.wanted(), monitor);
         let imported = clock.time("mesh", import)?;
@@ -169,20 +169,21 @@ pub(crate) fn compile_or_fetch<R: Serialize>(
     key: Option<&Key>,
     needed: &dyn Fn(&Record) -> bool,
     monitor: &dyn Monitor,
-    build: impl FnOnce() -> Result<(Content, R, bool)>,
+    build: impl FnOnce(&dyn Monitor) -> Result<(Content, R, bool)>,
 ) -> Result<CachedCompilation<R>> {
     let fetched = || key.and_then(|key| fetch(cache, key, needed, monitor));
     let (found, _working) = cache.find_or_lock((key, ""), monitor, fetched)?;
     if let Some(found) = found {
         return Ok(found);
     }
-    let (content, built, keep) = build()?;
-    let report = serde_json::to_value(&built).map_err(|e| Error::Internal {
+    let recording = Recording::new(monitor);
+    let (content, built, keep) = build(&recording)?;
+    let report = recording.with_report(&built).map_err(|e| Error::Internal {
         code: "BTH-X081",
         message: format!("the report cannot be written: {e}"),
     })?;
     let record = match (key, keep) {
-        (Some(key), true) => cache.put(key, "", &joined(&content)?, &report, monitor),
+        (Some(key), true) => cache.put(key, "", &joined(&content)?, &report, &recording),
         (Some(key), false) => cache.put_name(key, (content.name(), content.length()), &report, monitor),
         (None, _) => None,
     };
@@ -208,6 +209,7 @@ fn fetch<R>(
     let mut record = cache.find(key, monitor)?;
     let content = if needed(&record) { Some(cache.read(&record, monitor)?.into()) } else { None };
     cache.hit(key, "");
+    replay(&record.report, monitor);
     cache.store()?.touch(&record);
     let report = std::mem::take(&mut record.report);
     Some(CachedCompilation { content, built: None, report, record: Some(record) })

@@ -1,6 +1,6 @@
 //! Tetrahedralizations of single nodes from the cache.
 
-use super::{Cache, decode, encode, keys};
+use super::{Cache, Recording, decode, encode, keys};
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::tets::{NodeInput, NodeJob, NodeReport, NodeResult, NodeRunner, Outcome, TetMesh, TimedNodes};
@@ -30,7 +30,7 @@ impl NodeRunner for CachedNodes<'_> {
         if result.reproducible {
             let encoded = |mesh| encode(&with_ids_of_node(mesh, &input));
             let bytes = result.built.as_ref().map_or(Vec::new(), encoded);
-            self.cache.put(&key, "", &bytes, &result.report, self.monitor);
+            self.cache.put(&key, "", &bytes, &result.report, &Recording::new(self.monitor));
         }
         Ok(result)
     }

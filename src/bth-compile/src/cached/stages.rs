@@ -55,7 +55,7 @@ impl Stages for CachedStages<'_> {
             monitor,
             decode,
             encode,
-            || Ok(MeshSummary::of(Direct.import(model, wanted, monitor)?)),
+            |monitor| Ok(MeshSummary::of(Direct.import(model, wanted, monitor)?)),
         )?;
         self.geometry = Some(summary.geometry);
         Ok((mesh, summary.report))
@@ -89,7 +89,7 @@ impl Stages for CachedStages<'_> {
             monitor,
             |bytes| decode::<Topology>(bytes)?.over(mesh),
             |tree| encode(&Topology::of(tree)),
-            || Direct.bvh(mesh, options, monitor),
+            |monitor| Direct.bvh(mesh, options, monitor),
         )
     }
 
@@ -109,7 +109,7 @@ impl Stages for CachedStages<'_> {
             monitor,
             |bytes| decode(bytes).filter(|found: &free::Free| found.is_of(mesh.triangles.len())),
             encode,
-            || Direct.free(mesh, tree, (built, options), monitor),
+            |monitor| Direct.free(mesh, tree, (built, options), monitor),
         )
     }
 
@@ -129,7 +129,7 @@ impl Stages for CachedStages<'_> {
             monitor,
             |bytes| decode(bytes).filter(|m: &marks::Marks| m.suitable.len() == tree.nodes.len()),
             encode,
-            || Direct.marks(mesh, tree, options, monitor),
+            |monitor| Direct.marks(mesh, tree, options, monitor),
         )
     }
 

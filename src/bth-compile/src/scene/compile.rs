@@ -79,11 +79,12 @@ pub fn compile_cached(
     policy: CachePolicy<'_>,
     monitor: &dyn Monitor,
 ) -> Result<CachedCompilation<SceneReport>> {
-    let mut context = Context::new(options, cache, monitor)?;
+    let context = Context::new(options, cache, monitor)?;
     let mut clock = Clock::default();
     let plan = ScenePlan::of(manifest, source.folder, options, &mut clock)?;
     let key = key(manifest, &plan, &context)?;
-    let outcome = cached::compile_or_fetch(cache, key.as_ref(), policy.needed, monitor, || {
+    let outcome = cached::compile_or_fetch(cache, key.as_ref(), policy.needed, monitor, |monitor| {
+        let mut context = context.with_monitor(monitor);
         context.previous = previous(policy.target, &context);
         let (content, report, index) = build(manifest, &plan, source.name, &context, clock)?;
         if policy.target.is_some() && !options.costs.for_scene {
@@ -329,7 +330,7 @@ fn refused(name: &Path, error: &bth::Error) -> Error {
         bth::Code::Singular | bth::Code::NotFinite => Error::Input {
             code: "BTH-I050",
             place: error::Place::File(name.to_owned()),
-            message: format!("the first frame cannot be shown: {error}"),
+            message: format!("the first frame cannot be shown: {}", error.without_hint()),
             hint: error.hint().to_owned(),
         },
         _ => Error::Internal { code: "BTH-X030", message: format!("the written file fails: {error}") },

@@ -43,7 +43,8 @@ pub(crate) fn compile_meshes(
     let mut clock = Clock::default();
     let plan = plan(&manifest, meshes, &mut clock);
     let key = key(&manifest, &plan, &context)?;
-    let outcome = cached::compile_or_fetch(cache, key.as_ref(), &|_| true, monitor, || {
+    let outcome = cached::compile_or_fetch(cache, key.as_ref(), &|_| true, monitor, |monitor| {
+        let context = context.with_monitor(monitor);
         let (content, report, _) = build(&manifest, &plan, Path::new(SCENE_NAME), &context, clock)?;
         Ok((content, report, false))
     })?;

@@ -10,6 +10,7 @@ use crate::source::TriangleMesh;
 use bth_cache::Key;
 use bth_files::Digest;
 use bth_import::{self as mesh, GltfPart, Mesh};
+use serde::Deserialize;
 
 /// A mesh of a source. The mesh itself is absent while the cache has it; the summary is always present.
 pub(super) struct SourceMesh {
@@ -69,7 +70,9 @@ fn key(file: &File<'_>, part: SourcePart, context: &Context<'_>) -> Key {
 /// The summary of a mesh that the cache has.
 fn known(key: &Key, context: &Context<'_>) -> Option<MeshSummary> {
     let record = context.cache.find(key, context.monitor)?;
-    serde_json::from_value(record.report).ok()
+    let summary = MeshSummary::deserialize(&record.report).ok()?;
+    cached::replay(&record.report, context.monitor);
+    Some(summary)
 }
 
 /// The objects of a file that neither the previous file nor the cache has, with the reasons.
@@ -145,6 +148,9 @@ fn import(file: &File<'_>, parts: &[SourcePart], context: &Context<'_>) -> Resul
     if parts.is_empty() {
         return Ok(Vec::new());
     }
+    // The warnings about a file are kept with the first of its meshes.
+    let recording = cached::Recording::new(context.monitor);
+    let context = &context.with_monitor(&recording);
     let Context { options, monitor, .. } = context;
     if let Some(TriangleMesh { positions, triangles }) = file.in_memory {
         let read = mesh::import_triangles(&file.full, positions, triangles, options.wanted(), *monitor)?;
@@ -152,7 +158,7 @@ fn import(file: &File<'_>, parts: &[SourcePart], context: &Context<'_>) -> Resul
     }
     if let Some(moving) = &file.moving {
         let read = moving.import(&file.digest, context)?;
-        return Ok(vec![keep_mesh(file, SourcePart::Whole, read, context)]);
+        return Ok(vec![keep_mesh(file, SourcePart::Whole, read, context, &recording)]);
     }
     let single: Vec<GltfPart> = parts.iter().filter_map(|part| part.gltf()).collect();
     let meshes = if single.is_empty() {
@@ -162,8 +168,12 @@ fn import(file: &File<'_>, parts: &[SourcePart], context: &Context<'_>) -> Resul
     };
     let meshes = with_opacity(file, &single, meshes, context)?;
     let meshes = file.digest.unchanged(&file.full, meshes)?;
-    let keep = |(part, read)| keep_mesh(file, part, read, context);
-    Ok(parts.iter().copied().zip(meshes).map(keep).collect())
+    let none = cached::Recording::new(*monitor);
+    let keep = |(row, (part, read))| {
+        let recording = if row == 0 { &recording } else { &none };
+        keep_mesh(file, part, read, context, recording)
+    };
+    Ok(parts.iter().copied().zip(meshes).enumerate().map(keep).collect())
 }
 
 /// Keeps a mesh in the cache.
@@ -172,13 +182,14 @@ fn keep_mesh(
     part: SourcePart,
     read: (Mesh, mesh::Report),
     context: &Context<'_>,
+    recording: &cached::Recording<'_>,
 ) -> (Mesh, MeshSummary) {
     let (mesh, summary) = MeshSummary::of(read);
-    let Context { cache, monitor, .. } = context;
+    let cache = context.cache;
     if cache.store().is_some() {
         let name = file.name_of(part);
         cache.miss(&key(file, part, context), &name);
-        cache.put(&key(file, part, context), &name, &cached::encode(&mesh), &summary, *monitor);
+        cache.put(&key(file, part, context), &name, &cached::encode(&mesh), &summary, recording);
     }
     (mesh, summary)
 }

@@ -5,9 +5,10 @@ use super::meshes::SourceMesh;
 use super::object_key::object_key;
 use super::report::ObjectReport;
 use super::sources::File;
-use crate::cached::{CachedStages, ObjectKeys};
+use crate::cached::{CachedStages, ObjectKeys, Recording, replay};
 use crate::costs;
 use crate::error::Result;
+use crate::monitor::Monitor;
 use crate::options::CompileOptions;
 use crate::pipeline::{self, Clock};
 use crate::tets;
@@ -76,16 +77,18 @@ fn build_or_fetch(
     if let Some(found) = found {
         return Ok(found);
     }
+    let recording = Recording::new(*monitor);
+    let monitor: &dyn Monitor = &recording;
     let triangles = clock.time("mesh", || mesh.take(file, context))?;
     if mesh.summary.deformation.is_some() {
-        pipeline::warn_of_options(part, context.options, *monitor);
+        pipeline::warn_of_options(part, context.options, monitor);
     }
     let poses = mesh.part.clip().and_then(|clip| file.clips.poses(&clip, &triangles));
     let (built, reports) = match poses {
-        Some(poses) => pipeline::compile_moving(&file.full, (triangles, &poses), options, clock, *monitor)?,
+        Some(poses) => pipeline::compile_moving(&file.full, (triangles, &poses), options, clock, monitor)?,
         None => {
             let stages = &mut CachedStages::of_object(cache, part, mesh.summary.geometry);
-            pipeline::compile_mesh(&file.full, triangles, options, stages, clock, *monitor)?
+            pipeline::compile_mesh(&file.full, triangles, options, stages, clock, monitor)?
         }
     };
     let report = ObjectReport {
@@ -109,7 +112,7 @@ fn build_or_fetch(
     })?;
     drop(built);
     if let Some(key) = key {
-        cache.put(&key, part, file.bytes(), &record, *monitor);
+        cache.put(&key, part, file.bytes(), &record, &recording);
     }
     Ok(BuiltObject { file, record })
 }
@@ -118,7 +121,8 @@ fn build_or_fetch(
 fn fetch(key: &Key, part: &str, context: &Context<'_>) -> Option<BuiltObject> {
     let record = context.cache.find(key, context.monitor)?;
     let file = context.cache.open(&record, context.monitor).filter(|file| file.object_count() >= 1)?;
-    let report = serde_json::from_value(record.report).ok()?;
+    let report = ObjectRecord::deserialize(&record.report).ok()?;
     context.cache.hit(key, part);
+    replay(&record.report, context.monitor);
     Some(BuiltObject { file, record: report })
 }

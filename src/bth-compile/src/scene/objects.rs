@@ -163,24 +163,25 @@ fn build_all(
 /// Takes objects from a compiled file.
 fn copy(objects: &mut Objects, places: &mut Places<'_>, manifest: &Manifest, file: &File<'_>) -> Result<()> {
     let path = file.full.as_path();
-    let unusable = |e: &dyn std::fmt::Display| Error::Input {
+    let unusable = |found: &str, hint: &str| Error::Input {
         code: "BTH-I051",
         place: Place::File(path.to_owned()),
-        message: format!("expected a compiled file that can be used: {e}"),
-        hint: "compile it again".to_owned(),
+        message: format!("expected a compiled file that can be used: {found}"),
+        hint: hint.to_owned(),
     };
-    let read = Arc::new(bth_format::File::read(path).map_err(|e| unusable(&e))?);
+    let read = bth_format::File::read(path).map_err(|e| unusable(&e.without_hint(), e.hint()))?;
+    let read = Arc::new(read);
     for (part, rows) in &file.parts {
         let SourcePart::Object(object) = *part else { continue };
         let view = read.check(object).map_err(|e| {
             let names: Vec<_> = rows.iter().map(|row| manifest.objects[*row].name.as_str()).collect();
-            unusable(&format!("object \"{}\": {e}", names.join("\", \"")))
+            unusable(&format!("object \"{}\": {}", names.join("\", \""), e.without_hint()), e.hint())
         })?;
         let in_order = |(row, segment): (usize, &layout::Segment)| segment.object as usize == row;
         let segments = read.sequence(object).segments;
         if !segments.iter().enumerate().all(in_order) || read.check_segments().is_err() {
             let found = format!("object {object} has segments that do not follow it");
-            return Err(unusable(&found));
+            return Err(unusable(&found, "compile it again"));
         }
         let mut hasher = blake3::Hasher::new();
         hasher.update(b"compiled");

@@ -64,4 +64,7 @@ impl Monitor for WithoutStages<'_> {
     fn warn(&self, message: &str) {
         self.0.warn(message);
     }
+    fn notice(&self, message: &str) {
+        self.0.notice(message);
+    }
 }

@@ -62,7 +62,7 @@ pub(crate) fn build_through(
     let program = match find(options) {
         Ok(program) => program,
         Err(hint) => {
-            monitor.warn(&hint);
+            monitor.notice(&hint);
             report.worker = WorkerStatus::Missing { hint };
             return Ok((Vec::new(), none_built(report)));
         }
@@ -73,7 +73,7 @@ pub(crate) fn build_through(
     let version = match first.tetgen(monitor)? {
         Ok(tetgen) => tetgen.to_owned(),
         Err(error) => {
-            monitor.warn(&error.to_string());
+            monitor.notice(&error.to_string());
             report.worker = WorkerStatus::Unusable { reason: error.to_string() };
             return Ok((Vec::new(), none_built(report)));
         }

@@ -132,9 +132,9 @@ pub(crate) struct Gltf {
     /// taken.
     #[arg(long, value_name = "ANIMATION")]
     pub(crate) animation: Option<String>,
-    /// Frames per second.
-    #[arg(long, default_value_t = 24.0, value_parser = positive)]
-    pub(crate) rate: f64,
+    /// Frames per second; 24 by default.
+    #[arg(long, value_parser = positive)]
+    pub(crate) rate: Option<f64>,
     /// Leave meshes with skins and morph targets at rest; by default they deform where an animation moves them.
     #[arg(long)]
     pub(crate) at_rest: bool,
@@ -148,6 +148,19 @@ pub(crate) struct Gltf {
 }
 
 impl Gltf {
+    /// The first of these options that is given.
+    pub(crate) fn given(&self) -> Option<&'static str> {
+        let options = [
+            ("--scene", self.scene.is_some()),
+            ("--animation", self.animation.is_some()),
+            ("--rate", self.rate.is_some()),
+            ("--at-rest", self.at_rest),
+            ("--rigid-parts", self.rigid_parts),
+            ("--strict", self.strict),
+        ];
+        options.into_iter().find(|(_, given)| *given).map(|(name, _)| name)
+    }
+
     /// The options of the import.
     pub(crate) fn options(&self) -> bth_import::gltf::scene::ImportOptions {
         use bth_import::gltf::Chosen;
@@ -160,7 +173,7 @@ impl Gltf {
         bth_import::gltf::scene::ImportOptions {
             scene: self.scene.clone(),
             animation,
-            rate: self.rate,
+            rate: self.rate.unwrap_or(24.0),
             deform: !self.at_rest,
             rigid_parts: self.rigid_parts,
             strict: self.strict,

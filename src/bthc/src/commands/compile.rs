@@ -36,7 +36,8 @@ pub(crate) fn run(args: &Compile) -> Result<(), Failure> {
     }
     let mut jobs = plan(args, &models)?;
     check_rays(args, &jobs)?;
-    let progress = Progress::new(args.quiet || args.json);
+    check_gltf(args, &jobs)?;
+    let progress = Progress::with_warnings(args.quiet || args.json, !args.quiet);
     let store = args.keeping.store(&|text| progress.warn(text))?;
     let options = CompileOptions {
         objects_memory: jobs::memory_of_objects(args, jobs.len()),
@@ -145,6 +146,24 @@ fn check_rays(args: &Compile, jobs: &[Job]) -> Result<(), Failure> {
             format!("--rays are rays through one model, and there are {}", jobs.len()),
             "compile them one by one",
         ),
+    }
+}
+
+/// Fails if options for glTF files are given and there is none that they could be about.
+fn check_gltf(args: &Compile, jobs: &[Job]) -> Result<(), Failure> {
+    let without = |option: &str, what: &str| Failure::Usage {
+        message: format!("{option} is about {what}, and there is none among the models"),
+        hint: "leave it out; manifests say themselves what they show",
+    };
+    if args.flatten && !jobs.iter().any(|job| scene::is_gltf(&job.model)) {
+        return Err(without("--flatten", "glTF files"));
+    }
+    let is_gltf_scene = |job: &Job| scene::is_gltf(&job.model) && scene::is_scene(&job.model, args);
+    match args.gltf.given() {
+        Some(option) if !jobs.iter().any(is_gltf_scene) => {
+            Err(without(option, "glTF files that are compiled as scenes"))
+        }
+        _ => Ok(()),
     }
 }
 

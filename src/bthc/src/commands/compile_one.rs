@@ -4,9 +4,11 @@ use super::job::{Job, JobContext, JobReport, cache};
 use super::summary::summary;
 use super::{deliver, scene};
 use crate::failure::Failure;
+use crate::progress::Collecting;
 use bth_compile::Monitor;
 
-/// Compiles a model or scene, or takes it from the cache, and brings it to its target.
+/// Compiles a model or scene, or takes it from the cache, and brings it to its target. The report has the warnings, those of an earlier
+/// compilation included whose results are taken.
 ///
 /// # Errors
 /// If it cannot be compiled or written.
@@ -15,6 +17,13 @@ pub(super) fn compile_one(
     job: &Job,
     monitor: &dyn Monitor,
 ) -> Result<JobReport, Failure> {
+    let collecting = Collecting::new(monitor);
+    let mut report = compile_job(context, job, &collecting)?;
+    report.json["warnings"] = collecting.into_warnings().into();
+    Ok(report)
+}
+
+fn compile_job(context: &JobContext<'_>, job: &Job, monitor: &dyn Monitor) -> Result<JobReport, Failure> {
     if scene::is_scene(&job.model, context.args) {
         return scene::compile(context, job, monitor);
     }

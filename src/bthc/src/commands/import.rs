@@ -19,11 +19,20 @@ pub(crate) fn run(args: &Import) -> Result<(), Failure> {
         return Err(Failure::Usage { message, hint: "manifests of other models are written by hand" });
     }
     let path = args.output.clone().unwrap_or_else(|| args.model.with_extension("manifest"));
+    let to_stdout = path.as_os_str() == "-";
+    if to_stdout && args.json {
+        let message = "standard output takes the manifest or one JSON object".to_owned();
+        return Err(Failure::Usage { message, hint: "name a file with -o" });
+    }
     overwrite::check(&path, [&args.model])?;
     let name = name_from(folder(&path), &args.model)?;
-    let progress = Progress::new(args.quiet || args.json);
+    let progress = Progress::with_warnings(args.quiet || args.json, !args.quiet);
     let (manifest, report) = scene::import(&args.model, &name, &args.gltf.options(), &progress)?;
     let text = format!("# From {name}, scene {}.\n{}", comment(&report.scene), manifest.to_toml());
+    if to_stdout {
+        drop(progress);
+        return Ok(output::text(&text)?);
+    }
     write::write_atomically(&path, text.as_bytes())?;
     drop(progress);
     if args.json {

@@ -20,9 +20,11 @@ function compileModule() {
     const small = "llvm-args=-inline-threshold=5";
     // Calls and addresses as short as they are, in place of five bytes each.
     const short = "link-arg=--compress-relocations";
+    // The stack pointer, which index.js sets back after a call that did not end.
+    const stack = "link-arg=--export=__stack_pointer";
     // Panics name files of crates: without the folder of whoever builds, so that the same sources give the same module.
     const crates = `--remap-path-prefix=${process.env.CARGO_HOME ?? join(homedir(), ".cargo")}=cargo`;
-    const flags = [...(process.env.RUSTFLAGS ?? "").split(" "), "-C", "target-feature=+simd128", "-C", small, "-C", short, crates];
+    const flags = [...(process.env.RUSTFLAGS ?? "").split(" "), "-C", "target-feature=+simd128", "-C", small, "-C", short, "-C", stack, crates];
     const CARGO_ENCODED_RUSTFLAGS = flags.filter((flag) => flag !== "").join("\x1f");
     // BLAKE3 in plain Rust, so that no C compiler for the target is needed.
     execFileSync("cargo", [...arguments_, "--features", "bth/small,bth-format/pure"], { cwd: root, stdio: "inherit", env: { ...process.env, CARGO_ENCODED_RUSTFLAGS } });

@@ -7,7 +7,7 @@ export class Bth {
     readonly simd: boolean;
     /**
      * Opens a compiled file, of which it keeps a copy. All indices are checked, so that no file can make tracing unsafe.
-     * @throws BthError with a code of the specification if the file is damaged, too new, or too large for the memory.
+     * @throws BthError with a code of the specification if the file is damaged or too new; with BTH-O001 if the memory is too small.
      */
     open(file: ArrayBuffer | ArrayBufferView): Scene;
 }
@@ -30,7 +30,8 @@ export class BthError extends Error {
 /**
  * An open file. Rays are a Float32Array of eight numbers each: origin x, y, z, least t, direction x, y, z, greatest t, in world
  * space. Directions need not be normalized; t is in units of their length. About a thousand coherent rays that are adjacent, such as
- * a tile of a picture, are traced fastest. Answers are exact, and the same bits as on every other machine.
+ * a tile of a picture, are traced fastest. Answers are exact, and the same bits as on every other machine. Queries throw a BthError
+ * with BTH-O001 where the memory is too small for them, and can be asked again when other scenes were closed.
  */
 export interface Scene {
     /** Number of objects. */
@@ -43,7 +44,11 @@ export interface Scene {
     readonly frames: { first: number; last: number; rate: number } | null;
     /** Box in world space that contains what can be seen at the scene's time; null if that is nothing. */
     readonly bounds: { lower: Vector; upper: Vector } | null;
-    /** The scene's time in seconds. @throws BthError if an instance cannot be placed at that time; the scene is then unchanged. */
+    /**
+     * The scene's time in seconds.
+     * @throws BthError if an instance cannot be placed at that time; the scene is then unchanged. With BTH-O001 if the memory is too
+     * small; the scene can then only be closed.
+     */
     seconds: number;
     /** The nearest hit of each ray. */
     nearest(rays: Float32Array): Hits;

@@ -11,8 +11,8 @@ const WORDS = CHUNK * (HIT_COLUMNS + SURFACE_COLUMNS);
 
 /** What the library refuses: `code` is that of the error, such as "BTH-F001", or "" where it has none. */
 export class BthError extends Error {
-    constructor(message) {
-        super(message);
+    constructor(message, options) {
+        super(message, options);
         this.name = "BthError";
         this.code = /BTH-[A-Z]\d+/.exec(message)?.[0] ?? "";
     }
@@ -22,7 +22,32 @@ export class BthError extends Error {
 export async function load(source = new URL("./bth.wasm", import.meta.url)) {
     const module = source instanceof WebAssembly.Module ? source : await compile(await source);
     const { exports } = await WebAssembly.instantiate(module, {});
-    return new Bth(exports, module);
+    return new Bth(guarded(exports), module);
+}
+
+/** What is said where the module has too little memory for something. */
+function noMemory(what, memory, options) {
+    return new BthError(`BTH-O001: not enough memory for ${what} (the module has ${Math.round(memory.buffer.byteLength / 2 ** 20)} MiB)`, options);
+}
+
+/**
+ * What the module exports, with functions that throw a BthError where the module cannot get memory: it then executes "unreachable". Its
+ * stack stays as deep as it was at such a trap, so that the stack pointer is set back, else some traps would leave no stack.
+ */
+function guarded(exports) {
+    const { memory, __stack_pointer: stack } = exports;
+    const guard = (call) => (...numbers) => {
+        const top = stack.value;
+        try {
+            return call(...numbers);
+        } catch (error) {
+            if (!(error instanceof WebAssembly.RuntimeError)) throw error;
+            stack.value = top;
+            throw /unreachable/i.test(error.message) ? noMemory("this call", memory, { cause: error }) : error;
+        }
+    };
+    const calls = Object.entries(exports).filter(([, call]) => typeof call === "function");
+    return { memory, ...Object.fromEntries(calls.map(([name, call]) => [name, guard(call)])) };
 }
 
 async function compile(source) {
@@ -53,8 +78,9 @@ export class Bth {
         const bytes = ArrayBuffer.isView(file)
             ? new Uint8Array(file.buffer, file.byteOffset, file.byteLength)
             : new Uint8Array(file);
-        const memory = this.#wasm.bth_file_new(bytes.length);
-        if (memory === 0) throw this.#error();
+        // The module counts bytes with 32 bits.
+        const memory = bytes.length < 2 ** 32 ? this.#wasm.bth_file_new(bytes.length) : 0;
+        if (memory === 0) throw noMemory(`a file of ${bytes.length} bytes`, this.#wasm.memory);
         new Uint8Array(this.#wasm.memory.buffer, this.#wasm.bth_file_bytes(memory) >>> 0, bytes.length).set(bytes);
         const scene = this.#wasm.bth_open(memory);
         if (scene === 0) throw this.#error();
@@ -74,6 +100,8 @@ class Scene {
     #memory;
     #scene;
     #error;
+    /** Whether memory ended while the time was set, so that instances may be at different times. */
+    #torn = false;
 
     constructor(wasm, memory, scene, error) {
         this.#wasm = wasm;
@@ -98,7 +126,11 @@ class Scene {
     }
 
     set seconds(seconds) {
-        if (this.#wasm.bth_set_seconds(this.#open(), seconds) === 0) throw this.#error();
+        const scene = this.#open();
+        this.#torn = true;
+        const set = this.#wasm.bth_set_seconds(scene, seconds);
+        this.#torn = false;
+        if (set === 0) throw this.#error();
     }
 
     nearest(rays) {
@@ -159,13 +191,15 @@ class Scene {
     }
 
     close() {
-        if (this.#scene !== 0) this.#wasm.bth_close(this.#scene);
+        const scene = this.#scene;
         this.#scene = 0;
+        if (scene !== 0) this.#wasm.bth_close(scene);
     }
 
     /** The address of the scene. */
     #open() {
         if (this.#scene === 0) throw new BthError("the scene is closed");
+        if (this.#torn) throw new BthError("memory ended while the time of the scene was set: it can only be closed");
         return this.#scene;
     }
 

@@ -162,6 +162,49 @@ test("arguments of the wrong kind and closed scenes are errors", () => {
     assert.throws(() => scene.nearest(new Float32Array(8)), BthError);
 });
 
+/** The module with a memory of at most so many pages of 64 KiB. */
+function withMemory(module, pages) {
+    const leb = (number) => (number < 128 ? [number] : [(number & 127) | 128, ...leb(number >> 7)]);
+    const read = (at) => {
+        let value = 0, shift = 0;
+        do (value |= (module[at] & 127) << shift), (shift += 7);
+        while (module[at++] & 128);
+        return [value, at];
+    };
+    for (let at = 8; at < module.length; ) {
+        const [length, from] = read(at + 1);
+        if (module[at] === 5) {
+            // One memory: whether it has a maximum, its minimum, its maximum.
+            const section = [1, 1, ...leb(read(from + 2)[0]), ...leb(pages)];
+            return Buffer.concat([module.subarray(0, at), Buffer.from([5, section.length, ...section]), module.subarray(from + length)]);
+        }
+        at = from + length;
+    }
+    throw new Error("the module has no memory");
+}
+
+test("where memory ends calls throw errors, and work again when there is some", async () => {
+    const full = await load(withMemory(readFileSync(join(process.env.DIST, "bth.wasm")), 256));
+    const file = (name) => readFileSync(join(conformance, "valid", name));
+    const model = full.open(file("tets-link32.bth")), moving = full.open(file("deformers.bth"));
+    const rays = raysInto(model.bounds, 4096, 5);
+    const expected = bth.open(file("tets-link32.bth")).nearest(rays);
+    const noMemory = (error) => error instanceof BthError && error.code === "BTH-O001" && /not enough memory/.test(error.message);
+    const others = [];
+    for (const name of ["tets-link32.bth", "two-objects.bth", "no-objects.bth"]) {
+        const bytes = file(name);
+        assert.throws(() => { for (;;) others.push(full.open(bytes)); }, noMemory);
+    }
+    assert.throws(() => full.open(new ArrayBuffer(1 << 24)), noMemory);
+    // Each trap would leave a part of the stack in use, of which there is 1 MiB.
+    for (let i = 0; i < 300; i++) assert.throws(() => model.nearest(rays), noMemory);
+    assert.throws(() => (moving.seconds = 1), noMemory);
+    assert.throws(() => moving.bounds, BthError);
+    for (const scene of [...others, moving]) scene.close();
+    assert.deepEqual(model.nearest(rays), expected);
+    full.open(file("deformers.bth")).seconds = 1;
+});
+
 test("a compiled module and bytes can be loaded", async () => {
     assert.ok((await load(bth.module)).simd);
     assert.ok((await load(readFileSync(join(process.env.DIST, "bth.wasm")))).simd);

@@ -7,9 +7,10 @@ export class Bth {
     readonly simd: boolean;
     /**
      * Opens a compiled file, of which it keeps a copy. All indices are checked, so that no file can make tracing unsafe.
+     * @throws TypeError for anything but bytes, such as a promise of them.
      * @throws BthError with a code of the specification if the file is damaged or too new; with BTH-O001 if the memory is too small.
      */
-    open(file: ArrayBuffer | ArrayBufferView): Scene;
+    open(file: ArrayBufferLike | ArrayBufferView): Scene;
 }
 
 /**
@@ -31,7 +32,8 @@ export class BthError extends Error {
  * An open file. Rays are a Float32Array of eight numbers each: origin x, y, z, least t, direction x, y, z, greatest t, in world
  * space. Directions need not be normalized; t is in units of their length. About a thousand coherent rays that are adjacent, such as
  * a tile of a picture, are traced fastest. Answers are exact, and the same bits as on every other machine. Queries throw a BthError
- * with BTH-O001 where the memory is too small for them, and can be asked again when other scenes were closed.
+ * with BTH-O001 where the memory is too small for them, and can be asked again when other scenes were closed. They throw a TypeError
+ * for rays of another kind, or whose buffer was transferred.
  */
 export interface Scene {
     /** Number of objects. */
@@ -46,6 +48,7 @@ export interface Scene {
     readonly bounds: { lower: Vector; upper: Vector } | null;
     /**
      * The scene's time in seconds.
+     * @throws TypeError unless it is a finite number.
      * @throws BthError if an instance cannot be placed at that time; the scene is then unchanged. With BTH-O001 if the memory is too
      * small; the scene can then only be closed.
      */
@@ -56,7 +59,10 @@ export interface Scene {
     any(rays: Float32Array): Uint8Array;
     /** What the search for the nearest hit of each ray visits. */
     steps(rays: Float32Array): Steps;
-    /** The surface at hits of this scene at its present time. */
+    /**
+     * The surface at hits of this scene at its present time. Any object with the columns of hits will do, such as a copy from a worker.
+     * @throws TypeError unless each column has its type and `count` elements.
+     */
     surface(hits: Hits): Surface;
     /** Frees the scene's memory. All other methods throw from then on. */
     close(): void;

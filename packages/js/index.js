@@ -4,6 +4,8 @@
 const CHUNK = 4096;
 /** Numbers of a ray: origin, tmin, direction, tmax. */
 const RAY = 8;
+/** Columns of hits: the first three are numbers, the others indices. */
+const HIT_NAMES = ["t", "u", "v", "instance", "triangle"];
 /** Columns of the results of the module's functions. */
 const HIT_COLUMNS = 5, STEP_COLUMNS = 4, SURFACE_COLUMNS = 18;
 /** Words of memory that a chunk needs at most: hits and their surfaces. */
@@ -75,9 +77,7 @@ export class Bth {
     }
 
     open(file) {
-        const bytes = ArrayBuffer.isView(file)
-            ? new Uint8Array(file.buffer, file.byteOffset, file.byteLength)
-            : new Uint8Array(file);
+        const bytes = bytesOf(file);
         // The module counts bytes with 32 bits.
         const memory = bytes.length < 2 ** 32 ? this.#wasm.bth_file_new(bytes.length) : 0;
         if (memory === 0) throw noMemory(`a file of ${bytes.length} bytes`, this.#wasm.memory);
@@ -126,6 +126,7 @@ class Scene {
     }
 
     set seconds(seconds) {
+        if (!Number.isFinite(seconds)) throw new TypeError(`seconds: expected a finite number, found ${String(seconds)}`);
         const scene = this.#open();
         this.#torn = true;
         const set = this.#wasm.bth_set_seconds(scene, seconds);
@@ -136,7 +137,7 @@ class Scene {
     nearest(rays) {
         const count = countOf(rays);
         const hits = new Hits(count);
-        const columns = [hits.t, hits.u, hits.v, hits.instance, hits.triangle];
+        const columns = HIT_NAMES.map((name) => hits[name]);
         this.#inChunks(rays, count, (from, n) => {
             this.#wasm.bth_nearest(this.#scene, this.#memory.rays, n, this.#memory.results);
             this.#columns(columns, this.#memory.results, from, n);
@@ -167,10 +168,11 @@ class Scene {
 
     surface(hits) {
         const scene = this.#open();
+        checkHits(hits);
         const surface = new Surface(hits.count);
         const { results } = this.#memory;
         const surfaces = results + 4 * CHUNK * HIT_COLUMNS;
-        const columns = [hits.t, hits.u, hits.v, hits.instance, hits.triangle];
+        const columns = HIT_NAMES.map((name) => hits[name]);
         for (let from = 0; from < hits.count; from += CHUNK) {
             const n = Math.min(CHUNK, hits.count - from);
             columns.forEach((column, k) => {
@@ -228,12 +230,47 @@ class Scene {
     }
 }
 
+/** What an argument is, for errors. */
+function kindOf(value) {
+    return value?.constructor?.name ?? String(value);
+}
+
+/** The bytes of a file, which come as a buffer or as a view of one. */
+function bytesOf(file) {
+    if (ArrayBuffer.isView(file)) return new Uint8Array(file.buffer, file.byteOffset, file.byteLength);
+    // Buffers of other windows are instances of other classes.
+    if (/^\[object (Shared)?ArrayBuffer\]$/.test(Object.prototype.toString.call(file))) return new Uint8Array(file);
+    const hint = typeof file?.then === "function" ? ": await it" : typeof file?.arrayBuffer === "function" ? ": await its arrayBuffer()" : "";
+    throw new TypeError(`file: expected an ArrayBuffer or a view of one, with the bytes of a file; found ${kindOf(file)}${hint}`);
+}
+
 /** Number of rays in an array. */
 function countOf(rays) {
     if (!(rays instanceof Float32Array) || rays.length % RAY !== 0) {
         throw new TypeError("rays: expected a Float32Array of eight numbers a ray (origin, tmin, direction, tmax)");
     }
+    if (rays.length === 0 && isDetached(rays.buffer)) throw new TypeError("rays: their buffer is detached; it was transferred");
     return rays.length / RAY;
+}
+
+/** Whether a buffer was transferred, for example to a worker. `detached` is younger than some of the supported programs. */
+function isDetached(buffer) {
+    try {
+        new Uint8Array(buffer);
+        return false;
+    } catch {
+        return true;
+    }
+}
+
+/** Refuses hits whose columns are not those of their number of rays. */
+function checkHits(hits) {
+    HIT_NAMES.forEach((name, k) => {
+        const column = hits?.[name], of = k < 3 ? Float32Array : Uint32Array;
+        if (column instanceof of && column.length === hits.count) return;
+        const found = `${kindOf(column)} of ${column?.length}`;
+        throw new TypeError(`hits.${name}: expected a ${of.name} of ${hits?.count} elements, as many as there are rays; found ${found}`);
+    });
 }
 
 /** Element k of the vector of hit i is element i of column k. */

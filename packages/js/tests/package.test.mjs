@@ -8,6 +8,7 @@ import { tmpdir } from "node:os";
 import { dirname, join, resolve } from "node:path";
 import { after, before, test } from "node:test";
 import { fileURLToPath, pathToFileURL } from "node:url";
+import { runInNewContext } from "node:vm";
 
 const here = dirname(fileURLToPath(import.meta.url)), conformance = resolve(here, "../../../format-spec/conformance");
 const { BTHC, BTH_SCENES } = process.env;
@@ -157,6 +158,12 @@ test("arguments of the wrong kind and closed scenes are errors", () => {
     const scene = bth.open(readFileSync(join(conformance, "valid/triangle.bth")));
     assert.throws(() => scene.nearest(new Float32Array(9)), TypeError);
     assert.throws(() => scene.any([0, 0, 0, 0, 0, 0, 1, 1]), TypeError);
+    const sent = new Float32Array(8);
+    structuredClone(sent, { transfer: [sent.buffer] });
+    for (const query of ["nearest", "any", "steps"]) {
+        assert.throws(() => scene[query](sent), (error) => error instanceof TypeError && /detached/.test(error.message));
+        scene[query](new Float32Array(0));
+    }
     scene.close();
     scene.close();
     assert.throws(() => scene.nearest(new Float32Array(8)), BthError);
@@ -203,6 +210,49 @@ test("where memory ends calls throw errors, and work again when there is some", 
     for (const scene of [...others, moving]) scene.close();
     assert.deepEqual(model.nearest(rays), expected);
     full.open(file("deformers.bth")).seconds = 1;
+});
+
+test("what is no file is refused with what is expected", async () => {
+    const bytes = readFileSync(join(conformance, "valid/triangle.bth"));
+    const buffer = bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length), shared = new SharedArrayBuffer(bytes.length);
+    new Uint8Array(shared).set(bytes);
+    for (const file of [bytes, buffer, shared, new DataView(buffer), runInNewContext("new Uint8Array(bytes).buffer", { bytes })]) bth.open(file).close();
+    const refused = (file, found) => assert.throws(() => bth.open(file), (error) => error instanceof TypeError && found.test(error.message), String(found));
+    refused(Promise.resolve(buffer), /expected an ArrayBuffer .* found Promise: await it$/);
+    refused(new Response(buffer), /found Response: await its arrayBuffer\(\)$/);
+    refused(new Blob([bytes]), /found Blob: await its arrayBuffer\(\)$/);
+    refused("triangle.bth", /found String$/);
+    refused(5, /found Number$/);
+    refused(undefined, /found undefined$/);
+    refused(null, /found null$/);
+    refused([...bytes], /found Array$/);
+    structuredClone(buffer, { transfer: [buffer] });
+    refused(buffer, /detached/);
+});
+
+test("hits need all their columns", () => {
+    const scene = bth.open(readFileSync(join(conformance, "valid/triangle.bth")));
+    const hits = scene.nearest(Float32Array.of(0.25, 0.25, 1, 0, 0, 0, -1, Infinity, 0.5, 0.25, 1, 0, 0, 0, -1, Infinity));
+    assert.equal(scene.surface(structuredClone({ ...hits })).count, 2);
+    const refused = (changed) => assert.throws(() => scene.surface({ ...hits, ...changed }), TypeError, Object.keys(changed).join());
+    refused({ triangle: hits.triangle.subarray(1) });
+    refused({ t: hits.t.subarray(1) });
+    refused({ u: Float64Array.from(hits.u) });
+    refused({ v: [...hits.v] });
+    refused({ instance: Int32Array.from(hits.instance) });
+    refused({ v: undefined });
+    refused({ count: 3 });
+    refused({ count: undefined });
+    assert.throws(() => scene.surface(), TypeError);
+});
+
+test("a time is a finite number", () => {
+    const scene = bth.open(readFileSync(join(conformance, "valid/scene-moving.bth")));
+    scene.seconds = 0.5;
+    for (const seconds of [NaN, Infinity, -Infinity, "1", "abc", undefined, null, 1n]) {
+        assert.throws(() => (scene.seconds = seconds), TypeError, String(seconds));
+    }
+    assert.equal(scene.seconds, 0.5);
 });
 
 test("a compiled module and bytes can be loaded", async () => {

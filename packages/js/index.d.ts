@@ -2,7 +2,7 @@
 export class Bth {
     private constructor();
     /** The compiled module. Send it to workers, and `load` it there. */
-    readonly module: WebAssembly.Module;
+    readonly module: CompiledModule;
     /** Whether the module has vector instructions (SIMD128). */
     readonly simd: boolean;
     /**
@@ -19,8 +19,24 @@ export class Bth {
  * beside this one.
  */
 export function load(
-    source?: string | URL | Response | Promise<Response> | BufferSource | WebAssembly.Module,
+    source?: string | UrlLike | ResponseLike | Promise<ResponseLike> | ArrayBuffer | ArrayBufferView | CompiledModule,
 ): Promise<Bth>;
+
+// These stand for types that only the library "dom" of TypeScript and the types of node have, which a program may do without.
+
+/** A WebAssembly.Module. */
+export type CompiledModule = object;
+
+/** A URL. */
+export interface UrlLike {
+    readonly href: string;
+}
+
+/** A Response. */
+export interface ResponseLike {
+    readonly status: number;
+    arrayBuffer(): Promise<ArrayBuffer>;
+}
 
 /** What the library refuses. */
 export class BthError extends Error {

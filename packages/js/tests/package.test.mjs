@@ -1,9 +1,9 @@
 // The package in node: answers beside those of bthc, errors, what a file holds.
 //
-//   DIST=FOLDER BTHC=PROGRAM BTH_SCENES=PROGRAM node --test package.test.mjs
+//   DIST=FOLDER BTHC=PROGRAM BTH_SCENES=PROGRAM [TSC=PROGRAM] node --test package.test.mjs
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
-import { mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
+import { copyFileSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { dirname, join, resolve } from "node:path";
 import { after, before, test } from "node:test";
@@ -253,6 +253,26 @@ test("a time is a finite number", () => {
         assert.throws(() => (scene.seconds = seconds), TypeError, String(seconds));
     }
     assert.equal(scene.seconds, 0.5);
+});
+
+test("the types need no library but ES2022", (t) => {
+    const types = join(process.env.DIST, "index.d.ts"), code = readFileSync(types, "utf8").replace(/\/\*[^]*?\*\/|\/\/.*/g, "");
+    assert.doesNotMatch(code, /\b(WebAssembly|BufferSource|URL|Response|Blob|Worker|Buffer)\b/);
+    if (!process.env.TSC) return t.diagnostic("no compiler of TypeScript: TSC names none");
+    // A program of each kind: without other types, and with those of browsers.
+    for (const [lib, more] of [["es2022", ""], ["es2022,dom", "load(fetch(new URL('a', 'b:'))); new WebAssembly.Instance(bth.module); new Worker('').postMessage(bth.module);"]]) {
+        const program = join(folder, "program.ts");
+        writeFileSync(program, `import { load, BthError, type Bth, type Scene, type Surface } from "./bth/index.js";
+            const bth: Bth = await load(new Uint8Array(8));
+            await load(bth.module);
+            const scene: Scene = bth.open(new ArrayBuffer(8));
+            const surface: Surface = scene.surface(scene.nearest(Float32Array.of(1)));
+            ${more} export { surface, BthError };`);
+        mkdirSync(join(folder, "bth"), { recursive: true });
+        copyFileSync(types, join(folder, "bth/index.d.ts"));
+        const options = ["--strict", "--noEmit", "--lib", lib, "--types", "", "--target", "es2022", "--module", "esnext", "--moduleResolution", "bundler"];
+        execFileSync(process.env.TSC, [...options, program], { encoding: "utf8" });
+    }
 });
 
 test("a compiled module and bytes can be loaded", async () => {

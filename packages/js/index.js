@@ -34,7 +34,8 @@ function noMemory(what, memory, options) {
 
 /**
  * What the module exports, with functions that throw a BthError where the module cannot get memory: it then executes "unreachable". Its
- * stack stays as deep as it was at such a trap, so that the stack pointer is set back, else some traps would leave no stack.
+ * stack stays as deep as it was at such a trap, so that the stack pointer is set back, else some traps would leave no stack. A panic,
+ * which would be a defect of the library, ends in the same way; the trap is the error's cause.
  */
 function guarded(exports) {
     const { memory, __stack_pointer: stack } = exports;

@@ -5,14 +5,14 @@
 // With BTH_BLESS=1 the pictures are written to expected/ in place of compared; look at them.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { dirname, join, resolve } from "node:path";
 import { after, before, test } from "node:test";
 import { fileURLToPath, pathToFileURL } from "node:url";
 import { Browser } from "./browser.mjs";
 
-const here = dirname(fileURLToPath(import.meta.url));
+const here = dirname(fileURLToPath(import.meta.url)), valid = resolve(here, "../../../format-spec/conformance/valid");
 const { BTHC, BTH_SCENES, CHROMIUM } = process.env;
 const WIDTH = 320, HEIGHT = 240;
 /** Greatest difference of the means of a square of 16 pixels, of 255: what other compilers of sines make of the same samples. */
@@ -105,8 +105,104 @@ test("a damaged file is refused with its code, and the model stays", async () =>
     writeFileSync(damaged, bytes);
     await browser.drop(damaged, WIDTH / 2, HEIGHT / 2);
     await browser.until("/damaged.bth: .*BTH-F002/.test(document.getElementById('message').textContent)");
-    await browser.value(`document.getElementById("message").hidden = true`);
+    await hidesMessage();
     assert.ok((await difference(before, await picture())) <= MOST);
+});
+
+/** What the page says in its middle. */
+const message = () => browser.value(`(({ hidden, textContent }) => (hidden ? "" : textContent))(document.getElementById("message"))`);
+
+/** Does what hides the message of something that failed: a press of the pointer, or of a key that has no meaning. */
+async function hidesMessage(key) {
+    assert.notEqual(await message(), "");
+    if (key) {
+        for (const type of ["keyDown", "keyUp"]) await browser.send("Input.dispatchKeyEvent", { type, key });
+    } else {
+        for (const type of ["mousePressed", "mouseReleased"]) await browser.mouse(type, 100, 150);
+    }
+    assert.equal(await message(), "");
+}
+
+test("a file with nothing to see is refused, and the model stays and can be turned", async () => {
+    const before = await picture();
+    await browser.drop(join(valid, "no-objects.bth"), WIDTH / 2, HEIGHT / 2);
+    await browser.until("/no-objects.bth: there is nothing to see/.test(document.getElementById('message').textContent)");
+    await hidesMessage("Shift");
+    assert.match(await browser.value("document.getElementById('status').textContent"), /^knot\.bth/);
+    await browser.mouse("mousePressed", 100, 150);
+    await browser.mouse("mouseMoved", 200, 150);
+    await browser.mouse("mouseReleased", 200, 150);
+    assert.ok((await difference(before, await picture())) > 20);
+    await browser.value(`document.getElementById("reset").click()`);
+    assert.ok((await difference(before, await picture())) <= MOST);
+});
+
+test("a folder is refused, and the model stays", async () => {
+    const before = await picture(), dropped = join(folder, "a folder");
+    mkdirSync(dropped);
+    await browser.drop(dropped, WIDTH / 2, HEIGHT / 2);
+    await browser.until("/a folder: this is a folder, or a file that cannot be read/.test(document.getElementById('message').textContent)");
+    await hidesMessage();
+    assert.ok((await difference(before, await picture())) <= MOST);
+});
+
+test("of two files that are opened at a time the later is shown", async () => {
+    const [large, small] = [model, join(valid, "triangle.bth")].map((path) => readFileSync(path, "base64"));
+    const status = await browser.value(`(async () => {
+        const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
+        // Workers of the older open it slowly, as they do a large file.
+        const { Worker } = window;
+        window.Worker = class extends Worker {
+            postMessage(request, transfer) {
+                setTimeout(() => super.postMessage(request, transfer), 300);
+            }
+        };
+        const older = viewer.open(bytes("${large}"), "older");
+        await new Promise((resolve) => setTimeout(resolve, 100));
+        window.Worker = Worker;
+        // The bytes of another older one come late.
+        const late = new Promise((resolve) => setTimeout(resolve, 900, bytes("${large}")));
+        await Promise.all([older, viewer.open(late, "late"), viewer.open(bytes("${small}"), "newer")]);
+        await viewer.whenSettled();
+        return document.getElementById("status").textContent;
+    })()`);
+    assert.match(status, /^newer · 1 triangles/);
+    assert.equal(await message(), "");
+});
+
+test("a scene that is empty at first is shown once there is something", async () => {
+    await browser.drop(join(valid, "scene-moving.bth"), WIDTH / 2, HEIGHT / 2);
+    await browser.until("document.getElementById('status').textContent === 'scene-moving.bth'");
+    assert.match(await message(), /nothing to see in this frame/);
+    const blank = await browser.screenshot();
+    const slider = "document.getElementById('time')";
+    assert.equal(await browser.value(`${slider}.parentElement.hidden`), false);
+    // Neither a press nor a key breaks anything while there is no view.
+    for (const type of ["mousePressed", "mouseReleased"]) await browser.mouse(type, 100, 150);
+    for (const key of ["r", "u", "u"]) await browser.send("Input.dispatchKeyEvent", { type: "keyDown", key, text: key });
+    await browser.value(`${slider}.value = ${slider}.max; ${slider}.dispatchEvent(new Event("input"))`);
+    await browser.until("/^scene-moving.bth · .*4 of 4 samples/.test(document.getElementById('status').textContent)");
+    assert.equal(await message(), "");
+    assert.ok((await difference(blank, await picture())) > 20);
+});
+
+test("the first view of an upright window shows all of the model", async () => {
+    const resize = (width, height) => browser.send("Emulation.setDeviceMetricsOverride", { width, height, deviceScaleFactor: 1, mobile: false });
+    await browser.drop(model, WIDTH / 2, HEIGHT / 2);
+    await browser.until("/^knot.bth · .*4 of 4 samples/.test(document.getElementById('status').textContent)");
+    await resize(200, 500);
+    await browser.until("innerWidth === 200");
+    await browser.value(`document.getElementById("reset").click()`);
+    await browser.value("viewer.whenSettled()");
+    // In this mode nothing but the model differs from the corner of the picture.
+    const [left, right] = await browser.value(`(() => {
+        const { width, height } = document.getElementById("picture");
+        const pixels = new Uint32Array(document.getElementById("picture").getContext("2d").getImageData(0, 0, width, height).data.buffer);
+        const columns = Array.from({ length: width }, (_, x) => x).filter((x) => pixels.some((p, i) => i % width === x && p !== pixels[0]));
+        return [columns[0], width - 1 - columns.at(-1)];
+    })()`);
+    assert.ok(left > 0 && right > 0 && left < 50 && right < 50, `${left} and ${right} pixels beside the model`);
+    await browser.send("Emulation.clearDeviceMetricsOverride");
 });
 
 test("nothing was asked of a network, and no error was left unseen", () => {

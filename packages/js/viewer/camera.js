@@ -4,16 +4,17 @@ import { add, cross, dot, length, scale, unit } from "./vectors.js";
 
 /** Half the vertical field of view, radians: narrow enough to keep proportions natural. */
 const HALF_FOV = (16 * Math.PI) / 180;
-/** Share of the height of the picture that the model's sphere fills. */
+/** Share of the height of the picture, or of its width where that is less, that the model's sphere fills. */
 const FILLED = 1.05;
 /** The camera stays this far from the poles, radians. */
 const POLE = 0.01;
 
-/** A view of bounds from the front, somewhat to the side and above. */
-export function firstView({ lower, upper }, up) {
+/** A view of bounds from the front, somewhat to the side and above, for a picture with this ratio of width to height. */
+export function firstView({ lower, upper }, up, aspect) {
     const target = scale(add(lower, upper), 0.5);
     const radius = Math.max(length(add(upper, lower, -1)) / 2, Number.MIN_VALUE);
-    return { target, up, yaw: 0.61, pitch: 0.35, distance: radius / Math.sin(HALF_FOV) / FILLED, radius };
+    const half = aspect < 1 ? Math.atan(Math.tan(HALF_FOV) * aspect) : HALF_FOV;
+    return { target, up, yaw: 0.61, pitch: 0.35, distance: radius / Math.sin(half) / FILLED, radius };
 }
 
 /** Turns a view by angles in radians. */

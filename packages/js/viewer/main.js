@@ -24,20 +24,39 @@ let picture = null;
 let settled = false;
 /** Functions that wait for the picture to be done. */
 let waiting = [];
+/** Number of the last file that was to be opened. */
+let last = 0;
+/** Whether the message is of something that failed, which the next action hides. */
+let failed = false;
 
-/** Opens a file; says what is wrong if it cannot be opened, and then keeps what was shown. */
+/**
+ * Opens a file, of which there are the bytes or a promise of them; says what is wrong if it cannot be opened, and then keeps what was
+ * shown. Of several files that are being opened, the last is shown.
+ */
 export async function open(file, name) {
+    const number = ++last;
     say("Opening …");
     try {
-        const opened = await Pool.open(workerUrl(), await compiledModule(), file);
+        const bytes = await file;
+        if (number !== last) return;
+        const opened = await Pool.open(workerUrl(), await compiledModule(), bytes);
+        if (number !== last) return opened.pool.end();
+        if (!opened.content.bounds && !isMoving(opened.content)) {
+            opened.pool.end();
+            throw new Error("there is nothing to see in this file");
+        }
         shown.pool?.end();
-        Object.assign(shown, opened, { name });
-        if (!opened.content.bounds) throw new Error("there is nothing to see in this file");
-        say("");
+        Object.assign(shown, opened, { name, view: null });
         showTime();
         reset();
+        sayWhatIsSeen();
+        if (!shown.view) {
+            // The picture of another file would stay.
+            canvas.getContext("2d").clearRect(0, 0, canvas.width, canvas.height);
+            status.textContent = name;
+        }
     } catch (error) {
-        say(`${name}: ${error.message}`);
+        if (number === last) complain(`${name}: ${error.message}`);
         throw error;
     }
 }
@@ -56,12 +75,26 @@ export function whenSettled() {
 }
 
 function say(text) {
+    failed = false;
     message.textContent = text || (shown.content ? "" : "Drop a .bth file here");
     message.hidden = message.textContent === "";
 }
 
+/** Says what failed, until something else is done. */
+function complain(text) {
+    say(text);
+    failed = true;
+}
+
+/** Says so where there was nothing to see yet. */
+function sayWhatIsSeen() {
+    say(shown.view ? "" : "There is nothing to see in this frame");
+}
+
+/** Shows the first view. There is none as long as there was nothing to see. */
 function reset() {
-    shown.view = firstView(shown.content.bounds, shown.up);
+    const { bounds } = shown.content, { width, height } = pixels();
+    shown.view = bounds && firstView(bounds, shown.up, width / height);
     changed();
 }
 
@@ -100,7 +133,7 @@ async function refine(of) {
             if (!stopped()) report(sample + 1, performance.now() - start, common);
         }
     } catch (error) {
-        if (!stopped()) say(error.message);
+        if (!stopped()) complain(error.message);
     }
     if (stopped()) return;
     settled = true;
@@ -146,11 +179,13 @@ function report(samples, milliseconds, { mode, size }) {
     status.textContent = parts.filter(Boolean).join(" · ");
 }
 
+const isMoving = ({ frames }) => frames !== null && frames.first !== frames.last;
+
 /** Shows the slider of time for scenes of several frames. */
 function showTime() {
     const { frames } = shown.content;
     const slider = element("time");
-    slider.parentElement.hidden = !frames || frames.first === frames.last;
+    slider.parentElement.hidden = !isMoving(shown.content);
     if (frames) Object.assign(slider, { min: frames.first, max: frames.last, value: frames.first, step: 1 });
 }
 
@@ -160,9 +195,11 @@ async function setFrame(frame) {
     try {
         const { bounds } = await shown.pool.askAll("seconds", { seconds: frame / frames.rate });
         if (bounds) shown.content.bounds = bounds;
-        say("");
+        // The view stays as it is, once there is one.
+        if (!shown.view) reset();
+        sayWhatIsSeen();
     } catch (error) {
-        say(error.message);
+        complain(error.message);
     }
     changed();
 }
@@ -191,17 +228,28 @@ addEventListener("drop", (event) => {
     openFile(event.dataTransfer.files[0]);
 });
 element("file").addEventListener("change", (event) => openFile(event.target.files[0]));
-async function openFile(file) {
-    // `open` has said what is wrong.
-    if (file) await file.arrayBuffer().then((bytes) => open(bytes, file.name)).catch(() => {});
+/** Opens a file that was chosen. `open` says what is wrong. */
+function openFile(file) {
+    if (file) open(chosenBytes(file), file.name).catch(() => {});
+}
+/** The bytes of a file. Browsers hand over folders as files, too, which alone cannot be read. */
+async function chosenBytes(file) {
+    try {
+        return await file.arrayBuffer();
+    } catch (error) {
+        throw new Error(`this is a folder, or a file that cannot be read (${error.message})`);
+    }
+}
+async function fetchedBytes(url) {
+    const response = await fetch(url);
+    if (!response.ok) throw new Error(`${response.status} ${response.statusText}`);
+    return response.arrayBuffer();
 }
 const named = asked.get("file");
-if (named) {
-    fetch(named)
-        .then((response) => (response.ok ? response.arrayBuffer() : Promise.reject(new Error(`${response.status} ${response.statusText}`))))
-        .then((bytes) => open(bytes, named.split("/").pop()))
-        .catch((error) => say(`${named}: ${error.message}`));
-}
+if (named) open(fetchedBytes(named), named.split("/").pop()).catch(() => {});
+
+// What failed was read when something else is done.
+for (const action of ["pointerdown", "keydown"]) addEventListener(action, () => failed && say(""), { capture: true });
 
 // The pointer: one button turns, the other or Shift shifts, two fingers zoom and shift, the wheel zooms.
 const pointers = new Map();

@@ -10,6 +10,7 @@ use crate::groups::Groups;
 use crate::materials::{ImageFile, Looks};
 use crate::mesh::{Attributes, Mesh, Report, Wanted};
 use crate::monitor::Monitor;
+use crate::number::without_mark;
 use crate::raw::{Raw, RowKind, check_rows, check_triangles};
 use crate::source::{NON_FINITE, Source, input_error, read_file};
 use crate::{attributes, gltf, mtl, obj, off, ply, stl, topology, weld};
@@ -303,13 +304,13 @@ pub(crate) fn format(source: &Source<'_>) -> Result<Format> {
 
 /// The format that the first bytes suggest, if they suggest one.
 fn sniff(data: &[u8]) -> Option<Format> {
-    let text = data.trim_ascii_start();
+    let text = without_mark(data).trim_ascii_start();
     let first_word = text.split(|c| c.is_ascii_whitespace()).next().unwrap_or_default();
     if data.starts_with(b"glTF") || text.starts_with(b"{") {
         Some(Format::Gltf)
     } else if first_word == b"ply" {
         Some(Format::Ply)
-    } else if first_word == b"solid" || stl::is_binary_size(data) {
+    } else if first_word.eq_ignore_ascii_case(b"solid") || stl::is_binary_size(data) {
         Some(Format::Stl)
     } else if off::is_keyword(first_word) {
         Some(Format::Off)
@@ -333,6 +334,10 @@ mod tests {
             (b"\n{\"asset\":{}}", Some(Format::Gltf)),
             (b"ply\r\nformat ascii 1.0", Some(Format::Ply)),
             (b"solid name", Some(Format::Stl)),
+            (b"SOLID name", Some(Format::Stl)),
+            (b"\xEF\xBB\xBFply\n", Some(Format::Ply)),
+            (b"\xEF\xBB\xBF{}", Some(Format::Gltf)),
+            (b"\xEF\xBB\xBFv 1 2 3\n", Some(Format::Obj)),
             (&binary_stl, Some(Format::Stl)),
             (b"COFF\n3 1 0", Some(Format::Off)),
             (b"# comment\n\nv 1 2 3\n", Some(Format::Obj)),

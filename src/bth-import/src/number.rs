@@ -47,6 +47,14 @@ pub(super) fn shown(word: &[u8]) -> String {
     String::from_utf8_lossy(cut).escape_debug().to_string()
 }
 
+/// What some editors write at the start of UTF-8 text: U+FEFF, the byte order mark.
+const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
+
+/// A text without the byte order mark at its start, if there is one.
+pub(super) fn without_mark(data: &[u8]) -> &[u8] {
+    data.strip_prefix(BYTE_ORDER_MARK).unwrap_or(data)
+}
+
 /// Lines of a text with their numbers. LF, CR LF and CR end a line.
 pub(super) struct Lines<'a> {
     data: &'a [u8],
@@ -55,9 +63,10 @@ pub(super) struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    /// Lines of a text, numbered from 1.
+    /// Lines of a text, numbered from 1. The first one begins behind the byte order mark, if there is one; [`Self::position`]
+    /// counts its bytes.
     pub(super) fn new(data: &'a [u8]) -> Self {
-        Lines::after(data, 0, 0)
+        Lines::after(data, data.len() - without_mark(data).len(), 0)
     }
 
     /// Lines from byte `at` on, which `number` lines precede.
@@ -103,6 +112,9 @@ mod tests {
         let lines: Vec<_> = Lines::new(b"a\r\nb\rc\n\nd").collect();
         assert_eq!(lines, [(1, &b"a"[..]), (2, b"b"), (3, b"c"), (4, b""), (5, b"d")]);
         assert_eq!(Lines::new(b"").next(), None);
+        let mut marked = Lines::new(b"\xEF\xBB\xBFa\n\xEF\xBB\xBFb");
+        assert_eq!((marked.next(), marked.position()), (Some((1, &b"a"[..])), 5));
+        assert_eq!(marked.next(), Some((2, &b"\xEF\xBB\xBFb"[..])));
     }
 
     #[test]

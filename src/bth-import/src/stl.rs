@@ -3,7 +3,7 @@
 //! A reader of our own rather than `stl_io`: docs/decisions.md says why.
 
 use crate::error::Result;
-use crate::number::{Lines, float, shown, words};
+use crate::number::{Lines, float, shown, without_mark, words};
 use crate::raw::{Raw, RowKind, check_triangles};
 use crate::source::{MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
 
@@ -23,12 +23,15 @@ pub(super) fn is_binary_size(data: &[u8]) -> bool {
     binary_count(data).is_some_and(|n| data.len() as u64 == HEADER as u64 + FACET as u64 * u64::from(n))
 }
 
+/// Whether the first word of a text begins with "solid" in letters of any case.
+fn begins_with_solid(data: &[u8]) -> bool {
+    without_mark(data).trim_ascii_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
+}
+
 /// Reads an STL file. Each solid of a text is a group. Facet normals are not shading attributes and are ignored.
 pub(super) fn read<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
     let data = source.data;
-    let text = !is_binary_size(data)
-        && data.trim_ascii_start().starts_with(b"solid")
-        && !data[..data.len().min(1024)].contains(&0);
+    let text = !is_binary_size(data) && begins_with_solid(data) && !data[..data.len().min(1024)].contains(&0);
     if text { read_text(source) } else { read_binary(source) }
 }
 

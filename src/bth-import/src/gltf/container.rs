@@ -1,16 +1,17 @@
 //! The GLB container (glTF 2.0 specification, §4).
 
 use crate::error::Result;
+use crate::number::without_mark;
 use crate::source::{MALFORMED, Source, TRUNCATED, TRUNCATED_HINT, UNSUPPORTED};
 
 const JSON_CHUNK: u32 = 0x4E4F_534A;
 const BIN_CHUNK: u32 = 0x004E_4942;
 
-/// Splits a GLB into its JSON and its binary chunk; a `.gltf` is all JSON.
+/// Splits a GLB into its JSON and its binary chunk; a `.gltf` is all JSON, before which a byte order mark may stand.
 pub(crate) fn split<'a>(source: &Source<'a>) -> Result<(&'a [u8], Option<&'a [u8]>)> {
     let data = source.data;
     if !data.starts_with(b"glTF") {
-        return Ok((data, None));
+        return Ok((without_mark(data), None));
     }
     let word = |at: usize| -> Result<u32> {
         let bytes = data.get(at..at + 4).and_then(|b| b.try_into().ok());

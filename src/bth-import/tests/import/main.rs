@@ -134,3 +134,32 @@ fn the_report_counts_what_was_read_and_found() {
     );
     assert!(listener.heard("1 positions are not finite"));
 }
+
+#[test]
+fn a_byte_order_mark_before_text_is_passed_over() {
+    let marked = |text: &str| [b"\xEF\xBB\xBF", text.as_bytes()].concat();
+    let gltf = "{\"asset\": {\"version\": \"2.0\"}}";
+    let corners = "0 0 0\n1 0 0\n0 1 0\n";
+    let header = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+    let ply = format!("ply\nformat ascii 1.0\n{header}{corners}3 0 1 2\n");
+    let stl =
+        "solid\nfacet\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n";
+    let off = format!("OFF\n3 1 0\n{corners}3 0 1 2\n");
+    let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    for (name, text, triangles) in
+        [("a.obj", obj, 1), ("a.off", &off, 1), ("a.stl", stl, 1), ("a.ply", &ply, 1), ("a.gltf", gltf, 0)]
+    {
+        for name in [name, "a"] {
+            let (mesh, _) = import_bytes(name, &marked(text), Keep::None).expect(text);
+            assert_eq!(mesh.triangles.len(), triangles, "{text}");
+        }
+    }
+    // Places are those of the file: lines from its first one, bytes with those of the mark.
+    assert_refused("a.obj", &marked("v 0 0 0\nf 1 2 3\n"), "BTH-I005", "line 2", "from 1 to 1");
+    let mut binary = marked(&format!("ply\nformat binary_little_endian 1.0\n{header}"));
+    let body = binary.len();
+    binary.extend([f32::NAN; 9].iter().flat_map(|x| x.to_le_bytes()));
+    binary.extend([3u8, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0]);
+    assert_refused("a.ply", &binary, "BTH-I004", &format!("byte {body}"), "NaN");
+}

@@ -91,3 +91,17 @@ fn refuses_coordinates_that_are_not_finite_where_they_stand() {
     assert_refused("a.stl", &binary(b"", &corners), "BTH-I004", "byte 170", "NaN");
     assert_refused("a.stl", TEXT.replace("1 1 0", "1 inf 0").as_bytes(), "BTH-I004", "line 6", "inf");
 }
+
+#[test]
+fn the_first_word_of_a_text_may_have_capital_letters() {
+    for first in ["SOLID", "Solid", " sOLID"] {
+        let text = TEXT.replacen("solid", first, 1);
+        for name in ["a.stl", "a"] {
+            assert_eq!(import_bytes(name, text.as_bytes(), Keep::None).unwrap().0.triangles.len(), 2);
+        }
+        // A binary header may begin so, too.
+        let bytes = binary(first.as_bytes(), &square());
+        assert_eq!(import_bytes("a.stl", &bytes, Keep::None).unwrap().0.triangles.len(), 2);
+        assert_refused("a.stl", &bytes[..150], "BTH-I003", "byte 150", "expected 2 facets");
+    }
+}

@@ -45,7 +45,8 @@ impl SourceDigest {
     /// `BTH-O001` when one cannot be read.
     pub fn of(path: &Path, looks: impl Into<Looks>) -> Result<Self> {
         let looks = looks.into();
-        let others = files(path, looks)?.iter().skip(1).map(|other| digest(other)).collect::<Result<_>>()?;
+        let others =
+            files(path, looks)?.iter().skip(1).map(|other| digest_of_other(other)).collect::<Result<_>>()?;
         Ok(Self { file: digest(path)?, others, looks })
     }
 
@@ -99,9 +100,17 @@ pub(crate) fn changed(path: &Path) -> Error {
 
 fn digest(path: &Path) -> Result<Digest> {
     let read = File::open(path).and_then(Digest::of_reader);
-    read.map(|(digest, _)| digest).map_err(|e| Error::File {
-        code: "BTH-O001",
-        path: path.to_owned(),
-        message: format!("cannot read: {e}"),
-    })
+    read.map(|(digest, _)| digest).map_err(|e| cannot_read(path, &e))
+}
+
+/// The digest of a file that a model names, which must be a regular one: opening a named pipe would wait for a writer.
+fn digest_of_other(path: &Path) -> Result<Digest> {
+    match std::fs::metadata(path).map_err(|e| cannot_read(path, &e))?.is_file() {
+        true => digest(path),
+        false => Err(cannot_read(path, &std::io::Error::other("not a regular file"))),
+    }
+}
+
+fn cannot_read(path: &Path, error: &std::io::Error) -> Error {
+    Error::File { code: "BTH-O001", path: path.to_owned(), message: format!("cannot read: {error}") }
 }

@@ -24,10 +24,11 @@ pub(crate) fn read_at_most(path: &Path, most: u64) -> Result<Vec<u8>> {
         path: path.to_owned(),
         message: format!("cannot read: {e}"),
     };
-    let file = std::fs::File::open(path).map_err(file_error)?;
-    if !file.metadata().map_err(file_error)?.is_file() {
+    // Opening a named pipe waits for a writer, so what the path is must be known before.
+    if !std::fs::metadata(path).map_err(file_error)?.is_file() {
         return Err(file_error(std::io::Error::other("not a regular file")));
     }
+    let file = std::fs::File::open(path).map_err(file_error)?;
     let mut bytes = Vec::new();
     file.take(most).read_to_end(&mut bytes).map_err(file_error)?;
     Ok(bytes)

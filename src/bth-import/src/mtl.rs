@@ -5,9 +5,10 @@ use crate::gltf::uri::read_at_most;
 use crate::image_file::{self, MAX_FILE, MAX_TEXELS, Refused};
 use crate::materials::{ImageFile, MaterialRecorder, PLAIN};
 use crate::number::{Lines, float, shown, words};
+use crate::obj::{name, statements};
 use crate::source::{IMAGE, MALFORMED, MALFORMED_HINT, Source, input_error};
 use bth_format::layout::*;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Component, Path, PathBuf};
 
 /// A statement that names a material library, and its line in the OBJ file.
@@ -84,24 +85,20 @@ pub(super) fn read(
 
 /// The files that the libraries of an OBJ file are, and their images, as far as they exist and can be read.
 pub(super) fn files(path: &Path, data: &[u8]) -> Vec<PathBuf> {
-    let mut files = Vec::new();
+    let (mut files, mut read, mut listed) = (Vec::new(), LibrariesRead::default(), HashSet::new());
     for library in libraries_of(data) {
-        for file in library_files(path, &library.names).into_iter().filter(|file| file.exists()) {
-            let maps = read_at_most(&file, MAX_FILE).map(|text| {
-                let mut found = Libraries::default();
-                // What is malformed is reported when it is read.
-                let _ = parse(&file, &text, &mut found);
-                let mut maps: Vec<PathBuf> =
-                    found.materials.values().flat_map(kept_maps).map(|m| m.file.clone()).collect();
-                maps.sort_unstable();
-                maps
-            });
-            let maps = maps.unwrap_or_default().into_iter().filter(|map| map.exists());
-            for file in std::iter::once(file).chain(maps) {
-                if !files.contains(&file) {
-                    files.push(file);
-                }
-            }
+        for file in read.new_files(path, &library.names) {
+            // What cannot be read is reported when it is read.
+            let Ok(text) = read_at_most(&file, MAX_FILE) else { continue };
+            let mut found = Libraries::default();
+            // What is malformed is reported when it is read.
+            let _ = parse(&file, &text, &mut found);
+            let maps: BTreeSet<&PathBuf> =
+                found.materials.values().flat_map(kept_maps).map(|m| &m.file).collect();
+            let maps = maps.into_iter().filter(|map| map.is_file());
+            files.extend(
+                std::iter::once(&file).chain(maps).filter(|file| listed.insert((*file).clone())).cloned(),
+            );
         }
     }
     files
@@ -124,10 +121,31 @@ fn kept_maps(material: &MtlMaterial) -> impl Iterator<Item = &Map> {
 
 /// The statements of an OBJ file that name libraries.
 fn libraries_of(data: &[u8]) -> impl Iterator<Item = Library> + '_ {
-    Lines::new(data).filter_map(|(line, text)| {
-        let mut words = words(text);
-        (words.next() == Some(b"mtllib")).then(|| Library { line, names: joined(words) })
+    statements(data).filter_map(|(line, text)| {
+        let mut words = words(&text);
+        (words.next() == Some(b"mtllib")).then(|| Library { line, names: name(words) })
     })
+}
+
+/// The libraries that are read already. Programs may write the statement `mtllib` before every face; a library is parsed once.
+#[derive(Default)]
+struct LibrariesRead {
+    /// Names of statements.
+    statements: HashSet<String>,
+    /// Files, without symbolic links where they exist.
+    files: HashSet<PathBuf>,
+}
+
+impl LibrariesRead {
+    /// The files of a statement that no statement before has, which count as read from now on.
+    fn new_files(&mut self, obj: &Path, names: &str) -> Vec<PathBuf> {
+        if !self.statements.insert(names.to_owned()) {
+            return Vec::new();
+        }
+        let mut files = library_files(obj, names);
+        files.retain(|file| self.files.insert(std::fs::canonicalize(file).unwrap_or_else(|_| file.clone())));
+        files
+    }
 }
 
 /// The files of a statement: one whose name has spaces, or several.
@@ -149,11 +167,11 @@ fn beside(folder: &Path, name: &str) -> Option<PathBuf> {
 }
 
 fn read_libraries(source: &Source<'_>, libraries: &[Library]) -> Result<Libraries> {
-    let mut found = Libraries::default();
+    let (mut found, mut read) = (Libraries::default(), LibrariesRead::default());
     for library in libraries {
-        let files = library_files(source.path, &library.names);
         let hint = "put the material library there, or compile without --materials";
-        if files.is_empty() {
+        let files = read.new_files(source.path, &library.names);
+        if files.is_empty() && library.names.split(' ').all(|name| beside(Path::new(""), name).is_none()) {
             let message =
                 format!("expected a relative name of a material library, found \"{}\"", library.names);
             return Err(source.error_at_line(IMAGE, library.line, message, hint));
@@ -181,7 +199,7 @@ fn parse(path: &Path, text: &[u8], found: &mut Libraries) -> Result<()> {
         let keyword = keyword.to_ascii_lowercase();
         if keyword == b"newmtl" {
             keep(found, current.take());
-            current = Some((joined(words), MtlMaterial::default()));
+            current = Some((name(words), MtlMaterial::default()));
             continue;
         }
         let Some((_, material)) = &mut current else { continue };
@@ -267,7 +285,7 @@ fn map<'w>(library: &Path, place: Place, words: impl Iterator<Item = &'w [u8]>) 
             _ => 2,
         };
     }
-    let name = joined(words.iter().skip(at).copied());
+    let name = name(words.iter().skip(at).copied());
     let folder = library.parent().unwrap_or(Path::new(""));
     if !scale.iter().chain(&offset).all(|x| x.is_finite()) {
         return Err(malformed(place, "expected finite numbers behind -s and -o"));
@@ -359,9 +377,4 @@ fn image_name(map: &Map, images: &mut HashMap<PathBuf, [u8; 16]>) -> Result<[u8;
 
 fn malformed(place: Place, message: &str) -> Error {
     input_error(MALFORMED, place, message, MALFORMED_HINT)
-}
-
-/// The words of a name, with single spaces between them.
-fn joined<'w>(words: impl Iterator<Item = &'w [u8]>) -> String {
-    words.map(String::from_utf8_lossy).collect::<Vec<_>>().join(" ")
 }

@@ -104,10 +104,11 @@ pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>
     let mut lines = Lines::new(source.data);
     while let Some((number, line)) = next_statement(&mut lines) {
         source.tick(number, lines.position())?;
-        let mut words = words(&line).take_while(|word| !word.starts_with(b"#"));
-        match words.next() {
+        let mut words = words(&line);
+        match words.next().filter(|word| !word.starts_with(b"#")) {
             None => {}
             Some(b"v") => {
+                let mut words = until_comment(words);
                 let position = reader.numbers(number, &mut words, 3)?;
                 if wanted.materials {
                     reader.color(words);
@@ -115,24 +116,24 @@ pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>
                 reader.raw.positions.push(position);
             }
             Some(b"vn") if reader.normals => {
-                let normal = reader.numbers(number, &mut words, 3)?;
+                let normal = reader.numbers(number, &mut until_comment(words), 3)?;
                 reader.raw.normals.push(normal);
             }
             Some(b"vt") if reader.uvs => {
-                let [u, v, _] = reader.numbers(number, &mut words, 1)?;
+                let [u, v, _] = reader.numbers(number, &mut until_comment(words), 1)?;
                 reader.raw.uvs.push([u, v]);
             }
-            Some(b"f" | b"fo") => reader.face(number, words)?,
+            Some(b"f" | b"fo") => reader.face(number, until_comment(words))?,
             Some(b"g" | b"o") if wanted.groups => {
-                reader.groups.name(reader.raw.triangles.len(), rest(words));
+                reader.groups.name(reader.raw.triangles.len(), name(words));
             }
             Some(b"mtllib") if wanted.materials => {
-                reader.libraries.push(Library { line: number, names: rest(words) });
+                reader.libraries.push(Library { line: number, names: name(words) });
             }
             Some(b"usemtl") if wanted.groups => {
-                reader.groups.material(reader.raw.triangles.len(), rest(words));
+                reader.groups.material(reader.raw.triangles.len(), name(words));
             }
-            Some(b"p") => reader.raw.skipped += words.count() as u64,
+            Some(b"p") => reader.raw.skipped += until_comment(words).count() as u64,
             Some(b"l" | b"curv" | b"curv2" | b"surf") => reader.raw.skipped += 1,
             Some(keyword) if KNOWN.contains(&keyword) => {}
             Some(keyword) => {
@@ -285,24 +286,46 @@ impl Reader<'_, '_> {
     }
 }
 
-/// The words of a name, with single spaces between them. Bytes that are not UTF-8 become the replacement character.
-fn rest<'w>(words: impl Iterator<Item = &'w [u8]>) -> String {
-    let words: Vec<_> = words.map(String::from_utf8_lossy).collect();
+/// The words before a comment, which begins at a word that begins with `#`.
+#[inline]
+fn until_comment<'w>(words: impl Iterator<Item = &'w [u8]>) -> impl Iterator<Item = &'w [u8]> {
+    words.take_while(|word| !word.starts_with(b"#"))
+}
+
+/// The words of a name, with single spaces between them. Bytes that are not UTF-8 become the replacement character. Names go on to the
+/// end of the line, and a word such as `#12` belongs to them, as other readers have it (Blender, tinyobjloader). Only `#` as
+/// a word of its own begins a comment.
+pub(super) fn name<'w>(words: impl Iterator<Item = &'w [u8]>) -> String {
+    let words: Vec<_> = words.take_while(|word| *word != b"#").map(String::from_utf8_lossy).collect();
     words.join(" ")
 }
 
-/// The next line and its number. While a line ends in a backslash, the following line is joined to it.
+/// The statements of a text with the numbers of their first lines, as [`next_statement`] joins them.
+pub(super) fn statements(data: &[u8]) -> impl Iterator<Item = (u64, Cow<'_, [u8]>)> {
+    let mut lines = Lines::new(data);
+    std::iter::from_fn(move || next_statement(&mut lines))
+}
+
+/// Whether a line goes on in the next one: it ends in a backslash that is not in a comment.
+fn goes_on(line: &[u8]) -> bool {
+    line.last() == Some(&b'\\') && !words(line).next().is_some_and(|word| word.starts_with(b"#"))
+}
+
+/// The next line and its number. While a line ends in a backslash, the following line is joined to it, but for lines that are comments.
 #[inline]
 fn next_statement<'a>(lines: &mut Lines<'a>) -> Option<(u64, Cow<'a, [u8]>)> {
     let (number, line) = lines.next()?;
-    if line.last() != Some(&b'\\') {
+    if !goes_on(line) {
         return Some((number, Cow::Borrowed(line)));
     }
     let mut joined = line.to_vec();
-    while joined.last() == Some(&b'\\') {
+    let mut open = true;
+    while open {
         joined.pop();
         joined.push(b' ');
-        joined.extend_from_slice(lines.next().map_or(&b""[..], |(_, line)| line));
+        let next = lines.next().map_or(&b""[..], |(_, line)| line);
+        joined.extend_from_slice(next);
+        open = goes_on(next);
     }
     Some((number, Cow::Owned(joined)))
 }
@@ -313,8 +336,6 @@ fn line_of_row(data: &[u8], kind: RowKind, row: usize) -> u64 {
         RowKind::Normal => b"vn",
         RowKind::Uv => b"vt",
     };
-    let mut lines = Lines::new(data);
-    let statements = std::iter::from_fn(|| next_statement(&mut lines));
-    let mut found = statements.filter(|(_, line)| words(line).next() == Some(keyword));
+    let mut found = statements(data).filter(|(_, line)| words(line).next() == Some(keyword));
     found.nth(row).map_or(0, |(number, _)| number)
 }

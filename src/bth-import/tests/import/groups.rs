@@ -121,3 +121,14 @@ fn primitives_of_gltf_are_groups() {
         (vec!["mesh 0|material 1|0".into()], vec!["door/0|glass|0".into(), "door/2|-|2".into()])
     );
 }
+
+#[test]
+fn names_of_obj_may_have_words_that_begin_with_a_hash() {
+    let text = format!(
+        "{CORNERS}g #1\nusemtl Material #25\nf 1 2 3\no part #2 # a comment\nusemtl #glass\nf 1 3 4\n\
+         g # no name\nusemtl # no material\nf 1 2 4 #f 1 2 3\n"
+    );
+    let (mesh, groups) = groups("a.obj", text.as_bytes());
+    assert_eq!(mesh.triangles.len(), 3);
+    assert_eq!(shown(&groups), ["#1|Material #25|0", "part #2|#glass|1", "|-|2"]);
+}

@@ -272,3 +272,87 @@ fn vertices_of_ply_and_obj_have_colors() {
     assert_eq!(colors, [[65535, 0, 65535, 65535], [0, 0, 0, 65535], [65535; 4]]);
     assert_eq!(read("b.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), Materials::default());
 }
+
+/// The red parts of the materials of an OBJ file with one triangle of each of these materials, beside a library of this text, and
+/// the warnings.
+fn obj_materials(folder: &Path, statements: &str, library: &[u8]) -> (Vec<f32>, Vec<String>) {
+    let path = folder.join("a.obj");
+    std::fs::write(folder.join("a.mtl"), library).unwrap();
+    std::fs::write(&path, format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{statements}")).unwrap();
+    let heard = Listener::default();
+    let (mesh, _) = import(&path, WANTED, &heard).unwrap();
+    let red = mesh.materials.unwrap().parameters.iter().map(|material| material.base_color[0]).collect();
+    (red, heard.0.into_inner().unwrap())
+}
+
+#[test]
+fn names_of_obj_materials_may_have_hashes_and_libraries_a_byte_order_mark() {
+    let folder = tempfile::tempdir().unwrap();
+    let library = b"\xEF\xBB\xBFnewmtl Material #1 # red\nKd 1 0 0\nnewmtl #2\nKd 0.5 0 0\n";
+    let faces = "mtllib a.mtl # colours\nusemtl Material #1\nf 1 2 3\nusemtl #2 # darker\nf 1 2 3\n";
+    assert_eq!(obj_materials(folder.path(), faces, library), (vec![1.0, 0.5], Vec::new()));
+}
+
+#[test]
+fn a_library_that_is_named_before_every_face_is_read_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut library = b"newmtl red\nKd 1 0 0\n".to_vec();
+    library.extend(b"# what takes long to read again and again\n".repeat(20_000));
+    let faces = "mtllib a.mtl\nusemtl red\nf 1 2 3\nmtllib ./a.mtl a.mtl\n".repeat(20_000);
+    let start = std::time::Instant::now();
+    let (red, warnings) = obj_materials(folder.path(), &faces, &library);
+    assert_eq!((red, warnings), (vec![1.0], Vec::new()));
+    let path = folder.path().join("a.obj");
+    let looks = bth_import::Looks { materials: true, ..Default::default() };
+    let files = bth_import::source_files(&path, looks).unwrap();
+    assert_eq!(files, [path.as_path(), &folder.path().join("a.mtl")]);
+    assert!(import_images(&path, &Silent).unwrap().is_empty());
+    // Reading it 40,000 times would take minutes.
+    assert!(start.elapsed().as_secs() < 20);
+}
+
+#[cfg(unix)]
+#[test]
+fn named_pipes_and_folders_in_place_of_files_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let pipe = at("pipe.mtl");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    std::fs::create_dir(at("folder.mtl")).unwrap();
+    std::fs::write(at("real.mtl"), "newmtl red\nKd 1 0 0\n").unwrap();
+    std::os::unix::fs::symlink(at("real.mtl"), at("link.mtl")).unwrap();
+    let read = |library: &str| {
+        let path = at("a.obj");
+        let text = format!("mtllib {library}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n");
+        std::fs::write(&path, text).unwrap();
+        // Opening the pipe would wait for ever, so another thread does it.
+        let (send, receive) = std::sync::mpsc::channel();
+        std::thread::spawn(move || {
+            let looks = bth_import::Looks { materials: true, ..Default::default() };
+            let files = bth_import::source_files(&path, looks).unwrap();
+            let _ = send.send((import(&path, WANTED, &Silent), files.len()));
+        });
+        receive.recv_timeout(std::time::Duration::from_secs(60)).expect("this should not wait for a writer")
+    };
+    for library in ["pipe.mtl", "folder.mtl"] {
+        let (found, files) = read(library);
+        let error = found.unwrap_err();
+        assert!(matches!(error, Error::Input { code: "BTH-I016", .. }), "{error}");
+        assert!(error.to_string().contains("not a regular file"), "{error}");
+        assert_eq!(files, 1);
+    }
+    let (found, files) = read("link.mtl");
+    assert_eq!(found.unwrap().0.materials.unwrap().parameters[0].base_color[0], 1.0);
+    assert_eq!(files, 2);
+
+    let buffer = json!({"asset": {"version": "2.0"}, "buffers": [{"uri": "pipe.mtl", "byteLength": 36}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}], "nodes": [{"mesh": 0}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}]});
+    let path = at("a.gltf");
+    std::fs::write(&path, buffer.to_string()).unwrap();
+    let (send, receive) = std::sync::mpsc::channel();
+    std::thread::spawn(move || send.send(import(&path, Keep::None, &Silent)));
+    let found = receive.recv_timeout(std::time::Duration::from_secs(60)).expect("this should not wait");
+    assert!(found.unwrap_err().to_string().contains("BTH-O001: cannot read: not a regular file"));
+}

@@ -118,3 +118,10 @@ fn refuses_a_used_normal_that_is_not_finite() {
 fn refuses_binary_content() {
     assert_bad("\0\0", "BTH-I006", "byte 32", "expected text");
 }
+
+#[test]
+fn comments_end_with_their_line_also_after_a_backslash() {
+    assert_eq!(triangles("# C:\\models\\\nf 1 2 3\n  # again \\\nf 1 3 4\n"), [[0, 1, 2], [0, 2, 3]]);
+    assert_eq!(triangles("f 1 2 \\\n 3 \\\n# inside \\\nf 1 3 4\n"), [[0, 1, 2], [0, 2, 3]]);
+    assert_bad("# \\\nv nan 0 0\nf 1 2 5\n", "BTH-I004", "line 6", "NaN");
+}

@@ -7,7 +7,12 @@ use crate::source::{
     INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT, UNSUPPORTED,
 };
 
-/// Whether a word is the keyword of a variant of OFF: `[ST][C][N][4][n]OFF`.
+/// Hint for a file that ends early and has lines with more numbers than those of a position.
+const LINES_HINT: &str =
+    "write each vertex and each face on a line of its own, or copy the file again if it is cut off";
+
+/// Whether a word is the keyword of a variant of OFF: `[ST][C][N][4][n]OFF`. Files have the letters before `OFF` in other orders,
+/// too.
 pub(super) fn is_keyword(word: &[u8]) -> bool {
     variant(word).is_some()
 }
@@ -15,17 +20,20 @@ pub(super) fn is_keyword(word: &[u8]) -> bool {
 /// The prefix of a keyword; `None` for other words.
 fn variant(word: &[u8]) -> Option<&[u8]> {
     let prefix = word.strip_suffix(b"OFF")?;
-    let mut rest = prefix;
-    for part in [&b"ST"[..], b"C", b"N", b"4", b"n"] {
-        rest = rest.strip_prefix(part).unwrap_or(rest);
+    let (mut rest, mut parts) = (prefix, vec![&b"ST"[..], b"C", b"N", b"4", b"n"]);
+    while !rest.is_empty() {
+        let next = parts.iter().position(|part| rest.starts_with(part))?;
+        rest = &rest[parts.swap_remove(next).len()..];
     }
-    rest.is_empty().then_some(prefix)
+    Some(prefix)
 }
 
 /// Lines without comments; blank ones are omitted.
 struct Statements<'a, 'b> {
     source: &'b Source<'a>,
     lines: Lines<'a>,
+    /// The first line of a vertex that has numbers for a second one, which may also be attributes.
+    long_line: Option<u64>,
 }
 
 impl<'a> Statements<'a, '_> {
@@ -42,14 +50,20 @@ impl<'a> Statements<'a, '_> {
     fn expect(&mut self, what: &str) -> Result<(u64, &'a [u8])> {
         self.next().ok_or_else(|| {
             let message = format!("expected {what}, found the end of the file");
-            self.source.error_at_line(TRUNCATED, self.lines.number(), message, TRUNCATED_HINT)
+            let Some(long) = self.long_line else {
+                return self.source.error_at_line(TRUNCATED, self.lines.number(), message, TRUNCATED_HINT);
+            };
+            let message =
+                format!("{message}; a line has one vertex or one face, line {long} has more numbers");
+            self.source.error_at_line(TRUNCATED, self.lines.number(), message, LINES_HINT)
         })
     }
 }
 
-/// Reads an OFF file. Colours, normals and texture coordinates at the ends of lines are ignored.
+/// Reads an OFF file. Colours, normals and texture coordinates at the ends of lines are ignored, which is why each vertex and each face
+/// must have a line of its own.
 pub(super) fn read<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
-    let mut statements = Statements { source, lines: Lines::new(source.data) };
+    let mut statements = Statements { source, lines: Lines::new(source.data), long_line: None };
     let malformed =
         |number, message: String| source.error_at_line(MALFORMED, number, message, MALFORMED_HINT);
 
@@ -88,6 +102,9 @@ pub(super) fn read<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
                 malformed(number, format!("expected three coordinates, found \"{}\"", shown(word)))
             })?;
         }
+        if statements.long_line.is_none() && line.count() >= 3 {
+            statements.long_line = Some(number);
+        }
         raw.positions.push(position);
     }
     let mut face = Vec::new();
@@ -120,7 +137,7 @@ pub(super) fn read<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
 }
 
 fn line_of_vertex(source: &Source<'_>, row: usize) -> u64 {
-    let mut statements = Statements { source, lines: Lines::new(source.data) };
+    let mut statements = Statements { source, lines: Lines::new(source.data), long_line: None };
     let Some((_, first)) = statements.next() else { return 0 };
     let word = words(first).next().unwrap_or_default();
     if is_keyword(word) && word.len() == first.len() {

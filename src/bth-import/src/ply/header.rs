@@ -76,6 +76,8 @@ pub(super) enum Meaning {
 /// A property of an element.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Property {
+    /// Its name, as messages show it.
+    pub(super) name: String,
     /// Type of a list's count; `None` for a single value.
     pub(super) list: Option<Scalar>,
     /// Type of the value or of a list's items.
@@ -151,7 +153,8 @@ impl Header {
     }
 }
 
-fn meaning(kind: ElementKind, name: &[u8], list: bool) -> Meaning {
+/// What a property of this name is used for where it is the first one of its meaning.
+pub(super) fn meaning(kind: ElementKind, name: &[u8], list: bool) -> Meaning {
     match (kind, name, list) {
         (ElementKind::Vertices, b"x", false) => Meaning::Position(0),
         (ElementKind::Vertices, b"y", false) => Meaning::Position(1),
@@ -258,7 +261,12 @@ impl HeaderReader<'_, '_> {
             return Err(self.malformed("an integer type for the count of a list"));
         }
         let mut meaning = meaning(element.kind, name, list.is_some());
-        if matches!(meaning, Meaning::Color(_)) && element.properties.iter().any(|p| p.meaning == meaning) {
+        // Of several colours or texture coordinates, such as u and v beside s and t, the first counts.
+        let again = |p: &Property| {
+            p.meaning == meaning && (matches!(meaning, Meaning::Color(_)) || p.name != shown(name))
+        };
+        let several = matches!(meaning, Meaning::Color(_) | Meaning::Uv(_));
+        if several && element.properties.iter().any(again) {
             meaning = Meaning::Other;
         }
         if meaning == Meaning::Indices && !item.is_integer() {
@@ -268,7 +276,7 @@ impl HeaderReader<'_, '_> {
             return Err(self.malformed("each property once"));
         }
         if let Some(element) = self.elements.last_mut() {
-            element.properties.push(Property { list, scalar: item, meaning });
+            element.properties.push(Property { name: shown(name), list, scalar: item, meaning });
         }
         Ok(())
     }

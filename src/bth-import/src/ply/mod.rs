@@ -1,11 +1,12 @@
 //! Reads PLY: vertices with faces or triangle strips, in text or binary of either byte order.
 //!
-//! `header` reads the elements and their properties, `ascii` or `binary` the body, and `sink` collects the rows. Readers of
-//! our own rather than `ply-rs-bw`: docs/decisions.md says why.
+//! `header` reads the elements and their properties, `ascii` or `binary` the body, `sink` collects the rows, and `left_out` warns of
+//! what is not kept. Readers of our own rather than `ply-rs-bw`: docs/decisions.md says why.
 
 mod ascii;
 mod binary;
 mod header;
+mod left_out;
 mod sink;
 
 use self::header::{ElementKind, Encoding, Header};
@@ -21,6 +22,7 @@ pub(crate) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>
     if !wanted.materials || header.color_scale().is_none() {
         header.skip_colors();
     }
+    left_out::warn(source, &header, wanted);
     check_rows(header.vertices().map_or(0, |v| v.count))?;
     let raw = Raw::new("ply", Box::new(|_, _| Place::File(source.path.to_owned())));
     let mut sink = Sink::new(raw, &header, wanted);

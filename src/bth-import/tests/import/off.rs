@@ -56,3 +56,25 @@ fn refuses_coordinates_that_are_not_finite_where_they_stand() {
     let text = b"OFF 3 1 0\n0 0 0\n1 nan 0\n1 1 0\n3 0 1 2\n";
     assert_refused("a.off", text, "BTH-I004", "line 3", "NaN");
 }
+
+#[test]
+fn the_letters_of_variants_may_have_any_order() {
+    for keyword in ["NCOFF", "CNOFF", "STCNOFF", "CSTOFF", "NSTOFF"] {
+        for name in ["a.off", "a"] {
+            let text = format!("{keyword}\n3 1 0\n0 0 0 1 1\n1 0 0 1 1\n1 1 0 1 1\n3 0 1 2\n");
+            assert_eq!(import_bytes(name, text.as_bytes(), Keep::None).unwrap().0.triangles, [[0, 1, 2]]);
+        }
+    }
+    assert_refused("a.off", b"NnOFF\n0 0 0\n", "BTH-I006", "line 1", "NnOFF");
+    assert_refused("a.off", b"CCOFF\n0 0 0\n", "BTH-I002", "line 1", "number of vertices");
+}
+
+#[test]
+fn several_vertices_in_one_line_are_told() {
+    let text = b"OFF\n4 1 0\n0 0 0 1 0 0\n1 1 0 0 1 0\n4 0 1 2 3\n";
+    assert_refused("a.off", text, "BTH-I003", "line 5", "a line has one vertex or one face, line 3 has more");
+    let error = import_bytes("a.off", text, Keep::None).unwrap_err().to_string();
+    assert!(error.contains("on a line of its own"), "{error}");
+    let error = import_bytes("a.off", b"OFF\n4 1 0\n0 0 0\n", Keep::None).unwrap_err().to_string();
+    assert!(!error.contains("line of its own"), "{error}");
+}

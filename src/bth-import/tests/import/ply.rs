@@ -206,3 +206,57 @@ fn values_after_the_end_of_a_row_are_told() {
             .heard("2 rows have more values than the header tells, which are ignored; the first is line 15")
     );
 }
+
+/// A triangle, with these properties of vertices and values behind each position, and with these lines of other elements.
+fn triangle(properties: &str, values: &str, elements: &str, rows: &str) -> String {
+    let corners = ["0 0 0", "1 0 0", "0 1 0"].map(|corner| format!("{corner} {values}\n")).concat();
+    format!(
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{properties}\
+         {elements}end_header\n{corners}{rows}"
+    )
+}
+
+#[test]
+fn polygons_of_other_elements_are_told() {
+    for (element, list) in
+        [("polygon", "vertex_indices"), ("range_grid", "vertex_indices"), ("fan", "vertex_index")]
+    {
+        let elements = format!(
+            "element face 1\nproperty list uchar int vertex_indices\nelement {element} 2\nproperty list uchar int {list}\n"
+        );
+        let listener = Listener::default();
+        let text = triangle("", "", &elements, "3 0 1 2\n3 0 1 2\n0\n");
+        let (mesh, _) = import_with("a.ply", text.as_bytes(), Keep::None, &listener).unwrap();
+        assert_eq!(mesh.triangles.len(), 1);
+        assert!(listener.heard(&format!("2 rows of element {element}: {list} is not read")));
+        assert_eq!(listener.0.lock().unwrap().len(), 1);
+    }
+}
+
+#[test]
+fn texture_coordinates_of_faces_are_told_where_they_are_wanted() {
+    let elements =
+        "element face 1\nproperty list uchar int vertex_indices\nproperty list uchar float texcoord\n";
+    let text = triangle("", "", elements, "3 0 1 2 6 0 0 1 0 0 1\n");
+    for (keep, told) in [(Keep::All, true), (Keep::Normals, false), (Keep::None, false)] {
+        let listener = Listener::default();
+        import_with("a.ply", text.as_bytes(), keep, &listener).unwrap();
+        assert_eq!(
+            listener.heard("1 rows of element face: the texture coordinates texcoord are not kept"),
+            told
+        );
+        assert_eq!(listener.0.lock().unwrap().len(), usize::from(told));
+    }
+}
+
+#[test]
+fn of_two_pairs_of_texture_coordinates_the_first_counts() {
+    let properties = "property float u\nproperty float v\nproperty float s\nproperty float t\n";
+    let elements = "element face 1\nproperty list uchar int vertex_indices\n";
+    let text = triangle(properties, "0.25 0.5 7 8", elements, "3 0 1 2\n");
+    assert!(import_bytes("a.ply", text.as_bytes(), Keep::None).is_ok());
+    let listener = Listener::default();
+    let (mesh, _) = import_with("a.ply", text.as_bytes(), Keep::All, &listener).unwrap();
+    assert_eq!(mesh.attributes.unwrap().uvs[0], [0.25, 0.5]);
+    assert!(listener.heard("3 rows of element vertex: the texture coordinates s, t are not kept"));
+}

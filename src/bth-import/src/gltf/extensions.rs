@@ -14,10 +14,14 @@ pub(crate) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_c
 /// Changes the texture coordinates of a texture.
 pub(crate) const TEXTURE_TRANSFORM: &str = "KHR_texture_transform";
 
+/// Hides nodes and all that are below them.
+pub(crate) const VISIBILITY: &str = "KHR_node_visibility";
+
 /// Required extensions that are read or that do not change where triangles are. A name that ends with `_` stands for all
 /// names that begin with it.
-pub(crate) const SUPPORTED: [&str; 20] = [
+pub(crate) const SUPPORTED: [&str; 21] = [
     "KHR_mesh_quantization",
+    VISIBILITY,
     DRACO,
     MESHOPT[0],
     MESHOPT[1],
@@ -40,7 +44,7 @@ pub(crate) const SUPPORTED: [&str; 20] = [
 ];
 
 /// Extensions of nodes that scenes read and flat models cannot.
-pub(crate) const SCENE_EXTENSIONS: [&str; 2] = ["EXT_mesh_gpu_instancing", "KHR_node_visibility"];
+pub(crate) const SCENE_EXTENSIONS: [&str; 1] = ["EXT_mesh_gpu_instancing"];
 
 /// Whether `name` is among `supported`.
 pub(crate) fn is_supported(name: &str, supported: &[&str]) -> bool {

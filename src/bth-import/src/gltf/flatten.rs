@@ -53,13 +53,18 @@ struct Flattener<'r, 'a> {
     colors: bool,
 }
 
-/// Reads a glTF or GLB file: its default scene, else its first, else all root nodes, at rest. Lines count each segment, points each point as skipped.
+/// Reads a glTF or GLB file: its default scene, else its first, else all root nodes, at rest and without hidden nodes. Lines count each segment, points each point as skipped.
 pub(crate) fn read<'a>(source: &'a Source<'a>, wanted: Wanted) -> Result<Raw<'a>> {
     let (document, binary) = document::read(source, &SUPPORTED)?;
     if document.extensions_used.iter().any(|name| name == "EXT_mesh_gpu_instancing") {
         source.monitor.warn("EXT_mesh_gpu_instancing is ignored: each of its meshes is read once");
     }
-    let placed = placed_meshes(source, &document)?;
+    let (placed, hidden) = placed_meshes(source, &document)?;
+    if hidden > 0 {
+        source
+            .monitor
+            .warn(&format!("{hidden} nodes with meshes are left out: KHR_node_visibility hides them"));
+    }
     let has_skin = |placed: &PlacedMesh| placed.node.is_some_and(|node| document.nodes[node].skin.is_some());
     let deforms = |placed: &PlacedMesh| has_skin(placed) || document.has_targets(placed.mesh);
     if !document.animations.is_empty() && placed.iter().any(deforms) {

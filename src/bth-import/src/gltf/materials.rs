@@ -19,6 +19,7 @@ use crate::gltf::texture::{self, KeptSet};
 use crate::gltf::texture_parts::{TextureParts, TextureReader};
 use crate::image_file::{self, MAX_TEXELS, Refused};
 use crate::materials::{ImageFile, MaterialRecorder};
+use crate::number::shown;
 use crate::source::{IMAGE, Source};
 
 /// How to do without what is read here, in errors.
@@ -27,6 +28,9 @@ const WITHOUT: &str = "without --materials";
 const UNLIT: &str = "KHR_materials_unlit";
 const EMISSIVE_STRENGTH: &str = "KHR_materials_emissive_strength";
 const SPECULAR_GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
+
+/// The alpha modes of materials; others count as the first.
+pub(super) const ALPHA_MODES: [&str; 3] = ["OPAQUE", "MASK", "BLEND"];
 
 /// What is read of a material.
 #[derive(Deserialize, Default)]
@@ -198,6 +202,9 @@ impl MaterialReader<'_, '_> {
         let material: SurfaceMaterial = reader.part(&reader.parts.materials, number, &part)?;
         let base = material.base(reader, &part)?;
         self.shared.left_out.borrow_mut().extend(material.left_out(&base));
+        if let Some(mode) = material.alpha_mode.as_deref().filter(|mode| !ALPHA_MODES.contains(mode)) {
+            self.shared.left_out.borrow_mut().insert(format!("alphaMode \"{}\"", shown(mode.as_bytes())));
+        }
         let kept = texture::kept_set(&reader.parts.materials[number])
             .map_err(|e| reader.malformed(&part, format!("expected a glTF material, found: {e}")))?;
         let strength = match material.extensions.get(EMISSIVE_STRENGTH) {

@@ -70,8 +70,9 @@ impl GltfPart {
     }
 }
 
-/// The scene's nodes that have a mesh, in depth-first order, with their world transforms.
-pub(super) fn placed_meshes(source: &Source<'_>, document: &GltfDocument) -> Result<Vec<PlacedMesh>> {
+/// The scene's visible nodes that have a mesh, in depth-first order, with their world transforms, and the number of those that
+/// KHR_node_visibility hides.
+pub(super) fn placed_meshes(source: &Source<'_>, document: &GltfDocument) -> Result<(Vec<PlacedMesh>, u64)> {
     let error =
         |part: String, message: &str| source.error_in_part(GRAPH, part, message, "export the model again");
     let roots = match document.scenes.get(document.scene.unwrap_or(0)) {
@@ -81,20 +82,24 @@ pub(super) fn placed_meshes(source: &Source<'_>, document: &GltfDocument) -> Res
         }
         None => document.parentless_nodes(),
     };
-    let mut placed = Vec::new();
+    let (mut placed, mut hidden) = (Vec::new(), 0);
     let mut visited = vec![false; document.nodes.len()];
-    let mut stack: Vec<_> = roots.into_iter().rev().map(|node| (node, DAffine3::IDENTITY)).collect();
-    while let Some((index, parent)) = stack.pop() {
+    let mut stack: Vec<_> = roots.into_iter().rev().map(|node| (node, DAffine3::IDENTITY, true)).collect();
+    while let Some((index, parent, visible)) = stack.pop() {
         let part = || format!("node {index}");
         let node = document.nodes.get(index).ok_or_else(|| error(part(), "it does not exist"))?;
         if std::mem::replace(&mut visited[index], true) {
             return Err(error(part(), "expected a node with one parent, found it twice in the scene"));
         }
         let world = parent * transform::local(node);
-        if let Some(mesh) = node.mesh {
-            placed.push(PlacedMesh { node: Some(index), mesh, world, kept: KeptTriangles::All });
+        let visible = node.is_visible(source, index)? && visible;
+        match node.mesh {
+            Some(mesh) if visible => {
+                placed.push(PlacedMesh { node: Some(index), mesh, world, kept: KeptTriangles::All });
+            }
+            mesh => hidden += u64::from(mesh.is_some()),
         }
-        stack.extend(node.children.iter().rev().map(|&child| (child, world)));
+        stack.extend(node.children.iter().rev().map(|&child| (child, world, visible)));
     }
-    Ok(placed)
+    Ok((placed, hidden))
 }

@@ -35,9 +35,11 @@ pub(crate) struct GltfDocument {
 }
 
 #[derive(Deserialize, Default)]
-#[serde(default)]
+#[serde(default, rename_all = "camelCase")]
 pub(crate) struct GltfAsset {
     pub(crate) version: String,
+    /// The least version that readers of the document must know.
+    pub(crate) min_version: Option<String>,
 }
 
 #[derive(Deserialize, Default)]

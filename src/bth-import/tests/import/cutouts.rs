@@ -172,3 +172,24 @@ fn jpeg_images_have_no_alpha() {
     let found = cutouts(&model, AlphaMode::Mask).unwrap();
     assert_eq!((found.materials[0].image, found.images.len()), (None, 0));
 }
+
+#[test]
+fn hidden_nodes_have_no_cutouts_and_unknown_alpha_modes_are_told() {
+    let (mut json, bytes) = document(masked());
+    let visible = cutouts(&(json.clone(), bytes.clone()), AlphaMode::Mask).unwrap();
+    json["nodes"][0]["extensions"] = json!({"KHR_node_visibility": {"visible": false}});
+    let hidden = cutouts(&(json, bytes), AlphaMode::Mask).unwrap();
+    // The mesh of the second node has one triangle.
+    assert_eq!((visible.triangles.len(), hidden.triangles.len()), (2, 1));
+    assert_eq!((hidden.mesh_triangles, hidden.triangles[0].triangle), (1, 0));
+
+    let mut material = masked();
+    material["alphaMode"] = "mask".into();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.glb");
+    let (json, bytes) = document(material);
+    std::fs::write(&path, glb(&json, &bytes)).unwrap();
+    let listener = Listener::default();
+    assert!(import_cutouts(&path, AlphaMode::Mask, &listener).unwrap().triangles.is_empty());
+    assert!(listener.heard("expected an alphaMode of OPAQUE, MASK, BLEND, found \"mask\"; it has no holes"));
+}

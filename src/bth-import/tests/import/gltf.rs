@@ -18,7 +18,7 @@ pub(super) fn glb(document: &Value, binary: &[u8]) -> Vec<u8> {
 }
 
 /// The square as 48 bytes of positions, 6 u16 indices, and 48 bytes of normals along z.
-fn binary() -> Vec<u8> {
+pub(super) fn binary() -> Vec<u8> {
     let mut bytes: Vec<u8> = SQUARE.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect();
     bytes.extend([0u16, 1, 2, 0, 2, 3].iter().flat_map(|i| i.to_le_bytes()));
     for _ in 0..4 {
@@ -48,19 +48,19 @@ fn document() -> Value {
     })
 }
 
-fn edited(edit: impl FnOnce(&mut Value)) -> Value {
+pub(super) fn edited(edit: impl FnOnce(&mut Value)) -> Value {
     let mut document = document();
     edit(&mut document);
     document
 }
 
 #[track_caller]
-fn read(document: &Value) -> (Mesh, Report) {
+pub(super) fn read(document: &Value) -> (Mesh, Report) {
     import_bytes("a.glb", &glb(document, &binary()), Keep::None).unwrap()
 }
 
 #[track_caller]
-fn assert_bad(edit: impl FnOnce(&mut Value), code: &str, place: &str, message: &str) {
+pub(super) fn assert_bad(edit: impl FnOnce(&mut Value), code: &str, place: &str, message: &str) {
     assert_refused("a.glb", &glb(&edited(edit), &binary()), code, place, message);
 }
 

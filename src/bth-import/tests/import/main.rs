@@ -5,6 +5,7 @@ mod cutouts;
 mod damaged_scenes;
 mod data;
 mod gltf;
+mod gltf_nodes;
 mod groups;
 mod materials;
 mod memory;

@@ -130,6 +130,9 @@ fn what_is_left_out_is_reported() {
     let (read, warnings) = materials(json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 2}}}));
     assert_eq!(read.parameters[0].base_color_texture, NONE);
     assert!(warnings[0].contains("no image in PNG, JPEG or WebP"), "{warnings:?}");
+    let (read, warnings) = materials(json!({"alphaMode": "mask"}));
+    assert_eq!(read.parameters[0].alpha_mode, ALPHA_OPAQUE);
+    assert_eq!(warnings, ["materials: not kept are alphaMode \"mask\""]);
 }
 
 /// The texture coordinates of the corners of the triangle for a texture, by the rows that the materials keep.

@@ -11,7 +11,9 @@ use super::image::{self, ImageError, MAX_TEXELS};
 use crate::cutout::{AlphaImage, AlphaMode, CutoutMaterial, Wrap};
 use crate::error::{Error, Result};
 use crate::gltf::accessor::Accessors;
+use crate::gltf::materials::ALPHA_MODES;
 use crate::gltf::texture_parts::{IndexedTexture, TextureParts, TextureReader};
+use crate::number::shown;
 
 #[derive(Deserialize, Default)]
 #[serde(default, rename_all = "camelCase")]
@@ -81,6 +83,14 @@ impl<'m, 'a> Materials<'m, 'a> {
         }
         let part = format!("material {index}");
         let material: AlphaMaterial = self.reader.part(&self.reader.parts.materials, index, &part)?;
+        if let Some(mode) = material.alpha_mode.as_deref().filter(|mode| !ALPHA_MODES.contains(mode)) {
+            let expected = ALPHA_MODES.join(", ");
+            let message = format!(
+                "{part}: expected an alphaMode of {expected}, found \"{}\"; it has no holes",
+                shown(mode.as_bytes())
+            );
+            self.reader.accessors.source.monitor.warn(&message);
+        }
         let row = match cutoff(&material, self.mode) {
             Some(cutoff) => {
                 let read = self.cutout(&material, cutoff, &part)?;

@@ -24,7 +24,7 @@ use material::Materials;
 /// The cut-outs of a document's default scene, as [`crate::import()`] reads it.
 pub(crate) fn flat(source: &Source<'_>, mode: AlphaMode) -> Result<Cutouts> {
     let (document, binary) = document::read(source, &SUPPORTED)?;
-    let placed = placed_meshes(source, &document)?;
+    let (placed, _) = placed_meshes(source, &document)?;
     Ok(placed_cutouts(source, &document, binary, mode, &[placed])?.swap_remove(0))
 }
 

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::gltf::placed_mesh::GltfPart;
 use crate::gltf::scene::importer::{Importer, unique};
 use crate::gltf::scene::options::ImportOptions;
-use crate::gltf::schema::{GltfNode, Instancing, LightReference, Visibility};
+use crate::gltf::schema::{GltfNode, Instancing, LightReference};
 use crate::source::UNSUPPORTED;
 
 impl Importer<'_> {
@@ -70,10 +70,7 @@ impl Importer<'_> {
     fn node(&mut self, index: usize, node: &GltfNode, parent: Option<usize>) -> Result<()> {
         let part = format!("node {index}");
         let row = self.manifest.nodes.len();
-        let visible = match node.extensions.get("KHR_node_visibility") {
-            Some(value) => self.typed::<Visibility>(value, &part)?.visible.unwrap_or(true),
-            None => true,
-        };
+        let visible = node.is_visible(self.source, index)?;
         let name = self.node_name(&node.name, part.clone());
         let transform = self.transform(node, &part)?;
         self.manifest.nodes.push(Node { name: name.clone(), parent, transform, object: None, visible });

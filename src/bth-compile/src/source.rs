@@ -94,7 +94,7 @@ pub(crate) fn changed(path: &Path) -> Error {
     Error::File {
         code: "BTH-O002",
         path: path.to_owned(),
-        message: "the file changed while it was read; compile again when it is complete".to_owned(),
+        message: "the file changed while it was read".to_owned(),
     }
 }
 

@@ -45,7 +45,7 @@ pub enum Error {
         hint: String,
     },
     /// A file could not be read or written; programs exit with code 4.
-    #[error("{}: {code}: {message}", path.display())]
+    #[error("{}: {code}: {message}{}", path.display(), hint_text(file_hint(code)))]
     File {
         /// Stable code, `BTH-O…`.
         code: &'static str,
@@ -55,7 +55,7 @@ pub enum Error {
         message: String,
     },
     /// The model exceeds a limit of the file format; programs exit with code 5.
-    #[error("{code}: {message}")]
+    #[error("{code}: {message}{}", hint_text(limit_hint(code)))]
     Limit {
         /// Stable code, `BTH-L…`.
         code: &'static str,
@@ -75,6 +75,68 @@ pub enum Error {
     Cancelled,
 }
 
+impl Error {
+    /// What the user can do; empty for defects of the compiler and cancellation.
+    pub fn hint(&self) -> &str {
+        match self {
+            Error::Input { hint, .. } => hint,
+            Error::File { code, .. } => file_hint(code),
+            Error::Limit { code, .. } => limit_hint(code),
+            Error::Internal { .. } | Error::Cancelled => "",
+        }
+    }
+}
+
+/// The hint for a file that cannot be read or written.
+fn file_hint(code: &str) -> &'static str {
+    match code {
+        "BTH-O002" => "compile again when the file is complete",
+        "BTH-O020" => "name a folder that is there and may be written, on a disk that has room",
+        "BTH-O060" => "name a profile that may be read, or a folder for the cache that may be written",
+        "BTH-O061" => "let the cache be larger (--cache-size), or name an output",
+        "BTH-O062" => "pipe a model into the program, and let the folder for temporary files have room",
+        "BTH-O091" => "send the output to where there is room",
+        _ => "name a file or folder that is there and may be read",
+    }
+}
+
+/// The hint for what exceeds a limit.
+fn limit_hint(code: &str) -> &'static str {
+    match code {
+        "BTH-L003" => "make the image smaller, or compile without --materials and --alpha",
+        "BTH-L004" => "leave out frames, or make several sequences of them",
+        "BTH-L020" => "compile with --structure bvh, without tetrahedra",
+        "BTH-L032" => "divide the scene into several with fewer objects",
+        "BTH-L033" => "leave out one of these options",
+        "BTH-L034" => "free memory, or compile on a machine that has more",
+        "BTH-L050" => "shorten the names, or divide the scene into several",
+        "BTH-L090" => "ask for fewer threads (--threads)",
+        _ => "divide the model into several objects of a scene",
+    }
+}
+
 fn hint_text(hint: &str) -> String {
     if hint.is_empty() { String::new() } else { format!(" (hint: {hint})") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_of_files_and_limits_end_with_a_hint() {
+        let message = || "what is wrong".to_owned();
+        for code in
+            ["BTH-O001", "BTH-O002", "BTH-O020", "BTH-O060", "BTH-O061", "BTH-O062", "BTH-O090", "BTH-O091"]
+        {
+            let error = Error::File { code, path: "a.obj".into(), message: message() };
+            assert_eq!(error.to_string(), format!("a.obj: {code}: what is wrong (hint: {})", error.hint()));
+            assert!(!error.hint().is_empty());
+        }
+        for code in ["BTH-L001", "BTH-L003", "BTH-L033", "BTH-L090", "BTH-L202"] {
+            let error = Error::Limit { code, message: message() };
+            assert_eq!(error.to_string(), format!("{code}: what is wrong (hint: {})", error.hint()));
+            assert!(!error.hint().is_empty());
+        }
+    }
 }

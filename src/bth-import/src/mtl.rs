@@ -365,9 +365,7 @@ fn image_name(map: &Map, images: &mut HashMap<PathBuf, [u8; 16]>) -> Result<[u8;
         }
         Refused::TooLarge(texels) => Error::Limit {
             code: "BTH-L003",
-            message: format!(
-                "{shown} has {texels} texels; up to {MAX_TEXELS} are kept (hint: make it smaller, or compile without --materials)"
-            ),
+            message: format!("{shown} has {texels} texels; up to {MAX_TEXELS} are kept"),
         },
     })?;
     let name = ImageFile::new(bytes).name;

@@ -98,18 +98,8 @@ impl Failure {
 
     /// The error as JSON: `code`, `message`, and where known `place` and `hint`.
     pub(crate) fn json(&self) -> serde_json::Value {
-        use bth_compile::Error;
         match self {
-            Self::Compile(Error::Input { code, place, message, hint }) => {
-                json!({"code": code, "place": place.to_string(), "message": message, "hint": hint})
-            }
-            Self::Compile(Error::File { code, path, message }) => {
-                json!({"code": code, "place": path.to_string_lossy(), "message": message})
-            }
-            Self::Compile(Error::Limit { code, message } | Error::Internal { code, message }) => {
-                json!({"code": code, "message": message})
-            }
-            Self::Compile(Error::Cancelled) => json!({"code": "BTH-C000", "message": "cancelled"}),
+            Self::Compile(error) => compile_json(error),
             Self::Runtime(error) => runtime_json(error),
             Self::Manifest(error) => json!({"code": error.code, "place": error.path.to_string_lossy(),
                 "line": error.line, "column": error.column, "message": error.message, "hint": error.hint}),
@@ -139,6 +129,21 @@ impl Failure {
             Self::Usage { message, hint } => format!("BTH-U001: {message} (hint: {hint})"),
         };
         output::error(&text);
+    }
+}
+
+/// An error of the compiler as JSON.
+fn compile_json(error: &bth_compile::Error) -> serde_json::Value {
+    use bth_compile::Error;
+    match error {
+        Error::Input { code, place, message, hint } => {
+            json!({"code": code, "place": place.to_string(), "message": message, "hint": hint})
+        }
+        Error::File { code, path, message } => json!({"code": code, "place": path.to_string_lossy(),
+            "message": message, "hint": error.hint()}),
+        Error::Limit { code, message } => json!({"code": code, "message": message, "hint": error.hint()}),
+        Error::Internal { code, message } => json!({"code": code, "message": message}),
+        Error::Cancelled => json!({"code": "BTH-C000", "message": "cancelled"}),
     }
 }
 

@@ -48,6 +48,8 @@ fn a_failed_model_stops_no_other_and_gives_the_exit_code() {
     let codes: Vec<_> = json["jobs"].as_array().unwrap().iter().map(|j| &j["error"]["code"]).collect();
     assert_eq!((codes[0].is_null(), codes[1].is_string(), codes[2].is_null()), (true, true, true));
     assert_eq!(codes[3], "BTH-O001");
+    let hint = json["jobs"][3]["error"]["hint"].as_str().unwrap();
+    assert!(!hint.is_empty() && run.stderr.contains(&format!(" (hint: {hint})")), "{run:?}");
 }
 
 #[test]

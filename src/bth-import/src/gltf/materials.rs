@@ -317,7 +317,7 @@ fn image_file(textures: &TextureReader<'_, '_>, index: usize) -> Result<ImageFil
         Refused::TooLarge(texels) => Error::Limit {
             code: "BTH-L003",
             message: format!(
-                "{}: {part} has {texels} texels; up to {MAX_TEXELS} are kept (hint: make it smaller, or compile {WITHOUT})",
+                "{}: {part} has {texels} texels; up to {MAX_TEXELS} are kept",
                 textures.accessors.source.path.display()
             ),
         },

@@ -1,7 +1,7 @@
 //! Reads MDD files, the motion designer data of LightWave and Blender: the numbers of frames and points, the time of each frame in
 //! seconds, then the positions of each frame; all numbers are big-endian.
 
-use super::vertex_cache::VertexCache;
+use super::vertex_cache::{VertexCache, length_hint};
 use super::{MAX_FRAMES, MISMATCH, Timing};
 use crate::error::Result;
 use crate::source::{MALFORMED, Source, TRUNCATED, TRUNCATED_HINT};
@@ -35,7 +35,7 @@ pub(super) fn read(source: &Source<'_>, timing: &Timing) -> Result<VertexCache> 
             "expected {bytes} bytes for the times and positions of {frames} frames of {points} points, found {}",
             body.len()
         );
-        return Err(source.error_at_byte(TRUNCATED, HEADER, message, TRUNCATED_HINT));
+        return Err(source.error_at_byte(TRUNCATED, HEADER, message, length_hint(body.len(), bytes)));
     }
     let (times, rows) = body.split_at(4 * frames);
     let number = |bytes: &[u8]| f32::from_be_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);

@@ -1,7 +1,7 @@
 //! Reads PC2 files, the point caches of 3ds Max and Blender: a header of 32 bytes, then the positions of each sample; all numbers
 //! are little-endian.
 
-use super::vertex_cache::VertexCache;
+use super::vertex_cache::{VertexCache, length_hint};
 use super::{MAX_FRAMES, Timing};
 use crate::error::Result;
 use crate::source::{MALFORMED, Source, TRUNCATED, TRUNCATED_HINT, UNSUPPORTED};
@@ -40,7 +40,7 @@ pub(super) fn read(source: &Source<'_>, timing: &Timing) -> Result<VertexCache> 
             "expected {bytes} bytes for {samples} samples of {points} points behind the header, found {}",
             body.len()
         );
-        return Err(source.error_at_byte(TRUNCATED, HEADER, message, TRUNCATED_HINT));
+        return Err(source.error_at_byte(TRUNCATED, HEADER, message, length_hint(body.len(), bytes)));
     }
     let rate = timing.rate();
     let time = |sample: usize| timing.start + (f64::from(first) + sample as f64 * f64::from(step)) / rate;

@@ -148,6 +148,12 @@ fn bad_vertex_caches_are_refused() {
     assert!(error(&pc2(1, &[[0.0; 3]; 2], 0.0, 0.0)).contains("BTH-I017: frame 1"));
     assert!(error(&pc2(1, &[[0.0; 3]; 2], f32::NAN, 1.0)).contains("BTH-I017: frame 0"));
     let good = mdd(1, &[0.0, 1.0], &[[0.0; 3]; 2]);
+    for good in [&pc2(1, &[[0.0; 3]; 3], 0.0, 1.0), &good] {
+        let longer = error(&[&good[..], &[0]].concat());
+        assert!(longer.contains("BTH-I003") && longer.contains("its header does not belong"), "{longer}");
+        let cut = error(&good[..good.len() - 1]);
+        assert!(cut.contains("BTH-I003") && cut.contains("the file is cut off"), "{cut}");
+    }
     for cut in 0..good.len() {
         error(&good[..cut]);
     }

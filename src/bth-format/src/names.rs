@@ -11,12 +11,14 @@ pub(crate) fn name(text: &[u8], first: u32, length: u32) -> Option<&str> {
 
 /// The part of a section of text in which names can lie: all before the first byte that is not UTF-8. Found once, so that checking all names
 /// costs no more than the bytes of the section and the rows, however names overlap.
+#[inline(never)]
 pub(crate) fn checked(text: &[u8]) -> &str {
     let valid = std::str::from_utf8(text).map_or_else(|error| error.valid_up_to(), str::len);
-    std::str::from_utf8(&text[..valid]).unwrap_or_default()
+    text.get(..valid).and_then(|text| std::str::from_utf8(text).ok()).unwrap_or_default()
 }
 
 /// Whether the bytes from `first` on are a name of an allowed length, given the [`checked`] text of the section.
+#[inline(never)]
 pub(crate) fn is_name(text: &str, first: u32, length: u32) -> bool {
     let end = (first as usize).checked_add(length as usize);
     length <= MAX_NAME && end.is_some_and(|end| text.get(first as usize..end).is_some())

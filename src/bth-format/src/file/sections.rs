@@ -116,10 +116,7 @@ impl File {
 
     /// The scene sections, whose **indices are not checked**; `None` when the file has none of them.
     pub fn scene(&self) -> Option<SceneView<'_>> {
-        // The table is sorted, and may have any number of sections of unknown kinds.
-        let table = self.table();
-        let first = table.partition_point(|e| (e.object, e.kind) < (NONE, kind::SCENE));
-        table.get(first).filter(|e| kind::is_scene(e.kind))?;
+        (kind::SCENE..=kind::MORPH_WEIGHTS).find(|kind| self.section(NONE, *kind).is_some())?;
         Some(SceneView {
             scene: self.slice(NONE, kind::SCENE),
             nodes: self.slice(NONE, kind::NODES),

@@ -52,6 +52,7 @@ pub(super) struct MorphRuns<'a> {
 
 impl<'a> MorphRuns<'a> {
     /// The runs of the targets of an object of so many vertices by their weights. Targets of weight 0 have none.
+    #[inline(never)]
     pub(super) fn new(deformation: &DeformationView<'a>, weights: &[f64], vertices: usize) -> Self {
         // How many runs chunks have, then where they begin, then, as they are filled, where they end.
         let mut ends = vec![0u32; vertices.div_ceil(CHUNK)];
@@ -85,18 +86,18 @@ fn each_run<'a>(
 ) {
     for (target, &weight) in weights.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
         let morph = deformation.morph(target);
-        let Some(mut rows) = morph.rows else {
-            let chunks = morph.deltas.chunks(CHUNK).enumerate();
-            chunks.for_each(|(chunk, deltas)| give(chunk, MorphRun { weight, rows: None, deltas }));
-            continue;
-        };
-        let mut deltas = morph.deltas;
-        while let Some(row) = rows.first() {
-            let chunk = row / CHUNK as u32;
-            let count = rows.partition_point(|row| row / CHUNK as u32 == chunk);
-            let (of_chunk, later) = rows.split_at(count);
-            give(chunk as usize, MorphRun { weight, rows: Some(of_chunk), deltas: &deltas[..count] });
-            (rows, deltas) = (later, &deltas[count..]);
+        let mut from = 0;
+        while from < morph.deltas.len() {
+            let (chunk, to) = match morph.rows {
+                None => (from / CHUNK, morph.deltas.len().min(from + CHUNK)),
+                Some(rows) => {
+                    let chunk = rows[from] as usize / CHUNK;
+                    (chunk, from + rows[from..].partition_point(|row| *row as usize / CHUNK == chunk))
+                }
+            };
+            let rows = morph.rows.map(|rows| &rows[from..to]);
+            give(chunk, MorphRun { weight, rows, deltas: &morph.deltas[from..to] });
+            from = to;
         }
     }
 }

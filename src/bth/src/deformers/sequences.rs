@@ -7,7 +7,6 @@ use crate::deform::Deforming;
 use crate::objects::Objects;
 use bth_format::error::Result;
 use bth_format::{File, FramePosition};
-use std::collections::HashSet;
 
 /// From this number of positions on, several threads compute them.
 #[cfg(feature = "rayon")]
@@ -57,9 +56,14 @@ impl Moved {
         self.states.iter().map(|(object, _)| *object)
     }
 
-    /// The objects that have got another hierarchy.
-    pub(super) fn replaced(&self) -> HashSet<u32> {
-        self.replaced.iter().map(|(object, _)| *object).collect()
+    /// Whether an object is among them, of those of one file, which ascend.
+    pub(super) fn has(&self, object: u32) -> bool {
+        self.states.binary_search_by_key(&object, |row| row.0).is_ok()
+    }
+
+    /// Whether an object, of those of one file, has got another hierarchy.
+    pub(super) fn is_replaced(&self, object: u32) -> bool {
+        self.replaced.binary_search_by_key(&object, |row| row.0).is_ok()
     }
 
     /// Adds the objects of others.

@@ -114,7 +114,6 @@ impl Deformers {
         let mut posed = Posed { objects: moved.objects().collect(), poses: Vec::new(), moved };
         let Some(view) = file.scene() else { return Ok(posed) };
         let mut matrices = SkinMatrices::new(&view, hierarchy);
-        let (moves, replaced): (HashSet<u32>, _) = (posed.moved.objects().collect(), posed.moved.replaced());
         for (row, deformer) in view.deformers.iter().enumerate() {
             let object = first_object + deformer.object;
             let can_be_hit = file.object_header(deformer.object).root != NONE;
@@ -122,7 +121,7 @@ impl Deformers {
                 continue;
             }
             let pose = Pose::of(&mut matrices, deformer, seconds);
-            if self.poses.get(object) == Some(&pose) && !replaced.contains(&object) {
+            if self.poses.get(object) == Some(&pose) && !posed.moved.is_replaced(object) {
                 continue;
             }
             if let Err(error) = stage_pose(objects, (file, deformer.object), object, &pose) {
@@ -139,7 +138,7 @@ impl Deformers {
             }
             posed.poses.push((object, pose));
             // No other deformer has the object (BTH-F180).
-            if !moves.contains(&object) {
+            if !posed.moved.has(object) {
                 posed.objects.push(object);
             }
         }
@@ -197,9 +196,8 @@ fn stage_pose(objects: &mut Objects, (file, row): (&File, u32), object: u32, pos
 impl Deformed {
     /// Gives the objects the positions and hierarchies that they had before the update.
     pub(crate) fn undo(mut self, objects: &mut Objects) {
-        let replaced = self.posed.moved.replaced();
         for object in &self.posed.objects {
-            if !replaced.contains(object)
+            if !self.posed.moved.is_replaced(*object)
                 && let Ok(deforming) = objects.deforming(*object)
             {
                 deforming.undo();

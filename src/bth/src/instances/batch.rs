@@ -21,7 +21,7 @@ use crate::query::{AnswersOf, AnyQuery, Goal, NearestQuery, Query, any_answers, 
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use bth_format::layout::NONE;
-use std::cell::RefCell;
+use std::cell::Cell;
 use std::ops::Range;
 
 /// Number of rays that advance together.
@@ -56,7 +56,7 @@ impl ActiveRays {
 }
 
 thread_local! {
-    static ACTIVE_RAYS: RefCell<ActiveRays> = RefCell::default();
+    static ACTIVE_RAYS: Cell<Option<Box<ActiveRays>>> = const { Cell::new(None) };
 }
 
 /// Kernel that starts the rays of a chunk.
@@ -212,14 +212,14 @@ impl World {
     ) {
         let batch = SceneBatch { world: self, objects, rays, from };
         // They are taken out while they are in use, so that after a panic the next batch begins with new memory.
-        let mut active_rays = ACTIVE_RAYS.take();
+        let mut active_rays = ACTIVE_RAYS.take().unwrap_or_default();
         let isa = Isa::chosen();
         for first in (0..rays.len()).step_by(CHUNK) {
             let end = (first + CHUNK).min(rays.len());
             active_rays.visits.clear();
             active_rays.free_starts.find(&batch, first..end, query);
             let (count, progress) = (end - first, query.progress().of_rays_from(first));
-            let active_rays = &mut active_rays;
+            let active_rays = &mut *active_rays;
             isa.run(StartKernel { batch: &batch, first, count, progress, active_rays });
             self.trace(&batch, query, active_rays);
             while active_rays.is_any_active() {
@@ -229,7 +229,7 @@ impl World {
                 self.trace(&batch, query, active_rays);
             }
         }
-        ACTIVE_RAYS.set(active_rays);
+        ACTIVE_RAYS.set(Some(active_rays));
     }
 
     /// The instance on which a ray starts, if it is visible.

@@ -10,7 +10,6 @@ use crate::update::Update;
 use bth_format::error::{Code, Error, Result};
 use bth_format::layout::*;
 use bth_format::text;
-use std::collections::HashSet;
 
 impl World {
     /// The instances of a file at the first frame of its scene; `None` if the objects are not those of a file with scene sections.
@@ -98,7 +97,8 @@ impl World {
         all: bool,
     ) -> Result<Update> {
         let view = scene_of(objects);
-        let deformed: HashSet<u32> = deformed.iter().copied().collect();
+        let mut deforms = vec![false; if deformed.is_empty() { 0 } else { objects.count() as usize }];
+        deformed.iter().for_each(|object| deforms[*object as usize] = true);
         let mut update = Update::default();
         for (row, instance) in view.instances.iter().enumerate() {
             let TransformSource::File(hierarchy) = &self.source else { break };
@@ -112,7 +112,7 @@ impl World {
                 true => all || hidden != self.placements[row].is_none(),
                 false => hierarchy.moved(instance.node),
             };
-            if !moved && !deformed.contains(&instance.object) {
+            if !moved && !deforms.get(instance.object as usize).is_some_and(|deforms| *deforms) {
                 continue;
             }
             self.placements[row] = None;

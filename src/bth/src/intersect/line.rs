@@ -158,7 +158,6 @@ impl Line {
     }
 
     /// The depth at which the line crosses a triangle that it certainly crosses, and a bound of its error.
-    #[inline(always)]
     fn depth_of_crossing([a, b, c]: [&Projected; 3], error: f64) -> (f64, f64) {
         let weight = [cross(b, c), cross(c, a), cross(a, b)];
         let bound = 4.0 * error * (a.size() + b.size() + c.size() + error);

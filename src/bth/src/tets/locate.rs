@@ -94,7 +94,8 @@ impl TetWalker<'_> {
                 true => entered.behind,
                 false => self.records.link(tet, entered, vertex[apex]).next,
             };
-            if !(self.line.t_after(corner.each_ref(), self.error) < -LEAST_T) {
+            let t = self.line.t_after(corner.each_ref(), self.error);
+            if t.is_nan() || t >= -LEAST_T {
                 return None;
             }
             let entered = Entered { face: indices.map(|i| vertex[i]), apex: vertex[apex], behind };

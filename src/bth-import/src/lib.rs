@@ -28,6 +28,7 @@ mod raw;
 mod rows;
 mod sequence;
 mod source;
+mod statements;
 mod stl;
 mod topology;
 mod weld;

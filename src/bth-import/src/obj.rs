@@ -3,8 +3,6 @@
 //!
 //! A reader of our own rather than `tobj`: docs/decisions.md says why.
 
-use std::borrow::Cow;
-
 use crate::error::{Error, Result};
 use crate::groups::NamedGroups;
 use crate::mesh::{Keep, Wanted};
@@ -13,6 +11,7 @@ use crate::number::{Lines, float, integer, shown, words};
 use crate::raw::{Raw, RowKind, check_rows};
 use crate::rows::NONE;
 use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, UNSUPPORTED};
+use crate::statements::{name, next_statement, statements};
 
 const ATTRIBUTE_HINT: &str = "correct the file, or compile without attributes (--attributes none)";
 
@@ -290,44 +289,6 @@ impl Reader<'_, '_> {
 #[inline]
 fn until_comment<'w>(words: impl Iterator<Item = &'w [u8]>) -> impl Iterator<Item = &'w [u8]> {
     words.take_while(|word| !word.starts_with(b"#"))
-}
-
-/// The words of a name, with single spaces between them. Bytes that are not UTF-8 become the replacement character. Names go on to the
-/// end of the line, and a word such as `#12` belongs to them, as other readers have it (Blender, tinyobjloader). Only `#` as
-/// a word of its own begins a comment.
-pub(super) fn name<'w>(words: impl Iterator<Item = &'w [u8]>) -> String {
-    let words: Vec<_> = words.take_while(|word| *word != b"#").map(String::from_utf8_lossy).collect();
-    words.join(" ")
-}
-
-/// The statements of a text with the numbers of their first lines, as [`next_statement`] joins them.
-pub(super) fn statements(data: &[u8]) -> impl Iterator<Item = (u64, Cow<'_, [u8]>)> {
-    let mut lines = Lines::new(data);
-    std::iter::from_fn(move || next_statement(&mut lines))
-}
-
-/// Whether a line goes on in the next one: it ends in a backslash that is not in a comment.
-fn goes_on(line: &[u8]) -> bool {
-    line.last() == Some(&b'\\') && !words(line).next().is_some_and(|word| word.starts_with(b"#"))
-}
-
-/// The next line and its number. While a line ends in a backslash, the following line is joined to it, but for lines that are comments.
-#[inline]
-fn next_statement<'a>(lines: &mut Lines<'a>) -> Option<(u64, Cow<'a, [u8]>)> {
-    let (number, line) = lines.next()?;
-    if !goes_on(line) {
-        return Some((number, Cow::Borrowed(line)));
-    }
-    let mut joined = line.to_vec();
-    let mut open = true;
-    while open {
-        joined.pop();
-        joined.push(b' ');
-        let next = lines.next().map_or(&b""[..], |(_, line)| line);
-        joined.extend_from_slice(next);
-        open = goes_on(next);
-    }
-    Some((number, Cow::Owned(joined)))
 }
 
 fn line_of_row(data: &[u8], kind: RowKind, row: usize) -> u64 {

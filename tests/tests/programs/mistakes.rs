@@ -43,8 +43,8 @@ const BTH_PLAY: [Mistake; 11] = [
     ("bth-play", &["missing.manifest", "-o", "x.png"], 4, &["missing.manifest", "BTH-M"]),
     ("bth-play", &["empty", "-o", "x.png"], 4, &["empty", "BTH-O001"]),
     ("bth-play", &["words.obj.bth", "-o", "x.png"], 3, &["words.obj.bth", "BTH-F"]),
-    ("bth-play", &["ball.bth", "-o", "missing/x.png", "--size", "8x8"], 4, &["missing/x.png", "BTH-P002"]),
-    ("bth-play", &["missing.obj", "-o", "x.png", "--cache-dir", "cache"], 4, &["missing.obj", "BTH-P003"]),
+    ("bth-play", &["ball.bth", "-o", "ball.bth/x.png", "--size", "8x8"], 4, &["ball.bth", "BTH-P002"]),
+    ("bth-play", &["missing.obj", "-o", "x.png", "--cache-dir", "cache"], 4, &["missing.obj", "BTH-O001"]),
     ("bth-play", &["ball.obj", "-o", "x.png", "--cache-dir", "ball.obj"], 4, &["ball.obj", "BTH-P002"]),
 ];
 

@@ -326,3 +326,19 @@ fn objects_that_no_ray_comes_near_are_not_touched() {
     assert_eq!(touched("-2,3,2,-2.5,-1,2.5"), 1, "a corner of the floor");
     assert_eq!(touched("0,3,6,0,0,0"), 2, "all");
 }
+
+/// What a scene leaves out is told, as for single models.
+#[test]
+fn scenes_tell_what_they_leave_out() {
+    let manifest = r#"version = 1
+objects = [{ name = "o", model = "o.obj" }]
+nodes = [{ name = "a", object = "o" }, { name = "flat", object = "o", scale = [1, 0, 1] }]
+"#;
+    let folder =
+        folder(&[("o.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\np 1\nl 1 2\n"), ("s.manifest", manifest)]);
+    let run = run("bthc", folder.path(), &["compile", "s.manifest", "--json"]).expect(0);
+    let warnings = run.json()["warnings"].to_string();
+    for text in ["o.obj: 2 elements are left out", "node \\\"flat\\\""] {
+        assert!(warnings.contains(text), "{warnings}");
+    }
+}

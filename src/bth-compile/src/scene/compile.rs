@@ -6,7 +6,7 @@ use super::objects::{self, Objects};
 use super::plan::ScenePlan;
 use super::previous::Previous;
 use super::report::{ObjectReport, SceneReport};
-use super::{deformers, encode, known_rays, meshes, sources};
+use super::{deformers, encode, known_rays, meshes, sources, visible};
 use crate::bvh::{BvhOptions, Quality};
 use crate::cached::{self, Cache, CachedCompilation, DryRun};
 use crate::costs;
@@ -82,6 +82,7 @@ pub fn compile_cached(
     let context = Context::new(options, cache, monitor)?;
     let mut clock = Clock::default();
     let plan = ScenePlan::of(manifest, source.folder, options, &mut clock)?;
+    warn_of_flattened(manifest, monitor);
     let key = key(manifest, &plan, &context)?;
     let outcome = cached::compile_or_fetch(cache, key.as_ref(), policy.needed, monitor, |monitor| {
         let mut context = context.with_monitor(monitor);
@@ -95,6 +96,19 @@ pub fn compile_cached(
     let objects = Vec::<ObjectReport>::deserialize(&outcome.report["objects"]).unwrap_or_default();
     warn_over_limit(&objects, options, monitor);
     Ok(outcome)
+}
+
+/// Warns of nodes that are hidden because a scale is 0.
+fn warn_of_flattened(manifest: &Manifest, monitor: &dyn Monitor) {
+    let nodes = visible::flattened(manifest);
+    if let Some(first) = nodes.first() {
+        let others =
+            if nodes.len() > 1 { format!(" and {} other nodes", nodes.len() - 1) } else { String::new() };
+        monitor.warn(&format!(
+            "node \"{}\"{others}: a scale of 0 along an axis hides what is below; a small one shows it flat",
+            first.escape_debug()
+        ));
+    }
 }
 
 /// Warns if objects are over the limit on bytes.

@@ -168,6 +168,12 @@ fn import(file: &File<'_>, parts: &[SourcePart], context: &Context<'_>) -> Resul
     };
     let meshes = with_opacity(file, &single, meshes, context)?;
     let meshes = file.digest.unchanged(&file.full, meshes)?;
+    for (part, (_, report)) in parts.iter().zip(&meshes).filter(|(_, (_, report))| report.skipped > 0) {
+        let count = report.skipped;
+        let name = part.gltf().map_or_else(|| file.path.to_string(), |_| file.name_of(*part));
+        let what = "elements are left out: points, lines and faces of fewer than three corners";
+        monitor.warn(&format!("{name}: {count} {what}"));
+    }
     let none = cached::Recording::new(*monitor);
     let keep = |(row, (part, read))| {
         let recording = if row == 0 { &recording } else { &none };

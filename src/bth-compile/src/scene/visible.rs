@@ -34,6 +34,20 @@ pub(super) fn visible(manifest: &Manifest, order: &[usize]) -> Vec<bool> {
         .collect()
 }
 
+/// The nodes that are hidden because they have no size along some axis, though they have one along another: a file may mean flat surfaces.
+pub(super) fn flattened(manifest: &Manifest) -> Vec<&str> {
+    let mut has_track = vec![false; manifest.nodes.len()];
+    let of_scale = manifest.tracks.iter().filter(|track| track.property == Property::Scale);
+    of_scale.for_each(|track| has_track[track.node] = true);
+    let is_flat = |transform: &Transform| match transform {
+        Transform::Parts { scale, .. } => scale.contains(&0.0) && scale.iter().any(|x| *x != 0.0),
+        Transform::Matrix(_) => false,
+    };
+    let nodes = manifest.nodes.iter().enumerate();
+    let flat = nodes.filter(|(row, node)| node.visible && is_flat(&node.transform) && !has_track[*row]);
+    flat.map(|(_, node)| node.name.as_str()).collect()
+}
+
 fn has_size(transform: &Transform) -> bool {
     match transform {
         Transform::Parts { scale, .. } => !scale.contains(&0.0),

@@ -1,13 +1,11 @@
 //! Positions of the vertices of an object that deforms.
 
 use super::JointMatrix;
-use super::morph_runs::MorphRuns;
+use super::morph_runs::{CHUNK, MorphRuns};
 use super::pose::Pose;
 use crate::simd::{Isa, Kernel, Simd};
 use bth_format::DeformationView;
 
-/// Vertices that are computed together, in memory that stays in the first-level cache.
-pub(super) const CHUNK: usize = 256;
 /// Vertices that one task computes.
 #[cfg(feature = "rayon")]
 const TASK: usize = 16 * CHUNK;

@@ -3,8 +3,10 @@
 //! A target may move few vertices, and a file may have any number of targets that move none. The deltas are therefore divided among the chunks
 //! once for each pose, so that a chunk visits only targets that move some of its vertices: the time is linear in the number of deltas.
 
-use super::evaluate::CHUNK;
 use bth_format::DeformationView;
+
+/// Vertices that are computed together, in memory that stays in the first-level cache.
+pub(super) const CHUNK: usize = 256;
 
 /// The deltas of a target within a chunk; at least one.
 #[derive(Clone, Copy, Debug)]

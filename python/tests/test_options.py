@@ -18,7 +18,7 @@ import bth
 PAGE = pathlib.Path(__file__).resolve().parents[2] / "docs" / "reference.md"
 #: Options of `bthc compile` that a function has no use for, and those that have another name.
 OTHERS = {
-    "jobs", "dry-run", "depfile", "format", "watch", "shard", "json", "quiet", "in-cache", "no-cache", "cache-dir", "no-geometry",
+    "jobs", "dry-run", "depfile", "end-with-input", "format", "watch", "shard", "json", "quiet", "in-cache", "no-cache", "cache-dir", "no-geometry",
     "help", "version", "isa",
 }
 OURS = {"cache", "geometry", "progress"}

@@ -307,14 +307,18 @@ fn warnings_are_those_of_the_first_compilation() {
 }
 
 #[test]
-fn options_for_gltf_files_need_one() {
+fn options_without_effect_are_told() {
     let folder = folder(&[("a.obj", &sphere(4)), ("s.manifest", "version = 1\n")]);
+    let warned = |model: &str, option: &[&str]| {
+        let run = cached(folder.path(), &[&["compile", model], option].concat()).expect(0);
+        run.stderr.contains("has no effect")
+    };
     for model in ["a.obj", "s.manifest"] {
-        for option in
-            [&["--flatten"][..], &["--rate", "30"], &["--scene", "0"], &["--at-rest"], &["--strict"]]
-        {
-            let run = cached(folder.path(), &[&["compile", model], option].concat()).expect(2);
-            assert!(run.stderr.contains("glTF"), "{run:?}");
+        assert!(!warned(model, &[]));
+        for option in [&["--rate", "30"][..], &["--scene", "0"], &["--at-rest"], &["--strict"]] {
+            assert!(warned(model, option), "{model} {option:?}");
         }
     }
+    // What is no scene is flat as it is.
+    assert!(warned("s.manifest", &["--flatten"]) && !warned("a.obj", &["--flatten"]));
 }

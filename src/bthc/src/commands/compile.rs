@@ -36,8 +36,8 @@ pub(crate) fn run(args: &Compile) -> Result<(), Failure> {
     }
     let mut jobs = plan(args, &models)?;
     check_rays(args, &jobs)?;
-    check_gltf(args, &jobs)?;
     let progress = Progress::with_warnings(args.quiet || args.json, !args.quiet);
+    warn_of_options(args, &jobs, &progress);
     let store = args.keeping.store(&|text| progress.warn(text))?;
     let options = CompileOptions {
         objects_memory: jobs::memory_of_objects(args, jobs.len()),
@@ -149,21 +149,19 @@ fn check_rays(args: &Compile, jobs: &[Job]) -> Result<(), Failure> {
     }
 }
 
-/// Fails if options for glTF files are given and there is none that they could be about.
-fn check_gltf(args: &Compile, jobs: &[Job]) -> Result<(), Failure> {
-    let without = |option: &str, what: &str| Failure::Usage {
-        message: format!("{option} is about {what}, and there is none among the models"),
-        hint: "leave it out; manifests say themselves what they show",
-    };
-    if args.flatten && !jobs.iter().any(|job| scene::is_gltf(&job.model)) {
-        return Err(without("--flatten", "glTF files"));
+/// Warns of options that have no effect on these models.
+fn warn_of_options(args: &Compile, jobs: &[Job], monitor: &dyn Monitor) {
+    // Other models than scenes are flat as they are.
+    if args.flatten
+        && let Some(job) = jobs.iter().find(|job| scene::is_scene(&job.model, args))
+    {
+        monitor.warn(&format!("--flatten has no effect on {}, which is a manifest", job.model.display()));
     }
     let is_gltf_scene = |job: &Job| scene::is_gltf(&job.model) && scene::is_scene(&job.model, args);
-    match args.gltf.given() {
-        Some(option) if !jobs.iter().any(is_gltf_scene) => {
-            Err(without(option, "glTF files that are compiled as scenes"))
-        }
-        _ => Ok(()),
+    if let Some(option) = args.gltf.given()
+        && !jobs.iter().any(is_gltf_scene)
+    {
+        monitor.warn(&format!("{option} has no effect: no model is a glTF file that is compiled as a scene"));
     }
 }
 

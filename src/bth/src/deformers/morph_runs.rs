@@ -48,7 +48,7 @@ fn add(position: &mut [f64; 4], weight: f64, delta: &[f32; 3]) {
 pub(super) struct MorphRuns<'a> {
     /// Chunk after chunk, of each in the order of the targets.
     runs: Vec<MorphRun<'a>>,
-    /// For each chunk where its runs end.
+    /// For each chunk where its runs end; empty without targets.
     ends: Vec<u32>,
 }
 
@@ -56,8 +56,8 @@ impl<'a> MorphRuns<'a> {
     /// The runs of the targets of an object of so many vertices by their weights. Targets of weight 0 have none.
     #[inline(never)]
     pub(super) fn new(deformation: &DeformationView<'a>, weights: &[f64], vertices: usize) -> Self {
-        // How many runs chunks have, then where they begin, then, as they are filled, where they end.
-        let mut ends = vec![0u32; vertices.div_ceil(CHUNK)];
+        // How many runs chunks have, then where they begin, then, as they are filled, where they end. Without targets no memory is needed.
+        let mut ends = vec![0u32; if weights.is_empty() { 0 } else { vertices.div_ceil(CHUNK) }];
         each_run(deformation, weights, &mut |chunk, _| ends[chunk] += 1);
         let mut count = 0;
         for end in &mut ends {

@@ -12,7 +12,7 @@ pub(crate) struct Pose {
     /// Weights of the morph targets.
     pub(crate) weights: Vec<f64>,
     /// For each joint of the skin its matrix, which all objects of the skin share; `None` without a skin.
-    pub(crate) joints: Option<Arc<Vec<JointMatrix>>>,
+    pub(crate) joints: Option<Arc<[JointMatrix]>>,
 }
 
 /// The matrices of the joints of skins at a time, each skin computed when it is asked for.
@@ -20,7 +20,7 @@ pub(crate) struct SkinMatrices<'a> {
     view: &'a SceneView<'a>,
     hierarchy: &'a NodeHierarchy,
     /// By the row of the skin.
-    skins: Vec<Option<Arc<Vec<JointMatrix>>>>,
+    skins: Vec<Option<Arc<[JointMatrix]>>>,
 }
 
 impl<'a> SkinMatrices<'a> {
@@ -30,12 +30,12 @@ impl<'a> SkinMatrices<'a> {
     }
 
     /// The matrices of a skin; `None` if there is none of that row.
-    fn of(&mut self, row: u32) -> Option<Arc<Vec<JointMatrix>>> {
+    fn of(&mut self, row: u32) -> Option<Arc<[JointMatrix]>> {
         let SkinMatrices { view, hierarchy, skins } = self;
         let (skin, matrices) = (view.skins.get(row as usize)?, &mut skins[row as usize]);
         let joints = &view.skin_joints[skin.first_joint as usize..][..skin.joints as usize];
         let matrix = |joint: &SkinJoint| joint_matrix(joint, &hierarchy.to_world(view, joint.node));
-        Some(matrices.get_or_insert_with(|| Arc::new(joints.iter().map(matrix).collect())).clone())
+        Some(matrices.get_or_insert_with(|| joints.iter().map(matrix).collect()).clone())
     }
 }
 

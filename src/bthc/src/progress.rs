@@ -5,7 +5,6 @@ use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressState, Prog
 use std::io::IsTerminal;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError};
 
 /// Set by Ctrl-C; stages poll it a few times a second.
 static CANCELLED: AtomicBool = AtomicBool::new(false);
@@ -96,38 +95,6 @@ impl Monitor for Quiet<'_> {
     }
     fn warn(&self, message: &str) {
         self.all.warn(&format!("{}: {message}", self.model.display()));
-    }
-}
-
-/// A monitor that also collects the warnings that it passes on.
-pub(crate) struct Collecting<'a> {
-    to: &'a dyn Monitor,
-    warnings: Mutex<Vec<String>>,
-}
-
-impl<'a> Collecting<'a> {
-    pub(crate) fn new(to: &'a dyn Monitor) -> Self {
-        Self { to, warnings: Mutex::default() }
-    }
-
-    pub(crate) fn into_warnings(self) -> Vec<String> {
-        self.warnings.into_inner().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Monitor for Collecting<'_> {
-    fn stage(&self, name: &'static str, total: Option<u64>) {
-        self.to.stage(name, total);
-    }
-    fn advance(&self, units: u64) {
-        self.to.advance(units);
-    }
-    fn cancelled(&self) -> bool {
-        self.to.cancelled()
-    }
-    fn warn(&self, message: &str) {
-        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).push(message.to_owned());
-        self.to.warn(message);
     }
 }
 

@@ -1,9 +1,9 @@
 //! Access to the store: lookups and additions of results, and the log of hits and misses.
 
 use super::log::{Log, Miss};
-use super::warnings::{Recording, replay};
+use super::warnings::{replay, with_warnings};
 use crate::error::Result;
-use crate::monitor::Monitor;
+use crate::monitor::{Monitor, Recording};
 use crate::tets;
 use bth_cache::{Key, Record, Store, WorkLock};
 use bth_files::Digest;
@@ -111,7 +111,7 @@ impl<'a> Cache<'a> {
         recording: &Recording<'_>,
     ) -> Option<Record> {
         let store = self.store?;
-        let report = recording.with_report(report).map_err(std::io::Error::from);
+        let report = with_warnings(report, recording).map_err(std::io::Error::from);
         self.note_put(key, part, report.and_then(|report| store.put(key, bytes, report)), recording)
     }
 

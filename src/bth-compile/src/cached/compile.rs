@@ -1,8 +1,9 @@
 //! The compilation of a model through the cache.
 
-use super::{Cache, CachedStages, Miss, Recording, keys, replay};
+use super::warnings::with_warnings;
+use super::{Cache, CachedStages, Miss, keys, replay};
 use crate::error::{Error, Result};
-use crate::monitor::Monitor;
+use crate::monitor::{Monitor, Recording};
 use crate::options::{CompileOptions, Structure};
 use crate::pipeline::{Clock, CompileReport, FileReport, compile_imported, compile_model, warn_over_limit};
 use crate::source::{MESH_NAME, Model, SourceDigest, TriangleMesh};
@@ -178,7 +179,7 @@ pub(crate) fn compile_or_fetch<R: Serialize>(
     }
     let recording = Recording::new(monitor);
     let (content, built, keep) = build(&recording)?;
-    let report = recording.with_report(&built).map_err(|e| Error::Internal {
+    let report = with_warnings(&built, &recording).map_err(|e| Error::Internal {
         code: "BTH-X081",
         message: format!("the report cannot be written: {e}"),
     })?;

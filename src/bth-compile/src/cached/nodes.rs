@@ -1,8 +1,8 @@
 //! Tetrahedralizations of single nodes from the cache.
 
-use super::{Cache, Recording, decode, encode, keys};
+use super::{Cache, decode, encode, keys};
 use crate::error::Result;
-use crate::monitor::Monitor;
+use crate::monitor::{Monitor, Recording};
 use crate::tets::{NodeInput, NodeJob, NodeReport, NodeResult, NodeRunner, Outcome, TetMesh, TimedNodes};
 
 /// Takes results of nodes from the cache. Results that do not depend on clocks and machines are kept, including failures.

@@ -5,6 +5,7 @@ use super::object_key::object_key;
 use super::sources::{File, SourcePart};
 use crate::cached::{self, MeshSummary, Miss};
 use crate::error::Result;
+use crate::monitor::Recording;
 use crate::opacity;
 use crate::source::TriangleMesh;
 use bth_cache::Key;
@@ -149,7 +150,7 @@ fn import(file: &File<'_>, parts: &[SourcePart], context: &Context<'_>) -> Resul
         return Ok(Vec::new());
     }
     // The warnings about a file are kept with the first of its meshes.
-    let recording = cached::Recording::new(context.monitor);
+    let recording = Recording::new(context.monitor);
     let context = &context.with_monitor(&recording);
     let Context { options, monitor, .. } = context;
     if let Some(TriangleMesh { positions, triangles }) = file.in_memory {
@@ -174,7 +175,7 @@ fn import(file: &File<'_>, parts: &[SourcePart], context: &Context<'_>) -> Resul
         let what = "elements are left out: points, lines and faces of fewer than three corners";
         monitor.warn(&format!("{name}: {count} {what}"));
     }
-    let none = cached::Recording::new(*monitor);
+    let none = Recording::new(*monitor);
     let keep = |(row, (part, read))| {
         let recording = if row == 0 { &recording } else { &none };
         keep_mesh(file, part, read, context, recording)
@@ -188,7 +189,7 @@ fn keep_mesh(
     part: SourcePart,
     read: (Mesh, mesh::Report),
     context: &Context<'_>,
-    recording: &cached::Recording<'_>,
+    recording: &Recording<'_>,
 ) -> (Mesh, MeshSummary) {
     let (mesh, summary) = MeshSummary::of(read);
     let cache = context.cache;

@@ -4,8 +4,8 @@ use super::job::{Job, JobContext, JobReport, cache};
 use super::summary::summary;
 use super::{deliver, scene};
 use crate::failure::Failure;
-use crate::progress::Collecting;
 use bth_compile::Monitor;
+use bth_compile::monitor::Recording;
 
 /// Compiles a model or scene, or takes it from the cache, and brings it to its target. The report has the warnings, those of an earlier
 /// compilation included whose results are taken.
@@ -17,9 +17,9 @@ pub(super) fn compile_one(
     job: &Job,
     monitor: &dyn Monitor,
 ) -> Result<JobReport, Failure> {
-    let collecting = Collecting::new(monitor);
-    let mut report = compile_job(context, job, &collecting)?;
-    report.json["warnings"] = collecting.into_warnings().into();
+    let recording = Recording::with_notices(monitor);
+    let mut report = compile_job(context, job, &recording)?;
+    report.json["warnings"] = recording.warnings().into();
     Ok(report)
 }
 

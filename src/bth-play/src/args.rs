@@ -11,6 +11,9 @@ Exit codes:
     3  bad input: the compiled file cannot be used
     4  a file could not be read or written, or there is no display for a window";
 
+/// Where the window writes pictures by default.
+pub(crate) const SCREENSHOT: &str = "bth-play.png";
+
 /// Renders compiled BTH files and scenes to pictures and animations.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "bth-play", version, after_help = EXIT_CODES, max_term_width = 100)]

@@ -74,6 +74,8 @@ fn run(args: &args::Args) -> Result<(), Failure> {
         .map_err(|e| Failure::Usage(format!("cannot start {} threads: {e}", args.threads)))?;
     let threads = pool.current_num_threads();
     if args.window {
+        let screenshot = args.screenshot.clone().unwrap_or_else(|| args::SCREENSHOT.into());
+        output::refuse_inputs(&[screenshot], &inputs)?;
         return show_window(&mut scene, file, args, &pool);
     }
     let output = args.output()?;

@@ -4,6 +4,7 @@ use crate::support::{bthc, crossing, folder, obj, run, sphere, sphere_mesh};
 use bth_format::layout::{FreeBins, kind};
 use bth_scenes::knot::torus_knot;
 use bth_tests::conformance::{Editor, Seal};
+use std::path::Path;
 
 #[test]
 fn info_shows_sections_and_provenance_without_paths() {
@@ -93,6 +94,19 @@ nodes = [{ name = "o", object = "o" }]
         bthc(folder.path(), &["verify", "--deep", "--rays", "900", "s.bth", "--json"]).expect(0).json();
     let count = |name: &str| deep["deep"][name].as_u64().unwrap();
     assert!(count("hits") > 250 && count("rays") >= 900 && count("wrong") == 0, "{deep:#}");
+}
+
+/// Objects without triangles, without instances and with all that a file may have.
+#[test]
+fn verify_deep_accepts_every_valid_file() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../format-spec/conformance/valid");
+    let mut files = 0;
+    for entry in std::fs::read_dir(&folder).unwrap() {
+        let path = entry.unwrap().path();
+        bthc(&folder, &["verify", "--deep", "--rays", "60", path.to_str().unwrap()]).expect(0);
+        files += 1;
+    }
+    assert!(files > 20, "{files}");
 }
 
 #[test]

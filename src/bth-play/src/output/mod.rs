@@ -10,5 +10,5 @@ mod tone_mapping;
 mod y4m;
 
 pub(crate) use picture::Picture;
-pub(crate) use sink::Sink;
+pub(crate) use sink::{Sink, refuse_inputs};
 pub(crate) use tone_mapping::{reinhard, shoulder, to_picture};

@@ -79,13 +79,21 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// Creates the folder of a file where it is missing, and fails if no file can be written there: before hours of rendering, not after them.
+/// Creates the folder of a file where it is missing.
+///
+/// # Errors
+/// `BTH-P002` if it cannot be created.
+pub(super) fn create_folder(path: &Path) -> Result<(), Failure> {
+    let folder = folder_of(path);
+    std::fs::create_dir_all(folder).map_err(|e| Failure::file(folder, &e))
+}
+
+/// As [`create_folder`]; also fails if no file can be written there: before hours of rendering, not after them.
 ///
 /// # Errors
 /// `BTH-P002` if it cannot be written.
 pub(super) fn prepare_folder(path: &Path) -> Result<(), Failure> {
-    let folder = folder_of(path);
-    std::fs::create_dir_all(folder).map_err(|e| Failure::file(folder, &e))?;
+    create_folder(path)?;
     temporary_in(path).map(drop)
 }
 

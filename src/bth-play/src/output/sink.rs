@@ -9,6 +9,23 @@ use std::collections::HashSet;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+/// Fails if one of these files that are to be written is one that is read, whatever the paths are spelled like.
+///
+/// # Errors
+/// Wrong usage (exit code 2).
+pub(crate) fn refuse_inputs(files: &[PathBuf], inputs: &[PathBuf]) -> Result<(), Failure> {
+    let inputs: HashSet<PathBuf> = inputs.iter().filter_map(|input| input.canonicalize().ok()).collect();
+    let is_input = |file: &&PathBuf| file.canonicalize().is_ok_and(|real| inputs.contains(&real));
+    match files.iter().find(is_input) {
+        None => Ok(()),
+        Some(file) => {
+            let message =
+                format!("{} would replace a file that is read: name another output", file.display());
+            Err(Failure::Usage(message))
+        }
+    }
+}
+
 /// Where the pictures of a sequence go.
 pub(crate) enum Sink {
     /// One PNG file.
@@ -65,15 +82,8 @@ impl Sink {
     /// # Errors
     /// `BTH-P002` and wrong usage (exit code 2).
     pub(crate) fn prepare(&self, frames: &[i32], inputs: &[PathBuf]) -> Result<(), Failure> {
-        let inputs: HashSet<PathBuf> = inputs.iter().filter_map(|input| input.canonicalize().ok()).collect();
         let files = self.files(frames);
-        for file in &files {
-            if file.canonicalize().is_ok_and(|real| inputs.contains(&real)) {
-                let message =
-                    format!("{} would replace a file that is read: name another output", file.display());
-                return Err(Failure::Usage(message));
-            }
-        }
+        refuse_inputs(&files, inputs)?;
         files.first().map_or(Ok(()), |file| picture::prepare_folder(file))
     }
 
@@ -99,7 +109,7 @@ impl Sink {
             Sink::Numbered(pattern) => {
                 let path = pattern.path(frame);
                 // The number may be in the name of the folder.
-                picture::prepare_folder(&path)?;
+                picture::create_folder(&path)?;
                 picture.write(&path)
             }
             Sink::Animation(animation) => animation.add(picture),

@@ -85,34 +85,30 @@ fn check_object(
     report: &mut Report,
     monitor: &dyn Monitor,
 ) -> Result<Vec<String>, Failure> {
-    let triangles = scene.object(object).triangle_ids.len();
-    let count = count.unwrap_or((TESTS / triangles.max(1)).clamp(RAYS[0], RAYS[1]));
     let poses = poses::of(scene, object);
     let mut findings = Vec::new();
     for pose in &poses {
         let Some((alone, instance)) = poses::alone(scene, object, *pose)? else { continue };
-        let starts =
-            rays::sample(&triangles_of(&alone, instance), count.div_ceil(poses.len()), u64::from(object));
-        findings.extend(check_pose(&alone, instance, &starts, report, monitor)?);
+        let all = triangles(&alone.object(alone.instance(instance).object));
+        if all.is_empty() {
+            break;
+        }
+        let count = count.unwrap_or((TESTS / all.len()).clamp(RAYS[0], RAYS[1]));
+        let starts = rays::sample(&all, count.div_ceil(poses.len()), u64::from(object));
+        findings.extend(check_pose((&alone, instance), &all, &starts, report, monitor)?);
     }
     Ok(findings)
 }
 
-/// The triangles of an instance, in the space of its object.
-fn triangles_of(alone: &Scene, instance: u32) -> Vec<Triangle> {
-    triangles(&alone.object(alone.instance(instance).object))
-}
-
-/// What differs in a scene of one visible instance, a line for each ray.
+/// What differs in a scene of one visible instance, which has these triangles, a line for each ray.
 fn check_pose(
-    alone: &Scene,
-    instance: u32,
+    (alone, instance): (&Scene, u32),
+    all: &[Triangle],
     starts: &[Start],
     report: &mut Report,
     monitor: &dyn Monitor,
 ) -> Result<Vec<String>, Failure> {
     let view = alone.object(alone.instance(instance).object);
-    let all = triangles_of(alone, instance);
     monitor.stage("trace exactly", Some(starts.len() as u64));
     let traced = trace(alone, starts, instance, monitor)?;
     let world = World::new(alone);

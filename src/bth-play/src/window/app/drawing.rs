@@ -1,6 +1,7 @@
 //! Drawing: rendering for a moment, showing and saving pictures, and the title.
 
 use super::state::App;
+use crate::args::SCREENSHOT;
 use crate::failure::Failure;
 use crate::messages::note;
 use std::time::Duration;
@@ -32,7 +33,7 @@ impl App<'_> {
     pub(super) fn save(&mut self) -> Result<(), Failure> {
         self.save_requested = false;
         let Some(picture) = &self.picture else { return Ok(()) };
-        let path = self.screenshot.clone().unwrap_or_else(|| "bth-play.png".into());
+        let path = self.screenshot.clone().unwrap_or_else(|| SCREENSHOT.into());
         picture.write(&path)?;
         note(&format!("wrote {}", path.display()));
         Ok(())

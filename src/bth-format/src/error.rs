@@ -153,42 +153,46 @@ impl Error {
 
 impl Error {
     /// The text of the error without its hint, for messages that give a hint apart.
-    pub fn without_hint(&self) -> String {
-        let mut text = self.to_string();
-        if let Some(at) = text.rfind(" (hint: ") {
-            text.truncate(at);
-        }
-        text
+    pub fn without_hint(&self) -> impl std::fmt::Display + '_ {
+        WithoutHint(self)
     }
 }
 
 impl std::fmt::Display for Error {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Details { code, section, offset, expected, found, path, .. } = &*self.0;
+        write!(f, "{} (hint: {})", WithoutHint(self), self.hint())
+    }
+}
+
+/// An error, shown without its hint.
+struct WithoutHint<'a>(&'a Error);
+
+impl std::fmt::Display for WithoutHint<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Details { code, section, offset, expected, found, path, .. } = &*self.0.0;
         // Where there are no files, the formatting of paths would be in the way.
         const HAS_FILES: bool = !cfg!(all(target_family = "wasm", target_os = "unknown"));
         if let Some(path) = path.as_ref().filter(|_| HAS_FILES) {
             write!(f, "{}: ", path.display())?;
         }
-        write!(f, "{code}: ")?;
+        write!(f, "{code}:")?;
         if let Some(Section { kind, object }) = *section {
-            write!(f, "{}", kind::name(kind))?;
+            write!(f, " {}", kind::name(kind))?;
             if object != NONE {
                 write!(f, " of object {object}")?;
             }
-            write!(f, ", ")?;
+            write!(f, ",")?;
         }
         if let Some(offset) = offset {
-            write!(f, "byte {offset}: ")?;
+            write!(f, " byte {offset}:")?;
         }
         // With the feature `brief` some texts are empty.
         match (expected.is_empty(), found.is_empty()) {
-            (false, false) => write!(f, "expected {expected}, found {found} ")?,
-            (false, true) => write!(f, "expected {expected} ")?,
-            (true, false) => write!(f, "found {found} ")?,
-            (true, true) => {}
+            (false, false) => write!(f, " expected {expected}, found {found}"),
+            (false, true) => write!(f, " expected {expected}"),
+            (true, false) => write!(f, " found {found}"),
+            (true, true) => Ok(()),
         }
-        write!(f, "(hint: {})", self.hint())
     }
 }
 

@@ -23,3 +23,28 @@ pub(crate) fn is_name(text: &str, first: u32, length: u32) -> bool {
     let end = (first as usize).checked_add(length as usize);
     length <= MAX_NAME && end.is_some_and(|end| text.get(first as usize..end).is_some())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_lie_between_characters_before_the_first_byte_that_is_not_utf_8() {
+        let text = checked(b"a\xc3\xa4b\xffcd");
+        assert_eq!(text, "a\u{e4}b");
+        for (first, length, is) in [
+            (0, 4, true),
+            (1, 2, true),
+            (1, 1, false),
+            (2, 1, false),
+            (4, 0, true),
+            (3, 2, false),
+            (5, 1, false),
+        ] {
+            assert_eq!(is_name(text, first, length), is, "{first} {length}");
+        }
+        assert!(!is_name(text, u32::MAX, u32::MAX));
+        let long = "x".repeat(MAX_NAME as usize + 1);
+        assert!(is_name(&long, 0, MAX_NAME) && !is_name(&long, 0, MAX_NAME + 1));
+    }
+}

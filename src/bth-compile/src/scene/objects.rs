@@ -169,7 +169,7 @@ fn copy(objects: &mut Objects, places: &mut Places<'_>, manifest: &Manifest, fil
         message: format!("expected a compiled file that can be used: {found}"),
         hint: hint.to_owned(),
     };
-    let read = bth_format::File::read(path).map_err(|e| unusable(&e.without_hint(), e.hint()))?;
+    let read = bth_format::File::read(path).map_err(|e| unusable(&e.without_hint().to_string(), e.hint()))?;
     let read = Arc::new(read);
     for (part, rows) in &file.parts {
         let SourcePart::Object(object) = *part else { continue };

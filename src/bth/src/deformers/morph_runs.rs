@@ -103,3 +103,45 @@ fn each_run<'a>(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bth_format::layout::{Deformation, Morph, NONE};
+
+    /// A chunk visits the targets that move some of its vertices and no others, however many there are.
+    #[test]
+    fn chunks_have_runs_of_targets_that_move_their_vertices() {
+        let vertices = 3 * CHUNK + 7;
+        let morph = |deltas: usize, first_delta: u32, first_row: u32| Morph {
+            deltas: deltas as u32,
+            first_delta,
+            first_row,
+            reserved: 0,
+        };
+        // A target for every vertex, many for none, one for two chunks, and one whose weight is 0.
+        let mut morphs = vec![morph(vertices, 0, NONE)];
+        morphs.extend((0..1000).map(|_| morph(0, vertices as u32, 0)));
+        morphs.extend([morph(3, 0, 0), morph(vertices, 0, NONE)]);
+        let deltas = vec![[1.0; 3]; vertices];
+        let rows = [5, CHUNK as u32 - 1, 3 * CHUNK as u32];
+        let targets = morphs.len();
+        let counts = [Deformation { joints: 0, influence_sets: 0, targets: targets as u32, reserved: 0 }];
+        let view = DeformationView {
+            rows: &counts,
+            morphs: &morphs,
+            morph_rows: &rows,
+            deltas: &deltas,
+            ..DeformationView::default()
+        };
+        let mut weights = vec![2.0; targets];
+        weights[targets - 1] = 0.0;
+        let runs = MorphRuns::new(&view, &weights, vertices);
+        let deltas_of = |chunk: usize| -> Vec<usize> {
+            runs.of_chunk(chunk).iter().map(|run| run.deltas.len()).collect()
+        };
+        let found: Vec<Vec<usize>> = (0..5).map(deltas_of).collect();
+        assert_eq!(found, [vec![CHUNK, 2], vec![CHUNK], vec![CHUNK], vec![7, 1], vec![]]);
+        assert!(MorphRuns::new(&DeformationView::default(), &[], vertices).of_chunk(0).is_empty());
+    }
+}

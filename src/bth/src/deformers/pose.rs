@@ -74,3 +74,42 @@ fn joint_matrix(joint: &SkinJoint, to_world: &Affine) -> JointMatrix {
     let [x, y, z] = translation;
     [column(0), column(1), column(2), [x, y, z, 0.0]]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn objects_of_one_skin_share_its_matrices() {
+        let transform = [1.0, 0.0, 0.0, 5.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+        let node =
+            Node { transform, parent: NONE, flags: NODE_MATRIX, name: 0, name_length: 0, reserved: [0; 4] };
+        let joint = SkinJoint { inverse_bind: transform, node: 0, reserved: [0; 3] };
+        let skin = |first_joint, joints| Skin { first_joint, joints, reserved: [0; 2] };
+        let deformer =
+            |object, skin| Deformer { node: 0, object, skin, weights: 0, first_weight: 0, reserved: [0; 3] };
+        let view = SceneView {
+            scene: &[],
+            nodes: &[node],
+            instances: &[],
+            tracks: &[],
+            times: &[],
+            values: &[],
+            cameras: &[],
+            lights: &[],
+            names: &[],
+            deformers: &[],
+            skins: &[skin(0, 1), skin(1, 2)],
+            skin_joints: &[joint; 3],
+            morph_weights: &[],
+        };
+        let mut hierarchy = NodeHierarchy::new(&view);
+        hierarchy.update(&view, 0.0, true);
+        let mut matrices = SkinMatrices::new(&view, &hierarchy);
+        let mut joints = |object, skin| Pose::of(&mut matrices, &deformer(object, skin), 0.0).joints;
+        let (a, b, c) = (joints(0, 1).unwrap(), joints(1, 1).unwrap(), joints(2, 0).unwrap());
+        assert!(Arc::ptr_eq(&a, &b) && !Arc::ptr_eq(&a, &c));
+        assert_eq!((a.len(), c.len(), a[1][3]), (2, 1, [10.0, 0.0, 0.0, 0.0]));
+        assert!(joints(3, NONE).is_none());
+    }
+}

@@ -165,7 +165,9 @@ impl Code {
             Code::Read => "check the path and its permissions",
             Code::Host => "big-endian machines are not supported",
             Code::NoSuchObject => "objects are numbered from 0",
-            Code::HeaderSize | Code::Identifier => "this is not a BTH file, or a transfer changed or cut it",
+            Code::HeaderSize | Code::Identifier => {
+                "this is not a BTH file (`bthc compile` makes one of a model), or a transfer changed or cut it"
+            }
             Code::Version | Code::Features | Code::UnknownKind => {
                 "a newer version of this library can read the file"
             }

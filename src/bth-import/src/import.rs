@@ -284,6 +284,14 @@ fn kept_vertex(position: &[f32; 3]) -> [f32; 3] {
 /// The format of a source by its extension, or else by its content.
 pub(crate) fn format(source: &Source<'_>) -> Result<Format> {
     source.fetched()?;
+    if source.data.starts_with(&bth_format::layout::IDENTIFIER) {
+        let message = "expected a model, found a compiled file";
+        return Err(source.error(
+            "BTH-I001",
+            message,
+            "name the model that it was compiled from, or see what it contains with `bthc info`",
+        ));
+    }
     let extension = source.path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     let by_name = match extension.as_deref() {
         Some("obj") => Some(Format::Obj),
@@ -293,6 +301,10 @@ pub(crate) fn format(source: &Source<'_>) -> Result<Format> {
         Some("off") => Some(Format::Off),
         _ => None,
     };
+    if extension.as_deref() == Some("manifest") {
+        let message = "expected a model, found the name of a scene manifest";
+        return Err(source.error("BTH-I001", message, "compile the manifest, or name one of its models"));
+    }
     by_name.or_else(|| sniff(source.data)).ok_or_else(|| {
         source.error(
             "BTH-I001",

@@ -87,9 +87,9 @@ pub(crate) struct Args {
     /// No ground under the model. Scenes never have one but their own.
     #[arg(long)]
     pub(crate) no_ground: bool,
-    /// Times that light is reflected, in mode path.
-    #[arg(long, default_value_t = 4, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=64))]
-    pub(crate) bounces: u32,
+    /// Times that light is reflected, in mode path; 4 by default.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=64))]
+    pub(crate) bounces: Option<u32>,
     /// Light from all around in mode path, a picture in Radiance format (.hdr) over longitude and latitude; by default a sky,
     /// and a sun where the scene has no lights.
     #[arg(long, value_name = "FILE")]
@@ -158,6 +158,11 @@ impl Args {
     /// The compiled file or source, which clap requires.
     pub(crate) fn file(&self) -> Result<&Path, Failure> {
         self.file.as_deref().ok_or_else(|| Failure::Usage("a file is needed".to_owned()))
+    }
+
+    /// Times that light is reflected in mode path.
+    pub(crate) fn bounces(&self) -> u32 {
+        self.bounces.unwrap_or(4)
     }
 
     /// The same options with another number of samples per pixel.

@@ -7,7 +7,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 
 /// Why a manifest cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}:{line}:{column}: {code}: {message} (hint: {hint})", path.display())]
+#[error("{}: {code}: {message} (hint: {hint})", self.place())]
 pub struct Error {
     /// Stable code, one of [`code`].
     pub code: &'static str,
@@ -23,11 +23,21 @@ pub struct Error {
     pub hint: String,
 }
 
+impl Error {
+    /// The manifest, with line and column where they are known.
+    pub fn place(&self) -> String {
+        match (self.path.display(), self.line) {
+            (path, 0) => path.to_string(),
+            (path, line) => format!("{path}:{line}:{}", self.column),
+        }
+    }
+}
+
 /// The codes of [`Error`]; their meanings never change.
 pub mod code {
     /// The file cannot be read.
     pub const READ: &str = "BTH-M001";
-    /// It is not TOML.
+    /// It is not TOML, or not UTF-8.
     pub const SYNTAX: &str = "BTH-M002";
     /// A key that the format does not have.
     pub const UNKNOWN_KEY: &str = "BTH-M003";

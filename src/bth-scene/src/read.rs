@@ -36,18 +36,26 @@ pub fn read(path: &Path) -> Result<Manifest> {
         let path = path.to_owned();
         Error { code: code::READ, path, line: 0, column: 0, message, hint: hint.to_owned() }
     };
-    let cannot = |e: std::io::Error| {
-        failed(format!("cannot read: {e}"), "check the path and its permissions; manifests are UTF-8")
-    };
-    let mut text = String::new();
+    let cannot =
+        |e: std::io::Error| failed(format!("cannot read: {e}"), "check the path and its permissions");
+    let mut bytes = Vec::new();
     // Reading one byte more than allowed detects longer files without trusting the size that the system reports.
     let file = std::fs::File::open(path).map_err(cannot)?;
-    file.take(MAX_MANIFEST + 1).read_to_string(&mut text).map_err(cannot)?;
-    if text.len() as u64 > MAX_MANIFEST {
+    file.take(MAX_MANIFEST + 1).read_to_end(&mut bytes).map_err(cannot)?;
+    if bytes.len() as u64 > MAX_MANIFEST {
         let message = format!("expected a manifest of at most {MAX_MANIFEST} bytes, found more");
         return Err(failed(message, "is this a manifest? split the scene if it is"));
     }
+    let text = String::from_utf8(bytes).map_err(|e| not_utf8(path, &e))?;
     parse(&text, path)
+}
+
+/// The first byte of a file that is not UTF-8, by its place.
+fn not_utf8(path: &Path, error: &std::string::FromUtf8Error) -> Error {
+    let (before, wrong) = error.as_bytes().split_at(error.utf8_error().valid_up_to());
+    let text = std::str::from_utf8(before).unwrap_or_default();
+    let message = format!("expected UTF-8, found the byte 0x{:02x}", wrong.first().unwrap_or(&0));
+    Document { path, text }.error(text.len()..text.len(), code::SYNTAX, message, "save the manifest as UTF-8")
 }
 
 /// Reads the text of a manifest; `path` is for messages.

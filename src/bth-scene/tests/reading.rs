@@ -330,3 +330,20 @@ fn what_is_written_is_read_back_equal() {
     assert_eq!(read(&text).unwrap().to_toml(), text);
     assert_eq!(read(&Manifest::default().to_toml()).unwrap(), Manifest::default());
 }
+
+#[test]
+fn files_that_are_not_utf8_or_not_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.manifest");
+    std::fs::write(&path, b"version = 1\n# caf\xe9\n").unwrap();
+    let error = bth_scene::read(&path).unwrap_err();
+    assert_eq!((error.code, error.line, error.column), ("BTH-M002", 2, 6), "{error}");
+    assert!(
+        error.to_string().contains("scene.manifest:2:6: BTH-M002: expected UTF-8, found the byte 0xe9"),
+        "{error}"
+    );
+
+    let error = bth_scene::read(&folder.path().join("none.manifest")).unwrap_err();
+    assert_eq!((error.code, error.line), ("BTH-M001", 0));
+    assert!(error.to_string().contains("none.manifest: BTH-M001: cannot read"), "{error}");
+}

@@ -101,8 +101,11 @@ impl Failure {
         match self {
             Self::Compile(error) => compile_json(error),
             Self::Runtime(error) => runtime_json(error),
-            Self::Manifest(error) => json!({"code": error.code, "place": error.path.to_string_lossy(),
-                "line": error.line, "column": error.column, "message": error.message, "hint": error.hint}),
+            Self::Manifest(error) => {
+                let known = |number: usize| (number > 0).then_some(number);
+                json!({"code": error.code, "place": error.path.to_string_lossy(), "line": known(error.line),
+                    "column": known(error.column), "message": error.message, "hint": error.hint})
+            }
             Self::Usage { message, hint } => json!({"code": "BTH-U001", "message": message, "hint": hint}),
             Self::Check | Self::Reported(_) | Self::ClosedOutput => serde_json::Value::Null,
         }

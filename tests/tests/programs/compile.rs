@@ -151,3 +151,35 @@ fn degenerate_triangles_are_counted_and_keep_their_ids() {
     };
     assert_eq!(scene.nearest(&ray).map(|hit| hit.primitive.triangle), Some(1));
 }
+
+#[test]
+fn the_help_lists_options_under_their_headings() {
+    let folder = folder(&[]);
+    let help = bthc(folder.path(), &["compile", "--help"]).expect(0).stdout;
+    let mut heading = "";
+    let mut headings = std::collections::BTreeMap::new();
+    for line in help.lines() {
+        if let Some(name) = line.strip_suffix(':').filter(|name| !name.starts_with(' ')) {
+            heading = name;
+        } else if line.trim_start().starts_with('-')
+            && let Some(option) = line.split_whitespace().find(|word| word.starts_with("--"))
+        {
+            headings.entry(option).or_insert(heading);
+        }
+    }
+    for (option, heading) in [
+        ("--quality", "Options"),
+        ("--threads", "Options"),
+        ("--json", "Options"),
+        ("--materials", "What the file keeps"),
+        ("--boxes", "Smaller files"),
+        ("--deformable", "Objects that deform"),
+        ("--c-tet", "Tetrahedra"),
+        ("--flatten", "Scenes from glTF"),
+        ("--strict", "Scenes from glTF"),
+        ("--depfile", "Many models and build systems"),
+        ("--in-cache", "Cache"),
+    ] {
+        assert_eq!(headings.get(option), Some(&heading), "{option}");
+    }
+}

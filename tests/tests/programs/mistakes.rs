@@ -14,7 +14,7 @@ fn mistaken(program: &str, folder: &Path, args: &[&str]) -> Run {
 /// A program, its arguments, its exit code, and what the error must contain.
 type Mistake = (&'static str, &'static [&'static str], i32, &'static [&'static str]);
 
-const BTHC: [Mistake; 17] = [
+const BTHC: [Mistake; 20] = [
     ("bthc", &["nosuch"], 2, &["nosuch"]),
     ("bthc", &["compile", "ball.obj", "--nosuch"], 2, &["--nosuch"]),
     ("bthc", &["compile", "missing.obj"], 4, &["missing.obj", "BTH-O"]),
@@ -27,7 +27,10 @@ const BTHC: [Mistake; 17] = [
     ("bthc", &["compile", "ball.obj", "--profile", "missing.json"], 4, &["missing.json", "BTH-O"]),
     ("bthc", &["compile", "ball.obj", "--cache-dir", "ball.obj"], 4, &["ball.obj", "BTH-O060"]),
     ("bthc", &["info", "empty"], 4, &["empty", "BTH-O001"]),
-    ("bthc", &["info", "ball.obj"], 3, &["ball.obj", "BTH-F"]),
+    ("bthc", &["info", "ball.obj"], 3, &["ball.obj", "BTH-F", "`bthc compile` makes one of a model"]),
+    ("bthc", &["explain", "ball.bth"], 3, &["ball.bth", "BTH-I001", "a compiled file", "bthc info"]),
+    ("bthc", &["marks", "words.manifest"], 3, &["words.manifest", "BTH-I001", "a scene manifest"]),
+    ("bthc", &["compile", "ball.bth", "-o", "x.bth"], 3, &["ball.bth", "BTH-I001", "a compiled file"]),
     ("bthc", &["verify", "missing.bth"], 4, &["missing.bth", "BTH-O001"]),
     ("bthc", &["trace", "missing.bth", "missing.rays", "-o", "x.hits"], 4, &["missing.rays", "BTH-O090"]),
     ("bthc", &["import", "ball.obj"], 2, &["BTH-U001", "ball.obj", "hint"]),

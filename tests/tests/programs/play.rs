@@ -87,3 +87,24 @@ fn model_without_triangles_gives_an_empty_picture() {
         play(folder.path(), &["--mode", mode, "--inside"]).expect(0);
     }
 }
+
+#[test]
+fn options_and_files_that_show_nothing_are_warned_of() {
+    let empty = "version = 1\nobjects = [{ name = \"none\", model = \"none.obj\" }]\n[[nodes]]\nname = \"n\"\nobject = \"none\"\n";
+    let folder = folder(&[("ball.obj", &sphere(16)), ("none.obj", "v 0 0 0\n"), ("none.manifest", empty)]);
+    bthc(folder.path(), &["compile", "ball.obj", "none.obj"]).expect(0);
+    bthc(folder.path(), &["compile", "none.manifest", "-o", "scene.bth"]).expect(0);
+    let stderr = |args: &[&str]| play(folder.path(), args).expect(0).stderr;
+    assert_eq!(stderr(&["--fov", "40"]), "");
+    assert_eq!(stderr(&["--mode", "path", "--bounces", "1"]), "");
+    assert_eq!(stderr(&["--mode", "steps", "--scale", "9"]), "");
+    assert!(stderr(&["--bounces", "1"]).contains("warning: ball.bth: --bounces changes nothing"));
+    assert!(stderr(&["--scale", "9"]).contains("warning: ball.bth: --scale changes nothing"));
+    for (file, what) in
+        [("none.bth", "the model has no triangles"), ("scene.bth", "no frame shows a triangle")]
+    {
+        let args = [file, "-o", "none.png", "--size", "8x8", "--spp", "1"];
+        let told = run("bth-play", folder.path(), &args).expect(0).stderr;
+        assert!(told.contains(&format!("warning: {file}: {what}")), "{told}");
+    }
+}

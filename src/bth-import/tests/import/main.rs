@@ -89,6 +89,15 @@ fn content_of_no_format_is_refused() {
 }
 
 #[test]
+fn what_is_no_model_is_named() {
+    let compiled = b"\x89BTH1\r\n\x1a\n\0\0\0\0\0\0\0and more";
+    for name in ["model.bth", "model.obj"] {
+        assert_refused(name, compiled, "BTH-I001", "file", "found a compiled file");
+    }
+    assert_refused("scene.manifest", b"version = 1\n", "BTH-I001", "file", "scene manifest");
+}
+
+#[test]
 fn a_format_is_found_without_its_extension() {
     let (mesh, report) = import_bytes("model", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", Keep::None).unwrap();
     assert_eq!((mesh.triangles.len(), report.format.as_str()), (1, "obj"));

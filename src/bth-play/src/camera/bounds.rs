@@ -40,6 +40,9 @@ impl SceneBounds {
     pub(super) fn of_object(scene: &Scene) -> Self {
         let view = scene.object(0);
         let (lower, upper) = (to_f64(view.header.lower), to_f64(view.header.upper));
+        if view.header.triangles == 0 {
+            return SceneBounds { lower, upper, points: Vec::new() }.or_origin();
+        }
         let points = view.positions.iter().map(|p| to_f64(*p)).collect();
         let mut bounds = SceneBounds { lower, upper, points };
         if bounds.points.is_empty() {
@@ -55,6 +58,11 @@ impl SceneBounds {
             let pick = |axis: usize| [lower, upper][(corner >> axis) & 1][axis];
             self.points.push(DVec3::new(pick(0), pick(1), pick(2)));
         }
+    }
+
+    /// Whether no frame shows anything.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.points.is_empty()
     }
 
     /// The origin instead of empty bounds, for a scene that shows nothing.

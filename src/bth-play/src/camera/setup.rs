@@ -83,6 +83,12 @@ impl SceneSetup {
         }
     }
 
+    /// Whether the camera of the scene that is used has no field of view.
+    pub(crate) fn is_orthographic(&self, scene: &Scene) -> bool {
+        let lens = |row: u32| scene.description().map(|view| view.cameras[row as usize].projection == 1);
+        self.scene_camera_row().and_then(lens).unwrap_or(false)
+    }
+
     /// The camera at the time to which the scene is set.
     pub(crate) fn camera(&self, scene: &Scene, args: &Args) -> Camera {
         match self.source {

@@ -5,6 +5,7 @@ mod progress;
 mod sequence;
 mod shutter;
 mod tile;
+mod warnings;
 
 pub(crate) use sequence::{FrameReport, Report, frame_range, frames_to_show, render_sequence, shutter};
 pub(crate) use shutter::{Exposure, Shutter};

@@ -3,9 +3,11 @@
 use super::frame::{FrameRenderer, Summary, Updates};
 use super::progress::Progress;
 use super::shutter::Shutter;
+use super::warnings;
 use crate::args::Args;
 use crate::camera::SceneSetup;
 use crate::failure::Failure;
+use crate::messages::warn;
 use crate::output::Sink;
 use bth::Scene;
 use serde::Serialize;
@@ -133,6 +135,7 @@ pub(crate) fn render_sequence(
     report.skipped = before - frames.len();
     // Made also where no frame is left, since it checks the options.
     let setup = SceneSetup::new(scene, file, args, whole)?;
+    warnings::of(scene, args, &setup).iter().for_each(|text| warn(&format!("{}: {text}", file.display())));
     if !frames.is_empty() {
         let shutter = shutter(scene, args);
         let times = shutter.exposures().len();

@@ -53,7 +53,7 @@ pub(super) fn shade(
     };
     let mut paths: Vec<PathState> = samples.iter().enumerate().map(start).collect();
     let mut hits = hits.to_vec();
-    for number in 0..=frame.args.bounces {
+    for number in 0..=frame.args.bounces() {
         let mut bounce = Bounce::new(frame, lights, samples, number);
         for (path, hit) in paths.iter().zip(&hits) {
             colors[path.sample] += path.throughput * bounce.meet(path, hit);
@@ -123,7 +123,7 @@ impl<'a> Bounce<'a> {
         let shading = frame.geometry.shading_normal(hit, normal);
         let throughput = path.throughput * surface.albedo;
         let origin = Origin::above(point, normal, hit.primitive, frame.bounds.diagonal());
-        let last = number == frame.args.bounces;
+        let last = number == frame.args.bounces();
         let surroundings = lights.surroundings(sample(3)).map(|(light, density)| {
             // A path that goes on may find the surroundings by itself.
             let scattered = if last { 0.0 } else { shading.dot(light.direction).max(0.0) / PI };

@@ -1,6 +1,6 @@
 //! Options of the cache, and the commands that maintain it.
 
-use super::common::EXIT_CODES;
+use super::common::{CACHE, EXIT_CODES};
 use crate::failure::Failure;
 use bth_cache::{DEFAULT_CAP, Store, parse_bytes};
 use clap::{Args as Group, Subcommand};
@@ -8,32 +8,30 @@ use std::path::PathBuf;
 
 /// Which folder is the cache, and how large it may be.
 #[derive(Clone, Debug, Group)]
-#[command(next_help_heading = "Cache")]
 pub(crate) struct CacheLocation {
     /// Folder of the cache; by default BTH_CACHE_DIR, else `bth` in the user's folder for caches.
-    #[arg(long, global = true, value_name = "FOLDER")]
+    #[arg(long, help_heading = CACHE, global = true, value_name = "FOLDER")]
     pub(crate) cache_dir: Option<PathBuf>,
     /// Bytes to keep, such as 20GiB; beyond it, what was used longest ago goes. By default BTH_CACHE_SIZE, else 20GiB.
-    #[arg(long, global = true, value_name = "BYTES", value_parser = parse_bytes)]
+    #[arg(long, help_heading = CACHE, global = true, value_name = "BYTES", value_parser = parse_bytes)]
     pub(crate) cache_size: Option<u64>,
 }
 
 /// Whether and where results are kept.
 #[derive(Clone, Debug, Group)]
-#[command(next_help_heading = "Cache")]
 pub(crate) struct Keeping {
     #[command(flatten)]
     pub(crate) location: CacheLocation,
     /// A folder that machines share, or with the feature s3 a place such as s3://bucket/prefix: what the cache lacks is looked
     /// for there, what is made is put there too. By default
     /// BTH_SHARED_CACHE.
-    #[arg(long, value_name = "PLACE")]
+    #[arg(long, help_heading = CACHE, value_name = "PLACE")]
     pub(crate) shared_cache: Option<String>,
     /// Neither look into the cache nor keep anything; so does setting BTH_NO_CACHE, unless --cache-dir is given.
-    #[arg(long, conflicts_with_all = ["cache_dir", "shared_cache", "in_cache"])]
+    #[arg(long, help_heading = CACHE, conflicts_with_all = ["cache_dir", "shared_cache", "in_cache"])]
     pub(crate) no_cache: bool,
     /// Keep the compiled file in the cache only; --json says where, and which files were read. For programs that map it there.
-    #[arg(long, conflicts_with_all = ["output", "depfile"])]
+    #[arg(long, help_heading = CACHE, conflicts_with_all = ["output", "depfile"])]
     pub(crate) in_cache: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What several commands share: the exit codes in the help, and the number of threads.
+//! What several commands share: headings and exit codes in the help, and kinds of numbers.
 
 /// Exit codes, as the help lists them.
 pub(super) const EXIT_CODES: &str = "\
@@ -12,10 +12,28 @@ Exit codes:
    70  internal error; please report it
   130  cancelled";
 
+// The headings of the help. Each option names its own, since one that is set for a group of options would hold for what
+// follows the group, too.
+pub(super) const CACHE: &str = "Cache";
+pub(super) const DEFORMING: &str = "Objects that deform";
+pub(super) const GLTF: &str = "Scenes from glTF";
+pub(super) const JOBS: &str = "Many models and build systems";
+pub(super) const KEPT: &str = "What the file keeps";
+pub(super) const SMALLER: &str = "Smaller files";
+pub(super) const TETRAHEDRA: &str = "Tetrahedra";
+
 /// Parses a number of threads: at most 4096, 0 for one per processor.
 pub(super) fn threads(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(n) if n <= 4096 => Ok(n),
         _ => Err("expected a number from 0 to 4096".to_owned()),
+    }
+}
+
+/// Parses a finite positive number.
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
+        _ => Err("expected a number above 0".into()),
     }
 }

@@ -1,36 +1,36 @@
 //! Options for compiling many models, and for build systems.
 
+use super::common::JOBS;
 use clap::Args as Group;
 use std::path::PathBuf;
 
 /// How many models are compiled at once, and output for build systems.
 #[derive(Clone, Debug, Group)]
-#[command(next_help_heading = "Many models and build systems")]
 pub(crate) struct Jobs {
     /// Models that are compiled at once; the threads are shared among them. By default as many as there are threads.
-    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    #[arg(short, long, help_heading = JOBS, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub(crate) jobs: Option<u32>,
     /// Memory of all models and objects of scenes that are compiled at once, in MiB, estimated from the sizes of their
     /// files. One is compiled in any case.
-    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, help_heading = JOBS, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) memory: Option<u64>,
     /// Say what would be done and why, and do nothing.
-    #[arg(long, conflicts_with_all = ["depfile", "watch"])]
+    #[arg(long, help_heading = JOBS, conflicts_with_all = ["depfile", "watch"])]
     pub(crate) dry_run: bool,
     /// Also write which files the outputs depend on, for Make and Ninja.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, help_heading = JOBS, value_name = "FILE")]
     pub(crate) depfile: Option<PathBuf>,
     /// Format of a model from standard input: obj, ply, stl, off or glb; by default by its content.
-    #[arg(long, value_name = "FORMAT", value_parser = ["obj", "ply", "stl", "off", "glb"])]
+    #[arg(long, help_heading = JOBS, value_name = "FORMAT", value_parser = ["obj", "ply", "stl", "off", "glb"])]
     pub(crate) format: Option<String>,
     /// Go on: compile again whenever one of the files changes, until Ctrl-C.
-    #[arg(long, conflicts_with_all = ["json", "in_cache"])]
+    #[arg(long, help_heading = JOBS, conflicts_with_all = ["json", "in_cache"])]
     pub(crate) watch: bool,
     /// Stop, as on Ctrl-C, when standard input ends: for programs that start this one and may themselves be ended.
-    #[arg(long)]
+    #[arg(long, help_heading = JOBS)]
     pub(crate) end_with_input: bool,
     /// Compile only part I of N of the models (from 1), or of a scene's objects into the cache: for many machines.
-    #[arg(long, value_name = "I/N", value_parser = shard, conflicts_with_all = ["watch", "depfile"])]
+    #[arg(long, help_heading = JOBS, value_name = "I/N", value_parser = shard, conflicts_with_all = ["watch", "depfile"])]
     pub(crate) shard: Option<(u32, u32)>,
 }
 

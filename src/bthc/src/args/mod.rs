@@ -4,10 +4,14 @@ pub(crate) mod cache;
 mod choices;
 mod common;
 mod compile;
+mod gltf;
 mod jobs;
+mod selection;
 
 pub(crate) use cache::*;
 pub(crate) use compile::*;
+pub(crate) use gltf::Gltf;
+pub(crate) use selection::Selection;
 
 use clap::{Args as Group, Parser, Subcommand};
 use common::{EXIT_CODES, threads};

@@ -318,6 +318,7 @@ fn free_directions() -> Vec<Case> {
     };
     let place = |leaf, slot| FreePlace { leaf, slot }.code();
     vec![
+        rows("F022-two-rows-of-levels", levels, [16, 2, 2]),
         rows("F168-rows", directions, [24, 2, 1]),
         rows("F168-levels-alone", directions, [24, 2, 0]),
         Case::new("F168-both-sections", super::valid::free_directions_and_distances()),

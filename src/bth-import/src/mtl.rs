@@ -251,7 +251,8 @@ fn has_alpha_in_color(material: &MtlMaterial) -> bool {
 
 /// Three numbers from 0; `None` for spectral curves and CIE colours, which are rare.
 fn color<'w>(place: &Place, words: impl Iterator<Item = &'w [u8]>) -> Result<Option<[f32; 3]>> {
-    let words: Vec<&[u8]> = words.take(3).collect();
+    // A comment may follow one number for all three.
+    let words: Vec<&[u8]> = words.take_while(|word| !word.starts_with(b"#")).take(3).collect();
     if matches!(words.first(), Some(&b"spectral" | &b"xyz")) {
         return Ok(None);
     }

@@ -291,7 +291,7 @@ fn obj_materials(folder: &Path, statements: &str, library: &[u8]) -> (Vec<f32>, 
 #[test]
 fn names_of_obj_materials_may_have_hashes_and_libraries_a_byte_order_mark() {
     let folder = tempfile::tempdir().unwrap();
-    let library = b"\xEF\xBB\xBFnewmtl Material #1 # red\nKd 1 0 0\nnewmtl #2\nKd 0.5 0 0\n";
+    let library = b"\xEF\xBB\xBFnewmtl Material #1 # red\nKd 1 0 0\nnewmtl #2\nKd 0.5 # grey\n";
     let faces = "mtllib a.mtl # colours\nusemtl Material #1\nf 1 2 3\nusemtl #2 # darker\nf 1 2 3\n";
     assert_eq!(obj_materials(folder.path(), faces, library), (vec![1.0, 0.5], Vec::new()));
 }

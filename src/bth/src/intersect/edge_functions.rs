@@ -10,7 +10,7 @@
 //! off by less than δ = 8ur. A cross product of two points is off by 2δM + 2δ² because of its points and by 3uM² <= δM because
 //! of its own roundings, together by less than 4δ(M + δ). Products that underflow add at most the least normal number. The
 //! filter of single rays takes for r the distance (maximum norm) to the farthest corner of the object's box, so that 8δ and 4δ² are constants
-//! of the ray, and for M twice the greatest |x| or |y|. Packets take r = M + |depth|, which is tighter and was measured to be
+//! of the ray, and for M twice the greatest |x| or |y|; where that leaves a pair undecided, it takes the bound of packets. Packets take r = M + |depth|, which is tighter and was measured to be
 //! faster.
 //!
 //! **Error of a depth.** A change of the three weights by e each changes the depth by at most 3e·range/(|sum| - 3e), where
@@ -71,6 +71,13 @@ pub(crate) fn error<S: Lanewise>(s: S, l1_norm: S::F, greatest_depth: S::F, floo
     s.fma(s.mul(reach, s.splat(4.001 * DELTA)), s.fma(reach, s.splat(DELTA), l1_norm), floor)
 }
 
+/// As [`error`], from the projected corners.
+#[inline(always)]
+pub(crate) fn error_of<S: Lanewise>(s: S, [a, b, c]: &Corners<S>, floor: S::F) -> S::F {
+    let norm = s.max(s.max(l1_norm(s, *a), l1_norm(s, *b)), l1_norm(s, *c));
+    error(s, norm, s.max(s.max_abs(a[2], b[2]), s.abs(c[2])), floor)
+}
+
 /// Sides on which sixteen lines pass the edges of their triangles.
 #[derive(Clone, Copy)]
 pub(super) struct Sides<S: Lanewise> {
@@ -80,8 +87,8 @@ pub(super) struct Sides<S: Lanewise> {
     pub(super) error: S::F,
     /// Pairs that certainly miss.
     pub(super) missed: S::M,
-    /// Pairs that certainly hit.
-    certain: S::M,
+    /// Pairs that certainly hit, at whatever depth.
+    pub(super) certain: S::M,
 }
 
 /// Tests sixteen triangles for hits at depths from `first` to `limit`. `error` bounds the error of the weights, see the
@@ -101,16 +108,27 @@ pub(crate) fn test_triangles<S: Lanewise>(
 #[inline(always)]
 pub(super) fn sides<S: Lanewise>(s: S, &[a, b, c]: &Corners<S>, error: S::F) -> Sides<S> {
     let weight = [cross(s, b, c), cross(s, c, a), cross(s, a, b)];
-    let minus_error = s.sub(s.splat(0.0), error);
-    let least = s.min(s.min(weight[0], weight[1]), weight[2]);
-    let greatest = s.max(s.max(weight[0], weight[1]), weight[2]);
-    // Comparisons with NaN are false, so a pair with NaN is neither missed nor certain and remains a candidate.
-    let missed = s.and(s.lt(least, minus_error), s.lt(error, greatest));
-    let certain = s.or(s.lt(error, least), s.lt(greatest, minus_error));
-    Sides { weight, error, missed, certain }
+    Sides::of(s, weight, error)
 }
 
 impl<S: Lanewise> Sides<S> {
+    #[inline(always)]
+    fn of(s: S, weight: [S::F; 3], error: S::F) -> Self {
+        let minus_error = s.sub(s.splat(0.0), error);
+        let least = s.min(s.min(weight[0], weight[1]), weight[2]);
+        let greatest = s.max(s.max(weight[0], weight[1]), weight[2]);
+        // Comparisons with NaN are false, so a pair with NaN is neither missed nor certain and remains a candidate.
+        let missed = s.and(s.lt(least, minus_error), s.lt(error, greatest));
+        let certain = s.or(s.lt(error, least), s.lt(greatest, minus_error));
+        Sides { weight, error, missed, certain }
+    }
+
+    /// The same sides with another bound of the errors.
+    #[inline(always)]
+    pub(super) fn with_error(self, s: S, error: S::F) -> Self {
+        Sides::of(s, self.weight, error)
+    }
+
     /// Bounds the depths of the hits and compares them with the range from `first` to `limit`.
     #[inline(always)]
     pub(super) fn bound_depths(

@@ -6,7 +6,7 @@
 //! [`edge_functions`](crate::intersect::edge_functions) derives the bounds of the errors.
 
 use crate::intersect::boxes::RaySlabs;
-use crate::intersect::edge_functions::{Corners, FilteredTriangles, Sides, error_coefficients, sides};
+use crate::intersect::edge_functions::{self, Corners, FilteredTriangles, Sides, error_coefficients, sides};
 use crate::intersect::line::Line;
 use crate::rays::Ray;
 use crate::simd::{LANES, Lanewise, Part, Simd, lanes_of_piece};
@@ -278,12 +278,15 @@ impl TriangleFilter {
         limit: f32,
     ) -> Candidates<S> {
         let corners = block.project(s, self);
-        let sides = self.sides(s, &corners);
-        let (valid, error) = (valid_triangles(block), sides.error);
+        let (valid, mut sides) = (valid_triangles(block), self.sides(s, &corners));
+        let mut crossed = valid & !s.mask_bits(sides.missed);
+        if crossed & !s.mask_bits(sides.certain) != 0 {
+            sides = self.closer(s, sides, &corners);
+            crossed &= !s.mask_bits(sides.missed);
+        }
         // In most leaves that a ray enters, all triangles are missed: then depths need not be computed.
-        let crossed = valid & !s.mask_bits(sides.missed);
         if crossed == 0 {
-            return Candidates { crossed, maybe: 0, sure: 0, nearest: error, farthest: error };
+            return Candidates { crossed, maybe: 0, sure: 0, nearest: sides.error, farthest: sides.error };
         }
         let tested = self.bound_depths(s, sides, &corners, (first, limit));
         let maybe = valid & !s.mask_bits(tested.excluded);
@@ -297,6 +300,16 @@ impl TriangleFilter {
         let greatest = greatest_coordinate(s, corners);
         let error = s.fma(greatest, s.splat(self.error_slope), s.splat(self.error_floor));
         sides(s, corners, error)
+    }
+
+    /// The sides with the errors that the triangles' own distances from the ray's origin bound. Where the object is much larger than
+    /// what lies around the ray, such as a statue on a plain, the bound by the object's box decides nothing.
+    #[inline(always)]
+    fn closer<S: Lanewise>(&self, s: S, sides: Sides<S>, corners: &Corners<S>) -> Sides<S> {
+        // Where products may overflow, no bound holds.
+        let floor = if self.error_floor < f32::INFINITY { f32::MIN_POSITIVE } else { f32::INFINITY };
+        let own = edge_functions::error_of(s, corners, s.splat(floor));
+        sides.with_error(s, s.min(own, sides.error))
     }
 
     /// As [`Sides::bound_depths`]; certain are only hits within the ray's range.
@@ -341,7 +354,10 @@ impl<S: Simd, B: TriangleBlock> Part<S> for CandidatesOf<'_, B> {
                 break;
             }
             let corners = block.project_piece(p, filter, points.as_ref());
-            let sides = filter.sides(p, &corners);
+            let mut sides = filter.sides(p, &corners);
+            if valid & !p.mask_bits(p.or(sides.missed, sides.certain)) != 0 {
+                sides = filter.closer(p, sides, &corners);
+            }
             if valid & !p.mask_bits(sides.missed) == 0 {
                 continue;
             }

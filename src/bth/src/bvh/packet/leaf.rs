@@ -51,12 +51,7 @@ impl<S: Lanewise> RayLimits<S> {
     /// Tests rays against a triangle, with the error bound of the triangle itself.
     #[inline(always)]
     fn test(&self, s: S, [a, b, c]: Corners<S>) -> FilteredTriangles<S> {
-        let norm = s.max(
-            s.max(edge_functions::l1_norm(s, a), edge_functions::l1_norm(s, b)),
-            edge_functions::l1_norm(s, c),
-        );
-        let depth = s.max_abs(s.max_abs(a[2], b[2]), c[2]);
-        let error = edge_functions::error(s, norm, depth, s.splat(f32::MIN_POSITIVE));
+        let error = edge_functions::error_of(s, &[a, b, c], s.splat(f32::MIN_POSITIVE));
         let tested = edge_functions::test_triangles(s, [a, b, c], error, self.first, self.limit);
         let in_range = s.and(s.le(self.certain[0], tested.nearest), s.le(tested.farthest, self.certain[1]));
         FilteredTriangles { certain: s.and(tested.certain, in_range), ..tested }

@@ -37,6 +37,14 @@ impl OneTriangle {
         }
         OneTriangle { node, leaf, object }
     }
+
+    /// Makes the object reach beyond its triangle on all sides, as where there are others.
+    fn enlarge(&mut self, by: f32) {
+        for k in 0..3 {
+            self.object.lower[k] = (self.object.lower[k] - by).max(f32::MIN);
+            self.object.upper[k] = (self.object.upper[k] + by).min(f32::MAX);
+        }
+    }
 }
 
 /// Result of the filter for the triangle.
@@ -140,7 +148,10 @@ fn boxes_and_triangles_that_the_line_crosses_are_kept_and_sure_hits_are_hits() {
         }
         let endless = Ray { origin, tmin: f32::NEG_INFINITY, direction, tmax: f32::INFINITY };
         let Some(line) = Line::new(&endless) else { continue };
-        let object = OneTriangle::new(corners);
+        let mut object = OneTriangle::new(corners);
+        if round % 7 == 0 {
+            object.enlarge(1e3 * scale);
+        }
         let intersection = line.intersection(corners);
         let t = intersection.map_or(1.0, |c| c.t as f32);
         // The whole line, and ranges that end or begin at the intersection or directly beside it.
@@ -187,6 +198,35 @@ fn boxes_and_triangles_that_the_line_crosses_are_kept_and_sure_hits_are_hits() {
     }
     assert!(intersections > 2_000 && missed > 10_000, "{intersections} intersections, {missed} boxes missed");
     assert!(sure > 10_000 && prepared > 100_000, "{sure} sure, {prepared} prepared in f32");
+}
+
+#[test]
+fn small_triangles_of_large_objects_are_decided_in_f32() {
+    let mut rng = Rng::new(5);
+    let mut decided = [0; 2];
+    for round in 0..500 {
+        let unit = |rng: &mut Rng| rng.below(1 << 24) as f32 / (1 << 24) as f32;
+        let corners = [[0.0, 0.0, 0.0], [1e-3, 0.0, 2e-4], [0.0, 1e-3, -1e-4]];
+        let mut object = OneTriangle::new(corners);
+        object.enlarge(1e3);
+        // A point within the triangle, or beside it, at least a fifth of it away from its edges.
+        let [u, v] = [0.2 + 0.2 * unit(&mut rng), 0.2 + 0.2 * unit(&mut rng)];
+        let is_hit = round % 2 == 0;
+        let [u, v] = if is_hit { [u, v] } else { [-u, v] };
+        let target = [0, 1, 2].map(|k| u * corners[1][k] + v * corners[2][k]);
+        let origin = [unit(&mut rng) - 0.5, unit(&mut rng) - 0.5, 1.0];
+        let ray = Ray::new(origin, [0, 1, 2].map(|k| target[k] - origin[k]));
+        let line = Line::new(&ray).unwrap();
+        for preparation in all_preparations(&ray, &line, &object.object, round % LANES) {
+            for isa in Isa::ALL {
+                let (_, found) = isa.run(BoxAndFilter(&preparation, &object));
+                let expected = u32::from(is_hit);
+                assert_eq!([found.maybe, found.sure], [expected; 2], "{isa}, round {round}: {preparation:?}");
+                decided[expected as usize] += 1;
+            }
+        }
+    }
+    assert!(decided[0] > 1_000 && decided[1] > 1_000, "{decided:?}");
 }
 
 #[test]

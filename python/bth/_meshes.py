@@ -4,7 +4,11 @@ import numpy as np
 
 
 def triangles_of(mesh):
-    """Vertices (n, 3) float32 and faces (m, 3) uint32, contiguous, of a pair of arrays or of a mesh of trimesh, meshio or pyvista."""
+    """Vertices (n, 3) float32 and faces (m, 3) uint32, contiguous, of a pair of arrays or of a mesh of trimesh, meshio or pyvista.
+
+    They are copies: the compiler reads them while other threads run, and drop-ins compile them when they are first traced. Whatever
+    becomes of the caller's arrays then must not change the result.
+    """
     vertices, faces = _parts(mesh)
     vertices = np.asarray(vertices)
     if vertices.dtype.kind not in "fiu":
@@ -26,8 +30,7 @@ def triangles_of(mesh):
     if faces.shape[1] == 4:
         faces = faces[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
     with np.errstate(over="ignore"):
-        vertices = np.require(vertices, np.float32, "CA")
-    return vertices, np.require(faces, np.uint32, "CA")
+        return np.array(vertices, np.float32, order="C"), np.array(faces, np.uint32, order="C")
 
 
 def _parts(mesh):

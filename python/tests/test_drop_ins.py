@@ -168,6 +168,20 @@ def test_open3d(mesh, rays):
         scene.compute_occupancy(points, nsamples=2)
 
 
+def test_meshes_are_those_of_the_call():
+    """A buffer that is used for one mesh after the other, as Embree and Open3D allow."""
+    corners, face = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32), np.array([[0, 1, 2]], np.uint32)
+    embree, open3d, down = EmbreeScene(), RaycastingScene(), np.array([[0.2, 0.2, 9, 0, 0, -1]], np.float32)
+    for height in (0, 5, 7):
+        corners[:, 2] = height
+        TriangleMesh(embree, corners, face)
+        TriangleMesh(embree, corners[face])
+        open3d.add_triangles(corners, face)
+    corners[:], face[:] = 0, 99
+    assert open3d.list_intersections(down)["t_hit"].tolist() == [2, 4, 9]
+    assert embree.run(down[:, :3], down[:, 3:], query="DISTANCE").tolist() == [2]
+
+
 def test_open3d_camera():
     rays = RaycastingScene.create_rays_pinhole(fov_deg=60, center=[0, 0, 0], eye=[0, 0, 4], up=[0, 1, 0], width_px=8, height_px=4)
     assert rays.shape == (4, 8, 6) and rays.dtype == np.float32

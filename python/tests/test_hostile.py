@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import bth
+from bth import _meshes
 
 NAN, INF = float("nan"), float("inf")
 
@@ -392,6 +393,22 @@ def test_positions_stay_when_the_rays_are_moved_there(scene):
     moved = hits.position
     moved += 1
     assert np.array_equal(hits.position, expected, equal_nan=True)
+
+
+@pytest.mark.parametrize("kinds", [(np.float32, np.uint32), (np.float64, np.int64)])
+def test_meshes_are_those_of_the_call(mesh, kinds):
+    """The compiler reads arrays while other threads run, so it has its own."""
+    vertices, faces = mesh[0].astype(kinds[0]), mesh[1].astype(kinds[1])
+    for own, given in zip(_meshes.triangles_of((vertices, faces)), (vertices, faces)):
+        assert not np.shares_memory(own, given) and own.flags.c_contiguous
+
+    def change(*_):
+        vertices[:], faces[:] = NAN, 2**31 - 1
+
+    # Enough triangles for some calls of the function, which may come at any time.
+    vertices, faces = np.tile(vertices, (200, 1)), np.tile(faces, (200, 1))
+    expected = bth.compile((vertices.copy(), faces.copy()), quality="fast").content_id
+    assert bth.compile((vertices, faces), quality="fast", threads=1, progress=change).content_id == expected
 
 
 def test_failed_saves_leave_nothing(scene, tmp_path):

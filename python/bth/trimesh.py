@@ -46,8 +46,10 @@ class RayMeshIntersector:
             found = scene.all_hits(scaled, directions)
             triangles, rays = found.triangle.astype(np.int64), found.ray
             facing = np.einsum("ij,ij->i", self.mesh.face_normals[triangles], directions[rays]) > 0
-            same = (rays[1:] == rays[:-1]) & (found.t[1:] == found.t[:-1]) & (facing[1:] == facing[:-1])
-            keep = np.concatenate([np.ones(min(len(rays), 1), bool), ~same])
+            # Hits in one point follow one another, those from both sides in any order.
+            elsewhere = (np.diff(rays, prepend=-1) != 0) | (np.diff(found.t, prepend=np.float32(-1)) != 0)
+            _, keep = np.unique(2 * np.cumsum(elsewhere) + facing, return_index=True)
+            keep.sort()
             triangles, rays, t = triangles[keep], rays[keep], found.t[keep]
             rank = np.arange(len(rays)) - np.searchsorted(rays, rays)
             triangles, rays, t = (a[rank < max_hits] for a in (triangles, rays, t))

@@ -51,6 +51,19 @@ def test_trimesh_counts_an_edge_once(mesh, trimesh_mesh):
     assert of_ray.tolist() == list(range(len(targets)))
 
 
+def test_trimesh_counts_a_vertex_once_for_each_side():
+    """A ray that touches the tip of two wedges, whose triangles are met from the front and from behind in turn."""
+    trimesh = pytest.importorskip("trimesh")
+    import bth.trimesh
+
+    corners = [[0, 0, 0], [1, 1, 0], [-1, 1, 0], [0, 1, 1], [0, 1, -1]]
+    mesh = trimesh.Trimesh(corners, [[0, 1, 3], [0, 4, 1], [0, 3, 2], [0, 2, 4]], process=False)
+    facing = mesh.face_normals[:, 2] > 0
+    assert facing.tolist() == [True, False, True, False]
+    triangles, of_ray = bth.trimesh.RayMeshIntersector(mesh).intersects_id([[0, 0, -5], [9, 9, 9], [0, 0, -5]], [[0, 0, 1]] * 3)
+    assert of_ray.tolist() == [0, 0, 2, 2] and facing[triangles].sum() == 2
+
+
 def test_embreex(mesh, rays):
     scene = EmbreeScene(EmbreeDevice())
     TriangleMesh(scene, *mesh)

@@ -4,7 +4,7 @@ import inspect
 import math
 import os
 
-from . import _meshes, _native
+from . import _meshes, _native, _threads
 from ._ray_queries import rays_and_shape
 from ._scene import Scene
 
@@ -30,7 +30,7 @@ def compile(
     rays: rays that will be traced through a model, a pair (origins, directions) or with tmin and tmax behind, as those of `Scene.nearest`. The tree is
     built for them more than for rays from everywhere; answers do not depend on it.
     progress: is called with the name of the stage, the units done and the units in all or None; an exception from it cancels.
-    threads: by default one for each processor; the result does not depend on it.
+    threads: by default as many as queries use (see `set_threads`); the result does not depend on it.
 
     All other options are those of `bthc compile`. `structure` is 'bvh' by default, since the package has no worker for tetrahedra, and
     free_directions is 'none'.
@@ -90,6 +90,9 @@ def _checked(options):
     for name in ("output", "profile", "shared_cache"):
         if name in options:
             options[name] = os.fspath(options[name])
+    # More than there are processors bring nothing, and as many are those that all calls share.
+    if 0 < _threads.default() < _native.processors():
+        options.setdefault("threads", _threads.default())
     # Numbers of scenes and animations are spelled as in the program.
     for name in ("scene", "animation"):
         if isinstance(options.get(name), int) and not isinstance(options[name], bool):

@@ -24,10 +24,14 @@ def count(threads):
         if not 0 <= threads <= _MOST:
             raise ValueError(f"threads: expected a number from 0 (one for each processor) to {_MOST}, got {threads}")
         return threads or _native.processors()
+    return default() or _native.processors()
+
+
+def default():
+    """The number of threads of calls that do not say so themselves; 0 for one for each processor."""
     if _default is not None:
         return _default
-    text = os.environ.get("BTH_THREADS", "")
     try:
-        return min(int(text), _MOST) if int(text) > 0 else _native.processors()
+        return min(max(int(os.environ.get("BTH_THREADS", "")), 0), _MOST)
     except ValueError:
-        return _native.processors()
+        return 0

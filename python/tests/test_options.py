@@ -14,6 +14,7 @@ import pytest
 from test_bits import BTHC
 
 import bth
+from bth import _compile
 
 PAGE = pathlib.Path(__file__).resolve().parents[2] / "docs" / "reference.md"
 #: Options of `bthc compile` that a function has no use for, and those that have another name.
@@ -142,3 +143,23 @@ def test_stubs_have_the_options():
     parameters = set(inspect.signature(bth.compile).parameters) - {"model"}
     assert functions["compile"] == parameters
     assert functions["compile_scene"] == parameters - {"flatten", "scene", "animation", "rate", "at_rest", "rigid_parts", "strict", "rays"}
+
+
+def test_threads_of_all_calls_are_those_of_compilations(monkeypatch, mesh):
+    used = []
+    monkeypatch.setattr(_compile._native, "processors", lambda: 8)
+    monkeypatch.setattr(_compile._native, "compile_mesh", lambda *arguments: used.append(arguments[-1].get("threads")) or scene._native)
+    scene = bth.compile_scene([mesh])
+    monkeypatch.setenv("BTH_THREADS", "3")
+    bth.compile(mesh), bth.compile(mesh, threads=5), bth.compile(mesh, threads=0)
+    bth.set_threads(2)
+    try:
+        bth.compile(mesh)
+        # As many as there are processors are those that all calls share.
+        bth.set_threads(9)
+        bth.compile(mesh)
+    finally:
+        bth.set_threads(None)
+    monkeypatch.delenv("BTH_THREADS")
+    bth.compile(mesh)
+    assert used == [3, 5, 0, 2, None, None]

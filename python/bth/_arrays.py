@@ -17,14 +17,28 @@ def vectors(array, name):
 
 def _native_floats(array):
     if array.dtype not in (np.float32, np.float64) or not array.dtype.isnative:
-        array = array.astype(np.float32 if array.dtype == np.float16 else np.float64)
+        # Others are rounded once: by way of float64, large integers would be rounded twice.
+        with np.errstate(over="ignore"):
+            array = array.astype(np.float64 if array.dtype == np.dtype(np.float64).newbyteorder() else np.float32)
     return array if array.flags.aligned else array.copy()
+
+
+def number(value, name):
+    """One number as a float."""
+    if isinstance(value, (str, bytes, bytearray)):
+        raise TypeError(f"{name}: expected a number, got {type(value).__name__}")
+    try:
+        return float(value)
+    except TypeError:
+        raise TypeError(f"{name}: expected a number, got {type(value).__name__}") from None
+    except OverflowError:
+        raise ValueError(f"{name}: expected a number within the range of float64, got one beyond it") from None
 
 
 def numbers(array, name, shape):
     """A number, or an array of one number for each element of the shape."""
     if isinstance(array, (int, float)):
-        return float(array)
+        return number(array, name)
     array = np.asarray(array)
     if array.dtype.kind not in "fiub":
         raise TypeError(f"{name}: expected numbers, got an array of {array.dtype}")
@@ -37,13 +51,13 @@ def numbers(array, name, shape):
 
 
 def indices(array, name):
-    """An array of uint32; a copy only where it must be."""
+    """An aligned array of uint32; a copy only where it must be."""
     array = np.asarray(array)
     if array.dtype.kind not in "iu" and array.size:
         raise TypeError(f"{name}: expected integers, got an array of {array.dtype}")
     if array.dtype not in (np.uint32, np.uint16, np.uint8) and array.size and (array.min() < 0 or array.max() > 0xFFFFFFFF):
         raise IndexError(f"{name}: expected indices from 0, got {array.min() if array.min() < 0 else array.max()}")
-    return array.astype(np.uint32, copy=False)
+    return np.require(array, np.uint32, "A")
 
 
 def together(first, first_name, second, second_name):

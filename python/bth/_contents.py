@@ -13,7 +13,8 @@ def _weights(array, name):
     array = np.asarray(array)
     if array.dtype.kind not in "fiu":
         raise TypeError(f"{name}: expected numbers, got an array of {array.dtype}")
-    return array.astype(np.float32, copy=False)
+    with np.errstate(over="ignore"):
+        return array.astype(np.float32, copy=False)
 
 
 def _index(index, name):

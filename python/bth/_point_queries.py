@@ -57,7 +57,7 @@ class PointQueries:
         rows, shape = _rows(points)
         columns, position = hit_columns(len(rows)), np.empty(len(rows) * 3, np.float32)
         feature = np.empty(len(rows), np.uint8)
-        _native.closest(self._native, rows, float(radius), _threads.count(threads), columns, position, feature)
+        _native.closest(self._native, rows, _arrays.number(radius, "radius"), _threads.count(threads), columns, position, feature)
         columns = [c.reshape(shape) for c in columns]
         return Closest(columns, position.reshape(*shape, 3), feature.reshape(shape), self)
 

@@ -22,6 +22,8 @@ def _conditions(mask, cull, filter):
         raise TypeError(f"filter: expected a function, got {type(filter).__name__}")
     if cull is not None and not isinstance(cull, str):
         raise TypeError(f"cull: expected None, 'back' or 'front', got {type(cull).__name__}")
+    if cull not in (None, "back", "front"):
+        raise ValueError(f"cull: expected None, 'back' or 'front', got {cull!r}")
     return mask_bits(mask), cull or "none", filter
 
 

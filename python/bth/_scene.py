@@ -3,6 +3,7 @@
 import contextlib
 import io
 import math
+import operator
 import os
 import secrets
 
@@ -110,13 +111,16 @@ class Scene(RayQueries, PointQueries, Contents):
 
     @seconds.setter
     def seconds(self, seconds):
-        seconds = float(seconds)
+        seconds = _arrays.number(seconds, "seconds")
         if not math.isfinite(seconds):
             raise ValueError(f"seconds: expected a finite number, got {seconds}")
         self._native.set_seconds(seconds)
 
     def set_frame(self, frame):
         """Sets the time to that of a frame."""
+        frame = operator.index(frame)
+        if not -(2**31) <= frame < 2**31:
+            raise ValueError(f"frame: expected a number from {-(2**31)} to {2**31 - 1}, got {frame}")
         self._native.set_frame(frame)
 
     # Deformation.
@@ -138,7 +142,7 @@ class Scene(RayQueries, PointQueries, Contents):
         """Gives an object positions on the straight lines between those at two times, at `share` of the way from `open` to `close`, from
         0 to 1: for motion blur. The rest is as for `set_positions`."""
         ends = _positions(open, "open"), _positions(close, "close")
-        return self._native.set_positions_between(_index(obj, "obj"), *ends, float(share))
+        return self._native.set_positions_between(_index(obj, "obj"), *ends, _arrays.number(share, "share"))
 
     # Life.
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import bth
-from bth import _meshes
+from bth import _meshes, _ray_queries
 
 NAN, INF = float("nan"), float("inf")
 
@@ -447,6 +447,53 @@ def test_numbers_out_of_range(scene):
     for most in (2.7, "2"):
         with pytest.raises(TypeError):
             scene.all_hits(*rays, most=most)
+
+
+def test_numbers_that_are_none(scene):
+    rays = np.zeros((4, 3)), np.ones((4, 3))
+    calls = {
+        "radius": lambda x: scene.closest(rays[0], radius=x), "tmin": lambda x: scene.nearest(*rays, tmin=x), "tmax": lambda x: scene.any(*rays, tmax=x),
+        "seconds": lambda x: setattr(scene, "seconds", x), "share": lambda x: scene.set_positions_between(rays[0], rays[0], x),
+    }
+    for name, call in calls.items():
+        for wrong, error in (("1", TypeError), (b"1", TypeError), (None, TypeError), ({}, TypeError), (10**400, ValueError), (10**5000, ValueError)):
+            with pytest.raises(error, match=f"^{name}: expected"):
+                call(wrong)
+    for frame in (2**31, -(10**30)):
+        with pytest.raises(ValueError, match="frame"):
+            scene.set_frame(frame)
+    for frame in (1.0, "1"):
+        with pytest.raises(TypeError):
+            scene.set_frame(frame)
+    for cull in ("", "none", "both"):
+        with pytest.raises(ValueError, match="cull"):
+            scene.any(*rays, cull=cull)
+
+
+def test_numbers_are_rounded_once():
+    """An integer that float64 rounds to the middle between two float32. As a vertex and as a point it is the same."""
+    x = 2**60 + 2**36 + 1
+    scene = bth.compile((np.array([[x, 0, 0], [x, 8, 0], [x, 0, 8]]), [[0, 1, 2]]))
+    assert scene.bounds[0, 0] == 2**60 + 2**37 != np.float32(np.float64(x))
+    for kind in (np.int64, np.uint64, np.longdouble, np.dtype(np.int64).newbyteorder()):
+        if np.dtype(kind) == np.longdouble and np.finfo(kind).nmant < 60:
+            continue
+        assert scene.closest(np.array([x, 2, 2], kind)).distance == 0 and scene.overlaps_sphere(np.array([x, 2, 2], kind), 0)
+        assert not scene.any([0, 2, 2], [1, 0, 0], tmax=np.array(x, kind) - np.array(2**38, kind))
+    wide = np.finfo(np.longdouble).max
+    with np.errstate(all="raise"):
+        assert not scene.closest(np.array([wide, 0, 0])).found and len(scene.surface(0, [0], 1e300).position) == 1
+
+
+def test_arrays_that_are_not_aligned(scene, rays):
+    packed = np.zeros(len(rays[0]), [("odd", "u1"), ("instance", "u4"), ("triangle", "u4"), ("origin", "f4", 3), ("direction", "f8", 3), ("t", "f4")])
+    packed["origin"], packed["direction"], packed["t"] = *rays, np.inf
+    hits = scene.nearest(*rays)
+    packed["triangle"] = np.where(hits.hit, hits.triangle, 0)
+    given = scene.nearest(packed["origin"], packed["direction"], tmax=packed["t"], start=(packed["instance"], packed["triangle"]))
+    assert (given.t == hits.t).all() and (given.triangle == hits.triangle).all()
+    for indices in _ray_queries._start((packed["instance"][::-1], packed["triangle"]), (len(packed),)):
+        assert indices.flags.aligned
 
 
 def test_ctrl_c_while_waiting_for_a_change(scene, rays):

@@ -146,12 +146,12 @@ def test_animated_scenes(animated):
     for frame, x in ((10, 0), (15, 5), (30, 20)):
         animated.set_frame(frame)
         assert animated.seconds == frame / 10 and at(x).hit and not at(x + 3).hit
-    for wrong, error in ((np.nan, ValueError), (np.inf, ValueError), ("noon", ValueError), (None, TypeError)):
+    for wrong, error in ((np.nan, ValueError), (np.inf, ValueError), ("1", TypeError), (None, TypeError)):
         with pytest.raises(error):
             animated.seconds = wrong
     with pytest.raises(TypeError):
         animated.set_frame(1.5)
-    with pytest.raises(OverflowError):
+    with pytest.raises(ValueError):
         animated.set_frame(1 << 40)
     assert animated.seconds == 3.0
 

@@ -1,6 +1,7 @@
 """python -m bth compile|info|ao|thickness|sight|lidar|sdf …"""
 
 import argparse
+import os
 import sys
 
 import bth
@@ -10,7 +11,7 @@ from bth.bake.commands import ao, lidar, sdf, sight, thickness
 
 
 def _compile(arguments: argparse.Namespace) -> None:
-    output = arguments.output or arguments.model.rpartition(".")[0] + ".bth"
+    output = arguments.output or os.path.splitext(arguments.model)[0] + ".bth"
     with Bar() as bar:
         scene = bth.compile(arguments.model, output=output, quality=arguments.quality, progress=bar if bar.shown else None)
     print(f"{output}: {scene!r}")

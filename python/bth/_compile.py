@@ -2,7 +2,10 @@
 
 import inspect
 import math
+import operator
 import os
+
+import numpy as np
 
 from . import _meshes, _native, _threads
 from ._ray_queries import rays_and_shape
@@ -40,7 +43,7 @@ def compile(
     """
     options = {name: value for name, value in locals().items() if name != "model" and value is not None}
     if isinstance(model, (str, os.PathLike)):
-        path = os.fspath(model)
+        path = os.fsdecode(model)
         os.stat(path)
         return Scene(_native.compile_path(path, _checked(options)))
     for name in _GLTF:
@@ -87,9 +90,13 @@ def _checked(options):
     progress = options.get("progress")
     if progress is not None and not callable(progress):
         raise TypeError(f"progress: expected a function, got {type(progress).__name__}")
-    for name in ("output", "profile", "shared_cache"):
-        if name in options:
-            options[name] = os.fspath(options[name])
+    for name in ("output", "profile", "shared_cache", "cache"):
+        if name in options and not (name == "cache" and isinstance(options[name], (bool, np.bool_))):
+            options[name] = _path(options[name], name)
+    if "cache_size" in options and not isinstance(options["cache_size"], str):
+        options["cache_size"] = operator.index(options["cache_size"])
+        if not 0 <= options["cache_size"] < 2**64:
+            raise ValueError(f"cache_size: expected a number of bytes from 0, got {options['cache_size']}")
     # More than there are processors bring nothing, and as many are those that all calls share.
     if 0 < _threads.default() < _native.processors():
         options.setdefault("threads", _threads.default())
@@ -103,3 +110,11 @@ def _checked(options):
         origins, directions, tmin, tmax = (*options["rays"], *(0.0, math.inf)[len(options["rays"]) - 2:])
         options["rays"], _ = rays_and_shape(origins, directions, tmin, tmax)
     return options
+
+
+def _path(path, name):
+    try:
+        return os.fsdecode(path)
+    except TypeError:
+        wanted = "True, False or a folder" if name == "cache" else "a path"
+        raise TypeError(f"{name}: expected {wanted}, got {type(path).__name__}") from None

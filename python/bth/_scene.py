@@ -1,6 +1,7 @@
 """Scenes: opening, time, and what becomes of them."""
 
 import contextlib
+import errno
 import io
 import math
 import operator
@@ -21,7 +22,7 @@ def open(path, mmap=False):
     mmap: maps the file instead of reading it, in a time that does not depend on its size. Use it for unchanged files that the compiler
     has written, and do not change the file while the scene is open.
     """
-    path = os.fspath(path)
+    path = os.fsdecode(path)
     os.stat(path)
     return Scene(_native.open(path, bool(mmap)))
 
@@ -153,6 +154,11 @@ class Scene(RayQueries, PointQueries, Contents):
     def save(self, path):
         """Writes the compiled file; it appears whole or not at all. Time, new positions and masks are not part of it."""
         path, content = os.fsdecode(path), self.to_bytes()
+        if os.path.isdir(path):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), path)
+        # The file would take the place of a device or a named pipe.
+        if os.path.exists(path) and not os.path.isfile(path):
+            raise OSError(f"{path}: cannot write: expected a regular file or none there, found something else (hint: use to_bytes)")
         part = f"{path}.{os.getpid()}-{secrets.token_hex(8)}.part"
         try:
             with io.open(part, "xb") as file:

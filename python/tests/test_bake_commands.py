@@ -65,6 +65,9 @@ def test_what_is_written(folder, capsys):
         assert (volume["distance"] == expected.distance).all() and volume["spacing"] == expected.spacing
         assert (volume["origin"] == expected.origin).all()
     assert main(["compile", "ball.ply"]) == 0 and main(["thickness", "ball.bth", "-o", "t.npy", "-q"]) == 0
+    os.makedirs("d.x")
+    os.link("ball.ply", "d.x/ball")
+    assert main(["compile", "d.x/ball"]) == 0 and sorted(os.listdir("d.x")) == ["ball", "ball.bth"]
     capsys.readouterr()
     code, out, _ = call(capsys, "sight", "ball.ply", "--from=0,3,0", "--to=0,-3,0", "--to=1,3,0", "--json")
     assert code == 0 and json.loads(out)["seen"] == [[False, True]]

@@ -5,6 +5,7 @@ import gc
 import os
 import pickle
 import signal
+import stat
 import subprocess
 import sys
 import textwrap
@@ -431,6 +432,38 @@ def test_failed_saves_leave_nothing(scene, tmp_path):
     finally:
         threading.excepthook = before
     assert not failed and sorted(tmp_path.iterdir()) == [tmp_path / "a.bth", folder]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")
+def test_saving_replaces_no_pipe(scene, tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(OSError, match="regular file"):
+        scene.save(tmp_path / "pipe")
+    with pytest.raises(IsADirectoryError):
+        scene.save(tmp_path)
+    assert stat.S_ISFIFO(os.stat(tmp_path / "pipe").st_mode) and os.listdir(tmp_path) == ["pipe"]
+
+
+def test_paths_as_bytes(scene, mesh, tmp_path):
+    class Path:
+        def __init__(self, path):
+            self.path = path
+
+        def __fspath__(self):
+            return os.fsencode(self.path)
+
+    for path in (os.fsencode(tmp_path / "é.bth"), Path(tmp_path / "ü.bth")):
+        scene.save(path)
+        assert bth.open(path).content_id == bth.open(path, mmap=True).content_id == scene.content_id
+        bth.compile(mesh, output=path)
+    (tmp_path / "a.off").write_text("OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    assert bth.compile(Path(tmp_path / "a.off"), cache=False).triangle_counts == [1]
+    for name in ("output", "profile", "shared_cache", "cache"):
+        with pytest.raises(TypeError, match=f"^{name}: expected"):
+            bth.compile(mesh, **{name: 5})
+    for size, error in ((-1, ValueError), (2**64, ValueError), (1.5, TypeError)):
+        with pytest.raises(error):
+            bth.compile(mesh, cache_size=size)
 
 
 def test_numbers_out_of_range(scene):

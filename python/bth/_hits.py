@@ -151,7 +151,8 @@ class Hits(_OnTriangles):
 class AllHits(_OnTriangles):
     """All hits of rays: those of ray i are the rows offsets[i] to offsets[i + 1] of the arrays t, u, v, instance and triangle.
 
-    They ascend by t, and by instance and triangle where t is the same. Rays of several axes count in C order.
+    They ascend by t, and by instance and triangle where t is the same; those of one instance by t before it was rounded to float32. Rays of
+    several axes count in C order.
     """
 
     __slots__ = ("offsets", "t", "u", "v", "instance", "triangle", "_scene")

@@ -16,9 +16,12 @@ class RaycastingScene:
         self._threads = nthreads or None
         self._assembly = Assembly()
 
-    def add_triangles(self, vertices, triangles=None):
+    def add_triangles(self, vertex_positions=None, triangle_indices=None, *, mesh=None):
         """Adds vertices (n, 3) and triangles (m, 3), or a mesh; returns its geometry's index."""
-        return self._assembly.add(vertices if triangles is None else (vertices, triangles))
+        if (mesh is None) == (vertex_positions is None):
+            raise TypeError("expected vertex_positions and triangle_indices, or a mesh")
+        mesh = vertex_positions if mesh is None else mesh
+        return self._assembly.add(mesh if triangle_indices is None else (mesh, triangle_indices))
 
     def _rays(self, rays, nthreads):
         rays = np.asarray(rays)

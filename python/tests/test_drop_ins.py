@@ -160,6 +160,11 @@ def test_embreex_elements_are_closed(corners, element):
 def test_open3d(mesh, rays):
     scene = RaycastingScene()
     assert scene.add_triangles(*mesh) == 0 and scene.add_triangles((mesh[0] + [5, 0, 0], mesh[1])) == 1
+    named = RaycastingScene()
+    assert named.add_triangles(vertex_positions=mesh[0], triangle_indices=mesh[1]) == 0 and named.add_triangles(mesh=mesh) == 1
+    for wrong in ({}, {"mesh": mesh, "vertex_positions": mesh[0]}):
+        with pytest.raises(TypeError):
+            named.add_triangles(**wrong)
     packed = np.concatenate(rays, axis=-1).reshape(20, 20, 6)
     single = bth.compile((np.concatenate([mesh[0], mesh[0] + np.float32([5, 0, 0])]), np.concatenate([mesh[1], mesh[1] + len(mesh[0])])))
     hits, out = single.nearest(*rays), scene.cast_rays(packed)

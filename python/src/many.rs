@@ -1,12 +1,12 @@
 //! Queries that return several hits of a ray, or a number of them.
 
 use crate::conditions::Conditions;
-use crate::output::{chunks, chunks_of, numbers};
+use crate::output::{Part, Parts, chunks, chunks_of, numbers};
 use crate::rays::RayArrays;
 use crate::scene::NativeScene;
 use bth::Crossings;
 use bth::rays::Hit;
-use numpy::{IntoPyArray, PyArray1, PyReadwriteArray1};
+use numpy::{PyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
 use std::ops::Range;
 
@@ -32,15 +32,20 @@ pub(crate) fn all_hits<'py>(
 ) -> PyResult<Columns<'py>> {
     let (scene, rays, conditions) = (scene.get()?, rays.rays()?, conditions.checked()?);
     let counts = numbers(&mut counts, rays.len())?;
-    let mut parts: Vec<Vec<Hit>> = Vec::new();
-    parts.resize_with(rays.len().div_ceil(crate::rays::CHUNK), Vec::new);
-    let mut rest = parts.iter_mut();
+    let mut parts = Parts::new(rays.len());
     let mut rows = counts;
-    let jobs = chunks(rays.len(), |count| {
-        let counts = rows.split_off_mut(..count).expect("a count for each ray");
-        (counts, rest.next().expect("a part for each chunk"))
-    });
-    let each = |scene: &bth::Scene, (range, (counts, hits)): (Range<usize>, (&mut [u64], &mut Vec<Hit>))| {
+    let jobs = {
+        let mut rest = parts.each();
+        chunks(rays.len(), |count| {
+            let counts = rows.split_off_mut(..count).expect("a count for each ray");
+            (counts, rest.next().expect("a part for each chunk"))
+        })
+    };
+    let each = |scene: &bth::Scene,
+                (range, (counts, mut hits)): (Range<usize>, (&mut [u64], Part<'_, Hit>))| {
+        if hits.is_full() {
+            return;
+        }
         let (mut read, mut of_ray) = (Vec::new(), Vec::new());
         rays.read(range.clone(), &mut read);
         conditions.each(scene, range.start, &read, |i, ray, accept| {
@@ -49,18 +54,17 @@ pub(crate) fn all_hits<'py>(
                 Some(most) => scene.nearest_hits(ray, most, accept, &mut of_ray),
             }
             counts[i] = of_ray.len() as u64;
-            hits.extend_from_slice(&of_ray);
+            hits.append(&of_ray);
         });
     };
     scene.run(py, conditions.threads(threads), jobs, each)?;
     conditions.finish()?;
-    let hits = || parts.iter().flatten();
     Ok((
-        hits().map(|h| h.t).collect::<Vec<_>>().into_pyarray(py),
-        hits().map(|h| h.u).collect::<Vec<_>>().into_pyarray(py),
-        hits().map(|h| h.v).collect::<Vec<_>>().into_pyarray(py),
-        hits().map(|h| h.primitive.instance).collect::<Vec<_>>().into_pyarray(py),
-        hits().map(|h| h.primitive.triangle).collect::<Vec<_>>().into_pyarray(py),
+        parts.column(py, |h| h.t)?,
+        parts.column(py, |h| h.u)?,
+        parts.column(py, |h| h.v)?,
+        parts.column(py, |h| h.primitive.instance)?,
+        parts.column(py, |h| h.primitive.triangle)?,
     ))
 }
 

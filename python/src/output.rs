@@ -2,10 +2,11 @@
 
 use crate::rays::CHUNK;
 use bth::rays::Hit;
-use numpy::{Element, PyReadwriteArray1};
-use pyo3::exceptions::PyValueError;
+use numpy::{Element, IntoPyArray, PyArray1, PyReadwriteArray1};
+use pyo3::exceptions::{PyMemoryError, PyValueError};
 use pyo3::prelude::*;
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A mutable array of so many numbers.
 pub(crate) fn numbers<'a, T: Element>(
@@ -100,4 +101,69 @@ pub(crate) fn chunks<T>(count: usize, mut part: impl FnMut(usize) -> T) -> Vec<(
 /// As [`chunks`], for results in one array.
 pub(crate) fn chunks_of<T>(mut results: &mut [T]) -> Vec<(Range<usize>, &mut [T])> {
     chunks(results.len(), |rows| split_off(&mut results, rows))
+}
+
+/// What the chunks of a call find, where that may be more than there is memory for.
+pub(crate) struct Parts<T> {
+    parts: Vec<Vec<T>>,
+    is_full: AtomicBool,
+}
+
+/// Where a chunk puts what it finds.
+pub(crate) struct Part<'a, T> {
+    found: &'a mut Vec<T>,
+    is_full: &'a AtomicBool,
+}
+
+impl<T: Copy> Parts<T> {
+    /// No results of so many rays or regions.
+    pub(crate) fn new(count: usize) -> Parts<T> {
+        Parts {
+            parts: (0..count.div_ceil(CHUNK)).map(|_| Vec::new()).collect(),
+            is_full: AtomicBool::new(false),
+        }
+    }
+
+    /// The parts of the chunks, in their order.
+    pub(crate) fn each(&mut self) -> impl Iterator<Item = Part<'_, T>> {
+        let is_full = &self.is_full;
+        self.parts.iter_mut().map(move |found| Part { found, is_full })
+    }
+
+    /// One number of each result. Fails if there was or is not enough memory.
+    pub(crate) fn column<'py, N: Element>(
+        &self,
+        py: Python<'py>,
+        number: impl Fn(&T) -> N,
+    ) -> PyResult<Bound<'py, PyArray1<N>>> {
+        let full = || PyMemoryError::new_err("there is not enough memory for all that is found");
+        if self.is_full.load(Ordering::Relaxed) {
+            return Err(full());
+        }
+        let mut column = Vec::new();
+        column.try_reserve_exact(self.parts.iter().map(Vec::len).sum()).map_err(|_| full())?;
+        column.extend(self.parts.iter().flatten().map(number));
+        Ok(column.into_pyarray(py))
+    }
+}
+
+impl<T: Copy> Part<'_, T> {
+    /// Whether the call fails anyway, since there is not enough memory.
+    pub(crate) fn is_full(&self) -> bool {
+        self.is_full.load(Ordering::Relaxed)
+    }
+
+    /// Appends results. If there is no memory for them, those of the chunk are freed.
+    pub(crate) fn append(&mut self, found: &[T]) {
+        if self.is_full() {
+            return;
+        }
+        match self.found.try_reserve(found.len()) {
+            Ok(()) => self.found.extend_from_slice(found),
+            Err(_) => {
+                self.is_full.store(true, Ordering::Relaxed);
+                *self.found = Vec::new();
+            }
+        }
+    }
 }

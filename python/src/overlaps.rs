@@ -1,10 +1,10 @@
 //! Overlaps of triangles with boxes and balls.
 
-use crate::output::{chunks, chunks_of, numbers};
+use crate::output::{Part, Parts, chunks, chunks_of, numbers};
 use crate::rays::{Bound1, Numbers, Rows, Vectors};
 use crate::scene::NativeScene;
 use bth::rays::PrimitiveRef;
-use numpy::{IntoPyArray, PyArray1, PyReadwriteArray1};
+use numpy::{PyArray1, PyReadwriteArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::ops::Range;
@@ -115,27 +115,30 @@ pub(crate) fn triangles_in<'py>(
 ) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>)> {
     let (scene, regions) = (scene.get()?, regions.regions()?);
     let mut rows = numbers(&mut counts, regions.len())?;
-    let mut parts: Vec<Vec<PrimitiveRef>> = Vec::new();
-    parts.resize_with(regions.len().div_ceil(crate::rays::CHUNK), Vec::new);
-    let mut rest = parts.iter_mut();
-    let jobs = chunks(regions.len(), |count| {
-        let counts = rows.split_off_mut(..count).expect("a count for each region");
-        (counts, rest.next().expect("a part for each chunk"))
-    });
-    scene.run(py, threads, jobs, |scene, (range, (counts, all))| {
-        let mut triangles = Vec::new();
-        for (region, count) in regions.read(range).iter().zip(counts) {
-            match region.radius {
-                None => scene.triangles_in_box(region.first, region.upper, &mut triangles),
-                Some(radius) => scene.triangles_in_sphere(region.first, radius, &mut triangles),
+    let mut parts = Parts::new(regions.len());
+    let jobs = {
+        let mut rest = parts.each();
+        chunks(regions.len(), |count| {
+            let counts = rows.split_off_mut(..count).expect("a count for each region");
+            (counts, rest.next().expect("a part for each chunk"))
+        })
+    };
+    let each =
+        |scene: &bth::Scene,
+         (range, (counts, mut all)): (Range<usize>, (&mut [u64], Part<'_, PrimitiveRef>))| {
+            if all.is_full() {
+                return;
             }
-            *count = triangles.len() as u64;
-            all.extend_from_slice(&triangles);
-        }
-    })?;
-    let all = || parts.iter().flatten();
-    Ok((
-        all().map(|p| p.instance).collect::<Vec<_>>().into_pyarray(py),
-        all().map(|p| p.triangle).collect::<Vec<_>>().into_pyarray(py),
-    ))
+            let mut triangles = Vec::new();
+            for (region, count) in regions.read(range).iter().zip(counts) {
+                match region.radius {
+                    None => scene.triangles_in_box(region.first, region.upper, &mut triangles),
+                    Some(radius) => scene.triangles_in_sphere(region.first, radius, &mut triangles),
+                }
+                *count = triangles.len() as u64;
+                all.append(&triangles);
+            }
+        };
+    scene.run(py, threads, jobs, each)?;
+    Ok((parts.column(py, |p| p.instance)?, parts.column(py, |p| p.triangle)?))
 }

@@ -277,6 +277,34 @@ def test_huge_shapes(scene):
     assert scene.contains(deep).shape == (1,) * 30
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="the limit is that of Linux")
+@pytest.mark.parametrize("threads", [1, 2])
+def test_more_hits_than_memory(threads):
+    code = """
+        import resource, sys
+        import numpy as np, bth
+        layers, rays = 500, np.zeros((100000, 3), np.float32)
+        sheets = np.concatenate([[[-1, -1, k], [1, -1, k], [0, 1, k]] for k in range(layers)])
+        scene = bth.compile((sheets, np.arange(3 * layers).reshape(-1, 3)))
+        # The threads that all calls share are started here.
+        scene.any(rays, [0, 0, 1], threads=2)
+        with open("/proc/self/statm") as file:
+            limit = int(file.read().split()[0]) * resource.getpagesize() + (128 << 20)
+        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+        threads = int(sys.argv[1])
+        calls = [lambda: scene.all_hits(rays, [0, 0, 1], threads=threads), lambda: scene.triangles_in_box(rays, [1, 1, layers], threads=threads)]
+        for call in calls:
+            try:
+                call()
+            except MemoryError as error:
+                assert "memory" in str(error)
+            else:
+                sys.exit(3)
+        assert len(scene.all_hits(rays[:10], [0, 0, 1], threads=threads)) == 10 * layers
+    """
+    assert _exits(code, str(threads)) == 0
+
+
 def _resident():
     with open("/proc/self/statm") as file:
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")

@@ -11,6 +11,7 @@ use bth_compile::memory::{self, Instance, TriangleMesh};
 use bth_compile::pipeline::CompileOptions;
 use bth_compile::scene::{CachePolicy, SceneSource};
 use bth_compile::{Monitor, write};
+use bth_import::Looks;
 use bth_import::gltf::Chosen;
 use bth_import::gltf::scene::ImportOptions;
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
@@ -136,6 +137,11 @@ pub(crate) fn compile_path(
             format!("rays: an option for one model, and {} is a scene: see for_scene", path.display());
         return Err(PyValueError::new_err(message));
     }
+    if let Some(output) = output.as_deref().filter(|output| output.is_file()) {
+        let mut inputs = py.detach(|| inputs(&path, options.looks()));
+        inputs.extend(keywords.value::<PathBuf>("profile")?);
+        refuse_input(output, &inputs)?;
+    }
     let bytes = monitored(py, &keywords, |monitor| {
         let content = compile_file(&path, flatten, &gltf, &options, store.as_ref(), monitor)?;
         deliver(&content, output.as_deref())
@@ -242,6 +248,34 @@ fn triangle_mesh<'a>(
     let (positions, _) = positions.as_slice().map_err(contiguous)?.as_chunks::<3>();
     let (triangles, _) = triangles.as_slice().map_err(contiguous)?.as_chunks::<3>();
     Ok(TriangleMesh { positions, triangles })
+}
+
+/// The files that a compilation of a file reads, itself among them.
+#[pyfunction]
+pub(crate) fn source_files(py: Python<'_>, path: PathBuf) -> Vec<PathBuf> {
+    py.detach(|| inputs(&path, Looks::default()))
+}
+
+fn inputs(path: &Path, looks: Looks) -> Vec<PathBuf> {
+    let files = match has_extension(path, &["manifest", "toml"]) {
+        true => bth_scene::read(path).ok().map(|manifest| bth_compile::scene::files(&manifest, path, looks)),
+        false => Some(bth_compile::source::files(path, looks)),
+    };
+    // A source that cannot be read is reported when it is compiled.
+    files.and_then(Result::ok).unwrap_or_else(|| vec![path.to_owned()])
+}
+
+/// Fails if an output, which is a file already, would replace one of these files.
+fn refuse_input(output: &Path, inputs: &[PathBuf]) -> PyResult<()> {
+    let Ok(real) = output.canonicalize() else { return Ok(()) };
+    match inputs.iter().find(|input| input.canonicalize().is_ok_and(|input| input == real)) {
+        None => Ok(()),
+        Some(input) => Err(PyValueError::new_err(format!(
+            "output: {} would replace {}, which is read (hint: name another output)",
+            output.display(),
+            input.display()
+        ))),
+    }
 }
 
 /// Whether a file is compiled as a scene.

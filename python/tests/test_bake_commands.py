@@ -73,6 +73,31 @@ def test_what_is_written(folder, capsys):
     assert code == 0 and json.loads(out)["seen"] == [[False, True]]
 
 
+@pytest.mark.parametrize("arguments", [
+    ["compile", "ball.ply", "-o", "./ball.ply"], ["compile", "room.manifest", "-o", "d/../ball.ply"], ["compile", "room.manifest", "-o", "room.manifest"],
+    ["compile", "link.ply", "-o", "ball.ply"], ["ao", "ball.ply", "-o", "ball.ply"], ["thickness", "room.manifest", "-o", "link.ply"],
+])
+def test_nothing_that_is_read_is_replaced(folder, capsys, arguments):
+    os.mkdir("d")
+    os.symlink("ball.ply", "link.ply")
+    (folder / "room.manifest").write_text("""
+        version = 1
+        objects = [{ name = "ball", model = "ball.ply" }]
+        nodes = [{ name = "ball", object = "ball" }]
+    """)
+    before = {name: open(name, "rb").read() for name in ("ball.ply", "room.manifest")}
+    code, out, err = call(capsys, *arguments)
+    assert (code, out) == (2, "") and "BTH-U001" in err and "would replace" in err and "hint: " in err
+    assert {name: open(name, "rb").read() for name in before} == before and os.path.islink("link.ply")
+    # A compiled file that is there already is no reason to refuse.
+    assert main(["compile", "ball.ply"]) == main(["compile", "ball.ply"]) == 0
+
+
+def test_the_result_and_the_picture_are_two_files(folder, capsys):
+    code, _, err = call(capsys, "ao", "ball.ply", "-o", "a.png", "--texture", "8x8", "--picture", "./a.png")
+    assert code == 2 and "both" in err and not os.path.exists("a.png")
+
+
 @pytest.mark.parametrize("arguments, exit_code, code", [
     (["ao", "ball.ply"], 2, "BTH-U001"),
     (["ao", "ball.ply", "-o", "out.txt"], 2, "BTH-U001"),

@@ -163,3 +163,18 @@ def test_threads_of_all_calls_are_those_of_compilations(monkeypatch, mesh):
     monkeypatch.delenv("BTH_THREADS")
     bth.compile(mesh)
     assert used == [3, 5, 0, 2, None, None]
+
+
+@pytest.mark.skipif(not PAGE.exists(), reason="not in the repository")
+def test_outputs_replace_no_input(path, tmp_path):
+    """Neither the model nor a file that it names, nor that of an option."""
+    library = tmp_path / "parts.mtl"
+    library.write_text("newmtl a\nKd 1 0 0\n")
+    path.write_text("mtllib parts.mtl\n" + path.read_text())
+    profile = tmp_path / "profile.json"
+    profile.write_bytes((PAGE.parents[1] / "bth-profile.json").read_bytes())
+    before = [file.read_bytes() for file in (path, library, profile)]
+    for output, options in ((path, {}), (library, {"materials": True}), (profile, {"profile": profile})):
+        with pytest.raises(ValueError, match="output: .* would replace .*hint"):
+            bth.compile(path, output=output, cache=False, **options)
+    assert [file.read_bytes() for file in (path, library, profile)] == before

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ... import _compile, _scene
+from ... import _compile, _native, _scene
 from ..._command import Usage
 from .._arithmetic import Floats
 from .._camera import UP, Camera
@@ -105,6 +105,7 @@ class Job:
         self.progress = bar if bar.shown else None
         _check_output(arguments.output, endings)
         _check_output(arguments.picture, (".png",))
+        self._refuse_inputs()
         if any((path or "").lower().endswith(".png") for path in (arguments.output, arguments.picture)):
             pillow()
         self.scene = self._open(arguments.model, attributes)
@@ -114,6 +115,18 @@ class Job:
                 has = "none" if frames is None else f"{frames[0]} to {frames[1]}"
                 raise Usage(f"--frame: the scene has no frame {arguments.frame}; its frames are {has}")
             self.scene.set_frame(arguments.frame)
+
+    def _refuse_inputs(self) -> None:
+        """Fails if an output would replace a file that is read, or the other output, whatever the paths are spelled like."""
+        options = self.arguments
+        outputs = {path: os.path.realpath(path) for path in (options.output, options.picture) if path is not None and os.path.isfile(path)}
+        for read in _native.source_files(options.model) if outputs else ():
+            for output, real in outputs.items():
+                if real == os.path.realpath(read):
+                    raise Usage(f"{output} would replace {os.fspath(read)}, which is read (hint: name another output)")
+        if options.output is not None and options.picture is not None:
+            if os.path.realpath(options.output) == os.path.realpath(options.picture):
+                raise Usage(f"{options.picture} would be both the result and the picture (hint: name another file with --picture)")
 
     def _open(self, model: str, attributes: Literal["none", "normals", "all"] | None) -> _scene.Scene:
         if model.lower().endswith(".bth"):

@@ -10,6 +10,7 @@ mod context;
 mod deformers;
 mod encode;
 mod file_index;
+mod files;
 mod images;
 mod in_memory;
 mod known_rays;
@@ -28,7 +29,7 @@ mod sources;
 mod visible;
 
 pub use compile::{CachePolicy, SceneSource, compile, compile_cached, compile_objects, dry_run};
+pub use files::files;
 pub use in_memory::Instance;
 pub(crate) use in_memory::compile_meshes;
-pub use moving::moving_files;
 pub use report::{ObjectReport, SceneReport};

@@ -22,7 +22,7 @@ pub(super) struct Moving {
 ///
 /// # Errors
 /// As [`mesh::sequence_files`].
-pub fn moving_files(source: &Source, folder: &Path) -> Result<Vec<PathBuf>> {
+pub(super) fn moving_files(source: &Source, folder: &Path) -> Result<Vec<PathBuf>> {
     match source {
         Source::Sequence { frames: SequenceFrames::Numbered(pattern), .. } => {
             mesh::sequence_files(&folder.join(pattern))

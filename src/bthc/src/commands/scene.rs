@@ -125,27 +125,7 @@ fn files(manifest: &Manifest, model: &Path, looks: Looks) -> bth_compile::Result
     if is_gltf(model) {
         return source::files(model, looks);
     }
-    let mut files = vec![model.to_owned()];
-    let folder = model.parent().unwrap_or(Path::new(""));
-    for object in &manifest.objects {
-        // The files of an object without visible instances may be missing.
-        let moving = scene::moving_files(&object.source, folder).unwrap_or_default();
-        for file in moving.iter().filter(|file| file.exists()) {
-            files.extend(source::files(file, looks)?);
-        }
-    }
-    let mut paths: Vec<&str> = manifest.objects.iter().map(|o| o.source.path()).collect();
-    paths.sort_unstable();
-    paths.dedup();
-    for path in paths {
-        // Without a leading `./`, since build systems compare names.
-        let path = model.parent().unwrap_or(Path::new("")).join(path);
-        // The file of an object without visible instances may be missing.
-        if path != *model && path.exists() && !files.contains(&path) {
-            files.extend(source::files(&path, looks)?);
-        }
-    }
-    Ok(files)
+    scene::files(manifest, model, looks)
 }
 
 /// What is known about the trees of objects whose vertices move.

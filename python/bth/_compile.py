@@ -33,6 +33,7 @@ def compile(
     rays: rays that will be traced through a model, a pair (origins, directions) or with tmin and tmax behind, as those of `Scene.nearest`. The tree is
     built for them more than for rays from everywhere; answers do not depend on it.
     progress: is called with the name of the stage, the units done and the units in all or None; an exception from it cancels.
+    It may query scenes, but not change one.
     threads: by default as many as queries use (see `set_threads`); the result does not depend on it.
 
     All other options are those of `bthc compile`. `structure` is 'bvh' by default, since the package has no worker for tetrahedra, and

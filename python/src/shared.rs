@@ -79,7 +79,7 @@ impl OpenScene {
         change: impl FnOnce(&mut bth::Scene) -> T + Send,
     ) -> PyResult<T> {
         if work::is_inside_call() {
-            let message = "a scene cannot be changed by a filter, nor by the handler of a signal that interrupts a call of this package";
+            let message = "a scene cannot be changed by a filter or a progress function, nor by the handler of a signal that interrupts a call of this package";
             return Err(PyRuntimeError::new_err(message));
         }
         work::note_thread(py);

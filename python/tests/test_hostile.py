@@ -431,8 +431,13 @@ def test_meshes_are_those_of_the_call(mesh, kinds):
     for own, given in zip(_meshes.triangles_of((vertices, faces)), (vertices, faces)):
         assert not np.shares_memory(own, given) and own.flags.c_contiguous
 
+    other = bth.compile(mesh, quality="fast")
+
     def change(*_):
         vertices[:], faces[:] = NAN, 2**31 - 1
+        assert other.any([0, 0, 0], [0, 0, 1])
+        with pytest.raises(RuntimeError, match="progress"):
+            other.seconds = 1
 
     # Enough triangles for some calls of the function, which may come at any time.
     vertices, faces = np.tile(vertices, (200, 1)), np.tile(faces, (200, 1))

@@ -164,3 +164,12 @@ def test_geometry(scene, mesh):
     assert scene.triangle_counts.tolist() == [len(mesh[1])]
     np.testing.assert_allclose(scene.bounds, [mesh[0].min(0), mesh[0].max(0)], atol=1e-6)
     assert (scene.transforms == np.eye(4)).all() and scene.visible.all()
+
+
+def test_t_beyond_float32():
+    """Beyond the range of float32 there are no hits; passages are counted by the exact t."""
+    scene = bth.compile(([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
+    ray = [0.2, 0.2, 1e30], [0, 0, -1e-20]
+    assert not scene.nearest(*ray).hit and not scene.any(*ray) and not scene.any(*ray, filter=lambda _: True)
+    assert scene.count(*ray) == len(scene.all_hits(*ray)) == len(scene.all_hits(*ray, most=1)) == 0
+    assert scene.crossings(*ray)[0] == 1

@@ -68,6 +68,12 @@ def _displacement(view):
             raise view.invalid("F208", f"{p} is {float(square) ** 0.5} from the grid", c.POSITIONS, 12 * row)
 
 
+def _room(point):
+    """The ends of the least box with the room around a point that widened boxes have."""
+    margin = max(abs(Fraction(x)) for x in point) / 2**20
+    return [Fraction(x) - margin for x in point], [Fraction(x) + margin for x in point]
+
+
 def _tree(view):
     """F201 to F204 and F207; returns the corners of the triangles that are in a triangle leaf of the tree or are a constrained face."""
     placed, in_subtree = {}, [set() for _ in view.tet_leaves]
@@ -86,7 +92,8 @@ def _tree(view):
         placed[t] = corners
 
     # A reference, the boxes around it, and the tet leaf whose subtree it lies in.
-    stack = [(view.root, [(view.lower, view.upper)], None)]
+    object_box = (view.lower, view.upper)
+    stack = [(view.root, [object_box], None)]
     # Boxes around the triangles of each leaf, and those triangles' points.
     found = []
     while stack:
@@ -122,7 +129,8 @@ def _tree(view):
                 points += corners
         found.append((boxes, points))
     for boxes, points in found:
-        if not all(contains(box, points) for box in boxes):
+        room = [end for point in points for end in _room(point)] if view.widened_boxes else points
+        if not all(contains(box, points if box is object_box else room) for box in boxes):
             raise view.invalid("F204", "triangles outside a box above", c.LINES)
     for row, leaf in enumerate(view.tet_leaves):
         if leaf.subtree != NONE and len(in_subtree[row]) != leaf.faces:

@@ -208,7 +208,8 @@ def _deformable(view):
         return
     announced = view.container.header.required_features & c.FEATURE_DEFORMABLE_TETS
     tets = bool(view.tet_leaves) and not announced or any(leaf.subtree == NONE for leaf in view.tet_leaves)
-    if not view.positions or not view.source or view.grid or view.packed_nodes or tets or view.dropped:
+    is_f32 = not (view.grid or view.packed_nodes or view.widened_boxes)
+    if not view.positions or not view.source or not is_f32 or tets or view.dropped:
         raise view.invalid("F163", "LEAF_VERTICES in an object that cannot be deformable", c.LEAF_VERTICES)
     nodes, leaves = _depth_first(view)
     next_line = 0

@@ -60,7 +60,8 @@ class ObjectView:
         bits, *exponents = struct.unpack_from("<4B", raw, 44)
         origin, displacement = struct.unpack_from("<3f", raw, 48), struct.unpack_from("<f", raw, 60)[0]
         self.packed_nodes = bits >> 7 == 1
-        bits &= 127
+        self.widened_boxes = bits >> 6 & 1 == 1
+        bits &= 63
         if not bits and not any(raw[45:48]):
             grid, wrong = None, any(raw[48:64])
         else:
@@ -70,6 +71,7 @@ class ObjectView:
             grid = Grid(bits, origin, tuple(math.ldexp(1.0, e - 127) for e in exponents), displacement)
             wrong = wrong or not all(_is_exact(o, s, bits) for o, s in zip(grid.origin, grid.step))
         wrong = wrong or self.packed_nodes and not self.container.header.required_features & c.FEATURE_PACKED_NODES
+        wrong = wrong or self.widened_boxes and not self.container.header.required_features & c.FEATURE_WIDENED_BOXES
         if wrong:
             raise self.invalid("F104", f"coordinates {raw[44:64].hex()}", c.OBJECT, 44)
         return grid

@@ -249,6 +249,7 @@ fn tree() -> Vec<Case> {
         grid("F104-origin-between", kind::OBJECT, offset_of!(Object, grid_origin), 1e-7f32.to_bits()),
         grid("F104-displacement", kind::OBJECT, offset_of!(Object, displacement), nan),
         object("F104-packed-nodes-not-announced", offset_of!(Object, coordinates), PACKED_NODES),
+        object("F104-widened-boxes-not-announced", offset_of!(Object, coordinates), WIDENED_BOXES),
         line("F105-packed-among-nodes", child(0), Child::Packed(INNER as u32 / 64).code()),
         packed("F105-node-among-packed", packed_child(0), Child::Node(3).code()),
         packed("F111-packed-empty-slot", 4, 0xffff_ff00),
@@ -439,6 +440,8 @@ fn geometry() -> Vec<Case> {
         field("F203-more-dropped", base, kind::OBJECT, offset_of!(Object, dropped), 2),
         field("F204-small-box", base, kind::LINES, 64, half),
         field("F204-small-packed-box", "packed-nodes", kind::LINES, 16, 0),
+        // A box that holds the triangles, without room.
+        field("F204-no-room", "widened-boxes", kind::LINES, 64, 4f32.to_bits()),
         field("F204-small-bounds", base, kind::OBJECT, offset_of!(Object, upper), half),
         field("F205-small-tet-box", tets, kind::TET_LEAVES, offset_of!(TetLeaf, upper), half),
         broken("F206-turned-over", tets, Seal::Sections, |e| {

@@ -19,6 +19,7 @@ pub fn valid() -> Vec<Case> {
         Case::new("grid-21", two_levels(Some(GridBits::B21), false)),
         Case::new("packed-nodes", two_levels(None, true)),
         Case::new("packed-nodes-grid-16", two_levels(Some(GridBits::B16), true)),
+        Case::new("widened-boxes", two_levels_widened()),
         Case::new("opacity", opacity()),
         Case::new("free-directions", free_directions()),
         Case::new("free-distances", free_distances()),
@@ -233,10 +234,34 @@ fn triangle_bare() -> Vec<u8> {
     })
 }
 
+/// The ends of the least box of `f32` with the room around a point that widened boxes have.
+fn room_around(point: [f32; 3]) -> [[f32; 3]; 2] {
+    let margin = point.into_iter().fold(0.0, |m: f64, x| m.max(f64::from(x).abs())) * BOX_MARGIN;
+    let lower = point.map(|x| {
+        // The sum of these few bits is exact.
+        let end = f64::from(x) - margin;
+        if f64::from(end as f32) > end { (end as f32).next_down() } else { end as f32 }
+    });
+    let upper = point.map(|x| {
+        let end = f64::from(x) + margin;
+        if f64::from(end as f32) < end { (end as f32).next_up() } else { end as f32 }
+    });
+    [lower, upper]
+}
+
 /// A grid of 4 by 5 squares, two triangles each: 12 squares in an inner node with indexed and raw leaves, 8 in
 /// leaves beside it; and a triangle without area. Normals and texture coordinates are kept. With bits, the leaves are
 /// quantized to a grid that moves the source's positions slightly; boxes of nodes may be packed.
 fn two_levels(bits: Option<GridBits>, packed_nodes: bool) -> Vec<u8> {
+    two_levels_of(bits, packed_nodes, false)
+}
+
+/// As [`two_levels`], with child boxes that have the least room around the triangles that widened boxes must have.
+fn two_levels_widened() -> Vec<u8> {
+    two_levels_of(None, false, true)
+}
+
+fn two_levels_of(bits: Option<GridBits>, packed_nodes: bool, widened_boxes: bool) -> Vec<u8> {
     let mut positions = Vec::new();
     for y in 0..6 {
         for x in 0..5 {
@@ -254,7 +279,10 @@ fn two_levels(bits: Option<GridBits>, packed_nodes: bool) -> Vec<u8> {
     triangles.push([7, 7, 8]);
     let corners = |t: u32| triangles[t as usize].map(|v| positions[v as usize]);
     let range = |from: u32, to: u32| (from..to).map(corners).collect::<Vec<_>>();
-    let of = |from: u32, to: u32| bounds(range(from, to).iter().flatten().collect::<Vec<_>>());
+    let of = |from: u32, to: u32| {
+        let room = |p: &[f32; 3]| if widened_boxes { room_around(*p) } else { [*p; 2] };
+        bounds(&range(from, to).iter().flatten().flat_map(room).collect::<Vec<_>>())
+    };
     // Root, inner node, then the leaves.
     let (inner, leaf) = (NODE_LINES as u32, 2 * NODE_LINES as u32);
     let at = |indexed: u32, raw: u32| leaf + indexed * INDEXED_LINES as u32 + raw * RAW_LINES as u32;
@@ -282,6 +310,7 @@ fn two_levels(bits: Option<GridBits>, packed_nodes: bool) -> Vec<u8> {
         depth: 2,
         subtrees: Vec::new(),
         leaf_vertices: Vec::new(),
+        widened_boxes,
     };
     let bounds = bounds(&positions);
     let grid = bits.map(|bits| {
@@ -310,6 +339,7 @@ fn two_levels(bits: Option<GridBits>, packed_nodes: bool) -> Vec<u8> {
         dropped: 1,
         grid,
         packed_nodes,
+        widened_boxes,
         lines: &wide.lines,
         triangle_ids: &wide.triangle_ids,
         source: Some(source),

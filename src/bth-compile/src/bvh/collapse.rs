@@ -4,11 +4,13 @@ use super::plan::{Costs, Decision, Plan, Planner};
 use super::poses::Weighed;
 use super::slot_order::SlotOrder;
 use super::wide::{CollapseReport, Wide};
+use super::wide_lines::greatest_coordinate;
 use super::wide_tree::Writer;
 use super::{BinaryBvh, MAX_LEVELS};
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
 use bth_format::layout::NONE;
+use bth_format::object::WIDENED_RANGE;
 use bth_import::Mesh;
 
 /// Options of [`collapse`].
@@ -64,7 +66,10 @@ pub fn collapse_by<'a>(
         return Err(Error::Internal { code: "BTH-X203", message });
     }
     monitor.stage("collapse", None);
-    let mut wide = Wide { root: NONE, subtrees: vec![NONE; cut.len()], ..Wide::default() };
+    let greatest = bvh.nodes.first().map_or(0.0, greatest_coordinate);
+    // The boxes of an object that deforms are computed anew by readers, which do not widen them.
+    let widened_boxes = !options.leaf_vertices && WIDENED_RANGE.contains(&greatest);
+    let mut wide = Wide { root: NONE, subtrees: vec![NONE; cut.len()], widened_boxes, ..Wide::default() };
     let mut report = CollapseReport::default();
     if bvh.nodes.is_empty() {
         return Ok((wide, report));

@@ -17,6 +17,8 @@ pub struct Wide {
     /// For each leaf, in order of the leaves' lines, the rows of the mesh's positions in its slots: one array for an indexed leaf, one
     /// for each corner of a raw one. Empty if they are not recorded.
     pub leaf_vertices: Vec<[u32; WIDTH]>,
+    /// Whether child boxes are widened ([`WIDENED_BOXES`](bth_format::layout::WIDENED_BOXES)).
+    pub widened_boxes: bool,
     /// [`Child`] code of the root, `NONE` when no triangle can be hit.
     pub root: u32,
     /// Wide nodes on the longest path from the root; subtrees count as below their tet leaf.

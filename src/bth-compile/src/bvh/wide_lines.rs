@@ -1,7 +1,7 @@
 //! Contents of the wide BVH's nodes and leaves.
 
 use super::Node;
-use bth_format::layout::{CacheLine, IndexedLeaf, NONE, RawLeaf, WIDTH, WideNode};
+use bth_format::layout::{BOX_MARGIN, CacheLine, IndexedLeaf, NONE, RawLeaf, WIDTH, WideNode};
 use bth_import::Mesh;
 use zerocopy::{Immutable, IntoBytes};
 
@@ -11,18 +11,31 @@ pub(super) fn put<T: IntoBytes + Immutable>(lines: &mut [CacheLine], at: usize, 
     lines[at..at + bytes.len() / size_of::<CacheLine>()].as_mut_bytes().copy_from_slice(bytes);
 }
 
-/// A wide node over at most 16 nodes of the binary BVH and their child codes.
-pub(super) fn wide_node<'a>(children: impl Iterator<Item = (&'a Node, u32)>) -> WideNode {
+/// A wide node over at most 16 nodes of the binary BVH and their child codes, with their boxes or these widened.
+pub(super) fn wide_node<'a>(children: impl Iterator<Item = (&'a Node, u32)>, widened: bool) -> WideNode {
     let empty = [[f32::MAX; WIDTH], [-f32::MAX; WIDTH]];
     let mut wide = WideNode { bounds: [empty; 3], child: [NONE; WIDTH] };
     for (slot, (node, code)) in children.enumerate() {
+        let margin = if widened { margin(node) } else { 0.0 };
         for k in 0..3 {
-            wide.bounds[k][0][slot] = node.lower[k];
-            wide.bounds[k][1][slot] = node.upper[k];
+            // Sums and products are rounded, each to a neighbour at most.
+            let [lower, upper] = [node.lower[k] - margin, node.upper[k] + margin];
+            wide.bounds[k][0][slot] = if widened { lower.next_down() } else { lower };
+            wide.bounds[k][1][slot] = if widened { upper.next_up() } else { upper };
         }
         wide.child[slot] = code;
     }
     wide
+}
+
+/// The greatest |coordinate| of a node's box.
+pub(super) fn greatest_coordinate(node: &Node) -> f32 {
+    node.lower.iter().chain(&node.upper).fold(0.0, |greatest, x| x.abs().max(greatest))
+}
+
+/// By how much the box of a node is widened: at least as much as any corner in it asks for.
+fn margin(node: &Node) -> f32 {
+    greatest_coordinate(node) * BOX_MARGIN as f32
 }
 
 /// A leaf over 1 to 16 triangles of at most 16 distinct vertices, and the rows of these vertices.

@@ -150,11 +150,12 @@ impl Writer<'_> {
         } else {
             self.wide.lines.resize(next, CacheLine([0; 16]));
         }
+        let widened = self.wide.widened_boxes;
         let node_lines = self.wide.lines[base..leaves_from].par_chunks_mut(NODE_LINES);
         node_lines.zip(inner.par_iter()).for_each(|(lines, &Inner { first, count })| {
             let slots =
                 slots[first..first + count].iter().map(|s| (&self.bvh.nodes[s.node as usize], s.code));
-            put(lines, 0, &wide_node(slots));
+            put(lines, 0, &wide_node(slots, widened));
         });
         self.leaves(&placed, leaves_from)?;
         for &(slot, row) in &subtrees {

@@ -204,6 +204,7 @@ impl Object {
             leaf_vertices: &self.wide.leaf_vertices,
             grid: on_grid.as_ref().map(|on| (on.grid, on.displacement)),
             packed_nodes: self.packed_nodes,
+            widened_boxes: self.wide.widened_boxes,
             groups: self.groups.as_ref(),
             materials: mesh.materials.as_ref(),
             deformation: mesh.deformation.as_ref(),

@@ -23,6 +23,8 @@ pub struct ObjectParts<'a> {
     pub grid: Option<(Grid, f32)>,
     /// Whether the nodes are packed: all of them or none.
     pub packed_nodes: bool,
+    /// Whether child boxes are widened ([`WIDENED_BOXES`]).
+    pub widened_boxes: bool,
     /// Nodes and triangle leaves.
     pub lines: &'a [CacheLine],
     /// Source id of each triangle in leaf order.
@@ -109,7 +111,9 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
         triangles: parts.triangles,
         dropped: parts.dropped,
         depth,
-        coordinates: coordinates | if parts.packed_nodes { PACKED_NODES } else { 0 },
+        coordinates: coordinates
+            | if parts.packed_nodes { PACKED_NODES } else { 0 }
+            | if parts.widened_boxes { WIDENED_BOXES } else { 0 },
         grid_origin,
         displacement: parts.grid.map_or(0.0, |(_, displacement)| displacement),
     };

@@ -22,6 +22,8 @@ fn prerequisites(view: &ObjectView, features: u64) -> Result<()> {
         "none of them"
     } else if view.grid.is_some() || view.has_packed_nodes() {
         "coordinates or boxes that are not f32"
+    } else if view.has_widened_boxes() {
+        "widened boxes"
     } else if view.tet_leaves.iter().any(|leaf| leaf.subtree == NONE) {
         "a tet leaf without a subtree"
     } else if !view.tet_leaves.is_empty() && features & FEATURE_DEFORMABLE_TETS == 0 {

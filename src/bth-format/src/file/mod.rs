@@ -292,7 +292,7 @@ impl File {
         })
     }
 
-    /// BTH-F104: the grid of an object, and that the header announces grids and packed nodes.
+    /// BTH-F104: the grid of an object, and that the header announces grids, packed nodes and widened boxes.
     fn grid(&self, object: &Object) -> Result<Option<Grid>> {
         let at = std::mem::offset_of!(Object, coordinates) as u64;
         let wrong = |expected: &'static str, found: Text| {
@@ -307,6 +307,10 @@ impl File {
         if object.coordinates & PACKED_NODES != 0 && features & FEATURE_PACKED_NODES == 0 {
             let found = text!("{:#x}", object.coordinates);
             return Err(wrong("no packed nodes, as the header announces none", found));
+        }
+        if object.coordinates & WIDENED_BOXES != 0 && features & FEATURE_WIDENED_BOXES == 0 {
+            let found = text!("{:#x}", object.coordinates);
+            return Err(wrong("boxes that are not widened, as the header announces none", found));
         }
         Ok(grid)
     }

@@ -12,7 +12,8 @@ pub(super) const HEADER_SIZE: usize = size_of::<Header>();
 /// Bytes of a section entry.
 const ENTRY_SIZE: u64 = size_of::<SectionEntry>() as u64;
 /// Required feature bits that this library knows.
-const KNOWN_FEATURES: u64 = FEATURE_GRID | FEATURE_PACKED_NODES | FEATURE_DEFORMABLE_TETS;
+const KNOWN_FEATURES: u64 =
+    FEATURE_GRID | FEATURE_PACKED_NODES | FEATURE_DEFORMABLE_TETS | FEATURE_WIDENED_BOXES;
 
 /// Whether hashes are compared. Not under fuzzing: mutated files would have wrong hashes, and no check behind would be reached.
 const CHECKSUMS: bool = !cfg!(fuzzing);

@@ -31,8 +31,8 @@ pub struct Header {
     pub section_count: u32,
     /// Zero.
     pub reserved: u32,
-    /// Bits that a reader must know to read the file: [`FEATURE_GRID`], [`FEATURE_PACKED_NODES`] and
-    /// [`FEATURE_DEFORMABLE_TETS`].
+    /// Bits that a reader must know to read the file: [`FEATURE_GRID`], [`FEATURE_PACKED_NODES`],
+    /// [`FEATURE_DEFORMABLE_TETS`] and [`FEATURE_WIDENED_BOXES`].
     pub required_features: u64,
     /// Bits that a reader may ignore; none is assigned.
     pub optional_features: u64,
@@ -79,6 +79,9 @@ pub const FEATURE_PACKED_NODES: u64 = 2;
 
 /// Bit of [`Header::required_features`]: an object that can be given new positions has tet leaves. Bit 2 is not assigned.
 pub const FEATURE_DEFORMABLE_TETS: u64 = 8;
+
+/// Bit of [`Header::required_features`]: the boxes of an object are widened, see [`super::WIDENED_BOXES`].
+pub const FEATURE_WIDENED_BOXES: u64 = 16;
 
 /// Bit of [`SectionEntry::flags`]: a reader that does not know the section's kind must refuse the file.
 pub const SECTION_REQUIRED: u32 = 1;

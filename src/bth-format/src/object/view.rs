@@ -81,6 +81,11 @@ impl ObjectView<'_> {
             _ => code,
         }
     }
+    /// Whether child boxes are widened ([`WIDENED_BOXES`]).
+    pub fn has_widened_boxes(&self) -> bool {
+        self.header.coordinates & WIDENED_BOXES != 0
+    }
+
     /// Whether all nodes are packed; else none is.
     #[inline(always)]
     pub fn has_packed_nodes(&self) -> bool {

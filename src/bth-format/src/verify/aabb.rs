@@ -1,5 +1,18 @@
 //! Axis-aligned boxes that grow.
 
+use crate::layout::BOX_MARGIN;
+
+/// The greatest `f32` that is not above the exact value of `x - margin`.
+fn below(x: f64, margin: f64) -> f32 {
+    // The difference and what its rounding left out (Knuth's sum of two numbers).
+    let difference = x - margin;
+    let taken = difference - x;
+    let rest = (x - (difference - taken)) - (margin + taken);
+    let number = difference as f32;
+    let is_above = f64::from(number) > difference || f64::from(number) == difference && rest < 0.0;
+    if is_above { number.next_down() } else { number }
+}
+
 /// An axis-aligned box, object space.
 #[derive(Clone, Copy)]
 pub(super) struct Aabb {
@@ -19,12 +32,26 @@ impl Aabb {
         }
     }
 
+    /// Grows to contain a point with the room that widened boxes have around it.
+    pub(super) fn add_widened(&mut self, point: [f32; 3]) {
+        let greatest = point.into_iter().fold(0.0, |m: f64, x| m.max(f64::from(x).abs()));
+        let margin = greatest * BOX_MARGIN;
+        self.add(point.map(|x| below(x.into(), margin)));
+        self.add(point.map(|x| -below(-f64::from(x), margin)));
+    }
+
     /// Grows to contain another box.
     pub(super) fn merge(&mut self, other: &Aabb) {
         for axis in 0..3 {
             self.lower[axis] = self.lower[axis].min(other.lower[axis]);
             self.upper[axis] = self.upper[axis].max(other.upper[axis]);
         }
+    }
+
+    /// The box around both.
+    pub(super) fn with(mut self, other: &Aabb) -> Aabb {
+        self.merge(other);
+        self
     }
 
     /// Whether the other box lies within this one, boundaries included.

@@ -17,6 +17,8 @@ struct Visit {
     tet_leaf: Option<u32>,
     /// Bounds of the triangles below, as far as they have been visited.
     content: Aabb,
+    /// The same with the room around corners that widened boxes have; the box of no point where the object has none.
+    widened: Aabb,
 }
 
 /// Checks BTH-F201 to BTH-F204 and BTH-F207 of the stored triangles; returns which triangles the tree holds.
@@ -30,6 +32,7 @@ pub(super) fn check(view: &ObjectView) -> Result<TriangleMarks> {
         check_containment(view, &visit, &visits)?;
         if let Some((parent, _)) = visit.parent {
             visits[parent].content.merge(&visit.content);
+            visits[parent].widened.merge(&visit.widened);
         }
     }
     triangles.check_subtrees()?;
@@ -39,7 +42,13 @@ pub(super) fn check(view: &ObjectView) -> Result<TriangleMarks> {
 /// All nodes and leaves, parents before their children.
 fn visits(view: &ObjectView) -> Vec<Visit> {
     let visit = |code, parent, tet_leaf| {
-        Child::from_code(code).map(|child| Visit { child, parent, tet_leaf, content: Aabb::EMPTY })
+        Child::from_code(code).map(|child| Visit {
+            child,
+            parent,
+            tet_leaf,
+            content: Aabb::EMPTY,
+            widened: Aabb::EMPTY,
+        })
     };
     let mut visits: Vec<Visit> = visit(view.header.root, None, None).into_iter().collect();
     let mut i = 0;
@@ -69,7 +78,8 @@ fn check_containment(view: &ObjectView, visit: &Visit, visits: &[Visit]) -> Resu
     } else {
         return Ok(());
     };
-    let content = &visit.content;
+    // The object's bounds are not widened.
+    let content = if section == kind::LINES { &visit.content.with(&visit.widened) } else { &visit.content };
     if bounds.contains(content) {
         return Ok(());
     }
@@ -115,7 +125,7 @@ impl Triangles<'_> {
 
     /// BTH-F203, BTH-F201 and BTH-F207 of a triangle of a leaf, given its row of TRIANGLE_IDS.
     fn check_leaf_triangle(&mut self, visit: &mut Visit, row: usize, corners: [[f32; 3]; 3]) -> Result<()> {
-        corners.into_iter().for_each(|p| visit.content.add(p));
+        self.add(visit, corners);
         let (id, at) = (self.view.triangle_ids[row], 4 * row as u64);
         match visit.tet_leaf {
             Some(tet_leaf) => self.mark_in_subtree(id, tet_leaf, at)?,
@@ -129,11 +139,21 @@ impl Triangles<'_> {
     fn check_constrained_face(&mut self, visit: &mut Visit, row: u32) -> Result<()> {
         let face = &self.view.tet_faces[row as usize];
         let corners = face.vertex.map(|v| self.view.tet_vertices[v as usize].position);
-        corners.into_iter().for_each(|p| visit.content.add(p));
+        self.add(visit, corners);
         let at = u64::from(row) * size_of::<TetFace>() as u64;
         self.mark_placed(face.triangle, kind::TET_FACES, at + offset_of!(TetFace, triangle) as u64)?;
         let stored = Stored { code: Code::FaceSource, section: kind::TET_FACES, at };
         check_corners(self.view, face.triangle, corners, stored)
+    }
+
+    /// Adds the corners of a triangle to the content of a visit.
+    fn add(&self, visit: &mut Visit, corners: [[f32; 3]; 3]) {
+        for corner in corners {
+            visit.content.add(corner);
+            if self.view.has_widened_boxes() {
+                visit.widened.add_widened(corner);
+            }
+        }
     }
 
     /// BTH-F203: a triangle lies in one triangle leaf or constrained face.

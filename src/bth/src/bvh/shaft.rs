@@ -14,7 +14,8 @@ use bth_format::object::ObjectBounds;
 /// one of r bound it. As all operations round monotonically, only roundings need the pad. With u = 2^-24 and E the sum of the
 /// greatest coordinate of the object and that of all origins, they come to at most uE|r| for the reciprocal, 2uE|r| for the
 /// padded end, uE|r| for the difference and uE|r| for the product: with the half [`PAD`] = 8uE|r| of [`boxes`] for
-/// clamped components less than 14uE|r|; the pad is 2 · PAD = 32uE.
+/// clamped components less than 14uE|r|; the pad is 2 · PAD = 32uE. Of these, less than 12u are relative to the planes, which widened
+/// boxes cover by 16u: then E counts the object's coordinates by their small part only ([`prepare::padded_extent`]).
 #[derive(Clone, Copy)]
 pub(crate) struct Shaft<S: Simd> {
     /// For each axis the end of the origins' interval that is nearest to the planes at which rays enter boxes.
@@ -33,7 +34,7 @@ impl<S: Simd> Shaft<S> {
     /// The shaft of coherent rays ([`Span::is_coherent`]), given for each axis the least and the greatest reciprocal of the directions' components
     /// in the unit of depth, the least depth of the rays' ranges, and E.
     #[inline(always)]
-    pub(crate) fn new(s: S, span: &Span, reciprocal: [[f32; 2]; 3], first: f32, extent: f32) -> Self {
+    pub(crate) fn new(s: S, span: &Span, reciprocal: [[f32; 2]; 3], first: f32, padded: f32) -> Self {
         let zero = s.splat(0.0);
         let mut shaft = Shaft {
             near_origin: [0.0; 3],
@@ -42,7 +43,7 @@ impl<S: Simd> Shaft<S> {
             near: [0; 3],
             first: s.splat(first),
         };
-        let pad = 2.0 * PAD as f32 * extent;
+        let pad = 2.0 * PAD as f32 * padded;
         for k in 0..3 {
             shaft.reciprocal[k] = [s.splat(reciprocal[k][0]), s.splat(reciprocal[k][1])];
             let [low, high] = [span.origin[k][0] - pad, span.origin[k][1] + pad];
@@ -57,8 +58,8 @@ impl<S: Simd> Shaft<S> {
     /// prepare them.
     #[inline(always)]
     pub(crate) fn of(s: S, bounds: &ObjectBounds, span: &Span) -> Option<(Self, f32)> {
-        let (extent, main) = (prepare::extent(bounds, span.farthest_origin()), span.main_axis().1);
-        let is_prepared = prepare::SMALLEST < extent && extent < prepare::LARGEST;
+        let (padded, main) = (prepare::padded_extent(bounds, span.farthest_origin()), span.main_axis().1);
+        let is_prepared = prepare::SMALLEST < padded && padded < prepare::LARGEST;
         if !(span.is_coherent() && is_prepared && 1.0 / prepare::LARGEST < main && main < prepare::LARGEST) {
             return None;
         }
@@ -75,7 +76,7 @@ impl<S: Simd> Shaft<S> {
         let [first_slack, last_slack] =
             [first, last].map(|t| t.abs() * (4.0 / (1 << 24) as f32) + f32::MIN_POSITIVE);
         let first = (first - first_slack).max(-f32::MAX);
-        Some((Shaft::new(s, span, reciprocal, first, extent), last + last_slack))
+        Some((Shaft::new(s, span, reciprocal, first, padded), last + last_slack))
     }
 
     /// The children of a node that any ray may meet before the depth `limit`, a bit each, and lower bounds of the depths at which any of

@@ -9,11 +9,16 @@ use crate::intersect::line::Line;
 use crate::rays::Ray;
 use crate::simd::Simd;
 use bth_format::layout::{Object, PackedNode, WIDTH, WideNode};
+use bth_format::object::ObjectBounds;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// Pad of a plane relative to the sum of the greatest |coordinate| of the boxes and of the origin. Half of it covers the
 /// roundings (reciprocal, product with the origin, addend, product with the plane and sum: at most 5 · 2^-24), the other half
 /// the clamping of components ([`LEAST_COMPONENT`]).
+///
+/// Where the file's boxes are widened, the pad need not cover the boxes' part of that sum. With p a point of the box below, o the origin, r the reciprocal and
+/// u = 2^-24, what is rounded is off by at most 5u(|P| + |o|)|r| for a plane P beyond p, and clamping by 2^-22 (|p| + |o|)|r| in the maximum norm; the file keeps 2^-20 |p| between
+/// p and P, and where P is farther away, its own roundings are less than what it is farther.
 pub(crate) const PAD: f64 = 1.0 / (1 << 20) as f64;
 /// Least |component| of a direction whose greatest |component| is 1; smaller ones are raised to it, which keeps products
 /// finite. Up to the farthest coordinate this moves the ray by less than half the pad.
@@ -60,21 +65,27 @@ impl RaySlabs {
 
     /// For the boxes of an object.
     pub(crate) fn new(ray: &Ray, line: &Line, object: &Object) -> RaySlabs {
-        let corners = object.lower.iter().chain(&object.upper);
-        RaySlabs::with_pad(ray, line, corners.fold(0.0, |m: f64, &x| m.max(f64::from(x).abs())), |_| 0.0)
+        let bounds = ObjectBounds::new(object);
+        RaySlabs::with_pad(ray, line, [bounds.greatest, bounds.padded].map(f64::from), |_| 0.0)
     }
 
     /// For boxes whose |coordinates| do not exceed `farthest`. `extra_pad` maps the greatest |coordinate| of the ray's origin
     /// to a length by which the boxes are widened further. None for a ray without a line.
     pub(crate) fn widened(ray: &Ray, farthest: f32, extra_pad: impl Fn(f64) -> f64) -> Option<RaySlabs> {
-        Some(RaySlabs::with_pad(ray, &Line::new(ray)?, farthest.into(), extra_pad))
+        Some(RaySlabs::with_pad(ray, &Line::new(ray)?, [farthest.into(); 2], extra_pad))
     }
 
-    fn with_pad(ray: &Ray, line: &Line, farthest: f64, extra_pad: impl Fn(f64) -> f64) -> RaySlabs {
+    /// Of the greatest |coordinate| of the boxes, and of what pads allow for in its place ([`ObjectBounds::padded`]).
+    fn with_pad(
+        ray: &Ray,
+        line: &Line,
+        [farthest, padded]: [f64; 2],
+        extra_pad: impl Fn(f64) -> f64,
+    ) -> RaySlabs {
         let scale = line.direction[line.axis[2]].abs();
         let farthest_origin = line.origin.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         let extent = farthest + farthest_origin;
-        let pad = PAD * extent + extra_pad(farthest_origin);
+        let pad = PAD * (padded + farthest_origin) + extra_pad(farthest_origin);
         let mut slabs = RaySlabs { scale: scale as f32, ..RaySlabs::NONE };
         // Finite even where it is the depth of all boxes: the traversal writes lane numbers into the low bits of depths, which
         // would turn an infinity into NaN.

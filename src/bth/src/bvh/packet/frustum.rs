@@ -33,6 +33,7 @@ impl<S: Simd, const POINT: bool> Frustum<S, POINT> {
     pub(crate) fn new(s: S, bounds: &ObjectBounds, span: &Span, groups: &[RayGroup<S>]) -> Self {
         let zero = s.splat(0.0);
         let extent = prepare::extent(bounds, span.farthest_origin());
+        let padded = prepare::padded_extent(bounds, span.farthest_origin());
         let (main, _) = span.main_axis();
         let axis = [(main + 1) % 3, (main + 2) % 3, main];
         let mut center = [0.0; 3];
@@ -77,7 +78,7 @@ impl<S: Simd, const POINT: bool> Frustum<S, POINT> {
         let ends = least;
         let both = |of: usize| [ends[of], -ends[8 + of]];
         let view = FrustumView { origin: center, axis, shear: [0.0; 2], shear_width: [0.0; 2] };
-        let shaft = Shaft::new(s, span, [both(0), both(1), both(2)], ends[7], extent);
+        let shaft = Shaft::new(s, span, [both(0), both(1), both(2)], ends[7], padded);
         let mut frustum = Frustum { view, shaft, upper: [0.0; 2], lower: [0.0; 2] };
         let pad = 4.0 * PAD as f32 * extent;
         for j in 0..2 {

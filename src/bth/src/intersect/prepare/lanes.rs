@@ -90,7 +90,7 @@ pub(crate) fn prepare_lanes<S: Lanewise>(
         origin_sum = s.add(coordinate, origin_sum);
         direction_sum = s.add(size[k], direction_sum);
     }
-    let extent = s.mul(s.add(s.splat(bounds.greatest), farthest), s.splat(ROUND_UP));
+    let extent = s.mul(s.add(s.splat(bounds.padded), farthest), s.splat(ROUND_UP));
     let large = s.splat(LARGEST);
     let finite = s.and(
         s.and(s.lt(s.splat(1.0 / LARGEST), greatest), s.lt(direction_sum, large)),

@@ -54,6 +54,13 @@ pub(crate) fn extent(bounds: &ObjectBounds, greatest_origin: f32) -> f32 {
     (bounds.greatest + greatest_origin) * ROUND_UP
 }
 
+/// Upper bound of what the pads of boxes are relative to: as [`extent`], but that widened boxes allow for their own coordinates. Not below
+/// [`LARGEST`] where the extent is not.
+#[inline(always)]
+pub(crate) fn padded_extent(bounds: &ObjectBounds, greatest_origin: f32) -> f32 {
+    (bounds.padded + greatest_origin) * ROUND_UP
+}
+
 /// A ray prepared for box tests and for the filter, with the progress of its traversal. The first cache line holds what node
 /// steps read, the second what leaves read and write, so that interleaved rays take little of the L1 cache.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
@@ -115,7 +122,7 @@ impl PreparedRay {
         let greatest = s.greatest_of_three(end.abs().to_array());
         let [greatest_origin, ..] = s.greatest_of_three(start.abs().to_array());
         let (greatest, greatest_lanes) = (greatest[0], Vec3A::from_vec4(Vec4::from_array(greatest)));
-        let extent = extent(bounds, greatest_origin);
+        let extent = padded_extent(bounds, greatest_origin);
         // NaN and infinity among the components make these the greatest.
         if !(lies_between(greatest, 1.0 / LARGEST, LARGEST)
             & lies_between(extent, SMALLEST, LARGEST)

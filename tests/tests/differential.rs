@@ -1,7 +1,7 @@
 //! Every structure and record agrees with the exact oracle, and with each other bit for bit.
 
-use bth::Steps;
 use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::{Accept, Steps};
 use bth_scenes::{Model, blob::blob, gyroid::gyroid, hall::hall, knot::torus_knot, soup::soup};
 use bth_tests::oracle;
 use bth_tests::rays::{assorted, onward};
@@ -165,6 +165,26 @@ fn rays_without_a_line_hit_nothing() {
         for ray in &bad {
             assert_eq!(scene.nearest(ray), None, "{name}: {ray:?}");
             assert!(!scene.any_from(ray, PrimitiveRef { instance: 0, triangle: 0 }), "{name}: {ray:?}");
+        }
+    }
+}
+
+/// With a direction of 1e38, a hit as near as 1e-8 has a t that is reported as 0.
+#[test]
+fn hits_whose_t_is_rounded_to_an_end_of_the_range_are_found() {
+    let model =
+        Model { positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], triangles: vec![[0, 1, 2]] };
+    let corners: Corners = vec![model.corners(0)];
+    for Traced { name, scene } in &every_structure(&model, false) {
+        for (z, length) in [(1e-8, 3e38), (-1e-8, 3e38), (1e-30, 1e18), (-1e-30, -1e18), (1e-8, -3e38)] {
+            for (tmin, tmax) in [(0.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, f32::INFINITY)] {
+                let ray = Ray { origin: [0.25, 0.25, z], tmin, direction: [0.0, 0.0, -length], tmax };
+                let hit = scene.nearest(&ray).unwrap_or(Hit::MISS);
+                assert!(hit.is_hit() && hit.t == 0.0, "{name}: {ray:?}: {hit:?}");
+                check_against_oracle(&corners, &ray, &hit);
+                assert!(scene.any(&ray), "{name}: {ray:?}");
+                assert_eq!(scene.count_hits(&ray, &Accept::default()), 1, "{name}: {ray:?}");
+            }
         }
     }
 }

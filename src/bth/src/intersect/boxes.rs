@@ -6,6 +6,7 @@
 //! that depths are of the magnitude of coordinates.
 
 use crate::intersect::line::Line;
+use crate::query::widened;
 use crate::rays::Ray;
 use crate::simd::Simd;
 use bth_format::layout::{Object, PackedNode, WIDTH, WideNode};
@@ -89,8 +90,11 @@ impl RaySlabs {
         let mut slabs = RaySlabs { scale: scale as f32, ..RaySlabs::NONE };
         // Finite even where it is the depth of all boxes: the traversal writes lane numbers into the low bits of depths, which
         // would turn an infinity into NaN.
-        slabs.first = ((f64::from(ray.tmin) * scale) as f32).next_down().max(-f32::MAX);
-        slabs.last = slabs.limit(f64::from(ray.tmax));
+        // A hit is in the range if its t is after it was rounded, as a t of 2^-150 is to 0: with a great direction the depth of such a hit
+        // is far beyond that of the end of the range.
+        let after = |t: f64| widened(t.max(f64::MIN));
+        slabs.first = ((-after(-f64::from(ray.tmin)) * scale) as f32).next_down().max(-f32::MAX);
+        slabs.last = slabs.limit(after(f64::from(ray.tmax)));
         for k in 0..3 {
             let d = line.direction[k] / scale;
             let r = 1.0 / d.abs().max(LEAST_COMPONENT).copysign(d);

@@ -4,7 +4,8 @@ use crate::instances::World;
 use crate::objects::Objects;
 use crate::scene::Scene;
 use crate::update::Update;
-use bth_format::{Error, File, SceneView};
+use bth_format::text;
+use bth_format::{Code, Error, File, SceneView};
 
 /// An instance at the scene's time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +31,14 @@ pub fn check_first_frame(file: &File) -> Result<(), Error> {
     World::new(&Objects::of_file(file.clone())).map(drop)
 }
 
+/// Checks that a time is finite.
+pub(crate) fn check_time(seconds: f64) -> Result<(), Error> {
+    if seconds.is_finite() {
+        return Ok(());
+    }
+    Err(Error::of_call(Code::NotFinite, "a finite time", text!("{seconds}")))
+}
+
 impl Scene {
     /// The scene sections; `None` if the file has none or a scene builder made the scene.
     pub fn description(&self) -> Option<SceneView<'_>> {
@@ -47,8 +56,9 @@ impl Scene {
     ///
     /// # Errors
     /// `BTH-S001` if the transform of a visible instance cannot be inverted, `BTH-S002` if the transform, the world box or the position of
-    /// a vertex that deforms is not finite in `f32`. The error gives the node. The scene is then unchanged.
+    /// a vertex that deforms is not finite in `f32`, or the time is not finite. The error gives the node. The scene is then unchanged.
     pub fn set_seconds(&mut self, seconds: f64) -> Result<Update, Error> {
+        check_time(seconds)?;
         let (objects, world) = self.parts_mut();
         world.as_mut().map_or(Ok(Update::default()), |world| world.update(objects, seconds))
     }

@@ -137,6 +137,11 @@ fn transforms_that_cannot_be_shown_name_the_node_and_change_nothing() {
         assert!(!error.hint().is_empty() && scene.seconds() == 0.0);
         assert!(hits(&scene, &rays) == before, "frame {frame}");
     }
+    for seconds in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let error = scene.set_seconds(seconds).unwrap_err();
+        assert!(error.to_string().contains(&format!("expected a finite time, found {seconds}")), "{error}");
+        assert!(error.code().as_str() == "BTH-S002" && scene.seconds() == 0.0, "{error}");
+    }
     for frame in [2, 5, 8] {
         scene.set_frame(frame).unwrap();
     }

@@ -3,6 +3,7 @@
 use super::SceneBuilder;
 use super::instances::StagedInstance;
 use super::subscene::{Pose, Subscene};
+use crate::motion::check_time;
 use bth_format::text;
 use bth_format::{Code, Error};
 
@@ -65,8 +66,9 @@ impl SceneBuilder {
     /// theirs.
     ///
     /// # Errors
-    /// `BTH-S003` if there is no such subscene.
+    /// `BTH-S003` if there is no such subscene, `BTH-S002` if the time is not finite.
     pub fn set_subscene_seconds(&mut self, subscene: u32, seconds: f64) -> Result<(), Error> {
+        check_time(seconds)?;
         self.pose(subscene)?.seconds = seconds;
         Ok(())
     }

@@ -70,6 +70,9 @@ fn calls_that_name_nothing_are_errors_and_change_nothing() {
         let transforms = [at(9.0, 0.0, 0.0), IDENTITY];
         assert_eq!(code(builder.set_transforms(&[own, unknown], &transforms)), Code::NoSuchInstance);
     }
+    for seconds in [f64::NAN, f64::INFINITY] {
+        assert_eq!(code(builder.set_subscene_seconds(subscene, seconds)), Code::NotFinite);
+    }
     assert_eq!(code(builder.set_group_mask(4, 0, 1)), Code::NoSuchObject);
     assert_eq!(code(builder.set_group_mask(0, 1, 1)), Code::NoSuchObject);
     let error = builder.set_transform(placed, &IDENTITY).unwrap_err();

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <time.h>
 
 _Static_assert(sizeof(bth_mesh_instance) == 104, "instance");
 
@@ -39,7 +40,9 @@ static bth_mesh hills(void) {
 
 struct seen {
     int calls;
+    int begun; /* calls with nothing done */
     int stages;
+    int warnings;
     int cancel;
     char last[64];
 };
@@ -47,9 +50,22 @@ struct seen {
 static int32_t progress(void *user, const char *stage, uint64_t done, uint64_t total) {
     struct seen *seen = user;
     seen->calls++;
+    seen->begun += done == 0;
     seen->stages += strcmp(seen->last, stage) != 0;
     snprintf(seen->last, sizeof seen->last, "%s", stage);
     return (total && done > total) || seen->cancel;
+}
+
+static void warning(void *user, const char *message) {
+    struct seen *seen = user;
+    seen->warnings += strstr(message, "/absent/bth-tetgen") != NULL;
+}
+
+/* Seconds of some clock. */
+static double now(void) {
+    struct timespec time;
+    timespec_get(&time, TIME_UTC);
+    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
 }
 
 static int write_file(const char *path, bth_bytes bytes) {
@@ -103,6 +119,17 @@ int main(int argc, char **argv) {
     bth_close(scene);
     bth_free_bytes(&bytes);
 
+    /* Within a stage, progress is told a few times a second. */
+    struct seen often = {0};
+    double start = now();
+    options.user = &often;
+    options.quality = BTH_QUALITY_BEST;
+    CHECK(bth_compile_mesh(&mesh, &options, &bytes) == BTH_COMPILE_OK);
+    bth_free_bytes(&bytes);
+    CHECK(often.calls - often.begun <= 10 * (now() - start) + 1);
+    options.user = &seen;
+    options.quality = BTH_QUALITY_FAST;
+
     /* Free directions. */
     options.free_directions = 9;
     CHECK(bth_compile_mesh(&mesh, &options, &bytes) == BTH_COMPILE_ERROR_ARGUMENT && strstr(bth_compile_last_error(), "9"));
@@ -131,6 +158,28 @@ int main(int argc, char **argv) {
     CHECK(strstr(bth_compile_last_error(), "instance 1"));
     options.quality = 9;
     CHECK(bth_compile_mesh(&mesh, &options, &bytes) == BTH_COMPILE_ERROR_ARGUMENT);
+    CHECK(strcmp(bth_compile_last_error(), "options: quality: expected 0, 1 or 2, found 9") == 0);
+    options.quality = BTH_QUALITY_FAST;
+    positions[1] = 0;
+    options.cache = "";
+    CHECK(bth_compile_mesh(&mesh, &options, &bytes) == BTH_COMPILE_ERROR_ARGUMENT && strstr(bth_compile_last_error(), "cache"));
+    options.cache = NULL;
+    options.tetgen = "\xff";
+    CHECK(bth_compile_mesh(&mesh, &options, &bytes) == BTH_COMPILE_ERROR_ARGUMENT && strstr(bth_compile_last_error(), "tetgen"));
+
+    options.tetgen = NULL;
+    options.flags = BTH_COMPILE_DEFORMABLE | BTH_COMPILE_NO_GEOMETRY;
+    CHECK(bth_compile_mesh(&mesh, &options, &bytes) == BTH_COMPILE_ERROR_ARGUMENT && strstr(bth_compile_last_error(), "BTH-L033"));
+    options.flags = 0;
+
+    /* A program that is named but absent is told, where it would be used. */
+    options.tetgen = "/absent/bth-tetgen";
+    options.warning = warning;
+    CHECK(bth_compile_mesh(&mesh, &options, &bytes) == BTH_COMPILE_OK && seen.warnings == 0);
+    bth_free_bytes(&bytes);
+    options.structure = BTH_STRUCTURE_BTH;
+    CHECK(bth_compile_mesh(&mesh, &options, &bytes) == BTH_COMPILE_OK && seen.warnings == 1);
+    bth_free_bytes(&bytes);
     CHECK(bth_compile_mesh(NULL, NULL, &bytes) == BTH_COMPILE_ERROR_ARGUMENT);
     CHECK(bth_compile_mesh(&mesh, NULL, NULL) == BTH_COMPILE_ERROR_ARGUMENT);
     bth_mesh none = {NULL, 0, NULL, 5};

@@ -15,7 +15,8 @@ extern "C" {
 
 /* Results of functions. */
 #define BTH_COMPILE_OK 0
-#define BTH_COMPILE_ERROR_ARGUMENT (-1)  /* a null pointer, an unknown option, a path that is not UTF-8 */
+#define BTH_COMPILE_ERROR_ARGUMENT (-1)  /* a null pointer, an unknown option, options that exclude each other, a path
+                                            that is empty or not UTF-8 */
 #define BTH_COMPILE_ERROR_FILE (-2)      /* the cache or the profile could not be read or written */
 #define BTH_COMPILE_ERROR_INPUT (-3)     /* the triangles cannot be used: an index out of range, a position that is not finite */
 #define BTH_COMPILE_ERROR_LIMIT (-4)     /* beyond a limit of the file format */
@@ -66,7 +67,7 @@ typedef struct {
     uint32_t threads;          /* 0 for one per processor; the result does not depend on it */
     uint32_t free_directions;  /* BTH_FREE_...; BTH_FREE_NONE for a deformable mesh */
     const char *cache;         /* folder of a cache of results, UTF-8; null for none */
-    const char *tetgen;        /* path of the program bth-tetgen, UTF-8; null to search for it */
+    const char *tetgen;        /* path of the program bth-tetgen, UTF-8; null to search for it. If there is none, a warning says so */
     bth_progress progress;     /* null for none */
     bth_warning warning;       /* null for none */
     void *user;                /* passed to both */
@@ -83,7 +84,8 @@ typedef struct {
 
 /* A mesh of a scene at a place in the world. */
 typedef struct {
-    double to_world[3][4]; /* rows, applied to columns (x, y, z, 1); finite; invertible, or all zeros for an invisible instance */
+    double to_world[3][4]; /* rows, applied to columns (x, y, z, 1); finite; invertible, or zeros but for the last column for an
+                              invisible instance */
     uint32_t mesh;         /* row of the mesh */
     uint32_t reserved;     /* 0 */
 } bth_mesh_instance;

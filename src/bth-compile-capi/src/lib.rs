@@ -8,7 +8,7 @@ pub mod options;
 use bth_cache::{DEFAULT_CAP, Store};
 use compiler::cached::Cache;
 use compiler::memory::{self, Instance, TriangleMesh};
-use compiler::pipeline::CompileOptions;
+use compiler::pipeline::{CompileOptions, Structure};
 use compiler::write::Content;
 use compiler::{Error, Monitor};
 use monitor::Callbacks;
@@ -44,6 +44,8 @@ impl From<Error> for Failure {
         let code = match &error {
             Error::Input { .. } => ERROR_INPUT,
             Error::File { .. } => ERROR_FILE,
+            // Options that exclude each other.
+            Error::Limit { code: "BTH-L033", .. } => ERROR_ARGUMENT,
             Error::Limit { .. } => ERROR_LIMIT,
             Error::Internal { .. } => ERROR_INTERNAL,
             Error::Cancelled => ERROR_CANCELLED,
@@ -206,12 +208,22 @@ unsafe fn with_bytes<T: Sync>(
         // SAFETY: by contract its paths are null or C strings.
         let (chosen, folder) = unsafe { (options.compiler()?, options.cache()?) };
         let store = folder.map(|folder| {
-            let cannot = |e| Failure(ERROR_FILE, format!("{}: cannot be a cache: {e}", folder.display()));
+            let cannot = |e| {
+                let hint = "hint: name a folder that can be made and written to, or null";
+                Failure(ERROR_FILE, format!("{}: cannot be a cache: {e} ({hint})", folder.display()))
+            };
             Store::open(&folder, DEFAULT_CAP).map_err(cannot)
         });
         let store = store.transpose()?;
         let cache = store.as_ref().map_or_else(Cache::none, |store| Cache::new(store, "memory"));
         let monitor = Callbacks::new(&options);
+        let worker = chosen.tets.worker.as_ref().filter(|_| chosen.structure != Structure::Bvh);
+        if let Some(absent) = worker.filter(|worker| !worker.is_file()) {
+            monitor.warn(&format!(
+                "tetgen: there is no program {}; nothing is tetrahedralized",
+                absent.display()
+            ));
+        }
         let content = in_threads(options.threads, || Ok(compile(&input, &chosen, &cache, &monitor)?))?;
         let content = content.ok_or_else(|| Failure(ERROR_INTERNAL, "no content".into()))?;
         let made = content.bytes().map_err(|e| Failure(ERROR_FILE, e.to_string()))?;

@@ -5,6 +5,10 @@ use compiler::Monitor;
 use std::ffi::{CString, c_void};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError, TryLockError};
+use std::time::{Duration, Instant};
+
+/// Least time between two calls of the progress function within a stage. Stages ask some thousand times a second whether they are cancelled.
+const INTERVAL: Duration = Duration::from_millis(100);
 
 /// Calls the functions of C one at a time.
 pub(crate) struct Callbacks {
@@ -20,6 +24,8 @@ struct State {
     stage: CString,
     total: u64,
     user: *mut c_void,
+    /// When the progress function was last called.
+    reported: Instant,
 }
 
 // SAFETY: `user` is the only field that is not `Send`. It is only passed to the caller's functions, which by the contract of
@@ -31,18 +37,31 @@ impl Callbacks {
         Self {
             progress: options.progress,
             warning: options.warning,
-            state: Mutex::new(State { stage: CString::default(), total: 0, user: options.user }),
+            state: Mutex::new(State {
+                stage: CString::default(),
+                total: 0,
+                user: options.user,
+                reported: Instant::now(),
+            }),
             done: AtomicU64::new(0),
             cancelled: AtomicBool::new(false),
         }
     }
 
-    fn report(&self, state: &State) {
+    fn report(&self, state: &mut State) {
         let Some(progress) = self.progress else { return };
         let done = self.done.load(Ordering::Relaxed);
         // SAFETY: the caller gave a function of this type; the name lives until it returns.
         if unsafe { progress(state.user, state.stage.as_ptr(), done, state.total) } != 0 {
             self.cancelled.store(true, Ordering::Relaxed);
+        }
+        state.reported = Instant::now();
+    }
+
+    /// Calls the progress function if the last call is long enough ago.
+    fn report_again(&self, state: &mut State) {
+        if state.reported.elapsed() >= INTERVAL {
+            self.report(state);
         }
     }
 }
@@ -53,7 +72,7 @@ impl Monitor for Callbacks {
         state.stage = CString::new(name).unwrap_or_default();
         state.total = total.unwrap_or(0);
         self.done.store(0, Ordering::Relaxed);
-        self.report(&state);
+        self.report(&mut state);
     }
 
     fn advance(&self, units: u64) {
@@ -64,8 +83,8 @@ impl Monitor for Callbacks {
         if !self.cancelled.load(Ordering::Relaxed) {
             // While another thread is in a callback this one does not wait for it.
             match self.state.try_lock() {
-                Ok(state) => self.report(&state),
-                Err(TryLockError::Poisoned(state)) => self.report(&state.into_inner()),
+                Ok(mut state) => self.report_again(&mut state),
+                Err(TryLockError::Poisoned(state)) => self.report_again(&mut state.into_inner()),
                 Err(TryLockError::WouldBlock) => {}
             }
         }

@@ -63,12 +63,14 @@ impl Options {
     /// # Safety
     /// `tetgen` is null or points to a C string.
     pub(crate) unsafe fn compiler(&self) -> Result<CompileOptions, Failure> {
-        let unknown = |what: &str, value: u32| Err(argument(format!("unknown {what} {value}")));
+        let unknown = |option: &str, expected: &str, found: u32| {
+            Err(argument(format!("options: {option}: expected {expected}, found {found}")))
+        };
         let structure = match self.structure {
             0 => Structure::Bth,
             1 => Structure::Bvh,
             2 => Structure::Tets,
-            other => return unknown("structure", other),
+            other => return unknown("structure", "0, 1 or 2", other),
         };
         let deformable = self.flags & DEFORMABLE != 0;
         let mut options = CompileOptions {
@@ -83,37 +85,40 @@ impl Options {
             0 => Quality::Balanced,
             1 => Quality::Fast,
             2 => Quality::Best,
-            other => return unknown("quality", other),
+            other => return unknown("quality", "0, 1 or 2", other),
         };
         options.coordinates.bits = match self.coordinate_bits {
             0 => None,
             16 => Some(GridBits::B16),
             21 => Some(GridBits::B21),
-            other => return unknown("number of bits of a coordinate:", other),
+            other => return unknown("coordinate_bits", "0, 16 or 21", other),
         };
         options.coordinates.max_error = match self.max_error {
             0.0 => None,
             limit if limit.is_finite() && limit > 0.0 => Some(MaxError::Absolute(limit)),
-            limit => return Err(argument(format!("max_error must be 0 or above, found {limit}"))),
+            limit => {
+                let text = format!("options: max_error: expected a finite number from 0 on, found {limit}");
+                return Err(argument(text));
+            }
         };
         if self.flags & BYTE_BOXES != 0 {
             options.coordinates.boxes = Boxes::Bytes;
         }
         if self.flags & !(NO_GEOMETRY | BYTE_BOXES | DEFORMABLE) != 0 {
-            return unknown("flags", self.flags);
+            return unknown("flags", "a sum of 1, 2 and 4", self.flags);
         }
         options.free.keep = match self.free_directions {
             0 => KeepFree::None,
             1 => KeepFree::Auto,
             2 => KeepFree::Distances,
             3 => KeepFree::All,
-            other => return unknown("choice of free directions:", other),
+            other => return unknown("free_directions", "0 to 3", other),
         };
         if self.threads > MOST_THREADS {
-            return unknown("number of threads", self.threads);
+            return unknown("threads", &format!("at most {MOST_THREADS}"), self.threads);
         }
         // SAFETY: the contract of this function is that of `path`.
-        options.tets.worker = unsafe { path(self.tetgen) }?;
+        options.tets.worker = unsafe { path(self.tetgen, "tetgen") }?;
         Ok(options)
     }
 
@@ -123,19 +128,26 @@ impl Options {
     /// `cache` is null or points to a C string.
     pub(crate) unsafe fn cache(&self) -> Result<Option<PathBuf>, Failure> {
         // SAFETY: the contract of this function is that of `path`.
-        unsafe { path(self.cache) }
+        unsafe { path(self.cache, "cache") }
     }
 }
 
-/// A path in UTF-8, or none.
+/// A path in UTF-8, or none. An empty one would name the current folder, which nobody means.
 ///
 /// # Safety
 /// `text` is null or points to a C string.
-unsafe fn path(text: *const c_char) -> Result<Option<PathBuf>, Failure> {
+unsafe fn path(text: *const c_char, option: &str) -> Result<Option<PathBuf>, Failure> {
     if text.is_null() {
         return Ok(None);
     }
     // SAFETY: it is not null, so by contract it points to a C string.
-    let text = unsafe { CStr::from_ptr(text) }.to_str();
-    text.map(|text| Some(text.into())).map_err(|_| argument("a path is not UTF-8".to_owned()))
+    let text = unsafe { CStr::from_ptr(text) };
+    match text.to_str() {
+        Ok("") => Err(argument(format!("options: {option}: expected a path or null, found an empty path"))),
+        Ok(text) => Ok(Some(text.into())),
+        Err(_) => {
+            let found = String::from_utf8_lossy(text.to_bytes());
+            Err(argument(format!("options: {option}: expected a path in UTF-8, found {found:?}")))
+        }
+    }
 }

@@ -123,7 +123,12 @@ int main(int argc, char **argv) {
     } catch (const bth::error &e) {
         caught += e.code() == BTH_ERROR_ARGUMENT;
     }
+    try {
+        bth::scene::open(std::string(argc > 1 ? argv[1] : "") + '\0' + ".bth");
+    } catch (const bth::error &e) {
+        caught += e.code() == BTH_ERROR_ARGUMENT;
+    }
     scene.nearest(nullptr, nullptr, 0);
-    CHECK(caught == 4 && scene.any(down));
+    CHECK(caught == 5 && scene.any(down));
     return 0;
 }

@@ -122,10 +122,10 @@ public:
     }
 
     /* The same with positions at a share of the way between those at two times; see bth_set_positions_between. */
-    bth_update set_positions_between(std::uint32_t object, const float *open, const float *close, std::size_t count,
+    bth_update set_positions_between(std::uint32_t object, const float *first, const float *last, std::size_t count,
                                      double share) {
         bth_update update;
-        const float *const ends[2] = {open, close};
+        const float *const ends[2] = {first, last};
         check(bth_set_positions_between(get(), object, ends, count, share, &update));
         return update;
     }
@@ -273,6 +273,8 @@ private:
     }
 
     static scene open(const std::string &path, std::uint32_t flags) {
+        /* bth_open would end the path there and open another file. */
+        if (path.find('\0') != std::string::npos) throw error(BTH_ERROR_ARGUMENT, "the path holds a zero byte");
         bth_scene *opened = nullptr;
         check(bth_open(path.c_str(), flags, &opened));
         return scene(opened);

@@ -182,7 +182,8 @@ pub unsafe extern "C" fn bth_builder_set_transforms(
 ) -> i32 {
     let name = "bth_builder_set_transforms";
     if count == 0 {
-        return OK;
+        // SAFETY: the contract of `with` is part of that of this function.
+        return unsafe { with(builder, name, |_| Ok(())) };
     }
     if instances.is_null() || transforms.is_null() {
         return null(name, "instances and transforms");

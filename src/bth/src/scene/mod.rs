@@ -22,8 +22,9 @@ use std::path::Path;
 ///
 /// Results are exact: a ray hits a closed triangle if and only if its line intersects the triangle in real arithmetic at a t
 /// that, rounded to f32 as reported, lies in the closed interval from `tmin` to `tmax`. Lines in the plane of a triangle do not
-/// hit it. Among hits of equal t in an object the triangle of least id is reported. Results depend neither on hints nor on the
-/// acceleration structures in the file. In a file with scene sections, a ray is first transformed into the object's space, where
+/// hit it. Hits in an object are ordered by t in f64, which is within 2^-28 of the exact one; among equal ones the triangle of
+/// least id is reported. Results depend neither on hints nor on the acceleration structures in the file. In a file with scene
+/// sections, a ray is first transformed into the object's space, where
 /// each component of its origin and direction is rounded to f32 (relative error 2^-24). Among hits of equal t in several
 /// instances that of least index is reported.
 ///

@@ -211,11 +211,9 @@ fn tetrahedra_move_with_the_surface_or_stand_aside() {
             let moved = |(row, p): (usize, &[f32; 3])| [p[0], p[1], p[2] + if row == 3 { z } else { 0.0 }];
             let moved: Vec<_> = rest.iter().enumerate().map(moved).collect();
             let update = scene.set_positions(0, &moved).unwrap();
-            assert_eq!(
-                (update.tet_leaves_in_use, update.tet_leaves_aside),
-                (in_use, 2 - in_use),
-                "{name}, {z}"
-            );
+            // The feature `small` uses no hints, and so no tetrahedra under objects that deform.
+            let expected = if cfg!(feature = "small") { (0, 0) } else { (in_use, 2 - in_use) };
+            assert_eq!((update.tet_leaves_in_use, update.tet_leaves_aside), expected, "{name}, {z}");
             trace(&scene);
         }
     }

@@ -5,13 +5,17 @@
 //! are not supported, the bytes go to a hidden file in the target's folder; it is removed on failure. A
 //! file left by a killed program is removed by the next write to the same target, which finds it unlocked.
 
-use std::ffi::OsString;
+use crate::Digest;
+use std::ffi::{OsStr, OsString};
 use std::fs::File;
 use std::io::{BufWriter, Error as IoError, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 /// End of the names of unfinished files.
 pub const SUFFIX: &str = ".bth-part";
+/// Longest name of a target that its hidden names contain, in bytes. Most file systems take 255 bytes, and a hidden name is longer than
+/// the target's.
+const LONGEST: usize = 200;
 
 /// Writes a file that is whole or absent, replacing one of that name; it is on the disk on return.
 ///
@@ -42,13 +46,18 @@ pub fn replace_file(
     if std::fs::metadata(path).is_ok_and(|m| !m.is_file()) {
         return Err(IoError::new(ErrorKind::InvalidInput, "the target exists and is not a regular file"));
     }
+    // Renaming over a link such as /dev/stdout would take it away from all programs.
+    if std::fs::read_link(path).is_ok_and(|to| to.starts_with("/proc")) {
+        return Err(IoError::new(
+            ErrorKind::InvalidInput,
+            "the target leads to a file that a program has open",
+        ));
+    }
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
-    let mut prefix = OsString::from(".");
-    prefix.push(name);
-    prefix.push(".");
+    let prefix = prefix_of(name);
     remove_stale(folder, &prefix);
 
     let (mut file, named) = create(folder, &prefix, 0o666)?;
@@ -77,10 +86,7 @@ pub fn write_once(path: &Path, bytes: &[u8]) -> std::io::Result<bool> {
     let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else {
         return Err(IoError::new(ErrorKind::InvalidInput, "not the name of a file"));
     };
-    let mut prefix = OsString::from(".");
-    prefix.push(name);
-    prefix.push(".");
-    let (mut file, named) = create(folder, &prefix, 0o444)?;
+    let (mut file, named) = create(folder, &prefix_of(name), 0o444)?;
     file.write_all(bytes)?;
     let linked = match &named {
         None => link_to(&file, path),
@@ -105,6 +111,17 @@ impl Drop for Named {
     }
 }
 
+/// Beginning of the hidden names of a target: its name, or the hash of a long one.
+fn prefix_of(name: &OsStr) -> OsString {
+    let mut prefix = OsString::from(".");
+    match name.len() > LONGEST {
+        true => prefix.push(Digest::of(name.as_encoded_bytes()).hex()),
+        false => prefix.push(name),
+    }
+    prefix.push(".");
+    prefix
+}
+
 /// A locked file to write to, and its name if it needs one.
 fn create(folder: &Path, prefix: &OsString, mode: u32) -> std::io::Result<(File, Option<Named>)> {
     let mut options = std::fs::OpenOptions::new();
@@ -119,6 +136,8 @@ fn create(folder: &Path, prefix: &OsString, mode: u32) -> std::io::Result<(File,
         let nameless = options.clone().custom_flags(libc::O_TMPFILE).open(folder);
         if let Ok(file) = nameless
             && file.try_lock().is_ok()
+            // Without /proc it could not get a name.
+            && std::fs::metadata(name_in_proc(&file)).is_ok()
         {
             return Ok((file, None));
         }
@@ -140,9 +159,14 @@ fn link(file: &File, folder: &Path, prefix: &OsString) -> std::io::Result<Named>
 #[cfg(target_os = "linux")]
 fn link_to(file: &File, path: &Path) -> std::io::Result<()> {
     use rustix::fs::{AtFlags, CWD, linkat};
+    Ok(linkat(CWD, name_in_proc(file).as_str(), CWD, path, AtFlags::SYMLINK_FOLLOW)?)
+}
+
+/// Where /proc shows an open file.
+#[cfg(target_os = "linux")]
+fn name_in_proc(file: &File) -> String {
     use std::os::fd::AsRawFd;
-    let nameless = format!("/proc/self/fd/{}", file.as_raw_fd());
-    Ok(linkat(CWD, nameless.as_str(), CWD, path, AtFlags::SYMLINK_FOLLOW)?)
+    format!("/proc/self/fd/{}", file.as_raw_fd())
 }
 
 #[cfg(not(target_os = "linux"))]
@@ -296,6 +320,34 @@ mod tests {
         assert_eq!(std::fs::read(&path).unwrap(), b"first");
         assert!(std::fs::metadata(&path).unwrap().permissions().readonly());
         assert_eq!(names(folder.path()), ["a"]);
+    }
+
+    #[test]
+    fn names_may_be_as_long_as_the_file_system_takes() {
+        let folder = tempfile::tempdir().unwrap();
+        let name = "n".repeat(251) + ".bth";
+        write(&folder.path().join(&name), b"first").unwrap();
+        write(&folder.path().join(&name), b"second").unwrap();
+        assert!(write_once(&folder.path().join("o".repeat(255)), b"once").unwrap());
+        assert_eq!(names(folder.path()), [name.as_str(), "o".repeat(255).as_str()]);
+        // What a killed program left of a long name is found, too.
+        let mut stale = prefix_of(OsStr::new(&name));
+        stale.push(format!("1-0{SUFFIX}"));
+        std::fs::write(folder.path().join(&stale), b"half").unwrap();
+        write(&folder.path().join(&name), b"third").unwrap();
+        assert!(!folder.path().join(&stale).exists());
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn links_to_open_files_are_not_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let (out, link) = (folder.path().join("out"), folder.path().join("stdout"));
+        let file = File::create(&out).unwrap();
+        std::os::unix::fs::symlink(name_in_proc(&file), &link).unwrap();
+        assert!(write(&link, b"x").is_err());
+        assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(names(folder.path()), ["out", "stdout"]);
     }
 
     #[test]

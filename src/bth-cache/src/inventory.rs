@@ -5,6 +5,8 @@ use crate::files::{named, remove};
 use crate::{Digest, Record, Statistics, Store};
 use serde::Serialize;
 use std::collections::{BTreeMap, HashSet};
+use std::io::{Error, ErrorKind};
+use std::path::Path;
 use std::time::SystemTime;
 
 /// A record and the state of its content.
@@ -53,8 +55,39 @@ pub struct Verification {
     pub bytes: u64,
     /// Damaged records and contents, which were removed.
     pub damaged: Vec<String>,
+    /// Damaged records and contents that could not be removed, and those that may not be read, each with the reason.
+    pub not_removed: Vec<String>,
     /// Files left by killed processes, which were removed.
     pub leftovers: u64,
+}
+
+impl Verification {
+    /// Whether nothing is damaged.
+    pub fn is_clean(&self) -> bool {
+        self.damaged.is_empty() && self.not_removed.is_empty()
+    }
+
+    /// Removes and lists what is damaged.
+    fn remove(&mut self, path: &Path) {
+        match std::fs::remove_file(path) {
+            Ok(()) => self.damaged.push(path.display().to_string()),
+            // Another process found it, too.
+            Err(e) if e.kind() == ErrorKind::NotFound => {}
+            Err(e) => self.not_removed.push(format!("{}: cannot be removed: {e}", path.display())),
+        }
+    }
+
+    /// Removes and lists what cannot be read, unless another user may read it.
+    fn unreadable(&mut self, path: &Path, error: &Error) {
+        match error.kind() {
+            // It was evicted meanwhile.
+            ErrorKind::NotFound => {}
+            ErrorKind::PermissionDenied => {
+                self.not_removed.push(format!("{}: cannot be read: {error}", path.display()));
+            }
+            _ => self.remove(path),
+        }
+    }
 }
 
 impl Store {
@@ -103,29 +136,38 @@ impl Store {
         let mut found = Verification { leftovers: sweep(&self.files), ..Verification::default() };
         for entry in self.files.below("keys") {
             let (path, id) = (entry.path(), named(&entry.path()));
-            // It may have been evicted meanwhile.
-            let Ok(text) = std::fs::read(&path) else { continue };
+            let text = match std::fs::read(&path) {
+                Ok(text) => text,
+                Err(e) => {
+                    found.unreadable(&path, &e);
+                    continue;
+                }
+            };
             found.records += 1;
             found.bytes += text.len() as u64;
-            if id.is_none_or(|id| Record::from_text(&text, &id).is_err()) && remove(&path) {
-                found.damaged.push(path.display().to_string());
+            if id.is_none_or(|id| Record::from_text(&text, &id).is_err()) {
+                found.remove(&path);
             }
         }
         for entry in self.files.below("blobs") {
             let path = entry.path();
-            let Ok((digest, bytes)) = std::fs::File::open(&path).and_then(Digest::of_reader) else {
-                continue;
+            let (digest, bytes) = match std::fs::File::open(&path).and_then(Digest::of_reader) {
+                Ok(read) => read,
+                Err(e) => {
+                    found.unreadable(&path, &e);
+                    continue;
+                }
             };
             found.contents += 1;
             found.bytes += bytes;
-            if named(&path) != Some(digest) && remove(&path) {
-                found.damaged.push(path.display().to_string());
+            if named(&path) != Some(digest) {
+                found.remove(&path);
             }
             if !go_on(bytes) {
                 break;
             }
         }
-        for path in &found.damaged {
+        for path in found.damaged.iter().chain(&found.not_removed) {
             self.damaged(path, "found by verification");
         }
         self.flush();

@@ -6,6 +6,7 @@ use crate::lock::{WorkLock, same_file};
 use crate::{Digest, Key, Record, Remote, Statistics, last_keys};
 use bth_files::write_once;
 use serde_json::Value;
+use std::collections::HashSet;
 use std::fs::File;
 use std::io::{ErrorKind, Result};
 use std::path::{Path, PathBuf};
@@ -18,12 +19,17 @@ const SHARE: u64 = 64;
 /// Longest time between evictions by any process.
 const LONG_UNCHECKED: Duration = Duration::from_secs(600);
 
+/// What is wrong with a content that was changed.
+const OTHER_HASH: &str = "its bytes do not have the hash that names it";
+
 /// A store; see the crate's page.
 pub struct Store {
     folder: PathBuf,
     pub(crate) files: Files,
     pub(crate) cap: u64,
     remote: Mutex<Option<Box<dyn Remote>>>,
+    /// Names of contents in the shared store that were found damaged, and are replaced when they are made again.
+    damaged_there: Mutex<HashSet<String>>,
     notes: Mutex<Vec<String>>,
     statistics: Mutex<Statistics>,
     written: AtomicU64,
@@ -48,6 +54,7 @@ impl Store {
             files: Files::open(folder)?,
             cap,
             remote: Mutex::new(None),
+            damaged_there: Mutex::default(),
             notes: Mutex::default(),
             statistics: Mutex::default(),
             written: AtomicU64::new(0),
@@ -103,10 +110,12 @@ impl Store {
                 touch(&path);
                 return Some(bytes);
             }
-            self.drop_damaged(&path, "its bytes do not have the hash that names it");
+            self.drop_damaged(&path, OTHER_HASH);
         }
-        let bytes = self.fetch(&name("blobs", &record.blob))?;
+        let there = name("blobs", &record.blob);
+        let bytes = self.fetch(&there)?;
         if Digest::of(&bytes) != record.blob {
+            lock(&self.damaged_there).insert(there);
             self.damaged(
                 &format!("content {} of the shared store", record.blob.hex()),
                 "it has another hash",
@@ -153,7 +162,7 @@ impl Store {
                             touch(&path);
                             return Some(Pin { path, _file: file });
                         }
-                        _ => self.drop_damaged(&path, "its bytes do not have the hash that names it"),
+                        _ => self.drop_damaged(&path, OTHER_HASH),
                     }
                 }
             }
@@ -185,7 +194,9 @@ impl Store {
     /// When it cannot be written; the store is then as it was.
     pub fn put(&self, key: &Key, bytes: &[u8], report: Value) -> Result<Record> {
         let (record, text) = self.put_both(key, bytes, report)?;
-        self.share(&name("blobs", &record.blob), bytes, false);
+        let there = name("blobs", &record.blob);
+        let is_damaged = lock(&self.damaged_there).remove(&there);
+        self.share(&there, bytes, is_damaged);
         self.share(&name("keys", &key.id()), text.as_bytes(), true);
         Ok(record)
     }
@@ -221,9 +232,20 @@ impl Store {
     fn put_content(&self, record: &Record, bytes: &[u8]) -> Result<()> {
         let blob = self.files.blob(&record.blob);
         let mut new = self.write(&blob, bytes)?;
-        if !new && std::fs::metadata(&blob).is_ok_and(|m| m.len() != record.bytes) {
-            remove(&blob);
-            new = self.write(&blob, bytes)?;
+        if !new {
+            match File::open(&blob).and_then(Digest::of_reader) {
+                Ok((digest, _)) if digest == record.blob => {}
+                // It was evicted meanwhile.
+                Err(e) if e.kind() == ErrorKind::NotFound => new = self.write(&blob, bytes)?,
+                found => {
+                    let why = match found {
+                        Ok(_) => OTHER_HASH,
+                        Err(_) => "it cannot be read",
+                    };
+                    self.drop_damaged(&blob, why);
+                    new = self.write(&blob, bytes)?;
+                }
+            }
         }
         touch(&blob);
         if new {

@@ -1,5 +1,6 @@
 //! What the store guarantees: damage is detected, the size limit holds, entries in use are kept, and a failing shared store
 //! does no harm.
+#![allow(clippy::print_stdout)]
 
 use bth_cache::{Digest, Folder, Key, Record, Store};
 use serde_json::json;
@@ -119,6 +120,48 @@ fn damage_is_noticed_before_a_content_is_mapped_and_by_verification() {
 }
 
 #[test]
+fn a_content_that_is_put_takes_the_place_of_a_damaged_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path(), LARGE).unwrap();
+    let record = put(&store, "a", 500);
+    // A record is lost, and its content changed without another length.
+    let [path] = files(&folder.path().join("v1/keys")).try_into().unwrap();
+    std::fs::remove_file(path).unwrap();
+    overwrite(&store.path(&record), &content("b", 500));
+    assert_eq!(put(&store, "a", 500), record);
+    assert_eq!(std::fs::read(store.path(&record)).unwrap(), content("a", 500));
+    assert!(store.take_notes()[0].contains("damaged"));
+}
+
+#[cfg(unix)]
+#[test]
+fn verification_tells_what_it_cannot_read_or_remove() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path(), LARGE).unwrap();
+    let records = ["a", "b"].map(|name| put(&store, name, 500));
+    overwrite(&store.path(&records[0]), &content("b", 500));
+    let mode = |path: &Path, mode: u32| {
+        std::fs::set_permissions(path, std::fs::Permissions::from_mode(mode)).unwrap();
+    };
+    let kept = store.path(&records[0]).parent().unwrap().to_owned();
+    mode(&kept, 0o555);
+    mode(&store.path(&records[1]), 0);
+    if std::fs::read(store.path(&records[1])).is_ok() {
+        println!("skipped: rights do not count for this user");
+        mode(&kept, 0o755);
+        return;
+    }
+    let verdict = store.verify(&|_| true);
+    assert!(verdict.damaged.is_empty() && !verdict.is_clean());
+    let mut told = verdict.not_removed;
+    told.sort_by_key(|text| text.contains("cannot be read"));
+    assert!(told[0].contains("cannot be removed") && told[1].contains("cannot be read"), "{told:?}");
+    mode(&kept, 0o755);
+    assert_eq!(store.verify(&|_| true).damaged.len(), 1);
+}
+
+#[test]
 fn what_was_used_longest_ago_goes_first_and_never_what_is_in_use() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path(), LARGE).unwrap();
@@ -218,6 +261,12 @@ fn a_shared_folder_is_read_through_with_a_local_copy() {
     assert_eq!(store.read(&record), None);
     assert!(store.take_notes()[0].contains("shared store"));
     assert!(files(&four.path().join("v1/blobs")).is_empty());
+
+    // What is made in its place is put there, too, so that the next machine finds it.
+    assert_eq!(put(&store, "a", 2000), record);
+    assert_eq!(std::fs::read(&blob).unwrap(), content("a", 2000));
+    let five = tempfile::tempdir().unwrap();
+    assert_eq!(open(five.path()).read(&record), Some(content("a", 2000)));
 }
 
 #[test]

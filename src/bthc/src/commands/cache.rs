@@ -100,16 +100,17 @@ fn verify(store: &Store, as_json: bool) -> Result<(), Failure> {
     } else {
         let mut text: String =
             verdict.damaged.iter().map(|path| format!("damaged, removed: {path}\n")).collect();
+        text.extend(verdict.not_removed.iter().map(|entry| format!("damaged: {entry}\n")));
         text.push_str(&format!(
             "{} records, {} contents, {}: {} damaged\n",
             count(verdict.records),
             count(verdict.contents),
             bytes(verdict.bytes),
-            count(verdict.damaged.len() as u64)
+            count((verdict.damaged.len() + verdict.not_removed.len()) as u64)
         ));
         output::text(&text)?;
     }
-    if verdict.damaged.is_empty() { Ok(()) } else { Err(Failure::Check) }
+    if verdict.is_clean() { Ok(()) } else { Err(Failure::Check) }
 }
 
 fn path(store: &Store, key: Option<&str>) -> Result<(Value, String), Failure> {

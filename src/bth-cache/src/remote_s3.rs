@@ -4,14 +4,17 @@ use crate::Remote;
 use object_store::aws::{AmazonS3, AmazonS3Builder};
 use object_store::path::Path;
 use object_store::{ClientOptions, ObjectStoreExt, RetryConfig};
-use std::io::{Error, Result};
+use std::io::{Error, ErrorKind, Result};
 use std::time::Duration;
 use tokio::runtime::Runtime;
+use tokio::time::timeout;
 
 /// Time limits of one try and of all tries together: a machine that is offline goes on without the store soon.
 const CONNECT: Duration = Duration::from_secs(5);
 const TRIES: usize = 2;
 const ALL_TRIES: Duration = Duration::from_secs(30);
+/// Least bytes a second of a transfer: a slower server counts as one that does not answer.
+const SLOWEST: u64 = 1 << 20;
 
 /// A bucket, or part of one.
 #[derive(Debug)]
@@ -30,7 +33,9 @@ impl S3 {
     /// When it is no such place, or a variable is none.
     pub fn open(url: &str) -> Result<Self> {
         let prefix = url.strip_prefix("s3://").and_then(|rest| rest.split_once('/')).map_or("", |(_, p)| p);
-        let options = ClientOptions::new().with_connect_timeout(CONNECT).with_allow_http(allow_http());
+        // The client's own limit is one for a whole transfer of any size.
+        let options = ClientOptions::new().with_connect_timeout(CONNECT).with_timeout_disabled();
+        let options = options.with_allow_http(allow_http());
         let retry = RetryConfig { max_retries: TRIES, retry_timeout: ALL_TRIES, ..RetryConfig::default() };
         let bucket = AmazonS3Builder::from_env().with_url(url).with_retry(retry).with_client_options(options);
         Ok(Self {
@@ -48,27 +53,40 @@ impl S3 {
 
 impl Remote for S3 {
     fn get(&self, name: &str) -> Result<Option<Vec<u8>>> {
-        let got = self.runtime.block_on(async {
-            let found = self.bucket.get(&self.place(name)).await?;
-            found.bytes().await
-        });
-        match got {
-            Ok(bytes) => Ok(Some(bytes.into())),
-            Err(object_store::Error::NotFound { .. }) => Ok(None),
-            Err(e) => Err(Error::other(e)),
-        }
+        self.runtime.block_on(async {
+            let found = match timeout(ALL_TRIES, self.bucket.get(&self.place(name))).await? {
+                Err(object_store::Error::NotFound { .. }) => return Ok(None),
+                found => found.map_err(Error::other)?,
+            };
+            let size = found.meta.size;
+            // The client takes memory for as many bytes as the server says, and ends the program where there is none.
+            let has_memory =
+                usize::try_from(size).is_ok_and(|n| Vec::<u8>::new().try_reserve_exact(n).is_ok());
+            if !has_memory {
+                return Err(Error::new(ErrorKind::OutOfMemory, format!("{name} has {size} bytes")));
+            }
+            let bytes = timeout(limit(size), found.bytes()).await?;
+            bytes.map(|bytes| Some(bytes.into())).map_err(Error::other)
+        })
     }
 
     fn put(&self, name: &str, bytes: &[u8], _over: bool) -> Result<()> {
         // What is there under the name of a content is that content: writing it again changes nothing.
         let place = self.place(name);
-        let put = self.bucket.put(&place, bytes.to_vec().into());
-        self.runtime.block_on(put).map(|_| ()).map_err(Error::other)
+        self.runtime.block_on(async {
+            let put = self.bucket.put(&place, bytes.to_vec().into());
+            timeout(limit(bytes.len() as u64), put).await?.map(|_| ()).map_err(Error::other)
+        })
     }
 
     fn name(&self) -> String {
         self.url.clone()
     }
+}
+
+/// Longest time of a transfer.
+fn limit(bytes: u64) -> Duration {
+    ALL_TRIES + Duration::from_secs(bytes / SLOWEST)
 }
 
 /// Options of the client override the environment, so the variable is read here.

@@ -23,17 +23,23 @@ fn main() -> ExitCode {
         Ok(args) => args,
         Err(error) => return failure::usage(&error, wants_json),
     };
-    match run(args) {
+    let done = std::panic::catch_unwind(|| run(args, wants_json)).unwrap_or_else(|panic| {
+        // The message was printed when it was raised.
+        let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+        let message = text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default();
+        Err(bth_compile::Error::Internal { code: "BTH-X090", message: format!("panicked: {message}") }.into())
+    });
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(wants_json),
     }
 }
 
-fn run(args: args::Args) -> Result<(), failure::Failure> {
+fn run(args: args::Args, wants_json: bool) -> Result<(), failure::Failure> {
     choose_isa(args.isa)?;
     match args.command {
         _ if args.version => version::show(args.verbose),
-        Some(command) => commands::run(command),
+        Some(command) => commands::run(command, wants_json),
         None => Err(failure::Failure::Usage {
             message: "expected a command".to_owned(),
             hint: "see `bthc --help`",

@@ -1,11 +1,26 @@
 //! Standard output and standard error.
 
 use serde::Serialize;
-use std::io::{Result, Write};
+use std::io::{Result, StdoutLock, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Whether something was printed on standard output, or is being printed.
+static BEGUN: AtomicBool = AtomicBool::new(false);
+
+/// Whether something was printed on standard output, or is being printed.
+pub(crate) fn has_begun() -> bool {
+    BEGUN.load(Ordering::Relaxed)
+}
+
+/// Standard output, locked.
+pub(crate) fn stdout() -> StdoutLock<'static> {
+    BEGUN.store(true, Ordering::Relaxed);
+    std::io::stdout().lock()
+}
 
 /// Prints text as it is.
 pub(crate) fn text(text: &str) -> Result<()> {
-    let mut out = std::io::stdout().lock();
+    let mut out = stdout();
     out.write_all(text.as_bytes())?;
     out.flush()
 }

@@ -1,20 +1,31 @@
 //! Progress on a terminal, and cancellation by Ctrl-C.
 
+use crate::failure::Failure;
+use crate::output;
 use bth_compile::Monitor;
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Set by Ctrl-C; stages poll it a few times a second.
 static CANCELLED: AtomicBool = AtomicBool::new(false);
+/// Values of [`Progress`] that live: while there is one, stages poll [`CANCELLED`].
+static POLLERS: AtomicUsize = AtomicUsize::new(0);
 
-/// Makes Ctrl-C stop the compilation cleanly; a second one ends the program at once.
-pub(crate) fn listen_for_interrupts() {
+/// Makes Ctrl-C stop the compilation cleanly; a second one ends the program at once, as does the first where nothing polls for it: while
+/// standard input is read, and in commands without stages.
+pub(crate) fn listen_for_interrupts(wants_json: bool) {
     // Fails only when a handler is there already, and then Ctrl-C works anyway.
-    let _ = ctrlc::set_handler(|| {
-        if CANCELLED.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
+    let _ = ctrlc::set_handler(move || {
+        let again = CANCELLED.swap(true, Ordering::Relaxed);
+        if again || POLLERS.load(Ordering::Relaxed) == 0 {
+            let cancelled = Failure::from(bth_compile::Error::Cancelled);
+            // Who prints already may wait for a reader, and holds the lock of standard output.
+            if !again && !output::has_begun() {
+                cancelled.report(wants_json);
+            }
+            std::process::exit(cancelled.exit_code().into());
         }
     });
 }
@@ -52,6 +63,7 @@ impl Progress {
     pub(crate) fn with_warnings(quiet: bool, warns: bool) -> Self {
         let visible = !quiet && std::io::stderr().is_terminal();
         let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        POLLERS.fetch_add(1, Ordering::Relaxed);
         Self { bar: ProgressBar::with_draw_target(None, target), warns }
     }
 }
@@ -72,7 +84,7 @@ impl Progress {
     pub(crate) fn print(&self, line: &str) {
         // A closed standard output is ignored, since the files are written all the same.
         self.bar.suspend(|| {
-            let _ = crate::output::text(&format!("{line}\n"));
+            let _ = output::text(&format!("{line}\n"));
         });
     }
 }
@@ -101,6 +113,7 @@ impl Monitor for Quiet<'_> {
 impl Drop for Progress {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
+        POLLERS.fetch_sub(1, Ordering::Relaxed);
     }
 }
 

@@ -7,6 +7,9 @@ use bth_format::layout::NONE;
 use std::path::Path;
 
 const HEADER: usize = 16;
+/// The hint for a file of another kind.
+const OTHER_KIND: &str =
+    "name a file of that kind; the section on ray files in docs/reference.md describes them";
 
 /// Reads a `.rays` file: `ox oy oz tmin dx dy dz tmax` as f32.
 pub(crate) fn read_rays(path: &Path) -> Result<Vec<Ray>, Failure> {
@@ -82,7 +85,7 @@ fn read(path: &Path, tag: &[u8; 4], stride: u64) -> Result<Vec<u8>, Failure> {
     let name = String::from_utf8_lossy(tag);
     let Some(start) = data.first_chunk::<HEADER>() else {
         let message = format!("expected a {name} file, found {} bytes", data.len());
-        return Err(Failure::ray_file(path, 0, message, ""));
+        return Err(Failure::ray_file(path, 0, message, OTHER_KIND));
     };
     let [tag_found @ .., _, _, _, _, _, _, _, _, _, _, _, _] = start;
     let version = u32::from_le_bytes([start[4], start[5], start[6], start[7]]);
@@ -91,7 +94,7 @@ fn read(path: &Path, tag: &[u8; 4], stride: u64) -> Result<Vec<u8>, Failure> {
             "expected the tag {name} and version 1, found {:?} and {version}",
             tag_found.escape_ascii().to_string()
         );
-        return Err(Failure::ray_file(path, 0, message, ""));
+        return Err(Failure::ray_file(path, 0, message, OTHER_KIND));
     }
     let mut count = [0; 8];
     count.copy_from_slice(&start[8..]);

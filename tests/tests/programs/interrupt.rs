@@ -61,6 +61,23 @@ fn interrupted_compilation_exits_130_and_leaves_nothing() {
     assert!(interrupted > 0, "no interrupt met the compiler at work");
 }
 
+/// While it waits for standard input, nothing polls.
+#[cfg(unix)]
+#[test]
+fn a_command_that_waits_for_its_input_is_cancelled() {
+    let folder = folder(&[]);
+    let mut command = command("bthc", folder.path(), &["compile", "-", "-o", "a.bth", "--json"]);
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    let sent = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+    let status = wait(&mut child, Duration::from_secs(20)).expect("ends soon after Ctrl-C");
+    assert_eq!(status.code(), Some(130));
+    let json: serde_json::Value = serde_json::from_reader(child.stdout.take().unwrap()).unwrap();
+    assert_eq!(json["error"]["code"], "BTH-C000");
+}
+
 #[test]
 fn compilation_ends_with_its_input_where_that_is_asked_for() {
     let folder = folder(&[("ball.obj", &sphere(160))]);

@@ -138,9 +138,11 @@ fn identify(
 ) -> Result<(SourceDigest, Option<Key>)> {
     // In parallel, because starting the worker takes as long as hashing a small model.
     let (digest, tetgen) = std::thread::scope(|scope| {
-        let tetgen = scope.spawn(|| tetgen_in_keys(options, cache, monitor));
+        let name = || tetgen_in_keys(options, cache, monitor);
+        let tetgen = std::thread::Builder::new().spawn_scoped(scope, name);
         let digest = clock.time("hash", || SourceDigest::of(source, options.looks()));
-        (digest, tetgen.join())
+        // Where the system gives no more threads, one after the other.
+        (digest, tetgen.map_or_else(|_| Ok(name()), |tetgen| tetgen.join()))
     });
     let digest = digest?;
     let tetgen = tetgen.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;

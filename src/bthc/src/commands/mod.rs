@@ -28,9 +28,9 @@ use crate::failure::Failure;
 use crate::output;
 use clap::CommandFactory;
 
-/// Runs a subcommand.
-pub(crate) fn run(command: Command) -> Result<(), Failure> {
-    crate::progress::listen_for_interrupts();
+/// Runs a subcommand. `wants_json`: whether errors are printed as JSON, too.
+pub(crate) fn run(command: Command, wants_json: bool) -> Result<(), Failure> {
+    crate::progress::listen_for_interrupts(wants_json);
     match command {
         Command::Compile(args) => compile::run(&args),
         Command::Cache(args) => cache::run(&args),

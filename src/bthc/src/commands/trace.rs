@@ -3,7 +3,7 @@
 use super::threads::with_threads;
 use crate::args::Trace;
 use crate::failure::Failure;
-use crate::progress::{self, Progress};
+use crate::progress::Progress;
 use crate::table::count;
 use crate::{output, overwrite, ray_files};
 use bth::Scene;
@@ -60,7 +60,6 @@ pub(crate) fn run(args: &Trace) -> Result<(), Failure> {
 
 /// Every ray against every triangle.
 fn exact(scene: &Scene, rays: &[Ray], args: &Trace) -> Result<Vec<Hit>, Failure> {
-    progress::listen_for_interrupts();
     let progress = Progress::new(args.json);
     let world = World::new(scene);
     progress.stage("trace exactly", Some(rays.len() as u64));

@@ -4,7 +4,7 @@ use crate::args::Verify;
 use crate::deep;
 use crate::failure::{Failure, runtime_json};
 use crate::output;
-use crate::progress::{self, Progress};
+use crate::progress::Progress;
 use crate::table::{Table, bytes, count};
 use bth_format::verify::Report;
 use serde_json::json;
@@ -47,7 +47,6 @@ pub(crate) fn run(args: &Verify) -> Result<(), Failure> {
 
 /// Traces sample rays through each object.
 fn deeply(args: &Verify) -> Result<deep::Report, Failure> {
-    progress::listen_for_interrupts();
     deep::check(&args.file, args.rays.map(NonZeroUsize::get), &Progress::new(args.json))
 }
 

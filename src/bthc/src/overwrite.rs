@@ -37,6 +37,15 @@ impl<'a> Outputs<'a> {
     }
 }
 
+/// Where a file of this path lies or would lie, the same for every spelling of its folder.
+pub(crate) fn place(path: &Path) -> PathBuf {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    match (folder.canonicalize(), path.file_name()) {
+        (Ok(folder), Some(name)) => folder.join(name),
+        _ => path.to_owned(),
+    }
+}
+
 /// Fails if an output would replace one of these files.
 ///
 /// # Errors
@@ -64,5 +73,9 @@ mod tests {
         }
         assert!(check(&at("d"), [at("d")]).is_ok());
         assert!(check(&at("a.ply"), [at("d")]).is_ok());
+        for name in ["new", "./new", "d/../new"] {
+            assert_eq!(place(&at(name)), place(&at("new")));
+        }
+        assert_ne!(place(&at("new")), place(&at("d/new")));
     }
 }

@@ -131,6 +131,7 @@ fn outputs_never_replace_what_is_read() {
         &["explain", "a.obj", "--picture", "./a.obj"],
         &["explain", "a.obj", "--free-picture", "./a.obj"],
         &["marks", "a.obj", "--tris", "./a.obj"],
+        &["calibrate", "a.obj", "-o", "./a.obj"],
     ] {
         let run = bthc(path, args).expect(2);
         assert!(run.stderr.contains("BTH-U001"), "{args:?}: {run:?}");

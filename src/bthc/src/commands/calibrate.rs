@@ -4,9 +4,9 @@ use crate::args::Calibrate;
 use crate::calibrate::{Measured, Subject, fit, measure};
 use crate::failure::Failure;
 use crate::measure::{QueryKind, Rays};
-use crate::output;
 use crate::progress::Progress;
 use crate::table::{Table, bytes};
+use crate::{output, overwrite};
 use bth::Scene;
 use bth_compile::costs::Profile;
 use bth_compile::pipeline::{self, CompileOptions};
@@ -22,6 +22,7 @@ const LARGE_FACES: u32 = 220_000;
 const LARGE_BYTES: f64 = 6e6;
 
 pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
+    overwrite::check(&args.output, &args.models)?;
     let progress = Progress::new(args.json);
     let mut measured = Measured { small: Vec::new(), large: Vec::new(), leaf: 0.0 };
     let own = [

@@ -21,7 +21,13 @@ use std::time::Instant;
 pub(crate) fn run(args: &Explain) -> Result<(), Failure> {
     let mut options = pipeline::CompileOptions { geometry: false, ..pipeline::CompileOptions::default() };
     for picture in args.picture.iter().chain(&args.free_picture) {
-        overwrite::check(picture, [&args.model])?;
+        overwrite::check(picture, [&args.model].into_iter().chain(args.selection.files()))?;
+    }
+    if let (Some(picture), Some(other)) = (&args.picture, &args.free_picture)
+        && overwrite::place(picture) == overwrite::place(other)
+    {
+        let message = format!("both pictures would be written to {}", picture.display());
+        return Err(Failure::Usage { message, hint: "name another file with --free-picture" });
     }
     let progress = Progress::new(args.json);
     args.selection.apply(&mut options, &progress)?;

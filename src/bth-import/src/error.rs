@@ -93,7 +93,7 @@ fn file_hint(code: &str) -> &'static str {
         "BTH-O002" => "compile again when the file is complete",
         "BTH-O020" => "name a folder that is there and may be written, on a disk that has room",
         "BTH-O060" => "name a profile that may be read, or a folder for the cache that may be written",
-        "BTH-O061" => "let the cache be larger (--cache-size), or name an output",
+        "BTH-O061" => "let the cache have room (--cache-size, --cache-dir), or name an output",
         "BTH-O062" => "pipe a model into the program, and let the folder for temporary files have room",
         "BTH-O091" => "send the output to where there is room",
         _ => "name a file or folder that is there and may be read",

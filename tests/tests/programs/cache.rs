@@ -254,6 +254,42 @@ fn shards_of_a_scene_meet_in_the_cache() {
     assert_eq!([shard("1/3"), shard("2/3"), shard("3/3")], [2, 2, 1]);
     let (hits, misses) = found(&compile(path, &["s.manifest"]));
     assert_eq!((&hits[..], &misses[..]), (&["object 5".into()][..], &["scene".into()][..]));
+    // Without a cache all work would be lost.
+    for args in [&["--no-cache"][..], &["--cache-dir", "s.manifest"]] {
+        let run = cached(path, &[&["compile", "s.manifest", "--shard", "1/3"], args].concat());
+        assert!(matches!(run.code, Some(2 | 4)), "{run:?}");
+    }
+    for variable in ["HOME", "XDG_CACHE_HOME"] {
+        let mut command = command("bthc", path, &["compile", "s.manifest", "--shard", "1/3"]);
+        command.env_remove("BTH_NO_CACHE").env_remove("HOME").env_remove("XDG_CACHE_HOME");
+        command.env(variable, path.join("s.manifest"));
+        let run = run_with(command).expect(2);
+        assert!(run.stderr.contains("BTH-U001"), "{run:?}");
+    }
+}
+
+#[test]
+fn what_a_cache_is_too_small_for_is_not_said_to_be_in_it() {
+    let folder = folder(&[("a.obj", &sphere(16))]);
+    let small = ["--cache-size", "1000"];
+    let run = cached(folder.path(), &[&["compile", "a.obj", "--in-cache"], &small[..]].concat()).expect(4);
+    assert!(run.stderr.contains("BTH-O061"), "{run:?}");
+    cached(folder.path(), &[&["compile", "a.obj"], &small[..]].concat()).expect(0);
+}
+
+#[test]
+fn a_shared_cache_that_is_not_used_is_told() {
+    let folder = folder(&[("a.obj", &sphere(4))]);
+    std::fs::create_dir(folder.path().join("shared")).unwrap();
+    let args = ["compile", "a.obj", "--shared-cache", "shared"];
+    let off = run_with(command("bthc", folder.path(), &args)).expect(0);
+    let mut homeless = command("bthc", folder.path(), &args);
+    for name in ["BTH_NO_CACHE", "BTH_CACHE_DIR", "HOME", "XDG_CACHE_HOME", "LOCALAPPDATA"] {
+        homeless.env_remove(name);
+    }
+    for run in [off, run_with(homeless).expect(0)] {
+        assert!(run.stderr.contains("warning: ") && run.stderr.contains("BTH_"), "{run:?}");
+    }
 }
 
 #[test]
@@ -319,6 +355,9 @@ fn options_without_effect_are_told() {
             assert!(warned(model, option), "{model} {option:?}");
         }
     }
+    assert!(warned("a.obj", &["--for-scene"]));
+    assert!(warned("a.obj", &["--format", "ply"]));
+    assert!(warned("s.manifest", &["--shard", "1/2", "-o", "x.bth"]));
     // What is no scene is flat as it is.
     assert!(warned("s.manifest", &["--flatten"]) && !warned("a.obj", &["--flatten"]));
 }

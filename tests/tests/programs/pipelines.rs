@@ -60,7 +60,12 @@ fn outputs_that_would_collide_are_refused_before_anything_is_done() {
     assert!(run.stderr.contains("both be written to a.bth"), "{run:?}");
     bthc(path, &["compile", "a.obj", "a.off", "-o", "none"]).expect(2);
     bthc(path, &["compile", "a.obj", "a.off", "-o", "-"]).expect(2);
+    // Whatever their folders are spelled like.
+    bthc(path, &["compile", "a.obj", "./a.off"]).expect(2);
+    bthc(path, &["compile", "a.obj", "--depfile", "./a.bth"]).expect(2);
     assert!(!path.join("a.bth").exists());
+    let run = bthc(path, &["explain", "a.obj", "--picture", "p.png", "--free-picture", "./p.png"]).expect(2);
+    assert!(run.stderr.contains("both pictures") && !path.join("p.png").exists(), "{run:?}");
 }
 
 #[test]
@@ -79,6 +84,50 @@ fn a_model_passes_through_pipes() {
     let unnamed = bthc(path, &["compile", "-"]).expect(2);
     assert!(unnamed.stderr.contains("-o"), "{unnamed:?}");
     bthc(path, &["compile", "-", "-o", "empty.bth"]).expect(3);
+    // Only what is a file can be watched, and only a file has a name for a dependency file.
+    bthc(path, &["compile", "-", "-o", "a.bth", "--watch"]).expect(2);
+    bthc(path, &["compile", "a.obj", "-o", "-", "--watch"]).expect(2);
+    bthc(path, &["compile", "a.obj", "-o", "-", "--depfile", "a.d"]).expect(2);
+}
+
+#[test]
+fn a_model_from_standard_input_is_called_so_wherever_it_is_named() {
+    let folder = folder(&[("a.obj", &sphere(8))]);
+    let path = folder.path();
+    let compile = |output: &str| {
+        let mut command =
+            command("bthc", path, &["compile", "-", "-o", output, "--depfile", "a.d", "--json"]);
+        command.env_remove("BTH_NO_CACHE").env("BTH_CACHE_DIR", path.join("cache"));
+        command.stdin(std::fs::File::open(path.join("a.obj")).unwrap());
+        run_with(command).expect(0).json()
+    };
+    let names = || std::fs::read_dir(path.join("cache/v1/last")).unwrap().count();
+    assert_eq!(compile("a.bth")["model"], "-");
+    // The temporary file is gone when Make would look for it.
+    assert_eq!(read(path, "a.d"), b"a.bth:\n");
+    let before = names();
+    compile("b.bth");
+    assert_eq!(names(), before, "the cache keeps no name for every temporary file");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_read_only_output_that_is_up_to_date_gets_a_newer_time() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = folder(&[("a.obj", &sphere(8))]);
+    let (model, output) = (folder.path().join("a.obj"), folder.path().join("a.bth"));
+    let compile = || {
+        let mut command = command("bthc", folder.path(), &["compile", "a.obj"]);
+        command.env_remove("BTH_NO_CACHE").env("BTH_CACHE_DIR", folder.path().join("cache"));
+        run_with(command).expect(0)
+    };
+    let modified = |path: &Path| std::fs::metadata(path).unwrap().modified().unwrap();
+    compile();
+    std::fs::set_permissions(&output, std::fs::Permissions::from_mode(0o444)).unwrap();
+    std::fs::File::open(&model).unwrap().set_modified(std::time::SystemTime::now()).unwrap();
+    assert!(modified(&model) > modified(&output));
+    compile();
+    assert!(modified(&output) >= modified(&model));
 }
 
 #[test]
@@ -135,6 +184,19 @@ fn compiled_files_are_compared_by_content() {
     assert!(json["sections"].as_array().unwrap().iter().any(|s| s["object"] == 0));
     bthc(path, &["diff", "a.bth", "a.obj"]).expect(3);
     bthc(path, &["diff", "a.bth", "missing.bth"]).expect(4);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_link_to_standard_output_stays_a_link() {
+    let folder = folder(&[("a.obj", &sphere(8))]);
+    let path = folder.path();
+    std::os::unix::fs::symlink("/proc/self/fd/1", path.join("stdout")).unwrap();
+    let mut command = command("bthc", path, &["compile", "a.obj", "-o", "stdout"]);
+    command.stdout(std::fs::File::create(path.join("out")).unwrap());
+    let output = command.output().unwrap();
+    assert_eq!(output.status.code(), Some(4), "{output:?}");
+    assert!(std::fs::symlink_metadata(path.join("stdout")).unwrap().is_symlink());
 }
 
 #[cfg(unix)]

@@ -103,7 +103,11 @@ impl Keeping {
     pub(crate) fn store(&self, warn: &dyn Fn(&str)) -> Result<Option<Store>, Failure> {
         let set = |name: &str| std::env::var(name).ok().filter(|v| !v.is_empty());
         let asked = self.location.cache_dir.is_some() || self.in_cache;
-        if self.no_cache || !asked && set("BTH_NO_CACHE").is_some() {
+        let is_off = std::env::var_os("BTH_NO_CACHE").is_some_and(|value| !value.is_empty());
+        if self.no_cache || !asked && is_off {
+            if self.shared_cache.is_some() {
+                warn("--shared-cache has no effect, since BTH_NO_CACHE is set and there is no --cache-dir");
+            }
             return Ok(None);
         }
         let store = match self.location.store() {
@@ -116,7 +120,15 @@ impl Keeping {
         let shared = self.shared_cache.clone().or_else(|| set("BTH_SHARED_CACHE"));
         match (store, shared) {
             (Some(store), Some(shared)) => Ok(Some(store.with_remote(remote(&shared)?))),
-            (store, _) => Ok(store),
+            (None, Some(shared)) => {
+                // Results go to the shared cache from the one of this machine.
+                warn(&format!(
+                    "going on without the shared cache {shared}: there is no folder for a cache of this machine; \
+                     BTH_CACHE_DIR or --cache-dir names one"
+                ));
+                Ok(None)
+            }
+            (store, None) => Ok(store),
         }
     }
 }

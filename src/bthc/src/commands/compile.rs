@@ -34,7 +34,7 @@ pub(crate) fn run(args: &Compile) -> Result<(), Failure> {
             return Err(Failure::Usage { message, hint: "name the output with -o" });
         }
     }
-    let mut jobs = plan(args, &models)?;
+    let mut jobs = plan(args, &models, from_input)?;
     check_rays(args, &jobs)?;
     let progress = Progress::with_warnings(args.quiet || args.json, !args.quiet);
     warn_of_options(args, &jobs, &progress);
@@ -94,7 +94,7 @@ fn all(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -> Result<(),
         Ok(done) => done.json,
         Err(failure) => {
             failure.print();
-            json!({"model": job.model.to_string_lossy(), "error": failure.json()})
+            json!({"model": job.name(), "error": failure.json()})
         }
     };
     let reports: Vec<_> = jobs.iter().zip(results).map(report).collect();
@@ -109,8 +109,8 @@ fn check_outputs(context: &JobContext<'_>, jobs: &[Job]) -> Result<(), Failure> 
     let depfile = context.args.jobs.depfile.as_deref();
     let outputs: Vec<&Path> = jobs.iter().filter_map(|job| job.target.path()).collect();
     if let Some(depfile) = depfile {
-        let same = |output: &&Path| **output == *depfile;
-        if let Some(output) = outputs.iter().find(|output| same(output)) {
+        let place = overwrite::place(depfile);
+        if let Some(output) = outputs.iter().find(|output| overwrite::place(output) == place) {
             let message =
                 format!("{} would be both the compiled file and the dependency file", output.display());
             return Err(Failure::Usage { message, hint: "name another file with --depfile" });
@@ -163,10 +163,24 @@ fn warn_of_options(args: &Compile, jobs: &[Job], monitor: &dyn Monitor) {
     {
         monitor.warn(&format!("{option} has no effect: no model is a glTF file that is compiled as a scene"));
     }
+    if args.for_scene && !jobs.iter().any(|job| scene::is_scene(&job.model, args)) {
+        monitor.warn("--for-scene has no effect: no model is a scene");
+    }
+    if args.jobs.format.is_some() && !jobs.iter().any(|job| job.is_input) {
+        monitor.warn("--format has no effect: no model comes from standard input");
+    }
+    if args.output.is_some()
+        && args.jobs.shard.is_some()
+        && let [job] = jobs
+        && scene::is_scene(&job.model, args)
+    {
+        monitor.warn("--output has no effect: --shard compiles the objects of a scene into the cache only");
+    }
 }
 
 /// A job for each model; fails if outputs coincide with each other or with a model.
-fn plan(args: &Compile, models: &[PathBuf]) -> Result<Vec<Job>, Failure> {
+/// `from_input` is the number of the model that came from standard input.
+fn plan(args: &Compile, models: &[PathBuf], from_input: Option<usize>) -> Result<Vec<Job>, Failure> {
     let usage = |message: String, hint| Err(Failure::Usage { message, hint });
     let into_folder = args.output.as_ref().filter(|o| models.len() > 1 || o.is_dir());
     let target = |model: &PathBuf| match (&args.output, into_folder) {
@@ -178,12 +192,26 @@ fn plan(args: &Compile, models: &[PathBuf]) -> Result<Vec<Job>, Failure> {
         (Some(output), None) => Target::File(output.clone()),
         (None, None) => Target::File(model.with_extension("bth")),
     };
-    let jobs: Vec<Job> = models.iter().map(|m| Job { model: m.clone(), target: target(m) }).collect();
+    let job = |(i, model): (usize, &PathBuf)| Job {
+        model: model.clone(),
+        is_input: from_input == Some(i),
+        target: target(model),
+    };
+    let jobs: Vec<Job> = models.iter().enumerate().map(job).collect();
     if jobs.iter().any(|job| job.target == Target::Stdout) && (jobs.len() > 1 || args.json) {
         return usage(
             "standard output takes one compiled file and nothing else".to_owned(),
             "name a file with -o",
         );
+    }
+    if args.jobs.depfile.is_some() && jobs.iter().any(|job| job.target == Target::Stdout) {
+        let message = "a dependency file names the output, and standard output has no name".to_owned();
+        return usage(message, "name a file with -o");
+    }
+    if args.jobs.watch && (from_input.is_some() || jobs.iter().any(|job| job.target == Target::Stdout)) {
+        let message =
+            "--watch reads and writes files again and again, and standard input and output pass once";
+        return usage(message.to_owned(), "name a model and with -o an output");
     }
     if let Some(folder) = into_folder
         && !folder.is_dir()
@@ -194,7 +222,7 @@ fn plan(args: &Compile, models: &[PathBuf]) -> Result<Vec<Job>, Failure> {
     let mut of_output = HashMap::new();
     for job in &jobs {
         let Target::File(path) = &job.target else { continue };
-        if let Some(other) = of_output.insert(path, &job.model) {
+        if let Some(other) = of_output.insert(overwrite::place(path), &job.model) {
             let (one, two) = (other.display(), job.model.display());
             let message = format!("{one} and {two} would both be written to {}", path.display());
             return usage(message, "compile them one by one, or rename one");

@@ -27,7 +27,7 @@ fn compile_job(context: &JobContext<'_>, job: &Job, monitor: &dyn Monitor) -> Re
     if scene::is_scene(&job.model, context.args) {
         return scene::compile(context, job, monitor);
     }
-    let cache = cache(context, &job.model);
+    let cache = cache(context, job);
     let needed = |record: &_| job.target.needs(record, context.store.as_ref());
     let outcome = bth_compile::cached::compile(&job.model, &context.options, &cache, &needed, monitor)?;
     let files = || {

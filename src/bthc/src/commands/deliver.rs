@@ -2,6 +2,7 @@
 
 use super::job::{Job, JobContext, JobReport, Target};
 use crate::failure::Failure;
+use crate::output;
 use crate::table::{bytes, seconds};
 use bth_cache::{Record, Store};
 use bth_compile::cached::{Cache, CachedCompilation};
@@ -38,13 +39,15 @@ pub(super) fn deliver<R>(
             }
         }
         (Target::Stdout, Some(content)) => {
-            let mut out = std::io::stdout().lock();
+            let mut out = output::stdout();
             content.write_to(&mut out)?;
             out.flush()?;
         }
         (Target::Stdout | Target::Cache, _) => {}
     }
-    if job.target == Target::Cache && outcome.record.is_none() {
+    let holds = |record: &Record| context.store.as_ref().is_some_and(|store| store.holds(record));
+    // A small cache may have dropped it again.
+    if job.target == Target::Cache && !outcome.record.as_ref().is_some_and(holds) {
         return Err(Failure::file(
             "BTH-O061",
             Path::new("the cache"),
@@ -73,7 +76,7 @@ pub(super) fn deliver<R>(
     let mut text = if outcome.built.is_none() { format!("{from}\n") } else { String::new() };
     text.push_str(&format!("{wrote} {name}\n"));
     let mut json = json!({
-        "model": job.model.to_string_lossy(),
+        "model": job.name(),
         "output": name,
         "written": outcome.content.is_some(),
         "cache": state,
@@ -96,7 +99,8 @@ fn modified(path: &Path) -> Option<SystemTime> {
 fn touch(path: &Path, record: Option<&Record>, store: Option<&Store>) -> Result<(), Failure> {
     let failed =
         |e: std::io::Error| Failure::file("BTH-O020", path, &format!("cannot be marked as new: {e}"));
-    let file = File::options().append(true).open(path).map_err(failed)?;
+    // The owner of a read-only file may set its time, too.
+    let file = File::options().append(true).open(path).or_else(|_| File::open(path)).map_err(failed)?;
     file.set_modified(SystemTime::now()).map_err(failed)?;
     if let (Some(record), Some(store)) = (record, store) {
         store.store_fingerprint(path, record.blob);

@@ -16,7 +16,7 @@ pub(super) fn show(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -
     let mut reports = Vec::new();
     let mut text = String::new();
     for job in jobs {
-        let cache = cache(context, &job.model);
+        let cache = cache(context, job);
         let found = match scene::is_scene(&job.model, context.args) {
             true => scene::dry_run(context, job, &cache, &progress)?,
             false => cached::dry_run(&job.model, &context.options, &cache, &progress)?,
@@ -29,7 +29,7 @@ pub(super) fn show(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -
             text.push_str(&format!("  {}: compile ({})\n", part.part, part.because.join(", ")));
         }
         reports.push(json!({
-            "model": job.model.to_string_lossy(),
+            "model": job.name(),
             "output": job.target.name(),
             "action": what,
             "because": found.because,

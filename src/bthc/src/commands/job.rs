@@ -6,6 +6,7 @@ use bth_compile::cached::Cache;
 use bth_compile::pipeline::CompileOptions;
 use bth_compile::write;
 use serde_json::Value;
+use std::borrow::Cow;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -13,6 +14,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub(super) struct Job {
     pub(super) model: PathBuf,
+    /// Whether the model came from standard input; then its file is a temporary one.
+    pub(super) is_input: bool,
     pub(super) target: Target,
 }
 
@@ -38,6 +41,16 @@ pub(super) struct JobReport {
     pub(super) text: String,
     /// The report of one of many jobs, one line.
     pub(super) line: String,
+}
+
+impl Job {
+    /// The name of the model in reports: as it was given.
+    pub(super) fn name(&self) -> Cow<'_, str> {
+        match self.is_input {
+            true => "-".into(),
+            false => self.model.to_string_lossy(),
+        }
+    }
 }
 
 impl Target {
@@ -89,8 +102,12 @@ fn contains(path: &Path, record: &Record, store: Option<&Store>) -> bool {
 }
 
 /// The cache of a job; without a store one that keeps nothing.
-pub(super) fn cache<'a>(context: &'a JobContext<'_>, model: &Path) -> Cache<'a> {
-    let subject = std::path::absolute(model).unwrap_or_else(|_| model.to_owned());
+pub(super) fn cache<'a>(context: &'a JobContext<'_>, job: &Job) -> Cache<'a> {
+    // All models from standard input have one name, since the cache keeps something for every name.
+    let subject = match job.is_input {
+        true => PathBuf::from("-"),
+        false => std::path::absolute(&job.model).unwrap_or_else(|_| job.model.clone()),
+    };
     match &context.store {
         Some(store) => Cache::new(store, subject.to_string_lossy()),
         None => Cache::none(),

@@ -60,10 +60,20 @@ pub(super) fn compile(
     monitor: &dyn Monitor,
 ) -> Result<JobReport, Failure> {
     let (manifest, import) = read(&job.model, &context.args.gltf, monitor)?;
-    let cache = job::cache(context, &job.model);
+    let cache = job::cache(context, job);
     let source = SceneSource { folder: folder(&job.model), name: &job.model };
     if let Some(shard) = context.args.jobs.shard {
+        if context.store.is_none() {
+            return Err(Failure::Usage {
+                message: "--shard keeps the objects of a scene in the cache, and there is none".to_owned(),
+                hint: "leave --no-cache and BTH_NO_CACHE out, and name a folder with --cache-dir or BTH_CACHE_DIR",
+            });
+        }
         let built = scene::compile_objects(&manifest, source, &context.options, &cache, shard, monitor)?;
+        if cache.log().failed {
+            let message = "the compiled objects could not be kept";
+            return Err(Failure::file("BTH-O061", Path::new("the cache"), &message));
+        }
         return Ok(shard_report(job, &cache, built));
     }
     let policy = CachePolicy {
@@ -91,7 +101,7 @@ fn shard_report(job: &Job, cache: &Cache<'_>, built: u64) -> JobReport {
     let log = cache.log();
     JobReport {
         json: json!({
-            "model": job.model.to_string_lossy(),
+            "model": job.name(),
             "objects": built,
             "cache": {"hits": log.hits, "misses": log.misses},
         }),

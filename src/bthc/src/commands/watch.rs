@@ -48,6 +48,7 @@ pub(super) fn run(context: &mut JobContext<'_>, jobs: &[Job], progress: &Progres
                 }
             }
             match with_threads(context.args.threads, || compile_one(context, job, progress))? {
+                Ok(_) if context.args.quiet => {}
                 Ok(done) => output::text(&format!("{}\n", done.line))?,
                 Err(Failure::Compile(bth_compile::Error::Cancelled)) => break,
                 Err(failure) => failure.print(),

@@ -135,10 +135,12 @@ fn create(folder: &Path, prefix: &OsString, mode: u32) -> std::io::Result<(File,
         use std::os::unix::fs::OpenOptionsExt;
         let nameless = options.clone().custom_flags(libc::O_TMPFILE).open(folder);
         if let Ok(file) = nameless
-            && file.try_lock().is_ok()
             // Without /proc it could not get a name.
             && std::fs::metadata(name_in_proc(&file)).is_ok()
         {
+            // A file system without locks takes it all the same: nobody can tell there that the hidden name, which it has for an
+            // instant, is unlocked.
+            let _ = file.try_lock();
             return Ok((file, None));
         }
     }

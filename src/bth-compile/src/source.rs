@@ -42,9 +42,13 @@ impl SourceDigest {
     /// Reads and hashes the files of a model.
     ///
     /// # Errors
-    /// `BTH-O001` when one cannot be read.
+    /// `BTH-O001` when one cannot be read, or read once only, such as a pipe.
     pub fn of(path: &Path, looks: impl Into<Looks>) -> Result<Self> {
         let looks = looks.into();
+        if std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
+            let why = "not a regular file, and a model is read more than once; `-` stands for standard input";
+            return Err(cannot_read(path, &std::io::Error::other(why)));
+        }
         let others =
             files(path, looks)?.iter().skip(1).map(|other| digest_of_other(other)).collect::<Result<_>>()?;
         Ok(Self { file: digest(path)?, others, looks })

@@ -88,6 +88,21 @@ fn a_model_passes_through_pipes() {
     bthc(path, &["compile", "-", "-o", "a.bth", "--watch"]).expect(2);
     bthc(path, &["compile", "a.obj", "-o", "-", "--watch"]).expect(2);
     bthc(path, &["compile", "a.obj", "-o", "-", "--depfile", "a.d"]).expect(2);
+    bthc(path, &["compile", "a.obj", "--watch", "--depfile", "a.d"]).expect(2);
+}
+
+/// A model is hashed and then read, and a pipe is empty after that.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_pipe_that_is_named_as_a_model_is_refused() {
+    let folder = folder(&[]);
+    let mut child = command("bthc", folder.path(), &["compile", "/dev/stdin", "-o", "a.bth"]);
+    let mut child = child.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    // It may have ended without reading.
+    let _ = child.stdin.take().unwrap().write_all(sphere(8).as_bytes());
+    let output = child.wait_with_output().unwrap();
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(4) && stderr.contains("not a regular file"), "{stderr}");
 }
 
 #[test]

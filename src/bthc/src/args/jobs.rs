@@ -24,7 +24,7 @@ pub(crate) struct Jobs {
     #[arg(long, help_heading = JOBS, value_name = "FORMAT", value_parser = ["obj", "ply", "stl", "off", "glb"])]
     pub(crate) format: Option<String>,
     /// Go on: compile again whenever one of the files changes, until Ctrl-C.
-    #[arg(long, help_heading = JOBS, conflicts_with_all = ["json", "in_cache"])]
+    #[arg(long, help_heading = JOBS, conflicts_with_all = ["json", "in_cache", "depfile"])]
     pub(crate) watch: bool,
     /// Stop, as on Ctrl-C, when standard input ends: for programs that start this one and may themselves be ended.
     #[arg(long, help_heading = JOBS)]

@@ -59,3 +59,19 @@ impl Aabb {
         (0..3).all(|a| self.lower[a] <= other.lower[a] && other.upper[a] <= self.upper[a])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differences_are_rounded_down_from_their_exact_values() {
+        assert_eq!(below(1.0, 0.25), 0.75);
+        assert_eq!(below(1.0, f64::from(f32::EPSILON) / 8.0), 1f32.next_down());
+        // The difference is 1 in f64, too, and a little less without rounding.
+        assert_eq!(below(1.0, 1e-30), 1f32.next_down());
+        assert_eq!(below(-1.0, 1e-30), (-1f32).next_down());
+        assert_eq!(below(0.0, f64::from(f32::from_bits(1)) / 2.0), -f32::from_bits(1));
+        assert_eq!(below(3.0, 0.0), 3.0);
+    }
+}

@@ -8,7 +8,7 @@ use crate::intersect::filter::TriangleFilter;
 use crate::intersect::line::Line;
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, LANES, Simd};
-use bth_format::layout::{IndexedLeaf, NONE, Object, WIDTH, WideNode};
+use bth_format::layout::{BOX_MARGIN, IndexedLeaf, NONE, Object, WIDENED_BOXES, WIDTH, WideNode};
 use bth_format::object::ObjectBounds;
 use bth_random::Rng;
 use zerocopy::FromZeros;
@@ -36,6 +36,26 @@ impl OneTriangle {
             leaf.corner[k][0] = k as u8;
         }
         OneTriangle { node, leaf, object }
+    }
+
+    /// Gives the box of the triangle the least room that widened boxes have.
+    fn widen(&mut self, corners: [[f32; 3]; 3]) {
+        self.object.coordinates |= WIDENED_BOXES;
+        for corner in corners {
+            let greatest = corner.into_iter().fold(0.0, |m: f64, x| m.max(f64::from(x).abs()));
+            for (k, x) in corner.into_iter().enumerate() {
+                let [lower, upper] = [-1.0, 1.0].map(|sign| f64::from(x) + sign * greatest * BOX_MARGIN);
+                let (mut least, mut most) = (lower as f32, upper as f32);
+                if f64::from(least) > lower {
+                    least = least.next_down();
+                }
+                if f64::from(most) < upper {
+                    most = most.next_up();
+                }
+                let [from, to] = &mut self.node.bounds[k];
+                (from[0], to[0]) = (from[0].min(least), to[0].max(most));
+            }
+        }
     }
 
     /// Makes the object reach beyond its triangle on all sides, as where there are others.
@@ -150,7 +170,10 @@ fn boxes_and_triangles_that_the_line_crosses_are_kept_and_sure_hits_are_hits() {
         let Some(line) = Line::new(&endless) else { continue };
         let mut object = OneTriangle::new(corners);
         if round % 7 == 0 {
-            object.enlarge(1e3 * scale);
+            object.enlarge([1e3, 1e6][round / 7 % 2] * scale);
+        }
+        if round % 5 < 2 {
+            object.widen(corners);
         }
         let intersection = line.intersection(corners);
         let t = intersection.map_or(1.0, |c| c.t as f32);
@@ -227,6 +250,39 @@ fn small_triangles_of_large_objects_are_decided_in_f32() {
         }
     }
     assert!(decided[0] > 1_000 && decided[1] > 1_000, "{decided:?}");
+}
+
+#[test]
+fn small_boxes_of_large_objects_are_told_apart_where_they_are_widened() {
+    let mut rng = Rng::new(6);
+    let mut entered = [[0; 2]; 2];
+    for round in 0..500 {
+        let unit = |rng: &mut Rng| rng.below(1 << 24) as f32 / (1 << 24) as f32;
+        let corners = [[0.5, 0.5, 0.5], [0.501, 0.5, 0.501], [0.5, 0.501, 0.5]];
+        let mut object = OneTriangle::new(corners);
+        object.enlarge(1e5);
+        let is_widened = round % 2 == 0;
+        if is_widened {
+            object.widen(corners);
+        }
+        // A point within the box, or beside it by its own size.
+        let is_met = round % 4 < 2;
+        let away = if is_met { 0.0 } else { 1e-3 };
+        let target = [0.5005 + away, 0.5005, 0.5005];
+        let origin = [0.4 + 0.2 * unit(&mut rng), unit(&mut rng), 1.5];
+        let ray = Ray::new(origin, [0, 1, 2].map(|k| target[k] - origin[k]));
+        let line = Line::new(&ray).unwrap();
+        for preparation in all_preparations(&ray, &line, &object.object, round % LANES) {
+            for isa in Isa::ALL {
+                let (children, _) = isa.run(BoxAndFilter(&preparation, &object));
+                assert!(!is_met || children == 1, "{isa}, round {round}: {preparation:?}");
+                entered[usize::from(is_widened)][usize::from(is_met)] += children;
+            }
+        }
+    }
+    let [[plain, _], [widened, met]] = entered;
+    assert!(met > 1_000 && plain > 1_000, "{entered:?}");
+    assert_eq!(widened, 0, "what is beside a box is not entered: {entered:?}");
 }
 
 #[test]

@@ -1,7 +1,9 @@
 //! Slow, obvious checks of both trees against the mesh: the oracle of the tests.
 
 use super::{BinaryBvh, Wide};
-use bth_format::layout::{Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, NONE, RAW_LINES, RawLeaf, WideNode};
+use bth_format::layout::{
+    BOX_MARGIN, Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, NONE, RAW_LINES, RawLeaf, WideNode,
+};
 use bth_import::{Mesh, is_zero_area};
 use std::collections::BTreeSet;
 use zerocopy::{FromBytes, IntoBytes};
@@ -157,7 +159,12 @@ impl Reader<'_> {
                 assert!(l > line, "children lie behind their parent");
             }
             let ids = self.child(code, level + 1, subtrees);
-            assert_eq!((lower, upper), bounds_of(self.mesh, &ids), "boxes are exact");
+            let exact = bounds_of(self.mesh, &ids);
+            if self.wide.widened_boxes {
+                assert_widened((lower, upper), exact);
+            } else {
+                assert_eq!((lower, upper), exact, "boxes are exact");
+            }
             all.extend(ids);
         }
         all
@@ -172,5 +179,18 @@ impl Reader<'_> {
             assert_eq!(bits(corners(t)), bits(self.mesh.corners(id)), "corners are those of triangle {id}");
         }
         ids
+    }
+}
+
+/// A box is widened by the room that its greatest |coordinate| asks for, and a few roundings at most.
+fn assert_widened((lower, upper): ([f32; 3], [f32; 3]), exact: ([f32; 3], [f32; 3])) {
+    let greatest = exact.0.iter().chain(&exact.1).fold(0.0, |m: f64, x| m.max(f64::from(*x).abs()));
+    let room = greatest * BOX_MARGIN;
+    for k in 0..3 {
+        for (end, exact) in [(-lower[k], -exact.0[k]), (upper[k], exact.1[k])] {
+            let [end, exact] = [end, exact].map(f64::from);
+            let rounded = 4.0 * f64::from(f32::EPSILON) * end.abs().max(room) + f64::from(f32::MIN_POSITIVE);
+            assert!(exact + room <= end && end <= exact + room + rounded, "{exact} widened by {room}: {end}");
+        }
     }
 }

@@ -31,7 +31,7 @@ const MATERIALS: &str = "2";
 const DEFORMABLE: &str = "1";
 /// Version of how objects are compiled whose vertices move by themselves.
 pub(crate) const MOTION: &str = "1";
-const FILE: &str = "2";
+const FILE: &str = "3";
 const OUTLINE: &str = "1";
 
 /// A mesh read from a model. A supported extension determines the format in which the file is read.

@@ -5,8 +5,7 @@
 //! components, so a box that the ray hits is never excluded. **Depth** is t times the greatest |component| of the direction, so
 //! that depths are of the magnitude of coordinates.
 
-use crate::intersect::line::Line;
-use crate::query::widened;
+use crate::intersect::line::{Line, widened};
 use crate::rays::Ray;
 use crate::simd::Simd;
 use bth_format::layout::{Object, PackedNode, WIDTH, WideNode};

@@ -10,6 +10,15 @@ use crate::rays::Ray;
 /// Error up to which f64 values are taken: 2^-28, an eighth of the rounding of f32, relative to 1 for u and v and to itself for
 /// t. Where the error may be greater, t, u and v are computed from exact sums.
 pub(crate) const RATIO_ERROR: f64 = 1.0 / (1u64 << 28) as f64;
+
+/// Upper bound of all t that cannot be distinguished from `t`: t is rounded to f32 before it is compared with the ray's range,
+/// and it has a relative error of 2^-28 ([`RATIO_ERROR`]), so one of two equal hits may appear nearer.
+pub(crate) fn widened(t: f64) -> f64 {
+    const SLACK: f64 = 1.0 / (1 << 23) as f64;
+    const LEAST: f64 = f32::from_bits(1) as f64;
+    t + (t.abs() * SLACK + LEAST)
+}
+
 /// 8u with u = 2^-53: bounds the error of a projected coordinate relative to the greatest |coordinate| of the point relative to
 /// the ray's origin; see [`Line::project`].
 pub(crate) const F64_PROJECTION_ERROR: f64 = 1.0 / (1u64 << 50) as f64;

@@ -1,8 +1,9 @@
 //! Queries for any hit, with a type of their own.
 
 use super::goal::{AnyHit, EitherGoal};
-use super::{AnswerLanes, EitherQuery, Query, TriangleRef, in_range, may_be_in_range, widened};
+use super::{AnswerLanes, EitherQuery, Query, TriangleRef, in_range, may_be_in_range};
 use crate::intersect::exact::Intersection;
+use crate::intersect::line::widened;
 use crate::rays::{PrimitiveRef, Ray};
 use crate::simd::{LANES, Simd};
 use bth_format::layout::NONE;

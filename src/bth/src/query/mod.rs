@@ -18,6 +18,7 @@ pub(crate) use self::goal::{
 
 use crate::intersect::exact::{Intersection, reported};
 use crate::intersect::exact_lanes::Intersections;
+use crate::intersect::line::widened;
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::simd::{LANES, Simd};
 use bth_format::layout::NONE;
@@ -100,14 +101,6 @@ pub(crate) trait Query: Copy {
     fn accept(&mut self);
     /// The result of an any-hit query after [`Self::accept`].
     const ACCEPTED: Self::Answer;
-}
-
-/// Upper bound of all t that cannot be distinguished from `t`: t is rounded to f32 before it is compared with the ray's range,
-/// and it has a relative error of 2^-28 ([`crate::intersect::exact::RATIO_ERROR`]), so one of two equal hits may appear nearer.
-pub(crate) fn widened(t: f64) -> f64 {
-    const SLACK: f64 = 1.0 / (1 << 23) as f64;
-    const LEAST: f64 = f32::from_bits(1) as f64;
-    t + (t.abs() * SLACK + LEAST)
 }
 
 /// The answers to queries of a type.

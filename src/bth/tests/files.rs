@@ -9,7 +9,7 @@ macro_rules! files {
     };
 }
 
-const VALID: [(&str, &[u8]); 29] = files![
+const VALID: [(&str, &[u8]); 30] = files![
     "deformable",
     "deformable-tets-link32",
     "deformable-tets-tet16",
@@ -39,6 +39,7 @@ const VALID: [(&str, &[u8]); 29] = files![
     "two-levels",
     "two-objects",
     "unknown-optional-section",
+    "widened-boxes",
 ];
 
 #[test]

@@ -110,6 +110,71 @@ fn scales_of_1e30_and_1e_minus_30_are_traced_exactly() {
     }
 }
 
+/// A knot far from the origin along z, on a square that is wider than it by a factor of `width`.
+fn knot_on_a_plain(width: f32) -> Model {
+    let mut model = torus_knot(400);
+    for p in &mut model.positions {
+        *p = [p[0], p[1], p[2] + 1e4];
+    }
+    let lowest = model.positions.iter().fold(f32::INFINITY, |least, p| least.min(p[1]));
+    let first = model.positions.len() as u32;
+    model.positions.extend(
+        [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+            .map(|[x, z]| [x * width, lowest - 0.01, z * width]),
+    );
+    model.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    model
+}
+
+#[test]
+fn small_things_on_a_wide_plain_are_traced_exactly() {
+    for width in [1e3, 1e5, 1e7] {
+        check(&knot_on_a_plain(width), false, 300, 7);
+    }
+}
+
+/// Rays from about the origin have pads that allow neither for the plain's coordinates nor for those of the knot, which only the boxes in the
+/// file do: rays along the sides of boxes tell whether they do.
+#[test]
+fn packets_to_the_corners_of_small_things_on_a_wide_plain_are_traced_exactly() {
+    let mut hits_found = 0;
+    for width in [1e3, 1e5, 1e7] {
+        let model = knot_on_a_plain(width);
+        let corners: Corners = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
+        let scene = every_structure(&model, false).remove(0).scene;
+        for along_one_direction in [false, true] {
+            // Rays to the corners of each triangle and beside them, those of one triangle after those of the last.
+            let targets = corners.iter().take(200).flatten().flat_map(|p| {
+                [
+                    *p,
+                    [p[0].next_up(), p[1], p[2]],
+                    [p[0], p[1].next_down(), p[2]],
+                    [p[0] - 1e-4, p[1] + 1e-4, p[2]],
+                ]
+            });
+            let rays: Vec<Ray> = targets
+                .map(|to| match along_one_direction {
+                    // Below the least component of directions that boxes are tested with.
+                    true => Ray::new([to[0], to[1], 0.0], [1e-9, -1e-9, 1.0]),
+                    false => Ray::new([0.0; 3], to),
+                })
+                .collect();
+            let mut hits = vec![Hit::MISS; rays.len()];
+            for (rays, hits) in rays.chunks(256).zip(hits.chunks_mut(256)) {
+                scene.batch(rays).nearest(hits);
+            }
+            for (ray, hit) in rays.iter().zip(&hits) {
+                assert_eq!(bits(hit), bits(&scene.nearest(ray).unwrap_or(Hit::MISS)), "{ray:?}");
+                hits_found += usize::from(hit.is_hit());
+            }
+            for (ray, hit) in rays.iter().zip(&hits).step_by(5) {
+                check_against_oracle(&corners, ray, hit);
+            }
+        }
+    }
+    assert!(hits_found > 5_000, "{hits_found}");
+}
+
 #[test]
 fn soup_that_intersects_itself_is_traced_exactly() {
     check(&soup(600), false, 1200, 5);

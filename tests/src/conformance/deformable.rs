@@ -144,6 +144,10 @@ pub(super) fn invalid() -> Vec<Case> {
     let child = offset_of!(WideNode, child);
     vec![
         field("F163-dropped", base, kind::OBJECT, offset_of!(Object, dropped), 1),
+        broken("F163-widened-boxes", base, Seal::Sections, |e| {
+            e.put(offset_of!(Header, required_features), &FEATURE_WIDENED_BOXES.to_le_bytes());
+            e.put_u32(kind::OBJECT, offset_of!(Object, coordinates), WIDENED_BOXES);
+        }),
         broken("F164-slots-exchanged", base, Seal::Sections, |e| {
             // The same boxes and children in the other order: the leaves lie no longer in depth-first order.
             for at in (0..6).map(|row| 448 + 64 * row).chain([448 + child]) {

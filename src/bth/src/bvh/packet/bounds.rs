@@ -29,6 +29,9 @@ pub(crate) trait PacketBounds<S: Simd> {
     fn corners(&self, node: &WideNode, slot: usize) -> [[f32; 3]; 2];
 }
 
+/// More than what roundings come to in projections that coherent rays share, relative to each term of a sum: 32u with u = 2^-24.
+pub(super) const SLACK: f32 = 1.0 / (1 << 19) as f32;
+
 /// The projection that coherent rays share.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FrustumView {
@@ -38,7 +41,7 @@ pub(crate) struct FrustumView {
     pub(super) axis: [usize; 3],
     /// For each axis of the plane the middle of the interval of slopes.
     pub(super) shear: [f32; 2],
-    /// For each axis of the plane half the width of that interval, rounded to nearest.
+    /// For each axis of the plane half the width of that interval, increased by [`SLACK`] of itself and of 1.
     pub(super) shear_width: [f32; 2],
 }
 
@@ -51,17 +54,16 @@ impl FrustumView {
 
     /// For sixteen points relative to the origin, given as rows of x, y and z: an upper bound of |x| and |y| in the projection of any
     /// ray, and |depth|. The bound is the sheared coordinate for the middle of the interval of slopes, plus half the interval times
-    /// the depth. Added to it are 2^-20 of the depth and of the sum, which exceed the roundings here and in the rays' slopes.
+    /// the depth, plus [`SLACK`] of the sum.
     #[inline(always)]
     pub(crate) fn spread<S: Simd>(&self, s: S, rows: [S::F; 3]) -> [S::F; 2] {
-        const UP: f32 = 1.0 / (1 << 20) as f32;
         let depth = rows[self.axis[2]];
         let far = s.abs(depth);
         let mut greatest = s.splat(0.0);
         for j in 0..2 {
             let middle = s.abs(s.fnma(s.splat(self.shear[j]), depth, rows[self.axis[j]]));
-            greatest = s.max(s.fma(far, s.splat(self.shear_width[j] + UP), middle), greatest);
+            greatest = s.max(s.fma(far, s.splat(self.shear_width[j]), middle), greatest);
         }
-        [s.mul(greatest, s.splat(1.0 + UP)), far]
+        [s.mul(greatest, s.splat(1.0 + SLACK)), far]
     }
 }

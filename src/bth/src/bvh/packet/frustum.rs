@@ -1,10 +1,10 @@
 //! Packet bounds of coherent rays: a frustum, by interval arithmetic.
 
-use super::bounds::{FrustumView, PacketBounds};
+use super::bounds::{FrustumView, PacketBounds, SLACK};
 use super::ray_group::RayGroup;
 use crate::bvh::coherence::Span;
 use crate::bvh::shaft::Shaft;
-use crate::intersect::boxes::{self, PAD};
+use crate::intersect::boxes;
 use crate::intersect::prepare;
 use crate::simd::{LANES, Part, Simd};
 use bth_format::layout::{WIDTH, WideNode};
@@ -14,8 +14,10 @@ use bth_format::object::ObjectBounds;
 ///
 /// With s = d_x/d_z along one axis z for all, a point's sheared x is
 /// (x - c_x) - s₀(z - c_z) + (s₀ - s)(z - c_z) + a with a = (c_x - o_x) - s(c_z - o_z): the middle of the interval of s,
-/// its half width, and an interval of a. Coherent rays have |s| <= 1.25, rounded at most twice. Roundings: 6uE for the first two
-/// terms, 8uE for s in the third, 20uE for a, 8uE for the sums; the pad is 64uE.
+/// its half width, and an interval of a. Coherent rays have |s| <= 1.25, rounded at most twice. With u = 2^-24, the first two terms
+/// and their difference x' are wrong by at most 4u|z - c_z| + 2u|x'|, s in the third by 3u, the products and sums on the other side by
+/// 2u of each of their terms, and a by 16u of the greatest distance D of two origins along an axis. [`SLACK`] = 32u of |z - c_z|, of D
+/// and of each term on the other side covers them: where |x'| is greater than that side, its error is less than what it exceeds it by.
 /// Where all rays have the same origin (`POINT`), the intervals of origins, widened by their pads, are also used for the single rays
 /// ([`RayGroup::may_enter`]), and the interval of a is zero.
 pub(crate) struct Frustum<S: Simd, const POINT: bool> {
@@ -32,7 +34,6 @@ impl<S: Simd, const POINT: bool> Frustum<S, POINT> {
     #[inline(always)]
     pub(crate) fn new(s: S, bounds: &ObjectBounds, span: &Span, groups: &[RayGroup<S>]) -> Self {
         let zero = s.splat(0.0);
-        let extent = prepare::extent(bounds, span.farthest_origin());
         let padded = prepare::padded_extent(bounds, span.farthest_origin());
         let (main, _) = span.main_axis();
         let axis = [(main + 1) % 3, (main + 2) % 3, main];
@@ -80,14 +81,20 @@ impl<S: Simd, const POINT: bool> Frustum<S, POINT> {
         let view = FrustumView { origin: center, axis, shear: [0.0; 2], shear_width: [0.0; 2] };
         let shaft = Shaft::new(s, span, [both(0), both(1), both(2)], ends[7], padded);
         let mut frustum = Frustum { view, shaft, upper: [0.0; 2], lower: [0.0; 2] };
-        let pad = 4.0 * PAD as f32 * extent;
+        let pad = if POINT {
+            f32::MIN_POSITIVE
+        } else {
+            let apart = span.origin.map(|[least, greatest]| greatest - least);
+            apart[0].max(apart[1]).max(apart[2]) * SLACK + f32::MIN_POSITIVE
+        };
         for j in 0..2 {
-            let (shear, addend) = (both(3 + j), both(5 + j));
+            let shear = both(3 + j);
+            let addend = if POINT { [0.0; 2] } else { both(5 + j) };
             let middle = 0.5 * (shear[0] + shear[1]);
             frustum.view.shear[j] = middle;
-            frustum.view.shear_width[j] = (shear[1] - middle).max(middle - shear[0]);
-            frustum.upper[j] = pad - addend[0];
-            frustum.lower[j] = pad + addend[1];
+            frustum.view.shear_width[j] = (shear[1] - middle).max(middle - shear[0]) * (1.0 + SLACK) + SLACK;
+            frustum.upper[j] = pad + addend[0].abs() * SLACK - addend[0];
+            frustum.lower[j] = pad + addend[1].abs() * SLACK + addend[1];
         }
         frustum
     }
@@ -153,5 +160,111 @@ impl<S: Simd, const POINT: bool> PacketBounds<S> for Frustum<S, POINT> {
             }
         }
         out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::packet::entry::{GROUPS, PACKET};
+    use crate::bvh::packet::prepare_group::PrepareGroup;
+    use crate::rays::Ray;
+    use crate::simd::{Isa, Kernel};
+    use bth_random::Rng;
+
+    /// For each of sixteen points, given as rows, the sides of the frustum of the rays beyond which it lies.
+    struct Sides<'a, const POINT: bool>(&'a [Ray], &'a ObjectBounds, &'a [[f32; LANES]; 3]);
+
+    impl<const POINT: bool> Kernel for Sides<'_, POINT> {
+        type Output = [u32; LANES];
+        #[inline(always)]
+        fn run<S: Simd>(self, s: S) -> [u32; LANES] {
+            let Sides(rays, bounds, points) = self;
+            let span = Span::of(s, rays);
+            assert!(span.is_coherent() && span.is_from_point() == POINT, "{rays:?}");
+            let mut groups = [RayGroup::vacant(s); GROUPS];
+            for (group, rays) in groups.iter_mut().zip(rays.chunks(LANES)) {
+                assert!(PrepareGroup::<S, Frustum<S, POINT>>::of(group, bounds, rays, true).run(s));
+            }
+            let groups = &groups[..rays.len().div_ceil(LANES)];
+            let frustum = Frustum::<S, POINT>::new(s, bounds, &span, groups);
+            let rows = [s.load(&points[0]), s.load(&points[1]), s.load(&points[2])];
+            let mut sides = [0; LANES];
+            s.store_u(frustum.sides(s, rows), &mut sides);
+            sides
+        }
+    }
+
+    /// Points on rays, which are exact because all coordinates are integers below 2^24 times a power of two, and such points moved
+    /// away from all rays by about 2^-15 of their distance.
+    fn check<const POINT: bool>(seed: u64) {
+        let mut rng = Rng::new(seed);
+        let mut below = |limit: u64| rng.below(limit) as f32;
+        let (mut on, mut beyond) = (0, 0);
+        for round in 0..if cfg!(miri) { 4 } else { 400 } {
+            let scale = [1.0, 2f32.powi(-30), 2f32.powi(6), 2f32.powi(-50)][round % 4];
+            // The object may be much larger than the distances of rays and points.
+            let bounds = ObjectBounds::around((1u64 << 24) as f32 * scale * [1.0, 256.0][round / 4 % 2]);
+            let main = round % 3;
+            let signs = [(); 3].map(|()| below(2) * 2.0 - 1.0);
+            let middle = [0, 1, 2].map(|k| if k == main { 1_000_000.0 } else { 1.0 + below(700_000) });
+            let jitter = [1, 1 << 10, 1 << 17][round / 8 % 3];
+            let place = [(); 3].map(|()| below(1 << 21) - (1 << 20) as f32);
+            let apart = [1 << 4, 1 << 18][round / 24 % 2];
+            let rays: Vec<Ray> = (0..PACKET - round % 60)
+                .map(|_| Ray {
+                    origin: place.map(|x| (x + if POINT { 0.0 } else { below(apart) }) * scale),
+                    tmin: 0.0,
+                    direction: [0, 1, 2].map(|k| (middle[k] + below(jitter)) * signs[k] * scale),
+                    tmax: f32::INFINITY,
+                })
+                .collect();
+            let axis = [(main + 1) % 3, (main + 2) % 3];
+            let mut points = [[0.0; LANES]; 3];
+            let mut is_on = [true; LANES];
+            for i in 0..LANES {
+                let (ray, t) = (&rays[below(rays.len() as u64) as usize], [0.0, 1.0, 4.0, 8.0][i % 4]);
+                for k in 0..3 {
+                    points[k][i] = ray.origin[k] + t * ray.direction[k];
+                }
+                if POINT && i % 2 == 1 {
+                    let (k, sign) = (axis[i / 2 % 2], if i / 4 % 2 == 0 { 1.0 } else { -1.0 });
+                    let slopes =
+                        rays.iter().map(|r| f64::from(r.direction[k]) / f64::from(r.direction[main]));
+                    let depth = f64::from(points[main][i]) - f64::from(ray.origin[main]);
+                    let ends = slopes.map(|s| sign * s * depth).fold(f64::NEG_INFINITY, f64::max);
+                    let at = f64::from(ray.origin[k]) + sign * (ends + depth.abs() / f64::from(1 << 15));
+                    points[k][i] = at as f32;
+                    is_on[i] = false;
+                }
+            }
+            for isa in Isa::ALL {
+                // There are no packets in scalar code.
+                let Ok(sides) = isa.run_wide(Sides::<POINT>(&rays, &bounds, &points)) else { continue };
+                for i in 0..LANES {
+                    let point = points.map(|row| row[i]);
+                    if is_on[i] {
+                        assert_eq!(sides[i], 0, "{isa}, round {round}: a ray meets {point:?}");
+                        on += 1;
+                    } else {
+                        assert_ne!(sides[i], 0, "{isa}, round {round}: no ray comes close to {point:?}");
+                        beyond += 1;
+                    }
+                }
+            }
+        }
+        let least = if Isa::best() == Isa::Scalar { 0 } else { 16 };
+        assert!(on >= least && (beyond >= least || !POINT), "{on}, {beyond}");
+    }
+
+    #[test]
+    fn points_that_rays_from_a_point_meet_lie_within_all_sides_and_those_beyond_do_not_however_large_the_object()
+     {
+        check::<true>(41);
+    }
+
+    #[test]
+    fn points_that_coherent_rays_meet_lie_within_all_sides() {
+        check::<false>(42);
     }
 }

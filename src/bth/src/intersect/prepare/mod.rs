@@ -47,15 +47,9 @@ fn is_tiny(tmin: f32) -> bool {
     tmin.abs().to_bits().wrapping_sub(1) < f32::MIN_POSITIVE.to_bits()
 }
 
-/// Upper bound of |coordinate of the object's box| + |coordinate of the origin|, for origins whose |coordinates| do not exceed
-/// `greatest_origin`.
-#[inline(always)]
-pub(crate) fn extent(bounds: &ObjectBounds, greatest_origin: f32) -> f32 {
-    (bounds.greatest + greatest_origin) * ROUND_UP
-}
-
-/// Upper bound of what the pads of boxes are relative to: as [`extent`], but that widened boxes allow for their own coordinates. Not below
-/// [`LARGEST`] where the extent is not.
+/// Upper bound of what the pads of boxes are relative to, for origins whose |coordinates| do not exceed `greatest_origin`: the sum of the
+/// greatest |coordinates| of the origins and of the object, of the latter only a small part where boxes are widened to allow for their own. Not
+/// below [`LARGEST`] where the whole sum is not.
 #[inline(always)]
 pub(crate) fn padded_extent(bounds: &ObjectBounds, greatest_origin: f32) -> f32 {
     (bounds.padded + greatest_origin) * ROUND_UP

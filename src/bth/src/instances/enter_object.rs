@@ -33,7 +33,6 @@ impl ObjectRays {
         visits: &[Visit],
         progress: Progress<'_>,
     ) {
-        self.rays.clear();
         self.t_scale.clear();
         self.from.clear();
         if hinted && batch.hints().is_some() {
@@ -82,6 +81,7 @@ impl Kernel for EnterKernel<'_> {
             visits,
             progress,
         } = self;
+        // All of them are replaced.
         rays.resize(visits.len(), NO_RAY);
         t_scale.resize(visits.len(), 1.0);
         let by_itself = |visit: Visit, ray: &mut Ray, t_scale: &mut f32| {

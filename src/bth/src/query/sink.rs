@@ -1,7 +1,6 @@
 //! Destination of the answers of a batch: one type for models and for scenes, so that every kernel is compiled once for both.
 
 use super::{AnswerLanes, Answers, AnswersOf, EitherQuery, Goal, Query};
-use crate::SMALL;
 use crate::intersect::exact_lanes::Intersections;
 use crate::rays::{PrimitiveRef, Ray};
 use crate::simd::{LANES, Simd};
@@ -72,13 +71,6 @@ impl<'a, Q: Query> Sink<'a, Q> {
     /// The instance that is reported with a hit of a ray.
     pub(crate) fn instance_of(&self, ray: usize) -> u32 {
         self.scene.as_ref().map_or(self.instance, |scene| scene.visits[self.first + ray].instance)
-    }
-
-    /// The visits of instances by the rays of the batch, if answers are merged. None in [`SMALL`] libraries, which do without what these
-    /// are for.
-    #[inline(always)]
-    pub(crate) fn visits(&self) -> Option<&'a [Visit]> {
-        self.scene.filter(|_| !SMALL).map(|scene| &scene.visits[self.first..])
     }
 
     /// Stores the answer of a ray, which reports the instance of [`Self::instance_of`].

@@ -11,7 +11,7 @@ use super::segment_box::SegmentBox;
 use super::traverse::{PacketOutcome, PacketTracer, TracePacket};
 use crate::bvh::coherence::{Span, is_same_octant};
 use crate::bvh::nodes::is_large;
-use crate::query::sink::{Sink, Visit};
+use crate::query::sink::Sink;
 use crate::query::{Goal, Query};
 use crate::rays::{RAYS_PER_CACHE_LINE, Ray};
 use crate::simd::{CacheLevel, Kernel, LANES, Part, Simd};
@@ -100,8 +100,7 @@ fn trace<S: Simd, Q: Query>(
     let PacketScratch { groups, buffers, backoffs, rest } = scratch;
     rest.clear();
     let backoffs = backoffs.of(object.identity, goal.is_any());
-    let visits = sink.visits();
-    let mut runs = Runs { bounds: &bounds, rays, visits, next: 0, backoffs: *backoffs, rest };
+    let mut runs = Runs { bounds: &bounds, rays, next: 0, backoffs: *backoffs, rest };
     // The first run is found before the loop, so that `packets` is made only if there are any.
     let Some(mut run) = runs.next(s, goal) else {
         *backoffs = runs.backoffs;
@@ -189,8 +188,6 @@ enum Kind {
 struct Runs<'a, 'b> {
     bounds: &'b ObjectBounds,
     rays: &'a [Ray],
-    /// The visits of instances by the rays, sorted by instance. A packet is made of rays through one instance.
-    visits: Option<&'b [Visit]>,
     /// Index of the next ray.
     next: usize,
     backoffs: KindBackoffs,
@@ -204,25 +201,14 @@ impl<'a> Runs<'a, '_> {
     fn next(&mut self, s: impl Simd, goal: impl Goal) -> Option<Run<'a>> {
         while self.next < self.rays.len() {
             let first = self.next;
-            let left = &self.rays[first..];
-            let together = match self.visits {
-                // The first rays tell most batches of incoherent rays, which are skipped in few steps.
-                Some(visits) if left.iter().take(3).all(|ray| is_same_octant(ray, &left[0])) => {
-                    through_one_instance(&visits[first..])
-                }
-                _ => left.len(),
-            };
-            let count = match together {
+            let count = match self.rays.len() - first {
                 // The rays behind a full packet would be too few for one.
                 count if count > PACKET && count < PACKET + MIN_RAYS => count - MIN_RAYS,
                 count => count.min(PACKET),
             };
-            let rays = &left[..count];
+            let rays = &self.rays[first..first + count];
             self.next = first + count;
-            let least = if self.visits.is_some() { LANES } else { MIN_RAYS };
-            if count >= least
-                && let Some(kind) = choose(s, goal, self.bounds, rays, &mut self.backoffs)
-            {
+            if let Some(kind) = choose(s, goal, self.bounds, rays, &mut self.backoffs) {
                 return Some(Run { first, rays, kind });
             }
             self.skip(first, rays.len());
@@ -235,15 +221,6 @@ impl<'a> Runs<'a, '_> {
     fn skip(&mut self, first: usize, count: usize) {
         self.rest.extend(first as u32..(first + count) as u32);
     }
-}
-
-/// The number of the first visits that are of the same instance, as far as it matters to the size of a packet.
-#[inline(never)]
-fn through_one_instance(visits: &[Visit]) -> usize {
-    let visits = &visits[..visits.len().min(PACKET + MIN_RAYS)];
-    let is_same = |visit: &Visit| visit.instance == visits[0].instance;
-    // The visits are sorted.
-    if visits.last().is_none_or(is_same) { visits.len() } else { visits.partition_point(is_same) }
 }
 
 /// The choice of the kind of packet that rays may make, if any, as a part of kernels.
@@ -279,6 +256,9 @@ fn choose(
     rays: &[Ray],
     KindBackoffs { coherent, short }: &mut KindBackoffs,
 ) -> Option<Kind> {
+    if rays.len() < MIN_RAYS {
+        return None;
+    }
     let try_coherent = coherent.may_try() && is_same_octant(&rays[0], &rays[rays.len() - 1]);
     let try_short = goal.is_any() && short.may_try();
     if !try_coherent && !try_short {

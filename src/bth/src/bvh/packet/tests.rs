@@ -1,10 +1,9 @@
 //! Tests that packets give the same bits as single rays with every instruction set, over a surface of triangles with shared edges.
 
-use crate::SMALL;
 use crate::bvh::height_field::HeightField;
 use crate::bvh::packet::runs::{MINIMUM_USE, MinimumUse, PacketCount, PacketScratch, Packets};
 use crate::object::{self, Scratch, single};
-use crate::query::sink::{SceneRays, Sink, Visit};
+use crate::query::sink::Sink;
 use crate::query::{
     ANY, Answer, AnswersOf, AnyQuery, EitherAnswers, EitherGoal, Goal, NEAREST, Nearest, NearestQuery, Query,
     any_answers, nearest_answers,
@@ -259,45 +258,6 @@ fn a_batch_of_all_kinds_is_split_and_traced_to_the_same_bits() {
     let [(nearest, _), (any, _)] = check(&surface, &rays, ALWAYS);
     assert!(nearest.rays > 0 && nearest.rays < rays.len(), "{nearest:?}");
     assert!(any.coherent > 0 && any.short > 0, "{any:?}");
-}
-
-/// Rays through several instances of an object follow each other in a batch, and the directions of those through one are unlike those through
-/// the next.
-#[test]
-fn packets_are_made_of_rays_through_one_instance() {
-    let surface = HeightField::new(1.0, 0.0);
-    let (object, bundles) = (surface.view(), bundles(&surface, 1.0, false, 15));
-    let (mut rays, mut visits) = (vec![], vec![]);
-    for (instance, bundle) in bundles.chunks(64).enumerate() {
-        let count = [40, 20, 64, 7][instance % 4];
-        for ray in &bundle[..count] {
-            visits.push(Visit { ray: rays.len() as u32, instance: instance as u32 });
-            rays.push(*ray);
-        }
-    }
-    let t_scale = vec![1.0; rays.len()];
-    for isa in isas() {
-        let mut scratch = PacketScratch::default();
-        let mut hits = vec![Hit::MISS; rays.len()];
-        let scene = SceneRays { rays: &rays, visits: &visits, t_scale: &t_scale };
-        let mut sink = Sink::<NearestQuery>::of_scene(object.triangle_ids, &mut hits, scene);
-        let (rays, of_scene) = (&rays, &mut scratch);
-        let kernel = Packets { object: &object, rays, scratch: of_scene, least: ALWAYS, sink: &mut sink };
-        let Ok(count) = isa.run_wide(kernel) else { panic!("{isa} has packets") };
-        for (i, ray) in rays.iter().enumerate() {
-            if scratch.rest.contains(&(i as u32)) {
-                continue;
-            }
-            let expected = alone(&object, ray).0;
-            assert_eq!(bits(&hits[i]), bits(&expected), "{isa}, ray {i}");
-            let instance = if expected.is_hit() { visits[i].instance } else { NONE };
-            assert_eq!(hits[i].primitive.instance, instance, "{isa}, ray {i}");
-        }
-        let mut hits = vec![Hit::MISS; rays.len()];
-        let apart = packed::<NearestQuery>(isa, &object, rays, ALWAYS, nearest_answers(&mut hits)).0;
-        assert!(SMALL || count.coherent > 10, "{isa}: {count:?}");
-        assert!(SMALL || count.rays > 2 * apart.rays, "{isa}: {count:?}, {apart:?}");
-    }
 }
 
 #[test]

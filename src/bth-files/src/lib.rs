@@ -1,9 +1,11 @@
 //! Files as the compiler and its cache use them: content hashes ([`Digest`]), writes that leave a whole file or none
-//! ([`replace`], [`write_once`]) and copies of ranges from a file that others may change ([`OpenFile`]).
+//! ([`replace`], [`write_once`]), copies of ranges from a file that others may change ([`OpenFile`]),
+//! and signals that end a program ([`signals`]).
 
 mod atomic;
 mod digest;
 mod open_file;
+pub mod signals;
 
 pub use atomic::{SUFFIX, replace, replace_file, write_once};
 pub use digest::Digest;

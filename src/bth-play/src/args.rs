@@ -9,7 +9,8 @@ Exit codes:
     0  done
     2  wrong usage
     3  bad input: the compiled file cannot be used
-    4  a file could not be read or written, or there is no display for a window";
+    4  a file could not be read or written, or there is no display for a window
+  130  cancelled, by Ctrl-C, SIGTERM or SIGHUP";
 
 /// Where the window writes pictures by default.
 pub(crate) const SCREENSHOT: &str = "bth-play.png";

@@ -1,5 +1,6 @@
-//! Ctrl-C ends the program, and no part of a file that is being written stays.
+//! Ctrl-C, SIGTERM and SIGHUP end the program, and no part of a file that is being written stays.
 
+use bth_files::signals;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -13,10 +14,9 @@ fn parts() -> MutexGuard<'static, Vec<PathBuf>> {
     PARTS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Listens for Ctrl-C from now on. With `json` the end is reported on standard output.
+/// Listens for Ctrl-C and the signals that are like it from now on. With `json` the end is reported on standard output.
 pub(crate) fn listen(json: bool) {
-    // Fails only when a handler is there already, and then Ctrl-C ends the program anyway.
-    let _ = ctrlc::set_handler(move || {
+    let end = move || {
         // Kept locked, so that no other file begins.
         let parts = parts();
         parts.iter().for_each(|part| remove(part));
@@ -27,7 +27,9 @@ pub(crate) fn listen(json: bool) {
             let _ = crate::messages::print(&format!("{}\n", serde_json::json!({ "error": error })));
         }
         std::process::exit(CANCELLED);
-    });
+    };
+    // Fails only when a handler is there already, and then Ctrl-C ends the program anyway.
+    signals::install(|| drop(ctrlc::set_handler(end)));
 }
 
 fn remove(part: &Path) {

@@ -12,6 +12,7 @@ mod overwrite;
 mod progress;
 mod ray_files;
 mod table;
+mod temporary;
 mod version;
 
 use clap::Parser;

@@ -1,33 +1,36 @@
-//! Progress on a terminal, and cancellation by Ctrl-C.
+//! Progress on a terminal, and cancellation by Ctrl-C, SIGTERM or SIGHUP.
 
 use crate::failure::Failure;
-use crate::output;
+use crate::{output, temporary};
 use bth_compile::Monitor;
+use bth_files::signals;
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// Set by Ctrl-C; stages poll it a few times a second.
+/// Set by Ctrl-C and the signals that are like it; stages poll it a few times a second.
 static CANCELLED: AtomicBool = AtomicBool::new(false);
 /// Values of [`Progress`] that live: while there is one, stages poll [`CANCELLED`].
 static POLLERS: AtomicUsize = AtomicUsize::new(0);
 
 /// Makes Ctrl-C stop the compilation cleanly; a second one ends the program at once, as does the first where nothing polls for it: while
-/// standard input is read, and in commands without stages.
+/// standard input is read, and in commands without stages. SIGTERM and SIGHUP are like Ctrl-C.
 pub(crate) fn listen_for_interrupts(wants_json: bool) {
-    // Fails only when a handler is there already, and then Ctrl-C works anyway.
-    let _ = ctrlc::set_handler(move || {
+    let end = move || {
         let again = CANCELLED.swap(true, Ordering::Relaxed);
         if again || POLLERS.load(Ordering::Relaxed) == 0 {
             let cancelled = Failure::from(bth_compile::Error::Cancelled);
-            // Who prints already may wait for a reader, and holds the lock of standard output.
-            if !again && !output::has_begun() {
+            // Who prints already may wait for a reader, and holds the lock of standard output. Else the second signal is reported, too:
+            // `timeout` sends one to the program and at once another to its group.
+            if !output::has_begun() {
                 cancelled.report(wants_json);
             }
-            std::process::exit(cancelled.exit_code().into());
+            temporary::exit(cancelled.exit_code());
         }
-    });
+    };
+    // Fails only when a handler is there already, and then Ctrl-C works anyway.
+    signals::install(|| drop(ctrlc::set_handler(end)));
 }
 
 /// Stops the compilation cleanly when standard input ends.

@@ -10,7 +10,7 @@ Exit codes:
     4  a file could not be read or written
     5  the model exceeds a limit of the format
    70  internal error; please report it
-  130  cancelled";
+  130  cancelled, by Ctrl-C, SIGTERM or SIGHUP";
 
 // The headings of the help. Each option names its own, since one that is set for a group of options would hold for what
 // follows the group, too.

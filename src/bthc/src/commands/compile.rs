@@ -16,7 +16,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 pub(crate) fn run(args: &Compile) -> Result<(), Failure> {
-    let _stdin;
+    let stdin;
     let mut models = args.models.clone();
     let from_input = models.iter().position(|m| m.as_os_str() == "-");
     if args.jobs.end_with_input {
@@ -27,8 +27,8 @@ pub(crate) fn run(args: &Compile) -> Result<(), Failure> {
         progress::end_with_input();
     }
     if let Some(i) = from_input {
-        let (folder, path) = deliver::standard_input(args.jobs.format.as_deref())?;
-        (_stdin, models[i]) = (folder, path);
+        stdin = deliver::standard_input(args.jobs.format.as_deref())?;
+        stdin.path().clone_into(&mut models[i]);
         if args.output.is_none() && !args.keeping.in_cache {
             let message = "a model from standard input has no name that the output could have".to_owned();
             return Err(Failure::Usage { message, hint: "name the output with -o" });

@@ -4,6 +4,7 @@ use super::job::{Job, JobContext, JobReport, Target};
 use crate::failure::Failure;
 use crate::output;
 use crate::table::{bytes, seconds};
+use crate::temporary::TemporaryFile;
 use bth_cache::{Record, Store};
 use bth_compile::cached::{Cache, CachedCompilation};
 use bth_compile::write::{self, Content};
@@ -108,16 +109,16 @@ fn touch(path: &Path, record: Option<&Record>, store: Option<&Store>) -> Result<
     Ok(())
 }
 
-/// The model on standard input, as a file in a folder that lives as long as the first value.
-pub(super) fn standard_input(format: Option<&str>) -> Result<(tempfile::TempDir, PathBuf), Failure> {
+/// The model on standard input, as a file that lives as long as the value.
+pub(super) fn standard_input(format: Option<&str>) -> Result<TemporaryFile, Failure> {
     let failed = |e: std::io::Error| Failure::file("BTH-O062", Path::new("standard input"), &e);
     let mut bytes = Vec::new();
     std::io::stdin().lock().read_to_end(&mut bytes).map_err(failed)?;
-    let folder = tempfile::Builder::new().prefix("bthc-").tempdir().map_err(failed)?;
-    let mut path = folder.path().join("stdin");
+    let mut name = PathBuf::from("stdin");
     if let Some(format) = format {
-        path.set_extension(format);
+        name.set_extension(format);
     }
-    std::fs::write(&path, bytes).map_err(failed)?;
-    Ok((folder, path))
+    let (temporary, mut file) = TemporaryFile::new(&name).map_err(failed)?;
+    file.write_all(&bytes).map_err(failed)?;
+    Ok(temporary)
 }

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 
 /// Runs the jobs, at most `parallel` at a time, and only as many as together need at most `memory` bytes by the `estimate`;
-/// a job that needs more runs alone. Results are in the order of the jobs.
+/// a job that needs more runs alone. Results are in the order of the jobs. Where the system starts fewer threads, fewer jobs run at a time.
 ///
 /// `within` runs the work of each thread, for example in a pool of its own.
 pub fn run<J: Send, T: Send>(
@@ -40,7 +40,13 @@ pub fn run<J: Send, T: Send>(
     if parallel == 1 {
         within(&worker);
     } else {
-        std::thread::scope(|scope| (0..parallel).for_each(|_| drop(scope.spawn(|| within(&worker)))));
+        std::thread::scope(|scope| {
+            let start = |_| std::thread::Builder::new().spawn_scoped(scope, || within(&worker)).is_ok();
+            let started = (0..parallel).take_while(|&n| start(n)).count();
+            if started == 0 {
+                within(&worker);
+            }
+        });
     }
     let result =
         |place: Mutex<(Option<J>, Option<T>)>| place.into_inner().unwrap_or_else(PoisonError::into_inner).1;
@@ -101,6 +107,21 @@ mod tests {
         };
         assert_eq!(run(jobs.clone(), 8, 100, |bytes| *bytes, |worker| worker(), work), jobs);
         assert!(most.load(Ordering::SeqCst) <= 100);
+    }
+
+    /// Runs itself again in a process in which no thread has the memory for its stack.
+    #[test]
+    fn jobs_run_where_no_thread_can_be_started() {
+        const VARIABLE: &str = "BTH_TEST_NO_THREADS";
+        if std::env::var_os(VARIABLE).is_some() {
+            assert!(std::thread::Builder::new().spawn(|| ()).is_err());
+            let done = run((0..20u64).collect(), 4, u64::MAX, |_| 1, |worker| worker(), |n| n + 1);
+            return assert_eq!(done, (1..21).collect::<Vec<_>>());
+        }
+        let mut again = std::process::Command::new(std::env::current_exe().unwrap());
+        again.args(["--exact", "jobs::tests::jobs_run_where_no_thread_can_be_started", "--test-threads=1"]);
+        let done = again.env(VARIABLE, "1").env("RUST_MIN_STACK", (1u64 << 47).to_string()).output().unwrap();
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stdout));
     }
 
     #[test]

@@ -2,14 +2,21 @@
 #![allow(unsafe_code)]
 
 /// Installs handlers of the signals that end a program. A hangup that the program was told to ignore (`nohup`) stays ignored.
-pub fn install(handlers: impl FnOnce()) {
+pub fn install<T>(handlers: impl FnOnce() -> T) -> T {
     #[cfg(unix)]
     let is_ignored = is_ignored(libc::SIGHUP);
-    handlers();
+    let installed = handlers();
     #[cfg(unix)]
     if is_ignored {
         ignore(libc::SIGHUP);
     }
+    installed
+}
+
+/// Makes writes beyond the limit on the size of files (`ulimit -f`) fail with an error. Without this they end the program by SIGXFSZ.
+pub fn survive_file_size_limit() {
+    #[cfg(unix)]
+    ignore(libc::SIGXFSZ);
 }
 
 /// Whether this process ignores a signal.

@@ -1,5 +1,6 @@
 //! Ctrl-C, SIGTERM and SIGHUP end the program, and no part of a file that is being written stays.
 
+use crate::failure::Failure;
 use bth_files::signals;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -15,7 +16,10 @@ fn parts() -> MutexGuard<'static, Vec<PathBuf>> {
 }
 
 /// Listens for Ctrl-C and the signals that are like it from now on. With `json` the end is reported on standard output.
-pub(crate) fn listen(json: bool) {
+///
+/// # Errors
+/// If the thread that waits for signals cannot be started.
+pub(crate) fn listen(json: bool) -> Result<(), Failure> {
     let end = move || {
         // Kept locked, so that no other file begins.
         let parts = parts();
@@ -28,8 +32,14 @@ pub(crate) fn listen(json: bool) {
         }
         std::process::exit(CANCELLED);
     };
-    // Fails only when a handler is there already, and then Ctrl-C ends the program anyway.
-    signals::install(|| drop(ctrlc::set_handler(end)));
+    match signals::install(|| ctrlc::set_handler(end)) {
+        // Nothing would end the program, since the signals are taken over already.
+        Err(ctrlc::Error::System(e)) => {
+            Err(Failure::Usage(format!("cannot start a thread that waits for signals: {e}")))
+        }
+        // Else it fails only when a handler is there already, and then Ctrl-C ends the program anyway.
+        _ => Ok(()),
+    }
 }
 
 fn remove(part: &Path) {

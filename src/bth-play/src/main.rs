@@ -25,6 +25,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    bth_files::signals::survive_file_size_limit();
     let wants_json = std::env::args_os().skip(1).take_while(|a| a != "--").any(|a| a == "--json");
     let args = match args::Args::try_parse() {
         Ok(args) => args,
@@ -52,7 +53,7 @@ fn run(args: &args::Args) -> Result<(), Failure> {
         None => bth::Isa::from_environment().map(|_| ()),
     };
     isa.map_err(|error| Failure::Usage(error.to_string()))?;
-    interrupt::listen(args.json);
+    interrupt::listen(args.json)?;
     let file = args.file()?;
     // Keeps the entry from being evicted from the cache until the end of the program.
     let compiled;

@@ -16,7 +16,10 @@ static POLLERS: AtomicUsize = AtomicUsize::new(0);
 
 /// Makes Ctrl-C stop the compilation cleanly; a second one ends the program at once, as does the first where nothing polls for it: while
 /// standard input is read, and in commands without stages. SIGTERM and SIGHUP are like Ctrl-C.
-pub(crate) fn listen_for_interrupts(wants_json: bool) {
+///
+/// # Errors
+/// `BTH-L090` if the thread that waits for signals cannot be started.
+pub(crate) fn listen_for_interrupts(wants_json: bool) -> Result<(), Failure> {
     let end = move || {
         let again = CANCELLED.swap(true, Ordering::Relaxed);
         if again || POLLERS.load(Ordering::Relaxed) == 0 {
@@ -29,17 +32,33 @@ pub(crate) fn listen_for_interrupts(wants_json: bool) {
             temporary::exit(cancelled.exit_code());
         }
     };
-    // Fails only when a handler is there already, and then Ctrl-C works anyway.
-    signals::install(|| drop(ctrlc::set_handler(end)));
+    match signals::install(|| ctrlc::set_handler(end)) {
+        // Nothing would end the program, since the signals are taken over already.
+        Err(ctrlc::Error::System(e)) => Err(no_thread(&e, "signals")),
+        // Else it fails only when a handler is there already, and then Ctrl-C works anyway.
+        _ => Ok(()),
+    }
 }
 
 /// Stops the compilation cleanly when standard input ends.
-pub(crate) fn end_with_input() {
-    std::thread::spawn(|| {
+///
+/// # Errors
+/// `BTH-L090` if the thread that waits for the end cannot be started.
+pub(crate) fn end_with_input() -> Result<(), Failure> {
+    let wait = || {
         // An error is an end, too.
         let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
         CANCELLED.store(true, Ordering::Relaxed);
-    });
+    };
+    match std::thread::Builder::new().spawn(wait) {
+        Ok(_) => Ok(()),
+        Err(e) => Err(no_thread(&e, "the end of standard input")),
+    }
+}
+
+fn no_thread(error: &std::io::Error, awaits: &str) -> Failure {
+    let message = format!("cannot start a thread that waits for {awaits}: {error}");
+    bth_compile::Error::Limit { code: "BTH-L090", message }.into()
 }
 
 /// Units per second, without decimals.

@@ -1,6 +1,6 @@
 //! Exit codes and error messages of wrong usage, missing files and malformed models.
 
-use crate::support::{bthc, folder, run, sphere};
+use crate::support::{bthc, command, folder, run, run_with, sphere};
 
 #[test]
 fn wrong_usage_exits_2() {
@@ -95,4 +95,36 @@ fn model_is_never_overwritten_by_its_own_output() {
     let folder = folder(&[("model.bth", "v 0 0 0\n")]);
     bthc(folder.path(), &["compile", "model.bth"]).expect(2);
     assert_eq!(std::fs::read(folder.path().join("model.bth")).unwrap(), b"v 0 0 0\n");
+}
+
+/// By default a signal ends who writes beyond the limit.
+#[cfg(unix)]
+#[test]
+fn a_limit_on_the_size_of_files_is_an_error_of_the_write() {
+    let folder = folder(&[("ball.obj", &sphere(48))]);
+    let path = folder.path();
+    bthc(path, &["compile", "ball.obj", "--quiet"]).expect(0);
+    for (program, args, code) in [
+        ("bthc", &["compile", "ball.obj", "-o", "other.bth", "--json"][..], "BTH-O020"),
+        ("bth-play", &["ball.bth", "-o", "a.png", "--json"], "BTH-P002"),
+    ] {
+        let program = command(program, path, &[]);
+        let mut limited = std::process::Command::new("sh");
+        limited.args(["-c", "ulimit -f 4; exec \"$0\" \"$@\""]).arg(program.get_program()).args(args);
+        limited.current_dir(path).env("BTH_NO_CACHE", "1");
+        let run = run_with(limited).expect(4);
+        assert_eq!(run.json()["error"]["code"], code);
+    }
+    let mut names: Vec<_> = std::fs::read_dir(path).unwrap().map(|e| e.unwrap().file_name()).collect();
+    names.sort();
+    assert_eq!(names, ["ball.bth", "ball.obj"], "no part of a file stays");
+}
+
+#[test]
+fn where_no_thread_can_be_started_there_is_an_error() {
+    let folder = folder(&[("ball.obj", &sphere(4))]);
+    let mut command = command("bthc", folder.path(), &["compile", "ball.obj", "--end-with-input", "--json"]);
+    // No system has as much memory for a stack.
+    command.env("RUST_MIN_STACK", (1u64 << 47).to_string());
+    assert_eq!(run_with(command).expect(5).json()["error"]["code"], "BTH-L090");
 }

@@ -101,7 +101,10 @@ pub(crate) fn build_through(
     };
     std::thread::scope(|scope| {
         for _ in 1..workers {
-            scope.spawn(|| work(WorkerSlot::new(&setup)));
+            // Where the system starts fewer threads, the others do the work.
+            if std::thread::Builder::new().spawn_scoped(scope, || work(WorkerSlot::new(&setup))).is_err() {
+                break;
+            }
         }
         work(first);
     });

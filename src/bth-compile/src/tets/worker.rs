@@ -72,7 +72,7 @@ impl Worker {
         let mut to = child.stdin.take().expect("stdin was piped");
         let mut from = child.stdout.take().expect("stdout was piped");
         // The pipes are served by a separate thread, which may block; killing the process unblocks it.
-        let io_thread = std::thread::spawn(move || {
+        let serve = move || {
             let mut receive = || Reply::from_bytes(&read_frame(&mut from)?);
             if inbox.send(receive()).is_err() {
                 return;
@@ -83,14 +83,13 @@ impl Worker {
                     return;
                 }
             }
-        });
-        let mut worker = Self {
-            child,
-            tetgen: String::new(),
-            requests: Some(requests),
-            replies,
-            io_thread: Some(io_thread),
         };
+        let mut worker =
+            Self { child, tetgen: String::new(), requests: Some(requests), replies, io_thread: None };
+        match std::thread::Builder::new().spawn(serve) {
+            Ok(io_thread) => worker.io_thread = Some(io_thread),
+            Err(error) => return fail("cannot be served by a thread", &error),
+        }
         Ok(match worker.wait(START, monitor)? {
             Ok(Reply::Hello { protocol: PROTOCOL, tetgen }) => {
                 worker.tetgen = tetgen;

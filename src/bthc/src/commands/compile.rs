@@ -24,7 +24,7 @@ pub(crate) fn run(args: &Compile) -> Result<(), Failure> {
             let message = "a model from standard input ends with it".to_owned();
             return Err(Failure::Usage { message, hint: "leave --end-with-input out" });
         }
-        progress::end_with_input();
+        progress::end_with_input()?;
     }
     if let Some(i) = from_input {
         stdin = deliver::standard_input(args.jobs.format.as_deref())?;

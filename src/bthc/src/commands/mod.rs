@@ -30,7 +30,7 @@ use clap::CommandFactory;
 
 /// Runs a subcommand. `wants_json`: whether errors are printed as JSON, too.
 pub(crate) fn run(command: Command, wants_json: bool) -> Result<(), Failure> {
-    crate::progress::listen_for_interrupts(wants_json);
+    crate::progress::listen_for_interrupts(wants_json)?;
     match command {
         Command::Compile(args) => compile::run(&args),
         Command::Cache(args) => cache::run(&args),

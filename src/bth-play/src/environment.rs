@@ -49,7 +49,12 @@ impl Environment {
     /// `BTH-P006` if it cannot be read or used.
     pub(crate) fn read(path: &Path, front: DVec3, vertical: DVec3) -> Result<Self, Failure> {
         let wrong = |message: String, exit: u8| Failure::Environment { path: path.into(), message, exit };
-        let size = std::fs::metadata(path).map_err(|e| wrong(format!("cannot read: {e}"), 4))?.len();
+        let found = std::fs::metadata(path).map_err(|e| wrong(format!("cannot read: {e}"), 4))?;
+        // A device may have no end.
+        if !found.is_file() && !found.is_dir() {
+            return Err(wrong("cannot read: not a regular file".to_owned(), 4));
+        }
+        let size = found.len();
         if size > MAX_FILE {
             return Err(wrong(format!("expected at most {MAX_FILE} bytes, found {size}"), 3));
         }

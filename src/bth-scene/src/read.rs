@@ -40,6 +40,11 @@ pub fn read(path: &Path) -> Result<Manifest> {
         |e: std::io::Error| failed(format!("cannot read: {e}"), "check the path and its permissions");
     let mut bytes = Vec::new();
     // Reading one byte more than allowed detects longer files without trusting the size that the system reports.
+    // A named pipe would wait for a writer.
+    let found = std::fs::metadata(path).map_err(cannot)?;
+    if !found.is_file() && !found.is_dir() {
+        return Err(cannot(std::io::Error::other("not a regular file")));
+    }
     let file = std::fs::File::open(path).map_err(cannot)?;
     file.take(MAX_MANIFEST + 1).read_to_end(&mut bytes).map_err(cannot)?;
     if bytes.len() as u64 > MAX_MANIFEST {

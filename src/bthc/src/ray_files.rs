@@ -4,6 +4,8 @@
 use crate::failure::Failure;
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_format::layout::NONE;
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 const HEADER: usize = 16;
@@ -81,7 +83,10 @@ fn header(tag: &[u8; 4], count: usize, stride: usize) -> Vec<u8> {
 }
 
 fn read(path: &Path, tag: &[u8; 4], stride: u64) -> Result<Vec<u8>, Failure> {
-    let data = std::fs::read(path).map_err(|e| Failure::file("BTH-O090", path, &e))?;
+    let failed = |e: std::io::Error| Failure::file("BTH-O090", path, &e);
+    let mut file = File::open(path).map_err(failed)?;
+    let mut data = Vec::new();
+    file.by_ref().take(HEADER as u64).read_to_end(&mut data).map_err(failed)?;
     let name = String::from_utf8_lossy(tag);
     let Some(start) = data.first_chunk::<HEADER>() else {
         let message = format!("expected a {name} file, found {} bytes", data.len());
@@ -99,12 +104,21 @@ fn read(path: &Path, tag: &[u8; 4], stride: u64) -> Result<Vec<u8>, Failure> {
     let mut count = [0; 8];
     count.copy_from_slice(&start[8..]);
     let expected = u64::from_le_bytes(count).checked_mul(stride).and_then(|n| n.checked_add(HEADER as u64));
-    if expected != Some(data.len() as u64) {
-        let expected = expected.map_or("more than can be stored".to_owned(), |n| n.to_string());
-        let message = format!("expected {expected} bytes by the count, found {}", data.len());
-        return Err(Failure::ray_file(path, 8, message, "the file seems to be truncated"));
+    // One byte more shows that there are more; devices and pipes may have no end.
+    let most = expected.map_or(0, |n| n - HEADER as u64 + 1);
+    file.take(most).read_to_end(&mut data).map_err(failed)?;
+    match expected {
+        Some(n) if n == data.len() as u64 => Ok(data),
+        Some(n) if n < data.len() as u64 => {
+            let message = format!("expected {n} bytes by the count, found more");
+            Err(Failure::ray_file(path, 8, message, "the count does not belong to the elements"))
+        }
+        _ => {
+            let expected = expected.map_or("more than can be stored".to_owned(), |n| n.to_string());
+            let message = format!("expected {expected} bytes by the count, found {}", data.len());
+            Err(Failure::ray_file(path, 8, message, "the file seems to be truncated"))
+        }
     }
-    Ok(data)
 }
 
 #[cfg(test)]

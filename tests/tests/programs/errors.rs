@@ -1,6 +1,8 @@
 //! Exit codes and error messages of wrong usage, missing files and malformed models.
 
-use crate::support::{bthc, command, folder, run, run_with, sphere};
+use crate::support::{bthc, command, folder, run, run_with, sphere, wait};
+use std::process::Stdio;
+use std::time::Duration;
 
 #[test]
 fn wrong_usage_exits_2() {
@@ -127,4 +129,38 @@ fn where_no_thread_can_be_started_there_is_an_error() {
     // No system has as much memory for a stack.
     command.env("RUST_MIN_STACK", (1u64 << 47).to_string());
     assert_eq!(run_with(command).expect(5).json()["error"]["code"], "BTH-L090");
+}
+
+/// A pipe without a writer would keep a program waiting, where Ctrl-C is heeded by nobody; and `/dev/zero` has no end.
+#[cfg(unix)]
+#[test]
+fn pipes_and_devices_are_refused_where_files_are_read_whole() {
+    let folder = folder(&[("ball.obj", &sphere(4))]);
+    let path = folder.path();
+    bthc(path, &["compile", "ball.obj", "--quiet"]).expect(0);
+    for pipe in ["p.obj", "p.glb", "p.manifest", "p"] {
+        assert!(std::process::Command::new("mkfifo").arg(path.join(pipe)).status().unwrap().success());
+    }
+    for args in [
+        &["bthc", "compile", "p.obj"][..],
+        &["bthc", "compile", "p.glb"],
+        &["bthc", "compile", "p.manifest"],
+        &["bthc", "import", "p.glb", "-o", "a.manifest"],
+        &["bthc", "explain", "p.obj"],
+        &["bthc", "marks", "p.obj"],
+        &["bthc", "calibrate", "p.obj", "-o", "a.json"],
+        &["bthc", "compile", "ball.obj", "--rays", "p"],
+        &["bthc", "compile", "ball.obj", "--profile", "p"],
+        &["bthc", "compile", "ball.obj", "--profile", "/dev/zero"],
+        &["bth-play", "ball.bth", "-o", "a.png", "--mode", "path", "--env", "/dev/zero"],
+    ] {
+        let mut child = command(args[0], path, &args[1..]);
+        let mut child = child.stderr(Stdio::piped()).spawn().unwrap();
+        let status = wait(&mut child, Duration::from_secs(20)).unwrap_or_else(|| panic!("{args:?} waits"));
+        assert_eq!(status.code(), Some(4), "{args:?}");
+        let said = std::io::read_to_string(child.stderr.take().unwrap()).unwrap();
+        assert!(said.contains("not a regular file"), "{args:?}: {said}");
+    }
+    // What tells its length may come from where there is more.
+    bthc(path, &["trace", "ball.bth", "/dev/zero", "-o", "a.hits"]).expect(3);
 }

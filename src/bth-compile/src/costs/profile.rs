@@ -4,7 +4,11 @@ use crate::error::{Error, Place, Result};
 use bth_format::layout::RecordKind;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::io::Read;
 use std::path::Path;
+
+/// Bytes of a profile that are read; all of one takes a few thousand.
+const LONGEST: u64 = 1 << 20;
 
 /// Times on one thread, nanoseconds a ray in batches unless stated otherwise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -83,13 +87,24 @@ impl Default for Profile {
     }
 }
 
+/// The text of a regular file of at most [`LONGEST`] bytes: a named pipe would wait for a writer, and a device may have no end.
+fn read(path: &Path) -> std::io::Result<String> {
+    let found = std::fs::metadata(path)?;
+    if !found.is_file() && !found.is_dir() {
+        return Err(std::io::Error::other("not a regular file"));
+    }
+    let mut text = String::new();
+    std::fs::File::open(path)?.take(LONGEST).read_to_string(&mut text)?;
+    Ok(text)
+}
+
 impl Profile {
     /// Reads a profile.
     ///
     /// # Errors
     /// `BTH-O060` when it cannot be read, `BTH-I060` when it is not a profile.
     pub fn read(path: &Path) -> Result<Profile> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::File {
+        let text = read(path).map_err(|e| Error::File {
             code: "BTH-O060",
             path: path.to_owned(),
             message: e.to_string(),

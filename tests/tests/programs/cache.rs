@@ -278,6 +278,19 @@ fn what_a_cache_is_too_small_for_is_not_said_to_be_in_it() {
 }
 
 #[test]
+fn a_damaged_entry_that_stays_in_the_cache_is_made_again() {
+    let folder = folder(&[("a.obj", &sphere(8))]);
+    let args = ["a.obj", "--in-cache"];
+    let entry = compile(folder.path(), &args)["cache"]["entry"].as_str().unwrap().to_owned();
+    let good = std::fs::read(&entry).unwrap();
+    assert_eq!(compile(folder.path(), &args)["cache"]["hit"], true);
+    std::fs::remove_file(&entry).unwrap();
+    std::fs::write(&entry, vec![0; good.len()]).unwrap();
+    assert_eq!(compile(folder.path(), &args)["cache"]["hit"], false);
+    assert!(std::fs::read(&entry).unwrap() == good);
+}
+
+#[test]
 fn a_shared_cache_that_is_not_used_is_told() {
     let folder = folder(&[("a.obj", &sphere(4))]);
     std::fs::create_dir(folder.path().join("shared")).unwrap();

@@ -59,8 +59,8 @@ impl Target {
         match self {
             Self::File(path) => !contains(path, record, store),
             Self::Stdout => true,
-            // The record may exist without its content, which must then be compiled again.
-            Self::Cache => !store.is_some_and(|store| store.holds(record)),
+            // The record may exist without its content, or with a damaged one, which must then be compiled again.
+            Self::Cache => store.and_then(|store| store.pin(record)).is_none(),
         }
     }
 

@@ -1,6 +1,7 @@
 //! The layout of a store's folder.
 
 use crate::Digest;
+use bth_files::create_folders;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
@@ -25,8 +26,9 @@ impl Files {
     /// When they cannot be.
     pub(crate) fn open(folder: &Path) -> std::io::Result<Self> {
         let files = Self { root: folder.join("v1") };
+        std::fs::create_dir_all(folder)?;
         for name in ["keys", "blobs", "locks", "last"] {
-            std::fs::create_dir_all(files.root.join(name))?;
+            create_folders(folder, &files.root.join(name))?;
         }
         let tag = folder.join("CACHEDIR.TAG");
         if !tag.exists() {

@@ -39,7 +39,7 @@ impl Remote for Folder {
             return Err(Error::new(ErrorKind::NotFound, "the folder is not there"));
         }
         if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder)?;
+            bth_files::create_folders(&self.0, folder)?;
         }
         if overwrite {
             // A failure to remove shows in the write below.

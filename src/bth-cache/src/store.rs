@@ -4,7 +4,7 @@ use crate::evict::{Evicted, evict};
 use crate::files::{Files, named, remove, touch};
 use crate::lock::{WorkLock, same_file};
 use crate::{Digest, Key, Record, Remote, Statistics, last_keys};
-use bth_files::write_once;
+use bth_files::{create_folders, write_once};
 use serde_json::Value;
 use std::collections::HashSet;
 use std::fs::File;
@@ -343,7 +343,7 @@ impl Store {
     fn write(&self, path: &Path, bytes: &[u8]) -> Result<bool> {
         match write_once(path, bytes) {
             Err(e) if e.kind() == ErrorKind::NotFound => {
-                std::fs::create_dir_all(path.parent().unwrap_or(Path::new(".")))?;
+                create_folders(&self.folder, path.parent().unwrap_or(Path::new(".")))?;
                 write_once(path, bytes)
             }
             done => done,

@@ -78,7 +78,8 @@ pub fn replace_file(
 }
 
 /// Writes a read-only file that is whole or absent, unless there is one of that name already; whether it
-/// was written. It is not flushed to disk and may be lost when the machine stops, so readers must check it.
+/// was written. It is not flushed to disk and may be lost when the machine stops, so readers must check it. Whoever may write to the
+/// folder may read it.
 ///
 /// # Errors
 /// Those of the system.
@@ -88,6 +89,7 @@ pub fn write_once(path: &Path, bytes: &[u8]) -> std::io::Result<bool> {
     };
     let (mut file, named) = create(folder, &prefix_of(name), 0o444)?;
     file.write_all(bytes)?;
+    share(&file, folder, 0o4);
     let linked = match &named {
         None => link_to(&file, path),
         Some(named) => match std::fs::hard_link(&named.0, path) {
@@ -101,6 +103,49 @@ pub fn write_once(path: &Path, bytes: &[u8]) -> std::io::Result<bool> {
         Err(e) => Err(e),
     }
 }
+
+/// Makes the folders of a path that are missing below `root`. Whoever may write to a folder may write to those that are made in it.
+///
+/// # Errors
+/// Those of the system.
+pub fn create_folders(root: &Path, path: &Path) -> std::io::Result<()> {
+    match std::fs::create_dir(path) {
+        Ok(()) => {}
+        Err(e) if e.kind() == ErrorKind::AlreadyExists && path.is_dir() => return Ok(()),
+        Err(e) if e.kind() == ErrorKind::NotFound && path != root => {
+            let parent = path.parent().ok_or(e)?;
+            create_folders(root, parent)?;
+            return create_folders(root, path);
+        }
+        Err(e) => return Err(e),
+    }
+    if let (true, Some(parent)) = (path != root, path.parent())
+        && let Ok(made) = File::open(path)
+    {
+        share(&made, parent, 0o7);
+    }
+    Ok(())
+}
+
+/// Gives these permissions to the group and to others where they may write to the folder, whatever the umask: the folder says with whom
+/// its content is shared. Folders inherit that they let nobody remove what is another user's.
+#[cfg(unix)]
+fn share(file: &File, folder: &Path, permissions: u32) {
+    use std::os::unix::fs::{MetadataExt, PermissionsExt};
+    let (Ok(of_folder), Ok(of_file)) = (std::fs::metadata(folder), file.metadata()) else { return };
+    let mut mode = of_file.mode() & 0o7777;
+    for class in [3, 0] {
+        if of_folder.mode() >> class & 0o2 != 0 {
+            mode |= permissions << class;
+            mode |= if of_file.is_dir() { of_folder.mode() & 0o1000 } else { 0 };
+        }
+    }
+    // Where the system refuses, others cannot use the file and make their own.
+    let _ = file.set_permissions(std::fs::Permissions::from_mode(mode));
+}
+
+#[cfg(not(unix))]
+fn share(_: &File, _: &Path, _: u32) {}
 
 /// A hidden name that is removed unless it has been renamed.
 struct Named(PathBuf);
@@ -338,6 +383,39 @@ mod tests {
         std::fs::write(folder.path().join(&stale), b"half").unwrap();
         write(&folder.path().join(&name), b"third").unwrap();
         assert!(!folder.path().join(&stale).exists());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn whoever_may_write_to_a_folder_may_use_what_is_in_it() {
+        use std::os::unix::fs::PermissionsExt;
+        let mode = |path: &Path| std::fs::metadata(path).unwrap().permissions().mode() & 0o7777;
+        let set = |path: &Path, mode| {
+            std::fs::set_permissions(path, std::fs::Permissions::from_mode(mode)).unwrap();
+        };
+        for (of_folder, folders, file) in [
+            (0o755, 0, 0),
+            (0o700, 0, 0),
+            (0o775, 0o070, 0o040),
+            (0o777, 0o077, 0o044),
+            (0o1777, 0o1077, 0o044),
+        ] {
+            let temporary = tempfile::tempdir().unwrap();
+            let root = temporary.path();
+            set(root, of_folder);
+            let below = root.join("a").join("b");
+            create_folders(root, &below).unwrap();
+            create_folders(root, &below).unwrap();
+            write_once(&below.join("c"), b"once").unwrap();
+            for folder in [below.as_path(), &root.join("a")] {
+                assert_eq!(mode(folder) & folders, folders, "{of_folder:o}");
+            }
+            // What the umask leaves to others anyway is not looked at.
+            assert_eq!(mode(&below.join("c")) & file, file, "{of_folder:o}");
+            assert_eq!(mode(&below.join("c")) & 0o222, 0);
+            assert_eq!(mode(root), of_folder);
+        }
+        assert!(create_folders(Path::new("/nowhere/a"), Path::new("/nowhere/a/b")).is_err());
     }
 
     #[cfg(target_os = "linux")]

@@ -7,6 +7,6 @@ mod digest;
 mod open_file;
 pub mod signals;
 
-pub use atomic::{SUFFIX, replace, replace_file, write_once};
+pub use atomic::{SUFFIX, create_folders, replace, replace_file, write_once};
 pub use digest::Digest;
 pub use open_file::{FileState, OpenFile};

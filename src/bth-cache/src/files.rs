@@ -70,7 +70,8 @@ impl Files {
         while let Some(folder) = folders.pop() {
             for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
                 match entry.file_type() {
-                    Ok(kind) if kind.is_dir() => folders.push(entry.path()),
+                    // A folder in the place of an entry is one that cannot be used.
+                    Ok(kind) if kind.is_dir() && named(&entry.path()).is_none() => folders.push(entry.path()),
                     Ok(_) => found.push(entry),
                     // It went away meanwhile.
                     Err(_) => {}

@@ -238,12 +238,21 @@ impl Store {
                 // It was evicted meanwhile.
                 Err(e) if e.kind() == ErrorKind::NotFound => new = self.write(&blob, bytes)?,
                 found => {
-                    let why = match found {
-                        Ok(_) => OTHER_HASH,
-                        Err(_) => "it cannot be read",
-                    };
-                    self.drop_damaged(&blob, why);
+                    match found {
+                        Ok(_) => self.drop_damaged(&blob, OTHER_HASH),
+                        // The user who made it can use it, but here it is a miss.
+                        Err(e) if e.kind() == ErrorKind::PermissionDenied => {
+                            remove(&blob);
+                        }
+                        Err(_) => self.drop_damaged(&blob, "it cannot be read"),
+                    }
                     new = self.write(&blob, bytes)?;
+                    // Another process may have put it there.
+                    let found = File::open(&blob).and_then(Digest::of_reader);
+                    if !new && !found.is_ok_and(|(digest, _)| digest == record.blob) {
+                        let what = format!("{} is in the way and cannot be removed", blob.display());
+                        return Err(std::io::Error::new(ErrorKind::AlreadyExists, what));
+                    }
                 }
             }
         }

@@ -135,6 +135,24 @@ fn a_content_that_is_put_takes_the_place_of_a_damaged_one() {
 
 #[cfg(unix)]
 #[test]
+fn a_folder_in_the_place_of_an_entry_is_told_and_not_taken_for_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path(), LARGE).unwrap();
+    let record = put(&store, "a", 1000);
+    let path = store.path(&record);
+    std::fs::remove_file(&path).unwrap();
+    std::fs::create_dir(&path).unwrap();
+    assert!(store.read(&record).is_none() && store.pin(&record).is_none() && !store.holds(&record));
+    let error = store.put(&key("a"), &content("a", 1000), json!(null)).unwrap_err();
+    assert!(error.to_string().contains("is in the way"), "{error}");
+    let found = store.verify(&|_| true);
+    assert_eq!(found.not_removed.len(), 1, "{found:?}");
+    store.evict(0);
+    store.clear();
+    assert!(path.is_dir(), "what is no entry is not removed");
+}
+
+#[test]
 fn verification_tells_what_it_cannot_read_or_remove() {
     use std::os::unix::fs::PermissionsExt;
     let folder = tempfile::tempdir().unwrap();

@@ -15,6 +15,8 @@ pub(crate) struct Files {
     root: PathBuf,
 }
 
+/// Folder of the entries, named by the version of their layout.
+const VERSION: &str = "v1";
 /// Tag by which backup programs recognize caches (<https://bford.info/cachedir/>).
 const TAG: &str = "Signature: 8a477f597d28d172789f06886806bc55\n\
     # This folder is a cache of compiled models (bthc); it may be deleted at any time.\n";
@@ -25,7 +27,7 @@ impl Files {
     /// # Errors
     /// When they cannot be.
     pub(crate) fn open(folder: &Path) -> std::io::Result<Self> {
-        let files = Self { root: folder.join("v1") };
+        let files = Self { root: folder.join(VERSION) };
         std::fs::create_dir_all(folder)?;
         for name in ["keys", "blobs", "locks", "last"] {
             create_folders(folder, &files.root.join(name))?;
@@ -36,6 +38,18 @@ impl Files {
             let _ = std::fs::write(tag, TAG);
         }
         Ok(files)
+    }
+
+    /// Whether a folder is a store or may become one: whether it has the store's folder, or is empty.
+    pub(crate) fn may_be_in(folder: &Path) -> std::io::Result<bool> {
+        let mut is_empty = true;
+        for entry in std::fs::read_dir(folder)? {
+            if entry?.file_name() == VERSION {
+                return Ok(true);
+            }
+            is_empty = false;
+        }
+        Ok(is_empty)
     }
 
     /// The record of a key.

@@ -61,6 +61,17 @@ impl Store {
         })
     }
 
+    /// As [`Store::open`] of a folder that is a store already, or empty: what is named by mistake is left as it is.
+    ///
+    /// # Errors
+    /// When it is neither, or cannot be read.
+    pub fn open_existing(folder: &Path, cap: u64) -> Result<Self> {
+        match Files::may_be_in(folder)? {
+            true => Self::open(folder, cap),
+            false => Err(std::io::Error::new(ErrorKind::NotFound, "it has other files, and none of a cache")),
+        }
+    }
+
     /// With a shared store behind it, which is read on a miss and to which every put is copied. When it fails, there is a note,
     /// and this process goes on without it.
     #[must_use]

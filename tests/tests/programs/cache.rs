@@ -227,7 +227,24 @@ fn the_cache_is_looked_after() {
     cached(path, &["compile", "s.manifest", "--cache-size", "1X"]).expect(2);
     std::fs::write(path.join("file"), "").unwrap();
     let wrong = cached(path, &["compile", "s.manifest", "--cache-dir", "file"]).expect(4);
-    assert!(wrong.stderr.contains("BTH-O060"), "{wrong:?}");
+    assert!(wrong.stderr.contains("BTH-O063"), "{wrong:?}");
+}
+
+#[test]
+fn a_folder_that_is_named_by_mistake_stays_as_it_is() {
+    let folder = folder(&[("a.obj", &sphere(4))]);
+    let path = folder.path();
+    for command in ["stats", "list", "gc", "verify", "path", "clear"] {
+        for mistake in ["missing", "."] {
+            let wrong = cached(path, &["cache", command, "--cache-dir", mistake]).expect(4);
+            assert!(wrong.stderr.contains("BTH-O063"), "{wrong:?}");
+        }
+    }
+    assert_eq!(std::fs::read_dir(path).unwrap().count(), 1);
+    std::fs::create_dir(path.join("empty")).unwrap();
+    cached(path, &["cache", "stats", "--cache-dir", "empty"]).expect(0);
+    compile(path, &["a.obj", "--cache-dir", "made"]);
+    cached(path, &["cache", "stats", "--cache-dir", "made"]).expect(0);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::common::{CACHE, EXIT_CODES};
 use crate::failure::Failure;
 use bth_cache::{DEFAULT_CAP, Store, parse_bytes};
 use clap::{Args as Group, Subcommand};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Which folder is the cache, and how large it may be.
 #[derive(Clone, Debug, Group)]
@@ -75,11 +75,26 @@ impl CacheLocation {
     /// The store; `None` if no folder for it is known.
     ///
     /// # Errors
-    /// `BTH-O060` when its folder cannot be used, `BTH-U001` for a size that is none.
+    /// `BTH-O063` when its folder cannot be used, `BTH-U001` for a size that is none.
     pub(crate) fn store(&self) -> Result<Option<Store>, Failure> {
+        self.store_by(Store::open)
+    }
+
+    /// As [`CacheLocation::store`], but a folder that the command line names must be a store already, or empty.
+    ///
+    /// # Errors
+    /// As [`CacheLocation::store`].
+    pub(crate) fn existing_store(&self) -> Result<Option<Store>, Failure> {
+        self.store_by(match self.cache_dir {
+            Some(_) => Store::open_existing,
+            None => Store::open,
+        })
+    }
+
+    fn store_by(&self, open: fn(&Path, u64) -> std::io::Result<Store>) -> Result<Option<Store>, Failure> {
         let Some(folder) = self.cache_dir.clone().or_else(bth_cache::folder) else { return Ok(None) };
-        let store = Store::open(&folder, self.size()?);
-        store.map(Some).map_err(|e| Failure::file("BTH-O060", &folder, &format!("cannot be the cache: {e}")))
+        let store = open(&folder, self.size()?);
+        store.map(Some).map_err(|e| Failure::file("BTH-O063", &folder, &format!("cannot be the cache: {e}")))
     }
 
     fn size(&self) -> Result<u64, Failure> {

@@ -10,7 +10,7 @@ use bth_compile::Monitor;
 use serde_json::{Value, json};
 
 pub(crate) fn run(args: &Cache) -> Result<(), Failure> {
-    let Some(store) = args.location.store()? else {
+    let Some(store) = args.location.existing_store()? else {
         let message = "there is no folder for the cache".to_owned();
         return Err(Failure::Usage { message, hint: "name one with --cache-dir or BTH_CACHE_DIR" });
     };

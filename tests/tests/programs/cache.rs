@@ -386,6 +386,9 @@ fn options_without_effect_are_told() {
         }
     }
     assert!(warned("a.obj", &["--for-scene"]));
+    for option in [["--poses", "3"], ["--segments", "2"]] {
+        assert!(warned("a.obj", &option) && !warned("s.manifest", &option), "{option:?}");
+    }
     assert!(warned("a.obj", &["--format", "ply"]));
     assert!(warned("s.manifest", &["--shard", "1/2", "-o", "x.bth"]));
     // What is no scene is flat as it is.

@@ -74,13 +74,14 @@ pub(crate) struct Compile {
     /// source. The object is a BVH unless --structure says otherwise.
     #[arg(long, help_heading = DEFORMING, conflicts_with_all = ["coordinates", "max_error", "no_geometry", "compact", "rigid_parts"])]
     pub(crate) deformable: bool,
-    /// Poses over which the tree of an object is built whose vertices move by themselves, 1 to 16; more take longer. 1 builds it for
-    /// the first pose.
-    #[arg(long, help_heading = DEFORMING, default_value_t = 8, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=16))]
-    pub(crate) poses: u32,
-    /// Most ranges of time that get a tree of their own, where one tree for all poses would cost rays too much; each takes memory.
-    #[arg(long, help_heading = DEFORMING, default_value_t = 4, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
-    pub(crate) segments: u32,
+    /// Poses over which the tree of an object is built whose vertices move by themselves, 1 to 16, by default 8; more take longer. 1
+    /// builds it for the first pose.
+    #[arg(long, help_heading = DEFORMING, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=16))]
+    pub(crate) poses: Option<u32>,
+    /// Most ranges of time that get a tree of their own, where one tree for all poses would cost rays too much, by default 4; each takes
+    /// memory.
+    #[arg(long, help_heading = DEFORMING, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
+    pub(crate) segments: Option<u32>,
     #[command(flatten)]
     pub(crate) selection: Selection,
     /// For scenes: let the rays of their cameras, lights and frames decide how trees are built and what is tetrahedralized, more than
@@ -158,7 +159,7 @@ impl Compile {
             geometry: !self.no_geometry,
             deformable: self.deformable,
             deformable_tets: self.deformable && structure == Structure::Bth,
-            motion: bth_compile::pipeline::MotionOptions { poses: self.poses, segments: self.segments },
+            motion: self.motion(),
             ..Default::default()
         };
         self.selection.apply(&mut options, monitor)?;
@@ -171,6 +172,14 @@ impl Compile {
             options.tets.memory = mib << 20;
         }
         Ok(options)
+    }
+
+    fn motion(&self) -> bth_compile::pipeline::MotionOptions {
+        let usual = bth_compile::pipeline::MotionOptions::default();
+        bth_compile::pipeline::MotionOptions {
+            poses: self.poses.unwrap_or(usual.poses),
+            segments: self.segments.unwrap_or(usual.segments),
+        }
     }
 
     /// Who asks for fast compiling or small files gets nothing that only hinted rays use without asking for it.

@@ -163,8 +163,15 @@ fn warn_of_options(args: &Compile, jobs: &[Job], monitor: &dyn Monitor) {
     {
         monitor.warn(&format!("{option} has no effect: no model is a glTF file that is compiled as a scene"));
     }
-    if args.for_scene && !jobs.iter().any(|job| scene::is_scene(&job.model, args)) {
-        monitor.warn("--for-scene has no effect: no model is a scene");
+    if !jobs.iter().any(|job| scene::is_scene(&job.model, args)) {
+        let of_scenes = [
+            ("--for-scene", args.for_scene),
+            ("--poses", args.poses.is_some()),
+            ("--segments", args.segments.is_some()),
+        ];
+        for (option, _) in of_scenes.iter().filter(|(_, is_given)| *is_given) {
+            monitor.warn(&format!("{option} has no effect: no model is a scene"));
+        }
     }
     if args.jobs.format.is_some() && !jobs.iter().any(|job| job.is_input) {
         monitor.warn("--format has no effect: no model comes from standard input");

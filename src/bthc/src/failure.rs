@@ -76,6 +76,25 @@ impl Failure {
         })
     }
 
+    /// With another name of a file in the place of the error.
+    pub(crate) fn with_name(mut self, file: &Path, name: &Path) -> Self {
+        use bth_compile::Error;
+        use bth_compile::error::Place;
+        let path = match &mut self {
+            Self::Compile(Error::File { path, .. }) => path,
+            Self::Compile(Error::Input { place, .. }) => match place {
+                Place::File(path) | Place::Line(path, _) | Place::Byte(path, _) | Place::Part(path, _) => {
+                    path
+                }
+            },
+            _ => return self,
+        };
+        if path == file {
+            name.clone_into(path);
+        }
+        self
+    }
+
     pub(crate) fn exit_code(&self) -> u8 {
         use bth_compile::Error;
         match self {

@@ -91,6 +91,30 @@ fn a_model_passes_through_pipes() {
     bthc(path, &["compile", "a.obj", "--watch", "--depfile", "a.d"]).expect(2);
 }
 
+#[test]
+fn places_of_errors_name_standard_input_and_not_its_copy() {
+    let folder =
+        folder(&[("bad.obj", "v 0 0 0\nv 1 0 0\nf 1 2 9\n"), ("a.obj", &sphere(4)), ("bad.glb", "glTF")]);
+    let path = folder.path();
+    let run = |args: &[&str], model: &str| {
+        let mut command = command("bthc", path, args);
+        command.stdin(std::fs::File::open(path.join(model)).unwrap());
+        run_with(command)
+    };
+    let bad = run(&["compile", "-", "--format", "obj", "-o", "x.bth", "--json"], "bad.obj").expect(3);
+    assert_eq!(bad.json()["error"]["place"], "standard input:3");
+    assert!(bad.stderr.starts_with("error: standard input:3: BTH-"), "{bad:?}");
+    let dry = run(&["compile", "-", "--format", "glb", "-o", "x.bth", "--dry-run"], "bad.glb").expect(3);
+    assert!(dry.stderr.starts_with("error: standard input"), "{dry:?}");
+    let many = run(&["compile", "-", "a.obj", "--format", "glb", "-o", ".", "--json"], "bad.glb").expect(3);
+    assert!(
+        many.json()["jobs"][0]["error"]["place"].as_str().unwrap().starts_with("standard input"),
+        "{many:?}"
+    );
+    let kept = run(&["compile", "-", "--in-cache", "--cache-dir", "c", "--json"], "a.obj").expect(0);
+    assert_eq!(kept.json()["inputs"], serde_json::json!([]));
+}
+
 /// A model is hashed and then read, and a pipe is empty after that.
 #[cfg(target_os = "linux")]
 #[test]

@@ -27,12 +27,12 @@ pub(crate) fn run(args: &Compile) -> Result<(), Failure> {
         progress::end_with_input()?;
     }
     if let Some(i) = from_input {
-        stdin = deliver::standard_input(args.jobs.format.as_deref())?;
-        stdin.path().clone_into(&mut models[i]);
         if args.output.is_none() && !args.keeping.in_cache {
             let message = "a model from standard input has no name that the output could have".to_owned();
             return Err(Failure::Usage { message, hint: "name the output with -o" });
         }
+        stdin = deliver::standard_input(args.jobs.format.as_deref())?;
+        stdin.path().clone_into(&mut models[i]);
     }
     let mut jobs = plan(args, &models, from_input)?;
     check_rays(args, &jobs)?;
@@ -78,7 +78,9 @@ fn all(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -> Result<(),
     }
     let progress = progress.of_jobs(jobs.len() as u64);
     let results = jobs::run(args, jobs, |job, threads| {
-        let done = with_threads(threads, || compile_one(context, job, &Quiet::new(&progress, &job.model)))?;
+        let name = job.name();
+        let monitor = Quiet::new(&progress, Path::new(&*name));
+        let done = with_threads(threads, || compile_one(context, job, &monitor))?;
         if let Ok(done) = &done
             && !args.json
             && !args.quiet

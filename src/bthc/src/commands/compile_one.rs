@@ -18,7 +18,7 @@ pub(super) fn compile_one(
     monitor: &dyn Monitor,
 ) -> Result<JobReport, Failure> {
     let recording = Recording::with_notices(monitor);
-    let mut report = compile_job(context, job, &recording)?;
+    let mut report = compile_job(context, job, &recording).map_err(|failure| job.failure(failure))?;
     report.json["warnings"] = recording.warnings().into();
     Ok(report)
 }

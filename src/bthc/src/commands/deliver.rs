@@ -34,7 +34,7 @@ pub(super) fn deliver<R>(
             }
         }
         (Target::File(path), None) => {
-            if inputs()?.iter().any(|input| modified(input) > modified(path)) {
+            if job.is_input || inputs()?.iter().any(|input| modified(input) > modified(path)) {
                 // Build systems compare modification times, so an output that is up to date must be newer than its inputs.
                 touch(path, outcome.record.as_ref(), context.store.as_ref())?;
             }
@@ -84,7 +84,8 @@ pub(super) fn deliver<R>(
     });
     if job.target == Target::Cache {
         // For programs that must not replace them.
-        json["inputs"] = inputs()?.iter().map(|input| input.to_string_lossy()).collect();
+        let is_named = |input: &&PathBuf| !job.is_input || **input != job.model;
+        json["inputs"] = inputs()?.iter().filter(is_named).map(|input| input.to_string_lossy()).collect();
     }
     Ok(JobReport {
         json,

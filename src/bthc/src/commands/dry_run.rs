@@ -18,9 +18,10 @@ pub(super) fn show(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -
     for job in jobs {
         let cache = cache(context, job);
         let found = match scene::is_scene(&job.model, context.args) {
-            true => scene::dry_run(context, job, &cache, &progress)?,
-            false => cached::dry_run(&job.model, &context.options, &cache, &progress)?,
+            true => scene::dry_run(context, job, &cache, &progress),
+            false => cached::dry_run(&job.model, &context.options, &cache, &progress).map_err(Failure::from),
         };
+        let found = found.map_err(|failure| job.failure(failure))?;
         let (what, why) = action(context, job, &found);
         let why = why.join(", ");
         let behind = if why.is_empty() { String::new() } else { format!(" ({why})") };

@@ -1,6 +1,7 @@
 //! A compilation job: a model, where its compiled file goes, and what is reported about it.
 
 use crate::args::Compile;
+use crate::failure::Failure;
 use bth_cache::{Digest, Record, Store};
 use bth_compile::cached::Cache;
 use bth_compile::pipeline::CompileOptions;
@@ -43,7 +44,18 @@ pub(super) struct JobReport {
     pub(super) line: String,
 }
 
+/// Name of standard input in the places of errors.
+const STANDARD_INPUT: &str = "standard input";
+
 impl Job {
+    /// An error of this job. The temporary file of a model from standard input is not a place that users know.
+    pub(super) fn failure(&self, failure: Failure) -> Failure {
+        match self.is_input {
+            true => failure.with_name(&self.model, Path::new(STANDARD_INPUT)),
+            false => failure,
+        }
+    }
+
     /// The name of the model in reports: as it was given.
     pub(super) fn name(&self) -> Cow<'_, str> {
         match self.is_input {

@@ -14,7 +14,7 @@ fn mistaken(program: &str, folder: &Path, args: &[&str]) -> Run {
 /// A program, its arguments, its exit code, and what the error must contain.
 type Mistake = (&'static str, &'static [&'static str], i32, &'static [&'static str]);
 
-const BTHC: [Mistake; 20] = [
+const BTHC: [Mistake; 25] = [
     ("bthc", &["nosuch"], 2, &["nosuch"]),
     ("bthc", &["compile", "ball.obj", "--nosuch"], 2, &["--nosuch"]),
     ("bthc", &["compile", "missing.obj"], 4, &["missing.obj", "BTH-O"]),
@@ -35,6 +35,11 @@ const BTHC: [Mistake; 20] = [
     ("bthc", &["trace", "missing.bth", "missing.rays", "-o", "x.hits"], 4, &["missing.rays", "BTH-O090"]),
     ("bthc", &["import", "ball.obj"], 2, &["BTH-U001", "ball.obj", "hint"]),
     ("bthc", &["--isa", "nosuch", "info", "ball.obj"], 2, &["nosuch"]),
+    ("bthc", &["compile", "ball.obj", "--depfile", "-"], 2, &["--depfile", "not standard output"]),
+    ("bthc", &["marks", "ball.obj", "--tris", "-"], 2, &["--tris", "not standard output"]),
+    ("bthc", &["explain", "ball.obj", "--picture", "-"], 2, &["--picture", "not standard output"]),
+    ("bthc", &["trace", "a.bth", "a.rays", "-o", "-"], 2, &["--output", "not standard output"]),
+    ("bthc", &["calibrate", "-o", "-"], 2, &["--output", "not standard output"]),
 ];
 
 const BTH_PLAY: [Mistake; 11] = [

@@ -1,5 +1,8 @@
 //! What several commands share: headings and exit codes in the help, and kinds of numbers.
 
+use clap::builder::{PathBufValueParser, TypedValueParser};
+use std::path::PathBuf;
+
 /// Exit codes, as the help lists them.
 pub(super) const EXIT_CODES: &str = "\
 Exit codes:
@@ -28,6 +31,14 @@ pub(super) fn threads(text: &str) -> Result<usize, String> {
         Ok(n) if n <= 4096 => Ok(n),
         _ => Err("expected a number from 0 to 4096".to_owned()),
     }
+}
+
+/// Parses the path of a file that is written, which standard output cannot take the place of.
+pub(super) fn output_file() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| match path.as_os_str() == "-" {
+        true => Err("expected the name of a file, not standard output; ./- is a file of that name"),
+        false => Ok(path),
+    })
 }
 
 /// Parses a finite positive number.

@@ -1,6 +1,6 @@
 //! Options for compiling many models, and for build systems.
 
-use super::common::JOBS;
+use super::common::{JOBS, output_file};
 use clap::Args as Group;
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ pub(crate) struct Jobs {
     #[arg(long, help_heading = JOBS, conflicts_with_all = ["depfile", "watch"])]
     pub(crate) dry_run: bool,
     /// Also write which files the outputs depend on, for Make and Ninja.
-    #[arg(long, help_heading = JOBS, value_name = "FILE")]
+    #[arg(long, help_heading = JOBS, value_name = "FILE", value_parser = output_file())]
     pub(crate) depfile: Option<PathBuf>,
     /// Format of a model from standard input: obj, ply, stl, off or glb; by default by its content.
     #[arg(long, help_heading = JOBS, value_name = "FORMAT", value_parser = ["obj", "ply", "stl", "off", "glb"])]

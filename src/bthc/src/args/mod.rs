@@ -14,7 +14,7 @@ pub(crate) use gltf::Gltf;
 pub(crate) use selection::Selection;
 
 use clap::{Args as Group, Parser, Subcommand};
-use common::{EXIT_CODES, threads};
+use common::{EXIT_CODES, output_file, threads};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -130,10 +130,10 @@ pub(crate) struct Explain {
     #[arg(long)]
     pub(crate) measure: bool,
     /// Also draw the model, coloured by what its triangles are in and by what a bounce costs, as a PNG.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = output_file())]
     pub(crate) picture: Option<PathBuf>,
     /// Also decide in which directions rays from triangles meet nothing, say what it costs, and draw as a PNG which surfaces are free.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = output_file())]
     pub(crate) free_picture: Option<PathBuf>,
     /// Nodes to show, largest first; 0 for all.
     #[arg(long, default_value_t = 20, value_name = "N")]
@@ -153,7 +153,7 @@ pub(crate) struct Calibrate {
     /// Models to measure on besides our own; they must be free of bad contacts.
     pub(crate) models: Vec<PathBuf>,
     /// The profile.
-    #[arg(short, long, value_name = "FILE", default_value = "bth-profile.json")]
+    #[arg(short, long, value_name = "FILE", default_value = "bth-profile.json", value_parser = output_file())]
     pub(crate) output: PathBuf,
     /// Rounds of which the fastest counts.
     #[arg(long, default_value_t = 30, value_name = "N", value_parser = rounds)]
@@ -170,7 +170,7 @@ pub(crate) struct Marks {
     /// The model.
     pub(crate) model: PathBuf,
     /// Also write the triangles that were read, as a .tris file.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = output_file())]
     pub(crate) tris: Option<PathBuf>,
     /// Threads; 0 for one per processor.
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = threads)]
@@ -198,7 +198,7 @@ pub(crate) struct Trace {
     /// The rays.
     pub(crate) rays: PathBuf,
     /// Where the hits go.
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", value_parser = output_file())]
     pub(crate) output: PathBuf,
     /// Ask only whether anything is hit: the triangle of a hit is 0 and t is 0.
     #[arg(long)]

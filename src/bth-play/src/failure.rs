@@ -138,11 +138,11 @@ pub(crate) fn text_of(error: &Value) -> String {
 
 /// Reports a wrong command line, or shows help or the version.
 pub(crate) fn usage(error: &clap::Error, wants_json: bool) -> ExitCode {
-    // Where the output is closed, the exit code is all that can be reported.
-    let _ = error.print();
+    let printed = error.print().and_then(|()| std::io::stdout().flush());
     if !error.use_stderr() {
-        return ExitCode::SUCCESS;
+        return printed.map_or_else(|e| Failure::from(e).report(wants_json), |()| ExitCode::SUCCESS);
     }
+    // Where standard error is closed, the exit code is all that can be reported.
     if wants_json {
         let text = error.to_string();
         let first = text.lines().next().unwrap_or_default().trim_start_matches("error: ");

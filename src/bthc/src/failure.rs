@@ -2,6 +2,7 @@
 
 use crate::output;
 use serde_json::json;
+use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -190,12 +191,15 @@ fn print_json_error(mut error: serde_json::Value, exit_code: u8) {
 
 /// Reports a wrong command line, or shows help or the version.
 pub(crate) fn usage(error: &clap::Error, wants_json: bool) -> ExitCode {
-    // Where the output is closed, the exit code is all that can be reported.
-    let _ = error.print();
-    if error.use_stderr() && wants_json {
+    let printed = error.print().and_then(|()| std::io::stdout().flush());
+    if !error.use_stderr() {
+        return printed.map_or_else(|e| Failure::from(e).report(wants_json), |()| ExitCode::SUCCESS);
+    }
+    // Where standard error is closed, the exit code is all that can be reported.
+    if wants_json {
         let first =
             error.to_string().lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
         print_json_error(json!({"code": "BTH-U001", "message": first}), 2);
     }
-    ExitCode::from(if error.use_stderr() { 2 } else { 0 })
+    ExitCode::from(2)
 }

@@ -99,6 +99,30 @@ fn model_is_never_overwritten_by_its_own_output() {
     assert_eq!(std::fs::read(folder.path().join("model.bth")).unwrap(), b"v 0 0 0\n");
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn help_that_cannot_be_printed_is_an_error_and_a_closed_pipe_is_none() {
+    let folder = folder(&[]);
+    for (program, args) in [
+        ("bthc", &["--help"][..]),
+        ("bthc", &["compile", "-h"]),
+        ("bthc", &["--version"]),
+        ("bth-play", &["--help"]),
+        ("bth-play", &["--version"]),
+    ] {
+        let mut full = command(program, folder.path(), args);
+        full.stdout(std::fs::File::options().write(true).open("/dev/full").unwrap());
+        let full = run_with(full).expect(4);
+        assert!(full.stderr.contains("standard output"), "{full:?}");
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let mut closed = command(program, folder.path(), args);
+        closed.stdout(writer);
+        let closed = run_with(closed).expect(0);
+        assert_eq!(closed.stderr, "", "{args:?}");
+    }
+}
+
 /// By default a signal ends who writes beyond the limit.
 #[cfg(unix)]
 #[test]

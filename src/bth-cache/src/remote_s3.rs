@@ -5,7 +5,7 @@ use object_store::aws::{AmazonS3, AmazonS3Builder};
 use object_store::path::Path;
 use object_store::{ClientOptions, ObjectStoreExt, RetryConfig};
 use std::io::{Error, ErrorKind, Result};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
 use tokio::time::timeout;
 
@@ -16,6 +16,9 @@ const ALL_TRIES: Duration = Duration::from_secs(30);
 /// Least bytes a second of a transfer: a slower server counts as one that does not answer.
 const SLOWEST: u64 = 1 << 20;
 
+/// Time between two looks at whether the user cancelled.
+const CANCEL_INTERVAL: Duration = Duration::from_millis(100);
+
 /// A bucket, or part of one.
 #[derive(Debug)]
 pub struct S3 {
@@ -23,15 +26,17 @@ pub struct S3 {
     prefix: Path,
     bucket: AmazonS3,
     runtime: Runtime,
+    cancelled: fn() -> bool,
 }
 
 impl S3 {
     /// A place such as `s3://bucket/prefix`; how to reach it stands in the variables `AWS_ACCESS_KEY_ID`,
-    /// `AWS_SECRET_ACCESS_KEY`, `AWS_REGION`, `AWS_ENDPOINT_URL` and `AWS_ALLOW_HTTP`. Nothing is sent yet.
+    /// `AWS_SECRET_ACCESS_KEY`, `AWS_REGION`, `AWS_ENDPOINT_URL` and `AWS_ALLOW_HTTP`. Nothing is sent yet. When `cancelled` says so,
+    /// nothing more is waited for.
     ///
     /// # Errors
     /// When it is no such place, or a variable is none.
-    pub fn open(url: &str) -> Result<Self> {
+    pub fn open(url: &str, cancelled: fn() -> bool) -> Result<Self> {
         let prefix = url.strip_prefix("s3://").and_then(|rest| rest.split_once('/')).map_or("", |(_, p)| p);
         // The client's own limit is one for a whole transfer of any size.
         let options = ClientOptions::new().with_connect_timeout(CONNECT).with_timeout_disabled();
@@ -43,7 +48,28 @@ impl S3 {
             prefix: Path::parse(prefix).map_err(Error::other)?,
             bucket: bucket.build().map_err(Error::other)?,
             runtime: tokio::runtime::Builder::new_current_thread().enable_all().build()?,
+            cancelled,
         })
+    }
+
+    /// What the server answers within a time limit.
+    ///
+    /// # Errors
+    /// `TimedOut`, and `Interrupted` when the user cancelled.
+    async fn within<T>(&self, limit: Duration, answer: impl Future<Output = T>) -> Result<T> {
+        let mut answer = std::pin::pin!(answer);
+        let start = Instant::now();
+        loop {
+            if (self.cancelled)() {
+                return Err(Error::new(ErrorKind::Interrupted, "cancelled"));
+            }
+            let left = limit.saturating_sub(start.elapsed());
+            match timeout(left.min(CANCEL_INTERVAL), answer.as_mut()).await {
+                Ok(answer) => return Ok(answer),
+                Err(elapsed) if left.is_zero() => return Err(elapsed.into()),
+                Err(_) => {}
+            }
+        }
     }
 
     fn place(&self, name: &str) -> Path {
@@ -54,7 +80,7 @@ impl S3 {
 impl Remote for S3 {
     fn get(&self, name: &str) -> Result<Option<Vec<u8>>> {
         self.runtime.block_on(async {
-            let found = match timeout(ALL_TRIES, self.bucket.get(&self.place(name))).await? {
+            let found = match self.within(ALL_TRIES, self.bucket.get(&self.place(name))).await? {
                 Err(object_store::Error::NotFound { .. }) => return Ok(None),
                 found => found.map_err(Error::other)?,
             };
@@ -65,7 +91,7 @@ impl Remote for S3 {
             if !has_memory {
                 return Err(Error::new(ErrorKind::OutOfMemory, format!("{name} has {size} bytes")));
             }
-            let bytes = timeout(limit(size), found.bytes()).await?;
+            let bytes = self.within(limit(size), found.bytes()).await?;
             bytes.map(|bytes| Some(bytes.into())).map_err(Error::other)
         })
     }
@@ -75,7 +101,7 @@ impl Remote for S3 {
         let place = self.place(name);
         self.runtime.block_on(async {
             let put = self.bucket.put(&place, bytes.to_vec().into());
-            timeout(limit(bytes.len() as u64), put).await?.map(|_| ()).map_err(Error::other)
+            self.within(limit(bytes.len() as u64), put).await?.map(|_| ()).map_err(Error::other)
         })
     }
 

@@ -399,7 +399,10 @@ impl Store {
     }
 
     fn give_up(&self, remote: &mut Option<Box<dyn Remote>>, error: &std::io::Error) {
-        if let Some(gone) = remote.take() {
+        if let Some(gone) = remote.take()
+            // Who cancels does not go on.
+            && error.kind() != ErrorKind::Interrupted
+        {
             let name = gone.name();
             lock(&self.notes).push(format!("cache: going on without the shared store {name}: {error}"));
         }

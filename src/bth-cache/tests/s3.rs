@@ -3,7 +3,8 @@
 #![allow(clippy::print_stdout)]
 
 use bth_cache::{Digest, Key, Remote, S3, Store};
-use std::time::Instant;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 const LARGE: u64 = 1 << 30;
 
@@ -13,7 +14,8 @@ fn store(folder: &tempfile::TempDir) -> Option<(Store, String)> {
         println!("skipped: BTH_TEST_S3 names no bucket (tools/s3/run does)");
         return None;
     };
-    let store = Store::open(folder.path(), LARGE).unwrap().with_remote(Box::new(S3::open(&url).unwrap()));
+    let store =
+        Store::open(folder.path(), LARGE).unwrap().with_remote(Box::new(S3::open(&url, || false).unwrap()));
     Some((store, url))
 }
 
@@ -39,7 +41,7 @@ fn what_one_machine_makes_another_finds() {
     assert!(alone.find(&key("a")).and_then(|r| alone.read(&r)).as_deref() == Some(&content[..]));
 
     // Damaged entries of the server are not copied.
-    let s3 = S3::open(&url).unwrap();
+    let s3 = S3::open(&url, || false).unwrap();
     let hex = record.blob.hex();
     s3.put(&format!("blobs/{}/{hex}", &hex[..2]), b"something else", true).unwrap();
     let third = tempfile::tempdir().unwrap();
@@ -55,7 +57,7 @@ fn a_server_that_cannot_be_reached_is_gone_on_without() {
         return;
     }
     // The bucket does not exist, which must be handled like a server that cannot be reached.
-    let gone = S3::open("s3://no-such-bucket/x").unwrap();
+    let gone = S3::open("s3://no-such-bucket/x", || false).unwrap();
     let local = tempfile::tempdir().unwrap();
     let store = Store::open(local.path(), LARGE).unwrap().with_remote(Box::new(gone));
     let start = Instant::now();
@@ -64,4 +66,32 @@ fn a_server_that_cannot_be_reached_is_gone_on_without() {
     assert!(notes.len() == 1 && notes[0].contains("going on without"), "{notes:?}");
     assert!(start.elapsed().as_secs() < 40);
     assert_eq!(store.read(&record).map(|bytes| Digest::of(&bytes)), Some(record.blob));
+}
+
+/// Runs itself again in a process whose server accepts connections and says nothing.
+#[test]
+fn a_server_that_hangs_is_not_waited_for_when_the_user_cancels() {
+    const VARIABLE: &str = "BTH_TEST_HANGING_S3";
+    static CANCELLED: AtomicBool = AtomicBool::new(false);
+    if std::env::var_os(VARIABLE).is_some() {
+        let local = tempfile::tempdir().unwrap();
+        let s3 = S3::open("s3://bucket/x", || CANCELLED.load(Ordering::Relaxed)).unwrap();
+        let store = Store::open(local.path(), LARGE).unwrap().with_remote(Box::new(s3));
+        std::thread::spawn(|| {
+            std::thread::sleep(Duration::from_millis(300));
+            CANCELLED.store(true, Ordering::Relaxed);
+        });
+        let start = Instant::now();
+        assert_eq!(store.find(&key("a")), None);
+        assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
+        return assert_eq!(store.take_notes(), [""; 0]);
+    }
+    let server = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let mut again = std::process::Command::new(std::env::current_exe().unwrap());
+    again.args(["--exact", "a_server_that_hangs_is_not_waited_for_when_the_user_cancels"]).env(VARIABLE, "1");
+    again.env("AWS_ENDPOINT_URL", format!("http://{}", server.local_addr().unwrap()));
+    again.envs([("AWS_ALLOW_HTTP", "true"), ("AWS_REGION", "us-east-1")]);
+    again.envs([("AWS_ACCESS_KEY_ID", "test"), ("AWS_SECRET_ACCESS_KEY", "test")]);
+    let done = again.output().unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stdout));
 }

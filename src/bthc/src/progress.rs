@@ -40,6 +40,11 @@ pub(crate) fn listen_for_interrupts(wants_json: bool) -> Result<(), Failure> {
     }
 }
 
+/// Whether the user cancelled.
+pub(crate) fn is_cancelled() -> bool {
+    CANCELLED.load(Ordering::Relaxed)
+}
+
 /// Stops the compilation cleanly when standard input ends.
 ///
 /// # Errors
@@ -159,7 +164,7 @@ impl Monitor for Progress {
         self.bar.inc(units);
     }
     fn cancelled(&self) -> bool {
-        CANCELLED.load(Ordering::Relaxed)
+        is_cancelled()
     }
     fn warn(&self, message: &str) {
         if self.warns {

@@ -152,7 +152,7 @@ impl Keeping {
 fn remote(name: &str) -> Result<Box<dyn bth_cache::Remote>, Failure> {
     #[cfg(feature = "s3")]
     if name.starts_with("s3://") {
-        let s3 = bth_cache::S3::open(name).map_err(|e| Failure::Usage {
+        let s3 = bth_cache::S3::open(name, crate::progress::is_cancelled).map_err(|e| Failure::Usage {
             message: format!("{name} cannot be a shared cache: {e}"),
             hint: "the variables AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION and AWS_ENDPOINT_URL say how to reach it",
         })?;

@@ -5,11 +5,16 @@ use crate::failure::Failure;
 use crate::interrupt::Part;
 use crate::messages;
 use bth_cache::{DEFAULT_CAP, Digest, Pin, Store};
+use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::Value;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::{Condvar, Mutex, PoisonError};
+use std::time::Duration;
 
+/// Time between two changes of what a terminal shows.
+const INTERVAL: Duration = Duration::from_millis(100);
 /// Extensions of the files that `bthc` compiles.
 const SOURCES: [&str; 8] = ["manifest", "toml", "gltf", "glb", "obj", "ply", "stl", "off"];
 
@@ -122,6 +127,37 @@ impl std::fmt::Display for CompileError {
     }
 }
 
+/// Does work, and shows on a terminal for how long.
+fn showing_time<T: Send>(what: &str, work: impl FnOnce() -> T + Send) -> T {
+    if !std::io::stderr().is_terminal() {
+        return work();
+    }
+    let bar = ProgressBar::new_spinner().with_message(what.to_owned());
+    if let Ok(style) = ProgressStyle::with_template("{msg} {spinner} {elapsed}") {
+        bar.set_style(style);
+    }
+    let has_ended = Mutex::new(false);
+    let ended = Condvar::new();
+    let done = std::thread::scope(|scope| {
+        let show = || {
+            let mut has_ended = has_ended.lock().unwrap_or_else(PoisonError::into_inner);
+            while !*has_ended {
+                bar.tick();
+                let waited = ended.wait_timeout(has_ended, INTERVAL).unwrap_or_else(PoisonError::into_inner);
+                has_ended = waited.0;
+            }
+        };
+        // Where the system starts no thread, the time does not move.
+        let _ = std::thread::Builder::new().spawn_scoped(scope, show);
+        let done = work();
+        *has_ended.lock().unwrap_or_else(PoisonError::into_inner) = true;
+        ended.notify_all();
+        done
+    });
+    bar.finish_and_clear();
+    done
+}
+
 /// Runs `bthc` to compile into the cache. It ends when this program does, however that ends, since its standard input is closed then.
 fn compile(source: &Path, cache: &Path, materials: bool) -> Result<Done, CompileError> {
     let failed = |message: String| CompileError::Started(Failure::Source { path: source.into(), message });
@@ -132,9 +168,6 @@ fn compile(source: &Path, cache: &Path, materials: bool) -> Result<Done, Compile
     let Some(bthc) = bthc else {
         return Err(failed("it is not compiled yet, and there is no bthc beside this program".to_owned()));
     };
-    if std::io::stderr().is_terminal() {
-        messages::note(&format!("compiling {}", source.display()));
-    }
     let mut command = Command::new(&bthc);
     command.arg("compile").args(["--in-cache", "--json", "--end-with-input", "--cache-dir"]).arg(cache);
     if materials {
@@ -143,7 +176,7 @@ fn compile(source: &Path, cache: &Path, materials: bool) -> Result<Done, Compile
     command.arg("--").arg(source).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let started = command.spawn().and_then(|mut child| {
         let _open_until_it_ends = child.stdin.take();
-        child.wait_with_output()
+        showing_time(&format!("compiling {}", source.display()), || child.wait_with_output())
     });
     let output = started.map_err(|e| failed(format!("{} cannot be started: {e}", bthc.display())))?;
     let stderr = String::from_utf8_lossy(&output.stderr);

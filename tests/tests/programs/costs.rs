@@ -37,6 +37,22 @@ fn limits_and_weights_decide_what_is_tetrahedralized() {
 }
 
 #[test]
+fn tetrahedra_need_no_folder_for_temporary_files() {
+    let folder = folder(&[("ball.obj", &sphere(24))]);
+    let args = [&["compile", "ball.obj", "-o", "out.bth", "--json"], &CHEAP[..]].concat();
+    if !worker_is_there(&bthc(folder.path(), &args).expect(0).json()) {
+        return;
+    }
+    let mut without = command("bthc", folder.path(), &args);
+    without.env("TMPDIR", folder.path().join("missing"));
+    let json = run_with(without).expect(0).json();
+    assert!(
+        worker_is_there(&json) && json["report"]["file"]["tet_triangles"].as_u64().unwrap() > 0,
+        "{json:#}"
+    );
+}
+
+#[test]
 fn tracing_reads_no_more_bytes_than_the_limit_and_what_cannot_be_held_is_said() {
     let folder = folder(&[("ball.obj", &sphere(24))]);
     let compile = |more: &[&str]| {

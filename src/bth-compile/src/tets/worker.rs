@@ -54,12 +54,12 @@ impl Worker {
         let mut command = Command::new(&setup.program);
         command.args(["--memory", &setup.memory.to_string(), "--parent", &std::process::id().to_string()]);
         // TetGen opens no files here; a version that did would leave them in the folder for temporary files, not in the
-        // user's.
-        command
-            .current_dir(std::env::temp_dir())
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null());
+        // user's. Where there is none, it must not keep the worker from starting.
+        let folder = std::env::temp_dir();
+        if folder.is_dir() {
+            command.current_dir(folder);
+        }
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
         // The worker does not receive interrupts from the terminal; the compiler receives them and ends its workers.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);

@@ -49,23 +49,28 @@ impl TemporaryCache {
 }
 
 /// The compiled file of a scene or model in the cache, checked; compiled now if the cache lacks it. With `materials` it is compiled with
-/// these and with holes by alpha, or without where its materials cannot be read. Where `BTH_NO_CACHE` is set and no folder is given, the cache
-/// is a temporary one.
+/// these and with holes by alpha, or without where its materials cannot be read. Where no folder is given and `BTH_NO_CACHE` is set, or the
+/// usual folder is not known or cannot be used, the cache is a temporary one.
 ///
 /// # Errors
 /// If the source cannot be compiled, or the cache cannot be used.
 pub(crate) fn compiled(source: &Path, cache: Option<&Path>, materials: bool) -> Result<Compiled, Failure> {
     let failed = |message: &str| Failure::Source { path: source.into(), message: message.to_owned() };
     let is_off = std::env::var_os("BTH_NO_CACHE").is_some_and(|value| !value.is_empty());
-    let temporary = if is_off && cache.is_none() { Some(TemporaryCache::new()?) } else { None };
-    let folder = match &temporary {
-        Some(temporary) => Some(temporary.folder.path().to_owned()),
-        None => cache.map(Path::to_owned).or_else(bth_cache::folder),
+    let (store, temporary) = match cache {
+        Some(folder) => (open(folder)?, None),
+        None => match bth_cache::folder().filter(|_| !is_off).map(|folder| open(&folder)) {
+            Some(Ok(store)) => (store, None),
+            found => {
+                if let Some(Err(failure)) = found {
+                    messages::warn(&format!("going on without the cache: {failure}"));
+                }
+                let temporary = TemporaryCache::new()?;
+                (open(temporary.folder.path())?, Some(temporary))
+            }
+        },
     };
-    let folder = folder
-        .ok_or_else(|| failed("there is no folder for the cache; BTH_CACHE_DIR or --cache-dir names one"))?;
-    let store = Store::open(&folder, DEFAULT_CAP)
-        .map_err(|e| Failure::file(&folder, &format!("cannot be the cache: {e}")))?;
+    let folder = store.folder().to_owned();
     // An entry that is damaged, or evicted before it is pinned, is compiled again.
     for _ in 0..3 {
         let done = match compile(source, &folder, materials) {
@@ -84,6 +89,10 @@ pub(crate) fn compiled(source: &Path, cache: Option<&Path>, materials: bool) -> 
         }
     }
     Err(failed("the compiled file does not stay in the cache"))
+}
+
+fn open(folder: &Path) -> Result<Store, Failure> {
+    Store::open(folder, DEFAULT_CAP).map_err(|e| Failure::file(folder, &format!("cannot be the cache: {e}")))
 }
 
 /// What `bthc` made.

@@ -45,6 +45,12 @@ impl From<bth::Error> for Failure {
     }
 }
 
+impl Display for Failure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.json().map_or(Ok(()), |(error, _)| f.write_str(&text_of(&error)))
+    }
+}
+
 impl Failure {
     /// A file or folder that could not be written.
     pub(crate) fn file(path: &Path, message: &dyn Display) -> Self {

@@ -38,6 +38,24 @@ fn no_picture_replaces_what_is_read() {
     assert!(path.join("other/0000.png").is_file());
 }
 
+/// As in a container without a home, or with one that cannot be written.
+#[test]
+fn models_are_shown_without_a_folder_for_the_cache() {
+    let folder = folder(&[("ball.obj", &sphere(12)), ("file", "")]);
+    for home in [None, Some("file")] {
+        let mut player = command("bth-play", folder.path(), &["ball.obj", "-o", "a.png", "--size", "16x9"]);
+        player.env_remove("BTH_NO_CACHE").env_remove("BTH_CACHE_DIR").env_remove("XDG_CACHE_HOME");
+        player.env_remove("LOCALAPPDATA");
+        match home {
+            Some(home) => player.env("HOME", folder.path().join(home)),
+            None => player.env_remove("HOME"),
+        };
+        let run = run_with(player).expect(0);
+        assert_eq!(run.stderr.contains("warning: going on without the cache"), home.is_some(), "{run:?}");
+        std::fs::remove_file(folder.path().join("a.png")).unwrap();
+    }
+}
+
 #[test]
 fn where_nothing_can_be_written_nothing_is_rendered() {
     let folder = folder(&[("ball.obj", &sphere(12)), ("file", "")]);

@@ -17,6 +17,8 @@ pub struct Evicted {
     pub bytes: u64,
     /// Contents that would have been removed, were they not in use.
     pub in_use: u64,
+    /// Contents that should have been removed and could not be.
+    pub not_removed: u64,
     /// Unfinished files and locks of killed processes that were removed.
     pub leftovers: u64,
     /// Bytes that are left.
@@ -51,6 +53,8 @@ pub(crate) fn evict(files: &Files, cap: u64) -> Evicted {
             done.entries += 1;
             done.bytes += bytes;
             done.left_bytes -= bytes;
+        } else if path.exists() {
+            done.not_removed += 1;
         }
     }
     for entry in records {

@@ -61,6 +61,17 @@ pub struct Verification {
     pub leftovers: u64,
 }
 
+/// Result of removing everything.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Cleared {
+    /// Contents that were removed.
+    pub removed: u64,
+    /// Contents that stay because they are in use.
+    pub in_use: u64,
+    /// Contents that could not be removed.
+    pub not_removed: u64,
+}
+
 impl Verification {
     /// Whether nothing is damaged.
     pub fn is_clean(&self) -> bool {
@@ -174,16 +185,18 @@ impl Store {
         found
     }
 
-    /// Removes everything but what is in use; how many contents were removed, and how many not.
-    pub fn clear(&self) -> (u64, u64) {
-        let (mut removed, mut in_use) = (0, 0);
+    /// Removes everything but what is in use.
+    pub fn clear(&self) -> Cleared {
+        let mut done = Cleared::default();
         let mut kept = HashSet::new();
         for entry in self.files.below("blobs") {
             if is_locked(&entry.path()) {
-                in_use += 1;
+                done.in_use += 1;
                 kept.extend(named(&entry.path()));
             } else if remove(&entry.path()) {
-                removed += 1;
+                done.removed += 1;
+            } else if entry.path().exists() {
+                done.not_removed += 1;
             }
         }
         for entry in self.files.below("keys") {
@@ -198,6 +211,6 @@ impl Store {
         });
         sweep(&self.files);
         remove(&self.files.statistics());
-        (removed, in_use)
+        done
     }
 }

@@ -31,7 +31,7 @@ mod store;
 
 pub use bth_files::Digest;
 pub use evict::Evicted;
-pub use inventory::{Entry, Inventory, Verification};
+pub use inventory::{Cleared, Entry, Inventory, Verification};
 pub use key::Key;
 pub use locate::{DEFAULT_CAP, folder, parse_bytes};
 pub use lock::WorkLock;

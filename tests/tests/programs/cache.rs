@@ -308,6 +308,20 @@ fn a_damaged_entry_that_stays_in_the_cache_is_made_again() {
 }
 
 #[test]
+fn what_cannot_be_removed_is_told() {
+    let folder = folder(&[("a.obj", &sphere(8))]);
+    let entry = compile(folder.path(), &["a.obj"])["cache"]["entry"].as_str().unwrap().to_owned();
+    // Not even the superuser removes a folder as if it were a file.
+    std::fs::remove_file(&entry).unwrap();
+    std::fs::create_dir(&entry).unwrap();
+    for args in [&["cache", "gc", "--cache-size", "0", "--json"][..], &["cache", "clear", "--json"]] {
+        let run = cached(folder.path(), args).expect(4);
+        assert!(run.stderr.contains("1 contents cannot be removed"), "{run:?}");
+        assert_eq!(run.json()["not_removed"], 1);
+    }
+}
+
+#[test]
 fn a_shared_cache_that_is_not_used_is_told() {
     let folder = folder(&[("a.obj", &sphere(4))]);
     std::fs::create_dir(folder.path().join("shared")).unwrap();

@@ -14,6 +14,7 @@ pub(crate) fn run(args: &Cache) -> Result<(), Failure> {
         let message = "there is no folder for the cache".to_owned();
         return Err(Failure::Usage { message, hint: "name one with --cache-dir or BTH_CACHE_DIR" });
     };
+    let mut not_removed = 0;
     let (value, text) = match &args.command {
         CacheCommand::Stats => {
             let inventory = store.inventory();
@@ -22,6 +23,7 @@ pub(crate) fn run(args: &Cache) -> Result<(), Failure> {
         CacheCommand::List { stage } => list(&store, stage.as_deref()),
         CacheCommand::Gc => {
             let evicted = store.evict(store.cap());
+            not_removed = evicted.not_removed;
             let text = format!(
                 "removed {} contents ({}), {} left by killed programs; {} left, {} in use\n",
                 count(evicted.entries),
@@ -35,15 +37,25 @@ pub(crate) fn run(args: &Cache) -> Result<(), Failure> {
         CacheCommand::Verify => return verify(&store, args.json),
         CacheCommand::Path { key } => path(&store, key.as_deref())?,
         CacheCommand::Clear => {
-            let (removed, in_use) = store.clear();
-            let text = format!("removed {} contents; {} in use\n", count(removed), count(in_use));
-            (json!({"removed": removed, "in_use": in_use}), text)
+            let cleared = store.clear();
+            not_removed = cleared.not_removed;
+            let text =
+                format!("removed {} contents; {} in use\n", count(cleared.removed), count(cleared.in_use));
+            (json!(cleared), text)
         }
     };
     if args.json {
         output::json(&value)?;
     } else {
         output::text(&text)?;
+    }
+    if not_removed > 0 {
+        output::error(&format!(
+            "{} contents cannot be removed from {}; who may write to their folders can",
+            count(not_removed),
+            store.folder().display()
+        ));
+        return Err(Failure::Reported(4));
     }
     Ok(())
 }

@@ -112,9 +112,15 @@ enum CompileError {
 }
 
 impl CompileError {
-    /// Whether something that is read is at fault.
+    /// Whether something that is read is at fault, and not the cache.
     fn is_of_source(&self) -> bool {
-        matches!(self, CompileError::Reported(_, 3 | 4))
+        match self {
+            CompileError::Reported(_, 3) => true,
+            CompileError::Reported(error, 4) => {
+                matches!(error["code"].as_str(), Some("BTH-O001" | "BTH-O002"))
+            }
+            _ => false,
+        }
     }
 }
 

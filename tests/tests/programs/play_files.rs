@@ -56,6 +56,20 @@ fn models_are_shown_without_a_folder_for_the_cache() {
     }
 }
 
+/// A cache in which nothing can be kept is no fault of the materials.
+#[cfg(unix)]
+#[test]
+fn an_entry_that_cannot_be_kept_is_an_error_of_the_cache() {
+    let folder = folder(&[("ball.obj", &sphere(48))]);
+    let player = command("bth-play", folder.path(), &[]);
+    let mut limited = std::process::Command::new("sh");
+    limited.args(["-c", "ulimit -f 40; exec \"$0\" \"$@\""]).arg(player.get_program());
+    limited.args(["ball.obj", "-o", "a.png", "--size", "16x9", "--mode", "path", "--cache-dir", "c"]);
+    limited.current_dir(folder.path());
+    let run = run_with(limited).expect(4);
+    assert!(run.stderr.contains("BTH-O061") && !run.stderr.contains("materials"), "{run:?}");
+}
+
 #[test]
 fn where_nothing_can_be_written_nothing_is_rendered() {
     let folder = folder(&[("ball.obj", &sphere(12)), ("file", "")]);

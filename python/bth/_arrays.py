@@ -3,9 +3,17 @@
 import numpy as np
 
 
+def plain(array, name):
+    """The array without a mask. One in which something is masked is refused: no answer could say that it is of nothing."""
+    if isinstance(array, np.ma.MaskedArray) and np.ma.is_masked(array):
+        found = f"a masked array in which {np.ma.count_masked(array)} numbers are masked"
+        raise ValueError(f"{name}: expected an array without a mask, got {found}: leave them out (numpy.ma.compressed) or fill them")
+    return np.asarray(array)
+
+
 def vectors(array, name):
     """An aligned array of float32 or float64 whose last axis has three numbers; a copy only where it must be."""
-    array = np.asarray(array)
+    array = plain(array, name)
     if array.dtype.kind not in "fiub":
         raise TypeError(f"{name}: expected numbers, got an array of {array.dtype}")
     if array.ndim == 0 or array.shape[-1] != 3:
@@ -39,7 +47,7 @@ def numbers(array, name, shape):
     """A number, or an array of one number for each element of the shape."""
     if isinstance(array, (int, float)):
         return number(array, name)
-    array = np.asarray(array)
+    array = plain(array, name)
     if array.dtype.kind not in "fiub":
         raise TypeError(f"{name}: expected numbers, got an array of {array.dtype}")
     if array.ndim == 0:
@@ -52,7 +60,7 @@ def numbers(array, name, shape):
 
 def indices(array, name):
     """An aligned array of uint32; a copy only where it must be."""
-    array = np.asarray(array)
+    array = plain(array, name)
     if array.dtype.kind not in "iu" and array.size:
         raise TypeError(f"{name}: expected integers, got an array of {array.dtype}")
     if array.dtype not in (np.uint32, np.uint16, np.uint8) and array.size and (array.min() < 0 or array.max() > 0xFFFFFFFF):

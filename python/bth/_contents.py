@@ -10,7 +10,7 @@ from ._ray_queries import mask_bits
 
 
 def _weights(array, name):
-    array = np.asarray(array)
+    array = _arrays.plain(array, name)
     if array.dtype.kind not in "fiu":
         raise TypeError(f"{name}: expected numbers, got an array of {array.dtype}")
     with np.errstate(over="ignore"):

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from . import _arrays
+
 
 def triangles_of(mesh):
     """Vertices (n, 3) float32 and faces (m, 3) uint32, contiguous, of a pair of arrays or of a mesh of trimesh, meshio or pyvista.
@@ -10,14 +12,14 @@ def triangles_of(mesh):
     becomes of the caller's arrays then must not change the result.
     """
     vertices, faces = _parts(mesh)
-    vertices = np.asarray(vertices)
+    vertices = _arrays.plain(vertices, "vertices")
     if vertices.dtype.kind not in "fiu":
         raise TypeError(f"vertices: expected numbers, got an array of {vertices.dtype}")
     if vertices.size == 0 and vertices.ndim <= 2:
         vertices = vertices.reshape(0, 3)
     if vertices.ndim != 2 or vertices.shape[1] != 3:
         raise ValueError(f"vertices: expected the shape (n, 3), got {vertices.shape}")
-    faces = np.asarray(faces)
+    faces = _arrays.plain(faces, "faces")
     if faces.size == 0 and faces.ndim <= 2:
         faces = np.zeros((0, 3), np.uint32)
     if faces.dtype.kind not in "iu":
@@ -80,7 +82,7 @@ def parts_of_scene(scene):
 
 def places_of(instances, transforms, meshes):
     """Rows of meshes (n,) uint32 and matrices (n, 3, 4) float64, contiguous, of instances of so many meshes."""
-    instances = np.arange(meshes) if instances is None else np.asarray(instances)
+    instances = np.arange(meshes) if instances is None else _arrays.plain(instances, "instances")
     if instances.size == 0 and instances.ndim <= 1:
         instances = np.zeros(0, np.uint32)
     if instances.dtype.kind not in "iu":
@@ -90,7 +92,7 @@ def places_of(instances, transforms, meshes):
     if instances.size and (instances.min() < 0 or instances.max() >= meshes):
         worst = instances.min() if instances.min() < 0 else instances.max()
         raise ValueError(f"instances: expected rows from 0 to {meshes - 1}, got {worst}")
-    transforms = np.asarray(np.eye(4) if transforms is None else transforms)
+    transforms = np.eye(4) if transforms is None else _arrays.plain(transforms, "transforms")
     if transforms.dtype.kind not in "fiu":
         raise TypeError(f"transforms: expected numbers, got an array of {transforms.dtype}")
     if transforms.shape[-2:] not in ((3, 4), (4, 4)):

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from . import _arrays
 from ._assembly import Assembly
 
 _INVALID = 0xFFFFFFFF
@@ -24,7 +25,7 @@ class RaycastingScene:
         return self._assembly.add(mesh if triangle_indices is None else (mesh, triangle_indices))
 
     def _rays(self, rays, nthreads):
-        rays = np.asarray(rays)
+        rays = _arrays.plain(rays, "rays")
         if rays.ndim == 0 or rays.shape[-1] != 6:
             raise ValueError(f"rays: expected the shape (..., 6), got {rays.shape}")
         return rays[..., :3], rays[..., 3:], nthreads or self._threads

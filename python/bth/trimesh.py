@@ -7,6 +7,7 @@ import numpy as np
 import trimesh
 from trimesh import caching, util
 
+from . import _arrays
 from ._compile import compile
 
 
@@ -32,8 +33,8 @@ class RayMeshIntersector:
         return compile(((vertices - corner) * scale, faces), quality="fast"), corner, scale
 
     def _rays(self, ray_origins, ray_directions):
-        origins = np.array(ray_origins, dtype=np.float64)
-        directions = np.array(ray_directions, dtype=np.float64)
+        origins = np.array(_arrays.plain(ray_origins, "ray_origins"), dtype=np.float64)
+        directions = np.array(_arrays.plain(ray_directions, "ray_directions"), dtype=np.float64)
         if origins.shape != directions.shape:
             raise ValueError("Ray origin and direction don't match!")
         scene, corner, scale = self._scene

@@ -37,6 +37,25 @@ def test_wrong_arrays(scene, origins, directions, error):
             query(origins, directions)
 
 
+def test_masked_arrays(scene, mesh):
+    masked = np.ma.masked_array(np.zeros((4, 3)), mask=np.eye(4, 3))
+    unmasked = np.ma.masked_array(np.zeros((4, 3)))
+    numbers, ones = np.ma.masked_array(np.ones(4), mask=[0, 0, 1, 0]), np.ones((4, 3))
+    rows = np.ma.masked_array(np.zeros(4, np.uint32), mask=[1, 0, 0, 0])
+    calls = {
+        "origins": lambda: scene.nearest(masked, ones), "directions": lambda: scene.any(ones, masked),
+        "tmax": lambda: scene.nearest(ones, ones, tmax=numbers), "start": lambda: scene.nearest(ones, ones, start=(rows, rows)),
+        "points": lambda: scene.contains(masked), "u": lambda: scene.surface(0, 0, numbers, 0),
+        "vertices": lambda: bth.compile((masked, [[0, 1, 2]])), "faces": lambda: bth.compile((ones, masked.astype(int))),
+        "transforms": lambda: bth.compile_scene([mesh], [0], np.ma.masked_equal(np.eye(4), 1)),
+        "poses": lambda: bth.bake.lidar(scene, masked), "box": lambda: bth.bake.sdf(scene, 8, box=masked[:2]),
+    }
+    for name, call in calls.items():
+        with pytest.raises(ValueError, match=f"^{name}: .* masked"):
+            call()
+    np.testing.assert_array_equal(scene.contains(unmasked), scene.contains(np.zeros((4, 3))))
+
+
 def test_wrong_options(scene, mesh):
     rays = np.zeros((4, 3)), np.ones((4, 3))
     with pytest.raises(ValueError, match="tmin"):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .. import _arrays
 from .._hits import NONE
 from .._scene import Scene
 from ._arithmetic import Floats, dot, turn, unit
@@ -60,7 +61,7 @@ def lidar(
         raise ValueError(f"noise: expected a number from 0, got {noise}")
     if columns < 1:
         raise ValueError(f"columns: expected at least 1, got {columns}")
-    angles = np.atleast_1d(np.asarray(elevations, np.float64))
+    angles = np.atleast_1d(np.asarray(_arrays.plain(elevations, "elevations"), np.float64))
     if angles.ndim != 1 or not (np.abs(angles) <= 90).all():
         raise ValueError("elevations: expected degrees from -90 to 90")
     transforms = _transforms(poses, columns)
@@ -83,7 +84,7 @@ def lidar(
 
 def _transforms(poses: ArrayLike, columns: int) -> Floats:
     """Transforms (revolutions, columns or 1, 4, 4)."""
-    poses = np.asarray(poses, np.float64)
+    poses = np.asarray(_arrays.plain(poses, "poses"), np.float64)
     if not np.isfinite(poses).all():
         raise ValueError("poses: expected finite numbers")
     if poses.ndim in (1, 2) and poses.shape[-1] == 3:
@@ -124,7 +125,7 @@ def poses_along(path: ArrayLike, revolutions: int, columns: int, up: ArrayLike =
     first revolution is at the first point.
     up: the scanner's z axis in world space. Its x axis points along the path, as far as that is perpendicular to z.
     """
-    path, up = np.asarray(path, np.float64), unit(np.asarray(up, np.float64))
+    path, up = np.asarray(_arrays.plain(path, "path"), np.float64), unit(np.asarray(up, np.float64))
     if path.ndim != 2 or path.shape[1:] != (3,) or len(path) < 2 or not np.isfinite(path).all():
         raise ValueError(f"path: expected the shape (n, 3) with n >= 2 and finite numbers, got {path.shape}")
     if revolutions < 1 or columns < 1:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _arrays
 from .._compile import compile
 from .._scene import Scene
 from ._arithmetic import Floats
@@ -84,7 +85,7 @@ def at_texels(scene: Scene, width: int, height: int, uv: Floats | None = None, *
     if width < 1 or height < 1:
         raise ValueError(f"texture: expected a size of at least 1x1, got {width}x{height}")
     mesh = world_mesh(scene)
-    uv = texture_coordinates(scene) if uv is None else np.asarray(uv, np.float64)
+    uv = texture_coordinates(scene) if uv is None else np.asarray(_arrays.plain(uv, "uv"), np.float64)
     if uv is None:
         raise lacks_texture_coordinates()
     if uv.shape != (len(mesh.faces), 3, 2):

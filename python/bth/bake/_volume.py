@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .. import _arrays
 from .._scene import Scene
 from ._arithmetic import Floats
 from ._errors import lacks_surface
@@ -74,7 +75,7 @@ def sdf(
 
 
 def _box(box: ArrayLike) -> tuple[Floats, Floats]:
-    box = np.asarray(box, np.float64)
+    box = np.asarray(_arrays.plain(box, "box"), np.float64)
     if box.shape != (2, 3) or not np.isfinite(box).all() or (box[0] > box[1]).any() or not (box[1] > box[0]).any():
         raise ValueError("box: expected two finite points, the lower end and the upper end, (2, 3)")
     return box[0], box[1]

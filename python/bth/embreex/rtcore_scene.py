@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from .. import _arrays
 from .._assembly import Assembly
 
 # What embreex takes for no limit.
@@ -18,11 +19,11 @@ class EmbreeScene:
         """As in embreex: indices of triangles or -1, distances, or with `output` a dictionary of arrays."""
         if query not in ("INTERSECT", "OCCLUDED", "DISTANCE"):
             raise ValueError(f"Embree ray query type {query} not recognized.\nAccepted types are (INTERSECT,OCCLUDED,DISTANCE)")
-        origins, directions = np.asarray(vec_origins), np.asarray(vec_directions)
+        origins, directions = _arrays.plain(vec_origins, "vec_origins"), _arrays.plain(vec_directions, "vec_directions")
         for name, array in (("vec_origins", origins), ("vec_directions", directions)):
             if array.ndim != 2 or array.shape[1] != 3:
                 raise ValueError(f"{name}: expected the shape (n, 3), got {array.shape}")
-        far = np.broadcast_to(np.asarray(_FAR if dists is None else dists, np.float32), (len(origins),))
+        far = np.broadcast_to(np.asarray(_FAR if dists is None else _arrays.plain(dists, "dists"), np.float32), (len(origins),))
         scene, first_face = self._assembly.scene()
         if query == "OCCLUDED" and not output:
             return np.where(scene.any(origins, directions, tmax=far), 0, -1).astype(np.int32)

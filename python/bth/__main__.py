@@ -1,8 +1,10 @@
 """python -m bth compile|info|ao|thickness|sight|lidar|sdf …"""
 
 import argparse
+import json
 import os
 import sys
+from typing import Any
 
 import bth
 from bth._command import Parser, run
@@ -17,7 +19,29 @@ def _compile(arguments: argparse.Namespace) -> None:
     print(f"{output}: {scene!r}")
 
 
+def _facts(path: str, scene: bth.Scene) -> dict[str, Any]:
+    frames, bounds = scene.frames, scene.bounds
+    return {
+        "file": path,
+        "objects": scene.object_count,
+        "instances": scene.instance_count,
+        "triangles": int(scene.triangle_counts.sum()),
+        "bytes": scene.nbytes,
+        "resident_bytes": scene.resident_bytes,
+        "content_id": scene.content_id,
+        "bounds": None if bounds is None else bounds.tolist(),
+        "frames": None if frames is None else dict(zip(("first", "last", "rate"), frames)),
+    }
+
+
 def _info(arguments: argparse.Namespace) -> None:
+    if arguments.json:
+        files = []
+        for path in arguments.files:
+            with bth.open(path) as scene:
+                files.append(_facts(path, scene))
+        print(json.dumps({"command": "info", "files": files}, indent=2))
+        return
     for path in arguments.files:
         with bth.open(path) as scene:
             bounds = scene.bounds
@@ -34,6 +58,7 @@ def main(arguments: list[str] | None = None) -> int:
     compiler.set_defaults(run=_compile)
     info = commands.add_parser("info", help="what is in compiled files")
     info.add_argument("files", nargs="+")
+    info.add_argument("--json", action="store_true", help="print one JSON object")
     info.set_defaults(run=_info)
     for baker in (ao, thickness, sight, lidar, sdf):
         baker.add_to(commands)

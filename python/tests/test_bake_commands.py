@@ -54,6 +54,25 @@ def test_a_result_a_picture_and_a_summary(folder, capsys, command):
     assert (code, out, err) == (0, "", "") and open(options[1], "rb").read() == first
 
 
+def test_what_is_in_files_as_json(folder, capsys):
+    scene = bth.compile("ball.ply", output="ball.bth")
+    with open("empty.obj", "w") as file:
+        file.write("v 0 0 0\n")
+    bth.compile("empty.obj", output="empty.bth")
+    code, out, err = call(capsys, "info", "ball.bth", "empty.bth", "--json")
+    assert (code, err) == (0, "")
+    found = json.loads(out)
+    assert list(found) == ["command", "files"] and found["command"] == "info"
+    ball, empty = found["files"]
+    assert ball == {
+        "file": "ball.bth", "objects": 1, "instances": 1, "triangles": len(sphere()[1]), "bytes": os.path.getsize("ball.bth"),
+        "resident_bytes": scene.resident_bytes, "content_id": scene.content_id, "bounds": scene.bounds.tolist(), "frames": None,
+    }
+    assert (empty["triangles"], empty["bounds"]) == (0, None)
+    code, out, err = call(capsys, "info", "ball.bth", "no such file.bth", "--json")
+    assert code == 4 and json.loads(out)["error"]["exit_code"] == 4
+
+
 def test_what_is_written(folder, capsys):
     assert main(["ao", "ball.ply", "-o", "a.npy", "-q"]) == main(["ao", "ball.ply", "-o", "a.ply", "-q"]) == 0
     assert (np.load("a.npy") == 1).all() and len(np.load("a.npy")) == len(sphere()[0])

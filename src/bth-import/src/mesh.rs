@@ -122,7 +122,8 @@ pub struct Report {
     pub positions: u64,
     /// Faces of more than three corners that were fan-triangulated.
     pub polygons: u64,
-    /// Elements that were left out: faces of fewer than three corners, points and lines.
+    /// Elements that were left out: faces of fewer than three corners, triangles of glTF that the number of indices leaves
+    /// incomplete, points and lines.
     pub skipped: u64,
     /// Triangles of exactly zero area, decided by exact arithmetic. They keep their ids, and no ray hits them.
     pub degenerate: u64,

@@ -184,6 +184,14 @@ impl Flattener<'_, '_> {
             primitive: index,
         });
         let mut triangles = reader.read(&kept, self.raw.positions.len())?;
+        if triangles.skipped > 0 {
+            let indices = self.accessors.count(primitive.indices.unwrap_or(kept.positions))?;
+            let warning = format!(
+                "{}: the last of its {indices} indices form no whole triangle and are left out",
+                reader.part
+            );
+            self.accessors.source.monitor.warn(&warning);
+        }
         selection.retain(index, &mut triangles.corners);
         let first = [self.raw.positions.len(), self.raw.normals.len()];
         match &mut self.raw.deformation {

@@ -56,7 +56,13 @@ fn hidden_nodes_are_left_out_with_all_below_them() {
 }
 
 #[test]
-fn a_triangle_that_its_indices_leave_incomplete_counts_as_skipped() {
-    let (mesh, report) = read(&edited(|d| d["accessors"][1]["count"] = 5.into()));
+fn a_triangle_that_its_indices_leave_incomplete_counts_as_skipped_and_is_told() {
+    let listener = Listener::default();
+    let document = edited(|d| d["accessors"][1]["count"] = 5.into());
+    let (mesh, report) = import_with("a.glb", &glb(&document, &binary()), Keep::None, &listener).unwrap();
     assert_eq!((mesh.triangles.len(), report.skipped), (1, 1));
+    assert!(
+        listener
+            .heard("mesh 0 primitive 0: the last of its 5 indices form no whole triangle and are left out")
+    );
 }

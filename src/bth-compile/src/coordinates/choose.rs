@@ -115,27 +115,33 @@ impl OnGrid {
 ///
 /// # Errors
 /// `BTH-I070` when `bits` move a vertex farther than `max_error` allows, `BTH-I071` when the object has no grid of so many
-/// bits.
+/// bits, as its coordinates are too great or too close together.
 pub(crate) fn place(source: &Path, mesh: &mut Mesh, options: &CoordinateOptions) -> Result<Option<OnGrid>> {
     let Some(bounds) = bounds(&mesh.positions) else { return Ok(None) };
     let found = |bits: GridBits| {
-        let grid = grid(bits, bounds)?;
-        Some((grid, displacement(&grid, &mesh.positions)))
+        let grid = grid(bits, bounds).ok_or("great that points of a grid of that many would be infinite")?;
+        let displacement = displacement(&grid, &mesh.positions);
+        if displacement > 0.0 && is_too_coarse(&grid, bounds) {
+            return Err(
+                "close together that the steps of a grid of that many would be below 2^-126, the least that a file holds",
+            );
+        }
+        Ok((grid, displacement))
     };
     let allowed = options.max_error.map_or(f64::INFINITY, |most| most.distance(diagonal(bounds)));
     let (grid, displacement) = match (options.bits, options.max_error) {
         (None, None) => return Ok(None),
         (None, Some(_)) => {
             let fits = |(_, displacement): &(Grid, f32)| f64::from(*displacement) <= allowed;
-            match GridBits::ALL.into_iter().filter_map(found).find(fits) {
+            match GridBits::ALL.into_iter().filter_map(|bits| found(bits).ok()).find(fits) {
                 Some(fits) => fits,
                 None => return Ok(None),
             }
         }
         (Some(bits), _) => {
-            let (grid, moved) = found(bits).ok_or_else(|| too_large(source, bits))?;
+            let (grid, moved) = found(bits).map_err(|coordinates| out_of_range(source, bits, coordinates))?;
             if f64::from(moved) > allowed {
-                return Err(too_far(source, bits, moved, allowed, found(GridBits::B21)));
+                return Err(too_far(source, bits, moved, allowed, found(GridBits::B21).ok()));
             }
             (grid, moved)
         }
@@ -164,15 +170,15 @@ fn too_far(source: &Path, bits: GridBits, moved: f32, allowed: f64, finer: Optio
     }
 }
 
-fn too_large(source: &Path, bits: GridBits) -> Error {
+fn out_of_range(source: &Path, bits: GridBits, coordinates: &str) -> Error {
     Error::Input {
         code: "BTH-I071",
         place: Place::File(source.to_owned()),
         message: format!(
-            "coordinates are so great that points of a grid of {} bits would be infinite",
+            "expected coordinates that fit into {} bits (--coordinates), but they are so {coordinates}",
             bits as u32
         ),
-        hint: "scale the model down, or leave out --coordinates".to_owned(),
+        hint: "scale the model, or leave out --coordinates".to_owned(),
     }
 }
 
@@ -207,6 +213,15 @@ fn grid(bits: GridBits, bounds: AxisRanges) -> Option<Grid> {
         (first_exponent(bits, ends)..=127).find(|exponent| fits(*exponent))?;
     }
     Some(grid)
+}
+
+/// Whether the least step of a file is too great for a box: its longest side then has less than half of the steps that its bits
+/// stand for, and none at the least extents, where the surface would be a point.
+fn is_too_coarse(grid: &Grid, bounds: AxisRanges) -> bool {
+    let extent = |axis: usize| f64::from(bounds[axis][1]) - f64::from(bounds[axis][0]);
+    let longest = (0..3).fold(0, |longest, axis| if extent(axis) > extent(longest) { axis } else { longest });
+    let steps = extent(longest) / f64::from(grid.step[longest]);
+    steps > 0.0 && grid.step[longest] == f32::MIN_POSITIVE && steps < f64::from(grid.bits.max_steps() / 2)
 }
 
 /// An exponent of a normal number below which the box certainly has too many steps.
@@ -262,6 +277,11 @@ mod tests {
                 let found = place(Path::new("a"), &mut moved, &options);
                 if points.iter().flatten().any(|x| x.abs() > 2f32.powi(110)) {
                     prop_assert!(found.is_ok() || found.unwrap_err().to_string().contains("BTH-I071"));
+                    continue;
+                }
+                let extent = bounds(&points).unwrap().into_iter().fold(0.0f64, |most, [low, high]| most.max(f64::from(high) - f64::from(low)));
+                if extent < 2f64.powi(bits as i32 - 127) && found.is_err() {
+                    prop_assert!(found.unwrap_err().to_string().contains("below 2^-126"));
                     continue;
                 }
                 let on = found.unwrap().unwrap();
@@ -321,6 +341,37 @@ mod tests {
             error.contains("BTH-I070") && error.contains("hint: 21 bits move vertices by at most"),
             "{error}"
         );
+    }
+
+    /// The grid of a tiny model would have steps below the least of a file, down to none at all.
+    #[test]
+    fn bits_that_would_lose_a_tiny_surface_are_refused() {
+        let corners = |size: f32| vec![[0.0; 3], [size, 0.0, 0.0], [0.0, size, 0.0]];
+        let place = |points: &[[f32; 3]], bits, max_error| {
+            let options = CoordinateOptions { bits, max_error, ..CoordinateOptions::default() };
+            let mut mesh = mesh(points.to_vec());
+            place(Path::new("a.ply"), &mut mesh, &options).map(|on| on.map(|_| mesh.positions))
+        };
+        for bits in GridBits::ALL {
+            for size in [
+                f32::from_bits(1),
+                2f32.powi(-128),
+                2f32.powi(-126) * 1.3,
+                2f32.powi(bits as i32 - 128) * 1.3,
+            ] {
+                let points = corners(size);
+                let error = place(&points, Some(bits), None).unwrap_err().to_string();
+                assert!(error.contains("BTH-I071") && error.contains("below 2^-126"), "{error}");
+                let kept = place(&points, None, Some(MaxError::Absolute(1.0))).unwrap();
+                assert!(kept.is_none_or(|moved| moved[1][0] > 0.0), "{size}");
+            }
+            let moved =
+                place(&corners(2f32.powi(bits as i32 - 127) * 1.3), Some(bits), None).unwrap().unwrap();
+            assert!(moved[1][0] > 0.0);
+            // Nothing is lost of corners that lie on the grid.
+            let exact = corners(2f32.powi(-126));
+            assert_eq!(place(&exact, Some(bits), None).unwrap(), Some(exact));
+        }
     }
 
     #[test]

@@ -9,6 +9,7 @@ use super::tree::{BLOCK, Block, Tree};
 use bth::simd::{Kernel, Simd};
 use bth_format::layout::{FREE_SECTORS, FreeBins, FreeSectors};
 use bth_import::Mesh;
+use std::ops::Range;
 
 /// What all searches of a mesh share.
 pub(super) struct Surroundings<'a> {
@@ -20,6 +21,24 @@ pub(super) struct Surroundings<'a> {
     pub(super) levels: [f32; FreeSectors::LEVELS],
     /// What is decided.
     pub(super) kept: Kept,
+}
+
+impl Surroundings<'_> {
+    /// Runs of rows that follow each other and whose triangles have the same corners in the same order. What is known of one of them is
+    /// known of all, since triangles with the same three corners do not block each other. Without this, a pile of coincident triangles
+    /// would take quadratic time: none of them ends the search of another.
+    pub(super) fn coincident(&self, rows: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+        let corners = |row: usize| self.mesh.corners(self.order[row]).map(|p| p.map(f32::to_bits));
+        let mut rest = rows;
+        std::iter::from_fn(move || {
+            let first = rest.next()?;
+            let of_first = corners(first);
+            while rest.start < rest.end && corners(rest.start) == of_first {
+                rest.start += 1;
+            }
+            Some(first..rest.start)
+        })
+    }
 }
 
 /// What is known of a triangle.
@@ -37,7 +56,7 @@ const ENOUGH: f64 = 1.0 / 8.0;
 /// Decides the directions of some triangles, by rows of the order of the BVH.
 pub(super) struct Decide<'a> {
     pub(super) around: &'a Surroundings<'a>,
-    pub(super) rows: std::ops::Range<usize>,
+    pub(super) rows: Range<usize>,
 }
 
 impl Kernel for Decide<'_> {
@@ -46,8 +65,9 @@ impl Kernel for Decide<'_> {
     fn run<S: Simd>(self, s: S) -> Vec<Found> {
         let mut search = Search { around: self.around, stack: Vec::new() };
         let mut decided = Vec::with_capacity(self.rows.len());
-        for row in self.rows {
-            decided.push(search.decide(s, row));
+        for rows in self.around.coincident(self.rows) {
+            let found = search.decide(s, rows.start);
+            decided.extend(std::iter::repeat_n(found, rows.len()));
         }
         decided
     }

@@ -66,6 +66,28 @@ fn soup(count: usize, seed: u64) -> Mesh {
     weld(&corners)
 }
 
+/// Triangles with the same corners in the same order are decided once, with what each would find by itself.
+#[test]
+fn coincident_triangles_are_decided_together() {
+    let pile: Vec<u32> = (0..600).map(|i| [0, 0, 0, 1, 1, 2][i % 6]).collect();
+    let mut mesh = soup(40, 21);
+    let pile: Vec<[u32; 3]> = pile.into_iter().map(|i| mesh.triangles[i as usize]).collect();
+    mesh.triangles.splice(0..0, pile);
+    let (tree, _) = bvh::build(&mesh, &BvhOptions::default(), &Silent).unwrap();
+    let wide = Tree::new(&mesh, &tree).unwrap();
+    for kept in [Kept::Directions, Kept::Distances] {
+        let levels = levels(&tree, 1.0 / 16.0);
+        let around = Surroundings { mesh: &mesh, order: &tree.order, tree: wide.clone(), levels, kept };
+        let rows = tree.order.len();
+        let runs: Vec<_> = around.coincident(0..rows).collect();
+        assert!(runs.len() < rows / 2, "{}", runs.len());
+        assert!(runs.iter().flat_map(Clone::clone).eq(0..rows));
+        let alone = |row: usize| Isa::chosen().run(Decide { around: &around, rows: row..row + 1 });
+        let together = Isa::chosen().run(Decide { around: &around, rows: 0..rows });
+        assert!(together == (0..rows).flat_map(alone).collect::<Vec<_>>());
+    }
+}
+
 /// A start on a triangle: a corner, a point of an edge, or one inside, moved a little along the direction or not at all.
 fn start(random: &mut Rng, corners: [[f32; 3]; 3], direction: [f32; 3]) -> [f32; 3] {
     let mut weights = match random.below(3) {

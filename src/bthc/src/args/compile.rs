@@ -104,7 +104,8 @@ pub(crate) struct Compile {
     /// By default kept with `--structure bth` and `--deformable`, and pruned with `tets`.
     #[arg(long, help_heading = TETRAHEDRA, value_enum)]
     pub(crate) subtrees: Option<Subtrees>,
-    /// Seconds that the tetrahedralization of one node may take; by default according to its size.
+    /// Seconds that an attempt to tetrahedralize a node may take; by default according to its size. Up to four attempts are made with
+    /// other points, and the second in a row that takes too long is the last. A worker has 20 seconds to start besides.
     #[arg(long, help_heading = TETRAHEDRA, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=86_400))]
     pub(crate) tet_deadline: Option<u64>,
     /// Memory of a tetrahedralization worker, in MiB.

@@ -27,7 +27,7 @@ impl<Id> ExactHit<Id> {
 /// Whether a hit counts: t, rounded to f32 as it is reported, lies within the ray's range.
 fn in_range(ray: &Ray, t: &BigRational) -> bool {
     let reported = to_f64(t) as f32;
-    ray.tmin <= reported && reported <= ray.tmax && reported < f32::INFINITY
+    ray.tmin <= reported && reported <= ray.tmax && reported.is_finite()
 }
 
 /// The nearest of the intersections, which must come in ascending order of their triangles.

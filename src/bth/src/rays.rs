@@ -11,7 +11,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 pub struct Ray {
     /// Point at t = 0, finite.
     pub origin: [f32; 3],
-    /// Least t of a hit; may be negative or infinite.
+    /// Least t of a hit; may be negative or infinite. No hit's t is infinite: what lies beyond the range of `f32` is not hit.
     pub tmin: f32,
     /// Direction of any length except zero, finite.
     pub direction: [f32; 3],

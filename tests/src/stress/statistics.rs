@@ -150,7 +150,7 @@ impl Statistics {
 }
 
 fn within([tmin, tmax]: [f32; 2], t: f32) -> bool {
-    tmin <= t && t <= tmax && t < f32::INFINITY
+    tmin <= t && t <= tmax && t.is_finite()
 }
 
 /// The t at which the line is known to meet a triangle: one at the target vertex or edge whose plane does not contain the

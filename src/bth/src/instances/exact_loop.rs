@@ -46,7 +46,7 @@ pub(crate) fn add_hits(
         let in_object = reported(at.t);
         let t = if object_ray.t_scale == 1.0 { in_object } else { in_object * object_ray.t_scale };
         let Ray { tmin, tmax, .. } = object_ray.ray;
-        if tmin <= in_object && in_object <= tmax && ray.tmin <= t && t <= ray.tmax && t < f32::INFINITY {
+        if tmin <= in_object && in_object <= tmax && ray.tmin <= t && t <= ray.tmax && t.is_finite() {
             let [u, v] = at.uv();
             if object.opacity_at(triangle, u, v) != Opacity::Transparent {
                 found.push((at.t, Hit { t, u, v, primitive: PrimitiveRef { instance, triangle } }));

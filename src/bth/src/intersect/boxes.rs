@@ -120,10 +120,10 @@ impl RaySlabs {
         t.map_or(f32::INFINITY, |[t, _]| ((t * f64::from(self.scale)) as f32).next_down())
     }
 
-    /// The range of depths in which a hit certainly lies in the ray's range of t.
+    /// The range of depths in which a hit certainly lies in the ray's range of t, whose ends are no NaN, and is finite.
     pub(crate) fn certain_range(&self, ray: &Ray) -> [f32; 2] {
         let depth = |t: f32| (f64::from(t) * f64::from(self.scale)) as f32;
-        [depth(ray.tmin).next_up(), depth(ray.tmax.min(f32::MAX)).next_down()]
+        [depth(ray.tmin.max(f32::MIN)).next_up(), depth(ray.tmax.min(f32::MAX)).next_down()]
     }
 
     /// As [`RaySlabLanes::children`], for one node.

@@ -239,8 +239,11 @@ impl Inverse {
         let scale = f64::from_bits(((1023 + exponent) as u64) << 52);
         let direction = direction.map(|x| (x / scale) as f32);
         // Where the ends of the range are rounded because they leave the normal numbers of f32, they are rounded inwards, so that no
-        // hit outside of the range in world space counts.
-        let scaled = |t: f32| (f64::from(t) * scale, (f64::from(t) * scale) as f32);
+        // hit outside of the range in world space counts. Ends at infinity stand for the farthest t that are finite in world space.
+        let scaled = |t: f32| {
+            let exact = f64::from(t.clamp(f32::MIN, f32::MAX)) * scale;
+            (exact, exact as f32)
+        };
         let ((least, tmin), (greatest, tmax)) = (scaled(ray.tmin), scaled(ray.tmax));
         let tmin = if f64::from(tmin) < least { tmin.next_up() } else { tmin };
         let tmax = if greatest < f64::from(tmax) { tmax.next_down() } else { tmax };

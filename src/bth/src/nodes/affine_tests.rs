@@ -84,6 +84,22 @@ fn rays_keep_their_t_whatever_the_scale() {
     }
 }
 
+/// Of a range without ends, an object's ray has what is finite in world space.
+#[test]
+fn no_t_of_a_scaled_ray_is_infinite_in_world_space() {
+    for size in [1e-38, 1e-30, 1e30, 1e36] {
+        let affine =
+            Affine { linear: [[size, 0.0, 0.0], [0.0, size, 0.0], [0.0, 0.0, size]], ..Affine::IDENTITY };
+        let (inverse, _) = affine.inverse().unwrap();
+        let ray = Ray::new([0.0; 3], [1.0, 0.0, 0.0]).with_range(f32::NEG_INFINITY, f32::INFINITY);
+        let ObjectRay { ray, t_scale } = inverse.ray(&ray);
+        assert!(t_scale != 1.0);
+        for t in [ray.tmin, ray.tmax] {
+            assert!((t * t_scale).is_finite() && t.is_finite(), "{size}: {ray:?}");
+        }
+    }
+}
+
 #[test]
 fn sixteen_rays_at_once_are_the_same_to_the_bit() {
     let mut rng = Rng::new(9);

@@ -127,7 +127,8 @@ impl EitherQuery {
     /// For any hits: offers a certain intersection of which only bounds of t are known, which include all roundings. Returns whether
     /// the query is complete.
     pub(crate) fn offer_bounds(&mut self, t: (f64, f64)) -> bool {
-        if f64::from(self.tmin) <= t.0 && t.1 <= f64::from(self.tmax) && t.1 <= f64::from(f32::MAX) {
+        let finite = f64::from(f32::MIN) <= t.0 && t.1 <= f64::from(f32::MAX);
+        if finite && f64::from(self.tmin) <= t.0 && t.1 <= f64::from(self.tmax) {
             self.accept();
         }
         self.goal.is_any() && self.triangle != NONE
@@ -236,9 +237,8 @@ pub(crate) fn better(ray: &Ray, best: &Hit, hit: &Hit, t_scale: f32) -> Option<H
     // With a factor of 1, t is not rounded again.
     let t = if t_scale == 1.0 { hit.t } else { hit.t * t_scale };
     let hit = Hit { t, ..*hit };
-    let in_range = ray.tmin <= hit.t && hit.t <= ray.tmax && hit.is_hit();
     let nearer = hit.t < best.t || hit.t == best.t && hit.primitive.instance < best.primitive.instance;
-    (in_range && nearer).then_some(hit)
+    (nearer && in_range(hit.t, ray.tmin, ray.tmax)).then_some(hit)
 }
 
 /// Whether a t between two values may lie between `tmin` and `limit` after rounding to f32.
@@ -246,10 +246,10 @@ pub(crate) fn may_be_in_range(t: [f64; 2], tmin: f32, limit: f64) -> bool {
     t[0] <= limit && (t[1] as f32).next_up() >= tmin
 }
 
-/// Whether a t that is already rounded for the answer lies in the ray's range.
+/// Whether a t that is already rounded for the answer lies in the ray's range and is finite.
 #[inline(always)]
 pub(crate) fn in_range(t: f32, tmin: f32, tmax: f32) -> bool {
-    tmin <= t && t <= tmax && t < f32::INFINITY
+    tmin <= t && t <= tmax && t.is_finite()
 }
 
 /// Receiver of the statistics of a traversal; `()` counts nothing.

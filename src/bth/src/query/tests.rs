@@ -70,6 +70,24 @@ fn queries_that_are_converted_there_and_back_give_the_same_answers() {
     assert!(hits.iter().all(|hits| (2_000..18_000).contains(hits)), "{hits:?}");
 }
 
+/// A t beyond the finite numbers of f32, in either direction, is no hit: it tells no point.
+#[test]
+fn hits_at_infinity_are_none() {
+    let ray = Ray::new([0.0; 3], [1.0; 3]).with_range(f32::NEG_INFINITY, f32::INFINITY);
+    for (t, is_hit) in [(3.5e38, false), (3.4e38, true), (-3.4e38, true), (-3.5e38, false)] {
+        let (triangle, intersection) = (TriangleRef::id(0, &[]), Intersection { t, weight: [0.0, 0.0, 1.0] });
+        let (mut nearest, mut any) = (Nearest::new(NearestHit, &ray), Any::new(AnyHit, &ray));
+        nearest.offer(triangle, intersection);
+        assert_eq!(nearest.answer(&[], 0).is_hit(), is_hit, "{t}");
+        assert_eq!(any.offer(triangle, intersection), is_hit, "{t}");
+        let mut either = EitherQuery::new(EitherGoal { is_any: true }, &ray);
+        assert_eq!(either.offer_bounds((t, t)), is_hit, "{t}");
+        let in_object =
+            Hit { t: (t / 4.0) as f32, u: 0.0, v: 0.0, primitive: PrimitiveRef { instance: 0, triangle: 0 } };
+        assert_eq!(better(&ray, &Hit::MISS, &in_object, 4.0).is_some(), is_hit, "{t}");
+    }
+}
+
 #[test]
 fn bounds_complete_queries_for_any_hit_only_if_all_t_between_them_do() {
     let mut rng = Rng::new(84);

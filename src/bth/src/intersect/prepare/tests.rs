@@ -139,7 +139,7 @@ fn all_preparations(ray: &Ray, line: &Line, object: &Object, lane: usize) -> Vec
 fn in_range(ray: &Ray, intersection: &Option<Intersection>) -> bool {
     intersection.is_some_and(|intersection| {
         let t = intersection.t as f32;
-        ray.tmin <= t && t <= ray.tmax && t < f32::INFINITY
+        ray.tmin <= t && t <= ray.tmax && t.is_finite()
     })
 }
 
@@ -349,5 +349,15 @@ fn one_comparison_of_bits_tells_what_lies_between() {
         for x in [x, -x] {
             assert_eq!(lies_between(x, lower, upper), lower < x && x < upper, "{x}");
         }
+    }
+}
+
+/// Of a direction so small that t overflows before the depth does.
+#[test]
+fn no_t_that_is_certainly_in_the_range_is_infinite() {
+    let ray = Ray::new([0.0; 3], [1e-42, 0.0, 0.0]).with_range(f32::NEG_INFINITY, f32::INFINITY);
+    let slabs = RaySlabs::widened(&ray, 1.0, |_| 0.0).unwrap();
+    for end in slabs.certain_range(&ray) {
+        assert!(((f64::from(end) / f64::from(slabs.scale)) as f32).is_finite(), "{end}");
     }
 }

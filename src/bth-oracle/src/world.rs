@@ -88,6 +88,11 @@ impl World {
         self.intersections(ray).any(|found| nearest_of(ray, std::iter::once(found)).is_some())
     }
 
+    /// How many triangles the whole line of a ray meets, in both directions. Each costs the search for a hit as much as many that it misses.
+    pub fn crossed(&self, ray: &Ray) -> usize {
+        self.intersections(ray).count()
+    }
+
     fn intersections<'a>(&'a self, ray: &'a Ray) -> impl Iterator<Item = (PrimitiveRef, Intersection)> + 'a {
         self.instances.iter().filter(|_| has_line(ray)).flat_map(move |instance| {
             instance.triangles.iter().filter_map(move |triangle| {

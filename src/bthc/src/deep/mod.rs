@@ -22,6 +22,10 @@ use std::path::Path;
 
 /// Tests of a ray against a triangle for each object, by which the number of its rays is chosen: some seconds on two cores.
 const TESTS: usize = 200_000_000;
+/// An intersection, which is computed exactly, takes as long as this many tests of triangles that a line misses.
+const INTERSECTION: usize = 800;
+/// Rays by which the number of intersections along a ray is estimated.
+const ESTIMATE: usize = 16;
 /// Least and most rays of an object where their number is not given.
 const RAYS: [usize; 2] = [64, 20_000];
 /// What may be wrong: the answer, that ways of tracing differ, what is known of directions.
@@ -93,11 +97,24 @@ fn check_object(
         if all.is_empty() {
             break;
         }
-        let count = count.unwrap_or((TESTS / all.len()).clamp(RAYS[0], RAYS[1]));
+        let count = count.unwrap_or_else(|| affordable(&alone, &all));
         let starts = rays::sample(&all, count.div_ceil(poses.len()), u64::from(object));
         findings.extend(check_pose((&alone, instance), &all, &starts, report, monitor)?);
     }
     Ok(findings)
+}
+
+/// How many rays of the only visible instance, which has these triangles, take some seconds. Where triangles are many times as large as
+/// the space between them, lines meet a great part of them.
+fn affordable(alone: &Scene, all: &[Triangle]) -> usize {
+    let most = TESTS / all.len();
+    if most <= RAYS[0] {
+        return RAYS[0];
+    }
+    let (world, starts) = (World::new(alone), rays::sample(all, ESTIMATE, 0));
+    let crossed: usize = starts.par_iter().map(|start| world.crossed(&start.ray)).sum();
+    let tests = all.len() + INTERSECTION * crossed / starts.len().max(1);
+    (TESTS / tests).clamp(RAYS[0], RAYS[1])
 }
 
 /// What differs in a scene of one visible instance, which has these triangles, a line for each ray.
@@ -225,4 +242,43 @@ fn is_rounded(t: f32, exact: f64) -> bool {
 fn is_as_near(ray: &Ray, hit: &Hit, exact: f64, corners_of: &impl Fn(u32) -> Option<[[f32; 3]; 3]>) -> bool {
     let at = corners_of(hit.primitive.triangle).and_then(|corners| intersection(ray, corners));
     at.is_some_and(|at| (to_f64(&at.t) - exact).abs() <= 1e-12 * exact.abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bth_compile::Silent;
+    use bth_compile::memory::{TriangleMesh, open};
+    use bth_compile::pipeline::{CompileOptions, Structure};
+    use bth_random::Rng;
+
+    /// The default number of rays for 3,000 triangles of this size with their first corners anywhere in the unit cube.
+    fn rays_of(size: f64) -> usize {
+        let mut random = Rng::new(5);
+        let mut positions = Vec::new();
+        for _ in 0..3000 {
+            let first: [f64; 3] = std::array::from_fn(|_| random.unit_f64());
+            positions.extend(
+                [(); 3]
+                    .map(|()| random.unit_vector())
+                    .map(|d| -> [f32; 3] { std::array::from_fn(|k| (first[k] + size * d[k]) as f32) }),
+            );
+        }
+        let triangles: Vec<[u32; 3]> = (0..3000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let mesh = TriangleMesh { positions: &positions, triangles: &triangles };
+        let options = CompileOptions { structure: Structure::Bvh, ..CompileOptions::default() };
+        let scene = open(mesh, &options, &Silent).unwrap();
+        affordable(&scene, &triangles_of(&scene))
+    }
+
+    fn triangles_of(scene: &Scene) -> Vec<Triangle> {
+        triangles(&scene.object(0))
+    }
+
+    #[test]
+    fn fewer_rays_are_traced_where_each_meets_many_triangles() {
+        assert_eq!(rays_of(0.01), RAYS[1]);
+        let few = rays_of(1.0);
+        assert!((RAYS[0]..2_000).contains(&few), "{few}");
+    }
 }

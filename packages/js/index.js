@@ -177,7 +177,7 @@ class Scene {
         for (let from = 0; from < hits.count; from += CHUNK) {
             const n = Math.min(CHUNK, hits.count - from);
             columns.forEach((column, k) => {
-                const of = column instanceof Float32Array ? Float32Array : Uint32Array;
+                const of = k < 3 ? Float32Array : Uint32Array;
                 new of(this.#wasm.memory.buffer, results + 4 * n * k, n).set(column.subarray(from, from + n));
             });
             this.#wasm.bth_surface(scene, results, n, surfaces);
@@ -236,19 +236,29 @@ function kindOf(value) {
     return value?.constructor?.name ?? String(value);
 }
 
+/** What an argument is, with its length where it is an array. */
+function sizedKindOf(value) {
+    if (classOf(value) === "DataView") return `DataView of ${value.byteLength} bytes`;
+    return ArrayBuffer.isView(value) || Array.isArray(value) ? `${kindOf(value)} of ${value.length}` : kindOf(value);
+}
+
+/** The built-in class of a value, such as "Float32Array". Objects of other windows are instances of other classes of this name. */
+function classOf(value) {
+    return Object.prototype.toString.call(value).slice(8, -1);
+}
+
 /** The bytes of a file, which come as a buffer or as a view of one. */
 function bytesOf(file) {
     if (ArrayBuffer.isView(file)) return new Uint8Array(file.buffer, file.byteOffset, file.byteLength);
-    // Buffers of other windows are instances of other classes.
-    if (/^\[object (Shared)?ArrayBuffer\]$/.test(Object.prototype.toString.call(file))) return new Uint8Array(file);
+    if (/^(Shared)?ArrayBuffer$/.test(classOf(file))) return new Uint8Array(file);
     const hint = typeof file?.then === "function" ? ": await it" : typeof file?.arrayBuffer === "function" ? ": await its arrayBuffer()" : "";
     throw new TypeError(`file: expected an ArrayBuffer or a view of one, with the bytes of a file; found ${kindOf(file)}${hint}`);
 }
 
 /** Number of rays in an array. */
 function countOf(rays) {
-    if (!(rays instanceof Float32Array) || rays.length % RAY !== 0) {
-        throw new TypeError("rays: expected a Float32Array of eight numbers a ray (origin, tmin, direction, tmax)");
+    if (classOf(rays) !== "Float32Array" || rays.length % RAY !== 0) {
+        throw new TypeError(`rays: expected a Float32Array of eight numbers a ray (origin, tmin, direction, tmax); found ${sizedKindOf(rays)}`);
     }
     if (rays.length === 0 && isDetached(rays.buffer)) throw new TypeError("rays: their buffer is detached; it was transferred");
     return rays.length / RAY;
@@ -266,11 +276,11 @@ function isDetached(buffer) {
 
 /** Refuses hits whose columns are not those of their number of rays. */
 function checkHits(hits) {
+    if (hits?.count === undefined) throw new TypeError(`hits: expected the answer of nearest; found ${kindOf(hits)}`);
     HIT_NAMES.forEach((name, k) => {
-        const column = hits?.[name], of = k < 3 ? Float32Array : Uint32Array;
-        if (column instanceof of && column.length === hits.count) return;
-        const found = `${kindOf(column)} of ${column?.length}`;
-        throw new TypeError(`hits.${name}: expected a ${of.name} of ${hits?.count} elements, as many as there are rays; found ${found}`);
+        const column = hits[name], of = k < 3 ? "Float32Array" : "Uint32Array";
+        if (classOf(column) === of && column.length === hits.count) return;
+        throw new TypeError(`hits.${name}: expected a ${of} of ${hits.count} elements, as many as there are rays; found ${sizedKindOf(column)}`);
     });
 }
 

@@ -243,7 +243,28 @@ test("hits need all their columns", () => {
     refused({ v: undefined });
     refused({ count: 3 });
     refused({ count: undefined });
-    assert.throws(() => scene.surface(), TypeError);
+    const nothing = (hits, found) => assert.throws(() => scene.surface(hits), (error) => error instanceof TypeError && found.test(error.message), String(hits));
+    nothing(undefined, /^hits: expected the answer of nearest; found undefined$/);
+    nothing(null, /found null$/);
+    nothing([hits], /found Array$/);
+    nothing({ ...hits, v: undefined }, /^hits.v: expected a Float32Array of 2 elements, .* found undefined$/);
+});
+
+test("rays and hits of another window are taken", () => {
+    const scene = bth.open(readFileSync(join(conformance, "valid/triangle.bth")));
+    const rays = Float32Array.of(0.25, 0.25, 1, 0, 0, 0, -1, Infinity, 9, 9, 1, 0, 0, 0, -1, Infinity), hits = scene.nearest(rays);
+    const elsewhere = (array) => runInNewContext(`${array.constructor.name}.from(array)`, { array: [...array] });
+    assert.ok(!(elsewhere(rays) instanceof Float32Array));
+    assert.deepEqual(scene.nearest(elsewhere(rays)), hits);
+    assert.deepEqual(scene.any(elsewhere(rays)), scene.any(rays));
+    const columns = Object.fromEntries(["t", "u", "v", "instance", "triangle"].map((name) => [name, elsewhere(hits[name])]));
+    assert.deepEqual(scene.surface({ count: hits.count, ...columns }), scene.surface(hits));
+    const refused = (rays, found) => assert.throws(() => scene.nearest(rays), (error) => error instanceof TypeError && found.test(error.message), String(found));
+    refused(new Float64Array(8), /found Float64Array of 8$/);
+    refused(new Float32Array(9), /found Float32Array of 9$/);
+    refused([...rays], /found Array of 16$/);
+    refused(undefined, /found undefined$/);
+    refused(new DataView(new ArrayBuffer(32)), /found DataView of 32 bytes$/);
 });
 
 test("a time is a finite number", () => {

@@ -15,12 +15,14 @@ export class Bth {
 
 /**
  * Loads the library.
- * @param source bth.wasm: its URL, a response with it, its bytes, or a module that is already compiled; by default the file that lies
- * beside this one.
+ * @param source bth.wasm: its URL (a relative one from index.js on), a response with it of the type application/wasm, its bytes, or a
+ * module that is already compiled; or a promise of one of them. By default the file that lies beside index.js.
+ * @throws TypeError for anything else. What fetching, reading or compiling it throws is passed on.
  */
-export function load(
-    source?: string | UrlLike | ResponseLike | Promise<ResponseLike> | ArrayBuffer | ArrayBufferView | CompiledModule,
-): Promise<Bth>;
+export function load(source?: ModuleSource | Promise<ModuleSource>): Promise<Bth>;
+
+/** Where the module comes from. */
+export type ModuleSource = string | UrlLike | ResponseLike | ArrayBuffer | ArrayBufferView | CompiledModule;
 
 // These stand for types that only the library "dom" of TypeScript and the types of node have, which a program may do without.
 

@@ -22,7 +22,8 @@ export class BthError extends Error {
 
 /** Loads the module; see index.d.ts. */
 export async function load(source = new URL("./bth.wasm", import.meta.url)) {
-    const module = source instanceof WebAssembly.Module ? source : await compile(await source);
+    const found = await source;
+    const module = classOf(found) === "WebAssembly.Module" ? found : await compile(found);
     const { exports } = await WebAssembly.instantiate(module, {});
     return new Bth(guarded(exports), module);
 }
@@ -54,8 +55,11 @@ function guarded(exports) {
 }
 
 async function compile(source) {
-    if (source instanceof ArrayBuffer || ArrayBuffer.isView(source)) return WebAssembly.compile(source);
-    if (typeof Response !== "undefined" && source instanceof Response) return WebAssembly.compileStreaming(source);
+    if (classOf(source) === "ArrayBuffer" || ArrayBuffer.isView(source)) return WebAssembly.compile(source);
+    if (classOf(source) === "Response") return WebAssembly.compileStreaming(source);
+    if (typeof source !== "string" && typeof source?.href !== "string") {
+        throw new TypeError(`source: expected bth.wasm as its URL, a response, its bytes or a compiled module; found ${kindOf(source)}`);
+    }
     const url = new URL(source, import.meta.url);
     if (url.protocol === "file:" && typeof process === "object") {
         const { readFile } = await import("node:fs/promises");

@@ -298,5 +298,14 @@ test("the types need no library but ES2022", (t) => {
 
 test("a compiled module and bytes can be loaded", async () => {
     assert.ok((await load(bth.module)).simd);
-    assert.ok((await load(readFileSync(join(process.env.DIST, "bth.wasm")))).simd);
+    const bytes = readFileSync(join(process.env.DIST, "bth.wasm"));
+    assert.ok((await load(bytes)).simd);
+    assert.ok((await load(Promise.resolve(bth.module))).simd);
+    assert.ok((await load(runInNewContext("new Uint8Array(bytes).buffer", { bytes }))).simd);
+});
+
+test("what is no module is refused with what is expected", async () => {
+    for (const [source, found] of [[null, "null"], [5, "Number"], [[], "Array"], [{}, "Object"], [new SharedArrayBuffer(8), "SharedArrayBuffer"]]) {
+        await assert.rejects(load(source), (error) => error instanceof TypeError && /expected bth.wasm as its URL/.test(error.message) && error.message.endsWith(`found ${found}`), found);
+    }
 });

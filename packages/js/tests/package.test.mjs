@@ -285,14 +285,21 @@ test("the types need no library but ES2022", (t) => {
         const program = join(folder, "program.ts");
         writeFileSync(program, `import { load, BthError, type Bth, type Scene, type Surface } from "./bth/index.js";
             const bth: Bth = await load(new Uint8Array(8));
-            await load(bth.module);
+            await load(Promise.resolve(bth.module));
             const scene: Scene = bth.open(new ArrayBuffer(8));
             const surface: Surface = scene.surface(scene.nearest(Float32Array.of(1)));
+            // @ts-expect-error: it is not to be set.
+            scene.objects = 1;
+            // @ts-expect-error: rays are no array.
+            scene.nearest([1]);
+            // @ts-expect-error: the bytes have to be awaited.
+            bth.open(Promise.resolve(new ArrayBuffer(8)));
             ${more} export { surface, BthError };`);
         mkdirSync(join(folder, "bth"), { recursive: true });
         copyFileSync(types, join(folder, "bth/index.d.ts"));
-        const options = ["--strict", "--noEmit", "--lib", lib, "--types", "", "--target", "es2022", "--module", "esnext", "--moduleResolution", "bundler"];
-        execFileSync(process.env.TSC, [...options, program], { encoding: "utf8" });
+        const compilerOptions = { strict: true, noEmit: true, lib: lib.split(","), types: [], target: "es2022", module: "esnext", moduleResolution: "bundler" };
+        writeFileSync(join(folder, "tsconfig.json"), JSON.stringify({ compilerOptions, files: [program] }));
+        execFileSync(process.env.TSC, ["-p", folder], { encoding: "utf8" });
     }
 });
 

@@ -16,7 +16,8 @@ pub unsafe extern "C" fn bth_describe(scene: *const Scene, numbers: *mut [u8; 8]
     // SAFETY: by contract the scene is open, and the address is that of an array of this length; bytes need no alignment.
     let (scene, to) = unsafe { (&*scene, std::slice::from_raw_parts_mut(numbers, NUMBERS)) };
     let objects = scene.object_count();
-    let triangles: f64 = (0..objects).map(|i| f64::from(scene.object(i).header.triangles)).sum();
+    // From +0 on: the sum of no numbers is -0.
+    let triangles = (0..objects).fold(0.0, |sum, i| sum + f64::from(scene.object(i).header.triangles));
     let (lower, upper) = scene.bounds().unwrap_or(([f32::NAN; 3], [f32::NAN; 3]));
     let mut out = [0.0; NUMBERS];
     out[..3].copy_from_slice(&[f64::from(objects), f64::from(scene.instance_count()), triangles]);

@@ -145,6 +145,16 @@ test("the surface at a hit", () => {
     assert.ok(Number.isNaN(surface.position[3]) && surface.object[1] === 0xffffffff);
 });
 
+test("what files hold is counted", () => {
+    const counts = (name) => {
+        const scene = bth.open(readFileSync(join(conformance, "valid", name)));
+        return [scene.objects, scene.instances, scene.triangles];
+    };
+    assert.deepStrictEqual(counts("no-objects.bth"), [0, 0, 0]);
+    assert.deepStrictEqual(counts("groups.bth"), [2, 2, 8]);
+    assert.deepStrictEqual(counts("scene-moving.bth"), [2, 3, 2]);
+});
+
 test("a scene moves when its time is set", () => {
     const scene = bth.open(readFileSync(join(conformance, "valid/scene-moving.bth")));
     assert.ok(scene.frames.last > scene.frames.first);

@@ -175,22 +175,25 @@ impl std::fmt::Display for WithoutHint<'_> {
         if let Some(path) = path.as_ref().filter(|_| HAS_FILES) {
             write!(f, "{}: ", path.display())?;
         }
-        write!(f, "{code}:")?;
+        write!(f, "{code}")?;
+        // What separates a part of the text from the one before.
+        let mut gap = ":";
         if let Some(Section { kind, object }) = *section {
-            write!(f, " {}", kind::name(kind))?;
+            write!(f, "{gap} {}", kind::name(kind))?;
             if object != NONE {
                 write!(f, " of object {object}")?;
             }
-            write!(f, ",")?;
+            gap = ",";
         }
         if let Some(offset) = offset {
-            write!(f, " byte {offset}:")?;
+            write!(f, "{gap} byte {offset}")?;
+            gap = ":";
         }
         // With the feature `brief` some texts are empty.
         match (expected.is_empty(), found.is_empty()) {
-            (false, false) => write!(f, " expected {expected}, found {found}"),
-            (false, true) => write!(f, " expected {expected}"),
-            (true, false) => write!(f, " found {found}"),
+            (false, false) => write!(f, "{gap} expected {expected}, found {found}"),
+            (false, true) => write!(f, "{gap} expected {expected}"),
+            (true, false) => write!(f, "{gap} found {found}"),
             (true, true) => Ok(()),
         }
     }

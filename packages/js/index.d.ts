@@ -65,7 +65,8 @@ export interface Scene {
     /** Box in world space that contains what can be seen at the scene's time; null if that is nothing. */
     readonly bounds: { lower: Vector; upper: Vector } | null;
     /**
-     * The scene's time in seconds.
+     * The scene's time in seconds; at first that of its first frame. It may lie outside of the frames: nothing moves beyond them. A file
+     * whose `frames` are null has none: it stays 0.
      * @throws TypeError unless it is a finite number.
      * @throws BthError if an instance cannot be placed at that time; the scene is then unchanged. With BTH-O001 if the memory is too
      * small; the scene can then only be closed.

@@ -170,6 +170,19 @@ test("of two files that are opened at a time the later is shown", async () => {
     assert.equal(await message(), "");
 });
 
+test("the status is never that of another file", async () => {
+    const status = "document.getElementById('status').textContent";
+    assert.match(await browser.value(status), /^newer/);
+    // There is no picture yet when the file is open.
+    const opened = await browser.value(`(async () => {
+        await viewer.open(Uint8Array.from(atob("${readFileSync(model, "base64")}"), (c) => c.charCodeAt(0)).buffer, "another");
+        return ${status};
+    })()`);
+    assert.equal(opened, "another");
+    await browser.value("viewer.whenSettled()");
+    assert.match(await browser.value(status), /^another · 2,880 triangles/);
+});
+
 test("a scene that is empty at first is shown once there is something", async () => {
     await browser.drop(join(valid, "scene-moving.bth"), WIDTH / 2, HEIGHT / 2);
     await browser.until("document.getElementById('status').textContent === 'scene-moving.bth'");

@@ -48,12 +48,13 @@ export async function open(file, name) {
         shown.pool?.end();
         Object.assign(shown, opened, { name, view: null });
         showTime();
+        // That of another file would stay until there is a sample of each pixel.
+        status.textContent = name;
         reset();
         sayWhatIsSeen();
         if (!shown.view) {
             // The picture of another file would stay.
             canvas.getContext("2d").clearRect(0, 0, canvas.width, canvas.height);
-            status.textContent = name;
         }
     } catch (error) {
         if (number === last) complain(`${name}: ${error.message}`);

@@ -98,6 +98,17 @@ test("dragging turns the model, and Reset view brings it back", async () => {
     assert.ok((await difference(before, await picture())) <= MOST);
 });
 
+test("a double click shows what is at that point, until the view is reset", async () => {
+    const status = "document.getElementById('status').textContent";
+    for (let clickCount = 1; clickCount <= 2; clickCount++) {
+        for (const type of ["mousePressed", "mouseReleased"]) await browser.mouse(type, 175, 120, { clickCount });
+    }
+    await browser.until(`/ · instance 0, triangle \\d+, t [\\d.]+$/.test(${status})`);
+    await browser.until(`/^knot.bth · .*4 of 4 samples .* · instance 0, triangle \\d+, t [\\d.]+$/.test(${status})`);
+    await browser.value(`document.getElementById("reset").click()`);
+    await browser.until(`/4 of 4 samples .* workers?$/.test(${status})`);
+});
+
 test("a damaged file is refused with its code, and the model stays", async () => {
     const before = await picture(), damaged = join(folder, "damaged.bth");
     const bytes = readFileSync(model);

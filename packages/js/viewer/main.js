@@ -16,8 +16,8 @@ const samplesFor = (mode) => Math.max(1, Number(asked.get("samples")) || SAMPLES
 const element = (id) => document.getElementById(id);
 const canvas = element("picture"), status = element("status"), message = element("message");
 
-/** What is shown: the workers, what the file holds, the view and the mode. */
-const shown = { pool: null, content: null, name: "", view: null, mode: "shaded", up: "y" };
+/** What is shown: the workers, what the file holds, the view, the mode, and what is known of the point that was last looked at. */
+const shown = { pool: null, content: null, name: "", view: null, mode: "shaded", up: "y", picked: "" };
 /** Grows with every change, so that work for an older state is dropped. */
 let state = 0;
 let picture = null;
@@ -96,6 +96,7 @@ function sayWhatIsSeen() {
 function reset() {
     const { bounds } = shown.content, { width, height } = pixels();
     shown.view = bounds && firstView(bounds, shown.up, width / height);
+    shown.picked = "";
     changed();
 }
 
@@ -176,6 +177,7 @@ function report(samples, milliseconds, { mode, size }) {
         `${rate.toFixed(2)} million pixels a second`,
         `${pool.size} ${pool.size === 1 ? "worker" : "workers"}`,
         mode === "steps" ? `brightest: ${picture.mostSteps} steps` : "",
+        shown.picked,
     ];
     status.textContent = parts.filter(Boolean).join(" · ");
 }
@@ -213,7 +215,8 @@ async function lookAt(x, y) {
     if (hit.t === Infinity) return;
     shown.view = { ...shown.view, target: add(camera.eye, direction, hit.t) };
     shown.view.distance = hit.t;
-    status.textContent = `instance ${hit.instance}, triangle ${hit.triangle}, t ${hit.t}`;
+    shown.picked = `instance ${hit.instance}, triangle ${hit.triangle}, t ${hit.t}`;
+    status.textContent = `${shown.name} · ${shown.picked}`;
     changed();
 }
 

@@ -201,11 +201,14 @@ test("a scene that is empty at first is shown once there is something", async ()
     const blank = await browser.screenshot();
     const slider = "document.getElementById('time')";
     assert.equal(await browser.value(`${slider}.parentElement.hidden`), false);
+    const frame = "document.getElementById('frame').textContent";
+    assert.equal(await browser.value(frame), "-3");
     // Neither a press nor a key breaks anything while there is no view.
     for (const type of ["mousePressed", "mouseReleased"]) await browser.mouse(type, 100, 150);
     for (const key of ["r", "u", "u"]) await browser.send("Input.dispatchKeyEvent", { type: "keyDown", key, text: key });
     await browser.value(`${slider}.value = ${slider}.max; ${slider}.dispatchEvent(new Event("input"))`);
     await browser.until("/^scene-moving.bth · .*4 of 4 samples/.test(document.getElementById('status').textContent)");
+    assert.equal(await browser.value(frame), "60");
     assert.equal(await message(), "");
     assert.ok((await difference(blank, await picture())) > 20);
 });

@@ -190,10 +190,12 @@ function showTime() {
     const slider = element("time");
     slider.parentElement.hidden = !isMoving(shown.content);
     if (frames) Object.assign(slider, { min: frames.first, max: frames.last, value: frames.first, step: 1 });
+    element("frame").textContent = slider.value;
 }
 
 async function setFrame(frame) {
     const { frames } = shown.content;
+    element("frame").textContent = frame;
     state++;
     try {
         const { bounds } = await shown.pool.askAll("seconds", { seconds: frame / frames.rate });

@@ -5,7 +5,7 @@
 // With BTH_BLESS=1 the pictures are written to expected/ in place of compared; look at them.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
-import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { mkdirSync, mkdtempSync, readFileSync, rmSync, truncateSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { dirname, join, resolve } from "node:path";
 import { after, before, test } from "node:test";
@@ -155,6 +155,16 @@ test("a folder is refused, and the model stays", async () => {
     await browser.until("/a folder: this is a folder, or a file that cannot be read/.test(document.getElementById('message').textContent)");
     await hidesMessage();
     assert.ok((await difference(before, await picture())) <= MOST);
+});
+
+test("a file that is too large for the browser is refused with its size", async () => {
+    const large = join(folder, "large.bth");
+    writeFileSync(large, "");
+    // It takes no room on the disk.
+    truncateSync(large, 2.5 * 2 ** 30);
+    await browser.drop(large, WIDTH / 2, HEIGHT / 2);
+    await browser.until("/large.bth: the browser cannot read files of 2 GiB .* 2.5 GiB; bth-play/.test(document.getElementById('message').textContent)");
+    await hidesMessage();
 });
 
 test("of two files that are opened at a time the later is shown", async () => {

@@ -238,11 +238,13 @@ element("file").addEventListener("change", (event) => openFile(event.target.file
 function openFile(file) {
     if (file) open(chosenBytes(file), file.name).catch(() => {});
 }
-/** The bytes of a file. Browsers hand over folders as files, too, which alone cannot be read. */
+/** The bytes of a file. Browsers hand over folders as files, too, which cannot be read, and have no buffers for files of 2 GiB and more. */
 async function chosenBytes(file) {
     try {
         return await file.arrayBuffer();
     } catch (error) {
+        const gib = file.size / 2 ** 30;
+        if (gib >= 2) throw new Error(`the browser cannot read files of 2 GiB and more at once, and this one has ${gib.toFixed(1)} GiB; bth-play shows it`);
         throw new Error(`this is a folder, or a file that cannot be read (${error.message})`);
     }
 }

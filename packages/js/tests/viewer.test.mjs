@@ -157,6 +157,19 @@ test("a folder is refused, and the model stays", async () => {
     assert.ok((await difference(before, await picture())) <= MOST);
 });
 
+test("a file that is chosen again is opened again", async () => {
+    const chosen = join(folder, "chosen.bth");
+    const { root } = await browser.send("DOM.getDocument");
+    const { nodeId } = await browser.send("DOM.querySelector", { nodeId: root.nodeId, selector: "#file" });
+    for (const [bytes, said] of [["", /^chosen.bth: BTH-F001/], [readFileSync(join(valid, "triangle.bth")), /^$/]]) {
+        writeFileSync(chosen, bytes);
+        await browser.send("DOM.setFileInputFiles", { nodeId, files: [chosen] });
+        assert.equal(await browser.value("document.getElementById('file').value"), "");
+        await browser.until(`${said}.test(((m) => (m.hidden ? "" : m.textContent))(document.getElementById("message")))`);
+    }
+    await browser.until("/^chosen.bth · 1 triangle/.test(document.getElementById('status').textContent)");
+});
+
 test("a file that is too large for the browser is refused with its size", async () => {
     const large = join(folder, "large.bth");
     writeFileSync(large, "");

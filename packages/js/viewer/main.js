@@ -233,7 +233,11 @@ addEventListener("drop", (event) => {
     document.body.classList.remove("over");
     openFile(event.dataTransfer.files[0]);
 });
-element("file").addEventListener("change", (event) => openFile(event.target.files[0]));
+element("file").addEventListener("change", ({ target }) => {
+    openFile(target.files[0]);
+    // Else the same file, which may have changed, would not be opened when it is chosen again.
+    target.value = "";
+});
 /** Opens a file that was chosen. `open` says what is wrong. */
 function openFile(file) {
     if (file) open(chosenBytes(file), file.name).catch(() => {});

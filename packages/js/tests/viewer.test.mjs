@@ -167,7 +167,7 @@ test("a file that is chosen again is opened again", async () => {
         assert.equal(await browser.value("document.getElementById('file').value"), "");
         await browser.until(`${said}.test(((m) => (m.hidden ? "" : m.textContent))(document.getElementById("message")))`);
     }
-    await browser.until("/^chosen.bth · 1 triangle/.test(document.getElementById('status').textContent)");
+    await browser.until("/^chosen.bth · 1 triangle ·/.test(document.getElementById('status').textContent)");
 });
 
 test("a file that is too large for the browser is refused with its size", async () => {
@@ -200,7 +200,7 @@ test("of two files that are opened at a time the later is shown", async () => {
         await viewer.whenSettled();
         return document.getElementById("status").textContent;
     })()`);
-    assert.match(status, /^newer · 1 triangles/);
+    assert.match(status, /^newer · 1 triangle ·/);
     assert.equal(await message(), "");
 });
 

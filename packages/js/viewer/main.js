@@ -167,16 +167,16 @@ function pixels() {
 
 function report(samples, milliseconds, { mode, size }) {
     const { content, pool, name } = shown;
-    const number = (x) => x.toLocaleString("en");
+    const counted = (n, thing) => `${n.toLocaleString("en")} ${thing}${n === 1 ? "" : "s"}`;
     const rate = (samples * size.width * size.height) / milliseconds / 1000;
     const parts = [
         name,
-        `${number(content.triangles)} triangles`,
-        content.instances > 1 ? `${number(content.instances)} instances` : "",
+        counted(content.triangles, "triangle"),
+        content.instances > 1 ? counted(content.instances, "instance") : "",
         `${samples} of ${samplesFor(mode)} samples`,
         `${rate.toFixed(2)} million pixels a second`,
-        `${pool.size} ${pool.size === 1 ? "worker" : "workers"}`,
-        mode === "steps" ? `brightest: ${picture.mostSteps} steps` : "",
+        counted(pool.size, "worker"),
+        mode === "steps" ? `brightest: ${counted(picture.mostSteps, "step")}` : "",
         shown.picked,
     ];
     status.textContent = parts.filter(Boolean).join(" · ");

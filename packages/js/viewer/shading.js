@@ -9,6 +9,8 @@ const OFFSET = 2e-5;
 const AMBIENT_RAYS = 2, AO_RAYS = 4;
 /** Length of ambient-occlusion rays relative to the diagonal of the scene, of pictures from outside and from inside. */
 const OPEN_OUTSIDE = 0.5, OPEN_INSIDE = 0.08;
+/** How far the lamp of a room is above the camera, relative to the diagonal of the scene. */
+const LAMP_HEIGHT = 1e-3;
 /** Radius of the key light at distance 1, which decides how soft its shadows are. */
 const KEY_RADIUS = 0.16;
 
@@ -193,11 +195,11 @@ function shaded(scene, job, samples) {
 }
 
 /** The lights of a camera: the key light is far away, or beside the camera in a room. */
-function studio({ camera, inside }) {
+function studio({ camera, inside, diagonal }) {
     const { right, up, forward, vertical } = camera;
     const direction = add(add(scale(forward, -0.45), right, -0.55), vertical, 0.85);
     const fill = unit(add(add(scale(right, 0.85), forward, -0.5), vertical, 0.1));
-    return { fill, key: inside ? null : unit(direction), lamp: add(camera.eye, up, 0.001) };
+    return { fill, key: inside ? null : unit(direction), lamp: add(camera.eye, up, LAMP_HEIGHT * diagonal) };
 }
 
 /** Adds the ray to the key light; returns its unit direction without the light's radius. */

@@ -318,6 +318,15 @@ test("the types need no library but ES2022", (t) => {
     }
 });
 
+test("the viewer shows means of any number of samples", async () => {
+    const { Picture } = await import(pathToFileURL(resolve(here, "../viewer/picture.js")));
+    const image = { data: new Uint8ClampedArray(4) };
+    const picture = new Picture({ getContext: () => ({ createImageData: () => image, putImageData() {} }) }, 1, 1);
+    const job = { mode: "normals", tile: { left: 0, top: 0, width: 1, height: 1 } };
+    for (let i = 0; i < 70_000; i++) picture.add(job, [0.2, 0.4, i % 2]);
+    assert.deepEqual([...image.data], [51, 102, 128, 255]);
+});
+
 test("the viewer lights a room alike at every size", async () => {
     const { shadeTile } = await import(pathToFileURL(resolve(here, "../viewer/shading.js")));
     const picture = (size) => {

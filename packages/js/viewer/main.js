@@ -11,7 +11,7 @@ const TILE = 64, COARSE = 4;
 const asked = new URLSearchParams(location.search);
 /** Samples of a pixel after which the picture is done. */
 const SAMPLES = { shaded: 64, normals: 16, ao: 64, steps: 4 };
-const samplesFor = (mode) => Math.max(1, Number(asked.get("samples")) || SAMPLES[mode]);
+const samplesFor = (mode) => Math.max(1, Math.floor(Number(asked.get("samples"))) || SAMPLES[mode]);
 
 const element = (id) => document.getElementById(id);
 const canvas = element("picture"), status = element("status"), message = element("message");

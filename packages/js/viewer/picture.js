@@ -39,8 +39,9 @@ export class Picture {
         this.height = height;
         this.#context = canvas.getContext("2d");
         this.#image = this.#context.createImageData(width, height);
-        this.#sums = new Float32Array(3 * width * height);
-        this.#counts = new Uint16Array(width * height);
+        // As many samples as the address of the page asks for, which no type with fewer bits counts and adds up.
+        this.#sums = new Float64Array(3 * width * height);
+        this.#counts = new Uint32Array(width * height);
         /** Steps that have the last colour of the map. */
         this.mostSteps = 1;
     }

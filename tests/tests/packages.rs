@@ -84,3 +84,39 @@ fn programs_find_the_libraries_by_pkg_config() {
     }
     run_both(folder.path());
 }
+
+/// Packages for Debian in a folder: their names without version, and their paths.
+fn debian_packages(folder: &Path) -> Vec<(String, PathBuf)> {
+    let built = bth_tests::built(&["bthc", "bth-play", "bth-scenes", "bth-capi", "bth-compile-capi"]);
+    let mut pack = Command::new(root().join("tools/package/debian"));
+    output_of(pack.arg(folder).env("BTH_INSTALL_FROM", built).env_remove("SOURCE_DATE_EPOCH"));
+    let paths =
+        std::fs::read_dir(folder).expect("the packages").map(|entry| entry.expect("a package").path());
+    let named = |path: PathBuf| {
+        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+        (name.split('_').next().expect("a name").to_owned(), path)
+    };
+    let mut packages: Vec<_> = paths.map(named).collect();
+    packages.sort();
+    packages
+}
+
+#[test]
+fn the_same_files_give_the_same_debian_packages() {
+    if !have("dpkg-deb") {
+        return;
+    }
+    let folders = [(), ()].map(|()| tempfile::tempdir().expect("a temporary folder"));
+    let [first, second] = folders.each_ref().map(|folder| {
+        // Times of files are in seconds.
+        std::thread::sleep(std::time::Duration::from_millis(1100));
+        debian_packages(folder.path())
+    });
+    assert!(first.len() >= 2, "{first:?}");
+    for ((name, a), (_, b)) in first.iter().zip(&second) {
+        assert!(
+            std::fs::read(a).expect("a package") == std::fs::read(b).expect("a package"),
+            "{name} differs"
+        );
+    }
+}

@@ -102,6 +102,27 @@ fn debian_packages(folder: &Path) -> Vec<(String, PathBuf)> {
 }
 
 #[test]
+fn debian_packages_list_the_sums_of_their_files() {
+    if !["dpkg-deb", "md5sum"].into_iter().all(have) {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (name, package) in debian_packages(folder.path()) {
+        let unpacked = folder.path().join(&name);
+        output_of(Command::new("dpkg-deb").arg("-R").arg(&package).arg(&unpacked));
+        let checked = output_of(Command::new("md5sum").args(["-c", "DEBIAN/md5sums"]).current_dir(&unpacked));
+        let found = output_of(Command::new("find").args(["usr", "-type", "f"]).current_dir(&unpacked));
+        assert_eq!(checked.lines().count(), found.lines().count(), "{name}");
+        let control = std::fs::read_to_string(unpacked.join("DEBIAN/control")).expect("a description");
+        let description = control.lines().skip_while(|line| !line.starts_with("Description:")).skip(1);
+        assert!(
+            description.clone().count() > 0 && description.clone().all(|line| line.len() <= 80),
+            "{control}"
+        );
+    }
+}
+
+#[test]
 fn the_same_files_give_the_same_debian_packages() {
     if !have("dpkg-deb") {
         return;

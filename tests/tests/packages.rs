@@ -123,6 +123,28 @@ fn debian_packages_list_the_sums_of_their_files() {
 }
 
 #[test]
+fn debian_packages_have_manuals_and_completions_where_they_are_looked_for() {
+    if !have("dpkg-deb") {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let packages = debian_packages(folder.path());
+    let (_, package) = packages.iter().find(|(name, _)| name == "bth").expect("the package of programs");
+    let files = output_of(Command::new("dpkg-deb").arg("-c").arg(package));
+    for program in ["bthc", "bth-play", "bth-scenes"] {
+        for file in [
+            format!("bin/{program}"),
+            format!("share/man/man1/{program}.1.gz"),
+            format!("share/bash-completion/completions/{program}"),
+            format!("share/zsh/vendor-completions/_{program}"),
+            format!("share/fish/vendor_completions.d/{program}.fish"),
+        ] {
+            assert!(files.lines().any(|line| line.ends_with(&format!(" ./usr/{file}"))), "{file}: {files}");
+        }
+    }
+}
+
+#[test]
 fn the_same_files_give_the_same_debian_packages() {
     if !have("dpkg-deb") {
         return;

@@ -90,3 +90,4 @@ const wasm = stripped(readFileSync(compileModule()));
 keep("bth.wasm", wasm, MOST_WASM);
 keep("viewer.html", page(wasm), MOST_PAGE);
 for (const name of ["index.js", "index.d.ts", "package.json"]) copyFileSync(join(here, name), join(out, name));
+for (const name of ["LICENSE-MIT", "LICENSE-APACHE"]) copyFileSync(join(root, name), join(out, name));

@@ -346,6 +346,12 @@ test("the viewer lights a room alike at every size", async () => {
     for (const size of [2 ** -40, 2 ** 20]) assert.deepEqual(picture(size), expected, String(size));
 });
 
+test("the package is complete", () => {
+    const { files } = JSON.parse(readFileSync(join(process.env.DIST, "package.json"), "utf8"));
+    for (const name of files) assert.ok(readFileSync(join(process.env.DIST, name)).length > 0, name);
+    for (const name of ["LICENSE-MIT", "LICENSE-APACHE"]) assert.ok(files.includes(name), name);
+});
+
 test("a compiled module and bytes can be loaded", async () => {
     assert.ok((await load(bth.module)).simd);
     const bytes = readFileSync(join(process.env.DIST, "bth.wasm"));

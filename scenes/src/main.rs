@@ -135,5 +135,10 @@ fn manual() -> Result<(), Failure> {
         man.render_description_section(&mut page)?;
         man.render_options_section(&mut page)?;
     }
-    Ok(std::io::stdout().lock().write_all(&page)?)
+    // Subcommands have no pages of their own: what the page says of them stands further down.
+    let mut page = String::from_utf8_lossy(&page).into_owned();
+    for name in command.get_subcommands().map(clap::Command::get_name) {
+        page = page.replace(&format!("bth\\-scenes\\-{name}(1)"), &format!("\\fBbth\\-scenes {name}\\fR"));
+    }
+    Ok(std::io::stdout().lock().write_all(page.as_bytes())?)
 }

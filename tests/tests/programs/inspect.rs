@@ -200,5 +200,6 @@ fn completions_and_manual_are_printed() {
         }
         let page = run(program, folder.path(), &[man]).expect(0).stdout;
         assert!(page.contains(&format!(".TH {program}")), "{program}: {page}");
+        assert!(!page.contains("(1)"), "{program}: the page names others, which there are not: {page}");
     }
 }

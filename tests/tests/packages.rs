@@ -123,6 +123,27 @@ fn debian_packages_list_the_sums_of_their_files() {
 }
 
 #[test]
+fn debian_packages_have_the_licences_of_what_they_hold() {
+    if !have("dpkg-deb") {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (name, package) in debian_packages(folder.path()) {
+        let unpacked = folder.path().join(&name);
+        output_of(Command::new("dpkg-deb").arg("-x").arg(&package).arg(&unpacked));
+        let text = std::fs::read_to_string(unpacked.join("usr/share/doc").join(&name).join("copyright"));
+        let text = text.expect("a file of licences");
+        // All programs and libraries hold the first crate.
+        for part in ["libc 0.", "Permission is hereby granted", "Apache License"] {
+            assert!(text.contains(part), "{name} has no {part:?}");
+        }
+        if name == "bth-tetgen" {
+            assert!(text.contains("GNU AFFERO GENERAL PUBLIC LICENSE\nVersion 3"), "{name}");
+        }
+    }
+}
+
+#[test]
 fn debian_packages_have_manuals_and_completions_where_they_are_looked_for() {
     if !have("dpkg-deb") {
         return;

@@ -8,8 +8,10 @@ const EXIT_CODES: &str = "\
 Exit codes:
     0  done
     2  wrong usage
-    3  bad input: the compiled file cannot be used
+    3  bad input: the model or the compiled file cannot be used
     4  a file could not be read or written, or there is no display for a window
+    5  the model exceeds a limit of the format
+   70  internal error of the compiler; please report it
   130  cancelled, by Ctrl-C, SIGTERM or SIGHUP";
 
 /// Where the window writes pictures by default.

@@ -89,6 +89,20 @@ fn model_without_triangles_gives_an_empty_picture() {
 }
 
 #[test]
+fn help_lists_all_exit_codes() {
+    let folder = folder(&[]);
+    let lists = |program: &str| {
+        let help = run(program, folder.path(), &["--help"]).expect(0).stdout;
+        let codes = help.lines().skip_while(|line| *line != "Exit codes:").skip(1);
+        codes.map(|line| line.split_whitespace().next().unwrap_or_default().to_owned()).collect::<Vec<_>>()
+    };
+    // Those of models that bth-play compiles are the compiler's, except that nothing is checked.
+    let compiler = lists("bthc");
+    assert_eq!(compiler, ["0", "1", "2", "3", "4", "5", "70", "130"]);
+    assert_eq!(lists("bth-play"), compiler.into_iter().filter(|code| code != "1").collect::<Vec<_>>());
+}
+
+#[test]
 fn options_and_files_that_show_nothing_are_warned_of() {
     let empty = "version = 1\nobjects = [{ name = \"none\", model = \"none.obj\" }]\n[[nodes]]\nname = \"n\"\nobject = \"none\"\n";
     let folder = folder(&[("ball.obj", &sphere(16)), ("none.obj", "v 0 0 0\n"), ("none.manifest", empty)]);

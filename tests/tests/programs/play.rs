@@ -89,6 +89,18 @@ fn model_without_triangles_gives_an_empty_picture() {
 }
 
 #[test]
+fn frames_that_a_model_does_not_have_are_named() {
+    let folder = folder(&[("ball.obj", &sphere(16))]);
+    bthc(folder.path(), &["compile", "ball.obj"]).expect(0);
+    play(folder.path(), &["--frames", "0"]).expect(0);
+    for (frames, found) in [("5", "frame 5 alone"), ("0..3", "frames 0 to 3")] {
+        let refused = play(folder.path(), &["--frames", frames]).expect(2).stderr;
+        let text = format!("ball.bth has frame 0 alone; expected frames of it, found {found}");
+        assert!(refused.contains(&text), "{refused}");
+    }
+}
+
+#[test]
 fn help_lists_all_exit_codes() {
     let folder = folder(&[]);
     let lists = |program: &str| {

@@ -84,13 +84,20 @@ pub(crate) fn frames_to_show(
     let ((first, last), _) = frame_range(scene);
     match args.frames {
         Some((a, b)) if a < first || b > last => Err(Failure::Usage(format!(
-            "{} has frames {first} to {last}; expected some of these, found {a} to {b}",
-            file.display()
+            "{} has {}; expected frames of it, found {}",
+            file.display(),
+            frames_named(first, last),
+            frames_named(a, b)
         ))),
         Some(frames) => Ok(frames),
         None if output.is_some_and(is_one_picture) => Ok((first, first)),
         None => Ok((first, last)),
     }
+}
+
+/// A range of frames as text.
+fn frames_named(first: i32, last: i32) -> String {
+    if first == last { format!("frame {first} alone") } else { format!("frames {first} to {last}") }
 }
 
 fn is_one_picture(output: &Path) -> bool {

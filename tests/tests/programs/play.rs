@@ -126,6 +126,9 @@ fn options_and_files_that_show_nothing_are_warned_of() {
     assert_eq!(stderr(&["--mode", "steps", "--scale", "9"]), "");
     assert!(stderr(&["--bounces", "1"]).contains("warning: ball.bth: --bounces changes nothing"));
     assert!(stderr(&["--scale", "9"]).contains("warning: ball.bth: --scale changes nothing"));
+    let seen_from = |eye: &str| stderr(&["--camera", &format!("{eye},0,0,0,0,0")]);
+    assert_eq!(seen_from("3.4e38"), "");
+    assert!(seen_from("1e39").contains("warning: ball.bth: the camera is farther from the origin than f32"));
     for (file, what) in
         [("none.bth", "the model has no triangles"), ("scene.bth", "no frame shows a triangle")]
     {

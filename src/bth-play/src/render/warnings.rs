@@ -14,6 +14,13 @@ pub(super) fn of(scene: &Scene, args: &Args, setup: &SceneSetup) -> Vec<String> 
             None => "the model has no triangles, so the picture is empty".to_owned(),
         });
     }
+    // Rays have origins of f32.
+    if !setup.camera(scene, args).eye.as_vec3().is_finite() {
+        warnings.push(format!(
+            "the camera is farther from the origin than f32 numbers reach ({:e}), so it sees nothing",
+            f32::MAX
+        ));
+    }
     if args.bounces.is_some() && args.mode != Mode::Path {
         warnings.push(format!("--bounces changes nothing: it is for --mode path, found --mode {mode}"));
     }

@@ -161,6 +161,15 @@ fn free_directions(
     Ok(report)
 }
 
+/// A distance in units of the model, whose size may be anything, to at least three digits.
+fn distance_text(distance: f32) -> String {
+    match distance {
+        0.0 => "0".to_owned(),
+        d if (0.1..1e6).contains(&d) => format!("{d:.3}"),
+        d => format!("{d:.2e}"),
+    }
+}
+
 /// What free directions bring and cost.
 fn free_line(path: &Path, free: &FreeReport) -> String {
     let bytes = |row: usize| count(free.triangles * row as u64);
@@ -170,7 +179,7 @@ fn free_line(path: &Path, free: &FreeReport) -> String {
          {}: {} by --free-directions auto\n",
         path.display(),
         100.0 * free.free,
-        free.levels.map(|distance| format!("{distance:.3}")).join(", "),
+        free.levels.map(distance_text).join(", "),
         100.0 * free.beyond[0],
         100.0 * free.beyond[1],
         100.0 * free.beyond[2],

@@ -2,10 +2,13 @@
 
 use std::process::Command;
 
+/// A path in this crate at which there is no file.
+const NO_FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/no-such-library");
+
 /// The exit code and standard error of the program, run with backtraces enabled.
 fn mistake(arguments: &[&str]) -> (i32, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bth-bench"));
-    command.env("RUST_BACKTRACE", "1").env("EMBREE_LIB", "/nonexistent").env("TINYBVH_LIB", "/nonexistent");
+    command.env("RUST_BACKTRACE", "1").env("EMBREE_LIB", NO_FILE).env("TINYBVH_LIB", NO_FILE);
     let output = command.args(arguments).output().unwrap();
     let message = String::from_utf8(output.stderr).unwrap();
     assert!(

@@ -4,15 +4,13 @@ use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
 
+/// A path in this crate at which there is no file.
+const NO_FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/no-such-library");
+
 fn bench(arguments: &[&str]) -> Output {
     // Whatever is installed on this machine is not there.
     let mut command = Command::new(env!("CARGO_BIN_EXE_bth-bench"));
-    command
-        .env("EMBREE_LIB", "/nonexistent")
-        .env("TINYBVH_LIB", "/nonexistent")
-        .args(arguments)
-        .output()
-        .unwrap()
+    command.env("EMBREE_LIB", NO_FILE).env("TINYBVH_LIB", NO_FILE).args(arguments).output().unwrap()
 }
 
 fn json(path: &Path) -> Value {

@@ -13,7 +13,7 @@ use crate::monitor::Monitor;
 use crate::number::without_mark;
 use crate::raw::{Raw, RowKind, check_rows, check_triangles};
 use crate::source::{NON_FINITE, Source, input_error, read_file};
-use crate::{attributes, gltf, mtl, obj, off, ply, stl, topology, weld};
+use crate::{attributes, coordinate_range, gltf, mtl, obj, off, ply, stl, topology, weld};
 
 /// The supported formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -260,6 +260,7 @@ fn count(
     let mesh = Mesh { positions: welded.positions, triangles, attributes, ..Mesh::default() };
     let counts = topology::topology(&mesh);
     monitor.check()?;
+    coordinate_range::warn(&mesh, monitor);
     let report = Report {
         triangles: mesh.triangles.len() as u64,
         positions_read: positions_read as u64,

@@ -7,6 +7,7 @@
 #![warn(missing_docs)]
 
 mod attributes;
+mod coordinate_range;
 mod cutout;
 mod deformation;
 mod disjoint_sets;

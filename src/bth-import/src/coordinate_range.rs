@@ -56,9 +56,10 @@ pub(crate) fn warn(mesh: &Mesh, monitor: &dyn Monitor) {
         if let (true, Some(triangle)) = (count > 0, mesh.triangles.iter().position(is_far)) {
             let corners = mesh.triangles[triangle].map(|v| mesh.positions[v as usize]);
             let first = corners.into_iter().find(|corner| bulk.is_far(corner)).unwrap_or_default();
+            let vertices = if count == 1 { "1 vertex lies".into() } else { format!("{count} vertices lie") };
             return monitor.warn(&format!(
-                "{count} vertices lie more than 2^30 times as far out as most of the mesh is large, the first at {first:?} \
-                 in triangle {triangle}: all rays take many times as long. Remove them if they are there by mistake",
+                "{vertices} more than 2^30 times as far out as most of the mesh is large, the first at {first:?} \
+                 in triangle {triangle}: all rays take many times as long. Remove what is there by mistake",
             ));
         }
     }

@@ -173,6 +173,11 @@ impl Args {
         Self { spp, ..self.clone() }
     }
 
+    /// Whether the pictures go to standard output.
+    pub(crate) fn takes_stdout(&self) -> bool {
+        self.output.as_deref() == Some(Path::new("-"))
+    }
+
     /// Where pictures go, which clap requires unless they go to a window.
     pub(crate) fn output(&self) -> Result<&Path, Failure> {
         self.output.as_deref().ok_or_else(|| Failure::Usage("an output is needed".to_owned()))

@@ -53,6 +53,11 @@ fn run(args: &args::Args) -> Result<(), Failure> {
         None => bth::Isa::from_environment().map(|_| ()),
     };
     isa.map_err(|error| Failure::Usage(error.to_string()))?;
+    if args.json && args.takes_stdout() {
+        return Err(Failure::Usage(
+            "standard output takes the pictures or one JSON object; name a file with -o".to_owned(),
+        ));
+    }
     interrupt::listen(args.json)?;
     let file = args.file()?;
     // Keeps the entry from being evicted from the cache until the end of the program.

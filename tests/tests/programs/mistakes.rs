@@ -42,8 +42,9 @@ const BTHC: [Mistake; 25] = [
     ("bthc", &["calibrate", "-o", "-"], 2, &["--output", "not standard output"]),
 ];
 
-const BTH_PLAY: [Mistake; 11] = [
+const BTH_PLAY: [Mistake; 12] = [
     ("bth-play", &["ball.bth", "-o", "x.png", "--mode", "nosuch"], 2, &["nosuch", "shaded"]),
+    ("bth-play", &["ball.bth", "-o", "-", "--json"], 2, &["BTH-U001", "standard output", "-o"]),
     ("bth-play", &["ball.bth", "-o", "x.bmp"], 2, &["BTH-U001", "x.bmp", ".png"]),
     ("bth-play", &["ball.bth", "-o", "x.png", "--camera", "nosuch"], 2, &["nosuch"]),
     ("bth-play", &["ball.bth", "-o", "x.png", "--frames", "5..9"], 2, &["BTH-U001", "5 to 9"]),

@@ -3,7 +3,7 @@
 use crate::mesh::Mesh;
 use crate::monitor::Monitor;
 
-/// From this |coordinate| on, f32 cannot prepare rays, and f64 decides on every triangle of a leaf.
+/// From this |coordinate| on, f32 cannot prepare rays (`LARGEST` of the runtime), and f64 decides on every triangle of a leaf.
 const GREATEST: f32 = (1u64 << 40) as f32;
 /// Where no |coordinate| is greater, products of distances within a leaf are denormal in f32.
 const LEAST: f32 = 1.0 / (1u64 << 50) as f32;

@@ -242,3 +242,18 @@ fn cuts_and_flipped_bits_of_models_never_panic() {
         }
     }
 }
+
+/// A vertex far out of a scan, as a number in place of one that is missing would be.
+#[test]
+fn a_vertex_far_out_of_a_scan_is_warned_of_and_the_scan_is_not() {
+    let Some(folder) = folder() else { return };
+    let listener = Listener::default();
+    let path = folder.join("static/stanford-bunny.ply");
+    let (mesh, _) = import(&path, Keep::None, &listener).unwrap();
+    assert!(!listener.heard("lie"), "{:?}", listener.0);
+    let mut positions = mesh.positions;
+    positions[mesh.triangles[1000][1] as usize][2] = -1e13;
+    let far = bth_import::import_triangles(&path, &positions, &mesh.triangles, Keep::None, &listener);
+    assert_eq!(far.unwrap().1.triangles, mesh.triangles.len() as u64);
+    assert!(listener.heard("1 vertex lies more than 2^30 times as far out"), "{:?}", listener.0);
+}

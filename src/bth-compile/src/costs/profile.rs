@@ -88,13 +88,19 @@ impl Default for Profile {
 }
 
 /// The text of a regular file of at most [`LONGEST`] bytes: a named pipe would wait for a writer, and a device may have no end.
+///
+/// # Errors
+/// Those of the system; when it is no such file.
 fn read(path: &Path) -> std::io::Result<String> {
     let found = std::fs::metadata(path)?;
     if !found.is_file() && !found.is_dir() {
         return Err(std::io::Error::other("not a regular file"));
     }
     let mut text = String::new();
-    std::fs::File::open(path)?.take(LONGEST).read_to_string(&mut text)?;
+    std::fs::File::open(path)?.take(LONGEST + 1).read_to_string(&mut text)?;
+    if text.len() as u64 > LONGEST {
+        return Err(std::io::Error::other(format!("no profile: it has more than {LONGEST} bytes")));
+    }
     Ok(text)
 }
 
@@ -191,6 +197,19 @@ mod tests {
     #[test]
     fn the_default_profile_can_be_used() {
         assert_eq!(Profile::default().check(), Ok(()));
+    }
+
+    #[test]
+    fn a_file_that_is_too_long_for_a_profile_is_refused() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        // Blanks are no part of the profile before them.
+        let text = serde_json::to_string(&Profile::default()).unwrap();
+        for (length, is_read) in [(LONGEST, true), (LONGEST + 1, false)] {
+            std::fs::write(file.path(), text.clone() + &" ".repeat(length as usize - text.len())).unwrap();
+            let found = Profile::read(file.path()).map_err(|e| e.to_string());
+            assert_eq!(found.is_ok(), is_read, "{found:?}");
+            assert!(found.err().is_none_or(|error| error.contains("more than 1048576 bytes")));
+        }
     }
 
     #[test]

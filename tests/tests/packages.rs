@@ -4,6 +4,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::OnceLock;
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().expect("the repository")
@@ -85,10 +86,12 @@ fn programs_find_the_libraries_by_pkg_config() {
     run_both(folder.path());
 }
 
-/// Packages for Debian in a folder: their names without version, and their paths.
-fn debian_packages(folder: &Path) -> Vec<(String, PathBuf)> {
+/// Packs packages for Debian into a folder: their names without version, and their paths.
+fn pack_debian_packages(folder: &Path) -> Vec<(String, PathBuf)> {
     let built = bth_tests::built(&["bthc", "bth-play", "bth-scenes", "bth-capi", "bth-compile-capi"]);
     let mut pack = Command::new(root().join("tools/package/debian"));
+    // Programs of debug builds are large, and the usual compression takes half a minute for them.
+    pack.envs([("DPKG_DEB_COMPRESSOR_TYPE", "gzip"), ("DPKG_DEB_COMPRESSOR_LEVEL", "1")]);
     output_of(pack.arg(folder).env("BTH_INSTALL_FROM", built).env_remove("SOURCE_DATE_EPOCH"));
     let paths =
         std::fs::read_dir(folder).expect("the packages").map(|entry| entry.expect("a package").path());
@@ -101,15 +104,28 @@ fn debian_packages(folder: &Path) -> Vec<(String, PathBuf)> {
     packages
 }
 
+/// The packages for Debian, which are packed once for all tests, into a folder beside those of the build.
+fn debian_packages() -> &'static [(String, PathBuf)] {
+    static PACKED: OnceLock<Vec<(String, PathBuf)>> = OnceLock::new();
+    PACKED.get_or_init(|| {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("debian");
+        if folder.exists() {
+            std::fs::remove_dir_all(&folder).expect("the packages of the run before can be removed");
+        }
+        std::fs::create_dir_all(&folder).expect("a folder for packages");
+        pack_debian_packages(&folder)
+    })
+}
+
 #[test]
 fn debian_packages_list_the_sums_of_their_files() {
     if !["dpkg-deb", "md5sum"].into_iter().all(have) {
         return;
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
-    for (name, package) in debian_packages(folder.path()) {
-        let unpacked = folder.path().join(&name);
-        output_of(Command::new("dpkg-deb").arg("-R").arg(&package).arg(&unpacked));
+    for (name, package) in debian_packages() {
+        let unpacked = folder.path().join(name);
+        output_of(Command::new("dpkg-deb").arg("-R").arg(package).arg(&unpacked));
         let checked = output_of(Command::new("md5sum").args(["-c", "DEBIAN/md5sums"]).current_dir(&unpacked));
         let found = output_of(Command::new("find").args(["usr", "-type", "f"]).current_dir(&unpacked));
         assert_eq!(checked.lines().count(), found.lines().count(), "{name}");
@@ -128,10 +144,10 @@ fn debian_packages_have_the_licences_of_what_they_hold() {
         return;
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
-    for (name, package) in debian_packages(folder.path()) {
-        let unpacked = folder.path().join(&name);
-        output_of(Command::new("dpkg-deb").arg("-x").arg(&package).arg(&unpacked));
-        let text = std::fs::read_to_string(unpacked.join("usr/share/doc").join(&name).join("copyright"));
+    for (name, package) in debian_packages() {
+        let unpacked = folder.path().join(name);
+        output_of(Command::new("dpkg-deb").arg("-x").arg(package).arg(&unpacked));
+        let text = std::fs::read_to_string(unpacked.join("usr/share/doc").join(name).join("copyright"));
         let text = text.expect("a file of licences");
         // All programs and libraries hold the first crate.
         for part in ["libc 0.", "Permission is hereby granted", "Apache License"] {
@@ -148,9 +164,8 @@ fn debian_packages_have_manuals_and_completions_where_they_are_looked_for() {
     if !have("dpkg-deb") {
         return;
     }
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let packages = debian_packages(folder.path());
-    let (_, package) = packages.iter().find(|(name, _)| name == "bth").expect("the package of programs");
+    let (_, package) =
+        debian_packages().iter().find(|(name, _)| name == "bth").expect("the package of programs");
     let files = output_of(Command::new("dpkg-deb").arg("-c").arg(package));
     for program in ["bthc", "bth-play", "bth-scenes"] {
         for file in [
@@ -170,13 +185,13 @@ fn the_same_files_give_the_same_debian_packages() {
     if !have("dpkg-deb") {
         return;
     }
-    let folders = [(), ()].map(|()| tempfile::tempdir().expect("a temporary folder"));
-    let [first, second] = folders.each_ref().map(|folder| {
-        // Times of files are in seconds.
-        std::thread::sleep(std::time::Duration::from_millis(1100));
-        debian_packages(folder.path())
-    });
+    let first = debian_packages();
+    // Times of files are in seconds.
+    std::thread::sleep(std::time::Duration::from_millis(1100));
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let second = pack_debian_packages(folder.path());
     assert!(first.len() >= 2, "{first:?}");
+    assert_eq!(first.len(), second.len());
     for ((name, a), (_, b)) in first.iter().zip(&second) {
         assert!(
             std::fs::read(a).expect("a package") == std::fs::read(b).expect("a package"),

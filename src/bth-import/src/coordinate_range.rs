@@ -7,8 +7,8 @@ use crate::monitor::Monitor;
 const GREATEST: f32 = (1u64 << 40) as f32;
 /// Where no |coordinate| is greater, products of distances within a leaf are denormal in f32.
 const LEAST: f32 = 1.0 / (1u64 << 50) as f32;
-/// Ratio of the size of a mesh to that of the [`Bulk`] of it from which on the pads of boxes, which are relative to the mesh, are no longer
-/// small beside leaves.
+/// Ratio of the size of a mesh to that of the [`Bulk`] of it from which on a triangle to such a vertex is taken for a mistake: all rays pass
+/// close to it.
 const FAR: f64 = (1u64 << 30) as f64;
 /// Number of vertices by which the bulk is found.
 const SAMPLES: usize = 4096;
@@ -38,7 +38,7 @@ impl Bulk {
         bulk
     }
 
-    /// Whether a position is so far out that pads of boxes are not small beside the bulk.
+    /// Whether a position is so far out that it is taken for a mistake.
     fn is_far(&self, position: &[f32; 3]) -> bool {
         (0..3).any(|k| (f64::from(position[k]) - self.middle[k]).abs() > FAR * self.size)
     }
@@ -59,14 +59,15 @@ pub(crate) fn warn(mesh: &Mesh, monitor: &dyn Monitor) {
             let vertices = if count == 1 { "1 vertex lies".into() } else { format!("{count} vertices lie") };
             return monitor.warn(&format!(
                 "{vertices} more than 2^30 times as far out as most of the mesh is large, the first at {first:?} \
-                 in triangle {triangle}: all rays take many times as long. Remove what is there by mistake",
+                 in triangle {triangle}: rays take two to four times as long, from coordinates of 1.1e12 (2^40) on ten times, from 3e29 \
+                 (2^98) on thousands of times. Remove what is there by mistake",
             ));
         }
     }
     let greatest = mesh.positions.as_flattened().iter().fold(0f32, |greatest, x| greatest.max(x.abs()));
     if greatest >= GREATEST {
         monitor.warn(&format!(
-            "coordinates reach {greatest:e}: from 1.1e12 (2^40) on rays take several times as long, from 1e30 on thousands of times. \
+            "coordinates reach {greatest:e}: from 1.1e12 (2^40) on rays take several times as long, from 3e29 (2^98) on thousands of times. \
              Answers are exact all the same; in a greater unit the model is faster",
         ));
     } else if 0.0 < greatest && greatest <= LEAST {

@@ -1,6 +1,6 @@
 //! The bounds of an object in the shape that vector loads need.
 
-use crate::layout::{BOX_MARGIN, Object, WIDENED_BOXES};
+use crate::layout::{Object, WIDENED_BOXES};
 
 /// An axis-aligned box in object space, padded so that each corner is one load of four lanes.
 #[derive(Clone, Copy, Debug, Default)]
@@ -12,23 +12,35 @@ pub struct ObjectBounds {
     pub upper: [f32; 4],
     /// Greatest absolute value of a coordinate of either corner.
     pub greatest: f32,
-    /// What pads of boxes allow for besides the origin of a ray: `greatest`, or a small part of it where the file's boxes are widened.
+    /// What pads of boxes allow for besides the origin of a ray when f32 prepares it: `greatest`, or [`Self::padded_in_f64`] where that is below
+    /// [`GREATEST_IN_F32`].
     pub padded: f32,
 }
 
-/// Objects with widened boxes have greatest |coordinates| in this range, in which neither pads underflow nor products overflow.
-pub const WIDENED_RANGE: std::ops::Range<f32> = 1.0 / (1u64 << 60) as f32..(1u64 << 40) as f32;
+/// Objects with widened boxes have greatest |coordinates| in this range, in which neither pads underflow nor products of planes overflow.
+pub const WIDENED_RANGE: std::ops::Range<f32> =
+    1.0 / (1u64 << 60) as f32..(1u64 << 49) as f32 * (1u64 << 49) as f32;
+/// From this greatest |coordinate| on, products of three coordinates could overflow f32, which then prepares no rays.
+pub const GREATEST_IN_F32: f32 = (1u64 << 40) as f32;
+/// What pads of widened boxes allow for besides the origin of a ray. No rounding needs it; it keeps pads far from denormal numbers, for rays
+/// from the origin of the object's space, too.
+const LEAST_PADDED: f32 = 1.0 / ((1u64 << 50) as f32 * (1u64 << 50) as f32);
 
 impl ObjectBounds {
     /// The bounds of an object, from its OBJECT row.
     pub fn new(object: &Object) -> ObjectBounds {
         let ([x, y, z], [to_x, to_y, to_z]) = (object.lower, object.upper);
-        let corners = object.lower.iter().chain(&object.upper);
-        let greatest = corners.fold(0.0, |m: f32, x| if x.abs() > m { x.abs() } else { m });
-        let is_widened = object.coordinates & WIDENED_BOXES != 0 && WIDENED_RANGE.contains(&greatest);
-        // What remains keeps pads far from denormal numbers, for rays from the origin of the object's space, too.
-        let padded = if is_widened { greatest * BOX_MARGIN as f32 } else { greatest };
+        let greatest = greatest_coordinate(object);
+        let padded = if greatest < GREATEST_IN_F32 { ObjectBounds::padded_in_f64(object) } else { greatest };
         ObjectBounds { lower: [x, y, z, 0.0], upper: [to_x, to_y, to_z, 0.0], greatest, padded }
+    }
+
+    /// What pads of boxes allow for besides the origin of a ray: the greatest |coordinate| of the object, or next to nothing where the file's
+    /// boxes are widened.
+    pub fn padded_in_f64(object: &Object) -> f32 {
+        let greatest = greatest_coordinate(object);
+        let is_widened = object.coordinates & WIDENED_BOXES != 0 && WIDENED_RANGE.contains(&greatest);
+        if is_widened { LEAST_PADDED } else { greatest }
     }
 
     /// The cube around the origin that holds all points with coordinates of at most `greatest` in absolute value.
@@ -42,4 +54,10 @@ impl ObjectBounds {
     pub fn size(&self) -> f32 {
         (0..3).fold(0.0, |m: f32, k| m.max(self.upper[k] - self.lower[k]))
     }
+}
+
+/// Greatest absolute value of a coordinate of either corner of an object's bounds.
+fn greatest_coordinate(object: &Object) -> f32 {
+    let corners = object.lower.iter().chain(&object.upper);
+    corners.fold(0.0, |greatest: f32, x| if x.abs() > greatest { x.abs() } else { greatest })
 }

@@ -15,7 +15,7 @@ use bth_format::object::ObjectBounds;
 /// greatest coordinate of the object and that of all origins, they come to at most uE|r| for the reciprocal, 2uE|r| for the
 /// padded end, uE|r| for the difference and uE|r| for the product: with the half [`PAD`] = 8uE|r| of [`boxes`] for
 /// clamped components less than 14uE|r|; the pad is 2 · PAD = 32uE. Of these, less than 12u are relative to the planes, which widened
-/// boxes cover by 16u: then E counts the object's coordinates by their small part only ([`prepare::padded_extent`]).
+/// boxes cover by 16u: then E counts next to nothing of the object's coordinates ([`prepare::padded_extent`]).
 #[derive(Clone, Copy)]
 pub(crate) struct Shaft<S: Simd> {
     /// For each axis the end of the origins' interval that is nearest to the planes at which rays enter boxes.

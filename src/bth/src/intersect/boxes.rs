@@ -65,8 +65,8 @@ impl RaySlabs {
 
     /// For the boxes of an object.
     pub(crate) fn new(ray: &Ray, line: &Line, object: &Object) -> RaySlabs {
-        let bounds = ObjectBounds::new(object);
-        RaySlabs::with_pad(ray, line, [bounds.greatest, bounds.padded].map(f64::from), |_| 0.0)
+        let extents = [ObjectBounds::new(object).greatest, ObjectBounds::padded_in_f64(object)];
+        RaySlabs::with_pad(ray, line, extents.map(f64::from), |_| 0.0)
     }
 
     /// For boxes whose |coordinates| do not exceed `farthest`. `extra_pad` maps the greatest |coordinate| of the ray's origin
@@ -75,7 +75,7 @@ impl RaySlabs {
         Some(RaySlabs::with_pad(ray, &Line::new(ray)?, [farthest.into(); 2], extra_pad))
     }
 
-    /// Of the greatest |coordinate| of the boxes, and of what pads allow for in its place ([`ObjectBounds::padded`]).
+    /// Of the greatest |coordinate| of the boxes, and of what pads allow for in its place ([`ObjectBounds::padded_in_f64`]).
     fn with_pad(
         ray: &Ray,
         line: &Line,

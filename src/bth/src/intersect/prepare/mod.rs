@@ -18,7 +18,7 @@ use crate::intersect::line::Line;
 use crate::rays::Ray;
 use crate::simd::{LANES, Lanewise, Part, Scalar, Simd};
 use bth_format::layout::{NONE, Object};
-use bth_format::object::ObjectBounds;
+use bth_format::object::{GREATEST_IN_F32, ObjectBounds};
 use glam::{Vec3A, Vec4, Vec4Swizzles};
 use std::mem::offset_of;
 use std::ops::Range;
@@ -26,7 +26,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// f32 prepares rays whose |coordinates| are below this and whose greatest |component| of the direction lies between 1 /
 /// `LARGEST` and `LARGEST`.
-pub(crate) const LARGEST: f32 = (1u64 << 40) as f32;
+pub(crate) const LARGEST: f32 = GREATEST_IN_F32;
 /// Where the sum of the greatest |coordinates| of box and origin is not above this, pads could underflow.
 pub(crate) const SMALLEST: f32 = boxes::SMALLEST_EXTENT as f32;
 /// Factor that turns a result of a few f32 roundings into an upper bound.
@@ -48,7 +48,7 @@ fn is_tiny(tmin: f32) -> bool {
 }
 
 /// Upper bound of what the pads of boxes are relative to, for origins whose |coordinates| do not exceed `greatest_origin`: the sum of the
-/// greatest |coordinates| of the origins and of the object, of the latter only a small part where boxes are widened to allow for their own. Not
+/// greatest |coordinates| of the origins and of the object, of the latter next to nothing where boxes are widened to allow for their own. Not
 /// below [`LARGEST`] where the whole sum is not.
 #[inline(always)]
 pub(crate) fn padded_extent(bounds: &ObjectBounds, greatest_origin: f32) -> f32 {

@@ -1,7 +1,7 @@
 //! Measures bth beside other CPU ray tracers on identical rays.
 //!
 //! `rays` makes the seeded ray sets, `structures` and `rivals` the [`tracer::Contender`]s. `speed`, `compare`, `accuracy`, `load`,
-//! `stress`, `inside`, `costs`, `paper`, `quality`, `scenes`, `hints`, `instances`, `refit` and `animation` are the measurements; `output` writes their
+//! `stress`, `inside`, `costs`, `paper`, `quality`, `scales`, `scenes`, `hints`, `instances`, `refit` and `animation` are the measurements; `output` writes their
 //! records as Markdown, JSON and SVG, and `records` keeps the figures of `benchmarks/`.
 #![warn(missing_docs)]
 
@@ -30,6 +30,7 @@ pub mod records;
 pub mod refit;
 pub mod rivals;
 pub mod rounds;
+pub mod scales;
 pub mod scatter;
 pub mod scenes;
 pub mod shutter;

@@ -4,7 +4,7 @@ use bth_bench::args::{Arguments, Command};
 use bth_bench::compare::Verdict;
 use bth_bench::{
     accuracy, animation, compare, costs, hints, inside, instances, load, output, paper, quality, records,
-    refit, scenes, shutter, speed, stress,
+    refit, scales, scenes, shutter, speed, stress,
 };
 use clap::Parser;
 use std::process::ExitCode;
@@ -26,6 +26,7 @@ fn main() -> ExitCode {
         Command::Costs(arguments) => costs::run(&arguments),
         Command::Paper(arguments) => paper::run(&arguments),
         Command::Quality(arguments) => quality::run(&arguments),
+        Command::Scales(arguments) => scales::run(&arguments),
         Command::Scenes(arguments) => scenes::run(&arguments),
         Command::Hints(arguments) => hints::run(&arguments),
         Command::Instances(arguments) => instances::run(&arguments),

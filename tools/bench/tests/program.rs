@@ -75,6 +75,28 @@ fn load_measures_our_files_where_embree_is_missing() {
 }
 
 #[test]
+fn hits_do_not_depend_on_the_size_of_a_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scales.json");
+    let done =
+        bench(&["scales", "torus-knot:320", "--rays", "256", "--quick", "--json", path.to_str().unwrap()]);
+    let said = String::from_utf8(done.stderr).unwrap();
+    assert!(done.status.success(), "{said}");
+    let record = json(&path);
+    let rows = record["rows"].as_array().unwrap();
+    for row in rows {
+        assert!(row["ns"].as_array().unwrap().iter().all(|ns| ns.as_f64().unwrap() > 0.0), "{row}");
+    }
+    let differ = |size: i32| {
+        let is_it = |row: &&Value| row["size"] == size && row["vertex"].is_null();
+        rows.iter().find(is_it).unwrap()["differ"].as_u64()
+    };
+    assert!([-75, -50, 0, 42, 96].into_iter().all(|size| differ(size) == Some(0)), "{rows:?}");
+    assert_eq!(differ(-126), None, "coordinates are denormal");
+    assert_eq!(rows.iter().filter(|row| !row["vertex"].is_null()).count(), 9);
+}
+
+#[test]
 fn every_variation_of_the_builder_gives_the_same_answers() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("quality.json");

@@ -15,6 +15,7 @@ mod quality;
 mod records;
 mod refit;
 mod run;
+mod scales;
 mod scenes;
 mod shutter;
 mod speed;
@@ -36,6 +37,7 @@ pub use quality::Quality;
 pub use records::{RecordRows, Summary};
 pub use refit::Refit;
 pub use run::RunOptions;
+pub use scales::Scales;
 pub use scenes::Scenes;
 pub use shutter::Shutter;
 pub use speed::Speed;
@@ -79,6 +81,8 @@ pub enum Command {
     Paper(Paper),
     /// What each step of the BVH builder is worth.
     Quality(Quality),
+    /// Models of all sizes, and with a vertex far out: whether answers depend on the scale, and what rays take.
+    Scales(Scales),
     /// Scenes that move: ours, and Embree with the same instances.
     Scenes(Scenes),
     /// Rays in scenes that say where they start, beside the same rays without that.

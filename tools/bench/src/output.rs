@@ -103,9 +103,7 @@ impl Record<'_> {
     /// # Errors
     /// If something cannot be written.
     pub fn write(&self, to: &Output) -> Result<()> {
-        self.save(to)?;
-        std::io::stdout().lock().write_all(self.page("").as_bytes())?;
-        Ok(())
+        print_and_save(&self.page(""), || self.save(to))
     }
 
     fn page(&self, charts: &str) -> String {
@@ -139,6 +137,16 @@ impl Record<'_> {
         }
         Ok(())
     }
+}
+
+/// Prints a page and saves files. Each is done also where the other fails: what was measured may have taken hours.
+///
+/// # Errors
+/// If something cannot be written.
+pub fn print_and_save(page: &str, save: impl FnOnce() -> Result<()>) -> Result<()> {
+    let printed = std::io::stdout().lock().write_all(page.as_bytes());
+    save()?;
+    Ok(printed?)
 }
 
 fn write(path: &Path, text: &str) -> Result<()> {

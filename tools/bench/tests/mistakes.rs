@@ -25,6 +25,7 @@ fn misused_command_lines_exit_with_2_and_name_the_word() {
         (&["speeds", "torus-knot"][..], "speeds"),
         (&["speed", "torus-knot", "--ray", "5"], "--ray"),
         (&["speed", "torus-knot", "--rounds", "0"], "--rounds"),
+        (&["speed", "torus-knot", "--rays", "0"], "--rays"),
         (&["speed"], "<MODEL>"),
         (&["compare", "a.so", "b.so", "torus-knot", "--worse", "1"], "--worse"),
         (&["stress", "--size", "0"], "--size"),

@@ -46,6 +46,25 @@ fn a_quick_speed_run_needs_no_rival() {
 }
 
 #[test]
+fn what_cannot_be_saved_is_printed() {
+    let inside_a_file = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml/speed.json");
+    let done = bench(&[
+        "speed",
+        "torus-knot:320",
+        "--quick",
+        "--tracer",
+        "bvh",
+        "--set",
+        "ao",
+        "--json",
+        inside_a_file,
+    ]);
+    let (printed, said) = (String::from_utf8(done.stdout).unwrap(), String::from_utf8(done.stderr).unwrap());
+    assert_eq!(done.status.code(), Some(1), "{said}");
+    assert!(printed.contains("| bvh |") && said.contains("Cargo.toml"), "{printed}{said}");
+}
+
+#[test]
 fn load_measures_our_files_where_embree_is_missing() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("load.json");

@@ -11,7 +11,7 @@ pub struct Instances {
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [10_000], value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pub counts: Vec<u32>,
     /// Numbers of threads.
-    #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [1, 2], value_parser = at_least_one)]
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "1,2", value_parser = at_least_one)]
     pub threads: Vec<usize>,
     /// Rounds of which the median counts; one more comes before.
     #[arg(long, value_name = "N", default_value_t = 51, value_parser = at_least_one)]

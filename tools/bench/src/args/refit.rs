@@ -11,7 +11,7 @@ pub struct Refit {
     #[arg(required = true, value_name = "MODEL")]
     pub models: Vec<String>,
     /// Numbers of threads.
-    #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [1, 2], value_parser = at_least_one)]
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "1,2", value_parser = at_least_one)]
     pub threads: Vec<usize>,
     /// Rounds of which the median counts; one more comes before.
     #[arg(long, value_name = "N", default_value_t = 21, value_parser = at_least_one)]

@@ -13,7 +13,7 @@ pub struct Speed {
     #[allow(missing_docs)]
     pub models: Models,
     /// Rays of a set, at most (about).
-    #[arg(long, value_name = "N", default_value_t = 200_000)]
+    #[arg(long, value_name = "N", default_value_t = 200_000, value_parser = at_least_one)]
     pub rays: usize,
     /// Rounds of which the median counts; one more comes before and warms up.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = at_least_one)]

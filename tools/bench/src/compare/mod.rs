@@ -16,12 +16,12 @@ use self::library::{Build, OpenedByBuild};
 use crate::args::Compare;
 use crate::clock::Clock;
 use crate::isa;
+use crate::output::print_and_save;
 use crate::progress::Progress;
 use crate::rays::{self, Finder, RaySet};
 use crate::rounds::quartiles;
 use anyhow::{Context, Result, bail, ensure};
 use bth::rays::{Hit, Ray};
-use std::io::Write;
 
 /// Seconds of CPU time that a turn takes at least; small sets are traced several times a turn, as the clock is too coarse for
 /// shorter ones.
@@ -55,11 +55,11 @@ pub fn run(arguments: &Compare) -> Result<Verdict> {
         comparison.models.push(model(which, arguments, [&old, &new], &progress)?);
     }
     drop(progress);
-    if let Some(path) = &arguments.json {
+    print_and_save(&comparison.markdown(), || {
+        let Some(path) = &arguments.json else { return Ok(()) };
         let text = format!("{:#}\n", serde_json::to_value(&comparison)?);
-        std::fs::write(path, text).with_context(|| path.display().to_string())?;
-    }
-    std::io::stdout().lock().write_all(comparison.markdown().as_bytes())?;
+        std::fs::write(path, text).with_context(|| path.display().to_string())
+    })?;
     let differing = comparison.differing();
     ensure!(differing.is_empty(), "the builds give different answers: {}", differing.join(", "));
     Ok(comparison.verdict())

@@ -16,7 +16,8 @@ use crate::machine::{self, Machine};
 use crate::output::note;
 use anyhow::{Context, Result, ensure};
 use std::fmt::Write as _;
-use std::io::Write;
+use std::io::{Read, Write};
+use std::path::Path;
 
 /// Measures what a definition names, and appends the rows to the file of this processor and day.
 ///
@@ -25,23 +26,46 @@ use std::io::Write;
 pub fn record(arguments: &RecordRows) -> Result<()> {
     let path = arguments.folder.join("definitions").join(format!("{}.toml", arguments.definition));
     let definition = Definition::read(&path)?;
+    let folder = arguments.folder.join("record").join(cpu_folder(&Machine::this().cpu));
+    if !arguments.quick {
+        // Before hours are spent on what could not be kept.
+        std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+    }
     let rows = measure::measure(&definition, &arguments.models, arguments.quick)?;
     let text: String = rows.iter().fold(String::new(), |mut text, row| {
         let _ = writeln!(text, "{}", row.line());
         text
     });
     if arguments.quick {
-        std::io::stdout().lock().write_all(format!("{HEAD}\n{text}").as_bytes())?;
-        return Ok(());
+        return Ok(print(&text)?);
     }
-    let folder = arguments.folder.join("record").join(cpu_folder(&Machine::this().cpu));
-    std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     let file = folder.join(format!("{}.csv", machine::today()));
-    let head = if file.exists() { String::new() } else { format!("{HEAD}\n") };
-    let mut open = std::fs::OpenOptions::new().create(true).append(true).open(&file)?;
-    open.write_all((head + &text).as_bytes()).with_context(|| file.display().to_string())?;
+    if let Err(error) = append(&file, &text) {
+        // What cannot be kept there is shown at least.
+        print(&text)?;
+        return Err(error).with_context(|| file.display().to_string());
+    }
     note(&format!("{} rows appended to {}", rows.len(), file.display()));
     Ok(())
+}
+
+/// Prints rows under the names of their columns.
+fn print(rows: &str) -> std::io::Result<()> {
+    std::io::stdout().lock().write_all(format!("{HEAD}\n{rows}").as_bytes())
+}
+
+/// Appends rows to a file. An empty one gets the names of the columns, and a last line without an end, as a full disk leaves it, gets one,
+/// so that it does not become one line with the first row.
+fn append(file: &Path, rows: &str) -> std::io::Result<()> {
+    let mut open = std::fs::OpenOptions::new().create(true).read(true).append(true).open(file)?;
+    let mut found = Vec::new();
+    open.read_to_end(&mut found)?;
+    let before = match found.last() {
+        None => format!("{HEAD}\n"),
+        Some(b'\n') => String::new(),
+        Some(_) => "\n".to_owned(),
+    };
+    open.write_all((before + rows).as_bytes())
 }
 
 /// Writes SUMMARY.md from all records, and the charts if `--charts` is given.
@@ -64,4 +88,24 @@ pub fn run_summary(arguments: &Summary) -> Result<()> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_lines_of_their_own_behind_whatever_the_file_holds() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("day.csv");
+        append(&file, "1\n").unwrap();
+        append(&file, "2\n").unwrap();
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), format!("{HEAD}\n1\n2\n"));
+        std::fs::write(&file, "").unwrap();
+        append(&file, "1\n").unwrap();
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), format!("{HEAD}\n1\n"));
+        std::fs::write(&file, format!("{HEAD}\ncut off")).unwrap();
+        append(&file, "1\n").unwrap();
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), format!("{HEAD}\ncut off\n1\n"));
+    }
 }

@@ -68,8 +68,7 @@ pub fn dry_run(
     Ok(DryRun::of(key.as_ref(), cache, monitor))
 }
 
-/// Compiles a model, or takes results from the cache that were made from the same content. `needed` decides whether the
-/// bytes
+/// Compiles a model, or takes results from the cache that were made from the same content. `needed` decides whether the bytes
 /// of a file in the cache are read.
 ///
 /// # Errors

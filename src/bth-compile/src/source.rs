@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use bth_files::Digest;
 use bth_import::Looks;
 use std::fs::File;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use zerocopy::IntoBytes;
 
@@ -45,12 +46,16 @@ impl SourceDigest {
     /// `BTH-O001` when one cannot be read, or read once only, such as a pipe.
     pub fn of(path: &Path, looks: impl Into<Looks>) -> Result<Self> {
         let looks = looks.into();
-        if std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
-            let why = "not a regular file, and a model is read more than once; `-` stands for standard input";
-            return Err(cannot_read(path, &std::io::Error::other(why)));
+        if let Err(error) = bth_files::regular_file(path) {
+            return Err(match error.kind() {
+                ErrorKind::NotSeekable => {
+                    let why = "and a model is read more than once; `-` stands for standard input";
+                    cannot_read(path, &format_args!("{error}, {why}"))
+                }
+                _ => cannot_read(path, &error),
+            });
         }
-        let others =
-            files(path, looks)?.iter().skip(1).map(|other| digest_of_other(other)).collect::<Result<_>>()?;
+        let others = files(path, looks)?.iter().skip(1).map(|other| digest(other)).collect::<Result<_>>()?;
         Ok(Self { file: digest(path)?, others, looks })
     }
 
@@ -103,18 +108,10 @@ pub(crate) fn changed(path: &Path) -> Error {
 }
 
 fn digest(path: &Path) -> Result<Digest> {
-    let read = File::open(path).and_then(Digest::of_reader);
+    let read = bth_files::regular_file(path).and_then(|_| File::open(path)).and_then(Digest::of_reader);
     read.map(|(digest, _)| digest).map_err(|e| cannot_read(path, &e))
 }
 
-/// The digest of a file that a model names, which must be a regular one: opening a named pipe would wait for a writer.
-fn digest_of_other(path: &Path) -> Result<Digest> {
-    match std::fs::metadata(path).map_err(|e| cannot_read(path, &e))?.is_file() {
-        true => digest(path),
-        false => Err(cannot_read(path, &std::io::Error::other("not a regular file"))),
-    }
-}
-
-fn cannot_read(path: &Path, error: &std::io::Error) -> Error {
+fn cannot_read(path: &Path, error: &dyn std::fmt::Display) -> Error {
     Error::File { code: "BTH-O001", path: path.to_owned(), message: format!("cannot read: {error}") }
 }

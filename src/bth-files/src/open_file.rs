@@ -1,5 +1,6 @@
 //! A file that is read while other processes may change it.
 
+use crate::regular::regular_file;
 use std::fs::{File, Metadata};
 use std::io::{Error, ErrorKind, Read, Result, Seek, SeekFrom, Write};
 use std::ops::Range;
@@ -57,12 +58,9 @@ impl OpenFile {
     /// Opens a file for reading.
     ///
     /// # Errors
-    /// Those of the system; `InvalidInput` for anything but a regular file.
+    /// Those of [`regular_file`] and of the system.
     pub fn open(path: &Path) -> Result<Self> {
-        // Before it is opened: pipes would wait for a writer.
-        if !std::fs::metadata(path)?.is_file() {
-            return Err(Error::new(ErrorKind::InvalidInput, "not a regular file"));
-        }
+        regular_file(path)?;
         let file = File::open(path)?;
         let state = FileState::of(&file.metadata()?);
         Ok(Self { file: Mutex::new(file), state })

@@ -97,7 +97,7 @@ fn file_hint(code: &str) -> &'static str {
         "BTH-O062" => "pipe a model into the program, and let the folder for temporary files have room",
         "BTH-O063" => "name a folder that may be written, with --cache-dir or BTH_CACHE_DIR",
         "BTH-O091" => "send the output to where there is room",
-        _ => "name a file or folder that is there and may be read",
+        _ => "check the path and its permissions",
     }
 }
 

@@ -103,16 +103,12 @@ pub(crate) fn input_error(code: &'static str, place: Place, message: impl Into<S
     Error::Input { code, place, message: message.into(), hint: hint.to_owned() }
 }
 
-/// All bytes of a source, which must be a regular file: a named pipe would wait for a writer, and a device may have no end.
+/// All bytes of a source, which must be a regular file.
 ///
 /// # Errors
 /// `BTH-O001` when it cannot be read.
 pub fn read_file(path: &Path) -> Result<Vec<u8>> {
-    let read = || match std::fs::metadata(path)? {
-        found if found.is_file() || found.is_dir() => std::fs::read(path),
-        _ => Err(std::io::Error::other("not a regular file")),
-    };
-    read().map_err(|e| Error::File {
+    bth_files::regular_file(path).and_then(|_| std::fs::read(path)).map_err(|e| Error::File {
         code: "BTH-O001",
         path: path.to_owned(),
         message: format!("cannot read: {e}"),

@@ -49,16 +49,12 @@ impl Environment {
     /// `BTH-P006` if it cannot be read or used.
     pub(crate) fn read(path: &Path, front: DVec3, vertical: DVec3) -> Result<Self, Failure> {
         let wrong = |message: String, exit: u8| Failure::Environment { path: path.into(), message, exit };
-        let found = std::fs::metadata(path).map_err(|e| wrong(format!("cannot read: {e}"), 4))?;
-        // A device may have no end.
-        if !found.is_file() && !found.is_dir() {
-            return Err(wrong("cannot read: not a regular file".to_owned(), 4));
-        }
-        let size = found.len();
+        let cannot = |e: std::io::Error| wrong(format!("cannot read: {e}"), 4);
+        let size = bth_files::regular_file(path).map_err(cannot)?.len();
         if size > MAX_FILE {
             return Err(wrong(format!("expected at most {MAX_FILE} bytes, found {size}"), 3));
         }
-        let bytes = std::fs::read(path).map_err(|e| wrong(format!("cannot read: {e}"), 4))?;
+        let bytes = std::fs::read(path).map_err(cannot)?;
         let (width, height, texels) = decoded(&bytes).map_err(|what| wrong(what, 3))?;
         Self::new((width, height), texels, front, vertical).map_err(|what| wrong(what, 3))
     }

@@ -38,14 +38,9 @@ pub fn read(path: &Path) -> Result<Manifest> {
     };
     let cannot =
         |e: std::io::Error| failed(format!("cannot read: {e}"), "check the path and its permissions");
+    let file = bth_files::regular_file(path).and_then(|_| std::fs::File::open(path)).map_err(cannot)?;
     let mut bytes = Vec::new();
     // Reading one byte more than allowed detects longer files without trusting the size that the system reports.
-    // A named pipe would wait for a writer.
-    let found = std::fs::metadata(path).map_err(cannot)?;
-    if !found.is_file() && !found.is_dir() {
-        return Err(cannot(std::io::Error::other("not a regular file")));
-    }
-    let file = std::fs::File::open(path).map_err(cannot)?;
     file.take(MAX_MANIFEST + 1).read_to_end(&mut bytes).map_err(cannot)?;
     if bytes.len() as u64 > MAX_MANIFEST {
         let message = format!("expected a manifest of at most {MAX_MANIFEST} bytes, found more");

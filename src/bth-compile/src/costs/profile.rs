@@ -87,15 +87,12 @@ impl Default for Profile {
     }
 }
 
-/// The text of a regular file of at most [`LONGEST`] bytes: a named pipe would wait for a writer, and a device may have no end.
+/// The text of a regular file of at most [`LONGEST`] bytes.
 ///
 /// # Errors
 /// Those of the system; when it is no such file.
 fn read(path: &Path) -> std::io::Result<String> {
-    let found = std::fs::metadata(path)?;
-    if !found.is_file() && !found.is_dir() {
-        return Err(std::io::Error::other("not a regular file"));
-    }
+    bth_files::regular_file(path)?;
     let mut text = String::new();
     std::fs::File::open(path)?.take(LONGEST + 1).read_to_string(&mut text)?;
     if text.len() as u64 > LONGEST {

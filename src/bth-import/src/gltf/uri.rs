@@ -24,11 +24,7 @@ pub(crate) fn read_at_most(path: &Path, most: u64) -> Result<Vec<u8>> {
         path: path.to_owned(),
         message: format!("cannot read: {e}"),
     };
-    // Opening a named pipe waits for a writer, so what the path is must be known before.
-    if !std::fs::metadata(path).map_err(file_error)?.is_file() {
-        return Err(file_error(std::io::Error::other("not a regular file")));
-    }
-    let file = std::fs::File::open(path).map_err(file_error)?;
+    let file = bth_files::regular_file(path).and_then(|_| std::fs::File::open(path)).map_err(file_error)?;
     let mut bytes = Vec::new();
     file.take(most).read_to_end(&mut bytes).map_err(file_error)?;
     Ok(bytes)

@@ -99,10 +99,8 @@ impl Selection {
 /// # Errors
 /// If the file cannot be read, or none can be traced.
 fn known_rays(path: &Path, monitor: &dyn Monitor) -> Result<KnownRays, Failure> {
-    // A named pipe would keep the compiler waiting for a writer, and build systems ask for the age of the file.
-    if std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
-        return Err(Failure::file("BTH-O090", path, &"not a regular file"));
-    }
+    // Build systems ask for the age of the file, too.
+    bth_files::regular_file(path).map_err(|e| Failure::file("BTH-O090", path, &e))?;
     let rays = ray_files::read_rays(path)?;
     let (known, left_out) = KnownRays::of(&rays);
     if known.count() == 0 {

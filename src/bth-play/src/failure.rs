@@ -25,6 +25,10 @@ pub(crate) enum Failure {
     File { path: PathBuf, message: String },
     /// There is no window, or it stopped working (exit code 4).
     Window(String),
+    /// The system starts no more threads (exit code 5).
+    Threads(String),
+    /// The program panicked, which is a defect of it (exit code 70).
+    Panic(String),
     /// Standard output was closed by its reader, which is no error.
     ClosedOutput,
 }
@@ -97,6 +101,14 @@ impl Failure {
                 let hint = "a window needs a display (DISPLAY or WAYLAND_DISPLAY) and the libraries libX11, libXcursor, libXi and libxkbcommon-x11; -o writes pictures without";
                 (json!({"code": "BTH-P004", "message": message, "hint": hint}), 4)
             }
+            Self::Threads(message) => {
+                let hint = "ask for fewer threads (--threads), or let the user have more processes (ulimit -u) and memory";
+                (json!({"code": "BTH-L090", "message": message, "hint": hint}), 5)
+            }
+            Self::Panic(message) => {
+                let message = format!("internal error: panicked: {message}");
+                (json!({"code": "BTH-X090", "message": message, "hint": "please report this"}), 70)
+            }
             Self::ClosedOutput => return None,
         };
         Some(found)
@@ -113,6 +125,16 @@ impl Failure {
         }
         ExitCode::from(exit_code)
     }
+}
+
+/// Does `work`, and makes a panic in it an error.
+pub(crate) fn without_panic(work: impl FnOnce() -> Result<(), Failure>) -> Result<(), Failure> {
+    // What the panic leaves behind is only removed.
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+        // The message was printed when it was raised.
+        let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+        Err(Failure::Panic(text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default()))
+    })
 }
 
 fn located(code: &str, path: &Path, message: &str, hint: &str) -> Value {
@@ -156,4 +178,27 @@ pub(crate) fn usage(error: &clap::Error, wants_json: bool) -> ExitCode {
         let _ = writeln!(std::io::stdout().lock(), "{error:#}");
     }
     ExitCode::from(2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_is_an_internal_error() {
+        let number = 7;
+        for (panicked, message) in [
+            (without_panic(|| panic!("no {number}")), "no 7"),
+            (without_panic(|| panic!("constant")), "constant"),
+            (without_panic(|| std::panic::panic_any(number)), ""),
+        ] {
+            let failure = panicked.unwrap_err();
+            let (error, exit) = failure.json().unwrap();
+            assert_eq!((error["code"].as_str(), exit), (Some("BTH-X090"), 70));
+            let expected =
+                format!("BTH-X090: internal error: panicked: {message} (hint: please report this)");
+            assert_eq!(failure.to_string(), expected);
+        }
+        assert!(without_panic(|| Ok(())).is_ok());
+    }
 }

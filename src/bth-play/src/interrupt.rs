@@ -18,7 +18,7 @@ fn parts() -> MutexGuard<'static, Vec<PathBuf>> {
 /// Listens for Ctrl-C and the signals that are like it from now on. With `json` the end is reported on standard output.
 ///
 /// # Errors
-/// If the thread that waits for signals cannot be started.
+/// `BTH-L090` if the thread that waits for signals cannot be started.
 pub(crate) fn listen(json: bool) -> Result<(), Failure> {
     let end = move || {
         // Kept locked, so that no other file begins.
@@ -35,7 +35,7 @@ pub(crate) fn listen(json: bool) -> Result<(), Failure> {
     match signals::install(|| ctrlc::set_handler(end)) {
         // Nothing would end the program, since the signals are taken over already.
         Err(ctrlc::Error::System(e)) => {
-            Err(Failure::Usage(format!("cannot start a thread that waits for signals: {e}")))
+            Err(Failure::Threads(format!("cannot start a thread that waits for signals: {e}")))
         }
         // Else it fails only when a handler is there already, and then Ctrl-C ends the program anyway.
         _ => Ok(()),

@@ -31,7 +31,7 @@ fn main() -> ExitCode {
         Ok(args) => args,
         Err(error) => return failure::usage(&error, wants_json),
     };
-    match run(&args) {
+    match failure::without_panic(|| run(&args)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(wants_json),
     }
@@ -77,7 +77,7 @@ fn run(args: &args::Args) -> Result<(), Failure> {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads)
         .build()
-        .map_err(|e| Failure::Usage(format!("cannot start {} threads: {e}", args.threads)))?;
+        .map_err(|e| Failure::Threads(format!("cannot start {} threads: {e}", args.threads)))?;
     let threads = pool.current_num_threads();
     if args.window {
         let screenshot = args.screenshot.clone().unwrap_or_else(|| args::SCREENSHOT.into());

@@ -149,10 +149,17 @@ fn a_limit_on_the_size_of_files_is_an_error_of_the_write() {
 #[test]
 fn where_no_thread_can_be_started_there_is_an_error() {
     let folder = folder(&[("ball.obj", &sphere(4))]);
-    let mut command = command("bthc", folder.path(), &["compile", "ball.obj", "--end-with-input", "--json"]);
-    // No system has as much memory for a stack.
-    command.env("RUST_MIN_STACK", (1u64 << 47).to_string());
-    assert_eq!(run_with(command).expect(5).json()["error"]["code"], "BTH-L090");
+    for (program, args) in [
+        ("bthc", &["compile", "ball.obj", "--end-with-input", "--json"][..]),
+        ("bth-play", &["ball.obj", "-o", "ball.png", "--json"]),
+    ] {
+        let mut command = command(program, folder.path(), args);
+        // No system has as much memory for a stack.
+        command.env("RUST_MIN_STACK", (1u64 << 47).to_string());
+        let error = &run_with(command).expect(5).json()["error"];
+        assert_eq!(error["code"], "BTH-L090", "{error}");
+        assert!(error["hint"].as_str().unwrap().contains("--threads"), "{error}");
+    }
 }
 
 /// A pipe without a writer would keep a program waiting, where Ctrl-C is heeded by nobody; and `/dev/zero` has no end.

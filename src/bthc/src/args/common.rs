@@ -11,7 +11,7 @@ Exit codes:
     2  wrong usage
     3  bad input: the model or the compiled file cannot be used
     4  a file could not be read or written
-    5  the model exceeds a limit of the format
+    5  a limit of the format or of the machine (memory, threads) is exceeded
    70  internal error; please report it
   130  cancelled, by Ctrl-C, SIGTERM or SIGHUP";
 

@@ -56,13 +56,15 @@ pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
     let profile = fit(&measured, &isa.to_string(), isa == bth::Isa::Avx512);
     let mut text = serde_json::to_string_pretty(&profile).map_err(std::io::Error::from)?;
     text.push('\n');
+    // What cannot be written is shown at least, and written where it cannot be shown.
+    let shown = if args.json { Ok(()) } else { output::text(&table(&profile)) };
     write::write_atomically(&args.output, text.as_bytes())?;
-    if args.json {
-        output::json(
+    shown?;
+    match args.json {
+        true => output::json(
             &json!({"output": args.output.to_string_lossy(), "hash": profile.hash(), "profile": profile}),
-        )?;
-    } else {
-        output::text(&format!("{}wrote {}\n", table(&profile), args.output.display()))?;
+        )?,
+        false => output::text(&format!("wrote {}\n", args.output.display()))?,
     }
     Ok(())
 }

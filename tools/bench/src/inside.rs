@@ -82,7 +82,7 @@ pub fn run(arguments: &Inside) -> Result<()> {
         progress.show(format!("{which}: compiling"));
         runs.push(ModelRun::new(which)?);
     }
-    let share = (arguments.millions * 1_000_000).div_ceil(runs.len() as u64);
+    let share = arguments.millions.saturating_mul(1_000_000).div_ceil(runs.len() as u64);
     let mut round = 0;
     while runs[0].statistics.points < share {
         for (number, run) in runs.iter_mut().enumerate() {

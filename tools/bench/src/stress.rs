@@ -59,7 +59,11 @@ pub fn run(arguments: &Stress) -> Result<()> {
             return record(arguments, &runs, &all, seconds, true);
         }
         record(arguments, &runs, &all, seconds, false)?;
-        progress.show(format!("{} of {} rays", count(all.traced), count(share * runs.len() as u64)));
+        progress.show(format!(
+            "{} of {} rays",
+            count(all.traced),
+            count(share.saturating_mul(runs.len() as u64))
+        ));
         ensure!(all.defects() == 0, "{} wrong answers, such as {:#?}", all.defects(), all.examples);
         round += 1;
     }

@@ -1,7 +1,7 @@
 //! The options of `shutter`.
 
 use super::run::RunOptions;
-use super::values::at_least_one;
+use super::values::{at_least_one, positive};
 use clap::Args;
 
 /// `shutter`.
@@ -11,7 +11,7 @@ pub struct Shutter {
     #[arg(required = true, value_name = "SCENE")]
     pub scenes: Vec<String>,
     /// For how many frames the shutter is open.
-    #[arg(long, value_name = "FRAMES,…", value_delimiter = ',', default_values_t = [0.5, 1.0, 4.0])]
+    #[arg(long, value_name = "FRAMES,…", value_delimiter = ',', default_value = "0.5,1,4", value_parser = positive)]
     pub open: Vec<f64>,
     /// Rounds of which the quickest counts.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = at_least_one)]

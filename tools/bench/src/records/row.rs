@@ -1,6 +1,6 @@
 //! A row of a record: one figure.
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 
 /// The columns.
 pub const HEAD: &str = "commit,benchmark,engine,model,set,threads,isa,value,unit,low,high,rounds";
@@ -69,14 +69,18 @@ impl Row {
     /// Reads a line.
     ///
     /// # Errors
-    /// If it does not have the columns of [`HEAD`], or a number is none.
+    /// If it does not have the columns of [`HEAD`], or a number is none or not finite.
     pub fn parse(line: &str) -> Result<Row> {
         let cells: Vec<&str> = line.split(',').collect();
         let [commit, benchmark, engine, model, set, threads, isa, value, unit, low, high, rounds] = cells[..]
         else {
             bail!("expected 12 columns, found {}: {line}", cells.len());
         };
-        let optional = |text: &str| if text.is_empty() { Ok(None) } else { text.parse().map(Some) };
+        let figure = |text: &str| {
+            let found = text.parse::<f64>().ok().filter(|x| x.is_finite());
+            found.with_context(|| format!("expected a finite number, found {text:?}"))
+        };
+        let optional = |text: &str| if text.is_empty() { Ok(None) } else { figure(text).map(Some) };
         Ok(Row {
             commit: commit.to_owned(),
             benchmark: benchmark.to_owned(),
@@ -85,7 +89,7 @@ impl Row {
             set: set.to_owned(),
             threads: threads.parse()?,
             isa: isa.to_owned(),
-            value: value.parse()?,
+            value: figure(value)?,
             unit: unit.to_owned(),
             low: optional(low)?,
             high: optional(high)?,
@@ -132,7 +136,9 @@ mod tests {
         assert_eq!(line, "0123456789ab,speed,embree hq packet16,igea,ao,1,-,12.345,Mrays/s,12,,5");
         assert_eq!(Row::parse(&line).unwrap(), row);
         assert!(Row::parse("a,b").is_err());
-        assert!(Row::parse(&line.replace("12.345", "fast")).is_err());
+        for wrong in ["fast", "NaN", "inf", ""] {
+            assert!(Row::parse(&line.replace("12.345", wrong)).is_err(), "{wrong:?}");
+        }
     }
 
     #[test]

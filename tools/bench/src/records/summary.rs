@@ -27,13 +27,17 @@ type Dated = (String, Row);
 /// Reads all records of a folder and makes the page.
 ///
 /// # Errors
-/// If a record or definition cannot be read.
+/// If a record or definition cannot be read, or a row is of a benchmark that no definition has.
 pub fn summarize(folder: &Path) -> Result<SummaryPage> {
     let definitions = Definition::read_all(&folder.join("definitions"))?;
     let mut page = SummaryPage { text: String::from(INTRODUCTION), charts: Vec::new() };
     let records = folder.join("record");
     for cpu in sorted(&records)? {
         let newest = newest(&records.join(&cpu))?;
+        for (day, Row { benchmark, .. }) in newest.values() {
+            let is_defined = definitions.iter().any(|definition| definition.benchmark == *benchmark);
+            ensure!(is_defined, "{cpu}/{day}.csv: no definition is of the benchmark {benchmark:?}");
+        }
         let _ = write!(page.text, "\n## {cpu}\n");
         for definition in &definitions {
             let rows: Vec<&Dated> =
@@ -201,7 +205,16 @@ mod tests {
         assert_eq!(page.charts.len(), 1);
         std::fs::write(path.join("record/cpu/2026-01-03.csv"), format!("{HEAD}\n{}\n", line(2.4))).unwrap();
         assert!(summarize(path).unwrap().text.contains("**missed**"));
-        std::fs::write(path.join("record/cpu/2026-01-04.csv"), "other,columns\n").unwrap();
-        assert!(summarize(path).is_err());
+        for (wrong, named) in [
+            ("other,columns\n".to_owned(), "2026-01-04.csv: expected the columns"),
+            (
+                format!("{HEAD}\n{}\n", line(1.0).replace("speed", "sped")),
+                "2026-01-04.csv: no definition is of",
+            ),
+        ] {
+            std::fs::write(path.join("record/cpu/2026-01-04.csv"), wrong).unwrap();
+            let error = summarize(path).err().unwrap().to_string();
+            assert!(error.contains(named), "{error}");
+        }
     }
 }

@@ -61,7 +61,7 @@ impl Head {
         let machine = &self.machine;
         format!(
             "{}; commit {commit}. {}, {}, {} logical cores, {}. Our kernels: {}. Options: `{}`. \
-             Only ratios within this record mean something.\n",
+             Only ratios within this report mean something.\n",
             self.date,
             machine.cpu,
             machine.isa.join("/"),

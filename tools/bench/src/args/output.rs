@@ -12,10 +12,10 @@ pub struct Output {
     /// Draw SVG charts into this folder.
     #[arg(long, value_name = "DIR")]
     pub svg: Option<PathBuf>,
-    /// Keep a record in this folder: DATE-NAME.md, DATE-NAME.json and charts.
+    /// Keep a report in this folder: DATE-NAME.md, DATE-NAME.json and charts.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Name of the record; by default that of the measurement.
+    /// Name of the report; by default that of the measurement.
     #[arg(long, value_name = "NAME")]
     pub name: Option<String>,
 }

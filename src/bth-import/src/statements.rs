@@ -3,12 +3,25 @@
 use crate::number::{Lines, words};
 use std::borrow::Cow;
 
-/// The words of a name, with single spaces between them. Bytes that are not UTF-8 become the replacement character. Names go on to the
+/// The words of a name, with single spaces between them, as [`text`] reads them. Names go on to the
 /// end of the line, and a word such as `#12` belongs to them, as other readers have it (Blender, tinyobjloader). Only `#` as
 /// a word of its own begins a comment.
 pub(crate) fn name<'w>(words: impl Iterator<Item = &'w [u8]>) -> String {
-    let words: Vec<_> = words.take_while(|word| *word != b"#").map(String::from_utf8_lossy).collect();
-    words.join(" ")
+    let words: Vec<_> = words.take_while(|word| *word != b"#").collect();
+    text(words.join(&b' '))
+}
+
+/// What the bytes 0x80 to 0x9F stand for in Windows-1252; those that stand for nothing are control characters.
+const WINDOWS_1252: &str = "€\u{81}‚ƒ„…†‡ˆ‰Š‹Œ\u{8D}Ž\u{8F}\u{90}‘’“”•–—˜™š›œ\u{9D}žŸ";
+
+/// The text of bytes: UTF-8, or else Windows-1252. That gives different bytes different text whatever they mean, so that names in any
+/// encoding are told apart.
+pub(crate) fn text(bytes: Vec<u8>) -> String {
+    let character = |byte: &u8| match byte {
+        0x80..0xA0 => WINDOWS_1252.chars().nth(usize::from(byte - 0x80)).unwrap_or_default(),
+        _ => char::from(*byte),
+    };
+    String::from_utf8(bytes).unwrap_or_else(|e| e.as_bytes().iter().map(character).collect())
 }
 
 /// The statements of a text with the numbers of their first lines, as [`next_statement`] joins them.

@@ -6,6 +6,7 @@ use crate::error::Result;
 use crate::number::{Lines, float, shown, without_mark, words};
 use crate::raw::{Raw, RowKind, check_triangles};
 use crate::source::{MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
+use crate::statements::text;
 
 /// Bytes before the first facet: 80 of any content and the count of facets.
 const HEADER: usize = 84;
@@ -31,8 +32,9 @@ fn begins_with_solid(data: &[u8]) -> bool {
 /// Reads an STL file. Each solid of a text is a group. Facet normals are not shading attributes and are ignored.
 pub(super) fn read<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
     let data = source.data;
-    let text = !is_binary_size(data) && begins_with_solid(data) && !data[..data.len().min(1024)].contains(&0);
-    if text { read_text(source) } else { read_binary(source) }
+    let is_text =
+        !is_binary_size(data) && begins_with_solid(data) && !data[..data.len().min(1024)].contains(&0);
+    if is_text { read_text(source) } else { read_binary(source) }
 }
 
 fn read_binary<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
@@ -79,8 +81,8 @@ fn read_text<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
         match (keyword.to_ascii_lowercase().as_slice(), &mut open) {
             (b"solid", None) if !in_solid => {
                 in_solid = true;
-                let name: Vec<_> = words.map(String::from_utf8_lossy).collect();
-                let group = raw.groups.group(name.join(" "), None);
+                let name = text(words.collect::<Vec<_>>().join(&b' '));
+                let group = raw.groups.group(name, None);
                 raw.groups.start(raw.triangles.len(), group);
             }
             (b"endsolid", None) if in_solid => in_solid = false,

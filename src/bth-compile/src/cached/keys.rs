@@ -26,8 +26,8 @@ const COSTS: &str = "4";
 const TETS: &str = "1";
 const COLLAPSE: &str = "4";
 const OPACITY: &str = "1";
-const NAMES: &str = "1";
-const MATERIALS: &str = "2";
+const NAMES: &str = "2";
+const MATERIALS: &str = "3";
 const DEFORMABLE: &str = "1";
 /// Version of how objects are compiled whose vertices move by themselves.
 pub(crate) const MOTION: &str = "1";

@@ -61,9 +61,17 @@ fn obj_groups_that_come_again_are_the_same_and_many_are_quick() {
 }
 
 #[test]
-fn names_that_are_not_utf8_are_replaced() {
-    let (_, groups) = groups("a.obj", &[CORNERS.as_bytes(), b"usemtl a\xff\nf 1 2 3\n"].concat());
-    assert_eq!(groups.materials, ["a\u{fffd}"]);
+fn names_that_are_not_utf8_are_told_apart() {
+    // Red and blue in GBK: without characters that are not UTF-8 the two would have the same name.
+    let text =
+        b"usemtl \xBA\xEC\xC9\xAB\nf 1 2 3\nusemtl \xC0\xB6\xC9\xAB\nf 1 3 4\ng H\xFCtte \x80\nf 1 2 4\n";
+    let (_, groups) = groups("a.obj", &[CORNERS.as_bytes(), text].concat());
+    let [red, blue] = ["\u{BA}\u{EC}\u{C9}\u{AB}", "\u{C0}\u{B6}\u{C9}\u{AB}"];
+    assert_eq!(groups.materials, [red, blue]);
+    assert_eq!(
+        shown(&groups),
+        [format!("|{red}|0"), format!("|{blue}|1"), format!("H\u{FC}tte \u{20AC}|{blue}|2")]
+    );
 }
 
 #[test]
@@ -73,6 +81,8 @@ fn solids_of_stl_are_groups() {
         "solid left  wheel\n{facet}{facet}endsolid\nsolid\nendsolid\nsolid right\n{facet}endsolid right\n"
     );
     assert_eq!(shown(&groups("a.stl", text.as_bytes()).1), ["left wheel|-|0", "right|-|2"]);
+    let latin_1 = [&b"solid T\xFCr\n"[..], facet.as_bytes(), b"endsolid T\xFCr\n"].concat();
+    assert_eq!(shown(&groups("a.stl", &latin_1).1), ["T\u{FC}r|-|0"]);
 }
 
 #[test]

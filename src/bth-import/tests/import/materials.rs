@@ -297,6 +297,28 @@ fn names_of_obj_materials_may_have_hashes_and_libraries_a_byte_order_mark() {
 }
 
 #[test]
+fn materials_whose_names_are_not_utf8_are_told_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    // Red and blue in GBK, which differ in bytes that are not UTF-8.
+    let [red, blue] = [&b"\xBA\xEC\xC9\xAB"[..], b"\xC0\xB6\xC9\xAB"];
+    let library = [b"newmtl ", red, b"\nKd 1 0 0\nnewmtl ", blue, b"\nKd 0 0 1\n"].concat();
+    std::fs::write(folder.path().join("a.mtl"), library).unwrap();
+    let path = folder.path().join("a.obj");
+    let text = [
+        b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl ",
+        red,
+        b"\nf 1 2 3\nusemtl ",
+        blue,
+        b"\nf 3 2 1\n",
+    ]
+    .concat();
+    std::fs::write(&path, text).unwrap();
+    let parameters = import(&path, WANTED, &Silent).unwrap().0.materials.unwrap().parameters;
+    let colors: Vec<_> = parameters.iter().map(|material| material.base_color).collect();
+    assert_eq!(colors, [[1.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0]]);
+}
+
+#[test]
 fn a_library_that_is_named_before_every_face_is_read_once() {
     let folder = tempfile::tempdir().unwrap();
     let mut library = b"newmtl red\nKd 1 0 0\n".to_vec();

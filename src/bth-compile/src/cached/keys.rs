@@ -17,7 +17,7 @@ use serde::Serialize;
 use std::path::Path;
 
 /// Versions of the results of the stages.
-const MESH: &str = "4";
+const MESH: &str = "5";
 const COORDINATES: &str = "1";
 const BVH: &str = "3";
 const FREE: &str = "6";

@@ -32,7 +32,7 @@ pub(crate) fn read<'a>(source: &Source<'a>, supported: &[&str]) -> Result<(GltfD
         );
         return Err(source.error_in_part(UNSUPPORTED, "asset", message, "convert the model to glTF 2.0"));
     }
-    check_matrices(source, &document)?;
+    check_transforms(source, &document)?;
     match document.extensions_required.iter().find(|name| !is_supported(name, supported)) {
         Some(name) => Err(unsupported_extension(source, name)),
         None => Ok((document, binary)),
@@ -46,9 +46,19 @@ fn is_known(version: &str) -> bool {
     number(major).zip(number(minor)).is_some_and(|version| version <= (2, 0))
 }
 
-/// Refuses node matrices whose last row is not (0, 0, 0, 1) up to rounding: no affine transform does what they do.
-fn check_matrices(source: &Source<'_>, document: &GltfDocument) -> Result<()> {
+/// Refuses node matrices whose last row is not (0, 0, 0, 1) up to rounding, since no affine transform does what they do, and
+/// rotations without a direction.
+fn check_transforms(source: &Source<'_>, document: &GltfDocument) -> Result<()> {
     for (index, node) in document.nodes.iter().enumerate() {
+        if node.matrix.is_none() && node.rotation == Some([0.0; 4]) {
+            let message = "expected a rotation that is not zero";
+            return Err(source.error_in_part(
+                GRAPH,
+                format!("node {index}"),
+                message,
+                "export the model again",
+            ));
+        }
         let Some(columns) = node.matrix else { continue };
         let row = [3, 7, 11, 15].map(|k| columns[k]);
         let is_affine =

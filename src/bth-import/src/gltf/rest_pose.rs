@@ -137,7 +137,7 @@ fn to_world(accessors: &Accessors<'_>, parents: &[Option<usize>], node: usize) -
         if steps > document.nodes.len() {
             return Err(graph_error(accessors, format!("node {node}"), "it is an ancestor of itself"));
         }
-        world = transform::local_of_joint(found) * world;
+        world = transform::local(found) * world;
         next = parents[index];
     }
     Ok(world)

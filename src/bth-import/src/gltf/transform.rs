@@ -5,27 +5,18 @@ use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 use crate::gltf::schema::GltfNode;
 
 /// The transform from a node's space to its parent's. The last row of a matrix counts as (0, 0, 0, 1); without a matrix
-/// the node scales, then rotates by a unit quaternion (x, y, z, w), then translates.
+/// the node scales, then rotates by a quaternion (x, y, z, w), then translates. The quaternion, which is not zero, is brought to unit
+/// length as in scenes: the numbers of a file are rounded, with others than those of a rotation a mesh would be sheared, and
+/// in a long chain of joints what they lack adds up.
 pub(super) fn local(node: &GltfNode) -> DAffine3 {
     match node.matrix {
         Some(columns) => DAffine3::from_mat4(DMat4::from_cols_array(&columns)),
         None => DAffine3::from_scale_rotation_translation(
             DVec3::from_array(node.scale.unwrap_or([1.0; 3])),
-            DQuat::from_array(node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0])),
+            DQuat::from_array(node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0])).normalize(),
             DVec3::from_array(node.translation.unwrap_or([0.0; 3])),
         ),
     }
-}
-
-/// As [`local`], with a rotation that is brought to unit length, as scenes have it: the numbers of a file are rounded, and in a long
-/// chain of joints what they lack adds up.
-pub(super) fn local_of_joint(node: &GltfNode) -> DAffine3 {
-    let unit = |q: [f64; 4]| {
-        let q = DQuat::from_array(q);
-        if q.length() > 0.0 { q.normalize().to_array() } else { q.to_array() }
-    };
-    let GltfNode { matrix, translation, rotation, scale, .. } = *node;
-    local(&GltfNode { matrix, translation, rotation: rotation.map(unit), scale, ..GltfNode::default() })
 }
 
 /// The rows of a transform, applied to columns (x, y, z, 1).

@@ -33,6 +33,19 @@ fn refuses_matrices_that_are_not_affine() {
 }
 
 #[test]
+fn rotations_turn_and_do_not_scale_or_shear() {
+    // Two digits of the square root of a half, as some programs write them: a quarter turn about z.
+    let turned = edited(|d| d["nodes"][0]["rotation"] = json!([0.0, 0.0, 0.71, 0.71]));
+    let quarter = SQUARE.map(|[x, y, z]| [-y, x, z]);
+    for (found, expected) in read(&turned).0.positions.iter().zip(&quarter) {
+        let off = found.iter().zip(expected).fold(0.0f32, |most, (a, b)| most.max((a - b).abs()));
+        assert!(off <= f32::EPSILON, "{found:?} in the place of {expected:?}");
+    }
+    let none = |d: &mut Value| d["nodes"][0]["rotation"] = json!([0, 0, 0, 0]);
+    assert_bad(none, "BTH-I012", "node 0", "expected a rotation that is not zero");
+}
+
+#[test]
 fn hidden_nodes_are_left_out_with_all_below_them() {
     for key in ["extensionsUsed", "extensionsRequired"] {
         let hidden = edited(|d| {

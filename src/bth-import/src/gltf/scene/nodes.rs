@@ -128,9 +128,6 @@ impl Importer<'_> {
         let numbers: Vec<f64> = match transform {
             Transform::Matrix(rows) => rows.as_flattened().to_vec(),
             Transform::Parts { translation, rotation, scale } => {
-                if rotation == [0.0; 4] {
-                    return Err(self.error(part, "expected a rotation that is not zero"));
-                }
                 [translation.as_slice(), &rotation, &scale].concat()
             }
         };

@@ -114,6 +114,27 @@ fn nodes_keep_their_hierarchy_transforms_names_and_visibility() {
 }
 
 #[test]
+fn the_last_frame_is_that_of_the_last_key_whatever_its_rounding_to_f32() {
+    let last = |time: f64, rate: f64| {
+        let mut numbers = binary();
+        (numbers[10], numbers[11]) = (time as f32 * 0.5, time as f32);
+        let bytes: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
+        let folder = written(&document());
+        std::fs::write(folder.path().join("data.bin"), bytes).unwrap();
+        let options = ImportOptions { rate, ..ImportOptions::default() };
+        let (manifest, _) =
+            scene::import(&folder.path().join("a.gltf"), "a.gltf", &options, &Silent).unwrap();
+        manifest.frames.last
+    };
+    for rate in [24.0, 25.0, 29.97, 30.0, 60.0] {
+        for frame in [1, 49, 61, 239, 1001] {
+            assert_eq!(last(f64::from(frame) / rate, rate), frame, "at {rate} frames a second");
+            assert_eq!(last((f64::from(frame) + 0.01) / rate, rate), frame + 1, "at {rate} frames a second");
+        }
+    }
+}
+
+#[test]
 fn cameras_and_lights_stand_at_their_nodes() {
     let (manifest, _) = import(&document(), &ImportOptions::default()).unwrap();
     let [eye, flat] = manifest.cameras.as_slice() else { panic!("two cameras") };

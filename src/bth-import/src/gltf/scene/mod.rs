@@ -89,10 +89,18 @@ pub fn import_bytes(
     if options.rigid_parts {
         importer.rigid_parts()?;
     }
-    let last = (last * options.rate).ceil().clamp(0.0, f64::from(MAX_FRAMES)) as i32;
-    importer.manifest.frames = Frames { first: 0, last, rate: options.rate };
+    importer.manifest.frames = Frames { first: 0, last: last_frame(last, options.rate), rate: options.rate };
     source.progress(data.len())?;
     Ok(finish(importer))
+}
+
+/// The first frame that is not before the last key. Times of keys are f32, so that a key of frame 49 at 24 frames a second lies a little
+/// behind that frame; the times of frames are rounded as well before the two are compared.
+fn last_frame(last_key: f64, rate: f64) -> i32 {
+    let before = (last_key * rate).floor();
+    let is_last = (before / rate) as f32 >= last_key as f32;
+    let frame = if is_last { before } else { before + 1.0 };
+    frame.clamp(0.0, f64::from(MAX_FRAMES)) as i32
 }
 
 /// Adds the totals to the report.

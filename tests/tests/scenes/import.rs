@@ -135,6 +135,36 @@ fn the_last_frame_is_that_of_the_last_key_whatever_its_rounding_to_f32() {
 }
 
 #[test]
+fn spots_may_have_a_sharp_edge_and_an_angle_that_was_rounded_to_f32() {
+    let right_angle = f64::from(std::f32::consts::FRAC_PI_2);
+    let cone = |spot: Value| -> Result<[f64; 2], String> {
+        let mut document = document();
+        document["extensions"]["KHR_lights_punctual"]["lights"][1]["spot"] = spot;
+        let (manifest, _) = import(&document, &ImportOptions::default()).map_err(|e| e.to_string())?;
+        // The manifest is read back as it is written.
+        assert_eq!(bth_scene::parse(&manifest.to_toml(), Path::new("a.manifest")).unwrap(), manifest);
+        match manifest.lights[0].kind {
+            LightKind::Spot { inner, outer } => Ok([inner, outer]),
+            _ => panic!("a spot"),
+        }
+    };
+    let [inner, outer] = cone(json!({"innerConeAngle": 0.5, "outerConeAngle": 0.5})).unwrap();
+    assert_eq!(outer, 0.5f64.to_degrees());
+    assert!(inner < outer && (inner / outer) as f32 == 1.0 - f32::EPSILON / 2.0, "{inner} {outer}");
+    let wide = cone(json!({"innerConeAngle": 0.5, "outerConeAngle": right_angle}));
+    assert_eq!(wide, Ok([0.5f64.to_degrees(), 90.0]));
+    let [inner, outer] = cone(json!({"innerConeAngle": right_angle, "outerConeAngle": right_angle})).unwrap();
+    assert!(outer == 90.0 && (89.9999..90.0).contains(&inner), "{inner} {outer}");
+    for bad in [[0.6, 0.5], [0.0, 0.0], [0.5, 1.571], [0.5, 1.5707966]] {
+        let refused = cone(json!({"innerConeAngle": bad[0], "outerConeAngle": bad[1]})).unwrap_err();
+        assert!(
+            refused.contains("expected a color, intensity, range and cone that glTF allows"),
+            "{refused}"
+        );
+    }
+}
+
+#[test]
 fn cameras_and_lights_stand_at_their_nodes() {
     let (manifest, _) = import(&document(), &ImportOptions::default()).unwrap();
     let [eye, flat] = manifest.cameras.as_slice() else { panic!("two cameras") };

@@ -1,10 +1,12 @@
 //! Lights of a glTF scene (KHR_lights_punctual).
 
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+
 use bth_scene::{Light, LightKind};
 
 use crate::error::Result;
 use crate::gltf::scene::importer::{Importer, unique};
-use crate::gltf::schema::Lights;
+use crate::gltf::schema::{Lights, Spot};
 
 impl Importer<'_> {
     /// Adds a light at a row of the manifest's nodes.
@@ -19,10 +21,10 @@ impl Importer<'_> {
         let kind = match light.kind.as_str() {
             "directional" => LightKind::Directional,
             "point" => LightKind::Point,
-            "spot" => LightKind::Spot {
-                inner: light.spot.inner_cone_angle.unwrap_or(0.0).to_degrees(),
-                outer: light.spot.outer_cone_angle.unwrap_or(std::f64::consts::FRAC_PI_4).to_degrees(),
-            },
+            "spot" => {
+                let [inner, outer] = cone_angles(&light.spot).map(f64::to_degrees);
+                LightKind::Spot { inner, outer }
+            }
             other => {
                 return self.ignore(&light_part, format!("lights of kind \"{other}\" are ignored"));
             }
@@ -43,4 +45,13 @@ impl Importer<'_> {
         self.manifest.lights.push(Light { name, node, kind, color, intensity, range: light.range });
         Ok(())
     }
+}
+
+/// The angles in radians at which a spot begins to fade and ends. Programs that compute in f32 write a right angle a little greater
+/// than it is. For a cone without a soft edge Blender writes the same angle twice, where a scene needs a lesser one to
+/// begin with: that is the next f32 below.
+fn cone_angles(spot: &Spot) -> [f64; 2] {
+    let (inner, outer) = (spot.inner_cone_angle.unwrap_or(0.0), spot.outer_cone_angle.unwrap_or(FRAC_PI_4));
+    let inner = if inner == outer { f64::from((outer as f32).next_down()) } else { inner };
+    [inner, if outer as f32 == FRAC_PI_2 as f32 { FRAC_PI_2 } else { outer }]
 }

@@ -282,13 +282,7 @@ pub(crate) struct Orthographic {
     pub(crate) zfar: f64,
 }
 
-/// KHR_lights_punctual of the document.
-#[derive(Deserialize, Default)]
-#[serde(default)]
-pub(crate) struct Lights {
-    pub(crate) lights: Vec<GltfLight>,
-}
-
+/// A light of KHR_lights_punctual.
 #[derive(Deserialize)]
 pub(crate) struct GltfLight {
     #[serde(default)]

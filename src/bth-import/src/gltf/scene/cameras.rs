@@ -3,7 +3,7 @@
 use bth_scene::{Camera, Lens};
 
 use crate::error::Result;
-use crate::gltf::scene::importer::{Importer, unique};
+use crate::gltf::scene::importer::Importer;
 use crate::gltf::schema::GltfCamera;
 
 impl Importer<'_> {
@@ -30,9 +30,8 @@ impl Importer<'_> {
             let message = "expected a field of view or height above 0, and znear below zfar";
             return Err(self.error(camera_part, message));
         }
-        let mut names = self.manifest.cameras.iter().map(|c| c.name.clone()).collect();
         let given = if camera.name.is_empty() { self.manifest.nodes[node].name.clone() } else { camera.name };
-        let name = unique(&mut names, &given, camera_part);
+        let name = self.camera_names.unique(&given, camera_part);
         self.manifest.cameras.push(Camera { name, node, lens, aspect, near: Some(near), far });
         self.manifest.camera = Some(0);
         Ok(())

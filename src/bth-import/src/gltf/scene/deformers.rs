@@ -7,7 +7,7 @@ use bth_scene::{Deformer, JointSet, Node, Skin, Source, Transform};
 use crate::error::{Error, Result};
 use crate::gltf::placed_mesh::GltfPart;
 use crate::gltf::scene::animated::Deforming;
-use crate::gltf::scene::importer::{Importer, unique};
+use crate::gltf::scene::importer::Importer;
 use crate::gltf::schema::GltfNode;
 use crate::gltf::transform;
 
@@ -61,14 +61,14 @@ impl Importer<'_> {
             next = node.parent;
         }
         let name = format!("{}/at rest", self.manifest.nodes[row].name);
-        let name = unique(&mut self.node_names, &name, String::new());
+        let name = self.node_names.unique(&name, String::new());
         let transform = Transform::default();
         self.manifest.nodes.push(Node { name, parent: None, transform, object: Some(object), visible });
     }
 
     /// A further object of the manifest.
     pub(super) fn new_object(&mut self, name: &str, mesh: usize, source: Source) -> usize {
-        let name = unique(&mut self.object_names, name, format!("mesh {mesh}"));
+        let name = self.object_names.unique(name, format!("mesh {mesh}"));
         self.manifest.objects.push(bth_scene::Object { name, source });
         self.manifest.objects.len() - 1
     }
@@ -171,7 +171,7 @@ impl Importer<'_> {
         for &joint in &found.joints {
             joints.push(self.joint(joint)?);
         }
-        let name = unique(&mut self.skin_names, &found.name, part);
+        let name = self.skin_names.unique(&found.name, part);
         self.manifest.skins.push(Skin { name, joints, inverse_binds });
         Ok(self.manifest.skins.len() - 1)
     }
@@ -186,7 +186,7 @@ impl Importer<'_> {
                 None => {
                     let node = &self.document.nodes[index];
                     let transform = self.transform(node, &format!("node {index}"))?;
-                    let name = unique(&mut self.node_names, &node.name, format!("node {index}"));
+                    let name = self.node_names.unique(&node.name, format!("node {index}"));
                     let row = self.manifest.nodes.len();
                     self.manifest.nodes.push(Node { name, parent, transform, object: None, visible: true });
                     self.report.node_rows[index] = Some(row);

@@ -1,6 +1,6 @@
 //! What the steps of a scene's import share: the document, the manifest so far, and the names that are taken.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 use bth_scene::Manifest;
 use serde::de::DeserializeOwned;
@@ -10,6 +10,7 @@ use crate::gltf::accessor::Accessors;
 use crate::gltf::document::GRAPH;
 use crate::gltf::placed_mesh::GltfPart;
 use crate::gltf::scene::animated::{Animated, Deforming};
+use crate::gltf::scene::names::Names;
 use crate::gltf::scene::options::ImportReport;
 use crate::gltf::schema::GltfDocument;
 use crate::source::{MALFORMED, Source};
@@ -26,13 +27,17 @@ pub(super) struct Importer<'a> {
     pub(super) manifest: Manifest,
     pub(super) report: ImportReport,
     /// Names of the nodes so far.
-    pub(super) node_names: HashSet<String>,
+    pub(super) node_names: Names,
     /// Names of the objects so far.
-    pub(super) object_names: HashSet<String>,
+    pub(super) object_names: Names,
     /// Row of the object of each mesh, and of each node whose mesh is taken at rest.
     pub(super) objects: HashMap<GltfPart, usize>,
     /// Names of the skins so far.
-    pub(super) skin_names: HashSet<String>,
+    pub(super) skin_names: Names,
+    /// Names of the cameras so far.
+    pub(super) camera_names: Names,
+    /// Names of the lights so far.
+    pub(super) light_names: Names,
     /// For each node of the document its parent.
     pub(super) parents: Vec<Option<usize>>,
     /// What the chosen animations change.
@@ -70,18 +75,4 @@ impl Importer<'_> {
             self.source.error_in_part(MALFORMED, part, message, "export the model again")
         })
     }
-}
-
-/// The given name or else the fallback, without control characters and with a number if it is among `names` already;
-/// added to them.
-pub(super) fn unique(names: &mut HashSet<String>, given: &str, fallback: String) -> String {
-    let base: String = given.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
-    let base = if base.is_empty() { fallback } else { base };
-    let mut name = base.clone();
-    let mut number = 2;
-    while !names.insert(name.clone()) {
-        name = format!("{base} {number}");
-        number += 1;
-    }
-    name
 }

@@ -5,19 +5,18 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use bth_scene::{Light, LightKind};
 
 use crate::error::Result;
-use crate::gltf::scene::importer::{Importer, unique};
-use crate::gltf::schema::{Lights, Spot};
+use crate::gltf::scene::importer::Importer;
+use crate::gltf::schema::{GltfLight, Spot};
 
 impl Importer<'_> {
     /// Adds a light at a row of the manifest's nodes.
     pub(super) fn light(&mut self, index: usize, node: usize, part: &str) -> Result<()> {
-        let lights: Lights = match self.document.extensions.get("KHR_lights_punctual") {
-            Some(value) => self.typed(value, "KHR_lights_punctual")?,
-            None => Lights::default(),
-        };
-        let light = lights.lights.into_iter().nth(index);
-        let light = light.ok_or_else(|| self.error(part, format!("its light {index} does not exist")))?;
+        let lights =
+            self.document.extensions.get("KHR_lights_punctual").and_then(|value| value.get("lights"));
+        let value = lights.and_then(|lights| lights.get(index));
+        let value = value.ok_or_else(|| self.error(part, format!("its light {index} does not exist")))?;
         let light_part = format!("light {index}");
+        let light: GltfLight = self.typed(value, &light_part)?;
         let kind = match light.kind.as_str() {
             "directional" => LightKind::Directional,
             "point" => LightKind::Point,
@@ -40,8 +39,7 @@ impl Importer<'_> {
             let message = "expected a color, intensity, range and cone that glTF allows";
             return Err(self.error(light_part, message));
         }
-        let mut names = self.manifest.lights.iter().map(|l| l.name.clone()).collect();
-        let name = unique(&mut names, &light.name, light_part);
+        let name = self.light_names.unique(&light.name, light_part);
         self.manifest.lights.push(Light { name, node, kind, color, intensity, range: light.range });
         Ok(())
     }

@@ -5,18 +5,20 @@ mod cameras;
 mod deformers;
 mod importer;
 mod lights;
+mod names;
 mod nodes;
 pub(crate) mod options;
 mod rigid_parts;
 mod tracks;
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::path::Path;
 
 use bth_scene::{Frames, Manifest};
 
 use self::animated::Animated;
 use self::importer::Importer;
+use self::names::Names;
 pub use self::options::{ImportOptions, ImportReport};
 use crate::error::Result;
 use crate::gltf::accessor::Accessors;
@@ -71,10 +73,12 @@ pub fn import_bytes(
         file: name,
         manifest: Manifest::default(),
         report: ImportReport { node_rows: vec![None; document.nodes.len()], ..ImportReport::default() },
-        node_names: HashSet::new(),
-        object_names: HashSet::new(),
+        node_names: Names::default(),
+        object_names: Names::default(),
         objects: HashMap::new(),
-        skin_names: HashSet::new(),
+        skin_names: Names::default(),
+        camera_names: Names::default(),
+        light_names: Names::default(),
         parents: parents(&document),
         animated: Animated::default(),
         deform: options.deform,

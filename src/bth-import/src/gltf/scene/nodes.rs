@@ -4,7 +4,7 @@ use bth_scene::{Node, Transform};
 
 use crate::error::Result;
 use crate::gltf::placed_mesh::GltfPart;
-use crate::gltf::scene::importer::{Importer, unique};
+use crate::gltf::scene::importer::Importer;
 use crate::gltf::scene::options::ImportOptions;
 use crate::gltf::schema::{GltfNode, Instancing, LightReference};
 use crate::source::UNSUPPORTED;
@@ -12,7 +12,7 @@ use crate::source::UNSUPPORTED;
 impl Importer<'_> {
     /// A name that no other node has.
     fn node_name(&mut self, given: &str, fallback: String) -> String {
-        unique(&mut self.node_names, given, fallback)
+        self.node_names.unique(given, fallback)
     }
 
     /// The root nodes and the name or number of the wanted scene, or else of the default one.

@@ -7,7 +7,7 @@ use glam::{DMat3, DVec3};
 use crate::error::Result;
 use crate::gltf::placed_mesh::GltfPart;
 use crate::gltf::rigid_parts::RigidParts;
-use crate::gltf::scene::importer::{Importer, unique};
+use crate::gltf::scene::importer::Importer;
 
 /// Triangles from which a part is an instance, where something else is left in the object that deforms: placing an instance takes about
 /// as long as 100 to 150 triangles do that are deformed and refitted (`docs/notes/scenes.md`).
@@ -90,7 +90,7 @@ impl Importer<'_> {
             }
         };
         let name = format!("{}/{joint_name}", self.manifest.nodes[deformer.node].name);
-        let name = unique(&mut self.node_names, &name, String::new());
+        let name = self.node_names.unique(&name, String::new());
         let visible = self.chain(deformer.node).all(|node| node.visible);
         let transform = inverse_bind.map_or_else(Transform::default, Transform::Matrix);
         self.manifest.nodes.push(Node {

@@ -183,6 +183,7 @@ pub fn source_files(path: &Path, looks: impl Into<Looks>) -> Result<Vec<PathBuf>
 fn finish(mut raw: Raw<'_>, wanted: Wanted, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
     check_triangles(raw.triangles.len() as u64)?;
     check_rows(raw.positions.len() as u64)?;
+    raw.folds.warn(monitor);
     let collected = attributes::collect(&raw, wanted.attributes)?;
     let (attributes, normal_sources) = collected.map_or((None, Vec::new()), |(a, rows)| (Some(a), rows));
     let triangles = std::mem::take(&mut raw.triangles);

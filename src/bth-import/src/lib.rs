@@ -12,6 +12,7 @@ mod cutout;
 mod deformation;
 mod disjoint_sets;
 pub mod error;
+mod folds;
 pub mod gltf;
 mod groups;
 mod image_file;

@@ -2,6 +2,7 @@
 
 use crate::deformation::RawDeformation;
 use crate::error::{Error, Place, Result};
+use crate::folds::Folds;
 use crate::groups::GroupRecorder;
 use crate::materials::MaterialRecorder;
 use crate::rows::NONE;
@@ -39,6 +40,8 @@ pub(super) struct Raw<'a> {
     pub(super) uv_rows: Vec<[u32; 3]>,
     /// Faces of more than three corners.
     pub(super) polygons: u64,
+    /// Those of them whose fans are not the polygon.
+    pub(super) folds: Folds,
     /// Points, lines and faces of fewer than three corners.
     pub(super) skipped: u64,
     /// Groups of triangles, if the caller wants them and the source has some.
@@ -63,6 +66,7 @@ impl<'a> Raw<'a> {
             uvs: Vec::new(),
             uv_rows: Vec::new(),
             polygons: 0,
+            folds: Folds::default(),
             skipped: 0,
             groups: GroupRecorder::default(),
             materials: MaterialRecorder::default(),
@@ -75,6 +79,7 @@ impl<'a> Raw<'a> {
     #[inline]
     pub(super) fn push_face(&mut self, face: &[u32]) -> Result<()> {
         self.count_face(face.len());
+        self.folds.note(&self.positions, face, self.triangles.len());
         fan(&mut self.triangles, face);
         check_triangles(self.triangles.len() as u64)
     }

@@ -276,6 +276,37 @@ fn vertices_of_ply_and_obj_have_colors() {
     assert_eq!(read("b.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), Materials::default());
 }
 
+#[test]
+fn colors_of_ply_that_are_not_kept_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.ply");
+    let colors = |kind: &str| format!("property {kind} red\nproperty {kind} green\nproperty {kind} blue\n");
+    let told = |of_vertices: &str, of_faces: &str, wanted: Wanted| {
+        let [vertex, face] = [of_vertices, of_faces].map(|text| " 255 0 0".repeat(text.len().div_ceil(60)));
+        let text = format!(
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{of_vertices}element face 1\n\
+             property list uchar int vertex_indices\n{of_faces}end_header\n0 0 0{vertex}\n1 0 0{vertex}\n0 1 0{vertex}\n3 0 1 2{face}\n"
+        );
+        std::fs::write(&path, text).unwrap();
+        let heard = Listener::default();
+        let (mesh, _) = import(&path, wanted, &heard).unwrap();
+        assert_eq!(
+            mesh.materials.is_some_and(|m| !m.colors.is_empty()),
+            of_vertices.contains("uchar") && wanted.materials
+        );
+        heard.0.into_inner().unwrap()
+    };
+    let of_faces =
+        "1 rows of element face: the colours red, green, blue are not kept, only those of vertices are";
+    assert_eq!(told("", &colors("uchar"), WANTED), [of_faces]);
+    assert_eq!(told(&colors("uchar"), &colors("uchar"), WANTED), [of_faces]);
+    assert_eq!(told(&colors("uchar"), "", WANTED), [""; 0]);
+    assert_eq!(told(&colors("uchar"), &colors("uchar"), Wanted { materials: false, ..WANTED }), [""; 0]);
+    let of_vertices = "3 rows of element vertex: the colours red, green, blue are not kept, of vertices the first red, green and \
+        blue of one type are, uchar, ushort or float";
+    assert_eq!(told(&colors("int"), "", WANTED), [of_vertices]);
+}
+
 /// The red parts of the materials of an OBJ file with one triangle of each of these materials, beside a library of this text, and
 /// the warnings.
 fn obj_materials(folder: &Path, statements: &str, library: &[u8]) -> (Vec<f32>, Vec<String>) {

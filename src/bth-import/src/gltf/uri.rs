@@ -9,7 +9,8 @@ use crate::error::{Error, Result};
 pub(crate) fn beside(document: &Path, uri: &str) -> Option<PathBuf> {
     let name = decode_percent(uri)?;
     let relative = Path::new(&name);
-    let is_relative = !uri.contains(':')
+    let is_relative = !name.is_empty()
+        && !uri.contains(':')
         && !relative.components().any(|c| matches!(c, path::Component::RootDir | path::Component::Prefix(_)));
     is_relative.then(|| document.parent().unwrap_or(Path::new("")).join(relative))
 }

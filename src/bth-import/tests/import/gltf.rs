@@ -93,7 +93,7 @@ fn buffers_may_be_external_or_embedded() {
         let files: Vec<_> = std::iter::once(path.clone()).chain(external).collect();
         assert_eq!(bth_import::source_files(&path, bth_import::AlphaMode::None).unwrap(), files);
     }
-    for uri in ["/etc/hostname", "http://x/y.bin", "data:,abc"] {
+    for uri in ["/etc/hostname", "http://x/y.bin", "data:,abc", ""] {
         std::fs::write(&path, edited(|d| d["buffers"][0]["uri"] = uri.into()).to_string()).unwrap();
         let error = import(&path, Keep::None, &Silent).unwrap_err();
         assert!(matches!(error, Error::Input { code: "BTH-I014", .. }), "{error}");

@@ -40,6 +40,7 @@ pub(crate) fn compiled(manifest: &Manifest, folder: &Path) -> (bth::Scene, Scene
         .unwrap_or_else(|e| panic!("{e}"));
     let file = bth_format::File::from_bytes(&compiled.bytes).unwrap();
     bth_format::verify::verify(&file).unwrap_or_else(|e| panic!("{}", e[0]));
+    assert_eq!(report.resident_bytes, file.resident_bytes());
     (bth::from_bytes(&compiled.bytes).unwrap(), report)
 }
 

@@ -121,7 +121,7 @@ impl ObjectSections {
 
     /// Bytes of the sections that tracing reads.
     pub(super) fn resident_bytes(&self) -> u64 {
-        let resident = |kind: u32, length: u64| if kind::is_required(kind) { length } else { 0 };
+        let resident = |kind: u32, length: u64| if kind::is_traced(kind) { length } else { 0 };
         match self {
             Self::InFile { file, object, .. } => {
                 Self::sections(file, *object).map(|s| resident(s.entry.kind, s.entry.length)).sum()

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use crate::cutout::{AlphaMode, Cutouts};
 use crate::error::{Error, Result};
 use crate::gltf::GltfPart;
+use crate::gltf::accessor::Accessors;
+use crate::gltf::buffer::Buffers;
 use crate::gltf::extensions::{SCENE_EXTENSIONS, SUPPORTED};
 use crate::groups::Groups;
 use crate::materials::{ImageFile, Looks};
@@ -99,9 +101,11 @@ pub fn import_gltf_parts_bytes(
     }
     let supported = [SUPPORTED.as_slice(), &SCENE_EXTENSIONS].concat();
     let (document, binary) = gltf::document::read(&source, &supported)?;
+    let accessors =
+        Accessors { source: &source, document: &document, buffers: Buffers::new(&source, &document, binary) };
     let shared = gltf::materials::SharedMaterials::default();
     let one = |part: &GltfPart| {
-        let raw = gltf::flatten::read_part(&source, &document, binary, *part, (wanted, &shared))?;
+        let raw = gltf::flatten::read_part(&source, &accessors, *part, (wanted, &shared))?;
         finish(raw, wanted, monitor)
     };
     let imported = parts.iter().map(one).collect();

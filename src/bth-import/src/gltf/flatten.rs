@@ -42,8 +42,8 @@ struct GroupNumbers {
 }
 
 /// Appends primitives to a raw mesh.
-struct Flattener<'r, 'a> {
-    accessors: Accessors<'r>,
+struct Flattener<'r, 'd, 'a> {
+    accessors: &'r Accessors<'d>,
     raw: Raw<'a>,
     spans: Vec<Span>,
     keep: Keep,
@@ -71,32 +71,31 @@ pub(crate) fn read<'a>(source: &'a Source<'a>, wanted: Wanted) -> Result<Raw<'a>
         source.monitor.warn("animations are ignored: meshes with skins or morph targets are read at rest");
     }
     let shared = SharedMaterials::default();
-    let raw = read_placed(source, &document, binary, (wanted, &shared), (&placed, false))?;
+    let accessors =
+        Accessors { source, document: &document, buffers: Buffers::new(source, &document, binary) };
+    let raw = read_placed(source, &accessors, (wanted, &shared), (&placed, false))?;
     shared.report(source);
     Ok(raw)
 }
 
-/// Reads one part of a document.
+/// Reads one part of the document of accessors, which other parts may share with it: then each buffer is read once.
 pub(crate) fn read_part<'a>(
     source: &'a Source<'a>,
-    document: &GltfDocument,
-    binary: Option<&[u8]>,
+    accessors: &Accessors<'_>,
     part: GltfPart,
     wanted: (Wanted, &SharedMaterials),
 ) -> Result<Raw<'a>> {
-    let placed = [part.placed(source, document)?];
-    read_placed(source, document, binary, wanted, (&placed, matches!(part, GltfPart::Deforming { .. })))
+    let placed = [part.placed(source, accessors.document)?];
+    read_placed(source, accessors, wanted, (&placed, matches!(part, GltfPart::Deforming { .. })))
 }
 
 /// Reads placed meshes; those that are `deforming` without moving their vertices.
 fn read_placed<'a>(
     source: &'a Source<'a>,
-    document: &GltfDocument,
-    binary: Option<&[u8]>,
+    accessors: &Accessors<'_>,
     (wanted, shared): (Wanted, &SharedMaterials),
     (placed, deforming): (&[PlacedMesh], bool),
 ) -> Result<Raw<'a>> {
-    let accessors = Accessors { source, document, buffers: Buffers::new(source, document, binary) };
     let no_place = Box::new(|_: RowKind, _: usize| Place::File(source.path.to_owned()));
     let mut flattener = Flattener {
         accessors,
@@ -113,9 +112,9 @@ fn read_placed<'a>(
         source.progress(source.data.len() / placed.len() * done)?;
         flattener.mesh(mesh)?;
     }
-    let Flattener { mut raw, spans, accessors, groups, .. } = flattener;
+    let Flattener { mut raw, spans, groups, .. } = flattener;
     if let (true, Some(GroupNumbers { numbers, .. })) = (wanted.materials, groups) {
-        materials::read(&accessors, shared, &numbers, &mut raw.materials)?;
+        materials::read(accessors, shared, &numbers, &mut raw.materials)?;
     }
     if raw.normals.is_empty() {
         raw.normal_rows.clear();
@@ -136,7 +135,7 @@ fn locate(source: &Source<'_>, spans: &[Span], kind: RowKind, row: usize) -> Pla
     Place::Part(source.path.to_owned(), part)
 }
 
-impl Flattener<'_, '_> {
+impl Flattener<'_, '_, '_> {
     fn mesh(&mut self, placed: &PlacedMesh) -> Result<()> {
         let (document, source) = (self.accessors.document, self.accessors.source);
         let Some(GltfMesh { primitives, .. }) = document.meshes.get(placed.mesh) else {
@@ -148,9 +147,9 @@ impl Flattener<'_, '_> {
         // Nothing but their joint moves the vertices of a rigid part.
         let pose = match (&self.raw.deformation, placed.kept) {
             (Some(_), _) | (None, KeptTriangles::Part(_)) => RestPose::default(),
-            (None, _) => RestPose::new(&self.accessors, placed.node, placed.mesh)?,
+            (None, _) => RestPose::new(self.accessors, placed.node, placed.mesh)?,
         };
-        let selection = placed.kept.of_mesh(&self.accessors, placed.mesh)?;
+        let selection = placed.kept.of_mesh(self.accessors, placed.mesh)?;
         for (index, primitive) in primitives.iter().enumerate() {
             source.monitor.check()?;
             self.primitive((placed, &pose, &selection), index, primitive)?;
@@ -165,7 +164,7 @@ impl Flattener<'_, '_> {
         primitive: &Primitive,
     ) -> Result<()> {
         let part = format!("mesh {} primitive {index}", placed.mesh);
-        let reader = PrimitiveReader { accessors: &self.accessors, primitive, part };
+        let reader = PrimitiveReader { accessors: self.accessors, primitive, part };
         let Some(kept) = reader.kept(self.keep)? else {
             let warning = format!("{} has no positions and is left out", reader.part);
             self.accessors.source.monitor.warn(&warning);

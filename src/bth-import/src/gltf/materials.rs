@@ -1,7 +1,7 @@
 //! How the materials of a document look: base colour, emission, alpha and sidedness, with their textures (glTF 2.0 specification,
 //! §3.9), and what of them is left out.
 
-use std::cell::RefCell;
+use std::cell::{OnceCell, RefCell};
 use std::collections::{BTreeSet, HashMap};
 
 use bth_format::layout::*;
@@ -115,9 +115,19 @@ pub(crate) struct SharedMaterials {
     images: RefCell<HashMap<usize, [u8; 16]>>,
     /// What some material has and no file keeps.
     left_out: RefCell<BTreeSet<String>>,
+    /// The parts of the document that textures are made of, read when the first mesh needs them.
+    parts: OnceCell<TextureParts>,
 }
 
 impl SharedMaterials {
+    fn parts(&self, source: &Source<'_>) -> Result<&TextureParts> {
+        if let Some(parts) = self.parts.get() {
+            return Ok(parts);
+        }
+        let parts = TextureParts::of(source)?;
+        Ok(self.parts.get_or_init(|| parts))
+    }
+
     /// Reports what was left out.
     pub(crate) fn report(&self, source: &Source<'_>) {
         let left_out = self.left_out.take();
@@ -179,7 +189,7 @@ pub(super) fn read(
     numbers: &[usize],
     recorder: &mut MaterialRecorder,
 ) -> Result<()> {
-    let parts = TextureParts::of(accessors.source)?;
+    let parts = shared.parts(accessors.source)?;
     let mut reader =
         MaterialReader { textures: TextureReader { accessors, parts, without: WITHOUT }, shared, recorder };
     for number in numbers {
@@ -351,7 +361,8 @@ pub(crate) fn images(source: &Source<'_>) -> Result<Vec<ImageFile>> {
     let (document, binary) = document::read(source, &supported)?;
     let accessors =
         &Accessors { source, document: &document, buffers: Buffers::new(source, &document, binary) };
-    let textures = TextureReader { accessors, parts: TextureParts::of(source)?, without: WITHOUT };
+    let parts = &TextureParts::of(source)?;
+    let textures = TextureReader { accessors, parts, without: WITHOUT };
     let used = used_textures(&textures.parts.materials);
     let numbers: BTreeSet<usize> =
         used.into_iter().filter_map(|texture| textures.texture(texture).ok()?.image).collect();

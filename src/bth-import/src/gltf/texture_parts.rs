@@ -104,7 +104,7 @@ fn source_of(texture: &Texture) -> Option<usize> {
 /// Reads textures, and names in errors how to do without them.
 pub(super) struct TextureReader<'m, 'a> {
     pub(super) accessors: &'m Accessors<'a>,
-    pub(super) parts: TextureParts,
+    pub(super) parts: &'m TextureParts,
     /// How to compile without what is read, such as `without cut-outs (--alpha none)`.
     pub(super) without: &'static str,
 }

@@ -7,6 +7,7 @@ mod data;
 mod gltf;
 mod gltf_nodes;
 mod groups;
+mod many_meshes;
 mod materials;
 mod memory;
 mod obj;

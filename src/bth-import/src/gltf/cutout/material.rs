@@ -66,7 +66,7 @@ pub(super) struct Materials<'m, 'a> {
 }
 
 impl<'m, 'a> Materials<'m, 'a> {
-    pub(super) fn new(accessors: &'m Accessors<'a>, parts: TextureParts, mode: AlphaMode) -> Self {
+    pub(super) fn new(accessors: &'m Accessors<'a>, parts: &'m TextureParts, mode: AlphaMode) -> Self {
         let (rows, image_rows) = (HashMap::new(), HashMap::new());
         let reader = TextureReader { accessors, parts, without: "without cut-outs (--alpha none)" };
         Materials { reader, mode, rows, image_rows, read: Vec::new(), images: Vec::new() }

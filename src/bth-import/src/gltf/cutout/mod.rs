@@ -53,7 +53,7 @@ fn placed_cutouts(
     mode: AlphaMode,
     models: &[Vec<PlacedMesh>],
 ) -> Result<Vec<Cutouts>> {
-    let parts = TextureParts::of(source)?;
+    let parts = &TextureParts::of(source)?;
     let accessors = Accessors { source, document, buffers: Buffers::new(source, document, binary) };
     let mut reader = CutoutReader {
         accessors: &accessors,

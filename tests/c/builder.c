@@ -97,6 +97,7 @@ int main(int argc, char **argv) {
     if (bth_builder_set_subscene_transform(builder, 0, NULL) != wrong || bth_builder_add(builder, NULL, id) != wrong) return 30;
     if (bth_builder_set_transforms(builder, NULL, NULL, 1) != wrong || bth_builder_set_transforms(builder, NULL, NULL, 0)) return 31;
     if (bth_builder_set_transforms(NULL, NULL, NULL, 0) != wrong) return 31;
+    if (bth_builder_add(builder, bth_builder_scene(builder), id) != wrong || bth_object_count(bth_builder_scene(builder)) != 2) return 33;
     if (bth_builder_scene(NULL) || bth_builder_commit(builder, NULL) != BTH_OK) return 32;
     bth_builder_free(builder);
     bth_builder_free(NULL);

@@ -374,7 +374,8 @@ const bth_scene *bth_builder_scene(const bth_builder *builder);
 
 /* Adds the objects of another scene, without instances of them, and stores the index of the first in *first_object: the object with
  * index i there has index *first_object + i here. The memory of the file is shared, and lasts until the last of the scenes is closed;
- * a mapped file must not change until then. Masks and the time of the other scene have no effect here. */
+ * a mapped file must not change until then. Masks and the time of the other scene have no effect here. Returns BTH_ERROR_ARGUMENT for
+ * the scene of this builder. */
 int32_t bth_builder_add(bth_builder *builder, const bth_scene *scene, uint32_t *first_object);
 
 /* Adds an instance of an object and stores its id in *instance. bth_builder_commit decides whether the transform can be used. */

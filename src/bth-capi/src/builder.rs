@@ -96,24 +96,30 @@ pub unsafe extern "C" fn bth_builder_scene(builder: *const SceneBuilder) -> *con
 /// Adds the objects of a scene; see `bth.h`.
 ///
 /// # Safety
-/// `builder` is null or was not freed, and no other call uses it or its scene at the same time. `scene` is null or open, and not the
-/// scene of this builder; `first_object` is null or valid for writes.
+/// `builder` is null or was not freed, and no other call uses it or its scene at the same time. `scene` is null or
+/// open; `first_object` is null or valid for writes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_builder_add(
     builder: *mut SceneBuilder,
     scene: *const Scene,
     first_object: *mut u32,
 ) -> i32 {
+    let name = "bth_builder_add";
+    // Its objects would be read from memory that is freed while they are added.
+    // SAFETY: by contract the builder is null or valid.
+    if !scene.is_null() && std::ptr::eq(scene, unsafe { bth_builder_scene(builder) }) {
+        return fail(ERROR_ARGUMENT, format!("{name}: expected another scene than that of the builder"));
+    }
     // SAFETY: by contract they are null or valid.
     let (Some(scene), Some(out)) = (unsafe { scene.as_ref() }, unsafe { first_object.as_mut() }) else {
-        return null("bth_builder_add", "scene and first_object");
+        return null(name, "scene and first_object");
     };
     let add = |builder: &mut SceneBuilder| {
         *out = builder.add(scene);
         Ok(())
     };
     // SAFETY: the contract of `with` is part of that of this function.
-    unsafe { with(builder, "bth_builder_add", add) }
+    unsafe { with(builder, name, add) }
 }
 
 /// Adds an instance or a subscene; stores its id.

@@ -217,7 +217,12 @@ fn matrix(rng: &mut Rng) -> [f64; 12] {
 /// singular.
 fn placed_scene(rng: &mut Rng, triangles: &[Corners]) -> Option<(Scene, Vec<Corners>)> {
     let matrices: Vec<_> = (0..1 + rng.below(30)).map(|_| matrix(rng)).collect();
-    let scene = bth::from_bytes(&placed_soup(triangles, &matrices)).ok()?;
+    placed(triangles, &matrices)
+}
+
+/// As [`placed_scene`], with given transforms.
+fn placed(triangles: &[Corners], matrices: &[[f64; 12]]) -> Option<(Scene, Vec<Corners>)> {
+    let scene = bth::from_bytes(&placed_soup(triangles, matrices)).ok()?;
     let world = matrices.iter().flat_map(|m| {
         let row = |p: [f64; 3], r: &[f64]| (r[0] * p[0] + r[1] * p[1] + r[2] * p[2] + r[3]) as f32;
         let apply = move |p: [f32; 3]| [0, 4, 8].map(|r| row(p.map(f64::from), &m[r..]));
@@ -307,6 +312,26 @@ fn instances_are_measured_in_world_space() {
         }
     }
     assert!(placed > 150, "{placed}");
+}
+
+/// The corners of instances are rounded to denormal numbers in world space, points are in the space of objects, or both.
+#[test]
+fn instances_of_denormal_size_are_measured_in_world_space() {
+    let mut rng = Rng::new(6);
+    for round in 0..120 {
+        let (size, scale) = [(1e-44, 1e6), (1e-42, 1.0), (1.0, 1e-44), (1e-30, 1e-12)][round % 4];
+        let triangles = hostile_triangles(&mut rng, 1 + round % 20, size);
+        let matrix = std::array::from_fn(|i| match i % 5 {
+            0 => f64::from(scale),
+            _ if i % 4 == 3 => 0.0,
+            _ => f64::from(unit(&mut rng) * scale * 0.25),
+        });
+        let Some((scene, world)) = placed(&triangles, &[matrix]) else { continue };
+        let points: Vec<_> = (0..6).map(|_| hostile_point(&mut rng, &world, size * scale)).collect();
+        for (point, found) in points.iter().zip(all_ways(&scene, &points)) {
+            check(*point, &world, found);
+        }
+    }
 }
 
 #[test]

@@ -11,6 +11,8 @@ use bth_format::object::ObjectView;
 /// Bound of all roundings relative to the magnitudes given at [`PlacedObject::new`]: that of world corners and of the point in
 /// object space, 2^-24 · √3 each, and the error of the inverse, 10 · 2^24 · 2^-53 (see `instances/placement.rs`).
 const ROUNDING: f64 = 1.0 / (1 << 21) as f64;
+/// The least magnitude that roundings are relative to: those of denormal numbers are as large as those of the least normal one.
+const LEAST: f64 = f32::MIN_POSITIVE as f64;
 
 /// An instance for a search.
 #[derive(Clone, Copy, Debug)]
@@ -18,7 +20,7 @@ pub(super) struct PlacedObject {
     placed: Placed,
     /// Upper bound of |A|.
     norm: f64,
-    /// Greatest |coordinate| of the world box.
+    /// Greatest |coordinate| of the world box, at least [`LEAST`].
     extent: f64,
     /// Magnitude of the roundings in object space for a point at the origin of world space.
     magnitude: f64,
@@ -27,10 +29,10 @@ pub(super) struct PlacedObject {
 impl PlacedObject {
     pub(super) fn new(placed: Placed, object: &ObjectView<'_>) -> PlacedObject {
         let norm = spectral_norm(&placed.inverse);
-        let world = placed.lower.iter().chain(&placed.upper).fold(0.0f64, |m, x| m.max(f64::from(x.abs())));
+        let world = placed.lower.iter().chain(&placed.upper).fold(LEAST, |m, x| m.max(f64::from(x.abs())));
         let origin = placed.origin.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         // Three coordinates of at most the greatest one have at most twice its length.
-        let magnitude = 2.0 * (norm * (world + origin) + f64::from(object.bounds.greatest));
+        let magnitude = 2.0 * (norm * (world + origin) + f64::from(object.bounds.greatest).max(LEAST));
         PlacedObject { placed, norm, extent: world, magnitude }
     }
 

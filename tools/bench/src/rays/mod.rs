@@ -67,7 +67,8 @@ impl RaySet {
     /// About `most` of the rays at most: whole runs of neighbours, evenly spread over the set.
     fn thinned(mut self, most: usize) -> RaySet {
         const RUN: usize = 64;
-        let step = self.rays.len().div_ceil(most.max(1)).max(1);
+        // An odd step: rows of tiles are often a power of two of runs long, of which an even one would take the same columns of the picture.
+        let step = self.rays.len().div_ceil(most.max(1)) | 1;
         let kept = |i: usize| (i / RUN).is_multiple_of(step);
         let keep = |index: &mut usize| {
             *index += 1;
@@ -194,4 +195,25 @@ fn misses(finder: &Finder<'_>, bounds: &Bounds, count: usize, rng: &mut Rng) -> 
     }
     found.truncate(count);
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_rays_of_a_picture_come_from_all_columns() {
+        // The origin tells the number of the ray in a picture whose rows of tiles are 64 runs long.
+        let rays = (0..1 << 19).map(|i| Ray::new([i as f32, 0.0, 0.0], [0.0, 0.0, 1.0])).collect();
+        let set = RaySet { name: NAMES[0], any: false, coherent: true, rays, from: None };
+        for most in [64 << 7, 64 << 6, 64 << 5] {
+            let thinned = set.clone().thinned(most);
+            let mut columns: Vec<u32> =
+                thinned.rays.iter().map(|ray| ray.origin[0] as u32 / 64 % 64).collect();
+            assert!(columns.len() <= most + 64, "{}", columns.len());
+            columns.sort_unstable();
+            columns.dedup();
+            assert!(columns.len() >= most / 64 / 2, "{} columns of {most} rays", columns.len());
+        }
+    }
 }

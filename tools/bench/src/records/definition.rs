@@ -1,6 +1,6 @@
 //! What is measured: a file of `benchmarks/definitions/`.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -83,10 +83,19 @@ impl Definition {
     /// Reads a definition.
     ///
     /// # Errors
-    /// If the file cannot be read or is not a definition; the error names line and key.
+    /// If the file cannot be read or is not a definition; the error names line and key. If it is one of which nothing can be measured.
     pub fn read(path: &Path) -> Result<Definition> {
         let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
-        toml::from_str(&text).with_context(|| path.display().to_string())
+        let definition: Definition = toml::from_str(&text).with_context(|| path.display().to_string())?;
+        let Definition { measurement, models, rays, rounds, threads, .. } = &definition;
+        let all_from_one = [rays, rounds].into_iter().chain(threads).all(|n| *n > 0);
+        let is_empty = *measurement == Measurement::Speed && (models.is_empty() || threads.is_empty());
+        ensure!(
+            all_from_one && !is_empty,
+            "{}: expected models, and rays, rounds and threads from 1",
+            path.display()
+        );
+        Ok(definition)
     }
 
     /// All definitions of a folder, by name.
@@ -101,5 +110,28 @@ impl Definition {
         files.retain(|file| file.extension().is_some_and(|e| e == "toml"));
         files.sort();
         files.iter().map(|file| Self::read(file)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn definitions_of_nothing_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("speed.toml");
+        let read = |more: &str| {
+            let text = format!("benchmark = \"speed\"\nabout = \"Rays.\"\nmeasurement = \"speed\"\n{more}\n");
+            std::fs::write(&path, text).unwrap();
+            Definition::read(&path)
+        };
+        assert!(read("models = [\"blob\"]").is_ok());
+        for wrong in ["", "models = []", "rays = 0", "rounds = 0", "threads = []", "threads = [1, 0]"] {
+            let models =
+                if wrong.contains("models") || wrong.is_empty() { "" } else { "models = [\"blob\"]\n" };
+            let error = read(&format!("{models}{wrong}")).unwrap_err().to_string();
+            assert!(error.contains("speed.toml: expected models, and rays"), "{wrong:?}: {error}");
+        }
     }
 }

@@ -193,7 +193,7 @@ mod tests {
         let path = folder.path();
         std::fs::create_dir_all(path.join("definitions")).unwrap();
         std::fs::create_dir_all(path.join("record/cpu")).unwrap();
-        let definition = "benchmark = \"speed\"\nabout = \"Rays.\"\nmeasurement = \"speed\"\n[[bars]]\nengine = \"bth\"\n\
+        let definition = "benchmark = \"speed\"\nabout = \"Rays.\"\nmeasurement = \"external\"\n[[bars]]\nengine = \"bth\"\n\
              set = \"ao\"\nunit = \"times embree\"\nat_least = 2.5\n";
         std::fs::write(path.join("definitions/speed.toml"), definition).unwrap();
         let line = |value: f64| format!("abc,speed,bth,mean,ao,1,avx2,{value},times embree,1,4,5");

@@ -8,6 +8,9 @@ use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_format::layout::RecordKind;
 use bth_scenes::Model;
 
+/// Names of what [`deformed`] and [`deformed_tets`] make.
+pub const DEFORMED: [&str; 3] = ["deformed bvh", "deformed tets link32", "deformed tets tet16"];
+
 /// A structure compiled from a model.
 #[derive(Debug)]
 pub struct Traced {
@@ -42,6 +45,11 @@ pub fn compiled(model: &Model, options: &CompileOptions) -> Scene {
 /// The model in every structure, the BVH first. Structures with tetrahedra are included where the worker exists, and a
 /// tetrahedralization of the whole model only where `whole` is set.
 pub fn every_structure(model: &Model, whole: bool) -> Vec<Traced> {
+    structures_named(model, whole, |_| true)
+}
+
+/// Those of [`every_structure`] whose names are wanted; no others are compiled.
+pub fn structures_named(model: &Model, whole: bool, is_wanted: impl Fn(&str) -> bool) -> Vec<Traced> {
     let bvh = options(Structure::Bvh, RecordKind::Link32, false);
     let mut packed = bvh.clone();
     packed.coordinates.boxes = Boxes::Bytes;
@@ -67,7 +75,8 @@ pub fn every_structure(model: &Model, whole: bool) -> Vec<Traced> {
         with_subtrees.coordinates.boxes = Boxes::Bytes;
         wanted.push(("bth with subtrees of packed nodes".into(), with_subtrees));
     }
-    wanted.into_iter().map(|(name, options)| Traced { scene: compiled(model, &options), name }).collect()
+    let wanted = wanted.into_iter().filter(|(name, _)| is_wanted(name));
+    wanted.map(|(name, options)| Traced { scene: compiled(model, &options), name }).collect()
 }
 
 /// The model as a deformable object that was compiled in another shape and then given the positions of the model: each point
@@ -93,7 +102,7 @@ pub fn deformed(model: &Model, seed: u64) -> Traced {
     let options = CompileOptions { deformable: true, ..options(Structure::Bvh, RecordKind::Link32, false) };
     let mut scene = compiled(&shape, &options);
     scene.set_positions(0, &model.positions).unwrap_or_else(|e| panic!("{e}"));
-    Traced { name: "deformed bvh".into(), scene }
+    Traced { name: DEFORMED[0].into(), scene }
 }
 
 /// The model as deformable objects with tetrahedra, which were compiled twice as long on one axis and four times on another, and then given
@@ -109,14 +118,14 @@ pub fn deformed_tets(model: &Model, whole: bool) -> Vec<Traced> {
     let positions = model.positions.iter().map(|[x, y, z]| [2.0 * x, 4.0 * y, *z]).collect();
     let shape = Model { positions, triangles: model.triangles.clone() };
     let structure = if whole { Structure::Tets } else { Structure::Bth };
-    let of = |record: RecordKind| {
+    let of = |name: &str, record: RecordKind| {
         let options =
             CompileOptions { deformable: true, deformable_tets: true, ..options(structure, record, true) };
         let mut scene = compiled(&shape, &options);
         scene.set_positions(0, &model.positions).unwrap_or_else(|e| panic!("{e}"));
-        Traced { name: format!("deformed tets {}", record.name()), scene }
+        Traced { name: name.into(), scene }
     };
-    vec![of(RecordKind::Link32), of(RecordKind::Tet16)]
+    vec![of(DEFORMED[1], RecordKind::Link32), of(DEFORMED[2], RecordKind::Tet16)]
 }
 
 /// All bits of a hit.

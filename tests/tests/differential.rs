@@ -2,10 +2,12 @@
 
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth::{Accept, Steps};
+use bth_compile::pipeline::Structure;
+use bth_format::layout::RecordKind;
 use bth_scenes::{Model, blob::blob, gyroid::gyroid, hall::hall, knot::torus_knot, soup::soup};
 use bth_tests::oracle;
 use bth_tests::rays::{assorted, onward};
-use bth_tests::structures::{Traced, bits, every_structure};
+use bth_tests::structures::{Traced, bits, compiled, every_structure, options};
 
 type Corners = Vec<[[f32; 3]; 3]>;
 
@@ -141,7 +143,7 @@ fn packets_to_the_corners_of_small_things_on_a_wide_plain_are_traced_exactly() {
     for width in [1e3, 1e5, 1e7] {
         let model = knot_on_a_plain(width);
         let corners: Corners = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
-        let scene = every_structure(&model, false).remove(0).scene;
+        let scene = compiled(&model, &options(Structure::Bvh, RecordKind::Link32, false));
         for along_one_direction in [false, true] {
             // Rays to the corners of each triangle and beside them, those of one triangle after those of the last.
             let targets = corners.iter().take(200).flatten().flat_map(|p| {

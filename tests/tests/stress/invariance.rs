@@ -4,11 +4,12 @@ use bth::Scene;
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, Structure};
+use bth_format::layout::RecordKind;
 use bth_random::Rng;
 use bth_scenes::Model;
 use bth_scenes::{blob::blob, soup::soup};
 use bth_tests::rays::assorted;
-use bth_tests::structures::every_structure;
+use bth_tests::structures::{self, every_structure};
 use std::fmt::Write;
 
 const RAYS: usize = 1500;
@@ -139,6 +140,8 @@ fn cutting_into_instances_changes_no_answer() {
             hit.primitive = PrimitiveRef { instance: 0, triangle };
         }
         // Of hits at the same t, rounded, that of the least instance is reported; within an object the nearest is.
-        compare(&hits(&every_structure(&model, false)[0].scene, &rays), &ours, |id| id, false);
+        let whole =
+            structures::compiled(&model, &structures::options(Structure::Bvh, RecordKind::Link32, false));
+        compare(&hits(&whole, &rays), &ours, |id| id, false);
     }
 }

@@ -6,7 +6,7 @@ use crate::output::{Head, Record};
 use crate::progress::Progress;
 use anyhow::{Result, ensure};
 use bth_tests::stress::{Shape, Statistics, run as trace, shapes};
-use bth_tests::structures::{Traced, deformed, deformed_tets, every_structure};
+use bth_tests::structures::{DEFORMED, Traced, deformed, deformed_tets, structures_named};
 use serde_json::{Value, json};
 
 /// Rays of a shape in a round: a number of batches that the instruction sets divide.
@@ -32,18 +32,22 @@ pub fn run(arguments: &Stress) -> Result<()> {
     let compiled = shapes.into_iter().map(|shape| {
         progress.show(format!("{}: compiling", shape.name));
         let model = shape.grid.model();
-        let mut structures = every_structure(&model, shape.whole);
-        structures.push(deformed(&model, arguments.seed));
-        structures.extend(deformed_tets(&model, shape.whole));
-        structures.retain(|traced| traced.name.contains(&arguments.structure));
-        ShapeRun { shape, structures, statistics: Statistics::default() }
+        let is_wanted = |name: &str| name.contains(&arguments.structure);
+        let mut structures = structures_named(&model, shape.whole, is_wanted);
+        if DEFORMED.into_iter().any(is_wanted) {
+            structures.push(deformed(&model, arguments.seed));
+            structures.extend(deformed_tets(&model, shape.whole));
+            structures.retain(|traced| is_wanted(&traced.name));
+        }
+        ensure!(
+            !structures.is_empty(),
+            "{} has no structure that is named {:?}",
+            shape.name,
+            arguments.structure
+        );
+        Ok(ShapeRun { shape, structures, statistics: Statistics::default() })
     });
-    let mut runs: Vec<ShapeRun> = compiled.collect();
-    ensure!(
-        runs.iter().all(|run| !run.structures.is_empty()),
-        "a shape has no structure that is named {:?}",
-        arguments.structure
-    );
+    let mut runs = compiled.collect::<Result<Vec<ShapeRun>>>()?;
     let mut round = 0;
     loop {
         let mut traced = false;

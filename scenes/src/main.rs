@@ -59,12 +59,20 @@ fn main() -> ExitCode {
     }
 }
 
-/// A name that is not in the catalogue of `kind`s; `names` are those that are.
-fn unknown<'a>(kind: &str, found: &str, names: impl Iterator<Item = &'a str>) -> Failure {
+/// A name that is not in the catalogue of `kind`s; `names` are those that are. One of the other catalogue needs the command `other`.
+fn unknown<'a>(
+    kind: &str,
+    found: &str,
+    names: impl Iterator<Item = &'a str>,
+    other: Option<&str>,
+) -> Failure {
     let names: Vec<&str> = names.collect();
     Failure::Usage {
         message: format!("expected the name of a {kind}, found {found:?}"),
-        hint: format!("the {kind}s are {}", names.join(", ")),
+        hint: match other {
+            Some(command) => format!("`bth-scenes {command} {found}` makes it"),
+            None => format!("the {kind}s are {}", names.join(", ")),
+        },
     }
 }
 
@@ -80,8 +88,9 @@ fn list() -> Result<(), Failure> {
 }
 
 fn make(name: &str, faces: Option<u32>, output: &Path) -> Result<(), Failure> {
-    let entry =
-        catalogue::find(name).ok_or_else(|| unknown("model", name, ENTRIES.iter().map(|e| e.name)))?;
+    let entry = catalogue::find(name).ok_or_else(|| {
+        unknown("model", name, ENTRIES.iter().map(|e| e.name), animations::find(name).map(|_| "scene"))
+    })?;
     let model = (entry.make)(faces.unwrap_or(entry.faces));
     write::file(&model, output)?;
     let topology = topology::topology(&model);
@@ -98,8 +107,9 @@ fn make(name: &str, faces: Option<u32>, output: &Path) -> Result<(), Failure> {
 }
 
 fn scene(name: &str, folder: &Path) -> Result<(), Failure> {
-    let animation =
-        animations::find(name).ok_or_else(|| unknown("scene", name, ANIMATIONS.iter().map(|a| a.name)))?;
+    let animation = animations::find(name).ok_or_else(|| {
+        unknown("scene", name, ANIMATIONS.iter().map(|a| a.name), catalogue::find(name).map(|_| "make"))
+    })?;
     let mut out = std::io::stdout().lock();
     let scene = (animation.make)();
     for (path, model) in &scene.models {

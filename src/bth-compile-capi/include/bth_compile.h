@@ -19,7 +19,7 @@ extern "C" {
                                             that is empty or not UTF-8 */
 #define BTH_COMPILE_ERROR_FILE (-2)      /* the cache or the profile could not be read or written */
 #define BTH_COMPILE_ERROR_INPUT (-3)     /* the triangles cannot be used: an index out of range, a position that is not finite */
-#define BTH_COMPILE_ERROR_LIMIT (-4)     /* beyond a limit of the file format */
+#define BTH_COMPILE_ERROR_LIMIT (-4)     /* beyond a limit of the file format, or more threads than the system starts */
 #define BTH_COMPILE_ERROR_INTERNAL (-5)  /* a defect of this library */
 #define BTH_COMPILE_ERROR_CANCELLED (-6) /* the progress callback cancelled */
 

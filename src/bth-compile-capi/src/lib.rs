@@ -253,7 +253,7 @@ fn in_threads<T: Send>(threads: u32, work: impl FnOnce() -> Result<T, Failure> +
         return work();
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build();
-    pool.map_err(|e| Failure(ERROR_INTERNAL, format!("threads cannot be started: {e}")))?.install(work)
+    pool.map_err(|e| Failure(ERROR_LIMIT, format!("{threads} threads cannot be started: {e}")))?.install(work)
 }
 
 /// Frees bytes; see `bth_compile.h`.

@@ -76,6 +76,50 @@ fn hits_in_instances_are_those_that_the_nearest_hit_finds_one_after_the_other() 
     assert!(found > 3000, "{found}");
 }
 
+/// With a direction so long that t is denormal, hits at different distances have the same t. Of these the first is that in the first
+/// instance, in whatever order instances are visited, and a range that ends at this t holds all of them.
+#[test]
+fn hits_whose_t_are_rounded_to_the_same_are_ordered_by_instance() {
+    const NODES: &str = r#"
+version = 1
+objects = [{ name = "layers", model = "layers.ply" }]
+nodes = [
+    { name = "0", object = "layers", translation = [0, 0, 1.0000003] },
+    { name = "1", object = "layers", translation = [0, 0, 1] },
+    { name = "2", object = "layers", translation = [0, 0, 1.0000001] },
+]
+"#;
+    let folder = tempfile::tempdir().unwrap();
+    bth_scenes::write::file(&layers(2), &folder.path().join("layers.ply")).unwrap();
+    let manifest = bth_scene::parse(NODES, "hits.manifest".as_ref()).unwrap();
+    let options = CompileOptions { structure: Structure::Bvh, ..CompileOptions::default() };
+    let compiled = bth_compile::scene::compile(&manifest, folder.path(), "x".as_ref(), &options, &Silent);
+    let scene = bth::from_bytes(&compiled.unwrap().0.bytes).unwrap();
+    for sign in [1.0, -1.0] {
+        let ray = Ray::new([0.3, 0.2, 1.0 - 2.0 * sign], [0.0, 0.0, sign * f32::MAX]);
+        let hits = all_hits(&scene, &ray, &Accept::default());
+        let first = hits[0];
+        let equal = hits.iter().filter(|hit| hit.t == first.t).count();
+        assert!(equal > 1 && first.t < f32::MIN_POSITIVE, "{hits:?}");
+        assert!(hits.is_sorted_by_key(|hit| (hit.t.to_bits(), hit.primitive.instance)), "{hits:?}");
+        for cull in [Cull::None, Cull::Back, Cull::Front] {
+            let accept = Accept { cull, ..Accept::default() };
+            let expected = all_hits(&scene, &ray, &accept).first().copied();
+            assert_eq!(scene.nearest_accepted(&ray, &accept), expected, "{cull:?}");
+        }
+        let mut batch = [bth::rays::Hit::MISS; 20];
+        scene.batch(&[ray; 20]).nearest(&mut batch);
+        assert_eq!(batch.map(|hit| bits(&hit)), [bits(&first); 20]);
+        let up_to = ray.with_range(0.0, first.t);
+        assert_eq!(all_hits(&scene, &up_to, &Accept::default()), hits[..equal]);
+        assert_eq!(scene.nearest(&up_to), Some(first));
+        assert!(
+            scene.any(&ray.with_range(first.t, first.t))
+                && !scene.any(&ray.with_range(0.0, first.t.next_down()))
+        );
+    }
+}
+
 #[test]
 fn masks_hide_instances_from_rays_without_a_common_bit() {
     let mut scene = instances();

@@ -57,9 +57,11 @@ const BTH_PLAY: [Mistake; 12] = [
     ("bth-play", &["ball.obj", "-o", "x.png", "--cache-dir", "ball.obj"], 4, &["ball.obj", "BTH-P002"]),
 ];
 
-const BTH_SCENES: [Mistake; 8] = [
+const BTH_SCENES: [Mistake; 10] = [
     ("bth-scenes", &["nosuch"], 2, &["nosuch"]),
     ("bth-scenes", &["make", "nosuch", "-o", "x.ply"], 2, &["BTH-U001", "nosuch", "hint", "gyroid"]),
+    ("bth-scenes", &["make", "carousel", "-o", "x.ply"], 2, &["carousel", "bth-scenes scene carousel"]),
+    ("bth-scenes", &["scene", "blob", "-o", "x"], 2, &["BTH-U001", "bth-scenes make blob"]),
     ("bth-scenes", &["make", "blob", "-o", "x.fbx"], 2, &["BTH-U001", "x.fbx", ".ply", "hint"]),
     ("bth-scenes", &["make", "blob", "--faces", "0", "-o", "x.ply"], 2, &["0", "--faces"]),
     ("bth-scenes", &["make", "blob", "-o", "missing/x.ply"], 4, &["missing/x.ply", "BTH-O020"]),

@@ -214,6 +214,18 @@ pub(crate) struct ObjectRay {
     pub(crate) t_scale: f32,
 }
 
+/// The greatest t in object space that is at most `t` in world space, where it is the product with `t_scale` = 1 / `scale`, a power of two, rounded to f32.
+/// An end at infinity stands for the farthest t that is finite in world space. NaN stays what it is.
+pub(super) fn greatest_below(t: f32, scale: f64, t_scale: f32) -> f32 {
+    // Products that are denormal are rounded to multiples of twice this; it is lost in the sum with numbers so great that products are exact.
+    const HALF_STEP: f64 = 0.5 * f32::from_bits(1) as f64;
+    let t = t.clamp(f32::MIN, f32::MAX);
+    let exact = (f64::from(t) + HALF_STEP) * scale;
+    let below = if exact < f64::from(exact as f32) { (exact as f32).next_down() } else { exact as f32 };
+    // Ties are rounded to even numbers.
+    if below * t_scale > t { below.next_down() } else { below }
+}
+
 impl Inverse {
     /// Whether object space is world space.
     pub(crate) fn is_identity(&self) -> bool {
@@ -238,17 +250,10 @@ impl Inverse {
         let exponent = exponent.clamp(-100, 100);
         let scale = f64::from_bits(((1023 + exponent) as u64) << 52);
         let direction = direction.map(|x| (x / scale) as f32);
-        // Where the ends of the range are rounded because they leave the normal numbers of f32, they are rounded inwards, so that no
-        // hit outside of the range in world space counts. Ends at infinity stand for the farthest t that are finite in world space.
-        let scaled = |t: f32| {
-            let exact = f64::from(t.clamp(f32::MIN, f32::MAX)) * scale;
-            (exact, exact as f32)
-        };
-        let ((least, tmin), (greatest, tmax)) = (scaled(ray.tmin), scaled(ray.tmax));
-        let tmin = if f64::from(tmin) < least { tmin.next_up() } else { tmin };
-        let tmax = if greatest < f64::from(tmax) { tmax.next_down() } else { tmax };
-        let ray = Ray { origin, direction, tmin, tmax };
-        ObjectRay { ray, t_scale: (1.0 / scale) as f32 }
+        let t_scale = (1.0 / scale) as f32;
+        let (tmin, tmax) =
+            (-greatest_below(-ray.tmin, scale, t_scale), greatest_below(ray.tmax, scale, t_scale));
+        ObjectRay { ray: Ray { origin, direction, tmin, tmax }, t_scale }
     }
 
     /// As [`Self::ray`] for sixteen rays, with the same bits. The results of lanes that are not `unscaled` are not valid.

@@ -84,6 +84,38 @@ fn rays_keep_their_t_whatever_the_scale() {
     }
 }
 
+/// A hit counts in an object if and only if its t is in the range when it is rounded in world space.
+#[test]
+fn ranges_of_scaled_rays_hold_the_t_that_are_in_range_in_world_space() {
+    let mut rng = Rng::new(12);
+    let (mut inside, mut outside) = (0, 0);
+    for case in 0..20_000 {
+        let scale = [2f64.powi(70), 2f64.powi(100), 2f64.powi(-70), 2f64.powi(-100)][case % 4];
+        let t_scale = (1.0 / scale) as f32;
+        // An end of the range: denormal, close to the least normal number, or any.
+        let bits = match case / 4 % 3 {
+            0 => rng.below(64) as u32,
+            1 => f32::MIN_POSITIVE.to_bits() - 8 + rng.below(16) as u32,
+            _ => rng.below(u64::from(f32::INFINITY.to_bits())) as u32,
+        };
+        let end = f32::from_bits(bits | (rng.below(2) as u32) << 31);
+        let (last, first) = (greatest_below(end, scale, t_scale), -greatest_below(-end, scale, t_scale));
+        let near = (f64::from(end) * scale) as f32;
+        for t in [last, last.next_up(), last.next_down(), first, first.next_up(), first.next_down(), near] {
+            let in_world = t * t_scale;
+            if !t.is_finite() || !in_world.is_finite() {
+                continue;
+            }
+            assert_eq!(t <= last, in_world <= end, "{end:e}, {scale:e}: {t:e}, {in_world:e}, {last:e}");
+            assert_eq!(t >= first, in_world >= end, "{end:e}, {scale:e}: {t:e}, {in_world:e}, {first:e}");
+            inside += u32::from(t <= last);
+            outside += u32::from(t > last);
+        }
+    }
+    assert!(inside > 10_000 && outside > 10_000, "{inside}, {outside}");
+    assert!(greatest_below(f32::NAN, 2f64.powi(70), 2f32.powi(-70)).is_nan());
+}
+
 /// Of a range without ends, an object's ray has what is finite in world space.
 #[test]
 fn no_t_of_a_scaled_ray_is_infinite_in_world_space() {

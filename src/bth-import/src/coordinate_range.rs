@@ -59,7 +59,7 @@ pub(crate) fn warn(mesh: &Mesh, monitor: &dyn Monitor) {
             let vertices = if count == 1 { "1 vertex lies".into() } else { format!("{count} vertices lie") };
             return monitor.warn(&format!(
                 "{vertices} more than 2^30 times as far out as most of the mesh is large, the first at {first:?} \
-                 in triangle {triangle}: rays take two to four times as long, from coordinates of 1.1e12 (2^40) on ten to twenty times, from 3e29 \
+                 in triangle {triangle}: rays take two to four times as long, from coordinates of 1.1e12 (2^40) on ten to thirty times, from 3e29 \
                  (2^98) on thousands of times. Remove what is there by mistake",
             ));
         }

@@ -228,7 +228,13 @@ fn what_is_ignored_is_said_and_refused_when_strict() {
     let pointed = edited(|d| d["animations"][0]["channels"][0]["target"]["path"] = "pointer".into());
     let without_targets =
         edited(|d| d["animations"][0]["channels"][0]["target"] = json!({"node": 3, "path": "weights"}));
-    for (document, words) in [(pointed, "animations of pointer"), (without_targets, "no morph targets")] {
+    let without_rows =
+        edited(|d| d["nodes"][3]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = json!({}));
+    for (document, words) in [
+        (pointed, "animations of pointer"),
+        (without_targets, "no morph targets"),
+        (without_rows, "has no instances"),
+    ] {
         let (_, report) = import(&document, &ImportOptions::default()).unwrap();
         assert!(report.ignored.len() == 1 && report.ignored[0].contains(words), "{:?}", report.ignored);
         let strict = ImportOptions { strict: true, ..ImportOptions::default() };

@@ -179,7 +179,10 @@ impl Importer<'_> {
             scales.as_ref().map(Vec::len),
         ];
         let mut counts = lengths.into_iter().flatten();
-        let count = counts.next().unwrap_or(0);
+        let Some(count) = counts.next().filter(|count| *count > 0) else {
+            let what = "EXT_mesh_gpu_instancing without rows of TRANSLATION, ROTATION or SCALE has no instances: its mesh is left out";
+            return self.ignore(part, what.to_owned());
+        };
         if counts.any(|n| n != count) {
             let message =
                 format!("expected equally many rows of each attribute of instances, found {lengths:?}");

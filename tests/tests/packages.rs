@@ -1,4 +1,5 @@
-//! Programs in C and C++ that find the installed libraries by CMake and by pkg-config (`tools/package/install`).
+//! Programs in C and C++ that find the installed libraries by CMake and by pkg-config (`tools/package/install`), and packages for Debian
+//! (`tools/package/debian`).
 #![cfg(unix)]
 #![allow(clippy::print_stdout)]
 

@@ -2,9 +2,8 @@
 
 use crate::mesh::Mesh;
 use crate::monitor::Monitor;
+use bth_format::object::GREATEST_IN_F32;
 
-/// From this |coordinate| on, f32 cannot prepare rays (`LARGEST` of the runtime), and f64 decides on every triangle of a leaf.
-const GREATEST: f32 = (1u64 << 40) as f32;
 /// Where no |coordinate| is greater, products of distances within a leaf are denormal in f32.
 const LEAST: f32 = 1.0 / (1u64 << 50) as f32;
 /// Ratio of the size of a mesh to that of the [`Bulk`] of it from which on a triangle to such a vertex is taken for a mistake: all rays pass
@@ -65,7 +64,7 @@ pub(crate) fn warn(mesh: &Mesh, monitor: &dyn Monitor) {
         }
     }
     let greatest = mesh.positions.as_flattened().iter().fold(0f32, |greatest, x| greatest.max(x.abs()));
-    if greatest >= GREATEST {
+    if greatest >= GREATEST_IN_F32 {
         monitor.warn(&format!(
             "coordinates reach {greatest:e}: from 1.1e12 (2^40) on rays take several times as long, from 3e29 (2^98) on thousands of times. \
              Answers are exact all the same; in a greater unit the model is faster",
@@ -110,7 +109,7 @@ mod tests {
         for scale in [1.0, 1e-12, 1e9, 3e-14, 2e10] {
             assert_eq!(said(scale, &[]), [""; 0], "{scale}");
             let plane = [[-1e8 * scale, 0.0, 0.0], [1e8 * scale, 0.0, 1e9 * scale]];
-            assert_eq!(said(scale, &plane).len(), usize::from(1e9 * scale >= GREATEST), "{scale}");
+            assert_eq!(said(scale, &plane).len(), usize::from(1e9 * scale >= GREATEST_IN_F32), "{scale}");
         }
         let said = Said(Mutex::default());
         warn(&Mesh::default(), &said);

@@ -31,16 +31,14 @@ impl ObjectBounds {
     pub fn new(object: &Object) -> ObjectBounds {
         let ([x, y, z], [to_x, to_y, to_z]) = (object.lower, object.upper);
         let greatest = greatest_coordinate(object);
-        let padded = if greatest < GREATEST_IN_F32 { ObjectBounds::padded_in_f64(object) } else { greatest };
+        let padded = if greatest < GREATEST_IN_F32 { padded(object, greatest) } else { greatest };
         ObjectBounds { lower: [x, y, z, 0.0], upper: [to_x, to_y, to_z, 0.0], greatest, padded }
     }
 
     /// What pads of boxes allow for besides the origin of a ray: the greatest |coordinate| of the object, or next to nothing where the file's
     /// boxes are widened.
     pub fn padded_in_f64(object: &Object) -> f32 {
-        let greatest = greatest_coordinate(object);
-        let is_widened = object.coordinates & WIDENED_BOXES != 0 && WIDENED_RANGE.contains(&greatest);
-        if is_widened { LEAST_PADDED } else { greatest }
+        padded(object, greatest_coordinate(object))
     }
 
     /// The cube around the origin that holds all points with coordinates of at most `greatest` in absolute value.
@@ -54,6 +52,12 @@ impl ObjectBounds {
     pub fn size(&self) -> f32 {
         (0..3).fold(0.0, |m: f32, k| m.max(self.upper[k] - self.lower[k]))
     }
+}
+
+/// [`ObjectBounds::padded_in_f64`], given the greatest |coordinate|.
+fn padded(object: &Object, greatest: f32) -> f32 {
+    let is_widened = object.coordinates & WIDENED_BOXES != 0 && WIDENED_RANGE.contains(&greatest);
+    if is_widened { LEAST_PADDED } else { greatest }
 }
 
 /// Greatest absolute value of a coordinate of either corner of an object's bounds.

@@ -9,7 +9,7 @@ use bth_import::error;
 use bth_import::gltf::Chosen;
 use bth_import::gltf::scene::{self, ImportOptions};
 use bth_import::{
-    AlphaMode, GltfPart, Keep, Mesh, Silent, Timing, Wanted, import_bytes, import_cutouts_bytes,
+    AlphaMode, GltfPart, Keep, Mesh, Polygons, Silent, Timing, Wanted, import_bytes, import_cutouts_bytes,
     import_gltf_parts_bytes, import_sequence_bytes, import_vertex_cache_bytes, read_vertex_cache,
 };
 use bth_random::Rng;
@@ -123,7 +123,8 @@ fn ray(scene: &Scene, rng: &mut Rng) -> Ray {
 /// Imports a model of this format; a mesh that comes out keeps the promises of its type.
 pub fn import(format: &str, bytes: &[u8]) {
     let name = Path::new("/nonexistent/fuzz/model").with_extension(format);
-    let wanted = Wanted { attributes: Keep::All, groups: true, materials: true, vertices: false };
+    let polygons = Polygons::Ears;
+    let wanted = Wanted { attributes: Keep::All, groups: true, materials: true, polygons, vertices: false };
     let Ok((mesh, report)) = import_bytes(&name, bytes, wanted, &Silent) else { return };
     assert_eq!(report.triangles, mesh.triangles.len() as u64);
     check(&mesh);
@@ -153,7 +154,7 @@ pub fn import_scene(bytes: &[u8]) {
         _ => None,
     };
     let parts: Vec<GltfPart> = manifest.objects.iter().filter_map(part).take(16).collect();
-    let wanted = Wanted { attributes: Keep::All, groups: true, materials: true, vertices: false };
+    let wanted = Wanted { attributes: Keep::All, groups: true, materials: true, ..Wanted::default() };
     let Ok(meshes) = import_gltf_parts_bytes(path, bytes, &parts, wanted, &Silent) else { return };
     for ((mesh, _), part) in meshes.iter().zip(&parts) {
         check(mesh);
@@ -225,7 +226,9 @@ pub fn import_frames(bytes: &[u8]) {
     }
     files.push((name, rest.to_vec()));
     let timing = Timing { rate: Some(f64::from(*choice)), usual_rate: 24.0, start: 0.0 };
-    let wanted = |vertices| Wanted { attributes: Keep::All, groups: true, materials: true, vertices };
+    let polygons = Polygons::Ears;
+    let wanted =
+        |vertices| Wanted { attributes: Keep::All, groups: true, materials: true, polygons, vertices };
     for vertices in [false, true] {
         if let Ok((mesh, _)) = import_sequence_bytes(&files, &timing, wanted(vertices), &Silent) {
             assert_eq!(mesh.sequence.as_ref().expect("frames").times.len(), files.len());
@@ -243,7 +246,7 @@ pub fn import_cache(bytes: &[u8]) {
         if let Ok(cache) = read_vertex_cache(name, bytes, &timing, &Silent) {
             assert_eq!(cache.positions.len(), cache.points * cache.times.len());
         }
-        let wanted = Wanted { attributes: Keep::All, groups: true, materials: true, vertices: false };
+        let wanted = Wanted { attributes: Keep::All, groups: true, materials: true, ..Wanted::default() };
         let read = import_vertex_cache_bytes((model, square), (name, bytes), &timing, wanted, &Silent);
         if let Ok((mesh, _)) = read {
             check_moving(&mesh);

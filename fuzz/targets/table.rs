@@ -24,8 +24,8 @@ struct Section {
 
 /// Kinds that are known, and one that is not.
 const KINDS: [u32; 39] = [
-    1, 2, 3, 4, 5, 6, 7, 8, 9, 16, 17, 18, 19, 20, 21, 22, 23, 24, 28, 29, 32, 33, 34, 35, 36, 37, 38, 39, 40,
-    48, 49, 50, 51, 52, 53, 54, 55, 56, 99,
+    1, 2, 3, 4, 5, 6, 7, 8, 9, 16, 17, 18, 19, 20, 21, 22, 23, 24, 28, 29, 32, 33, 34, 35, 36, 37, 38, 39,
+    40, 48, 49, 50, 51, 52, 53, 54, 55, 56, 99,
 ];
 
 /// Bytes of a file with these sections; hashes are not looked at under fuzzing.

@@ -5,7 +5,7 @@ use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_compile::sampling::KnownRays;
 use bth_compile::{bvh, coordinates, costs, free};
 use bth_format::layout::{GridBits, RecordKind};
-use bth_import::{AlphaMode, Keep};
+use bth_import::{AlphaMode, Keep, Polygons};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyAny, PyDict};
@@ -108,6 +108,9 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
                 "alpha",
                 &[("none", AlphaMode::None), ("mask", AlphaMode::Mask), ("blend", AlphaMode::Blend)],
             )?
+            .unwrap_or_default(),
+        polygons: keywords
+            .choice("polygons", &[("fans", Polygons::Fans), ("ears", Polygons::Ears)])?
             .unwrap_or_default(),
         geometry: keywords.value("geometry")?.unwrap_or(true),
         names: materials || keywords.value("names")?.unwrap_or(false),

@@ -55,6 +55,13 @@ def test_bytes_of_the_program(path, options):
     assert bth.compile(path, cache=False, **options).to_bytes() == path.with_suffix(".bth").read_bytes()
 
 
+def test_concave_polygons(tmp_path):
+    (tmp_path / "arrow.obj").write_text("v 2 -1 0\nv 1 0 0\nv 2 1 0\nv 0 0 0\nf 1 2 3 4\n")
+    in_notch = [[1.5, 0, 1]], [[0, 0, -1]]
+    assert bth.compile(tmp_path / "arrow.obj").any(*in_notch).tolist() == [True]
+    assert bth.compile(tmp_path / "arrow.obj", polygons="ears").any(*in_notch).tolist() == [False]
+
+
 @pytest.mark.skipif(not BTHC.exists(), reason=f"there is no {BTHC}")
 def test_known_rays(path):
     random = np.random.default_rng(3)
@@ -85,7 +92,7 @@ def test_the_default_profile_has_a_name(path):
 
 
 @pytest.mark.parametrize("options, error", [
-    ({"alpha": "holes"}, ValueError), ({"attributes": "colours"}, ValueError), ({"names": "yes"}, TypeError), ({"threads": -1}, ValueError),
+    ({"alpha": "holes"}, ValueError), ({"polygons": "delaunay"}, ValueError), ({"attributes": "colours"}, ValueError), ({"names": "yes"}, TypeError), ({"threads": -1}, ValueError),
     ({"threads": 5000}, ValueError), ({"threads": 1.5}, TypeError), ({"tet_deadline": 0}, ValueError), ({"tet_memory": 1}, ValueError),
     ({"memory": 0}, ValueError), ({"min_tet_triangles": 0}, ValueError), ({"budget": -1}, ValueError), ({"c_tet": float("nan")}, ValueError),
     ({"max_error": "much"}, ValueError), ({"cache_size": "large", "cache": True}, ValueError), ({"cache": 3.5}, TypeError),

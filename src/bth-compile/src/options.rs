@@ -25,6 +25,8 @@ pub struct CompileOptions {
     pub structure: Structure,
     /// Shading attributes to keep.
     pub attributes: mesh::Keep,
+    /// How polygons of more than three corners become triangles.
+    pub polygons: mesh::Polygons,
     /// Materials whose alpha makes holes.
     pub alpha: mesh::AlphaMode,
     /// Whether to keep groups of triangles, materials, and the names of these and of objects.
@@ -69,6 +71,7 @@ impl Default for CompileOptions {
         Self {
             structure: Structure::default(),
             attributes: mesh::Keep::default(),
+            polygons: mesh::Polygons::default(),
             names: false,
             materials: false,
             alpha: mesh::AlphaMode::default(),
@@ -97,6 +100,7 @@ impl CompileOptions {
             attributes,
             groups: self.names || self.materials,
             materials: self.materials,
+            polygons: self.polygons,
             vertices: self.deformable,
         }
     }

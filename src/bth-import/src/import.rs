@@ -28,7 +28,7 @@ pub(crate) enum Format {
 }
 
 /// Reads an OBJ, glTF, GLB, PLY, STL or OFF file. The extension decides about the format, or else the content. Triangle
-/// ids are the source's face order after fan triangulation. A model without faces is an empty mesh.
+/// ids are the source's face order after polygons have been triangulated. A model without faces is an empty mesh.
 ///
 /// # Errors
 /// `BTH-O001` when the file cannot be read, `BTH-I…` with the place when it does not follow its
@@ -64,7 +64,7 @@ pub(crate) fn read_raw<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw
         Format::Gltf => gltf::flatten::read(source, wanted),
         Format::Ply => ply::read(source, wanted),
         Format::Stl => stl::read(source),
-        Format::Off => off::read(source),
+        Format::Off => off::read(source, wanted),
     }
 }
 
@@ -187,7 +187,7 @@ pub fn source_files(path: &Path, looks: impl Into<Looks>) -> Result<Vec<PathBuf>
 fn finish(mut raw: Raw<'_>, wanted: Wanted, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
     check_triangles(raw.triangles.len() as u64)?;
     check_rows(raw.positions.len() as u64)?;
-    raw.folds.warn(monitor);
+    raw.concave.warn(wanted.polygons, monitor);
     let collected = attributes::collect(&raw, wanted.attributes)?;
     let (attributes, normal_sources) = collected.map_or((None, Vec::new()), |(a, rows)| (Some(a), rows));
     let triangles = std::mem::take(&mut raw.triangles);
@@ -222,7 +222,7 @@ fn finish(mut raw: Raw<'_>, wanted: Wanted, monitor: &dyn Monitor) -> Result<(Me
 /// The counts with what the reader counted.
 fn report(raw: &Raw<'_>, counted: Report) -> Report {
     let format = raw.format.to_owned();
-    Report { format, polygons: raw.polygons, skipped: raw.skipped, ..counted }
+    Report { format, polygons: raw.polygons, concave: raw.concave.count(), skipped: raw.skipped, ..counted }
 }
 
 /// Welds and counts triangles whose indices have been checked. The report's fields that depend on the format are empty.

@@ -7,12 +7,13 @@
 #![warn(missing_docs)]
 
 mod attributes;
+mod concave;
 mod coordinate_range;
 mod cutout;
 mod deformation;
 mod disjoint_sets;
+mod ears;
 pub mod error;
-mod folds;
 pub mod gltf;
 mod groups;
 mod image_file;
@@ -26,6 +27,7 @@ mod number;
 mod obj;
 mod off;
 mod ply;
+mod polygon;
 mod raw;
 mod rows;
 mod sequence;
@@ -47,7 +49,9 @@ pub use import::{
 };
 pub use materials::{ImageFile, Looks, Materials};
 pub use memory::{MEMORY_FORMAT, import_triangles};
-pub use mesh::{Attributes, Keep, Mesh, OpacityReport, Report, Sequence, TriangleOpacities, Wanted};
+pub use mesh::{
+    Attributes, Keep, Mesh, OpacityReport, Polygons, Report, Sequence, TriangleOpacities, Wanted,
+};
 pub use monitor::{Monitor, Silent};
 pub use sequence::{
     MAX_FRAMES, Timing, VertexCache, import_sequence, import_sequence_bytes, import_vertex_cache,

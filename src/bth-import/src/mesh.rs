@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct Mesh {
     /// Distinct finite positions, in order of first use by the faces; with [`Wanted::vertices`] those of the source in its order.
     pub positions: Vec<[f32; 3]>,
-    /// Rows of `positions`, in the source's face order after fan triangulation. The index of a triangle here is its id
+    /// Rows of `positions`, in the source's face order after polygons have been triangulated. The index of a triangle here is its id
     /// in the compiled file and in hits. Degenerate triangles are kept.
     pub triangles: Vec<[u32; 3]>,
     /// Shading attributes, if the source has some and the caller keeps them.
@@ -90,6 +90,17 @@ pub enum Keep {
     All,
 }
 
+/// How polygons of more than three corners become triangles. There are two triangles fewer than corners either way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Polygons {
+    /// Fans from the first corner, which cover more than the polygon where it is concave.
+    #[default]
+    Fans,
+    /// Fans where these cover nothing twice, and otherwise ears that are clipped one after the other, which cover the polygon exactly.
+    Ears,
+}
+
 /// What to read of a model besides positions and triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wanted {
@@ -99,6 +110,8 @@ pub struct Wanted {
     pub groups: bool,
     /// How materials look, and vertex colours (`--materials`). Needs groups.
     pub materials: bool,
+    /// How polygons of OBJ, PLY and OFF become triangles (`--polygons`).
+    pub polygons: Polygons,
     /// All vertices of the source, in its order, those at equal positions and unused ones too (`--deformable`).
     pub vertices: bool,
 }
@@ -114,14 +127,17 @@ impl From<Keep> for Wanted {
 pub struct Report {
     /// Name of the format that was read.
     pub format: String,
-    /// Triangles after fan triangulation.
+    /// Triangles after polygons have been triangulated.
     pub triangles: u64,
     /// Positions in the source, before welding.
     pub positions_read: u64,
     /// Distinct positions that faces use, after welding.
     pub positions: u64,
-    /// Faces of more than three corners that were fan-triangulated.
+    /// Faces of more than three corners.
     pub polygons: u64,
+    /// Those of them that are concave, so that the fan from the first corner covers more than the polygon.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub concave: u64,
     /// Elements that were left out: faces of fewer than three corners, triangles of glTF that the number of indices leaves
     /// incomplete, points and lines.
     pub skipped: u64,

@@ -8,6 +8,7 @@ use crate::groups::NamedGroups;
 use crate::mesh::{Keep, Wanted};
 use crate::mtl::{self, Library};
 use crate::number::{Lines, float, integer, shown, words};
+use crate::polygon::fan;
 use crate::raw::{Raw, RowKind, check_rows};
 use crate::rows::NONE;
 use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, UNSUPPORTED};
@@ -163,6 +164,7 @@ impl<'a> Reader<'a, '_> {
     fn finish(self, wanted: Wanted) -> Result<Raw<'a>> {
         let Reader { source, mut raw, groups, libraries, colors, .. } = self;
         raw.groups = groups.recorder;
+        raw.finish_polygons(wanted.polygons, source.monitor)?;
         if wanted.materials {
             mtl::read(source, &libraries, raw.groups.material_names(), &mut raw.materials)?;
         }
@@ -228,8 +230,8 @@ impl Reader<'_, '_> {
                 self.face_normals.push(normal);
             }
         }
-        crate::raw::fan(&mut self.raw.normal_rows, &self.face_normals);
-        crate::raw::fan(&mut self.raw.uv_rows, &self.face_uvs);
+        fan(&mut self.raw.normal_rows, &self.face_normals);
+        fan(&mut self.raw.uv_rows, &self.face_uvs);
         self.raw.push_face(&self.face)
     }
 

@@ -1,6 +1,7 @@
 //! Reads OFF (the object file format of Geomview) as text.
 
 use crate::error::Result;
+use crate::mesh::Wanted;
 use crate::number::{Lines, float, integer, shown, words};
 use crate::raw::{Raw, check_rows};
 use crate::source::{
@@ -62,7 +63,7 @@ impl<'a> Statements<'a, '_> {
 
 /// Reads an OFF file. Colours, normals and texture coordinates at the ends of lines are ignored, which is why each vertex and each face
 /// must have a line of its own.
-pub(super) fn read<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
+pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
     let mut statements = Statements { source, lines: Lines::new(source.data), long_line: None };
     let malformed =
         |number, message: String| source.error_at_line(MALFORMED, number, message, MALFORMED_HINT);
@@ -133,6 +134,7 @@ pub(super) fn read<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
     if let Some((number, _)) = statements.next() {
         source.monitor.warn(&format!("line {number}: what follows the last face is ignored"));
     }
+    raw.finish_polygons(wanted.polygons, source.monitor)?;
     Ok(raw)
 }
 

@@ -1,10 +1,13 @@
 //! The mesh that a format's reader makes: the source's own rows, not welded.
 
+use crate::concave::ConcavePolygons;
 use crate::deformation::RawDeformation;
 use crate::error::{Error, Place, Result};
-use crate::folds::Folds;
 use crate::groups::GroupRecorder;
 use crate::materials::MaterialRecorder;
+use crate::mesh::Polygons;
+use crate::monitor::Monitor;
+use crate::polygon::fan;
 use crate::rows::NONE;
 use bth_format::limits::MAX_TRIANGLES;
 
@@ -28,7 +31,7 @@ pub(super) struct Raw<'a> {
     pub(super) format: &'static str,
     /// All positions, finite or not.
     pub(super) positions: Vec<[f32; 3]>,
-    /// Rows of `positions` of all faces after fan triangulation.
+    /// Rows of `positions` of all faces after triangulation.
     pub(super) triangles: Vec<[u32; 3]>,
     /// Normals, if there are some and the caller keeps them.
     pub(super) normals: Vec<[f32; 3]>,
@@ -41,7 +44,7 @@ pub(super) struct Raw<'a> {
     /// Faces of more than three corners.
     pub(super) polygons: u64,
     /// Those of them whose fans are not the polygon.
-    pub(super) folds: Folds,
+    pub(super) concave: ConcavePolygons,
     /// Points, lines and faces of fewer than three corners.
     pub(super) skipped: u64,
     /// Groups of triangles, if the caller wants them and the source has some.
@@ -66,7 +69,7 @@ impl<'a> Raw<'a> {
             uvs: Vec::new(),
             uv_rows: Vec::new(),
             polygons: 0,
-            folds: Folds::default(),
+            concave: ConcavePolygons::default(),
             skipped: 0,
             groups: GroupRecorder::default(),
             materials: MaterialRecorder::default(),
@@ -79,9 +82,21 @@ impl<'a> Raw<'a> {
     #[inline]
     pub(super) fn push_face(&mut self, face: &[u32]) -> Result<()> {
         self.count_face(face.len());
-        self.folds.note(&self.positions, face, self.triangles.len());
+        self.concave.note(&self.positions, face, self.triangles.len());
         fan(&mut self.triangles, face);
         check_triangles(self.triangles.len() as u64)
+    }
+
+    /// Finds which polygons are concave, and splits them as wanted, once all faces and positions are read.
+    ///
+    /// # Errors
+    /// Cancellation.
+    pub(super) fn finish_polygons(&mut self, polygons: Polygons, monitor: &dyn Monitor) -> Result<()> {
+        self.concave.find((&self.positions, &self.triangles), polygons, monitor)?;
+        for triangles in [&mut self.triangles, &mut self.normal_rows, &mut self.uv_rows] {
+            self.concave.replace(triangles);
+        }
+        Ok(())
     }
 
     /// Counts faces of more than three corners as polygons and of fewer as skipped.
@@ -89,14 +104,6 @@ impl<'a> Raw<'a> {
     pub(super) fn count_face(&mut self, corners: usize) {
         self.polygons += u64::from(corners > 3);
         self.skipped += u64::from(corners < 3);
-    }
-}
-
-/// Appends the fan of a polygon around its first corner: the triangles (0, k-1, k) for k from 2.
-#[inline]
-pub(super) fn fan(triangles: &mut Vec<[u32; 3]>, face: &[u32]) {
-    if let [first, rest @ ..] = face {
-        triangles.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
     }
 }
 

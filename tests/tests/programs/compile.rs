@@ -1,6 +1,7 @@
 //! `bthc compile`: outputs, structures, options and reports.
 
 use crate::support::{bthc, crossing, folder, run, sphere};
+use bth::rays::Ray;
 
 #[test]
 fn writes_a_file_beside_the_model_that_verifies() {
@@ -182,4 +183,27 @@ fn the_help_lists_options_under_their_headings() {
     ] {
         assert_eq!(headings.get(option), Some(&heading), "{option}");
     }
+}
+
+#[test]
+fn concave_polygons_are_covered_exactly_where_that_is_asked_for() {
+    // A frame of 4 by 4 around a hole of 2 by 2, whose outline runs to the hole and back.
+    let frame =
+        "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 0 4 0\nv 1 1 0\nv 1 3 0\nv 3 3 0\nv 3 1 0\nf 1 2 3 4 1 5 6 7 8 5\n";
+    let folder = folder(&[("frame.obj", frame)]);
+    // Through which of sixteen squares of one unit rays along z find a surface.
+    let covered = |polygons: &str, concave: u64, warnings: usize| {
+        let all =
+            ["compile", "frame.obj", "-o", "out.bth", "--structure", "bvh", "--json", "--polygons", polygons];
+        let run = bthc(folder.path(), &all).expect(0);
+        let mesh = &run.json()["report"]["mesh"];
+        assert_eq!((&mesh["concave"], &mesh["triangles"]), (&concave.into(), &8.into()), "{mesh:#}");
+        assert_eq!(run.stderr.lines().count(), warnings, "{run:?}");
+        let scene = bth::open(folder.path().join("out.bth")).unwrap();
+        let ray = |k: u8| Ray::new([f32::from(k % 4) + 0.4, f32::from(k / 4) + 0.3, 1.0], [0.0, 0.0, -1.0]);
+        (0..16).filter(|k| scene.any(&ray(*k))).fold(0u16, |bits, k| bits | 1 << k)
+    };
+    let hole = 1 << 5 | 1 << 6 | 1 << 9 | 1 << 10;
+    assert_eq!(covered("ears", 1, 0), !hole);
+    assert_ne!(covered("fans", 1, 1) & hole, 0);
 }

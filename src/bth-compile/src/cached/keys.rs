@@ -12,12 +12,12 @@ use crate::source::SourceDigest;
 use crate::write::SceneParts;
 use bth_cache::Key;
 use bth_files::Digest;
-use bth_import::{AlphaMode, Wanted};
+use bth_import::{AlphaMode, Polygons, Wanted};
 use serde::Serialize;
 use std::path::Path;
 
 /// Versions of the results of the stages.
-const MESH: &str = "5";
+const MESH: &str = "6";
 const COORDINATES: &str = "1";
 const BVH: &str = "3";
 const FREE: &str = "6";
@@ -25,6 +25,7 @@ const MARKS: &str = "1";
 const COSTS: &str = "4";
 const TETS: &str = "1";
 const COLLAPSE: &str = "4";
+const POLYGONS: &str = "1";
 const OPACITY: &str = "1";
 const NAMES: &str = "2";
 const MATERIALS: &str = "3";
@@ -44,6 +45,9 @@ pub(crate) fn mesh(source: &SourceDigest, path: &Path, part: &str, wanted: Wante
         .with("mesh version", MESH);
     if wanted.groups {
         key = key.with("names", "true").with("names version", NAMES);
+    }
+    if wanted.polygons != Polygons::default() {
+        key = key.with("polygons", text(&wanted.polygons)).with("polygons version", POLYGONS);
     }
     if wanted.vertices {
         key = key.with("vertices", "all").with("deformable version", DEFORMABLE);
@@ -220,6 +224,9 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
     ];
     if options.alpha != AlphaMode::None {
         all.extend([("alpha", text(&options.alpha)), ("opacity version", OPACITY.to_owned())]);
+    }
+    if options.polygons != Polygons::default() {
+        all.extend([("polygons", text(&options.polygons)), ("polygons version", POLYGONS.to_owned())]);
     }
     if options.deformable {
         all.extend([("deformable", "true".to_owned()), ("deformable version", DEFORMABLE.to_owned())]);

@@ -34,6 +34,7 @@ pub(crate) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>
         Encoding::Little => binary::read::<false>(source, &header, &mut sink)?,
         Encoding::Big => binary::read::<true>(source, &header, &mut sink)?,
     }
+    sink.raw.finish_polygons(wanted.polygons, source.monitor)?;
     let raw = sink.finish();
     Ok(Raw { locate: Box::new(move |_, row| place_of_vertex(source, &header, row)), ..raw })
 }

@@ -13,7 +13,7 @@ use crate::topology::topology;
 use std::path::{Path, PathBuf};
 
 /// Reads the frames of a sequence: OBJ, PLY, STL or OFF files of the same faces over as many vertices. Everything but positions is
-/// that of the first file; of its normals none are kept, since they would not fit the other frames. The mesh has the positions of
+/// that of the first file, also how polygons are split; of its normals none are kept, since they would not fit the other frames. The mesh has the positions of
 /// the first frame; vertices are welded that coincide in all frames.
 ///
 /// # Errors
@@ -65,8 +65,8 @@ fn import_frames(
         let data = read(frame)?;
         let source = Source::new(file, &data, monitor);
         let plain = Wanted::from(Keep::None);
-        let frame = read_frame(&source, plain)?;
-        check_topology(&source, first, &raw, &frame)?;
+        let mut frame = read_frame(&source, plain)?;
+        check_topology(&source, first, &raw, &mut frame)?;
         frames.push(frame.positions);
     }
     let rate = timing.rate();
@@ -87,7 +87,8 @@ fn read_frame<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
     Ok(raw)
 }
 
-fn check_topology(source: &Source<'_>, first: &Path, expected: &Raw<'_>, found: &Raw<'_>) -> Result<()> {
+/// Refuses a frame of other faces than the first one, whose polygons may be split otherwise than as fans.
+fn check_topology(source: &Source<'_>, first: &Path, expected: &Raw<'_>, found: &mut Raw<'_>) -> Result<()> {
     let differs = |what: String| {
         let hint = "all frames must have the same faces over the same vertices; export them again, or compile them one by one";
         Err(source.error(MISMATCH, format!("expected the faces of {}, {what}", first.display()), hint))
@@ -100,6 +101,7 @@ fn check_topology(source: &Source<'_>, first: &Path, expected: &Raw<'_>, found: 
             return differs(format!("{expected} {what}; found {found}"));
         }
     }
+    expected.concave.replace(&mut found.triangles);
     match expected.triangles.iter().zip(&found.triangles).position(|(a, b)| a != b) {
         None => Ok(()),
         Some(row) => {
@@ -120,6 +122,7 @@ pub(super) fn finish(
 ) -> Result<(Mesh, Report)> {
     check_triangles(raw.triangles.len() as u64)?;
     check_rows((raw.positions.len() as u64).saturating_mul(frames.len() as u64))?;
+    raw.concave.warn(wanted.polygons, monitor);
     let attributes = attributes::collect(&raw, wanted.attributes)?;
     let attributes = attributes.and_then(|(attributes, _)| without_normals(attributes));
     let mut triangles = std::mem::take(&mut raw.triangles);
@@ -162,6 +165,7 @@ pub(super) fn finish(
         positions_read: read,
         positions: kept.len() as u64,
         polygons: raw.polygons,
+        concave: raw.concave.count(),
         skipped: raw.skipped,
         degenerate: counts.degenerate,
         duplicate: counts.duplicate,

@@ -2,7 +2,7 @@
 
 use super::gltf::glb;
 use super::*;
-use bth_import::{Groups, Wanted};
+use bth_import::{Groups, Polygons, Wanted};
 use serde_json::json;
 
 const CORNERS: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
@@ -12,9 +12,19 @@ fn groups(name: &str, bytes: &[u8]) -> (Mesh, Groups) {
     let path = folder.path().join(name);
     std::fs::write(&path, bytes).unwrap();
     let read = |groups| {
-        import(&path, Wanted { attributes: Keep::None, groups, materials: false, vertices: false }, &Silent)
-            .unwrap()
-            .0
+        import(
+            &path,
+            Wanted {
+                attributes: Keep::None,
+                groups,
+                materials: false,
+                polygons: Polygons::Fans,
+                vertices: false,
+            },
+            &Silent,
+        )
+        .unwrap()
+        .0
     };
     let (mut mesh, plain) = (read(true), read(false));
     let groups = mesh.groups.take().expect("wanted groups");
@@ -121,7 +131,13 @@ fn primitives_of_gltf_are_groups() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.glb");
     std::fs::write(&path, &bytes).unwrap();
-    let wanted = Wanted { attributes: Keep::None, groups: true, materials: false, vertices: false };
+    let wanted = Wanted {
+        attributes: Keep::None,
+        groups: true,
+        materials: false,
+        polygons: Polygons::Fans,
+        vertices: false,
+    };
     let meshes =
         bth_import::import_gltf_parts(&path, &[0, 1].map(bth_import::GltfPart::Mesh), wanted, &Silent)
             .unwrap();

@@ -1,6 +1,7 @@
 //! Import of models: what each format yields, what is refused and where, and the collected test models.
 
 mod compressed;
+mod concave;
 mod cutouts;
 mod damaged_scenes;
 mod data;
@@ -132,6 +133,7 @@ fn the_report_counts_what_was_read_and_found() {
             positions_read: 6,
             positions: 4,
             polygons: 1,
+            concave: 0,
             skipped: 4,
             degenerate: 1,
             duplicate: 1,

@@ -2,7 +2,7 @@
 
 use super::gltf::{binary, edited};
 use super::*;
-use bth_import::{GltfPart, Wanted, import_gltf_parts};
+use bth_import::{GltfPart, Polygons, Wanted, import_gltf_parts};
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -53,7 +53,13 @@ fn a_material_for_each_of_many_meshes_is_quick() {
     });
     std::fs::write(&path, gltf::glb(&document, &binary())).unwrap();
     let parts: Vec<_> = (0..4000).map(GltfPart::Mesh).collect();
-    let wanted = Wanted { attributes: Keep::All, groups: true, materials: true, vertices: false };
+    let wanted = Wanted {
+        attributes: Keep::All,
+        groups: true,
+        materials: true,
+        polygons: Polygons::Fans,
+        vertices: false,
+    };
     let start = std::time::Instant::now();
     let meshes = import_gltf_parts(&path, &parts, wanted, &Silent).unwrap();
     // Reading the document again for each mesh takes longer.

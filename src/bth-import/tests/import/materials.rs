@@ -3,11 +3,17 @@
 use super::gltf::glb;
 use super::*;
 use bth_format::layout::*;
-use bth_import::{Materials, Wanted, import_images};
+use bth_import::{Materials, Polygons, Wanted, import_images};
 use serde_json::{Value, json};
 use std::path::Path;
 
-const WANTED: Wanted = Wanted { attributes: Keep::All, groups: true, materials: true, vertices: false };
+const WANTED: Wanted = Wanted {
+    attributes: Keep::All,
+    groups: true,
+    materials: true,
+    polygons: Polygons::Fans,
+    vertices: false,
+};
 
 /// The smallest file that begins as a PNG image of one texel.
 fn image(seed: u8) -> Vec<u8> {

@@ -18,30 +18,6 @@ fn polygons_are_fans_in_file_order() {
 }
 
 #[test]
-fn concave_polygons_are_told_with_the_first_triangle() {
-    let dart = "v 2 -1 0\nv 1 0 0\nv 2 1 0\n";
-    let told = |name: &str, text: &str| {
-        let listener = Listener::default();
-        import_with(name, text.as_bytes(), Keep::None, &listener).unwrap();
-        listener.0.into_inner().unwrap()
-    };
-    let obj = |faces: &str| told("a.obj", &format!("{CORNERS}{dart}{faces}"));
-    let [one] = obj("f 1 2 3 4\nf 1 5 6 7\nf 5 6 7 1\n").try_into().unwrap();
-    assert!(one.starts_with("1 polygon is concave: ") && one.contains("the first is triangle 4."), "{one}");
-    let [two] = obj("f 7 1 5 6\nf 5 6 7 1\n").try_into().unwrap();
-    assert!(two.starts_with("2 polygons are concave: ") && two.contains("the first is triangle 0."), "{two}");
-    assert_eq!(obj("f 1 2 3 4\nf 1 5 6 7\nf 6 7 1 5\n"), [""; 0]);
-    let rows = "0 0 0\n2 -1 0\n1 0 0\n2 1 0\n4 1 2 3 0\n";
-    let properties = "property float x\nproperty float y\nproperty float z\n";
-    let ply = format!(
-        "ply\nformat ascii 1.0\nelement vertex 4\n{properties}element face 1\n\
-         property list uchar int vertex_indices\nend_header\n{rows}"
-    );
-    assert!(told("a.ply", &ply)[0].starts_with("1 polygon is concave"));
-    assert!(told("a.off", &format!("OFF\n4 1 0\n{rows}"))[0].starts_with("1 polygon is concave"));
-}
-
-#[test]
 fn negative_indices_count_back_from_the_last_vertex_so_far() {
     assert_eq!(triangles("f -4 -3 -2\nv 9 9 9\nf 1 2 -1\n"), [[0, 1, 2], [0, 1, 3]]);
 }

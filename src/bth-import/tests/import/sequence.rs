@@ -1,11 +1,19 @@
 //! Meshes whose vertices move: numbered files, PC2 and MDD.
 
 use super::*;
-use bth_import::{Timing, Wanted, import_sequence, import_vertex_cache, read_vertex_cache, sequence_files};
+use bth_import::{
+    Polygons, Timing, Wanted, import_sequence, import_vertex_cache, read_vertex_cache, sequence_files,
+};
 use std::path::{Path, PathBuf};
 
 const TIMING: Timing = Timing { rate: Some(10.0), usual_rate: 24.0, start: 0.5 };
-const PLAIN: Wanted = Wanted { attributes: Keep::None, groups: false, materials: false, vertices: false };
+const PLAIN: Wanted = Wanted {
+    attributes: Keep::None,
+    groups: false,
+    materials: false,
+    polygons: Polygons::Fans,
+    vertices: false,
+};
 
 /// Two triangles whose shared edge comes as vertices of its own for each, and which part in the second frame if `lift` is not 0.
 fn frame(lift: f32) -> String {
@@ -24,6 +32,22 @@ fn write(folder: &Path, files: &[(&str, &[u8])]) -> Vec<PathBuf> {
             path
         })
         .collect()
+}
+
+#[test]
+fn concave_polygons_are_split_as_in_the_first_frame() {
+    let folder = tempfile::tempdir().unwrap();
+    // In the second frame the arrow head has become a square, whose fan would have the other diagonal.
+    let frame = |notch: &str| format!("v 2 -1 0\nv {notch} 0\nv 2 1 0\nv 0 0 0\nf 1 2 3 4\n");
+    let frames = [frame("1 0"), frame("4 0")];
+    let files = write(folder.path(), &[("1.obj", frames[0].as_bytes()), ("2.obj", frames[1].as_bytes())]);
+    let wanted = Wanted { polygons: Polygons::Ears, ..PLAIN };
+    let (mesh, report) = import_sequence(&files, &TIMING, wanted, &Silent).unwrap();
+    assert_eq!((mesh.triangles, report.concave), (vec![[0, 1, 2], [2, 3, 0]], 1));
+    // As fans they are told.
+    let listener = Listener::default();
+    import_sequence(&files, &TIMING, PLAIN, &listener).unwrap();
+    assert!(listener.0.into_inner().unwrap()[0].starts_with("1 polygon is concave: "));
 }
 
 #[test]

@@ -105,6 +105,23 @@ pub(crate) enum Attributes {
     All,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Polygons {
+    /// Fans from the first corner.
+    Fans,
+    /// Fans where these cover nothing twice, else ears that are clipped one after the other, exactly.
+    Ears,
+}
+
+impl From<Polygons> for bth_import::Polygons {
+    fn from(polygons: Polygons) -> Self {
+        match polygons {
+            Polygons::Fans => Self::Fans,
+            Polygons::Ears => Self::Ears,
+        }
+    }
+}
+
 impl From<Attributes> for Keep {
     fn from(attributes: Attributes) -> Self {
         match attributes {

@@ -27,6 +27,9 @@ pub(crate) struct Compile {
     /// What to build. By default bth, with --deformable bvh.
     #[arg(long, value_enum)]
     pub(crate) structure: Option<Structure>,
+    /// How polygons of more than three corners become triangles in OBJ, PLY and OFF. Fans cover more than a polygon that is concave.
+    #[arg(long, value_enum, default_value_t = Polygons::Fans)]
+    pub(crate) polygons: Polygons,
     /// Shading attributes to keep.
     #[arg(long, help_heading = KEPT, value_enum, default_value_t = Attributes::None)]
     pub(crate) attributes: Attributes,
@@ -143,6 +146,7 @@ impl Compile {
             attributes: if self.materials { Keep::All } else { self.attributes.into() },
             names: self.names || self.materials,
             materials: self.materials,
+            polygons: self.polygons.into(),
             alpha: self.alpha.into(),
             record: if self.compact { Record::Tet16 } else { self.tets }.into(),
             coordinates: self.coordinates(),

@@ -1,6 +1,6 @@
 //! What rays may hit: masks, culling, and filters in Python.
 
-use crate::work;
+use crate::work::{self, Watch};
 use bth::rays::{Hit, Ray};
 use bth::{Accept, Cull};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -76,15 +76,20 @@ impl Checked {
     }
 
     /// Calls `query` for each ray with its index within the rays and what it may hit. `first` is the index of the first ray in the
-    /// call. After an exception of the filter, the rest is left out.
+    /// call. After an exception of the filter, and when the call ends early, the rest is left out.
     pub(crate) fn each(
         &self,
         scene: &bth::Scene,
         first: usize,
         rays: &[Ray],
+        watch: &Watch<'_>,
         mut query: impl FnMut(usize, &Ray, &Accept<'_>),
     ) {
         for (i, ray) in rays.iter().enumerate() {
+            // Most rays take less time than a look at the clock.
+            if i % 16 == 0 && watch.is_over() {
+                return;
+            }
             let Some(filter) = &self.filter else {
                 query(i, ray, &self.accept);
                 continue;

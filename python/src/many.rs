@@ -4,6 +4,7 @@ use crate::conditions::Conditions;
 use crate::output::{Part, Parts, chunks, chunks_of, numbers};
 use crate::rays::RayArrays;
 use crate::scene::NativeScene;
+use crate::work::Watch;
 use bth::Crossings;
 use bth::rays::Hit;
 use numpy::{PyArray1, PyReadwriteArray1};
@@ -42,13 +43,14 @@ pub(crate) fn all_hits<'py>(
         })
     };
     let each = |scene: &bth::Scene,
-                (range, (counts, mut hits)): (Range<usize>, (&mut [u64], Part<'_, Hit>))| {
+                (range, (counts, mut hits)): (Range<usize>, (&mut [u64], Part<'_, Hit>)),
+                watch: &Watch<'_>| {
         if hits.is_full() {
             return;
         }
         let (mut read, mut of_ray) = (Vec::new(), Vec::new());
         rays.read(range.clone(), &mut read);
-        conditions.each(scene, range.start, &read, |i, ray, accept| {
+        conditions.each(scene, range.start, &read, watch, |i, ray, accept| {
             match most {
                 None => scene.all_hits(ray, accept, &mut of_ray),
                 Some(most) => scene.nearest_hits(ray, most, accept, &mut of_ray),
@@ -80,10 +82,10 @@ pub(crate) fn count(
 ) -> PyResult<()> {
     let (scene, rays, conditions) = (scene.get()?, rays.rays()?, conditions.checked()?);
     let jobs = chunks_of(numbers(&mut out, rays.len())?);
-    scene.run(py, conditions.threads(threads), jobs, |scene, (range, counts)| {
+    scene.run(py, conditions.threads(threads), jobs, |scene, (range, counts), watch| {
         let mut read = Vec::new();
         rays.read(range.clone(), &mut read);
-        conditions.each(scene, range.start, &read, |i, ray, accept| {
+        conditions.each(scene, range.start, &read, watch, |i, ray, accept| {
             counts[i] = scene.count_hits(ray, accept) as u64;
         });
     })?;
@@ -106,11 +108,11 @@ pub(crate) fn crossings(
         let part = "a result for each ray";
         (count.split_off_mut(..rows).expect(part), winding.split_off_mut(..rows).expect(part))
     });
-    scene.run(py, threads, jobs, |scene, (range, (count, winding))| {
+    scene.run(py, threads, jobs, |scene, (range, (count, winding)), watch| {
         let mut read = Vec::new();
         rays.read(range, &mut read);
         let mut found = vec![Crossings::default(); read.len()];
-        scene.crossings_batch(&read, &mut found);
+        watch.in_parts(read.len(), |part| scene.crossings_batch(&read[part.clone()], &mut found[part]));
         for (i, found) in found.iter().enumerate() {
             (count[i], winding[i]) = (found.count, found.winding);
         }

@@ -3,6 +3,7 @@
 use crate::output::{Part, Parts, chunks, chunks_of, numbers};
 use crate::rays::{Bound1, Numbers, Rows, Vectors};
 use crate::scene::NativeScene;
+use crate::work::Watch;
 use bth::rays::PrimitiveRef;
 use numpy::{PyArray1, PyReadwriteArray1};
 use pyo3::exceptions::PyValueError;
@@ -94,8 +95,11 @@ pub(crate) fn overlaps(
 ) -> PyResult<()> {
     let (scene, regions) = (scene.get()?, regions.regions()?);
     let jobs = chunks_of(numbers(&mut out, regions.len())?);
-    scene.run(py, threads, jobs, |scene, (range, found)| {
+    scene.run(py, threads, jobs, |scene, (range, found), watch| {
         for (region, found) in regions.read(range).iter().zip(found) {
+            if watch.is_over() {
+                return;
+            }
             *found = match region.radius {
                 None => scene.overlaps_box(region.first, region.upper),
                 Some(radius) => scene.overlaps_sphere(region.first, radius),
@@ -123,22 +127,22 @@ pub(crate) fn triangles_in<'py>(
             (counts, rest.next().expect("a part for each chunk"))
         })
     };
-    let each =
-        |scene: &bth::Scene,
-         (range, (counts, mut all)): (Range<usize>, (&mut [u64], Part<'_, PrimitiveRef>))| {
-            if all.is_full() {
+    let each = |scene: &bth::Scene,
+                (range, (counts, mut all)): (Range<usize>, (&mut [u64], Part<'_, PrimitiveRef>)),
+                watch: &Watch<'_>| {
+        let mut triangles = Vec::new();
+        for (region, count) in regions.read(range).iter().zip(counts) {
+            if all.is_full() || watch.is_over() {
                 return;
             }
-            let mut triangles = Vec::new();
-            for (region, count) in regions.read(range).iter().zip(counts) {
-                match region.radius {
-                    None => scene.triangles_in_box(region.first, region.upper, &mut triangles),
-                    Some(radius) => scene.triangles_in_sphere(region.first, radius, &mut triangles),
-                }
-                *count = triangles.len() as u64;
-                all.append(&triangles);
+            match region.radius {
+                None => scene.triangles_in_box(region.first, region.upper, &mut triangles),
+                Some(radius) => scene.triangles_in_sphere(region.first, radius, &mut triangles),
             }
-        };
+            *count = triangles.len() as u64;
+            all.append(&triangles);
+        }
+    };
     scene.run(py, threads, jobs, each)?;
     Ok((parts.column(py, |p| p.instance)?, parts.column(py, |p| p.triangle)?))
 }

@@ -26,8 +26,9 @@ pub(crate) fn contains(
 ) -> PyResult<()> {
     let (scene, points) = (scene.get()?, points.rows()?);
     let jobs = chunks_of(numbers(&mut out, points.len())?);
-    scene.run(py, threads, jobs, |scene, (range, inside)| {
-        scene.contains_batch(&read(points, range), inside);
+    scene.run(py, threads, jobs, |scene, (range, inside), watch| {
+        let points = read(points, range);
+        watch.in_parts(points.len(), |part| scene.contains_batch(&points[part.clone()], &mut inside[part]));
     })
 }
 
@@ -42,8 +43,9 @@ pub(crate) fn winding(
 ) -> PyResult<()> {
     let (scene, points) = (scene.get()?, points.rows()?);
     let jobs = chunks_of(numbers(&mut out, points.len())?);
-    scene.run(py, threads, jobs, |scene, (range, winding)| {
-        scene.winding_batch(&read(points, range), winding);
+    scene.run(py, threads, jobs, |scene, (range, winding), watch| {
+        let points = read(points, range);
+        watch.in_parts(points.len(), |part| scene.winding_batch(&points[part.clone()], &mut winding[part]));
     })
 }
 
@@ -58,8 +60,11 @@ pub(crate) fn signed_distance(
 ) -> PyResult<()> {
     let (scene, points) = (scene.get()?, points.rows()?);
     let jobs = chunks_of(numbers(&mut out, points.len())?);
-    scene.run(py, threads, jobs, |scene, (range, distances)| {
-        scene.signed_distance_batch(&read(points, range), distances);
+    scene.run(py, threads, jobs, |scene, (range, distances), watch| {
+        let points = read(points, range);
+        watch.in_parts(points.len(), |part| {
+            scene.signed_distance_batch(&points[part.clone()], &mut distances[part]);
+        });
     })
 }
 
@@ -83,10 +88,12 @@ pub(crate) fn closest(
     let jobs = chunks(points.len(), |rows| {
         (columns.split_off(rows), split_off(&mut positions, rows * 3), split_off(&mut features, rows))
     });
-    scene.run(py, threads, jobs, |scene, (range, (mut columns, positions, features))| {
+    scene.run(py, threads, jobs, |scene, (range, (mut columns, positions, features)), watch| {
         let points = read(points, range);
         let mut found = vec![None; points.len()];
-        scene.closest_batch(&points, radius, &mut found);
+        watch.in_parts(points.len(), |part| {
+            scene.closest_batch(&points[part.clone()], radius, &mut found[part]);
+        });
         let hit = |c: &Option<bth::Closest>| match c {
             Some(c) => Hit { t: c.distance, u: c.u, v: c.v, primitive: c.primitive },
             None => Hit { t: f32::INFINITY, u: 0.0, v: 0.0, primitive: PrimitiveRef::NONE },

@@ -37,7 +37,7 @@ pub(crate) fn nearest(
     let starts = start.as_ref().map(|s| Starts::new(s, rays.len())).transpose()?;
     let mut columns = out.columns(rays.len())?;
     let jobs = chunks(rays.len(), |rows| columns.split_off(rows));
-    scene.run(py, conditions.threads(threads), jobs, |scene, (range, mut columns)| {
+    scene.run(py, conditions.threads(threads), jobs, |scene, (range, mut columns), watch| {
         let mut scratch = SCRATCH.take();
         let Scratch { rays: read, starts: from, hits } = &mut scratch;
         rays.read(range.clone(), read);
@@ -46,7 +46,7 @@ pub(crate) fn nearest(
         if conditions.filter.is_none() {
             scene.batch(read).from(from).accept(&conditions.accept).nearest(hits);
         } else {
-            conditions.each(scene, range.start, read, |i, ray, accept| {
+            conditions.each(scene, range.start, read, watch, |i, ray, accept| {
                 hits[i] = scene.nearest_accepted(ray, accept).unwrap_or(Hit::MISS);
             });
         }
@@ -70,7 +70,7 @@ pub(crate) fn any(
     let (scene, rays, conditions) = (scene.get()?, rays.rays()?, conditions.checked()?);
     let starts = start.as_ref().map(|s| Starts::new(s, rays.len())).transpose()?;
     let jobs = chunks_of(numbers(&mut out, rays.len())?);
-    scene.run(py, conditions.threads(threads), jobs, |scene, (range, found)| {
+    scene.run(py, conditions.threads(threads), jobs, |scene, (range, found), watch| {
         let mut scratch = SCRATCH.take();
         let Scratch { rays: read, starts: from, .. } = &mut scratch;
         rays.read(range.clone(), read);
@@ -78,7 +78,7 @@ pub(crate) fn any(
         if conditions.filter.is_none() {
             scene.batch(read).from(from).accept(&conditions.accept).any(found);
         } else {
-            conditions.each(scene, range.start, read, |i, ray, accept| {
+            conditions.each(scene, range.start, read, watch, |i, ray, accept| {
                 found[i] = scene.any_accepted(ray, accept);
             });
         }

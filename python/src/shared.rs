@@ -1,6 +1,6 @@
 //! A scene that several threads use: many trace it, one at a time changes it, and any may close it.
 
-use crate::work::{self, Pauses};
+use crate::work::{self, Pauses, Watch};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -62,13 +62,13 @@ impl OpenScene {
         py: Python<'_>,
         threads: usize,
         jobs: Vec<J>,
-        work: impl Fn(&bth::Scene, J) + Sync + Send,
+        work: impl Fn(&bth::Scene, J, &Watch<'_>) + Sync + Send,
     ) -> PyResult<()> {
         work::note_thread(py);
         py.detach(|| {
             let guard = self.read()?;
             let scene: &bth::Scene = &guard;
-            work::run(threads, jobs, |job| work(scene, job))
+            work::run(threads, jobs, |job, watch| work(scene, job, watch))
         })
     }
 

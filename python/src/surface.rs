@@ -246,7 +246,7 @@ pub(crate) fn surface(
     crate::work::note_thread(py);
     py.detach(|| points.check(&*scene.read()?, with_surface))?;
     let jobs = crate::output::chunks(points.len(), |rows| columns.split_off(rows));
-    scene.run(py, threads, jobs, |scene, (range, mut columns): (Range<usize>, Columns<'_>)| {
+    scene.run(py, threads, jobs, |scene, (range, mut columns): (Range<usize>, Columns<'_>), _| {
         for (row, point) in range.enumerate() {
             if let Some(hit) = points.hit(point) {
                 columns.store(scene, row, &hit, with_surface);
@@ -269,7 +269,7 @@ pub(crate) fn triangle_positions(
     py.detach(|| points.check(&*scene.read()?, true))?;
     let (rows, _) = numbers(&mut out, points.len() * 9)?.as_chunks_mut::<9>();
     let jobs: Vec<_> = rows.chunks_mut(CHUNK).zip((0..).step_by(CHUNK)).collect();
-    scene.run(py, threads, jobs, |scene, (rows, first)| {
+    scene.run(py, threads, jobs, |scene, (rows, first), _| {
         for (point, row) in (first..).zip(rows) {
             if let Some(corners) = points.primitive(point).and_then(|p| scene.triangle_in_world(p)) {
                 row.copy_from_slice(corners.as_flattened());

@@ -2,7 +2,8 @@
 
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
@@ -116,10 +117,68 @@ impl Pauses {
     }
 }
 
+/// What a job asks while it works, since some take much longer than the time after which a call looks for signals.
+pub(crate) struct Watch<'a>(Kind<'a>);
+
+enum Kind<'a> {
+    /// The job is on the caller's thread, which looks for signals itself: when it last did, and the exception that a handler has raised.
+    Caller { looked: Cell<Instant>, failure: RefCell<Option<PyErr>> },
+    /// The job is on a thread of the pool, to which the caller's says that it stops.
+    Pool(&'a AtomicBool),
+}
+
+impl Watch<'_> {
+    fn of_caller() -> Self {
+        Watch(Kind::Caller { looked: Cell::new(Instant::now()), failure: RefCell::new(None) })
+    }
+
+    /// Whether the call ends early, so that what remains of the job has no use.
+    pub(crate) fn is_over(&self) -> bool {
+        match &self.0 {
+            Kind::Pool(stop) => stop.load(Ordering::Relaxed),
+            Kind::Caller { looked, failure } => {
+                if failure.borrow().is_some() {
+                    return true;
+                }
+                if looked.get().elapsed() > SIGNALS_EVERY {
+                    let found = check_signals().err();
+                    looked.set(Instant::now());
+                    *failure.borrow_mut() = found;
+                }
+                failure.borrow().is_some()
+            }
+        }
+    }
+
+    /// Calls `work` with one part of so many rows after the other, until the call ends early. Rows that lie together are answered
+    /// fastest in one part, so parts grow as long as they take little time.
+    pub(crate) fn in_parts(&self, rows: usize, mut work: impl FnMut(Range<usize>)) {
+        let mut part = 0..rows.min(4);
+        while !part.is_empty() && !self.is_over() {
+            let start = Instant::now();
+            work(part.clone());
+            let share = SIGNALS_EVERY.as_secs_f64() / start.elapsed().as_secs_f64();
+            let next = (part.len() as f64 * share.min(4.0)) as usize;
+            part = part.end..rows.min(part.end + next.max(1));
+        }
+    }
+
+    fn finish(self) -> PyResult<()> {
+        match self.0 {
+            Kind::Caller { failure, .. } => failure.into_inner().map_or(Ok(()), Err),
+            Kind::Pool(_) => Ok(()),
+        }
+    }
+}
+
 /// Calls `work` with each of the jobs, on up to so many threads, none of which has the interpreter's lock. One thread is the caller's
 /// own, which must not have the lock either. Ends early with the exception that the handler of a signal raises; then some of the
-/// jobs have not been done.
-pub(crate) fn run<J: Send>(threads: usize, jobs: Vec<J>, work: impl Fn(J) + Sync + Send) -> PyResult<()> {
+/// jobs have not been done, or not to their ends.
+pub(crate) fn run<J: Send>(
+    threads: usize,
+    jobs: Vec<J>,
+    work: impl Fn(J, &Watch<'_>) + Sync + Send,
+) -> PyResult<()> {
     let threads = threads.min(jobs.len());
     let queue = Mutex::new(jobs.into_iter());
     let next = || lock(&queue).next();
@@ -128,16 +187,14 @@ pub(crate) fn run<J: Send>(threads: usize, jobs: Vec<J>, work: impl Fn(J) + Sync
 }
 
 /// Does all jobs on the caller's thread.
-fn alone<J>(next: &impl Fn() -> Option<J>, work: &impl Fn(J)) -> PyResult<()> {
-    let mut looked = Instant::now();
-    while let Some(job) = next() {
-        work(job);
-        if looked.elapsed() > SIGNALS_EVERY {
-            check_signals()?;
-            looked = Instant::now();
-        }
+fn alone<J>(next: &impl Fn() -> Option<J>, work: &impl Fn(J, &Watch<'_>)) -> PyResult<()> {
+    let watch = Watch::of_caller();
+    while !watch.is_over()
+        && let Some(job) = next()
+    {
+        work(job, &watch);
     }
-    Ok(())
+    watch.finish()
 }
 
 /// How many threads are still at work.
@@ -161,7 +218,7 @@ impl Drop for AtWork<'_> {
 fn together<J: Send>(
     threads: usize,
     next: &(impl Fn() -> Option<J> + Sync),
-    work: &(impl Fn(J) + Sync),
+    work: &(impl Fn(J, &Watch<'_>) + Sync),
 ) -> PyResult<()> {
     let pool = pool();
     let stop = AtomicBool::new(false);
@@ -174,7 +231,7 @@ fn together<J: Send>(
                 while !stop.load(Ordering::Relaxed)
                     && let Some(job) = next()
                 {
-                    work(job);
+                    work(job, &Watch(Kind::Pool(&stop)));
                 }
             });
         }

@@ -1,12 +1,9 @@
 """Scenes: opening, time, and what becomes of them."""
 
-import contextlib
 import errno
-import io
 import math
 import operator
 import os
-import secrets
 
 import numpy as np
 
@@ -153,21 +150,10 @@ class Scene(RayQueries, PointQueries, Contents):
 
     def save(self, path):
         """Writes the compiled file; it appears whole or not at all. Time, new positions and masks are not part of it."""
-        path, content = os.fsdecode(path), self.to_bytes()
+        path = os.fsdecode(path)
         if os.path.isdir(path):
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), path)
-        # The file would take the place of a device or a named pipe.
-        if os.path.exists(path) and not os.path.isfile(path):
-            raise OSError(f"{path}: cannot write: expected a regular file or none there, found something else (hint: use to_bytes)")
-        part = f"{path}.{os.getpid()}-{secrets.token_hex(8)}.part"
-        try:
-            with io.open(part, "xb") as file:
-                file.write(content)
-            os.replace(part, path)
-        except BaseException:
-            with contextlib.suppress(OSError):
-                os.remove(part)
-            raise
+        self._native.save(path)
 
     def close(self):
         """Frees the scene as soon as no query of another thread uses it. Queries then raise ValueError."""

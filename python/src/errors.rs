@@ -3,6 +3,7 @@
 use pyo3::create_exception;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
+use std::path::Path;
 
 create_exception!(
     bth,
@@ -26,6 +27,18 @@ pub(crate) fn format_error(error: &bth_format::Error) -> PyErr {
     let code = error.code().as_str();
     let text = error.to_string();
     if code.starts_with("BTH-O") { PyOSError::new_err(text) } else { coded(code, text) }
+}
+
+/// The exception for a file that cannot be written: the subclass of `OSError` for the number that the system gives.
+pub(crate) fn write_error(path: &Path, error: &std::io::Error) -> PyErr {
+    match error.raw_os_error() {
+        Some(number) => {
+            let text = error.to_string();
+            let reason = text.split(" (os error").next().unwrap_or_default().to_owned();
+            PyOSError::new_err((number, reason, path.as_os_str().to_owned()))
+        }
+        None => PyOSError::new_err(format!("{}: cannot write: {error}", path.display())),
+    }
 }
 
 /// The exception for an error of the compiler.

@@ -1,11 +1,12 @@
 //! The class of scenes: opening, closing, what a scene consists of, and its time.
 
-use crate::errors::format_error;
+use crate::errors::{format_error, write_error};
 use crate::shared::{Handle, OpenScene};
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
+use std::io::Write;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -77,6 +78,13 @@ impl NativeScene {
         let scene = self.get()?;
         let read = scene.read_attached(py)?;
         Ok(PyBytes::new(py, read.file().bytes()))
+    }
+
+    /// Writes the compiled file, whole or not at all.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let write =
+            |scene: &bth::Scene| bth_files::replace_file(&path, |file| file.write_all(scene.file().bytes()));
+        self.with(py, write)?.map_err(|error| write_error(&path, &error))
     }
 
     /// Counts and facts.

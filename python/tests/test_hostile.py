@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import bth
+import bth.bake
 from bth import _meshes, _ray_queries
 
 NAN, INF = float("nan"), float("inf")
@@ -528,6 +529,26 @@ def test_saving_replaces_no_pipe(scene, tmp_path):
     with pytest.raises(IsADirectoryError):
         scene.save(tmp_path)
     assert stat.S_ISFIFO(os.stat(tmp_path / "pipe").st_mode) and os.listdir(tmp_path) == ["pipe"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc is that of Linux")
+def test_saving_replaces_no_link_to_an_open_file(scene, tmp_path):
+    """As /dev/stdout is one where the output goes to a file: no program would have it any more."""
+    with open(tmp_path / "file", "wb") as file:
+        (tmp_path / "stdout").symlink_to(f"/proc/self/fd/{file.fileno()}")
+        with pytest.raises(OSError, match="open"):
+            scene.save(tmp_path / "stdout")
+    assert (tmp_path / "stdout").is_symlink() and sorted(os.listdir(tmp_path)) == ["file", "stdout"]
+
+
+def test_names_as_long_as_they_can_be(scene, mesh, tmp_path):
+    path = tmp_path / ("é" * 125 + "e.bth")
+    scene.save(path)
+    assert bth.open(path).content_id == scene.content_id and len(os.listdir(tmp_path)) == 1
+    bth.bake.write_ply(path, {axis: column for axis, column in zip("xyz", mesh[0].T)}, mesh[1])
+    with pytest.raises(FileNotFoundError) as error:
+        scene.save(tmp_path / "missing" / "a.bth")
+    assert error.value.filename == str(tmp_path / "missing" / "a.bth")
 
 
 def test_paths_as_bytes(scene, mesh, tmp_path):

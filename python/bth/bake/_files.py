@@ -1,6 +1,7 @@
 """Output files that appear whole or not at all."""
 
 import os
+import secrets
 from collections.abc import Callable
 from typing import BinaryIO
 
@@ -15,7 +16,8 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[BinaryIO], object
         with open(path, "wb") as file:
             write(file)
         return
-    part = f"{path}.{os.getpid()}.part"
+    # Not the path with more behind it: names may be as long as the system takes them.
+    part = os.path.join(os.path.dirname(path), f".{secrets.token_hex(8)}.part")
     file = open(part, "xb")
     try:
         with file:

@@ -37,6 +37,9 @@ class RayMeshIntersector:
         directions = np.array(_arrays.plain(ray_directions, "ray_directions"), dtype=np.float64)
         if origins.shape != directions.shape:
             raise ValueError("Ray origin and direction don't match!")
+        # By a power of two, which changes no other bit: float32 ends at 3e38, while `scale_to_box` takes meshes, and so directions, of any size.
+        _, exponents = np.frexp(np.abs(directions).max(axis=-1, initial=0, keepdims=True))
+        directions = np.ldexp(directions, -exponents)
         scene, corner, scale = self._scene
         return scene, (origins - corner) * scale, directions, origins
 

@@ -42,6 +42,19 @@ def test_trimesh(trimesh_mesh, mesh, rays):
         ray.intersects_any(origins, directions[:5])
 
 
+@pytest.mark.parametrize("size", [1e-5, 1e45])
+def test_trimesh_of_any_size(size):
+    trimesh = pytest.importorskip("trimesh")
+    import bth.trimesh
+
+    small, large = (bth.trimesh.RayMeshIntersector(trimesh.creation.box([length] * 3)) for length in (1, size))
+    origins, directions = np.random.default_rng(8).normal(size=(2, 50, 3))
+    expected, found = (ray.intersects_id(size * origins, size * directions, return_locations=True) for ray, size in ((small, 1), (large, size)))
+    assert len(expected[0]) > 10 and all((a == b).all() for a, b in zip(expected[:2], found))
+    np.testing.assert_allclose(found[2] / size, expected[2], atol=1e-5)
+    assert (large.intersects_any(size * origins, size * directions) == small.intersects_any(origins, directions)).all()
+
+
 def test_trimesh_counts_an_edge_once(mesh, trimesh_mesh):
     import bth.trimesh
 

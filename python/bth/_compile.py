@@ -43,7 +43,7 @@ def compile(
     triangle meet nothing, and up to which distance.
     """
     options = {name: value for name, value in locals().items() if name != "model" and value is not None}
-    if isinstance(model, (str, os.PathLike)):
+    if isinstance(model, (str, bytes, os.PathLike)):
         path = os.fsdecode(model)
         os.stat(path)
         return Scene(_native.compile_path(path, _checked(options)))
@@ -76,7 +76,7 @@ def compile_scene(meshes, instances=None, transforms=None, **options):
     if hasattr(meshes, "vertices") or hasattr(meshes, "points"):
         raise TypeError(f"meshes: expected a list of meshes, got a {type(meshes).__name__}")
     meshes = list(meshes)
-    if any(isinstance(mesh, (str, os.PathLike)) for mesh in meshes):
+    if any(isinstance(mesh, (str, bytes, os.PathLike)) for mesh in meshes):
         raise TypeError("meshes: expected meshes in memory, got a path: scenes of files are manifests (format-spec/scene-manifest.md)")
     parts = [_meshes.triangles_of(mesh) for mesh in meshes]
     instances, transforms = _meshes.places_of(instances, transforms, len(parts))

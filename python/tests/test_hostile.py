@@ -564,7 +564,8 @@ def test_paths_as_bytes(scene, mesh, tmp_path):
         assert bth.open(path).content_id == bth.open(path, mmap=True).content_id == scene.content_id
         bth.compile(mesh, output=path)
     (tmp_path / "a.off").write_text("OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
-    assert bth.compile(Path(tmp_path / "a.off"), cache=False).triangle_counts == [1]
+    for path in (Path(tmp_path / "a.off"), os.fsencode(tmp_path / "a.off")):
+        assert bth.compile(path, cache=False).triangle_counts == [1]
     for name in ("output", "profile", "shared_cache", "cache"):
         with pytest.raises(TypeError, match=f"^{name}: expected"):
             bth.compile(mesh, **{name: 5})

@@ -8,7 +8,8 @@ export class Bth {
     /**
      * Opens a compiled file, of which it keeps a copy. All indices are checked, so that no file can make tracing unsafe.
      * @throws TypeError for anything but bytes, such as a promise of them.
-     * @throws BthError with a code of the specification if the file is damaged or too new; with BTH-O001 if the memory is too small.
+     * @throws BthError with a code of the specification if the file is damaged or too new; with BTH-O001 if the memory is too small, or
+     * the file has 2 GiB or more.
      */
     open(file: ArrayBufferLike | ArrayBufferView): Scene;
 }

@@ -8,6 +8,8 @@ const RAY = 8;
 const HIT_NAMES = ["t", "u", "v", "instance", "triangle"];
 /** Columns of the results of the module's functions. */
 const HIT_COLUMNS = 5, STEP_COLUMNS = 4, SURFACE_COLUMNS = 18;
+/** Bytes of a file at most: the module holds it in one piece, at a multiple of 64. */
+const MOST_FILE = 2 ** 31 - 64;
 /** Words of memory that a chunk needs at most: hits and their surfaces. */
 const WORDS = CHUNK * (HIT_COLUMNS + SURFACE_COLUMNS);
 
@@ -83,8 +85,7 @@ export class Bth {
 
     open(file) {
         const bytes = bytesOf(file);
-        // The module counts bytes with 32 bits.
-        const memory = bytes.length < 2 ** 32 ? this.#wasm.bth_file_new(bytes.length) : 0;
+        const memory = this.#wasm.bth_file_new(bytes.length);
         if (memory === 0) throw noMemory(`a file of ${bytes.length} bytes`, this.#wasm.memory);
         new Uint8Array(this.#wasm.memory.buffer, this.#wasm.bth_file_bytes(memory) >>> 0, bytes.length).set(bytes);
         const scene = this.#wasm.bth_open(memory);
@@ -253,10 +254,15 @@ function classOf(value) {
 
 /** The bytes of a file, which come as a buffer or as a view of one. */
 function bytesOf(file) {
-    if (ArrayBuffer.isView(file)) return new Uint8Array(file.buffer, file.byteOffset, file.byteLength);
-    if (/^(Shared)?ArrayBuffer$/.test(classOf(file))) return new Uint8Array(file);
-    const hint = typeof file?.then === "function" ? ": await it" : typeof file?.arrayBuffer === "function" ? ": await its arrayBuffer()" : "";
-    throw new TypeError(`file: expected an ArrayBuffer or a view of one, with the bytes of a file; found ${kindOf(file)}${hint}`);
+    const isView = ArrayBuffer.isView(file);
+    if (!isView && !/^(Shared)?ArrayBuffer$/.test(classOf(file))) {
+        const hint = typeof file?.then === "function" ? ": await it" : typeof file?.arrayBuffer === "function" ? ": await its arrayBuffer()" : "";
+        throw new TypeError(`file: expected an ArrayBuffer or a view of one, with the bytes of a file; found ${kindOf(file)}${hint}`);
+    }
+    if (file.byteLength > MOST_FILE) {
+        throw new BthError(`BTH-O001: expected a file of less than 2 GiB, which a module can hold in one piece; found ${file.byteLength} bytes`);
+    }
+    return isView ? new Uint8Array(file.buffer, file.byteOffset, file.byteLength) : new Uint8Array(file);
 }
 
 /** Number of rays in an array. */

@@ -245,6 +245,11 @@ test("what is no file is refused with what is expected", async () => {
     refused(buffer, /detached/);
 });
 
+test("files of 2 GiB and more are refused", () => {
+    const refused = (error) => error instanceof BthError && error.code === "BTH-O001" && /less than 2 GiB.* found 2147483648 bytes$/.test(error.message);
+    assert.throws(() => bth.open(new ArrayBuffer(2 ** 31)), refused);
+});
+
 test("hits need all their columns", () => {
     const scene = bth.open(readFileSync(join(conformance, "valid/triangle.bth")));
     const hits = scene.nearest(Float32Array.of(0.25, 0.25, 1, 0, 0, 0, -1, Infinity, 0.5, 0.25, 1, 0, 0, 0, -1, Infinity));

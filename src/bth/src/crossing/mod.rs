@@ -66,7 +66,7 @@ impl Scene {
     pub fn crossings(&self, ray: &Ray) -> Crossings {
         let mut total = Crossings::default();
         self.enumerate_instances(ray, &mut |entered| {
-            let ray = entered.object_ray(ray).ray;
+            let ray = entered.object_ray(ray).with_exact_range(ray);
             let mut counter = CrossingCounter { ray, found: Crossings::default() };
             enumerate(entered.object, &ray, &mut counter);
             total.count += counter.found.count;

@@ -214,6 +214,15 @@ pub(crate) struct ObjectRay {
     pub(crate) t_scale: f32,
 }
 
+impl ObjectRay {
+    /// The ray with the ends of the range of `world`, the same ray in world space, as they are: for t that are compared with them exactly.
+    /// The range of [`Self::ray`] reaches to all t that are rounded to its ends in world space.
+    pub(crate) fn with_exact_range(&self, world: &Ray) -> Ray {
+        let end = |t: f32| (f64::from(t) / f64::from(self.t_scale)) as f32;
+        Ray { tmin: end(world.tmin), tmax: end(world.tmax), ..self.ray }
+    }
+}
+
 /// The greatest t in object space that is at most `t` in world space, where it is the product with `t_scale` = 1 / `scale`, a power of two, rounded to f32.
 /// An end at infinity stands for the farthest t that is finite in world space. NaN stays what it is.
 pub(super) fn greatest_below(t: f32, scale: f64, t_scale: f32) -> f32 {

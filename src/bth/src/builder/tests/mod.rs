@@ -156,3 +156,34 @@ fn scenes_without_instances_answer_all_queries() {
     assert_eq!((scene.object_count(), scene.instance_count(), scene.seconds()), (0, 0, 0.0));
     assert!(scene.description().is_none());
 }
+
+/// Rays that start on the surface, whose directions are so short or so long in the space of the object that they are scaled there.
+#[test]
+fn crossings_of_rays_from_the_surface_do_not_depend_on_the_lengths_of_directions() {
+    let mut builder = SceneBuilder::new();
+    let object = builder.add(&crate::from_bytes(FILES[1]).unwrap());
+    for x in [0.0, 64.0] {
+        builder.instance(object, &at(x, 0.0, 0.0)).unwrap();
+    }
+    builder.commit().unwrap();
+    let scene = builder.scene();
+    let corners = scene.object(object).positions;
+    let (mut rng, mut crossed) = (Rng::new(31), 0);
+    for case in 0..2000 {
+        let [from, to] = [(); 2].map(|()| corners[rng.below(corners.len() as u64) as usize]);
+        let aside = [(); 3].map(|()| rng.below(5) as f32 - 2.0);
+        let direction = [0, 1, 2].map(|k| if case % 2 == 0 { aside[k] } else { to[k] - from[k] + aside[k] });
+        let range = [[0.0, f32::INFINITY], [f32::NEG_INFINITY, 0.0], [0.0, 1.0], [-1.0, 0.0]][case / 2 % 4];
+        let crossings = |exponent: i32| {
+            let scale = 2f32.powi(exponent);
+            let ray = Ray::new(from, direction.map(|x| x * scale));
+            scene.crossings(&ray.with_range(range[0] / scale, range[1] / scale))
+        };
+        let expected = crossings(0);
+        for exponent in [-70, -100, 70, 100] {
+            assert_eq!(crossings(exponent), expected, "case {case}: {from:?}, {direction:?}, 2^{exponent}");
+        }
+        crossed += expected.count;
+    }
+    assert!(crossed > 100, "{crossed}");
+}

@@ -1,5 +1,6 @@
 //! Runs the chunks of a call on threads without the interpreter's lock, and lets signals through.
 
+use pyo3::exceptions::PyRecursionError;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::cell::{Cell, RefCell};
@@ -23,13 +24,23 @@ pub(crate) fn is_inside_call() -> bool {
     DEPTH.get() > 0
 }
 
+/// How many calls may be inside of one another. Each takes up to 30 KiB of the stack, less than Python's own limit assumes.
+const DEEPEST: u32 = 32;
+
 /// Counts a call for as long as it exists.
 struct Inside;
 
 impl Inside {
-    fn new() -> Inside {
+    /// Fails in a filter that calls itself, before the stack ends.
+    fn new() -> PyResult<Inside> {
+        if DEPTH.get() >= DEEPEST {
+            let message = format!(
+                "expected at most {DEEPEST} calls inside of one another, got more: does a filter call itself?"
+            );
+            return Err(PyRecursionError::new_err(message));
+        }
         DEPTH.set(DEPTH.get() + 1);
-        Inside
+        Ok(Inside)
     }
 }
 
@@ -182,7 +193,7 @@ pub(crate) fn run<J: Send>(
     let threads = threads.min(jobs.len());
     let queue = Mutex::new(jobs.into_iter());
     let next = || lock(&queue).next();
-    let _inside = Inside::new();
+    let _inside = Inside::new()?;
     if threads <= 1 { alone(&next, &work) } else { together(threads, &next, &work) }
 }
 
@@ -268,7 +279,7 @@ pub(crate) fn run_cancellable<T: Send>(
     work: impl FnOnce() -> T + Send,
     look: impl Fn(Python<'_>) -> PyResult<()> + Sync + Send,
 ) -> PyResult<T> {
-    let _inside = Inside::new();
+    let _inside = Inside::new()?;
     note_thread(py);
     py.detach(|| {
         std::thread::scope(|scope| {

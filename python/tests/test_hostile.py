@@ -446,6 +446,26 @@ def _exits(code, *arguments):
     return subprocess.run([sys.executable, "-c", textwrap.dedent(code), *arguments], timeout=120).returncode
 
 
+def test_filters_that_call_themselves():
+    code = """
+        import sys, bth
+        scene = bth.compile(([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
+        ray = [0.2, 0.2, 1], [0, 0, -1]
+        def within(depth):
+            return lambda candidate: depth == 0 or bool(scene.any(*ray, filter=within(depth - 1)))
+        assert scene.any(*ray, filter=within(10))
+        for query in (scene.nearest, scene.any, scene.all_hits, scene.count):
+            try:
+                query(*ray, filter=within(10**6))
+            except RecursionError as error:
+                assert "filter" in str(error)
+            else:
+                sys.exit(3)
+        assert scene.any(*ray, filter=within(10))
+    """
+    assert _exits(code) == 0
+
+
 @pytest.mark.parametrize("threads", [None, 1])
 def test_exit_while_daemons_trace(threads):
     """A thread that still traces must not reach for an interpreter that has ended."""

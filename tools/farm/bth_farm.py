@@ -90,7 +90,8 @@ def compile_scene(client, scene, output, options, environment, count, on_done=la
     done = run_part("bthc", ["compile", scene, "-o", str(output), *options], environment)
     if isinstance(done, Failure):
         raise done
-    done["farm"] = {"parts": count, "objects": sum(part["objects"] for part in objects)}
+    # A model is one object, and the part that compiles it reports the model and no number of objects.
+    done["farm"] = {"parts": count, "objects": sum(part.get("objects", int("model" in part)) for part in objects)}
     return done
 
 
@@ -99,6 +100,13 @@ def render_frames(client, scene, output, options, environment, count, on_done=la
     scene, output = str(Path(scene).resolve()), str(Path(output).absolute())
     parts = [("bth-play", [scene, "-o", output, "--shard", shard, *options]) for shard in shards(count)]
     return {"output": output, "farm": {"parts": count}, "parts": run_parts(client, parts, environment, on_done)}
+
+
+def positive(text):
+    """A number from 1, for argparse."""
+    if not text.isdecimal() or int(text) == 0:
+        raise argparse.ArgumentTypeError(f"expected a number from 1, found {text!r}")
+    return int(text)
 
 
 def arguments(argv):
@@ -112,8 +120,8 @@ def arguments(argv):
         sub.add_argument("scene", type=Path)
         sub.add_argument("-o", "--output", required=True, help=output)
         sub.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster; by default one is started on this machine")
-        sub.add_argument("--workers", type=int, metavar="N", help="workers of the cluster on this machine")
-        sub.add_argument("--parts", type=int, metavar="N", help="parts of the work; by default four for each worker")
+        sub.add_argument("--workers", type=positive, metavar="N", help="workers of the cluster on this machine")
+        sub.add_argument("--parts", type=positive, metavar="N", help="parts of the work; by default four for each worker")
         sub.add_argument("--cache-dir", metavar="FOLDER", help="a cache that all workers see")
         sub.add_argument("--shared-cache", metavar="PLACE", help="a cache behind that of each worker")
         sub.add_argument("--json", action="store_true", help="print one JSON object")

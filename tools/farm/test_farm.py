@@ -105,6 +105,11 @@ def main():
         local = [*farm, "--workers", "2", "--cache-dir", folder / "cache", "--json", "--", "--quality", "fast"]
         done = json.loads(subprocess.run(local, check=True, stdout=subprocess.PIPE).stdout)
         assert done["farm"]["objects"] == OBJECTS and (folder / "local.bth").exists(), done["farm"]
+        single = [*farm[:3], folder / "0.obj", "-o", folder / "0.bth", "--workers", "1", "--parts", "2", "--json"]
+        done = json.loads(subprocess.run(single, check=True, stdout=subprocess.PIPE).stdout)
+        assert (done["farm"]["parts"], done["farm"]["objects"]) == (2, 1), done["farm"]
+        for wrong in ["--parts=-3", "--workers=0"]:
+            assert subprocess.run([*farm, wrong], stderr=subprocess.DEVNULL).returncode == 2, wrong
     print("three workers, one killed mid-way, twice: same bytes, same frames")
 
 

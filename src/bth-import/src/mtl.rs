@@ -172,8 +172,8 @@ fn read_libraries(source: &Source<'_>, libraries: &[Library]) -> Result<Librarie
         let hint = "put the material library there, or compile without --materials";
         let files = read.new_files(source.path, &library.names);
         if files.is_empty() && library.names.split(' ').all(|name| beside(Path::new(""), name).is_none()) {
-            let message =
-                format!("expected a relative name of a material library, found \"{}\"", library.names);
+            let found = shown(library.names.as_bytes());
+            let message = format!("expected a relative name of a material library, found \"{found}\"");
             return Err(source.error_at_line(IMAGE, library.line, message, hint));
         }
         for file in files {

@@ -15,6 +15,7 @@ use crate::gltf::container::split;
 use crate::gltf::schema::Extensions;
 use crate::gltf::uri::{beside, decode_base64, read_at_most};
 use crate::image_file::MAX_FILE;
+use crate::number::shown;
 use crate::source::{IMAGE, MALFORMED, MALFORMED_HINT, Source};
 
 /// Gives a texture a WebP image in the place of its own.
@@ -156,8 +157,11 @@ impl TextureReader<'_, '_> {
 
     fn file(&self, part: &str, uri: &str) -> Result<Vec<u8>> {
         let Some(path) = beside(self.accessors.source.path, uri) else {
-            let message = format!("expected a relative file name or a data: URI, found \"{uri}\"");
-            return Err(self.unreadable(part, message));
+            let found = shown(uri.as_bytes());
+            let message = format!("expected a relative file name or a data: URI, found \"{found}\"");
+            let hint =
+                format!("put the image beside the model and name it in the uri, or compile {}", self.without);
+            return Err(self.accessors.source.error_in_part(IMAGE, part, message, &hint));
         };
         read_at_most(&path, MAX_FILE)
     }

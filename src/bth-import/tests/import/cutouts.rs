@@ -141,6 +141,18 @@ fn images_come_from_files_and_data_uris_too() {
 }
 
 #[test]
+fn an_uri_that_is_no_file_is_not_shown_whole() {
+    let mut model = document(masked());
+    model.0["images"][0] = json!({"uri": format!("blob:\u{1b}{}", "A".repeat(1 << 20))});
+    let text = cutouts(&model, AlphaMode::Mask).unwrap_err().to_string();
+    assert!(
+        text.len() < 400 && !text.contains('\u{1b}') && text.contains("beside the model"),
+        "{} bytes",
+        text.len()
+    );
+}
+
+#[test]
 fn what_cannot_be_read_is_an_error_with_a_code_only_where_it_is_asked_for() {
     type Change = (&'static str, fn(&mut Value));
     let changes: [Change; 11] = [

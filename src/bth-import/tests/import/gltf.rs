@@ -93,10 +93,13 @@ fn buffers_may_be_external_or_embedded() {
         let files: Vec<_> = std::iter::once(path.clone()).chain(external).collect();
         assert_eq!(bth_import::source_files(&path, bth_import::AlphaMode::None).unwrap(), files);
     }
-    for uri in ["/etc/hostname", "http://x/y.bin", "data:,abc", ""] {
+    let long = format!("DATA:,\u{1b}{}", "A".repeat(1 << 20));
+    for uri in ["/etc/hostname", "http://x/y.bin", "data:,abc", "", &long] {
         std::fs::write(&path, edited(|d| d["buffers"][0]["uri"] = uri.into()).to_string()).unwrap();
         let error = import(&path, Keep::None, &Silent).unwrap_err();
         assert!(matches!(error, Error::Input { code: "BTH-I014", .. }), "{error}");
+        let text = error.to_string();
+        assert!(text.len() < 400 && !text.contains('\u{1b}'), "{} bytes", text.len());
     }
     std::fs::write(&path, edited(|d| d["buffers"][0]["uri"] = "absent.bin".into()).to_string()).unwrap();
     let error = import(&path, Keep::None, &Silent).unwrap_err();

@@ -11,6 +11,7 @@ use serde_json::{Value, from_slice};
 use crate::cutout::Wrap;
 use crate::error::{Error, Result};
 use crate::gltf::accessor::Accessors;
+use crate::gltf::base_color::{BaseColor, SPECULAR_GLOSSINESS, UsedTexture, base_color};
 use crate::gltf::buffer::Buffers;
 use crate::gltf::document;
 use crate::gltf::extensions::{SCENE_EXTENSIONS, SUPPORTED};
@@ -24,10 +25,9 @@ use crate::source::{IMAGE, Source};
 
 /// How to do without what is read here, in errors.
 const WITHOUT: &str = "without --materials";
-/// Materials without light; the factor of emission; the colours of an older model of materials.
+/// Materials without light; the factor of emission.
 const UNLIT: &str = "KHR_materials_unlit";
 const EMISSIVE_STRENGTH: &str = "KHR_materials_emissive_strength";
-const SPECULAR_GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
 
 /// The alpha modes of materials; others count as the first.
 pub(super) const ALPHA_MODES: [&str; 3] = ["OPAQUE", "MASK", "BLEND"];
@@ -47,50 +47,17 @@ struct SurfaceMaterial {
     extensions: Extensions,
 }
 
-#[derive(Deserialize, Default, Clone)]
-#[serde(default, rename_all = "camelCase")]
-struct BaseColor {
-    base_color_factor: Option<[f64; 4]>,
-    base_color_texture: Option<UsedTexture>,
-    metallic_roughness_texture: Option<Value>,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(default, rename_all = "camelCase")]
-struct SpecularGlossiness {
-    diffuse_factor: Option<[f64; 4]>,
-    diffuse_texture: Option<UsedTexture>,
-}
-
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct EmissiveStrength {
     emissive_strength: Option<f64>,
 }
 
-/// A material's use of a texture.
-#[derive(Deserialize, Clone)]
-struct UsedTexture {
-    index: usize,
-    #[serde(flatten)]
-    reference: TextureReference,
-}
-
 impl SurfaceMaterial {
     /// Base colour and its texture: those of the older model where the material has nothing else.
     fn base(&self, reader: &TextureReader<'_, '_>, part: &str) -> Result<BaseColor> {
-        let own = self.pbr_metallic_roughness.clone();
-        let Some(value) = self.extensions.get(SPECULAR_GLOSSINESS).filter(|_| own.is_none()) else {
-            return Ok(own.unwrap_or_default());
-        };
-        let older = SpecularGlossiness::deserialize(value).map_err(|e| {
+        base_color(self.pbr_metallic_roughness.as_ref(), &self.extensions).map_err(|e| {
             reader.malformed(part, format!("expected what {SPECULAR_GLOSSINESS} defines, found: {e}"))
-        })?;
-        let SpecularGlossiness { diffuse_factor, diffuse_texture } = older;
-        Ok(BaseColor {
-            base_color_factor: diffuse_factor,
-            base_color_texture: diffuse_texture,
-            metallic_roughness_texture: None,
         })
     }
 
@@ -171,11 +138,7 @@ pub(super) fn second_set(material: &Value) -> Option<u32> {
 
 /// The texture of a material's base colour, if the material is well-formed.
 fn base_texture(material: &SurfaceMaterial) -> Option<UsedTexture> {
-    if let Some(base) = &material.pbr_metallic_roughness {
-        return base.base_color_texture.clone();
-    }
-    let older = material.extensions.get(SPECULAR_GLOSSINESS)?;
-    SpecularGlossiness::deserialize(older).ok()?.diffuse_texture
+    base_color(material.pbr_metallic_roughness.as_ref(), &material.extensions).ok()?.base_color_texture
 }
 
 /// Reads the materials with these numbers, in order, into a recorder.

@@ -4,6 +4,7 @@
 //! meshes there are and where, and `flatten` a model. `cutout` reads which materials make holes. [`scene`] makes a manifest instead.
 
 pub(crate) mod accessor;
+mod base_color;
 pub(crate) mod buffer;
 mod container;
 pub(crate) mod cutout;

@@ -28,6 +28,14 @@ pub(super) struct KeptAttributes {
     coordinates: Option<TextureCoordinates>,
 }
 
+impl KeptAttributes {
+    /// Takes these texture coordinates of the primitive in the place of those that its material's textures decide.
+    pub(super) fn take_coordinates(&mut self, primitive: &Primitive, coordinates: TextureCoordinates) {
+        self.uvs = primitive.attributes.get(&coordinates.attribute).copied();
+        self.coordinates = Some(coordinates);
+    }
+}
+
 /// The vertices and triangles of a primitive. All corners are rows of `positions`, and so are `normals` and `uvs`.
 pub(super) struct Triangles {
     pub(super) positions: Vec<[f32; 3]>,

@@ -13,6 +13,7 @@ use crate::gltf::schema::{GltfDocument, Material, Primitive, TextureReference, T
 use crate::source::{MALFORMED, Source};
 
 /// A set of texture coordinates and its transform.
+#[derive(Clone)]
 pub(super) struct TextureCoordinates {
     /// Name of the attribute, such as `TEXCOORD_0`.
     pub(super) attribute: String,
@@ -36,7 +37,12 @@ impl TextureCoordinates {
             |e: serde_json::Error| error(source, &part, format!("expected a glTF material, found: {e}"));
         let material = Material::deserialize(value).map_err(parsed)?;
         let Some(texture) = deciding_texture(&material) else { return Ok(plain) };
-        let (set, transform) = set_of(texture).map_err(parsed)?;
+        Self::of_texture(texture).map_err(parsed)
+    }
+
+    /// Those of one texture of a material.
+    pub(super) fn of_texture(texture: &TextureReference) -> serde_json::Result<Self> {
+        let (set, transform) = set_of(texture)?;
         Ok(TextureCoordinates { attribute: format!("TEXCOORD_{set}"), transform })
     }
 
@@ -118,7 +124,7 @@ impl KeptSet {
 }
 
 /// Scale, then rotation, then offset, in f64.
-#[derive(PartialEq)]
+#[derive(Clone, PartialEq)]
 struct UvTransform {
     /// Rows of the linear part.
     linear: [[f64; 2]; 2],

@@ -35,12 +35,6 @@ pub(super) struct TextureParts {
     pub(super) materials: Vec<Value>,
 }
 
-/// A material's use of a texture, without its texture coordinates.
-#[derive(Deserialize)]
-pub(super) struct IndexedTexture {
-    pub(super) index: usize,
-}
-
 #[derive(Deserialize, Default)]
 #[serde(default)]
 struct Texture {

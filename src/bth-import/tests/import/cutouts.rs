@@ -97,6 +97,23 @@ fn materials_of_the_mode_are_read_with_their_corners() {
     assert_eq!(cutouts(&document(masked()), AlphaMode::None).unwrap(), Cutouts::default());
 }
 
+/// The alpha of an older model of materials is that of its diffuse colour, at the coordinates of its texture, whichever set is kept.
+#[test]
+fn older_models_have_holes_by_the_alpha_of_their_diffuse_colors() {
+    let expected = cutouts(&document(masked()), AlphaMode::Mask).unwrap();
+    let older = json!({"diffuseFactor": [1, 1, 1, 0.5], "diffuseTexture": {"index": 0}});
+    let older = json!({"alphaMode": "MASK", "alphaCutoff": 0.25, "normalTexture": {"index": 0, "texCoord": 1},
+        "extensions": {"KHR_materials_pbrSpecularGlossiness": older}});
+    assert_eq!(cutouts(&document(older.clone()), AlphaMode::Mask).unwrap(), expected);
+    let mut model = document(older);
+    model.0["images"][0] = json!({"uri": "a leaf.png"});
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a leaf.png"), image()).unwrap();
+    assert_eq!(read(folder.path(), &model, AlphaMode::Mask).unwrap(), expected);
+    let path = folder.path().join("a.glb");
+    assert!(source_files(&path, AlphaMode::Mask).unwrap().contains(&folder.path().join("a leaf.png")));
+}
+
 #[test]
 fn blended_materials_count_where_they_are_asked_for() {
     let blend = json!({"alphaMode": "BLEND", "alphaCutoff": 0.1, "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}});

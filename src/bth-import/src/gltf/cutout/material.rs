@@ -11,8 +11,11 @@ use super::image::{self, ImageError, MAX_TEXELS};
 use crate::cutout::{AlphaImage, AlphaMode, CutoutMaterial, Wrap};
 use crate::error::{Error, Result};
 use crate::gltf::accessor::Accessors;
+use crate::gltf::base_color::{BaseColor, SPECULAR_GLOSSINESS, base_color};
 use crate::gltf::materials::ALPHA_MODES;
-use crate::gltf::texture_parts::{IndexedTexture, TextureParts, TextureReader};
+use crate::gltf::schema::Extensions;
+use crate::gltf::texture::TextureCoordinates;
+use crate::gltf::texture_parts::{TextureParts, TextureReader};
 use crate::number::shown;
 
 #[derive(Deserialize, Default)]
@@ -20,14 +23,14 @@ use crate::number::shown;
 struct AlphaMaterial {
     alpha_mode: Option<String>,
     alpha_cutoff: Option<f64>,
-    pbr_metallic_roughness: BaseColor,
+    pbr_metallic_roughness: Option<BaseColor>,
+    extensions: Extensions,
 }
 
-#[derive(Deserialize, Default)]
-#[serde(default, rename_all = "camelCase")]
-struct BaseColor {
-    base_color_factor: Option<[f64; 4]>,
-    base_color_texture: Option<IndexedTexture>,
+impl AlphaMaterial {
+    fn base(&self) -> serde_json::Result<BaseColor> {
+        base_color(self.pbr_metallic_roughness.as_ref(), &self.extensions)
+    }
 }
 
 /// Whether the alpha of a material makes holes, and its cutoff.
@@ -46,7 +49,7 @@ pub(super) fn files(parts: &TextureParts, mode: AlphaMode) -> Vec<String> {
     for material in parts.materials.iter().filter_map(|value| AlphaMaterial::deserialize(value).ok()) {
         let uri = || {
             cutoff(&material, mode)?;
-            parts.file(material.pbr_metallic_roughness.base_color_texture?.index)
+            parts.file(material.base().ok()?.base_color_texture?.index)
         };
         uris.extend(uri().filter(|uri| !uris.contains(uri)));
     }
@@ -62,6 +65,8 @@ pub(super) struct Materials<'m, 'a> {
     /// Rows of `images` by the document's images; `None` for images without alpha.
     image_rows: HashMap<usize, Option<usize>>,
     pub(super) read: Vec<CutoutMaterial>,
+    /// For each row of `read` the coordinates of its texture; `None` without one.
+    coordinates: Vec<Option<TextureCoordinates>>,
     pub(super) images: Vec<AlphaImage>,
 }
 
@@ -69,7 +74,8 @@ impl<'m, 'a> Materials<'m, 'a> {
     pub(super) fn new(accessors: &'m Accessors<'a>, parts: &'m TextureParts, mode: AlphaMode) -> Self {
         let (rows, image_rows) = (HashMap::new(), HashMap::new());
         let reader = TextureReader { accessors, parts, without: "without cut-outs (--alpha none)" };
-        Materials { reader, mode, rows, image_rows, read: Vec::new(), images: Vec::new() }
+        let (read, coordinates, images) = (Vec::new(), Vec::new(), Vec::new());
+        Materials { reader, mode, rows, image_rows, read, coordinates, images }
     }
 
     /// The row of a material of the document; `None` where its alpha makes no holes.
@@ -93,8 +99,9 @@ impl<'m, 'a> Materials<'m, 'a> {
         }
         let row = match cutoff(&material, self.mode) {
             Some(cutoff) => {
-                let read = self.cutout(&material, cutoff, &part)?;
+                let (read, coordinates) = self.cutout(&material, cutoff, &part)?;
                 self.read.push(read);
+                self.coordinates.push(coordinates);
                 Some(self.read.len() - 1)
             }
             None => None,
@@ -103,8 +110,15 @@ impl<'m, 'a> Materials<'m, 'a> {
         Ok(row)
     }
 
-    fn cutout(&mut self, material: &AlphaMaterial, cutoff: f64, part: &str) -> Result<CutoutMaterial> {
-        let base = &material.pbr_metallic_roughness;
+    fn cutout(
+        &mut self,
+        material: &AlphaMaterial,
+        cutoff: f64,
+        part: &str,
+    ) -> Result<(CutoutMaterial, Option<TextureCoordinates>)> {
+        let base = material.base().map_err(|e| {
+            self.reader.malformed(part, format!("expected what {SPECULAR_GLOSSINESS} defines, found: {e}"))
+        })?;
         let factor = base.base_color_factor.map_or(1.0, |factor| factor[3]);
         let is_valid = (0.0..=1.0).contains(&factor) && cutoff >= 0.0 && cutoff.is_finite();
         if !is_valid {
@@ -114,15 +128,18 @@ impl<'m, 'a> Materials<'m, 'a> {
             return Err(self.reader.malformed(part, message));
         }
         let plain = CutoutMaterial { image: None, wrap: [Wrap::Repeat; 2], nearest: false, factor, cutoff };
-        let Some(reference) = &base.base_color_texture else { return Ok(plain) };
-        let texture = self.reader.texture(reference.index)?;
+        let Some(used) = &base.base_color_texture else { return Ok((plain, None)) };
+        let coordinates = TextureCoordinates::of_texture(&used.reference)
+            .map_err(|e| self.reader.malformed(part, format!("expected a texture, found: {e}")))?;
+        let texture = self.reader.texture(used.index)?;
         let Some(source) = texture.image else {
-            let name = format!("texture {}", reference.index);
+            let name = format!("texture {}", used.index);
             let message = "expected a PNG, JPEG or WebP image, found none";
             return Err(self.reader.unreadable(&name, message.to_owned()));
         };
         let image = self.image(source)?;
-        Ok(CutoutMaterial { image, wrap: texture.wrap, nearest: texture.nearest, ..plain })
+        let read = CutoutMaterial { image, wrap: texture.wrap, nearest: texture.nearest, ..plain };
+        Ok((read, Some(coordinates)))
     }
 
     /// The row of an image of the document; `None` where its alpha is 1 everywhere.
@@ -144,6 +161,11 @@ impl<'m, 'a> Materials<'m, 'a> {
         });
         self.image_rows.insert(index, row);
         Ok(row)
+    }
+
+    /// The coordinates of the texture of a row; `None` without one.
+    pub(super) fn coordinates(&self, row: usize) -> Option<&TextureCoordinates> {
+        self.coordinates[row].as_ref()
     }
 
     /// Whether the texture coordinates of a material decide about its alpha.

@@ -108,9 +108,10 @@ impl CutoutReader<'_, '_> {
             Some(material) => self.materials.row(material)?,
             None => None,
         };
-        let keep = if row.is_some() { Keep::All } else { Keep::None };
-        let Some(mut kept) = reader.kept(keep)? else { return Ok(()) };
-        kept.normals = None;
+        let Some(mut kept) = reader.kept(Keep::None)? else { return Ok(()) };
+        if let Some(coordinates) = row.and_then(|row| self.materials.coordinates(row)) {
+            kept.take_coordinates(reader.primitive, coordinates.clone());
+        }
         if reader.points_or_lines(&kept)?.is_some() {
             return Ok(());
         }

@@ -182,6 +182,15 @@ fn dependencies_name_every_file_of_a_scene() {
 }
 
 #[test]
+fn a_dependency_file_that_cannot_be_written_leaves_one_json_object() {
+    let folder = folder(&[("a.obj", &sphere(4)), ("b.obj", &sphere(4))]);
+    for models in [&["a.obj"][..], &["a.obj", "b.obj"]] {
+        let args = [&["compile", "--depfile", "none/a.d", "--json"], models].concat();
+        assert_eq!(bthc(folder.path(), &args).expect(4).json()["error"]["code"], "BTH-O020");
+    }
+}
+
+#[test]
 fn a_dry_run_says_what_would_be_done_and_does_nothing() {
     let folder = folder(&[("a.obj", &sphere(8))]);
     let path = folder.path();

@@ -57,19 +57,16 @@ pub(crate) fn run(args: &Compile) -> Result<(), Failure> {
     if args.jobs.watch {
         return watch::run(&mut context, &jobs, &progress);
     }
-    all(&context, &jobs, progress)?;
-    match &args.jobs.depfile {
-        Some(path) => depfile::write(path, &context, &jobs),
-        None => Ok(()),
-    }
+    all(&context, &jobs, progress)
 }
 
-/// Compiles all jobs and prints their reports.
+/// Compiles all jobs, writes the dependency file, and prints the reports.
 fn all(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -> Result<(), Failure> {
     let args = context.args;
     if let [job] = jobs {
         let done = with_threads(args.threads, || compile_one(context, job, &progress))??;
         drop(progress);
+        write_dependencies(context, jobs)?;
         return match (args.json, args.quiet || job.target == Target::Stdout) {
             (true, _) => Ok(output::json(&done.json)?),
             (false, true) => Ok(()),
@@ -92,6 +89,9 @@ fn all(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -> Result<(),
     });
     drop(progress);
     let failed = results.iter().filter_map(|r| r.as_ref().err()).map(Failure::exit_code).next();
+    if failed.is_none() {
+        write_dependencies(context, jobs)?;
+    }
     let report = |(job, result): (&Job, Result<JobReport, Failure>)| match result {
         Ok(done) => done.json,
         Err(failure) => {
@@ -104,6 +104,14 @@ fn all(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -> Result<(),
         output::json(&json!({ "jobs": reports }))?;
     }
     failed.map_or(Ok(()), |code| Err(Failure::Reported(code)))
+}
+
+/// Writes the dependency file, if there is to be one. Before the reports, since with --json an error takes their place.
+fn write_dependencies(context: &JobContext<'_>, jobs: &[Job]) -> Result<(), Failure> {
+    match &context.args.jobs.depfile {
+        Some(path) => depfile::write(path, context, jobs),
+        None => Ok(()),
+    }
 }
 
 /// Fails if an output would replace a file that is read, or the dependency file an output.

@@ -63,16 +63,17 @@ fn run(args: &args::Args) -> Result<(), Failure> {
     // Keeps the entry from being evicted from the cache until the end of the program.
     let compiled;
     let mut inputs: Vec<PathBuf> = [file.to_owned()].into_iter().chain(args.env.clone()).collect();
-    let (file, mut scene) = if compile_source::is_source(file) {
+    // Messages name the file that the user named, also where another one is mapped.
+    let (mapped, mut scene) = if compile_source::is_source(file) {
         compiled = compile_source::compiled(
             file,
             args.cache_dir.as_deref(),
             args.window || args.mode.shows_materials(),
         )?;
         inputs.extend(compiled.inputs.iter().cloned());
-        (compiled.pin.path.as_path(), open(&compiled.pin.path, true)?)
+        (Some(compiled.pin.path.as_path()), open(&compiled.pin.path, true)?)
     } else {
-        (file, open(file, args.map)?)
+        (Some(file).filter(|_| args.map), open(file, args.map)?)
     };
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads)
@@ -87,7 +88,7 @@ fn run(args: &args::Args) -> Result<(), Failure> {
     let output = args.output()?;
     let (report, quiet) =
         pool.install(|| render::render_sequence(&mut scene, file, output, &inputs, args))?;
-    report::show(args, &scene, file, &report, threads, quiet)
+    report::show(args, &scene, mapped, &report, threads, quiet)
 }
 
 fn show_window(

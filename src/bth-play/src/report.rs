@@ -39,13 +39,14 @@ struct Stats {
 }
 
 impl Stats {
-    fn new(scene: &Scene, file: &Path, mapped: bool) -> Self {
+    /// `mapped` is the path of the file, if it is mapped.
+    fn new(scene: &Scene, mapped: Option<&Path>) -> Self {
         let file_bytes = scene.file().bytes().len() as u64;
         let (instance_bytes, hierarchy_bytes) = scene.heap_bytes();
         Stats {
             file_bytes,
-            mapped_bytes: if mapped { file_bytes } else { 0 },
-            resident_bytes: if mapped { resident(file) } else { Some(file_bytes) },
+            mapped_bytes: if mapped.is_some() { file_bytes } else { 0 },
+            resident_bytes: mapped.map_or(Some(file_bytes), resident),
             objects: scene.object_count(),
             objects_touched: scene.touched_objects(),
             instances: scene.instance_count(),
@@ -65,15 +66,16 @@ fn resident(file: &Path) -> Option<u64> {
 }
 
 /// Prints time and rays of the frames, for people or as JSON; on standard error when the pictures went to standard output.
+/// `mapped` is the path of the file, if it is mapped.
 pub(crate) fn show(
     args: &Args,
     scene: &Scene,
-    file: &Path,
+    mapped: Option<&Path>,
     report: &Report,
     threads: usize,
     quiet: bool,
 ) -> Result<(), Failure> {
-    let stats = args.stats.then(|| Stats::new(scene, file, args.map));
+    let stats = args.stats.then(|| Stats::new(scene, mapped));
     let text = match args.json {
         true => format!("{:#}\n", json(args, scene, report, threads, stats)),
         false => text(args, report, threads, stats),

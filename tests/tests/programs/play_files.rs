@@ -56,6 +56,20 @@ fn models_are_shown_without_a_folder_for_the_cache() {
     }
 }
 
+/// A model is mapped from the cache, whose files have names that nobody knows.
+#[test]
+fn messages_about_a_model_name_it_and_not_its_entry_in_the_cache() {
+    let folder = folder(&[("ball.obj", &sphere(4))]);
+    let args = ["ball.obj", "-o", "a.png", "--cache-dir", "c"];
+    let play = |more: &[&str]| play(folder.path(), &[&args, more].concat());
+    let lacks = play(&["--camera", "nosuch"]).expect(2);
+    assert!(lacks.stderr.starts_with("error: BTH-U001: ball.obj has no cameras"), "{lacks:?}");
+    let far = play(&["--camera", "1e39,0,0,0,0,0"]).expect(0);
+    assert!(far.stderr.starts_with("warning: ball.obj: the camera"), "{far:?}");
+    let stats = &play(&["--stats", "--json"]).expect(0).json()["stats"];
+    assert!(stats["mapped_bytes"] == stats["file_bytes"], "{stats}");
+}
+
 /// A cache in which nothing can be kept is no fault of the materials.
 #[cfg(unix)]
 #[test]

@@ -9,6 +9,7 @@ mod sink;
 mod tone_mapping;
 mod y4m;
 
+pub(crate) use numbered::Pattern;
 pub(crate) use picture::Picture;
 pub(crate) use sink::{Sink, refuse_inputs};
 pub(crate) use tone_mapping::{reinhard, shoulder, to_picture};

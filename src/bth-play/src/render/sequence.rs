@@ -8,7 +8,7 @@ use crate::args::Args;
 use crate::camera::SceneSetup;
 use crate::failure::Failure;
 use crate::messages::warn;
-use crate::output::Sink;
+use crate::output::{Pattern, Sink};
 use bth::Scene;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -101,8 +101,7 @@ fn frames_named(first: i32, last: i32) -> String {
 }
 
 fn is_one_picture(output: &Path) -> bool {
-    output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"))
-        && !output.to_string_lossy().contains('#')
+    output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) && Pattern::new(output).is_none()
 }
 
 /// Renders the frames that the options choose; `inputs` are the files that no picture may replace. The second value tells whether the pictures went to standard output, so that

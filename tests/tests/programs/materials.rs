@@ -177,7 +177,7 @@ fn surroundings_light_the_scene_in_their_color() {
         at(&shown(folder.path(), &["--mode", "path", "--env", "grey.hdr", "--spp", "256"]), 1.0, 1.0);
     let light = 0.8 * 0.6f64;
     let expected = 255.0 * (1.055 * (light * (1.0 + light / 16.0) / (1.0 + light)).powf(1.0 / 2.4) - 0.055);
-    assert!((f64::from(r) - expected).abs() < 3.0, "{r} for {expected}");
+    assert!((f64::from(r) - expected).abs() < 1.0, "{r} for {expected}");
     let failed = |args: &[&str], code: i32, text: &str| {
         let all: Vec<&str> = ["a.bth", "-o", "x.png"].iter().chain(args).copied().collect();
         let run = run("bth-play", folder.path(), &all).expect(code);

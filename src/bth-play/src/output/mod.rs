@@ -12,4 +12,4 @@ mod y4m;
 pub(crate) use numbered::Pattern;
 pub(crate) use picture::Picture;
 pub(crate) use sink::{Sink, refuse_inputs};
-pub(crate) use tone_mapping::{reinhard, shoulder, to_picture};
+pub(crate) use tone_mapping::{shoulder, to_picture};

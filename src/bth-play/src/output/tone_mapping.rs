@@ -12,8 +12,9 @@ pub(crate) fn shoulder(color: Vec3) -> Vec3 {
 }
 
 /// The extended operator of Reinhard et al. ("Photographic Tone Reproduction for Digital Images", 2002, equation 4), which
-/// maps 4 to white.
-pub(crate) fn reinhard(color: Vec3) -> Vec3 {
+/// maps 4 to white. It is for mean colours: the curve is concave, so that means of compressed samples would be the darker the more these
+/// differ.
+fn reinhard(color: Vec3) -> Vec3 {
     color * (Vec3::ONE + color / 16.0) / (Vec3::ONE + color)
 }
 
@@ -25,7 +26,8 @@ pub(crate) fn to_picture(colors: &[Vec3], args: &Args) -> Picture {
         _ => 0,
     };
     let display = |color: &Vec3| match args.mode {
-        Mode::Shaded | Mode::Ao | Mode::Path | Mode::Instances | Mode::Clay => color.to_array().map(srgb),
+        Mode::Shaded | Mode::Ao | Mode::Instances | Mode::Clay => color.to_array().map(srgb),
+        Mode::Path => reinhard(*color).to_array().map(srgb),
         Mode::Normals => color.to_array(),
         Mode::Steps => color_map::color(color.x / maximum as f32),
     };

@@ -7,7 +7,6 @@ use super::occlusion_rays::{OcclusionRays, Origin};
 use super::surface_colors::instance_color;
 use super::visibility;
 use crate::materials::Look;
-use crate::output::reinhard;
 use crate::sampling::cosine_hemisphere;
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use glam::{DVec2, DVec3, Vec3};
@@ -67,7 +66,7 @@ pub(super) fn shade(
         counters.nearest_rays += hits.len() as u64;
         paths = next;
     }
-    colors.into_iter().map(reinhard).collect()
+    colors
 }
 
 /// What the paths of a batch meet after the bounce of a number.

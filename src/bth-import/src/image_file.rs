@@ -1,11 +1,14 @@
-//! What is checked of an image file without decoding it: its format and its size.
+//! Image files, and what is checked of them without decoding them: format and size.
 
+use crate::error::{Error, Result as ImportResult};
+use crate::gltf::uri::read_at_most;
 use imagesize::{ImageError, ImageType};
+use std::path::Path;
 
 /// Greatest number of texels of an image that is kept: 8,192 by 8,192.
 pub(crate) const MAX_TEXELS: u64 = 1 << 26;
-/// Greatest number of bytes of an image file.
-pub(crate) const MAX_FILE: u64 = 1 << 28;
+/// Greatest number of bytes of an image or a material library in a file of its own.
+const MAX_FILE: u64 = 1 << 28;
 
 /// Why an image is not kept.
 #[derive(Debug, PartialEq)]
@@ -14,6 +17,20 @@ pub(crate) enum Refused {
     Malformed(String),
     /// It has this many texels, more than [`MAX_TEXELS`].
     TooLarge(u64),
+}
+
+/// The bytes of an image or a material library beside a model.
+///
+/// # Errors
+/// `BTH-O001` when it cannot be read or is no regular file, `BTH-L003` for one that is too large.
+pub(crate) fn read(path: &Path) -> ImportResult<Vec<u8>> {
+    match bth_files::regular_file(path).map(|file| file.len()) {
+        Ok(bytes) if bytes > MAX_FILE => Err(Error::Limit {
+            code: "BTH-L003",
+            message: format!("{} has {bytes} bytes; up to {MAX_FILE} are read", path.display()),
+        }),
+        _ => read_at_most(path, MAX_FILE),
+    }
 }
 
 /// Checks that the header of a file is that of a PNG, JPEG or WebP image of a size that is kept.

@@ -1,8 +1,7 @@
 //! Material libraries of OBJ files (MTL): diffuse colour, emission, opacity and their images. Colours count as linear.
 
 use crate::error::{Error, Place, Result};
-use crate::gltf::uri::read_at_most;
-use crate::image_file::{self, MAX_FILE, MAX_TEXELS, Refused};
+use crate::image_file::{self, MAX_TEXELS, Refused};
 use crate::materials::{ImageFile, MaterialRecorder, PLAIN};
 use crate::number::{Lines, float, shown, words};
 use crate::source::{IMAGE, MALFORMED, MALFORMED_HINT, Source, input_error};
@@ -89,7 +88,7 @@ pub(super) fn files(path: &Path, data: &[u8]) -> Vec<PathBuf> {
     for library in libraries_of(data) {
         for file in read.new_files(path, &library.names) {
             // What cannot be read is reported when it is read.
-            let Ok(text) = read_at_most(&file, MAX_FILE) else { continue };
+            let Ok(text) = image_file::read(&file) else { continue };
             let mut found = Libraries::default();
             // What is malformed is reported when it is read.
             let _ = parse(&file, &text, &mut found);
@@ -111,7 +110,7 @@ pub(super) fn images(source: &Source<'_>) -> Result<Vec<ImageFile>> {
     let maps: BTreeSet<&PathBuf> =
         found.materials.values().flat_map(kept_maps).map(|map| &map.file).collect();
     // Materials that no face has may refer to images that cannot be read.
-    Ok(maps.into_iter().filter_map(|file| read_at_most(file, MAX_FILE).ok().map(ImageFile::new)).collect())
+    Ok(maps.into_iter().filter_map(|file| image_file::read(file).ok().map(ImageFile::new)).collect())
 }
 
 /// The images of a material that files keep.
@@ -177,7 +176,7 @@ fn read_libraries(source: &Source<'_>, libraries: &[Library]) -> Result<Librarie
             return Err(source.error_at_line(IMAGE, library.line, message, hint));
         }
         for file in files {
-            let text = read_at_most(&file, MAX_FILE).map_err(|e| match e {
+            let text = image_file::read(&file).map_err(|e| match e {
                 Error::File { path, message, .. } => {
                     let message = format!("expected the material library {}: {message}", path.display());
                     source.error_at_line(IMAGE, library.line, message, hint)
@@ -350,7 +349,7 @@ fn image_name(map: &Map, images: &mut HashMap<PathBuf, [u8; 16]>) -> Result<[u8;
         return Ok(*name);
     }
     let shown = map.file.display();
-    let bytes = read_at_most(&map.file, MAX_FILE).map_err(|e| {
+    let bytes = image_file::read(&map.file).map_err(|e| {
         let hint = "put the image there, or compile without --materials";
         match e {
             Error::File { message, .. } => {

@@ -13,8 +13,8 @@ use crate::error::{Error, Result};
 use crate::gltf::accessor::Accessors;
 use crate::gltf::container::split;
 use crate::gltf::schema::Extensions;
-use crate::gltf::uri::{beside, decode_base64, read_at_most};
-use crate::image_file::MAX_FILE;
+use crate::gltf::uri::{beside, decode_base64};
+use crate::image_file;
 use crate::number::shown;
 use crate::source::{IMAGE, MALFORMED, MALFORMED_HINT, Source};
 
@@ -157,7 +157,7 @@ impl TextureReader<'_, '_> {
                 format!("put the image beside the model and name it in the uri, or compile {}", self.without);
             return Err(self.accessors.source.error_in_part(IMAGE, part, message, &hint));
         };
-        read_at_most(&path, MAX_FILE)
+        image_file::read(&path)
     }
 
     /// A row of a list of the document, parsed.

@@ -157,6 +157,20 @@ fn images_come_from_files_and_data_uris_too() {
     assert_eq!(source_files(&path, AlphaMode::Mask).unwrap(), [path, folder.path().join("a leaf.png")]);
 }
 
+/// An image of 2^28 bytes and one more, without its end, would look like one that is damaged.
+#[test]
+fn an_image_file_that_is_too_large_is_refused_and_not_cut_off() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut model = document(masked());
+    model.0["images"][0] = json!({"uri": "large.png"});
+    let path = folder.path().join("large.png");
+    std::fs::write(&path, image()).unwrap();
+    std::fs::File::options().write(true).open(&path).unwrap().set_len((1 << 28) + 1).unwrap();
+    let error = read(folder.path(), &model, AlphaMode::Mask).unwrap_err();
+    assert!(matches!(error, Error::Limit { code: "BTH-L003", .. }), "{error}");
+    assert!(error.to_string().contains("large.png has 268435457 bytes"), "{error}");
+}
+
 #[test]
 fn an_uri_that_is_no_file_is_not_shown_whole() {
     let mut model = document(masked());

@@ -29,6 +29,8 @@ fn misused_command_lines_exit_with_2_and_name_the_word() {
         (&["speed"], "<MODEL>"),
         (&["compare", "a.so", "b.so", "torus-knot", "--worse", "1"], "--worse"),
         (&["stress", "--size", "0"], "--size"),
+        (&["speed", "torus-knot", "--name", "../speed"], "--name"),
+        (&["speed", "torus-knot", "--name", ""], "--name"),
         (&["shutter", "swarm", "--open", "1,nan"], "--open"),
     ] {
         let (code, message) = mistake(arguments);

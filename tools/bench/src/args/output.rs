@@ -1,5 +1,6 @@
 //! Where a command writes its results.
 
+use super::values::file_name;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -16,6 +17,6 @@ pub struct Output {
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Name of the report; by default that of the measurement.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = file_name)]
     pub name: Option<String>,
 }

@@ -9,6 +9,12 @@ pub(super) fn share(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "expected a share such as 1%".to_owned())
 }
 
+/// A part of a file's name, which names no other folder.
+pub(super) fn file_name(text: &str) -> Result<String, String> {
+    let is_name = !text.is_empty() && !text.contains(|c| std::path::is_separator(c) || c.is_control());
+    is_name.then(|| text.to_owned()).ok_or_else(|| "expected a name, without folders".to_owned())
+}
+
 /// A whole number from 1.
 pub(super) fn at_least_one(text: &str) -> Result<usize, String> {
     text.parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a number from 1".to_owned())

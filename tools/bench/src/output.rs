@@ -149,15 +149,36 @@ pub fn print_and_save(page: &str, save: impl FnOnce() -> Result<()>) -> Result<(
     Ok(printed?)
 }
 
-fn write(path: &Path, text: &str) -> Result<()> {
+/// Writes a file that is whole or absent, and the folders that it lies in. What it replaces stays where it cannot be written.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn write(path: &Path, text: &str) -> Result<()> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     }
-    std::fs::write(path, text).with_context(|| path.display().to_string())
+    bth_files::replace(path, |file| file.write_all(text.as_bytes()))
+        .with_context(|| path.display().to_string())
 }
 
 /// Prints a message to standard error.
 pub fn note(what: &str) {
     // Nothing can be done when standard error is closed.
     let _ = writeln!(std::io::stderr().lock(), "{what}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_replaced_and_not_written_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let [path, link] = ["of/it/report.md", "former.md"].map(|name| folder.path().join(name));
+        write(&path, "former").unwrap();
+        std::fs::hard_link(&path, &link).unwrap();
+        write(&path, "new").unwrap();
+        let text = |path: &Path| std::fs::read_to_string(path).unwrap();
+        assert_eq!((text(&path), text(&link)), ("new".to_owned(), "former".to_owned()));
+    }
 }

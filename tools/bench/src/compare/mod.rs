@@ -16,11 +16,11 @@ use self::library::{Build, OpenedByBuild};
 use crate::args::Compare;
 use crate::clock::Clock;
 use crate::isa;
-use crate::output::print_and_save;
+use crate::output::{print_and_save, write};
 use crate::progress::Progress;
 use crate::rays::{self, Finder, RaySet};
 use crate::rounds::quartiles;
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Result, bail, ensure};
 use bth::rays::{Hit, Ray};
 
 /// Seconds of CPU time that a turn takes at least; small sets are traced several times a turn, as the clock is too coarse for
@@ -58,7 +58,7 @@ pub fn run(arguments: &Compare) -> Result<Verdict> {
     print_and_save(&comparison.markdown(), || {
         let Some(path) = &arguments.json else { return Ok(()) };
         let text = format!("{:#}\n", serde_json::to_value(&comparison)?);
-        std::fs::write(path, text).with_context(|| path.display().to_string())
+        write(path, &text)
     })?;
     let differing = comparison.differing();
     ensure!(differing.is_empty(), "the builds give different answers: {}", differing.join(", "));

@@ -13,7 +13,7 @@ pub use summary::summarize;
 
 use crate::args::{RecordRows, Summary};
 use crate::machine::{self, Machine};
-use crate::output::note;
+use crate::output::{self, note};
 use anyhow::{Context, Result, ensure};
 use std::fmt::Write as _;
 use std::io::{Read, Write};
@@ -80,11 +80,10 @@ pub fn run_summary(arguments: &Summary) -> Result<()> {
         ensure!(found == summary.text, "{}: not up to date: run `bth-bench summary`", file.display());
         return Ok(());
     }
-    std::fs::write(&file, &summary.text).with_context(|| file.display().to_string())?;
+    output::write(&file, &summary.text)?;
     if let Some(folder) = &arguments.charts {
-        std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         for chart in &summary.charts {
-            std::fs::write(folder.join(format!("{}.svg", chart.name)), &chart.svg)?;
+            output::write(&folder.join(format!("{}.svg", chart.name)), &chart.svg)?;
         }
     }
     Ok(())

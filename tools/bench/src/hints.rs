@@ -5,7 +5,7 @@ use crate::args::Hints;
 use crate::clock::Clock;
 use crate::isa;
 use crate::markdown::{cells, count, table};
-use crate::output::{Head, Record};
+use crate::output::{Head, Report};
 use crate::progress::Progress;
 use crate::rounds::medians;
 use crate::scenes::{FrameRaySet, FrameRays, Source};
@@ -45,10 +45,10 @@ pub struct HintTimes {
     pub differ: usize,
 }
 
-/// Measures, prints and writes the record.
+/// Measures, prints and writes the report.
 ///
 /// # Errors
-/// If an option or scene cannot be used, an answer differs, or the record cannot be written.
+/// If an option or scene cannot be used, an answer differs, or the report cannot be written.
 pub fn run(arguments: &Hints) -> Result<()> {
     let isa = isa::select(arguments.run.isa.as_deref())?;
     let progress = Progress::new();
@@ -64,7 +64,7 @@ pub fn run(arguments: &Hints) -> Result<()> {
     drop(progress);
     let json = json!({ "head": head, "rows": rows });
     let body = markdown(&rows);
-    Record { head: &head, title: "Hints in scenes", body, json, charts: Vec::new() }
+    Report { head: &head, title: "Hints in scenes", body, json, charts: Vec::new() }
         .write(&arguments.run.output)?;
     ensure!(rows.iter().all(|row| row.differ == 0), "answers differ");
     Ok(())

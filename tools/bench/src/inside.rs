@@ -5,7 +5,7 @@ use crate::args::Inside;
 use crate::clock::Clock;
 use crate::markdown::{count, table};
 use crate::model::Model;
-use crate::output::{Head, Record};
+use crate::output::{Head, Report};
 use crate::progress::Progress;
 use anyhow::{Result, ensure};
 use bth::Scene;
@@ -73,7 +73,7 @@ impl ModelRun {
 /// Asks for rounds of points of all models until there are enough.
 ///
 /// # Errors
-/// If a model cannot be compiled or is not closed, if any answer was wrong, or if the record cannot be written.
+/// If a model cannot be compiled or is not closed, if any answer was wrong, or if the report cannot be written.
 pub fn run(arguments: &Inside) -> Result<()> {
     let progress = Progress::new();
     let start = std::time::Instant::now();
@@ -108,8 +108,8 @@ pub fn run(arguments: &Inside) -> Result<()> {
     let options = json!({ "one_in": arguments.one_in, "seed": arguments.seed, "seconds": seconds });
     let head = Head::now("inside", isas.join(", in turn "), options);
     let json = json!({ "head": head, "models": runs.iter().map(ModelRun::json).collect::<Vec<_>>() });
-    let record = Record { head: &head, title: "Inside", body: body(&runs), json, charts: Vec::new() };
-    record.write(&arguments.output)
+    let report = Report { head: &head, title: "Inside", body: body(&runs), json, charts: Vec::new() };
+    report.write(&arguments.output)
 }
 
 fn body(runs: &[ModelRun]) -> String {

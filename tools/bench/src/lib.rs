@@ -1,8 +1,8 @@
 //! Measures bth beside other CPU ray tracers on identical rays.
 //!
 //! `rays` makes the seeded ray sets, `structures` and `rivals` the [`tracer::Contender`]s. `speed`, `compare`, `accuracy`, `load`,
-//! `stress`, `inside`, `costs`, `paper`, `quality`, `scales`, `scenes`, `hints`, `instances`, `refit` and `animation` are the measurements; `output` writes their
-//! records as Markdown, JSON and SVG, and `records` keeps the figures of `benchmarks/`.
+//! `stress`, `inside`, `costs`, `paper`, `quality`, `scales`, `scenes`, `hints`, `instances`, `refit`, `animation` and `shutter` are the measurements; `output` writes their
+//! reports as Markdown, JSON and SVG, and `records` keeps the figures of `benchmarks/`.
 #![warn(missing_docs)]
 
 pub mod accuracy;

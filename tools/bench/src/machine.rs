@@ -1,4 +1,4 @@
-//! Day, commit and type of machine for records, which hold no host names and no paths.
+//! Day, commit and type of machine for reports and rows, which hold no host names and no paths.
 
 use serde::Serialize;
 use std::process::Command;

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use std::io::Write;
 use std::path::Path;
 
-/// When, where and how a record was measured: the first part of every record.
+/// When, where and how a report was measured: the first part of every report.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Head {
     /// Name of the measurement, such as `speed`.
@@ -82,9 +82,9 @@ pub struct Chart {
     pub svg: String,
 }
 
-/// A finished record.
+/// A finished report.
 #[derive(Clone, Debug)]
-pub struct Record<'a> {
+pub struct Report<'a> {
     /// When, where and how it was measured.
     pub head: &'a Head,
     /// Title of the page.
@@ -97,7 +97,7 @@ pub struct Record<'a> {
     pub charts: Vec<Chart>,
 }
 
-impl Record<'_> {
+impl Report<'_> {
     /// Prints the Markdown and writes the files.
     ///
     /// # Errors

@@ -5,7 +5,7 @@ use crate::clock::Clock;
 use crate::isa;
 use crate::markdown::{count, table, two_decimals};
 use crate::model::Model;
-use crate::output::{Head, Record};
+use crate::output::{Head, Report};
 use crate::progress::Progress;
 use crate::rivals::embree::{self, EmbreeScene};
 use crate::rounds::median;
@@ -83,10 +83,10 @@ impl Contender {
     }
 }
 
-/// Measures, prints and writes the record.
+/// Measures, prints and writes the report.
 ///
 /// # Errors
-/// If an option or model cannot be used, Embree is missing, or the record cannot be written.
+/// If an option or model cannot be used, Embree is missing, or the report cannot be written.
 pub fn run(arguments: &Refit) -> Result<()> {
     let isa = isa::select(arguments.run.isa.as_deref())?;
     let rounds = if arguments.run.quick { 1 } else { arguments.rounds };
@@ -107,7 +107,7 @@ pub fn run(arguments: &Refit) -> Result<()> {
     let options = json!({ "rounds": rounds, "twist": TWIST, "quick": arguments.run.quick });
     let head = Head::now("refit", isa, options);
     let json = json!({ "head": head, "rows": rows });
-    Record { head: &head, title: "Objects that deform", body: body(&rows), json, charts: Vec::new() }
+    Report { head: &head, title: "Objects that deform", body: body(&rows), json, charts: Vec::new() }
         .write(&arguments.run.output)
 }
 

@@ -6,7 +6,7 @@ use crate::clock::Clock;
 use crate::isa;
 use crate::markdown::{cells, count, table};
 use crate::model::Model;
-use crate::output::{Head, Record};
+use crate::output::{Head, Report};
 use crate::progress::Progress;
 use crate::rays::{self, Finder};
 use crate::rounds::least;
@@ -48,10 +48,10 @@ struct Set {
     hits: Vec<Hit>,
 }
 
-/// Measures, prints and writes the record.
+/// Measures, prints and writes the report.
 ///
 /// # Errors
-/// If an option or model cannot be used, an answer depends on the scale, or the record cannot be written.
+/// If an option or model cannot be used, an answer depends on the scale, or the report cannot be written.
 pub fn run(arguments: &Scales) -> Result<()> {
     let isa = isa::select(arguments.run.isa.as_deref())?;
     let rounds = if arguments.run.quick { 1 } else { arguments.rounds };
@@ -76,7 +76,7 @@ pub fn run(arguments: &Scales) -> Result<()> {
     let options = json!({ "rounds": rounds, "rays": arguments.rays, "quick": arguments.run.quick });
     let head = Head::now("scales", isa, options);
     let json = json!({ "head": head, "rows": rows });
-    Record { head: &head, title: "Sizes of models", body: body(&rows), json, charts: Vec::new() }
+    Report { head: &head, title: "Sizes of models", body: body(&rows), json, charts: Vec::new() }
         .write(&arguments.run.output)?;
     let differ: u64 = rows.iter().filter_map(|row| row.differ).sum();
     ensure!(differ == 0, "{differ} hits depend on the scale");

@@ -2,7 +2,7 @@
 
 use crate::args::Stress;
 use crate::markdown::{count, table};
-use crate::output::{Head, Record};
+use crate::output::{Head, Report};
 use crate::progress::Progress;
 use anyhow::{Result, ensure};
 use bth_tests::stress::{Shape, Statistics, run as trace, shapes};
@@ -19,11 +19,11 @@ struct ShapeRun {
     statistics: Statistics,
 }
 
-/// Traces rounds of all shapes until enough rays of each are traced. The record is written after every round, so that it is
+/// Traces rounds of all shapes until enough rays of each are traced. The report is written after every round, so that it is
 /// there also if the run is stopped.
 ///
 /// # Errors
-/// If anything was wrong with any answer, or the record cannot be written.
+/// If anything was wrong with any answer, or the report cannot be written.
 pub fn run(arguments: &Stress) -> Result<()> {
     let progress = Progress::new();
     let start = std::time::Instant::now();
@@ -60,9 +60,9 @@ pub fn run(arguments: &Stress) -> Result<()> {
         let seconds = start.elapsed().as_secs();
         if !traced {
             drop(progress);
-            return record(arguments, &runs, &all, seconds, true);
+            return report(arguments, &runs, &all, seconds, true);
         }
-        record(arguments, &runs, &all, seconds, false)?;
+        report(arguments, &runs, &all, seconds, false)?;
         progress.show(format!(
             "{} of {} rays",
             count(all.traced),
@@ -79,7 +79,7 @@ fn total(runs: &[ShapeRun]) -> Statistics {
     all
 }
 
-fn record(
+fn report(
     arguments: &Stress,
     runs: &[ShapeRun],
     all: &Statistics,
@@ -100,8 +100,8 @@ fn record(
     let found: Vec<_> =
         runs.iter().map(|run| json(&run.shape, run.structures.len(), &run.statistics)).collect();
     let json = json!({ "head": head, "shapes": found, "examples": all.examples });
-    let record = Record { head: &head, title: "Stress", body: body(&rows), json, charts: Vec::new() };
-    if is_last { record.write(&arguments.output) } else { record.save(&arguments.output) }
+    let report = Report { head: &head, title: "Stress", body: body(&rows), json, charts: Vec::new() };
+    if is_last { report.write(&arguments.output) } else { report.save(&arguments.output) }
 }
 
 impl ShapeRun {

@@ -138,7 +138,7 @@ pub fn compile(model: &Model, kind: &Kind) -> Result<Compiled> {
     Ok(Compiled { bytes: compiled.bytes, seconds, in_tets })
 }
 
-/// The message of an error without its path, as records hold no paths.
+/// The message of an error without its path, as reports hold no paths.
 fn reason(error: &bth_compile::Error) -> String {
     match error {
         bth_compile::Error::Input { message, hint, .. } => format!("{message} (hint: {hint})"),

@@ -30,8 +30,8 @@ fn a_quick_speed_run_needs_no_rival() {
 
     let files: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|f| f.unwrap().path()).collect();
     let find = |end: &str| files.iter().find(|f| f.to_str().unwrap().ends_with(end)).expect(end);
-    let record = json(find("-quick.json"));
-    let tracers = record["models"][0]["runs"][0]["tracers"].as_array().unwrap();
+    let results = json(find("-quick.json"));
+    let tracers = results["models"][0]["runs"][0]["tracers"].as_array().unwrap();
     let names: Vec<&str> = tracers.iter().map(|t| t["name"].as_str().unwrap()).collect();
     for name in ["bth", "bth from", "bth single", "bvh", "bvh single", "obvhs cwbvh", "k-d tree"] {
         assert!(names.contains(&name), "{names:?}");
@@ -83,8 +83,8 @@ fn load_measures_our_files_where_embree_is_missing() {
     let said = String::from_utf8(done.stderr).unwrap();
     assert!(done.status.success(), "{said}");
     assert!(said.contains("embree: not measured"), "{said}");
-    let record = json(&path);
-    let starts = record["models"][0]["runs"][0]["starts"].as_array().unwrap();
+    let results = json(&path);
+    let starts = results["models"][0]["runs"][0]["starts"].as_array().unwrap();
     let names: Vec<&str> = starts.iter().map(|s| s[0].as_str().unwrap()).collect();
     assert_eq!(names[..4], ["bth map warm", "bth map cold", "bth read warm", "bth read cold"]);
     for start in starts {
@@ -101,8 +101,8 @@ fn hits_do_not_depend_on_the_size_of_a_model() {
         bench(&["scales", "torus-knot:320", "--rays", "256", "--quick", "--json", path.to_str().unwrap()]);
     let said = String::from_utf8(done.stderr).unwrap();
     assert!(done.status.success(), "{said}");
-    let record = json(&path);
-    let rows = record["rows"].as_array().unwrap();
+    let results = json(&path);
+    let rows = results["rows"].as_array().unwrap();
     for row in rows {
         assert!(row["ns"].as_array().unwrap().iter().all(|ns| ns.as_f64().unwrap() > 0.0), "{row}");
     }
@@ -121,8 +121,8 @@ fn every_variation_of_the_builder_gives_the_same_answers() {
     let path = folder.path().join("quality.json");
     let done = bench(&["quality", "hall:1500", "--quick", "--json", path.to_str().unwrap()]);
     assert!(done.status.success(), "{}", String::from_utf8(done.stderr).unwrap());
-    let record = json(&path);
-    let rows = record["models"][0]["rows"].as_array().unwrap();
+    let results = json(&path);
+    let rows = results["models"][0]["rows"].as_array().unwrap();
     let row = |name: &str| rows.iter().find(|r| r["name"] == name).expect(name);
     let number = |name: &str, key: &str| row(name)[key].as_f64().unwrap();
     for row in rows {
@@ -174,8 +174,8 @@ fn accuracy_compares_ours_and_the_crates_without_any_installed_rival() {
 
     let files: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|f| f.unwrap().path()).collect();
     let find = |end: &str| files.iter().find(|f| f.to_str().unwrap().ends_with(end)).expect(end);
-    let record = json(find("-quick.json"));
-    for model in record["models"].as_array().unwrap() {
+    let results = json(find("-quick.json"));
+    for model in results["models"].as_array().unwrap() {
         for tracer in model["tracers"].as_array().unwrap() {
             assert_eq!(tracer["aimed"]["rays"], 4000, "{tracer}");
             assert!(tracer["nanoseconds"]["vertices"].as_f64().unwrap() > 0.0, "{tracer}");

@@ -1,12 +1,12 @@
 //! What fixed figures look like: tables, charts and JSON. After a wanted change: `INSTA_UPDATE=always`.
 
 use bth_bench::clock::Clock;
-use bth_bench::load::{self, LoadRecord, ModelStarts, Times};
+use bth_bench::load::{self, LoadResults, ModelStarts, Times};
 use bth_bench::machine::Machine;
 use bth_bench::output::Head;
 use bth_bench::rays::View;
-use bth_bench::speed::record::{CompiledFile, LeftOut, TracerSpeeds};
-use bth_bench::speed::{self, ModelSpeeds, SpeedRecord};
+use bth_bench::speed::results::{CompiledFile, LeftOut, TracerSpeeds};
+use bth_bench::speed::{self, ModelSpeeds, SpeedResults};
 use serde_json::json;
 use std::collections::BTreeMap;
 
@@ -37,7 +37,7 @@ fn tracer(name: &str, ours: bool, rates: &[(&'static str, f64)]) -> TracerSpeeds
     }
 }
 
-fn speed_record() -> SpeedRecord {
+fn speed_record() -> SpeedResults {
     let model = |name: &str, view, factor: f64, tets: bool| {
         let mut tracers = vec![
             tracer("bth", true, &[("primary", 8.0 * factor), ("diffuse", 3.0)]),
@@ -58,10 +58,10 @@ fn speed_record() -> SpeedRecord {
         }
     };
     let models = vec![model("a", View::Outside, 1.0, false), model("b", View::Inside, 4.0, true)];
-    SpeedRecord { head: head("speed"), models }
+    SpeedResults { head: head("speed"), models }
 }
 
-fn load_record() -> LoadRecord {
+fn load_record() -> LoadResults {
     let times = |total: f64, storage: Option<u64>| Times {
         ready_s: total / 10.0,
         first_hit_s: total / 5.0,
@@ -84,7 +84,7 @@ fn load_record() -> LoadRecord {
         left_out: vec![("embree robust".to_owned(), "not wanted".to_owned())],
         runs: vec![load::StartsRun { threads: 2, starts }],
     };
-    LoadRecord { head: head("load"), rays: 1000, models: vec![model] }
+    LoadResults { head: head("load"), rays: 1000, models: vec![model] }
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The charts of `accuracy`: what is paid, in time or bytes, against what is wrong.
 
 use super::contenders::GROUPS;
-use super::record::{AccuracyRecord, TracerSummary};
+use super::results::{AccuracyResults, TracerSummary};
 use crate::output::Chart;
 use crate::scatter::{PointSeries, Scatter};
 
@@ -53,8 +53,8 @@ const CHARTS: [Axes; 4] = [
 ];
 
 /// All charts, over all models.
-pub fn draw(record: &AccuracyRecord) -> Vec<Chart> {
-    let summaries = record.summaries();
+pub fn draw(results: &AccuracyResults) -> Vec<Chart> {
+    let summaries = results.summaries();
     let chart = |axes: &Axes| Chart { name: axes.name.to_owned(), svg: scatter(axes, &summaries).svg() };
     CHARTS.iter().map(chart).collect()
 }

@@ -5,7 +5,7 @@ use crate::model::Model;
 use crate::names::Names;
 use crate::progress::Progress;
 use crate::rivals::{F32_TESTS, RIVALS, Rival};
-use crate::speed::record::LeftOut;
+use crate::speed::results::LeftOut;
 use crate::structures::{self, Compiled, Kind};
 use crate::tracer::Contender;
 use anyhow::Result;

@@ -9,7 +9,7 @@ mod contenders;
 pub mod defects;
 pub mod exact_answers;
 pub mod picture;
-pub mod record;
+pub mod results;
 mod tables;
 
 pub use charts::draw;
@@ -18,7 +18,7 @@ pub use tables::markdown;
 use crate::args::Accuracy;
 use crate::clock::Clock;
 use crate::model::Model;
-use crate::output::{Head, Record, note};
+use crate::output::{Head, Report, note};
 use crate::progress::Progress;
 use crate::rays::{self, Finder, RaySet};
 use crate::rounds::medians;
@@ -31,7 +31,7 @@ use contenders::{MeasuredTracer, MeasuredTracers};
 use defects::{Defects, ErrorQuantiles, Neighbours};
 use exact_answers::Exact;
 use picture::PictureSetup;
-use record::{AIMED, AccuracyRecord, Errors, ModelErrors, ORDINARY};
+use results::{AIMED, AccuracyResults, Errors, ModelErrors, ORDINARY};
 use serde_json::json;
 use std::collections::BTreeMap;
 
@@ -40,7 +40,7 @@ const PICTURE: (u32, u32) = (512, 288);
 /// Rays of a set in a quick run.
 const QUICK_RAYS: usize = 2000;
 
-/// Measures, prints and writes the record.
+/// Measures, prints and writes the report.
 ///
 /// # Errors
 /// If an option or model cannot be used or a file cannot be written, and, when all is written, if one of our own
@@ -58,25 +58,25 @@ pub fn run(arguments: &Accuracy) -> Result<()> {
     let rays = if arguments.quick { QUICK_RAYS } else { arguments.rays };
     let options = json!({ "rays": rays, "rounds": rounds, "one_in": arguments.one_in });
     let head = Head::now("accuracy", available.join(", "), options);
-    let mut record = AccuracyRecord { head, models: Vec::new() };
+    let mut results = AccuracyResults { head, models: Vec::new() };
     let mut wrong = Vec::new();
     let progress = Progress::new();
     for which in &arguments.models.models {
         let model = Model::load(which)?;
-        record.models.push(measure(&model, arguments, rays, rounds, &progress, &mut wrong)?);
+        results.models.push(measure(&model, arguments, rays, rounds, &progress, &mut wrong)?);
     }
     drop(progress);
-    for model in &record.models {
+    for model in &results.models {
         for left_out in &model.left_out {
             note(&format!("{}: {}: not measured: {}", model.name, left_out.name, left_out.why));
         }
     }
-    Record {
-        head: &record.head,
+    Report {
+        head: &results.head,
         title: "Run time against error",
-        body: markdown(&record),
-        json: serde_json::to_value(&record)?,
-        charts: draw(&record),
+        body: markdown(&results),
+        json: serde_json::to_value(&results)?,
+        charts: draw(&results),
     }
     .write(&arguments.output)?;
     ensure!(wrong.is_empty(), "wrong answers that have to be right: {}", wrong.join(", "));

@@ -3,7 +3,7 @@
 use super::defects::{Defects, ErrorQuantiles};
 use crate::output::Head;
 use crate::rounds::geometric_mean;
-use crate::speed::record::LeftOut;
+use crate::speed::results::LeftOut;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ pub const AIMED: [&str; 2] = ["vertices", "edges"];
 
 /// Everything that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct AccuracyRecord {
+pub struct AccuracyResults {
     /// When and where.
     #[serde(flatten)]
     pub head: Head,
@@ -97,7 +97,7 @@ pub struct TracerSummary<'a> {
     pub dissimilarity: f64,
 }
 
-impl AccuracyRecord {
+impl AccuracyResults {
     /// Every tracer over all models, in the order of the first that has it.
     pub fn summaries(&self) -> Vec<TracerSummary<'_>> {
         let mut names: Vec<&str> = Vec::new();

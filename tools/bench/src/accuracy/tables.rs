@@ -1,16 +1,16 @@
 //! The tables of `accuracy`.
 
 use super::defects::Defects;
-use super::record::{AccuracyRecord, Errors, ModelErrors, ORDINARY, TracerSummary};
+use super::results::{AccuracyResults, Errors, ModelErrors, ORDINARY, TracerSummary};
 use crate::markdown::{cells, count, table};
 
-/// All tables of a record.
-pub fn markdown(record: &AccuracyRecord) -> String {
+/// All tables of a report.
+pub fn markdown(results: &AccuracyResults) -> String {
     let mut text = String::from(LEGEND);
-    if record.models.len() > 1 {
-        text.push_str(&summary(record));
+    if results.models.len() > 1 {
+        text.push_str(&summary(results));
     }
-    for model in &record.models {
+    for model in &results.models {
         text.push_str(&page(model));
     }
     text
@@ -48,9 +48,9 @@ fn bytes(value: Option<f64>) -> String {
     value.map_or("?".to_owned(), |b| format!("{b:.1}"))
 }
 
-fn summary(record: &AccuracyRecord) -> String {
+fn summary(results: &AccuracyResults) -> String {
     let row = |s: &TracerSummary<'_>| {
-        let name = if s.models < record.models.len() {
+        let name = if s.models < results.models.len() {
             format!("{} ({})", s.name, s.models)
         } else {
             s.name.to_owned()
@@ -67,12 +67,12 @@ fn summary(record: &AccuracyRecord) -> String {
             short(s.dissimilarity),
         ]
     };
-    let rows: Vec<Vec<String>> = record.summaries().iter().map(row).collect();
+    let rows: Vec<Vec<String>> = results.summaries().iter().map(row).collect();
     let names = ["tracer", "ns", "B/tri", "wrong", "aimed", "Δt/t, 99 %", "ulp, greatest", "RMSE", "1-SSIM"];
     format!(
         "## All models\n\nGeometric means of ns and bytes, wrong answers of all kinds per million, the worst of the other \
          errors; in brackets: over how many of the {} models, if not all.\n\n{}\n",
-        record.models.len(),
+        results.models.len(),
         table(&cells(&names), &rows)
     )
 }

@@ -10,7 +10,7 @@ mod tables;
 use crate::args::Animation;
 use crate::clock::Clock;
 use crate::isa;
-use crate::output::{Head, Record as Page};
+use crate::output::{Head, Report};
 use crate::progress::Progress;
 use crate::rounds::median;
 use crate::scenes::{FrameRays, Source, compiled};
@@ -68,10 +68,10 @@ pub struct UpdateTimes {
     pub least_refit_ms: f64,
 }
 
-/// Measures, prints and writes the record.
+/// Measures, prints and writes the report.
 ///
 /// # Errors
-/// If an option or scene cannot be used, Embree is missing, an answer differs from that of a tree of ours that is compiled anew, or the record
+/// If an option or scene cannot be used, Embree is missing, an answer differs from that of a tree of ours that is compiled anew, or the report
 /// cannot be written.
 pub fn run(arguments: &Animation) -> Result<()> {
     let isa = isa::select(arguments.run.isa.as_deref())?;
@@ -88,7 +88,7 @@ pub fn run(arguments: &Animation) -> Result<()> {
     drop(progress);
     let json = json!({ "head": head, "scenes": scenes });
     let body = tables::markdown(&scenes);
-    Page { head: &head, title: "Scenes whose objects deform", body, json, charts: Vec::new() }
+    Report { head: &head, title: "Scenes whose objects deform", body, json, charts: Vec::new() }
         .write(&arguments.run.output)?;
     let wrong = scenes.iter().find(|scene| scene.same_triangles && scene.rows[1].differ > 0);
     ensure!(wrong.is_none(), "{}: a tree compiled anew answers otherwise", wrong.map_or("", |s| &s.name));

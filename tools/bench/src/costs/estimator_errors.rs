@@ -1,6 +1,6 @@
 //! How well the estimators predict steps and times of nodes that were not fitted on.
 
-use super::record::{Constants, ESTIMATORS, EstimatorError, MeasuredNode, STARTS};
+use super::results::{Constants, ESTIMATORS, EstimatorError, MeasuredNode, STARTS};
 use super::statistics::{median_error, rank_correlation};
 use crate::rounds::median;
 

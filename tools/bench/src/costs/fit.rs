@@ -1,6 +1,6 @@
 //! The constants of the cost model: fitted on measured nodes, and what they predict for others.
 
-use super::record::{Constants, MeasuredNode};
+use super::results::{Constants, MeasuredNode};
 use anyhow::{Context, Result};
 use bth_compile::costs::{Walk, fit};
 
@@ -102,7 +102,7 @@ impl Constants {
 mod tests {
     use super::*;
     use crate::costs::estimator_errors::estimator_errors;
-    use crate::costs::record::ESTIMATORS;
+    use crate::costs::results::ESTIMATORS;
 
     fn node(triangles: u32, bytes: f64) -> MeasuredNode {
         let levels = f64::from(triangles).log2() / 2.0;

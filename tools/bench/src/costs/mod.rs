@@ -4,7 +4,7 @@
 mod estimator_errors;
 mod fit;
 mod nodes;
-pub mod record;
+pub mod results;
 mod selection_regret;
 mod statistics;
 mod tables;
@@ -18,25 +18,25 @@ pub use tables::{charts, markdown};
 use crate::args::Costs;
 use crate::isa;
 use crate::model::Model;
-use crate::output::{Head, Record};
+use crate::output::{Head, Report};
 use crate::progress::Progress;
 use anyhow::Result;
 use nodes::NodeChoice;
-use record::CostsRecord;
+use results::CostsResults;
 use serde_json::json;
 
-/// Measures, prints and writes the record.
+/// Measures, prints and writes the report.
 ///
 /// # Errors
 /// If an option or model cannot be used or a file cannot be written.
 pub fn run(arguments: &Costs) -> Result<()> {
-    let record = measure(arguments)?;
-    Record {
-        head: &record.head,
+    let results = measure(arguments)?;
+    Report {
+        head: &results.head,
         title: "The cost model against measurements",
-        body: markdown(&record),
-        json: serde_json::to_value(&record)?,
-        charts: charts(&record),
+        body: markdown(&results),
+        json: serde_json::to_value(&results)?,
+        charts: charts(&results),
     }
     .write(&arguments.output)
 }
@@ -45,7 +45,7 @@ pub fn run(arguments: &Costs) -> Result<()> {
 ///
 /// # Errors
 /// If a model cannot be used.
-pub fn measure(arguments: &Costs) -> Result<CostsRecord> {
+pub fn measure(arguments: &Costs) -> Result<CostsResults> {
     let isa = isa::select(arguments.isa.as_deref())?;
     let which = NodeChoice {
         least: arguments.least,
@@ -83,7 +83,7 @@ pub fn measure(arguments: &Costs) -> Result<CostsRecord> {
     for name in &arguments.small {
         regrets.push(selection_regret::measure(&Model::load(name)?, arguments.rounds, &progress)?);
     }
-    Ok(CostsRecord {
+    Ok(CostsResults {
         head: Head::now("costs", isa, options),
         fitted_on,
         judged_on,

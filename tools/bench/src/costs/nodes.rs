@@ -1,7 +1,7 @@
 //! Candidate nodes of models, each as an object of its own: the predictions of the estimators, and the measured steps and times
 //! of rays.
 
-use super::record::{ESTIMATORS, MeasuredNode};
+use super::results::{ESTIMATORS, MeasuredNode};
 use crate::clock::Clock;
 use crate::model::Model;
 use crate::progress::Progress;

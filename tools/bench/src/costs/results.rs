@@ -7,7 +7,7 @@ use serde::Serialize;
 /// others need tetrahedra.
 pub const ESTIMATORS: [&str; 4] = ["face count", "average depth", "area", "sampling"];
 
-/// Where rays start; pairs of numbers in a record are in this order.
+/// Where rays start; pairs of numbers in results are in this order.
 pub const STARTS: [&str; 2] = ["outside", "surface"];
 
 /// A node of a model, tetrahedralized.
@@ -93,7 +93,7 @@ pub struct Regret {
 
 /// Everything that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct CostsRecord {
+pub struct CostsResults {
     /// When and where.
     #[serde(flatten)]
     pub head: Head,

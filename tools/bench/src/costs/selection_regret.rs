@@ -1,6 +1,6 @@
 //! Regret: by how much the selections of the rules are slower than the best one, found by measuring every selection.
 
-use super::record::{Regret, Selection};
+use super::results::{Regret, Selection};
 use crate::clock::Clock;
 use crate::model::Model;
 use crate::progress::Progress;

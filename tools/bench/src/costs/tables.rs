@@ -1,7 +1,7 @@
 //! The tables and plots of `costs`.
 
-use super::record::{
-    Constants, CostsRecord, ESTIMATORS, EstimatorError, MeasuredNode, Regret, STARTS, Selection,
+use super::results::{
+    Constants, CostsResults, ESTIMATORS, EstimatorError, MeasuredNode, Regret, STARTS, Selection,
 };
 use crate::markdown::{cells, count, table};
 use crate::output::Chart;
@@ -16,34 +16,34 @@ fn percent(value: Option<f64>) -> String {
 }
 
 /// The page below its head.
-pub fn markdown(record: &CostsRecord) -> String {
+pub fn markdown(results: &CostsResults) -> String {
     let mut text = format!(
         "Constants fitted on {} ({} nodes), estimators judged on {} ({} nodes). Each node is an object of its own, whole in \
          tetrahedra (Link32), traced in batches; steps and times are means over 8,192 rays. Rank correlation is Spearman's, \
          errors are medians of relative errors.\n\n## Estimators\n\n",
-        record.fitted_on.join(", "),
-        record.fitted.len(),
-        record.judged_on.join(", "),
-        record.nodes.len(),
+        results.fitted_on.join(", "),
+        results.fitted.len(),
+        results.judged_on.join(", "),
+        results.nodes.len(),
     );
-    text.push_str(&estimators(record));
+    text.push_str(&estimators(results));
     text.push_str("\n## Constants\n\n");
-    text.push_str(&constants(&record.constants));
+    text.push_str(&constants(&results.constants));
     text.push_str(
         "\nSizes are those of the tetrahedra and their vertices; in between what the logarithm of the size says.\n",
     );
-    if !record.regrets.is_empty() {
+    if !results.regrets.is_empty() {
         text.push_str(
             "\n## Regret\n\nEvery selection of the suitable nodes in the three topmost levels of small models was measured: \
              a quarter camera rays, the others bounces and ambient occlusion with hints.\n\n",
         );
-        text.push_str(&regrets(&record.regrets));
+        text.push_str(&regrets(&results.regrets));
     }
     text
 }
 
 /// How well each estimator predicts.
-fn estimators(record: &CostsRecord) -> String {
+fn estimators(results: &CostsResults) -> String {
     let head = cells(&[
         "estimator",
         "rays from",
@@ -64,7 +64,7 @@ fn estimators(record: &CostsRecord) -> String {
             percent(j.nanoseconds[1]),
         ]
     };
-    table(&head, &record.judged.iter().map(cells).collect::<Vec<_>>())
+    table(&head, &results.judged.iter().map(cells).collect::<Vec<_>>())
 }
 
 /// The fitted constants, a row for each place where rays start.
@@ -119,13 +119,13 @@ fn regrets(regrets: &[Regret]) -> String {
 }
 
 /// Predicted against measured nanoseconds of each estimator, and error against run time.
-pub fn charts(record: &CostsRecord) -> Vec<Chart> {
+pub fn charts(results: &CostsResults) -> Vec<Chart> {
     let mut charts = Vec::new();
     for (start, start_name) in STARTS.iter().enumerate() {
-        let predicted = |e: usize, n: &MeasuredNode| record.constants.predict(e, start, n);
+        let predicted = |e: usize, n: &MeasuredNode| results.constants.predict(e, start, n);
         let cloud = |e: usize| PointSeries {
             name: ESTIMATORS[e].to_owned(),
-            points: record.nodes.iter().map(|n| (n.nanoseconds[start], predicted(e, n))).collect(),
+            points: results.nodes.iter().map(|n| (n.nanoseconds[start], predicted(e, n))).collect(),
             labels: Vec::new(),
         };
         let scatter = Scatter {
@@ -140,7 +140,7 @@ pub fn charts(record: &CostsRecord) -> Vec<Chart> {
         charts.push(Chart { name: format!("scatter-{start_name}"), svg: scatter.svg() });
     }
     let judged = |e: &'static str| {
-        record.judged.iter().filter(move |j| j.name == e).filter_map(|j| Some((j.micros, j.nanoseconds[1]?)))
+        results.judged.iter().filter(move |j| j.name == e).filter_map(|j| Some((j.micros, j.nanoseconds[1]?)))
     };
     let pareto = Scatter {
         title: "Error against run time".to_owned(),

@@ -7,7 +7,7 @@ use crate::args::Instances;
 use crate::clock::Clock;
 use crate::isa;
 use crate::markdown::{count, table, two_decimals};
-use crate::output::{Head, Record};
+use crate::output::{Head, Report};
 use crate::progress::Progress;
 use crate::rivals::embree::{self, EmbreeScene, Variant};
 use crate::rounds::median;
@@ -80,10 +80,10 @@ impl Contender {
     }
 }
 
-/// Measures, prints and writes the record.
+/// Measures, prints and writes the report.
 ///
 /// # Errors
-/// If an option cannot be used, Embree is missing, or the record cannot be written.
+/// If an option cannot be used, Embree is missing, or the report cannot be written.
 pub fn run(arguments: &Instances) -> Result<()> {
     let isa = isa::select(arguments.run.isa.as_deref())?;
     let rounds = if arguments.run.quick { 1 } else { arguments.rounds };
@@ -100,7 +100,7 @@ pub fn run(arguments: &Instances) -> Result<()> {
     let options = json!({ "rounds": rounds, "triangles": TRIANGLES, "quick": arguments.run.quick });
     let head = Head::now("instances", isa, options);
     let json = json!({ "head": head, "rows": rows });
-    Record {
+    Report {
         head: &head,
         title: "Instances placed by the caller",
         body: body(&rows),

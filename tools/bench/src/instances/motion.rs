@@ -16,7 +16,7 @@ pub(super) enum Motion {
 impl Motion {
     pub(super) const ALL: [Motion; 3] = [Motion::Drift, Motion::Shuffle, Motion::Few];
 
-    /// Its name in tables and records.
+    /// Its name in tables and reports.
     pub(super) fn name(self) -> &'static str {
         match self {
             Motion::Drift => "drift",

@@ -5,21 +5,21 @@
 mod files;
 mod first_rays;
 pub mod probe;
-mod record;
-mod scene_record;
+mod results;
+mod scene_results;
 mod scene_tables;
 pub mod scenes;
 mod starts;
 mod tables;
 
-use record::StartCase;
-pub use record::{LoadRecord, ModelStarts, StartsRun, Times};
-pub use scene_record::{SceneLoadRecord, SceneStarts};
+use results::StartCase;
+pub use results::{LoadResults, ModelStarts, StartsRun, Times};
+pub use scene_results::{SceneLoadResults, SceneStarts};
 pub use tables::{draw, markdown};
 
 use crate::args::{Load, Start};
 use crate::model::Model;
-use crate::output::{Head, Record, note};
+use crate::output::{Head, Report, note};
 use crate::progress::Progress;
 use crate::rays::{self, Finder, RaySet};
 use crate::rivals::embree;
@@ -31,23 +31,23 @@ use first_rays::{SIZE, first_of};
 use serde_json::json;
 use starts::StartRounds;
 
-/// Measures, prints and writes the record.
+/// Measures, prints and writes the report.
 ///
 /// # Errors
 /// If an option or model cannot be used, a start fails or a file cannot be written.
 pub fn run(arguments: &Load) -> Result<()> {
-    let record = measure(arguments)?;
-    for model in &record.models {
+    let results = measure(arguments)?;
+    for model in &results.models {
         for (name, why) in &model.left_out {
             note(&format!("{}: {name}: not measured: {why}", model.name));
         }
     }
-    Record {
-        head: &record.head,
+    Report {
+        head: &results.head,
         title: "Load against rebuild",
-        body: markdown(&record),
-        json: serde_json::to_value(&record)?,
-        charts: draw(&record),
+        body: markdown(&results),
+        json: serde_json::to_value(&results)?,
+        charts: draw(&results),
     }
     .write(&arguments.starts.output)
 }
@@ -56,19 +56,19 @@ pub fn run(arguments: &Load) -> Result<()> {
 ///
 /// # Errors
 /// If a model cannot be used or a start fails.
-pub fn measure(arguments: &Load) -> Result<LoadRecord> {
+pub fn measure(arguments: &Load) -> Result<LoadResults> {
     let isa = isa::select(arguments.starts.isa.as_deref())?;
     let options = json!({"rays": arguments.starts.rays, "rounds": arguments.starts.rounds});
-    let mut record = LoadRecord {
+    let mut results = LoadResults {
         head: Head::now("load", isa.clone(), options),
         rays: arguments.starts.rays,
         models: Vec::new(),
     };
     let progress = Progress::new();
     for which in &arguments.models.models {
-        record.models.push(measure_model(which, arguments, &isa, &progress)?);
+        results.models.push(measure_model(which, arguments, &isa, &progress)?);
     }
-    Ok(record)
+    Ok(results)
 }
 
 fn measure_model(which: &str, arguments: &Load, isa: &str, progress: &Progress) -> Result<ModelStarts> {

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 
 /// Everything that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct LoadRecord {
+pub struct LoadResults {
     /// When and where.
     #[serde(flatten)]
     pub head: Head,

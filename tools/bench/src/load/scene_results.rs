@@ -1,13 +1,13 @@
 //! What `load-scenes` measured, as it is written to JSON.
 
-use super::record::StartsRun;
+use super::results::StartsRun;
 use crate::output::Head;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Everything that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct SceneLoadRecord {
+pub struct SceneLoadResults {
     /// When and where.
     #[serde(flatten)]
     pub head: Head,

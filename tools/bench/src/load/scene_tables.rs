@@ -1,7 +1,7 @@
 //! Tables and chart of `load-scenes`.
 
-use super::record::{StartsRun, Times};
-use super::scene_record::{SceneLoadRecord, SceneStarts};
+use super::results::{StartsRun, Times};
+use super::scene_results::{SceneLoadResults, SceneStarts};
 use super::tables::{factor, on_threads};
 use crate::chart::{BarChart, Scale, Series};
 use crate::markdown::{cells, count, seconds, table};
@@ -11,17 +11,17 @@ use crate::rivals::embree;
 /// What the charts show.
 const SHOWN: [&str; 4] = ["bth map warm", "bth map cold", "bth read warm", "bth read cold"];
 
-pub(super) fn markdown(record: &SceneLoadRecord) -> String {
+pub(super) fn markdown(results: &SceneLoadResults) -> String {
     let mut text = format!(
         "Wall-clock time from before the file is opened, or from before Embree builds all objects (several at once) and their \
          instances from triangles in memory, until the first {} camera rays are traced, each in a process of its own; \
          medians of interleaved rounds. `picture`: {} camera rays, the faster of two rounds after that. `even after`: pictures \
          after which a program that built at its start has caught up by faster tracing; `never` where ours traces as \
          fast. `pays after`: starts after which compiling without a cache has paid.\n\n",
-        count(record.rays as u64),
-        count(record.picture as u64)
+        count(results.rays as u64),
+        count(results.picture as u64)
     );
-    for scene in &record.scenes {
+    for scene in &results.scenes {
         text.push_str(&page(scene));
     }
     text
@@ -98,13 +98,13 @@ fn pays_after(compile_s: f64, ours: &Times, base: &Times) -> String {
 }
 
 /// A chart for each number of threads; none where Embree did not run.
-pub(super) fn draw(record: &SceneLoadRecord) -> Vec<Chart> {
-    let threads = record.scenes.first().map_or(Vec::new(), |s| s.runs.iter().map(|r| r.threads).collect());
+pub(super) fn draw(results: &SceneLoadResults) -> Vec<Chart> {
+    let threads = results.scenes.first().map_or(Vec::new(), |s| s.runs.iter().map(|r| r.threads).collect());
     let mut charts = Vec::new();
     for threads in threads {
         let run = |scene: &'_ SceneStarts| scene.runs.iter().find(|r| r.threads == threads).cloned();
         let runs: Vec<(String, StartsRun)> =
-            record.scenes.iter().filter_map(|s| Some((s.name.clone(), run(s)?))).collect();
+            results.scenes.iter().filter_map(|s| Some((s.name.clone(), run(s)?))).collect();
         if runs.iter().any(|(_, run)| run.faster(embree::NAME).is_none()) {
             continue;
         }
@@ -116,7 +116,7 @@ pub(super) fn draw(record: &SceneLoadRecord) -> Vec<Chart> {
             title: format!("Load against rebuild of scenes, {}", on_threads(threads)),
             unit: format!(
                 "times faster than Embree's build of all objects, first {} rays included; logarithmic",
-                count(record.rays as u64)
+                count(results.rays as u64)
             ),
             groups: runs.iter().map(|(name, _)| name.clone()).collect(),
             series: SHOWN.iter().map(series).collect(),

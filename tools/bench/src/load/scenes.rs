@@ -2,14 +2,14 @@
 
 use super::files::{self, PageCache, Scratch};
 use super::first_rays::{SIZE, first_of};
-use super::record::StartCase;
-use super::scene_record::{SceneLoadRecord, SceneStarts};
+use super::results::StartCase;
+use super::scene_results::{SceneLoadResults, SceneStarts};
 use super::scene_tables;
 use super::starts::StartRounds;
 use crate::args::{LoadScenes, Start};
 use crate::isa;
 use crate::model::position;
-use crate::output::{Head, Record, note};
+use crate::output::{Head, Report, note};
 use crate::progress::Progress;
 use crate::rays::Camera;
 use crate::rivals::embree;
@@ -26,7 +26,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Measures, prints and writes the record.
+/// Measures, prints and writes the report.
 ///
 /// # Errors
 /// If an option or scene cannot be used, a start fails or a file cannot be written.
@@ -34,7 +34,7 @@ pub fn run(arguments: &LoadScenes) -> Result<()> {
     let starts = &arguments.starts;
     let isa = isa::select(starts.isa.as_deref())?;
     let options = json!({"rays": starts.rays, "rounds": starts.rounds});
-    let mut record = SceneLoadRecord {
+    let mut results = SceneLoadResults {
         head: Head::now("load-scenes", isa.clone(), options),
         rays: starts.rays,
         picture: (SIZE.0 * SIZE.1) as usize + starts.rays,
@@ -42,14 +42,14 @@ pub fn run(arguments: &LoadScenes) -> Result<()> {
     };
     let progress = Progress::new();
     for which in &arguments.scenes {
-        record.scenes.push(measure(which, arguments, &isa, &progress)?);
+        results.scenes.push(measure(which, arguments, &isa, &progress)?);
     }
-    Record {
-        head: &record.head,
+    Report {
+        head: &results.head,
         title: "Load against rebuild of scenes",
-        body: scene_tables::markdown(&record),
-        json: serde_json::to_value(&record)?,
-        charts: scene_tables::draw(&record),
+        body: scene_tables::markdown(&results),
+        json: serde_json::to_value(&results)?,
+        charts: scene_tables::draw(&results),
     }
     .write(&starts.output)
 }

@@ -1,7 +1,7 @@
 //! Runs every way to start, each time in a new process, in interleaved rounds.
 
 use super::probe::StartTimes;
-use super::record::{StartCase, StartsRun, Times};
+use super::results::{StartCase, StartsRun, Times};
 use crate::args::Starts;
 use crate::progress::Progress;
 use anyhow::{Context, Result, ensure};

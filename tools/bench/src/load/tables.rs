@@ -1,6 +1,6 @@
 //! Tables and charts of `load`.
 
-use super::record::{LoadRecord, ModelStarts};
+use super::results::{LoadResults, ModelStarts};
 use crate::chart::{BarChart, Scale, Series};
 use crate::markdown::{cells, count, seconds, table};
 use crate::output::Chart;
@@ -13,22 +13,22 @@ pub(super) fn on_threads(threads: usize) -> String {
     format!("{threads} thread{}", if threads == 1 { "" } else { "s" })
 }
 
-fn threads(record: &LoadRecord) -> Vec<usize> {
-    record.models.first().map_or(Vec::new(), |m| m.runs.iter().map(|r| r.threads).collect())
+fn threads(results: &LoadResults) -> Vec<usize> {
+    results.models.first().map_or(Vec::new(), |m| m.runs.iter().map(|r| r.threads).collect())
 }
 
-/// All tables of a record.
-pub fn markdown(record: &LoadRecord) -> String {
+/// All tables of a report.
+pub fn markdown(results: &LoadResults) -> String {
     let mut text = format!(
         "Wall-clock time from before the file is opened, or from before the build begins with the triangles in memory, \
          until the first {} camera rays are traced, each in a process of its own; medians of interleaved rounds. \
          `map`: mapped; `read`: read and checked; `cold`: the file's pages were dropped from memory first.\n\n",
-        count(record.rays as u64)
+        count(results.rays as u64)
     );
-    for threads in threads(record) {
-        text.push_str(&summary(record, threads));
+    for threads in threads(results) {
+        text.push_str(&summary(results, threads));
     }
-    for model in &record.models {
+    for model in &results.models {
         text.push_str(&page(model));
     }
     text
@@ -42,11 +42,11 @@ pub(super) fn factor(value: Option<f64>) -> String {
     }
 }
 
-fn summary(record: &LoadRecord, threads: usize) -> String {
+fn summary(results: &LoadResults, threads: usize) -> String {
     let mut head = cells(&["model", "triangles", "Embree"]);
     head.extend(cells(&SHOWN));
     let mut rows = Vec::new();
-    for model in &record.models {
+    for model in &results.models {
         let Some(run) = model.runs.iter().find(|r| r.threads == threads) else { continue };
         let base = run.starts.iter().find(|(name, _)| name == embree::NAME).map(|(_, t)| t.total_s);
         let mut cells = vec![model.name.clone(), count(model.triangles as u64), seconds(base)];
@@ -95,10 +95,10 @@ fn page(model: &ModelStarts) -> String {
 }
 
 /// A chart for each number of threads; none where Embree did not run.
-pub fn draw(record: &LoadRecord) -> Vec<Chart> {
+pub fn draw(results: &LoadResults) -> Vec<Chart> {
     let mut charts = Vec::new();
-    for threads in threads(record) {
-        let runs: Vec<_> = record
+    for threads in threads(results) {
+        let runs: Vec<_> = results
             .models
             .iter()
             .filter_map(|m| Some((&m.name, m.runs.iter().find(|r| r.threads == threads)?)))
@@ -115,7 +115,7 @@ pub fn draw(record: &LoadRecord) -> Vec<Chart> {
             title: format!("Load against rebuild, {}", on_threads(threads)),
             unit: format!(
                 "times faster than Embree's build, first {} rays included; logarithmic",
-                count(record.rays as u64)
+                count(results.rays as u64)
             ),
             groups: runs.iter().map(|(name, _)| (*name).clone()).collect(),
             series: SHOWN.iter().map(series).collect(),

@@ -6,21 +6,21 @@
 
 mod calibrate;
 mod published;
-mod record;
 mod render;
+mod results;
 mod tables;
 mod tet_records;
 mod tet_walk;
 mod tree;
 mod views;
 
-pub use record::{PaperRecord, PaperScene, StructureRow};
+pub use results::{PaperResults, PaperScene, StructureRow};
 pub use tables::markdown;
 
 use crate::args::Paper;
 use crate::isa;
 use crate::model::Model;
-use crate::output::{Head, Record as Page, note};
+use crate::output::{Head, Report, note};
 use crate::progress::Progress;
 use crate::rivals;
 use crate::structures::{self, Use};
@@ -42,7 +42,7 @@ const QUICK_SIZE: (u32, u32) = (192, 108);
 /// Nodes of fewer triangles are not tetrahedralized: their tetrahedra would have more hull faces than triangles.
 const LEAST_TRIANGLES: u32 = 64;
 
-/// Measures, prints and writes the record.
+/// Measures, prints and writes the report.
 ///
 /// # Errors
 /// If an option or model cannot be used or a file cannot be written.
@@ -55,18 +55,18 @@ pub fn run(arguments: &Paper) -> Result<()> {
     let size = if arguments.run.quick { QUICK_SIZE } else { SIZE };
     let options =
         json!({"pixels": size, "rounds": arguments.rounds, "threads": threads, "quick": arguments.run.quick});
-    let mut record = PaperRecord { head: Head::now("paper", isa, options), profile, scenes: Vec::new() };
+    let mut results = PaperResults { head: Head::now("paper", isa, options), profile, scenes: Vec::new() };
     for name in &arguments.models {
         let model = Model::load(name)?;
-        record.scenes.push(scene(&model, &record.profile, arguments, size, threads, &progress)?);
+        results.scenes.push(scene(&model, &results.profile, arguments, size, threads, &progress)?);
     }
     drop(progress);
-    for scene in &record.scenes {
+    for scene in &results.scenes {
         scene.left_out.iter().for_each(|why| note(&format!("{}: {why}", scene.name)));
     }
-    let body = markdown(&record);
-    let json = serde_json::to_value(&record)?;
-    Page { head: &record.head, title: "The paper's tables", body, json, charts: Vec::new() }
+    let body = markdown(&results);
+    let json = serde_json::to_value(&results)?;
+    Report { head: &results.head, title: "The paper's tables", body, json, charts: Vec::new() }
         .write(&arguments.run.output)
 }
 
@@ -79,7 +79,7 @@ fn scene(
     progress: &Progress,
 ) -> Result<PaperScene> {
     let views = Views::of(model, size)?;
-    let mut record = PaperScene {
+    let mut results = PaperScene {
         name: model.name.clone(),
         triangles: model.triangles(),
         view: views.view,
@@ -89,9 +89,9 @@ fn scene(
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let mut built: Vec<BuiltStructure> = Vec::new();
     progress.show(format!("{}: BTH32, Tet32", model.name));
-    one.install(|| scalar::<Tet32>(model, profile, &views, RecordKind::Tet32, &mut built, &mut record))?;
+    one.install(|| scalar::<Tet32>(model, profile, &views, RecordKind::Tet32, &mut built, &mut results))?;
     progress.show(format!("{}: BTH20, Tet20", model.name));
-    one.install(|| scalar::<Tet20>(model, profile, &views, RecordKind::Tet20, &mut built, &mut record))?;
+    one.install(|| scalar::<Tet20>(model, profile, &views, RecordKind::Tet20, &mut built, &mut results))?;
     progress.show(format!("{}: our files", model.name));
     one.install(|| own(model, &mut built))?;
     if let Some(rival) = rivals::RIVALS.iter().find(|r| r.name == "k-d tree")
@@ -109,9 +109,9 @@ fn scene(
         });
     }
     let rendering = Rendering { views: &views, rounds: arguments.rounds, threads };
-    record.rows =
+    results.rows =
         rendering.rows(&built, |view| progress.show(format!("{}: rendering the {view} view", model.name)));
-    Ok(record)
+    Ok(results)
 }
 
 /// Builds the paper's structures with tetrahedra of one record; with Tet32 also its BVH.
@@ -121,7 +121,7 @@ fn scalar<R: TetRecord + 'static>(
     views: &Views,
     kind: RecordKind,
     built: &mut Vec<BuiltStructure>,
-    record: &mut PaperScene,
+    results: &mut PaperScene,
 ) -> Result<()> {
     let names = if kind == RecordKind::Tet32 { ["BTH32", "Tet32"] } else { ["BTH20", "Tet20"] };
     let mesh = &model.mesh;
@@ -169,13 +169,13 @@ fn scalar<R: TetRecord + 'static>(
     });
 
     if marks.suitable.first() != Some(&true) {
-        record.left_out.push(format!("{}: some triangles are in bad contact", names[1]));
+        results.left_out.push(format!("{}: some triangles are in bad contact", names[1]));
         return Ok(());
     }
     let clock = Instant::now();
     let (whole, _) = tets::build(mesh, &tree, &[0], &tet_options, &Silent)?;
     if !matches!(whole[..], [(0, _)]) {
-        record.left_out.push(format!("{}: could not be tetrahedralized whole", names[1]));
+        results.left_out.push(format!("{}: could not be tetrahedralized whole", names[1]));
         return Ok(());
     }
     let mut tets = PaperTree::<R>::new(mesh, &tree, &whole);

@@ -1,6 +1,6 @@
 //! Renders the views of a model with all structures in turn, on all threads.
 
-use super::record::StructureRow;
+use super::results::StructureRow;
 use super::views::{THREAD_TILE, Views};
 use crate::clock::process_cpu;
 use crate::rounds::least;

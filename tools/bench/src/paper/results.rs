@@ -7,7 +7,7 @@ use serde::Serialize;
 
 /// Everything that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PaperRecord {
+pub struct PaperResults {
     /// When and where.
     #[serde(flatten)]
     pub head: Head,

@@ -1,11 +1,11 @@
 //! The page of `paper`.
 
 use super::published;
-use super::record::{PaperRecord, PaperScene};
+use super::results::{PaperResults, PaperScene};
 use crate::markdown::{cells, count, table, two_decimals};
 
 /// The page below its head.
-pub fn markdown(record: &PaperRecord) -> String {
+pub fn markdown(results: &PaperResults) -> String {
     let mut text = String::from(
         "Camera rays only, 16×16 tiles, all threads, least of the rounds; CPU time of all threads over their number, which is the time \
          on the wall clock of a machine that does nothing else. Construction on one thread, wall clock. The first six rows are the paper's structures with one scalar traversal: a binary BVH as in pbrt with up to four triangles a leaf (BVH), \
@@ -13,7 +13,7 @@ pub fn markdown(record: &PaperRecord) -> String {
          tree. The others are our files in our SIMD traversal. Paper: the figures of its Tables 1 and 2, on another machine with six \
          cores and from other cameras, some on other versions of a model; only ratios can be compared.\n\n",
     );
-    let costs = &record.profile;
+    let costs = &results.profile;
     text.push_str(&format!(
         "Costs of the scalar traversals, ns: {:.2} a node of the binary BVH",
         costs.bvh.outside
@@ -25,15 +25,15 @@ pub fn markdown(record: &PaperRecord) -> String {
         }
     }
     text.push_str(".\n\n## Ratios\n\n");
-    text.push_str(&ratios(record));
-    for scene in &record.scenes {
+    text.push_str(&ratios(results));
+    for scene in &results.scenes {
         text.push_str(&page(scene));
     }
     text
 }
 
 /// Ours beside the paper's.
-fn ratios(record: &PaperRecord) -> String {
+fn ratios(results: &PaperResults) -> String {
     let head = cells(&[
         "scene",
         "BTH20/BVH far",
@@ -47,7 +47,7 @@ fn ratios(record: &PaperRecord) -> String {
         "BTH20/k-d far",
         "paper",
     ]);
-    let rows: Vec<Vec<String>> = record
+    let rows: Vec<Vec<String>> = results
         .scenes
         .iter()
         .map(|s| {

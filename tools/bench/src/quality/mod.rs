@@ -4,20 +4,20 @@
 mod block_order;
 mod boxes;
 mod greedy_collapse;
-pub mod record;
+pub mod results;
 mod spatial_splits;
 mod split_plane;
 mod tables;
 mod variations;
 
-use record::STEPS_OF;
-pub use record::{ModelQuality, QualityRecord, VariationRow};
+use results::STEPS_OF;
+pub use results::{ModelQuality, QualityResults, VariationRow};
 pub use tables::markdown;
 
 use crate::args::Quality;
 use crate::clock::Clock;
 use crate::model::Model;
-use crate::output::{Head, Record};
+use crate::output::{Head, Report};
 use crate::progress::Progress;
 use crate::rays::{self, Finder, RaySet};
 use crate::speed::Answers;
@@ -31,7 +31,7 @@ use variations::BuiltVariation;
 /// Rays of a set whose steps are counted, at most.
 const COUNTED: usize = 10_000;
 
-/// Measures, prints and writes the record.
+/// Measures, prints and writes the report.
 ///
 /// # Errors
 /// If an option or model cannot be used or a file cannot be written, and, when all is written, if a variation gave
@@ -40,16 +40,16 @@ pub fn run(arguments: &Quality) -> Result<()> {
     if let Some(name) = arguments.sets.unknown(&rays::NAMES).first() {
         bail!("--set {name}: there are {}", rays::NAMES.join(", "));
     }
-    let record = measure(arguments)?;
-    Record {
-        head: &record.head,
+    let results = measure(arguments)?;
+    Report {
+        head: &results.head,
         title: "What steps of the BVH builder are worth",
-        body: markdown(&record),
-        json: serde_json::to_value(&record)?,
+        body: markdown(&results),
+        json: serde_json::to_value(&results)?,
         charts: Vec::new(),
     }
     .write(&arguments.run.output)?;
-    let rows = record.models.iter().flat_map(|m| m.rows.iter().map(move |r| (m, r)));
+    let rows = results.models.iter().flat_map(|m| m.rows.iter().map(move |r| (m, r)));
     let wrong: Vec<String> =
         rows.filter(|(_, r)| r.differ > 0).map(|(m, r)| format!("{} on {}", r.name, m.name)).collect();
     ensure!(wrong.is_empty(), "answers differ: {}", wrong.join(", "));
@@ -60,14 +60,14 @@ pub fn run(arguments: &Quality) -> Result<()> {
 ///
 /// # Errors
 /// If a model cannot be used.
-pub fn measure(arguments: &Quality) -> Result<QualityRecord> {
+pub fn measure(arguments: &Quality) -> Result<QualityResults> {
     let (head, rounds) = Head::of_ray_sets("bvh-quality", &arguments.run, arguments.rays, arguments.rounds)?;
-    let mut record = QualityRecord { head, models: Vec::new() };
+    let mut results = QualityResults { head, models: Vec::new() };
     let progress = Progress::new();
     for which in &arguments.models.models {
-        record.models.push(measure_model(which, arguments, rounds, &progress)?);
+        results.models.push(measure_model(which, arguments, rounds, &progress)?);
     }
-    Ok(record)
+    Ok(results)
 }
 
 fn measure_model(

@@ -11,7 +11,7 @@ pub(super) const STEPS_OF: [&str; 2] = ["primary", "diffuse"];
 
 /// Everything that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct QualityRecord {
+pub struct QualityResults {
     /// When and where.
     #[serde(flatten)]
     pub head: Head,
@@ -59,7 +59,7 @@ pub struct VariationRow {
     pub differ: usize,
 }
 
-impl QualityRecord {
+impl QualityResults {
     /// Names of the sets that were measured.
     pub fn sets(&self) -> Vec<&'static str> {
         let mut all: Vec<&'static str> = crate::rays::NAMES.to_vec();

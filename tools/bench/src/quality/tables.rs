@@ -1,6 +1,6 @@
 //! The page of `quality`.
 
-use super::record::{ModelQuality, QualityRecord, STEPS_OF};
+use super::results::{ModelQuality, QualityResults, STEPS_OF};
 use crate::markdown::{cells, count, table, two_decimals};
 
 fn three_decimals(value: Option<f64>) -> String {
@@ -8,36 +8,36 @@ fn three_decimals(value: Option<f64>) -> String {
 }
 
 /// The page below its head.
-pub fn markdown(record: &QualityRecord) -> String {
+pub fn markdown(results: &QualityResults) -> String {
     let mut text = String::from(
         "Each row is built as files are, but for the one thing that it names; `the same again` is built as files are, too, and shows \
          what chance makes of a time. Batches without hints on one thread, CPU time, the fastest of interleaved rounds.\n\n\
          ## Over the first row, geometric means over the models\n\n\
          Times below 1 are faster. SAH: wide nodes and leaves that a random line through the box meets.\n\n",
     );
-    let sets = record.sets();
+    let sets = results.sets();
     let mut head = cells(&["", "SAH", "B/tri", "building"]);
     head.extend(sets.iter().map(|s| (*s).to_owned()));
     head.push("all".to_owned());
-    let names = record.models.first().map_or(&[][..], |m| &m.rows[..]);
+    let names = results.models.first().map_or(&[][..], |m| &m.rows[..]);
     let rows: Vec<Vec<String>> = names
         .iter()
         .enumerate()
         .map(|(i, r)| {
             let mut cells = vec![
                 r.name.clone(),
-                three_decimals(record.ratio(i, |r| Some(r.wide_visits[0] + r.wide_visits[1]))),
-                two_decimals(record.ratio(i, |r| Some(r.bytes))),
-                two_decimals(record.ratio(i, |r| Some(r.seconds))),
+                three_decimals(results.ratio(i, |r| Some(r.wide_visits[0] + r.wide_visits[1]))),
+                two_decimals(results.ratio(i, |r| Some(r.bytes))),
+                two_decimals(results.ratio(i, |r| Some(r.seconds))),
             ];
-            let set = |set: &&str| three_decimals(record.ratio(i, |r| r.nanoseconds.get(*set).copied()));
+            let set = |set: &&str| three_decimals(results.ratio(i, |r| r.nanoseconds.get(*set).copied()));
             cells.extend(sets.iter().map(set));
-            cells.push(three_decimals(record.time_ratio(i)));
+            cells.push(three_decimals(results.time_ratio(i)));
             cells
         })
         .collect();
     text.push_str(&table(&head, &rows));
-    record.models.iter().for_each(|m| text.push_str(&page(m, &sets)));
+    results.models.iter().for_each(|m| text.push_str(&page(m, &sets)));
     text
 }
 

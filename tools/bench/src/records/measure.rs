@@ -7,7 +7,7 @@ use crate::machine;
 use crate::names::Names;
 use crate::rivals::embree;
 use crate::rounds::geometric_mean;
-use crate::speed::{self, SpeedRecord, ThreadsRun};
+use crate::speed::{self, SpeedResults, ThreadsRun};
 use anyhow::{Result, bail};
 use std::path::Path;
 
@@ -52,7 +52,7 @@ fn rate_without_hints(run: &ThreadsRun, tracer: &str, set: &str) -> Option<f64> 
 }
 
 /// Rays per second and bytes of every tracer, what hints are worth, and means over the models relative to Embree where it was measured.
-fn rows_of_speed(benchmark: &str, rounds: usize, record: &SpeedRecord) -> Vec<Row> {
+fn rows_of_speed(benchmark: &str, rounds: usize, record: &SpeedResults) -> Vec<Row> {
     let commit = record.head.commit.clone().or_else(machine::commit).unwrap_or_else(|| "?".to_owned());
     let commit = commit.split(' ').next().unwrap_or("?").to_owned();
     let row =

@@ -4,19 +4,19 @@
 
 mod contenders;
 mod frame_rays;
-mod record;
+mod results;
 mod source;
 mod tables;
 
 pub(crate) use frame_rays::{FrameRaySet, FrameRays};
-pub use record::{ContenderRow, SceneTimes, ScenesRecord};
+pub use results::{ContenderRow, SceneTimes, ScenesResults};
 pub(crate) use source::{Source, compiled};
 pub use tables::markdown;
 
 use crate::args::Scenes;
 use crate::clock::Clock;
 use crate::isa;
-use crate::output::{Head, Record as Page, note};
+use crate::output::{Head, Report, note};
 use crate::progress::Progress;
 use crate::rounds::median;
 use anyhow::{Context, Result, ensure};
@@ -27,7 +27,7 @@ use serde_json::json;
 /// Sets of rays of a frame.
 pub const SETS: [&str; 3] = ["camera", "diffuse", "later"];
 
-/// Measures, prints and writes the record.
+/// Measures, prints and writes the report.
 ///
 /// # Errors
 /// If an option or scene cannot be used, an answer of ours differs from that of our plain BVH, or a file cannot be written.
@@ -39,20 +39,20 @@ pub fn run(arguments: &Scenes) -> Result<()> {
         "pixels": size, "frames": arguments.frames, "rounds": arguments.rounds, "bounces": frame_rays::BOUNCES,
         "threads": 1, "quick": arguments.run.quick,
     });
-    let mut record = ScenesRecord { head: Head::now("scenes", isa, options), scenes: Vec::new() };
+    let mut results = ScenesResults { head: Head::now("scenes", isa, options), scenes: Vec::new() };
     for name in &arguments.scenes {
         let source = Source::load(name)?;
-        record.scenes.push(scene(&source, arguments, size, &progress)?);
+        results.scenes.push(scene(&source, arguments, size, &progress)?);
     }
     drop(progress);
-    for scene in &record.scenes {
+    for scene in &results.scenes {
         scene.left_out.iter().for_each(|why| note(&format!("{}: {why}", scene.name)));
     }
-    let body = markdown(&record);
-    let json = serde_json::to_value(&record)?;
-    Page { head: &record.head, title: "Scenes that move", body, json, charts: Vec::new() }
+    let body = markdown(&results);
+    let json = serde_json::to_value(&results)?;
+    Report { head: &results.head, title: "Scenes that move", body, json, charts: Vec::new() }
         .write(&arguments.run.output)?;
-    let wrong = record.scenes.iter().flat_map(|s| &s.rows).find(|r| r.ours && r.differ > 0);
+    let wrong = results.scenes.iter().flat_map(|s| &s.rows).find(|r| r.ours && r.differ > 0);
     ensure!(wrong.is_none(), "{} answers another than the plain BVH", wrong.map_or("", |r| r.name.as_str()));
     Ok(())
 }
@@ -61,7 +61,7 @@ fn scene(source: &Source, arguments: &Scenes, size: (u32, u32), progress: &Progr
     progress.show(format!("{}: compiling", source.name));
     let plain = contenders::compile(source, &CONTENDERS[1])?;
     let mut shown = bth::from_bytes(&plain.bytes).context("a file that was just compiled")?;
-    let mut record = SceneTimes {
+    let mut results = SceneTimes {
         name: source.name.clone(),
         instances: shown.instance_count(),
         objects: shown.object_count(),
@@ -81,17 +81,17 @@ fn scene(source: &Source, arguments: &Scenes, size: (u32, u32), progress: &Progr
         progress.show(format!("{}: {}", source.name, kind.name));
         match contenders::build(source, kind, &shown) {
             Ok(contender) => contenders.push(contender),
-            Err(why) => record.left_out.push(format!("{}: {why:#}", kind.name)),
+            Err(why) => results.left_out.push(format!("{}: {why:#}", kind.name)),
         }
     }
     let mut taken = vec![[0.0; 4]; contenders.len()];
     let mut differ = vec![0; contenders.len()];
-    for (i, number) in record.frames.clone().into_iter().enumerate() {
-        progress.show(format!("{}: frame {} of {}", source.name, i + 1, record.frames.len()));
+    for (i, number) in results.frames.clone().into_iter().enumerate() {
+        progress.show(format!("{}: frame {} of {}", source.name, i + 1, results.frames.len()));
         shown.set_frame(number)?;
         let frame = Frame::of(&shown, number);
         let frame_rays = FrameRays::of(&shown, size)?;
-        for (sum, set) in record.rays.iter_mut().zip(&frame_rays.sets) {
+        for (sum, set) in results.rays.iter_mut().zip(&frame_rays.sets) {
             *sum += set.rays.len() as u64;
         }
         let times = measure(&mut contenders, &frame, &frame_rays, arguments.rounds, &mut differ)?;
@@ -99,9 +99,9 @@ fn scene(source: &Source, arguments: &Scenes, size: (u32, u32), progress: &Progr
             sums.iter_mut().zip(times).for_each(|(sum, time)| *sum += time);
         }
     }
-    let count = record.frames.len() as f64;
+    let count = results.frames.len() as f64;
     for ((contender, taken), differ) in contenders.iter().zip(&taken).zip(differ) {
-        record.rows.push(ContenderRow {
+        results.rows.push(ContenderRow {
             name: contender.name.to_owned(),
             ours: contender.ours,
             build_s: contender.build_s,
@@ -110,7 +110,7 @@ fn scene(source: &Source, arguments: &Scenes, size: (u32, u32), progress: &Progr
             differ,
         });
     }
-    Ok(record)
+    Ok(results)
 }
 
 /// Median seconds of each contender: for the update of a frame and for each set of its rays. Rounds are interleaved: every

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 /// Everything that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ScenesRecord {
+pub struct ScenesResults {
     /// When and where.
     #[serde(flatten)]
     pub head: Head,

@@ -1,10 +1,10 @@
 //! The page of `scenes`.
 
-use super::record::{PARTS, SceneTimes, ScenesRecord};
+use super::results::{PARTS, SceneTimes, ScenesResults};
 use crate::markdown::{cells, count, table, two_decimals};
 
 /// The page below its head.
-pub fn markdown(record: &ScenesRecord) -> String {
+pub fn markdown(results: &ScenesResults) -> String {
     let mut text = String::from(
         "One thread, its CPU clock; medians of interleaved rounds, means over the frames. A frame is its update (tracks and top level; \
          for Embree the transforms, which are given to it, and the commit) and its rays: `camera`; `diffuse`: one cosine-weighted bounce; `later`: \
@@ -29,8 +29,8 @@ pub fn markdown(record: &ScenesRecord) -> String {
             .chain(pairs.iter().flat_map(|(of, over)| [0, 1, 2].map(|part| ratio(of, over, part))))
             .collect()
     };
-    text.push_str(&table(&head, &record.scenes.iter().map(ratios).collect::<Vec<_>>()));
-    record.scenes.iter().for_each(|scene| text.push_str(&page(scene)));
+    text.push_str(&table(&head, &results.scenes.iter().map(ratios).collect::<Vec<_>>()));
+    results.scenes.iter().for_each(|scene| text.push_str(&page(scene)));
     text
 }
 

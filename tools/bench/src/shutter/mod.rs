@@ -7,7 +7,7 @@ mod tables;
 use crate::args::Shutter;
 use crate::clock::Clock;
 use crate::isa;
-use crate::output::{Head, Record};
+use crate::output::{Head, Report};
 use crate::progress::Progress;
 use crate::scenes::{FrameRays, Source, compiled};
 use anyhow::{Result, ensure};
@@ -59,10 +59,10 @@ pub struct PerRay {
     pub differ: f64,
 }
 
-/// Measures, prints and writes the record.
+/// Measures, prints and writes the report.
 ///
 /// # Errors
-/// If an option or scene cannot be used, or the record cannot be written.
+/// If an option or scene cannot be used, or the report cannot be written.
 pub fn run(arguments: &Shutter) -> Result<()> {
     let isa = isa::select(arguments.run.isa.as_deref())?;
     let progress = Progress::new();
@@ -82,7 +82,7 @@ pub fn run(arguments: &Shutter) -> Result<()> {
     drop(progress);
     let json = json!({ "head": head, "rows": rows });
     let body = tables::markdown(&rows);
-    Record { head: &head, title: "Motion blur of objects that deform", body, json, charts: Vec::new() }
+    Report { head: &head, title: "Motion blur of objects that deform", body, json, charts: Vec::new() }
         .write(&arguments.run.output)
 }
 

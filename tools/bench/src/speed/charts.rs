@@ -1,6 +1,6 @@
 //! The charts of `speed`: ratios to Embree's single rays; where it did not run, rays per second.
 
-use super::record::{SpeedRecord, ThreadsRun};
+use super::results::{SpeedResults, ThreadsRun};
 use super::tables::sets_of;
 use crate::chart::{BarChart, Scale, Series};
 use crate::output::Chart;
@@ -19,25 +19,25 @@ const SHOWN: [&str; 8] = [
 ];
 
 /// A chart for each number of threads, and one for each model if there are several.
-pub fn draw(record: &SpeedRecord) -> Vec<Chart> {
+pub fn draw(results: &SpeedResults) -> Vec<Chart> {
     let mut charts = Vec::new();
-    for threads in record.threads() {
+    for threads in results.threads() {
         let plural = if threads == 1 { "" } else { "s" };
         let on = format!("{threads} thread{plural}");
-        let tracers = record.tracers(threads);
+        let tracers = results.tracers(threads);
         let ratios = tracers.contains(&embree::NAME);
         let mut shown: Vec<&str> = tracers.iter().copied().filter(|t| SHOWN.contains(t)).collect();
         if shown.is_empty() {
             // None of these was selected: the first few tracers are shown instead.
             shown = tracers.into_iter().take(SHOWN.len()).collect();
         }
-        if record.models.len() > 1 && ratios {
-            let value = |tracer: &str, set: &str| Some(record.mean_ratio(threads, tracer, set)?.0);
-            let title = format!("Means over {} models, {on}", record.models.len());
-            let svg = chart(title, true, sets_of(record.models.iter()), &shown, value);
+        if results.models.len() > 1 && ratios {
+            let value = |tracer: &str, set: &str| Some(results.mean_ratio(threads, tracer, set)?.0);
+            let title = format!("Means over {} models, {on}", results.models.len());
+            let svg = chart(title, true, sets_of(results.models.iter()), &shown, value);
             charts.push(Chart { name: format!("means-{}", on.replace(' ', "-")), svg });
         }
-        for model in &record.models {
+        for model in &results.models {
             let Some(run) = model.runs.iter().find(|r| r.threads == threads) else { continue };
             let shown: Vec<&str> =
                 shown.iter().copied().filter(|t| run.tracers.iter().any(|r| r.name == *t)).collect();

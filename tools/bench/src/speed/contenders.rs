@@ -4,7 +4,7 @@ use crate::model::Model;
 use crate::names::Names;
 use crate::progress::Progress;
 use crate::rivals::RIVALS;
-use crate::speed::record::{CompiledFile, LeftOut};
+use crate::speed::results::{CompiledFile, LeftOut};
 use crate::structures::{self, Compiled, KINDS, Kind};
 use crate::tracer::Contender;
 use anyhow::Result;

@@ -2,17 +2,17 @@
 
 mod charts;
 mod contenders;
-pub mod record;
+pub mod results;
 mod tables;
 
 pub use charts::draw;
-pub use record::{ModelSpeeds, SpeedRecord, ThreadsRun};
+pub use results::{ModelSpeeds, SpeedResults, ThreadsRun};
 pub use tables::markdown;
 
 use crate::args::Speed;
 use crate::clock::Clock;
 use crate::model::Model;
-use crate::output::{Head, Record, note};
+use crate::output::{Head, Report, note};
 use crate::progress::Progress;
 use crate::rays::{self, Finder, RaySet};
 use crate::rounds::medians;
@@ -22,28 +22,28 @@ use anyhow::{Result, bail, ensure};
 use bth::rays::{Hit, PrimitiveRef};
 use std::collections::BTreeMap;
 
-/// Measures, prints and writes the record.
+/// Measures, prints and writes the report.
 ///
 /// # Errors
 /// If an option or model cannot be used or a file cannot be written, and, when all is written, if one of
 /// our own structures gave another answer than the plain BVH.
 pub fn run(arguments: &Speed) -> Result<()> {
     check_names(arguments)?;
-    let record = measure(arguments)?;
-    for model in &record.models {
+    let results = measure(arguments)?;
+    for model in &results.models {
         for left_out in &model.left_out {
             note(&format!("{}: {}: not measured: {}", model.name, left_out.name, left_out.why));
         }
     }
-    Record {
-        head: &record.head,
+    Report {
+        head: &results.head,
         title: "Rays per second",
-        body: markdown(&record),
-        json: serde_json::to_value(&record)?,
-        charts: draw(&record),
+        body: markdown(&results),
+        json: serde_json::to_value(&results)?,
+        charts: draw(&results),
     }
     .write(&arguments.run.output)?;
-    let wrong = record.models.iter().flat_map(|m| m.runs.iter().map(move |r| (m, r)));
+    let wrong = results.models.iter().flat_map(|m| m.runs.iter().map(move |r| (m, r)));
     let wrong: Vec<String> = wrong
         .flat_map(|(model, run)| run.wrong().map(move |name| format!("{} on {}", name, model.name)))
         .collect();
@@ -55,14 +55,14 @@ pub fn run(arguments: &Speed) -> Result<()> {
 ///
 /// # Errors
 /// If a model cannot be used.
-pub fn measure(arguments: &Speed) -> Result<SpeedRecord> {
+pub fn measure(arguments: &Speed) -> Result<SpeedResults> {
     let (head, rounds) = Head::of_ray_sets("speed", &arguments.run, arguments.rays, arguments.rounds)?;
-    let mut record = SpeedRecord { head, models: Vec::new() };
+    let mut results = SpeedResults { head, models: Vec::new() };
     let progress = Progress::new();
     for which in &arguments.models.models {
-        record.models.push(measure_model(which, arguments, rounds, &progress)?);
+        results.models.push(measure_model(which, arguments, rounds, &progress)?);
     }
-    Ok(record)
+    Ok(results)
 }
 
 fn check_names(arguments: &Speed) -> Result<()> {

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 /// Everything that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct SpeedRecord {
+pub struct SpeedResults {
     /// When and where.
     #[serde(flatten)]
     pub head: Head,
@@ -130,7 +130,7 @@ impl ThreadsRun {
     }
 }
 
-impl SpeedRecord {
+impl SpeedResults {
     /// Numbers of threads that were measured.
     pub(super) fn threads(&self) -> Vec<usize> {
         self.models.first().map_or(Vec::new(), |m| m.runs.iter().map(|r| r.threads).collect())

@@ -1,19 +1,19 @@
 //! The tables of `speed`.
 
-use super::record::{ModelSpeeds, SpeedRecord, ThreadsRun};
+use super::results::{ModelSpeeds, SpeedResults, ThreadsRun};
 use crate::markdown::{count, table, two_decimals};
 use crate::rays::{NAMES, View};
 use crate::rivals::embree;
 
-/// All tables of a record.
-pub fn markdown(record: &SpeedRecord) -> String {
+/// All tables of a report.
+pub fn markdown(results: &SpeedResults) -> String {
     let mut text = String::new();
-    if record.models.len() > 1 {
-        for threads in record.threads() {
-            text.push_str(&means(record, threads));
+    if results.models.len() > 1 {
+        for threads in results.threads() {
+            text.push_str(&means(results, threads));
         }
     }
-    for model in &record.models {
+    for model in &results.models {
         text.push_str(&page(model));
     }
     text
@@ -32,19 +32,19 @@ fn on_threads(threads: usize) -> String {
     if threads == 1 { "one thread".to_owned() } else { format!("{threads} threads") }
 }
 
-fn means(record: &SpeedRecord, threads: usize) -> String {
-    let sets = sets_of(record.models.iter());
-    let tracers = record.tracers(threads);
+fn means(results: &SpeedResults, threads: usize) -> String {
+    let sets = sets_of(results.models.iter());
+    let tracers = results.tracers(threads);
     if !tracers.contains(&embree::NAME) {
         return String::new();
     }
     let row = |tracer: &&str| {
         let mean = |set: &&str| {
-            let Some((ratio, models)) = record.mean_ratio(threads, tracer, set) else {
+            let Some((ratio, models)) = results.mean_ratio(threads, tracer, set) else {
                 return "-".to_owned();
             };
             // Of fewer models than the others: not comparable with them.
-            let all = record.runs(threads).filter(|r| r.ratio(embree::NAME, set).is_some()).count();
+            let all = results.runs(threads).filter(|r| r.ratio(embree::NAME, set).is_some()).count();
             if models < all { format!("{ratio:.2} ({models})") } else { format!("{ratio:.2}") }
         };
         [(*tracer).to_owned()].into_iter().chain(sets.iter().map(mean)).collect()
@@ -53,7 +53,7 @@ fn means(record: &SpeedRecord, threads: usize) -> String {
     format!(
         "## Speed over that of Embree's single rays, {}\n\nGeometric means over {} models; in brackets: over how many, if not all.\n\n{}\n",
         on_threads(threads),
-        record.models.len(),
+        results.models.len(),
         table(&head("tracer", &sets, &[]), &rows)
     )
 }
@@ -64,7 +64,7 @@ fn page(model: &ModelSpeeds) -> String {
         View::Inside => "seen from inside",
     };
     let mut text = format!("## {} ({} triangles, {view})\n\n", model.name, count(model.triangles as u64));
-    let share = |s: &super::record::CompiledFile| {
+    let share = |s: &super::results::CompiledFile| {
         format!("{} {:.2} s, {:.0} % of the triangles in tets", s.name, s.compile_s, 100.0 * s.in_tets)
     };
     if !model.structures.is_empty() {

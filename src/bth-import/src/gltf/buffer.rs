@@ -9,8 +9,7 @@ use crate::error::{Error, Result};
 use crate::gltf::extensions::{MESHOPT, unsupported_extension};
 use crate::gltf::meshopt;
 use crate::gltf::schema::{Buffer, BufferView, GltfDocument, MeshoptCompression};
-use crate::gltf::uri::{beside, decode_base64, read_at_most};
-use crate::number::shown;
+use crate::gltf::uri::{beside, decode_base64, read_at_most, refusal};
 use crate::source::{Source, TRUNCATED, TRUNCATED_HINT};
 
 const BUFFER: &str = "BTH-I014";
@@ -149,9 +148,7 @@ impl<'a> Buffers<'a> {
     /// Reads a file beside the document, at most as many bytes of it as the document uses.
     fn read_external(&self, part: &str, uri: &str, length: u64) -> Result<Vec<u8>> {
         let Some(path) = beside(self.source.path, uri) else {
-            let found = shown(uri.as_bytes());
-            let message = format!("expected a relative file name or a data: URI, found \"{found}\"");
-            let hint = "put the buffer beside the model and refer to it by its name";
+            let (message, hint) = refusal(uri);
             return Err(self.source.error_in_part(BUFFER, part, message, hint));
         };
         read_at_most(&path, length)

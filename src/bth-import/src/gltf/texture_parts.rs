@@ -13,9 +13,8 @@ use crate::error::{Error, Result};
 use crate::gltf::accessor::Accessors;
 use crate::gltf::container::split;
 use crate::gltf::schema::Extensions;
-use crate::gltf::uri::{beside, decode_base64};
+use crate::gltf::uri::{beside, decode_base64, refusal};
 use crate::image_file;
-use crate::number::shown;
 use crate::source::{IMAGE, MALFORMED, MALFORMED_HINT, Source};
 
 /// Gives a texture a WebP image in the place of its own.
@@ -151,10 +150,8 @@ impl TextureReader<'_, '_> {
 
     fn file(&self, part: &str, uri: &str) -> Result<Vec<u8>> {
         let Some(path) = beside(self.accessors.source.path, uri) else {
-            let found = shown(uri.as_bytes());
-            let message = format!("expected a relative file name or a data: URI, found \"{found}\"");
-            let hint =
-                format!("put the image beside the model and name it in the uri, or compile {}", self.without);
+            let (message, hint) = refusal(uri);
+            let hint = format!("{hint}, or compile {}", self.without);
             return Err(self.accessors.source.error_in_part(IMAGE, part, message, &hint));
         };
         image_file::read(&path)

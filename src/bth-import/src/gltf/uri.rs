@@ -4,6 +4,7 @@ use std::io::Read;
 use std::path::{self, Path, PathBuf};
 
 use crate::error::{Error, Result};
+use crate::number::shown;
 
 /// The file that a relative URI names; `None` for others.
 pub(crate) fn beside(document: &Path, uri: &str) -> Option<PathBuf> {
@@ -13,6 +14,23 @@ pub(crate) fn beside(document: &Path, uri: &str) -> Option<PathBuf> {
         && !uri.contains(':')
         && !relative.components().any(|c| matches!(c, path::Component::RootDir | path::Component::Prefix(_)));
     is_relative.then(|| document.parent().unwrap_or(Path::new("")).join(relative))
+}
+
+/// Why [`beside`] finds no file: what was expected and found, and a hint.
+pub(crate) fn refusal(uri: &str) -> (String, &'static str) {
+    let found = shown(uri.as_bytes());
+    match decode_percent(uri) {
+        None => (
+            format!(
+                "expected percent escapes of two hexadecimal digits that stand for UTF-8, found \"{found}\""
+            ),
+            "write a percent sign in a name as %25",
+        ),
+        Some(_) => (
+            format!("expected a relative file name or a data: URI, found \"{found}\""),
+            "put the file beside the model and refer to it by its name",
+        ),
+    }
 }
 
 /// The first bytes of a file beside the document, at most `most`.

@@ -101,6 +101,11 @@ fn buffers_may_be_external_or_embedded() {
         let text = error.to_string();
         assert!(text.len() < 400 && !text.contains('\u{1b}'), "{} bytes", text.len());
     }
+    for uri in ["100%.bin", "a%2", "a%zz.bin", "%ff.bin"] {
+        std::fs::write(&path, edited(|d| d["buffers"][0]["uri"] = uri.into()).to_string()).unwrap();
+        let error = import(&path, Keep::None, &Silent).unwrap_err().to_string();
+        assert!(error.contains("BTH-I014") && error.contains(uri) && error.contains("as %25"), "{error}");
+    }
     std::fs::write(&path, edited(|d| d["buffers"][0]["uri"] = "absent.bin".into()).to_string()).unwrap();
     let error = import(&path, Keep::None, &Silent).unwrap_err();
     assert!(error.to_string().contains("absent.bin: BTH-O001"), "{error}");

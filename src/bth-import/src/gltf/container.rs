@@ -53,5 +53,14 @@ pub(crate) fn split<'a>(source: &Source<'a>) -> Result<(&'a [u8], Option<&'a [u8
         let message = "expected a JSON chunk, found none";
         source.error_at_byte(MALFORMED, 12, message, "export the model again")
     })?;
-    Ok((json, binary))
+    Ok((without_zeros(source, json), binary))
+}
+
+/// A JSON chunk without zeros at its end, with which some programs pad it, where the specification wants blanks (§4.4.3.2).
+fn without_zeros<'a>(source: &Source<'_>, json: &'a [u8]) -> &'a [u8] {
+    let end = json.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
+    if end < json.len() {
+        source.monitor.warn("the JSON of the GLB is padded with zeros in place of blanks");
+    }
+    &json[..end]
 }

@@ -75,6 +75,21 @@ fn a_glb_is_read_with_its_normals() {
 }
 
 #[test]
+fn json_that_is_padded_with_zeros_is_read_with_a_warning() {
+    for length in 0..4 {
+        let document = edited(|d| d["asset"]["generator"] = "x".repeat(length).into());
+        let mut bytes = glb(&document, &binary());
+        let end = 20 + u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+        let blanks = bytes[..end].iter().rev().take_while(|byte| **byte == b' ').count();
+        bytes[end - blanks..end].fill(0);
+        let listener = Listener::default();
+        let (mesh, _) = import_with("a.glb", &bytes, Keep::None, &listener).unwrap();
+        assert_eq!(mesh.triangles.len(), 2);
+        assert_eq!(listener.heard("padded with zeros"), blanks > 0, "{length}");
+    }
+}
+
+#[test]
 fn buffers_may_be_external_or_embedded() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.gltf");

@@ -1,6 +1,7 @@
 //! How stages report progress and are cancelled.
 
 use crate::error::{Error, Result};
+use std::collections::HashSet;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Receives progress and warnings, and cancels. All methods may be called from any thread.
@@ -33,11 +34,30 @@ impl dyn Monitor + '_ {
 pub struct Silent;
 impl Monitor for Silent {}
 
-/// A monitor that also keeps the warnings that it passes on.
+/// A monitor that also keeps the warnings that it passes on. Of several with the same text the first counts: a document that holds many
+/// meshes is read more than once.
 pub struct Recording<'a> {
     to: &'a dyn Monitor,
     keeps_notices: bool,
-    warnings: Mutex<Vec<String>>,
+    warnings: Mutex<Warnings>,
+}
+
+/// Warnings in their order, without repetitions.
+#[derive(Default)]
+struct Warnings {
+    all: Vec<String>,
+    known: HashSet<String>,
+}
+
+impl Warnings {
+    /// Keeps a warning; whether it is a new one.
+    fn keep(&mut self, message: &str) -> bool {
+        let is_new = self.known.insert(message.to_owned());
+        if is_new {
+            self.all.push(message.to_owned());
+        }
+        is_new
+    }
 }
 
 impl<'a> Recording<'a> {
@@ -53,10 +73,10 @@ impl<'a> Recording<'a> {
 
     /// The warnings so far.
     pub fn warnings(&self) -> Vec<String> {
-        self.lock().clone()
+        self.lock().all.clone()
     }
 
-    fn lock(&self) -> MutexGuard<'_, Vec<String>> {
+    fn lock(&self) -> MutexGuard<'_, Warnings> {
         self.warnings.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -78,13 +98,43 @@ impl Monitor for Recording<'_> {
         self.to.cancelled()
     }
     fn warn(&self, message: &str) {
-        self.lock().push(message.to_owned());
-        self.to.warn(message);
+        let is_new = self.lock().keep(message);
+        if is_new {
+            self.to.warn(message);
+        }
     }
     fn notice(&self, message: &str) {
-        if self.keeps_notices {
-            self.lock().push(message.to_owned());
+        let is_new = !self.keeps_notices || self.lock().keep(message);
+        if is_new {
+            self.to.notice(message);
         }
-        self.to.notice(message);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Default)]
+    struct Heard(Mutex<Vec<String>>);
+
+    impl Monitor for Heard {
+        fn warn(&self, message: &str) {
+            self.0.lock().unwrap().push(message.to_owned());
+        }
+    }
+
+    #[test]
+    fn warnings_of_the_same_text_are_given_and_kept_once() {
+        let heard = Heard::default();
+        let all = Recording::with_notices(&heard);
+        for _ in 0..2 {
+            let of_object = Recording::new(&all);
+            ["a", "b", "a"].iter().for_each(|message| of_object.warn(message));
+            of_object.notice("c");
+            assert_eq!(of_object.warnings(), ["a", "b"]);
+        }
+        assert_eq!(all.warnings(), ["a", "b", "c"]);
+        assert_eq!(*heard.0.lock().unwrap(), ["a", "b", "c"]);
     }
 }

@@ -217,9 +217,17 @@ fn parse(path: &Path, text: &[u8], found: &mut Libraries) -> Result<()> {
                     false => material.opacity = material.opacity.or(Some(1.0 - number)),
                 }
             }
-            b"map_kd" => material.diffuse_map = Some(map(path, place, words)?),
-            b"map_ke" => material.emissive_map = Some(map(path, place, words)?),
-            b"map_d" => material.opacity_map = Some(map(path, place, words)?),
+            b"map_kd" | b"map_ke" | b"map_d" => {
+                let map = map(path, place, words)?;
+                if map.is_none() {
+                    found.left_out.insert(format!("{} without a file", String::from_utf8_lossy(&keyword)));
+                }
+                match keyword.as_slice() {
+                    b"map_kd" => material.diffuse_map = map,
+                    b"map_ke" => material.emissive_map = map,
+                    _ => material.opacity_map = map,
+                }
+            }
             b"bump" | b"disp" | b"decal" | b"norm" | b"refl" => {
                 found.left_out.insert(String::from_utf8_lossy(&keyword).into_owned());
             }
@@ -267,8 +275,8 @@ fn color<'w>(place: &Place, words: impl Iterator<Item = &'w [u8]>) -> Result<Opt
     }
 }
 
-/// The image of a statement, behind its options.
-fn map<'w>(library: &Path, place: Place, words: impl Iterator<Item = &'w [u8]>) -> Result<Map> {
+/// The image of a statement, behind its options; `None` where it names none, as programs write it for materials without an image.
+fn map<'w>(library: &Path, place: Place, words: impl Iterator<Item = &'w [u8]>) -> Result<Option<Map>> {
     let words: Vec<&[u8]> = words.collect();
     let (mut scale, mut offset, mut clamp, mut at) = ([1.0; 2], [0.0; 2], false, 0);
     while let Some(option) = words.get(at).filter(|word| word.starts_with(b"-") && word.len() > 1) {
@@ -290,8 +298,11 @@ fn map<'w>(library: &Path, place: Place, words: impl Iterator<Item = &'w [u8]>) 
     if !scale.iter().chain(&offset).all(|x| x.is_finite()) {
         return Err(malformed(place, "expected finite numbers behind -s and -o"));
     }
+    if name.is_empty() {
+        return Ok(None);
+    }
     match beside(folder, &name) {
-        Some(file) => Ok(Map { file, place, scale, offset, clamp }),
+        Some(file) => Ok(Some(Map { file, place, scale, offset, clamp })),
         None => {
             let message = format!("expected a relative file name, found \"{}\"", shown(name.as_bytes()));
             let hint = "put the image beside the library and refer to it by its name";

@@ -11,6 +11,7 @@ mod groups;
 mod many_meshes;
 mod materials;
 mod memory;
+mod mtl;
 mod obj;
 mod off;
 mod ply;

@@ -8,6 +8,7 @@ mod data;
 mod gltf;
 mod gltf_nodes;
 mod groups;
+mod joints;
 mod many_meshes;
 mod materials;
 mod memory;

@@ -1,6 +1,6 @@
 //! Deformers of a manifest from the skins and morph targets of a glTF scene (glTF 2.0 specification, §3.7.2.2 and §3.7.3).
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use bth_scene::{Deformer, JointSet, Node, Skin, Source, Transform};
 
@@ -97,21 +97,27 @@ impl Importer<'_> {
         let Some(found) = self.document.skins.get(skin) else {
             return Err(self.error(format!("skin {skin}"), "it does not exist"));
         };
+        let mut at_rest = HashSet::new();
         for &joint in &found.joints {
-            if self.ancestors(joint)?.iter().any(|node| self.animated.transforms[*node]) {
+            let path = self.ancestors_until(joint, |node| at_rest.contains(&node))?;
+            if path.iter().any(|node| self.animated.transforms[*node]) {
                 return Ok(true);
             }
+            at_rest.extend(path);
         }
         Ok(false)
     }
 
-    /// A node of the document and all above it, upwards.
-    fn ancestors(&self, node: usize) -> Result<Vec<usize>> {
+    /// A node of the document and those above it, upwards, below the first that is known.
+    fn ancestors_until(&self, node: usize, is_known: impl Fn(usize) -> bool) -> Result<Vec<usize>> {
         let mut path = Vec::new();
         let mut next = Some(node);
         while let Some(index) = next {
             if index >= self.document.nodes.len() {
                 return Err(self.error(format!("node {index}"), "it does not exist"));
+            }
+            if is_known(index) {
+                break;
             }
             if path.len() > self.document.nodes.len() {
                 return Err(self.error(format!("node {node}"), "it is an ancestor of itself"));
@@ -178,24 +184,18 @@ impl Importer<'_> {
 
     /// The row of a joint's node.
     fn joint(&mut self, joint: usize) -> Result<usize> {
-        let path = self.ancestors(joint)?;
-        let mut parent = None;
-        for &index in path.iter().rev() {
-            let row = match self.report.node_rows[index] {
-                Some(row) => row,
-                None => {
-                    let node = &self.document.nodes[index];
-                    let transform = self.transform(node, &format!("node {index}"))?;
-                    let name = self.node_names.unique(&node.name, format!("node {index}"));
-                    let row = self.manifest.nodes.len();
-                    self.manifest.nodes.push(Node { name, parent, transform, object: None, visible: true });
-                    self.report.node_rows[index] = Some(row);
-                    row
-                }
-            };
-            parent = Some(row);
+        let without_row = self.ancestors_until(joint, |node| self.report.node_rows[node].is_some())?;
+        let above = without_row.last().map_or(Some(joint), |last| self.parents[*last]);
+        let mut row = above.and_then(|node| self.report.node_rows[node]);
+        for &index in without_row.iter().rev() {
+            let node = &self.document.nodes[index];
+            let transform = self.transform(node, &format!("node {index}"))?;
+            let name = self.node_names.unique(&node.name, format!("node {index}"));
+            let parent = row.replace(self.manifest.nodes.len());
+            self.manifest.nodes.push(Node { name, parent, transform, object: None, visible: true });
+            self.report.node_rows[index] = row;
         }
-        parent.ok_or_else(|| self.error(format!("node {joint}"), "it does not exist"))
+        row.ok_or_else(|| self.error(format!("node {joint}"), "it does not exist"))
     }
 
     fn weight_error(&self, part: &str, message: String) -> Error {

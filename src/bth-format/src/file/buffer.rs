@@ -141,8 +141,10 @@ impl Buffer {
 /// they are opened.
 fn open(path: &Path) -> Result<(std::fs::File, u64)> {
     let io = |e| Error::io(path, e);
-    if !std::fs::metadata(path).map_err(io)?.is_file() {
-        return Err(io(std::io::Error::new(std::io::ErrorKind::InvalidInput, "not a regular file")));
+    let found = std::fs::metadata(path).map_err(io)?;
+    if !found.is_file() {
+        let what = if found.is_dir() { "a folder, not a file" } else { "not a regular file" };
+        return Err(io(std::io::Error::new(std::io::ErrorKind::InvalidInput, what)));
     }
     let file = std::fs::File::open(path).map_err(io)?;
     let length = file.metadata().map_err(io)?.len();

@@ -13,7 +13,7 @@ use bth_compile::scene::{CachePolicy, SceneSource};
 use bth_compile::{Monitor, write};
 use bth_import::Looks;
 use bth_import::gltf::Chosen;
-use bth_import::gltf::scene::ImportOptions;
+use bth_import::gltf::scene::{self, ImportOptions};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -296,10 +296,7 @@ fn compile_file(
     let content = if is_scene(path, flatten) {
         let manifest = match has_extension(path, &["manifest", "toml"]) {
             true => bth_scene::read(path).map_err(manifest_error)?,
-            false => {
-                let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-                bth_import::gltf::scene::import(path, &name, gltf, monitor)?.0
-            }
+            false => scene::import(path, scene::file_name(path)?, gltf, monitor)?.0,
         };
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let source = SceneSource { folder, name: path };

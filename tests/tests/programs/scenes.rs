@@ -294,6 +294,26 @@ fn animated_models_are_imported_compiled_and_rendered() {
     assert!(seen > 10, "{seen}");
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn gltf_files_whose_names_cannot_stand_in_manifests_are_refused_by_name() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = tempfile::tempdir().unwrap();
+    let not_text = std::ffi::OsStr::from_bytes(b"a\xFF.gltf");
+    for name in [not_text, "a:b.gltf".as_ref()] {
+        std::fs::write(folder.path().join(name), "{}").unwrap();
+        let mut import = command("bthc", folder.path(), &["import"]);
+        import.arg(name);
+        let refused = run_with(import).expect(2);
+        assert!(refused.stderr.contains("cannot stand in a manifest"), "{refused:?}");
+        assert!(refused.stderr.contains("rename it"), "{refused:?}");
+    }
+    let mut compile = command("bthc", folder.path(), &["compile"]);
+    compile.arg(not_text);
+    let refused = run_with(compile).expect(3);
+    assert!(refused.stderr.contains("BTH-I006: expected a file name in UTF-8"), "{refused:?}");
+}
+
 #[test]
 fn manifests_are_written_beside_or_above_their_model_only() {
     let Some(data) = data() else { return };

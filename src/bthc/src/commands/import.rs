@@ -50,14 +50,13 @@ fn comment(text: &str) -> String {
 
 /// The path of a model, relative to the folder of the manifest.
 fn name_from(folder: &Path, model: &Path) -> Result<String, Failure> {
-    let usage = |message: String| Failure::Usage {
-        message,
-        hint: "write the manifest beside the glTF file or in a folder above it",
-    };
     let real = |path: &Path| std::fs::canonicalize(path).map_err(|e| Failure::file("BTH-O001", path, &e));
     let (folder, model) = (real(folder)?, real(model)?);
     let Ok(inside) = model.strip_prefix(&folder) else {
-        return Err(usage(format!("{} does not lie below {}", model.display(), folder.display())));
+        return Err(Failure::Usage {
+            message: format!("{} does not lie below {}", model.display(), folder.display()),
+            hint: "write the manifest beside the glTF file or in a folder above it",
+        });
     };
     let parts: Option<Vec<&str>> = inside
         .components()
@@ -66,9 +65,10 @@ fn name_from(folder: &Path, model: &Path) -> Result<String, Failure> {
             _ => None,
         })
         .collect();
-    parts
-        .map(|parts| parts.join("/"))
-        .ok_or_else(|| usage(format!("{} has no portable name", model.display())))
+    parts.map(|parts| parts.join("/")).ok_or_else(|| Failure::Usage {
+        message: format!("{} has a name that cannot stand in a manifest", inside.display()),
+        hint: "rename it: names in manifests are UTF-8, without colons and back slashes",
+    })
 }
 
 fn summary(path: &Path, report: &ImportReport) -> String {

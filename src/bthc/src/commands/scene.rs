@@ -11,7 +11,7 @@ use bth_compile::cached::{Cache, DryRun};
 use bth_compile::scene::{self, CachePolicy, SceneReport, SceneSource};
 use bth_compile::source;
 use bth_import::Looks;
-use bth_import::gltf::scene::{ImportReport, import};
+use bth_import::gltf::scene::{ImportReport, file_name, import};
 use bth_scene::Manifest;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -48,8 +48,7 @@ fn read(
     if is_manifest(model) {
         return Ok((bth_scene::read(model)?, None));
     }
-    let name = model.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let (manifest, report) = import(model, &name, &gltf.options(), monitor)?;
+    let (manifest, report) = import(model, file_name(model)?, &gltf.options(), monitor)?;
     Ok((manifest, Some(report)))
 }
 

@@ -20,17 +20,29 @@ use self::animated::Animated;
 use self::importer::Importer;
 use self::names::Names;
 pub use self::options::{ImportOptions, ImportReport};
-use crate::error::Result;
+use crate::error::{Place, Result};
 use crate::gltf::accessor::Accessors;
 use crate::gltf::buffer::Buffers;
 use crate::gltf::document;
 use crate::gltf::extensions::{SCENE_EXTENSIONS, SUPPORTED};
 use crate::gltf::rest_pose::parents;
 use crate::monitor::Monitor;
-use crate::source::{Source, read_file};
+use crate::source::{Source, UNSUPPORTED, input_error, read_file};
 
 /// The longest animation in frames.
 const MAX_FRAMES: u32 = 1 << 24;
+
+/// The name of a glTF file, by which the objects of a manifest in its folder refer to it.
+///
+/// # Errors
+/// `BTH-I006` when it is not UTF-8, which manifests are.
+pub fn file_name(path: &Path) -> Result<&str> {
+    path.file_name().and_then(|name| name.to_str()).ok_or_else(|| {
+        let message = "expected a file name in UTF-8, by which the objects of a scene refer to their file";
+        let hint = "rename the file, or flatten it";
+        input_error(UNSUPPORTED, Place::File(path.to_owned()), message, hint)
+    })
+}
 
 /// Reads the scene of a glTF or GLB file. `name` is the file's path as it is to stand in the manifest.
 ///

@@ -131,12 +131,19 @@ impl Failure {
         }
     }
 
+    /// As [`Self::json`], with `exit_code`: what stands at `error` with `--json`.
+    pub(crate) fn json_with_exit_code(&self) -> serde_json::Value {
+        let mut error = self.json();
+        error["exit_code"] = self.exit_code().into();
+        error
+    }
+
     /// Prints the error, with `--json` as an object too, and returns the exit code.
     pub(crate) fn report(&self, wants_json: bool) -> ExitCode {
         if !matches!(self, Self::Check | Self::Reported(_) | Self::ClosedOutput) {
             self.print();
             if wants_json {
-                print_json_error(self.json(), self.exit_code());
+                print_json_error(self.json_with_exit_code());
             }
         }
         ExitCode::from(self.exit_code())
@@ -183,8 +190,7 @@ pub(crate) fn runtime_json(error: &bth::Error) -> serde_json::Value {
     })
 }
 
-fn print_json_error(mut error: serde_json::Value, exit_code: u8) {
-    error["exit_code"] = exit_code.into();
+fn print_json_error(error: serde_json::Value) {
     // Where standard output is closed, the exit code is all that can be reported.
     let _ = output::json(&json!({ "error": error }));
 }
@@ -199,7 +205,7 @@ pub(crate) fn usage(error: &clap::Error, wants_json: bool) -> ExitCode {
     if wants_json {
         let first =
             error.to_string().lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
-        print_json_error(json!({"code": "BTH-U001", "message": first}), 2);
+        print_json_error(json!({"code": "BTH-U001", "message": first, "exit_code": 2}));
     }
     ExitCode::from(2)
 }

@@ -13,7 +13,8 @@ use bth_compile::pipeline::{self, CompileOptions};
 use bth_compile::{Monitor, bvh, sampling, write};
 use bth_import::{self, Keep, Mesh};
 use bth_scenes::{Model, blob, gyroid};
-use serde_json::json;
+use serde_json::{Value, json};
+use std::path::Path;
 
 /// Faces of the generated models: their tetrahedra take a quarter of a megabyte, and many times the caches.
 const SMALL_FACES: u32 = 2_400;
@@ -57,16 +58,29 @@ pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
     let mut text = serde_json::to_string_pretty(&profile).map_err(std::io::Error::from)?;
     text.push('\n');
     // What cannot be written is shown at least, and written where it cannot be shown.
-    let shown = if args.json { Ok(()) } else { output::text(&table(&profile)) };
+    if args.json {
+        let written = write::write_atomically(&args.output, text.as_bytes()).map_err(Failure::from);
+        let shown = output::json(&object(&profile, &args.output, &written));
+        if let Err(failure) = written {
+            failure.print();
+            return Err(Failure::Reported(failure.exit_code()));
+        }
+        return Ok(shown?);
+    }
+    let shown = output::text(&table(&profile));
     write::write_atomically(&args.output, text.as_bytes())?;
     shown?;
-    match args.json {
-        true => output::json(
-            &json!({"output": args.output.to_string_lossy(), "hash": profile.hash(), "profile": profile}),
-        )?,
-        false => output::text(&format!("wrote {}\n", args.output.display()))?,
+    Ok(output::text(&format!("wrote {}\n", args.output.display()))?)
+}
+
+/// What `--json` shows: the profile, and where it is, or why it could not be written there.
+fn object(profile: &Profile, output: &Path, written: &Result<(), Failure>) -> Value {
+    let mut object = json!({"hash": profile.hash(), "profile": profile});
+    match written {
+        Ok(()) => object["output"] = output.to_string_lossy().into(),
+        Err(failure) => object["error"] = failure.json_with_exit_code(),
     }
-    Ok(())
+    object
 }
 
 fn of(model: Model) -> Mesh {
@@ -116,4 +130,21 @@ fn table(profile: &Profile) -> String {
         }
     }
     table.render()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn costs_that_cannot_be_written_stand_beside_the_error() {
+        let (profile, path) = (Profile::default(), Path::new("missing/costs.json"));
+        let failed = Failure::file("BTH-O020", path, &"no such folder");
+        let object = |written| super::object(&profile, path, &written);
+        let (good, bad) = (object(Ok(())), object(Err(failed)));
+        assert_eq!((&good["output"], &good["error"]), (&"missing/costs.json".into(), &Value::Null));
+        assert_eq!((&bad["output"], &bad["error"]["code"]), (&Value::Null, &"BTH-O020".into()));
+        assert_eq!(bad["error"]["exit_code"], 4);
+        assert!(good["profile"].is_object() && good["profile"] == bad["profile"], "{bad}");
+    }
 }

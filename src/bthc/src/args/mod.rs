@@ -95,10 +95,10 @@ pub(crate) struct Verify {
     /// The compiled file.
     pub(crate) file: PathBuf,
     /// Trace sample rays through each object, too, in all ways, and compare them, and what is known of the directions in which they
-    /// start, with every triangle in exact arithmetic
+    /// start, with every triangle in exact arithmetic.
     #[arg(long)]
     pub(crate) deep: bool,
-    /// Rays of each object with --deep. By default as many as take some seconds
+    /// Rays of each object with --deep. By default as many as take some seconds.
     #[arg(long, value_name = "N", requires = "deep")]
     pub(crate) rays: Option<NonZeroUsize>,
     /// Print one JSON object.

@@ -91,3 +91,10 @@ keep("bth.wasm", wasm, MOST_WASM);
 keep("viewer.html", page(wasm), MOST_PAGE);
 for (const name of ["index.js", "index.d.ts", "package.json"]) copyFileSync(join(here, name), join(out, name));
 for (const name of ["LICENSE-MIT", "LICENSE-APACHE"]) copyFileSync(join(root, name), join(out, name));
+// The licences of the crates that the module holds, most of which ask to be where it is.
+try {
+    const notices = execFileSync("bash", [join(root, "tools/package/notices"), "--target", "wasm32-unknown-unknown", "bth-js"]);
+    writeFileSync(join(out, "NOTICES"), notices);
+} catch (error) {
+    console.error(`NOTE: without NOTICES, the licences of crates, which whoever passes the package on has to add: ${error.message}`);
+}

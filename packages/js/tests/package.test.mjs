@@ -354,7 +354,8 @@ test("the viewer lights a room alike at every size", async () => {
 test("the package is complete", () => {
     const { files } = JSON.parse(readFileSync(join(process.env.DIST, "package.json"), "utf8"));
     for (const name of files) assert.ok(readFileSync(join(process.env.DIST, name)).length > 0, name);
-    for (const name of ["LICENSE-MIT", "LICENSE-APACHE"]) assert.ok(files.includes(name), name);
+    for (const name of ["LICENSE-MIT", "LICENSE-APACHE", "NOTICES"]) assert.ok(files.includes(name), name);
+    assert.match(readFileSync(join(process.env.DIST, "NOTICES"), "utf8"), /^blake3 /m);
 });
 
 test("a compiled module and bytes can be loaded", async () => {

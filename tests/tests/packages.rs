@@ -179,6 +179,10 @@ fn debian_packages_have_manuals_and_completions_where_they_are_looked_for() {
             assert!(files.lines().any(|line| line.ends_with(&format!(" ./usr/{file}"))), "{file}: {files}");
         }
     }
+    if let Some((_, worker)) = debian_packages().iter().find(|(name, _)| name == "bth-tetgen") {
+        let files = output_of(Command::new("dpkg-deb").arg("-c").arg(worker));
+        assert!(files.contains(" ./usr/share/man/man1/bth-tetgen.1.gz"), "{files}");
+    }
 }
 
 #[test]

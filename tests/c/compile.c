@@ -1,5 +1,5 @@
 /* Compiles a mesh and a scene in memory, opens them and traces rays. Writes the bytes of both to files, for a comparison with those
- * that Rust makes. Arguments: the two files. Exits with the line of the first check that fails. */
+ * that Rust makes. Arguments: the two files; without them, the errors where no thread can be started. Exits with the line of the first check that fails. */
 #include "bth.h"
 #include "bth_compile.h"
 #include <math.h>
@@ -74,8 +74,18 @@ static int write_file(const char *path, bth_bytes bytes) {
 }
 
 int main(int argc, char **argv) {
-    CHECK(argc == 3 && strchr(bth_version(), '.') && strcmp(bth_version(), bth_compile_version()) == 0);
     bth_mesh mesh = hills();
+    if (argc == 1) { /* No thread can be started, not at the second time either. */
+        bth_compile_options options = {0};
+        bth_bytes bytes = {0};
+        for (int time = 0; time < 4; time++) {
+            options.threads = time % 2 ? 2 : 0;
+            CHECK(bth_compile_mesh(&mesh, &options, &bytes) == BTH_COMPILE_ERROR_LIMIT && !bytes.data);
+            CHECK(strstr(bth_compile_last_error(), time % 2 ? "BTH-L090: cannot start 2 threads" : "BTH-L090: cannot start a thread for"));
+        }
+        return 0;
+    }
+    CHECK(argc == 3 && strchr(bth_version(), '.') && strcmp(bth_version(), bth_compile_version()) == 0);
     struct seen seen = {0};
     bth_compile_options options = {0};
     options.structure = BTH_STRUCTURE_BVH;

@@ -16,6 +16,7 @@ use options::Options;
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::OnceLock;
 
 // Results of functions, `BTH_COMPILE_OK` and `BTH_COMPILE_ERROR_*` in C.
 const OK: i32 = 0;
@@ -249,11 +250,28 @@ unsafe fn with_bytes<T: Sync>(
 
 /// Runs a function in a pool of so many threads; 0 for the pool that all share.
 fn in_threads<T: Send>(threads: u32, work: impl FnOnce() -> Result<T, Failure> + Send) -> Result<T, Failure> {
+    let no_threads = |which: &str, why: &str| {
+        Failure::from(Error::Limit { code: "BTH-L090", message: format!("cannot start {which}: {why}") })
+    };
     if threads == 0 {
-        return work();
+        return match why_there_is_no_shared_pool() {
+            Some(why) => Err(no_threads("a thread for each processor", why)),
+            None => work(),
+        };
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build();
-    pool.map_err(|e| Failure(ERROR_LIMIT, format!("{threads} threads cannot be started: {e}")))?.install(work)
+    pool.map_err(|e| no_threads(&format!("{threads} threads"), &e.to_string()))?.install(work)
+}
+
+/// Why the pool that all share could not be started, which is tried once: what needs it panics then.
+fn why_there_is_no_shared_pool() -> Option<&'static str> {
+    static WHY: OnceLock<Option<String>> = OnceLock::new();
+    let failed = || {
+        let error = rayon::ThreadPoolBuilder::new().build_global().err()?;
+        // Without a source it says that the pool is there already.
+        std::error::Error::source(&error).map(ToString::to_string)
+    };
+    WHY.get_or_init(failed).as_deref()
 }
 
 /// Frees bytes; see `bth_compile.h`.

@@ -220,6 +220,10 @@ fn a_c_program_compiles_in_memory_and_gets_the_bytes_of_rust() {
     let [mesh, scene] = ["mesh.bth", "scene.bth"].map(|name| folder.path().join(name));
     let output = run(&program, &[&mesh, &scene].map(|path| path.to_str().expect("UTF-8")), "");
     assert!(output.status.success(), "{output:?}");
+    // No system has as much memory for the stack of a thread.
+    let output = Command::new(&program).env("RUST_MIN_STACK", (1u64 << 47).to_string()).output();
+    let output = output.expect("the C program ends");
+    assert!(output.status.success(), "{output:?}");
 
     let (positions, triangles) = hills();
     let hills = TriangleMesh { positions: &positions, triangles: &triangles };

@@ -121,7 +121,9 @@ fn scene(name: &str, folder: &Path) -> Result<(), Failure> {
         writeln!(out, "{}: {} faces", path.display(), model.triangles.len())?;
     }
     let path = folder.join(format!("{name}.manifest"));
-    std::fs::write(&path, scene.manifest.to_toml()).map_err(|e| Failure::file(&path, e))?;
+    let manifest = scene.manifest.to_toml();
+    bth_files::replace(&path, |file| file.write_all(manifest.as_bytes()))
+        .map_err(|e| Failure::file(&path, e))?;
     let frames = scene.manifest.frames;
     writeln!(out, "{}: frames {} to {}", path.display(), frames.first, frames.last)?;
     Ok(())

@@ -66,7 +66,7 @@ pub fn stl(model: &Model) -> Vec<u8> {
     bytes
 }
 
-/// Writes a model in the format that the extension names: `.obj`, `.ply` or `.stl`.
+/// Writes a model in the format that the extension names: `.obj`, `.ply` or `.stl`. The file is whole or as it was.
 ///
 /// # Errors
 /// Fails on another extension, or when the file cannot be written.
@@ -77,5 +77,23 @@ pub fn file(model: &Model, path: &Path) -> Result<(), Error> {
         Some("stl") => stl(model),
         _ => return Err(Error::Extension(path.into())),
     };
-    std::fs::write(path, bytes).map_err(|source| Error::Write { path: path.into(), source })
+    bth_files::replace(path, |out| out.write_all(&bytes))
+        .map_err(|source| Error::Write { path: path.into(), source })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn models_are_replaced_and_not_written_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let [path, link] = ["model.ply", "former.ply"].map(|name| folder.path().join(name));
+        file(&crate::blob::blob(80), &path).unwrap();
+        let former = std::fs::read(&path).unwrap();
+        std::fs::hard_link(&path, &link).unwrap();
+        file(&crate::blob::blob(320), &path).unwrap();
+        assert_eq!(std::fs::read(&link).unwrap(), former);
+        assert_ne!(std::fs::read(&path).unwrap(), former);
+    }
 }

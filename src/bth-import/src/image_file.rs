@@ -1,7 +1,7 @@
 //! Image files, and what is checked of them without decoding them: format and size.
 
 use crate::error::{Error, Result as ImportResult};
-use crate::gltf::uri::read_at_most;
+use crate::source::read_at_most;
 use imagesize::{ImageError, ImageType};
 use std::path::Path;
 

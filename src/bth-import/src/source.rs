@@ -1,6 +1,7 @@
 //! The bytes of a source file, the progress of its reader, and errors at places in it.
 
 use std::cell::Cell;
+use std::io::Read;
 use std::path::Path;
 
 use crate::error::{Error, Place, Result};
@@ -108,11 +109,22 @@ pub(crate) fn input_error(code: &'static str, place: Place, message: impl Into<S
 /// # Errors
 /// `BTH-O001` when it cannot be read.
 pub fn read_file(path: &Path) -> Result<Vec<u8>> {
-    bth_files::regular_file(path).and_then(|_| std::fs::read(path)).map_err(|e| Error::File {
-        code: "BTH-O001",
-        path: path.to_owned(),
-        message: format!("cannot read: {e}"),
-    })
+    bth_files::regular_file(path).and_then(|_| std::fs::read(path)).map_err(|e| cannot_read(path, &e))
+}
+
+/// The first bytes of a file beside a model, at most `most`.
+///
+/// # Errors
+/// `BTH-O001` when it cannot be read or is no regular file.
+pub(crate) fn read_at_most(path: &Path, most: u64) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let file = bth_files::regular_file(path).and_then(|_| std::fs::File::open(path));
+    let read = file.and_then(|file| file.take(most).read_to_end(&mut bytes));
+    read.map(|_| bytes).map_err(|e| cannot_read(path, &e))
+}
+
+fn cannot_read(path: &Path, e: &std::io::Error) -> Error {
+    Error::File { code: "BTH-O001", path: path.to_owned(), message: format!("cannot read: {e}") }
 }
 
 /// Code: the file is cut off. Use it with [`TRUNCATED_HINT`].

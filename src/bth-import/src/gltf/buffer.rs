@@ -9,8 +9,8 @@ use crate::error::{Error, Result};
 use crate::gltf::extensions::{MESHOPT, unsupported_extension};
 use crate::gltf::meshopt;
 use crate::gltf::schema::{Buffer, BufferView, GltfDocument, MeshoptCompression};
-use crate::gltf::uri::{beside, decode_base64, read_at_most, refusal};
-use crate::source::{Source, TRUNCATED, TRUNCATED_HINT};
+use crate::gltf::uri::{beside, decode_base64, refusal};
+use crate::source::{Source, TRUNCATED, TRUNCATED_HINT, read_at_most};
 
 const BUFFER: &str = "BTH-I014";
 

@@ -1,9 +1,7 @@
 //! URIs of glTF buffers: files beside the document and data: URIs (glTF 2.0 specification, §2.8).
 
-use std::io::Read;
 use std::path::{self, Path, PathBuf};
 
-use crate::error::{Error, Result};
 use crate::number::shown;
 
 /// The file that a relative URI names; `None` for others.
@@ -31,22 +29,6 @@ pub(crate) fn refusal(uri: &str) -> (String, &'static str) {
             "put the file beside the model and refer to it by its name",
         ),
     }
-}
-
-/// The first bytes of a file beside the document, at most `most`.
-///
-/// # Errors
-/// `BTH-O001` when it cannot be read or is no regular file.
-pub(crate) fn read_at_most(path: &Path, most: u64) -> Result<Vec<u8>> {
-    let file_error = |e: std::io::Error| Error::File {
-        code: "BTH-O001",
-        path: path.to_owned(),
-        message: format!("cannot read: {e}"),
-    };
-    let file = bth_files::regular_file(path).and_then(|_| std::fs::File::open(path)).map_err(file_error)?;
-    let mut bytes = Vec::new();
-    file.take(most).read_to_end(&mut bytes).map_err(file_error)?;
-    Ok(bytes)
 }
 
 /// Decodes percent escapes (RFC 3986, §2.1); `None` if that is malformed or the result is not UTF-8.

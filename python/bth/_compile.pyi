@@ -8,7 +8,7 @@ from ._scene import Scene
 
 def compile(
     model: Any, *,
-    output: str | PathLike[str] | None = None, quality: Literal["fast", "balanced", "best"] | None = None,
+    output: str | bytes | PathLike[str] | PathLike[bytes] | None = None, quality: Literal["fast", "balanced", "best"] | None = None,
     structure: Literal["bth", "bvh", "tets"] | None = None, coordinates: Literal["f32", "21", "16", 21, 16] | None = None,
     max_error: float | str | None = None, boxes: Literal["f32", "8", 8] | None = None,
     polygons: Literal["fans", "ears"] | None = None,
@@ -31,7 +31,7 @@ def compile(
 ) -> Scene: ...
 def compile_scene(
     meshes: Iterable[Any], instances: ArrayLike | None = None, transforms: ArrayLike | None = None, *,
-    output: str | PathLike[str] | None = None, quality: Literal["fast", "balanced", "best"] | None = None,
+    output: str | bytes | PathLike[str] | PathLike[bytes] | None = None, quality: Literal["fast", "balanced", "best"] | None = None,
     structure: Literal["bth", "bvh", "tets"] | None = None, coordinates: Literal["f32", "21", "16", 21, 16] | None = None,
     max_error: float | str | None = None, boxes: Literal["f32", "8", 8] | None = None,
     attributes: Literal["none", "normals", "all"] | None = None, alpha: Literal["none", "mask", "blend"] | None = None,

@@ -107,6 +107,7 @@ impl ConcavePolygons {
 
     /// Warns of those that remain fans.
     pub(super) fn warn(&self, polygons: Polygons, monitor: &dyn Monitor) {
+        debug_assert!(self.suspects.is_empty(), "polygons are told before all are known");
         if self.left == 0 {
             return;
         }

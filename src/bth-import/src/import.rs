@@ -63,7 +63,7 @@ pub(crate) fn read_raw<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw
         Format::Obj => obj::read(source, wanted),
         Format::Gltf => gltf::flatten::read(source, wanted),
         Format::Ply => ply::read(source, wanted),
-        Format::Stl => stl::read(source),
+        Format::Stl => stl::read(source, wanted),
         Format::Off => off::read(source, wanted),
     }
 }

@@ -110,7 +110,7 @@ pub struct Wanted {
     pub groups: bool,
     /// How materials look, and vertex colours (`--materials`). Needs groups.
     pub materials: bool,
-    /// How polygons of OBJ, PLY and OFF become triangles (`--polygons`).
+    /// How polygons of OBJ, PLY, OFF and STL become triangles (`--polygons`).
     pub polygons: Polygons,
     /// All vertices of the source, in its order, those at equal positions and unused ones too (`--deformable`).
     pub vertices: bool,

@@ -3,6 +3,7 @@
 //! A reader of our own rather than `stl_io`: docs/decisions.md says why.
 
 use crate::error::Result;
+use crate::mesh::Wanted;
 use crate::number::{Lines, float, shown, without_mark, words};
 use crate::raw::{Raw, RowKind, check_triangles};
 use crate::source::{MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
@@ -30,11 +31,11 @@ fn begins_with_solid(data: &[u8]) -> bool {
 }
 
 /// Reads an STL file. Each solid of a text is a group. Facet normals are not shading attributes and are ignored.
-pub(super) fn read<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
+pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
     let data = source.data;
     let is_text =
         !is_binary_size(data) && begins_with_solid(data) && !data[..data.len().min(1024)].contains(&0);
-    if is_text { read_text(source) } else { read_binary(source) }
+    if is_text { read_text(source, wanted) } else { read_binary(source) }
 }
 
 fn read_binary<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
@@ -67,7 +68,7 @@ fn read_binary<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
     Ok(raw)
 }
 
-fn read_text<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
+fn read_text<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
     let mut raw = Raw::new("stl", Box::new(|_, row| source.line(line_of_vertex(source.data, row))));
     let mut lines = Lines::new(source.data);
     let mut in_solid = false;
@@ -118,6 +119,7 @@ fn read_text<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
         let message = "expected endsolid, found the end of the file";
         return Err(source.error_at_line(TRUNCATED, lines.number(), message, TRUNCATED_HINT));
     }
+    raw.finish_polygons(wanted.polygons, source.monitor)?;
     Ok(raw)
 }
 

@@ -78,7 +78,7 @@ fn concave_polygons_are_split_exactly_where_that_is_wanted() {
 }
 
 #[test]
-fn concave_polygons_of_ply_and_off_are_split_too() {
+fn concave_polygons_of_other_formats_are_split_too() {
     let rows = "2 -1 0\n1 0 0\n2 1 0\n0 0 0\n4 0 1 2 3\n";
     let colored = "2 -1 0 10\n1 0 0 20\n2 1 0 30\n0 0 0 40\n4 0 1 2 3\n";
     let properties = "property float x\nproperty float y\nproperty float z\nproperty uchar red\n";
@@ -86,7 +86,9 @@ fn concave_polygons_of_ply_and_off_are_split_too() {
         "ply\nformat ascii 1.0\nelement vertex 4\n{properties}element face 1\n\
          property list uchar int vertex_indices\nend_header\n{colored}"
     );
-    for (name, text) in [("a.ply", ply), ("a.off", format!("OFF\n4 1 0\n{rows}"))] {
+    let vertices = ARROW.lines().map(|line| format!("vertex{}\n", &line[1..])).collect::<String>();
+    let stl = format!("solid\nfacet\nouter loop\n{vertices}endloop\nendfacet\nendsolid\n");
+    for (name, text) in [("a.ply", ply), ("a.off", format!("OFF\n4 1 0\n{rows}")), ("a.stl", stl)] {
         let wanted = Wanted { polygons: Polygons::Ears, ..Keep::None.into() };
         let (mesh, _) = import_named(Path::new(name), text.as_bytes(), wanted, &Silent).unwrap();
         let [a, b, c, d] = [[2.0, -1.0, 0.0], [1.0, 0.0, 0.0], [2.0, 1.0, 0.0], [0.0; 3]];

@@ -27,7 +27,7 @@ pub(crate) struct Compile {
     /// What to build. By default bth, with --deformable bvh.
     #[arg(long, value_enum)]
     pub(crate) structure: Option<Structure>,
-    /// How polygons of more than three corners become triangles in OBJ, PLY and OFF. Fans cover more than a polygon that is concave.
+    /// How polygons of more than three corners become triangles in OBJ, PLY, OFF and STL. Fans cover more than a polygon that is concave.
     #[arg(long, value_enum, default_value_t = Polygons::Fans)]
     pub(crate) polygons: Polygons,
     /// Shading attributes to keep.

@@ -34,6 +34,7 @@ def compile_scene(
     output: str | bytes | PathLike[str] | PathLike[bytes] | None = None, quality: Literal["fast", "balanced", "best"] | None = None,
     structure: Literal["bth", "bvh", "tets"] | None = None, coordinates: Literal["f32", "21", "16", 21, 16] | None = None,
     max_error: float | str | None = None, boxes: Literal["f32", "8", 8] | None = None,
+    polygons: Literal["fans", "ears"] | None = None,
     attributes: Literal["none", "normals", "all"] | None = None, alpha: Literal["none", "mask", "blend"] | None = None,
     tets: Literal["link32", "tet32", "tet20", "tet16"] | None = None, subtrees: Literal["keep", "prune"] | None = None,
     compact: bool | None = None, geometry: bool | None = None, names: bool | None = None, materials: bool | None = None,

@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+from processes import exits
 
 import bth
 
@@ -48,7 +49,7 @@ def test_more_hits_than_memory(threads):
                 sys.exit(3)
         assert len(scene.all_hits(rays[:10], [0, 0, 1], threads=threads)) == 10 * layers
     """
-    assert _exits(code, str(threads)) == 0
+    assert exits(code, str(threads)) == 0
 
 
 def _resident():

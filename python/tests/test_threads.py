@@ -1,14 +1,13 @@
 """Many threads, processes and filters at once: changes wait for queries, and nothing crashes."""
 
 import os
-import subprocess
 import sys
-import textwrap
 import threading
 import time
 
 import numpy as np
 import pytest
+from processes import exits
 
 import bth
 
@@ -135,10 +134,6 @@ def test_fork(scene):
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
 
 
-def _exits(code, *arguments):
-    return subprocess.run([sys.executable, "-c", textwrap.dedent(code), *arguments], timeout=120).returncode
-
-
 def test_filters_that_call_themselves():
     code = """
         import sys, bth
@@ -156,7 +151,7 @@ def test_filters_that_call_themselves():
                 sys.exit(3)
         assert scene.any(*ray, filter=within(10))
     """
-    assert _exits(code) == 0
+    assert exits(code) == 0
 
 
 @pytest.mark.parametrize("threads", [None, 1])
@@ -176,4 +171,4 @@ def test_exit_while_daemons_trace(threads):
             threading.Thread(target=trace, daemon=True).start()
         time.sleep(0.2 + float(sys.argv[1]))
     """
-    assert [_exits(code, str(0.01 * i), str(threads)) for i in range(8)] == [0] * 8
+    assert [exits(code, str(0.01 * i), str(threads)) for i in range(8)] == [0] * 8

@@ -27,6 +27,11 @@ pub(crate) enum RegionArrays<'py> {
     },
 }
 
+/// Greatest numbers of regions, and of triangles in them, between two looks at whether the call ends early. Most regions take little more
+/// time than a look at the clock.
+const REGIONS: usize = 16;
+const TRIANGLES: usize = 4096;
+
 /// Regions that may be shared between threads.
 #[derive(Clone, Copy)]
 enum Regions<'a> {
@@ -96,8 +101,8 @@ pub(crate) fn overlaps(
     let (scene, regions) = (scene.get()?, regions.regions()?);
     let jobs = chunks_of(numbers(&mut out, regions.len())?);
     scene.run(py, threads, jobs, |scene, (range, found), watch| {
-        for (region, found) in regions.read(range).iter().zip(found) {
-            if watch.is_over() {
+        for (i, (region, found)) in regions.read(range).iter().zip(found).enumerate() {
+            if i % REGIONS == 0 && watch.is_over() {
                 return;
             }
             *found = match region.radius {
@@ -130,16 +135,23 @@ pub(crate) fn triangles_in<'py>(
     let each = |scene: &bth::Scene,
                 (range, (counts, mut all)): (Range<usize>, (&mut [u64], Part<'_, PrimitiveRef>)),
                 watch: &Watch<'_>| {
-        let mut triangles = Vec::new();
-        for (region, count) in regions.read(range).iter().zip(counts) {
-            if all.is_full() || watch.is_over() {
+        let (mut triangles, mut listed) = (Vec::new(), 0);
+        for (i, (region, count)) in regions.read(range).iter().zip(counts).enumerate() {
+            if all.is_full() {
                 return;
+            }
+            if i % REGIONS == 0 || listed > TRIANGLES {
+                listed = 0;
+                if watch.is_over() {
+                    return;
+                }
             }
             match region.radius {
                 None => scene.triangles_in_box(region.first, region.upper, &mut triangles),
                 Some(radius) => scene.triangles_in_sphere(region.first, radius, &mut triangles),
             }
             *count = triangles.len() as u64;
+            listed += triangles.len();
             all.append(&triangles);
         }
     };

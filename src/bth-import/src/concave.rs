@@ -114,7 +114,9 @@ impl ConcavePolygons {
         let are = if self.left == 1 { "polygon is" } else { "polygons are" };
         let (why, hint) = match polygons {
             Polygons::Fans => ("", "Compile with --polygons ears, or triangulate"),
-            Polygons::Ears => (" and cannot be split, since the outline crosses itself", "Triangulate"),
+            Polygons::Ears => {
+                (" and cannot be split, since the outline crosses itself or is far from flat", "Triangulate")
+            }
         };
         monitor.warn(&format!(
             "{} {are} concave{why}: the fan of triangles from the first corner covers more than the polygon; the first is triangle {}. \

@@ -1,5 +1,6 @@
 //! Triangulation of single polygons by clipping ears.
 
+use crate::corner_grid::CornerGrid;
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::polygon::{area_vector, fan};
@@ -14,9 +15,10 @@ const CHECKED: u64 = 1024;
 /// something the other way, or since the polygon is so far from flat that its projection does.
 ///
 /// The polygon is projected along the axis that is nearest to its normal, which rounds nothing. There an ear, a convex corner whose
-/// triangle holds no other corner, is clipped until three corners are left (Meisters, "Polygons have ears", 1975). Predicates are exact. All corners stay, those on
-/// straight lines too, so no gaps open between neighbours, and there are two triangles fewer than corners, as in a fan: where
-/// corners come twice in a row, some have no area. An outline may run along an edge and back, as it does to reach a hole.
+/// triangle holds no other corner, is clipped until three corners are left (Meisters, "Polygons have ears", 1975). Predicates are
+/// exact. All corners stay, those on straight lines too, so no gaps open between neighbours, and there are two triangles fewer than
+/// corners, as in a fan: where corners come twice in a row, some have no area. An outline may run along an edge and back, as it does
+/// to reach a hole. A polygon of n corners takes about n steps where ears are small, and n² where they are as long as the polygon.
 ///
 /// # Errors
 /// Cancellation.
@@ -69,8 +71,8 @@ struct Outline {
     neighbours: Vec<[u32; 2]>,
     /// Number of corners that are left.
     count: usize,
-    /// Corners that are not convex.
-    hollow: Grid,
+    /// Corners that are left and not convex.
+    hollow: CornerGrid,
 }
 
 impl Outline {
@@ -83,7 +85,7 @@ impl Outline {
         let count = points.len() as u32;
         let around = |corner: u32| [(corner + count - 1) % count, (corner + 1) % count];
         let neighbours = (0..count).map(around).collect();
-        let hollow = Grid::new(&points);
+        let hollow = CornerGrid::new(&points);
         let mut outline = Self { points, neighbours, count: count as usize, hollow };
         (0..count).for_each(|corner| outline.note(corner));
         outline
@@ -150,67 +152,10 @@ impl Outline {
                 let sides = [(before, corner), (corner, behind), (behind, before)];
                 sides.iter().all(|(from, to)| self.turn(*from, *to, other) >= 0.0)
             };
-            !self.is_gone(other)
-                && !triangle.contains(&self.point(other))
-                && inside()
-                && !self.is_convex(other)
+            !triangle.contains(&self.point(other)) && inside()
         };
         !self.hollow.near(&triangle).any(blocks)
     }
-}
-
-/// Corners by the cells of a grid over the polygon's box.
-struct Grid {
-    lower: [f64; 2],
-    /// Cells for each unit of length.
-    density: [f64; 2],
-    /// Columns and rows.
-    size: [usize; 2],
-    corners: Vec<Vec<u32>>,
-}
-
-impl Grid {
-    /// An empty grid of square cells, about as many as there are points.
-    fn new(points: &[[f64; 2]]) -> Self {
-        let [lower, upper] = bounds(points);
-        let extent = [upper[0] - lower[0], upper[1] - lower[1]];
-        let side = (extent[0] * extent[1] / points.len() as f64).sqrt();
-        let size = extent.map(|extent| ((extent / side) as usize).clamp(1, points.len()));
-        // Without extent there is one column or row of cells.
-        let density = [0, 1].map(|k| size[k] as f64 / extent[k]).map(|x| if x.is_finite() { x } else { 0.0 });
-        Self { lower, density, size, corners: vec![Vec::new(); size[0] * size[1]] }
-    }
-
-    /// The column and the row of a point. They ascend with the coordinates, whatever is rounded.
-    fn cell(&self, point: [f64; 2]) -> [usize; 2] {
-        [0, 1].map(|k| (((point[k] - self.lower[k]) * self.density[k]) as usize).min(self.size[k] - 1))
-    }
-
-    /// Adds a corner, or takes it away.
-    fn set(&mut self, corner: u32, point: [f64; 2], present: bool) {
-        let [x, y] = self.cell(point);
-        let cell = &mut self.corners[y * self.size[0] + x];
-        match cell.iter().position(|other| *other == corner) {
-            Some(at) if !present => _ = cell.swap_remove(at),
-            None if present => cell.push(corner),
-            _ => {}
-        }
-    }
-
-    /// The corners in the cells that the box of some points touches.
-    fn near(&self, points: &[[f64; 2]]) -> impl Iterator<Item = u32> + '_ {
-        let [lower, upper] = bounds(points).map(|point| self.cell(point));
-        let row = move |y: usize| &self.corners[y * self.size[0]..][lower[0]..=upper[0]];
-        (lower[1]..=upper[1]).flat_map(row).flatten().copied()
-    }
-}
-
-/// The least and the greatest coordinates of points.
-fn bounds(points: &[[f64; 2]]) -> [[f64; 2]; 2] {
-    let of = |pick: fn(f64, f64) -> f64, start| {
-        [0, 1].map(|k| points.iter().map(|point| point[k]).fold(start, pick))
-    };
-    [of(f64::min, f64::INFINITY), of(f64::max, f64::NEG_INFINITY)]
 }
 
 #[cfg(test)]
@@ -339,6 +284,21 @@ mod tests {
             let corners: Vec<_> = outline(bow_tie).iter().map(|[x, y]| [*x, *y, 0.0]).collect();
             assert_eq!(split(&corners), None);
         }
+    }
+
+    #[test]
+    fn large_polygons_can_be_cancelled() {
+        struct Cancelled;
+        impl Monitor for Cancelled {
+            fn cancelled(&self) -> bool {
+                true
+            }
+        }
+        let comb = |k: u16| [f32::from(k), f32::from(k % 2), 0.0];
+        let corners: Vec<_> =
+            (0..4000).rev().map(comb).chain([[0.0, -1.0, 0.0], [4000.0, -1.0, 0.0]]).collect();
+        assert!(split(&corners).is_some());
+        assert!(matches!(clip_ears(&corners, &Cancelled), Err(crate::error::Error::Cancelled)));
     }
 
     /// Whether sides meet in common corners only.

@@ -9,6 +9,7 @@
 mod attributes;
 mod concave;
 mod coordinate_range;
+mod corner_grid;
 mod cutout;
 mod deformation;
 mod disjoint_sets;

@@ -98,6 +98,19 @@ test("dragging turns the model, and Reset view brings it back", async () => {
     assert.ok((await difference(before, await picture())) <= MOST);
 });
 
+test("keys turn, move and zoom, and turn back", async () => {
+    const press = (key, modifiers = "") => browser.value(`dispatchEvent(new KeyboardEvent("keydown", { key: "${key}"${modifiers} }))`);
+    const before = await picture();
+    for (const [there, back, modifiers] of [
+        ["ArrowLeft", "ArrowRight"], ["ArrowDown", "ArrowUp"], ["ArrowUp", "ArrowDown", ", shiftKey: true"], ["+", "-"],
+    ]) {
+        await press(there, modifiers);
+        assert.ok((await difference(before, await picture())) > 5, there);
+        await press(back, modifiers);
+        assert.ok((await difference(before, await picture())) <= MOST, back);
+    }
+});
+
 test("a double click shows what is at that point, until the view is reset", async () => {
     const status = "document.getElementById('status').textContent";
     for (let clickCount = 1; clickCount <= 2; clickCount++) {

@@ -313,8 +313,27 @@ const actions = {
     },
     r: () => shown.content && reset(),
 };
+/** Which way arrow keys drag the model: to the right and down. */
+const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+/** The view after a key: arrows drag the model as the pointer does, 24 to a whole turn, with Shift a twentieth of the picture; + and - zoom. */
+function viewAfter(view, { key, shiftKey }) {
+    if (key in arrows) {
+        const [right, down] = arrows[key];
+        return shiftKey ? shifted(view, -right / 20, down / 20) : turned(view, (-Math.PI / 12) * right, (Math.PI / 12) * down);
+    }
+    if (key === "+" || key === "=") return zoomed(view, 0.8);
+    return key === "-" ? zoomed(view, 1 / 0.8) : view;
+}
 addEventListener("keydown", (event) => {
-    if (!event.ctrlKey && !event.metaKey && !event.altKey) actions[event.key.toLowerCase()]?.();
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    actions[event.key.toLowerCase()]?.();
+    // Arrows move the slider while it has the focus.
+    if (!shown.view || event.target === element("time")) return;
+    const view = viewAfter(shown.view, event);
+    if (view === shown.view) return;
+    event.preventDefault();
+    shown.view = view;
+    changed();
 });
 element("up").addEventListener("click", actions.u);
 element("reset").addEventListener("click", actions.r);

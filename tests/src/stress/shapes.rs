@@ -57,6 +57,11 @@ pub fn shapes(size: i32) -> Vec<Shape> {
         sphere("", 10 * s, 1 << 18).placed("sphere, scale 2^82 (1e30)", [0; 3], 82),
         sphere("", 8 * s, 64).placed("sphere 1e5 radii away", [6_400_000, -6_400_000, 6_400_000], -10),
         cube("", 1, 2).placed("cube 1e7 radii away", [10_000_000, 10_000_001, -10_000_002], 3),
+        model("", &bth_scenes::blob::blob(900 * s as u32), 1 << 17, vec![[0; 3]], true).placed(
+            "bumpy sphere 60 radii away along two axes",
+            [8_000_000, 10_000, -8_000_000],
+            -16,
+        ),
         bipyramid("slivers of aspect 1e7, high valence", 4, 1, LIMIT - 2),
         bipyramid("needle fans of high valence", 64 * s, 1 << 16, 1 << 21),
         bipyramid("nearly flat", 32 * s, 1 << 20, 2),

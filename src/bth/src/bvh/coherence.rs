@@ -136,9 +136,16 @@ impl Span {
     /// Greatest |coordinate| of an origin.
     #[inline(always)]
     pub(crate) fn farthest_origin(&self) -> f32 {
+        self.farthest_from(&[0.0; 4])
+    }
+
+    /// Greatest |coordinate| of an origin, measured from a point; rounded once.
+    #[inline(always)]
+    pub(crate) fn farthest_from(&self, point: &[f32; 4]) -> f32 {
         let mut farthest = 0f32;
-        for [least, greatest] in self.origin {
-            farthest = farthest.max(least.abs()).max(greatest.abs());
+        for k in 0..3 {
+            let [least, greatest] = self.origin[k].map(|x| (x - point[k]).abs());
+            farthest = farthest.max(least).max(greatest);
         }
         farthest
     }

@@ -15,7 +15,8 @@ use bth_format::object::ObjectBounds;
 /// greatest coordinate of the object and that of all origins, they come to at most uE|r| for the reciprocal, 2uE|r| for the
 /// padded end, uE|r| for the difference and uE|r| for the product: with the half [`PAD`] = 8uE|r| of [`boxes`] for
 /// clamped components less than 14uE|r|; the pad is 2 · PAD = 32uE. Of these, less than 12u are relative to the planes, which widened
-/// boxes cover by 16u: then E counts next to nothing of the object's coordinates ([`prepare::padded_extent`]).
+/// boxes cover by 16u: then E counts next to nothing of the object's coordinates ([`prepare::padded_extent`]). Measured from an anchor c
+/// all but the padded end's 2u|o| is relative to distances, and E counts a quarter of |c|.
 #[derive(Clone, Copy)]
 pub(crate) struct Shaft<S: Simd> {
     /// For each axis the end of the origins' interval that is nearest to the planes at which rays enter boxes.
@@ -58,7 +59,8 @@ impl<S: Simd> Shaft<S> {
     /// prepare them.
     #[inline(always)]
     pub(crate) fn of(s: S, bounds: &ObjectBounds, span: &Span) -> Option<(Self, f32)> {
-        let (padded, main) = (prepare::padded_extent(bounds, span.farthest_origin()), span.main_axis().1);
+        let padded = prepare::padded_extent(bounds, span.farthest_from(&bounds.anchor));
+        let main = span.main_axis().1;
         let is_prepared = prepare::SMALLEST < padded && padded < prepare::LARGEST;
         if !(span.is_coherent() && is_prepared && 1.0 / prepare::LARGEST < main && main < prepare::LARGEST) {
             return None;
@@ -103,18 +105,19 @@ mod tests {
     use crate::bvh::box_oracle::meets;
     use crate::rays::Ray;
     use crate::simd::{Isa, Kernel};
-    use bth_format::layout::{NONE, WIDTH};
+    use bth_format::layout::{NONE, Object, WIDTH};
     use bth_random::Rng;
+    use zerocopy::FromZeros;
 
     /// The children of a node that the shaft of rays reaches, a bit each, if the rays have a shaft.
-    struct Reached<'a>(&'a [Ray], &'a WideNode, f32);
+    struct Reached<'a>(&'a [Ray], &'a WideNode, ObjectBounds);
 
     impl Kernel for Reached<'_> {
         type Output = Option<u32>;
         #[inline(always)]
         fn run<S: Simd>(self, s: S) -> Option<u32> {
-            let Reached(rays, node, greatest) = self;
-            let (shaft, limit) = Shaft::of(s, &ObjectBounds::around(greatest), &Span::of(s, rays))?;
+            let Reached(rays, node, bounds) = self;
+            let (shaft, limit) = Shaft::of(s, &bounds, &Span::of(s, rays))?;
             Some(shaft.children(s, node, limit).0)
         }
     }
@@ -128,13 +131,19 @@ mod tests {
             let scale = [1.0, 1e-9, 3e10, 1e-30][round % 4];
             let mut unit = || rng.below(1 << 20) as f32 / (1 << 19) as f32 - 1.0;
             let size = |x: f32| x * scale;
+            // In some rounds everything is far from the origin.
+            let away = [0.0, 0.0, 1e4][round / 12 % 3];
+            let place = |x: f32| size(away + x);
+            let object = Object { lower: [place(-8.0); 3], upper: [place(8.0); 3], ..Object::new_zeroed() };
+            let bounds = ObjectBounds::new(&object);
+            assert_eq!(bounds.anchor[0] != 0.0, away != 0.0 && scale < 1e10);
             let (eye, spread) = ([(); 3].map(|()| 8.0 * unit()), [0.0, 0.001, 0.3][round / 4 % 3]);
             let middle = [(); 3].map(|()| unit());
             // In some rounds a component is close to zero.
             let middle = [0, 1, 2].map(|k| if round % 5 == k { middle[k] * 1e-7 } else { middle[k] });
             let rays: Vec<Ray> = (0..64 - round % 60)
                 .map(|_| Ray {
-                    origin: eye.map(|x| size(x + spread * unit())),
+                    origin: eye.map(|x| place(x + spread * unit())),
                     tmin: if round % 3 == 0 { 2.0 + unit() } else { 0.0 },
                     direction: middle.map(|x| size(x * (1.0 + 0.1 * unit()))),
                     tmax: [f32::INFINITY, 8.0][round % 2],
@@ -148,14 +157,14 @@ mod tests {
                 let t = 4.0 + 4.0 * unit();
                 let ray = &rays[slot % rays.len()];
                 for k in 0..3 {
-                    let on = (ray.origin[k] + t * ray.direction[k]).clamp(size(-7.0), size(7.0));
-                    let at = if slot % 2 == 0 { on } else { size(7.0 * unit()) };
+                    let on = (ray.origin[k] + t * ray.direction[k]).clamp(place(-7.0), place(7.0));
+                    let at = if slot % 2 == 0 { on } else { place(7.0 * unit()) };
                     let half = if slot % 7 == k { 0.0 } else { size(0.5 + 0.5 * unit()) };
                     (node.bounds[k][0][slot], node.bounds[k][1][slot]) = (at - half, at + half);
                 }
             }
             for isa in Isa::ALL {
-                let Some(reached) = isa.run(Reached(&rays, &node, size(8.0))) else { continue };
+                let Some(reached) = isa.run(Reached(&rays, &node, bounds)) else { continue };
                 assert_eq!(reached >> used, 0, "{isa}: unused slots are not reached");
                 for slot in 0..used {
                     let [lower, upper] = [0, 1].map(|end| [0, 1, 2].map(|k| node.bounds[k][end][slot]));
@@ -181,7 +190,8 @@ mod tests {
     fn rays_that_are_not_coherent_or_not_prepared_in_f32_have_no_shaft() {
         let ray = |direction| Ray { origin: [0.0; 3], tmin: 0.0, direction, tmax: f32::INFINITY };
         let node = WideNode { bounds: [[[0.0; WIDTH]; 2]; 3], child: [NONE; WIDTH] };
-        let shaft = |rays: [Ray; 2], greatest| Isa::best().run(Reached(&rays, &node, greatest));
+        let shaft =
+            |rays: [Ray; 2], greatest| Isa::best().run(Reached(&rays, &node, ObjectBounds::around(greatest)));
         let coherent = [ray([1.0, 2.0, 3.0]), ray([1.1, 2.0, 3.0])];
         assert!(shaft(coherent, 1.0).is_some());
         assert!(shaft(coherent, 1e30).is_none());

@@ -19,6 +19,10 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 /// Where the file's boxes are widened, the pad need not cover the boxes' part of that sum. With p a point of the box below, o the origin, r the reciprocal and
 /// u = 2^-24, what is rounded is off by at most 5u(|P| + |o|)|r| for a plane P beyond p, and clamping by 2^-22 (|p| + |o|)|r| in the maximum norm; the file keeps 2^-20 |p| between
 /// p and P, and where P is farther away, its own roundings are less than what it is farther.
+///
+/// Where the object has an anchor c, coordinates are measured from it: clamping and the roundings of reciprocal and sum are off by what is relative to |P - o|, at most
+/// |P - c| + |o - c|; only the products with P and o and the addend are relative to the coordinates themselves, so that 3u|c| |r| comes to what is relative to |P - c|
+/// and |o - c|: less than the pad of a quarter of |c|.
 pub(crate) const PAD: f64 = 1.0 / (1 << 20) as f64;
 /// Least |component| of a direction whose greatest |component| is 1; smaller ones are raised to it, which keeps products
 /// finite. Up to the farthest coordinate this moves the ray by less than half the pad.
@@ -65,26 +69,22 @@ impl RaySlabs {
 
     /// For the boxes of an object.
     pub(crate) fn new(ray: &Ray, line: &Line, object: &Object) -> RaySlabs {
-        let extents = [ObjectBounds::new(object).greatest, ObjectBounds::padded_in_f64(object)];
-        RaySlabs::with_pad(ray, line, extents.map(f64::from), |_| 0.0)
+        RaySlabs::with_pad(ray, line, &ObjectBounds::new(object), |_| 0.0)
     }
 
     /// For boxes whose |coordinates| do not exceed `farthest`. `extra_pad` maps the greatest |coordinate| of the ray's origin
     /// to a length by which the boxes are widened further. None for a ray without a line.
     pub(crate) fn widened(ray: &Ray, farthest: f32, extra_pad: impl Fn(f64) -> f64) -> Option<RaySlabs> {
-        Some(RaySlabs::with_pad(ray, &Line::new(ray)?, [farthest.into(); 2], extra_pad))
+        Some(RaySlabs::with_pad(ray, &Line::new(ray)?, &ObjectBounds::around(farthest), extra_pad))
     }
 
-    /// Of the greatest |coordinate| of the boxes, and of what pads allow for in its place ([`ObjectBounds::padded_in_f64`]).
-    fn with_pad(
-        ray: &Ray,
-        line: &Line,
-        [farthest, padded]: [f64; 2],
-        extra_pad: impl Fn(f64) -> f64,
-    ) -> RaySlabs {
+    /// For boxes in these bounds.
+    fn with_pad(ray: &Ray, line: &Line, bounds: &ObjectBounds, extra_pad: impl Fn(f64) -> f64) -> RaySlabs {
         let scale = line.direction[line.axis[2]].abs();
-        let farthest_origin = line.origin.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-        let extent = farthest + farthest_origin;
+        let from_anchor = |k: usize| (line.origin[k] - f64::from(bounds.anchor[k])).abs();
+        let farthest_origin = from_anchor(0).max(from_anchor(1)).max(from_anchor(2));
+        let [greatest, padded] = [bounds.greatest, bounds.padded_in_f64].map(f64::from);
+        let extent = greatest + farthest_origin;
         let pad = PAD * (padded + farthest_origin) + extra_pad(farthest_origin);
         let mut slabs = RaySlabs { scale: scale as f32, ..RaySlabs::NONE };
         // Finite even where it is the depth of all boxes: the traversal writes lane numbers into the low bits of depths, which

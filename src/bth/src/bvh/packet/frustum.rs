@@ -34,7 +34,7 @@ impl<S: Simd, const POINT: bool> Frustum<S, POINT> {
     #[inline(always)]
     pub(crate) fn new(s: S, bounds: &ObjectBounds, span: &Span, groups: &[RayGroup<S>]) -> Self {
         let zero = s.splat(0.0);
-        let padded = prepare::padded_extent(bounds, span.farthest_origin());
+        let padded = prepare::padded_extent(bounds, span.farthest_from(&bounds.anchor));
         let (main, _) = span.main_axis();
         let axis = [(main + 1) % 3, (main + 2) % 3, main];
         let mut center = [0.0; 3];

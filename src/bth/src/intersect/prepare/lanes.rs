@@ -85,7 +85,7 @@ pub(crate) fn prepare_lanes<S: Lanewise>(
         let far =
             s.max(s.abs(s.sub(s.splat(bounds.lower[k]), o[k])), s.abs(s.sub(s.splat(bounds.upper[k]), o[k])));
         reach = s.max(far, reach);
-        let coordinate = s.abs(o[k]);
+        let coordinate = s.abs(s.sub(o[k], s.splat(bounds.anchor[k])));
         farthest = s.max(coordinate, farthest);
         origin_sum = s.add(coordinate, origin_sum);
         direction_sum = s.add(size[k], direction_sum);

@@ -47,9 +47,9 @@ fn is_tiny(tmin: f32) -> bool {
     tmin.abs().to_bits().wrapping_sub(1) < f32::MIN_POSITIVE.to_bits()
 }
 
-/// Upper bound of what the pads of boxes are relative to, for origins whose |coordinates| do not exceed `greatest_origin`: the sum of the
-/// greatest |coordinates| of the origins and of the object, of the latter next to nothing where boxes are widened to allow for their own. Not
-/// below [`LARGEST`] where the whole sum is not.
+/// Upper bound of what the pads of boxes are relative to, for origins whose |coordinates|, measured from the object's anchor, do not exceed
+/// `greatest_origin`: the sum of that and of what the object asks for. Without an anchor it is not below [`LARGEST`] where the sum of the
+/// greatest |coordinates| of the origins and of the object is not.
 #[inline(always)]
 pub(crate) fn padded_extent(bounds: &ObjectBounds, greatest_origin: f32) -> f32 {
     (bounds.padded + greatest_origin) * ROUND_UP
@@ -114,7 +114,8 @@ impl PreparedRay {
         let [lower, upper] = [bounds.lower, bounds.upper].map(|p| Vec3A::from_vec4(Vec4::from_array(p)));
         let reach = (lower - o).abs().max((upper - o).abs()).max_element();
         let greatest = s.greatest_of_three(end.abs().to_array());
-        let [greatest_origin, ..] = s.greatest_of_three(start.abs().to_array());
+        let from_anchor = start - Vec4::from_array(bounds.anchor);
+        let [greatest_origin, ..] = s.greatest_of_three(from_anchor.abs().to_array());
         let (greatest, greatest_lanes) = (greatest[0], Vec3A::from_vec4(Vec4::from_array(greatest)));
         let extent = padded_extent(bounds, greatest_origin);
         // NaN and infinity among the components make these the greatest.

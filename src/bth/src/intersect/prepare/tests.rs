@@ -287,6 +287,37 @@ fn small_boxes_of_large_objects_are_told_apart_where_they_are_widened() {
 }
 
 #[test]
+fn boxes_of_objects_far_from_the_origin_are_told_apart() {
+    let mut rng = Rng::new(7);
+    let mut met = 0;
+    for round in 0..500 {
+        // Coordinates of f32 are 2^-10 apart here, and the pads that are relative to the origin would be 2^-6.
+        let away = [1, 2, 3].map(|k| if (round % 7) & k == 0 { 8192.0 } else { -8193.0 });
+        let place = |p: [f32; 3]| [0, 1, 2].map(|k| p[k] + away[k]);
+        let size = 1.0 / 32.0;
+        let corners = [[0.5, 0.5, 0.5], [0.5 + size, 0.5, 0.5], [0.5, 0.5 + size, 0.5 + size]].map(place);
+        let mut object = OneTriangle::new(corners);
+        (object.object.lower, object.object.upper) = (place([0.0; 3]), place([1.0; 3]));
+        // A point within the box, or beside it by three eighths of its size.
+        let is_met = round % 2 == 0;
+        let beside = if is_met { 0.5 } else { 1.375 };
+        let target = place([0.5 + beside * size, 0.5 + size / 2.0, 0.5 + size / 2.0]);
+        let mut unit = || rng.below(1 << 10) as f32 / (1 << 10) as f32;
+        let origin = place([0.4 + 0.2 * unit(), unit(), 1.5]);
+        let ray = Ray::new(origin, [0, 1, 2].map(|k| target[k] - origin[k]));
+        let line = Line::new(&ray).unwrap();
+        for preparation in all_preparations(&ray, &line, &object.object, round % LANES) {
+            for isa in Isa::ALL {
+                let (children, _) = isa.run(BoxAndFilter(&preparation, &object));
+                assert_eq!(children, u32::from(is_met), "{isa}, round {round}: {preparation:?}");
+                met += children;
+            }
+        }
+    }
+    assert!(met > 1_000, "{met}");
+}
+
+#[test]
 fn rays_that_f32_cannot_prepare_are_left_to_f64() {
     let object = Object { lower: [-1.0; 3], upper: [1.0; 3], ..Object::new_zeroed() };
     let usual = Ray::new([0.5, -3.0, 0.25], [0.3, 0.9, -0.1]);

@@ -1,5 +1,5 @@
-//! Models of all sizes, and with a vertex far out (`bth-bench scales`): answers that do not depend on the scale, and what rays take where
-//! f32 is too small or too coarse to prepare them.
+//! Models of all sizes, with a vertex far out, and far from the origin (`bth-bench scales`): answers that do not depend on the scale, and
+//! what rays take where f32 is too small or too coarse to prepare them.
 
 use crate::args::Scales;
 use crate::clock::Clock;
@@ -23,10 +23,12 @@ use serde_json::json;
 const SIZES: [i32; 15] = [-126, -116, -108, -75, -60, -55, -50, -40, 0, 38, 42, 60, 96, 102, 126];
 /// Exponents of two of the coordinates of the vertex far out of a model of size 1.
 const DISTANCES: [i32; 9] = [10, 20, 30, 36, 39, 42, 60, 96, 102];
+/// Exponents of two of how far a model of size 1 is moved along two axes. Its coordinates lose as many bits.
+const MOVES: [i32; 5] = [4, 7, 10, 13, 16];
 /// Rays of a call.
 const BATCH: usize = 1024;
 
-/// What was measured of a model at a size, or with a vertex far out.
+/// What was measured of a model at a size, with a vertex far out, or far from the origin.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
     /// The model.
@@ -35,6 +37,8 @@ pub struct Row {
     pub size: i32,
     /// Exponent of two of the coordinates of the vertex far out, if there is one.
     pub vertex: Option<i32>,
+    /// Exponent of two of how far the model was moved, if it was.
+    pub moved: Option<i32>,
     /// Nanoseconds a ray: from the camera, and bounces from what it sees.
     pub ns: [f64; 2],
     /// Hits that differ in any bit from those of the model of size 1, but for t, which is scaled. None where coordinates or t at this size are
@@ -70,6 +74,13 @@ pub fn run(arguments: &Scales) -> Result<()> {
         for distance in DISTANCES {
             progress.show(format!("{}, a vertex at 2^{distance}", model.name));
             rows.push(with_vertex(&model, distance, &sets, rounds)?);
+        }
+        let positions = model.mesh.positions.clone();
+        for by in MOVES {
+            progress.show(format!("{}, moved by 2^{by}", model.name));
+            let far = positions.iter().map(|[x, y, z]| [x + scaled(1.0, by), *y, z - scaled(1.0, by)]);
+            model.mesh.positions = far.collect();
+            rows.push(moved(&model, by, arguments, rounds)?);
         }
     }
     drop(progress);
@@ -109,12 +120,15 @@ fn picture(pixels: usize) -> (u32, u32) {
 
 /// Camera rays, and bounces from what they see.
 fn sets(model: &Model, arguments: &Scales) -> Result<[Set; 2]> {
-    let scene = compiled(&model.mesh.positions, &model.mesh.triangles)?;
+    sets_of(model, &compiled(&model.mesh.positions, &model.mesh.triangles)?, arguments)
+}
+
+fn sets_of(model: &Model, scene: &Scene, arguments: &Scales) -> Result<[Set; 2]> {
     let options = rays::Options { size: picture(arguments.rays), most: arguments.rays, view: None };
-    let (_, all) = rays::sets(&Finder::new(model, &scene), &options);
+    let (_, all) = rays::sets(&Finder::new(model, scene), &options);
     let set = |name: &str| {
         let rays = all.iter().find(|set| set.name == name).map(|set| set.rays.clone()).unwrap_or_default();
-        let hits = traced(&scene, &rays);
+        let hits = traced(scene, &rays);
         Set { rays, hits }
     };
     let sets = ["primary", "diffuse"].map(set);
@@ -167,7 +181,7 @@ fn of_size(model: &Model, size: i32, sets: &[Set; 2], rounds: usize) -> Result<R
         differ = differ.map(|count| count + others);
     }
     let ns = time(&scene, rays.each_ref().map(Vec::as_slice), rounds);
-    Ok(Row { model: model.name.clone(), size, vertex: None, ns, differ })
+    Ok(Row { model: model.name.clone(), size, vertex: None, moved: None, ns, differ })
 }
 
 /// The model of size 1 with one more triangle, whose third corner is far out.
@@ -178,18 +192,29 @@ fn with_vertex(model: &Model, distance: i32, sets: &[Set; 2], rounds: usize) -> 
     positions.push([1.0, 0.5, 0.75].map(|x| scaled(x, distance)));
     let scene = compiled(&positions, &triangles)?;
     let ns = time(&scene, sets.each_ref().map(|set| set.rays.as_slice()), rounds);
-    Ok(Row { model: model.name.clone(), size: 0, vertex: Some(distance), ns, differ: None })
+    Ok(Row { model: model.name.clone(), size: 0, vertex: Some(distance), moved: None, ns, differ: None })
+}
+
+/// A model that was moved, and rays of the same kinds around it.
+fn moved(model: &Model, by: i32, arguments: &Scales, rounds: usize) -> Result<Row> {
+    let scene = compiled(&model.mesh.positions, &model.mesh.triangles)?;
+    let sets = sets_of(model, &scene, arguments)?;
+    let ns = time(&scene, sets.each_ref().map(|set| set.rays.as_slice()), rounds);
+    Ok(Row { model: model.name.clone(), size: 0, vertex: None, moved: Some(by), ns, differ: None })
 }
 
 fn body(rows: &[Row]) -> String {
     let of_size_one = |row: &Row| {
-        let is_it = |other: &&Row| other.model == row.model && (other.size, other.vertex) == (0, None);
+        let is_it = |other: &&Row| {
+            other.model == row.model && (other.size, other.vertex, other.moved) == (0, None, None)
+        };
         rows.iter().find(is_it).map_or([f64::NAN; 2], |one| one.ns)
     };
     let line = |row: &Row| {
         let one = of_size_one(row);
-        let vertex = row.vertex.map_or_else(|| "–".to_owned(), |exponent| format!("2^{exponent}"));
-        let mut line = vec![row.model.clone(), format!("2^{}", row.size), vertex];
+        let [vertex, moved] = [row.vertex, row.moved]
+            .map(|exponent| exponent.map_or_else(|| "–".to_owned(), |exponent| format!("2^{exponent}")));
+        let mut line = vec![row.model.clone(), format!("2^{}", row.size), vertex, moved];
         for (ns, one) in row.ns.iter().zip(one) {
             line.extend([format!("{ns:.0}"), format!("{:.1}", ns / one)]);
         }
@@ -200,6 +225,7 @@ fn body(rows: &[Row]) -> String {
         "model",
         "size",
         "a vertex at",
+        "moved by",
         "camera, ns",
         "times size 1",
         "bounces, ns",
@@ -208,7 +234,7 @@ fn body(rows: &[Row]) -> String {
     ]);
     format!(
         "Nanoseconds a ray on one thread, batches of {BATCH}, the least of the rounds. `size`: greatest |coordinate|; rays are scaled with the model. `a vertex at`: \
-         one more triangle, whose third corner is so far out. `differ`: hits with other bits than at size 1, but for t, which is scaled; – where a coordinate or t \
+         one more triangle, whose third corner is so far out. `moved by`: along x and, the other way, z, with rays around the model that was moved. `differ`: hits with other bits than at size 1, but for t, which is scaled; – where a coordinate or t \
          at this size is no f32.\n\n{}",
         table(&head, &rows.iter().map(line).collect::<Vec<_>>())
     )

@@ -81,7 +81,7 @@ pub enum Command {
     Paper(Paper),
     /// What each step of the BVH builder is worth.
     Quality(Quality),
-    /// Models of all sizes, and with a vertex far out: whether answers depend on the scale, and what rays take.
+    /// Models of all sizes, with a vertex far out, and far from the origin: whether answers depend on the scale, and what rays take.
     Scales(Scales),
     /// Scenes that move: ours, and Embree with the same instances.
     Scenes(Scenes),

@@ -98,8 +98,12 @@ class RaycastingScene:
         """Rays (height, width, 6) of a pinhole camera: by its matrices, or by fov_deg, center, eye and up. z is 1 in the camera's space."""
         if intrinsic_matrix is None:
             eye, center, up = (np.asarray(a, np.float64) for a in (eye, center, up))
-            forward = (center - eye) / np.linalg.norm(center - eye)
+            forward = center - eye
             right = np.cross(forward, up)
+            # What rounding leaves of the product of parallel vectors is relative to their lengths.
+            if not np.linalg.norm(right) > 2.0**-40 * np.linalg.norm(forward) * np.linalg.norm(up):
+                raise ValueError(f"up: expected a direction across the view from eye to center, got {up.tolist()}")
+            forward /= np.linalg.norm(forward)
             right /= np.linalg.norm(right)
             rotation = np.stack([right, np.cross(forward, right), forward])
             focal = 0.5 * width_px / np.tan(0.5 * np.deg2rad(fov_deg))

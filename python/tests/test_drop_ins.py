@@ -221,3 +221,6 @@ def test_open3d_camera():
     # Columns go right, rows go down; half a pixel from the border is seen under nearly half of the angle.
     np.testing.assert_allclose(rays[0, :, 3], (np.arange(8) - 3.5) / 4 * np.tan(np.pi / 6), atol=1e-6)
     assert (np.diff(rays[:, 0, 4]) < 0).all()
+    for center, up in [([0, 0, 0], [0, 0, 1]), ([0.1, 0.2, 4.3], [-1, -2, -3]), ([0, 0, 4], [0, 1, 0]), ([0, 0, 0], [0, 0, 0])]:
+        with pytest.raises(ValueError, match="up: expected"):
+            RaycastingScene.create_rays_pinhole(fov_deg=60, center=center, eye=[0, 0, 4], up=up, width_px=8, height_px=4)

@@ -27,6 +27,7 @@ export async function load(source = new URL("./bth.wasm", import.meta.url)) {
     const found = await source;
     const module = classOf(found) === "WebAssembly.Module" ? found : await compile(found);
     const { exports } = await WebAssembly.instantiate(module, {});
+    if (!exports.bth_has_vectors) throw new TypeError("source: expected bth.wasm; found another module of WebAssembly");
     return new Bth(guarded(exports), module);
 }
 
@@ -57,14 +58,18 @@ function guarded(exports) {
 }
 
 async function compile(source) {
-    if (classOf(source) === "ArrayBuffer" || ArrayBuffer.isView(source)) return WebAssembly.compile(source);
+    // Node does not compile a DataView.
+    if (ArrayBuffer.isView(source)) return WebAssembly.compile(new Uint8Array(source.buffer, source.byteOffset, source.byteLength));
+    if (classOf(source) === "ArrayBuffer") return WebAssembly.compile(source);
     if (classOf(source) === "Response") return WebAssembly.compileStreaming(source);
     if (typeof source !== "string" && typeof source?.href !== "string") {
         throw new TypeError(`source: expected bth.wasm as its URL, a response, its bytes or a compiled module; found ${kindOf(source)}`);
     }
-    const url = new URL(source, import.meta.url);
+    // With these comments bundlers leave it as it is: they do not know the address, and browsers have no module of node. That is also why
+    // package.json has "browser", which esbuild reads.
+    const url = new URL(/* webpackIgnore: true */ source.href ?? source, import.meta.url);
     if (url.protocol === "file:" && typeof process === "object") {
-        const { readFile } = await import("node:fs/promises");
+        const { readFile } = await import(/* webpackIgnore: true */ /* @vite-ignore */ "node:fs/promises");
         return WebAssembly.compile(await readFile(url));
     }
     return WebAssembly.compileStreaming(fetch(url));
@@ -132,7 +137,10 @@ class Scene {
     }
 
     set seconds(seconds) {
-        if (!Number.isFinite(seconds)) throw new TypeError(`seconds: expected a finite number, found ${String(seconds)}`);
+        if (!Number.isFinite(seconds)) {
+            // The text of a string can look like a number.
+            throw new TypeError(`seconds: expected a finite number, found ${typeof seconds === "number" ? seconds : kindOf(seconds)}`);
+        }
         const scene = this.#open();
         this.#torn = true;
         const set = this.#wasm.bth_set_seconds(scene, seconds);

@@ -290,8 +290,9 @@ test("rays and hits of another window are taken", () => {
 test("a time is a finite number", () => {
     const scene = bth.open(readFileSync(join(conformance, "valid/scene-moving.bth")));
     scene.seconds = 0.5;
-    for (const seconds of [NaN, Infinity, -Infinity, "1", "abc", undefined, null, 1n]) {
-        assert.throws(() => (scene.seconds = seconds), TypeError, String(seconds));
+    const refused = [[NaN, "NaN"], [-Infinity, "-Infinity"], ["1", "String"], [undefined, "undefined"], [null, "null"], [1n, "BigInt"], [[1], "Array"]];
+    for (const [seconds, found] of refused) {
+        assert.throws(() => (scene.seconds = seconds), (error) => error instanceof TypeError && error.message.endsWith(`, found ${found}`), found);
     }
     assert.equal(scene.seconds, 0.5);
 });
@@ -363,6 +364,8 @@ test("a compiled module and bytes can be loaded", async () => {
     const bytes = readFileSync(join(process.env.DIST, "bth.wasm"));
     assert.ok((await load(bytes)).simd);
     assert.ok((await load(Promise.resolve(bth.module))).simd);
+    assert.ok((await load(new DataView(bytes.buffer, bytes.byteOffset, bytes.length))).simd);
+    assert.ok((await load({ href: pathToFileURL(join(resolve(process.env.DIST), "bth.wasm")).href })).simd);
     assert.ok((await load(runInNewContext("new Uint8Array(bytes).buffer", { bytes }))).simd);
 });
 
@@ -370,4 +373,20 @@ test("what is no module is refused with what is expected", async () => {
     for (const [source, found] of [[null, "null"], [5, "Number"], [[], "Array"], [{}, "Object"], [new SharedArrayBuffer(8), "SharedArrayBuffer"]]) {
         await assert.rejects(load(source), (error) => error instanceof TypeError && /expected bth.wasm as its URL/.test(error.message) && error.message.endsWith(`found ${found}`), found);
     }
+    // The shortest module: the magic number and the version.
+    const another = Uint8Array.of(0, 97, 115, 109, 1, 0, 0, 0);
+    await assert.rejects(load(another), (error) => error instanceof TypeError && /expected bth.wasm; found another module/.test(error.message));
+});
+
+test("bundlers for browsers leave out what is of node", () => {
+    const file = (name) => readFileSync(join(process.env.DIST, name), "utf8"), { browser } = JSON.parse(file("package.json"));
+    const imports = [...file("index.js").matchAll(/\bimport\((.*)"(node:[^"]+)"\)|from "(node:[^"]+)"/g)];
+    assert.equal(imports.length, 1);
+    for (const [text, comments, name] of imports) {
+        assert.ok(/webpackIgnore: true/.test(comments) && /@vite-ignore/.test(comments), text);
+        assert.equal(browser[name], false, text);
+    }
+    // What is not a constant is left as it is; the default is taken along.
+    assert.match(file("index.js"), /new URL\("\.\/bth\.wasm", import\.meta\.url\)/);
+    assert.match(file("index.js"), /new URL\(\/\* webpackIgnore: true \*\/ source/);
 });

@@ -32,10 +32,12 @@ export class Browser {
             text = messages.pop();
             for (const message of messages) browser.#take(JSON.parse(message));
         });
-        const { targetId } = await browser.send("Target.createTarget", { url: "about:blank", width, height });
+        const { targetId } = await browser.send("Target.createTarget", { url: "about:blank", width, height, newWindow: true });
         const { sessionId } = await browser.send("Target.attachToTarget", { targetId, flatten: true });
         browser.#session = sessionId;
         for (const domain of ["Page", "Runtime", "Network", "DOM"]) await browser.send(`${domain}.enable`);
+        // That of the window may include bars.
+        await browser.resize(width, height);
         return browser;
     }
 
@@ -58,6 +60,11 @@ export class Browser {
         const message = { id, method, params, ...(this.#session && { sessionId: this.#session }) };
         this.#process.stdio[3].write(`${JSON.stringify(message)}\0`);
         return new Promise((resolve, reject) => this.#waiting.set(id, { resolve, reject }));
+    }
+
+    /** Gives the page a size, and pixels of the screen for each of its own. */
+    async resize(width, height, deviceScaleFactor = 1) {
+        await this.send("Emulation.setDeviceMetricsOverride", { width, height, deviceScaleFactor, mobile: false });
     }
 
     open(url) {

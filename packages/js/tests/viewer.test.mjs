@@ -250,10 +250,9 @@ test("a scene that is empty at first is shown once there is something", async ()
 });
 
 test("the first view of an upright window shows all of the model", async () => {
-    const resize = (width, height) => browser.send("Emulation.setDeviceMetricsOverride", { width, height, deviceScaleFactor: 1, mobile: false });
     await browser.drop(model, WIDTH / 2, HEIGHT / 2);
     await browser.until("/^knot.bth · .*4 of 4 samples/.test(document.getElementById('status').textContent)");
-    await resize(200, 500);
+    await browser.resize(200, 500);
     await browser.until("innerWidth === 200");
     await browser.value(`document.getElementById("reset").click()`);
     await browser.value("viewer.whenSettled()");
@@ -265,7 +264,7 @@ test("the first view of an upright window shows all of the model", async () => {
         return [columns[0], width - 1 - columns.at(-1)];
     })()`);
     assert.ok(left > 0 && right > 0 && left < 50 && right < 50, `${left} and ${right} pixels beside the model`);
-    await browser.send("Emulation.clearDeviceMetricsOverride");
+    await browser.resize(WIDTH, HEIGHT);
 });
 
 test("nothing was asked of a network, and no error was left unseen", () => {

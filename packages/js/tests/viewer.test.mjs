@@ -267,7 +267,29 @@ test("the first view of an upright window shows all of the model", async () => {
     await browser.resize(WIDTH, HEIGHT);
 });
 
+test("the picture has the pixels of the screen that the window is moved to", async () => {
+    for (const ratio of [1, 2, 1.5]) {
+        await browser.resize(100, 80, ratio);
+        // Without a screenshot the emulated screen shows nothing new, of which the page would be told.
+        await browser.screenshot();
+        await browser.until(`document.getElementById("picture").width === ${100 * ratio}`, 10);
+    }
+    await browser.resize(WIDTH, HEIGHT);
+});
+
+test("screen readers are told what the picture is of", async () => {
+    const { root } = await browser.send("DOM.getDocument");
+    const { nodeId } = await browser.send("DOM.querySelector", { nodeId: root.nodeId, selector: "canvas" });
+    const { nodes } = await browser.send("Accessibility.getPartialAXTree", { nodeId, fetchRelatives: false });
+    assert.equal(nodes[0].name.value, "Picture of knot.bth");
+});
+
 test("nothing was asked of a network, and no error was left unseen", () => {
     assert.deepEqual(browser.requests.filter((url) => !/^(blob|data):/.test(url)), []);
     assert.deepEqual(browser.complaints, []);
+});
+
+test("a page from a disk says that it cannot read other files", async () => {
+    await browser.open(`${pathToFileURL(join(resolve(process.env.DIST), "viewer.html")).href}?file=knot.bth`);
+    await browser.until(`/^knot.bth: pages that are opened from a disk .* drop it here/.test(document.getElementById("message")?.textContent)`, 10);
 });

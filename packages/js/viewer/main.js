@@ -50,6 +50,7 @@ export async function open(file, name) {
         showTime();
         // That of another file would stay until there is a sample of each pixel.
         status.textContent = name;
+        canvas.setAttribute("aria-label", `Picture of ${name}`);
         reset();
         sayWhatIsSeen();
         if (!shown.view) {
@@ -253,7 +254,10 @@ async function chosenBytes(file) {
     }
 }
 async function fetchedBytes(url) {
-    const response = await fetch(url);
+    const response = await fetch(url).catch((error) => {
+        if (location.protocol !== "file:") throw error;
+        throw new Error("pages that are opened from a disk can read no other files; drop it here, or open the page from a server");
+    });
     if (!response.ok) throw new Error(`${response.status} ${response.statusText}`);
     return response.arrayBuffer();
 }
@@ -339,6 +343,12 @@ element("up").addEventListener("click", actions.u);
 element("reset").addEventListener("click", actions.r);
 element("time").addEventListener("input", (event) => setFrame(Number(event.target.value)));
 addEventListener("resize", changed);
+/** Follows the pixels of the screen: a window that is moved to a finer one keeps its size. */
+function followScreen() {
+    const changes = matchMedia(`(resolution: ${window.devicePixelRatio}dppx)`);
+    changes.addEventListener("change", () => (changed(), followScreen()), { once: true });
+}
+followScreen();
 
 // For tests, and for pages that show a file of their own.
 window.viewer = { open, setMode, whenSettled };

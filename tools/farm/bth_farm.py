@@ -24,7 +24,7 @@ USAGE, FAILED, LOST = 2, 1, 4
 
 
 class Failure(Exception):
-    """A part that failed, with the last line of its program's error output."""
+    """What ends the run: most often a part that failed, with the error of its program."""
 
     def __init__(self, message, code=FAILED):
         super().__init__(message)
@@ -36,11 +36,14 @@ class Failure(Exception):
 
 def program(name):
     """The path of a program: named by a variable (`BTHC`, `BTH_PLAY`), else on the PATH, else built here."""
-    named = os.environ.get(name.upper().replace("-", "_"))
+    variable = name.upper().replace("-", "_")
+    named = os.environ.get(variable)
     target = Path(os.environ.get("CARGO_TARGET_DIR", Path(__file__).resolve().parents[2] / "target"))
+    if named and not shutil.which(named):
+        raise Failure(f"{named} is no program (hint: set {variable} to the path of {name})", USAGE)
     found = named or shutil.which(name) or shutil.which(name, path=str(target / "release"))
     if not found:
-        raise Failure(f"{name} is not on the PATH (hint: cargo build --release, or set {name.upper().replace('-', '_')})", USAGE)
+        raise Failure(f"{name} is not on the PATH (hint: cargo build --release, or set {variable})", USAGE)
     return found
 
 
@@ -52,8 +55,10 @@ def run_part(name, arguments, environment):
     done = subprocess.run(command, env={**os.environ, **environment}, capture_output=True, text=True)
     if done.returncode == 0:
         return json.loads(done.stdout)
-    said = done.stderr.strip().splitlines()[-1:] or [f"ended with {done.returncode}"]
-    failure = Failure(f"{' '.join(command)}: {said[0]}", max(done.returncode, FAILED))
+    lines = done.stderr.strip().splitlines() or [f"ended with {done.returncode}"]
+    # Below an error about options is how to get help.
+    said = next((line for line in lines if line.startswith("error: ")), lines[-1])
+    failure = Failure(f"{' '.join(command)}: {said}", max(done.returncode, FAILED))
     if 2 <= done.returncode <= 5:
         return failure
     raise failure
@@ -142,7 +147,10 @@ def environment_of(args):
 
 def connect(args):
     if args.scheduler:
-        return None, Client(args.scheduler, timeout="30s")
+        try:
+            return None, Client(args.scheduler, timeout="30s")
+        except ValueError as error:
+            raise Failure(f"--scheduler: {error} (hint: expected an address such as tcp://head:8786)", USAGE) from error
     workers = args.workers or os.cpu_count() or 1
     cluster = LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None)
     return cluster, Client(cluster)

@@ -3,6 +3,8 @@
 Usage: test_farm.py BTHC BTH_PLAY
 """
 
+import contextlib
+import io
 import json
 import os
 import signal
@@ -110,6 +112,20 @@ def main():
         assert (done["farm"]["parts"], done["farm"]["objects"]) == (2, 1), done["farm"]
         for wrong in ["--parts=-3", "--workers=0"]:
             assert subprocess.run([*farm, wrong], stderr=subprocess.DEVNULL).returncode == 2, wrong
+        for address in ["head", "nothing://head:8786"]:
+            said = io.StringIO()
+            with contextlib.redirect_stderr(said):
+                code = bth_farm.main(["compile", str(manifest), "-o", "x.bth", "--scheduler", address])
+            assert code == 2 and said.getvalue().startswith("error: --scheduler: "), said.getvalue()
+        failure = bth_farm.run_part("bthc", ["compile", str(manifest), "--nothing"], {})
+        assert failure.code == 2 and "'--nothing'" in str(failure), failure
+        os.environ["BTHC"] = str(folder / "absent")
+        try:
+            bth_farm.run_part("bthc", ["--version"], {})
+        except bth_farm.Failure as failure:
+            assert failure.code == 2 and "absent is no program" in str(failure), failure
+        else:
+            raise AssertionError("a program that is not there was run")
     print("three workers, one killed mid-way, twice: same bytes, same frames")
 
 

@@ -8,7 +8,12 @@ import { dirname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
 
 const here = dirname(fileURLToPath(import.meta.url)), root = resolve(here, "../..");
-const out = resolve(process.argv[2] ?? join(here, "dist"));
+const given = process.argv.slice(2);
+if (given.length > 1 || given[0]?.startsWith("-")) {
+    console.error("usage: node packages/js/build.mjs [FOLDER]");
+    process.exit(2);
+}
+const out = resolve(given[0] ?? join(here, "dist"));
 /** Bytes at most. */
 const MOST_WASM = 400_000, MOST_PAGE = 1_000_000;
 

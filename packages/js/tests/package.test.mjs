@@ -2,7 +2,7 @@
 //
 //   DIST=FOLDER BTHC=PROGRAM BTH_SCENES=PROGRAM [TSC=PROGRAM] node --test package.test.mjs
 import assert from "node:assert/strict";
-import { execFileSync } from "node:child_process";
+import { execFileSync, spawnSync } from "node:child_process";
 import { copyFileSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { dirname, join, resolve } from "node:path";
@@ -357,6 +357,15 @@ test("the package is complete", () => {
     for (const name of files) assert.ok(readFileSync(join(process.env.DIST, name)).length > 0, name);
     for (const name of ["LICENSE-MIT", "LICENSE-APACHE", "NOTICES"]) assert.ok(files.includes(name), name);
     assert.match(readFileSync(join(process.env.DIST, "NOTICES"), "utf8"), /^blake3 /m);
+});
+
+test("what is no folder is refused before anything is built", () => {
+    for (const given of [["--help"], ["one", "two"]]) {
+        const { status, stderr } = spawnSync(process.execPath, [resolve(here, "../build.mjs"), ...given], { cwd: folder, encoding: "utf8", timeout: 5000 });
+        assert.equal(status, 2, String(given));
+        assert.match(stderr, /^usage: /);
+    }
+    assert.ok(!readdirSync(folder).some((name) => ["--help", "one", "two"].includes(name)));
 });
 
 test("a compiled module and bytes can be loaded", async () => {

@@ -1,10 +1,13 @@
 # Functions that the scripts in tools/ share; to be sourced, not run.
 
+started_in=$PWD
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root" || exit 2
 target_dir=${CARGO_TARGET_DIR:-$root/target}
 
 note() { printf '%s\n' "$*" >&2; }
+# absolute PATH: a path as whoever started the script means it, who may be in another folder.
+absolute() { case $1 in /*) printf '%s\n' "$1" ;; *) printf '%s\n' "$started_in/$1" ;; esac }
 
 # Exits with a hint when there is no Rust; finds one that rustup has installed into the home folder.
 need_rust() {

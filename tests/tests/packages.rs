@@ -51,7 +51,11 @@ fn a_cmake_project_finds_the_libraries() {
         return;
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let prefix = installed(folder.path());
+    let moved = installed(folder.path());
+    // A link to the folder with the files for CMake, as /lib is one to /usr/lib; /include is not beside it.
+    let prefix = folder.path().join("root");
+    std::fs::create_dir(&prefix).expect("a folder");
+    std::os::unix::fs::symlink(moved.join("lib"), prefix.join("lib")).expect("a link");
     let build = folder.path().join("build");
     let configure = |extra: &str| {
         let mut cmake = Command::new("cmake");
@@ -85,6 +89,38 @@ fn programs_find_the_libraries_by_pkg_config() {
         output_of(compile.arg("-o").arg(folder.path().join(source).with_extension("")));
     }
     run_both(folder.path());
+}
+
+#[test]
+fn folders_start_where_the_scripts_are_started() {
+    let built = bth_tests::built(&["bthc", "bth-play", "bth-scenes", "bth-capi", "bth-compile-capi"]);
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let script = |name: &str, arguments: &[&str]| {
+        let mut script = Command::new(root().join("tools/package").join(name));
+        script
+            .args(arguments)
+            .current_dir(folder.path())
+            .env("BTH_INSTALL_FROM", &built)
+            .env_remove("DESTDIR");
+        script.output().expect("the script runs")
+    };
+    std::os::unix::fs::symlink(&built, folder.path().join("programs")).expect("a link");
+    assert!(script("install", &["here/bth"]).status.success());
+    assert!(folder.path().join("here/bth/include/bth.h").exists());
+    assert!(script("manuals", &["programs", "here"]).status.success());
+    assert!(folder.path().join("here/share/man/man1/bthc.1.gz").exists());
+    let absent = script("manuals", &["absent", "there"]);
+    assert_eq!(absent.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&absent.stderr).contains("there is no bthc in"), "{absent:?}");
+    // Nothing of what was asked is left out without a word.
+    for name in ["install", "static", "debian", "wheel"] {
+        let refused = script(name, &["one", "two"]);
+        assert_eq!(refused.status.code(), Some(2), "{name}: {refused:?}");
+        assert!(String::from_utf8_lossy(&refused.stderr).starts_with("usage: "), "{name}: {refused:?}");
+    }
+    for name in ["absent", "there", "one", "two"] {
+        assert!(!root().join(name).exists() && !folder.path().join(name).exists(), "{name}");
+    }
 }
 
 /// Packs packages for Debian into a folder: their names without version, and their paths.

@@ -230,6 +230,15 @@ test("the status is never that of another file", async () => {
     assert.match(await browser.value(status), /^another · 2,880 triangles/);
 });
 
+test("a long name stays in the window", async () => {
+    const wide = await browser.value(`(async () => {
+        await viewer.open(Uint8Array.from(atob("${readFileSync(join(valid, "triangle.bth"), "base64")}"), (c) => c.charCodeAt(0)).buffer, "n".repeat(300));
+        const { scrollWidth, clientWidth } = document.getElementById("status");
+        return [scrollWidth, clientWidth];
+    })()`);
+    assert.ok(wide[0] <= wide[1], `${wide}`);
+});
+
 test("a scene that is empty at first is shown once there is something", async () => {
     await browser.drop(join(valid, "scene-moving.bth"), WIDTH / 2, HEIGHT / 2);
     await browser.until("document.getElementById('status').textContent === 'scene-moving.bth'");

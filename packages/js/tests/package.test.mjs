@@ -324,34 +324,6 @@ test("the types need no library but ES2022", (t) => {
     }
 });
 
-test("the viewer shows means of any number of samples", async () => {
-    const { Picture } = await import(pathToFileURL(resolve(here, "../viewer/picture.js")));
-    const image = { data: new Uint8ClampedArray(4) };
-    const picture = new Picture({ getContext: () => ({ createImageData: () => image, putImageData() {} }) }, 1, 1);
-    const job = { mode: "normals", tile: { left: 0, top: 0, width: 1, height: 1 } };
-    for (let i = 0; i < 70_000; i++) picture.add(job, [0.2, 0.4, i % 2]);
-    assert.deepEqual([...image.data], [51, 102, 128, 255]);
-});
-
-test("the viewer lights a room alike at every size", async () => {
-    const { shadeTile } = await import(pathToFileURL(resolve(here, "../viewer/shading.js")));
-    const picture = (size) => {
-        // A cube, seen from within.
-        const corners = Array.from({ length: 8 }, (_, i) => [i & 1, (i >> 1) & 1, i >> 2].map((bit) => (bit ? size : -size)));
-        const faces = [[1, 2, 4, 3], [5, 6, 8, 7], [1, 2, 6, 5], [3, 4, 8, 7], [1, 3, 7, 5], [2, 4, 8, 6]];
-        const [model, file] = [join(folder, "room.obj"), join(folder, "room.bth")];
-        writeFileSync(model, [...corners.map((at) => `v ${at.join(" ")}`), ...faces.map((face) => `f ${face.join(" ")}`)].join("\n"));
-        execFileSync(BTHC, ["compile", model, "-o", file, "--quiet"]);
-        const camera = { eye: [0.1 * size, 0.2 * size, 0.5 * size], right: [1, 0, 0], up: [0, 1, 0], forward: [0, 0, -1], half: [1, 1], vertical: [0, 1, 0] };
-        const bounds = { lower: [-size, -size, -size], upper: [size, size, size] }, diagonal = 2 * size * Math.sqrt(3);
-        const tile = { left: 0, top: 0, width: 32, height: 32 };
-        return shadeTile(bth.open(readFileSync(file)), { camera, bounds, diagonal, inside: true, mode: "shaded", size: tile, tile, step: 1, sample: 0 });
-    };
-    const expected = picture(1);
-    assert.ok(expected.every((x) => x > 0.05));
-    for (const size of [2 ** -40, 2 ** 20]) assert.deepEqual(picture(size), expected, String(size));
-});
-
 test("the package is complete", () => {
     const { files } = JSON.parse(readFileSync(join(process.env.DIST, "package.json"), "utf8"));
     for (const name of files) assert.ok(readFileSync(join(process.env.DIST, name)).length > 0, name);

@@ -9,12 +9,21 @@ const FILLED = 1.05;
 /** The camera stays this far from the poles, radians. */
 const POLE = 0.01;
 
-/** A view of bounds from the front, somewhat to the side and above, for a picture with this ratio of width to height. */
+/** A view of bounds from the front, somewhat to the side and above, for a picture with this ratio of width to height. All of them are seen. */
 export function firstView({ lower, upper }, up, aspect) {
     const target = scale(add(lower, upper), 0.5);
     const radius = Math.max(length(add(upper, lower, -1)) / 2, Number.MIN_VALUE);
     const half = aspect < 1 ? Math.atan(Math.tan(HALF_FOV) * aspect) : HALF_FOV;
-    return { target, up, yaw: 0.61, pitch: 0.35, distance: radius / Math.sin(half) / FILLED, radius };
+    const view = { target, up, yaw: 0.61, pitch: 0.35, distance: radius / Math.sin(half) / FILLED, radius };
+    const camera = cameraOf(view, aspect);
+    for (let corner = 0; corner < 8; corner++) {
+        const to = add(target.map((_, k) => ((corner >> k) & 1 ? upper : lower)[k]), target, -1);
+        for (const [k, axis] of [camera.right, camera.up].entries()) {
+            // From there on it lies on the picture's edge or within.
+            view.distance = Math.max(view.distance, Math.abs(dot(to, axis)) / camera.half[k] - dot(to, camera.forward));
+        }
+    }
+    return view;
 }
 
 /** Turns a view by angles in radians. */

@@ -1,0 +1,71 @@
+// Parts of the viewer in node: the camera, the picture, the light.
+//
+//   DIST=FOLDER BTHC=PROGRAM node --test viewer-parts.test.mjs
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join, resolve } from "node:path";
+import { after, before, test } from "node:test";
+import { pathToFileURL } from "node:url";
+import { cameraOf, firstView } from "../viewer/camera.js";
+import { Picture } from "../viewer/picture.js";
+import { shadeTile } from "../viewer/shading.js";
+
+const { BTHC } = process.env;
+const { load } = await import(pathToFileURL(join(resolve(process.env.DIST), "index.js")));
+
+let folder, bth;
+before(async () => {
+    folder = mkdtempSync(join(tmpdir(), "bth-viewer-parts-"));
+    bth = await load();
+});
+after(() => rmSync(folder, { recursive: true }));
+
+/** Numbers from 0 to 1 by a linear congruential generator (Numerical Recipes). */
+function numbers(seed) {
+    let state = seed >>> 0;
+    return () => (state = (Math.imul(state, 1664525) + 1013904223) >>> 0) / 2 ** 32;
+}
+
+test("the viewer shows means of any number of samples", () => {
+    const image = { data: new Uint8ClampedArray(4) };
+    const picture = new Picture({ getContext: () => ({ createImageData: () => image, putImageData() {} }) }, 1, 1);
+    const job = { mode: "normals", tile: { left: 0, top: 0, width: 1, height: 1 } };
+    for (let i = 0; i < 70_000; i++) picture.add(job, [0.2, 0.4, i % 2]);
+    assert.deepEqual([...image.data], [51, 102, 128, 255]);
+});
+
+test("the first view of the viewer shows all corners of any bounds", () => {
+    const dot = (a, b) => a.reduce((sum, x, k) => sum + x * b[k], 0);
+    const random = numbers(6);
+    for (let i = 0; i < 1000; i++) {
+        const lower = [0, 1, 2].map(() => 10 * random() - 5), upper = lower.map((x) => x + 2 ** (8 * random() - 4));
+        const aspect = 2 ** (4 * random() - 2), view = firstView({ lower, upper }, i % 2 ? "y" : "z", aspect), camera = cameraOf(view, aspect);
+        for (let corner = 0; corner < 8; corner++) {
+            const to = lower.map((low, k) => ((corner >> k) & 1 ? upper[k] : low) - camera.eye[k]), away = dot(to, camera.forward);
+            for (const [k, axis] of [camera.right, camera.up].entries()) {
+                // Up to the rounding of numbers of this size.
+                assert.ok(Math.abs(dot(to, axis)) <= camera.half[k] * away * (1 + 1e-12), `${i}, ${aspect}`);
+            }
+        }
+    }
+});
+
+test("the viewer lights a room alike at every size", () => {
+    const picture = (size) => {
+        // A cube, seen from within.
+        const corners = Array.from({ length: 8 }, (_, i) => [i & 1, (i >> 1) & 1, i >> 2].map((bit) => (bit ? size : -size)));
+        const faces = [[1, 2, 4, 3], [5, 6, 8, 7], [1, 2, 6, 5], [3, 4, 8, 7], [1, 3, 7, 5], [2, 4, 8, 6]];
+        const [model, file] = [join(folder, "room.obj"), join(folder, "room.bth")];
+        writeFileSync(model, [...corners.map((at) => `v ${at.join(" ")}`), ...faces.map((face) => `f ${face.join(" ")}`)].join("\n"));
+        execFileSync(BTHC, ["compile", model, "-o", file, "--quiet"]);
+        const camera = { eye: [0.1 * size, 0.2 * size, 0.5 * size], right: [1, 0, 0], up: [0, 1, 0], forward: [0, 0, -1], half: [1, 1], vertical: [0, 1, 0] };
+        const bounds = { lower: [-size, -size, -size], upper: [size, size, size] }, diagonal = 2 * size * Math.sqrt(3);
+        const tile = { left: 0, top: 0, width: 32, height: 32 };
+        return shadeTile(bth.open(readFileSync(file)), { camera, bounds, diagonal, inside: true, mode: "shaded", size: tile, tile, step: 1, sample: 0 });
+    };
+    const expected = picture(1);
+    assert.ok(expected.every((x) => x > 0.05));
+    for (const size of [2 ** -40, 2 ** 20]) assert.deepEqual(picture(size), expected, String(size));
+});

@@ -19,7 +19,7 @@ const { load } = await import(pathToFileURL(join(resolve(DIST), "index.js")));
 
 /** Camera rays to all of a scene, in blocks of 8 by 8 pixels. */
 function cameraRays(scene) {
-    const camera = cameraOf(firstView(scene.bounds, "y"), 1), rays = new Float32Array(8 * SIZE * SIZE);
+    const camera = cameraOf(firstView(scene.bounds, "y", 1), 1), rays = new Float32Array(8 * SIZE * SIZE);
     for (let i = 0; i < SIZE * SIZE; i++) {
         const block = i >> 6, x = (block % (SIZE / 8)) * 8 + (i & 7), y = Math.floor(block / (SIZE / 8)) * 8 + ((i >> 3) & 7);
         rays.set([...camera.eye, 0, ...directionThrough(camera, (2 * x) / SIZE - 1, 1 - (2 * y) / SIZE), Infinity], 8 * i);

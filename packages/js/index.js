@@ -38,8 +38,8 @@ function noMemory(what, memory, options) {
 
 /**
  * What the module exports, with functions that throw a BthError where the module cannot get memory: it then executes "unreachable". Its
- * stack stays as deep as it was at such a trap, so that the stack pointer is set back, else some traps would leave no stack. A panic,
- * which would be a defect of the library, ends in the same way; the trap is the error's cause.
+ * stack stays as deep as it was at such a trap, and where the caller's own recursion ends a call, so that the stack pointer is set back,
+ * else some of these would leave no stack. A panic, which would be a defect of the library, ends as a trap does; it is the error's cause.
  */
 function guarded(exports) {
     const { memory, __stack_pointer: stack } = exports;
@@ -48,9 +48,9 @@ function guarded(exports) {
         try {
             return call(...numbers);
         } catch (error) {
-            if (!(error instanceof WebAssembly.RuntimeError)) throw error;
             stack.value = top;
-            throw /unreachable/i.test(error.message) ? noMemory("this call", memory, { cause: error }) : error;
+            const isTrap = error instanceof WebAssembly.RuntimeError && /unreachable/i.test(error.message);
+            throw isTrap ? noMemory("this call", memory, { cause: error }) : error;
         }
     };
     const calls = Object.entries(exports).filter(([, call]) => typeof call === "function");

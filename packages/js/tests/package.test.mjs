@@ -227,6 +227,24 @@ test("where memory ends calls throw errors, and work again when there is some", 
     full.open(file("deformers.bth")).seconds = 1;
 });
 
+test("calls work again after some that recursion left too little stack", async () => {
+    const scene = (await load(bth.module)).open(readFileSync(join(conformance, "valid/tets-link32.bth")));
+    const rays = raysInto(scene.bounds, 16, 8), expected = scene.nearest(rays);
+    let failed = 0;
+    for (let i = 0; i < 3; i++) {
+        // From the deepest call on, until there is stack enough.
+        let done = false;
+        const deeper = () => {
+            try { deeper(); } catch {}
+            if (done) return;
+            try { scene.nearest(rays); done = true; } catch { failed++; }
+        };
+        deeper();
+    }
+    assert.ok(failed > 0);
+    assert.deepEqual(scene.nearest(rays), expected);
+});
+
 test("what is no file is refused with what is expected", async () => {
     const bytes = readFileSync(join(conformance, "valid/triangle.bth"));
     const buffer = bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length), shared = new SharedArrayBuffer(bytes.length);

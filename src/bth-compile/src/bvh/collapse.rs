@@ -10,7 +10,7 @@ use super::{BinaryBvh, MAX_LEVELS};
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
 use bth_format::layout::NONE;
-use bth_format::object::{WIDENED_RANGE, anchor};
+use bth_format::object::{WIDENED_RANGE, far_away};
 use bth_import::Mesh;
 
 /// Options of [`collapse`].
@@ -68,8 +68,8 @@ pub fn collapse_by<'a>(
     monitor.stage("collapse", None);
     let greatest = bvh.nodes.first().map_or(0.0, greatest_coordinate);
     // The boxes of an object that deforms are computed anew by readers, which do not widen them. Those of an object that is far from the
-    // origin would be widened by much for its size, more than the pads of readers, which measure from its anchor.
-    let is_far = bvh.nodes.first().is_some_and(|root| anchor(&root.lower, &root.upper).is_some());
+    // origin would be widened by much for its size, and readers need not allow for it.
+    let is_far = bvh.nodes.first().is_some_and(|root| far_away(&root.lower, &root.upper).is_some());
     let widened_boxes = !options.leaf_vertices && !is_far && WIDENED_RANGE.contains(&greatest);
     let mut wide = Wide { root: NONE, subtrees: vec![NONE; cut.len()], widened_boxes, ..Wide::default() };
     let mut report = CollapseReport::default();

@@ -10,12 +10,12 @@ pub struct ObjectBounds {
     pub lower: [f32; 4],
     /// Greatest x, y and z; the fourth number is 0.
     pub upper: [f32; 4],
-    /// The point that the pads of boxes are relative to: the object's [`anchor`], or the origin of its space; the fourth number is 0.
-    pub anchor: [f32; 4],
     /// Greatest absolute value of a coordinate of either corner.
     pub greatest: f32,
-    /// What pads of boxes allow for besides the origin of a ray: the greatest |coordinate| of the object, or its size and a quarter of the
-    /// anchor's greatest |coordinate|, or next to nothing where the file's boxes are widened.
+    /// How [`far_away`] the object is from the origin of its space; 0 where it is near.
+    pub away: f32,
+    /// What pads of boxes allow for besides the origin of a ray: the greatest |coordinate| of the object, or its size and a quarter of
+    /// `away` where it is far away, or next to nothing where the file's boxes are widened.
     pub padded_in_f64: f32,
     /// The same when f32 prepares the ray: not less than `greatest` where that is not below [`GREATEST_IN_F32`].
     pub padded: f32,
@@ -26,11 +26,8 @@ pub const WIDENED_RANGE: std::ops::Range<f32> =
     1.0 / (1u64 << 60) as f32..(1u64 << 49) as f32 * (1u64 << 49) as f32;
 /// From this greatest |coordinate| on, products of three coordinates could overflow f32, which then prepares no rays.
 pub const GREATEST_IN_F32: f32 = (1u64 << 40) as f32;
-/// A box that is this many times its size away from the origin has an [`anchor`].
+/// A box that is more than this many times its size away from the origin is far away.
 const FAR: f32 = 8.0;
-/// Coordinates of anchors are below this in absolute value, so that a ray's origin that is as far from one as f32 prepares it is not
-/// much farther from the origin of its space.
-const GREATEST_ANCHOR: f32 = GREATEST_IN_F32 / 4.0;
 /// What pads of widened boxes allow for besides the origin of a ray. No rounding needs it; it keeps pads far from denormal numbers, for rays
 /// from the origin of the object's space, too.
 const LEAST_PADDED: f32 = 1.0 / ((1u64 << 50) as f32 * (1u64 << 50) as f32);
@@ -41,17 +38,18 @@ impl ObjectBounds {
         let ([x, y, z], [to_x, to_y, to_z]) = (object.lower, object.upper);
         let [near, far] = [greatest_of(&object.lower), greatest_of(&object.upper)];
         let greatest = if far > near { far } else { near };
-        let (mut at, mut padded_in_f64) = ([0.0; 3], greatest);
+        let (mut away, mut padded_in_f64) = (0.0, greatest);
         if object.coordinates & WIDENED_BOXES != 0 && WIDENED_RANGE.contains(&greatest) {
             padded_in_f64 = LEAST_PADDED;
-        } else if let Some(anchor) = anchor(&object.lower, &object.upper) {
-            (at, padded_in_f64) = (anchor, size(&object.lower, &object.upper) + greatest_of(&anchor) / 4.0);
+        } else if let Some(distance) = far_away(&object.lower, &object.upper) {
+            away = distance;
+            padded_in_f64 = size(&object.lower, &object.upper) + away / 4.0;
         }
         ObjectBounds {
             lower: [x, y, z, 0.0],
             upper: [to_x, to_y, to_z, 0.0],
-            anchor: [at[0], at[1], at[2], 0.0],
             greatest,
+            away,
             padded_in_f64,
             padded: if greatest < GREATEST_IN_F32 { padded_in_f64 } else { greatest },
         }
@@ -60,7 +58,7 @@ impl ObjectBounds {
     /// The cube around the origin that holds all points with coordinates of at most `greatest` in absolute value.
     pub fn around(greatest: f32) -> ObjectBounds {
         let [lower, upper] = [-greatest, greatest].map(|x| [x, x, x, 0.0]);
-        ObjectBounds { lower, upper, anchor: [0.0; 4], greatest, padded_in_f64: greatest, padded: greatest }
+        ObjectBounds { lower, upper, greatest, away: 0.0, padded_in_f64: greatest, padded: greatest }
     }
 
     /// Length of the longest side, rounded to `f32`.
@@ -70,13 +68,12 @@ impl ObjectBounds {
     }
 }
 
-/// The point of a box that is nearest to the origin, if it is much farther away than the box is large: distances from it are then small
-/// beside coordinates.
-pub fn anchor(lower: &[f32; 3], upper: &[f32; 3]) -> Option<[f32; 3]> {
+/// How far away a box is from the origin, if that is much for its size: the greatest |coordinate| of its point that is nearest to the origin.
+/// Distances from that point are then small beside coordinates.
+pub fn far_away(lower: &[f32; 3], upper: &[f32; 3]) -> Option<f32> {
     let nearest = |lower: f32, upper: f32| if lower > 0.0 { lower } else { upper.min(0.0) };
-    let anchor = [0, 1, 2].map(|k| nearest(lower[k], upper[k]));
-    let farthest = greatest_of(&anchor);
-    (size(lower, upper) < farthest / FAR && farthest < GREATEST_ANCHOR).then_some(anchor)
+    let distance = greatest_of(&[0, 1, 2].map(|k| nearest(lower[k], upper[k])));
+    (size(lower, upper) < distance / FAR && distance < GREATEST_IN_F32).then_some(distance)
 }
 
 /// Length of the longest side of a box, rounded to `f32`.
@@ -96,14 +93,14 @@ mod tests {
     use zerocopy::FromZeros;
 
     #[test]
-    fn boxes_far_from_the_origin_for_their_size_have_their_nearest_point_as_anchor() {
-        assert_eq!(anchor(&[9.0, -0.5, -0.5], &[10.0, 0.5, 0.5]), Some([9.0, 0.0, 0.0]));
-        assert_eq!(anchor(&[-10.0, 9.0, 0.0], &[-9.0, 10.0, 0.5]), Some([-9.0, 9.0, 0.0]));
-        assert_eq!(anchor(&[8.0, 0.0, 0.0], &[9.0, 1.0, 1.0]), None, "eight times its size is near");
-        assert_eq!(anchor(&[-1.0; 3], &[1.0; 3]), None);
-        assert_eq!(anchor(&[0.0; 3], &[0.0; 3]), None);
-        assert_eq!(anchor(&[1e-40; 3], &[1e-40; 3]), Some([1e-40; 3]));
-        assert_eq!(anchor(&[GREATEST_ANCHOR; 3], &[GREATEST_ANCHOR; 3]), None);
+    fn boxes_more_than_eight_times_their_size_away_are_far_away() {
+        assert_eq!(far_away(&[9.0, -0.5, -0.5], &[10.0, 0.5, 0.5]), Some(9.0));
+        assert_eq!(far_away(&[-10.0, 8.5, 0.0], &[-9.0, 9.5, 0.5]), Some(9.0));
+        assert_eq!(far_away(&[8.0, 0.0, 0.0], &[9.0, 1.0, 1.0]), None);
+        assert_eq!(far_away(&[-1.0; 3], &[1.0; 3]), None);
+        assert_eq!(far_away(&[0.0; 3], &[0.0; 3]), None);
+        assert_eq!(far_away(&[1e-40; 3], &[1e-40; 3]), Some(1e-40));
+        assert_eq!(far_away(&[GREATEST_IN_F32; 3], &[GREATEST_IN_F32; 3]), None);
     }
 
     #[test]
@@ -111,15 +108,12 @@ mod tests {
         let mut object =
             Object { lower: [96.0, -0.5, -0.5], upper: [97.0, 0.5, 0.5], ..Object::new_zeroed() };
         let bounds = ObjectBounds::new(&object);
-        assert_eq!((bounds.padded, bounds.padded_in_f64, bounds.anchor), (25.0, 25.0, [96.0, 0.0, 0.0, 0.0]));
+        assert_eq!((bounds.padded, bounds.padded_in_f64, bounds.away), (25.0, 25.0, 96.0));
         object.coordinates = WIDENED_BOXES;
         let bounds = ObjectBounds::new(&object);
-        assert_eq!(
-            (bounds.padded, bounds.padded_in_f64, bounds.anchor),
-            (LEAST_PADDED, LEAST_PADDED, [0.0; 4])
-        );
+        assert_eq!((bounds.padded, bounds.padded_in_f64, bounds.away), (LEAST_PADDED, LEAST_PADDED, 0.0));
         let near = Object { lower: [-1.0; 3], upper: [2.0; 3], ..Object::new_zeroed() };
         let bounds = ObjectBounds::new(&near);
-        assert_eq!((bounds.padded, bounds.padded_in_f64, bounds.anchor), (2.0, 2.0, [0.0; 4]));
+        assert_eq!((bounds.padded, bounds.padded_in_f64, bounds.away), (2.0, 2.0, 0.0));
     }
 }

@@ -12,7 +12,7 @@ mod opacity;
 mod records;
 mod view;
 
-pub use bounds::{GREATEST_IN_F32, ObjectBounds, WIDENED_RANGE, anchor};
+pub use bounds::{GREATEST_IN_F32, ObjectBounds, WIDENED_RANGE, far_away};
 pub use leaves::Unpacked;
 pub(crate) use nodes::MAX_LINES;
 pub use nodes::NodeBase;

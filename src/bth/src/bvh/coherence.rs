@@ -1,6 +1,7 @@
 //! Coherence of rays: the ranges of their origins and directions.
 
 use crate::intersect::boxes::PAD;
+use crate::intersect::prepare;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use bth_format::object::ObjectBounds;
@@ -136,18 +137,22 @@ impl Span {
     /// Greatest |coordinate| of an origin.
     #[inline(always)]
     pub(crate) fn farthest_origin(&self) -> f32 {
-        self.farthest_from(&[0.0; 4])
-    }
-
-    /// Greatest |coordinate| of an origin, measured from a point; rounded once.
-    #[inline(always)]
-    pub(crate) fn farthest_from(&self, point: &[f32; 4]) -> f32 {
         let mut farthest = 0f32;
-        for k in 0..3 {
-            let [least, greatest] = self.origin[k].map(|x| (x - point[k]).abs());
-            farthest = farthest.max(least).max(greatest);
+        for [least, greatest] in self.origin {
+            farthest = farthest.max(least.abs()).max(greatest.abs());
         }
         farthest
+    }
+
+    /// [`prepare::padded_extent`] of the rays.
+    #[inline(always)]
+    pub(crate) fn padded_extent(&self, bounds: &ObjectBounds) -> (f32, bool) {
+        let mut reach = 0f32;
+        for k in 0..3 {
+            let [least, greatest] = self.origin[k];
+            reach = reach.max(bounds.upper[k] - least).max(greatest - bounds.lower[k]);
+        }
+        prepare::padded_extent(bounds, self.farthest_origin(), reach)
     }
 
     /// A box of all points at which the rays can hit something, as lower and upper corner, if they are short and close together.

@@ -11,12 +11,9 @@ use bth_format::object::ObjectBounds;
 /// Wald, Boulos and Shirley, "Ray Tracing Deformable Scenes Using Dynamic Bounding Volume Hierarchies", TOG 2007.
 ///
 /// The depth at which ray l meets a plane is (plane - o)·r: an interval of o, widened by a pad on both sides, and
-/// one of r bound it. As all operations round monotonically, only roundings need the pad. With u = 2^-24 and E the sum of the
-/// greatest coordinate of the object and that of all origins, they come to at most uE|r| for the reciprocal, 2uE|r| for the
-/// padded end, uE|r| for the difference and uE|r| for the product: with the half [`PAD`] = 8uE|r| of [`boxes`] for
-/// clamped components less than 14uE|r|; the pad is 2 · PAD = 32uE. Of these, less than 12u are relative to the planes, which widened
-/// boxes cover by 16u: then E counts next to nothing of the object's coordinates ([`prepare::padded_extent`]). Measured from an anchor c
-/// all but the padded end's 2u|o| is relative to distances, and E counts a quarter of |c|.
+/// one of r bound it. As all operations round monotonically, only roundings need the pad. With u = 2^-24 and P a plane, they come to at most 2u|o||r| for the
+/// padded end, and u|P - o||r| each for the reciprocal, the difference and the product; clamped components to 4u|P - o||r|. With the
+/// distances from c of [`boxes::PAD`] together 7u|P - c| + 9u|o - c| + 2u|c|: the pad is 2 · PAD of what it is there.
 #[derive(Clone, Copy)]
 pub(crate) struct Shaft<S: Simd> {
     /// For each axis the end of the origins' interval that is nearest to the planes at which rays enter boxes.
@@ -59,9 +56,7 @@ impl<S: Simd> Shaft<S> {
     /// prepare them.
     #[inline(always)]
     pub(crate) fn of(s: S, bounds: &ObjectBounds, span: &Span) -> Option<(Self, f32)> {
-        let padded = prepare::padded_extent(bounds, span.farthest_from(&bounds.anchor));
-        let main = span.main_axis().1;
-        let is_prepared = prepare::SMALLEST < padded && padded < prepare::LARGEST;
+        let ((padded, is_prepared), main) = (span.padded_extent(bounds), span.main_axis().1);
         if !(span.is_coherent() && is_prepared && 1.0 / prepare::LARGEST < main && main < prepare::LARGEST) {
             return None;
         }
@@ -136,7 +131,7 @@ mod tests {
             let place = |x: f32| size(away + x);
             let object = Object { lower: [place(-8.0); 3], upper: [place(8.0); 3], ..Object::new_zeroed() };
             let bounds = ObjectBounds::new(&object);
-            assert_eq!(bounds.anchor[0] != 0.0, away != 0.0 && scale < 1e10);
+            assert_eq!(bounds.away != 0.0, away != 0.0 && scale < 1e10);
             let (eye, spread) = ([(); 3].map(|()| 8.0 * unit()), [0.0, 0.001, 0.3][round / 4 % 3]);
             let middle = [(); 3].map(|()| unit());
             // In some rounds a component is close to zero.

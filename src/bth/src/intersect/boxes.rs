@@ -12,17 +12,15 @@ use bth_format::layout::{Object, PackedNode, WIDTH, WideNode};
 use bth_format::object::ObjectBounds;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// Pad of a plane relative to the sum of the greatest |coordinate| of the boxes and of the origin. Half of it covers the
-/// roundings (reciprocal, product with the origin, addend, product with the plane and sum: at most 5 · 2^-24), the other half
-/// the clamping of components ([`LEAST_COMPONENT`]).
+/// Pad of a plane relative to what the object asks for ([`ObjectBounds::padded`]) and the least of two bounds of how far away the ray's origin o is: the distance
+/// of the farthest corner of the object's box, and the greatest |coordinate| of o and how far away the object is ([`ObjectBounds::away`]).
 ///
-/// Where the file's boxes are widened, the pad need not cover the boxes' part of that sum. With p a point of the box below, o the origin, r the reciprocal and
-/// u = 2^-24, what is rounded is off by at most 5u(|P| + |o|)|r| for a plane P beyond p, and clamping by 2^-22 (|p| + |o|)|r| in the maximum norm; the file keeps 2^-20 |p| between
-/// p and P, and where P is farther away, its own roundings are less than what it is farther.
-///
-/// Where the object has an anchor c, coordinates are measured from it: clamping and the roundings of reciprocal and sum are off by what is relative to |P - o|, at most
-/// |P - c| + |o - c|; only the products with P and o and the addend are relative to the coordinates themselves, so that 3u|c| |r| comes to what is relative to |P - c|
-/// and |o - c|: less than the pad of a quarter of |c|.
+/// With P a plane, p a point of the box within it, r the reciprocal, u = 2^-24, and c the point of the object's box that is nearest to the origin of its space:
+/// products with P and o and the addend are off by at most u(|P| + 2|o|)|r|, reciprocal and sum by 2u|P - o||r|, and clamping moves the ray by at most 4u|p - o|
+/// ([`LEAST_COMPONENT`]), all in the maximum norm. Measured from c that is 7u|P - c| + 8u|o - c| + 3u|c|. Both bounds are bounds of |o - c|, if |c| is added to the
+/// second: the pad has 16u of it. Of what the object asks for it has 16u, too: of the greatest |coordinate|, which is |c| + |P - c| for some P,
+/// as these have the same signs, so that it covers an |o - c| of |o| + |c|, too; or, where the object is far away, of its size and |c| / 4. Widened boxes
+/// bring 16u|p| in place of it; where P is farther away, its own roundings are less than what it is farther.
 pub(crate) const PAD: f64 = 1.0 / (1 << 20) as f64;
 /// Least |component| of a direction whose greatest |component| is 1; smaller ones are raised to it, which keeps products
 /// finite. Up to the farthest coordinate this moves the ray by less than half the pad.
@@ -81,11 +79,13 @@ impl RaySlabs {
     /// For boxes in these bounds.
     fn with_pad(ray: &Ray, line: &Line, bounds: &ObjectBounds, extra_pad: impl Fn(f64) -> f64) -> RaySlabs {
         let scale = line.direction[line.axis[2]].abs();
-        let from_anchor = |k: usize| (line.origin[k] - f64::from(bounds.anchor[k])).abs();
-        let farthest_origin = from_anchor(0).max(from_anchor(1)).max(from_anchor(2));
-        let [greatest, padded] = [bounds.greatest, bounds.padded_in_f64].map(f64::from);
+        let farthest_origin = line.origin.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let to_corner = |k: usize, corner: &[f32; 4]| (f64::from(corner[k]) - line.origin[k]).abs();
+        let reach =
+            (0..3).fold(0.0, |m: f64, k| m.max(to_corner(k, &bounds.lower)).max(to_corner(k, &bounds.upper)));
+        let [greatest, padded, away] = [bounds.greatest, bounds.padded_in_f64, bounds.away].map(f64::from);
         let extent = greatest + farthest_origin;
-        let pad = PAD * (padded + farthest_origin) + extra_pad(farthest_origin);
+        let pad = PAD * (padded + reach.min(farthest_origin + away)) + extra_pad(farthest_origin);
         let mut slabs = RaySlabs { scale: scale as f32, ..RaySlabs::NONE };
         // Finite even where it is the depth of all boxes: the traversal writes lane numbers into the low bits of depths, which
         // would turn an infinity into NaN.

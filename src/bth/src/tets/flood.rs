@@ -11,7 +11,6 @@ use super::walk::{TetWalker, WalkOutcome};
 use crate::intersect::line::{Projected, Sign};
 use crate::query::{Count, EitherQuery, Query};
 use bth_format::layout::{FACE_BIT, NONE, TetFace};
-use smallvec::SmallVec;
 use std::collections::BTreeSet;
 
 /// The tetrahedra that a flood has visited, or the faces. Around most vertices these are about ten, around the center of a fan as
@@ -46,6 +45,13 @@ impl VisitedSet {
         true
     }
 }
+
+/// Tetrahedra that a flood has yet to pass, with the faces through which it enters them. Most are few enough to need no allocation; the
+/// small library, which has no room for what growing arrays say when they fail, allocates.
+#[cfg(not(feature = "small"))]
+type Pending = smallvec::SmallVec<[(u32, Entered); 64]>;
+#[cfg(feature = "small")]
+type Pending = Vec<(u32, Entered)>;
 
 /// Receiver of the constrained faces that a flood reaches.
 pub(crate) trait FaceReceiver {
@@ -87,7 +93,7 @@ impl TetWalker<'_> {
     pub(crate) fn flood_faces<C: Count>(&self, receiver: &mut dyn FaceReceiver, count: &mut C) -> bool {
         count.flood();
         let mut visited = VisitedSet::new();
-        let mut stack = SmallVec::<[(u32, Entered); 64]>::new();
+        let mut stack = Pending::new();
         for face in self.hull {
             if self.touches(&face.vertex.map(|v| self.project(v))) && visited.insert(face.tet) {
                 stack.push((face.tet, Entered { face: face.vertex, apex: face.opposite, behind: NONE }));

@@ -5,7 +5,6 @@ use super::ray_group::RayGroup;
 use crate::bvh::coherence::Span;
 use crate::bvh::shaft::Shaft;
 use crate::intersect::boxes;
-use crate::intersect::prepare;
 use crate::simd::{LANES, Part, Simd};
 use bth_format::layout::{WIDTH, WideNode};
 use bth_format::object::ObjectBounds;
@@ -34,7 +33,7 @@ impl<S: Simd, const POINT: bool> Frustum<S, POINT> {
     #[inline(always)]
     pub(crate) fn new(s: S, bounds: &ObjectBounds, span: &Span, groups: &[RayGroup<S>]) -> Self {
         let zero = s.splat(0.0);
-        let padded = prepare::padded_extent(bounds, span.farthest_from(&bounds.anchor));
+        let (padded, _) = span.padded_extent(bounds);
         let (main, _) = span.main_axis();
         let axis = [(main + 1) % 3, (main + 2) % 3, main];
         let mut center = [0.0; 3];

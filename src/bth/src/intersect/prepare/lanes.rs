@@ -85,12 +85,14 @@ pub(crate) fn prepare_lanes<S: Lanewise>(
         let far =
             s.max(s.abs(s.sub(s.splat(bounds.lower[k]), o[k])), s.abs(s.sub(s.splat(bounds.upper[k]), o[k])));
         reach = s.max(far, reach);
-        let coordinate = s.abs(s.sub(o[k], s.splat(bounds.anchor[k])));
+        let coordinate = s.abs(o[k]);
         farthest = s.max(coordinate, farthest);
         origin_sum = s.add(coordinate, origin_sum);
         direction_sum = s.add(size[k], direction_sum);
     }
-    let extent = s.mul(s.add(s.splat(bounds.padded), farthest), s.splat(ROUND_UP));
+    // As `padded_extent`.
+    let (padded, round_up) = (s.splat(bounds.padded), s.splat(ROUND_UP));
+    let extent = s.mul(s.add(padded, s.min(s.add(farthest, s.splat(bounds.away)), reach)), round_up);
     let large = s.splat(LARGEST);
     let finite = s.and(
         s.and(s.lt(s.splat(1.0 / LARGEST), greatest), s.lt(direction_sum, large)),

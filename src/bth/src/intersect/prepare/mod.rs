@@ -47,12 +47,14 @@ fn is_tiny(tmin: f32) -> bool {
     tmin.abs().to_bits().wrapping_sub(1) < f32::MIN_POSITIVE.to_bits()
 }
 
-/// Upper bound of what the pads of boxes are relative to, for origins whose |coordinates|, measured from the object's anchor, do not exceed
-/// `greatest_origin`: the sum of that and of what the object asks for. Without an anchor it is not below [`LARGEST`] where the sum of the
-/// greatest |coordinates| of the origins and of the object is not.
+/// Upper bound of what the pads of boxes are relative to ([`boxes::PAD`]), for origins whose |coordinates| do not exceed `farthest`
+/// and that are no farther from any corner of the object's box than `reach`; and whether f32 can prepare such rays. It cannot where
+/// `farthest` is NaN.
 #[inline(always)]
-pub(crate) fn padded_extent(bounds: &ObjectBounds, greatest_origin: f32) -> f32 {
-    (bounds.padded + greatest_origin) * ROUND_UP
+pub(crate) fn padded_extent(bounds: &ObjectBounds, farthest: f32, reach: f32) -> (f32, bool) {
+    let away = farthest + bounds.away;
+    let extent = (bounds.padded + if reach < away { reach } else { away }) * ROUND_UP;
+    (extent, lies_between(extent, SMALLEST, LARGEST) & (farthest < LARGEST))
 }
 
 /// A ray prepared for box tests and for the filter, with the progress of its traversal. The first cache line holds what node
@@ -114,16 +116,11 @@ impl PreparedRay {
         let [lower, upper] = [bounds.lower, bounds.upper].map(|p| Vec3A::from_vec4(Vec4::from_array(p)));
         let reach = (lower - o).abs().max((upper - o).abs()).max_element();
         let greatest = s.greatest_of_three(end.abs().to_array());
-        let from_anchor = start - Vec4::from_array(bounds.anchor);
-        let [greatest_origin, ..] = s.greatest_of_three(from_anchor.abs().to_array());
+        let [greatest_origin, ..] = s.greatest_of_three(start.abs().to_array());
         let (greatest, greatest_lanes) = (greatest[0], Vec3A::from_vec4(Vec4::from_array(greatest)));
-        let extent = padded_extent(bounds, greatest_origin);
         // NaN and infinity among the components make these the greatest.
-        if !(lies_between(greatest, 1.0 / LARGEST, LARGEST)
-            & lies_between(extent, SMALLEST, LARGEST)
-            & (tmin <= tmax)
-            & !is_tiny(tmin))
-        {
+        let (extent, is_prepared) = padded_extent(bounds, greatest_origin, reach);
+        if !(lies_between(greatest, 1.0 / LARGEST, LARGEST) & is_prepared & (tmin <= tmax) & !is_tiny(tmin)) {
             return None;
         }
         let least = greatest_lanes * boxes::LEAST_COMPONENT as f32;

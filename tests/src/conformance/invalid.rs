@@ -339,6 +339,8 @@ fn free_directions() -> Vec<Case> {
         // With a greater distance of the level, the triangle above lies within it.
         field("F209-met-within-a-level", base, levels, 8, 20f32.to_bits()),
         field("F209-met-within-a-level-of-distances", "free-distances", levels, 8, 20f32.to_bits()),
+        // The middle of the triangle above, at 10.011, lies within it, though one of its corners, at 10.050, does not.
+        field("F209-middle-within-a-level", "free-distances", levels, 8, 10.02f32.to_bits()),
         broken("F210-sliver", base, Seal::Sections, |e| {
             // The third corner of the first triangle, vertex 5, comes close to the first edge.
             let lines = e.section_at(kind::LINES);

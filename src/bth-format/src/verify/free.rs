@@ -1,7 +1,7 @@
 //! BTH-F210: triangles with free bins have axes. BTH-F209: rays from some triangles meet nothing where their directions are called free.
 //!
-//! All pairs of triangles would take quadratic time. Of evenly spaced triangles rays from the corners to points of all other triangles
-//! are decided, exactly: a wrong bin is found as soon as one of the points lies in the bin.
+//! All pairs of triangles would take quadratic time. Of evenly spaced triangles rays from the corners to the middles of all other
+//! triangles are decided: a wrong bin is found as soon as one of the middles lies in the bin.
 
 use crate::error::{Code, Error, Result, Text};
 use crate::exact::side;
@@ -97,35 +97,27 @@ struct Start {
 
 impl Start {
     /// Whether the ray from a corner through the middle of another triangle meets it though its direction is called free, or free as far
-    /// as that.
+    /// as that. It meets the middle itself, unless it lies in the plane of the triangle.
     fn meets(&self, from: [f32; 3], target: Corners) -> bool {
-        let middle: [f32; 3] = std::array::from_fn(|k| {
-            let sum: f64 = target.iter().map(|p| f64::from(p[k])).sum();
-            (sum / 3.0) as f32
+        /// Bounds the rounding errors of the direction, a sum of six numbers, relative to the greatest coordinate; and that of its length.
+        const ERROR: f64 = 1.0 / (1u64 << 48) as f64;
+        // Three times the direction to the middle.
+        let direction: [f64; 3] = std::array::from_fn(|k| {
+            target.iter().map(|p| f64::from(p[k])).sum::<f64>() - 3.0 * f64::from(from[k])
         });
-        let d: [f64; 3] = std::array::from_fn(|k| f64::from(middle[k]) - f64::from(from[k]));
-        // Rounding errors of the bin are far below its margin.
-        let Some((bin, is_back)) = free_bin(&self.axes, d) else { return false };
+        let greatest = |m: f64, x: &f32| m.max(f64::from(x.abs()));
+        let error = target.iter().flatten().chain(&from).fold(0.0, greatest) * ERROR;
+        let length = direction.iter().map(|x| x * x).sum::<f64>().sqrt();
+        // Such errors of a direction are far below the margin of its bin.
+        if length <= error * (1 << 16) as f64 {
+            return false;
+        }
+        let Some((bin, is_back)) = free_bin(&self.axes, direction) else { return false };
         let KnownFree { bins, sectors, .. } = self.known;
         let is_free = bins.is_free(bin) && bins.is_back() == is_back;
         let level = sectors[usize::from(is_back)].level_of_bin(bin);
-        if !is_free && beyond(from, target, f64::from(self.levels.within(level))) {
-            return false;
-        }
-        // The triangle is met beyond the start if the line passes its edges on the same side, and the start lies on the side of the
-        // triangle from which that direction comes.
+        let within = 3.0 * f64::from(self.levels.within(level));
         let [a, b, c] = target;
-        let sides = [side(from, middle, a, b), side(from, middle, b, c), side(from, middle, c, a)];
-        let before = side(a, b, c, from);
-        before != Ordering::Equal
-            && sides.iter().any(|s| *s != Ordering::Equal)
-            && sides.iter().all(|s| *s != before)
+        (is_free || length * (1.0 + ERROR) + error < within) && side(a, b, c, from) != Ordering::Equal
     }
-}
-
-/// Whether all of a triangle may be at least as far from a point as a distance.
-fn beyond(from: [f32; 3], target: Corners, distance: f64) -> bool {
-    let square = |p: &[f32; 3]| (0..3).map(|k| (f64::from(p[k]) - f64::from(from[k])).powi(2)).sum::<f64>();
-    // Points of a triangle are no farther than its farthest corner.
-    target.iter().map(square).fold(0.0, f64::max) >= distance * distance
 }

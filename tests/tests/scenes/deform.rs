@@ -198,6 +198,21 @@ fn positions_between_two_times_never_leave_what_lies_between() {
     }
 }
 
+/// A model of triangles that share no vertex, as STL files hold them.
+#[test]
+fn a_surface_is_closed_where_its_vertices_are_at_one_place() {
+    let knot = bth_scenes::knot::torus_knot(64);
+    let corners = |row: &[u32; 3]| row.map(|vertex| knot.positions[vertex as usize]);
+    let mut positions: Positions = knot.triangles.iter().flat_map(corners).collect();
+    let rows: Vec<[u32; 3]> =
+        (0..knot.triangles.len() as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+    let mut scene = bth::from_bytes(&bytes(&positions, &rows, &deformable())).unwrap();
+    assert_eq!(scene.is_closed(0), Some(true));
+    positions[0][2] += 0.5;
+    scene.set_positions(0, &positions).unwrap();
+    assert_eq!(scene.is_closed(0), Some(false), "a corner stands off");
+}
+
 #[test]
 fn what_cannot_be_set_is_an_error_and_changes_nothing() {
     let (rest, triangles) = mesh(600);

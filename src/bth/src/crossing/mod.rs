@@ -148,7 +148,8 @@ impl Scene {
 
     /// Whether the triangles of an object form a surface without boundary: whether every edge has as many triangles in one direction
     /// as in the other, so that winding numbers are exact and do not depend on the direction of a ray. `None` if the file was
-    /// compiled without the triangles of its source. The time is that of sorting the edges.
+    /// compiled without the triangles of its source. Vertices at one place are one, also where a deformable object keeps several. The
+    /// time is that of sorting the edges.
     ///
     /// # Panics
     /// If `object` is not less than [`Self::object_count`].
@@ -157,14 +158,18 @@ impl Scene {
         if view.triangles.len() != view.header.triangles as usize {
             return None;
         }
-        // The edges from lower to higher rows of positions, and the others, turned round.
+        // Positions are distinct in other objects.
+        let vertices = view.is_deformable().then(|| vertices_by_place(view.positions));
+        // The edges from lower to higher vertices, and the others, turned round.
         let (mut up, mut down) = (Vec::new(), Vec::new());
-        for [a, b, c] in view.triangles {
+        for rows in view.triangles {
+            let [a, b, c] =
+                vertices.as_ref().map_or(*rows, |vertices| rows.map(|row| vertices[row as usize]));
             for (p, q) in [(a, b), (b, c), (c, a)] {
                 let edge = |low: u32, high: u32| u64::from(low) << 32 | u64::from(high);
-                match p.cmp(q) {
-                    Ordering::Less => up.push(edge(*p, *q)),
-                    Ordering::Greater => down.push(edge(*q, *p)),
+                match p.cmp(&q) {
+                    Ordering::Less => up.push(edge(p, q)),
+                    Ordering::Greater => down.push(edge(q, p)),
                     Ordering::Equal => {}
                 }
             }
@@ -196,4 +201,17 @@ impl Scene {
             });
         }
     }
+}
+
+/// For each position a number that it shares with those that are equal to it, and with no others.
+fn vertices_by_place(positions: &[[f32; 3]]) -> Vec<u32> {
+    // The sum has the same bits for zeros of either sign.
+    let place = |row: &u32| positions[*row as usize].map(|x| (x + 0.0).to_bits());
+    let mut rows: Vec<u32> = (0..positions.len() as u32).collect();
+    rows.sort_unstable_by_key(place);
+    let mut vertices = vec![0; rows.len()];
+    for equal in rows.chunk_by(|a, b| place(a) == place(b)) {
+        equal.iter().for_each(|row| vertices[*row as usize] = equal[0]);
+    }
+    vertices
 }

@@ -51,5 +51,11 @@ def test_wrong_options(scene, options, match):
 
 def test_what_is_closed():
     assert bth.bake.world_mesh(bth.compile(sphere())).closed() and not bth.bake.world_mesh(bth.compile(grid(3, 1.0))).closed()
+    # Triangles that share no vertex, as in STL files, in an object that keeps them all.
+    vertices, faces = (np.asarray(rows) for rows in sphere())
+    corners = vertices[faces].reshape(-1, 3)
+    rows = np.arange(len(corners)).reshape(-1, 3)
+    assert bth.bake.world_mesh(bth.compile((corners, rows), deformable=True)).closed()
+    assert not bth.bake.world_mesh(bth.compile((corners, rows[1:]), deformable=True)).closed()
     with pytest.raises(bth.Error, match="BTH-P001"):
         bth.bake.sdf(bth.compile((np.zeros((0, 3)), np.zeros((0, 3), int))))

@@ -48,12 +48,28 @@ class WorldMesh:
         return np.einsum("...c,...ck->...k", weights, corners) if corners.ndim > faces.ndim else np.einsum("...c,...c->...", weights, corners)
 
     def closed(self) -> bool:
-        """Whether each edge of a face is that of another one in the other direction, so that there is an inside."""
-        edges = self.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+        """Whether each edge of a face is that of another one in the other direction, so that there is an inside.
+
+        Vertices of an instance at one place are one: deformable objects keep those of their source, of STL files three for each triangle.
+        """
+        return self._closed(self.faces) or self._closed(self._by_place()[self.faces])
+
+    def _closed(self, faces: NDArray[np.int64]) -> bool:
+        edges = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
         edges = edges[edges[:, 0] != edges[:, 1]]
         there = np.sort(edges[:, 0] * len(self.vertices) + edges[:, 1])
         back = np.sort(edges[:, 1] * len(self.vertices) + edges[:, 0])
         return len(edges) > 0 and bool((there == back).all())
+
+    def _by_place(self) -> NDArray[np.int64]:
+        """For each vertex a number that it shares with those at the same place of the same instance alone."""
+        instance = np.zeros(len(self.vertices), np.int64)
+        instance[self.faces] = self.instance[:, None]
+        order = np.lexsort((*self.vertices.T, instance))
+        places = np.column_stack([instance, self.vertices])[order]
+        numbers = np.empty(len(order), np.int64)
+        numbers[order] = np.cumsum(np.append([False], (places[1:] != places[:-1]).any(axis=1))[: len(order)])
+        return numbers
 
 
 def visible_instances(scene: Scene) -> Iterator[tuple[int, int, Floats]]:

@@ -209,6 +209,29 @@ fn info_lists_groups_and_materials() {
 }
 
 #[test]
+fn info_tells_objects_apart_with_the_bytes_of_each() {
+    let manifest = "version = 1\n\
+        objects = [{ name = \"ball\", model = \"ball.obj\" }, { name = \"flat\", model = \"flat.obj\" }]\n\
+        nodes = [{ name = \"a\", object = \"ball\" }, { name = \"b\", object = \"flat\" }]\n";
+    let flat = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    let folder = folder(&[("ball.obj", &sphere(12)), ("flat.obj", flat), ("two.manifest", manifest)]);
+    bthc(folder.path(), &["compile", "two.manifest", "--names"]).expect(0);
+    let json = bthc(folder.path(), &["info", "two.bth", "--json"]).expect(0).json();
+    let text = bthc(folder.path(), &["info", "two.bth"]).expect(0).stdout;
+    let values = |name: &str| -> Vec<String> {
+        text.lines().filter_map(|line| Some(line.strip_prefix(name)?.trim().replace(',', ""))).collect()
+    };
+    assert_eq!(values("object  "), ["0 ball", "1 flat"], "{text}");
+    let numbers =
+        |name: &str| values(name).iter().map(|text| text.parse::<f64>().unwrap()).collect::<Vec<_>>();
+    let each = numbers("bytes a triangle").into_iter().zip(numbers("triangles  "));
+    let total: f64 = each.map(|(bytes, triangles)| bytes * triangles).sum();
+    // The text has one digit behind the point.
+    let rounding = 0.05 * (4 * 12 * 11 + 1) as f64;
+    assert!((total - json["resident_bytes"].as_f64().unwrap()).abs() <= rounding, "{total} {text}");
+}
+
+#[test]
 fn completions_and_manual_are_printed() {
     let folder = folder(&[]);
     let programs = [

@@ -11,6 +11,7 @@ use bth_format::File;
 use bth_format::layout::kind;
 use bth_format::layout::{
     FREE_BINS, FREE_SECTORS, FreeBins, FreeSectors, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE, RecordKind,
+    SectionEntry,
 };
 use bth_format::object::ObjectView;
 use bth_import::gltf::scene::{self, ImportOptions};
@@ -214,40 +215,8 @@ fn summary(file: &File) -> Result<String, Failure> {
     facts.row(["content id", &hex(&file.content_id()[..16])]);
     facts.row(["file", &bytes(header.file_length)]);
     facts.row(["traversal reads", &bytes(file.resident_bytes())]);
-    for i in 0..file.object_count() {
-        let view = file.object(i)?;
-        facts.row(["triangles", &count(view.header.triangles.into())]);
-        facts.row(["dropped", &count(view.header.dropped.into())]);
-        facts.row(["depth", &count(view.header.depth.into())]);
-        if let Some(grid) = &view.grid {
-            facts.row(["coordinates", &format!("{} bits", grid.bits as u32)]);
-            facts.row(["vertices moved by at most", &view.header.displacement.to_string()]);
-        }
-        if view.has_packed_nodes() {
-            facts.row(["boxes of nodes", "8 bits"]);
-        }
-        if let Some(Holes { triangles, shares: [opaque, transparent, unknown] }) = holes(&view) {
-            facts.row(["triangles with holes", &count(triangles)]);
-            let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-            facts.row(["  of their area opaque", &percent(opaque)]);
-            facts.row(["  transparent", &percent(transparent)]);
-            facts.row(["  unknown", &percent(unknown)]);
-        }
-        let sequence = file.sequence(i);
-        if let ([first, ..], [.., last]) = (sequence.times, sequence.times) {
-            let frames = format!("{} from {first} to {last} s", sequence.times.len());
-            facts.row(["frames of its vertices", &frames]);
-        }
-        for segment in sequence.segments {
-            let of = i.saturating_add(segment.object);
-            facts.row(["tree of", &format!("object {of} from {} s", segment.first)]);
-        }
-        facts.row(["tet leaves", &count(view.tet_leaves.len() as u64)]);
-        facts.row(["triangles in tet leaves", &count(view.tet_faces.len() as u64)]);
-        facts.row(["tetrahedra", &count(view.records.len() as u64)]);
-        facts.row(["record", record(&view)]);
-        let per_triangle = file.resident_bytes() as f64 / f64::from(view.header.triangles.max(1));
-        facts.row(["bytes a triangle", &format!("{per_triangle:.1}")]);
+    for object in 0..file.object_count() {
+        add_object(&mut facts, file, object)?;
     }
     if let Some(view) = file.check_scene()? {
         let scene = &view.scene[0];
@@ -268,6 +237,50 @@ fn summary(file: &File) -> Result<String, Failure> {
     }
     let made = file.provenance().map_or(String::new(), |text| format!("\n{}\n", printable(text)));
     Ok(format!("{}\n{}{}{made}", facts.render(), groups_table(file)?, sections.render()))
+}
+
+/// Adds the facts of an object, behind a row that tells which it is where the file has several.
+fn add_object(facts: &mut Table, file: &File, object: u32) -> Result<(), Failure> {
+    let view = file.object(object)?;
+    if file.object_count() > 1 {
+        let name = file.object_name(object).escape_debug();
+        facts.row(["object", format!("{object} {name}").trim_end()]);
+    }
+    facts.row(["triangles", &count(view.header.triangles.into())]);
+    facts.row(["dropped", &count(view.header.dropped.into())]);
+    facts.row(["depth", &count(view.header.depth.into())]);
+    if let Some(grid) = &view.grid {
+        facts.row(["coordinates", &format!("{} bits", grid.bits as u32)]);
+        facts.row(["vertices moved by at most", &view.header.displacement.to_string()]);
+    }
+    if view.has_packed_nodes() {
+        facts.row(["boxes of nodes", "8 bits"]);
+    }
+    if let Some(Holes { triangles, shares: [opaque, transparent, unknown] }) = holes(&view) {
+        facts.row(["triangles with holes", &count(triangles)]);
+        let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+        facts.row(["  of their area opaque", &percent(opaque)]);
+        facts.row(["  transparent", &percent(transparent)]);
+        facts.row(["  unknown", &percent(unknown)]);
+    }
+    let sequence = file.sequence(object);
+    if let ([first, ..], [.., last]) = (sequence.times, sequence.times) {
+        let frames = format!("{} from {first} to {last} s", sequence.times.len());
+        facts.row(["frames of its vertices", &frames]);
+    }
+    for segment in sequence.segments {
+        let of = object.saturating_add(segment.object);
+        facts.row(["tree of", &format!("object {of} from {} s", segment.first)]);
+    }
+    facts.row(["tet leaves", &count(view.tet_leaves.len() as u64)]);
+    facts.row(["triangles in tet leaves", &count(view.tet_faces.len() as u64)]);
+    facts.row(["tetrahedra", &count(view.records.len() as u64)]);
+    facts.row(["record", record(&view)]);
+    let own = |e: &&SectionEntry| e.object == object && kind::is_traced(e.kind);
+    let traced: u64 = file.sections().map(|s| s.entry).filter(own).map(|e| e.length).sum();
+    let per_triangle = traced as f64 / f64::from(view.header.triangles.max(1));
+    facts.row(["bytes a triangle", &format!("{per_triangle:.1}")]);
+    Ok(())
 }
 
 /// JSON without characters that would change the state of a terminal.

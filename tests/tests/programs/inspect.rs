@@ -209,6 +209,30 @@ fn info_lists_groups_and_materials() {
 }
 
 #[test]
+fn verify_tells_of_which_objects_the_file_keeps_the_source() {
+    let objects = ["kept", "dropped"].map(|name| format!("{{ name = \"{name}\", file = \"{name}.bth\" }}"));
+    let nodes = ["kept", "dropped"].map(|name| format!("{{ name = \"{name}\", object = \"{name}\" }}"));
+    let manifest =
+        format!("version = 1\nobjects = [{}]\nnodes = [{}]\n", objects.join(", "), nodes.join(", "));
+    let folder = folder(&[("a.obj", &sphere(6)), ("both.manifest", &manifest)]);
+    let path = folder.path();
+    bthc(path, &["compile", "a.obj", "-o", "kept.bth"]).expect(0);
+    bthc(path, &["compile", "a.obj", "-o", "dropped.bth", "--no-geometry"]).expect(0);
+    bthc(path, &["compile", "both.manifest"]).expect(0);
+    for (name, last) in [
+        ("kept.bth", "verified; compared with the source's triangles\n"),
+        ("dropped.bth", "verified; the file keeps no source to compare with\n"),
+        (
+            "both.bth",
+            "verified; 1 of 2 objects compared with the source's triangles, which the file keeps of no others\n",
+        ),
+    ] {
+        let text = bthc(path, &["verify", name]).expect(0).stdout;
+        assert!(text.ends_with(last), "{text}");
+    }
+}
+
+#[test]
 fn info_tells_objects_apart_with_the_bytes_of_each() {
     let manifest = "version = 1\n\
         objects = [{ name = \"ball\", model = \"ball.obj\" }, { name = \"flat\", model = \"flat.obj\" }]\n\

@@ -79,11 +79,12 @@ fn summary(report: &Report, deep: Option<deep::Report>) -> String {
         table.row(["hits", &count(deep.hits)]);
         table.row(["known directions", &count(deep.known)]);
     }
-    let compared = report.compared_with_source == report.objects;
-    let source = if compared {
-        "compared with the source's triangles"
-    } else {
-        "the file keeps no source to compare with"
+    let source = match (report.compared_with_source, report.objects) {
+        (compared, objects) if compared == objects => "compared with the source's triangles".to_owned(),
+        (0, _) => "the file keeps no source to compare with".to_owned(),
+        (compared, objects) => format!(
+            "{compared} of {objects} objects compared with the source's triangles, which the file keeps of no others"
+        ),
     };
     format!("{}verified; {source}\n", table.render())
 }

@@ -4,7 +4,7 @@ use crate::args::Diff;
 use crate::failure::Failure;
 use crate::output;
 use crate::table::bytes;
-use bth_format::layout::{NONE, SectionEntry};
+use bth_format::layout::{NONE, SectionEntry, kind};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -49,8 +49,8 @@ struct Difference {
 
 impl Difference {
     fn name(&self) -> String {
-        let kind = bth_format::layout::kind::name(self.kind).to_owned();
-        if self.object == NONE { kind } else { format!("object {}, {kind}", self.object) }
+        let kind = kind::name(self.kind);
+        if self.object == NONE { kind.to_owned() } else { format!("object {}, {kind}", self.object) }
     }
 
     fn line(&self) -> String {
@@ -60,7 +60,7 @@ impl Difference {
 
     fn json(&self) -> Value {
         let object = (self.object != NONE).then_some(self.object);
-        json!({"object": object, "kind": self.kind, "bytes": self.bytes})
+        json!({"object": object, "kind": kind::name(self.kind), "bytes": self.bytes})
     }
 }
 

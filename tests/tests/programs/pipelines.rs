@@ -211,6 +211,10 @@ fn a_dry_run_says_what_would_be_done_and_does_nothing() {
     std::fs::write(path.join("a.obj"), sphere(9)).unwrap();
     assert_eq!(dry(&[]), "a.bth: compile (source)\n");
     assert_eq!(dry(&["--no-cache"]), "a.bth: compile (no cache)\n");
+    let scene = "version = 1\nobjects = [{ name = \"a\", model = \"a.obj\" }]\nnodes = [{ name = \"a\", object = \"a\" }]\n";
+    std::fs::write(path.join("s.manifest"), scene).unwrap();
+    let of_scene = run(&["compile", "s.manifest", "--dry-run", "--no-cache"]).expect(0).stdout;
+    assert_eq!(of_scene, "s.bth: compile (no cache)\n  a.obj flat: compile\n");
 }
 
 #[test]

@@ -23,11 +23,9 @@ pub(super) fn show(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -
         };
         let found = found.map_err(|failure| job.failure(failure))?;
         let (what, why) = action(context, job, &found);
-        let why = why.join(", ");
-        let behind = if why.is_empty() { String::new() } else { format!(" ({why})") };
-        text.push_str(&format!("{}: {what}{behind}\n", job.target.name()));
+        text.push_str(&format!("{}: {what}{}\n", job.target.name(), in_parentheses(why)));
         for part in &found.parts {
-            text.push_str(&format!("  {}: compile ({})\n", part.part, part.because.join(", ")));
+            text.push_str(&format!("  {}: compile{}\n", part.part, in_parentheses(&part.because)));
         }
         reports.push(json!({
             "model": job.name(),
@@ -43,6 +41,11 @@ pub(super) fn show(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -
         return Ok(output::json(&json!({ "jobs": reports }))?);
     }
     Ok(output::text(&text)?)
+}
+
+/// Reasons behind what is done for them; nothing where there are none, as for the parts of a scene without a cache.
+fn in_parentheses(reasons: &[String]) -> String {
+    if reasons.is_empty() { String::new() } else { format!(" ({})", reasons.join(", ")) }
 }
 
 fn action<'a>(context: &JobContext<'_>, job: &Job, found: &'a DryRun) -> (&'static str, &'a [String]) {

@@ -59,7 +59,8 @@ impl Failure {
         let (exit_code, message) = match self {
             Self::Usage { message, hint } => (2, format!("BTH-U001: {message} (hint: {hint})")),
             Self::File { path, source } => {
-                (4, format!("{}: BTH-O020: cannot write: {source}", path.display()))
+                let hint = "name a folder that is there and may be written, on a disk that has room";
+                (4, format!("{}: BTH-O020: cannot write: {source} (hint: {hint})", path.display()))
             }
             Self::ClosedOutput => return ExitCode::SUCCESS,
         };

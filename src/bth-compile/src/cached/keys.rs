@@ -17,7 +17,7 @@ use serde::Serialize;
 use std::path::Path;
 
 /// Versions of the results of the stages.
-const MESH: &str = "6";
+const MESH: &str = "7";
 const COORDINATES: &str = "1";
 const BVH: &str = "3";
 const FREE: &str = "6";

@@ -204,10 +204,22 @@ pub(super) fn read(source: &Source<'_>) -> Result<Header> {
             [b"format", name, version] if reader.encoding.is_none() => reader.format(name, version)?,
             [b"element", name, count] => reader.element(name, count)?,
             [b"property", ref rest @ ..] => reader.property(rest)?,
-            [b"end_header"] => return reader.finish(lines.position()),
+            [b"end_header"] => {
+                let body = body(source.data, lines.position(), reader.encoding);
+                return reader.finish(body);
+            }
             _ => return Err(reader.malformed("format, element, property, comment or end_header")),
         }
     }
+}
+
+/// The byte at which the body begins, given that behind the line `end_header`. Where the lines of a header end with CR alone, so does
+/// that one, and an LF behind it is the first byte of a binary body.
+fn body(data: &[u8], after: usize, encoding: Option<Encoding>) -> usize {
+    let first = data.iter().position(|c| matches!(c, b'\r' | b'\n')).unwrap_or(data.len());
+    let ends_with_cr = data[first..].starts_with(b"\r") && !data[first..].starts_with(b"\r\n");
+    let takes_lf = encoding != Some(Encoding::Ascii) && data[..after].ends_with(b"\r\n");
+    if ends_with_cr && takes_lf { after - 1 } else { after }
 }
 
 impl HeaderReader<'_, '_> {

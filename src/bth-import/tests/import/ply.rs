@@ -38,6 +38,23 @@ fn text_and_both_byte_orders_give_the_same_fans_in_file_order() {
 }
 
 #[test]
+fn a_body_may_begin_with_a_line_feed_behind_a_header_of_carriage_returns() {
+    // The coordinate whose least byte is an LF.
+    let first = f32::from_bits(0x3f80_000a);
+    for end in ["\r", "\n", "\r\n"] {
+        let head = "ply|format binary_little_endian 1.0|element vertex 3|property float x|property float y|property float z|\
+            element face 1|property list uchar uchar vertex_indices|end_header|";
+        let mut bytes = head.replace('|', end).into_bytes();
+        for x in [first, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 1.0, 0.0] {
+            bytes.extend(x.to_le_bytes());
+        }
+        bytes.extend([3, 0, 1, 2]);
+        let (mesh, _) = import_bytes("a.ply", &bytes, Keep::None).unwrap();
+        assert_eq!(mesh.positions, [[first, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0]], "{end:?}");
+    }
+}
+
+#[test]
 fn double_coordinates_are_rounded_and_other_elements_passed_over() {
     let head = "element junk 2\nproperty list uchar double many\nproperty char c\nelement edge 1\n\
         property int vertex1\nproperty int vertex2\nelement vertex 3\nproperty double x\nproperty double y\n\

@@ -148,6 +148,12 @@ fn clips_that_one_topology_would_make_dear_are_divided_and_answer_the_same() {
     let motion = report.objects[0].motion.as_ref().unwrap();
     assert!(motion.segments.len() > 1, "{motion:?}");
     assert_eq!(report.objects.len(), motion.segments.len());
+    // Trees for later times are no objects and triangles of their own.
+    let counted = |report: &SceneReport| {
+        let segments = report.objects.iter().filter(|object| object.segment_from.is_some()).count();
+        (report.triangles, report.objects.len() - segments)
+    };
+    assert_eq!(counted(&report), (triangles.len() as u64, 1));
     assert_eq!(file.sequence(0).segments.len(), motion.segments.len());
     let one = CompileOptions { motion: MotionOptions { poses: 4, segments: 1 }, ..options() };
     let (_, whole) = built(&text, folder.path(), &one);
@@ -166,7 +172,8 @@ fn clips_that_one_topology_would_make_dear_are_divided_and_answer_the_same() {
     let copy = format!(
         "objects = [{{ name = \"quad\", file = \"done.bth\" }}, {{ name = \"knot\", file = \"done.bth\" }}]\n{NODE}"
     );
-    let (copied, _) = built(&copy, folder.path(), &options());
+    let (copied, report) = built(&copy, folder.path(), &options());
+    assert_eq!(counted(&report), (triangles.len() as u64, 1));
     assert_eq!(
         copied.sequence(0).segments,
         bth_format::File::from_bytes(&bytes).unwrap().sequence(0).segments

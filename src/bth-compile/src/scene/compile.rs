@@ -287,7 +287,7 @@ fn report(
         first_frame: manifest.frames.first,
         last_frame: manifest.frames.last,
         rate: manifest.frames.rate,
-        triangles: objects.reports.iter().map(|o| o.triangles).sum(),
+        triangles: objects.reports.iter().filter(|o| o.segment_from.is_none()).map(|o| o.triangles).sum(),
         instanced_triangles: parts.instances.iter().map(|i| triangles(i.object)).sum(),
         bytes,
         resident_bytes: objects.reports.iter().map(|o| o.resident_bytes).sum(),

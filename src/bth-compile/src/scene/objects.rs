@@ -202,8 +202,9 @@ fn copy(objects: &mut Objects, places: &mut Places<'_>, manifest: &Manifest, fil
             let one = |object: u32, report| {
                 (ObjectSections::InFile { file: read.clone(), object, made: None }, report)
             };
-            let behind = (1..read.sequence(object).segments.len() as u32).map(|segment| {
-                one(object + segment, ObjectReport { copied: true, ..ObjectReport::default() })
+            let behind = (1..).zip(segments.iter().skip(1)).map(|(number, segment)| {
+                let segment_from = Some(segment.first);
+                one(object + number, ObjectReport { segment_from, copied: true, ..ObjectReport::default() })
             });
             let first = one(object, report);
             places.stored.push(Some(std::iter::once(first).chain(behind).collect()));

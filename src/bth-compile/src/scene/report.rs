@@ -61,7 +61,7 @@ pub struct SceneReport {
     pub last_frame: i32,
     /// Frames per second.
     pub rate: f64,
-    /// Triangles of all objects.
+    /// Triangles of all objects; those of segments are the same as of the objects before them.
     pub triangles: u64,
     /// Triangles of all instances.
     pub instanced_triangles: u64,

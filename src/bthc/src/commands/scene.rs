@@ -172,8 +172,9 @@ fn summary(report: &SceneReport) -> String {
     let mut facts = Table::default();
     facts.row(["nodes", &count(report.nodes)]);
     facts.row(["instances", &count(report.instances)]);
-    facts.row(["objects", &count(report.objects.len() as u64)]);
-    // Objects of later ranges of time have no name of their own.
+    // Objects of later ranges of time are not counted, and have no name of their own.
+    let objects = report.objects.iter().filter(|object| object.segment_from.is_none()).count();
+    facts.row(["objects", &count(objects as u64)]);
     let stored_once = report.objects.iter().map(|object| object.names.len().saturating_sub(1) as u64).sum();
     row_unless_zero(&mut facts, "objects of equal geometry, stored once", stored_once);
     row_unless_zero(&mut facts, "objects that nobody sees, left out", report.unused.len() as u64);

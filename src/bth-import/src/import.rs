@@ -215,7 +215,7 @@ fn finish(mut raw: Raw<'_>, wanted: Wanted, monitor: &dyn Monitor) -> Result<(Me
     let deformation = Some(deformation.finish(&sources, &normal_sources));
     let left_out = welded.non_finite_unused;
     let (mesh, counted) = count(welded, triangles, (raw.positions.len(), attributes), monitor)?;
-    warn_not_finite(left_out, "are left out", monitor);
+    warn_not_finite(left_out, false, monitor);
     Ok((Mesh { groups, materials, deformation, ..mesh }, report(&raw, counted)))
 }
 
@@ -238,8 +238,7 @@ pub(crate) fn weld_and_count(
 ) -> Result<(Mesh, Report)> {
     let unwelded = wanted.vertices.then(|| triangles.clone());
     let welded = weld::weld(positions, &mut triangles).map_err(not_finite)?;
-    let fate = if wanted.vertices { "are kept as zeros" } else { "are left out" };
-    warn_not_finite(welded.non_finite_unused, fate, monitor);
+    warn_not_finite(welded.non_finite_unused, wanted.vertices, monitor);
     let (mut mesh, report) = count(welded, triangles, (positions.len(), attributes), monitor)?;
     if let Some(triangles) = unwelded {
         (mesh.positions, mesh.triangles) = (positions.iter().map(kept_vertex).collect(), triangles);
@@ -247,9 +246,10 @@ pub(crate) fn weld_and_count(
     Ok((mesh, report))
 }
 
-/// Warns of positions that are not finite and that no face uses.
-fn warn_not_finite(count: u64, fate: &str, monitor: &dyn Monitor) {
+/// Warns of positions that are not finite and that no face uses; whether they are kept all the same.
+pub(crate) fn warn_not_finite(count: u64, kept: bool, monitor: &dyn Monitor) {
     if count > 0 {
+        let fate = if kept { "are kept as zeros" } else { "are left out" };
         monitor.warn(&format!("{count} positions are not finite; no face uses them, they {fate}"));
     }
 }

@@ -3,8 +3,9 @@
 use super::weld::weld;
 use super::{MISMATCH, Timing, check_times};
 use crate::attributes;
+use crate::coordinate_range;
 use crate::error::{Error, Place, Result};
-use crate::import::{Format, format, read_raw};
+use crate::import::{Format, format, read_raw, warn_not_finite};
 use crate::mesh::{Attributes, Keep, Mesh, Report, Sequence, Wanted};
 use crate::monitor::Monitor;
 use crate::raw::{Raw, check_rows, check_triangles};
@@ -141,6 +142,8 @@ pub(super) fn finish(
         )
     })?;
     monitor.check()?;
+    let left_out = not_finite(&frames, raw.positions.len());
+    warn_not_finite(left_out, wanted.vertices, monitor);
     let read = raw.positions.len() as u64;
     let mut positions = Vec::with_capacity(kept.len() * frames.len());
     for frame in frames {
@@ -158,6 +161,7 @@ pub(super) fn finish(
         sequence: Some(Sequence { times, positions }),
         ..Mesh::default()
     };
+    coordinate_range::warn(&mesh, monitor);
     let counts = topology(&mesh);
     let report = Report {
         format,
@@ -172,10 +176,20 @@ pub(super) fn finish(
         boundary_edges: counts.boundary_edges,
         non_manifold_edges: counts.non_manifold_edges,
         components: counts.components,
+        non_finite_unused: left_out,
         frames: mesh.sequence.as_ref().map_or(0, |sequence| sequence.times.len() as u64),
         ..Report::default()
     };
     Ok((mesh, report))
+}
+
+/// Number of vertices that are not finite in some frame, which no triangle uses.
+fn not_finite(frames: &[Vec<[f32; 3]>], vertices: usize) -> u64 {
+    let mut found = vec![false; vertices];
+    for frame in frames {
+        found.iter_mut().zip(frame).for_each(|(found, p)| *found |= !p.iter().all(|x| x.is_finite()));
+    }
+    found.into_iter().filter(|found| *found).count() as u64
 }
 
 /// The rows of the source that are kept: all of them, or one for each vertex that differs from others in some frame and is used.

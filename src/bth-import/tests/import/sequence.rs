@@ -50,6 +50,25 @@ fn concave_polygons_are_split_as_in_the_first_frame() {
     assert!(listener.0.into_inner().unwrap()[0].starts_with("1 polygon is concave: "));
 }
 
+/// As of single models.
+#[test]
+fn what_no_face_uses_and_is_not_finite_is_told_and_so_are_coordinates_far_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let frame = |x: &str, unused: &str| format!("v 0 0 0\nv {x} 0 0\nv 0 1 0\nv {unused} 0 0\nf 1 2 3\n");
+    let frames = [frame("1e15", "1"), frame("1e15", "nan"), frame("1e15", "inf")];
+    let files: Vec<_> =
+        ["1.obj", "2.obj", "3.obj"].into_iter().zip(frames.iter().map(String::as_bytes)).collect();
+    let files = write(folder.path(), &files);
+    for (vertices, fate) in [(false, "are left out"), (true, "are kept as zeros")] {
+        let listener = Listener::default();
+        let (mesh, report) =
+            import_sequence(&files, &TIMING, Wanted { vertices, ..PLAIN }, &listener).unwrap();
+        assert_eq!((mesh.positions.len(), report.non_finite_unused), (if vertices { 4 } else { 3 }, 1));
+        assert!(listener.heard(&format!("1 positions are not finite; no face uses them, they {fate}")));
+        assert!(listener.heard("1.1e12 (2^40)"), "{:?}", listener.0);
+    }
+}
+
 #[test]
 fn frames_become_one_mesh_whose_vertices_are_welded_where_all_frames_agree() {
     let folder = tempfile::tempdir().unwrap();

@@ -386,6 +386,53 @@ fn warnings_are_those_of_the_first_compilation() {
     }
 }
 
+/// Warnings about the files of a scene name them, and none is lost or about another file, whatever comes from the cache.
+#[test]
+fn warnings_of_scenes_name_the_files() {
+    let model = "v 9 9 nan\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\np 2\n";
+    let other = model.replace("v 1 0 0", "v 2 0 0");
+    let two = |first: &str, x: u32| {
+        format!(
+            "version = 1\nobjects = [{{ name = \"a\", model = \"{first}.obj\" }}, {{ name = \"b\", model = \"b.obj\" }}]\n\
+            nodes = [{{ name = \"a\", object = \"a\" }}, {{ name = \"b\", object = \"b\", translation = [{x}, 0, 0] }}]\n"
+        )
+    };
+    let (of_a, of_c) = (two("a", 1), two("c", 2));
+    let folder = folder(&[
+        ("a.obj", model),
+        ("b.obj", &other),
+        ("c.obj", model),
+        ("a.manifest", &of_a),
+        ("c.manifest", &of_c),
+    ]);
+    let path = folder.path();
+    let warned = |model: &str| {
+        let json = cached(path, &["compile", model, "--json"]).expect(0).json();
+        let texts = json["warnings"].as_array().unwrap().iter().map(|text| text.as_str().unwrap().to_owned());
+        let mut texts: Vec<String> = texts.collect();
+        texts.sort();
+        texts
+    };
+    let about = |file: &str| {
+        let left_out = "1 elements are left out: points, lines and faces of fewer than three corners";
+        let not_finite = "1 positions are not finite; no face uses them, they are left out";
+        [left_out, not_finite].map(|text| format!("{file}: {text}"))
+    };
+    // Results of a model that is compiled by itself have no name.
+    assert_eq!(warned("c.obj"), [about("c.obj")[1].trim_start_matches("c.obj: ")]);
+    let of_both = [about("a.obj"), about("b.obj")].concat();
+    assert_eq!(warned("a.manifest"), of_both);
+    assert_eq!(warned("a.manifest"), of_both, "of a scene that has not changed");
+    std::fs::write(path.join("b.obj"), other.replace("v 2 0 0", "v 3 0 0")).unwrap();
+    assert_eq!(warned("a.manifest"), of_both, "with an object of the file that was there");
+    assert_eq!(
+        warned("c.manifest"),
+        [about("b.obj"), about("c.obj")].concat(),
+        "of a file of the same content"
+    );
+    assert_eq!(warned("a.obj"), [about("a.obj")[1].trim_start_matches("a.obj: ")]);
+}
+
 #[test]
 fn options_without_effect_are_told() {
     let folder = folder(&[("a.obj", &sphere(4)), ("s.manifest", "version = 1\n")]);

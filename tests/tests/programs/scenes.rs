@@ -351,14 +351,15 @@ fn objects_that_no_ray_comes_near_are_not_touched() {
 #[test]
 fn scenes_tell_what_they_leave_out() {
     let manifest = r#"version = 1
-objects = [{ name = "o", model = "o.obj" }]
-nodes = [{ name = "a", object = "o" }, { name = "flat", object = "o", scale = [1, 0, 1] }]
+objects = [{ name = "o", model = "o.obj" }, { name = "moves", sequence = ["p.obj", "q.obj"] }]
+nodes = [{ name = "a", object = "o" }, { name = "flat", object = "o", scale = [1, 0, 1] }, { name = "m", object = "moves" }]
 "#;
-    let folder =
-        folder(&[("o.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\np 1\nl 1 2\n"), ("s.manifest", manifest)]);
+    let model = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\np 1\nl 1 2\n";
+    let moved = model.replace("v 1 0 0", "v 2 0 0");
+    let folder = folder(&[("o.obj", model), ("p.obj", model), ("q.obj", &moved), ("s.manifest", manifest)]);
     let run = run("bthc", folder.path(), &["compile", "s.manifest", "--json"]).expect(0);
     let warnings = run.json()["warnings"].to_string();
-    for text in ["o.obj: 2 elements are left out", "node \\\"flat\\\""] {
+    for text in ["o.obj: 2 elements are left out", "p.obj: 2 elements are left out", "node \\\"flat\\\""] {
         assert!(warnings.contains(text), "{warnings}");
     }
 }

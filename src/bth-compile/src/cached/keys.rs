@@ -33,7 +33,7 @@ const DEFORMABLE: &str = "1";
 /// Version of how objects are compiled whose vertices move by themselves.
 pub(crate) const MOTION: &str = "1";
 const FILE: &str = "3";
-const OUTLINE: &str = "1";
+const OUTLINE: &str = "2";
 
 /// A mesh read from a model. A supported extension determines the format in which the file is read.
 pub(crate) fn mesh(source: &SourceDigest, path: &Path, part: &str, wanted: Wanted) -> Key {

@@ -25,4 +25,4 @@ pub(crate) use compile::{compile_or_fetch, compile_triangles, joined, tetgen_in_
 pub(crate) use keys::{MOTION, ObjectKeys, extension, file_index, mesh, scene};
 pub(crate) use rows::{HashedRows, RowReader, RowWriter};
 pub(crate) use stages::CachedStages;
-pub(crate) use warnings::replay;
+pub(crate) use warnings::{replay, warnings};

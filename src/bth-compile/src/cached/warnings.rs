@@ -19,8 +19,12 @@ pub(super) fn with_warnings(report: &impl Serialize, recording: &Recording<'_>) 
     Ok(report)
 }
 
+/// The warnings that are kept with a report.
+pub(crate) fn warnings(report: &Value) -> impl Iterator<Item = &str> {
+    report[KEY].as_array().into_iter().flatten().filter_map(Value::as_str)
+}
+
 /// Gives again the warnings that are kept with a report.
 pub(crate) fn replay(report: &Value, monitor: &dyn Monitor) {
-    let warnings = report[KEY].as_array().into_iter().flatten();
-    warnings.filter_map(Value::as_str).for_each(|message| monitor.warn(message));
+    warnings(report).for_each(|message| monitor.warn(message));
 }

@@ -6,7 +6,7 @@ use crate::cached::{Codec, RowReader, RowWriter};
 use crate::tets::WorkerStatus;
 use bth_format::layout as on_disk;
 use bth_format::layout::ALIGNMENT;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 /// BLAKE3 of an object's content, or of the identity of a part of a source.
@@ -66,6 +66,8 @@ pub(super) struct FileIndex {
     pub(super) formats: Vec<String>,
     /// Statuses of the worker; objects that needed no worker refer to `None`.
     pub(super) workers: Vec<Option<WorkerStatus>>,
+    /// What was warned of while parts were read, by their rows; most have nothing.
+    pub(super) warnings: BTreeMap<u32, Vec<String>>,
     by_content: HashMap<Hash, u32>,
     by_part: HashMap<Hash, u32>,
 }
@@ -85,9 +87,10 @@ impl FileIndex {
         self.by_content.get(content).copied()
     }
 
-    /// The row of a part of a source.
-    pub(super) fn part(&self, part: &Hash) -> Option<&PartRow> {
-        self.parts.get(*self.by_part.get(part)? as usize)
+    /// The row of a part of a source, and what was warned of while it was read.
+    pub(super) fn part(&self, part: &Hash) -> Option<(&PartRow, &[String])> {
+        let row = *self.by_part.get(part)?;
+        Some((self.parts.get(row as usize)?, self.warnings.get(&row).map_or(&[], Vec::as_slice)))
     }
 
     /// The sections of an object.
@@ -139,15 +142,16 @@ impl Codec for FileIndex {
         to.add(&self.objects);
         to.add(&self.sections);
         to.add(&self.parts);
-        // Names and statuses can always be expressed in JSON.
-        to.add(&serde_json::to_vec(&(&self.formats, &self.workers)).unwrap_or_default());
+        // Names, statuses and warnings can always be expressed in JSON.
+        let words = (&self.formats, &self.workers, &self.warnings);
+        to.add(&serde_json::to_vec(&words).unwrap_or_default());
     }
 
     fn read(from: &mut RowReader<'_>) -> Option<Self> {
         let (objects, sections, parts) = (from.take()?, from.take()?, from.take()?);
         let words: Vec<u8> = from.take()?;
-        let (formats, workers) = serde_json::from_slice(&words).ok()?;
-        let mut index = Self { objects, sections, parts, formats, workers, ..Self::default() };
+        let (formats, workers, warnings) = serde_json::from_slice(&words).ok()?;
+        let mut index = Self { objects, sections, parts, formats, workers, warnings, ..Self::default() };
         let numbered = |hashes: &mut dyn Iterator<Item = Hash>| hashes.zip(0..).collect();
         index.by_content = numbered(&mut index.objects.iter().map(|row| row.content));
         index.by_part = numbered(&mut index.parts.iter().map(|row| row.part));
@@ -181,6 +185,7 @@ mod tests {
             parts: vec![PartRow { part: [2; 32], object: 0, format: 0 }],
             formats: vec!["obj".into()],
             workers: vec![None],
+            warnings: BTreeMap::from([(0, vec!["left out".into()])]),
             ..FileIndex::default()
         }
     }
@@ -189,7 +194,8 @@ mod tests {
     fn an_index_comes_back_and_is_searched() {
         let back: FileIndex = decode(&encode(&index())).unwrap();
         assert_eq!((back.object_of(&[1; 32]), back.object_of(&[2; 32])), (Some(0), None));
-        assert_eq!(back.part(&[2; 32]).map(|part| part.object), Some(0));
+        let part = back.part(&[2; 32]).map(|(row, warnings)| (row.object, warnings));
+        assert_eq!(part, Some((0, &["left out".to_owned()][..])));
         assert!(back.part(&[1; 32]).is_none());
         assert_eq!(back.sections_of(0).iter().map(|s| s.offset).collect::<Vec<_>>(), [640, 768]);
         assert_eq!((back.report_of(0).triangles, back.report_of(0).degenerate), (3, 1));

@@ -97,12 +97,14 @@ fn plan<'a>(manifest: &'a Manifest, meshes: &[TriangleMesh<'a>], clock: &mut Clo
     let count = manifest.nodes.len();
     let mut used = vec![false; meshes.len()];
     manifest.nodes.iter().filter_map(|node| node.object).for_each(|object| used[object] = true);
+    let several = used.iter().filter(|used| **used).count() > 1;
     let file = |row: usize| {
         let path = manifest.objects[row].source.path();
         let digest = SourceDigest::of_triangles(meshes[row]);
         let in_memory = Some(meshes[row]);
         File {
             path,
+            shown: several.then_some(path),
             full: path.into(),
             compiled: false,
             parts: vec![(SourcePart::Whole, vec![row])],

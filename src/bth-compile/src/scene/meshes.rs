@@ -2,10 +2,11 @@
 
 use super::context::Context;
 use super::object_key::object_key;
+use super::of_file::OfFile;
 use super::sources::{File, SourcePart};
 use crate::cached::{self, MeshSummary, Miss};
 use crate::error::Result;
-use crate::monitor::Recording;
+use crate::monitor::{Monitor, Recording};
 use crate::opacity;
 use crate::source::TriangleMesh;
 use bth_cache::Key;
@@ -18,7 +19,16 @@ pub(super) struct SourceMesh {
     pub(super) summary: MeshSummary,
     /// The part of the file.
     pub(super) part: SourcePart,
+    /// What was warned of while it was read, without the name of the file.
+    pub(super) warnings: Vec<String>,
     mesh: Option<Mesh>,
+}
+
+/// A mesh that has been imported.
+struct Imported {
+    mesh: Mesh,
+    summary: MeshSummary,
+    warnings: Vec<String>,
 }
 
 /// The meshes of a file that are used, in order. Those that the cache lacks are imported together.
@@ -29,23 +39,39 @@ pub(super) fn read(file: &File<'_>, context: &Context<'_>) -> Result<Vec<SourceM
     // A mesh in memory is not kept: reading it from the cache would take longer than its import.
     let in_cache = |part| match file.in_memory {
         Some(_) => None,
-        None => known(&key(file, part, context), context),
+        None => known(file, part, context),
     };
-    let known: Vec<Option<MeshSummary>> = file.parts.iter().map(|(part, _)| in_cache(*part)).collect();
+    let known: Vec<Option<SourceMesh>> = file.parts.iter().map(|(part, _)| in_cache(*part)).collect();
     let lacking: Vec<SourcePart> =
         file.parts.iter().zip(&known).filter(|(_, k)| k.is_none()).map(|(p, _)| p.0).collect();
     let mut imported = import(file, &lacking, context)?.into_iter();
-    let found = file.parts.iter().zip(known).map(|((part, _), summary)| match summary {
-        Some(summary) => Some(SourceMesh { summary, part: *part, mesh: None }),
-        None => {
-            let (mesh, summary) = imported.next()?;
-            Some(SourceMesh { summary, part: *part, mesh: Some(mesh) })
-        }
+    let found = file.parts.iter().zip(known).map(|((part, _), known)| {
+        known.or_else(|| {
+            let Imported { mesh, summary, warnings } = imported.next()?;
+            Some(SourceMesh { summary, part: *part, warnings, mesh: Some(mesh) })
+        })
     });
-    Ok(found.flatten().collect())
+    let mut meshes: Vec<SourceMesh> = found.flatten().collect();
+    for mesh in &mut meshes {
+        if let Some(warning) = mesh.left_out() {
+            OfFile::new(file, context.monitor).warn(&warning);
+            mesh.warnings.push(warning);
+        }
+    }
+    Ok(meshes)
 }
 
 impl SourceMesh {
+    /// What to warn of where elements of the source became no triangles. It is not kept with the mesh: reports on single models have
+    /// the number.
+    fn left_out(&self) -> Option<String> {
+        let count = Some(self.summary.report.skipped).filter(|count| *count > 0)?;
+        let of = self.part.gltf().map_or_else(String::new, |_| format!("{}: ", self.part.name()));
+        Some(format!(
+            "{of}{count} elements are left out: points, lines and faces of fewer than three corners"
+        ))
+    }
+
     /// The mesh itself.
     ///
     /// # Errors
@@ -60,7 +86,7 @@ impl SourceMesh {
             return Ok(mesh);
         }
         let mut again = import(file, &[self.part], context)?;
-        Ok(again.swap_remove(0).0)
+        Ok(again.swap_remove(0).mesh)
     }
 }
 
@@ -68,12 +94,13 @@ fn key(file: &File<'_>, part: SourcePart, context: &Context<'_>) -> Key {
     cached::mesh(&file.digest, &file.full, &file.part(part), context.options.wanted())
 }
 
-/// The summary of a mesh that the cache has.
-fn known(key: &Key, context: &Context<'_>) -> Option<MeshSummary> {
-    let record = context.cache.find(key, context.monitor)?;
+/// A mesh that the cache has.
+fn known(file: &File<'_>, part: SourcePart, context: &Context<'_>) -> Option<SourceMesh> {
+    let record = context.cache.find(&key(file, part, context), context.monitor)?;
     let summary = MeshSummary::deserialize(&record.report).ok()?;
-    cached::replay(&record.report, context.monitor);
-    Some(summary)
+    cached::replay(&record.report, &OfFile::new(file, context.monitor));
+    let warnings = cached::warnings(&record.report).map(str::to_owned).collect();
+    Some(SourceMesh { summary, part, warnings, mesh: None })
 }
 
 /// The objects of a file that neither the previous file nor the cache has, with the reasons.
@@ -81,7 +108,7 @@ pub(super) fn missing(file: &File<'_>, context: &Context<'_>) -> Vec<Miss> {
     let one = |source_part: SourcePart| {
         let part = file.name_of(source_part);
         let mesh = key(file, source_part, context);
-        let summary = known(&mesh, context);
+        let summary = known(file, source_part, context).map(|mesh| mesh.summary);
         let object = summary.as_ref().and_then(|summary| object_key(summary, source_part, context));
         let (Some(summary), Some(object)) = (summary, object) else {
             let because = context.cache.reasons(&mesh, &part);
@@ -145,17 +172,19 @@ fn with_opacity(
 }
 
 /// Imports meshes of a file and keeps them in the cache.
-fn import(file: &File<'_>, parts: &[SourcePart], context: &Context<'_>) -> Result<Vec<(Mesh, MeshSummary)>> {
+fn import(file: &File<'_>, parts: &[SourcePart], context: &Context<'_>) -> Result<Vec<Imported>> {
     if parts.is_empty() {
         return Ok(Vec::new());
     }
     // The warnings about a file are kept with the first of its meshes.
-    let recording = Recording::new(context.monitor);
+    let of_file = OfFile::new(file, context.monitor);
+    let recording = Recording::new(&of_file);
     let context = &context.with_monitor(&recording);
     let Context { options, monitor, .. } = context;
     if let Some(TriangleMesh { positions, triangles }) = file.in_memory {
         let read = mesh::import_triangles(&file.full, positions, triangles, options.wanted(), *monitor)?;
-        return Ok(vec![MeshSummary::of(read)]);
+        let (mesh, summary) = MeshSummary::of(read);
+        return Ok(vec![Imported { mesh, summary, warnings: recording.warnings() }]);
     }
     if let Some(moving) = &file.moving {
         let read = moving.import(&file.digest, context)?;
@@ -169,12 +198,6 @@ fn import(file: &File<'_>, parts: &[SourcePart], context: &Context<'_>) -> Resul
     };
     let meshes = with_opacity(file, &single, meshes, context)?;
     let meshes = file.digest.unchanged(&file.full, meshes)?;
-    for (part, (_, report)) in parts.iter().zip(&meshes).filter(|(_, (_, report))| report.skipped > 0) {
-        let count = report.skipped;
-        let name = part.gltf().map_or_else(|| file.path.to_string(), |_| file.name_of(*part));
-        let what = "elements are left out: points, lines and faces of fewer than three corners";
-        monitor.warn(&format!("{name}: {count} {what}"));
-    }
     let none = Recording::new(*monitor);
     let keep = |(row, (part, read))| {
         let recording = if row == 0 { &recording } else { &none };
@@ -190,7 +213,7 @@ fn keep_mesh(
     read: (Mesh, mesh::Report),
     context: &Context<'_>,
     recording: &Recording<'_>,
-) -> (Mesh, MeshSummary) {
+) -> Imported {
     let (mesh, summary) = MeshSummary::of(read);
     let cache = context.cache;
     if cache.store().is_some() {
@@ -198,5 +221,5 @@ fn keep_mesh(
         cache.miss(&key(file, part, context), &name);
         cache.put(&key(file, part, context), &name, &cached::encode(&mesh), &summary, recording);
     }
-    (mesh, summary)
+    Imported { mesh, summary, warnings: recording.warnings() }
 }

@@ -1,6 +1,6 @@
 //! The compilation of scenes: manifest → plan (visible nodes, source files) → meshes → objects → file.
 //!
-//! `compile` is the entry, `in_memory` that for meshes in memory; `objects` compiles all objects and `object` one; `sources` and `meshes` read the source files; `clips` gives the
+//! `compile` is the entry, `in_memory` that for meshes in memory; `objects` compiles all objects and `object` one; `sources` and `meshes` read the source files, `of_file` names them in warnings; `clips` gives the
 //! poses of objects that skins and morph targets deform;
 //! `previous`, `file_index` and `sections` reuse the file of an earlier compilation; `encode` lays out the scene itself.
 
@@ -19,6 +19,7 @@ mod moving;
 mod object;
 mod object_key;
 mod objects;
+mod of_file;
 mod parallel;
 mod places;
 mod plan;

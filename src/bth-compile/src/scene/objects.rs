@@ -4,12 +4,14 @@ use super::context::Context;
 use super::file_index::{FileIndex, Hash, ObjectRow, PartRow, SectionRow};
 use super::meshes;
 use super::object::{self, BuiltObject};
+use super::of_file::OfFile;
 use super::parallel::run_parallel;
 use super::places::{Part, Places, Stored, Task, place_of};
 use super::report::ObjectReport;
 use super::sections::ObjectSections;
 use super::sources::{File, SourcePart};
 use crate::error::{Error, Place, Result};
+use crate::monitor::Monitor;
 use crate::pipeline::Clock;
 use crate::tets;
 use crate::write::FileBuilder;
@@ -33,8 +35,20 @@ pub(super) struct Objects {
     pub(super) sources: Vec<(String, String)>,
     /// Status of the worker, where one was needed.
     pub(super) worker: Option<tets::WorkerStatus>,
-    /// For each part of a mesh file the hash that identifies it, its format and its object.
-    parts: Vec<(Hash, String, u32)>,
+    /// The parts of the source files that objects are made from, but of compiled files.
+    parts: Vec<MadePart>,
+}
+
+/// A part of a source file that an object is made from.
+struct MadePart {
+    /// The hash that identifies it.
+    part: Hash,
+    /// Format of the file.
+    format: String,
+    /// What was warned of while it was read.
+    warnings: Vec<String>,
+    /// Number of the object.
+    object: u32,
 }
 
 /// Compiles the objects that are used, or takes them from the previous file or the cache.
@@ -52,17 +66,15 @@ pub(super) fn build(
             copy(&mut objects, &mut places, manifest, file)?;
             continue;
         }
-        let format = match parts.first() {
-            Some(Part::InPrevious(format, _)) => format.clone(),
-            Some(Part::Mesh(mesh)) => mesh.summary.report.format.clone(),
-            None => String::new(),
-        };
+        let format = parts.first().map_or_else(String::new, |part| part.format().to_owned());
         objects.sources.push((format.clone(), file.digest.file.hex()));
         for ((part, rows), what) in file.parts.iter().zip(parts) {
-            let number = places.of_part(file, what, context);
-            objects.parts.push((part_hash(file, *part), format.clone(), number));
+            let warnings = what.warnings().to_vec();
+            let object = places.of_part(file, what, context);
+            let format = format.clone();
+            objects.parts.push(MadePart { part: part_hash(file, *part), format, warnings, object });
             for row in rows {
-                objects.number[*row] = Some(places.for_row(*part, number));
+                objects.number[*row] = Some(places.for_row(*part, object));
             }
         }
     }
@@ -93,6 +105,10 @@ pub(super) fn build(
 fn read(sources: &[File<'_>], context: &Context<'_>, clock: &mut Clock) -> Result<Vec<Vec<Part>>> {
     let mut all: Vec<Option<Vec<Part>>> =
         sources.iter().map(|file| parts_without_reading(file, context)).collect();
+    for (file, parts) in sources.iter().zip(&all) {
+        let monitor = OfFile::new(file, context.monitor);
+        parts.iter().flatten().flat_map(Part::warnings).for_each(|warning| monitor.warn(warning));
+    }
     let bytes = |file: &&File<'_>| match &file.moving {
         Some(moving) => moving.bytes(),
         None => std::fs::metadata(&file.full).map_or(0, |m| m.len()),
@@ -120,9 +136,9 @@ pub(super) fn parts_without_reading(file: &File<'_>, context: &Context<'_>) -> O
     }
     let previous = context.previous.as_ref()?;
     let part = |part: SourcePart| {
-        let row = previous.index.part(&part_hash(file, part))?;
+        let (row, warnings) = previous.index.part(&part_hash(file, part))?;
         let format = previous.index.formats[row.format as usize].clone();
-        previous.has(row.object).then_some(Part::InPrevious(format, row.object))
+        previous.has(row.object).then(|| Part::InPrevious(format, row.object, warnings.to_vec()))
     };
     file.parts.iter().map(|(source, _)| part(*source)).collect()
 }
@@ -226,7 +242,7 @@ impl Objects {
             self.reports.extend(reports);
         }
         self.number.iter_mut().flatten().for_each(|number| *number = first[*number as usize]);
-        self.parts.iter_mut().for_each(|(.., number)| *number = first[*number as usize]);
+        self.parts.iter_mut().for_each(|part| part.object = first[part.object as usize]);
     }
 
     /// Keeps the first status of a worker that was needed.
@@ -306,9 +322,12 @@ impl Objects {
                 reserved: 0,
             });
         }
-        for (part, format, number) in &self.parts {
-            if let Some(object) = rows[*number as usize] {
+        for MadePart { part, format, warnings, object } in &self.parts {
+            if let Some(object) = rows[*object as usize] {
                 let format = FileIndex::row_of(&mut index.formats, format);
+                if !warnings.is_empty() {
+                    index.warnings.insert(index.parts.len() as u32, warnings.clone());
+                }
                 index.parts.push(PartRow { part: *part, object, format });
             }
         }

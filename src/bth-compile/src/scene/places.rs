@@ -13,9 +13,27 @@ use std::sync::Arc;
 
 /// A part of a source.
 pub(super) enum Part {
-    /// In the previous file: the format of the source, and the object in that file.
-    InPrevious(String, u32),
+    /// In the previous file: the format of the source, the object in that file, and what was warned of when it was read.
+    InPrevious(String, u32, Vec<String>),
     Mesh(Box<SourceMesh>),
+}
+
+impl Part {
+    /// The format of the source.
+    pub(super) fn format(&self) -> &str {
+        match self {
+            Part::InPrevious(format, ..) => format,
+            Part::Mesh(mesh) => &mesh.summary.report.format,
+        }
+    }
+
+    /// What was warned of while it was read.
+    pub(super) fn warnings(&self) -> &[String] {
+        match self {
+            Part::InPrevious(.., warnings) => warnings,
+            Part::Mesh(mesh) => &mesh.warnings,
+        }
+    }
 }
 
 /// An object that is built from a mesh.
@@ -112,7 +130,7 @@ impl<'a> Places<'a> {
 fn find<'a>(part: &Part, context: &'a Context<'_>) -> (Option<(&'a Arc<Previous>, u32)>, blake3::Hash) {
     let previous = context.previous.as_ref();
     match part {
-        Part::InPrevious(_, object) => {
+        Part::InPrevious(_, object, _) => {
             let hash = previous.map_or([0; 32], |p| p.index.objects[*object as usize].content);
             (previous.map(|p| (p, *object)), blake3::Hash::from_bytes(hash))
         }

@@ -92,6 +92,8 @@ impl SourcePart {
 pub(super) struct File<'a> {
     /// Path as in the manifest.
     pub(super) path: &'a str,
+    /// The path in warnings, where the scene has several files.
+    pub(super) shown: Option<&'a str>,
     /// Full path.
     pub(super) full: PathBuf,
     pub(super) compiled: bool,
@@ -171,7 +173,8 @@ pub(super) fn files<'a>(
             let full = moving.as_ref().map_or_else(|| folder.join(path), |moving| moving.first().to_owned());
             let digest = unhashed(looks);
             let (parts, clips) = (Vec::new(), clips.clone());
-            files.push(File { path, full, compiled, parts, digest, moving, clips, in_memory: None });
+            let (shown, in_memory) = (None, None);
+            files.push(File { path, shown, full, compiled, parts, digest, moving, clips, in_memory });
             files.len() - 1
         });
         let parts = &mut files[file].parts;
@@ -180,6 +183,9 @@ pub(super) fn files<'a>(
             parts.len() - 1
         });
         parts[place].1.push(row);
+    }
+    if files.len() > 1 {
+        files.iter_mut().for_each(|file| file.shown = Some(file.path));
     }
     // The first error in the order of the files is returned, so that the message does not depend on timing.
     let digest = |file: &File<'_>| match &file.moving {

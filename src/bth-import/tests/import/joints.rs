@@ -46,3 +46,20 @@ fn many_joints_below_each_other_are_quick() {
     assert_eq!(manifest.nodes[joints[0]].parent, None);
     assert!(joints.windows(2).all(|pair| manifest.nodes[pair[1]].parent == Some(pair[0])));
 }
+
+#[test]
+fn animations_of_more_frames_than_there_may_be_are_told() {
+    let bytes = chain(1);
+    let imported = |rate: f64, strict: bool| {
+        let options = ImportOptions { rate, strict, ..ImportOptions::default() };
+        scene::import_bytes(Path::new("a.glb"), &bytes, "a.glb", &options, &Silent)
+    };
+    // The last key is at 1 s.
+    let most = 1 << 24;
+    let (manifest, report) = imported(f64::from(most), true).unwrap();
+    assert_eq!((manifest.frames.last, report.ignored.len()), (most, 0));
+    let (manifest, report) = imported(f64::from(most + 1), false).unwrap();
+    assert_eq!(manifest.frames.last, most);
+    assert!(report.ignored[0].contains("1 s are more than 16777216 frames"), "{:?}", report.ignored);
+    assert!(imported(f64::from(most + 1), true).unwrap_err().to_string().contains("BTH-I015"));
+}

@@ -105,6 +105,13 @@ pub fn import_bytes(
     if options.rigid_parts {
         importer.rigid_parts()?;
     }
+    if last * options.rate > f64::from(MAX_FRAMES) {
+        let what = format!(
+            "at {} frames a second {last} s are more than {MAX_FRAMES} frames: no later ones are shown",
+            options.rate
+        );
+        importer.ignore("animations", what)?;
+    }
     importer.manifest.frames = Frames { first: 0, last: last_frame(last, options.rate), rate: options.rate };
     source.progress(data.len())?;
     Ok(finish(importer))

@@ -147,12 +147,16 @@ impl Span {
     /// [`prepare::padded_extent`] of the rays.
     #[inline(always)]
     pub(crate) fn padded_extent(&self, bounds: &ObjectBounds) -> (f32, bool) {
-        let mut reach = 0f32;
-        for k in 0..3 {
-            let [least, greatest] = self.origin[k];
-            reach = reach.max(bounds.upper[k] - least).max(greatest - bounds.lower[k]);
+        let farthest = self.farthest_origin();
+        if bounds.away == 0.0 {
+            // The farthest corner would take longer to find than it saves.
+            return prepare::padded_extent(bounds, farthest, farthest);
         }
-        prepare::padded_extent(bounds, self.farthest_origin(), reach)
+        let reach = (0..3).fold(0f32, |reach, k| {
+            let [least, greatest] = self.origin[k];
+            reach.max(bounds.upper[k] - least).max(greatest - bounds.lower[k])
+        });
+        prepare::padded_extent(bounds, farthest, reach)
     }
 
     /// A box of all points at which the rays can hit something, as lower and upper corner, if they are short and close together.

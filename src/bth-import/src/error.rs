@@ -111,7 +111,9 @@ fn limit_hint(code: &str) -> &'static str {
         "BTH-L033" => "leave out one of these options",
         "BTH-L034" => "free memory, or compile on a machine that has more",
         "BTH-L050" => "shorten the names, or divide the scene into several",
-        "BTH-L090" => "ask for fewer threads, or let the user have more processes (ulimit -u) and memory",
+        "BTH-L090" => {
+            "ask for fewer threads (bthc: --threads), or let the user have more processes (ulimit -u) and memory"
+        }
         _ => "divide the model into several objects of a scene",
     }
 }

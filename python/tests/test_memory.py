@@ -57,6 +57,16 @@ def _resident():
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
+def _assert_does_not_grow(work, first, times):
+    """After `first` times of `work`, which fill what is kept, `times` more of it take no memory."""
+    work(first)
+    gc.collect()
+    before = _resident()
+    work(times)
+    gc.collect()
+    assert _resident() - before < 4 << 20
+
+
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="no /proc")
 def test_copies_and_pickles_do_not_grow():
     scene = bth.compile(([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
@@ -67,12 +77,7 @@ def test_copies_and_pickles_do_not_grow():
             assert other.any([0.2, 0.2, 1], [0, 0, -1])
 
     scene.set_instance_mask(0, 3)
-    work(500)
-    gc.collect()
-    before = _resident()
-    work(10_000)
-    gc.collect()
-    assert _resident() - before < 4 << 20
+    _assert_does_not_grow(work, 500, 10_000)
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="no /proc")
@@ -91,9 +96,4 @@ def test_queries_do_not_grow(scene, rays):
             with pytest.raises(IndexError):
                 scene.surface(0, 10**6)
 
-    work(30)
-    gc.collect()
-    before = _resident()
-    work(300)
-    gc.collect()
-    assert _resident() - before < 4 << 20
+    _assert_does_not_grow(work, 30, 300)

@@ -36,8 +36,7 @@ impl ObjectBounds {
     /// The bounds of an object, from its OBJECT row.
     pub fn new(object: &Object) -> ObjectBounds {
         let ([x, y, z], [to_x, to_y, to_z]) = (object.lower, object.upper);
-        let [near, far] = [greatest_of(&object.lower), greatest_of(&object.upper)];
-        let greatest = if far > near { far } else { near };
+        let greatest = greatest_of(&object.lower).max(greatest_of(&object.upper));
         let (mut away, mut padded_in_f64) = (0.0, greatest);
         if object.coordinates & WIDENED_BOXES != 0 && WIDENED_RANGE.contains(&greatest) {
             padded_in_f64 = LEAST_PADDED;

@@ -124,7 +124,7 @@ fn ray(scene: &Scene, rng: &mut Rng) -> Ray {
 pub fn import(format: &str, bytes: &[u8]) {
     let name = Path::new("/nonexistent/fuzz/model").with_extension(format);
     let polygons = Polygons::Ears;
-    let wanted = Wanted { attributes: Keep::All, groups: true, materials: true, polygons, vertices: false };
+    let wanted = Wanted { attributes: Keep::All, groups: true, materials: true, polygons, ..Wanted::default() };
     let Ok((mesh, report)) = import_bytes(&name, bytes, wanted, &Silent) else { return };
     assert_eq!(report.triangles, mesh.triangles.len() as u64);
     check(&mesh);
@@ -228,7 +228,7 @@ pub fn import_frames(bytes: &[u8]) {
     let timing = Timing { rate: Some(f64::from(*choice)), usual_rate: 24.0, start: 0.0 };
     let polygons = Polygons::Ears;
     let wanted =
-        |vertices| Wanted { attributes: Keep::All, groups: true, materials: true, polygons, vertices };
+        |vertices| Wanted { attributes: Keep::All, groups: true, materials: true, polygons, vertices, ..Wanted::default() };
     for vertices in [false, true] {
         if let Ok((mesh, _)) = import_sequence_bytes(&files, &timing, wanted(vertices), &Silent) {
             assert_eq!(mesh.sequence.as_ref().expect("frames").times.len(), files.len());

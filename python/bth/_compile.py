@@ -17,8 +17,8 @@ _GLTF = ("flatten", "scene", "animation", "rate", "at_rest", "rigid_parts", "str
 
 def compile(
     model, *, output=None, quality=None, structure=None, coordinates=None, max_error=None, boxes=None, polygons=None,
-    attributes=None, alpha=None, tets=None, subtrees=None, compact=None, geometry=None, names=None, materials=None, estimator=None, select=None, optimize_for=None,
-    profile=None, max_bytes_per_triangle=None, budget=None, probe=None, min_tet_triangles=None, c_tet=None, for_scene=None,
+    attributes=None, alpha=None, tets=None, subtrees=None, compact=None, geometry=None, names=None, materials=None,
+    lenient_materials=None, estimator=None, select=None, optimize_for=None, profile=None, max_bytes_per_triangle=None, budget=None, probe=None, min_tet_triangles=None, c_tet=None, for_scene=None,
     rays=None, tet_deadline=None, tet_memory=None, flatten=None, scene=None, animation=None, rate=None, at_rest=None,
     rigid_parts=None, strict=None, deformable=None, poses=None, segments=None, free_directions=None, free_reach=None,
     cache=None, cache_size=None, shared_cache=None, memory=None, threads=None, progress=None,
@@ -39,7 +39,8 @@ def compile(
     All other options are those of `bthc compile`. `structure` is 'bvh' by default, since the package has no worker for tetrahedra, and
     free_directions is 'none'.
     polygons ('ears') covers concave polygons of models in files exactly, which fans do not.
-    attributes ('normals', 'all'), alpha ('mask', 'blend'), names and materials (True) keep what models in files have of these.
+    attributes ('normals', 'all'), alpha ('mask', 'blend'), names and materials (True) keep what models in files have of these;
+    lenient_materials leaves out images that cannot be read.
     deformable: keeps what `Scene.set_positions` needs. free_directions ('auto', 'distances', 'all') keeps in which directions rays from a
     triangle meet nothing, and up to which distance.
     """

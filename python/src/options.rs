@@ -115,6 +115,7 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
         geometry: keywords.value("geometry")?.unwrap_or(true),
         names: materials || keywords.value("names")?.unwrap_or(false),
         materials,
+        lenient_materials: keywords.value("lenient_materials")?.unwrap_or(false),
         deformable,
         deformable_tets: deformable && structure == Structure::Bth,
         ..CompileOptions::default()

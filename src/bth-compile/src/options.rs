@@ -33,6 +33,8 @@ pub struct CompileOptions {
     pub names: bool,
     /// Whether to keep how materials look, with textures and vertex colours. Includes all attributes and the groups of triangles.
     pub materials: bool,
+    /// Whether images and material libraries that are missing, broken or too large are left out, each with a warning.
+    pub lenient_materials: bool,
     /// Coordinates that triangle leaves store.
     pub coordinates: coordinates::CoordinateOptions,
     /// Builder of the binary BVH.
@@ -74,6 +76,7 @@ impl Default for CompileOptions {
             polygons: mesh::Polygons::default(),
             names: false,
             materials: false,
+            lenient_materials: false,
             alpha: mesh::AlphaMode::default(),
             coordinates: coordinates::CoordinateOptions::default(),
             bvh: bvh::BvhOptions::default(),
@@ -100,6 +103,7 @@ impl CompileOptions {
             attributes,
             groups: self.names || self.materials,
             materials: self.materials,
+            unreadable: self.looks().unreadable,
             polygons: self.polygons,
             vertices: self.deformable,
         }
@@ -124,7 +128,11 @@ impl CompileOptions {
 
     /// What of the looks of models is read, for which files besides the models are needed.
     pub fn looks(&self) -> mesh::Looks {
-        mesh::Looks { alpha: self.alpha, materials: self.materials }
+        let unreadable = match self.lenient_materials {
+            true => mesh::Unreadable::LeftOut,
+            false => mesh::Unreadable::Refused,
+        };
+        mesh::Looks { alpha: self.alpha, materials: self.materials, unreadable }
     }
 
     /// What is built: see `deformable_tets`.

@@ -187,7 +187,9 @@ impl Code {
                 "remove instances that are not seen, or join objects that move together"
             }
             Code::NotDeformable => "compile the model with --deformable",
-            Code::NewPositions => "give one position for each vertex of the source, in its order",
+            Code::NewPositions => {
+                "give one position for each vertex of the source, in its order, and a share from 0 to 1"
+            }
             _ => "the program that wrote the file has a defect; compile it again with bthc",
         }
     }

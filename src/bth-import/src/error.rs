@@ -104,7 +104,9 @@ fn file_hint(code: &str) -> &'static str {
 /// The hint for what exceeds a limit.
 fn limit_hint(code: &str) -> &'static str {
     match code {
-        "BTH-L003" => "make the image smaller, or compile without --materials and --alpha",
+        "BTH-L003" => {
+            "make the image smaller, or compile with --lenient-materials or without --materials and --alpha"
+        }
         "BTH-L004" => "leave out frames, or make several sequences of them",
         "BTH-L020" => "compile with --structure bvh, without tetrahedra",
         "BTH-L032" => "divide the scene into several with fewer objects",

@@ -117,8 +117,8 @@ pub fn import_gltf_parts_bytes(
 ///
 /// # Errors
 /// As [`import`]; `BTH-I016` for an image that cannot be read, `BTH-L003` for one that is too large.
-pub fn import_cutouts(path: &Path, mode: AlphaMode, monitor: &dyn Monitor) -> Result<Cutouts> {
-    import_cutouts_bytes(path, &read_file(path)?, mode, monitor)
+pub fn import_cutouts(path: &Path, looks: impl Into<Looks>, monitor: &dyn Monitor) -> Result<Cutouts> {
+    import_cutouts_bytes(path, &read_file(path)?, looks, monitor)
 }
 
 /// As [`import_cutouts`], from the bytes of a file, as [`import_bytes`] reads it.
@@ -128,12 +128,13 @@ pub fn import_cutouts(path: &Path, mode: AlphaMode, monitor: &dyn Monitor) -> Re
 pub fn import_cutouts_bytes(
     name: &Path,
     data: &[u8],
-    mode: AlphaMode,
+    looks: impl Into<Looks>,
     monitor: &dyn Monitor,
 ) -> Result<Cutouts> {
+    let looks = looks.into();
     let source = Source::new(name, data, monitor);
     match format(&source)? {
-        Format::Gltf if mode != AlphaMode::None => gltf::cutout::flat(&source, mode),
+        Format::Gltf if looks.alpha != AlphaMode::None => gltf::cutout::flat(&source, looks),
         _ => Ok(Cutouts::default()),
     }
 }
@@ -145,23 +146,23 @@ pub fn import_cutouts_bytes(
 pub fn import_gltf_cutouts(
     path: &Path,
     parts: &[GltfPart],
-    mode: AlphaMode,
+    looks: impl Into<Looks>,
     monitor: &dyn Monitor,
 ) -> Result<Vec<Cutouts>> {
     let data = read_file(path)?;
-    gltf::cutout::parts(&Source::new(path, &data, monitor), mode, parts)
+    gltf::cutout::parts(&Source::new(path, &data, monitor), looks.into(), parts)
 }
 
 /// The images of the materials of a model ([`Wanted::materials`]), each with the name by which textures refer to it.
 ///
 /// # Errors
 /// As [`import`].
-pub fn import_images(path: &Path, monitor: &dyn Monitor) -> Result<Vec<ImageFile>> {
+pub fn import_images(path: &Path, looks: Looks, monitor: &dyn Monitor) -> Result<Vec<ImageFile>> {
     let data = read_file(path)?;
     let source = Source::new(path, &data, monitor);
     match format(&source)? {
         Format::Gltf => gltf::materials::images(&source),
-        Format::Obj => mtl::images(&source),
+        Format::Obj => mtl::images(&source, looks.unreadable),
         Format::Ply | Format::Stl | Format::Off => Ok(Vec::new()),
     }
 }

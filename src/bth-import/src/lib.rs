@@ -48,7 +48,7 @@ pub use import::{
     import, import_bytes, import_cutouts, import_cutouts_bytes, import_gltf_cutouts, import_gltf_parts,
     import_gltf_parts_bytes, import_images, source_files,
 };
-pub use materials::{ImageFile, Looks, Materials};
+pub use materials::{ImageFile, Looks, Materials, Unreadable};
 pub use memory::{MEMORY_FORMAT, import_triangles};
 pub use mesh::{
     Attributes, Keep, Mesh, OpacityReport, Polygons, Report, Sequence, TriangleOpacities, Wanted,

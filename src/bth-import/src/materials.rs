@@ -2,6 +2,9 @@
 //! second set of texture coordinates.
 
 use crate::cutout::AlphaMode;
+use crate::error::{Error, Result};
+use crate::monitor::Monitor;
+use crate::source::IMAGE;
 use bth_format::file::hash128;
 use bth_format::layout::{MaterialParameters, NONE, Texture, UV_SET_SECOND};
 use std::collections::HashMap;
@@ -24,6 +27,34 @@ pub struct Materials {
     pub second_uvs: Vec<[f32; 2]>,
 }
 
+/// What becomes of images and material libraries that are missing, broken or too large (`--lenient-materials`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Unreadable {
+    /// They are errors.
+    #[default]
+    Refused,
+    /// They are left out, each with a warning. A texture without its image counts as white.
+    LeftOut,
+}
+
+impl Unreadable {
+    /// What was read. `None`, with a warning, for an image or a material library that cannot be read and is left out.
+    ///
+    /// # Errors
+    /// Other errors, and all where nothing is left out.
+    pub(crate) fn check<T>(self, read: Result<T>, monitor: &dyn Monitor) -> Result<Option<T>> {
+        let what = match (self, &read) {
+            (Unreadable::LeftOut, Err(Error::Input { code: IMAGE, place, message, .. })) => {
+                format!("{place}: {message}")
+            }
+            (Unreadable::LeftOut, Err(Error::Limit { code: "BTH-L003", message })) => message.clone(),
+            _ => return read.map(Some),
+        };
+        monitor.warn(&format!("{what}; it is left out"));
+        Ok(None)
+    }
+}
+
 /// What of a model's looks is read, for which files besides the model itself are needed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Looks {
@@ -31,11 +62,13 @@ pub struct Looks {
     pub alpha: AlphaMode,
     /// How materials look.
     pub materials: bool,
+    /// What becomes of images and material libraries that cannot be read.
+    pub unreadable: Unreadable,
 }
 
 impl From<AlphaMode> for Looks {
     fn from(alpha: AlphaMode) -> Self {
-        Self { alpha, materials: false }
+        Self { alpha, ..Self::default() }
     }
 }
 

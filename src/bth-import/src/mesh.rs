@@ -2,7 +2,7 @@
 
 use crate::deformation::Deformation;
 use crate::groups::Groups;
-use crate::materials::Materials;
+use crate::materials::{Materials, Unreadable};
 use serde::{Deserialize, Serialize};
 
 /// A triangle mesh in object space, with bit-equal positions welded (-0 counts as +0) unless all vertices of the source are wanted.
@@ -110,6 +110,8 @@ pub struct Wanted {
     pub groups: bool,
     /// How materials look, and vertex colours (`--materials`). Needs groups.
     pub materials: bool,
+    /// What becomes of images and material libraries that cannot be read (`--lenient-materials`).
+    pub unreadable: Unreadable,
     /// How polygons of OBJ, PLY, OFF and STL become triangles (`--polygons`).
     pub polygons: Polygons,
     /// All vertices of the source, in its order, those at equal positions and unused ones too (`--deformable`).

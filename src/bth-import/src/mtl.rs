@@ -2,10 +2,11 @@
 
 use crate::error::{Error, Place, Result};
 use crate::image_file::{self, MAX_TEXELS, Refused};
-use crate::materials::{ImageFile, MaterialRecorder, PLAIN};
+use crate::materials::{ImageFile, MaterialRecorder, PLAIN, Unreadable};
+use crate::monitor::{Monitor, Silent};
 use crate::number::{Lines, float, shown, words};
 use crate::source::{IMAGE, MALFORMED, MALFORMED_HINT, Source, input_error};
-use crate::statements::{name, statements};
+use crate::statements::{file_name, name, statements};
 use bth_format::layout::*;
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Component, Path, PathBuf};
@@ -33,8 +34,9 @@ struct MtlMaterial {
 /// An image and how its coordinates are changed.
 #[derive(Clone, Debug, PartialEq)]
 struct Map {
-    /// File, and the place of the statement.
-    file: PathBuf,
+    /// File, or the name in the library where that is not relative.
+    file: std::result::Result<PathBuf, String>,
+    /// Place of the statement.
     place: Place,
     scale: [f32; 2],
     offset: [f32; 2],
@@ -57,13 +59,13 @@ pub(super) fn read(
     source: &Source<'_>,
     libraries: &[Library],
     names: &[String],
-    recorder: &mut MaterialRecorder,
+    (unreadable, recorder): (Unreadable, &mut MaterialRecorder),
 ) -> Result<()> {
     if libraries.is_empty() {
         return Ok(());
     }
-    let found = read_libraries(source, libraries)?;
-    let mut images = HashMap::new();
+    let found = read_libraries(source, libraries, unreadable)?;
+    let mut images = Images { unreadable, monitor: source.monitor, read: HashMap::new() };
     for name in names {
         let parameters = match found.materials.get(name) {
             Some(material) => parameters(material, recorder, &mut images)?,
@@ -92,8 +94,7 @@ pub(super) fn files(path: &Path, data: &[u8]) -> Vec<PathBuf> {
             let mut found = Libraries::default();
             // What is malformed is reported when it is read.
             let _ = parse(&file, &text, &mut found);
-            let maps: BTreeSet<&PathBuf> =
-                found.materials.values().flat_map(kept_maps).map(|m| &m.file).collect();
+            let maps: BTreeSet<&PathBuf> = found.materials.values().flat_map(kept_files).collect();
             let maps = maps.into_iter().filter(|map| map.is_file());
             files.extend(
                 std::iter::once(&file).chain(maps).filter(|file| listed.insert((*file).clone())).cloned(),
@@ -104,25 +105,26 @@ pub(super) fn files(path: &Path, data: &[u8]) -> Vec<PathBuf> {
 }
 
 /// The images of an OBJ file's materials that can be read.
-pub(super) fn images(source: &Source<'_>) -> Result<Vec<ImageFile>> {
+pub(super) fn images(source: &Source<'_>, unreadable: Unreadable) -> Result<Vec<ImageFile>> {
     let libraries: Vec<Library> = libraries_of(source.data).collect();
-    let found = read_libraries(source, &libraries)?;
-    let maps: BTreeSet<&PathBuf> =
-        found.materials.values().flat_map(kept_maps).map(|map| &map.file).collect();
+    // What is left out was warned of when the materials were read.
+    let quiet = Source::new(source.path, source.data, &Silent);
+    let found = read_libraries(&quiet, &libraries, unreadable)?;
+    let maps: BTreeSet<&PathBuf> = found.materials.values().flat_map(kept_files).collect();
     // Materials that no face has may refer to images that cannot be read.
     Ok(maps.into_iter().filter_map(|file| image_file::read(file).ok().map(ImageFile::new)).collect())
 }
 
-/// The images of a material that files keep.
-fn kept_maps(material: &MtlMaterial) -> impl Iterator<Item = &Map> {
-    material.diffuse_map.iter().chain(&material.emissive_map)
+/// The image files of a material that compiled files keep.
+fn kept_files(material: &MtlMaterial) -> impl Iterator<Item = &PathBuf> {
+    material.diffuse_map.iter().chain(&material.emissive_map).filter_map(|map| map.file.as_ref().ok())
 }
 
 /// The statements of an OBJ file that name libraries.
 fn libraries_of(data: &[u8]) -> impl Iterator<Item = Library> + '_ {
     statements(data).filter_map(|(line, text)| {
         let mut words = words(&text);
-        (words.next() == Some(b"mtllib")).then(|| Library { line, names: name(words) })
+        (words.next() == Some(b"mtllib")).then(|| Library { line, names: file_name(words) })
     })
 }
 
@@ -165,15 +167,17 @@ fn beside(folder: &Path, name: &str) -> Option<PathBuf> {
     (!absolute && !name.is_empty() && name.as_bytes().get(1) != Some(&b':')).then(|| folder.join(path))
 }
 
-fn read_libraries(source: &Source<'_>, libraries: &[Library]) -> Result<Libraries> {
+fn read_libraries(source: &Source<'_>, libraries: &[Library], unreadable: Unreadable) -> Result<Libraries> {
     let (mut found, mut read) = (Libraries::default(), LibrariesRead::default());
     for library in libraries {
-        let hint = "put the material library there, or compile without --materials";
+        let hint =
+            "put the material library there, or compile with --lenient-materials or without --materials";
         let files = read.new_files(source.path, &library.names);
         if files.is_empty() && library.names.split(' ').all(|name| beside(Path::new(""), name).is_none()) {
             let found = shown(library.names.as_bytes());
             let message = format!("expected a relative name of a material library, found \"{found}\"");
-            return Err(source.error_at_line(IMAGE, library.line, message, hint));
+            let refused = Err(source.error_at_line(IMAGE, library.line, message, hint));
+            unreadable.check::<()>(refused, source.monitor)?;
         }
         for file in files {
             let text = image_file::read(&file).map_err(|e| match e {
@@ -182,8 +186,10 @@ fn read_libraries(source: &Source<'_>, libraries: &[Library]) -> Result<Librarie
                     source.error_at_line(IMAGE, library.line, message, hint)
                 }
                 other => other,
-            })?;
-            parse(&file, &text, &mut found)?;
+            });
+            if let Some(text) = unreadable.check(text, source.monitor)? {
+                parse(&file, &text, &mut found)?;
+            }
         }
     }
     Ok(found)
@@ -293,7 +299,7 @@ fn map<'w>(library: &Path, place: Place, words: impl Iterator<Item = &'w [u8]>) 
             _ => 2,
         };
     }
-    let name = name(words.iter().skip(at).copied());
+    let name = file_name(words.iter().skip(at).copied());
     let folder = library.parent().unwrap_or(Path::new(""));
     if !scale.iter().chain(&offset).all(|x| x.is_finite()) {
         return Err(malformed(place, "expected finite numbers behind -s and -o"));
@@ -301,26 +307,20 @@ fn map<'w>(library: &Path, place: Place, words: impl Iterator<Item = &'w [u8]>) 
     if name.is_empty() {
         return Ok(None);
     }
-    match beside(folder, &name) {
-        Some(file) => Ok(Some(Map { file, place, scale, offset, clamp })),
-        None => {
-            let message = format!("expected a relative file name, found \"{}\"", shown(name.as_bytes()));
-            let hint = "put the image beside the library and refer to it by its name";
-            Err(input_error(IMAGE, place, message, hint))
-        }
-    }
+    let file = beside(folder, &name).ok_or(name);
+    Ok(Some(Map { file, place, scale, offset, clamp }))
 }
 
 fn parameters(
     material: &MtlMaterial,
     recorder: &mut MaterialRecorder,
-    images: &mut HashMap<PathBuf, [u8; 16]>,
+    images: &mut Images<'_>,
 ) -> Result<MaterialParameters> {
     let [r, g, b] = material.diffuse.unwrap_or([1.0; 3]);
     let opacity = material.opacity.unwrap_or(1.0);
     let mut texture = |map: &Option<Map>| match map {
         None => Ok(NONE),
-        Some(map) => Ok(recorder.texture(texture(map, image_name(map, images)?))),
+        Some(map) => Ok(images.name(map)?.map_or(NONE, |image| recorder.texture(texture(map, image)))),
     };
     Ok(MaterialParameters {
         base_color: [r, g, b, opacity],
@@ -354,14 +354,38 @@ fn texture(map: &Map, image: [u8; 16]) -> Texture {
     }
 }
 
-/// The name of a map's image, whose format and size are checked.
-fn image_name(map: &Map, images: &mut HashMap<PathBuf, [u8; 16]>) -> Result<[u8; 16]> {
-    if let Some(name) = images.get(&map.file) {
-        return Ok(*name);
+/// The images that were read, and what becomes of those that cannot be.
+struct Images<'m> {
+    unreadable: Unreadable,
+    monitor: &'m dyn Monitor,
+    /// Names by files; `None` for those that are left out.
+    read: HashMap<PathBuf, Option<[u8; 16]>>,
+}
+
+impl Images<'_> {
+    /// The name of a map's image, whose format and size are checked; `None` if it is left out.
+    fn name(&mut self, map: &Map) -> Result<Option<[u8; 16]>> {
+        if let Some(name) = map.file.as_ref().ok().and_then(|file| self.read.get(file)) {
+            return Ok(*name);
+        }
+        let name = self.unreadable.check(image_name(map), self.monitor)?;
+        if let Ok(file) = &map.file {
+            self.read.insert(file.clone(), name);
+        }
+        Ok(name)
     }
-    let shown = map.file.display();
-    let bytes = image_file::read(&map.file).map_err(|e| {
-        let hint = "put the image there, or compile without --materials";
+}
+
+/// The name of a map's image, whose format and size are checked.
+fn image_name(map: &Map) -> Result<[u8; 16]> {
+    let file = map.file.as_ref().map_err(|name| {
+        let message = format!("expected a relative file name, found \"{}\"", shown(name.as_bytes()));
+        let hint = "put the image beside the library and refer to it by its name";
+        input_error(IMAGE, map.place.clone(), message, hint)
+    })?;
+    let shown = file.display();
+    let bytes = image_file::read(file).map_err(|e| {
+        let hint = "put the image there, or compile with --lenient-materials or without --materials";
         match e {
             Error::File { message, .. } => {
                 input_error(IMAGE, map.place.clone(), format!("expected the image {shown}: {message}"), hint)
@@ -371,7 +395,8 @@ fn image_name(map: &Map, images: &mut HashMap<PathBuf, [u8; 16]>) -> Result<[u8;
     })?;
     image_file::check(&bytes).map_err(|refused| match refused {
         Refused::Malformed(message) => {
-            let hint = "save the image as PNG, JPEG or WebP, or compile without --materials";
+            let hint =
+                "save the image as PNG, JPEG or WebP, or compile with --lenient-materials or without --materials";
             input_error(IMAGE, map.place.clone(), format!("{shown}: {message}"), hint)
         }
         Refused::TooLarge(texels) => Error::Limit {
@@ -379,9 +404,7 @@ fn image_name(map: &Map, images: &mut HashMap<PathBuf, [u8; 16]>) -> Result<[u8;
             message: format!("{shown} has {texels} texels; up to {MAX_TEXELS} are kept"),
         },
     })?;
-    let name = ImageFile::new(bytes).name;
-    images.insert(map.file.clone(), name);
-    Ok(name)
+    Ok(ImageFile::new(bytes).name)
 }
 
 fn malformed(place: Place, message: &str) -> Error {

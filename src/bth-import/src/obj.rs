@@ -12,7 +12,7 @@ use crate::polygon::fan;
 use crate::raw::{Raw, RowKind, check_rows};
 use crate::rows::NONE;
 use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, UNSUPPORTED};
-use crate::statements::{name, next_statement, statements};
+use crate::statements::{file_name, name, next_statement, statements};
 
 const ATTRIBUTE_HINT: &str = "correct the file, or compile without attributes (--attributes none)";
 
@@ -128,7 +128,7 @@ pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>
                 reader.groups.name(reader.raw.triangles.len(), name(words));
             }
             Some(b"mtllib") if wanted.materials => {
-                reader.libraries.push(Library { line: number, names: name(words) });
+                reader.libraries.push(Library { line: number, names: file_name(words) });
             }
             Some(b"usemtl") if wanted.groups => {
                 reader.groups.material(reader.raw.triangles.len(), name(words));
@@ -166,7 +166,8 @@ impl<'a> Reader<'a, '_> {
         raw.groups = groups.recorder;
         raw.finish_polygons(wanted.polygons, source.monitor)?;
         if wanted.materials {
-            mtl::read(source, &libraries, raw.groups.material_names(), &mut raw.materials)?;
+            let looks = (wanted.unreadable, &mut raw.materials);
+            mtl::read(source, &libraries, raw.groups.material_names(), looks)?;
         }
         if !colors.is_empty() {
             // A position without a colour is white.

@@ -11,6 +11,13 @@ pub(crate) fn name<'w>(words: impl Iterator<Item = &'w [u8]>) -> String {
     text(words.join(&b' '))
 }
 
+/// The name of a file, which some programs write in double quotes.
+pub(crate) fn file_name<'w>(words: impl Iterator<Item = &'w [u8]>) -> String {
+    let name = name(words);
+    let within = name.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
+    within.filter(|within| !within.contains('"')).map_or_else(|| name.clone(), str::to_owned)
+}
+
 /// What the bytes 0x80 to 0x9F stand for in Windows-1252; those that stand for nothing are control characters.
 const WINDOWS_1252: &str = "€\u{81}‚ƒ„…†‡ˆ‰Š‹Œ\u{8D}Ž\u{8F}\u{90}‘’“”•–—˜™š›œ\u{9D}žŸ";
 

@@ -186,7 +186,7 @@ fn compile(source: &Path, cache: &Path, materials: bool) -> Result<Done, Compile
     let mut command = Command::new(&bthc);
     command.arg("compile").args(["--in-cache", "--json", "--end-with-input", "--cache-dir"]).arg(cache);
     if materials {
-        command.args(["--materials", "--alpha", "mask"]);
+        command.args(["--materials", "--lenient-materials", "--alpha", "mask"]);
     }
     command.arg("--").arg(source).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let started = command.spawn().and_then(|mut child| {

@@ -83,7 +83,11 @@ impl Scene {
     /// # Panics
     /// If there is no such instance.
     pub fn object_of(&self, instance: u32) -> u32 {
-        self.world().map_or(instance, |world| world.object_of(self.objects(), instance))
+        let Some(world) = self.world() else {
+            assert!(instance < self.object_count(), "an instance below instance_count");
+            return instance;
+        };
+        world.object_of(self.objects(), instance)
     }
 
     /// An instance at the scene's time.

@@ -252,7 +252,8 @@ fn what_cannot_be_read_is_an_error_with_place_and_hint() {
     );
 }
 
-/// The player compiles models with materials; where these cannot be read it says so and shows the rest.
+/// The player compiles models with materials. Images that cannot be read it does without, and where materials are malformed it says so
+/// and shows the rest.
 #[test]
 fn models_are_shown_in_their_colors() {
     let folder = folder(&[]);
@@ -267,12 +268,25 @@ fn models_are_shown_in_their_colors() {
     std::fs::write(folder.path().join("a.gltf"), square(&red, &[], None)).unwrap();
     let (shown, clay) = (play("a.gltf", &[]).1, play("a.gltf", &["--mode", "clay"]).1);
     assert_ne!(shown, clay);
-    let broken = unlit(json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}));
-    std::fs::write(folder.path().join("b.gltf"), square(&broken, &[json!({"uri": "none.png"})], None))
+    let textured = unlit(json!({"pbrMetallicRoughness":
+        {"baseColorFactor": [1, 0, 0, 1], "baseColorTexture": {"index": 0}}}));
+    std::fs::write(folder.path().join("b.gltf"), square(&textured, &[json!({"uri": "none.png"})], None))
         .unwrap();
     let (said, picture) = play("b.gltf", &[]);
     assert!(
-        said.contains("BTH-I016") && said.contains("warning: b.gltf: its materials cannot be read"),
+        said.contains("b.gltf: image 0: expected the image") && said.contains("; it is left out"),
+        "{said}"
+    );
+    assert_eq!(picture, shown);
+    // The image is used as soon as it is there.
+    std::fs::write(folder.path().join("none.png"), png(1, &[[0, 255, 0, 255]])).unwrap();
+    let (said, picture) = play("b.gltf", &[]);
+    assert!(said.lines().all(|line| !line.starts_with("warning: ")) && picture != shown, "{said}");
+    let broken = unlit(json!({"pbrMetallicRoughness": {"baseColorFactor": [2, 0, 0, 3]}}));
+    std::fs::write(folder.path().join("c.gltf"), square(&broken, &[], None)).unwrap();
+    let (said, picture) = play("c.gltf", &[]);
+    assert!(
+        said.contains("BTH-I002") && said.contains("warning: c.gltf: its materials cannot be read"),
         "{said}"
     );
     assert_eq!(picture, clay);

@@ -12,7 +12,7 @@ use crate::source::SourceDigest;
 use crate::write::SceneParts;
 use bth_cache::Key;
 use bth_files::Digest;
-use bth_import::{AlphaMode, Polygons, Wanted};
+use bth_import::{AlphaMode, Polygons, Unreadable, Wanted};
 use serde::Serialize;
 use std::path::Path;
 
@@ -54,6 +54,9 @@ pub(crate) fn mesh(source: &SourceDigest, path: &Path, part: &str, wanted: Wante
     }
     if wanted.materials {
         key = key.with("materials", "true").with("materials version", MATERIALS);
+    }
+    if source.looks.unreadable == Unreadable::LeftOut {
+        key = key.with("unreadable images", "left out");
     }
     match source.looks.alpha {
         AlphaMode::None => key,
@@ -239,6 +242,9 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
     }
     if options.materials {
         all.extend([("materials", "true".to_owned()), ("materials version", MATERIALS.to_owned())]);
+    }
+    if options.lenient_materials {
+        all.push(("lenient materials", "true".to_owned()));
     }
     if options.free.keep != free::KeepFree::None {
         all.extend([

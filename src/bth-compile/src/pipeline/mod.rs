@@ -100,7 +100,7 @@ fn images(
     if names.is_empty() {
         return Ok(Vec::new());
     }
-    let mut images = mesh::import_images(model.path, monitor)?;
+    let mut images = mesh::import_images(model.path, model.digest.looks, monitor)?;
     images.retain(|image| names.remove(&image.name));
     if names.is_empty() { Ok(images) } else { Err(changed(model.path)) }
 }

@@ -68,6 +68,9 @@ fn options_json(options: &CompileOptions) -> serde_json::Value {
     if options.materials {
         json["materials"] = json!(true);
     }
+    if options.lenient_materials {
+        json["lenient_materials"] = json!(true);
+    }
     if options.coordinates != Default::default() {
         json["coordinates"] = json!(options.coordinates);
     }

@@ -25,9 +25,9 @@ pub(crate) trait Stages {
         monitor: &dyn Monitor,
     ) -> Result<(Mesh, mesh::Report)> {
         let (mut mesh, mut report) = mesh::import(model.path, wanted, monitor)?;
-        let alpha = model.digest.looks.alpha;
-        if alpha != mesh::AlphaMode::None {
-            let cutouts = mesh::import_cutouts(model.path, alpha, monitor)?;
+        let looks = model.digest.looks;
+        if looks.alpha != mesh::AlphaMode::None {
+            let cutouts = mesh::import_cutouts(model.path, looks, monitor)?;
             opacity::add(&mut mesh, &mut report, &cutouts, monitor)?;
         }
         model.digest.unchanged(model.path, (mesh, report))

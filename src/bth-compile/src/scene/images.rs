@@ -43,7 +43,7 @@ fn images_of(file: &File<'_>, context: &Context<'_>) -> Result<Vec<([u8; 16], Ve
         return Ok(Vec::new());
     }
     if !file.compiled {
-        let images = bth_import::import_images(&file.full, context.monitor)?;
+        let images = bth_import::import_images(&file.full, file.digest.looks, context.monitor)?;
         return Ok(images.into_iter().map(|image| (image.name, image.bytes)).collect());
     }
     let Ok(compiled) = bth_format::File::read(&file.full) else { return Err(changed(&file.full)) };

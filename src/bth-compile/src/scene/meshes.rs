@@ -161,9 +161,9 @@ fn with_opacity(
         return Ok(meshes);
     }
     let cutouts = if parts.is_empty() {
-        vec![mesh::import_cutouts(&file.full, options.alpha, *monitor)?]
+        vec![mesh::import_cutouts(&file.full, options.looks(), *monitor)?]
     } else {
-        mesh::import_gltf_cutouts(&file.full, parts, options.alpha, *monitor)?
+        mesh::import_gltf_cutouts(&file.full, parts, options.looks(), *monitor)?
     };
     for ((mesh, report), cutouts) in meshes.iter_mut().zip(&cutouts) {
         opacity::add(mesh, report, cutouts, *monitor)?;

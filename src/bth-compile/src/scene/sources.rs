@@ -6,7 +6,7 @@ use crate::cached;
 use crate::error::Result;
 use crate::source::{SourceDigest, TriangleMesh};
 use bth_files::Digest;
-use bth_import::{AlphaMode, GltfPart, Looks};
+use bth_import::{AlphaMode, GltfPart, Looks, Unreadable};
 use bth_scene::{JointSet, Manifest, Source};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -121,9 +121,10 @@ impl File<'_> {
             mode => format!(" {mode:?}"),
         };
         let materials = if self.digest.looks.materials { " materials" } else { "" };
+        let lenient = if self.digest.looks.unreadable == Unreadable::LeftOut { " lenient" } else { "" };
         let clip = part.clip().map_or_else(String::new, |clip| format!(" clip {}", clip.hex()));
         format!(
-            "{} {} {}{alpha}{materials}{clip}",
+            "{} {} {}{alpha}{materials}{lenient}{clip}",
             self.digest.text(),
             self.part(part),
             cached::extension(&self.full)

@@ -114,7 +114,7 @@ fn read_placed<'a>(
     }
     let Flattener { mut raw, spans, groups, .. } = flattener;
     if let (true, Some(GroupNumbers { numbers, .. })) = (wanted.materials, groups) {
-        materials::read(accessors, shared, &numbers, &mut raw.materials)?;
+        materials::read(accessors, shared, &numbers, (wanted.unreadable, &mut raw.materials))?;
     }
     if raw.normals.is_empty() {
         raw.normal_rows.clear();

@@ -19,9 +19,9 @@ use crate::gltf::schema::{Extensions, TextureReference};
 use crate::gltf::texture::{self, KeptSet};
 use crate::gltf::texture_parts::{TextureParts, TextureReader};
 use crate::image_file::{self, MAX_TEXELS, Refused};
-use crate::materials::{ImageFile, MaterialRecorder};
+use crate::materials::{ImageFile, MaterialRecorder, Unreadable};
 use crate::number::shown;
-use crate::source::{IMAGE, Source};
+use crate::source::Source;
 
 /// How to do without what is read here, in errors.
 const WITHOUT: &str = "without --materials";
@@ -78,8 +78,8 @@ impl SurfaceMaterial {
 /// What the meshes of a document share while their materials are read.
 #[derive(Default)]
 pub(crate) struct SharedMaterials {
-    /// Names of the document's images that were read.
-    images: RefCell<HashMap<usize, [u8; 16]>>,
+    /// Names of the document's images that were read; `None` for those that are left out.
+    images: RefCell<HashMap<usize, Option<[u8; 16]>>>,
     /// What some material has and no file keeps.
     left_out: RefCell<BTreeSet<String>>,
     /// The parts of the document that textures are made of, read when the first mesh needs them.
@@ -150,11 +150,11 @@ pub(super) fn read(
     accessors: &Accessors<'_>,
     shared: &SharedMaterials,
     numbers: &[usize],
-    recorder: &mut MaterialRecorder,
+    (unreadable, recorder): (Unreadable, &mut MaterialRecorder),
 ) -> Result<()> {
     let parts = shared.parts(accessors.source)?;
-    let mut reader =
-        MaterialReader { textures: TextureReader { accessors, parts, without: WITHOUT }, shared, recorder };
+    let textures = TextureReader { accessors, parts, without: WITHOUT };
+    let mut reader = MaterialReader { textures, unreadable, shared, recorder };
     for number in numbers {
         let parameters = reader.material(*number)?;
         reader.recorder.parameters.push(parameters);
@@ -164,6 +164,7 @@ pub(super) fn read(
 
 struct MaterialReader<'m, 'a> {
     textures: TextureReader<'m, 'a>,
+    unreadable: Unreadable,
     shared: &'m SharedMaterials,
     recorder: &'m mut MaterialRecorder,
 }
@@ -259,16 +260,18 @@ impl MaterialReader<'_, '_> {
             Wrap::Clamp => WRAP_CLAMP,
         });
         let filter = if sampled.nearest { FILTER_NEAREST } else { FILTER_LINEAR };
-        let image = self.image(image)?;
+        let Some(image) = self.image(image)? else { return Ok(NONE) };
         Ok(self.recorder.texture(Texture { image, wrap, filter, transform, uv_set, reserved: [0; 2] }))
     }
 
-    /// The name of an image.
-    fn image(&self, index: usize) -> Result<[u8; 16]> {
+    /// The name of an image; `None` if it is left out.
+    fn image(&self, index: usize) -> Result<Option<[u8; 16]>> {
         if let Some(name) = self.shared.images.borrow().get(&index) {
             return Ok(*name);
         }
-        let name = image_file(&self.textures, index)?.name;
+        let monitor = self.textures.accessors.source.monitor;
+        let image = self.unreadable.check(image_file(&self.textures, index), monitor)?;
+        let name = image.map(|image| image.name);
         self.shared.images.borrow_mut().insert(index, name);
         Ok(name)
     }
@@ -277,14 +280,7 @@ impl MaterialReader<'_, '_> {
 /// An image of the document, whose format and size are checked.
 fn image_file(textures: &TextureReader<'_, '_>, index: usize) -> Result<ImageFile> {
     let part = format!("image {index}");
-    let bytes = textures.image(index).map_err(|e| match e {
-        Error::File { message, path, .. } => {
-            let hint = format!("put the image there, or compile {WITHOUT}");
-            let message = format!("expected the image {}: {message}", path.display());
-            textures.accessors.source.error_in_part(IMAGE, &part, message, &hint)
-        }
-        other => other,
-    })?;
+    let bytes = textures.image(index)?;
     image_file::check(&bytes).map_err(|refused| match refused {
         Refused::Malformed(message) => textures.unreadable(&part, message),
         Refused::TooLarge(texels) => Error::Limit {

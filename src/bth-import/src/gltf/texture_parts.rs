@@ -95,6 +95,9 @@ fn source_of(texture: &Texture) -> Option<usize> {
     webp.map(|extension| extension.source).or(texture.source)
 }
 
+/// How to compile where images are missing.
+pub(super) const LENIENT: &str = "with --lenient-materials";
+
 /// Reads textures, and names in errors how to do without them.
 pub(super) struct TextureReader<'m, 'a> {
     pub(super) accessors: &'m Accessors<'a>,
@@ -131,8 +134,8 @@ impl TextureReader<'_, '_> {
     /// The bytes of an image file.
     ///
     /// # Errors
-    /// `BTH-I002` where it does not exist or is malformed, `BTH-I014` and `BTH-I016` where its bytes cannot be found,
-    /// `BTH-O001` where its file cannot be read.
+    /// `BTH-I002` where it does not exist or is malformed, `BTH-I014` and `BTH-I016` where its bytes cannot be found or read,
+    /// `BTH-L003` where its file is too large.
     pub(super) fn image(&self, index: usize) -> Result<Cow<'_, [u8]>> {
         let part = format!("image {index}");
         let image: Image = self.part(&self.parts.images, index, &part)?;
@@ -151,10 +154,17 @@ impl TextureReader<'_, '_> {
     fn file(&self, part: &str, uri: &str) -> Result<Vec<u8>> {
         let Some(path) = beside(self.accessors.source.path, uri) else {
             let (message, hint) = refusal(uri);
-            let hint = format!("{hint}, or compile {}", self.without);
+            let hint = format!("{hint}, or compile {LENIENT} or {}", self.without);
             return Err(self.accessors.source.error_in_part(IMAGE, part, message, &hint));
         };
-        image_file::read(&path)
+        image_file::read(&path).map_err(|e| match e {
+            Error::File { message, path, .. } => {
+                let hint = format!("put the image there, or compile {LENIENT} or {}", self.without);
+                let message = format!("expected the image {}: {message}", path.display());
+                self.accessors.source.error_in_part(IMAGE, part, message, &hint)
+            }
+            other => other,
+        })
     }
 
     /// A row of a list of the document, parsed.
@@ -170,7 +180,7 @@ impl TextureReader<'_, '_> {
     }
 
     pub(super) fn unreadable(&self, part: &str, message: String) -> Error {
-        let hint = format!("save the image as PNG, JPEG or WebP, or compile {}", self.without);
+        let hint = format!("save the image as PNG, JPEG or WebP, or compile {LENIENT} or {}", self.without);
         self.accessors.source.error_in_part(IMAGE, part, message, &hint)
     }
 }

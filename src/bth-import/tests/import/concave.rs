@@ -1,7 +1,7 @@
 //! Polygons from whose first corner not all of them is seen.
 
 use super::*;
-use bth_import::{Polygons, Wanted, import_bytes as import_named};
+use bth_import::{Polygons, Unreadable, Wanted, import_bytes as import_named};
 use std::path::Path;
 
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
@@ -39,8 +39,14 @@ fn concave_polygons_are_told_with_the_first_triangle() {
 fn concave_polygons_are_split_exactly_where_that_is_wanted() {
     let split = |name: &str, text: &str, polygons: Polygons| {
         let listener = Listener::default();
-        let wanted =
-            Wanted { attributes: Keep::All, groups: true, materials: true, polygons, vertices: false };
+        let wanted = Wanted {
+            attributes: Keep::All,
+            groups: true,
+            materials: true,
+            polygons,
+            vertices: false,
+            unreadable: Unreadable::Refused,
+        };
         let (mesh, report) = import_named(Path::new(name), text.as_bytes(), wanted, &listener).unwrap();
         (mesh, report.concave, listener.0.into_inner().unwrap())
     };

@@ -149,7 +149,7 @@ fn images_come_from_files_and_data_uris_too() {
     assert_eq!(read(folder.path(), &model, AlphaMode::Mask).unwrap(), expected);
     model.0["images"][0] = json!({"uri": "a%20leaf.png"});
     let missing = read(folder.path(), &model, AlphaMode::Mask).unwrap_err();
-    assert!(matches!(missing, Error::File { code: "BTH-O001", .. }), "{missing}");
+    assert!(matches!(missing, Error::Input { code: "BTH-I016", .. }), "{missing}");
     std::fs::write(folder.path().join("a leaf.png"), image()).unwrap();
     assert_eq!(read(folder.path(), &model, AlphaMode::Mask).unwrap(), expected);
     let path = folder.path().join("a.glb");

@@ -2,7 +2,7 @@
 
 use super::gltf::glb;
 use super::*;
-use bth_import::{Groups, Polygons, Wanted};
+use bth_import::{Groups, Polygons, Unreadable, Wanted};
 use serde_json::json;
 
 const CORNERS: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
@@ -20,6 +20,7 @@ fn groups(name: &str, bytes: &[u8]) -> (Mesh, Groups) {
                 materials: false,
                 polygons: Polygons::Fans,
                 vertices: false,
+                unreadable: Unreadable::Refused,
             },
             &Silent,
         )
@@ -137,6 +138,7 @@ fn primitives_of_gltf_are_groups() {
         materials: false,
         polygons: Polygons::Fans,
         vertices: false,
+        unreadable: Unreadable::Refused,
     };
     let meshes =
         bth_import::import_gltf_parts(&path, &[0, 1].map(bth_import::GltfPart::Mesh), wanted, &Silent)

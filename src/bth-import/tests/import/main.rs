@@ -9,6 +9,7 @@ mod gltf;
 mod gltf_nodes;
 mod groups;
 mod joints;
+mod lenient;
 mod many_meshes;
 mod materials;
 mod memory;

@@ -2,7 +2,7 @@
 
 use super::gltf::{binary, edited};
 use super::*;
-use bth_import::{GltfPart, Polygons, Wanted, import_gltf_parts};
+use bth_import::{GltfPart, Polygons, Unreadable, Wanted, import_gltf_parts};
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -59,6 +59,7 @@ fn a_material_for_each_of_many_meshes_is_quick() {
         materials: true,
         polygons: Polygons::Fans,
         vertices: false,
+        unreadable: Unreadable::Refused,
     };
     let start = std::time::Instant::now();
     let meshes = import_gltf_parts(&path, &parts, wanted, &Silent).unwrap();

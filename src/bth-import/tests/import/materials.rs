@@ -3,7 +3,7 @@
 use super::gltf::glb;
 use super::*;
 use bth_format::layout::*;
-use bth_import::{Materials, Polygons, Wanted, import_images};
+use bth_import::{Looks, Materials, Polygons, Unreadable, Wanted, import_images};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -14,6 +14,7 @@ pub(super) const WANTED: Wanted = Wanted {
     materials: true,
     polygons: Polygons::Fans,
     vertices: false,
+    unreadable: Unreadable::Refused,
 };
 
 /// The smallest file that begins as a PNG image of one texel.
@@ -62,7 +63,9 @@ fn read(folder: &Path, material: Value) -> Result<(Mesh, Vec<String>)> {
     let heard = Listener::default();
     let (mesh, _) = import(&path, WANTED, &heard)?;
     for texture in &mesh.materials.as_ref().unwrap().textures {
-        assert!(import_images(&path, &heard)?.iter().any(|image| image.name == texture.image));
+        assert!(
+            import_images(&path, Looks::default(), &heard)?.iter().any(|image| image.name == texture.image)
+        );
     }
     Ok((mesh, heard.0.into_inner().unwrap()))
 }

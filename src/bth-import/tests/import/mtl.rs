@@ -70,7 +70,7 @@ fn a_library_that_is_named_before_every_face_is_read_once() {
     let looks = bth_import::Looks { materials: true, ..Default::default() };
     let files = bth_import::source_files(&path, looks).unwrap();
     assert_eq!(files, [path.as_path(), &folder.path().join("a.mtl")]);
-    assert!(import_images(&path, &Silent).unwrap().is_empty());
+    assert!(import_images(&path, looks, &Silent).unwrap().is_empty());
     // Reading it 40,000 times would take minutes.
     assert!(start.elapsed().as_secs() < 20);
 }

@@ -2,7 +2,8 @@
 
 use super::*;
 use bth_import::{
-    Polygons, Timing, Wanted, import_sequence, import_vertex_cache, read_vertex_cache, sequence_files,
+    Polygons, Timing, Unreadable, Wanted, import_sequence, import_vertex_cache, read_vertex_cache,
+    sequence_files,
 };
 use std::path::{Path, PathBuf};
 
@@ -13,6 +14,7 @@ const PLAIN: Wanted = Wanted {
     materials: false,
     polygons: Polygons::Fans,
     vertices: false,
+    unreadable: Unreadable::Refused,
 };
 
 /// Two triangles whose shared edge comes as vertices of its own for each, and which part in the second frame if `lift` is not 0.

@@ -43,6 +43,10 @@ pub(crate) struct Compile {
     /// glTF materials whose alpha makes holes, through which rays pass: see docs/models.md.
     #[arg(long, help_heading = KEPT, value_enum, default_value_t = Alpha::None, value_name = "MATERIALS")]
     pub(crate) alpha: Alpha,
+    /// Leave out images and material libraries that are missing, broken or too large, each with a warning, in place of an error: see
+    /// docs/models.md.
+    #[arg(long, help_heading = KEPT)]
+    pub(crate) lenient_materials: bool,
     /// Leave out the positions and triangles of the source (tracing does not need them).
     #[arg(long, help_heading = KEPT)]
     pub(crate) no_geometry: bool,
@@ -146,6 +150,7 @@ impl Compile {
             attributes: if self.materials { Keep::All } else { self.attributes.into() },
             names: self.names || self.materials,
             materials: self.materials,
+            lenient_materials: self.lenient_materials,
             polygons: self.polygons.into(),
             alpha: self.alpha.into(),
             record: if self.compact { Record::Tet16 } else { self.tets }.into(),

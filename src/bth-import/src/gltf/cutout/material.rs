@@ -16,6 +16,7 @@ use crate::gltf::materials::ALPHA_MODES;
 use crate::gltf::schema::Extensions;
 use crate::gltf::texture::TextureCoordinates;
 use crate::gltf::texture_parts::{TextureParts, TextureReader};
+use crate::materials::Looks;
 use crate::number::shown;
 
 #[derive(Deserialize, Default)]
@@ -59,7 +60,7 @@ pub(super) fn files(parts: &TextureParts, mode: AlphaMode) -> Vec<String> {
 /// Reads the cut-out materials of a document, each when it is first used.
 pub(super) struct Materials<'m, 'a> {
     reader: TextureReader<'m, 'a>,
-    mode: AlphaMode,
+    looks: Looks,
     /// Rows of `read` by the document's materials; `None` for materials without holes.
     rows: HashMap<usize, Option<usize>>,
     /// Rows of `images` by the document's images; `None` for images without alpha.
@@ -71,11 +72,11 @@ pub(super) struct Materials<'m, 'a> {
 }
 
 impl<'m, 'a> Materials<'m, 'a> {
-    pub(super) fn new(accessors: &'m Accessors<'a>, parts: &'m TextureParts, mode: AlphaMode) -> Self {
+    pub(super) fn new(accessors: &'m Accessors<'a>, parts: &'m TextureParts, looks: Looks) -> Self {
         let (rows, image_rows) = (HashMap::new(), HashMap::new());
         let reader = TextureReader { accessors, parts, without: "without cut-outs (--alpha none)" };
         let (read, coordinates, images) = (Vec::new(), Vec::new(), Vec::new());
-        Materials { reader, mode, rows, image_rows, read, coordinates, images }
+        Materials { reader, looks, rows, image_rows, read, coordinates, images }
     }
 
     /// The row of a material of the document; `None` where its alpha makes no holes.
@@ -97,7 +98,7 @@ impl<'m, 'a> Materials<'m, 'a> {
             );
             self.reader.accessors.source.monitor.warn(&message);
         }
-        let row = match cutoff(&material, self.mode) {
+        let row = match cutoff(&material, self.looks.alpha) {
             Some(cutoff) => {
                 let (read, coordinates) = self.cutout(&material, cutoff, &part)?;
                 self.read.push(read);
@@ -135,32 +136,40 @@ impl<'m, 'a> Materials<'m, 'a> {
         let Some(source) = texture.image else {
             let name = format!("texture {}", used.index);
             let message = "expected a PNG, JPEG or WebP image, found none";
-            return Err(self.reader.unreadable(&name, message.to_owned()));
+            let refused = Err(self.reader.unreadable(&name, message.to_owned()));
+            self.looks.unreadable.check::<()>(refused, self.reader.accessors.source.monitor)?;
+            return Ok((plain, None));
         };
         let image = self.image(source)?;
         let read = CutoutMaterial { image, wrap: texture.wrap, nearest: texture.nearest, ..plain };
         Ok((read, Some(coordinates)))
     }
 
-    /// The row of an image of the document; `None` where its alpha is 1 everywhere.
+    /// The row of an image of the document; `None` where its alpha is 1 everywhere, and where it is left out.
     fn image(&mut self, index: usize) -> Result<Option<usize>> {
         if let Some(known) = self.image_rows.get(&index) {
             return Ok(*known);
         }
-        let part = format!("image {index}");
-        let decoded = image::decode(&self.reader.image(index)?).map_err(|e| match e {
-            ImageError::Malformed(message) => self.reader.unreadable(&part, message),
-            ImageError::TooLarge(texels) => Error::Limit {
-                code: "BTH-L003",
-                message: format!("{part} has {texels} texels; up to {MAX_TEXELS} are read"),
-            },
-        })?;
+        let monitor = self.reader.accessors.source.monitor;
+        let decoded = self.looks.unreadable.check(self.decoded(index), monitor)?.flatten();
         let row = decoded.map(|image| {
             self.images.push(image);
             self.images.len() - 1
         });
         self.image_rows.insert(index, row);
         Ok(row)
+    }
+
+    /// The alpha of an image of the document; `None` where it is 1 everywhere.
+    fn decoded(&self, index: usize) -> Result<Option<AlphaImage>> {
+        let part = format!("image {index}");
+        image::decode(&self.reader.image(index)?).map_err(|e| match e {
+            ImageError::Malformed(message) => self.reader.unreadable(&part, message),
+            ImageError::TooLarge(texels) => Error::Limit {
+                code: "BTH-L003",
+                message: format!("{part} has {texels} texels; up to {MAX_TEXELS} are read"),
+            },
+        })
     }
 
     /// The coordinates of the texture of a row; `None` without one.

@@ -17,24 +17,25 @@ use crate::gltf::rigid_parts::Selection;
 use crate::gltf::schema::GltfDocument;
 use crate::gltf::texture_parts::TextureParts;
 use crate::gltf::transform;
+use crate::materials::Looks;
 use crate::mesh::Keep;
 use crate::source::Source;
 use material::Materials;
 
 /// The cut-outs of a document's default scene, as [`crate::import()`] reads it.
-pub(crate) fn flat(source: &Source<'_>, mode: AlphaMode) -> Result<Cutouts> {
+pub(crate) fn flat(source: &Source<'_>, looks: Looks) -> Result<Cutouts> {
     let (document, binary) = document::read(source, &SUPPORTED)?;
     let (placed, _) = placed_meshes(source, &document)?;
-    Ok(placed_cutouts(source, &document, binary, mode, &[placed])?.swap_remove(0))
+    Ok(placed_cutouts(source, &document, binary, looks, &[placed])?.swap_remove(0))
 }
 
 /// The cut-outs of parts, as [`crate::import_gltf_parts`] reads them.
-pub(crate) fn parts(source: &Source<'_>, mode: AlphaMode, parts: &[GltfPart]) -> Result<Vec<Cutouts>> {
+pub(crate) fn parts(source: &Source<'_>, looks: Looks, parts: &[GltfPart]) -> Result<Vec<Cutouts>> {
     let supported = [SUPPORTED.as_slice(), &SCENE_EXTENSIONS].concat();
     let (document, binary) = document::read(source, &supported)?;
     let model = |part: &GltfPart| Ok(vec![part.placed(source, &document)?]);
     let models = parts.iter().map(model).collect::<Result<Vec<_>>>()?;
-    placed_cutouts(source, &document, binary, mode, &models)
+    placed_cutouts(source, &document, binary, looks, &models)
 }
 
 /// The URIs of files beside a document that cut-outs read.
@@ -50,14 +51,14 @@ fn placed_cutouts(
     source: &Source<'_>,
     document: &GltfDocument,
     binary: Option<&[u8]>,
-    mode: AlphaMode,
+    looks: Looks,
     models: &[Vec<PlacedMesh>],
 ) -> Result<Vec<Cutouts>> {
     let parts = &TextureParts::of(source)?;
     let accessors = Accessors { source, document, buffers: Buffers::new(source, document, binary) };
     let mut reader = CutoutReader {
         accessors: &accessors,
-        materials: Materials::new(&accessors, parts, mode),
+        materials: Materials::new(&accessors, parts, looks),
         cutouts: Cutouts::default(),
     };
     let mut all = Vec::new();

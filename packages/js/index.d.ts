@@ -84,6 +84,21 @@ export interface Scene {
      * @throws TypeError unless each column has its type and `count` elements.
      */
     surface(hits: Hits): Surface;
+    /**
+     * How the materials of an object look, by their indices; none if the file was compiled without `--materials`.
+     * @throws RangeError unless there is such an object.
+     */
+    materials(object: number): Material[];
+    /**
+     * The textures of an object, by their indices.
+     * @throws RangeError unless there is such an object.
+     */
+    textures(object: number): Texture[];
+    /**
+     * A copy of the image file of a texture: PNG, JPEG or WebP. Red, green and blue of its texels are sRGB, alpha is linear.
+     * @throws RangeError unless there is such an object and texture.
+     */
+    image(object: number, texture: number): Uint8Array;
     /** Frees the scene's memory. All other methods throw from then on. */
     close(): void;
 }
@@ -132,10 +147,47 @@ export interface Surface {
     readonly uv: Float32Array;
     /** Linear red, green, blue and alpha: the material's factor times the colour at the vertices, without textures; else 1. */
     readonly color: Float32Array;
+    /** Texture coordinates of the second set, 2 numbers a hit, for textures whose `uvSet` is 1. */
+    readonly secondUv: Float32Array;
     /** Index of the object. */
     readonly object: Uint32Array;
     /** Index of the group of triangles; 0 if the file keeps no groups. */
     readonly group: Uint32Array;
     /** Index of the object's material. */
     readonly material: Uint32Array;
+}
+
+/** How a material looks. Colours are linear, with the primaries of sRGB. */
+export interface Material {
+    /** To be multiplied by the texel of the texture and the colour at the vertices; `Surface.color` has the product without the texel. */
+    readonly baseColor: [red: number, green: number, blue: number, alpha: number];
+    /** Index of the base colour's texture; null without one. */
+    readonly baseColorTexture: number | null;
+    /** Emitted radiance, to be multiplied by the texel of its texture. */
+    readonly emissive: [red: number, green: number, blue: number];
+    readonly emissiveTexture: number | null;
+    /** What alpha means: nothing; a surface where it is at least `alphaCutoff`; the share of light that the surface stops. */
+    readonly alpha: "opaque" | "mask" | "blend";
+    readonly alphaCutoff: number;
+    /** Whether the back of triangles is seen too. */
+    readonly doubleSided: boolean;
+    /** Whether the base colour is shown as it is, without light. */
+    readonly unlit: boolean;
+}
+
+/** A texture. */
+export interface Texture {
+    /** Index of its image: equal for textures of the same image, whichever object of a file they belong to. `Scene.image` has its bytes. */
+    readonly image: number;
+    /** How coordinates beyond 0 and 1 find texels, for u and for v. */
+    readonly wrap: ["repeat" | "mirror" | "clamp", "repeat" | "mirror" | "clamp"];
+    /** Whether the nearest texel is taken, or four are interpolated after they have been made linear. */
+    readonly filter: "nearest" | "linear";
+    /** 0 for `Surface.uv`, 1 for `Surface.secondUv`. */
+    readonly uvSet: number;
+    /**
+     * Rows of the transform from (u, v, 1) to coordinates of the image, six numbers. There (0, 0) is the upper left corner, (1, 1) the lower
+     * right one, and the middle of texel (i, j) is at ((i + ½) / width, (j + ½) / height).
+     */
+    readonly transform: number[];
 }

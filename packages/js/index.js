@@ -7,11 +7,16 @@ const RAY = 8;
 /** Columns of hits: the first three are numbers, the others indices. */
 const HIT_NAMES = ["t", "u", "v", "instance", "triangle"];
 /** Columns of the results of the module's functions. */
-const HIT_COLUMNS = 5, STEP_COLUMNS = 4, SURFACE_COLUMNS = 18;
+const HIT_COLUMNS = 5, STEP_COLUMNS = 4, SURFACE_COLUMNS = 20;
 /** Bytes of a file at most: the module holds it in one piece, at a multiple of 64. */
 const MOST_FILE = 2 ** 31 - 64;
 /** Words of memory that a chunk needs at most: hits and their surfaces. */
 const WORDS = CHUNK * (HIT_COLUMNS + SURFACE_COLUMNS);
+
+/** What stands for no texture. */
+const NONE = 0xffffffff;
+/** How texture coordinates beyond 0 and 1 find texels. */
+const WRAPS = ["repeat", "mirror", "clamp"];
 
 /** What the library refuses: `code` is that of the error, such as "BTH-F001", or "" where it has none. */
 export class BthError extends Error {
@@ -201,9 +206,56 @@ class Scene {
             interleave([6, 7, 8].map(words), geometricNormal, from);
             interleave([9, 10].map(words), uv, from);
             interleave([11, 12, 13, 14].map(words), color, from);
-            this.#columns([surface.object, surface.group, surface.material], surfaces + 4 * n * 15, from, n);
+            interleave([15, 16].map(words), surface.secondUv, from);
+            this.#columns([surface.object, surface.group, surface.material], surfaces + 4 * n * 17, from, n);
         }
         return surface;
+    }
+
+    materials(object) {
+        return this.#rows("bth_material", object, (words, floats) => ({
+            baseColor: [...floats.subarray(0, 4)],
+            baseColorTexture: words[10] === NONE ? null : words[10],
+            emissive: [...floats.subarray(4, 7)],
+            emissiveTexture: words[11] === NONE ? null : words[11],
+            alpha: ["opaque", "mask", "blend"][words[8]],
+            alphaCutoff: floats[7],
+            doubleSided: (words[9] & 1) !== 0,
+            unlit: (words[9] & 2) !== 0,
+        }));
+    }
+
+    textures(object) {
+        return this.#rows("bth_texture", object, (words, floats) => ({
+            image: words[2],
+            wrap: [WRAPS[words[3]], WRAPS[words[4]]],
+            filter: words[5] === 1 ? "nearest" : "linear",
+            uvSet: words[6],
+            transform: [...floats.subarray(7, 13)],
+        }));
+    }
+
+    image(object, texture) {
+        const scene = this.#open();
+        checkIndex("object", object, this.objects);
+        const words = this.#memory.numbers;
+        if (!Number.isInteger(texture) || texture < 0 || texture >= NONE || this.#wasm.bth_texture(scene, object, texture, words) === 0) {
+            throw new RangeError(`texture: expected the index of a texture of object ${object}; found ${String(texture)}`);
+        }
+        const [address, length] = new Uint32Array(this.#wasm.memory.buffer, words, 2);
+        return new Uint8Array(this.#wasm.memory.buffer, address, length).slice();
+    }
+
+    /** What one of the module's functions writes about the parts of an object, until there are no more. */
+    #rows(name, object, read) {
+        const scene = this.#open();
+        checkIndex("object", object, this.objects);
+        const rows = [];
+        while (this.#wasm[name](scene, object, rows.length, this.#memory.numbers) !== 0) {
+            const words = new Uint32Array(this.#wasm.memory.buffer, this.#memory.numbers, 13);
+            rows.push(read(words, new Float32Array(words.buffer, words.byteOffset, 13)));
+        }
+        return rows;
     }
 
     close() {
@@ -273,6 +325,12 @@ function bytesOf(file) {
     return isView ? new Uint8Array(file.buffer, file.byteOffset, file.byteLength) : new Uint8Array(file);
 }
 
+/** Refuses what is no index below a number. */
+function checkIndex(name, index, count) {
+    if (Number.isInteger(index) && index >= 0 && index < count) return;
+    throw new RangeError(`${name}: expected an index below ${count}; found ${typeof index === "number" ? index : kindOf(index)}`);
+}
+
 /** Number of rays in an array. */
 function countOf(rays) {
     if (classOf(rays) !== "Float32Array" || rays.length % RAY !== 0) {
@@ -340,6 +398,7 @@ class Surface {
         this.geometricNormal = new Float32Array(3 * count);
         this.uv = new Float32Array(2 * count);
         this.color = new Float32Array(4 * count);
+        this.secondUv = new Float32Array(2 * count);
         this.object = new Uint32Array(count);
         this.group = new Uint32Array(count);
         this.material = new Uint32Array(count);

@@ -18,10 +18,11 @@ _GLTF = ("flatten", "scene", "animation", "rate", "at_rest", "rigid_parts", "str
 def compile(
     model, *, output=None, quality=None, structure=None, coordinates=None, max_error=None, boxes=None, polygons=None,
     attributes=None, alpha=None, tets=None, subtrees=None, compact=None, geometry=None, names=None, materials=None,
-    lenient_materials=None, estimator=None, select=None, optimize_for=None, profile=None, max_bytes_per_triangle=None, budget=None, probe=None, min_tet_triangles=None, c_tet=None, for_scene=None,
-    rays=None, tet_deadline=None, tet_memory=None, flatten=None, scene=None, animation=None, rate=None, at_rest=None,
-    rigid_parts=None, strict=None, deformable=None, poses=None, segments=None, free_directions=None, free_reach=None,
-    cache=None, cache_size=None, shared_cache=None, memory=None, threads=None, progress=None,
+    lenient_materials=None, estimator=None, select=None, optimize_for=None, profile=None, max_bytes_per_triangle=None,
+    budget=None, probe=None, min_tet_triangles=None, c_tet=None, for_scene=None, rays=None,
+    tet_deadline=None, tet_memory=None, flatten=None, scene=None, animation=None, rate=None, at_rest=None, rigid_parts=None,
+    strict=None, deformable=None, poses=None, segments=None, free_directions=None, free_reach=None, cache=None,
+    cache_size=None, shared_cache=None, memory=None, threads=None, progress=None,
 ):
     """Compiles a model and returns its scene.
 

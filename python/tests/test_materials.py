@@ -83,3 +83,16 @@ def test_without_materials_only_names_are_kept(path):
             scene.materials(wrong)
         with pytest.raises(IndexError):
             scene.textures(wrong)
+
+
+def test_a_missing_image_is_an_error_unless_it_is_left_out(path, tmp_path):
+    (tmp_path / "colored.obj").write_text(MODEL)
+    (tmp_path / "colored.mtl").write_text(MATERIALS)
+    with pytest.raises(bth.Error, match="BTH-I016.*grey.png"):
+        bth.compile(tmp_path / "colored.obj", materials=True, cache=False)
+    with pytest.warns(UserWarning, match="grey.png.*left out"):
+        scene = bth.compile(tmp_path / "colored.obj", materials=True, lenient_materials=True, cache=False)
+    [lamp, glass] = scene.materials()
+    whole = bth.compile(path, materials=True, cache=False).materials()
+    np.testing.assert_array_equal([lamp.base_color, glass.base_color], [material.base_color for material in whole])
+    assert lamp.base_color_texture is None and scene.textures() == []

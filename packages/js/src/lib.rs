@@ -6,6 +6,7 @@
 #![allow(unsafe_code)] // All functions are called from outside, and most take addresses.
 
 pub mod describe;
+pub mod materials;
 pub mod memory;
 pub mod queries;
 pub mod surface;

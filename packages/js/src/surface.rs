@@ -5,8 +5,8 @@ use bth::Scene;
 use bth::rays::Hit;
 
 /// Numbers of a hit's surface: position, normal and geometric normal (3 each, world space), texture coordinates (2), linear red,
-/// green, blue and alpha, as f32; object, group and material, as words.
-const SURFACE_COLUMNS: usize = 18;
+/// green, blue and alpha, texture coordinates of the second set (2), as f32; object, group and material, as words.
+const SURFACE_COLUMNS: usize = 20;
 
 /// The surface at hits: columns of [`SURFACE_COLUMNS`] words a hit. A miss, and all hits if the file does not keep the vertices of
 /// triangles, have numbers of NaN and indices of 2^32 - 1. So have texture coordinates and materials that the file does not keep. The
@@ -37,7 +37,7 @@ pub unsafe extern "C" fn bth_surface(
 /// The words of one hit.
 fn surface(scene: &Scene, hit: &Hit) -> [u32; SURFACE_COLUMNS] {
     let mut words = [f32::NAN.to_bits(); SURFACE_COLUMNS];
-    words[15..].fill(u32::MAX);
+    words[17..].fill(u32::MAX);
     let Some(surface) = hit.is_hit().then(|| scene.surface(hit)).flatten() else { return words };
     let vectors = [surface.position, surface.normal, surface.geometric_normal];
     for (to, from) in words.iter_mut().zip(vectors.as_flattened()) {
@@ -51,6 +51,9 @@ fn surface(scene: &Scene, hit: &Hit) -> [u32; SURFACE_COLUMNS] {
     for k in 0..4 {
         words[11 + k] = (factor[k] * at_vertices[k]).to_bits();
     }
-    words[15..].copy_from_slice(&[surface.object, surface.group, surface.material.unwrap_or(u32::MAX)]);
+    for (to, from) in words[15..17].iter_mut().zip(scene.texture_coordinates(hit, 1).iter().flatten()) {
+        *to = from.to_bits();
+    }
+    words[17..].copy_from_slice(&[surface.object, surface.group, surface.material.unwrap_or(u32::MAX)]);
     words
 }

@@ -177,6 +177,7 @@ function report(samples, milliseconds, { mode, size }) {
         `${samples} of ${samplesFor(mode)} samples`,
         `${rate.toFixed(2)} million pixels a second`,
         counted(pool.size, "worker"),
+        content.undecoded > 0 ? `${counted(content.undecoded, "image")} the browser cannot decode` : "",
         mode === "steps" ? `brightest: ${counted(picture.mostSteps, "step")}` : "",
         shown.picked,
     ];

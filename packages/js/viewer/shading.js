@@ -1,6 +1,7 @@
 // The colours of a tile of the picture in each mode.
 
 import { directionThrough, onGround } from "./camera.js";
+import { texel } from "./materials.js";
 import { add, blend, cosineDirection, dot, length, mix, perpendicular, samplePoint, scale, unit } from "./vectors.js";
 
 /** Distance from a surface at which secondary rays start, relative to the diagonal of the scene: more than the rounding of points. */
@@ -11,6 +12,8 @@ const AMBIENT_RAYS = 2, AO_RAYS = 4;
 const OPEN_OUTSIDE = 0.5, OPEN_INSIDE = 0.08;
 /** How far the lamp of a room is above the camera, relative to the diagonal of the scene. */
 const LAMP_HEIGHT = 1e-3;
+/** Surfaces that let a part of the light through, behind each other, at most; the last one counts as opaque. */
+const MOST_LAYERS = 16;
 /** Radius of the key light at distance 1, which decides how soft its shadows are. */
 const KEY_RADIUS = 0.16;
 
@@ -25,14 +28,15 @@ const BACKGROUND_BOTTOM = [0.8, 0.81, 0.82];
 const DARK = [0.02, 0.02, 0.02];
 
 /**
- * The colours of a tile, three numbers a pixel, row by row; in mode steps the first is the number of steps. A job has the camera, the
+ * The colours of a tile, three numbers a pixel, row by row; in mode steps the first is the number of steps. `materials` are those of
+ * the scene as `materialsOf` has them. A job has the camera, the
  * mode, the size of the whole picture, the tile (left, top, width, height), the distance of its pixels in those of the picture
  * (`step`), the number of the sample, the scene's bounds and whether the camera is inside them.
  */
-export function shadeTile(scene, job) {
+export function shadeTile(scene, materials, job) {
     const samples = samplesOf(job);
     const shade = { shaded, normals, ao: ambientOcclusion, steps }[job.mode];
-    const colors = shade(scene, job, samples);
+    const colors = shade({ scene, materials }, job, samples);
     const { width, height } = job.tile;
     const picture = new Float32Array(3 * width * height);
     samples.forEach(({ x, y }, i) => picture.set(colors[i], 3 * (y * width + x)));
@@ -64,8 +68,9 @@ class Rays {
         this.numbers = new Float32Array(8 * capacity);
         this.count = 0;
     }
-    push(origin, direction, tmax) {
+    push(origin, direction, tmax, tmin = 0) {
         const { numbers } = this, at = 8 * this.count++;
+        numbers[at + 3] = tmin;
         for (let k = 0; k < 3; k++) {
             numbers[at + k] = origin[k];
             numbers[at + 4 + k] = direction[k];
@@ -85,27 +90,59 @@ function cameraRays(camera, samples) {
 
 const vector = (array, i) => [array[3 * i], array[3 * i + 1], array[3 * i + 2]];
 
-/** What the camera rays hit: for each sample the point and its normals on the side of the camera, or null. */
-function visiblePoints(scene, camera, samples) {
-    const rays = cameraRays(camera, samples);
-    const hits = scene.nearest(rays);
-    const surface = scene.surface(hits);
-    return samples.map(({ direction }, i) => {
-        if (hits.t[i] === Infinity) return null;
-        let geometric = vector(surface.geometricNormal, i), normal = vector(surface.normal, i);
-        // A file without vertices has no normals: surfaces then face the camera.
-        if (Number.isNaN(geometric[0])) geometric = normal = scale(direction, -1);
-        if (dot(geometric, direction) > 0) geometric = scale(geometric, -1);
-        if (dot(normal, geometric) < 0) normal = scale(normal, -1);
-        const color = [surface.color[4 * i], surface.color[4 * i + 1], surface.color[4 * i + 2]];
-        const hasColor = surface.material[i] !== 0xffffffff || color[0] !== 1 || color[1] !== 1 || color[2] !== 1;
-        return {
-            point: add(camera.eye, direction, hits.t[i]),
-            geometric,
-            normal,
-            color: hasColor && !Number.isNaN(color[0]) ? color : CLAY,
-        };
-    });
+/**
+ * What the camera rays meet: for each sample the point, its normals on the side of the camera and its colours, or null. Rays pass
+ * surfaces whose alpha lets them through: all below the cutoff of a mask, else as many as light passes.
+ */
+function visiblePoints({ scene, materials }, { camera, sample }, samples) {
+    const points = new Array(samples.length).fill(null);
+    let rays = cameraRays(camera, samples), indices = samples.map((_, i) => i);
+    for (let layer = 0; indices.length > 0; layer++) {
+        const hits = scene.nearest(rays), surface = scene.surface(hits);
+        const further = new Rays(indices.length), passed = [];
+        indices.forEach((index, i) => {
+            if (hits.t[i] === Infinity) return;
+            const { direction, pixel } = samples[index];
+            const look = lookOf(materials, surface, i);
+            const [share] = samplePoint(pixel, 3 + layer, sample);
+            if (layer + 1 < MOST_LAYERS && (look.alpha === 0 || look.alpha < share)) {
+                // From the next number behind the hit on.
+                further.push(camera.eye, direction, Infinity, hits.t[i] * (1 + 2 ** -23));
+                passed.push(index);
+                return;
+            }
+            points[index] = { ...look, ...sideOf(surface, i, direction), point: add(camera.eye, direction, hits.t[i]) };
+        });
+        [rays, indices] = [further.used, passed];
+    }
+    return points;
+}
+
+/** The normals at a hit, on the side from which a ray comes. */
+function sideOf(surface, i, direction) {
+    let geometric = vector(surface.geometricNormal, i), normal = vector(surface.normal, i);
+    // A file without vertices has no normals: surfaces then face the camera.
+    if (Number.isNaN(geometric[0])) geometric = normal = scale(direction, -1);
+    if (dot(geometric, direction) > 0) geometric = scale(geometric, -1);
+    if (dot(normal, geometric) < 0) normal = scale(normal, -1);
+    return { geometric, normal };
+}
+
+/** The colour of the surface at a hit, what it emits, the share of light that it stops, and whether it is shown without light. */
+function lookOf(materials, surface, i) {
+    const color = [...surface.color.subarray(4 * i, 4 * i + 4)];
+    const material = materials.of(surface.object[i], surface.material[i]);
+    if (material === undefined) {
+        const hasColor = surface.material[i] !== 0xffffffff || color.some((x) => x !== 1);
+        return { color: hasColor && !Number.isNaN(color[0]) ? color : CLAY, emission: null, alpha: 1, unlit: false };
+    }
+    const coordinates = { 0: surface.uv, 1: surface.secondUv };
+    const at = (texture) => texel(texture, ...coordinates[texture.uvSet].subarray(2 * i, 2 * i + 2));
+    const { baseColorTexture, emissiveTexture, emissive, alpha, alphaCutoff, unlit } = material;
+    if (baseColorTexture) at(baseColorTexture).forEach((x, k) => (color[k] *= x));
+    const texture = emissiveTexture && at(emissiveTexture);
+    const stopped = { opaque: 1, mask: color[3] >= alphaCutoff ? 1 : 0, blend: color[3] }[alpha];
+    return { color, emission: texture ? emissive.map((x, k) => x * texture[k]) : emissive, alpha: stopped, unlit };
 }
 
 /** A point just above a surface. Far from the origin the spacing of f32 numbers exceeds the relative distance. */
@@ -114,22 +151,24 @@ function above(point, normal, diagonal) {
     return add(point, normal, Math.max(OFFSET * diagonal, greatest * 2 ** -21));
 }
 
-function normals(scene, { camera }, samples) {
+function normals(shown, job, samples) {
+    const { camera } = job;
     const shade = (along) => 0.5 + 0.5 * along;
-    return visiblePoints(scene, camera, samples).map((at) => {
+    return visiblePoints(shown, job, samples).map((at) => {
         if (at === null) return DARK;
         const { normal } = at;
         return [shade(dot(normal, camera.right)), shade(dot(normal, camera.up)), shade(-dot(normal, camera.forward))];
     });
 }
 
-function steps(scene, { camera }, samples) {
+function steps({ scene }, { camera }, samples) {
     const { nodes, leaves, tets } = scene.steps(cameraRays(camera, samples));
     return samples.map((_, i) => [nodes[i] + leaves[i] + tets[i], 0, 0]);
 }
 
-function ambientOcclusion(scene, job, samples) {
-    const points = visiblePoints(scene, job.camera, samples);
+function ambientOcclusion(shown, job, samples) {
+    const { scene } = shown;
+    const points = visiblePoints(shown, job, samples);
     const rays = new Rays(AO_RAYS * samples.length);
     points.forEach((at, i) => {
         if (at !== null) pushAmbient(rays, job, at.point, at.geometric, samples[i].pixel, AO_RAYS);
@@ -160,12 +199,12 @@ const mean = (values, from, count) => {
 };
 
 /** A matte model under a soft key light and a fill light, with ambient occlusion, on a ground that only catches shadows. */
-function shaded(scene, job, samples) {
-    const { camera, diagonal, inside, bounds } = job;
+function shaded(shown, job, samples) {
+    const { scene } = shown, { camera, diagonal, inside, bounds } = job;
     const lights = studio(job);
     const ground = inside ? null : dot(camera.vertical, camera.vertical.map((x, k) => (x < 0 ? bounds.upper[k] : bounds.lower[k])));
     const center = scale(add(bounds.lower, bounds.upper), 0.5);
-    const points = visiblePoints(scene, camera, samples).map((at, i) => {
+    const points = visiblePoints(shown, job, samples).map((at, i) => {
         if (at !== null || ground === null) return at;
         const point = onGround(camera, samples[i].direction, ground);
         if (point === null) return null;
@@ -178,7 +217,7 @@ function shaded(scene, job, samples) {
     const each = 1 + AMBIENT_RAYS;
     const rays = new Rays(each * samples.length);
     points.forEach((at, i) => {
-        if (at === null) return;
+        if (at === null || at.unlit) return;
         at.toKey = pushKey(rays, lights, job, at, samples[i].pixel);
         pushAmbient(rays, job, at.point, at.geometric, samples[i].pixel, AMBIENT_RAYS);
     });
@@ -187,6 +226,7 @@ function shaded(scene, job, samples) {
     return points.map((at, i) => {
         const behind = background(samples[i]);
         if (at === null) return behind;
+        if (at.unlit) return at.color;
         const key = 1 - blocked[next], open = 1 - mean(blocked, next + 1, AMBIENT_RAYS);
         next += each;
         if (at.shadow !== undefined) return scale(behind, 1 - at.shadow * (0.62 * (1 - open) + 0.3 * (1 - key)));
@@ -223,7 +263,8 @@ function lit(at, { fill }, camera, direction, key, open) {
     // A weak specular term (Blinn) shows curvature in the lit parts.
     const half = unit(add(at.toKey, direction, -1));
     const gloss = 0.06 * key * Math.max(dot(at.normal, half), 0) ** 24;
-    const channel = (k) => at.color[k] * (KEY[k] * key * facing + FILL[k] * fromFill + ambient[k] * open) + KEY[k] * gloss;
+    const emission = at.emission ?? [0, 0, 0];
+    const channel = (k) => emission[k] + at.color[k] * (KEY[k] * key * facing + FILL[k] * fromFill + ambient[k] * open) + KEY[k] * gloss;
     return [channel(0), channel(1), channel(2)];
 }
 

@@ -1,22 +1,24 @@
 // A worker: it holds a copy of the file and shades tiles.
 
 import { load } from "../index.js";
+import { materialsOf } from "./materials.js";
 import { shadeTile } from "./shading.js";
 
 let bth = null;
-let scene = null;
+let scene = null, materials = null;
 
 const answers = {
     async module({ module }) {
         bth = await load(module);
         return {};
     },
-    open({ file }) {
+    async open({ file }) {
         scene?.close();
         scene = null;
         scene = bth.open(file);
+        materials = await materialsOf(scene);
         const { objects, instances, triangles, frames, bounds } = scene;
-        return { objects, instances, triangles, frames, bounds };
+        return { objects, instances, triangles, frames, bounds, undecoded: materials.undecoded };
     },
     seconds({ seconds }) {
         scene.seconds = seconds;
@@ -24,7 +26,7 @@ const answers = {
     },
     tile({ job }) {
         const start = performance.now();
-        const picture = shadeTile(scene, job);
+        const picture = shadeTile(scene, materials, job);
         return { picture, milliseconds: performance.now() - start };
     },
     pick({ ray }) {

@@ -9,6 +9,7 @@ import { dirname, join, resolve } from "node:path";
 import { after, before, test } from "node:test";
 import { fileURLToPath, pathToFileURL } from "node:url";
 import { runInNewContext } from "node:vm";
+import { FOUR_TEXELS, png, quads } from "./models.mjs";
 
 const here = dirname(fileURLToPath(import.meta.url)), conformance = resolve(here, "../../../format-spec/conformance");
 const { BTHC, BTH_SCENES } = process.env;
@@ -145,6 +146,46 @@ test("the surface at a hit", () => {
     assert.equal(Math.abs(surface.geometricNormal[2]), 1);
     assert.deepEqual([...surface.color.subarray(0, 4)], [1, 1, 1, 1]);
     assert.ok(Number.isNaN(surface.position[3]) && surface.object[1] === 0xffffffff);
+});
+
+test("materials, textures and their images are those of the source", () => {
+    const [model, file] = [join(folder, "quads.gltf"), join(folder, "quads.bth")];
+    const document = JSON.parse(quads());
+    // A texture whose coordinates are a second set.
+    document.materials[0].emissiveFactor = [0.5, 0.25, 1];
+    document.materials[0].emissiveTexture = { index: 1, texCoord: 1 };
+    document.textures.push({ source: 0 });
+    document.meshes[0].primitives[0].attributes.TEXCOORD_1 = 2;
+    writeFileSync(model, JSON.stringify(document));
+    execFileSync(BTHC, ["compile", model, "-o", file, "--materials", "--quiet"]);
+    const scene = bth.open(readFileSync(file));
+    const [glass, green] = scene.materials(0);
+    assert.deepEqual(glass, {
+        baseColor: [1, 1, 1, 1], baseColorTexture: 0, emissive: [0.5, 0.25, 1], emissiveTexture: 1, alpha: "blend", alphaCutoff: 0,
+        doubleSided: false, unlit: true,
+    });
+    assert.deepEqual([green.baseColor, green.baseColorTexture, green.emissiveTexture, green.alpha, green.doubleSided], [[0, 0.5, 0, 1], null, null, "opaque", true]);
+    const textures = scene.textures(0);
+    const transform = [1, 0, 0, 0, 1, 0];
+    assert.deepEqual(textures[0], { image: 0, wrap: ["clamp", "clamp"], filter: "nearest", uvSet: 0, transform });
+    assert.deepEqual(textures[1], { image: 0, wrap: ["repeat", "repeat"], filter: "linear", uvSet: 1, transform });
+    for (const texture of [0, 1]) assert.deepEqual([...scene.image(0, texture)], [...png(2, 2, FOUR_TEXELS)]);
+    const hits = scene.nearest(Float32Array.of(0.5, 0.25, 1, 0, 0, 0, -1, Infinity, 1.5, 1.5, 1, 0, 0, 0, -1, Infinity));
+    const { uv, secondUv, material, color } = scene.surface(hits);
+    assert.deepEqual([[...uv.subarray(0, 2)], [...secondUv.subarray(0, 2)]], [[0.75, 0.375], [0.75, 0.375]]);
+    assert.deepEqual([...material, ...color.subarray(4)], [0, 1, 0, 0.5, 0, 1]);
+    // What is not kept, and what is not there.
+    const plain = bth.open(readFileSync(join(conformance, "valid/triangle.bth")));
+    assert.deepEqual([plain.materials(0), plain.textures(0)], [[], []]);
+    for (const object of [1, -1, 0.5, NaN, "0", undefined, 2 ** 32]) {
+        assert.throws(() => plain.materials(object), (error) => error instanceof RangeError && /^object: expected an index below 1; found/.test(error.message));
+        assert.throws(() => scene.textures(object), RangeError);
+        assert.throws(() => scene.image(object, 0), RangeError);
+    }
+    for (const texture of [2, -1, 0.5, NaN, "0", undefined, 2 ** 32]) assert.throws(() => scene.image(0, texture), /^RangeError: texture: expected the index of a texture of object 0/);
+    assert.throws(() => plain.image(0, 0), RangeError);
+    scene.close();
+    for (const call of [() => scene.materials(0), () => scene.textures(0), () => scene.image(0, 0)]) assert.throws(call, BthError);
 });
 
 test("what files hold is counted", () => {

@@ -11,6 +11,7 @@ import { dirname, join, resolve } from "node:path";
 import { after, before, test } from "node:test";
 import { fileURLToPath, pathToFileURL } from "node:url";
 import { Browser } from "./browser.mjs";
+import { quads } from "./models.mjs";
 
 const here = dirname(fileURLToPath(import.meta.url)), valid = resolve(here, "../../../format-spec/conformance/valid");
 const { BTHC, BTH_SCENES, CHROMIUM } = process.env;
@@ -77,6 +78,25 @@ test("a dropped file is shown", async () => {
     await browser.until("/4 of 4 samples/.test(document.getElementById('status').textContent)");
     assert.match(await browser.value("document.getElementById('status').textContent"), /^knot\.bth · 2,880 triangles .* workers?$/);
     await looksAs("shaded");
+});
+
+test("materials are shown with their textures and holes", async () => {
+    const [source, file, broken] = ["quads.gltf", "quads.bth", "broken.bth"].map((name) => join(folder, name));
+    writeFileSync(source, quads());
+    execFileSync(BTHC, ["compile", source, "-o", file, "--materials", "--quiet"]);
+    await browser.drop(file, WIDTH / 2, HEIGHT / 2);
+    await browser.until("/^quads.bth .*4 of 4 samples/.test(document.getElementById('status').textContent)");
+    await looksAs("textures");
+    // An image that only looks like one.
+    const document = JSON.parse(quads());
+    const image = Buffer.from(document.images[0].uri.split(",")[1], "base64");
+    document.images[0].uri = `data:image/png;base64,${image.subarray(0, 60).toString("base64")}`;
+    writeFileSync(source, JSON.stringify(document));
+    execFileSync(BTHC, ["compile", source, "-o", broken, "--materials", "--quiet"]);
+    await browser.drop(broken, WIDTH / 2, HEIGHT / 2);
+    await browser.until("/^broken.bth .*4 of 4 samples .* 1 image the browser cannot decode/.test(document.getElementById('status').textContent)");
+    await browser.drop(model, WIDTH / 2, HEIGHT / 2);
+    await browser.until("/^knot.bth .*4 of 4 samples/.test(document.getElementById('status').textContent)");
 });
 
 for (const [key, mode] of [["2", "normals"], ["3", "ao"], ["4", "steps"]]) {

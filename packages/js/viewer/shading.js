@@ -128,13 +128,13 @@ function sideOf(surface, i, direction) {
     return { geometric, normal };
 }
 
-/** The colour of the surface at a hit, what it emits, the share of light that it stops, and whether it is shown without light. */
+/** Red, green and blue of the surface at a hit, what it emits, the share of light that it stops, and whether it is shown without light. */
 function lookOf(materials, surface, i) {
     const color = [...surface.color.subarray(4 * i, 4 * i + 4)];
     const material = materials.of(surface.object[i], surface.material[i]);
     if (material === undefined) {
         const hasColor = surface.material[i] !== 0xffffffff || color.some((x) => x !== 1);
-        return { color: hasColor && !Number.isNaN(color[0]) ? color : CLAY, emission: null, alpha: 1, unlit: false };
+        return { color: hasColor && !Number.isNaN(color[0]) ? color.slice(0, 3) : CLAY, emission: null, alpha: 1, unlit: false };
     }
     const coordinates = { 0: surface.uv, 1: surface.secondUv };
     const at = (texture) => texel(texture, ...coordinates[texture.uvSet].subarray(2 * i, 2 * i + 2));
@@ -142,7 +142,7 @@ function lookOf(materials, surface, i) {
     if (baseColorTexture) at(baseColorTexture).forEach((x, k) => (color[k] *= x));
     const texture = emissiveTexture && at(emissiveTexture);
     const stopped = { opaque: 1, mask: color[3] >= alphaCutoff ? 1 : 0, blend: color[3] }[alpha];
-    return { color, emission: texture ? emissive.map((x, k) => x * texture[k]) : emissive, alpha: stopped, unlit };
+    return { color: color.slice(0, 3), emission: texture ? emissive.map((x, k) => x * texture[k]) : emissive, alpha: stopped, unlit };
 }
 
 /** A point just above a surface. Far from the origin the spacing of f32 numbers exceeds the relative distance. */

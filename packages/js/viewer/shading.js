@@ -100,49 +100,69 @@ function visiblePoints({ scene, materials }, { camera, sample }, samples) {
     for (let layer = 0; indices.length > 0; layer++) {
         const hits = scene.nearest(rays), surface = scene.surface(hits);
         const further = new Rays(indices.length), passed = [];
-        indices.forEach((index, i) => {
-            if (hits.t[i] === Infinity) return;
-            const { direction, pixel } = samples[index];
-            const look = lookOf(materials, surface, i);
-            const [share] = samplePoint(pixel, 3 + layer, sample);
-            if (layer + 1 < MOST_LAYERS && (look.alpha === 0 || look.alpha < share)) {
+        for (let i = 0; i < indices.length; i++) {
+            if (hits.t[i] === Infinity) continue;
+            const { direction, pixel } = samples[indices[i]], seen = lookOf(materials, surface, i);
+            if (seen.alpha < 1 && layer + 1 < MOST_LAYERS && seen.alpha <= samplePoint(pixel, 3 + layer, sample)[0]) {
                 // From the next number behind the hit on.
                 further.push(camera.eye, direction, Infinity, hits.t[i] * (1 + 2 ** -23));
-                passed.push(index);
-                return;
+                passed.push(indices[i]);
+                continue;
             }
-            points[index] = { ...look, ...sideOf(surface, i, direction), point: add(camera.eye, direction, hits.t[i]) };
-        });
+            seen.point = add(camera.eye, direction, hits.t[i]);
+            turnToCamera(seen, surface, i, direction);
+            points[indices[i]] = seen;
+        }
         [rays, indices] = [further.used, passed];
     }
     return points;
 }
 
-/** The normals at a hit, on the side from which a ray comes. */
-function sideOf(surface, i, direction) {
+/** Notes the normals at a hit, on the side from which a ray comes. */
+function turnToCamera(seen, surface, i, direction) {
     let geometric = vector(surface.geometricNormal, i), normal = vector(surface.normal, i);
     // A file without vertices has no normals: surfaces then face the camera.
     if (Number.isNaN(geometric[0])) geometric = normal = scale(direction, -1);
     if (dot(geometric, direction) > 0) geometric = scale(geometric, -1);
     if (dot(normal, geometric) < 0) normal = scale(normal, -1);
-    return { geometric, normal };
+    seen.geometric = geometric;
+    seen.normal = normal;
 }
 
-/** Red, green and blue of the surface at a hit, what it emits, the share of light that it stops, and whether it is shown without light. */
+const NO_LIGHT = [0, 0, 0];
+
+/** The surface at a hit: its colour, what it emits, the share of light that it stops, and whether it is shown without light. */
 function lookOf(materials, surface, i) {
-    const color = [...surface.color.subarray(4 * i, 4 * i + 4)];
+    const values = surface.color, from = 4 * i;
+    const color = [values[from], values[from + 1], values[from + 2]];
+    const seen = { color, emission: NO_LIGHT, alpha: 1, unlit: false, point: null, geometric: null, normal: null };
     const material = materials.of(surface.object[i], surface.material[i]);
     if (material === undefined) {
-        const hasColor = surface.material[i] !== 0xffffffff || color.some((x) => x !== 1);
-        return { color: hasColor && !Number.isNaN(color[0]) ? color.slice(0, 3) : CLAY, emission: null, alpha: 1, unlit: false };
+        const isWhite = color[0] === 1 && color[1] === 1 && color[2] === 1;
+        if ((isWhite && surface.material[i] === 0xffffffff) || Number.isNaN(color[0])) seen.color = CLAY;
+        return seen;
     }
-    const coordinates = { 0: surface.uv, 1: surface.secondUv };
-    const at = (texture) => texel(texture, ...coordinates[texture.uvSet].subarray(2 * i, 2 * i + 2));
-    const { baseColorTexture, emissiveTexture, emissive, alpha, alphaCutoff, unlit } = material;
-    if (baseColorTexture) at(baseColorTexture).forEach((x, k) => (color[k] *= x));
-    const texture = emissiveTexture && at(emissiveTexture);
-    const stopped = { opaque: 1, mask: color[3] >= alphaCutoff ? 1 : 0, blend: color[3] }[alpha];
-    return { color: color.slice(0, 3), emission: texture ? emissive.map((x, k) => x * texture[k]) : emissive, alpha: stopped, unlit };
+    let share = values[from + 3];
+    if (material.baseColorTexture) {
+        const texels = texelAt(material.baseColorTexture, surface, i);
+        for (let k = 0; k < 3; k++) color[k] *= texels[k];
+        share *= texels[3];
+    }
+    seen.emission = material.emissive;
+    if (material.emissiveTexture) {
+        const texels = texelAt(material.emissiveTexture, surface, i);
+        seen.emission = material.emissive.map((x, k) => x * texels[k]);
+    }
+    if (material.alpha === "mask") seen.alpha = share >= material.alphaCutoff ? 1 : 0;
+    if (material.alpha === "blend") seen.alpha = share;
+    seen.unlit = material.unlit;
+    return seen;
+}
+
+/** The texel of a texture at a hit. */
+function texelAt(texture, surface, i) {
+    const coordinates = texture.uvSet === 0 ? surface.uv : surface.secondUv;
+    return texel(texture, coordinates[2 * i], coordinates[2 * i + 1]);
 }
 
 /** A point just above a surface. Far from the origin the spacing of f32 numbers exceeds the relative distance. */
@@ -263,8 +283,7 @@ function lit(at, { fill }, camera, direction, key, open) {
     // A weak specular term (Blinn) shows curvature in the lit parts.
     const half = unit(add(at.toKey, direction, -1));
     const gloss = 0.06 * key * Math.max(dot(at.normal, half), 0) ** 24;
-    const emission = at.emission ?? [0, 0, 0];
-    const channel = (k) => emission[k] + at.color[k] * (KEY[k] * key * facing + FILL[k] * fromFill + ambient[k] * open) + KEY[k] * gloss;
+    const channel = (k) => at.emission[k] + at.color[k] * (KEY[k] * key * facing + FILL[k] * fromFill + ambient[k] * open) + KEY[k] * gloss;
     return [channel(0), channel(1), channel(2)];
 }
 

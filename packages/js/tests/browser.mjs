@@ -89,7 +89,7 @@ export class Browser {
 
     /** Drops a file onto the page, as a person does. */
     async drop(file, x, y) {
-        const data = { items: [], files: [file], dragOperationsMask: 1 };
+        const data = { items: [], files: [file].flat(), dragOperationsMask: 1 };
         for (const type of ["dragEnter", "dragOver", "drop"]) await this.send("Input.dispatchDragEvent", { type, x, y, data });
     }
 

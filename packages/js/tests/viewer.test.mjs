@@ -93,8 +93,9 @@ test("materials are shown with their textures and holes", async () => {
     document.images[0].uri = `data:image/png;base64,${image.subarray(0, 60).toString("base64")}`;
     writeFileSync(source, JSON.stringify(document));
     execFileSync(BTHC, ["compile", source, "-o", broken, "--materials", "--quiet"]);
-    await browser.drop(broken, WIDTH / 2, HEIGHT / 2);
-    await browser.until("/^broken.bth .*4 of 4 samples .* 1 image the browser cannot decode/.test(document.getElementById('status').textContent)");
+    // Of several files the first is shown, which is said.
+    await browser.drop([broken, model], WIDTH / 2, HEIGHT / 2);
+    await browser.until("/^broken.bth .the first of 2 files. .*4 of 4 samples .* 1 image the browser cannot decode/.test(document.getElementById('status').textContent)");
     await browser.drop(model, WIDTH / 2, HEIGHT / 2);
     await browser.until("/^knot.bth .*4 of 4 samples/.test(document.getElementById('status').textContent)");
 });

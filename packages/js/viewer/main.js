@@ -233,16 +233,17 @@ addEventListener("dragleave", () => document.body.classList.remove("over"));
 addEventListener("drop", (event) => {
     event.preventDefault();
     document.body.classList.remove("over");
-    openFile(event.dataTransfer.files[0]);
+    openFile(event.dataTransfer.files);
 });
 element("file").addEventListener("change", ({ target }) => {
-    openFile(target.files[0]);
+    openFile(target.files);
     // Else the same file, which may have changed, would not be opened when it is chosen again.
     target.value = "";
 });
-/** Opens a file that was chosen. `open` says what is wrong. */
-function openFile(file) {
-    if (file) open(chosenBytes(file), file.name).catch(() => {});
+/** Opens the first of the files that were chosen. `open` says what is wrong. */
+function openFile([file, ...others]) {
+    const name = others.length > 0 ? `${file.name} (the first of ${others.length + 1} files)` : file?.name;
+    if (file) open(chosenBytes(file), name).catch(() => {});
 }
 /** The bytes of a file. Browsers hand over folders as files, too, which cannot be read, and have no buffers for files of 2 GiB and more. */
 async function chosenBytes(file) {

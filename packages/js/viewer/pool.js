@@ -23,7 +23,7 @@ class Helper {
             data.error === undefined ? resolve(data.answer) : reject(new Error(data.error));
         };
         this.#worker.onerror = (event) => {
-            for (const { reject } of this.#waiting.values()) reject(new Error(event.message || "a worker failed"));
+            for (const { reject } of this.#waiting.values()) reject(new Error(event.message || "a worker cannot be started; a content security policy must allow worker-src blob:"));
             this.#waiting.clear();
         };
     }

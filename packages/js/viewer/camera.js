@@ -72,8 +72,13 @@ export function contains({ lower, upper }, point) {
 
 /** The unit direction through a point of the picture: (-1, -1) is the lower left corner, (1, 1) the upper right. */
 export function directionThrough(camera, x, y) {
-    const shift = add(scale(camera.right, x * camera.half[0]), camera.up, y * camera.half[1]);
-    return unit(add(camera.forward, shift));
+    const { right, up, forward, half } = camera, across = x * half[0], along = y * half[1];
+    const to = [
+        forward[0] + across * right[0] + along * up[0],
+        forward[1] + across * right[1] + along * up[1],
+        forward[2] + across * right[2] + along * up[2],
+    ];
+    return unit(to);
 }
 
 /** Where a ray meets the plane through a height along the vertical from above, or null. */

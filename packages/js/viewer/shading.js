@@ -2,7 +2,7 @@
 
 import { directionThrough, onGround } from "./camera.js";
 import { texel } from "./materials.js";
-import { add, blend, cosineDirection, dot, length, mix, perpendicular, samplePoint, scale, unit } from "./vectors.js";
+import { add, blend, cosineDirection, dot, length, mix, samplePoint, scale, tilted, unit } from "./vectors.js";
 
 /** Distance from a surface at which secondary rays start, relative to the diagonal of the scene: more than the rounding of points. */
 const OFFSET = 2e-5;
@@ -268,10 +268,8 @@ function pushKey(rays, lights, { diagonal, sample }, at, pixel) {
     const toKey = lights.key ?? unit(toLamp);
     const distance = lights.key === null ? length(toLamp) * 0.999 : 4 * diagonal;
     const [x, y] = samplePoint(pixel, 1, sample);
-    const [tangent, bitangent] = perpendicular(toKey);
-    const radius = KEY_RADIUS * Math.sqrt(y), angle = 2 * Math.PI * x;
-    const spread = add(scale(tangent, radius * Math.cos(angle)), bitangent, radius * Math.sin(angle));
-    rays.push(above(at.point, at.geometric, diagonal), unit(add(toKey, spread)), distance);
+    const to = unit(tilted(toKey, KEY_RADIUS * Math.sqrt(y), 1, 2 * Math.PI * x));
+    rays.push(above(at.point, at.geometric, diagonal), to, distance);
     return toKey;
 }
 

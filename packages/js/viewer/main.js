@@ -263,6 +263,7 @@ async function fetchedBytes(url) {
     if (!response.ok) throw new Error(`${response.status} ${response.statusText}`);
     return response.arrayBuffer();
 }
+say("");
 const named = asked.get("file");
 if (named) open(fetchedBytes(named), named.split("/").pop()).catch(() => {});
 
@@ -354,4 +355,3 @@ followScreen();
 
 // For tests, and for pages that show a file of their own.
 window.viewer = { open, setMode, whenSettled };
-say("");

@@ -15,7 +15,7 @@ use crate::monitor::Monitor;
 use crate::number::without_mark;
 use crate::raw::{Raw, RowKind, check_rows, check_triangles};
 use crate::source::{NON_FINITE, Source, input_error, read_file};
-use crate::{attributes, coordinate_range, gltf, mtl, obj, off, ply, stl, topology, weld};
+use crate::{attributes, coordinate_range, foreign, gltf, mtl, obj, off, ply, stl, topology, weld};
 
 /// The supported formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -313,11 +313,13 @@ pub(crate) fn format(source: &Source<'_>) -> Result<Format> {
         return Err(source.error("BTH-I001", message, "compile the manifest, or name one of its models"));
     }
     by_name.or_else(|| sniff(source.data)).ok_or_else(|| {
-        source.error(
-            "BTH-I001",
-            "expected a model in OBJ, glTF, GLB, PLY, STL or OFF format, found something else",
-            "give the file its format's extension if it is one of these, or convert it",
-        )
+        let found = foreign::of(source.data).unwrap_or(foreign::Foreign {
+            what: "something else",
+            hint: "give the file its format's extension if it is one of these, or convert it",
+        });
+        let what = found.what;
+        let message = format!("expected a model in OBJ, glTF, GLB, PLY, STL or OFF format, found {what}");
+        source.error("BTH-I001", message, found.hint)
     })
 }
 

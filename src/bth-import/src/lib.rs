@@ -15,6 +15,7 @@ mod deformation;
 mod disjoint_sets;
 mod ears;
 pub mod error;
+mod foreign;
 pub mod gltf;
 mod groups;
 mod image_file;

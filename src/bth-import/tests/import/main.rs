@@ -90,7 +90,7 @@ fn a_missing_file_is_a_file_error() {
 
 #[test]
 fn content_of_no_format_is_refused() {
-    assert_refused("model.bin", b"PK\x03\x04 something", "BTH-I001", "file", "found something else");
+    assert_refused("model.bin", b"PK\x03\x04 something", "BTH-I001", "file", "found a ZIP archive");
 }
 
 #[test]

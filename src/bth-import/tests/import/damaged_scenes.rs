@@ -102,9 +102,20 @@ fn read(bytes: &[u8], rigid_parts: bool) -> [bool; 3] {
 }
 
 #[test]
+fn a_skin_that_does_not_exist_is_an_error_of_meshes_whose_weights_move() {
+    let text = String::from_utf8(seed("morphed_skin.gltf")).unwrap();
+    let other = text.replace(r#""skin":0"#, r#""skin":1"#);
+    assert_ne!(other, text);
+    let options = ImportOptions::default();
+    let read = scene::import_bytes(Path::new("a.gltf"), other.as_bytes(), "a.gltf", &options, &Silent);
+    let error = read.err().map(|error| error.to_string()).unwrap_or_default();
+    assert!(error.starts_with("a.gltf: skin 1: BTH-I012: it does not exist"), "{error}");
+}
+
+#[test]
 fn damaged_documents_are_refused_or_make_sense() {
     let mut counts = [0; 3];
-    for name in ["skinned.gltf", "morphed.gltf"] {
+    for name in ["skinned.gltf", "morphed.gltf", "morphed_skin.gltf"] {
         let whole = seed(name);
         assert_eq!(read(&whole, false), [true; 3], "{name}");
         assert_eq!(read(&whole, true)[..2], [true; 2], "{name}");

@@ -151,8 +151,11 @@ impl Importer<'_> {
 
     /// Adds a skin to the manifest. Joints outside of the scene get nodes with the transforms of the document's.
     fn skin(&mut self, number: usize) -> Result<usize> {
-        let found = &self.document.skins[number];
         let part = format!("skin {number}");
+        // Not seen before where animated weights alone make the mesh deform.
+        let Some(found) = self.document.skins.get(number) else {
+            return Err(self.error(part, "it does not exist"));
+        };
         if found.joints.is_empty() {
             return Err(self.error(part, "expected at least one joint"));
         }

@@ -1,6 +1,7 @@
 //! Exit codes and error messages of wrong usage, missing files and malformed models.
 
 use crate::support::{bthc, command, folder, run, run_with, sphere, wait};
+use std::path::Path;
 use std::process::Stdio;
 use std::time::Duration;
 
@@ -78,6 +79,24 @@ fn errors_name_file_and_line() {
         let run = bthc(folder.path(), &["compile", name]).expect(3);
         assert!(run.stderr.contains(&format!("{name}:{line}")), "{run:?}");
     }
+}
+
+#[test]
+fn errors_about_the_contents_of_compiled_files_name_the_file() {
+    let files = Path::new(env!("CARGO_MANIFEST_DIR")).join("../format-spec/conformance/invalid");
+    for name in ["F104-bits.bth", "F150-frames.bth"] {
+        let found = bthc(&files, &["info", name, "--json"]).expect(3);
+        assert_eq!(found.json()["error"]["place"], name, "{found:?}");
+        let found = bthc(&files, &["verify", name, "--json"]).expect(1);
+        assert_eq!(found.json()["errors"][0]["place"], name, "{found:?}");
+        for run in [bthc(&files, &["info", name]).expect(3), bthc(&files, &["verify", name]).expect(1)] {
+            assert!(run.stderr.starts_with(&format!("error: {name}: BTH-F")), "{run:?}");
+        }
+    }
+    // SAFETY: nobody writes to the file, whose contents are refused.
+    #[allow(unsafe_code)]
+    let mapped = unsafe { bth::map(files.join("F150-frames.bth")) };
+    assert!(mapped.err().unwrap().path().is_some_and(|path| path.ends_with("F150-frames.bth")));
 }
 
 #[test]

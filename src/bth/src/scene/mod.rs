@@ -83,9 +83,10 @@ pub fn from_file(file: File) -> Result<Scene, Error> {
 /// As [`open`], except for those about the contents of objects.
 #[allow(unsafe_code)]
 pub unsafe fn map(path: impl AsRef<Path>) -> Result<Scene, Error> {
+    let path = path.as_ref();
     // SAFETY: the caller's contract includes that of `File::map`.
-    let file = unsafe { File::map(path.as_ref())? };
-    Scene::with_world(file)
+    let file = unsafe { File::map(path)? };
+    Scene::with_world(file).map_err(|e| e.in_file(path))
 }
 
 impl Scene {

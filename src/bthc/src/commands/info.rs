@@ -23,14 +23,18 @@ pub(crate) fn run(args: &Info) -> Result<(), Failure> {
         return gltf(model, args.json);
     }
     let file = args.file.as_ref().map(File::read).transpose()?;
+    let named = |failure| match (failure, &args.file) {
+        (Failure::Runtime(error), Some(path)) => Failure::Runtime(error.in_file(path)),
+        (other, _) => other,
+    };
     if args.json {
-        let mut value = file.as_ref().map_or_else(|| Ok(json!({})), describe)?;
+        let mut value = file.as_ref().map_or_else(|| Ok(json!({})), describe).map_err(named)?;
         if args.cpu {
             value["cpu"] = cpu();
         }
         return Ok(output::json(&value)?);
     }
-    let mut text = file.as_ref().map_or_else(|| Ok(String::new()), summary)?;
+    let mut text = file.as_ref().map_or_else(|| Ok(String::new()), summary).map_err(named)?;
     if args.cpu {
         text.push_str(&format!("{:#}\n", cpu()));
     }

@@ -28,17 +28,12 @@ pub(crate) fn run(args: &Verify) -> Result<(), Failure> {
             if is_right { Ok(()) } else { Err(Failure::Check) }
         }
         Err(errors) => {
+            let errors: Vec<_> = errors.into_iter().map(|error| error.in_file(&args.file)).collect();
             if args.json {
                 let errors: Vec<_> = errors.iter().map(runtime_json).collect();
                 output::json(&json!({"verified": false, "errors": errors}))?;
             } else {
-                for error in &errors {
-                    // Errors of opening the file name it already.
-                    match error.path() {
-                        Some(_) => output::error(&error.to_string()),
-                        None => output::error(&format!("{}: {error}", args.file.display())),
-                    }
-                }
+                errors.iter().for_each(|error| output::error(&error.to_string()));
             }
             Err(Failure::Check)
         }

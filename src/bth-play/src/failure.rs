@@ -1,5 +1,6 @@
 //! Errors: messages, codes, and exit codes.
 
+use bth_files::printable;
 use serde_json::{Value, json};
 use std::fmt::Display;
 use std::io::Write;
@@ -118,7 +119,7 @@ impl Failure {
     pub(crate) fn report(&self, wants_json: bool) -> ExitCode {
         let Some((mut error, exit_code)) = self.json() else { return ExitCode::SUCCESS };
         // Where the outputs are closed, the exit code is all that can be reported.
-        let _ = writeln!(std::io::stderr().lock(), "error: {}", text_of(&error));
+        let _ = writeln!(std::io::stderr().lock(), "error: {}", printable(&text_of(&error)));
         if wants_json {
             error["exit_code"] = exit_code.into();
             let _ = writeln!(std::io::stdout().lock(), "{:#}", json!({ "error": error }));

@@ -1,6 +1,7 @@
 //! Standard output and standard error.
 
 use crate::failure::Failure;
+use bth_files::printable;
 use std::io::Write;
 
 /// Prints a warning.
@@ -11,7 +12,7 @@ pub(crate) fn warn(text: &str) {
 /// Prints a line on standard error.
 pub(crate) fn note(text: &str) {
     // Nothing can be done when standard error is closed.
-    let _ = writeln!(std::io::stderr().lock(), "{text}");
+    let _ = writeln!(std::io::stderr().lock(), "{}", printable(text));
 }
 
 /// Prints text on standard output.

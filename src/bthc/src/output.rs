@@ -1,5 +1,6 @@
 //! Standard output and standard error.
 
+use bth_files::printable;
 use serde::Serialize;
 use std::io::{Result, StdoutLock, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -34,10 +35,10 @@ pub(crate) fn json(value: &impl Serialize) -> Result<()> {
 
 /// Prints an error; nothing can be done when standard error is closed.
 pub(crate) fn error(message: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "error: {message}");
+    let _ = writeln!(std::io::stderr().lock(), "error: {}", printable(message));
 }
 
 /// Prints a warning.
 pub(crate) fn warning(message: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "warning: {message}");
+    let _ = writeln!(std::io::stderr().lock(), "warning: {}", printable(message));
 }

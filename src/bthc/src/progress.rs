@@ -168,11 +168,7 @@ impl Monitor for Progress {
     }
     fn warn(&self, message: &str) {
         if self.warns {
-            self.bar.suspend(|| {
-                use std::io::Write;
-                // Nothing can be done when standard error is closed.
-                let _ = writeln!(std::io::stderr().lock(), "warning: {message}");
-            });
+            self.bar.suspend(|| output::warning(message));
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Plain text tables, and numbers, for people.
 
+use bth_files::printable;
 use comfy_table::{CellAlignment, presets};
 
 /// A table without lines, whose first column is aligned left and whose others are aligned right.
@@ -17,7 +18,7 @@ impl Default for Table {
 impl Table {
     /// Adds a row.
     pub(crate) fn row<const N: usize>(&mut self, cells: [&str; N]) {
-        self.0.add_row(cells);
+        self.0.add_row(cells.map(printable));
     }
 
     /// The text, one line a row, without trailing blanks and without terminal codes.

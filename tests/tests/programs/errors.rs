@@ -100,6 +100,24 @@ fn errors_about_the_contents_of_compiled_files_name_the_file() {
 }
 
 #[test]
+fn control_characters_of_names_in_files_are_escaped() {
+    let animated = r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{}],
+        "animations":[{"name":"\u001b[31mrun","channels":[],"samplers":[]}]}"#;
+    let folder = folder(&[
+        ("library.obj", "mtllib \u{1b}[31mred.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+        ("key.manifest", "version = 1\n\"\\u001b[31mkey\" = 1\n"),
+        ("animated.gltf", animated),
+    ]);
+    let library = bthc(folder.path(), &["compile", "library.obj", "--materials"]).expect(3);
+    let key = bthc(folder.path(), &["compile", "key.manifest"]).expect(3);
+    let played = run("bth-play", folder.path(), &["key.manifest", "-o", "x.png"]).expect(3);
+    let info = bthc(folder.path(), &["info", "animated.gltf"]).expect(0);
+    for text in [library.stderr, key.stderr, played.stderr, info.stdout] {
+        assert!(text.contains("\\u{1b}[31m") && !text.contains('\u{1b}'), "{text:?}");
+    }
+}
+
+#[test]
 fn unknown_formats_and_foreign_files_exit_3() {
     let folder = folder(&[("model.txt", "hello"), ("foreign.bth", "hello")]);
     bthc(folder.path(), &["compile", "model.txt"]).expect(3);

@@ -363,3 +363,36 @@ nodes = [{ name = "a", object = "o" }, { name = "flat", object = "o", scale = [1
         assert!(warnings.contains(text), "{warnings}");
     }
 }
+
+#[test]
+fn warnings_come_in_the_order_of_the_objects() {
+    // The first object takes longer than the others together.
+    let arrows = |count: usize| {
+        let positions: String =
+            (0..count).map(|z| format!("v 0 0 {z}\nv 4 0 {z}\nv 1 1 {z}\nv 0 4 {z}\n")).collect();
+        let faces: String = (0..count)
+            .map(|z| 4 * z)
+            .map(|v| format!("f {} {} {} {}\n", v + 2, v + 3, v + 4, v + 1))
+            .collect();
+        positions + &faces
+    };
+    let (long, short) = (arrows(10_000), arrows(1));
+    let names: Vec<String> = (0..6).map(|row| format!("{row}.obj")).collect();
+    let object = |name: &String| format!("[[objects]]\nname = \"{name}\"\nmodel = \"{name}\"\n");
+    let node = |name: &String| format!("[[nodes]]\nname = \"{name}\"\nobject = \"{name}\"\n");
+    let rows: String = names.iter().map(object).chain(names.iter().map(node)).collect();
+    let manifest = format!("version = 1\n{rows}");
+    let mut files = vec![("order.manifest", manifest.as_str())];
+    let text = |row| if row == 0 { long.as_str() } else { short.as_str() };
+    files.extend(names.iter().enumerate().map(|(row, name)| (name.as_str(), text(row))));
+    let folder = folder(&files);
+    let run =
+        run("bthc", folder.path(), &["compile", "order.manifest", "--json", "--threads", "4"]).expect(0);
+    let report = run.json();
+    let warnings: Vec<_> =
+        report["warnings"].as_array().unwrap().iter().map(|w| w.as_str().unwrap()).collect();
+    assert_eq!(warnings.len(), names.len(), "{warnings:#?}");
+    for (warning, name) in warnings.iter().zip(&names) {
+        assert!(warning.contains(&format!("{name}: ")), "{warnings:#?}");
+    }
+}

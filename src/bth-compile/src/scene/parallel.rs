@@ -6,9 +6,10 @@ use crate::jobs;
 use crate::monitor::Monitor;
 use crate::pipeline::Clock;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// Runs `work` on all items, at most as many at a time as there are threads and as fit in memory by the `estimate` in
-/// bytes. Fails with the first failure in the order of the items.
+/// bytes. Fails with the first failure in the order of the items, and warns in that order, whichever item is ready first.
 pub(super) fn run_parallel<J: Send, T: Send>(
     items: Vec<J>,
     context: &Context<'_>,
@@ -17,19 +18,18 @@ pub(super) fn run_parallel<J: Send, T: Send>(
     work: impl Fn(&Context<'_>, &mut Clock, J) -> Result<T> + Sync,
 ) -> Result<Vec<T>> {
     let threads = rayon::current_num_threads().min(items.len());
-    let without_stages = WithoutStages(context.monitor);
-    let context = context.with_monitor(&without_stages);
     let failed = AtomicUsize::new(usize::MAX);
     let one = |(place, item): (usize, J)| {
         let mut clock = Clock::default();
+        let monitor = OfItem { to: context.monitor, warnings: Mutex::default() };
         if failed.load(Ordering::Relaxed) < place {
-            return (clock, None);
+            return (clock, monitor.warnings, None);
         }
-        let done = work(&context, &mut clock, item);
+        let done = work(&context.with_monitor(&monitor), &mut clock, item);
         if done.is_err() {
             failed.fetch_min(place, Ordering::Relaxed);
         }
-        (clock, Some(done))
+        (clock, monitor.warnings, Some(done))
     };
     let memory = context.options.objects_memory;
     let items = items.into_iter().enumerate().collect();
@@ -38,8 +38,10 @@ pub(super) fn run_parallel<J: Send, T: Send>(
         None => worker(),
     };
     let done = jobs::run(items, threads, memory, |(_, item)| estimate(item), within, one);
-    let results = done.into_iter().filter_map(|(times, result)| {
+    let results = done.into_iter().filter_map(|(times, warnings, result)| {
         clock.add(times);
+        let warnings = warnings.into_inner().unwrap_or_else(PoisonError::into_inner);
+        warnings.iter().for_each(|message| context.monitor.warn(message));
         result
     });
     results.collect()
@@ -54,17 +56,20 @@ fn own_pool(threads: usize) -> Option<rayon::ThreadPool> {
     (threads > 1).then(pool)?.ok()
 }
 
-/// A monitor for one of several items, which shows no stages.
-struct WithoutStages<'a>(&'a dyn Monitor);
+/// A monitor for one of several items, which shows no stages and keeps warnings.
+struct OfItem<'a> {
+    to: &'a dyn Monitor,
+    warnings: Mutex<Vec<String>>,
+}
 
-impl Monitor for WithoutStages<'_> {
+impl Monitor for OfItem<'_> {
     fn cancelled(&self) -> bool {
-        self.0.cancelled()
+        self.to.cancelled()
     }
     fn warn(&self, message: &str) {
-        self.0.warn(message);
+        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).push(message.to_owned());
     }
     fn notice(&self, message: &str) {
-        self.0.notice(message);
+        self.to.notice(message);
     }
 }

@@ -1,6 +1,6 @@
 //! Errors of importing and compiling, each with a stable code, a place and a hint.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Result of functions that import or compile.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -76,6 +76,16 @@ pub enum Error {
 }
 
 impl Error {
+    /// With the name of the model in the text, where there is no place that has it.
+    pub(crate) fn of_model(self, name: &Path) -> Self {
+        match self {
+            Error::Limit { code, message } => {
+                Error::Limit { code, message: format!("{}: {message}", name.display()) }
+            }
+            other => other,
+        }
+    }
+
     /// What the user can do; empty for defects of the compiler and cancellation.
     pub fn hint(&self) -> &str {
         match self {

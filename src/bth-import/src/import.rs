@@ -54,18 +54,19 @@ pub fn import_bytes(
     let source = Source::new(name, data, monitor);
     let raw = read_raw(&source, wanted)?;
     source.progress(data.len())?;
-    finish(raw, wanted, monitor)
+    finish(raw, wanted, monitor).map_err(|e| e.of_model(name))
 }
 
 /// Reads a source with its own rows.
 pub(crate) fn read_raw<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
-    match format(source)? {
+    let raw = match format(source)? {
         Format::Obj => obj::read(source, wanted),
         Format::Gltf => gltf::flatten::read(source, wanted),
         Format::Ply => ply::read(source, wanted),
         Format::Stl => stl::read(source, wanted),
         Format::Off => off::read(source, wanted),
-    }
+    };
+    raw.map_err(|e| e.of_model(source.path))
 }
 
 /// Reads parts of a glTF or GLB file, each as a model of its own, without the transforms of nodes.
@@ -105,8 +106,8 @@ pub fn import_gltf_parts_bytes(
         Accessors { source: &source, document: &document, buffers: Buffers::new(&source, &document, binary) };
     let shared = gltf::materials::SharedMaterials::default();
     let one = |part: &GltfPart| {
-        let raw = gltf::flatten::read_part(&source, &accessors, *part, (wanted, &shared))?;
-        finish(raw, wanted, monitor)
+        let raw = gltf::flatten::read_part(&source, &accessors, *part, (wanted, &shared));
+        raw.and_then(|raw| finish(raw, wanted, monitor)).map_err(|e| e.of_model(name))
     };
     let imported = parts.iter().map(one).collect();
     shared.report(&source);

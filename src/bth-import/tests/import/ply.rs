@@ -132,6 +132,7 @@ fn refuses_counts_that_the_file_cannot_hold_without_allocating_for_them() {
         for (what, huge) in [("vertex 4", "vertex 4000000000"), ("vertex 4", "vertex 999999999999999999")] {
             let error = import_bytes("a.ply", text.replace(what, huge).as_bytes(), Keep::None).unwrap_err();
             assert!(matches!(error, Error::Input { code: "BTH-I003", .. } | Error::Limit { .. }), "{error}");
+            assert!(error.to_string().contains("a.ply:"), "{error}");
         }
     }
     let mut bytes = binary(false);

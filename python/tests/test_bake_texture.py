@@ -43,6 +43,20 @@ def test_charts_that_repeat_overlap_or_leave_texels_out(square):
     assert 20 < twice.shared <= 36
 
 
+def test_the_triangle_of_the_least_number_has_a_texel_that_several_cover():
+    random, faces = np.random.default_rng(6), np.arange(120).reshape(-1, 3)
+    scene = bth.compile((random.normal(size=(120, 3)), faces), quality="fast")
+    # In units of 2^-10 all of this is exact.
+    corners = random.integers(0, 1025, (40, 3, 2))
+    texels = bth.bake.at_texels(scene, 16, 16, corners / 1024)
+    middles = np.stack([64 * texels.columns + 32, 1024 - (64 * texels.rows + 32)], axis=-1)[:, None, None]
+    before, behind = corners - middles, np.roll(corners, -1, axis=1) - middles
+    signs = before[..., 0] * behind[..., 1] - before[..., 1] * behind[..., 0]
+    inside = (signs >= 0).all(axis=2) | (signs <= 0).all(axis=2)
+    assert (inside.sum(axis=1) > 1).sum() > 100
+    assert (texels.points.triangle == inside.argmax(axis=1)).all()
+
+
 @pytest.mark.parametrize("uv, error, match", [
     (WHOLE * np.nan, ValueError, "finite"), (WHOLE[:1], ValueError, "uv"), (WHOLE * 100, bth.Error, "repeat"), (None, bth.Error, "texture coordinates"),
 ])

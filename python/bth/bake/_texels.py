@@ -93,7 +93,8 @@ def at_texels(scene: Scene, width: int, height: int, uv: Floats | None = None, *
     flat, face_of = _tiled(uv)
     y, x = np.mgrid[0:height, 0:width]
     v = (height - 0.5 - y if v_up else y + 0.5) / height
-    middles = np.stack([(x + 0.5) / width, v, np.ones_like(v)], axis=-1)
+    # Rays start in the plane itself, where t is 0 without rounding for all triangles: hits are then in the order of their numbers.
+    middles = np.stack([(x + 0.5) / width, v, np.zeros_like(v)], axis=-1)
     atlas = compile((np.pad(flat, ((0, 0), (0, 0), (0, 1))).reshape(-1, 3), np.arange(len(flat) * 3).reshape(-1, 3)), quality="fast")
     found = atlas.all_hits(middles, [0.0, 0.0, -1.0], most=2)
     counts = np.diff(found.offsets)

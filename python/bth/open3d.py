@@ -95,11 +95,12 @@ class RaycastingScene:
     @staticmethod
     def create_rays_pinhole(intrinsic_matrix=None, extrinsic_matrix=None, width_px=None, height_px=None, *, fov_deg=None,
                             center=None, eye=None, up=None):
-        """Rays (height, width, 6) of a pinhole camera: by its matrices, or by fov_deg, center, eye and up. z is 1 in the camera's space."""
+        """Rays (height, width, 6) of a pinhole camera: by its matrices, or by fov_deg, center, eye and up, along which rows go. z is 1 in the camera's space."""
         if intrinsic_matrix is None:
             eye, center, up = (np.asarray(a, np.float64) for a in (eye, center, up))
             forward = center - eye
-            right = np.cross(forward, up)
+            # As in Open3D, rows of pixels go along `up`, and columns to the left of who looks.
+            right = np.cross(up, forward)
             # What rounding leaves of the product of parallel vectors is relative to their lengths.
             if not np.linalg.norm(right) > 2.0**-40 * np.linalg.norm(forward) * np.linalg.norm(up):
                 raise ValueError(f"up: expected a direction across the view from eye to center, got {up.tolist()}")

@@ -218,9 +218,13 @@ def test_open3d_camera():
     assert rays.shape == (4, 8, 6) and rays.dtype == np.float32
     np.testing.assert_allclose(rays[..., :3], np.broadcast_to([0, 0, 4], (4, 8, 3)), atol=1e-6)
     np.testing.assert_allclose(rays[..., 5], -1, atol=1e-6)
-    # Columns go right, rows go down; half a pixel from the border is seen under nearly half of the angle.
-    np.testing.assert_allclose(rays[0, :, 3], (np.arange(8) - 3.5) / 4 * np.tan(np.pi / 6), atol=1e-6)
-    assert (np.diff(rays[:, 0, 4]) < 0).all()
+    # Columns go left, rows go up, as in Open3D; half a pixel from the border is seen under nearly half of the angle.
+    np.testing.assert_allclose(rays[0, :, 3], (3.5 - np.arange(8)) / 4 * np.tan(np.pi / 6), atol=1e-6)
+    np.testing.assert_allclose(rays[:, 0, 4], (np.arange(4) - 1.5) / 4 * np.tan(np.pi / 6), atol=1e-6)
+    # The first and the last ray of Open3D 0.20.
+    askew = {"fov_deg": 75, "center": [0.3, -2, 1], "eye": [1, 2, 4], "up": [0.2, -1, 0.4], "width_px": 5, "height_px": 7}
+    expected = [[1, 2, 4, -0.982773, -0.274244, -1.087949], [1, 2, 4, 0.705477, -1.310303, -0.100461]]
+    np.testing.assert_allclose(RaycastingScene.create_rays_pinhole(**askew)[[0, -1], [0, -1]], expected, rtol=1e-5)
     for center, up in [([0, 0, 0], [0, 0, 1]), ([0.1, 0.2, 4.3], [-1, -2, -3]), ([0, 0, 4], [0, 1, 0]), ([0, 0, 0], [0, 0, 0])]:
         with pytest.raises(ValueError, match="up: expected"):
             RaycastingScene.create_rays_pinhole(fov_deg=60, center=center, eye=[0, 0, 4], up=up, width_px=8, height_px=4)

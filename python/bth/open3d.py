@@ -93,30 +93,39 @@ class RaycastingScene:
         return self._assembly.scene()[0].contains(query_points, threads=nthreads or self._threads).astype(np.float32)
 
     @staticmethod
-    def create_rays_pinhole(intrinsic_matrix=None, extrinsic_matrix=None, width_px=None, height_px=None, *, fov_deg=None,
-                            center=None, eye=None, up=None):
-        """Rays (height, width, 6) of a pinhole camera: by its matrices, or by fov_deg, center, eye and up, along which rows go. z is 1 in the camera's space."""
-        if intrinsic_matrix is None:
-            eye, center, up = (np.asarray(a, np.float64) for a in (eye, center, up))
-            forward = center - eye
-            # As in Open3D, rows of pixels go along `up`, and columns to the left of who looks.
-            right = np.cross(up, forward)
-            # What rounding leaves of the product of parallel vectors is relative to their lengths.
-            if not np.linalg.norm(right) > 2.0**-40 * np.linalg.norm(forward) * np.linalg.norm(up):
-                raise ValueError(f"up: expected a direction across the view from eye to center, got {up.tolist()}")
-            forward /= np.linalg.norm(forward)
-            right /= np.linalg.norm(right)
-            rotation = np.stack([right, np.cross(forward, right), forward])
-            focal = 0.5 * width_px / np.tan(0.5 * np.deg2rad(fov_deg))
-            intrinsic_matrix = [[focal, 0, 0.5 * width_px], [0, focal, 0.5 * height_px], [0, 0, 1]]
-            extrinsic_matrix = np.eye(4)
-            extrinsic_matrix[:3, :3], extrinsic_matrix[:3, 3] = rotation, -rotation @ eye
-        intrinsic, extrinsic = np.asarray(intrinsic_matrix, np.float64), np.asarray(extrinsic_matrix, np.float64)
-        y, x = np.meshgrid(np.arange(height_px) + 0.5, np.arange(width_px) + 0.5, indexing="ij")
-        pixels = np.stack([x, y, np.ones_like(x)], axis=-1)
-        directions = pixels @ np.linalg.inv(intrinsic).T @ extrinsic[:3, :3]
-        origins = np.broadcast_to(-extrinsic[:3, :3].T @ extrinsic[:3, 3], directions.shape)
-        return np.concatenate([origins, directions], axis=-1).astype(np.float32)
+    def create_rays_pinhole(*args, **named):
+        """Rays (height, width, 6) of a pinhole camera; z is 1 in the camera's space.
+
+        create_rays_pinhole(intrinsic_matrix, extrinsic_matrix, width_px, height_px): by its matrices.
+        create_rays_pinhole(fov_deg, center, eye, up, width_px, height_px): by where it is and looks; rows go along `up`.
+        """
+        return (_rays_by_view if len(args) + len(named) > 4 else _rays_by_matrices)(*args, **named)
+
+
+def _rays_by_view(fov_deg, center, eye, up, width_px, height_px):
+    eye, center, up = (np.asarray(a, np.float64) for a in (eye, center, up))
+    forward = center - eye
+    # As in Open3D, rows of pixels go along `up`, and columns to the left of who looks.
+    left = np.cross(up, forward)
+    # What rounding leaves of the product of parallel vectors is relative to their lengths.
+    if not np.linalg.norm(left) > 2.0**-40 * np.linalg.norm(forward) * np.linalg.norm(up):
+        raise ValueError(f"up: expected a direction across the view from eye to center, got {up.tolist()}")
+    forward /= np.linalg.norm(forward)
+    left /= np.linalg.norm(left)
+    rotation = np.stack([left, np.cross(forward, left), forward])
+    focal = 0.5 * width_px / np.tan(0.5 * np.deg2rad(fov_deg))
+    extrinsic = np.eye(4)
+    extrinsic[:3, :3], extrinsic[:3, 3] = rotation, -rotation @ eye
+    return _rays_by_matrices([[focal, 0, 0.5 * width_px], [0, focal, 0.5 * height_px], [0, 0, 1]], extrinsic, width_px, height_px)
+
+
+def _rays_by_matrices(intrinsic_matrix, extrinsic_matrix, width_px, height_px):
+    intrinsic, extrinsic = np.asarray(intrinsic_matrix, np.float64), np.asarray(extrinsic_matrix, np.float64)
+    y, x = np.meshgrid(np.arange(height_px) + 0.5, np.arange(width_px) + 0.5, indexing="ij")
+    pixels = np.stack([x, y, np.ones_like(x)], axis=-1)
+    directions = pixels @ np.linalg.inv(intrinsic).T @ extrinsic[:3, :3]
+    origins = np.broadcast_to(-extrinsic[:3, :3].T @ extrinsic[:3, 3], directions.shape)
+    return np.concatenate([origins, directions], axis=-1).astype(np.float32)
 
 
 def _odd(nsamples):

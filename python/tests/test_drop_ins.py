@@ -225,6 +225,12 @@ def test_open3d_camera():
     askew = {"fov_deg": 75, "center": [0.3, -2, 1], "eye": [1, 2, 4], "up": [0.2, -1, 0.4], "width_px": 5, "height_px": 7}
     expected = [[1, 2, 4, -0.982773, -0.274244, -1.087949], [1, 2, 4, 0.705477, -1.310303, -0.100461]]
     np.testing.assert_allclose(RaycastingScene.create_rays_pinhole(**askew)[[0, -1], [0, -1]], expected, rtol=1e-5)
+    by_place = RaycastingScene.create_rays_pinhole(75, [0.3, -2, 1], [1, 2, 4], [0.2, -1, 0.4], 5, 7)
+    assert (by_place == RaycastingScene.create_rays_pinhole(**askew)).all()
+    intrinsic = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    assert RaycastingScene.create_rays_pinhole(intrinsic, np.eye(4), 2, height_px=1).tolist() == [[[0, 0, 0, 0.5, 0.5, 1], [0, 0, 0, 1.5, 0.5, 1]]]
+    with pytest.raises(TypeError):
+        RaycastingScene.create_rays_pinhole(intrinsic, np.eye(4), 2)
     for center, up in [([0, 0, 0], [0, 0, 1]), ([0.1, 0.2, 4.3], [-1, -2, -3]), ([0, 0, 4], [0, 1, 0]), ([0, 0, 0], [0, 0, 0])]:
         with pytest.raises(ValueError, match="up: expected"):
             RaycastingScene.create_rays_pinhole(fov_deg=60, center=center, eye=[0, 0, 4], up=up, width_px=8, height_px=4)

@@ -49,9 +49,16 @@ def _parts(mesh):
         return surface.points, _pyvista_faces(surface)
     if hasattr(mesh, "vertices") and hasattr(mesh, "triangles"):  # Open3D
         return np.asarray(mesh.vertices), np.asarray(mesh.triangles)
+    if hasattr(mesh, "vertex") and hasattr(mesh, "triangle"):  # Open3D's of tensors, which its RaycastingScene takes
+        return _tensor(mesh.vertex, "positions"), _tensor(mesh.triangle, "indices")
     raise TypeError(
         f"expected a path, a pair (vertices, faces) or a mesh of trimesh, meshio, pyvista or Open3D, got {type(mesh).__name__}"
     )
+
+
+def _tensor(attributes, name):
+    """An attribute of a mesh of tensors, from wherever it is; a mesh without vertices or triangles lacks it."""
+    return attributes[name].cpu().numpy() if name in attributes else np.zeros((0, 3), np.uint32)
 
 
 def _meshio_faces(cells):

@@ -268,6 +268,25 @@ def test_open3d_meshes(mesh):
     _same(mesh, types.SimpleNamespace(vertices=mesh[0].astype(np.float64), triangles=mesh[1].astype(np.int32)))
 
 
+def test_open3d_meshes_of_tensors(mesh):
+    class Tensor:
+        """Is no array for numpy until it is asked for one, on the processor."""
+
+        def __init__(self, array, device):
+            self._array, self._device = array, device
+
+        def cpu(self):
+            return Tensor(self._array, "CPU:0")
+
+        def numpy(self):
+            assert self._device == "CPU:0"
+            return self._array
+
+    parts = {"positions": Tensor(mesh[0], "CUDA:0")}, {"indices": Tensor(mesh[1].astype(np.int64), "CUDA:0")}
+    _same(mesh, types.SimpleNamespace(vertex=parts[0], triangle=parts[1]))
+    assert bth.compile(types.SimpleNamespace(vertex={}, triangle={})).triangle_counts.tolist() == [0]
+
+
 def test_names_in_memory(mesh):
     scene = bth.compile_scene([mesh, sphere(3, 5)], names=True)
     assert scene.instance_names == ["instance 0", "instance 1"] and scene.object_names == ["mesh 0", "mesh 1"]

@@ -285,10 +285,7 @@ fn image_file(textures: &TextureReader<'_, '_>, index: usize) -> Result<ImageFil
         Refused::Malformed(message) => textures.unreadable(&part, message),
         Refused::TooLarge(texels) => Error::Limit {
             code: "BTH-L003",
-            message: format!(
-                "{}: {part} has {texels} texels; up to {MAX_TEXELS} are kept",
-                textures.accessors.source.path.display()
-            ),
+            message: format!("{part} has {texels} texels; up to {MAX_TEXELS} are kept"),
         },
     })?;
     Ok(ImageFile::new(bytes.into_owned()))

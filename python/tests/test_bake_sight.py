@@ -77,3 +77,17 @@ def test_above_ground(axis):
     expected[axis] = 2.5
     np.testing.assert_allclose(points[0], expected, rtol=1e-6)
     assert np.isnan(points[1]).any()
+
+
+def test_lines_longer_than_float32_are_followed_to_their_end():
+    with pytest.warns(UserWarning):
+        scene = bth.compile((np.array([[1e38, -1e37, -1e37], [1e38, 1e37, -1e37], [1e38, 0, 1e37]]), [[0, 1, 2]]))
+    ends = [[3e38, 0, 0], [9e37, 0, 0]]
+    assert bth.bake.line_of_sight(scene, ends, [-3e38, 0, 0]).tolist() == [False, True]
+
+
+def test_points_without_normal_are_not_seen():
+    scene = bth.compile((np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 2, 0], [3, 3, 0], [4, 4, 0]]), [[0, 1, 2], [3, 4, 5]]))
+    at = bth.bake.at_vertices(scene)
+    assert at.usable.tolist() == [True] * 3 + [False] * 3
+    assert bth.bake.viewshed(scene, [[0.5, 0.5, 9]], at).tolist() == [at.usable.tolist()]

@@ -43,6 +43,29 @@ def test_charts_that_repeat_overlap_or_leave_texels_out(square):
     assert 20 < twice.shared <= 36
 
 
+def test_mirrored_instances(tmp_path):
+    (tmp_path / "face.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n")
+    (tmp_path / "mirror.manifest").write_text(
+        'version = 1\nobjects = [{ name = "face", model = "face.obj" }]\n'
+        'nodes = [{ name = "mirrored", object = "face", scale = [-1, 1, 1] }]\n'
+    )
+    scene = bth.compile(tmp_path / "mirror.manifest", attributes="all", cache=False)
+    texels = bth.bake.at_texels(scene, 8, 4)
+    expected = np.stack([-(texels.columns + 0.5) / 8, 1 - (texels.rows + 0.5) / 4, np.zeros(len(texels.rows))], axis=-1)
+    assert len(expected) > 10
+    np.testing.assert_allclose(texels.points.position, expected, atol=1e-6)
+    mesh, hits = texels.points.mesh, scene.nearest(expected + [0, 0, 1], [0, 0, -1])
+    values = mesh.interpolated(mesh.vertices, hits.instance, hits.triangle, hits.u, hits.v)
+    np.testing.assert_allclose(values, expected, atol=1e-6)
+
+
+def test_texels_on_an_edge_are_not_shared():
+    corners = np.array([[1, 2, 0], [3, 0, 2]])
+    square = bth.compile((SQUARE[0], corners))
+    texels = bth.bake.at_texels(square, 8, 8, np.array([[0, 0], [1, 0], [1, 1], [0, 1]])[corners])
+    assert len(texels.points) == 64 and texels.shared == 0
+
+
 def test_the_triangle_of_the_least_number_has_a_texel_that_several_cover():
     random, faces = np.random.default_rng(6), np.arange(120).reshape(-1, 3)
     scene = bth.compile((random.normal(size=(120, 3)), faces), quality="fast")

@@ -55,6 +55,16 @@ def test_trimesh_of_any_size(size):
     assert (large.intersects_any(size * origins, size * directions) == small.intersects_any(origins, directions)).all()
 
 
+def test_trimesh_takes_so_many_hits_of_each_ray():
+    trimesh = pytest.importorskip("trimesh")
+    import bth.trimesh
+
+    ray = bth.trimesh.RayMeshIntersector(trimesh.creation.box())
+    for most in (1, 2, 3):
+        hits = min(most, 2)
+        assert ray.intersects_id([[0.1, 0.2, 5]] * 2, [[0, 0, -1]] * 2, max_hits=most)[1].tolist() == [0] * hits + [1] * hits
+
+
 def test_trimesh_counts_an_edge_once(mesh, trimesh_mesh):
     import bth.trimesh
 
@@ -197,6 +207,13 @@ def test_open3d(mesh, rays):
         scene.cast_rays(np.zeros((4, 3)))
     with pytest.raises(ValueError):
         scene.compute_occupancy(points, nsamples=2)
+
+
+def test_open3d_ranges():
+    scene, ray = RaycastingScene(), np.array([[0.2, 0.2, 2, 0, 0, -1]], np.float32)
+    scene.add_triangles(CORNER[:3], np.array([[0, 1, 2]]))
+    assert [scene.test_occlusions(ray, *ends).item() for ends in [(0, 3), (0, 1), (2.5, 3), (2, 2)]] == [True, False, False, True]
+    assert scene.compute_occupancy(ray[:, :3]).dtype == np.float32
 
 
 def test_meshes_are_those_of_the_call():

@@ -11,7 +11,8 @@ const LINEAR = Float32Array.from({ length: 256 }, (_, i) => {
 
 /**
  * The materials of a scene's objects: `of(object, material)` has one with `baseColorTexture` and `emissiveTexture` as what `texel`
- * takes, or undefined. `undecoded` is the number of images that the browser does not decode: they count as white.
+ * takes, or undefined. `undecoded` is the number of images that the browser does not decode: base colours count as white then, and what
+ * would emit does not.
  */
 export async function materialsOf(scene, decode = decoded) {
     const objects = Array.from({ length: scene.objects }, (_, object) => ({
@@ -35,6 +36,7 @@ export async function materialsOf(scene, decode = decoded) {
             ...material,
             baseColorTexture: used(material.baseColorTexture),
             emissiveTexture: used(material.emissiveTexture),
+            emissive: material.emissiveTexture === null || used(material.emissiveTexture) ? material.emissive : [0, 0, 0],
         }));
     });
     return {

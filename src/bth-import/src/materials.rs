@@ -33,7 +33,7 @@ pub enum Unreadable {
     /// They are errors.
     #[default]
     Refused,
-    /// They are left out, each with a warning. A texture without its image counts as white.
+    /// They are left out, each with a warning. A base colour counts as white then, and what would emit does not.
     LeftOut,
 }
 

@@ -322,20 +322,23 @@ fn parameters(
         None => Ok(NONE),
         Some(map) => Ok(images.name(map)?.map_or(NONE, |image| recorder.texture(texture(map, image)))),
     };
+    let base_color_texture = texture(&material.diffuse_map)?;
+    let emissive_texture = texture(&material.emissive_map)?;
     Ok(MaterialParameters {
         base_color: [r, g, b, opacity],
-        emissive: material.emissive.unwrap_or(if material.emissive_map.is_some() {
-            [1.0; 3]
-        } else {
-            [0.0; 3]
-        }),
+        emissive: match (&material.emissive_map, emissive_texture) {
+            (None, _) => material.emissive.unwrap_or_default(),
+            // Without its texture all of the surface would glow.
+            (Some(_), NONE) => [0.0; 3],
+            (Some(_), _) => material.emissive.unwrap_or([1.0; 3]),
+        },
         alpha_mode: match has_alpha_in_color(material) {
             true => ALPHA_MASK,
             false if opacity < 1.0 => ALPHA_BLEND,
             false => ALPHA_OPAQUE,
         },
-        base_color_texture: texture(&material.diffuse_map)?,
-        emissive_texture: texture(&material.emissive_map)?,
+        base_color_texture,
+        emissive_texture,
         ..PLAIN
     })
 }

@@ -28,7 +28,7 @@ const COLLAPSE: &str = "5";
 const POLYGONS: &str = "1";
 const OPACITY: &str = "2";
 const NAMES: &str = "2";
-const MATERIALS: &str = "3";
+const MATERIALS: &str = "4";
 const DEFORMABLE: &str = "1";
 /// Version of how objects are compiled whose vertices move by themselves.
 pub(crate) const MOTION: &str = "1";

@@ -213,7 +213,12 @@ impl MaterialReader<'_, '_> {
             true => NONE,
             false => self.texture(material.emissive_texture.as_ref(), sets, &part, "emissive")?,
         };
-        Ok(MaterialParameters { base_color_texture, emissive_texture, ..parameters })
+        // Without its texture all of the surface would glow.
+        let emissive = match material.emissive_texture.is_some() && emissive_texture == NONE {
+            true => [0.0; 3],
+            false => emissive,
+        };
+        Ok(MaterialParameters { base_color_texture, emissive, emissive_texture, ..parameters })
     }
 
     /// Refuses numbers beyond what the format holds.

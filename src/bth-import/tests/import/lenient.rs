@@ -41,7 +41,9 @@ fn obj_materials_keep_what_can_be_read() {
     std::fs::write(at("a.obj"), text).unwrap();
     let maps = ["lost.png", "lost.png", "C:\\x.png", "huge.png", "text.png", "\"good one.png\""];
     let library: String = (0..names.len())
-        .map(|i| format!("newmtl {}\nKd 0.{} 0 0\nmap_Kd {}\n", names[i], i + 1, maps[i]))
+        .map(|i| {
+            format!("newmtl {}\nKd 0.{} 0 0\nmap_Kd {map}\nmap_Ke {map}\n", names[i], i + 1, map = maps[i])
+        })
         .collect();
     std::fs::write(at("a b.mtl"), library).unwrap();
     std::fs::write(at("huge.png"), image(1 << 20)).unwrap();
@@ -53,13 +55,16 @@ fn obj_materials_keep_what_can_be_read() {
     assert_eq!(red, [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]);
     let textures: Vec<_> = materials.parameters.iter().map(|material| material.base_color_texture).collect();
     assert_eq!(textures, [NONE, NONE, NONE, NONE, NONE, 0]);
+    let emitted: Vec<_> = materials.parameters.iter().map(|material| material.emissive[0]).collect();
+    assert_eq!(emitted, [0.0, 0.0, 0.0, 0.0, 0.0, 1.0], "all of the surface would glow");
     let expected = [
         ("a.obj:2: expected the material library lost.mtl: ", true),
         ("a.obj:3: expected a relative name of a material library, found \"C:\\\\x.mtl\"", false),
         ("a b.mtl:3: expected the image lost.png: ", true),
-        ("a b.mtl:9: expected a relative file name, found \"C:\\\\x.png\"", false),
+        ("a b.mtl:11: expected a relative file name, found \"C:\\\\x.png\"", false),
+        ("a b.mtl:12: expected a relative file name, found \"C:\\\\x.png\"", false),
         ("huge.png has 1099511627776 texels; up to 67108864 are kept", false),
-        ("a b.mtl:15: text.png: expected a PNG, JPEG or WebP image, found something else", false),
+        ("a b.mtl:19: text.png: expected a PNG, JPEG or WebP image, found something else", false),
     ];
     assert_eq!(warnings.len(), expected.len(), "{warnings:#?}");
     for (warning, (start, more)) in warnings.iter().zip(expected) {
@@ -97,6 +102,7 @@ fn gltf_materials_and_holes_do_without_images_that_cannot_be_read() {
     let parameters = &materials.parameters[0];
     assert_eq!((parameters.base_color_texture, parameters.emissive_texture), (NONE, 0));
     assert_eq!((parameters.base_color, materials.textures.len()), ([0.25, 0.0, 0.0, 0.75], 1));
+    assert_eq!(parameters.emissive, [1.0; 3]);
     let told = "a.glb: image 0: expected the image lost.png: ";
     assert!(warnings.len() == 1 && warnings[0].starts_with(told), "{warnings:?}");
 

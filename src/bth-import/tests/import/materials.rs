@@ -129,6 +129,7 @@ fn what_is_left_out_is_reported() {
         "normalTexture": {"index": 1, "texCoord": 2}, "extensions": {"KHR_materials_clearcoat": {},
         "KHR_materials_pbrSpecularGlossiness": {"diffuseTexture": {"index": 1, "texCoord": 1}}}}));
     assert_eq!((read.parameters[0].base_color_texture, read.parameters[0].emissive_texture), (0, NONE));
+    assert_eq!(read.parameters[0].emissive, [0.0; 3], "all of the surface would glow");
     let all = warnings.join("\n");
     for part in [
         "material 0: its emissive texture is left out: its texture coordinates",

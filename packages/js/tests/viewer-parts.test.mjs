@@ -117,3 +117,17 @@ test("the viewer shows textures, and what is behind their holes", async () => {
     assert.equal(white.undecoded, 1);
     assert.deepEqual([...shadeTile(scene, white, { ...job, sample: 0 })].slice(0, 9), [1, 1, 1, 1, 1, 1, 1, 1, 1]);
 });
+
+test("what would emit by an image that is not decoded does not", async () => {
+    const lamp = { emissive: [1, 0.5, 0], emissiveTexture: 0, baseColorTexture: null };
+    const scene = {
+        objects: 2, image: () => new Uint8Array(), textures: () => [{ image: 7 }],
+        materials: (object) => [object === 0 ? lamp : { ...lamp, emissiveTexture: null }],
+    };
+    const image = { width: 1, height: 1, texels: Uint8Array.of(255, 255, 255, 255) };
+    let decoded = 0;
+    const whole = await materialsOf(scene, async () => (decoded++, image));
+    assert.deepEqual([whole.of(0, 0).emissive, whole.of(1, 0).emissive, whole.undecoded, decoded], [[1, 0.5, 0], [1, 0.5, 0], 0, 1]);
+    const lost = await materialsOf(scene, () => Promise.reject(new Error()));
+    assert.deepEqual([lost.of(0, 0).emissive, lost.of(1, 0).emissive, lost.undecoded], [[0, 0, 0], [1, 0.5, 0], 1]);
+});

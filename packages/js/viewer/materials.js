@@ -32,12 +32,11 @@ export async function materialsOf(scene, decode = decoded) {
             const texture = index === null ? undefined : textures[index], image = texture && images.get(texture.image);
             return image ? { ...texture, ...image } : null;
         };
-        return materials.map((material) => ({
-            ...material,
-            baseColorTexture: used(material.baseColorTexture),
-            emissiveTexture: used(material.emissiveTexture),
-            emissive: material.emissiveTexture === null || used(material.emissiveTexture) ? material.emissive : [0, 0, 0],
-        }));
+        return materials.map((material) => {
+            const baseColorTexture = used(material.baseColorTexture), emissiveTexture = used(material.emissiveTexture);
+            const emissive = material.emissiveTexture === null || emissiveTexture ? material.emissive : [0, 0, 0];
+            return { ...material, baseColorTexture, emissiveTexture, emissive };
+        });
     });
     return {
         of: (object, material) => found[object]?.[material],

@@ -252,6 +252,32 @@ fn what_cannot_be_read_is_an_error_with_place_and_hint() {
     );
 }
 
+/// What was compiled without an image is not taken from the cache where the image is wanted, neither for a model nor for a scene.
+#[test]
+fn what_lacks_an_image_is_in_the_cache_for_lenient_compilations_alone() {
+    let folder = folder(&[]);
+    obj(folder.path(), "newmtl paint\nKd 1 0 0\nmap_Kd none.png\n").expect(3);
+    let material = json!({"alphaMode": "MASK", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}});
+    std::fs::write(folder.path().join("a.gltf"), square(&material, &[json!({"uri": "none.png"})], None))
+        .unwrap();
+    for model in ["a.obj", "a.gltf"] {
+        for wanted in [&["--materials"][..], &["--alpha", "mask"]] {
+            if model == "a.obj" && wanted[0] == "--alpha" {
+                continue;
+            }
+            let compile = |output: &str, more: &[&str]| {
+                let common = ["compile", model, "--structure", "bvh", "--cache-dir", "cache", "-o", output];
+                bthc(folder.path(), &[&common, wanted, more].concat())
+            };
+            for output in ["first.bth", "second.bth"] {
+                let lenient = compile(output, &["--lenient-materials"]).expect(0);
+                assert!(lenient.stderr.contains("; it is left out"), "{lenient:?}");
+            }
+            assert!(compile("third.bth", &[]).expect(3).stderr.contains("BTH-I016"), "{model} {wanted:?}");
+        }
+    }
+}
+
 /// The player compiles models with materials. Images that cannot be read it does without, and where materials are malformed it says so
 /// and shows the rest.
 #[test]

@@ -14,21 +14,17 @@ use crate::monitor::Silent;
 use crate::source::Source;
 
 /// The files beside a glTF document that hold its buffers and images that its looks need, in order; none for what is no
-/// document, which reading it reports. A file of a fallback buffer counts only if it exists: with the compressed views it is not
-/// read.
+/// document, which reading it reports. Images count only if they exist: which of them are needed, reading them tells. So does a file of a
+/// fallback buffer: with the compressed views it is not read.
 pub fn external_files(path: &Path, data: &[u8], looks: Looks) -> Vec<PathBuf> {
     let source = Source::new(path, data, &Silent);
     let json = split(&source).map_or(&[][..], |(json, _)| json);
     let document = serde_json::from_slice::<GltfDocument>(json).ok();
     let of_materials = if looks.materials { materials::files(json) } else { Vec::new() };
-    let of_materials = of_materials.iter().filter_map(|uri| beside(path, uri)).filter(|file| file.exists());
-    let images = cutout::files(json, looks.alpha);
-    let mut images: Vec<PathBuf> = images.iter().filter_map(|uri| beside(path, uri)).collect();
-    of_materials.for_each(|file| {
-        if !images.contains(&file) {
-            images.push(file);
-        }
-    });
+    let mut images: Vec<PathBuf> = Vec::new();
+    for uri in cutout::files(json, looks.alpha).iter().chain(&of_materials) {
+        images.extend(beside(path, uri).filter(|file| file.is_file() && !images.contains(file)));
+    }
     let buffers = document.into_iter().flat_map(|document| document.buffers);
     let file = |buffer: Buffer| {
         let uri = buffer.uri.as_deref().filter(|uri| !uri.starts_with("data:"))?;

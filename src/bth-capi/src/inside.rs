@@ -20,7 +20,7 @@ pub unsafe extern "C" fn bth_crossings(
     count: usize,
 ) -> i32 {
     // SAFETY: the contract of `batch` is part of that of this function.
-    let (scene, rays, _) = match unsafe { batch(scene, rays, std::ptr::null(), count) } {
+    let (scene, rays) = match unsafe { batch(scene, rays, count) } {
         Ok(batch) => batch,
         Err(code) => return code,
     };

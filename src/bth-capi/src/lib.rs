@@ -9,6 +9,7 @@ pub mod inside;
 pub mod materials;
 pub mod memory;
 pub mod motion;
+pub mod starts;
 pub mod surface;
 
 use runtime::rays::{Hit, PrimitiveRef, Ray};
@@ -114,29 +115,20 @@ pub extern "C" fn bth_last_error() -> *const c_char {
     LAST_ERROR.with(|last| last.borrow().as_ptr())
 }
 
-/// The arguments of a query: the scene, the rays, and for each ray the triangle on which it starts, if given.
-type Batch<'a> = (&'a Scene, &'a [Ray], Option<&'a [PrimitiveRef]>);
+/// The arguments of a query: the scene and the rays.
+type Batch<'a> = (&'a Scene, &'a [Ray]);
 
 /// The arguments of a query as slices. `Err` is the result of the query if there are no rays, or `scene` or `rays` is null.
 ///
 /// # Safety
-/// `scene` is null or open. `rays` and `from` are each null or point to `count` elements. All of them outlive the result and are
-/// not written to during its life.
-unsafe fn batch<'a>(
-    scene: *const Scene,
-    rays: *const Ray,
-    from: *const PrimitiveRef,
-    count: usize,
-) -> Result<Batch<'a>, i32> {
+/// `scene` is null or open. `rays` is null or points to `count` elements. Both outlive the result and are not written to during its life.
+unsafe fn batch<'a>(scene: *const Scene, rays: *const Ray, count: usize) -> Result<Batch<'a>, i32> {
     if scene.is_null() || rays.is_null() || count == 0 {
         return Err(if count == 0 { OK } else { null_argument() });
     }
-    // SAFETY: the pointers are not null, so by contract `scene` is an open scene, and `rays` and `from` point to `count`
-    // elements. `Ray` and `PrimitiveRef` have the layout of the C structs, and all bit patterns are valid for them.
-    unsafe {
-        let from = (!from.is_null()).then(|| std::slice::from_raw_parts(from, count));
-        Ok((&*scene, std::slice::from_raw_parts(rays, count), from))
-    }
+    // SAFETY: the pointers are not null, so by contract `scene` is an open scene, and `rays` points to `count` elements. `Ray` has the
+    // layout of the C struct, and all bit patterns are valid for it.
+    unsafe { Ok((&*scene, std::slice::from_raw_parts(rays, count))) }
 }
 
 /// The result of a query without a scene, rays or room for results.
@@ -154,24 +146,24 @@ fn defect() -> i32 {
 /// Nearest hits; see `bth.h`.
 ///
 /// # Safety
-/// `scene` is null or open. `rays`, `from` and `hits` are each null or point to `count` elements; those of `hits` are valid for
+/// `scene` is null or open. `rays` and `hits` are each null or point to `count` elements; those of `hits` are valid for
 /// writes and do not overlap the others.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_nearest(
     scene: *const Scene,
     rays: *const Ray,
-    from: *const PrimitiveRef,
+    _reserved: *const PrimitiveRef,
     hits: *mut Hit,
     count: usize,
 ) {
     if count == 1 {
-        // SAFETY: by contract each pointer is null or points to one element, and `hits` is valid for writes. `Ray`, `PrimitiveRef` and
-        // `Hit` have the layout of the C structs, and all bit patterns are valid for them.
-        let (one, from) = unsafe { ((scene.as_ref(), rays.as_ref(), hits.as_mut()), from.as_ref()) };
+        // SAFETY: by contract each pointer is null or points to one element, and `hits` is valid for writes. `Ray` and `Hit` have the
+        // layout of the C structs, and all bit patterns are valid for them.
+        let one = unsafe { (scene.as_ref(), rays.as_ref(), hits.as_mut()) };
         if let (Some(scene), Some(ray), Some(hit)) = one {
             // With nothing but the kernel behind it, no registers are saved for what only batches need.
-            let (ray, from, hits) = (from_ref(ray), from.map(from_ref), from_mut(hit));
-            if catch_unwind(AssertUnwindSafe(|| scene.batch(ray).from(from).nearest(hits))).is_err() {
+            let (ray, hits) = (from_ref(ray), from_mut(hit));
+            if catch_unwind(AssertUnwindSafe(|| scene.batch(ray).nearest(hits))).is_err() {
                 hits.fill(Hit::MISS);
                 defect();
             }
@@ -179,7 +171,7 @@ pub unsafe extern "C" fn bth_nearest(
         }
     }
     // SAFETY: the contract is the same.
-    unsafe { nearest_of_batch(scene, rays, from, hits, count) }
+    unsafe { nearest_of_batch(scene, rays, hits, count) }
 }
 
 /// [`bth_nearest`] for any number of rays.
@@ -187,15 +179,9 @@ pub unsafe extern "C" fn bth_nearest(
 /// # Safety
 /// As for [`bth_nearest`].
 #[inline(never)]
-unsafe fn nearest_of_batch(
-    scene: *const Scene,
-    rays: *const Ray,
-    from: *const PrimitiveRef,
-    hits: *mut Hit,
-    count: usize,
-) {
+unsafe fn nearest_of_batch(scene: *const Scene, rays: *const Ray, hits: *mut Hit, count: usize) {
     // SAFETY: the contract of `batch` is part of that of this function.
-    let Ok((scene, rays, from)) = (unsafe { batch(scene, rays, from, count) }) else { return };
+    let Ok((scene, rays)) = (unsafe { batch(scene, rays, count) }) else { return };
     if hits.is_null() {
         null_argument();
         return;
@@ -204,7 +190,7 @@ unsafe fn nearest_of_batch(
     // slices above. All bit patterns are valid for `Hit`.
     let hits = unsafe { std::slice::from_raw_parts_mut(hits, count) };
     // A panic must not unwind into C. After a panic, which would be a defect of the library, all rays are reported as misses.
-    if catch_unwind(AssertUnwindSafe(|| scene.batch(rays).from(from).nearest(hits))).is_err() {
+    if catch_unwind(AssertUnwindSafe(|| scene.batch(rays).nearest(hits))).is_err() {
         hits.fill(Hit::MISS);
         defect();
     }
@@ -218,16 +204,16 @@ unsafe fn nearest_of_batch(
 pub unsafe extern "C" fn bth_any(
     scene: *const Scene,
     rays: *const Ray,
-    from: *const PrimitiveRef,
+    _reserved: *const PrimitiveRef,
     hit: *mut u8,
     count: usize,
 ) {
     if count == 1 {
         // SAFETY: as in `bth_nearest`; `hit` is null or points to a byte that is valid for writes.
-        let (one, from) = unsafe { ((scene.as_ref(), rays.as_ref(), hit.as_mut()), from.as_ref()) };
+        let one = unsafe { (scene.as_ref(), rays.as_ref(), hit.as_mut()) };
         if let (Some(scene), Some(ray), Some(hit)) = one {
-            let (ray, from, mut found) = (from_ref(ray), from.map(from_ref), [false]);
-            let traced = catch_unwind(AssertUnwindSafe(|| scene.batch(ray).from(from).any(&mut found)));
+            let (ray, mut found) = (from_ref(ray), [false]);
+            let traced = catch_unwind(AssertUnwindSafe(|| scene.batch(ray).any(&mut found)));
             *hit = (traced.is_ok() && found[0]).into();
             if traced.is_err() {
                 defect();
@@ -236,7 +222,7 @@ pub unsafe extern "C" fn bth_any(
         }
     }
     // SAFETY: the contract is the same.
-    unsafe { any_of_batch(scene, rays, from, hit, count) }
+    unsafe { any_of_batch(scene, rays, hit, count) }
 }
 
 /// [`bth_any`] for any number of rays.
@@ -244,22 +230,16 @@ pub unsafe extern "C" fn bth_any(
 /// # Safety
 /// As for [`bth_any`].
 #[inline(never)]
-unsafe fn any_of_batch(
-    scene: *const Scene,
-    rays: *const Ray,
-    from: *const PrimitiveRef,
-    hit: *mut u8,
-    count: usize,
-) {
+unsafe fn any_of_batch(scene: *const Scene, rays: *const Ray, hit: *mut u8, count: usize) {
     // SAFETY: the contract of `batch` is part of that of this function.
-    let Ok((scene, rays, from)) = (unsafe { batch(scene, rays, from, count) }) else { return };
+    let Ok((scene, rays)) = (unsafe { batch(scene, rays, count) }) else { return };
     if hit.is_null() {
         null_argument();
         return;
     }
     // SAFETY: it is not null, so by contract it points to `count` bytes, which are valid for writes and do not overlap the slices
     // above. The caller's bytes are not used as a slice of `bool`, because `bool` has invalid bit patterns.
-    any_in_chunks(scene, rays, from, unsafe { std::slice::from_raw_parts_mut(hit, count) });
+    any_in_chunks(scene, rays, unsafe { std::slice::from_raw_parts_mut(hit, count) });
 }
 
 /// Number of rays that [`any_in_chunks`] traces together.
@@ -267,12 +247,11 @@ const CHUNK: usize = 1024;
 
 /// Whether rays hit anything, for [`CHUNK`] rays at a time. After a panic, the rays of a chunk are reported as misses.
 #[inline(never)]
-fn any_in_chunks(scene: &Scene, rays: &[Ray], from: Option<&[PrimitiveRef]>, hit: &mut [u8]) {
+fn any_in_chunks(scene: &Scene, rays: &[Ray], hit: &mut [u8]) {
     let mut buffer = [false; CHUNK];
-    for (i, (rays, hit)) in rays.chunks(CHUNK).zip(hit.chunks_mut(CHUNK)).enumerate() {
-        let from = from.map(|f| &f[i * CHUNK..i * CHUNK + rays.len()]);
+    for (rays, hit) in rays.chunks(CHUNK).zip(hit.chunks_mut(CHUNK)) {
         let found = &mut buffer[..rays.len()];
-        if catch_unwind(AssertUnwindSafe(|| scene.batch(rays).from(from).any(found))).is_err() {
+        if catch_unwind(AssertUnwindSafe(|| scene.batch(rays).any(found))).is_err() {
             found.fill(false);
             defect();
         }

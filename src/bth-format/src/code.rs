@@ -159,6 +159,7 @@ codes! {
     TooManyInstances "S005" "A scene has at most 2^30 instances."
     NotDeformable "S006" "An object that is given new positions was compiled for them."
     NewPositions "S007" "New positions are finite, and as many as the object has vertices."
+    Start "S008" "A ray starts at a point of a triangle with area, on an instance that is visible."
 }
 
 impl Code {
@@ -181,6 +182,7 @@ impl Code {
                 "hide the instance, or scale its node by 0; else keep the scales of one transform within 2^24 of each other"
             }
             Code::NotFinite => "keep translations and scales within the range of 32-bit numbers",
+            Code::Start => "take instance, triangle, u and v from a hit of this scene",
             Code::NoSuchInstance => "use ids that the scene builder returned and that were not removed since",
             Code::PlacedByFile => {
                 "move, hide or remove the subscene, or add the object as an instance of its own"

@@ -1,35 +1,34 @@
 //! Queries of many rays in one call.
 
 use crate::hits::Accept;
-use crate::rays::{Hit, PrimitiveRef, Ray};
+use crate::rays::{Hit, Ray};
 use crate::scene::Scene;
+use crate::starts::TraceRay;
 
-/// Rays in world space that are traced together, with options. Made by [`Scene::batch`].
+/// Rays in world space that are traced together, with options: [`Ray`]s, or [`StartRay`](crate::rays::StartRay)s. Made by [`Scene::batch`].
 ///
 /// Rays that are traced together answer as each would alone, to the last bit. About a thousand coherent rays that are adjacent in
 /// the slice (a tile of a picture, the shadow rays of a tile) are traced fastest.
 ///
 /// ```no_run
-/// use bth::rays::{Hit, Ray};
+/// use bth::rays::{Hit, Ray, StartRay};
 ///
 /// let scene = bth::open("bunny.bth")?;
 /// let rays = vec![Ray::new([0.0, 0.1, 1.0], [0.0, 0.0, -1.0]); 1024];
 /// let mut hits = vec![Hit::MISS; rays.len()];
 /// scene.batch(&rays).nearest(&mut hits);
 ///
-/// // The triangles on which the next rays start are a hint, which never changes an answer.
-/// let onward: Vec<Ray> = rays.iter().zip(&hits).map(|(ray, hit)| Ray::new(ray.at(hit.t), [0.0, 1.0, 0.0])).collect();
-/// let starts: Vec<_> = hits.iter().map(|hit| hit.primitive).collect();
+/// // The next rays start where these hit: they need no offset and do not hit what they leave.
+/// let onward: Vec<StartRay> = hits.iter().map(|hit| StartRay::from_hit(hit, [0.0, 1.0, 0.0])).collect();
 /// let mut blocked = vec![false; rays.len()];
-/// scene.batch(&onward).from(&starts[..]).any(&mut blocked);
+/// scene.batch(&onward).any(&mut blocked);
 /// # Ok::<(), bth::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
 #[must_use = "nothing is traced before `nearest` or `any`"]
-pub struct RayBatch<'a> {
+pub struct RayBatch<'a, R: TraceRay = Ray> {
     scene: &'a Scene,
-    rays: &'a [Ray],
-    from: Option<&'a [PrimitiveRef]>,
+    rays: &'a [R],
     accept: Option<&'a Accept<'a>>,
     #[cfg(feature = "rayon")]
     parallel: bool,
@@ -42,11 +41,10 @@ const TASK: usize = 4096;
 impl Scene {
     /// A batch of rays, to be traced by [`RayBatch::nearest`] or [`RayBatch::any`].
     #[inline]
-    pub fn batch<'a>(&'a self, rays: &'a [Ray]) -> RayBatch<'a> {
+    pub fn batch<'a, R: TraceRay>(&'a self, rays: &'a [R]) -> RayBatch<'a, R> {
         RayBatch {
             scene: self,
             rays,
-            from: None,
             accept: None,
             #[cfg(feature = "rayon")]
             parallel: false,
@@ -54,16 +52,9 @@ impl Scene {
     }
 }
 
-impl<'a> RayBatch<'a> {
-    /// Sets for each ray the triangle on which it starts, or [`PrimitiveRef::NONE`]: a hint where a traversal of tetrahedra may
-    /// begin. `None` for no hints.
-    #[inline]
-    pub fn from(self, triangles: impl Into<Option<&'a [PrimitiveRef]>>) -> Self {
-        RayBatch { from: triangles.into(), ..self }
-    }
-
+impl<'a, R: TraceRay> RayBatch<'a, R> {
     /// Sets what the rays are allowed to hit; by default everything, whatever the masks of the scene. Where something is excluded, rays
-    /// are traced one at a time and hints are not used, as by [`Scene::nearest_accepted`].
+    /// are traced one at a time, as by [`Scene::nearest_accepted`].
     #[inline]
     pub fn accept(self, accept: &'a Accept<'a>) -> Self {
         RayBatch { accept: Some(accept), ..self }
@@ -79,13 +70,13 @@ impl<'a> RayBatch<'a> {
     /// Stores the nearest hit of each ray, or [`Hit::MISS`].
     ///
     /// # Panics
-    /// If there are not as many hits, and hints if there are any, as rays.
+    /// If there are not as many hits as rays.
     // What a single ray needs is inlined into the caller: what is not asked for, such as conditions, then takes no time.
     #[inline(always)]
     pub fn nearest(self, hits: &mut [Hit]) {
         self.check_lengths(hits.len());
         match (self.rays, &mut *hits, self.accept) {
-            ([ray], [hit], None) => self.scene.nearest_of_ray(ray, self.first_start(), hit),
+            ([ray], [hit], None) => ray.store_nearest(self.scene, hit),
             _ => self.nearest_of_many(hits),
         }
     }
@@ -98,7 +89,7 @@ impl<'a> RayBatch<'a> {
     pub fn any(self, found: &mut [bool]) {
         self.check_lengths(found.len());
         match (self.rays, &mut *found, self.accept) {
-            ([ray], [found], None) => *found = self.scene.any_of_ray(ray, self.first_start()),
+            ([ray], [found], None) => *found = ray.any(self.scene),
             _ => self.any_of_many(found),
         }
     }
@@ -111,7 +102,7 @@ impl<'a> RayBatch<'a> {
             return self.in_tasks(hits, |part, hits| part.nearest_of_many(hits));
         }
         match self.conditions() {
-            None => self.scene.nearest_hits_of(self.rays, self.from, hits),
+            None => R::nearest_of(self.scene, self.rays, hits),
             Some(accept) => self.scene.nearest_accepted_batch(self.rays, accept, hits),
         }
     }
@@ -124,15 +115,9 @@ impl<'a> RayBatch<'a> {
             return self.in_tasks(found, |part, found| part.any_of_many(found));
         }
         match self.conditions() {
-            None => self.scene.any_hits_of(self.rays, self.from, found),
+            None => R::any_of(self.scene, self.rays, found),
             Some(accept) => self.scene.any_accepted_batch(self.rays, accept, found),
         }
-    }
-
-    /// The triangle on which the first ray starts, or [`PrimitiveRef::NONE`].
-    #[inline(always)]
-    fn first_start(&self) -> PrimitiveRef {
-        self.from.and_then(|from| from.first()).map_or(PrimitiveRef::NONE, |&first| first)
     }
 
     /// What the rays are allowed to hit; `None` if that is everything.
@@ -143,18 +128,16 @@ impl<'a> RayBatch<'a> {
     #[inline(always)]
     fn check_lengths(&self, results: usize) {
         assert_eq!(self.rays.len(), results, "as many results as rays");
-        assert!(self.from.is_none_or(|from| from.len() == results), "as many hints as rays");
     }
 
     /// Calls `trace` for each part of the rays and its results, in parallel.
     #[cfg(feature = "rayon")]
-    fn in_tasks<T: Send>(self, results: &mut [T], trace: impl Fn(RayBatch<'a>, &mut [T]) + Sync) {
+    fn in_tasks<T: Send>(self, results: &mut [T], trace: impl Fn(RayBatch<'a, R>, &mut [T]) + Sync) {
         use rayon::iter::{IndexedParallelIterator, ParallelIterator};
         use rayon::slice::ParallelSliceMut;
         results.par_chunks_mut(TASK).enumerate().for_each(|(task, results)| {
             let part = task * TASK..task * TASK + results.len();
-            let from = self.from.map(|from| &from[part.clone()]);
-            trace(RayBatch { rays: &self.rays[part], from, parallel: false, ..self }, results);
+            trace(RayBatch { rays: &self.rays[part], parallel: false, ..self }, results);
         });
     }
 }

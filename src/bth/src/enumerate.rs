@@ -5,6 +5,7 @@ use crate::instances::Placement;
 use crate::nodes::ObjectRay;
 use crate::rays::Ray;
 use crate::scene::Scene;
+use crate::starts::placed::WorldRay;
 use bth_format::object::ObjectView;
 
 /// An instance that a ray may hit.
@@ -20,8 +21,11 @@ pub(crate) struct EnteredInstance<'a> {
 
 impl EnteredInstance<'_> {
     /// A ray in the space of the object. All queries transform rays as here, so t has the same bits in all of them.
-    pub(crate) fn object_ray(&self, ray: &Ray) -> ObjectRay {
-        self.placement.map_or(ObjectRay { ray: *ray, t_scale: 1.0 }, |placement| placement.inverse.ray(ray))
+    pub(crate) fn object_ray(&self, ray: WorldRay<'_>) -> ObjectRay {
+        match self.placement {
+            None => ObjectRay { ray: *ray.ray, t_scale: 1.0 },
+            Some(placement) => placement.inverse.ray_from(ray.ray, ray.start_in(self.instance)),
+        }
     }
 }
 

@@ -1,54 +1,48 @@
 //! Queries for the nearest hit of rays in world space, and for any hit.
 
-use crate::SMALL;
 use crate::object;
 use crate::query::Steps;
-use crate::rays::{Hit, PrimitiveRef, Ray};
+use crate::rays::{Hit, Ray};
 use crate::scene::Scene;
-use bth_format::layout::NONE;
+use crate::starts::TraceRay;
+use crate::starts::placed::WorldRay;
 
 impl Scene {
-    /// Nearest hit of a ray in world space.
-    pub fn nearest(&self, ray: &Ray) -> Option<Hit> {
-        self.nearest_from(ray, PrimitiveRef::NONE)
-    }
-
-    /// As [`Self::nearest`], for a ray that starts on a triangle, or [`PrimitiveRef::NONE`]. The triangle is a hint where a
-    /// traversal of tetrahedra may begin, and never changes the result.
-    pub fn nearest_from(&self, ray: &Ray, triangle: PrimitiveRef) -> Option<Hit> {
+    /// Nearest hit of a ray in world space: a [`Ray`], or a [`StartRay`](crate::rays::StartRay).
+    pub fn nearest<R: TraceRay>(&self, ray: &R) -> Option<Hit> {
         let mut hit = Hit::MISS;
-        self.nearest_of_ray(ray, triangle, &mut hit);
+        ray.store_nearest(self, &mut hit);
         hit.is_hit().then_some(hit)
     }
 
-    /// Whether a ray in world space hits anything.
-    pub fn any(&self, ray: &Ray) -> bool {
-        self.any_from(ray, PrimitiveRef::NONE)
+    /// Whether a ray in world space hits anything: a [`Ray`], or a [`StartRay`](crate::rays::StartRay).
+    pub fn any<R: TraceRay>(&self, ray: &R) -> bool {
+        ray.any(self)
     }
 
-    /// As [`Self::any`], with a hint as for [`Self::nearest_from`].
-    pub fn any_from(&self, ray: &Ray, triangle: PrimitiveRef) -> bool {
-        self.any_of_ray(ray, triangle)
-    }
-
-    /// As [`Self::nearest_from`], with statistics of the traversal. A miss is [`Hit::MISS`].
-    pub fn nearest_counted(&self, ray: &Ray, from: PrimitiveRef) -> (Hit, Steps) {
-        let counted = self.nearest_of_all_counted(ray, from);
-        if self.has_opacity() { self.counted_not_transparent(ray, counted) } else { counted }
+    /// As [`Self::nearest`], with statistics of the traversal. A miss is [`Hit::MISS`].
+    pub fn nearest_counted<R: TraceRay>(&self, ray: &R) -> (Hit, Steps) {
+        let Some(placed) = ray.placed(self) else { return (Hit::MISS, Steps::default()) };
+        let (mut hit, steps) = self.nearest_of_all_counted(placed.world_ray());
+        if self.has_opacity() {
+            // The steps of the search behind holes are not counted.
+            self.go_on(placed.world_ray(), &mut hit);
+        }
+        (hit, steps)
     }
 
     /// As [`Self::nearest_counted`], as if every triangle were opaque.
-    fn nearest_of_all_counted(&self, ray: &Ray, from: PrimitiveRef) -> (Hit, Steps) {
+    fn nearest_of_all_counted(&self, world_ray: WorldRay<'_>) -> (Hit, Steps) {
         if let Some((object, instance)) = self.sole() {
-            return object::nearest_counted(object, ray, hint(from, instance), instance);
+            return object::nearest_counted(object, world_ray.exact_in(instance), instance);
         }
         if let Some(world) = self.world() {
-            return world.nearest_counted(self.objects(), ray, from);
+            return world.nearest_counted(self.objects(), world_ray);
         }
-        let (mut best, mut steps, mut ray) = (Hit::MISS, Steps::default(), *ray);
+        let (mut best, mut steps, mut ray) = (Hit::MISS, Steps::default(), *world_ray.ray);
         for instance in 0..self.object_count() {
-            let (hit, object_steps) =
-                object::nearest_counted(self.view(instance), &ray, hint(from, instance), instance);
+            let exact_ray = (&ray, world_ray.start_in(instance));
+            let (hit, object_steps) = object::nearest_counted(self.view(instance), exact_ray, instance);
             steps += object_steps;
             if hit.t < best.t {
                 (best, ray.tmax) = (hit, hit.t);
@@ -57,96 +51,96 @@ impl Scene {
         (best, steps)
     }
 
-    /// Stores the nearest hit of a ray, or [`Hit::MISS`]. `from` is the triangle on which it starts, or [`PrimitiveRef::NONE`].
+    /// Stores the nearest hit of a ray, or [`Hit::MISS`].
     ///
     /// Inlined up to the kernel, which is not: every crate that traces single rays would hold kernels of its own. For a single ray in a
     /// model every instruction on the way there counts.
     #[inline(always)]
-    pub(crate) fn nearest_of_ray(&self, ray: &Ray, from: PrimitiveRef, hit: &mut Hit) {
+    pub(crate) fn nearest_of_ray(&self, ray: &Ray, hit: &mut Hit) {
         match self.sole_opaque() {
-            Some(object) => object::store_nearest(object, ray, hint(from, 0), 0, hit),
-            None => self.nearest_of_ray_elsewhere(ray, from, hit),
+            Some(object) => object::store_nearest(object, (ray, None), 0, hit),
+            None => self.nearest_of_ray_elsewhere(ray, hit),
         }
     }
 
     /// As [`Self::nearest_of_ray`], in any scene.
     #[inline(never)]
-    fn nearest_of_ray_elsewhere(&self, ray: &Ray, from: PrimitiveRef, hit: &mut Hit) {
+    fn nearest_of_ray_elsewhere(&self, ray: &Ray, hit: &mut Hit) {
         if !self.has_opacity() {
             if let Some((object, instance)) = self.sole() {
-                return object::store_nearest(object, ray, hint(from, instance), instance, hit);
+                return object::store_nearest(object, (ray, None), instance, hit);
             }
             if let Some(world) = self.world() {
-                return world.store_nearest_of_ray(self.objects(), ray, from, hit);
+                return world.store_nearest_of_ray(self.objects(), WorldRay::plain(ray), hit);
             }
         }
-        self.nearest_hits_of(std::slice::from_ref(ray), Some(&[from]), std::slice::from_mut(hit));
+        self.nearest_hits_of(std::slice::from_ref(ray), std::slice::from_mut(hit));
     }
 
-    /// Whether a ray hits anything; `from` as for [`Self::nearest_of_ray`].
+    /// Whether a ray hits anything.
     #[inline(always)]
-    pub(crate) fn any_of_ray(&self, ray: &Ray, from: PrimitiveRef) -> bool {
+    pub(crate) fn any_of_ray(&self, ray: &Ray) -> bool {
         match self.sole_opaque() {
-            Some(object) => object::any(object, ray, hint(from, 0)),
-            None => self.any_of_ray_elsewhere(ray, from),
+            Some(object) => object::any(object, (ray, None)),
+            None => self.any_of_ray_elsewhere(ray),
         }
     }
 
     /// As [`Self::any_of_ray`], in any scene.
     #[inline(never)]
-    fn any_of_ray_elsewhere(&self, ray: &Ray, from: PrimitiveRef) -> bool {
+    fn any_of_ray_elsewhere(&self, ray: &Ray) -> bool {
         if !self.has_opacity() {
-            if let Some((object, instance)) = self.sole() {
-                return object::any(object, ray, hint(from, instance));
+            if let Some((object, _)) = self.sole() {
+                return object::any(object, (ray, None));
             }
             if let Some(world) = self.world() {
-                return world.any_of_ray(self.objects(), ray, from);
+                return world.any_of_ray(self.objects(), WorldRay::plain(ray));
             }
         }
         let mut found = [false];
-        self.any_hits_of(std::slice::from_ref(ray), Some(&[from]), &mut found);
+        self.any_hits_of(std::slice::from_ref(ray), &mut found);
         found[0]
     }
 
-    /// Stores the nearest hit of each ray, or [`Hit::MISS`]. `hits`, and `from` if it is given, are as long as `rays`.
+    /// Stores the nearest hit of each ray, or [`Hit::MISS`]. `hits` is as long as `rays`.
     #[inline(never)]
-    pub(crate) fn nearest_hits_of(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, hits: &mut [Hit]) {
+    pub(crate) fn nearest_hits_of(&self, rays: &[Ray], hits: &mut [Hit]) {
         if self.has_opacity() {
-            return self.nearest_not_transparent(rays, from, hits);
+            return self.nearest_not_transparent(rays, hits);
         }
-        self.nearest_of_all(rays, from, hits);
+        self.nearest_of_all(rays, hits);
     }
 
     /// As [`Self::nearest_hits_of`], as if every triangle were opaque.
-    pub(crate) fn nearest_of_all(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, hits: &mut [Hit]) {
+    pub(crate) fn nearest_of_all(&self, rays: &[Ray], hits: &mut [Hit]) {
         object::fill_misses(hits);
         if let Some((object, instance)) = self.sole() {
             if rays.len() < object::MIN_BATCH {
-                for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
-                    *hit = object::nearest(object, ray, hint(start_primitive(from, i), instance), instance);
+                for (ray, hit) in rays.iter().zip(hits) {
+                    *hit = object::nearest(object, (ray, None), instance);
                 }
                 return;
             }
             return object::with_scratch(|scratch| {
-                object::nearest_batch(object, rays, from, instance, scratch, hits);
+                object::nearest_batch(object, rays, instance, scratch, hits);
             });
         }
         if let Some(world) = self.world() {
             if !world.go_one_by_one(rays) {
-                return world.nearest(self.objects(), rays, from, hits);
+                return world.nearest(self.objects(), rays, &[], hits);
             }
-            for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
-                world.store_nearest_of_ray(self.objects(), ray, start_primitive(from, i), hit);
+            for (ray, hit) in rays.iter().zip(hits) {
+                world.store_nearest_of_ray(self.objects(), WorldRay::plain(ray), hit);
             }
             return;
         }
         for instance in 0..self.object_count() {
             let object = self.view(instance);
-            for (i, (ray, best)) in rays.iter().zip(hits.iter_mut()).enumerate() {
+            for (ray, best) in rays.iter().zip(hits.iter_mut()) {
                 // Not `f32::min`, which would replace a `tmax` of NaN by a number.
                 let tmax = if best.t < ray.tmax { best.t } else { ray.tmax };
                 let ray = Ray { tmax, ..*ray };
-                let hit = object::nearest(object, &ray, hint(start_primitive(from, i), instance), instance);
+                let hit = object::nearest(object, (&ray, None), instance);
                 if hit.t < best.t {
                     *best = hit;
                 }
@@ -154,53 +148,43 @@ impl Scene {
         }
     }
 
-    /// Stores for each ray whether it hits anything. `found`, and `from` if it is given, are as long as `rays`.
+    /// Stores for each ray whether it hits anything. `found` is as long as `rays`.
     #[inline(never)]
-    pub(crate) fn any_hits_of(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, found: &mut [bool]) {
+    pub(crate) fn any_hits_of(&self, rays: &[Ray], found: &mut [bool]) {
         if self.has_opacity() {
-            return self.any_not_transparent(rays, from, found);
+            return self.any_not_transparent(rays, found);
         }
-        self.any_of_all(rays, from, found);
+        self.any_of_all(rays, found);
     }
 
     /// As [`Self::any_hits_of`], as if every triangle were opaque.
-    pub(crate) fn any_of_all(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, found: &mut [bool]) {
+    pub(crate) fn any_of_all(&self, rays: &[Ray], found: &mut [bool]) {
         found.fill(false);
         if let Some((object, instance)) = self.sole() {
             if rays.len() < object::MIN_BATCH {
-                for (i, (ray, found)) in rays.iter().zip(found).enumerate() {
-                    *found = object::any(object, ray, hint(start_primitive(from, i), instance));
+                for (ray, found) in rays.iter().zip(found) {
+                    *found = object::any(object, (ray, None));
                 }
                 return;
             }
             return object::with_scratch(|scratch| {
-                object::any_batch(object, rays, from, instance, scratch, found);
+                object::any_batch(object, rays, instance, scratch, found);
             });
         }
         if let Some(world) = self.world() {
             if !world.go_one_by_one(rays) {
-                return world.any(self.objects(), rays, from, found);
+                return world.any(self.objects(), rays, &[], found);
             }
-            for (i, (ray, found)) in rays.iter().zip(found).enumerate() {
-                *found = world.any_of_ray(self.objects(), ray, start_primitive(from, i));
+            for (ray, found) in rays.iter().zip(found) {
+                *found = world.any_of_ray(self.objects(), WorldRay::plain(ray));
             }
             return;
         }
         for instance in 0..self.object_count() {
             let object = self.view(instance);
-            for (i, (ray, found)) in rays.iter().zip(found.iter_mut()).enumerate() {
-                *found = *found || object::any(object, ray, hint(start_primitive(from, i), instance));
+            for (ray, found) in rays.iter().zip(found.iter_mut()) {
+                *found = *found || object::any(object, (ray, None));
             }
         }
     }
-}
-
-/// The triangle on which a ray of a batch starts, or [`PrimitiveRef::NONE`].
-fn start_primitive(from: Option<&[PrimitiveRef]>, ray: usize) -> PrimitiveRef {
-    from.map_or(PrimitiveRef::NONE, |f| f[ray])
-}
-
-/// The triangle of an instance's object on which a ray starts, or `NONE`.
-fn hint(from: PrimitiveRef, instance: u32) -> u32 {
-    if SMALL { NONE } else { from.triangle_of(instance) }
 }

@@ -6,9 +6,9 @@
 //! call, and rays that meet no holes pay for looking up the opacity of their hit.
 
 use crate::hits::Accept;
-use crate::query::Steps;
-use crate::rays::{Hit, PrimitiveRef, Ray};
+use crate::rays::{Hit, Ray};
 use crate::scene::Scene;
+use crate::starts::placed::WorldRay;
 use bth_format::layout::Opacity;
 
 impl Scene {
@@ -24,43 +24,25 @@ impl Scene {
     /// As `nearest_hits_of`, for a scene with triangles that let rays pass.
     #[cold]
     #[inline(never)]
-    pub(crate) fn nearest_not_transparent(
-        &self,
-        rays: &[Ray],
-        from: Option<&[PrimitiveRef]>,
-        hits: &mut [Hit],
-    ) {
-        self.nearest_of_all(rays, from, hits);
+    pub(crate) fn nearest_not_transparent(&self, rays: &[Ray], hits: &mut [Hit]) {
+        self.nearest_of_all(rays, hits);
         for (ray, hit) in rays.iter().zip(hits) {
-            self.go_on(ray, hit);
+            self.go_on(WorldRay::plain(ray), hit);
         }
     }
 
     /// As `any_hits_of`, for a scene with triangles that let rays pass.
     #[cold]
     #[inline(never)]
-    pub(crate) fn any_not_transparent(
-        &self,
-        rays: &[Ray],
-        from: Option<&[PrimitiveRef]>,
-        found: &mut [bool],
-    ) {
-        self.any_of_all(rays, from, found);
+    pub(crate) fn any_not_transparent(&self, rays: &[Ray], found: &mut [bool]) {
+        self.any_of_all(rays, found);
         for (ray, found) in rays.iter().zip(found) {
-            *found = *found && self.search_any(ray, &Accept::default());
+            *found = *found && self.search_any(WorldRay::plain(ray), &Accept::default());
         }
     }
 
-    /// As `nearest_counted`, for a scene with triangles that let rays pass. The steps of the search behind holes are not counted.
-    #[cold]
-    #[inline(never)]
-    pub(crate) fn counted_not_transparent(&self, ray: &Ray, (mut hit, steps): (Hit, Steps)) -> (Hit, Steps) {
-        self.go_on(ray, &mut hit);
-        (hit, steps)
-    }
-
     /// Replaces a ray's nearest hit by its nearest one that is not transparent.
-    fn go_on(&self, ray: &Ray, hit: &mut Hit) {
+    pub(crate) fn go_on(&self, ray: WorldRay<'_>, hit: &mut Hit) {
         if hit.is_hit() && self.opacity(hit) == Opacity::Transparent {
             *hit = self.search_nearest(ray, &Accept::default()).unwrap_or(Hit::MISS);
         }

@@ -57,13 +57,73 @@ pub struct PrimitiveRef {
 }
 
 impl PrimitiveRef {
-    /// No triangle: the surface of a miss, and of a ray of which it is not known where it starts.
+    /// No triangle: that of a miss.
     pub const NONE: PrimitiveRef = PrimitiveRef { instance: NONE, triangle: NONE };
 
     /// The triangle, if it is one of the given instance; else `NONE`.
     #[inline(always)]
     pub(crate) fn triangle_of(self, instance: u32) -> u32 {
         if self.instance == instance { self.triangle } else { NONE }
+    }
+}
+
+/// A point of a surface, at which a ray may start: the point with these weights of a triangle of an instance.
+///
+/// It is the exact point a + u(b - a) + v(c - a) of the triangle's stored vertices a, b and c in the space of the object, not rounded.
+/// Weights of hits are rounded; where u + v exceeds 1, the start is the point (ub + vc) / (u + v) of the edge from b to c. So a start
+/// always lies on its triangle.
+#[derive(Clone, Copy, Debug, PartialEq, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct Start {
+    /// The triangle.
+    pub primitive: PrimitiveRef,
+    /// Barycentric weight of the triangle's second vertex, from 0 to 1.
+    pub u: f32,
+    /// Barycentric weight of the triangle's third vertex, from 0 to 1. u + v is at most 1, but for rounding (2^-22).
+    pub v: f32,
+}
+
+impl Start {
+    /// No point: a ray that starts here hits nothing.
+    pub const NONE: Start = Start { primitive: PrimitiveRef::NONE, u: 0.0, v: 0.0 };
+
+    /// The ray that leaves this point in a direction.
+    pub const fn ray(self, direction: [f32; 3]) -> StartRay {
+        StartRay { start: self, direction, tmax: f32::INFINITY }
+    }
+}
+
+/// A ray that starts on a surface: the points `S + t * direction` with t > 0 and `t <= tmax`, where S is the exact point of its start.
+///
+/// It never hits the surface that it leaves, nor another one through S, and never skips a wall, however near: t > 0 is decided exactly.
+/// It needs no offset and no `tmin`. t is in units of the length of the direction.
+///
+/// A ray whose start is not a point of a visible instance hits nothing; [`Scene::check_start`](crate::Scene::check_start) says why.
+#[derive(Clone, Copy, Debug, PartialEq, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct StartRay {
+    /// Where the ray starts.
+    pub start: Start,
+    /// Direction in world space, of any length except zero, finite.
+    pub direction: [f32; 3],
+    /// Greatest t of a hit; may be infinite.
+    pub tmax: f32,
+}
+
+impl StartRay {
+    /// The ray that leaves a hit in a direction.
+    pub const fn from_hit(hit: &Hit, direction: [f32; 3]) -> StartRay {
+        hit.start().ray(direction)
+    }
+
+    /// The same ray with another end.
+    pub const fn with_tmax(self, tmax: f32) -> StartRay {
+        StartRay { tmax, ..self }
+    }
+
+    /// For each ray the words of instance, triangle, u, v, direction and `tmax`.
+    pub(crate) fn rows(rays: &[StartRay]) -> &[[u32; 8]] {
+        <[[u32; 8]]>::ref_from_bytes(rays.as_bytes()).ok().expect("a ray is eight words")
     }
 }
 
@@ -85,10 +145,16 @@ impl Hit {
     /// The result for a ray that hits nothing.
     pub const MISS: Hit = Hit { t: f32::INFINITY, u: 0.0, v: 0.0, primitive: PrimitiveRef::NONE };
 
+    /// The point of the surface that was hit, at which another ray may start; [`Start::NONE`] for a miss.
+    pub const fn start(&self) -> Start {
+        Start { primitive: self.primitive, u: self.u, v: self.v }
+    }
+
     /// Whether the ray hits a triangle.
     pub fn is_hit(&self) -> bool {
         self.t < f32::INFINITY
     }
 }
 
-const _: () = assert!(size_of::<Ray>() == 32 && size_of::<PrimitiveRef>() == 8 && size_of::<Hit>() == 20);
+const _: () = assert!(size_of::<Ray>() == 32 && size_of::<StartRay>() == 32);
+const _: () = assert!(size_of::<Start>() == 16 && size_of::<PrimitiveRef>() == 8 && size_of::<Hit>() == 20);

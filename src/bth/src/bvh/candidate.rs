@@ -4,6 +4,7 @@ use super::nodes;
 use crate::intersect::exact::{Estimate, Intersection, estimate, wide};
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::line::Line;
+use crate::intersect::start::{ExactStart, StartDecision, StartPoint, decide_start, decide_start_exactly};
 use crate::query::{Query, TriangleRef};
 use crate::rays::Ray;
 use crate::simd::{Scalar, Simd};
@@ -75,19 +76,24 @@ impl Reader for ReadCorners {
 }
 
 /// Offers candidates of a ray to its query: the pending hit, then the triangles of the leaf with child code `leaf` whose bit is set
-/// in `triangles`. Returns whether the query is complete. All traversals decide here, in f64 and where that is uncertain exactly,
-/// what the f32 filter leaves open.
+/// in `triangles`. `start` is where the ray starts on a triangle of the object. Returns whether the query is complete. All traversals
+/// decide here, in f64 and where that is uncertain exactly, what the f32 filter leaves open.
 #[inline(never)]
 pub(crate) fn settle<Q: Query>(
     object: &ObjectView<'_>,
-    ray: &Ray,
+    (ray, start): (&Ray, Option<&StartPoint>),
     pending: Candidate,
     (leaf, mut triangles): (u32, u32),
     query: &mut Q,
 ) -> bool {
     let mut candidate = pending;
     loop {
-        if candidate.leaf != NONE && settle_one(object, ray, candidate, query) {
+        if candidate.leaf != NONE
+            && match start {
+                None => settle_one(object, ray, candidate, query),
+                Some(start) => settle_from_start(object, (ray, start), candidate, query),
+            }
+        {
             return true;
         }
         if triangles == 0 {
@@ -115,6 +121,40 @@ pub(crate) fn settle_one<Q: Query>(
     };
     intersection
         .is_some_and(|intersection| query.offer(TriangleRef::index(index, object.triangle_ids), intersection))
+}
+
+/// As [`settle_one`], for a ray that starts on a triangle.
+#[inline(never)]
+fn settle_from_start<Q: Query>(
+    object: &ObjectView<'_>,
+    (ray, start): (&Ray, &StartPoint),
+    candidate: Candidate,
+    query: &mut Q,
+) -> bool {
+    let Some((index, corners)) = candidate.read(object, ReadCorners) else { return false };
+    let intersection = match decide_start(start.origin, wide(ray.direction), corners.map(wide)) {
+        StartDecision::Certain(found) => found,
+        StartDecision::Open(_, t) if !query.may_matter(t) => None,
+        StartDecision::Open(uncertain, _) => start_on(object, start)
+            .and_then(|start| decide_start_exactly(&start, wide(ray.direction), corners, &uncertain)),
+    };
+    intersection
+        .is_some_and(|intersection| query.offer(TriangleRef::index(index, object.triangle_ids), intersection))
+}
+
+/// The corners of a triangle in a leaf; in a tet leaf `slot` is the index of a constrained face of the object.
+pub(crate) fn start_corners(object: &ObjectView<'_>, leaf: u32, slot: u32) -> Option<[[f32; 3]; 3]> {
+    if let Some(Child::Tets(_)) = Child::from_code(leaf) {
+        let face = object.tet_faces.get(slot as usize)?;
+        return Some(face.vertex.map(|v| object.tet_vertices[v as usize].position));
+    }
+    Some(Candidate { leaf, triangle: slot }.read(object, ReadCorners)?.1)
+}
+
+/// A start with the corners of its triangle.
+pub(crate) fn start_on(object: &ObjectView<'_>, start: &StartPoint) -> Option<ExactStart> {
+    let corners = start_corners(object, start.leaf, start.slot)?;
+    Some(ExactStart::new(corners, start.u, start.v))
 }
 
 /// Decides exactly a candidate that f64 leaves open. Its corners are read again, so that the common path keeps them in registers.

@@ -1,11 +1,12 @@
 //! The answer of a single ray whose nearest hit is certain: t, u and v in f64, as [`super::deferred`] computes them for sixteen rays.
 
 use super::candidate::{Candidate, settle};
+use super::leaf::ExactRay;
 use crate::intersect::exact::{reported, reported_barycentric};
 use crate::intersect::exact_quad::rounded_intersection;
 use crate::intersect::filter::TriangleBlock;
 use crate::query::Query;
-use crate::rays::{PrimitiveRef, Ray};
+use crate::rays::PrimitiveRef;
 use crate::simd::Simd;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
@@ -16,12 +17,14 @@ use bth_format::object::ObjectView;
 pub(crate) fn store_certain_hit<S: Simd, Q: Query>(
     s: S,
     object: &ObjectView<'_>,
-    ray: &Ray,
+    exact_ray: ExactRay<'_>,
     (candidate, norm): (Candidate, f32),
     goal: Q::Goal,
     (answer, instance): (&mut Q::Answer, u32),
 ) {
-    if let Some(leaf) = object.node_base().indexed_leaf(candidate.leaf) {
+    if let (ray, None) = exact_ray
+        && let Some(leaf) = object.node_base().indexed_leaf(candidate.leaf)
+    {
         let corners = leaf.corners(candidate.triangle as usize);
         let rounded = rounded_intersection(s.doubles(), (ray.origin, ray.direction), corners, norm);
         if rounded.is_accurate {
@@ -33,18 +36,18 @@ pub(crate) fn store_certain_hit<S: Simd, Q: Query>(
             return;
         }
     }
-    *answer = decided_hit::<Q>(object, ray, candidate, (goal, instance));
+    *answer = decided_hit::<Q>(object, exact_ray, candidate, (goal, instance));
 }
 
-/// The answer, for leaves of other formats, and where f64 leaves t, u or v inaccurate.
+/// The answer, for leaves of other formats, for rays that start on a triangle, and where f64 leaves t, u or v inaccurate.
 #[inline(never)]
 fn decided_hit<Q: Query>(
     object: &ObjectView<'_>,
-    ray: &Ray,
+    ray: ExactRay<'_>,
     candidate: Candidate,
     (goal, instance): (Q::Goal, u32),
 ) -> Q::Answer {
-    let mut query = Q::new(goal, ray);
+    let mut query = Q::new(goal, ray.0);
     settle(object, ray, candidate, (NONE, 0), &mut query);
     query.answer(object.triangle_ids, instance)
 }

@@ -3,6 +3,7 @@
 use super::leaf::Progress;
 use super::ray_state::RayState;
 use crate::bvh::candidate::{Candidate, Reader, settle};
+use crate::intersect::exact::RoundedOrigin;
 use crate::intersect::exact_lanes::{Intersections, Pairs};
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::prepare::gather_rays;
@@ -131,8 +132,16 @@ impl DeferredHits {
             s.store(origin[k], &mut self.pairs.origin[k]);
             s.store(direction[k], &mut self.pairs.direction[k]);
         }
-        let intersections = &mut self.intersections;
-        intersections.compute(s, all, &self.pairs);
+        let (starts, intersections) = (sink.starts(), &mut self.intersections);
+        if starts.is_empty() {
+            intersections.compute(s, all, &self.pairs);
+        } else {
+            let mut origins = [RoundedOrigin([0.0; 3], 0.0); LANES];
+            for (origin, ray) in origins.iter_mut().zip(self.ray) {
+                *origin = starts.0[ray as usize].origin;
+            }
+            intersections.compute_from(s, all, &origins, &self.pairs);
+        }
         for lane in 0..LANES {
             if intersections.certain >> lane & 1 != 0 {
                 let (t, u, v) = (intersections.t[lane], intersections.u[lane], intersections.v[lane]);
@@ -143,9 +152,10 @@ impl DeferredHits {
         while rest != 0 {
             let lane = rest.trailing_zeros() as usize % LANES;
             rest &= rest - 1;
-            let ray = &rays[self.ray[lane] as usize];
+            let index = self.ray[lane] as usize;
+            let (ray, start) = (&rays[index], starts.of(index));
             let mut query = Q::new(sink.goal(), ray);
-            settle(object, ray, self.candidate[lane], (NONE, 0), &mut query);
+            settle(object, (ray, start), self.candidate[lane], (NONE, 0), &mut query);
             sink.query(self.ray[lane] as usize, &query);
         }
     }

@@ -7,6 +7,7 @@
 //! are then all of one sign or zero, and the filter excludes only triangles with two weights of certain and opposite signs.
 
 use super::candidate::{Candidate, ReadCorners};
+use super::leaf::ExactRay;
 use super::nodes::{UnpackedNode, indexed_leaf, node, prefetch, raw as raw_leaf};
 use super::ray_state::key_limit;
 use super::single_stack::SingleStack;
@@ -15,12 +16,11 @@ use crate::intersect::boxes::RaySlabLanes;
 use crate::intersect::line::Line;
 use crate::intersect::prepare::PreparedRay;
 use crate::query::{NearestHit, TriangleRef};
-use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, Scalar, Simd};
 use crate::tets::flood::{FaceReceiver, VisitedSet};
 use crate::tets::walk::TetWalker;
 use bth_format::layout::{Child, NONE, TetFace, WIDTH};
-use bth_format::object::ObjectView;
+use bth_format::object::{ObjectBounds, ObjectView};
 
 /// Receiver of the triangles that a ray may hit.
 pub(crate) trait Receiver {
@@ -35,26 +35,42 @@ pub(crate) trait Receiver {
 /// Passes the triangles of an object that a ray in object space may hit within its range to a receiver: each triangle that the
 /// line touches at a t from `tmin` to the lesser of `tmax` and the receiver's limit, and some others. For a line in the plane of a
 /// triangle these are the t of its points in the triangle. Nearer boxes come first, but triangles come in no particular order.
-/// Returns whether the receiver has ended the enumeration.
-pub(crate) fn enumerate(object: &ObjectView<'_>, ray: &Ray, receiver: &mut dyn Receiver) -> bool {
+/// Returns whether the receiver has ended the enumeration. A ray that starts on a triangle passes all that it touches at t >= 0.
+pub(crate) fn enumerate(
+    object: &ObjectView<'_>,
+    (ray, start): ExactRay<'_>,
+    receiver: &mut dyn Receiver,
+) -> bool {
     if object.header.root == NONE {
         return false;
     }
-    let prepared = match PreparedRay::of(Scalar, &object.bounds, ray) {
+    let bounds = &match start {
+        None => object.bounds,
+        Some(_) => object.bounds.for_starts(),
+    };
+    let prepared = match PreparedRay::of(Scalar, bounds, ray) {
         Some(prepared) => prepared,
-        None => match PreparedRay::in_f64(object.header, ray) {
+        None => match PreparedRay::in_f64(bounds, ray) {
             Some(prepared) => prepared,
             None => return false,
         },
     };
     let stack = &mut SingleStack::new();
-    Isa::chosen().run(EnumerateKernel { object, ray, prepared: &prepared, stack, receiver })
+    Isa::chosen().run(EnumerateKernel {
+        object,
+        bounds,
+        ray: (ray, start),
+        prepared: &prepared,
+        stack,
+        receiver,
+    })
 }
 
 /// The kernel of [`enumerate`]. The receiver is called through a table, so that there is one kernel per instruction set.
 struct EnumerateKernel<'a> {
     object: &'a ObjectView<'a>,
-    ray: &'a Ray,
+    bounds: &'a ObjectBounds,
+    ray: ExactRay<'a>,
     prepared: &'a PreparedRay,
     stack: &'a mut SingleStack,
     receiver: &'a mut dyn Receiver,
@@ -65,11 +81,12 @@ impl Kernel for EnumerateKernel<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> bool {
-        let EnumerateKernel { object, ray, prepared, stack, receiver } = self;
+        let EnumerateKernel { object, bounds, ray, prepared, stack, receiver } = self;
+        let (origin_error, origin_reach) = (bounds.origin_error, bounds.origin_reach);
         let (slabs, node_base) = (&prepared.slabs, object.node_base());
         let mut code = object.header.root;
         let mut stack = stack.start(code);
-        let mut last = lesser(slabs.last, slabs.limit(receiver.limit()));
+        let mut last = lesser(slabs.last, slabs.limit(receiver.limit(), origin_error));
         // Stack entries with a greater key are dropped.
         let mut limit = key_limit(last);
         let mut unpacked_node = UnpackedNode::NONE;
@@ -95,12 +112,12 @@ impl Kernel for EnumerateKernel<'_> {
             }
             let (mut unpacked, mut unpacked_raw) = (None, None);
             let maybe = if let Some(leaf) = indexed_leaf(s, object, node_base, code, &mut unpacked) {
-                prepared.filter.candidates(s, leaf, slabs.first, last).maybe
+                prepared.filter.candidates(s, leaf, slabs.first, last, origin_reach).maybe
             } else {
                 match Child::from_code(code) {
                     Some(Child::Raw(at)) => {
                         let leaf = raw_leaf(s, object, at, &mut unpacked_raw);
-                        prepared.filter.candidates(s, leaf, slabs.first, last).maybe
+                        prepared.filter.candidates(s, leaf, slabs.first, last, origin_reach).maybe
                     }
                     Some(Child::Tets(row)) => {
                         let subtree = object.tet_leaves[row as usize].subtree;
@@ -119,7 +136,7 @@ impl Kernel for EnumerateKernel<'_> {
             if maybe != 0 && pass_triangles(object, (code, maybe), receiver) {
                 return true;
             }
-            last = lesser(slabs.last, slabs.limit(receiver.limit()));
+            last = lesser(slabs.last, slabs.limit(receiver.limit(), origin_error));
             limit = key_limit(last);
             code = stack.pop(limit, NearestHit);
         }
@@ -157,8 +174,16 @@ fn pass_triangles(
 /// edges and vertices or lies in the plane of a face.
 #[cold]
 #[inline(never)]
-fn pass_faces(object: &ObjectView<'_>, row: u32, ray: &Ray, receiver: &mut dyn Receiver) -> bool {
-    let Some(line) = Line::new(ray) else { return false };
+fn pass_faces(
+    object: &ObjectView<'_>,
+    row: u32,
+    (ray, start): ExactRay<'_>,
+    receiver: &mut dyn Receiver,
+) -> bool {
+    let Some(mut line) = Line::new(ray) else { return false };
+    if let Some(start) = start {
+        line.start_at(start);
+    }
     let walker = TetWalker::new(object, row, &line);
     walker.flood_faces(&mut PassedFaces { object, receiver, passed: VisitedSet::new() }, &mut ())
 }

@@ -4,7 +4,7 @@
 use super::coherence::is_same_octant;
 use super::deferred::DeferredHits;
 use super::entry_node::{ENTRY_RAYS, FindEntryNode};
-use super::leaf::{LeafOutcome, Progress, decide};
+use super::leaf::{ExactRay, LeafOutcome, Progress, decide};
 use super::nodes::{UnpackedNode, Wide, node};
 use super::ray_pool::{POOL_SIZE, RareSteps, RayPool, Slot, has_rare_steps};
 use super::ray_state::RayState;
@@ -76,7 +76,7 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
     /// Traces all rays and stores their answers. `tets` intersects a tet leaf without a subtree, given its row, and returns whether the
     /// query is complete.
     #[inline(always)]
-    pub(crate) fn run<S: Simd>(self, s: S, mut tets: impl FnMut(u32, &Ray, &mut Q) -> bool) {
+    pub(crate) fn run<S: Simd>(self, s: S, mut tets: impl FnMut(u32, ExactRay<'_>, &mut Q) -> bool) {
         let Interleaved { object, rays, remaining, stacks, sink, entry_nodes } = self;
         let walked = remaining.walked;
         let mut source = RaySource {
@@ -99,7 +99,7 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
             taken: 0,
         };
         let mut deferred = DeferredHits::new();
-        let goal = sink.goal();
+        let (goal, starts) = (sink.goal(), sink.starts());
         let mut slots = [Slot::vacant(goal); POOL_SIZE];
         let mut pool = RayPool::new(object, &mut slots, stacks, goal);
         let has_rare_steps = has_rare_steps(object);
@@ -115,12 +115,12 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
                     source.start(s, goal, slot, &mut pool);
                 }
             }
-            pool.leaf_steps(s, (object, rays), |row, state, top, stacks| {
+            pool.leaf_steps(s, (object, rays, starts), |row, state, top, stacks| {
                 let ray = state.ray();
                 if walked.is_some_and(|walked| walked[ray] == row) {
                     return LeafOutcome::Nothing;
                 }
-                enter_tets(object, row, &rays[ray], (state, top), stacks, &mut tets)
+                enter_tets(object, row, (&rays[ray], starts.of(ray)), (state, top), stacks, &mut tets)
             });
         }
         deferred.flush(s, object, rays, sink);
@@ -152,7 +152,7 @@ impl RaySource<'_> {
                 }
             }
             if query.is_some() {
-                state.update_from_query(&self.rays[index as usize]);
+                state.update_from_query(&self.rays[index as usize], self.bounds.origin_error);
             }
             if prepared.is_some() && self.root & Child::LEAF_BIT == 0 {
                 pool.start_among(s, slot, &self.codes, (self.children[lane], s.load(&self.enter[lane])));
@@ -259,16 +259,20 @@ fn root(object: &ObjectView<'_>) -> u32 {
 fn enter_tets<Q: Query>(
     object: &ObjectView<'_>,
     row: u32,
-    ray: &Ray,
+    ray: ExactRay<'_>,
     (state, top): (&mut RayState<Q>, StackPosition),
     stacks: &mut Stacks,
-    tets: &mut impl FnMut(u32, &Ray, &mut Q) -> bool,
+    tets: &mut impl FnMut(u32, ExactRay<'_>, &mut Q) -> bool,
 ) -> LeafOutcome {
     let subtree = object.tet_leaves[row as usize].subtree;
     if subtree != NONE {
         stacks.set_code(top, subtree);
         return LeafOutcome::Replaced;
     }
-    decide(object, ray, state, NONE, 0);
-    if tets(row, ray, state.query(ray)) { LeafOutcome::Done } else { state.update_from_query(ray) }
+    decide(object, ray, &object.bounds, state, (NONE, 0));
+    if tets(row, ray, state.query(ray.0)) {
+        LeafOutcome::Done
+    } else {
+        state.update_from_query(ray.0, object.bounds.origin_error)
+    }
 }

@@ -9,10 +9,11 @@
 use crate::bvh::candidate::{Candidate, settle};
 use crate::intersect::filter::{Certain, TriangleBlock};
 use crate::intersect::prepare::PreparedRay;
+use crate::intersect::start::StartPoint;
 use crate::query::{Goal, Query};
 use crate::rays::Ray;
 use crate::simd::Simd;
-use bth_format::object::ObjectView;
+use bth_format::object::{ObjectBounds, ObjectView};
 
 /// Result of a leaf for a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,40 +46,58 @@ pub(crate) trait Progress<Q: Query> {
     /// Records that some triangle is certainly hit, which completes an any-hit query.
     fn accept(&mut self);
 
-    /// Updates the limits of depth from the hits that the query holds: [`LeafOutcome::Nearer`] if they shrank.
+    /// Updates the limits of depth from the hits that the query holds: [`LeafOutcome::Nearer`] if they shrank. `origin_error` is that
+    /// of the [bounds](bth_format::object::ObjectBounds::origin_error) for which the ray was prepared.
     #[inline(always)]
-    fn update_from_query(&mut self, ray: &Ray) -> LeafOutcome {
+    fn update_from_query(&mut self, ray: &Ray, origin_error: f32) -> LeafOutcome {
         // The limits of an any-hit query do not change before its first hit, which ends it.
         if self.goal().is_any() {
             return LeafOutcome::Nothing;
         }
         let (before, query) = (self.last(), *self.query(ray));
-        self.set_last(self.prepared().slabs.limit(query.limit()));
-        self.set_nearest(self.prepared().slabs.nearest(query.found_bounds()));
+        let slabs = self.prepared().slabs;
+        self.set_last(slabs.limit(query.limit(), origin_error));
+        self.set_nearest(slabs.nearest(query.found_bounds(), origin_error));
         if self.last() < before { LeafOutcome::Nearer } else { LeafOutcome::Nothing }
     }
 }
 
-/// Intersects a ray with the triangles of a leaf, given as its record and its child code. `ray` is called only where f32 does not decide.
+/// A ray as decisions in f64 need it: with the exact point at which it starts, if it starts on a triangle of the object.
+pub(crate) type ExactRay<'r> = (&'r Ray, Option<&'r StartPoint>);
+
+/// Intersects a ray with the triangles of a leaf, given as its record and its child code. `ray` is called only where some triangle may
+/// be hit. `bounds` are those for which the ray was prepared.
 #[inline(always)]
 pub(crate) fn enter_leaf<'r, S: Simd, Q: Query, B: TriangleBlock>(
     s: S,
     (object, goal): (&ObjectView<'_>, Q::Goal),
-    ray: impl FnOnce() -> &'r Ray,
+    bounds: &ObjectBounds,
+    ray: impl FnOnce() -> ExactRay<'r>,
     progress: &mut impl Progress<Q>,
     (block, code): (&B, u32),
 ) -> LeafOutcome {
     let prepared = progress.prepared();
-    let found = prepared.filter.candidates(s, block, prepared.slabs.first, progress.last());
+    let (first, last) = (prepared.slabs.first, progress.last());
+    let mut found = prepared.filter.candidates(s, block, first, last, bounds.origin_reach);
     if found.maybe == 0 {
         return LeafOutcome::Nothing;
+    }
+    let ray = ray();
+    if let (_, Some(start)) = ray
+        && start.leaf == code
+    {
+        // A ray does not hit the triangle on which it starts.
+        found = found.without(start.slot);
+        if found.maybe == 0 {
+            return LeafOutcome::Nothing;
+        }
     }
     if goal.is_any() {
         if found.sure != 0 {
             progress.accept();
             return LeafOutcome::Done;
         }
-        return decide(object, ray(), progress, code, found.maybe);
+        return decide(object, ray, bounds, progress, (code, found.maybe));
     }
     let (maybe, certain) = found.nearest_candidates(s);
     if let Some(Certain { triangle, near, far }) = certain
@@ -92,22 +111,22 @@ pub(crate) fn enter_leaf<'r, S: Simd, Q: Query, B: TriangleBlock>(
         progress.set_last(if nearer { far } else { progress.last() });
         return if nearer { LeafOutcome::Nearer } else { LeafOutcome::Nothing };
     }
-    decide(object, ray(), progress, code, maybe)
+    decide(object, ray, bounds, progress, (code, maybe))
 }
 
-/// Decides the triangles of a leaf whose bit is set in `maybe`, and before them the pending hit.
+/// Decides the triangles of a leaf, given as its child code and their bits, and before them the pending hit.
 #[inline(always)]
 pub(crate) fn decide<Q: Query>(
     object: &ObjectView<'_>,
-    ray: &Ray,
+    ray: ExactRay<'_>,
+    bounds: &ObjectBounds,
     progress: &mut impl Progress<Q>,
-    code: u32,
-    maybe: u32,
+    triangles: (u32, u32),
 ) -> LeafOutcome {
     let pending = progress.pending();
     progress.set_pending(Candidate::NONE);
-    if settle(object, ray, pending, (code, maybe), progress.query(ray)) {
+    if settle(object, ray, pending, triangles, progress.query(ray.0)) {
         return LeafOutcome::Done;
     }
-    progress.update_from_query(ray)
+    progress.update_from_query(ray.0, bounds.origin_error)
 }

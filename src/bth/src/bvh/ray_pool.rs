@@ -5,6 +5,7 @@ use super::leaf::{LeafOutcome, enter_leaf};
 use super::nodes::{Nodes, Packed, Wide, indexed_leaf, is_large, prefetch, prefetch_into, raw as raw_leaf};
 use super::ray_state::{RayState, write_children};
 use super::stack::{BOTTOM, StackPosition, Stacks};
+use crate::intersect::start::Starts;
 use crate::query::{Goal, Query};
 use crate::rays::Ray;
 use crate::simd::{CacheLevel, Part, Simd};
@@ -247,7 +248,7 @@ impl<'a, Q: Query> RayPool<'a, Q> {
     pub(super) fn leaf_steps<S: Simd>(
         &mut self,
         s: S,
-        (object, rays): (&ObjectView<'_>, &[Ray]),
+        (object, rays, starts): (&ObjectView<'_>, &[Ray], Starts<'_>),
         mut tets: impl FnMut(u32, &mut RayState<Q>, StackPosition, &mut Stacks) -> LeafOutcome,
     ) {
         let RayPool { slots, tops, lists, stacks, bottoms, goal, .. } = self;
@@ -257,14 +258,15 @@ impl<'a, Q: Query> RayPool<'a, Q> {
             let state = &mut slots[slot].0;
             let (code, top) = (tops.code[slot], tops.position[slot]);
             let (ray, mut unpacked) = (state.ray(), None);
+            let exact_ray = || (&rays[ray], starts.of(ray));
             let found = if let Some(leaf) = indexed_leaf(s, object, node_base, code, &mut unpacked) {
-                enter_leaf(s, (object, goal), || &rays[ray], state, (leaf, code))
+                enter_leaf(s, (object, goal), &object.bounds, exact_ray, state, (leaf, code))
             } else {
                 let mut unpacked = None;
                 match Child::from_code(code) {
                     Some(Child::Raw(index)) => {
                         let leaf = raw_leaf(s, object, index, &mut unpacked);
-                        enter_leaf(s, (object, goal), || &rays[ray], state, (leaf, code))
+                        enter_leaf(s, (object, goal), &object.bounds, exact_ray, state, (leaf, code))
                     }
                     Some(Child::Tets(row)) => tets(row, state, top, stacks),
                     _ => LeafOutcome::Nothing,

@@ -45,7 +45,7 @@ impl<Q: Query> RayState<Q> {
         query: Option<Q>,
     ) -> bool {
         let prepared =
-            PreparedRay::of(Scalar, &object.bounds, ray).or_else(|| PreparedRay::in_f64(object.header, ray));
+            PreparedRay::of(Scalar, &object.bounds, ray).or_else(|| PreparedRay::in_f64(&object.bounds, ray));
         prepared.map(|prepared| self.start(&PreparedRay { ray: index, ..prepared }, query)).is_some()
     }
 

@@ -4,7 +4,7 @@
 //! speed. The nearest certain hit is therefore kept with f32 bounds of its depth, and its t, u and v are computed in f64 once, at
 //! the end ([`super::certain_hit`]).
 
-use super::leaf::{LeafOutcome, Progress, decide, enter_leaf};
+use super::leaf::{ExactRay, LeafOutcome, Progress, decide, enter_leaf};
 use super::nodes::{Nodes, Packed, Wide, indexed_leaf, prefetch, raw as raw_leaf};
 use super::ray_state::key_limit;
 use super::single_stack::{OpenSingleStack, SingleStack};
@@ -16,7 +16,7 @@ use crate::rays::Ray;
 use crate::simd::{Part, Simd};
 use crate::tets::TetOutcome;
 use bth_format::layout::{Child, NONE, WIDTH};
-use bth_format::object::{NodeBase, ObjectView};
+use bth_format::object::{NodeBase, ObjectBounds, ObjectView};
 use std::hint::black_box;
 
 /// What a single ray has found.
@@ -88,8 +88,8 @@ impl<Q: Query> Progress<Q> for SingleState<'_, Q> {
     }
 }
 
-/// Traverses the BVH of an object from its root. `tets` intersects a tet leaf without a subtree, given its row. `walked` is the row
-/// of a tet leaf that is skipped, because the query, which is then constructed, already holds the ray's hits in it, or `NONE`.
+/// Traverses the BVH of an object from its root. `tets` intersects a tet leaf without a subtree, given its row. `bounds` are
+/// those for which the ray was prepared.
 ///
 /// This is one kernel, longer than other functions and with more parameters: its variables must stay in registers across all steps,
 /// and a function boundary or a struct of parameters between the steps was measured to be slower.
@@ -97,9 +97,8 @@ impl<Q: Query> Progress<Q> for SingleState<'_, Q> {
 #[expect(clippy::too_many_arguments)]
 pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
     s: S,
-    (object, ray): (&ObjectView<'_>, &Ray),
-    prepared: &PreparedRay,
-    walked: u32,
+    (object, ray): (&ObjectView<'_>, ExactRay<'_>),
+    (prepared, bounds): (&PreparedRay, &ObjectBounds),
     (goal, query): (Q::Goal, &mut Option<Q>),
     stack: &mut SingleStack,
     count: &mut C,
@@ -116,9 +115,6 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
         nearest: f32::INFINITY,
         pending: Candidate::NONE,
     };
-    if walked != NONE {
-        state.update_from_query(ray);
-    }
     let node_base = object.node_base();
     let mut code = object.header.root;
     let mut stack = stack.start(code);
@@ -136,7 +132,7 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
         let done = if let Some(leaf) = leaf {
             count.leaf();
             count.triangles(leaf.triangles);
-            enter_leaf(s, (object, goal), || ray, &mut state, (leaf, code)) == LeafOutcome::Done
+            enter_leaf(s, (object, goal), bounds, || ray, &mut state, (leaf, code)) == LeafOutcome::Done
         } else {
             let mut unpacked = None;
             match Child::from_code(code) {
@@ -144,18 +140,19 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
                     let leaf = raw_leaf(s, object, at, &mut unpacked);
                     count.leaf();
                     count.triangles(leaf.triangles);
-                    enter_leaf(s, (object, goal), || ray, &mut state, (leaf, code)) == LeafOutcome::Done
+                    enter_leaf(s, (object, goal), bounds, || ray, &mut state, (leaf, code))
+                        == LeafOutcome::Done
                 }
-                Some(Child::Tets(row)) if row != walked => {
+                Some(Child::Tets(row)) => {
                     let subtree = object.tet_leaves[row as usize].subtree;
                     if subtree != NONE {
                         code = subtree;
                         continue;
                     }
                     count.leaf();
-                    decide(object, ray, &mut state, NONE, 0);
-                    let done = tets(row, state.query(ray), count) == TetOutcome::Done;
-                    state.update_from_query(ray);
+                    decide(object, ray, bounds, &mut state, (NONE, 0));
+                    let done = tets(row, state.query(ray.0), count) == TetOutcome::Done;
+                    state.update_from_query(ray.0, bounds.origin_error);
                     done
                 }
                 Some(Child::Packed(_)) => {
@@ -165,7 +162,7 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
                     (code, stack) = s.call(steps);
                     continue;
                 }
-                // A leaf that is skipped, or a code of a file that was not checked.
+                // A code of a file that was not checked.
                 _ => false,
             }
         };

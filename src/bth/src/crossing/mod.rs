@@ -5,11 +5,15 @@
 
 mod walk;
 
+use crate::bvh::candidate::start_on;
 use crate::bvh::enumerate::{Receiver, enumerate};
-use crate::intersect::crossing::crossing;
+use crate::intersect::crossing::{crossing, crossing_from_start};
+use crate::intersect::start::{ExactStart, StartPoint};
 use crate::query::TriangleRef;
 use crate::rays::Ray;
 use crate::scene::Scene;
+use crate::starts::TraceRay;
+use crate::starts::placed::WorldRay;
 use std::cmp::Ordering;
 
 /// Passages of a ray through triangles, counted by the crossing rule of [`Scene::crossings`].
@@ -24,14 +28,19 @@ pub struct Crossings {
 }
 
 /// Counts the crossings of a ray in object space.
-struct CrossingCounter {
+struct CrossingCounter<'a> {
     ray: Ray,
+    /// Where it starts, if that is on a triangle of the object.
+    start: Option<(&'a StartPoint, &'a ExactStart)>,
     found: Crossings,
 }
 
-impl Receiver for CrossingCounter {
+impl Receiver for CrossingCounter<'_> {
     fn receive(&mut self, _triangle: TriangleRef<'_>, corners: [[f32; 3]; 3]) -> bool {
-        let sign = crossing(&self.ray, corners);
+        let sign = match self.start {
+            None => crossing(&self.ray, corners),
+            Some((point, start)) => crossing_from_start(&self.ray, point, start, corners),
+        };
         self.found.count += sign.unsigned_abs();
         self.found.winding += sign;
         false
@@ -51,6 +60,9 @@ impl Scene {
     /// each crossing is in exactly one: t is compared with the ends exactly, without rounding. A ray without a line (see
     /// [`Scene`]) has no crossings, nor has one of a range that is empty or a single t.
     ///
+    /// A [`StartRay`](crate::rays::StartRay) counts the crossings of the moved line whose t, as that of the line through the start
+    /// itself, is above 0: none of a triangle through the start.
+    ///
     /// Each instance is counted in its own space, into which the ray is rounded as for other queries. A mirrored instance keeps
     /// its front and back.
     ///
@@ -63,12 +75,17 @@ impl Scene {
     /// println!("{} crossings", scene.crossings(&ray).count);
     /// # Ok::<(), bth::Error>(())
     /// ```
-    pub fn crossings(&self, ray: &Ray) -> Crossings {
+    pub fn crossings<R: TraceRay>(&self, ray: &R) -> Crossings {
         let mut total = Crossings::default();
-        self.enumerate_instances(ray, &mut |entered| {
-            let ray = entered.object_ray(ray).with_exact_range(ray);
-            let mut counter = CrossingCounter { ray, found: Crossings::default() };
-            enumerate(entered.object, &ray, &mut counter);
+        let Some(placed) = ray.placed(self) else { return total };
+        let world_ray = placed.world_ray();
+        self.enumerate_instances(world_ray.ray, &mut |entered| {
+            let ray = entered.object_ray(world_ray).with_exact_range(world_ray.ray);
+            let start = world_ray.start_in(entered.instance);
+            let exact_start = start.and_then(|start| start_on(entered.object, start));
+            let start_pair = start.zip(exact_start.as_ref());
+            let mut counter = CrossingCounter { ray, start: start_pair, found: Crossings::default() };
+            enumerate(entered.object, (&ray, start), &mut counter);
             total.count += counter.found.count;
             total.winding += counter.found.winding;
             Some(f32::INFINITY)
@@ -80,7 +97,7 @@ impl Scene {
     ///
     /// # Panics
     /// If there are not as many results as rays.
-    pub fn crossings_batch(&self, rays: &[Ray], crossings: &mut [Crossings]) {
+    pub fn crossings_batch<R: TraceRay>(&self, rays: &[R], crossings: &mut [Crossings]) {
         assert_eq!(rays.len(), crossings.len(), "as many results as rays");
         for (ray, crossings) in rays.iter().zip(crossings) {
             *crossings = self.crossings(ray);
@@ -195,7 +212,7 @@ impl Scene {
             // The boxes at t = 0 are those that contain the point.
             let ray = Ray { origin: *point, tmin: 0.0, direction: [1.0, 0.0, 0.0], tmax: 0.0 };
             self.enumerate_instances(&ray, &mut |entered| {
-                let point = entered.object_ray(&ray).ray.origin;
+                let point = entered.object_ray(WorldRay::plain(&ray)).ray.origin;
                 walk::add_windings(entered.object, &[point], std::slice::from_mut(winding));
                 Some(0.0)
             });

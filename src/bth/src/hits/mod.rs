@@ -17,8 +17,10 @@ pub use accept::{Accept, Cull, Filter};
 use self::collect::{Any, Count, First, FirstOf, Found};
 use self::search::search;
 use crate::masks::Masks;
-use crate::rays::{Hit, Ray};
+use crate::rays::Hit;
 use crate::scene::Scene;
+use crate::starts::TraceRay;
+use crate::starts::placed::WorldRay;
 use std::collections::BinaryHeap;
 
 /// Queries for several hits, and with conditions. Hits are ordered by ascending t, then instance, then triangle. More precisely, as
@@ -28,19 +30,19 @@ use std::collections::BinaryHeap;
 impl Scene {
     /// The nearest hit of a ray in world space that is accepted; among equal t as for [`Self::nearest`], whose result it has to
     /// the bit if everything is accepted.
-    pub fn nearest_accepted(&self, ray: &Ray, accept: &Accept<'_>) -> Option<Hit> {
+    pub fn nearest_accepted<R: TraceRay>(&self, ray: &R, accept: &Accept<'_>) -> Option<Hit> {
         if self.accepts_everything(accept) {
             return self.nearest(ray);
         }
-        self.search_nearest(ray, accept)
+        self.search_nearest(ray.placed(self)?.world_ray(), accept)
     }
 
     /// Whether a ray in world space has a hit that is accepted.
-    pub fn any_accepted(&self, ray: &Ray, accept: &Accept<'_>) -> bool {
+    pub fn any_accepted<R: TraceRay>(&self, ray: &R, accept: &Accept<'_>) -> bool {
         if self.accepts_everything(accept) {
             return self.any(ray);
         }
-        self.search_any(ray, accept)
+        ray.placed(self).is_some_and(|placed| self.search_any(placed.world_ray(), accept))
     }
 
     /// Replaces `hits` by all hits of a ray in world space that are accepted, in order. The time grows with the number of triangles
@@ -59,22 +61,24 @@ impl Scene {
     /// }
     /// # Ok::<(), bth::Error>(())
     /// ```
-    pub fn all_hits(&self, ray: &Ray, accept: &Accept<'_>, hits: &mut Vec<Hit>) {
+    pub fn all_hits<R: TraceRay>(&self, ray: &R, accept: &Accept<'_>, hits: &mut Vec<Hit>) {
         hits.clear();
         self.append_all(ray, accept, &mut Vec::new(), hits);
     }
 
     /// Replaces `hits` by the first `k` of the hits that [`Self::all_hits`] returns, or by all if there are fewer. What lies
     /// beyond is not searched.
-    pub fn nearest_hits(&self, ray: &Ray, k: usize, accept: &Accept<'_>, hits: &mut Vec<Hit>) {
+    pub fn nearest_hits<R: TraceRay>(&self, ray: &R, k: usize, accept: &Accept<'_>, hits: &mut Vec<Hit>) {
         hits.clear();
         self.append_nearest(ray, k, accept, hits);
     }
 
     /// Number of the hits that [`Self::all_hits`] returns. They are not stored.
-    pub fn count_hits(&self, ray: &Ray, accept: &Accept<'_>) -> usize {
+    pub fn count_hits<R: TraceRay>(&self, ray: &R, accept: &Accept<'_>) -> usize {
         let mut count = Count::default();
-        search(self, ray, accept, &mut count);
+        if let Some(placed) = ray.placed(self) {
+            search(self, placed.world_ray(), accept, &mut count);
+        }
         count.0
     }
 
@@ -135,33 +139,41 @@ impl Scene {
     }
 
     /// As [`Self::nearest_accepted`], always by [`mod@search`].
-    pub(crate) fn search_nearest(&self, ray: &Ray, accept: &Accept<'_>) -> Option<Hit> {
+    pub(crate) fn search_nearest(&self, ray: WorldRay<'_>, accept: &Accept<'_>) -> Option<Hit> {
         let mut first = First::default();
         search(self, ray, accept, &mut first);
         first.0.map(|found| found.hit)
     }
 
     /// As [`Self::any_accepted`], always by [`mod@search`].
-    pub(crate) fn search_any(&self, ray: &Ray, accept: &Accept<'_>) -> bool {
+    pub(crate) fn search_any(&self, ray: WorldRay<'_>, accept: &Accept<'_>) -> bool {
         let mut any = Any::default();
         search(self, ray, accept, &mut any);
         any.0
     }
 
     /// Appends all accepted hits of a ray to `hits`, in order. `found` is scratch memory.
-    fn append_all(&self, ray: &Ray, accept: &Accept<'_>, found: &mut Vec<Found>, hits: &mut Vec<Hit>) {
+    fn append_all<R: TraceRay>(
+        &self,
+        ray: &R,
+        accept: &Accept<'_>,
+        found: &mut Vec<Found>,
+        hits: &mut Vec<Hit>,
+    ) {
         found.clear();
-        search(self, ray, accept, found);
+        if let Some(placed) = ray.placed(self) {
+            search(self, placed.world_ray(), accept, found);
+        }
         // The heap of `append_nearest` sorts these few hits, too, so that there is no code of another sort for them.
         *found = BinaryHeap::from(std::mem::take(found)).into_sorted_vec();
         hits.extend(found.iter().map(|found| found.hit));
     }
 
     /// Appends the `k` nearest accepted hits of a ray to `hits`, in order.
-    fn append_nearest(&self, ray: &Ray, k: usize, accept: &Accept<'_>, hits: &mut Vec<Hit>) {
-        if k > 0 {
+    fn append_nearest<R: TraceRay>(&self, ray: &R, k: usize, accept: &Accept<'_>, hits: &mut Vec<Hit>) {
+        if let (1.., Some(placed)) = (k, ray.placed(self)) {
             let mut first = FirstOf { count: k, hits: BinaryHeap::new() };
-            search(self, ray, accept, &mut first);
+            search(self, placed.world_ray(), accept, &mut first);
             hits.extend(first.hits.into_sorted_vec().iter().map(|found| found.hit));
         }
     }

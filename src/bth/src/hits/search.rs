@@ -3,27 +3,34 @@
 
 use super::accept::Accept;
 use super::collect::{Collector, Found};
-use crate::bvh::candidate::intersect_exactly;
+use crate::bvh::candidate::{intersect_exactly, start_on};
 use crate::bvh::enumerate::{Receiver, enumerate};
 use crate::enumerate::EnteredInstance;
 use crate::intersect::exact::{Estimate, Intersection, estimate, reported, wide};
 use crate::intersect::line::widened;
+use crate::intersect::start::{ExactStart, StartDecision, StartPoint, decide_start, decide_start_exactly};
 use crate::masks::Masks;
 use crate::nodes::ObjectRay;
 use crate::query::{TriangleRef, in_range, may_be_in_range};
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::scene::Scene;
+use crate::starts::placed::WorldRay;
 use bth_format::layout::Opacity;
 use bth_format::object::ObjectView;
 
 /// Passes to a collector the hits of a ray that are accepted and that it wants.
-pub(super) fn search(scene: &Scene, ray: &Ray, accept: &Accept<'_>, collector: &mut dyn Collector) {
-    let masks = scene.masks();
+pub(super) fn search(
+    scene: &Scene,
+    world_ray: WorldRay<'_>,
+    accept: &Accept<'_>,
+    collector: &mut dyn Collector,
+) {
+    let (masks, ray) = (scene.masks(), world_ray.ray);
     // Not `f32::min`, which would replace a `tmax` of NaN by a number.
     let tmax = |limit: f32| if limit < ray.tmax { limit } else { ray.tmax };
     scene.enumerate_instances(ray, &mut |entered| {
         if accept.mask & masks.of_instance(entered.instance) != 0
-            && search_instance(&entered, (ray, tmax(collector.limit())), (accept, masks), collector)
+            && search_instance(&entered, (world_ray, tmax(collector.limit())), (accept, masks), collector)
         {
             return None;
         }
@@ -34,13 +41,17 @@ pub(super) fn search(scene: &Scene, ray: &Ray, accept: &Accept<'_>, collector: &
 /// As [`search`], for the hits in an instance up to a greatest t. Returns whether the collector's result is complete.
 fn search_instance(
     entered: &EnteredInstance<'_>,
-    (ray, tmax): (&Ray, f32),
+    (world_ray, tmax): (WorldRay<'_>, f32),
     (accept, masks): (&Accept<'_>, &Masks),
     collector: &mut dyn Collector,
 ) -> bool {
-    let object_ray = entered.object_ray(&Ray { tmax, ..*ray });
+    let ray = world_ray.ray;
+    let object_ray = entered.object_ray(WorldRay { ray: &Ray { tmax, ..*ray }, ..world_ray });
+    let start = world_ray.start_in(entered.instance);
+    let exact_start = start.and_then(|start| start_on(entered.object, start));
     let mut hits = InstanceHits {
         ray,
+        start: start.zip(exact_start.as_ref()),
         instance: entered.instance,
         object: entered.object,
         object_ray,
@@ -49,13 +60,15 @@ fn search_instance(
         collector,
         limit: widened(object_ray.ray.tmax.into()),
     };
-    enumerate(entered.object, &object_ray.ray, &mut hits)
+    enumerate(entered.object, (&object_ray.ray, start), &mut hits)
 }
 
 /// The state of a search in an instance.
 struct InstanceHits<'a> {
     /// In world space.
     ray: &'a Ray,
+    /// Where it starts, if that is on a triangle of this instance.
+    start: Option<(&'a StartPoint, &'a ExactStart)>,
     instance: u32,
     object: &'a ObjectView<'a>,
     object_ray: ObjectRay,
@@ -72,6 +85,15 @@ impl InstanceHits<'_> {
     /// the result.
     fn intersection(&self, corners: [[f32; 3]; 3]) -> Option<Intersection> {
         let ray = &self.object_ray.ray;
+        if let Some((point, start)) = self.start {
+            return match decide_start(point.origin, wide(ray.direction), corners.map(wide)) {
+                StartDecision::Certain(found) => found,
+                StartDecision::Open(_, t) if !may_be_in_range(t, ray.tmin, self.limit) => None,
+                StartDecision::Open(uncertain, _) => {
+                    decide_start_exactly(start, wide(ray.direction), corners, &uncertain)
+                }
+            };
+        }
         match estimate(wide(ray.origin), wide(ray.direction), corners.map(wide)) {
             Estimate::Missed => None,
             Estimate::Intersects(intersection) => Some(intersection),

@@ -3,7 +3,7 @@
 
 use super::World;
 use super::enter_object::ObjectRays;
-use super::free_starts::{FreeStarts, Starts};
+use super::free_starts::FreeStarts;
 use super::listed_rays::ListedRays;
 use super::packets::TopLevelPackets;
 use super::placement::Placement;
@@ -14,15 +14,16 @@ use super::top_level::TopLevel;
 use super::traverse::RayTraversals;
 use super::visit_queue::VisitQueue;
 use crate::SMALL;
-use crate::object::{self, HintUse, QueryKind, Scratch, Strategy};
+use crate::intersect::start::Starts;
+use crate::object::{self, Scratch};
 use crate::objects::Objects;
 use crate::query::sink::{SceneRays, Sink, Visit};
 use crate::query::{AnswersOf, AnyQuery, Goal, NearestQuery, Query, any_answers, better, nearest_answers};
-use crate::rays::{Hit, PrimitiveRef, Ray};
+use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
+use crate::starts::placed::InstanceStart;
 use bth_format::layout::NONE;
 use std::cell::Cell;
-use std::ops::Range;
 
 /// Number of rays that advance together.
 const CHUNK: usize = 2048;
@@ -66,8 +67,6 @@ struct StartKernel<'a> {
     first: usize,
     /// Number of its rays.
     count: usize,
-    /// The answers so far of the rays of the chunk.
-    progress: Progress<'a>,
     active_rays: &'a mut ActiveRays,
 }
 
@@ -80,37 +79,24 @@ impl Kernel for StartKernel<'_> {
             batch,
             first,
             count,
-            progress,
             active_rays: ActiveRays { packets, lists, traversals, active, visits, free_starts, .. },
         } = self;
         let (world, rays) = (batch.world, &batch.rays[first..first + count]);
         let top = &world.top;
         packets.start(s, top, rays, active);
-        if free_starts.are_any_traced() {
-            // Which rays have ended is not predictable, so there is no branch.
-            let mut kept = 0;
-            for i in 0..active.len() {
-                let index = active[i];
-                active[kept] = index;
-                kept += usize::from(progress.tmax(index as usize) > f32::NEG_INFINITY);
-            }
-            active.truncate(kept);
-        }
-        if let (Some(from), true) = (batch.hints(), world.has_single_visible()) {
+        if world.has_single_visible() && !batch.starts.is_empty() {
             // No other instance is visible, so a ray that starts on it needs no traversal.
             active.retain(|&index| {
-                let instance = world.start_instance(from[first + index as usize]);
-                if let Some(instance) = instance
-                    && free_starts.not_met(index as usize) == NONE
-                {
-                    visits.all.push(Visit { ray: first as u32 + index, instance });
+                let start = &batch.starts[first + index as usize];
+                let starts_here = start.instance != NONE;
+                if starts_here && !start.is_free {
+                    visits.all.push(Visit { ray: first as u32 + index, instance: start.instance });
                 }
-                instance.is_none()
+                !starts_here
             });
         }
         let queue = (lists, first as u32, &mut visits.all);
-        let (rays, not_met) = free_starts.ended(rays, progress);
-        traversals.start(s, top, rays, active, queue, |index| not_met.get(index).copied().unwrap_or(NONE));
+        traversals.start(s, top, rays, active, queue, |index| free_starts.not_met(index));
     }
 }
 
@@ -144,83 +130,36 @@ impl Kernel for AdvanceKernel<'_> {
 }
 
 impl World {
-    /// Stores the nearest hits; among hits of equal t that in the instance of least index. All are [`Hit::MISS`] before.
+    /// Stores the nearest hits; among hits of equal t that in the instance of least index. All are [`Hit::MISS`] before. `starts` holds
+    /// the starts of all rays, or is empty.
     pub(crate) fn nearest(
         &self,
         objects: &Objects,
         rays: &[Ray],
-        from: Option<&[PrimitiveRef]>,
+        starts: &[InstanceStart],
         hits: &mut [Hit],
     ) {
-        self.by_hints(objects, (rays, from), false, |range, from, scratch| {
-            let mut query = SceneNearest { hits: &mut hits[range.clone()], scratch };
-            self.run(objects, &rays[range], from, &mut query);
-        });
+        object::with_scratch(|scratch| self.run(objects, rays, starts, &mut SceneNearest { hits, scratch }));
     }
 
     /// Stores whether rays hit anything; false before.
-    pub(crate) fn any(
-        &self,
-        objects: &Objects,
-        rays: &[Ray],
-        from: Option<&[PrimitiveRef]>,
-        found: &mut [bool],
-    ) {
-        self.by_hints(objects, (rays, from), true, |range, from, scratch| {
-            let rays = &rays[range.clone()];
-            let mut query = SceneAny { rays, found: &mut found[range], scratch };
-            self.run(objects, rays, from, &mut query);
-        });
-    }
-
-    /// Calls `trace` with ranges of a batch and their hints, or with none where they are of no use to it or it was measured to be faster so
-    /// through this scene: most rays may leave in directions that are not free, or meet nothing of their instance anyway.
-    fn by_hints(
-        &self,
-        objects: &Objects,
-        (rays, from): (&[Ray], Option<&[PrimitiveRef]>),
-        any: bool,
-        mut trace: impl FnMut(Range<usize>, Option<&[PrimitiveRef]>, &mut Scratch),
-    ) {
-        let hints = from.filter(|from| !SMALL && self.has_use_for(objects, from));
+    pub(crate) fn any(&self, objects: &Objects, rays: &[Ray], starts: &[InstanceStart], found: &mut [bool]) {
         object::with_scratch(|scratch| {
-            let Some(from) = hints else { return trace(0..rays.len(), None, scratch) };
-            let key = (self.identity, HintUse::StartInstance.kind(QueryKind::of(any, rays, self.top.extent)));
-            object::by_hint(key, from.len(), Strategy::Bvh, scratch, |range, strategy, scratch| {
-                let hints = (strategy == Strategy::Hinted).then(|| &from[range.clone()]);
-                trace(range, hints, scratch);
-            });
+            self.run(objects, rays, starts, &mut SceneAny { rays, found, scratch })
         });
     }
 
-    /// Whether hints are of use to any ray of a sample of a batch.
-    fn has_use_for(&self, objects: &Objects, from: &[PrimitiveRef]) -> bool {
-        /// One ray of so many is looked at.
-        const EVERY: usize = 16;
-        let mut starts = Starts::new(self, objects);
-        let mut instances = from.iter().step_by(EVERY);
-        instances
-            .any(|from| starts.instance(*from).is_some() && (starts.is_of_use || self.has_single_visible()))
-    }
-
-    fn run(
-        &self,
-        objects: &Objects,
-        rays: &[Ray],
-        from: Option<&[PrimitiveRef]>,
-        query: &mut dyn SceneQuery,
-    ) {
-        let batch = SceneBatch { world: self, objects, rays, from };
+    fn run(&self, objects: &Objects, rays: &[Ray], starts: &[InstanceStart], query: &mut dyn SceneQuery) {
+        let batch = SceneBatch { world: self, objects, rays, starts };
         // They are taken out while they are in use, so that after a panic the next batch begins with new memory.
         let mut active_rays = ACTIVE_RAYS.take().unwrap_or_default();
         let isa = Isa::chosen();
         for first in (0..rays.len()).step_by(CHUNK) {
             let end = (first + CHUNK).min(rays.len());
             active_rays.visits.clear();
-            active_rays.free_starts.find(&batch, first..end, query);
-            let (count, progress) = (end - first, query.progress().of_rays_from(first));
-            let active_rays = &mut *active_rays;
-            isa.run(StartKernel { batch: &batch, first, count, progress, active_rays });
+            active_rays.free_starts.find(&batch, first..end);
+            let (count, active_rays) = (end - first, &mut *active_rays);
+            isa.run(StartKernel { batch: &batch, first, count, active_rays });
             self.trace(&batch, query, active_rays);
             while active_rays.is_any_active() {
                 let progress = query.progress().of_rays_from(first);
@@ -230,11 +169,6 @@ impl World {
             }
         }
         ACTIVE_RAYS.set(Some(active_rays));
-    }
-
-    /// The instance on which a ray starts, if it is visible.
-    fn start_instance(&self, from: PrimitiveRef) -> Option<u32> {
-        self.placements.get(from.instance as usize)?.is_some().then_some(from.instance)
     }
 
     /// The placement of an instance that is in the top level.
@@ -290,8 +224,9 @@ fn trace_visits<Q: Query>(
     mut answers: AnswersOf<'_, Q>,
 ) {
     let scene = SceneRays { rays: batch.rays, visits, t_scale: &object_rays.t_scale };
-    let mut sink = Sink::<Q>::of_scene(object.triangle_ids, Q::Goal::reborrow(&mut answers), scene);
-    object::trace_batch(object, &object_rays.rays, object_rays.hints(), scratch, &mut sink);
+    let sink = Sink::<Q>::of_scene(object.triangle_ids, Q::Goal::reborrow(&mut answers), scene);
+    let mut sink = sink.with_starts(Starts(&object_rays.starts));
+    object::trace_batch(object, &object_rays.rays, None, scratch, &mut sink);
 }
 
 struct SceneNearest<'a> {
@@ -307,8 +242,7 @@ impl SceneQuery for SceneNearest<'_> {
         for &visit in visits {
             let i = visit.ray as usize;
             let ray = batch.object_ray(visit, batch.rays[i].tmax.min(self.hits[i].t));
-            let from = batch.hint(i, visit.instance);
-            let hit = object::nearest(object, &ray.ray, from, visit.instance);
+            let hit = object::nearest(object, (&ray.ray, batch.start(visit)), visit.instance);
             self.hits[i] = better(&batch.rays[i], &self.hits[i], &hit, ray.t_scale).unwrap_or(self.hits[i]);
         }
     }
@@ -331,8 +265,8 @@ impl SceneQuery for SceneAny<'_> {
     fn trace_one_by_one(&mut self, ObjectVisits { batch, object, visits }: ObjectVisits<'_>) {
         for &visit in visits {
             let i = visit.ray as usize;
-            let (ray, from) = (batch.object_ray(visit, self.rays[i].tmax), batch.hint(i, visit.instance));
-            self.found[i] |= object::any(object, &ray.ray, from);
+            let ray = batch.object_ray(visit, self.rays[i].tmax);
+            self.found[i] |= object::any(object, (&ray.ray, batch.start(visit)));
         }
     }
     fn trace_placed(&mut self, of_object: ObjectVisits<'_>, object_rays: &ObjectRays) {

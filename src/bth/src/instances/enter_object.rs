@@ -2,12 +2,11 @@
 
 use super::progress::Progress;
 use super::scene_batch::SceneBatch;
-use crate::SMALL;
+use crate::intersect::start::StartPoint;
 use crate::nodes::affine::RayLanes;
 use crate::query::sink::Visit;
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, LANES, Simd};
-use bth_format::layout::NONE;
 
 /// The rays of visits of one object, in its space and in the order of the visits.
 #[derive(Default)]
@@ -15,8 +14,8 @@ pub(super) struct ObjectRays {
     pub(super) rays: Vec<Ray>,
     /// For each ray the factor from its t to t in world space.
     pub(super) t_scale: Vec<f32>,
-    /// For each ray the triangle on which it starts, or `NONE`; empty where hints are of no use.
-    pub(super) from: Vec<u32>,
+    /// For each ray where it starts; empty if no rays start on triangles.
+    pub(super) starts: Vec<StartPoint>,
     /// For each visit the index of its ray in the batch.
     index: Vec<u32>,
     /// For each ray the greatest t, in world space, of hits that can still change the result.
@@ -24,40 +23,22 @@ pub(super) struct ObjectRays {
 }
 
 impl ObjectRays {
-    /// Transforms the rays of visits into the space of the object. `hinted` says whether hints are of use there; `progress` are the
-    /// answers so far, beyond which they end.
-    pub(super) fn fill(
-        &mut self,
-        batch: &SceneBatch<'_>,
-        hinted: bool,
-        visits: &[Visit],
-        progress: Progress<'_>,
-    ) {
+    /// Transforms the rays of visits into the space of the object. `progress` are the answers so far, beyond
+    /// which they end.
+    pub(super) fn fill(&mut self, batch: &SceneBatch<'_>, visits: &[Visit], progress: Progress<'_>) {
         self.t_scale.clear();
-        self.from.clear();
-        if hinted && batch.hints().is_some() {
-            self.from.extend(visits.iter().map(|visit| batch.hint(visit.ray as usize, visit.instance)));
-        }
+        self.starts.clear();
         Isa::chosen().run(EnterKernel { object_rays: self, batch, visits, progress });
-    }
-
-    /// Keeps those of the visits whose indices are in `order`, ascending, with the rays at these indices of `rays`.
-    pub(super) fn keep(&mut self, order: &[u32], rays: &[Ray], hinted: bool) {
-        let ObjectRays { rays: kept, t_scale, from, .. } = self;
-        kept.clear();
-        kept.extend(order.iter().map(|index| rays[*index as usize]));
-        // No visit is before its place among those that are left.
-        for (i, index) in order.iter().enumerate() {
-            t_scale[i] = t_scale[*index as usize];
-            from[i] = from[*index as usize];
+        if !batch.starts.is_empty() {
+            let ObjectRays { rays, starts, .. } = self;
+            starts.extend(rays.iter_mut().zip(visits).map(|(ray, visit)| match batch.start(*visit) {
+                Some(start) => {
+                    ray.origin = start.rounded();
+                    *start
+                }
+                None => StartPoint::beside(ray.origin),
+            }));
         }
-        t_scale.truncate(order.len());
-        from.truncate(if hinted { order.len() } else { 0 });
-    }
-
-    /// The triangles on which rays start, if there are any.
-    pub(super) fn hints(&self) -> Option<&[u32]> {
-        (!SMALL && self.from.iter().any(|from| *from != NONE)).then_some(&self.from)
     }
 }
 

@@ -1,15 +1,16 @@
 //! One ray through the instances: it enters one after the other, the nearest box first, and nothing is queued.
 
 use super::World;
-use crate::SMALL;
 use crate::bvh::coherence::is_same_octant;
 use crate::bvh::packet;
+use crate::intersect::start::StartPoint;
 use crate::nodes::affine::ObjectRay;
 use crate::object;
 use crate::objects::Objects;
 use crate::query::{Steps, better};
-use crate::rays::{Hit, PrimitiveRef, Ray};
+use crate::rays::{Hit, Ray};
 use crate::simd::Isa;
+use crate::starts::placed::WorldRay;
 use bth_format::object::ObjectView;
 
 /// Fewer rays go one by one if a single instance is visible.
@@ -33,8 +34,8 @@ struct Entered<'a> {
     object: &'a ObjectView<'a>,
     /// The ray in the space of the object.
     ray: ObjectRay,
-    /// The triangle on which it starts, or `NONE`.
-    from: u32,
+    /// Where it starts, if that is on a triangle of this instance.
+    start: Option<&'a StartPoint>,
 }
 
 impl World {
@@ -49,28 +50,22 @@ impl World {
                 && !(is_same_octant(rays.len() / 2) && is_same_octant(rays.len() - 1))
     }
 
-    /// Stores the nearest hit of a ray, or [`Hit::MISS`], as [`Self::nearest`] does for many. `from` is the triangle on which it starts, or
-    /// [`PrimitiveRef::NONE`].
+    /// Stores the nearest hit of a ray, or [`Hit::MISS`], as [`Self::nearest`] does for many.
     #[inline(never)]
-    pub(crate) fn store_nearest_of_ray(
-        &self,
-        objects: &Objects,
-        ray: &Ray,
-        from: PrimitiveRef,
-        best: &mut Hit,
-    ) {
-        self.nearest_by((objects, ray, from), best, |entered, instance, hit| {
-            object::store_nearest(entered.object, &entered.ray.ray, entered.from, instance, hit);
+    pub(crate) fn store_nearest_of_ray(&self, objects: &Objects, ray: WorldRay<'_>, best: &mut Hit) {
+        self.nearest_by((objects, ray), best, |entered, instance, hit| {
+            let exact_ray = (&entered.ray.ray, entered.start);
+            object::store_nearest(entered.object, exact_ray, instance, hit);
         });
     }
 
     /// As [`Self::store_nearest_of_ray`], with the statistics of the traversal of objects.
-    pub(crate) fn nearest_counted(&self, objects: &Objects, ray: &Ray, from: PrimitiveRef) -> (Hit, Steps) {
+    pub(crate) fn nearest_counted(&self, objects: &Objects, ray: WorldRay<'_>) -> (Hit, Steps) {
         let (mut best, mut steps) = (Hit::MISS, Steps::default());
-        self.nearest_by((objects, ray, from), &mut best, |entered, instance, hit| {
+        self.nearest_by((objects, ray), &mut best, |entered, instance, hit| {
             let of_object;
-            (*hit, of_object) =
-                object::nearest_counted(entered.object, &entered.ray.ray, entered.from, instance);
+            let exact_ray = (&entered.ray.ray, entered.start);
+            (*hit, of_object) = object::nearest_counted(entered.object, exact_ray, instance);
             steps += of_object;
         });
         (best, steps)
@@ -80,15 +75,17 @@ impl World {
     #[inline(always)]
     fn nearest_by(
         &self,
-        (objects, ray, from): (&Objects, &Ray, PrimitiveRef),
+        (objects, world_ray): (&Objects, WorldRay<'_>),
         best: &mut Hit,
         mut trace: impl FnMut(&Entered<'_>, u32, &mut Hit),
     ) {
         *best = Hit::MISS;
+        let ray = world_ray.ray;
         self.enumerate(ray, &mut |instance| {
             // Neither is NaN: for a ray whose `tmax` is, nothing is enumerated.
             let tmax = if best.t < ray.tmax { best.t } else { ray.tmax };
-            let entered = self.enter(objects, instance, &Ray { tmax, ..*ray }, from);
+            let ended = Ray { tmax, ..*ray };
+            let entered = self.enter(objects, instance, WorldRay { ray: &ended, ..world_ray });
             let mut hit = Hit::MISS;
             trace(&entered, instance, &mut hit);
             let Some(nearer) = better(ray, best, &hit, entered.ray.t_scale) else { return Some(tmax) };
@@ -97,24 +94,25 @@ impl World {
         });
     }
 
-    /// Whether a ray hits anything, as [`Self::any`] computes it for many; `from` as for [`Self::store_nearest_of_ray`].
+    /// Whether a ray hits anything, as [`Self::any`] computes it for many.
     #[inline(never)]
-    pub(crate) fn any_of_ray(&self, objects: &Objects, ray: &Ray, from: PrimitiveRef) -> bool {
-        self.enumerate(ray, &mut |instance| {
-            let entered = self.enter(objects, instance, ray, from);
-            (!object::any(entered.object, &entered.ray.ray, entered.from)).then_some(ray.tmax)
+    pub(crate) fn any_of_ray(&self, objects: &Objects, ray: WorldRay<'_>) -> bool {
+        self.enumerate(ray.ray, &mut |instance| {
+            let entered = self.enter(objects, instance, ray);
+            let exact_ray = (&entered.ray.ray, entered.start);
+            (!object::any(entered.object, exact_ray)).then_some(ray.ray.tmax)
         })
     }
 
     #[inline(always)]
-    fn enter<'a>(&self, objects: &'a Objects, instance: u32, ray: &Ray, from: PrimitiveRef) -> Entered<'a> {
+    fn enter<'a>(&self, objects: &'a Objects, instance: u32, world_ray: WorldRay<'a>) -> Entered<'a> {
         let placement = self.placement(instance);
         self.mark_traced(placement.object());
-        let from = if SMALL { PrimitiveRef::NONE } else { from };
+        let start = world_ray.start_in(instance);
         Entered {
             object: objects.view(placement.object()),
-            ray: placement.inverse.ray(ray),
-            from: from.triangle_of(instance),
+            ray: placement.inverse.ray_from(world_ray.ray, start),
+            start,
         }
     }
 }

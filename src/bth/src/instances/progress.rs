@@ -5,8 +5,6 @@ use crate::rays::Hit;
 /// The answers so far, by ray.
 #[derive(Clone, Copy)]
 pub(super) enum Progress<'a> {
-    /// There are no answers yet.
-    None,
     /// The nearest hits.
     Nearest(&'a [Hit]),
     /// Whether anything is hit.
@@ -17,7 +15,6 @@ impl<'a> Progress<'a> {
     /// The rays from an index on.
     pub(super) fn of_rays_from(self, first: usize) -> Progress<'a> {
         match self {
-            Progress::None => Progress::None,
             Progress::Nearest(hits) => Progress::Nearest(&hits[first..]),
             Progress::Any(found) => Progress::Any(&found[first..]),
         }
@@ -29,7 +26,7 @@ impl<'a> Progress<'a> {
         match self {
             Progress::Nearest(hits) => hits[ray].t,
             Progress::Any(found) if found[ray] => f32::NEG_INFINITY,
-            Progress::Any(_) | Progress::None => f32::INFINITY,
+            Progress::Any(_) => f32::INFINITY,
         }
     }
 }

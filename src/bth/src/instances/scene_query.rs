@@ -25,11 +25,11 @@ pub(super) trait SceneQuery {
     fn trace_placed(&mut self, of_object: ObjectVisits<'_>, object_rays: &ObjectRays);
     /// Traces visits, given memory for their rays in the space of the object.
     fn trace(&mut self, of_object: ObjectVisits<'_>, object_rays: &mut ObjectRays) {
-        let ObjectVisits { batch, object, visits } = of_object;
+        let ObjectVisits { batch, visits, .. } = of_object;
         if visits.len() < object::MIN_BATCH {
             return self.trace_one_by_one(of_object);
         }
-        object_rays.fill(batch, !object.tet_leaves.is_empty(), visits, self.progress());
+        object_rays.fill(batch, visits, self.progress());
         self.trace_placed(of_object, object_rays);
     }
 }

@@ -8,8 +8,8 @@ use crate::deformers::Deformers;
 use crate::nodes::affine::{Affine, Inverse};
 use crate::nodes::hierarchy::NodeHierarchy;
 use crate::objects::Objects;
+use bth_format::SceneView;
 use bth_format::file::File;
-use bth_format::{Identity, SceneView};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The transforms of a visible instance.
@@ -44,8 +44,6 @@ pub(super) enum TransformSource {
 /// The instances of a scene at a time.
 #[derive(Debug)]
 pub(crate) struct World {
-    /// What measurements of tracing are kept under.
-    pub(super) identity: Identity,
     /// Time of the scene; 0 if the caller places the instances.
     pub(crate) seconds: f64,
     pub(super) source: TransformSource,
@@ -65,7 +63,6 @@ impl World {
     pub(super) fn unplaced(source: TransformSource, seconds: f64, instances: usize, objects: u32) -> World {
         let (placements, top, only_visible) = (vec![None; instances], TopLevel::default(), None);
         let mut world = World {
-            identity: Identity::new(),
             seconds,
             source,
             placements,

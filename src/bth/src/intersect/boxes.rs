@@ -8,7 +8,7 @@
 use crate::intersect::line::{Line, widened};
 use crate::rays::Ray;
 use crate::simd::Simd;
-use bth_format::layout::{Object, PackedNode, WIDTH, WideNode};
+use bth_format::layout::{PackedNode, WIDTH, WideNode};
 use bth_format::object::ObjectBounds;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
@@ -65,9 +65,9 @@ impl RaySlabs {
         near: [0; 3],
     };
 
-    /// For the boxes of an object.
-    pub(crate) fn new(ray: &Ray, line: &Line, object: &Object) -> RaySlabs {
-        RaySlabs::with_pad(ray, line, &ObjectBounds::new(object), |_| 0.0)
+    /// For the boxes of an object of these bounds.
+    pub(crate) fn new(ray: &Ray, line: &Line, bounds: &ObjectBounds) -> RaySlabs {
+        RaySlabs::with_pad(ray, line, bounds, |_| 0.0)
     }
 
     /// For boxes whose |coordinates| do not exceed `farthest`. `extra_pad` maps the greatest |coordinate| of the ray's origin
@@ -92,8 +92,9 @@ impl RaySlabs {
         // A hit is in the range if its t is after it was rounded, as a t of 2^-150 is to 0: with a great direction the depth of such a hit
         // is far beyond that of the end of the range.
         let after = |t: f64| widened(t.max(f64::MIN));
-        slabs.first = ((-after(-f64::from(ray.tmin)) * scale) as f32).next_down().max(-f32::MAX);
-        slabs.last = slabs.limit(after(f64::from(ray.tmax)));
+        let off = f64::from(bounds.origin_error);
+        slabs.first = ((-after(-f64::from(ray.tmin)) * scale - off) as f32).next_down().max(-f32::MAX);
+        slabs.last = slabs.limit(after(f64::from(ray.tmax)), bounds.origin_error);
         for k in 0..3 {
             let d = line.direction[k] / scale;
             let r = 1.0 / d.abs().max(LEAST_COMPONENT).copysign(d);
@@ -107,23 +108,26 @@ impl RaySlabs {
         slabs
     }
 
-    /// Upper bound of the depth of t, for [`Self::children`].
+    /// Upper bound of the depth of t, for [`Self::children`]. `origin_error` is that of the bounds for which the ray was prepared.
     #[inline(always)]
-    pub(crate) fn limit(&self, t: f64) -> f32 {
+    pub(crate) fn limit(&self, t: f64, origin_error: f32) -> f32 {
         // The next greater number is an upper bound although the conversion to f32 may round down or underflow.
-        ((t * f64::from(self.scale)) as f32).next_up()
+        ((t * f64::from(self.scale) + f64::from(origin_error)) as f32).next_up()
     }
 
     /// Lower bound of the depth of a hit, given bounds of its t; infinite if there is no hit.
     #[inline(always)]
-    pub(crate) fn nearest(&self, t: Option<[f64; 2]>) -> f32 {
-        t.map_or(f32::INFINITY, |[t, _]| ((t * f64::from(self.scale)) as f32).next_down())
+    pub(crate) fn nearest(&self, t: Option<[f64; 2]>, origin_error: f32) -> f32 {
+        let depth = |t: f64| t * f64::from(self.scale) - f64::from(origin_error);
+        t.map_or(f32::INFINITY, |[t, _]| (depth(t) as f32).next_down())
     }
 
-    /// The range of depths in which a hit certainly lies in the ray's range of t, whose ends are no NaN, and is finite.
-    pub(crate) fn certain_range(&self, ray: &Ray) -> [f32; 2] {
-        let depth = |t: f32| (f64::from(t) * f64::from(self.scale)) as f32;
-        [depth(ray.tmin.max(f32::MIN)).next_up(), depth(ray.tmax.min(f32::MAX)).next_down()]
+    /// The range of depths in which a hit certainly lies in the ray's range of t, whose ends are no NaN, and is finite. The exact
+    /// origin may be off by `origin_error`.
+    pub(crate) fn certain_range(&self, ray: &Ray, origin_error: f32) -> [f32; 2] {
+        let depth = |t: f32, off: f32| (f64::from(t) * f64::from(self.scale) + f64::from(off)) as f32;
+        let (tmin, tmax) = (ray.tmin.max(f32::MIN), ray.tmax.min(f32::MAX));
+        [depth(tmin, origin_error).next_up(), depth(tmax, -origin_error).next_down()]
     }
 
     /// As [`RaySlabLanes::children`], for one node.

@@ -32,6 +32,7 @@
 //! most four factors of f32, so they lie between 2^-596 and 2^520.
 
 use crate::intersect::exact::{Estimate, RATIO_ERROR, estimate, wide};
+use crate::intersect::start::{ExactStart, StartPoint};
 use crate::rays::Ray;
 use bth_format::exact::{EDGE_PARTS, Expansion, VOLUME_PARTS};
 
@@ -76,6 +77,56 @@ fn crossing_by_signs(ray: &Ray, [a, b, c]: [[f64; 3]; 3]) -> i32 {
     if position(ray.tmin) > 0 && position(ray.tmax) < 0 { passed } else { 0 }
 }
 
+/// As [`crossing`], for a ray that starts on a triangle: crossings at t > 0 of the line through the start itself, up to `tmax`.
+pub(crate) fn crossing_from_start(
+    ray: &Ray,
+    point: &StartPoint,
+    start: &ExactStart,
+    corners: [[f32; 3]; 3],
+) -> i32 {
+    let (direction, wide_corners) = (wide(ray.direction), corners.map(wide));
+    match estimate(point.origin, direction, wide_corners) {
+        Estimate::Missed => 0,
+        Estimate::Intersects(found) => {
+            let error = 2.0 * RATIO_ERROR * found.t.abs();
+            if found.t <= 0.0 || found.t - f64::from(ray.tmax) > error {
+                0
+            } else if f64::from(ray.tmax) - found.t > error {
+                sign(found.weight[2])
+            } else {
+                start_crossing_by_signs(ray, start, wide_corners)
+            }
+        }
+        Estimate::Open(_, [_, last]) if last <= 0.0 => 0,
+        Estimate::Open(..) => start_crossing_by_signs(ray, start, wide_corners),
+    }
+}
+
+/// [`crossing_from_start`] by the signs of its definition. The gradients along the origin are those of [`side`] and [`order`], since
+/// all functions are affine.
+#[cold]
+#[inline(never)]
+fn start_crossing_by_signs(ray: &Ray, start: &ExactStart, corners: [[f64; 3]; 3]) -> i32 {
+    let ([a, b, c], d) = (corners, wide(ray.direction));
+    let side = |p, q| first_sign(start.edge(d, p, q).value(), side_gradient(d, p, q));
+    let passed = side(b, c);
+    if passed == 0 || side(c, a) != passed || side(a, b) != passed {
+        return 0;
+    }
+    let volume = start.volume(corners);
+    if passed * sign(volume.value()) <= 0 {
+        return 0;
+    }
+    let tmax = f64::from(ray.tmax);
+    if !tmax.is_finite() {
+        return if tmax > 0.0 { passed } else { 0 };
+    }
+    let mut determinant = Expansion::<EDGE_PARTS>::new();
+    determinant.add_edge(a, d, b, c);
+    let beyond = first_sign(start.minus_product(&volume, &determinant, tmax), order_gradient(corners));
+    if passed * beyond < 0 { passed } else { 0 }
+}
+
 /// The sign of a number that is not NaN.
 fn sign(x: f64) -> i32 {
     i32::from(x > 0.0) - i32::from(x < 0.0)
@@ -94,7 +145,12 @@ fn side(o: [f64; 3], d: [f64; 3], p: [f64; 3], q: [f64; 3]) -> i32 {
     }
     let mut exact = Expansion::<EDGE_PARTS>::new();
     exact.add_edge(o, d, p, q);
-    let gradient = NEXT.map(|[i, j]| {
+    first_sign(exact.value(), side_gradient(d, p, q))
+}
+
+/// The partial derivatives of E(p, q) along the origin.
+fn side_gradient(d: [f64; 3], p: [f64; 3], q: [f64; 3]) -> [impl Fn() -> f64; 3] {
+    NEXT.map(|[i, j]| {
         move || {
             let mut sum = Expansion::<4>::new();
             for (x, y) in [(d[i], q[j]), (-d[i], p[j]), (-d[j], q[i]), (d[j], p[i])] {
@@ -102,8 +158,7 @@ fn side(o: [f64; 3], d: [f64; 3], p: [f64; 3], q: [f64; 3]) -> i32 {
             }
             sum.value()
         }
-    });
-    first_sign(exact.value(), gradient)
+    })
 }
 
 /// Whether the moved line crosses the plane of a triangle after `s` (1) or before it (-1), given the sign of W, which is not 0. 0
@@ -129,7 +184,12 @@ fn order(ray: &Ray, corners: [[f64; 3]; 3], s: f32, passed: i32) -> i32 {
     let mut exact = Expansion::<{ VOLUME_PARTS + 2 * EDGE_PARTS }>::new();
     exact.add_volume(o, a, b, c);
     exact.add_scaled(&determinant, -s);
-    let gradient = NEXT.map(|[i, j]| {
+    passed * first_sign(exact.value(), order_gradient(corners))
+}
+
+/// The partial derivatives of V - sW along the origin.
+fn order_gradient([a, b, c]: [[f64; 3]; 3]) -> [impl Fn() -> f64; 3] {
+    NEXT.map(|[i, j]| {
         move || {
             // The component of the normal is the sum of those of the vector products a×b, b×c and c×a.
             let mut sum = Expansion::<6>::new();
@@ -139,8 +199,7 @@ fn order(ray: &Ray, corners: [[f64; 3]; 3], s: f32, passed: i32) -> i32 {
             }
             sum.value()
         }
-    });
-    passed * first_sign(exact.value(), gradient)
+    })
 }
 
 /// The sign of `value`, or if it is 0 that of the first of `gradient` that is not 0.

@@ -62,7 +62,9 @@ pub(crate) fn error_coefficients(reach: f32) -> [f32; 2] {
     [slope, slope * slope + f32::MIN_POSITIVE]
 }
 
-/// Bound of the error of weights, 4δ(M + δ), from the greatest |x| + |y| (`l1_norm`) and |depth| of the projected corners.
+/// Bound of the error of weights, 4δ(M + δ), from the greatest |x| + |y| (`l1_norm`) and |depth| of the projected corners. Where
+/// the ray's exact origin is another than that in f32, `greatest_depth` is larger by the
+/// [`origin_reach`](bth_format::object::ObjectBounds::origin_reach) of the bounds for which the ray was prepared.
 #[inline(always)]
 pub(crate) fn error<S: Lanewise>(s: S, l1_norm: S::F, greatest_depth: S::F, floor: S::F) -> S::F {
     let reach = s.add(l1_norm, greatest_depth);
@@ -73,9 +75,10 @@ pub(crate) fn error<S: Lanewise>(s: S, l1_norm: S::F, greatest_depth: S::F, floo
 
 /// As [`error`], from the projected corners.
 #[inline(always)]
-pub(crate) fn error_of<S: Lanewise>(s: S, [a, b, c]: &Corners<S>, floor: S::F) -> S::F {
+pub(crate) fn error_of<S: Lanewise>(s: S, [a, b, c]: &Corners<S>, origin_reach: S::F, floor: S::F) -> S::F {
     let norm = s.max(s.max(l1_norm(s, *a), l1_norm(s, *b)), l1_norm(s, *c));
-    error(s, norm, s.max(s.max_abs(a[2], b[2]), s.abs(c[2])), floor)
+    let depth = s.max(s.max_abs(a[2], b[2]), s.abs(c[2]));
+    error(s, norm, s.add(depth, origin_reach), floor)
 }
 
 /// Sides on which sixteen lines pass the edges of their triangles.

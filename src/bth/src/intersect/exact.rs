@@ -133,20 +133,58 @@ pub(crate) struct OriginTerms {
     pub(crate) min_determinant: f64,
 }
 
+/// The origin of a ray in f64, as far as it is known there.
+pub(crate) trait Origin: Copy {
+    fn point(self) -> [f64; 3];
+    /// Adds to bounds of the errors of weights and of the volume what the error of the origin adds, for a triangle whose edges have
+    /// no component larger than `edge`.
+    fn enlarge(self, error: [f64; 2], edge: f64) -> [f64; 2];
+}
+
+/// An origin that f64 holds exactly.
+impl Origin for [f64; 3] {
+    #[inline(always)]
+    fn point(self) -> [f64; 3] {
+        self
+    }
+    #[inline(always)]
+    fn enlarge(self, error: [f64; 2], _edge: f64) -> [f64; 2] {
+        error
+    }
+}
+
+/// An origin that was rounded to f64, and a bound of the error of its coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RoundedOrigin(pub(crate) [f64; 3], pub(crate) f64);
+
+impl Origin for RoundedOrigin {
+    #[inline(always)]
+    fn point(self) -> [f64; 3] {
+        self.0
+    }
+    /// An error e of each coordinate changes a weight of the second or the third corner, a determinant of the direction, an edge and
+    /// the origin, by at most 6Dme; the weight of the first by the sum of both changes, 12Dme; and the volume by 6m²e.
+    #[inline(always)]
+    fn enlarge(self, [weight, volume]: [f64; 2], edge: f64) -> [f64; 2] {
+        [weight + self.1 * (16.0 * edge), volume + self.1 * (8.0 * (edge * edge))]
+    }
+}
+
 impl OriginTerms {
     #[inline(always)]
-    pub(crate) fn new(origin: [f64; 3], corners: [[f64; 3]; 3]) -> OriginTerms {
+    pub(crate) fn new(origin: impl Origin, corners: [[f64; 3]; 3]) -> OriginTerms {
         OriginTerms::with_errors(origin, corners).0
     }
 
     /// Also returns bounds of the errors of the weights, for a direction whose greatest |component| is 1, and of the volume.
     #[inline(always)]
-    fn with_errors(origin: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> (OriginTerms, [f64; 2]) {
-        let (offset, second, third) = (minus(a, origin), minus(b, a), minus(c, a));
+    fn with_errors(origin: impl Origin, [a, b, c]: [[f64; 3]; 3]) -> (OriginTerms, [f64; 2]) {
+        let (offset, second, third) = (minus(a, origin.point()), minus(b, a), minus(c, a));
         let normal = vector_product(second, third);
         let volume = unordered_scalar_product(offset, normal);
         let (distance, edge) = (max_norm(offset), greater(max_norm(second), max_norm(third)));
         let error = [WEIGHT_ERROR * (edge * (edge + distance)), WEIGHT_ERROR * (distance * (edge * edge))];
+        let error = origin.enlarge(error, edge);
         let is_accurate = INVERSE_RATIO_ERROR * error[1] < volume.abs();
         let terms = OriginTerms {
             normal,
@@ -208,7 +246,7 @@ struct Sides {
 impl Sides {
     /// There are no branches, so that the compiler can vectorize a loop of it.
     #[inline(always)]
-    fn new(origin: [f64; 3], direction: [f64; 3], corners: [[f64; 3]; 3]) -> Sides {
+    fn new(origin: impl Origin, direction: [f64; 3], corners: [[f64; 3]; 3]) -> Sides {
         let (terms, error) = OriginTerms::with_errors(origin, corners);
         let norm = max_norm(direction);
         let rounded = RoundedIntersection::new(&terms, direction, norm);
@@ -230,7 +268,7 @@ impl Sides {
 /// Decides in f64 whether a line crosses a triangle and computes t, u and v, or returns [`Estimate::Open`] where the error bounds
 /// do not allow it.
 #[inline(always)]
-pub(crate) fn estimate(origin: [f64; 3], direction: [f64; 3], corners: [[f64; 3]; 3]) -> Estimate {
+pub(crate) fn estimate(origin: impl Origin, direction: [f64; 3], corners: [[f64; 3]; 3]) -> Estimate {
     let Sides { rounded, weight, error, is_inside, is_outside } = Sides::new(origin, direction, corners);
     if is_outside {
         return Estimate::Missed;
@@ -277,34 +315,44 @@ pub(crate) fn wide(v: [f32; 3]) -> [f64; 3] {
     v.map(f64::from)
 }
 
+/// Decides a triangle that f64 leaves uncertain: uncertain weights are replaced by exact ones, and t, u and v are computed from exact
+/// sums unless the f64 values are accurate. `edge` returns the exact weight of the corner opposite an edge, or its product with a
+/// positive number; `exact` the intersection from exact sums.
+pub(super) fn decide_exactly(
+    uncertain: &UncertainWeights,
+    corners: [[f64; 3]; 3],
+    edge: impl Fn([f64; 3], [f64; 3]) -> f64,
+    exact: impl FnOnce() -> Intersection,
+) -> Option<Intersection> {
+    let &UncertainWeights { rounded, mut weight, bound } = uncertain;
+    for i in 0..3 {
+        if weight[i].abs() <= bound {
+            weight[i] = edge(corners[(i + 1) % 3], corners[(i + 2) % 3]);
+        }
+    }
+    let positive = weight.iter().any(|&w| w > 0.0);
+    let negative = weight.iter().any(|&w| w < 0.0);
+    if positive == negative {
+        return None; // The line passes outside of the triangle or lies in its plane.
+    }
+    Some(if rounded.is_accurate { rounded.intersection() } else { exact() })
+}
+
 impl Line {
     /// The intersection of the line with the closed triangle of these corners (object space), decided exactly.
     pub(crate) fn intersection(&self, corners: [[f32; 3]; 3]) -> Option<Intersection> {
         match estimate(self.origin, self.direction, corners.map(wide)) {
             Estimate::Missed => None,
             Estimate::Intersects(intersection) => Some(intersection),
-            Estimate::Open(uncertain, _) => self.decide_exactly(corners, &uncertain),
+            Estimate::Open(uncertain, _) => self.decide_uncertain(corners.map(wide), &uncertain),
         }
     }
 
-    /// Decides a triangle that f64 leaves uncertain: uncertain weights are replaced by exact ones, and t, u and v are computed
-    /// from exact sums unless the f64 values are accurate.
     #[cold]
     #[inline(never)]
-    fn decide_exactly(&self, corners: [[f32; 3]; 3], uncertain: &UncertainWeights) -> Option<Intersection> {
-        let corners = corners.map(wide);
-        let &UncertainWeights { rounded, mut weight, bound } = uncertain;
-        for i in 0..3 {
-            if weight[i].abs() <= bound {
-                weight[i] = self.edge(corners[(i + 1) % 3], corners[(i + 2) % 3]).value();
-            }
-        }
-        let positive = weight.iter().any(|&w| w > 0.0);
-        let negative = weight.iter().any(|&w| w < 0.0);
-        if positive == negative {
-            return None; // The line passes outside of the triangle or lies in its plane.
-        }
-        Some(if rounded.is_accurate { rounded.intersection() } else { self.exact_intersection(corners) })
+    fn decide_uncertain(&self, corners: [[f64; 3]; 3], uncertain: &UncertainWeights) -> Option<Intersection> {
+        let edge = |p, q| self.edge(p, q).value();
+        decide_exactly(uncertain, corners, edge, || self.exact_intersection(corners))
     }
 
     /// The weight of the corner opposite an edge p→q: det[d, p-o, q-o].

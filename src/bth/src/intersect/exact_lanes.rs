@@ -1,7 +1,7 @@
 //! The arithmetic of [`super::exact`] in f64 for sixteen pairs of a ray and a triangle that the f32 filter is sure the ray hits.
 
 use crate::intersect::exact::{
-    Intersection, OriginTerms, RoundedIntersection, certain_intersection, max_norm, reported,
+    Intersection, OriginTerms, RoundedIntersection, RoundedOrigin, certain_intersection, max_norm, reported,
     reported_barycentric, wide,
 };
 use crate::simd::{LANES, Simd};
@@ -115,6 +115,34 @@ impl Intersections {
             let corners = [lane(&corner[0], i), lane(&corner[1], i), lane(&corner[2], i)];
             let direction = lane(direction, i);
             let terms = OriginTerms::new(lane(origin, i), corners);
+            let rounded = RoundedIntersection::new(&terms, direction, max_norm(direction));
+            self.store_lane(i, &rounded, &mut accurate);
+        }
+        self.set_masks(s, lanes, &accurate);
+    }
+
+    /// As [`Self::compute`], for rays whose origins f64 does not hold exactly; `pairs.origin` is not read.
+    #[inline(always)]
+    pub(crate) fn compute_from<S: Simd>(
+        &mut self,
+        s: S,
+        lanes: u32,
+        origins: &[RoundedOrigin; LANES],
+        pairs: &Pairs,
+    ) {
+        let Pairs { direction, corner, .. } = pairs;
+        let (mut point, mut error) = ([[0.0; LANES]; 3], [0.0; LANES]);
+        for i in 0..LANES {
+            let RoundedOrigin([x, y, z], off) = origins[i];
+            (point[0][i], point[1][i], point[2][i], error[i]) = (x, y, z, off);
+        }
+        let mut accurate = [0; LANES];
+        // There are no branches in this loop, so that the compiler vectorizes it.
+        for i in 0..LANES {
+            let corners = [lane(&corner[0], i), lane(&corner[1], i), lane(&corner[2], i)];
+            let direction = lane(direction, i);
+            let origin = RoundedOrigin([point[0][i], point[1][i], point[2][i]], error[i]);
+            let terms = OriginTerms::new(origin, corners);
             let rounded = RoundedIntersection::new(&terms, direction, max_norm(direction));
             self.store_lane(i, &rounded, &mut accurate);
         }

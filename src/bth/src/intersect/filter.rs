@@ -10,7 +10,8 @@ use crate::intersect::edge_functions::{self, Corners, FilteredTriangles, Sides, 
 use crate::intersect::line::Line;
 use crate::rays::Ray;
 use crate::simd::{LANES, Lanewise, Part, Simd, lanes_of_piece};
-use bth_format::layout::{IndexedLeaf, Object, RawLeaf, WIDTH};
+use bth_format::layout::{IndexedLeaf, RawLeaf, WIDTH};
+use bth_format::object::ObjectBounds;
 use std::hint::black_box;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
@@ -70,6 +71,14 @@ pub(crate) struct Certain {
 }
 
 impl<S: Simd> Candidates<S> {
+    /// The same candidates but for a triangle.
+    #[inline(always)]
+    pub(crate) fn without(self, triangle: u32) -> Self {
+        let others = !(1 << (triangle % WIDTH as u32));
+        let Candidates { crossed, maybe, sure, .. } = self;
+        Candidates { crossed: crossed & others, maybe: maybe & others, sure: sure & others, ..self }
+    }
+
     /// The triangles that may be the nearest hit, as bits, and the nearest hit if it is certain. `maybe` must not be empty.
     #[inline(always)]
     pub(crate) fn nearest_candidates(&self, s: S) -> (u32, Option<Certain>) {
@@ -90,6 +99,11 @@ impl<S: Simd> Candidates<S> {
         let triangle = only.trailing_zeros() as usize % WIDTH;
         (maybe, Some(Certain { triangle, near: near[triangle], far: far[triangle] }))
     }
+}
+
+/// A corner of [`ObjectBounds`] without the number that fills a vector.
+fn corner([x, y, z, _]: [f32; 4]) -> [f32; 3] {
+    [x, y, z]
 }
 
 /// Projected points of a leaf: x, y and depth of each.
@@ -229,9 +243,10 @@ impl TriangleBlock for RawLeaf {
 
 impl TriangleFilter {
     /// Computes the constants in f64, for any ray that has a line.
-    pub(crate) fn new(ray: &Ray, line: &Line, slabs: &RaySlabs, object: &Object) -> TriangleFilter {
-        let reach = line.reach_of_box(object.lower, object.upper);
-        let [first, last] = slabs.certain_range(ray);
+    pub(crate) fn new(ray: &Ray, line: &Line, slabs: &RaySlabs, bounds: &ObjectBounds) -> TriangleFilter {
+        let reach = line.reach_of_box(corner(bounds.lower), corner(bounds.upper));
+        let reach = reach + f64::from(bounds.origin_reach);
+        let [first, last] = slabs.certain_range(ray, bounds.origin_error);
         let forward = 1f32.copysign(line.direction[line.axis[2]] as f32);
         let [error_slope, error_floor] =
             if reach < MAX_REACH { error_coefficients(reach as f32) } else { [0.0, f32::INFINITY] };
@@ -257,7 +272,8 @@ impl TriangleFilter {
         [s.fnma(s.splat(self.shear[0]), depth, x), s.fnma(s.splat(self.shear[1]), depth, y), depth]
     }
 
-    /// The triangles of a leaf that may be hit at a depth between `first` and `limit`.
+    /// The triangles of a leaf that may be hit at a depth between `first` and `limit`. `origin_reach` is that of the
+    /// [bounds](ObjectBounds::origin_reach) for which the ray was prepared.
     #[inline(always)]
     pub(crate) fn candidates<S: Simd, B: TriangleBlock>(
         &self,
@@ -265,8 +281,9 @@ impl TriangleFilter {
         block: &B,
         first: f32,
         limit: f32,
+        origin_reach: f32,
     ) -> Candidates<S> {
-        CandidatesOf { filter: self, block, first, limit }.inline_or_call(s)
+        CandidatesOf { filter: self, block, first, limit, origin_reach }.inline_or_call(s)
     }
 
     #[inline(always)]
@@ -276,12 +293,13 @@ impl TriangleFilter {
         block: &B,
         first: f32,
         limit: f32,
+        origin_reach: f32,
     ) -> Candidates<S> {
         let corners = block.project(s, self);
         let (valid, mut sides) = (valid_triangles(block), self.sides(s, &corners));
         let mut crossed = valid & !s.mask_bits(sides.missed);
         if crossed & !s.mask_bits(sides.certain) != 0 {
-            sides = self.closer(s, sides, &corners);
+            sides = self.closer(s, sides, &corners, origin_reach);
             crossed &= !s.mask_bits(sides.missed);
         }
         // In most leaves that a ray enters, all triangles are missed: then depths need not be computed.
@@ -305,10 +323,16 @@ impl TriangleFilter {
     /// The sides with the errors that the triangles' own distances from the ray's origin bound. Where the object is much larger than
     /// what lies around the ray, such as a statue on a plain, the bound by the object's box decides nothing.
     #[inline(always)]
-    fn closer<S: Lanewise>(&self, s: S, sides: Sides<S>, corners: &Corners<S>) -> Sides<S> {
+    fn closer<S: Lanewise>(
+        &self,
+        s: S,
+        sides: Sides<S>,
+        corners: &Corners<S>,
+        origin_reach: f32,
+    ) -> Sides<S> {
         // Where products may overflow, no bound holds.
         let floor = if self.error_floor < f32::INFINITY { f32::MIN_POSITIVE } else { f32::INFINITY };
-        let own = edge_functions::error_of(s, corners, s.splat(floor));
+        let own = edge_functions::error_of(s, corners, s.splat(origin_reach), s.splat(floor));
         sides.with_error(s, s.min(own, sides.error))
     }
 
@@ -334,15 +358,16 @@ struct CandidatesOf<'a, B> {
     block: &'a B,
     first: f32,
     limit: f32,
+    origin_reach: f32,
 }
 
 impl<S: Simd, B: TriangleBlock> Part<S> for CandidatesOf<'_, B> {
     type Output = Candidates<S>;
     #[inline(always)]
     fn run(self, s: S) -> Candidates<S> {
-        let CandidatesOf { filter, block, first, limit } = self;
+        let CandidatesOf { filter, block, first, limit, origin_reach } = self;
         if S::PIECES == 1 {
-            return filter.candidates_inlined(s, block, first, limit);
+            return filter.candidates_inlined(s, block, first, limit, origin_reach);
         }
         let valid = valid_triangles(block);
         let (mut crossed, mut maybe, mut sure) = (0, 0, 0);
@@ -356,7 +381,7 @@ impl<S: Simd, B: TriangleBlock> Part<S> for CandidatesOf<'_, B> {
             let corners = block.project_piece(p, filter, points.as_ref());
             let mut sides = filter.sides(p, &corners);
             if valid & !p.mask_bits(p.or(sides.missed, sides.certain)) != 0 {
-                sides = filter.closer(p, sides, &corners);
+                sides = filter.closer(p, sides, &corners, origin_reach);
             }
             if valid & !p.mask_bits(sides.missed) == 0 {
                 continue;

@@ -5,6 +5,8 @@
 //! [`Sign::Uncertain`]. The intersection of lines with triangles is decided exactly in [`super::exact`]; a line in the plane of a
 //! triangle misses it.
 
+use super::exact::RoundedOrigin;
+use super::start::StartPoint;
 use crate::rays::Ray;
 
 /// Error up to which f64 values are taken: 2^-28, an eighth of the rounding of f32, relative to 1 for u and v and to itself for
@@ -34,6 +36,8 @@ pub(crate) struct Line {
     pub(crate) shear: [f64; 2],
     /// `1 / direction[axis[2]]`, the factor from depth to t.
     pub(crate) inverse_depth: f64,
+    /// Bound of the error of the coordinates of `origin`; 0 unless the ray starts on a triangle.
+    pub(crate) origin_error: f64,
 }
 
 /// A point projected along the line.
@@ -99,7 +103,20 @@ impl Line {
             axis: [x, y, z],
             shear: [direction[x] * inverse_depth, direction[y] * inverse_depth],
             inverse_depth,
+            origin_error: 0.0,
         })
+    }
+
+    /// Moves the origin to a start on a triangle, where f64 may not hold it exactly.
+    pub(crate) fn start_at(&mut self, start: &StartPoint) {
+        let RoundedOrigin(point, error) = start.origin;
+        (self.origin, self.origin_error) = (point, error);
+    }
+
+    /// By how much t may be off because of the origin.
+    #[inline(always)]
+    fn t_error(&self) -> f64 {
+        self.origin_error * self.inverse_depth.abs()
     }
 
     /// Projects a point. Let u = 2^-53 and R the greatest |coordinate| of point - origin. The differences are off by uR, the
@@ -145,7 +162,8 @@ impl Line {
     #[inline(always)]
     pub(crate) fn t_range(&self, corners: [&Projected; 3]) -> (f64, f64) {
         let t = corners.map(|p| p.depth * self.inverse_depth);
-        (t[0].min(t[1]).min(t[2]), t[0].max(t[1]).max(t[2]))
+        let off = self.t_error();
+        (t[0].min(t[1]).min(t[2]) - off, t[0].max(t[1]).max(t[2]) + off)
     }
 
     /// Whether the corners of a triangle that the line certainly crosses are clockwise about it.
@@ -157,13 +175,13 @@ impl Line {
     /// coordinates.
     pub(crate) fn t_before(&self, corners: [&Projected; 3], error: f64) -> f64 {
         let (depth, shift) = Self::depth_of_crossing(corners, error);
-        depth * self.inverse_depth - shift * self.inverse_depth.abs()
+        depth * self.inverse_depth - shift * self.inverse_depth.abs() - self.t_error()
     }
 
     /// Upper bound of that t.
     pub(crate) fn t_after(&self, corners: [&Projected; 3], error: f64) -> f64 {
         let (depth, shift) = Self::depth_of_crossing(corners, error);
-        depth * self.inverse_depth + shift * self.inverse_depth.abs()
+        depth * self.inverse_depth + shift * self.inverse_depth.abs() + self.t_error()
     }
 
     /// The depth at which the line crosses a triangle that it certainly crosses, and a bound of its error.

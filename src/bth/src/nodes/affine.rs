@@ -1,5 +1,6 @@
 //! Affine transforms in f64, and their inverses for rays.
 
+use crate::intersect::start::StartPoint;
 use crate::rays::Ray;
 use crate::simd::LANES;
 use bth_format::layout::Node;
@@ -263,6 +264,16 @@ impl Inverse {
         let (tmin, tmax) =
             (-greatest_below(-ray.tmin, scale, t_scale), greatest_below(ray.tmax, scale, t_scale));
         ObjectRay { ray: Ray { origin, direction, tmin, tmax }, t_scale }
+    }
+
+    /// As [`Self::ray`], for a ray that may start on a triangle of the object: then its origin is that start, rounded.
+    #[inline(always)]
+    pub(crate) fn ray_from(&self, ray: &Ray, start: Option<&StartPoint>) -> ObjectRay {
+        let mut of_object = self.ray(ray);
+        if let Some(start) = start {
+            of_object.ray.origin = start.rounded();
+        }
+        of_object
     }
 
     /// As [`Self::ray`] for sixteen rays, with the same bits. The results of lanes that are not `unscaled` are not valid.

@@ -1,23 +1,18 @@
 //! Scratch memory of a thread, which is reused from one batch to the next.
 
-use super::strategy::StrategyTable;
 use super::walked_batch::WalkScratch;
 use crate::bvh::packet::PacketScratch;
 use crate::bvh::stack::Stacks;
-use crate::free::Rest;
+use crate::starts::prepare::PreparedStarts;
 use std::cell::Cell;
 
-/// Memory that the traversals of batches use, and the measured costs of strategies.
+/// Memory that the traversals of batches use.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
     pub(super) stacks: Stacks,
     pub(super) packets: PacketScratch,
-    pub(super) choices: StrategyTable,
-    /// For each ray of a batch the triangle on which it starts, or `NONE`.
-    pub(super) hints: Vec<u32>,
-    /// The rays that remain after those that meet nothing have ended.
-    pub(crate) rest: Rest,
     pub(super) walks: WalkScratch,
+    pub(super) starts: PreparedStarts,
 }
 
 /// The first scratch memory of a thread.

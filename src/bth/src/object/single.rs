@@ -1,30 +1,27 @@
 //! Tracing of one object by a single ray.
 
-use crate::SMALL;
 use crate::bvh::certain_hit::store_certain_hit;
+use crate::bvh::leaf::ExactRay;
 use crate::bvh::single::{SingleResult, trace_single};
 use crate::bvh::single_stack::SingleStack;
 use crate::intersect::prepare::PreparedRay;
 use crate::query::{Answer, Count, Query};
-use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, Simd};
-use crate::tets::{TetStart, enter_tets, start_in_tets};
-use bth_format::layout::{Child, NONE};
+use crate::tets::enter_tets;
+use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 
-/// Traces one ray and stores its answer. `from` is the triangle on which the ray starts, or `NONE`; `instance` is reported with a
-/// hit.
+/// Traces one ray and stores its answer. `instance` is reported with a hit.
 #[inline(always)]
 pub(crate) fn trace<Q: Query, C: Count>(
     (object, goal): (&ObjectView<'_>, Q::Goal),
-    ray: &Ray,
-    from: u32,
+    ray: ExactRay<'_>,
     instance: u32,
     count: &mut C,
     answer: &mut Q::Answer,
 ) {
     // The kernel is passed by reference, because a copy of fields that were just written would stall.
-    let kernel = &mut SingleKernel::<Q, C> { object, goal, ray, from, instance, count, answer };
+    let kernel = &mut SingleKernel::<Q, C> { object, goal, ray, instance, count, answer };
     // Where nothing but the kernel is called, the registers need not be saved a second time.
     match Isa::already_chosen() {
         Some(isa) => isa.run_found(kernel),
@@ -43,8 +40,7 @@ fn run_first<Q: Query, C: Count>(kernel: &mut SingleKernel<'_, Q, C>) {
 struct SingleKernel<'a, Q: Query, C> {
     object: &'a ObjectView<'a>,
     goal: Q::Goal,
-    ray: &'a Ray,
-    from: u32,
+    ray: ExactRay<'a>,
     instance: u32,
     count: &'a mut C,
     answer: &'a mut Q::Answer,
@@ -54,18 +50,13 @@ impl<Q: Query, C: Count> Kernel for &mut SingleKernel<'_, Q, C> {
     type Output = ();
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let SingleKernel { object, goal, ray, from, instance, count, answer } = self;
+        let SingleKernel { object, goal, ray, instance, count, answer } = self;
         let (object, ray) = (*object, *ray);
-        let mut query = None;
-        let (from_tets, walked) = if SMALL || *from == NONE || object.tet_leaves.is_empty() {
-            (object.header.root == NONE, NONE)
-        } else {
-            from_tets(object, ray, *from, query.insert(Q::new(*goal, ray)), *count)
-        };
-        let result = if from_tets {
+        let mut query: Option<Q> = None;
+        let result = if object.header.root == NONE {
             SingleResult::OfQuery
         } else {
-            through_bvh(s, (object, ray), walked, (*goal, &mut query), *count)
+            through_bvh(s, (object, ray), (*goal, &mut query), *count)
         };
         // The answer is written in place: a copy of what was just written word by word would stall.
         match result {
@@ -84,44 +75,29 @@ impl<Q: Query, C: Count> Kernel for &mut SingleKernel<'_, Q, C> {
     }
 }
 
-/// Traces a ray through the BVH, except for the tet leaf `walked`, whose hits the query already holds; `NONE` for no leaf.
+/// Traces a ray through the BVH.
 #[inline(always)]
 fn through_bvh<S: Simd, Q: Query, C: Count>(
     s: S,
-    (object, ray): (&ObjectView<'_>, &Ray),
-    walked: u32,
+    (object, ray): (&ObjectView<'_>, ExactRay<'_>),
     query: (Q::Goal, &mut Option<Q>),
     count: &mut C,
 ) -> SingleResult {
-    let prepared = match PreparedRay::of(s, &object.bounds, ray) {
+    let for_starts;
+    let bounds = match ray.1 {
+        None => &object.bounds,
+        Some(_) => {
+            for_starts = object.bounds.for_starts();
+            &for_starts
+        }
+    };
+    let prepared = match PreparedRay::of(s, bounds, ray.0) {
         Some(prepared) => prepared,
-        None => match PreparedRay::in_f64(object.header, ray) {
+        None => match PreparedRay::in_f64(bounds, ray.0) {
             Some(prepared) => prepared,
             None => return SingleResult::OfQuery,
         },
     };
     let tets = |leaf, query: &mut Q, count: &mut C| enter_tets(object, leaf, ray, query, count);
-    trace_single(s, (object, ray), &prepared, walked, query, &mut SingleStack::new(), count, tets)
-}
-
-/// Walks the ray from a triangle through the tetrahedra of which that is a face. Returns whether the query is complete, and the tet
-/// leaf whose hits the query holds, or `NONE`.
-#[inline(never)]
-fn from_tets<Q: Query, C: Count>(
-    object: &ObjectView<'_>,
-    ray: &Ray,
-    from: u32,
-    query: &mut Q,
-    count: &mut C,
-) -> (bool, u32) {
-    let mut either = query.to_either();
-    let start = start_in_tets(object, ray, from, &mut either, count);
-    *query = Q::from_either(query.goal(), &either);
-    match start {
-        TetStart::Done => (true, NONE),
-        TetStart::Walked(leaf) => {
-            let root = object.header.root;
-            (root == NONE || leaf != NONE && root == Child::Tets(leaf).code(), leaf)
-        }
-    }
+    trace_single(s, (object, ray), (&prepared, bounds), query, &mut SingleStack::new(), count, tets)
 }

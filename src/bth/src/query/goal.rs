@@ -8,7 +8,6 @@ use super::Nearest;
 use super::better;
 use crate::rays::{Hit, Ray};
 use crate::simd::LANES;
-use std::ops::Range;
 
 /// What a query looks for: the nearest hit, or any.
 pub(crate) trait Goal: Copy {
@@ -20,8 +19,6 @@ pub(crate) trait Goal: Copy {
     fn is_any(self) -> bool;
     /// The same answers for a shorter time.
     fn reborrow<'s>(answers: &'s mut Self::Answers<'_>) -> Self::Answers<'s>;
-    /// The answers of a range of the rays.
-    fn part<'s>(answers: &'s mut Self::Answers<'_>, rays: Range<usize>) -> Self::Answers<'s>;
 }
 
 /// The result of a ray.
@@ -63,9 +60,6 @@ impl Goal for NearestHit {
     fn reborrow<'s>(answers: &'s mut Self::Answers<'_>) -> Self::Answers<'s> {
         answers
     }
-    fn part<'s>(answers: &'s mut Self::Answers<'_>, rays: Range<usize>) -> Self::Answers<'s> {
-        &mut answers[rays]
-    }
 }
 
 /// Any hit.
@@ -82,9 +76,6 @@ impl Goal for AnyHit {
     #[inline(always)]
     fn reborrow<'s>(answers: &'s mut Self::Answers<'_>) -> Self::Answers<'s> {
         answers
-    }
-    fn part<'s>(answers: &'s mut Self::Answers<'_>, rays: Range<usize>) -> Self::Answers<'s> {
-        &mut answers[rays]
     }
 }
 
@@ -104,12 +95,6 @@ impl Goal for EitherGoal {
     #[inline(always)]
     fn reborrow<'s>(answers: &'s mut Self::Answers<'_>) -> Self::Answers<'s> {
         answers.reborrow()
-    }
-    fn part<'s>(answers: &'s mut Self::Answers<'_>, rays: Range<usize>) -> Self::Answers<'s> {
-        match answers {
-            EitherAnswers::Nearest(hits) => EitherAnswers::Nearest(&mut hits[rays]),
-            EitherAnswers::Any(found) => EitherAnswers::Any(&mut found[rays]),
-        }
     }
 }
 

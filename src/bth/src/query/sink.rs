@@ -2,6 +2,7 @@
 
 use super::{AnswerLanes, Answers, AnswersOf, EitherQuery, Goal, Query};
 use crate::intersect::exact_lanes::Intersections;
+use crate::intersect::start::Starts;
 use crate::rays::{PrimitiveRef, Ray};
 use crate::simd::{LANES, Simd};
 
@@ -35,17 +36,30 @@ pub(crate) struct Sink<'a, Q: Query> {
     scene: Option<SceneRays<'a>>,
     /// Index in the batch of the ray with index 0 in calls.
     first: usize,
+    /// Where the rays of the batch start.
+    starts: Starts<'a>,
 }
 
 impl<'a, Q: Query> Sink<'a, Q> {
     /// Stores the answer of ray i in `answers[i]`.
     pub(crate) fn new(ids: &'a [u32], answers: AnswersOf<'a, Q>, instance: u32) -> Self {
-        Sink { ids, answers, instance, scene: None, first: 0 }
+        Sink { ids, answers, instance, scene: None, first: 0, starts: Starts::NONE }
+    }
+
+    /// The same sink for rays with these starts.
+    pub(crate) fn with_starts(self, starts: Starts<'a>) -> Self {
+        Sink { starts, ..self }
+    }
+
+    /// Where the rays start, by their index in calls.
+    #[inline(always)]
+    pub(crate) fn starts(&self) -> Starts<'a> {
+        self.starts.from(self.first)
     }
 
     /// Merges the answer of each visit into the answer of its ray; `answers` are those of the scene's batch.
     pub(crate) fn of_scene(ids: &'a [u32], answers: AnswersOf<'a, Q>, scene: SceneRays<'a>) -> Self {
-        Sink { ids, answers, instance: 0, scene: Some(scene), first: 0 }
+        Sink { ids, answers, instance: 0, scene: Some(scene), first: 0, starts: Starts::NONE }
     }
 
     /// What the answers are about.
@@ -57,15 +71,15 @@ impl<'a, Q: Query> Sink<'a, Q> {
     /// A sink for the rays from `first` on, whose indices in calls begin at 0.
     #[inline(always)]
     pub(crate) fn part(&mut self, first: usize) -> Sink<'_, Q> {
-        let (ids, instance, scene) = (self.ids, self.instance, self.scene);
+        let (ids, instance, scene, starts) = (self.ids, self.instance, self.scene, self.starts);
         let answers = Q::Goal::reborrow(&mut self.answers);
-        Sink { ids, answers, instance, scene, first: self.first + first }
+        Sink { ids, answers, instance, scene, first: self.first + first, starts }
     }
 
     /// A sink for the same rays, to which queries of either goal report.
     pub(crate) fn either(&mut self) -> Sink<'_, EitherQuery> {
-        let Sink { ids, instance, scene, first, .. } = *self;
-        Sink { ids, answers: self.answers.either(), instance, scene, first }
+        let Sink { ids, instance, scene, first, starts, .. } = *self;
+        Sink { ids, answers: self.answers.either(), instance, scene, first, starts }
     }
 
     /// The instance that is reported with a hit of a ray.

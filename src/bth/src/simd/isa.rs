@@ -169,11 +169,6 @@ impl Isa {
         Isa::ALL.into_iter().rev().find(|isa| isa.is_available()).unwrap_or(Isa::Scalar)
     }
 
-    /// Whether walks of batches through tetrahedra are compiled for it. With 128 bits they would be a fifth of its code.
-    pub(crate) fn walks_tets(self) -> bool {
-        matches!(self, Isa::Avx2 | Isa::Avx512)
-    }
-
     /// Uses this instruction set for all tracing in this process from now on.
     ///
     /// # Errors

@@ -18,10 +18,11 @@ pub(crate) mod walk;
 pub(crate) mod walks;
 
 use self::walk::{TetWalker, WalkOutcome};
+use crate::bvh::candidate::start_on;
+use crate::bvh::leaf::ExactRay;
 use crate::intersect::line::Line;
 use crate::query::{Count, EitherQuery, Query};
-use crate::rays::Ray;
-use bth_format::layout::NONE;
+use bth_format::layout::Child;
 use bth_format::object::ObjectView;
 
 /// Result of a tet leaf for a ray.
@@ -33,68 +34,12 @@ pub(crate) enum TetOutcome {
     Continue,
 }
 
-/// Result of the walk of a ray from the face on which it starts.
-pub(crate) enum TetStart {
-    /// The query is complete.
-    Done,
-    /// The ray continues through the BVH. The value is the index of the tet leaf whose hits the query already holds, or `NONE` if
-    /// the ray was not walked.
-    Walked(u32),
-}
-
-/// Walks through the tet leaf of the triangle on which a ray starts, from the constrained face of that triangle. The traversal of
-/// the BVH then skips the leaf, so the hint affects where the search begins, never the result.
-#[inline(never)]
-pub(crate) fn start_in_tets<C: Count>(
-    object: &ObjectView<'_>,
-    ray: &Ray,
-    triangle: u32,
-    query: &mut EitherQuery,
-    count: &mut C,
-) -> TetStart {
-    let face = object.triangle_faces.get(triangle as usize).copied().unwrap_or(NONE);
-    // The walk starts at the origin, so it would miss hits with t < 0.
-    if face == NONE || ray.tmin < 0.0 {
-        return TetStart::Walked(NONE);
-    }
-    let leaf = leaf_of_face(object, face);
-    // For a single ray the BVH over the leaf's triangles is faster, if there is one.
-    if object.tet_leaves[leaf as usize].subtree != NONE {
-        return TetStart::Walked(NONE);
-    }
-    let Some(line) = Line::new(ray) else { return TetStart::Done };
-    let outcome = walk_from_face(object, leaf, face, &line, query, count);
-    match outcome {
-        Some(WalkOutcome::Done) => TetStart::Done,
-        Some(_) => TetStart::Walked(leaf),
-        None => TetStart::Walked(NONE),
-    }
-}
-
-/// Walks from the constrained face with index `face`. `None` if the tetrahedron that holds the origin was not found.
-fn walk_from_face<C: Count>(
-    object: &ObjectView<'_>,
-    leaf: u32,
-    face: u32,
-    line: &Line,
-    query: &mut EitherQuery,
-    count: &mut C,
-) -> Option<WalkOutcome> {
-    let walker = TetWalker::new(object, leaf, line);
-    let position = walker.locate(face)?;
-    count.leaf();
-    Some(match walker.walk(position, query, count) {
-        WalkOutcome::Uncertain => walker.flood(query, count),
-        outcome => outcome,
-    })
-}
-
 /// Walks through a tet leaf that has no subtree, from the face of its hull through which the line enters.
 #[inline(never)]
 pub(crate) fn enter_tets<Q: Query, C: Count>(
     object: &ObjectView<'_>,
     leaf: u32,
-    ray: &Ray,
+    ray: ExactRay<'_>,
     query: &mut Q,
     count: &mut C,
 ) -> TetOutcome {
@@ -109,13 +54,21 @@ pub(crate) fn enter_tets<Q: Query, C: Count>(
 fn enter<C: Count>(
     object: &ObjectView<'_>,
     leaf: u32,
-    ray: &Ray,
+    (ray, start): ExactRay<'_>,
     query: &mut EitherQuery,
     count: &mut C,
 ) -> TetOutcome {
-    let Some(line) = Line::new(ray) else { return TetOutcome::Done };
-    let walker = TetWalker::new(object, leaf, &line);
-    let outcome = match walker.enter_hull() {
+    let Some(mut line) = Line::new(ray) else { return TetOutcome::Done };
+    if let Some(start) = start {
+        line.start_at(start);
+    }
+    let mut walker = TetWalker::new(object, leaf, &line);
+    walker.start = start.and_then(|start| start_on(object, start));
+    let entered = match start {
+        Some(start) if start.leaf == Child::Tets(leaf).code() => walker.leave(start.slot),
+        _ => None,
+    };
+    let outcome = match entered.map_or_else(|| walker.enter_hull(), Ok) {
         Ok(position) => walker.walk(position, query, count),
         Err(outcome) => outcome,
     };

@@ -8,6 +8,7 @@
 
 use super::records::{Entered, ReadRecords};
 use crate::intersect::line::{Line, Projected, Sign};
+use crate::intersect::start::ExactStart;
 use crate::query::{Count, EitherQuery, Query, TriangleRef};
 use bth_format::layout::{FACE_BIT, HullFace, Link, NONE, TetFace, TetLeaf, TetVertex};
 use bth_format::object::{ObjectView, Records};
@@ -26,6 +27,8 @@ pub(crate) struct TetWalker<'a> {
     pub(crate) line: &'a Line,
     /// Bound of the error of projected coordinates of points within the leaf's box.
     pub(crate) error: f64,
+    /// Where the ray starts, if it starts on a triangle of the object.
+    pub(super) start: Option<ExactStart>,
     /// Ids of the object's triangles, in leaf order.
     ids: &'a [u32],
 }
@@ -63,7 +66,9 @@ impl<'a> TetWalker<'a> {
             hull: &object.hull_faces[leaf.first_hull as usize..][..leaf.hulls as usize],
             ids: object.triangle_ids,
             line,
-            error: Line::projection_error(line.reach_of_box(leaf.lower, leaf.upper)),
+            error: Line::projection_error(line.reach_of_box(leaf.lower, leaf.upper))
+                + 2.0 * line.origin_error,
+            start: None,
         }
     }
 
@@ -87,7 +92,11 @@ impl<'a> TetWalker<'a> {
     /// query is complete.
     pub(crate) fn offer(&self, face: &TetFace, query: &mut EitherQuery) -> bool {
         let corners = face.vertex.map(|v| self.position(v));
-        match self.line.intersection(corners) {
+        let found = match &self.start {
+            None => self.line.intersection(corners),
+            Some(start) => start.intersection(self.line, corners),
+        };
+        match found {
             Some(intersection) => query.offer(TriangleRef::id(face.triangle, self.ids), intersection),
             None => false,
         }
@@ -158,6 +167,25 @@ impl<'a> TetWalker<'a> {
             position.entered.behind = behind;
         }
         WalkOutcome::Uncertain
+    }
+
+    /// The position behind the constrained face on which the ray starts. `None` if it is uncertain that the line crosses the face.
+    pub(crate) fn leave(&self, face: u32) -> Option<TetPosition> {
+        let constrained = &self.faces[face as usize];
+        let mut vertex = constrained.vertex;
+        let mut corner = vertex.map(|v| self.project(v));
+        let sides = self.sides(&corner);
+        let side = match sides {
+            [Sign::Positive, Sign::Positive, Sign::Positive] => 0,
+            [Sign::Negative, Sign::Negative, Sign::Negative] => 1,
+            _ => return None,
+        };
+        if side == 1 {
+            vertex.swap(1, 2);
+            corner.swap(1, 2);
+        }
+        let entered = Entered { face: vertex, apex: constrained.opposite[side], behind: face | FACE_BIT };
+        Some(TetPosition { tet: constrained.tet[side], entered, corner })
     }
 
     /// The position at which the line enters the hull.

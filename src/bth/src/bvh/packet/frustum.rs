@@ -84,7 +84,9 @@ impl<S: Simd, const POINT: bool> Frustum<S, POINT> {
             f32::MIN_POSITIVE
         } else {
             let apart = span.origin.map(|[least, greatest]| greatest - least);
-            apart[0].max(apart[1]).max(apart[2]) * SLACK + f32::MIN_POSITIVE
+            // A moved origin moves a by at most 2.25 times as much.
+            let moved = bounds.origin_error * 2.5;
+            apart[0].max(apart[1]).max(apart[2]) * SLACK + moved + f32::MIN_POSITIVE
         };
         for j in 0..2 {
             let shear = both(3 + j);

@@ -50,8 +50,9 @@ fn missed<S: Lanewise>(s: S, [a, b, c]: &Corners<S>, error: S::F) -> S::M {
 impl<S: Lanewise> RayLimits<S> {
     /// Tests rays against a triangle, with the error bound of the triangle itself.
     #[inline(always)]
-    fn test(&self, s: S, [a, b, c]: Corners<S>) -> FilteredTriangles<S> {
-        let error = edge_functions::error_of(s, &[a, b, c], s.splat(f32::MIN_POSITIVE));
+    fn test(&self, s: S, [a, b, c]: Corners<S>, origin_reach: f32) -> FilteredTriangles<S> {
+        let (origin_reach, floor) = (s.splat(origin_reach), s.splat(f32::MIN_POSITIVE));
+        let error = edge_functions::error_of(s, &[a, b, c], origin_reach, floor);
         let tested = edge_functions::test_triangles(s, [a, b, c], error, self.first, self.limit);
         let in_range = s.and(s.le(self.certain[0], tested.nearest), s.le(tested.farthest, self.certain[1]));
         FilteredTriangles { certain: s.and(tested.certain, in_range), ..tested }
@@ -66,6 +67,7 @@ struct TestRays<'a, S: Simd, C> {
     points: [usize; 3],
     /// Bound of the errors of weights.
     error: &'a S::F,
+    origin_reach: f32,
     active: u32,
 }
 
@@ -73,7 +75,7 @@ impl<S: Simd, C: CornerSource<S>> Part<S> for TestRays<'_, S, C> {
     type Output = RayTest<S>;
     #[inline(always)]
     fn run(self, s: S) -> RayTest<S> {
-        let TestRays { group, corners, points: [a, b, c], error, active } = self;
+        let TestRays { group, corners, points: [a, b, c], error, origin_reach, active } = self;
         let (mut maybe, mut sure, mut nearest, mut farthest) = (0, 0, [0.0; LANES], [0.0; LANES]);
         for i in 0..S::PIECES {
             let (active, p) = (active & lanes_of_piece::<S>(i), s.piece(i));
@@ -85,7 +87,7 @@ impl<S: Simd, C: CornerSource<S>> Part<S> for TestRays<'_, S, C> {
             if active & !p.mask_bits(missed(p, &corners, S::pick(p, error))) == 0 {
                 continue;
             }
-            let tested = group.limits_of_piece(p).test(p, corners);
+            let tested = group.limits_of_piece(p).test(p, corners, origin_reach);
             maybe |= active & !p.mask_bits(tested.excluded);
             sure |= active & p.mask_bits(tested.certain);
             p.store(tested.nearest, &mut nearest);
@@ -190,8 +192,14 @@ impl<Q: Query> PacketRays<'_, Q> {
         while active != 0 {
             let lane = active.trailing_zeros() as usize;
             active &= active - 1;
-            let found = self.single_rays.candidates::<S, H>(s, group, (at, lane), block);
+            let origin_reach = self.object.bounds.origin_reach;
+            let mut found = self.single_rays.candidates::<S, H>(s, group, (at, lane), block, origin_reach);
             let ray = at * LANES + lane;
+            if let Some(start) = self.starts.of(ray)
+                && start.leaf == code
+            {
+                found = found.without(start.slot);
+            }
             let hit = found.sure != 0
                 || found.maybe != 0 && self.settle_one(ray, Candidate::NONE, (code, found.maybe));
             self.alive &= !(u64::from(hit) << ray);
@@ -251,7 +259,8 @@ impl<Q: Query> PacketRays<'_, Q> {
             }
         }
         let size = s.add(greatest.coordinate, greatest.coordinate);
-        let error = edge_functions::error(s, size, greatest.depth, floor);
+        let depth = s.add(greatest.depth, s.splat(self.object.bounds.origin_reach));
+        let error = edge_functions::error(s, size, depth, floor);
         self.test_triangles::<S, H>(s, group, at, &*points, error, leaf, cache_indices, triangles, active)
     }
 
@@ -272,27 +281,33 @@ impl<Q: Query> PacketRays<'_, Q> {
         mut triangles: u32,
         mut active: u32,
     ) -> bool {
-        let mut nearer = false;
+        let (mut nearer, origin_reach) = (false, self.object.bounds.origin_reach);
         while triangles != 0 {
             let triangle = triangles.trailing_zeros();
             triangles &= triangles - 1;
             let [a, b, c] = leaf.points_of(triangle as usize);
-            let RayTest { maybe, sure, nearest, farthest } = if S::INLINES_PARTS {
+            let RayTest { mut maybe, mut sure, nearest, farthest } = if S::INLINES_PARTS {
                 let corners = [corners.corner(s, a), corners.corner(s, b), corners.corner(s, c)];
                 if active & !s.mask_bits(missed(s, &corners, error)) == 0 {
                     continue;
                 }
-                let tested = group.limits().test(s, corners);
+                let tested = group.limits().test(s, corners, origin_reach);
                 let maybe = active & !s.mask_bits(tested.excluded);
                 let sure = maybe & s.mask_bits(tested.certain);
                 RayTest { maybe, sure, nearest: tested.nearest, farthest: tested.farthest }
             } else {
-                s.call(TestRays { group: &*group, corners, points: [a, b, c], error: &error, active })
+                let error = &error;
+                s.call(TestRays { group: &*group, corners, points: [a, b, c], error, origin_reach, active })
             };
             if !S::INLINES_PARTS && maybe == 0 {
                 continue;
             }
             let candidate = Candidate { leaf: leaf.code, triangle };
+            if self.has_starts {
+                // No ray hits the triangle on which it starts.
+                let own = self.starts_of(at, maybe, candidate);
+                (maybe, sure) = (maybe & !own, sure & !own);
+            }
             let clear = if H::is_any(self.goal) {
                 self.alive &= !(u64::from(sure) << (at * LANES));
                 active &= !sure;

@@ -4,6 +4,7 @@ use super::hit_cache::{HitCache, UNCACHED};
 use super::ray_group::RayGroup;
 use super::single_rays::SingleRays;
 use crate::bvh::candidate::{Candidate, settle};
+use crate::intersect::start::Starts;
 use crate::query::Query;
 use crate::rays::Ray;
 use crate::simd::{LANES, Part, Simd};
@@ -24,6 +25,10 @@ pub(crate) struct PacketRays<'a, Q: Query> {
     pub(crate) hit_cache: &'a mut HitCache,
     /// A bit for each ray whose query is not complete.
     pub(crate) alive: u64,
+    /// Where the rays start.
+    pub(crate) starts: Starts<'a>,
+    /// Whether `starts` are given.
+    pub(crate) has_starts: bool,
 }
 
 /// The uncached pending hits of a group; see [`RayGroup::leaf`] and [`RayGroup::triangle`].
@@ -97,9 +102,10 @@ impl<Q: Query> PacketRays<'_, Q> {
             if self.settle_one(ray, pending_hit, (candidate.leaf, 1 << candidate.triangle)) {
                 self.alive &= !(1 << ray);
             } else if let Some(t) = self.queries[ray].found_bounds() {
+                let off = f64::from(self.object.bounds.origin_error);
                 let [near, far] = t.map(|t| t * f64::from(scale[lane]));
-                nearest[lane] = (near as f32).next_down();
-                limit[lane] = limit[lane].min((far as f32).next_up());
+                nearest[lane] = ((near - off) as f32).next_down();
+                limit[lane] = limit[lane].min(((far + off) as f32).next_up());
             }
             pending[lane] = NONE;
         }
@@ -129,6 +135,22 @@ impl<Q: Query> PacketRays<'_, Q> {
             self.queries[ray] = Q::new(self.goal, &self.rays[ray]);
             self.queried |= 1 << ray;
         }
-        settle(self.object, &self.rays[ray], pending, of_leaf, &mut self.queries[ray])
+        let exact_ray = (&self.rays[ray], self.starts.of(ray));
+        settle(self.object, exact_ray, pending, of_leaf, &mut self.queries[ray])
+    }
+
+    /// Of some rays of a group, a bit each, those that start on a triangle.
+    #[inline(always)]
+    pub(super) fn starts_of(&self, at: usize, mut rays: u32, candidate: Candidate) -> u32 {
+        let mut own = 0;
+        while rays != 0 {
+            let lane = rays.trailing_zeros();
+            rays &= rays - 1;
+            let start = self.starts.of(at * LANES + lane as usize);
+            let is_own =
+                start.is_some_and(|start| start.leaf == candidate.leaf && start.slot == candidate.triangle);
+            own |= u32::from(is_own) << lane;
+        }
+        own
     }
 }

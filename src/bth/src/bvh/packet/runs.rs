@@ -119,7 +119,7 @@ fn trace<S: Simd, Q: Query>(
         let (outcome, backoff, least_use, kind) = match run.kind {
             Kind::Coherent(span) => {
                 // Any-hit rays with the same origin are rare, so that kernel is compiled for nearest hits only.
-                let outcome = if !goal.is_any() && span.is_from_point() {
+                let outcome = if !goal.is_any() && sink.starts().is_empty() && span.is_from_point() {
                     frustum::<S, Q, true>(s, object, &bounds, &span, &mut packets, rays, sink)
                 } else {
                     frustum::<S, Q, false>(s, object, &bounds, &span, &mut packets, rays, sink)

@@ -94,10 +94,12 @@ impl SingleRays {
         group: &RayGroup<S>,
         (at, lane): (usize, usize),
         block: &impl TriangleBlock,
+        origin_reach: f32,
     ) -> Candidates<S> {
         self.convert(s, group, at, H::MIXED_OCTANTS);
         let [first, last] = &self.depths[at % GROUPS];
-        self.prepared(at, lane).filter.candidates(s, block, first[lane % LANES], last[lane % LANES])
+        let (first, last) = (first[lane % LANES], last[lane % LANES]);
+        self.prepared(at, lane).filter.candidates(s, block, first, last, origin_reach)
     }
 
     /// Writes the stack entries of the children of a node that any of the given rays may meet; returns their number.

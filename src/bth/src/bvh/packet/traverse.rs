@@ -72,8 +72,19 @@ impl<S: Simd, Q: Query, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, 
         let groups = &mut groups[..rays.len().div_ceil(LANES)];
         let all = u64::MAX >> (PACKET - rays.len());
         single_rays.clear();
-        let mut rays =
-            PacketRays { object, rays, goal, queries, single_rays, hit_cache, queried: 0, alive: all };
+        let starts = sink.starts();
+        let mut rays = PacketRays {
+            object,
+            rays,
+            goal,
+            queries,
+            single_rays,
+            hit_cache,
+            queried: 0,
+            alive: all,
+            starts,
+            has_starts: !starts.is_empty(),
+        };
         if let Some(group) = groups.last_mut() {
             // Lanes without a ray get the least limit, so that they never keep a child or a triangle.
             let valid = s.mask((all >> ((rays.rays.len() - 1) / LANES * LANES)) as u32);
@@ -189,6 +200,12 @@ fn finish<S: Simd, H: PacketBounds<S>, Q: Query>(
         } else {
             let packet = PhantomData::<H>;
             IntersectGroup { group, cached, intersections, packet }.inline_or_call(s);
+        }
+    }
+    if rays.has_starts {
+        // Exact origins are not in lanes, so hits are computed one by one.
+        for intersections in &mut *intersections {
+            intersections.open |= std::mem::take(&mut intersections.certain);
         }
     }
     for (i, (group, intersections)) in groups.iter().zip(intersections.iter()).enumerate() {

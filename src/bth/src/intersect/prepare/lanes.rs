@@ -90,6 +90,7 @@ pub(crate) fn prepare_lanes<S: Lanewise>(
         origin_sum = s.add(coordinate, origin_sum);
         direction_sum = s.add(size[k], direction_sum);
     }
+    reach = s.add(reach, s.splat(bounds.origin_reach));
     // As `padded_extent`.
     let (padded, round_up) = (s.splat(bounds.padded), s.splat(ROUND_UP));
     let extent = s.mul(s.add(padded, s.min(s.add(farthest, s.splat(bounds.away)), reach)), round_up);
@@ -117,7 +118,8 @@ pub(crate) fn prepare_lanes<S: Lanewise>(
     let forward = s.select(s.lt(dz, zero), s.splat(-1.0), s.splat(1.0));
 
     // Bounds of the errors by rounding and underflow of the depths of tmin and tmax.
-    let least = s.mul(s.add(greatest, s.splat(1.0)), s.splat(f32::MIN_POSITIVE));
+    let least =
+        s.fma(s.add(greatest, s.splat(1.0)), s.splat(f32::MIN_POSITIVE), s.splat(bounds.origin_error));
     let ulps = s.splat(4.0 / (1 << 24) as f32);
     let slack = |depth: S::F| s.fma(s.abs(depth), ulps, least);
     // For the least normal number and denormal ones, whose products would be denormal, 0 stands: that moves them by less than the slack.

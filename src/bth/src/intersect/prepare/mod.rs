@@ -17,7 +17,7 @@ use crate::intersect::filter::TriangleFilter;
 use crate::intersect::line::Line;
 use crate::rays::Ray;
 use crate::simd::{LANES, Lanewise, Part, Scalar, Simd};
-use bth_format::layout::{NONE, Object};
+use bth_format::layout::NONE;
 use bth_format::object::{GREATEST_IN_F32, ObjectBounds};
 use glam::{Vec3A, Vec4, Vec4Swizzles};
 use std::mem::offset_of;
@@ -114,7 +114,7 @@ impl PreparedRay {
         // The fourth lane is not tmax, which as f32::MAX would make the reciprocal denormal, and so take hundreds of cycles.
         let size = Vec3A::from_vec4(end.abs().xyzz());
         let [lower, upper] = [bounds.lower, bounds.upper].map(|p| Vec3A::from_vec4(Vec4::from_array(p)));
-        let reach = (lower - o).abs().max((upper - o).abs()).max_element();
+        let reach = (lower - o).abs().max((upper - o).abs()).max_element() + bounds.origin_reach;
         let greatest = s.greatest_of_three(end.abs().to_array());
         let [greatest_origin, ..] = s.greatest_of_three(start.abs().to_array());
         let (greatest, greatest_lanes) = (greatest[0], Vec3A::from_vec4(Vec4::from_array(greatest)));
@@ -138,7 +138,8 @@ impl PreparedRay {
         let depths = Vec4::new(tmin, tmax, tmin, tmax) * greatest;
         let depths = depths.max(LEAST).min(GREATEST);
         // No intermediate result is denormal, which would cost a hundred cycles.
-        let slack = depths.abs() * (4.0 / (1 << 24) as f32) + (greatest + 1.0) * f32::MIN_POSITIVE;
+        let least_slack = (greatest + 1.0) * f32::MIN_POSITIVE + bounds.origin_error;
+        let slack = depths.abs() * (4.0 / (1 << 24) as f32) + least_slack;
         let [first, last, certain_first, certain_last] =
             (depths + slack * Vec4::new(-1.0, 1.0, 1.0, -1.0)).to_array();
         let [error_slope, error_floor] = edge_functions::error_coefficients(reach);
@@ -167,16 +168,16 @@ impl PreparedRay {
     /// of t.
     #[cold]
     #[inline(never)]
-    pub(crate) fn in_f64(object: &Object, ray: &Ray) -> Option<PreparedRay> {
+    pub(crate) fn in_f64(bounds: &ObjectBounds, ray: &Ray) -> Option<PreparedRay> {
         if is_tiny(ray.tmin) && ray.tmin <= ray.tmax && 0.0 <= ray.tmax {
-            let prepared = PreparedRay::of(Scalar, &ObjectBounds::new(object), &Ray { tmin: 0.0, ..*ray });
+            let prepared = PreparedRay::of(Scalar, bounds, &Ray { tmin: 0.0, ..*ray });
             if prepared.is_some() {
                 return prepared;
             }
         }
         let line = Line::new(ray)?;
-        let slabs = RaySlabs::new(ray, &line, object);
-        let filter = TriangleFilter::new(ray, &line, &slabs, object);
+        let slabs = RaySlabs::new(ray, &line, bounds);
+        let filter = TriangleFilter::new(ray, &line, &slabs, bounds);
         (ray.tmin <= ray.tmax).then(|| PreparedRay::new(slabs, filter))
     }
 }

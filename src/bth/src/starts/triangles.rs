@@ -1,42 +1,57 @@
 //! The triangles on which sixteen rays start: what must be read of them, without waiting for it.
 
-use super::corners_at;
+use super::locate::place;
+use crate::bvh::candidate::start_corners;
 use crate::simd::{LANES, Simd};
-use bth_format::layout::{Child, FreeBins, FreeDirections, FreeDistances, TrianglePlace};
+use bth_format::exact::is_zero_area;
+use bth_format::layout::{Child, FreeBins, FreeDirections, FreeDistances, NONE, TrianglePlace};
 use bth_format::object::{NodeBase, ObjectView};
 
 /// Bit of the last word of bins.
 const BACK: u32 = (FreeBins::BACK >> 96) as u32;
 
-/// A row of one of the sections.
-pub(super) trait Row {
+/// A row of what is known of a triangle.
+pub(crate) trait Row {
+    /// Whether it tells anything.
+    const TELLS: bool;
     /// Whether it tells free bins.
     const HAS_BINS: bool;
     /// Copies what the row tells to a column.
-    fn copy(&self, starts: &mut Starts, column: usize);
+    fn copy(&self, triangles: &mut StartTriangles, column: usize);
+}
+
+/// Nothing is known.
+pub(crate) struct NoRow;
+
+impl Row for NoRow {
+    const TELLS: bool = false;
+    const HAS_BINS: bool = false;
+    fn copy(&self, _: &mut StartTriangles, _: usize) {}
 }
 
 impl Row for FreeDirections {
+    const TELLS: bool = true;
     const HAS_BINS: bool = true;
 
     #[inline(always)]
-    fn copy(&self, starts: &mut Starts, column: usize) {
+    fn copy(&self, triangles: &mut StartTriangles, column: usize) {
         for word in 0..4 {
-            starts.bins[word][column] = self.bins[word];
+            triangles.bins[word][column] = self.bins[word];
         }
         let back = if self.bins[3] & BACK != 0 { u32::MAX } else { 0 };
-        starts.sectors[0][column] = self.sectors & !back;
-        starts.sectors[1][column] = self.sectors & back;
+        triangles.sectors[0][column] = self.sectors & !back;
+        triangles.sectors[1][column] = self.sectors & back;
     }
 }
 
 impl Row for FreeDistances {
+    const TELLS: bool = true;
     const HAS_BINS: bool = false;
 
     #[inline(always)]
-    fn copy(&self, starts: &mut Starts, column: usize) {
-        starts.sectors[0][column] = self.sectors[0];
-        starts.sectors[1][column] = self.sectors[1];
+    fn copy(&self, triangles: &mut StartTriangles, column: usize) {
+        triangles.sectors[0][column] = self.sectors[0];
+        triangles.sectors[1][column] = self.sectors[1];
     }
 }
 
@@ -55,28 +70,36 @@ const fn before(distance: usize) -> [u32; LANES] {
     lanes
 }
 
-/// The triangles on which sixteen rays start.
+/// The ids of the triangles on which sixteen rays start; an id may be anything.
 #[derive(Clone, Copy)]
-pub(super) struct Hints<'a> {
-    triangle: &'a [u32; LANES],
+pub(super) struct TriangleIds {
+    ids: [u32; LANES],
     /// Bits of the rays that start on another triangle than the one before. Neighbouring rays often start on the same one.
     new: u32,
 }
 
-impl<'a> Hints<'a> {
+impl TriangleIds {
+    pub(super) const NONE: TriangleIds = TriangleIds { ids: [NONE; LANES], new: 0 };
+
     #[inline(always)]
-    pub(super) fn new<S: Simd>(s: S, triangle: &'a [u32; LANES]) -> Self {
-        let of = s.load_u(triangle);
+    pub(super) fn new<S: Simd>(s: S, of: S::U) -> Self {
         let same = s.mask_bits(s.eq_u(of, s.lookup_u(of, s.load_u(&BEFORE[0]))));
-        Hints { triangle, new: !same & 0xffff | 1 }
+        let mut ids = [NONE; LANES];
+        s.store_u(of, &mut ids);
+        TriangleIds { ids, new: !same & 0xffff | 1 }
     }
 
     /// Prefetches the rows and the places of the triangles.
     #[inline(always)]
     pub(super) fn prefetch_rows<S: Simd, R: Row>(&self, s: S, object: &ObjectView<'_>, rows: &[R]) {
-        for &triangle in self.triangle {
-            s.prefetch(rows.as_ptr().wrapping_add(triangle as usize));
-            s.prefetch(object.places.as_ptr().wrapping_add(triangle as usize));
+        let mut new = self.new;
+        while new != 0 {
+            let id = self.ids[new.trailing_zeros() as usize % LANES] as usize;
+            new &= new - 1;
+            if R::TELLS {
+                s.prefetch(rows.as_ptr().wrapping_add(id));
+            }
+            s.prefetch(object.places.as_ptr().wrapping_add(id));
         }
     }
 
@@ -86,9 +109,9 @@ impl<'a> Hints<'a> {
     pub(super) fn prefetch_leaves<S: Simd>(&self, s: S, object: &ObjectView<'_>) {
         let mut new = self.new;
         while new != 0 {
-            let lane = new.trailing_zeros() as usize % LANES;
+            let id = self.ids[new.trailing_zeros() as usize % LANES] as usize;
             new &= new - 1;
-            let Some(place) = object.places.get(self.triangle[lane] as usize) else { continue };
+            let Some(place) = object.places.get(id) else { continue };
             let leaf = object.lines.as_ptr().wrapping_add((place >> 4 & TrianglePlace::INDEX_LIMIT) as usize);
             for k in 0..4 {
                 s.prefetch(leaf.wrapping_add(k));
@@ -97,14 +120,18 @@ impl<'a> Hints<'a> {
     }
 }
 
-/// What the file knows of the triangles on which sixteen rays start. Each vector is a cache line, so what is shorter comes last.
+/// The triangles on which sixteen rays start, and what the file knows of them. Each vector is a cache line, so what is shorter comes last.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
-pub(super) struct Starts {
+pub(crate) struct StartTriangles {
     /// For each ray the column of its triangle: the first ray that starts there.
     column: [u32; LANES],
-    /// Corners of the triangles, by corner and axis. Triangles of which nothing is known have no area.
+    /// Corners of the triangles, by corner and axis.
     pub(super) corners: [[[f32; LANES]; 3]; 3],
+    /// Child codes of their leaves; `NONE` where there is no such triangle, or it has no area.
+    pub(super) leaf: [u32; LANES],
+    /// Their slots in the leaves.
+    pub(super) slot: [u32; LANES],
     /// The words of their bins.
     pub(super) bins: [[u32; LANES]; 4],
     /// The sectors of their fronts and backs.
@@ -113,10 +140,12 @@ pub(super) struct Starts {
     is_expanded: bool,
 }
 
-impl Starts {
-    pub(super) const NONE: Starts = Starts {
+impl StartTriangles {
+    pub(super) const NONE: StartTriangles = StartTriangles {
         column: [0; LANES],
         corners: [[[0.0; LANES]; 3]; 3],
+        leaf: [NONE; LANES],
+        slot: [0; LANES],
         bins: [[0; LANES]; 4],
         sectors: [[0; LANES]; 2],
         is_expanded: false,
@@ -129,17 +158,21 @@ impl Starts {
         s: S,
         object: &ObjectView<'_>,
         rows: &[R],
-        hints: &Hints<'_>,
+        triangles: &TriangleIds,
     ) {
-        let (mut new, base) = (hints.new, object.node_base());
+        let (mut new, base) = (triangles.new, object.node_base());
         self.is_expanded = new == 0xffff;
         self.set_columns(s, new);
         while new != 0 {
             let lane = new.trailing_zeros() as usize % LANES;
             new &= new - 1;
-            let triangle = hints.triangle[lane] as usize;
-            let row = rows.get(triangle).zip(object.places.get(triangle));
-            self.set((object, base), row, lane);
+            let id = triangles.ids[lane];
+            if R::TELLS
+                && let Some(row) = rows.get(id as usize)
+            {
+                row.copy(self, lane);
+            }
+            self.set((object, base), id, lane);
         }
     }
 
@@ -155,23 +188,16 @@ impl Starts {
     }
 
     #[inline(always)]
-    fn set<R: Row>(&mut self, of: (&ObjectView<'_>, NodeBase<'_>), row: Option<(&R, &u32)>, column: usize) {
-        let (object, base) = of;
-        // A triangle that does not exist has no row, nor has NONE.
-        let Some((row, &place)) = row else {
-            return self.set_corners([[0.0; 3]; 3], column);
-        };
-        row.copy(self, column);
+    fn set(&mut self, (object, base): (&ObjectView<'_>, NodeBase<'_>), id: u32, column: usize) {
+        let place = object.places.get(id as usize).copied().unwrap_or(NONE);
         // Most triangles lie in indexed leaves of f32.
-        let leaf = if place & TrianglePlace::RAW == 0 {
-            base.indexed_leaf(Child::LEAF_BIT | place >> 4)
-        } else {
-            None
-        };
-        let Some(leaf) = leaf else {
-            return self.set_corners(corners_at(object, place).unwrap_or_default(), column);
+        let code = Child::LEAF_BIT | place >> 4;
+        let leaf = if place & TrianglePlace::RAW == 0 { base.indexed_leaf(code) } else { None };
+        let Some(leaf) = leaf.filter(|_| !object.is_deformable()) else {
+            return self.set_other(object, id, column);
         };
         let slot = place as usize % LANES;
+        (self.leaf[column], self.slot[column]) = (code, slot as u32);
         for corner in 0..3 {
             let vertex = usize::from(leaf.corner[corner][slot]) % LANES;
             for axis in 0..3 {
@@ -180,9 +206,16 @@ impl Starts {
         }
     }
 
-    /// Sets the corners of a triangle. Nothing is known of one that has no area.
+    /// As [`Self::set`], for any triangle.
     #[inline(never)]
-    fn set_corners(&mut self, corners: [[f32; 3]; 3], column: usize) {
+    fn set_other(&mut self, object: &ObjectView<'_>, id: u32, column: usize) {
+        self.leaf[column] = NONE;
+        let Some((leaf, slot)) = place(object, id) else { return };
+        let Some(corners) = start_corners(object, leaf, slot) else { return };
+        if object.is_deformable() && is_zero_area(corners) {
+            return;
+        }
+        (self.leaf[column], self.slot[column]) = (leaf, slot);
         for corner in 0..3 {
             for axis in 0..3 {
                 self.corners[corner][axis][column] = corners[corner][axis];
@@ -202,10 +235,13 @@ impl Starts {
                 s.store(s.lookup(s.load(row), column), row);
             }
         }
+        for row in [&mut self.leaf, &mut self.slot] {
+            s.store_u(s.lookup_u(s.load_u(row), column), row);
+        }
         for row in if R::HAS_BINS { &mut self.bins[..] } else { &mut [] } {
             s.store_u(s.lookup_u(s.load_u(row), column), row);
         }
-        for row in &mut self.sectors {
+        for row in if R::TELLS { &mut self.sectors[..] } else { &mut [] } {
             s.store_u(s.lookup_u(s.load_u(row), column), row);
         }
     }

@@ -1,0 +1,167 @@
+//! What rays that start on triangles certainly do not meet.
+//!
+//! For directions in bins, a file may say that rays that leave a triangle meet nothing else, at all or within a distance (specification,
+//! "Free directions"). A ray whose bin is free hits nothing; another one begins behind that distance, where boxes and triangles before it
+//! are skipped. Neither changes an answer. Where a direction is in doubt, the ray is traced from its start.
+
+use super::leaving::{DIRECTIONS, Leaving, SLACK as SLACK_F32};
+use super::triangles::{Row, StartTriangles};
+use crate::simd::{LANES, Lanewise, Simd};
+use bth_format::layout::{FREE_BINS, FREE_SECTOR_OF, FREE_SIDE, FreeBins, FreeLevels, free_axes, free_bin};
+use bth_format::object::ObjectView;
+
+/// Bit of the last word of bins.
+const BACK: u32 = (FreeBins::BACK >> 96) as u32;
+/// 2^i for lane i.
+static POWERS: [u32; LANES] = {
+    let mut powers = [1; LANES];
+    let mut i = 1;
+    while i < LANES {
+        powers[i] = 2 * powers[i - 1];
+        i += 1;
+    }
+    powers
+};
+
+/// For each row its first bin. Lanes without a row lead to bins that are never free.
+static FIRST_BIN: [u32; LANES] = {
+    let mut first = [FREE_BINS as u32; LANES];
+    let mut row = 0;
+    while row < FREE_SIDE {
+        first[row] = (FREE_SIDE * row) as u32;
+        row += 1;
+    }
+    first
+};
+/// For each column and each row the bits of the levels in the sectors that hold it. Lanes without a column have none.
+static OF_SECTORS: [[u32; LANES]; 2] = {
+    let mut bits = [[0; LANES]; 2];
+    let mut column = 0;
+    while column < FREE_SIDE {
+        if let Some(sector) = FREE_SECTOR_OF[column] {
+            bits[0][column] = 0x1111_1111 << sector;
+            bits[1][column] = 0x000f_000f << (4 * sector);
+        }
+        column += 1;
+    }
+    bits
+};
+
+/// Where the range of a ray that starts on a triangle of an object can begin: infinite in a free direction, 0 where nothing is known.
+#[inline(never)]
+pub(super) fn begin(
+    object: &ObjectView<'_>,
+    triangle: u32,
+    corners: [[f32; 3]; 3],
+    direction: [f32; 3],
+) -> f32 {
+    known_begin(object, triangle, corners, direction).unwrap_or(0.0)
+}
+
+fn known_begin(
+    object: &ObjectView<'_>,
+    triangle: u32,
+    corners: [[f32; 3]; 3],
+    direction: [f32; 3],
+) -> Option<f32> {
+    let known = object.known_free(triangle as usize)?;
+    let greatest = direction[0].abs().max(direction[1].abs()).max(direction[2].abs());
+    if !(greatest > DIRECTIONS[0] && greatest < DIRECTIONS[1]) {
+        return None;
+    }
+    // The file may lie about which triangles have axes; then nothing is known.
+    let (bin, is_back) = free_bin(&free_axes(corners)?, direction.map(f64::from))?;
+    if known.bins.is_free(bin) && known.bins.is_back() == is_back {
+        return Some(f32::INFINITY);
+    }
+    let level = known.sectors[usize::from(is_back)].level_of_bin(bin);
+    let within = f64::from(object.free_levels.first()?.within(level));
+    let length = direction.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
+    Some((within / length * (1.0 - 4.0 * f64::from(SLACK_F32))) as f32)
+}
+
+/// Bits of the rays in free directions, and where the ranges of the others can begin, given their directions.
+#[inline(always)]
+pub(super) fn decide<S: Simd, R: Row>(
+    s: S,
+    triangles: &StartTriangles,
+    direction: [S::F; 3],
+    levels: &FreeLevels,
+) -> (u32, S::F) {
+    let (mut to_front, mut to_back) = (0, 0);
+    let mut columns = [[0; LANES]; 2];
+    for i in 0..S::PIECES {
+        let p = s.piece(i);
+        let d = [S::pick(p, &direction[0]), S::pick(p, &direction[1]), S::pick(p, &direction[2])];
+        let leaving = Leaving::new(p, &triangles.corners, d);
+        to_front |= leaving.front;
+        to_back |= leaving.back;
+        p.store_u(leaving.columns[0], &mut columns[0]);
+        p.store_u(leaving.columns[1], &mut columns[1]);
+    }
+    let [column, row] = [s.load_u(&columns[0]), s.load_u(&columns[1])];
+    let free = if R::HAS_BINS { free_lanes(s, triangles, [column, row], [to_front, to_back]) } else { 0 };
+    let sectors = [s.load_u(&triangles.sectors[0]), s.load_u(&triangles.sectors[1])];
+    let none = s.splat_u(0);
+    let of_side = s.select_u(s.mask(to_front), sectors[0], s.select_u(s.mask(to_back), sectors[1], none));
+    (free, begins(s, direction, within(s, of_side, [column, row], levels)))
+}
+
+/// Bits of the rays in free directions, given their columns and rows, and the bits of those to the front and to the back.
+#[inline(always)]
+fn free_lanes<S: Simd>(
+    s: S,
+    triangles: &StartTriangles,
+    [column, row]: [S::U; 2],
+    [to_front, to_back]: [u32; 2],
+) -> u32 {
+    let bin = s.add_u(s.lookup_u(s.load_u(&FIRST_BIN), row), column);
+    let mut words = [s.splat_u(0); 4];
+    for word in 0..4 {
+        words[word] = s.load_u(&triangles.bins[word]);
+    }
+    let mut word = words[3];
+    for k in [2, 1, 0] {
+        word = s.select_u(s.lt_u(bin, s.splat_u(32 * (k + 1))), words[k as usize], word);
+    }
+    let power = s.lookup_u(s.load_u(&POWERS), bin);
+    let in_lower_half = s.eq_u(s.and_u(bin, s.splat_u(16)), s.splat_u(0));
+    let bit = s.select_u(in_lower_half, power, s.shl_u::<16>(power));
+    let back = lanes_with(s, words[3], BACK);
+    let open = !s.mask_bits(s.eq_u(s.and_u(word, bit), s.splat_u(0)));
+    open & s.mask_bits(s.lt_u(row, s.splat_u(FREE_SIDE as u32))) & (to_front & !back | to_back & back)
+}
+
+/// The distances within which nothing is met, given the sectors of the sides to which rays go, and their columns and rows.
+#[inline(always)]
+fn within<S: Simd>(s: S, sectors: S::U, [column, row]: [S::U; 2], levels: &FreeLevels) -> S::F {
+    let of_column = s.lookup_u(s.load_u(&OF_SECTORS[0]), column);
+    let of_row = s.lookup_u(s.load_u(&OF_SECTORS[1]), row);
+    let bits = s.and_u(sectors, s.and_u(of_column, of_row));
+    let is_low = s.lt_u(s.splat_u(0), s.and_u(bits, s.splat_u(0xffff)));
+    let is_high = s.lt_u(s.splat_u(0xffff), bits);
+    let [one, two, three] = [0, 1, 2].map(|level| s.splat(levels.distance[level]));
+    s.select(is_high, s.select(is_low, three, two), s.select(is_low, one, s.splat(0.0)))
+}
+
+/// Where the ranges of rays can begin, given the distances within which they meet nothing.
+///
+/// With a guess g of the length of a direction d, (g² + d²) / 2g is an upper bound of it, by the inequality of the means, and for a good guess
+/// a close one. The slack is more than the rounding errors of all terms.
+#[inline(always)]
+fn begins<S: Simd>(s: S, [dx, dy, dz]: [S::F; 3], within: S::F) -> S::F {
+    let greatest = s.max_abs(s.max_abs(dx, dy), dz);
+    let sum = s.add(s.add(s.abs(dx), s.abs(dy)), s.abs(dz));
+    let guess = s.fma(s.sub(sum, greatest), s.splat(0.35), greatest);
+    let square = s.fma(dz, dz, s.fma(dy, dy, s.mul(dx, dx)));
+    // The division does not wait for the distance.
+    let per_length = s.div(s.add(guess, guess), s.fma(guess, guess, square));
+    let begin = s.mul(s.mul(within, per_length), s.splat(1.0 - 4.0 * SLACK_F32));
+    s.select(s.lt(s.splat(0.0), within), begin, s.splat(0.0))
+}
+
+/// Bits of the lanes whose word has a bit in common with `bits`.
+#[inline(always)]
+fn lanes_with<S: Simd>(s: S, word: S::U, bits: u32) -> u32 {
+    !s.mask_bits(s.eq_u(s.and_u(word, s.splat_u(bits)), s.splat_u(0))) & 0xffff
+}

@@ -1,0 +1,62 @@
+//! Where the triangle of a start lies in its object, and the start in f64.
+
+use crate::bvh::candidate::start_corners;
+use crate::intersect::exact::{RoundedOrigin, wide};
+use crate::intersect::start::{StartPoint, are_weights, rounded_start};
+use bth_format::exact::is_zero_area;
+use bth_format::layout::{Child, NONE, TrianglePlace};
+use bth_format::object::ObjectView;
+
+/// Why a start is not a point of a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum StartError {
+    /// No leaf of the object holds the triangle: it does not exist, or it has no area and was dropped.
+    NoTriangle,
+    /// The triangle has no area.
+    NoArea,
+    /// The weights are not those of a point of the triangle.
+    Weights,
+}
+
+/// Finds the start at weights u and v of a triangle of an object.
+#[inline(always)]
+pub(crate) fn locate(object: &ObjectView<'_>, triangle: u32, uv: [f32; 2]) -> Result<StartPoint, StartError> {
+    let (leaf, slot) = place(object, triangle).ok_or(StartError::NoTriangle)?;
+    let corners = start_corners(object, leaf, slot).ok_or(StartError::NoTriangle)?;
+    if object.is_deformable() && is_zero_area(corners) {
+        return Err(StartError::NoArea);
+    }
+    if !are_weights(uv) {
+        return Err(StartError::Weights);
+    }
+    let [u, v] = uv;
+    Ok(StartPoint { origin: rounded_start(corners.map(wide), uv.map(f64::from)), leaf, slot, u, v })
+}
+
+/// The child code of the leaf that holds a triangle, and its slot there. For a triangle of a tet leaf without a subtree, these are the
+/// code of the tet leaf and the index of the constrained face.
+#[inline(always)]
+pub(super) fn place(object: &ObjectView<'_>, triangle: u32) -> Option<(u32, u32)> {
+    let code = *object.places.get(triangle as usize)?;
+    match TrianglePlace::from_code(code) {
+        Some(TrianglePlace { leaf, slot }) => Some((leaf.code(), slot)),
+        None => place_in_tets(object, triangle),
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn place_in_tets(object: &ObjectView<'_>, triangle: u32) -> Option<(u32, u32)> {
+    let face = *object.triangle_faces.get(triangle as usize)?;
+    let leaf = object.tet_leaves.partition_point(|leaf| leaf.first_face <= face).checked_sub(1)?;
+    (face != NONE).then(|| (Child::Tets(leaf as u32).code(), face))
+}
+
+impl StartPoint {
+    /// The point, rounded to f32.
+    #[inline(always)]
+    pub(crate) fn rounded(&self) -> [f32; 3] {
+        let RoundedOrigin([x, y, z], _) = self.origin;
+        [x as f32, y as f32, z as f32]
+    }
+}

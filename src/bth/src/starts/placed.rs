@@ -1,0 +1,136 @@
+//! Rays in world space that may start on a triangle of an instance.
+
+use super::locate::{StartError, locate};
+use crate::bvh::leaf::ExactRay;
+use crate::instances::World;
+use crate::intersect::exact::RoundedOrigin;
+use crate::intersect::start::StartPoint;
+use crate::rays::{Ray, Start, StartRay};
+use crate::scene::Scene;
+use bth_format::layout::NONE;
+use bth_format::text;
+use bth_format::{Code, Error};
+
+/// A start in the space of the object of an instance.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct InstanceStart {
+    pub(crate) instance: u32,
+    pub(crate) point: StartPoint,
+    /// Whether the ray leaves in a direction in which it meets nothing of the instance.
+    pub(crate) is_free: bool,
+}
+
+impl InstanceStart {
+    /// For a ray that starts on no triangle.
+    pub(crate) fn none(origin: [f32; 3]) -> InstanceStart {
+        InstanceStart { instance: NONE, point: StartPoint::beside(origin), is_free: false }
+    }
+}
+
+/// A ray in world space, and its start if that is on a triangle. Its origin is then the start rounded to f32, where other instances see
+/// it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct WorldRay<'a> {
+    pub(crate) ray: &'a Ray,
+    pub(crate) start: Option<&'a InstanceStart>,
+}
+
+impl<'a> WorldRay<'a> {
+    /// A ray with an origin.
+    #[inline(always)]
+    pub(crate) fn plain(ray: &'a Ray) -> WorldRay<'a> {
+        WorldRay { ray, start: None }
+    }
+
+    /// The start, if it is on this instance.
+    #[inline(always)]
+    pub(crate) fn start_in(&self, instance: u32) -> Option<&'a StartPoint> {
+        self.start.filter(|start| start.instance == instance).map(|start| &start.point)
+    }
+
+    /// As a ray of an instance whose object's space is world space.
+    #[inline(always)]
+    pub(crate) fn exact_in(&self, instance: u32) -> ExactRay<'a> {
+        (self.ray, self.start_in(instance))
+    }
+}
+
+/// A ray that was placed in the world.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PlacedRay {
+    pub(crate) ray: Ray,
+    pub(crate) start: Option<InstanceStart>,
+}
+
+impl PlacedRay {
+    pub(crate) fn world_ray(&self) -> WorldRay<'_> {
+        WorldRay { ray: &self.ray, start: self.start.as_ref() }
+    }
+}
+
+/// Why a ray cannot be placed.
+enum Misplaced {
+    NoInstance,
+    Hidden,
+    Start(StartError),
+}
+
+impl Scene {
+    /// Places a start in the world: with its point in world space, rounded to f32.
+    fn place_start(&self, start: &Start) -> Result<(InstanceStart, [f32; 3]), Misplaced> {
+        let object = self.object_at(start.primitive).ok_or(Misplaced::NoInstance)?;
+        let instance = start.primitive.instance;
+        if self.world().is_some_and(|world| world.placements[instance as usize].is_none()) {
+            return Err(Misplaced::Hidden);
+        }
+        let found = locate(self.view(object), start.primitive.triangle, [start.u, start.v]);
+        let point = found.map_err(Misplaced::Start)?;
+        let origin = match self.world() {
+            None => point.rounded(),
+            Some(world) => self.in_world(world, instance, &point),
+        };
+        Ok((InstanceStart { instance, point, is_free: false }, origin))
+    }
+
+    /// A start in world space, rounded to f32.
+    fn in_world(&self, world: &World, instance: u32, point: &StartPoint) -> [f32; 3] {
+        let RoundedOrigin(origin, _) = point.origin;
+        world.row(self.objects(), instance).to_world.apply(origin).map(|x| x as f32)
+    }
+
+    /// Places a ray in the world; `None` if its start is not a point of a visible instance.
+    pub(crate) fn place(&self, ray: &StartRay) -> Option<PlacedRay> {
+        let &StartRay { start, direction, tmax } = ray;
+        let (start, origin) = self.place_start(&start).ok()?;
+        Some(PlacedRay { ray: Ray { origin, tmin: 0.0, direction, tmax }, start: Some(start) })
+    }
+
+    /// Checks that rays can start at a point: that it is a point of a triangle with area of a visible instance.
+    ///
+    /// Queries do not check starts: a ray whose start is not such a point hits nothing.
+    ///
+    /// # Errors
+    /// `BTH-S003` if there is no such instance, `BTH-S008` if it is hidden, if it has no such triangle or the triangle has no area, or if
+    /// u or v is not finite, negative, or their sum above 1 by more than 2^-22. The error says what was found.
+    pub fn check_start(&self, start: &Start) -> Result<(), Error> {
+        let Start { primitive, u, v } = *start;
+        let (instance, triangle) = (primitive.instance, primitive.triangle);
+        let bad = |expected: &'static str, found: String| Err(Error::of_call(Code::Start, expected, found));
+        match self.place_start(start) {
+            Ok(_) => Ok(()),
+            Err(Misplaced::NoInstance) => {
+                let expected = text!("an instance below {}", self.instance_count());
+                Err(Error::of_call(Code::NoSuchInstance, expected, text!("{instance}")))
+            }
+            Err(Misplaced::Hidden) => {
+                bad("a visible instance", text!("instance {instance}, which is hidden"))
+            }
+            Err(Misplaced::Start(StartError::NoTriangle | StartError::NoArea)) => {
+                bad("a triangle with area", text!("triangle {triangle} of instance {instance}"))
+            }
+            Err(Misplaced::Start(StartError::Weights)) => {
+                bad("u >= 0, v >= 0 and u + v <= 1", text!("u = {u}, v = {v}"))
+            }
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! The nearest hit of rays that start on surfaces, and any hit.
+
+use super::locate::locate;
+use super::placed::{InstanceStart, WorldRay};
+use super::prepare::ENDED;
+use crate::object;
+use crate::rays::{Hit, Ray, StartRay};
+use crate::scene::Scene;
+use bth_format::object::ObjectView;
+
+impl Scene {
+    /// Stores the nearest hit of a ray, or [`Hit::MISS`].
+    #[inline(always)]
+    pub(crate) fn nearest_of_start(&self, ray: &StartRay, hit: &mut Hit) {
+        match self.sole_opaque() {
+            Some(object) => nearest_in(object, 0, ray, hit),
+            None => self.nearest_of_start_elsewhere(ray, hit),
+        }
+    }
+
+    /// As [`Self::nearest_of_start`], in any scene.
+    #[inline(never)]
+    fn nearest_of_start_elsewhere(&self, ray: &StartRay, hit: &mut Hit) {
+        if !self.has_opacity()
+            && let Some((object, instance)) = self.sole()
+        {
+            return nearest_in(object, instance, ray, hit);
+        }
+        *hit = Hit::MISS;
+        let Some(placed) = self.place(ray) else { return };
+        let world_ray = placed.world_ray();
+        match self.world() {
+            Some(world) => world.store_nearest_of_ray(self.objects(), world_ray, hit),
+            None => self.nearest_of_objects(world_ray, hit),
+        }
+        if self.has_opacity() {
+            self.go_on(world_ray, hit);
+        }
+    }
+
+    /// Stores the nearest hit of a ray in all objects of a file without scene sections, each in world space.
+    fn nearest_of_objects(&self, world_ray: WorldRay<'_>, best: &mut Hit) {
+        for instance in 0..self.object_count() {
+            let tmax = if best.t < world_ray.ray.tmax { best.t } else { world_ray.ray.tmax };
+            let (ray, mut hit) = (Ray { tmax, ..*world_ray.ray }, Hit::MISS);
+            let exact_ray = (&ray, world_ray.start_in(instance));
+            object::store_nearest(self.view(instance), exact_ray, instance, &mut hit);
+            if hit.t < best.t {
+                *best = hit;
+            }
+        }
+    }
+
+    /// Whether a ray hits anything.
+    #[inline(always)]
+    pub(crate) fn any_of_start(&self, ray: &StartRay) -> bool {
+        match self.sole_opaque() {
+            Some(object) => any_in(object, 0, ray),
+            None => self.any_of_start_elsewhere(ray),
+        }
+    }
+
+    /// As [`Self::any_of_start`], in any scene.
+    #[inline(never)]
+    fn any_of_start_elsewhere(&self, ray: &StartRay) -> bool {
+        if !self.has_opacity()
+            && let Some((object, instance)) = self.sole()
+        {
+            return any_in(object, instance, ray);
+        }
+        let Some(placed) = self.place(ray) else { return false };
+        let world_ray = placed.world_ray();
+        if self.has_opacity() {
+            return self.search_any(world_ray, &crate::Accept::default());
+        }
+        match self.world() {
+            Some(world) => world.any_of_ray(self.objects(), world_ray),
+            None => (0..self.object_count())
+                .any(|instance| object::any(self.view(instance), world_ray.exact_in(instance))),
+        }
+    }
+
+    /// Stores the nearest hit of each ray, or [`Hit::MISS`]. `hits` is as long as `rays`.
+    #[inline(never)]
+    pub(crate) fn nearest_of_starts(&self, rays: &[StartRay], hits: &mut [Hit]) {
+        if !self.goes_in_batches(rays) {
+            return rays.iter().zip(hits).for_each(|(ray, hit)| self.nearest_of_start(ray, hit));
+        }
+        object::fill_misses(hits);
+        if let Some((object, instance)) = self.sole() {
+            object::with_scratch(|scratch| {
+                object::starts::nearest_from_starts(object, rays, instance, scratch, hits);
+            });
+        } else if let Some(world) = self.world() {
+            let (world_rays, starts) = self.placed_batch(rays);
+            world.nearest(self.objects(), &world_rays, &starts, hits);
+        }
+        if self.has_opacity() {
+            for (ray, hit) in rays.iter().zip(hits) {
+                if hit.is_hit()
+                    && let Some(placed) = self.place(ray)
+                {
+                    self.go_on(placed.world_ray(), hit);
+                }
+            }
+        }
+    }
+
+    /// Stores for each ray whether it hits anything. `found` is as long as `rays`.
+    #[inline(never)]
+    pub(crate) fn any_of_starts(&self, rays: &[StartRay], found: &mut [bool]) {
+        if !self.goes_in_batches(rays) {
+            return rays.iter().zip(found).for_each(|(ray, found)| *found = self.any_of_start(ray));
+        }
+        found.fill(false);
+        if let Some((object, instance)) = self.sole() {
+            object::with_scratch(|scratch| {
+                object::starts::any_from_starts(object, rays, instance, scratch, found);
+            });
+        } else if let Some(world) = self.world() {
+            let (world_rays, starts) = self.placed_batch(rays);
+            world.any(self.objects(), &world_rays, &starts, found);
+        }
+        if self.has_opacity() {
+            for (ray, found) in rays.iter().zip(found) {
+                *found = *found && self.any_of_start(ray);
+            }
+        }
+    }
+
+    /// Whether rays are traced together. Those through several objects of a file without scene sections are not.
+    fn goes_in_batches(&self, rays: &[StartRay]) -> bool {
+        rays.len() >= object::MIN_BATCH && (self.world().is_some() || self.object_count() == 1)
+    }
+
+    /// The rays of a batch in world space, and their starts.
+    fn placed_batch(&self, rays: &[StartRay]) -> (Vec<Ray>, Vec<InstanceStart>) {
+        let placed = rays.iter().map(|ray| match self.place(ray) {
+            Some(placed) => (placed.ray, placed.start.unwrap_or(InstanceStart::none(placed.ray.origin))),
+            None => (ENDED, InstanceStart::none(ENDED.origin)),
+        });
+        placed.unzip()
+    }
+}
+
+/// Stores the nearest hit of a ray in an instance whose object's space is world space.
+#[inline(always)]
+fn nearest_in(object: &ObjectView<'_>, instance: u32, ray: &StartRay, hit: &mut Hit) {
+    let &StartRay { start, direction, tmax } = ray;
+    match locate(object, start.primitive.triangle_of(instance), [start.u, start.v]) {
+        Ok(point) => {
+            let ray = Ray { origin: point.rounded(), tmin: 0.0, direction, tmax };
+            object::store_nearest(object, (&ray, Some(&point)), instance, hit);
+        }
+        Err(_) => *hit = Hit::MISS,
+    }
+}
+
+/// Whether a ray hits anything in an instance whose object's space is world space.
+#[inline(always)]
+fn any_in(object: &ObjectView<'_>, instance: u32, ray: &StartRay) -> bool {
+    let &StartRay { start, direction, tmax } = ray;
+    locate(object, start.primitive.triangle_of(instance), [start.u, start.v]).is_ok_and(|point| {
+        let ray = Ray { origin: point.rounded(), tmin: 0.0, direction, tmax };
+        object::any(object, (&ray, Some(&point)))
+    })
+}

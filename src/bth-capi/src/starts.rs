@@ -28,8 +28,15 @@ impl Parts<'_> {
         let mut code = OK;
         for first in (0..self.starts.len()).step_by(CHUNK) {
             let count = CHUNK.min(self.starts.len() - first);
-            for (i, ray) in rays[..count].iter_mut().enumerate() {
-                *ray = self.ray(first + i);
+            let part = first..first + count;
+            let of = self.starts[part.clone()].iter().zip(&self.directions[part.clone()]);
+            for (ray, (&start, &direction)) in rays.iter_mut().zip(of) {
+                *ray = start.ray(direction);
+            }
+            if let Some(tmax) = self.tmax {
+                for (ray, &tmax) in rays.iter_mut().zip(&tmax[part]) {
+                    ray.tmax = tmax;
+                }
             }
             // A panic must not unwind into C. After a panic, which would be a defect of the library, rays are reported as misses.
             if catch_unwind(AssertUnwindSafe(|| trace(first, &rays[..count]))).is_err() {

@@ -34,15 +34,25 @@ impl Scene {
     /// As [`Self::nearest_counted`], as if every triangle were opaque.
     fn nearest_of_all_counted(&self, world_ray: WorldRay<'_>) -> (Hit, Steps) {
         if let Some((object, instance)) = self.sole() {
-            return object::nearest_counted(object, world_ray.exact_in(instance), instance);
+            return world_ray.in_object(
+                instance,
+                world_ray.ray,
+                |start| object::nearest_counted(object, start, instance),
+                |ray| object::nearest_counted(object, ray, instance),
+            );
         }
         if let Some(world) = self.world() {
             return world.nearest_counted(self.objects(), world_ray);
         }
         let (mut best, mut steps, mut ray) = (Hit::MISS, Steps::default(), *world_ray.ray);
         for instance in 0..self.object_count() {
-            let exact_ray = (&ray, world_ray.start_in(instance));
-            let (hit, object_steps) = object::nearest_counted(self.view(instance), exact_ray, instance);
+            let object = self.view(instance);
+            let (hit, object_steps) = world_ray.in_object(
+                instance,
+                &ray,
+                |start| object::nearest_counted(object, start, instance),
+                |ray| object::nearest_counted(object, ray, instance),
+            );
             steps += object_steps;
             if hit.t < best.t {
                 (best, ray.tmax) = (hit, hit.t);
@@ -58,7 +68,7 @@ impl Scene {
     #[inline(always)]
     pub(crate) fn nearest_of_ray(&self, ray: &Ray, hit: &mut Hit) {
         match self.sole_opaque() {
-            Some(object) => object::store_nearest(object, (ray, None), 0, hit),
+            Some(object) => object::store_nearest(object, ray, 0, hit),
             None => self.nearest_of_ray_elsewhere(ray, hit),
         }
     }
@@ -68,7 +78,7 @@ impl Scene {
     fn nearest_of_ray_elsewhere(&self, ray: &Ray, hit: &mut Hit) {
         if !self.has_opacity() {
             if let Some((object, instance)) = self.sole() {
-                return object::store_nearest(object, (ray, None), instance, hit);
+                return object::store_nearest(object, ray, instance, hit);
             }
             if let Some(world) = self.world() {
                 return world.store_nearest_of_ray(self.objects(), WorldRay::plain(ray), hit);
@@ -81,7 +91,7 @@ impl Scene {
     #[inline(always)]
     pub(crate) fn any_of_ray(&self, ray: &Ray) -> bool {
         match self.sole_opaque() {
-            Some(object) => object::any(object, (ray, None)),
+            Some(object) => object::any(object, ray),
             None => self.any_of_ray_elsewhere(ray),
         }
     }
@@ -91,7 +101,7 @@ impl Scene {
     fn any_of_ray_elsewhere(&self, ray: &Ray) -> bool {
         if !self.has_opacity() {
             if let Some((object, _)) = self.sole() {
-                return object::any(object, (ray, None));
+                return object::any(object, ray);
             }
             if let Some(world) = self.world() {
                 return world.any_of_ray(self.objects(), WorldRay::plain(ray));
@@ -117,7 +127,7 @@ impl Scene {
         if let Some((object, instance)) = self.sole() {
             if rays.len() < object::MIN_BATCH {
                 for (ray, hit) in rays.iter().zip(hits) {
-                    *hit = object::nearest(object, (ray, None), instance);
+                    *hit = object::nearest(object, ray, instance);
                 }
                 return;
             }
@@ -140,7 +150,7 @@ impl Scene {
                 // Not `f32::min`, which would replace a `tmax` of NaN by a number.
                 let tmax = if best.t < ray.tmax { best.t } else { ray.tmax };
                 let ray = Ray { tmax, ..*ray };
-                let hit = object::nearest(object, (&ray, None), instance);
+                let hit = object::nearest(object, &ray, instance);
                 if hit.t < best.t {
                     *best = hit;
                 }
@@ -163,7 +173,7 @@ impl Scene {
         if let Some((object, instance)) = self.sole() {
             if rays.len() < object::MIN_BATCH {
                 for (ray, found) in rays.iter().zip(found) {
-                    *found = object::any(object, (ray, None));
+                    *found = object::any(object, ray);
                 }
                 return;
             }
@@ -183,7 +193,7 @@ impl Scene {
         for instance in 0..self.object_count() {
             let object = self.view(instance);
             for (ray, found) in rays.iter().zip(found.iter_mut()) {
-                *found = *found || object::any(object, (ray, None));
+                *found = *found || object::any(object, ray);
             }
         }
     }

@@ -1,13 +1,14 @@
 //! Candidates: triangles that the f32 filter does not exclude, and their decision in f64 or in exact arithmetic.
 
+use super::leaf::ExactRay;
 use super::nodes;
-use crate::intersect::exact::{Estimate, Intersection, estimate, wide};
+use crate::intersect::exact::{Estimate, Intersection, estimate, in_pairs, wide};
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::line::Line;
 use crate::intersect::start::{ExactStart, StartDecision, StartPoint, decide_start, decide_start_exactly};
 use crate::query::{Query, TriangleRef};
 use crate::rays::Ray;
-use crate::simd::{Scalar, Simd};
+use crate::simd::{Part, Scalar, Simd};
 use bth_format::layout::{Child, NONE};
 use bth_format::object::ObjectView;
 
@@ -76,48 +77,66 @@ impl Reader for ReadCorners {
 }
 
 /// Offers candidates of a ray to its query: the pending hit, then the triangles of the leaf with child code `leaf` whose bit is set
-/// in `triangles`. `start` is where the ray starts on a triangle of the object. Returns whether the query is complete. All traversals
-/// decide here, in f64 and where that is uncertain exactly, what the f32 filter leaves open.
-#[inline(never)]
-pub(crate) fn settle<Q: Query>(
-    object: &ObjectView<'_>,
-    (ray, start): (&Ray, Option<&StartPoint>),
-    pending: Candidate,
-    (leaf, mut triangles): (u32, u32),
-    query: &mut Q,
-) -> bool {
-    let mut candidate = pending;
-    loop {
-        if candidate.leaf != NONE
-            && match start {
-                None => settle_one(object, ray, candidate, query),
-                Some(start) => settle_from_start(object, (ray, start), candidate, query),
+/// in `triangles`. Its output is whether the query is complete. All traversals decide here, in f64 and where that is uncertain exactly,
+/// what the f32 filter leaves open.
+pub(crate) struct Settle<'a, Q> {
+    pub(crate) object: &'a ObjectView<'a>,
+    pub(crate) ray: ExactRay<'a>,
+    pub(crate) pending: Candidate,
+    /// `leaf` and `triangles`.
+    pub(crate) of_leaf: (u32, u32),
+    pub(crate) query: &'a mut Q,
+}
+
+impl<S: Simd, Q: Query> Part<S> for Settle<'_, Q> {
+    type Output = bool;
+    #[inline(always)]
+    fn run(self, s: S) -> bool {
+        let Settle { object, ray: (ray, start), pending, of_leaf: (leaf, mut triangles), query } = self;
+        let mut candidate = pending;
+        loop {
+            if candidate.leaf != NONE {
+                let is_complete = match start {
+                    None => settle_one(s, object, ray, candidate, query),
+                    Some(start) => settle_from_start(object, (ray, start), candidate, query),
+                };
+                if is_complete {
+                    return true;
+                }
             }
-        {
-            return true;
+            if triangles == 0 {
+                return false;
+            }
+            candidate = Candidate { leaf, triangle: triangles.trailing_zeros() };
+            triangles &= triangles - 1;
         }
-        if triangles == 0 {
-            return false;
-        }
-        candidate = Candidate { leaf, triangle: triangles.trailing_zeros() };
-        triangles &= triangles - 1;
     }
 }
 
 /// Offers a candidate of a ray to its query; returns whether the query is complete.
 #[inline(always)]
-pub(crate) fn settle_one<Q: Query>(
+fn settle_one<S: Simd, Q: Query>(
+    s: S,
     object: &ObjectView<'_>,
     ray: &Ray,
     candidate: Candidate,
     query: &mut Q,
 ) -> bool {
     let Some((index, corners)) = candidate.read(object, ReadCorners) else { return false };
-    let intersection = match estimate(wide(ray.origin), wide(ray.direction), corners.map(wide)) {
+    let mut wide_corners = [[0.0; 3]; 3];
+    for c in 0..3 {
+        for k in 0..3 {
+            wide_corners[c][k] = f64::from(corners[c][k]);
+        }
+    }
+    let intersection = match estimate(wide(ray.origin), wide(ray.direction), wide_corners) {
         Estimate::Missed => None,
         Estimate::Intersects(intersection) => Some(intersection),
         Estimate::Open(_, t) if !query.may_matter(t) => None,
-        Estimate::Open(..) => intersect_candidate_exactly(object, ray, candidate),
+        Estimate::Open(uncertain, _) => match in_pairs(s.doubles(), ray.origin, corners, &uncertain) {
+            Some(intersection) => Some(intersection),
+            None => intersect_candidate_exactly(object, ray, candidate),
+        },
     };
     intersection
         .is_some_and(|intersection| query.offer(TriangleRef::index(index, object.triangle_ids), intersection))

@@ -1,6 +1,6 @@
 //! The answer of a single ray whose nearest hit is certain: t, u and v in f64, as [`super::deferred`] computes them for sixteen rays.
 
-use super::candidate::{Candidate, settle};
+use super::candidate::{Candidate, Settle};
 use super::leaf::ExactRay;
 use crate::intersect::exact::{reported, reported_barycentric};
 use crate::intersect::exact_quad::rounded_intersection;
@@ -36,18 +36,9 @@ pub(crate) fn store_certain_hit<S: Simd, Q: Query>(
             return;
         }
     }
-    *answer = decided_hit::<Q>(object, exact_ray, candidate, (goal, instance));
-}
-
-/// The answer, for leaves of other formats, for rays that start on a triangle, and where f64 leaves t, u or v inaccurate.
-#[inline(never)]
-fn decided_hit<Q: Query>(
-    object: &ObjectView<'_>,
-    ray: ExactRay<'_>,
-    candidate: Candidate,
-    (goal, instance): (Q::Goal, u32),
-) -> Q::Answer {
-    let mut query = Q::new(goal, ray.0);
-    settle(object, ray, candidate, (NONE, 0), &mut query);
-    query.answer(object.triangle_ids, instance)
+    // Leaves of other formats, rays that start on a triangle, and where f64 leaves t, u or v inaccurate.
+    let mut query = Q::new(goal, exact_ray.0);
+    let (pending, of_leaf) = (candidate, (NONE, 0));
+    s.call(Settle { object, ray: exact_ray, pending, of_leaf, query: &mut query });
+    *answer = query.answer(object.triangle_ids, instance);
 }

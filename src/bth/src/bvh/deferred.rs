@@ -2,7 +2,7 @@
 
 use super::leaf::Progress;
 use super::ray_state::RayState;
-use crate::bvh::candidate::{Candidate, Reader, settle};
+use crate::bvh::candidate::{Candidate, Reader, Settle};
 use crate::intersect::exact::RoundedOrigin;
 use crate::intersect::exact_lanes::{Intersections, Pairs};
 use crate::intersect::filter::TriangleBlock;
@@ -155,7 +155,8 @@ impl DeferredHits {
             let index = self.ray[lane] as usize;
             let (ray, start) = (&rays[index], starts.of(index));
             let mut query = Q::new(sink.goal(), ray);
-            settle(object, (ray, start), self.candidate[lane], (NONE, 0), &mut query);
+            let (ray, pending, of_leaf) = ((ray, start), self.candidate[lane], (NONE, 0));
+            s.call(Settle { object, ray, pending, of_leaf, query: &mut query });
             sink.query(self.ray[lane] as usize, &query);
         }
     }

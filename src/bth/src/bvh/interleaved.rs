@@ -10,10 +10,11 @@ use super::ray_pool::{POOL_SIZE, RareSteps, RayPool, Slot, has_rare_steps};
 use super::ray_state::RayState;
 use super::stack::{StackPosition, Stacks};
 use crate::intersect::prepare::Prepared;
+use crate::intersect::start::Starts;
 use crate::query::sink::Sink;
 use crate::query::{EitherQuery, Query};
 use crate::rays::Ray;
-use crate::simd::{CacheLevel, LANES, Simd};
+use crate::simd::{CacheLevel, LANES, Scalar, Simd};
 use bth_format::layout::{Child, NONE, WIDTH, WideNode};
 use bth_format::object::ObjectBounds;
 use bth_format::object::ObjectView;
@@ -60,6 +61,8 @@ struct RaySource<'a> {
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
     remaining: RemainingRays<'a>,
+    /// Where the rays start.
+    starts: Starts<'a>,
     /// Child code at which rays start.
     root: u32,
     bounds: ObjectBounds,
@@ -78,11 +81,12 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
     #[inline(always)]
     pub(crate) fn run<S: Simd>(self, s: S, mut tets: impl FnMut(u32, ExactRay<'_>, &mut Q) -> bool) {
         let Interleaved { object, rays, remaining, stacks, sink, entry_nodes } = self;
-        let walked = remaining.walked;
+        let (walked, starts) = (remaining.walked, sink.starts());
         let mut source = RaySource {
             object,
             rays,
             remaining,
+            starts,
             root: root(object),
             bounds: object.bounds,
             prepared: Prepared::new(),
@@ -99,7 +103,7 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
             taken: 0,
         };
         let mut deferred = DeferredHits::new();
-        let (goal, starts) = (sink.goal(), sink.starts());
+        let goal = sink.goal();
         let mut slots = [Slot::vacant(goal); POOL_SIZE];
         let mut pool = RayPool::new(object, &mut slots, stacks, goal);
         let has_rare_steps = has_rare_steps(object);
@@ -194,7 +198,11 @@ impl RaySource<'_> {
         for lane in 0..count {
             let mut may_hit = true;
             if let (Some(prepared), Some(root)) = (self.prepared.prepared(lane), root) {
-                let (bits, enter) = prepared.slabs.children(s, root, prepared.slabs.last);
+                let (mut bits, enter) = prepared.slabs.children(s, root, prepared.slabs.last);
+                if let Some(start) = self.starts.of(self.ray[lane] as usize) {
+                    let ray = &self.rays[self.ray[lane] as usize];
+                    bits &= !prepared.slabs.left_behind(s, root, ray, start);
+                }
                 s.store(enter, &mut self.enter[lane % LANES]);
                 self.children[lane % LANES] = bits;
                 may_hit = bits != 0;
@@ -269,7 +277,7 @@ fn enter_tets<Q: Query>(
         stacks.set_code(top, subtree);
         return LeafOutcome::Replaced;
     }
-    decide(object, ray, &object.bounds, state, (NONE, 0));
+    decide(Scalar, object, ray, &object.bounds, state, (NONE, 0));
     if tets(row, ray, state.query(ray.0)) {
         LeafOutcome::Done
     } else {

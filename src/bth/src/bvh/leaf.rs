@@ -3,10 +3,10 @@
 //! The conservative f32 filter ([`TriangleFilter`](crate::intersect::filter::TriangleFilter)) excludes the triangles that are
 //! certainly missed. A triangle that is certainly hit, and certainly nearer than all hits before, becomes the pending hit: its
 //! t, u and v are computed when the traversal has ended, since most rays find several hits, each nearer than the one before.
-//! The other triangles are decided at once, in f64 or exactly ([`settle`]). Packets take the same decisions with one ray in each
-//! lane (`bvh/packet/leaf.rs`), and share [`settle`].
+//! The other triangles are decided at once, in f64 or exactly ([`Settle`]). Packets take the same decisions with one ray in each
+//! lane (`bvh/packet/leaf.rs`), and share [`Settle`].
 
-use crate::bvh::candidate::{Candidate, settle};
+use crate::bvh::candidate::{Candidate, Settle};
 use crate::intersect::filter::{Certain, TriangleBlock};
 use crate::intersect::prepare::PreparedRay;
 use crate::intersect::start::StartPoint;
@@ -97,7 +97,7 @@ pub(crate) fn enter_leaf<'r, S: Simd, Q: Query, B: TriangleBlock>(
             progress.accept();
             return LeafOutcome::Done;
         }
-        return decide(object, ray, bounds, progress, (code, found.maybe));
+        return decide(s, object, ray, bounds, progress, (code, found.maybe));
     }
     let (maybe, certain) = found.nearest_candidates(s);
     if let Some(Certain { triangle, near, far }) = certain
@@ -111,12 +111,13 @@ pub(crate) fn enter_leaf<'r, S: Simd, Q: Query, B: TriangleBlock>(
         progress.set_last(if nearer { far } else { progress.last() });
         return if nearer { LeafOutcome::Nearer } else { LeafOutcome::Nothing };
     }
-    decide(object, ray, bounds, progress, (code, maybe))
+    decide(s, object, ray, bounds, progress, (code, maybe))
 }
 
 /// Decides the triangles of a leaf, given as its child code and their bits, and before them the pending hit.
 #[inline(always)]
-pub(crate) fn decide<Q: Query>(
+pub(crate) fn decide<S: Simd, Q: Query>(
+    s: S,
     object: &ObjectView<'_>,
     ray: ExactRay<'_>,
     bounds: &ObjectBounds,
@@ -125,7 +126,8 @@ pub(crate) fn decide<Q: Query>(
 ) -> LeafOutcome {
     let pending = progress.pending();
     progress.set_pending(Candidate::NONE);
-    if settle(object, ray, pending, triangles, progress.query(ray.0)) {
+    let query = progress.query(ray.0);
+    if s.call(Settle { object, ray, pending, of_leaf: triangles, query }) {
         return LeafOutcome::Done;
     }
     progress.update_from_query(ray.0, bounds.origin_error)

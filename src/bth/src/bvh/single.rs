@@ -150,7 +150,7 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
                         continue;
                     }
                     count.leaf();
-                    decide(object, ray, bounds, &mut state, (NONE, 0));
+                    decide(s, object, ray, bounds, &mut state, (NONE, 0));
                     let done = tets(row, state.query(ray.0), count) == TetOutcome::Done;
                     state.update_from_query(ray.0, bounds.origin_error);
                     done

@@ -242,7 +242,12 @@ impl SceneQuery for SceneNearest<'_> {
         for &visit in visits {
             let i = visit.ray as usize;
             let ray = batch.object_ray(visit, batch.rays[i].tmax.min(self.hits[i].t));
-            let hit = object::nearest(object, (&ray.ray, batch.start(visit)), visit.instance);
+            let hit = batch.in_object(
+                visit,
+                &ray.ray,
+                |start| object::nearest(object, start, visit.instance),
+                |ray| object::nearest(object, ray, visit.instance),
+            );
             self.hits[i] = better(&batch.rays[i], &self.hits[i], &hit, ray.t_scale).unwrap_or(self.hits[i]);
         }
     }
@@ -266,7 +271,12 @@ impl SceneQuery for SceneAny<'_> {
         for &visit in visits {
             let i = visit.ray as usize;
             let ray = batch.object_ray(visit, self.rays[i].tmax);
-            self.found[i] |= object::any(object, (&ray.ray, batch.start(visit)));
+            self.found[i] |= batch.in_object(
+                visit,
+                &ray.ray,
+                |start| object::any(object, start),
+                |ray| object::any(object, ray),
+            );
         }
     }
     fn trace_placed(&mut self, of_object: ObjectVisits<'_>, object_rays: &ObjectRays) {

@@ -3,7 +3,6 @@
 use super::World;
 use crate::bvh::coherence::is_same_octant;
 use crate::bvh::packet;
-use crate::intersect::start::StartPoint;
 use crate::nodes::affine::ObjectRay;
 use crate::object;
 use crate::objects::Objects;
@@ -34,8 +33,6 @@ struct Entered<'a> {
     object: &'a ObjectView<'a>,
     /// The ray in the space of the object.
     ray: ObjectRay,
-    /// Where it starts, if that is on a triangle of this instance.
-    start: Option<&'a StartPoint>,
 }
 
 impl World {
@@ -53,20 +50,28 @@ impl World {
     /// Stores the nearest hit of a ray, or [`Hit::MISS`], as [`Self::nearest`] does for many.
     #[inline(never)]
     pub(crate) fn store_nearest_of_ray(&self, objects: &Objects, ray: WorldRay<'_>, best: &mut Hit) {
-        self.nearest_by((objects, ray), best, |entered, instance, hit| {
-            let exact_ray = (&entered.ray.ray, entered.start);
-            object::store_nearest(entered.object, exact_ray, instance, hit);
+        self.nearest_by((objects, ray), best, |&Entered { object, ray: of_object }, instance, hit| {
+            *hit = ray.in_object(
+                instance,
+                &of_object.ray,
+                |start| object::nearest(object, start, instance),
+                |ray| object::nearest(object, ray, instance),
+            );
         });
     }
 
     /// As [`Self::store_nearest_of_ray`], with the statistics of the traversal of objects.
     pub(crate) fn nearest_counted(&self, objects: &Objects, ray: WorldRay<'_>) -> (Hit, Steps) {
         let (mut best, mut steps) = (Hit::MISS, Steps::default());
-        self.nearest_by((objects, ray), &mut best, |entered, instance, hit| {
-            let of_object;
-            let exact_ray = (&entered.ray.ray, entered.start);
-            (*hit, of_object) = object::nearest_counted(entered.object, exact_ray, instance);
-            steps += of_object;
+        self.nearest_by((objects, ray), &mut best, |&Entered { object, ray: of_object }, instance, hit| {
+            let counted = ray.in_object(
+                instance,
+                &of_object.ray,
+                |start| object::nearest_counted(object, start, instance),
+                |ray| object::nearest_counted(object, ray, instance),
+            );
+            *hit = counted.0;
+            steps += counted.1;
         });
         (best, steps)
     }
@@ -99,8 +104,14 @@ impl World {
     pub(crate) fn any_of_ray(&self, objects: &Objects, ray: WorldRay<'_>) -> bool {
         self.enumerate(ray.ray, &mut |instance| {
             let entered = self.enter(objects, instance, ray);
-            let exact_ray = (&entered.ray.ray, entered.start);
-            (!object::any(entered.object, exact_ray)).then_some(ray.ray.tmax)
+            let object = entered.object;
+            let is_hit = ray.in_object(
+                instance,
+                &entered.ray.ray,
+                |start| object::any(object, start),
+                |ray| object::any(object, ray),
+            );
+            (!is_hit).then_some(ray.ray.tmax)
         })
     }
 
@@ -112,7 +123,6 @@ impl World {
         Entered {
             object: objects.view(placement.object()),
             ray: placement.inverse.ray_from(world_ray.ray, start),
-            start,
         }
     }
 }

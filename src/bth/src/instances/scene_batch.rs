@@ -5,8 +5,8 @@ use crate::intersect::start::StartPoint;
 use crate::nodes::affine::ObjectRay;
 use crate::objects::Objects;
 use crate::query::sink::Visit;
-use crate::rays::Ray;
-use crate::starts::placed::InstanceStart;
+use crate::rays::{Ray, StartRay};
+use crate::starts::placed::{InstanceStart, WorldRay};
 
 /// A batch of rays in world space, and the scene that they go through.
 pub(super) struct SceneBatch<'a> {
@@ -22,6 +22,19 @@ impl SceneBatch<'_> {
     pub(super) fn object_ray(&self, visit: Visit, tmax: f32) -> ObjectRay {
         let ray = Ray { tmax, ..self.rays[visit.ray as usize] };
         self.world.placement(visit.instance).inverse.ray_from(&ray, self.start(visit))
+    }
+
+    /// As [`WorldRay::in_object`], for the ray of a visit.
+    pub(super) fn in_object<T>(
+        &self,
+        visit: Visit,
+        ray: &Ray,
+        start: impl FnOnce(&StartRay) -> T,
+        plain: impl FnOnce(&Ray) -> T,
+    ) -> T {
+        let index = visit.ray as usize;
+        let world_ray = WorldRay { ray: &self.rays[index], start: self.starts.get(index) };
+        world_ray.in_object(visit.instance, ray, start, plain)
     }
 
     /// Where the ray of a visit starts, if that is on a triangle of the instance.

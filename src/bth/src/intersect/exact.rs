@@ -16,6 +16,8 @@
 
 use crate::intersect::line::Line;
 pub(crate) use crate::intersect::line::RATIO_ERROR;
+use crate::intersect::pairs;
+use crate::simd::{Doubles, PlainDoubles};
 use bth_format::exact::{EDGE_PARTS, Expansion, VOLUME_PARTS};
 
 /// 128u, more than the 98u above: bounds the error of weights relative to Dm(m+r) and that of the volume relative to rm².
@@ -315,6 +317,26 @@ pub(crate) fn wide(v: [f32; 3]) -> [f64; 3] {
     v.map(f64::from)
 }
 
+/// The intersection of a line that certainly crosses a triangle, where f64 leaves only the volume inaccurate: with the volume in pairs.
+/// `None` if more than that is uncertain.
+#[inline(always)]
+pub(crate) fn in_pairs<D: Doubles>(
+    s: D,
+    origin: [f32; 3],
+    corners: [[f32; 3]; 3],
+    &UncertainWeights { rounded, weight: [first, second, third], bound }: &UncertainWeights,
+) -> Option<Intersection> {
+    let least = lesser(lesser(first, second), third);
+    let greatest = greater(greater(first, second), third);
+    let is_inside = (least > bound) | (greatest < -bound);
+    let [.., determinant] = rounded.weight;
+    if !is_inside || determinant.abs() <= INVERSE_RATIO_ERROR * bound {
+        return None;
+    }
+    let volume = pairs::volume(s, origin, corners)?;
+    Some(Intersection { t: volume * rounded.inverse, weight: rounded.weight })
+}
+
 /// Decides a triangle that f64 leaves uncertain: uncertain weights are replaced by exact ones, and t, u and v are computed from exact
 /// sums unless the f64 values are accurate. `edge` returns the exact weight of the corner opposite an edge, or its product with a
 /// positive number; `exact` the intersection from exact sums.
@@ -344,8 +366,14 @@ impl Line {
         match estimate(self.origin, self.direction, corners.map(wide)) {
             Estimate::Missed => None,
             Estimate::Intersects(intersection) => Some(intersection),
-            Estimate::Open(uncertain, _) => self.decide_uncertain(corners.map(wide), &uncertain),
+            Estimate::Open(uncertain, _) => in_pairs(PlainDoubles, self.f32_origin(), corners, &uncertain)
+                .or_else(|| self.decide_uncertain(corners.map(wide), &uncertain)),
         }
+    }
+
+    /// The origin, which is one of f32 unless the ray starts on a triangle.
+    fn f32_origin(&self) -> [f32; 3] {
+        self.origin.map(|x| x as f32)
     }
 
     #[cold]

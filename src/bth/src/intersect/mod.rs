@@ -17,6 +17,7 @@ pub(crate) mod exact_lanes;
 pub(crate) mod exact_quad;
 pub(crate) mod filter;
 pub(crate) mod line;
+mod pairs;
 pub(crate) mod point_exact;
 pub(crate) mod point_lanes;
 pub(crate) mod point_triangle;

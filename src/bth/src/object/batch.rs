@@ -201,11 +201,11 @@ fn one_by_one<Q: Query>(
     remaining: &RemainingRays<'_>,
     sink: &mut Sink<'_, Q>,
 ) {
-    // Without vectors no walk is compiled, so no ray has been walked before.
+    // Without vectors no walk is compiled, so no ray has been walked before, and rays that start on triangles are not traced together.
     let trace = |index: usize, sink: &mut Sink<'_, Q>| {
         let (goal, instance, mut answer) = (sink.goal(), sink.instance_of(index), Answer::MISS);
-        let (count, ray) = (&mut Uncounted::default(), (&rays[index], sink.starts().of(index)));
-        single::trace::<Q, _>((object, goal), ray, instance, count, &mut answer);
+        let count = &mut Uncounted::default();
+        single::trace::<Q, _, _>((object, goal), &rays[index], instance, count, &mut answer);
         sink.answer(index, answer);
     };
     match remaining.order {

@@ -9,15 +9,14 @@ mod walked_batch;
 pub(crate) use batch::{MIN_BATCH, any_batch, fill_misses, nearest_batch, trace_batch};
 pub(crate) use scratch::{Scratch, with_scratch};
 
-use self::single::trace;
-use crate::bvh::leaf::ExactRay;
+use self::single::{SingleRay, trace};
 use crate::query::{ANY, Answer, AnyQuery, NEAREST, NearestQuery, Steps, Uncounted};
 use crate::rays::Hit;
 use bth_format::object::ObjectView;
 
 /// Nearest hit of a ray in object space; `instance` is reported with a hit.
 #[inline(never)]
-pub(crate) fn nearest(object: &ObjectView<'_>, ray: ExactRay<'_>, instance: u32) -> Hit {
+pub(crate) fn nearest<R: SingleRay>(object: &ObjectView<'_>, ray: &R, instance: u32) -> Hit {
     let mut hit = Hit::MISS;
     store_nearest(object, ray, instance, &mut hit);
     hit
@@ -25,21 +24,21 @@ pub(crate) fn nearest(object: &ObjectView<'_>, ray: ExactRay<'_>, instance: u32)
 
 /// As [`nearest`], but stores the hit in `hit`, which avoids a copy.
 #[inline(never)]
-pub(crate) fn store_nearest(object: &ObjectView<'_>, ray: ExactRay<'_>, instance: u32, hit: &mut Hit) {
-    trace::<NearestQuery, Uncounted>((object, NEAREST), ray, instance, &mut Uncounted::default(), hit);
+pub(crate) fn store_nearest<R: SingleRay>(object: &ObjectView<'_>, ray: &R, instance: u32, hit: &mut Hit) {
+    trace::<NearestQuery, Uncounted, R>((object, NEAREST), ray, instance, &mut Uncounted::default(), hit);
 }
 
 /// As [`nearest`], with the statistics of the traversal.
-pub(crate) fn nearest_counted(object: &ObjectView<'_>, ray: ExactRay<'_>, instance: u32) -> (Hit, Steps) {
+pub(crate) fn nearest_counted<R: SingleRay>(object: &ObjectView<'_>, ray: &R, instance: u32) -> (Hit, Steps) {
     let (mut hit, mut steps) = (Hit::MISS, Steps::default());
-    trace::<NearestQuery, Steps>((object, NEAREST), ray, instance, &mut steps, &mut hit);
+    trace::<NearestQuery, Steps, R>((object, NEAREST), ray, instance, &mut steps, &mut hit);
     (hit, steps)
 }
 
 /// Whether a ray in object space hits anything.
 #[inline(never)]
-pub(crate) fn any(object: &ObjectView<'_>, ray: ExactRay<'_>) -> bool {
+pub(crate) fn any<R: SingleRay>(object: &ObjectView<'_>, ray: &R) -> bool {
     let mut found = Answer::MISS;
-    trace::<AnyQuery, Uncounted>((object, ANY), ray, 0, &mut Uncounted::default(), &mut found);
+    trace::<AnyQuery, Uncounted, R>((object, ANY), ray, 0, &mut Uncounted::default(), &mut found);
     Answer::is_hit(&found)
 }

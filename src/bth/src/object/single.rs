@@ -5,23 +5,97 @@ use crate::bvh::leaf::ExactRay;
 use crate::bvh::single::{SingleResult, trace_single};
 use crate::bvh::single_stack::SingleStack;
 use crate::intersect::prepare::PreparedRay;
+use crate::intersect::start::StartPoint;
 use crate::query::{Answer, Count, Query};
+use crate::rays::{Ray, StartRay};
 use crate::simd::{Isa, Kernel, Simd};
+use crate::starts::locate::locate;
 use crate::tets::enter_tets;
 use bth_format::layout::NONE;
-use bth_format::object::ObjectView;
+use bth_format::object::{ObjectBounds, ObjectView};
+use glam::Vec4;
+
+/// A ray in the space of an object, as a kernel takes it. There are no closures, which might be compiled without the instruction set of the
+/// kernel.
+pub(crate) trait SingleRay {
+    /// What is computed of the ray at first.
+    type Line;
+    /// Computes it; `None` if the ray hits nothing.
+    fn line(&self, object: &ObjectView<'_>) -> Option<Self::Line>;
+    /// The ray for decisions in f64.
+    fn exact<'a>(&'a self, line: &'a Self::Line) -> ExactRay<'a>;
+    /// The bounds for which the ray is prepared, which may be stored in `place`.
+    fn bounds<'a>(object: &'a ObjectView<'_>, place: &'a mut ObjectBounds) -> &'a ObjectBounds;
+    /// Prepares the ray for boxes and triangles, if f32 can.
+    fn prepared<S: Simd>(&self, s: S, line: &Self::Line, bounds: &ObjectBounds) -> Option<PreparedRay>;
+}
+
+impl SingleRay for Ray {
+    type Line = ();
+    #[inline(always)]
+    fn line(&self, _object: &ObjectView<'_>) -> Option<()> {
+        Some(())
+    }
+    #[inline(always)]
+    fn exact<'a>(&'a self, _line: &'a ()) -> ExactRay<'a> {
+        (self, None)
+    }
+    #[inline(always)]
+    fn bounds<'a>(object: &'a ObjectView<'_>, _place: &'a mut ObjectBounds) -> &'a ObjectBounds {
+        &object.bounds
+    }
+    #[inline(always)]
+    fn prepared<S: Simd>(&self, s: S, _line: &(), bounds: &ObjectBounds) -> Option<PreparedRay> {
+        PreparedRay::of(s, bounds, self)
+    }
+}
+
+/// A ray from a start, and its floats as rows of four.
+pub(crate) struct StartLine {
+    rows: [Vec4; 2],
+    ray: Ray,
+    point: StartPoint,
+}
+
+/// A ray whose direction is in the space of the object.
+impl SingleRay for StartRay {
+    type Line = StartLine;
+    #[inline(always)]
+    fn line(&self, object: &ObjectView<'_>) -> Option<StartLine> {
+        let &StartRay { start, direction: [dx, dy, dz], tmax } = self;
+        let point = locate(object, start).ok()?;
+        // Vectors are made in registers: loading what was just written word by word would stall.
+        let [x, y, z] = point.rounded();
+        let rows = [Vec4::new(x, y, z, 0.0), Vec4::new(dx, dy, dz, tmax)];
+        let floats = [rows[0].to_array(), rows[1].to_array()];
+        Some(StartLine { rows, ray: zerocopy::transmute!(floats), point })
+    }
+    #[inline(always)]
+    fn exact<'a>(&'a self, line: &'a StartLine) -> ExactRay<'a> {
+        (&line.ray, Some(&line.point))
+    }
+    #[inline(always)]
+    fn bounds<'a>(object: &'a ObjectView<'_>, place: &'a mut ObjectBounds) -> &'a ObjectBounds {
+        *place = object.bounds.for_starts();
+        place
+    }
+    #[inline(always)]
+    fn prepared<S: Simd>(&self, s: S, line: &StartLine, bounds: &ObjectBounds) -> Option<PreparedRay> {
+        PreparedRay::of_rows(s, bounds, line.rows, &line.ray)
+    }
+}
 
 /// Traces one ray and stores its answer. `instance` is reported with a hit.
 #[inline(always)]
-pub(crate) fn trace<Q: Query, C: Count>(
+pub(crate) fn trace<Q: Query, C: Count, R: SingleRay>(
     (object, goal): (&ObjectView<'_>, Q::Goal),
-    ray: ExactRay<'_>,
+    ray: &R,
     instance: u32,
     count: &mut C,
     answer: &mut Q::Answer,
 ) {
     // The kernel is passed by reference, because a copy of fields that were just written would stall.
-    let kernel = &mut SingleKernel::<Q, C> { object, goal, ray, instance, count, answer };
+    let kernel = &mut SingleKernel::<Q, C, R> { object, goal, ray, instance, count, answer };
     // Where nothing but the kernel is called, the registers need not be saved a second time.
     match Isa::already_chosen() {
         Some(isa) => isa.run_found(kernel),
@@ -32,72 +106,59 @@ pub(crate) fn trace<Q: Query, C: Count>(
 /// Runs the kernel where no instruction set is chosen.
 #[cold]
 #[inline(never)]
-fn run_first<Q: Query, C: Count>(kernel: &mut SingleKernel<'_, Q, C>) {
+fn run_first<Q: Query, C: Count, R: SingleRay>(kernel: &mut SingleKernel<'_, Q, C, R>) {
     Isa::chosen().run(kernel);
 }
 
 /// The kernel of [`trace`]: all that is done for a ray, so that little is passed through memory.
-struct SingleKernel<'a, Q: Query, C> {
+struct SingleKernel<'a, Q: Query, C, R> {
     object: &'a ObjectView<'a>,
     goal: Q::Goal,
-    ray: ExactRay<'a>,
+    ray: &'a R,
     instance: u32,
     count: &'a mut C,
     answer: &'a mut Q::Answer,
 }
 
-impl<Q: Query, C: Count> Kernel for &mut SingleKernel<'_, Q, C> {
+impl<Q: Query, C: Count, R: SingleRay> Kernel for &mut SingleKernel<'_, Q, C, R> {
     type Output = ();
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let SingleKernel { object, goal, ray, instance, count, answer } = self;
-        let (object, ray) = (*object, *ray);
-        let mut query: Option<Q> = None;
-        let result = if object.header.root == NONE {
-            SingleResult::OfQuery
-        } else {
-            through_bvh(s, (object, ray), (*goal, &mut query), *count)
+        let (object, goal, instance) = (*object, *goal, *instance);
+        let line = if object.header.root == NONE { None } else { ray.line(object) };
+        let Some(line) = line else {
+            **answer = Answer::MISS;
+            return;
         };
+        let mut place = ObjectBounds::default();
+        let (bounds, ray_of_line) = (R::bounds(object, &mut place), ray.exact(&line));
+        let prepared = match ray.prepared(s, &line, bounds) {
+            Some(prepared) => prepared,
+            None => match PreparedRay::in_f64(bounds, ray_of_line.0) {
+                Some(prepared) => prepared,
+                None => {
+                    **answer = Answer::MISS;
+                    return;
+                }
+            },
+        };
+        let (mut query, mut stack): (Option<Q>, _) = (None, SingleStack::new());
+        let tets = |leaf, query: &mut Q, count: &mut C| enter_tets(object, leaf, ray_of_line, query, count);
+        let (of, prepared) = ((object, ray_of_line), (&prepared, bounds));
         // The answer is written in place: a copy of what was just written word by word would stall.
-        match result {
+        match trace_single(s, of, prepared, (goal, &mut query), &mut stack, *count, tets) {
             SingleResult::Accepted => **answer = Q::ACCEPTED,
             SingleResult::Certain(candidate, norm) => {
-                let place = (&mut **answer, *instance);
-                store_certain_hit::<S, Q>(s, object, ray, (candidate, norm), *goal, place);
+                let place = (&mut **answer, instance);
+                store_certain_hit::<S, Q>(s, object, ray_of_line, (candidate, norm), goal, place);
             }
             SingleResult::OfQuery => {
                 **answer = match &query {
-                    Some(query) => query.answer(object.triangle_ids, *instance),
+                    Some(query) => query.answer(object.triangle_ids, instance),
                     None => Answer::MISS,
                 };
             }
         }
     }
-}
-
-/// Traces a ray through the BVH.
-#[inline(always)]
-fn through_bvh<S: Simd, Q: Query, C: Count>(
-    s: S,
-    (object, ray): (&ObjectView<'_>, ExactRay<'_>),
-    query: (Q::Goal, &mut Option<Q>),
-    count: &mut C,
-) -> SingleResult {
-    let for_starts;
-    let bounds = match ray.1 {
-        None => &object.bounds,
-        Some(_) => {
-            for_starts = object.bounds.for_starts();
-            &for_starts
-        }
-    };
-    let prepared = match PreparedRay::of(s, bounds, ray.0) {
-        Some(prepared) => prepared,
-        None => match PreparedRay::in_f64(bounds, ray.0) {
-            Some(prepared) => prepared,
-            None => return SingleResult::OfQuery,
-        },
-    };
-    let tets = |leaf, query: &mut Q, count: &mut C| enter_tets(object, leaf, ray, query, count);
-    trace_single(s, (object, ray), (&prepared, bounds), query, &mut SingleStack::new(), count, tets)
 }

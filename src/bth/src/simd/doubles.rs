@@ -9,6 +9,8 @@ pub trait Doubles: Copy + 'static {
     fn add(self, a: Self::V, b: Self::V) -> Self::V;
     fn sub(self, a: Self::V, b: Self::V) -> Self::V;
     fn mul(self, a: Self::V, b: Self::V) -> Self::V;
+    /// The exact error of `product`, the rounded product of `a` and `b`: a·b - `product`.
+    fn product_error(self, a: Self::V, b: Self::V, product: Self::V) -> Self::V;
     fn abs(self, a: Self::V) -> Self::V;
     /// The greater; `b` where either is NaN.
     fn max(self, a: Self::V, b: Self::V) -> Self::V;
@@ -22,6 +24,18 @@ pub trait Doubles: Copy + 'static {
 /// Plain code.
 #[derive(Clone, Copy, Debug)]
 pub struct PlainDoubles;
+
+/// The error of a product by Dekker's splitting, without a fused operation.
+#[inline(always)]
+fn product_error(a: f64, b: f64, product: f64) -> f64 {
+    let split = |x: f64| {
+        let c = 134_217_729.0 * x;
+        let high = c - (c - x);
+        (high, x - high)
+    };
+    let ((ah, al), (bh, bl)) = (split(a), split(b));
+    al * bl - (((product - ah * bh) - al * bh) - ah * bl)
+}
 
 /// One operation on each element.
 macro_rules! elementwise {
@@ -44,6 +58,7 @@ impl Doubles for PlainDoubles {
         add(a, b) = a + b;
         sub(a, b) = a - b;
         mul(a, b) = a * b;
+        product_error(a, b, product) = product_error(a, b, product);
         abs(a) = a.abs();
         max(a, b) = if a > b { a } else { b };
     }

@@ -2,7 +2,8 @@
 
 use crate::bvh::candidate::start_corners;
 use crate::intersect::exact::{RoundedOrigin, wide};
-use crate::intersect::start::{StartPoint, are_weights, rounded_start};
+use crate::intersect::start::{StartPoint, are_weights, flat_axis, rounded_start};
+use crate::rays::{PrimitiveRef, Start};
 use bth_format::exact::is_zero_area;
 use bth_format::layout::{Child, NONE, TrianglePlace};
 use bth_format::object::ObjectView;
@@ -18,19 +19,21 @@ pub(crate) enum StartError {
     Weights,
 }
 
-/// Finds the start at weights u and v of a triangle of an object.
+/// Finds a start on a triangle of an object, of whatever instance.
 #[inline(always)]
-pub(crate) fn locate(object: &ObjectView<'_>, triangle: u32, uv: [f32; 2]) -> Result<StartPoint, StartError> {
+pub(crate) fn locate(object: &ObjectView<'_>, start: Start) -> Result<StartPoint, StartError> {
+    let Start { primitive: PrimitiveRef { triangle, .. }, u, v } = start;
     let (leaf, slot) = place(object, triangle).ok_or(StartError::NoTriangle)?;
     let corners = start_corners(object, leaf, slot).ok_or(StartError::NoTriangle)?;
     if object.is_deformable() && is_zero_area(corners) {
         return Err(StartError::NoArea);
     }
-    if !are_weights(uv) {
+    if !are_weights([u, v]) {
         return Err(StartError::Weights);
     }
-    let [u, v] = uv;
-    Ok(StartPoint { origin: rounded_start(corners.map(wide), uv.map(f64::from)), leaf, slot, u, v })
+    let corners = corners.map(wide);
+    let origin = rounded_start(corners, [u.into(), v.into()]);
+    Ok(StartPoint { origin, leaf, slot, flat_axis: flat_axis(corners), u, v })
 }
 
 /// The child code of the leaf that holds a triangle, and its slot there. For a triangle of a tet leaf without a subtree, these are the

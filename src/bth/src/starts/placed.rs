@@ -1,7 +1,6 @@
 //! Rays in world space that may start on a triangle of an instance.
 
 use super::locate::{StartError, locate};
-use crate::bvh::leaf::ExactRay;
 use crate::instances::World;
 use crate::intersect::exact::RoundedOrigin;
 use crate::intersect::start::StartPoint;
@@ -15,6 +14,7 @@ use bth_format::{Code, Error};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct InstanceStart {
     pub(crate) instance: u32,
+    pub(crate) start: Start,
     pub(crate) point: StartPoint,
     /// Whether the ray leaves in a direction in which it meets nothing of the instance.
     pub(crate) is_free: bool,
@@ -23,7 +23,8 @@ pub(crate) struct InstanceStart {
 impl InstanceStart {
     /// For a ray that starts on no triangle.
     pub(crate) fn none(origin: [f32; 3]) -> InstanceStart {
-        InstanceStart { instance: NONE, point: StartPoint::beside(origin), is_free: false }
+        let point = StartPoint::beside(origin);
+        InstanceStart { instance: NONE, start: Start::NONE, point, is_free: false }
     }
 }
 
@@ -48,10 +49,19 @@ impl<'a> WorldRay<'a> {
         self.start.filter(|start| start.instance == instance).map(|start| &start.point)
     }
 
-    /// As a ray of an instance whose object's space is world space.
+    /// As a ray in an instance, given the ray in the space of its object: one that starts there, or else one with an origin.
     #[inline(always)]
-    pub(crate) fn exact_in(&self, instance: u32) -> ExactRay<'a> {
-        (self.ray, self.start_in(instance))
+    pub(crate) fn in_object<T>(
+        &self,
+        instance: u32,
+        ray: &Ray,
+        start: impl FnOnce(&StartRay) -> T,
+        plain: impl FnOnce(&Ray) -> T,
+    ) -> T {
+        match self.start.filter(|start| start.instance == instance) {
+            Some(of) => start(&StartRay { start: of.start, direction: ray.direction, tmax: ray.tmax }),
+            None => plain(ray),
+        }
     }
 }
 
@@ -83,13 +93,12 @@ impl Scene {
         if self.world().is_some_and(|world| world.placements[instance as usize].is_none()) {
             return Err(Misplaced::Hidden);
         }
-        let found = locate(self.view(object), start.primitive.triangle, [start.u, start.v]);
-        let point = found.map_err(Misplaced::Start)?;
+        let point = locate(self.view(object), *start).map_err(Misplaced::Start)?;
         let origin = match self.world() {
             None => point.rounded(),
             Some(world) => self.in_world(world, instance, &point),
         };
-        Ok((InstanceStart { instance, point, is_free: false }, origin))
+        Ok((InstanceStart { instance, start: *start, point, is_free: false }, origin))
     }
 
     /// A start in world space, rounded to f32.

@@ -5,8 +5,8 @@ use super::locate::{locate, place};
 use super::triangles::{NoRow, Row, StartTriangles, TriangleIds};
 use crate::bvh::candidate::start_corners;
 use crate::intersect::exact::RoundedOrigin;
-use crate::intersect::start::{ABOVE_ONE, StartPoint, rounded_start};
-use crate::rays::{Ray, StartRay};
+use crate::intersect::start::{ABOVE_ONE, NO_AXIS, StartPoint, flat_axis, rounded_start};
+use crate::rays::{PrimitiveRef, Ray, Start, StartRay};
 use crate::simd::{Isa, Kernel, LANES, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
@@ -54,7 +54,8 @@ impl PreparedStarts {
 
     fn fill_one(&mut self, object: &ObjectView<'_>, ray: &StartRay, instance: u32, index: usize) {
         let triangle = ray.start.primitive.triangle_of(instance);
-        let Ok(point) = locate(object, triangle, [ray.start.u, ray.start.v]) else {
+        let start = Start { primitive: PrimitiveRef { instance, triangle }, ..ray.start };
+        let Ok(point) = locate(object, start) else {
             (self.rays[index], self.points[index]) = (ENDED, StartPoint::beside([0.0; 3]));
             return;
         };
@@ -89,6 +90,14 @@ fn words<S: Simd>(s: S, rays: &[StartRay; LANES]) -> [S::U; 8] {
     s.columns8(StartRay::rows(rays).first_chunk().expect("sixteen rows"))
 }
 
+/// The triangles of an instance on which the rays of a group start.
+#[inline(always)]
+fn ids<S: Simd>(s: S, groups: &[[StartRay; LANES]], group: usize, instance: u32) -> TriangleIds {
+    let Some(rays) = groups.get(group) else { return TriangleIds::NONE };
+    let [of, triangle, ..] = words(s, rays);
+    TriangleIds::new(s, s.select_u(s.eq_u(of, s.splat_u(instance)), triangle, s.splat_u(NONE)))
+}
+
 impl<R: Row> Kernel for PrepareKernel<'_, '_, R> {
     type Output = ();
     #[inline(always)]
@@ -97,23 +106,18 @@ impl<R: Row> Kernel for PrepareKernel<'_, '_, R> {
         let PreparedStarts { rays: object_rays, points, order } = prepared;
         let levels = object.free_levels.first().copied().unwrap_or_default();
         let (blocks, _) = rays.as_chunks::<LANES>();
-        let ids = |i: usize| {
-            let Some(rays) = blocks.get(i) else { return TriangleIds::NONE };
-            let [of, triangle, ..] = words(s, rays);
-            TriangleIds::new(s, s.select_u(s.eq_u(of, s.splat_u(instance)), triangle, s.splat_u(NONE)))
-        };
         // What is stored lane by lane and loaded at once waits until the stores are done, so sixteen rays are fetched before the sixteen
         // before them are decided.
         let mut triangles = [StartTriangles::NONE; 2];
         // Sixteen indices are stored at once; those of rays that have ended are overwritten.
         let mut end = order.len();
         order.resize(end + rays.len() + LANES, 0);
-        let mut ahead = [ids(0), ids(1)];
+        let mut ahead = [ids(s, blocks, 0, instance), ids(s, blocks, 1, instance)];
         ahead[0].prefetch_rows(s, object, rows);
         ahead[1].prefetch_rows(s, object, rows);
         ahead[0].prefetch_leaves(s, object);
         for i in 0..=blocks.len() {
-            let next = ids(i + 2);
+            let next = ids(s, blocks, i + 2, instance);
             next.prefetch_rows(s, object, rows);
             ahead[1].prefetch_leaves(s, object);
             triangles[i % 2].fetch(s, object, rows, &ahead[0]);
@@ -153,7 +157,9 @@ impl Group<'_> {
     ) -> u32 {
         let Group { rays, triangles } = self;
         triangles.expand::<S, R>(s);
-        let [_, _, u, v, dx, dy, dz, tmax] = words(s, rays).map(|word| s.floats(word));
+        let [_, _, u, v, dx, dy, dz, tmax] = words(s, rays);
+        let (u, v, tmax) = (s.floats(u), s.floats(v), s.floats(tmax));
+        let (dx, dy, dz) = (s.floats(dx), s.floats(dy), s.floats(dz));
         let zero = s.splat(0.0);
         let sum = s.le(s.add(u, v), s.splat(1.0 + ABOVE_ONE));
         let weights = s.and(s.and(s.le(zero, u), s.le(zero, v)), sum);
@@ -167,11 +173,18 @@ impl Group<'_> {
         }
         let StartTriangles { corners, leaf, slot, .. } = &*triangles;
         let (mut origin, mut error) = ([[0.0f64; LANES]; 3], [0.0f64; LANES]);
+        let mut axis = [NO_AXIS; LANES];
         // There are no branches in this loop, so that the compiler vectorizes it.
         for i in 0..LANES {
-            let corner = |c: usize| [0, 1, 2].map(|k: usize| f64::from(corners[c][k][i]));
             let weights = [rays[i].start.u.into(), rays[i].start.v.into()];
-            let RoundedOrigin([x, y, z], off) = rounded_start([corner(0), corner(1), corner(2)], weights);
+            let mut corner = [[0.0f64; 3]; 3];
+            for c in 0..3 {
+                for k in 0..3 {
+                    corner[c][k] = f64::from(corners[c][k][i]);
+                }
+            }
+            axis[i] = flat_axis(corner);
+            let RoundedOrigin([x, y, z], off) = rounded_start(corner, weights);
             (origin[0][i], origin[1][i], origin[2][i], error[i]) = (x, y, z, off);
         }
         for lane in 0..LANES {
@@ -182,6 +195,7 @@ impl Group<'_> {
                 origin: RoundedOrigin(point, error[lane]),
                 leaf: if is_start { leaf[lane] } else { NONE },
                 slot: slot[lane],
+                flat_axis: axis[lane],
                 u: ray.start.u,
                 v: ray.start.v,
             };

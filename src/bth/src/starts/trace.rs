@@ -1,11 +1,11 @@
 //! The nearest hit of rays that start on surfaces, and any hit.
 
-use super::locate::locate;
 use super::placed::{InstanceStart, WorldRay};
 use super::prepare::ENDED;
 use crate::object;
 use crate::rays::{Hit, Ray, StartRay};
 use crate::scene::Scene;
+use crate::simd::Isa;
 use bth_format::object::ObjectView;
 
 impl Scene {
@@ -42,9 +42,14 @@ impl Scene {
     fn nearest_of_objects(&self, world_ray: WorldRay<'_>, best: &mut Hit) {
         for instance in 0..self.object_count() {
             let tmax = if best.t < world_ray.ray.tmax { best.t } else { world_ray.ray.tmax };
-            let (ray, mut hit) = (Ray { tmax, ..*world_ray.ray }, Hit::MISS);
-            let exact_ray = (&ray, world_ray.start_in(instance));
-            object::store_nearest(self.view(instance), exact_ray, instance, &mut hit);
+            let ray = Ray { tmax, ..*world_ray.ray };
+            let object = self.view(instance);
+            let hit = world_ray.in_object(
+                instance,
+                &ray,
+                |start| object::nearest(object, start, instance),
+                |ray| object::nearest(object, ray, instance),
+            );
             if hit.t < best.t {
                 *best = hit;
             }
@@ -75,8 +80,15 @@ impl Scene {
         }
         match self.world() {
             Some(world) => world.any_of_ray(self.objects(), world_ray),
-            None => (0..self.object_count())
-                .any(|instance| object::any(self.view(instance), world_ray.exact_in(instance))),
+            None => (0..self.object_count()).any(|instance| {
+                let object = self.view(instance);
+                world_ray.in_object(
+                    instance,
+                    world_ray.ray,
+                    |start| object::any(object, start),
+                    |ray| object::any(object, ray),
+                )
+            }),
         }
     }
 
@@ -128,9 +140,10 @@ impl Scene {
         }
     }
 
-    /// Whether rays are traced together. Those through several objects of a file without scene sections are not.
+    /// Whether rays are traced together: not in scalar code, nor through several objects of a file without scene sections.
     fn goes_in_batches(&self, rays: &[StartRay]) -> bool {
-        rays.len() >= object::MIN_BATCH && (self.world().is_some() || self.object_count() == 1)
+        let has_vectors = Isa::chosen() != Isa::Scalar;
+        has_vectors && rays.len() >= object::MIN_BATCH && (self.world().is_some() || self.object_count() == 1)
     }
 
     /// The rays of a batch in world space, and their starts.
@@ -146,22 +159,15 @@ impl Scene {
 /// Stores the nearest hit of a ray in an instance whose object's space is world space.
 #[inline(always)]
 fn nearest_in(object: &ObjectView<'_>, instance: u32, ray: &StartRay, hit: &mut Hit) {
-    let &StartRay { start, direction, tmax } = ray;
-    match locate(object, start.primitive.triangle_of(instance), [start.u, start.v]) {
-        Ok(point) => {
-            let ray = Ray { origin: point.rounded(), tmin: 0.0, direction, tmax };
-            object::store_nearest(object, (&ray, Some(&point)), instance, hit);
-        }
-        Err(_) => *hit = Hit::MISS,
+    if ray.start.primitive.instance == instance {
+        object::store_nearest(object, ray, instance, hit);
+    } else {
+        *hit = Hit::MISS;
     }
 }
 
 /// Whether a ray hits anything in an instance whose object's space is world space.
 #[inline(always)]
 fn any_in(object: &ObjectView<'_>, instance: u32, ray: &StartRay) -> bool {
-    let &StartRay { start, direction, tmax } = ray;
-    locate(object, start.primitive.triangle_of(instance), [start.u, start.v]).is_ok_and(|point| {
-        let ray = Ray { origin: point.rounded(), tmin: 0.0, direction, tmax };
-        object::any(object, (&ray, Some(&point)))
-    })
+    ray.start.primitive.instance == instance && object::any(object, ray)
 }

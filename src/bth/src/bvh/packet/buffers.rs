@@ -6,8 +6,8 @@ use super::points::{ProjectedPoints, RelativePoints};
 use super::ray_group::RayGroup;
 use super::single_rays::SingleRays;
 use crate::intersect::exact_lanes::{Intersections, OriginTermsLanes, Pairs};
-use crate::simd::Simd;
-use bth_format::layout::WIDTH;
+use crate::simd::{LANES, Simd};
+use bth_format::layout::{NONE, WIDTH};
 use bth_format::limits::MAX_DEPTH;
 use bth_format::object::ObjectView;
 use std::any::Any;
@@ -25,6 +25,8 @@ pub(crate) struct PacketBuffers {
     /// Rays and triangles of the hits that are computed. They are kept, because clearing them takes longer than the computation.
     pub(super) pairs: Pairs,
     pub(super) intersections: [Intersections; GROUPS],
+    /// For each ray that starts on a triangle the child code of its leaf, and its slot there.
+    pub(super) own: [[[u32; LANES]; 2]; GROUPS],
 }
 
 impl PacketBuffers {
@@ -49,6 +51,7 @@ impl Default for PacketBuffers {
             origin_terms: OriginTermsLanes::NONE,
             pairs: Pairs::NONE,
             intersections: [Intersections::NONE; GROUPS],
+            own: [[[NONE; LANES]; 2]; GROUPS],
         }
     }
 }

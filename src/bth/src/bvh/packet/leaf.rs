@@ -201,7 +201,7 @@ impl<Q: Query> PacketRays<'_, Q> {
                 found = found.without(start.slot);
             }
             let hit = found.sure != 0
-                || found.maybe != 0 && self.settle_one(ray, Candidate::NONE, (code, found.maybe));
+                || found.maybe != 0 && self.settle_one(s, ray, Candidate::NONE, (code, found.maybe));
             self.alive &= !(u64::from(hit) << ray);
         }
     }
@@ -282,6 +282,7 @@ impl<Q: Query> PacketRays<'_, Q> {
         mut active: u32,
     ) -> bool {
         let (mut nearer, origin_reach) = (false, self.object.bounds.origin_reach);
+        let starting = self.starting_in(s, at, leaf.code);
         while triangles != 0 {
             let triangle = triangles.trailing_zeros();
             triangles &= triangles - 1;
@@ -303,10 +304,10 @@ impl<Q: Query> PacketRays<'_, Q> {
                 continue;
             }
             let candidate = Candidate { leaf: leaf.code, triangle };
-            if self.has_starts {
+            if starting != 0 {
                 // No ray hits the triangle on which it starts.
-                let own = self.starts_of(at, maybe, candidate);
-                (maybe, sure) = (maybe & !own, sure & !own);
+                let others = !(starting & self.starting_at(s, at, triangle));
+                (maybe, sure) = (maybe & others, sure & others);
             }
             let clear = if H::is_any(self.goal) {
                 self.alive &= !(u64::from(sure) << (at * LANES));

@@ -1,9 +1,10 @@
 //! The rays of a packet with their queries, and the decisions in f64 about what the f32 tests of a packet leave open.
 
+use super::entry::GROUPS;
 use super::hit_cache::{HitCache, UNCACHED};
 use super::ray_group::RayGroup;
 use super::single_rays::SingleRays;
-use crate::bvh::candidate::{Candidate, settle};
+use crate::bvh::candidate::{Candidate, Settle};
 use crate::intersect::start::Starts;
 use crate::query::Query;
 use crate::rays::Ray;
@@ -27,8 +28,8 @@ pub(crate) struct PacketRays<'a, Q: Query> {
     pub(crate) alive: u64,
     /// Where the rays start.
     pub(crate) starts: Starts<'a>,
-    /// Whether `starts` are given.
-    pub(crate) has_starts: bool,
+    /// For each ray the child code of the leaf that holds the triangle on which it starts, and the slot there; not set without starts.
+    pub(crate) own: &'a mut [[[u32; LANES]; 2]; GROUPS],
 }
 
 /// The uncached pending hits of a group; see [`RayGroup::leaf`] and [`RayGroup::triangle`].
@@ -99,7 +100,7 @@ impl<Q: Query> PacketRays<'_, Q> {
             lanes &= lanes - 1;
             let ray = at * LANES + lane;
             let pending_hit = uncached.candidate(self.hit_cache, pending[lane], lane);
-            if self.settle_one(ray, pending_hit, (candidate.leaf, 1 << candidate.triangle)) {
+            if self.settle_one(s, ray, pending_hit, (candidate.leaf, 1 << candidate.triangle)) {
                 self.alive &= !(1 << ray);
             } else if let Some(t) = self.queries[ray].found_bounds() {
                 let off = f64::from(self.object.bounds.origin_error);
@@ -124,33 +125,40 @@ impl<Q: Query> PacketRays<'_, Q> {
             let lane = lanes.trailing_zeros() as usize % LANES;
             lanes &= lanes - 1;
             let pending_hit = uncached.candidate(self.hit_cache, pending[lane], lane);
-            self.settle_one(at * LANES + lane, pending_hit, (NONE, 0));
+            self.settle_one(s, at * LANES + lane, pending_hit, (NONE, 0));
         }
     }
 
-    /// Offers candidates of a ray to its query; see [`settle`].
+    /// Offers candidates of a ray to its query; see [`Settle`].
     #[inline(always)]
-    pub(super) fn settle_one(&mut self, ray: usize, pending: Candidate, of_leaf: (u32, u32)) -> bool {
+    pub(super) fn settle_one<S: Simd>(
+        &mut self,
+        s: S,
+        ray: usize,
+        pending: Candidate,
+        of_leaf: (u32, u32),
+    ) -> bool {
         if self.queried >> ray & 1 == 0 {
             self.queries[ray] = Q::new(self.goal, &self.rays[ray]);
             self.queried |= 1 << ray;
         }
         let exact_ray = (&self.rays[ray], self.starts.of(ray));
-        settle(self.object, exact_ray, pending, of_leaf, &mut self.queries[ray])
+        let (object, query) = (self.object, &mut self.queries[ray]);
+        s.call(Settle { object, ray: exact_ray, pending, of_leaf, query })
     }
 
-    /// Of some rays of a group, a bit each, those that start on a triangle.
+    /// The rays of a group that start in a leaf, a bit each.
     #[inline(always)]
-    pub(super) fn starts_of(&self, at: usize, mut rays: u32, candidate: Candidate) -> u32 {
-        let mut own = 0;
-        while rays != 0 {
-            let lane = rays.trailing_zeros();
-            rays &= rays - 1;
-            let start = self.starts.of(at * LANES + lane as usize);
-            let is_own =
-                start.is_some_and(|start| start.leaf == candidate.leaf && start.slot == candidate.triangle);
-            own |= u32::from(is_own) << lane;
+    pub(super) fn starting_in<S: Simd>(&self, s: S, at: usize, leaf: u32) -> u32 {
+        if self.starts.is_empty() {
+            return 0;
         }
-        own
+        s.mask_bits(s.eq_u(s.load_u(&self.own[at % GROUPS][0]), s.splat_u(leaf)))
+    }
+
+    /// The rays of a group whose triangle has this slot in its leaf, a bit each.
+    #[inline(always)]
+    pub(super) fn starting_at<S: Simd>(&self, s: S, at: usize, slot: u32) -> u32 {
+        s.mask_bits(s.eq_u(s.load_u(&self.own[at % GROUPS][1]), s.splat_u(slot)))
     }
 }

@@ -68,6 +68,7 @@ impl<S: Simd, Q: Query, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, 
             origin_terms,
             pairs,
             intersections,
+            own,
         } = &mut **buffers;
         let groups = &mut groups[..rays.len().div_ceil(LANES)];
         let all = u64::MAX >> (PACKET - rays.len());
@@ -83,8 +84,15 @@ impl<S: Simd, Q: Query, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, 
             queried: 0,
             alive: all,
             starts,
-            has_starts: !starts.is_empty(),
+            own,
         };
+        if !starts.is_empty() {
+            for ray in 0..rays.rays.len() {
+                let [leaf, slot] = &mut rays.own[ray / LANES % GROUPS];
+                let start = &starts.0[ray];
+                (leaf[ray % LANES], slot[ray % LANES]) = (start.leaf, start.slot);
+            }
+        }
         if let Some(group) = groups.last_mut() {
             // Lanes without a ray get the least limit, so that they never keep a child or a triangle.
             let valid = s.mask((all >> ((rays.rays.len() - 1) / LANES * LANES)) as u32);
@@ -202,7 +210,7 @@ fn finish<S: Simd, H: PacketBounds<S>, Q: Query>(
             IntersectGroup { group, cached, intersections, packet }.inline_or_call(s);
         }
     }
-    if rays.has_starts {
+    if !rays.starts.is_empty() {
         // Exact origins are not in lanes, so hits are computed one by one.
         for intersections in &mut *intersections {
             intersections.open |= std::mem::take(&mut intersections.certain);

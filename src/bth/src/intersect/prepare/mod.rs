@@ -107,9 +107,19 @@ impl PreparedRay {
     /// of t is empty.
     #[inline(always)]
     pub(crate) fn of<S: Simd>(s: S, bounds: &ObjectBounds, ray: &Ray) -> Option<PreparedRay> {
-        let [start, end]: [[f32; 4]; 2] = zerocopy::transmute!(*ray);
-        let ([.., tmin], [.., tmax]) = (start, end);
-        let [start, end] = [start, end].map(Vec4::from_array);
+        let rows: [[f32; 4]; 2] = zerocopy::transmute!(*ray);
+        PreparedRay::of_rows(s, bounds, rows.map(Vec4::from_array), ray)
+    }
+
+    /// As [`Self::of`], given the floats of the ray as two rows of four.
+    #[inline(always)]
+    pub(crate) fn of_rows<S: Simd>(
+        s: S,
+        bounds: &ObjectBounds,
+        [start, end]: [Vec4; 2],
+        ray: &Ray,
+    ) -> Option<PreparedRay> {
+        let (tmin, tmax) = (start.w, end.w);
         let (o, d) = (Vec3A::from_vec4(start), Vec3A::from_vec4(end));
         // The fourth lane is not tmax, which as f32::MAX would make the reciprocal denormal, and so take hundreds of cycles.
         let size = Vec3A::from_vec4(end.abs().xyzz());

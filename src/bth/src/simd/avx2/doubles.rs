@@ -3,13 +3,13 @@
 use crate::simd::Doubles;
 use std::arch::x86_64::*;
 
-/// AVX, on machines that have AVX2.
+/// AVX, on machines that have AVX2 and FMA.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::simd) struct AvxDoubles(());
 
 impl AvxDoubles {
     /// # Safety
-    /// The machine must have AVX2.
+    /// The machine must have AVX2 and FMA.
     #[inline(always)]
     pub(in crate::simd) unsafe fn new() -> AvxDoubles {
         AvxDoubles(())
@@ -21,7 +21,7 @@ macro_rules! intrinsics {
     ($($name:ident($($arg:ident),*) = $do:expr;)*) => { $(
         #[inline(always)]
         fn $name(self, $($arg: __m256d),*) -> __m256d {
-            // SAFETY: self proves AVX2, and only registers are accessed.
+            // SAFETY: self proves AVX2 and FMA, and only registers are accessed.
             unsafe { $do }
         }
     )* };
@@ -38,6 +38,7 @@ impl Doubles for AvxDoubles {
         add(a, b) = _mm256_add_pd(a, b);
         sub(a, b) = _mm256_sub_pd(a, b);
         mul(a, b) = _mm256_mul_pd(a, b);
+        product_error(a, b, product) = _mm256_fmsub_pd(a, b, product);
         abs(a) = _mm256_andnot_pd(_mm256_set1_pd(-0.0), a);
         max(a, b) = _mm256_max_pd(a, b);
         rotate(a) = _mm256_permute4x64_pd::<0b01_00_10_01>(a);

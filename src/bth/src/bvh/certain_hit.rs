@@ -22,11 +22,12 @@ pub(crate) fn store_certain_hit<S: Simd, Q: Query>(
     goal: Q::Goal,
     (answer, instance): (&mut Q::Answer, u32),
 ) {
-    if let (ray, None) = exact_ray
-        && let Some(leaf) = object.node_base().indexed_leaf(candidate.leaf)
-    {
-        let corners = leaf.corners(candidate.triangle as usize);
-        let rounded = rounded_intersection(s.doubles(), (ray.origin, ray.direction), corners, norm);
+    if let Some(leaf) = object.node_base().indexed_leaf(candidate.leaf) {
+        let (corners, (ray, start)) = (leaf.corners(candidate.triangle as usize), exact_ray);
+        let rounded = match start {
+            None => rounded_intersection(s.doubles(), (ray.origin, ray.direction), corners, norm),
+            Some(start) => rounded_intersection(s.doubles(), (start.origin, ray.direction), corners, norm),
+        };
         if rounded.is_accurate {
             let index = leaf.first.wrapping_add(candidate.triangle);
             let primitive = PrimitiveRef { instance, triangle: object.triangle_ids[index as usize] };
@@ -36,7 +37,7 @@ pub(crate) fn store_certain_hit<S: Simd, Q: Query>(
             return;
         }
     }
-    // Leaves of other formats, rays that start on a triangle, and where f64 leaves t, u or v inaccurate.
+    // Leaves of other formats, and where f64 leaves t, u or v inaccurate.
     let mut query = Q::new(goal, exact_ray.0);
     let (pending, of_leaf) = (candidate, (NONE, 0));
     s.call(Settle { object, ray: exact_ray, pending, of_leaf, query: &mut query });

@@ -10,7 +10,6 @@ use super::ray_pool::{POOL_SIZE, RareSteps, RayPool, Slot, has_rare_steps};
 use super::ray_state::RayState;
 use super::stack::{StackPosition, Stacks};
 use crate::intersect::prepare::Prepared;
-use crate::intersect::start::Starts;
 use crate::query::sink::Sink;
 use crate::query::{EitherQuery, Query};
 use crate::rays::Ray;
@@ -61,8 +60,6 @@ struct RaySource<'a> {
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
     remaining: RemainingRays<'a>,
-    /// Where the rays start.
-    starts: Starts<'a>,
     /// Child code at which rays start.
     root: u32,
     bounds: ObjectBounds,
@@ -86,7 +83,6 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
             object,
             rays,
             remaining,
-            starts,
             root: root(object),
             bounds: object.bounds,
             prepared: Prepared::new(),
@@ -198,11 +194,7 @@ impl RaySource<'_> {
         for lane in 0..count {
             let mut may_hit = true;
             if let (Some(prepared), Some(root)) = (self.prepared.prepared(lane), root) {
-                let (mut bits, enter) = prepared.slabs.children(s, root, prepared.slabs.last);
-                if let Some(start) = self.starts.of(self.ray[lane] as usize) {
-                    let ray = &self.rays[self.ray[lane] as usize];
-                    bits &= !prepared.slabs.left_behind(s, root, ray, start);
-                }
+                let (bits, enter) = prepared.slabs.children(s, root, prepared.slabs.last);
                 s.store(enter, &mut self.enter[lane % LANES]);
                 self.children[lane % LANES] = bits;
                 may_hit = bits != 0;

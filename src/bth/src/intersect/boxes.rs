@@ -6,7 +6,6 @@
 //! that depths are of the magnitude of coordinates.
 
 use crate::intersect::line::{Line, widened};
-use crate::intersect::start::StartPoint;
 use crate::rays::Ray;
 use crate::simd::Simd;
 use bth_format::layout::{PackedNode, WIDTH, WideNode};
@@ -129,31 +128,6 @@ impl RaySlabs {
         let depth = |t: f32, off: f32| (f64::from(t) * f64::from(self.scale) + f64::from(off)) as f32;
         let (tmin, tmax) = (ray.tmin.max(f32::MIN), ray.tmax.min(f32::MAX));
         [depth(tmin, origin_error).next_up(), depth(tmax, -origin_error).next_down()]
-    }
-
-    /// The children of a node that a ray cannot hit because it leaves them at once, as bits: it starts on a triangle that is
-    /// perpendicular to an axis, at a coordinate there that is exact, and their boxes end there or before.
-    #[inline(always)]
-    pub(crate) fn left_behind<S: Simd, B: ChildBoxes>(
-        &self,
-        s: S,
-        node: &B,
-        ray: &Ray,
-        start: &StartPoint,
-    ) -> u32 {
-        let axis = start.flat_axis as usize;
-        if axis >= 3 {
-            return 0;
-        }
-        let (at, direction) = (s.splat(ray.origin[axis]), ray.direction[axis]);
-        let far = node.planes(s, axis, self.near[axis] ^ FAR);
-        if direction > 0.0 {
-            s.mask_bits(s.le(far, at))
-        } else if direction < 0.0 {
-            s.mask_bits(s.le(at, far))
-        } else {
-            0
-        }
     }
 
     /// As [`RaySlabLanes::children`], for one node.

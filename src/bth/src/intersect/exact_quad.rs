@@ -1,19 +1,52 @@
 //! The arithmetic of [`super::exact`] in vectors of four f64, for one pair of a ray and a triangle: its three vector products are one
 //! operation, and so are its four scalar products.
 
-use crate::intersect::exact::{INVERSE_RATIO_ERROR, RoundedIntersection, WEIGHT_ERROR};
+use crate::intersect::exact::{
+    INVERSE_RATIO_ERROR, Origin, RoundedIntersection, RoundedOrigin, WEIGHT_ERROR,
+};
 use crate::simd::Doubles;
+
+/// The origin of a ray.
+pub(crate) trait QuadOrigin: Copy {
+    /// A coordinate of a corner, but in the third place that of the origin along the same axis.
+    fn with_corner<D: Doubles>(self, s: D, corner: f32, axis: usize) -> D::V;
+    /// As [`Origin::enlarge`].
+    fn enlarge(self, error: [f64; 2], edge: f64) -> [f64; 2];
+}
+
+impl QuadOrigin for [f32; 3] {
+    #[inline(always)]
+    fn with_corner<D: Doubles>(self, s: D, a: f32, axis: usize) -> D::V {
+        s.widen([a, a, self[axis], a])
+    }
+    #[inline(always)]
+    fn enlarge(self, error: [f64; 2], _edge: f64) -> [f64; 2] {
+        error
+    }
+}
+
+impl QuadOrigin for RoundedOrigin {
+    #[inline(always)]
+    fn with_corner<D: Doubles>(self, s: D, a: f32, axis: usize) -> D::V {
+        let a = f64::from(a);
+        s.load([a, a, self.0[axis], a])
+    }
+    #[inline(always)]
+    fn enlarge(self, error: [f64; 2], edge: f64) -> [f64; 2] {
+        Origin::enlarge(self, error, edge)
+    }
+}
 
 /// As [`RoundedIntersection::new`] with the terms of an origin and a triangle, with the same bits.
 #[inline(always)]
 pub(crate) fn rounded_intersection<D: Doubles>(
     s: D,
-    (origin, direction): ([f32; 3], [f32; 3]),
+    (origin, direction): (impl QuadOrigin, [f32; 3]),
     [a, b, c]: [[f32; 3]; 3],
     norm: f32,
 ) -> RoundedIntersection {
     // By axis, four factors of vector products: the edges to b and c, the offset of a from the origin, and the first edge again.
-    let factor = |k: usize| s.sub(s.widen([b[k], c[k], a[k], b[k]]), s.widen([a[k], a[k], origin[k], a[k]]));
+    let factor = |k: usize| s.sub(s.widen([b[k], c[k], a[k], b[k]]), origin.with_corner(s, a[k], k));
     let left = [factor(0), factor(1), factor(2)];
     // The other factors, so that the products are `normal`, `second`, `third` and `normal` again.
     let right = [s.rotate(left[0]), s.rotate(left[1]), s.rotate(left[2])];
@@ -27,6 +60,7 @@ pub(crate) fn rounded_intersection<D: Doubles>(
     let [edge_b, edge_c, distance, _] = s.array(s.max(s.max(s.abs(left[0]), s.abs(left[1])), s.abs(left[2])));
     let edge = if edge_b > edge_c { edge_b } else { edge_c };
     let error = [WEIGHT_ERROR * (edge * (edge + distance)), WEIGHT_ERROR * (distance * (edge * edge))];
+    let error = origin.enlarge(error, edge);
     let inverse = 1.0 / determinant;
     RoundedIntersection {
         weight: [second, third, determinant],

@@ -28,9 +28,6 @@ const START_EDGE_PARTS: usize = 9 * EDGE_PARTS;
 /// The same for volumes.
 const START_VOLUME_PARTS: usize = 9 * VOLUME_PARTS;
 
-/// No axis.
-pub(crate) const NO_AXIS: u32 = 3;
-
 /// Where a ray of a batch starts, in the space of the object.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StartPoint {
@@ -41,9 +38,6 @@ pub(crate) struct StartPoint {
     pub(crate) leaf: u32,
     /// Slot of the triangle in the leaf.
     pub(crate) slot: u32,
-    /// The axis to which the triangle is perpendicular: all its corners and the start have one exact coordinate there. [`NO_AXIS`] for
-    /// most triangles.
-    pub(crate) flat_axis: u32,
     /// Weights of the second and the third corner.
     pub(crate) u: f32,
     pub(crate) v: f32,
@@ -53,7 +47,7 @@ impl StartPoint {
     /// For a ray that starts at its f32 origin, on no triangle of the object.
     pub(crate) fn beside(origin: [f32; 3]) -> StartPoint {
         let origin = RoundedOrigin(wide(origin), 0.0);
-        StartPoint { origin, leaf: NONE, slot: 0, flat_axis: NO_AXIS, u: 0.0, v: 0.0 }
+        StartPoint { origin, leaf: NONE, slot: 0, u: 0.0, v: 0.0 }
     }
 
     /// Whether the ray starts on a triangle of the object.
@@ -103,17 +97,6 @@ fn is_above_one(u: f64, v: f64) -> bool {
     let (greater, less) = if u < v { (v, u) } else { (u, v) };
     let sum = u + v;
     (sum > 1.0) | ((sum == 1.0) & (less - (sum - greater) > 0.0))
-}
-
-/// The axis along which all corners have the same coordinate, or [`NO_AXIS`].
-#[inline(always)]
-pub(crate) fn flat_axis([a, b, c]: [[f64; 3]; 3]) -> u32 {
-    let mut axis = NO_AXIS;
-    for k in 0..3 {
-        let is_flat = (a[k] == b[k]) & (a[k] == c[k]);
-        axis = if is_flat { k as u32 } else { axis };
-    }
-    axis
 }
 
 /// The point with weights u and v of a triangle, rounded to f64, and a bound of the error of its coordinates. There are no branches,

@@ -9,7 +9,7 @@ use crate::intersect::start::StartPoint;
 use crate::query::{Answer, Count, Query};
 use crate::rays::{Ray, StartRay};
 use crate::simd::{Isa, Kernel, Simd};
-use crate::starts::locate::locate;
+use crate::starts::locate::{locate, prefetch_leaf};
 use crate::tets::enter_tets;
 use bth_format::layout::NONE;
 use bth_format::object::{ObjectBounds, ObjectView};
@@ -21,7 +21,7 @@ pub(crate) trait SingleRay {
     /// What is computed of the ray at first.
     type Line;
     /// Computes it; `None` if the ray hits nothing.
-    fn line(&self, object: &ObjectView<'_>) -> Option<Self::Line>;
+    fn line<S: Simd>(&self, s: S, object: &ObjectView<'_>) -> Option<Self::Line>;
     /// The ray for decisions in f64.
     fn exact<'a>(&'a self, line: &'a Self::Line) -> ExactRay<'a>;
     /// The bounds for which the ray is prepared, which may be stored in `place`.
@@ -33,7 +33,7 @@ pub(crate) trait SingleRay {
 impl SingleRay for Ray {
     type Line = ();
     #[inline(always)]
-    fn line(&self, _object: &ObjectView<'_>) -> Option<()> {
+    fn line<S: Simd>(&self, _s: S, _object: &ObjectView<'_>) -> Option<()> {
         Some(())
     }
     #[inline(always)]
@@ -61,8 +61,9 @@ pub(crate) struct StartLine {
 impl SingleRay for StartRay {
     type Line = StartLine;
     #[inline(always)]
-    fn line(&self, object: &ObjectView<'_>) -> Option<StartLine> {
+    fn line<S: Simd>(&self, s: S, object: &ObjectView<'_>) -> Option<StartLine> {
         let &StartRay { start, direction: [dx, dy, dz], tmax } = self;
+        prefetch_leaf(s, object, start.primitive.triangle);
         let point = locate(object, start).ok()?;
         // Vectors are made in registers: loading what was just written word by word would stall.
         let [x, y, z] = point.rounded();
@@ -126,7 +127,7 @@ impl<Q: Query, C: Count, R: SingleRay> Kernel for &mut SingleKernel<'_, Q, C, R>
     fn run<S: Simd>(self, s: S) {
         let SingleKernel { object, goal, ray, instance, count, answer } = self;
         let (object, goal, instance) = (*object, *goal, *instance);
-        let line = if object.header.root == NONE { None } else { ray.line(object) };
+        let line = if object.header.root == NONE { None } else { ray.line(s, object) };
         let Some(line) = line else {
             **answer = Answer::MISS;
             return;

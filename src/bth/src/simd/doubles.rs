@@ -6,6 +6,8 @@ pub trait Doubles: Copy + 'static {
     type V: Copy;
     /// Converts four f32, which is exact.
     fn widen(self, a: [f32; 4]) -> Self::V;
+    /// These four numbers.
+    fn load(self, a: [f64; 4]) -> Self::V;
     fn add(self, a: Self::V, b: Self::V) -> Self::V;
     fn sub(self, a: Self::V, b: Self::V) -> Self::V;
     fn mul(self, a: Self::V, b: Self::V) -> Self::V;
@@ -53,6 +55,10 @@ impl Doubles for PlainDoubles {
     #[inline(always)]
     fn widen(self, a: [f32; 4]) -> [f64; 4] {
         [a[0].into(), a[1].into(), a[2].into(), a[3].into()]
+    }
+    #[inline(always)]
+    fn load(self, a: [f64; 4]) -> [f64; 4] {
+        a
     }
     elementwise! {
         add(a, b) = a + b;

@@ -2,8 +2,9 @@
 
 use crate::bvh::candidate::start_corners;
 use crate::intersect::exact::{RoundedOrigin, wide};
-use crate::intersect::start::{StartPoint, are_weights, flat_axis, rounded_start};
+use crate::intersect::start::{StartPoint, are_weights, rounded_start};
 use crate::rays::{PrimitiveRef, Start};
+use crate::simd::Simd;
 use bth_format::exact::is_zero_area;
 use bth_format::layout::{Child, NONE, TrianglePlace};
 use bth_format::object::ObjectView;
@@ -33,7 +34,7 @@ pub(crate) fn locate(object: &ObjectView<'_>, start: Start) -> Result<StartPoint
     }
     let corners = corners.map(wide);
     let origin = rounded_start(corners, [u.into(), v.into()]);
-    Ok(StartPoint { origin, leaf, slot, flat_axis: flat_axis(corners), u, v })
+    Ok(StartPoint { origin, leaf, slot, u, v })
 }
 
 /// The child code of the leaf that holds a triangle, and its slot there. For a triangle of a tet leaf without a subtree, these are the
@@ -44,6 +45,16 @@ pub(super) fn place(object: &ObjectView<'_>, triangle: u32) -> Option<(u32, u32)
     match TrianglePlace::from_code(code) {
         Some(TrianglePlace { leaf, slot }) => Some((leaf.code(), slot)),
         None => place_in_tets(object, triangle),
+    }
+}
+
+/// Prefetches the lines of the leaf of a triangle that [`locate`] reads one after the other.
+#[inline(always)]
+pub(crate) fn prefetch_leaf<S: Simd>(s: S, object: &ObjectView<'_>, triangle: u32) {
+    let Some(place) = object.places.get(triangle as usize) else { return };
+    let leaf = object.lines.as_ptr().wrapping_add((place >> 4 & TrianglePlace::INDEX_LIMIT) as usize);
+    for line in 0..4 {
+        s.prefetch(leaf.wrapping_add(line));
     }
 }
 

@@ -5,7 +5,7 @@ use super::locate::{locate, place};
 use super::triangles::{NoRow, Row, StartTriangles, TriangleIds};
 use crate::bvh::candidate::start_corners;
 use crate::intersect::exact::RoundedOrigin;
-use crate::intersect::start::{ABOVE_ONE, NO_AXIS, StartPoint, flat_axis, rounded_start};
+use crate::intersect::start::{ABOVE_ONE, StartPoint, rounded_start};
 use crate::rays::{PrimitiveRef, Ray, Start, StartRay};
 use crate::simd::{Isa, Kernel, LANES, Simd};
 use bth_format::layout::NONE;
@@ -173,7 +173,6 @@ impl Group<'_> {
         }
         let StartTriangles { corners, leaf, slot, .. } = &*triangles;
         let (mut origin, mut error) = ([[0.0f64; LANES]; 3], [0.0f64; LANES]);
-        let mut axis = [NO_AXIS; LANES];
         // There are no branches in this loop, so that the compiler vectorizes it.
         for i in 0..LANES {
             let weights = [rays[i].start.u.into(), rays[i].start.v.into()];
@@ -183,7 +182,6 @@ impl Group<'_> {
                     corner[c][k] = f64::from(corners[c][k][i]);
                 }
             }
-            axis[i] = flat_axis(corner);
             let RoundedOrigin([x, y, z], off) = rounded_start(corner, weights);
             (origin[0][i], origin[1][i], origin[2][i], error[i]) = (x, y, z, off);
         }
@@ -195,7 +193,6 @@ impl Group<'_> {
                 origin: RoundedOrigin(point, error[lane]),
                 leaf: if is_start { leaf[lane] } else { NONE },
                 slot: slot[lane],
-                flat_axis: axis[lane],
                 u: ray.start.u,
                 v: ray.start.v,
             };

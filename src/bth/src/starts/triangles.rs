@@ -1,6 +1,6 @@
 //! The triangles on which sixteen rays start: what must be read of them, without waiting for it.
 
-use super::locate::place;
+use super::locate::{place, prefetch_leaf};
 use crate::bvh::candidate::start_corners;
 use crate::simd::{LANES, Simd};
 use bth_format::exact::is_zero_area;
@@ -109,13 +109,9 @@ impl TriangleIds {
     pub(super) fn prefetch_leaves<S: Simd>(&self, s: S, object: &ObjectView<'_>) {
         let mut new = self.new;
         while new != 0 {
-            let id = self.ids[new.trailing_zeros() as usize % LANES] as usize;
+            let id = self.ids[new.trailing_zeros() as usize % LANES];
             new &= new - 1;
-            let Some(place) = object.places.get(id) else { continue };
-            let leaf = object.lines.as_ptr().wrapping_add((place >> 4 & TrianglePlace::INDEX_LIMIT) as usize);
-            for k in 0..4 {
-                s.prefetch(leaf.wrapping_add(k));
-            }
+            prefetch_leaf(s, object, id);
         }
     }
 }

@@ -34,6 +34,11 @@ impl Doubles for AvxDoubles {
         // SAFETY: self proves AVX2, and only registers are accessed.
         unsafe { _mm256_cvtps_pd(_mm_setr_ps(x, y, z, w)) }
     }
+    #[inline(always)]
+    fn load(self, [x, y, z, w]: [f64; 4]) -> __m256d {
+        // SAFETY: self proves AVX2 and FMA, and only registers are accessed.
+        unsafe { _mm256_setr_pd(x, y, z, w) }
+    }
     intrinsics! {
         add(a, b) = _mm256_add_pd(a, b);
         sub(a, b) = _mm256_sub_pd(a, b);

@@ -30,6 +30,17 @@ impl EnteredInstance<'_> {
 }
 
 impl Scene {
+    /// A visible instance.
+    pub(crate) fn entered(&self, instance: u32) -> EnteredInstance<'_> {
+        let sole = self.sole().filter(|(_, sole)| *sole == instance);
+        let placement = self.world().filter(|_| sole.is_none()).map(|world| world.placement(instance));
+        let object_index = self.object_of(instance);
+        if let Some(world) = self.world() {
+            world.mark_traced(object_index);
+        }
+        EnteredInstance { instance, object_index, object: self.view(object_index), placement }
+    }
+
     /// Calls `visit` with each visible instance that a ray in world space may hit within its range of t. `visit` returns the
     /// greatest t, in world space and rounded to f32, of hits that can still change the result, or `None` to end; instances that
     /// lie beyond may be left out. Returns whether `visit` has ended the enumeration.

@@ -63,7 +63,7 @@ pub use motion::{InstanceView, check_first_frame};
 pub use query::Steps;
 pub use scene::{Scene, from_bytes, from_file, map, open};
 pub use simd::{Isa, IsaError};
-pub use starts::TraceRay;
+pub use starts::{SegmentEnd, TraceRay};
 pub use streams::{HitStreams, RayStreams};
 pub use surface::{Bounds, SurfacePoint};
 pub use update::Update;

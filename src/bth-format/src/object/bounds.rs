@@ -72,12 +72,25 @@ impl ObjectBounds {
     /// `origin_error`, since slopes are at most 1: three tenths of `greatest` cover that.
     #[inline(always)]
     pub fn for_starts(&self) -> ObjectBounds {
-        let more = self.greatest / 8.0;
+        self.moved(self.greatest)
+    }
+
+    /// The bounds for segments, as rays from their first end, whose greatest |coordinate| is `farthest`, with a rounded direction.
+    ///
+    /// Within the object a point of the segment is off by the roundings of both ends and by those of the direction, which are relative to
+    /// its distance from the first end: together by at most four times u and the greater of `farthest` and `greatest`.
+    pub fn for_segments(&self, farthest: f32) -> ObjectBounds {
+        self.moved(4.0 * self.greatest.max(farthest))
+    }
+
+    /// The bounds for rays that are off by at most u times `coordinate`.
+    #[inline(always)]
+    fn moved(&self, coordinate: f32) -> ObjectBounds {
         ObjectBounds {
-            padded: self.padded + more,
-            padded_in_f64: self.padded_in_f64 + more,
-            origin_error: self.greatest * (U * 1.01) + f32::MIN_POSITIVE,
-            origin_reach: self.greatest * 0.3,
+            padded: self.padded + coordinate / 8.0,
+            padded_in_f64: self.padded_in_f64 + coordinate / 8.0,
+            origin_error: coordinate * (U * 1.01) + 4.0 * f32::MIN_POSITIVE,
+            origin_reach: coordinate * 0.3,
             ..*self
         }
     }

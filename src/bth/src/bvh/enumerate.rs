@@ -41,13 +41,23 @@ pub(crate) fn enumerate(
     (ray, start): ExactRay<'_>,
     receiver: &mut dyn Receiver,
 ) -> bool {
-    if object.header.root == NONE {
-        return false;
-    }
     let bounds = &match start {
         None => object.bounds,
         Some(_) => object.bounds.for_starts(),
     };
+    enumerate_within(object, bounds, (ray, start), receiver)
+}
+
+/// As [`enumerate`], with tests of boxes and triangles for these bounds.
+pub(crate) fn enumerate_within(
+    object: &ObjectView<'_>,
+    bounds: &ObjectBounds,
+    (ray, start): ExactRay<'_>,
+    receiver: &mut dyn Receiver,
+) -> bool {
+    if object.header.root == NONE {
+        return false;
+    }
     let prepared = match PreparedRay::of(Scalar, bounds, ray) {
         Some(prepared) => prepared,
         None => match PreparedRay::in_f64(bounds, ray) {

@@ -22,5 +22,6 @@ pub(crate) mod point_exact;
 pub(crate) mod point_lanes;
 pub(crate) mod point_triangle;
 pub(crate) mod prepare;
+pub(crate) mod segment;
 pub(crate) mod start;
 pub(crate) mod triangle_box;

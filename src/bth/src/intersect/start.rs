@@ -26,7 +26,7 @@ const ROUNDING: f64 = 1.0 / (1u64 << 49) as f64;
 /// Parts of an affine combination of edges: that of `a`, and differences of two others with `a`, times a number of f32 each.
 const START_EDGE_PARTS: usize = 9 * EDGE_PARTS;
 /// The same for volumes.
-const START_VOLUME_PARTS: usize = 9 * VOLUME_PARTS;
+pub(super) const START_VOLUME_PARTS: usize = 9 * VOLUME_PARTS;
 
 /// Where a ray of a batch starts, in the space of the object.
 #[derive(Clone, Copy, Debug)]
@@ -137,7 +137,7 @@ impl ExactStart {
     }
 
     /// An affine function of a point, given its values at the corners, at this start: exactly, times [`Self::scale`].
-    fn combined<const PARTS: usize, const SUM: usize>(
+    pub(super) fn combined<const PARTS: usize, const SUM: usize>(
         &self,
         at: impl Fn([f64; 3]) -> Expansion<PARTS>,
     ) -> Expansion<SUM> {

@@ -4,6 +4,7 @@
 //! object, [`triangles`] the triangles of sixteen rays. [`free`] looks up what they certainly do not meet, by the side on which they leave
 //! the triangle and the bin of their direction ([`leaving`]). [`prepare`] makes rays of the object of a batch. [`placed`] places a ray in
 //! the world; [`trace`] traces rays and batches; [`queries`] tells the kinds of rays apart.
+//! [`visible`] decides whether two points see each other.
 
 mod free;
 #[cfg(test)]
@@ -15,5 +16,7 @@ pub(crate) mod prepare;
 mod queries;
 mod trace;
 mod triangles;
+mod visible;
 
 pub use queries::TraceRay;
+pub use visible::SegmentEnd;

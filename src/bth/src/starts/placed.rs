@@ -79,7 +79,7 @@ impl PlacedRay {
 }
 
 /// Why a ray cannot be placed.
-enum Misplaced {
+pub(super) enum Misplaced {
     NoInstance,
     Hidden,
     Start(StartError),
@@ -87,7 +87,7 @@ enum Misplaced {
 
 impl Scene {
     /// Places a start in the world: with its point in world space, rounded to f32.
-    fn place_start(&self, start: &Start) -> Result<(InstanceStart, [f32; 3]), Misplaced> {
+    pub(super) fn place_start(&self, start: &Start) -> Result<(InstanceStart, [f32; 3]), Misplaced> {
         let object = self.object_at(start.primitive).ok_or(Misplaced::NoInstance)?;
         let instance = start.primitive.instance;
         if self.world().is_some_and(|world| world.placements[instance as usize].is_none()) {

@@ -77,8 +77,8 @@ fn byte_tables_are_those_of_the_structures() {
         MaterialParameters { base_color emissive alpha_cutoff alpha_mode flags base_color_texture emissive_texture reserved }
         Texture { image wrap filter transform uv_set reserved }
         Image { name first length }
-        FreeDirections { place sectors bins }
-        FreeDistances { place sectors }
+        FreeDirections { sectors bins }
+        FreeDistances { sectors }
         FreeLevels { distance reserved }
         Deformation { joints influence_sets targets reserved }
         Morph { deltas first_delta first_row reserved }

@@ -54,7 +54,7 @@ codes! {
     Limit "F022" "Triangles and tetrahedra of an object number at most 2^30, lines at most 2^29."
 
     Record "F101" "The record is of a known kind that has the stride of the TETS section, or 0 with neither tetrahedra nor tet leaves."
-    Counts "F102" "TRIANGLE_FACES, TRIANGLES and CORNERS are empty or have as many rows as the object has triangles; no more triangles are dropped than there are."
+    Counts "F102" "TRIANGLE_FACES, TRIANGLE_PLACES, TRIANGLES and CORNERS are empty or have as many rows as the object has triangles; no more triangles are dropped than there are."
     ObjectBounds "F103" "Object bounds are finite with lower <= upper; without a root they are zero."
     Coordinates "F104" "Coordinates of triangle leaves are f32, with zeros in the fields of the grid, or have 16 or 21 bits on a grid whose points are all f32, with a displacement that is finite and not negative; the header's features announce the grids, packed nodes and widened boxes of objects."
     ChildCode "F105" "Child codes are NONE or of an assigned kind; the nodes of an object are all packed or none is; the subtree of a tet leaf holds no tet leaves."
@@ -113,9 +113,10 @@ codes! {
     LeafVertexRows "F166" "Elements of LEAF_VERTICES are rows of POSITIONS; those of unused slots repeat that of slot 0."
     LeafTriangles "F167" "In a deformable object the corners of a leaf's triangle have the rows of POSITIONS that TRIANGLES gives."
     FreeRows "F168" "FREE_DIRECTIONS has as many rows as the object has triangles, or none, and so has FREE_DISTANCES; at most one of them has any, in a deformable object none. FREE_LEVELS has one row beside them, else none."
-    FreePlace "F169" "The place of a row of FREE_DIRECTIONS or FREE_DISTANCES is NONE or that of the row's triangle in a triangle leaf; without a place all bits are 0."
+    TrianglePlace "F169" "A row of TRIANGLE_PLACES is NONE, or names a slot of a triangle leaf that holds the row's triangle."
     FreeBins "F170" "Bits 121 to 125 and 127 of the bins of a row of FREE_DIRECTIONS are zero."
     FreeLevels "F171" "The distances of FREE_LEVELS are zeros, or ascending and from 2^-50 to 2^50; its reserved field is zero."
+    FreeUnplaced "F172" "A row of FREE_DIRECTIONS or FREE_DISTANCES whose triangle has no place is zero."
     Deformation "F173" "DEFORMATION has one row or none; it comes with TRIANGLES, has at most 2 sets of influences and 2^16 joints, none of one only without the other, and a reserved field of zero; without it JOINTS, JOINT_WEIGHTS, MORPHS, MORPH_ROWS and MORPH_DELTAS are empty."
     InfluenceRows "F174" "JOINTS and JOINT_WEIGHTS have as many rows for each position as DEFORMATION has sets of influences."
     Influences "F175" "Joints are below the number of joints in DEFORMATION; the weights of a position are finite, not negative, and not all zero."
@@ -130,6 +131,7 @@ codes! {
     SkinJoint "F184" "The node of a skin's joint exists, its matrix is finite, and its reserved fields are zero."
     WeightTrack "F185" "A track of weights belongs to the node of a deformer that has weights."
     DeformerObject "F186" "The object of a deformer has LEAF_VERTICES, or nothing that can be hit; it has no SEQUENCE_TIMES."
+    PlaceMissing "F187" "With TRIANGLE_PLACES, each triangle in a triangle leaf has a place, unless the index of the leaf is 2^27 - 1 or more."
 
     SequenceRows "F190" "SEQUENCE_POSITIONS has a row for each time of SEQUENCE_TIMES and each row of POSITIONS; an object with times is deformable."
     SequenceTimes "F191" "Times of SEQUENCE_TIMES are finite and ascend strictly."
@@ -148,7 +150,7 @@ codes! {
     ZeroArea "F207" "Exactly the triangles of zero area are dropped; of a deformable object none is."
     Displacement "F208" "No vertex of a triangle is farther from that of the source than the displacement of the object."
     FreeMet "F209" "Rays that start on a triangle, in a direction of a free bin or its margin, meet no point of a triangle beyond; none within the distance of a level, in a direction of its sector."
-    FreeAxes "F210" "A triangle with a place in FREE_DIRECTIONS or FREE_DISTANCES has axes: edges from 2^-20 to 2^20 long at its first corner, and a sine of at least 1/128 between them."
+    FreeAxes "F210" "A triangle with a row of FREE_DIRECTIONS or FREE_DISTANCES that is not zero has axes: edges from 2^-20 to 2^20 long at its first corner, and a sine of at least 1/128 between them."
 
     Singular "S001" "The transform of an instance that is seen can be inverted."
     NotFinite "S002" "The transform and the world box of an instance that is seen are finite."

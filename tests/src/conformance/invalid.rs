@@ -9,6 +9,7 @@ pub fn invalid() -> Vec<Case> {
     let mut cases = container();
     cases.extend(tree());
     cases.extend(opacity());
+    cases.extend(places());
     cases.extend(free_directions());
     cases.extend(tets());
     cases.extend(geometry());
@@ -304,38 +305,63 @@ fn tree() -> Vec<Case> {
     ]
 }
 
+/// A case in which `rows` of `before` rows of a section of object 0 are left. The others become a gap, which is zero.
+fn shortened((name, base): (&str, &str), kind: u32, [stride, before, rows]: [usize; 3]) -> Case {
+    broken(name, base, Seal::Sections, |e| {
+        let end = e.section_at(kind) + stride * rows;
+        e.put(end, &vec![0; stride * (before - rows)]);
+        let at = e.entry_at(0, kind);
+        e.put(at + offset_of!(SectionEntry, length), &((stride * rows) as u64).to_le_bytes());
+        e.put(at + offset_of!(SectionEntry, count), &(rows as u64).to_le_bytes());
+    })
+}
+
+/// Faults of the places of triangles.
+fn places() -> Vec<Case> {
+    let (base, tets) = ("places", "tets-link32");
+    let row = |name, base, triangle: usize, place| field(name, base, kind::TRIANGLE_PLACES, 4 * triangle, place);
+    let line = |at: usize| (at / size_of::<CacheLine>()) as u32;
+    let place = |leaf, slot| TrianglePlace { leaf, slot }.code();
+    let first = Child::Indexed(line(LEAF));
+    vec![
+        shortened(("F102-places", base), kind::TRIANGLE_PLACES, [4, 41, 40]),
+        row("F169-place-of-another", base, 0, place(first, 1)),
+        row("F169-raw-leaf", base, 0, place(Child::Raw(line(LEAF)), 0)),
+        row("F169-empty-slot", base, 7, place(first, 8)),
+        row("F169-node", base, 3, place(Child::Indexed(0), 3)),
+        row("F169-beyond", base, 8, place(Child::Raw(1 << 20), 0)),
+        row("F169-beyond-the-limit", base, 8, NONE - 16),
+        row("F169-dropped", base, 40, place(first, 0)),
+        row("F169-grid", "places-grid-16", 1, place(Child::Indexed(0), 1)),
+        row("F169-constrained-face", tets, 2, place(Child::Indexed(NODE_LINES as u32), 0)),
+        row("F187-none", base, 1, NONE),
+        row("F187-none-in-a-raw-leaf", base, 15, NONE),
+        row("F187-none-on-a-grid", "places-grid-16", 39, NONE),
+        row("F187-none-in-a-subtree", tets, 1, NONE),
+        row("F187-none-in-a-deformable-object", "deformable", 0, NONE),
+    ]
+}
+
 /// Faults of free directions.
 fn free_directions() -> Vec<Case> {
     let base = "free-directions";
-    let (directions, levels) = (kind::FREE_DIRECTIONS, kind::FREE_LEVELS);
-    let rows = |name: &str, kind: u32, [stride, before, count]: [usize; 3]| {
-        broken(name, base, Seal::Sections, |e| {
-            let end = e.section_at(kind) + stride * count;
-            e.put(end, &vec![0; stride * (before - count)]);
-            let at = e.entry_at(0, kind);
-            e.put(at + offset_of!(SectionEntry, length), &((stride * count) as u64).to_le_bytes());
-            e.put(at + offset_of!(SectionEntry, count), &(count as u64).to_le_bytes());
-        })
-    };
-    let place = |leaf, slot| FreePlace { leaf, slot }.code();
+    let (directions, levels, places) = (kind::FREE_DIRECTIONS, kind::FREE_LEVELS, kind::TRIANGLE_PLACES);
+    let rows = |name: &str, kind: u32, rows: [usize; 3]| shortened((name, base), kind, rows);
     vec![
         rows("F022-two-rows-of-levels", levels, [16, 2, 2]),
-        rows("F168-rows", directions, [24, 2, 1]),
-        rows("F168-levels-alone", directions, [24, 2, 0]),
+        rows("F168-rows", directions, [20, 2, 1]),
+        rows("F168-levels-alone", directions, [20, 2, 0]),
         Case::new("F168-both-sections", super::valid::free_directions_and_distances()),
-        field("F169-place-of-another", base, directions, 0, place(Child::Indexed(0), 0)),
-        field("F169-other-leaf", base, directions, 0, place(Child::Raw(0), 1)),
-        field("F169-beyond", base, directions, 24, place(Child::Indexed(1 << 20), 0)),
-        field("F169-sectors-without-a-place", base, directions, 0, NONE),
-        field("F169-distances-without-a-place", "free-distances", kind::FREE_DISTANCES, 12, NONE),
-        field("F170-reserved", base, directions, 20, (FreeBins::BACK >> 96) as u32 | 1 << 25),
-        field("F170-last-bit", base, directions, 20, 1 << 31),
+        rows("F172-no-places", places, [4, 2, 0]),
+        shortened(("F172-distances-without-places", "free-distances"), places, [4, 2, 0]),
+        field("F170-reserved", base, directions, 16, (FreeBins::BACK >> 96) as u32 | 1 << 25),
+        field("F170-last-bit", base, directions, 16, 1 << 31),
         field("F171-infinite", base, levels, 8, f32::INFINITY.to_bits()),
         field("F171-negative", base, levels, 0, (-1f32).to_bits()),
         field("F171-not-ascending", base, levels, 0, 1f32.to_bits()),
         field("F171-reserved", base, levels, 12, 1),
         // The bin in the middle is free, though the triangle above lies there.
-        field("F209-met", base, directions, 8 + 4 * (FREE_BINS / 2 / 32), 1 << (FREE_BINS / 2 % 32)),
+        field("F209-met", base, directions, 4 + 4 * (FREE_BINS / 2 / 32), 1 << (FREE_BINS / 2 % 32)),
         // With a greater distance of the level, the triangle above lies within it.
         field("F209-met-within-a-level", base, levels, 8, 20f32.to_bits()),
         field("F209-met-within-a-level-of-distances", "free-distances", levels, 8, 20f32.to_bits()),

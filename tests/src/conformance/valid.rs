@@ -1,7 +1,7 @@
 //! Small valid files.
 
 use super::Case;
-use bth_compile::bvh::Wide;
+use bth_compile::bvh::{Wide, triangle_places};
 use bth_compile::coordinates::pack;
 use bth_compile::write::{FileBuilder, GroupParts, ObjectParts, Source, object, object_names};
 use bth_format::layout::*;
@@ -20,6 +20,8 @@ pub fn valid() -> Vec<Case> {
         Case::new("packed-nodes", two_levels(None, true)),
         Case::new("packed-nodes-grid-16", two_levels(Some(GridBits::B16), true)),
         Case::new("widened-boxes", two_levels_widened()),
+        Case::new("places", with_places(None, false)),
+        Case::new("places-grid-16", with_places(Some(GridBits::B16), true)),
         Case::new("opacity", opacity()),
         Case::new("free-directions", free_directions()),
         Case::new("free-distances", free_distances()),
@@ -144,16 +146,12 @@ fn one_above_the_other(free: &[FreeDirections], free_distances: &[FreeDistances]
         triangles: 2,
         lines: &lines,
         triangle_ids: &[1, 0],
+        places: &[1, 0].map(|slot| TrianglePlace { leaf: Child::Indexed(0), slot }.code()),
         free,
         free_distances,
         free_levels: &[LEVELS],
         ..ObjectParts::default()
     })
-}
-
-/// The place of the lower triangle, and of the upper one.
-fn places() -> [u32; 2] {
-    [1, 0].map(|slot| FreePlace { leaf: Child::Indexed(0), slot }.code())
 }
 
 /// Sectors of which that of steep directions has a level.
@@ -165,20 +163,15 @@ fn steep(level: usize) -> FreeSectors {
 /// Rows of [`one_above_the_other`]: straight up from the lower triangle there is nothing within the third level, and from the upper one nothing at
 /// all.
 fn directions() -> [FreeDirections; 2] {
-    let [lower, upper] = places();
     let all = FreeSectors(u32::MAX);
-    [
-        FreeDirections::new(lower, steep(3), FreeBins(0)),
-        FreeDirections::new(upper, all, FreeBins(FreeBins::ALL)),
-    ]
+    [FreeDirections::new(steep(3), FreeBins(0)), FreeDirections::new(all, FreeBins(FreeBins::ALL))]
 }
 
 /// As [`directions`], of both sides: there is nothing within the second level below the upper triangle, either.
 fn distances() -> [FreeDistances; 2] {
-    let [lower, upper] = places();
     [
-        FreeDistances { place: lower, sectors: [steep(3).0, u32::MAX] },
-        FreeDistances { place: upper, sectors: [u32::MAX, steep(2).0] },
+        FreeDistances { sectors: [steep(3).0, u32::MAX] },
+        FreeDistances { sectors: [u32::MAX, steep(2).0] },
     ]
 }
 
@@ -253,15 +246,24 @@ fn room_around(point: [f32; 3]) -> [[f32; 3]; 2] {
 /// leaves beside it; and a triangle without area. Normals and texture coordinates are kept. With bits, the leaves are
 /// quantized to a grid that moves the source's positions slightly; boxes of nodes may be packed.
 fn two_levels(bits: Option<GridBits>, packed_nodes: bool) -> Vec<u8> {
-    two_levels_of(bits, packed_nodes, false)
+    two_levels_of(bits, packed_nodes, [false; 2])
+}
+
+/// The same, with the places of triangles.
+fn with_places(bits: Option<GridBits>, packed_nodes: bool) -> Vec<u8> {
+    two_levels_of(bits, packed_nodes, [false, true])
 }
 
 /// As [`two_levels`], with child boxes that have the least room around the triangles that widened boxes must have.
 fn two_levels_widened() -> Vec<u8> {
-    two_levels_of(None, false, true)
+    two_levels_of(None, false, [true, false])
 }
 
-fn two_levels_of(bits: Option<GridBits>, packed_nodes: bool, widened_boxes: bool) -> Vec<u8> {
+fn two_levels_of(
+    bits: Option<GridBits>,
+    packed_nodes: bool,
+    [widened_boxes, has_places]: [bool; 2],
+) -> Vec<u8> {
     let mut positions = Vec::new();
     for y in 0..6 {
         for x in 0..5 {
@@ -323,6 +325,10 @@ fn two_levels_of(bits: Option<GridBits>, packed_nodes: bool, widened_boxes: bool
     });
     let packed = pack(&mut wide, grid.as_ref().map(|(grid, _)| grid), packed_nodes).expect("a few lines");
     assert_eq!(packed, packed_nodes);
+    let places = match &grid {
+        _ if !has_places => Vec::new(),
+        of_leaves => triangle_places(&wide, of_leaves.as_ref().map(|(grid, _)| grid), triangles.len()),
+    };
     let normals = vec![[0.0, 0.0, 1.0]; positions.len()];
     let uvs: Vec<_> = positions.iter().map(|p| [p[0] / 4.0, p[1] / 5.0]).collect();
     let source = Source {
@@ -342,6 +348,7 @@ fn two_levels_of(bits: Option<GridBits>, packed_nodes: bool, widened_boxes: bool
         widened_boxes,
         lines: &wide.lines,
         triangle_ids: &wide.triangle_ids,
+        places: &places,
         source: Some(source),
         ..ObjectParts::default()
     })
@@ -429,6 +436,8 @@ fn tets(record: RecordKind) -> Vec<u8> {
     all.extend(lines(indexed(&beside, 1).as_bytes()));
     let mut homes: Vec<u32> = (0..4).collect();
     homes.extend([NONE, NONE]);
+    let place = |leaf, slot| TrianglePlace { leaf: Child::Indexed(leaf), slot }.code();
+    let places = [place(subtree, 0), place(subtree, 1), NONE, NONE, place(leaf, 0), NONE];
     let source = Source { positions: &positions, triangles: &triangles, ..Source::default() };
     file(&ObjectParts {
         bounds: Some(bounds(&positions)),
@@ -439,6 +448,7 @@ fn tets(record: RecordKind) -> Vec<u8> {
         packed_nodes: false,
         lines: &all,
         triangle_ids: &[4, 0, 1],
+        places: &places,
         record: Some(record),
         tet_leaves: &parts.leaves,
         tets: &parts.records,

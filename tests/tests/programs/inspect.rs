@@ -60,7 +60,7 @@ fn verify_deep_finds_what_a_file_knows_wrongly() {
     let step = triangles.div_ceil(64);
     let bins = FreeBins::ALL.to_le_bytes();
     for triangle in (0..triangles).filter(|triangle| !triangle.is_multiple_of(step)) {
-        let at = editor.section_at(kind::FREE_DIRECTIONS) + 24 * triangle + 8;
+        let at = editor.section_at(kind::FREE_DIRECTIONS) + 20 * triangle + 4;
         editor.put(at, &bins);
     }
     std::fs::write(&path, editor.seal(Seal::Sections)).unwrap();

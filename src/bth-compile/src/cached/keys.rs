@@ -20,7 +20,7 @@ use std::path::Path;
 const MESH: &str = "7";
 const COORDINATES: &str = "1";
 const BVH: &str = "3";
-const FREE: &str = "6";
+const FREE: &str = "7";
 const MARKS: &str = "1";
 const COSTS: &str = "4";
 const TETS: &str = "1";
@@ -32,7 +32,7 @@ const MATERIALS: &str = "4";
 const DEFORMABLE: &str = "1";
 /// Version of how objects are compiled whose vertices move by themselves.
 pub(crate) const MOTION: &str = "1";
-const FILE: &str = "3";
+const FILE: &str = "4";
 const OUTLINE: &str = "2";
 
 /// A mesh read from a model. A supported extension determines the format in which the file is read.

@@ -13,8 +13,8 @@
 
 mod frame;
 mod meet;
-mod places;
 mod report;
+mod rows;
 mod search;
 mod see;
 mod start;
@@ -24,15 +24,15 @@ mod worth;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use places::FreeRows;
 pub use report::{FreeReport, Kept};
+pub(crate) use rows::FreeRows;
 pub use worth::{Seen, Worth};
 
 use crate::bvh::BinaryBvh;
 use crate::error::Result;
 use crate::monitor::Monitor;
 use bth::Isa;
-use bth_format::layout::{FREE_DISTANCE_RANGE, FreeDirections, FreeDistances, FreeSectors, NONE};
+use bth_format::layout::{FREE_DISTANCE_RANGE, FreeDirections, FreeDistances, FreeSectors};
 use bth_import::Mesh;
 use rayon::prelude::*;
 use search::{Decide, Found, Surroundings};
@@ -93,9 +93,9 @@ impl Default for FreeOptions {
 pub struct Free {
     /// Distances of the levels of sectors, object space.
     pub levels: [f32; FreeSectors::LEVELS],
-    /// Bins and sectors of one side, without places.
+    /// Bins and sectors of one side.
     pub directions: Vec<FreeDirections>,
-    /// Sectors of both sides, without places.
+    /// Sectors of both sides.
     pub distances: Vec<FreeDistances>,
 }
 
@@ -155,7 +155,7 @@ pub fn find(
         free.directions = vec![FreeDirections::UNKNOWN; triangles];
         for (row, found) in &decided {
             let side = usize::from(found.bins.is_back());
-            let of_triangle = FreeDirections::new(NONE, found.sectors[side], found.bins);
+            let of_triangle = FreeDirections::new(found.sectors[side], found.bins);
             free.directions[tree.order[*row] as usize] = of_triangle;
         }
     } else {

@@ -7,7 +7,7 @@ use crate::costs::{self, Choice, ProbeReport, Weighed, least_useful};
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::{bvh, tets};
-use bth_format::layout::{FreeLevels, Object as Header};
+use bth_format::layout::{FreeLevels, NONE, Object as Header};
 use bth_import::Mesh;
 
 /// How the tetrahedra of a mesh will be stored; under a limit on bytes also the size of the object without them.
@@ -112,10 +112,12 @@ fn bytes(
 ) -> Result<u64> {
     let cut: Vec<u32> = leaves.iter().map(|(node, _)| *node).collect();
     let wide = collapse(traced, &cut, options, monitor)?.0.wide;
-    let face_of_triangle = if leaves.is_empty() { 0 } else { size_of::<u32>() * traced.mesh.triangles.len() };
+    let row_per_triangle = size_of::<u32>() * traced.mesh.triangles.len();
+    let face_of_triangle = if leaves.is_empty() { 0 } else { row_per_triangle };
+    let places = if wide.root == NONE { 0 } else { row_per_triangle };
     let rest = size_of::<Header>() + size_of_val(&wide.lines[..]) + size_of_val(&wide.triangle_ids[..]);
     let tets = leaves.iter().map(|(_, tets)| tets::encoded_bytes(tets, options.record));
-    Ok((rest + face_of_triangle) as u64 + tets.sum::<u64>())
+    Ok((rest + face_of_triangle + places) as u64 + tets.sum::<u64>())
 }
 
 /// The gain of a tet leaf as probed, or without a probe as estimated when the node was chosen. A cell of a chosen node that

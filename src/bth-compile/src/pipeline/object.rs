@@ -56,6 +56,8 @@ pub(crate) struct Object {
     traced: TracedMesh,
     wide: bvh::Wide,
     packed_nodes: bool,
+    /// The place of each triangle in the leaves.
+    places: Vec<u32>,
     /// Absent where free directions are not kept.
     free: Option<free::FreeRows>,
     /// Absent without tet leaves.
@@ -92,11 +94,13 @@ pub(super) fn join(
     let tet_triangles = meshes.iter().map(|m| m.faces.len() as u64).sum();
     let groups = traced.mesh.groups.as_ref().map(write::GroupParts::of);
     let grid = traced.on_grid.as_ref().map(|on_grid| &on_grid.grid);
-    let free = free.map(|free| free::FreeRows::new(&free, &wide, grid));
+    let places = bvh::triangle_places(&wide, grid, triangles);
+    let free = free.map(|free| free::FreeRows::new(free, &places));
     let object = Object {
         traced,
         wide,
         packed_nodes,
+        places,
         free,
         encoded,
         groups,
@@ -202,6 +206,7 @@ impl Object {
             lines: &self.wide.lines,
             triangle_ids: &self.wide.triangle_ids,
             leaf_vertices: &self.wide.leaf_vertices,
+            places: &self.places,
             grid: on_grid.as_ref().map(|on| (on.grid, on.displacement)),
             packed_nodes: self.packed_nodes,
             widened_boxes: self.wide.widened_boxes,
@@ -264,6 +269,7 @@ fn resident_bytes(parts: &write::ObjectParts<'_>) -> u64 {
         + size_of_val(parts.tet_faces)
         + size_of_val(parts.hull_faces)
         + size_of_val(parts.triangle_faces)
+        + size_of_val(parts.places)
         + size_of_val(parts.free)
         + size_of_val(parts.free_distances)
         + size_of_val(parts.free_levels)

@@ -45,6 +45,8 @@ pub struct ObjectParts<'a> {
     pub hull_faces: &'a [HullFace],
     /// Row of `tet_faces` per source triangle; left out without tet leaves.
     pub triangle_faces: &'a [u32],
+    /// The place of each triangle in the leaves; empty if it is not kept.
+    pub places: &'a [u32],
     /// In which directions rays that start on each triangle meet nothing; empty where nothing is known.
     pub free: &'a [FreeDirections],
     /// Within which distances they meet nothing, in place of `free`.
@@ -132,6 +134,7 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
     if record.is_some() {
         builder.rows(kind::TRIANGLE_FACES, index, parts.triangle_faces)?;
     }
+    builder.rows(kind::TRIANGLE_PLACES, index, parts.places)?;
     builder.rows(kind::FREE_DIRECTIONS, index, parts.free)?;
     if !parts.free.is_empty() || !parts.free_distances.is_empty() {
         builder.rows(kind::FREE_LEVELS, index, parts.free_levels)?;

@@ -1,12 +1,11 @@
-//! The free directions and distances of triangles: BTH-F168 to BTH-F171.
+//! The free directions and distances of triangles: BTH-F168 and BTH-F170 to BTH-F172.
 
-use super::bit_set::BitSet;
 use crate::error::{Code, Error, Result};
-use crate::layout::{Child, FREE_DISTANCE_RANGE, FreeBins, FreeDirections, FreePlace, NONE, kind};
+use crate::layout::{FREE_DISTANCE_RANGE, FreeBins, FreeDirections, NONE, kind};
 use crate::object::ObjectView;
 use std::mem::offset_of;
 
-/// Checks everything but the places of triangles.
+/// Checks the rows and the levels.
 pub(super) fn check(view: &ObjectView) -> Result<()> {
     let triangles = if view.is_deformable() { 0 } else { view.header.triangles as usize };
     let (directions, distances) = (view.free.len(), view.free_distances.len());
@@ -41,45 +40,18 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
             return Err(Error::within(Code::FreeBins, kind::FREE_DIRECTIONS, at, expected, found));
         }
     }
-    Ok(())
+    check_unplaced(view)
 }
 
-/// Marks the triangles of a leaf, which has been checked, that lie where their rows say.
-pub(super) fn mark_placed(view: &ObjectView, leaf: Child, placed: &mut BitSet) {
-    if !view.has_free_directions() {
-        return;
-    }
-    let (first, triangles) = match leaf {
-        Child::Indexed(index) => {
-            let mut unpacked = None;
-            let leaf = view.indexed(index, &mut unpacked);
-            (leaf.first, leaf.triangles)
-        }
-        Child::Raw(index) => {
-            let mut unpacked = None;
-            let leaf = view.raw(index, &mut unpacked);
-            (leaf.first, leaf.triangles)
-        }
-        Child::Node(_) | Child::Packed(_) | Child::Tets(_) => return,
-    };
-    for slot in 0..triangles {
-        let triangle = view.triangle_ids[(first + slot) as usize] as usize;
-        let place = FreePlace { leaf, slot }.code();
-        if place != NONE && view.free_place(triangle).is_some_and(|(found, _)| found == place) {
-            placed.insert(triangle);
-        }
-    }
-}
-
-/// BTH-F169: rows have no place and nothing known, or the place of their triangle.
-pub(super) fn check_places(view: &ObjectView, placed: &BitSet) -> Result<()> {
-    for triangle in 0..view.header.triangles as usize {
-        let Some((place, is_told)) = view.free_place(triangle) else { break };
-        let is_right = if place == NONE { !is_told } else { placed.contains(triangle) };
-        if !is_right {
-            let (kind, stride) = view.free_kind();
-            let (at, expected) = ((stride * triangle) as u64, "the place of the triangle, or NONE and zeros");
-            return Err(Error::within(Code::FreePlace, kind, at, expected, text!("{place:#010x}")));
+/// BTH-F172: a row of a triangle without a place is zero.
+fn check_unplaced(view: &ObjectView) -> Result<()> {
+    let (kind, stride) = view.free_kind();
+    for triangle in 0.. {
+        let Some(known) = view.known_free(triangle) else { break };
+        let place = view.places.get(triangle).copied().unwrap_or(NONE);
+        if place == NONE && !known.is_nothing() {
+            let (at, expected) = ((stride * triangle) as u64, "zeros, since the triangle has no place");
+            return Err(Error::within(Code::FreeUnplaced, kind, at, expected, text!("{known:?}")));
         }
     }
     Ok(())

@@ -38,6 +38,7 @@ fn record(view: &ObjectView) -> Result<()> {
 fn counts(view: &ObjectView) -> Result<()> {
     let h = view.header;
     let rows = [
+        ("TRIANGLE_PLACES", view.places.len()),
         ("TRIANGLE_FACES", view.triangle_faces.len()),
         ("TRIANGLES", view.triangles.len()),
         ("CORNERS", view.corners.len()),

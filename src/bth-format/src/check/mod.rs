@@ -17,6 +17,7 @@ mod leaves;
 mod materials;
 mod nodes;
 mod opacity;
+mod places;
 mod rows;
 mod scene;
 mod sequence;
@@ -38,7 +39,7 @@ use crate::object::ObjectView;
 /// Checks every index of an object. `features` are those that the header of its file requires.
 ///
 /// # Errors
-/// The first violation of `BTH-F101` to `BTH-F147` and `BTH-F163` to `BTH-F171`, with an offset from the start of its section;
+/// The first violation of `BTH-F101` to `BTH-F147` and `BTH-F163` to `BTH-F172` and `BTH-F187`, with an offset from the start of its section;
 /// [`crate::file::File::check`] gives offsets from the start of the file.
 pub(crate) fn object(view: &ObjectView, features: u64) -> Result<()> {
     header::check(view)?;

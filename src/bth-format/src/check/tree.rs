@@ -4,7 +4,8 @@
 //! half line that is claimed twice is an error. So every block is visited once, the work is O(lines), and there is no cycle.
 
 use super::bit_set::BitSet;
-use super::{free, leaves, nodes};
+use super::places::Placed;
+use super::{leaves, nodes};
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::limits::MAX_DEPTH;
@@ -39,13 +40,13 @@ impl Reference {
 }
 
 /// Checks that the blocks of LINES and the tet leaves form one tree that covers both: BTH-F105 to BTH-F115, BTH-F117,
-/// BTH-F118, BTH-F123 and BTH-F169.
+/// BTH-F118, BTH-F123, BTH-F169 and BTH-F187.
 pub(super) fn check(view: &ObjectView) -> Result<()> {
     let mut tree = Tree {
         view,
         claimed: BitSet::new(2 * view.lines.len()),
         referenced: BitSet::new(view.tet_leaves.len()),
-        placed: BitSet::new(view.free.len().max(view.free_distances.len())),
+        placed: Placed::new(view),
         stack: Vec::new(),
     };
     let at = offset_of!(Object, root) as u64;
@@ -58,7 +59,7 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
     }
     tree.check_claimed()?;
     tree.check_referenced()?;
-    free::check_places(view, &tree.placed)
+    tree.placed.check(view)
 }
 
 struct Tree<'a> {
@@ -67,8 +68,7 @@ struct Tree<'a> {
     claimed: BitSet,
     /// Tet leaves that a code leads to.
     referenced: BitSet,
-    /// Triangles that lie where FREE_DIRECTIONS or FREE_DISTANCES says.
-    placed: BitSet,
+    placed: Placed,
     stack: Vec<Reference>,
 }
 
@@ -84,8 +84,7 @@ impl Tree<'_> {
             Child::Node(_) | Child::Packed(_) => self.follow_node(reference, child, first_half),
             _ => {
                 leaves::check(self.view, child, first_half * HALF_LINE as u64)?;
-                free::mark_placed(self.view, child, &mut self.placed);
-                Ok(())
+                self.placed.add_leaf(self.view, child)
             }
         }
     }

@@ -171,6 +171,7 @@ impl DeformedObject {
             lines: tree.lines,
             triangle_ids: tree.triangle_ids,
             leaf_vertices: tree.leaf_vertices,
+            places: tree.places,
             tet_leaves: tree.tet_leaves,
             records: tree.records,
             tet_vertices: tree.tet_vertices,

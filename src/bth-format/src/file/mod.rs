@@ -275,6 +275,7 @@ impl File {
             hull_faces: self.slice(object, kind::HULL_FACES),
             triangle_faces: self.slice(object, kind::TRIANGLE_FACES),
             leaf_vertices: self.slice(object, kind::LEAF_VERTICES),
+            places: self.slice(object, kind::TRIANGLE_PLACES),
             free: self.slice(object, kind::FREE_DIRECTIONS),
             free_distances: self.slice(object, kind::FREE_DISTANCES),
             free_levels: self.slice(object, kind::FREE_LEVELS),

@@ -44,6 +44,7 @@ pub fn kind_stride(kind: u32) -> Option<usize> {
         kind::OBJECT => size_of::<Object>(),
         kind::LINES => size_of::<CacheLine>(),
         kind::TRIANGLE_IDS | kind::TRIANGLE_FACES | kind::OPACITY | kind::OPACITY_MICRO => 4,
+        kind::TRIANGLE_PLACES => 4,
         kind::TET_LEAVES => size_of::<TetLeaf>(),
         kind::LEAF_VERTICES => size_of::<[u32; WIDTH]>(),
         kind::TETS => 0,
@@ -100,7 +101,7 @@ fn max_count(kind: u32) -> u64 {
         kind::TRIANGLE_IDS | kind::TRIANGLE_FACES | kind::TRIANGLES | kind::CORNERS | kind::OPACITY => {
             limits::MAX_TRIANGLES as u64
         }
-        kind::FREE_DIRECTIONS | kind::FREE_DISTANCES => limits::MAX_TRIANGLES as u64,
+        kind::TRIANGLE_PLACES | kind::FREE_DIRECTIONS | kind::FREE_DISTANCES => limits::MAX_TRIANGLES as u64,
         kind::FREE_LEVELS => 1,
         kind::OPACITY_MICRO => limits::MAX_OPACITY_WORDS as u64,
         kind::LEAF_VERTICES => limits::MAX_LEAF_VERTICES as u64,

@@ -1,6 +1,6 @@
 //! What rays that start on a triangle cannot meet. Specification: "Free directions".
 
-use super::{Child, NONE, assert_layout::assert_layout};
+use super::assert_layout::assert_layout;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// Columns, and rows, of direction bins.
@@ -33,8 +33,6 @@ pub const FREE_DISTANCE_RANGE: [f32; 2] = [1.0 / (1u64 << 50) as f32, (1u64 << 5
 #[derive(Clone, Copy, Debug, PartialEq, Eq, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct FreeDirections {
-    /// Where the triangle lies ([`FreePlace`]); [`NONE`] if nothing is known.
-    pub place: u32,
     /// [`FreeSectors`] of the side that `bins` are of.
     pub sectors: u32,
     /// [`FreeBins`], the lowest bits first.
@@ -45,8 +43,6 @@ pub struct FreeDirections {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct FreeDistances {
-    /// As of [`FreeDirections`].
-    pub place: u32,
     /// [`FreeSectors`] of the front, and of the back.
     pub sectors: [u32; 2],
 }
@@ -62,8 +58,8 @@ pub struct FreeLevels {
 }
 
 assert_layout! {
-    FreeDirections 24 { sectors 4, bins 8 }
-    FreeDistances 12 { sectors 4 }
+    FreeDirections 20 { bins 4 }
+    FreeDistances 8 { sectors 0 }
     FreeLevels 16 { reserved 12 }
 }
 
@@ -133,13 +129,13 @@ impl FreeLevels {
 }
 
 impl FreeDirections {
-    /// A row that knows nothing.
-    pub const UNKNOWN: Self = FreeDirections { place: NONE, sectors: 0, bins: [0; 4] };
+    /// No free direction is known.
+    pub const UNKNOWN: Self = FreeDirections { sectors: 0, bins: [0; 4] };
 
     /// The row of a triangle.
-    pub fn new(place: u32, sectors: FreeSectors, bins: FreeBins) -> Self {
+    pub fn new(sectors: FreeSectors, bins: FreeBins) -> Self {
         let bins = std::array::from_fn(|k| (bins.0 >> (32 * k)) as u32);
-        FreeDirections { place, sectors: sectors.0, bins }
+        FreeDirections { sectors: sectors.0, bins }
     }
 
     /// The bins.
@@ -149,15 +145,13 @@ impl FreeDirections {
 }
 
 impl FreeDistances {
-    /// A row that knows nothing.
-    pub const UNKNOWN: Self = FreeDistances { place: NONE, sectors: [0; 2] };
+    /// No distance is known.
+    pub const UNKNOWN: Self = FreeDistances { sectors: [0; 2] };
 }
 
 /// What an object knows of the directions of a triangle, from whichever section it has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct KnownFree {
-    /// Where the triangle lies ([`FreePlace`]).
-    pub place: u32,
     /// The sectors of the front, and of the back.
     pub sectors: [FreeSectors; 2],
     /// The free bins; none where the section has none.
@@ -175,13 +169,13 @@ impl From<&FreeDirections> for KnownFree {
     fn from(row: &FreeDirections) -> Self {
         let (bins, mut sectors) = (row.bins(), [FreeSectors(0); 2]);
         sectors[usize::from(bins.is_back())] = FreeSectors(row.sectors);
-        KnownFree { place: row.place, sectors, bins }
+        KnownFree { sectors, bins }
     }
 }
 
 impl From<&FreeDistances> for KnownFree {
     fn from(row: &FreeDistances) -> Self {
-        KnownFree { place: row.place, sectors: row.sectors.map(FreeSectors), bins: FreeBins(0) }
+        KnownFree { sectors: row.sectors.map(FreeSectors), bins: FreeBins(0) }
     }
 }
 
@@ -234,43 +228,6 @@ pub fn free_column(column: usize) -> [f64; 2] {
     [least - margin(least), greatest + margin(greatest)]
 }
 
-/// Place of a triangle in the leaves of an object: bit 31 is set for raw leaves, bits 4 to 30 are the index of the leaf's child
-/// code, bits 0 to 3 the slot.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FreePlace {
-    /// The leaf, [`Child::Indexed`] or [`Child::Raw`].
-    pub leaf: Child,
-    /// Slot of the triangle in the leaf.
-    pub slot: u32,
-}
-
-impl FreePlace {
-    /// Leaf indices are below this.
-    pub const INDEX_LIMIT: u32 = (1 << 27) - 1;
-    /// Bit of a code that is set for raw leaves.
-    pub const RAW: u32 = 1 << 31;
-
-    /// The number that encodes it; [`NONE`] for leaves whose index does not fit and what is no triangle leaf.
-    pub fn code(self) -> u32 {
-        match self.leaf {
-            Child::Indexed(index) if index < Self::INDEX_LIMIT => index << 4 | self.slot,
-            Child::Raw(index) if index < Self::INDEX_LIMIT => Self::RAW | index << 4 | self.slot,
-            _ => NONE,
-        }
-    }
-
-    /// The place that a number encodes; `None` for [`NONE`] and other numbers beyond the limit.
-    #[inline(always)]
-    pub const fn from_code(code: u32) -> Option<Self> {
-        let (index, slot) = (code >> 4 & Self::INDEX_LIMIT, code & 15);
-        if index == Self::INDEX_LIMIT {
-            return None;
-        }
-        let leaf = if code & Self::RAW == 0 { Child::Indexed(index) } else { Child::Raw(index) };
-        Some(FreePlace { leaf, slot })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -283,26 +240,12 @@ mod tests {
             let bits = (0..4).fold(0u128, |bits, _| bits << 32 | u128::from(random.below(1 << 32)));
             let sectors = (0..FREE_SECTORS)
                 .fold(FreeSectors(0), |all, sector| all.with(sector, (bits >> (2 * sector) & 3) as usize));
-            let row = FreeDirections::new(7, sectors, FreeBins(bits));
+            let row = FreeDirections::new(sectors, FreeBins(bits));
             assert_eq!(row.bins().0, bits);
             for sector in 0..FREE_SECTORS {
                 assert_eq!(FreeSectors(row.sectors).level(sector), (bits >> (2 * sector) & 3) as usize);
             }
         }
-    }
-
-    #[test]
-    fn places_are_encoded() {
-        for leaf in
-            [Child::Indexed(0), Child::Raw(0), Child::Indexed(77), Child::Raw(FreePlace::INDEX_LIMIT - 1)]
-        {
-            let place = FreePlace { leaf, slot: 9 };
-            assert_eq!(FreePlace::from_code(place.code()), Some(place));
-        }
-        for leaf in [Child::Indexed(FreePlace::INDEX_LIMIT), Child::Node(0), Child::Tets(1)] {
-            assert_eq!(FreePlace { leaf, slot: 0 }.code(), NONE);
-        }
-        assert_eq!(FreePlace::from_code(NONE), None);
     }
 
     #[test]

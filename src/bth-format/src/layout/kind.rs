@@ -37,6 +37,8 @@ kinds! {
     /// `[u32; 16]` per indexed leaf and three of them per raw leaf, in the order of the leaves: rows of `POSITIONS`. Objects that
     /// have it can be given new positions ("Deformable objects").
     LEAF_VERTICES = 10;
+    /// `u32` per source triangle: its [`super::TrianglePlace`], or `NONE`.
+    TRIANGLE_PLACES = 11;
     /// [`super::FreeDirections`] per source triangle: what rays that start on it cannot meet.
     FREE_DIRECTIONS = 12;
     /// One [`super::FreeLevels`], if there are free directions or distances.
@@ -148,6 +150,7 @@ pub const fn is_sequence(kind: u32) -> bool {
 /// Whether tracing reads sections of this kind of an object.
 pub const fn is_traced(kind: u32) -> bool {
     is_required(kind) && kind != LEAF_VERTICES && !is_sequence(kind) && !is_of_file(kind)
+        || kind == TRIANGLE_PLACES
         || kind == FREE_DIRECTIONS
         || kind == FREE_LEVELS
         || kind == FREE_DISTANCES

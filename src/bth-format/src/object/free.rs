@@ -16,14 +16,6 @@ impl ObjectView<'_> {
         of_directions.or_else(|| self.free_distances.get(triangle).map(KnownFree::from))
     }
 
-    /// Where the file says that a triangle lies, and whether it tells anything else of it; `None` beyond the last row.
-    pub(crate) fn free_place(&self, triangle: usize) -> Option<(u32, bool)> {
-        if let Some(row) = self.free.get(triangle) {
-            return Some((row.place, row.sectors != 0 || row.bins != [0; 4]));
-        }
-        self.free_distances.get(triangle).map(|row| (row.place, row.sectors != [0; 2]))
-    }
-
     /// The kind of the section that [`Self::known_free`] reads, and the bytes of its rows.
     pub fn free_kind(&self) -> (u32, usize) {
         if self.free.is_empty() {

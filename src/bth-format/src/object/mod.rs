@@ -9,6 +9,7 @@ mod groups;
 mod leaves;
 mod nodes;
 mod opacity;
+mod places;
 mod records;
 mod view;
 

@@ -35,6 +35,8 @@ pub struct ObjectView<'a> {
     /// Per leaf its rows of `positions`, in the order of the leaves: one row for an indexed leaf, one for each corner of a raw
     /// one. Empty but in deformable objects.
     pub leaf_vertices: &'a [[u32; WIDTH]],
+    /// Per source triangle its [`TrianglePlace`], or [`NONE`]. Empty if the file has none.
+    pub places: &'a [u32],
     /// Per source triangle in which directions rays that start on it meet nothing; empty where nothing is known.
     pub free: &'a [FreeDirections],
     /// Per source triangle within which distances such rays meet nothing, in place of `free`.

@@ -5,7 +5,7 @@
 
 use crate::error::{Code, Error, Result, Text};
 use crate::exact::side;
-use crate::layout::{Child, FreeLevels, FreePlace, KnownFree, free_axes, free_bin};
+use crate::layout::{Child, FreeLevels, KnownFree, TrianglePlace, free_axes, free_bin};
 use crate::object::ObjectView;
 use std::cmp::Ordering;
 
@@ -21,7 +21,10 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
     }
     let known: Vec<KnownFree> =
         (0..view.header.triangles as usize).map_while(|triangle| view.known_free(triangle)).collect();
-    let triangles: Vec<Option<Corners>> = known.iter().map(|known| corners(view, known.place)).collect();
+    let triangles: Vec<Option<Corners>> = (0..)
+        .zip(&known)
+        .map(|(triangle, known)| if known.is_nothing() { None } else { corners(view, view.place(triangle)?) })
+        .collect();
     let levels = view.free_levels.first().copied().unwrap_or_default();
     let (kind, stride) = view.free_kind();
     let step = triangles.len().div_ceil(STARTS).max(1);
@@ -78,8 +81,7 @@ fn all_corners(view: &ObjectView) -> Vec<(u32, Corners)> {
 }
 
 /// The corners of the triangle at a place, if it is one.
-fn corners(view: &ObjectView, place: u32) -> Option<Corners> {
-    let FreePlace { leaf, slot } = FreePlace::from_code(place)?;
+fn corners(view: &ObjectView, TrianglePlace { leaf, slot }: TrianglePlace) -> Option<Corners> {
     let (mut indexed, mut raw) = (None, None);
     match leaf {
         Child::Indexed(index) => Some(view.indexed(index, &mut indexed).triangle(slot as usize)),

@@ -149,6 +149,7 @@ impl HeightField {
             tet_faces: &[],
             hull_faces: &[],
             triangle_faces: &[],
+            places: &[],
             free: &[],
             free_distances: &[],
             free_levels: &[],

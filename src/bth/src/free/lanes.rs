@@ -77,13 +77,13 @@ impl<R: Row> Kernel for FreeKernel<'_, '_, R> {
         rest.resize(end + range.len() + LANES, 0);
         let (blocks, _) = from[range.clone()].as_chunks::<LANES>();
         let mut ahead = [hints(s, blocks, 0), hints(s, blocks, 1)];
-        ahead[0].prefetch_rows(s, rows);
-        ahead[1].prefetch_rows(s, rows);
-        ahead[0].prefetch_leaves(s, object, rows);
+        ahead[0].prefetch_rows(s, object, rows);
+        ahead[1].prefetch_rows(s, object, rows);
+        ahead[0].prefetch_leaves(s, object);
         for i in 0..=blocks.len() {
             let next = hints(s, blocks, i + 2);
-            next.prefetch_rows(s, rows);
-            ahead[1].prefetch_leaves(s, object, rows);
+            next.prefetch_rows(s, object, rows);
+            ahead[1].prefetch_leaves(s, object);
             for line in 0..LANES / RAYS_PER_CACHE_LINE {
                 let ray = range.start + (i + 1) * LANES + line * RAYS_PER_CACHE_LINE;
                 s.prefetch(rays.as_ptr().wrapping_add(ray));

@@ -22,7 +22,7 @@ mod starts;
 
 use crate::rays::Ray;
 use crate::simd::{Isa, LANES};
-use bth_format::layout::{Child, FreePlace};
+use bth_format::layout::{Child, TrianglePlace};
 use bth_format::object::ObjectView;
 use lanes::FreeKernel;
 use starts::Row;
@@ -132,10 +132,10 @@ fn one_by_one(
     count
 }
 
-/// The corners of the triangle at a place.
+/// The corners of the triangle at the place with a code.
 #[inline(always)]
 fn corners_at(object: &ObjectView<'_>, place: u32) -> Option<[[f32; 3]; 3]> {
-    let FreePlace { leaf, slot } = FreePlace::from_code(place)?;
+    let TrianglePlace { leaf, slot } = TrianglePlace::from_code(place)?;
     let slot = slot as usize;
     if object.grid.is_some() {
         return corners_on_grid(object, leaf, slot);

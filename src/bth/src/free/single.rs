@@ -22,7 +22,7 @@ pub(super) fn begin(object: &ObjectView<'_>, ray: &Ray, triangle: u32) -> f32 {
 
 fn known_begin(object: &ObjectView<'_>, ray: &Ray, triangle: u32) -> Option<f32> {
     let known = object.known_free(triangle as usize)?;
-    let corners = corners_at(object, known.place)?;
+    let corners = corners_at(object, *object.places.get(triangle as usize)?)?;
     let direction = ray.direction;
     let greatest = direction[0].abs().max(direction[1].abs()).max(direction[2].abs());
     if !(greatest > DIRECTIONS[0] && greatest < DIRECTIONS[1]) {

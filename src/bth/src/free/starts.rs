@@ -2,7 +2,7 @@
 
 use super::corners_at;
 use crate::simd::{LANES, Simd};
-use bth_format::layout::{Child, FreeBins, FreeDirections, FreeDistances, FreePlace};
+use bth_format::layout::{Child, FreeBins, FreeDirections, FreeDistances, TrianglePlace};
 use bth_format::object::{NodeBase, ObjectView};
 
 /// Bit of the last word of bins.
@@ -12,19 +12,12 @@ const BACK: u32 = (FreeBins::BACK >> 96) as u32;
 pub(super) trait Row {
     /// Whether it tells free bins.
     const HAS_BINS: bool;
-    /// Where the triangle lies.
-    fn place(&self) -> u32;
     /// Copies what the row tells to a column.
     fn copy(&self, starts: &mut Starts, column: usize);
 }
 
 impl Row for FreeDirections {
     const HAS_BINS: bool = true;
-
-    #[inline(always)]
-    fn place(&self) -> u32 {
-        self.place
-    }
 
     #[inline(always)]
     fn copy(&self, starts: &mut Starts, column: usize) {
@@ -39,11 +32,6 @@ impl Row for FreeDirections {
 
 impl Row for FreeDistances {
     const HAS_BINS: bool = false;
-
-    #[inline(always)]
-    fn place(&self) -> u32 {
-        self.place
-    }
 
     #[inline(always)]
     fn copy(&self, starts: &mut Starts, column: usize) {
@@ -83,25 +71,25 @@ impl<'a> Hints<'a> {
         Hints { triangle, new: !same & 0xffff | 1 }
     }
 
-    /// Prefetches the rows of the triangles.
+    /// Prefetches the rows and the places of the triangles.
     #[inline(always)]
-    pub(super) fn prefetch_rows<S: Simd, R: Row>(&self, s: S, rows: &[R]) {
+    pub(super) fn prefetch_rows<S: Simd, R: Row>(&self, s: S, object: &ObjectView<'_>, rows: &[R]) {
         for &triangle in self.triangle {
             s.prefetch(rows.as_ptr().wrapping_add(triangle as usize));
+            s.prefetch(object.places.as_ptr().wrapping_add(triangle as usize));
         }
     }
 
-    /// Prefetches the leaves in which the triangles lie, whose rows are there. Those on a grid, and what is beyond the lines of an
+    /// Prefetches the leaves in which the triangles lie, whose places are there. Those on a grid, and what is beyond the lines of an
     /// indexed leaf, are not.
     #[inline(always)]
-    pub(super) fn prefetch_leaves<S: Simd, R: Row>(&self, s: S, object: &ObjectView<'_>, rows: &[R]) {
+    pub(super) fn prefetch_leaves<S: Simd>(&self, s: S, object: &ObjectView<'_>) {
         let mut new = self.new;
         while new != 0 {
             let lane = new.trailing_zeros() as usize % LANES;
             new &= new - 1;
-            let Some(row) = rows.get(self.triangle[lane] as usize) else { continue };
-            let leaf =
-                object.lines.as_ptr().wrapping_add((row.place() >> 4 & FreePlace::INDEX_LIMIT) as usize);
+            let Some(place) = object.places.get(self.triangle[lane] as usize) else { continue };
+            let leaf = object.lines.as_ptr().wrapping_add((place >> 4 & TrianglePlace::INDEX_LIMIT) as usize);
             for k in 0..4 {
                 s.prefetch(leaf.wrapping_add(k));
             }
@@ -149,7 +137,9 @@ impl Starts {
         while new != 0 {
             let lane = new.trailing_zeros() as usize % LANES;
             new &= new - 1;
-            self.set((object, base), rows.get(hints.triangle[lane] as usize), lane);
+            let triangle = hints.triangle[lane] as usize;
+            let row = rows.get(triangle).zip(object.places.get(triangle));
+            self.set((object, base), row, lane);
         }
     }
 
@@ -165,17 +155,19 @@ impl Starts {
     }
 
     #[inline(always)]
-    fn set<R: Row>(&mut self, of: (&ObjectView<'_>, NodeBase<'_>), row: Option<&R>, column: usize) {
+    fn set<R: Row>(&mut self, of: (&ObjectView<'_>, NodeBase<'_>), row: Option<(&R, &u32)>, column: usize) {
         let (object, base) = of;
         // A triangle that does not exist has no row, nor has NONE.
-        let Some(row) = row else {
+        let Some((row, &place)) = row else {
             return self.set_corners([[0.0; 3]; 3], column);
         };
         row.copy(self, column);
-        let place = row.place();
         // Most triangles lie in indexed leaves of f32.
-        let leaf =
-            if place & FreePlace::RAW == 0 { base.indexed_leaf(Child::LEAF_BIT | place >> 4) } else { None };
+        let leaf = if place & TrianglePlace::RAW == 0 {
+            base.indexed_leaf(Child::LEAF_BIT | place >> 4)
+        } else {
+            None
+        };
         let Some(leaf) = leaf else {
             return self.set_corners(corners_at(object, place).unwrap_or_default(), column);
         };

@@ -1,12 +1,10 @@
-"""Free directions and distances (format-spec/README.md, "Free directions"): F168 to F171, F209 and F210."""
+"""Free directions and distances (format-spec/README.md, "Free directions"): F168, F170 to F172, F209 and F210."""
 
 import math
 from fractions import Fraction
 
 import bth_container as c
-import bth_leaves
 from bth_container import NONE
-from bth_leaves import INDEXED, RAW
 
 SIDE, BINS = 11, 121
 BACK = 1 << 126
@@ -24,7 +22,7 @@ STARTS = 64
 
 
 def check(view):
-    """F168, F170 and F171."""
+    """F168 and F170 to F172."""
     directions, distances, levels = view.free, view.free_distances, view.free_levels
     rows = 0 if view.leaf_vertices else view.triangles
     if len(directions) not in (0, rows):
@@ -39,50 +37,36 @@ def check(view):
             raise view.invalid("F171", f"levels {of}, {reserved}", c.FREE_LEVELS)
     for triangle, row in enumerate(directions):
         if _bits(row) & ~((1 << BINS) - 1 | BACK):
-            raise view.invalid("F170", f"{_bits(row):#034x}", c.FREE_DIRECTIONS, 24 * triangle + 8)
+            raise view.invalid("F170", f"{_bits(row):#034x}", c.FREE_DIRECTIONS, 20 * triangle + 4)
+    for triangle, known in enumerate(_known(view)):
+        if _is_known(known) and not (view.places and view.places[triangle] != NONE):
+            raise _invalid(view, "F172", f"{known} without a place", triangle)
 
 
 def _bits(row):
     """The 128 bits of the bins of a row of FREE_DIRECTIONS."""
-    return sum(word << 32 * k for k, word in enumerate(row[2:]))
+    return sum(word << 32 * k for k, word in enumerate(row[1:]))
 
 
 def _known(view):
-    """For each triangle its place, the sectors of its front and its back, and the bits of its bins."""
+    """For each triangle the sectors of its front and its back, and the bits of its bins."""
     for row in view.free:
         bits = _bits(row)
-        yield row[0], (0, row[1]) if bits & BACK else (row[1], 0), bits
-    for place, front, back in view.free_distances:
-        yield place, (front, back), 0
+        yield (0, row[0]) if bits & BACK else (row[0], 0), bits
+    for front, back in view.free_distances:
+        yield (front, back), 0
+
+
+def _is_known(known):
+    """Whether anything is known of a triangle."""
+    sectors, bins = known
+    return any(sectors) or bins
 
 
 def _invalid(view, code, found, triangle):
     """An error in the row of a triangle."""
-    kind, row = (c.FREE_DIRECTIONS, 24) if view.free else (c.FREE_DISTANCES, 12)
+    kind, row = (c.FREE_DIRECTIONS, 20) if view.free else (c.FREE_DISTANCES, 8)
     return view.invalid(code, found, kind, row * triangle)
-
-
-def _code(kind, index, slot):
-    """The number of a place; NONE if the index is too large."""
-    return NONE if index >= (1 << 27) - 1 else (kind == RAW) << 31 | index << 4 | slot
-
-
-def placed(view, kind, index):
-    """Triangles of a leaf that lie where their rows say."""
-    rows = view.free or view.free_distances
-    if rows:
-        found = bth_leaves.leaf(view, kind, index)
-        for slot in range(found.triangles):
-            triangle, place = view.triangle_ids[found.first + slot], _code(kind, index, slot)
-            if place != NONE and triangle < len(rows) and rows[triangle][0] == place:
-                yield triangle
-
-
-def check_places(view, found):
-    """F169; `found` holds the triangles that lie where their rows say."""
-    for triangle, (place, sectors, bins) in enumerate(_known(view)):
-        if any(sectors) or bins if place == NONE else triangle not in found:
-            raise _invalid(view, "F169", f"place {place:#x}", triangle)
 
 
 def _minus(p, q):
@@ -165,8 +149,8 @@ def check_met(view, corners, side):
     points, scale = in_integers([p for triangle in corners.values() for p in triangle])
     integers = {triangle: points[3 * k : 3 * k + 3] for k, triangle in enumerate(corners)}
     starts = {}
-    for triangle, (place, _, _) in enumerate(known):
-        if place != NONE:
+    for triangle, of_triangle in enumerate(known):
+        if _is_known(of_triangle):
             starts[triangle] = axes(integers[triangle], scale)
             if starts[triangle] is None:
                 raise _invalid(view, "F210", f"{corners[triangle]}", triangle)
@@ -176,7 +160,7 @@ def check_met(view, corners, side):
         if start not in starts:
             continue
         quick = [[x / scale**power for x in axis] for axis, power in zip(starts[start], (1, 3, 2))]
-        of_start = starts[start], quick, known[start][1:], squares
+        of_start = starts[start], quick, known[start], squares
         origins = list(zip(corners[start], integers[start]))
         for other, target in corners.items():
             if other != start and any(_is_met(of_start, p, (target, integers[other]), side) for p in origins):

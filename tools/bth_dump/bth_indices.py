@@ -6,6 +6,7 @@ import struct
 import bth_container as c
 import bth_free
 import bth_leaves
+import bth_places
 from bth_container import NONE
 from bth_leaves import INDEXED, NODE, PACKED, RAW
 from bth_tets import derive
@@ -45,7 +46,13 @@ def _header(view):
         if not condition:
             raise view.invalid(number, message, c.OBJECT, at)
 
-    for name, rows in (("TRIANGLE_FACES", view.triangle_faces), ("TRIANGLES", view.source), ("CORNERS", view.corners)):
+    tables = (
+        ("TRIANGLE_FACES", view.triangle_faces),
+        ("TRIANGLE_PLACES", view.places),
+        ("TRIANGLES", view.source),
+        ("CORNERS", view.corners),
+    )
+    for name, rows in tables:
         need(len(rows) in (0, view.triangles), "F102", f"{len(rows)} rows of {name}", 32)
     need(view.triangles <= 1 << 30, "F022", f"{view.triangles} triangles", 32)
     need(view.dropped <= view.triangles, "F102", f"{view.dropped} dropped", 36)
@@ -173,14 +180,14 @@ def _tree(view):
                 stack.append((codes[slot], depth + 1, block.start, in_subtree, c.LINES, at))
         else:
             bth_leaves.check(view, kind, index)
-            placed.update(bth_free.placed(view, kind, index))
+            placed.update(bth_places.check_leaf(view, kind, index))
     for half in range(halves):
         spare = view.grid and half % 2 and not any(view.lines[32 * half : 32 * half + 32])
         if half not in claimed and not spare:
             raise view.invalid("F109", f"half line {half} is no block's", c.LINES, 32 * half)
     if len(referenced) != len(view.tet_leaves):
         raise view.invalid("F123", "a tet leaf without a reference", c.TET_LEAVES)
-    bth_free.check_places(view, placed)
+    bth_places.check(view, placed)
     for row, triangle in enumerate(view.triangle_ids):
         if triangle >= view.triangles:
             raise view.invalid("F116", f"id {triangle}", c.TRIANGLE_IDS, 4 * row)

@@ -38,8 +38,8 @@ extern "C" {
  * distance they do not, for rays that say where they start. */
 #define BTH_FREE_NONE 0u
 #define BTH_FREE_AUTO 1u      /* where that is worth its bytes, as the program bthc does by default */
-#define BTH_FREE_DISTANCES 2u /* distances alone, 12 bytes a triangle */
-#define BTH_FREE_ALL 3u       /* 24 bytes a triangle */
+#define BTH_FREE_DISTANCES 2u /* distances alone, 8 bytes a triangle */
+#define BTH_FREE_ALL 3u       /* 20 bytes a triangle */
 
 /* Bits of bth_compile_options.flags. */
 #define BTH_COMPILE_NO_GEOMETRY 1u /* leaves out the positions and triangles of the source, which tracing does not need */

@@ -32,6 +32,18 @@ const LEAVES: [&[u32]; 3] = [&[0, 1, 6], &[3, 2], &[4, 5, 7]];
 /// Lines of the leaves, behind the root and an inner node.
 const LINES: [u32; 3] = [14, 18, 28];
 
+/// The place of each triangle.
+fn places() -> Vec<u32> {
+    let mut places = vec![NONE; TRIANGLES.len()];
+    let leaves = [Child::Indexed(LINES[0]), Child::Raw(LINES[1]), Child::Indexed(LINES[2])];
+    for (leaf, ids) in leaves.into_iter().zip(LEAVES) {
+        for (slot, id) in (0..).zip(ids) {
+            places[*id as usize] = TrianglePlace { leaf, slot }.code();
+        }
+    }
+    places
+}
+
 fn corners(ids: &[u32]) -> Vec<[[f32; 3]; 3]> {
     ids.iter().map(|id| TRIANGLES[*id as usize].map(|row| POSITIONS[row as usize])).collect()
 }
@@ -73,6 +85,7 @@ fn with_parts<T>(make: impl FnOnce(&ObjectParts<'_>) -> T) -> T {
         lines: &all,
         triangle_ids: &LEAVES.concat(),
         leaf_vertices: &leaf_vertices(),
+        places: &places(),
         source: Some(Source { positions: &POSITIONS, triangles: &TRIANGLES, ..Source::default() }),
         ..ObjectParts::default()
     })

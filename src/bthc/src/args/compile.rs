@@ -51,7 +51,7 @@ pub(crate) struct Compile {
     #[arg(long, help_heading = KEPT)]
     pub(crate) no_geometry: bool,
     /// Directions in which rays that start on a triangle meet nothing, and distances within which they do not, so that rays end at once
-    /// or begin later where a caller says on which triangle they start: 24 bytes a triangle, or 12 for `distances` alone. With `auto` what
+    /// or begin later where a caller says on which triangle they start: 20 bytes a triangle, or 8 for `distances` alone. With `auto` what
     /// is worth its bytes. By default auto, but none where fast compiling (--quality fast) or small files (--coordinates, --max-error,
     /// --boxes, --compact) are asked for, or for objects of more than a million triangles.
     #[arg(long, help_heading = KEPT, value_enum, value_name = "WHERE", conflicts_with = "deformable")]

@@ -319,7 +319,8 @@ fn shortened((name, base): (&str, &str), kind: u32, [stride, before, rows]: [usi
 /// Faults of the places of triangles.
 fn places() -> Vec<Case> {
     let (base, tets) = ("places", "tets-link32");
-    let row = |name, base, triangle: usize, place| field(name, base, kind::TRIANGLE_PLACES, 4 * triangle, place);
+    let row =
+        |name, base, triangle: usize, place| field(name, base, kind::TRIANGLE_PLACES, 4 * triangle, place);
     let line = |at: usize| (at / size_of::<CacheLine>()) as u32;
     let place = |leaf, slot| TrianglePlace { leaf, slot }.code();
     let first = Child::Indexed(line(LEAF));

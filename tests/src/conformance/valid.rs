@@ -169,10 +169,7 @@ fn directions() -> [FreeDirections; 2] {
 
 /// As [`directions`], of both sides: there is nothing within the second level below the upper triangle, either.
 fn distances() -> [FreeDistances; 2] {
-    [
-        FreeDistances { sectors: [steep(3).0, u32::MAX] },
-        FreeDistances { sectors: [u32::MAX, steep(2).0] },
-    ]
+    [FreeDistances { sectors: [steep(3).0, u32::MAX] }, FreeDistances { sectors: [u32::MAX, steep(2).0] }]
 }
 
 fn free_directions() -> Vec<u8> {

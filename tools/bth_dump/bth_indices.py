@@ -1,4 +1,4 @@
-"""The index check (format-spec/README.md, "Index check"): F101 to F147 and F163 to F171."""
+"""The index check (format-spec/README.md, "Index check"): F101 to F147, F163 to F172 and F187."""
 
 import math
 import struct

@@ -59,6 +59,11 @@ pub(super) fn deformable() -> Vec<u8> {
     with_parts(file)
 }
 
+/// The object with the places of its triangles.
+pub(super) fn with_places() -> Vec<u8> {
+    with_parts(|parts| file(&ObjectParts { places: &places(), ..*parts }))
+}
+
 /// Makes something of the parts of the object.
 fn with_parts<T>(make: impl FnOnce(&ObjectParts<'_>) -> T) -> T {
     let of = |leaf: usize| bounds(corners(LEAVES[leaf]).as_flattened());

@@ -318,7 +318,7 @@ fn shortened((name, base): (&str, &str), kind: u32, [stride, before, rows]: [usi
 
 /// Faults of the places of triangles.
 fn places() -> Vec<Case> {
-    let (base, tets) = ("places", "tets-link32");
+    let (base, tets) = ("places", "places-tets");
     let row =
         |name, base, triangle: usize, place| field(name, base, kind::TRIANGLE_PLACES, 4 * triangle, place);
     let line = |at: usize| (at / size_of::<CacheLine>()) as u32;
@@ -339,7 +339,7 @@ fn places() -> Vec<Case> {
         row("F187-none-in-a-raw-leaf", base, 15, NONE),
         row("F187-none-on-a-grid", "places-grid-16", 39, NONE),
         row("F187-none-in-a-subtree", tets, 1, NONE),
-        row("F187-none-in-a-deformable-object", "deformable", 0, NONE),
+        row("F187-none-in-a-deformable-object", "places-deformable", 0, NONE),
     ]
 }
 
@@ -465,10 +465,11 @@ fn geometry() -> Vec<Case> {
         field("F208-displacement", "grid-21", kind::OBJECT, offset_of!(Object, displacement), 1),
         field("F202-other-vertex", tets, kind::TET_VERTICES, 16, half),
         field("F203-triangle-twice", base, kind::TRIANGLE_IDS, 4, 0),
-        broken("F203-subtree-of-others", tets, Seal::Sections, |e| {
-            // Triangle 4 takes the slot of triangle 0, which then has no place.
-            e.put_u32(kind::TRIANGLE_IDS, 4, 4).put_u32(kind::TRIANGLE_PLACES, 0, NONE);
+        broken("F203-triangle-twice-with-a-place", "places", Seal::Sections, |e| {
+            // Triangle 0 takes the slot of triangle 1, which then has no place.
+            e.put_u32(kind::TRIANGLE_IDS, 4, 0).put_u32(kind::TRIANGLE_PLACES, 4, NONE);
         }),
+        field("F203-subtree-of-others", tets, kind::TRIANGLE_IDS, 4, 4),
         field("F203-more-dropped", base, kind::OBJECT, offset_of!(Object, dropped), 2),
         field("F204-small-box", base, kind::LINES, 64, half),
         field("F204-small-packed-box", "packed-nodes", kind::LINES, 16, 0),

@@ -22,6 +22,8 @@ pub fn valid() -> Vec<Case> {
         Case::new("widened-boxes", two_levels_widened()),
         Case::new("places", with_places(None, false)),
         Case::new("places-grid-16", with_places(Some(GridBits::B16), true)),
+        Case::new("places-tets", tets_of(RecordKind::Link32, true)),
+        Case::new("places-deformable", super::deformable::with_places()),
         Case::new("opacity", opacity()),
         Case::new("free-directions", free_directions()),
         Case::new("free-distances", free_distances()),
@@ -401,6 +403,10 @@ pub(super) const FACES: [[u32; 3]; 2] = [[1, 2, 7], [1, 4, 2]];
 /// Two cubes as tet leaves, each around two triangles, the first with a subtree; a triangle leaf; and a triangle without
 /// area.
 fn tets(record: RecordKind) -> Vec<u8> {
+    tets_of(record, false)
+}
+
+fn tets_of(record: RecordKind, has_places: bool) -> Vec<u8> {
     let mut positions: Vec<[f32; 3]> = Vec::new();
     let mut triangles: Vec<[u32; 3]> = Vec::new();
     let mut parts = TetParts::default();
@@ -445,7 +451,7 @@ fn tets(record: RecordKind) -> Vec<u8> {
         packed_nodes: false,
         lines: &all,
         triangle_ids: &[4, 0, 1],
-        places: &places,
+        places: if has_places { &places } else { &[] },
         record: Some(record),
         tet_leaves: &parts.leaves,
         tets: &parts.records,

@@ -108,12 +108,12 @@ fn free_directions_are_kept_by_default_where_they_pay_and_fit() {
     let (none, plain) = kept(&["--free-directions", "none"]);
     let (all, with) = kept(&[]);
     assert_eq!([&none[..], &all[..]], ["none", "directions"]);
-    assert!(with > plain + 23.9 && with < plain + 24.1, "{plain} {with}");
+    assert!(with > plain + 19.9 && with < plain + 20.1, "{plain} {with}");
     for small in [&["--quality", "fast"][..], &["--coordinates", "16"], &["--boxes", "8"]] {
         assert_eq!(kept(small).0, none, "{small:?}");
         assert_eq!(kept(&[small, &["--free-directions", "auto"]].concat()).0, all, "{small:?}");
     }
-    for (more, expected) in [(24.5, "directions"), (23.5, "distances"), (12.5, "distances"), (11.5, "none")] {
+    for (more, expected) in [(20.5, "directions"), (19.5, "distances"), (8.5, "distances"), (7.5, "none")] {
         let limit = plain + more;
         let (kept, each) = kept(&["--max-bytes-per-triangle", &limit.to_string()]);
         assert_eq!(kept, expected, "{more}");

@@ -97,3 +97,7 @@ fn read<T: FromBytes + KnownLayout + Immutable>(wide: &Wide, half: u64) -> &T {
     let bytes = &wide.lines.as_bytes()[half as usize * HALF_LINE..];
     T::ref_from_prefix(bytes).expect("blocks lie within the lines, at half lines").0
 }
+
+#[cfg(test)]
+#[path = "places_tests.rs"]
+mod tests;

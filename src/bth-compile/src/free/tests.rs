@@ -304,7 +304,7 @@ fn what_is_kept_is_decided_by_rays() {
 
 /// Many small triangles in a ball, of radius 1 before it is scaled.
 fn dense(count: usize, radius: f64) -> Mesh {
-    let mut mesh = soup(count, 11);
+    let mut mesh = soup(count, 7);
     let length = |p: &[f32; 3]| p.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
     let greatest = mesh.positions.iter().map(length).fold(0.0, f64::max);
     mesh.positions.iter_mut().flatten().for_each(|x| *x *= (radius / greatest) as f32);
@@ -384,10 +384,10 @@ fn what_is_too_large_or_has_no_room_is_left_out() {
         (report.kept, report.undecided)
     };
     let count = mesh.triangles.len();
-    assert_eq!(of(KeepFree::Auto, count, 24), (Kept::Directions, false));
-    assert_eq!(of(KeepFree::Auto, count, 23), (Kept::Distances, false));
-    assert_eq!(of(KeepFree::Auto, count, 11), (Kept::None, false));
-    assert_eq!(of(KeepFree::Auto, count - 1, 24), (Kept::None, true));
+    assert_eq!(of(KeepFree::Auto, count, 20), (Kept::Directions, false));
+    assert_eq!(of(KeepFree::Auto, count, 19), (Kept::Distances, false));
+    assert_eq!(of(KeepFree::Auto, count, 7), (Kept::None, false));
+    assert_eq!(of(KeepFree::Auto, count - 1, 20), (Kept::None, true));
     // Who asks for it gets it.
     assert_eq!(of(KeepFree::All, 0, 0), (Kept::Directions, false));
 }

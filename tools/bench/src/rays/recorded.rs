@@ -4,35 +4,46 @@
 //! |---|---|
 //! | `nearest`, `any` | as the renderer traced them |
 //! | `nearest-past`, `any-past` | the same, but tmin is just past the triangle on which the ray starts |
+//! | `nearest-beside`, `any-beside` | the same, but the start is a little off that triangle |
 
-use super::RaySet;
+use super::{LIFT, RaySet};
+use crate::model::{Model, position};
 use anyhow::{Context, Result, ensure};
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth::{Accept, Scene};
 use bth_format::layout::NONE;
+use glam::DVec3;
 use std::path::Path;
 
 /// Names of the sets, in order.
-pub const NAMES: [&str; 4] = ["nearest", "nearest-past", "any", "any-past"];
+pub const NAMES: [&str; 6] = ["nearest", "nearest-past", "nearest-beside", "any", "any-past", "any-beside"];
 /// The file of the model in a folder of recorded rays.
 pub const MODEL: &str = "model.ply";
 
-/// Reads the sets of a folder, of about `most` rays at most.
+/// Reads the sets of a folder, whose model and its compiled scene are given, of about `most` rays at most.
 ///
 /// # Errors
 /// If a file cannot be read or its elements do not belong to the others or to the scene.
-pub fn sets(folder: &Path, scene: &Scene, most: usize) -> Result<Vec<RaySet>> {
+pub fn sets(folder: &Path, model: &Model, scene: &Scene, most: usize) -> Result<Vec<RaySet>> {
+    let lift = LIFT * model.bounds().diagonal();
     let mut sets = Vec::new();
-    for (any, [name, past]) in [(false, [NAMES[0], NAMES[1]]), (true, [NAMES[2], NAMES[3]])] {
-        let set = read(folder, name, any)?;
-        let triangles = scene.object(0).header.triangles;
-        let fits = |p: &PrimitiveRef| *p == PrimitiveRef::NONE || p.triangle < triangles;
-        ensure!(set.from.iter().flatten().all(fits), "{name}.from: a triangle that {MODEL} lacks");
+    for (any, names) in [(false, &NAMES[..3]), (true, &NAMES[3..])] {
+        let set = read(folder, names[0], any)?;
+        let fits = |p: &PrimitiveRef| *p == PrimitiveRef::NONE || (p.triangle as usize) < model.triangles();
+        ensure!(set.from.iter().flatten().all(fits), "{}.from: a triangle that {MODEL} lacks", names[0]);
         let set = set.thinned(most);
-        let rays = set.rays.iter().zip(set.from.iter().flatten()).map(|(r, own)| past_own(scene, r, *own));
-        sets.extend([RaySet { name: past, rays: rays.collect(), ..set.clone() }, set]);
+        let other = |name, change: &dyn Fn(&Ray, PrimitiveRef) -> Ray| {
+            let changed = |(ray, own): (&Ray, &PrimitiveRef)| match *own {
+                PrimitiveRef::NONE => *ray,
+                own => change(ray, own),
+            };
+            let rays = set.rays.iter().zip(set.from.iter().flatten()).map(changed).collect();
+            RaySet { name, rays, ..set.clone() }
+        };
+        let past = other(names[1], &|ray, own| past_own(scene, ray, own));
+        let beside = other(names[2], &|ray, own| lifted(ray, model.normal(own.triangle) * lift));
+        sets.extend([set, past, beside]);
     }
-    sets.sort_by_key(|set| NAMES.iter().position(|name| *name == set.name));
     Ok(sets)
 }
 
@@ -40,10 +51,13 @@ pub fn sets(folder: &Path, scene: &Scene, most: usize) -> Result<Vec<RaySet>> {
 fn past_own(scene: &Scene, ray: &Ray, own: PrimitiveRef) -> Ray {
     let is_own = |_: &Ray, hit: &Hit| hit.primitive == own;
     let accept = Accept { filter: Some(&is_own), ..Accept::default() };
-    match scene.nearest_accepted(ray, &accept) {
-        Some(hit) if own != PrimitiveRef::NONE => Ray { tmin: hit.t.next_up(), ..*ray },
-        _ => *ray,
-    }
+    scene.nearest_accepted(ray, &accept).map_or(*ray, |hit| Ray { tmin: hit.t.next_up(), ..*ray })
+}
+
+/// The ray, moved along its own triangle's normal to the side that it travels to.
+fn lifted(ray: &Ray, lift: DVec3) -> Ray {
+    let side = lift.dot(position(ray.direction)).signum();
+    Ray { origin: (position(ray.origin) + lift * side).as_vec3().to_array(), ..*ray }
 }
 
 fn read(folder: &Path, name: &'static str, any: bool) -> Result<RaySet> {

@@ -88,7 +88,7 @@ fn measure_model(which: &str, arguments: &Speed, rounds: usize, progress: &Progr
 
     progress.show(format!("{}: making rays", model.name));
     let (view, mut sets) = if Path::new(which).is_dir() {
-        (None, recorded::sets(Path::new(which), &scene, arguments.rays)?)
+        (None, recorded::sets(Path::new(which), &model, &scene, arguments.rays)?)
     } else {
         let size = if arguments.run.quick { rays::QUICK_PICTURE_SIZE } else { rays::PICTURE_SIZE };
         let options = rays::Options { size, most: arguments.rays, view: arguments.models.seen_from.view() };

@@ -3,8 +3,8 @@
 use crate::model::Model;
 use crate::tracer::{Batch, Contender, Tracer};
 use anyhow::{Context, Result};
-use bth::Scene;
-use bth::rays::{Hit, PrimitiveRef};
+use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::{Accept, Scene};
 use bth_compile::coordinates::{self, Boxes};
 use bth_compile::free::{FreeOptions, KeepFree};
 use bth_compile::pipeline::{self, CompileOptions, Structure};
@@ -79,10 +79,11 @@ impl Kind {
 
     /// Names of the ways to trace it.
     pub fn uses(&self) -> impl Iterator<Item = (String, Use)> {
+        let own = (self.name == KINDS[0].name).then(|| (format!("{} single own", self.name), Use::Own));
         let hinted = self.takes_hints().then(|| (format!("{} from", self.name), Use::Hinted));
         let plain = [(self.name.to_owned(), Use::Batch), (format!("{} single", self.name), Use::Single)];
         let [batch, single] = plain;
-        [Some(batch), hinted, Some(single)].into_iter().flatten()
+        [Some(batch), hinted, Some(single), own].into_iter().flatten()
     }
 
     /// Compiler options. Whole-model tetrahedra come without a BVH below them, which would be traced instead of them where
@@ -112,6 +113,8 @@ pub enum Use {
     Hinted,
     /// One ray a call, without hints.
     Single,
+    /// One ray a call, with a filter that rejects the triangle on which the ray starts.
+    Own,
 }
 
 /// A compiled file.
@@ -179,6 +182,14 @@ struct OurTracer {
 
 impl Tracer for OurTracer {
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
+        if let (Use::Own, Some(from)) = (self.usage, batch.from) {
+            for ((ray, own), hit) in batch.rays.iter().zip(from).zip(hits) {
+                let is_other = |_: &Ray, hit: &Hit| hit.primitive != *own;
+                let accept = Accept { filter: Some(&is_other), ..Accept::default() };
+                *hit = self.scene.nearest_accepted(ray, &accept).unwrap_or(Hit::MISS);
+            }
+            return;
+        }
         if self.usage == Use::Single {
             for (ray, hit) in batch.rays.iter().zip(hits) {
                 *hit = self.scene.nearest(ray).unwrap_or(Hit::MISS);
@@ -191,6 +202,14 @@ impl Tracer for OurTracer {
     }
 
     fn any(&self, batch: Batch<'_>, found: &mut [bool]) {
+        if let (Use::Own, Some(from)) = (self.usage, batch.from) {
+            for ((ray, own), found) in batch.rays.iter().zip(from).zip(found) {
+                let is_other = |_: &Ray, hit: &Hit| hit.primitive != *own;
+                let accept = Accept { filter: Some(&is_other), ..Accept::default() };
+                *found = self.scene.any_accepted(ray, &accept);
+            }
+            return;
+        }
         if self.usage == Use::Single {
             for (ray, found) in batch.rays.iter().zip(found) {
                 *found = self.scene.any(ray);
@@ -203,7 +222,11 @@ impl Tracer for OurTracer {
     }
 
     fn needs_hints(&self) -> bool {
-        self.usage == Use::Hinted
+        matches!(self.usage, Use::Hinted | Use::Own)
+    }
+
+    fn skips_own(&self) -> bool {
+        self.usage == Use::Own
     }
 }
 

@@ -35,6 +35,10 @@ pub trait Tracer: Send + Sync {
     fn needs_hints(&self) -> bool {
         false
     }
+    /// Returns true if no ray hits the triangle that it starts on.
+    fn skips_own(&self) -> bool {
+        false
+    }
 }
 
 /// A tracer that is measured.

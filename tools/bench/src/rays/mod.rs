@@ -13,6 +13,7 @@
 mod camera;
 mod directions;
 mod finder;
+pub mod recorded;
 mod viewpoint;
 
 pub use camera::Camera;

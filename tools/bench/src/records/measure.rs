@@ -5,6 +5,7 @@ use super::row::Row;
 use crate::args::{Models, RunOptions, SeenFrom, Speed};
 use crate::machine;
 use crate::names::Names;
+use crate::output::note;
 use crate::rivals::embree;
 use crate::rounds::geometric_mean;
 use crate::speed::{self, SpeedResults, ThreadsRun};
@@ -24,14 +25,24 @@ pub(super) fn measure(definition: &Definition, models: &Path, quick: bool) -> Re
     }
     let model = |name: &String| {
         let file = models.join(name);
-        if file.exists() { file.to_string_lossy().into_owned() } else { name.clone() }
+        if file.exists() {
+            return Some(file.to_string_lossy().into_owned());
+        }
+        if name.ends_with('/') {
+            note(&format!(
+                "{name}: no such folder of recorded rays: skipped (tools/bench/record_rays/run makes it)"
+            ));
+            return None;
+        }
+        Some(name.clone())
     };
+    let models: Vec<String> = definition.models.iter().filter_map(model).collect();
+    if models.is_empty() {
+        return Ok(Vec::new());
+    }
     let names = |names: &[String]| names.join(",").parse::<Names>().unwrap_or_default();
     let arguments = Speed {
-        models: Models {
-            models: definition.models.iter().map(model).collect(),
-            seen_from: SeenFrom::default(),
-        },
+        models: Models { models, seen_from: SeenFrom::default() },
         rays: definition.rays,
         rounds: definition.rounds,
         threads: definition.threads.clone(),

@@ -16,8 +16,8 @@ pub use shapes::{Shape, shapes};
 pub use statistics::Statistics;
 
 use crate::structures::{Traced, bits};
-use bth::rays::{Hit, PrimitiveRef, Ray};
-use bth::{Hinted, Isa};
+use bth::Isa;
+use bth::rays::{Hit, Ray};
 
 /// Rays that are traced together.
 const BATCH: usize = 1024;
@@ -53,8 +53,7 @@ pub fn run(
                 expected.iter().zip(&found).filter(|(hit, found)| hit.is_hit() != **found).count() as u64;
             statistics.traced += 2 * rays.len() as u64;
             if batch % 4 == i % 4 {
-                hinted(traced, &rays, &expected, statistics);
-                from_start(traced, &rays, &expected, statistics);
+                singly(traced, &rays, &expected, statistics);
             }
         }
         for (i, (aimed, hit)) in aimed.iter().zip(&expected).enumerate() {
@@ -68,41 +67,13 @@ pub fn run(
     best.choose().expect("it is available");
 }
 
-/// Rays with hints, right and wrong ones, and one by one: the same bits.
-fn hinted(traced: &Traced, rays: &[Ray], expected: &[Hit], statistics: &mut Statistics) {
-    let from: Vec<PrimitiveRef> = expected.iter().map(|hit| hit.primitive).collect();
-    let mut hits = vec![Hit::MISS; rays.len()];
-    traced.scene.batch(rays).from(&from[..]).nearest(&mut hits);
-    statistics.different += differing(expected, &hits);
-    statistics.traced += rays.len() as u64;
+/// Rays one by one: the same bits.
+fn singly(traced: &Traced, rays: &[Ray], expected: &[Hit], statistics: &mut Statistics) {
     for (ray, hit) in rays.iter().zip(expected).step_by(16) {
         let one = traced.scene.nearest(ray).unwrap_or(Hit::MISS);
         statistics.different += u64::from(bits(&one) != bits(hit));
         statistics.traced += 1;
     }
-}
-
-/// Rays that are told the surface that their line crosses last before they begin, or that they begin on, and use it wherever they
-/// can: the same bits, and whether they hit.
-fn from_start(traced: &Traced, rays: &[Ray], expected: &[Hit], statistics: &mut Statistics) {
-    let back = |ray: &Ray| {
-        let [tmin, tmax] = [-ray.tmin, f32::INFINITY];
-        Ray { direction: ray.direction.map(|x| -x), tmin, tmax, ..*ray }
-    };
-    let mut crossed = vec![Hit::MISS; rays.len()];
-    traced.scene.batch(&rays.iter().map(back).collect::<Vec<_>>()).nearest(&mut crossed);
-    let from: Vec<PrimitiveRef> = crossed.iter().map(|hit| hit.primitive).collect();
-    let chosen = Hinted::chosen();
-    Hinted::Tets.choose();
-    let mut hits = vec![Hit::MISS; rays.len()];
-    traced.scene.batch(rays).from(&from[..]).nearest(&mut hits);
-    statistics.different += differing(expected, &hits);
-    let mut found = vec![false; rays.len()];
-    traced.scene.batch(rays).from(&from[..]).any(&mut found);
-    statistics.different +=
-        expected.iter().zip(&found).filter(|(hit, found)| hit.is_hit() != **found).count() as u64;
-    chosen.choose();
-    statistics.traced += 2 * rays.len() as u64;
 }
 
 fn differing(a: &[Hit], b: &[Hit]) -> u64 {

@@ -1,9 +1,9 @@
 //! `bthc verify --deep`: sample rays through each object, traced in all ways and decided in exact arithmetic.
 //!
 //! A file that passes every check may still answer wrongly, where it tells something of its triangles that is not so: free directions and
-//! distances, boxes that were damaged together with their hashes, or a defect of this program. So rays are traced in a batch, with and
-//! without hints, and one at a time, and compared with every triangle in exact arithmetic; and what is known of the directions of the
-//! triangles on which rays start is compared with that, too.
+//! distances, boxes that were damaged together with their hashes, or a defect of this program. So rays are traced in a batch and one at a time, from an origin and from a
+//! start, and compared with every triangle in exact arithmetic; and what is known of the directions of the triangles on which rays start
+//! is compared with that, too.
 
 mod bounds;
 mod poses;
@@ -11,13 +11,14 @@ mod rays;
 
 use crate::failure::Failure;
 use crate::output;
-use bth::rays::{Hit, Ray};
-use bth::{Hinted, Scene};
+use bth::rays::{Hit, Ray, StartRay};
+use bth::{Scene, TraceRay};
 use bth_compile::{Error, Monitor};
 use bth_oracle::{Triangle, World, intersection, to_f64, triangles};
 use rayon::prelude::*;
 use rays::Start;
 use serde_json::json;
+use std::fmt::Debug;
 use std::path::Path;
 
 /// Tests of a ray against a triangle for each object, by which the number of its rays is chosen: some seconds on two cores.
@@ -61,8 +62,6 @@ impl Report {
 /// A file that cannot be opened; cancellation.
 pub(crate) fn check(file: &Path, count: Option<usize>, monitor: &dyn Monitor) -> Result<Report, Failure> {
     let scene = bth::open(file)?;
-    // The answers with hints are those of the look-ups, whether or not these pay.
-    Hinted::Tets.choose();
     let mut report = Report::default();
     for object in 0..scene.object_count() {
         let findings = check_object(&scene, object, count, &mut report, monitor)?;
@@ -127,30 +126,41 @@ fn check_pose(
 ) -> Result<Vec<String>, Failure> {
     let view = alone.object(alone.instance(instance).object);
     monitor.stage("trace exactly", Some(starts.len() as u64));
-    let traced = trace(alone, starts, instance, monitor)?;
+    let rays: Vec<Ray> = starts.iter().map(|start| start.ray).collect();
+    let start_rays: Vec<StartRay> = starts.iter().map(|start| start.start_ray(instance)).collect();
+    let plain = trace(alone, &rays, monitor)?;
+    let from_starts = trace(alone, &start_rays, monitor)?;
     let world = World::new(alone);
     let corners_of = |id: u32| all.binary_search_by_key(&id, |t| t.id).ok().map(|row| all[row].corners);
-    let one = |(start, ways): (&Start, &Traced)| {
+    let one = |((start, plain), from_start): ((&Start, &Traced), &Traced)| {
         if monitor.cancelled() {
             return Err(Failure::Compile(Error::Cancelled));
         }
         let truth = world.nearest(&start.ray);
         let t = truth.as_ref().map(bth_oracle::ExactHit::t_f64);
         let known = bounds::known(&view, start);
-        let found = ways
+        let right = |hit: &Hit| match &truth {
+            None => !hit.is_hit(),
+            Some(truth) => {
+                hit.is_hit()
+                    && is_rounded(hit.t, truth.t_f64())
+                    && (truth.triangles.contains(&hit.primitive)
+                        || is_as_near(&start.ray, hit, truth.t_f64(), &corners_of))
+            }
+        };
+        let found = plain
             .differing(&start.ray)
+            .or_else(|| from_start.differing(&start.start_ray(instance)))
             .or_else(|| {
-                let hit = &ways.plain;
-                let right = match &truth {
-                    None => !hit.is_hit(),
-                    Some(truth) => {
-                        hit.is_hit()
-                            && is_rounded(hit.t, truth.t_f64())
-                            && (truth.triangles.contains(&hit.primitive)
-                                || is_as_near(&start.ray, hit, truth.t_f64(), &corners_of))
-                    }
-                };
-                (!right).then(|| format!("BTH-V001: {:?}: expected t = {t:?}, found {hit:?}", start.ray))
+                (!right(&plain.hit))
+                    .then(|| format!("BTH-V001: {:?}: expected t = {t:?}, found {:?}", start.ray, plain.hit))
+            })
+            .or_else(|| {
+                let is_wrong = start.is_at_corner && !right(&from_start.hit);
+                is_wrong.then(|| {
+                    let (ray, hit) = (start.start_ray(instance), from_start.hit);
+                    format!("BTH-V001: {ray:?}: expected t = {t:?}, found {hit:?}")
+                })
             })
             .or_else(|| {
                 let bound = known.filter(|bound| t.is_some_and(|t| bound.is_broken(t)))?;
@@ -160,7 +170,7 @@ fn check_pose(
         monitor.advance(1);
         Ok((found, t.is_some(), known.is_some()))
     };
-    let results = starts.par_iter().zip(&traced).map(one).collect::<Result<Vec<_>, _>>()?;
+    let results = starts.par_iter().zip(&plain).zip(&from_starts).map(one).collect::<Result<Vec<_>, _>>()?;
     report.rays += results.len() as u64;
     report.hits += results.iter().filter(|(_, hit, _)| *hit).count() as u64;
     report.known += results.iter().filter(|(_, _, known)| *known).count() as u64;
@@ -169,67 +179,45 @@ fn check_pose(
 
 /// The answers for a ray.
 struct Traced {
-    plain: Hit,
-    hinted: Hit,
+    hit: Hit,
     single: Hit,
     any: bool,
-    any_hinted: bool,
 }
 
 impl Traced {
     /// What differs between the ways of tracing, if anything does.
-    fn differing(&self, ray: &Ray) -> Option<String> {
-        let Traced { plain, hinted, single, any, any_hinted } = self;
+    fn differing(&self, ray: &impl Debug) -> Option<String> {
+        let Traced { hit, single, any } = self;
         let bits = |hit: &Hit| ([hit.t, hit.u, hit.v].map(f32::to_bits), hit.primitive);
-        if [hinted, single].iter().any(|hit| bits(hit) != bits(plain)) {
-            return Some(format!(
-                "BTH-V002: {ray:?}: expected {plain:?} in every way, found {hinted:?} with a hint, {single:?} alone"
-            ));
-        }
-        if [*any, *any_hinted].iter().any(|found| *found != plain.is_hit()) {
-            return Some(format!(
-                "BTH-V002: {ray:?}: expected {plain:?} in every way, found any hit {any}, with a hint {any_hinted}"
-            ));
-        }
-        None
+        let is_same = bits(hit) == bits(single) && *any == hit.is_hit();
+        (!is_same).then(|| {
+            format!("BTH-V002: {ray:?}: expected {hit:?} in every way, found {single:?} alone, any hit {any}")
+        })
     }
 }
 
-/// Traces rays through the only instance in all ways.
+/// Traces rays in all ways.
 ///
 /// # Errors
 /// Cancellation.
-fn trace(
-    alone: &Scene,
-    starts: &[Start],
-    instance: u32,
-    monitor: &dyn Monitor,
-) -> Result<Vec<Traced>, Failure> {
-    let mut singles = Vec::with_capacity(starts.len());
-    let rays: Vec<Ray> = starts.iter().map(|start| start.ray).collect();
-    let hints: Vec<_> = starts.iter().map(|start| start.hint(instance)).collect();
-    let (mut plain, mut hinted) = (vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]);
-    let (mut any, mut any_hinted) = (vec![false; rays.len()], vec![false; rays.len()]);
-    for from in (0..rays.len()).step_by(BATCH) {
-        let part = from..rays.len().min(from + BATCH);
-        let (rays, hints) = (&rays[part.clone()], &hints[part.clone()]);
-        alone.batch(rays).nearest(&mut plain[part.clone()]);
-        alone.batch(rays).from(hints).nearest(&mut hinted[part.clone()]);
-        alone.batch(rays).any(&mut any[part.clone()]);
-        alone.batch(rays).from(hints).any(&mut any_hinted[part]);
-        singles.extend(rays.iter().map(|ray| alone.nearest(ray).unwrap_or(Hit::MISS)));
+fn trace<R: TraceRay>(alone: &Scene, rays: &[R], monitor: &dyn Monitor) -> Result<Vec<Traced>, Failure> {
+    let mut traced = Vec::with_capacity(rays.len());
+    let (mut hits, mut found) = ([Hit::MISS; BATCH], [false; BATCH]);
+    for rays in rays.chunks(BATCH) {
+        let (hits, found) = (&mut hits[..rays.len()], &mut found[..rays.len()]);
+        alone.batch(rays).nearest(hits);
+        alone.batch(rays).any(found);
+        let one = |(ray, (hit, any)): (&R, (&Hit, &bool))| Traced {
+            hit: *hit,
+            single: alone.nearest(ray).unwrap_or(Hit::MISS),
+            any: *any,
+        };
+        traced.extend(rays.iter().zip(hits.iter().zip(&*found)).map(one));
         if monitor.cancelled() {
             return Err(Failure::Compile(Error::Cancelled));
         }
     }
-    let one = |i: usize| Traced {
-        plain: plain[i],
-        hinted: hinted[i],
-        single: singles[i],
-        any: any[i],
-        any_hinted: any_hinted[i],
-    };
-    Ok((0..rays.len()).map(one).collect())
+    Ok(traced)
 }
 
 /// Whether t is the exact one, rounded to f32, or the next number to that, since it is rounded to f64 before.

@@ -42,7 +42,7 @@ fn speed_record() -> SpeedResults {
     let model = |name: &str, view, factor: f64, tets: bool| {
         let mut tracers = vec![
             tracer("bth", true, &[("primary", 8.0 * factor), ("diffuse", 3.0)]),
-            tracer("bth from", true, &[("diffuse", 6.0 * factor)]),
+            tracer("bth start", true, &[("diffuse", 6.0 * factor)]),
             tracer("embree", false, &[("primary", 4.0), ("diffuse", 3.0)]),
         ];
         if tets {

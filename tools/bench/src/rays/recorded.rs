@@ -2,14 +2,14 @@
 //!
 //! | set | rays |
 //! |---|---|
-//! | `nearest`, `any` | as the renderer traced them |
+//! | `nearest`, `any` | those that start on a triangle, as the renderer traced them |
 //! | `nearest-past`, `any-past` | the same, but tmin is just past the triangle on which the ray starts |
 //! | `nearest-beside`, `any-beside` | the same, but the start is a little off that triangle |
 
 use super::{LIFT, RaySet};
 use crate::model::{Model, position};
 use anyhow::{Context, Result, ensure};
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::{Hit, PrimitiveRef, Ray, Start};
 use bth::{Accept, Scene};
 use bth_format::layout::NONE;
 use glam::DVec3;
@@ -28,17 +28,15 @@ pub fn sets(folder: &Path, model: &Model, scene: &Scene, most: usize) -> Result<
     let lift = LIFT * model.bounds().diagonal();
     let mut sets = Vec::new();
     for (any, names) in [(false, &NAMES[..3]), (true, &NAMES[3..])] {
-        let set = read(folder, names[0], any)?;
-        let fits = |p: &PrimitiveRef| *p == PrimitiveRef::NONE || (p.triangle as usize) < model.triangles();
-        ensure!(set.from.iter().flatten().all(fits), "{}.from: a triangle that {MODEL} lacks", names[0]);
-        let set = set.thinned(most);
+        let (rays, from) = read(folder, names[0])?;
+        let fits = |p: &PrimitiveRef| (p.triangle as usize) < model.triangles();
+        ensure!(from.iter().all(fits), "{}.from: a triangle that {MODEL} lacks", names[0]);
+        let starts = rays.iter().zip(from).map(|(ray, own)| start(ray, own, model)).collect();
+        let set = RaySet { name: names[0], any, coherent: false, rays, starts: Some(starts) }.thinned(most);
         let other = |name, change: &dyn Fn(&Ray, PrimitiveRef) -> Ray| {
-            let changed = |(ray, own): (&Ray, &PrimitiveRef)| match *own {
-                PrimitiveRef::NONE => *ray,
-                own => change(ray, own),
-            };
-            let rays = set.rays.iter().zip(set.from.iter().flatten()).map(changed).collect();
-            RaySet { name, rays, ..set.clone() }
+            let changed = |(ray, start): (&Ray, &Start)| change(ray, start.primitive);
+            let rays = set.rays.iter().zip(set.starts.iter().flatten()).map(changed).collect();
+            RaySet { name, rays, starts: None, ..set.clone() }
         };
         let past = other(names[1], &|ray, own| past_own(scene, ray, own));
         let beside = other(names[2], &|ray, own| lifted(ray, model.normal(own.triangle) * lift));
@@ -60,7 +58,19 @@ fn lifted(ray: &Ray, lift: DVec3) -> Ray {
     Ray { origin: (position(ray.origin) + lift * side).as_vec3().to_array(), ..*ray }
 }
 
-fn read(folder: &Path, name: &'static str, any: bool) -> Result<RaySet> {
+/// The point of a triangle that is nearest to the origin of a ray which starts there.
+fn start(ray: &Ray, primitive: PrimitiveRef, model: &Model) -> Start {
+    let [a, b, c] = model.corners(primitive.triangle);
+    let (e, f, p) = (b - a, c - a, position(ray.origin) - a);
+    let normal = e.cross(f);
+    let of = |weight: f64| weight.max(0.0) / normal.length_squared();
+    let (u, v) = (of(p.cross(f).dot(normal)), of(e.cross(p).dot(normal)));
+    let sum = (u + v).max(1.0);
+    Start { primitive, u: (u / sum) as f32, v: (v / sum) as f32 }
+}
+
+/// The rays that start on triangles, and these triangles.
+fn read(folder: &Path, name: &str) -> Result<(Vec<Ray>, Vec<PrimitiveRef>)> {
     let rays: Vec<Ray> = elements(&folder.join(format!("{name}.rays")), b"RAYS", |bytes: [[u8; 4]; 8]| {
         let [x, y, z, tmin, dx, dy, dz, tmax] = bytes.map(f32::from_le_bytes);
         Ray { origin: [x, y, z], tmin, direction: [dx, dy, dz], tmax }
@@ -74,7 +84,8 @@ fn read(folder: &Path, name: &'static str, any: bool) -> Result<RaySet> {
         },
     )?;
     ensure!(rays.len() == from.len(), "{name}.from: expected one triangle for each of {} rays", rays.len());
-    Ok(RaySet { name, any, coherent: false, rays, from: Some(from) })
+    let known = rays.into_iter().zip(from).filter(|(_, from)| *from != PrimitiveRef::NONE);
+    Ok(known.unzip())
 }
 
 /// The elements of a ray file of N words each (`docs/reference.md` describes them).
@@ -107,14 +118,12 @@ mod tests {
         let words: Vec<u32> = (1..=16).map(|i| (i as f32).to_bits()).collect();
         file(&folder.path().join("any.rays"), b"RAYS", &words, 8);
         file(&folder.path().join("any.from"), b"FROM", &[7, NONE], 1);
-        let set = read(folder.path(), "any", true).unwrap();
-        let second = Ray { origin: [9.0, 10.0, 11.0], tmin: 12.0, direction: [13.0, 14.0, 15.0], tmax: 16.0 };
-        assert_eq!(set.rays[1], second);
+        let ray = Ray { origin: [1.0, 2.0, 3.0], tmin: 4.0, direction: [5.0, 6.0, 7.0], tmax: 8.0 };
         let own = PrimitiveRef { instance: 0, triangle: 7 };
-        assert_eq!(set.from, Some(vec![own, PrimitiveRef::NONE]));
+        assert_eq!(read(folder.path(), "any").unwrap(), (vec![ray], vec![own]));
         for wrong in [&words[..8], &words[..15]] {
             file(&folder.path().join("any.rays"), b"RAYS", wrong, 8);
-            assert!(read(folder.path(), "any", true).is_err());
+            assert!(read(folder.path(), "any").is_err());
         }
     }
 }

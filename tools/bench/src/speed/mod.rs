@@ -16,10 +16,10 @@ use crate::output::{Head, Report, note};
 use crate::progress::Progress;
 use crate::rays::{self, Finder, RaySet, recorded};
 use crate::rounds::medians;
-use crate::tracer::{Contender, Tracer};
+use crate::tracer::{Contender, Starting, Tracer};
 use crate::{rivals, structures};
 use anyhow::{Result, bail, ensure};
-use bth::rays::{Hit, PrimitiveRef};
+use bth::rays::{Hit, PrimitiveRef, Start};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -96,10 +96,9 @@ fn measure_model(which: &str, arguments: &Speed, rounds: usize, progress: &Progr
         (Some(view), sets)
     };
     sets.retain(|s| arguments.sets.select(s.name) && s.rays.len() >= rays::FEWEST_TIMED);
-    let skipping = structures::tracer(&bvh.bytes, structures::Use::Own)?;
-    let expected: Vec<Expected> = sets.iter().map(|s| Expected::new(&scene, &*skipping, s)).collect();
-    let own_hits = sets.iter().zip(&expected).filter(|_| view.is_none());
-    let own_hits = own_hits.filter_map(|(s, e)| Some((s.name, e.own_hits(s.from.as_ref()?)))).collect();
+    let expected = sets.iter().map(|set| Expected::new(&bvh.bytes, set)).collect::<Result<Vec<_>>>()?;
+    let own_hits = sets.iter().zip(&expected);
+    let own_hits = own_hits.filter_map(|(s, e)| Some((s.name, e.own_hits(s.starts.as_ref()?)))).collect();
 
     let most_threads = arguments.threads.iter().copied().max().unwrap_or(1);
     let (contenders, notes) = contenders::build(&model, bvh, &arguments.tracers, most_threads, progress)?;
@@ -142,7 +141,7 @@ fn measure_set(
     // The first round, which is not counted, tells how often the rays are traced in the others.
     let mut passes: BTreeMap<String, usize> = BTreeMap::new();
     let times = medians(contenders, rounds, |round, contender| {
-        if contender.tracer.needs_hints() && set.from.is_none() {
+        if contender.tracer.starting() != Starting::AtOrigin && set.starts.is_none() {
             return None;
         }
         let again = passes.get(&contender.name).copied().unwrap_or(1);
@@ -154,7 +153,7 @@ fn measure_set(
             }
         });
         if round == 0 {
-            let expected = expected.of(&*contender.tracer);
+            let expected = expected.of(contender.tracer.starting());
             let counts = [expected.differ(contender.ours, &hits, &found), expected.other(&hits)];
             differ.insert(contender.name.clone(), counts);
             if run.threads > 1 && rounds > 1 {
@@ -176,46 +175,43 @@ fn measure_set(
     }
 }
 
-/// The exact answers to a set, and if rays say where they start: those without hits on that triangle.
+/// The exact answers to a set: from the origins of its rays; and if it knows starts, without hits on the triangle there, and from
+/// the exact starts.
 struct Expected {
-    all: Answers,
-    without_own: Option<Answers>,
+    at_origin: Answers,
+    others: Option<[Answers; 2]>,
 }
 
 impl Expected {
-    fn new(scene: &bth::Scene, skipping: &dyn Tracer, set: &RaySet) -> Expected {
-        let without_own = set.from.as_ref().map(|_| {
-            if set.any {
-                let mut found = vec![false; set.rays.len()];
-                skipping.any(set.batch(), &mut found);
-                Answers::Any(found)
-            } else {
-                let mut hits = vec![Hit::MISS; set.rays.len()];
-                skipping.nearest(set.batch(), &mut hits);
-                Answers::Nearest(hits)
-            }
-        });
-        Expected { all: Answers::of_scene(scene, set), without_own }
+    fn new(bvh: &[u8], set: &RaySet) -> Result<Expected> {
+        let of = |usage| Ok::<_, anyhow::Error>(Answers::of(&*structures::tracer(bvh, usage)?, set));
+        let others = match set.starts {
+            Some(_) => Some([of(structures::Use::Own)?, of(structures::Use::StartSingle)?]),
+            None => None,
+        };
+        Ok(Expected { at_origin: of(structures::Use::Batch)?, others })
     }
 
     /// The answers that a tracer has to give.
-    fn of(&self, tracer: &dyn Tracer) -> &Answers {
-        self.without_own.as_ref().filter(|_| tracer.skips_own()).unwrap_or(&self.all)
+    fn of(&self, starting: Starting) -> &Answers {
+        match (starting, &self.others) {
+            (Starting::RejectOwn, Some([without_own, _])) => without_own,
+            (Starting::OnSurface, Some([_, on_surface])) => on_surface,
+            _ => &self.at_origin,
+        }
     }
 
-    /// How many rays say where they start, and how many hit that triangle; for any hit: how many hit nothing else.
-    fn own_hits(&self, from: &[PrimitiveRef]) -> [usize; 2] {
-        let known = from.iter().filter(|p| **p != PrimitiveRef::NONE).count();
-        let own = match (&self.all, &self.without_own) {
+    /// How many rays hit the triangle that they start on; for any hit: how many hit nothing else.
+    fn own_hits(&self, starts: &[Start]) -> usize {
+        match (&self.at_origin, self.of(Starting::RejectOwn)) {
             (Answers::Nearest(hits), _) => {
-                hits.iter().zip(from).filter(|(h, own)| h.is_hit() && h.primitive == **own).count()
+                hits.iter().zip(starts).filter(|(h, own)| h.is_hit() && h.primitive == own.primitive).count()
             }
-            (Answers::Any(all), Some(Answers::Any(others))) => {
+            (Answers::Any(all), Answers::Any(others)) => {
                 all.iter().zip(others).filter(|(all, other)| **all && !**other).count()
             }
             _ => 0,
-        };
-        [known, own]
+        }
     }
 }
 
@@ -226,14 +222,14 @@ pub(crate) enum Answers {
 }
 
 impl Answers {
-    pub(crate) fn of_scene(scene: &bth::Scene, set: &RaySet) -> Answers {
+    pub(crate) fn of(tracer: &dyn Tracer, set: &RaySet) -> Answers {
         if set.any {
             let mut found = vec![false; set.rays.len()];
-            scene.batch(&set.rays).any(&mut found);
+            tracer.any(set.batch(), &mut found);
             Answers::Any(found)
         } else {
             let mut hits = vec![Hit::MISS; set.rays.len()];
-            scene.batch(&set.rays).nearest(&mut hits);
+            tracer.nearest(set.batch(), &mut hits);
             Answers::Nearest(hits)
         }
     }

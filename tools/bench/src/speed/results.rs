@@ -31,10 +31,10 @@ pub struct ModelSpeeds {
     pub view: Option<View>,
     /// Rays of each set that was timed.
     pub rays: BTreeMap<&'static str, usize>,
-    /// Of the rays of a renderer: of how many the start is known, and how many hit the triangle that they start on;
-    /// of a set for any hit: how many hit nothing else.
+    /// Of sets that start at hits: how many rays hit the triangle that they start on; of a set for any hit: how many hit
+    /// nothing else.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub own_hits: BTreeMap<&'static str, [usize; 2]>,
+    pub own_hits: BTreeMap<&'static str, usize>,
     /// Our compiled files.
     pub structures: Vec<CompiledFile>,
     /// What could not be measured, and why.

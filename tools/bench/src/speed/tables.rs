@@ -74,9 +74,9 @@ fn page(model: &ModelSpeeds) -> String {
         let compiled: Vec<String> = model.structures.iter().map(share).collect();
         text.push_str(&format!("Compiled: {}.\n\n", compiled.join("; ")));
     }
-    for (set, [known, own]) in &model.own_hits {
-        let (known, own) = (count(*known as u64), count(*own as u64));
-        text.push_str(&format!("- {set}: {known} rays say where they start; {own} hit that triangle\n"));
+    for (set, own) in &model.own_hits {
+        let (rays, own) = (count(model.rays[set] as u64), count(*own as u64));
+        text.push_str(&format!("- {set}: {own} of {rays} rays hit the triangle that they start on\n"));
     }
     if !model.own_hits.is_empty() {
         text.push('\n');

@@ -240,8 +240,8 @@ pub(super) fn singly(
     let mut arguments = QueryArguments::new(batch.coherent);
     let mut context = OwnContext { instance: [NONE; 2], own: NONE };
     let context = &raw mut context;
-    let from = if own { batch.from } else { None };
-    if from.is_some() {
+    let starts = if own { batch.starts } else { None };
+    if starts.is_some() {
         arguments.flags |= QUERY_FILTER;
         arguments.context = context.cast();
         arguments.filter = reject_own as Function;
@@ -249,9 +249,9 @@ pub(super) fn singly(
     let mut lane = RayHit::<1>::EMPTY;
     for (i, ray) in batch.rays.iter().enumerate() {
         lane.set(0, ray);
-        if let Some(from) = from {
+        if let Some(starts) = starts {
             // SAFETY: the context lives on the stack, and the library reads it only during calls.
-            unsafe { (*context).own = from[i].triangle };
+            unsafe { (*context).own = starts[i].primitive.triangle };
         }
         // SAFETY: the scene is committed, and both structures are as the library defines them.
         unsafe { trace(scene, &mut lane, &mut arguments) };

@@ -3,7 +3,7 @@
 
 use super::Variant;
 use super::api::*;
-use crate::tracer::{Batch, Tracer};
+use crate::tracer::{Batch, Starting, Tracer};
 use anyhow::{Result, ensure};
 use bth::rays::Hit;
 use std::ffi::c_void;
@@ -277,11 +277,7 @@ impl Tracer for EmbreeScene {
         }
     }
 
-    fn needs_hints(&self) -> bool {
-        self.own
-    }
-
-    fn skips_own(&self) -> bool {
-        self.own
+    fn starting(&self) -> Starting {
+        if self.own { Starting::RejectOwn } else { Starting::AtOrigin }
     }
 }

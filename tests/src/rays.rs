@@ -4,7 +4,7 @@ use crate::structures::bits;
 use bth::rays::{Hit, PrimitiveRef, Ray, Start, StartRay};
 use bth::{Scene, TraceRay};
 use bth_random::Rng;
-use std::fmt::Debug;
+use std::fmt::{Debug, Display};
 
 fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [0, 1, 2].map(|k| a[k] - b[k])
@@ -106,7 +106,7 @@ fn point_of([a, b, c]: [[f32; 3]; 3], [u, v]: [f32; 2]) -> [f32; 3] {
 /// vertices, along axes and anywhere, with tiny and huge directions; some of them short.
 pub fn starts(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<StartRay> {
     let mut rng = Rng::new(seed);
-    let mut any = |rng: &mut Rng| rng.below(corners.len() as u64) as usize;
+    let any = |rng: &mut Rng| rng.below(corners.len() as u64) as usize;
     let ray = |_| {
         let triangle = any(&mut rng);
         let of @ [a, b, c] = corners[triangle];
@@ -144,7 +144,7 @@ fn max_norm(v: [f32; 3]) -> f32 {
 }
 
 /// Checks that a batch has these nearest hits, to the bit, and any hit where there is one.
-pub fn check_batch<R: TraceRay + Debug>(scene: &Scene, rays: &[R], expected: &[Hit], context: &str) {
+pub fn check_batch<R: TraceRay + Debug>(scene: &Scene, rays: &[R], expected: &[Hit], context: impl Display) {
     let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
     scene.batch(rays).nearest(&mut hits);
     scene.batch(rays).any(&mut found);

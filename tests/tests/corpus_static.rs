@@ -7,11 +7,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-use bth::rays::{Hit, Ray, StartRay};
 use bth::Isa;
+use bth::rays::{Hit, Ray, StartRay};
 use bth_random::Rng;
 use bth_tests::rays::{alone, check_batch};
-use zerocopy::IntoBytes;
 
 use corpus_support::{Ended, data_and_compiler, listed_triangles, models, program, run};
 
@@ -158,9 +157,9 @@ fn agree_in_batches(tets: &bth::Scene, bvh: &bth::Scene, model: &Path) {
     for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
         isa.choose().expect("an instruction set that is available");
         for scene in [tets, bvh] {
-            let context = format!("{}, {isa}", model.display());
-            check_batch(scene, &rays, &expected, &context);
-            check_batch(scene, &onward, &after, &context);
+            let context = format_args!("{}, {isa}", model.display());
+            check_batch(scene, &rays, &expected, context);
+            check_batch(scene, &onward, &after, context);
         }
     }
     Isa::best().choose().expect("the best is available");

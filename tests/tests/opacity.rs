@@ -1,6 +1,6 @@
 //! Rays through holes: all queries against the hits of a file without opacity, each judged by the alpha of its texture.
 
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::{Hit, Ray};
 use bth::{Accept, Isa, Opacity, Scene};
 use bth_compile::Silent;
 use bth_compile::coordinates::Boxes;

@@ -84,7 +84,13 @@ impl<'a> FromStart<'a> {
         let start = ExactStart::new(&of.map(|p| p.map(integer)), ray.start.u, ray.start.v)?;
         let rounded = start.rounded(&(BigInt::from(1) << 149u32));
         let greatest = of.iter().flatten().fold(0.0, |most: f64, x| most.max(f64::from(x.abs())));
-        has_direction(ray).then_some(FromStart { corners, direction: ray.direction, start, rounded, greatest })
+        has_direction(ray).then_some(FromStart {
+            corners,
+            direction: ray.direction,
+            start,
+            rounded,
+            greatest,
+        })
     }
 
     /// The intersection with a triangle at t > 0.
@@ -122,9 +128,8 @@ pub fn any(corners: &[[[f32; 3]; 3]], ray: &StartRay) -> bool {
 /// All hits, by ascending t and then triangle.
 pub fn all_hits(corners: &[[[f32; 3]; 3]], ray: &StartRay) -> Vec<(u32, Intersection)> {
     let Some(from) = FromStart::new(corners, ray) else { return Vec::new() };
-    let in_range = |found: &(u32, Intersection)| {
-        nearest_of(&range(ray), std::iter::once(found.clone())).is_some()
-    };
+    let in_range =
+        |found: &(u32, Intersection)| nearest_of(&range(ray), std::iter::once(found.clone())).is_some();
     let mut hits: Vec<_> = from.intersections().filter(in_range).collect();
     hits.sort_by(|(a, at_a), (b, at_b)| at_a.t.cmp(&at_b.t).then(a.cmp(b)));
     hits
@@ -158,15 +163,18 @@ pub fn crossings(corners: &[[[f32; 3]; 3]], ray: &StartRay) -> Crossings {
             let fine: Point = [0, 1, 2].map(|k| &scaled[i][k] << (3 * BITS));
             sub(&fine, &moved)
         });
-        let sides =
-            [determinant(&direction, &b, &c), determinant(&direction, &c, &a), determinant(&direction, &a, &b)];
+        let sides = [
+            determinant(&direction, &b, &c),
+            determinant(&direction, &c, &a),
+            determinant(&direction, &a, &b),
+        ];
         let sign = match () {
             () if sides.iter().all(BigInt::is_positive) => 1,
             () if sides.iter().all(BigInt::is_negative) => -1,
             () => continue,
         };
         let [p, q, r] = [0, 1, 2].map(|i| sub(&scaled[i], point));
-        let before_all = determinant(&p, &q, &r) * sign;
+        let ahead: BigInt = determinant(&p, &q, &r) * sign;
         // t = volume / whole, in units of 2^-3BITS / scale.
         let (volume, whole): (BigInt, BigInt) = (determinant(&a, &b, &c), sides.iter().sum());
         let is_beyond = match ray.tmax.is_infinite() {
@@ -177,7 +185,7 @@ pub fn crossings(corners: &[[[f32; 3]; 3]], ray: &StartRay) -> Crossings {
                 difference.is_positive()
             }
         };
-        if before_all.is_positive() && !is_beyond {
+        if ahead.is_positive() && !is_beyond {
             found.count += 1;
             found.winding += sign;
         }

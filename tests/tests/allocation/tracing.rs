@@ -41,9 +41,8 @@ fn rays_that_are_traced_again_allocate_nothing() {
             scene.batch(&rays).nearest(&mut hits);
             let onward = onward(&hits, corners.len(), 2);
             let mut found = vec![false; rays.len()];
-            let mut all = || {
-                trace(scene, &rays, &mut hits, &mut found) + trace(scene, &onward, &mut hits, &mut found)
-            };
+            let mut all =
+                || trace(scene, &rays, &mut hits, &mut found) + trace(scene, &onward, &mut hits, &mut found);
             // What a thread keeps grows until each way that batches may take was taken once.
             let first = all();
             let mut again = 0;

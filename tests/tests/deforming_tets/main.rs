@@ -87,8 +87,8 @@ fn compare(scene: &Scene, plain: &Scene, rng: &mut Rng, isas: &[Isa]) -> usize {
     let chosen = Isa::chosen();
     for isa in isas {
         isa.choose().unwrap();
-        check_batch(scene, &rays, &expected, isa.name());
-        check_batch(scene, &starts, &after, isa.name());
+        check_batch(scene, &rays, &expected, isa);
+        check_batch(scene, &starts, &after, isa);
         for (ray, hit) in starts.iter().zip(&after).step_by(29) {
             assert_eq!(bits(&scene.nearest(ray).unwrap_or(Hit::MISS)), bits(hit), "{isa}: {ray:?}");
         }
@@ -281,8 +281,8 @@ fn instances_of_an_object_with_tetrahedra_have_the_answers_of_the_bvh() {
         let (expected, after) = (alone(bvh.scene(), &rays), alone(bvh.scene(), &starts));
         for isa in available() {
             isa.choose().unwrap();
-            check_batch(tets.scene(), &rays, &expected, isa.name());
-            check_batch(tets.scene(), &starts, &after, isa.name());
+            check_batch(tets.scene(), &rays, &expected, isa);
+            check_batch(tets.scene(), &starts, &after, isa);
         }
         assert!(expected.iter().chain(&after).filter(|hit| hit.is_hit()).count() > 300);
     }

@@ -199,7 +199,7 @@ fn starts_have_the_same_hits_in_batches_and_alone_also_with_tetrahedra() {
         scene.set_frame(frame).unwrap();
         let onward = onward(&hits(&scene, &rays(2000)), scene.object(0).triangles.len(), 5);
         let expected = alone(&scene, &onward);
-        check_batch(&scene, &onward, &expected, &format!("frame {frame}"));
+        check_batch(&scene, &onward, &expected, format_args!("frame {frame}"));
         let of_others = |(ray, hit): &(&StartRay, &Hit)| ray.start.primitive.instance > 1 && hit.is_hit();
         hit_count += onward.iter().zip(&expected).filter(of_others).count();
     }

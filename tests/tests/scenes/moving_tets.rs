@@ -26,7 +26,7 @@ fn compare(bvh: &Scene, tets: &Scene, rays: &[StartRay]) {
     let chosen = Isa::chosen();
     for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
         isa.choose().unwrap();
-        check_batch(tets, rays, &expected, isa.name());
+        check_batch(tets, rays, &expected, isa);
     }
     chosen.choose().unwrap();
 }

@@ -108,7 +108,8 @@ impl Kernel for BoxAndFilter<'_> {
     type Output = (u32, FilterResult);
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Self::Output {
-        let BoxAndFilter(PreparedRay { slabs, filter, .. }, OneTriangle { node, leaf, .. }, origin_reach) = self;
+        let BoxAndFilter(PreparedRay { slabs, filter, .. }, OneTriangle { node, leaf, .. }, origin_reach) =
+            self;
         let (bits, _) = slabs.children(s, node, slabs.last);
         let children = (0..WIDTH).filter(|&i| bits >> i & 1 != 0 && node.child[i] != NONE);
         let candidates = filter.candidates(s, leaf, slabs.first, slabs.last, origin_reach);

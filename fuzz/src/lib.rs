@@ -2,8 +2,8 @@
 
 pub mod write;
 
-use bth::rays::{Hit, PrimitiveRef, Ray};
-use bth::{Hinted, Isa, Scene};
+use bth::rays::{Hit, PrimitiveRef, Ray, Start, StartRay};
+use bth::{Accept, Isa, Scene};
 // Sources of `bth-compile` in `write` name it as their crate's.
 use bth_import::error;
 use bth_import::gltf::Chosen;
@@ -29,7 +29,6 @@ pub fn open_and_trace(bytes: &[u8]) {
     let mut rng = seeded_by(bytes);
     let available: Vec<Isa> = Isa::ALL.into_iter().filter(|isa| isa.is_available()).collect();
     available[rng.below(available.len() as u64) as usize].choose().expect("it is available");
-    if rng.below(2) == 0 { Hinted::Tets } else { Hinted::default() }.choose();
     trace(&scene, &mut rng);
     if scene.description().is_some() {
         for seconds in [0.3, -1.0, 1.5, 1e300, f64::NAN] {
@@ -54,19 +53,33 @@ pub fn open_and_trace(bytes: &[u8]) {
     }
 }
 
-/// 64 rays: one by one, as a batch, with and without hints, nearest and any hit.
+/// 64 rays and 64 from starts: one by one, as a batch, nearest and any hit.
 fn trace(scene: &Scene, rng: &mut Rng) {
     let rays: Vec<Ray> = (0..64).map(|_| ray(scene, rng)).collect();
-    let from: Vec<PrimitiveRef> = rays
+    let starts: Vec<StartRay> = rays
         .iter()
-        .map(|_| PrimitiveRef { instance: rng.below(3) as u32, triangle: rng.below(40) as u32 })
+        .map(|ray| {
+            let primitive = PrimitiveRef { instance: rng.below(3) as u32, triangle: rng.below(40) as u32 };
+            let mut weight = || [0.0, 0.25, 0.5, 1.0, -1.0, f32::NAN][rng.below(6) as usize];
+            let (u, v) = (weight(), weight());
+            Start { primitive, u, v }.ray(ray.direction).with_tmax(ray.tmax)
+        })
         .collect();
     let mut hits = vec![Hit::MISS; rays.len()];
     let mut found = vec![false; rays.len()];
     scene.batch(&rays).nearest(&mut hits);
-    scene.batch(&rays).from(&from[..]).nearest(&mut hits);
-    scene.batch(&rays).from(&from[..]).any(&mut found);
     scene.batch(&rays).any(&mut found);
+    let onward: Vec<StartRay> =
+        rays.iter().zip(&hits).map(|(ray, hit)| StartRay::from_hit(hit, ray.direction)).collect();
+    for starts in [&starts, &onward] {
+        let (mut after, mut blocked) = (hits.clone(), found.clone());
+        scene.batch(starts).nearest(&mut after);
+        scene.batch(starts).any(&mut blocked);
+        for ((ray, hit), blocked) in starts.iter().zip(&after).zip(blocked) {
+            assert_eq!(hit.is_hit(), blocked);
+            assert!(!hit.is_hit() || scene.check_start(&ray.start).is_ok());
+        }
+    }
     for hit in &hits {
         if let Some(surface) = scene.surface(hit) {
             assert!(surface.group < scene.group_count(surface.object));
@@ -88,10 +101,16 @@ fn trace(scene: &Scene, rng: &mut Rng) {
         scene.triangle_in_world(hit.primitive);
     }
     scene.bounds();
-    for (ray, from) in rays.iter().zip(&from).take(8) {
-        scene.nearest_from(ray, *from);
+    let mut all = Vec::new();
+    for (ray, start) in rays.iter().zip(&starts).take(8) {
+        scene.nearest(ray);
         scene.any(ray);
-        scene.nearest_counted(ray, *from);
+        scene.nearest_counted(ray);
+        scene.nearest(start);
+        scene.any(start);
+        scene.nearest_counted(start);
+        scene.all_hits(start, &Accept::default(), &mut all);
+        scene.crossings(start);
     }
 }
 

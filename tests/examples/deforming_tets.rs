@@ -4,8 +4,7 @@
 //!     cargo run --release -p bth-tests --example deforming_tets -- bvh.bth tets.bth
 #![allow(clippy::print_stdout)]
 
-use bth::Hinted;
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::{Hit, PrimitiveRef, Start, StartRay};
 use bth_format::exact::side;
 use bth_format::verify::filling_tets;
 use bth_random::Rng;
@@ -61,48 +60,40 @@ fn main() -> Result<(), bth::Error> {
     Ok(())
 }
 
-/// Times rays from the surface, with hints through the BVH and through tetrahedra.
+/// Times rays from the surface.
 fn rays(scene: &bth::Scene, twist: f32) {
     let view = scene.object(0);
     let size = (0..3).map(|k| view.header.upper[k] - view.header.lower[k]).fold(0.0, f32::max);
     for (name, tmax, any) in [("diffuse, nearest", f32::INFINITY, false), ("AO, any", 0.1 * size, true)] {
-        let (rays, from) = from_surface(scene, tmax);
+        let rays = from_surface(scene, tmax);
         let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-        let mut best = [f64::INFINITY; 2];
+        let mut best = f64::INFINITY;
         for _ in 0..ROUNDS {
-            for (hinted, best) in [Hinted::Bvh, Hinted::Tets].into_iter().zip(&mut best) {
-                hinted.choose();
-                let start = Instant::now();
-                for ((rays, from), (hits, found)) in rays
-                    .chunks(4096)
-                    .zip(from.chunks(4096))
-                    .zip(hits.chunks_mut(4096).zip(found.chunks_mut(4096)))
-                {
-                    let batch = scene.batch(rays);
-                    if any { batch.from(from).any(found) } else { batch.from(from).nearest(hits) }
-                }
-                *best = best.min(1e9 * start.elapsed().as_secs_f64() / rays.len() as f64);
+            let start = Instant::now();
+            let results = hits.chunks_mut(4096).zip(found.chunks_mut(4096));
+            for (rays, (hits, found)) in rays.chunks(4096).zip(results) {
+                let batch = scene.batch(rays);
+                if any { batch.any(found) } else { batch.nearest(hits) }
             }
+            best = best.min(1e9 * start.elapsed().as_secs_f64() / rays.len() as f64);
         }
-        println!("  twist {twist}, {name}: BVH {:.0} ns, tets {:.0} ns a ray", best[0], best[1]);
+        println!("  twist {twist}, {name}: {best:.0} ns a ray");
     }
 }
 
 /// Rays from points of random triangles to random sides of them, in random directions.
-fn from_surface(scene: &bth::Scene, tmax: f32) -> (Vec<Ray>, Vec<PrimitiveRef>) {
+fn from_surface(scene: &bth::Scene, tmax: f32) -> Vec<StartRay> {
     let (view, mut rng) = (scene.object(0), Rng::new(5));
     let ray = |_| {
         let triangle = rng.below(view.triangles.len() as u64) as u32;
-        let [a, b, c] = view.triangles[triangle as usize].map(|v| view.positions[v as usize]);
         let (u, v) = (rng.unit_f32(), rng.unit_f32());
         let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
-        let origin = [0, 1, 2].map(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]));
         let direction = rng.point_in_ball().map(|x| x as f32);
         let length = direction.iter().map(|x| x * x).sum::<f32>().sqrt();
-        let ray = Ray { tmin: 1e-4, tmax, ..Ray::new(origin, direction.map(|x| x / length)) };
-        (ray, PrimitiveRef { instance: 0, triangle })
+        let start = Start { primitive: PrimitiveRef { instance: 0, triangle }, u, v };
+        start.ray(direction.map(|x| x / length)).with_tmax(tmax)
     };
-    (0..RAYS).map(ray).unzip()
+    (0..RAYS).map(ray).collect()
 }
 
 /// Positions that are turned about the last axis, by an angle that grows along it.

@@ -1,7 +1,10 @@
 //! Rays for tests, including those for which ray tracers tend to miss hits.
 
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use crate::structures::bits;
+use bth::rays::{Hit, PrimitiveRef, Ray, Start, StartRay};
+use bth::{Scene, TraceRay};
 use bth_random::Rng;
+use std::fmt::{Debug, Display};
 
 fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [0, 1, 2].map(|k| a[k] - b[k])
@@ -58,19 +61,106 @@ pub fn assorted(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<Ray> 
         .collect()
 }
 
-/// Rays that start where others hit, with the surface that they start on; and some with wild hints, wrong ones
-/// and ones out of range.
-pub fn onward(rays: &[Ray], hits: &[Hit], triangles: usize, seed: u64) -> Vec<(Ray, PrimitiveRef)> {
+/// Rays that start where others hit, in any direction; where one misses, and for some others, at any point of any triangle, also of
+/// ones that do not exist.
+pub fn onward(hits: &[Hit], triangles: usize, seed: u64) -> Vec<StartRay> {
     let mut rng = Rng::new(seed);
-    let mut from = |(ray, hit): (&Ray, &Hit)| {
-        if !hit.is_hit() || rng.below(8) == 0 {
-            let triangle = rng.below(triangles as u64 + 3) as u32;
-            return (*ray, PrimitiveRef { instance: 0, triangle });
-        }
-        let back = hit.t * (1.0 - 1e-4 * rng.unit_f32());
-        let origin = [0, 1, 2].map(|k| ray.origin[k] + ray.direction[k] * back);
+    let mut from = |hit: &Hit| {
         let direction = [(); 3].map(|()| rng.unit_f32() - 0.5);
-        (Ray::new(origin, direction), hit.primitive)
+        if hit.is_hit() && rng.below(8) > 0 {
+            return StartRay::from_hit(hit, direction);
+        }
+        let triangle = rng.below(triangles as u64 + 3) as u32;
+        let (u, v) = (0.5 * rng.unit_f32(), 0.5 * rng.unit_f32());
+        Start { primitive: PrimitiveRef { instance: 0, triangle }, u, v }.ray(direction)
     };
-    rays.iter().zip(hits).map(&mut from).collect()
+    hits.iter().map(&mut from).collect()
+}
+
+/// Weights of points of a triangle: corners, points of edges, some of which have a sum that rounds to above 1, and others.
+pub fn weights(rng: &mut Rng) -> [f32; 2] {
+    let w = rng.unit_f32();
+    match rng.below(10) {
+        0 => [0.0, 0.0],
+        1 => [1.0, 0.0],
+        2 => [0.0, 1.0],
+        3 => [w, 0.0],
+        4 => [0.0, w],
+        5 => [w, 1.0 - w],
+        6 => [w, (1.0 - w).next_up()],
+        7 => [[0.5, 0.5], [0.5, 0.0], [0.0, 0.5], [0.25, 0.25]][rng.below(4) as usize],
+        _ => [w * 0.5, rng.unit_f32() * 0.5],
+    }
+}
+
+/// The point with these weights, rounded.
+fn point_of([a, b, c]: [[f32; 3]; 3], [u, v]: [f32; 2]) -> [f32; 3] {
+    let (u, v) = (f64::from(u), f64::from(v));
+    [0, 1, 2].map(|k| {
+        let [a, b, c] = [a[k], b[k], c[k]].map(f64::from);
+        (a + u * (b - a) + v * (c - a)) as f32
+    })
+}
+
+/// Rays from starts of every kind on an object's triangles: in faces, on edges and at corners, along edges, in the plane, to
+/// vertices, along axes and anywhere, with tiny and huge directions; some of them short.
+pub fn starts(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<StartRay> {
+    let mut rng = Rng::new(seed);
+    let any = |rng: &mut Rng| rng.below(corners.len() as u64) as usize;
+    let ray = |_| {
+        let triangle = any(&mut rng);
+        let of @ [a, b, c] = corners[triangle];
+        let [u, v] = weights(&mut rng);
+        let start = Start { primitive: PrimitiveRef { instance: 0, triangle: triangle as u32 }, u, v };
+        let (from, other) = (point_of(of, [u, v]), corners[any(&mut rng)]);
+        let size = max_norm(sub(b, a)).max(max_norm(sub(c, a)));
+        let anywhere = rng.point_in_ball().map(|x| x as f32 * size);
+        let mut direction = match rng.below(10) {
+            0 => sub(b, a),
+            1 => sub(c, b),
+            2 => sub(of[rng.below(3) as usize], from),
+            3 => sub(point_of(of, weights(&mut rng)), from),
+            4 => sub(other[0], from),
+            5 => sub(point_of(other, weights(&mut rng)), from),
+            6 => {
+                let mut axis = [0.0, -0.0, 0.0];
+                axis[rng.below(3) as usize] = if rng.below(2) == 0 { size } else { -size };
+                axis
+            }
+            _ => anywhere,
+        };
+        if direction == [0.0; 3] {
+            direction = anywhere;
+        }
+        let scale = [1.0, 1.0, -1.0, 2f32.powi(-20), 2f32.powi(20)][rng.below(5) as usize];
+        let tmax = [f32::INFINITY, 1.0 / scale.abs(), 0.1 / scale.abs()][rng.below(3) as usize];
+        start.ray(direction.map(|d| d * scale)).with_tmax(tmax)
+    };
+    (0..count).map(ray).collect()
+}
+
+fn max_norm(v: [f32; 3]) -> f32 {
+    v.iter().fold(0.0, |most: f32, x| most.max(x.abs()))
+}
+
+/// Checks that a batch has these nearest hits, to the bit, and any hit where there is one.
+pub fn check_batch<R: TraceRay + Debug>(scene: &Scene, rays: &[R], expected: &[Hit], context: impl Display) {
+    let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+    scene.batch(rays).nearest(&mut hits);
+    scene.batch(rays).any(&mut found);
+    for (i, ray) in rays.iter().enumerate() {
+        assert_eq!(
+            bits(&hits[i]),
+            bits(&expected[i]),
+            "{context}: {ray:?}: {:?}, not {:?}",
+            hits[i],
+            expected[i]
+        );
+        assert_eq!(found[i], expected[i].is_hit(), "any hit, {context}: {ray:?}");
+    }
+}
+
+/// The nearest hits of rays, each traced alone.
+pub fn alone<R: TraceRay>(scene: &Scene, rays: &[R]) -> Vec<Hit> {
+    rays.iter().map(|ray| scene.nearest(ray).unwrap_or(Hit::MISS)).collect()
 }

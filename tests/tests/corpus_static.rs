@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-use bth::rays::{Hit, PrimitiveRef, Ray};
-use bth::{Hinted, Isa};
+use bth::Isa;
+use bth::rays::{Hit, Ray, StartRay};
 use bth_random::Rng;
-use zerocopy::IntoBytes;
+use bth_tests::rays::{alone, check_batch};
 
 use corpus_support::{Ended, data_and_compiler, listed_triangles, models, program, run};
 
@@ -122,60 +122,45 @@ fn compare(tets: &bth::Scene, bvh: &bth::Scene, model: &Path) -> usize {
 }
 
 /// A pinhole camera's rays from one side, in tiles, and random rays from the surfaces they hit.
-fn coherent_and_bounced(bvh: &bth::Scene) -> (Vec<Ray>, Vec<PrimitiveRef>) {
+fn coherent_and_bounced(bvh: &bth::Scene) -> (Vec<Ray>, Vec<StartRay>) {
     const SIDE: u16 = 64;
     let object = *bvh.object(0).header;
     let (lower, upper) = (object.lower, object.upper);
     let size = (0..3).map(|k| upper[k] - lower[k]).fold(0.0, f32::max);
     let middle = [0, 1, 2].map(|k| 0.5 * (lower[k] + upper[k]));
     let origin = [middle[0] + 0.9 * size, middle[1] + 0.3 * size, middle[2] + 1.1 * size];
-    let (mut rays, mut from) = (Vec::new(), Vec::new());
-    for i in 0..SIDE * SIDE {
+    let ray = |i: u16| {
         // Tiles of eight by eight.
         let (tile, within) = (i / 64, i % 64);
         let x = (tile % (SIDE / 8)) * 8 + within % 8;
         let y = (tile / (SIDE / 8)) * 8 + within / 8;
         let [x, y] = [x, y].map(|x| (f32::from(x) / f32::from(SIDE) - 0.5) * size);
         let target = [middle[0] + x, middle[1] + y, middle[2] - x];
-        let direction = [0, 1, 2].map(|k| target[k] - origin[k]);
-        rays.push(Ray::new(origin, direction));
-        from.push(PrimitiveRef::NONE);
-    }
+        Ray::new(origin, [0, 1, 2].map(|k| target[k] - origin[k]))
+    };
+    let rays: Vec<Ray> = (0..SIDE * SIDE).map(ray).collect();
     let mut rng = Rng::new(5);
-    for i in 0..rays.len() {
-        let hit = bvh.nearest(&rays[i]).unwrap_or(Hit::MISS);
-        if hit.is_hit() {
-            let (o, d) = (rays[i].origin, rays[i].direction);
-            let origin = [0, 1, 2].map(|k| o[k] + hit.t * d[k]);
-            let direction = [(); 3].map(|()| (rng.unit_f32() - 0.5) * size);
-            let tmax = if i % 3 == 0 { 0.1 } else { f32::INFINITY };
-            rays.push(Ray { origin, tmin: 1e-4, direction, tmax });
-            from.push(hit.primitive);
-        }
-    }
-    (rays, from)
+    let onward = rays.iter().enumerate().filter_map(|(i, ray)| {
+        let hit = bvh.nearest(ray)?;
+        let direction = [(); 3].map(|()| (rng.unit_f32() - 0.5) * size);
+        let tmax = if i % 3 == 0 { 0.1 } else { f32::INFINITY };
+        Some(StartRay::from_hit(&hit, direction).with_tmax(tmax))
+    });
+    let onward = onward.collect();
+    (rays, onward)
 }
 
-/// Batches of both structures, with hints and without, give on every instruction set the bits of single rays.
+/// Batches of both structures give on every instruction set the bits of single rays.
 fn agree_in_batches(tets: &bth::Scene, bvh: &bth::Scene, model: &Path) {
-    let (rays, from) = coherent_and_bounced(bvh);
-    let single = |(ray, from): (&Ray, &PrimitiveRef)| bvh.nearest_from(ray, *from).unwrap_or(Hit::MISS);
-    let expected: Vec<Hit> = rays.iter().zip(&from).map(single).collect();
+    let (rays, onward) = coherent_and_bounced(bvh);
+    let (expected, after) = (alone(bvh, &rays), alone(bvh, &onward));
     for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
         isa.choose().expect("an instruction set that is available");
-        for (scene, hinted) in [(tets, Hinted::Tets), (tets, Hinted::Bvh), (bvh, Hinted::Measured)] {
-            hinted.choose();
-            let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-            scene.batch(&rays).from(&from[..]).nearest(&mut hits);
-            scene.batch(&rays).from(&from[..]).any(&mut found);
-            for (i, ray) in rays.iter().enumerate() {
-                let context =
-                    || format!("{}, {isa}, {hinted:?}: {ray:?} from {:?}", model.display(), from[i]);
-                assert_eq!(hits[i].as_bytes(), expected[i].as_bytes(), "{}", context());
-                assert_eq!(found[i], expected[i].is_hit(), "any hit, {}", context());
-            }
+        for scene in [tets, bvh] {
+            let context = format_args!("{}, {isa}", model.display());
+            check_batch(scene, &rays, &expected, context);
+            check_batch(scene, &onward, &after, context);
         }
     }
     Isa::best().choose().expect("the best is available");
-    Hinted::Measured.choose();
 }

@@ -14,8 +14,12 @@ fn passes(bytes: &[u8]) -> bool {
             bth::rays::Ray { origin: [0.3, 0.2, 9.0], tmin: 0.0, direction: [0.0, 0.1, -1.0], tmax: 1e9 };
         for seconds in [-1.0, 0.3, 1.5, 1e300, f64::NAN] {
             let _ = scene.set_seconds(seconds);
-            scene.nearest_from(&ray, bth::rays::PrimitiveRef { instance: 1, triangle: 0 });
+            let primitive = bth::rays::PrimitiveRef { instance: 1, triangle: 0 };
+            let onward = bth::rays::Start { primitive, u: 0.25, v: 0.5 }.ray(ray.direction);
+            scene.nearest(&ray);
             scene.any(&ray);
+            scene.nearest(&onward);
+            scene.any(&onward);
         }
     }
     if good {

@@ -3,8 +3,8 @@
 #![cfg(target_arch = "x86_64")]
 #![allow(unsafe_code)] // The flags of floating-point operations are read by an instruction.
 
-use bth::rays::{Hit, PrimitiveRef, Ray};
-use bth::{Hinted, Isa, Scene};
+use bth::rays::{Hit, Ray, StartRay};
+use bth::{Isa, Scene, TraceRay};
 use bth_random::Rng;
 use bth_tests::rays::onward;
 use bth_tests::structures::every_structure;
@@ -40,15 +40,13 @@ fn ordinary(count: usize, tmin: f32, tmax: f32) -> Vec<Ray> {
     (0..count).map(ray).collect()
 }
 
-/// Traces the rays one by one and in batches, with and without hints.
-fn trace(scene: &Scene, rays: &[Ray], from: &[PrimitiveRef], hits: &mut [Hit], found: &mut [bool]) {
-    for (ray, from) in rays.iter().zip(from) {
-        std::hint::black_box((scene.nearest(ray), scene.any(ray), scene.nearest_from(ray, *from)));
+/// Traces the rays one by one and in batches.
+fn trace<R: TraceRay>(scene: &Scene, rays: &[R], hits: &mut [Hit], found: &mut [bool]) {
+    for ray in rays {
+        std::hint::black_box((scene.nearest(ray), scene.any(ray)));
     }
-    for hints in [None, Some(from)] {
-        scene.batch(rays).from(hints).nearest(hits);
-        scene.batch(rays).from(hints).any(found);
-    }
+    scene.batch(rays).nearest(hits);
+    scene.batch(rays).any(found);
 }
 
 #[test]
@@ -79,15 +77,14 @@ fn no_number_of_an_ordinary_ray_is_denormal() {
                 scene.batch(&rays).nearest(&mut hits);
                 let some = hits.iter().filter(|hit| hit.is_hit()).count();
                 assert!(some > 20, "{name}: {some} hits");
-                let (onward, from): (Vec<_>, Vec<_>) =
-                    onward(&rays, &hits, model.triangles.len(), 2).into_iter().unzip();
-                let onward: Vec<_> = onward.into_iter().map(|ray| Ray { tmin, tmax, ..ray }).collect();
-                for (rays, hinted) in [(&rays, Hinted::Bvh), (&onward, Hinted::Bvh), (&onward, Hinted::Tets)]
-                {
-                    hinted.choose();
-                    let flags = denormal_flags(|| trace(scene, rays, &from, &mut hits, &mut found));
-                    assert_eq!(flags, 0, "{name}, {isa}, {hinted:?}, rays from {tmin} to {tmax}");
-                }
+                let onward: Vec<StartRay> = onward(&hits, model.triangles.len(), 2)
+                    .into_iter()
+                    .map(|ray| ray.with_tmax(tmax))
+                    .collect();
+                let flags = denormal_flags(|| trace(scene, &rays, &mut hits, &mut found));
+                assert_eq!(flags, 0, "{name}, {isa}, rays from {tmin} to {tmax}");
+                let flags = denormal_flags(|| trace(scene, &onward, &mut hits, &mut found));
+                assert_eq!(flags, 0, "{name}, {isa}, rays from starts to {tmax}");
             }
         }
     }

@@ -1,19 +1,33 @@
 //! Every structure and record agrees with the exact oracle, and with each other bit for bit.
 
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::{Hit, PrimitiveRef, Ray, Start, StartRay};
 use bth::{Accept, Steps};
 use bth_compile::pipeline::Structure;
 use bth_format::layout::RecordKind;
 use bth_scenes::{Model, blob::blob, gyroid::gyroid, hall::hall, knot::torus_knot, soup::soup};
 use bth_tests::oracle;
-use bth_tests::rays::{assorted, onward};
+use bth_tests::rays::{alone, assorted, check_batch, onward, starts};
 use bth_tests::structures::{Traced, bits, compiled, every_structure, options};
 
 type Corners = Vec<[[f32; 3]; 3]>;
 
 fn check_against_oracle(corners: &Corners, ray: &Ray, hit: &Hit) {
-    let truth = oracle::nearest(corners, ray);
-    let context = || format!("{ray:?}: {hit:?}, exactly {truth:?}");
+    let at = |triangle: u32| oracle::intersection(ray, corners[triangle as usize]);
+    check_hit(oracle::nearest(corners, ray), at, hit, &format!("{ray:?}"));
+}
+
+fn check_start_against_oracle(corners: &Corners, ray: &StartRay, hit: &Hit) {
+    let at = |triangle: u32| oracle::starts::intersection(corners, ray, triangle);
+    check_hit(oracle::starts::nearest(corners, ray), at, hit, &format!("{ray:?}"));
+}
+
+fn check_hit(
+    truth: Option<oracle::ExactHit<u32>>,
+    at: impl Fn(u32) -> Option<oracle::Intersection>,
+    hit: &Hit,
+    ray: &str,
+) {
+    let context = || format!("{ray}: {hit:?}, exactly {truth:?}");
     let Some(truth) = &truth else {
         assert!(!hit.is_hit(), "ghost: {}", context());
         return;
@@ -24,8 +38,7 @@ fn check_against_oracle(corners: &Corners, ray: &Ray, hit: &Hit) {
     let id = hit.primitive.triangle;
     if !truth.triangles.contains(&id) {
         // Another triangle at the same t but for less than the rounding of f64.
-        let other = oracle::intersection(ray, corners[id as usize]).map(|at| oracle::to_f64(&at.t));
-        let gap = other.map(|t| (t - truth.t_f64()).abs());
+        let gap = at(id).map(|at| (oracle::to_f64(&at.t) - truth.t_f64()).abs());
         assert!(gap.is_some_and(|g| g <= truth.t_f64().abs() * 1e-12), "other triangle: {}", context());
     }
     assert!(hit.u >= 0.0 && hit.v >= 0.0 && hit.u + hit.v <= 1.0 + f32::EPSILON, "weights: {}", context());
@@ -41,7 +54,12 @@ fn check(model: &Model, whole: bool, ray_count: usize, seed: u64) {
     for (ray, hit) in rays.iter().zip(&expected) {
         check_against_oracle(&corners, ray, hit);
     }
-    let onward = onward(&rays, &expected, corners.len(), seed + 1);
+    let mut onward = onward(&expected, corners.len(), seed + 1);
+    onward.extend(starts(&corners, ray_count / 2, seed + 2));
+    let after = alone(plain, &onward);
+    for (ray, hit) in onward.iter().zip(&after) {
+        check_start_against_oracle(&corners, ray, hit);
+    }
     for Traced { name, scene } in &traced {
         let mut hits = vec![Hit::MISS; rays.len()];
         scene.batch(&rays).nearest(&mut hits);
@@ -62,22 +80,10 @@ fn check(model: &Model, whole: bool, ray_count: usize, seed: u64) {
                 "{name}: one ray at a time"
             );
         }
-        for (ray, from) in &onward {
-            let (without, with) = (
-                scene.nearest(ray).unwrap_or(Hit::MISS),
-                scene.nearest_from(ray, *from).unwrap_or(Hit::MISS),
-            );
-            assert_eq!(
-                bits(&without),
-                bits(&with),
-                "{name}: a hint, {from:?}, changed {ray:?}: {without:?} {with:?}"
-            );
-            assert_eq!(scene.any_from(ray, *from), with.is_hit(), "{name}: any hit of {ray:?} from {from:?}");
-            assert_eq!(
-                bits(&plain.nearest(ray).unwrap_or(Hit::MISS)),
-                bits(&with),
-                "{name}: {ray:?} differs from the BVH"
-            );
+        check_batch(scene, &onward, &after, name);
+        for (ray, hit) in onward.iter().zip(&after).step_by(7) {
+            assert_eq!(bits(&scene.nearest(ray).unwrap_or(Hit::MISS)), bits(hit), "{name}: {ray:?} alone");
+            assert_eq!(scene.any(ray), hit.is_hit(), "{name}: any hit of {ray:?} alone");
         }
     }
 }
@@ -231,7 +237,13 @@ fn rays_without_a_line_hit_nothing() {
     for Traced { name, scene } in &every_structure(&torus_knot(400), true) {
         for ray in &bad {
             assert_eq!(scene.nearest(ray), None, "{name}: {ray:?}");
-            assert!(!scene.any_from(ray, PrimitiveRef { instance: 0, triangle: 0 }), "{name}: {ray:?}");
+            assert!(!scene.any(ray), "{name}: {ray:?}");
+            let start = Start { primitive: PrimitiveRef { instance: 0, triangle: 0 }, u: 0.25, v: 0.25 };
+            let from_start = start.ray(ray.direction).with_tmax(ray.tmax);
+            // A start has an origin and a range that begins at 0.
+            if from_start.direction != [0.0, 0.0, 1.0] || !(from_start.tmax > 1.0) {
+                assert_eq!((scene.nearest(&from_start), scene.any(&from_start)), (None, false), "{name}");
+            }
         }
     }
 }
@@ -257,7 +269,7 @@ fn hits_whose_t_is_rounded_to_an_end_of_the_range_are_found() {
 }
 
 #[test]
-fn tets_are_really_walked_and_hints_save_steps() {
+fn tets_are_really_walked_also_from_starts() {
     if bth_tests::worker().is_none() {
         return;
     }
@@ -268,13 +280,14 @@ fn tets_are_really_walked_and_hints_save_steps() {
     let first = assorted(&corners, 4000, 9);
     let mut hits = vec![Hit::MISS; first.len()];
     tets.batch(&first).nearest(&mut hits);
-    let (mut plain, mut hinted, mut rays) = (Steps::default(), Steps::default(), 0);
-    for (ray, from) in onward(&first, &hits, corners.len(), 10) {
-        plain += tets.nearest_counted(&ray, PrimitiveRef::NONE).1;
-        hinted += tets.nearest_counted(&ray, from).1;
+    let (mut plain, mut from_starts, mut rays) = (Steps::default(), Steps::default(), 0);
+    for (ray, onward) in first.iter().zip(onward(&hits, corners.len(), 10)) {
+        plain += tets.nearest_counted(ray).1;
+        from_starts += tets.nearest_counted(&onward).1;
         rays += 1;
     }
-    assert!(plain.tets > 0 && hinted.tets > 0 && plain.nodes == 0, "{plain:?} {hinted:?}");
-    assert!(hinted.tets * 4 < plain.tets * 3, "{hinted:?} is little less than {plain:?}");
-    assert!(hinted.floods * 3 < rays, "most rays need no exact fall-back: {hinted:?} of {rays}");
+    assert!(plain.tets > 0 && from_starts.tets > 0, "{plain:?} {from_starts:?}");
+    assert_eq!((plain.nodes, from_starts.nodes), (0, 0), "{plain:?} {from_starts:?}");
+    assert!(from_starts.tets < plain.tets, "{from_starts:?} {plain:?}");
+    assert!(from_starts.floods * 3 < rays, "most rays need no exact fall-back: {from_starts:?} of {rays}");
 }

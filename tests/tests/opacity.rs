@@ -1,6 +1,6 @@
 //! Rays through holes: all queries against the hits of a file without opacity, each judged by the alpha of its texture.
 
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::{Hit, Ray};
 use bth::{Accept, Isa, Opacity, Scene};
 use bth_compile::Silent;
 use bth_compile::coordinates::Boxes;
@@ -137,7 +137,7 @@ fn compare(opaque: &Scene, scene: &Scene, rays: &[Ray], flat: bool) -> usize {
         let first = left.first().copied().unwrap_or(Hit::MISS);
         passed += all.iter().take_while(|hit| bits(hit) != bits(&first)).count();
         assert_eq!(bits(&scene.nearest(ray).unwrap_or(Hit::MISS)), bits(&first), "{ray:?}");
-        assert_eq!(bits(&scene.nearest_counted(ray, PrimitiveRef::NONE).0), bits(&first), "{ray:?}");
+        assert_eq!(bits(&scene.nearest_counted(ray).0), bits(&first), "{ray:?}");
         assert_eq!(scene.any(ray), !left.is_empty(), "{ray:?}");
         scene.all_hits(ray, &everything, &mut found);
         assert!(found.iter().map(bits).eq(left.iter().map(bits)), "{ray:?}: {found:?} {left:?}");

@@ -8,6 +8,8 @@
 //! compared with the range of the ray. The vertices of an instance are transformed exactly by its f64 matrix, whereas the
 //! runtime rounds the ray into the space of the object; see [`World`].
 //!
+//! Rays that start on triangles ([`mod@starts`]) have exact rational starts.
+//!
 //! Of the runtime only the ray types and the reader of compiled files are used, nothing of its traversal or intersection.
 //! A filter in f64 skips triangles that the line misses by far more than its rounding error, and decides nothing else.
 #![warn(missing_docs)]
@@ -19,6 +21,7 @@ mod intersection;
 mod nearest;
 mod orientation;
 mod overlap;
+pub mod starts;
 mod world;
 
 pub use closest::{is_root_within, squared_distance};

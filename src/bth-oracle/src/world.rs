@@ -5,8 +5,9 @@ use crate::intersection::{
     Intersection, Point, certainly_missed, has_line, integer, intersect_exactly, intersection, to_f64,
 };
 use crate::nearest::{ExactHit, nearest_of};
+use crate::starts::{ExactStart, has_direction, range};
 use bth::Scene;
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::{Hit, PrimitiveRef, Ray, StartRay};
 use bth_format::layout::{Opacity, opacity_at};
 use num_bigint::BigInt;
 
@@ -74,18 +75,45 @@ impl World {
     /// The nearest exact hit as the runtime reports hits: t, u and v rounded to f32; of equal ones that of the least
     /// instance and triangle.
     pub fn hit(&self, ray: &Ray) -> Hit {
-        let rounded = |x: &_| to_f64(x) as f32;
-        self.nearest(ray).map_or(Hit::MISS, |truth| Hit {
-            t: rounded(&truth.at.t),
-            u: rounded(&truth.at.u),
-            v: rounded(&truth.at.v),
-            primitive: truth.triangles[0],
-        })
+        as_reported(self.nearest(ray))
     }
 
     /// Whether any triangle is hit within the ray's range.
     pub fn any(&self, ray: &Ray) -> bool {
         self.intersections(ray).any(|found| nearest_of(ray, std::iter::once(found)).is_some())
+    }
+
+    /// The nearest exact hit of a ray from a start. The instance on which it starts sees the exact point, others see it rounded to f32, at
+    /// t >= 0, as in the runtime.
+    pub fn nearest_from_start(&self, ray: &StartRay) -> Option<ExactHit<PrimitiveRef>> {
+        let PrimitiveRef { instance, triangle } = ray.start.primitive;
+        let own = self.instances.iter().find(|other| other.number == instance)?;
+        let of = own.triangles.iter().find(|other| other.id == triangle)?;
+        let start = ExactStart::new(&own.exact(of.corners), ray.start.u, ray.start.v)?;
+        if !has_direction(ray) {
+            return None;
+        }
+        let one = BigInt::from(1) << (UNITS[0] + UNITS[1]);
+        let rounded = Ray { origin: start.rounded(&one).map(|x| x as f32), ..range(ray) };
+        let direction = ray.direction.map(|x| integer(x) << UNITS[0]);
+        let found = self.instances.iter().flat_map(|other| {
+            let (start, direction, rounded) = (&start, &direction, &rounded);
+            other.triangles.iter().filter_map(move |triangle| {
+                let primitive = PrimitiveRef { instance: other.number, triangle: triangle.id };
+                let at = if other.number == instance {
+                    start.intersection(direction, &other.exact(triangle.corners))?
+                } else {
+                    other.intersection(rounded, triangle.corners)?
+                };
+                other.blocks(triangle.id, &at).then_some((primitive, at))
+            })
+        });
+        nearest_of(&rounded, found)
+    }
+
+    /// As [`Self::hit`], for a ray from a start.
+    pub fn hit_from_start(&self, ray: &StartRay) -> Hit {
+        as_reported(self.nearest_from_start(ray))
     }
 
     /// How many triangles the whole line of a ray meets, in both directions. Each costs the search for a hit as much as many that it misses.
@@ -97,17 +125,56 @@ impl World {
         self.instances.iter().filter(|_| has_line(ray)).flat_map(move |instance| {
             instance.triangles.iter().filter_map(move |triangle| {
                 let primitive = PrimitiveRef { instance: instance.number, triangle: triangle.id };
-                let at = match &instance.to_world {
-                    None => intersection(ray, triangle.corners)?,
-                    Some(rows) => intersection_in_world(ray, rows, triangle.corners)?,
-                };
-                let [rows, words] = &instance.opacity;
-                let [u, v] = [&at.u, &at.v].map(|x| to_f64(x) as f32);
-                let passes = opacity_at(rows, words, triangle.id, u, v) == Opacity::Transparent;
-                (!passes).then_some((primitive, at))
+                let at = instance.intersection(ray, triangle.corners)?;
+                instance.blocks(triangle.id, &at).then_some((primitive, at))
             })
         })
     }
+}
+
+impl Instance {
+    /// The intersection of the line of a ray with a triangle.
+    fn intersection(&self, ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Intersection> {
+        match &self.to_world {
+            None => intersection(ray, corners),
+            Some(rows) => intersection_in_world(ray, rows, corners),
+        }
+    }
+
+    /// Whether a point of a triangle is not transparent.
+    fn blocks(&self, triangle: u32, at: &Intersection) -> bool {
+        let [rows, words] = &self.opacity;
+        let [u, v] = [&at.u, &at.v].map(|x| to_f64(x) as f32);
+        opacity_at(rows, words, triangle, u, v) != Opacity::Transparent
+    }
+
+    /// The corners of a triangle in world space, in units of 2^-(1074 + 149).
+    fn exact(&self, corners: [[f32; 3]; 3]) -> [Point; 3] {
+        match &self.to_world {
+            None => corners.map(|p| p.map(|x| integer(x) << UNITS[0])),
+            Some(rows) => corners.map(|p| in_world(rows, p)),
+        }
+    }
+}
+
+/// A hit as the runtime reports it; of equal ones that of the least instance and triangle.
+fn as_reported(hit: Option<ExactHit<PrimitiveRef>>) -> Hit {
+    let rounded = |x: &_| to_f64(x) as f32;
+    hit.map_or(Hit::MISS, |truth| Hit {
+        t: rounded(&truth.at.t),
+        u: rounded(&truth.at.u),
+        v: rounded(&truth.at.v),
+        primitive: truth.triangles[0],
+    })
+}
+
+/// A point that the rows of a matrix transform to world space, in units of 2^-(1074 + 149).
+fn in_world(rows: &[[f64; 4]; 3], p: [f32; 3]) -> Point {
+    let p = p.map(integer);
+    std::array::from_fn(|k| {
+        let [a, b, c, moved] = rows[k].map(integer_f64);
+        a * &p[0] + b * &p[1] + c * &p[2] + (moved << UNITS[1])
+    })
 }
 
 /// The intersection with a triangle that the rows of a matrix transform to world space.
@@ -128,12 +195,5 @@ fn intersection_in_world(ray: &Ray, rows: &[[f64; 4]; 3], corners: [[f32; 3]; 3]
         return None;
     }
     let widen = |v: [f32; 3]| v.map(|x| integer(x) << UNITS[0]);
-    let exact = |p: [f32; 3]| -> Point {
-        let p = p.map(integer);
-        std::array::from_fn(|k| {
-            let [a, b, c, moved] = rows[k].map(integer_f64);
-            a * &p[0] + b * &p[1] + c * &p[2] + (moved << UNITS[1])
-        })
-    };
-    intersect_exactly(&widen(ray.origin), &widen(ray.direction), &corners.map(exact))
+    intersect_exactly(&widen(ray.origin), &widen(ray.direction), &corners.map(|p| in_world(rows, p)))
 }

@@ -4,7 +4,7 @@
 
 #![allow(clippy::print_stdout)]
 
-use bth::rays::{Hit, Ray};
+use bth::rays::{Hit, Ray, StartRay};
 use bth_random::Rng;
 
 /// Rays in a batch.
@@ -16,25 +16,30 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let (scene, count, times) = (bth::open(scene)?, rays.parse()?, times.parse::<usize>()?);
     let camera = camera_rays(&scene, count).ok_or("the scene is empty")?;
+    let reach = if set == "ao" { 0.05 * diagonal(&scene) } else { f32::INFINITY };
     let rays = match set.as_str() {
-        "camera" => camera,
-        "diffuse" => bounces(&scene, &camera, f32::INFINITY),
-        "ao" => bounces(&scene, &camera, 0.05 * diagonal(&scene)),
+        "camera" => repeat(&scene, &camera, false, times),
+        "diffuse" | "ao" => repeat(&scene, &bounces(&scene, &camera, reach), set == "ao", times),
         _ => return Err(format!("unknown rays {set:?}: expected camera, diffuse or ao").into()),
     };
+    println!("{rays}");
+    Ok(())
+}
+
+/// Traces rays so many times. Returns their number.
+fn repeat<R: bth::TraceRay>(scene: &bth::Scene, rays: &[R], any: bool, times: usize) -> usize {
     let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
     for _ in 0..times {
         for (i, rays) in rays.chunks(BATCH).enumerate() {
             let part = i * BATCH..i * BATCH + rays.len();
-            if set == "ao" {
+            if any {
                 scene.batch(rays).any(&mut found[part]);
             } else {
                 scene.batch(rays).nearest(&mut hits[part]);
             }
         }
     }
-    println!("{}", rays.len());
-    Ok(())
+    rays.len()
 }
 
 /// The diagonal of the scene's bounds.
@@ -65,7 +70,7 @@ fn camera_rays(scene: &bth::Scene, count: usize) -> Option<Vec<Ray>> {
 }
 
 /// For each of the rays that hits, one of length `reach` from there, on the side from which it came.
-fn bounces(scene: &bth::Scene, rays: &[Ray], reach: f32) -> Vec<Ray> {
+fn bounces(scene: &bth::Scene, rays: &[Ray], reach: f32) -> Vec<StartRay> {
     let mut hits = vec![Hit::MISS; rays.len()];
     scene.batch(rays).nearest(&mut hits);
     let mut rng = Rng::new(1);
@@ -79,8 +84,7 @@ fn bounces(scene: &bth::Scene, rays: &[Ray], reach: f32) -> Vec<Ray> {
         if dot(direction, normal) * dot(ray.direction, normal) > 0.0 {
             direction = direction.map(|x| -x);
         }
-        let start = hit.t * (1.0 - 1e-5);
-        out.push(Ray::new(ray.at(start), direction).with_range(0.0, reach));
+        out.push(StartRay::from_hit(hit, direction).with_tmax(reach));
     }
     out
 }

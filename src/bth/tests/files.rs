@@ -1,7 +1,8 @@
 //! The conformance files, embedded: opened, checked, damaged and traced without a file system, as it runs under Miri
 //! (`tools/check/miri`), in WebAssembly and on 32-bit machines (`tools/check/targets`).
 
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::TraceRay;
+use bth::rays::{Hit, PrimitiveRef, Ray, Start, StartRay};
 
 macro_rules! files {
     ($($name:literal),* $(,)?) => {
@@ -74,19 +75,31 @@ fn rays(scene: &bth::Scene) -> Vec<Ray> {
 
 fn trace(scene: &bth::Scene) -> usize {
     let rays = rays(scene);
-    let from: Vec<PrimitiveRef> =
-        (0..rays.len() as u32).map(|i| PrimitiveRef { instance: i % 2, triangle: i % 5 }).collect();
-    let (mut hits, mut with_hints) = (vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]);
-    scene.batch(&rays).nearest(&mut hits);
-    scene.batch(&rays).from(&from[..]).nearest(&mut with_hints);
-    assert_eq!(hits, with_hints);
-    let mut found = vec![false; rays.len()];
-    scene.batch(&rays).from(&from[..]).any(&mut found);
+    let hits = trace_all(scene, &rays);
+    // The rays that start where these hit, and some that start elsewhere.
+    let onward: Vec<StartRay> = (rays.iter().zip(&hits).zip(0u32..))
+        .map(|((ray, hit), i)| match i % 3 {
+            0 => {
+                let primitive = PrimitiveRef { instance: i % 2, triangle: i % 5 };
+                Start { primitive, u: 0.25, v: (i % 4) as f32 * 0.25 }.ray(ray.direction)
+            }
+            _ => StartRay::from_hit(hit, ray.direction.map(|x| -x)).with_tmax(ray.tmax),
+        })
+        .collect();
+    trace_all(scene, &onward);
+    hits.iter().filter(|hit| hit.is_hit()).count()
+}
+
+/// The nearest hits of rays, which are the same in a batch and alone.
+fn trace_all<R: TraceRay + std::fmt::Debug>(scene: &bth::Scene, rays: &[R]) -> Vec<Hit> {
+    let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+    scene.batch(rays).nearest(&mut hits);
+    scene.batch(rays).any(&mut found);
     for ((ray, hit), found) in rays.iter().zip(&hits).zip(found) {
         assert_eq!(hit.is_hit(), found);
-        assert_eq!(scene.nearest(ray).unwrap_or(Hit::MISS), *hit);
+        assert_eq!(scene.nearest(ray).unwrap_or(Hit::MISS), *hit, "{ray:?}");
     }
-    hits.iter().filter(|hit| hit.is_hit()).count()
+    hits
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Measures the time of rays through compiled objects, on one thread.
 
 use bth::Scene;
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::{Hit, Ray};
 use bth_compile::sampling::SampleRay;
 
 /// Rays in one call of a batch.
@@ -9,11 +9,7 @@ const BATCH: usize = 1024;
 
 /// Rays of one kind, as the library takes them.
 #[derive(Clone, Debug)]
-pub(crate) struct Rays {
-    rays: Vec<Ray>,
-    /// The primitive on which each ray starts.
-    from: Vec<PrimitiveRef>,
-}
+pub(crate) struct Rays(Vec<Ray>);
 
 impl Rays {
     pub(crate) fn new(samples: &[SampleRay]) -> Rays {
@@ -23,24 +19,19 @@ impl Rays {
             direction: s.direction.map(|x| x as f32),
             tmax: s.tmax as f32,
         };
-        let from = |s: &SampleRay| match s.from {
-            Some(triangle) => PrimitiveRef { instance: 0, triangle },
-            None => PrimitiveRef::NONE,
-        };
-        Rays { rays: samples.iter().map(ray).collect(), from: samples.iter().map(from).collect() }
+        Rays(samples.iter().map(ray).collect())
     }
 
-    /// The rays without their surfaces.
     pub(crate) fn each(&self) -> impl Iterator<Item = &Ray> {
-        self.rays.iter()
+        self.0.iter()
     }
 
     pub(crate) fn len(&self) -> usize {
-        self.rays.len()
+        self.0.len()
     }
 }
 
-/// How rays are traced; always with the primitives on which they start.
+/// How rays are traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum QueryKind {
     /// In batches, nearest hits.
@@ -80,13 +71,13 @@ pub(crate) fn nanoseconds(runs: &[TimedRun<'_>], rounds: usize, stop: impl Fn() 
 fn once(scene: &Scene, rays: &Rays, query: QueryKind) -> f64 {
     let (mut hits, mut found) = (vec![Hit::MISS; BATCH], vec![false; BATCH]);
     let start = thread_seconds();
-    for (batch, from) in rays.rays.chunks(BATCH).zip(rays.from.chunks(BATCH)) {
+    for batch in rays.0.chunks(BATCH) {
         match query {
-            QueryKind::Nearest => scene.batch(batch).from(from).nearest(&mut hits[..batch.len()]),
-            QueryKind::Any => scene.batch(batch).from(from).any(&mut found[..batch.len()]),
+            QueryKind::Nearest => scene.batch(batch).nearest(&mut hits[..batch.len()]),
+            QueryKind::Any => scene.batch(batch).any(&mut found[..batch.len()]),
             QueryKind::Single => {
-                for ((ray, from), hit) in batch.iter().zip(from).zip(&mut hits) {
-                    *hit = scene.nearest_from(ray, *from).unwrap_or(Hit::MISS);
+                for (ray, hit) in batch.iter().zip(&mut hits) {
+                    *hit = scene.nearest(ray).unwrap_or(Hit::MISS);
                 }
             }
         }

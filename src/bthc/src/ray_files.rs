@@ -1,9 +1,8 @@
-//! `.rays`, `.from`, `.hits` and `.tris` files: a tag of four bytes, u32 1, a u64 count, then the
+//! `.rays`, `.hits` and `.tris` files: a tag of four bytes, u32 1, a u64 count, then the
 //! elements. Little-endian.
 
 use crate::failure::Failure;
 use bth::rays::{Hit, PrimitiveRef, Ray};
-use bth_format::layout::NONE;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -24,23 +23,6 @@ pub(crate) fn read_rays(path: &Path) -> Result<Vec<Ray>, Failure> {
                 f32::from_le_bytes([bytes[4 * i], bytes[4 * i + 1], bytes[4 * i + 2], bytes[4 * i + 3]])
             };
             Ray { origin: [f(0), f(1), f(2)], tmin: f(3), direction: [f(4), f(5), f(6)], tmax: f(7) }
-        })
-        .collect())
-}
-
-/// Reads a `.from` file: for each ray the u32 id of the triangle on which it starts, or 2^32 - 1 for none.
-pub(crate) fn read_from(path: &Path, rays: usize) -> Result<Vec<PrimitiveRef>, Failure> {
-    let data = read(path, b"FROM", 4)?;
-    let (ids, _) = data[HEADER..].as_chunks::<4>();
-    if ids.len() != rays {
-        let message = format!("expected one triangle for each of {rays} rays, found {}", ids.len());
-        return Err(Failure::ray_file(path, 8, message, "use the .from file that belongs to the rays"));
-    }
-    Ok(ids
-        .iter()
-        .map(|id| match u32::from_le_bytes(*id) {
-            NONE => PrimitiveRef::NONE,
-            triangle => PrimitiveRef { instance: 0, triangle },
         })
         .collect())
 }

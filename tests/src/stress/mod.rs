@@ -16,8 +16,8 @@ pub use shapes::{Shape, shapes};
 pub use statistics::Statistics;
 
 use crate::structures::{Traced, bits};
-use bth::rays::{Hit, PrimitiveRef, Ray};
-use bth::{Hinted, Isa};
+use bth::Isa;
+use bth::rays::{Hit, Ray, StartRay};
 
 /// Rays that are traced together.
 const BATCH: usize = 1024;
@@ -37,6 +37,7 @@ pub fn run(
         let aimed = rays(shape, BATCH.min(count - batch * BATCH), seed ^ ((batch as u64 + 1) << 20));
         let rays: Vec<Ray> = aimed.iter().map(|a| shape.grid.ray(&a.ray)).collect();
         let mut expected = vec![Hit::MISS; rays.len()];
+        let (mut onward, mut after) = (Vec::new(), Vec::new());
         for (i, traced) in structures.iter().enumerate() {
             // The instruction sets take turns, so that each structure is traced with each of them.
             isas[(batch + i) % isas.len()].choose().expect("it is available");
@@ -44,6 +45,8 @@ pub fn run(
             traced.scene.batch(&rays).nearest(&mut hits);
             if i == 0 {
                 expected = hits;
+                onward = self::onward(&rays, &expected);
+                after = onward.iter().map(|ray| traced.scene.nearest(ray).unwrap_or(Hit::MISS)).collect();
             } else {
                 statistics.different += differing(&expected, &hits);
             }
@@ -53,8 +56,8 @@ pub fn run(
                 expected.iter().zip(&found).filter(|(hit, found)| hit.is_hit() != **found).count() as u64;
             statistics.traced += 2 * rays.len() as u64;
             if batch % 4 == i % 4 {
-                hinted(traced, &rays, &expected, statistics);
-                from_start(traced, &rays, &expected, statistics);
+                one_by_one(traced, &rays, &expected, statistics);
+                from_starts(traced, &onward, &after, statistics);
             }
         }
         for (i, (aimed, hit)) in aimed.iter().zip(&expected).enumerate() {
@@ -68,13 +71,8 @@ pub fn run(
     best.choose().expect("it is available");
 }
 
-/// Rays with hints, right and wrong ones, and one by one: the same bits.
-fn hinted(traced: &Traced, rays: &[Ray], expected: &[Hit], statistics: &mut Statistics) {
-    let from: Vec<PrimitiveRef> = expected.iter().map(|hit| hit.primitive).collect();
-    let mut hits = vec![Hit::MISS; rays.len()];
-    traced.scene.batch(rays).from(&from[..]).nearest(&mut hits);
-    statistics.different += differing(expected, &hits);
-    statistics.traced += rays.len() as u64;
+/// Rays one by one: the same bits.
+fn one_by_one(traced: &Traced, rays: &[Ray], expected: &[Hit], statistics: &mut Statistics) {
     for (ray, hit) in rays.iter().zip(expected).step_by(16) {
         let one = traced.scene.nearest(ray).unwrap_or(Hit::MISS);
         statistics.different += u64::from(bits(&one) != bits(hit));
@@ -82,26 +80,24 @@ fn hinted(traced: &Traced, rays: &[Ray], expected: &[Hit], statistics: &mut Stat
     }
 }
 
-/// Rays that are told the surface that their line crosses last before they begin, or that they begin on, and use it wherever they
-/// can: the same bits, and whether they hit.
-fn from_start(traced: &Traced, rays: &[Ray], expected: &[Hit], statistics: &mut Statistics) {
-    let back = |ray: &Ray| {
-        let [tmin, tmax] = [-ray.tmin, f32::INFINITY];
-        Ray { direction: ray.direction.map(|x| -x), tmin, tmax, ..*ray }
+/// Rays that start where others hit, in the directions of other rays.
+fn onward(rays: &[Ray], hits: &[Hit]) -> Vec<StartRay> {
+    let at = |(i, hit): (usize, &Hit)| {
+        let direction = if i % 4 == 0 { rays[i].direction } else { rays[(i + 1) % rays.len()].direction };
+        let tmax = if i % 3 == 0 { rays[i].tmax } else { f32::INFINITY };
+        StartRay::from_hit(hit, direction).with_tmax(tmax)
     };
-    let mut crossed = vec![Hit::MISS; rays.len()];
-    traced.scene.batch(&rays.iter().map(back).collect::<Vec<_>>()).nearest(&mut crossed);
-    let from: Vec<PrimitiveRef> = crossed.iter().map(|hit| hit.primitive).collect();
-    let chosen = Hinted::chosen();
-    Hinted::Tets.choose();
-    let mut hits = vec![Hit::MISS; rays.len()];
-    traced.scene.batch(rays).from(&from[..]).nearest(&mut hits);
+    hits.iter().enumerate().map(at).collect()
+}
+
+/// Rays from starts: the bits of the first structure, and whether they hit.
+fn from_starts(traced: &Traced, rays: &[StartRay], expected: &[Hit], statistics: &mut Statistics) {
+    let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+    traced.scene.batch(rays).nearest(&mut hits);
+    traced.scene.batch(rays).any(&mut found);
     statistics.different += differing(expected, &hits);
-    let mut found = vec![false; rays.len()];
-    traced.scene.batch(rays).from(&from[..]).any(&mut found);
     statistics.different +=
         expected.iter().zip(&found).filter(|(hit, found)| hit.is_hit() != **found).count() as u64;
-    chosen.choose();
     statistics.traced += 2 * rays.len() as u64;
 }
 

@@ -25,7 +25,7 @@ pub struct Statistics {
     pub leaks: u64,
     /// A triangle was reported that the line does not meet, or outside the range.
     pub ghosts: u64,
-    /// Answers whose bits depend on structure, record, instruction set, hint or batch.
+    /// Answers whose bits depend on structure, record, instruction set or batch.
     pub different: u64,
     /// Other triangle than the nearest of all.
     pub wrong: u64,

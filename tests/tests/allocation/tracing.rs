@@ -1,8 +1,8 @@
 //! Rays that are traced again allocate nothing: threads that trace at the same time do not meet in the allocator.
 
 use crate::measure::largest;
-use bth::Isa;
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::{Hit, Ray};
+use bth::{Isa, TraceRay};
 use bth_tests::rays::{assorted, onward};
 use bth_tests::structures::every_structure;
 
@@ -12,23 +12,11 @@ fn camera(side: usize) -> Vec<Ray> {
     (0..side * side).map(|i| Ray::new([0.1, 0.2, 9.0], [at(i % side), at(i / side), -9.0])).collect()
 }
 
-/// Traces all rays in batches and one by one, as nearest and any hits, with and without hints; returns the number of hits.
-fn trace(
-    scene: &bth::Scene,
-    rays: &[Ray],
-    from: &[PrimitiveRef],
-    hits: &mut [Hit],
-    found: &mut [bool],
-) -> usize {
-    for hints in [None, Some(from)] {
-        scene.batch(rays).from(hints).nearest(hits);
-        scene.batch(rays).from(hints).any(found);
-    }
-    let single = rays.iter().zip(from).filter(|(ray, from)| {
-        scene.nearest(ray).is_some()
-            && scene.nearest_from(ray, **from).is_some()
-            && scene.any_from(ray, **from)
-    });
+/// Traces all rays in batches and one by one, as nearest and any hits; returns the number of hits.
+fn trace<R: TraceRay>(scene: &bth::Scene, rays: &[R], hits: &mut [Hit], found: &mut [bool]) -> usize {
+    scene.batch(rays).nearest(hits);
+    scene.batch(rays).any(found);
+    let single = rays.iter().filter(|ray| scene.nearest(*ray).is_some() && scene.any(*ray));
     single.count() + hits.iter().filter(|hit| hit.is_hit()).count()
 }
 
@@ -51,18 +39,14 @@ fn rays_that_are_traced_again_allocate_nothing() {
         for (name, scene) in &structures {
             let mut hits = vec![Hit::MISS; rays.len()];
             scene.batch(&rays).nearest(&mut hits);
-            let (rays, from): (Vec<_>, Vec<_>) = onward(&rays, &hits, corners.len(), 2)
-                .into_iter()
-                .chain(rays.iter().map(|r| (*r, PrimitiveRef::NONE)))
-                .unzip();
-            let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-            let mut first = 0;
-            // What a thread keeps grows until each way that batches may take was taken once: which one is faster is measured while tracing.
-            for _ in 0..20 {
-                first = trace(scene, &rays, &from, &mut hits, &mut found);
-            }
+            let onward = onward(&hits, corners.len(), 2);
+            let mut found = vec![false; rays.len()];
+            let mut all =
+                || trace(scene, &rays, &mut hits, &mut found) + trace(scene, &onward, &mut hits, &mut found);
+            // What a thread keeps grows until each way that batches may take was taken once.
+            let first = all();
             let mut again = 0;
-            let most = largest(|| again = trace(scene, &rays, &from, &mut hits, &mut found));
+            let most = largest(|| again = all());
             assert_eq!((most, again), (0, first), "{name}, {isa}: an allocation of {most} bytes");
             assert!(first > 100, "{name}: {first} hits");
         }

@@ -1,14 +1,15 @@
-//! Batches with hints through files with free directions.
+//! Batches of rays from starts through files with free directions.
 
-use crate::{bits, hinted_rays, scaled, turn};
-use bth::rays::{Hit, PrimitiveRef, Ray};
-use bth::{Hinted, Isa, Scene, SceneBuilder};
+use crate::{scaled, starts_about_hits, turn};
+use bth::rays::{PrimitiveRef, Start, StartRay};
+use bth::{Isa, Scene, SceneBuilder};
 use bth_compile::Silent;
 use bth_compile::free::{FreeOptions, KeepFree, Kept};
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_format::layout::GridBits;
 use bth_random::Rng;
 use bth_scenes::{Model, gyroid::gyroid, knot::torus_knot};
+use bth_tests::rays::{alone, check_batch};
 
 /// Compiled with free directions or distances of all triangles, on a grid or not.
 fn with_free_directions(model: &Model, options: CompileOptions, keep: KeepFree) -> Scene {
@@ -22,12 +23,12 @@ fn with_free_directions(model: &Model, options: CompileOptions, keep: KeepFree) 
     bth::from_bytes(&compiled.bytes).expect("a file that opens")
 }
 
-/// Rays from points just above or below triangles, from their edges and corners, in all directions, some of which end early.
-fn rays_off_the_surface(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<(Ray, PrimitiveRef)> {
+/// Rays from points of triangles, of their edges and corners, in all directions, some of which end early.
+fn rays_off_the_surface(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<StartRay> {
     let mut rng = Rng::new(seed);
     let of_ray = |i: usize, rng: &mut Rng| {
-        let triangle = rng.below(corners.len() as u64) as usize;
-        let [a, b, c] = corners[triangle];
+        let triangle = rng.below(corners.len() as u64);
+        let [a, b, _] = corners[triangle as usize];
         let (u, v) = match i % 4 {
             0 => (0.0, 0.0),
             1 => (rng.unit_f64() as f32, 0.0),
@@ -36,38 +37,36 @@ fn rays_off_the_surface(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> V
         let d = rng.unit_vector().map(|x| x as f32);
         let length = |p: [f32; 3]| p.iter().map(|x| x * x).sum::<f32>().sqrt();
         let edge = length([0, 1, 2].map(|k| b[k] - a[k]));
-        let off = edge * [1e-2, 1e-4, 1e-6, 0.0][i / 4 % 4];
-        let origin = [0, 1, 2].map(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]) + off * d[k]);
         // Lengths of directions and ranges vary.
         let scale = [1.0, 1e-3, 3e5, 1e-30][i / 16 % 4];
         let tmax = [f32::INFINITY, 10.0 * edge / scale, 0.5 * edge / scale][i % 3];
-        let ray = Ray { origin, tmin: 0.0, direction: d.map(|x| x * scale), tmax };
-        let triangle = if rng.below(8) == 0 { rng.below(2 * corners.len() as u64) } else { triangle as u64 };
-        (ray, PrimitiveRef { instance: 0, triangle: triangle as u32 })
+        let triangle = if rng.below(50) == 0 { triangle + corners.len() as u64 } else { triangle };
+        let start = Start { primitive: PrimitiveRef { instance: 0, triangle: triangle as u32 }, u, v };
+        start.ray(d.map(|x| x * scale)).with_tmax(tmax)
     };
     (0..count).map(|i| of_ray(i, &mut rng)).collect()
 }
 
 /// Whether a ray points to the side of a triangle from which its corners go around counterclockwise.
-fn is_outward(ray: &Ray, [a, b, c]: &[[f32; 3]; 3]) -> bool {
+fn is_outward(ray: &StartRay, [a, b, c]: &[[f32; 3]; 3]) -> bool {
     let [p, q] = [b, c].map(|corner| [0, 1, 2].map(|k| corner[k] - a[k]));
     let normal = [0, 1, 2].map(|k| p[(k + 1) % 3] * q[(k + 2) % 3] - p[(k + 2) % 3] * q[(k + 1) % 3]);
     (0..3).map(|k| f64::from(normal[k]) * f64::from(ray.direction[k])).sum::<f64>() > 0.0
 }
 
-/// Of [`rays_off_the_surface`], 250,000 of them, those that leave the outside of a triangle, and some of all: where few rays end, batches are
-/// traced without look-ups.
-fn rays_of_which_many_end(corners: &[[[f32; 3]; 3]], seed: u64) -> Vec<(Ray, PrimitiveRef)> {
-    let leaves = |i: usize, ray: &Ray, start: &PrimitiveRef| {
-        let off_the_middle = i % 4 >= 2 && (i / 4).is_multiple_of(4);
-        off_the_middle && corners.get(start.triangle as usize).is_some_and(|corners| is_outward(ray, corners))
+/// Of [`rays_off_the_surface`], 100,000 of them, those that leave the outside of a triangle, and some of all: many of them end without being
+/// traced.
+fn rays_of_which_many_end(corners: &[[[f32; 3]; 3]], seed: u64) -> Vec<StartRay> {
+    let leaves = |i: usize, ray: &StartRay| {
+        let of = corners.get(ray.start.primitive.triangle as usize);
+        i % 4 >= 2 && of.is_some_and(|corners| is_outward(ray, corners))
     };
-    let all = rays_off_the_surface(corners, 250_000, seed).into_iter().enumerate();
-    all.filter(|(i, (ray, start))| i % 36 == 5 || leaves(*i, ray, start)).map(|(_, ray)| ray).collect()
+    let all = rays_off_the_surface(corners, 100_000, seed).into_iter().enumerate();
+    all.filter(|(i, ray)| i % 36 == 5 || leaves(*i, ray)).map(|(_, ray)| ray).collect()
 }
 
 /// Groups of 64 rays in almost the same direction, each from the outside of a triangle near the one before: such rays go in packets.
-fn parallel_rays(corners: &[[[f32; 3]; 3]], groups: usize, seed: u64) -> Vec<(Ray, PrimitiveRef)> {
+fn parallel_rays(corners: &[[[f32; 3]; 3]], groups: usize, seed: u64) -> Vec<StartRay> {
     const GROUP: usize = 64;
     let mut rng = Rng::new(seed);
     let mut all = Vec::new();
@@ -75,15 +74,13 @@ fn parallel_rays(corners: &[[[f32; 3]; 3]], groups: usize, seed: u64) -> Vec<(Ra
         let d = rng.unit_vector().map(|x| x as f32);
         let first = rng.below(corners.len() as u64) as usize;
         let of_triangle = |i: usize| {
-            let triangle = (first + i) % corners.len();
-            let origin =
-                [0, 1, 2].map(|k| corners[triangle].iter().map(|corner| corner[k]).sum::<f32>() / 3.0);
+            let triangle = ((first + i) % corners.len()) as u32;
             let direction = d.map(|x| x * (1.0 + 1e-4 * (i % 7) as f32));
-            let ray = Ray { origin, tmin: 1e-4, direction, tmax: f32::INFINITY };
-            (ray, PrimitiveRef { instance: 0, triangle: triangle as u32 })
+            let third = 1.0 / 3.0;
+            Start { primitive: PrimitiveRef { instance: 0, triangle }, u: third, v: third }.ray(direction)
         };
         let facing = (0..corners.len()).map(of_triangle);
-        let facing = facing.filter(|(ray, start)| is_outward(ray, &corners[start.triangle as usize]));
+        let facing = facing.filter(|ray| is_outward(ray, &corners[ray.start.primitive.triangle as usize]));
         all.extend(facing.take(GROUP));
     }
     all
@@ -94,34 +91,29 @@ fn check_free_directions(model: &Model, options: CompileOptions) {
     let _turn = turn();
     let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
     for keep in [KeepFree::All, KeepFree::Distances] {
-        check_hinted_rays(&with_free_directions(model, options.clone(), keep), &corners);
+        check_starts(&with_free_directions(model, options.clone(), keep), &corners);
     }
 }
 
-/// Hinted rays in batches, with all instruction sets, against rays that are traced one by one without hints.
-fn check_hinted_rays(scene: &Scene, corners: &[[[f32; 3]; 3]]) {
-    let mut all = hinted_rays(scene, corners, 3000, 11);
-    all.extend(rays_off_the_surface(corners, 30_000, 12));
-    all.extend(rays_of_which_many_end(corners, 13));
-    let (rays, from): (Vec<Ray>, Vec<PrimitiveRef>) = all.into_iter().unzip();
-    let expected: Vec<Hit> = rays.iter().map(|ray| scene.nearest(ray).unwrap_or(Hit::MISS)).collect();
-    let ways = Isa::ALL.into_iter().flat_map(|isa| [(isa, Hinted::Tets), (isa, Hinted::Measured)]);
-    for (isa, hinted) in ways.filter(|(isa, _)| isa.is_available()) {
+/// Rays from starts in batches, with all instruction sets, against rays that are traced one by one, for which the file tells nothing.
+fn check_starts(scene: &Scene, corners: &[[[f32; 3]; 3]]) {
+    let mut rays = starts_about_hits(scene, corners, 3000, 11);
+    rays.extend(rays_off_the_surface(corners, 30_000, 12));
+    rays.extend(rays_of_which_many_end(corners, 13));
+    check_parts(scene, &rays, 1000);
+}
+
+/// Compares batches of `size` rays with rays traced alone; returns the number of hits.
+fn check_parts(scene: &Scene, rays: &[StartRay], size: usize) -> usize {
+    let expected = alone(scene, rays);
+    for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
         isa.choose().expect("an instruction set that is available");
-        hinted.choose();
-        let mut hits = vec![Hit::MISS; rays.len()];
-        let mut any = vec![false; rays.len()];
-        for first in (0..rays.len()).step_by(1000) {
-            let part = first..rays.len().min(first + 1000);
-            scene.batch(&rays[part.clone()]).from(&from[part.clone()]).nearest(&mut hits[part.clone()]);
-            scene.batch(&rays[part.clone()]).from(&from[part.clone()]).any(&mut any[part]);
-        }
-        for (i, (ray, from)) in rays.iter().zip(&from).enumerate() {
-            assert_eq!(bits(&hits[i]), bits(&expected[i]), "{isa}, {hinted:?}: {ray:?} from {from:?}");
-            assert_eq!(any[i], expected[i].is_hit(), "any hit, {isa}, {hinted:?}: {ray:?} from {from:?}");
+        for (rays, expected) in rays.chunks(size).zip(expected.chunks(size)) {
+            check_batch(scene, rays, expected, isa);
         }
     }
     Isa::best().choose().expect("the best is available");
+    expected.iter().filter(|hit| hit.is_hit()).count()
 }
 
 #[test]
@@ -147,39 +139,20 @@ fn what_lies_just_behind_a_distance_is_hit() {
             let model = Model { positions, triangles: vec![[0, 1, 2], [3, 4, 5], [6, 7, 8]] };
             let scene = with_free_directions(&model, CompileOptions::default(), KeepFree::Distances);
             let mut rng = Rng::new(3);
-            let rays: Vec<Ray> = (0..4096)
+            let primitive = PrimitiveRef { instance: 0, triangle: 0 };
+            let rays: Vec<StartRay> = (0..4096)
                 .map(|_| {
                     let mut number = |size: f32| rng.unit_f64() as f32 * size;
-                    let [u, v, along, scale] =
-                        [number(0.004), number(0.004), number(0.1), number(30.0) + 0.03];
+                    let [u, v, along, scale] = [number(0.4), number(0.4), number(0.1), number(30.0) + 0.03];
                     let direction = [scale * (0.1 * along - 0.005), scale * 0.3 * along, scale];
-                    Ray {
-                        origin: [u, v, 1e-4 * height * (along - 0.05)],
-                        tmin: 1e-5 * height / scale,
-                        direction,
-                        tmax: 1e30,
-                    }
+                    Start { primitive, u, v }.ray(direction).with_tmax(1e30)
                 })
                 .collect();
-            let from = vec![PrimitiveRef { instance: 0, triangle: 0 }; rays.len()];
             later += usize::from(scene.nearest(&rays[0]).is_some_and(|hit| hit.primitive.triangle == 2));
-            for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
-                isa.choose().expect("an instruction set that is available");
-                Hinted::Tets.choose();
-                let (mut hits, mut any) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-                scene.batch(&rays).from(&from[..]).nearest(&mut hits);
-                scene.batch(&rays).from(&from[..]).any(&mut any);
-                for (i, ray) in rays.iter().enumerate() {
-                    let expected = scene.nearest(ray).unwrap_or(Hit::MISS);
-                    assert_eq!(bits(&hits[i]), bits(&expected), "{isa}, {level} {beyond}: {ray:?}");
-                    assert_eq!(any[i], expected.is_hit(), "{isa}, {level} {beyond}: {ray:?}");
-                }
-            }
+            check_parts(&scene, &rays, 4096);
         }
     }
     assert_eq!(later, 15, "the triangle above is hit");
-    Hinted::Measured.choose();
-    Isa::best().choose().expect("the best is available");
 }
 
 #[test]
@@ -218,15 +191,17 @@ fn instances_of(object: &Scene, count: usize, seed: u64) -> (Scene, Vec<[f32; 12
     (builder.into_scene(), transforms)
 }
 
-/// The ray in world space whose transform is about this ray of an object.
-fn placed(ray: &Ray, rows: &[f32; 12]) -> Ray {
+/// The ray from an instance of an object, in about the direction of the object.
+fn placed(ray: &StartRay, instance: u32, rows: &[f32; 12]) -> StartRay {
     let times =
         |v: [f32; 3], k: usize| (0..3).map(|j| f64::from(rows[4 * k + j]) * f64::from(v[j])).sum::<f64>();
-    let origin = [0, 1, 2].map(|k| (times(ray.origin, k) + f64::from(rows[4 * k + 3])) as f32);
-    Ray { origin, direction: [0, 1, 2].map(|k| times(ray.direction, k) as f32), ..*ray }
+    let mut placed = *ray;
+    placed.start.primitive.instance = instance;
+    placed.direction = [0, 1, 2].map(|k| times(ray.direction, k) as f32);
+    placed
 }
 
-/// Rays that start on instances have the same bits with and without hints, right ones and wrong ones.
+/// Rays that start on instances, of which some do not exist.
 #[test]
 fn free_directions_of_instances_change_no_answer() {
     let _turn = turn();
@@ -239,39 +214,22 @@ fn free_directions_of_instances_change_no_answer() {
     for (i, count) in [1, 3, 24, 1, 3, 24].into_iter().enumerate() {
         let object = &objects[i / 3];
         let (scene, transforms) = instances_of(object, count, 21 + count as u64);
-        let (mut rays, mut from) = (Vec::new(), Vec::new());
         let single = rays_of_which_many_end(&corners, 22);
         let parallel = parallel_rays(&corners, 300, 23);
         let mut packet = 0;
-        for (i, (ray, start)) in parallel.into_iter().chain(single).enumerate() {
+        let rays = parallel.into_iter().chain(single).enumerate().map(|(i, ray)| {
             if i % 64 == 0 {
                 packet = rng.below(count as u64) as u32;
             }
             let instance = if i < 300 * 64 { packet } else { rng.below(count as u64) as u32 };
-            rays.push(placed(&ray, &transforms[instance as usize]));
-            let wrong = rng.below(12) == 0;
-            let hint = if wrong { rng.below(count as u64 + 2) as u32 } else { instance };
-            from.push(PrimitiveRef { instance: hint, ..start });
-        }
-        let expected: Vec<Hit> = rays.iter().map(|ray| scene.nearest(ray).unwrap_or(Hit::MISS)).collect();
-        assert!(expected.iter().filter(|hit| hit.is_hit()).count() > 1000);
-        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
-            isa.choose().expect("an instruction set that is available");
-            // Hints are used although they may be slower.
-            Hinted::Tets.choose();
-            let mut hits = vec![Hit::MISS; rays.len()];
-            let mut any = vec![false; rays.len()];
-            for first in (0..rays.len()).step_by(5000) {
-                let part = first..rays.len().min(first + 5000);
-                scene.batch(&rays[part.clone()]).from(&from[part.clone()]).nearest(&mut hits[part.clone()]);
-                scene.batch(&rays[part.clone()]).from(&from[part.clone()]).any(&mut any[part]);
+            let mut ray = placed(&ray, instance, &transforms[instance as usize]);
+            if rng.below(50) == 0 {
+                ray.start.primitive.instance = rng.below(count as u64 + 2) as u32;
             }
-            for (i, (ray, from)) in rays.iter().zip(&from).enumerate() {
-                assert_eq!(bits(&hits[i]), bits(&expected[i]), "{isa}, {count}: {ray:?} from {from:?}");
-                assert_eq!(any[i], expected[i].is_hit(), "any hit, {isa}, {count}: {ray:?} from {from:?}");
-            }
-        }
+            ray
+        });
+        let rays: Vec<StartRay> = rays.collect();
+        let hits = check_parts(&scene, &rays, 5000);
+        assert!(hits > 1000, "{count}: {hits} of {}", rays.len());
     }
-    Hinted::Measured.choose();
-    Isa::best().choose().expect("the best is available");
 }

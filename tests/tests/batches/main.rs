@@ -1,15 +1,16 @@
-//! Batches of rays, with and without hints, give the bits of the same rays traced one at a time, on every instruction set.
+//! Batches of rays, with origins or from starts, give the bits of the same rays traced one at a time, on every instruction set.
 
 mod free_directions;
 
-use bth::rays::{Hit, PrimitiveRef, Ray};
-use bth::{Accept, Hinted, HitStreams, Isa, RayStreams, Scene};
+use bth::rays::{Hit, PrimitiveRef, Ray, StartRay};
+use bth::{Accept, HitStreams, Isa, RayStreams, Scene, TraceRay};
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_format::layout::RecordKind;
 use bth_random::Rng;
 use bth_scenes::{Model, gyroid::gyroid, knot::torus_knot};
-use bth_tests::rays::{assorted, onward};
+use bth_tests::rays::{alone, assorted, check_batch, onward, starts};
+use bth_tests::structures::bits;
 use std::sync::{Mutex, MutexGuard};
 
 /// The instruction set is a setting of the whole process, so tests that set it run one after the other.
@@ -36,60 +37,29 @@ pub(crate) fn compiled(
     bth::from_bytes(&compiled.bytes).expect("a file that opens")
 }
 
-pub(crate) fn bits(hit: &Hit) -> [u32; 5] {
-    [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.primitive.instance, hit.primitive.triangle]
+/// Rays of [`assorted`], and the same cut right about their hits.
+fn rays_about_hits(plain: &Scene, corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<Ray> {
+    let mut rays = assorted(corners, count, seed);
+    for (i, hit) in alone(plain, &rays).into_iter().enumerate().filter(|(_, hit)| hit.is_hit()) {
+        let t = [hit.t, hit.t.next_up(), hit.t.next_down()][i % 3];
+        let ray = rays[i];
+        rays.push(if i % 2 == 0 { Ray { tmax: t, ..ray } } else { Ray { tmin: t, ..ray } });
+    }
+    rays
 }
 
-/// Rays as programs send them on: off the surface a little, or exactly on it, or cut right about a hit; and the rays
-/// of [`onward`], from wrong triangles too.
-pub(crate) fn hinted_rays(
+/// Rays from starts of every kind, from hits and of triangles that do not exist, and the same cut right about their hits.
+pub(crate) fn starts_about_hits(
     plain: &Scene,
     corners: &[[[f32; 3]; 3]],
     count: usize,
     seed: u64,
-) -> Vec<(Ray, PrimitiveRef)> {
-    let first = assorted(corners, count, seed);
-    let mut hits = vec![Hit::MISS; first.len()];
-    plain.batch(&first).nearest(&mut hits);
-    let mut rays = onward(&first, &hits, corners.len(), seed + 1);
-    let mut rng = Rng::new(seed + 2);
-    for i in 0..rays.len() {
-        let (mut ray, from) = rays[i];
-        match i % 7 {
-            // Along an edge or through a vertex of some triangle, from the surface.
-            0 => {
-                let [a, b, c] = corners[rng.below(corners.len() as u64) as usize];
-                let to = [a, [0, 1, 2].map(|k| 0.5 * (b[k] + c[k]))][i / 7 % 2];
-                ray.direction = [0, 1, 2].map(|k| to[k] - ray.origin[k]);
-            }
-            // In the plane of the triangle that it starts on.
-            1 if from.triangle < corners.len() as u32 => {
-                let [a, b, c] = corners[from.triangle as usize];
-                ray.origin = [0, 1, 2].map(|k| 0.5 * (a[k] + b[k]));
-                ray.direction = [0, 1, 2].map(|k| c[k] - a[k]);
-            }
-            // Through the surface that it starts on, with a tmin beyond it or before it.
-            2 => {
-                ray.origin = [0, 1, 2].map(|k| ray.origin[k] - 0.01 * ray.direction[k]);
-                ray.tmin = [0.0, 0.02, 0.01, -0.5][i / 7 % 4];
-            }
-            // An axis, exactly.
-            3 => {
-                ray.direction = [0.0; 3];
-                ray.direction[i / 7 % 3] = 1.0;
-            }
-            _ => {}
-        }
-        if ray.direction.iter().any(|d| *d != 0.0) {
-            rays[i].0 = ray;
-        }
-        // Cut right about the hit.
-        let hit = plain.nearest(&ray).unwrap_or(Hit::MISS);
-        if hit.is_hit() {
-            let t = [hit.t, hit.t.next_up(), hit.t.next_down()][i % 3];
-            let cut = if i % 2 == 0 { Ray { tmax: t, ..ray } } else { Ray { tmin: t, ..ray } };
-            rays.push((cut, from));
-        }
+) -> Vec<StartRay> {
+    let first = alone(plain, &assorted(corners, count, seed));
+    let mut rays = onward(&first, corners.len(), seed + 1);
+    rays.extend(starts(corners, count, seed + 2));
+    for (i, hit) in alone(plain, &rays).into_iter().enumerate().filter(|(_, hit)| hit.is_hit()) {
+        rays.push(rays[i].with_tmax([hit.t, hit.t.next_up(), hit.t.next_down()][i % 3]));
     }
     rays
 }
@@ -101,27 +71,20 @@ fn check(model: &Model, structure: Structure, rays: usize, seed: u64) {
     let _turn = turn();
     let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
     let plain = compiled(model, Structure::Bvh, RecordKind::Link32, false);
-    let (rays, from): (Vec<Ray>, Vec<PrimitiveRef>) =
-        hinted_rays(&plain, &corners, rays, seed).into_iter().unzip();
-    let expected: Vec<Hit> = rays.iter().map(|ray| plain.nearest(ray).unwrap_or(Hit::MISS)).collect();
-    let some_hits = expected.iter().filter(|hit| hit.is_hit()).count();
-    assert!(some_hits > rays.len() / 4 && some_hits < rays.len(), "{some_hits} of {} hit", rays.len());
+    let starts = starts_about_hits(&plain, &corners, rays / 2, seed + 1);
+    let rays = rays_about_hits(&plain, &corners, rays, seed);
+    let (expected, after) = (alone(&plain, &rays), alone(&plain, &starts));
+    for hits in [&expected, &after] {
+        let some_hits = hits.iter().filter(|hit| hit.is_hit()).count();
+        assert!(some_hits > hits.len() / 4 && some_hits < hits.len(), "{some_hits} of {} hit", hits.len());
+    }
     for (record, keep) in RecordKind::ALL.into_iter().zip([true, false, true, false]) {
         let scene = compiled(model, structure, record, keep);
         assert!(!scene.object(0).tet_leaves.is_empty());
-        let ways = Isa::ALL.into_iter().flat_map(|isa| [(isa, Hinted::Tets), (isa, Hinted::Measured)]);
-        for (isa, hinted) in ways.filter(|(isa, _)| isa.is_available()) {
+        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
             isa.choose().expect("an instruction set that is available");
-            hinted.choose();
-            let mut hits = vec![Hit::MISS; rays.len()];
-            scene.batch(&rays).from(&from[..]).nearest(&mut hits);
-            let mut any = vec![false; rays.len()];
-            scene.batch(&rays).from(&from[..]).any(&mut any);
-            for (i, (ray, from)) in rays.iter().zip(&from).enumerate() {
-                let context = || format!("{isa}, {hinted:?}, {}: {ray:?} from {from:?}", record.name());
-                assert_eq!(bits(&hits[i]), bits(&expected[i]), "{}", context());
-                assert_eq!(any[i], expected[i].is_hit(), "any hit, {}", context());
-            }
+            check_batch(&scene, &rays, &expected, format_args!("{isa}, {}", record.name()));
+            check_batch(&scene, &starts, &after, format_args!("{isa}, {}", record.name()));
         }
     }
     Isa::best().choose().expect("the best is available");
@@ -199,14 +162,17 @@ fn a_batch_on_many_threads_has_the_answers_of_one() {
     let scene = compiled(&model, Structure::Bvh, RecordKind::Link32, false);
     let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
     // More rays than one task takes, and not a multiple of that.
-    let (rays, from): (Vec<Ray>, Vec<PrimitiveRef>) =
-        hinted_rays(&scene, &corners, 10_001, 5).into_iter().unzip();
+    are_alike_in_parallel(&scene, &rays_about_hits(&scene, &corners, 10_001, 5));
+    are_alike_in_parallel(&scene, &starts_about_hits(&scene, &corners, 5_003, 5));
+}
+
+fn are_alike_in_parallel<R: TraceRay + std::fmt::Debug>(scene: &Scene, rays: &[R]) {
     let (mut alone, mut together) = (vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]);
-    scene.batch(&rays).nearest(&mut alone);
-    scene.batch(&rays).from(&from[..]).parallel().nearest(&mut together);
+    scene.batch(rays).nearest(&mut alone);
+    scene.batch(rays).parallel().nearest(&mut together);
     let (mut any_alone, mut any_together) = (vec![false; rays.len()], vec![false; rays.len()]);
-    scene.batch(&rays).any(&mut any_alone);
-    scene.batch(&rays).parallel().any(&mut any_together);
+    scene.batch(rays).any(&mut any_alone);
+    scene.batch(rays).parallel().any(&mut any_together);
     for i in 0..rays.len() {
         assert_eq!(bits(&together[i]), bits(&alone[i]), "{:?}", rays[i]);
     }

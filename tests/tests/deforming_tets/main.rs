@@ -4,14 +4,14 @@
 mod meshes;
 
 use crate::meshes::{KINDS, Positions, Triangles, compiled, deformed, mesh, with_flat};
-use bth::rays::{Hit, PrimitiveRef, Ray};
-use bth::{Code, Hinted, Isa, Scene, SceneBuilder, Update};
+use bth::rays::{Hit, Ray, StartRay};
+use bth::{Code, Isa, Scene, SceneBuilder, Update};
 use bth_compile::pipeline::Structure;
 use bth_format::layout::{NONE, RecordKind, TetLeaf};
 use bth_format::object::{ObjectView, Records};
 use bth_random::Rng;
 use bth_tests::oracle::{World, orientation};
-use bth_tests::rays::assorted;
+use bth_tests::rays::{alone, assorted, check_batch, starts};
 use bth_tests::structures::bits;
 use std::cmp::Ordering;
 use std::collections::BTreeSet;
@@ -72,66 +72,36 @@ fn in_use(file: &ObjectView<'_>, view: &ObjectView<'_>) -> Vec<bool> {
     view.tet_leaves.iter().map(of).collect()
 }
 
-/// Rays of every kind, and rays that start on the surface, with the triangles on which they start or others.
-fn hinted_rays(scene: &Scene, rng: &mut Rng) -> (Vec<Ray>, Vec<PrimitiveRef>) {
+/// Rays of every kind, and rays that start on the surface.
+fn rays_and_starts(scene: &Scene, rng: &mut Rng) -> (Vec<Ray>, Vec<StartRay>) {
     let view = scene.object(0);
     let corners: Vec<[[f32; 3]; 3]> =
         view.triangles.iter().map(|t| t.map(|v| view.positions[v as usize])).collect();
-    let mut rays = assorted(&corners, 500, rng.next());
-    let count = corners.len() as u64;
-    let mut from: Vec<PrimitiveRef> =
-        (0..rays.len()).map(|_| PrimitiveRef { instance: 0, triangle: rng.below(count) as u32 }).collect();
-    let size = (0..3).map(|k| view.header.upper[k] - view.header.lower[k]).fold(0.0, f32::max);
-    for i in 0..1500 {
-        let triangle = rng.below(count) as u32;
-        let [a, b, c] = corners[triangle as usize];
-        let (u, v) = (0.5 * rng.unit_f32(), 0.5 * rng.unit_f32());
-        let origin = [0, 1, 2].map(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]));
-        let direction = rng.point_in_ball().map(|x| x as f32 * size);
-        // Short rays of any hit and long ones of the nearest are those that walk.
-        let tmax = if i % 2 == 0 { f32::INFINITY } else { 0.05 };
-        rays.push(Ray { tmin: 1e-6, tmax, ..Ray::new(origin, direction) });
-        from.push(PrimitiveRef { instance: 0, triangle });
-    }
-    (rays, from)
+    (assorted(&corners, 500, rng.next()), starts(&corners, 1500, rng.next()))
 }
 
-/// Compares rays through the scene, which use tetrahedra wherever they can, with those through another without any; returns the hits.
+/// Compares rays through the scene with those through another without tetrahedra; returns the number of hits.
 fn compare(scene: &Scene, plain: &Scene, rng: &mut Rng, isas: &[Isa]) -> usize {
-    let (rays, from) = hinted_rays(plain, rng);
-    let (mut expected, mut any) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-    plain.batch(&rays).nearest(&mut expected);
-    plain.batch(&rays).any(&mut any);
+    let (rays, starts) = rays_and_starts(plain, rng);
+    let (expected, after) = (alone(plain, &rays), alone(plain, &starts));
     let chosen = Isa::chosen();
     for isa in isas {
         isa.choose().unwrap();
-        for hinted in [Hinted::Tets, Hinted::Bvh] {
-            hinted.choose();
-            let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-            scene.batch(&rays).from(&from[..]).nearest(&mut hits);
-            scene.batch(&rays).from(&from[..]).any(&mut found);
-            for (row, (hit, expected)) in hits.iter().zip(&expected).enumerate() {
-                assert_eq!(
-                    bits(hit),
-                    bits(expected),
-                    "{isa}, {hinted:?}: {:?} from {:?}",
-                    rays[row],
-                    from[row]
-                );
-            }
-            assert!(found == any, "{isa}, {hinted:?}");
-        }
-        for ((ray, from), hit) in rays.iter().zip(&from).zip(&expected).step_by(29) {
-            assert_eq!(bits(&scene.nearest_from(ray, *from).unwrap_or(Hit::MISS)), bits(hit));
+        check_batch(scene, &rays, &expected, isa);
+        check_batch(scene, &starts, &after, isa);
+        for (ray, hit) in starts.iter().zip(&after).step_by(29) {
+            assert_eq!(bits(&scene.nearest(ray).unwrap_or(Hit::MISS)), bits(hit), "{isa}: {ray:?}");
         }
     }
     chosen.choose().unwrap();
-    Hinted::default().choose();
     let exact = World::new(scene);
     for (ray, hit) in rays.iter().zip(&expected).step_by(97) {
         assert_eq!(exact.hit(ray).t, hit.t, "{ray:?}");
     }
-    expected.iter().filter(|hit| hit.is_hit()).count()
+    for (ray, hit) in starts.iter().zip(&after).step_by(97) {
+        assert_eq!(exact.hit_from_start(ray).t, hit.t, "{ray:?}");
+    }
+    expected.iter().chain(&after).filter(|hit| hit.is_hit()).count()
 }
 
 fn available() -> Vec<Isa> {
@@ -298,23 +268,23 @@ fn instances_of_an_object_with_tetrahedra_have_the_answers_of_the_bvh() {
             builder.set_positions(0, &positions).unwrap();
             numbers.insert(builder.commit().unwrap().tet_leaves_in_use);
         }
-        let (rays, mut from) = hinted_rays(bvh.scene(), rng);
+        let (rays, mut starts) = rays_and_starts(bvh.scene(), rng);
         let half = |x: [f32; 3]| x.map(|x| 0.5 * x);
         let rays: Vec<Ray> = rays
             .iter()
             .map(|ray| Ray { origin: half(ray.origin), direction: half(ray.direction), ..*ray })
             .collect();
-        from.iter_mut().enumerate().for_each(|(row, from)| from.instance = row as u32 / 5 % 3);
-        let [mut expected, mut hits] = [vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]];
-        bvh.scene().batch(&rays).nearest(&mut expected);
+        for (row, ray) in starts.iter_mut().enumerate() {
+            ray.start.primitive.instance = row as u32 / 5 % 3;
+            ray.direction = half(ray.direction);
+        }
+        let (expected, after) = (alone(bvh.scene(), &rays), alone(bvh.scene(), &starts));
         for isa in available() {
             isa.choose().unwrap();
-            Hinted::Tets.choose();
-            tets.scene().batch(&rays).from(&from[..]).nearest(&mut hits);
-            assert!(hits.iter().zip(&expected).all(|(a, b)| bits(a) == bits(b)), "kind {kind}, {isa}");
+            check_batch(tets.scene(), &rays, &expected, isa);
+            check_batch(tets.scene(), &starts, &after, isa);
         }
-        Hinted::default().choose();
-        assert!(expected.iter().filter(|hit| hit.is_hit()).count() > 300);
+        assert!(expected.iter().chain(&after).filter(|hit| hit.is_hit()).count() > 300);
     }
     Isa::best().choose().unwrap();
     assert_eq!(numbers, BTreeSet::from([0, 1]));
@@ -345,14 +315,18 @@ fn doubled_vertices_that_move_apart_and_surfaces_that_touch_the_box_set_a_leaf_a
         ] {
             let update = scene.set_positions(0, &positions).unwrap();
             assert_eq!(used(&update), (in_use, 2 - in_use), "{positions:?}");
-            let (rays, from) = hinted_rays(&scene, &mut Rng::new(9));
-            let mut hits = vec![Hit::MISS; rays.len()];
-            Hinted::Tets.choose();
-            scene.batch(&rays).from(&from[..]).nearest(&mut hits);
-            Hinted::default().choose();
+            let (rays, starts) = rays_and_starts(&scene, &mut Rng::new(9));
             let exact = World::new(&scene);
-            for (ray, hit) in rays.iter().zip(&hits) {
-                assert_eq!(exact.hit(ray).t, hit.t, "{ray:?}");
+            let expected: Vec<Hit> = rays.iter().map(|ray| exact.hit(ray)).collect();
+            let after: Vec<Hit> = starts.iter().map(|ray| exact.hit_from_start(ray)).collect();
+            let (mut hits, mut onward) = (expected.clone(), after.clone());
+            scene.batch(&rays).nearest(&mut hits);
+            scene.batch(&starts).nearest(&mut onward);
+            for (ray, (hit, expected)) in rays.iter().zip(hits.iter().zip(&expected)) {
+                assert_eq!(hit.t, expected.t, "{ray:?}");
+            }
+            for (ray, (hit, expected)) in starts.iter().zip(onward.iter().zip(&after)) {
+                assert_eq!(hit.t, expected.t, "{ray:?}");
             }
         }
     }

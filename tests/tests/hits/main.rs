@@ -329,6 +329,6 @@ fn batches_give_the_results_of_single_rays() {
         }
     }
     let (mut offsets, mut hits) = (vec![], vec![Hit::MISS]);
-    scene.all_hits_batch(&[], &Accept::default(), &mut offsets, &mut hits);
+    scene.all_hits_batch::<Ray>(&[], &Accept::default(), &mut offsets, &mut hits);
     assert_eq!((offsets, hits), (vec![0], vec![]));
 }

@@ -1,7 +1,7 @@
 //! Trees for rays that are known when a model is compiled: `--rays` and `--for-scene`.
 
 use crate::support::{bthc, command, data, folder, run_with, sphere, wait};
-use bth::rays::{PrimitiveRef, Ray};
+use bth::rays::Ray;
 use bth_random::Rng;
 use bth_scenes::knot::torus_knot;
 use std::io::{BufRead, BufReader};
@@ -33,7 +33,7 @@ fn traced(path: &Path, rays: &[Ray]) -> (u64, Vec<bth::rays::Hit>) {
     let scene = bth::open(path).unwrap();
     let mut total = 0;
     let hits = rays.iter().map(|ray| {
-        let (hit, steps) = scene.nearest_counted(ray, PrimitiveRef::NONE);
+        let (hit, steps) = scene.nearest_counted(ray);
         total += u64::from(steps.nodes + steps.leaves);
         hit
     });

@@ -1,4 +1,4 @@
-//! `bthc trace`: ray files, hints, and the exact answers of `--exact`.
+//! `bthc trace`: ray files, and the exact answers of `--exact`.
 
 use crate::support::{bthc, command, folder, sphere};
 use bth::rays::{Hit, Ray};
@@ -28,8 +28,6 @@ fn hits_are_those_of_the_library_bit_for_bit() {
     let scene = bth::open(folder.path().join("ball.bth")).unwrap();
     let rays = rays();
     std::fs::write(folder.path().join("x.rays"), file(b"RAYS", rays.iter().map(ray_bytes))).unwrap();
-    let from = rays.iter().map(|_| u32::MAX.to_le_bytes().to_vec());
-    std::fs::write(folder.path().join("x.from"), file(b"FROM", from)).unwrap();
 
     let expected = file(
         b"HITS",
@@ -39,7 +37,7 @@ fn hits_are_those_of_the_library_bit_for_bit() {
             [values, hit.primitive.triangle.to_le_bytes().to_vec()].concat()
         }),
     );
-    for extra in [&[][..], &["--threads", "1"], &["--threads", "2", "--from", "x.from"]] {
+    for extra in [&[][..], &["--threads", "1"], &["--threads", "2"]] {
         let mut args = vec!["trace", "ball.bth", "x.rays", "-o", "x.hits"];
         args.extend(extra);
         bthc(folder.path(), &args).expect(0);
@@ -84,8 +82,6 @@ fn exact_hits_are_those_of_every_structure() {
     bthc(folder.path(), &["trace", "ball.bth", "x.rays", "--exact", "--any", "-o", "any.hits"]).expect(0);
     let any = rows(&folder.path().join("any.hits"));
     assert!(any.iter().zip(&exact).all(|(a, b)| (a.1 == 0) == (b.1 != u32::MAX)));
-    bthc(folder.path(), &["trace", "ball.bth", "x.rays", "--exact", "--from", "x.from", "-o", "y.hits"])
-        .expect(2);
 }
 
 #[test]
@@ -121,13 +117,9 @@ fn rejects_ray_files_that_are_cut_or_of_another_kind() {
     bthc(folder.path(), &["compile", "ball.obj"]).expect(0);
     let whole = file(b"RAYS", rays().iter().map(ray_bytes));
     std::fs::write(folder.path().join("cut.rays"), &whole[..whole.len() - 1]).unwrap();
-    std::fs::write(folder.path().join("whole.rays"), &whole).unwrap();
-    std::fs::write(folder.path().join("short.from"), file(b"FROM", std::iter::once(vec![0; 4]))).unwrap();
     for rays in ["text.rays", "cut.rays"] {
         let run = bthc(folder.path(), &["trace", "ball.bth", rays, "-o", "x.hits"]).expect(3);
         assert!(run.stderr.contains(rays) && run.stderr.contains("BTH-I090"), "{run:?}");
     }
-    bthc(folder.path(), &["trace", "ball.bth", "whole.rays", "--from", "short.from", "-o", "x.hits"])
-        .expect(3);
     assert!(!folder.path().join("x.hits").exists());
 }

@@ -1,8 +1,9 @@
 //! Animation: motion, visibility, and transforms that cannot be used.
 
 use crate::support::{compiled, manifest, models, varied};
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::{Hit, PrimitiveRef, Ray, Start, StartRay};
 use bth_random::Rng;
+use bth_tests::rays::{alone, check_batch, onward};
 
 fn rays(count: usize) -> Vec<Ray> {
     let mut rng = Rng::new(8);
@@ -105,11 +106,12 @@ fn hidden_instances_are_hit_by_no_ray_and_others_are() {
         ]"#;
     let (mut scene, _) = compiled(&manifest(text), folder.path());
     let ray = Ray::new([0.1, 5.0, 0.3], [0.0, -1.0, 0.0]);
-    let from = PrimitiveRef { instance: 0, triangle: 0 };
+    let start = Start { primitive: PrimitiveRef { instance: 0, triangle: 0 }, u: 0.25, v: 0.25 };
     for (frame, seen) in [(0, true), (1, false), (2, false), (3, false), (0, true)] {
         scene.set_frame(frame).unwrap();
         assert_eq!(scene.nearest(&ray).is_some(), seen, "frame {frame}");
-        assert_eq!(scene.any_from(&ray, from), seen, "frame {frame}");
+        assert_eq!(scene.any(&ray), seen, "frame {frame}");
+        assert_eq!(scene.check_start(&start).is_ok(), seen, "frame {frame}");
         assert_eq!(scene.instance(0).visible, seen, "frame {frame}");
     }
 }
@@ -180,7 +182,7 @@ fn normals_stand_on_their_surfaces_in_the_world() {
 }
 
 #[test]
-fn starting_surfaces_change_no_answer_also_with_tetrahedra() {
+fn starts_have_the_same_hits_in_batches_and_alone_also_with_tetrahedra() {
     use bth_compile::pipeline::{CompileOptions, Structure};
     let folder = models();
     let mut options = CompileOptions { structure: Structure::Tets, ..CompileOptions::default() };
@@ -192,24 +194,14 @@ fn starting_surfaces_change_no_answer_also_with_tetrahedra() {
     let compiled =
         bth_compile::scene::compile(&varied(), folder.path(), name, &options, &bth_compile::Silent);
     let mut scene = bth::from_bytes(&compiled.unwrap().0.bytes).unwrap();
-    let mut hinted = 0;
-    // Hints are used although they may be slower; no answer of other tests depends on it.
-    bth::Hinted::Tets.choose();
+    let mut hit_count = 0;
     for frame in [0, 12, 35] {
         scene.set_frame(frame).unwrap();
-        let first = rays(2000);
-        let starts = hits(&scene, &first);
-        let triangles = scene.object(0).triangles.len();
-        let onward = bth_tests::rays::onward(&first, &starts, triangles, 5);
-        let (rays, from): (Vec<Ray>, Vec<PrimitiveRef>) = onward.into_iter().unzip();
-        let plain = hits(&scene, &rays);
-        let mut found = vec![Hit::MISS; rays.len()];
-        scene.batch(&rays).from(&from[..]).nearest(&mut found);
-        assert!(found == plain, "frame {frame}");
-        let mut any = vec![false; rays.len()];
-        scene.batch(&rays).from(&from[..]).any(&mut any);
-        assert!(any.iter().zip(&plain).all(|(any, hit)| *any == hit.is_hit()), "frame {frame}");
-        hinted += from.iter().zip(&plain).filter(|(f, h)| f.instance > 1 && h.is_hit()).count();
+        let onward = onward(&hits(&scene, &rays(2000)), scene.object(0).triangles.len(), 5);
+        let expected = alone(&scene, &onward);
+        check_batch(&scene, &onward, &expected, format_args!("frame {frame}"));
+        let of_others = |(ray, hit): &(&StartRay, &Hit)| ray.start.primitive.instance > 1 && hit.is_hit();
+        hit_count += onward.iter().zip(&expected).filter(of_others).count();
     }
-    assert!(hinted > 300, "{hinted}");
+    assert!(hit_count > 300, "{hit_count}");
 }

@@ -3,45 +3,30 @@
 use crate::built::CHOICE;
 use crate::sequences::{NODE, between, built, exchanging, folder, frames};
 use crate::support::{animated, imported, options};
-use bth::rays::{Hit, PrimitiveRef, Ray};
-use bth::{Hinted, Isa, Scene};
+use bth::rays::StartRay;
+use bth::{Isa, Scene};
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, MotionOptions, Structure};
 use bth_compile::scene;
 use bth_random::Rng;
+use bth_tests::rays::{alone, check_batch, starts};
 use std::path::{Path, PathBuf};
 
-/// Rays that start on the surface of a scene of one instance, most of them on the triangle that the hint names.
-fn rays_from_the_surface(
-    positions: &[[f32; 3]],
-    triangles: &[[u32; 3]],
-    rng: &mut Rng,
-) -> (Vec<Ray>, Vec<PrimitiveRef>) {
-    let ray = |i: usize| {
-        let triangle = rng.below(triangles.len() as u64) as u32;
-        let [a, b, c] = triangles[triangle as usize].map(|v| positions[v as usize]);
-        let (u, v) = (0.5 * rng.unit_f32(), 0.5 * rng.unit_f32());
-        let origin = [0, 1, 2].map(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]));
-        let direction = rng.point_in_ball().map(|x| x as f32);
-        let hint = if i.is_multiple_of(7) { triangle / 2 } else { triangle };
-        (Ray { tmin: 1e-5, ..Ray::new(origin, direction) }, PrimitiveRef { instance: 0, triangle: hint })
-    };
-    (0..4000).map(ray).unzip()
+/// Rays that start on the surface of a scene of one instance.
+fn rays_from_the_surface(positions: &[[f32; 3]], triangles: &[[u32; 3]], rng: &mut Rng) -> Vec<StartRay> {
+    let corners: Vec<_> = triangles.iter().map(|t| t.map(|v| positions[v as usize])).collect();
+    starts(&corners, 4000, rng.next())
 }
 
-/// Compares hinted rays through tetrahedra, where there are any to start in, with the BVH.
-fn compare(bvh: &Scene, tets: &Scene, (rays, from): &(Vec<Ray>, Vec<PrimitiveRef>)) {
-    let [mut expected, mut hits] = [vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]];
-    bvh.batch(rays).nearest(&mut expected);
+/// Compares rays through tetrahedra, where there are any, with the BVH.
+fn compare(bvh: &Scene, tets: &Scene, rays: &[StartRay]) {
+    let expected = alone(bvh, rays);
     assert!(expected.iter().filter(|hit| hit.is_hit()).count() > 300);
     let _choice = CHOICE.lock();
     let chosen = Isa::chosen();
     for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
         isa.choose().unwrap();
-        // Hints are used although they may be slower; no answer of other tests depends on it.
-        Hinted::Tets.choose();
-        tets.batch(rays).from(&from[..]).nearest(&mut hits);
-        assert!(hits == expected, "{isa}");
+        check_batch(tets, rays, &expected, isa);
     }
     chosen.choose().unwrap();
 }

@@ -267,14 +267,13 @@ fn masks_are_of_groups() {
     let masks = (0..scene.group_count(0)).map(|group| scene.group_mask(0, group)).collect::<Vec<_>>();
     assert!(masks.contains(&2) && masks.iter().all(|&mask| mask == 2 || mask == u32::MAX));
     assert_eq!(scene.instance_mask(0), u32::MAX);
-    // Masks that are set back exclude nothing, and hints are used again.
+    // Masks that are set back exclude nothing.
     (0..scene.group_count(0)).for_each(|group| scene.set_group_mask(0, group, u32::MAX));
     for triangle in &model.triangles {
         let ray = aimed(&IDENTITY, *triangle, &mut rng);
         let nearest = scene.nearest(&ray);
-        let starts = [nearest.map_or(PrimitiveRef::NONE, |hit| hit.primitive)];
         let mut hits = [Hit::MISS];
-        scene.batch(&[ray]).from(&starts[..]).accept(&accept).nearest(&mut hits);
+        scene.batch(&[ray]).accept(&accept).nearest(&mut hits);
         assert_eq!(
             (hits[0].is_hit().then_some(hits[0]), scene.nearest_accepted(&ray, &accept)),
             (nearest, nearest)

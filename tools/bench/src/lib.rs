@@ -1,7 +1,7 @@
 //! Measures bth beside other CPU ray tracers on identical rays.
 //!
 //! `rays` makes the seeded ray sets, `structures` and `rivals` the [`tracer::Contender`]s. `speed`, `compare`, `accuracy`, `load`,
-//! `stress`, `inside`, `costs`, `paper`, `quality`, `scales`, `scenes`, `hints`, `instances`, `refit`, `animation` and `shutter` are the measurements; `output` writes their
+//! `stress`, `inside`, `costs`, `paper`, `quality`, `scales`, `scenes`, `instances`, `refit`, `animation` and `shutter` are the measurements; `output` writes their
 //! reports as Markdown, JSON and SVG, and `records` keeps the figures of `benchmarks/`.
 #![warn(missing_docs)]
 
@@ -12,7 +12,6 @@ pub mod chart;
 pub mod clock;
 pub mod compare;
 pub mod costs;
-pub mod hints;
 pub mod inside;
 pub mod instances;
 pub mod isa;

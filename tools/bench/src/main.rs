@@ -3,8 +3,8 @@
 use bth_bench::args::{Arguments, Command};
 use bth_bench::compare::Verdict;
 use bth_bench::{
-    accuracy, animation, compare, costs, hints, inside, instances, load, output, paper, quality, records,
-    refit, scales, scenes, shutter, speed, stress,
+    accuracy, animation, compare, costs, inside, instances, load, output, paper, quality, records, refit,
+    scales, scenes, shutter, speed, stress,
 };
 use clap::Parser;
 use std::process::ExitCode;
@@ -28,7 +28,6 @@ fn main() -> ExitCode {
         Command::Quality(arguments) => quality::run(&arguments),
         Command::Scales(arguments) => scales::run(&arguments),
         Command::Scenes(arguments) => scenes::run(&arguments),
-        Command::Hints(arguments) => hints::run(&arguments),
         Command::Instances(arguments) => instances::run(&arguments),
         Command::Refit(arguments) => refit::run(&arguments),
         Command::Animation(arguments) => animation::run(&arguments),

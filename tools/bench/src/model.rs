@@ -1,5 +1,6 @@
-//! The models that are measured: files, or models that `bth-scenes` makes by name.
+//! The models that are measured: files, folders of recorded rays, or models that `bth-scenes` makes by name.
 
+use crate::rays::recorded;
 use anyhow::{Context, Result, anyhow, ensure};
 use bth_import::{self, Mesh};
 use bth_scenes::{catalogue, write};
@@ -21,7 +22,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// Imports a file, or generates the model `NAME` or `NAME:FACES` of `bth-scenes list`.
+    /// Imports a file or the model of a folder of recorded rays, or generates the model `NAME` or `NAME:FACES` of `bth-scenes list`.
     ///
     /// # Errors
     /// If there is neither, or the file cannot be imported or has no triangles.
@@ -29,7 +30,8 @@ impl Model {
         let path = Path::new(which);
         if path.exists() {
             let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            return Self::import(name, path.to_owned(), None);
+            let file = if path.is_dir() { path.join(recorded::MODEL) } else { path.to_owned() };
+            return Self::import(name, file, None);
         }
         let (name, faces) = match which.split_once(':') {
             Some((name, faces)) => (name, Some(faces)),

@@ -77,7 +77,7 @@ impl Contender {
                 *hit = scene.nearest(ray).unwrap_or(Hit::MISS);
             }),
             Contender::Embree(scene) => {
-                Tracer::nearest(scene, Batch { rays, from: None, coherent: false }, hits);
+                Tracer::nearest(scene, Batch { rays, starts: None, coherent: false }, hits);
             }
         }
     }

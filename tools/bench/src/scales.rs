@@ -131,7 +131,7 @@ fn sets_of(model: &Model, scene: &Scene, arguments: &Scales) -> Result<[Set; 2]>
         let hits = traced(scene, &rays);
         Set { rays, hits }
     };
-    let sets = ["primary", "diffuse"].map(set);
+    let sets = ["primary", "diffuse-beside"].map(set);
     ensure!(sets.iter().all(|set| set.hits.iter().any(Hit::is_hit)), "{}: no ray hits", model.name);
     Ok(sets)
 }

@@ -1,10 +1,10 @@
 //! The structures of bth: each kind of compiled file, and the ways to trace it.
 
 use crate::model::Model;
-use crate::tracer::{Batch, Contender, Tracer};
+use crate::tracer::{Batch, Contender, Starting, Tracer};
 use anyhow::{Context, Result};
-use bth::Scene;
-use bth::rays::{Hit, PrimitiveRef};
+use bth::rays::{Hit, Ray, Start, StartRay};
+use bth::{Accept, Scene};
 use bth_compile::coordinates::{self, Boxes};
 use bth_compile::free::{FreeOptions, KeepFree};
 use bth_compile::pipeline::{self, CompileOptions, Structure};
@@ -72,21 +72,22 @@ impl Kind {
         self.structure == Structure::Tets
     }
 
-    /// Whether it can hold tetrahedra or free directions, to which hints matter.
-    fn takes_hints(&self) -> bool {
-        self.structure != Structure::Bvh || self.free != KeepFree::None
-    }
-
     /// Names of the ways to trace it.
     pub fn uses(&self) -> impl Iterator<Item = (String, Use)> {
-        let hinted = self.takes_hints().then(|| (format!("{} from", self.name), Use::Hinted));
-        let plain = [(self.name.to_owned(), Use::Batch), (format!("{} single", self.name), Use::Single)];
-        let [batch, single] = plain;
-        [Some(batch), hinted, Some(single)].into_iter().flatten()
+        let all = [
+            ("", Use::Batch),
+            (" start", Use::Start),
+            (" single", Use::Single),
+            (" start single", Use::StartSingle),
+            (" single own", Use::Own),
+        ];
+        // The last two are told from others by the default file alone.
+        let uses = if self.name == KINDS[0].name { &all[..] } else { &all[..3] };
+        uses.to_vec().into_iter().map(|(of, usage)| (format!("{}{of}", self.name), usage))
     }
 
-    /// Compiler options. Whole-model tetrahedra come without a BVH below them, which would be traced instead of them where
-    /// there are no hints; all else is the default.
+    /// Compiler options. Whole-model tetrahedra come without a BVH below them, which would be traced instead of them; all else is
+    /// the default.
     fn options(&self) -> CompileOptions {
         CompileOptions {
             structure: self.structure,
@@ -106,12 +107,16 @@ impl Kind {
 /// How a file is traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Use {
-    /// In batches, without hints.
+    /// In batches.
     Batch,
-    /// In batches, with the surface that each ray starts on.
-    Hinted,
-    /// One ray a call, without hints.
+    /// In batches, from exact points of the surface.
+    Start,
+    /// One ray a call.
     Single,
+    /// One ray a call, from exact points of the surface.
+    StartSingle,
+    /// One ray a call, with a filter that rejects the triangle on which the ray starts.
+    Own,
 }
 
 /// A compiled file.
@@ -179,36 +184,82 @@ struct OurTracer {
 
 impl Tracer for OurTracer {
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
-        if self.usage == Use::Single {
-            for (ray, hit) in batch.rays.iter().zip(hits) {
-                *hit = self.scene.nearest(ray).unwrap_or(Hit::MISS);
+        let (scene, rays) = (&self.scene, batch.rays.iter());
+        match (self.usage, batch.starts) {
+            (Use::Own, Some(starts)) => {
+                for ((ray, own), hit) in rays.zip(starts).zip(hits) {
+                    let is_other = |_: &Ray, hit: &Hit| hit.primitive != own.primitive;
+                    let accept = Accept { filter: Some(&is_other), ..Accept::default() };
+                    *hit = scene.nearest_accepted(ray, &accept).unwrap_or(Hit::MISS);
+                }
             }
-            return;
-        }
-        for (batch, hits) in batch.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
-            self.scene.batch(batch.rays).from(self.hints(&batch)).nearest(hits);
+            (Use::StartSingle, Some(starts)) => {
+                for ((ray, start), hit) in rays.zip(starts).zip(hits) {
+                    *hit = scene.nearest(&start_ray(ray, start)).unwrap_or(Hit::MISS);
+                }
+            }
+            (Use::Start, Some(_)) => {
+                in_start_batches(batch, hits, |rays, hits| scene.batch(rays).nearest(hits));
+            }
+            (Use::Single, _) => {
+                rays.zip(hits).for_each(|(ray, hit)| *hit = scene.nearest(ray).unwrap_or(Hit::MISS));
+            }
+            _ => {
+                for (rays, hits) in batch.rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
+                    scene.batch(rays).nearest(hits);
+                }
+            }
         }
     }
 
     fn any(&self, batch: Batch<'_>, found: &mut [bool]) {
-        if self.usage == Use::Single {
-            for (ray, found) in batch.rays.iter().zip(found) {
-                *found = self.scene.any(ray);
+        let (scene, rays) = (&self.scene, batch.rays.iter());
+        match (self.usage, batch.starts) {
+            (Use::Own, Some(starts)) => {
+                for ((ray, own), found) in rays.zip(starts).zip(found) {
+                    let is_other = |_: &Ray, hit: &Hit| hit.primitive != own.primitive;
+                    let accept = Accept { filter: Some(&is_other), ..Accept::default() };
+                    *found = scene.any_accepted(ray, &accept);
+                }
             }
-            return;
-        }
-        for (batch, found) in batch.chunks(BATCH).zip(found.chunks_mut(BATCH)) {
-            self.scene.batch(batch.rays).from(self.hints(&batch)).any(found);
+            (Use::StartSingle, Some(starts)) => {
+                for ((ray, start), found) in rays.zip(starts).zip(found) {
+                    *found = scene.any(&start_ray(ray, start));
+                }
+            }
+            (Use::Start, Some(_)) => {
+                in_start_batches(batch, found, |rays, found| scene.batch(rays).any(found));
+            }
+            (Use::Single, _) => rays.zip(found).for_each(|(ray, found)| *found = scene.any(ray)),
+            _ => {
+                for (rays, found) in batch.rays.chunks(BATCH).zip(found.chunks_mut(BATCH)) {
+                    scene.batch(rays).any(found);
+                }
+            }
         }
     }
 
-    fn needs_hints(&self) -> bool {
-        self.usage == Use::Hinted
+    fn starting(&self) -> Starting {
+        match self.usage {
+            Use::Batch | Use::Single => Starting::AtOrigin,
+            Use::Own => Starting::RejectOwn,
+            Use::Start | Use::StartSingle => Starting::OnSurface,
+        }
     }
 }
 
-impl OurTracer {
-    fn hints<'a>(&self, batch: &Batch<'a>) -> Option<&'a [PrimitiveRef]> {
-        if self.usage == Use::Hinted { batch.from } else { None }
+/// The ray from the exact point.
+fn start_ray(ray: &Ray, start: &Start) -> StartRay {
+    start.ray(ray.direction).with_tmax(ray.tmax)
+}
+
+/// Calls `trace` with the rays of each batch and its answers. The time to make them counts, as for rivals.
+fn in_start_batches<T>(batch: Batch<'_>, answers: &mut [T], trace: impl Fn(&[StartRay], &mut [T])) {
+    let mut rays = Vec::with_capacity(BATCH);
+    for (batch, answers) in batch.chunks(BATCH).zip(answers.chunks_mut(BATCH)) {
+        rays.clear();
+        let starts = batch.starts.unwrap_or_default();
+        rays.extend(batch.rays.iter().zip(starts).map(|(ray, start)| start_ray(ray, start)));
+        trace(&rays, answers);
     }
 }

@@ -1,16 +1,16 @@
 //! The interface of all tracers, ours and rivals: batches of rays.
 
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::{Hit, Ray, Start};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Rays to trace, and hints that a tracer may use.
+/// Rays to trace.
 #[derive(Clone, Copy, Debug)]
 pub struct Batch<'a> {
     /// The rays, model space.
     pub rays: &'a [Ray],
-    /// The triangle that each ray starts on, in sets that start on triangles.
-    pub from: Option<&'a [PrimitiveRef]>,
+    /// Where each ray starts on the surface, in sets that start at hits.
+    pub starts: Option<&'a [Start]>,
     /// Whether neighbouring rays have similar origins and directions; Embree takes this as a flag.
     pub coherent: bool,
 }
@@ -20,7 +20,7 @@ impl<'a> Batch<'a> {
     pub fn chunks(self, most: usize) -> impl Iterator<Item = Batch<'a>> {
         (0..self.rays.len()).step_by(most).map(move |first| {
             let part = first..self.rays.len().min(first + most);
-            Batch { rays: &self.rays[part.clone()], from: self.from.map(|f| &f[part]), ..self }
+            Batch { rays: &self.rays[part.clone()], starts: self.starts.map(|s| &s[part]), ..self }
         })
     }
 }
@@ -31,10 +31,21 @@ pub trait Tracer: Send + Sync {
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]);
     /// Whether anything lies within [tmin, tmax] of every ray.
     fn any(&self, batch: Batch<'_>, found: &mut [bool]);
-    /// Whether the tracer need not be measured on sets without hints, because without them it is the same as another one.
-    fn needs_hints(&self) -> bool {
-        false
+    /// What it does with the starts of rays.
+    fn starting(&self) -> Starting {
+        Starting::AtOrigin
     }
+}
+
+/// What a tracer does with the starts of rays. A tracer that uses them is measured only on sets that have them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Starting {
+    /// Ignores them: rays start at their origins, and may hit the triangle that they start on.
+    AtOrigin,
+    /// As `AtOrigin`, with a filter that rejects the triangle on which a ray starts.
+    RejectOwn,
+    /// Rays start at the exact points.
+    OnSurface,
 }
 
 /// A tracer that is measured.

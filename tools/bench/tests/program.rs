@@ -33,7 +33,7 @@ fn a_quick_speed_run_needs_no_rival() {
     let results = json(find("-quick.json"));
     let tracers = results["models"][0]["runs"][0]["tracers"].as_array().unwrap();
     let names: Vec<&str> = tracers.iter().map(|t| t["name"].as_str().unwrap()).collect();
-    for name in ["bth", "bth from", "bth single", "bvh", "bvh single", "obvhs cwbvh", "k-d tree"] {
+    for name in ["bth", "bth start", "bth single", "bvh", "bvh single", "obvhs cwbvh", "k-d tree"] {
         assert!(names.contains(&name), "{names:?}");
     }
     for tracer in tracers.iter().filter(|t| t["ours"] == true) {

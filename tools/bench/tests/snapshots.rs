@@ -33,6 +33,7 @@ fn tracer(name: &str, ours: bool, rates: &[(&'static str, f64)]) -> TracerSpeeds
         build_s: 0.25,
         bytes: ours.then_some(36_000),
         mrays_per_s: rates.iter().copied().collect(),
+        other: BTreeMap::new(),
         differ: rates.iter().map(|(set, _)| (*set, usize::from(!ours))).collect(),
     }
 }
@@ -41,7 +42,7 @@ fn speed_record() -> SpeedResults {
     let model = |name: &str, view, factor: f64, tets: bool| {
         let mut tracers = vec![
             tracer("bth", true, &[("primary", 8.0 * factor), ("diffuse", 3.0)]),
-            tracer("bth from", true, &[("diffuse", 6.0 * factor)]),
+            tracer("bth start", true, &[("diffuse", 6.0 * factor)]),
             tracer("embree", false, &[("primary", 4.0), ("diffuse", 3.0)]),
         ];
         if tets {
@@ -50,7 +51,8 @@ fn speed_record() -> SpeedResults {
         ModelSpeeds {
             name: name.to_owned(),
             triangles: 1200,
-            view,
+            view: Some(view),
+            own_hits: BTreeMap::new(),
             rays: BTreeMap::from([("primary", 2000), ("diffuse", 1100)]),
             structures: vec![CompiledFile { name: "bth", compile_s: 0.25, file_bytes: 50_000, in_tets: 0.5 }],
             left_out: vec![LeftOut { name: "tinybvh bvh8 hq".to_owned(), why: "not installed".to_owned() }],

@@ -73,11 +73,6 @@ impl<'a> Prices<'a> {
         self.cost(&self.costs.alone, triangles, steps, hits)
     }
 
-    /// Whether rays that start on known triangles walk at all.
-    pub(super) fn hints(&self) -> bool {
-        self.options.profile.hints || !self.keep_subtrees
-    }
-
     /// Steps of the node's tetrahedralization, estimated.
     pub(super) fn steps(&self, start: Start, triangles: u32, average_depth: f64) -> f64 {
         self.options.estimator.steps(start, triangles, average_depth)

@@ -24,8 +24,6 @@ pub struct Profile {
     pub tets: BTreeMap<String, TetCosts>,
     /// Sizes in bytes of the tetrahedra that the two costs of a step were measured on.
     pub bytes: [f64; 2],
-    /// Whether the runtime lets rays with hints walk tetrahedra when there is a BVH beside them.
-    pub hints: bool,
     /// Tetrahedralization, microseconds a triangle.
     pub tetrahedralize: f64,
 }

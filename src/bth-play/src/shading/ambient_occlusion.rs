@@ -1,9 +1,9 @@
 //! Mode ao: the share of the hemisphere above each hit that is open.
 
 use super::context::{FrameContext, Sample};
-use super::occlusion_rays::{OcclusionRays, Origin};
+use super::occlusion_rays::OcclusionRays;
 use crate::sampling::cosine_hemisphere;
-use bth::rays::Hit;
+use bth::rays::{Hit, StartRay};
 use glam::Vec3;
 
 /// Ambient-occlusion rays per sample.
@@ -18,14 +18,15 @@ pub(super) fn shade(
     hits: &[Hit],
     any_rays: &mut u64,
 ) -> Vec<Vec3> {
-    let mut rays = OcclusionRays::default();
+    let mut rays = OcclusionRays::new();
     for (sample, hit) in samples.iter().zip(hits).filter(|(_, hit)| hit.is_hit()) {
-        let (point, normal) = frame.point_and_normal(sample, hit);
-        let origin = Origin::above(point, normal, hit.primitive, frame.bounds.diagonal());
+        let (_, normal) = frame.point_and_normal(sample, hit);
         for ray in 0..RAYS {
             let at = sample.sampler.point(1, sample.index * RAYS + ray);
             let chance = sample.chance(1 + u64::from(ray));
-            rays.push(origin, cosine_hemisphere(normal, at), frame.occlusion_distance, chance);
+            let direction = cosine_hemisphere(normal, at).as_vec3().to_array();
+            let ray = StartRay::from_hit(hit, direction).with_tmax(frame.occlusion_distance as f32);
+            rays.push(ray, chance);
         }
     }
     *any_rays += rays.len() as u64;

@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use bth::Scene;
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::{Hit, PrimitiveRef};
 use bth_format::object::ObjectView;
 use glam::{DVec3, Vec3};
 use std::path::Path;
@@ -61,10 +61,10 @@ impl<'a> ShadingGeometry<'a> {
         if normal.dot(towards) < 0.0 { -normal } else { normal }
     }
 
-    /// Whether a ray meets the front of a triangle: the side from which its vertices are seen counter-clockwise, in the space of
+    /// Whether a ray in a direction hits the front of a triangle: the side from which its vertices are seen counter-clockwise, in the space of
     /// the object.
-    pub(super) fn is_front(&self, primitive: PrimitiveRef, ray: &Ray) -> bool {
-        let direction = to_f64(ray.direction);
+    pub(super) fn is_front(&self, primitive: PrimitiveRef, direction: [f32; 3]) -> bool {
+        let direction = to_f64(direction);
         self.front_normal(primitive).is_none_or(|normal| normal.dot(direction) < 0.0)
     }
 

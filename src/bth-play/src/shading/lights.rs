@@ -178,10 +178,6 @@ impl Light {
         });
         let window = (1.0 - (distance / range).powi(4)).max(0.0);
         let scale = lights * spot * window / (distance * distance);
-        (scale > 0.0).then(|| LightSample {
-            direction,
-            distance: distance * 0.999,
-            light: *light * scale as f32,
-        })
+        (scale > 0.0).then(|| LightSample { direction, distance, light: *light * scale as f32 })
     }
 }

@@ -1,14 +1,14 @@
 //! Mode path: diffuse path tracing with the scene's lights, sun and sky, or surroundings. Each bounce of all samples of a tile
-//! is one batch of rays, each with the primitive on which it starts.
+//! is one batch of rays, which start at the hits of the last one.
 
 use super::context::{Counters, FrameContext, Sample};
 use super::lights::{LightSample, Lights};
-use super::occlusion_rays::{OcclusionRays, Origin};
+use super::occlusion_rays::OcclusionRays;
 use super::surface_colors::instance_color;
 use super::visibility;
 use crate::materials::Look;
 use crate::sampling::cosine_hemisphere;
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::{Hit, PrimitiveRef, Start, StartRay};
 use glam::{DVec2, DVec3, Vec3};
 use std::f64::consts::PI;
 
@@ -25,10 +25,10 @@ struct PathState {
     sample: usize,
     /// Product of the albedos along the path.
     throughput: Vec3,
+    /// Where its next ray starts: the point, and the same as a point of a triangle.
     origin: DVec3,
+    start: Start,
     direction: DVec3,
-    /// The primitive on which the next ray starts.
-    from: PrimitiveRef,
     /// Density with which its direction was chosen, with regard to solid angle; `None` for rays of the camera.
     density: Option<f64>,
 }
@@ -46,8 +46,8 @@ pub(super) fn shade(
         sample,
         throughput: Vec3::ONE,
         origin: s.ray.origin,
+        start: Start::NONE,
         direction: s.ray.direction,
-        from: PrimitiveRef::NONE,
         density: None,
     };
     let mut paths: Vec<PathState> = samples.iter().enumerate().map(start).collect();
@@ -71,17 +71,11 @@ pub(super) fn shade(
 
 /// What the paths of a batch meet after the bounce of a number.
 fn trace(frame: &FrameContext<'_>, paths: &[PathState], samples: &[Sample], number: u32) -> Vec<Hit> {
-    let ray = |path: &PathState| Ray {
-        origin: path.origin.as_vec3().to_array(),
-        tmin: 0.0,
-        direction: path.direction.as_vec3().to_array(),
-        tmax: f32::INFINITY,
-    };
-    let rays: Vec<Ray> = paths.iter().map(ray).collect();
-    let from: Vec<PrimitiveRef> = paths.iter().map(|path| path.from).collect();
+    let ray = |path: &PathState| path.start.ray(path.direction.as_vec3().to_array());
+    let rays: Vec<StartRay> = paths.iter().map(ray).collect();
     let mut hits = vec![Hit::MISS; rays.len()];
     let chance = |row: usize| samples[paths[row].sample].chance(RAYS * (u64::from(number) + 1));
-    visibility::nearest(frame, (&rays, Some(&from)), false, chance, &mut hits);
+    visibility::nearest(frame, &rays, None, chance, &mut hits);
     hits
 }
 
@@ -91,7 +85,7 @@ struct Bounce<'a> {
     lights: &'a Lights<'a>,
     samples: &'a [Sample],
     number: u32,
-    shadow_rays: OcclusionRays,
+    shadow_rays: OcclusionRays<StartRay>,
     /// For each shadow ray its sample, and the light that it brings if it is not blocked.
     contributions: Vec<(usize, Vec3)>,
     /// Paths that go on.
@@ -100,7 +94,7 @@ struct Bounce<'a> {
 
 impl<'a> Bounce<'a> {
     fn new(frame: &'a FrameContext<'a>, lights: &'a Lights<'a>, samples: &'a [Sample], number: u32) -> Self {
-        let (shadow_rays, contributions) = (OcclusionRays::default(), Vec::new());
+        let (shadow_rays, contributions) = (OcclusionRays::new(), Vec::new());
         Self { frame, lights, samples, number, shadow_rays, contributions, next: Vec::new() }
     }
 
@@ -121,28 +115,29 @@ impl<'a> Bounce<'a> {
         let normal = frame.geometry.geometric_normal(hit.primitive, -path.direction);
         let shading = frame.geometry.shading_normal(hit, normal);
         let throughput = path.throughput * surface.albedo;
-        let origin = Origin::above(point, normal, hit.primitive, frame.bounds.diagonal());
         let last = number == frame.args.bounces();
         let surroundings = lights.surroundings(sample(3)).map(|(light, density)| {
             // A path that goes on may find the surroundings by itself.
             let scattered = if last { 0.0 } else { shading.dot(light.direction).max(0.0) / PI };
             LightSample { light: light.light * share(Some(density), scattered), ..light }
         });
-        let of_scene = lights.samples(origin.point, sample(0), sample(1));
+        let of_scene = lights.samples(point, sample(0), sample(1));
         for (ray, light) in of_scene.chain(surroundings).enumerate() {
             // The cosine at the shading normal, faded to 0 where the light goes below the geometric surface.
             let cosine = shading.dot(light.direction).min(normal.dot(light.direction) * 1e3);
             if cosine > 0.0 {
                 let chance = self.samples[path.sample].chance(RAYS * u64::from(number) + 1 + ray as u64);
-                self.shadow_rays.push(origin, light.direction, light.distance, chance);
+                let direction = light.direction.as_vec3().to_array();
+                let ray = StartRay::from_hit(hit, direction).with_tmax(light.distance as f32);
+                self.shadow_rays.push(ray, chance);
                 self.contributions.push((path.sample, throughput * light.light * cosine as f32));
             }
         }
         if !last {
             let direction = scattered(shading, normal, sample(2));
             let density = Some(shading.dot(direction).max(0.0) / PI);
-            let (origin, from) = (origin.point, hit.primitive);
-            self.next.push(PathState { sample: path.sample, throughput, origin, direction, from, density });
+            let (sample, origin, start) = (path.sample, point, hit.start());
+            self.next.push(PathState { sample, throughput, origin, start, direction, density });
         }
         surface.emitted
     }

@@ -57,7 +57,8 @@ impl<'a> Shader<'a> {
             return step_counts::shade(frame.scene, &rays, &mut counters.steps);
         }
         let mut hits = vec![Hit::MISS; rays.len()];
-        visibility::nearest(frame, (&rays, None), true, |row| samples[row].chance(0), &mut hits);
+        let direction = |ray: &Ray| ray.direction;
+        visibility::nearest(frame, &rays, Some(direction), |row| samples[row].chance(0), &mut hits);
         match self {
             Shader::Studio(studio) => studio.shade(frame, samples, &hits, &mut counters.any_rays),
             Shader::Path(lights) => path_tracer::shade(frame, lights, samples, &hits, counters),

@@ -2,12 +2,13 @@
 //! occlusion, on a ground that only catches shadows.
 
 use super::context::{FrameContext, Sample};
-use super::occlusion_rays::{OcclusionRays, Origin};
+use super::occlusion_rays::OcclusionRays;
 use super::room_lamp::room_lamp;
 use crate::materials::Look;
 use crate::output::shoulder;
 use crate::sampling::{cosine_hemisphere, uniform_disc};
-use bth::rays::{Hit, PrimitiveRef};
+use bth::TraceRay;
+use bth::rays::{Hit, Ray, StartRay};
 use glam::{DVec3, Vec3};
 
 /// Ambient-occlusion rays per sample.
@@ -55,6 +56,18 @@ struct ShadingPoint {
     what: Surface,
 }
 
+/// Points of one kind, and the occlusion rays of all of them.
+struct Lit<R> {
+    points: Vec<ShadingPoint>,
+    rays: OcclusionRays<R>,
+}
+
+impl<R: TraceRay> Lit<R> {
+    fn new() -> Self {
+        Self { points: Vec::new(), rays: OcclusionRays::new() }
+    }
+}
+
 /// What is lit.
 #[derive(Clone, Copy, Debug)]
 enum Surface {
@@ -88,8 +101,7 @@ impl Studio {
         any_rays: &mut u64,
     ) -> Vec<Vec3> {
         let mut colors: Vec<Vec3> = samples.iter().map(|s| background(s.at.y, s.at.length())).collect();
-        let mut rays = OcclusionRays::default();
-        let mut points = Vec::new();
+        let (mut lit, mut on_ground) = (Lit::new(), Lit::new());
         for (index, (sample, hit)) in samples.iter().zip(hits).enumerate() {
             if hit.is_hit() {
                 let look = frame.materials.look(frame.scene, frame.geometry.object(hit.primitive), hit);
@@ -98,26 +110,35 @@ impl Studio {
                     continue;
                 }
                 let (point, geometric) = frame.point_and_normal(sample, hit);
-                let origin = Origin::above(point, geometric, hit.primitive, self.diagonal);
-                let to_key = self.push(&mut rays, origin, geometric, sample, frame.occlusion_distance);
+                let ray = |direction, tmax| StartRay::from_hit(hit, direction).with_tmax(tmax);
+                let to_key = self.push(&mut lit.rays, (point, geometric), ray, sample, frame);
                 let normal = frame.geometry.shading_normal(hit, geometric);
                 let what = look.map_or(Surface::Clay, Surface::Material);
-                points.push(ShadingPoint { sample: index, normal, to_key, what });
+                lit.points.push(ShadingPoint { sample: index, normal, to_key, what });
             } else if let Some((point, share)) = self.on_ground(frame, sample) {
-                let origin = Origin::above(point, self.vertical, PrimitiveRef::NONE, self.diagonal);
-                let distance = frame.occlusion_distance;
-                let to_key = self.push(&mut rays, origin, self.vertical, sample, distance);
-                points.push(ShadingPoint {
-                    sample: index,
-                    normal: self.vertical,
-                    to_key,
-                    what: Surface::Ground(share),
-                });
+                let (normal, origin) = (self.vertical, point.as_vec3().to_array());
+                let ray = |direction, tmax| Ray { origin, tmin: 0.0, direction, tmax };
+                let to_key = self.push(&mut on_ground.rays, (point, normal), ray, sample, frame);
+                let what = Surface::Ground(share);
+                on_ground.points.push(ShadingPoint { sample: index, normal, to_key, what });
             }
         }
-        *any_rays += rays.len() as u64;
-        let blocked = rays.trace(frame);
-        for (point, blocked) in points.iter().zip(blocked.chunks(1 + AMBIENT_RAYS as usize)) {
+        *any_rays += (lit.rays.len() + on_ground.rays.len()) as u64;
+        self.light_points(frame, samples, &lit, &mut colors);
+        self.light_points(frame, samples, &on_ground, &mut colors);
+        colors
+    }
+
+    /// Sets the colours of points.
+    fn light_points<R: TraceRay>(
+        &self,
+        frame: &FrameContext<'_>,
+        samples: &[Sample],
+        lit: &Lit<R>,
+        colors: &mut [Vec3],
+    ) {
+        let blocked = lit.rays.trace(frame);
+        for (point, blocked) in lit.points.iter().zip(blocked.chunks(1 + AMBIENT_RAYS as usize)) {
             let open = blocked[1..].iter().filter(|b| !**b).count() as f32 / AMBIENT_RAYS as f32;
             let key = if blocked[0] { 0.0 } else { 1.0 };
             let color = &mut colors[point.sample];
@@ -134,32 +155,34 @@ impl Studio {
                 }
             };
         }
-        colors
     }
 
-    /// Adds the key ray and the ambient rays, of length `distance`, of a point; returns the direction to the key light.
-    fn push(
+    /// Adds the key ray and the ambient rays of a point with its normal, made of direction and length by `ray`; returns the
+    /// direction to the key light.
+    fn push<R: TraceRay>(
         &self,
-        rays: &mut OcclusionRays,
-        origin: Origin,
-        normal: DVec3,
+        rays: &mut OcclusionRays<R>,
+        (point, normal): (DVec3, DVec3),
+        ray: impl Fn([f32; 3], f32) -> R,
         sample: &Sample,
-        distance: f64,
+        frame: &FrameContext<'_>,
     ) -> DVec3 {
+        let ray = |direction: DVec3, length: f64| ray(direction.as_vec3().to_array(), length as f32);
         let (to_key, length) = match self.key {
             Key::Directional(direction) => (direction, 4.0 * self.diagonal),
             Key::Point(lamp) => {
-                let to_lamp = lamp - origin.point;
+                let to_lamp = lamp - point;
                 (to_lamp.normalize_or(normal), to_lamp.length())
             }
         };
         let (tangent, bitangent) = to_key.any_orthonormal_pair();
         let spread = uniform_disc(sample.sampler.point(1, sample.index)) * KEY_RADIUS;
         let towards = (to_key + tangent * spread.x + bitangent * spread.y).normalize();
-        rays.push(origin, towards, length * 0.999, sample.chance(1));
-        for ray in 0..AMBIENT_RAYS {
-            let at = sample.sampler.point(2, sample.index * AMBIENT_RAYS + ray);
-            rays.push(origin, cosine_hemisphere(normal, at), distance, sample.chance(2 + u64::from(ray)));
+        rays.push(ray(towards, length), sample.chance(1));
+        for number in 0..AMBIENT_RAYS {
+            let at = sample.sampler.point(2, sample.index * AMBIENT_RAYS + number);
+            let direction = cosine_hemisphere(normal, at);
+            rays.push(ray(direction, frame.occlusion_distance), sample.chance(2 + u64::from(number)));
         }
         to_key
     }

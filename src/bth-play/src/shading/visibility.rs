@@ -6,14 +6,15 @@
 
 use super::chance::Chance;
 use super::context::FrameContext;
-use bth::rays::{Hit, PrimitiveRef, Ray};
-use bth::{Accept, Alpha};
+use bth::rays::Hit;
+use bth::{Accept, Alpha, TraceRay};
 
-/// Whether a ray is stopped where it hits a surface.
-fn stops(frame: &FrameContext<'_>, ray: &Ray, hit: &Hit, camera: bool, chance: Chance) -> bool {
+/// Returns true if a ray is stopped where it hits a surface. `camera` is the direction of a ray of the camera.
+fn stops(frame: &FrameContext<'_>, camera: Option<[f32; 3]>, hit: &Hit, chance: Chance) -> bool {
     let (materials, view) = (frame.materials, frame.geometry.object(hit.primitive));
     let Some(material) = materials.material(frame.scene, view, hit) else { return true };
-    if camera && !material.double_sided && !frame.geometry.is_front(hit.primitive, ray) {
+    let sees_back = |direction| !frame.geometry.is_front(hit.primitive, direction);
+    if !material.double_sided && camera.is_some_and(sees_back) {
         return false;
     }
     match material.alpha {
@@ -23,22 +24,23 @@ fn stops(frame: &FrameContext<'_>, ray: &Ray, hit: &Hit, camera: bool, chance: C
     }
 }
 
-/// Stores what each ray meets first. `chance` gives the chance of each ray.
-pub(super) fn nearest(
+/// Stores what each ray hits first. `camera` gives the directions of rays of the camera, and `chance` the chance of each ray.
+pub(super) fn nearest<R: TraceRay>(
     frame: &FrameContext<'_>,
-    (rays, from): (&[Ray], Option<&[PrimitiveRef]>),
-    camera: bool,
+    rays: &[R],
+    camera: Option<fn(&R) -> [f32; 3]>,
     chance: impl Fn(usize) -> Chance,
     hits: &mut [Hit],
 ) {
-    frame.scene.batch(rays).from(from).nearest(hits);
-    if !frame.materials.lets_pass(camera) {
+    frame.scene.batch(rays).nearest(hits);
+    if !frame.materials.lets_pass(camera.is_some()) {
         return;
     }
     for (row, (ray, hit)) in rays.iter().zip(hits).enumerate() {
-        if hit.is_hit() && !stops(frame, ray, hit, camera, chance(row)) {
-            let chance = chance(row);
-            let filter: &bth::Filter<'_> = &|ray, hit| stops(frame, ray, hit, camera, chance);
+        let chance = chance(row);
+        if hit.is_hit() && !stops(frame, camera.map(|direction| direction(ray)), hit, chance) {
+            let filter: &bth::Filter<'_> =
+                &|ray, hit| stops(frame, camera.map(|_| ray.direction), hit, chance);
             let accept = Accept { filter: Some(filter), ..Accept::default() };
             *hit = frame.scene.nearest_accepted(ray, &accept).unwrap_or(Hit::MISS);
         }
@@ -46,19 +48,19 @@ pub(super) fn nearest(
 }
 
 /// Stores whether each ray is stopped by anything.
-pub(super) fn any(
+pub(super) fn any<R: TraceRay>(
     frame: &FrameContext<'_>,
-    (rays, from): (&[Ray], &[PrimitiveRef]),
+    rays: &[R],
     chances: &[Chance],
     blocked: &mut [bool],
 ) {
-    frame.scene.batch(rays).from(from).any(blocked);
+    frame.scene.batch(rays).any(blocked);
     if !frame.materials.lets_pass(false) {
         return;
     }
     for ((ray, blocked), chance) in rays.iter().zip(blocked).zip(chances) {
         if *blocked {
-            let filter: &bth::Filter<'_> = &|ray, hit| stops(frame, ray, hit, false, *chance);
+            let filter: &bth::Filter<'_> = &|_, hit| stops(frame, None, hit, *chance);
             let accept = Accept { filter: Some(filter), ..Accept::default() };
             *blocked = frame.scene.any_accepted(ray, &accept);
         }

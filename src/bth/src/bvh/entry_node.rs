@@ -296,8 +296,14 @@ mod tests {
                     let traced = |i: usize| order.is_none_or(|order| order.contains(&(i as u32)));
                     for (i, ray) in rays.iter().enumerate().filter(|&(i, _)| traced(i)) {
                         let mut hit = Hit::MISS;
-                        single::trace::<NearestQuery, ()>((object, NEAREST), ray, NONE, 0, &mut (), &mut hit);
-                        let is_hit = crate::object::any(object, ray, NONE);
+                        single::trace::<NearestQuery, ()>(
+                            (object, NEAREST),
+                            (ray, None),
+                            0,
+                            &mut (),
+                            &mut hit,
+                        );
+                        let is_hit = crate::object::any(object, (ray, None));
                         assert_eq!(format!("{:?}", hits[i]), format!("{hit:?}"), "{isa}, {scale}: {ray:?}");
                         assert_eq!(found[i], is_hit, "{isa}, {scale}: {ray:?}");
                     }

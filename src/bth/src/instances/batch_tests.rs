@@ -6,7 +6,9 @@ use super::super::test_worlds::{FILES, rays, unit, world};
 use super::*;
 use crate::hits::Accept;
 use crate::nodes::affine::Affine;
+use crate::rays::{PrimitiveRef, Start, StartRay};
 use crate::scene::Scene;
+use crate::starts::placed::WorldRay;
 use bth_format::File;
 use bth_random::Rng;
 
@@ -17,29 +19,22 @@ fn nearest_by_loop(world: &World, file: &File, ray: &Ray) -> Hit {
         let Some(placement) = placement else { continue };
         let object = placement.inverse.ray(ray);
         let view = file.object(placement.object()).unwrap();
-        let hit = object::nearest(&view, &object.ray, bth_format::layout::NONE, instance as u32);
+        let hit = object::nearest(&view, (&object.ray, None), instance as u32);
         best = better(ray, &best, &hit, object.t_scale).unwrap_or(best);
     }
     best
 }
 
-/// The answers of a batch that uses its hints, which [`World::nearest`] and [`World::any`] do only where that was measured to be faster.
-fn traced(
-    world: &World,
-    objects: &Objects,
-    rays: &[Ray],
-    from: Option<&[PrimitiveRef]>,
-) -> (Vec<Hit>, Vec<bool>) {
+/// The answers of a batch.
+fn traced(world: &World, objects: &Objects, rays: &[Ray]) -> (Vec<Hit>, Vec<bool>) {
     let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-    object::with_scratch(|scratch| {
-        world.run(objects, rays, from, &mut SceneNearest { hits: &mut hits, scratch });
-        world.run(objects, rays, from, &mut SceneAny { rays, found: &mut found, scratch });
-    });
+    world.nearest(objects, rays, &[], &mut hits);
+    world.any(objects, rays, &[], &mut found);
     (hits, found)
 }
 
 #[test]
-fn top_level_and_hints_do_not_change_results() {
+fn the_top_level_does_not_change_results() {
     let mut rng = Rng::new(11);
     let (mut hit_count, mut far_hits, mut ray_count) = (0, 0, 0);
     for case in 0..600 {
@@ -48,37 +43,24 @@ fn top_level_and_hints_do_not_change_results() {
         let count = [1, 2, 7, 16, 17, 40, 300][case % 7];
         let (world, transforms) = world(&file, &mut rng, count);
         let rays = rays(&mut rng, &transforms, 40);
-        let from: Vec<PrimitiveRef> = rays
-            .iter()
-            .map(|_| PrimitiveRef {
-                instance: rng.below(count as u64 + 2) as u32,
-                triangle: rng.below(3) as u32,
-            })
-            .collect();
-        for from in [None, Some(from.as_slice())] {
-            let (hits, found) = traced(&world, &objects, &rays, from);
-            for (i, ray) in rays.iter().enumerate() {
-                let expected = nearest_by_loop(&world, &file, ray);
-                assert_eq!(hits[i], expected, "case {case}, ray {i}: {ray:?}");
-                assert_eq!(found[i], expected.is_hit(), "case {case}, ray {i}: {ray:?}");
-                let start = from.map_or(PrimitiveRef::NONE, |from| from[i]);
-                // What a single ray stored before does not matter.
-                let mut alone = Hit { t: 0.0, ..expected };
-                world.store_nearest_of_ray(&objects, ray, start, &mut alone);
-                let any = world.any_of_ray(&objects, ray, start);
-                assert_eq!(
-                    (alone, any),
-                    (expected, expected.is_hit()),
-                    "case {case}, ray {i} alone: {ray:?}"
-                );
-                if i % 8 == 0 {
-                    assert_eq!(world.nearest_counted(&objects, ray, PrimitiveRef::NONE).0, expected);
-                }
-                let start = ray.origin.iter().fold(0.0f32, |m, x| m.max(x.abs()));
-                far_hits += u32::from(expected.is_hit() && start > world.top.reach);
-                hit_count += u32::from(expected.is_hit());
-                ray_count += 1;
+        let (hits, found) = traced(&world, &objects, &rays);
+        for (i, ray) in rays.iter().enumerate() {
+            let expected = nearest_by_loop(&world, &file, ray);
+            assert_eq!(hits[i], expected, "case {case}, ray {i}: {ray:?}");
+            assert_eq!(found[i], expected.is_hit(), "case {case}, ray {i}: {ray:?}");
+            // What a single ray stored before does not matter.
+            let mut alone = Hit { t: 0.0, ..expected };
+            let world_ray = WorldRay::plain(ray);
+            world.store_nearest_of_ray(&objects, world_ray, &mut alone);
+            let any = world.any_of_ray(&objects, world_ray);
+            assert_eq!((alone, any), (expected, expected.is_hit()), "case {case}, ray {i} alone: {ray:?}");
+            if i % 8 == 0 {
+                assert_eq!(world.nearest_counted(&objects, world_ray).0, expected);
             }
+            let farthest = ray.origin.iter().fold(0.0f32, |m, x| m.max(x.abs()));
+            far_hits += u32::from(expected.is_hit() && farthest > world.top.reach);
+            hit_count += u32::from(expected.is_hit());
+            ray_count += 1;
         }
     }
     assert!(
@@ -87,24 +69,58 @@ fn top_level_and_hints_do_not_change_results() {
     );
 }
 
-/// The first batches of a scene take turns with and without their hints, whatever is measured.
-#[test]
-fn batches_that_are_measured_with_and_without_hints_have_the_same_answers() {
-    let mut rng = Rng::new(13);
-    let file = File::from_bytes(FILES[1]).unwrap();
-    let objects = Objects::of_file(file.clone());
-    let (world, transforms) = world(&file, &mut rng, 40);
-    let rays = rays(&mut rng, &transforms, 300);
-    let start = |i: usize| PrimitiveRef { instance: i as u32 % 40, triangle: i as u32 % 3 };
-    let from: Vec<PrimitiveRef> = (0..rays.len()).map(start).collect();
-    let expected = traced(&world, &objects, &rays, None);
-    for batch in 0..12 {
-        let mut answers = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-        world.nearest(&objects, &rays, Some(&from), &mut answers.0);
-        world.any(&objects, &rays, Some(&from), &mut answers.1);
-        assert_eq!(answers, expected, "batch {batch}");
+/// Oracle: the nearest hit of a ray that starts on an instance, of a loop over all instances.
+fn nearest_start_by_loop(scene: &Scene, ray: &StartRay) -> Hit {
+    let mut best = Hit::MISS;
+    let Some(placed) = scene.place(ray) else { return best };
+    let world = scene.world().expect("instances");
+    for (instance, placement) in world.placements.iter().enumerate() {
+        let Some(placement) = placement else { continue };
+        let (instance, start) = (instance as u32, placed.world_ray().start_in(instance as u32));
+        let of_object = placement.inverse.ray_from(&placed.ray, start);
+        let view = scene.file().object(placement.object()).unwrap();
+        let hit = object::nearest(&view, (&of_object.ray, start), instance);
+        best = better(&placed.ray, &best, &hit, of_object.t_scale).unwrap_or(best);
     }
-    assert!(expected.1.iter().filter(|found| **found).count() > 50);
+    best
+}
+
+#[test]
+fn starts_on_instances_have_the_hits_of_a_loop() {
+    let mut rng = Rng::new(13);
+    let (mut hit_count, mut ray_count, mut unusable) = (0, 0, 0);
+    for case in 0..300 {
+        let file = File::from_bytes(FILES[case % 2]).unwrap();
+        let count = [1, 2, 7, 16, 17, 40, 300][case % 7];
+        let (world, transforms) = world(&file, &mut rng, count);
+        let scene = Scene::with_instances(file, world);
+        let rays: Vec<StartRay> = rays(&mut rng, &transforms, [40, 300][case / 7 % 2])
+            .into_iter()
+            .map(|ray| {
+                let (instance, triangle) = (rng.below(count as u64 + 1) as u32, rng.below(4) as u32);
+                let [u, v] = [[0.0, 0.0], [0.3, 0.4], [0.5, 0.5], [0.0, 1.0]][rng.below(4) as usize];
+                let start = Start { primitive: PrimitiveRef { instance, triangle }, u, v };
+                start.ray(ray.direction).with_tmax(ray.tmax)
+            })
+            .collect();
+        let (mut hits, mut found) = (vec![Hit { t: 7.0, ..Hit::MISS }; rays.len()], vec![true; rays.len()]);
+        scene.batch(&rays).nearest(&mut hits);
+        scene.batch(&rays).any(&mut found);
+        for (i, ray) in rays.iter().enumerate() {
+            let expected = nearest_start_by_loop(&scene, ray);
+            let is_hit = expected.is_hit();
+            assert_eq!((hits[i], found[i]), (expected, is_hit), "case {case}, ray {i}: {ray:?}");
+            let alone = (scene.nearest(ray), scene.any(ray));
+            assert_eq!(alone, (is_hit.then_some(expected), is_hit), "case {case}, ray {i} alone: {ray:?}");
+            unusable += u32::from(scene.check_start(&ray.start).is_err());
+            hit_count += u32::from(is_hit);
+            ray_count += 1;
+        }
+    }
+    assert!(
+        hit_count > ray_count / 20 && unusable > 100 && unusable < ray_count * 3 / 4,
+        "{hit_count} of {ray_count} hit, {unusable} unusable"
+    );
 }
 
 #[test]
@@ -122,12 +138,12 @@ fn rays_that_are_not_finite_or_have_an_empty_range_hit_nothing() {
         Ray { tmin: f32::NAN, ..good },
     ] {
         let (mut hit, mut found) = ([Hit::MISS], [false]);
-        world.nearest(&objects, &[ray], None, &mut hit);
-        world.any(&objects, &[ray], None, &mut found);
+        world.nearest(&objects, &[ray], &[], &mut hit);
+        world.any(&objects, &[ray], &[], &mut found);
         assert_eq!((hit[0], found[0]), (Hit::MISS, false), "{ray:?}");
         (hit, found) = ([Hit { t: 1.0, ..Hit::MISS }], [true]);
-        world.store_nearest_of_ray(&objects, &ray, PrimitiveRef::NONE, &mut hit[0]);
-        found[0] = world.any_of_ray(&objects, &ray, PrimitiveRef::NONE);
+        world.store_nearest_of_ray(&objects, WorldRay::plain(&ray), &mut hit[0]);
+        found[0] = world.any_of_ray(&objects, WorldRay::plain(&ray));
         assert_eq!((hit[0], found[0]), (Hit::MISS, false), "{ray:?} alone");
     }
 }
@@ -164,8 +180,8 @@ fn packets_through_the_top_level_do_not_change_results() {
         let (world, transforms) = world(&file, &mut rng, count);
         let rays = bundle(&mut rng, &transforms, [33, 64, 100][case % 3]);
         let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-        world.nearest(&objects, &rays, None, &mut hits);
-        world.any(&objects, &rays, None, &mut found);
+        world.nearest(&objects, &rays, &[], &mut hits);
+        world.any(&objects, &rays, &[], &mut found);
         for (i, ray) in rays.iter().enumerate() {
             let expected = nearest_by_loop(&world, &file, ray);
             assert_eq!(hits[i], expected, "case {case}, ray {i}: {ray:?}");
@@ -173,12 +189,11 @@ fn packets_through_the_top_level_do_not_change_results() {
             hit_count += usize::from(expected.is_hit());
         }
         let mut active_rays = ActiveRays::default();
-        let batch = SceneBatch { world: &world, objects: &objects, rays: &rays, from: None };
+        let batch = SceneBatch { world: &world, objects: &objects, rays: &rays, starts: &[] };
         Isa::chosen().run(StartKernel {
             batch: &batch,
             first: 0,
             count: rays.len(),
-            progress: Progress::None,
             active_rays: &mut active_rays,
         });
         in_packets += usize::from(!active_rays.packets.is_empty());
@@ -212,17 +227,13 @@ fn a_single_instance_in_world_space_has_the_same_hits_with_and_without_the_top_l
         assert_eq!(World::with_placements(placements, file.object_count()).sole(), None);
 
         let rays = rays(&mut rng, &[identity], count);
-        let from: Vec<PrimitiveRef> = rays
-            .iter()
-            .map(|_| PrimitiveRef { instance: rng.below(6) as u32, triangle: rng.below(3) as u32 })
-            .collect();
-        let (hits, found) = traced(&world, &objects, &rays, Some(&from));
+        let (hits, found) = traced(&world, &objects, &rays);
         let scene = Scene::with_instances(file, world);
         let (mut sole_hits, mut sole_found) = (vec![Hit { t: 7.0, ..Hit::MISS }; count], vec![true; count]);
-        scene.batch(&rays).from(&from[..]).nearest(&mut sole_hits);
-        scene.batch(&rays).from(&from[..]).any(&mut sole_found);
+        scene.batch(&rays).nearest(&mut sole_hits);
+        scene.batch(&rays).any(&mut sole_found);
         assert_eq!((&sole_hits, &sole_found), (&hits, &found), "case {case}: {rays:?}");
-        assert_eq!(scene.nearest_counted(&rays[0], from[0]).0, hits[0]);
+        assert_eq!(scene.nearest_counted(&rays[0]).0, hits[0]);
         assert_eq!(scene.touched_objects(), 1);
         hit_count += hits.iter().filter(|hit| hit.is_hit()).count();
         ray_count += count;

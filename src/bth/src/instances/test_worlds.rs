@@ -48,7 +48,9 @@ pub(super) fn world(file: &File, rng: &mut Rng, count: usize) -> (World, Vec<Aff
         Placement::new(transform, object, file.object_header(object), &parts).ok()
     };
     let placements = transforms.iter().map(|t| place(t, rng.next()).filter(|_| rng.below(8) > 0)).collect();
-    (World::with_placements(placements, file.object_count()), transforms)
+    let mut world = World::with_placements(placements, file.object_count());
+    world.set_transforms(&transforms);
+    (world, transforms)
 }
 
 /// Random rays, each aimed at a point of an object under one of the transforms.

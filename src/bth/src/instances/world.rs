@@ -80,14 +80,29 @@ impl World {
         World::unplaced(TransformSource::Caller(CallerInstances::default()), 0.0, 0, 0)
     }
 
-    /// Instances with given placements, without transforms.
+    /// Instances with given placements. Their transforms are the identity unless [`Self::set_transforms`] sets them.
     #[cfg(test)]
     pub(crate) fn with_placements(placements: Vec<Option<Placement>>, objects: u32) -> World {
         let mut world = World::empty();
         world.add_objects(objects);
         world.placements = placements;
+        world.set_transforms(&[]);
         world.build_top();
         world
+    }
+
+    /// Sets the transforms from objects to the world, which place nothing.
+    #[cfg(test)]
+    pub(super) fn set_transforms(&mut self, transforms: &[Affine]) {
+        let row = |(i, placement): (usize, &Option<Placement>)| InstanceRow {
+            object: placement.as_ref().map_or(0, Placement::object),
+            node: 0,
+            to_world: transforms.get(i).copied().unwrap_or(Affine::IDENTITY),
+        };
+        let rows = self.placements.iter().enumerate().map(row).collect();
+        if let TransformSource::Caller(caller) = &mut self.source {
+            caller.rows = rows;
+        }
     }
 
     /// Makes the number of objects `count`.

@@ -2,145 +2,221 @@
 //! upper one, at the height 10, nothing is met upwards, from the lower one nothing straight up within 4; by the latter file nothing within 1
 //! straight down from the upper one, either.
 
-use super::{Rest, find_rest, single};
-use crate::rays::Ray;
+use super::prepare::PreparedStarts;
+use crate::rays::{Hit, PrimitiveRef, Start, StartRay};
 use crate::simd::Isa;
 use bth_format::File;
 use bth_format::layout::NONE;
+use bth_random::Rng;
 use std::sync::{Mutex, PoisonError};
 
 const DIRECTIONS: &[u8] = include_bytes!("../../../../format-spec/conformance/valid/free-directions.bth");
 const DISTANCES: &[u8] = include_bytes!("../../../../format-spec/conformance/valid/free-distances.bth");
+const UP: [f32; 3] = [0.0, 0.0, 1.0];
+const DOWN: [f32; 3] = [0.0, 0.0, -1.0];
 
-/// Where the range of a ray begins that is looked up alone and in lanes; `None` if it ends without being traced.
-fn begin(file: &[u8], ray: Ray, from: u32) -> Option<f32> {
-    let file = File::from_bytes(file).unwrap();
-    let object = file.check(0).unwrap();
-    let alone = single::begin(&object, &ray, from);
-    let ends = alone == f32::INFINITY || ray.tmax < alone;
-    let is_later = alone > ray.tmin;
-    assert!(ends || is_later || alone.to_bits() == ray.tmin.to_bits());
+/// A ray that starts within a triangle.
+fn ray(triangle: u32, direction: [f32; 3]) -> StartRay {
+    Start { primitive: PrimitiveRef { instance: 0, triangle }, u: 0.25, v: 0.25 }.ray(direction)
+}
+
+/// How a ray is prepared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Prepared {
+    /// It starts on no triangle.
+    Unusable,
+    /// It ends without being traced.
+    Ended,
+    /// Its range begins here.
+    Begins(f32),
+}
+
+/// The rays, prepared with this instruction set.
+fn prepared(isa: Isa, file: &[u8], rays: &[StartRay]) -> Vec<Prepared> {
     // Which instruction set is used is a setting of the process.
     static TURN: Mutex<()> = Mutex::new(());
     let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-    for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
-        isa.choose().unwrap();
-        let mut rest = Rest { order: Vec::new(), rays: vec![Ray::new([7.0; 3], [7.0; 3]); 17] };
-        let later = super::decide(&object, &[ray; 17], &[from; 17], 0..17, &mut rest);
-        // The last ray is less than a group, and left as it is; in scalar code there are no groups.
-        let groups = if isa == Isa::Scalar { 17 } else { 16 };
-        assert_eq!(rest.order.len(), if ends { 17 - groups } else { 17 }, "{isa}: {ray:?}");
-        assert_eq!(later, if is_later && !ends { groups } else { 0 }, "{isa}: {ray:?}");
-        for (i, of) in rest.rays.iter().enumerate() {
-            let begin = of.tmin;
-            assert_eq!(bits(&Ray { tmin: ray.tmin, ..*of }), bits(&ray), "{isa}");
-            let is_close = begin <= alone && alone - begin <= 1e-2 * (alone - ray.tmin);
-            assert!(
-                ends || i >= groups || begin.to_bits() == alone.to_bits() || is_close,
-                "{isa}: {begin} {alone} {ray:?}"
-            );
-        }
-    }
+    let file = File::from_bytes(file).unwrap();
+    let object = file.check(0).unwrap();
+    // What was prepared before does not matter.
+    let mut prepared = PreparedStarts::default();
+    prepared.fill(&object, &[ray(1, UP), ray(0, DOWN), ray(7, UP)].repeat(11), 0);
+    isa.choose().unwrap();
+    prepared.fill(&object, rays, 0);
     Isa::best().choose().unwrap();
-    (!ends).then_some(alone)
+    assert!(prepared.order.is_sorted(), "{isa}");
+    let of = |i: usize| {
+        let (point, of_object) = (&prepared.points[i], &prepared.rays[i]);
+        let goes_on = prepared.order.contains(&(i as u32));
+        if !point.is_on_triangle() {
+            assert!(!goes_on, "{isa}: {:?}", rays[i]);
+            return Prepared::Unusable;
+        }
+        let StartRay { start, direction, tmax } = rays[i];
+        let height = start.primitive.triangle as f32 * 10.0;
+        assert_eq!(of_object.origin, [start.u, start.v, height], "{isa}: {:?}", rays[i]);
+        let same = direction.map(f32::to_bits) == of_object.direction.map(f32::to_bits);
+        assert!(same && of_object.tmax.to_bits() == tmax.to_bits(), "{isa}: {of_object:?} {:?}", rays[i]);
+        if goes_on { Prepared::Begins(of_object.tmin) } else { Prepared::Ended }
+    };
+    (0..rays.len()).map(of).collect()
 }
 
-fn bits(ray: &Ray) -> [u32; 8] {
-    Ray::rows(std::slice::from_ref(ray))[0]
+fn available() -> impl Iterator<Item = Isa> {
+    Isa::ALL.into_iter().filter(|isa| isa.is_available())
+}
+
+/// How a ray is prepared alone. In lanes it is about the same.
+fn begin(file: &[u8], ray: StartRay) -> Prepared {
+    let [alone] = prepared(Isa::Scalar, file, &[ray])[..] else { unreachable!("one ray") };
+    for isa in available() {
+        // The last ray is less than a group.
+        let all = prepared(isa, file, &[ray; 17]);
+        assert_eq!(all[16], alone, "{isa}: {ray:?}");
+        for of in all {
+            let is_close = match (of, alone) {
+                (Prepared::Begins(of), Prepared::Begins(alone)) => of <= alone && of >= 0.99 * alone,
+                _ => of == alone,
+            };
+            assert!(is_close, "{isa}: {of:?} {alone:?} {ray:?}");
+        }
+    }
+    alone
 }
 
 /// Whether a ray ends, by the file with directions.
-fn ends(ray: Ray, from: u32) -> bool {
-    begin(DIRECTIONS, ray, from).is_none()
-}
-
-fn ray(height: f32, direction: [f32; 3]) -> Ray {
-    Ray { origin: [0.25, 0.25, height], tmin: 0.0, direction, tmax: f32::INFINITY }
+fn ends(ray: StartRay) -> bool {
+    begin(DIRECTIONS, ray) == Prepared::Ended
 }
 
 #[test]
-fn rays_that_certainly_leave_in_a_free_direction_end() {
-    let up = [0.0, 0.0, 1.0];
-    assert!(ends(ray(10.01, up), 1));
-    assert!(ends(ray(10.01, [0.0, 0.3, 0.4]), 1));
-    assert!(ends(ray(10.01, [100.0, 300.0, 400.0]), 1) == ends(ray(10.01, [0.25, 0.75, 1.0]), 1));
-    // From before the triangle, with a range that begins behind it.
-    assert!(ends(Ray { tmin: 1.5, ..ray(9.0, up) }, 1));
-    // Downwards; before the triangle; on it; beside it; too steep; from no or another triangle.
-    assert!(!ends(ray(10.01, [0.0, 0.0, -1.0]), 1));
-    assert!(!ends(ray(9.99, up), 1));
-    assert!(!ends(Ray { tmin: 1.0, ..ray(9.0, up) }, 1));
-    assert!(!ends(ray(10.0, up), 1));
-    assert!(!ends(Ray { origin: [0.7, 0.7, 10.01], ..ray(0.0, up) }, 1));
-    assert!(!ends(ray(10.001, [1.0, 0.0, 0.05]), 1));
-    for from in [2, 77, NONE] {
-        assert!(!ends(ray(10.01, up), from));
+fn rays_that_leave_in_a_free_direction_end() {
+    assert!(ends(ray(1, UP)));
+    assert!(ends(ray(1, [0.0, 0.3, 0.4])));
+    assert!(ends(ray(1, [0.0, 0.0, 400.0])));
+    // From an edge and a corner.
+    for [u, v] in [[0.0, 0.5], [0.5, 0.5], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0]] {
+        let at = ray(1, UP);
+        assert!(ends(StartRay { start: Start { u, v, ..at.start }, ..at }));
     }
+    // Downwards; too steep; along the triangle.
+    assert!(!ends(ray(1, DOWN)));
+    assert!(!ends(ray(1, [1.0, 0.0, 0.05])));
+    assert!(!ends(ray(1, [1.0, 0.0, 0.0])));
+    for triangle in [2, 77, NONE] {
+        assert_eq!(begin(DIRECTIONS, ray(triangle, UP)), Prepared::Unusable);
+    }
+    let mut elsewhere = ray(1, UP);
+    elsewhere.start.primitive.instance = 1;
+    assert_eq!(begin(DIRECTIONS, elsewhere), Prepared::Unusable);
 }
 
 #[test]
 fn rays_that_end_within_a_distance_end() {
     for file in [DIRECTIONS, DISTANCES] {
-        let up = [0.0, 0.0, 2.0];
-        let within = |tmax: f32| begin(file, Ray { tmax, ..ray(0.01, up) }, 0).is_none();
+        let up = ray(0, [0.0, 0.0, 2.0]);
+        let within = |tmax: f32| begin(file, up.with_tmax(tmax)) == Prepared::Ended;
         assert!(within(0.25) && within(1.98) && !within(2.0) && !within(f32::INFINITY));
         // Another sector than the one in the middle.
-        assert!(begin(file, Ray { tmax: 0.25, ..ray(0.01, [3.0, 0.0, 1.0]) }, 0).is_some());
+        assert_eq!(begin(file, ray(0, [3.0, 0.0, 1.0]).with_tmax(0.25)), Prepared::Begins(0.0));
     }
 }
 
 #[test]
 fn other_rays_begin_behind_that_distance() {
-    let is_about = |begin: Option<f32>, expected: f32| {
-        let begin = begin.expect("a ray that does not end");
+    let is_about = |begin: Prepared, expected: f32| {
+        let Prepared::Begins(begin) = begin else { panic!("a ray that does not end") };
         assert!(begin <= expected && begin > 0.99 * expected, "{begin} {expected}");
     };
     for file in [DIRECTIONS, DISTANCES] {
-        // The line crosses the triangle at a height of 0, at the t of -0.01 and 0.5.
-        is_about(begin(file, ray(0.01, [0.0, 0.0, 1.0]), 0), 3.99);
-        is_about(begin(file, Ray { tmin: 0.75, ..ray(-1.0, [0.0, 0.0, 2.0]) }, 0), 2.0);
-        is_about(begin(file, ray(0.01, [0.1, 0.1, 1.0]), 0), 4.0 / 1.02f32.sqrt() - 0.01);
-        // The range begins behind that distance already; in doubt about the crossing; not before `tmin`.
-        assert_eq!(begin(file, Ray { tmin: 5.0, ..ray(0.01, [0.0, 0.0, 1.0]) }, 0), Some(5.0));
-        assert_eq!(begin(file, ray(0.0, [0.0, 0.0, 1.0]), 0), Some(0.0));
-        assert_eq!(begin(file, ray(-1.0, [0.0, 0.0, 1.0]), 0), Some(0.0));
+        is_about(begin(file, ray(0, UP)), 4.0);
+        is_about(begin(file, ray(0, [0.0, 0.0, 2.0])), 2.0);
+        is_about(begin(file, ray(0, [0.1, 0.1, 1.0])), 4.0 / 1.02f32.sqrt());
     }
+    // Of the lower one's back only the file with distances of both sides tells the last level.
+    assert_eq!(begin(DIRECTIONS, ray(0, DOWN)), Prepared::Begins(0.0));
+    is_about(begin(DISTANCES, ray(0, DOWN)), 4.0);
     // Downwards from the upper one, which only the file with distances of both sides tells.
-    let down = ray(9.99, [0.0, 0.0, -1.0]);
-    assert_eq!(begin(DIRECTIONS, down, 1), Some(0.0));
-    is_about(begin(DISTANCES, down, 1), 0.99);
-    // From below upwards, and from above through the triangle.
-    assert_eq!(begin(DISTANCES, ray(9.99, [0.0, 0.0, 1.0]), 1), Some(0.0));
-    is_about(begin(DISTANCES, Ray { tmin: 0.02, ..ray(10.01, [0.0, 0.0, -1.0]) }, 1), 1.01);
+    assert_eq!(begin(DIRECTIONS, ray(1, DOWN)), Prepared::Begins(0.0));
+    is_about(begin(DISTANCES, ray(1, DOWN)), 1.0);
+    is_about(begin(DISTANCES, ray(1, UP)), 4.0);
 }
 
 #[test]
 fn numbers_that_are_none_end_nothing() {
     for x in [0.0, f32::NAN, f32::INFINITY, f32::MIN_POSITIVE, f32::MAX] {
-        assert!(!ends(ray(10.01, [0.0, 0.0, x]), 1));
-        assert!(
-            !ends(Ray { tmin: -x, ..ray(10.01, [0.0, 0.0, 1.0]) }, 1) || x == 0.0 || x == f32::MIN_POSITIVE
-        );
-        assert!(!ends(Ray { origin: [x, f32::NAN, 1.0], ..ray(0.0, [0.0, 0.0, 1.0]) }, 1));
+        assert!(!ends(ray(1, [0.0, 0.0, x])));
+        assert!(!ends(ray(1, [x, f32::NAN, 1.0])));
+    }
+    for bad in [f32::NAN, f32::INFINITY, -0.1, 1.1, f32::NEG_INFINITY] {
+        let mut at = ray(1, UP);
+        at.start.u = bad;
+        assert_eq!(begin(DIRECTIONS, at), Prepared::Unusable, "{bad}");
+        (at.start.u, at.start.v) = (0.0, bad);
+        assert_eq!(begin(DIRECTIONS, at), Prepared::Unusable, "{bad}");
     }
 }
 
+/// Rays that differ in one group, on both triangles and on none.
 #[test]
-fn batches_in_which_little_is_saved_are_traced_as_they_are() {
-    let file = File::from_bytes(DIRECTIONS).unwrap();
-    let object = file.check(0).unwrap();
-    let (free, other) = (ray(10.01, [0.0, 0.0, 1.0]), ray(10.01, [0.0, 0.0, -1.0]));
-    let rays: Vec<Ray> = (0..192).map(|i| if i % 2 == 0 { free } else { other }).collect();
-    let mut rest = Rest::default();
-    assert!(find_rest(&object, &rays, &[1; 192], false, &mut rest));
-    assert_eq!(rest.order, (0..192).filter(|i| i % 2 == 1).collect::<Vec<u32>>());
-    let mut few = [other; 192];
-    few[100] = free;
-    assert!(!find_rest(&object, &few, &[1; 192], false, &mut rest));
-    assert!(find_rest(&object, &few, &[1; 192], true, &mut rest));
-    assert_eq!(rest.order, (0..192).filter(|i| *i != 100).collect::<Vec<u32>>());
-    assert_eq!(rest.rays.len(), 192);
-    // Rays that begin later save something, too.
-    assert!(find_rest(&object, &[ray(0.01, [0.0, 0.0, 1.0]); 192], &[0; 192], false, &mut rest));
-    assert_eq!(rest.order.len(), 192);
+fn lanes_decide_as_single_rays() {
+    let mut rng = Rng::new(17);
+    let mut unit = || rng.below(1 << 12) as f32 / (1 << 11) as f32 - 1.0;
+    let rays: Vec<StartRay> = (0..16 * 200)
+        .map(|i| {
+            let direction = [(); 3].map(|()| unit() * [1.0, 1e-3, 100.0][i % 3]);
+            let tmax = if i % 5 == 0 { unit().abs() * 8.0 } else { f32::INFINITY };
+            // Runs of rays start on one triangle.
+            let triangle = [0, 0, 0, 1, 1, 0, 1, 2][i / [1, 3, 16][i / 96 % 3] % 8];
+            let mut ray = ray(triangle, direction).with_tmax(tmax);
+            ray.start.u = (unit().abs() * 0.5).min(0.5);
+            ray
+        })
+        .collect();
+    for file in [DIRECTIONS, DISTANCES] {
+        let expected = prepared(Isa::Scalar, file, &rays);
+        for isa in available() {
+            let found = prepared(isa, file, &rays);
+            let mut different = 0;
+            for (i, (found, expected)) in found.into_iter().zip(&expected).enumerate() {
+                let same = match (found, *expected) {
+                    (Prepared::Begins(found), Prepared::Begins(expected)) => {
+                        found <= expected && found >= 0.9 * expected
+                    }
+                    _ => found == *expected,
+                };
+                // Near the border of a bin they may differ.
+                different += usize::from(!same);
+                let unusable = [found, *expected].map(|of| of == Prepared::Unusable);
+                assert!(unusable[0] == unusable[1], "{isa}, ray {i}: {found:?} {expected:?}");
+            }
+            assert!(different * 100 < rays.len(), "{isa}: {different} of {}", rays.len());
+        }
+        let ended = expected.iter().filter(|of| **of == Prepared::Ended).count();
+        let later = expected.iter().filter(|of| matches!(of, Prepared::Begins(t) if *t > 0.0)).count();
+        assert!(ended > 50 && later > 50, "{ended} ended, {later} begin later");
+    }
+}
+
+/// Batches of which nothing, little and most ends.
+#[test]
+fn rays_that_end_change_no_answer() {
+    for file in [DIRECTIONS, DISTANCES] {
+        let scene = crate::from_bytes(file).unwrap();
+        for share in [0, 100, 9, 7, 2, 1] {
+            let rays: Vec<StartRay> = (0..192)
+                .map(|i| if share > 0 && i % share == 0 { ray(1, UP) } else { ray((i % 2) as u32, DOWN) })
+                .map(|of| if of.start.primitive.triangle == 0 { ray(0, UP) } else { of })
+                .collect();
+            let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+            scene.batch(&rays).nearest(&mut hits);
+            scene.batch(&rays).any(&mut found);
+            for (i, ray) in rays.iter().enumerate() {
+                let is_hit = ray.direction == DOWN || ray.start.primitive.triangle == 0;
+                assert_eq!((hits[i].is_hit(), found[i]), (is_hit, is_hit), "{share}, {i}: {ray:?}");
+                assert_eq!(scene.nearest(ray), is_hit.then_some(hits[i]), "{share}, {i}: {ray:?}");
+                assert!(!is_hit || hits[i].t == 10.0, "{:?}", hits[i]);
+            }
+        }
+    }
 }

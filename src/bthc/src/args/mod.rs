@@ -203,9 +203,6 @@ pub(crate) struct Trace {
     /// Ask only whether anything is hit: the triangle of a hit is 0 and t is 0.
     #[arg(long)]
     pub(crate) any: bool,
-    /// A .from file: the triangle that each ray starts on. Changes speed only.
-    #[arg(long, value_name = "FILE", conflicts_with = "exact")]
-    pub(crate) from: Option<PathBuf>,
     /// Compare every ray with every triangle in exact arithmetic instead of walking the structure: the truth to
     /// compare with, some million times slower on large models. Instances count where their transforms put them,
     /// without the rounding of rays in the object's space.

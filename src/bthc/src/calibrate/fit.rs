@@ -45,7 +45,7 @@ fn alone<'a>(times: impl Iterator<Item = (&'a Timed, bool)>, time: impl Fn(&Time
 }
 
 /// The profile.
-pub(crate) fn fit(measured: &Measured, isa: &str, hints: bool) -> Profile {
+pub(crate) fn fit(measured: &Measured, isa: &str) -> Profile {
     let all = || measured.small.iter().chain(&measured.large);
     let ray = all().map(|t| t.nothing).fold(f64::INFINITY, f64::min);
     // Small and large models alike, since the number of visits grows with the logarithm of the size.
@@ -93,7 +93,6 @@ pub(crate) fn fit(measured: &Measured, isa: &str, hints: bool) -> Profile {
         bvh,
         tets,
         bytes: [small, bytes(&measured.large).max(2.0 * small)],
-        hints,
         // Small models are tetrahedralized several times.
         tetrahedralize: mean(measured.small.iter().map(|t| t.tetrahedralize)),
     }
@@ -133,7 +132,7 @@ mod tests {
     #[test]
     fn exact_times_give_their_costs_back() {
         let (small, large) = (vec![exact(2.0, 1e6)], vec![exact(3.0, 4e7)]);
-        let profile = fit(&Measured { small, large, leaf: 26.0 }, "avx512", true);
+        let profile = fit(&Measured { small, large, leaf: 26.0 }, "avx512");
         let bvh = profile.bvh;
         assert_eq!([bvh.ray, bvh.outside, bvh.surface, bvh.block], [14.0, 1.5, 2.5, 12.0]);
         assert_eq!(bvh.node, (50.0 * 1.5 - 2.0 * 12.0) / 4.0);

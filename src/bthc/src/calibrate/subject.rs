@@ -315,7 +315,7 @@ fn parts(walker: &TetWalker<'_>, rays: &[SampleRay]) -> [Vec<SampleRay>; 4] {
 fn wide(scene: &Scene, samples: &[SampleRay]) -> [f64; 2] {
     let mut sums = [0.0; 2];
     for ray in Rays::new(samples).each() {
-        let (_, steps) = scene.nearest_counted(ray, bth::rays::PrimitiveRef::NONE);
+        let (_, steps) = scene.nearest_counted(ray);
         sums[0] += f64::from(steps.nodes);
         sums[1] += f64::from(steps.leaves);
     }

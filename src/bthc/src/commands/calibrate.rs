@@ -52,9 +52,7 @@ pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
     }
     drop(progress);
 
-    let isa = bth::Isa::chosen();
-    // Only with AVX-512 does the library use hints to start rays in tetrahedra that have a subtree beside them.
-    let profile = fit(&measured, &isa.to_string(), isa == bth::Isa::Avx512);
+    let profile = fit(&measured, &bth::Isa::chosen().to_string());
     let mut text = serde_json::to_string_pretty(&profile).map_err(std::io::Error::from)?;
     text.push('\n');
     // What cannot be written is shown at least, and written where it cannot be shown.

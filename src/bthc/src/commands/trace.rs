@@ -18,11 +18,9 @@ use std::time::Instant;
 const CHUNK: usize = 4096;
 
 pub(crate) fn run(args: &Trace) -> Result<(), Failure> {
-    overwrite::check(&args.output, [&args.file, &args.rays].into_iter().chain(&args.from))?;
+    overwrite::check(&args.output, [&args.file, &args.rays])?;
     let rays = ray_files::read_rays(&args.rays)?;
-    let from = args.from.as_ref().map(|path| ray_files::read_from(path, rays.len())).transpose()?;
     let scene = bth::open(&args.file)?;
-    let hint = |i: usize, n: usize| from.as_ref().map(|f| &f[i * CHUNK..i * CHUNK + n]);
 
     let (hits, seconds) = with_threads(args.threads, || {
         let start = Instant::now();
@@ -30,13 +28,13 @@ pub(crate) fn run(args: &Trace) -> Result<(), Failure> {
             exact(&scene, &rays, args)?
         } else if args.any {
             let mut found = vec![false; rays.len()];
-            let tasks = rays.par_chunks(CHUNK).zip(found.par_chunks_mut(CHUNK)).enumerate();
-            tasks.for_each(|(i, (rays, found))| scene.batch(rays).from(hint(i, rays.len())).any(found));
+            let tasks = rays.par_chunks(CHUNK).zip(found.par_chunks_mut(CHUNK));
+            tasks.for_each(|(rays, found)| scene.batch(rays).any(found));
             found.into_iter().map(ray_files::answer).collect()
         } else {
             let mut hits = vec![Hit::MISS; rays.len()];
-            let tasks = rays.par_chunks(CHUNK).zip(hits.par_chunks_mut(CHUNK)).enumerate();
-            tasks.for_each(|(i, (rays, hits))| scene.batch(rays).from(hint(i, rays.len())).nearest(hits));
+            let tasks = rays.par_chunks(CHUNK).zip(hits.par_chunks_mut(CHUNK));
+            tasks.for_each(|(rays, hits)| scene.batch(rays).nearest(hits));
             hits
         };
         Ok::<_, Failure>((hits, start.elapsed().as_secs_f64()))
@@ -45,7 +43,7 @@ pub(crate) fn run(args: &Trace) -> Result<(), Failure> {
     bth_compile::write::write_atomically(&args.output, &ray_files::hits(&hits))?;
     let found = hits.iter().filter(|h| h.is_hit()).count();
     if args.json {
-        let report = json!({"rays": rays.len(), "hits": found, "seconds": seconds, "any": args.any, "hints": from.is_some(), "exact": args.exact});
+        let report = json!({"rays": rays.len(), "hits": found, "seconds": seconds, "any": args.any, "exact": args.exact});
         output::json(&report)?;
     } else {
         let rate = rays.len() as f64 / seconds.max(1e-9) / 1e6;

@@ -1,9 +1,9 @@
 //! `bthc verify --deep`: sample rays through each object, traced in all ways and decided in exact arithmetic.
 //!
 //! A file that passes every check may still answer wrongly, where it tells something of its triangles that is not so: free directions and
-//! distances, boxes that were damaged together with their hashes, or a defect of this program. So rays are traced in a batch, with and
-//! without hints, and one at a time, and compared with every triangle in exact arithmetic; and what is known of the directions of the
-//! triangles on which rays start is compared with that, too.
+//! distances, boxes that were damaged together with their hashes, or a defect of this program. So rays are traced in a batch and one at a time, from an origin and from a
+//! start, and compared with every triangle in exact arithmetic; and what is known of the directions of the triangles on which rays start
+//! is compared with that, too.
 
 mod bounds;
 mod poses;
@@ -11,17 +11,19 @@ mod rays;
 
 use crate::failure::Failure;
 use crate::output;
-use bth::rays::{Hit, Ray};
-use bth::{Hinted, Scene};
+use bth::rays::{Hit, PrimitiveRef, Ray, StartRay};
+use bth::{Scene, TraceRay};
 use bth_compile::{Error, Monitor};
-use bth_oracle::{Triangle, World, intersection, to_f64, triangles};
+use bth_oracle::{ExactHit, Intersection, Triangle, World, intersection, starts, to_f64, triangles};
 use rayon::prelude::*;
 use rays::Start;
 use serde_json::json;
+use std::fmt::Debug;
 use std::path::Path;
 
-/// Tests of a ray against a triangle for each object, by which the number of its rays is chosen: some seconds on two cores.
-const TESTS: usize = 200_000_000;
+/// Tests of a ray against a triangle for each object, by which the number of its rays is chosen: some seconds on two cores. Each ray is
+/// traced from its origin and from its start.
+const TESTS: usize = 100_000_000;
 /// An intersection, which is computed exactly, takes as long as this many tests of triangles that a line misses.
 const INTERSECTION: usize = 800;
 /// Rays by which the number of intersections along a ray is estimated.
@@ -61,8 +63,6 @@ impl Report {
 /// A file that cannot be opened; cancellation.
 pub(crate) fn check(file: &Path, count: Option<usize>, monitor: &dyn Monitor) -> Result<Report, Failure> {
     let scene = bth::open(file)?;
-    // The answers with hints are those of the look-ups, whether or not these pay.
-    Hinted::Tets.choose();
     let mut report = Report::default();
     for object in 0..scene.object_count() {
         let findings = check_object(&scene, object, count, &mut report, monitor)?;
@@ -127,40 +127,37 @@ fn check_pose(
 ) -> Result<Vec<String>, Failure> {
     let view = alone.object(alone.instance(instance).object);
     monitor.stage("trace exactly", Some(starts.len() as u64));
-    let traced = trace(alone, starts, instance, monitor)?;
+    let rays: Vec<Ray> = starts.iter().map(|start| start.ray).collect();
+    let start_rays: Vec<StartRay> = starts.iter().map(|start| start.start_ray(instance)).collect();
+    let plain = trace(alone, &rays, monitor)?;
+    let from_starts = trace(alone, &start_rays, monitor)?;
     let world = World::new(alone);
     let corners_of = |id: u32| all.binary_search_by_key(&id, |t| t.id).ok().map(|row| all[row].corners);
-    let one = |(start, ways): (&Start, &Traced)| {
+    let one = |((start, plain), of_start): ((&Start, &Traced), &Traced)| {
         if monitor.cancelled() {
             return Err(Failure::Compile(Error::Cancelled));
         }
-        let truth = world.nearest(&start.ray);
-        let t = truth.as_ref().map(bth_oracle::ExactHit::t_f64);
+        let (ray, start_ray) = (&start.ray, start.start_ray(instance));
+        let (truth, from_start) = (world.nearest(ray), world.nearest_from_start(&start_ray));
+        let at = |id| intersection(ray, corners_of(id)?);
+        // The first of two triangles is that of the start.
+        let mut of_two = start_ray;
+        of_two.start.primitive.triangle = 0;
+        let at_from_start = |id| starts::intersection(&[start.triangle.corners, corners_of(id)?], &of_two, 1);
+        let t = truth.as_ref().map(ExactHit::t_f64);
         let known = bounds::known(&view, start);
-        let found = ways
-            .differing(&start.ray)
-            .or_else(|| {
-                let hit = &ways.plain;
-                let right = match &truth {
-                    None => !hit.is_hit(),
-                    Some(truth) => {
-                        hit.is_hit()
-                            && is_rounded(hit.t, truth.t_f64())
-                            && (truth.triangles.contains(&hit.primitive)
-                                || is_as_near(&start.ray, hit, truth.t_f64(), &corners_of))
-                    }
-                };
-                (!right).then(|| format!("BTH-V001: {:?}: expected t = {t:?}, found {hit:?}", start.ray))
-            })
+        let found = plain
+            .wrong(ray, truth.as_ref(), at)
+            .or_else(|| of_start.wrong(&start_ray, from_start.as_ref(), at_from_start))
             .or_else(|| {
                 let bound = known.filter(|bound| t.is_some_and(|t| bound.is_broken(t)))?;
                 let expected = format!("nothing nearer than {}", bound.distance);
-                Some(format!("BTH-F209: {:?}: expected {expected}, found t = {t:?}", start.ray))
+                Some(format!("BTH-F209: {ray:?}: expected {expected}, found t = {t:?}"))
             });
         monitor.advance(1);
         Ok((found, t.is_some(), known.is_some()))
     };
-    let results = starts.par_iter().zip(&traced).map(one).collect::<Result<Vec<_>, _>>()?;
+    let results = starts.par_iter().zip(&plain).zip(&from_starts).map(one).collect::<Result<Vec<_>, _>>()?;
     report.rays += results.len() as u64;
     report.hits += results.iter().filter(|(_, hit, _)| *hit).count() as u64;
     report.known += results.iter().filter(|(_, _, known)| *known).count() as u64;
@@ -169,67 +166,62 @@ fn check_pose(
 
 /// The answers for a ray.
 struct Traced {
-    plain: Hit,
-    hinted: Hit,
+    hit: Hit,
     single: Hit,
     any: bool,
-    any_hinted: bool,
 }
 
 impl Traced {
-    /// What differs between the ways of tracing, if anything does.
-    fn differing(&self, ray: &Ray) -> Option<String> {
-        let Traced { plain, hinted, single, any, any_hinted } = self;
+    /// What differs between the ways of tracing or from the exact hit, if anything does. `at` intersects the ray with a triangle.
+    fn wrong(
+        &self,
+        ray: &impl Debug,
+        truth: Option<&ExactHit<PrimitiveRef>>,
+        at: impl Fn(u32) -> Option<Intersection>,
+    ) -> Option<String> {
+        let Traced { hit, single, any } = self;
         let bits = |hit: &Hit| ([hit.t, hit.u, hit.v].map(f32::to_bits), hit.primitive);
-        if [hinted, single].iter().any(|hit| bits(hit) != bits(plain)) {
+        if bits(hit) != bits(single) || *any != hit.is_hit() {
             return Some(format!(
-                "BTH-V002: {ray:?}: expected {plain:?} in every way, found {hinted:?} with a hint, {single:?} alone"
+                "BTH-V002: {ray:?}: expected {hit:?} in every way, found {single:?} alone, any hit {any}"
             ));
         }
-        if [*any, *any_hinted].iter().any(|found| *found != plain.is_hit()) {
-            return Some(format!(
-                "BTH-V002: {ray:?}: expected {plain:?} in every way, found any hit {any}, with a hint {any_hinted}"
-            ));
-        }
-        None
+        let is_right = match truth {
+            None => !hit.is_hit(),
+            Some(truth) => {
+                hit.is_hit()
+                    && is_rounded(hit.t, truth.t_f64())
+                    && (truth.triangles.contains(&hit.primitive)
+                        || is_as_near(at(hit.primitive.triangle), truth.t_f64()))
+            }
+        };
+        let t = truth.map(ExactHit::t_f64);
+        (!is_right).then(|| format!("BTH-V001: {ray:?}: expected t = {t:?}, found {hit:?}"))
     }
 }
 
-/// Traces rays through the only instance in all ways.
+/// Traces rays in all ways.
 ///
 /// # Errors
 /// Cancellation.
-fn trace(
-    alone: &Scene,
-    starts: &[Start],
-    instance: u32,
-    monitor: &dyn Monitor,
-) -> Result<Vec<Traced>, Failure> {
-    let mut singles = Vec::with_capacity(starts.len());
-    let rays: Vec<Ray> = starts.iter().map(|start| start.ray).collect();
-    let hints: Vec<_> = starts.iter().map(|start| start.hint(instance)).collect();
-    let (mut plain, mut hinted) = (vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]);
-    let (mut any, mut any_hinted) = (vec![false; rays.len()], vec![false; rays.len()]);
-    for from in (0..rays.len()).step_by(BATCH) {
-        let part = from..rays.len().min(from + BATCH);
-        let (rays, hints) = (&rays[part.clone()], &hints[part.clone()]);
-        alone.batch(rays).nearest(&mut plain[part.clone()]);
-        alone.batch(rays).from(hints).nearest(&mut hinted[part.clone()]);
-        alone.batch(rays).any(&mut any[part.clone()]);
-        alone.batch(rays).from(hints).any(&mut any_hinted[part]);
-        singles.extend(rays.iter().map(|ray| alone.nearest(ray).unwrap_or(Hit::MISS)));
+fn trace<R: TraceRay>(alone: &Scene, rays: &[R], monitor: &dyn Monitor) -> Result<Vec<Traced>, Failure> {
+    let mut traced = Vec::with_capacity(rays.len());
+    let (mut hits, mut found) = ([Hit::MISS; BATCH], [false; BATCH]);
+    for rays in rays.chunks(BATCH) {
+        let (hits, found) = (&mut hits[..rays.len()], &mut found[..rays.len()]);
+        alone.batch(rays).nearest(hits);
+        alone.batch(rays).any(found);
+        let one = |(ray, (hit, any)): (&R, (&Hit, &bool))| Traced {
+            hit: *hit,
+            single: alone.nearest(ray).unwrap_or(Hit::MISS),
+            any: *any,
+        };
+        traced.extend(rays.iter().zip(hits.iter().zip(&*found)).map(one));
         if monitor.cancelled() {
             return Err(Failure::Compile(Error::Cancelled));
         }
     }
-    let one = |i: usize| Traced {
-        plain: plain[i],
-        hinted: hinted[i],
-        single: singles[i],
-        any: any[i],
-        any_hinted: any_hinted[i],
-    };
-    Ok((0..rays.len()).map(one).collect())
+    Ok(traced)
 }
 
 /// Whether t is the exact one, rounded to f32, or the next number to that, since it is rounded to f64 before.
@@ -239,8 +231,7 @@ fn is_rounded(t: f32, exact: f64) -> bool {
 }
 
 /// Whether another triangle is hit at a distance that differs by less than its rounding to f64.
-fn is_as_near(ray: &Ray, hit: &Hit, exact: f64, corners_of: &impl Fn(u32) -> Option<[[f32; 3]; 3]>) -> bool {
-    let at = corners_of(hit.primitive.triangle).and_then(|corners| intersection(ray, corners));
+fn is_as_near(at: Option<Intersection>, exact: f64) -> bool {
     at.is_some_and(|at| (to_f64(&at.t) - exact).abs() <= 1e-12 * exact.abs())
 }
 

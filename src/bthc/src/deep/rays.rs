@@ -1,6 +1,6 @@
 //! Rays that start on triangles: at corners, on edges, within, and off the surface.
 
-use bth::rays::{PrimitiveRef, Ray};
+use bth::rays::{self, PrimitiveRef, Ray, StartRay};
 use bth_oracle::Triangle;
 use bth_random::Rng;
 
@@ -12,19 +12,20 @@ pub(super) struct Start {
     pub(super) triangle: Triangle,
     /// Whether it starts exactly at a corner of the triangle, and behind what it touches there.
     pub(super) is_at_corner: bool,
-    /// Whether the hint names another triangle.
-    wrong_hint: Option<u32>,
+    /// Weights of the point on the triangle.
+    uv: [f32; 2],
 }
 
 impl Start {
-    /// The hint of the ray.
-    pub(super) fn hint(&self, instance: u32) -> PrimitiveRef {
-        PrimitiveRef { instance, triangle: self.wrong_hint.unwrap_or(self.triangle.id) }
+    /// The ray from the exact point of the triangle in an instance.
+    pub(super) fn start_ray(&self, instance: u32) -> StartRay {
+        let (primitive, [u, v]) = (PrimitiveRef { instance, triangle: self.triangle.id }, self.uv);
+        rays::Start { primitive, u, v }.ray(self.ray.direction).with_tmax(self.ray.tmax)
     }
 }
 
-/// So many rays, in part in any direction and in part to corners and edges of other triangles, in part short. First come those from
-/// corners, then those from edges, and then the others, since look-ups are used for all rays of a batch or for none.
+/// `count` rays, in part in any direction and in part to corners and edges of other triangles, in part short. First come the rays
+/// from corners, then those from edges, and then the others.
 pub(super) fn sample(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Start> {
     let mut random = Rng::new(seed);
     let kind = |i: usize| match 4 * i / count {
@@ -71,6 +72,9 @@ fn start(triangles: &[Triangle], kind: Kind, i: usize, random: &mut Rng) -> Opti
     let ray = Ray { origin, tmin, direction, tmax };
     let numbers = origin.iter().chain(&direction);
     let is_usable = numbers.clone().all(|x| x.is_finite()) && direction != [0.0; 3];
-    let wrong_hint = (i % 32 == 31).then_some(target.id);
-    is_usable.then_some(Start { ray, triangle, is_at_corner, wrong_hint })
+    // The weights of the corners a, b and c.
+    let mut weights = [0.0; 3];
+    [0, 1, 2].into_iter().zip([1.0 - u - v, u, v]).for_each(|(k, w)| weights[(first + k) % 3] = w);
+    let [_, u, v] = weights;
+    is_usable.then_some(Start { ray, triangle, is_at_corner, uv: [u, v] })
 }

@@ -2,7 +2,7 @@
 //! how many directions are free.
 
 use super::Explained;
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::{Hit, Ray, StartRay};
 use bth_compile::Result;
 use bth_compile::bvh::BinaryBvh;
 use bth_compile::costs::SelectionOutcome;
@@ -174,18 +174,10 @@ fn bounce(of: &Explained<'_>, ray: &Ray, hit: &Hit) -> Option<f64> {
     if !hit.is_hit() {
         return None;
     }
-    let (start, incoming) = (Vec3::from_array(ray.origin), Vec3::from_array(ray.direction));
+    let incoming = Vec3::from_array(ray.direction);
     let n = normal(of.mesh, hit.primitive.triangle);
-    let cosine = n.dot(incoming);
-    let direction = unit(incoming - 2.0 * cosine * n).to_array();
-    let root = &of.tree.nodes[0];
-    let diagonal = (Vec3::from_array(root.upper) - Vec3::from_array(root.lower)).length();
-    // Off the triangle by more than the rounding of the hit point, on the side of the incoming ray.
-    let lift = -2e-5 * diagonal * cosine.signum();
-    let origin = (start + hit.t * incoming + lift * n).to_array();
-    let ray = Ray::new(origin, direction);
-    let from = PrimitiveRef { instance: 0, triangle: hit.primitive.triangle };
-    let (_, steps) = of.compiled.nearest_counted(&ray, from);
+    let direction = unit(incoming - 2.0 * n.dot(incoming) * n).to_array();
+    let (_, steps) = of.compiled.nearest_counted(&StartRay::from_hit(hit, direction));
     let costs = &of.costs.profile;
     let walk = costs.record(bth_format::layout::RecordKind::Link32).surface;
     let tets =

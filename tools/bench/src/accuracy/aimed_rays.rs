@@ -37,7 +37,7 @@ pub fn set(model: &Model, target: Target, count: usize) -> RaySet {
         let Some(point) = (0..EDGE_TRIES).find_map(|_| point(model, target, &mut rng)) else { break };
         rays.extend(through(point, diagonal, &mut rng));
     }
-    RaySet { name: target.name(), any: false, coherent: false, rays, from: None }
+    RaySet { name: target.name(), any: false, coherent: false, rays, starts: None }
 }
 
 fn point(model: &Model, target: Target, rng: &mut Rng) -> Option<[f32; 3]> {

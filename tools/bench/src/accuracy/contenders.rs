@@ -128,7 +128,7 @@ impl MeasuredTracers {
     }
 
     fn add(&mut self, kind: &Kind, compiled: &Compiled, uses: Vec<(String, Isa)>) -> Result<()> {
-        // The first is the batch without hints.
+        // The first is the batch.
         let Some(contender) = structures::contenders(kind, compiled)?.into_iter().next() else {
             return Ok(());
         };

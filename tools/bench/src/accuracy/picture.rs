@@ -42,12 +42,12 @@ impl PictureSetup {
     /// the tracer's answers.
     pub fn draw(&self, model: &Model, tracer: &dyn Tracer) -> Picture {
         let mut hits = vec![Hit::MISS; self.rays.len()];
-        tracer.nearest(Batch { rays: &self.rays, from: None, coherent: true }, &mut hits);
+        tracer.nearest(Batch { rays: &self.rays, starts: None, coherent: true }, &mut hits);
         let lit: Vec<(Ray, f64)> =
             self.rays.iter().zip(&hits).map(|(ray, hit)| self.light_at(model, ray, hit)).collect();
         let to_light: Vec<Ray> = lit.iter().map(|(ray, _)| *ray).collect();
         let mut hidden = vec![false; to_light.len()];
-        tracer.any(Batch { rays: &to_light, from: None, coherent: true }, &mut hidden);
+        tracer.any(Batch { rays: &to_light, starts: None, coherent: true }, &mut hidden);
 
         let (width, height) = (self.size.0 as usize, self.size.1 as usize);
         let mut values = vec![0.0; width * height];

@@ -8,7 +8,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Ordinary sets: the run time of a tracer is the geometric mean over these.
-pub const ORDINARY: [&str; 3] = ["primary", "diffuse", "random"];
+pub const ORDINARY: [&str; 3] = ["primary", "diffuse-beside", "random"];
 /// Sets of rays that pass exactly through vertices and edges.
 pub const AIMED: [&str; 2] = ["vertices", "edges"];
 

@@ -17,7 +17,7 @@ pub fn markdown(results: &AccuracyResults) -> String {
 }
 
 const LEGEND: &str = "\
-*ns*: CPU nanoseconds a ray for the nearest hit, geometric mean over `primary`, `diffuse` and `random` rays; *aimed*: over \
+*ns*: CPU nanoseconds a ray for the nearest hit, geometric mean over `primary`, `diffuse-beside` and `random` rays; *aimed*: over \
 rays that pass exactly through vertices and middles of edges, as the errors per million of them. *Missed*: nothing was \
 found though something is hit; *leaked*: the nearest triangle was passed through, one behind it was found; *ghost*: a \
 triangle that the ray does not meet; *neighbour*: the same, but it shares a vertex with the right one. All are decided in \
@@ -92,7 +92,7 @@ fn page(model: &ModelErrors) -> String {
         "tracer",
         "ns",
         "primary",
-        "diffuse",
+        "diffuse-beside",
         "random",
         "B/tri",
         "missed",

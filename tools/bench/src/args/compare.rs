@@ -13,7 +13,8 @@ pub struct Compare {
     pub old: PathBuf,
     /// The build that may be faster.
     pub new: PathBuf,
-    /// Model files, models of `bth-scenes list` by NAME or NAME:FACES, or compiled .bth files, which are used as they are.
+    /// Model files, models of `bth-scenes list` by NAME or NAME:FACES, or compiled .bth files, which are used as they are. Builds
+    /// of other versions of the format than this program need `OLD.bth,NEW.bth`: the model as compiled for each of them.
     #[arg(required = true, value_name = "MODEL")]
     pub models: Vec<String>,
     #[command(flatten)]

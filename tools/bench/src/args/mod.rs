@@ -4,7 +4,6 @@ mod accuracy;
 mod animation;
 mod compare;
 mod costs;
-mod hints;
 mod inside;
 mod instances;
 mod load;
@@ -26,7 +25,6 @@ pub use accuracy::Accuracy;
 pub use animation::Animation;
 pub use compare::Compare;
 pub use costs::Costs;
-pub use hints::Hints;
 pub use inside::Inside;
 pub use instances::Instances;
 pub use load::{Load, LoadScenes, Probe, Start, Starts};
@@ -85,8 +83,6 @@ pub enum Command {
     Scales(Scales),
     /// Scenes that move: ours, and Embree with the same instances.
     Scenes(Scenes),
-    /// Rays in scenes that say where they start, beside the same rays without that.
-    Hints(Hints),
     /// Instances that the caller moves: setting their transforms and committing, ours and Embree's.
     Instances(Instances),
     /// Objects that deform: new positions of all vertices, ours and Embree's.

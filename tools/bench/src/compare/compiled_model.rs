@@ -1,4 +1,4 @@
-//! A model as both builds open it: compiled here, or a compiled file that is used as it is.
+//! A model as the builds open it: compiled here, or compiled files that are used as they are.
 
 use crate::model::Model;
 use crate::structures;
@@ -10,25 +10,27 @@ use tempfile::TempDir;
 /// A model and its compiled file.
 pub(super) struct CompiledModel {
     pub(super) model: Model,
-    /// The file, opened by this program: it finds the surfaces that rays start on.
+    /// The new build's file, opened by this program: it finds the surfaces that rays start on.
     pub(super) scene: Scene,
-    /// The file that both builds open.
-    pub(super) file: PathBuf,
+    /// The files that the old and the new build open.
+    pub(super) files: [PathBuf; 2],
     /// Holds the file if it was compiled here.
     _folder: Option<TempDir>,
 }
 
 impl CompiledModel {
-    /// Uses a `.bth` file as it is; compiles other models with the default options.
+    /// Uses a `.bth` file, or two with a comma between them, as they are; compiles other models with the default options.
     ///
     /// # Errors
     /// If the model cannot be read or compiled; see also [`Model::of_compiled`].
     pub(super) fn load(which: &str) -> Result<CompiledModel> {
-        let path = Path::new(which);
-        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("bth")) {
-            let scene = bth::open(path)?;
-            let model = Model::of_compiled(path, &scene)?;
-            return Ok(CompiledModel { model, scene, file: path.to_owned(), _folder: None });
+        let is_compiled = |path: &Path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("bth"));
+        let two = which.split_once(',').filter(|(old, _)| is_compiled(Path::new(old)));
+        let files = <[_; 2]>::from(two.unwrap_or((which, which))).map(PathBuf::from);
+        if is_compiled(&files[1]) {
+            let scene = bth::open(&files[1])?;
+            let model = Model::of_compiled(&files[1], &scene)?;
+            return Ok(CompiledModel { model, scene, files, _folder: None });
         }
         let model = Model::load(which)?;
         let bytes = structures::compile(&model, &structures::BTH)?.bytes;
@@ -36,7 +38,7 @@ impl CompiledModel {
         let file = folder.path().join("model.bth");
         std::fs::write(&file, &bytes)?;
         let scene = bth::from_bytes(&bytes)?;
-        Ok(CompiledModel { model, scene, file, _folder: Some(folder) })
+        Ok(CompiledModel { model, scene, files: [file.clone(), file], _folder: Some(folder) })
     }
 }
 
@@ -45,10 +47,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_compiled_file_is_used_as_it_is() {
+    fn compiled_files_are_used_as_they_are() {
         let made = CompiledModel::load("torus-knot:320").unwrap();
-        let again = CompiledModel::load(made.file.to_str().unwrap()).unwrap();
-        assert_eq!(again.file, made.file);
+        let file = made.files[0].to_str().unwrap();
+        let again = CompiledModel::load(file).unwrap();
+        assert_eq!(again.files, made.files);
+        let two = CompiledModel::load(&format!("older.bth,{file}")).unwrap();
+        assert_eq!(two.files, [PathBuf::from("older.bth"), made.files[1].clone()]);
         assert_eq!(again.model.mesh.positions, made.model.mesh.positions);
         assert_eq!(again.model.mesh.triangles, made.model.mesh.triangles);
     }

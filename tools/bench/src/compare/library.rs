@@ -82,10 +82,10 @@ pub(super) struct OpenedByBuild<'a> {
 }
 
 impl OpenedByBuild<'_> {
-    /// Nearest hits, in calls of `batch` rays, without hints.
+    /// Nearest hits, in calls of `batch` rays.
     pub(super) fn nearest(&self, rays: &[Ray], hits: &mut [Hit], batch: usize) {
         for (rays, hits) in rays.chunks(batch).zip(hits.chunks_mut(batch)) {
-            // SAFETY: rays and hits are slices of the length that is passed; the hints are null, which is allowed; the scene is open.
+            // SAFETY: rays and hits are slices of the length that is passed; the reserved argument is null; the scene is open.
             unsafe {
                 (self.build.nearest)(
                     self.scene,

@@ -1,6 +1,6 @@
 //! Whether one build of `libbth.so` is faster than another, measured in one interleaved run.
 //!
-//! Both builds are loaded into this process and trace the same rays through the same file in turn, so that other work of the
+//! Both builds are loaded into this process and trace the same rays through the same model in turn, so that other work of the
 //! machine affects both alike. The ratio of a round is the new build's CPU time over the old one's; a set's figure is the
 //! median over the rounds. The verdict is that of the geometric mean over the models, by the interval in which it lies with 95 %
 //! confidence (bootstrap over the rounds): builds that are the same must not be told apart by noise.
@@ -39,10 +39,11 @@ pub fn run(arguments: &Compare) -> Result<Verdict> {
     let [old, new] = [Build::load(&arguments.old)?, Build::load(&arguments.new)?];
     if let Some((first, second)) = names {
         let any_model = CompiledModel::load("torus-knot:320")?;
-        for (build, isa) in [(&old, first), (&new, second)] {
+        let [old_file, new_file] = &any_model.files;
+        for (build, file, isa) in [(&old, old_file, first), (&new, new_file, second)] {
             isa::select_for_libraries(isa)?;
             // A build reads the environment when it traces for the first time.
-            build.open(&any_model.file)?.any(&[Ray::new([0.0; 3], [1.0; 3])], &mut [false], 1);
+            build.open(file)?.any(&[Ray::new([0.0; 3], [1.0; 3])], &mut [false], 1);
         }
         ensure!(
             first == second || old.is_other_than(&new),
@@ -82,7 +83,8 @@ fn model(
         set.name != "miss" && arguments.sets.select(set.name) && set.rays.len() >= rays::FEWEST_TIMED
     });
 
-    let opened = [builds[0].open(&compiled.file)?, builds[1].open(&compiled.file)?];
+    let [old, new] = &compiled.files;
+    let opened = [builds[0].open(old)?, builds[1].open(new)?];
     let mut out = ModelComparison { name: model.name.clone(), sets: Vec::new() };
     for set in &sets {
         progress.show(format!("{}: {}", model.name, set.name));

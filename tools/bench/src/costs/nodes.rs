@@ -9,7 +9,7 @@ use crate::rounds::least;
 use crate::structures::{self, Use};
 use crate::tracer::{Batch, Tracer};
 use anyhow::Result;
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::{Hit, Ray};
 use bth_compile::costs::{Estimator, Start, TetWalker};
 use bth_compile::pipeline::{self, CompileOptions, Structure};
 use bth_compile::sampling::{self, SampleRay};
@@ -43,7 +43,7 @@ pub(super) struct Candidate {
     node: MeasuredNode,
     tracer: Box<dyn Tracer>,
     /// Rays from outside and from surfaces.
-    sets: [(Vec<Ray>, Vec<PrimitiveRef>); 2],
+    sets: [Vec<Ray>; 2],
 }
 
 /// The candidate nodes of a model: suitable ones, evenly spread over their sizes.
@@ -99,7 +99,7 @@ fn candidate(model: &str, node: u32, mesh: &Mesh) -> Result<Option<Candidate>> {
     let (built, _) = tets::build(mesh, &tree, &[0], &options.tets, &Silent)?;
     let [(0, tets)] = &built[..] else { return Ok(None) };
     let file = pipeline::assemble(mesh, &tree, &built, &options, &Silent)?;
-    let tracer = structures::tracer(&file.bytes, Use::Hinted)?;
+    let tracer = structures::tracer(&file.bytes, Use::Batch)?;
     let root = &tree.nodes[0];
     let outside = sampling::outside(root.lower, root.upper, RAYS, 21);
     let surface = sampling::from_surface(mesh, &tree, 0..tree.order.len(), 2 * RAYS, 22);
@@ -175,7 +175,7 @@ fn average_depth(tree: &bvh::BinaryBvh) -> f64 {
     sum / leaves.max(1.0)
 }
 
-/// Measures candidates in batches with hints, all of them in turn, so that other work of the machine affects all alike.
+/// Measures candidates in batches, all of them in turn, so that other work of the machine affects all alike.
 /// Each batch is traced once before it is timed, so that what it reads is in the caches.
 pub(super) fn time(candidates: Vec<Candidate>, rounds: usize, progress: &Progress) -> Vec<MeasuredNode> {
     let mut hits = vec![Hit::MISS; RAYS];
@@ -186,8 +186,8 @@ pub(super) fn time(candidates: Vec<Candidate>, rounds: usize, progress: &Progres
             progress.show(format!("round {round} of {rounds}: {} nodes", candidates.len()));
             said = round;
         }
-        let (rays, from) = &candidate.sets[*set];
-        let batch = Batch { rays, from: Some(from), coherent: false };
+        let rays = &candidate.sets[*set];
+        let batch = Batch { rays, starts: None, coherent: false };
         let hits = &mut hits[..rays.len()];
         candidate.tracer.nearest(batch, hits);
         Some(Clock::ThreadCpu.time(|| candidate.tracer.nearest(batch, hits)))
@@ -195,21 +195,19 @@ pub(super) fn time(candidates: Vec<Candidate>, rounds: usize, progress: &Progres
     let nanoseconds = |(row, rays): (usize, usize)| 1e9 * seconds[row].unwrap_or(0.0) / rays.max(1) as f64;
     let mut nodes = Vec::new();
     for (row, Candidate { node, sets, .. }) in candidates.into_iter().enumerate() {
-        let nanoseconds = [0, 1].map(|set| nanoseconds((2 * row + set, sets[set].0.len())));
+        let nanoseconds = [0, 1].map(|set| nanoseconds((2 * row + set, sets[set].len())));
         nodes.push(MeasuredNode { nanoseconds, ..node });
     }
     nodes
 }
 
-/// Sampled rays and the triangles that they start on, as the runtime library takes them.
-pub(crate) fn rays(samples: &[SampleRay]) -> (Vec<Ray>, Vec<PrimitiveRef>) {
+/// Sampled rays, as the runtime library takes them.
+pub(crate) fn rays(samples: &[SampleRay]) -> Vec<Ray> {
     let ray = |s: &SampleRay| Ray {
         origin: s.origin.map(|x| x as f32),
         tmin: 0.0,
         direction: s.direction.map(|x| x as f32),
         tmax: s.tmax as f32,
     };
-    let from =
-        |s: &SampleRay| s.from.map_or(PrimitiveRef::NONE, |triangle| PrimitiveRef { instance: 0, triangle });
-    (samples.iter().map(ray).collect(), samples.iter().map(from).collect())
+    samples.iter().map(ray).collect()
 }

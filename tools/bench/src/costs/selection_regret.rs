@@ -67,7 +67,7 @@ pub(super) fn measure(model: &Model, rounds: usize, progress: &Progress) -> Resu
     for nodes in &selections {
         let built: Vec<(u32, tets::TetMesh)> = nodes.iter().map(|n| (*n, meshes[n].clone())).collect();
         let file = pipeline::assemble(&model.mesh, &tree, &built, &options, &Silent)?;
-        tracers.push(structures::tracer(&file.bytes, Use::Hinted)?);
+        tracers.push(structures::tracer(&file.bytes, Use::Batch)?);
     }
     progress.show(format!("{}: {} selections", model.name, selections.len()));
     let times = mixed(model, &tracers, rounds)?;
@@ -111,7 +111,7 @@ fn mixed(model: &Model, tracers: &[Box<dyn Tracer>], rounds: usize) -> Result<Ve
     let (_, sets) = rays::sets(&Finder::new(model, &scene), &options);
     let weight = |set: &RaySet| match set.name {
         "primary" => 0.25,
-        "diffuse" | "ao" => 0.375,
+        "diffuse-beside" | "ao-beside" => 0.375,
         _ => 0.0,
     };
     let sets: Vec<&RaySet> = sets.iter().filter(|s| weight(s) > 0.0 && !s.rays.is_empty()).collect();

@@ -35,7 +35,7 @@ pub fn markdown(results: &CostsResults) -> String {
     if !results.regrets.is_empty() {
         text.push_str(
             "\n## Regret\n\nEvery selection of the suitable nodes in the three topmost levels of small models was measured: \
-             a quarter camera rays, the others bounces and ambient occlusion with hints.\n\n",
+             a quarter camera rays, the others bounces and ambient occlusion.\n\n",
         );
         text.push_str(&regrets(&results.regrets));
     }

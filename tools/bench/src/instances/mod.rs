@@ -73,7 +73,7 @@ impl Contender {
         match self {
             Contender::Ours(builder) => builder.scene().batch(rays).nearest(&mut hits),
             Contender::Embree(scene) => {
-                Tracer::nearest(scene, Batch { rays, from: None, coherent: false }, &mut hits);
+                Tracer::nearest(scene, Batch { rays, starts: None, coherent: false }, &mut hits);
             }
         }
         hits

@@ -96,7 +96,7 @@ fn probe<T: Tracer>(
 ) -> Result<StartTimes> {
     let rays = &all[..first];
     let mut hits = vec![Hit::MISS; rays.len()];
-    let batch = |rays| Batch { rays, from: None, coherent: true };
+    let batch = |rays| Batch { rays, starts: None, coherent: true };
     let (before, cpu, clock) = (storage_bytes(), process_cpu(), Instant::now());
     let tracer = start()?;
     let ready_s = clock.elapsed().as_secs_f64();

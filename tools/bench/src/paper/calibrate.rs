@@ -22,7 +22,7 @@ const ROUNDS: usize = 7;
 
 /// A profile of the scalar traversals.
 pub(super) fn profile() -> Result<Profile> {
-    let mut profile = Profile { isa: "scalar, the paper's".to_owned(), hints: false, ..Profile::default() };
+    let mut profile = Profile { isa: "scalar, the paper's".to_owned(), ..Profile::default() };
     let mut found = Vec::new();
     for name in MODELS {
         found.push(measure(&Model::load(name)?)?);
@@ -114,7 +114,7 @@ fn times(tracer: &dyn Tracer, sets: &[&[Ray]]) -> Vec<f64> {
     let most = sets.iter().map(|set| set.len()).max().unwrap_or(0);
     let mut hits = vec![Hit::MISS; most];
     let seconds = least(sets, ROUNDS, |_, rays| {
-        let batch = Batch { rays, from: None, coherent: true };
+        let batch = Batch { rays, starts: None, coherent: true };
         Some(Clock::ThreadCpu.time(|| tracer.nearest(batch, &mut hits[..rays.len()])))
     });
     sets.iter().zip(seconds).map(|(rays, s)| 1e9 * s.unwrap_or(0.0) / rays.len().max(1) as f64).collect()

@@ -63,7 +63,7 @@ impl Rendering<'_> {
         let mut hits = vec![Hit::MISS; rays.len()];
         let mut differ = vec![0; built.len()];
         let seconds = least(&structures, self.rounds, |round, &structure| {
-            let batch = Batch { rays, from: None, coherent: true };
+            let batch = Batch { rays, starts: None, coherent: true };
             let trace = |b: Batch<'_>, h: &mut [Hit]| built[structure].tracer.nearest(b, h);
             // CPU time, as other jobs may take turns on the same cores.
             let before = process_cpu();

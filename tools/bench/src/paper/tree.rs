@@ -266,7 +266,7 @@ mod tests {
         let mesh = Mesh { positions: model.positions, triangles: model.triangles, ..Mesh::default() };
         let (bvh, _) = bvh::build(&mesh, &bvh::BvhOptions::default(), &Silent).unwrap();
         let root = &bvh.nodes[0];
-        let (outside, _) = rays(&sampling::outside(root.lower, root.upper, 150, 1));
+        let outside = rays(&sampling::outside(root.lower, root.upper, 150, 1));
         let eye: [f32; 3] = std::array::from_fn(|k| 0.43 * root.lower[k] + 0.57 * root.upper[k]);
         let inside: Vec<Ray> = outside.iter().map(|r| Ray { origin: eye, ..*r }).collect();
         agrees(&mesh, &PaperTree::<Tet20>::new(&mesh, &bvh, &[]), &outside);

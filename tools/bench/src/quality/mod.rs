@@ -21,10 +21,10 @@ use crate::output::{Head, Report};
 use crate::progress::Progress;
 use crate::rays::{self, Finder, RaySet};
 use crate::speed::Answers;
-use crate::structures;
+use crate::structures::{self, Use};
 use anyhow::{Result, bail, ensure};
 use bth::Scene;
-use bth::rays::{Hit, PrimitiveRef};
+use bth::rays::Hit;
 use std::collections::BTreeMap;
 use variations::BuiltVariation;
 
@@ -90,7 +90,8 @@ fn measure_model(
     let counted: Vec<RaySet> = sets.iter().filter(|s| STEPS_OF.contains(&s.name)).cloned().collect();
     sets.retain(|s| arguments.sets.select(s.name) && s.rays.len() >= rays::FEWEST_TIMED);
 
-    let expected: Vec<Answers> = sets.iter().map(|s| Answers::of_scene(&plain, s)).collect();
+    let tracer = structures::tracer(&built[0].1.bytes, Use::Batch)?;
+    let expected: Vec<Answers> = sets.iter().map(|s| Answers::of(&*tracer, s)).collect();
     let mut rows = Vec::new();
     for (name, built) in &built {
         let scene = bth::from_bytes(&built.bytes)?;
@@ -144,7 +145,7 @@ fn steps(scene: &Scene, rays: &[bth::rays::Ray]) -> [f64; 2] {
     let mut sum = bth::Steps::default();
     let mut count = 0;
     for ray in rays.iter().step_by(step) {
-        sum += scene.nearest_counted(ray, PrimitiveRef::NONE).1;
+        sum += scene.nearest_counted(ray).1;
         count += 1;
     }
     [sum.nodes, sum.leaves].map(|n| f64::from(n) / f64::from(count.max(1)))

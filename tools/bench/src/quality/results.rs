@@ -7,7 +7,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Ray sets of which the visited nodes and leaves are counted.
-pub(super) const STEPS_OF: [&str; 2] = ["primary", "diffuse"];
+pub(super) const STEPS_OF: [&str; 2] = ["primary", "diffuse-beside"];
 
 /// Everything that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]

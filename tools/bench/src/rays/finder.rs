@@ -7,8 +7,8 @@ use bth::Scene;
 use bth::rays::{Hit, Ray};
 use glam::DVec3;
 
-/// By how much secondary rays are lifted off the surface that they start on, relative to the diagonal of the model, as
-/// renderers do it. On models far from the origin it is less than the resolution of f32.
+/// How far the rays of the sets `-beside` start off the surface, relative to the diagonal of the model. On models far from the
+/// origin it is less than the resolution of f32.
 pub const LIFT: f64 = 2e-5;
 
 /// A model and the compiled scene of it.
@@ -29,17 +29,24 @@ impl<'a> Finder<'a> {
     /// Nearest hits.
     pub(super) fn nearest(&self, rays: &[Ray]) -> Vec<Hit> {
         let mut hits = vec![Hit::MISS; rays.len()];
-        let batch = Batch { rays, from: None, coherent: false };
+        let batch = Batch { rays, starts: None, coherent: false };
         spread(batch, &mut hits, self.threads, BLOCK, |b, h| self.scene.batch(b.rays).nearest(h));
         hits
     }
 
-    /// Where a ray goes on from a hit: the point, lifted off the surface to the ray's side, and the unit
-    /// normal to that side.
-    pub(super) fn start(&self, ray: &Ray, hit: &Hit) -> (DVec3, DVec3) {
+    /// Where a ray goes on from a hit: the point, and the same lifted off the surface to the ray's side; and the unit normal to
+    /// that side. The point is computed in f64, and rounded once when a ray is made.
+    pub(super) fn points(&self, ray: &Ray, hit: &Hit) -> ([DVec3; 2], DVec3) {
         let normal = self.model.normal(hit.primitive.triangle);
         let direction = position(ray.direction);
         let normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
-        (position(ray.origin) + direction * f64::from(hit.t) + normal * self.lift, normal)
+        let point = position(ray.origin) + direction * f64::from(hit.t);
+        ([point, point + normal * self.lift], normal)
+    }
+
+    /// The point lifted off the surface, and the normal.
+    pub(super) fn beside(&self, ray: &Ray, hit: &Hit) -> (DVec3, DVec3) {
+        let ([_, beside], normal) = self.points(ray, hit);
+        (beside, normal)
     }
 }

@@ -7,12 +7,17 @@
 //! | `diffuse` | nearest | from each primary hit, cosine-weighted |
 //! | `ao` | any | four from each primary hit, cosine-weighted, 5 % of the diagonal long |
 //! | `shadow` | any | from each primary hit that faces it to a point light |
+//! | `diffuse-beside`, `ao-beside`, `shadow-beside` | the same | the same, but the start is a little off the surface |
 //! | `random` | nearest | chords between random points of a sphere around the model |
 //! | `miss` | nearest | such chords that cross the bounding box and hit nothing |
+//!
+//! Rays of `diffuse`, `ao` and `shadow` start at the hit, rounded to f32, with a tmin of 0: they may hit the triangle that they
+//! leave. The sets know the exact starts, too.
 
 mod camera;
 mod directions;
 mod finder;
+pub mod recorded;
 mod viewpoint;
 
 pub use camera::Camera;
@@ -23,13 +28,24 @@ pub use viewpoint::View;
 
 use crate::model::Bounds;
 use crate::tracer::Batch;
-use bth::rays::{PrimitiveRef, Ray};
+use bth::rays::{Ray, Start};
 use bth_random::Rng;
 use glam::DVec3;
 use viewpoint::CameraHits;
 
 /// Names of the sets, in order.
-pub const NAMES: [&str; 7] = ["primary", "closeup", "diffuse", "ao", "shadow", "random", "miss"];
+pub const NAMES: [&str; 10] = [
+    "primary",
+    "closeup",
+    "diffuse",
+    "diffuse-beside",
+    "ao",
+    "ao-beside",
+    "shadow",
+    "shadow-beside",
+    "random",
+    "miss",
+];
 
 /// Pixels of the cameras that rays are taken from.
 pub const PICTURE_SIZE: (u32, u32) = (1024, 576);
@@ -54,14 +70,14 @@ pub struct RaySet {
     pub coherent: bool,
     /// The rays, model space.
     pub rays: Vec<Ray>,
-    /// For each ray the triangle that it starts on, if the rays start on triangles.
-    pub from: Option<Vec<PrimitiveRef>>,
+    /// For each ray where it starts on the surface, if the rays start at hits.
+    pub starts: Option<Vec<Start>>,
 }
 
 impl RaySet {
     /// All rays as a batch.
     pub fn batch(&self) -> Batch<'_> {
-        Batch { rays: &self.rays, from: self.from.as_deref(), coherent: self.coherent }
+        Batch { rays: &self.rays, starts: self.starts.as_deref(), coherent: self.coherent }
     }
 
     /// About `most` of the rays at most: whole runs of neighbours, evenly spread over the set.
@@ -76,9 +92,9 @@ impl RaySet {
         };
         let mut index = 0;
         self.rays.retain(|_| keep(&mut index));
-        if let Some(from) = &mut self.from {
+        if let Some(starts) = &mut self.starts {
             index = 0;
-            from.retain(|_| keep(&mut index));
+            starts.retain(|_| keep(&mut index));
         }
         self
     }
@@ -106,20 +122,26 @@ pub fn sets(finder: &Finder<'_>, options: &Options) -> (View, Vec<RaySet>) {
     };
     let count = seen.rays.len();
     let closeup = viewpoint::close_up(finder, diagonal, &seen).rays();
-    let [diffuse, ao, shadow] = secondary(finder, &seen, diagonal, light);
+    let secondary = secondary(finder, &seen, diagonal, light);
     let chords = chords(&bounds, count, &mut Rng::new(3));
     let miss = misses(finder, &bounds, count, &mut Rng::new(4));
 
-    let set = |name, any, coherent, rays, from| RaySet { name, any, coherent, rays, from };
-    let sets = vec![
-        set("primary", false, true, seen.rays, None),
-        set("closeup", false, true, closeup, None),
-        set("diffuse", false, false, diffuse.0, Some(diffuse.1)),
-        set("ao", true, false, ao.0, Some(ao.1)),
-        set("shadow", true, true, shadow.0, Some(shadow.1)),
-        set("random", false, false, chords, None),
-        set("miss", false, false, miss, None),
+    let set = |name, any, coherent, rays, starts| RaySet { name, any, coherent, rays, starts };
+    let mut sets =
+        vec![set("primary", false, true, seen.rays, None), set("closeup", false, true, closeup, None)];
+    let kinds = [
+        (["diffuse", "diffuse-beside"], false, false),
+        (["ao", "ao-beside"], true, false),
+        (["shadow", "shadow-beside"], true, true),
     ];
+    for (([name, beside], any, coherent), Secondary { rays: [at_hit, off], starts }) in
+        kinds.into_iter().zip(secondary)
+    {
+        sets.push(set(name, any, coherent, at_hit, Some(starts)));
+        sets.push(set(beside, any, coherent, off, None));
+    }
+    sets.push(set("random", false, false, chords, None));
+    sets.push(set("miss", false, false, miss, None));
     (view, sets.into_iter().map(|s| s.thinned(options.most)).collect())
 }
 
@@ -142,26 +164,36 @@ fn trace_camera(finder: &Finder<'_>, options: &Options) -> (View, CameraHits) {
     (view, seen)
 }
 
-type Started = (Vec<Ray>, Vec<PrimitiveRef>);
+/// Secondary rays of one kind.
+#[derive(Default)]
+struct Secondary {
+    /// The rays from the hits, and the same from a little off the surface.
+    rays: [Vec<Ray>; 2],
+    starts: Vec<Start>,
+}
 
 /// Bounces, ambient occlusion and shadow rays from what the camera sees.
-fn secondary(finder: &Finder<'_>, seen: &CameraHits, diagonal: f64, light: DVec3) -> [Started; 3] {
+fn secondary(finder: &Finder<'_>, seen: &CameraHits, diagonal: f64, light: DVec3) -> [Secondary; 3] {
     let (mut bounces, mut occlusion) = (Rng::new(1), Rng::new(2));
-    let mut sets = [const { (Vec::new(), Vec::new()) }; 3];
-    let mut push = |set: usize, primitive: PrimitiveRef, ray: Ray| {
-        sets[set].0.push(ray);
-        sets[set].1.push(primitive);
-    };
+    let mut sets: [Secondary; 3] = Default::default();
     for (ray_in, hit) in seen.rays.iter().zip(&seen.hits).filter(|(_, h)| h.is_hit()) {
-        let (point, normal) = finder.start(ray_in, hit);
-        push(0, hit.primitive, ray(point, cosine_weighted(&mut bounces, normal), f64::INFINITY));
+        let (points, normal) = finder.points(ray_in, hit);
+        let mut push = |set: usize, to: &dyn Fn(DVec3) -> (DVec3, f64)| {
+            for (rays, point) in sets[set].rays.iter_mut().zip(points) {
+                let (direction, tmax) = to(point);
+                rays.push(ray(point, direction, tmax));
+            }
+            sets[set].starts.push(hit.start());
+        };
+        let direction = cosine_weighted(&mut bounces, normal);
+        push(0, &|_| (direction, f64::INFINITY));
         for _ in 0..AO_RAYS {
-            push(1, hit.primitive, ray(point, cosine_weighted(&mut occlusion, normal), AO_REACH * diagonal));
+            let direction = cosine_weighted(&mut occlusion, normal);
+            push(1, &|_| (direction, AO_REACH * diagonal));
         }
-        let to_light = light - point;
-        if to_light.dot(normal) > 0.0 {
+        if (light - points[1]).dot(normal) > 0.0 {
             // The ray ends just before the light.
-            push(2, hit.primitive, ray(point, to_light.normalize(), to_light.length() * (1.0 - 1e-4)));
+            push(2, &|point| ((light - point).normalize(), (light - point).length() * (1.0 - 1e-4)));
         }
     }
     sets
@@ -205,7 +237,7 @@ mod tests {
     fn few_rays_of_a_picture_come_from_all_columns() {
         // The origin tells the number of the ray in a picture whose rows of tiles are 64 runs long.
         let rays = (0..1 << 19).map(|i| Ray::new([i as f32, 0.0, 0.0], [0.0, 0.0, 1.0])).collect();
-        let set = RaySet { name: NAMES[0], any: false, coherent: true, rays, from: None };
+        let set = RaySet { name: NAMES[0], any: false, coherent: true, rays, starts: None };
         for most in [64 << 7, 64 << 6, 64 << 5] {
             let thinned = set.clone().thinned(most);
             let mut columns: Vec<u32> =

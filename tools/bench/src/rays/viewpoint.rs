@@ -50,7 +50,7 @@ pub(super) fn outside(finder: &Finder<'_>, bounds: &Bounds, size: (u32, u32)) ->
     for from in SIDES {
         let seen = look(from);
         let hit = seen.rays.iter().zip(&seen.hits).filter(|(_, h)| h.is_hit());
-        let starts: Vec<bool> = hit.map(|(r, h)| bounds.holds(finder.start(r, h).0)).collect();
+        let starts: Vec<bool> = hit.map(|(r, h)| bounds.holds(finder.beside(r, h).0)).collect();
         if 2 * starts.iter().filter(|holds| **holds).count() > starts.len() {
             return seen;
         }
@@ -95,7 +95,7 @@ pub(super) fn close_up(finder: &Finder<'_>, diagonal: f64, seen: &CameraHits) ->
     let central = |i: &usize| front.dot(crate::model::position(seen.rays[*i].direction));
     let hit = (0..seen.hits.len()).filter(|i| seen.hits[*i].is_hit());
     let Some(middle) = hit.max_by(|i, j| central(i).total_cmp(&central(j))) else { return seen.camera };
-    let (point, normal) = finder.start(&seen.rays[middle], &seen.hits[middle]);
+    let (point, normal) = finder.beside(&seen.rays[middle], &seen.hits[middle]);
     let (side, _) = perpendicular(normal);
     Camera {
         eye: point + (normal * 0.6 + side * 0.8) * (0.04 * diagonal),

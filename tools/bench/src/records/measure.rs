@@ -5,6 +5,7 @@ use super::row::Row;
 use crate::args::{Models, RunOptions, SeenFrom, Speed};
 use crate::machine;
 use crate::names::Names;
+use crate::output::note;
 use crate::rivals::embree;
 use crate::rounds::geometric_mean;
 use crate::speed::{self, SpeedResults, ThreadsRun};
@@ -24,14 +25,24 @@ pub(super) fn measure(definition: &Definition, models: &Path, quick: bool) -> Re
     }
     let model = |name: &String| {
         let file = models.join(name);
-        if file.exists() { file.to_string_lossy().into_owned() } else { name.clone() }
+        if file.exists() {
+            return Some(file.to_string_lossy().into_owned());
+        }
+        if name.ends_with('/') {
+            note(&format!(
+                "{name}: no such folder of recorded rays: skipped (tools/bench/record_rays/run makes it)"
+            ));
+            return None;
+        }
+        Some(name.clone())
     };
+    let models: Vec<String> = definition.models.iter().filter_map(model).collect();
+    if models.is_empty() {
+        return Ok(Vec::new());
+    }
     let names = |names: &[String]| names.join(",").parse::<Names>().unwrap_or_default();
     let arguments = Speed {
-        models: Models {
-            models: definition.models.iter().map(model).collect(),
-            seen_from: SeenFrom::default(),
-        },
+        models: Models { models, seen_from: SeenFrom::default() },
         rays: definition.rays,
         rounds: definition.rounds,
         threads: definition.threads.clone(),
@@ -42,16 +53,20 @@ pub(super) fn measure(definition: &Definition, models: &Path, quick: bool) -> Re
     Ok(rows_of_speed(&definition.benchmark, definition.rounds, &speed::measure(&arguments)?))
 }
 
-/// Unit of the speed of rays that say where they start, relative to the same rays through the same file that do not.
-const UNHINTED: &str = "times unhinted";
+/// Unit of the speed of rays from exact starts, relative to the same file and to rays that start a little off the surface.
+const BESIDE: &str = "times beside";
 
-/// Millions of rays per second of the tracer that is told nothing and else is the same, for a tracer that is told where rays start.
-fn rate_without_hints(run: &ThreadsRun, tracer: &str, set: &str) -> Option<f64> {
-    let base = tracer.strip_suffix(" from")?;
-    run.tracers.iter().find(|t| t.name == base)?.mrays_per_s.get(set).copied()
+/// Millions of rays per second that are traced as usual and start a little off the surface, for a tracer that takes exact starts.
+fn rate_beside(run: &ThreadsRun, tracer: &str, set: &str) -> Option<f64> {
+    let base = tracer.replace(" start", "");
+    let other = run.tracers.iter().find(|t| t.name == base && t.name != tracer)?;
+    other.mrays_per_s.get(format!("{set}-beside").as_str()).copied()
 }
 
-/// Rays per second and bytes of every tracer, what hints are worth, and means over the models relative to Embree where it was measured.
+/// Tracer, whether it is ours, set, threads and unit; and the ratios of the models.
+type Ratios<'a> = ((&'a str, bool, &'a str, usize, &'a str), Vec<f64>);
+
+/// Rays per second and bytes of every tracer, what exact starts take, and means over the models.
 fn rows_of_speed(benchmark: &str, rounds: usize, record: &SpeedResults) -> Vec<Row> {
     let commit = record.head.commit.clone().or_else(machine::commit).unwrap_or_else(|| "?".to_owned());
     let commit = commit.split(' ').next().unwrap_or("?").to_owned();
@@ -71,7 +86,7 @@ fn rows_of_speed(benchmark: &str, rounds: usize, record: &SpeedResults) -> Vec<R
             rounds,
         };
     let mut rows = Vec::new();
-    let mut ratios: Vec<(String, bool, String, usize, Vec<f64>)> = Vec::new();
+    let mut ratios: Vec<Ratios> = Vec::new();
     for model in &record.models {
         for run in &model.runs {
             let base = run.tracers.iter().find(|t| t.name == embree::NAME);
@@ -83,30 +98,26 @@ fn rows_of_speed(benchmark: &str, rounds: usize, record: &SpeedResults) -> Vec<R
                 }
                 for (set, speed) in &tracer.mrays_per_s {
                     rows.push(row(name, ours, &model.name, set, run.threads, *speed, "Mrays/s"));
-                    if let Some(without) = rate_without_hints(run, name, set) {
-                        let gain = speed / without;
-                        rows.push(row(name, ours, &model.name, set, run.threads, gain, UNHINTED));
-                    }
-                    let Some(other) = base.and_then(|base| base.mrays_per_s.get(set)) else { continue };
-                    let of = |r: &&mut (String, bool, String, usize, Vec<f64>)| {
-                        r.0 == name && r.2 == *set && r.3 == run.threads
-                    };
-                    match ratios.iter_mut().find(of) {
-                        Some(found) => found.4.push(speed / other),
-                        None => {
-                            let first = vec![speed / other];
-                            ratios.push((name.to_owned(), ours, (*set).to_owned(), run.threads, first));
+                    let beside = rate_beside(run, name, set).map(|other| speed / other);
+                    rows.extend(beside.map(|x| row(name, ours, &model.name, set, run.threads, x, BESIDE)));
+                    let embree = base.and_then(|base| base.mrays_per_s.get(set)).map(|other| speed / other);
+                    for (unit, ratio) in [("times embree", embree), (BESIDE, beside)] {
+                        let Some(ratio) = ratio else { continue };
+                        let of = (name, ours, *set, run.threads, unit);
+                        match ratios.iter_mut().find(|(key, _)| *key == of) {
+                            Some((_, found)) => found.push(ratio),
+                            None => ratios.push((of, vec![ratio])),
                         }
                     }
                 }
             }
         }
     }
-    for (name, ours, set, threads, ratios) in ratios {
+    for ((name, ours, set, threads, unit), ratios) in ratios {
         let least = ratios.iter().copied().reduce(f64::min);
         let greatest = ratios.iter().copied().reduce(f64::max);
         let Some(mean) = geometric_mean(ratios) else { continue };
-        let mean = row(&name, ours, "mean", &set, threads, mean, "times embree");
+        let mean = row(name, ours, "mean", set, threads, mean, unit);
         rows.push(Row { low: least, high: greatest, ..mean });
     }
     rows

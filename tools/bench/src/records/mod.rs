@@ -32,6 +32,9 @@ pub fn record(arguments: &RecordRows) -> Result<()> {
         std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     }
     let rows = measure::measure(&definition, &arguments.models, arguments.quick)?;
+    if rows.is_empty() {
+        return Ok(());
+    }
     let text: String = rows.iter().fold(String::new(), |mut text, row| {
         let _ = writeln!(text, "{}", row.line());
         text

@@ -20,9 +20,11 @@ pub struct Rival {
 }
 
 /// All rivals, in the order of the tables.
-pub const RIVALS: [Rival; 10] = [
+pub const RIVALS: [Rival; 12] = [
     Rival { name: embree::NAME, build: |m, n, t| embree::contender(m, n, &embree::DEFAULT, t) },
     Rival { name: "embree robust", build: |m, n, t| embree::contender(m, n, &embree::ROBUST, t) },
+    Rival { name: "embree own", build: |m, n, t| embree::contender(m, n, &embree::OWN, t) },
+    Rival { name: "embree robust own", build: |m, n, t| embree::contender(m, n, &embree::ROBUST_OWN, t) },
     Rival { name: "embree compact", build: |m, n, t| embree::contender(m, n, &embree::COMPACT, t) },
     Rival { name: "embree hq packet16", build: |m, n, t| embree::contender(m, n, &embree::PACKETS, t) },
     Rival { name: "embree sse4.2", build: |m, n, t| embree::contender(m, n, &embree::SSE4, t) },

@@ -19,7 +19,7 @@ pub(super) struct ContenderKind {
 }
 
 enum How {
-    /// Compiled like this, traced with hints in batches of so many rays.
+    /// Compiled like this, traced in batches of so many rays.
     Ours(fn(&mut CompileOptions), usize),
     Embree(Variant),
 }
@@ -150,7 +150,7 @@ impl Moving for OurScene {
 
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
         for (batch, hits) in batch.chunks(self.1).zip(hits.chunks_mut(self.1)) {
-            self.0.batch(batch.rays).from(batch.from).nearest(hits);
+            self.0.batch(batch.rays).nearest(hits);
         }
     }
 }

@@ -1,11 +1,11 @@
 //! The rays of a frame: the camera's, and those of the diffuse bounces after it.
 
 use crate::model::position;
-use crate::rays::{AO_RAYS, AO_REACH, Camera, LIFT, cosine_weighted, ray};
+use crate::rays::{Camera, LIFT, cosine_weighted, ray};
 use crate::tracer::Batch;
 use anyhow::{Context, Result, ensure};
 use bth::Scene;
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::{Hit, Ray};
 use bth_format::layout::NONE;
 use bth_random::Rng;
 use glam::DVec3;
@@ -18,7 +18,6 @@ const SAME: f32 = 1e-4;
 /// Rays of one kind.
 pub(crate) struct FrameRaySet {
     pub(crate) rays: Vec<Ray>,
-    from: Option<Vec<PrimitiveRef>>,
     coherent: bool,
     /// The answers of our plain BVH.
     expected: Vec<Hit>,
@@ -27,19 +26,17 @@ pub(crate) struct FrameRaySet {
 /// The rays of a frame, by [`super::SETS`].
 pub(crate) struct FrameRays {
     pub(crate) sets: [FrameRaySet; 3],
-    /// Ambient occlusion rays from what the camera sees.
-    pub(crate) occlusion: FrameRaySet,
 }
 
 impl FrameRaySet {
-    fn of(scene: &Scene, rays: Vec<Ray>, from: Option<Vec<PrimitiveRef>>, coherent: bool) -> FrameRaySet {
+    fn of(scene: &Scene, rays: Vec<Ray>, coherent: bool) -> FrameRaySet {
         let mut expected = vec![Hit::MISS; rays.len()];
         scene.batch(&rays).nearest(&mut expected);
-        FrameRaySet { rays, from, coherent, expected }
+        FrameRaySet { rays, coherent, expected }
     }
 
     pub(crate) fn batch(&self) -> Batch<'_> {
-        Batch { rays: &self.rays, from: self.from.as_deref(), coherent: self.coherent }
+        Batch { rays: &self.rays, starts: None, coherent: self.coherent }
     }
 
     /// Number of answers that differ: for ours in any bit, for rivals in whether or where something is hit.
@@ -64,38 +61,22 @@ impl FrameRays {
     /// The rays of a scene's camera at the scene's time.
     pub(crate) fn of(scene: &Scene, size: (u32, u32)) -> Result<FrameRays> {
         let (camera, diagonal) = camera(scene, size)?;
-        let first = FrameRaySet::of(scene, camera.rays(), None, true);
+        let first = FrameRaySet::of(scene, camera.rays(), true);
         let mut rng = Rng::new(1);
         let lift = LIFT * diagonal;
-        let (rays, from) = onward(scene, &first.rays, &first.expected, lift, &mut rng);
-        let second = FrameRaySet::of(scene, rays, Some(from), false);
-        let (mut later, mut from): (Vec<Ray>, Vec<PrimitiveRef>) = Default::default();
+        let rays = onward(scene, &first.rays, &first.expected, lift, &mut rng);
+        let second = FrameRaySet::of(scene, rays, false);
+        let mut later = Vec::new();
         let (mut rays, mut hits) = (second.rays.clone(), second.expected.clone());
         for _ in 1..BOUNCES {
-            let (next, starts) = onward(scene, &rays, &hits, lift, &mut rng);
-            let set = FrameRaySet::of(scene, next, None, false);
+            let next = onward(scene, &rays, &hits, lift, &mut rng);
+            let set = FrameRaySet::of(scene, next, false);
             later.extend(&set.rays);
-            from.extend(starts);
             (rays, hits) = (set.rays, set.expected);
         }
-        let third = FrameRaySet::of(scene, later, Some(from), false);
-        let occlusion = occlusion(scene, &first, diagonal, &mut Rng::new(2));
-        Ok(FrameRays { sets: [first, second, third], occlusion })
+        let third = FrameRaySet::of(scene, later, false);
+        Ok(FrameRays { sets: [first, second, third] })
     }
-}
-
-/// Short rays from the hits of other rays, several from each.
-fn occlusion(scene: &Scene, first: &FrameRaySet, diagonal: f64, rng: &mut Rng) -> FrameRaySet {
-    let (mut all, mut starts) = (Vec::new(), Vec::new());
-    for (ray, hit) in first.rays.iter().zip(&first.expected) {
-        for _ in 0..AO_RAYS {
-            let (rays, from) = onward(scene, &[*ray], &[*hit], LIFT * diagonal, rng);
-            let tmax = (AO_REACH * diagonal) as f32;
-            all.extend(rays.into_iter().map(|ray| Ray { tmax, ..ray }));
-            starts.extend(from);
-        }
-    }
-    FrameRaySet::of(scene, all, Some(starts), false)
 }
 
 /// The first camera of the scene, or one that frames all of it; and the diagonal of the visible instances' box.
@@ -123,14 +104,8 @@ fn camera(scene: &Scene, size: (u32, u32)) -> Result<(Camera, f64)> {
     Ok((camera, diagonal))
 }
 
-/// Cosine-weighted rays from the hits of other rays, and the triangles that they start on.
-fn onward(
-    scene: &Scene,
-    rays: &[Ray],
-    hits: &[Hit],
-    lift: f64,
-    rng: &mut Rng,
-) -> (Vec<Ray>, Vec<PrimitiveRef>) {
+/// Cosine-weighted rays from a little off the hits of other rays.
+fn onward(scene: &Scene, rays: &[Ray], hits: &[Hit], lift: f64, rng: &mut Rng) -> Vec<Ray> {
     let onward = rays.iter().zip(hits).filter(|(_, hit)| hit.is_hit()).map(|(from, hit)| {
         let direction = position(from.direction);
         let object = scene.object(scene.object_of(hit.primitive.instance));
@@ -140,7 +115,7 @@ fn onward(
         let normal = DVec3::from_array(normal).normalize();
         let normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
         let point = position(from.origin) + direction * f64::from(hit.t) + normal * lift;
-        (ray(point, cosine_weighted(rng, normal), f64::INFINITY), hit.primitive)
+        ray(point, cosine_weighted(rng, normal), f64::INFINITY)
     });
-    onward.unzip()
+    onward.collect()
 }

@@ -8,7 +8,7 @@ mod results;
 mod source;
 mod tables;
 
-pub(crate) use frame_rays::{FrameRaySet, FrameRays};
+pub(crate) use frame_rays::FrameRays;
 pub use results::{ContenderRow, SceneTimes, ScenesResults};
 pub(crate) use source::{Source, compiled};
 pub use tables::markdown;

@@ -9,9 +9,9 @@ use crate::rivals::embree;
 /// The tracers that a chart has, if they were measured; the table has all. Embree's single rays are the line at 1.
 const SHOWN: [&str; 8] = [
     "bth",
-    "bth from",
+    "bth start",
     "bvh",
-    "tets link32 from",
+    "tets link32 start",
     "embree robust",
     "embree hq packet16",
     "tinybvh bvh8 hq",

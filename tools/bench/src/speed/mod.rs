@@ -14,13 +14,14 @@ use crate::clock::Clock;
 use crate::model::Model;
 use crate::output::{Head, Report, note};
 use crate::progress::Progress;
-use crate::rays::{self, Finder, RaySet};
+use crate::rays::{self, Finder, RaySet, recorded};
 use crate::rounds::medians;
-use crate::tracer::Contender;
+use crate::tracer::{Contender, Starting, Tracer};
 use crate::{rivals, structures};
 use anyhow::{Result, bail, ensure};
-use bth::rays::{Hit, PrimitiveRef};
+use bth::rays::{Hit, PrimitiveRef, Start};
 use std::collections::BTreeMap;
+use std::path::Path;
 
 /// Measures, prints and writes the report.
 ///
@@ -72,8 +73,9 @@ fn check_names(arguments: &Speed) -> Result<()> {
     if let Some(name) = arguments.tracers.unknown(&all).first() {
         bail!("--tracer {name}: there are {}", all.join(", "));
     }
-    if let Some(name) = arguments.sets.unknown(&rays::NAMES).first() {
-        bail!("--set {name}: there are {}", rays::NAMES.join(", "));
+    let sets = [rays::NAMES.as_slice(), &recorded::NAMES].concat();
+    if let Some(name) = arguments.sets.unknown(&sets).first() {
+        bail!("--set {name}: there are {}", sets.join(", "));
     }
     Ok(())
 }
@@ -85,11 +87,18 @@ fn measure_model(which: &str, arguments: &Speed, rounds: usize, progress: &Progr
     let scene = bth::from_bytes(&bvh.bytes)?;
 
     progress.show(format!("{}: making rays", model.name));
-    let size = if arguments.run.quick { rays::QUICK_PICTURE_SIZE } else { rays::PICTURE_SIZE };
-    let options = rays::Options { size, most: arguments.rays, view: arguments.models.seen_from.view() };
-    let (view, mut sets) = rays::sets(&Finder::new(&model, &scene), &options);
+    let (view, mut sets) = if Path::new(which).is_dir() {
+        (None, recorded::sets(Path::new(which), &model, &scene, arguments.rays)?)
+    } else {
+        let size = if arguments.run.quick { rays::QUICK_PICTURE_SIZE } else { rays::PICTURE_SIZE };
+        let options = rays::Options { size, most: arguments.rays, view: arguments.models.seen_from.view() };
+        let (view, sets) = rays::sets(&Finder::new(&model, &scene), &options);
+        (Some(view), sets)
+    };
     sets.retain(|s| arguments.sets.select(s.name) && s.rays.len() >= rays::FEWEST_TIMED);
-    let expected: Vec<Answers> = sets.iter().map(|s| Answers::of_scene(&scene, s)).collect();
+    let expected = sets.iter().map(|set| Expected::new(&bvh.bytes, set)).collect::<Result<Vec<_>>>()?;
+    let own_hits = sets.iter().zip(&expected);
+    let own_hits = own_hits.filter_map(|(s, e)| Some((s.name, e.own_hits(s.starts.as_ref()?)))).collect();
 
     let most_threads = arguments.threads.iter().copied().max().unwrap_or(1);
     let (contenders, notes) = contenders::build(&model, bvh, &arguments.tracers, most_threads, progress)?;
@@ -98,7 +107,7 @@ fn measure_model(which: &str, arguments: &Speed, rounds: usize, progress: &Progr
         let mut run = ThreadsRun::new(threads, &contenders);
         for (set, expected) in sets.iter().zip(&expected) {
             progress.show(format!("{}: {} on {threads} thread(s)", model.name, set.name));
-            measure_set(set, expected, &contenders, rounds, &mut run);
+            measure_set(set, expected, &contenders, rounds, &mut run, view.is_none());
         }
         runs.push(run);
     }
@@ -107,6 +116,7 @@ fn measure_model(which: &str, arguments: &Speed, rounds: usize, progress: &Progr
         triangles: model.triangles(),
         view,
         rays: sets.iter().map(|s| (s.name, s.rays.len())).collect(),
+        own_hits,
         structures: notes.structures,
         left_out: notes.left_out,
         runs,
@@ -118,19 +128,20 @@ const LEAST_SECONDS: f64 = 0.1;
 
 fn measure_set(
     set: &RaySet,
-    expected: &Answers,
+    expected: &Expected,
     contenders: &[Contender],
     rounds: usize,
     run: &mut ThreadsRun,
+    count_others: bool,
 ) {
     let clock = Clock::for_threads(run.threads);
     let mut hits = vec![Hit::MISS; set.rays.len()];
     let mut found = vec![false; set.rays.len()];
-    let mut differ: BTreeMap<String, usize> = BTreeMap::new();
+    let mut differ: BTreeMap<String, [usize; 2]> = BTreeMap::new();
     // The first round, which is not counted, tells how often the rays are traced in the others.
     let mut passes: BTreeMap<String, usize> = BTreeMap::new();
     let times = medians(contenders, rounds, |round, contender| {
-        if contender.tracer.needs_hints() && set.from.is_none() {
+        if contender.tracer.starting() != Starting::AtOrigin && set.starts.is_none() {
             return None;
         }
         let again = passes.get(&contender.name).copied().unwrap_or(1);
@@ -142,7 +153,9 @@ fn measure_set(
             }
         });
         if round == 0 {
-            differ.insert(contender.name.clone(), expected.differ(contender.ours, &hits, &found));
+            let expected = expected.of(contender.tracer.starting());
+            let counts = [expected.differ(contender.ours, &hits, &found), expected.other(&hits)];
+            differ.insert(contender.name.clone(), counts);
             if run.threads > 1 && rounds > 1 {
                 passes.insert(contender.name.clone(), (LEAST_SECONDS / seconds).ceil().max(1.0) as usize);
             }
@@ -153,8 +166,51 @@ fn measure_set(
         if let Some(seconds) = seconds {
             row.mrays_per_s.insert(set.name, set.rays.len() as f64 / seconds / 1e6);
         }
-        if let Some(&count) = differ.get(&row.name) {
+        if let Some(&[count, other]) = differ.get(&row.name) {
             row.differ.insert(set.name, count);
+            if count_others && !set.any {
+                row.other.insert(set.name, other);
+            }
+        }
+    }
+}
+
+/// The exact answers to a set: from the origins of its rays; and if it knows starts, without hits on the triangle there, and from
+/// the exact starts.
+struct Expected {
+    at_origin: Answers,
+    others: Option<[Answers; 2]>,
+}
+
+impl Expected {
+    fn new(bvh: &[u8], set: &RaySet) -> Result<Expected> {
+        let of = |usage| Ok::<_, anyhow::Error>(Answers::of(&*structures::tracer(bvh, usage)?, set));
+        let others = match set.starts {
+            Some(_) => Some([of(structures::Use::Own)?, of(structures::Use::StartSingle)?]),
+            None => None,
+        };
+        Ok(Expected { at_origin: of(structures::Use::Batch)?, others })
+    }
+
+    /// The answers that a tracer has to give.
+    fn of(&self, starting: Starting) -> &Answers {
+        match (starting, &self.others) {
+            (Starting::RejectOwn, Some([without_own, _])) => without_own,
+            (Starting::OnSurface, Some([_, on_surface])) => on_surface,
+            _ => &self.at_origin,
+        }
+    }
+
+    /// How many rays hit the triangle that they start on; for any hit: how many hit nothing else.
+    fn own_hits(&self, starts: &[Start]) -> usize {
+        match (&self.at_origin, self.of(Starting::RejectOwn)) {
+            (Answers::Nearest(hits), _) => {
+                hits.iter().zip(starts).filter(|(h, own)| h.is_hit() && h.primitive == own.primitive).count()
+            }
+            (Answers::Any(all), Answers::Any(others)) => {
+                all.iter().zip(others).filter(|(all, other)| **all && !**other).count()
+            }
+            _ => 0,
         }
     }
 }
@@ -166,16 +222,23 @@ pub(crate) enum Answers {
 }
 
 impl Answers {
-    pub(crate) fn of_scene(scene: &bth::Scene, set: &RaySet) -> Answers {
+    pub(crate) fn of(tracer: &dyn Tracer, set: &RaySet) -> Answers {
         if set.any {
             let mut found = vec![false; set.rays.len()];
-            scene.batch(&set.rays).any(&mut found);
+            tracer.any(set.batch(), &mut found);
             Answers::Any(found)
         } else {
             let mut hits = vec![Hit::MISS; set.rays.len()];
-            scene.batch(&set.rays).nearest(&mut hits);
+            tracer.nearest(set.batch(), &mut hits);
             Answers::Nearest(hits)
         }
+    }
+
+    /// How many rays hit another triangle.
+    fn other(&self, hits: &[Hit]) -> usize {
+        let Answers::Nearest(expected) = self else { return 0 };
+        let is_other = |(a, b): &(&Hit, &Hit)| a.is_hit() && b.is_hit() && a.primitive != b.primitive;
+        expected.iter().zip(hits).filter(is_other).count()
     }
 
     /// How many answers differ: of ours in any bit, of rivals in whether something is hit.

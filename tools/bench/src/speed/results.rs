@@ -27,10 +27,14 @@ pub struct ModelSpeeds {
     pub name: String,
     /// Triangles.
     pub triangles: usize,
-    /// Where the cameras stood.
-    pub view: View,
+    /// Where the cameras stood; absent if the rays are those of a renderer.
+    pub view: Option<View>,
     /// Rays of each set that was timed.
     pub rays: BTreeMap<&'static str, usize>,
+    /// Of sets that start at hits: how many rays hit the triangle that they start on; of a set for any hit: how many hit
+    /// nothing else.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub own_hits: BTreeMap<&'static str, usize>,
     /// Our compiled files.
     pub structures: Vec<CompiledFile>,
     /// What could not be measured, and why.
@@ -95,6 +99,10 @@ pub struct TracerSpeeds {
     /// Rays that it answers otherwise than the plain BVH, by set: for ours in any bit, for rivals in
     /// whether something is hit.
     pub differ: BTreeMap<&'static str, usize>,
+    /// Rays of a renderer that hit another triangle than in the answer of the plain BVH, by set. A ray that passes through
+    /// an edge may hit either triangle.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub other: BTreeMap<&'static str, usize>,
 }
 
 impl ThreadsRun {
@@ -107,6 +115,7 @@ impl ThreadsRun {
             bytes: c.bytes,
             mrays_per_s: BTreeMap::new(),
             differ: BTreeMap::new(),
+            other: BTreeMap::new(),
         };
         ThreadsRun {
             threads,

@@ -2,8 +2,9 @@
 
 use super::results::{ModelSpeeds, SpeedResults, ThreadsRun};
 use crate::markdown::{count, table, two_decimals};
-use crate::rays::{NAMES, View};
+use crate::rays::{NAMES, View, recorded};
 use crate::rivals::embree;
+use std::collections::BTreeMap;
 
 /// All tables of a report.
 pub fn markdown(results: &SpeedResults) -> String {
@@ -21,7 +22,8 @@ pub fn markdown(results: &SpeedResults) -> String {
 
 /// Sets that have figures, in order.
 pub(super) fn sets_of<'a>(models: impl Iterator<Item = &'a ModelSpeeds> + Clone) -> Vec<&'static str> {
-    NAMES.into_iter().filter(|set| models.clone().any(|m| m.rays.contains_key(set))).collect()
+    let names = NAMES.into_iter().chain(recorded::NAMES);
+    names.filter(|set| models.clone().any(|m| m.rays.contains_key(set))).collect()
 }
 
 fn head(first: &str, sets: &[&str], more: &[&str]) -> Vec<String> {
@@ -60,8 +62,9 @@ fn means(results: &SpeedResults, threads: usize) -> String {
 
 fn page(model: &ModelSpeeds) -> String {
     let view = match model.view {
-        View::Outside => "seen from outside",
-        View::Inside => "seen from inside",
+        Some(View::Outside) => "seen from outside",
+        Some(View::Inside) => "seen from inside",
+        None => "rays of a renderer",
     };
     let mut text = format!("## {} ({} triangles, {view})\n\n", model.name, count(model.triangles as u64));
     let share = |s: &super::results::CompiledFile| {
@@ -70,6 +73,13 @@ fn page(model: &ModelSpeeds) -> String {
     if !model.structures.is_empty() {
         let compiled: Vec<String> = model.structures.iter().map(share).collect();
         text.push_str(&format!("Compiled: {}.\n\n", compiled.join("; ")));
+    }
+    for (set, own) in &model.own_hits {
+        let (rays, own) = (count(model.rays[set] as u64), count(*own as u64));
+        text.push_str(&format!("- {set}: {own} of {rays} rays hit the triangle that they start on\n"));
+    }
+    if !model.own_hits.is_empty() {
+        text.push('\n');
     }
     for run in &model.runs {
         text.push_str(&rates(model, run));
@@ -85,6 +95,9 @@ fn page(model: &ModelSpeeds) -> String {
 
 fn rates(model: &ModelSpeeds, run: &ThreadsRun) -> String {
     let sets = sets_of(std::iter::once(model));
+    let recorded = model.view.is_none();
+    let more: &[&str] =
+        if recorded { &["B/tri", "build s", "differ", "other"] } else { &["B/tri", "build s", "differ"] };
     let mut rows: Vec<Vec<String>> = Vec::new();
     for tracer in &run.tracers {
         let mut row = vec![tracer.name.clone()];
@@ -93,20 +106,24 @@ fn rates(model: &ModelSpeeds, run: &ThreadsRun) -> String {
             tracer.bytes.map_or("?".to_owned(), |b| format!("{:.0}", b as f64 / model.triangles as f64)),
         );
         row.push(two_decimals(Some(tracer.build_s)));
-        row.push(match tracer.differ.values().sum::<usize>() {
+        let of_sets = |counts: &BTreeMap<_, usize>| match counts.values().sum::<usize>() {
             0 => String::new(),
             n => count(n as u64),
-        });
+        };
+        row.push(of_sets(&tracer.differ));
+        if recorded {
+            row.push(of_sets(&tracer.other));
+        }
         rows.push(row);
     }
     let mut last = vec!["(rays)".to_owned()];
     last.extend(sets.iter().map(|set| count(model.rays[set] as u64)));
-    last.extend([const { String::new() }; 3]);
+    last.extend(more.iter().map(|_| String::new()));
     rows.push(last);
     format!(
         "Mrays per {}, {}:\n\n{}\n",
         run.clock.second(),
         on_threads(run.threads),
-        table(&head("tracer", &sets, &["B/tri", "build s", "differ"]), &rows)
+        table(&head("tracer", &sets, more), &rows)
     )
 }

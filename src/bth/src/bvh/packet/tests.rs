@@ -10,7 +10,6 @@ use crate::query::{
 };
 use crate::rays::{Hit, Ray};
 use crate::simd::Isa;
-use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 use bth_random::Rng;
 
@@ -57,11 +56,11 @@ fn bits(hit: &Hit) -> [u32; 4] {
 /// The answers of a single ray.
 fn alone(object: &ObjectView<'_>, ray: &Ray) -> (Hit, bool) {
     let (mut hit, mut found) = (Hit::MISS, Answer::MISS);
-    single::trace::<NearestQuery, ()>((object, NEAREST), ray, NONE, 0, &mut (), &mut hit);
-    single::trace::<AnyQuery, ()>((object, ANY), ray, NONE, 0, &mut (), &mut found);
+    single::trace::<NearestQuery, ()>((object, NEAREST), (ray, None), 0, &mut (), &mut hit);
+    single::trace::<AnyQuery, ()>((object, ANY), (ray, None), 0, &mut (), &mut found);
     for is_any in [false, true] {
         let (goal, mut either) = (EitherGoal { is_any }, Hit::MISS);
-        single::trace::<Nearest<EitherGoal>, ()>((object, goal), ray, NONE, 0, &mut (), &mut either);
+        single::trace::<Nearest<EitherGoal>, ()>((object, goal), (ray, None), 0, &mut (), &mut either);
         match is_any {
             true => assert_eq!(either.is_hit(), Answer::is_hit(&found), "{ray:?}"),
             false => assert_eq!(bits(&either), bits(&hit), "{ray:?}"),

@@ -3,9 +3,10 @@
 
 use super::{LARGEST, Prepared, PreparedRay, SMALLEST, lies_between};
 use crate::intersect::boxes::RaySlabs;
-use crate::intersect::exact::Intersection;
+use crate::intersect::exact::{Intersection, wide};
 use crate::intersect::filter::TriangleFilter;
 use crate::intersect::line::Line;
+use crate::intersect::start::{ExactStart, StartPoint, rounded_start};
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, LANES, Simd};
 use bth_format::layout::{BOX_MARGIN, IndexedLeaf, NONE, Object, WIDENED_BOXES, WIDTH, WideNode};
@@ -58,12 +59,37 @@ impl OneTriangle {
         }
     }
 
+    /// Makes the object hold other points.
+    fn include(&mut self, points: [[f32; 3]; 3]) {
+        for p in points {
+            for k in 0..3 {
+                self.object.lower[k] = self.object.lower[k].min(p[k]);
+                self.object.upper[k] = self.object.upper[k].max(p[k]);
+            }
+        }
+    }
+
     /// Makes the object reach beyond its triangle on all sides, as where there are others.
     fn enlarge(&mut self, by: f32) {
         for k in 0..3 {
             self.object.lower[k] = (self.object.lower[k] - by).max(f32::MIN);
             self.object.upper[k] = (self.object.upper[k] + by).min(f32::MAX);
         }
+    }
+}
+
+/// Where a ray starts on a triangle.
+struct RoundStart {
+    corners: [[f32; 3]; 3],
+    u: f32,
+    v: f32,
+}
+
+impl RoundStart {
+    fn point(&self) -> StartPoint {
+        let &RoundStart { corners, u, v } = self;
+        let origin = rounded_start(corners.map(wide), [u, v].map(f64::from));
+        StartPoint { origin, leaf: 7, slot: 0, u, v }
     }
 }
 
@@ -75,17 +101,18 @@ struct FilterResult {
     depth: [f32; 2],
 }
 
-/// Kernel of box test and filter. Its output is the set of children that are hit, as bits, and the result of the filter.
-struct BoxAndFilter<'a>(&'a PreparedRay, &'a OneTriangle);
+/// Kernel of box test and filter, with the `origin_reach` of the bounds. Its output is the set of children that are hit, as bits, and the result of the filter.
+struct BoxAndFilter<'a>(&'a PreparedRay, &'a OneTriangle, f32);
 
 impl Kernel for BoxAndFilter<'_> {
     type Output = (u32, FilterResult);
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Self::Output {
-        let BoxAndFilter(PreparedRay { slabs, filter, .. }, OneTriangle { node, leaf, .. }) = self;
+        let BoxAndFilter(PreparedRay { slabs, filter, .. }, OneTriangle { node, leaf, .. }, origin_reach) =
+            self;
         let (bits, _) = slabs.children(s, node, slabs.last);
         let children = (0..WIDTH).filter(|&i| bits >> i & 1 != 0 && node.child[i] != NONE);
-        let candidates = filter.candidates(s, leaf, slabs.first, slabs.last);
+        let candidates = filter.candidates(s, leaf, slabs.first, slabs.last, origin_reach);
         let (mut nearest, mut farthest) = ([0.0; LANES], [0.0; LANES]);
         s.store(candidates.nearest, &mut nearest);
         s.store(candidates.farthest, &mut farthest);
@@ -96,7 +123,7 @@ impl Kernel for BoxAndFilter<'_> {
 }
 
 /// Kernel that prepares sixteen rays together.
-struct PrepareKernel<'a>(&'a [Ray; LANES], &'a Object);
+struct PrepareKernel<'a>(&'a [Ray; LANES], &'a ObjectBounds);
 
 impl Kernel for PrepareKernel<'_> {
     type Output = Prepared;
@@ -104,32 +131,32 @@ impl Kernel for PrepareKernel<'_> {
     fn run<S: Simd>(self, s: S) -> Prepared {
         let mut prepared = Prepared::new();
         let at = std::array::from_fn(|i| i as u32);
-        prepared.fill(s, &ObjectBounds::new(self.1), self.0, &at, LANES);
+        prepared.fill(s, self.1, self.0, &at, LANES);
         prepared
     }
 }
 
 /// Kernel that prepares one ray alone.
-struct PrepareOneKernel<'a>(&'a Ray, &'a Object);
+struct PrepareOneKernel<'a>(&'a Ray, &'a ObjectBounds);
 
 impl Kernel for PrepareOneKernel<'_> {
     type Output = Option<PreparedRay>;
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Option<PreparedRay> {
-        PreparedRay::of(s, &ObjectBounds::new(self.1), self.0)
+        PreparedRay::of(s, self.1, self.0)
     }
 }
 
 /// The ray prepared in all ways: in f64, and on every instruction set alone and in a lane among others.
-fn all_preparations(ray: &Ray, line: &Line, object: &Object, lane: usize) -> Vec<PreparedRay> {
-    let slabs = RaySlabs::new(ray, line, object);
-    let mut all = vec![PreparedRay::new(slabs, TriangleFilter::new(ray, line, &slabs, object))];
-    all.extend(PreparedRay::in_f64(object, ray));
+fn all_preparations(ray: &Ray, line: &Line, bounds: &ObjectBounds, lane: usize) -> Vec<PreparedRay> {
+    let slabs = RaySlabs::new(ray, line, bounds);
+    let mut all = vec![PreparedRay::new(slabs, TriangleFilter::new(ray, line, &slabs, bounds))];
+    all.extend(PreparedRay::in_f64(bounds, ray));
     let mut others = [Ray { origin: [f32::NAN; 3], ..*ray }; LANES];
     others[lane] = *ray;
     for isa in Isa::ALL {
-        all.extend(isa.run(PrepareOneKernel(ray, object)));
-        let prepared = isa.run(PrepareKernel(&others, object));
+        all.extend(isa.run(PrepareOneKernel(ray, bounds)));
+        let prepared = isa.run(PrepareKernel(&others, bounds));
         all.extend(prepared.prepared(lane));
         assert!(prepared.prepared((lane + 1) % LANES).is_none(), "a ray without a line is not prepared");
     }
@@ -166,8 +193,16 @@ fn boxes_and_triangles_that_the_line_crosses_are_kept_and_sure_hits_are_hits() {
         if round % 4 == 0 {
             direction[round / 4 % 3] = if round % 8 == 0 { 0.0 } else { -0.0 };
         }
-        let endless = Ray { origin, tmin: f32::NEG_INFINITY, direction, tmax: f32::INFINITY };
-        let Some(line) = Line::new(&endless) else { continue };
+        let mut endless = Ray { origin, tmin: f32::NEG_INFINITY, direction, tmax: f32::INFINITY };
+        // Every other ray starts on another triangle of the object.
+        let start = (round % 2 == 1).then(|| {
+            let [u, v] = [[0.0, 0.0], [1.0, 0.0], [0.5, 0.5], [0.25, 0.1], [1.0 / 3.0, 2.0 / 3.0]][round % 5];
+            RoundStart { corners: [origin, point(4.0), point(1.0)], u, v }
+        });
+        if let Some(start) = &start {
+            (endless.origin, endless.tmin) = (start.point().rounded(), 0.0);
+        }
+        let Some(mut line) = Line::new(&endless) else { continue };
         let mut object = OneTriangle::new(corners);
         if round % 7 == 0 {
             object.enlarge([1e3, 1e6, 1e11][round / 7 % 3] * scale);
@@ -175,14 +210,22 @@ fn boxes_and_triangles_that_the_line_crosses_are_kept_and_sure_hits_are_hits() {
         if round % 5 < 2 {
             object.widen(corners);
         }
-        let intersection = line.intersection(corners);
+        let (bounds, intersection) = match &start {
+            None => (ObjectBounds::new(&object.object), line.intersection(corners)),
+            Some(start) => {
+                object.include(start.corners);
+                line.start_at(&start.point());
+                let exact = ExactStart::new(start.corners, start.u, start.v);
+                (ObjectBounds::new(&object.object).for_starts(), exact.intersection(&line, corners))
+            }
+        };
         let t = intersection.map_or(1.0, |c| c.t as f32);
         // The whole line, and ranges that end or begin at the intersection or directly beside it.
         let ranges = [
-            (f32::NEG_INFINITY, f32::INFINITY),
+            (endless.tmin, f32::INFINITY),
             (t, t),
             (t.next_up(), f32::INFINITY),
-            (f32::NEG_INFINITY, t.next_down()),
+            (endless.tmin, t.next_down()),
         ];
         for (tmin, tmax) in ranges {
             let ray = Ray { tmin, tmax, ..endless };
@@ -190,11 +233,11 @@ fn boxes_and_triangles_that_the_line_crosses_are_kept_and_sure_hits_are_hits() {
                 continue;
             }
             let hit = in_range(&ray, &intersection);
-            let preparations = all_preparations(&ray, &line, &object.object, round % LANES);
+            let preparations = all_preparations(&ray, &line, &bounds, round % LANES);
             prepared += preparations.len() - 1;
             for preparation in &preparations {
                 for isa in Isa::ALL {
-                    let (children, found) = isa.run(BoxAndFilter(preparation, &object));
+                    let (children, found) = isa.run(BoxAndFilter(preparation, &object, bounds.origin_reach));
                     let context = || {
                         format!(
                             "{isa}, round {round}: {ray:?}, {corners:?}, {intersection:?}, {preparation:?}"
@@ -240,9 +283,10 @@ fn small_triangles_of_large_objects_are_decided_in_f32() {
         let origin = [unit(&mut rng) - 0.5, unit(&mut rng) - 0.5, 1.0];
         let ray = Ray::new(origin, [0, 1, 2].map(|k| target[k] - origin[k]));
         let line = Line::new(&ray).unwrap();
-        for preparation in all_preparations(&ray, &line, &object.object, round % LANES) {
+        let bounds = ObjectBounds::new(&object.object);
+        for preparation in all_preparations(&ray, &line, &bounds, round % LANES) {
             for isa in Isa::ALL {
-                let (_, found) = isa.run(BoxAndFilter(&preparation, &object));
+                let (_, found) = isa.run(BoxAndFilter(&preparation, &object, bounds.origin_reach));
                 let expected = u32::from(is_hit);
                 assert_eq!([found.maybe, found.sure], [expected; 2], "{isa}, round {round}: {preparation:?}");
                 decided[expected as usize] += 1;
@@ -273,9 +317,10 @@ fn small_boxes_of_large_objects_are_told_apart_where_they_are_widened() {
         let origin = [0.4 + 0.2 * unit(&mut rng), unit(&mut rng), 1.5];
         let ray = Ray::new(origin, [0, 1, 2].map(|k| target[k] - origin[k]));
         let line = Line::new(&ray).unwrap();
-        for preparation in all_preparations(&ray, &line, &object.object, round % LANES) {
+        let bounds = ObjectBounds::new(&object.object);
+        for preparation in all_preparations(&ray, &line, &bounds, round % LANES) {
             for isa in Isa::ALL {
-                let (children, _) = isa.run(BoxAndFilter(&preparation, &object));
+                let (children, _) = isa.run(BoxAndFilter(&preparation, &object, bounds.origin_reach));
                 assert!(!is_met || children == 1, "{isa}, round {round}: {preparation:?}");
                 entered[usize::from(is_widened)][usize::from(is_met)] += children;
             }
@@ -306,9 +351,10 @@ fn boxes_of_objects_far_from_the_origin_are_told_apart() {
         let origin = place([0.4 + 0.2 * unit(), unit(), 1.5]);
         let ray = Ray::new(origin, [0, 1, 2].map(|k| target[k] - origin[k]));
         let line = Line::new(&ray).unwrap();
-        for preparation in all_preparations(&ray, &line, &object.object, round % LANES) {
+        let bounds = ObjectBounds::new(&object.object);
+        for preparation in all_preparations(&ray, &line, &bounds, round % LANES) {
             for isa in Isa::ALL {
-                let (children, _) = isa.run(BoxAndFilter(&preparation, &object));
+                let (children, _) = isa.run(BoxAndFilter(&preparation, &object, bounds.origin_reach));
                 assert_eq!(children, u32::from(is_met), "{isa}, round {round}: {preparation:?}");
                 met += children;
             }
@@ -319,10 +365,10 @@ fn boxes_of_objects_far_from_the_origin_are_told_apart() {
 
 #[test]
 fn rays_that_f32_cannot_prepare_are_left_to_f64() {
-    let object = Object { lower: [-1.0; 3], upper: [1.0; 3], ..Object::new_zeroed() };
+    let bounds = ObjectBounds::around(1.0);
     let usual = Ray::new([0.5, -3.0, 0.25], [0.3, 0.9, -0.1]);
     let is_prepared = |ray: Ray| {
-        let all = Isa::ALL.map(|isa| isa.run(PrepareOneKernel(&ray, &object)).is_some());
+        let all = Isa::ALL.map(|isa| isa.run(PrepareOneKernel(&ray, &bounds)).is_some());
         assert!(all.iter().all(|of| *of == all[0]), "{ray:?}: {all:?}");
         all[0]
     };
@@ -331,7 +377,7 @@ fn rays_that_f32_cannot_prepare_are_left_to_f64() {
     assert!(!is_prepared(Ray { tmin: 2.0, tmax: 1.0, ..usual }));
     for tmax in [-0.0, 0.0, 1e-41] {
         let empty = Ray { tmin: 1e-40, tmax, ..usual };
-        assert!(PreparedRay::in_f64(&object, &empty).is_none(), "an empty range up to {tmax}");
+        assert!(PreparedRay::in_f64(&bounds, &empty).is_none(), "an empty range up to {tmax}");
     }
     // Products of these are denormal; 0 stands for them.
     for tmin in [f32::MIN_POSITIVE, -f32::MIN_POSITIVE, 1e-40, f32::from_bits(1)] {
@@ -343,7 +389,7 @@ fn rays_that_f32_cannot_prepare_are_left_to_f64() {
                     == (tmin.abs() == f32::MIN_POSITIVE)
         );
         let [of_tiny, of_zero] =
-            [ray, zero].map(|ray| PreparedRay::in_f64(&object, &ray).expect("a ray with a line"));
+            [ray, zero].map(|ray| PreparedRay::in_f64(&bounds, &ray).expect("a ray with a line"));
         let depth = f64::from(tmin) * f64::from(of_tiny.slabs.scale);
         assert!(f64::from(of_tiny.slabs.first) <= depth && depth <= f64::from(of_tiny.filter.first));
         assert!((of_tiny.slabs.first - of_zero.slabs.first).abs() <= 4.0 * f32::MIN_POSITIVE);
@@ -389,7 +435,7 @@ fn one_comparison_of_bits_tells_what_lies_between() {
 fn no_t_that_is_certainly_in_the_range_is_infinite() {
     let ray = Ray::new([0.0; 3], [1e-42, 0.0, 0.0]).with_range(f32::NEG_INFINITY, f32::INFINITY);
     let slabs = RaySlabs::widened(&ray, 1.0, |_| 0.0).unwrap();
-    for end in slabs.certain_range(&ray) {
+    for end in slabs.certain_range(&ray, 0.0) {
         assert!(((f64::from(end) / f64::from(slabs.scale)) as f32).is_finite(), "{end}");
     }
 }

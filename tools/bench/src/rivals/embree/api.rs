@@ -20,6 +20,7 @@ pub(super) const FORMAT_FLOAT3: c_int = 0x9003;
 pub(super) const TYPE_INSTANCE: c_int = 121;
 pub(super) const FORMAT_ROWS: c_int = 0x9134;
 const QUERY_COHERENT: c_int = 1 << 16;
+const QUERY_FILTER: c_int = 1 << 1;
 
 /// `RTCRayHit` for one lane and `RTCRayHitN` for more; rays whose `RTCRay` part alone is used too.
 #[repr(C, align(64))]
@@ -112,6 +113,39 @@ impl QueryArguments {
     }
 }
 
+/// `RTCRayQueryContext`, and the triangle that [`reject_own`] rejects.
+#[repr(C)]
+struct OwnContext {
+    /// Instance, and row in an instance array in libraries that were built with those.
+    instance: [u32; 2],
+    own: u32,
+}
+
+/// `RTCFilterFunctionNArguments`.
+#[repr(C)]
+struct FilterArguments {
+    valid: *mut c_int,
+    user: Handle,
+    context: *const OwnContext,
+    ray: *const f32,
+    /// `RTCHit`: normal, u and v, then the triangle.
+    hit: *const [u32; 6],
+    lanes: u32,
+}
+
+/// Rejects a hit on the triangle on which the ray starts.
+///
+/// # Safety
+/// Called by the library for one ray, in a query whose context is an `OwnContext`.
+unsafe extern "C" fn reject_own(arguments: *const FilterArguments) {
+    // SAFETY: by the contract; the library's pointers are valid during the call.
+    unsafe {
+        if (*(*arguments).hit)[5] == (*(*arguments).context).own {
+            *(*arguments).valid = 0;
+        }
+    }
+}
+
 /// Which lanes of a packet hold rays: -1, else 0.
 #[repr(C, align(64))]
 pub(super) struct Lanes([c_int; 16]);
@@ -195,17 +229,30 @@ impl EmbreeApi {
     }
 }
 
-/// Traces rays through a committed scene one by one.
+/// Traces rays through a committed scene one by one; with `own` they do not hit the triangles that they start on.
 pub(super) fn singly(
     scene: Handle,
     batch: Batch<'_>,
+    own: bool,
     trace: Trace1,
     mut done: impl FnMut(usize, &RayHit<1>),
 ) {
     let mut arguments = QueryArguments::new(batch.coherent);
+    let mut context = OwnContext { instance: [NONE; 2], own: NONE };
+    let context = &raw mut context;
+    let starts = if own { batch.starts } else { None };
+    if starts.is_some() {
+        arguments.flags |= QUERY_FILTER;
+        arguments.context = context.cast();
+        arguments.filter = reject_own as Function;
+    }
     let mut lane = RayHit::<1>::EMPTY;
     for (i, ray) in batch.rays.iter().enumerate() {
         lane.set(0, ray);
+        if let Some(starts) = starts {
+            // SAFETY: the context lives on the stack, and the library reads it only during calls.
+            unsafe { (*context).own = starts[i].primitive.triangle };
+        }
         // SAFETY: the scene is committed, and both structures are as the library defines them.
         unsafe { trace(scene, &mut lane, &mut arguments) };
         done(i, &lane);

@@ -23,6 +23,8 @@ pub struct Variant {
     geometry_quality: c_int,
     flags: c_int,
     packets: bool,
+    /// Passes a filter with every ray that rejects the triangle on which it starts, as renderers do.
+    own: bool,
     /// The instruction set that the library may use; the best of the machine if absent.
     isa: Option<&'static str>,
 }
@@ -34,6 +36,7 @@ const QUALITY_REFIT: c_int = 3;
 const FLAG_DYNAMIC: c_int = 1;
 const FLAG_COMPACT: c_int = 2;
 const FLAG_ROBUST: c_int = 4;
+const FLAG_FILTER: c_int = 8;
 
 /// The library's defaults; one ray a call.
 pub const DEFAULT: Variant = Variant {
@@ -41,10 +44,15 @@ pub const DEFAULT: Variant = Variant {
     geometry_quality: QUALITY_MEDIUM,
     flags: 0,
     packets: false,
+    own: false,
     isa: None,
 };
 /// The robust mode, which has no high quality; one ray a call.
 pub const ROBUST: Variant = Variant { flags: FLAG_ROBUST, ..DEFAULT };
+/// The defaults, with a filter that rejects the triangle on which a ray starts; one ray a call.
+pub const OWN: Variant = Variant { flags: FLAG_FILTER, own: true, ..DEFAULT };
+/// The same in the robust mode, as Cycles traces; one ray a call.
+pub const ROBUST_OWN: Variant = Variant { flags: FLAG_ROBUST | FLAG_FILTER, own: true, ..DEFAULT };
 /// The mode that saves memory; one ray a call.
 pub const COMPACT: Variant = Variant { flags: FLAG_COMPACT, ..DEFAULT };
 /// What the library advises for scenes that change often: dynamic and of low quality; one ray a call.

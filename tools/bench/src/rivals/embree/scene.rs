@@ -3,7 +3,7 @@
 
 use super::Variant;
 use super::api::*;
-use crate::tracer::{Batch, Tracer};
+use crate::tracer::{Batch, Starting, Tracer};
 use anyhow::{Result, ensure};
 use bth::rays::Hit;
 use std::ffi::c_void;
@@ -15,6 +15,7 @@ pub struct EmbreeScene {
     device: Handle,
     scene: Handle,
     packets: bool,
+    own: bool,
     /// The scenes of the objects that `scene` has instances of.
     objects: Vec<Handle>,
     /// The geometries of `scene` that are instances.
@@ -128,9 +129,9 @@ impl EmbreeScene {
             (api.monitor)(device, count_bytes, total.cast_mut().cast());
             device
         };
-        let (scene, packets) = (std::ptr::null_mut(), variant.packets);
+        let (scene, packets, own) = (std::ptr::null_mut(), variant.packets, variant.own);
         let (objects, instances) = (Vec::new(), Vec::new());
-        Ok(EmbreeScene { api, device, scene, packets, objects, instances, _meshes: meshes, allocated })
+        Ok(EmbreeScene { api, device, scene, packets, own, objects, instances, _meshes: meshes, allocated })
     }
 
     /// A scene without geometries.
@@ -262,7 +263,9 @@ impl Tracer for EmbreeScene {
                 hits[i] = lanes.hit(lane, instances);
             });
         } else {
-            singly(self.scene, batch, self.api.intersect1, |i, lane| hits[i] = lane.hit(0, instances));
+            singly(self.scene, batch, self.own, self.api.intersect1, |i, lane| {
+                hits[i] = lane.hit(0, instances);
+            });
         }
     }
 
@@ -270,7 +273,11 @@ impl Tracer for EmbreeScene {
         if self.packets {
             packets(self.scene, batch, self.api.occluded16, |i, lanes, lane| found[i] = lanes.occluded(lane));
         } else {
-            singly(self.scene, batch, self.api.occluded1, |i, lane| found[i] = lane.occluded(0));
+            singly(self.scene, batch, self.own, self.api.occluded1, |i, lane| found[i] = lane.occluded(0));
         }
+    }
+
+    fn starting(&self) -> Starting {
+        if self.own { Starting::RejectOwn } else { Starting::AtOrigin }
     }
 }

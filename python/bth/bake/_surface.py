@@ -188,7 +188,7 @@ class SurfacePoints:
         for k in range(int(counts.max(initial=0))):
             has = np.nonzero(counts > k)[0]
             row = first[has] + k
-            rise = side * dot(directions[has], around.normal[row][:, None])
+            rise = side * dot(np.asarray(directions[has], np.float64), around.normal[row][:, None])
             higher = (rise >= 0) & (rise > highest[has])
             rows[has], highest[has] = np.where(higher, row[:, None], rows[has]), np.where(higher, rise, highest[has])
         uv = np.stack([around.u[rows], around.v[rows]], axis=-1)
@@ -218,14 +218,14 @@ def at_vertices(scene: Scene) -> SurfacePoints:
     # Corners of faces with area, by their vertices.
     solid = np.nonzero(face_normals.any(axis=1))[0]
     order = np.argsort(faces[solid].reshape(-1), kind="stable")
-    face, corner = solid[order // 3], order % 3
+    face = solid[order // 3]
     counts = np.bincount(faces[solid].reshape(-1), minlength=count)
     normals[counts == 0] = 0.0
     instance, triangle = mesh.instance[face], mesh.triangle[face]
     # Corners of faces that were turned round are others of their triangles.
-    corner = np.where(mesh.mirrored[instance], np.array([0, 2, 1])[corner], corner)
-    u, v = (np.where(corner == k, 1 - 2 * _NEXT, _NEXT).astype(np.float32) for k in (1, 2))
+    corner_of = np.where(mesh.mirrored[instance], np.array([0, 2, 1])[order % 3], order % 3)
+    u, v = (np.where(corner_of == k, 1 - 2 * _NEXT, _NEXT).astype(np.float32) for k in (1, 2))
     around = FacesAround.of(counts, instance, triangle, u, v, face_normals[face])
     row = np.where(counts > 0, around.first[:-1], -1)
-    u, v = (np.append(corner == k, False)[row].astype(np.float32) for k in (1, 2))
+    u, v = (np.append(corner_of == k, False)[row].astype(np.float32) for k in (1, 2))
     return SurfacePoints(mesh.vertices, normals, around.instance[row], around.triangle[row], u, v, np.arange(count), mesh, around)

@@ -137,7 +137,7 @@ def _points(scene: Scene, mesh, faces, u: Floats, v: Floats) -> SurfacePoints:
     position = a + u[:, None] * (b - a) + v[:, None] * (c - a)
     instance, triangle = mesh.instance[faces], mesh.triangle[faces]
     mirrored = mesh.mirrored[instance]
-    u, v = np.where(mirrored, v, u).astype(np.float32), np.where(mirrored, u, v).astype(np.float32)
+    second, third = np.where(mirrored, v, u).astype(np.float32), np.where(mirrored, u, v).astype(np.float32)
     normals = scene.normals(instance, triangle)
-    around = FacesAround.of(np.ones(len(faces), np.int64), instance, triangle, u, v, normals)
-    return SurfacePoints(position, normals, instance, triangle, u, v, np.full(len(faces), -1), mesh, around)
+    around = FacesAround.of(np.ones(len(faces), np.int64), instance, triangle, second, third, normals)
+    return SurfacePoints(position, normals, instance, triangle, second, third, np.full(len(faces), -1), mesh, around)

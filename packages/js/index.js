@@ -154,21 +154,36 @@ class Scene {
     }
 
     nearest(rays) {
-        const count = countOf(rays);
+        return this.#nearest(this.#wasm.bth_nearest, countOf(rays), copied(rays));
+    }
+
+    any(rays) {
+        return this.#any(this.#wasm.bth_any, countOf(rays), copied(rays));
+    }
+
+    nearestStarts(starts, directions, tmax = Infinity) {
+        return this.#nearest(this.#wasm.bth_nearest_starts, countOfStarts(starts, directions, tmax), startsCopied(starts, directions, tmax));
+    }
+
+    anyStarts(starts, directions, tmax = Infinity) {
+        return this.#any(this.#wasm.bth_any_starts, countOfStarts(starts, directions, tmax), startsCopied(starts, directions, tmax));
+    }
+
+    /** The nearest hits of rays that `copy` copies, by one of the module's functions. */
+    #nearest(trace, count, copy) {
         const hits = new Hits(count);
         const columns = HIT_NAMES.map((name) => hits[name]);
-        this.#inChunks(rays, count, (from, n) => {
-            this.#wasm.bth_nearest(this.#scene, this.#memory.rays, n, this.#memory.results);
+        this.#inChunks(count, copy, (from, n) => {
+            trace(this.#scene, this.#memory.rays, n, this.#memory.results);
             this.#columns(columns, this.#memory.results, from, n);
         });
         return hits;
     }
 
-    any(rays) {
-        const count = countOf(rays);
+    #any(trace, count, copy) {
         const found = new Uint8Array(count);
-        this.#inChunks(rays, count, (from, n) => {
-            this.#wasm.bth_any(this.#scene, this.#memory.rays, n, this.#memory.results);
+        this.#inChunks(count, copy, (from, n) => {
+            trace(this.#scene, this.#memory.rays, n, this.#memory.results);
             found.set(new Uint8Array(this.#wasm.memory.buffer, this.#memory.results, n), from);
         });
         return found;
@@ -178,7 +193,7 @@ class Scene {
         const count = countOf(rays);
         const steps = new Steps(count);
         const columns = [steps.nodes, steps.leaves, steps.triangles, steps.tets];
-        this.#inChunks(rays, count, (from, n) => {
+        this.#inChunks(count, copied(rays), (from, n) => {
             this.#wasm.bth_steps(this.#scene, this.#memory.rays, n, this.#memory.results);
             this.#columns(columns, this.#memory.results, from, n);
         });
@@ -277,12 +292,11 @@ class Scene {
     }
 
     /** Copies a chunk of rays after the other to the module, and calls `trace` with the index of its first ray and its length. */
-    #inChunks(rays, count, trace) {
+    #inChunks(count, copy, trace) {
         this.#open();
         for (let from = 0; from < count; from += CHUNK) {
             const n = Math.min(CHUNK, count - from);
-            const to = new Float32Array(this.#wasm.memory.buffer, this.#memory.rays, n * RAY);
-            to.set(rays.subarray(from * RAY, (from + n) * RAY));
+            copy(new Float32Array(this.#wasm.memory.buffer, this.#memory.rays, n * RAY), from, n);
             trace(from, n);
         }
     }
@@ -340,6 +354,46 @@ function countOf(rays) {
     return rays.length / RAY;
 }
 
+/** A function that copies `n` rays from an index on to the module. */
+function copied(rays) {
+    return (to, from, n) => to.set(rays.subarray(from * RAY, (from + n) * RAY));
+}
+
+/** The same for rays that start on surfaces: instance, triangle, u, v, direction, tmax. */
+function startsCopied({ instance, triangle, u, v }, directions, tmax) {
+    return (to, from, n) => {
+        const indices = new Uint32Array(to.buffer, to.byteOffset, to.length);
+        for (let i = 0; i < n; i++) {
+            const at = RAY * i, ray = from + i;
+            indices[at] = instance[ray];
+            indices[at + 1] = triangle[ray];
+            to[at + 2] = u[ray];
+            to[at + 3] = v[ray];
+            for (let k = 0; k < 3; k++) to[at + 4 + k] = directions[3 * ray + k];
+            to[at + 7] = typeof tmax === "number" ? tmax : tmax[ray];
+        }
+    };
+}
+
+/** Number of rays that start on surfaces. */
+function countOfStarts(starts, directions, tmax) {
+    const count = starts?.count;
+    if (count === undefined) throw new TypeError(`starts: expected hits, or their columns instance, triangle, u, v and count; found ${kindOf(starts)}`);
+    for (const name of ["u", "v", "instance", "triangle"]) {
+        const of = name.length === 1 ? "Float32Array" : "Uint32Array";
+        checkColumn(`starts.${name}`, starts[name], of, count);
+    }
+    checkColumn("directions", directions, "Float32Array", 3 * count, "three numbers a ray");
+    if (typeof tmax !== "number") checkColumn("tmax", tmax, "Float32Array", count, "or a number for all rays");
+    return count;
+}
+
+/** Refuses what is no typed array of this class and length. */
+function checkColumn(name, column, of, length, what = "as many as there are rays") {
+    if (classOf(column) === of && column.length === length) return;
+    throw new TypeError(`${name}: expected a ${of} of ${length} elements, ${what}; found ${sizedKindOf(column)}`);
+}
+
 /** Whether a buffer was transferred, for example to a worker. `detached` is younger than some of the supported programs. */
 function isDetached(buffer) {
     try {
@@ -353,11 +407,7 @@ function isDetached(buffer) {
 /** Refuses hits whose columns are not those of their number of rays. */
 function checkHits(hits) {
     if (hits?.count === undefined) throw new TypeError(`hits: expected the answer of nearest; found ${kindOf(hits)}`);
-    HIT_NAMES.forEach((name, k) => {
-        const column = hits[name], of = k < 3 ? "Float32Array" : "Uint32Array";
-        if (classOf(column) === of && column.length === hits.count) return;
-        throw new TypeError(`hits.${name}: expected a ${of} of ${hits.count} elements, as many as there are rays; found ${sizedKindOf(column)}`);
-    });
+    HIT_NAMES.forEach((name, k) => checkColumn(`hits.${name}`, hits[name], k < 3 ? "Float32Array" : "Uint32Array", hits.count));
 }
 
 /** Element k of the vector of hit i is element i of column k. */

@@ -68,6 +68,15 @@ def indices(array, name):
     return np.require(array, np.uint32, "A")
 
 
+def weights(array, name):
+    """An array of float32: barycentric weights."""
+    array = plain(array, name)
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"{name}: expected numbers, got an array of {array.dtype}")
+    with np.errstate(over="ignore"):
+        return array.astype(np.float32, copy=False)
+
+
 def together(first, first_name, second, second_name):
     """Two arrays of vectors, broadcast to one shape and with their leading axes made one; and these leading axes."""
     first, second = vectors(first, first_name), vectors(second, second_name)

@@ -9,14 +9,6 @@ from ._hits import FIELDS, NONE, SurfacePoints
 from ._ray_queries import mask_bits
 
 
-def _weights(array, name):
-    array = _arrays.plain(array, name)
-    if array.dtype.kind not in "fiu":
-        raise TypeError(f"{name}: expected numbers, got an array of {array.dtype}")
-    with np.errstate(over="ignore"):
-        return array.astype(np.float32, copy=False)
-
-
 def _index(index, name):
     """One index as the native module takes it, which knows how many there are."""
     number = operator.index(index)
@@ -33,7 +25,7 @@ class Contents:
     # At points of triangles.
 
     def _points(self, u, v, instance, triangle):
-        points = _weights(u, "u"), _weights(v, "v"), _arrays.indices(instance, "instance"), _arrays.indices(triangle, "triangle")
+        points = _arrays.weights(u, "u"), _arrays.weights(v, "v"), _arrays.indices(instance, "instance"), _arrays.indices(triangle, "triangle")
         try:
             points = np.broadcast_arrays(*points)
         except ValueError:

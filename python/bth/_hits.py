@@ -131,11 +131,15 @@ class Hits(_OnTriangles):
     def position(self):
         """The points hit in world space, in float64, computed from t; NaN for a miss. `surface().position` is nearer to the triangle.
 
-        They are computed once, when they are first asked for, from the arrays of origins and directions that the query was given.
+        They are computed once, when they are first asked for, from the arrays of origins and directions that the query was given. For rays
+        with starts they are `surface().position`.
         """
         if self._position is not None:
             return self._position.copy()
         origins, directions = self._rays
+        if origins is None:
+            self._position, self._rays = self._field("position"), None
+            return self._position.copy()
         t = np.where(self.hit, self.t, np.nan).astype(np.float64)
         points = np.asarray(origins, np.float64) + t.reshape(-1)[:, None] * np.asarray(directions, np.float64)
         self._position, self._rays = points.reshape(*t.shape, 3), None

@@ -27,29 +27,64 @@ def _conditions(mask, cull, filter):
     return mask_bits(mask), cull or "none", filter
 
 
-def _start(start, shape):
-    if start is None:
-        return None
-    pair = (start.instance, start.triangle) if hasattr(start, "instance") else start
-    if not isinstance(pair, (tuple, list)) or len(pair) != 2:
-        raise TypeError(f"start: expected Hits or a pair (instance, triangle), got {type(start).__name__}")
-    pair = [_arrays.indices(a, "start") for a in pair]
+def _start_columns(start):
+    """Instances, triangles, u and v of points at which rays start, broadcast to one shape."""
+    if hasattr(start, "triangle"):
+        instance, triangle, u, v = start.instance, start.triangle, start.u, start.v
+    elif isinstance(start, (tuple, list)) and len(start) == 3:
+        instance, triangle, uv = start
+        uv = _arrays.weights(uv, "start: uv")
+        if uv.ndim == 0 or uv.shape[-1] != 2:
+            raise ValueError(f"start: expected uv of the shape (..., 2), got {uv.shape}")
+        u, v = uv[..., 0], uv[..., 1]
+    else:
+        found = f"{len(start)} of them" if isinstance(start, (tuple, list)) else type(start).__name__
+        raise TypeError(f"start: expected Hits or (instances, triangles, uv), got {found}")
+    instance, triangle = _arrays.indices(instance, "start: instances"), _arrays.indices(triangle, "start: triangles")
+    columns = instance, triangle, _arrays.weights(u, "start: u"), _arrays.weights(v, "start: v")
     try:
-        return tuple(np.broadcast_to(a, shape).reshape(-1) for a in pair)
+        return np.broadcast_arrays(*columns)
     except ValueError:
-        raise ValueError(f"start: the shapes do not fit {shape}, that of the rays") from None
+        found = f"instances {instance.shape}, triangles {triangle.shape} and uv {(*np.shape(u), 2)}"
+        raise ValueError(f"start: expected shapes that fit together, got {found}") from None
 
 
-def rays_and_shape(origins, directions, tmin, tmax):
-    """Origins, directions and ranges as the native module takes them, and the leading shape."""
-    origins, directions, shape = _arrays.together(origins, "origins", directions, "directions")
-    return (origins, directions, _arrays.numbers(tmin, "tmin", shape), _arrays.numbers(tmax, "tmax", shape)), shape
+def _flat(columns, shape):
+    """Columns that are broadcast to a shape as the native module takes them."""
+    return tuple(np.require(np.broadcast_to(column, shape).reshape(-1), None, "A") for column in columns)
+
+
+def rays_and_shape(origins, directions, tmin, tmax, start=None):
+    """Rays as the native module takes them, and their leading shape."""
+    if start is None:
+        if origins is None:
+            raise TypeError("origins: expected an array of the shape (..., 3), got None (hint: None takes start=)")
+        origins, directions, shape = _arrays.together(origins, "origins", directions, "directions")
+        return (origins, directions, _arrays.numbers(tmin, "tmin", shape), _arrays.numbers(tmax, "tmax", shape), None), shape
+    if origins is not None:
+        raise ValueError("origins: expected None together with start, got both (hint: the start is the origin)")
+    if np.ndim(tmin) > 0 or tmin != 0:
+        hint = "hint: these rays hit what lies at t > 0, and never the surface that they leave"
+        raise ValueError(f"tmin: expected none together with start, got {tmin} ({hint})")
+    columns, directions = _start_columns(start), _arrays.vectors(directions, "directions")
+    try:
+        shape = np.broadcast_shapes(columns[0].shape, directions.shape[:-1])
+    except ValueError:
+        found = f"{columns[0].shape} starts and directions of the shape {directions.shape}"
+        raise ValueError(f"start and directions: expected shapes that fit together, got {found}") from None
+    directions = _arrays.rows(directions, (*shape, 3))
+    return (None, directions, 0.0, _arrays.numbers(tmax, "tmax", shape), _flat(columns, shape)), shape
 
 
 class RayQueries:
     """The queries of a Scene by rays.
 
     Origins and directions are of shape (..., 3) and are broadcast; tmin and tmax are numbers or arrays that are broadcast to (...).
+
+    start: the points of surfaces at which rays start; origins are then None, and there is no tmin. Hits (or Closest), or
+    (instances, triangles, uv) of the shapes (...), (...) and (..., 2), broadcast against directions. A ray starts at the exact point, not
+    at a rounded one, and hits what lies at t > 0: never the surface that it leaves, and never nothing where there is a wall. It misses if
+    its start is not a point of a visible instance, as the start of a miss is; `check_start` says why.
 
     mask: instances and groups of triangles whose own mask (`set_instance_mask`, `set_group_mask`) has no bit in common with this one
     are not hit. cull: 'back' or 'front' ignores hits on these sides of triangles.
@@ -60,31 +95,26 @@ class RayQueries:
     __slots__ = ()
 
     def nearest(
-        self, origins, directions, tmin=0.0, tmax=math.inf, start=None, *, mask=NONE, cull=None, filter=None, threads=None,
+        self, origins, directions, tmin=0.0, tmax=math.inf, *, start=None, mask=NONE, cull=None, filter=None, threads=None,
     ):
-        """The nearest hits of rays, as Hits.
-
-        start: the triangles on which rays start, as Hits or a pair (instance, triangle). It is a hint, which never changes an
-        answer: see free_directions of `compile`.
-        """
-        rays, shape = rays_and_shape(origins, directions, tmin, tmax)
-        columns = hit_columns(len(rays[0]))
-        conditions = _conditions(mask, cull, filter)
-        _native.nearest(self._native, rays, _start(start, shape), conditions, _threads.count(threads), columns)
+        """The nearest hits of rays, as Hits."""
+        rays, shape = rays_and_shape(origins, directions, tmin, tmax, start)
+        columns = hit_columns(len(rays[1]))
+        _native.nearest(self._native, rays, _conditions(mask, cull, filter), _threads.count(threads), columns)
         return Hits([c.reshape(shape) for c in columns], self, rays[:2])
 
     def any(
-        self, origins, directions, tmin=0.0, tmax=math.inf, start=None, *, mask=NONE, cull=None, filter=None, threads=None,
+        self, origins, directions, tmin=0.0, tmax=math.inf, *, start=None, mask=NONE, cull=None, filter=None, threads=None,
     ):
-        """Whether rays hit anything: an array of bool. start: see `nearest`."""
-        rays, shape = rays_and_shape(origins, directions, tmin, tmax)
-        found = np.empty(len(rays[0]), bool)
-        conditions = _conditions(mask, cull, filter)
-        _native.any(self._native, rays, _start(start, shape), conditions, _threads.count(threads), found)
+        """Whether rays hit anything: an array of bool."""
+        rays, shape = rays_and_shape(origins, directions, tmin, tmax, start)
+        found = np.empty(len(rays[1]), bool)
+        _native.any(self._native, rays, _conditions(mask, cull, filter), _threads.count(threads), found)
         return found.reshape(shape)
 
     def all_hits(
-        self, origins, directions, tmin=0.0, tmax=math.inf, *, most=None, mask=NONE, cull=None, filter=None, threads=None,
+        self, origins, directions, tmin=0.0, tmax=math.inf, *, start=None, most=None, mask=NONE, cull=None, filter=None,
+        threads=None,
     ):
         """All hits of rays in order, or the nearest `most` of each, as AllHits. A ray through an edge hits both triangles at it."""
         if most is not None:
@@ -92,22 +122,33 @@ class RayQueries:
             most = min(operator.index(most), 2**63 - 1)
             if most < 0:
                 raise ValueError(f"most: expected a number from 0, got {most}")
-        rays, _ = rays_and_shape(origins, directions, tmin, tmax)
-        counts = np.empty(len(rays[0]), np.uint64)
+        rays, _ = rays_and_shape(origins, directions, tmin, tmax, start)
+        counts = np.empty(len(rays[1]), np.uint64)
         conditions = _conditions(mask, cull, filter)
         columns = _native.all_hits(self._native, rays, most, conditions, _threads.count(threads), counts)
         return AllHits(offsets_of(counts), columns, self)
 
-    def count(self, origins, directions, tmin=0.0, tmax=math.inf, *, mask=NONE, cull=None, filter=None, threads=None):
+    def count(
+        self, origins, directions, tmin=0.0, tmax=math.inf, *, start=None, mask=NONE, cull=None, filter=None, threads=None,
+    ):
         """Number of hits of rays, int64. See `crossings` for passages of closed surfaces."""
-        rays, shape = rays_and_shape(origins, directions, tmin, tmax)
-        counts = np.empty(len(rays[0]), np.uint64)
+        rays, shape = rays_and_shape(origins, directions, tmin, tmax, start)
+        counts = np.empty(len(rays[1]), np.uint64)
         _native.count(self._native, rays, _conditions(mask, cull, filter), _threads.count(threads), counts)
         return counts.astype(np.int64).reshape(shape)
 
-    def crossings(self, origins, directions, tmin=0.0, tmax=math.inf, *, threads=None):
+    def crossings(self, origins, directions, tmin=0.0, tmax=math.inf, *, start=None, threads=None):
         """How often rays pass through surfaces, each passage of a closed one counted once; and the passages outwards minus those inwards."""
-        rays, shape = rays_and_shape(origins, directions, tmin, tmax)
-        count, winding = np.empty(len(rays[0]), np.uint32), np.empty(len(rays[0]), np.int32)
+        rays, shape = rays_and_shape(origins, directions, tmin, tmax, start)
+        count, winding = np.empty(len(rays[1]), np.uint32), np.empty(len(rays[1]), np.int32)
         _native.crossings(self._native, rays, _threads.count(threads), count, winding)
         return count.reshape(shape), winding.reshape(shape)
+
+    def check_start(self, start):
+        """Raises bth.Error unless rays can start at all of these points; see `start` above.
+
+        Its code is BTH-S003 if there is no such instance; BTH-S008 if the instance is hidden, if it has no such triangle or the triangle has no
+        area, or if u and v are not the weights of a point of it. Queries do not check starts.
+        """
+        columns = _start_columns(start)
+        _native.check_start(self._native, _flat(columns, columns[0].shape))

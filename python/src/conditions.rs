@@ -77,13 +77,13 @@ impl Checked {
 
     /// Calls `query` for each ray with its index within the rays and what it may hit. `first` is the index of the first ray in the
     /// call. After an exception of the filter, and when the call ends early, the rest is left out.
-    pub(crate) fn each(
+    pub(crate) fn each<R>(
         &self,
         scene: &bth::Scene,
         first: usize,
-        rays: &[Ray],
+        rays: &[R],
         watch: &Watch<'_>,
-        mut query: impl FnMut(usize, &Ray, &Accept<'_>),
+        mut query: impl FnMut(usize, &R, &Accept<'_>),
     ) {
         for (i, ray) in rays.iter().enumerate() {
             // Most rays take less time than a look at the clock.

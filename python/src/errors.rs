@@ -29,6 +29,12 @@ pub(crate) fn format_error(error: &bth_format::Error) -> PyErr {
     if code.starts_with("BTH-O") { PyOSError::new_err(text) } else { coded(code, text) }
 }
 
+/// The exception for a point at which no ray can start, and its row if there are several.
+pub(crate) fn start_error(row: Option<usize>, error: &bth_format::Error) -> PyErr {
+    let place = row.map_or(String::new(), |row| format!(" {row}"));
+    coded(error.code().as_str(), format!("start{place}: {error}"))
+}
+
 /// The exception for a file that cannot be written: the subclass of `OSError` for the number that the system gives.
 pub(crate) fn write_error(path: &Path, error: &std::io::Error) -> PyErr {
     match error.raw_os_error() {

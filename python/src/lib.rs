@@ -51,6 +51,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(scene::load, module)?)?;
     module.add_function(wrap_pyfunction!(queries::nearest, module)?)?;
     module.add_function(wrap_pyfunction!(queries::any, module)?)?;
+    module.add_function(wrap_pyfunction!(queries::check_start, module)?)?;
     module.add_function(wrap_pyfunction!(compile::compile_path, module)?)?;
     module.add_function(wrap_pyfunction!(compile::source_files, module)?)?;
     module.add_function(wrap_pyfunction!(many::all_hits, module)?)?;

@@ -2,7 +2,7 @@
 
 use crate::conditions::Conditions;
 use crate::output::{Part, Parts, chunks, chunks_of, numbers};
-use crate::rays::RayArrays;
+use crate::rays::{Given, RayArrays, Rays};
 use crate::scene::NativeScene;
 use crate::work::Watch;
 use bth::Crossings;
@@ -29,9 +29,24 @@ pub(crate) fn all_hits<'py>(
     most: Option<usize>,
     conditions: Conditions,
     threads: usize,
+    counts: PyReadwriteArray1<'_, u64>,
+) -> PyResult<Columns<'py>> {
+    match rays.given()? {
+        Given::Origins(rays) => all_hits_of(py, scene, rays, most, conditions, threads, counts),
+        Given::Starts(rays) => all_hits_of(py, scene, rays, most, conditions, threads, counts),
+    }
+}
+
+fn all_hits_of<'py, R: Rays>(
+    py: Python<'py>,
+    scene: &NativeScene,
+    rays: R,
+    most: Option<usize>,
+    conditions: Conditions,
+    threads: usize,
     mut counts: PyReadwriteArray1<'_, u64>,
 ) -> PyResult<Columns<'py>> {
-    let (scene, rays, conditions) = (scene.get()?, rays.rays()?, conditions.checked()?);
+    let (scene, conditions) = (scene.get()?, conditions.checked()?);
     let counts = numbers(&mut counts, rays.len())?;
     let mut parts = Parts::new(rays.len());
     let mut rows = counts;
@@ -78,9 +93,23 @@ pub(crate) fn count(
     rays: RayArrays<'_>,
     conditions: Conditions,
     threads: usize,
+    out: PyReadwriteArray1<'_, u64>,
+) -> PyResult<()> {
+    match rays.given()? {
+        Given::Origins(rays) => count_of(py, scene, rays, conditions, threads, out),
+        Given::Starts(rays) => count_of(py, scene, rays, conditions, threads, out),
+    }
+}
+
+fn count_of<R: Rays>(
+    py: Python<'_>,
+    scene: &NativeScene,
+    rays: R,
+    conditions: Conditions,
+    threads: usize,
     mut out: PyReadwriteArray1<'_, u64>,
 ) -> PyResult<()> {
-    let (scene, rays, conditions) = (scene.get()?, rays.rays()?, conditions.checked()?);
+    let (scene, conditions) = (scene.get()?, conditions.checked()?);
     let jobs = chunks_of(numbers(&mut out, rays.len())?);
     scene.run(py, conditions.threads(threads), jobs, |scene, (range, counts), watch| {
         let mut read = Vec::new();
@@ -99,10 +128,24 @@ pub(crate) fn crossings(
     scene: &NativeScene,
     rays: RayArrays<'_>,
     threads: usize,
+    count: PyReadwriteArray1<'_, u32>,
+    winding: PyReadwriteArray1<'_, i32>,
+) -> PyResult<()> {
+    match rays.given()? {
+        Given::Origins(rays) => crossings_of(py, scene, rays, threads, count, winding),
+        Given::Starts(rays) => crossings_of(py, scene, rays, threads, count, winding),
+    }
+}
+
+fn crossings_of<R: Rays>(
+    py: Python<'_>,
+    scene: &NativeScene,
+    rays: R,
+    threads: usize,
     mut count: PyReadwriteArray1<'_, u32>,
     mut winding: PyReadwriteArray1<'_, i32>,
 ) -> PyResult<()> {
-    let (scene, rays) = (scene.get()?, rays.rays()?);
+    let scene = scene.get()?;
     let (mut count, mut winding) = (numbers(&mut count, rays.len())?, numbers(&mut winding, rays.len())?);
     let jobs = chunks(rays.len(), |rows| {
         let part = "a result for each ray";

@@ -1,6 +1,6 @@
 //! The options of a compilation, as keywords of Python.
 
-use crate::rays::RayArrays;
+use crate::rays::{Given, RayArrays, Rays};
 use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_compile::sampling::KnownRays;
 use bth_compile::{bvh, coordinates, costs, free};
@@ -189,7 +189,10 @@ enum MaxError {
 
 /// The rays that will be traced. Some may be such that they cannot, but not all.
 fn known_rays(arrays: &RayArrays<'_>) -> PyResult<KnownRays> {
-    let (rays, mut read) = (arrays.rays()?, Vec::new());
+    let Given::Origins(rays) = arrays.given()? else {
+        return Err(PyValueError::new_err("rays: expected origins, got starts"));
+    };
+    let mut read = Vec::new();
     rays.read(0..rays.len(), &mut read);
     let (known, _) = KnownRays::of(&read);
     if known.count() == 0 {

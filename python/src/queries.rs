@@ -1,20 +1,19 @@
 //! Queries by rays: the nearest hit, and whether there is one.
 
 use crate::conditions::Conditions;
+use crate::errors::start_error;
 use crate::output::{HitArrays, chunks, chunks_of, numbers};
-use crate::rays::{RayArrays, StartArrays, Starts};
+use crate::rays::{Buffers, Given, RayArrays, Rays, StartArrays};
 use crate::scene::NativeScene;
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::Hit;
 use numpy::PyReadwriteArray1;
 use pyo3::prelude::*;
 use std::cell::RefCell;
-use std::ops::Range;
 
 /// What a thread needs for a chunk, kept from chunk to chunk.
 #[derive(Default)]
 struct Scratch {
-    rays: Vec<Ray>,
-    starts: Vec<PrimitiveRef>,
+    buffers: Buffers,
     hits: Vec<Hit>,
 }
 
@@ -28,23 +27,35 @@ pub(crate) fn nearest(
     py: Python<'_>,
     scene: &NativeScene,
     rays: RayArrays<'_>,
-    start: Option<StartArrays<'_>>,
+    conditions: Conditions,
+    threads: usize,
+    out: HitArrays<'_>,
+) -> PyResult<()> {
+    match rays.given()? {
+        Given::Origins(rays) => nearest_of(py, scene, rays, conditions, threads, out),
+        Given::Starts(rays) => nearest_of(py, scene, rays, conditions, threads, out),
+    }
+}
+
+fn nearest_of<R: Rays>(
+    py: Python<'_>,
+    scene: &NativeScene,
+    rays: R,
     conditions: Conditions,
     threads: usize,
     mut out: HitArrays<'_>,
 ) -> PyResult<()> {
-    let (scene, rays, conditions) = (scene.get()?, rays.rays()?, conditions.checked()?);
-    let starts = start.as_ref().map(|s| Starts::new(s, rays.len())).transpose()?;
+    let (scene, conditions) = (scene.get()?, conditions.checked()?);
     let mut columns = out.columns(rays.len())?;
     let jobs = chunks(rays.len(), |rows| columns.split_off(rows));
     scene.run(py, conditions.threads(threads), jobs, |scene, (range, mut columns), watch| {
         let mut scratch = SCRATCH.take();
-        let Scratch { rays: read, starts: from, hits } = &mut scratch;
+        let Scratch { buffers, hits } = &mut scratch;
+        let read = R::buffer(buffers);
         rays.read(range.clone(), read);
         hits.resize(range.len(), Hit::MISS);
-        let from = read_starts(starts, range.clone(), from);
         if conditions.filter.is_none() {
-            scene.batch(read).from(from).accept(&conditions.accept).nearest(hits);
+            scene.batch(read).accept(&conditions.accept).nearest(hits);
         } else {
             conditions.each(scene, range.start, read, watch, |i, ray, accept| {
                 hits[i] = scene.nearest_accepted(ray, accept).unwrap_or(Hit::MISS);
@@ -56,27 +67,38 @@ pub(crate) fn nearest(
     conditions.finish()
 }
 
-/// Whether rays hit anything, into an array.
+/// Stores which rays hit anything.
 #[pyfunction]
 pub(crate) fn any(
     py: Python<'_>,
     scene: &NativeScene,
     rays: RayArrays<'_>,
-    start: Option<StartArrays<'_>>,
+    conditions: Conditions,
+    threads: usize,
+    out: PyReadwriteArray1<'_, bool>,
+) -> PyResult<()> {
+    match rays.given()? {
+        Given::Origins(rays) => any_of(py, scene, rays, conditions, threads, out),
+        Given::Starts(rays) => any_of(py, scene, rays, conditions, threads, out),
+    }
+}
+
+fn any_of<R: Rays>(
+    py: Python<'_>,
+    scene: &NativeScene,
+    rays: R,
     conditions: Conditions,
     threads: usize,
     mut out: PyReadwriteArray1<'_, bool>,
 ) -> PyResult<()> {
-    let (scene, rays, conditions) = (scene.get()?, rays.rays()?, conditions.checked()?);
-    let starts = start.as_ref().map(|s| Starts::new(s, rays.len())).transpose()?;
+    let (scene, conditions) = (scene.get()?, conditions.checked()?);
     let jobs = chunks_of(numbers(&mut out, rays.len())?);
     scene.run(py, conditions.threads(threads), jobs, |scene, (range, found), watch| {
         let mut scratch = SCRATCH.take();
-        let Scratch { rays: read, starts: from, .. } = &mut scratch;
+        let read = R::buffer(&mut scratch.buffers);
         rays.read(range.clone(), read);
-        let from = read_starts(starts, range.clone(), from);
         if conditions.filter.is_none() {
-            scene.batch(read).from(from).accept(&conditions.accept).any(found);
+            scene.batch(read).accept(&conditions.accept).any(found);
         } else {
             conditions.each(scene, range.start, read, watch, |i, ray, accept| {
                 found[i] = scene.any_accepted(ray, accept);
@@ -87,11 +109,16 @@ pub(crate) fn any(
     conditions.finish()
 }
 
-fn read_starts<'a>(
-    starts: Option<Starts<'_>>,
-    range: Range<usize>,
-    read: &'a mut Vec<PrimitiveRef>,
-) -> Option<&'a [PrimitiveRef]> {
-    starts?.read(range, read);
-    Some(read)
+/// Fails if rays cannot start at one of the points, and says why.
+#[pyfunction]
+pub(crate) fn check_start(py: Python<'_>, scene: &NativeScene, start: StartArrays<'_>) -> PyResult<()> {
+    let starts = start.starts()?;
+    let bad = scene.with(py, |scene| {
+        let failure = |row: usize| scene.check_start(&starts.get(row)).err().map(|error| (row, error));
+        (0..starts.len()).find_map(failure)
+    })?;
+    match bad {
+        None => Ok(()),
+        Some((row, error)) => Err(start_error((starts.len() > 1).then_some(row), &error)),
+    }
 }

@@ -1,6 +1,7 @@
 //! Arrays of numpy to rays and points, a chunk at a time, so that what is converted stays in the cache until it is traced.
 
-use bth::rays::{PrimitiveRef, Ray};
+use bth::TraceRay;
+use bth::rays::{PrimitiveRef, Ray, Start, StartRay};
 use numpy::ndarray::{ArrayView1, ArrayView2};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
@@ -125,88 +126,175 @@ impl Numbers<'_> {
     }
 }
 
-/// The arrays of a call that hold its rays.
+/// The arrays of a call that hold its rays: with origins, or with starts.
 #[derive(FromPyObject)]
 pub(crate) struct RayArrays<'py> {
     #[pyo3(item(0))]
-    origins: Vectors<'py>,
+    origins: Option<Vectors<'py>>,
     #[pyo3(item(1))]
     directions: Vectors<'py>,
     #[pyo3(item(2))]
     tmin: Bound1<'py>,
     #[pyo3(item(3))]
     tmax: Bound1<'py>,
+    #[pyo3(item(4))]
+    start: Option<StartArrays<'py>>,
 }
 
-/// Rays that may be shared between threads.
+/// Points of surfaces at which rays start.
+#[derive(FromPyObject)]
+pub(crate) struct StartArrays<'py> {
+    #[pyo3(item(0))]
+    instance: PyReadonlyArray1<'py, u32>,
+    #[pyo3(item(1))]
+    triangle: PyReadonlyArray1<'py, u32>,
+    #[pyo3(item(2))]
+    u: PyReadonlyArray1<'py, f32>,
+    #[pyo3(item(3))]
+    v: PyReadonlyArray1<'py, f32>,
+}
+
+/// The rays of a call, of either kind.
+pub(crate) enum Given<'a> {
+    Origins(OriginRays<'a>),
+    Starts(StartRays<'a>),
+}
+
+/// Rays of a call, which may be shared between threads.
+pub(crate) trait Rays: Copy + Sync {
+    type Ray: TraceRay;
+
+    /// Number of rays.
+    fn len(&self) -> usize;
+
+    /// Replaces `rays` by the rays of a range.
+    fn read(&self, range: Range<usize>, rays: &mut Vec<Self::Ray>);
+
+    /// The buffer for rays of this kind.
+    fn buffer(buffers: &mut Buffers) -> &mut Vec<Self::Ray>;
+}
+
+/// Buffers for the rays of a chunk.
+#[derive(Default)]
+pub(crate) struct Buffers {
+    rays: Vec<Ray>,
+    starts: Vec<StartRay>,
+}
+
+/// Rays with origins.
 #[derive(Clone, Copy)]
-pub(crate) struct Rays<'a> {
+pub(crate) struct OriginRays<'a> {
     origins: Rows<'a>,
     directions: Rows<'a>,
     tmin: Numbers<'a>,
     tmax: Numbers<'a>,
 }
 
+/// Rays that start on surfaces.
+#[derive(Clone, Copy)]
+pub(crate) struct StartRays<'a> {
+    starts: Starts<'a>,
+    directions: Rows<'a>,
+    tmax: Numbers<'a>,
+}
+
+/// Points of surfaces, which may be shared between threads.
+#[derive(Clone, Copy)]
+pub(crate) struct Starts<'a> {
+    instance: ArrayView1<'a, u32>,
+    triangle: ArrayView1<'a, u32>,
+    u: ArrayView1<'a, f32>,
+    v: ArrayView1<'a, f32>,
+}
+
 impl RayArrays<'_> {
     /// The rays. All arrays must have one length.
-    pub(crate) fn rays(&self) -> PyResult<Rays<'_>> {
-        let rays = Rays {
-            origins: self.origins.rows()?,
-            directions: self.directions.rows()?,
-            tmin: self.tmin.numbers(),
-            tmax: self.tmax.numbers(),
-        };
-        let count = rays.len();
+    pub(crate) fn given(&self) -> PyResult<Given<'_>> {
+        let (directions, tmax) = (self.directions.rows()?, self.tmax.numbers());
+        let count = directions.len();
         let same = |n: Option<usize>| n.is_none_or(|n| n == count);
-        if same(Some(rays.directions.len())) && same(rays.tmin.len()) && same(rays.tmax.len()) {
-            Ok(rays)
-        } else {
-            Err(PyValueError::new_err("origins, directions, tmin and tmax differ in length"))
+        let (given, fits) = match (&self.origins, &self.start) {
+            (Some(origins), None) => {
+                let (origins, tmin) = (origins.rows()?, self.tmin.numbers());
+                let fits = origins.len() == count && same(tmin.len());
+                (Given::Origins(OriginRays { origins, directions, tmin, tmax }), fits)
+            }
+            (None, Some(start)) => {
+                let starts = start.starts()?;
+                (Given::Starts(StartRays { starts, directions, tmax }), starts.len() == count)
+            }
+            _ => return Err(PyValueError::new_err("expected either origins or starts")),
+        };
+        match fits && same(tmax.len()) {
+            true => Ok(given),
+            false => Err(PyValueError::new_err("the arrays of rays differ in length")),
         }
     }
 }
 
-impl Rays<'_> {
-    /// Number of rays.
+impl StartArrays<'_> {
+    /// The points. All arrays must have one length.
+    pub(crate) fn starts(&self) -> PyResult<Starts<'_>> {
+        let (instance, triangle) = (self.instance.as_array(), self.triangle.as_array());
+        let starts = Starts { instance, triangle, u: self.u.as_array(), v: self.v.as_array() };
+        let count = starts.len();
+        match triangle.len() == count && starts.u.len() == count && starts.v.len() == count {
+            true => Ok(starts),
+            false => Err(PyValueError::new_err("start: its arrays differ in length")),
+        }
+    }
+}
+
+impl Starts<'_> {
+    /// Number of points.
     pub(crate) fn len(&self) -> usize {
+        self.instance.len()
+    }
+
+    /// The point of a row.
+    #[inline(always)]
+    pub(crate) fn get(&self, row: usize) -> Start {
+        let primitive = PrimitiveRef { instance: self.instance[row], triangle: self.triangle[row] };
+        Start { primitive, u: self.u[row], v: self.v[row] }
+    }
+}
+
+impl Rays for OriginRays<'_> {
+    type Ray = Ray;
+
+    fn len(&self) -> usize {
         self.origins.len()
     }
 
-    /// The rays of a range.
-    pub(crate) fn read(&self, range: Range<usize>, rays: &mut Vec<Ray>) {
-        rays.resize(range.len(), Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 });
+    fn read(&self, range: Range<usize>, rays: &mut Vec<Ray>) {
+        let none = Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 };
+        rays.resize(range.len(), none);
         self.origins.each(range.clone(), |i, origin| rays[i].origin = origin);
         self.directions.each(range.clone(), |i, direction| rays[i].direction = direction);
         self.tmin.each(range.clone(), |i, t| rays[i].tmin = t);
         self.tmax.each(range, |i, t| rays[i].tmax = t);
     }
+
+    fn buffer(buffers: &mut Buffers) -> &mut Vec<Ray> {
+        &mut buffers.rays
+    }
 }
 
-/// The triangles on which the rays of a call start: two arrays, of instances and of triangles.
-pub(crate) type StartArrays<'py> = (PyReadonlyArray1<'py, u32>, PyReadonlyArray1<'py, u32>);
+impl Rays for StartRays<'_> {
+    type Ray = StartRay;
 
-/// Triangles on which rays start, that may be shared between threads.
-#[derive(Clone, Copy)]
-pub(crate) struct Starts<'a> {
-    instances: ArrayView1<'a, u32>,
-    triangles: ArrayView1<'a, u32>,
-}
-
-impl<'a> Starts<'a> {
-    /// The triangles of so many rays.
-    pub(crate) fn new(arrays: &'a StartArrays<'_>, rays: usize) -> PyResult<Starts<'a>> {
-        let starts = Starts { instances: arrays.0.as_array(), triangles: arrays.1.as_array() };
-        if starts.instances.len() == rays && starts.triangles.len() == rays {
-            Ok(starts)
-        } else {
-            Err(PyValueError::new_err(format!("start: expected {rays} triangles, one for each ray")))
-        }
+    fn len(&self) -> usize {
+        self.starts.len()
     }
 
-    /// The triangles of a range of rays.
-    pub(crate) fn read(&self, range: Range<usize>, starts: &mut Vec<PrimitiveRef>) {
-        starts.clear();
-        starts
-            .extend(range.map(|i| PrimitiveRef { instance: self.instances[i], triangle: self.triangles[i] }));
+    fn read(&self, range: Range<usize>, rays: &mut Vec<StartRay>) {
+        rays.clear();
+        rays.extend(range.clone().map(|row| self.starts.get(row).ray([0.0; 3])));
+        self.directions.each(range.clone(), |i, direction| rays[i].direction = direction);
+        self.tmax.each(range, |i, t| rays[i].tmax = t);
+    }
+
+    fn buffer(buffers: &mut Buffers) -> &mut Vec<StartRay> {
+        &mut buffers.starts
     }
 }

@@ -92,12 +92,25 @@ def test_masks_are_copied(grouped, aimed):
         assert grouped.instance_masks.tolist() == [2]
 
 
-def test_hints_change_nothing_under_masks(grouped, aimed):
-    hits = grouped.nearest(*aimed)
+def test_conditions_hold_for_rays_that_start_on_surfaces(grouped, aimed):
+    hits, directions = grouped.nearest(*aimed), aimed[1]
+    every = grouped.all_hits(None, directions, start=hits)
     grouped.set_group_mask("part 1", 1)
-    for mask in (1, 2):
-        assert (grouped.nearest(*aimed, start=hits, mask=mask).t == grouped.nearest(*aimed, mask=mask).t).all()
-        assert (grouped.any(*aimed, start=hits, mask=mask) == grouped.any(*aimed, mask=mask)).all()
+    groups, seen = every.group, []
+    for condition, accepted in (
+        ({"mask": 1}, np.ones(len(every), bool)), ({"mask": 2}, np.array(every.group_name) != "part 1"),
+        ({"cull": "back"}, np.einsum("ij,ij->i", every.normal, directions[every.ray].astype(float)) < 0),
+        ({"filter": lambda candidate: candidate.triangle % 2 == 0}, every.triangle % 2 == 0),
+    ):
+        found = grouped.all_hits(None, directions, start=hits, **condition)
+        assert (found.triangle == every.triangle[accepted]).all() and (found.t == every.t[accepted]).all()
+        first = np.full(len(directions), np.inf, np.float32)
+        np.minimum.at(first, every.ray[accepted], every.t[accepted])
+        assert (grouped.nearest(None, directions, start=hits, **condition).t == first).all()
+        assert (grouped.any(None, directions, start=hits, **condition) == np.isfinite(first)).all()
+        assert (grouped.count(None, directions, start=hits, **condition) == np.bincount(every.ray[accepted], minlength=len(first))).all()
+        seen.append(int(accepted.sum()))
+    assert len(set(seen)) > 2 and len(set(groups)) > 1
 
 
 @pytest.mark.parametrize("call, error", [

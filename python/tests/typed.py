@@ -15,7 +15,8 @@ def nearest(scene: bth.Scene, rays: NDArray[np.float32]) -> NDArray[np.float64]:
     hits: bth.Hits = scene.nearest(rays[..., :3], rays[..., 3:], tmax=9, mask=3, cull="back", filter=keep)
     t: NDArray[np.float32] = hits.t
     triangle: NDArray[np.uint32] = hits.triangle
-    found: NDArray[np.bool_] = scene.any(hits.position, [0, 0, 1], start=hits)
+    found: NDArray[np.bool_] = scene.any(None, [0, 0, 1], start=hits)
+    scene.check_start((0, [0, 1], np.zeros((2, 2))))
     group: str = hits.group_name.item(0)
     surface: bth.SurfacePoints = hits.surface()
     assert t.shape == triangle.shape == found.shape == surface.texcoord.shape[:-1] and group == ""

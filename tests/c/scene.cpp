@@ -34,11 +34,21 @@ int main(int argc, char **argv) {
     const bth_ray beside = {{3, 3, 2}, 0, {0, 0, -1}, INFINITY};
     const bth_hit hit = scene.nearest(down);
     CHECK(hit.t == 2 && hit.surface.triangle == 0 && !bth::is_miss(hit) && bth::is_miss(scene.nearest(beside)));
-    CHECK(scene.any(down, &hit.surface) && !scene.any(beside));
+    CHECK(scene.any(down) && !scene.any(beside));
     const std::vector<bth_ray> rays = {beside, down};
     const std::vector<bth_hit> hits = scene.nearest_of(rays);
     CHECK(bth::is_miss(hits[0]) && std::memcmp(&hits[1], &hit, sizeof hit) == 0);
     CHECK((scene.any_of(rays) == std::vector<std::uint8_t>{0, 1}));
+
+    /* The ray along the surface does not hit the neighbour, which lies in the same plane. */
+    const std::vector<bth_start> starts = {bth::start_of(hit), bth::start_of(hits[0])};
+    const std::vector<std::array<float, 3>> across = {{1, 1, 0}, {0, 0, -1}};
+    CHECK(bth::is_miss(scene.nearest(starts[0], {1, 1, 0})) && !scene.any(starts[0], {0, 0, -1}, 5));
+    const std::vector<bth_hit> onward = scene.nearest_of(starts, across);
+    CHECK(bth::is_miss(onward[0]) && bth::is_miss(onward[1]));
+    CHECK((scene.any_of(starts, across) == std::vector<std::uint8_t>{0, 0}));
+    scene.check_start(starts[0]);
+
     CHECK(scene.instance_count() == 1 && scene.instance(0).visible == 1 && scene.frames().rate == 1);
     CHECK(scene.resident_bytes() > 0 && scene.seconds() == 0);
 
@@ -128,7 +138,17 @@ int main(int argc, char **argv) {
     } catch (const bth::error &e) {
         caught += e.code() == BTH_ERROR_ARGUMENT;
     }
+    try {
+        scene.check_start(starts[1]);
+    } catch (const bth::error &e) {
+        caught += e.code() == BTH_ERROR_ARGUMENT && std::strstr(e.what(), "BTH-S003") != nullptr;
+    }
+    try {
+        scene.nearest_of(starts, std::vector<std::array<float, 3>>(1));
+    } catch (const bth::error &e) {
+        caught += e.code() == BTH_ERROR_ARGUMENT;
+    }
     scene.nearest(nullptr, nullptr, 0);
-    CHECK(caught == 5 && scene.any(down));
+    CHECK(caught == 7 && scene.any(down));
     return 0;
 }

@@ -29,10 +29,8 @@ int main(int argc, char **argv) {
         n++;
     bth_hit hit[16];
     uint8_t any[16];
-    bth_surface from[16];
     bth_nearest(scene, ray, NULL, hit, n);
-    for (size_t i = 0; i < n; i++) from[i] = hit[i].surface;
-    bth_any(scene, ray, from, any, n);
+    bth_any(scene, ray, NULL, any, n);
     for (size_t i = 0; i < n; i++)
         printf("%.9g %.9g %.9g %u %u %u\n", hit[i].t, hit[i].u, hit[i].v, hit[i].surface.instance,
                hit[i].surface.triangle, any[i]);

@@ -1,7 +1,7 @@
 //! Queries of many rays.
 
-use bth::Scene;
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::{Hit, PrimitiveRef, Ray, StartRay};
+use bth::{Scene, TraceRay};
 
 /// Rays that are traced together.
 const BLOCK: usize = 1024;
@@ -25,6 +25,30 @@ pub(crate) fn hit(columns: &[u32], count: usize, i: usize) -> Hit {
 /// `scene` is open, `rays` points to `count` rays, and `hits` to as many words as stated, which overlap nothing else.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_nearest(scene: *const Scene, rays: *const Ray, count: usize, hits: *mut u32) {
+    // SAFETY: the contract is the same.
+    unsafe { nearest(scene, rays, count, hits) }
+}
+
+/// Nearest hits of rays that start on surfaces, as by [`bth_nearest`].
+///
+/// # Safety
+/// As for [`bth_nearest`].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_nearest_starts(
+    scene: *const Scene,
+    rays: *const StartRay,
+    count: usize,
+    hits: *mut u32,
+) {
+    // SAFETY: the contract is the same.
+    unsafe { nearest(scene, rays, count, hits) }
+}
+
+/// Nearest hits of rays of a kind.
+///
+/// # Safety
+/// As for [`bth_nearest`].
+unsafe fn nearest<R: TraceRay>(scene: *const Scene, rays: *const R, count: usize, hits: *mut u32) {
     // SAFETY: by contract the scene is open, and the addresses are those of arrays of these lengths that do not overlap. All bit
     // patterns are valid for their elements.
     let (scene, rays, columns) = unsafe {
@@ -45,13 +69,37 @@ pub unsafe extern "C" fn bth_nearest(scene: *const Scene, rays: *const Ray, coun
     }
 }
 
-/// Whether rays hit anything: a byte a ray, 0 or 1.
+/// Which rays hit anything: a byte a ray, 0 or 1.
 ///
 /// # Safety
 /// As for [`bth_nearest`], with `count` bytes at `found`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_any(scene: *const Scene, rays: *const Ray, count: usize, found: *mut u8) {
-    // SAFETY: as in `bth_nearest`.
+    // SAFETY: the contract is the same.
+    unsafe { any(scene, rays, count, found) }
+}
+
+/// Which rays that start on surfaces hit anything, as by [`bth_any`].
+///
+/// # Safety
+/// As for [`bth_any`].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_any_starts(
+    scene: *const Scene,
+    rays: *const StartRay,
+    count: usize,
+    found: *mut u8,
+) {
+    // SAFETY: the contract is the same.
+    unsafe { any(scene, rays, count, found) }
+}
+
+/// Which rays of a kind hit anything.
+///
+/// # Safety
+/// As for [`bth_any`].
+unsafe fn any<R: TraceRay>(scene: *const Scene, rays: *const R, count: usize, found: *mut u8) {
+    // SAFETY: as in `nearest`.
     let (scene, rays, found) = unsafe {
         let found = std::slice::from_raw_parts_mut(found, count);
         (&*scene, std::slice::from_raw_parts(rays, count), found)
@@ -72,13 +120,13 @@ pub unsafe extern "C" fn bth_any(scene: *const Scene, rays: *const Ray, count: u
 /// As for [`bth_nearest`], with as many words at `steps` as stated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_steps(scene: *const Scene, rays: *const Ray, count: usize, steps: *mut u32) {
-    // SAFETY: as in `bth_nearest`.
+    // SAFETY: as in `nearest`.
     let (scene, rays, columns) = unsafe {
         let columns = std::slice::from_raw_parts_mut(steps, STEP_COLUMNS * count);
         (&*scene, std::slice::from_raw_parts(rays, count), columns)
     };
     for (i, ray) in rays.iter().enumerate() {
-        let (_, steps) = scene.nearest_counted(ray, PrimitiveRef::NONE);
+        let (_, steps) = scene.nearest_counted(ray);
         let words = [steps.nodes, steps.leaves, steps.triangles, steps.tets];
         for (k, word) in words.into_iter().enumerate() {
             columns[k * count + i] = word;

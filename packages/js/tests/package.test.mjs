@@ -116,6 +116,89 @@ test("answers of camera rays to a scene of 18 instances have the bits of bthc", 
     assert.ok(sameAnswers(file, (bounds) => raysInto(bounds, 3000, 3)) > 500);
 });
 
+/** Directions of rays: three numbers each from -1 to 1. */
+function directionsOf(count, seed) {
+    const random = numbers(seed);
+    return Float32Array.from({ length: 3 * count }, () => 2 * random() - 1);
+}
+
+/** The rows of columns, as an object of its own. */
+const rowsOf = ({ instance, triangle, u, v }, from, to) => ({
+    count: to - from, instance: instance.subarray(from, to), triangle: triangle.subarray(from, to), u: u.subarray(from, to), v: v.subarray(from, to),
+});
+
+test("rays that start on surfaces leave them, and hit what is behind", () => {
+    const [model, file] = [join(folder, "room.obj"), join(folder, "room.bth")];
+    const corners = Array.from({ length: 8 }, (_, i) => [i & 1, (i >> 1) & 1, i >> 2].join(" "));
+    const faces = [[1, 2, 4, 3], [5, 6, 8, 7], [1, 2, 6, 5], [3, 4, 8, 7], [1, 3, 7, 5], [2, 4, 8, 6]];
+    writeFileSync(model, [...corners.map((at) => `v ${at}`), ...faces.map((face) => `f ${face.join(" ")}`)].join("\n"));
+    execFileSync(BTHC, ["compile", model, "-o", file, "--quiet"]);
+    const scene = bth.open(readFileSync(file)), random = numbers(9);
+    // From the middle to all sides, more than a chunk; then on through the room, and out of it.
+    const count = 5000, rays = new Float32Array(8 * count);
+    for (let i = 0; i < count; i++) rays.set([0.5, 0.5, 0.5, 0, 2 * random() - 1, 2 * random() - 1, 2 * random() - 1, Infinity], 8 * i);
+    const hits = scene.nearest(rays), { position } = scene.surface(hits);
+    const inward = Float32Array.from(position, (x) => 0.5 - x + 0.1 * (random() - 0.5)), outward = inward.map((x) => -x);
+    const onward = scene.nearestStarts(hits, inward);
+    assert.ok(onward.t.every((t, i) => t > 0.5 && t < 10 && onward.triangle[i] !== hits.triangle[i]));
+    assert.ok(scene.anyStarts(hits, inward).every((any) => any === 1));
+    assert.ok(scene.anyStarts(hits, outward).every((any) => any === 0));
+    // An end for all, and one for each.
+    assert.ok(scene.nearestStarts(hits, inward, 0.5).triangle.every((triangle) => triangle === 0xffffffff));
+    const ends = onward.t.map((t, i) => (i % 2 ? t : t / 2));
+    assert.deepEqual([...scene.anyStarts(hits, inward, ends)], [...ends.keys()].map((i) => i % 2));
+    // Alone and together.
+    for (const i of [0, 4095, 4096, 4999]) {
+        const one = scene.nearestStarts(rowsOf(hits, i, i + 1), inward.subarray(3 * i, 3 * i + 3));
+        for (const name of ["t", "u", "v", "instance", "triangle"]) assert.deepEqual(bits(one[name]), bits(onward[name].slice(i, i + 1)));
+    }
+    scene.close();
+    assert.throws(() => scene.nearestStarts(hits, inward), BthError);
+});
+
+test("rays from hits of a scene are the same alone, together and for any hit", () => {
+    for (const name of ["gyroid.bth", "carousel.bth"]) {
+        const scene = bth.open(readFileSync(join(folder, name))), count = 64 * 64;
+        const hits = scene.nearest(cameraRays(scene.bounds, 64)), directions = directionsOf(count, 10);
+        const onward = scene.nearestStarts(hits, directions), any = scene.anyStarts(hits, directions);
+        let found = 0;
+        for (let i = 0; i < count; i++) {
+            assert.equal(any[i], Number(onward.t[i] < Infinity));
+            assert.ok(onward.t[i] > 0);
+            if (hits.t[i] === Infinity) assert.equal(any[i], 0);
+            found += any[i];
+        }
+        assert.ok(found > 200, `${name}: ${found}`);
+        for (let i = 0; i < count; i += 37) {
+            const one = scene.nearestStarts(rowsOf(hits, i, i + 1), directions.subarray(3 * i, 3 * i + 3));
+            assert.deepEqual([one.t[0], one.u[0], one.v[0], one.triangle[0]], [onward.t[i], onward.u[i], onward.v[i], onward.triangle[i]]);
+        }
+        scene.close();
+    }
+});
+
+test("what is no start is a miss, and other arguments are refused", () => {
+    const scene = bth.open(readFileSync(join(conformance, "valid/triangle.bth"))), up = Float32Array.of(0, 0, 1);
+    const start = (instance, triangle, u, v) => ({ count: 1, instance: Uint32Array.of(instance), triangle: Uint32Array.of(triangle), u: Float32Array.of(u), v: Float32Array.of(v) });
+    const good = start(0, 0, 0.25, 0.25);
+    for (const bad of [start(1, 0, 0, 0), start(0, 9, 0, 0), start(0, 0, -1, 0), start(0, 0, 0.75, 0.5), start(0, 0, NaN, 0), good]) {
+        assert.equal(scene.nearestStarts(bad, up).t[0], Infinity);
+        assert.deepEqual([...scene.anyStarts(bad, up)], [0]);
+    }
+    assert.equal(scene.nearestStarts({ ...good, count: 0, instance: new Uint32Array(0), triangle: new Uint32Array(0), u: new Float32Array(0), v: new Float32Array(0) }, new Float32Array(0)).count, 0);
+    const refused = (text, ...given) => {
+        for (const query of ["nearestStarts", "anyStarts"]) assert.throws(() => scene[query](...given), (error) => error instanceof TypeError && text.test(error.message), String(text));
+    };
+    refused(/^starts: expected hits, .* found undefined$/);
+    refused(/^starts: expected hits, .* found Array$/, [good], up);
+    refused(/^starts.u: expected a Float32Array of 1 elements, .* found Float64Array of 1$/, { ...good, u: Float64Array.of(0) }, up);
+    refused(/^starts.triangle: expected a Uint32Array of 1 elements, .* found Uint32Array of 2$/, { ...good, triangle: new Uint32Array(2) }, up);
+    refused(/^directions: expected a Float32Array of 3 elements, three numbers a ray; found Array of 3$/, good, [0, 0, 1]);
+    refused(/^directions: .* found Float32Array of 6$/, good, new Float32Array(6));
+    refused(/^tmax: expected a Float32Array of 1 elements, or a number for all rays; found Array of 1$/, good, up, [1]);
+    refused(/^tmax: .* found Float32Array of 2$/, good, up, new Float32Array(2));
+});
+
 test("damaged files are refused with the code of the specification", () => {
     const names = readdirSync(join(conformance, "invalid")).filter((name) => name.endsWith(".bth"));
     let refused = 0;
@@ -367,7 +450,9 @@ test("the types need no library but ES2022", (t) => {
             const bth: Bth = await load(new Uint8Array(8));
             await load(Promise.resolve(bth.module));
             const scene: Scene = bth.open(new ArrayBuffer(8));
-            const surface: Surface = scene.surface(scene.nearest(Float32Array.of(1)));
+            const hits = scene.nearest(Float32Array.of(1));
+            const surface: Surface = scene.surface(scene.nearestStarts(hits, Float32Array.of(1), 2));
+            scene.anyStarts({ count: 0, u: hits.u, v: hits.v, instance: hits.instance, triangle: hits.triangle }, hits.t, hits.t);
             // @ts-expect-error: it is not to be set.
             scene.objects = 1;
             // @ts-expect-error: rays are no array.

@@ -4,8 +4,6 @@ import { directionThrough, onGround } from "./camera.js";
 import { texel } from "./materials.js";
 import { add, blend, cosineDirection, dot, length, mix, samplePoint, scale, tilted, unit } from "./vectors.js";
 
-/** Distance from a surface at which secondary rays start, relative to the diagonal of the scene: more than the rounding of points. */
-const OFFSET = 2e-5;
 /** Ambient-occlusion rays of a sample in mode shaded and in mode ao. */
 const AMBIENT_RAYS = 2, AO_RAYS = 4;
 /** Length of ambient-occlusion rays relative to the diagonal of the scene, of pictures from outside and from inside. */
@@ -68,9 +66,8 @@ class Rays {
         this.numbers = new Float32Array(8 * capacity);
         this.count = 0;
     }
-    push(origin, direction, tmax, tmin = 0) {
+    push(origin, direction, tmax) {
         const { numbers } = this, at = 8 * this.count++;
-        numbers[at + 3] = tmin;
         for (let k = 0; k < 3; k++) {
             numbers[at + k] = origin[k];
             numbers[at + 4 + k] = direction[k];
@@ -79,6 +76,49 @@ class Rays {
     }
     get used() {
         return this.numbers.subarray(0, 8 * this.count);
+    }
+}
+
+/** Rays that start on surfaces and are traced together. */
+class StartRays {
+    constructor(capacity) {
+        this.columns = Object.fromEntries(["u", "v", "tmax"].map((name) => [name, new Float32Array(capacity)]));
+        for (const name of ["instance", "triangle"]) this.columns[name] = new Uint32Array(capacity);
+        this.directions = new Float32Array(3 * capacity);
+        this.count = 0;
+    }
+    push(start, direction, tmax) {
+        const { columns, directions } = this, i = this.count++;
+        columns.instance[i] = start.instance;
+        columns.triangle[i] = start.triangle;
+        columns.u[i] = start.u;
+        columns.v[i] = start.v;
+        columns.tmax[i] = tmax;
+        for (let k = 0; k < 3; k++) directions[3 * i + k] = direction[k];
+    }
+    /** The arguments of the queries. */
+    get used() {
+        const { count } = this, used = { count };
+        for (const [name, column] of Object.entries(this.columns)) used[name] = column.subarray(0, count);
+        return [used, this.directions.subarray(0, 3 * count), used.tmax];
+    }
+}
+
+/** Rays that go on from points: from surfaces, at the exact points of their starts, and from the ground. */
+class SecondaryRays {
+    constructor(capacity) {
+        this.fromSurfaces = new StartRays(capacity);
+        this.fromGround = new Rays(capacity);
+    }
+    push(at, direction, tmax) {
+        if (at.start === null) this.fromGround.push(at.point, direction, tmax);
+        else this.fromSurfaces.push(at.start, direction, tmax);
+    }
+    /** Traces all; returns a function that says for one ray of a point after the other, in the order of `push`, 1 if it is blocked. */
+    blocked(scene) {
+        const surfaces = scene.anyStarts(...this.fromSurfaces.used), ground = scene.any(this.fromGround.used);
+        let surface = 0, onGround = 0;
+        return (at) => (at.start === null ? ground[onGround++] : surfaces[surface++]);
     }
 }
 
@@ -96,24 +136,28 @@ const vector = (array, i) => [array[3 * i], array[3 * i + 1], array[3 * i + 2]];
  */
 function visiblePoints({ scene, materials }, { camera, sample }, samples) {
     const points = new Array(samples.length).fill(null);
-    let rays = cameraRays(camera, samples), indices = samples.map((_, i) => i);
+    // How far the ray of each sample has come.
+    const reached = new Float64Array(samples.length);
+    let hits = scene.nearest(cameraRays(camera, samples)), indices = samples.map((_, i) => i);
     for (let layer = 0; indices.length > 0; layer++) {
-        const hits = scene.nearest(rays), surface = scene.surface(hits);
-        const further = new Rays(indices.length), passed = [];
+        const surface = scene.surface(hits);
+        const further = new StartRays(indices.length), passed = [];
         for (let i = 0; i < indices.length; i++) {
             if (hits.t[i] === Infinity) continue;
             const { direction, pixel } = samples[indices[i]], seen = lookOf(materials, surface, i);
+            reached[indices[i]] += hits.t[i];
+            seen.start = { instance: hits.instance[i], triangle: hits.triangle[i], u: hits.u[i], v: hits.v[i] };
             if (seen.alpha < 1 && layer + 1 < MOST_LAYERS && seen.alpha <= samplePoint(pixel, 3 + layer, sample)[0]) {
-                // From the next number behind the hit on.
-                further.push(camera.eye, direction, Infinity, hits.t[i] * (1 + 2 ** -23));
+                further.push(seen.start, direction, Infinity);
                 passed.push(indices[i]);
                 continue;
             }
-            seen.point = add(camera.eye, direction, hits.t[i]);
+            seen.point = add(camera.eye, direction, reached[indices[i]]);
             turnToCamera(seen, surface, i, direction);
             points[indices[i]] = seen;
         }
-        [rays, indices] = [further.used, passed];
+        hits = scene.nearestStarts(...further.used);
+        indices = passed;
     }
     return points;
 }
@@ -135,7 +179,7 @@ const NO_LIGHT = [0, 0, 0];
 function lookOf(materials, surface, i) {
     const values = surface.color, from = 4 * i;
     const color = [values[from], values[from + 1], values[from + 2]];
-    const seen = { color, emission: NO_LIGHT, alpha: 1, unlit: false, point: null, geometric: null, normal: null };
+    const seen = { color, emission: NO_LIGHT, alpha: 1, unlit: false, start: null, point: null, geometric: null, normal: null };
     const material = materials.of(surface.object[i], surface.material[i]);
     if (material === undefined) {
         const isWhite = color[0] === 1 && color[1] === 1 && color[2] === 1;
@@ -165,12 +209,6 @@ function texelAt(texture, surface, i) {
     return texel(texture, coordinates[2 * i], coordinates[2 * i + 1]);
 }
 
-/** A point just above a surface. Far from the origin the spacing of f32 numbers exceeds the relative distance. */
-function above(point, normal, diagonal) {
-    const greatest = Math.max(Math.abs(point[0]), Math.abs(point[1]), Math.abs(point[2]));
-    return add(point, normal, Math.max(OFFSET * diagonal, greatest * 2 ** -21));
-}
-
 function normals(shown, job, samples) {
     const { camera } = job;
     const shade = (along) => 0.5 + 0.5 * along;
@@ -189,32 +227,30 @@ function steps({ scene }, { camera }, samples) {
 function ambientOcclusion(shown, job, samples) {
     const { scene } = shown;
     const points = visiblePoints(shown, job, samples);
-    const rays = new Rays(AO_RAYS * samples.length);
+    const rays = new SecondaryRays(AO_RAYS * samples.length);
     points.forEach((at, i) => {
-        if (at !== null) pushAmbient(rays, job, at.point, at.geometric, samples[i].pixel, AO_RAYS);
+        if (at !== null) pushAmbient(rays, job, at, samples[i].pixel, AO_RAYS);
     });
-    const blocked = scene.any(rays.used);
-    let next = 0;
+    const blocked = rays.blocked(scene);
     return points.map((at) => {
         if (at === null) return DARK;
-        const open = 1 - mean(blocked, next, AO_RAYS);
-        next += AO_RAYS;
+        const open = 1 - mean(blocked, at, AO_RAYS);
         return [0.9 * open, 0.9 * open, 0.9 * open];
     });
 }
 
 /** Adds rays over the hemisphere above a point. */
-function pushAmbient(rays, { diagonal, inside, sample }, point, normal, pixel, count) {
-    const origin = above(point, normal, diagonal);
+function pushAmbient(rays, { diagonal, inside, sample }, at, pixel, count) {
     for (let ray = 0; ray < count; ray++) {
-        const at = samplePoint(pixel, 2, sample * count + ray);
-        rays.push(origin, cosineDirection(normal, at), diagonal * (inside ? OPEN_INSIDE : OPEN_OUTSIDE));
+        const direction = cosineDirection(at.geometric, samplePoint(pixel, 2, sample * count + ray));
+        rays.push(at, direction, diagonal * (inside ? OPEN_INSIDE : OPEN_OUTSIDE));
     }
 }
 
-const mean = (values, from, count) => {
+/** The share of the next rays of a point that are blocked. */
+const mean = (blocked, at, count) => {
     let sum = 0;
-    for (let i = 0; i < count; i++) sum += values[from + i];
+    for (let i = 0; i < count; i++) sum += blocked(at);
     return sum / count;
 };
 
@@ -232,23 +268,21 @@ function shaded(shown, job, samples) {
         const flat = length(add(away, camera.vertical, -dot(away, camera.vertical))) / diagonal;
         // Beyond a few diagonals the shadow is too faint to be seen.
         if (flat > 3) return null;
-        return { point, geometric: camera.vertical, normal: camera.vertical, shadow: Math.exp(-((flat / 1.1) ** 2)) };
+        return { start: null, point, geometric: camera.vertical, normal: camera.vertical, shadow: Math.exp(-((flat / 1.1) ** 2)) };
     });
     const each = 1 + AMBIENT_RAYS;
-    const rays = new Rays(each * samples.length);
+    const rays = new SecondaryRays(each * samples.length);
     points.forEach((at, i) => {
         if (at === null || at.unlit) return;
-        at.toKey = pushKey(rays, lights, job, at, samples[i].pixel);
-        pushAmbient(rays, job, at.point, at.geometric, samples[i].pixel, AMBIENT_RAYS);
+        pushKey(rays, lights, job, at, samples[i].pixel);
+        pushAmbient(rays, job, at, samples[i].pixel, AMBIENT_RAYS);
     });
-    const blocked = scene.any(rays.used);
-    let next = 0;
+    const blocked = rays.blocked(scene);
     return points.map((at, i) => {
         const behind = background(samples[i]);
         if (at === null) return behind;
         if (at.unlit) return at.color;
-        const key = 1 - blocked[next], open = 1 - mean(blocked, next + 1, AMBIENT_RAYS);
-        next += each;
+        const key = at.facesKey ? 1 - blocked(at) : 0, open = 1 - mean(blocked, at, AMBIENT_RAYS);
         if (at.shadow !== undefined) return scale(behind, 1 - at.shadow * (0.62 * (1 - open) + 0.3 * (1 - key)));
         return shoulder(lit(at, lights, camera, samples[i].direction, key, open));
     });
@@ -262,15 +296,15 @@ function studio({ camera, inside, diagonal }) {
     return { fill, key: inside ? null : unit(direction), lamp: add(camera.eye, up, LAMP_HEIGHT * diagonal) };
 }
 
-/** Adds the ray to the key light; returns its unit direction without the light's radius. */
+/** Notes the unit direction to the key light without the light's radius, and adds a ray to it if it is in front of the surface. */
 function pushKey(rays, lights, { diagonal, sample }, at, pixel) {
     const toLamp = add(lights.lamp, at.point, -1);
-    const toKey = lights.key ?? unit(toLamp);
+    at.toKey = lights.key ?? unit(toLamp);
     const distance = lights.key === null ? length(toLamp) * 0.999 : 4 * diagonal;
     const [x, y] = samplePoint(pixel, 1, sample);
-    const to = unit(tilted(toKey, KEY_RADIUS * Math.sqrt(y), 1, 2 * Math.PI * x));
-    rays.push(above(at.point, at.geometric, diagonal), to, distance);
-    return toKey;
+    const to = unit(tilted(at.toKey, KEY_RADIUS * Math.sqrt(y), 1, 2 * Math.PI * x));
+    at.facesKey = dot(to, at.geometric) > 0;
+    if (at.facesKey) rays.push(at, to, distance);
 }
 
 /** The light that leaves a point towards the camera; `key` and `open` are the visible shares of key light and hemisphere. */

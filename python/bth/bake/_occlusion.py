@@ -28,7 +28,7 @@ def ambient_occlusion(
     progress: see `bth.compile`.
 
     Returns (n,) float32: the share of rays that hit nothing, of directions with a density proportional to the cosine to the normal; NaN
-    where the point has no normal. Rays start as `SurfacePoints.origins` says, so that no surface hides itself.
+    where the point has no normal. Rays start on the surface itself, as `SurfacePoints.leaving` says, and no surface hides itself.
     """
     if rays < 1:
         raise ValueError(f"rays: expected at least 1, got {rays}")
@@ -42,12 +42,11 @@ def ambient_occlusion(
     sides = SIDES[side]
     for part in chunks(len(usable), rays * len(sides), "ambient occlusion", progress):
         points = usable[part]
-        start = at.instance[points, None], at.triangle[points, None]
         open_rays = []
         for sign in sides:
             directions = hemisphere(sign * at.normal[points], seed, points, rays).astype(np.float32)
-            origins = at.origins(sign)[points, None]
-            blocked = scene.any(origins, directions, tmax=distance, start=start, threads=threads)
-            open_rays.append(rays - blocked.sum(axis=1))
+            start, leaves = at.leaving(points, directions, sign)
+            blocked = scene.any(None, directions, tmax=distance, start=start, threads=threads)
+            open_rays.append((leaves & ~blocked).sum(axis=1))
         result[points] = np.maximum.reduce(open_rays) / np.float64(rays)
     return result

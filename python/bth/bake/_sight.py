@@ -26,14 +26,20 @@ def line_of_sight(scene: Scene, observers: ArrayLike, targets: ArrayLike, *, thr
     """
     starts, ends, shape = _arrays.together(targets, "targets", observers, "observers")
     starts, ends = starts.astype(np.float32), ends.astype(np.float32)
-    finite = np.isfinite(starts).all(axis=1) & np.isfinite(ends).all(axis=1)
+    directions, tmax, finite = _lines(starts, ends)
+    blocked = scene.any(starts, directions, tmin=_BEGIN, tmax=tmax, threads=threads)
+    return (finite & ~blocked).reshape(shape)
+
+
+def _lines(starts: NDArray[np.floating], ends: NDArray[np.floating]) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Directions and largest t of lines between points (..., 3), and whether both ends are finite."""
+    finite = np.isfinite(starts).all(axis=-1) & np.isfinite(ends).all(axis=-1)
     with np.errstate(over="ignore", invalid="ignore"):
         directions = ends.astype(np.float64) - starts
         # Halved where the difference has no float32.
-        far = np.abs(directions).max(axis=1, initial=0.0) > np.finfo(np.float32).max
+        far = np.abs(directions).max(axis=-1, initial=0.0) > np.finfo(np.float32).max
         directions[far] *= 0.5
-    blocked = scene.any(starts, directions, tmin=_BEGIN, tmax=np.where(far, 2.0, 1.0) * _END, threads=threads)
-    return (finite & ~blocked).reshape(shape)
+    return directions, np.where(far, 2.0, 1.0) * _END, finite
 
 
 def viewshed(
@@ -43,8 +49,9 @@ def viewshed(
     """Which points of surfaces are seen by observers, as on a terrain.
 
     observers: (k, 3) in world space; see `above_ground`.
-    at: the points, by default `bake.at_vertices(scene)`. Lines start as `SurfacePoints.origins` says.
-    height: of targets above the points, along the unit vector `up`, in world units: that of a mast, say.
+    at: the points, by default `bake.at_vertices(scene)`.
+    height: of targets above the points, along the unit vector `up`, in world units: that of a mast, say. With 0 lines start on the
+    surface itself, as `SurfacePoints.leaving` says, and points are seen from the front.
 
     Returns (k, n) bool. Points without normal are not seen.
     """
@@ -54,10 +61,16 @@ def viewshed(
     if observers.ndim != 2:
         raise ValueError(f"observers: expected the shape (k, 3), got {observers.shape}")
     at = at_vertices(scene) if at is None else at
-    targets = at.origins() + height * np.asarray(up, np.float64)
     seen = np.zeros((len(observers), len(at)), bool)
     for part in chunks(len(at), len(observers), "lines of sight", progress):
-        seen[:, part] = line_of_sight(scene, observers[:, None], targets[part], threads=threads)
+        if height != 0:
+            targets = at.position[part] + height * np.asarray(up, np.float64)
+            seen[:, part] = line_of_sight(scene, observers[:, None], targets, threads=threads)
+            continue
+        directions, tmax, finite = _lines(at.position[part, None], observers.astype(np.float32))
+        start, leaves = at.leaving(np.arange(len(at))[part], directions)
+        blocked = scene.any(None, directions, tmax=tmax, start=start, threads=threads)
+        seen[:, part] = (finite & leaves & ~blocked).T
     return seen & at.usable
 
 

@@ -11,8 +11,8 @@ from .._scene import Scene
 from ._arithmetic import Floats, angle_between, dot, unit
 from ._errors import lacks_geometry
 
-#: Faces that turn from the normal of a vertex by more than the angle of this cosine (89 degrees) do not raise its start any further.
-_STEEPEST = 1 / 64
+#: Weights that the other two corners of a face have in a start next to one: the least with which float32 has all weights exactly.
+_NEXT = np.float32(2.0**-24)
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,7 @@ class WorldMesh:
     vertices: (n, 3) float64. Those of an instance follow one another.
     faces: (m, 3) int64, rows of `vertices`, counter-clockwise from the front; those of mirrored instances are turned round.
     instance, triangle: (m,) uint32, what each face is in hits.
+    mirrored: for each instance whether its faces were turned round.
     """
 
     vertices: Floats
@@ -29,7 +30,7 @@ class WorldMesh:
     instance: NDArray[np.uint32]
     triangle: NDArray[np.uint32]
     _first: NDArray[np.int64]
-    _mirrored: NDArray[np.bool_]
+    mirrored: NDArray[np.bool_]
 
     def rows(self, instance: NDArray[np.uint32], triangle: NDArray[np.uint32]) -> NDArray[np.int64]:
         """The faces that are these triangles of these instances; the last for `bth.NONE`."""
@@ -41,7 +42,7 @@ class WorldMesh:
         """Values of vertices, (n,) or (n, k), interpolated at hits."""
         faces = self.faces[self.rows(instance, triangle)]
         # In faces that were turned round, the second vertex of the triangle is the third.
-        mirrored = self._mirrored[np.where(triangle == NONE, 0, instance)]
+        mirrored = self.mirrored[np.where(triangle == NONE, 0, instance)]
         u, v = np.where(mirrored, v, u).astype(np.float64), np.where(mirrored, u, v).astype(np.float64)
         weights = np.stack([1.0 - u - v, u, v], axis=-1)
         corners = values[faces]
@@ -117,60 +118,86 @@ def _transformed(transform: Floats, points: NDArray[np.float32]) -> Floats:
 
 
 @dataclass(frozen=True)
+class FacesAround:
+    """The faces around points: those of point i are the rows first[i] to first[i + 1]. The last row of all is none.
+
+    instance, triangle, u, v: where rays start on the face. normal: (m, 3), unit.
+    """
+
+    first: NDArray[np.int64]
+    instance: NDArray[np.uint32]
+    triangle: NDArray[np.uint32]
+    u: NDArray[np.float32]
+    v: NDArray[np.float32]
+    normal: Floats
+
+    @staticmethod
+    def of(counts: NDArray[np.int64], instance, triangle, u, v, normal) -> "FacesAround":
+        """The faces of so many for each point, without the last row."""
+        first = np.append([0], np.cumsum(counts))
+        instance, triangle = (np.append(rows, np.uint32(NONE)) for rows in (instance, triangle))
+        u, v = (np.append(weights, np.float32(0)) for weights in (u, v))
+        return FacesAround(first, instance, triangle, u, v, normal)
+
+
+#: Points at which rays start, as queries take them: instances, triangles and weights.
+Start = tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float32]]
+
+
+@dataclass(frozen=True)
 class SurfacePoints:
     """Points on the surfaces of a scene, from which rays start.
 
     position: (n, 3) float64, world space.
     normal: (n, 3) float64, unit; zeros where all triangles at the point are without area. No rays start there.
-    lift: (n,) float64, the distance along the normal, in world units, that takes a start off the surface; see `origins`.
-    instance, triangle: (n,) uint32, a triangle at the point.
+    instance, triangle: (n,) uint32, a triangle at the point. u, v: (n,) float32, the point's weights in it.
     vertex: (n,) int64, the vertex of `mesh` that the point is, or -1.
     mesh: the scene's mesh.
+    around: the faces around the points.
     """
 
     position: Floats
     normal: Floats
-    lift: Floats
     instance: NDArray[np.uint32]
     triangle: NDArray[np.uint32]
+    u: NDArray[np.float32]
+    v: NDArray[np.float32]
     vertex: NDArray[np.int64]
     mesh: WorldMesh
+    around: FacesAround
 
     def __len__(self) -> int:
         return len(self.position)
 
-    def origins(self, side: int = 1) -> NDArray[np.float32]:
-        """Where rays start: just above the surface (side 1) or just below (-1), (n, 3) float32.
+    def starts(self, points: NDArray[np.int64]) -> Start:
+        """The points of some rows, exactly, as `start=` of queries takes them."""
+        return self.instance[points], self.triangle[points], np.stack([self.u[points], self.v[points]], axis=-1)
 
-        A point of a surface is rounded to float32 and may come to lie on either side of its triangle. Tracing is exact, so no more
-        than this rounding has to be overcome. With B the largest coordinate of the scene's box in magnitude, a coordinate is off by at most
-        2^-24 B and the point by less than 2^-23 B, so a lift of 2^-22 B is enough. At a vertex the lift is divided by the cosine between its
-        normal and the steepest face, so that the start is above all faces there. In instances with a transform rays are rounded
-        once more, and the lift is twice the bound that docs/accuracy.md states for them.
+    def leaving(self, points: NDArray[np.int64], directions: NDArray[np.floating], side: int = 1) -> tuple[Start, NDArray[np.bool_]]:
+        """Where rays leave surfaces to a side, the front (1) or the back (-1), and which of them do.
+
+        points: (n,) rows. directions: (n, rays, 3). Returns what `start=` of queries takes, (n, rays), and bool (n, rays). The others
+        have no start, and miss.
+
+        Rays from a vertex start on a face around it, that from which they rise most, a 2^-24 of its edges away from the vertex. So the
+        other faces at a concave vertex hide what is behind them, and those at a convex one hide nothing.
         """
-        return (self.position + side * self.lift[:, None] * self.normal).astype(np.float32)
+        around, shape = self.around, directions.shape[:-1]
+        first, counts = around.first[points], np.diff(around.first)[points]
+        rows, highest = np.full(shape, -1), np.full(shape, -1.0)
+        for k in range(int(counts.max(initial=0))):
+            has = np.nonzero(counts > k)[0]
+            row = first[has] + k
+            rise = side * dot(np.asarray(directions[has], np.float64), around.normal[row][:, None])
+            higher = (rise >= 0) & (rise > highest[has])
+            rows[has], highest[has] = np.where(higher, row[:, None], rows[has]), np.where(higher, rise, highest[has])
+        uv = np.stack([around.u[rows], around.v[rows]], axis=-1)
+        return (around.instance[rows], around.triangle[rows], uv), rows >= 0
 
     @property
     def usable(self) -> NDArray[np.bool_]:
         """Where there is a normal."""
         return np.asarray(self.normal.any(axis=1))
-
-
-def lifts(scene: Scene) -> Floats:
-    """For each instance the distance in world units that takes points of its surface off it; see `SurfacePoints.origins`."""
-    transforms, bounds = scene.transforms, scene.bounds
-    largest = 0.0 if bounds is None else float(np.abs(bounds).max())
-    out = np.full(len(transforms), 2.0**-22 * largest)
-    for index, obj, transform in visible_instances(scene):
-        if (transform == np.eye(4)).all():
-            continue
-        linear, offset = transform[:3, :3], float(np.abs(transform[:3, 3]).max())
-        norm = float(np.abs(linear).sum(axis=1).max())
-        determinant = np.linalg.det(linear)
-        condition = norm * float(np.abs(np.linalg.inv(linear)).sum(axis=1).max()) if determinant != 0 else 0.0
-        extent = float(np.abs(geometry(scene, obj)[0]).max(initial=0.0))
-        out[index] = 2.0**-20 * (condition * (largest + offset) + norm * extent)
-    return out
 
 
 def at_vertices(scene: Scene) -> SurfacePoints:
@@ -188,19 +215,17 @@ def at_vertices(scene: Scene) -> SurfacePoints:
         for axis in range(3):
             total[:, axis] += np.bincount(faces[:, corner], weighted[:, axis], count)
     normals = unit(total)
-    steepest = np.ones(count)
-    face_of = np.full(count, -1, np.int64)
+    # Corners of faces with area, by their vertices.
     solid = np.nonzero(face_normals.any(axis=1))[0]
-    for corner in range(3):
-        rows = faces[solid, corner]
-        np.minimum.at(steepest, rows, dot(normals[rows], face_normals[solid]))
-        face_of[rows] = solid
-    normals[face_of < 0] = 0.0
-    instance, triangle = _of_faces(mesh, face_of)
-    lift = np.append(lifts(scene), 0.0)[np.where(face_of < 0, -1, instance.astype(np.int64))]
-    return SurfacePoints(mesh.vertices, normals, lift / np.maximum(steepest, _STEEPEST), instance, triangle, np.arange(count), mesh)
-
-
-def _of_faces(mesh: WorldMesh, faces: NDArray[np.int64]) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
-    """Instances and triangles of faces of the mesh; bth.NONE for -1."""
-    return tuple(np.append(rows, np.uint32(NONE))[faces] for rows in (mesh.instance, mesh.triangle))  # type: ignore[return-value]
+    order = np.argsort(faces[solid].reshape(-1), kind="stable")
+    face = solid[order // 3]
+    counts = np.bincount(faces[solid].reshape(-1), minlength=count)
+    normals[counts == 0] = 0.0
+    instance, triangle = mesh.instance[face], mesh.triangle[face]
+    # Corners of faces that were turned round are others of their triangles.
+    corner_of = np.where(mesh.mirrored[instance], np.array([0, 2, 1])[order % 3], order % 3)
+    u, v = (np.where(corner_of == k, 1 - 2 * _NEXT, _NEXT).astype(np.float32) for k in (1, 2))
+    around = FacesAround.of(counts, instance, triangle, u, v, face_normals[face])
+    row = np.where(counts > 0, around.first[:-1], -1)
+    u, v = (np.append(corner_of == k, False)[row].astype(np.float32) for k in (1, 2))
+    return SurfacePoints(mesh.vertices, normals, around.instance[row], around.triangle[row], u, v, np.arange(count), mesh, around)

@@ -10,7 +10,7 @@ from .._compile import compile
 from .._scene import Scene
 from ._arithmetic import Floats
 from ._errors import coded, lacks_texture_coordinates
-from ._surface import SurfacePoints, lifts, visible_instances, world_mesh
+from ._surface import FacesAround, SurfacePoints, visible_instances, world_mesh
 
 #: Most copies of one triangle that repeats over the texture.
 _MOST_TILES = 64
@@ -136,6 +136,8 @@ def _points(scene: Scene, mesh, faces, u: Floats, v: Floats) -> SurfacePoints:
     a, b, c = (mesh.vertices[mesh.faces[faces, k]] for k in range(3))
     position = a + u[:, None] * (b - a) + v[:, None] * (c - a)
     instance, triangle = mesh.instance[faces], mesh.triangle[faces]
-    lift = lifts(scene)[instance] if len(faces) else np.zeros(0)
+    mirrored = mesh.mirrored[instance]
+    second, third = np.where(mirrored, v, u).astype(np.float32), np.where(mirrored, u, v).astype(np.float32)
     normals = scene.normals(instance, triangle)
-    return SurfacePoints(position, normals, lift, instance, triangle, np.full(len(faces), -1), mesh)
+    around = FacesAround.of(np.ones(len(faces), np.int64), instance, triangle, second, third, normals)
+    return SurfacePoints(position, normals, instance, triangle, second, third, np.full(len(faces), -1), mesh, around)

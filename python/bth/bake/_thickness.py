@@ -5,7 +5,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from .._hits import NONE
 from .._scene import Scene
 from ._arithmetic import Floats, arctangent, dot
 from ._progress import Progress, chunks
@@ -30,8 +29,8 @@ def thickness(
     seed, threads, progress: see `ambient_occlusion`.
 
     Returns (n,) float32; NaN where no ray leaves the solid through the back of a triangle, as on open sheets, and where the point has
-    no normal. Rays that hit a front first were outside of the solid already and do not count, and neither do hits of the triangles around
-    the vertex where the ray starts.
+    no normal. Rays start at the point itself and never hit the triangles around it. Those that hit a front first were outside of the solid
+    already and do not count.
     """
     if rays < 1:
         raise ValueError(f"rays: expected at least 1, got {rays}")
@@ -42,21 +41,14 @@ def thickness(
     at = at_vertices(scene) if at is None else at
     result = np.full(len(at), np.nan, np.float32)
     usable = np.nonzero(at.usable)[0]
-    origins, cosine = at.origins(-1), math.cos(math.radians(angle))
+    cosine = math.cos(math.radians(angle))
     for part in chunks(len(usable), rays, "thickness", progress):
         points = usable[part]
         directions, cosines = cone(-at.normal[points], cosine, seed, points, rays)
-        start = at.instance[points, None], at.triangle[points, None]
-        hits = scene.nearest(origins[points, None], directions, start=start, threads=threads)
-        inside = hits.hit & (dot(hits.normal, directions) > 0) & ~_around(at, points, hits)
+        hits = scene.nearest(None, directions, start=at.starts(points[:, None]), threads=threads)
+        inside = hits.hit & (dot(hits.normal, directions) > 0)
         result[points] = _reduced(np.where(inside, hits.t.astype(np.float64), np.nan), cosines, reduce)
     return result
-
-
-def _around(at: SurfacePoints, points: NDArray[np.int64], hits) -> NDArray[np.bool_]:
-    """Whether rays hit a triangle that has the vertex where they start."""
-    faces = at.mesh.faces[at.mesh.rows(hits.instance, hits.triangle)]
-    return np.asarray((hits.triangle != NONE) & (faces == at.vertex[points, None, None]).any(axis=-1))
 
 
 def _reduced(lengths: Floats, cosines: Floats, reduce: str) -> Floats:

@@ -23,8 +23,8 @@ extern "C" {
 typedef struct bth_scene bth_scene;
 
 /* A ray in world space: the points origin + t * direction with tmin <= t <= tmax. The direction need not be normalized; t is
- * in units of its length. tmin and tmax may be infinite, but the t of a hit never is. A ray hits nothing if its origin or direction is not finite, its
- * direction is zero, tmin or tmax is NaN, or tmin exceeds tmax. 32 bytes. */
+ * in units of its length. tmin and tmax may be infinite, but the t of a hit never is. A ray hits nothing if its origin or
+ * direction is not finite, its direction is zero, tmin or tmax is NaN, or tmin exceeds tmax. 32 bytes. */
 typedef struct {
     float origin[3];
     float tmin;
@@ -59,7 +59,8 @@ typedef struct {
 /* Results of functions. */
 #define BTH_OK 0
 #define BTH_ERROR_ARGUMENT (-1)    /* a null pointer, an unknown flag, a path that is not UTF-8, an object or instance that
-                                      does not exist, or a time that is not finite */
+                                      does not exist, a start that is not a point of a surface, or a time that is not
+                                      finite */
 #define BTH_ERROR_FILE (-2)        /* the file could not be read */
 #define BTH_ERROR_FORMAT (-3)      /* not a BTH file, or one that violates the specification */
 #define BTH_ERROR_VERSION (-4)     /* a version or feature that this library does not support */
@@ -85,15 +86,51 @@ void bth_close(bth_scene *scene);
  * can fail. */
 const char *bth_last_error(void);
 
-/* Stores the nearest hits of `count` rays in `hits`. `from` is null or holds for each ray the triangle on which it starts, or
- * BTH_NONE in both fields. It is a hint for the traversal and never changes a result. `hits` must not overlap the other arrays.
- * After an error, which bth_last_error tells, nothing is stored if an argument is null, and all rays are misses if the error is
- * internal. bth_nearest_accepted with a null `accept` does the same and returns a code. */
-void bth_nearest(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, bth_hit *hits, size_t count);
+/* Stores the nearest hits of `count` rays in `hits`, which must not overlap `rays`. `reserved` is
+ * ignored: pass NULL. After an error, which bth_last_error tells, nothing is stored if an argument
+ * is null, and all rays are misses if the error is internal. bth_nearest_accepted with a null
+ * `accept` does the same and returns a code. */
+void bth_nearest(const bth_scene *scene, const bth_ray *rays, const bth_surface *reserved, bth_hit *hits, size_t count);
 
-/* Stores in `hit` for each of `count` rays 1 if it hits anything, else 0. `from` is as for bth_nearest. `hit` must not overlap
- * the other arrays. Errors are those of bth_nearest; bth_any_accepted returns a code. */
-void bth_any(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, uint8_t *hit, size_t count);
+/* Stores in `hit` for each of `count` rays 1 if it hits anything, else 0. `hit` must not overlap
+ * `rays`. `reserved` is ignored: pass NULL. Errors are those of bth_nearest; bth_any_accepted
+ * returns a code. */
+void bth_any(const bth_scene *scene, const bth_ray *rays, const bth_surface *reserved, uint8_t *hit, size_t count);
+
+/* Rays that start on a surface. Such a ray is all points S + t * direction with t > 0 and t <=
+ * tmax, where S is the exact point of its start. It never hits the surface that it leaves, nor
+ * another one through S, and never skips a wall, however near. It needs no offset from the surface
+ * and no tmin.
+ *
+ * A start is the point a + u(b - a) + v(c - a) of the stored vertices a, b and c of a triangle,
+ * not rounded. u and v, from 0 to 1, are the weights of the second and the third vertex, as in
+ * bth_hit. Where their rounded sum exceeds 1, the start is the point (ub + vc) / (u + v) of the
+ * edge. The start of a hit is {hit.surface.instance, hit.surface.triangle, hit.u, hit.v}.
+ * 16 bytes. */
+typedef struct {
+    uint32_t instance;
+    uint32_t triangle;
+    float u;
+    float v;
+} bth_start;
+
+/* Stores the nearest hits of `count` rays that start on surfaces in `hits`, which must not overlap
+ * the other arrays. `directions` holds three floats for each ray, in world space, of any length
+ * except zero; t is in units of that length. `tmax` holds the largest t of each ray, and may be
+ * null: then no ray has an end. A ray is a miss if its start is not a point of a visible instance;
+ * bth_check_start says why. Returns BTH_OK or a negative code. After BTH_ERROR_ARGUMENT nothing is
+ * stored. */
+int32_t bth_nearest_starts(const bth_scene *scene, const bth_start *starts, const float *directions, const float *tmax,
+                           bth_hit *hits, size_t count);
+
+/* As bth_nearest_starts; stores in `hit` for each ray 1 if it hits anything, else 0. */
+int32_t bth_any_starts(const bth_scene *scene, const bth_start *starts, const float *directions, const float *tmax,
+                       uint8_t *hit, size_t count);
+
+/* Checks that rays can start at a point. Returns BTH_OK, or BTH_ERROR_ARGUMENT if there is no such
+ * instance, it is hidden, it has no such triangle, the triangle has no area, or u and v are not the
+ * weights of a point of it. The text of the error says which. */
+int32_t bth_check_start(const bth_scene *scene, const bth_start *start);
 
 /* Stores the first and the last frame and the number of frames per second of the scene; each of the three pointers may be
  * null. A file without scene sections has only frame 0, at one frame per second. */

@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -46,6 +47,12 @@ inline void check_arrays(const void *rays, const void *results, std::size_t coun
 /* Whether a hit is none. */
 inline bool is_miss(const bth_hit &hit) noexcept { return hit.surface.triangle == BTH_NONE; }
 
+/* The point that was hit, at which another ray may start. The start of a miss is none: rays from it
+ * are misses. */
+inline bth_start start_of(const bth_hit &hit) noexcept {
+    return {hit.surface.instance, hit.surface.triangle, hit.u, hit.v};
+}
+
 /* Frames of a scene. */
 struct frame_range {
     std::int32_t first;
@@ -69,30 +76,30 @@ public:
         return scene(opened);
     }
 
-    /* The nearest hit of a ray, or a miss. `from` is the triangle on which the ray starts, a hint, or null. */
-    bth_hit nearest(const bth_ray &ray, const bth_surface *from = nullptr) const {
+    /* The nearest hit of a ray, or a miss. */
+    bth_hit nearest(const bth_ray &ray) const {
         bth_hit hit{};
-        bth_nearest(opened(), &ray, from, &hit, 1);
+        bth_nearest(opened(), &ray, nullptr, &hit, 1);
         return hit;
     }
 
     /* Whether a ray hits anything. */
-    bool any(const bth_ray &ray, const bth_surface *from = nullptr) const {
+    bool any(const bth_ray &ray) const {
         std::uint8_t hit = 0;
-        bth_any(opened(), &ray, from, &hit, 1);
+        bth_any(opened(), &ray, nullptr, &hit, 1);
         return hit != 0;
     }
 
     /* As bth_nearest. */
-    void nearest(const bth_ray *rays, bth_hit *hits, std::size_t count, const bth_surface *from = nullptr) const {
+    void nearest(const bth_ray *rays, bth_hit *hits, std::size_t count) const {
         check_arrays(rays, hits, count);
-        bth_nearest(opened(), rays, from, hits, count);
+        bth_nearest(opened(), rays, nullptr, hits, count);
     }
 
     /* As bth_any. */
-    void any(const bth_ray *rays, std::uint8_t *hit, std::size_t count, const bth_surface *from = nullptr) const {
+    void any(const bth_ray *rays, std::uint8_t *hit, std::size_t count) const {
         check_arrays(rays, hit, count);
-        bth_any(opened(), rays, from, hit, count);
+        bth_any(opened(), rays, nullptr, hit, count);
     }
 
     /* For any range of rays that are adjacent in memory: std::vector, std::array, std::span. */
@@ -109,6 +116,39 @@ public:
         any(std::data(rays), hit.data(), hit.size());
         return hit;
     }
+
+    /* The nearest hit of a ray that starts on a surface, or a miss; see bth_start. */
+    bth_hit nearest(const bth_start &start, const float (&direction)[3], float tmax = infinite) const {
+        bth_hit hit;
+        check(bth_nearest_starts(opened(), &start, direction, &tmax, &hit, 1));
+        return hit;
+    }
+
+    /* Whether a ray that starts on a surface hits anything. */
+    bool any(const bth_start &start, const float (&direction)[3], float tmax = infinite) const {
+        std::uint8_t hit = 0;
+        check(bth_any_starts(opened(), &start, direction, &tmax, &hit, 1));
+        return hit != 0;
+    }
+
+    /* For ranges of starts and of directions that are adjacent in memory; the elements of the
+     * latter are three floats: std::array<float, 3> or a struct. */
+    template <typename Starts, typename Directions>
+    std::vector<bth_hit> nearest_of(const Starts &starts, const Directions &directions, const float *tmax = nullptr) const {
+        std::vector<bth_hit> hits(std::size(starts));
+        check(bth_nearest_starts(opened(), std::data(starts), floats_of(directions, hits.size()), tmax, hits.data(), hits.size()));
+        return hits;
+    }
+
+    template <typename Starts, typename Directions>
+    std::vector<std::uint8_t> any_of(const Starts &starts, const Directions &directions, const float *tmax = nullptr) const {
+        std::vector<std::uint8_t> hit(std::size(starts));
+        check(bth_any_starts(opened(), std::data(starts), floats_of(directions, hit.size()), tmax, hit.data(), hit.size()));
+        return hit;
+    }
+
+    /* Throws unless rays can start at a point; queries report misses instead. */
+    void check_start(const bth_start &start) const { check(bth_check_start(opened(), &start)); }
 
     /* Moves the scene to a time in seconds, or to that of a frame; on an error the scene is unchanged. */
     void set_seconds(double seconds) { check(bth_set_seconds(get(), seconds)); }
@@ -252,6 +292,16 @@ public:
     bth_scene *get() const noexcept { return handle_.get(); }
 
 private:
+    static constexpr float infinite = std::numeric_limits<float>::infinity();
+
+    /* The floats of a range of vectors, one for each of `count` rays. */
+    template <typename Directions>
+    static const float *floats_of(const Directions &directions, std::size_t count) {
+        static_assert(sizeof(*std::data(directions)) == 3 * sizeof(float), "a direction is three floats");
+        if (std::size(directions) != count) throw error(BTH_ERROR_ARGUMENT, "expected a direction for each start");
+        return reinterpret_cast<const float *>(std::data(directions));
+    }
+
     struct close {
         void operator()(bth_scene *scene) const noexcept { bth_close(scene); }
     };

@@ -55,6 +55,7 @@ fn code_of(error: &Error) -> i32 {
         Code::NoSuchObject
         | Code::NoSuchInstance
         | Code::PlacedByFile
+        | Code::Start
         | Code::TooManyInstances
         | Code::NewPositions => ERROR_ARGUMENT,
         Code::NotDeformable => ERROR_MISSING,

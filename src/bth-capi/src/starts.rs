@@ -1,11 +1,11 @@
 //! Rays that start on surfaces.
 
-use crate::{OK, defect, null_argument};
+use crate::{ERROR_ARGUMENT, ERROR_INTERNAL, OK, code_of, defect, fail, null_argument};
 use runtime::Scene;
 use runtime::rays::{Hit, Start, StartRay};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Number of rays that are put together and traced at a time.
+/// Number of rays that are traced together.
 const CHUNK: usize = 1024;
 
 /// The arguments of a query as slices: starts, directions and, if given, ends of rays.
@@ -22,7 +22,8 @@ impl Parts<'_> {
         StartRay { start: self.starts[i], direction: self.directions[i], tmax }
     }
 
-    /// Calls `trace` with the rays of each chunk and the index of the first. Returns the code of the query.
+    /// Calls `trace` with the rays of each chunk and the index of the first.
+    /// Returns the code of the query.
     fn in_chunks(&self, mut trace: impl FnMut(usize, &[StartRay])) -> i32 {
         let mut rays = [Start::NONE.ray([0.0; 3]); CHUNK];
         let mut code = OK;
@@ -38,7 +39,8 @@ impl Parts<'_> {
                     ray.tmax = tmax;
                 }
             }
-            // A panic must not unwind into C. After a panic, which would be a defect of the library, rays are reported as misses.
+            // A panic must not unwind into C. It would be a defect of the library.
+            // The rays of its chunk are then misses.
             if catch_unwind(AssertUnwindSafe(|| trace(first, &rays[..count]))).is_err() {
                 code = defect();
             }
@@ -48,8 +50,8 @@ impl Parts<'_> {
 }
 
 /// # Safety
-/// `scene` is null or open. `starts`, `directions` and `tmax` are each null or point to `count` elements. All of them outlive the result
-/// and are not written to during its life.
+/// `scene` is null or open. `starts`, `directions` and `tmax` are each null or point to `count`
+/// elements. All of them outlive the result and are not written to during its life.
 unsafe fn parts<'a>(
     scene: *const Scene,
     starts: *const Start,
@@ -60,8 +62,9 @@ unsafe fn parts<'a>(
     if scene.is_null() || starts.is_null() || directions.is_null() {
         return None;
     }
-    // SAFETY: the pointers are not null, so by contract `scene` is an open scene and the others point to `count` elements. `Start` has the
-    // layout of `bth_start`, and all bit patterns are valid for it and for numbers.
+    // SAFETY: the pointers are not null, so by contract `scene` is an open scene and the others
+    // point to `count` elements. `Start` has the layout of `bth_start`, and all bit patterns are
+    // valid for it and for numbers.
     unsafe {
         let starts = std::slice::from_raw_parts(starts, count);
         let directions = std::slice::from_raw_parts(directions, count);
@@ -73,8 +76,8 @@ unsafe fn parts<'a>(
 /// Nearest hits of rays that start on surfaces; see `bth.h`.
 ///
 /// # Safety
-/// `scene` is null or open. `starts`, `directions`, `tmax` and `hits` are each null or point to `count` elements; those of `hits` are valid
-/// for writes and do not overlap the others.
+/// `scene` is null or open. `starts`, `directions`, `tmax` and `hits` are each null or point to
+/// `count` elements. The elements of `hits` are valid for writes and do not overlap the others.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_nearest_starts(
     scene: *const Scene,
@@ -87,15 +90,15 @@ pub unsafe extern "C" fn bth_nearest_starts(
     if count == 0 {
         return OK;
     }
-    // SAFETY: the contract of `parts` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `parts`.
     let Some((scene, parts)) = (unsafe { parts(scene, starts, directions, tmax, count) }) else {
         return null_argument();
     };
     if hits.is_null() {
         return null_argument();
     }
-    // SAFETY: it is not null, so by contract it points to `count` elements, which are valid for writes and do not overlap the slices above.
-    // All bit patterns are valid for `Hit`.
+    // SAFETY: it is not null, so by contract it points to `count` elements, which are valid for
+    // writes and do not overlap the slices above. All bit patterns are valid for `Hit`.
     let hits = unsafe { std::slice::from_raw_parts_mut(hits, count) };
     if let [hit] = hits {
         let ray = parts.ray(0);
@@ -116,10 +119,11 @@ pub unsafe extern "C" fn bth_nearest_starts(
     })
 }
 
-/// Whether rays that start on surfaces hit anything; see `bth.h`.
+/// Stores which rays that start on surfaces hit anything; see `bth.h`.
 ///
 /// # Safety
-/// As for [`bth_nearest_starts`], with `hit` for `hits`: it is null or points to `count` bytes.
+/// The contract of [`bth_nearest_starts`], with `hit` for `hits`: it is null or points to `count`
+/// bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_any_starts(
     scene: *const Scene,
@@ -132,14 +136,15 @@ pub unsafe extern "C" fn bth_any_starts(
     if count == 0 {
         return OK;
     }
-    // SAFETY: the contract of `parts` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `parts`.
     let Some((scene, parts)) = (unsafe { parts(scene, starts, directions, tmax, count) }) else {
         return null_argument();
     };
     if hit.is_null() {
         return null_argument();
     }
-    // SAFETY: it is not null, so by contract it points to `count` bytes, which are valid for writes and do not overlap the slices above.
+    // SAFETY: it is not null, so by contract it points to `count` bytes, which are valid for writes
+    // and do not overlap the slices above.
     let hit = unsafe { std::slice::from_raw_parts_mut(hit, count) };
     if let [hit] = hit {
         let (ray, mut found) = (parts.ray(0), [false]);
@@ -154,4 +159,22 @@ pub unsafe extern "C" fn bth_any_starts(
         scene.batch(rays).any(found);
         hit.iter_mut().zip(found).for_each(|(hit, found)| *hit = (*found).into());
     })
+}
+
+/// Checks that rays can start at a point; see `bth.h`.
+///
+/// # Safety
+/// `scene` is null or open. `start` is null or valid for reads.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_check_start(scene: *const Scene, start: *const Start) -> i32 {
+    // SAFETY: by contract each is null or valid for reads. `Start` has the layout of `bth_start`,
+    // and all bit patterns are valid for it.
+    let (Some(scene), Some(start)) = (unsafe { (scene.as_ref(), start.as_ref()) }) else {
+        return fail(ERROR_ARGUMENT, "bth_check_start: scene and start must not be null".into());
+    };
+    match catch_unwind(AssertUnwindSafe(|| scene.check_start(start))) {
+        Ok(Ok(())) => OK,
+        Ok(Err(error)) => fail(code_of(&error), format!("bth_check_start: {error}")),
+        Err(_) => fail(ERROR_INTERNAL, "bth_check_start: internal error".into()),
+    }
 }

@@ -35,7 +35,7 @@ extern "C" {
 #define BTH_QUALITY_BEST 2u
 
 /* Values of bth_compile_options.free_directions: which directions are kept in which rays from a triangle meet nothing, and up to which
- * distance they do not, for rays that say where they start. */
+ * distance they do not, for rays that start on surfaces. */
 #define BTH_FREE_NONE 0u
 #define BTH_FREE_AUTO 1u      /* where that is worth its bytes, as the program bthc does by default */
 #define BTH_FREE_DISTANCES 2u /* distances alone, 8 bytes a triangle */

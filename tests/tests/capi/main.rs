@@ -2,6 +2,7 @@
 
 mod queries;
 mod scenes;
+mod starts;
 
 use crate::queries::hills;
 use bth::rays::{Hit, Ray};

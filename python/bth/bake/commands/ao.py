@@ -96,7 +96,7 @@ def _color_of_texture(job: Job, texels: Texels, texture: NDArray[np.float32], v_
 
 def _by_corner(mesh: Any, values: Floats, seen: Seen) -> Floats:
     """Values (3 m, k) of corners, interpolated at hits."""
-    corners = type(mesh)(mesh.vertices, np.arange(len(values)).reshape(-1, 3), mesh.instance, mesh.triangle, mesh._first, mesh._mirrored)
+    corners = type(mesh)(mesh.vertices, np.arange(len(values)).reshape(-1, 3), mesh.instance, mesh.triangle, mesh._first, mesh.mirrored)
     return corners.interpolated(values, seen.instance, seen.triangle, seen.u, seen.v)
 
 

@@ -9,6 +9,7 @@ use crate::scene::Scene;
 use bth_format::layout::NONE;
 use bth_format::text;
 use bth_format::{Code, Error};
+use std::borrow::Cow;
 
 /// A start in the space of the object of an instance.
 #[derive(Clone, Copy, Debug)]
@@ -124,7 +125,9 @@ impl Scene {
     pub fn check_start(&self, start: &Start) -> Result<(), Error> {
         let Start { primitive, u, v } = *start;
         let (instance, triangle) = (primitive.instance, primitive.triangle);
-        let bad = |expected: &'static str, found: String| Err(Error::of_call(Code::Start, expected, found));
+        let bad = |expected: &'static str, found: Cow<'static, str>| {
+            Err(Error::of_call(Code::Start, expected, found))
+        };
         match self.place_start(start) {
             Ok(_) => Ok(()),
             Err(Misplaced::NoInstance) => {
@@ -132,13 +135,13 @@ impl Scene {
                 Err(Error::of_call(Code::NoSuchInstance, expected, text!("{instance}")))
             }
             Err(Misplaced::Hidden) => {
-                bad("a visible instance", text!("instance {instance}, which is hidden"))
+                bad("a visible instance", text!("instance {instance}, which is hidden").into())
             }
             Err(Misplaced::Start(StartError::NoTriangle | StartError::NoArea)) => {
-                bad("a triangle with area", text!("triangle {triangle} of instance {instance}"))
+                bad("a triangle with area", text!("triangle {triangle} of instance {instance}").into())
             }
             Err(Misplaced::Start(StartError::Weights)) => {
-                bad("u >= 0, v >= 0 and u + v <= 1", text!("u = {u}, v = {v}"))
+                bad("u >= 0, v >= 0 and u + v <= 1", text!("u = {u}, v = {v}").into())
             }
         }
     }

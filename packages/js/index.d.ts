@@ -78,15 +78,17 @@ export interface Scene {
     /** For each ray 1 if it hits anything, else 0. */
     any(rays: Float32Array): Uint8Array;
     /**
-     * The nearest hit of rays that start on surfaces: at the exact points of `starts`, such as hits of this scene. Such a ray hits what lies
-     * at t > 0: never the surface that it leaves, and never nothing where there is a wall. It needs no offset and no least t. It misses if
-     * its start is not a point of a visible instance, as the start of a miss is.
-     * @param directions Three numbers a ray, of any length except zero; t is in units of that length.
-     * @param tmax The greatest t of all rays, or of each; infinite by default.
+     * The nearest hits of rays that start on surfaces: at the exact points of `starts`, such as
+     * hits of this scene. Such a ray hits what lies at t > 0: never the surface that it leaves, and
+     * it never skips a wall. It needs no offset and no least t. A ray is a miss if its start is not
+     * a point of a visible instance; the start of a miss is not.
+     * @param directions Three numbers a ray, of any length except zero; t is in units of that
+     * length.
+     * @param tmax The largest t of all rays, or of each; infinite by default.
      * @throws TypeError unless each array has its type and as many elements as there are rays.
      */
     nearestStarts(starts: Starts, directions: Float32Array, tmax?: number | Float32Array): Hits;
-    /** For each ray that starts on a surface, as for `nearestStarts`, 1 if it hits anything, else 0. */
+    /** As `nearestStarts`: for each ray 1 if it hits anything, else 0. */
     anyStarts(starts: Starts, directions: Float32Array, tmax?: number | Float32Array): Uint8Array;
     /** What the search for the nearest hit of each ray visits. */
     steps(rays: Float32Array): Steps;
@@ -134,8 +136,9 @@ export class Hits {
 }
 
 /**
- * Points of surfaces at which rays start, each array with one element for each ray. Hits are starts. A start is the exact point
- * a + u(b - a) + v(c - a) of the triangle with the vertices a, b and c.
+ * Points of surfaces at which rays start, each array with one element for each ray. Hits are
+ * starts. A start is the exact point a + u(b - a) + v(c - a) of the triangle with the vertices a, b
+ * and c.
  */
 export type Starts = Pick<Hits, "count" | "u" | "v" | "instance" | "triangle">;
 

@@ -131,8 +131,8 @@ class Hits(_OnTriangles):
     def position(self):
         """The points hit in world space, in float64, computed from t; NaN for a miss. `surface().position` is nearer to the triangle.
 
-        They are computed once, when they are first asked for, from the arrays of origins and directions that the query was given. For rays
-        with starts they are `surface().position`.
+        They are computed once, when they are first asked for, from the arrays of origins and directions that the query was given.
+        For rays with starts they are `surface().position`.
         """
         if self._position is not None:
             return self._position.copy()

@@ -81,10 +81,11 @@ class RayQueries:
 
     Origins and directions are of shape (..., 3) and are broadcast; tmin and tmax are numbers or arrays that are broadcast to (...).
 
-    start: the points of surfaces at which rays start; origins are then None, and there is no tmin. Hits (or Closest), or
-    (instances, triangles, uv) of the shapes (...), (...) and (..., 2), broadcast against directions. A ray starts at the exact point, not
-    at a rounded one, and hits what lies at t > 0: never the surface that it leaves, and never nothing where there is a wall. It misses if
-    its start is not a point of a visible instance, as the start of a miss is; `check_start` says why.
+    start: the points of surfaces at which rays start; origins are then None, and there is no tmin.
+    Hits (or Closest), or (instances, triangles, uv) of the shapes (...), (...) and (..., 2),
+    broadcast against directions. A ray starts at the exact point, not at a rounded one, and hits
+    what lies at t > 0: never the surface that it leaves, and it never skips a wall. A ray is a miss
+    if its start is not a point of a visible instance; `check_start` says why.
 
     mask: instances and groups of triangles whose own mask (`set_instance_mask`, `set_group_mask`) has no bit in common with this one
     are not hit. cull: 'back' or 'front' ignores hits on these sides of triangles.
@@ -147,8 +148,9 @@ class RayQueries:
     def check_start(self, start):
         """Raises bth.Error unless rays can start at all of these points; see `start` above.
 
-        Its code is BTH-S003 if there is no such instance; BTH-S008 if the instance is hidden, if it has no such triangle or the triangle has no
-        area, or if u and v are not the weights of a point of it. Queries do not check starts.
+        Its code is BTH-S003 if there is no such instance. It is BTH-S008 if the instance is hidden,
+        if it has no such triangle, if the triangle has no area, or if u and v are not the weights of
+        a point of the triangle. Queries do not check starts.
         """
         columns = _start_columns(start)
         _native.check_start(self._native, _flat(columns, columns[0].shape))

@@ -1,7 +1,7 @@
 /* Traces bounces by starts through the C interface alone: opens a file, traces rays read from
  * standard input (lines of eight numbers), and goes on from their hits twice, in batches of several
  * sizes. Prints the answers, and what bth_check_start says about starts that are not points of a
- * surface. Exits with a separate number for each answer that is not as documented. */
+ * surface. Exits with a separate code for each answer that is not as documented. */
 #include "bth.h"
 #include <math.h>
 #include <stdio.h>

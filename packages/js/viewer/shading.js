@@ -104,7 +104,7 @@ class StartRays {
     }
 }
 
-/** Rays that go on from points: from surfaces, at the exact points of their starts, and from the ground. */
+/** Rays that go on from points: from surfaces, where they start exactly, and from the ground. */
 class SecondaryRays {
     constructor(capacity) {
         this.fromSurfaces = new StartRays(capacity);
@@ -114,7 +114,10 @@ class SecondaryRays {
         if (at.start === null) this.fromGround.push(at.point, direction, tmax);
         else this.fromSurfaces.push(at.start, direction, tmax);
     }
-    /** Traces all; returns a function that says for one ray of a point after the other, in the order of `push`, 1 if it is blocked. */
+    /**
+     * Traces all. Returns a function that takes the point of each ray, in the order of `push`, and
+     * returns 1 if the ray is blocked.
+     */
     blocked(scene) {
         const surfaces = scene.anyStarts(...this.fromSurfaces.used), ground = scene.any(this.fromGround.used);
         let surface = 0, onGround = 0;
@@ -296,7 +299,10 @@ function studio({ camera, inside, diagonal }) {
     return { fill, key: inside ? null : unit(direction), lamp: add(camera.eye, up, LAMP_HEIGHT * diagonal) };
 }
 
-/** Notes the unit direction to the key light without the light's radius, and adds a ray to it if it is in front of the surface. */
+/**
+ * Notes the unit direction to the key light without its radius. Adds a ray to the light if that is
+ * in front of the surface.
+ */
 function pushKey(rays, lights, { diagonal, sample }, at, pixel) {
     const toLamp = add(lights.lamp, at.point, -1);
     at.toKey = lights.key ?? unit(toLamp);

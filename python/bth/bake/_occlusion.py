@@ -28,7 +28,8 @@ def ambient_occlusion(
     progress: see `bth.compile`.
 
     Returns (n,) float32: the share of rays that hit nothing, of directions with a density proportional to the cosine to the normal; NaN
-    where the point has no normal. Rays start on the surface itself, as `SurfacePoints.leaving` says, and no surface hides itself.
+    where the point has no normal. Rays start on the surface itself (`SurfacePoints.leaving`), and no surface
+    hides itself.
     """
     if rays < 1:
         raise ValueError(f"rays: expected at least 1, got {rays}")

@@ -51,7 +51,7 @@ def viewshed(
     observers: (k, 3) in world space; see `above_ground`.
     at: the points, by default `bake.at_vertices(scene)`.
     height: of targets above the points, along the unit vector `up`, in world units: that of a mast, say. With 0 lines start on the
-    surface itself, as `SurfacePoints.leaving` says, and points are seen from the front.
+    surface itself (`SurfacePoints.leaving`), and points are seen from the front.
 
     Returns (k, n) bool. Points without normal are not seen.
     """

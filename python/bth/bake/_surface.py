@@ -11,7 +11,7 @@ from .._scene import Scene
 from ._arithmetic import Floats, angle_between, dot, unit
 from ._errors import lacks_geometry
 
-#: Weights that the other two corners of a face have in a start next to one: the least with which float32 has all weights exactly.
+#: Weight of the other two corners of a face in a start next to a corner: all weights are exact.
 _NEXT = np.float32(2.0**-24)
 
 
@@ -119,9 +119,10 @@ def _transformed(transform: Floats, points: NDArray[np.float32]) -> Floats:
 
 @dataclass(frozen=True)
 class FacesAround:
-    """The faces around points: those of point i are the rows first[i] to first[i + 1]. The last row of all is none.
+    """The faces around points: the rows first[i] to first[i + 1] are around point i.
 
-    instance, triangle, u, v: where rays start on the face. normal: (m, 3), unit.
+    instance, triangle, u, v: where rays start on the face. Their last row is no face.
+    normal: (m, 3), unit.
     """
 
     first: NDArray[np.int64]
@@ -133,7 +134,7 @@ class FacesAround:
 
     @staticmethod
     def of(counts: NDArray[np.int64], instance, triangle, u, v, normal) -> "FacesAround":
-        """The faces of so many for each point, without the last row."""
+        """Adds the last row, given the number of faces around each point."""
         first = np.append([0], np.cumsum(counts))
         instance, triangle = (np.append(rows, np.uint32(NONE)) for rows in (instance, triangle))
         u, v = (np.append(weights, np.float32(0)) for weights in (u, v))
@@ -149,8 +150,9 @@ class SurfacePoints:
     """Points on the surfaces of a scene, from which rays start.
 
     position: (n, 3) float64, world space.
-    normal: (n, 3) float64, unit; zeros where all triangles at the point are without area. No rays start there.
-    instance, triangle: (n,) uint32, a triangle at the point. u, v: (n,) float32, the point's weights in it.
+    normal: (n, 3) float64, unit; zeros where all triangles at the point are without area. No rays
+    start there.
+    instance, triangle: (n,) uint32, a triangle at the point. u, v: (n,) float32, its weights there.
     vertex: (n,) int64, the vertex of `mesh` that the point is, or -1.
     mesh: the scene's mesh.
     around: the faces around the points.
@@ -173,14 +175,17 @@ class SurfacePoints:
         """The points of some rows, exactly, as `start=` of queries takes them."""
         return self.instance[points], self.triangle[points], np.stack([self.u[points], self.v[points]], axis=-1)
 
-    def leaving(self, points: NDArray[np.int64], directions: NDArray[np.floating], side: int = 1) -> tuple[Start, NDArray[np.bool_]]:
+    def leaving(
+        self, points: NDArray[np.int64], directions: NDArray[np.floating], side: int = 1
+    ) -> tuple[Start, NDArray[np.bool_]]:
         """Where rays leave surfaces to a side, the front (1) or the back (-1), and which of them do.
 
-        points: (n,) rows. directions: (n, rays, 3). Returns what `start=` of queries takes, (n, rays), and bool (n, rays). The others
-        have no start, and miss.
+        points: (n,) rows. directions: (n, rays, 3). Returns what `start=` of queries takes,
+        (n, rays), and bool (n, rays). The other rays have no start, and miss.
 
-        Rays from a vertex start on a face around it, that from which they rise most, a 2^-24 of its edges away from the vertex. So the
-        other faces at a concave vertex hide what is behind them, and those at a convex one hide nothing.
+        A ray from a vertex starts on one of the faces around, 2^-24 of the edges away from the
+        vertex: on the face from which it rises most. So faces at a concave vertex hide what is
+        behind them, and faces at a convex vertex hide nothing.
         """
         around, shape = self.around, directions.shape[:-1]
         first, counts = around.first[points], np.diff(around.first)[points]
@@ -190,7 +195,8 @@ class SurfacePoints:
             row = first[has] + k
             rise = side * dot(np.asarray(directions[has], np.float64), around.normal[row][:, None])
             higher = (rise >= 0) & (rise > highest[has])
-            rows[has], highest[has] = np.where(higher, row[:, None], rows[has]), np.where(higher, rise, highest[has])
+            rows[has] = np.where(higher, row[:, None], rows[has])
+            highest[has] = np.where(higher, rise, highest[has])
         uv = np.stack([around.u[rows], around.v[rows]], axis=-1)
         return (around.instance[rows], around.triangle[rows], uv), rows >= 0
 
@@ -228,4 +234,5 @@ def at_vertices(scene: Scene) -> SurfacePoints:
     around = FacesAround.of(counts, instance, triangle, u, v, face_normals[face])
     row = np.where(counts > 0, around.first[:-1], -1)
     u, v = (np.append(corner_of == k, False)[row].astype(np.float32) for k in (1, 2))
-    return SurfacePoints(mesh.vertices, normals, around.instance[row], around.triangle[row], u, v, np.arange(count), mesh, around)
+    instance, triangle = around.instance[row], around.triangle[row]
+    return SurfacePoints(mesh.vertices, normals, instance, triangle, u, v, np.arange(count), mesh, around)

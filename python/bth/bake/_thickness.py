@@ -29,8 +29,8 @@ def thickness(
     seed, threads, progress: see `ambient_occlusion`.
 
     Returns (n,) float32; NaN where no ray leaves the solid through the back of a triangle, as on open sheets, and where the point has
-    no normal. Rays start at the point itself and never hit the triangles around it. Those that hit a front first were outside of the solid
-    already and do not count.
+    no normal. Rays start at the point itself and never hit the triangles around it. Rays that
+    hit a front first were outside of the solid already and do not count.
     """
     if rays < 1:
         raise ValueError(f"rays: expected at least 1, got {rays}")

@@ -23,8 +23,9 @@ extern "C" {
 typedef struct bth_scene bth_scene;
 
 /* A ray in world space: the points origin + t * direction with tmin <= t <= tmax. The direction need not be normalized; t is
- * in units of its length. tmin and tmax may be infinite, but the t of a hit never is. A ray hits nothing if its origin or
- * direction is not finite, its direction is zero, tmin or tmax is NaN, or tmin exceeds tmax. 32 bytes. */
+ * in units of its length. tmin and tmax may be infinite, but the t of a hit never is. A ray hits
+ * nothing if its origin or direction is not finite, its direction is zero, tmin or tmax is NaN, or
+ * tmin exceeds tmax. 32 bytes. */
 typedef struct {
     float origin[3];
     float tmin;

@@ -94,13 +94,22 @@ impl World {
             return None;
         }
         let one = BigInt::from(1) << (UNITS[0] + UNITS[1]);
-        let rounded = Ray { origin: start.rounded(&one).map(|x| x as f32), ..range(ray) };
+        let wide = start.rounded(&one);
+        let greatest = of.corners.iter().flatten().fold(0.0, |most: f64, x| most.max(f64::from(x.abs())));
+        let misses = |corners: [[f32; 3]; 3]| {
+            let from = corners.map(|p| [0, 1, 2].map(|k| f64::from(p[k]) - wide[k]));
+            own.to_world.is_none() && certainly_missed(ray.direction.map(f64::from), from, 2.0 * greatest)
+        };
+        let rounded = Ray { origin: wide.map(|x| x as f32), ..range(ray) };
         let direction = ray.direction.map(|x| integer(x) << UNITS[0]);
         let found = self.instances.iter().flat_map(|other| {
-            let (start, direction, rounded) = (&start, &direction, &rounded);
+            let (start, direction, rounded, misses) = (&start, &direction, &rounded, &misses);
             other.triangles.iter().filter_map(move |triangle| {
                 let primitive = PrimitiveRef { instance: other.number, triangle: triangle.id };
                 let at = if other.number == instance {
+                    if misses(triangle.corners) {
+                        return None;
+                    }
                     start.intersection(direction, &other.exact(triangle.corners))?
                 } else {
                     other.intersection(rounded, triangle.corners)?

@@ -50,6 +50,15 @@ pub const KINDS: [Kind; 9] = [
     Kind { name: "bvh distances", structure: Structure::Bvh, free: KeepFree::Distances, ..LINK32 },
 ];
 
+/// The ways to trace a structure, and what they add to its name.
+const USES: [(&str, Use); 5] = [
+    ("", Use::Batch),
+    (" start", Use::Start),
+    (" single", Use::Single),
+    (" start single", Use::StartSingle),
+    (" single own", Use::Own),
+];
+
 /// The default file.
 pub const BTH: Kind = KINDS[0];
 /// The plain BVH.
@@ -74,16 +83,9 @@ impl Kind {
 
     /// Names of the ways to trace it.
     pub fn uses(&self) -> impl Iterator<Item = (String, Use)> {
-        let all = [
-            ("", Use::Batch),
-            (" start", Use::Start),
-            (" single", Use::Single),
-            (" start single", Use::StartSingle),
-            (" single own", Use::Own),
-        ];
-        // The last two are told from others by the default file alone.
-        let uses = if self.name == KINDS[0].name { &all[..] } else { &all[..3] };
-        uses.to_vec().into_iter().map(|(of, usage)| (format!("{}{of}", self.name), usage))
+        // The last two differ from others in the default file alone.
+        let count = if self.name == KINDS[0].name { USES.len() } else { 3 };
+        USES[..count].iter().map(|(of, usage)| (format!("{}{of}", self.name), *usage))
     }
 
     /// Compiler options. Whole-model tetrahedra come without a BVH below them, which would be traced instead of them; all else is

@@ -2,7 +2,7 @@
 
 use super::super::exact_loop;
 use super::super::placement::PartBoxes;
-use super::super::test_worlds::{FILES, rays, unit, world};
+use super::super::test_worlds::{FILES, START_FILES, rays, unit, world};
 use super::*;
 use crate::hits::Accept;
 use crate::nodes::affine::Affine;
@@ -19,7 +19,7 @@ fn nearest_by_loop(world: &World, file: &File, ray: &Ray) -> Hit {
         let Some(placement) = placement else { continue };
         let object = placement.inverse.ray(ray);
         let view = file.object(placement.object()).unwrap();
-        let hit = object::nearest(&view, (&object.ray, None), instance as u32);
+        let hit = object::nearest(&view, &object.ray, instance as u32);
         best = better(ray, &best, &hit, object.t_scale).unwrap_or(best);
     }
     best
@@ -76,10 +76,15 @@ fn nearest_start_by_loop(scene: &Scene, ray: &StartRay) -> Hit {
     let world = scene.world().expect("instances");
     for (instance, placement) in world.placements.iter().enumerate() {
         let Some(placement) = placement else { continue };
-        let (instance, start) = (instance as u32, placed.world_ray().start_in(instance as u32));
-        let of_object = placement.inverse.ray_from(&placed.ray, start);
+        let (instance, world_ray) = (instance as u32, placed.world_ray());
+        let of_object = placement.inverse.ray_from(&placed.ray, world_ray.start_in(instance));
         let view = scene.file().object(placement.object()).unwrap();
-        let hit = object::nearest(&view, (&of_object.ray, start), instance);
+        let hit = world_ray.in_object(
+            instance,
+            &of_object.ray,
+            |start| object::nearest(&view, start, instance),
+            |ray| object::nearest(&view, ray, instance),
+        );
         best = better(&placed.ray, &best, &hit, of_object.t_scale).unwrap_or(best);
     }
     best
@@ -90,7 +95,7 @@ fn starts_on_instances_have_the_hits_of_a_loop() {
     let mut rng = Rng::new(13);
     let (mut hit_count, mut ray_count, mut unusable) = (0, 0, 0);
     for case in 0..300 {
-        let file = File::from_bytes(FILES[case % 2]).unwrap();
+        let file = File::from_bytes(START_FILES[case % 2]).unwrap();
         let count = [1, 2, 7, 16, 17, 40, 300][case % 7];
         let (world, transforms) = world(&file, &mut rng, count);
         let scene = Scene::with_instances(file, world);

@@ -12,6 +12,12 @@ pub(super) const FILES: [&[u8]; 2] = [
     include_bytes!("../../../../format-spec/conformance/valid/two-levels.bth"),
 ];
 
+/// Files whose triangles have places, so that rays can start on them.
+pub(super) const START_FILES: [&[u8]; 2] = [
+    include_bytes!("../../../../format-spec/conformance/valid/places.bth"),
+    include_bytes!("../../../../format-spec/conformance/valid/free-directions.bth"),
+];
+
 pub(super) fn unit(rng: &mut Rng) -> f64 {
     rng.below(1 << 30) as f64 / (1u64 << 29) as f64 - 1.0
 }

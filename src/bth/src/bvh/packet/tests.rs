@@ -56,11 +56,11 @@ fn bits(hit: &Hit) -> [u32; 4] {
 /// The answers of a single ray.
 fn alone(object: &ObjectView<'_>, ray: &Ray) -> (Hit, bool) {
     let (mut hit, mut found) = (Hit::MISS, Answer::MISS);
-    single::trace::<NearestQuery, ()>((object, NEAREST), (ray, None), 0, &mut (), &mut hit);
-    single::trace::<AnyQuery, ()>((object, ANY), (ray, None), 0, &mut (), &mut found);
+    single::trace::<NearestQuery, (), _>((object, NEAREST), ray, 0, &mut (), &mut hit);
+    single::trace::<AnyQuery, (), _>((object, ANY), ray, 0, &mut (), &mut found);
     for is_any in [false, true] {
         let (goal, mut either) = (EitherGoal { is_any }, Hit::MISS);
-        single::trace::<Nearest<EitherGoal>, ()>((object, goal), (ray, None), 0, &mut (), &mut either);
+        single::trace::<Nearest<EitherGoal>, (), _>((object, goal), ray, 0, &mut (), &mut either);
         match is_any {
             true => assert_eq!(either.is_hit(), Answer::is_hit(&found), "{ray:?}"),
             false => assert_eq!(bits(&either), bits(&hit), "{ray:?}"),

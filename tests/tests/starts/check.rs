@@ -119,6 +119,19 @@ fn check_all(scene: &Scene, corners: &Corners, ray: &StartRay, nearest: Option<H
 
 /// Checks rays from the triangles of a scene of one object against the oracle, and on every instruction set. Returns how many hit.
 pub(crate) fn check(scene: &Scene, corners: &Corners, rays: &[StartRay], context: &str) -> usize {
+    check_with(scene, corners, rays, context, &|ray, hit, context| {
+        check_all(scene, corners, ray, hit.is_hit().then_some(*hit), context);
+    })
+}
+
+/// As [`check`], for the nearest hit and any hit, and what `check_one` checks.
+pub(crate) fn check_with(
+    scene: &Scene,
+    corners: &Corners,
+    rays: &[StartRay],
+    context: &str,
+    check_one: &dyn Fn(&StartRay, &Hit, &str),
+) -> usize {
     Isa::Scalar.choose().expect("it is everywhere");
     let expected = alone(scene, rays);
     for (ray, hit) in rays.iter().zip(&expected) {
@@ -127,9 +140,7 @@ pub(crate) fn check(scene: &Scene, corners: &Corners, rays: &[StartRay], context
         assert_eq!(scene.any(ray), truth.is_some(), "{context}: any hit of {ray:?}");
         assert_eq!(starts::any(corners, ray), truth.is_some(), "{ray:?}");
     }
-    check_isas(scene, rays, &expected, context, &|ray, hit, context| {
-        check_all(scene, corners, ray, hit.is_hit().then_some(*hit), context);
-    });
+    check_isas(scene, rays, &expected, context, check_one);
     expected.iter().filter(|hit| hit.is_hit()).count()
 }
 

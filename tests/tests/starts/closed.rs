@@ -1,12 +1,12 @@
 //! Closed surfaces: a ray that starts into one hits it again.
 
 use crate::check::{corners_of, isas, turn};
-use crate::meshes::{cube, placed};
 use bth::Isa;
 use bth::rays::{Hit, PrimitiveRef, Start, StartRay};
 use bth_compile::pipeline::Structure;
 use bth_format::layout::RecordKind;
 use bth_random::Rng;
+use bth_tests::meshes::{cube, placed};
 use bth_tests::oracle::is_front;
 use bth_tests::rays::alone;
 use bth_tests::structures::{compiled, options};

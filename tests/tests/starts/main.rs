@@ -2,7 +2,6 @@
 
 mod check;
 mod closed;
-mod meshes;
 mod objects;
 mod random;
 mod scenes;

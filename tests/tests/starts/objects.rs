@@ -1,10 +1,10 @@
 //! Files of several objects without scene sections: each object is an instance in world space.
 
 use crate::check::{check_isas, turn};
-use crate::meshes::mesh;
 use bth::rays::{Hit, StartRay};
 use bth_format::exact::is_zero_area;
 use bth_random::Rng;
+use bth_tests::meshes::mesh;
 use bth_tests::oracle::World;
 use bth_tests::placed_soup::soups;
 use bth_tests::rays::{alone, starts};

@@ -1,11 +1,11 @@
 //! Starts that are no points of a surface: `check_start` says why, and queries miss.
 
 use crate::check::{check_isas, turn};
-use crate::meshes::cube;
 use bth::rays::{Hit, PrimitiveRef, Start, StartRay};
 use bth::{Accept, Code, Crossings, Scene, SceneBuilder};
 use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_format::layout::RecordKind;
+use bth_tests::meshes::cube;
 use bth_tests::rays::starts;
 use bth_tests::structures::{compiled, options};
 

@@ -4,7 +4,7 @@ use bth_random::Rng;
 use bth_scenes::Model;
 
 /// The kinds of [`mesh`].
-pub(crate) const KINDS: usize = 9;
+pub const KINDS: usize = 9;
 
 fn on_grid(rng: &mut Rng, reach: u64) -> [f32; 3] {
     [(); 3].map(|()| rng.below(2 * reach + 1) as f32 - reach as f32)
@@ -14,8 +14,8 @@ fn rows(rng: &mut Rng, vertices: usize, triangles: u64) -> Vec<[u32; 3]> {
     (0..1 + rng.below(triangles)).map(|_| [(); 3].map(|()| rng.below(vertices as u64) as u32)).collect()
 }
 
-/// A closed box of cells, its corners pushed about if `bumpy`.
-pub(crate) fn cube(cells: usize, bumpy: Option<&mut Rng>) -> Model {
+/// A closed box of cells, its corners pushed about if `bumpy` is given.
+pub fn cube(cells: usize, bumpy: Option<&mut Rng>) -> Model {
     let mut model = Model::default();
     let mut rows = std::collections::BTreeMap::new();
     let mut vertex = |p: [usize; 3]| {
@@ -43,7 +43,7 @@ pub(crate) fn cube(cells: usize, bumpy: Option<&mut Rng>) -> Model {
 }
 
 /// A mesh of a kind.
-pub(crate) fn mesh(kind: usize, rng: &mut Rng) -> Model {
+pub fn mesh(kind: usize, rng: &mut Rng) -> Model {
     match kind {
         // On few points: coplanar, coincident and touching triangles.
         0 => {
@@ -109,7 +109,7 @@ pub(crate) fn mesh(kind: usize, rng: &mut Rng) -> Model {
 }
 
 /// The model in other units and elsewhere.
-pub(crate) fn placed(mut model: Model, scale: f32, by: f32) -> Model {
+pub fn placed(mut model: Model, scale: f32, by: f32) -> Model {
     for p in &mut model.positions {
         let [x, y, z] = p.map(|x| x * scale);
         *p = [x + by, y - by, z + 0.5 * by];

@@ -28,6 +28,7 @@ pub fn crowd(count: u32, own_tracks: bool) -> Vec<u8> {
         triangles: 1,
         lines: &lines,
         triangle_ids: &[0],
+        places: &[TrianglePlace { leaf: Child::Indexed(0), slot: 0 }.code()],
         ..ObjectParts::default()
     };
     let mut rng = Rng::new(1);

@@ -3,6 +3,7 @@
 pub mod conformance;
 pub mod crowd;
 pub mod leaves;
+pub mod meshes;
 pub mod placed_soup;
 pub mod rays;
 pub mod stress;

@@ -25,36 +25,91 @@ fn lines(bytes: &[u8]) -> impl Iterator<Item = CacheLine> {
 /// # Panics
 /// If there are no triangles or too many.
 pub fn placed_soup(triangles: &[[[f32; 3]; 3]], matrices: &[[f64; 12]]) -> Vec<u8> {
-    let leaves: Vec<&[[[f32; 3]; 3]]> = triangles.chunks(WIDTH).collect();
-    assert!((1..=WIDTH).contains(&leaves.len()));
-    let mut node = WideNode { bounds: [[[f32::MAX; WIDTH], [-f32::MAX; WIDTH]]; 3], child: [NONE; WIDTH] };
-    for (slot, leaf) in leaves.iter().enumerate() {
-        let (lower, upper) = bounds(leaf);
-        for k in 0..3 {
-            (node.bounds[k][0][slot], node.bounds[k][1][slot]) = (lower[k], upper[k]);
-        }
-        node.child[slot] = Child::Raw((NODE_LINES + slot * RAW_LINES) as u32).code();
-    }
-    let mut all: Vec<CacheLine> = lines(node.as_bytes()).collect();
-    for (slot, leaf) in leaves.iter().enumerate() {
-        let row = |c: usize, k: usize| std::array::from_fn(|i| leaf.get(i).unwrap_or(&leaf[0])[c][k]);
-        let raw = RawLeaf {
-            corner: std::array::from_fn(|c| std::array::from_fn(|k| row(c, k))),
-            first: (slot * WIDTH) as u32,
-            triangles: leaf.len() as u32,
-            reserved: [0; 14],
-        };
-        all.extend(lines(raw.as_bytes()));
-    }
     let ids: Vec<u32> = (0..triangles.len() as u32).collect();
-    let parts = ObjectParts {
-        bounds: Some(bounds(triangles)),
-        root: Child::Node(0).code(),
-        triangles: ids.len() as u32,
-        lines: &all,
-        triangle_ids: &ids,
-        ..ObjectParts::default()
-    };
+    let soup = Soup::new(triangles, &ids.chunks(WIDTH).map(<[u32]>::to_vec).collect::<Vec<_>>());
+    let scene_parts = scene_of(matrices);
+    let mut builder = FileBuilder::new();
+    object(&mut builder, 0, &soup.parts()).expect("an object");
+    if !matrices.is_empty() {
+        scene(&mut builder, &scene_parts).expect("a scene");
+    }
+    builder.finish()
+}
+
+/// A file without a scene, with an object for each list of triangles and of the ids in its raw leaves. A triangle may lie in several
+/// leaves.
+///
+/// # Panics
+/// If a list is empty, or has too many leaves or triangles in one of them.
+pub fn soups(objects: &[(&[[[f32; 3]; 3]], Vec<Vec<u32>>)]) -> Vec<u8> {
+    let soups: Vec<Soup> = objects.iter().map(|(triangles, leaves)| Soup::new(triangles, leaves)).collect();
+    let mut builder = FileBuilder::new();
+    for (index, soup) in (0..).zip(&soups) {
+        object(&mut builder, index, &soup.parts()).expect("an object");
+    }
+    builder.finish()
+}
+
+/// An object of one node over raw leaves.
+struct Soup {
+    bounds: ([f32; 3], [f32; 3]),
+    lines: Vec<CacheLine>,
+    ids: Vec<u32>,
+    places: Vec<u32>,
+}
+
+impl Soup {
+    fn new(triangles: &[[[f32; 3]; 3]], leaf_ids: &[Vec<u32>]) -> Soup {
+        let ids: Vec<u32> = leaf_ids.concat();
+        let corners = |leaf: &Vec<u32>| leaf.iter().map(|id| triangles[*id as usize]).collect::<Vec<_>>();
+        let leaves: Vec<Vec<[[f32; 3]; 3]>> = leaf_ids.iter().map(corners).collect();
+        assert!((1..=WIDTH).contains(&leaves.len()));
+        let mut node =
+            WideNode { bounds: [[[f32::MAX; WIDTH], [-f32::MAX; WIDTH]]; 3], child: [NONE; WIDTH] };
+        for (slot, leaf) in leaves.iter().enumerate() {
+            let (lower, upper) = bounds(leaf);
+            for k in 0..3 {
+                (node.bounds[k][0][slot], node.bounds[k][1][slot]) = (lower[k], upper[k]);
+            }
+            node.child[slot] = Child::Raw((NODE_LINES + slot * RAW_LINES) as u32).code();
+        }
+        let mut all: Vec<CacheLine> = lines(node.as_bytes()).collect();
+        let (mut first, mut places) = (0, vec![NONE; triangles.len()]);
+        for (slot, leaf) in leaves.iter().enumerate() {
+            let row = |c: usize, k: usize| std::array::from_fn(|i| leaf.get(i).unwrap_or(&leaf[0])[c][k]);
+            let raw = RawLeaf {
+                corner: std::array::from_fn(|c| std::array::from_fn(|k| row(c, k))),
+                first,
+                triangles: leaf.len() as u32,
+                reserved: [0; 14],
+            };
+            all.extend(lines(raw.as_bytes()));
+            let at = Child::Raw((NODE_LINES + slot * RAW_LINES) as u32);
+            for (row, id) in leaf_ids[slot].iter().enumerate() {
+                let place = &mut places[*id as usize];
+                if *place == NONE {
+                    *place = TrianglePlace { leaf: at, slot: row as u32 }.code();
+                }
+            }
+            first += leaf.len() as u32;
+        }
+        Soup { bounds: bounds(triangles), lines: all, ids, places }
+    }
+
+    fn parts(&self) -> ObjectParts<'_> {
+        ObjectParts {
+            bounds: Some(self.bounds),
+            root: Child::Node(0).code(),
+            triangles: self.places.len() as u32,
+            lines: &self.lines,
+            triangle_ids: &self.ids,
+            places: &self.places,
+            ..ObjectParts::default()
+        }
+    }
+}
+
+fn scene_of(matrices: &[[f64; 12]]) -> SceneParts {
     let node = |transform: &[f64; 12]| Node {
         transform: *transform,
         parent: NONE,
@@ -64,7 +119,7 @@ pub fn placed_soup(triangles: &[[[f32; 3]; 3]], matrices: &[[f64; 12]]) -> Vec<u
         reserved: [0; 4],
     };
     let instance = |node: u32| Instance { node, object: 0, flags: 0, reserved: 0 };
-    let parts_of_scene = SceneParts {
+    SceneParts {
         scene: Scene { rate: 24.0, first_frame: 0, last_frame: 0, camera: NONE, reserved: [0; 11] },
         nodes: matrices.iter().map(node).collect(),
         instances: (0..matrices.len() as u32).map(instance).collect(),
@@ -75,11 +130,5 @@ pub fn placed_soup(triangles: &[[[f32; 3]; 3]], matrices: &[[f64; 12]]) -> Vec<u
         lights: Vec::new(),
         names: Vec::new(),
         deformers: Default::default(),
-    };
-    let mut builder = FileBuilder::new();
-    object(&mut builder, 0, &parts).expect("an object");
-    if !matrices.is_empty() {
-        scene(&mut builder, &parts_of_scene).expect("a scene");
     }
-    builder.finish()
 }

@@ -139,6 +139,30 @@ pub fn starts(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<StartRa
     (0..count).map(ray).collect()
 }
 
+/// Groups of 64 rays that go in packets: from one triangle each, in nearly one direction, most of them short.
+pub fn coherent_starts(corners: &[[[f32; 3]; 3]], groups: usize, seed: u64) -> Vec<StartRay> {
+    let mut rng = Rng::new(seed);
+    let group = |_| {
+        let triangle = rng.below(corners.len() as u64) as usize;
+        let [a, b, c] = corners[triangle];
+        let size = max_norm(sub(b, a)).max(max_norm(sub(c, a)));
+        let [u, v] = weights(&mut rng);
+        let toward = rng.unit_vector().map(|x| x as f32 * size);
+        let tmax = [f32::INFINITY, 4.0, 1.0, 0.25][rng.below(4) as usize];
+        let spread = [0.0, 0.01, 0.1][rng.below(3) as usize];
+        let rays: Vec<StartRay> = (0..64)
+            .map(|_| {
+                let shrink = 1.0 - spread * rng.unit_f32();
+                let primitive = PrimitiveRef { instance: 0, triangle: triangle as u32 };
+                let direction = toward.map(|x| x + spread * size * (rng.unit_f32() - 0.5));
+                Start { primitive, u: u * shrink, v: v * shrink }.ray(direction).with_tmax(tmax)
+            })
+            .collect();
+        rays
+    };
+    (0..groups).flat_map(group).collect()
+}
+
 fn max_norm(v: [f32; 3]) -> f32 {
     v.iter().fold(0.0, |most: f32, x| most.max(x.abs()))
 }

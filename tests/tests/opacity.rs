@@ -1,7 +1,7 @@
 //! Rays through holes: all queries against the hits of a file without opacity, each judged by the alpha of its texture.
 
-use bth::rays::{Hit, Ray};
-use bth::{Accept, Isa, Opacity, Scene};
+use bth::rays::{Hit, Ray, StartRay};
+use bth::{Accept, Isa, Opacity, Scene, TraceRay};
 use bth_compile::Silent;
 use bth_compile::coordinates::Boxes;
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
@@ -11,6 +11,7 @@ use bth_import::gltf::scene::{ImportOptions, import};
 use bth_random::Rng;
 use bth_tests::leaves;
 use bth_tests::structures::{bits, options};
+use std::fmt::Debug;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard};
 
@@ -84,6 +85,20 @@ fn rays(count: usize) -> Vec<Ray> {
         .collect()
 }
 
+/// Rays from leaves, also from holes in them, and from the hits of rays.
+fn starts(scene: &Scene, rays: &[Ray], instances: u32) -> Vec<StartRay> {
+    let corners: Vec<_> = (scene.object(0).triangles.iter())
+        .map(|t| t.map(|v| scene.object(0).positions[v as usize]))
+        .collect();
+    let mut all = bth_tests::rays::starts(&corners, 1000, 4);
+    for (ray, instance) in all.iter_mut().zip((0..instances).cycle()) {
+        ray.start.primitive.instance = instance;
+    }
+    let hits = bth_tests::rays::alone(scene, rays);
+    all.extend(hits.iter().zip(&rays[1..]).map(|(hit, ray)| StartRay::from_hit(hit, ray.direction)));
+    all
+}
+
 /// Alpha of a leaf's texture at a hit, interpolated bilinearly in f64; `None` for the floor. Both triangles of a leaf have the
 /// corner (0, 0) first: then (1, 0) and (1, 1), or (1, 1) and (0, 1). In mirrored meshes the last two are exchanged.
 fn alpha(texture: &[u8], hit: &Hit, mirrored: bool) -> Option<f64> {
@@ -127,7 +142,7 @@ fn judged(scene: &Scene, all: &[Hit], flat: bool) -> Vec<Hit> {
 
 /// Compares all queries of a scene with holes; `opaque` is the same without. Returns how many transparent hits lay before the
 /// nearest that counts.
-fn compare(opaque: &Scene, scene: &Scene, rays: &[Ray], flat: bool) -> usize {
+fn compare<R: TraceRay + Debug>(opaque: &Scene, scene: &Scene, rays: &[R], flat: bool) -> usize {
     let everything = Accept::default();
     let (mut passed, mut all, mut found) = (0, Vec::new(), Vec::new());
     let mut expected = Vec::new();
@@ -182,6 +197,8 @@ fn rays_pass_through_the_holes_of_leaves_in_every_structure_and_on_every_instruc
             isa.choose().unwrap();
             let passed = compare(&opaque, &scene, &rays, true);
             assert!(passed > rays.len() / 10, "{name}: {passed} transparent hits");
+            let passed = compare(&opaque, &scene, &starts(&opaque, &rays, 1), true);
+            assert!(passed > 100, "{name}: {passed} transparent hits from starts");
         }
         Isa::best().choose().unwrap();
     }
@@ -194,6 +211,8 @@ fn rays_pass_through_the_holes_of_instances() {
     assert_eq!((scene.object_count(), scene.instance_count()), (1, 2));
     let passed = compare(&opaque, &scene, &rays(1500), false);
     assert!(passed > 150, "{passed} transparent hits");
+    let passed = compare(&opaque, &scene, &starts(&opaque, &rays(1500), 2), false);
+    assert!(passed > 100, "{passed} transparent hits from starts");
 }
 
 #[test]
@@ -205,6 +224,10 @@ fn the_exact_oracle_sees_the_same_holes() {
         let (truth, hit) = (world.hit(&ray), scene.nearest(&ray).unwrap_or(Hit::MISS));
         assert_eq!((truth.primitive, truth.t.to_bits()), (hit.primitive, hit.t.to_bits()), "{ray:?}");
         assert_eq!(world.any(&ray), scene.any(&ray));
+    }
+    for ray in starts(&scene, &rays(150), 1).iter().step_by(8) {
+        let (truth, hit) = (world.hit_from_start(ray), scene.nearest(ray).unwrap_or(Hit::MISS));
+        assert_eq!((truth.primitive, truth.t.to_bits()), (hit.primitive, hit.t.to_bits()), "{ray:?}");
     }
 }
 

@@ -296,13 +296,7 @@ mod tests {
                     let traced = |i: usize| order.is_none_or(|order| order.contains(&(i as u32)));
                     for (i, ray) in rays.iter().enumerate().filter(|&(i, _)| traced(i)) {
                         let mut hit = Hit::MISS;
-                        single::trace::<NearestQuery, (), _>(
-                            (object, NEAREST),
-                            ray,
-                            0,
-                            &mut (),
-                            &mut hit,
-                        );
+                        single::trace::<NearestQuery, (), _>((object, NEAREST), ray, 0, &mut (), &mut hit);
                         let is_hit = crate::object::any(object, ray);
                         assert_eq!(format!("{:?}", hits[i]), format!("{hit:?}"), "{isa}, {scale}: {ray:?}");
                         assert_eq!(found[i], is_hit, "{isa}, {scale}: {ray:?}");

@@ -3,7 +3,7 @@
 use crate::hits::Accept;
 use crate::rays::{Hit, Ray};
 use crate::scene::Scene;
-use crate::starts::TraceRay;
+use crate::start_queries::TraceRay;
 
 /// Rays in world space that are traced together, with options: [`Ray`]s, or [`StartRay`](crate::rays::StartRay)s. Made by [`Scene::batch`].
 ///

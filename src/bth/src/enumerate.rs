@@ -5,7 +5,7 @@ use crate::instances::Placement;
 use crate::nodes::ObjectRay;
 use crate::rays::Ray;
 use crate::scene::Scene;
-use crate::starts::placed::WorldRay;
+use crate::starts::world_ray::WorldRay;
 use bth_format::object::ObjectView;
 
 /// An instance that a ray may hit.

@@ -4,8 +4,8 @@ use crate::object;
 use crate::query::Steps;
 use crate::rays::{Hit, Ray};
 use crate::scene::Scene;
-use crate::starts::TraceRay;
-use crate::starts::placed::WorldRay;
+use crate::start_queries::TraceRay;
+use crate::starts::world_ray::WorldRay;
 
 impl Scene {
     /// Nearest hit of a ray in world space: a [`Ray`], or a [`StartRay`](crate::rays::StartRay).

@@ -44,6 +44,7 @@ pub mod rays;
 mod scene;
 #[doc(hidden)]
 pub mod simd;
+mod start_queries;
 mod starts;
 mod streams;
 mod surface;
@@ -63,7 +64,7 @@ pub use motion::{InstanceView, check_first_frame};
 pub use query::Steps;
 pub use scene::{Scene, from_bytes, from_file, map, open};
 pub use simd::{Isa, IsaError};
-pub use starts::{SegmentEnd, TraceRay};
+pub use start_queries::{SegmentEnd, TraceRay};
 pub use streams::{HitStreams, RayStreams};
 pub use surface::{Bounds, SurfacePoint};
 pub use update::Update;

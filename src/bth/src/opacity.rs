@@ -8,7 +8,7 @@
 use crate::hits::Accept;
 use crate::rays::{Hit, Ray};
 use crate::scene::Scene;
-use crate::starts::placed::WorldRay;
+use crate::starts::world_ray::WorldRay;
 use bth_format::layout::Opacity;
 
 impl Scene {
@@ -37,8 +37,13 @@ impl Scene {
     pub(crate) fn any_not_transparent(&self, rays: &[Ray], found: &mut [bool]) {
         self.any_of_all(rays, found);
         for (ray, found) in rays.iter().zip(found) {
-            *found = *found && self.search_any(WorldRay::plain(ray), &Accept::default());
+            *found = *found && self.hits_what_is_not_transparent(WorldRay::plain(ray));
         }
+    }
+
+    /// Whether a ray hits anything that is not transparent.
+    pub(crate) fn hits_what_is_not_transparent(&self, ray: WorldRay<'_>) -> bool {
+        self.search_any(ray, &Accept::default())
     }
 
     /// Replaces a ray's nearest hit by its nearest one that is not transparent.

@@ -1,11 +1,14 @@
 //! Candidates: triangles that the f32 filter does not exclude, and their decision in f64 or in exact arithmetic.
 
-use super::leaf::ExactRay;
 use super::nodes;
-use crate::intersect::exact::{Estimate, Intersection, estimate, in_pairs, wide};
+use crate::intersect::exact::{Estimate, Intersection, estimate, in_pairs};
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::line::Line;
-use crate::intersect::start::{ExactStart, StartDecision, StartPoint, decide_start, decide_start_exactly};
+use crate::intersect::origin::wide;
+use crate::intersect::start::start_on;
+use crate::intersect::start::{StartDecision, decide_start, decide_start_exactly};
+use crate::intersect::start_point::ExactRay;
+use crate::intersect::start_point::StartPoint;
 use crate::query::{Query, TriangleRef};
 use crate::rays::Ray;
 use crate::simd::{Part, Scalar, Simd};
@@ -159,21 +162,6 @@ fn settle_from_start<Q: Query>(
     };
     intersection
         .is_some_and(|intersection| query.offer(TriangleRef::index(index, object.triangle_ids), intersection))
-}
-
-/// The corners of a triangle in a leaf; in a tet leaf `slot` is the index of a constrained face of the object.
-pub(crate) fn start_corners(object: &ObjectView<'_>, leaf: u32, slot: u32) -> Option<[[f32; 3]; 3]> {
-    if let Some(Child::Tets(_)) = Child::from_code(leaf) {
-        let face = object.tet_faces.get(slot as usize)?;
-        return Some(face.vertex.map(|v| object.tet_vertices[v as usize].position));
-    }
-    Some(Candidate { leaf, triangle: slot }.read(object, ReadCorners)?.1)
-}
-
-/// A start with the corners of its triangle.
-pub(crate) fn start_on(object: &ObjectView<'_>, start: &StartPoint) -> Option<ExactStart> {
-    let corners = start_corners(object, start.leaf, start.slot)?;
-    Some(ExactStart::new(corners, start.u, start.v))
 }
 
 /// Decides exactly a candidate that f64 leaves open. Its corners are read again, so that the common path keeps them in registers.

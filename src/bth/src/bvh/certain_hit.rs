@@ -1,10 +1,10 @@
 //! The answer of a single ray whose nearest hit is certain: t, u and v in f64, as [`super::deferred`] computes them for sixteen rays.
 
 use super::candidate::{Candidate, Settle};
-use super::leaf::ExactRay;
 use crate::intersect::exact::{reported, reported_barycentric};
 use crate::intersect::exact_quad::rounded_intersection;
 use crate::intersect::filter::TriangleBlock;
+use crate::intersect::start_point::ExactRay;
 use crate::query::Query;
 use crate::rays::PrimitiveRef;
 use crate::simd::Simd;

@@ -3,9 +3,9 @@
 use super::leaf::Progress;
 use super::ray_state::RayState;
 use crate::bvh::candidate::{Candidate, Reader, Settle};
-use crate::intersect::exact::RoundedOrigin;
 use crate::intersect::exact_lanes::{Intersections, Pairs};
 use crate::intersect::filter::TriangleBlock;
+use crate::intersect::origin::RoundedOrigin;
 use crate::intersect::prepare::gather_rays;
 use crate::query::sink::Sink;
 use crate::query::{Goal, Query};

@@ -7,7 +7,6 @@
 //! are then all of one sign or zero, and the filter excludes only triangles with two weights of certain and opposite signs.
 
 use super::candidate::{Candidate, ReadCorners};
-use super::leaf::ExactRay;
 use super::nodes::{UnpackedNode, indexed_leaf, node, prefetch, raw as raw_leaf};
 use super::ray_state::key_limit;
 use super::single_stack::SingleStack;
@@ -15,6 +14,7 @@ use super::stack::BOTTOM;
 use crate::intersect::boxes::RaySlabLanes;
 use crate::intersect::line::Line;
 use crate::intersect::prepare::PreparedRay;
+use crate::intersect::start_point::ExactRay;
 use crate::query::{NearestHit, TriangleRef};
 use crate::simd::{Isa, Kernel, Scalar, Simd};
 use crate::tets::flood::{FaceReceiver, VisitedSet};

@@ -4,12 +4,13 @@
 use super::coherence::is_same_octant;
 use super::deferred::DeferredHits;
 use super::entry_node::{ENTRY_RAYS, FindEntryNode};
-use super::leaf::{ExactRay, LeafOutcome, Progress, decide};
+use super::leaf::{LeafOutcome, Progress, decide};
 use super::nodes::{UnpackedNode, Wide, node};
 use super::ray_pool::{POOL_SIZE, RareSteps, RayPool, Slot, has_rare_steps};
 use super::ray_state::RayState;
 use super::stack::{StackPosition, Stacks};
 use crate::intersect::prepare::Prepared;
+use crate::intersect::start_point::ExactRay;
 use crate::query::sink::Sink;
 use crate::query::{EitherQuery, Query};
 use crate::rays::Ray;

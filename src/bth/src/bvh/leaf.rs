@@ -9,7 +9,7 @@
 use crate::bvh::candidate::{Candidate, Settle};
 use crate::intersect::filter::{Certain, TriangleBlock};
 use crate::intersect::prepare::PreparedRay;
-use crate::intersect::start::StartPoint;
+use crate::intersect::start_point::ExactRay;
 use crate::query::{Goal, Query};
 use crate::rays::Ray;
 use crate::simd::Simd;
@@ -61,9 +61,6 @@ pub(crate) trait Progress<Q: Query> {
         if self.last() < before { LeafOutcome::Nearer } else { LeafOutcome::Nothing }
     }
 }
-
-/// A ray as decisions in f64 need it: with the exact point at which it starts, if it starts on a triangle of the object.
-pub(crate) type ExactRay<'r> = (&'r Ray, Option<&'r StartPoint>);
 
 /// Intersects a ray with the triangles of a leaf, given as its record and its child code. `ray` is called only where some triangle may
 /// be hit. `bounds` are those for which the ray was prepared.

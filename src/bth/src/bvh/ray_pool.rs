@@ -5,7 +5,7 @@ use super::leaf::{LeafOutcome, enter_leaf};
 use super::nodes::{Nodes, Packed, Wide, indexed_leaf, is_large, prefetch, prefetch_into, raw as raw_leaf};
 use super::ray_state::{RayState, write_children};
 use super::stack::{BOTTOM, StackPosition, Stacks};
-use crate::intersect::start::Starts;
+use crate::intersect::start_point::Starts;
 use crate::query::{Goal, Query};
 use crate::rays::Ray;
 use crate::simd::{CacheLevel, Part, Simd};

@@ -4,13 +4,14 @@
 //! speed. The nearest certain hit is therefore kept with f32 bounds of its depth, and its t, u and v are computed in f64 once, at
 //! the end ([`super::certain_hit`]).
 
-use super::leaf::{ExactRay, LeafOutcome, Progress, decide, enter_leaf};
+use super::leaf::{LeafOutcome, Progress, decide, enter_leaf};
 use super::nodes::{Nodes, Packed, Wide, indexed_leaf, prefetch, raw as raw_leaf};
 use super::ray_state::key_limit;
 use super::single_stack::{OpenSingleStack, SingleStack};
 use crate::bvh::candidate::Candidate;
 use crate::intersect::boxes::{ChildBoxes, RaySlabLanes};
 use crate::intersect::prepare::PreparedRay;
+use crate::intersect::start_point::ExactRay;
 use crate::query::{Count, Goal, Query};
 use crate::rays::Ray;
 use crate::simd::{Part, Simd};
@@ -94,7 +95,6 @@ impl<Q: Query> Progress<Q> for SingleState<'_, Q> {
 /// This is one kernel, longer than other functions and with more parameters: its variables must stay in registers across all steps,
 /// and a function boundary or a struct of parameters between the steps was measured to be slower.
 #[inline(always)]
-#[expect(clippy::too_many_arguments)]
 pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
     s: S,
     (object, ray): (&ObjectView<'_>, ExactRay<'_>),

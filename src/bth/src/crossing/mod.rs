@@ -5,15 +5,16 @@
 
 mod walk;
 
-use crate::bvh::candidate::start_on;
 use crate::bvh::enumerate::{Receiver, enumerate};
 use crate::intersect::crossing::{crossing, crossing_from_start};
-use crate::intersect::start::{ExactStart, StartPoint};
+use crate::intersect::start::ExactStart;
+use crate::intersect::start::start_on;
+use crate::intersect::start_point::StartPoint;
 use crate::query::TriangleRef;
 use crate::rays::Ray;
 use crate::scene::Scene;
-use crate::starts::TraceRay;
-use crate::starts::placed::WorldRay;
+use crate::start_queries::TraceRay;
+use crate::starts::world_ray::WorldRay;
 use std::cmp::Ordering;
 
 /// Passages of a ray through triangles, counted by the crossing rule of [`Scene::crossings`].

@@ -3,7 +3,7 @@
 use super::accept::Accept;
 use crate::rays::Hit;
 use crate::scene::Scene;
-use crate::starts::TraceRay;
+use crate::start_queries::TraceRay;
 
 /// Batches of queries. Rays are in world space.
 impl Scene {

@@ -19,8 +19,8 @@ use self::search::search;
 use crate::masks::Masks;
 use crate::rays::Hit;
 use crate::scene::Scene;
-use crate::starts::TraceRay;
-use crate::starts::placed::WorldRay;
+use crate::start_queries::TraceRay;
+use crate::starts::world_ray::WorldRay;
 use std::collections::BinaryHeap;
 
 /// Queries for several hits, and with conditions. Hits are ordered by ascending t, then instance, then triangle. More precisely, as

@@ -3,18 +3,21 @@
 
 use super::accept::Accept;
 use super::collect::{Collector, Found};
-use crate::bvh::candidate::{intersect_exactly, start_on};
+use crate::bvh::candidate::intersect_exactly;
 use crate::bvh::enumerate::{Receiver, enumerate};
 use crate::enumerate::EnteredInstance;
-use crate::intersect::exact::{Estimate, Intersection, estimate, reported, wide};
+use crate::intersect::exact::{Estimate, Intersection, estimate, reported};
 use crate::intersect::line::widened;
-use crate::intersect::start::{ExactStart, StartDecision, StartPoint, decide_start, decide_start_exactly};
+use crate::intersect::origin::wide;
+use crate::intersect::start::start_on;
+use crate::intersect::start::{ExactStart, StartDecision, decide_start, decide_start_exactly};
+use crate::intersect::start_point::StartPoint;
 use crate::masks::Masks;
 use crate::nodes::ObjectRay;
 use crate::query::{TriangleRef, in_range, may_be_in_range};
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::scene::Scene;
-use crate::starts::placed::WorldRay;
+use crate::starts::world_ray::WorldRay;
 use bth_format::layout::Opacity;
 use bth_format::object::ObjectView;
 

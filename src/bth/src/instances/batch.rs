@@ -14,14 +14,14 @@ use super::top_level::TopLevel;
 use super::traverse::RayTraversals;
 use super::visit_queue::VisitQueue;
 use crate::SMALL;
-use crate::intersect::start::Starts;
+use crate::intersect::start_point::Starts;
 use crate::object::{self, Scratch};
 use crate::objects::Objects;
 use crate::query::sink::{SceneRays, Sink, Visit};
 use crate::query::{AnswersOf, AnyQuery, Goal, NearestQuery, Query, any_answers, better, nearest_answers};
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
-use crate::starts::placed::InstanceStart;
+use crate::starts::world_ray::InstanceStart;
 use bth_format::layout::NONE;
 use std::cell::Cell;
 

@@ -8,7 +8,7 @@ use crate::hits::Accept;
 use crate::nodes::affine::Affine;
 use crate::rays::{PrimitiveRef, Start, StartRay};
 use crate::scene::Scene;
-use crate::starts::placed::WorldRay;
+use crate::starts::world_ray::WorldRay;
 use bth_format::File;
 use bth_random::Rng;
 

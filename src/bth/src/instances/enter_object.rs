@@ -2,7 +2,7 @@
 
 use super::progress::Progress;
 use super::scene_batch::SceneBatch;
-use crate::intersect::start::StartPoint;
+use crate::intersect::start_point::StartPoint;
 use crate::nodes::affine::RayLanes;
 use crate::query::sink::Visit;
 use crate::rays::Ray;

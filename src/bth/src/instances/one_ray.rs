@@ -9,7 +9,7 @@ use crate::objects::Objects;
 use crate::query::{Steps, better};
 use crate::rays::{Hit, Ray};
 use crate::simd::Isa;
-use crate::starts::placed::WorldRay;
+use crate::starts::world_ray::WorldRay;
 use bth_format::object::ObjectView;
 
 /// Fewer rays go one by one if a single instance is visible.

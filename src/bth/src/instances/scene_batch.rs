@@ -1,12 +1,12 @@
 //! The parameters of a batch of rays through the instances of a scene.
 
 use super::World;
-use crate::intersect::start::StartPoint;
+use crate::intersect::start_point::StartPoint;
 use crate::nodes::affine::ObjectRay;
 use crate::objects::Objects;
 use crate::query::sink::Visit;
 use crate::rays::{Ray, StartRay};
-use crate::starts::placed::{InstanceStart, WorldRay};
+use crate::starts::world_ray::{InstanceStart, WorldRay};
 
 /// A batch of rays in world space, and the scene that they go through.
 pub(super) struct SceneBatch<'a> {

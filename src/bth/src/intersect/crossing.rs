@@ -31,8 +31,10 @@
 //! **Exactness.** Signs come from f64 where its error bound allows, else from exact sums ([`bth_format::exact`]). Products have at
 //! most four factors of f32, so they lie between 2^-596 and 2^520.
 
-use crate::intersect::exact::{Estimate, RATIO_ERROR, estimate, wide};
-use crate::intersect::start::{ExactStart, StartPoint};
+use crate::intersect::exact::{Estimate, RATIO_ERROR, estimate};
+use crate::intersect::origin::wide;
+use crate::intersect::start::ExactStart;
+use crate::intersect::start_point::StartPoint;
 use crate::rays::Ray;
 use bth_format::exact::{EDGE_PARTS, Expansion, VOLUME_PARTS};
 

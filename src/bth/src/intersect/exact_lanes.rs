@@ -1,9 +1,9 @@
 //! The arithmetic of [`super::exact`] in f64 for sixteen pairs of a ray and a triangle that the f32 filter is sure the ray hits.
 
 use crate::intersect::exact::{
-    Intersection, OriginTerms, RoundedIntersection, RoundedOrigin, certain_intersection, max_norm, reported,
-    reported_barycentric, wide,
+    Intersection, OriginTerms, RoundedIntersection, certain_intersection, reported, reported_barycentric,
 };
+use crate::intersect::origin::{RoundedOrigin, max_norm, wide};
 use crate::simd::{LANES, Simd};
 
 /// A number of each of sixteen rays or triangles.

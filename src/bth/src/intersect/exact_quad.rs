@@ -1,9 +1,8 @@
 //! The arithmetic of [`super::exact`] in vectors of four f64, for one pair of a ray and a triangle: its three vector products are one
 //! operation, and so are its four scalar products.
 
-use crate::intersect::exact::{
-    INVERSE_RATIO_ERROR, Origin, RoundedIntersection, RoundedOrigin, WEIGHT_ERROR,
-};
+use crate::intersect::exact::{INVERSE_RATIO_ERROR, RoundedIntersection, WEIGHT_ERROR};
+use crate::intersect::origin::{Origin, RoundedOrigin};
 use crate::simd::Doubles;
 
 /// The origin of a ray.
@@ -74,7 +73,8 @@ pub(crate) fn rounded_intersection<D: Doubles>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::intersect::exact::{OriginTerms, max_norm, wide};
+    use crate::intersect::exact::OriginTerms;
+    use crate::intersect::origin::{max_norm, wide};
     use crate::simd::{Isa, Kernel, Simd};
     use bth_random::Rng;
 

@@ -5,8 +5,8 @@
 //! [`Sign::Uncertain`]. The intersection of lines with triangles is decided exactly in [`super::exact`]; a line in the plane of a
 //! triangle misses it.
 
-use super::exact::RoundedOrigin;
-use super::start::StartPoint;
+use super::origin::RoundedOrigin;
+use super::start_point::StartPoint;
 use crate::rays::Ray;
 
 /// Error up to which f64 values are taken: 2^-28, an eighth of the rounding of f32, relative to 1 for u and v and to itself for

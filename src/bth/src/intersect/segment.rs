@@ -1,6 +1,6 @@
 //! Whether triangles cross the open segment between two points, exactly. The points may be starts on triangles.
 
-use super::exact::RoundedOrigin;
+use super::origin::RoundedOrigin;
 use super::start::{ExactStart, START_VOLUME_PARTS};
 use crate::rays::Ray;
 use bth_format::exact::{Expansion, VOLUME_PARTS};

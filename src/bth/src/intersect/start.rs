@@ -12,10 +12,13 @@
 //! combination multiplies these by u and v, numbers of f32. f64 decides most rays before: S rounded to f64 is off by a bound that
 //! [`RoundedOrigin`] adds to the bounds of the errors.
 
-use super::exact::{Estimate, Intersection, RoundedOrigin, UncertainWeights, decide_exactly, estimate, wide};
+use super::exact::{Estimate, Intersection, UncertainWeights, decide_exactly, estimate};
 use super::line::Line;
+use super::origin::{RoundedOrigin, wide};
+use super::start_point::StartPoint;
 use bth_format::exact::{EDGE_PARTS, Expansion, VOLUME_PARTS};
-use bth_format::layout::NONE;
+use bth_format::layout::{Child, WIDTH};
+use bth_format::object::ObjectView;
 
 /// Weights of hits are rounded to f32: their sum, rounded too, exceeds 1 by at most this.
 pub(crate) const ABOVE_ONE: f32 = 1.0 / (1 << 22) as f32;
@@ -27,60 +30,6 @@ const ROUNDING: f64 = 1.0 / (1u64 << 49) as f64;
 const START_EDGE_PARTS: usize = 9 * EDGE_PARTS;
 /// The same for volumes.
 pub(super) const START_VOLUME_PARTS: usize = 9 * VOLUME_PARTS;
-
-/// Where a ray of a batch starts, in the space of the object.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct StartPoint {
-    /// The point, rounded, and a bound of its error.
-    pub(crate) origin: RoundedOrigin,
-    /// Child code of the leaf that holds the triangle; [`NONE`] if the ray starts on no triangle of the
-    /// object, and `origin` is exact.
-    pub(crate) leaf: u32,
-    /// Slot of the triangle in the leaf.
-    pub(crate) slot: u32,
-    /// Weights of the second and the third corner.
-    pub(crate) u: f32,
-    pub(crate) v: f32,
-}
-
-impl StartPoint {
-    /// For a ray that starts at its f32 origin, on no triangle of the object.
-    pub(crate) fn beside(origin: [f32; 3]) -> StartPoint {
-        let origin = RoundedOrigin(wide(origin), 0.0);
-        StartPoint { origin, leaf: NONE, slot: 0, u: 0.0, v: 0.0 }
-    }
-
-    /// Whether the ray starts on a triangle of the object.
-    #[inline(always)]
-    pub(crate) fn is_on_triangle(&self) -> bool {
-        self.leaf != NONE
-    }
-}
-
-/// The starts of the rays of a batch; empty where all of them start at their f32 origins.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Starts<'a>(pub(crate) &'a [StartPoint]);
-
-impl<'a> Starts<'a> {
-    pub(crate) const NONE: Starts<'static> = Starts(&[]);
-
-    /// The start of a ray, if it is on a triangle of the object.
-    #[inline(always)]
-    pub(crate) fn of(self, ray: usize) -> Option<&'a StartPoint> {
-        self.0.get(ray).filter(|start| start.is_on_triangle())
-    }
-
-    #[inline(always)]
-    pub(crate) fn is_empty(self) -> bool {
-        self.0.is_empty()
-    }
-
-    /// The starts of the rays from `first` on.
-    #[inline(always)]
-    pub(crate) fn from(self, first: usize) -> Starts<'a> {
-        Starts(self.0.get(first..).unwrap_or(&[]))
-    }
-}
 
 /// Whether weights are those of a point of a triangle: finite, not negative, and their sum not above 1 by more than the rounding of
 /// hits.
@@ -279,4 +228,33 @@ pub(crate) fn decide_start_exactly(
         return None;
     }
     start.decide(direction, corners.map(wide), uncertain)
+}
+
+/// The corners of the triangle in a slot of a leaf, given as its child code; in a tet leaf `slot` is the index of a constrained face of the
+/// object. `None` if there is no such leaf.
+pub(crate) fn start_corners(object: &ObjectView<'_>, leaf: u32, slot: u32) -> Option<[[f32; 3]; 3]> {
+    let at = slot as usize;
+    let (mut indexed, mut raw) = (None, None);
+    match Child::from_code(leaf)? {
+        Child::Indexed(index) => {
+            let leaf = object.indexed(index, &mut indexed);
+            let vertex = |corner: usize| usize::from(leaf.corner[corner][at % WIDTH]) % WIDTH;
+            Some([0, 1, 2].map(|corner| [0, 1, 2].map(|axis| leaf.vertex[axis][vertex(corner)])))
+        }
+        Child::Raw(index) => {
+            let leaf = object.raw(index, &mut raw);
+            Some([0, 1, 2].map(|corner| [0, 1, 2].map(|axis| leaf.corner[corner][axis][at % WIDTH])))
+        }
+        Child::Tets(_) => {
+            let face = object.tet_faces.get(at)?;
+            Some(face.vertex.map(|v| object.tet_vertices[v as usize].position))
+        }
+        Child::Node(_) | Child::Packed(_) => None,
+    }
+}
+
+/// A start with the corners of its triangle.
+pub(crate) fn start_on(object: &ObjectView<'_>, start: &StartPoint) -> Option<ExactStart> {
+    let corners = start_corners(object, start.leaf, start.slot)?;
+    Some(ExactStart::new(corners, start.u, start.v))
 }

@@ -1,6 +1,6 @@
 //! Affine transforms in f64, and their inverses for rays.
 
-use crate::intersect::start::StartPoint;
+use crate::intersect::start_point::StartPoint;
 use crate::rays::Ray;
 use crate::simd::LANES;
 use bth_format::layout::Node;

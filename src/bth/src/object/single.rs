@@ -1,11 +1,11 @@
 //! Tracing of one object by a single ray.
 
 use crate::bvh::certain_hit::store_certain_hit;
-use crate::bvh::leaf::ExactRay;
 use crate::bvh::single::{SingleResult, trace_single};
 use crate::bvh::single_stack::SingleStack;
 use crate::intersect::prepare::PreparedRay;
-use crate::intersect::start::StartPoint;
+use crate::intersect::start_point::ExactRay;
+use crate::intersect::start_point::StartPoint;
 use crate::query::{Answer, Count, Query};
 use crate::rays::{Ray, StartRay};
 use crate::simd::{Isa, Kernel, Simd};

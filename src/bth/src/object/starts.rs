@@ -3,7 +3,7 @@
 
 use super::batch::trace_batch;
 use super::scratch::Scratch;
-use crate::intersect::start::Starts;
+use crate::intersect::start_point::Starts;
 use crate::query::sink::Sink;
 use crate::query::{Answers, AnswersOf, AnyQuery, Goal, NearestQuery, Query, any_answers, nearest_answers};
 use crate::rays::{Hit, StartRay};

@@ -48,7 +48,8 @@ pub(super) fn walk(object: &ObjectView<'_>, rays: &[Ray], goal: EitherGoal, scra
     let states = filled(states, rays.len(), WalkState::NotWalked);
     walk_tets(object, rays, faces, queries, states, lists);
     filled(walked, rays.len(), NONE);
-    (done.clear(), rest.clear());
+    done.clear();
+    rest.clear();
     for (index, state) in (0..).zip(&*states) {
         if *state == WalkState::NotWalked { rest.push(index) } else { done.push(index) }
     }

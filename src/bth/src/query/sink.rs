@@ -2,7 +2,7 @@
 
 use super::{AnswerLanes, Answers, AnswersOf, EitherQuery, Goal, Query};
 use crate::intersect::exact_lanes::Intersections;
-use crate::intersect::start::Starts;
+use crate::intersect::start_point::Starts;
 use crate::rays::{PrimitiveRef, Ray};
 use crate::simd::{LANES, Simd};
 

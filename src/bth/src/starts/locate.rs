@@ -1,8 +1,9 @@
 //! Where the triangle of a start lies in its object, and the start in f64.
 
-use crate::bvh::candidate::start_corners;
-use crate::intersect::exact::{RoundedOrigin, wide};
-use crate::intersect::start::{StartPoint, are_weights, rounded_start};
+use crate::intersect::origin::wide;
+use crate::intersect::start::start_corners;
+use crate::intersect::start::{are_weights, rounded_start};
+use crate::intersect::start_point::StartPoint;
 use crate::rays::{PrimitiveRef, Start};
 use crate::simd::Simd;
 use bth_format::exact::is_zero_area;
@@ -64,13 +65,4 @@ fn place_in_tets(object: &ObjectView<'_>, triangle: u32) -> Option<(u32, u32)> {
     let face = *object.triangle_faces.get(triangle as usize)?;
     let leaf = object.tet_leaves.partition_point(|leaf| leaf.first_face <= face).checked_sub(1)?;
     (face != NONE).then(|| (Child::Tets(leaf as u32).code(), face))
-}
-
-impl StartPoint {
-    /// The point, rounded to f32.
-    #[inline(always)]
-    pub(crate) fn rounded(&self) -> [f32; 3] {
-        let RoundedOrigin([x, y, z], _) = self.origin;
-        [x as f32, y as f32, z as f32]
-    }
 }

@@ -3,9 +3,10 @@
 use super::free::{self, decide};
 use super::locate::{locate, place};
 use super::triangles::{NoRow, Row, StartTriangles, TriangleIds};
-use crate::bvh::candidate::start_corners;
-use crate::intersect::exact::RoundedOrigin;
-use crate::intersect::start::{ABOVE_ONE, StartPoint, rounded_start};
+use crate::intersect::origin::RoundedOrigin;
+use crate::intersect::start::start_corners;
+use crate::intersect::start::{ABOVE_ONE, rounded_start};
+use crate::intersect::start_point::StartPoint;
 use crate::rays::{PrimitiveRef, Ray, Start, StartRay};
 use crate::simd::{Isa, Kernel, LANES, Simd};
 use bth_format::layout::NONE;

@@ -4,9 +4,10 @@
 //! Projections, their errors and the signs of cross products are those of [`Line`]. Coordinates come permuted to the axes of each ray's
 //! projection, so that no lane selects an axis. The reach in the error bound is that of the four vertices of the tetrahedron.
 
-use crate::intersect::exact::{RATIO_ERROR, greater, max_norm};
+use crate::intersect::exact::RATIO_ERROR;
 use crate::intersect::exact_lanes::F32Lanes;
 use crate::intersect::line::Line;
+use crate::intersect::origin::{greater, max_norm};
 use crate::simd::LANES;
 
 /// Sixteen rays and tetrahedra, by lane. Coordinates are along the axes of a ray's projection, of which the third is that of the depth.

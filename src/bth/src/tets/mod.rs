@@ -18,9 +18,9 @@ pub(crate) mod walk;
 pub(crate) mod walks;
 
 use self::walk::{TetWalker, WalkOutcome};
-use crate::bvh::candidate::start_on;
-use crate::bvh::leaf::ExactRay;
 use crate::intersect::line::Line;
+use crate::intersect::start::start_on;
+use crate::intersect::start_point::ExactRay;
 use crate::query::{Count, EitherQuery, Query};
 use bth_format::layout::Child;
 use bth_format::object::ObjectView;

@@ -5,7 +5,7 @@ use super::hit_cache::{HitCache, UNCACHED};
 use super::ray_group::RayGroup;
 use super::single_rays::SingleRays;
 use crate::bvh::candidate::{Candidate, Settle};
-use crate::intersect::start::Starts;
+use crate::intersect::start_point::Starts;
 use crate::query::Query;
 use crate::rays::Ray;
 use crate::simd::{LANES, Part, Simd};

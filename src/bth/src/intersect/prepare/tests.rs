@@ -3,10 +3,12 @@
 
 use super::{LARGEST, Prepared, PreparedRay, SMALLEST, lies_between};
 use crate::intersect::boxes::RaySlabs;
-use crate::intersect::exact::{Intersection, wide};
+use crate::intersect::exact::Intersection;
 use crate::intersect::filter::TriangleFilter;
 use crate::intersect::line::Line;
-use crate::intersect::start::{ExactStart, StartPoint, rounded_start};
+use crate::intersect::origin::wide;
+use crate::intersect::start::{ExactStart, rounded_start};
+use crate::intersect::start_point::StartPoint;
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, LANES, Simd};
 use bth_format::layout::{BOX_MARGIN, IndexedLeaf, NONE, Object, WIDENED_BOXES, WIDTH, WideNode};

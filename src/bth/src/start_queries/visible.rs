@@ -5,16 +5,16 @@
 //! its edges p→q do not differ. These are affine in A and in B, so starts on triangles are decided exactly, as for rays
 //! ([`mod@crate::intersect::start`]). Triangles through A or B, or in a plane with both, do not block.
 
-use super::placed::{InstanceStart, WorldRay};
-use crate::bvh::candidate::start_on;
 use crate::bvh::enumerate::{Receiver, enumerate_within};
 use crate::enumerate::EnteredInstance;
-use crate::intersect::exact::wide;
+use crate::intersect::origin::wide;
 use crate::intersect::segment::{ExactEnd, Segment};
-use crate::intersect::start::StartPoint;
+use crate::intersect::start::start_on;
+use crate::intersect::start_point::StartPoint;
 use crate::query::TriangleRef;
 use crate::rays::{Ray, Start};
 use crate::scene::Scene;
+use crate::starts::world_ray::{InstanceStart, WorldRay};
 use bth_format::layout::Opacity;
 use bth_format::object::ObjectView;
 

@@ -4,9 +4,9 @@
 #![allow(private_interfaces)]
 
 use self::sealed::Traced;
-use super::placed::PlacedRay;
 use crate::rays::{Hit, Ray, StartRay};
 use crate::scene::Scene;
+use crate::starts::world_ray::PlacedRay;
 
 /// A ray that can be traced: a [`Ray`], or a [`StartRay`].
 pub trait TraceRay: sealed::Traced {}

@@ -1,11 +1,11 @@
 //! The nearest hit of rays that start on surfaces, and any hit.
 
-use super::placed::{InstanceStart, WorldRay};
-use super::prepare::ENDED;
 use crate::object;
 use crate::rays::{Hit, Ray, StartRay};
 use crate::scene::Scene;
 use crate::simd::Isa;
+use crate::starts::prepare::ENDED;
+use crate::starts::world_ray::{InstanceStart, WorldRay};
 use bth_format::object::ObjectView;
 
 impl Scene {
@@ -76,7 +76,7 @@ impl Scene {
         let Some(placed) = self.place(ray) else { return false };
         let world_ray = placed.world_ray();
         if self.has_opacity() {
-            return self.search_any(world_ray, &crate::Accept::default());
+            return self.hits_what_is_not_transparent(world_ray);
         }
         match self.world() {
             Some(world) => world.any_of_ray(self.objects(), world_ray),

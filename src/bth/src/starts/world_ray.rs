@@ -1,0 +1,73 @@
+//! Rays in world space that may start on a triangle of an instance.
+
+use crate::intersect::start_point::StartPoint;
+use crate::rays::{Ray, Start, StartRay};
+use bth_format::layout::NONE;
+
+/// A start in the space of the object of an instance.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct InstanceStart {
+    pub(crate) instance: u32,
+    pub(crate) start: Start,
+    pub(crate) point: StartPoint,
+    /// Whether the ray leaves in a direction in which it meets nothing of the instance.
+    pub(crate) is_free: bool,
+}
+
+impl InstanceStart {
+    /// For a ray that starts on no triangle.
+    pub(crate) fn none(origin: [f32; 3]) -> InstanceStart {
+        let point = StartPoint::beside(origin);
+        InstanceStart { instance: NONE, start: Start::NONE, point, is_free: false }
+    }
+}
+
+/// A ray in world space, and its start if that is on a triangle. Its origin is then the start rounded to f32, where other instances see
+/// it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct WorldRay<'a> {
+    pub(crate) ray: &'a Ray,
+    pub(crate) start: Option<&'a InstanceStart>,
+}
+
+impl<'a> WorldRay<'a> {
+    /// A ray with an origin.
+    #[inline(always)]
+    pub(crate) fn plain(ray: &'a Ray) -> WorldRay<'a> {
+        WorldRay { ray, start: None }
+    }
+
+    /// The start, if it is on this instance.
+    #[inline(always)]
+    pub(crate) fn start_in(&self, instance: u32) -> Option<&'a StartPoint> {
+        self.start.filter(|start| start.instance == instance).map(|start| &start.point)
+    }
+
+    /// As a ray in an instance, given the ray in the space of its object: one that starts there, or else one with an origin.
+    #[inline(always)]
+    pub(crate) fn in_object<T>(
+        &self,
+        instance: u32,
+        ray: &Ray,
+        start: impl FnOnce(&StartRay) -> T,
+        plain: impl FnOnce(&Ray) -> T,
+    ) -> T {
+        match self.start.filter(|start| start.instance == instance) {
+            Some(of) => start(&StartRay { start: of.start, direction: ray.direction, tmax: ray.tmax }),
+            None => plain(ray),
+        }
+    }
+}
+
+/// A ray that was placed in the world.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PlacedRay {
+    pub(crate) ray: Ray,
+    pub(crate) start: Option<InstanceStart>,
+}
+
+impl PlacedRay {
+    pub(crate) fn world_ray(&self) -> WorldRay<'_> {
+        WorldRay { ray: &self.ray, start: self.start.as_ref() }
+    }
+}

@@ -130,7 +130,7 @@ fn body(rows: &[Vec<String>]) -> String {
     format!(
         "Every ray goes through every structure (BVH; BTH with each record; where the shape has one, one \
          tetrahedralization with each record; a deformable object that was compiled in another shape and given these \
-         positions, and two with tetrahedra that were compiled longer), as nearest and any hit, a part also with hints and alone: *traced* \
+         positions, and two with tetrahedra that were compiled longer), as nearest and any hit, a part also from starts and alone: *traced* \
          counts all of these. Each tenth of the rays is of a kind: exactly at vertices; at middles of edges; along \
          edges; in planes of faces; along axes with zeros of either sign; with directions of 2^±60 and 2^-149; with \
          ranges that end at, just before and just behind a vertex; from the surface; from inside; from anywhere. \

@@ -53,7 +53,7 @@ pub struct VariationRow {
     pub bytes: f64,
     /// Nodes and leaves that a camera ray and a bounce visit, each traced on its own.
     pub steps: BTreeMap<&'static str, [f64; 2]>,
-    /// Nanoseconds a ray of each set, in batches, without hints.
+    /// Nanoseconds a ray of each set, in batches.
     pub nanoseconds: BTreeMap<&'static str, f64>,
     /// Answers that differ from those of the first row in any bit.
     pub differ: usize,

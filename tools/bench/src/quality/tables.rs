@@ -11,7 +11,7 @@ fn three_decimals(value: Option<f64>) -> String {
 pub fn markdown(results: &QualityResults) -> String {
     let mut text = String::from(
         "Each row is built as files are, but for the one thing that it names; `the same again` is built as files are, too, and shows \
-         what chance makes of a time. Batches without hints on one thread, CPU time, the fastest of interleaved rounds.\n\n\
+         what chance makes of a time. Batches on one thread, CPU time, the fastest of interleaved rounds.\n\n\
          ## Over the first row, geometric means over the models\n\n\
          Times below 1 are faster. SAH: wide nodes and leaves that a random line through the box meets.\n\n",
     );

@@ -195,7 +195,8 @@ impl Task {
             5 => compiled(&model, &CompileOptions { deformable: true, ..of }),
             _ => compiled(&model, &of),
         };
-        let scene = if rng.below(4) == 0 { placed(&object, &mut rng) } else { object };
+        // In another scene a deformed object has the shape in which it was compiled.
+        let scene = if form != 4 && rng.below(4) == 0 { placed(&object, &mut rng) } else { object };
         let mut corners = vec![[[0.0; 3]; 3]; model.triangles.len()];
         for triangle in oracle::triangles(&scene.object(0)) {
             corners[triangle.id as usize] = triangle.corners;

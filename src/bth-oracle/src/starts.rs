@@ -8,7 +8,8 @@ use crate::intersection::{
 };
 use crate::nearest::{ExactHit, nearest_of};
 use bth::Crossings;
-use bth::rays::{Ray, StartRay};
+use bth::SegmentEnd;
+use bth::rays::{Ray, Start, StartRay};
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{Signed, Zero};
@@ -117,6 +118,31 @@ pub fn intersection(corners: &[[[f32; 3]; 3]], ray: &StartRay, triangle: u32) ->
 /// also that of the start.
 pub fn nearest(corners: &[[[f32; 3]; 3]], ray: &StartRay) -> Option<ExactHit> {
     nearest_of(&range(ray), FromStart::new(corners, ray)?.intersections())
+}
+
+/// An end of a segment, exactly; a point has the scale 1.
+fn end(corners: &[[[f32; 3]; 3]], end: SegmentEnd) -> Option<ExactStart> {
+    match end {
+        SegmentEnd::Point(point) => Some(ExactStart { point: point.map(integer), scale: BigInt::from(1) }),
+        SegmentEnd::Start(Start { primitive, u, v }) => {
+            let of = corners.get(primitive.triangle as usize)?;
+            ExactStart::new(&of.map(|p| p.map(integer)), u, v)
+        }
+    }
+}
+
+/// Whether no triangle crosses the open segment between two points, of which both exist.
+pub fn visible(corners: &[[[f32; 3]; 3]], a: SegmentEnd, b: SegmentEnd) -> bool {
+    let (Some(a), Some(b)) = (end(corners, a), end(corners, b)) else { return false };
+    let scaled = |p: &Point, by: &BigInt| -> Point { [0, 1, 2].map(|k| &p[k] * by) };
+    let (from, to, both) = (scaled(&a.point, &b.scale), scaled(&b.point, &a.scale), &a.scale * &b.scale);
+    let direction = sub(&to, &from);
+    let one = BigRational::from(BigInt::from(1));
+    !corners.iter().any(|of| {
+        let of = of.map(|p| scaled(&p.map(integer), &both));
+        let at = intersect_exactly(&from, &direction, &of);
+        at.is_some_and(|at| at.t.is_positive() && at.t < one)
+    })
 }
 
 /// Whether any triangle is hit.

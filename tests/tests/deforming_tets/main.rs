@@ -315,17 +315,15 @@ fn doubled_vertices_that_move_apart_and_surfaces_that_touch_the_box_set_a_leaf_a
         ] {
             let update = scene.set_positions(0, &positions).unwrap();
             assert_eq!(used(&update), (in_use, 2 - in_use), "{positions:?}");
-            let (rays, starts) = rays_and_starts(&scene, &mut Rng::new(9));
+            let (rays, mut starts) = rays_and_starts(&scene, &mut Rng::new(9));
+            // The file does not tell where its triangles lie, so none is a start.
+            starts.truncate(100);
+            assert!(alone(&scene, &starts).iter().all(|hit| *hit == Hit::MISS));
             let exact = World::new(&scene);
             let expected: Vec<Hit> = rays.iter().map(|ray| exact.hit(ray)).collect();
-            let after: Vec<Hit> = starts.iter().map(|ray| exact.hit_from_start(ray)).collect();
-            let (mut hits, mut onward) = (expected.clone(), after.clone());
+            let mut hits = expected.clone();
             scene.batch(&rays).nearest(&mut hits);
-            scene.batch(&starts).nearest(&mut onward);
             for (ray, (hit, expected)) in rays.iter().zip(hits.iter().zip(&expected)) {
-                assert_eq!(hit.t, expected.t, "{ray:?}");
-            }
-            for (ray, (hit, expected)) in starts.iter().zip(onward.iter().zip(&after)) {
                 assert_eq!(hit.t, expected.t, "{ray:?}");
             }
         }

@@ -6,3 +6,4 @@ mod objects;
 mod random;
 mod scenes;
 mod unusable;
+mod visible;

@@ -5,8 +5,14 @@ use crate::rays::{Hit, Ray, StartRay};
 use crate::scene::Scene;
 use crate::simd::Isa;
 use crate::starts::prepare::ENDED;
-use crate::starts::world_ray::{InstanceStart, WorldRay};
+use crate::starts::world_ray::{InstanceStart, PlacedRay, WorldRay};
 use bth_format::object::ObjectView;
+use std::cell::Cell;
+
+thread_local! {
+    /// The rays of a batch in world space. A thread keeps their memory from one batch to the next.
+    static PLACED: Cell<(Vec<Ray>, Vec<InstanceStart>)> = const { Cell::new((Vec::new(), Vec::new())) };
+}
 
 impl Scene {
     /// Stores the nearest hit of a ray, or [`Hit::MISS`].
@@ -104,8 +110,7 @@ impl Scene {
                 object::starts::nearest_from_starts(object, rays, instance, scratch, hits);
             });
         } else if let Some(world) = self.world() {
-            let (world_rays, starts) = self.placed_batch(rays);
-            world.nearest(self.objects(), &world_rays, &starts, hits);
+            self.with_placed(rays, |rays, starts| world.nearest(self.objects(), rays, starts, hits));
         }
         if self.has_opacity() {
             for (ray, hit) in rays.iter().zip(hits) {
@@ -130,8 +135,7 @@ impl Scene {
                 object::starts::any_from_starts(object, rays, instance, scratch, found);
             });
         } else if let Some(world) = self.world() {
-            let (world_rays, starts) = self.placed_batch(rays);
-            world.any(self.objects(), &world_rays, &starts, found);
+            self.with_placed(rays, |rays, starts| world.any(self.objects(), rays, starts, found));
         }
         if self.has_opacity() {
             for (ray, found) in rays.iter().zip(found) {
@@ -146,13 +150,21 @@ impl Scene {
         has_vectors && rays.len() >= object::MIN_BATCH && (self.world().is_some() || self.object_count() == 1)
     }
 
-    /// The rays of a batch in world space, and their starts.
-    fn placed_batch(&self, rays: &[StartRay]) -> (Vec<Ray>, Vec<InstanceStart>) {
-        let placed = rays.iter().map(|ray| match self.place(ray) {
-            Some(placed) => (placed.ray, placed.start.unwrap_or(InstanceStart::none(placed.ray.origin))),
-            None => (ENDED, InstanceStart::none(ENDED.origin)),
-        });
-        placed.unzip()
+    /// Calls `trace` with the rays of a batch in world space, and their starts.
+    fn with_placed(&self, rays: &[StartRay], trace: impl FnOnce(&[Ray], &[InstanceStart])) {
+        let (mut world_rays, mut starts) = PLACED.take();
+        world_rays.clear();
+        starts.clear();
+        for ray in rays {
+            let (ray, start) = match self.place(ray) {
+                Some(PlacedRay { ray, start: Some(start) }) => (ray, start),
+                _ => (ENDED, InstanceStart::none(ENDED.origin)),
+            };
+            world_rays.push(ray);
+            starts.push(start);
+        }
+        trace(&world_rays, &starts);
+        PLACED.set((world_rays, starts));
     }
 }
 

@@ -266,6 +266,17 @@ impl Inverse {
         ObjectRay { ray: Ray { origin, direction, tmin, tmax }, t_scale }
     }
 
+    /// A point of object space in world space, with rounding errors of f64: the solution of the three equations by Cramer's rule.
+    pub(crate) fn to_world(&self, point: [f64; 3]) -> [f64; 3] {
+        let [a, b, c] = self.linear;
+        let cofactors = [cross(b, c), cross(c, a), cross(a, b)];
+        let determinant = dot(a, cofactors[0]);
+        [0, 1, 2].map(|k| {
+            let sum = point[0] * cofactors[0][k] + point[1] * cofactors[1][k] + point[2] * cofactors[2][k];
+            self.origin[k] + sum / determinant
+        })
+    }
+
     /// As [`Self::ray`], for a ray that may start on a triangle of the object: then its origin is that start, rounded.
     #[inline(always)]
     pub(crate) fn ray_from(&self, ray: &Ray, start: Option<&StartPoint>) -> ObjectRay {

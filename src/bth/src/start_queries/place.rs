@@ -1,8 +1,6 @@
 //! Places rays that start on surfaces in the world.
 
-use crate::instances::World;
 use crate::intersect::origin::RoundedOrigin;
-use crate::intersect::start_point::StartPoint;
 use crate::rays::{Ray, Start, StartRay};
 use crate::scene::Scene;
 use crate::starts::locate::{StartError, locate};
@@ -21,23 +19,19 @@ pub(super) enum Misplaced {
 impl Scene {
     /// Places a start in the world: with its point in world space, rounded to f32.
     pub(super) fn place_start(&self, start: &Start) -> Result<(InstanceStart, [f32; 3]), Misplaced> {
-        let object = self.object_at(start.primitive).ok_or(Misplaced::NoInstance)?;
         let instance = start.primitive.instance;
-        if self.world().is_some_and(|world| world.placements[instance as usize].is_none()) {
-            return Err(Misplaced::Hidden);
-        }
-        let point = locate(self.view(object), *start).map_err(Misplaced::Start)?;
-        let origin = match self.world() {
-            None => point.rounded(),
-            Some(world) => self.in_world(world, instance, &point),
+        let Some(world) = self.world() else {
+            let object = Some(instance).filter(|instance| *instance < self.object_count());
+            let point = locate(self.view(object.ok_or(Misplaced::NoInstance)?), *start);
+            let point = point.map_err(Misplaced::Start)?;
+            return Ok((InstanceStart { instance, start: *start, point, is_free: false }, point.rounded()));
         };
-        Ok((InstanceStart { instance, start: *start, point, is_free: false }, origin))
-    }
-
-    /// A start in world space, rounded to f32.
-    fn in_world(&self, world: &World, instance: u32, point: &StartPoint) -> [f32; 3] {
+        let placement = world.placements.get(instance as usize).ok_or(Misplaced::NoInstance)?;
+        let placement = placement.as_ref().ok_or(Misplaced::Hidden)?;
+        let point = locate(self.view(placement.object()), *start).map_err(Misplaced::Start)?;
         let RoundedOrigin(origin, _) = point.origin;
-        world.row(self.objects(), instance).to_world.apply(origin).map(|x| x as f32)
+        let origin = placement.inverse.to_world(origin).map(|x| x as f32);
+        Ok((InstanceStart { instance, start: *start, point, is_free: false }, origin))
     }
 
     /// Places a ray in the world; `None` if its start is not a point of a visible instance.

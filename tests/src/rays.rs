@@ -87,7 +87,11 @@ pub fn weights(rng: &mut Rng) -> [f32; 2] {
         3 => [w, 0.0],
         4 => [0.0, w],
         5 => [w, 1.0 - w],
-        6 => [w, (1.0 - w).next_up()],
+        6 => {
+            // Up to the greatest sum.
+            let v = 1.0 - w + (1 + rng.below(4)) as f32 / (1 << 24) as f32;
+            [w, if w + v <= 1.0 + 1.0 / (1 << 22) as f32 { v } else { 1.0 - w }]
+        }
         7 => [[0.5, 0.5], [0.5, 0.0], [0.0, 0.5], [0.25, 0.25]][rng.below(4) as usize],
         _ => [w * 0.5, rng.unit_f32() * 0.5],
     }

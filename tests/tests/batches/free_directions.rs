@@ -150,6 +150,12 @@ fn what_lies_just_behind_a_distance_is_hit() {
                 .collect();
             later += usize::from(scene.nearest(&rays[0]).is_some_and(|hit| hit.primitive.triangle == 2));
             check_parts(&scene, &rays, 4096);
+            // The same, cut right about their hits.
+            let cut = (rays.iter().zip(alone(&scene, &rays)).filter(|(_, hit)| hit.is_hit())).enumerate();
+            let cut: Vec<StartRay> = cut
+                .map(|(i, (ray, hit))| ray.with_tmax([hit.t, hit.t.next_up(), hit.t.next_down()][i % 3]))
+                .collect();
+            check_parts(&scene, &cut, 4096);
         }
     }
     assert_eq!(later, 15, "the triangle above is hit");

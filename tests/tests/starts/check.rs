@@ -66,7 +66,7 @@ fn check_nearest(
     }
     for (reported, exact) in [(hit.u, &at.u), (hit.v, &at.v)] {
         let off = (f64::from(reported) - to_f64(exact)).abs();
-        assert!(off <= 1e-7 && reported >= 0.0, "weights, off by {off}: {}", context());
+        assert!(off <= 4e-8 && reported >= 0.0, "weights, off by {off}: {}", context());
     }
     assert!(hit.u + hit.v <= 1.0 + 1.0 / (1 << 22) as f32, "sum of weights: {}", context());
 }

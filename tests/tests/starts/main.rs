@@ -2,6 +2,7 @@
 
 mod check;
 mod closed;
+mod near;
 mod objects;
 mod random;
 mod scenes;

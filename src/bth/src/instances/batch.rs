@@ -3,7 +3,6 @@
 
 use super::World;
 use super::enter_object::ObjectRays;
-use super::free_starts::FreeStarts;
 use super::listed_rays::ListedRays;
 use super::packets::TopLevelPackets;
 use super::placement::Placement;
@@ -46,8 +45,6 @@ struct ActiveRays {
     visits: VisitQueue,
     /// The rays of visits in the space of their object.
     object_rays: ObjectRays,
-    /// The instances that rays do not meet although they start there.
-    free_starts: FreeStarts,
 }
 
 impl ActiveRays {
@@ -79,7 +76,7 @@ impl Kernel for StartKernel<'_> {
             batch,
             first,
             count,
-            active_rays: ActiveRays { packets, lists, traversals, active, visits, free_starts, .. },
+            active_rays: ActiveRays { packets, lists, traversals, active, visits, .. },
         } = self;
         let (world, rays) = (batch.world, &batch.rays[first..first + count]);
         let top = &world.top;
@@ -89,14 +86,14 @@ impl Kernel for StartKernel<'_> {
             active.retain(|&index| {
                 let start = &batch.starts[first + index as usize];
                 let starts_here = start.instance != NONE;
-                if starts_here && !start.is_free {
+                if starts_here {
                     visits.all.push(Visit { ray: first as u32 + index, instance: start.instance });
                 }
                 !starts_here
             });
         }
         let queue = (lists, first as u32, &mut visits.all);
-        traversals.start(s, top, rays, active, queue, |index| free_starts.not_met(index));
+        traversals.start(s, top, rays, active, queue);
     }
 }
 
@@ -119,9 +116,9 @@ impl Kernel for AdvanceKernel<'_> {
             top,
             progress,
             first,
-            active_rays: ActiveRays { packets, lists, traversals, active, visits, free_starts, .. },
+            active_rays: ActiveRays { packets, lists, traversals, active, visits, .. },
         } = self;
-        packets.advance(s, progress, free_starts, (first, visits));
+        packets.advance(s, progress, (first, visits));
         if !SMALL {
             lists.advance(progress, (first, &mut visits.all));
         }
@@ -157,7 +154,6 @@ impl World {
         for first in (0..rays.len()).step_by(CHUNK) {
             let end = (first + CHUNK).min(rays.len());
             active_rays.visits.clear();
-            active_rays.free_starts.find(&batch, first..end);
             let (count, active_rays) = (end - first, &mut *active_rays);
             isa.run(StartKernel { batch: &batch, first, count, active_rays });
             self.trace(&batch, query, active_rays);

@@ -2,11 +2,15 @@
 
 use super::progress::Progress;
 use super::scene_batch::SceneBatch;
+use super::scene_query::ObjectVisits;
 use crate::intersect::start_point::StartPoint;
 use crate::nodes::affine::RayLanes;
 use crate::query::sink::Visit;
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, LANES, Simd};
+use crate::starts::free;
+use crate::starts::prepare::ENDED;
+use crate::starts::world_ray::InstanceStart;
 
 /// The rays of visits of one object, in its space and in the order of the visits.
 #[derive(Default)]
@@ -25,16 +29,23 @@ pub(super) struct ObjectRays {
 impl ObjectRays {
     /// Transforms the rays of visits into the space of the object. `progress` are the answers so far, beyond
     /// which they end.
-    pub(super) fn fill(&mut self, batch: &SceneBatch<'_>, visits: &[Visit], progress: Progress<'_>) {
+    pub(super) fn fill(&mut self, of_object: &ObjectVisits<'_>, progress: Progress<'_>) {
+        let &ObjectVisits { batch, object, visits } = of_object;
         self.t_scale.clear();
         self.starts.clear();
         Isa::chosen().run(EnterKernel { object_rays: self, batch, visits, progress });
         if !batch.starts.is_empty() {
             let ObjectRays { rays, starts, .. } = self;
             starts.extend(rays.iter_mut().zip(visits).map(|(ray, visit)| match batch.start(*visit) {
-                Some(start) => {
-                    ray.origin = start.rounded();
-                    *start
+                Some(InstanceStart { start, point, .. }) => {
+                    ray.origin = point.rounded();
+                    let begin = free::begin(object, start.primitive.triangle, point, ray.direction);
+                    if begin == f32::INFINITY {
+                        *ray = ENDED;
+                    } else {
+                        ray.tmin = begin;
+                    }
+                    *point
                 }
                 None => StartPoint::beside(ray.origin),
             }));

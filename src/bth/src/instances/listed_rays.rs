@@ -55,12 +55,10 @@ pub(super) struct RayToList<'a> {
     pub(super) slabs: &'a RaySlabs,
     /// Greatest depth of hits.
     pub(super) last: f32,
-    /// Code of an instance that it does not enter, or `NONE`.
-    pub(super) skip: u32,
 }
 
 impl RayToList<'_> {
-    pub(super) const NONE: Self = RayToList { index: NONE, slabs: &RaySlabs::NONE, last: 0.0, skip: NONE };
+    pub(super) const NONE: Self = RayToList { index: NONE, slabs: &RaySlabs::NONE, last: 0.0 };
 }
 
 /// A ray with a list.
@@ -300,7 +298,7 @@ impl Tests {
             let (bits, depth) = ray.slabs.children(s, node, ray.last);
             let child = s.load_u(&node.child);
             // With coordinates near the limit of f32 the test accepts all boxes, also of empty children, so these are excluded here.
-            let allowed = s.and_not(s.lt_u(child, s.splat_u(BOTTOM)), s.eq_u(child, s.splat_u(ray.skip)));
+            let allowed = s.lt_u(child, s.splat_u(BOTTOM));
             let met = bits & s.mask_bits(allowed);
             let inner = met & s.mask_bits(s.lt_u(child, s.splat_u(INSTANCE)));
             let to: &mut [u32; LANES] = nodes[end..].first_chunk_mut().expect("there is room for a node");

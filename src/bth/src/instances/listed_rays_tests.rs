@@ -13,8 +13,6 @@ use std::collections::BTreeSet;
 struct ListKernel<'a> {
     top: &'a TopLevel,
     rays: &'a [Ray],
-    /// Of each ray an instance that it does not enter.
-    skip: &'a [u32],
     /// Nearest hits that are found after the first visits.
     hits: &'a [Hit],
 }
@@ -25,11 +23,11 @@ type Listed = (Vec<Visit>, Vec<Visit>, BTreeSet<u32>);
 impl Kernel for ListKernel<'_> {
     type Output = Listed;
     fn run<S: Simd>(self, s: S) -> Listed {
-        let ListKernel { top, rays, skip, hits } = self;
+        let ListKernel { top, rays, hits } = self;
         let (mut lists, mut traversals) = (ListedRays::default(), RayTraversals::default());
         let mut active: Vec<u32> = (0..rays.len() as u32).collect();
         let (mut nearest, mut later) = (Vec::new(), Vec::new());
-        traversals.start(s, top, rays, &mut active, (&mut lists, 0, &mut nearest), |ray| skip[ray]);
+        traversals.start(s, top, rays, &mut active, (&mut lists, 0, &mut nearest));
         while !lists.active.is_empty() {
             lists.advance(Progress::Nearest(hits), (0, &mut later));
         }
@@ -49,14 +47,13 @@ fn rays_visit_what_is_enumerated_for_one_ray_or_are_not_listed() {
         let file = File::from_bytes(FILES[case % 2]).unwrap();
         let (world, transforms) = world(&file, &mut rng, [2, 17, 40, 300, 2000][case % 5]);
         let rays = rays(&mut rng, &transforms, 40);
-        let skip: Vec<u32> = rays.iter().map(|_| rng.below(2 * transforms.len() as u64) as u32).collect();
         let nearest_t = |ray: &Ray, random: u64| match random % 3 {
             0 => f32::INFINITY,
             _ => ray.tmin.max(0.0) + (random % 1000) as f32 / 500.0 / ray.direction[0].abs().max(1e-20),
         };
         let hits: Vec<Hit> =
             rays.iter().map(|ray| Hit { t: nearest_t(ray, rng.next()), ..Hit::MISS }).collect();
-        let kernel = ListKernel { top: &world.top, rays: &rays, skip: &skip, hits: &hits };
+        let kernel = ListKernel { top: &world.top, rays: &rays, hits: &hits };
         let Ok((nearest, later, without)) = Isa::chosen().run_wide(kernel) else { return };
         for (i, ray) in rays.iter().enumerate().filter(|(i, _)| !without.contains(&(*i as u32))) {
             let enumerated = |tmax: f32| {
@@ -65,7 +62,6 @@ fn rays_visit_what_is_enumerated_for_one_ray_or_are_not_listed() {
                     all.insert(instance);
                     Some(tmax)
                 });
-                all.remove(&skip[i]);
                 all
             };
             let expected = enumerated(ray.tmax);

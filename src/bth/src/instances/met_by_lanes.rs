@@ -23,8 +23,6 @@ pub(super) struct RaysTogether<'a> {
     /// The indices of the rays, and their number.
     pub(super) at: &'a [u32; LANES],
     pub(super) count: usize,
-    /// For each the code of an instance that it does not enter, or `NONE`.
-    pub(super) skip: &'a [u32; LANES],
 }
 
 /// Sixteen rays, and the instances that any of them may enter. Each is a row with a lane for each ray.
@@ -52,7 +50,7 @@ impl<S: Simd> MetByLanes<S> {
     /// Tests rays. `None` if they enter more instances than there are rows, or if there are too many boxes to be tested.
     #[inline(always)]
     pub(super) fn of(s: S, rays: &RaysTogether<'_>) -> Option<MetByLanes<S>> {
-        let RaysTogether { top, rays, at, count, skip } = *rays;
+        let RaysTogether { top, rays, at, count } = *rays;
         let used = s.mask(((1u64 << count) - 1) as u32);
         let field = gather_rays(s, used, rays, s.load_u(at));
         // Boxes do not need to know the greatest axis.
@@ -61,7 +59,7 @@ impl<S: Simd> MetByLanes<S> {
         let farthest = s.max(s.max(s.abs(field[0]), s.abs(field[1])), s.abs(field[2]));
         let is_near = s.and(s.le(farthest, s.splat(top.reach)), s.le(s.splat(0.0), field[3]));
         let tested = s.mask_bits(s.and(s.and(is_near, used), prepared.usable));
-        let (skip, nowhere) = (s.load_u(skip), s.splat(f32::INFINITY));
+        let nowhere = s.splat(f32::INFINITY);
         let mut met = MetByLanes {
             codes: [0; LANES],
             depths: [nowhere; LANES],
@@ -88,7 +86,7 @@ impl<S: Simd> MetByLanes<S> {
                 let code = node.child[slot];
                 let corners = [0, 1].map(|end| [0, 1, 2].map(|k| node.bounds[k][end][slot]));
                 let (enter, enters) = slabs.enter(s, corners, (true, false));
-                let enters = s.mask_bits(s.and_not(enters, s.eq_u(skip, s.splat_u(code)))) & tested;
+                let enters = s.mask_bits(enters) & tested;
                 if enters == 0 {
                     continue;
                 }

@@ -5,11 +5,10 @@
 //! the caller builds, a commit ([`caller`]) does the same for the instances that the caller has changed, and may refit the BVH
 //! instead. Rays meet the result ([`world`]) in the same way. A batch of rays ([`batch`]) traverses that BVH, coherent rays as
 //! packets ([`packets`]), of the others those that meet few boxes by lists ([`listed_rays`], through few boxes sixteen rays together:
-//! [`met_by_lanes`]) and the rest with stacks ([`traverse`]); the answers so far end them ([`progress`]). Rays that start on a known
-//! triangle may be traced in its instance first, or certainly not meet it ([`free_starts`]). Each visit of an instance by a ray is queued
-//! ([`visit_queue`]); the rays of an object's visits are transformed into its space ([`enter_object`]) and traced there together, with t
-//! unchanged. A single ray ([`one_ray`]), and
-//! one whose query reports several hits, goes through the top level alone ([`enumerate`], [`instance_list`]).
+//! [`met_by_lanes`]) and the rest with stacks ([`traverse`]); the answers so far end them ([`progress`]). Each visit of an instance by a
+//! ray is queued ([`visit_queue`]); the rays of an object's visits are transformed into its space ([`enter_object`]) and traced there
+//! together, with t unchanged. A single ray ([`one_ray`]), and one whose query reports several hits, goes through the top level alone
+//! ([`enumerate`], [`instance_list`]).
 
 mod batch;
 mod box_tests;
@@ -21,7 +20,6 @@ mod enumerate;
 #[cfg(test)]
 pub(crate) mod exact_loop;
 mod file_scene;
-mod free_starts;
 mod instance_list;
 mod listed_rays;
 mod met_by_lanes;

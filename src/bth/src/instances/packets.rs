@@ -5,7 +5,6 @@
 //! instances would be occluded by others.
 
 use super::box_tests::{limit, limit_lanes};
-use super::free_starts::FreeStarts;
 use super::progress::Progress;
 use super::top_level::TopLevel;
 use super::top_nodes::INSTANCE;
@@ -242,7 +241,6 @@ impl TopLevelPackets {
         &mut self,
         s: S,
         progress: Progress<'_>,
-        free_starts: &FreeStarts,
         (first_ray, visits): (u32, &mut VisitQueue),
     ) {
         let TopLevelPackets { items, packets, .. } = self;
@@ -267,7 +265,7 @@ impl TopLevelPackets {
                         entering |= u64::from(bits) << (group * LANES);
                     }
                 }
-                entering = free_starts.that_may_meet(item.instance, first, entering & item.rays);
+                entering &= item.rays;
                 if entering != 0 {
                     visits.push_run(s, first_ray + packet.first, entering, item.instance);
                     packets[kept] = packets[i];

@@ -1,7 +1,6 @@
 //! The parameters of a batch of rays through the instances of a scene.
 
 use super::World;
-use crate::intersect::start_point::StartPoint;
 use crate::nodes::affine::ObjectRay;
 use crate::objects::Objects;
 use crate::query::sink::Visit;
@@ -21,7 +20,10 @@ impl SceneBatch<'_> {
     /// The ray of a visit in the space of the object, ended at `tmax`.
     pub(super) fn object_ray(&self, visit: Visit, tmax: f32) -> ObjectRay {
         let ray = Ray { tmax, ..self.rays[visit.ray as usize] };
-        self.world.placement(visit.instance).inverse.ray_from(&ray, self.start(visit))
+        self.world
+            .placement(visit.instance)
+            .inverse
+            .ray_from(&ray, self.start(visit).map(|start| &start.point))
     }
 
     /// As [`WorldRay::in_object`], for the ray of a visit.
@@ -39,8 +41,7 @@ impl SceneBatch<'_> {
 
     /// Where the ray of a visit starts, if that is on a triangle of the instance.
     #[inline(always)]
-    pub(super) fn start(&self, visit: Visit) -> Option<&StartPoint> {
-        let start = self.starts.get(visit.ray as usize)?;
-        (start.instance == visit.instance).then_some(&start.point)
+    pub(super) fn start(&self, visit: Visit) -> Option<&InstanceStart> {
+        self.starts.get(visit.ray as usize).filter(|start| start.instance == visit.instance)
     }
 }

@@ -25,11 +25,10 @@ pub(super) trait SceneQuery {
     fn trace_placed(&mut self, of_object: ObjectVisits<'_>, object_rays: &ObjectRays);
     /// Traces visits, given memory for their rays in the space of the object.
     fn trace(&mut self, of_object: ObjectVisits<'_>, object_rays: &mut ObjectRays) {
-        let ObjectVisits { batch, visits, .. } = of_object;
-        if visits.len() < object::MIN_BATCH {
+        if of_object.visits.len() < object::MIN_BATCH {
             return self.trace_one_by_one(of_object);
         }
-        object_rays.fill(batch, visits, self.progress());
+        object_rays.fill(&of_object, self.progress());
         self.trace_placed(of_object, object_rays);
     }
 }

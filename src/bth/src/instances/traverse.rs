@@ -39,15 +39,12 @@ struct TopLevelRay {
     tmax: f32,
     /// Greatest depth of such hits.
     limit: f32,
-    /// Code of an instance that the ray does not enter, or `NONE`.
-    skip: u32,
     /// The top of the ray's stack.
     top: StackPosition,
 }
 
 impl RayTraversals {
-    /// Starts the rays whose indices are in `active`, and removes those that cannot hit anything. `skip` returns for the index of
-    /// a ray an instance that it is not to enter, or `NONE`.
+    /// Starts the rays whose indices are in `active`, and removes those that cannot hit anything.
     #[inline(always)]
     pub(super) fn start<S: Simd>(
         &mut self,
@@ -56,7 +53,6 @@ impl RayTraversals {
         rays: &[Ray],
         active: &mut Vec<u32>,
         (lists, first_ray, visits): (&mut ListedRays, u32, &mut Vec<Visit>),
-        skip: impl Fn(usize) -> u32,
     ) {
         if S::HAS_VECTORS && !SMALL {
             lists.clear(rays.len());
@@ -65,13 +61,7 @@ impl RayTraversals {
             return active.clear();
         }
         self.stacks.reserve_for(top.depth as usize, rays.len());
-        let vacant = TopLevelRay {
-            slabs: RaySlabs::NONE,
-            tmax: 0.0,
-            limit: 0.0,
-            skip: NONE,
-            top: StackPosition::FIRST,
-        };
+        let vacant = TopLevelRay { slabs: RaySlabs::NONE, tmax: 0.0, limit: 0.0, top: StackPosition::FIRST };
         if self.states.len() < rays.len() {
             self.states.resize(rays.len(), vacant);
         }
@@ -83,11 +73,7 @@ impl RayTraversals {
             index[..count].copy_from_slice(&active[first..first + count]);
             let mut done = 0;
             if S::HAS_VECTORS && !SMALL && lists.may_list_together() {
-                let mut skips = [NONE; LANES];
-                for (skips, ray) in skips.iter_mut().zip(&index[..count]) {
-                    *skips = INSTANCE | skip(*ray as usize);
-                }
-                let together = RaysTogether { top, rays, at: &index, count, skip: &skips };
+                let together = RaysTogether { top, rays, at: &index, count };
                 done = lists.list_together(s, &together, (first_ray, visits));
                 if done.count_ones() as usize == count {
                     continue;
@@ -107,11 +93,10 @@ impl RayTraversals {
                 let ray = &rays[ray_index as usize];
                 let [x, y, z] = ray.origin;
                 let is_near = x.abs() <= top.reach && y.abs() <= top.reach && z.abs() <= top.reach;
-                let skip = INSTANCE | skip(ray_index as usize);
                 let slabs = match prepared.prepared(lane).filter(|_| S::HAS_VECTORS && is_near) {
                     Some(PreparedRay { slabs, .. }) if lists_rays && ray.tmin >= 0.0 => {
                         let last = limit(slabs.scale, ray.tmax);
-                        listed[listed_count] = RayToList { index: ray_index, slabs, last, skip };
+                        listed[listed_count] = RayToList { index: ray_index, slabs, last };
                         listed_count += 1;
                         continue;
                     }
@@ -121,7 +106,7 @@ impl RayTraversals {
                         None => continue,
                     },
                 };
-                self.start_ray(ray_index, &slabs, ray.tmax, skip);
+                self.start_ray(ray_index, &slabs, ray.tmax);
                 active[kept] = ray_index;
                 kept += 1;
             }
@@ -129,9 +114,9 @@ impl RayTraversals {
             let mut failed =
                 if listed_count > 0 { lists.list(s, top, listed, (first_ray, visits)) } else { 0 };
             while failed != 0 {
-                let RayToList { index, slabs, skip, .. } = listed[failed.trailing_zeros() as usize % LANES];
+                let RayToList { index, slabs, .. } = listed[failed.trailing_zeros() as usize % LANES];
                 failed &= failed - 1;
-                self.start_ray(index, slabs, rays[index as usize].tmax, skip);
+                self.start_ray(index, slabs, rays[index as usize].tmax);
                 active[kept] = index;
                 kept += 1;
             }
@@ -139,11 +124,11 @@ impl RayTraversals {
         active.truncate(kept);
     }
 
-    /// Starts a ray at the root; `skip` is the code of an instance that it is not to enter.
+    /// Starts a ray at the root.
     #[inline(always)]
-    fn start_ray(&mut self, index: u32, slabs: &RaySlabs, tmax: f32, skip: u32) {
+    fn start_ray(&mut self, index: u32, slabs: &RaySlabs, tmax: f32) {
         let (limit, top) = (limit(slabs.scale, tmax), self.stacks.start(index as usize, 0));
-        self.states[index as usize] = TopLevelRay { slabs: *slabs, tmax, limit, skip, top };
+        self.states[index as usize] = TopLevelRay { slabs: *slabs, tmax, limit, top };
     }
 
     /// Advances each ray of `active` to the next instance whose box it may intersect, and appends the visit to `visits` in the
@@ -219,7 +204,7 @@ impl RayTraversals {
         let (bits, enter) = state.slabs.children(s, node, state.limit);
         let child = s.load_u(&node.child);
         // With coordinates near the limit of f32 the test accepts all boxes, also of empty children, so these are excluded here.
-        let allowed = s.and_not(s.lt_u(child, s.splat_u(BOTTOM)), s.eq_u(child, s.splat_u(state.skip)));
+        let allowed = s.lt_u(child, s.splat_u(BOTTOM));
         let (codes, keys) = self.stacks.free_entries(state.top);
         let count = s.compress_far_to_near(bits & s.mask_bits(allowed), enter, child, codes, keys);
         state.top = self.stacks.replaced(state.top, count);

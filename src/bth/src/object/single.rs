@@ -9,6 +9,7 @@ use crate::intersect::start_point::StartPoint;
 use crate::query::{Answer, Count, Query};
 use crate::rays::{Ray, StartRay};
 use crate::simd::{Isa, Kernel, Simd};
+use crate::starts::free;
 use crate::starts::locate::{locate, prefetch_leaf};
 use crate::tets::enter_tets;
 use bth_format::layout::NONE;
@@ -67,7 +68,11 @@ impl SingleRay for StartRay {
         let point = locate(object, start).ok()?;
         // Vectors are made in registers: loading what was just written word by word would stall.
         let [x, y, z] = point.rounded();
-        let rows = [Vec4::new(x, y, z, 0.0), Vec4::new(dx, dy, dz, tmax)];
+        let begin = free::begin(object, start.primitive.triangle, &point, self.direction);
+        if begin == f32::INFINITY {
+            return None;
+        }
+        let rows = [Vec4::new(x, y, z, begin), Vec4::new(dx, dy, dz, tmax)];
         let floats = [rows[0].to_array(), rows[1].to_array()];
         Some(StartLine { rows, ray: zerocopy::transmute!(floats), point })
     }

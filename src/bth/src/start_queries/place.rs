@@ -24,14 +24,14 @@ impl Scene {
             let object = Some(instance).filter(|instance| *instance < self.object_count());
             let point = locate(self.view(object.ok_or(Misplaced::NoInstance)?), *start);
             let point = point.map_err(Misplaced::Start)?;
-            return Ok((InstanceStart { instance, start: *start, point, is_free: false }, point.rounded()));
+            return Ok((InstanceStart { instance, start: *start, point }, point.rounded()));
         };
         let placement = world.placements.get(instance as usize).ok_or(Misplaced::NoInstance)?;
         let placement = placement.as_ref().ok_or(Misplaced::Hidden)?;
         let point = locate(self.view(placement.object()), *start).map_err(Misplaced::Start)?;
         let RoundedOrigin(origin, _) = point.origin;
         let origin = placement.inverse.to_world(origin).map(|x| x as f32);
-        Ok((InstanceStart { instance, start: *start, point, is_free: false }, origin))
+        Ok((InstanceStart { instance, start: *start, point }, origin))
     }
 
     /// Places a ray in the world; `None` if its start is not a point of a visible instance.

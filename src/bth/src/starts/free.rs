@@ -6,6 +6,8 @@
 
 use super::leaving::{DIRECTIONS, Leaving, SLACK as SLACK_F32};
 use super::triangles::{Row, StartTriangles};
+use crate::intersect::start::start_corners;
+use crate::intersect::start_point::StartPoint;
 use crate::simd::{LANES, Lanewise, Simd};
 use bth_format::layout::{FREE_BINS, FREE_SECTOR_OF, FREE_SIDE, FreeBins, FreeLevels, free_axes, free_bin};
 use bth_format::object::ObjectView;
@@ -47,24 +49,26 @@ static OF_SECTORS: [[u32; LANES]; 2] = {
     bits
 };
 
-/// Where the range of a ray that starts on a triangle of an object can begin: infinite in a free direction, 0 where nothing is known.
-#[inline(never)]
-pub(super) fn begin(
-    object: &ObjectView<'_>,
-    triangle: u32,
-    corners: [[f32; 3]; 3],
-    direction: [f32; 3],
-) -> f32 {
-    known_begin(object, triangle, corners, direction).unwrap_or(0.0)
+/// Where the range of a ray in the space of an object can begin, given the triangle and the point at which it starts: infinite in a free
+/// direction, 0 where nothing is known.
+#[inline(always)]
+pub(crate) fn begin(object: &ObjectView<'_>, triangle: u32, point: &StartPoint, direction: [f32; 3]) -> f32 {
+    if object.has_free_directions() {
+        known_begin(object, triangle, point, direction).unwrap_or(0.0)
+    } else {
+        0.0
+    }
 }
 
+#[inline(never)]
 fn known_begin(
     object: &ObjectView<'_>,
     triangle: u32,
-    corners: [[f32; 3]; 3],
+    point: &StartPoint,
     direction: [f32; 3],
 ) -> Option<f32> {
     let known = object.known_free(triangle as usize)?;
+    let corners = start_corners(object, point.leaf, point.slot)?;
     let greatest = direction[0].abs().max(direction[1].abs()).max(direction[2].abs());
     if !(greatest > DIRECTIONS[0] && greatest < DIRECTIONS[1]) {
         return None;

@@ -5,7 +5,7 @@
 //! the triangle and the bin of their direction ([`leaving`]). [`prepare`] makes rays of the object of a batch. [`world_ray`] holds a ray in
 //! world space that may start on a triangle of an instance; [`crate::start_queries`] places it there and traces it.
 
-mod free;
+pub(crate) mod free;
 #[cfg(test)]
 mod free_tests;
 mod leaving;

@@ -1,10 +1,9 @@
 //! The rays of a batch that start on triangles of an object, as rays of the object with the exact points at which they start.
 
 use super::free::{self, decide};
-use super::locate::{locate, place};
+use super::locate::locate;
 use super::triangles::{NoRow, Row, StartTriangles, TriangleIds};
 use crate::intersect::origin::RoundedOrigin;
-use crate::intersect::start::start_corners;
 use crate::intersect::start::{ABOVE_ONE, rounded_start};
 use crate::intersect::start_point::StartPoint;
 use crate::rays::{PrimitiveRef, Ray, Start, StartRay};
@@ -60,12 +59,7 @@ impl PreparedStarts {
             (self.rays[index], self.points[index]) = (ENDED, StartPoint::beside([0.0; 3]));
             return;
         };
-        let begin = if object.has_free_directions() {
-            let corners = place(object, triangle).and_then(|(leaf, slot)| start_corners(object, leaf, slot));
-            corners.map_or(0.0, |corners| free::begin(object, triangle, corners, ray.direction))
-        } else {
-            0.0
-        };
+        let begin = free::begin(object, triangle, &point, ray.direction);
         let is_free = begin == f32::INFINITY;
         let tmin = if is_free { 0.0 } else { begin };
         self.rays[index] = Ray { origin: point.rounded(), tmin, direction: ray.direction, tmax: ray.tmax };

@@ -10,15 +10,13 @@ pub(crate) struct InstanceStart {
     pub(crate) instance: u32,
     pub(crate) start: Start,
     pub(crate) point: StartPoint,
-    /// Whether the ray leaves in a direction in which it meets nothing of the instance.
-    pub(crate) is_free: bool,
 }
 
 impl InstanceStart {
     /// For a ray that starts on no triangle.
     pub(crate) fn none(origin: [f32; 3]) -> InstanceStart {
         let point = StartPoint::beside(origin);
-        InstanceStart { instance: NONE, start: Start::NONE, point, is_free: false }
+        InstanceStart { instance: NONE, start: Start::NONE, point }
     }
 }
 

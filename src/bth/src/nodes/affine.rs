@@ -267,7 +267,7 @@ impl Inverse {
     }
 
     /// A point of object space in world space, with rounding errors of f64: the solution of the three equations by Cramer's rule.
-    pub(crate) fn to_world(&self, point: [f64; 3]) -> [f64; 3] {
+    pub(crate) fn point_in_world(&self, point: [f64; 3]) -> [f64; 3] {
         let [a, b, c] = self.linear;
         let cofactors = [cross(b, c), cross(c, a), cross(a, b)];
         let determinant = dot(a, cofactors[0]);

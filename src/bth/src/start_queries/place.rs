@@ -30,7 +30,7 @@ impl Scene {
         let placement = placement.as_ref().ok_or(Misplaced::Hidden)?;
         let point = locate(self.view(placement.object()), *start).map_err(Misplaced::Start)?;
         let RoundedOrigin(origin, _) = point.origin;
-        let origin = placement.inverse.to_world(origin).map(|x| x as f32);
+        let origin = placement.inverse.point_in_world(origin).map(|x| x as f32);
         Ok((InstanceStart { instance, start: *start, point }, origin))
     }
 

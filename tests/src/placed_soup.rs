@@ -36,12 +36,15 @@ pub fn placed_soup(triangles: &[[[f32; 3]; 3]], matrices: &[[f64; 12]]) -> Vec<u
     builder.finish()
 }
 
+/// An object: the corners of its triangles, and its leaves, each as triangles.
+pub type SoupObject<'a> = (&'a [[[f32; 3]; 3]], Vec<Vec<u32>>);
+
 /// A file without a scene, with an object for each list of triangles and of the ids in its raw leaves. A triangle may lie in several
 /// leaves.
 ///
 /// # Panics
 /// If a list is empty, or has too many leaves or triangles in one of them.
-pub fn soups(objects: &[(&[[[f32; 3]; 3]], Vec<Vec<u32>>)]) -> Vec<u8> {
+pub fn soups(objects: &[SoupObject<'_>]) -> Vec<u8> {
     let soups: Vec<Soup> = objects.iter().map(|(triangles, leaves)| Soup::new(triangles, leaves)).collect();
     let mut builder = FileBuilder::new();
     for (index, soup) in (0..).zip(&soups) {

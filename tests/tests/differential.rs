@@ -242,7 +242,7 @@ fn rays_without_a_line_hit_nothing() {
             let start = Start { primitive: PrimitiveRef { instance: 0, triangle: 0 }, u: 0.25, v: 0.25 };
             let from_start = start.ray(ray.direction).with_tmax(ray.tmax);
             // A start has an origin and a range that begins at 0.
-            if from_start.direction != up || !(from_start.tmax >= 0.0) {
+            if from_start.direction != up || from_start.tmax.is_nan() || from_start.tmax < 0.0 {
                 assert_eq!((scene.nearest(&from_start), scene.any(&from_start)), (None, false), "{name}");
             }
         }

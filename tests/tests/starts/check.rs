@@ -9,6 +9,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 pub(crate) type Corners = Vec<[[f32; 3]; 3]>;
 
+/// A condition, and whether a hit meets it.
+type Condition<'a> = (Accept<'a>, &'a dyn Fn(&Hit) -> bool);
+
 /// The instruction set is a setting of the whole process, so tests that set it run one after the other.
 pub(crate) fn turn() -> MutexGuard<'static, ()> {
     static TURN: Mutex<()> = Mutex::new(());
@@ -98,7 +101,7 @@ fn check_all(scene: &Scene, corners: &Corners, ray: &StartRay, nearest: Option<H
     let even = |_: &Ray, hit: &Hit| hit.primitive.triangle.is_multiple_of(2);
     let at_origin = Ray::new([0.0; 3], ray.direction);
     let is_front = |hit: &Hit| oracle::is_front(&at_origin, corners[hit.primitive.triangle as usize]);
-    let conditions: [(Accept<'_>, &dyn Fn(&Hit) -> bool); 5] = [
+    let conditions: [Condition<'_>; 5] = [
         (Accept { filter: Some(&even), ..everything }, &|hit| hit.primitive.triangle.is_multiple_of(2)),
         (Accept { cull: Cull::Back, ..everything }, &is_front),
         (Accept { cull: Cull::Front, ..everything }, &|hit| !is_front(hit)),

@@ -12,7 +12,7 @@ fn walls_at_a_t_below_any_f32_are_hit_before_a_start_and_not_behind_it() {
     let at = |z: f32| [[0.0, 0.0, z], [1.0, 0.0, z], [0.0, 1.0, z]];
     for gap in [1e-8, 1e-30, 1e-44] {
         // A start on the middle one is between two walls.
-        let triangles = vec![at(0.0), at(gap), at(-gap)];
+        let triangles = [at(0.0), at(gap), at(-gap)];
         for walls in [vec![0, 1, 2], vec![0, 1], vec![0, 2]] {
             let corners: Vec<_> = walls.iter().map(|i| triangles[*i]).collect();
             let leaf = (0..corners.len() as u32).collect();

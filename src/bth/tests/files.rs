@@ -10,7 +10,7 @@ macro_rules! files {
     };
 }
 
-const VALID: [(&str, &[u8]); 30] = files![
+const VALID: [(&str, &[u8]); 34] = files![
     "deformable",
     "deformable-tets-link32",
     "deformable-tets-tet16",
@@ -40,6 +40,10 @@ const VALID: [(&str, &[u8]); 30] = files![
     "two-levels",
     "two-objects",
     "unknown-optional-section",
+    "places",
+    "places-deformable",
+    "places-grid-16",
+    "places-tets",
     "widened-boxes",
 ];
 

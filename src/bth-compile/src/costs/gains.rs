@@ -135,8 +135,8 @@ impl Sampled {
         for (k, ((gain, &at), &started)) in gains.iter_mut().zip(nodes).zip(&started).enumerate() {
             let node = &bvh.nodes[at as usize];
             gain.steps = steps(Start::Surface, k);
+            gain.saved += weights[1] * (gain.bvh - gain.tets) / self.surface.len().max(1) as f64;
             if !prices.keep_subtrees {
-                gain.saved += weights[1] * (gain.bvh - gain.tets) / self.surface.len().max(1) as f64;
                 let n = steps(Start::Outside, k);
                 let walked = match at {
                     0 => prices.outside(node.count, n, LINES_THAT_HIT),

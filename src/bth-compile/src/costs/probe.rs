@@ -88,9 +88,9 @@ pub fn probe(
             Some(known) => share_of(known, bvh, &rows),
             None => (areas[rows.end] - areas[rows.start]) / areas[bvh.order.len()],
         };
+        leaf.gain = weights[1] * share * (leaf.cost_bvh - leaf.cost_tet);
         if !storage.keep_subtrees {
-            leaf.gain = weights[1] * share * (leaf.cost_bvh - leaf.cost_tet)
-                + weights[0] * prober.entering(*node, tets);
+            leaf.gain += weights[0] * prober.entering(*node, tets);
         }
         leaf.kept = leaf.gain > 0.0;
         report.leaves.push(leaf);

@@ -84,7 +84,7 @@ impl World {
     }
 
     /// The nearest exact hit of a ray from a start. The instance on which it starts sees the exact point, others see it rounded to f32, at
-    /// t >= 0, as in the runtime.
+    /// t >= 0, as in the runtime. Of instances whose hits have an equal t as it is reported, rounded to f32, that of the least instance.
     pub fn nearest_from_start(&self, ray: &StartRay) -> Option<ExactHit<PrimitiveRef>> {
         let PrimitiveRef { instance, triangle } = ray.start.primitive;
         let own = self.instances.iter().find(|other| other.number == instance)?;
@@ -102,22 +102,24 @@ impl World {
         };
         let rounded = Ray { origin: wide.map(|x| x as f32), ..range(ray) };
         let direction = ray.direction.map(|x| integer(x) << UNITS[0]);
-        let found = self.instances.iter().flat_map(|other| {
-            let (start, direction, rounded, misses) = (&start, &direction, &rounded, &misses);
-            other.triangles.iter().filter_map(move |triangle| {
+        let of_instance = |other: &Instance| {
+            let found = other.triangles.iter().filter_map(|triangle| {
                 let primitive = PrimitiveRef { instance: other.number, triangle: triangle.id };
                 let at = if other.number == instance {
                     if misses(triangle.corners) {
                         return None;
                     }
-                    start.intersection(direction, &other.exact(triangle.corners))?
+                    start.intersection(&direction, &other.exact(triangle.corners))?
                 } else {
-                    other.intersection(rounded, triangle.corners)?
+                    other.intersection(&rounded, triangle.corners)?
                 };
                 other.blocks(triangle.id, &at).then_some((primitive, at))
-            })
-        });
-        nearest_of(&rounded, found)
+            });
+            nearest_of(&rounded, found)
+        };
+        let reported = |hit: &ExactHit<PrimitiveRef>| hit.t_f64() as f32;
+        // Of equal ones the first.
+        self.instances.iter().filter_map(of_instance).min_by(|a, b| reported(a).total_cmp(&reported(b)))
     }
 
     /// As [`Self::hit`], for a ray from a start.

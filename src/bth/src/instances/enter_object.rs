@@ -1,8 +1,7 @@
 //! Transformation of rays into the space of an object.
 
 use super::progress::Progress;
-use super::scene_batch::SceneBatch;
-use super::scene_query::ObjectVisits;
+use super::scene_batch::{ObjectVisits, SceneBatch};
 use crate::intersect::start_point::StartPoint;
 use crate::nodes::affine::RayLanes;
 use crate::query::sink::Visit;

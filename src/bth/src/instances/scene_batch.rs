@@ -6,6 +6,7 @@ use crate::objects::Objects;
 use crate::query::sink::Visit;
 use crate::rays::{Ray, StartRay};
 use crate::starts::world_ray::{InstanceStart, WorldRay};
+use bth_format::object::ObjectView;
 
 /// A batch of rays in world space, and the scene that they go through.
 pub(super) struct SceneBatch<'a> {
@@ -44,4 +45,12 @@ impl SceneBatch<'_> {
     pub(super) fn start(&self, visit: Visit) -> Option<&InstanceStart> {
         self.starts.get(visit.ray as usize).filter(|start| start.instance == visit.instance)
     }
+}
+
+/// Visits of the instances of an object by rays of a batch.
+#[derive(Clone, Copy)]
+pub(super) struct ObjectVisits<'a> {
+    pub(super) batch: &'a SceneBatch<'a>,
+    pub(super) object: &'a ObjectView<'a>,
+    pub(super) visits: &'a [Visit],
 }

@@ -2,18 +2,8 @@
 
 use super::enter_object::ObjectRays;
 use super::progress::Progress;
-use super::scene_batch::SceneBatch;
+use super::scene_batch::ObjectVisits;
 use crate::object;
-use crate::query::sink::Visit;
-use bth_format::object::ObjectView;
-
-/// Visits of the instances of an object by rays of a batch.
-#[derive(Clone, Copy)]
-pub(super) struct ObjectVisits<'a> {
-    pub(super) batch: &'a SceneBatch<'a>,
-    pub(super) object: &'a ObjectView<'a>,
-    pub(super) visits: &'a [Visit],
-}
 
 /// A query over the rays of a batch. The kernels are compiled once for all.
 pub(super) trait SceneQuery {

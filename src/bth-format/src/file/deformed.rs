@@ -168,6 +168,7 @@ impl DeformedObject {
             identity: self.view.identity,
             header: tree.header,
             bounds: tree.bounds,
+            start_bounds: tree.start_bounds,
             lines: tree.lines,
             triangle_ids: tree.triangle_ids,
             leaf_vertices: tree.leaf_vertices,
@@ -191,6 +192,7 @@ impl DeformedObject {
             view = ObjectView {
                 header,
                 bounds,
+                start_bounds: bounds.for_starts(),
                 lines,
                 positions,
                 normals,

@@ -261,10 +261,12 @@ impl File {
         };
         let grid = self.grid(header).map_err(|e| self.locate(e, object))?;
         let lines: &[CacheLine] = self.slice(object, kind::LINES);
+        let bounds = ObjectBounds::new(header);
         Ok(ObjectView {
             identity: Identity::new(),
             header,
-            bounds: ObjectBounds::new(header),
+            bounds,
+            start_bounds: bounds.for_starts(),
             grid,
             lines: lines.get(..MAX_LINES).unwrap_or(lines),
             triangle_ids: self.slice(object, kind::TRIANGLE_IDS),

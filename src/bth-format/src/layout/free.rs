@@ -74,11 +74,13 @@ impl FreeBins {
     pub const BACK: u128 = 1 << 126;
 
     /// Whether directions are those on the back.
+    #[inline(always)]
     pub const fn is_back(self) -> bool {
         self.0 & Self::BACK != 0
     }
 
     /// Whether a bin is free.
+    #[inline(always)]
     pub const fn is_free(self, bin: usize) -> bool {
         bin < FREE_BINS && self.0 >> bin & 1 == 1
     }
@@ -94,6 +96,7 @@ impl FreeSectors {
     pub const LEVELS: usize = 3;
 
     /// The sector of a bin, if it has one.
+    #[inline(always)]
     pub const fn of_bin(bin: usize) -> Option<usize> {
         match (FREE_SECTOR_OF[bin / FREE_SIDE], FREE_SECTOR_OF[bin % FREE_SIDE]) {
             (Some(row), Some(column)) => Some(4 * row + column),
@@ -102,6 +105,7 @@ impl FreeSectors {
     }
 
     /// The level of a bin: that of its sector, 0 without one.
+    #[inline(always)]
     pub const fn level_of_bin(self, bin: usize) -> usize {
         match Self::of_bin(bin) {
             Some(sector) => self.level(sector),
@@ -110,6 +114,7 @@ impl FreeSectors {
     }
 
     /// The level of a sector.
+    #[inline(always)]
     pub const fn level(self, sector: usize) -> usize {
         (self.0 >> sector & 1 | (self.0 >> (sector + 16) & 1) << 1) as usize
     }
@@ -123,6 +128,7 @@ impl FreeSectors {
 
 impl FreeLevels {
     /// The distance within which nothing is met in a sector of a level.
+    #[inline(always)]
     pub fn within(&self, level: usize) -> f32 {
         level.checked_sub(1).map_or(0.0, |above| self.distance[above])
     }
@@ -139,6 +145,7 @@ impl FreeDirections {
     }
 
     /// The bins.
+    #[inline(always)]
     pub fn bins(&self) -> FreeBins {
         FreeBins(self.bins.iter().rev().fold(0, |bits, word| bits << 32 | u128::from(*word)))
     }
@@ -166,6 +173,7 @@ impl KnownFree {
 }
 
 impl From<&FreeDirections> for KnownFree {
+    #[inline(always)]
     fn from(row: &FreeDirections) -> Self {
         let (bins, mut sectors) = (row.bins(), [FreeSectors(0); 2]);
         sectors[usize::from(bins.is_back())] = FreeSectors(row.sectors);
@@ -174,6 +182,7 @@ impl From<&FreeDirections> for KnownFree {
 }
 
 impl From<&FreeDistances> for KnownFree {
+    #[inline(always)]
     fn from(row: &FreeDistances) -> Self {
         KnownFree { sectors: row.sectors.map(FreeSectors), bins: FreeBins(0) }
     }

@@ -11,6 +11,7 @@ impl ObjectView<'_> {
     }
 
     /// What is known of a triangle; `None` beyond the last row.
+    #[inline(always)]
     pub fn known_free(&self, triangle: usize) -> Option<KnownFree> {
         let of_directions = self.free.get(triangle).map(KnownFree::from);
         of_directions.or_else(|| self.free_distances.get(triangle).map(KnownFree::from))

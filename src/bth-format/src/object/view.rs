@@ -14,6 +14,8 @@ pub struct ObjectView<'a> {
     pub header: &'a Object,
     /// The bounds of `header`, in the shape that tracing reads. Object space.
     pub bounds: ObjectBounds,
+    /// These bounds [for rays that start on triangles](ObjectBounds::for_starts).
+    pub start_bounds: ObjectBounds,
     /// The points that coordinates of triangle leaves can be; `None` where these are `f32`.
     pub grid: Option<Grid>,
     /// Nodes and triangle leaves.

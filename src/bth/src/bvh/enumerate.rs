@@ -41,10 +41,7 @@ pub(crate) fn enumerate(
     (ray, start): ExactRay<'_>,
     receiver: &mut dyn Receiver,
 ) -> bool {
-    let bounds = &match start {
-        None => object.bounds,
-        Some(_) => object.bounds.for_starts(),
-    };
+    let bounds = if start.is_some() { &object.start_bounds } else { &object.bounds };
     enumerate_within(object, bounds, (ray, start), receiver)
 }
 

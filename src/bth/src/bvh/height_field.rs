@@ -135,10 +135,12 @@ impl HeightField {
     }
 
     pub(crate) fn view(&self) -> ObjectView<'_> {
+        let bounds = ObjectBounds::new(&self.header);
         ObjectView {
             identity: self.identity,
             header: &self.header,
-            bounds: ObjectBounds::new(&self.header),
+            bounds,
+            start_bounds: bounds.for_starts(),
             grid: None,
             lines: &self.lines,
             leaf_vertices: &[],

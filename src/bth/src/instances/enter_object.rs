@@ -6,7 +6,7 @@ use crate::intersect::start_point::StartPoint;
 use crate::nodes::affine::RayLanes;
 use crate::query::sink::Visit;
 use crate::rays::Ray;
-use crate::simd::{Isa, Kernel, LANES, Simd};
+use crate::simd::{Isa, Kernel, LANES, Scalar, Simd};
 use crate::starts::free;
 use crate::starts::prepare::ENDED;
 use crate::starts::world_ray::InstanceStart;
@@ -38,7 +38,7 @@ impl ObjectRays {
             starts.extend(rays.iter_mut().zip(visits).map(|(ray, visit)| match batch.start(*visit) {
                 Some(InstanceStart { start, point, .. }) => {
                     ray.origin = point.rounded();
-                    let begin = free::begin(object, start.primitive.triangle, point, ray.direction);
+                    let begin = free::begin(Scalar, object, start.primitive.triangle, point, ray.direction);
                     if begin == f32::INFINITY {
                         *ray = ENDED;
                     } else {

@@ -13,11 +13,12 @@
 //! [`RoundedOrigin`] adds to the bounds of the errors.
 
 use super::exact::{Estimate, Intersection, UncertainWeights, decide_exactly, estimate};
+use super::filter::TriangleBlock;
 use super::line::Line;
 use super::origin::{RoundedOrigin, wide};
 use super::start_point::StartPoint;
 use bth_format::exact::{EDGE_PARTS, Expansion, VOLUME_PARTS};
-use bth_format::layout::{Child, WIDTH};
+use bth_format::layout::{Child, IndexedLeaf, WIDTH};
 use bth_format::object::ObjectView;
 
 /// Weights of hits are rounded to f32: their sum, rounded too, exceeds 1 by at most this.
@@ -232,7 +233,28 @@ pub(crate) fn decide_start_exactly(
 
 /// The corners of the triangle in a slot of a leaf, given as its child code; in a tet leaf `slot` is the index of a constrained face of the
 /// object. `None` if there is no such leaf.
+#[inline(always)]
 pub(crate) fn start_corners(object: &ObjectView<'_>, leaf: u32, slot: u32) -> Option<[[f32; 3]; 3]> {
+    let mut own = None;
+    // Most triangles lie in indexed leaves of f32. The others become one, so that in either case the corners are loaded, not copied: what
+    // was just stored number by number is slow to load as vectors.
+    let (leaf, triangle) = match object.node_base().indexed_leaf(leaf) {
+        Some(leaf) => (leaf, slot as usize),
+        None => (&*own.insert(leaf_of(other_corners(object, leaf, slot)?)), 0),
+    };
+    Some(leaf.corners(triangle))
+}
+
+/// A leaf of one triangle.
+fn leaf_of(corners: [[f32; 3]; 3]) -> IndexedLeaf {
+    let vertex = [0, 1, 2].map(|axis| std::array::from_fn(|i| corners[i.min(2)][axis]));
+    let corner = [0, 1, 2].map(|i| [i; WIDTH]);
+    IndexedLeaf { vertex, corner, first: 0, triangles: 1, vertices: 3, reserved: 0 }
+}
+
+/// As [`start_corners`], for any leaf.
+#[inline(never)]
+fn other_corners(object: &ObjectView<'_>, leaf: u32, slot: u32) -> Option<[[f32; 3]; 3]> {
     let at = slot as usize;
     let (mut indexed, mut raw) = (None, None);
     match Child::from_code(leaf)? {

@@ -90,7 +90,7 @@ pub(crate) fn trace_batch<Q: Query>(
         return;
     }
     if !sink.starts().is_empty() {
-        let object = &ObjectView { bounds: object.bounds.for_starts(), ..*object };
+        let object = &ObjectView { bounds: object.start_bounds, ..*object };
         return trace_through(object, rays, order, scratch, sink);
     }
     if !SMALL && sole_tet_leaf(object) != NONE && order.is_none() {

@@ -25,8 +25,8 @@ pub(crate) trait SingleRay {
     fn line<S: Simd>(&self, s: S, object: &ObjectView<'_>) -> Option<Self::Line>;
     /// The ray for decisions in f64.
     fn exact<'a>(&'a self, line: &'a Self::Line) -> ExactRay<'a>;
-    /// The bounds for which the ray is prepared, which may be stored in `place`.
-    fn bounds<'a>(object: &'a ObjectView<'_>, place: &'a mut ObjectBounds) -> &'a ObjectBounds;
+    /// The bounds for which the ray is prepared.
+    fn bounds<'a>(object: &'a ObjectView<'_>) -> &'a ObjectBounds;
     /// Prepares the ray for boxes and triangles, if f32 can.
     fn prepared<S: Simd>(&self, s: S, line: &Self::Line, bounds: &ObjectBounds) -> Option<PreparedRay>;
 }
@@ -42,7 +42,7 @@ impl SingleRay for Ray {
         (self, None)
     }
     #[inline(always)]
-    fn bounds<'a>(object: &'a ObjectView<'_>, _place: &'a mut ObjectBounds) -> &'a ObjectBounds {
+    fn bounds<'a>(object: &'a ObjectView<'_>) -> &'a ObjectBounds {
         &object.bounds
     }
     #[inline(always)]
@@ -64,11 +64,12 @@ impl SingleRay for StartRay {
     #[inline(always)]
     fn line<S: Simd>(&self, s: S, object: &ObjectView<'_>) -> Option<StartLine> {
         let &StartRay { start, direction: [dx, dy, dz], tmax } = self;
+        free::prefetch(s, object, start.primitive.triangle);
         prefetch_leaf(s, object, start.primitive.triangle);
         let point = locate(object, start).ok()?;
         // Vectors are made in registers: loading what was just written word by word would stall.
         let [x, y, z] = point.rounded();
-        let begin = free::begin(object, start.primitive.triangle, &point, self.direction);
+        let begin = free::begin(s, object, start.primitive.triangle, &point, self.direction);
         if begin == f32::INFINITY {
             return None;
         }
@@ -81,9 +82,8 @@ impl SingleRay for StartRay {
         (&line.ray, Some(&line.point))
     }
     #[inline(always)]
-    fn bounds<'a>(object: &'a ObjectView<'_>, place: &'a mut ObjectBounds) -> &'a ObjectBounds {
-        *place = object.bounds.for_starts();
-        place
+    fn bounds<'a>(object: &'a ObjectView<'_>) -> &'a ObjectBounds {
+        &object.start_bounds
     }
     #[inline(always)]
     fn prepared<S: Simd>(&self, s: S, line: &StartLine, bounds: &ObjectBounds) -> Option<PreparedRay> {
@@ -137,8 +137,7 @@ impl<Q: Query, C: Count, R: SingleRay> Kernel for &mut SingleKernel<'_, Q, C, R>
             **answer = Answer::MISS;
             return;
         };
-        let mut place = ObjectBounds::default();
-        let (bounds, ray_of_line) = (R::bounds(object, &mut place), ray.exact(&line));
+        let (bounds, ray_of_line) = (R::bounds(object), ray.exact(&line));
         let prepared = match ray.prepared(s, &line, bounds) {
             Some(prepared) => prepared,
             None => match PreparedRay::in_f64(bounds, ray_of_line.0) {

@@ -4,12 +4,12 @@
 //! "Free directions"). A ray whose bin is free hits nothing; another one begins behind that distance, where boxes and triangles before it
 //! are skipped. Neither changes an answer. Where a direction is in doubt, the ray is traced from its start.
 
-use super::leaving::{DIRECTIONS, Leaving, SLACK as SLACK_F32};
+use super::leaving::{Leaving, SLACK};
 use super::triangles::{Row, StartTriangles};
 use crate::intersect::start::start_corners;
 use crate::intersect::start_point::StartPoint;
 use crate::simd::{LANES, Lanewise, Simd};
-use bth_format::layout::{FREE_BINS, FREE_SECTOR_OF, FREE_SIDE, FreeBins, FreeLevels, free_axes, free_bin};
+use bth_format::layout::{FREE_BINS, FREE_SECTOR_OF, FREE_SIDE, FreeBins, FreeLevels, KnownFree};
 use bth_format::object::ObjectView;
 
 /// Bit of the last word of bins.
@@ -52,36 +52,62 @@ static OF_SECTORS: [[u32; LANES]; 2] = {
 /// Where the range of a ray in the space of an object can begin, given the triangle and the point at which it starts: infinite in a free
 /// direction, 0 where nothing is known.
 #[inline(always)]
-pub(crate) fn begin(object: &ObjectView<'_>, triangle: u32, point: &StartPoint, direction: [f32; 3]) -> f32 {
-    if object.has_free_directions() {
-        known_begin(object, triangle, point, direction).unwrap_or(0.0)
-    } else {
-        0.0
-    }
-}
-
-#[inline(never)]
-fn known_begin(
+pub(crate) fn begin<S: Simd>(
+    s: S,
     object: &ObjectView<'_>,
     triangle: u32,
     point: &StartPoint,
     direction: [f32; 3],
+) -> f32 {
+    match object.known_free(triangle as usize) {
+        Some(known) => known_begin(s, object, &known, point, direction).unwrap_or(0.0),
+        None => 0.0,
+    }
+}
+
+#[inline(always)]
+fn known_begin<S: Simd>(
+    s: S,
+    object: &ObjectView<'_>,
+    known: &KnownFree,
+    point: &StartPoint,
+    direction: [f32; 3],
 ) -> Option<f32> {
-    let known = object.known_free(triangle as usize)?;
     let corners = start_corners(object, point.leaf, point.slot)?;
-    let greatest = direction[0].abs().max(direction[1].abs()).max(direction[2].abs());
-    if !(greatest > DIRECTIONS[0] && greatest < DIRECTIONS[1]) {
+    // All lanes do the same.
+    let p = s.piece(0);
+    let d = [p.splat(direction[0]), p.splat(direction[1]), p.splat(direction[2])];
+    let Leaving { front, back, columns } = Leaving::new(p, |corner, k| p.splat(corners[corner][k]), d);
+    let (mut column, mut row) = ([0; LANES], [0; LANES]);
+    p.store_u(columns[0], &mut column);
+    p.store_u(columns[1], &mut row);
+    let (column, row) = (column[0] as usize, row[0] as usize);
+    if (front | back) & 1 == 0 || column >= FREE_SIDE || row >= FREE_SIDE {
         return None;
     }
-    // The file may lie about which triangles have axes; then nothing is known.
-    let (bin, is_back) = free_bin(&free_axes(corners)?, direction.map(f64::from))?;
+    let (bin, is_back) = (FREE_SIDE * row + column, back & 1 != 0);
     if known.bins.is_free(bin) && known.bins.is_back() == is_back {
         return Some(f32::INFINITY);
     }
     let level = known.sectors[usize::from(is_back)].level_of_bin(bin);
-    let within = f64::from(object.free_levels.first()?.within(level));
-    let length = direction.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
-    Some((within / length * (1.0 - 4.0 * f64::from(SLACK_F32))) as f32)
+    if level == 0 {
+        return None;
+    }
+    let within = object.free_levels.first()?.within(level);
+    let [x, y, z] = direction;
+    // The slack is more than the rounding errors of all terms.
+    Some(within / (x * x + y * y + z * z).sqrt() * (1.0 - 4.0 * SLACK))
+}
+
+/// Prefetches what [`begin`] reads.
+#[inline(always)]
+pub(crate) fn prefetch<S: Simd>(s: S, object: &ObjectView<'_>, triangle: u32) {
+    let at = triangle as usize;
+    if object.free.is_empty() {
+        s.prefetch(object.free_distances.as_ptr().wrapping_add(at));
+    } else {
+        s.prefetch(object.free.as_ptr().wrapping_add(at));
+    }
 }
 
 /// Bits of the rays in free directions, and where the ranges of the others can begin, given their directions.
@@ -97,7 +123,7 @@ pub(super) fn decide<S: Simd, R: Row>(
     for i in 0..S::PIECES {
         let p = s.piece(i);
         let d = [S::pick(p, &direction[0]), S::pick(p, &direction[1]), S::pick(p, &direction[2])];
-        let leaving = Leaving::new(p, &triangles.corners, d);
+        let leaving = Leaving::new(p, |corner, k| p.load(&triangles.corners[corner][k]), d);
         to_front |= leaving.front;
         to_back |= leaving.back;
         p.store_u(leaving.columns[0], &mut columns[0]);
@@ -160,7 +186,7 @@ fn begins<S: Simd>(s: S, [dx, dy, dz]: [S::F; 3], within: S::F) -> S::F {
     let square = s.fma(dz, dz, s.fma(dy, dy, s.mul(dx, dx)));
     // The division does not wait for the distance.
     let per_length = s.div(s.add(guess, guess), s.fma(guess, guess, square));
-    let begin = s.mul(s.mul(within, per_length), s.splat(1.0 - 4.0 * SLACK_F32));
+    let begin = s.mul(s.mul(within, per_length), s.splat(1.0 - 4.0 * SLACK));
     s.select(s.lt(s.splat(0.0), within), begin, s.splat(0.0))
 }
 

@@ -24,18 +24,18 @@ pub(super) struct Leaving<S: Lanewise> {
 }
 
 impl<S: Lanewise> Leaving<S> {
-    /// For rays with these directions, and triangles whose corners are by corner and axis.
+    /// For rays with these directions, and triangles whose corners `corner` loads, given corner and axis.
     ///
     /// Errors, in units of rounding u, where no component of the edges e and f is greater than `far` and `size` is the sum of the direction's:
     /// a component of e×f is off by 4.1u of its terms, 8.2u·far², and the product with d has three more roundings of at most 2·far²·size: 17u.
     #[inline(always)]
-    pub(super) fn new(s: S, corners: &[[[f32; LANES]; 3]; 3], d: [S::F; 3]) -> Self {
+    pub(super) fn new(s: S, corner: impl Fn(usize, usize) -> S::F, d: [S::F; 3]) -> Self {
         let zero = s.splat(0.0);
         let (mut e, mut f, mut far) = ([zero; 3], [zero; 3], zero);
         for k in 0..3 {
-            let first = s.load(&corners[0][k]);
-            e[k] = s.sub(s.load(&corners[1][k]), first);
-            f[k] = s.sub(s.load(&corners[2][k]), first);
+            let first = corner(0, k);
+            e[k] = s.sub(corner(1, k), first);
+            f[k] = s.sub(corner(2, k), first);
             far = s.max(s.max_abs(e[k], f[k]), far);
         }
         let sizes = [s.abs(d[0]), s.abs(d[1]), s.abs(d[2])];

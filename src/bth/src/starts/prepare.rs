@@ -7,7 +7,7 @@ use crate::intersect::origin::RoundedOrigin;
 use crate::intersect::start::{ABOVE_ONE, rounded_start};
 use crate::intersect::start_point::StartPoint;
 use crate::rays::{PrimitiveRef, Ray, Start, StartRay};
-use crate::simd::{Isa, Kernel, LANES, Simd};
+use crate::simd::{Isa, Kernel, LANES, Scalar, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 
@@ -59,7 +59,7 @@ impl PreparedStarts {
             (self.rays[index], self.points[index]) = (ENDED, StartPoint::beside([0.0; 3]));
             return;
         };
-        let begin = free::begin(object, triangle, &point, ray.direction);
+        let begin = free::begin(Scalar, object, triangle, &point, ray.direction);
         let is_free = begin == f32::INFINITY;
         let tmin = if is_free { 0.0 } else { begin };
         self.rays[index] = Ray { origin: point.rounded(), tmin, direction: ray.direction, tmax: ray.tmax };

@@ -10,7 +10,7 @@ use super::progress::Progress;
 use super::top_level::TopLevel;
 use super::top_nodes::INSTANCE;
 use crate::SMALL;
-use crate::bvh::ray_state::KEY_SLACK;
+use crate::bvh::ray_state::key_limit;
 use crate::bvh::stack::{BOTTOM, StackPosition, Stacks};
 use crate::intersect::boxes::RaySlabs;
 use crate::intersect::prepare::{Prepared, PreparedRay};
@@ -189,8 +189,7 @@ impl RayTraversals {
         if tmax < state.tmax {
             let limit = limit(state.slabs.scale, tmax);
             (state.tmax, state.limit) = (tmax, limit);
-            let keys = limit + (limit.abs() * KEY_SLACK + f32::MIN_POSITIVE);
-            state.top = self.stacks.keep_up_to(s, self.stacks.bottom(ray), state.top, keys);
+            state.top = self.stacks.keep_up_to(s, self.stacks.bottom(ray), state.top, key_limit(limit));
         }
         self.stacks.code(state.top)
     }

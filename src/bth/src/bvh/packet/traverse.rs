@@ -15,7 +15,7 @@ use super::packet_rays::PacketRays;
 use super::ray_group::{IntersectGroup, RayGroup};
 use super::single_rays::FEW_OF_PACKET;
 use crate::bvh::nodes::{self, prefetch_into};
-use crate::bvh::ray_state::KEY_SLACK;
+use crate::bvh::ray_state::key_limit;
 use crate::intersect::exact_lanes::{Intersections, OriginTermsLanes, Pairs};
 use crate::query::Query;
 use crate::query::sink::Sink;
@@ -152,7 +152,7 @@ impl<S: Simd, Q: Query, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, 
                 top -= 1;
                 let entry = stack[top];
                 mask = entry.rays & rays.alive;
-                if mask == 0 || (!H::is_any(goal) && entry.key > limit + limit.abs() * KEY_SLACK) {
+                if mask == 0 || (!H::is_any(goal) && entry.key > key_limit(limit)) {
                     continue;
                 }
                 let node = object.node(entry.parent);

@@ -119,12 +119,12 @@ impl Kernel for EnumerateKernel<'_> {
             }
             let (mut unpacked, mut unpacked_raw) = (None, None);
             let maybe = if let Some(leaf) = indexed_leaf(s, object, node_base, code, &mut unpacked) {
-                prepared.filter.candidates(s, leaf, slabs.first, last, origin_reach).maybe
+                prepared.filter.candidates(s, (leaf, 0), slabs.first, last, origin_reach).maybe
             } else {
                 match Child::from_code(code) {
                     Some(Child::Raw(at)) => {
                         let leaf = raw_leaf(s, object, at, &mut unpacked_raw);
-                        prepared.filter.candidates(s, leaf, slabs.first, last, origin_reach).maybe
+                        prepared.filter.candidates(s, (leaf, 0), slabs.first, last, origin_reach).maybe
                     }
                     Some(Child::Tets(row)) => {
                         let subtree = object.tet_leaves[row as usize].subtree;

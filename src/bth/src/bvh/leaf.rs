@@ -9,7 +9,7 @@
 use crate::bvh::candidate::{Candidate, Settle};
 use crate::intersect::filter::{Certain, TriangleBlock};
 use crate::intersect::prepare::PreparedRay;
-use crate::intersect::start_point::ExactRay;
+use crate::intersect::start_point::{ExactRay, own_triangle};
 use crate::query::{Goal, Query};
 use crate::rays::Ray;
 use crate::simd::Simd;
@@ -62,32 +62,23 @@ pub(crate) trait Progress<Q: Query> {
     }
 }
 
-/// Intersects a ray with the triangles of a leaf, given as its record and its child code. `ray` is called only where some triangle may
-/// be hit. `bounds` are those for which the ray was prepared.
+/// Intersects a ray with the triangles of a leaf, given as its record and its child code. `bounds` are those for which the ray was
+/// prepared.
 #[inline(always)]
-pub(crate) fn enter_leaf<'r, S: Simd, Q: Query, B: TriangleBlock>(
+pub(crate) fn enter_leaf<S: Simd, Q: Query, B: TriangleBlock>(
     s: S,
     (object, goal): (&ObjectView<'_>, Q::Goal),
     bounds: &ObjectBounds,
-    ray: impl FnOnce() -> ExactRay<'r>,
+    ray: ExactRay<'_>,
     progress: &mut impl Progress<Q>,
     (block, code): (&B, u32),
 ) -> LeafOutcome {
     let prepared = progress.prepared();
     let (first, last) = (prepared.slabs.first, progress.last());
-    let mut found = prepared.filter.candidates(s, block, first, last, bounds.origin_reach);
+    let own = own_triangle(ray.1, code);
+    let found = prepared.filter.candidates(s, (block, own), first, last, bounds.origin_reach);
     if found.maybe == 0 {
         return LeafOutcome::Nothing;
-    }
-    let ray = ray();
-    if let (_, Some(start)) = ray
-        && start.leaf == code
-    {
-        // A ray does not hit the triangle on which it starts.
-        found = found.without(start.slot);
-        if found.maybe == 0 {
-            return LeafOutcome::Nothing;
-        }
     }
     if goal.is_any() {
         if found.sure != 0 {

@@ -258,7 +258,7 @@ impl<'a, Q: Query> RayPool<'a, Q> {
             let state = &mut slots[slot].0;
             let (code, top) = (tops.code[slot], tops.position[slot]);
             let (ray, mut unpacked) = (state.ray(), None);
-            let exact_ray = || (&rays[ray], starts.of(ray));
+            let exact_ray = (&rays[ray], starts.of(ray));
             let found = if let Some(leaf) = indexed_leaf(s, object, node_base, code, &mut unpacked) {
                 enter_leaf(s, (object, goal), &object.bounds, exact_ray, state, (leaf, code))
             } else {

@@ -132,7 +132,7 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
         let done = if let Some(leaf) = leaf {
             count.leaf();
             count.triangles(leaf.triangles);
-            enter_leaf(s, (object, goal), bounds, || ray, &mut state, (leaf, code)) == LeafOutcome::Done
+            enter_leaf(s, (object, goal), bounds, ray, &mut state, (leaf, code)) == LeafOutcome::Done
         } else {
             let mut unpacked = None;
             match Child::from_code(code) {
@@ -140,8 +140,7 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
                     let leaf = raw_leaf(s, object, at, &mut unpacked);
                     count.leaf();
                     count.triangles(leaf.triangles);
-                    enter_leaf(s, (object, goal), bounds, || ray, &mut state, (leaf, code))
-                        == LeafOutcome::Done
+                    enter_leaf(s, (object, goal), bounds, ray, &mut state, (leaf, code)) == LeafOutcome::Done
                 }
                 Some(Child::Tets(row)) => {
                     let subtree = object.tet_leaves[row as usize].subtree;

@@ -71,14 +71,6 @@ pub(crate) struct Certain {
 }
 
 impl<S: Simd> Candidates<S> {
-    /// The same candidates but for a triangle.
-    #[inline(always)]
-    pub(crate) fn without(self, triangle: u32) -> Self {
-        let others = !(1 << (triangle % WIDTH as u32));
-        let Candidates { crossed, maybe, sure, .. } = self;
-        Candidates { crossed: crossed & others, maybe: maybe & others, sure: sure & others, ..self }
-    }
-
     /// The triangles that may be the nearest hit, as bits, and the nearest hit if it is certain. `maybe` must not be empty.
     #[inline(always)]
     pub(crate) fn nearest_candidates(&self, s: S) -> (u32, Option<Certain>) {
@@ -272,31 +264,32 @@ impl TriangleFilter {
         [s.fnma(s.splat(self.shear[0]), depth, x), s.fnma(s.splat(self.shear[1]), depth, y), depth]
     }
 
-    /// The triangles of a leaf that may be hit at a depth between `first` and `limit`. `origin_reach` is that of the
-    /// [bounds](ObjectBounds::origin_reach) for which the ray was prepared.
+    /// The triangles of a leaf that may be hit at a depth between `first` and `limit`, without those whose bits are set in `left_out`.
+    /// `origin_reach` is that of the [bounds](ObjectBounds::origin_reach) for which the ray was prepared.
     #[inline(always)]
     pub(crate) fn candidates<S: Simd, B: TriangleBlock>(
         &self,
         s: S,
-        block: &B,
+        (block, left_out): (&B, u32),
         first: f32,
         limit: f32,
         origin_reach: f32,
     ) -> Candidates<S> {
-        CandidatesOf { filter: self, block, first, limit, origin_reach }.inline_or_call(s)
+        let triangles = valid_triangles(block) & !left_out;
+        CandidatesOf { filter: self, block, triangles, first, limit, origin_reach }.inline_or_call(s)
     }
 
     #[inline(always)]
     fn candidates_inlined<S: Simd, B: TriangleBlock>(
         &self,
         s: S,
-        block: &B,
+        (block, valid): (&B, u32),
         first: f32,
         limit: f32,
         origin_reach: f32,
     ) -> Candidates<S> {
         let corners = block.project(s, self);
-        let (valid, mut sides) = (valid_triangles(block), self.sides(s, &corners));
+        let mut sides = self.sides(s, &corners);
         let mut crossed = valid & !s.mask_bits(sides.missed);
         if crossed & !s.mask_bits(sides.certain) != 0 {
             sides = self.closer(s, sides, &corners, origin_reach);
@@ -356,6 +349,8 @@ impl TriangleFilter {
 struct CandidatesOf<'a, B> {
     filter: &'a TriangleFilter,
     block: &'a B,
+    /// Bits of the triangles.
+    triangles: u32,
     first: f32,
     limit: f32,
     origin_reach: f32,
@@ -365,11 +360,10 @@ impl<S: Simd, B: TriangleBlock> Part<S> for CandidatesOf<'_, B> {
     type Output = Candidates<S>;
     #[inline(always)]
     fn run(self, s: S) -> Candidates<S> {
-        let CandidatesOf { filter, block, first, limit, origin_reach } = self;
+        let CandidatesOf { filter, block, triangles: valid, first, limit, origin_reach } = self;
         if S::PIECES == 1 {
-            return filter.candidates_inlined(s, block, first, limit, origin_reach);
+            return filter.candidates_inlined(s, (block, valid), first, limit, origin_reach);
         }
-        let valid = valid_triangles(block);
         let (mut crossed, mut maybe, mut sure) = (0, 0, 0);
         let (mut nearest, mut farthest) = ([0.0; LANES], [0.0; LANES]);
         let points = block.project_points(s, filter);

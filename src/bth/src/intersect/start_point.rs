@@ -2,7 +2,7 @@
 
 use super::origin::{RoundedOrigin, wide};
 use crate::rays::Ray;
-use bth_format::layout::NONE;
+use bth_format::layout::{NONE, WIDTH};
 
 /// A ray as decisions in f64 need it: with the exact point at which it starts, if it starts on a triangle of the object.
 pub(crate) type ExactRay<'r> = (&'r Ray, Option<&'r StartPoint>);
@@ -34,6 +34,12 @@ impl StartPoint {
     pub(crate) fn is_on_triangle(&self) -> bool {
         self.leaf != NONE
     }
+}
+
+/// The bit of the triangle on which a ray starts if it is in the leaf with this child code: a ray does not hit it.
+#[inline(always)]
+pub(crate) fn own_triangle(start: Option<&StartPoint>, leaf: u32) -> u32 {
+    start.filter(|start| start.leaf == leaf).map_or(0, |start| 1 << (start.slot % WIDTH as u32))
 }
 
 /// The starts of the rays of a batch; empty where all of them start at their f32 origins.

@@ -15,6 +15,7 @@ use super::single_rays::FEW_OF_GROUP;
 use crate::bvh::candidate::Candidate;
 use crate::intersect::edge_functions::{self, Corners, FilteredTriangles};
 use crate::intersect::prepare::{Axes, CommonAxis};
+use crate::intersect::start_point::own_triangle;
 use crate::query::Query;
 use crate::simd::{LANES, Lanewise, Part, Simd, lanes_of_piece};
 use bth_format::layout::WIDTH;
@@ -193,13 +194,9 @@ impl<Q: Query> PacketRays<'_, Q> {
             let lane = active.trailing_zeros() as usize;
             active &= active - 1;
             let origin_reach = self.object.bounds.origin_reach;
-            let mut found = self.single_rays.candidates::<S, H>(s, group, (at, lane), block, origin_reach);
             let ray = at * LANES + lane;
-            if let Some(start) = self.starts.of(ray)
-                && start.leaf == code
-            {
-                found = found.without(start.slot);
-            }
+            let own = own_triangle(self.starts.of(ray), code);
+            let found = self.single_rays.candidates::<S, H>(s, group, (at, lane), (block, own), origin_reach);
             let hit = found.sure != 0
                 || found.maybe != 0 && self.settle_one(s, ray, Candidate::NONE, (code, found.maybe));
             self.alive &= !(u64::from(hit) << ray);

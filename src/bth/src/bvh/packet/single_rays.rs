@@ -86,14 +86,14 @@ impl SingleRays {
         self.group[at % GROUPS].prepared(lane).expect("packets are made of rays that are prepared")
     }
 
-    /// The triangles of a leaf that a ray of a group may hit.
+    /// The triangles of a leaf that a ray of a group may hit; parameters as for its [filter](crate::intersect::filter::TriangleFilter).
     #[inline(always)]
     pub(crate) fn candidates<S: Simd, H: PacketBounds<S>>(
         &mut self,
         s: S,
         group: &RayGroup<S>,
         (at, lane): (usize, usize),
-        block: &impl TriangleBlock,
+        block: (&impl TriangleBlock, u32),
         origin_reach: f32,
     ) -> Candidates<S> {
         self.convert(s, group, at, H::MIXED_OCTANTS);

@@ -114,7 +114,7 @@ impl Kernel for BoxAndFilter<'_> {
             self;
         let (bits, _) = slabs.children(s, node, slabs.last);
         let children = (0..WIDTH).filter(|&i| bits >> i & 1 != 0 && node.child[i] != NONE);
-        let candidates = filter.candidates(s, leaf, slabs.first, slabs.last, origin_reach);
+        let candidates = filter.candidates(s, (leaf, 0), slabs.first, slabs.last, origin_reach);
         let (mut nearest, mut farthest) = ([0.0; LANES], [0.0; LANES]);
         s.store(candidates.nearest, &mut nearest);
         s.store(candidates.farthest, &mut farthest);

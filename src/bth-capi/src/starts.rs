@@ -2,7 +2,7 @@
 
 use crate::{ERROR_ARGUMENT, ERROR_INTERNAL, OK, code_of, defect, fail, null_argument};
 use runtime::Scene;
-use runtime::rays::{Hit, Start, StartRay};
+use runtime::rays::{Hit, PrimitiveRef, Start, StartRay};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Number of rays that are traced together.
@@ -17,31 +17,28 @@ struct Parts<'a> {
 }
 
 impl Parts<'_> {
+    #[inline(always)]
     fn ray(&self, i: usize) -> StartRay {
         let tmax = self.tmax.map_or(f32::INFINITY, |tmax| tmax[i]);
-        StartRay { start: self.starts[i], direction: self.directions[i], tmax }
+        // Number by number: an array would be copied once more, and loading it at once stalls.
+        let [x, y, z] = self.directions[i];
+        let Start { primitive: PrimitiveRef { instance, triangle }, u, v } = self.starts[i];
+        let start = Start { primitive: PrimitiveRef { instance, triangle }, u, v };
+        StartRay { start, direction: [x, y, z], tmax }
     }
 
     /// Calls `trace` with the rays of each chunk and the index of the first.
     /// Returns the code of the query.
     fn in_chunks(&self, mut trace: impl FnMut(usize, &[StartRay])) -> i32 {
-        let mut rays = [Start::NONE.ray([0.0; 3]); CHUNK];
+        let mut rays = Vec::with_capacity(CHUNK.min(self.starts.len()));
         let mut code = OK;
         for first in (0..self.starts.len()).step_by(CHUNK) {
             let count = CHUNK.min(self.starts.len() - first);
-            let part = first..first + count;
-            let of = self.starts[part.clone()].iter().zip(&self.directions[part.clone()]);
-            for (ray, (&start, &direction)) in rays.iter_mut().zip(of) {
-                *ray = start.ray(direction);
-            }
-            if let Some(tmax) = self.tmax {
-                for (ray, &tmax) in rays.iter_mut().zip(&tmax[part]) {
-                    ray.tmax = tmax;
-                }
-            }
+            rays.clear();
+            rays.extend((first..first + count).map(|i| self.ray(i)));
             // A panic must not unwind into C. It would be a defect of the library.
             // The rays of its chunk are then misses.
-            if catch_unwind(AssertUnwindSafe(|| trace(first, &rays[..count]))).is_err() {
+            if catch_unwind(AssertUnwindSafe(|| trace(first, &rays))).is_err() {
                 code = defect();
             }
         }

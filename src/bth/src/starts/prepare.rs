@@ -168,9 +168,12 @@ impl Group<'_> {
         }
         let StartTriangles { corners, leaf, slot, .. } = &*triangles;
         let (mut origin, mut error) = ([[0.0f64; LANES]; 3], [0.0f64; LANES]);
-        // There are no branches in this loop, so that the compiler vectorizes it.
+        let mut of_lane = [[0.0; LANES]; 2];
+        s.store(u, &mut of_lane[0]);
+        s.store(v, &mut of_lane[1]);
+        // There are no branches in this loop, and it reads whole vectors, so that the compiler vectorizes all of it.
         for i in 0..LANES {
-            let weights = [rays[i].start.u.into(), rays[i].start.v.into()];
+            let weights = [of_lane[0][i].into(), of_lane[1][i].into()];
             let mut corner = [[0.0f64; 3]; 3];
             for c in 0..3 {
                 for k in 0..3 {

@@ -6,8 +6,9 @@
 use bth::rays::{Hit, Ray, StartRay};
 use bth::{Isa, Scene, TraceRay};
 use bth_random::Rng;
+use bth_tests::meshes::cube;
 use bth_tests::rays::onward;
-use bth_tests::structures::every_structure;
+use bth_tests::structures::{every_structure, structures_named};
 use std::arch::asm;
 
 /// Flags of MXCSR: an operand was denormal (DE), a result was (UE).
@@ -86,6 +87,30 @@ fn no_number_of_an_ordinary_ray_is_denormal() {
                 let flags = denormal_flags(|| trace(scene, &onward, &mut hits, &mut found));
                 assert_eq!(flags, 0, "{name}, {isa}, rays from starts to {tmax}");
             }
+        }
+    }
+}
+
+#[test]
+fn no_number_of_a_ray_from_the_hit_itself_is_denormal() {
+    let model = cube(4, None);
+    let mut rng = Rng::new(11);
+    // From a side of the cube, with t = 0 where the ray hits it.
+    let rays: Vec<Ray> = (0..600)
+        .map(|i| {
+            let mut origin = [(); 3].map(|()| (rng.unit_f32() - 0.5) * 7.9);
+            origin[i % 3] = if i % 2 == 0 { 4.0 } else { -4.0 };
+            Ray::new(origin, rng.unit_vector().map(|x: f64| x as f32))
+        })
+        .collect();
+    let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+    for isa in [Isa::Sse4, Isa::Avx2, Isa::Avx512].into_iter().filter(|isa| isa.is_available()) {
+        isa.choose().expect("it is available");
+        for traced in structures_named(&model, false, |name| name.starts_with("bvh")) {
+            traced.scene.batch(&rays).nearest(&mut hits);
+            assert!(hits.iter().all(|hit| hit.t == 0.0), "{}", traced.name);
+            let flags = denormal_flags(|| trace(&traced.scene, &rays, &mut hits, &mut found));
+            assert_eq!(flags, 0, "{}, {isa}", traced.name);
         }
     }
 }

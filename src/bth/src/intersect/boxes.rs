@@ -53,6 +53,22 @@ pub(crate) struct RaySlabs {
     pub(crate) near: [u32; 3],
 }
 
+/// An upper bound of a depth in f32. It is not denormal, which would take operations hundreds of cycles: where rays hit the triangle that
+/// their origin lies on, depths are 0 or next to it.
+#[inline(always)]
+pub(crate) fn upper_depth(depth: f64) -> f32 {
+    const LEAST: f64 = 2.0 * f32::MIN_POSITIVE as f64;
+    let depth = if depth.abs() < LEAST { LEAST } else { depth };
+    // The next greater number is an upper bound although the conversion may round down.
+    (depth as f32).next_up()
+}
+
+/// A lower bound of a depth in f32, as [`upper_depth`].
+#[inline(always)]
+pub(crate) fn lower_depth(depth: f64) -> f32 {
+    -upper_depth(-depth)
+}
+
 impl RaySlabs {
     /// Constants with which every box is hit; used for values that are not yet set or cannot be computed in f32.
     pub(crate) const NONE: RaySlabs = RaySlabs {
@@ -111,15 +127,14 @@ impl RaySlabs {
     /// Upper bound of the depth of t, for [`Self::children`]. `origin_error` is that of the bounds for which the ray was prepared.
     #[inline(always)]
     pub(crate) fn limit(&self, t: f64, origin_error: f32) -> f32 {
-        // The next greater number is an upper bound although the conversion to f32 may round down or underflow.
-        ((t * f64::from(self.scale) + f64::from(origin_error)) as f32).next_up()
+        upper_depth(t * f64::from(self.scale) + f64::from(origin_error))
     }
 
     /// Lower bound of the depth of a hit, given bounds of its t; infinite if there is no hit.
     #[inline(always)]
     pub(crate) fn nearest(&self, t: Option<[f64; 2]>, origin_error: f32) -> f32 {
         let depth = |t: f64| t * f64::from(self.scale) - f64::from(origin_error);
-        t.map_or(f32::INFINITY, |[t, _]| (depth(t) as f32).next_down())
+        t.map_or(f32::INFINITY, |[t, _]| lower_depth(depth(t)))
     }
 
     /// The range of depths in which a hit certainly lies in the ray's range of t, whose ends are no NaN, and is finite. The exact

@@ -5,6 +5,7 @@ use super::hit_cache::{HitCache, UNCACHED};
 use super::ray_group::RayGroup;
 use super::single_rays::SingleRays;
 use crate::bvh::candidate::{Candidate, Settle};
+use crate::intersect::boxes::{lower_depth, upper_depth};
 use crate::intersect::start_point::Starts;
 use crate::query::Query;
 use crate::rays::Ray;
@@ -105,8 +106,8 @@ impl<Q: Query> PacketRays<'_, Q> {
             } else if let Some(t) = self.queries[ray].found_bounds() {
                 let off = f64::from(self.object.bounds.origin_error);
                 let [near, far] = t.map(|t| t * f64::from(scale[lane]));
-                nearest[lane] = ((near - off) as f32).next_down();
-                limit[lane] = limit[lane].min(((far + off) as f32).next_up());
+                nearest[lane] = lower_depth(near - off);
+                limit[lane] = limit[lane].min(upper_depth(far + off));
             }
             pending[lane] = NONE;
         }

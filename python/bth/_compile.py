@@ -16,7 +16,7 @@ _GLTF = ("flatten", "scene", "animation", "rate", "at_rest", "rigid_parts", "str
 
 
 def compile(
-    model, *, output=None, quality=None, structure=None, coordinates=None, max_error=None, boxes=None, polygons=None,
+    model, *, output=None, quality=None, structure=None, coordinates=None, max_error=None, polygons=None,
     attributes=None, alpha=None, tets=None, subtrees=None, compact=None, geometry=None, names=None, materials=None,
     lenient_materials=None, estimator=None, select=None, optimize_for=None, profile=None, max_bytes_per_triangle=None,
     budget=None, probe=None, min_tet_triangles=None, c_tet=None, for_scene=None, rays=None,

@@ -175,9 +175,7 @@ fn coordinates(keywords: &Keywords<'_, '_>) -> PyResult<coordinates::CoordinateO
         Some(bits) => (bits, max_error),
         None => (None, max_error),
     };
-    let boxes = [("f32", coordinates::Boxes::F32), ("8", coordinates::Boxes::Bytes)];
-    let boxes = keywords.choice("boxes", &boxes)?.unwrap_or(coordinates::Boxes::F32);
-    Ok(coordinates::CoordinateOptions { bits, max_error, boxes })
+    Ok(coordinates::CoordinateOptions { bits, max_error })
 }
 
 /// A distance as a number, or in words of the program.

@@ -42,7 +42,7 @@ def path(tmp_path):
 
 @pytest.mark.skipif(not BTHC.exists(), reason=f"there is no {BTHC}")
 @pytest.mark.parametrize("options", [
-    {}, {"names": True, "attributes": "all"}, {"attributes": "normals", "geometry": False}, {"coordinates": 16, "boxes": 8},
+    {}, {"names": True, "attributes": "all"}, {"attributes": "normals", "geometry": False}, {"coordinates": 16},
     {"max_error": "0.01%"}, {"quality": "best", "threads": 1}, {"alpha": "blend"}, {"deformable": True, "poses": 2, "segments": 1},
     {"free_directions": "all", "free_reach": 0.25}, {"free_directions": "distances"}, {"max_bytes_per_triangle": 500.0, "memory": 100},
 ])

@@ -7,7 +7,6 @@
 
 use bth::rays::{Hit, PrimitiveRef, Start, StartRay};
 use bth::{Isa, Scene, SceneBuilder};
-use bth_compile::coordinates::Boxes;
 use bth_compile::free::KeepFree;
 use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_format::layout::{GridBits, RecordKind};
@@ -184,7 +183,6 @@ impl Task {
         let mut of = options(Structure::Bvh, RecordKind::Link32, false);
         let form = rng.below(8);
         match form {
-            0 => of.coordinates.boxes = Boxes::Bytes,
             1 => of.coordinates.bits = Some(GridBits::B16),
             2 => of.free.keep = KeepFree::All,
             3 => of.free.keep = KeepFree::Distances,

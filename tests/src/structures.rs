@@ -2,7 +2,6 @@
 
 use bth::Scene;
 use bth_compile::Silent;
-use bth_compile::coordinates::Boxes;
 use bth_compile::free::KeepFree;
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_format::layout::RecordKind;
@@ -51,15 +50,12 @@ pub fn every_structure(model: &Model, whole: bool) -> Vec<Traced> {
 /// Those of [`every_structure`] whose names are wanted; no others are compiled.
 pub fn structures_named(model: &Model, whole: bool, is_wanted: impl Fn(&str) -> bool) -> Vec<Traced> {
     let bvh = options(Structure::Bvh, RecordKind::Link32, false);
-    let mut packed = bvh.clone();
-    packed.coordinates.boxes = Boxes::Bytes;
     let mut free = bvh.clone();
     free.free.keep = KeepFree::All;
     let mut distances = bvh.clone();
     distances.free.keep = KeepFree::Distances;
     let mut wanted = vec![
         ("bvh".to_string(), bvh),
-        ("bvh of packed nodes".to_string(), packed),
         ("bvh with free directions".to_string(), free),
         ("bvh with free distances".to_string(), distances),
     ];
@@ -70,10 +66,7 @@ pub fn structures_named(model: &Model, whole: bool, is_wanted: impl Fn(&str) -> 
                 wanted.push((format!("tets {}", record.name()), options(Structure::Tets, record, false)));
             }
         }
-        let mut with_subtrees = options(Structure::Bth, RecordKind::Link32, true);
-        wanted.push(("bth with subtrees".into(), with_subtrees.clone()));
-        with_subtrees.coordinates.boxes = Boxes::Bytes;
-        wanted.push(("bth with subtrees of packed nodes".into(), with_subtrees));
+        wanted.push(("bth with subtrees".into(), options(Structure::Bth, RecordKind::Link32, true)));
     }
     let wanted = wanted.into_iter().filter(|(name, _)| is_wanted(name));
     wanted.map(|(name, options)| Traced { scene: compiled(model, &options), name }).collect()

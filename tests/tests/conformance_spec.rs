@@ -63,7 +63,6 @@ fn byte_tables_are_those_of_the_structures() {
         SectionEntry { kind flags object alignment offset length stride reserved count hash }
         Object { lower upper root record triangles dropped depth coordinates grid_origin displacement }
         WideNode { bounds child }
-        PackedNode { bounds child origin step reserved }
         IndexedLeaf { vertex corner first triangles vertices reserved }
         RawLeaf { corner first triangles reserved }
         IndexedLeaf16 { vertex corner first triangles vertices reserved }

@@ -3,7 +3,6 @@
 use bth::rays::{Hit, Ray, StartRay};
 use bth::{Accept, Isa, Opacity, Scene, TraceRay};
 use bth_compile::Silent;
-use bth_compile::coordinates::Boxes;
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_format::layout::RecordKind;
 use bth_import::AlphaMode;
@@ -184,9 +183,7 @@ fn rays_pass_through_the_holes_of_leaves_in_every_structure_and_on_every_instruc
     let _turn = turn();
     let bvh = options(Structure::Bvh, RecordKind::Link32, false);
     let opaque = flat(AlphaMode::None, bvh.clone());
-    let mut packed = bvh.clone();
-    packed.coordinates.boxes = Boxes::Bytes;
-    let mut all = vec![("bvh", bvh), ("packed nodes", packed)];
+    let mut all = vec![("bvh", bvh)];
     if bth_tests::worker().is_some() {
         all.push(("tets", options(Structure::Bth, RecordKind::Tet20, false)));
     }

@@ -1,7 +1,6 @@
 //! The places of triangles in compiled files lead to the triangles, in every kind of leaf.
 
 use bth_compile::Silent;
-use bth_compile::coordinates::Boxes;
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_format::File;
 use bth_format::file::DeformedObject;
@@ -30,7 +29,6 @@ fn kinds() -> Vec<(&'static str, CompileOptions)> {
         ("f32", plain.clone()),
         ("16 bits", with(|o| o.coordinates.bits = Some(GridBits::B16))),
         ("21 bits", with(|o| o.coordinates.bits = Some(GridBits::B21))),
-        ("packed nodes", with(|o| o.coordinates.boxes = Boxes::Bytes)),
         ("deformable", with(|o| o.deformable = true)),
         ("free directions", with(|o| o.free.keep = bth_compile::free::KeepFree::All)),
     ];

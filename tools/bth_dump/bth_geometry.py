@@ -8,7 +8,7 @@ import bth_free
 import bth_leaves
 from bth_container import NONE
 from bth_indices import TETS, child
-from bth_leaves import NODE, PACKED
+from bth_leaves import NODE
 from bth_tets import FACE_BIT
 
 
@@ -102,7 +102,7 @@ def _tree(view):
             continue
         kind, index = child(code)
         points = []
-        if kind in (NODE, PACKED):
+        if kind == NODE:
             lower, upper, codes = view.node(index)
             stack.extend((codes[i], [*boxes, (lower[i], upper[i])], leaf_row) for i in range(16))
         elif kind == TETS:

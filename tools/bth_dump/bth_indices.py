@@ -8,7 +8,7 @@ import bth_free
 import bth_leaves
 import bth_places
 from bth_container import NONE
-from bth_leaves import INDEXED, NODE, PACKED, RAW
+from bth_leaves import INDEXED, NODE, RAW
 from bth_tets import derive
 
 MAX_DEPTH = 96
@@ -18,7 +18,7 @@ F32_MAX = struct.unpack("<f", struct.pack("<I", 0x7F7FFFFF))[0]
 
 def child(code):
     """Kind and index of a child code; None where there is none."""
-    kind = {0: NODE, 1: PACKED, 4: INDEXED, 5: RAW, 6: TETS}.get(code >> 29)
+    kind = {0: NODE, 4: INDEXED, 5: RAW, 6: TETS}.get(code >> 29)
     return None if kind is None else (kind, code & (1 << 29) - 1)
 
 
@@ -151,8 +151,7 @@ def _tree(view):
         if code == NONE:
             continue
         found = child(code)
-        other = NODE if view.packed_nodes else PACKED
-        if found is None or found[0] == other or (found[0] == TETS and in_subtree):
+        if found is None or (found[0] == TETS and in_subtree):
             raise view.invalid("F105", f"child code {code:#x}", section, at)
         kind, index = found
         if kind == TETS:
@@ -171,12 +170,12 @@ def _tree(view):
         if not claimed.isdisjoint(block):
             raise view.invalid("F108", f"{kind} at half line {block.start}", section, at)
         claimed.update(block)
-        if kind in (NODE, PACKED):
+        if kind == NODE:
             if depth + 1 > min(view.depth, MAX_DEPTH):
                 raise view.invalid("F110", f"{depth + 1} nodes on a path", section, at)
             codes = _slots(view, index)
             for slot in reversed(range(16)):
-                at = 64 * index + (96 if kind == PACKED else 384) + 4 * slot
+                at = 64 * index + 384 + 4 * slot
                 stack.append((codes[slot], depth + 1, block.start, in_subtree, c.LINES, at))
         else:
             bth_leaves.check(view, kind, index)
@@ -198,7 +197,7 @@ def _slots(view, line):
     lower, upper, codes = view.node(line)
     used = codes.index(NONE) if NONE in codes else 16
     if used == 0:
-        raise view.invalid("F111", "no children", c.LINES, 64 * line + (96 if view.packed_nodes else 384))
+        raise view.invalid("F111", "no children", c.LINES, 64 * line + 384)
     for i in range(16):
         if i < used:
             if not is_box(lower[i], upper[i]):
@@ -215,7 +214,7 @@ def _deformable(view):
         return
     announced = view.container.header.required_features & c.FEATURE_DEFORMABLE_TETS
     tets = bool(view.tet_leaves) and not announced or any(leaf.subtree == NONE for leaf in view.tet_leaves)
-    is_f32 = not (view.grid or view.packed_nodes or view.widened_boxes)
+    is_f32 = not (view.grid or view.widened_boxes)
     if not view.positions or not view.source or not is_f32 or tets or view.dropped:
         raise view.invalid("F163", "LEAF_VERTICES in an object that cannot be deformable", c.LEAF_VERTICES)
     nodes, leaves = _depth_first(view)

@@ -6,12 +6,12 @@ from collections import namedtuple
 
 import bth_container as c
 
-NODE, PACKED, INDEXED, RAW = "node", "packed", "indexed", "raw"
+NODE, INDEXED, RAW = "node", "indexed", "raw"
 # Half lines of a block, by bits of a coordinate; 32 for f32.
 HALVES = {
-    32: {NODE: 14, PACKED: 6, INDEXED: 8, RAW: 20},
-    21: {NODE: 14, PACKED: 6, INDEXED: 5, RAW: 13},
-    16: {NODE: 14, PACKED: 6, INDEXED: 4, RAW: 10},
+    32: {NODE: 14, INDEXED: 8, RAW: 20},
+    21: {NODE: 14, INDEXED: 5, RAW: 13},
+    16: {NODE: 14, INDEXED: 4, RAW: 10},
 }
 
 # Rows of 16 coordinates (three of an indexed leaf, nine of a raw one), corners of all 16 slots (indexed leaves), the rest.
@@ -20,7 +20,7 @@ Leaf = namedtuple("Leaf", "rows corners first triangles vertices unused")
 
 def halves(view, kind, index):
     """Half lines of a block."""
-    first = index if view.grid and kind not in (NODE, PACKED) else 2 * index
+    first = index if view.grid and kind != NODE else 2 * index
     return range(first, first + HALVES[view.grid.bits if view.grid else 32][kind])
 
 

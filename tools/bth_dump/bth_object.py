@@ -60,9 +60,8 @@ class ObjectView:
         """F104: the grid of the leaves' coordinates; None for f32."""
         bits, *exponents = struct.unpack_from("<4B", raw, 44)
         origin, displacement = struct.unpack_from("<3f", raw, 48), struct.unpack_from("<f", raw, 60)[0]
-        self.packed_nodes = bits >> 7 == 1
         self.widened_boxes = bits >> 6 & 1 == 1
-        bits &= 63
+        bits &= ~(1 << 6)
         if not bits and not any(raw[45:48]):
             grid, wrong = None, any(raw[48:64])
         else:
@@ -71,7 +70,6 @@ class ObjectView:
             wrong = wrong or not self.container.header.required_features & c.FEATURE_GRID
             grid = Grid(bits, origin, tuple(math.ldexp(1.0, e - 127) for e in exponents), displacement)
             wrong = wrong or not all(_is_exact(o, s, bits) for o, s in zip(grid.origin, grid.step))
-        wrong = wrong or self.packed_nodes and not self.container.header.required_features & c.FEATURE_PACKED_NODES
         wrong = wrong or self.widened_boxes and not self.container.header.required_features & c.FEATURE_WIDENED_BOXES
         if wrong:
             raise self.invalid("F104", f"coordinates {raw[44:64].hex()}", c.OBJECT, 44)
@@ -105,32 +103,7 @@ class ObjectView:
 
     def node(self, line):
         """Lower ends and upper ends of the children's boxes, and the children's codes."""
-        if self.packed_nodes:
-            return self._packed_node(line)
         raw = struct.unpack_from("<96f16I", self.lines, 64 * line)
         lower = list(zip(raw[0:16], raw[32:48], raw[64:80]))
         upper = list(zip(raw[16:32], raw[48:64], raw[80:96]))
         return lower, upper, raw[96:]
-
-    def _packed_node(self, line):
-        """As node, for a PackedNode; checks its steps, origin and reserved field (F112, F111)."""
-        steps = struct.unpack_from("<96B", self.lines, 64 * line)
-        codes = struct.unpack_from("<16I", self.lines, 64 * line + 96)
-        origin, step = (struct.unpack_from("<3f", self.lines, 64 * line + at) for at in (160, 172))
-        for axis in range(3):
-            if not (math.isfinite(step[axis]) and step[axis] >= 2.0**-126 and math.frexp(step[axis])[0] == 0.5):
-                raise self.invalid("F112", f"step {step[axis]}", c.LINES, 64 * line + 172)
-            if not _is_exact(origin[axis], step[axis], 8):
-                raise self.invalid("F112", f"origin {origin[axis]} of steps {step[axis]}", c.LINES, 64 * line + 160)
-        if any(self.lines[64 * line + 184 : 64 * line + 192]):
-            raise self.invalid("F111", "a reserved field is not zero", c.LINES, 64 * line + 184)
-        most, lower, upper = struct.unpack("<f", struct.pack("<I", 0x7F7FFFFF))[0], [], []
-        for slot in range(16):
-            ends = [[steps[32 * axis + 16 * end + slot] for axis in range(3)] for end in (0, 1)]
-            if codes[slot] == c.NONE and ends == [[255] * 3, [0] * 3]:
-                lower.append((most,) * 3)
-                upper.append((-most,) * 3)
-                continue
-            lower.append(tuple(origin[axis] + step[axis] * ends[0][axis] for axis in range(3)))
-            upper.append(tuple(origin[axis] + step[axis] * ends[1][axis] for axis in range(3)))
-        return lower, upper, codes

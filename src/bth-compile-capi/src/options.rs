@@ -3,7 +3,7 @@
 use crate::{Failure, argument};
 use bth_format::layout::GridBits;
 use compiler::bvh::Quality;
-use compiler::coordinates::{Boxes, MaxError};
+use compiler::coordinates::MaxError;
 use compiler::free::KeepFree;
 use compiler::pipeline::{CompileOptions, Structure};
 use std::ffi::{CStr, c_char, c_void};
@@ -52,7 +52,6 @@ impl Default for Options {
 }
 
 const NO_GEOMETRY: u32 = 1;
-const BYTE_BOXES: u32 = 2;
 const DEFORMABLE: u32 = 4;
 /// Greatest number of threads; more are a mistake.
 const MOST_THREADS: u32 = 1 << 12;
@@ -101,11 +100,8 @@ impl Options {
                 return Err(argument(text));
             }
         };
-        if self.flags & BYTE_BOXES != 0 {
-            options.coordinates.boxes = Boxes::Bytes;
-        }
-        if self.flags & !(NO_GEOMETRY | BYTE_BOXES | DEFORMABLE) != 0 {
-            return unknown("flags", "a sum of 1, 2 and 4", self.flags);
+        if self.flags & !(NO_GEOMETRY | DEFORMABLE) != 0 {
+            return unknown("flags", "a sum of 1 and 4", self.flags);
         }
         options.free.keep = match self.free_directions {
             0 => KeepFree::None,

@@ -1,4 +1,4 @@
-//! Leaves on a grid and packed nodes as their counterparts of `f32`, without rounding. Tracing, checking and verifying read
+//! Leaves on a grid as their counterparts of `f32`, without rounding. Tracing, checking and verifying read
 //! leaves in this form only.
 // Counted loops over arrays: closures would be compiled without the vector instructions of the kernels that inline them.
 #![allow(clippy::needless_range_loop)]
@@ -85,34 +85,4 @@ fn widened(reserved: [u32; 6]) -> [u32; 14] {
     let mut out = [0; 14];
     out[..6].copy_from_slice(&reserved);
     out
-}
-
-impl PackedNode {
-    /// An end of a child's box, object space: `upper` is 0 for the lower end and 1 for the upper one. Exact where
-    /// [`Self::is_exact`].
-    #[inline(always)]
-    pub fn end(&self, axis: usize, upper: usize, slot: usize) -> f32 {
-        self.origin[axis] + self.step[axis] * f32::from(self.bounds[axis][upper][slot])
-    }
-
-    /// The same node with boxes of `f32`; empty slots get the empty box of a [`WideNode`].
-    pub fn unpacked(&self) -> WideNode {
-        let mut bounds = [[[f32::MAX; WIDTH], [-f32::MAX; WIDTH]]; 3];
-        for slot in 0..WIDTH {
-            let ends = self.bounds.map(|ends| ends.map(|row| row[slot]));
-            if self.child[slot] == NONE && ends == [[255, 0]; 3] {
-                continue;
-            }
-            for axis in 0..3 {
-                bounds[axis][0][slot] = self.end(axis, 0, slot);
-                bounds[axis][1][slot] = self.end(axis, 1, slot);
-            }
-        }
-        WideNode { bounds, child: self.child }
-    }
-
-    /// Whether every end that a byte can stand for is an `f32` (BTH-F112).
-    pub fn is_exact(&self) -> bool {
-        (0..3).all(|axis| is_exact(self.origin[axis], self.step[axis], 255))
-    }
 }

@@ -19,9 +19,7 @@ pub fn triangles(object: &ObjectView<'_>) -> Vec<Triangle> {
     let mut stack = vec![object.header.root];
     while let Some(code) = stack.pop() {
         match Child::from_code(code) {
-            Some(child @ (Child::Node(_) | Child::Packed(_))) => {
-                stack.extend(object.unpacked_node(child).expect("a node").child);
-            }
+            Some(Child::Node(line)) => stack.extend(object.node(line).child),
             Some(Child::Indexed(line)) => {
                 let mut unpacked = None;
                 let leaf = object.indexed(line, &mut unpacked);

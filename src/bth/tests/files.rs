@@ -10,7 +10,7 @@ macro_rules! files {
     };
 }
 
-const VALID: [(&str, &[u8]); 34] = files![
+const VALID: [(&str, &[u8]); 32] = files![
     "deformable",
     "deformable-tets-link32",
     "deformable-tets-tet16",
@@ -21,8 +21,6 @@ const VALID: [(&str, &[u8]); 34] = files![
     "grid-21",
     "groups",
     "materials",
-    "packed-nodes",
-    "packed-nodes-grid-16",
     "no-objects",
     "nothing-to-hit",
     "opacity",
@@ -235,4 +233,11 @@ fn tetrahedra_move_with_the_surface_or_stand_aside() {
             trace(&scene);
         }
     }
+}
+
+#[test]
+fn files_with_boxes_of_8_bits_are_refused_and_the_error_says_what_to_do() {
+    let file = include_bytes!("../../../format-spec/conformance/invalid/F007-boxes-of-8-bits.bth");
+    let error = bth::from_bytes(file.as_slice()).unwrap_err().to_string();
+    assert!(error.contains("BTH-F007") && error.contains("compile the model again"), "{error}");
 }

@@ -115,6 +115,9 @@ fn container() -> Vec<Case> {
             1,
             4,
         ),
+        broken("F007-boxes-of-8-bits", "triangle", Seal::Header, |e| {
+            e.put(offset_of!(Header, required_features), &2u64.to_le_bytes());
+        }),
         broken("F007-unknown-feature", "triangle", Seal::Header, |e| {
             e.put(offset_of!(Header, required_features), &4u32.to_le_bytes());
         }),
@@ -228,8 +231,6 @@ fn tree() -> Vec<Case> {
     let line = |name, at, value| field(name, base, kind::LINES, at, value);
     let nan = f32::NAN.to_bits();
     let grid = |name, kind, at, value| field(name, "grid-21", kind, at, value);
-    let packed = |name, at, value| field(name, "packed-nodes", kind::LINES, at, value);
-    let packed_child = |slot: usize| offset_of!(PackedNode, child) + 4 * slot;
     vec![
         object("F101-record-without-tets", offset_of!(Object, record), 1),
         field("F101-other-record", "tets-tet20", kind::OBJECT, offset_of!(Object, record), 4),
@@ -249,15 +250,7 @@ fn tree() -> Vec<Case> {
         grid("F104-step", kind::OBJECT, offset_of!(Object, coordinates), 0x00ff_7f10),
         grid("F104-origin-between", kind::OBJECT, offset_of!(Object, grid_origin), 1e-7f32.to_bits()),
         grid("F104-displacement", kind::OBJECT, offset_of!(Object, displacement), nan),
-        object("F104-packed-nodes-not-announced", offset_of!(Object, coordinates), PACKED_NODES),
         object("F104-widened-boxes-not-announced", offset_of!(Object, coordinates), WIDENED_BOXES),
-        line("F105-packed-among-nodes", child(0), Child::Packed(INNER as u32 / 64).code()),
-        packed("F105-node-among-packed", packed_child(0), Child::Node(3).code()),
-        packed("F111-packed-empty-slot", 4, 0xffff_ff00),
-        packed("F111-packed-reserved", offset_of!(PackedNode, reserved), 1),
-        packed("F112-packed-step", offset_of!(PackedNode, step), 0x3f80_0001),
-        packed("F112-packed-origin", offset_of!(PackedNode, origin), 0.3f32.to_bits()),
-        packed("F112-packed-inside-out", 0, 0x00ff_ffff),
         grid("F109-half-a-line", kind::LINES, GRID_END, 1),
         grid("F118-high-bit", kind::LINES, LEAF + 96, 1 << 15),
         line("F105-unassigned", child(0), 7 << 29),
@@ -472,7 +465,6 @@ fn geometry() -> Vec<Case> {
         field("F203-subtree-of-others", tets, kind::TRIANGLE_IDS, 4, 4),
         field("F203-more-dropped", base, kind::OBJECT, offset_of!(Object, dropped), 2),
         field("F204-small-box", base, kind::LINES, 64, half),
-        field("F204-small-packed-box", "packed-nodes", kind::LINES, 16, 0),
         // A box that holds the triangles, without room.
         field("F204-no-room", "widened-boxes", kind::LINES, 64, 4f32.to_bits()),
         field("F204-small-bounds", base, kind::OBJECT, offset_of!(Object, upper), half),

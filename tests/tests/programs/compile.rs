@@ -1,6 +1,6 @@
 //! `bthc compile`: outputs, structures, options and reports.
 
-use crate::support::{bthc, crossing, folder, run, sphere};
+use crate::support::{bthc, crossing, folder, sphere};
 use bth::rays::Ray;
 
 #[test]
@@ -57,26 +57,6 @@ fn bytes_depend_on_neither_threads_nor_folder_nor_name() {
         assert!(one == compile(first.path(), "ball.obj", "2"), "threads, {options:?}");
         assert!(one == compile(second.path(), "other.obj", "2"), "folder, {options:?}");
     }
-}
-
-#[test]
-fn boxes_of_bytes_make_smaller_files_that_verify_and_answer_alike() {
-    let folder = folder(&[("ball.obj", &sphere(24))]);
-    let mut files = Vec::new();
-    for boxes in ["f32", "8"] {
-        let name = format!("{boxes}.bth");
-        bthc(folder.path(), &["compile", "ball.obj", "-o", &name, "--boxes", boxes, "--quiet"]).expect(0);
-        bthc(folder.path(), &["verify", &name]).expect(0);
-        let info = bthc(folder.path(), &["info", &name, "--json"]).expect(0).json();
-        assert_eq!(info["objects"][0]["boxes"], if boxes == "8" { 8 } else { 32 }, "{info:#}");
-        run("bth-play", folder.path(), &[&name, "-o", &format!("{boxes}.png"), "--size", "64x48"]).expect(0);
-        files.push((
-            info["bytes"].as_u64(),
-            std::fs::read(folder.path().join(format!("{boxes}.png"))).unwrap(),
-        ));
-    }
-    assert!(files[1].0 < files[0].0, "{:?} and {:?} bytes", files[0].0, files[1].0);
-    assert!(files[0].1 == files[1].1, "the pictures differ");
 }
 
 #[test]
@@ -173,7 +153,7 @@ fn the_help_lists_options_under_their_headings() {
         ("--threads", "Options"),
         ("--json", "Options"),
         ("--materials", "What the file keeps"),
-        ("--boxes", "Smaller files"),
+        ("--max-error", "Smaller files"),
         ("--deformable", "Objects that deform"),
         ("--c-tet", "Tetrahedra"),
         ("--flatten", "Scenes from glTF"),

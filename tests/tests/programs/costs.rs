@@ -109,7 +109,7 @@ fn free_directions_are_kept_by_default_where_they_pay_and_fit() {
     let (all, with) = kept(&[]);
     assert_eq!([&none[..], &all[..]], ["none", "directions"]);
     assert!(with > plain + 19.9 && with < plain + 20.1, "{plain} {with}");
-    for small in [&["--quality", "fast"][..], &["--coordinates", "16"], &["--boxes", "8"]] {
+    for small in [&["--quality", "fast"][..], &["--coordinates", "16"]] {
         assert_eq!(kept(small).0, none, "{small:?}");
         assert_eq!(kept(&[small, &["--free-directions", "auto"]].concat()).0, all, "{small:?}");
     }

@@ -315,11 +315,9 @@ fn options_that_exclude_each_other_are_an_error() {
     let whole = CompileOptions { structure: Structure::Tets, ..deformable() };
     let tets = CompileOptions { keep_subtrees: false, ..whole.clone() };
     let no_geometry = CompileOptions { geometry: false, ..deformable() };
-    let mut boxes = deformable();
-    boxes.coordinates.boxes = bth_compile::coordinates::Boxes::Bytes;
     let mut free = deformable();
     free.free.keep = bth_compile::free::KeepFree::All;
-    for options in [tets, no_geometry, boxes, free] {
+    for options in [tets, no_geometry, free] {
         let mesh = TriangleMesh { positions: &positions, triangles: &triangles };
         let error = compile(mesh, &options, &Silent).unwrap_err().to_string();
         assert!(error.contains("BTH-L033"), "{error}");

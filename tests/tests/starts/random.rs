@@ -4,7 +4,6 @@ use crate::check::{Corners, check, check_with, corners_of, turn};
 use bth::Scene;
 use bth::rays::StartRay;
 use bth_compile::Silent;
-use bth_compile::coordinates::Boxes;
 use bth_compile::free::KeepFree;
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_format::exact::is_zero_area;
@@ -22,23 +21,19 @@ fn scene_of(model: &Model, form: usize, rng: &mut Rng) -> Option<(&'static str, 
     let name = match form {
         0 => "plain",
         1 => {
-            of_bvh.coordinates.boxes = Boxes::Bytes;
-            "packed nodes"
-        }
-        2 => {
             of_bvh.coordinates.bits = Some(GridBits::B16);
             "a grid of 16 bits"
         }
-        3 => {
+        2 => {
             of_bvh.free.keep = KeepFree::All;
             "free directions"
         }
-        4 => {
+        3 => {
             of_bvh.free.keep = KeepFree::Distances;
             "free distances"
         }
-        5 => return Some(("deformed", deformed(model, rng.next()).scene)),
-        6 => return Some(("raw leaves", raw(model, 0, rng)?)),
+        4 => return Some(("deformed", deformed(model, rng.next()).scene)),
+        5 => return Some(("raw leaves", raw(model, 0, rng)?)),
         _ => return Some((SEVERAL, raw(model, 4, rng)?)),
     };
     Some((name, compiled(model, &of_bvh)?))
@@ -124,38 +119,33 @@ fn plain_files() {
 }
 
 #[test]
-fn packed_nodes() {
+fn grids_of_16_bits() {
     check_form(1, 16);
 }
 
 #[test]
-fn grids_of_16_bits() {
+fn free_directions() {
     check_form(2, 16);
 }
 
 #[test]
-fn free_directions() {
+fn free_distances() {
     check_form(3, 16);
 }
 
 #[test]
-fn free_distances() {
+fn deformable_objects_with_new_positions() {
     check_form(4, 16);
 }
 
 #[test]
-fn deformable_objects_with_new_positions() {
+fn raw_leaves() {
     check_form(5, 16);
 }
 
 #[test]
-fn raw_leaves() {
-    check_form(6, 16);
-}
-
-#[test]
 fn triangles_in_several_leaves() {
-    check_form(7, 16);
+    check_form(6, 16);
 }
 
 #[test]
@@ -163,10 +153,8 @@ fn models_of_many_nodes() {
     let _turn = turn();
     let model = bth_scenes::knot::torus_knot(3000);
     let plain = options(Structure::Bvh, RecordKind::Link32, false);
-    let mut packed = plain.clone();
-    packed.coordinates.boxes = Boxes::Bytes;
-    for (scale, by, options) in [(1.0, 0.0, &plain), (0.01, 700.0, &plain), (1e-20, 0.0, &packed)] {
-        let scene = compiled(&placed(model.clone(), scale, by), options).unwrap();
+    for (scale, by) in [(1.0, 0.0), (0.01, 700.0), (1e-20, 0.0)] {
+        let scene = compiled(&placed(model.clone(), scale, by), &plain).unwrap();
         let corners = corners_of(&scene, 0);
         let rays = rays(&scene, &corners, 150, 5);
         assert!(check(&scene, &corners, &rays, &format!("knot, {scale}")) > rays.len() / 4);

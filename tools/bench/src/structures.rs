@@ -5,7 +5,7 @@ use crate::tracer::{Batch, Contender, Starting, Tracer};
 use anyhow::{Context, Result};
 use bth::rays::{Hit, Ray, Start, StartRay};
 use bth::{Accept, Scene};
-use bth_compile::coordinates::{self, Boxes};
+use bth_compile::coordinates;
 use bth_compile::free::{FreeOptions, KeepFree};
 use bth_compile::pipeline::{self, CompileOptions, Structure};
 use bth_format::layout::{GridBits, RecordKind};
@@ -23,7 +23,6 @@ pub struct Kind {
     structure: Structure,
     record: RecordKind,
     bits: Option<GridBits>,
-    boxes: Boxes,
     free: KeepFree,
 }
 
@@ -32,20 +31,18 @@ const LINK32: Kind = Kind {
     structure: Structure::Tets,
     record: RecordKind::Link32,
     bits: None,
-    boxes: Boxes::F32,
     free: KeepFree::None,
 };
 
 /// The structures. The default file comes first, then the plain BVH, which also finds the hits that secondary rays start
 /// from.
-pub const KINDS: [Kind; 9] = [
+pub const KINDS: [Kind; 8] = [
     Kind { name: "bth", structure: Structure::Bth, ..LINK32 },
     Kind { name: "bvh", structure: Structure::Bvh, ..LINK32 },
     Kind { name: "tets link32", ..LINK32 },
     Kind { name: "tets tet32", record: RecordKind::Tet32, ..LINK32 },
     Kind { name: "tets tet20", record: RecordKind::Tet20, ..LINK32 },
     Kind { name: "tets tet16", record: RecordKind::Tet16, ..LINK32 },
-    Kind { name: "bvh 8-bit boxes", structure: Structure::Bvh, boxes: Boxes::Bytes, ..LINK32 },
     Kind { name: "bvh free", structure: Structure::Bvh, free: KeepFree::All, ..LINK32 },
     Kind { name: "bvh distances", structure: Structure::Bvh, free: KeepFree::Distances, ..LINK32 },
 ];
@@ -94,11 +91,7 @@ impl Kind {
         CompileOptions {
             structure: self.structure,
             record: self.record,
-            coordinates: coordinates::CoordinateOptions {
-                bits: self.bits,
-                max_error: None,
-                boxes: self.boxes,
-            },
+            coordinates: coordinates::CoordinateOptions { bits: self.bits, max_error: None },
             keep_subtrees: !self.is_tets(),
             free: FreeOptions { keep: self.free, ..FreeOptions::default() },
             ..CompileOptions::default()

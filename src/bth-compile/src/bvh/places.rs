@@ -47,9 +47,6 @@ fn leaves(wide: &Wide, grid: Option<&Grid>) -> Vec<Leaf> {
             Some(Child::Node(line)) => {
                 stack.extend(read::<WideNode>(wide, 2 * u64::from(line)).child);
             }
-            Some(Child::Packed(line)) => {
-                stack.extend(read::<PackedNode>(wide, 2 * u64::from(line)).child);
-            }
             Some(Child::Tets(_)) | None => {}
         }
     }

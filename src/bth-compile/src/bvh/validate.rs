@@ -100,7 +100,6 @@ impl Reader<'_> {
         self.deepest = self.deepest.max(level);
         match Child::from_code(code).expect("a code") {
             Child::Node(line) => self.node(line, level, subtrees),
-            Child::Packed(_) => panic!("collapsing packs no nodes"),
             Child::Indexed(line) => {
                 let leaf: IndexedLeaf = self.read(line, INDEXED_LINES);
                 let used = leaf.vertices as usize;

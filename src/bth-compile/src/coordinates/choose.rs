@@ -48,24 +48,7 @@ impl MaxError {
     }
 }
 
-/// How boxes of nodes are stored.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Boxes {
-    /// In `f32`, unchanged.
-    #[default]
-    F32,
-    /// Rounded outwards to bytes: nodes of three lines in place of seven.
-    Bytes,
-}
-
-impl Boxes {
-    fn is_f32(&self) -> bool {
-        *self == Boxes::F32
-    }
-}
-
-/// The form of coordinates in triangle leaves and nodes.
+/// The form of coordinates in triangle leaves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct CoordinateOptions {
     /// Bits of a coordinate. If absent, coordinates are `f32`, or have the fewest bits that keep within `max_error` if that
@@ -74,9 +57,6 @@ pub struct CoordinateOptions {
     pub bits: Option<GridBits>,
     /// Greatest distance that a vertex may move.
     pub max_error: Option<MaxError>,
-    /// Boxes of nodes. They move no vertex, and no answer to a ray depends on them.
-    #[serde(skip_serializing_if = "Boxes::is_f32")]
-    pub boxes: Boxes,
 }
 
 fn number_of_bits<S: Serializer>(bits: &Option<GridBits>, to: S) -> std::result::Result<S::Ok, S::Error> {

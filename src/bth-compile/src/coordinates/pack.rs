@@ -1,6 +1,5 @@
-//! Rewrites the lines of a wide BVH with shorter blocks: leaves on a grid, and nodes with boxes in bytes.
+//! Rewrites the lines of a wide BVH with shorter leaves, on a grid.
 
-use super::boxes::packed_node;
 use crate::bvh::Wide;
 use crate::error::{Error, Result};
 use bth_format::layout::*;
@@ -14,31 +13,20 @@ struct Block {
     half: u64,
 }
 
-/// Moves the blocks together, with leaves shortened where there is a grid, on which their corners must lie, and nodes
-/// shortened with `pack_nodes`. Returns whether nodes were packed; coordinates may be too great for steps of bytes.
+/// Shortens the leaves, whose corners must lie on the grid, and moves the blocks together.
 ///
 /// # Errors
 /// `BTH-L202` when a child code cannot address a leaf.
-pub fn pack(wide: &mut Wide, grid: Option<&Grid>, pack_nodes: bool) -> Result<bool> {
-    if grid.is_none() && !pack_nodes {
-        return Ok(false);
-    }
+pub fn pack(wide: &mut Wide, grid: &Grid) -> Result<()> {
     let mut blocks = blocks(wide);
-    let nodes = pack_nodes.then(|| packed_nodes(wide, &blocks)).flatten();
-    if grid.is_none() && nodes.is_none() {
-        return Ok(false);
-    }
-    let [indexed, raw] = match grid {
-        Some(grid) => grid.bits.half_lines(),
-        None => [2 * INDEXED_LINES, 2 * RAW_LINES],
-    };
+    let [indexed, raw] = grid.bits.half_lines();
     let mut end = 0u64;
     for block in &mut blocks {
         let halves = match block.old {
             Child::Node(_) => {
                 // Nodes stay on whole lines.
                 end = end.next_multiple_of(2);
-                2 * if nodes.is_some() { PACKED_NODE_LINES } else { NODE_LINES }
+                2 * NODE_LINES
             }
             Child::Indexed(_) => indexed,
             _ => raw,
@@ -46,13 +34,9 @@ pub fn pack(wide: &mut Wide, grid: Option<&Grid>, pack_nodes: bool) -> Result<bo
         block.half = end;
         end += halves as u64;
     }
-    // Leaves on a grid are counted in half lines.
-    let unit = if grid.is_some() { 1 } else { 2 };
-    if end > unit * u64::from(Child::INDEX_LIMIT) {
-        let message = format!(
-            "the BVH needs {end} half lines of 32 bytes; an object can have {}",
-            unit * u64::from(Child::INDEX_LIMIT)
-        );
+    if end > u64::from(Child::INDEX_LIMIT) {
+        let message =
+            format!("the BVH needs {end} half lines of 32 bytes; an object can have {}", Child::INDEX_LIMIT);
         return Err(Error::Limit { code: "BTH-L202", message });
     }
     let mut packed = Packed {
@@ -62,37 +46,22 @@ pub fn pack(wide: &mut Wide, grid: Option<&Grid>, pack_nodes: bool) -> Result<bo
         grid,
     };
     for block in &blocks {
-        let (line, leaf) = ((block.half / 2) as u32, (block.half / unit) as u32);
-        let (line, code) = match block.old {
-            Child::Node(old) if nodes.is_some() => (old, Child::Packed(line).code()),
-            Child::Node(old) => (old, Child::Node(line).code()),
-            Child::Indexed(old) => (old, Child::Indexed(leaf).code()),
-            Child::Raw(old) => (old, Child::Raw(leaf).code()),
-            Child::Packed(_) | Child::Tets(_) => unreachable!("a block of the wide BVH"),
+        // Leaves on a grid are counted in half lines.
+        let (old, code) = match block.old {
+            Child::Node(old) => (old, Child::Node((block.half / 2) as u32).code()),
+            Child::Indexed(old) => (old, Child::Indexed(block.half as u32).code()),
+            Child::Raw(old) => (old, Child::Raw(block.half as u32).code()),
+            Child::Tets(_) => unreachable!("a block of the wide BVH"),
         };
-        packed.code_at[line as usize] = code;
+        packed.code_at[old as usize] = code;
     }
-    let mut nodes = nodes.map(Vec::into_iter);
     for block in &blocks {
-        let node = match block.old {
-            Child::Node(_) => nodes.as_mut().and_then(Iterator::next),
-            _ => None,
-        };
-        packed.write(block, node);
+        packed.write(block);
     }
     wide.root = packed.code(wide.root);
     wide.subtrees = wide.subtrees.iter().map(|code| packed.code(*code)).collect();
     wide.lines = packed.lines;
-    Ok(nodes.is_some())
-}
-
-/// The nodes among the blocks with packed boxes and unchanged child codes; `None` if one of them cannot be packed.
-fn packed_nodes(wide: &Wide, blocks: &[Block]) -> Option<Vec<PackedNode>> {
-    let node = |block: &Block| match block.old {
-        Child::Node(line) => Some(packed_node(read(&wide.lines, line))),
-        _ => None,
-    };
-    blocks.iter().filter_map(node).collect()
+    Ok(())
 }
 
 /// All nodes and leaves, in the order of their lines.
@@ -108,7 +77,7 @@ fn blocks(wide: &Wide) -> Vec<Block> {
             Some(old @ (Child::Indexed(line) | Child::Raw(line))) => {
                 found.push((line, Block { old, half: 0 }))
             }
-            Some(Child::Packed(_) | Child::Tets(_)) | None => {}
+            Some(Child::Tets(_)) | None => {}
         }
     }
     found.sort_unstable_by_key(|(line, _)| *line);
@@ -125,7 +94,7 @@ struct Packed<'a> {
     /// New child code of the block at each old line.
     code_at: Vec<u32>,
     lines: Vec<CacheLine>,
-    grid: Option<&'a Grid>,
+    grid: &'a Grid,
 }
 
 impl Packed<'_> {
@@ -133,34 +102,18 @@ impl Packed<'_> {
     fn code(&self, old: u32) -> u32 {
         match Child::from_code(old) {
             Some(Child::Node(line) | Child::Indexed(line) | Child::Raw(line)) => self.code_at[line as usize],
-            Some(Child::Packed(_) | Child::Tets(_)) | None => old,
+            Some(Child::Tets(_)) | None => old,
         }
     }
 
-    fn write(&mut self, block: &Block, node: Option<PackedNode>) {
-        let half = block.half;
-        match (block.old, node) {
-            (Child::Node(_), Some(mut node)) => {
-                node.child = node.child.map(|code| self.code(code));
-                self.put(half, &node);
-            }
-            (Child::Node(line), None) => {
+    fn write(&mut self, block: &Block) {
+        let (half, grid, bits) = (block.half, self.grid, self.grid.bits);
+        match block.old {
+            Child::Node(line) => {
                 let mut node = *read::<WideNode>(self.old, line);
                 node.child = node.child.map(|code| self.code(code));
                 self.put(half, &node);
             }
-            (leaf, _) => match (leaf, self.grid) {
-                (leaf, Some(grid)) => self.write_on_grid(half, leaf, grid),
-                (Child::Indexed(line), None) => self.put(half, read::<IndexedLeaf>(self.old, line)),
-                (Child::Raw(line), None) => self.put(half, read::<RawLeaf>(self.old, line)),
-                _ => unreachable!("a block of the wide BVH"),
-            },
-        }
-    }
-
-    fn write_on_grid(&mut self, half: u64, leaf: Child, grid: &Grid) {
-        let bits = grid.bits;
-        match leaf {
             Child::Indexed(line) => {
                 let leaf = read::<IndexedLeaf>(self.old, line);
                 let (vertex, high) = split(grid, &leaf.vertex);
@@ -190,7 +143,7 @@ impl Packed<'_> {
                     GridBits::B21 => self.put(half, &RawLeaf21 { corner, high, first, triangles, reserved }),
                 }
             }
-            _ => unreachable!("a leaf of the wide BVH"),
+            Child::Tets(_) => unreachable!("a block of the wide BVH"),
         }
     }
 

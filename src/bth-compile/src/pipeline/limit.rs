@@ -111,7 +111,7 @@ fn bytes(
     monitor: &dyn Monitor,
 ) -> Result<u64> {
     let cut: Vec<u32> = leaves.iter().map(|(node, _)| *node).collect();
-    let wide = collapse(traced, &cut, options, monitor)?.0.wide;
+    let wide = collapse(traced, &cut, options, monitor)?.0;
     let row_per_triangle = size_of::<u32>() * traced.mesh.triangles.len();
     let face_of_triangle = if leaves.is_empty() { 0 } else { row_per_triangle };
     let places = if wide.root == NONE { 0 } else { row_per_triangle };

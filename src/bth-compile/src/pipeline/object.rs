@@ -3,7 +3,7 @@
 use super::clock::timed;
 use super::motion::MotionReport;
 use super::{CompileOptions, FileReport};
-use crate::coordinates::{Boxes, OnGrid};
+use crate::coordinates::OnGrid;
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::{bvh, coordinates, free, tets, write};
@@ -55,7 +55,6 @@ impl TracedMesh {
 pub(crate) struct Object {
     traced: TracedMesh,
     wide: bvh::Wide,
-    packed_nodes: bool,
     /// The place of each triangle in the leaves.
     places: Vec<u32>,
     /// Absent where free directions are not kept.
@@ -83,10 +82,7 @@ pub(super) fn join(
     monitor: &dyn Monitor,
 ) -> Result<(Object, bvh::CollapseReport)> {
     let (cut, meshes): (Vec<u32>, Vec<tets::TetMesh>) = leaves.into_iter().unzip();
-    let (PackedWide { wide, packed_nodes }, collapse) = collapse(traced.by_ref(), &cut, options, monitor)?;
-    if options.coordinates.boxes == Boxes::Bytes && !packed_nodes {
-        monitor.warn("boxes of nodes stay f32: coordinates are too great for steps of bytes");
-    }
+    let (wide, collapse) = collapse(traced.by_ref(), &cut, options, monitor)?;
     let triangles = traced.mesh.triangles.len();
     let encoded =
         (!meshes.is_empty()).then(|| tets::encode(&meshes, &wide.subtrees, options.record, triangles));
@@ -99,7 +95,6 @@ pub(super) fn join(
     let object = Object {
         traced,
         wide,
-        packed_nodes,
         places,
         free,
         encoded,
@@ -113,19 +108,13 @@ pub(super) fn join(
     Ok((object, collapse))
 }
 
-/// A wide BVH as it will be stored.
-pub(super) struct PackedWide {
-    pub(super) wide: bvh::Wide,
-    packed_nodes: bool,
-}
-
 /// The wide BVH over a binary one, in which the nodes `cut` are tet leaves.
 pub(super) fn collapse(
     traced: TracedRef<'_>,
     cut: &[u32],
     options: &CompileOptions,
     monitor: &dyn Monitor,
-) -> Result<(PackedWide, bvh::CollapseReport)> {
+) -> Result<(bvh::Wide, bvh::CollapseReport)> {
     let collapse_options = bvh::CollapseOptions {
         keep_subtrees: options.keep_subtrees,
         leaf_vertices: options.deformable,
@@ -134,10 +123,11 @@ pub(super) fn collapse(
     let weighed = bvh::Weighed { bvh: traced.tree, probabilities: traced.probabilities };
     let collapse = || bvh::collapse(traced.mesh, weighed, cut, &collapse_options, monitor);
     let (mut wide, mut report) = timed(collapse)?;
-    let grid = traced.on_grid.map(|on_grid| &on_grid.grid);
-    let packed_nodes = coordinates::pack(&mut wide, grid, options.coordinates.boxes == Boxes::Bytes)?;
+    if let Some(on_grid) = traced.on_grid {
+        coordinates::pack(&mut wide, &on_grid.grid)?;
+    }
     report.measure(&wide);
-    Ok((PackedWide { wide, packed_nodes }, report))
+    Ok((wide, report))
 }
 
 /// The bytes of a file from a mesh, its binary BVH and the tetrahedralizations of some of its nodes. For benchmarks, which
@@ -208,7 +198,6 @@ impl Object {
             leaf_vertices: &self.wide.leaf_vertices,
             places: &self.places,
             grid: on_grid.as_ref().map(|on| (on.grid, on.displacement)),
-            packed_nodes: self.packed_nodes,
             widened_boxes: self.wide.widened_boxes,
             groups: self.groups.as_ref(),
             materials: mesh.materials.as_ref(),

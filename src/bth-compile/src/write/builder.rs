@@ -246,10 +246,9 @@ fn coordinates_of(kind: u32, bytes: &[u8]) -> Option<u32> {
 
 /// Features that a reader needs for such coordinates.
 fn features(coordinates: u32) -> u64 {
-    let grid = if coordinates & !(PACKED_NODES | WIDENED_BOXES) != 0 { FEATURE_GRID } else { 0 };
-    let packed = if coordinates & PACKED_NODES != 0 { FEATURE_PACKED_NODES } else { 0 };
+    let grid = if coordinates & !WIDENED_BOXES != 0 { FEATURE_GRID } else { 0 };
     let widened = if coordinates & WIDENED_BOXES != 0 { FEATURE_WIDENED_BOXES } else { 0 };
-    grid | packed | widened
+    grid | widened
 }
 
 pub(super) fn defect(message: String) -> Error {

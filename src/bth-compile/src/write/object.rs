@@ -21,8 +21,6 @@ pub struct ObjectParts<'a> {
     pub dropped: u32,
     /// Grid of the coordinates in triangle leaves, and the greatest distance that a vertex moved; `None` for `f32`.
     pub grid: Option<(Grid, f32)>,
-    /// Whether the nodes are packed: all of them or none.
-    pub packed_nodes: bool,
     /// Whether child boxes are widened ([`WIDENED_BOXES`]).
     pub widened_boxes: bool,
     /// Nodes and triangle leaves.
@@ -113,9 +111,7 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
         triangles: parts.triangles,
         dropped: parts.dropped,
         depth,
-        coordinates: coordinates
-            | if parts.packed_nodes { PACKED_NODES } else { 0 }
-            | if parts.widened_boxes { WIDENED_BOXES } else { 0 },
+        coordinates: coordinates | if parts.widened_boxes { WIDENED_BOXES } else { 0 },
         grid_origin,
         displacement: parts.grid.map_or(0.0, |(_, displacement)| displacement),
     };
@@ -181,21 +177,17 @@ fn depth(parts: &ObjectParts) -> Result<u32> {
     let mut visits = 0;
     while let Some((code, above)) = stack.pop() {
         match Child::from_code(code) {
-            Some(child @ (Child::Node(line) | Child::Packed(line))) => {
+            Some(Child::Node(line)) => {
                 let missing = || defect(format!("no node at line {line}"));
                 let below = parts.lines.get(line as usize..).ok_or_else(missing)?.as_bytes();
-                let children = match child {
-                    Child::Packed(_) => PackedNode::ref_from_prefix(below).ok().map(|(node, _)| node.child),
-                    _ => WideNode::ref_from_prefix(below).ok().map(|(node, _)| node.child),
-                };
-                let children = children.ok_or_else(missing)?;
+                let (node, _) = WideNode::ref_from_prefix(below).map_err(|_| missing())?;
                 deepest = deepest.max(above + 1);
                 visits += 1;
                 // In a tree no two nodes share lines.
                 if visits > parts.lines.len() {
                     return Err(defect("the hierarchy is no tree".into()));
                 }
-                stack.extend(children.iter().map(|&c| (c, above + 1)));
+                stack.extend(node.child.map(|code| (code, above + 1)));
             }
             Some(Child::Tets(row)) => {
                 let leaf =

@@ -20,8 +20,8 @@ pub(super) fn check(view: &ObjectView, features: u64) -> Result<()> {
 fn prerequisites(view: &ObjectView, features: u64) -> Result<()> {
     let found = if view.positions.is_empty() || view.triangles.is_empty() {
         "none of them"
-    } else if view.grid.is_some() || view.has_packed_nodes() {
-        "coordinates or boxes that are not f32"
+    } else if view.grid.is_some() {
+        "coordinates that are not f32"
     } else if view.has_widened_boxes() {
         "widened boxes"
     } else if view.tet_leaves.iter().any(|leaf| leaf.subtree == NONE) {
@@ -51,16 +51,13 @@ fn leaves_in_order(view: &ObjectView) -> Result<Vec<Child>> {
                 stack.extend(children.into_iter().rev().filter(|child| *child != NONE));
             }
             Some(Child::Tets(row)) => stack.push(view.tet_leaves[row as usize].subtree),
-            // No packed nodes, by BTH-F163.
             leaf => leaves.extend(leaf),
         }
     }
     for leaf in &leaves {
         let (line, lines) = match leaf {
             Child::Raw(line) => (*line, RAW_LINES),
-            Child::Indexed(line) | Child::Node(line) | Child::Packed(line) | Child::Tets(line) => {
-                (*line, INDEXED_LINES)
-            }
+            Child::Indexed(line) | Child::Node(line) | Child::Tets(line) => (*line, INDEXED_LINES),
         };
         in_order(line, next)?;
         next += lines;
@@ -81,7 +78,7 @@ impl Rows<'_> {
             match *leaf {
                 Child::Indexed(line) => self.indexed(line)?,
                 Child::Raw(line) => self.raw(line)?,
-                Child::Node(_) | Child::Packed(_) | Child::Tets(_) => {}
+                Child::Node(_) | Child::Tets(_) => {}
             }
         }
         let rows = self.view.leaf_vertices.len();

@@ -11,7 +11,7 @@ pub(super) fn check(view: &ObjectView, child: Child, start: u64) -> Result<()> {
     let checked = match child {
         Child::Indexed(index) => indexed(view.indexed(index, &mut None), start, rows),
         Child::Raw(index) => raw(view.raw(index, &mut None), start, rows),
-        Child::Node(_) | Child::Packed(_) | Child::Tets(_) => Ok(()),
+        Child::Node(_) | Child::Tets(_) => Ok(()),
     };
     if view.grid.is_none() {
         return checked;

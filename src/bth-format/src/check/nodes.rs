@@ -5,40 +5,15 @@ use crate::error::{Code, Error, Result, Text};
 use crate::layout::*;
 use std::mem::offset_of;
 
-/// BTH-F112 and BTH-F111 of a packed node: its boxes can be unpacked without rounding, and its reserved fields are zero.
-pub(super) fn check_packed(node: &PackedNode, start: u64) -> Result<()> {
-    let fail = |code, offset: usize, expected: &'static str, found: Text| {
-        Err(Error::within(code, kind::LINES, start + offset as u64, expected, found))
-    };
-    if !node.step.iter().all(|step| step.is_normal() && *step > 0.0 && step.to_bits() << 9 == 0) {
-        let found = text!("{:?}", node.step);
-        return fail(Code::ChildBounds, offset_of!(PackedNode, step), "steps that are powers of two", found);
-    }
-    if !node.is_exact() {
-        let found = text!("{:?} and steps of {:?}", node.origin, node.step);
-        return fail(
-            Code::ChildBounds,
-            offset_of!(PackedNode, origin),
-            "an origin that makes every end an f32",
-            found,
-        );
-    }
-    if node.reserved != [0; 2] {
-        let found = text!("{:?}", node.reserved);
-        return fail(Code::Slots, offset_of!(PackedNode, reserved), "zeros", found);
-    }
-    Ok(())
-}
-
 /// BTH-F111 and BTH-F112: used slots come first and have boxes, empty ones hold the empty box. `start` is the node's first
-/// byte in LINES, `codes` the offset of its child codes in the stored node.
-pub(super) fn check_slots(node: &WideNode, start: u64, codes: usize) -> Result<()> {
+/// byte in LINES.
+pub(super) fn check_slots(node: &WideNode, start: u64) -> Result<()> {
     let used = node.child.iter().take_while(|c| **c != NONE).count();
     let fail = |code, offset: usize, expected: &'static str, found: Text| {
         Err(Error::within(code, kind::LINES, start + offset as u64, expected, found))
     };
     if used == 0 {
-        return fail(Code::Slots, codes, "at least one child", "none".into());
+        return fail(Code::Slots, offset_of!(WideNode, child), "at least one child", "none".into());
     }
     for i in 0..WIDTH {
         let lower = [0, 1, 2].map(|a| node.bounds[a][0][i]);

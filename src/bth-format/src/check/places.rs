@@ -31,7 +31,7 @@ impl Placed {
                 let leaf = view.raw(index, &mut unpacked);
                 (leaf.first, leaf.triangles)
             }
-            Child::Node(_) | Child::Packed(_) | Child::Tets(_) => return Ok(()),
+            Child::Node(_) | Child::Tets(_) => return Ok(()),
         };
         for slot in 0..triangles {
             let triangle = view.triangle_ids[(first + slot) as usize] as usize;

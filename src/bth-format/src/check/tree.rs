@@ -81,7 +81,7 @@ impl Tree<'_> {
         }
         let first_half = self.claim(reference, child)?;
         match child {
-            Child::Node(_) | Child::Packed(_) => self.follow_node(reference, child, first_half),
+            Child::Node(line) => self.follow_node(reference, line, first_half),
             _ => {
                 leaves::check(self.view, child, first_half * HALF_LINE as u64)?;
                 self.placed.add_leaf(self.view, child)
@@ -91,13 +91,8 @@ impl Tree<'_> {
 
     /// BTH-F105: the code is of a kind that may stand here.
     fn child(&self, reference: &Reference) -> Result<Child> {
-        let packed = self.view.has_packed_nodes();
-        let child = Child::from_code(reference.code).filter(|child| match child {
-            Child::Tets(_) => !reference.in_subtree,
-            Child::Node(_) => !packed,
-            Child::Packed(_) => packed,
-            Child::Indexed(_) | Child::Raw(_) => true,
-        });
+        let child = Child::from_code(reference.code);
+        let child = child.filter(|child| !(reference.in_subtree && matches!(child, Child::Tets(_))));
         let found = || text!("{:#010x}", reference.code);
         child.ok_or_else(|| reference.error(Code::ChildCode, "a child code that may stand here", found()))
     }
@@ -145,28 +140,22 @@ impl Tree<'_> {
     }
 
     /// BTH-F110 to BTH-F112: the node is not too deep, and its slots and boxes are as they should. Pushes its children.
-    fn follow_node(&mut self, reference: &Reference, child: Child, first_half: u64) -> Result<()> {
+    fn follow_node(&mut self, reference: &Reference, line: u32, first_half: u64) -> Result<()> {
         let (depth, most) = (reference.depth + 1, self.view.header.depth);
         if depth > most.min(MAX_DEPTH as u32) {
             let expected = text!("at most {most} (header) and {MAX_DEPTH} nodes on a path");
             return Err(reference.error(Code::Depth, expected, text!("{depth}")));
         }
         let start = first_half * HALF_LINE as u64;
-        let codes = if let Child::Packed(line) = child {
-            nodes::check_packed(self.view.packed_node(line), start)?;
-            offset_of!(PackedNode, child)
-        } else {
-            offset_of!(WideNode, child)
-        };
-        let node = self.view.unpacked_node(child).expect("the child is a node");
-        nodes::check_slots(&node, start, codes)?;
+        let node = self.view.node(line);
+        nodes::check_slots(node, start)?;
         self.stack.extend(node.child.iter().enumerate().rev().map(|(slot, &code)| Reference {
             code,
             depth,
             parent: Some(first_half),
             in_subtree: reference.in_subtree,
             section: kind::LINES,
-            at: start + (codes + 4 * slot) as u64,
+            at: start + (offset_of!(WideNode, child) + 4 * slot) as u64,
         }));
         Ok(())
     }

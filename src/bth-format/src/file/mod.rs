@@ -295,7 +295,7 @@ impl File {
         })
     }
 
-    /// BTH-F104: the grid of an object, and that the header announces grids, packed nodes and widened boxes.
+    /// BTH-F104: the grid of an object, and that the header announces grids and widened boxes.
     fn grid(&self, object: &Object) -> Result<Option<Grid>> {
         let at = std::mem::offset_of!(Object, coordinates) as u64;
         let wrong = |expected: &'static str, found: Text| {
@@ -306,10 +306,6 @@ impl File {
         let features = self.header().required_features;
         if grid.is_some() && features & FEATURE_GRID == 0 {
             return Err(wrong("f32, as the header announces no grid", text!("{:#x}", object.coordinates)));
-        }
-        if object.coordinates & PACKED_NODES != 0 && features & FEATURE_PACKED_NODES == 0 {
-            let found = text!("{:#x}", object.coordinates);
-            return Err(wrong("no packed nodes, as the header announces none", found));
         }
         if object.coordinates & WIDENED_BOXES != 0 && features & FEATURE_WIDENED_BOXES == 0 {
             let found = text!("{:#x}", object.coordinates);

@@ -12,8 +12,7 @@ pub(super) const HEADER_SIZE: usize = size_of::<Header>();
 /// Bytes of a section entry.
 const ENTRY_SIZE: u64 = size_of::<SectionEntry>() as u64;
 /// Required feature bits that this library knows.
-const KNOWN_FEATURES: u64 =
-    FEATURE_GRID | FEATURE_PACKED_NODES | FEATURE_DEFORMABLE_TETS | FEATURE_WIDENED_BOXES;
+const KNOWN_FEATURES: u64 = FEATURE_GRID | FEATURE_DEFORMABLE_TETS | FEATURE_WIDENED_BOXES;
 
 /// Whether hashes are compared. Not under fuzzing: mutated files would have wrong hashes, and no check behind would be reached.
 const CHECKSUMS: bool = !cfg!(fuzzing);
@@ -153,7 +152,12 @@ pub(super) fn check_header(bytes: &[u8], length: u64) -> Result<&Header> {
     let unknown = header.required_features & !KNOWN_FEATURES;
     if unknown != 0 {
         let at = offset_of!(Header, required_features);
-        return fail(Code::Features, at, "known feature bits".into(), text!("unknown {unknown:#x}"));
+        let old = if unknown & FEATURE_BYTE_BOXES != 0 {
+            ", boxes of 8 bits, which this version no longer reads: compile the model again"
+        } else {
+            ""
+        };
+        return fail(Code::Features, at, "known feature bits".into(), text!("unknown {unknown:#x}{old}"));
     }
     let max_entries = (length - HEADER_SIZE as u64) / ENTRY_SIZE;
     if header.section_offset != HEADER_SIZE as u64

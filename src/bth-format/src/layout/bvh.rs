@@ -12,13 +12,11 @@ pub struct CacheLine(pub [u32; 16]);
 /// 0 are an index. [`super::NONE`] is an empty slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Child {
-    /// CacheLine of a [`WideNode`].
+    /// Line of a [`WideNode`].
     Node(u32),
-    /// CacheLine of a [`PackedNode`].
-    Packed(u32),
-    /// CacheLine of an [`IndexedLeaf`]; on a grid the half line of an [`super::IndexedLeaf16`] or [`super::IndexedLeaf21`].
+    /// Line of an [`IndexedLeaf`]; on a grid the half line of an [`super::IndexedLeaf16`] or [`super::IndexedLeaf21`].
     Indexed(u32),
-    /// CacheLine of a [`RawLeaf`]; on a grid the half line of a [`super::RawLeaf16`] or [`super::RawLeaf21`].
+    /// Line of a [`RawLeaf`]; on a grid the half line of a [`super::RawLeaf16`] or [`super::RawLeaf21`].
     Raw(u32),
     /// Row of `TET_LEAVES`.
     Tets(u32),
@@ -27,8 +25,6 @@ pub enum Child {
 impl Child {
     /// Set in the codes of leaves.
     pub const LEAF_BIT: u32 = 1 << 31;
-    /// Set in the codes of packed nodes, clear in those of wide nodes.
-    pub const PACKED_BIT: u32 = 1 << 29;
     /// Indices are below this.
     pub const INDEX_LIMIT: u32 = 1 << 29;
 
@@ -36,7 +32,6 @@ impl Child {
     pub const fn code(self) -> u32 {
         match self {
             Child::Node(i) => i,
-            Child::Packed(i) => Self::PACKED_BIT | i,
             Child::Indexed(i) => Self::LEAF_BIT | i,
             Child::Raw(i) => Self::LEAF_BIT | (1 << 29) | i,
             Child::Tets(i) => Self::LEAF_BIT | (2 << 29) | i,
@@ -48,7 +43,6 @@ impl Child {
         let index = code & (Self::INDEX_LIMIT - 1);
         match code >> 29 {
             0 => Some(Child::Node(index)),
-            1 => Some(Child::Packed(index)),
             4 => Some(Child::Indexed(index)),
             5 => Some(Child::Raw(index)),
             6 => Some(Child::Tets(index)),
@@ -69,24 +63,6 @@ pub struct WideNode {
     pub bounds: [[[f32; WIDTH]; 2]; 3],
     /// Child codes. Nodes and triangle leaves lie behind the node that refers to them.
     pub child: [u32; WIDTH],
-}
-
-/// A [`WideNode`] whose child boxes are quantized to bytes: 3 lines. An end is `origin + step * byte` without rounding: steps
-/// are powers of two, the origin is a multiple of the step, and no end is more than 2^24 steps from 0. An empty slot has
-/// lower ends of 255, upper ends of 0 and child [`super::NONE`].
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct PackedNode {
-    /// `[axis][lower, upper][slot]`: the children's boxes, in steps from the origin.
-    pub bounds: [[[u8; WIDTH]; 2]; 3],
-    /// Child codes, as in [`WideNode`].
-    pub child: [u32; WIDTH],
-    /// Where byte 0 lies, per axis, object space.
-    pub origin: [f32; 3],
-    /// Distance that one unit of a byte stands for, per axis, object space.
-    pub step: [f32; 3],
-    /// Zero.
-    pub reserved: [u32; 2],
 }
 
 /// Triangle leaf whose triangles share vertices: 4 lines.
@@ -137,8 +113,6 @@ impl RawLeaf {
 
 /// Lines that a [`WideNode`] takes.
 pub const NODE_LINES: usize = size_of::<WideNode>() / 64;
-/// Lines that a [`PackedNode`] takes.
-pub const PACKED_NODE_LINES: usize = size_of::<PackedNode>() / 64;
 /// Lines that an [`IndexedLeaf`] takes.
 pub const INDEXED_LINES: usize = size_of::<IndexedLeaf>() / 64;
 /// Lines that a [`RawLeaf`] takes.
@@ -147,7 +121,6 @@ pub const RAW_LINES: usize = size_of::<RawLeaf>() / 64;
 assert_layout! {
     CacheLine 64 {}
     WideNode 448 { child 384 }
-    PackedNode 192 { child 96, origin 160, step 172, reserved 184 }
     IndexedLeaf 256 { corner 192, first 240, triangles 244, vertices 248 }
     RawLeaf 640 { first 576, triangles 580 }
 }

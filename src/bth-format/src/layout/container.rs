@@ -31,7 +31,7 @@ pub struct Header {
     pub section_count: u32,
     /// Zero.
     pub reserved: u32,
-    /// Bits that a reader must know to read the file: [`FEATURE_GRID`], [`FEATURE_PACKED_NODES`],
+    /// Bits that a reader must know to read the file: [`FEATURE_GRID`],
     /// [`FEATURE_DEFORMABLE_TETS`] and [`FEATURE_WIDENED_BOXES`].
     pub required_features: u64,
     /// Bits that a reader may ignore; none is assigned.
@@ -73,9 +73,8 @@ pub struct SectionEntry {
 /// Bit of [`Header::required_features`]: an object stores the coordinates of its triangle leaves on a [`super::Grid`].
 pub const FEATURE_GRID: u64 = 1;
 
-/// Bit of [`Header::required_features`]: the nodes of an object are [`super::PackedNode`]s, whose
-/// child boxes are quantized to bytes.
-pub const FEATURE_PACKED_NODES: u64 = 2;
+/// Bit of [`Header::required_features`] of older files: child boxes are quantized to bytes. Such files are refused.
+pub(crate) const FEATURE_BYTE_BOXES: u64 = 2;
 
 /// Bit of [`Header::required_features`]: an object that can be given new positions has tet leaves. Bit 2 is not assigned.
 pub const FEATURE_DEFORMABLE_TETS: u64 = 8;

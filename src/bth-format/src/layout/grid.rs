@@ -3,7 +3,7 @@
 
 use super::bvh::WIDTH;
 use super::grid_leaves::{HALF_LINE, IndexedLeaf16, IndexedLeaf21, RawLeaf16, RawLeaf21};
-use super::object::{Object, PACKED_NODES, WIDENED_BOXES};
+use super::object::{Object, WIDENED_BOXES};
 
 /// Bits of a coordinate of a triangle leaf on a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -55,7 +55,7 @@ impl Grid {
     /// # Errors
     /// What violates BTH-F104, in words.
     pub(crate) fn from_object(object: &Object) -> Result<Option<Grid>, &'static str> {
-        let coordinates = object.coordinates & !(PACKED_NODES | WIDENED_BOXES);
+        let coordinates = object.coordinates & !WIDENED_BOXES;
         if coordinates == 0 {
             let numbers = object.grid_origin.iter().chain([&object.displacement]);
             let zero = numbers.into_iter().all(|x| x.to_bits() == 0);

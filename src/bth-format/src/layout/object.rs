@@ -21,7 +21,7 @@ pub struct Object {
     pub dropped: u32,
     /// Upper bound on the nodes of a path from the root, through subtrees of tet leaves too.
     pub depth: u32,
-    /// Lowest byte: bits of a coordinate of a triangle leaf (16, 21, or 0 for `f32`), [`WIDENED_BOXES`] and [`PACKED_NODES`]. Above it a byte
+    /// Lowest byte: bits of a coordinate of a triangle leaf (16, 21, or 0 for `f32`), and [`WIDENED_BOXES`]. Above it a byte
     /// per axis: the biased `f32` exponent of the grid's step, or 0 for `f32`. See [`super::Grid`].
     pub coordinates: u32,
     /// The grid's least point, object space; zeros for `f32`.
@@ -29,9 +29,6 @@ pub struct Object {
     /// Upper bound on the distance of a stored vertex from that of the source, object space; 0 for `f32`.
     pub displacement: f32,
 }
-
-/// Bit of [`Object::coordinates`]: all nodes are [`super::PackedNode`]s; without it none is.
-pub const PACKED_NODES: u32 = 1 << 7;
 
 /// Bit of [`Object::coordinates`]: each child box contains the triangles below with room to spare, for each corner [`BOX_MARGIN`] of its
 /// greatest |coordinate| on all sides. A reader need not allow for roundings of the boxes' planes then, only for those of the ray, so that

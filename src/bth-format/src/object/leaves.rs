@@ -64,7 +64,6 @@ impl<'a> ObjectView<'a> {
         let leaf = |index: u32| if self.grid.is_some() { u64::from(index) } else { 2 * u64::from(index) };
         match child {
             Child::Node(line) => Some((2 * u64::from(line), 2 * NODE_LINES)),
-            Child::Packed(line) => Some((2 * u64::from(line), 2 * PACKED_NODE_LINES)),
             Child::Indexed(index) => Some((leaf(index), indexed)),
             Child::Raw(index) => Some((leaf(index), raw)),
             Child::Tets(_) => None,

@@ -4,9 +4,9 @@ use super::view::ObjectView;
 use crate::layout::*;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// An object has at most as many lines as child codes can be indices of, so that [`NodeBase::wide_node`] needs no test of the kind of a
-/// node. Further lines of a file, which nothing can lead to, are left out when it is opened.
-pub(crate) const MAX_LINES: usize = Child::PACKED_BIT as usize + NODE_LINES - 1;
+/// An object has at most as many lines as child codes can address, so that [`NodeBase::wide_node`] need not test the kind of a child.
+/// Opening a file skips further lines, which nothing can lead to.
+pub(crate) const MAX_LINES: usize = Child::INDEX_LIMIT as usize + NODE_LINES - 1;
 
 /// The lines of an object and how child codes index them: what a traversal loop keeps at hand.
 ///
@@ -30,13 +30,8 @@ impl<'a> NodeBase<'a> {
     pub fn node(self, line: u32) -> &'a WideNode {
         self.block(line, NODE_LINES)
     }
-    /// As [`ObjectView::packed_node`].
-    #[inline(always)]
-    pub fn packed_node(self, line: u32) -> &'a PackedNode {
-        self.block(line, PACKED_NODE_LINES)
-    }
-    /// The node that a child code leads to, if it is a wide node that lies within the lines: the codes of all others are greater than
-    /// the number of lines. So a traversal that asks it needs no test of the kind of a node.
+    /// The node that a child code leads to, if it is a node within the lines: the codes of all others are greater than the number of
+    /// lines. So a traversal that asks for it need not test the kind of the child.
     #[inline(always)]
     pub fn wide_node(self, code: u32) -> Option<&'a WideNode> {
         let at = code as usize;
@@ -70,11 +65,6 @@ impl<'a> ObjectView<'a> {
     pub fn node(&self, line: u32) -> &'a WideNode {
         self.node_base().node(line)
     }
-    /// The packed node at a line; panics as [`Self::node`] does.
-    #[inline(always)]
-    pub fn packed_node(&self, line: u32) -> &'a PackedNode {
-        self.node_base().packed_node(line)
-    }
     /// The indexed leaf of `f32` at a line; panics as [`Self::node`] does.
     #[inline(always)]
     pub fn indexed_leaf(&self, line: u32) -> &'a IndexedLeaf {
@@ -85,24 +75,20 @@ impl<'a> ObjectView<'a> {
     pub fn raw_leaf(&self, line: u32) -> &'a RawLeaf {
         NodeBase { lines: self.lines, halved: 0 }.block(line, RAW_LINES)
     }
-    /// The node that a child code leads to, unpacked if it is packed; `None` for leaves. Panics as [`Self::node`] does.
-    pub fn unpacked_node(&self, child: Child) -> Option<WideNode> {
+    /// The node that a child leads to; `None` for leaves. Panics as [`Self::node`] does.
+    pub fn node_at(&self, child: Child) -> Option<&'a WideNode> {
         match child {
-            Child::Node(line) => Some(*self.node(line)),
-            Child::Packed(line) => Some(self.packed_node(line).unpacked()),
+            Child::Node(line) => Some(self.node(line)),
             Child::Indexed(_) | Child::Raw(_) | Child::Tets(_) => None,
         }
     }
     /// The root, or that of the root's subtree where the root is a tet leaf; `None` where this is no node or does not lie
     /// within the lines, as may be in an object that was not checked.
-    pub fn root(&self) -> Option<WideNode> {
-        let mut root = Child::from_code(self.header.root)?;
-        if let Child::Tets(row) = root {
-            root = Child::from_code(self.tet_leaves.get(row as usize)?.subtree)?;
+    pub fn root(&self) -> Option<&'a WideNode> {
+        let mut root = self.header.root;
+        if let Child::Tets(row) = Child::from_code(root)? {
+            root = self.tet_leaves.get(row as usize)?.subtree;
         }
-        let (Child::Node(line) | Child::Packed(line)) = root else { return None };
-        let lines = if matches!(root, Child::Node(_)) { NODE_LINES } else { PACKED_NODE_LINES };
-        self.lines.get(line as usize..)?.get(..lines)?;
-        self.unpacked_node(root)
+        self.node_base().wide_node(root)
     }
 }

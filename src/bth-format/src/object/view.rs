@@ -89,10 +89,4 @@ impl ObjectView<'_> {
     pub fn has_widened_boxes(&self) -> bool {
         self.header.coordinates & WIDENED_BOXES != 0
     }
-
-    /// Whether all nodes are packed; else none is.
-    #[inline(always)]
-    pub fn has_packed_nodes(&self) -> bool {
-        self.header.coordinates & PACKED_NODES != 0
-    }
 }

@@ -73,7 +73,6 @@ fn all_corners(view: &ObjectView) -> Vec<(u32, Corners)> {
                 found.extend(slots.map(|slot| (id(leaf.first + slot), leaf.triangle(slot as usize))));
             }
             Some(Child::Node(index)) => stack.extend(view.node(index).child),
-            Some(Child::Packed(index)) => stack.extend(view.packed_node(index).child),
             Some(Child::Tets(_)) | None => {}
         }
     }
@@ -86,7 +85,7 @@ fn corners(view: &ObjectView, TrianglePlace { leaf, slot }: TrianglePlace) -> Op
     match leaf {
         Child::Indexed(index) => Some(view.indexed(index, &mut indexed).triangle(slot as usize)),
         Child::Raw(index) => Some(view.raw(index, &mut raw).triangle(slot as usize)),
-        Child::Node(_) | Child::Packed(_) | Child::Tets(_) => None,
+        Child::Node(_) | Child::Tets(_) => None,
     }
 }
 

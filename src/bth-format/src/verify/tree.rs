@@ -56,7 +56,7 @@ fn visits(view: &ObjectView) -> Vec<Visit> {
         let (child, tet_leaf) = (visits[i].child, visits[i].tet_leaf);
         if let Child::Tets(row) = child {
             visits.extend(visit(view.tet_leaves[row as usize].subtree, None, Some(row)));
-        } else if let Some(node) = view.unpacked_node(child) {
+        } else if let Some(node) = view.node_at(child) {
             let codes = node.child.iter().enumerate();
             visits.extend(codes.filter_map(|(slot, &code)| visit(code, Some((i, slot)), tet_leaf)));
         }
@@ -70,7 +70,7 @@ fn visits(view: &ObjectView) -> Vec<Visit> {
 fn check_containment(view: &ObjectView, visit: &Visit, visits: &[Visit]) -> Result<()> {
     let (bounds, section, at) = if let Some((parent, slot)) = visit.parent {
         let child = visits[parent].child;
-        let node = view.unpacked_node(child).expect("only nodes have slots");
+        let node = view.node_at(child).expect("only nodes have slots");
         let end = |upper: usize| [0, 1, 2].map(|axis| node.bounds[axis][upper][slot]);
         (Aabb { lower: end(0), upper: end(1) }, kind::LINES, view.block_start(child))
     } else if visit.tet_leaf.is_none() {
@@ -100,7 +100,7 @@ impl Triangles<'_> {
     fn check_leaf(&mut self, visit: &mut Visit) -> Result<()> {
         let view = self.view;
         match visit.child {
-            Child::Node(_) | Child::Packed(_) => Ok(()),
+            Child::Node(_) => Ok(()),
             Child::Tets(row) => {
                 let leaf = &view.tet_leaves[row as usize];
                 let mut faces = leaf.first_face..leaf.first_face + leaf.faces;

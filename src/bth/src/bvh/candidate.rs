@@ -57,7 +57,7 @@ impl Candidate {
                 let leaf = nodes::raw(s, object, line, &mut raw);
                 Some((leaf.first + at as u32, reader.read(leaf, at)))
             }
-            Child::Node(_) | Child::Packed(_) | Child::Tets(_) => None,
+            Child::Node(_) | Child::Tets(_) => None,
         }
     }
 }

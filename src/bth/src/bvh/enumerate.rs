@@ -7,7 +7,7 @@
 //! are then all of one sign or zero, and the filter excludes only triangles with two weights of certain and opposite signs.
 
 use super::candidate::{Candidate, ReadCorners};
-use super::nodes::{UnpackedNode, indexed_leaf, node, prefetch, raw as raw_leaf};
+use super::nodes::{indexed_leaf, prefetch, raw as raw_leaf};
 use super::ray_state::key_limit;
 use super::single_stack::SingleStack;
 use super::stack::BOTTOM;
@@ -96,11 +96,10 @@ impl Kernel for EnumerateKernel<'_> {
         let mut last = lesser(slabs.last, slabs.limit(receiver.limit(), origin_error));
         // Stack entries with a greater key are dropped.
         let mut limit = key_limit(last);
-        let mut unpacked_node = UnpackedNode::NONE;
         while code != BOTTOM {
             if code & Child::LEAF_BIT == 0 {
                 let planes = RaySlabLanes::new(s, slabs);
-                let node = node(s, node_base, code, &mut unpacked_node);
+                let node = node_base.node(code);
                 let ((bits, enter), children) = (planes.children(s, node, last), &node.child);
                 if bits == 0 {
                     code = stack.pop(limit, NearestHit);

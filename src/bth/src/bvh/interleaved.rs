@@ -5,7 +5,6 @@ use super::coherence::is_same_octant;
 use super::deferred::DeferredHits;
 use super::entry_node::{ENTRY_RAYS, FindEntryNode};
 use super::leaf::{LeafOutcome, Progress, decide};
-use super::nodes::{UnpackedNode, Wide, node};
 use super::ray_pool::{POOL_SIZE, RareSteps, RayPool, Slot, has_rare_steps};
 use super::ray_state::RayState;
 use super::stack::{StackPosition, Stacks};
@@ -108,7 +107,7 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
             if has_rare_steps {
                 s.call(RareSteps(&mut pool, object));
             } else {
-                pool.inner_steps::<S, Wide>(s, object, CacheLevel::First);
+                pool.inner_steps(s, object, CacheLevel::First);
             }
             for i in 0..pool.take_bottom() {
                 if let Some(slot) = pool.finished(i) {
@@ -181,13 +180,12 @@ impl RaySource<'_> {
             return false;
         }
         self.prepared.fill(s, &self.bounds, self.rays, &self.ray, count);
-        let (mut unpacked, node_base) = (UnpackedNode::NONE, self.object.node_base());
         let root = if self.root & Child::LEAF_BIT != 0 {
             None
         } else if self.taken <= self.entered {
             Some(&self.entry_node)
         } else {
-            Some(node(s, node_base, self.root, &mut unpacked))
+            Some(self.object.node(self.root))
         };
         if let Some(root) = root {
             self.codes = root.child;

@@ -2,7 +2,7 @@
 //! with the work of the others. [`super::interleaved`] starts the rays and stores their answers.
 
 use super::leaf::{LeafOutcome, enter_leaf};
-use super::nodes::{Nodes, Packed, Wide, indexed_leaf, is_large, prefetch, prefetch_into, raw as raw_leaf};
+use super::nodes::{indexed_leaf, is_large, prefetch, prefetch_into, raw as raw_leaf};
 use super::ray_state::{RayState, write_children};
 use super::stack::{BOTTOM, StackPosition, Stacks};
 use crate::intersect::start_point::Starts;
@@ -21,7 +21,7 @@ const MIN_INNER: u8 = (POOL_SIZE / 4) as u8;
 /// already, wait in the first: with them in the second, diffuse rays are slower.
 #[inline(always)]
 pub(super) fn has_rare_steps(object: &ObjectView<'_>) -> bool {
-    object.has_packed_nodes() || is_large(object) && CacheLevel::waiting() == CacheLevel::Second
+    is_large(object) && CacheLevel::waiting() == CacheLevel::Second
 }
 
 /// Slots of rays with the same kind of next step. Indices are `u8`, so the length 256 makes bounds checks unnecessary; at most
@@ -216,18 +216,13 @@ impl<'a, Q: Query> RayPool<'a, Q> {
 
     /// Steps through inner nodes until few rays have one as their next step.
     #[inline(always)]
-    pub(super) fn inner_steps<S: Simd, N: Nodes>(
-        &mut self,
-        s: S,
-        object: &ObjectView<'_>,
-        level: CacheLevel,
-    ) {
+    pub(super) fn inner_steps<S: Simd>(&mut self, s: S, object: &ObjectView<'_>, level: CacheLevel) {
         let RayPool { slots, tops, lists, stacks, goal, .. } = self;
         let (mut counts, mut stacks, node_base) = (self.counts, stacks.open(), object.node_base());
         while counts.inner() > 0 {
             for i in 0..counts.take(StepCounts::INNER) {
                 let slot = usize::from(lists.inner[i]) % POOL_SIZE;
-                let (top, node) = (tops.position[slot], N::node(node_base, tops.code[slot]));
+                let (top, node) = (tops.position[slot], node_base.node(tops.code[slot]));
                 let count = slots[slot].0.enter_node(s, *goal, node, stacks.free_entries(top));
                 let top = stacks.replaced(top, count);
                 let code = stacks.code(top);
@@ -290,8 +285,8 @@ impl<'a, Q: Query> RayPool<'a, Q> {
     }
 }
 
-/// [`RayPool::inner_steps`] through packed nodes, or through an object whose nodes wait in another level of caches, as a part of kernels:
-/// apart from the loop for all other objects, whose constants then stay in registers.
+/// [`RayPool::inner_steps`] through an object whose nodes wait in the second level of caches, as a part of kernels: apart from the loop
+/// for all other objects, whose constants then stay in registers.
 pub(super) struct RareSteps<'p, 'a, 'o, Q: Query>(
     pub(super) &'p mut RayPool<'a, Q>,
     pub(super) &'p ObjectView<'o>,
@@ -302,10 +297,6 @@ impl<S: Simd, Q: Query> Part<S> for RareSteps<'_, '_, '_, Q> {
     #[inline(always)]
     fn run(self, s: S) {
         let RareSteps(pool, object) = self;
-        if object.has_packed_nodes() {
-            pool.inner_steps::<S, Packed>(s, object, CacheLevel::First);
-        } else {
-            pool.inner_steps::<S, Wide>(s, object, CacheLevel::Second);
-        }
+        pool.inner_steps(s, object, CacheLevel::Second);
     }
 }

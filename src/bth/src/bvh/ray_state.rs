@@ -3,13 +3,12 @@
 
 use super::leaf::Progress;
 use crate::bvh::candidate::Candidate;
-use crate::intersect::boxes::ChildBoxes;
 use crate::intersect::prepare::{HitProgress, PreparedRay};
 use crate::query::sink::Sink;
 use crate::query::{Goal, Query};
 use crate::rays::Ray;
 use crate::simd::{Scalar, Simd};
-use bth_format::layout::WIDTH;
+use bth_format::layout::{WIDTH, WideNode};
 use bth_format::object::ObjectView;
 use zerocopy::FromZeros;
 
@@ -96,15 +95,15 @@ impl<Q: Query> RayState<Q> {
 
     /// Writes codes and keys of the children whose box the ray may meet, the nearest last; returns their number.
     #[inline(always)]
-    pub(crate) fn enter_node<S: Simd, B: ChildBoxes>(
+    pub(crate) fn enter_node<S: Simd>(
         &self,
         s: S,
         goal: Q::Goal,
-        node: &B,
+        node: &WideNode,
         entries: (&mut [u32; WIDTH], &mut [f32; WIDTH]),
     ) -> usize {
         let (bits, enter) = self.prepared.slabs.children(s, node, self.prepared.slabs.last);
-        write_children(s, goal, node.child(), (bits, enter), entries)
+        write_children(s, goal, &node.child, (bits, enter), entries)
     }
 }
 

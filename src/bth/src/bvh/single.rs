@@ -5,16 +5,16 @@
 //! the end ([`super::certain_hit`]).
 
 use super::leaf::{LeafOutcome, Progress, decide, enter_leaf};
-use super::nodes::{Nodes, Packed, Wide, indexed_leaf, prefetch, raw as raw_leaf};
+use super::nodes::{indexed_leaf, prefetch, raw as raw_leaf};
 use super::ray_state::key_limit;
 use super::single_stack::{OpenSingleStack, SingleStack};
 use crate::bvh::candidate::Candidate;
-use crate::intersect::boxes::{ChildBoxes, RaySlabLanes};
+use crate::intersect::boxes::RaySlabLanes;
 use crate::intersect::prepare::PreparedRay;
 use crate::intersect::start_point::ExactRay;
 use crate::query::{Count, Goal, Query};
 use crate::rays::Ray;
-use crate::simd::{Part, Simd};
+use crate::simd::Simd;
 use crate::tets::TetOutcome;
 use bth_format::layout::{Child, NONE, WIDTH};
 use bth_format::object::{NodeBase, ObjectBounds, ObjectView};
@@ -122,7 +122,7 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
     let mut limit = key_limit(state.last);
     loop {
         let limits = [state.last, limit];
-        code = descend::<S, Wide, _, C>(s, prepared, node_base, limits, (code, goal), &mut stack, count);
+        code = descend(s, prepared, node_base, limits, (code, goal), &mut stack, count);
         let mut unpacked = None;
         let leaf = match node_base.indexed_leaf(code) {
             Some(leaf) => Some(leaf),
@@ -154,13 +154,6 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
                     state.update_from_query(ray.0, bounds.origin_error);
                     done
                 }
-                Some(Child::Packed(_)) => {
-                    // The stack is moved, because one that is passed by reference would lie in memory.
-                    let count = &mut *count;
-                    let steps = PackedSteps { prepared, node_base, limits, code, stack, count, goal };
-                    (code, stack) = s.call(steps);
-                    continue;
-                }
                 // A code of a file that was not checked.
                 _ => false,
             }
@@ -180,11 +173,12 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
     }
 }
 
-/// Steps through inner nodes of a format down to the next leaf, the bottom of the stack or a wide node that is none; returns its code.
-/// `limits` are those of depths of hits and of keys of stack entries that can still change the result. The parameters are separate,
-/// because they stay in registers.
+/// Descends to the next leaf or to the bottom of the stack. Returns that code.
+///
+/// Hits deeper than the first of `limits` and stack entries with a greater key than the second cannot change the result. The parameters
+/// are separate, because they stay in registers.
 #[inline(always)]
-fn descend<S: Simd, N: Nodes, G: Goal, C: Count>(
+fn descend<S: Simd, G: Goal, C: Count>(
     s: S,
     prepared: &PreparedRay,
     node_base: NodeBase<'_>,
@@ -196,7 +190,7 @@ fn descend<S: Simd, N: Nodes, G: Goal, C: Count>(
     // These broadcasts stay in registers.
     let planes = RaySlabLanes::new(s, &prepared.slabs);
     while code & Child::LEAF_BIT == 0 {
-        let Some(node) = N::node_if(node_base, code) else { break };
+        let Some(node) = node_base.wide_node(code) else { break };
         count.node();
         let (bits, enter) = planes.children_soon(s, node, last);
         if bits == 0 {
@@ -205,46 +199,24 @@ fn descend<S: Simd, N: Nodes, G: Goal, C: Count>(
         }
         // For an any-hit query stacking is so cheap that one branch less is faster.
         if !goal.is_any() && bits & (bits - 1) == 0 {
-            code = node.child()[bits.trailing_zeros() as usize % WIDTH];
+            code = node.child[bits.trailing_zeros() as usize % WIDTH];
             continue;
         }
         let free = stack.free_entries();
-        let children = s.load_u(node.child());
+        let children = s.load_u(&node.child);
         if goal.is_any() {
             // The last slot is entered first, as from the stack: compiled files hold the child there in which a hit is most likely.
             let last = u32::BITS - 1 - bits.leading_zeros();
-            code = node.child()[last as usize % WIDTH];
+            code = node.child[last as usize % WIDTH];
             let others = s.compress(bits ^ 1 << last, children, free.codes);
             free.push(others + 1);
         } else {
             let (count, nearest) = s.sort_far_to_near(bits, enter, children, free.codes, free.keys);
-            code = node.child()[nearest % WIDTH];
+            code = node.child[nearest % WIDTH];
             free.push(count);
         }
         // The entry below the new top is most often needed next.
         prefetch(s, node_base, stack.below());
     }
     code
-}
-
-/// [`descend`] through packed nodes, as a part of kernels, so that the kernel for the other format stays short.
-struct PackedSteps<'p, 'o, 's, G, C> {
-    prepared: &'p PreparedRay,
-    node_base: NodeBase<'o>,
-    limits: [f32; 2],
-    code: u32,
-    stack: OpenSingleStack<'s>,
-    count: &'p mut C,
-    goal: G,
-}
-
-impl<'s, S: Simd, G: Goal, C: Count> Part<S> for PackedSteps<'_, '_, 's, G, C> {
-    type Output = (u32, OpenSingleStack<'s>);
-    #[inline(always)]
-    fn run(self, s: S) -> Self::Output {
-        let PackedSteps { prepared, node_base, limits, code, mut stack, count, goal } = self;
-        let code =
-            descend::<S, Packed, _, C>(s, prepared, node_base, limits, (code, goal), &mut stack, count);
-        (code, stack)
-    }
 }

@@ -183,11 +183,7 @@ impl RegionWalk<'_> {
         while let Some(code) = stack.pop() {
             let (mut indexed, mut raw) = (None, None);
             match Child::from_code(code) {
-                Some(child @ (Child::Node(_) | Child::Packed(_))) => {
-                    if let Some(node) = self.object.unpacked_node(child) {
-                        self.enter(&node, &mut stack);
-                    }
-                }
+                Some(Child::Node(line)) => self.enter(self.object.node(line), &mut stack),
                 Some(Child::Indexed(at)) => self.leaf(self.object.indexed(at, &mut indexed), visit)?,
                 Some(Child::Raw(at)) => self.leaf(self.object.raw(at, &mut raw), visit)?,
                 Some(Child::Tets(row)) => {

@@ -2,7 +2,7 @@
 
 use super::placed::PlacedObject;
 use super::search::Search;
-use crate::bvh::nodes::{UnpackedNode, indexed_leaf, node, prefetch, raw as raw_leaf};
+use crate::bvh::nodes::{indexed_leaf, prefetch, raw as raw_leaf};
 use crate::bvh::single_stack::SingleStack;
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::point_lanes::{CornerLanes, LanePoint, PointLanes, TriangleLanes};
@@ -68,10 +68,9 @@ impl Kernel for WalkKernel<'_> {
         let mut code = object.header.root;
         let mut stack = stack.start(code);
         let mut limit = walk.limit(search);
-        let mut unpacked_node = UnpackedNode::NONE;
         loop {
             while code & Child::LEAF_BIT == 0 {
-                let node = node(s, node_base, code, &mut unpacked_node);
+                let node = node_base.node(code);
                 let (child, (bits, squared)) = (&node.child, point.children(s, node, limit));
                 if bits & bits.wrapping_sub(1) == 0 {
                     code = match bits {

@@ -10,10 +10,10 @@
 //! That rule moves the ray by infinitely little. What the moved ray crosses, the ray touches, so no crossing is missed by
 //! tests that exclude only what the closed ray certainly does not touch; and a weight or depth of certain sign keeps it.
 
-use crate::bvh::nodes::{UnpackedNode, indexed_leaf, node, raw as raw_leaf};
+use crate::bvh::nodes::{indexed_leaf, raw as raw_leaf};
 use crate::bvh::single_stack::SingleStack;
 use crate::bvh::stack::BOTTOM;
-use crate::intersect::boxes::{ChildBoxes, FAR};
+use crate::intersect::boxes::{FAR, planes};
 use crate::intersect::crossing::crossing;
 use crate::intersect::edge_functions::cross;
 use crate::intersect::filter::{TriangleBlock, TriangleFilter};
@@ -125,12 +125,12 @@ impl AxisRay {
     #[inline(always)]
     fn children<S: Simd>(&self, s: S, node: &WideNode) -> u32 {
         let [i, j, k] = self.filter.axis.map(|axis| axis as usize);
-        let far = node.planes(s, k, if self.forward > 0.0 { FAR } else { 0 });
+        let far = planes(s, node, k, if self.forward > 0.0 { FAR } else { 0 });
         let mut touched = s.le(s.splat(-self.filter.start), s.mul(far, s.splat(self.forward)));
         for (axis, at) in [(i, self.filter.origin[0]), (j, self.filter.origin[1])] {
             let at = s.splat(at);
-            touched = s.and(touched, s.le(node.planes(s, axis, 0), at));
-            touched = s.and(touched, s.le(at, node.planes(s, axis, FAR)));
+            touched = s.and(touched, s.le(planes(s, node, axis, 0), at));
+            touched = s.and(touched, s.le(at, planes(s, node, axis, FAR)));
         }
         s.mask_bits(touched)
     }
@@ -185,10 +185,9 @@ impl AxisRay {
         let mut code = object.header.root;
         let mut stack = stack.start(code);
         let mut winding = 0;
-        let mut unpacked_node = UnpackedNode::NONE;
         while code != BOTTOM {
             if code & Child::LEAF_BIT == 0 {
-                let node = node(s, node_base, code, &mut unpacked_node);
+                let node = node_base.node(code);
                 let (bits, children) = (self.children(s, node), &node.child);
                 if bits == 0 {
                     code = stack.pop(0.0, AnyHit);

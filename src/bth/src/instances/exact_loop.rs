@@ -16,8 +16,8 @@ fn triangles(object: &ObjectView<'_>) -> Vec<(u32, [[f32; 3]; 3])> {
         let count = match child {
             Child::Indexed(at) => object.indexed(at, &mut None).triangles,
             Child::Raw(at) => object.raw(at, &mut None).triangles,
-            Child::Node(_) | Child::Packed(_) => {
-                stack.extend(object.unpacked_node(child).expect("a node").child);
+            Child::Node(line) => {
+                stack.extend(object.node(line).child);
                 continue;
             }
             Child::Tets(_) => panic!("a file without tetrahedra"),

@@ -8,7 +8,7 @@
 use crate::intersect::line::{Line, widened};
 use crate::rays::Ray;
 use crate::simd::Simd;
-use bth_format::layout::{PackedNode, WIDTH, WideNode};
+use bth_format::layout::{WIDTH, WideNode};
 use bth_format::object::ObjectBounds;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
@@ -147,7 +147,7 @@ impl RaySlabs {
 
     /// As [`RaySlabLanes::children`], for one node.
     #[inline(always)]
-    pub(crate) fn children<S: Simd, B: ChildBoxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
+    pub(crate) fn children<S: Simd>(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
         RaySlabLanes::new(s, self).children(s, node, limit)
     }
 }
@@ -183,7 +183,7 @@ impl<S: Simd> RaySlabLanes<S> {
     /// The children of a node whose boxes the ray may enter before the depth `limit`, as bits, and lower bounds of the depths
     /// at which it enters them. Empty slots may be among them where coordinates are too great for f32.
     #[inline(always)]
-    pub(crate) fn children<B: ChildBoxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
+    pub(crate) fn children(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
         if S::HAS_VECTORS {
             self.children_inlined(s, node, limit)
         } else {
@@ -193,12 +193,12 @@ impl<S: Simd> RaySlabLanes<S> {
 
     /// [`Self::children`] for one ray at a time, which waits for the result: comparisons follow each other twice, not three times.
     #[inline(always)]
-    pub(crate) fn children_soon<B: ChildBoxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
+    pub(crate) fn children_soon(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
         if !S::HAS_VECTORS {
             return self.children_called(s, node, limit);
         }
         let depth = |k: usize, side: u32, addend: [S::F; 3]| {
-            s.fma(node.planes(s, k, self.near[k] ^ side), self.reciprocal[k], addend[k])
+            s.fma(planes(s, node, k, self.near[k] ^ side), self.reciprocal[k], addend[k])
         };
         let enter = |k| depth(k, 0, self.near_addend);
         let leave = |k| depth(k, FAR, self.far_addend);
@@ -209,28 +209,20 @@ impl<S: Simd> RaySlabLanes<S> {
 
     /// [`Self::children`] as a function of its own, because unrolled in every scalar kernel it would take much code.
     #[inline(never)]
-    fn children_called<B: ChildBoxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
+    fn children_called(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
         self.children_inlined(s, node, limit)
     }
 
     #[inline(always)]
-    fn children_inlined<B: ChildBoxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
+    fn children_inlined(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
         let (mut enter, mut leave) = (self.first, s.splat(limit));
         for k in 0..3 {
-            let (near, far) = (node.planes(s, k, self.near[k]), node.planes(s, k, self.near[k] ^ FAR));
+            let (near, far) = (planes(s, node, k, self.near[k]), planes(s, node, k, self.near[k] ^ FAR));
             enter = s.max(s.fma(near, self.reciprocal[k], self.near_addend[k]), enter);
             leave = s.min(s.fma(far, self.reciprocal[k], self.far_addend[k]), leave);
         }
         (s.mask_bits(s.le(enter, leave)), enter)
     }
-}
-
-/// The boxes of a node's children, in any of the node formats.
-pub(crate) trait ChildBoxes {
-    /// Bounds of the boxes along an axis: the lower ones for `side` 0, the upper ones for [`FAR`].
-    fn planes<S: Simd>(&self, s: S, axis: usize, side: u32) -> S::F;
-    /// Codes of the children.
-    fn child(&self) -> &[u32; WIDTH];
 }
 
 /// One of the two rows of an axis: the lower bounds for `side` 0, the upper ones for [`FAR`].
@@ -240,25 +232,8 @@ pub(crate) fn row<T>(rows: &[[T; WIDTH]; 2], side: u32) -> &[T; WIDTH] {
     rows.as_flattened()[first..first + WIDTH].try_into().expect("a row")
 }
 
-impl ChildBoxes for WideNode {
-    #[inline(always)]
-    fn planes<S: Simd>(&self, s: S, axis: usize, side: u32) -> S::F {
-        s.load(row(&self.bounds[axis], side))
-    }
-    #[inline(always)]
-    fn child(&self) -> &[u32; WIDTH] {
-        &self.child
-    }
-}
-
-impl ChildBoxes for PackedNode {
-    #[inline(always)]
-    fn planes<S: Simd>(&self, s: S, axis: usize, side: u32) -> S::F {
-        let steps = s.numbers(s.load_bytes(row(&self.bounds[axis], side)));
-        s.fma(steps, s.splat(self.step[axis]), s.splat(self.origin[axis]))
-    }
-    #[inline(always)]
-    fn child(&self) -> &[u32; WIDTH] {
-        &self.child
-    }
+/// The bounds of a node's child boxes along an axis: the lower ones for `side` 0, the upper ones for [`FAR`].
+#[inline(always)]
+pub(crate) fn planes<S: Simd>(s: S, node: &WideNode, axis: usize, side: u32) -> S::F {
+    s.load(row(&node.bounds[axis], side))
 }

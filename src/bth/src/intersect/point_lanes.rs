@@ -10,7 +10,7 @@
 //! Detection", 5.1.5) in f32: an inaccurate q, as that of a needle, makes the bound loose, not wrong. Since q leads to a point of
 //! the triangle, |q| is an upper bound.
 
-use super::boxes::{ChildBoxes, FAR};
+use super::boxes::{FAR, planes};
 use crate::simd::{LANES, Lanewise, Part, Simd};
 use bth_format::layout::{IndexedLeaf, RawLeaf, WIDTH, WideNode};
 
@@ -104,8 +104,8 @@ impl<S: Simd> PointLanes<S> {
     fn children_inlined(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
         let mut squared = s.splat(0.0);
         for k in 0..3 {
-            let below = s.fma(node.planes(s, k, 0), self.scale, s.splat(-self.origin[k]));
-            let above = s.fnma(node.planes(s, k, FAR), self.scale, self.point[k]);
+            let below = s.fma(planes(s, node, k, 0), self.scale, s.splat(-self.origin[k]));
+            let above = s.fnma(planes(s, node, k, FAR), self.scale, self.point[k]);
             let outside = s.max(s.max(below, above), s.splat(0.0));
             squared = s.fma(outside, outside, squared);
         }

@@ -271,7 +271,7 @@ fn other_corners(object: &ObjectView<'_>, leaf: u32, slot: u32) -> Option<[[f32;
             let face = object.tet_faces.get(at)?;
             Some(face.vertex.map(|v| object.tet_vertices[v as usize].position))
         }
-        Child::Node(_) | Child::Packed(_) => None,
+        Child::Node(_) => None,
     }
 }
 

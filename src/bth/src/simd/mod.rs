@@ -146,8 +146,6 @@ pub trait Lanewise: Copy + 'static {
     fn bits(self, a: Self::F) -> Self::U;
     /// f32 lanes from their bits.
     fn floats(self, a: Self::U) -> Self::F;
-    /// Converts values below 2^24 to f32.
-    fn numbers(self, a: Self::U) -> Self::F;
     /// The mask of the sixteen lowest bits.
     fn mask(self, bits: u32) -> Self::M;
     /// The bits of a mask; bits from the sixteenth on are 0.

@@ -172,7 +172,6 @@ loops! {
     eq_u(a: U, b: U) -> M = all_bits(a == b);
     lt_u(a: U, b: U) -> M = all_bits(a < b);
     and_not_u(a: M, b: M) -> M = a & !b;
-    numbers(a: U) -> F = a as f32;
 }
 
 #[inline(always)]
@@ -242,7 +241,6 @@ impl Lanewise for Scalar {
         eq_u(a: U, b: U) -> M;
         lt_u(a: U, b: U) -> M;
         select_u(m: M, a: U, b: U) -> U;
-        numbers(a: U) -> F;
         mask_bits(m: M) -> u32;
     }
     #[inline(always)]

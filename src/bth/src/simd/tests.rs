@@ -150,7 +150,6 @@ impl Kernel for AllOperations<'_> {
             u(s.expand_u(x, mask, self.v)),
             u(s.bits(a)),
             f(s.floats(s.bits(a))),
-            f(s.numbers(s.load_bytes(&bytes))),
             s.greatest_of_three([0, 1, 2, 3].map(|i| self.a[i].abs())).map(f32::to_bits).to_vec(),
             m(mask),
             m(s.and(mask, other)),

@@ -203,16 +203,6 @@ pub(crate) enum Coordinates {
     B16,
 }
 
-/// How boxes of nodes are stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Boxes {
-    /// Six f32.
-    F32,
-    /// Six bytes, rounded outwards.
-    #[value(name = "8")]
-    Bytes,
-}
-
 impl From<Structure> for bth_compile::pipeline::Structure {
     fn from(structure: Structure) -> Self {
         match structure {

@@ -53,7 +53,7 @@ pub(crate) struct Compile {
     /// Directions in which rays that start on a triangle meet nothing, and distances within which they do not, so that rays end at once
     /// or begin later where a caller says on which triangle they start: 20 bytes a triangle, or 8 for `distances` alone. With `auto` what
     /// is worth its bytes. By default auto, but none where fast compiling (--quality fast) or small files (--coordinates, --max-error,
-    /// --boxes, --compact) are asked for, or for objects of more than a million triangles.
+    /// --compact) are asked for, or for objects of more than a million triangles.
     #[arg(long, help_heading = KEPT, value_enum, value_name = "WHERE", conflicts_with = "deformable")]
     pub(crate) free_directions: Option<Free>,
     /// The second of three distances that are told apart, an eighth of it, it and four times it, as a share of the diagonal of the
@@ -68,10 +68,6 @@ pub(crate) struct Compile {
     /// (0.01%). The fewest bits that honour it are taken; with --coordinates, more is refused.
     #[arg(long, help_heading = SMALLER, value_name = "DISTANCE", value_parser = str::parse::<bth_compile::coordinates::MaxError>)]
     pub(crate) max_error: Option<bth_compile::coordinates::MaxError>,
-    /// Boxes of BVH nodes: f32, or 8 bits an end, which makes nodes of 192 bytes out of 448. No vertex moves, and no answer
-    /// changes.
-    #[arg(long, help_heading = SMALLER, value_name = "BITS", value_enum, default_value_t = Boxes::F32)]
-    pub(crate) boxes: Boxes,
     /// The smallest tetrahedralizations: short for `--tets tet16 --subtrees prune
     /// --free-directions none`. Some 100 bytes a triangle where all
     /// triangles are in tetrahedra, in place of 180 to 200.
@@ -207,10 +203,6 @@ impl Compile {
             Some(Coordinates::B16) => (Some(GridBits::B16), self.max_error),
             None => (None, self.max_error),
         };
-        let boxes = match self.boxes {
-            Boxes::F32 => bth_compile::coordinates::Boxes::F32,
-            Boxes::Bytes => bth_compile::coordinates::Boxes::Bytes,
-        };
-        bth_compile::coordinates::CoordinateOptions { bits, max_error, boxes }
+        bth_compile::coordinates::CoordinateOptions { bits, max_error }
     }
 }

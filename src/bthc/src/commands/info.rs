@@ -82,7 +82,6 @@ fn describe(file: &File) -> Result<Value, Failure> {
         let h = view.header;
         Ok(json!({"lower": h.lower, "upper": h.upper, "triangles": h.triangles, "dropped": h.dropped,
             "depth": h.depth, "coordinates": view.grid.map_or(32, |grid| grid.bits as u32),
-            "boxes": if view.has_packed_nodes() { 8 } else { 32 },
             "displacement": h.displacement, "record": record(&view), "tet_leaves": view.tet_leaves.len(),
             "tets": view.records.len(), "tet_triangles": view.tet_faces.len(),
             "holes": holes(&view).map(|h| json!({"triangles": h.triangles, "opaque": h.shares[0],
@@ -256,9 +255,6 @@ fn add_object(facts: &mut Table, file: &File, object: u32) -> Result<(), Failure
     if let Some(grid) = &view.grid {
         facts.row(["coordinates", &format!("{} bits", grid.bits as u32)]);
         facts.row(["vertices moved by at most", &view.header.displacement.to_string()]);
-    }
-    if view.has_packed_nodes() {
-        facts.row(["boxes of nodes", "8 bits"]);
     }
     if let Some(Holes { triangles, shares: [opaque, transparent, unknown] }) = holes(&view) {
         facts.row(["triangles with holes", &count(triangles)]);

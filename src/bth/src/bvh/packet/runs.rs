@@ -162,10 +162,10 @@ fn trace<S: Simd, Q: Query>(
     count
 }
 
-/// Whether packets support an object: no tet leaves without a subtree, and no packed nodes.
+/// Whether packets support an object: no tet leaf lacks a subtree.
 #[inline(always)]
 fn is_supported(object: &ObjectView<'_>) -> bool {
-    !object.has_packed_nodes() && object.tet_leaves.first().is_none_or(|leaf| leaf.subtree != NONE)
+    object.tet_leaves.first().is_none_or(|leaf| leaf.subtree != NONE)
 }
 
 /// Consecutive rays that make a packet.

@@ -133,7 +133,6 @@ impl<S: Simd, Q: Query, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, 
                     }
                     continue;
                 }
-                Some(Child::Packed(_)) => return PacketOutcome::Refused,
                 None => None,
             };
             if let Some(reached) = reached

@@ -152,7 +152,6 @@ impl Lanewise for Avx2 {
         select_u(m: M, a: U, b: U) -> U = _mm256_blendv_epi8(b, a, m);
         bits(a: F) -> U = _mm256_castps_si256(a);
         floats(a: U) -> F = _mm256_castsi256_ps(a);
-        numbers(a: U) -> F = _mm256_cvtepi32_ps(a);
         and(a: M, b: M) -> M = _mm256_and_si256(a, b);
         or(a: M, b: M) -> M = _mm256_or_si256(a, b);
         and_not(a: M, b: M) -> M = _mm256_andnot_si256(b, a);

@@ -110,7 +110,6 @@ impl Lanewise for Avx512 {
         select_u(m: u16, a: __m512i, b: __m512i) -> __m512i = _mm512_mask_mov_epi32(b, m, a);
         bits(a: __m512) -> __m512i = _mm512_castps_si512(a);
         floats(a: __m512i) -> __m512 = _mm512_castsi512_ps(a);
-        numbers(a: __m512i) -> __m512 = _mm512_cvtepi32_ps(a);
     }
     #[inline(always)]
     fn load(self, from: &[f32; LANES]) -> __m512 {

@@ -72,7 +72,6 @@ pub(super) trait Quad: Copy + 'static {
     fn lt_u(self, a: Self::U, b: Self::U) -> Self::U;
     fn bits(self, a: Self::F) -> Self::U;
     fn floats(self, a: Self::U) -> Self::F;
-    fn numbers(self, a: Self::U) -> Self::F;
     /// Byte i of the result is byte `at[i]` of `a`; each `at[i]` must be below 16.
     fn bytes(self, a: Self::U, at: &[u8; LANES]) -> Self::U;
     /// A bit for each lane of a mask of four.
@@ -163,7 +162,6 @@ impl<Q: Quad> Lanewise for Quads<Q> {
         and_not(a: U, b: U) -> U;
         bits(a: F) -> U;
         floats(a: U) -> F;
-        numbers(a: U) -> F;
     }
     #[inline(always)]
     fn splat(self, x: f32) -> F<Q> {

@@ -88,7 +88,6 @@ impl Quad for Neon {
         lt_u(a: U, b: U) -> U = vcltq_u32(a, b);
         bits(a: F) -> U = vreinterpretq_u32_f32(a);
         floats(a: U) -> F = vreinterpretq_f32_u32(a);
-        numbers(a: U) -> F = vcvtq_f32_u32(a);
         mask_bits(m: U) -> u32 = vaddvq_u32(vandq_u32(m, vcombine_u32(vcreate_u32(2 << 32 | 1), vcreate_u32(8 << 32 | 4))));
         // The masks are narrowed to bytes, of which each keeps one bit; neighbouring bytes are then added until two remain.
         mask_bits_of_all(m: [U; QUADS]) -> u32 = {

@@ -50,7 +50,6 @@ impl<Q: Quad> Lanewise for Register<Q> {
         and_not(a: U, b: U) -> U;
         bits(a: F) -> U;
         floats(a: U) -> F;
-        numbers(a: U) -> F;
     }
 
     #[inline(always)]

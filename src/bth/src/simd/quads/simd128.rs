@@ -91,8 +91,6 @@ impl Quad for Simd128 {
         lt_u(a: v128, b: v128) -> v128 = u32x4_lt(a, b);
         bits(a: v128) -> v128 = a;
         floats(a: v128) -> v128 = a;
-        // Numbers are below 2^24; the conversion of signed numbers is one instruction on all machines.
-        numbers(a: v128) -> v128 = f32x4_convert_i32x4(a);
         mask_bits(m: v128) -> u32 = u32::from(i32x4_bitmask(m));
         // Masks keep their value when signed words and halves are saturated.
         mask_bits_of_all(m: [v128; QUADS]) -> u32 = {

@@ -137,7 +137,6 @@ impl Quad for Sse4 {
         lt_u(a: U, b: U) -> U = _mm_xor_si128(_mm_cmpeq_epi32(_mm_max_epu32(a, b), a), _mm_set1_epi32(-1));
         bits(a: F) -> U = _mm_castps_si128(a);
         floats(a: U) -> F = _mm_castsi128_ps(a);
-        numbers(a: U) -> F = _mm_cvtepi32_ps(a);
         mask_bits(m: U) -> u32 = _mm_movemask_ps(_mm_castsi128_ps(m)) as u32;
         // Masks keep their value when signed words and halves are saturated.
         mask_bits_of_all(m: [U; QUADS]) -> u32 =

@@ -102,7 +102,7 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
         attributes: if materials { Keep::All } else { attributes },
         record: if compact { RecordKind::Tet16 } else { record.unwrap_or(RecordKind::Link32) },
         coordinates: coordinates(keywords)?,
-        keep_subtrees: subtrees.unwrap_or(!compact && (deformable || structure == Structure::Bth)),
+        keep_subtrees: subtrees.unwrap_or(!compact && structure == Structure::Bth),
         alpha: keywords
             .choice(
                 "alpha",
@@ -117,7 +117,6 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
         materials,
         lenient_materials: keywords.value("lenient_materials")?.unwrap_or(false),
         deformable,
-        deformable_tets: deformable && structure == Structure::Bth,
         ..CompileOptions::default()
     };
     motion_and_free(keywords, &mut options)?;

@@ -7,8 +7,8 @@ use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_format::layout::RecordKind;
 use bth_scenes::Model;
 
-/// Names of what [`deformed`] and [`deformed_tets`] make.
-pub const DEFORMED: [&str; 3] = ["deformed bvh", "deformed tets link32", "deformed tets tet16"];
+/// Name of what [`deformed`] makes.
+pub const DEFORMED: &str = "deformed bvh";
 
 /// A structure compiled from a model.
 #[derive(Debug)]
@@ -95,30 +95,7 @@ pub fn deformed(model: &Model, seed: u64) -> Traced {
     let options = CompileOptions { deformable: true, ..options(Structure::Bvh, RecordKind::Link32, false) };
     let mut scene = compiled(&shape, &options);
     scene.set_positions(0, &model.positions).unwrap_or_else(|e| panic!("{e}"));
-    Traced { name: DEFORMED[0].into(), scene }
-}
-
-/// The model as deformable objects with tetrahedra, which were compiled twice as long on one axis and four times on another, and then given
-/// the positions of the model: no tetrahedron of the surface's corners is turned over. None without the worker; a tetrahedralization of the
-/// whole model where `whole` is set.
-///
-/// # Panics
-/// If one does not compile or open.
-pub fn deformed_tets(model: &Model, whole: bool) -> Vec<Traced> {
-    if crate::worker().is_none() {
-        return Vec::new();
-    }
-    let positions = model.positions.iter().map(|[x, y, z]| [2.0 * x, 4.0 * y, *z]).collect();
-    let shape = Model { positions, triangles: model.triangles.clone() };
-    let structure = if whole { Structure::Tets } else { Structure::Bth };
-    let of = |name: &str, record: RecordKind| {
-        let options =
-            CompileOptions { deformable: true, deformable_tets: true, ..options(structure, record, true) };
-        let mut scene = compiled(&shape, &options);
-        scene.set_positions(0, &model.positions).unwrap_or_else(|e| panic!("{e}"));
-        Traced { name: name.into(), scene }
-    };
-    vec![of(DEFORMED[1], RecordKind::Link32), of(DEFORMED[2], RecordKind::Tet16)]
+    Traced { name: DEFORMED.into(), scene }
 }
 
 /// All bits of a hit.

@@ -212,10 +212,8 @@ def _deformable(view):
     rows = view.leaf_vertices
     if not rows:
         return
-    announced = view.container.header.required_features & c.FEATURE_DEFORMABLE_TETS
-    tets = bool(view.tet_leaves) and not announced or any(leaf.subtree == NONE for leaf in view.tet_leaves)
     is_f32 = not (view.grid or view.widened_boxes)
-    if not view.positions or not view.source or not is_f32 or tets or view.dropped:
+    if not view.positions or not view.source or not is_f32 or view.tet_leaves or view.dropped:
         raise view.invalid("F163", "LEAF_VERTICES in an object that cannot be deformable", c.LEAF_VERTICES)
     nodes, leaves = _depth_first(view)
     next_line = 0
@@ -245,14 +243,11 @@ def _deformable(view):
 
 
 def _depth_first(view):
-    """The nodes and the leaves of a tree, depth first, those of the subtree of a tet leaf in its place."""
+    """The nodes and the leaves of a tree, depth first."""
     nodes, leaves, stack = [], [], [view.root]
     while stack:
         found = child(stack.pop())
         if found is None:
-            continue
-        if found[0] == TETS:
-            stack.append(view.tet_leaves[found[1]].subtree)
             continue
         (nodes if found[0] == NODE else leaves).append(found)
         if found[0] == NODE:

@@ -43,8 +43,8 @@ extern "C" {
 
 /* Bits of bth_compile_options.flags. */
 #define BTH_COMPILE_NO_GEOMETRY 1u /* leaves out the positions and triangles of the source, which tracing does not need */
-#define BTH_COMPILE_DEFORMABLE 4u  /* keeps what bth_set_positions needs; excludes the flag above. BTH_STRUCTURE_BTH then stands
-                                      for a BVH; the tetrahedra of BTH_STRUCTURE_TETS have a BVH beside them */
+#define BTH_COMPILE_DEFORMABLE 4u  /* keeps what bth_set_positions needs; excludes the flag above and
+                                      BTH_STRUCTURE_TETS; BTH_STRUCTURE_BTH then stands for a BVH */
 
 /* Called when a stage begins and a few times a second during it: never by two threads at a time, but not always by the thread that
  * compiles. `stage` is its name, `done` of `total` units are done; total is 0 if it is not known. A result other than 0

@@ -75,7 +75,7 @@ impl Options {
         let mut options = CompileOptions {
             structure,
             // As the program does by default.
-            keep_subtrees: structure == Structure::Bth || deformable,
+            keep_subtrees: structure == Structure::Bth,
             geometry: self.flags & NO_GEOMETRY == 0,
             deformable,
             ..CompileOptions::default()

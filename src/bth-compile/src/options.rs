@@ -55,11 +55,8 @@ pub struct CompileOptions {
     pub geometry: bool,
     /// Whether to keep what new positions at run time need (`bth::Scene::set_positions`). All vertices of the source are kept in its
     /// order, and triangles of zero area are not dropped. Excludes `coordinates` other than f32, leaving out the geometry, and
-    /// tetrahedralizations without a BVH beside them. `Structure::Bth` stands for a BVH unless `deformable_tets` is set.
+    /// `Structure::Tets`. `Structure::Bth` stands for a BVH.
     pub deformable: bool,
-    /// Whether `Structure::Bth` has its meaning for deformable objects, too. New positions then move tetrahedra, which takes longer than
-    /// moving the BVH, and rays use them only where none is turned over.
-    pub deformable_tets: bool,
     /// How objects whose vertices move by themselves are compiled.
     pub motion: MotionOptions,
     /// Limit on the estimated bytes of memory of the objects of a scene that are compiled at the same time; a single object
@@ -88,7 +85,6 @@ impl Default for CompileOptions {
             keep_subtrees: true,
             geometry: true,
             deformable: false,
-            deformable_tets: false,
             motion: MotionOptions::default(),
             objects_memory: u64::MAX,
         }
@@ -110,14 +106,11 @@ impl CompileOptions {
     }
 
     /// The options of an object whose vertices move by themselves: a BVH over coordinates that stay as they are, which keeps the
-    /// source's positions and triangles. Tetrahedra are made only where they are asked for of deformable objects.
+    /// source's positions and triangles.
     pub fn of_deforming(&self) -> Self {
-        let structure = if self.deformable { self.built_structure() } else { Structure::Bvh };
         Self {
-            structure,
+            structure: Structure::Bvh,
             deformable: true,
-            deformable_tets: structure == Structure::Bth,
-            keep_subtrees: true,
             coordinates: coordinates::CoordinateOptions::default(),
             geometry: true,
             free: free::FreeOptions::default(),
@@ -135,12 +128,9 @@ impl CompileOptions {
         mesh::Looks { alpha: self.alpha, materials: self.materials, unreadable }
     }
 
-    /// What is built: see `deformable_tets`.
+    /// What is built: a BVH for deformable objects.
     pub(crate) fn built_structure(&self) -> Structure {
-        match self.structure {
-            Structure::Bth if self.deformable && !self.deformable_tets => Structure::Bvh,
-            structure => structure,
-        }
+        if self.deformable { Structure::Bvh } else { self.structure }
     }
 
     /// Checks that the options do not exclude each other.
@@ -151,11 +141,11 @@ impl CompileOptions {
         let excluded = if !self.deformable {
             return Ok(());
         } else if self.coordinates != coordinates::CoordinateOptions::default() {
-            "coordinates or boxes of fewer bits"
+            "coordinates of fewer bits"
         } else if !self.geometry {
             "leaving out the geometry of the source"
-        } else if self.built_structure() != Structure::Bvh && !self.keep_subtrees {
-            "tetrahedralizations without a BVH beside them"
+        } else if self.structure == Structure::Tets {
+            "a tetrahedralization"
         } else if self.free.keep.always() {
             "free directions"
         } else if self.costs.rays.is_some() {

@@ -107,8 +107,8 @@ codes! {
     Colors "F161" "COLOR_CORNERS has as many rows as the object has triangles, or none, and its rows lie within COLORS."
     Images "F162" "IMAGES ascend strictly by name; the ranges of successive images follow each other, are not empty and together cover IMAGE_BYTES; the image of each texture is the name of one of them."
 
-    Deformable "F163" "LEAF_VERTICES is empty, or the object has POSITIONS and TRIANGLES, coordinates of f32, WideNodes whose boxes are not widened, a subtree for each tet leaf, and drops no triangle; the header's features announce tet leaves of deformable objects."
-    BlockOrder "F164" "In a deformable object LINES holds the nodes in depth-first order, then the leaves in depth-first order, with the subtree of a tet leaf in its place."
+    Deformable "F163" "LEAF_VERTICES is empty, or the object has POSITIONS and TRIANGLES, coordinates of f32, WideNodes whose boxes are not widened, no tet leaf, and drops no triangle."
+    BlockOrder "F164" "In a deformable object LINES holds the nodes in depth-first order, then the leaves in depth-first order."
     LeafRows "F165" "In a deformable object LEAF_VERTICES has one row for each indexed leaf and three for each raw leaf."
     LeafVertexRows "F166" "Elements of LEAF_VERTICES are rows of POSITIONS; those of unused slots repeat that of slot 0."
     LeafTriangles "F167" "In a deformable object the corners of a leaf's triangle have the rows of POSITIONS that TRIANGLES gives."

@@ -13,7 +13,7 @@ pub struct Triangle {
 }
 
 /// All triangles that can be hit, by ascending id: those of the triangle leaves, and the constrained faces of the tet
-/// leaves or, of an object that deforms, the triangles beside them. The object must have passed its check.
+/// leaves. The object must have passed its check.
 pub fn triangles(object: &ObjectView<'_>) -> Vec<Triangle> {
     let mut found = Vec::with_capacity(object.header.triangles as usize);
     let mut stack = vec![object.header.root];
@@ -38,10 +38,6 @@ pub fn triangles(object: &ObjectView<'_>) -> Vec<Triangle> {
                     let corners = leaf.corner.map(|axes| axes.map(|values| values[row]));
                     found.push(Triangle { id: object.triangle_ids[leaf.first as usize + row], corners });
                 }
-            }
-            // New positions are in the subtree whether the tet leaf is in use or not.
-            Some(Child::Tets(row)) if object.is_deformable() => {
-                stack.push(object.tet_leaves[row as usize].subtree);
             }
             // A subtree that is kept beside the tet leaf holds the same triangles, so it is not visited.
             Some(Child::Tets(row)) => {

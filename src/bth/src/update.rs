@@ -26,10 +26,6 @@ pub struct Update {
     /// greatest: the sum of the areas of the boxes of all nodes and leaves, relative to the area of the object's box (SAH). 1 if
     /// no object was deformed. Where it grows far beyond 1, compile the object anew in a pose nearer to the new one.
     pub deformed_cost_ratio: f64,
-    /// Tet leaves of the objects that got new positions in which rays may start: none of their tetrahedra is turned over or flat.
-    pub tet_leaves_in_use: usize,
-    /// Tet leaves of these objects for which the BVH beside them answers.
-    pub tet_leaves_aside: usize,
     /// Time to check the new positions and refit the objects.
     pub refit: Duration,
 }
@@ -46,8 +42,6 @@ impl Default for Update {
             top_level: Duration::ZERO,
             deformed: 0,
             deformed_cost_ratio: 1.0,
-            tet_leaves_in_use: 0,
-            tet_leaves_aside: 0,
             refit: Duration::ZERO,
         }
     }

@@ -10,10 +10,8 @@ macro_rules! files {
     };
 }
 
-const VALID: [(&str, &[u8]); 32] = files![
+const VALID: [(&str, &[u8]); 30] = files![
     "deformable",
-    "deformable-tets-link32",
-    "deformable-tets-tet16",
     "deformers",
     "free-directions",
     "free-distances",
@@ -217,27 +215,12 @@ fn new_positions_move_what_is_hit() {
 }
 
 #[test]
-fn tetrahedra_move_with_the_surface_or_stand_aside() {
-    for name in ["deformable-tets-link32", "deformable-tets-tet16"] {
-        let (_, bytes) = VALID.into_iter().find(|(valid, _)| *valid == name).unwrap();
-        let mut scene = bth::from_bytes(bytes).unwrap();
-        let rest = scene.object(0).positions.to_vec();
-        for (z, in_use) in [(0.0, 1), (0.5, 1), (-6.0, 0)] {
-            // One vertex of the surface: a little, and so far that a tetrahedron is turned over.
-            let moved = |(row, p): (usize, &[f32; 3])| [p[0], p[1], p[2] + if row == 3 { z } else { 0.0 }];
-            let moved: Vec<_> = rest.iter().enumerate().map(moved).collect();
-            let update = scene.set_positions(0, &moved).unwrap();
-            // The feature `small` uses no hints, and so no tetrahedra under objects that deform.
-            let expected = if cfg!(feature = "small") { (0, 0) } else { (in_use, 2 - in_use) };
-            assert_eq!((update.tet_leaves_in_use, update.tet_leaves_aside), expected, "{name}, {z}");
-            trace(&scene);
-        }
+fn files_with_what_is_no_longer_read_are_refused_and_the_error_says_what_to_do() {
+    for file in [
+        &include_bytes!("../../../format-spec/conformance/invalid/F007-boxes-of-8-bits.bth")[..],
+        include_bytes!("../../../format-spec/conformance/invalid/F007-tets-that-deform.bth"),
+    ] {
+        let error = bth::from_bytes(file).unwrap_err().to_string();
+        assert!(error.contains("BTH-F007") && error.contains("compile the model again"), "{error}");
     }
-}
-
-#[test]
-fn files_with_boxes_of_8_bits_are_refused_and_the_error_says_what_to_do() {
-    let file = include_bytes!("../../../format-spec/conformance/invalid/F007-boxes-of-8-bits.bth");
-    let error = bth::from_bytes(file.as_slice()).unwrap_err().to_string();
-    assert!(error.contains("BTH-F007") && error.contains("compile the model again"), "{error}");
 }

@@ -1,7 +1,7 @@
 //! An object that can be given new positions.
 
 use super::invalid::{broken, field};
-use super::valid::{bounds, file, indexed, lines, node, raw};
+use super::valid::{bounds, file, indexed, lines, node, raw, tets_of};
 use super::{Case, Seal};
 use bth_compile::write::{FileBuilder, ObjectParts, Source, object, scene};
 use bth_format::layout::*;
@@ -161,6 +161,7 @@ pub(super) fn invalid() -> Vec<Case> {
     };
     let child = offset_of!(WideNode, child);
     vec![
+        Case::new("F163-tets", tets_of(RecordKind::Link32, false, &[[0; WIDTH]])),
         field("F163-dropped", base, kind::OBJECT, offset_of!(Object, dropped), 1),
         broken("F163-widened-boxes", base, Seal::Sections, |e| {
             e.put(offset_of!(Header, required_features), &FEATURE_WIDENED_BOXES.to_le_bytes());

@@ -14,7 +14,6 @@ pub fn invalid() -> Vec<Case> {
     cases.extend(tets());
     cases.extend(geometry());
     cases.extend(super::deformable::invalid());
-    cases.extend(super::deformable_tets::invalid());
     cases.extend(super::deformers::invalid());
     cases.extend(super::deformable::invalid_sequences());
     cases.extend(groups());
@@ -117,6 +116,9 @@ fn container() -> Vec<Case> {
         ),
         broken("F007-boxes-of-8-bits", "triangle", Seal::Header, |e| {
             e.put(offset_of!(Header, required_features), &2u64.to_le_bytes());
+        }),
+        broken("F007-tets-that-deform", "triangle", Seal::Header, |e| {
+            e.put(offset_of!(Header, required_features), &8u64.to_le_bytes());
         }),
         broken("F007-unknown-feature", "triangle", Seal::Header, |e| {
             e.put(offset_of!(Header, required_features), &4u32.to_le_bytes());

@@ -4,7 +4,6 @@
 //! compares the committed files with what is made here.
 
 mod deformable;
-mod deformable_tets;
 mod deformers;
 mod edit;
 mod invalid;

@@ -20,7 +20,7 @@ pub fn valid() -> Vec<Case> {
         Case::new("widened-boxes", two_levels_widened()),
         Case::new("places", with_places(None)),
         Case::new("places-grid-16", with_places(Some(GridBits::B16))),
-        Case::new("places-tets", tets_of(RecordKind::Link32, true)),
+        Case::new("places-tets", tets_of(RecordKind::Link32, true, &[])),
         Case::new("places-deformable", super::deformable::with_places()),
         Case::new("opacity", opacity()),
         Case::new("free-directions", free_directions()),
@@ -35,7 +35,6 @@ pub fn valid() -> Vec<Case> {
         Case::new("unknown-optional-section", unknown_section()),
     ];
     cases.extend(super::scenes::valid());
-    cases.extend(super::deformable_tets::valid());
     cases.extend(RecordKind::ALL.map(|r| Case::new(&format!("tets-{}", r.name()), tets(r))));
     cases
 }
@@ -397,10 +396,10 @@ pub(super) const FACES: [[u32; 3]; 2] = [[1, 2, 7], [1, 4, 2]];
 /// Two cubes as tet leaves, each around two triangles, the first with a subtree; a triangle leaf; and a triangle without
 /// area.
 fn tets(record: RecordKind) -> Vec<u8> {
-    tets_of(record, false)
+    tets_of(record, false, &[])
 }
 
-fn tets_of(record: RecordKind, has_places: bool) -> Vec<u8> {
+pub(super) fn tets_of(record: RecordKind, has_places: bool, leaf_vertices: &[[u32; WIDTH]]) -> Vec<u8> {
     let mut positions: Vec<[f32; 3]> = Vec::new();
     let mut triangles: Vec<[u32; 3]> = Vec::new();
     let mut parts = TetParts::default();
@@ -444,6 +443,7 @@ fn tets_of(record: RecordKind, has_places: bool) -> Vec<u8> {
         grid: None,
         lines: &all,
         triangle_ids: &[4, 0, 1],
+        leaf_vertices,
         places: if has_places { &places } else { &[] },
         record: Some(record),
         tet_leaves: &parts.leaves,

@@ -312,8 +312,7 @@ fn instances_follow_objects_that_deform_and_a_failed_commit_changes_nothing() {
 #[test]
 fn options_that_exclude_each_other_are_an_error() {
     let (positions, triangles) = mesh(600);
-    let whole = CompileOptions { structure: Structure::Tets, ..deformable() };
-    let tets = CompileOptions { keep_subtrees: false, ..whole.clone() };
+    let tets = CompileOptions { structure: Structure::Tets, ..deformable() };
     let no_geometry = CompileOptions { geometry: false, ..deformable() };
     let mut free = deformable();
     free.free.keep = bth_compile::free::KeepFree::All;
@@ -322,10 +321,6 @@ fn options_that_exclude_each_other_are_an_error() {
         let error = compile(mesh, &options, &Silent).unwrap_err().to_string();
         assert!(error.contains("BTH-L033"), "{error}");
     }
-    // Triangles without area, which the mesh has, are no faces of tetrahedra.
-    let mesh = TriangleMesh { positions: &positions, triangles: &triangles };
-    let error = compile(mesh, &whole, &Silent).unwrap_err().to_string();
-    assert!(error.contains("BTH-I080") && error.contains("3 of its triangles have no area"), "{error}");
     // Tetrahedralizations are left out where they would be a choice.
     let default = CompileOptions { structure: Default::default(), ..deformable() };
     let file = bytes(&positions, &triangles, &default);

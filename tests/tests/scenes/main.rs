@@ -9,7 +9,6 @@ mod import;
 mod made_gltf;
 mod morphs;
 mod motion;
-mod moving_tets;
 mod poses;
 mod rigid_parts;
 mod sequences;

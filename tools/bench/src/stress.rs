@@ -6,7 +6,7 @@ use crate::output::{Head, Report};
 use crate::progress::Progress;
 use anyhow::{Result, ensure};
 use bth_tests::stress::{Shape, Statistics, run as trace, shapes};
-use bth_tests::structures::{DEFORMED, Traced, deformed, deformed_tets, structures_named};
+use bth_tests::structures::{DEFORMED, Traced, deformed, structures_named};
 use serde_json::{Value, json};
 
 /// Rays of a shape in a round: a number of batches that the instruction sets divide.
@@ -34,10 +34,8 @@ pub fn run(arguments: &Stress) -> Result<()> {
         let model = shape.grid.model();
         let is_wanted = |name: &str| name.contains(&arguments.structure);
         let mut structures = structures_named(&model, shape.whole, is_wanted);
-        if DEFORMED.into_iter().any(is_wanted) {
+        if is_wanted(DEFORMED) {
             structures.push(deformed(&model, arguments.seed));
-            structures.extend(deformed_tets(&model, shape.whole));
-            structures.retain(|traced| is_wanted(&traced.name));
         }
         ensure!(
             !structures.is_empty(),

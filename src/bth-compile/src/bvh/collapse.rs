@@ -61,8 +61,8 @@ pub fn collapse_by<'a>(
     let weighed = bvh.into();
     let bvh = weighed.bvh;
     check_cut(bvh, cut)?;
-    if options.leaf_vertices && !options.keep_subtrees && !cut.is_empty() {
-        let message = "tet leaves of a deformable object without subtrees".to_owned();
+    if options.leaf_vertices && !cut.is_empty() {
+        let message = "tet leaves of a deformable object".to_owned();
         return Err(Error::Internal { code: "BTH-X203", message });
     }
     monitor.stage("collapse", None);

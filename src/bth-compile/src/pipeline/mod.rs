@@ -5,7 +5,6 @@
 //! through the trait `Stages`, which a cache implements outside of this module.
 
 mod clock;
-mod deformable;
 mod limit;
 mod motion;
 mod moving;
@@ -37,7 +36,6 @@ use crate::source::{Model, SourceDigest, changed};
 use crate::{coordinates, free, tets};
 use bth_import::{self as mesh, Mesh};
 use report::TetReports;
-use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -117,7 +115,7 @@ pub(crate) fn compile_mesh(
     options.check()?;
     if let Some(sequence) = mesh.sequence.clone() {
         warn_of_options(&source.display().to_string(), options, monitor);
-        return compile_moving(source, (mesh, &sequence), &options.of_deforming(), clock, monitor);
+        return compile_moving((mesh, &sequence), &options.of_deforming(), clock, monitor);
     }
     let (mesh, on_grid) = match options.coordinates == coordinates::CoordinateOptions::default() {
         true => (mesh, None),
@@ -173,20 +171,14 @@ fn tet_leaves(
     clock: &mut Clock,
     monitor: &dyn Monitor,
 ) -> Result<(Vec<tets::Leaf>, TetReports)> {
-    let tree = &traced.tree;
-    let welded =
-        if options.deformable { deformable::welded(&traced.mesh) } else { Cow::Borrowed(&traced.mesh) };
-    let mesh: &Mesh = &welded;
-    if options.deformable {
-        select::check_flat(source, deformable::flat_triangles(mesh, tree), options)?;
-    }
-    let without_marks = || select::choose_without_marks((traced, mesh), options, monitor);
+    let (tree, mesh) = (&traced.tree, &traced.mesh);
+    let without_marks = || select::choose_without_marks(traced, options, monitor);
     let (choice, costs, marks) = match clock.time("costs", without_marks)? {
         Some((choice, costs)) => (choice, Some(costs), None),
         None => {
             let (marks, report) =
                 clock.time("marks", || stages.marks(mesh, tree, &TreeOptions::of(options), monitor))?;
-            let choose = || select::choose(source, (traced, mesh), &marks, options, monitor);
+            let choose = || select::choose(source, traced, &marks, options, monitor);
             let (choice, costs) = clock.time("costs", choose)?;
             (choice, costs, Some(report))
         }

@@ -4,7 +4,7 @@ use super::clock::timed;
 use super::motion::{MotionReport, SegmentReport};
 use super::object::{self, Object, TracedMesh};
 use super::report::TetReports;
-use super::{Clock, Direct, StageReports, tet_leaves};
+use super::{Clock, StageReports};
 use crate::bvh::{self, Costs, PoseOptions, Poses};
 use crate::error::Result;
 use crate::monitor::Monitor;
@@ -12,7 +12,6 @@ use crate::options::{CompileOptions, Structure};
 use bth_format::SequenceView;
 use bth_format::layout::Segment;
 use bth_import::{Mesh, Sequence};
-use std::path::Path;
 
 /// A range is divided if its tree costs more than this on average, relative to trees that are built for each pose alone.
 const TOO_DEAR: f64 = 1.05;
@@ -46,11 +45,8 @@ impl PoseSource for Sequence {
 /// Warns of options that have no effect on an object whose vertices move.
 pub(crate) fn warn_of_options(name: &str, options: &CompileOptions, monitor: &dyn Monitor) {
     let without_effect = [
-        (
-            options.structure == Structure::Tets && !options.deformable,
-            "nothing is tetrahedralized without --deformable",
-        ),
-        (options.coordinates != Default::default(), "coordinates and boxes stay f32"),
+        (options.structure == Structure::Tets, "nothing is tetrahedralized"),
+        (options.coordinates != Default::default(), "coordinates stay f32"),
         (!options.geometry, "the geometry of the source stays"),
         (options.free.keep.always(), "no free directions are kept"),
     ];
@@ -87,9 +83,8 @@ struct Compiler<'a> {
 }
 
 /// Compiles a mesh whose vertices move into an object, with objects of its segments behind it. `options` are those of deformable
-/// objects ([`CompileOptions::of_deforming`]); `path` names the model in messages.
+/// objects ([`CompileOptions::of_deforming`]).
 pub(crate) fn compile_moving(
-    path: &Path,
     (mesh, source): (Mesh, &dyn PoseSource),
     options: &CompileOptions,
     clock: &mut Clock,
@@ -110,14 +105,9 @@ pub(crate) fn compile_moving(
     let mut reports = None;
     for range in ranges {
         let Range { traced, bvh, .. } = range;
-        // Trees over poses depend on all frames, which keys of cached stages do not name.
-        let (leaves, tets) = match options.structure {
-            Structure::Bvh => (Vec::new(), TetReports::default()),
-            _ => tet_leaves(path, &traced, options, &mut Direct, clock, monitor)?,
-        };
         let (object, collapse) =
-            clock.time("collapse", || object::join(traced, leaves, None, options, monitor))?;
-        reports.get_or_insert((bvh, tets, collapse));
+            clock.time("collapse", || object::join(traced, Vec::new(), None, options, monitor))?;
+        reports.get_or_insert((bvh, TetReports::default(), collapse));
         objects.push(object);
     }
     let mut first = objects.remove(0);

@@ -59,9 +59,6 @@ fn options_json(options: &CompileOptions) -> serde_json::Value {
     if options.deformable {
         json["deformable"] = json!(true);
     }
-    if options.deformable_tets {
-        json["deformable_tets"] = json!(true);
-    }
     if options.names {
         json["names"] = json!(true);
     }

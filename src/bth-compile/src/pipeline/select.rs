@@ -13,7 +13,7 @@ use std::path::Path;
 /// The choice where no node would be chosen even if all were free of bad contacts, as it is with most models and profiles; `None`
 /// where the marks are needed.
 pub(super) fn choose_without_marks(
-    (traced, mesh): (&TracedMesh, &Mesh),
+    traced: &TracedMesh,
     options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<Option<(costs::Choice, costs::CostReport)>> {
@@ -21,20 +21,20 @@ pub(super) fn choose_without_marks(
         return Ok(None);
     }
     let storage = limit::storage_of(traced.by_ref(), options, monitor)?;
-    let choose = || costs::choose_of_all(mesh, &traced.tree, &options.costs, storage, monitor);
+    let choose = || costs::choose_of_all(&traced.mesh, &traced.tree, &options.costs, storage, monitor);
     let (choice, report) = timed(choose)?;
     Ok(choice.chosen.is_empty().then_some((choice, report)))
 }
 
-/// The nodes to tetrahedralize, in ascending order. `mesh` is what is tetrahedralized of the traced mesh.
+/// The nodes to tetrahedralize, in ascending order.
 pub(super) fn choose(
     source: &Path,
-    (traced, mesh): (&TracedMesh, &Mesh),
+    traced: &TracedMesh,
     marks: &marks::Marks,
     options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<(costs::Choice, Option<costs::CostReport>)> {
-    let tree = &traced.tree;
+    let (mesh, tree) = (&traced.mesh, &traced.tree);
     match (options.structure, marks.suitable.first()) {
         (Structure::Bvh, _) | (Structure::Tets, None) => Ok((costs::Choice::default(), None)),
         (Structure::Tets, Some(true)) => Ok((costs::Choice { chosen: vec![0], verdicts: Vec::new() }, None)),
@@ -90,16 +90,6 @@ pub(super) fn check_built(
             message,
             "is the worker bth-tetgen installed? Else use --structure bth",
         ));
-    }
-    Ok(())
-}
-
-/// Fails where the whole model has to be tetrahedralized and has triangles without area.
-pub(super) fn check_flat(source: &Path, flat: usize, options: &CompileOptions) -> Result<()> {
-    if options.structure == Structure::Tets && flat > 0 {
-        let message =
-            format!("the model cannot be tetrahedralized whole: {flat} of its triangles have no area");
-        return Err(unusable(source, message, "leave these out of the model, or use --structure bth"));
     }
     Ok(())
 }

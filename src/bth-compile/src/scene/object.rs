@@ -85,7 +85,7 @@ fn build_or_fetch(
     }
     let poses = mesh.part.clip().and_then(|clip| file.clips.poses(&clip, &triangles));
     let (built, reports) = match poses {
-        Some(poses) => pipeline::compile_moving(&file.full, (triangles, &poses), options, clock, monitor)?,
+        Some(poses) => pipeline::compile_moving((triangles, &poses), options, clock, monitor)?,
         None => {
             let stages = &mut CachedStages::of_object(cache, part, mesh.summary.geometry);
             pipeline::compile_mesh(&file.full, triangles, options, stages, clock, monitor)?

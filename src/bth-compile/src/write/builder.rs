@@ -183,7 +183,7 @@ impl<'a> FileBuilder<'a> {
             section_offset: size_of::<Header>() as u64,
             section_count: entries.len() as u32,
             reserved: 0,
-            required_features: self.required_features | self.deformable_tets(),
+            required_features: self.required_features,
             optional_features: 0,
             content_id: content_id(entries),
             table_hash: hash128(entries.as_bytes()),
@@ -191,14 +191,6 @@ impl<'a> FileBuilder<'a> {
         };
         header.header_hash = hash128(&header.as_bytes()[..std::mem::offset_of!(Header, header_hash)]);
         [header.as_bytes(), entries.as_bytes()].concat()
-    }
-
-    /// The feature of deformable objects with tet leaves, if there are any.
-    fn deformable_tets(&self) -> u64 {
-        let has = |object: u32, kind: u32| self.sections.contains_key(&(object, kind));
-        let mut objects = self.sections.keys().filter(|(_, kind)| *kind == kind::LEAF_VERTICES);
-        let any = objects.any(|(object, _)| has(*object, kind::TET_LEAVES));
-        if any { FEATURE_DEFORMABLE_TETS } else { 0 }
     }
 
     fn table_end(&self) -> u64 {

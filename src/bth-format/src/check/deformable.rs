@@ -5,40 +5,36 @@ use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::object::ObjectView;
 
-/// Checks the object if it is deformable. Its tree, leaves and rows of the source have been checked before. `features` are those
-/// that the header of its file requires.
-pub(super) fn check(view: &ObjectView, features: u64) -> Result<()> {
+/// Checks the object if it is deformable. Its tree, leaves and rows of the source have been checked before.
+pub(super) fn check(view: &ObjectView) -> Result<()> {
     if !view.is_deformable() {
         return Ok(());
     }
-    prerequisites(view, features)?;
+    prerequisites(view)?;
     let leaves = leaves_in_order(view)?;
     Rows { view, row: 0 }.check(&leaves)
 }
 
 /// BTH-F163.
-fn prerequisites(view: &ObjectView, features: u64) -> Result<()> {
+fn prerequisites(view: &ObjectView) -> Result<()> {
     let found = if view.positions.is_empty() || view.triangles.is_empty() {
         "none of them"
     } else if view.grid.is_some() {
         "coordinates that are not f32"
     } else if view.has_widened_boxes() {
         "widened boxes"
-    } else if view.tet_leaves.iter().any(|leaf| leaf.subtree == NONE) {
-        "a tet leaf without a subtree"
-    } else if !view.tet_leaves.is_empty() && features & FEATURE_DEFORMABLE_TETS == 0 {
-        "tet leaves that the header does not announce"
+    } else if !view.tet_leaves.is_empty() {
+        "tet leaves"
     } else if view.header.dropped != 0 {
         "triangles that are dropped"
     } else {
         return Ok(());
     };
-    let expected =
-        "POSITIONS and TRIANGLES beside LEAF_VERTICES, f32, subtrees of tet leaves, no dropped triangle";
+    let expected = "POSITIONS and TRIANGLES beside LEAF_VERTICES, f32, no tet leaf, no dropped triangle";
     Err(Error::within(Code::Deformable, kind::LEAF_VERTICES, 0, expected, found))
 }
 
-/// BTH-F164: the blocks lie in depth-first order, nodes before leaves, the subtree of a tet leaf in its place. Returns the leaves.
+/// BTH-F164: the blocks lie in depth-first order, nodes before leaves. Returns the leaves.
 fn leaves_in_order(view: &ObjectView) -> Result<Vec<Child>> {
     let (mut leaves, mut next) = (Vec::new(), 0);
     let mut stack = vec![view.header.root];
@@ -50,7 +46,6 @@ fn leaves_in_order(view: &ObjectView) -> Result<Vec<Child>> {
                 let children = view.node(line).child;
                 stack.extend(children.into_iter().rev().filter(|child| *child != NONE));
             }
-            Some(Child::Tets(row)) => stack.push(view.tet_leaves[row as usize].subtree),
             leaf => leaves.extend(leaf),
         }
     }

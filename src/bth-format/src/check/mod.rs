@@ -36,12 +36,12 @@ pub(crate) use sequence::{Segmented, segments, sequence};
 use crate::error::Result;
 use crate::object::ObjectView;
 
-/// Checks every index of an object. `features` are those that the header of its file requires.
+/// Checks every index of an object.
 ///
 /// # Errors
 /// The first violation of `BTH-F101` to `BTH-F147` and `BTH-F163` to `BTH-F172` and `BTH-F187`, with an offset from the start of its section;
 /// [`crate::file::File::check`] gives offsets from the start of the file.
-pub(crate) fn object(view: &ObjectView, features: u64) -> Result<()> {
+pub(crate) fn object(view: &ObjectView) -> Result<()> {
     header::check(view)?;
     sources::check(view)?;
     groups::check(view)?;
@@ -51,5 +51,5 @@ pub(crate) fn object(view: &ObjectView, features: u64) -> Result<()> {
     tree::check(view)?;
     leaves::check_ids(view)?;
     tet_faces::check(view)?;
-    deformable::check(view, features)
+    deformable::check(view)
 }

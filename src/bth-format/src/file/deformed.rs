@@ -4,19 +4,18 @@ use super::buffer::Owned;
 use super::{File, no_memory};
 use crate::Identity;
 use crate::error::{Code, Error, Result};
-use crate::layout::{CacheLine, Object, TetFace, TetLeaf, TetVertex, WIDTH};
+use crate::layout::{CacheLine, Object, WIDTH};
 use crate::object::{ObjectBounds, ObjectView};
 use std::sync::Arc;
 use zerocopy::{FromBytes, IntoBytes};
 
-/// A deformable object of a file whose positions have been replaced. It has nodes, leaves, positions and bounds of its own, and of tet
-/// leaves the boxes, the vertices and which triangles are faces; all else is that of the file, which stays as it is.
+/// A deformable object of a file whose positions have been replaced. It has its own nodes, leaves, positions and bounds; everything
+/// else stays in the file.
 #[derive(Debug)]
 pub struct DeformedObject {
     // The view comes first so that it is dropped before what it borrows from. It has no destructor.
     view: ObjectView<'static>,
     lines: Owned,
-    tets: OwnTets,
     positions: Vec<[f32; 3]>,
     normals: Normals,
     header: Arc<Object>,
@@ -29,42 +28,7 @@ pub struct DeformedObject {
 /// Normals of a deformed object, in the rows of NORMALS.
 pub type Normals = Option<Vec<[f32; 3]>>;
 
-/// What of the tet leaves new positions change.
-#[derive(Debug)]
-struct OwnTets {
-    leaves: Vec<TetLeaf>,
-    vertices: Vec<TetVertex>,
-    triangle_faces: Vec<u32>,
-}
-
-impl OwnTets {
-    fn of(view: &ObjectView<'_>) -> Result<Self> {
-        Ok(Self {
-            leaves: copy_of(view.tet_leaves)?,
-            vertices: copy_of(view.tet_vertices)?,
-            triangle_faces: copy_of(view.triangle_faces)?,
-        })
-    }
-}
-
-/// The tet leaves of an object, for a refit.
-#[derive(Debug)]
-pub struct TetParts<'a> {
-    /// The leaves, of which a refit may replace the boxes.
-    pub leaves: &'a mut [TetLeaf],
-    /// Their vertices, of which it replaces the positions.
-    pub vertices: &'a mut [TetVertex],
-    /// As [`ObjectView::triangle_faces`], for those leaves that rays may start in; those of others are `NONE`.
-    pub triangle_faces: &'a mut [u32],
-    /// Their constrained faces.
-    pub faces: &'a [TetFace],
-    /// The leaves as they were compiled.
-    pub compiled: &'a [TetLeaf],
-    /// The vertices as they were compiled.
-    pub compiled_vertices: &'a [TetVertex],
-}
-
-/// What a refit computes the boxes and vertices of an object from, and where it stores them.
+/// What a refit reads and writes.
 #[derive(Debug)]
 pub struct RefitParts<'a> {
     /// Nodes and leaves of the object: those of the file, or those of the refit before.
@@ -73,8 +37,6 @@ pub struct RefitParts<'a> {
     pub leaf_vertices: &'a [[u32; WIDTH]],
     /// The new positions.
     pub positions: &'a [[f32; 3]],
-    /// The tet leaves.
-    pub tets: TetParts<'a>,
 }
 
 impl DeformedObject {
@@ -99,12 +61,12 @@ impl DeformedObject {
         let bytes = view.lines.as_bytes();
         let mut lines = Owned::zeroed(bytes.len()).ok_or_else(|| no_memory(bytes.len() as u64))?;
         lines.bytes_mut().copy_from_slice(bytes);
-        let (tets, positions) = (OwnTets::of(&view)?, copy_of(view.positions)?);
+        let positions = copy_of(view.positions)?;
         let header = Arc::new(*view.header);
         // SAFETY: `file`, which the view borrows from, is held beside it; see `extended`.
         let view = unsafe { extended(ObjectView { identity: Identity::new(), ..view }) };
         let mut deformed =
-            Self { view, lines, tets, positions, normals: None, header, file: file.clone(), object, segment };
+            Self { view, lines, positions, normals: None, header, file: file.clone(), object, segment };
         deformed.set_view(true)?;
         Ok(deformed)
     }
@@ -117,14 +79,12 @@ impl DeformedObject {
 
     /// Bytes on the heap.
     pub fn heap_bytes(&self) -> usize {
-        let OwnTets { leaves, vertices, triangle_faces } = &self.tets;
-        let tets = size_of_val(&leaves[..]) + size_of_val(&vertices[..]) + size_of_val(&triangle_faces[..]);
-        self.lines.bytes().len() + tets + size_of_val(self.positions.as_slice()) + size_of::<Object>()
+        self.lines.bytes().len() + size_of_val(self.positions.as_slice()) + size_of::<Object>()
     }
 
     /// Replaces the positions by others, of which there are as many, and the normals: by others, by none at all (an empty vector), or by
-    /// those of the file (`None`). Returns the former ones in their place. `refit` computes the boxes of nodes, the vertices of leaves and
-    /// the tet leaves from them, changes nothing else of the lines, and returns the bounds of all triangles: lower and upper end.
+    /// those of the file (`None`). Returns the former ones in their place. `refit` computes the boxes of nodes and the vertices of leaves
+    /// from them, changes nothing else of the lines, and returns the bounds of all triangles: lower and upper end.
     ///
     /// # Errors
     /// None for an object that [`Self::new`] has made.
@@ -141,17 +101,8 @@ impl DeformedObject {
         std::mem::swap(&mut self.normals, normals);
         let lines =
             <[CacheLine]>::mut_from_bytes(self.lines.bytes_mut()).ok().expect("a whole number of lines");
-        let tets = TetParts {
-            leaves: &mut self.tets.leaves,
-            vertices: &mut self.tets.vertices,
-            triangle_faces: &mut self.tets.triangle_faces,
-            faces: view.tet_faces,
-            compiled: view.tet_leaves,
-            compiled_vertices: view.tet_vertices,
-        };
         let leaf_vertices = view.leaf_vertices;
-        let ([lower, upper], result) =
-            refit(RefitParts { lines, leaf_vertices, positions: &self.positions, tets });
+        let ([lower, upper], result) = refit(RefitParts { lines, leaf_vertices, positions: &self.positions });
         if let Some(header) = Arc::get_mut(&mut self.header) {
             (header.lower, header.upper) = (lower, upper);
         }
@@ -173,12 +124,6 @@ impl DeformedObject {
             triangle_ids: tree.triangle_ids,
             leaf_vertices: tree.leaf_vertices,
             places: tree.places,
-            tet_leaves: tree.tet_leaves,
-            records: tree.records,
-            tet_vertices: tree.tet_vertices,
-            tet_faces: tree.tet_faces,
-            hull_faces: tree.hull_faces,
-            triangle_faces: tree.triangle_faces,
             ..object
         };
         if own {
@@ -187,8 +132,6 @@ impl DeformedObject {
             let header: &Object = &self.header;
             let (bounds, positions) = (ObjectBounds::new(header), self.positions.as_slice());
             let normals = self.normals.as_deref().unwrap_or(view.normals);
-            let OwnTets { leaves, vertices, triangle_faces } = &self.tets;
-            let (tet_leaves, tet_vertices) = (leaves.as_slice(), vertices.as_slice());
             view = ObjectView {
                 header,
                 bounds,
@@ -196,13 +139,10 @@ impl DeformedObject {
                 lines,
                 positions,
                 normals,
-                tet_leaves,
-                tet_vertices,
-                triangle_faces,
                 ..view
             };
         }
-        // SAFETY: the view borrows from `file` and, if `own`, from `lines`, `tets`, `positions`, `normals` and `header`, which are held beside
+        // SAFETY: the view borrows from `file` and, if `own`, from `lines`, `positions`, `normals` and `header`, which are held beside
         // it. They lie on the heap or in mapped pages, so they do not move when `self` does, and are written to and replaced only in
         // `refit`, which first replaces the view by one that does not borrow from them. See `extended`.
         self.view = unsafe { extended(view) };

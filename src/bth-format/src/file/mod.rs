@@ -8,7 +8,7 @@ mod deformed;
 mod sections;
 mod table;
 
-pub use deformed::{DeformedObject, Normals, RefitParts, TetParts};
+pub use deformed::{DeformedObject, Normals, RefitParts};
 pub use table::{content_id, hash128, kind_stride};
 
 use crate::Identity;
@@ -322,8 +322,7 @@ impl File {
     /// `BTH-F179`.
     pub fn check(&self, object: u32) -> Result<ObjectView<'_>> {
         let view = self.object(object)?;
-        let features = self.header().required_features;
-        check::object(&view, features).map_err(|e| self.locate(e, object))?;
+        check::object(&view).map_err(|e| self.locate(e, object))?;
         let materials = self.materials(object);
         check::materials(&materials, view.materials.len(), view.header.triangles)
             .map_err(|e| self.locate(e, object))?;

@@ -12,7 +12,7 @@ pub(super) const HEADER_SIZE: usize = size_of::<Header>();
 /// Bytes of a section entry.
 const ENTRY_SIZE: u64 = size_of::<SectionEntry>() as u64;
 /// Required feature bits that this library knows.
-const KNOWN_FEATURES: u64 = FEATURE_GRID | FEATURE_DEFORMABLE_TETS | FEATURE_WIDENED_BOXES;
+const KNOWN_FEATURES: u64 = FEATURE_GRID | FEATURE_WIDENED_BOXES;
 
 /// Whether hashes are compared. Not under fuzzing: mutated files would have wrong hashes, and no check behind would be reached.
 const CHECKSUMS: bool = !cfg!(fuzzing);
@@ -152,10 +152,12 @@ pub(super) fn check_header(bytes: &[u8], length: u64) -> Result<&Header> {
     let unknown = header.required_features & !KNOWN_FEATURES;
     if unknown != 0 {
         let at = offset_of!(Header, required_features);
-        let old = if unknown & FEATURE_BYTE_BOXES != 0 {
-            ", boxes of 8 bits, which this version no longer reads: compile the model again"
-        } else {
-            ""
+        let old = match unknown {
+            FEATURE_BYTE_BOXES => ": boxes of 8 bits, which are no longer read; compile the model again",
+            FEATURE_DEFORMABLE_TETS => {
+                ": tetrahedra under an object that deforms, which are no longer read; compile the model again"
+            }
+            _ => "",
         };
         return fail(Code::Features, at, "known feature bits".into(), text!("unknown {unknown:#x}{old}"));
     }

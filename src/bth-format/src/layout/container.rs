@@ -31,8 +31,7 @@ pub struct Header {
     pub section_count: u32,
     /// Zero.
     pub reserved: u32,
-    /// Bits that a reader must know to read the file: [`FEATURE_GRID`],
-    /// [`FEATURE_DEFORMABLE_TETS`] and [`FEATURE_WIDENED_BOXES`].
+    /// Bits that a reader must know to read the file: [`FEATURE_GRID`] and [`FEATURE_WIDENED_BOXES`].
     pub required_features: u64,
     /// Bits that a reader may ignore; none is assigned.
     pub optional_features: u64,
@@ -76,8 +75,9 @@ pub const FEATURE_GRID: u64 = 1;
 /// Bit of [`Header::required_features`] of older files: child boxes are quantized to bytes. Such files are refused.
 pub(crate) const FEATURE_BYTE_BOXES: u64 = 2;
 
-/// Bit of [`Header::required_features`]: an object that can be given new positions has tet leaves. Bit 2 is not assigned.
-pub const FEATURE_DEFORMABLE_TETS: u64 = 8;
+/// Bit of [`Header::required_features`] of older files: an object that can be given new positions has tet leaves. Such files are
+/// refused. Bit 2 is not assigned.
+pub(crate) const FEATURE_DEFORMABLE_TETS: u64 = 8;
 
 /// Bit of [`Header::required_features`]: the boxes of an object are widened, see [`super::WIDENED_BOXES`].
 pub const FEATURE_WIDENED_BOXES: u64 = 16;

@@ -75,16 +75,6 @@ impl ObjectView<'_> {
     pub fn is_deformable(&self) -> bool {
         !self.leaf_vertices.is_empty()
     }
-    /// The child code with which a traversal of the BVH goes on: that of its subtree for a tet leaf that has one, for all others the
-    /// code itself.
-    #[inline(always)]
-    pub fn entered(&self, code: u32) -> u32 {
-        let Some(Child::Tets(row)) = Child::from_code(code) else { return code };
-        match self.tet_leaves.get(row as usize) {
-            Some(leaf) if leaf.subtree != NONE => leaf.subtree,
-            _ => code,
-        }
-    }
     /// Whether child boxes are widened ([`WIDENED_BOXES`]).
     pub fn has_widened_boxes(&self) -> bool {
         self.header.coordinates & WIDENED_BOXES != 0

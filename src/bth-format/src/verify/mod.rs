@@ -2,7 +2,6 @@
 //! predicates. Costs O(bytes of the file). Specification: "Verifying".
 
 mod aabb;
-mod filling;
 mod free;
 mod object;
 mod report;
@@ -11,7 +10,6 @@ mod tet_leaf;
 mod tree;
 mod triangle_marks;
 
-pub use filling::filling_tets;
 pub use report::Report;
 
 use crate::error::{Code, Error, Result};

@@ -2,7 +2,7 @@
 
 use super::SceneBuilder;
 use crate::clock;
-use crate::deform::{Deforming, TetUse};
+use crate::deform::Deforming;
 use crate::deformers::Posed;
 use crate::update::Update;
 use bth_format::Error;
@@ -93,15 +93,13 @@ impl SceneBuilder {
             return update;
         }
         let start = clock::now();
-        let (mut greatest, mut tet_use): (f64, _) = (0.0, TetUse::default());
+        let mut greatest: f64 = 0.0;
         for object in &self.deformed {
             if let Ok(deforming) = self.scene.objects_mut().deforming(*object) {
                 deforming.refit_staged();
                 greatest = greatest.max(deforming.cost_ratio());
-                tet_use.add(deforming.tet_use());
             }
         }
-        update = tet_use.of(update);
         (update.deformed_cost_ratio, update.refit) = (greatest, clock::elapsed(start));
         self.forget_boxes();
         for (id, staged) in self.instances.iter_mut().enumerate() {

@@ -154,8 +154,6 @@ impl SceneBuilder {
                 nodes,
                 deformed: refitted.deformed,
                 deformed_cost_ratio: refitted.deformed_cost_ratio,
-                tet_leaves_in_use: refitted.tet_leaves_in_use,
-                tet_leaves_aside: refitted.tet_leaves_aside,
                 refit: refitted.refit,
                 ..update
             },

@@ -3,8 +3,6 @@
 use super::cost::cost;
 use super::plan::RefitPlan;
 use super::refit::refit;
-use super::tets::{TetPlan, TetUse};
-use crate::SMALL;
 use bth_format::file::{DeformedObject, Normals};
 use bth_format::object::ObjectView;
 use bth_format::text;
@@ -15,9 +13,6 @@ use bth_format::{Code, Error, File};
 pub(crate) struct Deforming {
     object: DeformedObject,
     plan: RefitPlan,
-    tet_plan: TetPlan,
-    /// The tet leaves in use after the last refit.
-    tet_use: TetUse,
     /// Positions of the next refit, or those of the one before.
     staged: Vec<[f32; 3]>,
     /// The same for normals. New positions without normals have those of the triangles.
@@ -52,14 +47,11 @@ impl Deforming {
         let object = DeformedObject::of_segment(file, object, segment)?;
         let view = object.view();
         let plan = RefitPlan::new(view);
-        // Where no rays walk through tetrahedra, those of the file stay as they are.
-        let tet_plan = if SMALL { TetPlan::default() } else { TetPlan::new(view) };
-        let tet_use = TetUse { in_use: view.tet_leaves.len(), aside: 0 };
         let compiled_cost = cost(&view.lines[..plan.node_lines as usize]);
         let staged = view.positions.to_vec();
         let staged_normals = Some(Vec::new());
         let cost = compiled_cost;
-        Ok(Deforming { object, plan, tet_plan, tet_use, staged, staged_normals, compiled_cost, cost })
+        Ok(Deforming { object, plan, staged, staged_normals, compiled_cost, cost })
     }
 
     /// The sections of the object, with its own positions.
@@ -126,27 +118,17 @@ impl Deforming {
 
     /// Makes positions that [`Self::stage`] has staged those of the object.
     pub(crate) fn refit_staged(&mut self) {
-        let (plan, tet_plan) = (&self.plan, &self.tet_plan);
-        let (positions, normals) = (&mut self.staged, &mut self.staged_normals);
-        let refitted = self.object.refit(positions, normals, |mut parts| {
+        let plan = &self.plan;
+        let refitted = self.object.refit(&mut self.staged, &mut self.staged_normals, |mut parts| {
             let ends = refit(plan, &mut parts);
-            let tet_use = match SMALL {
-                true => TetUse::default(),
-                false => tet_plan.refit(&mut parts.tets, parts.positions),
-            };
-            (ends, (cost(&parts.lines[..plan.node_lines as usize]), tet_use))
+            (ends, cost(&parts.lines[..plan.node_lines as usize]))
         });
-        (self.cost, self.tet_use) = refitted.unwrap_or((self.cost, self.tet_use));
+        self.cost = refitted.unwrap_or(self.cost);
     }
 
     /// Undoes the last refit; its positions are staged again.
     pub(crate) fn undo(&mut self) {
         self.refit_staged();
-    }
-
-    /// How many tet leaves rays may start in with the positions of the last refit.
-    pub(crate) fn tet_use(&self) -> TetUse {
-        self.tet_use
     }
 
     /// Expected cost of rays relative to that for the positions of the file. 1 where the tree is a single leaf.

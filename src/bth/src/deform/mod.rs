@@ -3,15 +3,11 @@
 //! A file that is compiled with `--deformable` says for each leaf which vertices of the source stand in it. New positions go
 //! from there into the leaves, and boxes from the leaves to the root, in memory of the scene's own ([`refit`]), by tasks that are
 //! determined once ([`plan`]). The tree remains that of the pose for which it was compiled; [`cost`] tells how much worse it is
-//! for the new one. Tetrahedra follow with their vertices, and are used where none of a tet leaf inverts ([`tets`]).
+//! for the new one.
 
-mod bound_vertices;
 mod cost;
 mod deforming;
-mod orientation;
 mod plan;
 mod refit;
-mod tets;
 
 pub(crate) use deforming::Deforming;
-pub(crate) use tets::TetUse;

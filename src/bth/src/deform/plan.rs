@@ -62,8 +62,6 @@ pub(super) struct RefitPlan {
     pub(super) nodes: Vec<u32>,
     /// Leaves of these nodes.
     pub(super) leaves: Vec<TopLeaf>,
-    /// For each tet leaf the code of its subtree.
-    pub(super) subtrees: Vec<u32>,
 }
 
 /// Size of a subtree.
@@ -90,15 +88,6 @@ impl Size {
     }
 }
 
-/// The code that is followed at a child: that of its subtree for a tet leaf.
-#[inline(always)]
-pub(super) fn entered(code: u32, subtrees: &[u32]) -> u32 {
-    match Child::from_code(code) {
-        Some(Child::Tets(row)) => subtrees[row as usize],
-        _ => code,
-    }
-}
-
 /// The lines and the rows of LEAF_VERTICES of a leaf; `None` for codes of nodes.
 #[inline(always)]
 pub(super) fn leaf_size(code: u32) -> Option<(u32, u32)> {
@@ -112,15 +101,14 @@ pub(super) fn leaf_size(code: u32) -> Option<(u32, u32)> {
 impl RefitPlan {
     /// The plan for a deformable object.
     pub(super) fn new(view: &ObjectView<'_>) -> RefitPlan {
-        let subtrees: Vec<u32> = view.tet_leaves.iter().map(|leaf| leaf.subtree).collect();
-        let root = view.entered(view.header.root);
+        let root = view.header.root;
         if Size::of_leaf(root).is_some() {
             let leaves = vec![TopLeaf { parent: None, code: root, row: 0 }];
-            return RefitPlan { leaves, subtrees, ..RefitPlan::default() };
+            return RefitPlan { leaves, ..RefitPlan::default() };
         }
         let sizes = sizes(view);
         let node_lines = (sizes.len() * NODE_LINES) as u32;
-        let mut plan = RefitPlan { node_lines, subtrees, ..RefitPlan::default() };
+        let mut plan = RefitPlan { node_lines, ..RefitPlan::default() };
         // Nodes that are still to be divided, with their parent's slot and their first leaf.
         let mut stack = vec![(None, root, node_lines, 0)];
         while let Some((parent, node, line, row)) = stack.pop() {
@@ -151,17 +139,17 @@ impl RefitPlan {
     }
 }
 
-/// The codes of a node's children, for tet leaves those of their subtrees.
+/// The codes of a node's children.
 fn children<'a>(view: &'a ObjectView<'_>, node: u32) -> impl DoubleEndedIterator<Item = u32> + 'a {
     let codes = &view.node(node).child;
     let used = codes.iter().position(|code| *code == NONE).unwrap_or(WIDTH);
-    codes[..used].iter().map(|code| view.entered(*code))
+    codes[..used].iter().copied()
 }
 
 /// The sizes of the subtrees of all nodes.
 fn sizes(view: &ObjectView<'_>) -> Vec<Size> {
     let mut count = 0;
-    let mut stack = vec![view.entered(view.header.root)];
+    let mut stack = vec![view.header.root];
     // The nodes are the first ones of the lines. The last one in depth-first order has the greatest line.
     while let Some(node) = stack.pop() {
         count = count.max(node as usize / NODE_LINES + 1);

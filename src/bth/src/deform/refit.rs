@@ -4,7 +4,7 @@
 //! them are read and written one after the other; only positions are read in the order of the source. Boxes are exact bounds, so
 //! they have the same bits whoever computes them.
 
-use super::plan::{LeafRange, RefitPlan, Slot, Task, entered, leaf_size};
+use super::plan::{LeafRange, RefitPlan, Slot, Task, leaf_size};
 use crate::simd::{Isa, Kernel, LANES, Simd};
 use bth_format::file::RefitParts;
 use bth_format::layout::{
@@ -38,7 +38,7 @@ pub(super) fn refit(plan: &RefitPlan, parts: &mut RefitParts<'_>) -> Ends {
         let (node, behind) = lines[line as usize..].split_at_mut(NODE_LINES);
         let node = block_mut::<WideNode>(node);
         for slot in 0..WIDTH {
-            let code = entered(node.child[slot], &plan.subtrees);
+            let code = node.child[slot];
             if plan.nodes.binary_search(&code).is_ok() {
                 let child = &mut behind[code as usize - line as usize - NODE_LINES..][..NODE_LINES];
                 put(node, slot, &super::cost::bounds(block_mut(child)));
@@ -65,8 +65,7 @@ fn refit_tasks(
         let range = task.leaves;
         let own_leaves = take(&mut leaves, &mut leaf, range.line as usize, range.lines as usize);
         let rows = &leaf_vertices[range.row as usize..][..range.rows as usize];
-        let subtrees = &plan.subtrees;
-        TaskKernel { first: task.node, nodes: own_nodes, leaves: own_leaves, rows, positions, subtrees }
+        TaskKernel { first: task.node, nodes: own_nodes, leaves: own_leaves, rows, positions }
     };
     let kernels: Vec<_> = plan.tasks.iter().map(&mut kernel).collect();
     #[cfg(feature = "rayon")]
@@ -121,8 +120,6 @@ struct TaskKernel<'a> {
     /// Rows of LEAF_VERTICES of the leaves.
     rows: &'a [[u32; WIDTH]],
     positions: &'a [[f32; 3]],
-    /// For each tet leaf the code of its subtree, whose nodes and leaves lie where the tet leaf's would.
-    subtrees: &'a [u32],
 }
 
 impl Kernel for TaskKernel<'_> {
@@ -130,13 +127,13 @@ impl Kernel for TaskKernel<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Ends {
-        let TaskKernel { first, nodes, mut leaves, mut rows, positions, subtrees } = self;
+        let TaskKernel { first, nodes, mut leaves, mut rows, positions } = self;
         // The nodes on the path from the root to the current one, and in each the slot of the next.
         let mut path: Vec<(usize, usize)> = Vec::new();
         let (mut at, mut slot) = (0, 0);
         loop {
             let node: &mut WideNode = block_mut(&mut nodes[at..at + NODE_LINES]);
-            let code = if slot < WIDTH { entered(node.child[slot], subtrees) } else { NONE };
+            let code = if slot < WIDTH { node.child[slot] } else { NONE };
             if code == NONE {
                 let ends = union(s, node);
                 let Some((parent, parent_slot)) = path.pop() else { return ends };

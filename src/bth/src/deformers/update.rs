@@ -5,7 +5,6 @@ use super::evaluate::{self, Vertices};
 use super::pose::{Pose, SkinMatrices};
 use super::sequences::{Moved, Sequences};
 use crate::clock;
-use crate::deform::TetUse;
 use crate::nodes::NodeHierarchy;
 use crate::objects::Objects;
 use bth_format::File;
@@ -41,8 +40,6 @@ pub(crate) struct Deformed {
     pub(crate) posed: Posed,
     /// The greatest expected cost of one of these objects relative to that of its compiled positions; 1 without any.
     pub(crate) cost_ratio: f64,
-    /// The tet leaves of these objects.
-    pub(crate) tet_use: TetUse,
     /// Time to compute the positions and refit the objects.
     pub(crate) time: Duration,
 }
@@ -156,12 +153,7 @@ impl Deformers {
         hierarchy: &NodeHierarchy,
         seconds: f64,
     ) -> Result<Deformed> {
-        let mut deformed = Deformed {
-            posed: Posed::default(),
-            cost_ratio: 1.0,
-            tet_use: TetUse::default(),
-            time: Duration::ZERO,
-        };
+        let mut deformed = Deformed { posed: Posed::default(), cost_ratio: 1.0, time: Duration::ZERO };
         let Some(file) = objects.sole_file().filter(|_| !self.is_empty()).cloned() else {
             return Ok(deformed);
         };
@@ -171,7 +163,6 @@ impl Deformers {
             let deforming = objects.deforming(*object)?;
             deforming.refit_staged();
             deformed.cost_ratio = deformed.cost_ratio.max(deforming.cost_ratio());
-            deformed.tet_use.add(deforming.tet_use());
         }
         deformed.time = clock::elapsed(start);
         Ok(deformed)

@@ -76,9 +76,8 @@ impl World {
         };
         let (count, deformed_cost_ratio, refit) =
             (deformed.posed.objects.len(), deformed.cost_ratio, deformed.time);
-        let tet_use = deformed.tet_use;
         self.deformers.keep(deformed.posed);
-        Ok(tet_use.of(Update { nodes, deformed: count, deformed_cost_ratio, refit, ..update }))
+        Ok(Update { nodes, deformed: count, deformed_cost_ratio, refit, ..update })
     }
 
     /// Brings the nodes to a time, all of them with `all`; returns the number of those that moved.

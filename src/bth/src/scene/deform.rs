@@ -25,8 +25,7 @@ impl Scene {
     /// of the scene's own; the file is not touched, and other scenes with the same file are not either. All queries of this scene
     /// then answer for the new positions, as exactly as before. Triangles of zero area are not hit and are no part of the
     /// surface, as in a file that is compiled with these positions. The tree remains that of the pose that was compiled:
-    /// [`Update::deformed_cost_ratio`] tells how much worse it is for the new one. Tet leaves move with their triangles and are in use as long
-    /// as no tetrahedron is turned over or flat: [`Update::tet_leaves_in_use`].
+    /// [`Update::deformed_cost_ratio`] tells how much worse it is for the new one.
     ///
     /// # Errors
     /// `BTH-O003` if there is no such object, `BTH-S006` if it was not compiled with `--deformable`, `BTH-S007` if the number of
@@ -69,14 +68,13 @@ impl Scene {
         let deforming = self.objects_mut().deforming(object)?;
         deforming.refit_staged();
         let (refit, deformed_cost_ratio) = (clock::elapsed(start), deforming.cost_ratio());
-        let tet_use = deforming.tet_use();
         let (objects, world) = self.objects_and_world_mut();
         let placed = match world {
             Some(world) => world.place_again(objects, &[object]),
             None => Ok(Update { visible: objects.count() as usize, ..Update::default() }),
         };
         match placed {
-            Ok(update) => Ok(tet_use.of(Update { deformed: 1, deformed_cost_ratio, refit, ..update })),
+            Ok(update) => Ok(Update { deformed: 1, deformed_cost_ratio, refit, ..update }),
             Err(failed) => {
                 self.objects_mut().deforming(object)?.undo();
                 let (code, expected, found) = failed.error.words();

@@ -74,7 +74,7 @@ pub(crate) struct Compile {
     #[arg(long, help_heading = SMALLER, conflicts_with_all = ["tets", "subtrees"])]
     pub(crate) compact: bool,
     /// Keep what new positions at run time need, for objects that deform: see docs/deforming.md. All vertices keep the order of the
-    /// source. The object is a BVH unless --structure says otherwise.
+    /// source. The object is a BVH.
     #[arg(long, help_heading = DEFORMING, conflicts_with_all = ["coordinates", "max_error", "no_geometry", "compact", "rigid_parts"])]
     pub(crate) deformable: bool,
     /// Poses over which the tree of an object is built whose vertices move by themselves, 1 to 16, by default 8; more take longer. 1
@@ -104,7 +104,7 @@ pub(crate) struct Compile {
     #[arg(long, help_heading = TETRAHEDRA, value_enum, default_value_t = Record::Link32, value_name = "RECORD")]
     pub(crate) tets: Record,
     /// The BVH under each tet leaf: rays that do not start on a known surface take it, and are much faster so.
-    /// By default kept with `--structure bth` and `--deformable`, and pruned with `tets`.
+    /// By default kept with `--structure bth`, and pruned with `tets`.
     #[arg(long, help_heading = TETRAHEDRA, value_enum)]
     pub(crate) subtrees: Option<Subtrees>,
     /// Seconds that an attempt to tetrahedralize a node may take; by default according to its size. Up to four attempts are made with
@@ -159,12 +159,10 @@ impl Compile {
             },
             keep_subtrees: match self.subtrees {
                 Some(subtrees) => subtrees == Subtrees::Keep,
-                // Where tetrahedra are turned over, rays of deformable objects take the BVH beside them.
-                None => !self.compact && (self.deformable || structure == Structure::Bth),
+                None => !self.compact && structure == Structure::Bth,
             },
             geometry: !self.no_geometry,
             deformable: self.deformable,
-            deformable_tets: self.deformable && structure == Structure::Bth,
             motion: self.motion(),
             ..Default::default()
         };

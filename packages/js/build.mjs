@@ -33,7 +33,7 @@ function compileModule() {
     const flags = [...(process.env.RUSTFLAGS ?? "").split(" "), "-C", "target-feature=+simd128", "-C", small, "-C", short, "-C", stack, crates];
     const CARGO_ENCODED_RUSTFLAGS = flags.filter((flag) => flag !== "").join("\x1f");
     // BLAKE3 in plain Rust, so that no C compiler for the target is needed.
-    execFileSync("cargo", [...arguments_, "--features", "bth/small,bth-format/pure"], { cwd: root, stdio: "inherit", env: { ...process.env, CARGO_ENCODED_RUSTFLAGS } });
+    execFileSync("cargo", [...arguments_, "--features", "bth-format/pure"], { cwd: root, stdio: "inherit", env: { ...process.env, CARGO_ENCODED_RUSTFLAGS } });
     return join(target, "wasm32-unknown-unknown/wasm/bth_js.wasm");
 }
 

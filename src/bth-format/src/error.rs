@@ -8,13 +8,6 @@ use std::path::{Path, PathBuf};
 /// What opening and checking return.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// What `text!` makes.
-#[cfg(not(feature = "brief"))]
-pub(crate) type Text = String;
-
-#[cfg(feature = "brief")]
-pub(crate) type Text = &'static str;
-
 /// The section that an error is about. Specification: "Kinds".
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Section {
@@ -84,7 +77,7 @@ impl Error {
     /// An error of the operating system.
     pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
         let mut error =
-            Self::new(Code::Read, None, None, ("a readable file".into(), text!("{source}").into()));
+            Self::new(Code::Read, None, None, ("a readable file".into(), format!("{source}").into()));
         (error.0.path, error.0.source) = (Some(path.to_owned()), Some(source));
         error
     }
@@ -189,13 +182,7 @@ impl std::fmt::Display for WithoutHint<'_> {
             write!(f, "{gap} byte {offset}")?;
             gap = ":";
         }
-        // With the feature `brief` some texts are empty.
-        match (expected.is_empty(), found.is_empty()) {
-            (false, false) => write!(f, "{gap} expected {expected}, found {found}"),
-            (false, true) => write!(f, "{gap} expected {expected}"),
-            (true, false) => write!(f, "{gap} found {found}"),
-            (true, true) => Ok(()),
-        }
+        write!(f, "{gap} expected {expected}, found {found}")
     }
 }
 

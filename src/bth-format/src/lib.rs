@@ -19,31 +19,6 @@
 #![warn(missing_docs)]
 // What zerocopy tells about bytes that do not fit says less than the message, and its texts would be part of every program.
 #![allow(clippy::ok_expect)]
-// `Text` is `&str` with the feature, which `into` leaves as it is.
-#![cfg_attr(feature = "brief", allow(clippy::useless_conversion))]
-
-/// Text that is made for an error: as `format!`, and empty with the feature `brief`. For the runtime, too.
-#[cfg(not(feature = "brief"))]
-#[doc(hidden)]
-#[macro_export]
-macro_rules! text {
-    ($($arguments:tt)*) => {
-        format!($($arguments)*)
-    };
-}
-
-#[cfg(feature = "brief")]
-#[doc(hidden)]
-#[macro_export]
-macro_rules! text {
-    ($($arguments:tt)*) => {{
-        // The arguments count as used, and are not evaluated.
-        if false {
-            let _ = format_args!($($arguments)*);
-        }
-        ""
-    }};
-}
 
 mod check;
 mod code;

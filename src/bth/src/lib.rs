@@ -16,9 +16,6 @@
 // What zerocopy tells about bytes that do not fit says less than the message, and its texts would be part of every program.
 #![allow(clippy::ok_expect)]
 
-/// Whether the feature `small` is on.
-const SMALL: bool = cfg!(feature = "small");
-
 mod batch;
 mod builder;
 mod bvh;

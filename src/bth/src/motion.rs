@@ -4,7 +4,6 @@ use crate::instances::World;
 use crate::objects::Objects;
 use crate::scene::Scene;
 use crate::update::Update;
-use bth_format::text;
 use bth_format::{Code, Error, File, SceneView};
 
 /// An instance at the scene's time.
@@ -36,7 +35,7 @@ pub(crate) fn check_time(seconds: f64) -> Result<(), Error> {
     if seconds.is_finite() {
         return Ok(());
     }
-    Err(Error::of_call(Code::NotFinite, "a finite time", text!("{seconds}")))
+    Err(Error::of_call(Code::NotFinite, "a finite time", format!("{seconds}")))
 }
 
 impl Scene {

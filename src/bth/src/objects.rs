@@ -3,7 +3,6 @@
 use crate::deform::Deforming;
 use bth_format::layout::Object;
 use bth_format::object::ObjectView;
-use bth_format::text;
 use bth_format::{Code, Error, File};
 
 /// The objects of a scene, by their index.
@@ -188,8 +187,8 @@ impl Objects {
     pub(crate) fn deforming(&mut self, object: u32) -> Result<&mut Deforming, Error> {
         let count = self.count();
         let Some((file, row)) = self.locate(object) else {
-            let expected = text!("an object below {count}");
-            return Err(Error::of_call(Code::NoSuchObject, expected, text!("{object}")));
+            let expected = format!("an object below {count}");
+            return Err(Error::of_call(Code::NoSuchObject, expected, format!("{object}")));
         };
         let index = object as usize;
         if !self.is_deforming(object) {

@@ -5,7 +5,7 @@
 //! [`super::tet_faces`] then compares every record, hull face and constrained face with the result, so that no traversal,
 //! wherever it starts, can derive anything else. Specification: "Records" and the text below the table of "Index check".
 
-use crate::error::{Code, Error, Result, Text};
+use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::object::{ObjectView, Records};
 use std::borrow::Cow;
@@ -64,7 +64,7 @@ impl<'a> TetAdjacency<'a> {
             None => Ok(this),
             Some(i) => {
                 let tet = this.tets.start + i as u32;
-                let found = text!("none to {tet}");
+                let found = format!("none to {tet}");
                 Err(this.error(Code::Unreached, tet, "a way to each tetrahedron", found))
             }
         }
@@ -109,7 +109,7 @@ impl<'a> TetAdjacency<'a> {
         let face = others(self.vertices(tet), slot);
         let Some(next) = self.neighbour(tet, slot)? else { return Ok(None) };
         if !self.vertex_rows.contains(&next.opposite) || face.contains(&next.opposite) {
-            let found = text!("{} beyond slot {slot}", next.opposite);
+            let found = format!("{} beyond slot {slot}", next.opposite);
             let expected = "another vertex of the leaf beyond the face";
             return Err(self.error(Code::Neighbour, tet, expected, found));
         }
@@ -119,8 +119,8 @@ impl<'a> TetAdjacency<'a> {
             return Ok(Some(next.tet));
         }
         if known != found {
-            let expected = text!("vertices {known:?} in tetrahedron {}", next.tet);
-            return Err(self.error(Code::Neighbour, tet, expected, text!("{found:?} beyond slot {slot}")));
+            let expected = format!("vertices {known:?} in tetrahedron {}", next.tet);
+            return Err(self.error(Code::Neighbour, tet, expected, format!("{found:?} beyond slot {slot}")));
         }
         Ok(None)
     }
@@ -135,7 +135,7 @@ impl<'a> TetAdjacency<'a> {
             return self.across_constrained_face(tet, slot, link).map(Some);
         }
         if !self.tets.contains(&link) || link == tet {
-            let found = text!("tetrahedron {link}");
+            let found = format!("tetrahedron {link}");
             return Err(self.error(Code::Link, tet, "another tetrahedron of the leaf", found));
         }
         let row = link as usize;
@@ -155,10 +155,10 @@ impl<'a> TetAdjacency<'a> {
     fn across_constrained_face(&self, tet: u32, slot: usize, link: u32) -> Result<Neighbour> {
         let row = link & !FACE_BIT;
         if !self.face_rows.contains(&row) {
-            return Err(self.error(Code::Link, tet, "a constrained face of the leaf", text!("face {row}")));
+            return Err(self.error(Code::Link, tet, "a constrained face of the leaf", format!("face {row}")));
         }
         let named = &self.view.tet_faces[row as usize];
-        let error = |expected: Text, found: Text| {
+        let error = |expected: String, found: String| {
             let at = u64::from(row) * size_of::<TetFace>() as u64;
             Error::within(Code::TetFace, kind::TET_FACES, at, expected, found)
         };
@@ -166,12 +166,12 @@ impl<'a> TetAdjacency<'a> {
         let (face, opposite) = (others(vertices, slot), vertices[slot]);
         let side = (0..2).find(|&s| named.tet[s] == tet && named.opposite[s] == opposite);
         let (Some(side), true) = (side, is_same_face(named.vertex, face)) else {
-            let expected = text!("face {face:?} with tetrahedron {tet} and its vertex {opposite}");
-            return Err(error(expected, text!("{named:?}")));
+            let expected = format!("face {face:?} with tetrahedron {tet} and its vertex {opposite}");
+            return Err(error(expected, format!("{named:?}")));
         };
         let next = named.tet[1 - side];
         if !self.tets.contains(&next) || next == tet {
-            return Err(error("another tetrahedron of the leaf behind the face".into(), text!("{next}")));
+            return Err(error("another tetrahedron of the leaf behind the face".into(), format!("{next}")));
         }
         Ok(Neighbour { tet: next, opposite: named.opposite[1 - side], back: link })
     }
@@ -188,7 +188,7 @@ impl<'a> TetAdjacency<'a> {
         }
         let at = u64::from(row) * size_of::<HullFace>() as u64;
         let expected = "distinct vertices and a tetrahedron of the leaf";
-        Err(Error::within(Code::HullFace, kind::HULL_FACES, at, expected, text!("{hull:?}")))
+        Err(Error::within(Code::HullFace, kind::HULL_FACES, at, expected, format!("{hull:?}")))
     }
 
     /// An error about the record of a tetrahedron.

@@ -122,15 +122,15 @@ fn in_order(line: u32, expected: usize) -> Result<()> {
         return Ok(());
     }
     let at = u64::from(line) * size_of::<CacheLine>() as u64;
-    let expected = text!("line {expected}: nodes in depth-first order, then leaves");
-    Err(Error::within(Code::BlockOrder, kind::LINES, at, expected, text!("line {line}")))
+    let expected = format!("line {expected}: nodes in depth-first order, then leaves");
+    Err(Error::within(Code::BlockOrder, kind::LINES, at, expected, format!("line {line}")))
 }
 
 /// BTH-F165.
 fn wrong_count(needed: usize, rows: usize) -> Error {
-    let expected = text!("{needed} rows for the leaves, or more");
+    let expected = format!("{needed} rows for the leaves, or more");
     let at = (rows * size_of::<[u32; WIDTH]>()) as u64;
-    Error::within(Code::LeafRows, kind::LEAF_VERTICES, at, expected, text!("{rows}"))
+    Error::within(Code::LeafRows, kind::LEAF_VERTICES, at, expected, format!("{rows}"))
 }
 
 /// BTH-F166 of a row of LEAF_VERTICES.
@@ -139,8 +139,8 @@ fn check_slots(view: &ObjectView, slots: &[u32; WIDTH], row: usize, used: usize)
     let wrong = |i: usize| slots[i] as usize >= positions || (i >= used && slots[i] != slots[0]);
     let Some(i) = (0..WIDTH).find(|i| wrong(*i)) else { return Ok(()) };
     let at = (row * size_of::<[u32; WIDTH]>() + 4 * i) as u64;
-    let expected = text!("a row below {positions}, in unused slots that of slot 0");
-    Err(Error::within(Code::LeafVertexRows, kind::LEAF_VERTICES, at, expected, text!("{}", slots[i])))
+    let expected = format!("a row below {positions}, in unused slots that of slot 0");
+    Err(Error::within(Code::LeafVertexRows, kind::LEAF_VERTICES, at, expected, format!("{}", slots[i])))
 }
 
 /// BTH-F167 of a triangle of the leaf at a line, given its row of TRIANGLE_IDS and the rows of its corners.
@@ -151,6 +151,6 @@ fn check_triangle(view: &ObjectView, line: u32, row: usize, corners: [u32; 3]) -
         return Ok(());
     }
     let at = u64::from(line) * size_of::<CacheLine>() as u64;
-    let expected = text!("triangle {id} of positions {expected:?}");
-    Err(Error::within(Code::LeafTriangles, kind::LINES, at, expected, text!("{corners:?}")))
+    let expected = format!("triangle {id} of positions {expected:?}");
+    Err(Error::within(Code::LeafTriangles, kind::LINES, at, expected, format!("{corners:?}")))
 }

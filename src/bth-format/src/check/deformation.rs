@@ -50,12 +50,12 @@ fn influences(view: &DeformationView<'_>, counts: Deformation, positions: usize)
     let rows = positions as u64 * sets as u64;
     for (kind, found) in [(kind::JOINTS, view.joints.len()), (kind::JOINT_WEIGHTS, view.weights.len())] {
         if found as u64 != rows {
-            return error(Code::InfluenceRows, kind, 0, text!("{rows} rows"), &found);
+            return error(Code::InfluenceRows, kind, 0, format!("{rows} rows"), &found);
         }
     }
     let beyond = |joints: &[u16; 4]| joints.iter().any(|joint| u32::from(*joint) >= counts.joints);
     if let Some(row) = view.joints.iter().position(beyond) {
-        let expected = text!("joints below {}", counts.joints);
+        let expected = format!("joints below {}", counts.joints);
         return error(Code::Influences, kind::JOINTS, 8 * row, expected, &view.joints[row]);
     }
     let unusable = |weights: &[[f32; 4]]| {
@@ -76,7 +76,7 @@ fn influences(view: &DeformationView<'_>, counts: Deformation, positions: usize)
 fn morphs(view: &DeformationView<'_>, counts: Deformation, rows: [usize; 2]) -> Result<()> {
     let (targets, found) = (counts.targets as usize, view.morphs.len());
     if found != targets && found as u64 != 2 * targets as u64 {
-        let expected = text!("{targets} rows or twice as many");
+        let expected = format!("{targets} rows or twice as many");
         return error(Code::MorphRows, kind::MORPHS, 0, expected, &found);
     }
     let (mut delta, mut row) = (0u64, 0u64);
@@ -91,13 +91,14 @@ fn morphs(view: &DeformationView<'_>, counts: Deformation, rows: [usize; 2]) -> 
         row += if dense { 0 } else { u64::from(morph.deltas) };
         let ends = delta <= view.deltas.len() as u64 && row <= view.morph_rows.len() as u64;
         if !starts || !ends || dense && morph.deltas as usize != all {
-            let expected = text!("a range behind those before within its sections; if dense, of {all} rows");
+            let expected =
+                format!("a range behind those before within its sections; if dense, of {all} rows");
             return error(Code::MorphRanges, kind::MORPHS, at, expected, morph);
         }
         let (Some(rows), first) = (view.morph(i).rows, morph.first_row as usize) else { continue };
         let wrong = |k: usize| rows[k] as usize >= all || k > 0 && rows[k - 1] >= rows[k];
         if let Some(k) = (0..rows.len()).find(|k| wrong(*k)) {
-            let expected = text!("ascending rows below {all}");
+            let expected = format!("ascending rows below {all}");
             return error(Code::MorphOrder, kind::MORPH_ROWS, 4 * (first + k), expected, &rows[k]);
         }
     }
@@ -106,7 +107,7 @@ fn morphs(view: &DeformationView<'_>, counts: Deformation, rows: [usize; 2]) -> 
         (kind::MORPH_ROWS, 4, row, view.morph_rows.len()),
     ] {
         if used != there as u64 {
-            let expected = text!("{used} rows, as the morphs have");
+            let expected = format!("{used} rows, as the morphs have");
             return error(Code::MorphRanges, kind, stride * used as usize, expected, &there);
         }
     }
@@ -123,5 +124,5 @@ fn error<T>(
     expected: impl Into<Cow<'static, str>>,
     found: &dyn Debug,
 ) -> Result<T> {
-    Err(Error::within(code, kind, at as u64, expected, text!("{found:?}")))
+    Err(Error::within(code, kind, at as u64, expected, format!("{found:?}")))
 }

@@ -19,7 +19,7 @@ pub(super) fn check(view: &SceneView<'_>, objects: u32, deformation: Deformation
     match view.morph_weights.iter().position(|weight| !weight.is_finite()) {
         None => Ok(()),
         Some(row) => {
-            let found = text!("{}", view.morph_weights[row]);
+            let found = format!("{}", view.morph_weights[row]);
             let at = 8 * row as u64;
             Err(Error::within_file(Code::MorphWeights, kind::MORPH_WEIGHTS, at, "a finite weight", found))
         }
@@ -35,7 +35,7 @@ fn skins(view: &SceneView<'_>) -> Result<()> {
         if !starts || skin.joints == 0 || end > view.skin_joints.len() as u64 || skin.reserved != [0; 2] {
             let at = (size_of::<Skin>() * row) as u64;
             let expected = "joints behind those before within SKIN_JOINTS, at least one, and zeros";
-            return Err(Error::within_file(Code::Skin, kind::SKINS, at, expected, text!("{skin:?}")));
+            return Err(Error::within_file(Code::Skin, kind::SKINS, at, expected, format!("{skin:?}")));
         }
     }
     cover(Code::Skin, kind::SKIN_JOINTS, size_of::<SkinJoint>(), end, view.skin_joints.len())
@@ -93,7 +93,7 @@ fn deformers(view: &SceneView<'_>, objects: u32, deformation: DeformationOf<'_>)
         if !starts || end > view.morph_weights.len() as u64 {
             let at = (size_of::<Deformer>() * row + offset_of!(Deformer, first_weight)) as u64;
             let (expected, found) =
-                ("weights behind those before within MORPH_WEIGHTS", text!("{deformer:?}"));
+                ("weights behind those before within MORPH_WEIGHTS", format!("{deformer:?}"));
             return Err(Error::within_file(Code::MorphWeights, kind::DEFORMERS, at, expected, found));
         }
     }
@@ -111,7 +111,7 @@ fn distinct_objects(view: &SceneView<'_>) -> Result<()> {
         Some(pair) => {
             let row = pair[1] as u32 as usize;
             let at = (size_of::<Deformer>() * row + offset_of!(Deformer, object)) as u64;
-            let (expected, found) = ("an object of no other deformer", text!("{}", pair[1] >> 32));
+            let (expected, found) = ("an object of no other deformer", format!("{}", pair[1] >> 32));
             Err(Error::within_file(Code::Deformer, kind::DEFORMERS, at, expected, found))
         }
     }
@@ -122,6 +122,6 @@ fn cover(code: Code, kind: u32, stride: usize, end: u64, rows: usize) -> Result<
     if end == rows as u64 {
         return Ok(());
     }
-    let (at, expected) = (stride as u64 * end, text!("{end} rows, as the ranges have"));
-    Err(Error::within_file(code, kind, at, expected, text!("{rows}")))
+    let (at, expected) = (stride as u64 * end, format!("{end} rows, as the ranges have"));
+    Err(Error::within_file(code, kind, at, expected, format!("{rows}")))
 }

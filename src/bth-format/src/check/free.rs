@@ -12,14 +12,14 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
     let is_right = |rows: usize| rows == 0 || rows == triangles;
     // Where both are not 0, the sum is too great.
     if !is_right(directions) || !is_right(directions + distances) {
-        let expected = text!("{triangles} rows in one section, or none");
-        let (kind, found) = (view.free_kind().0, text!("{}", directions + distances));
+        let expected = format!("{triangles} rows in one section, or none");
+        let (kind, found) = (view.free_kind().0, format!("{}", directions + distances));
         return Err(Error::within(Code::FreeRows, kind, 0, expected, found));
     }
     let levels = view.free_levels;
     if levels.is_empty() == view.has_free_directions() {
         // There is at most one row.
-        let (expected, found) = ("one row beside such rows, else none", text!("{}", levels.len()));
+        let (expected, found) = ("one row beside such rows, else none", format!("{}", levels.len()));
         return Err(Error::within(Code::FreeRows, kind::FREE_LEVELS, 0, expected, found));
     }
     if let Some(row) = levels.first() {
@@ -27,8 +27,8 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
         let [a, b, c] = row.distance;
         let is_ascending = least <= a && a < b && b < c && c <= most;
         if row.distance != [0.0; 3] && !is_ascending || row.reserved != 0 {
-            let expected = text!("zeros, or ascending distances from {least:e} to {most:e}");
-            let found = text!("{a}, {b}, {c}");
+            let expected = format!("zeros, or ascending distances from {least:e} to {most:e}");
+            let found = format!("{a}, {b}, {c}");
             return Err(Error::within(Code::FreeLevels, kind::FREE_LEVELS, 0, expected, found));
         }
     }
@@ -36,7 +36,8 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
         let last = row.bins[3];
         if last & !((FreeBins::ALL | FreeBins::BACK) >> 96) as u32 != 0 {
             let at = (size_of::<FreeDirections>() * triangle + offset_of!(FreeDirections, bins)) as u64;
-            let (expected, found) = ("zero in bits 121 to 125 and 127", text!("{last:#010x} from bit 96 on"));
+            let (expected, found) =
+                ("zero in bits 121 to 125 and 127", format!("{last:#010x} from bit 96 on"));
             return Err(Error::within(Code::FreeBins, kind::FREE_DIRECTIONS, at, expected, found));
         }
     }
@@ -51,7 +52,7 @@ fn check_unplaced(view: &ObjectView) -> Result<()> {
         let place = view.places.get(triangle).copied().unwrap_or(NONE);
         if place == NONE && !known.is_nothing() {
             let (at, expected) = ((stride * triangle) as u64, "zeros, since the triangle has no place");
-            return Err(Error::within(Code::FreeUnplaced, kind, at, expected, text!("{known:?}")));
+            return Err(Error::within(Code::FreeUnplaced, kind, at, expected, format!("{known:?}")));
         }
     }
     Ok(())

@@ -1,6 +1,6 @@
 //! Groups of triangles, their materials and names: BTH-F142 to BTH-F144.
 
-use crate::error::{Code, Error, Result, Text};
+use crate::error::{Code, Error, Result};
 use crate::layout::{Group, GroupRun, Material, NONE, kind};
 use crate::names::{checked, is_name};
 use crate::object::ObjectView;
@@ -12,9 +12,9 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
     for (row, group) in view.groups.iter().enumerate() {
         let at = size_of::<Group>() * row;
         if group.material != NONE && group.material as usize >= view.materials.len() {
-            let expected = text!("a row below {} or NONE", view.materials.len());
+            let expected = format!("a row below {} or NONE", view.materials.len());
             let at = at + offset_of!(Group, material);
-            return error(Code::Group, kind::GROUPS, at, expected, text!("{}", group.material));
+            return error(Code::Group, kind::GROUPS, at, expected, format!("{}", group.material));
         }
         zero(kind::GROUPS, at + offset_of!(Group, reserved), group.reserved == 0)?;
         label(labels, kind::GROUPS, at, (group.name, group.name_length))?;
@@ -37,8 +37,8 @@ fn runs(view: &ObjectView) -> Result<()> {
             Code::GroupRuns,
             kind::GROUP_RUNS,
             0,
-            Text::from(expected),
-            text!("{} rows", runs.len()),
+            String::from(expected),
+            format!("{} rows", runs.len()),
         );
     }
     for (row, run) in runs.iter().enumerate() {
@@ -47,12 +47,12 @@ fn runs(view: &ObjectView) -> Result<()> {
             Some(before) => runs[before].first < run.first,
         };
         if !ascends || run.first >= triangles || run.group as usize >= view.groups.len() {
-            let expected = text!(
+            let expected = format!(
                 "ascending triangles from 0 and below {triangles}, and a group below {}",
                 view.groups.len()
             );
             let at = size_of::<GroupRun>() * row;
-            return error(Code::GroupRuns, kind::GROUP_RUNS, at, expected, text!("{run:?}"));
+            return error(Code::GroupRuns, kind::GROUP_RUNS, at, expected, format!("{run:?}"));
         }
     }
     Ok(())
@@ -71,10 +71,10 @@ fn label(labels: &str, kind: u32, at: usize, (first, length): (u32, u32)) -> Res
     if is_name(labels, first, length) {
         return Ok(());
     }
-    let expected = Text::from("a name of at most 4096 bytes within LABELS");
-    error(Code::Label, kind, at, expected, text!("{:?}", (first, length)))
+    let expected = String::from("a name of at most 4096 bytes within LABELS");
+    error(Code::Label, kind, at, expected, format!("{:?}", (first, length)))
 }
 
-fn error(code: Code, kind: u32, at: usize, expected: Text, found: Text) -> Result<()> {
+fn error(code: Code, kind: u32, at: usize, expected: String, found: String) -> Result<()> {
     Err(Error::within(code, kind, at as u64, expected, found))
 }

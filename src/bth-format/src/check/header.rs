@@ -1,7 +1,7 @@
 //! The OBJECT row: BTH-F101 to BTH-F103, and the limits of counts and depth (BTH-F022, BTH-F110).
 
 use super::boxes::is_box;
-use crate::error::{Code, Error, Result, Text};
+use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::limits::{MAX_DEPTH, MAX_TRIANGLES};
 use crate::object::{ObjectView, Records};
@@ -13,7 +13,7 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
     bounds(view.header)
 }
 
-fn fail(code: Code, offset: usize, expected: Text, found: Text) -> Result<()> {
+fn fail(code: Code, offset: usize, expected: String, found: String) -> Result<()> {
     Err(Error::within(code, kind::OBJECT, offset as u64, expected, found))
 }
 
@@ -28,7 +28,7 @@ fn record(view: &ObjectView) -> Result<()> {
         Records::Tet16(_) => record == RecordKind::Tet16 as u32,
     };
     if !fits {
-        let found = text!("{record} with {} tet leaves", view.tet_leaves.len());
+        let found = format!("{record} with {} tet leaves", view.tet_leaves.len());
         return fail(Code::Record, offset_of!(Object, record), "the kind of the records".into(), found);
     }
     Ok(())
@@ -46,21 +46,21 @@ fn counts(view: &ObjectView) -> Result<()> {
     let triangles = h.triangles as usize;
     for (name, rows) in rows {
         if rows != 0 && rows != triangles {
-            let expected = text!("{triangles} rows of {name}, or none");
-            return fail(Code::Counts, offset_of!(Object, triangles), expected, text!("{rows}"));
+            let expected = format!("{triangles} rows of {name}, or none");
+            return fail(Code::Counts, offset_of!(Object, triangles), expected, format!("{rows}"));
         }
     }
     if h.triangles > MAX_TRIANGLES {
-        let expected = text!("at most {MAX_TRIANGLES} triangles");
-        return fail(Code::Limit, offset_of!(Object, triangles), expected, text!("{triangles}"));
+        let expected = format!("at most {MAX_TRIANGLES} triangles");
+        return fail(Code::Limit, offset_of!(Object, triangles), expected, format!("{triangles}"));
     }
     if h.dropped > h.triangles {
-        let expected = text!("at most {triangles} dropped triangles");
-        return fail(Code::Counts, offset_of!(Object, dropped), expected, text!("{}", h.dropped));
+        let expected = format!("at most {triangles} dropped triangles");
+        return fail(Code::Counts, offset_of!(Object, dropped), expected, format!("{}", h.dropped));
     }
     if h.depth > MAX_DEPTH as u32 {
-        let expected = text!("at most {MAX_DEPTH}");
-        return fail(Code::Depth, offset_of!(Object, depth), expected, text!("{}", h.depth));
+        let expected = format!("at most {MAX_DEPTH}");
+        return fail(Code::Depth, offset_of!(Object, depth), expected, format!("{}", h.depth));
     }
     Ok(())
 }
@@ -74,7 +74,7 @@ fn bounds(header: &Object) -> Result<()> {
         (is_box(lower, upper), "finite bounds, lower <= upper")
     };
     if !good {
-        return fail(Code::ObjectBounds, 0, expected.into(), text!("{lower:?} to {upper:?}"));
+        return fail(Code::ObjectBounds, 0, expected.into(), format!("{lower:?} to {upper:?}"));
     }
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! Triangle leaves and the ids that they refer to: BTH-F113 to BTH-F118.
 
-use crate::error::{Code, Error, Result, Text};
+use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::object::ObjectView;
 use std::mem::offset_of;
@@ -20,13 +20,13 @@ pub(super) fn check(view: &ObjectView, child: Child, start: u64) -> Result<()> {
     checked.map_err(|error| error.moved_to(start))?;
     match view.unused_bits(child) {
         0 => Ok(()),
-        found => Err(Error::within(Code::LeafUnused, kind::LINES, start, "0", text!("{found:#x}"))),
+        found => Err(Error::within(Code::LeafUnused, kind::LINES, start, "0", format!("{found:#x}"))),
     }
 }
 
 /// Checks an indexed leaf; `start` is its first byte in LINES, `rows` the number of rows of TRIANGLE_IDS.
 fn indexed(leaf: &IndexedLeaf, start: u64, rows: usize) -> Result<()> {
-    let fail = |code, offset: usize, expected: &'static str, found: Text| {
+    let fail = |code, offset: usize, expected: &'static str, found: String| {
         Err(Error::within(code, kind::LINES, start + offset as u64, expected, found))
     };
     counts(leaf.triangles, start + offset_of!(IndexedLeaf, triangles) as u64)?;
@@ -38,10 +38,10 @@ fn indexed(leaf: &IndexedLeaf, start: u64, rows: usize) -> Result<()> {
             let offset = offset_of!(IndexedLeaf, corner) + WIDTH * k + i;
             if i < triangles && corner as usize >= vertices {
                 let expected = "a corner below the number of vertices";
-                return fail(Code::Corner, offset, expected, text!("{corner}"));
+                return fail(Code::Corner, offset, expected, format!("{corner}"));
             }
             if i >= triangles && corner != 0 {
-                return fail(Code::LeafUnused, offset, "0 in an unused slot", text!("{corner}"));
+                return fail(Code::LeafUnused, offset, "0 in an unused slot", format!("{corner}"));
             }
         }
     }
@@ -51,7 +51,7 @@ fn indexed(leaf: &IndexedLeaf, start: u64, rows: usize) -> Result<()> {
         }
     }
     if leaf.reserved != 0 {
-        return fail(Code::LeafUnused, offset_of!(IndexedLeaf, reserved), "0", text!("{}", leaf.reserved));
+        return fail(Code::LeafUnused, offset_of!(IndexedLeaf, reserved), "0", format!("{}", leaf.reserved));
     }
     Ok(())
 }
@@ -67,7 +67,7 @@ fn raw(leaf: &RawLeaf, start: u64, rows: usize) -> Result<()> {
     }
     if leaf.reserved != [0; 14] {
         let at = start + offset_of!(RawLeaf, reserved) as u64;
-        let found = text!("{:?}", leaf.reserved);
+        let found = format!("{:?}", leaf.reserved);
         return Err(Error::within(Code::LeafUnused, kind::LINES, at, "zeros", found));
     }
     Ok(())
@@ -78,7 +78,7 @@ fn counts(count: u32, at: u64) -> Result<()> {
     if (1..=WIDTH as u32).contains(&count) {
         return Ok(());
     }
-    Err(Error::within(Code::LeafCounts, kind::LINES, at, "1 to 16", text!("{count}")))
+    Err(Error::within(Code::LeafCounts, kind::LINES, at, "1 to 16", format!("{count}")))
 }
 
 /// BTH-F115: the rows of a leaf lie within TRIANGLE_IDS.
@@ -86,18 +86,24 @@ fn range(first: u32, count: u32, rows: usize, at: u64) -> Result<()> {
     if first as u64 + count as u64 <= rows as u64 {
         return Ok(());
     }
-    let (expected, found) = (text!("{count} rows below {rows}"), text!("row {first}"));
+    let (expected, found) = (format!("{count} rows below {rows}"), format!("row {first}"));
     Err(Error::within(Code::LeafIds, kind::LINES, at, expected, found))
 }
 
 /// BTH-F117 and BTH-F118: a coordinate in use is finite; an unused one repeats that of slot 0, bit for bit.
 fn vertex(x: f32, of_slot_0: f32, used: bool, at: u64) -> Result<()> {
     if used && !x.is_finite() {
-        return Err(Error::within(Code::LeafVertices, kind::LINES, at, "a finite coordinate", text!("{x}")));
+        return Err(Error::within(
+            Code::LeafVertices,
+            kind::LINES,
+            at,
+            "a finite coordinate",
+            format!("{x}"),
+        ));
     }
     if !used && x.to_bits() != of_slot_0.to_bits() {
-        let expected = text!("{of_slot_0}, as in slot 0");
-        return Err(Error::within(Code::LeafUnused, kind::LINES, at, expected, text!("{x}")));
+        let expected = format!("{of_slot_0}, as in slot 0");
+        return Err(Error::within(Code::LeafUnused, kind::LINES, at, expected, format!("{x}")));
     }
     Ok(())
 }
@@ -108,8 +114,8 @@ pub(super) fn check_ids(view: &ObjectView) -> Result<()> {
     match view.triangle_ids.iter().position(|id| *id >= triangles) {
         None => Ok(()),
         Some(row) => {
-            let expected = text!("an id below {triangles}");
-            let found = text!("{}", view.triangle_ids[row]);
+            let expected = format!("an id below {triangles}");
+            let found = format!("{}", view.triangle_ids[row]);
             Err(Error::within(Code::TriangleId, kind::TRIANGLE_IDS, 4 * row as u64, expected, found))
         }
     }

@@ -12,7 +12,7 @@ use std::mem::offset_of;
 pub(crate) fn materials(view: &MaterialsView<'_>, materials: usize, triangles: u32) -> Result<()> {
     let rows = view.parameters.len();
     if rows != 0 && rows != materials {
-        let expected = text!("{materials} rows or none");
+        let expected = format!("{materials} rows or none");
         return error(Code::MaterialParameters, kind::MATERIAL_PARAMETERS, 0, expected, &rows);
     }
     for (row, parameters) in view.parameters.iter().enumerate() {
@@ -53,7 +53,7 @@ fn parameters(p: &MaterialParameters, textures: usize, at: usize) -> Result<()> 
         (offset_of!(MaterialParameters, emissive_texture), p.emissive_texture),
     ] {
         if row != NONE && row as usize >= textures {
-            let expected = text!("a row below {textures} or NONE");
+            let expected = format!("a row below {textures} or NONE");
             return error(Code::MaterialParameters, kind::MATERIAL_PARAMETERS, at + field, expected, &row);
         }
     }
@@ -109,13 +109,13 @@ fn corners(
     (rows, triangles): (usize, usize),
 ) -> Result<()> {
     if !corners.is_empty() && corners.len() != triangles {
-        let expected = text!("{triangles} rows or none");
+        let expected = format!("{triangles} rows or none");
         return error(code, section, 0, expected, &corners.len());
     }
     match corners.as_flattened().iter().position(|row| *row as usize >= rows) {
         None => Ok(()),
         Some(i) => {
-            let expected = text!("a row below {rows}");
+            let expected = format!("a row below {rows}");
             error(code, section, 4 * i, expected, &corners.as_flattened()[i])
         }
     }
@@ -130,13 +130,13 @@ pub(crate) fn images(view: &ImagesView<'_>) -> Result<()> {
         end = match behind.filter(|behind| ascends && *behind <= view.bytes.len() as u64) {
             Some(behind) => behind,
             None => {
-                let expected = text!("a greater name, and bytes from {end} within {}", view.bytes.len());
+                let expected = format!("a greater name, and bytes from {end} within {}", view.bytes.len());
                 return within_file(row * size_of::<Image>(), expected, image);
             }
         };
     }
     if end != view.bytes.len() as u64 {
-        return within_file(0, text!("images of all {} bytes", view.bytes.len()), &end);
+        return within_file(0, format!("images of all {} bytes", view.bytes.len()), &end);
     }
     Ok(())
 }
@@ -153,7 +153,7 @@ pub(crate) fn image_names(view: &MaterialsView<'_>, images: &ImagesView<'_>) -> 
 }
 
 fn within_file(at: usize, expected: impl Into<Cow<'static, str>>, found: &dyn Debug) -> Result<()> {
-    Err(Error::within_file(Code::Images, kind::IMAGES, at as u64, expected, text!("{found:?}")))
+    Err(Error::within_file(Code::Images, kind::IMAGES, at as u64, expected, format!("{found:?}")))
 }
 
 fn error(
@@ -163,5 +163,5 @@ fn error(
     expected: impl Into<Cow<'static, str>>,
     found: &dyn Debug,
 ) -> Result<()> {
-    Err(Error::within(code, kind, at as u64, expected, text!("{found:?}")))
+    Err(Error::within(code, kind, at as u64, expected, format!("{found:?}")))
 }

@@ -1,7 +1,7 @@
 //! One node: its slots and boxes.
 
 use super::boxes::is_box;
-use crate::error::{Code, Error, Result, Text};
+use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use std::mem::offset_of;
 
@@ -9,7 +9,7 @@ use std::mem::offset_of;
 /// byte in LINES.
 pub(super) fn check_slots(node: &WideNode, start: u64) -> Result<()> {
     let used = node.child.iter().take_while(|c| **c != NONE).count();
-    let fail = |code, offset: usize, expected: &'static str, found: Text| {
+    let fail = |code, offset: usize, expected: &'static str, found: String| {
         Err(Error::within(code, kind::LINES, start + offset as u64, expected, found))
     };
     if used == 0 {
@@ -20,10 +20,10 @@ pub(super) fn check_slots(node: &WideNode, start: u64) -> Result<()> {
         let upper = [0, 1, 2].map(|a| node.bounds[a][1][i]);
         if i < used {
             if !is_box(lower, upper) {
-                return fail(Code::ChildBounds, 4 * i, "a finite box", text!("{lower:?} to {upper:?}"));
+                return fail(Code::ChildBounds, 4 * i, "a finite box", format!("{lower:?} to {upper:?}"));
             }
         } else if node.child[i] != NONE || lower != [f32::MAX; 3] || upper != [-f32::MAX; 3] {
-            let found = text!("child {:#010x} with {lower:?} to {upper:?} in slot {i}", node.child[i]);
+            let found = format!("child {:#010x} with {lower:?} to {upper:?} in slot {i}", node.child[i]);
             return fail(Code::Slots, 4 * i, "an empty slot behind the used ones", found);
         }
     }

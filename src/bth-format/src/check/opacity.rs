@@ -1,6 +1,6 @@
 //! The opacity of triangles: BTH-F145 to BTH-F147.
 
-use crate::error::{Code, Error, Result, Text};
+use crate::error::{Code, Error, Result};
 use crate::layout::{Opacity, TriangleOpacity, kind, opacity_words};
 use crate::object::ObjectView;
 
@@ -8,29 +8,29 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
     let (rows, words) = (view.opacity, view.opacity_micro);
     let triangles = view.header.triangles as usize;
     if rows.is_empty() && !words.is_empty() {
-        let found = text!("{} words", words.len());
+        let found = format!("{} words", words.len());
         return Err(Error::within(Code::OpacityRows, kind::OPACITY_MICRO, 0, "none without OPACITY", found));
     }
     if !rows.is_empty() && rows.len() != triangles {
-        let found = text!("{}", rows.len());
+        let found = format!("{}", rows.len());
         return Err(Error::within(
             Code::OpacityRows,
             kind::OPACITY,
             0,
-            text!("{triangles} rows or none"),
+            format!("{triangles} rows or none"),
             found,
         ));
     }
     for (triangle, row) in rows.iter().enumerate() {
-        let wrong = |expected: Text| {
-            Error::within(Code::Opacity, kind::OPACITY, 4 * triangle as u64, expected, text!("{row:#x}"))
+        let wrong = |expected: String| {
+            Error::within(Code::Opacity, kind::OPACITY, 4 * triangle as u64, expected, format!("{row:#x}"))
         };
         match TriangleOpacity::from_code(*row) {
             Some(TriangleOpacity::Whole(_)) => {}
             Some(TriangleOpacity::Micro { level, word }) => {
                 let first = word as usize;
                 if first + opacity_words(level) > words.len() {
-                    return Err(wrong(text!("states within {} words", words.len())));
+                    return Err(wrong(format!("states within {} words", words.len())));
                 }
                 if level == 1 && words[first] >> 8 != 0 {
                     return Err(micro(first, words[first]));
@@ -48,5 +48,5 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
 
 fn micro(row: usize, word: u32) -> Error {
     let expected = "states from 0 to 2 and zeros behind the last";
-    Error::within(Code::MicroOpacity, kind::OPACITY_MICRO, 4 * row as u64, expected, text!("{word:#010x}"))
+    Error::within(Code::MicroOpacity, kind::OPACITY_MICRO, 4 * row as u64, expected, format!("{word:#010x}"))
 }

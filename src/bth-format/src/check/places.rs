@@ -41,7 +41,7 @@ impl Placed {
             if found == place {
                 self.0.insert(triangle);
             } else if found == NONE {
-                let expected = text!("{place:#010x}, or another leaf that holds the triangle");
+                let expected = format!("{place:#010x}, or another leaf that holds the triangle");
                 return Err(wrong(Code::PlaceMissing, triangle, expected, found));
             }
         }
@@ -54,14 +54,14 @@ impl Placed {
         match places.find(|(triangle, place)| **place != NONE && !self.0.contains(*triangle)) {
             None => Ok(()),
             Some((triangle, &place)) => {
-                let expected = text!("a leaf and a slot that hold triangle {triangle}, or NONE");
+                let expected = format!("a leaf and a slot that hold triangle {triangle}, or NONE");
                 Err(wrong(Code::TrianglePlace, triangle, expected, place))
             }
         }
     }
 }
 
-fn wrong(code: Code, triangle: usize, expected: crate::error::Text, found: u32) -> Error {
+fn wrong(code: Code, triangle: usize, expected: String, found: u32) -> Error {
     let at = (size_of::<u32>() * triangle) as u64;
-    Error::within(code, kind::TRIANGLE_PLACES, at, expected, text!("{found:#010x}"))
+    Error::within(code, kind::TRIANGLE_PLACES, at, expected, format!("{found:#010x}"))
 }

@@ -1,6 +1,6 @@
 //! Rows of scene sections, each checked by itself.
 
-use crate::error::{Code, Error, Result, Text};
+use crate::error::{Code, Error, Result};
 use std::fmt::Debug;
 
 /// What a row violates.
@@ -9,7 +9,7 @@ pub(super) struct Violation {
     /// Byte of the row.
     pub(super) offset: usize,
     pub(super) expected: &'static str,
-    pub(super) found: Text,
+    pub(super) found: String,
 }
 
 /// What the check of one row returns.
@@ -22,7 +22,7 @@ pub(super) fn violation<T>(
     expected: &'static str,
     found: impl Debug,
 ) -> RowResult<T> {
-    Err(Violation { code, offset, expected, found: text!("{found:?}") })
+    Err(Violation { code, offset, expected, found: format!("{found:?}") })
 }
 
 /// Checks every row of a section of the whole file by itself.
@@ -42,7 +42,7 @@ impl Violation {
             kind,
             offset as u64,
             self.expected,
-            text!("{} in row {row}", self.found),
+            format!("{} in row {row}", self.found),
         )
     }
 }

@@ -31,7 +31,7 @@ pub(crate) fn check(view: &SceneView<'_>, objects: u32, deformation: Deformation
 /// BTH-F150: the SCENE row.
 fn scene_row(view: &SceneView<'_>) -> Result<()> {
     let [scene] = view.scene else {
-        let found = text!("{} rows of SCENE", view.scene.len());
+        let found = format!("{} rows of SCENE", view.scene.len());
         return Err(Error::within_file(Code::Scene, kind::SCENE, 0, "one row of SCENE", found));
     };
     check_rows(kind::SCENE, std::slice::from_ref(scene), |_, s| {

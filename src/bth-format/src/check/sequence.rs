@@ -13,18 +13,18 @@ pub(crate) fn sequence(view: &ObjectView, sequence: &SequenceView) -> Result<()>
     let fits = times.len().checked_mul(rows) == Some(positions.len());
     if !fits || (!times.is_empty() && !view.is_deformable()) {
         let expected = "a row for each time and each row of POSITIONS, in a deformable object";
-        let found = text!("{} rows for {} times and {rows} positions", positions.len(), times.len());
+        let found = format!("{} rows for {} times and {rows} positions", positions.len(), times.len());
         return Err(Error::within(Code::SequenceRows, kind::SEQUENCE_POSITIONS, 0, expected, found));
     }
     let finite = times.iter().position(|time| !time.is_finite());
     let ascending = || times.windows(2).position(|pair| pair[0] >= pair[1]).map(|row| row + 1);
     if let Some(row) = finite.or_else(ascending) {
-        let (at, found) = (8 * row as u64, text!("{}", times[row]));
+        let (at, found) = (8 * row as u64, format!("{}", times[row]));
         let expected = "finite times that ascend strictly";
         return Err(Error::within(Code::SequenceTimes, kind::SEQUENCE_TIMES, at, expected, found));
     }
     let wrong = |row: usize, expected: &'static str| {
-        let (at, found) = (12 * row as u64, text!("{:?}", positions[row]));
+        let (at, found) = (12 * row as u64, format!("{:?}", positions[row]));
         Err(Error::within(Code::SequencePositions, kind::SEQUENCE_POSITIONS, at, expected, found))
     };
     if let Some(row) = positions.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
@@ -58,7 +58,7 @@ pub(crate) fn segments<'a>(
             continue;
         }
         let fail = |code: Code, row: usize, expected: &'static str| {
-            let (at, found) = ((size_of::<Segment>() * row) as u64, text!("{:?}", segments.get(row)));
+            let (at, found) = ((size_of::<Segment>() * row) as u64, format!("{:?}", segments.get(row)));
             Err(Error::within(code, kind::SEGMENTS, at, expected, found).in_object(number))
         };
         let in_order = |row: usize| row == 0 || segments[row - 1].first < segments[row].first;
@@ -102,7 +102,7 @@ pub(crate) fn segments<'a>(
     match instances.iter().enumerate().find_map(|(row, instance)| Some((row, instance, used(instance)?))) {
         None => Ok(()),
         Some((row, instance, number)) => {
-            let found = text!("instance {row} of object {}", instance.object);
+            let found = format!("instance {row} of object {}", instance.object);
             let expected = "no instance of a segment but the first";
             Err(Error::within(Code::SegmentObjects, kind::SEGMENTS, 0, expected, found).in_object(number))
         }

@@ -8,14 +8,14 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
     rows(kind::TRIANGLES, view.triangles, view.positions.len())?;
     let (normals, uvs) = (view.normals.len(), view.uvs.len());
     if normals != 0 && uvs != 0 && normals != uvs {
-        let expected = text!("{normals} rows, as many as normals");
-        return Err(Error::within(Code::SourceRows, kind::UVS, 0, expected, text!("{uvs}")));
+        let expected = format!("{normals} rows, as many as normals");
+        return Err(Error::within(Code::SourceRows, kind::UVS, 0, expected, format!("{uvs}")));
     }
     rows(kind::CORNERS, view.corners, normals.max(uvs))?;
     match view.positions.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
         None => Ok(()),
         Some(row) => {
-            let found = text!("{:?}", view.positions[row]);
+            let found = format!("{:?}", view.positions[row]);
             Err(Error::within(Code::Positions, kind::POSITIONS, 12 * row as u64, "a finite position", found))
         }
     }
@@ -26,8 +26,8 @@ fn rows(section: u32, table: &[[u32; 3]], rows: usize) -> Result<()> {
     match table.iter().flatten().position(|v| *v as usize >= rows) {
         None => Ok(()),
         Some(i) => {
-            let found = text!("{}", table[i / 3][i % 3]);
-            Err(Error::within(Code::SourceRows, section, 4 * i as u64, text!("a row below {rows}"), found))
+            let found = format!("{}", table[i / 3][i % 3]);
+            Err(Error::within(Code::SourceRows, section, 4 * i as u64, format!("a row below {rows}"), found))
         }
     }
 }

@@ -30,15 +30,15 @@ fn check_hull_faces(tets: &TetAdjacency, leaf: &TetLeaf) -> Result<()> {
         let right = tets.vertices(hull.tet) == vertices && tets.links(hull.tet)[slot] == NONE;
         if !right || named.insert(face_number(hull.tet, slot)) {
             let at = u64::from(row) * size_of::<HullFace>() as u64;
-            let expected = text!("a face of {:?} without a neighbour, once", tets.vertices(hull.tet));
-            return Err(Error::within(Code::HullFace, kind::HULL_FACES, at, expected, text!("{hull:?}")));
+            let expected = format!("a face of {:?} without a neighbour, once", tets.vertices(hull.tet));
+            return Err(Error::within(Code::HullFace, kind::HULL_FACES, at, expected, format!("{hull:?}")));
         }
     }
     for tet in tets.tets.clone() {
         for (slot, link) in tets.links(tet).into_iter().enumerate() {
             if link == NONE && !named.contains(face_number(tet, slot)) {
                 let expected = "a hull face where there is no neighbour";
-                let found = text!("none for slot {slot} of tetrahedron {tet}");
+                let found = format!("none for slot {slot} of tetrahedron {tet}");
                 return Err(tets.error(Code::HullFace, tet, expected, found));
             }
         }
@@ -65,7 +65,7 @@ fn check_constrained_faces(tets: &TetAdjacency, leaf: &TetLeaf) -> Result<()> {
         if !refers(0) || !refers(1) || face.tet[0] == face.tet[1] {
             let at = u64::from(row) * size_of::<TetFace>() as u64;
             let expected = "two tetrahedra with this face that refer to it";
-            return Err(Error::within(Code::TetFace, kind::TET_FACES, at, expected, text!("{face:?}")));
+            return Err(Error::within(Code::TetFace, kind::TET_FACES, at, expected, format!("{face:?}")));
         }
     }
     Ok(())
@@ -79,16 +79,16 @@ fn check_links(tets: &TetAdjacency, tet: u32) -> Result<()> {
             let there = tets.vertices(next).iter().position(|v| *v == opposite);
             let found = there.map(|s| tets.links(next)[s]);
             if found != Some(back) {
-                let expected = text!("tetrahedron {next} to refer to {tet}");
-                return Err(tets.error(Code::Neighbour, next, expected, text!("{found:?}")));
+                let expected = format!("tetrahedron {next} to refer to {tet}");
+                return Err(tets.error(Code::Neighbour, next, expected, format!("{found:?}")));
             }
         }
         if let Records::Link32(r) = tets.view.records {
             let found = r[tet as usize].link[slot].opposite;
             let expected = neighbour.map_or(NONE, |n| n.opposite);
             if found != expected {
-                let expected = text!("opposite vertex {expected} beyond slot {slot}");
-                return Err(tets.error(Code::TetRecord, tet, expected, text!("{found}, link {link}")));
+                let expected = format!("opposite vertex {expected} beyond slot {slot}");
+                return Err(tets.error(Code::TetRecord, tet, expected, format!("{found}, link {link}")));
             }
         }
     }
@@ -108,6 +108,6 @@ fn check_record(tets: &TetAdjacency, tet: u32) -> Result<()> {
     if right {
         return Ok(());
     }
-    let expected = text!("the vertices {vertices:?} and their exclusive or {xor}");
+    let expected = format!("the vertices {vertices:?} and their exclusive or {xor}");
     Err(tets.error(Code::TetRecord, tet, expected, "others"))
 }

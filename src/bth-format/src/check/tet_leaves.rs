@@ -1,7 +1,7 @@
 //! Tet leaves, their vertices, and the map from triangles to constrained faces.
 
 use super::boxes::is_box;
-use crate::error::{Code, Error, Result, Text};
+use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::object::ObjectView;
 use std::mem::offset_of;
@@ -19,15 +19,15 @@ fn ranges(view: &ObjectView) -> Result<()> {
     let mut end = [0u64; 4];
     for (i, leaf) in view.tet_leaves.iter().enumerate() {
         let start = (i * size_of::<TetLeaf>()) as u64;
-        let fail = |code, offset: usize, expected: Text, found: Text| {
+        let fail = |code, offset: usize, expected: String, found: String| {
             Err(Error::within(code, kind::TET_LEAVES, start + offset as u64, expected, found))
         };
         if !is_box(leaf.lower, leaf.upper) || (0..3).any(|a| leaf.lower[a] >= leaf.upper[a]) {
-            let found = text!("{:?} to {:?}", leaf.lower, leaf.upper);
+            let found = format!("{:?} to {:?}", leaf.lower, leaf.upper);
             return fail(Code::TetBox, 0, "a finite box, lower < upper".into(), found);
         }
         if leaf.flags != 0 {
-            let found = text!("{}", leaf.flags);
+            let found = format!("{}", leaf.flags);
             return fail(Code::TetBox, offset_of!(TetLeaf, flags), "flags of 0".into(), found);
         }
         let first = [leaf.first_tet, leaf.first_vertex, leaf.first_face, leaf.first_hull];
@@ -37,21 +37,27 @@ fn ranges(view: &ObjectView) -> Result<()> {
             let offset = offset_of!(TetLeaf, first_tet) + 8 * k;
             let last = first[k] as u64 + count[k] as u64;
             if first[k] as u64 != end[k] || last > rows[k] as u64 {
-                let expected = text!("rows of {} from {} to {}", names[k], end[k], rows[k]);
-                return fail(Code::TetRanges, offset, expected, text!("{} to {last}", first[k]));
+                let expected = format!("rows of {} from {} to {}", names[k], end[k], rows[k]);
+                return fail(Code::TetRanges, offset, expected, format!("{} to {last}", first[k]));
             }
             if count[k] < least[k] {
-                let expected = text!("at least {} rows of {}", least[k], names[k]);
-                return fail(Code::TetCounts, offset + 4, expected, text!("{}", count[k]));
+                let expected = format!("at least {} rows of {}", least[k], names[k]);
+                return fail(Code::TetCounts, offset + 4, expected, format!("{}", count[k]));
             }
             end[k] = last;
         }
     }
     for k in 0..4 {
         if end[k] != rows[k] as u64 {
-            let expected = text!("tet leaves with {} rows of {}", rows[k], names[k]);
+            let expected = format!("tet leaves with {} rows of {}", rows[k], names[k]);
             let at = size_of_val(view.tet_leaves) as u64;
-            return Err(Error::within(Code::TetRanges, kind::TET_LEAVES, at, expected, text!("{}", end[k])));
+            return Err(Error::within(
+                Code::TetRanges,
+                kind::TET_LEAVES,
+                at,
+                expected,
+                format!("{}", end[k]),
+            ));
         }
     }
     Ok(())
@@ -64,7 +70,7 @@ fn vertices(view: &ObjectView) -> Result<()> {
         None => Ok(()),
         Some(row) => {
             let at = (row * size_of::<TetVertex>()) as u64;
-            let found = text!("{:?}", view.tet_vertices[row]);
+            let found = format!("{:?}", view.tet_vertices[row]);
             Err(Error::within(Code::TetVertices, kind::TET_VERTICES, at, "a finite position and 0", found))
         }
     }
@@ -72,26 +78,26 @@ fn vertices(view: &ObjectView) -> Result<()> {
 
 /// BTH-F131: TRIANGLE_FACES and the triangles of TET_FACES are inverse to each other.
 fn triangle_faces(view: &ObjectView) -> Result<()> {
-    let fail = |section, at: usize, expected: Text, found: Text| {
+    let fail = |section, at: usize, expected: String, found: String| {
         Err(Error::within(Code::TriangleFaces, section, at as u64, expected, found))
     };
     let expected = if view.tet_leaves.is_empty() { 0 } else { view.header.triangles as usize };
     if view.triangle_faces.len() != expected {
-        let found = text!("{}", view.triangle_faces.len());
-        return fail(kind::TRIANGLE_FACES, 0, text!("{expected} rows"), found);
+        let found = format!("{}", view.triangle_faces.len());
+        return fail(kind::TRIANGLE_FACES, 0, format!("{expected} rows"), found);
     }
     for (row, face) in view.tet_faces.iter().enumerate() {
         if view.triangle_faces.get(face.triangle as usize) != Some(&(row as u32)) {
             let at = row * size_of::<TetFace>() + offset_of!(TetFace, triangle);
             let expected = "a triangle that TRIANGLE_FACES maps to this face".into();
-            return fail(kind::TET_FACES, at, expected, text!("triangle {}", face.triangle));
+            return fail(kind::TET_FACES, at, expected, format!("triangle {}", face.triangle));
         }
     }
     for (triangle, &face) in view.triangle_faces.iter().enumerate() {
         let named = view.tet_faces.get(face as usize).map(|f| f.triangle);
         if face != NONE && named != Some(triangle as u32) {
-            let expected = text!("NONE or the face of triangle {triangle}");
-            return fail(kind::TRIANGLE_FACES, 4 * triangle, expected, text!("row {face}"));
+            let expected = format!("NONE or the face of triangle {triangle}");
+            return fail(kind::TRIANGLE_FACES, 4 * triangle, expected, format!("row {face}"));
         }
     }
     Ok(())

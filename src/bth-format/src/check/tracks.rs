@@ -64,7 +64,8 @@ fn follows(track: &Track, previous: Option<(u32, u32)>) -> RowResult<()> {
     let key = (track.node, track.property);
     match previous {
         Some(previous) if previous >= key => {
-            let (expected, found) = ("ascending nodes and properties", text!("{key:?} behind {previous:?}"));
+            let (expected, found) =
+                ("ascending nodes and properties", format!("{key:?} behind {previous:?}"));
             Err(Violation { code: Code::Track, offset: 0, expected, found })
         }
         _ => Ok(()),
@@ -86,13 +87,13 @@ impl Ends {
         let error = |expected, found| Err(Violation { code: Code::TrackRanges, offset: at, expected, found });
         let first = (u64::from(track.first_time), u64::from(track.first_value));
         if keys == 0 || first != (self.times, self.values) {
-            let found = text!("{keys} keys at {} and {}", track.first_time, track.first_value);
+            let found = format!("{keys} keys at {} and {}", track.first_time, track.first_value);
             return error("ranges behind those before", found);
         }
         self.times += keys;
         self.values += keys * width as u64;
         if self.times > view.times.len() as u64 || self.values > view.values.len() as u64 {
-            return error("ranges within TIMES and VALUES", text!("{keys} keys"));
+            return error("ranges within TIMES and VALUES", format!("{keys} keys"));
         }
         Ok(())
     }
@@ -103,13 +104,13 @@ impl Ends {
             [(kind::TIMES, self.times, view.times.len()), (kind::VALUES, self.values, view.values.len())];
         for (kind, used, rows) in sections {
             if used != rows as u64 {
-                let expected = text!("{used} rows, as the tracks have");
+                let expected = format!("{used} rows, as the tracks have");
                 return Err(Error::within_file(
                     Code::TrackRanges,
                     kind,
                     8 * used,
                     expected,
-                    text!("{}", rows),
+                    format!("{}", rows),
                 ));
             }
         }
@@ -123,7 +124,7 @@ fn keys(view: &SceneView<'_>, track: &Track, width: usize) -> Result<()> {
     let ascending = |i: usize| times[i].is_finite() && (i == 0 || times[i - 1] < times[i]);
     if let Some(i) = (0..times.len()).find(|i| !ascending(*i)) {
         let at = 8 * (u64::from(track.first_time) + i as u64);
-        let found = text!("{}", times[i]);
+        let found = format!("{}", times[i]);
         return Err(Error::within_file(Code::TrackKeys, kind::TIMES, at, "finite ascending times", found));
     }
     let fits = |key: &[f64]| {
@@ -138,7 +139,7 @@ fn keys(view: &SceneView<'_>, track: &Track, width: usize) -> Result<()> {
     for (i, key) in values.chunks_exact(width).enumerate() {
         if !key.iter().all(|x| x.is_finite()) || !fits(key) {
             let at = 8 * (u64::from(track.first_value) + (i * width) as u64);
-            let (expected, found) = ("a value of the property", text!("{key:?}"));
+            let (expected, found) = ("a value of the property", format!("{key:?}"));
             return Err(Error::within_file(Code::TrackKeys, kind::VALUES, at, expected, found));
         }
     }

@@ -93,19 +93,19 @@ impl Tree<'_> {
     fn child(&self, reference: &Reference) -> Result<Child> {
         let child = Child::from_code(reference.code);
         let child = child.filter(|child| !(reference.in_subtree && matches!(child, Child::Tets(_))));
-        let found = || text!("{:#010x}", reference.code);
+        let found = || format!("{:#010x}", reference.code);
         child.ok_or_else(|| reference.error(Code::ChildCode, "a child code that may stand here", found()))
     }
 
     /// BTH-F106 and BTH-F123: the tet leaf exists, and nothing else leads to it.
     fn follow_tet_leaf(&mut self, reference: &Reference, row: u32) -> Result<()> {
         let Some(leaf) = self.view.tet_leaves.get(row as usize) else {
-            let expected = text!("a row below {}", self.view.tet_leaves.len());
-            return Err(reference.error(Code::ChildRange, expected, text!("{row}")));
+            let expected = format!("a row below {}", self.view.tet_leaves.len());
+            return Err(reference.error(Code::ChildRange, expected, format!("{row}")));
         };
         if self.referenced.insert(row as usize) {
             let expected = "one reference to each tet leaf";
-            return Err(reference.error(Code::TetReferences, expected, text!("row {row} again")));
+            return Err(reference.error(Code::TetReferences, expected, format!("row {row} again")));
         }
         self.stack.push(Reference {
             code: leaf.subtree,
@@ -124,16 +124,16 @@ impl Tree<'_> {
         let (first, count) = self.view.half_lines(child).expect("all children but tet leaves have blocks");
         let (line, lines) = (first / 2, self.view.lines.len());
         if first + count as u64 > 2 * lines as u64 {
-            let expected = text!("{} lines below {lines}", count.div_ceil(2));
-            return Err(reference.error(Code::ChildRange, expected, text!("line {line}")));
+            let expected = format!("{} lines below {lines}", count.div_ceil(2));
+            return Err(reference.error(Code::ChildRange, expected, format!("line {line}")));
         }
         if reference.parent.is_some_and(|parent| first <= parent) {
             let expected = "a line behind the parent's";
-            return Err(reference.error(Code::ChildOrder, expected, text!("line {line}")));
+            return Err(reference.error(Code::ChildOrder, expected, format!("line {line}")));
         }
         let block = first as usize..first as usize + count;
         if let Some(half) = block.into_iter().find(|&half| self.claimed.insert(half)) {
-            let found = text!("line {}, which another block has", half / 2);
+            let found = format!("line {}, which another block has", half / 2);
             return Err(reference.error(Code::Overlap, "a block of its own", found));
         }
         Ok(first)
@@ -143,8 +143,8 @@ impl Tree<'_> {
     fn follow_node(&mut self, reference: &Reference, line: u32, first_half: u64) -> Result<()> {
         let (depth, most) = (reference.depth + 1, self.view.header.depth);
         if depth > most.min(MAX_DEPTH as u32) {
-            let expected = text!("at most {most} (header) and {MAX_DEPTH} nodes on a path");
-            return Err(reference.error(Code::Depth, expected, text!("{depth}")));
+            let expected = format!("at most {most} (header) and {MAX_DEPTH} nodes on a path");
+            return Err(reference.error(Code::Depth, expected, format!("{depth}")));
         }
         let start = first_half * HALF_LINE as u64;
         let node = self.view.node(line);
@@ -187,7 +187,7 @@ impl Tree<'_> {
             None => Ok(()),
             Some(row) => {
                 let at = (row * size_of::<TetLeaf>()) as u64;
-                let (expected, found) = ("a reference to each tet leaf", text!("none to row {row}"));
+                let (expected, found) = ("a reference to each tet leaf", format!("none to row {row}"));
                 Err(Error::within(Code::TetReferences, kind::TET_LEAVES, at, expected, found))
             }
         }

@@ -152,5 +152,5 @@ fn open(path: &Path) -> Result<(std::fs::File, u64)> {
 }
 
 pub(super) fn no_memory(length: u64) -> Error {
-    Error::at(Code::Read, 0, text!("{length} bytes of memory"), "less")
+    Error::at(Code::Read, 0, format!("{length} bytes of memory"), "less")
 }

@@ -56,7 +56,11 @@ impl DeformedObject {
     pub fn of_segment(file: &File, object: u32, segment: u32) -> Result<Self> {
         let view = file.object(segment)?;
         if !view.is_deformable() {
-            return Err(Error::of_call(Code::NotDeformable, "a deformable object", text!("object {object}")));
+            return Err(Error::of_call(
+                Code::NotDeformable,
+                "a deformable object",
+                format!("object {object}"),
+            ));
         }
         let bytes = view.lines.as_bytes();
         let mut lines = Owned::zeroed(bytes.len()).ok_or_else(|| no_memory(bytes.len() as u64))?;

@@ -13,7 +13,7 @@ pub use table::{content_id, hash128, kind_stride};
 
 use crate::Identity;
 use crate::check;
-use crate::error::{Code, Error, Result, Text};
+use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::object::{MAX_LINES, ObjectBounds, ObjectView, Records};
 use buffer::{Buffer, no_memory};
@@ -236,8 +236,8 @@ impl File {
 
     fn make_view(&self, object: u32) -> Result<ObjectView<'_>> {
         if object >= self.object_count() {
-            let expected = text!("an object below {}", self.object_count());
-            return Err(Error::at(Code::NoSuchObject, 0, expected, text!("{object}")));
+            let expected = format!("an object below {}", self.object_count());
+            return Err(Error::at(Code::NoSuchObject, 0, expected, format!("{object}")));
         }
         let header: &[Object] = self.slice(object, kind::OBJECT);
         let header = &header[0];
@@ -252,7 +252,7 @@ impl File {
             },
             None if header.record == 0 && entry.is_none_or(|e| e.count == 0) => Records::None,
             _ => {
-                let found = text!("record kind {} and a TETS stride of {stride}", header.record);
+                let found = format!("record kind {} and a TETS stride of {stride}", header.record);
                 let offset = std::mem::offset_of!(Object, record) as u64;
                 let error =
                     Error::within(Code::Record, kind::OBJECT, offset, "a record kind that fits TETS", found);
@@ -298,17 +298,17 @@ impl File {
     /// BTH-F104: the grid of an object, and that the header announces grids and widened boxes.
     fn grid(&self, object: &Object) -> Result<Option<Grid>> {
         let at = std::mem::offset_of!(Object, coordinates) as u64;
-        let wrong = |expected: &'static str, found: Text| {
+        let wrong = |expected: &'static str, found: String| {
             Error::within(Code::Coordinates, kind::OBJECT, at, expected, found)
         };
         let expected = "coordinates that are f32, with zeros, or a grid of points that are f32";
-        let grid = Grid::from_object(object).map_err(|what| wrong(expected, Text::from(what)))?;
+        let grid = Grid::from_object(object).map_err(|what| wrong(expected, String::from(what)))?;
         let features = self.header().required_features;
         if grid.is_some() && features & FEATURE_GRID == 0 {
-            return Err(wrong("f32, as the header announces no grid", text!("{:#x}", object.coordinates)));
+            return Err(wrong("f32, as the header announces no grid", format!("{:#x}", object.coordinates)));
         }
         if object.coordinates & WIDENED_BOXES != 0 && features & FEATURE_WIDENED_BOXES == 0 {
-            let found = text!("{:#x}", object.coordinates);
+            let found = format!("{:#x}", object.coordinates);
             return Err(wrong("boxes that are not widened, as the header announces none", found));
         }
         Ok(grid)

@@ -4,7 +4,7 @@
 use super::File;
 use crate::check;
 use crate::deformation_view::DeformationView;
-use crate::error::{Code, Error, Result, Text};
+use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::materials_view::{ImagesView, MaterialsView};
 use crate::names;
@@ -96,20 +96,20 @@ impl File {
     pub fn check_object_names(&self) -> Result<()> {
         let rows: &[ObjectName] = self.slice(NONE, kind::OBJECT_NAMES);
         let text: &[u8] = self.slice(NONE, kind::OBJECT_LABELS);
-        let error = |offset: usize, expected: Text, found: Text| {
+        let error = |offset: usize, expected: String, found: String| {
             let error =
                 Error::within_file(Code::ObjectName, kind::OBJECT_NAMES, offset as u64, expected, found);
             Err(self.locate(error, NONE))
         };
         if !rows.is_empty() && rows.len() != self.object_count() as usize {
-            return error(0, text!("{} rows or none", self.object_count()), text!("{}", rows.len()));
+            return error(0, format!("{} rows or none", self.object_count()), format!("{}", rows.len()));
         }
         let text = names::checked(text);
         match rows.iter().position(|n| !names::is_name(text, n.name, n.name_length)) {
             None => Ok(()),
             Some(row) => {
-                let expected = Text::from("a name of at most 4096 bytes within OBJECT_LABELS");
-                error(size_of::<ObjectName>() * row, expected, text!("{:?}", rows[row]))
+                let expected = String::from("a name of at most 4096 bytes within OBJECT_LABELS");
+                error(size_of::<ObjectName>() * row, expected, format!("{:?}", rows[row]))
             }
         }
     }

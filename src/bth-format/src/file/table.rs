@@ -1,7 +1,7 @@
 //! Checks of the header and the section table: BTH-F001 to BTH-F019 and BTH-F022. Costs O(sections).
 //! Specification: "Opening".
 
-use crate::error::{Code, Error, Result, Text};
+use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::limits;
 use std::mem::offset_of;
@@ -122,19 +122,19 @@ fn max_count(kind: u32) -> u64 {
 /// BTH-F001 to BTH-F008 of the header. `bytes` are the file's first 128, or all where there are fewer or more; `length` is
 /// the number of bytes of the file.
 pub(super) fn check_header(bytes: &[u8], length: u64) -> Result<&Header> {
-    let fail = |code, offset: usize, expected: Text, found: Text| {
+    let fail = |code, offset: usize, expected: String, found: String| {
         Err(Error::at(code, offset as u64, expected, found))
     };
     let Ok((header, _)) = Header::ref_from_prefix(bytes) else {
-        return fail(Code::HeaderSize, 0, text!("{HEADER_SIZE} bytes"), text!("{}", bytes.len()));
+        return fail(Code::HeaderSize, 0, format!("{HEADER_SIZE} bytes"), format!("{}", bytes.len()));
     };
     if header.identifier != IDENTIFIER {
         return fail(Code::Identifier, 0, hex(&IDENTIFIER), hex(&header.identifier));
     }
     let (writer, reader) = (header.writer_version, header.minimum_reader_version);
     if writer >> 16 != 1 || reader >> 16 != 1 || reader > writer || reader > WRITER_VERSION {
-        let expected = text!("versions 1.x that a reader of {} may read", version(WRITER_VERSION));
-        let found = text!("writer {}, minimum reader {}", version(writer), version(reader));
+        let expected = format!("versions 1.x that a reader of {} may read", version(WRITER_VERSION));
+        let found = format!("writer {}, minimum reader {}", version(writer), version(reader));
         return fail(Code::Version, offset_of!(Header, writer_version), expected, found);
     }
     let at = offset_of!(Header, header_hash);
@@ -144,10 +144,15 @@ pub(super) fn check_header(bytes: &[u8], length: u64) -> Result<&Header> {
     }
     if header.file_length != length {
         let at = offset_of!(Header, file_length);
-        return fail(Code::Length, at, text!("{} bytes", header.file_length), text!("{length} bytes"));
+        return fail(Code::Length, at, format!("{} bytes", header.file_length), format!("{length} bytes"));
     }
     if header.reserved != 0 {
-        return fail(Code::Reserved, offset_of!(Header, reserved), "0".into(), text!("{}", header.reserved));
+        return fail(
+            Code::Reserved,
+            offset_of!(Header, reserved),
+            "0".into(),
+            format!("{}", header.reserved),
+        );
     }
     let unknown = header.required_features & !KNOWN_FEATURES;
     if unknown != 0 {
@@ -159,7 +164,7 @@ pub(super) fn check_header(bytes: &[u8], length: u64) -> Result<&Header> {
             }
             _ => "",
         };
-        return fail(Code::Features, at, "known feature bits".into(), text!("unknown {unknown:#x}{old}"));
+        return fail(Code::Features, at, "known feature bits".into(), format!("unknown {unknown:#x}{old}"));
     }
     let max_entries = (length - HEADER_SIZE as u64) / ENTRY_SIZE;
     if header.section_offset != HEADER_SIZE as u64
@@ -168,8 +173,8 @@ pub(super) fn check_header(bytes: &[u8], length: u64) -> Result<&Header> {
     {
         let at = offset_of!(Header, section_offset);
         let expected =
-            text!("at most {} entries at byte {HEADER_SIZE}", max_entries.min(limits::MAX_SECTIONS as u64));
-        let found = text!("{} entries at byte {}", header.section_count, header.section_offset);
+            format!("at most {} entries at byte {HEADER_SIZE}", max_entries.min(limits::MAX_SECTIONS as u64));
+        let found = format!("{} entries at byte {}", header.section_count, header.section_offset);
         return fail(Code::Table, at, expected, found);
     }
     Ok(header)
@@ -213,14 +218,14 @@ pub(super) fn check(bytes: &[u8]) -> Result<u32> {
     // BTH-F019, which makes the file's length a multiple of 64. Sections end within the file, but rounding up may overflow.
     if end.checked_next_multiple_of(ALIGNMENT as u64) != Some(header.file_length) {
         let at = offset_of!(Header, file_length) as u64;
-        let expected = text!("the end of the last section, {end}, rounded up to {ALIGNMENT}");
-        return Err(Error::at(Code::Tail, at, expected, text!("{}", header.file_length)));
+        let expected = format!("the end of the last section, {end}, rounded up to {ALIGNMENT}");
+        return Err(Error::at(Code::Tail, at, expected, format!("{}", header.file_length)));
     }
     Ok(objects)
 }
 
 /// A violation in an entry: the code, the field's offset in the entry, what is expected and what was found.
-type Mismatch = (Code, usize, Text, Text);
+type Mismatch = (Code, usize, String, String);
 
 /// BTH-F006, BTH-F010 to BTH-F016 and BTH-F022 of an entry. `end` is where the section before ends, `length` that of the
 /// file; returns where this section ends.
@@ -233,63 +238,63 @@ fn check_entry(
     if let Some(p) = previous
         && (p.object, p.kind) >= (e.object, e.kind)
     {
-        let expected = text!("an entry behind object {}, kind {}", p.object, p.kind);
-        return Err((Code::Order, 0, expected, text!("object {}, kind {}", e.object, e.kind)));
+        let expected = format!("an entry behind object {}, kind {}", p.object, p.kind);
+        return Err((Code::Order, 0, expected, format!("object {}, kind {}", e.object, e.kind)));
     }
     if e.reserved != 0 {
         return Err((
             Code::Reserved,
             offset_of!(SectionEntry, reserved),
             "0".into(),
-            text!("{}", e.reserved),
+            format!("{}", e.reserved),
         ));
     }
     if e.flags & !SECTION_REQUIRED != 0 {
-        return Err((Code::Flags, offset_of!(SectionEntry, flags), "0 or 1".into(), text!("{}", e.flags)));
+        return Err((Code::Flags, offset_of!(SectionEntry, flags), "0 or 1".into(), format!("{}", e.flags)));
     }
     if e.alignment as usize != ALIGNMENT || !e.offset.is_multiple_of(ALIGNMENT as u64) {
-        let found = text!("alignment {} at offset {}", e.alignment, e.offset);
+        let found = format!("alignment {} at offset {}", e.alignment, e.offset);
         return Err((
             Code::Alignment,
             offset_of!(SectionEntry, alignment),
-            text!("multiples of {ALIGNMENT}"),
+            format!("multiples of {ALIGNMENT}"),
             found,
         ));
     }
     let last = e.offset.checked_add(e.length).filter(|last| e.offset >= end && *last <= length);
     let Some(last) = last else {
-        let found = text!("{} bytes at {}", e.length, e.offset);
+        let found = format!("{} bytes at {}", e.length, e.offset);
         return Err((
             Code::Bounds,
             offset_of!(SectionEntry, offset),
-            text!("bytes from {end} to {length}"),
+            format!("bytes from {end} to {length}"),
             found,
         ));
     };
     if (e.stride as u64).checked_mul(e.count) != Some(e.length) {
-        let found = text!("{} bytes", e.length);
+        let found = format!("{} bytes", e.length);
         return Err((
             Code::Count,
             offset_of!(SectionEntry, length),
-            text!("{} times {} bytes", e.count, e.stride),
+            format!("{} times {} bytes", e.count, e.stride),
             found,
         ));
     }
     match kind_stride(e.kind) {
         None if e.flags & SECTION_REQUIRED != 0 => {
-            return Err((Code::UnknownKind, 0, "a known kind".into(), text!("{}", e.kind)));
+            return Err((Code::UnknownKind, 0, "a known kind".into(), format!("{}", e.kind)));
         }
         None => {}
         Some(0) if RecordKind::ALL.iter().any(|r| r.stride() == e.stride as usize) => {}
         Some(stride) if stride == e.stride as usize && stride != 0 => {}
         Some(stride) => {
-            let expected = if stride == 0 { "16, 20 or 32".into() } else { text!("{}", stride) };
-            return Err((Code::Stride, offset_of!(SectionEntry, stride), expected, text!("{}", e.stride)));
+            let expected = if stride == 0 { "16, 20 or 32".into() } else { format!("{}", stride) };
+            return Err((Code::Stride, offset_of!(SectionEntry, stride), expected, format!("{}", e.stride)));
         }
     }
     if e.kind != kind::OBJECT && e.count > max_count(e.kind) {
-        let expected = text!("at most {}", max_count(e.kind));
-        return Err((Code::Limit, offset_of!(SectionEntry, count), expected, text!("{}", e.count)));
+        let expected = format!("at most {}", max_count(e.kind));
+        return Err((Code::Limit, offset_of!(SectionEntry, count), expected, format!("{}", e.count)));
     }
     Ok(last)
 }
@@ -310,8 +315,9 @@ fn check_objects(entries: &[SectionEntry]) -> Result<u32> {
         };
         if wrong {
             let at = HEADER_SIZE as u64 + i as u64 * ENTRY_SIZE + offset_of!(SectionEntry, object) as u64;
-            let expected = text!("the one OBJECT row of object {objects}, or a section that fits its object");
-            let found = text!("{} rows of kind {} in object {}", e.count, e.kind, e.object);
+            let expected =
+                format!("the one OBJECT row of object {objects}, or a section that fits its object");
+            let found = format!("{} rows of kind {} in object {}", e.count, e.kind, e.object);
             return Err(Error::within(Code::Objects, e.kind, at, expected, found).in_object(e.object));
         }
         objects += u32::from(first && e.kind == kind::OBJECT);
@@ -319,10 +325,10 @@ fn check_objects(entries: &[SectionEntry]) -> Result<u32> {
     Ok(objects)
 }
 
-fn version(v: u32) -> Text {
-    text!("{}.{}", v >> 16, v & 0xffff)
+fn version(v: u32) -> String {
+    format!("{}.{}", v >> 16, v & 0xffff)
 }
 
-fn hex(bytes: &[u8]) -> Text {
-    text!("{}", bytes.iter().map(|b| format!("{b:02x}")).collect::<String>())
+fn hex(bytes: &[u8]) -> String {
+    format!("{}", bytes.iter().map(|b| format!("{b:02x}")).collect::<String>())
 }

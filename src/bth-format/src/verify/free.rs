@@ -3,7 +3,7 @@
 //! All pairs of triangles would take quadratic time. Of evenly spaced triangles rays from the corners to the middles of all other
 //! triangles are decided: a wrong bin is found as soon as one of the middles lies in the bin.
 
-use crate::error::{Code, Error, Result, Text};
+use crate::error::{Code, Error, Result};
 use crate::exact::side;
 use crate::layout::{Child, FreeLevels, KnownFree, TrianglePlace, free_axes, free_bin};
 use crate::object::ObjectView;
@@ -33,7 +33,7 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
         let Some(corners) = corners else { continue };
         if free_axes(*corners).is_none() {
             let expected = "nothing known of a triangle without axes";
-            let found = text!("{corners:?}");
+            let found = format!("{corners:?}");
             return Err(Error::within(Code::FreeAxes, kind, at(triangle), expected, found));
         }
     }
@@ -44,8 +44,8 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
         let of_start = Start { axes, known: known[start], levels };
         for &(other, target) in all.iter().filter(|(other, _)| *other != start as u32) {
             if let Some(corner) = start_corners.iter().find(|corner| of_start.meets(**corner, target)) {
-                let expected = Text::from("nothing in free directions, nor within the distances of levels");
-                let found = text!("triangle {other} from {corner:?}");
+                let expected = String::from("nothing in free directions, nor within the distances of levels");
+                let found = format!("triangle {other} from {corner:?}");
                 return Err(Error::within(Code::FreeMet, kind, at(start), expected, found));
             }
         }

@@ -53,14 +53,14 @@ fn check_hash(section: &SectionView) -> Result<()> {
     if hash == e.hash {
         return Ok(());
     }
-    let (expected, found) = (text!("hash {:02x?}", e.hash), text!("{hash:02x?}"));
+    let (expected, found) = (format!("hash {:02x?}", e.hash), format!("{hash:02x?}"));
     Err(Error::within(Code::SectionHash, e.kind, e.offset, expected, found).in_object(e.object))
 }
 
 /// BTH-F020: the bytes between two parts of the file are zero.
 fn check_gap(file: &File, from: usize, to: usize, errors: &mut Vec<Error>) {
     if let Some(i) = file.bytes()[from..to].iter().position(|b| *b != 0) {
-        let found = text!("{}", file.bytes()[from + i]);
+        let found = format!("{}", file.bytes()[from + i]);
         errors.push(Error::at(Code::Gap, (from + i) as u64, "0 between sections", found));
     }
 }

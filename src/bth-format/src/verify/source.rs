@@ -28,11 +28,11 @@ pub(super) fn check_corners(
     let Some(source) = source_corners(view, id) else { return Ok(()) };
     let Stored { code, section, at } = stored;
     if source.map(|p| p.map(f32::to_bits)) != corners.map(|p| p.map(f32::to_bits)) {
-        let expected = text!("triangle {id}: {source:?}");
-        return Err(Error::within(code, section, at, expected, text!("{corners:?}")));
+        let expected = format!("triangle {id}: {source:?}");
+        return Err(Error::within(code, section, at, expected, format!("{corners:?}")));
     }
     if !view.is_deformable() && is_zero_area(source) {
-        let found = text!("triangle {id} of zero area");
+        let found = format!("triangle {id} of zero area");
         return Err(Error::within(Code::ZeroArea, section, at, "triangles that can be hit", found));
     }
     Ok(())
@@ -49,13 +49,13 @@ pub(super) fn check_dropped(view: &ObjectView, marks: &TriangleMarks) -> Result<
     let left_out = view.header.triangles as usize - marks.count(TriangleMarks::PLACED);
     if left_out != view.header.dropped as usize {
         let at = offset_of!(Object, dropped) as u64;
-        let expected = text!("{} triangles in no leaf", view.header.dropped);
-        return Err(Error::within(Code::Coverage, kind::OBJECT, at, expected, text!("{left_out}")));
+        let expected = format!("{} triangles in no leaf", view.header.dropped);
+        return Err(Error::within(Code::Coverage, kind::OBJECT, at, expected, format!("{left_out}")));
     }
     // Without kept triangles there is nothing to compare, and the header's count must not bound a loop.
     for id in (0..view.triangles.len()).filter(|id| !marks.has(*id as u32, TriangleMarks::PLACED)) {
         if source_corners(view, id as u32).is_some_and(|corners| !is_zero_area(corners)) {
-            let found = text!("triangle {id}, which has an area, in no leaf");
+            let found = format!("triangle {id}, which has an area, in no leaf");
             let expected = "triangles of zero area to be left out";
             return Err(Error::within(Code::ZeroArea, kind::TRIANGLES, 12 * id as u64, expected, found));
         }
@@ -70,8 +70,8 @@ pub(super) fn check_displacement(view: &ObjectView) -> Result<()> {
     for (row, position) in view.positions.iter().enumerate() {
         let found = distance(*position, grid.nearest(*position));
         if found > most {
-            let (at, expected) = (12 * row as u64, text!("at most {most} from the grid"));
-            return Err(Error::within(Code::Displacement, kind::POSITIONS, at, expected, text!("{found}")));
+            let (at, expected) = (12 * row as u64, format!("at most {most} from the grid"));
+            return Err(Error::within(Code::Displacement, kind::POSITIONS, at, expected, format!("{found}")));
         }
     }
     Ok(())

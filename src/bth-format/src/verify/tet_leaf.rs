@@ -2,7 +2,7 @@
 
 use super::aabb::Aabb;
 use crate::check::TetAdjacency;
-use crate::error::{Code, Error, Result, Text};
+use crate::error::{Code, Error, Result};
 use crate::exact::side;
 use crate::layout::*;
 use crate::object::ObjectView;
@@ -22,7 +22,7 @@ fn point(view: &ObjectView, vertex: u32) -> [f32; 3] {
     view.tet_vertices[vertex as usize].position
 }
 
-fn orientation(section: u32, at: u64, expected: &'static str, found: Text) -> Result<()> {
+fn orientation(section: u32, at: u64, expected: &'static str, found: String) -> Result<()> {
     Err(Error::within(Code::Orientation, section, at, expected, found))
 }
 
@@ -34,8 +34,8 @@ fn check_box(view: &ObjectView, row: usize, leaf: &TetLeaf) -> Result<()> {
         if !bounds.contains(&Aabb { lower: p, upper: p }) {
             let at = u64::from(v) * size_of::<TetVertex>() as u64;
             let (lower, upper) = (leaf.lower, leaf.upper);
-            let expected = text!("a vertex in the box of tet leaf {row}, {lower:?} to {upper:?}");
-            let found = text!("{p:?}");
+            let expected = format!("a vertex in the box of tet leaf {row}, {lower:?} to {upper:?}");
+            let found = format!("{p:?}");
             return Err(Error::within(Code::TetContainment, kind::TET_VERTICES, at, expected, found));
         }
     }
@@ -62,7 +62,7 @@ fn check_tetrahedra(view: &ObjectView, leaf: &TetLeaf, adjacency: &TetAdjacency<
     for (tet, sign) in rows.zip(&signs) {
         let at = u64::from(tet) * stride;
         if *sign == Ordering::Equal {
-            let found = text!("{:?}", adjacency.vertices(tet));
+            let found = format!("{:?}", adjacency.vertices(tet));
             return orientation(kind::TETS, at, "a tetrahedron with volume", found);
         }
         for (slot, link) in adjacency.links(tet).into_iter().enumerate() {
@@ -71,7 +71,7 @@ fn check_tetrahedra(view: &ObjectView, leaf: &TetLeaf, adjacency: &TetAdjacency<
             }
             let back = adjacency.links(link).iter().position(|l| *l == tet);
             if back.is_none_or(|back| opposite_side(tet, slot) == opposite_side(link, back)) {
-                let found = text!("tetrahedra {tet} and {link} on the same side of their face");
+                let found = format!("tetrahedra {tet} and {link} on the same side of their face");
                 return orientation(kind::TETS, at, "neighbours on either side of their face", found);
             }
         }
@@ -88,7 +88,7 @@ fn check_constrained_faces(view: &ObjectView, leaf: &TetLeaf) -> Result<()> {
         if sides != [Ordering::Greater, Ordering::Less] {
             let at = u64::from(row) * size_of::<TetFace>() as u64;
             let expected = "the first tetrahedron in front, the second behind";
-            return orientation(kind::TET_FACES, at, expected, text!("{sides:?}"));
+            return orientation(kind::TET_FACES, at, expected, format!("{sides:?}"));
         }
     }
     Ok(())
@@ -101,7 +101,7 @@ fn check_hull_faces(view: &ObjectView, leaf: &TetLeaf) -> Result<()> {
         let [a, b, c] = hull.vertex.map(|v| point(view, v));
         if side(a, b, c, point(view, hull.opposite)) != Ordering::Greater {
             let at = u64::from(row) * size_of::<HullFace>() as u64;
-            let found = text!("{:?}", hull.vertex);
+            let found = format!("{:?}", hull.vertex);
             return orientation(kind::HULL_FACES, at, "a hull face that points inwards", found);
         }
     }

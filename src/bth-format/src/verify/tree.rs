@@ -83,8 +83,8 @@ fn check_containment(view: &ObjectView, visit: &Visit, visits: &[Visit]) -> Resu
     if bounds.contains(content) {
         return Ok(());
     }
-    let expected = text!("a box around {:?} to {:?}", content.lower, content.upper);
-    let found = text!("{:?} to {:?}", bounds.lower, bounds.upper);
+    let expected = format!("a box around {:?} to {:?}", content.lower, content.upper);
+    let found = format!("{:?} to {:?}", bounds.lower, bounds.upper);
     Err(Error::within(Code::Containment, section, at, expected, found))
 }
 
@@ -161,7 +161,7 @@ impl Triangles<'_> {
         if self.marks.mark(id, TriangleMarks::PLACED) {
             return Ok(());
         }
-        let found = text!("triangle {id} again");
+        let found = format!("triangle {id} again");
         Err(Error::within(Code::Coverage, section, at, "each triangle once", found))
     }
 
@@ -174,7 +174,8 @@ impl Triangles<'_> {
             self.in_subtree[tet_leaf as usize] += 1;
             return Ok(());
         }
-        let (expected, found) = (text!("a triangle of tet leaf {tet_leaf}, once"), text!("triangle {id}"));
+        let (expected, found) =
+            (format!("a triangle of tet leaf {tet_leaf}, once"), format!("triangle {id}"));
         Err(Error::within(Code::Coverage, kind::TRIANGLE_IDS, at, expected, found))
     }
 
@@ -183,8 +184,14 @@ impl Triangles<'_> {
         for (row, (leaf, &found)) in self.view.tet_leaves.iter().zip(&self.in_subtree).enumerate() {
             if leaf.subtree != NONE && found != leaf.faces {
                 let at = (row * size_of::<TetLeaf>() + offset_of!(TetLeaf, subtree)) as u64;
-                let expected = text!("a subtree with all {} triangles", leaf.faces);
-                return Err(Error::within(Code::Coverage, kind::TET_LEAVES, at, expected, text!("{found}")));
+                let expected = format!("a subtree with all {} triangles", leaf.faces);
+                return Err(Error::within(
+                    Code::Coverage,
+                    kind::TET_LEAVES,
+                    at,
+                    expected,
+                    format!("{found}"),
+                ));
             }
         }
         Ok(())

@@ -6,7 +6,6 @@ use crate::instances::{InstanceRow, NewInstance};
 use crate::nodes::Affine;
 use crate::objects::Objects;
 use bth_format::layout::NONE;
-use bth_format::text;
 use bth_format::{Code, Error};
 use std::collections::HashSet;
 
@@ -130,7 +129,7 @@ impl SceneBuilder {
     pub(super) fn staged(&self, instance: u32) -> Result<&StagedInstance, Error> {
         let staged = self.instances.get(instance as usize).filter(|staged| staged.object != NONE);
         staged.ok_or_else(|| {
-            let found = text!("{instance}");
+            let found = format!("{instance}");
             Error::of_call(Code::NoSuchInstance, "an instance that was added and not removed", found)
         })
     }
@@ -154,7 +153,7 @@ impl SceneBuilder {
             return Ok(());
         }
         let expected = format!("at most {MAX_INSTANCES} instances");
-        Err(Error::of_call(Code::TooManyInstances, expected, text!("{total}")))
+        Err(Error::of_call(Code::TooManyInstances, expected, format!("{total}")))
     }
 
     /// Adds an instance; returns its id.

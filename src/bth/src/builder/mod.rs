@@ -15,7 +15,6 @@ use self::instances::StagedInstance;
 use self::subscene::Subscene;
 use crate::scene::Scene;
 use crate::update::Update;
-use bth_format::text;
 use bth_format::{Code, Error};
 
 /// Greatest number of instances: their indices are stored beside kinds of nodes in 32 bits.
@@ -120,7 +119,7 @@ impl SceneBuilder {
         let count = self.scene.group_count(object);
         if group >= count {
             let expected = format!("a group of object {object} below {count}");
-            return Err(Error::of_call(Code::NoSuchObject, expected, text!("{group}")));
+            return Err(Error::of_call(Code::NoSuchObject, expected, format!("{group}")));
         }
         self.scene.masks_mut().set_group(object, group, mask);
         Ok(())
@@ -185,7 +184,7 @@ impl SceneBuilder {
             return Ok(());
         }
         let expected = format!("an object below {count}, the number of those that were added");
-        Err(Error::of_call(Code::NoSuchObject, expected, text!("{object}")))
+        Err(Error::of_call(Code::NoSuchObject, expected, format!("{object}")))
     }
 }
 

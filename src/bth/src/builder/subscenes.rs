@@ -4,7 +4,6 @@ use super::SceneBuilder;
 use super::instances::StagedInstance;
 use super::subscene::{Pose, Subscene};
 use crate::motion::check_time;
-use bth_format::text;
 use bth_format::{Code, Error};
 
 /// Subscenes: files that are placed as a whole.
@@ -102,5 +101,5 @@ impl SceneBuilder {
 
 fn no_subscene(subscene: u32) -> Error {
     let expected = "a subscene that was added and not removed";
-    Error::of_call(Code::NoSuchInstance, expected, text!("{subscene}"))
+    Error::of_call(Code::NoSuchInstance, expected, format!("{subscene}"))
 }

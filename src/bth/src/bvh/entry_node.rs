@@ -139,7 +139,7 @@ mod tests {
     use crate::bvh::stack::Stacks;
     use crate::object::single;
     use crate::query::sink::Sink;
-    use crate::query::{AnyQuery, NEAREST, NearestQuery, Query, any_answers, nearest_answers};
+    use crate::query::{Any, Nearest, NearestHit, Query};
     use crate::rays::Hit;
     use crate::simd::{Isa, Kernel, Simd};
     use bth_format::layout::Child;
@@ -286,17 +286,17 @@ mod tests {
                     let mut hits = vec![Hit::MISS; rays.len()];
                     let mut found = vec![false; rays.len()];
                     let (mut stacks, object) = (Stacks::default(), &object);
-                    let (answers, sink_ids) = (nearest_answers(&mut hits), object.triangle_ids);
-                    let mut sink = Sink::<NearestQuery>::new(sink_ids, answers, 0);
+                    let (answers, sink_ids) = (&mut hits, object.triangle_ids);
+                    let mut sink = Sink::<Nearest>::new(sink_ids, answers, 0);
                     if !through_pool(isa, object, (&rays, order), &mut stacks, &mut sink) {
                         continue;
                     }
-                    let mut sink = Sink::<AnyQuery>::new(sink_ids, any_answers(&mut found), 0);
+                    let mut sink = Sink::<Any>::new(sink_ids, &mut found, 0);
                     assert!(through_pool(isa, object, (&rays, order), &mut stacks, &mut sink));
                     let traced = |i: usize| order.is_none_or(|order| order.contains(&(i as u32)));
                     for (i, ray) in rays.iter().enumerate().filter(|&(i, _)| traced(i)) {
                         let mut hit = Hit::MISS;
-                        single::trace::<NearestQuery, (), _>((object, NEAREST), ray, 0, &mut (), &mut hit);
+                        single::trace::<Nearest, (), _>((object, NearestHit), ray, 0, &mut (), &mut hit);
                         let is_hit = crate::object::any(object, ray);
                         assert_eq!(format!("{:?}", hits[i]), format!("{hit:?}"), "{isa}, {scale}: {ray:?}");
                         assert_eq!(found[i], is_hit, "{isa}, {scale}: {ray:?}");

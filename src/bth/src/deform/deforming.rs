@@ -5,7 +5,6 @@ use super::plan::RefitPlan;
 use super::refit::refit;
 use bth_format::file::{DeformedObject, Normals};
 use bth_format::object::ObjectView;
-use bth_format::text;
 use bth_format::{Code, Error, File};
 
 /// An object with positions, boxes and leaves of its own.
@@ -78,7 +77,7 @@ impl Deforming {
     #[cold]
     pub(crate) fn stage_between(&mut self, ends: [&[[f32; 3]]; 2], share: f64) -> Result<(), Error> {
         if !(0.0..=1.0).contains(&share) {
-            return Err(Error::of_call(Code::NewPositions, "a share from 0 to 1", text!("{share}")));
+            return Err(Error::of_call(Code::NewPositions, "a share from 0 to 1", format!("{share}")));
         }
         self.check(ends[1])?;
         self.stage(ends[0])?;
@@ -89,8 +88,8 @@ impl Deforming {
     /// Checks the number of positions that are given, and that all are finite.
     fn check(&self, positions: &[[f32; 3]]) -> Result<(), Error> {
         if positions.len() != self.staged.len() {
-            let expected = text!("{} positions", self.staged.len());
-            return Err(Error::of_call(Code::NewPositions, expected, text!("{}", positions.len())));
+            let expected = format!("{} positions", self.staged.len());
+            return Err(Error::of_call(Code::NewPositions, expected, format!("{}", positions.len())));
         }
         check_finite(positions)
     }
@@ -144,7 +143,7 @@ fn check_finite(positions: &[[f32; 3]]) -> Result<(), Error> {
         return Ok(());
     }
     let row = positions.iter().position(|p| !p.iter().all(|x| x.is_finite())).unwrap_or_default();
-    let found = text!("{:?} of vertex {row}", positions[row]);
+    let found = format!("{:?} of vertex {row}", positions[row]);
     Err(Error::of_call(Code::NewPositions, "finite positions", found))
 }
 

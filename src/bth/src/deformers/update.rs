@@ -10,7 +10,6 @@ use crate::objects::Objects;
 use bth_format::File;
 use bth_format::error::{Code, Error, Result};
 use bth_format::layout::*;
-use bth_format::text;
 use std::collections::HashSet;
 use std::time::Duration;
 
@@ -128,7 +127,7 @@ impl Deformers {
                 }
                 let at = size_of::<Deformer>() as u64 * row as u64;
                 let name = view.node_name(deformer.node);
-                let found = text!("others: node \"{}\" at {seconds} s", name.escape_debug());
+                let found = format!("others: node \"{}\" at {seconds} s", name.escape_debug());
                 let error =
                     Error::within_file(Code::NotFinite, kind::DEFORMERS, at, "finite positions", found);
                 return Err(file.locate(error, NONE));

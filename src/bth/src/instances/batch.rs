@@ -12,12 +12,11 @@ use super::scene_query::SceneQuery;
 use super::top_level::TopLevel;
 use super::traverse::RayTraversals;
 use super::visit_queue::VisitQueue;
-use crate::SMALL;
 use crate::intersect::start_point::Starts;
 use crate::object::{self, Scratch};
 use crate::objects::Objects;
 use crate::query::sink::{SceneRays, Sink, Visit};
-use crate::query::{AnswersOf, AnyQuery, Goal, NearestQuery, Query, any_answers, better, nearest_answers};
+use crate::query::{AnswersOf, Any, Goal, Nearest, Query, better};
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use crate::starts::world_ray::InstanceStart;
@@ -119,9 +118,7 @@ impl Kernel for AdvanceKernel<'_> {
             active_rays: ActiveRays { packets, lists, traversals, active, visits, .. },
         } = self;
         packets.advance(s, progress, (first, visits));
-        if !SMALL {
-            lists.advance(progress, (first, &mut visits.all));
-        }
+        lists.advance(progress, (first, &mut visits.all));
         traversals.advance(s, top, active, progress, (first, &mut visits.all));
     }
 }
@@ -248,8 +245,7 @@ impl SceneQuery for SceneNearest<'_> {
         }
     }
     fn trace_placed(&mut self, of_object: ObjectVisits<'_>, object_rays: &ObjectRays) {
-        let answers = nearest_answers(self.hits);
-        trace_visits::<NearestQuery>(of_object, object_rays, self.scratch, answers);
+        trace_visits::<Nearest>(of_object, object_rays, self.scratch, self.hits);
     }
 }
 
@@ -276,8 +272,7 @@ impl SceneQuery for SceneAny<'_> {
         }
     }
     fn trace_placed(&mut self, of_object: ObjectVisits<'_>, object_rays: &ObjectRays) {
-        let answers = any_answers(self.found);
-        trace_visits::<AnyQuery>(of_object, object_rays, self.scratch, answers);
+        trace_visits::<Any>(of_object, object_rays, self.scratch, self.found);
     }
 }
 

@@ -9,7 +9,7 @@ use crate::bvh::ray_state::key_limit;
 use crate::bvh::single_stack::SingleStack;
 use crate::intersect::boxes::{RaySlabLanes, RaySlabs};
 use crate::intersect::prepare::PreparedRay;
-use crate::query::NEAREST;
+use crate::query::NearestHit;
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, LANES, Scalar, Simd};
 use bth_format::layout::{WIDTH, WideNode};
@@ -81,7 +81,7 @@ impl Kernel for EnumerateKernel<'_> {
                 let node = top.node(code);
                 let (bits, enter) = entered(s, &planes, node, last);
                 if bits == 0 {
-                    code = stack.pop(keys, NEAREST);
+                    code = stack.pop(keys, NearestHit);
                     continue;
                 }
                 let free = stack.free_entries();
@@ -104,7 +104,7 @@ impl Kernel for EnumerateKernel<'_> {
             if stack.is_last() {
                 return false;
             }
-            code = stack.pop(keys, NEAREST);
+            code = stack.pop(keys, NearestHit);
         }
     }
 }

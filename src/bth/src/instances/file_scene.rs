@@ -9,7 +9,6 @@ use crate::objects::Objects;
 use crate::update::Update;
 use bth_format::error::{Code, Error, Result};
 use bth_format::layout::*;
-use bth_format::text;
 
 impl World {
     /// The instances of a file at the first frame of its scene; `None` if the objects are not those of a file with scene sections.
@@ -131,7 +130,7 @@ impl World {
             let placement = Placement::new(&world, instance.object, object, &parts).map_err(|error| {
                 let (code, expected, found) = error.words();
                 let name = view.node_name(instance.node);
-                let found = text!("{found}: node \"{}\" at {seconds} s", name.escape_debug());
+                let found = format!("{found}: node \"{}\" at {seconds} s", name.escape_debug());
                 let offset = u64::from(instance.node) * size_of::<Node>() as u64;
                 let error = Error::within_file(code, kind::NODES, offset, expected, found);
                 objects.sole_file().expect("a file with nodes").locate(error, NONE)

@@ -83,9 +83,8 @@ fn rays_visit_what_is_enumerated_for_one_ray_or_are_not_listed() {
             many += usize::from(expected.len() > 8);
         }
     }
-    // Small builds list no rays but those that meet nothing.
     assert!(
-        crate::SMALL || listed > 1000 && visits > 2000 && shortened > 100 && many > 50,
+        listed > 1000 && visits > 2000 && shortened > 100 && many > 50,
         "{listed}, {visits}, {shortened}, {many}"
     );
 }

@@ -4,12 +4,11 @@
 //! visited one after the other. If the list exceeds its limit, the rays are traversed one by one, because most of the listed
 //! instances would be occluded by others.
 
-use super::box_tests::{limit, limit_lanes};
+use super::box_tests::limit_lanes;
 use super::progress::Progress;
 use super::top_level::TopLevel;
 use super::top_nodes::INSTANCE;
 use super::visit_queue::VisitQueue;
-use crate::SMALL;
 use crate::bvh::coherence::{Span, is_same_octant};
 use crate::bvh::packet::backoff::PacketBackoff;
 use crate::bvh::packet::bounds::PacketBounds;
@@ -43,17 +42,7 @@ struct ListedInstance {
 /// Sorts instances by depth. A function of its own, so that it is compiled once for all instruction sets.
 #[inline(never)]
 fn sort_by_depth(items: &mut [ListedInstance]) {
-    if !SMALL {
-        return items.sort_unstable_by(|a, b| a.depth.total_cmp(&b.depth));
-    }
-    // Insertion: at most [`MAX_INSTANCES`] times as many steps as there are items.
-    for end in 1..items.len() {
-        let mut at = end;
-        while at > 0 && items[at].depth < items[at - 1].depth {
-            items.swap(at, at - 1);
-            at -= 1;
-        }
-    }
+    items.sort_unstable_by(|a, b| a.depth.total_cmp(&b.depth));
 }
 
 /// A packet, and the range of its instances in the list.
@@ -85,15 +74,6 @@ impl TopLevelPacket {
             *limits = limit_lanes(s, s.load(&self.scale[group]), s.load(&tmax[group]));
         }
         limits
-    }
-
-    /// The rays, a bit each, that may still enter an instance, in few instructions.
-    #[inline(never)]
-    fn entering_one_by_one(&self, item: &ListedInstance, progress: Progress<'_>) -> u64 {
-        let scale = self.scale.as_flattened();
-        let enters = |ray: &usize| item.depth <= limit(scale[*ray], progress.tmax(*ray));
-        let rays = (0..self.count as usize).filter(|ray| item.rays >> ray & 1 != 0);
-        rays.filter(enters).fold(0, |bits, ray| bits | 1 << ray)
     }
 
     /// Number of groups of sixteen rays.
@@ -251,19 +231,14 @@ impl TopLevelPackets {
                 continue;
             }
             let (first, groups) = (packet.first as usize, packet.groups());
-            let limits =
-                if SMALL { [s.splat(0.0); GROUPS] } else { packet.limits(s, progress.of_rays_from(first)) };
+            let limits = packet.limits(s, progress.of_rays_from(first));
             while packet.next < packet.end {
                 let item = items[packet.next as usize];
                 packet.next += 1;
                 let mut entering = 0;
-                if SMALL {
-                    entering = packet.entering_one_by_one(&item, progress.of_rays_from(first));
-                } else {
-                    for (group, limits) in limits[..groups].iter().enumerate() {
-                        let bits = s.mask_bits(s.le(s.splat(item.depth), *limits));
-                        entering |= u64::from(bits) << (group * LANES);
-                    }
+                for (group, limits) in limits[..groups].iter().enumerate() {
+                    let bits = s.mask_bits(s.le(s.splat(item.depth), *limits));
+                    entering |= u64::from(bits) << (group * LANES);
                 }
                 entering &= item.rays;
                 if entering != 0 {

@@ -9,7 +9,6 @@ use super::met_by_lanes::RaysTogether;
 use super::progress::Progress;
 use super::top_level::TopLevel;
 use super::top_nodes::INSTANCE;
-use crate::SMALL;
 use crate::bvh::ray_state::key_limit;
 use crate::bvh::stack::{BOTTOM, StackPosition, Stacks};
 use crate::intersect::boxes::RaySlabs;
@@ -54,7 +53,7 @@ impl RayTraversals {
         active: &mut Vec<u32>,
         (lists, first_ray, visits): (&mut ListedRays, u32, &mut Vec<Visit>),
     ) {
-        if S::HAS_VECTORS && !SMALL {
+        if S::HAS_VECTORS {
             lists.clear(rays.len());
         }
         if top.is_empty() || active.is_empty() {
@@ -72,7 +71,7 @@ impl RayTraversals {
             let count = LANES.min(active.len() - first);
             index[..count].copy_from_slice(&active[first..first + count]);
             let mut done = 0;
-            if S::HAS_VECTORS && !SMALL && lists.may_list_together() {
+            if S::HAS_VECTORS && lists.may_list_together() {
                 let together = RaysTogether { top, rays, at: &index, count };
                 done = lists.list_together(s, &together, (first_ray, visits));
                 if done.count_ones() as usize == count {
@@ -83,7 +82,7 @@ impl RayTraversals {
             if S::HAS_VECTORS {
                 prepared.fill(s, &top.cube, rays, &index, count);
             }
-            let lists_rays = S::HAS_VECTORS && !SMALL && lists.may_list();
+            let lists_rays = S::HAS_VECTORS && lists.may_list();
             let mut listed = [RayToList::NONE; LANES];
             let mut listed_count = 0;
             for (lane, &ray_index) in index[..count].iter().enumerate() {

@@ -1,6 +1,5 @@
 //! The visits of instances by rays that are to be traced next, sorted by instance.
 
-use crate::SMALL;
 use crate::query::sink::Visit;
 use crate::simd::{LANES, Simd};
 
@@ -39,10 +38,6 @@ impl VisitQueue {
     /// Queues visits of an instance by up to 64 rays, a bit each from the index `first` on; before any single visits.
     #[inline(always)]
     pub(super) fn push_run<S: Simd>(&mut self, s: S, first: u32, rays: u64, instance: u32) {
-        if SMALL {
-            let rays = (0..64).filter(|ray| rays >> ray & 1 != 0);
-            return self.all.extend(rays.map(|ray| Visit { ray: first + ray, instance }));
-        }
         const ROW: [u32; LANES] = {
             let mut row = [0; LANES];
             let mut i = 0;
@@ -104,9 +99,8 @@ impl VisitQueue {
             total += std::mem::replace(count, total);
         }
         sorted.resize(all.len(), Visit { ray: 0, instance: 0 });
-        // Without runs this is nothing.
         let mut rest = in_runs;
-        for run in runs.iter().filter(|_| !SMALL) {
+        for run in runs {
             let index = &mut next[run.instance as usize];
             let visits;
             (visits, rest) = rest.split_at(run.count as usize);

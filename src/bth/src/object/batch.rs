@@ -4,16 +4,12 @@
 use super::scratch::Scratch;
 use super::single;
 use super::walked_batch::{RAYS_PER_PART, sole_tet_leaf, walk};
-use crate::SMALL;
 use crate::bvh::interleaved::{Interleaved, RemainingRays};
 use crate::bvh::nodes::is_large;
 use crate::bvh::packet::{MinimumUse, Packets};
 use crate::intersect::exact_lanes::Intersections;
 use crate::query::sink::Sink;
-use crate::query::{
-    Answer, AnswerLanes, AnyQuery, EitherGoal, Goal, Nearest, NearestQuery, Query, Uncounted, any_answers,
-    nearest_answers,
-};
+use crate::query::{Answer, AnswerLanes, Any, EitherGoal, Goal, Nearest, Query};
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use crate::tets::TetOutcome;
@@ -62,7 +58,7 @@ pub(crate) fn nearest_batch(
     scratch: &mut Scratch,
     hits: &mut [Hit],
 ) {
-    let mut sink = Sink::<NearestQuery>::new(object.triangle_ids, nearest_answers(hits), instance);
+    let mut sink = Sink::<Nearest>::new(object.triangle_ids, hits, instance);
     trace_batch(object, rays, None, scratch, &mut sink);
 }
 
@@ -74,7 +70,7 @@ pub(crate) fn any_batch(
     scratch: &mut Scratch,
     found: &mut [bool],
 ) {
-    let mut sink = Sink::<AnyQuery>::new(object.triangle_ids, any_answers(found), instance);
+    let mut sink = Sink::<Any>::new(object.triangle_ids, found, instance);
     trace_batch(object, rays, None, scratch, &mut sink);
 }
 
@@ -93,7 +89,7 @@ pub(crate) fn trace_batch<Q: Query>(
         let object = &ObjectView { bounds: object.start_bounds, ..*object };
         return trace_through(object, rays, order, scratch, sink);
     }
-    if !SMALL && sole_tet_leaf(object) != NONE && order.is_none() {
+    if sole_tet_leaf(object) != NONE && order.is_none() {
         for (part, rays) in rays.chunks(RAYS_PER_PART).enumerate() {
             trace_in_tets(object, rays, scratch, &mut sink.part(part * RAYS_PER_PART));
         }
@@ -204,7 +200,7 @@ fn one_by_one<Q: Query>(
     // Without vectors no walk is compiled, so no ray has been walked before, and rays that start on triangles are not traced together.
     let trace = |index: usize, sink: &mut Sink<'_, Q>| {
         let (goal, instance, mut answer) = (sink.goal(), sink.instance_of(index), Answer::MISS);
-        let count = &mut Uncounted::default();
+        let count = &mut ();
         single::trace::<Q, _, _>((object, goal), &rays[index], instance, count, &mut answer);
         sink.answer(index, answer);
     };
@@ -230,8 +226,7 @@ impl<Q: Query> Kernel for InterleavedKernel<'_, '_, Q> {
         let InterleavedKernel { object, rays, remaining, scratch, sink } = self;
         let (stacks, entry_nodes) = (&mut scratch.stacks, is_large(object));
         let traversal = Interleaved { object, rays, remaining, stacks, sink, entry_nodes };
-        traversal.run(s, |leaf, ray, query| {
-            enter_tets(object, leaf, ray, query, &mut Uncounted::default()) == TetOutcome::Done
-        });
+        traversal
+            .run(s, |leaf, ray, query| enter_tets(object, leaf, ray, query, &mut ()) == TetOutcome::Done);
     }
 }

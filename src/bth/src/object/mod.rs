@@ -10,7 +10,7 @@ pub(crate) use batch::{MIN_BATCH, any_batch, fill_misses, nearest_batch, trace_b
 pub(crate) use scratch::{Scratch, with_scratch};
 
 use self::single::{SingleRay, trace};
-use crate::query::{ANY, Answer, AnyQuery, NEAREST, NearestQuery, Steps, Uncounted};
+use crate::query::{Answer, Any, AnyHit, Nearest, NearestHit, Steps};
 use crate::rays::Hit;
 use bth_format::object::ObjectView;
 
@@ -25,13 +25,13 @@ pub(crate) fn nearest<R: SingleRay>(object: &ObjectView<'_>, ray: &R, instance: 
 /// As [`nearest`], but stores the hit in `hit`, which avoids a copy.
 #[inline(never)]
 pub(crate) fn store_nearest<R: SingleRay>(object: &ObjectView<'_>, ray: &R, instance: u32, hit: &mut Hit) {
-    trace::<NearestQuery, Uncounted, R>((object, NEAREST), ray, instance, &mut Uncounted::default(), hit);
+    trace::<Nearest, (), R>((object, NearestHit), ray, instance, &mut (), hit);
 }
 
 /// As [`nearest`], with the statistics of the traversal.
 pub(crate) fn nearest_counted<R: SingleRay>(object: &ObjectView<'_>, ray: &R, instance: u32) -> (Hit, Steps) {
     let (mut hit, mut steps) = (Hit::MISS, Steps::default());
-    trace::<NearestQuery, Steps, R>((object, NEAREST), ray, instance, &mut steps, &mut hit);
+    trace::<Nearest, Steps, R>((object, NearestHit), ray, instance, &mut steps, &mut hit);
     (hit, steps)
 }
 
@@ -39,6 +39,6 @@ pub(crate) fn nearest_counted<R: SingleRay>(object: &ObjectView<'_>, ray: &R, in
 #[inline(never)]
 pub(crate) fn any<R: SingleRay>(object: &ObjectView<'_>, ray: &R) -> bool {
     let mut found = Answer::MISS;
-    trace::<AnyQuery, Uncounted, R>((object, ANY), ray, 0, &mut Uncounted::default(), &mut found);
+    trace::<Any, (), R>((object, AnyHit), ray, 0, &mut (), &mut found);
     Answer::is_hit(&found)
 }

@@ -5,7 +5,7 @@ use super::batch::trace_batch;
 use super::scratch::Scratch;
 use crate::intersect::start_point::Starts;
 use crate::query::sink::Sink;
-use crate::query::{Answers, AnswersOf, AnyQuery, Goal, NearestQuery, Query, any_answers, nearest_answers};
+use crate::query::{Answers, AnswersOf, Any, Goal, Nearest, Query};
 use crate::rays::{Hit, StartRay};
 use crate::starts::prepare::PreparedStarts;
 use bth_format::object::ObjectView;
@@ -21,7 +21,7 @@ pub(crate) fn nearest_from_starts(
     scratch: &mut Scratch,
     hits: &mut [Hit],
 ) {
-    trace::<NearestQuery>(object, rays, instance, scratch, nearest_answers(hits));
+    trace::<Nearest>(object, rays, instance, scratch, hits);
 }
 
 /// Stores which rays hit anything; parameters as for [`nearest_from_starts`].
@@ -32,7 +32,7 @@ pub(crate) fn any_from_starts(
     scratch: &mut Scratch,
     found: &mut [bool],
 ) {
-    trace::<AnyQuery>(object, rays, instance, scratch, any_answers(found));
+    trace::<Any>(object, rays, instance, scratch, found);
 }
 
 fn trace<Q: Query>(

@@ -1,10 +1,7 @@
 //! What queries look for, and the answers of batches that they store. A goal is a value, which kernels ask for at run time. Goals that
-//! are types of no size have kernels of their own; walks through tetrahedra, batches with vectors of 128 bits, and with the feature
-//! `small` all kernels, serve both by [`EitherGoal`].
+//! are types of no size have kernels of their own; walks through tetrahedra and batches with vectors of 128 bits serve
+//! both by [`EitherGoal`].
 
-#[cfg(not(feature = "small"))]
-use super::Any;
-use super::Nearest;
 use super::better;
 use crate::rays::{Hit, Ray};
 use crate::simd::LANES;
@@ -227,44 +224,3 @@ impl Answers for EitherAnswers<'_> {
         self.reborrow()
     }
 }
-
-/// The queries by which objects are traced, for nearest and for any hits, with their goals and the answers that they store.
-#[cfg(not(feature = "small"))]
-mod chosen {
-    use super::{Any, AnyHit, Hit, Nearest, NearestHit};
-
-    pub(crate) type NearestQuery = Nearest;
-    pub(crate) type AnyQuery = Any;
-    pub(crate) const NEAREST: NearestHit = NearestHit;
-    pub(crate) const ANY: AnyHit = AnyHit;
-
-    #[inline(always)]
-    pub(crate) fn nearest_answers(hits: &mut [Hit]) -> &mut [Hit] {
-        hits
-    }
-    #[inline(always)]
-    pub(crate) fn any_answers(found: &mut [bool]) -> &mut [bool] {
-        found
-    }
-}
-
-#[cfg(feature = "small")]
-mod chosen {
-    use super::{EitherAnswers, EitherGoal, Hit, Nearest};
-
-    pub(crate) type NearestQuery = Nearest<EitherGoal>;
-    pub(crate) type AnyQuery = Nearest<EitherGoal>;
-    pub(crate) const NEAREST: EitherGoal = EitherGoal { is_any: false };
-    pub(crate) const ANY: EitherGoal = EitherGoal { is_any: true };
-
-    #[inline(always)]
-    pub(crate) fn nearest_answers(hits: &mut [Hit]) -> EitherAnswers<'_> {
-        EitherAnswers::Nearest(hits)
-    }
-    #[inline(always)]
-    pub(crate) fn any_answers(found: &mut [bool]) -> EitherAnswers<'_> {
-        EitherAnswers::Any(found)
-    }
-}
-
-pub(crate) use chosen::{ANY, AnyQuery, NEAREST, NearestQuery, any_answers, nearest_answers};

@@ -1,20 +1,15 @@
 //! Queries over rays, nearest hit and any hit, and the statistics of their traversal.
 
-#[cfg(any(test, not(feature = "small")))]
 mod any;
 mod goal;
 pub(crate) mod sink;
 #[cfg(test)]
 mod tests;
 
-#[cfg(any(test, not(feature = "small")))]
-use self::any::Any;
+pub(crate) use self::any::Any;
 #[cfg(test)]
 pub(crate) use self::goal::EitherAnswers;
-pub(crate) use self::goal::{
-    ANY, Answer, Answers, AnyHit, AnyQuery, EitherGoal, Goal, NEAREST, NearestHit, NearestQuery, any_answers,
-    nearest_answers,
-};
+pub(crate) use self::goal::{Answer, Answers, AnyHit, EitherGoal, Goal, NearestHit};
 
 use crate::intersect::exact::{Intersection, reported};
 use crate::intersect::exact_lanes::Intersections;
@@ -267,14 +262,6 @@ pub(crate) trait Count {
 }
 
 impl Count for () {}
-
-/// Receiver of statistics that nobody reads.
-#[cfg(not(feature = "small"))]
-pub(crate) type Uncounted = ();
-
-/// With the feature `small`, kernels that count are the only ones.
-#[cfg(feature = "small")]
-pub(crate) type Uncounted = Steps;
 
 /// Statistics of the traversal of rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -5,7 +5,6 @@ use crate::clock;
 use crate::deform::Deforming;
 use crate::update::Update;
 use bth_format::Error;
-use bth_format::text;
 
 impl Scene {
     /// Number of vertices that [`Self::set_positions`] expects; `None` if the object was not compiled with `--deformable`.
@@ -78,7 +77,7 @@ impl Scene {
             Err(failed) => {
                 self.objects_mut().deforming(object)?.undo();
                 let (code, expected, found) = failed.error.words();
-                let found = text!("{found}: instance {}", failed.instance);
+                let found = format!("{found}: instance {}", failed.instance);
                 Err(Error::of_call(code, expected, found))
             }
         }

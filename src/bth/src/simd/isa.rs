@@ -204,9 +204,7 @@ impl Isa {
 
     #[cold]
     fn choose_first() -> Isa {
-        // Browsers have no environment variables.
-        let named = if crate::SMALL { None } else { Isa::from_environment().ok().flatten() };
-        let isa = named.unwrap_or_else(Isa::best);
+        let isa = Isa::from_environment().ok().flatten().unwrap_or_else(Isa::best);
         // Threads that run this concurrently store the same value.
         isa.store();
         isa

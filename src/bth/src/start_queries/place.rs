@@ -5,7 +5,6 @@ use crate::rays::{Ray, Start, StartRay};
 use crate::scene::Scene;
 use crate::starts::locate::{StartError, locate};
 use crate::starts::world_ray::{InstanceStart, PlacedRay};
-use bth_format::text;
 use bth_format::{Code, Error};
 use std::borrow::Cow;
 
@@ -57,17 +56,17 @@ impl Scene {
         match self.place_start(start) {
             Ok(_) => Ok(()),
             Err(Misplaced::NoInstance) => {
-                let expected = text!("an instance below {}", self.instance_count());
-                Err(Error::of_call(Code::NoSuchInstance, expected, text!("{instance}")))
+                let expected = format!("an instance below {}", self.instance_count());
+                Err(Error::of_call(Code::NoSuchInstance, expected, format!("{instance}")))
             }
             Err(Misplaced::Hidden) => {
-                bad("a visible instance", text!("instance {instance}, which is hidden").into())
+                bad("a visible instance", format!("instance {instance}, which is hidden").into())
             }
             Err(Misplaced::Start(StartError::NoTriangle | StartError::NoArea)) => {
-                bad("a triangle with area", text!("triangle {triangle} of instance {instance}").into())
+                bad("a triangle with area", format!("triangle {triangle} of instance {instance}").into())
             }
             Err(Misplaced::Start(StartError::Weights)) => {
-                bad("u >= 0, v >= 0 and u + v <= 1", text!("u = {u}, v = {v}").into())
+                bad("u >= 0, v >= 0 and u + v <= 1", format!("u = {u}, v = {v}").into())
             }
         }
     }

@@ -46,12 +46,9 @@ impl VisitedSet {
     }
 }
 
-/// Tetrahedra that a flood has yet to pass, with the faces through which it enters them. Most are few enough to need no allocation; the
-/// small library, which has no room for what growing arrays say when they fail, allocates.
-#[cfg(not(feature = "small"))]
+/// Tetrahedra that a flood has yet to pass, with the faces through which it enters them. Most are few enough to need no
+/// allocation.
 type Pending = smallvec::SmallVec<[(u32, Entered); 64]>;
-#[cfg(feature = "small")]
-type Pending = Vec<(u32, Entered)>;
 
 /// Receiver of the constrained faces that a flood reaches.
 pub(crate) trait FaceReceiver {

@@ -5,8 +5,7 @@ use crate::bvh::packet::runs::{MINIMUM_USE, MinimumUse, PacketCount, PacketScrat
 use crate::object::{self, Scratch, single};
 use crate::query::sink::Sink;
 use crate::query::{
-    ANY, Answer, AnswersOf, AnyQuery, EitherAnswers, EitherGoal, Goal, NEAREST, Nearest, NearestQuery, Query,
-    any_answers, nearest_answers,
+    Answer, AnswersOf, Any, AnyHit, EitherAnswers, EitherGoal, Goal, Nearest, NearestHit, Query,
 };
 use crate::rays::{Hit, Ray};
 use crate::simd::Isa;
@@ -56,8 +55,8 @@ fn bits(hit: &Hit) -> [u32; 4] {
 /// The answers of a single ray.
 fn alone(object: &ObjectView<'_>, ray: &Ray) -> (Hit, bool) {
     let (mut hit, mut found) = (Hit::MISS, Answer::MISS);
-    single::trace::<NearestQuery, (), _>((object, NEAREST), ray, 0, &mut (), &mut hit);
-    single::trace::<AnyQuery, (), _>((object, ANY), ray, 0, &mut (), &mut found);
+    single::trace::<Nearest, (), _>((object, NearestHit), ray, 0, &mut (), &mut hit);
+    single::trace::<Any, (), _>((object, AnyHit), ray, 0, &mut (), &mut found);
     for is_any in [false, true] {
         let (goal, mut either) = (EitherGoal { is_any }, Hit::MISS);
         single::trace::<Nearest<EitherGoal>, (), _>((object, goal), ray, 0, &mut (), &mut either);
@@ -111,9 +110,9 @@ fn check(surface: &HeightField, rays: &[Ray], least: MinimumUse) -> [(PacketCoun
     }
     for isa in isas() {
         let mut hits = vec![Hit::MISS; rays.len()];
-        let (count, rest) = packed::<NearestQuery>(isa, &object, rays, least, nearest_answers(&mut hits));
+        let (count, rest) = packed::<Nearest>(isa, &object, rays, least, &mut hits);
         let mut found = vec![false; rays.len()];
-        let (count_any, rest_any) = packed::<AnyQuery>(isa, &object, rays, least, any_answers(&mut found));
+        let (count_any, rest_any) = packed::<Any>(isa, &object, rays, least, &mut found);
         check_either(isa, &object, (rays, least), ((&count, &rest, &hits), (&count_any, &rest_any, &found)));
         for (i, (ray, (hit, is_hit))) in rays.iter().zip(&expected).enumerate() {
             if !rest.contains(&(i as u32)) {
@@ -300,8 +299,8 @@ fn what_is_known_of_packets_is_kept_for_the_next_batch_through_the_same_object()
         let mut scratch = PacketScratch::default();
         let mut poor = |surface: &HeightField| {
             let mut hits = vec![Hit::MISS; rays.len()];
-            let (object, answers) = (surface.view(), nearest_answers(&mut hits));
-            packed_in::<NearestQuery>(isa, &mut scratch, &object, &rays, MINIMUM_USE, answers).poor
+            let (object, answers) = (surface.view(), &mut hits);
+            packed_in::<Nearest>(isa, &mut scratch, &object, &rays, MINIMUM_USE, answers).poor
         };
         let first = poor(&surface);
         assert!(first > 2, "{isa}: {first}");
@@ -329,12 +328,11 @@ fn nothing_of_a_batch_is_left_for_the_next() {
     for isa in isas() {
         let mut scratch = PacketScratch::default();
         let mut hits = vec![Hit::MISS; before.len()];
-        let answers = nearest_answers(&mut hits);
-        packed_in::<NearestQuery>(isa, &mut scratch, &surface.view(), &before, ALWAYS, answers);
+        let answers = &mut hits;
+        packed_in::<Nearest>(isa, &mut scratch, &surface.view(), &before, ALWAYS, answers);
         assert!(hits.iter().filter(|hit| hit.is_hit()).count() > 500);
         let mut found = vec![false; rays.len()];
-        let count =
-            packed_in::<AnyQuery>(isa, &mut scratch, &leaf.view(), &rays, ALWAYS, any_answers(&mut found));
+        let count = packed_in::<Any>(isa, &mut scratch, &leaf.view(), &rays, ALWAYS, &mut found);
         assert!(count.short == 2 && found.iter().all(|&found| found), "{isa}: {count:?}");
     }
 }

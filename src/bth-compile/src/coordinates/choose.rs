@@ -311,11 +311,8 @@ mod tests {
     #[test]
     fn too_few_bits_are_refused_with_what_would_do() {
         let points = vec![[0.0; 3], [1.0; 3], [0.3, 0.4, 0.7]];
-        let options = CoordinateOptions {
-            bits: Some(GridBits::B16),
-            max_error: Some(MaxError::Absolute(1e-6)),
-            ..CoordinateOptions::default()
-        };
+        let options =
+            CoordinateOptions { bits: Some(GridBits::B16), max_error: Some(MaxError::Absolute(1e-6)) };
         let error = place(Path::new("a.ply"), &mut mesh(points), &options).unwrap_err().to_string();
         assert!(
             error.contains("BTH-I070") && error.contains("hint: 21 bits move vertices by at most"),
@@ -328,7 +325,7 @@ mod tests {
     fn bits_that_would_lose_a_tiny_surface_are_refused() {
         let corners = |size: f32| vec![[0.0; 3], [size, 0.0, 0.0], [0.0, size, 0.0]];
         let place = |points: &[[f32; 3]], bits, max_error| {
-            let options = CoordinateOptions { bits, max_error, ..CoordinateOptions::default() };
+            let options = CoordinateOptions { bits, max_error };
             let mut mesh = mesh(points.to_vec());
             place(Path::new("a.ply"), &mut mesh, &options).map(|on| on.map(|_| mesh.positions))
         };

@@ -330,5 +330,5 @@ fn version(v: u32) -> String {
 }
 
 fn hex(bytes: &[u8]) -> String {
-    format!("{}", bytes.iter().map(|b| format!("{b:02x}")).collect::<String>())
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }

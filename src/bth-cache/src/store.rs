@@ -400,7 +400,7 @@ impl Store {
 
     fn give_up(&self, remote: &mut Option<Box<dyn Remote>>, error: &std::io::Error) {
         if let Some(gone) = remote.take()
-            // Who cancels does not go on.
+            // Cancelled: no note, since nothing continues.
             && error.kind() != ErrorKind::Interrupted
         {
             let name = gone.name();

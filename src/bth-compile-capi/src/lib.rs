@@ -35,7 +35,7 @@ thread_local! {
 /// A code and a text.
 pub(crate) struct Failure(i32, String);
 
-/// The failure of a caller who gave something that cannot be.
+/// Invalid argument.
 pub(crate) fn argument(text: String) -> Failure {
     Failure(ERROR_ARGUMENT, text)
 }

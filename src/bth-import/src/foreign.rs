@@ -34,7 +34,7 @@ const STARTS: [(&[u8], &str, &str); 13] = [
 /// Bytes of a file in which the first element of XML is looked for.
 const XML_HEAD: usize = 1024;
 
-/// The format of a file that is none of those that are read, if it is known.
+/// Guesses the format of an unsupported file, for the error message.
 pub(crate) fn of(data: &[u8]) -> Option<Foreign> {
     let text = without_mark(data).trim_ascii_start();
     if let Some((_, what, hint)) = STARTS.iter().find(|(start, ..)| text.starts_with(start)) {

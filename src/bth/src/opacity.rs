@@ -16,7 +16,7 @@ impl Scene {
     /// a query is never transparent; where it is unknown, a filter ([`Accept::filter`]) may decide, and without one it counts.
     ///
     /// # Panics
-    /// If the hit is none of this scene.
+    /// If `hit` is not from this scene.
     pub fn opacity(&self, hit: &Hit) -> Opacity {
         self.view(self.object_of(hit.primitive.instance)).opacity_at(hit.primitive.triangle, hit.u, hit.v)
     }

@@ -60,7 +60,7 @@ impl Quality {
     }
 }
 
-/// BvhOptions of [`build`].
+/// Options of [`build`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BvhOptions {
     /// How much time to spend on the tree.
@@ -69,7 +69,7 @@ pub struct BvhOptions {
     pub keep_zero_area: bool,
 }
 
-/// BvhReport of [`build`].
+/// Report of [`build`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BvhReport {
     /// Triangles in the tree.

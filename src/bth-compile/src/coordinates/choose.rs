@@ -63,7 +63,7 @@ fn number_of_bits<S: Serializer>(bits: &Option<GridBits>, to: S) -> std::result:
     bits.map(|b| b as u32).serialize(to)
 }
 
-/// CoordinateReport on the coordinates.
+/// Report on the coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CoordinateReport {
     /// Bits of a coordinate.

@@ -1,4 +1,4 @@
-//! CostOptions of the selection, and the verdict on each node.
+//! Options of the selection, and the verdict on each node.
 
 use super::{Estimator, Profile};
 use crate::sampling::KnownRays;
@@ -200,7 +200,7 @@ pub struct Choice {
     pub verdicts: Vec<Verdict>,
 }
 
-/// CostReport of the selection.
+/// Report of the selection.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct CostReport {
     /// The costs and limits that were used.

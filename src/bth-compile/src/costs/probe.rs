@@ -23,7 +23,7 @@ use serde::Serialize;
 const RAYS_OF_ALL_LEAVES: usize = 1 << 16;
 const RAYS_OF_LEAF: [usize; 2] = [64, 1024];
 
-/// CostReport of the probe.
+/// Report of the probe.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ProbeReport {
     /// Each tet leaf that was built.

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// Greatest number of triangles of a subtree that one thread marks.
 const GRAIN: u32 = 4096;
 
-/// MarkReport of the marking stage.
+/// Report of the marking stage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MarkReport {
     /// Triangles in the BVH; those of zero area are not.

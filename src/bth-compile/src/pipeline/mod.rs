@@ -138,7 +138,7 @@ pub(crate) fn compile_mesh(
 }
 
 /// Decides in which directions rays from a triangle meet nothing, and whether that is kept. A tetrahedralization of the whole model
-/// has no leaves in which its triangles could be found, and of an object that deforms nothing is known. What is kept where it is worth its
+/// has no leaves in which its triangles could be found. Deformable objects get no free directions. What is kept where it is worth its
 /// bytes stays within the limit on them.
 fn free_directions(
     traced: &TracedMesh,

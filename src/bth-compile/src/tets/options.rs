@@ -1,11 +1,11 @@
-//! TetOptions of the tets stage.
+//! Options of the tets stage.
 
 use std::path::PathBuf;
 use std::time::Duration;
 
 use bth_tetgen_protocol::Fault;
 
-/// TetOptions of the tetrahedralization.
+/// Options of the tetrahedralization.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TetOptions {
     /// The worker program. If absent it is searched for: `BTH_TETGEN`, then beside this program, then on the `PATH`.

@@ -232,7 +232,8 @@ pub(crate) fn estimate(origin: impl Origin, direction: [f64; 3], corners: [[f64;
     Estimate::Open(UncertainWeights { rounded, weight, bound: error[0] }, t)
 }
 
-/// The intersection of a line and a triangle, and whether it is that of [`Estimate::Intersects`]; else it means nothing.
+/// The intersection of a line and a triangle. It is valid only if the flag is true: where [`estimate`] returns
+/// [`Estimate::Intersects`].
 #[inline(always)]
 pub(crate) fn certain_intersection(
     origin: [f64; 3],

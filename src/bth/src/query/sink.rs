@@ -109,7 +109,7 @@ impl<'a, Q: Query> Sink<'a, Q> {
         }
     }
 
-    /// Stores the answer of an any-hit query of which some triangle is certainly hit.
+    /// Records that `ray` hits something.
     #[inline(always)]
     pub(crate) fn accepted(&mut self, ray: usize) {
         let index = self.first + ray;

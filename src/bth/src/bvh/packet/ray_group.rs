@@ -157,7 +157,7 @@ impl<S: Simd> RayGroup<S> {
         }
     }
 
-    /// Makes a triangle, given as for `pending`, the pending hit of lanes. `depth` holds the bounds of its depth.
+    /// Sets the pending hit of masked lanes to `triangle`, given as for `pending`. `depth` holds the bounds of its depth.
     #[inline(always)]
     pub(crate) fn accept(&mut self, s: S, m: S::M, depth: [S::F; 2], triangle: u32) {
         self.nearest = s.select(m, depth[0], self.nearest);

@@ -94,7 +94,7 @@ pub fn collapse_by<'a>(
         report: &mut report,
     };
     let (root, tets) = writer.tree(0, 0, true)?;
-    if options.keep_subtrees && !options.leaf_vertices {
+    if options.keep_subtrees {
         for (at, level) in tets {
             let (code, _) = writer.tree(at, level, false)?;
             let row = cut.binary_search(&at).expect("tet leaves are cut nodes");

@@ -24,8 +24,6 @@ struct Pending {
     slot: usize,
     /// Wide nodes above it.
     level: u32,
-    /// Whether it lies in no subtree of a tet leaf.
-    outer: bool,
 }
 
 /// A slot of a wide node.
@@ -84,19 +82,16 @@ pub(super) struct Writer<'a> {
 
 impl Writer<'_> {
     /// Appends the tree below a node, nodes before leaves. `level` wide nodes lie above; `outer` is
-    /// false for the subtree of a tet leaf. Returns the root's code and the tet leaves with the wide nodes above each. Where the vertices
-    /// of leaves are recorded, the subtrees of tet leaves are part of the tree.
+    /// false for the subtree of a tet leaf. Returns the root's code and the tet leaves with the wide nodes above each.
     pub(super) fn tree(&mut self, root: u32, level: u32, outer: bool) -> Result<(u32, Vec<(u32, u32)>)> {
         let base = self.wide.lines.len();
         // First the shape is determined: slot 0 holds the root, every other slot belongs to a node.
         let mut slots = vec![Slot { node: root, code: NONE }];
         let mut inner: Vec<Inner> = Vec::new();
-        let mut leaves: Vec<(usize, bool)> = Vec::new();
+        let mut leaves: Vec<usize> = Vec::new();
         let mut tets = Vec::new();
-        // Slots of the roots of subtrees, which belong to no node, and the tet leaves.
-        let mut subtrees: Vec<(usize, usize)> = Vec::new();
-        let mut pending = vec![Pending { slot: 0, level, outer }];
-        while let Some(Pending { slot, level, outer }) = pending.pop() {
+        let mut pending = vec![Pending { slot: 0, level }];
+        while let Some(Pending { slot, level }) = pending.pop() {
             let at = slots[slot].node;
             let decision = self.decisions[at as usize];
             if outer && decision.is_cut() {
@@ -104,15 +99,10 @@ impl Writer<'_> {
                 slots[slot].code = Child::Tets(row as u32).code();
                 self.report.tet_leaves += 1;
                 tets.push((at, level));
-                if self.leaf_vertices {
-                    subtrees.push((slots.len(), row));
-                    pending.push(Pending { slot: slots.len(), level, outer: false });
-                    slots.push(Slot { node: at, code: NONE });
-                }
                 continue;
             }
             if decision.role() != Role::Node {
-                leaves.push((slot, outer));
+                leaves.push(slot);
                 continue;
             }
             slots[slot].code = Child::Node((base + inner.len() * NODE_LINES) as u32).code();
@@ -125,14 +115,14 @@ impl Writer<'_> {
             if outer {
                 self.report.node_visits += self.area(at);
             }
-            pending.extend((first..slots.len()).rev().map(|slot| Pending { slot, level: level + 1, outer }));
+            pending.extend((first..slots.len()).rev().map(|slot| Pending { slot, level: level + 1 }));
         }
 
         // Leaves follow the nodes.
         let leaves_from = base + inner.len() * NODE_LINES;
         let mut next = leaves_from;
         let mut placed = Vec::with_capacity(leaves.len());
-        for &(slot, outer) in &leaves {
+        for &slot in &leaves {
             let node = slots[slot].node;
             let leaf = Leaf { node, raw: self.decisions[node as usize].role() == Role::Raw };
             slots[slot].code = leaf.child(next).code();
@@ -158,11 +148,8 @@ impl Writer<'_> {
             put(lines, 0, &wide_node(slots, widened));
         });
         self.leaves(&placed, leaves_from)?;
-        for &(slot, row) in &subtrees {
-            self.wide.subtrees[row] = slots[slot].code;
-        }
         self.report.nodes += inner.len() as u64;
-        self.report.children += (slots.len() - subtrees.len()) as u64 - 1;
+        self.report.children += slots.len() as u64 - 1;
         Ok((slots[0].code, tets))
     }
 

@@ -16,6 +16,14 @@ bench old new *models:
 docs:
     cargo doc --no-deps --workspace --exclude bth-tetgen
 
+# Build the documentation site into target/book; needs mdbook. `just book serve` shows it.
+book verb="build":
+    mdbook {{verb}}
+
+# Find spelling mistakes; needs typos.
+spell:
+    typos
+
 # Install the libraries and headers for C and C++ below a folder.
 package folder:
     tools/package/install {{folder}}

@@ -17,11 +17,10 @@ _GLTF = ("flatten", "scene", "animation", "rate", "at_rest", "rigid_parts", "str
 
 def compile(
     model, *, output=None, quality=None, structure=None, coordinates=None, max_error=None, polygons=None,
-    attributes=None, alpha=None, tets=None, subtrees=None, compact=None, geometry=None, names=None, materials=None,
-    lenient_materials=None, estimator=None, select=None, optimize_for=None, profile=None, max_bytes_per_triangle=None,
-    budget=None, probe=None, min_tet_triangles=None, c_tet=None, for_scene=None, rays=None,
-    tet_deadline=None, tet_memory=None, flatten=None, scene=None, animation=None, rate=None, at_rest=None, rigid_parts=None,
-    strict=None, deformable=None, poses=None, segments=None, free_directions=None, free_reach=None, cache=None,
+    attributes=None, alpha=None, compact=None, geometry=None, names=None, materials=None,
+    lenient_materials=None, profile=None, max_bytes_per_triangle=None,
+    for_scene=None, rays=None, settings=None, flatten=None, scene=None, animation=None, rate=None, at_rest=None, rigid_parts=None,
+    strict=None, deformable=None, free_directions=None, cache=None,
     cache_size=None, shared_cache=None, memory=None, threads=None, progress=None,
 ):
     """Compiles a model and returns its scene.
@@ -42,6 +41,7 @@ def compile(
     polygons ('ears') covers concave polygons of models in files exactly, which fans do not.
     attributes ('normals', 'all'), alpha ('mask', 'blend'), names and materials (True) keep what models in files have of these;
     lenient_materials leaves out images that cannot be read.
+    settings: a dictionary of the keys of `bthc compile --set` and their values, such as {"poses": 1}.
     deformable: keeps what `Scene.set_positions` needs. free_directions ('auto', 'distances', 'all') keeps in which directions rays from a
     triangle meet nothing, and up to which distance.
     """

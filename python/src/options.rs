@@ -3,12 +3,14 @@
 use crate::rays::{Given, RayArrays, Rays};
 use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_compile::sampling::KnownRays;
+use bth_compile::settings::Setting;
 use bth_compile::{bvh, coordinates, costs, free};
 use bth_format::layout::{GridBits, RecordKind};
 use bth_import::{AlphaMode, Keep, Polygons};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyAny, PyDict};
+use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -77,21 +79,6 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
         .choice("structure", &[("bth", Structure::Bth), ("bvh", Structure::Bvh), ("tets", Structure::Tets)])?
         .unwrap_or(Structure::Bvh);
     let compact = keywords.value::<bool>("compact")?.unwrap_or(false);
-    let record = keywords.choice(
-        "tets",
-        &[
-            ("link32", RecordKind::Link32),
-            ("tet32", RecordKind::Tet32),
-            ("tet20", RecordKind::Tet20),
-            ("tet16", RecordKind::Tet16),
-        ],
-    )?;
-    let subtrees = keywords.choice("subtrees", &[("keep", true), ("prune", false)])?;
-    if compact && (record.is_some() || subtrees.is_some()) {
-        return Err(PyValueError::new_err(
-            "compact stands for tets='tet16' and subtrees='prune': leave these out",
-        ));
-    }
     let materials = keywords.value::<bool>("materials")?.unwrap_or(false);
     let deformable = keywords.value::<bool>("deformable")?.unwrap_or(false);
     let attributes = keywords
@@ -100,9 +87,9 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
     let mut options = CompileOptions {
         structure,
         attributes: if materials { Keep::All } else { attributes },
-        record: if compact { RecordKind::Tet16 } else { record.unwrap_or(RecordKind::Link32) },
+        record: if compact { RecordKind::Tet16 } else { RecordKind::Link32 },
         coordinates: coordinates(keywords)?,
-        keep_subtrees: subtrees.unwrap_or(!compact && structure == Structure::Bth),
+        keep_subtrees: !compact && structure == Structure::Bth,
         alpha: keywords
             .choice(
                 "alpha",
@@ -119,29 +106,16 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
         deformable,
         ..CompileOptions::default()
     };
-    motion_and_free(keywords, &mut options)?;
+    free_directions(keywords, &mut options)?;
     selection(keywords, &mut options)?;
-    if let Some(seconds) = keywords.within("tet_deadline", 1..=86_400)? {
-        options.tets.deadline = std::time::Duration::from_secs(seconds);
-        options.tets.deadline_per_triangle = std::time::Duration::ZERO;
-    }
-    if let Some(mib) = keywords.within("tet_memory", 16..=1 << 20)? {
-        options.tets.memory = mib << 20;
-    }
     if let Some(mib) = keywords.within("memory", 1..=u64::MAX >> 20)? {
         options.objects_memory = mib << 20;
     }
     Ok(options)
 }
 
-/// Trees of what moves, and free directions.
-fn motion_and_free(keywords: &Keywords<'_, '_>, options: &mut CompileOptions) -> PyResult<()> {
-    if let Some(poses) = keywords.within("poses", 1..=16)? {
-        options.motion.poses = poses as u32;
-    }
-    if let Some(segments) = keywords.within("segments", 1..=64)? {
-        options.motion.segments = segments as u32;
-    }
+/// Sets where free directions are kept.
+fn free_directions(keywords: &Keywords<'_, '_>, options: &mut CompileOptions) -> PyResult<()> {
     let keep = [
         ("none", free::KeepFree::None),
         ("auto", free::KeepFree::Auto),
@@ -150,9 +124,6 @@ fn motion_and_free(keywords: &Keywords<'_, '_>, options: &mut CompileOptions) ->
     ];
     if let Some(keep) = keywords.choice("free_directions", &keep)? {
         options.free.keep = keep;
-    }
-    if let Some(reach) = keywords.positive("free_reach")? {
-        options.free.reach = reach;
     }
     Ok(())
 }
@@ -206,42 +177,19 @@ fn selection(keywords: &Keywords<'_, '_>, options: &mut CompileOptions) -> PyRes
         options.bvh.quality = quality;
     }
     let costs = &mut options.costs;
-    let estimators =
-        [("face-count", costs::Estimator::FaceCount), ("average-depth", costs::Estimator::AverageDepth)];
-    if let Some(estimator) = keywords.choice("estimator", &estimators)? {
-        costs.estimator = estimator;
-    }
-    if let Some(select) =
-        keywords.choice("select", &[("best", costs::Select::Best), ("paper", costs::Select::Paper)])?
-    {
-        costs.select = select;
-    }
-    let rays = [
-        ("camera", costs::OptimizeFor::Camera),
-        ("secondary", costs::OptimizeFor::Secondary),
-        ("balanced", costs::OptimizeFor::Balanced),
-    ];
-    if let Some(rays) = keywords.choice("optimize_for", &rays)? {
-        costs.optimize_for = rays;
-    }
-    if let Some(probe) =
-        keywords.choice("probe", &[("steps", costs::Probe::Steps), ("off", costs::Probe::Off)])?
-    {
-        costs.probe = probe;
-    }
-    if let Some(triangles) = keywords.within("min_tet_triangles", 1..=u64::from(u32::MAX))? {
-        costs.minimum_triangles = triangles as u32;
-    }
     costs.for_scene = keywords.value("for_scene")?.unwrap_or(false);
     costs.max_bytes_per_triangle = keywords.positive("max_bytes_per_triangle")?;
-    costs.budget = keywords.positive("budget")?;
-    costs.c_tet = keywords.positive("c_tet")?;
     if let Some(arrays) = keywords.value::<RayArrays<'_>>("rays")? {
         costs.rays = Some(Arc::new(known_rays(&arrays)?));
     }
     if let Some(profile) = keywords.value::<PathBuf>("profile")?.filter(|path| path.as_os_str() != "default")
     {
         costs.profile = costs::Profile::read(&profile).map_err(crate::errors::compile_error)?;
+    }
+    for (key, value) in keywords.value::<BTreeMap<String, Bound<'_, PyAny>>>("settings")?.unwrap_or_default()
+    {
+        let setting = Setting::parse(&format!("{}={}", key.replace('_', "-"), value.str()?));
+        setting.map_err(|e| PyValueError::new_err(format!("settings: {e}")))?.apply(options);
     }
     Ok(())
 }

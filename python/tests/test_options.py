@@ -20,9 +20,9 @@ PAGE = pathlib.Path(__file__).resolve().parents[2] / "docs" / "reference.md"
 #: Options of `bthc compile` that a function has no use for, and those that have another name.
 OTHERS = {
     "jobs", "dry-run", "depfile", "end-with-input", "format", "watch", "shard", "json", "quiet", "in-cache", "no-cache", "cache-dir", "no-geometry",
-    "help", "version", "isa",
+    "help", "version", "isa", "set",
 }
-OURS = {"cache", "geometry", "progress"}
+OURS = {"cache", "geometry", "progress", "settings"}
 
 
 @pytest.mark.skipif(not PAGE.exists(), reason="not in the repository")
@@ -43,12 +43,15 @@ def path(tmp_path):
 @pytest.mark.skipif(not BTHC.exists(), reason=f"there is no {BTHC}")
 @pytest.mark.parametrize("options", [
     {}, {"names": True, "attributes": "all"}, {"attributes": "normals", "geometry": False}, {"coordinates": 16},
-    {"max_error": "0.01%"}, {"quality": "best", "threads": 1}, {"alpha": "blend"}, {"deformable": True, "poses": 2, "segments": 1},
-    {"free_directions": "all", "free_reach": 0.25}, {"free_directions": "distances"}, {"max_bytes_per_triangle": 500.0, "memory": 100},
+    {"max_error": "0.01%"}, {"quality": "best", "threads": 1}, {"alpha": "blend"}, {"deformable": True},
+    {"free_directions": "all", "settings": {"free-reach": 0.25, "poses": 2}}, {"free_directions": "distances"}, {"max_bytes_per_triangle": 500.0, "memory": 100},
 ])
 def test_bytes_of_the_program(path, options):
     command = [BTHC, "compile", path, "-o", path.with_suffix(".bth"), "--structure", "bvh", "--no-cache", "--quiet"]
     for name, value in options.items():
+        if name == "settings":
+            command += [f"--set={key}={number}" for key, number in value.items()]
+            continue
         name = "--" + name.replace("_", "-")
         command += ["--no-geometry"] if name == "--geometry" else [name] if value is True else [name, str(value)]
     subprocess.run(command, check=True)
@@ -93,10 +96,10 @@ def test_the_default_profile_has_a_name(path):
 
 @pytest.mark.parametrize("options, error", [
     ({"alpha": "holes"}, ValueError), ({"polygons": "delaunay"}, ValueError), ({"attributes": "colours"}, ValueError), ({"names": "yes"}, TypeError), ({"threads": -1}, ValueError),
-    ({"threads": 5000}, ValueError), ({"threads": 1.5}, TypeError), ({"tet_deadline": 0}, ValueError), ({"tet_memory": 1}, ValueError),
-    ({"memory": 0}, ValueError), ({"min_tet_triangles": 0}, ValueError), ({"budget": -1}, ValueError), ({"c_tet": float("nan")}, ValueError),
+    ({"threads": 5000}, ValueError), ({"threads": 1.5}, TypeError), ({"settings": {"tet-deadline": 0}}, ValueError), ({"settings": {"tet_memory": 1}}, ValueError),
+    ({"memory": 0}, ValueError), ({"settings": {"budget": -1}}, ValueError), ({"settings": {"c-tet": float("nan")}}, ValueError), ({"settings": 3}, TypeError), ({"settings": {"speed": 3}}, ValueError),
     ({"max_error": "much"}, ValueError), ({"cache_size": "large", "cache": True}, ValueError), ({"cache": 3.5}, TypeError),
-    ({"compact": True, "tets": "tet20"}, ValueError), ({"progress": 3}, TypeError), ({"rate": 0}, ValueError),
+    ({"progress": 3}, TypeError), ({"rate": 0}, ValueError),
     ({"cache": False, "shared_cache": "x"}, ValueError), ({"profile": "no such profile"}, OSError), ({"output": 7}, TypeError),
     ({"shared_cache": "s3://bucket/prefix"}, ValueError),
 ])
@@ -105,7 +108,7 @@ def test_wrong_options(path, tmp_path, options, error):
         options = {**options, "cache": tmp_path / "cache"}
     with pytest.raises(error) as raised:
         bth.compile(path, **options)
-    if error is not OSError and "compact" not in options:
+    if error is not OSError:
         names = [name for name in options if name != "cache"] or ["cache"]
         assert any(name in str(raised.value) for name in names) or error is TypeError
 

@@ -18,7 +18,7 @@ const LIMIT: Duration = Duration::from_secs(300);
 const CPU_SECONDS: u32 = 60;
 const MEMORY_KIB: u32 = 4 << 20;
 /// Seconds of a tetrahedralization. By default it may take minutes, which TetGen spends on two of the models without success.
-const TET_SECONDS: &str = "1";
+const DEADLINE: &str = "tet-deadline=1";
 
 /// Models that are not usable, and where the error must point.
 const UNUSABLE: [(&str, &str); 3] = [
@@ -143,7 +143,7 @@ fn limited(bthc: &Path) -> Command {
 /// Whether the model was compiled, and in how many seconds; an error when something is not as it must be.
 fn check(bthc: &Path, data: &Path, model: &Path, file: &Path) -> Result<(bool, f64), String> {
     let mut compile = limited(bthc);
-    compile.arg("compile").arg(model).arg("-o").arg(file).args(["--json", "--tet-deadline", TET_SECONDS]);
+    compile.arg("compile").arg(model).arg("-o").arg(file).args(["--json", "--set", DEADLINE]);
     let ended = run(&mut compile, LIMIT)?;
     if ended.stderr.contains("panicked") {
         return Err(format!("panicked: {}", ended.stderr));

@@ -27,6 +27,7 @@ mod options;
 pub mod pipeline;
 pub mod sampling;
 pub mod scene;
+pub mod settings;
 pub mod source;
 pub mod tets;
 mod vectors;

@@ -21,7 +21,7 @@ pub(crate) fn found(json: &Value) -> (Vec<String>, Vec<String>) {
 }
 
 pub(crate) fn compile(folder: &Path, args: &[&str]) -> Value {
-    let all = [&["compile", "--json", "--min-tet-triangles", "64", "--c-tet", "0.5"], args].concat();
+    let all = [&["compile", "--json", "--set", "min-tet-triangles=64", "--set", "c-tet=0.5"], args].concat();
     cached(folder, &all).expect(0).json()
 }
 
@@ -90,7 +90,7 @@ fn one_option_redoes_what_depends_on_it_and_says_so() {
     let all: Vec<&str> = all.chain(["free-directions"]).collect();
     assert_eq!(misses, all);
 
-    let json = compile(folder.path(), &["a.obj", "--tets", "tet16"]);
+    let json = compile(folder.path(), &["a.obj", "--set", "record=tet16"]);
     let (hits, misses) = found(&json);
     assert_eq!(misses, ["file"], "another record: nothing but the file");
     assert_eq!(hits.iter().any(|h| h == "tets 1"), tets, "{hits:?}");
@@ -124,8 +124,12 @@ fn the_limit_on_bytes_tells_files_apart_that_have_no_tetrahedra() {
 fn the_cache_never_shows_in_the_bytes() {
     let folder = folder(&[("a.obj", &sphere(20))]);
     let (path, out) = (folder.path(), folder.path().join("out.bth"));
-    let variants: [&[&str]; 4] =
-        [&[], &["--quality", "best"], &["--tets", "tet20", "--subtrees", "prune"], &["--structure", "bvh"]];
+    let variants: [&[&str]; 4] = [
+        &[],
+        &["--quality", "best"],
+        &["--set", "record=tet16", "--set", "subtrees=prune"],
+        &["--structure", "bvh"],
+    ];
     let args = |variant: &[&'static str]| [&["a.obj", "-o", "out.bth"], variant].concat();
     let plain: Vec<_> = variants
         .iter()
@@ -163,7 +167,16 @@ fn moving_an_instance_compiles_nothing_and_changing_an_object_only_that() {
     std::fs::write(path.join("2.obj"), sphere(40)).unwrap();
     let dry = cached(
         path,
-        &["compile", "--dry-run", "--json", "--min-tet-triangles", "64", "--c-tet", "0.5", "s.manifest"],
+        &[
+            "compile",
+            "--dry-run",
+            "--json",
+            "--set",
+            "min-tet-triangles=64",
+            "--set",
+            "c-tet=0.5",
+            "s.manifest",
+        ],
     );
     let dry = &dry.expect(0).json()["jobs"][0];
     assert_eq!((&dry["action"], &dry["objects_kept"]), (&"compile".into(), &3.into()));
@@ -196,7 +209,7 @@ fn damaged_entries_are_reported_removed_and_built_again() {
         std::fs::write(file, bytes).unwrap();
     }
     std::fs::remove_file(path.join("a.bth")).unwrap();
-    let args = ["compile", "a.obj", "--min-tet-triangles", "64", "--c-tet", "0.5"];
+    let args = ["compile", "a.obj", "--set", "min-tet-triangles=64", "--set", "c-tet=0.5"];
     let run = cached(path, &args).expect(0);
     assert!(run.stderr.contains("is damaged"), "{run:?}");
     assert_eq!(std::fs::read(path.join("a.bth")).unwrap(), good);
@@ -447,9 +460,8 @@ fn options_without_effect_are_told() {
         }
     }
     assert!(warned("a.obj", &["--for-scene"]));
-    for option in [["--poses", "3"], ["--segments", "2"]] {
-        assert!(warned("a.obj", &option) && !warned("s.manifest", &option), "{option:?}");
-    }
+    let poses = ["--set", "poses=3"];
+    assert!(warned("a.obj", &poses) && !warned("s.manifest", &poses));
     assert!(warned("a.obj", &["--format", "ply"]));
     assert!(warned("s.manifest", &["--shard", "1/2", "-o", "x.bth"]));
     // What is no scene is flat as it is.

@@ -2,7 +2,7 @@
 
 use crate::support::{bthc, command, folder, run_with, sphere};
 
-const CHEAP: [&str; 4] = ["--c-tet", "0.001", "--min-tet-triangles", "64"];
+const CHEAP: [&str; 4] = ["--set", "c-tet=0.001", "--set", "min-tet-triangles=64"];
 
 fn worker_is_there(json: &serde_json::Value) -> bool {
     let there = json["report"]["tets"]["worker"]["ready"].is_object();
@@ -29,11 +29,11 @@ fn limits_and_weights_decide_what_is_tetrahedralized() {
     assert_eq!(json["report"]["probe"]["leaves"][0]["kept"], true);
     let few = triangles(&compile(&["--max-bytes-per-triangle", "80"]));
     assert!(few > 0 && few < all, "{few} of {all}");
-    assert!(triangles(&compile(&["--budget", "0.005"])) < all);
+    assert!(triangles(&compile(&["--set", "budget=0.005"])) < all);
     // Rays from outside are traced through the BVH, which accompanies the tetrahedra.
-    assert_eq!(triangles(&compile(&["--optimize-for", "camera"])), 0);
-    assert_eq!(triangles(&compile(&["--optimize-for", "secondary"])), all);
-    assert_eq!(triangles(&compile(&["--select", "paper"])), all);
+    assert_eq!(triangles(&compile(&["--set", "optimize-for=camera"])), 0);
+    assert_eq!(triangles(&compile(&["--set", "optimize-for=secondary"])), all);
+    assert_eq!(triangles(&compile(&["--set", "select=paper"])), all);
 }
 
 #[test]
@@ -56,21 +56,22 @@ fn tetrahedra_need_no_folder_for_temporary_files() {
 fn tracing_reads_no_more_bytes_than_the_limit_and_what_cannot_be_held_is_said() {
     let folder = folder(&[("ball.obj", &sphere(24))]);
     let compile = |more: &[&str]| {
-        let args = ["compile", "ball.obj", "-o", "out.bth", "--no-cache", "--min-tet-triangles", "64"];
+        let args = ["compile", "ball.obj", "-o", "out.bth", "--no-cache", "--set", "min-tet-triangles=64"];
         bthc(folder.path(), &[&args[..], more].concat()).expect(0)
     };
     let file = |more: &[&str]| compile(&[&["--json"], more].concat()).json()["report"]["file"].clone();
     let each = |file: &serde_json::Value| file["resident_bytes_per_triangle"].as_f64().unwrap();
     let plain = each(&file(&["--structure", "bvh", "--free-directions", "none"]));
-    for select in ["best", "paper"] {
-        for more in
-            [&["--c-tet", "0.001"][..], &["--c-tet", "0.001", "--subtrees", "prune", "--probe", "off"]]
-        {
+    for select in ["select=best", "select=paper"] {
+        for more in [
+            &["--set", "c-tet=0.001"][..],
+            &["--set", "c-tet=0.001", "--set", "subtrees=prune", "--set", "probe=off"],
+        ] {
             let with = |limit: f64| {
                 let limit = limit.to_string();
-                file(&[&["--select", select, "--max-bytes-per-triangle", &limit], more].concat())
+                file(&[&["--set", select, "--max-bytes-per-triangle", &limit], more].concat())
             };
-            let all = file(&[&["--select", select], more].concat());
+            let all = file(&[&["--set", select], more].concat());
             if all["tet_leaves"] == 0 {
                 println!("skipped: tetrahedra need the worker bth-tetgen");
                 return;

@@ -12,7 +12,9 @@ fn wrong_usage_exits_2() {
         &[][..],
         &["compile"],
         &["compile", "a.obj", "--quality", "superb"],
-        &["compile", "a.obj", "--min-tet-triangles", "-3"],
+        &["compile", "a.obj", "--set", "min-tet-triangles=-3"],
+        &["compile", "a.obj", "--set", "poses"],
+        &["compile", "a.obj", "--set", "speed=3"],
         &["compile", "a.obj", "--threads", "many"],
         &["unknown"],
     ] {

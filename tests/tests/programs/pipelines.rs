@@ -226,7 +226,7 @@ fn compiled_files_are_compared_by_content() {
     };
     compile("a.obj", "a.bth", &[]);
     compile("a.obj", "same.bth", &[]);
-    compile("a.obj", "options.bth", &["--c-tet", "77"]);
+    compile("a.obj", "options.bth", &["--set", "c-tet=77"]);
     compile("b.obj", "b.bth", &[]);
     assert!(bthc(path, &["diff", "a.bth", "same.bth"]).expect(0).stdout.contains("identical"));
     let options = bthc(path, &["diff", "a.bth", "options.bth"]).expect(1).stdout;

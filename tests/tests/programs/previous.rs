@@ -38,7 +38,16 @@ fn unchanged_objects_come_from_the_file_that_was_there() {
     forget_objects(path);
     // A larger object moves the sections that follow it.
     std::fs::write(path.join("2.obj"), sphere(17)).unwrap();
-    let dry = ["compile", "--dry-run", "--json", "--min-tet-triangles", "64", "--c-tet", "0.5", "s.manifest"];
+    let dry = [
+        "compile",
+        "--dry-run",
+        "--json",
+        "--set",
+        "min-tet-triangles=64",
+        "--set",
+        "c-tet=0.5",
+        "s.manifest",
+    ];
     let dry = &crate::cache::cached(path, &dry).expect(0).json()["jobs"][0];
     assert_eq!((&dry["objects_kept"], &dry["objects"][0]["part"]), (&4.into(), &"2.obj flat".into()));
     let (hits, misses) = found(&compile(path, &["s.manifest"]));

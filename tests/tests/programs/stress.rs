@@ -36,7 +36,7 @@ struct Corpus {
 }
 
 const OPTIONS: [&[&str]; 3] =
-    [&["--min-tet-triangles", "64"], &["--structure", "bvh"], &["--quality", "best"]];
+    [&["--set", "min-tet-triangles=64"], &["--structure", "bvh"], &["--quality", "best"]];
 
 impl Corpus {
     fn new() -> Corpus {

@@ -14,64 +14,10 @@ pub(crate) enum Structure {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Subtrees {
-    /// Keep them: some 32 bytes a triangle more.
-    Keep,
-    /// Leave them out: all rays walk the tetrahedra.
-    Prune,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Quality {
     Fast,
     Balanced,
     Best,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Estimator {
-    /// From the number of triangles.
-    FaceCount,
-    /// From the average depth of the BVH.
-    AverageDepth,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Select {
-    /// What saves most time of all rays.
-    Best,
-    /// The paper's rule: from the root down, the first nodes whose tetrahedra are cheaper for rays from outside.
-    Paper,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum OptimizeFor {
-    /// Rays from outside only.
-    Camera,
-    /// Rays that start on known surfaces only.
-    Secondary,
-    /// Three rays from surfaces for one from outside.
-    Balanced,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Probe {
-    /// Steps of sampled rays, priced by the profile: the same on every machine.
-    Steps,
-    /// Nothing: all that was built stays.
-    Off,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Record {
-    /// 32 bytes, fastest.
-    Link32,
-    /// 32 bytes.
-    Tet32,
-    /// 20 bytes.
-    Tet20,
-    /// 16 bytes.
-    Tet16,
 }
 
 /// Which materials make holes.
@@ -132,60 +78,12 @@ impl From<Attributes> for Keep {
     }
 }
 
-impl From<Record> for bth_format::layout::RecordKind {
-    fn from(record: Record) -> Self {
-        match record {
-            Record::Link32 => Self::Link32,
-            Record::Tet32 => Self::Tet32,
-            Record::Tet20 => Self::Tet20,
-            Record::Tet16 => Self::Tet16,
-        }
-    }
-}
-
 impl From<Quality> for bth_compile::bvh::Quality {
     fn from(quality: Quality) -> Self {
         match quality {
             Quality::Fast => Self::Fast,
             Quality::Balanced => Self::Balanced,
             Quality::Best => Self::Best,
-        }
-    }
-}
-
-impl From<Estimator> for bth_compile::costs::Estimator {
-    fn from(estimator: Estimator) -> Self {
-        match estimator {
-            Estimator::FaceCount => Self::FaceCount,
-            Estimator::AverageDepth => Self::AverageDepth,
-        }
-    }
-}
-
-impl From<Select> for bth_compile::costs::Select {
-    fn from(select: Select) -> Self {
-        match select {
-            Select::Best => Self::Best,
-            Select::Paper => Self::Paper,
-        }
-    }
-}
-
-impl From<OptimizeFor> for bth_compile::costs::OptimizeFor {
-    fn from(rays: OptimizeFor) -> Self {
-        match rays {
-            OptimizeFor::Camera => Self::Camera,
-            OptimizeFor::Secondary => Self::Secondary,
-            OptimizeFor::Balanced => Self::Balanced,
-        }
-    }
-}
-
-impl From<Probe> for bth_compile::costs::Probe {
-    fn from(probe: Probe) -> Self {
-        match probe {
-            Probe::Steps => Self::Steps,
-            Probe::Off => Self::Off,
         }
     }
 }

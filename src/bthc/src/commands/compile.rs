@@ -174,11 +174,8 @@ fn warn_of_options(args: &Compile, jobs: &[Job], monitor: &dyn Monitor) {
         monitor.warn(&format!("{option} has no effect: no model is a glTF file that is compiled as a scene"));
     }
     if !jobs.iter().any(|job| scene::is_scene(&job.model, args)) {
-        let of_scenes = [
-            ("--for-scene", args.for_scene),
-            ("--poses", args.poses.is_some()),
-            ("--segments", args.segments.is_some()),
-        ];
+        let poses = args.selection.settings.iter().any(|setting| setting.name() == "poses");
+        let of_scenes = [("--for-scene", args.for_scene), ("--set poses", poses)];
         for (option, _) in of_scenes.iter().filter(|(_, is_given)| *is_given) {
             monitor.warn(&format!("{option} has no effect: no model is a scene"));
         }

@@ -63,7 +63,7 @@ pub enum Error {
         message: String,
     },
     /// The result failed the compiler's own checks, which is a defect of the compiler; programs exit with code 70.
-    #[error("{code}: internal error: {message} (please report this)")]
+    #[error("{code}: internal error: {message}{}", hint_text(DEFECT))]
     Internal {
         /// Stable code, `BTH-X…`.
         code: &'static str,
@@ -74,6 +74,9 @@ pub enum Error {
     #[error("cancelled")]
     Cancelled,
 }
+
+/// The hint for a defect of the compiler.
+const DEFECT: &str = "please report this";
 
 impl Error {
     /// With the name of the model in the text, where there is no place that has it.
@@ -86,14 +89,32 @@ impl Error {
         }
     }
 
-    /// What the user can do; empty for defects of the compiler and cancellation.
+    /// What the user can do; empty for cancellation.
     pub fn hint(&self) -> &str {
         match self {
             Error::Input { hint, .. } => hint,
             Error::File { code, .. } => file_hint(code),
             Error::Limit { code, .. } => limit_hint(code),
-            Error::Internal { .. } | Error::Cancelled => "",
+            Error::Internal { .. } => DEFECT,
+            Error::Cancelled => "",
         }
+    }
+}
+
+impl From<&Error> for bth_files::Diagnosis {
+    fn from(error: &Error) -> Self {
+        let diagnosis = match error {
+            Error::Input { code, place, message, .. } => {
+                Self { place: Some(place.to_string()), ..Self::new(3, code, message) }
+            }
+            Error::File { code, path, message } => Self::new(4, code, message).at(path),
+            // Options that exclude each other.
+            Error::Limit { code: code @ "BTH-L033", message } => Self::new(2, code, message),
+            Error::Limit { code, message } => Self::new(5, code, message),
+            Error::Internal { code, message } => Self::new(70, code, format!("internal error: {message}")),
+            Error::Cancelled => Self::new(130, "BTH-C000", "cancelled"),
+        };
+        diagnosis.with_hint(error.hint())
     }
 }
 

@@ -5,6 +5,7 @@ use crate::failure::Failure;
 use crate::interrupt::Part;
 use crate::messages;
 use bth_cache::{DEFAULT_CAP, Digest, Pin, Store};
+use bth_files::Diagnosis;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::Value;
 use std::io::IsTerminal;
@@ -107,19 +108,18 @@ struct Done {
 enum CompileError {
     /// It could not be run.
     Started(Failure),
-    /// What it reported as JSON, and its exit code.
-    Reported(Value, u8),
+    /// What it reported.
+    Reported(Diagnosis),
 }
 
 impl CompileError {
     /// Whether something that is read is at fault, and not the cache.
     fn is_of_source(&self) -> bool {
         match self {
-            CompileError::Reported(_, 3) => true,
-            CompileError::Reported(error, 4) => {
-                matches!(error["code"].as_str(), Some("BTH-O001" | "BTH-O002"))
+            CompileError::Reported(error) => {
+                error.exit_code == 3 || matches!(error.code.as_str(), "BTH-O001" | "BTH-O002")
             }
-            _ => false,
+            CompileError::Started(_) => false,
         }
     }
 }
@@ -128,7 +128,7 @@ impl From<CompileError> for Failure {
     fn from(error: CompileError) -> Failure {
         match error {
             CompileError::Started(failure) => failure,
-            CompileError::Reported(error, exit) => Failure::Compiler { error, exit },
+            CompileError::Reported(error) => Failure::Compiler(error),
         }
     }
 }
@@ -137,7 +137,7 @@ impl std::fmt::Display for CompileError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             CompileError::Started(_) => Ok(()),
-            CompileError::Reported(error, _) => write!(f, "{}", crate::failure::text_of(error)),
+            CompileError::Reported(error) => error.fmt(f),
         }
     }
 }
@@ -196,16 +196,15 @@ fn compile(source: &Path, cache: &Path, materials: bool) -> Result<Done, Compile
     let output = started.map_err(|e| failed(format!("{} cannot be started: {e}", bthc.display())))?;
     let stderr = String::from_utf8_lossy(&output.stderr);
     let mut json: Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
-    let reported = json["error"].take();
+    let reported: Option<Diagnosis> = serde_json::from_value(json["error"].take()).ok();
     // An error that is reported as JSON is not printed twice.
-    let is_new = |line: &&str| reported.is_null() || !line.starts_with("error: ");
+    let is_new = |line: &&str| reported.is_none() || !line.starts_with("error: ");
     stderr.lines().filter(is_new).for_each(messages::note);
-    match (reported, output.status.code().and_then(|code| u8::try_from(code).ok())) {
-        (error @ Value::Object(_), Some(exit)) => return Err(CompileError::Reported(error, exit)),
-        _ if !output.status.success() => {
-            return Err(failed(format!("{} ended with {}", bthc.display(), output.status)));
-        }
-        _ => {}
+    if let Some(error) = reported {
+        return Err(CompileError::Reported(error));
+    }
+    if !output.status.success() {
+        return Err(failed(format!("{} ended with {}", bthc.display(), output.status)));
     }
     let key = json["cache"]["key"].as_str().and_then(Digest::parse);
     let inputs = json["inputs"].as_array().into_iter().flatten().filter_map(|path| path.as_str());

@@ -1,7 +1,6 @@
 //! Errors: messages, codes, and exit codes.
 
-use bth_files::printable;
-use serde_json::{Value, json};
+use bth_files::Diagnosis;
 use std::fmt::Display;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -16,8 +15,8 @@ pub(crate) enum Failure {
     Runtime(bth::Error),
     /// A compiled file that lacks what the mode needs (exit code 3).
     Lacks { file: PathBuf, what: &'static str, hint: &'static str },
-    /// What `bthc` reported as JSON of a scene or model that it could not compile, and its exit code.
-    Compiler { error: Value, exit: u8 },
+    /// What `bthc` reported of a scene or model that it could not compile.
+    Compiler(Diagnosis),
     /// A scene or model for which `bthc` could not be run (exit code 3).
     Source { path: PathBuf, message: String },
     /// A picture of the surroundings that cannot be used (exit code 3) or read (exit code 4).
@@ -52,7 +51,7 @@ impl From<bth::Error> for Failure {
 
 impl Display for Failure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        self.json().map_or(Ok(()), |(error, _)| f.write_str(&text_of(&error)))
+        self.diagnosis().map_or(Ok(()), |diagnosis| diagnosis.fmt(f))
     }
 }
 
@@ -62,53 +61,40 @@ impl Failure {
         Self::File { path: path.into(), message: message.to_string() }
     }
 
-    /// The error as JSON, with `code`, `message` and where known `place` and `hint`, as those of `bthc`; and the exit code. `None` if it is no
-    /// error.
-    fn json(&self) -> Option<(Value, u8)> {
+    /// The error as it is reported; `None` if it is not an error.
+    fn diagnosis(&self) -> Option<Diagnosis> {
         let found = match self {
-            Self::Usage(message) => {
-                (json!({"code": "BTH-U001", "message": message, "hint": "see bth-play --help"}), 2)
-            }
-            Self::Runtime(error) => {
-                let error_json = json!({
-                    "code": error.code().as_str(),
-                    "place": error.path().map(|p| p.to_string_lossy()),
-                    "byte": error.offset(),
-                    "message": error.to_string(),
-                    "expected": error.expected(),
-                    "found": error.found(),
-                    "hint": error.hint(),
-                });
-                (error_json, if error.code() == bth::Code::Read { 4 } else { 3 })
-            }
-            Self::Compiler { error, exit } => (error.clone(), *exit),
+            Self::Usage(message) => Diagnosis::usage(message).with_hint("see bth-play --help"),
+            Self::Runtime(error) => error.into(),
+            Self::Compiler(diagnosis) => diagnosis.clone(),
             Self::Source { path, message } => {
                 let name = path.to_string_lossy();
                 let quote = if name.contains(char::is_whitespace) { "\"" } else { "" };
                 let hint =
                     format!("run: bthc compile {quote}{name}{quote} -o scene.bth, then play scene.bth");
-                (located("BTH-P003", path, message, &hint), 3)
+                Diagnosis::new(3, "BTH-P003", message).at(path).with_hint(&hint)
             }
             Self::Environment { path, message, exit } => {
-                let hint = "--env takes a picture in Radiance format (.hdr) over longitude and latitude; without it there is a sky";
-                (located("BTH-P006", path, message, hint), *exit)
+                Diagnosis::new(*exit, "BTH-P006", message).at(path).with_hint(
+                    "--env takes a picture in Radiance format (.hdr) over longitude and latitude; \
+                     without it there is a sky",
+                )
             }
-            Self::Lacks { file, what, hint } => (located("BTH-P001", file, what, hint), 3),
-            Self::File { path, message } => {
-                let hint = "name a place where files can be written and that has room";
-                (located("BTH-P002", path, message, hint), 4)
-            }
-            Self::Window(message) => {
-                let hint = "a window needs a display (DISPLAY or WAYLAND_DISPLAY) and the libraries libX11, libXcursor, libXi and libxkbcommon-x11; -o writes pictures without";
-                (json!({"code": "BTH-P004", "message": message, "hint": hint}), 4)
-            }
-            Self::Threads(message) => {
-                let hint = "ask for fewer threads (--threads), or let the user have more processes (ulimit -u) and memory";
-                (json!({"code": "BTH-L090", "message": message, "hint": hint}), 5)
-            }
+            Self::Lacks { file, what, hint } => Diagnosis::new(3, "BTH-P001", *what).at(file).with_hint(hint),
+            Self::File { path, message } => Diagnosis::new(4, "BTH-P002", message)
+                .at(path)
+                .with_hint("name a place where files can be written and that has room"),
+            Self::Window(message) => Diagnosis::new(4, "BTH-P004", message).with_hint(
+                "a window needs a display (DISPLAY or WAYLAND_DISPLAY) and the libraries libX11, \
+                 libXcursor, libXi and libxkbcommon-x11; -o writes pictures without",
+            ),
+            Self::Threads(message) => Diagnosis::new(5, "BTH-L090", message).with_hint(
+                "ask for fewer threads (--threads), or let the user have more processes (ulimit -u) \
+                 and memory",
+            ),
             Self::Panic(message) => {
-                let message = format!("internal error: panicked: {message}");
-                (json!({"code": "BTH-X090", "message": message, "hint": "please report this"}), 70)
+                Diagnosis::new(70, "BTH-X090", format!("internal error: panicked: {message}"))
+                    .with_hint("please report this")
             }
             Self::ClosedOutput => return None,
         };
@@ -117,14 +103,7 @@ impl Failure {
 
     /// Prints the error, with `--json` as an object too, and returns the exit code.
     pub(crate) fn report(&self, wants_json: bool) -> ExitCode {
-        let Some((mut error, exit_code)) = self.json() else { return ExitCode::SUCCESS };
-        // Where the outputs are closed, the exit code is all that can be reported.
-        let _ = writeln!(std::io::stderr().lock(), "error: {}", printable(&text_of(&error)));
-        if wants_json {
-            error["exit_code"] = exit_code.into();
-            let _ = writeln!(std::io::stdout().lock(), "{:#}", json!({ "error": error }));
-        }
-        ExitCode::from(exit_code)
+        self.diagnosis().map_or(ExitCode::SUCCESS, |diagnosis| diagnosis.report(wants_json))
     }
 }
 
@@ -138,33 +117,6 @@ pub(crate) fn without_panic(work: impl FnOnce() -> Result<(), Failure>) -> Resul
     })
 }
 
-fn located(code: &str, path: &Path, message: &str, hint: &str) -> Value {
-    json!({"code": code, "place": path.to_string_lossy(), "message": message, "hint": hint})
-}
-
-/// An error as a line of text: place, code, message and hint.
-pub(crate) fn text_of(error: &Value) -> String {
-    let field = |name: &str| error[name].as_str().unwrap_or_default();
-    let (code, message) = (field("code"), field("message"));
-    // The messages of the runtime name everything.
-    if message.contains(code) {
-        return message.to_owned();
-    }
-    let mut text = String::new();
-    if !field("place").is_empty() {
-        text += field("place");
-        for part in [&error["line"], &error["column"]].iter().filter_map(|part| part.as_u64()) {
-            text += &format!(":{part}");
-        }
-        text += ": ";
-    }
-    text += &format!("{code}: {message}");
-    if !field("hint").is_empty() {
-        text += &format!(" (hint: {})", field("hint"));
-    }
-    text
-}
-
 /// Reports a wrong command line, or shows help or the version.
 pub(crate) fn usage(error: &clap::Error, wants_json: bool) -> ExitCode {
     let printed = error.print().and_then(|()| std::io::stdout().flush());
@@ -173,10 +125,7 @@ pub(crate) fn usage(error: &clap::Error, wants_json: bool) -> ExitCode {
     }
     // Where standard error is closed, the exit code is all that can be reported.
     if wants_json {
-        let text = error.to_string();
-        let first = text.lines().next().unwrap_or_default().trim_start_matches("error: ");
-        let error = json!({"error": {"code": "BTH-U001", "message": first, "exit_code": 2}});
-        let _ = writeln!(std::io::stdout().lock(), "{error:#}");
+        Diagnosis::of_usage(&error.to_string()).print_json();
     }
     ExitCode::from(2)
 }
@@ -194,8 +143,8 @@ mod tests {
             (without_panic(|| std::panic::panic_any(number)), ""),
         ] {
             let failure = panicked.unwrap_err();
-            let (error, exit) = failure.json().unwrap();
-            assert_eq!((error["code"].as_str(), exit), (Some("BTH-X090"), 70));
+            let diagnosis = failure.diagnosis().unwrap();
+            assert_eq!((diagnosis.code.as_str(), diagnosis.exit_code), ("BTH-X090", 70));
             let expected =
                 format!("BTH-X090: internal error: panicked: {message} (hint: please report this)");
             assert_eq!(failure.to_string(), expected);

@@ -33,6 +33,16 @@ impl Error {
     }
 }
 
+impl From<&Error> for bth_files::Diagnosis {
+    /// Exit code 4 for a manifest that cannot be read, else 3.
+    fn from(error: &Error) -> Self {
+        let known = |number: usize| (number > 0).then_some(number as u64);
+        let exit_code = if error.code == code::READ { 4 } else { 3 };
+        let diagnosis = Self::new(exit_code, error.code, &error.message).at(&error.path);
+        Self { line: known(error.line), column: known(error.column), ..diagnosis.with_hint(&error.hint) }
+    }
+}
+
 /// The codes of [`Error`]; their meanings never change.
 pub mod code {
     /// The file cannot be read.

@@ -1,7 +1,6 @@
-//! Errors: exit codes, messages, and JSON for `--json`.
+//! Why a command did not succeed.
 
-use crate::output;
-use serde_json::json;
+use bth_files::Diagnosis;
 use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
@@ -96,103 +95,39 @@ impl Failure {
         self
     }
 
+    /// The error as it is reported; `None` if nothing is left to report.
+    pub(crate) fn diagnosis(&self) -> Option<Diagnosis> {
+        match self {
+            Self::Compile(error) => Some(error.into()),
+            Self::Runtime(error) => Some(error.into()),
+            Self::Manifest(error) => Some(error.into()),
+            Self::Usage { message, hint } => Some(Diagnosis::usage(message).with_hint(hint)),
+            Self::Check | Self::Reported(_) | Self::ClosedOutput => None,
+        }
+    }
+
     pub(crate) fn exit_code(&self) -> u8 {
-        use bth_compile::Error;
         match self {
             Self::Check => 1,
             Self::Reported(code) => *code,
-            // Options that exclude each other.
-            Self::Usage { .. } | Self::Compile(Error::Limit { code: "BTH-L033", .. }) => 2,
-            Self::Compile(Error::Input { .. }) => 3,
-            Self::Compile(Error::File { .. }) => 4,
-            Self::Compile(Error::Limit { .. }) => 5,
-            Self::Compile(Error::Internal { .. }) => 70,
-            Self::Compile(Error::Cancelled) => 130,
-            Self::Runtime(error) if error.code() == bth::Code::Read => 4,
-            Self::Runtime(_) => 3,
-            Self::Manifest(error) if error.code == bth_scene::error::code::READ => 4,
-            Self::Manifest(_) => 3,
-            Self::ClosedOutput => 0,
+            _ => self.diagnosis().map_or(0, |diagnosis| diagnosis.exit_code),
         }
-    }
-
-    /// The error as JSON: `code`, `message`, and where known `place` and `hint`.
-    pub(crate) fn json(&self) -> serde_json::Value {
-        match self {
-            Self::Compile(error) => compile_json(error),
-            Self::Runtime(error) => runtime_json(error),
-            Self::Manifest(error) => {
-                let known = |number: usize| (number > 0).then_some(number);
-                json!({"code": error.code, "place": error.path.to_string_lossy(), "line": known(error.line),
-                    "column": known(error.column), "message": error.message, "hint": error.hint})
-            }
-            Self::Usage { message, hint } => json!({"code": "BTH-U001", "message": message, "hint": hint}),
-            Self::Check | Self::Reported(_) | Self::ClosedOutput => serde_json::Value::Null,
-        }
-    }
-
-    /// As [`Self::json`], with `exit_code`: what stands at `error` with `--json`.
-    pub(crate) fn json_with_exit_code(&self) -> serde_json::Value {
-        let mut error = self.json();
-        error["exit_code"] = self.exit_code().into();
-        error
     }
 
     /// Prints the error, with `--json` as an object too, and returns the exit code.
     pub(crate) fn report(&self, wants_json: bool) -> ExitCode {
-        if !matches!(self, Self::Check | Self::Reported(_) | Self::ClosedOutput) {
-            self.print();
-            if wants_json {
-                print_json_error(self.json_with_exit_code());
-            }
+        match self.diagnosis() {
+            Some(diagnosis) => diagnosis.report(wants_json),
+            None => ExitCode::from(self.exit_code()),
         }
-        ExitCode::from(self.exit_code())
     }
 
     /// Prints the error on standard error.
     pub(crate) fn print(&self) {
-        let text = match self {
-            Self::Check | Self::Reported(_) | Self::ClosedOutput => return,
-            Self::Compile(error) => error.to_string(),
-            Self::Runtime(error) => error.to_string(),
-            Self::Manifest(error) => error.to_string(),
-            Self::Usage { message, hint } => format!("BTH-U001: {message} (hint: {hint})"),
-        };
-        output::error(&text);
-    }
-}
-
-/// An error of the compiler as JSON.
-fn compile_json(error: &bth_compile::Error) -> serde_json::Value {
-    use bth_compile::Error;
-    match error {
-        Error::Input { code, place, message, hint } => {
-            json!({"code": code, "place": place.to_string(), "message": message, "hint": hint})
+        if let Some(diagnosis) = self.diagnosis() {
+            diagnosis.print();
         }
-        Error::File { code, path, message } => json!({"code": code, "place": path.to_string_lossy(),
-            "message": message, "hint": error.hint()}),
-        Error::Limit { code, message } => json!({"code": code, "message": message, "hint": error.hint()}),
-        Error::Internal { code, message } => json!({"code": code, "message": message}),
-        Error::Cancelled => json!({"code": "BTH-C000", "message": "cancelled"}),
     }
-}
-
-/// An error of the runtime as JSON.
-pub(crate) fn runtime_json(error: &bth::Error) -> serde_json::Value {
-    json!({
-        "code": error.code().as_str(),
-        "place": error.path().map(|p| p.to_string_lossy()),
-        "byte": error.offset(),
-        "message": error.to_string(),
-        "expected": error.expected(),
-        "found": error.found(),
-        "hint": error.hint(),
-    })
-}
-
-fn print_json_error(error: serde_json::Value) {
-    // Where standard output is closed, the exit code is all that can be reported.
-    let _ = output::json(&json!({ "error": error }));
 }
 
 /// Reports a wrong command line, or shows help or the version.
@@ -203,9 +138,7 @@ pub(crate) fn usage(error: &clap::Error, wants_json: bool) -> ExitCode {
     }
     // Where standard error is closed, the exit code is all that can be reported.
     if wants_json {
-        let first =
-            error.to_string().lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
-        print_json_error(json!({"code": "BTH-U001", "message": first, "exit_code": 2}));
+        Diagnosis::of_usage(&error.to_string()).print_json();
     }
     ExitCode::from(2)
 }

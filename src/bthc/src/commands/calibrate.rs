@@ -76,7 +76,7 @@ fn object(profile: &Profile, output: &Path, written: &Result<(), Failure>) -> Va
     let mut object = json!({"hash": profile.hash(), "profile": profile});
     match written {
         Ok(()) => object["output"] = output.to_string_lossy().into(),
-        Err(failure) => object["error"] = failure.json_with_exit_code(),
+        Err(failure) => object["error"] = json!(failure.diagnosis()),
     }
     object
 }

@@ -96,7 +96,7 @@ fn all(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -> Result<(),
         Ok(done) => done.json,
         Err(failure) => {
             failure.print();
-            json!({"model": job.name(), "error": failure.json()})
+            json!({"model": job.name(), "error": failure.diagnosis()})
         }
     };
     let reports: Vec<_> = jobs.iter().zip(results).map(report).collect();

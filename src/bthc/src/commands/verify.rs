@@ -2,10 +2,11 @@
 
 use crate::args::Verify;
 use crate::deep;
-use crate::failure::{Failure, runtime_json};
+use crate::failure::Failure;
 use crate::output;
 use crate::progress::Progress;
 use crate::table::{Table, bytes, count};
+use bth_files::Diagnosis;
 use bth_format::verify::Report;
 use serde_json::json;
 use std::num::NonZeroUsize;
@@ -30,7 +31,7 @@ pub(crate) fn run(args: &Verify) -> Result<(), Failure> {
         Err(errors) => {
             let errors: Vec<_> = errors.into_iter().map(|error| error.in_file(&args.file)).collect();
             if args.json {
-                let errors: Vec<_> = errors.iter().map(runtime_json).collect();
+                let errors: Vec<_> = errors.iter().map(Diagnosis::from).collect();
                 output::json(&json!({"verified": false, "errors": errors}))?;
             } else {
                 errors.iter().for_each(|error| output::error(&error.to_string()));

@@ -45,6 +45,11 @@ pub fn built(packages: &[&str]) -> PathBuf {
     folder
 }
 
+/// Returns how many rays, points or rounds a test takes: more by night, where `BTH_DEEP` is set.
+pub fn by_day<T>(day: T, night: T) -> T {
+    if std::env::var_os("BTH_DEEP").is_some() { night } else { day }
+}
+
 /// The tetrahedralization worker: `BTH_TETGEN`, or the one built beside the tests. Prints a line where there is none, since
 /// tests with tetrahedra are skipped then.
 #[allow(clippy::print_stderr)]

@@ -155,7 +155,7 @@ pub fn run_inside(
     for batch in 0..count.div_ceil(BATCH) {
         let rays: Vec<Ray> = (0..BATCH.min(count - batch * BATCH)).map(|_| source.ray()).collect();
         let points: Vec<[f32; 3]> = rays.iter().map(|ray| ray.origin).collect();
-        isas[batch % isas.len()].choose().expect("it is available");
+        isas[(batch + seed as usize) % isas.len()].choose().expect("it is available");
         let (mut winding, mut inside) = (vec![0; points.len()], vec![false; points.len()]);
         scene.winding_batch(&points, &mut winding);
         scene.contains_batch(&points, &mut inside);

@@ -40,7 +40,7 @@ pub fn run(
         let (mut onward, mut after) = (Vec::new(), Vec::new());
         for (i, traced) in structures.iter().enumerate() {
             // The instruction sets take turns, so that each structure is traced with each of them.
-            isas[(batch + i) % isas.len()].choose().expect("it is available");
+            isas[(batch + i + seed as usize) % isas.len()].choose().expect("it is available");
             let mut hits = vec![Hit::MISS; rays.len()];
             traced.scene.batch(&rays).nearest(&mut hits);
             if i == 0 {

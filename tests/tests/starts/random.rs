@@ -10,6 +10,7 @@ use bth_format::exact::is_zero_area;
 use bth_format::layout::{GridBits, RecordKind};
 use bth_random::Rng;
 use bth_scenes::Model;
+use bth_tests::by_day;
 use bth_tests::meshes::{KINDS, cube, mesh, placed};
 use bth_tests::placed_soup::soups;
 use bth_tests::rays::{alone, assorted, coherent_starts, onward, starts};
@@ -101,7 +102,7 @@ fn check_form(form: usize, rounds: u64) {
         if corners.iter().all(|corners| is_zero_area(*corners)) {
             continue;
         }
-        let rays = rays(&scene, &corners, 60, seed);
+        let rays = rays(&scene, &corners, by_day(20, 60), seed);
         let context = format!("{name}, kind {kind}, seed {seed}, scale {scale}, by {by}");
         hits += match name {
             // Queries for several hits report a triangle for each of its leaves.
@@ -156,7 +157,7 @@ fn models_of_many_nodes() {
     for (scale, by) in [(1.0, 0.0), (0.01, 700.0), (1e-20, 0.0)] {
         let scene = compiled(&placed(model.clone(), scale, by), &plain).unwrap();
         let corners = corners_of(&scene, 0);
-        let rays = rays(&scene, &corners, 150, 5);
+        let rays = rays(&scene, &corners, by_day(50, 150), 5);
         assert!(check(&scene, &corners, &rays, &format!("knot, {scale}")) > rays.len() / 4);
     }
 }
@@ -176,7 +177,7 @@ fn whole_tetrahedralizations() {
             let scene = compiled(model, &of).unwrap();
             assert!(!scene.object(0).tet_leaves.is_empty());
             let corners = corners_of(&scene, 0);
-            let rays = rays(&scene, &corners, 60, i as u64);
+            let rays = rays(&scene, &corners, by_day(20, 60), i as u64);
             check(&scene, &corners, &rays, &format!("tets, model {i}, {}", record.name()));
         }
     }

@@ -6,9 +6,9 @@ use bth_compile::pipeline::Structure;
 use bth_format::layout::RecordKind;
 use bth_random::Rng;
 use bth_scenes::Model;
-use bth_tests::oracle;
 use bth_tests::stress::{Corners, InsideStatistics, is_closed, run_inside, shapes};
 use bth_tests::structures::{compiled, every_structure, options};
+use bth_tests::{by_day, oracle};
 
 fn bvh(model: &Model) -> Scene {
     compiled(model, &options(Structure::Bvh, RecordKind::Link32, false))
@@ -25,7 +25,7 @@ fn winding_numbers_are_exact_on_every_closed_surface_and_in_every_structure() {
             let corners = corners_of(&traced.scene);
             assert!(is_closed(&corners), "{}", shape.name);
             let mut found = InsideStatistics::default();
-            run_inside(&traced.scene, &corners, 3072, 64, i as u64, &mut found);
+            run_inside(&traced.scene, &corners, by_day(768, 3072), 16, i as u64, &mut found);
             assert_eq!(found.defects(), 0, "{}, {}: {found:#?}", shape.name, traced.name);
             assert!(found.compared >= 48 && found.aimed > found.points / 8, "{}: {found:?}", shape.name);
         }

@@ -1,6 +1,7 @@
-//! Traces very many rays from starts on random shapes, and checks them: no ray hits what it leaves, none that starts into a closed surface
-//! misses it, none that leaves a convex body hits it, batches and single rays have the same bits on every instruction set, and samples
-//! agree with the exact oracle. Prints the counts as JSON; the exit code is 1 if anything was wrong.
+//! Traces very many rays from starts on random shapes, and checks them: no ray hits what it leaves,
+//! none that starts into a closed surface misses it, none that leaves a convex body hits it,
+//! batches and single rays have the same bits on every instruction set, and samples agree with the
+//! exact oracle. Prints the counts as JSON; the exit code is 1 if anything was wrong.
 //!
 //!     cargo run --release -p bth-tests --example starts -- SECONDS [SEED]
 #![allow(clippy::print_stdout, clippy::print_stderr)]
@@ -26,7 +27,8 @@ use std::time::Instant;
 const BATCH: usize = 4096;
 /// Batches of a scene.
 const BATCHES: usize = 24;
-/// One in this many rays is traced alone, too, and one in [`ORACLE`] is compared with the oracle where there are few triangles.
+/// One in this many rays is traced alone, too, and one in [`ORACLE`] is compared with the oracle
+/// where there are few triangles.
 const ALONE: usize = 64;
 const ORACLE: usize = 1024;
 /// Up to this number of triangles the oracle is asked.
@@ -108,7 +110,8 @@ struct Task {
     scene: Scene,
     corners: Vec<[[f32; 3]; 3]>,
     transforms: Vec<[[f64; 4]; 3]>,
-    /// 1 for a closed surface whose corners are counterclockwise as seen from outside, -1 for the reverse, 0 for others.
+    /// 1 for a closed surface whose corners are counterclockwise as seen from outside, -1 for the
+    /// reverse, 0 for others.
     orientation: f64,
     is_convex: bool,
     rng: Rng,
@@ -130,7 +133,8 @@ fn main() -> ExitCode {
             seeds.into_par_iter().filter_map(|seed| Task::new(seed, &closed)).collect();
         for batch in 0..BATCHES {
             tasks.par_iter_mut().for_each(|task| task.make_rays(batch));
-            // All threads trace with one instruction set at a time, which is a setting of the process.
+            // All threads trace with one instruction set at a time, which is a setting of the
+            // process.
             for (i, isa) in isas.iter().enumerate() {
                 isa.choose().expect("it is available");
                 tasks.par_iter_mut().for_each(|task| task.trace(i, *isa, batch));
@@ -334,7 +338,8 @@ impl Task {
     }
 }
 
-/// Whether a hit is the exact one, or one at the same t but for the accuracy of f64, with t rounded to f32.
+/// Returns true if a hit is the exact one, or one at the same t but for the accuracy of f64, with t
+/// rounded to f32.
 fn is_right(corners: &[[[f32; 3]; 3]], ray: &StartRay, hit: &Hit) -> bool {
     let Some(truth) = oracle::starts::nearest(corners, ray) else { return !hit.is_hit() };
     let (t, exact) = (f64::from(hit.t), truth.t_f64());

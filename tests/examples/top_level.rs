@@ -1,4 +1,5 @@
-//! How long a frame takes before its first ray: tracks, hierarchy, instances and top level, on one thread.
+//! How long a frame takes before its first ray: tracks, hierarchy, instances and top level, on one
+//! thread.
 //!
 //!     cargo run --release -p bth-tests --example top_level
 #![allow(clippy::print_stdout)]

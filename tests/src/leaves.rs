@@ -1,4 +1,5 @@
-//! A tree of leaves: rectangles whose texture has the outline of a leaf, and a floor without holes, as GLB.
+//! A tree of leaves: rectangles whose texture has the outline of a leaf, and a floor without holes,
+//! as GLB.
 
 use bth_random::Rng;
 use serde_json::json;

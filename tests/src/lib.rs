@@ -22,9 +22,9 @@ pub fn target_folder() -> PathBuf {
     if deps.ends_with("deps") { deps.parent().expect("a folder").into() } else { deps.into() }
 }
 
-/// Builds packages of the workspace into [`target_folder`], and returns that folder. Cargo does not build the programs of
-/// other packages for a test. Where `BTH_BUILT` is set, the programs exist already: building a part of the workspace would
-/// rebuild dependencies with fewer features.
+/// Builds packages of the workspace into [`target_folder`], and returns that folder. Cargo does not
+/// build the programs of other packages for a test. Where `BTH_BUILT` is set, the programs exist
+/// already: building a part of the workspace would rebuild dependencies with fewer features.
 pub fn built(packages: &[&str]) -> PathBuf {
     let folder = target_folder();
     if std::env::var_os("BTH_BUILT").is_some() {
@@ -50,8 +50,8 @@ pub fn by_day<T>(day: T, night: T) -> T {
     if std::env::var_os("BTH_DEEP").is_some() { night } else { day }
 }
 
-/// The tetrahedralization worker: `BTH_TETGEN`, or the one built beside the tests. Prints a line where there is none, since
-/// tests with tetrahedra are skipped then.
+/// The tetrahedralization worker: `BTH_TETGEN`, or the one built beside the tests. Prints a line
+/// where there is none, since tests with tetrahedra are skipped then.
 #[allow(clippy::print_stderr)]
 pub fn worker() -> Option<&'static Path> {
     static FOUND: OnceLock<Option<PathBuf>> = OnceLock::new();

@@ -19,8 +19,9 @@ fn lines(bytes: &[u8]) -> impl Iterator<Item = CacheLine> {
     })
 }
 
-/// A file of one object with 1 to 256 triangles, whose ids are their indices: a node over raw leaves of 16 each. With matrices,
-/// rows of four, it has an instance for each of them, else no scene.
+/// A file of one object with 1 to 256 triangles, whose ids are their indices: a node over raw
+/// leaves of 16 each. With matrices, rows of four, it has an instance for each of them, else no
+/// scene.
 ///
 /// # Panics
 /// If there are no triangles or too many.
@@ -39,8 +40,8 @@ pub fn placed_soup(triangles: &[[[f32; 3]; 3]], matrices: &[[f64; 12]]) -> Vec<u
 /// An object: the corners of its triangles, and its leaves, each as triangles.
 pub type SoupObject<'a> = (&'a [[[f32; 3]; 3]], Vec<Vec<u32>>);
 
-/// A file without a scene, with an object for each list of triangles and of the ids in its raw leaves. A triangle may lie in several
-/// leaves.
+/// A file without a scene, with an object for each list of triangles and of the ids in its raw
+/// leaves. A triangle may lie in several leaves.
 ///
 /// # Panics
 /// If a list is empty, or has too many leaves or triangles in one of them.

@@ -10,8 +10,9 @@ fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [0, 1, 2].map(|k| a[k] - b[k])
 }
 
-/// Rays of every kind: through the model, exactly through vertices and edge midpoints, along axes and
-/// in the planes of faces, from vertices, with ranges that end about hits, with tiny and huge directions.
+/// Rays of every kind: through the model, exactly through vertices and edge midpoints, along axes
+/// and in the planes of faces, from vertices, with ranges that end about hits, with tiny and huge
+/// directions.
 pub fn assorted(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<Ray> {
     let mut rng = Rng::new(seed);
     let bound = |pick: fn(f32, f32) -> f32, start: f32| {
@@ -51,7 +52,8 @@ pub fn assorted(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<Ray> 
                 3 => ray.tmax = 1.0,
                 4 => ray.tmin = 1.0,
                 5 => ray.tmin = -1.0,
-                // Scaled by powers of two, so that exactly aimed rays stay exact; long ones stay finite.
+                // Scaled by powers of two, so that exactly aimed rays stay exact; long ones stay
+                // finite.
                 6 => ray.direction = ray.direction.map(|d| d * 2f32.powi(-20)),
                 7 => ray.direction = ray.direction.map(|d| d * 2f32.powi(20)),
                 _ => {}
@@ -61,8 +63,8 @@ pub fn assorted(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<Ray> 
         .collect()
 }
 
-/// Rays that start where others hit, in any direction; where one misses, and for some others, at any point of any triangle, also of
-/// ones that do not exist.
+/// Rays that start where others hit, in any direction; where one misses, and for some others, at
+/// any point of any triangle, also of ones that do not exist.
 pub fn onward(hits: &[Hit], triangles: usize, seed: u64) -> Vec<StartRay> {
     let mut rng = Rng::new(seed);
     let mut from = |hit: &Hit| {
@@ -77,7 +79,8 @@ pub fn onward(hits: &[Hit], triangles: usize, seed: u64) -> Vec<StartRay> {
     hits.iter().map(&mut from).collect()
 }
 
-/// Weights of points of a triangle: corners, points of edges, some of which have a sum that rounds to above 1, and others.
+/// Weights of points of a triangle: corners, points of edges, some of which have a sum that rounds
+/// to above 1, and others.
 pub fn weights(rng: &mut Rng) -> [f32; 2] {
     let w = rng.unit_f32();
     match rng.below(10) {
@@ -106,8 +109,9 @@ fn point_of([a, b, c]: [[f32; 3]; 3], [u, v]: [f32; 2]) -> [f32; 3] {
     })
 }
 
-/// Rays from starts of every kind on an object's triangles: in faces, on edges and at corners, along edges, in the plane, to
-/// vertices, along axes and anywhere, with tiny and huge directions; some of them short.
+/// Rays from starts of every kind on an object's triangles: in faces, on edges and at corners,
+/// along edges, in the plane, to vertices, along axes and anywhere, with tiny and huge directions;
+/// some of them short.
 pub fn starts(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<StartRay> {
     let mut rng = Rng::new(seed);
     let any = |rng: &mut Rng| rng.below(corners.len() as u64) as usize;
@@ -143,7 +147,8 @@ pub fn starts(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<StartRa
     (0..count).map(ray).collect()
 }
 
-/// Groups of 64 rays that go in packets: from one triangle each, in nearly one direction, most of them short.
+/// Groups of 64 rays that go in packets: from one triangle each, in nearly one direction, most of
+/// them short.
 pub fn coherent_starts(corners: &[[[f32; 3]; 3]], groups: usize, seed: u64) -> Vec<StartRay> {
     let mut rng = Rng::new(seed);
     let group = |_| {

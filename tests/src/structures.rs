@@ -41,8 +41,8 @@ pub fn compiled(model: &Model, options: &CompileOptions) -> Scene {
     bth::from_bytes(&compiled.bytes).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// The model in every structure, the BVH first. Structures with tetrahedra are included where the worker exists, and a
-/// tetrahedralization of the whole model only where `whole` is set.
+/// The model in every structure, the BVH first. Structures with tetrahedra are included where the
+/// worker exists, and a tetrahedralization of the whole model only where `whole` is set.
 pub fn every_structure(model: &Model, whole: bool) -> Vec<Traced> {
     structures_named(model, whole, |_| true)
 }
@@ -72,9 +72,10 @@ pub fn structures_named(model: &Model, whole: bool, is_wanted: impl Fn(&str) -> 
     wanted.map(|(name, options)| Traced { scene: compiled(model, &options), name }).collect()
 }
 
-/// The model as a deformable object that was compiled in another shape and then given the positions of the model: each point
-/// is turned about the last axis by an angle that grows along it, and moved by up to a sixteenth of the size of the model.
-/// Its tree is that of the other shape, so its boxes overlap much more.
+/// The model as a deformable object that was compiled in another shape and then given the positions
+/// of the model: each point is turned about the last axis by an angle that grows along it, and
+/// moved by up to a sixteenth of the size of the model. Its tree is that of the other shape, so its
+/// boxes overlap much more.
 ///
 /// # Panics
 /// If it does not compile or open, or a position is not finite.

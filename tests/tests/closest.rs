@@ -1,5 +1,5 @@
-//! Closest points agree with the exact oracle, whatever the shape of triangles, the scale, the structure, the transform of
-//! instances and the instruction set.
+//! Closest points agree with the exact oracle, whatever the shape of triangles, the scale, the
+//! structure, the transform of instances and the instruction set.
 
 use bth::rays::PrimitiveRef;
 use bth::{Closest, Feature, Isa, Scene};
@@ -11,7 +11,8 @@ use bth_tests::structures::{Traced, every_structure};
 
 type Corners = [[f32; 3]; 3];
 
-/// The bound that the documentation of `Closest::distance` states, in hundredths of a unit in the last place.
+/// The bound that the documentation of `Closest::distance` states, in hundredths of a unit in the
+/// last place.
 const UNITS: (u32, u32) = (55, 100);
 
 fn unit(rng: &mut Rng) -> f32 {
@@ -33,7 +34,8 @@ fn on_triangle(rng: &mut Rng, corners: &Corners) -> [f32; 3] {
     }
 }
 
-/// Triangles of all shapes: large and small, needles, slivers, without area, on a coarse grid, sharing vertices.
+/// Triangles of all shapes: large and small, needles, slivers, without area, on a coarse grid,
+/// sharing vertices.
 fn hostile_triangles(rng: &mut Rng, count: usize, scale: f32) -> Vec<Corners> {
     let mut triangles: Vec<Corners> = Vec::new();
     for i in 0..count {
@@ -121,7 +123,8 @@ fn bits(found: Option<Closest>) -> Option<([u32; 6], [u32; 3])> {
     })
 }
 
-/// The results for points one by one and as a batch, which must agree with any instruction set, and for limited radii.
+/// The results for points one by one and as a batch, which must agree with any instruction set, and
+/// for limited radii.
 fn all_ways(scene: &Scene, points: &[[f32; 3]]) -> Vec<Option<Closest>> {
     let mut expected = vec![None; points.len()];
     let mut batch = vec![None; points.len()];
@@ -213,8 +216,8 @@ fn matrix(rng: &mut Rng) -> [f64; 12] {
     std::array::from_fn(|i| f64::from(unit(rng)) * if i % 4 == 3 { spread } else { scale })
 }
 
-/// A scene of instances of triangles, and the corners of all of them in world space, rounded to f32. `None` if a transform is
-/// singular.
+/// A scene of instances of triangles, and the corners of all of them in world space, rounded to
+/// f32. `None` if a transform is singular.
 fn placed_scene(rng: &mut Rng, triangles: &[Corners]) -> Option<(Scene, Vec<Corners>)> {
     let matrices: Vec<_> = (0..1 + rng.below(30)).map(|_| matrix(rng)).collect();
     placed(triangles, &matrices)
@@ -231,7 +234,8 @@ fn placed(triangles: &[Corners], matrices: &[[f64; 12]]) -> Option<(Scene, Vec<C
     Some((scene, world.collect()))
 }
 
-/// Checks boxes and balls about points of the triangles, given in world space. `count` is the number of triangles of an instance.
+/// Checks boxes and balls about points of the triangles, given in world space. `count` is the
+/// number of triangles of an instance.
 fn check_overlaps(rng: &mut Rng, scene: &Scene, world: &[Corners], count: usize, scale: f32) -> [usize; 2] {
     let (mut found, mut results) = (Vec::new(), [0; 2]);
     let primitive = |i: usize| PrimitiveRef { instance: (i / count) as u32, triangle: (i % count) as u32 };
@@ -314,7 +318,8 @@ fn instances_are_measured_in_world_space() {
     assert!(placed > 150, "{placed}");
 }
 
-/// The corners of instances are rounded to denormal numbers in world space, points are in the space of objects, or both.
+/// The corners of instances are rounded to denormal numbers in world space, points are in the space
+/// of objects, or both.
 #[test]
 fn instances_of_denormal_size_are_measured_in_world_space() {
     let mut rng = Rng::new(6);

@@ -1,5 +1,5 @@
-//! The committed conformance files are those that the generators make, and the reader accepts the valid ones and rejects each
-//! invalid one with its code.
+//! The committed conformance files are those that the generators make, and the reader accepts the
+//! valid ones and rejects each invalid one with its code.
 
 use bth_tests::conformance::{Case, invalid, valid};
 use std::collections::BTreeSet;

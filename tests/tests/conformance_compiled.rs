@@ -1,4 +1,5 @@
-//! Files that the compiler writes satisfy the specification, as the reader, the verifier and the reader in Python check it.
+//! Files that the compiler writes satisfy the specification, as the reader, the verifier and the
+//! reader in Python check it.
 #![allow(clippy::print_stdout)] // Tests that cannot run print why.
 
 use bth_compile::Silent;

@@ -1,10 +1,12 @@
-//! The reader in `tools/bth_dump`, written from the specification alone, accepts and rejects the same files.
+//! The reader in `tools/bth_dump`, written from the specification alone, accepts and rejects the
+//! same files.
 #![allow(clippy::print_stdout)] // Tests that cannot run print why.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What the reader prints for each file in a folder: name, validity and code. `None` without Python.
+/// What the reader prints for each file in a folder: name, validity and code. `None` without
+/// Python.
 fn read_all(folder: &Path) -> Option<Vec<(String, bool, String)>> {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("..");
     let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();

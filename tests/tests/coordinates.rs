@@ -1,5 +1,5 @@
-//! Quantized leaves: no vertex moves farther than the file states, answers are exact for the triangles as they are stored, and
-//! files are as small as documented.
+//! Quantized leaves: no vertex moves farther than the file states, answers are exact for the
+//! triangles as they are stored, and files are as small as documented.
 #![allow(clippy::print_stdout, reason = "tests print what they skip")]
 
 #[allow(dead_code)]
@@ -34,8 +34,8 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
     (0..3).map(|k| (f64::from(a[k]) - f64::from(b[k])).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Every corner of every stored triangle against its source, and the share of the bytes that traversal reads, places
-/// of triangles not counted.
+/// Every corner of every stored triangle against its source, and the share of the bytes that
+/// traversal reads, places of triangles not counted.
 fn check_file(path: &Path, mesh: &Mesh, grid: GridBits) -> f64 {
     let file = compiled(path, Some(grid), plain());
     let verified = bth_format::verify::verify(&file).unwrap_or_else(|e| panic!("{}: {e:?}", path.display()));
@@ -45,7 +45,8 @@ fn check_file(path: &Path, mesh: &Mesh, grid: GridBits) -> f64 {
     for triangle in oracle::triangles(&object) {
         for (stored, source) in triangle.corners.into_iter().zip(mesh.corners(triangle.id)) {
             assert!(distance(stored, source) <= most, "{stored:?} {source:?} {most}");
-            // Triangles that share a vertex still share it: its place on the grid depends on its position alone.
+            // Triangles that share a vertex still share it: its place on the grid depends on its
+            // position alone.
             assert_eq!(stored, object.grid.unwrap().nearest(source));
         }
     }
@@ -76,7 +77,8 @@ fn no_vertex_is_farther_from_its_source_than_the_file_says() {
     for (i, path) in paths.iter().enumerate() {
         let (mesh, _) = bth_import::import(path, Keep::None, &Silent).unwrap();
         let shares = [GridBits::B21, GridBits::B16].map(|grid| check_file(path, &mesh, grid));
-        // The documented sizes of closed meshes; triangles without shared vertices stay within them, too.
+        // The documented sizes of closed meshes; triangles without shared vertices stay within
+        // them, too.
         if i < ours {
             assert!(shares[0] <= 0.8 && shares[1] <= 0.65, "{}: {shares:?}", path.display());
         }
@@ -105,8 +107,9 @@ fn answers_on_a_grid_are_exact_for_the_stored_triangles_in_every_structure() {
     }
 }
 
-/// Whether two answers agree: t to one ulp, since the expected one is rounded twice, and either the same triangle with u and
-/// v within the documented error, or another triangle that the line crosses at the same t.
+/// Returns true if two answers agree: t to one ulp, since the expected one is rounded twice, and
+/// either the same triangle with u and v within the documented error, or another triangle that the
+/// line crosses at the same t.
 fn same(a: &Hit, b: &Hit, ray: &Ray, triangles: &[oracle::Triangle]) -> bool {
     let near = |a: f32, b: f32| (f64::from(a) - f64::from(b)).abs() <= 1.0 / f64::from(1 << 24);
     if a.t.to_bits().abs_diff(b.t.to_bits()) > 1 {
@@ -121,7 +124,8 @@ fn same(a: &Hit, b: &Hit, ray: &Ray, triangles: &[oracle::Triangle]) -> bool {
         .is_some_and(|at| oracle::to_f64(&at.t) as f32 == b.t)
 }
 
-/// Nearest and any hits, in batches, coherent ones too, and alone, with every instruction set, against every triangle.
+/// Nearest and any hits, in batches, coherent ones too, and alone, with every instruction set,
+/// against every triangle.
 fn check_answers(scene: &Scene) {
     let triangles = oracle::triangles(&scene.object(0));
     let corners: Vec<_> = triangles.iter().map(|t| t.corners).collect();

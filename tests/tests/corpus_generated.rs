@@ -22,7 +22,7 @@ fn weld(model: &Model) -> Mesh {
     mesh
 }
 
-/// Whether the whole model is free of bad contacts according to the compiler.
+/// Returns true if the whole model is free of bad contacts according to the compiler.
 fn is_suitable(model: &Model) -> bool {
     let mesh = weld(model);
     let (tree, _) = bvh::build(&mesh, &bvh::BvhOptions::default(), &Silent).unwrap();

@@ -1,4 +1,5 @@
-//! Every messy model ends in a compiled file that verifies, or in an error that a person can act on.
+//! Every messy model ends in a compiled file that verifies, or in an error that a person can act
+//! on.
 #![allow(clippy::print_stdout, reason = "tests print what they skip and what they found")]
 
 mod corpus_support;
@@ -13,11 +14,12 @@ use corpus_support::{data_and_compiler, listed_triangles, models, program, run};
 
 /// Wall-clock limit, generous for busy machines; the documented limits are below.
 const LIMIT: Duration = Duration::from_secs(300);
-/// What a messy model may take: seconds of CPU time of the compiler, and memory. No messy model has as many as 70,000
-/// triangles.
+/// What a messy model may take: seconds of CPU time of the compiler, and memory. No messy model has
+/// as many as 70,000 triangles.
 const CPU_SECONDS: u32 = 60;
 const MEMORY_KIB: u32 = 4 << 20;
-/// Seconds of a tetrahedralization. By default it may take minutes, which TetGen spends on two of the models without success.
+/// Seconds of a tetrahedralization. By default it may take minutes, which TetGen spends on two of
+/// the models without success.
 const DEADLINE: &str = "tet-deadline=1";
 
 /// Models that are not usable, and where the error must point.
@@ -79,8 +81,8 @@ fn every_messy_model_compiles_or_is_refused_with_a_reason() {
     }
 }
 
-/// With materials, too: libraries and images that are missing or broken are errors with a code, a place and a hint. The player shows
-/// every model that compiles without them.
+/// With materials, too: libraries and images that are missing or broken are errors with a code, a
+/// place and a hint. The player shows every model that compiles without them.
 #[test]
 fn materials_of_messy_models_are_read_or_refused_with_a_reason() {
     let Some((data, bthc)) = data_and_compiler() else { return };
@@ -140,7 +142,8 @@ fn limited(bthc: &Path) -> Command {
     command
 }
 
-/// Whether the model was compiled, and in how many seconds; an error when something is not as it must be.
+/// Returns true if the model was compiled, and in how many seconds; an error when something is not
+/// as it must be.
 fn check(bthc: &Path, data: &Path, model: &Path, file: &Path) -> Result<(bool, f64), String> {
     let mut compile = limited(bthc);
     compile.arg("compile").arg(model).arg("-o").arg(file).args(["--json", "--set", DEADLINE]);

@@ -1,4 +1,5 @@
-//! The downloaded static models compile, verify, and give the same answers to rays with and without tetrahedra.
+//! The downloaded static models compile, verify, and give the same answers to rays with and without
+//! tetrahedra.
 #![allow(clippy::print_stdout, reason = "tests print what they skip and what they found")]
 
 mod corpus_support;

@@ -52,7 +52,8 @@ fn every_flipped_byte_is_found() {
     }
 }
 
-/// With all hashes recomputed, the flipped bits reach the checks of the section table and the indices.
+/// With all hashes recomputed, the flipped bits reach the checks of the section table and the
+/// indices.
 #[test]
 fn flips_behind_right_hashes_end_in_a_result() {
     let (mut passed, mut refused) = (0, 0);

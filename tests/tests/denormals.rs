@@ -1,5 +1,6 @@
-//! No number becomes denormal while ordinary rays are traced. On Intel processors each operation that makes or reads a denormal number takes
-//! hundreds of cycles, in one lane of sixteen as in all, so that one of them doubles the time of a ray. Processors note them in flags.
+//! No number becomes denormal while ordinary rays are traced. On Intel processors each operation
+//! that makes or reads a denormal number takes hundreds of cycles, in one lane of sixteen as in
+//! all, so that one of them doubles the time of a ray. Processors note them in flags.
 #![cfg(target_arch = "x86_64")]
 #![allow(unsafe_code)] // The flags of floating-point operations are read by an instruction.
 
@@ -27,8 +28,8 @@ fn denormal_flags(trace: impl FnOnce()) -> u32 {
     after & DENORMAL
 }
 
-/// Rays from around the model to points in it, as renderers send them: `tmin` 0, small or the least normal number, `tmax` a length, a large number, the greatest or
-/// infinite.
+/// Rays from around the model to points in it, as renderers send them: `tmin` 0, small or the least
+/// normal number, `tmax` a length, a large number, the greatest or infinite.
 fn ordinary(count: usize, tmin: f32, tmax: f32) -> Vec<Ray> {
     let mut rng = Rng::new(7);
     let mut point = |size: f32| [(); 3].map(|()| (rng.unit_f32() - 0.5) * size);
@@ -59,7 +60,8 @@ fn no_number_of_an_ordinary_ray_is_denormal() {
     scenes.push(("instances".into(), crowd));
     let count = 600;
     let (mut hits, mut found) = (vec![Hit::MISS; count], vec![false; count]);
-    // Scalar code is for processors without SSE4.1, and the compiler chooses what lies in unused lanes.
+    // Scalar code is for processors without SSE4.1, and the compiler chooses what lies in unused
+    // lanes.
     for isa in [Isa::Sse4, Isa::Avx2, Isa::Avx512].into_iter().filter(|isa| isa.is_available()) {
         isa.choose().expect("it is available");
         for (name, scene) in &scenes {
@@ -70,7 +72,8 @@ fn no_number_of_an_ordinary_ray_is_denormal() {
                 (1e-3, 2.5),
                 (f32::MIN_POSITIVE, f32::MAX),
             ] {
-                // Walks through tetrahedra multiply tmin by areas, and without a fused multiplication there are more products.
+                // Walks through tetrahedra multiply tmin by areas, and without a fused
+                // multiplication there are more products.
                 if tmin == f32::MIN_POSITIVE && (isa == Isa::Sse4 || !name.starts_with("bvh")) {
                     continue;
                 }

@@ -141,8 +141,9 @@ fn small_things_on_a_wide_plain_are_traced_exactly() {
     }
 }
 
-/// Rays from about the origin have pads that allow neither for the plain's coordinates nor for those of the knot, which only the boxes in the
-/// file do: rays along the sides of boxes tell whether they do.
+/// Rays from about the origin have pads that allow neither for the plain's coordinates nor for
+/// those of the knot, which only the boxes in the file do: rays along the sides of boxes tell
+/// whether they do.
 #[test]
 fn packets_to_the_corners_of_small_things_on_a_wide_plain_are_traced_exactly() {
     let mut hits_found = 0;
@@ -151,7 +152,8 @@ fn packets_to_the_corners_of_small_things_on_a_wide_plain_are_traced_exactly() {
         let corners: Corners = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
         let scene = compiled(&model, &options(Structure::Bvh, RecordKind::Link32, false));
         for along_one_direction in [false, true] {
-            // Rays to the corners of each triangle and beside them, those of one triangle after those of the last.
+            // Rays to the corners of each triangle and beside them, those of one triangle after
+            // those of the last.
             let targets = corners.iter().take(200).flatten().flat_map(|p| {
                 [
                     *p,

@@ -10,7 +10,8 @@ use bth_scenes::Model;
 use std::path::Path;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// A model, and one with what files may have: repeated and unused positions, triangles of no area, a negative zero.
+/// A model, and one with what files may have: repeated and unused positions, triangles of no area,
+/// a negative zero.
 fn models() -> Vec<(&'static str, Model)> {
     let mut messy = bth_scenes::gyroid::gyroid(2000);
     let count = messy.positions.len() as u32;

@@ -1,4 +1,5 @@
-//! Rays through holes: all queries against the hits of a file without opacity, each judged by the alpha of its texture.
+//! Rays through holes: all queries against the hits of a file without opacity, each judged by the
+//! alpha of its texture.
 
 use bth::rays::{Hit, Ray, StartRay};
 use bth::{Accept, Isa, Opacity, Scene, TraceRay};
@@ -16,7 +17,8 @@ use std::sync::{Mutex, MutexGuard};
 
 const LEAVES: usize = 60;
 
-/// The instruction set is a setting of the whole process, so tests that set it run one after the other.
+/// The instruction set is a setting of the whole process, so tests that set it run one after the
+/// other.
 fn turn() -> MutexGuard<'static, ()> {
     static TURN: Mutex<()> = Mutex::new(());
     TURN.lock().unwrap_or_else(|e| e.into_inner())
@@ -98,8 +100,9 @@ fn starts(scene: &Scene, rays: &[Ray], instances: u32) -> Vec<StartRay> {
     all
 }
 
-/// Alpha of a leaf's texture at a hit, interpolated bilinearly in f64; `None` for the floor. Both triangles of a leaf have the
-/// corner (0, 0) first: then (1, 0) and (1, 1), or (1, 1) and (0, 1). In mirrored meshes the last two are exchanged.
+/// Alpha of a leaf's texture at a hit, interpolated bilinearly in f64; `None` for the floor. Both
+/// triangles of a leaf have the corner (0, 0) first: then (1, 0) and (1, 1), or (1, 1) and (0, 1).
+/// In mirrored meshes the last two are exchanged.
 fn alpha(texture: &[u8], hit: &Hit, mirrored: bool) -> Option<f64> {
     let in_mesh = hit.primitive.triangle as usize % (2 * LEAVES + 2);
     if in_mesh >= 2 * LEAVES {
@@ -139,8 +142,8 @@ fn judged(scene: &Scene, all: &[Hit], flat: bool) -> Vec<Hit> {
     all.iter().filter(keep).copied().collect()
 }
 
-/// Compares all queries of a scene with holes; `opaque` is the same without. Returns how many transparent hits lay before the
-/// nearest that counts.
+/// Compares all queries of a scene with holes; `opaque` is the same without. Returns how many
+/// transparent hits lay before the nearest that counts.
 fn compare<R: TraceRay + Debug>(opaque: &Scene, scene: &Scene, rays: &[R], flat: bool) -> usize {
     let everything = Accept::default();
     let (mut passed, mut all, mut found) = (0, Vec::new(), Vec::new());

@@ -1,5 +1,5 @@
-//! Programs in C and C++ that find the installed libraries by CMake and by pkg-config (`tools/package/install`), and packages for Debian
-//! (`tools/package/debian`).
+//! Programs in C and C++ that find the installed libraries by CMake and by pkg-config
+//! (`tools/package/install`), and packages for Debian (`tools/package/debian`).
 #![cfg(unix)]
 #![allow(clippy::print_stdout)]
 
@@ -11,7 +11,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().expect("the repository")
 }
 
-/// Whether a program can be run; prints a line if not.
+/// Returns true if a program can be run; prints a line if not.
 fn have(program: &str) -> bool {
     let found = Command::new(program).arg("--version").output().is_ok();
     if !found {
@@ -52,7 +52,8 @@ fn a_cmake_project_finds_the_libraries() {
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
     let moved = installed(folder.path());
-    // A link to the folder with the files for CMake, as /lib is one to /usr/lib; /include is not beside it.
+    // A link to the folder with the files for CMake, as /lib is one to /usr/lib; /include is not
+    // beside it.
     let prefix = folder.path().join("root");
     std::fs::create_dir(&prefix).expect("a folder");
     std::os::unix::fs::symlink(moved.join("lib"), prefix.join("lib")).expect("a link");
@@ -141,7 +142,8 @@ fn pack_debian_packages(folder: &Path) -> Vec<(String, PathBuf)> {
     packages
 }
 
-/// The packages for Debian, which are packed once for all tests, into a folder beside those of the build.
+/// The packages for Debian, which are packed once for all tests, into a folder beside those of the
+/// build.
 fn debian_packages() -> &'static [(String, PathBuf)] {
     static PACKED: OnceLock<Vec<(String, PathBuf)>> = OnceLock::new();
     PACKED.get_or_init(|| {

@@ -39,8 +39,8 @@ fn kinds() -> Vec<(&'static str, CompileOptions)> {
     kinds
 }
 
-/// Checks that a place leads to each triangle in a leaf, and that no other triangle has a place. Returns the
-/// number of triangles in indexed leaves, in raw leaves, and without a place.
+/// Checks that a place leads to each triangle in a leaf, and that no other triangle has a place.
+/// Returns the number of triangles in indexed leaves, in raw leaves, and without a place.
 fn check(view: &ObjectView<'_>, name: &str) -> [usize; 3] {
     let mut counts = [0; 3];
     let mut in_leaves = vec![false; view.header.triangles as usize];

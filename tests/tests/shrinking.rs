@@ -53,7 +53,8 @@ fn an_opened_file_is_immune_to_truncation() {
 #[test]
 fn truncating_a_mapped_file_ends_the_process_that_traces_it_with_sigbus() {
     if let Some(path) = std::env::var_os(CHILD) {
-        // SAFETY: the test breaks the contract on purpose by truncating the file; the documented signal ends this child process.
+        // SAFETY: the test breaks the contract on purpose by truncating the file; the documented
+        // signal ends this child process.
         #[allow(unsafe_code)]
         let scene = unsafe { bth::map(&path) }.unwrap();
         truncate(Path::new(&path));

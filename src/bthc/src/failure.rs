@@ -31,7 +31,7 @@ impl From<bth_compile::Error> for Failure {
 }
 
 impl From<std::io::Error> for Failure {
-    /// Errors of standard output; those of files are made with [`Failure::file`].
+    /// For errors of standard output; [`Failure::file`] is for files.
     fn from(error: std::io::Error) -> Self {
         if error.kind() == std::io::ErrorKind::BrokenPipe {
             Self::ClosedOutput

@@ -45,12 +45,12 @@ pub(crate) enum QueryKind {
 /// A scene, the rays that are traced through it, and the kind of query.
 pub(crate) type TimedRun<'a> = (&'a Scene, &'a Rays, QueryKind);
 
-/// Rays of one turn of batches; sets with fewer rays are repeated. Single rays are not repeated, since the branch predictor
-/// learns a short sequence.
+/// Rays of one turn of batches; sets with fewer rays are repeated. Single rays are not repeated,
+/// since the branch predictor learns a short sequence.
 const TURN: usize = 16384;
 
-/// Nanoseconds of a ray in each run: the least over the rounds, in which the runs take turns, since other work of the machine
-/// can only add time. `None` if it was stopped.
+/// Nanoseconds of a ray in each run: the minimum over the rounds, in which the runs take turns,
+/// since other work of the machine can only add time. `None` if it was stopped.
 pub(crate) fn nanoseconds(runs: &[TimedRun<'_>], rounds: usize, stop: impl Fn() -> bool) -> Option<Vec<f64>> {
     let mut least = vec![f64::INFINITY; runs.len()];
     for _ in 0..=rounds {

@@ -5,10 +5,10 @@ use serde::Serialize;
 use std::io::{Result, StdoutLock, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Whether something was printed on standard output, or is being printed.
+/// True if something was printed on standard output, or is being printed.
 static BEGUN: AtomicBool = AtomicBool::new(false);
 
-/// Whether something was printed on standard output, or is being printed.
+/// Returns true if something was printed on standard output, or is being printed.
 pub(crate) fn has_begun() -> bool {
     BEGUN.load(Ordering::Relaxed)
 }

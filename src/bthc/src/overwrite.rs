@@ -14,7 +14,7 @@ impl<'a> Outputs<'a> {
         Self(files.filter_map(|output| Some((output.canonicalize().ok()?, output))).collect())
     }
 
-    /// Whether there is none.
+    /// Returns true if there are no outputs.
     pub(crate) fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

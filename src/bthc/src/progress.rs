@@ -14,8 +14,9 @@ static CANCELLED: AtomicBool = AtomicBool::new(false);
 /// Values of [`Progress`] that live: while there is one, stages poll [`CANCELLED`].
 static POLLERS: AtomicUsize = AtomicUsize::new(0);
 
-/// Makes Ctrl-C stop the compilation cleanly; a second one ends the program at once, as does the first where nothing polls for it: while
-/// standard input is read, and in commands without stages. SIGTERM and SIGHUP are like Ctrl-C.
+/// Makes Ctrl-C stop the compilation cleanly; a second one ends the program at once, as does the
+/// first where nothing polls for it: while standard input is read, and in commands without stages.
+/// SIGTERM and SIGHUP are like Ctrl-C.
 ///
 /// # Errors
 /// `BTH-L090` if the thread that waits for signals cannot be started.
@@ -24,8 +25,9 @@ pub(crate) fn listen_for_interrupts(wants_json: bool) -> Result<(), Failure> {
         let again = CANCELLED.swap(true, Ordering::Relaxed);
         if again || POLLERS.load(Ordering::Relaxed) == 0 {
             let cancelled = Failure::from(bth_compile::Error::Cancelled);
-            // Who prints already may wait for a reader, and holds the lock of standard output. Else the second signal is reported, too:
-            // `timeout` sends one to the program and at once another to its group.
+            // Who prints already may wait for a reader, and holds the lock of standard output. Else
+            // the second signal is reported, too: `timeout` sends one to the program and at once
+            // another to its group.
             if !output::has_begun() {
                 cancelled.report(wants_json);
             }
@@ -40,7 +42,7 @@ pub(crate) fn listen_for_interrupts(wants_json: bool) -> Result<(), Failure> {
     }
 }
 
-/// Whether the user cancelled.
+/// Returns true if the user cancelled.
 pub(crate) fn is_cancelled() -> bool {
     CANCELLED.load(Ordering::Relaxed)
 }
@@ -76,7 +78,7 @@ fn whole_rate(state: &ProgressState, out: &mut dyn std::fmt::Write) {
 #[derive(Debug)]
 pub(crate) struct Progress {
     bar: ProgressBar,
-    /// Whether warnings are printed.
+    /// True if warnings are printed.
     warns: bool,
 }
 

@@ -19,10 +19,10 @@ pub(crate) struct TemporaryFile {
 }
 
 impl TemporaryFile {
-    /// A new file of this name, in a folder of its own.
+    /// Creates a file of this name in a new folder.
     ///
     /// # Errors
-    /// Those of the system.
+    /// What the system reports.
     pub(crate) fn new(name: &Path) -> Result<(Self, File)> {
         // Locked until both are there, so that who removes the folder removes all of it.
         let mut folders = folders();

@@ -7,7 +7,7 @@ use bth_compile::Silent;
 use bth_compile::tets::{TetOptions, worker};
 use bth_format::layout::{MINIMUM_READER_VERSION, WRITER_VERSION};
 
-/// What the target offers to programs beside the processor and the system: the C library or compiler.
+/// What programs get from the target besides processor and system: the C library or compiler.
 const ENVIRONMENT: &str = if cfg!(target_env = "musl") {
     "musl"
 } else if cfg!(target_env = "gnu") {

@@ -26,7 +26,8 @@ const POSITIONS: [[f32; 3]; 10] = [
 const TRIANGLES: [[u32; 3]; 8] =
     [[0, 2, 1], [1, 2, 3], [2, 4, 3], [3, 4, 5], [4, 6, 5], [5, 6, 7], [0, 2, 4], [6, 8, 7]];
 
-/// Triangles of the leaves: an indexed and a raw one below an inner node, an indexed one below the root.
+/// Triangles of the leaves: an indexed and a raw one below an inner node, an indexed one below the
+/// root.
 const LEAVES: [&[u32]; 3] = [&[0, 1, 6], &[3, 2], &[4, 5, 7]];
 
 /// Lines of the leaves, behind the root and an inner node.
@@ -48,7 +49,8 @@ fn corners(ids: &[u32]) -> Vec<[[f32; 3]; 3]> {
     ids.iter().map(|id| TRIANGLES[*id as usize].map(|row| POSITIONS[row as usize])).collect()
 }
 
-/// Rows of LEAF_VERTICES: of the first and the last leaf by vertex in order of first use, of the raw leaf by corner.
+/// Rows of LEAF_VERTICES: of the first and the last leaf by vertex in order of first use, of the
+/// raw leaf by corner.
 fn leaf_vertices() -> Vec<[u32; WIDTH]> {
     let row = |used: &[u32]| std::array::from_fn(|i| *used.get(i).unwrap_or(&used[0]));
     // Vertices 6 and 8 have one position, but are two vertices.
@@ -71,7 +73,8 @@ fn with_parts<T>(make: impl FnOnce(&ObjectParts<'_>) -> T) -> T {
     let root = node(&[(Child::Node(7), bounds(inner.as_flattened())), (Child::Indexed(LINES[2]), of(2))]);
     let second = node(&[(Child::Indexed(LINES[0]), of(0)), (Child::Raw(LINES[1]), of(1))]);
     let mut last = indexed(&corners(LEAVES[2]), 5);
-    // The doubled vertex has a slot of its own: triangles 4 and 5 use vertices 4 to 7, triangle 7 has 6, 8 and 7.
+    // The doubled vertex has a slot of its own: triangles 4 and 5 use vertices 4 to 7, triangle 7
+    // has 6, 8 and 7.
     last.corner = [[0; WIDTH]; 3];
     for (t, vertices) in [[0, 1, 2], [2, 1, 3], [1, 4, 3]].into_iter().enumerate() {
         (0..3).for_each(|k| last.corner[k][t] = vertices[k]);
@@ -168,7 +171,8 @@ pub(super) fn invalid() -> Vec<Case> {
             e.put_u32(kind::OBJECT, offset_of!(Object, coordinates), WIDENED_BOXES);
         }),
         broken("F164-slots-exchanged", base, Seal::Sections, |e| {
-            // The same boxes and children in the other order: the leaves lie no longer in depth-first order.
+            // The same boxes and children in the other order: the leaves lie no longer in
+            // depth-first order.
             for at in (0..6).map(|row| 448 + 64 * row).chain([448 + child]) {
                 let [a, b] = [0, 4].map(|slot| e.get_u32(kind::LINES, at + slot));
                 e.put_u32(kind::LINES, at, b).put_u32(kind::LINES, at + 4, a);

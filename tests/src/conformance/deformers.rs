@@ -1,4 +1,5 @@
-//! A scene whose objects deform: one with a skin of two joints and two morph targets that change normals too, one with a morph target.
+//! A scene whose objects deform: one with a skin of two joints and two morph targets that change
+//! normals too, one with a morph target.
 
 use super::scenes::still;
 use super::valid::{bounds, indexed, lines};

@@ -300,7 +300,8 @@ fn tree() -> Vec<Case> {
     ]
 }
 
-/// A case in which `rows` of `before` rows of a section of object 0 are left. The others become a gap, which is zero.
+/// A case in which `rows` of `before` rows of a section of object 0 are left. The others become a
+/// gap, which is zero.
 fn shortened((name, base): (&str, &str), kind: u32, [stride, before, rows]: [usize; 3]) -> Case {
     broken(name, base, Seal::Sections, |e| {
         let end = e.section_at(kind) + stride * rows;
@@ -361,7 +362,8 @@ fn free_directions() -> Vec<Case> {
         // With a greater distance of the level, the triangle above lies within it.
         field("F209-met-within-a-level", base, levels, 8, 20f32.to_bits()),
         field("F209-met-within-a-level-of-distances", "free-distances", levels, 8, 20f32.to_bits()),
-        // The middle of the triangle above, at 10.011, lies within it, though one of its corners, at 10.050, does not.
+        // The middle of the triangle above, at 10.011, lies within it, though one of its corners,
+        // at 10.050, does not.
         field("F209-middle-within-a-level", "free-distances", levels, 8, 10.02f32.to_bits()),
         broken("F210-sliver", base, Seal::Sections, |e| {
             // The third corner of the first triangle, vertex 5, comes close to the first edge.
@@ -404,8 +406,8 @@ fn opacity() -> Vec<Case> {
 fn tets() -> Vec<Case> {
     let base = "tets-link32";
     let leaf = |name, row: usize, at: usize, value| field(name, base, kind::TET_LEAVES, 64 * row + at, value);
-    // The middle tetrahedron of the first cube has neighbours behind slots 0 (tetrahedron 4) and 1 (3),
-    // and constrained faces behind the others.
+    // The middle tetrahedron of the first cube has neighbours behind slots 0 (tetrahedron 4) and 1
+    // (3), and constrained faces behind the others.
     let middle = 2;
     vec![
         leaf("F105-tets-below-tets", 0, offset_of!(TetLeaf, subtree), Child::Tets(1).code()),

@@ -30,8 +30,8 @@ fn texture(image: &[u8], wrap: [u32; 2], filter: u32) -> Texture {
     Texture { image: hash128(image), wrap, filter, transform, uv_set: UV_SET_FIRST, reserved: [0; 2] }
 }
 
-/// Two materials with three textures of two images, and vertex colors; an object with a texture of one of these images; and one
-/// without materials.
+/// Two materials with three textures of two images, and vertex colors; an object with a texture of
+/// one of these images; and one without materials.
 pub(super) fn materials() -> Vec<u8> {
     let lines = lines(indexed(&[CORNERS], 0).as_bytes());
     let groups = GroupParts::of(&bth_import::Groups {
@@ -78,8 +78,8 @@ pub(super) fn materials() -> Vec<u8> {
     builder.finish()
 }
 
-/// A material whose base color texture and emissive texture have sets of texture coordinates of their own; and one without such coordinates,
-/// though its texture has them.
+/// A material whose base color texture and emissive texture have sets of texture coordinates of
+/// their own; and one without such coordinates, though its texture has them.
 pub(super) fn second_uvs() -> Vec<u8> {
     let lines = lines(indexed(&[CORNERS], 0).as_bytes());
     let groups = GroupParts::of(&bth_import::Groups {

@@ -159,14 +159,15 @@ fn steep(level: usize) -> FreeSectors {
         .with(FreeSectors::of_bin(FREE_BINS / 2).expect("the bin in the middle has a sector"), level)
 }
 
-/// Rows of [`one_above_the_other`]: straight up from the lower triangle there is nothing within the third level, and from the upper one nothing at
-/// all.
+/// Rows of [`one_above_the_other`]: straight up from the lower triangle there is nothing within the
+/// third level, and from the upper one nothing at all.
 fn directions() -> [FreeDirections; 2] {
     let all = FreeSectors(u32::MAX);
     [FreeDirections::new(steep(3), FreeBins(0)), FreeDirections::new(all, FreeBins(FreeBins::ALL))]
 }
 
-/// As [`directions`], of both sides: there is nothing within the second level below the upper triangle, either.
+/// As [`directions`], of both sides: there is nothing within the second level below the upper
+/// triangle, either.
 fn distances() -> [FreeDistances; 2] {
     [FreeDistances { sectors: [steep(3).0, u32::MAX] }, FreeDistances { sectors: [u32::MAX, steep(2).0] }]
 }
@@ -184,8 +185,8 @@ pub(super) fn free_directions_and_distances() -> Vec<u8> {
     one_above_the_other(&directions(), &distances())
 }
 
-/// Six triangles side by side: opaque, transparent, unknown, and divided at levels 1 and 2 and once more at level 1 by the
-/// same word.
+/// Six triangles side by side: opaque, transparent, unknown, and divided at levels 1 and 2 and once
+/// more at level 1 by the same word.
 fn opacity() -> Vec<u8> {
     let corners: [[[f32; 3]; 3]; 6] =
         std::array::from_fn(|k| CORNERS.map(|[x, y, z]| [x + 2.0 * k as f32, y, z]));
@@ -238,9 +239,9 @@ fn room_around(point: [f32; 3]) -> [[f32; 3]; 2] {
     [lower, upper]
 }
 
-/// A grid of 4 by 5 squares, two triangles each: 12 squares in an inner node with indexed and raw leaves, 8 in
-/// leaves beside it; and a triangle without area. Normals and texture coordinates are kept. With bits, the leaves are
-/// quantized to a grid that moves the source's positions slightly.
+/// A grid of 4 by 5 squares, two triangles each: 12 squares in an inner node with indexed and raw
+/// leaves, 8 in leaves beside it; and a triangle without area. Normals and texture coordinates are
+/// kept. With bits, the leaves are quantized to a grid that moves the source's positions slightly.
 fn two_levels(bits: Option<GridBits>) -> Vec<u8> {
     two_levels_of(bits, [false; 2])
 }
@@ -250,7 +251,8 @@ fn with_places(bits: Option<GridBits>) -> Vec<u8> {
     two_levels_of(bits, [false, true])
 }
 
-/// As [`two_levels`], with child boxes that have the least room around the triangles that widened boxes must have.
+/// As [`two_levels`], with child boxes that have the least room around the triangles that widened
+/// boxes must have.
 fn two_levels_widened() -> Vec<u8> {
     two_levels_of(None, [true, false])
 }
@@ -346,8 +348,8 @@ fn two_levels_of(bits: Option<GridBits>, [widened_boxes, has_places]: [bool; 2])
     })
 }
 
-/// Four triangles in three groups of two materials, one group in two runs, one without a name; and an object without
-/// groups. Both objects have names.
+/// Four triangles in three groups of two materials, one group in two runs, one without a name; and
+/// an object without groups. Both objects have names.
 fn groups() -> Vec<u8> {
     let triangles: Vec<_> = (0..4).map(|i| CORNERS.map(|[x, y, z]| [x, y, z + i as f32])).collect();
     let lines = lines(indexed(&triangles, 0).as_bytes());
@@ -388,13 +390,14 @@ fn unknown_section() -> Vec<u8> {
     builder.finish()
 }
 
-/// Vertices of the five tetrahedra that fill a cube whose corner i is at (i & 1, i >> 1 & 1, i >> 2).
+/// Vertices of the five tetrahedra that fill a cube whose corner i is at (i & 1, i >> 1 & 1, i >>
+/// 2).
 pub(super) const CUBE: [[u32; 4]; 5] = [[0, 1, 2, 4], [1, 2, 3, 7], [1, 2, 4, 7], [1, 4, 5, 7], [2, 4, 6, 7]];
 /// Two faces of the middle tetrahedron.
 pub(super) const FACES: [[u32; 3]; 2] = [[1, 2, 7], [1, 4, 2]];
 
-/// Two cubes as tet leaves, each around two triangles, the first with a subtree; a triangle leaf; and a triangle without
-/// area.
+/// Two cubes as tet leaves, each around two triangles, the first with a subtree; a triangle leaf;
+/// and a triangle without area.
 fn tets(record: RecordKind) -> Vec<u8> {
     tets_of(record, false, &[])
 }
@@ -467,7 +470,8 @@ pub(super) struct TetParts {
     pub(super) hulls: Vec<HullFace>,
 }
 
-/// Whether a vertex lies on the side of a face from which its corners are counter-clockwise.
+/// Returns true if a vertex lies on the side of a face from which its corners are
+/// counter-clockwise.
 fn is_in_front(points: &[[f32; 3]], face: &[u32; 3], vertex: u32) -> bool {
     let [a, b, c, d] = [face[0], face[1], face[2], vertex].map(|v| points[v as usize].map(f64::from));
     let [u, v, w] = [b, c, d].map(|p| [0, 1, 2].map(|k| p[k] - a[k]));
@@ -492,7 +496,8 @@ impl TetParts {
         }
     }
 
-    /// Adds a leaf of tetrahedra (ascending vertices) with constrained faces, whose triangles number from `ids`.
+    /// Adds a leaf of tetrahedra (ascending vertices) with constrained faces, whose triangles
+    /// number from `ids`.
     pub(super) fn add(
         &mut self,
         record: RecordKind,

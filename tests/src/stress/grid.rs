@@ -6,7 +6,8 @@ use bth_scenes::Model;
 /// A point or vector in units of the grid.
 pub type Point = [i32; 3];
 
-/// Magnitudes that products of three coordinates and their sums keep within i128, and f32 within its precision.
+/// Magnitudes that products of three coordinates and their sums keep within i128, and f32 within
+/// its precision.
 pub const LIMIT: i32 = 1 << 24;
 
 /// A mesh whose coordinates are multiples of 2^`exponent`.
@@ -27,7 +28,8 @@ pub struct GridRay {
     pub origin: Point,
     /// Direction, in units of 2^`exponent`.
     pub direction: Point,
-    /// Unit of the direction: not that of the grid where rays are stretched, by which their t shrinks.
+    /// Unit of the direction: not that of the grid where rays are stretched, by which their t
+    /// shrinks.
     pub exponent: i32,
     /// Range of t.
     pub range: [f32; 2],
@@ -85,7 +87,8 @@ impl Grid {
         Ray { origin: ray.origin.map(|x| float(x, self.exponent)), tmin, direction, tmax }
     }
 
-    /// The t at which the line of a ray meets a triangle; `None` if it misses or lies in the plane of the triangle.
+    /// The t at which the line of a ray meets a triangle; `None` if it misses or lies in the plane
+    /// of the triangle.
     pub fn intersection(&self, ray: &GridRay, triangle: u32) -> Option<Quotient> {
         let [a, b, c] =
             self.triangles[triangle as usize].map(|v| sub(self.positions[v as usize], ray.origin));

@@ -1,8 +1,9 @@
-//! Points inside and outside of closed meshes, many of them where counting hits goes wrong: on vertices and edges, or with rays
-//! that pass exactly through them.
+//! Points inside and outside of closed meshes, many of them where counting hits goes wrong: on
+//! vertices and edges, or with rays that pass exactly through them.
 //!
-//! The winding number along an axis, from the walk for points, is compared with the crossings of a ray in another direction, most
-//! often one that is aimed at a vertex or along an edge, and of samples with exact arithmetic on all triangles.
+//! The winding number along an axis, from the walk for points, is compared with the crossings of a
+//! ray in another direction, most often one that is aimed at a vertex or along an edge, and of
+//! samples with exact arithmetic on all triangles.
 
 use bth::rays::Ray;
 use bth::{Crossings, Isa, Scene};
@@ -49,7 +50,8 @@ impl InsideStatistics {
     }
 }
 
-/// Whether triangles form a surface without boundary: whether every edge has as many of them in one direction as in the other.
+/// Returns true if triangles form a surface without boundary: whether every edge has as many of
+/// them in one direction as in the other.
 pub fn is_closed(corners: &[Corners]) -> bool {
     let mut balance: HashMap<[[u32; 3]; 2], i32> = HashMap::new();
     // Adding 0.0 makes 0.0 of -0.0.
@@ -114,7 +116,8 @@ impl Source<'_> {
                 point = [0, 1, 2].map(|k| if k == axis { point[k] } else { target[k] });
             }
             _ => {
-                // Such that the difference to the target is an f32, and the ray passes exactly through it.
+                // Such that the difference to the target is an f32, and the ray passes exactly
+                // through it.
                 let back = [0, 1, 2].map(|k| target[k] - point[k]);
                 point = [0, 1, 2].map(|k| target[k] - back[k]);
             }
@@ -131,13 +134,15 @@ impl Source<'_> {
     }
 }
 
-/// Whether a ray passes exactly through a corner of a triangle, as far as f64 can tell: at t = 1.
+/// Returns true if a ray passes exactly through a corner of a triangle, as far as f64 can tell: at
+/// t = 1.
 fn is_aimed(ray: &Ray, target: [f32; 3]) -> bool {
     (0..3).all(|k| f64::from(ray.origin[k]) + f64::from(ray.direction[k]) == f64::from(target[k]))
 }
 
-/// Asks for about `count` points of a scene with one object and these triangles, which are closed, with every instruction set of
-/// this machine in turn. One of `one_in` points is compared with every triangle.
+/// Asks for about `count` points of a scene with one object and these triangles, which are closed,
+/// with every instruction set of this machine in turn. One of `one_in` points is compared with
+/// every triangle.
 pub fn run_inside(
     scene: &Scene,
     corners: &[Corners],

@@ -1,7 +1,9 @@
-//! Rays and surfaces for which ray tracers tend to miss hits, with answers that are checked exactly.
+//! Rays and surfaces for which ray tracers tend to miss hits, with answers that are checked
+//! exactly.
 //!
-//! Shapes and rays have integer coordinates times a power of two, so that a ray aimed at a vertex passes exactly through it,
-//! and each answer is checked in integer arithmetic: fast enough for 100 million rays.
+//! Shapes and rays have integer coordinates times a power of two, so that a ray aimed at a vertex
+//! passes exactly through it, and each answer is checked in integer arithmetic: fast enough for 100
+//! million rays.
 
 mod grid;
 mod inside;
@@ -22,8 +24,9 @@ use bth::rays::{Hit, Ray, StartRay};
 /// Rays that are traced together.
 const BATCH: usize = 1024;
 
-/// Traces about `count` rays of every kind through all structures of a shape, with every instruction set of this
-/// machine in turn, and adds what was found. One of `one_in` rays is compared with every triangle.
+/// Traces about `count` rays of every kind through all structures of a shape, with every
+/// instruction set of this machine in turn, and adds what was found. One of `one_in` rays is
+/// compared with every triangle.
 pub fn run(
     shape: &Shape,
     structures: &[Traced],

@@ -177,7 +177,8 @@ fn range_about_one(rng: &mut Rng) -> [f32; 2] {
     ranges[rng.below(ranges.len() as u64) as usize]
 }
 
-/// A point of the grid in a box three times as wide as the shape, often in its middle planes or at its bounds.
+/// A point of the grid in a box three times as wide as the shape, often in its middle planes or at
+/// its bounds.
 fn about(shape: &Shape, rng: &mut Rng) -> Point {
     let [lower, upper] = shape.bounds;
     [0, 1, 2].map(|k| {

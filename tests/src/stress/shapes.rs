@@ -18,7 +18,7 @@ pub struct Shape {
     pub bounds: [Point; 2],
     /// Triangles at each vertex.
     pub around: Vec<Vec<u32>>,
-    /// Whether the whole shape can be tetrahedralized at once, having no bad contacts.
+    /// True if the whole shape can be tetrahedralized at once, having no bad contacts.
     pub whole: bool,
 }
 

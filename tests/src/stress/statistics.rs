@@ -19,7 +19,8 @@ pub struct Statistics {
     pub hits: u64,
     /// Rays compared with every triangle.
     pub compared: u64,
-    /// Neither a triangle that the line is known to meet within the range was found, nor one before it.
+    /// Neither a triangle that the line is known to meet within the range was found, nor one before
+    /// it.
     pub misses: u64,
     /// A ray from inside a closed surface found nothing.
     pub leaks: u64,
@@ -138,7 +139,8 @@ impl Statistics {
             }
         }
         let right = match hit.is_hit() {
-            // t is rounded to half an ulp, so among triangles at the same rounded t any may be the nearest.
+            // t is rounded to half an ulp, so among triangles at the same rounded t any may be the
+            // nearest.
             true => hit.t <= nearest && (hit.primitive.triangle == least || hit.t == nearest),
             false => nearest == f32::INFINITY,
         };
@@ -153,8 +155,8 @@ fn within([tmin, tmax]: [f32; 2], t: f32) -> bool {
     tmin <= t && t <= tmax && t.is_finite()
 }
 
-/// The t at which the line is known to meet a triangle: one at the target vertex or edge whose plane does not contain the
-/// line.
+/// The t at which the line is known to meet a triangle: one at the target vertex or edge whose
+/// plane does not contain the line.
 fn known(shape: &Shape, aimed: &Aimed) -> Option<Quotient> {
     let (vertex, other) = match aimed.through? {
         Target::Vertex(vertex) => (vertex, vertex),

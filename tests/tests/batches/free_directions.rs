@@ -23,7 +23,8 @@ fn with_free_directions(model: &Model, options: CompileOptions, keep: KeepFree) 
     bth::from_bytes(&compiled.bytes).expect("a file that opens")
 }
 
-/// Rays from points of triangles, of their edges and corners, in all directions, some of which end early.
+/// Rays from points of triangles, of their edges and corners, in all directions, some of which end
+/// early.
 fn rays_off_the_surface(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<StartRay> {
     let mut rng = Rng::new(seed);
     let of_ray = |i: usize, rng: &mut Rng| {
@@ -47,15 +48,16 @@ fn rays_off_the_surface(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> V
     (0..count).map(|i| of_ray(i, &mut rng)).collect()
 }
 
-/// Whether a ray points to the side of a triangle from which its corners go around counterclockwise.
+/// Returns true if a ray points to the side of a triangle from which its corners go around
+/// counterclockwise.
 fn is_outward(ray: &StartRay, [a, b, c]: &[[f32; 3]; 3]) -> bool {
     let [p, q] = [b, c].map(|corner| [0, 1, 2].map(|k| corner[k] - a[k]));
     let normal = [0, 1, 2].map(|k| p[(k + 1) % 3] * q[(k + 2) % 3] - p[(k + 2) % 3] * q[(k + 1) % 3]);
     (0..3).map(|k| f64::from(normal[k]) * f64::from(ray.direction[k])).sum::<f64>() > 0.0
 }
 
-/// Of [`rays_off_the_surface`], 100,000 of them, those that leave the outside of a triangle, and some of all: many of them end without being
-/// traced.
+/// Of [`rays_off_the_surface`], 100,000 of them, those that leave the outside of a triangle, and
+/// some of all: many of them end without being traced.
 fn rays_of_which_many_end(corners: &[[[f32; 3]; 3]], seed: u64) -> Vec<StartRay> {
     let leaves = |i: usize, ray: &StartRay| {
         let of = corners.get(ray.start.primitive.triangle as usize);
@@ -65,7 +67,8 @@ fn rays_of_which_many_end(corners: &[[[f32; 3]; 3]], seed: u64) -> Vec<StartRay>
     all.filter(|(i, ray)| i % 36 == 5 || leaves(*i, ray)).map(|(_, ray)| ray).collect()
 }
 
-/// Groups of 64 rays in almost the same direction, each from the outside of a triangle near the one before: such rays go in packets.
+/// Groups of 64 rays in almost the same direction, each from the outside of a triangle near the one
+/// before: such rays go in packets.
 fn parallel_rays(corners: &[[[f32; 3]; 3]], groups: usize, seed: u64) -> Vec<StartRay> {
     const GROUP: usize = 64;
     let mut rng = Rng::new(seed);
@@ -95,7 +98,8 @@ fn check_free_directions(model: &Model, options: CompileOptions) {
     }
 }
 
-/// Rays from starts in batches, with all instruction sets, against rays that are traced one by one, for which the file tells nothing.
+/// Rays from starts in batches, with all instruction sets, against rays that are traced one by one,
+/// for which the file tells nothing.
 fn check_starts(scene: &Scene, corners: &[[[f32; 3]; 3]]) {
     let mut rays = starts_about_hits(scene, corners, 3000, 11);
     rays.extend(rays_off_the_surface(corners, 30_000, 12));
@@ -122,7 +126,8 @@ fn free_directions_change_no_answer() {
     check_free_directions(&gyroid(3000), CompileOptions::default());
 }
 
-/// What is hit lies just behind the distance of a level, so that ranges begin just before it, or just before that distance.
+/// What is hit lies just behind the distance of a level, so that ranges begin just before it, or
+/// just before that distance.
 #[test]
 fn what_lies_just_behind_a_distance_is_hit() {
     let _turn = turn();
@@ -170,8 +175,8 @@ fn free_directions_on_a_grid_and_far_from_the_origin_change_no_answer() {
     check_free_directions(&far, CompileOptions::default());
 }
 
-/// A scene of some instances of an object with free directions, moved, turned, mirrored, scaled and sheared, of which several overlap; and
-/// their transforms.
+/// A scene of some instances of an object with free directions, moved, turned, mirrored, scaled and
+/// sheared, of which several overlap; and their transforms.
 fn instances_of(object: &Scene, count: usize, seed: u64) -> (Scene, Vec<[f32; 12]>) {
     let mut rng = Rng::new(seed);
     let mut number = |size: f32| (2.0 * rng.unit_f64() as f32 - 1.0) * size;

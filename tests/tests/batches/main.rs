@@ -1,4 +1,5 @@
-//! Batches of rays, with origins or from starts, give the bits of the same rays traced one at a time, on every instruction set.
+//! Batches of rays, with origins or from starts, give the bits of the same rays traced one at a
+//! time, on every instruction set.
 
 mod free_directions;
 
@@ -13,7 +14,8 @@ use bth_tests::rays::{alone, assorted, check_batch, onward, starts};
 use bth_tests::structures::bits;
 use std::sync::{Mutex, MutexGuard};
 
-/// The instruction set is a setting of the whole process, so tests that set it run one after the other.
+/// The instruction set is a setting of the whole process, so tests that set it run one after the
+/// other.
 pub(crate) fn turn() -> MutexGuard<'static, ()> {
     static TURN: Mutex<()> = Mutex::new(());
     TURN.lock().unwrap_or_else(|e| e.into_inner())
@@ -48,7 +50,8 @@ fn rays_about_hits(plain: &Scene, corners: &[[[f32; 3]; 3]], count: usize, seed:
     rays
 }
 
-/// Rays from starts of every kind, from hits and of triangles that do not exist, and the same cut right about their hits.
+/// Rays from starts of every kind, from hits and of triangles that do not exist, and the same cut
+/// right about their hits.
 pub(crate) fn starts_about_hits(
     plain: &Scene,
     corners: &[[[f32; 3]; 3]],
@@ -119,7 +122,8 @@ fn batches_at_all_scales_have_the_bits_of_single_rays() {
     }
 }
 
-/// The f32 triangle tests find the hits of the exact test, except for a few rays that pass close to an edge.
+/// The f32 triangle tests find the hits of the exact test, except for a few rays that pass close to
+/// an edge.
 #[test]
 fn rays_through_two_points_of_a_surface_get_the_same_bits_on_every_instruction_set() {
     let _turn = turn();
@@ -243,7 +247,8 @@ fn conditions_of_a_batch_are_those_of_its_rays() {
     assert!(some_hits > rays.len() / 4 && some_hits < rays.len(), "{some_hits}");
 }
 
-/// A hit a little behind the origin is rounded to t = 0 where coordinates are tiny beside directions.
+/// A hit a little behind the origin is rounded to t = 0 where coordinates are tiny beside
+/// directions.
 #[test]
 fn hits_that_are_rounded_to_the_origin_are_found_through_tetrahedra() {
     check(&scaled(torus_knot(360), 1e-40, [0.0; 3]), Structure::Tets, 500, 6);

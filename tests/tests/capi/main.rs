@@ -1,4 +1,5 @@
-//! The C interface, used by C and C++ programs (`tests/c`) that include its headers and link its libraries only.
+//! The C interface, used by C and C++ programs (`tests/c`) that include its headers and link its
+//! libraries only.
 
 mod queries;
 mod scenes;
@@ -19,7 +20,8 @@ pub(crate) fn c_program(folder: &Path, name: &str) -> Option<PathBuf> {
     program(folder, &format!("{name}.c"), &["bth"])
 }
 
-/// Builds the libraries and a program of `tests/c` that uses them. Without a compiler prints why not, and returns `None`.
+/// Builds the libraries and a program of `tests/c` that uses them. Without a compiler prints why
+/// not, and returns `None`.
 #[allow(clippy::print_stdout)]
 pub(crate) fn program(folder: &Path, source: &str, libraries: &[&str]) -> Option<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");

@@ -12,8 +12,8 @@ fn direction(i: usize) -> [f32; 3] {
     [i * 7 % 13 - 6, i * 5 % 11 - 5, i * 3 % 17 - 8].map(|x| x as f32)
 }
 
-/// Traces rays from `starts`, and makes their hits the next starts. Returns the lines that `starts.c`
-/// prints.
+/// Traces rays from `starts`, and makes their hits the next starts. Returns the lines that
+/// `starts.c` prints.
 fn bounce(scene: &Scene, starts: &mut [Start], tmax: impl Fn(usize) -> f32) -> Vec<String> {
     let each = starts.iter_mut().enumerate().map(|(i, start)| {
         let ray = start.ray(direction(i)).with_tmax(tmax(i));

@@ -48,7 +48,8 @@ pub(crate) struct Ended {
 
 /// Runs a program; one that takes longer than `limit` is ended and reported as an error.
 pub(crate) fn run(command: &mut Command, limit: Duration) -> Result<Ended, String> {
-    // Files instead of pipes: the program would block on a full pipe that is not read until it ends.
+    // Files instead of pipes: the program would block on a full pipe that is not read until it
+    // ends.
     let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
     let (out, err) = (folder.path().join("out"), folder.path().join("err"));
     let create = |path: &Path| std::fs::File::create(path).map_err(|e| e.to_string());

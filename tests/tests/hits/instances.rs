@@ -10,7 +10,8 @@ use bth_scenes::knot::torus_knot;
 use bth_tests::oracle;
 use bth_tests::structures::bits;
 
-/// Instances of a knot and of layers: mirrored, sheared, hidden, of extreme scales, and twice at the same place.
+/// Instances of a knot and of layers: mirrored, sheared, hidden, of extreme scales, and twice at
+/// the same place.
 pub(crate) fn instances() -> Scene {
     const NODES: &str = r#"
 version = 1
@@ -63,7 +64,8 @@ fn hits_in_instances_are_those_that_the_nearest_hit_finds_one_after_the_other() 
         check_queries(&scene, &ray, "instances");
         let mut rest = ray;
         let mut hits = all_hits(&scene, &ray, &Accept::default()).into_iter().peekable();
-        // Directions that are scaled in an object's space round the range, too, so only others are ended at hits.
+        // Directions that are scaled in an object's space round the range, too, so only others are
+        // ended at hits.
         let ordinary = i % 11 != 6 && i % 11 != 7;
         while let Some(hit) = hits.peek().copied().filter(|_| ordinary) {
             assert_eq!(scene.nearest(&rest).as_ref().map(bits), Some(bits(&hit)), "{rest:?}");
@@ -76,8 +78,9 @@ fn hits_in_instances_are_those_that_the_nearest_hit_finds_one_after_the_other() 
     assert!(found > 3000, "{found}");
 }
 
-/// With a direction so long that t is denormal, hits at different distances have the same t. Of these the first is that in the first
-/// instance, in whatever order instances are visited, and a range that ends at this t holds all of them.
+/// With a direction so long that t is denormal, hits at different distances have the same t. Of
+/// these the first is that in the first instance, in whatever order instances are visited, and a
+/// range that ends at this t holds all of them.
 #[test]
 fn hits_whose_t_are_rounded_to_the_same_are_ordered_by_instance() {
     const NODES: &str = r#"
@@ -167,8 +170,8 @@ fn masks_hide_instances_from_rays_without_a_common_bit() {
 #[test]
 fn mirrored_instances_keep_their_front() {
     let scene = instances();
-    // Instances 0 and 3 are the same layers, the second one mirrored. Both are met from below, where of two triangles at the same
-    // place the one with the id 3 modulo 4 has its front.
+    // Instances 0 and 3 are the same layers, the second one mirrored. Both are met from below,
+    // where of two triangles at the same place the one with the id 3 modulo 4 has its front.
     let ray = Ray::new([0.5, 0.7, -5.0], [0.0, 0.0, 1.0]);
     for (cull, count) in [(Cull::None, 4), (Cull::Back, 2), (Cull::Front, 2)] {
         let hits = all_hits(&scene, &ray, &Accept { cull, ..Accept::default() });

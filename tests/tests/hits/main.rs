@@ -1,5 +1,5 @@
-//! Queries for several hits and with conditions agree with the exact oracle, with the nearest hit and any hit, and with each other,
-//! in every structure and on every instruction set.
+//! Queries for several hits and with conditions agree with the exact oracle, with the nearest hit
+//! and any hit, and with each other, in every structure and on every instruction set.
 
 mod instances;
 
@@ -33,7 +33,8 @@ fn nearest_hits(scene: &Scene, ray: &Ray, k: usize, accept: &Accept) -> Vec<Hit>
     hits
 }
 
-/// A filter that accepts everything, with which the nearest hit and any hit are searched among all candidates.
+/// A filter that accepts everything, with which the nearest hit and any hit are searched among all
+/// candidates.
 fn everything(_: &Ray, _: &Hit) -> bool {
     true
 }
@@ -44,7 +45,8 @@ fn some(_: &Ray, hit: &Hit) -> bool {
     (triangle.wrapping_mul(0x9e37_79b9) ^ instance.wrapping_mul(0x85eb_ca6b)) >> 7 & 3 == 0
 }
 
-/// The hits of the whole line: exactly the triangles that the oracle finds, each with its t, u and v, and its side.
+/// The hits of the whole line: exactly the triangles that the oracle finds, each with its t, u and
+/// v, and its side.
 fn check_against_oracle(scene: &Scene, triangles: &[Triangle], ray: &Ray) -> usize {
     let ray = Ray { tmin: WHOLE_LINE.0, tmax: WHOLE_LINE.1, ..*ray };
     let mut hits = all_hits(scene, &ray, &Accept::default());
@@ -138,7 +140,8 @@ fn check_filter_calls(scene: &Scene, ray: &Ray, expected: &[Hit], filter: fn(&Ra
     }
 }
 
-/// Rays of every kind, ended at one of their hits, before it or behind it, from the other side as well.
+/// Rays of every kind, ended at one of their hits, before it or behind it, from the other side as
+/// well.
 pub(crate) fn rays(scene: &Scene, corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<Ray> {
     let mut rng = Rng::new(seed);
     let mut rays = assorted(corners, count, seed);
@@ -214,8 +217,8 @@ fn scales_of_1e30_and_1e_minus_30() {
     }
 }
 
-/// Layers of squares with integer coordinates, each triangle twice, the second time with another first vertex or the other way
-/// round.
+/// Layers of squares with integer coordinates, each triangle twice, the second time with another
+/// first vertex or the other way round.
 pub(crate) fn layers(n: i32) -> Model {
     let mut model = Model::default();
     for (z, x, y) in (0..n * n * n).map(|i| (i / n / n, i / n % n, i % n)) {
@@ -238,7 +241,8 @@ fn a_ray_through_a_vertex_of_layers_hits_every_triangle_around_it_on_each_layer_
     let scene = compiled(&layers(3), &options(Structure::Bvh, RecordKind::Link32, false));
     let ray = Ray::new([1.0, 1.0, -5.0], [0.0, 0.0, 2.0]);
     let hits = all_hits(&scene, &ray, &Accept::default());
-    // Around an inner vertex lie four squares: of two of them both triangles, of the others one, and all of them twice.
+    // Around an inner vertex lie four squares: of two of them both triangles, of the others one,
+    // and all of them twice.
     assert_eq!(hits.len(), 3 * 2 * 6, "{hits:?}");
     for (i, hit) in hits.iter().enumerate() {
         assert_eq!(hit.t, [2.5, 3.0, 3.5][i / 12]);

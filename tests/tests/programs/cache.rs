@@ -56,7 +56,8 @@ fn an_unchanged_model_is_neither_compiled_nor_written_again() {
     assert_eq!(second["report"]["file"], first["report"]["file"]);
     assert_eq!(modified(&output), written);
 
-    // A model that is newer but has the same bytes: the output gets a newer time, as build systems expect.
+    // A model that is newer but has the same bytes: the output gets a newer time, as build systems
+    // expect.
     let model = folder.path().join("a.obj");
     std::fs::write(&model, sphere(16)).unwrap();
     assert_eq!(compile(folder.path(), &["a.obj"])["written"], false);
@@ -399,7 +400,8 @@ fn warnings_are_those_of_the_first_compilation() {
     }
 }
 
-/// Warnings about the files of a scene name them, and none is lost or about another file, whatever comes from the cache.
+/// Warnings about the files of a scene name them, and none is lost or about another file, whatever
+/// comes from the cache.
 #[test]
 fn warnings_of_scenes_name_the_files() {
     let model = "v 9 9 nan\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\np 2\n";

@@ -201,7 +201,8 @@ fn where_no_thread_can_be_started_there_is_an_error() {
     }
 }
 
-/// A pipe without a writer would keep a program waiting, where Ctrl-C is heeded by nobody; and `/dev/zero` has no end.
+/// A pipe without a writer would keep a program waiting, where Ctrl-C is heeded by nobody; and
+/// `/dev/zero` has no end.
 #[cfg(unix)]
 #[test]
 fn pipes_and_devices_are_refused_where_files_are_read_whole() {

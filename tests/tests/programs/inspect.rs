@@ -66,7 +66,8 @@ fn verify_deep_finds_what_a_file_knows_wrongly() {
     std::fs::write(&path, editor.seal(Seal::Sections)).unwrap();
     bthc(folder.path(), &["verify", "knot.bth"]).expect(0);
     let run = bthc(folder.path(), &["verify", "--deep", "--rays", "2000", "knot.bth"]).expect(1);
-    // All ways of tracing use what the file knows, so answers are wrong in the same way (V001), and do not differ (V002).
+    // All ways of tracing use what the file knows, so answers are wrong in the same way (V001), and
+    // do not differ (V002).
     assert!(run.stderr.contains("BTH-V001") && run.stderr.contains("BTH-F209"), "{run:?}");
     assert!(!run.stderr.contains("BTH-V002"), "{run:?}");
     assert!(run.stdout.is_empty(), "{run:?}");
@@ -76,7 +77,8 @@ fn verify_deep_finds_what_a_file_knows_wrongly() {
     assert!(wrong["deep"]["wrong"].as_u64().is_some_and(|wrong| wrong > 100), "{wrong:#}");
 }
 
-/// Rays must be sampled from the triangles that are traced: those of the poses, which here are far apart.
+/// Rays must be sampled from the triangles that are traced: those of the poses, which here are far
+/// apart.
 #[test]
 fn verify_deep_traces_objects_that_deform_in_their_poses() {
     let (positions, faces) = sphere_mesh(8);

@@ -89,7 +89,8 @@ fn send(signal: &str, child: &std::process::Child) {
     assert!(sent.success());
 }
 
-/// `timeout` sends two signals, since it sends one to the group, too. A second one ends the program at once.
+/// `timeout` sends two signals, since it sends one to the group, too. A second one ends the program
+/// at once.
 #[cfg(unix)]
 #[test]
 fn two_signals_leave_an_error_and_no_copy_of_the_input() {

@@ -4,7 +4,8 @@ use crate::support::{bthc, folder, run};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// What the player adds to every picture here: 40 by 40 pixels that show x and y from 0 to 2, from the front.
+/// What the player adds to every picture here: 40 by 40 pixels that show x and y from 0 to 2, from
+/// the front.
 pub(crate) const VIEW: [&str; 8] =
     ["--size", "40x40", "--spp", "4", "--camera", "1,1,5,1,1,0", "--fov", "22.61986494804043"];
 
@@ -32,8 +33,8 @@ pub(crate) fn png(width: u32, rgba: &[[u8; 4]]) -> Vec<u8> {
     bytes
 }
 
-/// A square from (0, 0, 0) to (2, 2, 0) of two triangles that faces +z, of a material whose textures are those of `images`. Its vertices
-/// have the colours, linear, if there are some.
+/// A square from (0, 0, 0) to (2, 2, 0) of two triangles that faces +z, of a material whose
+/// textures are those of `images`. Its vertices have the colours, linear, if there are some.
 pub(crate) fn square(material: &Value, images: &[Value], colors: Option<[[f32; 4]; 4]>) -> String {
     let mut floats: Vec<f32> = vec![0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 2.0, 2.0, 0.0, 0.0, 2.0, 0.0];
     floats.extend([0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]);

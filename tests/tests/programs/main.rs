@@ -1,4 +1,5 @@
-//! The programs `bthc`, `bth-play` and `bth-scenes`, from the command line to the files that they write.
+//! The programs `bthc`, `bth-play` and `bth-scenes`, from the command line to the files that they
+//! write.
 // Tests print what they skip.
 #![allow(clippy::print_stdout)]
 

@@ -1,4 +1,5 @@
-//! Materials from the source to pixels: colours of small made glTF and OBJ models in pictures of `bth-play`, and errors.
+//! Materials from the source to pixels: colours of small made glTF and OBJ models in pictures of
+//! `bth-play`, and errors.
 
 use crate::made_models::{VIEW, at, nothing, picture, png, shown, square, unlit, uri};
 use crate::support::{Run, bthc, command, folder, run, run_with};
@@ -15,8 +16,9 @@ fn four_texels_are_where_the_texture_has_them_with_their_bytes() {
     }
 }
 
-/// The base colour by the second set of texture coordinates, which runs from right to left, and the emission by the first one; and the
-/// other way round. A mirrored node shows the same surface from behind.
+/// The base colour by the second set of texture coordinates, which runs from right to left, and the
+/// emission by the first one; and the other way round. A mirrored node shows the same surface from
+/// behind.
 #[test]
 fn textures_of_two_sets_lie_where_each_set_has_them() {
     let red_left = uri(&png(2, &[[255, 0, 0, 255], [0, 0, 0, 255]]));
@@ -112,7 +114,8 @@ fn backs_are_seen_only_of_double_sided_materials() {
     assert_eq!(at(&picture(&square(&material(false), &[], None), &[]), 1.0, 1.0), [255, 0, 0]);
 }
 
-/// A black surface shows its emission alone: 0.2 of the light is the byte 124, and in mode path Reinhard's curve comes first.
+/// A black surface shows its emission alone: 0.2 of the light is the byte 124, and in mode path
+/// Reinhard's curve comes first.
 #[test]
 fn emission_is_added_to_reflected_light() {
     let texels = [json!({"uri": uri(&png(1, &[[255, 188, 255, 255]]))})];
@@ -171,7 +174,8 @@ fn surroundings_light_the_scene_in_their_color() {
     let seen = shown(folder.path(), &["--mode", "path", "--env", "blue.hdr", "--spp", "16"]);
     let [r, g, b] = at(&seen, 1.0, 1.0);
     assert!(b > g && g > r && b > 100, "{r} {g} {b}");
-    // In uniform surroundings of radiance L a diffuse plane shows its albedo times L: 0.6 in the mean.
+    // In uniform surroundings of radiance L a diffuse plane shows its albedo times L: 0.6 in the
+    // mean.
     std::fs::write(folder.path().join("grey.hdr"), hdr(4, 2, [128, 128, 128, 129])).unwrap();
     let [r, ..] =
         at(&shown(folder.path(), &["--mode", "path", "--env", "grey.hdr", "--spp", "256"]), 1.0, 1.0);
@@ -252,7 +256,8 @@ fn what_cannot_be_read_is_an_error_with_place_and_hint() {
     );
 }
 
-/// What was compiled without an image is not taken from the cache where the image is wanted, neither for a model nor for a scene.
+/// What was compiled without an image is not taken from the cache where the image is wanted,
+/// neither for a model nor for a scene.
 #[test]
 fn what_lacks_an_image_is_in_the_cache_for_lenient_compilations_alone() {
     let folder = folder(&[]);
@@ -278,8 +283,8 @@ fn what_lacks_an_image_is_in_the_cache_for_lenient_compilations_alone() {
     }
 }
 
-/// The player compiles models with materials. Images that cannot be read it does without, and where materials are malformed it says so
-/// and shows the rest.
+/// The player compiles models with materials. Images that cannot be read it does without, and where
+/// materials are malformed it says so and shows the rest.
 #[test]
 fn models_are_shown_in_their_colors() {
     let folder = folder(&[]);
@@ -318,7 +323,8 @@ fn models_are_shown_in_their_colors() {
     assert_eq!(picture, clay);
 }
 
-/// Files without the option are what they were; with it only sections are added, and a scene stores each image once.
+/// Files without the option are what they were; with it only sections are added, and a scene stores
+/// each image once.
 #[test]
 fn materials_are_sections_of_their_own_and_images_are_stored_once() {
     let folder = folder(&[]);

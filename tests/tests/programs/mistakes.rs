@@ -1,5 +1,6 @@
-//! Mistakes that users make: every program answers with an error that can be acted on and the documented exit code, and
-//! never with a panic or a backtrace, even where the environment enables backtraces.
+//! Mistakes that users make: every program answers with an error that can be acted on and the
+//! documented exit code, and never with a panic or a backtrace, even where the environment enables
+//! backtraces.
 
 use crate::support::{Run, bthc, command, folder, run, run_with, sphere};
 use std::path::Path;

@@ -1,12 +1,13 @@
-//! The unchanged parts of a scene are taken from the file of the last compilation if that is complete, and the result is the
-//! same as without.
+//! The unchanged parts of a scene are taken from the file of the last compilation if that is
+//! complete, and the result is the same as without.
 
 use crate::cache::{compile, found, scene};
 use crate::support::sphere;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// Compiles the scene over the existing output, compares with a compilation without a cache, and returns the file.
+/// Compiles the scene over the existing output, compares with a compilation without a cache, and
+/// returns the file.
 #[track_caller]
 fn same_as_new(path: &Path, options: &[&str]) -> Vec<u8> {
     compile(path, &[&["s.manifest"], options].concat());
@@ -110,7 +111,8 @@ fn a_large_file_that_was_there_is_taken_unread_only_if_nobody_touched_it() {
     for round in 0..3 {
         std::fs::write(path.join("1.obj"), sphere(30 + round)).unwrap();
         if round > 0 {
-            // A change in the middle of the large object that keeps the times of the file; then a change of the times only.
+            // A change in the middle of the large object that keeps the times of the file; then a
+            // change of the times only.
             let modified = std::fs::metadata(&output).unwrap().modified().unwrap();
             let mut file = std::fs::File::options().read(true).write(true).open(&output).unwrap();
             if round == 1 {

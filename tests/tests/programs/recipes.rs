@@ -1,5 +1,6 @@
-//! The recipes of `docs/pipelines.md`: each build tool runs the compiler when, and only when, something changed. A recipe is
-//! skipped where its tool is missing; `tools/test` prints which tools these are.
+//! The recipes of `docs/pipelines.md`: each build tool runs the compiler when, and only when,
+//! something changed. A recipe is skipped where its tool is missing; `tools/test` prints which
+//! tools these are.
 
 use crate::support::{folder, sphere, sphere_mesh};
 use std::path::{Path, PathBuf};
@@ -36,7 +37,8 @@ fn ply(size: usize) -> String {
     text
 }
 
-/// A project with the files that the recipes name, and a compiler that notes how often it is called.
+/// A project with the files that the recipes name, and a compiler that notes how often it is
+/// called.
 struct Project {
     folder: tempfile::TempDir,
     path: std::ffi::OsString,
@@ -90,7 +92,8 @@ impl Project {
         calls
     }
 
-    /// Runs a build after every kind of change. `outputs` are that of the model and, if the recipe has one, of the scene.
+    /// Runs a build after every kind of change. `outputs` are that of the model and, if the recipe
+    /// has one, of the scene.
     fn follows_changes(&self, outputs: &[&str], build: &dyn Fn()) {
         let step = || std::thread::sleep(Duration::from_millis(30));
         build();

@@ -226,7 +226,8 @@ fn manifests_are_played_through_the_cache() {
     let alone = tempfile::tempdir().unwrap();
     let program = alone.path().join("bth-play");
     let built = bth_tests::target_folder().join("bth-play");
-    // A file that is being written cannot be started, and other tests start programs that inherit open files.
+    // A file that is being written cannot be started, and other tests start programs that inherit
+    // open files.
     std::fs::hard_link(&built, &program).or_else(|_| std::fs::copy(&built, &program).map(|_| ())).unwrap();
     let mut command = std::process::Command::new(&program);
     let output =

@@ -4,7 +4,8 @@ use crate::scenes::{compiled, run};
 use crate::support::{folder, sphere};
 use std::path::Path;
 
-/// A ball that moves over the picture, turns and is scaled, with a moving camera, from 0 to 2 seconds.
+/// A ball that moves over the picture, turns and is scaled, with a moving camera, from 0 to 2
+/// seconds.
 fn moving(rate: u32) -> String {
     format!(
         r#"version = 1
@@ -78,7 +79,8 @@ fn blurred_pictures_are_the_mean_of_pictures_of_single_times() {
         picture("fine.bth", "65..191", "fine/####.png", &["--spp", "8", "--force"]);
         let (blurred, sharp) = (pixels(&at.join("blurred.png")), pixels(&at.join("sharp.png")));
         let mut mean = vec![0.0; blurred.len()];
-        // A shutter of one frame around the time of 1 second: the middles of 64 parts of the time from 0.5 to 1.5 seconds.
+        // A shutter of one frame around the time of 1 second: the middles of 64 parts of the time
+        // from 0.5 to 1.5 seconds.
         for frame in (65..192).step_by(2) {
             let still = pixels(&at.join(format!("fine/{frame:04}.png")));
             mean.iter_mut().zip(still).for_each(|(sum, byte)| *sum += value(byte) / 64.0);

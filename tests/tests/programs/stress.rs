@@ -1,4 +1,5 @@
-//! Many processes and one store, with random kills: no damaged entry is used, no partial file stays, and the store verifies.
+//! Many processes and one store, with random kills: no damaged entry is used, no partial file
+//! stays, and the store verifies.
 
 use crate::cache::{cached, scene};
 use crate::support::{command, run_with};
@@ -55,8 +56,9 @@ impl Corpus {
         Corpus { folder, inputs, expected }
     }
 
-    /// Compiles inputs of a seeded sequence one after another until `end`, kills the compiler in about half of the runs, and
-    /// checks every output. Returns the numbers of runs that were killed and that ended.
+    /// Compiles inputs of a seeded sequence one after another until `end`, kills the compiler in
+    /// about half of the runs, and checks every output. Returns the numbers of runs that were
+    /// killed and that ended.
     fn compile_until(&self, end: Instant, number: u64) -> (u32, u32) {
         let path = self.folder.path();
         let output = format!("out-{number}.bth");

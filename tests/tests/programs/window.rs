@@ -15,7 +15,8 @@ struct Display {
 }
 
 impl Display {
-    /// Starts a display that keeps its screen in a file of the folder; `None`, and a printed reason, where that is impossible.
+    /// Starts a display that keeps its screen in a file of the folder; `None`, and a printed
+    /// reason, where that is impossible.
     fn start(folder: &Path) -> Option<Display> {
         let there = |program: &str, arg: &str| {
             let found = Command::new(program).arg(arg).stdout(Stdio::null()).stderr(Stdio::null()).status();
@@ -75,7 +76,8 @@ fn until<T>(what: &str, mut ask: impl FnMut() -> Option<T>) -> T {
     }
 }
 
-/// A pixel of the screen that Xvfb keeps in a folder (XWD: a header of big-endian words, colours, rows of words).
+/// A pixel of the screen that Xvfb keeps in a folder (XWD: a header of big-endian words, colours,
+/// rows of words).
 fn screen(folder: &Path) -> impl Fn(usize, usize) -> [u8; 3] {
     let bytes = std::fs::read(folder.join("Xvfb_screen0")).unwrap();
     let word = |i: usize| u32::from_be_bytes(bytes[4 * i..4 * i + 4].try_into().unwrap()) as usize;

@@ -1,5 +1,5 @@
-//! Scenes that a builder makes at run time have the bits of the same scenes compiled from a manifest, on every instruction set and
-//! with any number of threads.
+//! Scenes that a builder makes at run time have the bits of the same scenes compiled from a
+//! manifest, on every instruction set and with any number of threads.
 
 use crate::support::{compiled, manifest, models, options, varied};
 use bth::rays::{Hit, Ray};
@@ -38,7 +38,8 @@ pub(crate) fn rays(scene: &Scene, rng: &mut Rng, count: usize) -> Vec<Ray> {
             let (lower, upper) = boxes[rng.below(boxes.len() as u64) as usize];
             let target = [0, 1, 2].map(|k| lower[k] + rng.unit_f32() * (upper[k] - lower[k]));
             let mut distance = if i % 3 == 0 { 0.5 } else { 30.0 };
-            // From afar all points of a tiny box are one in f32, and all triangles need exact arithmetic: one ray in ten starts there.
+            // From afar all points of a tiny box are one in f32, and all triangles need exact
+            // arithmetic: one ray in ten starts there.
             let size = (0..3).fold(0.0f32, |size, k| size.max(upper[k] - lower[k]));
             if size < 1e-6 && i % 10 > 0 {
                 distance *= size;
@@ -49,8 +50,8 @@ pub(crate) fn rays(scene: &Scene, rng: &mut Rng, count: usize) -> Vec<Ray> {
         .collect()
 }
 
-/// Compares all queries of two scenes, of which the second has the object indices of the first plus `objects`, and the same instance
-/// ids. Returns how many rays hit.
+/// Compares all queries of two scenes, of which the second has the object indices of the first plus
+/// `objects`, and the same instance ids. Returns how many rays hit.
 pub(crate) fn compare(a: &Scene, b: &Scene, objects: u32, rng: &mut Rng) -> usize {
     let rays = rays(a, rng, 1500);
     let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);

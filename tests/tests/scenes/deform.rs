@@ -1,5 +1,5 @@
-//! Objects with new positions have the answers of the same objects compiled with these positions, on every instruction set and with
-//! any number of threads.
+//! Objects with new positions have the answers of the same objects compiled with these positions,
+//! on every instruction set and with any number of threads.
 
 use crate::built::{IDENTITY, compare, transform};
 use crate::support::options;
@@ -24,7 +24,8 @@ fn bytes(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &CompileOption
     compiled.bytes
 }
 
-/// A closed mesh, and beside it triangles of zero area, a doubled vertex and a vertex that no triangle uses.
+/// A closed mesh, and beside it triangles of zero area, a doubled vertex and a vertex that no
+/// triangle uses.
 fn mesh(triangles: u32) -> (Positions, Vec<[u32; 3]>) {
     let knot = bth_scenes::knot::torus_knot(triangles);
     let (mut positions, mut rows) = (knot.positions, knot.triangles);
@@ -125,10 +126,11 @@ fn a_refit_has_the_same_bits_on_every_instruction_set_and_with_any_number_of_thr
     }
 }
 
-/// Positions between two times, by integers: the multiple of 2⁻¹⁴⁹ that is nearest to the exact value, which needs no more than a
-/// share of few bits.
+/// Positions between two times, by integers: the multiple of 2⁻¹⁴⁹ that is nearest to the exact
+/// value, which needs no more than a share of few bits.
 fn between(a: f32, b: f32, eighths: i64) -> f32 {
-    // Coordinates of the mesh are multiples of 2⁻²⁰ below 2⁷, so that all of this is exact in integers.
+    // Coordinates of the mesh are multiples of 2⁻²⁰ below 2⁷, so that all of this is exact in
+    // integers.
     let [a, b] = [a, b].map(|x| (f64::from(x) * f64::from(1 << 20)) as i64);
     let sum = (8 - eighths) * a + eighths * b;
     // Sums below 2³¹ are exact in f64; the only rounding is that to f32.
@@ -173,7 +175,8 @@ fn positions_between_two_times_are_those_of_the_formula_and_traced_as_exactly() 
     assert!(hits > 3000, "{hits}");
 }
 
-/// Ends of any magnitude: positions never leave what lies between them, are the ends at shares of 0 and 1, and stay where both are equal.
+/// Ends of any magnitude: positions never leave what lies between them, are the ends at shares of 0
+/// and 1, and stay where both are equal.
 #[test]
 fn positions_between_two_times_never_leave_what_lies_between() {
     let (rest, triangles) = mesh(600);
@@ -261,7 +264,8 @@ fn what_cannot_be_set_is_an_error_and_changes_nothing() {
     assert!(scene.closest([0.0; 3], f32::INFINITY).is_none() && !scene.overlaps_sphere([1.0; 3], 1.0));
 }
 
-/// The scene of a builder with a file's object as it is in a manifest scene of one instance for each transform.
+/// The scene of a builder with a file's object as it is in a manifest scene of one instance for
+/// each transform.
 fn placed(scene: &Scene, transforms: &[[f32; 12]]) -> SceneBuilder {
     let mut builder = SceneBuilder::new();
     let object = builder.add(scene);
@@ -290,7 +294,8 @@ fn instances_follow_objects_that_deform_and_a_failed_commit_changes_nothing() {
         hits += compare(placed(&fresh, &transforms).scene(), builder.scene(), 0, rng);
     }
     assert!(hits > 1500, "{hits}");
-    // Positions that no instance can be placed with: everything stays, and the staged positions too.
+    // Positions that no instance can be placed with: everything stays, and the staged positions
+    // too.
     let before = builder.scene().object(0).lines.to_vec();
     let bounds = builder.scene().bounds();
     let huge: Positions = rest.iter().map(|_| [3e38, 0.0, 0.0]).collect();

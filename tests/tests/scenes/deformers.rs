@@ -1,5 +1,5 @@
-//! Skins and morph targets of glTF files, rule by rule (glTF 2.0 specification, §3.7.2.2 and §3.7.3), from small files whose
-//! vertices are computed by hand.
+//! Skins and morph targets of glTF files, rule by rule (glTF 2.0 specification, §3.7.2.2 and
+//! §3.7.3), from small files whose vertices are computed by hand.
 
 use crate::made_gltf::{Document, SQUARE, assert_near, one_skin, world};
 use crate::morphs::morphed;

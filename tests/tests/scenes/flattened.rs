@@ -37,7 +37,8 @@ fn rays(flat: &bth::Scene, count: usize, seed: u64) -> Vec<Ray> {
     let size = extent.into_iter().fold(0.0, f32::max);
     (0..count)
         .map(|i| {
-            // At the middle of a triangle, from somewhere about; every other ray starts near the surface.
+            // At the middle of a triangle, from somewhere about; every other ray starts near the
+            // surface.
             let corners = object.triangles[rng.below(object.triangles.len() as u64) as usize]
                 .map(|v| object.positions[v as usize]);
             let target = [0, 1, 2].map(|k| (corners[0][k] + corners[1][k] + corners[2][k]) / 3.0);
@@ -81,8 +82,9 @@ fn compare(name: &str, scene: &mut bth::Scene, frames: &[i32]) -> usize {
                 other_name += usize::from(!same);
                 continue;
             }
-            // Other answers are right only where the ray passes an edge or a surface within rounding: then
-            // rays shifted by that much give this answer too, or at grazing angles nearer and farther ones.
+            // Other answers are right only where the ray passes an edge or a surface within
+            // rounding: then rays shifted by that much give this answer too, or at grazing angles
+            // nearer and farther ones.
             graze += 1;
             let others: Vec<Hit> = shifted(&flat, ray).collect();
             let instance = |c: &Hit| first[first.partition_point(|(t, _)| *t <= c.primitive.triangle) - 1].1;
@@ -112,7 +114,8 @@ fn size(flat: &bth::Scene, ray: &Ray) -> f32 {
     ends.fold(0.0f32, |m, x| m.max(x.abs()))
 }
 
-/// Answers for rays whose origin and target are shifted by a few rounding errors of the coordinates.
+/// Answers for rays whose origin and target are shifted by a few rounding errors of the
+/// coordinates.
 fn shifted<'a>(flat: &'a bth::Scene, ray: &'a Ray) -> impl Iterator<Item = Hit> + 'a {
     let mut rng = Rng::new(77);
     let size = size(flat, ray);

@@ -8,7 +8,8 @@ use bth_scene::{Interpolation, Lens, LightKind, Manifest, Property, Source, Tran
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Numbers of the binary chunk: a triangle, three times, three vectors, three quaternions, nine vectors.
+/// Numbers of the binary chunk: a triangle, three times, three vectors, three quaternions, nine
+/// vectors.
 fn binary() -> Vec<f32> {
     let mut numbers = vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     numbers.extend([0.0, 0.5, 2.0]);

@@ -17,7 +17,8 @@ pub(crate) struct Document {
 pub(crate) const SQUARE: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
 
 impl Document {
-    /// A mesh of the square at node 0, whose transform must not count for a skin, and two joints below a moved node.
+    /// A mesh of the square at node 0, whose transform must not count for a skin, and two joints
+    /// below a moved node.
     pub(crate) fn new() -> Document {
         let mut document = Document { json: json!({}), bytes: Vec::new() };
         document.json = json!({
@@ -140,7 +141,8 @@ impl Document {
         self.scene_with(&ImportOptions::default())
     }
 
-    /// Positions in world space of the vertices of the first instance at a time, in the order of the square.
+    /// Positions in world space of the vertices of the first instance at a time, in the order of
+    /// the square.
     pub(crate) fn world(&self, seconds: f64) -> Vec<[f64; 3]> {
         let mut scene = self.scene();
         scene.set_seconds(seconds).unwrap();
@@ -167,7 +169,8 @@ pub(crate) fn push(array: &mut Value, value: Value) -> usize {
     array.len() - 1
 }
 
-/// Positions in world space of the vertices of an instance, as its triangles use them: those of the square in its order.
+/// Positions in world space of the vertices of an instance, as its triangles use them: those of the
+/// square in its order.
 pub(crate) fn world(scene: &bth::Scene, instance: u32) -> Vec<[f64; 3]> {
     let view = scene.instance(instance);
     let (positions, triangles) = (scene.positions(view.object), scene.object(view.object).triangles);

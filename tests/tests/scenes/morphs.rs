@@ -47,7 +47,8 @@ fn morph_targets_of_weights_that_are_animated_in_every_way() {
     let cubic: [[f32; 2]; 6] = [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [3.0, 0.0], [1.0, 0.0], [0.0, 0.0]];
     let cubic: Vec<[f32; 1]> = cubic.as_flattened().iter().map(|x| [*x]).collect();
     let document = morphed().animate((0, "weights", "CUBICSPLINE"), &[0.0, 2.0], &cubic);
-    // At the middle, by halves of the values and an eighth of the duration times the difference of the tangents.
+    // At the middle, by halves of the values and an eighth of the duration times the difference of
+    // the tangents.
     assert_near(&document.world(1.0), &at(0.5 + 2.0 / 8.0 * (1.0 - 3.0), 0.5));
     assert_near(&document.world(2.0), &at(1.0, 0.0));
 }

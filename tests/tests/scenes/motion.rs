@@ -45,7 +45,8 @@ fn a_frame_does_not_depend_on_those_before() {
     assert!(different > 8);
 }
 
-/// Cameras are framed by these bounds: otherwise parts of a sequence that are rendered separately would not match.
+/// Cameras are framed by these bounds: otherwise parts of a sequence that are rendered separately
+/// would not match.
 #[test]
 fn bounds_of_instances_depend_on_neither_rays_nor_mapping() {
     let (folder, options) = (models(), crate::support::options());
@@ -81,7 +82,8 @@ fn only_what_moved_is_placed_anew() {
     let folder = models();
     let (mut scene, report) = compiled(&varied(), folder.path());
     assert_eq!((report.instances, scene.instance_count()), (37, 37));
-    // At 1.2 s the turntable with its 32 instances and the shrinking instance move; the floor and three others do not.
+    // At 1.2 s the turntable with its 32 instances and the shrinking instance move; the floor and
+    // three others do not.
     scene.set_frame(11).unwrap();
     let update = scene.set_frame(12).unwrap();
     assert_eq!((update.nodes, update.placed), (34, 33), "{update:?}");

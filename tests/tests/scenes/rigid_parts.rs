@@ -1,4 +1,5 @@
-//! Parts of skinned meshes that joints move rigidly, as instances: they answer as the undivided mesh does.
+//! Parts of skinned meshes that joints move rigidly, as instances: they answer as the undivided
+//! mesh does.
 
 use crate::made_gltf::{Document, push};
 use crate::support::options;
@@ -22,8 +23,8 @@ struct Ball {
     joints: [u8; 2],
 }
 
-/// Balls of joints 1 and 2; one of joints 1 and 2, which bends; one of joint 3, which is hidden; and one half of a ball, too small to be
-/// worth an instance.
+/// Balls of joints 1 and 2; one of joints 1 and 2, which bends; one of joint 3, which is hidden;
+/// and one half of a ball, too small to be worth an instance.
 const BALLS: [Ball; 4] = [
     Ball { center: [0.0, 0.0, 0.0], joints: [1, 1] },
     Ball { center: [4.0, 0.0, 0.0], joints: [2, 2] },
@@ -66,8 +67,9 @@ struct Soup {
     joints: Vec<u8>,
 }
 
-/// A mesh of two primitives of a material each. The first has the upper halves of all balls, the second the lower ones, so that only
-/// equal positions connect them. Joints turn about a moved node; joint 3 does so below a hidden node.
+/// A mesh of two primitives of a material each. The first has the upper halves of all balls, the
+/// second the lower ones, so that only equal positions connect them. Joints turn about a moved
+/// node; joint 3 does so below a hidden node.
 fn document() -> Document {
     let mut document = Document::new();
     let mut primitives = Vec::new();
@@ -127,7 +129,8 @@ fn scene(document: &Document, rigid_parts: bool) -> bth::Scene {
     bth::from_bytes(&compiled.bytes).unwrap()
 }
 
-/// For each triangle of the undivided mesh where it is in the divided scene, by the ranks that the specification gives triangles.
+/// For each triangle of the undivided mesh where it is in the divided scene, by the ranks that the
+/// specification gives triangles.
 fn places(parts: &bth::Scene) -> Vec<PrimitiveRef> {
     let node = |name: &str| {
         (0..parts.instance_count())
@@ -212,7 +215,8 @@ fn divided_and_undivided_meshes_answer_alike() {
                     let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
                     v.map(|x| x / length)
                 };
-                // Where a joint scales the axes differently, it makes a difference whether corners or points between them are turned.
+                // Where a joint scales the axes differently, it makes a difference whether corners
+                // or points between them are turned.
                 let bound = if b.object == 2 { 0.1 } else { 1e-4 };
                 assert!(near(unit(a.normal), unit(b.normal), bound), "{a:?} {b:?}");
                 assert!(near(unit(a.geometric_normal), unit(b.geometric_normal), 1e-4), "{a:?} {b:?}");
@@ -273,7 +277,8 @@ fn a_mesh_of_rigid_parts_alone_never_deforms() {
     let soft = |document: Document| {
         document.edit(|d| d["meshes"][0]["primitives"] = json!([d["meshes"][0]["primitives"][0]]))
     };
-    // The upper halves have one joint each, so nothing is left that deforms, however small they are.
+    // The upper halves have one joint each, so nothing is left that deforms, however small they
+    // are.
     let document = soft(all_rigid);
     let (manifest, report) = parted(&document);
     assert_eq!((report.deformers, report.rigid_parts, manifest.objects.len()), (0, 3, 3));

@@ -1,4 +1,5 @@
-//! Objects whose vertices move by themselves have the answers of the same objects compiled at each time.
+//! Objects whose vertices move by themselves have the answers of the same objects compiled at each
+//! time.
 
 use crate::built::compare;
 use crate::support::{manifest, options};
@@ -27,7 +28,8 @@ pub(crate) fn frames(count: usize, turns: f32) -> (Vec<Positions>, Vec<[u32; 3]>
     ((0..count).map(frame).collect(), knot.triangles)
 }
 
-/// Small squares on a grid of `side` times `side` places, which exchange their places between the second and the third of four frames.
+/// Small squares on a grid of `side` times `side` places, which exchange their places between the
+/// second and the third of four frames.
 pub(crate) fn exchanging(side: usize) -> (Vec<Positions>, Vec<[u32; 3]>) {
     let count = side * side;
     let place = |number: usize| [(number % side) as f32, 0.0, (number / side) as f32];
@@ -249,7 +251,8 @@ fn subscenes_move_vertices_and_change_trees_as_their_file_does() {
     assert!(compare(&alone, builder.scene(), 0, rng) > 100);
 }
 
-/// A folder with a glTF file whose one morph target makes squares exchange their places between 1.4 and 1.6 s.
+/// A folder with a glTF file whose one morph target makes squares exchange their places between 1.4
+/// and 1.6 s.
 fn morphing(side: usize) -> tempfile::TempDir {
     let (frames, triangles) = exchanging(side);
     let (base, other) = (&frames[0], &frames[2]);

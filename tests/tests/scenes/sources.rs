@@ -1,4 +1,5 @@
-//! Objects of a scene: only used ones are stored, each geometry once, from models and from compiled files.
+//! Objects of a scene: only used ones are stored, each geometry once, from models and from compiled
+//! files.
 
 use crate::support::{compiled, manifest, models, options};
 use bth_compile::pipeline::compile;

@@ -59,7 +59,8 @@ pub(crate) fn manifest(text: &str) -> Manifest {
         .unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Mirrored, sheared, stretched, turning, hidden and overlapping instances, some deep in a hierarchy.
+/// Mirrored, sheared, stretched, turning, hidden and overlapping instances, some deep in a
+/// hierarchy.
 pub(crate) fn varied() -> Manifest {
     let mut text = r#"
 frames = { first = 0, last = 40, rate = 10 }

@@ -12,7 +12,8 @@ pub(crate) type Corners = Vec<[[f32; 3]; 3]>;
 /// A condition, and whether a hit meets it.
 type Condition<'a> = (Accept<'a>, &'a dyn Fn(&Hit) -> bool);
 
-/// The instruction set is a setting of the whole process, so tests that set it run one after the other.
+/// The instruction set is a setting of the whole process, so tests that set it run one after the
+/// other.
 pub(crate) fn turn() -> MutexGuard<'static, ()> {
     static TURN: Mutex<()> = Mutex::new(());
     TURN.lock().unwrap_or_else(PoisonError::into_inner)
@@ -23,7 +24,8 @@ pub(crate) fn isas() -> impl Iterator<Item = Isa> {
     Isa::ALL.into_iter().filter(|isa| isa.is_available())
 }
 
-/// The corners of an object's triangles by id, as the file stores them. Triangles that it does not hold have no area.
+/// The corners of an object's triangles by id, as the file stores them. Triangles that it does not
+/// hold have no area.
 pub(crate) fn corners_of(scene: &Scene, object: u32) -> Corners {
     let view = scene.object(object);
     let mut corners = vec![[[0.0; 3]; 3]; view.header.triangles as usize];
@@ -37,7 +39,7 @@ pub(crate) fn corners_of(scene: &Scene, object: u32) -> Corners {
     corners
 }
 
-/// Whether a reported t is the exact one to half a unit in the last place, but for 2^-28.
+/// Returns true if a reported t is the exact one to half a unit in the last place, but for 2^-28.
 fn is_rounded(t: f32, exact: f64) -> bool {
     let t_exact = exact as f32;
     let near = (f64::from(t.next_up()) - f64::from(t)).min(f64::from(t) - f64::from(t.next_down()));
@@ -120,7 +122,8 @@ fn check_all(scene: &Scene, corners: &Corners, ray: &StartRay, nearest: Option<H
     assert_eq!(scene.crossings(ray), starts::crossings(corners, ray), "crossings of {}", context());
 }
 
-/// Checks rays from the triangles of a scene of one object against the oracle, and on every instruction set. Returns how many hit.
+/// Checks rays from the triangles of a scene of one object against the oracle, and on every
+/// instruction set. Returns how many hit.
 pub(crate) fn check(scene: &Scene, corners: &Corners, rays: &[StartRay], context: &str) -> usize {
     check_with(scene, corners, rays, context, &|ray, hit, context| {
         check_all(scene, corners, ray, hit.is_hit().then_some(*hit), context);
@@ -147,7 +150,8 @@ pub(crate) fn check_with(
     expected.iter().filter(|hit| hit.is_hit()).count()
 }
 
-/// Checks on every instruction set that rays have these hits, alone and in batches of all sizes, and calls `check_one` for some of them.
+/// Checks on every instruction set that rays have these hits, alone and in batches of all sizes,
+/// and calls `check_one` for some of them.
 pub(crate) fn check_isas(
     scene: &Scene,
     rays: &[StartRay],

@@ -1,4 +1,5 @@
-//! Rays that start on triangles: all queries agree with the exact oracle, with each other, and to the bit on every instruction set.
+//! Rays that start on triangles: all queries agree with the exact oracle, with each other, and to
+//! the bit on every instruction set.
 
 mod check;
 mod closed;

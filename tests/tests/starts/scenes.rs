@@ -1,4 +1,5 @@
-//! Starts on instances: against the exact oracle where transforms are exact, and against each other where they are not.
+//! Starts on instances: against the exact oracle where transforms are exact, and against each other
+//! where they are not.
 
 use crate::check::{check_isas, turn};
 use bth::rays::{Hit, StartRay};
@@ -14,7 +15,8 @@ use bth_tests::oracle::World;
 use bth_tests::rays::{alone, coherent_starts, starts};
 use bth_tests::structures::{compiled, options};
 
-/// Rows of a matrix that turns by multiples of 90 degrees, mirrors, and scales by powers of two, to integer places.
+/// Rows of a matrix that turns by multiples of 90 degrees, mirrors, and scales by powers of two, to
+/// integer places.
 fn exact_transform(rng: &mut Rng) -> [f32; 12] {
     let mut axes = [0, 1, 2];
     axes.swap(0, rng.below(3) as usize);

@@ -10,7 +10,8 @@ use bth_tests::meshes::{KINDS, cube, mesh, placed};
 use bth_tests::oracle::starts;
 use bth_tests::structures::{compiled, options};
 
-/// A start on a random triangle: in its face, on an edge or at a corner; or a point: anywhere, or a corner of the mesh.
+/// A start on a random triangle: in its face, on an edge or at a corner; or a point: anywhere, or a
+/// corner of the mesh.
 fn end(rng: &mut Rng, corners: &[[[f32; 3]; 3]]) -> SegmentEnd {
     let triangle = rng.below(corners.len() as u64) as usize;
     match rng.below(8) {

@@ -1,4 +1,5 @@
-//! Models that are hard for compilers: every one compiles, verifies, and gives the answers of the plain BVH.
+//! Models that are hard for compilers: every one compiles, verifies, and gives the answers of the
+//! plain BVH.
 
 use bth::rays::Hit;
 use bth_compile::Silent;
@@ -102,7 +103,8 @@ fn needle_fans_and_vertices_of_high_valence_compile() {
 fn facets_that_cross_touch_and_overlap_compile() {
     let mut plc = sheet(6, 0);
     let n = plc.positions.len() as u32;
-    // A crossing quad, a triangle that ends within another, a coplanar overlap, and an edge along an edge.
+    // A crossing quad, a triangle that ends within another, a coplanar overlap, and an edge along
+    // an edge.
     plc.positions.extend([[1.5, 1.5, 0.0], [4.5, 1.5, 0.0], [4.5, 1.5, 3.0], [1.5, 1.5, 3.0]]);
     plc.triangles.extend([[n, n + 1, n + 2], [n, n + 2, n + 3]]);
     let [a, b, c] = plc.triangles[20].map(|v| plc.positions[v as usize]);

@@ -1,4 +1,5 @@
-//! Instances under transforms: closed surfaces stay closed, and hits stay within a documented distance of the exact ones.
+//! Instances under transforms: closed surfaces stay closed, and hits stay within a documented
+//! distance of the exact ones.
 
 use bth::Scene;
 use bth::rays::{Hit, Ray};
@@ -90,10 +91,10 @@ fn rays_from_inside(scene: &Scene, instance: u32, rng: &mut Rng) -> Vec<Ray> {
     (0..600).map(ray).collect()
 }
 
-/// Let M be an instance's linear part, T its translation, κ the condition number of M, b the greatest coordinate of the
-/// object's box and o the ray's origin, all in the maximum norm. The point at the reported t lies within
-/// 2^-21 (κ (|o| + |T|) + |M| b) of the plane of the reported triangle: t is off by at most that over the speed at which
-/// the ray nears the plane.
+/// Let M be an instance's linear part, T its translation, κ the condition number of M, b the
+/// greatest coordinate of the object's box and o the ray's origin, all in the maximum norm. The
+/// point at the reported t lies within 2^-21 (κ (|o| + |T|) + |M| b) of the plane of the reported
+/// triangle: t is off by at most that over the speed at which the ray nears the plane.
 #[test]
 fn closed_surfaces_stay_closed_under_transforms_and_t_keeps_its_bound() {
     let scene = scene();
@@ -125,7 +126,8 @@ fn closed_surfaces_stay_closed_under_transforms_and_t_keeps_its_bound() {
             let origin = greatest(ray.origin.map(f64::from));
             let bound = (condition * (origin + translation) + norm * size) / f64::from(1 << 21);
             worst = worst.max(distance / bound);
-            // Of a sample, the exact truth for the instance as it stands: hit as well, and at about the same t.
+            // Of a sample, the exact truth for the instance as it stands: hit as well, and at about
+            // the same t.
             if i % 10 == 0 {
                 let exact = world.hit(ray);
                 assert_eq!((exact.is_hit(), exact.primitive.instance), (true, instance), "{ray:?}");
@@ -157,8 +159,8 @@ fn instances_take_less_than_200_bytes_whether_or_not_each_has_tracks_of_its_own(
     }
 }
 
-/// The winding number of a point is that along any ray from it, however the instance is transformed, and a mirrored instance keeps
-/// its inside.
+/// The winding number of a point is that along any ray from it, however the instance is
+/// transformed, and a mirrored instance keeps its inside.
 #[test]
 fn points_inside_of_instances_are_found_under_every_transform() {
     let scene = scene();
@@ -172,7 +174,8 @@ fn points_inside_of_instances_are_found_under_every_transform() {
             let share = [0.0, 0.5, 0.9, 1.25][round % 4];
             let point = apply(&view.to_world, vertex.map(|x| f64::from(x) * share)).map(|x| x as f32);
             let winding = scene.winding(point);
-            // The tiny instance is smaller than a step of f32 at its place, so rounding may move points into it.
+            // The tiny instance is smaller than a step of f32 at its place, so rounding may move
+            // points into it.
             if instance != TINY || share == 0.0 {
                 assert_eq!(winding, i32::from(share < 1.0), "instance {instance}: {point:?}");
             }

@@ -38,8 +38,9 @@ fn shuffled(count: usize, seed: u64) -> Vec<u32> {
     rows
 }
 
-/// Answers for a changed model: t to the bit; u and v too where the same triangle is named. Of triangles that are hit
-/// at the same t (at edges) another may be named only where the ids have another order.
+/// Answers for a changed model: t to the bit; u and v too where the same triangle is named. Of
+/// triangles that are hit at the same t (at edges) another may be named only where the ids have
+/// another order.
 fn compare(a: &[Hit], b: &[Hit], name: impl Fn(u32) -> u32, ordered: bool) {
     let mut same = 0;
     for (a, b) in a.iter().zip(b) {
@@ -139,7 +140,8 @@ fn cutting_into_instances_changes_no_answer() {
             let triangle = hit.primitive.instance * size as u32 + hit.primitive.triangle;
             hit.primitive = PrimitiveRef { instance: 0, triangle };
         }
-        // Of hits at the same t, rounded, that of the least instance is reported; within an object the nearest is.
+        // Of hits at the same t, rounded, that of the least instance is reported; within an object
+        // the nearest is.
         let whole =
             structures::compiled(&model, &structures::options(Structure::Bvh, RecordKind::Link32, false));
         compare(&hits(&whole, &rays), &ours, |id| id, false);

@@ -1,5 +1,5 @@
-//! What hits lead to: surfaces against an independent evaluation, groups, materials, names and bounds, through models, scenes, grids,
-//! files without attributes, and the cache.
+//! What hits lead to: surfaces against an independent evaluation, groups, materials, names and
+//! bounds, through models, scenes, grids, files without attributes, and the cache.
 
 mod model;
 
@@ -16,7 +16,8 @@ use bth_import::Keep;
 use bth_random::Rng;
 use std::path::Path;
 
-/// The normal of the object at three weights, evaluated independently: by the adjoint of the transform instead of its inverse.
+/// The normal of the object at three weights, evaluated independently: by the adjoint of the
+/// transform instead of its inverse.
 fn expected_normals(model: &Model, rows: &Rows, hit: &Hit) -> ([f64; 3], [f64; 3]) {
     let id = hit.primitive.triangle as usize;
     let [a, b, c] = model.triangles[id].map(wide);

@@ -12,25 +12,28 @@ pub(crate) struct CacheLocation {
     /// Folder of the cache; by default BTH_CACHE_DIR, else `bth` in the user's folder for caches.
     #[arg(long, help_heading = CACHE, global = true, value_name = "FOLDER")]
     pub(crate) cache_dir: Option<PathBuf>,
-    /// Bytes to keep, such as 20GiB; beyond it, what was used longest ago goes. By default BTH_CACHE_SIZE, else 20GiB.
+    /// Bytes to keep, such as 20GiB; beyond it, what was used longest ago goes. By default
+    /// BTH_CACHE_SIZE, else 20GiB.
     #[arg(long, help_heading = CACHE, global = true, value_name = "BYTES", value_parser = parse_bytes)]
     pub(crate) cache_size: Option<u64>,
 }
 
-/// Whether and where results are kept.
+/// Where results are kept, if at all.
 #[derive(Clone, Debug, Group)]
 pub(crate) struct Keeping {
     #[command(flatten)]
     pub(crate) location: CacheLocation,
-    /// A folder that machines share, or with the feature s3 a place such as s3://bucket/prefix: what the cache lacks is looked
-    /// for there, what is made is put there too. By default
+    /// A folder that machines share, or with the feature s3 a place such as s3://bucket/prefix:
+    /// what the cache lacks is looked for there, what is made is put there too. By default
     /// BTH_SHARED_CACHE.
     #[arg(long, help_heading = CACHE, value_name = "PLACE")]
     pub(crate) shared_cache: Option<String>,
-    /// Neither look into the cache nor keep anything; so does setting BTH_NO_CACHE, unless --cache-dir is given.
+    /// Neither look into the cache nor keep anything; so does setting BTH_NO_CACHE, unless
+    /// --cache-dir is given.
     #[arg(long, help_heading = CACHE, conflicts_with_all = ["cache_dir", "shared_cache", "in_cache"])]
     pub(crate) no_cache: bool,
-    /// Keep the compiled file in the cache only; --json says where, and which files were read. For programs that map it there.
+    /// Keep the compiled file in the cache only; --json says where, and which files were read. For
+    /// programs that map it there.
     #[arg(long, help_heading = CACHE, conflicts_with_all = ["output", "depfile"])]
     pub(crate) in_cache: bool,
 }
@@ -75,12 +78,13 @@ impl CacheLocation {
     /// The store; `None` if no folder for it is known.
     ///
     /// # Errors
-    /// `BTH-O063` when its folder cannot be used, `BTH-U001` for a size that is none.
+    /// `BTH-O063` when its folder cannot be used, `BTH-U001` for a wrong size.
     pub(crate) fn store(&self) -> Result<Option<Store>, Failure> {
         self.store_by(Store::open)
     }
 
-    /// As [`CacheLocation::store`], but a folder that the command line names must be a store already, or empty.
+    /// As [`CacheLocation::store`], but a folder that the command line names must be a store
+    /// already, or empty.
     ///
     /// # Errors
     /// As [`CacheLocation::store`].
@@ -111,7 +115,8 @@ impl CacheLocation {
 }
 
 impl Keeping {
-    /// The store, unless the options exclude it. A default folder that cannot be used is only a warning.
+    /// The store, unless the options exclude it. A default folder that cannot be used is only a
+    /// warning.
     ///
     /// # Errors
     /// As [`CacheLocation::store`] for a folder that the options name.

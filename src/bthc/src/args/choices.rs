@@ -5,7 +5,7 @@ use clap::ValueEnum;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Structure {
-    /// A BVH, some nodes of which are tetrahedralized where that pays.
+    /// A BVH with some nodes tetrahedralized, where that pays.
     Bth,
     /// A BVH only.
     Bvh,
@@ -27,7 +27,7 @@ pub(crate) enum Alpha {
     None,
     /// Those of alpha mode MASK.
     Mask,
-    /// Also those of alpha mode BLEND, with a cutoff of 0.5.
+    /// Also materials of alpha mode BLEND, with a cutoff of 0.5.
     Blend,
 }
 
@@ -55,7 +55,8 @@ pub(crate) enum Attributes {
 pub(crate) enum Polygons {
     /// Fans from the first corner.
     Fans,
-    /// Fans where these cover nothing twice, else ears that are clipped one after the other, exactly.
+    /// Fans where these cover nothing twice, else ears that are clipped one after the other,
+    /// exactly.
     Ears,
 }
 
@@ -116,7 +117,8 @@ impl From<Structure> for bth_compile::pipeline::Structure {
 pub(crate) enum Free {
     /// Nowhere.
     None,
-    /// Directions and distances where enough directions are free, else distances where they save enough.
+    /// Directions and distances where enough directions are free, else distances where they save
+    /// enough.
     Auto,
     /// Distances alone.
     Distances,

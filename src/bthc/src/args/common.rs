@@ -15,8 +15,8 @@ Exit codes:
    70  internal error; please report it
   130  cancelled, by Ctrl-C, SIGTERM or SIGHUP";
 
-// The headings of the help. Each option names its own, since one that is set for a group of options would hold for what
-// follows the group, too.
+// The headings of the help. Each option names its own, since one that is set for a group of options
+// would hold for what follows the group, too.
 pub(super) const CACHE: &str = "Cache";
 pub(super) const DEFORMING: &str = "Objects that deform";
 pub(super) const GLTF: &str = "Scenes from glTF";

@@ -19,26 +19,26 @@ use std::path::PathBuf;
 #[derive(Debug, Group)]
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Compile {
-    /// Models or scenes. A name that ends with .manifest or .toml is a scene manifest; `-` is a model
-    /// from standard input.
+    /// Models or scenes. A name that ends with .manifest or .toml is a scene manifest; `-` is a
+    /// model from standard input.
     #[arg(required = true, value_name = "MODEL")]
     pub(crate) models: Vec<PathBuf>,
-    /// The compiled file, or the folder for several. By default each model's name with the extension
-    /// .bth, in the model's folder. `-` is standard output.
+    /// The compiled file, or the folder for several. By default each model's name with the
+    /// extension .bth, in the model's folder. `-` is standard output.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
     /// What to build. By default bth, with --deformable bvh.
     #[arg(long, value_enum)]
     pub(crate) structure: Option<Structure>,
-    /// How polygons of more than three corners become triangles in OBJ, PLY, OFF and STL. Fans cover
-    /// too much where a polygon is concave.
+    /// How polygons of more than three corners become triangles in OBJ, PLY, OFF and STL. Fans
+    /// cover too much where a polygon is concave.
     #[arg(long, value_enum, default_value_t = Polygons::Fans)]
     pub(crate) polygons: Polygons,
     /// Shading attributes to keep.
     #[arg(long, help_heading = KEPT, value_enum, default_value_t = Attributes::None)]
     pub(crate) attributes: Attributes,
-    /// Keep groups of triangles, materials and names, so that hits lead back to parts of the source:
-    /// see docs/models.md.
+    /// Keep groups of triangles, materials and names, so that hits lead back to parts of the
+    /// source: see docs/models.md.
     #[arg(long, help_heading = KEPT)]
     pub(crate) names: bool,
     /// Keep how materials look: base colour, emission, alpha, sidedness, textures, and vertex
@@ -48,17 +48,17 @@ pub(crate) struct Compile {
     /// glTF materials whose alpha makes holes that rays pass: see docs/models.md.
     #[arg(long, help_heading = KEPT, value_enum, default_value_t = Alpha::None, value_name = "MATERIALS")]
     pub(crate) alpha: Alpha,
-    /// Warn of images and material libraries that are missing, broken or too large, and go on without
-    /// them: see docs/models.md.
+    /// Warn of images and material libraries that are missing, broken or too large, and go on
+    /// without them: see docs/models.md.
     #[arg(long, help_heading = KEPT)]
     pub(crate) lenient_materials: bool,
     /// Store no positions and triangles of the source. Tracing does not need them.
     #[arg(long, help_heading = KEPT)]
     pub(crate) no_geometry: bool,
-    /// Keep directions and distances in which rays from a triangle hit nothing. Such rays end at once
-    /// or begin later, if the caller names the triangle. Takes 20 bytes a triangle, `distances` 8.
-    /// By default auto; none with --quality fast, --coordinates, --max-error or --compact, and for
-    /// objects of more than a million triangles.
+    /// Keep directions and distances in which rays from a triangle hit nothing. Such rays end at
+    /// once or begin later, if the caller names the triangle. Takes 20 bytes a triangle,
+    /// `distances` 8. By default auto; none with --quality fast, --coordinates, --max-error or
+    /// --compact, and for objects of more than a million triangles.
     #[arg(long, help_heading = KEPT, value_enum, value_name = "WHERE", conflicts_with = "deformable")]
     pub(crate) free_directions: Option<Free>,
     /// Bits of a coordinate of a triangle leaf: f32, or 21 or 16 over the object's box. Fewer make
@@ -66,24 +66,24 @@ pub(crate) struct Compile {
     /// --max-error asks for.
     #[arg(long, help_heading = SMALLER, value_name = "BITS", value_enum)]
     pub(crate) coordinates: Option<Coordinates>,
-    /// Max distance that a vertex may move: in the units of the object (0.001), or as a share of the
-    /// diagonal of its box (0.01%). Takes the fewest bits that honour it; with --coordinates, fails
-    /// if a vertex would move more.
+    /// Max distance that a vertex may move: in the units of the object (0.001), or as a share of
+    /// the diagonal of its box (0.01%). Takes the fewest bits that honour it; with --coordinates,
+    /// fails if a vertex would move more.
     #[arg(long, help_heading = SMALLER, value_name = "DISTANCE", value_parser = str::parse::<MaxError>)]
     pub(crate) max_error: Option<MaxError>,
     /// Make the smallest tetrahedralizations: short for `--set record=tet16 --set subtrees=prune
-    /// --free-directions none`. Takes 100 bytes a triangle instead of 180 to 200 where all triangles
-    /// are in tetrahedra.
+    /// --free-directions none`. Takes 100 bytes a triangle instead of 180 to 200 where all
+    /// triangles are in tetrahedra.
     #[arg(long, help_heading = SMALLER)]
     pub(crate) compact: bool,
-    /// Keep what new positions at run time need: see docs/deforming.md. All vertices keep the order of
-    /// the source. The object is a BVH.
+    /// Keep what new positions at run time need: see docs/deforming.md. All vertices keep the order
+    /// of the source. The object is a BVH.
     #[arg(long, help_heading = DEFORMING, conflicts_with_all = ["coordinates", "max_error", "no_geometry", "compact", "rigid_parts"])]
     pub(crate) deformable: bool,
     #[command(flatten)]
     pub(crate) selection: Selection,
-    /// Build the trees of a scene for the rays of its cameras, lights and frames, more than for rays
-    /// from everywhere. Nodes that none of them hits are not tetrahedralized.
+    /// Build the trees of a scene for the rays of its cameras, lights and frames, more than for
+    /// rays from everywhere. Nodes that none of them hits are not tetrahedralized.
     #[arg(long)]
     pub(crate) for_scene: bool,
     /// Threads; 0 for one per processor. The result does not depend on it.
@@ -95,7 +95,8 @@ pub(crate) struct Compile {
     /// Print nothing but errors.
     #[arg(short, long)]
     pub(crate) quiet: bool,
-    /// Make one object of a glTF file: its scene at rest, in world space, without hierarchy and animation.
+    /// Make one object of a glTF file: its scene at rest, in world space, without hierarchy and
+    /// animation.
     #[arg(long, help_heading = GLTF, conflicts_with_all = ["scene", "animation", "rate", "at_rest", "rigid_parts", "strict"])]
     pub(crate) flatten: bool,
     #[command(flatten)]

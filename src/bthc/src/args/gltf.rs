@@ -9,18 +9,20 @@ pub(crate) struct Gltf {
     /// Scene by name or number; by default the file's own choice.
     #[arg(long, help_heading = GLTF, value_name = "SCENE")]
     pub(crate) scene: Option<String>,
-    /// Animation by name or number, `all` or `none`; by default the first. With `all`, of two that move the same thing the first is
-    /// taken.
+    /// Animation by name or number, `all` or `none`; by default the first. With `all`, of two that
+    /// move the same thing the first is taken.
     #[arg(long, help_heading = GLTF, value_name = "ANIMATION")]
     pub(crate) animation: Option<String>,
     /// Frames per second; 24 by default.
     #[arg(long, help_heading = GLTF, value_parser = positive)]
     pub(crate) rate: Option<f64>,
-    /// Leave meshes with skins and morph targets at rest; by default they deform where an animation moves them.
+    /// Leave meshes with skins and morph targets at rest; by default they deform where an animation
+    /// moves them.
     #[arg(long, help_heading = GLTF)]
     pub(crate) at_rest: bool,
-    /// Make instances of the parts of skinned meshes that one joint moves rigidly: updates of the time only place them, but rays that
-    /// have to enter several instances are slower. See docs/scenes.md.
+    /// Make instances of the parts of skinned meshes that one joint moves rigidly: updates of the
+    /// time only place them, but rays that have to enter several instances are slower. See
+    /// docs/scenes.md.
     #[arg(long, help_heading = GLTF, conflicts_with = "at_rest")]
     pub(crate) rigid_parts: bool,
     /// Refuse what would be ignored: animations of other things than nodes and morph weights.

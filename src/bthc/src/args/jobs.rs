@@ -7,11 +7,11 @@ use std::path::PathBuf;
 /// How many models are compiled at once, and output for build systems.
 #[derive(Clone, Debug, Group)]
 pub(crate) struct Jobs {
-    /// Models that are compiled at once; the threads are shared among them. By default as many as there are threads.
+    /// Models that are compiled at once; they share the threads. By default the number of threads.
     #[arg(short, long, help_heading = JOBS, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub(crate) jobs: Option<u32>,
-    /// Memory of all models and objects of scenes that are compiled at once, in MiB, estimated from the sizes of their
-    /// files. One is compiled in any case.
+    /// Memory of all models and objects of scenes that are compiled at once, in MiB, estimated from
+    /// the sizes of their files. One is compiled in any case.
     #[arg(long, help_heading = JOBS, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) memory: Option<u64>,
     /// Say what would be done and why, and do nothing.
@@ -26,10 +26,12 @@ pub(crate) struct Jobs {
     /// Go on: compile again whenever one of the files changes, until Ctrl-C.
     #[arg(long, help_heading = JOBS, conflicts_with_all = ["json", "in_cache", "depfile"])]
     pub(crate) watch: bool,
-    /// Stop, as on Ctrl-C, when standard input ends: for programs that start this one and may themselves be ended.
+    /// Stop, as on Ctrl-C, when standard input ends: for programs that start this one and may
+    /// themselves be ended.
     #[arg(long, help_heading = JOBS)]
     pub(crate) end_with_input: bool,
-    /// Compile only part I of N of the models (from 1), or of a scene's objects into the cache: for many machines.
+    /// Compile only part I of N of the models (from 1), or of a scene's objects into the cache: for
+    /// many machines.
     #[arg(long, help_heading = JOBS, value_name = "I/N", value_parser = shard, conflicts_with_all = ["watch", "depfile"])]
     pub(crate) shard: Option<(u32, u32)>,
 }

@@ -18,18 +18,20 @@ use common::{EXIT_CODES, output_file, threads};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-/// Compiles triangle models into BTH files, for tracing rays without building anything at the start.
+/// Compiles triangle models into BTH files, for tracing rays without building anything at the
+/// start.
 #[derive(Debug, Parser)]
 #[command(name = "bthc", version, disable_version_flag = true, arg_required_else_help = true, after_help = EXIT_CODES, max_term_width = 100)]
 pub(crate) struct Args {
-    /// Instruction set for tracing: scalar, sse4, neon, simd128, avx2 or avx512. By default what BTH_ISA says, else the
-    /// best of this machine. Answers do not depend on it.
+    /// Instruction set for tracing: scalar, sse4, neon, simd128, avx2 or avx512. By default what
+    /// BTH_ISA says, else the best of this machine. Answers do not depend on it.
     #[arg(long, global = true, value_name = "ISA")]
     pub(crate) isa: Option<bth::Isa>,
     /// Print the version and end.
     #[arg(short = 'V', long)]
     pub(crate) version: bool,
-    /// With --version: also the version of files, the target, instruction sets, features, and the TetGen that is found.
+    /// With --version: also the version of files, the target, instruction sets, features, and the
+    /// TetGen that is found.
     #[arg(long, requires = "version")]
     pub(crate) verbose: bool,
     #[command(subcommand)]
@@ -54,14 +56,14 @@ pub(crate) enum Command {
     Man,
 }
 
-/// Write a scene manifest from a glTF scene, to be edited and compiled. It refers to the meshes of the glTF file,
-/// so it must stand beside it or in a folder above.
+/// Write a scene manifest from a glTF scene, to be edited and compiled. It refers to the meshes of
+/// the glTF file, so keep it in the folder of that file or above.
 #[derive(Debug, Group)]
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Import {
     /// The glTF or GLB file.
     pub(crate) model: PathBuf,
-    /// The manifest; by default the model's name with the extension .manifest, beside it.
+    /// The manifest; by default the model's name with the extension .manifest, in the same folder.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]
@@ -74,7 +76,7 @@ pub(crate) struct Import {
     pub(crate) quiet: bool,
 }
 
-/// Show what a BTH file contains, or of a glTF file the animations and what a scene leaves out.
+/// Show what a BTH file contains; or a glTF file's animations, and what a scene skips.
 #[derive(Debug, Group)]
 pub(crate) struct Info {
     /// The compiled file, or a glTF or GLB file.
@@ -88,17 +90,18 @@ pub(crate) struct Info {
     pub(crate) json: bool,
 }
 
-/// Check a BTH file completely: hashes, indices and geometry, and with --deep the answers to sample rays.
+/// Check a BTH file completely: hashes, indices and geometry, and with --deep the answers to sample
+/// rays.
 #[derive(Debug, Group)]
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Verify {
     /// The compiled file.
     pub(crate) file: PathBuf,
-    /// Trace sample rays through each object, too, in all ways, and compare them, and what is known of the directions in which they
-    /// start, with every triangle in exact arithmetic.
+    /// Trace sample rays through each object, too, in all ways, and compare them, and what is known
+    /// of the directions in which they start, with every triangle in exact arithmetic.
     #[arg(long)]
     pub(crate) deep: bool,
-    /// Rays of each object with --deep. By default as many as take some seconds.
+    /// Rays of each object with --deep. By default what takes some seconds.
     #[arg(long, value_name = "N", requires = "deep")]
     pub(crate) rays: Option<NonZeroUsize>,
     /// Print one JSON object.
@@ -126,13 +129,15 @@ pub(crate) struct Explain {
     pub(crate) model: PathBuf,
     #[command(flatten)]
     pub(crate) selection: Selection,
-    /// Tetrahedralize the chosen nodes and measure, too: predicted beside measured costs.
+    /// Tetrahedralize the chosen nodes and measure, too: predicted costs next to measured ones.
     #[arg(long)]
     pub(crate) measure: bool,
-    /// Also draw the model, coloured by what its triangles are in and by what a bounce costs, as a PNG.
+    /// Also draw the model, coloured by what its triangles are in and by what a bounce costs, as a
+    /// PNG.
     #[arg(long, value_name = "FILE", value_parser = output_file())]
     pub(crate) picture: Option<PathBuf>,
-    /// Also decide in which directions rays from triangles meet nothing, say what it costs, and draw as a PNG which surfaces are free.
+    /// Also decide in which directions rays from triangles hit nothing, say what it costs, and draw
+    /// as a PNG which surfaces are free.
     #[arg(long, value_name = "FILE", value_parser = output_file())]
     pub(crate) free_picture: Option<PathBuf>,
     /// Nodes to show, largest first; 0 for all.
@@ -146,7 +151,8 @@ pub(crate) struct Explain {
     pub(crate) json: bool,
 }
 
-/// Measure what tracing costs on this machine, for `--profile`. Takes below a minute without models.
+/// Measure what tracing costs on this machine, for `--profile`. Takes below a minute without
+/// models.
 #[derive(Debug, Group)]
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Calibrate {
@@ -155,7 +161,7 @@ pub(crate) struct Calibrate {
     /// The profile.
     #[arg(short, long, value_name = "FILE", default_value = "bth-profile.json", value_parser = output_file())]
     pub(crate) output: PathBuf,
-    /// Rounds of which the fastest counts.
+    /// Rounds; the fastest counts.
     #[arg(long, default_value_t = 30, value_name = "N", value_parser = rounds)]
     pub(crate) rounds: usize,
     /// Print the profile as one JSON object on standard output, too.
@@ -180,12 +186,13 @@ pub(crate) struct Marks {
     pub(crate) json: bool,
 }
 
-/// Print where the vertices of a scene are at some times, as deformed by skins and morph targets: one JSON object.
+/// Print where the vertices of a scene are at some times, as deformed by skins and morph targets:
+/// one JSON object.
 #[derive(Debug, Group)]
 pub(crate) struct Positions {
     /// The compiled file.
     pub(crate) file: PathBuf,
-    /// Seconds of the animation; by default that of the first frame.
+    /// Seconds of the animation; by default the first frame.
     #[arg(long, value_name = "SECONDS", num_args = 1.., allow_negative_numbers = true, value_parser = finite)]
     pub(crate) seconds: Vec<f64>,
 }
@@ -203,9 +210,9 @@ pub(crate) struct Trace {
     /// Ask only whether anything is hit: the triangle of a hit is 0 and t is 0.
     #[arg(long)]
     pub(crate) any: bool,
-    /// Compare every ray with every triangle in exact arithmetic instead of walking the structure: the truth to
-    /// compare with, some million times slower on large models. Instances count where their transforms put them,
-    /// without the rounding of rays in the object's space.
+    /// Compare every ray with every triangle in exact arithmetic instead of walking the structure:
+    /// the truth to compare with, some million times slower on large models. Instances count where
+    /// their transforms put them, without the rounding of rays in the object's space.
     #[arg(long)]
     pub(crate) exact: bool,
     /// Threads; 0 for one per processor.

@@ -17,12 +17,12 @@ pub(crate) struct Selection {
     /// Effort of the BVH builder.
     #[arg(long, value_enum, default_value_t = Quality::Balanced)]
     pub(crate) quality: Quality,
-    /// What tracing costs: `default`, or a file that `bthc calibrate` wrote. Files of one profile are
-    /// the same on every machine.
+    /// What tracing costs: `default`, or a file that `bthc calibrate` wrote. Files of one profile
+    /// are the same on every machine.
     #[arg(long, help_heading = TETRAHEDRA, value_name = "PROFILE", default_value = "default")]
     pub(crate) profile: PathBuf,
-    /// Max bytes that tracing may read per triangle of an object, including the BVH. Nodes that save
-    /// least for their bytes stay BVH. Warns if the BVH alone is larger.
+    /// Max bytes that tracing may read per triangle of an object, including the BVH. Nodes that
+    /// save little for their bytes stay BVH. Warns if the BVH alone is larger.
     #[arg(long, help_heading = SMALLER, value_name = "BYTES", value_parser = positive)]
     pub(crate) max_bytes_per_triangle: Option<f64>,
     /// Rays that will be traced through the model, such as a light baker's, in a .rays file (see
@@ -70,7 +70,7 @@ impl Selection {
     }
 }
 
-/// The rays of a file. Those that cannot be traced are left out, with a warning.
+/// Reads the rays of a file. Skips rays that cannot be traced, with a warning.
 ///
 /// # Errors
 /// If the file cannot be read, or none can be traced.

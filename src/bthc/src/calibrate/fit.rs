@@ -5,8 +5,8 @@ use bth_compile::costs::{self, BvhCosts, Profile, TetCosts, Walk};
 use bth_format::layout::RecordKind;
 use std::collections::BTreeMap;
 
-/// Measurements on models whose tetrahedra fit the caches, on models whose tetrahedra do not, and on a model of a single
-/// leaf.
+/// Measurements on models whose tetrahedra fit the caches, on models whose tetrahedra do not, and
+/// on a model of a single leaf.
 pub(crate) struct Measured {
     pub(crate) small: Vec<Times>,
     pub(crate) large: Vec<Times>,
@@ -33,8 +33,8 @@ fn walk<'a>(times: impl Iterator<Item = (&'a Timed, bool)>, time: impl Fn(&Timed
     Walk { entry, hit, step: [small, large.max(small)] }
 }
 
-/// As [`walk`] for rays traced one a call, which take ten times as long. The cost of a hit is too small beside that to be
-/// fitted, and is part of the entry.
+/// Fits rays traced one a call, which take ten times as long. The cost of a hit is too small next
+/// to that to be fitted, and is part of the entry.
 fn alone<'a>(times: impl Iterator<Item = (&'a Timed, bool)>, time: impl Fn(&Timed) -> f64) -> Walk {
     let rows: Vec<([f64; 3], f64)> = times
         .map(|(t, large)| (if large { [1.0, 0.0, t.steps] } else { [1.0, t.steps, 0.0] }, time(t)))
@@ -48,7 +48,8 @@ fn alone<'a>(times: impl Iterator<Item = (&'a Timed, bool)>, time: impl Fn(&Time
 pub(crate) fn fit(measured: &Measured, isa: &str) -> Profile {
     let all = || measured.small.iter().chain(&measured.large);
     let ray = all().map(|t| t.nothing).fold(f64::INFINITY, f64::min);
-    // Small and large models alike, since the number of visits grows with the logarithm of the size.
+    // Small and large models alike, since the number of visits grows with the logarithm of the
+    // size.
     let a_visit = |t: &Timed| ((t.bvh - ray) / t.visits.max(1.0)).max(0.0);
     let block = (measured.leaf - ray).max(0.0);
     let node = |t: &Times| ((t.outside.bvh - ray - block * t.wide[1]) / t.wide[0].max(1.0)).max(0.0);

@@ -1,7 +1,8 @@
-//! Measures the costs of tracing on this machine, as the profile by which the compiler selects nodes.
+//! Measures the costs of tracing on this machine, as the profile by which the compiler selects
+//! nodes.
 //!
-//! `subject` compiles models into all structures and counts the steps of sampled rays through them; `fit` turns times and
-//! counts into costs.
+//! `subject` compiles models into all structures and counts the steps of sampled rays through them;
+//! `fit` turns times and counts into costs.
 
 mod fit;
 mod subject;

@@ -1,4 +1,5 @@
-//! A model to measure on: its compiled structures, sampled rays, and the traversal steps that these take.
+//! A model to measure on: its compiled structures, sampled rays, and the traversal steps that these
+//! take.
 
 use crate::failure::Failure;
 use crate::measure::{QueryKind, Rays, TimedRun, nanoseconds};
@@ -12,8 +13,8 @@ use bth_format::layout::RecordKind;
 use bth_import::Mesh;
 use std::time::Instant;
 
-/// Rays of each kind to a small model: few enough that they and the model stay in the caches of the core wherever the system
-/// places their pages.
+/// Rays of each kind to a small model: few enough that they and the model stay in the caches of the
+/// core wherever the system places their pages.
 const RAYS_TO_SMALL: usize = 4096;
 /// Rays of each kind to a large model.
 const RAYS_TO_LARGE: usize = 16384;
@@ -25,8 +26,8 @@ const SMALL_TRIANGLES: usize = 20_000;
 /// Number of times that small models are tetrahedralized to measure the time.
 const REPETITIONS: usize = 16;
 
-/// Number of times that models and rays are copied to new addresses during the rounds, since the addresses decide which data
-/// share a set of a cache.
+/// Number of times that models and rays are copied to new addresses during the rounds, since the
+/// addresses decide which data share a set of a cache.
 const COPIES: usize = 3;
 
 /// Rays of one kind and their mean steps.
@@ -83,7 +84,7 @@ pub(crate) struct Times {
     pub(crate) nothing: f64,
     /// Lines from outside.
     pub(crate) outside: Timed,
-    /// Bounces that miss and that hit a triangle, of each those of few steps and those of many.
+    /// Bounces that miss, then bounces that hit a triangle; each with few steps and with many.
     pub(crate) bounces: [Timed; 4],
     /// Short rays from surfaces.
     pub(crate) short: Timed,
@@ -185,7 +186,8 @@ impl Subject {
         [(&self.outside, QueryKind::Nearest), (&self.short, QueryKind::Any)].into_iter().chain(bounces)
     }
 
-    /// Assigns the times of the runs to the kinds of rays and structures, in the order of [`SubjectCopy::runs`].
+    /// Assigns the times of the runs to the kinds of rays and structures, in the order of
+    /// [`SubjectCopy::runs`].
     fn times(&self, times: &[f64]) -> Times {
         let kinds: Vec<&Kind> = self.kinds().map(|(kind, _)| kind).collect();
         let timed = |row: usize| {
@@ -219,7 +221,8 @@ struct SubjectCopy {
 }
 
 impl SubjectCopy {
-    /// The runs: rays that miss, then every kind through the BVH and through the tetrahedra in each record.
+    /// The runs: rays that miss, then every kind through the BVH and through the tetrahedra in each
+    /// record.
     fn runs(&self) -> Vec<TimedRun<'_>> {
         let (bvh, tets) = (&self.scenes[0], &self.scenes[1..]);
         let mut runs: Vec<TimedRun<'_>> = vec![(bvh, &self.nothing, QueryKind::Nearest)];
@@ -232,8 +235,9 @@ impl SubjectCopy {
     }
 }
 
-/// Times all kinds of rays through all structures of all models in turn, so that other work of the machine does not distort
-/// the times of one model only; and the nanoseconds of a ray of the additional run `beside`.
+/// Times all kinds of rays through all structures of all models in turn, so that other work of the
+/// machine does not distort the times of one model only; and the nanoseconds of a ray of the
+/// additional run `beside`.
 ///
 /// # Errors
 /// If it was stopped.
@@ -260,8 +264,8 @@ pub(crate) fn measure(
     Ok((times, least[0]))
 }
 
-/// Seconds of one tetrahedralization of a small model, as the mean of [`REPETITIONS`]: CPU seconds of the worker where the system
-/// counts them, else wall clock.
+/// Seconds of one tetrahedralization of a small model, as the mean of [`REPETITIONS`]: CPU seconds
+/// of the worker where the system counts them, else wall clock.
 fn repeated_seconds(
     mesh: &Mesh,
     tree: &bvh::BinaryBvh,
@@ -276,8 +280,8 @@ fn repeated_seconds(
     Ok(spent.unwrap_or(start.elapsed().as_secs_f64()) / REPETITIONS as f64)
 }
 
-/// CPU seconds of the child processes that this one has waited for, which exclude the time of other processes. `None` where
-/// the system does not count them.
+/// CPU seconds of the child processes that this one has waited for, which exclude the time of other
+/// processes. `None` where the system does not count them.
 fn worker_seconds() -> Option<f64> {
     /// Clock ticks of the counters in this file, on all systems that have it.
     const TICKS_A_SECOND: f64 = 100.0;
@@ -288,8 +292,8 @@ fn worker_seconds() -> Option<f64> {
     Some(ticks.sum::<Option<f64>>()? / TICKS_A_SECOND)
 }
 
-/// Rays that miss and rays that hit a triangle, of each the third with the fewest steps and the third with the most. The rays
-/// between tell little about the cost of a step and are left out.
+/// Rays that miss, then rays that hit a triangle; each the third with the fewest steps and the
+/// third with the most. Skips the rays between, which tell little about the cost of a step.
 fn parts(walker: &TetWalker<'_>, rays: &[SampleRay]) -> [Vec<SampleRay>; 4] {
     let mut parts = [const { Vec::new() }; 4];
     for hit in [true, false] {

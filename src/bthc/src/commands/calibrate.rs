@@ -16,7 +16,8 @@ use bth_scenes::{Model, blob, gyroid};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Faces of the generated models: their tetrahedra take a quarter of a megabyte, and many times the caches.
+/// Faces of the generated models: their tetrahedra take a quarter of a megabyte, and many times the
+/// caches.
 const SMALL_FACES: u32 = 2_400;
 const LARGE_FACES: u32 = 220_000;
 /// Bytes of tetrahedra from which a model counts as large.

@@ -106,7 +106,8 @@ fn all(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -> Result<(),
     failed.map_or(Ok(()), |code| Err(Failure::Reported(code)))
 }
 
-/// Writes the dependency file, if there is to be one. Before the reports, since with --json an error takes their place.
+/// Writes the dependency file, if there is to be one. Before the reports, since with --json an
+/// error takes their place.
 fn write_dependencies(context: &JobContext<'_>, jobs: &[Job]) -> Result<(), Failure> {
     match &context.args.jobs.depfile {
         Some(path) => depfile::write(path, context, jobs),

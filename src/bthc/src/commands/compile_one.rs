@@ -7,8 +7,8 @@ use crate::failure::Failure;
 use bth_compile::Monitor;
 use bth_compile::monitor::Recording;
 
-/// Compiles a model or scene, or takes it from the cache, and brings it to its target. The report has the warnings, those of an earlier
-/// compilation included whose results are taken.
+/// Compiles a model or scene, or takes it from the cache, and brings it to its target. The report
+/// has the warnings, also from earlier compilations whose results are taken.
 ///
 /// # Errors
 /// If it cannot be compiled or written.

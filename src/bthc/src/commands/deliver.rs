@@ -1,4 +1,5 @@
-//! Brings a compiled file to its target: to its path unless that is up to date, to standard output, or only into the cache.
+//! Brings a compiled file to its target: to its path unless that is up to date, to standard output,
+//! or only into the cache.
 
 use super::job::{Job, JobContext, JobReport, Target};
 use crate::failure::Failure;
@@ -35,7 +36,8 @@ pub(super) fn deliver<R>(
         }
         (Target::File(path), None) => {
             if job.is_input || inputs()?.iter().any(|input| modified(input) > modified(path)) {
-                // Build systems compare modification times, so an output that is up to date must be newer than its inputs.
+                // Build systems compare modification times, so an output that is up to date must be
+                // newer than its inputs.
                 touch(path, outcome.record.as_ref(), context.store.as_ref())?;
             }
         }
@@ -64,7 +66,7 @@ pub(super) fn deliver<R>(
     let name = job.target.name();
     let key = outcome.record.as_ref().map(|r| r.key.id());
     let log = cache.log();
-    // Scenes assembled from cached objects have no entry of their own.
+    // Scenes assembled from cached objects have no separate entry.
     let kept = outcome.record.as_ref().filter(|record| record.whole).zip(context.store.as_ref());
     let state = json!({
         "key": key,

@@ -20,7 +20,8 @@ pub(super) fn write(path: &Path, context: &JobContext<'_>, jobs: &[Job]) -> Resu
     Ok(write::write_atomically(path, &text)?)
 }
 
-/// All files that a job reads, those of its options included; not the temporary file of a model from standard input.
+/// Lists all files that a job reads, also for its options; but not the temporary file of a model
+/// from standard input.
 ///
 /// # Errors
 /// When a file that refers to others cannot be read.
@@ -45,8 +46,9 @@ fn rule(output: &Path, inputs: &[PathBuf]) -> Result<Vec<u8>, Failure> {
     Ok(text)
 }
 
-/// A path in the syntax of Make, as compilers write it: blanks, tabs and `#` get a backslash, as do the backslashes before them, colons and
-/// bars get one, and dollars are doubled. The bytes of a name stay as they are.
+/// A path in the syntax of Make, as compilers write it: blanks, tabs and `#` get a backslash, as do
+/// the backslashes before them, colons and bars get one, and dollars are doubled. The bytes of a
+/// name stay as they are.
 ///
 /// # Errors
 /// For line breaks and semicolons, which no escape makes part of a name.

@@ -43,7 +43,8 @@ pub(super) fn show(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -
     Ok(output::text(&text)?)
 }
 
-/// Reasons behind what is done for them; nothing where there are none, as for the parts of a scene without a cache.
+/// Shows the reasons for what is done. Empty without reasons, as for parts of a scene without a
+/// cache.
 fn in_parentheses(reasons: &[String]) -> String {
     if reasons.is_empty() { String::new() } else { format!(" ({})", reasons.join(", ")) }
 }

@@ -1,4 +1,5 @@
-//! `bthc explain`: shows which nodes would be tetrahedralized, which not, and why; and which surfaces have free directions.
+//! `bthc explain`: shows which nodes would be tetrahedralized, which not, and why; and which
+//! surfaces have free directions.
 
 use super::threads::with_threads;
 use crate::args::Explain;
@@ -96,7 +97,8 @@ struct Built {
     brightest: Option<f64>,
 }
 
-/// Tetrahedralizes the chosen nodes, measures what rays cost in them and draws the picture, as far as the options ask for it.
+/// Tetrahedralizes the chosen nodes, measures what rays cost in them and draws the picture, as far
+/// as the options ask for it.
 fn built(
     (mesh, tree): (&Mesh, &bvh::BinaryBvh),
     choice: &costs::Choice,

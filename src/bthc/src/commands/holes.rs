@@ -6,7 +6,8 @@ use bth_format::object::ObjectView;
 /// The triangles of an object that are not opaque, or not everywhere.
 pub(super) struct Holes {
     pub(super) triangles: u64,
-    /// Shares of their area that are opaque, transparent and unknown; of their number where the file has no positions.
+    /// Shares of their area that are opaque, transparent and unknown; of their number where the
+    /// file has no positions.
     pub(super) shares: [f64; 3],
 }
 

@@ -43,7 +43,7 @@ pub(crate) fn run(args: &Import) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A text that can stand in a comment: control characters become blanks.
+/// Makes a text fit for a comment: control characters become blanks.
 fn comment(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
@@ -75,7 +75,8 @@ fn summary(path: &Path, report: &ImportReport) -> String {
     format!("{}\nwrote {}\n", facts(report).render(), path.display())
 }
 
-/// The name of a scene or animation of a glTF file. One without a name is called by its number, which would look like a count.
+/// The name of a scene or animation of a glTF file. One without a name is called by its number,
+/// which would look like a count.
 fn name_or_number(name: &str) -> String {
     match name.parse::<u32>() {
         Ok(number) => format!("number {number} (without a name)"),

@@ -41,7 +41,7 @@ pub(crate) fn run(args: &Info) -> Result<(), Failure> {
     Ok(output::text(&text)?)
 }
 
-/// Shows what of a glTF file becomes a scene by default, and what is left out.
+/// Shows what of a glTF file becomes a scene by default, and what is skipped.
 fn gltf(model: &Path, json: bool) -> Result<(), Failure> {
     let options = ImportOptions::default();
     let (manifest, report) = scene::import(model, "model", &options, &bth_import::Silent)?;
@@ -107,8 +107,8 @@ fn describe(file: &File) -> Result<Value, Failure> {
     }))
 }
 
-/// Share of the triangles of an object of whose directions anything is known, of their bins those that are free, and of the sectors of the
-/// sides that are told those of each level or a greater one; null where nothing is known.
+/// Shares of what is known about free directions: triangles with any, free bins among their bins,
+/// and sectors of their sides with at least each level. Null where nothing is known.
 fn free_directions(view: &ObjectView<'_>) -> Value {
     let Some(levels) = view.free_levels.first() else { return Value::Null };
     let (mut rows, mut known, mut bins, mut beyond) = (0u64, 0u64, 0u64, [0u64; FreeSectors::LEVELS]);
@@ -129,7 +129,8 @@ fn free_directions(view: &ObjectView<'_>) -> Value {
         "levels": levels.distance, "bytes": rows as usize * view.free_kind().1})
 }
 
-/// Seconds from which the hierarchies of an object apply, and the objects that hold them; empty where one applies always.
+/// Seconds from which the hierarchies of an object apply, and the objects that hold them; empty
+/// where one applies always.
 fn segments(file: &File, object: u32) -> Vec<Value> {
     let rows = file.sequence(object).segments.iter();
     rows.map(|row| json!({"first": row.first, "object": object.saturating_add(row.object)})).collect()

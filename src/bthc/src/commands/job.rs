@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub(super) struct Job {
     pub(super) model: PathBuf,
-    /// Whether the model came from standard input; then its file is a temporary one.
+    /// True if the model came from standard input; then its file is a temporary one.
     pub(super) is_input: bool,
     pub(super) target: Target,
 }
@@ -48,7 +48,8 @@ pub(super) struct JobReport {
 const STANDARD_INPUT: &str = "standard input";
 
 impl Job {
-    /// An error of this job. The temporary file of a model from standard input is not a place that users know.
+    /// An error of this job. The temporary file of a model from standard input is not a place that
+    /// users know.
     pub(super) fn failure(&self, failure: Failure) -> Failure {
         match self.is_input {
             true => failure.with_name(&self.model, Path::new(STANDARD_INPUT)),
@@ -66,12 +67,14 @@ impl Job {
 }
 
 impl Target {
-    /// Whether the bytes of a compiled file that the cache holds must be written to the target.
+    /// Returns true if the bytes of a compiled file that the cache holds must be written to the
+    /// target.
     pub(super) fn needs(&self, record: &Record, store: Option<&Store>) -> bool {
         match self {
             Self::File(path) => !contains(path, record, store),
             Self::Stdout => true,
-            // The record may exist without its content, or with a damaged one, which must then be compiled again.
+            // The record may exist without its content, or with a damaged one, which must then be
+            // compiled again.
             Self::Cache => store.and_then(|store| store.pin(record)).is_none(),
         }
     }
@@ -93,7 +96,8 @@ impl Target {
     }
 }
 
-/// Whether a file has the content of a record, by its fingerprint in the store, or else by reading it.
+/// Returns true if a file has the content of a record, by its fingerprint in the store, or else by
+/// reading it.
 fn contains(path: &Path, record: &Record, store: Option<&Store>) -> bool {
     if store.and_then(|store| store.content_of(path)) == Some(record.blob) {
         return true;

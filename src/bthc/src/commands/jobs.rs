@@ -4,8 +4,8 @@ use super::job::Job;
 use crate::args::Compile;
 use bth_compile::jobs;
 
-/// Estimated memory of a compilation, as a multiple of the size of its source file (measured: 8 for text, 14 for binary
-/// meshes).
+/// Estimated memory of a compilation, as a multiple of the size of its source file (measured: 8 for
+/// text, 14 for binary meshes).
 const MEMORY_PER_BYTE: u64 = 16;
 /// Memory of a compilation in addition, with the worker for tetrahedra.
 const MEMORY_AT_LEAST: u64 = 64 << 20;
@@ -28,7 +28,7 @@ fn memory(args: &Compile) -> u64 {
     args.jobs.memory.map_or(u64::MAX, |mib| mib.saturating_mul(1 << 20))
 }
 
-/// Bytes that the objects of one of so many jobs may take, if it is a scene.
+/// Bytes that the objects of one of `jobs` jobs may take, if it is a scene.
 pub(super) fn memory_of_objects(args: &Compile, jobs: usize) -> u64 {
     match memory(args) {
         u64::MAX => u64::MAX,
@@ -36,7 +36,8 @@ pub(super) fn memory_of_objects(args: &Compile, jobs: usize) -> u64 {
     }
 }
 
-/// Runs the jobs, several at once; the results are in the order of the jobs. `work` gets the number of threads of a job.
+/// Runs the jobs, several at once; the results are in the order of the jobs. `work` gets the number
+/// of threads of a job.
 pub(super) fn run<T: Send>(args: &Compile, all: &[Job], work: impl Fn(&Job, usize) -> T + Sync) -> Vec<T> {
     let at_once = at_once(args, all.len());
     let share = (threads(args) / at_once).max(1);

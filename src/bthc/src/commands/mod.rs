@@ -64,7 +64,7 @@ fn manual() -> Result<(), Failure> {
         man.render_description_section(&mut page)?;
         man.render_options_section(&mut page)?;
     }
-    // Subcommands have no pages of their own: what the page says of them stands further down.
+    // Subcommands have no separate pages: the page describes them further down.
     let mut page = String::from_utf8_lossy(&page).into_owned();
     for name in command.get_subcommands().map(clap::Command::get_name) {
         page = page.replace(&format!("bthc\\-{name}(1)"), &format!("\\fBbthc {name}\\fR"));

@@ -16,7 +16,7 @@ use bth_scene::Manifest;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Whether a model is compiled as a scene.
+/// Returns true if a model is compiled as a scene.
 pub(super) fn is_scene(model: &Path, args: &Compile) -> bool {
     is_manifest(model) || is_gltf(model) && !args.flatten
 }
@@ -29,7 +29,7 @@ fn is_manifest(path: &Path) -> bool {
     has_extension(path, &["manifest", "toml"])
 }
 
-/// Whether a path names a glTF file.
+/// Returns true if a path names a glTF file.
 pub(super) fn is_gltf(path: &Path) -> bool {
     has_extension(path, &["gltf", "glb"])
 }

@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 
-/// Runs work on a pool of so many threads, one per processor for 0.
+/// Runs work on a pool of `threads` threads; 0 means one per processor.
 ///
 /// # Errors
 /// `BTH-L090` if the threads cannot be started.

@@ -18,8 +18,8 @@ const PAUSE: Duration = Duration::from_millis(200);
 /// Modification time and size of each file of a job; `None` for a missing file.
 type Fingerprint = Vec<(PathBuf, Option<(SystemTime, u64)>)>;
 
-/// Compiles the jobs, then again those whose files change, until it is cancelled. Errors are printed, and the job is compiled
-/// again when its files change.
+/// Compiles the jobs, then again those whose files change, until it is cancelled. Errors are
+/// printed, and the job is compiled again when its files change.
 ///
 /// # Errors
 /// Cancelled, or standard output closed.

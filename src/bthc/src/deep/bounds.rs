@@ -4,7 +4,7 @@ use super::rays::Start;
 use bth_format::layout::{KnownFree, free_axes, free_bin};
 use bth_format::object::ObjectView;
 
-/// Up to where nothing is met.
+/// Distance up to which nothing is hit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bound {
     /// Distance, in units of the object; infinite in a free direction.
@@ -14,7 +14,8 @@ pub(super) struct Bound {
 }
 
 impl Bound {
-    /// Whether a hit contradicts it. The distance of a file and the length are rounded, by far less than this.
+    /// Returns true if a hit contradicts it. The distance of a file and the length are rounded, by
+    /// far less than this.
     pub(super) fn is_broken(&self, t: f64) -> bool {
         t * self.length < self.distance * (1.0 - 1e-9)
     }

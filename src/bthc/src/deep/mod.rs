@@ -1,9 +1,11 @@
-//! `bthc verify --deep`: sample rays through each object, traced in all ways and decided in exact arithmetic.
+//! `bthc verify --deep`: sample rays through each object, traced in all ways and decided in exact
+//! arithmetic.
 //!
-//! A file that passes every check may still answer wrongly, where it tells something of its triangles that is not so: free directions and
-//! distances, boxes that were damaged together with their hashes, or a defect of this program. So rays are traced in a batch and one at a time, from an origin and from a
-//! start, and compared with every triangle in exact arithmetic; and what is known of the directions of the triangles on which rays start
-//! is compared with that, too.
+//! A file that passes every check may still answer wrongly, where it tells something of its
+//! triangles that is not so: free directions and distances, boxes that were damaged together with
+//! their hashes, or a defect of this program. So rays are traced in a batch and one at a time, from
+//! an origin and from a start, and compared with every triangle in exact arithmetic; and what is
+//! known of the directions of the triangles on which rays start is compared with that, too.
 
 mod bounds;
 mod poses;
@@ -21,10 +23,11 @@ use serde_json::json;
 use std::fmt::Debug;
 use std::path::Path;
 
-/// Tests of a ray against a triangle for each object, by which the number of its rays is chosen: some seconds on two cores. Each ray is
-/// traced from its origin and from its start.
+/// Tests of a ray against a triangle for each object, by which the number of its rays is chosen:
+/// some seconds on two cores. Each ray is traced from its origin and from its start.
 const TESTS: usize = 100_000_000;
-/// An intersection, which is computed exactly, takes as long as this many tests of triangles that a line misses.
+/// An intersection, which is computed exactly, takes as long as this many tests of triangles that a
+/// line misses.
 const INTERSECTION: usize = 800;
 /// Rays by which the number of intersections along a ray is estimated.
 const ESTIMATE: usize = 16;
@@ -57,7 +60,8 @@ impl Report {
     }
 }
 
-/// Compares so many rays of each object of a file, or a number that its triangles determine. Differences are printed on standard error.
+/// Compares `count` rays of each object of a file, by default a number that its triangles
+/// determine. Prints differences on standard error.
 ///
 /// # Errors
 /// A file that cannot be opened; cancellation.
@@ -104,8 +108,8 @@ fn check_object(
     Ok(findings)
 }
 
-/// How many rays of the only visible instance, which has these triangles, take some seconds. Where triangles are many times as large as
-/// the space between them, lines meet a great part of them.
+/// Number of rays of the only visible instance, which has these triangles, that take some seconds.
+/// Where triangles are many times as large as the space between them, lines hit many of them.
 fn affordable(alone: &Scene, all: &[Triangle]) -> usize {
     let most = TESTS / all.len();
     if most <= RAYS[0] {
@@ -140,7 +144,7 @@ fn check_pose(
         let (ray, start_ray) = (&start.ray, start.start_ray(instance));
         let (truth, from_start) = (world.nearest(ray), world.nearest_from_start(&start_ray));
         let at = |id| intersection(ray, corners_of(id)?);
-        // The first of two triangles is that of the start.
+        // The first of two triangles is the start.
         let mut of_two = start_ray;
         of_two.start.primitive.triangle = 0;
         let at_from_start = |id| starts::intersection(&[start.triangle.corners, corners_of(id)?], &of_two, 1);
@@ -176,7 +180,8 @@ struct Traced {
 }
 
 impl Traced {
-    /// What differs between the ways of tracing or from the exact hit, if anything does. `at` intersects the ray with a triangle.
+    /// What differs between the ways of tracing or from the exact hit, if anything does. `at`
+    /// intersects the ray with a triangle.
     fn wrong(
         &self,
         ray: &impl Debug,
@@ -228,13 +233,15 @@ fn trace<R: TraceRay>(alone: &Scene, rays: &[R], monitor: &dyn Monitor) -> Resul
     Ok(traced)
 }
 
-/// Whether t is the exact one, rounded to f32, or the next number to that, since it is rounded to f64 before.
+/// Returns true if t is the exact one, rounded to f32, or the next number to that, since it is
+/// rounded to f64 before.
 fn is_rounded(t: f32, exact: f64) -> bool {
     let exact = exact as f32;
     t == exact || t.to_bits().abs_diff(exact.to_bits()) <= 1
 }
 
-/// Whether another triangle is hit at a distance that differs by less than its rounding to f64.
+/// Returns true if another triangle is hit at a distance that differs by less than its rounding to
+/// f64.
 fn is_as_near(at: Option<Intersection>, exact: f64) -> bool {
     at.is_some_and(|at| (to_f64(&at.t) - exact).abs() <= 1e-12 * exact.abs())
 }
@@ -247,7 +254,8 @@ mod tests {
     use bth_compile::pipeline::{CompileOptions, Structure};
     use bth_random::Rng;
 
-    /// The default number of rays for 3,000 triangles of this size with their first corners anywhere in the unit cube.
+    /// The default number of rays for 3,000 triangles of this size with their first corners
+    /// anywhere in the unit cube.
     fn rays_of(size: f64) -> usize {
         let mut random = Rng::new(5);
         let mut positions = Vec::new();

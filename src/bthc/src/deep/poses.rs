@@ -1,4 +1,5 @@
-//! The scenes in which an object is traced: it alone, at rest or as the deformers of its file deform it.
+//! The scenes in which an object is traced: it alone, at rest or as the deformers of its file
+//! deform it.
 
 use crate::failure::Failure;
 use crate::output;
@@ -6,7 +7,8 @@ use bth::{Code, Scene, SceneBuilder};
 
 const IDENTITY: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
-/// Seconds at which an object is traced: the first, a middle and the last frame where its file deforms it, else `None` once.
+/// Seconds at which an object is traced: the first, a middle and the last frame where its file
+/// deforms it, else `None` once.
 pub(super) fn of(scene: &Scene, object: u32) -> Vec<Option<f64>> {
     let Some(view) = scene.description().filter(|view| view.deformers.iter().any(|d| d.object == object))
     else {
@@ -18,8 +20,9 @@ pub(super) fn of(scene: &Scene, object: u32) -> Vec<Option<f64>> {
     frames.into_iter().map(|frame| Some(frame / view.scene[0].rate)).collect()
 }
 
-/// A scene of one visible instance, and its id: the object by itself and at its place, where the runtime rounds no ray, with the positions that
-/// it has at `seconds` if these are given. `None`, after a warning, for an object that reaches so far that no instance of it can be placed.
+/// A scene of one visible instance, and its id: the object by itself and at its place, where the
+/// runtime rounds no ray, with the positions that it has at `seconds` if these are given. `None`,
+/// after a warning, for an object that reaches so far that no instance of it can be placed.
 ///
 /// # Errors
 /// Those of [`SceneBuilder::commit`].

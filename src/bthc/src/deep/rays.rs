@@ -10,7 +10,7 @@ pub(super) struct Start {
     pub(super) ray: Ray,
     /// The triangle on which it starts.
     pub(super) triangle: Triangle,
-    /// Whether it starts exactly at a corner of the triangle, and behind what it touches there.
+    /// True if it starts exactly at a corner of the triangle, and behind what it touches there.
     pub(super) is_at_corner: bool,
     /// Weights of the point on the triangle.
     uv: [f32; 2],
@@ -24,8 +24,8 @@ impl Start {
     }
 }
 
-/// `count` rays, in part in any direction and in part to corners and edges of other triangles, in part short. First come the rays
-/// from corners, then those from edges, and then the others.
+/// `count` rays, in part in any direction and in part to corners and edges of other triangles, in
+/// part short. First come the rays from corners, then those from edges, and then the others.
 pub(super) fn sample(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Start> {
     let mut random = Rng::new(seed);
     let kind = |i: usize| match 4 * i / count {

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 /// Rays that start on each node.
 const RAYS_PER_NODE: usize = 8192;
-/// Rounds of which the fastest counts.
+/// Rounds; the fastest counts.
 const ROUNDS: usize = 7;
 
 /// A tet leaf. Costs are nanoseconds per ray that starts on it; half of the rays are short.
@@ -46,7 +46,7 @@ pub(crate) fn measure(of: &Explained<'_>, most: usize, stop: impl Fn() -> bool) 
             (of.plain, &short, QueryKind::Any),
         ];
         let times = nanoseconds(&runs, ROUNDS, &stop)?;
-        // Descendants that replaced a failed node have no prediction of their own.
+        // Descendants that replaced a failed node have no prediction.
         let verdict = of.choice.verdicts.iter().find(|v| v.node == *node);
         let predicted = |value: fn(&bth_compile::costs::Verdict) -> f64| verdict.map_or(f64::NAN, value);
         nodes.push(MeasuredNode {

@@ -17,7 +17,8 @@ pub(crate) struct Explained<'a> {
     pub(crate) tree: &'a BinaryBvh,
     pub(crate) choice: &'a Choice,
     pub(crate) costs: &'a CostOptions,
-    /// Tetrahedralizations of the chosen nodes; a node that failed may be replaced by some below it.
+    /// Tetrahedralizations of the chosen nodes; a node that failed may be replaced by some below
+    /// it.
     pub(crate) built: &'a [(u32, TetMesh)],
     /// The model compiled with tetrahedra, and with a BVH only.
     pub(crate) compiled: &'a bth::Scene,

@@ -1,5 +1,5 @@
-//! Pictures of the model: twice, coloured by the structure that holds each triangle and by the cost of a bounced ray; and coloured by
-//! how many directions are free.
+//! Pictures of the model: twice, coloured by the structure that holds each triangle and by the cost
+//! of a bounced ray; and coloured by how many directions are free.
 
 use super::Explained;
 use bth::rays::{Hit, Ray, StartRay};
@@ -50,8 +50,8 @@ pub(crate) fn picture(of: &Explained<'_>) -> Result<(Vec<u8>, f64)> {
     Ok((encode(&pixels, 2 * SIZE)?, most))
 }
 
-/// The bytes of a PNG file that shows in how many of its directions rays from each triangle meet nothing: from dark where in none to
-/// yellow where in all. Directions that are free up to a distance count in part.
+/// Draws as PNG in how many of its directions rays from each triangle hit nothing: from dark for
+/// none to yellow for all. Directions that are free up to a distance count in part.
 ///
 /// # Errors
 /// An internal error of the encoder.
@@ -71,7 +71,8 @@ pub(crate) fn free_picture(
     encode(&pixels, SIZE)
 }
 
-/// Mean over the bins of a triangle: 1 where a bin is free, and a quarter for each level of its sector where it is not.
+/// Mean over the bins of a triangle: 1 where a bin is free, and a quarter for each level of its
+/// sector where it is not.
 fn openness(known: &KnownFree) -> f32 {
     let sectors = known.sectors[usize::from(known.bins.is_back())];
     let of_bin = |bin: usize| match known.bins.is_free(bin) {
@@ -89,7 +90,7 @@ fn nearest(scene: &bth::Scene, rays: &[Ray]) -> Vec<Hit> {
     hits
 }
 
-/// The light of a lamp beside the camera on what a ray hits.
+/// Light of a lamp at the camera on what a ray hits.
 fn light(mesh: &Mesh, ray: &Ray, hit: &Hit) -> f32 {
     0.35 + 0.65 * normal(mesh, hit.primitive.triangle).dot(Vec3::from_array(ray.direction)).abs()
 }
@@ -139,8 +140,8 @@ fn normal(mesh: &Mesh, triangle: u32) -> Vec3 {
     unit((b - a).cross(c - a))
 }
 
-/// Colour of each triangle: greens for tet leaves, orange where bad contacts forbid them, greys where the BVH is cheaper
-/// or there are too few triangles.
+/// Colour of each triangle: greens for tet leaves, orange where bad contacts forbid them, greys
+/// where the BVH is cheaper or there are too few triangles.
 fn kinds(of: &Explained<'_>) -> Vec<Vec3> {
     let mut colours = vec![Vec3::splat(0.5); of.mesh.triangles.len()];
     let mut paint = |node: u32, colour: [f32; 3]| {
@@ -168,8 +169,8 @@ fn kinds(of: &Explained<'_>) -> Vec<Vec3> {
     colours
 }
 
-/// The cost in nanoseconds, by the profile, of the ray that is mirrored at a hit: of the nodes, leaves and tetrahedra that it
-/// visits.
+/// The cost in nanoseconds, by the profile, of the ray that is mirrored at a hit: of the nodes,
+/// leaves and tetrahedra that it visits.
 fn bounce(of: &Explained<'_>, ray: &Ray, hit: &Hit) -> Option<f64> {
     if !hit.is_hit() {
         return None;

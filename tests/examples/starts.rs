@@ -52,7 +52,7 @@ struct Counts {
     ghosts: u64,
     /// Answers that depend on the instruction set, the batch or the query.
     different: u64,
-    /// Answers that are not those of the oracle.
+    /// Answers that differ from the oracle.
     wrong: u64,
 }
 

@@ -5,8 +5,7 @@ use bth_format::layout::*;
 use bth_random::Rng;
 use zerocopy::IntoBytes;
 
-/// A file with `count` moving instances: every node has a track of its own, or only the root has
-/// one.
+/// A file with `count` moving instances: every node has a track, or only the root.
 pub fn crowd(count: u32, own_tracks: bool) -> Vec<u8> {
     let corners = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.5]];
     let row = |k: usize| std::array::from_fn(|i| corners.get(i).unwrap_or(&corners[0])[k]);

@@ -50,7 +50,7 @@ pub fn by_day<T>(day: T, night: T) -> T {
     if std::env::var_os("BTH_DEEP").is_some() { night } else { day }
 }
 
-/// The tetrahedralization worker: `BTH_TETGEN`, or the one built beside the tests. Prints a line
+/// The tetrahedralization worker: `BTH_TETGEN`, or the one built with the tests. Prints a line
 /// where there is none, since tests with tetrahedra are skipped then.
 #[allow(clippy::print_stderr)]
 pub fn worker() -> Option<&'static Path> {

@@ -4,7 +4,7 @@ use bth_compile::write::{FileBuilder, ObjectParts, SceneParts, object, scene};
 use bth_format::layout::*;
 use zerocopy::IntoBytes;
 
-/// The least box around points.
+/// The smallest box around points.
 fn bounds(triangles: &[[[f32; 3]; 3]]) -> ([f32; 3], [f32; 3]) {
     let fold = |pick: fn(f32, f32) -> f32| {
         [0, 1, 2].map(|k| triangles.iter().flatten().map(|p| p[k]).reduce(pick).expect("a triangle"))

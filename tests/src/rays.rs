@@ -79,8 +79,8 @@ pub fn onward(hits: &[Hit], triangles: usize, seed: u64) -> Vec<StartRay> {
     hits.iter().map(&mut from).collect()
 }
 
-/// Weights of points of a triangle: corners, points of edges, some of which have a sum that rounds
-/// to above 1, and others.
+/// Weights of points of a triangle: corners; points of edges, some with a sum that rounds to above
+/// 1; and others.
 pub fn weights(rng: &mut Rng) -> [f32; 2] {
     let w = rng.unit_f32();
     match rng.below(10) {
@@ -91,7 +91,7 @@ pub fn weights(rng: &mut Rng) -> [f32; 2] {
         4 => [0.0, w],
         5 => [w, 1.0 - w],
         6 => {
-            // Up to the greatest sum.
+            // Up to the largest sum.
             let v = 1.0 - w + (1 + rng.below(4)) as f32 / (1 << 24) as f32;
             [w, if w + v <= 1.0 + 1.0 / (1 << 22) as f32 { v } else { 1.0 - w }]
         }

@@ -72,9 +72,9 @@ pub fn structures_named(model: &Model, whole: bool, is_wanted: impl Fn(&str) -> 
     wanted.map(|(name, options)| Traced { scene: compiled(model, &options), name }).collect()
 }
 
-/// The model as a deformable object that was compiled in another shape and then given the positions
-/// of the model: each point is turned about the last axis by an angle that grows along it, and
-/// moved by up to a sixteenth of the size of the model. Its tree is that of the other shape, so its
+/// The model as a deformable object, compiled in another shape and then given the positions of the
+/// model. In the other shape each point is turned about the last axis by an angle that grows along
+/// it, and moved by up to a sixteenth of the model's size. The tree fits the other shape, so its
 /// boxes overlap much more.
 ///
 /// # Panics

@@ -9,7 +9,7 @@ use bth_format::layout::RecordKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Compiles a model; `None` where the structure needs a worker and there is none.
+/// Compiles a model; `None` where the structure needs a worker that does not exist.
 fn compiled(model: &bth_scenes::Model, options: &CompileOptions) -> Option<Vec<u8>> {
     if options.structure != Structure::Bvh && bth_tests::worker().is_none() {
         return None;

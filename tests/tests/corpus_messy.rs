@@ -14,8 +14,8 @@ use corpus_support::{data_and_compiler, listed_triangles, models, program, run};
 
 /// Wall-clock limit, generous for busy machines; the documented limits are below.
 const LIMIT: Duration = Duration::from_secs(300);
-/// What a messy model may take: seconds of CPU time of the compiler, and memory. No messy model has
-/// as many as 70,000 triangles.
+/// Limits for a messy model: seconds of CPU time of the compiler, and memory. No messy model has
+/// 70,000 triangles.
 const CPU_SECONDS: u32 = 60;
 const MEMORY_KIB: u32 = 4 << 20;
 /// Seconds of a tetrahedralization. By default it may take minutes, which TetGen spends on two of
@@ -184,7 +184,7 @@ fn check(bthc: &Path, data: &Path, model: &Path, file: &Path) -> Result<(bool, f
     }
 }
 
-/// Models whose triangles the table counts by rules of its own.
+/// Models whose triangles the table counts by other rules.
 fn differently_counted(_model: &Path) -> bool {
     false
 }

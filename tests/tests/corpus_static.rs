@@ -17,7 +17,7 @@ use corpus_support::{Ended, data_and_compiler, listed_triangles, models, program
 
 const LIMIT: Duration = Duration::from_secs(600);
 
-/// Models with at most so many triangles are tried, by `BTH_CORPUS`: small ones without it.
+/// Max triangles of the models that are tried, by `BTH_CORPUS`: small ones without it.
 fn most_triangles() -> u64 {
     match std::env::var("BTH_CORPUS").as_deref() {
         Ok("all") => u64::MAX,
@@ -26,7 +26,7 @@ fn most_triangles() -> u64 {
     }
 }
 
-/// The models to try, with their numbers of triangles; prints which are left out.
+/// The models to try, with their numbers of triangles; prints which are skipped.
 fn chosen(data: &Path) -> Vec<(PathBuf, u64)> {
     let mut chosen = Vec::new();
     for model in models(&data.join("static")) {
@@ -116,7 +116,7 @@ fn compare(tets: &bth::Scene, bvh: &bth::Scene, model: &Path) -> usize {
         };
         let (a, b) = (tets.nearest(&ray).unwrap_or(Hit::MISS), bvh.nearest(&ray).unwrap_or(Hit::MISS));
         assert_eq!(a.t.to_bits(), b.t.to_bits(), "{}: {ray:?} gives {a:?} and {b:?}", model.display());
-        // Where triangles meet, either may be reported; only the distance must agree.
+        // Where triangles touch, either may be reported; only the distance must agree.
         hits += usize::from(a.t.is_finite());
     }
     hits

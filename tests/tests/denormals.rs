@@ -28,8 +28,8 @@ fn denormal_flags(trace: impl FnOnce()) -> u32 {
     after & DENORMAL
 }
 
-/// Rays from around the model to points in it, as renderers send them: `tmin` 0, small or the least
-/// normal number, `tmax` a length, a large number, the greatest or infinite.
+/// Rays from around the model to points in it, as renderers send them: `tmin` 0, small or the
+/// smallest normal number, `tmax` a length, a large number, the largest or infinite.
 fn ordinary(count: usize, tmin: f32, tmax: f32) -> Vec<Ray> {
     let mut rng = Rng::new(7);
     let mut point = |size: f32| [(); 3].map(|()| (rng.unit_f32() - 0.5) * size);

@@ -141,9 +141,8 @@ fn small_things_on_a_wide_plain_are_traced_exactly() {
     }
 }
 
-/// Rays from about the origin have pads that allow neither for the plain's coordinates nor for
-/// those of the knot, which only the boxes in the file do: rays along the sides of boxes tell
-/// whether they do.
+/// Rays from about the origin have pads that allow neither for the coordinates of the plain nor of
+/// the knot. Only the boxes in the file do, and rays along the sides of boxes tell whether they do.
 #[test]
 fn packets_to_the_corners_of_small_things_on_a_wide_plain_are_traced_exactly() {
     let mut hits_found = 0;
@@ -152,8 +151,7 @@ fn packets_to_the_corners_of_small_things_on_a_wide_plain_are_traced_exactly() {
         let corners: Corners = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
         let scene = compiled(&model, &options(Structure::Bvh, RecordKind::Link32, false));
         for along_one_direction in [false, true] {
-            // Rays to the corners of each triangle and beside them, those of one triangle after
-            // those of the last.
+            // Rays to the corners of each triangle and next to them, triangle by triangle.
             let targets = corners.iter().take(200).flatten().flat_map(|p| {
                 [
                     *p,
@@ -164,7 +162,7 @@ fn packets_to_the_corners_of_small_things_on_a_wide_plain_are_traced_exactly() {
             });
             let rays: Vec<Ray> = targets
                 .map(|to| match along_one_direction {
-                    // Below the least component of directions that boxes are tested with.
+                    // Below the smallest component of directions that boxes are tested with.
                     true => Ray::new([to[0], to[1], 0.0], [1e-9, -1e-9, 1.0]),
                     false => Ray::new([0.0; 3], to),
                 })

@@ -52,8 +52,8 @@ fn a_cmake_project_finds_the_libraries() {
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
     let moved = installed(folder.path());
-    // A link to the folder with the files for CMake, as /lib is one to /usr/lib; /include is not
-    // beside it.
+    // A link to the folder with the files for CMake, as /lib is one to /usr/lib; /include is
+    // elsewhere.
     let prefix = folder.path().join("root");
     std::fs::create_dir(&prefix).expect("a folder");
     std::os::unix::fs::symlink(moved.join("lib"), prefix.join("lib")).expect("a link");
@@ -113,7 +113,7 @@ fn folders_start_where_the_scripts_are_started() {
     let absent = script("manuals", &["absent", "there"]);
     assert_eq!(absent.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&absent.stderr).contains("there is no bthc in"), "{absent:?}");
-    // Nothing of what was asked is left out without a word.
+    // Whatever was asked is made, or its absence is told.
     for name in ["install", "static", "debian", "wheel"] {
         let refused = script(name, &["one", "two"]);
         assert_eq!(refused.status.code(), Some(2), "{name}: {refused:?}");
@@ -142,8 +142,7 @@ fn pack_debian_packages(folder: &Path) -> Vec<(String, PathBuf)> {
     packages
 }
 
-/// The packages for Debian, which are packed once for all tests, into a folder beside those of the
-/// build.
+/// The packages for Debian, which are packed once for all tests, into a folder next to the build's.
 fn debian_packages() -> &'static [(String, PathBuf)] {
     static PACKED: OnceLock<Vec<(String, PathBuf)>> = OnceLock::new();
     PACKED.get_or_init(|| {

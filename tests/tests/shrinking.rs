@@ -14,7 +14,7 @@ const CHILD: &str = "BTH_TEST_TRUNCATES";
 /// POSIX: access to an undefined portion of a memory object.
 const SIGBUS: i32 = 7;
 
-/// A compiled model of many pages in a folder of its own.
+/// A compiled model of many pages in a new folder.
 fn model() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let options = CompileOptions { structure: Structure::Bvh, ..CompileOptions::default() };

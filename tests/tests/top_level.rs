@@ -1,8 +1,8 @@
-//! Rebuilding the top level takes at most the documented time: the least of many frames, so that
+//! Rebuilding the top level takes at most the documented time: the fastest of many frames, so that
 //! other programs on the machine do not matter. The bound holds even with debug assertions.
 #![allow(clippy::print_stdout)]
 
-/// Seconds of the fastest rebuilding for a crowd of which each instance, or only the root, has a
+/// Seconds of the fastest rebuilding for a crowd in which each instance, or only the root, has a
 /// track.
 fn fastest_rebuilding(instances: u32, own_tracks: bool, frames: i32) -> f64 {
     let mut world = bth::from_bytes(&bth_tests::crowd::crowd(instances, own_tracks)).unwrap();

@@ -9,7 +9,7 @@ use bth_format::layout::*;
 use std::mem::offset_of;
 use zerocopy::IntoBytes;
 
-/// Two triangles; the last vertex stands where the first does, and moves in another way.
+/// Two triangles; the last vertex is at the place of the first, and moves in another way.
 const POSITIONS: [[f32; 3]; 5] =
     [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [0.0, 0.0, 0.0]];
 const TRIANGLES: [[u32; 3]; 2] = [[0, 1, 2], [2, 3, 4]];

@@ -18,7 +18,7 @@ pub use valid::valid;
 /// A conformance file.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// Name without extension; those of invalid files start with the code, as in `F012-overlap`.
+    /// Name without extension; invalid files start with the code, as in `F012-overlap`.
     pub name: String,
     /// The whole file.
     pub bytes: Vec<u8>,

@@ -153,7 +153,7 @@ fn one_above_the_other(free: &[FreeDirections], free_distances: &[FreeDistances]
     })
 }
 
-/// Sectors of which that of steep directions has a level.
+/// Sectors with a level for steep directions only.
 fn steep(level: usize) -> FreeSectors {
     FreeSectors(0)
         .with(FreeSectors::of_bin(FREE_BINS / 2).expect("the bin in the middle has a sector"), level)
@@ -224,7 +224,7 @@ fn triangle_bare() -> Vec<u8> {
     })
 }
 
-/// The ends of the least box of `f32` with the room around a point that widened boxes have.
+/// The ends of the smallest box of `f32` with the room around a point that widened boxes have.
 fn room_around(point: [f32; 3]) -> [[f32; 3]; 2] {
     let margin = point.into_iter().fold(0.0, |m: f64, x| m.max(f64::from(x).abs())) * BOX_MARGIN;
     let lower = point.map(|x| {
@@ -240,7 +240,7 @@ fn room_around(point: [f32; 3]) -> [[f32; 3]; 2] {
 }
 
 /// A grid of 4 by 5 squares, two triangles each: 12 squares in an inner node with indexed and raw
-/// leaves, 8 in leaves beside it; and a triangle without area. Normals and texture coordinates are
+/// leaves, 8 in leaves next to it; and a triangle without area. Normals and texture coordinates are
 /// kept. With bits, the leaves are quantized to a grid that moves the source's positions slightly.
 fn two_levels(bits: Option<GridBits>) -> Vec<u8> {
     two_levels_of(bits, [false; 2])
@@ -251,8 +251,7 @@ fn with_places(bits: Option<GridBits>) -> Vec<u8> {
     two_levels_of(bits, [false, true])
 }
 
-/// As [`two_levels`], with child boxes that have the least room around the triangles that widened
-/// boxes must have.
+/// Returns the file of [`two_levels`] with the smallest child boxes that widened boxes allow.
 fn two_levels_widened() -> Vec<u8> {
     two_levels_of(None, [true, false])
 }

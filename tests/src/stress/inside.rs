@@ -12,7 +12,7 @@ use std::collections::HashMap;
 
 /// Points that are asked for together.
 const BATCH: usize = 1024;
-/// Wrong answers of which the points are kept.
+/// Number of wrong answers whose points are kept.
 const EXAMPLES: usize = 4;
 
 /// The corners of a triangle.
@@ -27,7 +27,7 @@ pub struct InsideStatistics {
     pub inside: u64,
     /// Rays that pass exactly through a vertex or the middle of an edge.
     pub aimed: u64,
-    /// Answers that differ from those along another ray, from those of another call, or in parity.
+    /// Answers that differ along another ray, in another call, or in parity.
     pub different: u64,
     /// Points that were compared with all triangles.
     pub compared: u64,

@@ -162,7 +162,7 @@ fn ray(shape: &Shape, kind: Kind, rng: &mut Rng) -> Aimed {
     Aimed { kind, ray, through }
 }
 
-/// A range that begins or ends at t = 1, where the target is, or just beside it.
+/// A range that begins or ends at t = 1, where the target is, or next to it.
 fn range_about_one(rng: &mut Rng) -> [f32; 2] {
     let one = 1.0f32;
     let ranges = [

@@ -99,7 +99,7 @@ fn vertex(grid: &mut Grid, rows: &mut BTreeMap<Point, u32>, p: Point) -> u32 {
     })
 }
 
-/// A model rounded to even numbers of a grid in which its greatest coordinate is about `radius`.
+/// A model rounded to even numbers of a grid in which its largest coordinate is about `radius`.
 fn model(name: &'static str, model: &Model, radius: i32, inside: Vec<Point>, whole: bool) -> Shape {
     let greatest = model.positions.iter().flatten().fold(0.0f32, |m, x| m.max(x.abs()));
     let even = |x: f32| 2 * (f64::from(x) / f64::from(greatest) * f64::from(radius) / 2.0).round() as i32;

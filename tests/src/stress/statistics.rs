@@ -11,7 +11,7 @@ const BINS: usize = 8 * 8 + 1;
 /// Counts over many rays.
 #[derive(Clone, Debug)]
 pub struct Statistics {
-    /// Rays, each of which went through all structures.
+    /// Rays. Each went through all structures.
     pub rays: u64,
     /// Rays traced, over structures, instruction sets and kinds of query.
     pub traced: u64,
@@ -19,12 +19,12 @@ pub struct Statistics {
     pub hits: u64,
     /// Rays compared with every triangle.
     pub compared: u64,
-    /// Neither a triangle that the line is known to meet within the range was found, nor one before
-    /// it.
+    /// The line is known to hit a triangle within the range, but neither that one was found nor one
+    /// before it.
     pub misses: u64,
     /// A ray from inside a closed surface found nothing.
     pub leaks: u64,
-    /// A triangle was reported that the line does not meet, or outside the range.
+    /// A triangle was reported that the line does not hit, or outside the range.
     pub ghosts: u64,
     /// Answers whose bits depend on structure, record, instruction set or batch.
     pub different: u64,
@@ -155,8 +155,8 @@ fn within([tmin, tmax]: [f32; 2], t: f32) -> bool {
     tmin <= t && t <= tmax && t.is_finite()
 }
 
-/// The t at which the line is known to meet a triangle: one at the target vertex or edge whose
-/// plane does not contain the line.
+/// The t at which the line is known to hit a triangle: one at the target vertex or edge whose plane
+/// does not contain the line.
 fn known(shape: &Shape, aimed: &Aimed) -> Option<Quotient> {
     let (vertex, other) = match aimed.through? {
         Target::Vertex(vertex) => (vertex, vertex),

@@ -20,7 +20,7 @@ fn note(size: usize) {
 unsafe impl GlobalAlloc for Measuring {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         note(layout.size());
-        // SAFETY: the caller's contract is that of this method.
+        // SAFETY: the caller keeps this method's contract, which is the same.
         unsafe { System.alloc(layout) }
     }
     unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {

@@ -1,5 +1,5 @@
-//! Rays that are traced again allocate nothing: threads that trace at the same time do not meet in
-//! the allocator.
+//! Rays that are traced again allocate nothing, so threads that trace at the same time do not wait
+//! for each other in the allocator.
 
 use crate::measure::largest;
 use bth::rays::{Hit, Ray};

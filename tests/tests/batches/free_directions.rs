@@ -23,8 +23,7 @@ fn with_free_directions(model: &Model, options: CompileOptions, keep: KeepFree) 
     bth::from_bytes(&compiled.bytes).expect("a file that opens")
 }
 
-/// Rays from points of triangles, of their edges and corners, in all directions, some of which end
-/// early.
+/// Rays from points of triangles, of their edges and corners, in all directions. Some end early.
 fn rays_off_the_surface(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<StartRay> {
     let mut rng = Rng::new(seed);
     let of_ray = |i: usize, rng: &mut Rng| {
@@ -176,7 +175,7 @@ fn free_directions_on_a_grid_and_far_from_the_origin_change_no_answer() {
 }
 
 /// A scene of some instances of an object with free directions, moved, turned, mirrored, scaled and
-/// sheared, of which several overlap; and their transforms.
+/// sheared, and their transforms. Several overlap.
 fn instances_of(object: &Scene, count: usize, seed: u64) -> (Scene, Vec<[f32; 12]>) {
     let mut rng = Rng::new(seed);
     let mut number = |size: f32| (2.0 * rng.unit_f64() as f32 - 1.0) * size;
@@ -212,7 +211,7 @@ fn placed(ray: &StartRay, instance: u32, rows: &[f32; 12]) -> StartRay {
     placed
 }
 
-/// Rays that start on instances, of which some do not exist.
+/// Rays that start on instances, some of which do not exist.
 #[test]
 fn free_directions_of_instances_change_no_answer() {
     let _turn = turn();
@@ -221,7 +220,7 @@ fn free_directions_of_instances_change_no_answer() {
     let objects = [KeepFree::All, KeepFree::Distances]
         .map(|keep| with_free_directions(&model, CompileOptions::default(), keep));
     let mut rng = Rng::new(5);
-    // One visible instance has a way of its own.
+    // A single visible instance is traced in another way.
     for (i, count) in [1, 3, 24, 1, 3, 24].into_iter().enumerate() {
         let object = &objects[i / 3];
         let (scene, transforms) = instances_of(object, count, 21 + count as u64);

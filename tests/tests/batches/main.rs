@@ -247,7 +247,7 @@ fn conditions_of_a_batch_are_those_of_its_rays() {
     assert!(some_hits > rays.len() / 4 && some_hits < rays.len(), "{some_hits}");
 }
 
-/// A hit a little behind the origin is rounded to t = 0 where coordinates are tiny beside
+/// A hit a little behind the origin is rounded to t = 0 where coordinates are tiny compared with
 /// directions.
 #[test]
 fn hits_that_are_rounded_to_the_origin_are_found_through_tetrahedra() {

@@ -159,7 +159,7 @@ fn a_c_program_reads_how_surfaces_look() {
     let attributes = bth_import::Keep::All;
     let kept =
         shown(CompileOptions { attributes, names: true, materials: true, ..CompileOptions::default() });
-    // The rows of OBJ's images go up, those of the transform down.
+    // The rows of OBJ's images go up, the rows of the transform down.
     let expected = format!(
         "material 0.5 0.25 1 1 emissive 2 1 0 alpha 0 0 flags 1 textures 0 -1\n\
         material 1 1 1 0.5 emissive 0 0 0 alpha 2 0 flags 1 textures -1 -1\n\

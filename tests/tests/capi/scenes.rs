@@ -6,7 +6,7 @@ use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, compile};
 use std::path::Path;
 
-/// A wheel that turns, and stands on its edge without any depth in frame 3.
+/// A wheel that turns, and is on its edge without any depth in frame 3.
 pub(crate) const SCENE: &str = r#"version = 1
 frames = { first = -1, last = 4, rate = 2 }
 objects = [{ name = "quad", model = "quad.obj" }]

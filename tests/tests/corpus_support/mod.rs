@@ -1,10 +1,10 @@
-//! Runs the built programs on the models that lie beside the checkout.
+//! Runs the built programs on the models that lie next to the checkout.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Folder of the test models: `BTH_DATA`, else `../shared/data` beside the checkout.
+/// Folder of the test models: `BTH_DATA`, else `../shared/data` next to the checkout.
 pub(crate) fn data() -> Option<PathBuf> {
     let folder = std::env::var_os("BTH_DATA")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);

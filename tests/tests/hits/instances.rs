@@ -170,7 +170,7 @@ fn masks_hide_instances_from_rays_without_a_common_bit() {
 #[test]
 fn mirrored_instances_keep_their_front() {
     let scene = instances();
-    // Instances 0 and 3 are the same layers, the second one mirrored. Both are met from below,
+    // Instances 0 and 3 are the same layers, the second one mirrored. Both are hit from below,
     // where of two triangles at the same place the one with the id 3 modulo 4 has its front.
     let ray = Ray::new([0.5, 0.7, -5.0], [0.0, 0.0, 1.0]);
     for (cull, count) in [(Cull::None, 4), (Cull::Back, 2), (Cull::Front, 2)] {

@@ -174,7 +174,7 @@ fn for_every_isa(mut check: impl FnMut(Isa)) {
     Isa::best().choose().unwrap();
 }
 
-/// Checks a model, of which the triangles are stored as they are, in every structure.
+/// Checks a model in every structure. Its triangles are stored as they are.
 fn check(model: &Model, whole: bool, ray_count: usize, seed: u64) {
     let traced = every_structure(model, whole);
     let triangles = oracle::triangles(&traced[0].scene.object(0));

@@ -268,7 +268,7 @@ fn machines_share_what_they_made() {
     compile(here.path(), &["s.manifest", "--shared-cache", place]);
     let json = compile(there.path(), &["s.manifest", "--shared-cache", place]);
     let (hits, misses) = found(&json);
-    // The scene is assembled anew; the cache holds only its objects.
+    // The scene is assembled again; the cache holds only its objects.
     assert_eq!((&hits[..], &misses[..]), (&["object 3".into()][..], &["scene".into()][..]));
     let read = |folder: &tempfile::TempDir| std::fs::read(folder.path().join("s.bth")).unwrap();
     assert!(read(&here) == read(&there));

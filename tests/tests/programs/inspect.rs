@@ -77,8 +77,8 @@ fn verify_deep_finds_what_a_file_knows_wrongly() {
     assert!(wrong["deep"]["wrong"].as_u64().is_some_and(|wrong| wrong > 100), "{wrong:#}");
 }
 
-/// Rays must be sampled from the triangles that are traced: those of the poses, which here are far
-/// apart.
+/// Rays must be sampled from the triangles that are traced: the triangles of the poses, which here
+/// are far apart.
 #[test]
 fn verify_deep_traces_objects_that_deform_in_their_poses() {
     let (positions, faces) = sphere_mesh(8);

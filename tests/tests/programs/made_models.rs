@@ -33,8 +33,8 @@ pub(crate) fn png(width: u32, rgba: &[[u8; 4]]) -> Vec<u8> {
     bytes
 }
 
-/// A square from (0, 0, 0) to (2, 2, 0) of two triangles that faces +z, of a material whose
-/// textures are those of `images`. Its vertices have the colours, linear, if there are some.
+/// A square from (0, 0, 0) to (2, 2, 0) of two triangles that faces +z. Its material takes its
+/// textures from `images`. Its vertices have the linear colours, if there are some.
 pub(crate) fn square(material: &Value, images: &[Value], colors: Option<[[f32; 4]; 4]>) -> String {
     let mut floats: Vec<f32> = vec![0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 2.0, 2.0, 0.0, 0.0, 2.0, 0.0];
     floats.extend([0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]);

@@ -92,7 +92,7 @@ fn mistakes_get_an_error_with_its_place_and_never_a_backtrace() {
         for text in expected {
             assert!(run.stderr.contains(text), "{program} {args:?} does not name {text:?}: {run:?}");
         }
-        // Errors end with a hint, which those about the command line have as a text of their own.
+        // Errors end with a hint. Errors of the command line have it as a separate text.
         if code != 2 {
             assert!(run.stderr.contains(" (hint: "), "{args:?}: {run:?}");
         }

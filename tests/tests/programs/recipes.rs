@@ -92,8 +92,8 @@ impl Project {
         calls
     }
 
-    /// Runs a build after every kind of change. `outputs` are that of the model and, if the recipe
-    /// has one, of the scene.
+    /// Runs a build after every kind of change. `outputs` are the files of the model and, if the
+    /// recipe has one, of the scene.
     fn follows_changes(&self, outputs: &[&str], build: &dyn Fn()) {
         let step = || std::thread::sleep(Duration::from_millis(30));
         build();
@@ -160,7 +160,7 @@ fn cmake_compiles_what_changed() {
         let head = "cmake_minimum_required(VERSION 3.20)\nproject(models NONE)\n";
         let text = head.to_owned() + &recipe("CMake", "cmake");
         std::fs::write(project.at("CMakeLists.txt"), text).unwrap();
-        // The recipe has the model beside its CMakeLists.txt.
+        // The recipe has the model next to its CMakeLists.txt.
         std::fs::rename(project.at("models/dragon.ply"), project.at("dragon.ply")).unwrap();
         std::os::unix::fs::symlink("../dragon.ply", project.at("models/dragon.ply")).unwrap();
         project.run("", "cmake", &["-S", ".", "-B", "build", "-G", generator]);
@@ -184,7 +184,7 @@ fn a_git_lfs_project_gets_its_compiled_files_from_the_shared_cache() {
     let sh = recipe("Git LFS", "sh").replace("/mnt/team/bth", &shared);
     let (set_up, compile) = sh.split_at(sh.find("export ").unwrap());
     let shell = |folder: &str, script: &str| {
-        // Each machine has a cache of its own.
+        // Each machine has its cache.
         let own = project.at(&format!("cache of {folder}"));
         project.output(folder, "sh", &["-ec", &format!("export BTH_CACHE_DIR='{}'\n{script}", own.display())])
     };

@@ -348,7 +348,7 @@ fn objects_that_no_ray_comes_near_are_not_touched() {
     assert_eq!(touched("0,3,6,0,0,0"), 2, "all");
 }
 
-/// What a scene leaves out is told, as for single models.
+/// What a scene skips is told, as for single models.
 #[test]
 fn scenes_tell_what_they_leave_out() {
     let manifest = r#"version = 1

@@ -11,7 +11,7 @@ use std::fmt::Write;
 use std::path::Path;
 use std::sync::Mutex;
 
-/// The chosen instruction set is that of the process.
+/// Held by tests that choose the process's instruction set.
 pub(crate) static CHOICE: Mutex<()> = Mutex::new(());
 
 pub(crate) const IDENTITY: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
@@ -50,7 +50,7 @@ pub(crate) fn rays(scene: &Scene, rng: &mut Rng, count: usize) -> Vec<Ray> {
         .collect()
 }
 
-/// Compares all queries of two scenes, of which the second has the object indices of the first plus
+/// Compares all queries of two scenes. The second has the object indices of the first plus
 /// `objects`, and the same instance ids. Returns how many rays hit.
 pub(crate) fn compare(a: &Scene, b: &Scene, objects: u32, rng: &mut Rng) -> usize {
     let rays = rays(a, rng, 1500);
@@ -159,7 +159,7 @@ fn a_file_placed_as_a_whole_moves_as_it_does_alone() {
         hits += compare(&alone, builder.scene(), 0, rng);
     }
     assert!(hits > 3000, "{hits}");
-    // A second one at another time and place, beside an instance of its own.
+    // A second one at another time and place, next to an instance.
     let mut other = Vec::new();
     builder.instance(first, &[1.0, 0.0, 0.0, 50.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]).unwrap();
     let moved = [1.0, 0.0, 0.0, 256.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];

@@ -24,8 +24,7 @@ fn bytes(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &CompileOption
     compiled.bytes
 }
 
-/// A closed mesh, and beside it triangles of zero area, a doubled vertex and a vertex that no
-/// triangle uses.
+/// A closed mesh; and triangles of zero area, a doubled vertex and a vertex that no triangle uses.
 fn mesh(triangles: u32) -> (Positions, Vec<[u32; 3]>) {
     let knot = bth_scenes::knot::torus_knot(triangles);
     let (mut positions, mut rows) = (knot.positions, knot.triangles);
@@ -307,7 +306,7 @@ fn instances_follow_objects_that_deform_and_a_failed_commit_changes_nothing() {
     transforms.iter().enumerate().for_each(|(id, _)| builder.set_visible(id as u32, false).unwrap());
     builder.commit().unwrap();
     assert_eq!(builder.scene().object(0).positions[0], huge[0]);
-    // A scene of its own refuses them at once.
+    // A separate scene refuses them at once.
     let mut alone = placed(&file, &[IDENTITY.map(|x| x * 4.0)]).into_scene();
     let still = alone.object(0).lines.to_vec();
     assert_eq!(alone.set_positions(0, &huge).unwrap_err().code(), Code::NotFinite);
@@ -326,7 +325,7 @@ fn options_that_exclude_each_other_are_an_error() {
         let error = compile(mesh, &options, &Silent).unwrap_err().to_string();
         assert!(error.contains("BTH-L033"), "{error}");
     }
-    // Tetrahedralizations are left out where they would be a choice.
+    // Tetrahedralizations are skipped where they would be a choice.
     let default = CompileOptions { structure: Default::default(), ..deformable() };
     let file = bytes(&positions, &triangles, &default);
     assert!(file != bytes(&positions, &triangles, &options()));

@@ -33,7 +33,7 @@ fn joints_take_all_their_ancestors_and_the_transform_of_the_skinned_node_has_no_
 
 #[test]
 fn rays_hit_the_vertices_of_the_time_and_normals_turn_with_them() {
-    // Tilted, so that they are not those of the triangles.
+    // Tilted, so that they differ from the normals of the triangles.
     let normals = [[0.0f32, 0.6, 0.8]; 4];
     let quarter = 0.5f32.sqrt();
     let mut document = Document::new().skinned([[1, 0, 0, 0]; 4], [[1.0, 0.0, 0.0, 0.0]; 4]).animate(
@@ -88,7 +88,7 @@ fn subscenes_deform_and_are_placed_as_a_whole() {
     let shifted = [1.0, 0.0, 0.0, 1000.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     let one = builder.subscene(first, &shifted).unwrap();
     let two = builder.subscene(first, &[1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]).unwrap();
-    // The subscene of least id decides about the vertices.
+    // The subscene with the smallest id decides about the vertices.
     builder.set_subscene_seconds(one, 3.0).unwrap();
     let update = builder.commit().unwrap();
     assert_eq!((update.deformed, update.visible), (1, 2));

@@ -1,4 +1,4 @@
-//! Hits of a scene are those of its geometry in world space, compiled as one object.
+//! Hits of a scene equal hits of its geometry in world space, compiled as one object.
 
 use crate::support::{animated, compiled, imported, models, options, varied};
 use bth::rays::{Hit, PrimitiveRef, Ray};
@@ -96,7 +96,7 @@ fn compare(name: &str, scene: &mut bth::Scene, frames: &[i32]) -> usize {
                 "{name} frame {frame}: {ray:?} gives {a:?} and {b:?}"
             );
         }
-        // About as many rays meet their triangle at less than half a degree.
+        // About as many rays hit their triangle at less than half a degree.
         assert!(graze < rays.len() / 50, "{name} frame {frame}: {graze} rays graze");
         assert!(other_name < rays.len() / 10, "{name} frame {frame}: {other_name} other surfaces");
         // Any-hit queries agree with nearest-hit queries.
@@ -107,7 +107,7 @@ fn compare(name: &str, scene: &mut bth::Scene, frames: &[i32]) -> usize {
     hit
 }
 
-/// The greatest absolute coordinate of the object and of the origin of the ray.
+/// The largest absolute coordinate of the object and of the origin of the ray.
 fn size(flat: &bth::Scene, ray: &Ray) -> f32 {
     let object = flat.object(0).header;
     let ends = object.lower.iter().chain(&object.upper).chain(&ray.origin);

@@ -169,8 +169,8 @@ pub(crate) fn push(array: &mut Value, value: Value) -> usize {
     array.len() - 1
 }
 
-/// Positions in world space of the vertices of an instance, as its triangles use them: those of the
-/// square in its order.
+/// Positions in world space of the vertices of an instance, as its triangles use them: the corners
+/// of the square in its order.
 pub(crate) fn world(scene: &bth::Scene, instance: u32) -> Vec<[f64; 3]> {
     let view = scene.instance(instance);
     let (positions, triangles) = (scene.positions(view.object), scene.object(view.object).triangles);

@@ -41,7 +41,7 @@ fn at(ball: &Ball, ring: u32, step: u32) -> [f32; 3] {
     [0, 1, 2].map(|k| ball.center[k] + unit[k])
 }
 
-/// Triangles of the quads between two rings of a ball, corner by corner, each a vertex of its own.
+/// Triangles of the quads between two rings of a ball, corner by corner; no vertex is shared.
 fn band(ball: &Ball, rings: std::ops::Range<u32>, soup: &mut Soup) {
     for ring in rings {
         for step in 0..AROUND {
@@ -249,7 +249,7 @@ fn rays_do_not_leave_closed_parts_at_vertices_and_edges() {
                     let share = rng.unit_f64();
                     let along = |p: &[f64; 3], q: &[f64; 3]| [0, 1, 2].map(|k| p[k] + share * (q[k] - p[k]));
                     for to in [*a, *b, *c, along(a, b), along(b, c), along(c, a)] {
-                        // Ends behind the surface and before that of another ball can be met alone.
+                        // Ends behind the surface but before another ball, which then cannot be hit.
                         let direction = [0, 1, 2].map(|k| to[k] as f32 - origin[k]);
                         rays.push(Ray { tmax: 1.001, ..Ray::new(origin, direction) });
                     }

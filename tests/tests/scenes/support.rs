@@ -13,7 +13,7 @@ pub(crate) fn options() -> CompileOptions {
     CompileOptions { structure: Structure::Bvh, ..CompileOptions::default() }
 }
 
-/// Animated models beside the checkout, or a printed line.
+/// Animated models next to the checkout, or a printed line.
 pub(crate) fn animated() -> Vec<PathBuf> {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
     let folder = std::env::var_os("BTH_DATA").map_or(beside, PathBuf::from).join("animated");

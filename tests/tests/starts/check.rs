@@ -9,7 +9,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 pub(crate) type Corners = Vec<[[f32; 3]; 3]>;
 
-/// A condition, and whether a hit meets it.
+/// A condition, and a function that says if a hit satisfies it.
 type Condition<'a> = (Accept<'a>, &'a dyn Fn(&Hit) -> bool);
 
 /// The instruction set is a setting of the whole process, so tests that set it run one after the

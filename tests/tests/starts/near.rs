@@ -7,7 +7,7 @@ use bth_tests::placed_soup::soups;
 #[test]
 fn walls_at_a_t_below_any_f32_are_hit_before_a_start_and_not_behind_it() {
     let _turn = turn();
-    // The greatest sum of weights.
+    // The largest sum of weights.
     let above = [0.5, 0.5 + 1.0 / (1 << 22) as f32];
     let at = |z: f32| [[0.0, 0.0, z], [1.0, 0.0, z], [0.0, 1.0, z]];
     for gap in [1e-8, 1e-30, 1e-44] {

@@ -33,9 +33,8 @@ fn winding_numbers_are_exact_on_every_closed_surface_and_in_every_structure() {
     }
 }
 
-/// A mesh of which the winding numbers are known: unit cubes of a grid that are filled or not, as
-/// shells of squares between filled and empty cubes, and the same with every cube a shell of its
-/// own.
+/// A mesh with known winding numbers: unit cubes of a grid that are filled or not, as shells of
+/// squares between filled and empty cubes; and the same with a shell for every cube.
 fn cubes(filled: &dyn Fn([i32; 3]) -> bool, size: i32, merged: bool) -> Model {
     let mut model = Model::default();
     for cell in (0..size * size * size).map(|i| [i % size, i / size % size, i / size / size]) {
@@ -63,8 +62,8 @@ fn cubes(filled: &dyn Fn([i32; 3]) -> bool, size: i32, merged: bool) -> Model {
     model
 }
 
-/// A point is in the cube that it enters when it is moved a little along x, less along y and still
-/// less along z: for a point of the grid the cube of which it is the least corner.
+/// A point is in the cube that it enters when it is moved a little along x, less along y and even
+/// less along z: for a point of the grid the cube whose smallest corner it is.
 #[test]
 fn points_of_a_grid_of_cubes_are_in_the_cube_above_them() {
     const SIZE: i32 = 5;
@@ -145,8 +144,8 @@ fn points_and_rays_that_are_not_finite_are_outside_of_everything() {
     assert_eq!(scene.crossings(&Ray::new([0.5; 3], [0.0; 3])), Crossings::default());
 }
 
-/// Coordinates from the least to the greatest f32, where differences overflow and products in f32
-/// would, too.
+/// Coordinates from the smallest to the largest f32, where differences overflow, and products in
+/// f32 would, too.
 #[test]
 fn the_ends_of_the_range_of_f32_are_exact() {
     for unit in [f32::from_bits(1), f32::MIN_POSITIVE, f32::MAX / 4.0, f32::MAX] {
@@ -172,7 +171,7 @@ fn the_ends_of_the_range_of_f32_are_exact() {
     }
 }
 
-/// Closed models that lie beside the checkout, in `BTH_DATA` or `../shared/data`.
+/// Closed models next to the checkout, in `BTH_DATA` or `../shared/data`.
 #[test]
 #[allow(clippy::print_stdout, reason = "it prints what it skips")]
 fn winding_numbers_in_closed_scans_are_exact() {

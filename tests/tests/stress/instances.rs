@@ -54,7 +54,7 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Norm (greatest sum of a row) and condition number of the linear part.
+/// Norm (largest sum of a row) and condition number of the linear part.
 fn norm_and_condition(rows: &Rows) -> (f64, f64) {
     let norm =
         |rows: [[f64; 3]; 3]| rows.map(|r| r.iter().map(|x| x.abs()).sum()).into_iter().fold(0.0, f64::max);
@@ -92,7 +92,7 @@ fn rays_from_inside(scene: &Scene, instance: u32, rng: &mut Rng) -> Vec<Ray> {
 }
 
 /// Let M be an instance's linear part, T its translation, κ the condition number of M, b the
-/// greatest coordinate of the object's box and o the ray's origin, all in the maximum norm. The
+/// largest coordinate of the object's box and o the ray's origin, all in the maximum norm. The
 /// point at the reported t lies within 2^-21 (κ (|o| + |T|) + |M| b) of the plane of the reported
 /// triangle: t is off by at most that over the speed at which the ray nears the plane.
 #[test]
@@ -126,8 +126,8 @@ fn closed_surfaces_stay_closed_under_transforms_and_t_keeps_its_bound() {
             let origin = greatest(ray.origin.map(f64::from));
             let bound = (condition * (origin + translation) + norm * size) / f64::from(1 << 21);
             worst = worst.max(distance / bound);
-            // Of a sample, the exact truth for the instance as it stands: hit as well, and at about
-            // the same t.
+            // Of a sample, the exact truth for the instance as it is: hit as well, and at about the same
+            // t.
             if i % 10 == 0 {
                 let exact = world.hit(ray);
                 assert_eq!((exact.is_hit(), exact.primitive.instance), (true, instance), "{ray:?}");

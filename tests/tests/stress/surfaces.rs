@@ -22,7 +22,7 @@ fn no_ray_leaks_misses_or_hits_a_ghost_on_any_closed_surface() {
 }
 
 /// Where coordinates are beyond the range in which boxes are tested, every box is entered at the
-/// least t. Where that is -infinity, the sort keys of stacked nodes must not become NaN.
+/// smallest t. Where that is -infinity, the sort keys of stacked nodes must not become NaN.
 #[test]
 fn hierarchies_beyond_all_scales_are_walked_from_minus_infinity() {
     for shape in shapes(4).iter().filter(|shape| shape.name.contains("scale 2^")) {
@@ -50,7 +50,7 @@ fn a_missed_and_a_made_up_hit_are_counted() {
         assert_eq!(tally.ghosts, 1, "{aimed:?}");
         all.add(&tally);
     }
-    // Seven of ten kinds surely meet something, unless their range ends before or they lie in the
+    // Seven of ten kinds surely hit something, unless their range ends before or they lie in the
     // plane of all around.
     assert!(all.misses >= 100, "{all:#?}");
 }

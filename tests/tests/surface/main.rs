@@ -298,7 +298,7 @@ fn the_cache_keeps_groups() {
     let without = CompileOptions { names: false, ..options() };
     let first = through(&without);
     assert_eq!(through(&options()), plain);
-    // The mesh with its groups comes from the cache, the rest is made anew.
+    // The mesh with its groups comes from the cache, the rest is made again.
     let best = CompileOptions { geometry: false, ..options() };
     assert_eq!(through(&best), compile(&path, &best, &Silent).unwrap().0.bytes);
     assert_eq!(through(&options()), plain);

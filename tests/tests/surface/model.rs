@@ -19,8 +19,7 @@ pub(crate) fn number(rng: &mut Rng, scale: f32) -> f32 {
 }
 
 impl Model {
-    /// Triangles of all sizes and shapes, some of which have normals of zeros at some corners or at
-    /// all.
+    /// Triangles of all sizes and shapes. Some have normals of zeros at some corners or at all.
     pub(crate) fn random(count: usize, seed: u64) -> Self {
         let mut rng = Rng::new(seed);
         let mut model = Self { triangles: vec![], normals: vec![], uvs: vec![], parts: vec![] };

@@ -1,13 +1,11 @@
-//! Clocks. One thread is timed by its CPU clock, which leaves out the time in which other jobs run; several threads are timed by
-//! the wall clock.
+//! Clocks. One thread is timed by its CPU clock, which skips the time of other jobs; several threads by the wall
+//! clock.
 
 use rustix::time::{ClockId, clock_gettime};
-use serde::Serialize;
 use std::time::Instant;
 
 /// A clock.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clock {
     /// CPU time of the calling thread.
     ThreadCpu,
@@ -16,17 +14,9 @@ pub enum Clock {
 }
 
 impl Clock {
-    /// The clock to measure work on so many threads by.
+    /// The clock for work on `threads` threads.
     pub fn for_threads(threads: usize) -> Clock {
         if threads <= 1 { Clock::ThreadCpu } else { Clock::Wall }
-    }
-
-    /// The name of a second of this clock in tables.
-    pub fn second(self) -> &'static str {
-        match self {
-            Clock::ThreadCpu => "CPU second",
-            Clock::Wall => "second",
-        }
     }
 
     /// Seconds that the work takes.

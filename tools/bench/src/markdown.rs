@@ -33,18 +33,16 @@ pub fn count(n: u64) -> String {
     text
 }
 
-/// A number in two decimals, or `-` for none.
-pub fn two_decimals(value: Option<f64>) -> String {
-    value.map_or("-".to_owned(), |v| format!("{v:.2}"))
-}
-
-/// A time in the unit that suits it: `0.42 ms`, `1.50 s`.
-pub fn seconds(value: Option<f64>) -> String {
-    match value {
-        None => "-".to_owned(),
-        Some(s) if s < 1e-3 => format!("{:.0} µs", s * 1e6),
-        Some(s) if s < 1.0 => format!("{:.2} ms", s * 1e3),
-        Some(s) => format!("{s:.2} s"),
+/// Three significant digits. Large numbers keep all digits before the point; tiny ones have an exponent.
+pub fn short(x: f64) -> String {
+    match x.abs() {
+        size if size == 0.0 || !size.is_finite() => format!("{x}"),
+        size if size < 1e-4 => format!("{x:.1e}"),
+        size if size >= 1e4 => count(x.round() as u64),
+        size => {
+            let digits = (2 - size.log10().floor() as i32).clamp(0, 12) as usize;
+            format!("{x:.digits$}")
+        }
     }
 }
 
@@ -53,16 +51,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tables_align_numbers_right() {
+    fn tables_align_numbers_right_and_numbers_are_short() {
         let text = table(&cells(&["tracer", "ao"]), &[cells(&["bth", "1.00"])]);
         assert_eq!(text, "| tracer | ao |\n|---|---:|\n| bth | 1.00 |\n");
-    }
-
-    #[test]
-    fn numbers_are_short() {
         assert_eq!([0, 999, 1000, 1234567].map(count), ["0", "999", "1,000", "1,234,567"]);
-        assert_eq!(two_decimals(None), "-");
-        let times = [4.2e-5, 0.00345, 2.0].map(|s| seconds(Some(s)));
-        assert_eq!(times, ["42 µs", "3.45 ms", "2.00 s"]);
+        let numbers = [0.0, 1.0, 0.12345, 1234.5, 1234567.8, 5.07e-8].map(short);
+        assert_eq!(numbers, ["0", "1.00", "0.123", "1234", "1,234,568", "5.1e-8"]);
     }
 }

@@ -1,7 +1,7 @@
 //! Interleaved rounds: what is compared is measured in turn, so that other work of the machine affects all alike.
 
-/// Runs each measurement once per round, in turn, after a round that warms up and is not kept. Returns
-/// the median of each; `measure` returns `None` where a measurement does not apply.
+/// Runs each measurement once per round, in turn, after a round that warms up and is not kept. Returns the median of each;
+/// `measure` returns `None` if a measurement does not apply.
 pub fn medians<T>(
     items: &[T],
     rounds: usize,
@@ -10,7 +10,7 @@ pub fn medians<T>(
     interleaved(items, rounds, measure).into_iter().map(median).collect()
 }
 
-/// As [`medians`], but the least of each, as other work of the machine can only add to a time.
+/// Returns the smallest of each instead, as other work of the machine can only add to a time; else like [`medians`].
 pub fn least<T>(
     items: &[T],
     rounds: usize,
@@ -43,7 +43,7 @@ pub fn median(mut values: Vec<f64>) -> Option<f64> {
     Some((values[low] + values[high]) / 2.0)
 }
 
-/// Lower quartile, median and upper quartile, by linear interpolation; NaN where there are no values.
+/// Lower quartile, median and upper quartile, by linear interpolation; NaN if there are no values.
 pub fn quartiles(mut values: Vec<f64>) -> [f64; 3] {
     values.sort_by(f64::total_cmp);
     [0.25, 0.5, 0.75].map(|share| {

@@ -34,20 +34,18 @@ const LINK32: Kind = Kind {
     free: KeepFree::None,
 };
 
-/// The structures. The default file comes first, then the plain BVH, which also finds the hits that secondary rays start
-/// from.
-pub const KINDS: [Kind; 8] = [
+/// The structures. The default file comes first, then the plain BVH, which also finds the hits that secondary rays
+/// start from.
+pub const KINDS: [Kind; 6] = [
     Kind { name: "bth", structure: Structure::Bth, ..LINK32 },
     Kind { name: "bvh", structure: Structure::Bvh, ..LINK32 },
     Kind { name: "tets link32", ..LINK32 },
-    Kind { name: "tets tet32", record: RecordKind::Tet32, ..LINK32 },
-    Kind { name: "tets tet20", record: RecordKind::Tet20, ..LINK32 },
     Kind { name: "tets tet16", record: RecordKind::Tet16, ..LINK32 },
     Kind { name: "bvh free", structure: Structure::Bvh, free: KeepFree::All, ..LINK32 },
     Kind { name: "bvh distances", structure: Structure::Bvh, free: KeepFree::Distances, ..LINK32 },
 ];
 
-/// The ways to trace a structure, and what they add to its name.
+/// The ways to trace a structure, and the suffixes of their names.
 const USES: [(&str, Use); 5] = [
     ("", Use::Batch),
     (" start", Use::Start),
@@ -68,14 +66,19 @@ pub const ON_GRID: [Kind; 2] = [
 ];
 
 impl Kind {
-    /// Whether its triangles are not those of the source.
+    /// Returns true if it stores rounded corners.
     pub fn is_on_grid(&self) -> bool {
         self.bits.is_some()
     }
 
-    /// Whether it is a tetrahedralization of the whole model, which not every model has.
+    /// Returns true if it is a tetrahedralization of the whole model, which not every model has.
     pub fn is_tets(&self) -> bool {
         self.structure == Structure::Tets
+    }
+
+    /// Returns true if it has free directions or distances, which only rays from starts use.
+    pub fn is_free(&self) -> bool {
+        self.free != KeepFree::None
     }
 
     /// Names of the ways to trace it.
@@ -85,9 +88,9 @@ impl Kind {
         USES[..count].iter().map(|(of, usage)| (format!("{}{of}", self.name), *usage))
     }
 
-    /// Compiler options. Whole-model tetrahedra come without a BVH below them, which would be traced instead of them; all else is
-    /// the default.
-    fn options(&self) -> CompileOptions {
+    /// Compiler options. Tetrahedra of the whole model come without a BVH below them, which would be traced instead of
+    /// them; all else is the default.
+    pub(crate) fn options(&self) -> CompileOptions {
         CompileOptions {
             structure: self.structure,
             record: self.record,
@@ -121,8 +124,6 @@ pub struct Compiled {
     pub bytes: Vec<u8>,
     /// Wall-clock seconds that the compiler took, all cores.
     pub seconds: f64,
-    /// Share of the model's triangles that are in tetrahedralizations.
-    pub in_tets: f64,
 }
 
 /// Compiles a model.
@@ -131,11 +132,9 @@ pub struct Compiled {
 /// As the compiler: a whole tetrahedralization needs the worker and a model without bad contacts.
 pub fn compile(model: &Model, kind: &Kind) -> Result<Compiled> {
     let start = Instant::now();
-    let (compiled, report) = pipeline::compile(&model.path, &kind.options(), &bth_compile::Silent)
+    let (compiled, _) = pipeline::compile(&model.path, &kind.options(), &bth_compile::Silent)
         .map_err(|e| anyhow::anyhow!("{}", reason(&e)))?;
-    let seconds = start.elapsed().as_secs_f64();
-    let in_tets = report.file.tet_triangles as f64 / model.triangles() as f64;
-    Ok(Compiled { bytes: compiled.bytes, seconds, in_tets })
+    Ok(Compiled { bytes: compiled.bytes, seconds: start.elapsed().as_secs_f64() })
 }
 
 /// The message of an error without its path, as reports hold no paths.
@@ -151,86 +150,84 @@ fn reason(error: &bth_compile::Error) -> String {
 /// # Errors
 /// If the runtime refuses the file, which would be a fault of ours.
 pub fn contenders(kind: &Kind, compiled: &Compiled) -> Result<Vec<Contender>> {
-    let scene = Arc::new(bth::from_bytes(&compiled.bytes).context("a file that was just compiled")?);
-    let contender = |(name, usage)| Contender {
-        name,
-        ours: true,
-        build_s: compiled.seconds,
-        bytes: Some(scene.resident_bytes()),
-        tracer: Box::new(OurTracer { scene: scene.clone(), usage }),
+    let scene = bth::from_bytes(&compiled.bytes).context("a file that was just compiled")?;
+    let (bytes, scene) = (Some(scene.resident_bytes()), Arc::new(SceneTracer(scene)));
+    let contender = |(name, usage)| {
+        let tracer = Box::new(OurTracer { scene: scene.clone(), usage });
+        Contender { name, ours: true, tracer, build_s: compiled.seconds, bytes }
     };
     Ok(kind.uses().map(contender).collect())
 }
 
-/// A tracer of a compiled file.
+/// Opens a compiled file for one way to trace it.
 ///
 /// # Errors
 /// If the runtime refuses the file, which would be a fault of ours.
 pub fn tracer(bytes: &[u8], usage: Use) -> Result<Box<dyn Tracer>> {
-    let scene = Arc::new(bth::from_bytes(bytes).context("a file that was just compiled")?);
-    Ok(Box::new(OurTracer { scene, usage }))
+    let scene = bth::from_bytes(bytes).context("a file that was just compiled")?;
+    Ok(Box::new(OurTracer { scene: Arc::new(SceneTracer(scene)), usage }))
+}
+
+/// An opened scene, traced in batches from origins.
+pub struct SceneTracer(pub Scene);
+
+impl Tracer for SceneTracer {
+    fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
+        for (rays, hits) in batch.rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
+            self.0.batch(rays).nearest(hits);
+        }
+    }
+
+    fn any(&self, batch: Batch<'_>, found: &mut [bool]) {
+        for (rays, found) in batch.rays.chunks(BATCH).zip(found.chunks_mut(BATCH)) {
+            self.0.batch(rays).any(found);
+        }
+    }
 }
 
 /// A scene and how it is traced.
 struct OurTracer {
-    scene: Arc<Scene>,
+    scene: Arc<SceneTracer>,
     usage: Use,
 }
 
 impl Tracer for OurTracer {
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
-        let (scene, rays) = (&self.scene, batch.rays.iter());
+        let (scene, rays) = (&self.scene.0, batch.rays.iter());
+        let found = |hit: Option<Hit>| hit.unwrap_or(Hit::MISS);
         match (self.usage, batch.starts) {
-            (Use::Own, Some(starts)) => {
-                for ((ray, own), hit) in rays.zip(starts).zip(hits) {
-                    let is_other = |_: &Ray, hit: &Hit| hit.primitive != own.primitive;
-                    let accept = Accept { filter: Some(&is_other), ..Accept::default() };
-                    *hit = scene.nearest_accepted(ray, &accept).unwrap_or(Hit::MISS);
-                }
-            }
+            (Use::Own, Some(starts)) => rays.zip(starts).zip(hits).for_each(|((ray, own), hit)| {
+                *hit = with_others(own, |accept| found(scene.nearest_accepted(ray, accept)));
+            }),
             (Use::StartSingle, Some(starts)) => {
-                for ((ray, start), hit) in rays.zip(starts).zip(hits) {
-                    *hit = scene.nearest(&start_ray(ray, start)).unwrap_or(Hit::MISS);
-                }
+                rays.zip(starts)
+                    .zip(hits)
+                    .for_each(|((r, start), hit)| *hit = found(scene.nearest(&start_ray(r, start))));
             }
             (Use::Start, Some(_)) => {
-                in_start_batches(batch, hits, |rays, hits| scene.batch(rays).nearest(hits));
+                in_start_batches(batch, hits, |rays, hits| scene.batch(rays).nearest(hits))
             }
-            (Use::Single, _) => {
-                rays.zip(hits).for_each(|(ray, hit)| *hit = scene.nearest(ray).unwrap_or(Hit::MISS));
-            }
-            _ => {
-                for (rays, hits) in batch.rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
-                    scene.batch(rays).nearest(hits);
-                }
-            }
+            (Use::Single, _) => rays.zip(hits).for_each(|(ray, hit)| *hit = found(scene.nearest(ray))),
+            _ => self.scene.nearest(batch, hits),
         }
     }
 
     fn any(&self, batch: Batch<'_>, found: &mut [bool]) {
-        let (scene, rays) = (&self.scene, batch.rays.iter());
+        let (scene, rays) = (&self.scene.0, batch.rays.iter());
         match (self.usage, batch.starts) {
-            (Use::Own, Some(starts)) => {
-                for ((ray, own), found) in rays.zip(starts).zip(found) {
-                    let is_other = |_: &Ray, hit: &Hit| hit.primitive != own.primitive;
-                    let accept = Accept { filter: Some(&is_other), ..Accept::default() };
-                    *found = scene.any_accepted(ray, &accept);
-                }
-            }
+            (Use::Own, Some(starts)) => rays.zip(starts).zip(found).for_each(|((ray, own), found)| {
+                *found = with_others(own, |accept| scene.any_accepted(ray, accept));
+            }),
             (Use::StartSingle, Some(starts)) => {
-                for ((ray, start), found) in rays.zip(starts).zip(found) {
-                    *found = scene.any(&start_ray(ray, start));
-                }
+                rays.zip(starts)
+                    .zip(found)
+                    .for_each(|((r, start), found)| *found = scene.any(&start_ray(r, start)));
             }
             (Use::Start, Some(_)) => {
-                in_start_batches(batch, found, |rays, found| scene.batch(rays).any(found));
+                in_start_batches(batch, found, |rays, found| scene.batch(rays).any(found))
             }
             (Use::Single, _) => rays.zip(found).for_each(|(ray, found)| *found = scene.any(ray)),
-            _ => {
-                for (rays, found) in batch.rays.chunks(BATCH).zip(found.chunks_mut(BATCH)) {
-                    scene.batch(rays).any(found);
-                }
-            }
+            _ => self.scene.any(batch, found),
         }
     }
 
@@ -243,12 +240,18 @@ impl Tracer for OurTracer {
     }
 }
 
+/// Traces with a filter that rejects the triangle on which the ray starts.
+fn with_others<A>(own: &Start, trace: impl FnOnce(&Accept<'_>) -> A) -> A {
+    let is_other = |_: &Ray, hit: &Hit| hit.primitive != own.primitive;
+    trace(&Accept { filter: Some(&is_other), ..Accept::default() })
+}
+
 /// The ray from the exact point.
 fn start_ray(ray: &Ray, start: &Start) -> StartRay {
     start.ray(ray.direction).with_tmax(ray.tmax)
 }
 
-/// Calls `trace` with the rays of each batch and its answers. The time to make them counts, as for rivals.
+/// Calls `trace` with the rays of each batch and its answers. The time to make the rays counts, as for rivals.
 fn in_start_batches<T>(batch: Batch<'_>, answers: &mut [T], trace: impl Fn(&[StartRay], &mut [T])) {
     let mut rays = Vec::with_capacity(BATCH);
     for (batch, answers) in batch.chunks(BATCH).zip(answers.chunks_mut(BATCH)) {

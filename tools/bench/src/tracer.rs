@@ -9,9 +9,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub struct Batch<'a> {
     /// The rays, model space.
     pub rays: &'a [Ray],
-    /// Where each ray starts on the surface, in sets that start at hits.
+    /// The point of the surface at which each ray starts, in sets that start at hits.
     pub starts: Option<&'a [Start]>,
-    /// Whether neighbouring rays have similar origins and directions; Embree takes this as a flag.
+    /// True if neighbouring rays have similar origins and directions; Embree takes this as a flag.
     pub coherent: bool,
 }
 
@@ -29,67 +29,108 @@ impl<'a> Batch<'a> {
 pub trait Tracer: Send + Sync {
     /// Nearest hit of every ray; the instance in a surface is 0.
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]);
-    /// Whether anything lies within [tmin, tmax] of every ray.
+    /// Sets true for each ray that hits something within [tmin, tmax].
     fn any(&self, batch: Batch<'_>, found: &mut [bool]);
-    /// What it does with the starts of rays.
+    /// Says how it uses the starts of rays.
     fn starting(&self) -> Starting {
         Starting::AtOrigin
     }
 }
 
-/// What a tracer does with the starts of rays. A tracer that uses them is measured only on sets that have them.
+/// How a tracer uses the starts of rays. One that uses them is measured only on sets that have them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Starting {
     /// Ignores them: rays start at their origins, and may hit the triangle that they start on.
     AtOrigin,
-    /// As `AtOrigin`, with a filter that rejects the triangle on which a ray starts.
+    /// The same, with a filter that rejects the triangle on which a ray starts.
     RejectOwn,
     /// Rays start at the exact points.
     OnSurface,
+}
+
+/// The answers to a set of rays.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Answers {
+    /// Nearest hits.
+    Nearest(Vec<Hit>),
+    /// True for each ray that hits something.
+    Any(Vec<bool>),
+}
+
+impl Answers {
+    /// Room for answers to `count` rays.
+    pub fn empty(any: bool, count: usize) -> Answers {
+        if any { Answers::Any(vec![false; count]) } else { Answers::Nearest(vec![Hit::MISS; count]) }
+    }
+
+    /// Traces rays on this thread.
+    pub fn trace(&mut self, tracer: &dyn Tracer, batch: Batch<'_>) {
+        match self {
+            Answers::Nearest(hits) => tracer.nearest(batch, hits),
+            Answers::Any(found) => tracer.any(batch, found),
+        }
+    }
+
+    /// Compares other answers with these. Counts those that differ, for ours in any bit, for rivals in hit or miss;
+    /// and nearest hits on another triangle.
+    pub fn compare(&self, found: &Answers, ours: bool) -> [usize; 2] {
+        let bits = |h: &Hit| ([h.t, h.u, h.v].map(f32::to_bits), h.primitive);
+        match (self, found) {
+            (Answers::Any(expected), Answers::Any(found)) => {
+                [expected.iter().zip(found).filter(|(a, b)| a != b).count(), 0]
+            }
+            (Answers::Nearest(expected), Answers::Nearest(hits)) => {
+                let same =
+                    |a: &Hit, b: &Hit| if ours { bits(a) == bits(b) } else { a.is_hit() == b.is_hit() };
+                let other = |a: &Hit, b: &Hit| a.is_hit() && b.is_hit() && a.primitive != b.primitive;
+                let pairs = || expected.iter().zip(hits);
+                [pairs().filter(|(a, b)| !same(a, b)).count(), pairs().filter(|(a, b)| other(a, b)).count()]
+            }
+            _ => [0, 0],
+        }
+    }
 }
 
 /// A tracer that is measured.
 pub struct Contender {
     /// Its name in tables and charts.
     pub name: String,
-    /// Whether it is one of ours, whose answers have to be the same to the last bit.
+    /// True for ours, whose answers must be the same to the last bit.
     pub ours: bool,
     /// Traces the rays.
     pub tracer: Box<dyn Tracer>,
     /// Wall-clock seconds to compile or build the structure.
     pub build_s: f64,
-    /// Bytes that traversal reads, where that is known.
+    /// Bytes that traversal reads, if known.
     pub bytes: Option<u64>,
 }
 
 impl Contender {
-    /// Nearest hits, so many times over on so many threads.
-    pub fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit], threads: usize, passes: usize) {
-        spread_passes(batch, hits, (threads, passes), BLOCK, |batch, hits| self.tracer.nearest(batch, hits));
+    /// A rival, built in `build_s` seconds.
+    pub fn rival(name: &str, tracer: impl Tracer + 'static, build_s: f64, bytes: Option<u64>) -> Contender {
+        Contender { name: name.to_owned(), ours: false, tracer: Box::new(tracer), build_s, bytes }
     }
 
-    /// Any hits, so many times over on so many threads.
-    pub fn any(&self, batch: Batch<'_>, found: &mut [bool], threads: usize, passes: usize) {
-        spread_passes(batch, found, (threads, passes), BLOCK, |batch, found| self.tracer.any(batch, found));
+    /// Traces all rays `passes` times on `threads` threads.
+    pub fn trace(&self, batch: Batch<'_>, answers: &mut Answers, threads: usize, passes: usize) {
+        let tracer = &self.tracer;
+        match answers {
+            Answers::Nearest(hits) => {
+                spread(batch, hits, (threads, passes), BLOCK, |batch, hits| tracer.nearest(batch, hits));
+            }
+            Answers::Any(found) => {
+                spread(batch, found, (threads, passes), BLOCK, |batch, found| tracer.any(batch, found));
+            }
+        }
     }
 }
 
 /// Rays that a thread takes at a time.
 pub const BLOCK: usize = 4096;
 
-/// Calls `trace` for blocks of so many rays, from so many threads, each of which takes the next block.
+/// Traces all rays `passes` times, in blocks of `block` rays, on `threads` threads, each of which takes the next block.
+/// The threads start once: starting them takes as long as thousands of rays.
 pub fn spread<T: Send>(
-    batch: Batch<'_>,
-    answers: &mut [T],
-    threads: usize,
-    block: usize,
-    trace: impl Fn(Batch<'_>, &mut [T]) + Sync,
-) {
-    spread_passes(batch, answers, (threads, 1), block, trace);
-}
-
-/// As [`spread`], so many times over the whole batch. The threads start once: starting them takes as long as thousands of rays.
-fn spread_passes<T: Send>(
     batch: Batch<'_>,
     answers: &mut [T],
     (threads, passes): (usize, usize),
@@ -114,4 +155,21 @@ fn spread_passes<T: Send>(
             });
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bth::rays::PrimitiveRef;
+
+    #[test]
+    fn wrong_answers_are_counted_to_the_last_bit_for_ours() {
+        let hit = Hit { t: 1.0, u: 0.25, v: 0.5, primitive: PrimitiveRef { instance: 0, triangle: 7 } };
+        let nudged = Hit { u: 0.25f32.next_up(), ..hit };
+        let expected = Answers::Nearest(vec![hit, hit, Hit::MISS, Hit::MISS]);
+        let found = Answers::Nearest(vec![hit, nudged, Hit::MISS, hit]);
+        assert_eq!([true, false].map(|ours| expected.compare(&found, ours)), [[2, 0], [1, 0]]);
+        let [expected, found] = [[true, false], [true, true]].map(|any| Answers::Any(any.to_vec()));
+        assert_eq!(expected.compare(&found, false), [1, 0]);
+    }
 }

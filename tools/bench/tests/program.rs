@@ -1,52 +1,88 @@
-//! The program as it is called, without any rival that has to be installed.
+//! The program as it is called, without any rival that must be installed; and what a user gets who makes a mistake: a
+//! message and an exit code, never a backtrace.
 
 use serde_json::Value;
-use std::path::Path;
 use std::process::{Command, Output};
 
 /// A path in this crate at which there is no file.
 const NO_FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/no-such-library");
 
 fn bench(arguments: &[&str]) -> Output {
-    // Whatever is installed on this machine is not there.
     let mut command = Command::new(env!("CARGO_BIN_EXE_bth-bench"));
-    command.env("EMBREE_LIB", NO_FILE).env("TINYBVH_LIB", NO_FILE).args(arguments).output().unwrap()
+    command.env("RUST_BACKTRACE", "1").env("EMBREE_LIB", NO_FILE).env("TINYBVH_LIB", NO_FILE);
+    command.args(arguments).output().unwrap()
 }
 
-fn json(path: &Path) -> Value {
-    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+/// Runs a command that must succeed, with a report; returns the page and the rows.
+fn report(arguments: &[&str]) -> (String, Vec<Value>) {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let done = bench(&[arguments, &["--quick", "--out", out, "--name", "quick"]].concat());
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let text = |end: &str| {
+        let mut files = std::fs::read_dir(folder.path()).unwrap().map(|f| f.unwrap().path());
+        std::fs::read_to_string(files.find(|f| f.to_str().unwrap().ends_with(end)).expect(end)).unwrap()
+    };
+    let mut json: Value = serde_json::from_str(&text("-quick.json")).unwrap();
+    let Value::Array(rows) = json["rows"].take() else { panic!("no rows") };
+    (text("-quick.md"), rows)
+}
+
+/// The figure of an engine and set, in the first model.
+fn figure(rows: &[Value], engine: &str, set: &str) -> f64 {
+    let is_it = |row: &&Value| row["engine"] == engine && row["set"] == set;
+    rows.iter().find(is_it).unwrap_or_else(|| panic!("{engine}, {set}"))["value"].as_f64().unwrap()
 }
 
 #[test]
 fn a_quick_speed_run_needs_no_rival() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().to_str().unwrap();
-    let done =
-        bench(&["speed", "torus-knot:320", "--quick", "--threads", "1,2", "--out", out, "--name", "quick"]);
-    let (printed, said) = (String::from_utf8(done.stdout).unwrap(), String::from_utf8(done.stderr).unwrap());
-    assert!(done.status.success(), "{said}");
-    assert!(printed.contains("| k-d tree |") && printed.contains("2 threads"), "{printed}");
-    assert!(said.contains("embree: not measured: EMBREE_LIB names no file"), "{said}");
-
-    let files: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|f| f.unwrap().path()).collect();
-    let find = |end: &str| files.iter().find(|f| f.to_str().unwrap().ends_with(end)).expect(end);
-    let results = json(find("-quick.json"));
-    let tracers = results["models"][0]["runs"][0]["tracers"].as_array().unwrap();
-    let names: Vec<&str> = tracers.iter().map(|t| t["name"].as_str().unwrap()).collect();
-    for name in ["bth", "bth start", "bth single", "bvh", "bvh single", "obvhs cwbvh", "k-d tree"] {
-        assert!(names.contains(&name), "{names:?}");
+    let (page, rows) = report(&["speed", "torus-knot:320", "--threads", "1,2"]);
+    assert!(
+        page.contains("## torus-knot, 2 threads") && page.contains("embree: not measured: EMBREE_LIB"),
+        "{page}"
+    );
+    for engine in ["bth", "bth start", "bth single", "bvh", "bvh single", "obvhs cwbvh"] {
+        assert!(figure(&rows, engine, "ao") > 0.0);
     }
-    for tracer in tracers.iter().filter(|t| t["ours"] == true) {
-        assert!(tracer["differ"].as_object().unwrap().values().all(|n| n == 0), "{tracer}");
-        assert!(tracer["mrays_per_s"]["ao"].as_f64().unwrap() > 0.0, "{tracer}");
-    }
-    let page = std::fs::read_to_string(find("-quick.md")).unwrap();
-    assert!(page.contains("-quick-torus-knot-2-threads.svg"), "{page}");
-    find("-quick-torus-knot-1-thread.svg");
 }
 
 #[test]
-fn what_cannot_be_saved_is_printed() {
+fn load_scenes_and_stress_measure_ours() {
+    let (_, rows) = report(&["load", "torus-knot:320", "objects:3", "--threads", "1", "--rays", "100"]);
+    for start in ["bth map warm", "bth map cold", "bvh read warm"] {
+        let times = ["ready", "first hit", "total"].map(|set| figure(&rows, start, set));
+        assert!(times[0] > 0.0 && times.is_sorted(), "{start}: {times:?}");
+    }
+    let (_, rows) = report(&["scenes", "instances:30", "--frames", "2", "--threads", "1,2"]);
+    for engine in ["bth", "bvh", "bth single", "bth placed"] {
+        assert_eq!(figure(&rows, engine, "differ"), 0.0, "{engine}");
+        assert!(figure(&rows, engine, "update") > 0.0 && figure(&rows, engine, "later") > 0.0);
+    }
+    let (_, rows) = report(&["stress", "blob:320", "--millions", "0", "--one-in", "1000"]);
+    assert_eq!((figure(&rows, "blob", "triangles"), figure(&rows, "blob", "wrong")), (320.0, 0.0));
+}
+
+#[test]
+fn accuracy_finds_errors_of_rivals_only() {
+    let tracers = "bvh,bvh 21 bits,bth,obvhs cwbvh,embree compact";
+    let (page, rows) = report(&["accuracy", "torus-knot:320", "blob:400", "--tracer", tracers]);
+    assert!(page.contains("embree compact: not measured") && page.contains("t-against-bytes.svg"), "{page}");
+    let wrong = |engine: &str| {
+        ["false_misses", "leaks", "ghosts", "wrong_neighbours"].map(|kind| {
+            figure(&rows, engine, &format!("{kind} aimed"))
+                + figure(&rows, engine, &format!("{kind} ordinary"))
+        })
+    };
+    for engine in ["bvh", "bvh 21 bits", "bth"] {
+        assert_eq!(wrong(engine), [0.0; 4], "{engine}");
+    }
+    // Were there none here, nothing would be measured.
+    assert!(wrong("obvhs cwbvh") != [0.0; 4]);
+    assert!(figure(&rows, "bth", "error of t worst") < 0.51 && figure(&rows, "bth", "vertices") > 0.0);
+}
+
+#[test]
+fn a_report_that_cannot_be_saved_is_printed() {
     let inside_a_file = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml/speed.json");
     let done = bench(&[
         "speed",
@@ -65,136 +101,46 @@ fn what_cannot_be_saved_is_printed() {
 }
 
 #[test]
-fn load_measures_our_files_where_embree_is_missing() {
+fn mistakes_are_named_with_an_exit_code() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("load.json");
-    let done = bench(&[
-        "load",
-        "torus-knot:320",
-        "--rounds",
-        "1",
-        "--threads",
-        "1",
-        "--rays",
-        "100",
-        "--json",
-        path.to_str().unwrap(),
-    ]);
-    let said = String::from_utf8(done.stderr).unwrap();
-    assert!(done.status.success(), "{said}");
-    assert!(said.contains("embree: not measured"), "{said}");
-    let results = json(&path);
-    let starts = results["models"][0]["runs"][0]["starts"].as_array().unwrap();
-    let names: Vec<&str> = starts.iter().map(|s| s[0].as_str().unwrap()).collect();
-    assert_eq!(names[..4], ["bth map warm", "bth map cold", "bth read warm", "bth read cold"]);
-    for start in starts {
-        let times = ["ready_s", "first_hit_s", "total_s"].map(|k| start[1][k].as_f64().unwrap());
-        assert!(times[0] > 0.0 && times.is_sorted(), "{start}");
-    }
-}
-
-#[test]
-fn hits_do_not_depend_on_the_size_of_a_model() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("scales.json");
-    let done =
-        bench(&["scales", "torus-knot:320", "--rays", "256", "--quick", "--json", path.to_str().unwrap()]);
-    let said = String::from_utf8(done.stderr).unwrap();
-    assert!(done.status.success(), "{said}");
-    let results = json(&path);
-    let rows = results["rows"].as_array().unwrap();
-    for row in rows {
-        assert!(row["ns"].as_array().unwrap().iter().all(|ns| ns.as_f64().unwrap() > 0.0), "{row}");
-    }
-    let differ = |size: i32| {
-        let is_it = |row: &&Value| row["size"] == size && row["vertex"].is_null();
-        rows.iter().find(is_it).unwrap()["differ"].as_u64()
+    let path = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
     };
-    assert!([-75, -50, 0, 42, 96].into_iter().all(|size| differ(size) == Some(0)), "{rows:?}");
-    assert_eq!(differ(-126), None, "coordinates are denormal");
-    for (what, count) in [("vertex", 9), ("moved", 5)] {
-        assert_eq!(rows.iter().filter(|row| !row[what].is_null()).count(), count, "{what}");
-    }
-}
-
-#[test]
-fn every_variation_of_the_builder_gives_the_same_answers() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("quality.json");
-    let done = bench(&["quality", "hall:1500", "--quick", "--json", path.to_str().unwrap()]);
-    assert!(done.status.success(), "{}", String::from_utf8(done.stderr).unwrap());
-    let results = json(&path);
-    let rows = results["models"][0]["rows"].as_array().unwrap();
-    let row = |name: &str| rows.iter().find(|r| r["name"] == name).expect(name);
-    let number = |name: &str, key: &str| row(name)[key].as_f64().unwrap();
-    for row in rows {
-        assert_eq!(row["differ"], 0, "{row}");
-        assert!(row["nanoseconds"]["primary"].as_f64().unwrap() > 0.0, "{row}");
-    }
-    assert!(number("spatial splits", "references") > 1.0, "some triangles are in several leaves");
-    assert!(number("8 children", "children") <= 8.0 && number("8 triangles", "triangles") <= 8.0);
-    let plain = row("as in files");
-    for same in ["the same again", "leaves beside nodes", "breadth first", "random order"] {
-        for key in ["wide_visits", "bytes", "steps"] {
-            assert_eq!(row(same)[key], plain[key], "{same}: {key}");
-        }
-    }
-}
-
-#[test]
-fn misspelled_names_are_refused_before_anything_is_measured() {
-    for (option, name) in [("--tracer", "embre"), ("--set", "primarily"), ("--isa", "avx1024")] {
-        let done = bench(&["speed", "torus-knot", option, name]);
-        assert!(!done.status.success());
+    let broken =
+        [path("broken.ply", "ply\nformat none 1.0\n"), path("broken.stl", ""), path("broken.xyz", "1 2 3\n")];
+    let words = |text: &str| text.split(' ').map(str::to_owned).collect::<Vec<String>>();
+    // Exit code, command line, and the word that the message names.
+    let cases = [
+        (2, "speeds torus-knot", "speeds"),
+        (2, "speed torus-knot --ray 5", "--ray"),
+        (2, "speed torus-knot --rounds 0", "--rounds"),
+        (2, "speed", "<MODEL>"),
+        (2, "compare a.so b.so torus-knot --worse 1", "--worse"),
+        (2, "stress --size 0", "--size"),
+        (2, "speed torus-knot --name ../speed", "--name"),
+        (1, "speed missing.ply", "missing.ply: neither a file nor a model"),
+        (1, "speed torus-knot:0", "torus-knot:0"),
+        (1, "speed torus-knot --set primarily", "primarily"),
+        (1, "speed torus-knot --isa avx1024", "avx1024"),
+        (1, "accuracy torus-knot --tracer embre", "embre"),
+        (1, "load missing.manifest", "missing.manifest"),
+        (1, "load objects:missing", "objects:missing"),
+        (1, "scenes missing", "missing"),
+        (1, "record missing", "missing"),
+        (1, "summary --folder missing", "missing"),
+        (1, "compare missing.so missing.so torus-knot", "missing.so"),
+    ];
+    let mut cases: Vec<(i32, Vec<String>, String)> =
+        cases.into_iter().map(|(code, line, word)| (code, words(line), word.to_owned())).collect();
+    cases.extend(broken.map(|file| (1, vec!["speed".to_owned(), file.clone()], file)));
+    for (code, arguments, word) in cases {
+        let done = bench(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
         let said = String::from_utf8(done.stderr).unwrap();
-        assert!(said.contains(name), "{said}");
-    }
-    let done = bench(&["speed", "no-such-model"]);
-    assert!(String::from_utf8(done.stderr).unwrap().contains("neither a file nor a model"));
-}
-
-#[test]
-fn accuracy_compares_ours_and_the_crates_without_any_installed_rival() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().to_str().unwrap();
-    let tracers = "bvh,bvh scalar,bvh 21 bits,bth,obvhs bvh2,k-d tree,f32 moller-trumbore,embree compact";
-    let done = bench(&[
-        "accuracy",
-        "torus-knot:320",
-        "blob:400",
-        "--quick",
-        "--tracer",
-        tracers,
-        "--out",
-        out,
-        "--name",
-        "quick",
-    ]);
-    let (printed, said) = (String::from_utf8(done.stdout).unwrap(), String::from_utf8(done.stderr).unwrap());
-    assert!(done.status.success(), "{said}");
-    assert!(printed.contains("## All models") && said.contains("embree compact: not measured"), "{said}");
-
-    let files: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|f| f.unwrap().path()).collect();
-    let find = |end: &str| files.iter().find(|f| f.to_str().unwrap().ends_with(end)).expect(end);
-    let results = json(find("-quick.json"));
-    for model in results["models"].as_array().unwrap() {
-        for tracer in model["tracers"].as_array().unwrap() {
-            assert_eq!(tracer["aimed"]["rays"], 4000, "{tracer}");
-            assert!(tracer["nanoseconds"]["vertices"].as_f64().unwrap() > 0.0, "{tracer}");
-            let defects = ["false_misses", "leaks", "ghosts", "wrong_neighbours"].map(|kind| {
-                tracer["aimed"][kind].as_u64().unwrap() + tracer["ordinary"][kind].as_u64().unwrap()
-            });
-            let name = tracer["name"].as_str().unwrap();
-            let exact = ["bvh", "bth"].contains(&tracer["group"].as_str().unwrap());
-            // Rays exactly at vertices are lost by those that are not exact: were none, nothing would be measured.
-            assert_eq!(exact, defects == [0; 4], "{tracer}");
-            if exact && name != "bvh 21 bits" {
-                assert!(tracer["t_ulp"]["max"].as_f64().unwrap() < 0.51, "{tracer}");
-                assert_eq!(tracer["rmse"], 0.0, "{tracer}");
-            }
-        }
-    }
-    for chart in ["wrong-against-time", "t-against-time", "t-against-bytes", "picture-against-bytes"] {
-        find(&format!("-quick-{chart}.svg"));
+        assert_eq!(done.status.code(), Some(code), "{arguments:?}: {said}");
+        assert!(said.contains(&word) && said.starts_with("error: "), "{arguments:?}: {said}");
+        assert!(!said.contains("backtrace") && !said.contains("panicked"), "{arguments:?}: {said}");
+        assert!(done.stdout.is_empty(), "{arguments:?} printed results");
     }
 }

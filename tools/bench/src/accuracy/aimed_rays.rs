@@ -10,7 +10,7 @@ const EDGE_TRIES: usize = 1000;
 
 /// What is aimed at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Target {
+pub(super) enum Target {
     /// Vertices.
     Vertices,
     /// Middles of edges.
@@ -19,7 +19,7 @@ pub enum Target {
 
 impl Target {
     /// Name of the ray set.
-    pub fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Target::Vertices => "vertices",
             Target::Edges => "edges",
@@ -28,7 +28,7 @@ impl Target {
 }
 
 /// A set of such rays. Each passes through its target at t = 1 without any rounding.
-pub fn set(model: &Model, target: Target, count: usize) -> RaySet {
+pub(super) fn set(model: &Model, target: Target, count: usize) -> RaySet {
     let mut rng = Rng::new(11 + target as u64);
     let diagonal = model.bounds().diagonal();
     let mut rays = Vec::with_capacity(count);

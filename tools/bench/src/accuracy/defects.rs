@@ -2,7 +2,6 @@
 
 use super::exact_answers::{Exact, Geometry};
 use bth::rays::{Hit, Ray};
-use serde::Serialize;
 
 /// The class of an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,71 +14,62 @@ enum AnswerClass {
 }
 
 /// Numbers of answers by what is wrong with them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Defects {
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Defects {
     /// Answers.
     pub rays: u64,
-    /// Nothing was found, though something is hit.
+    /// Nothing was found though something is hit.
     pub false_misses: u64,
     /// The nearest triangle was passed through: another behind it was found.
     pub leaks: u64,
-    /// A triangle was found that the ray does not meet, or not within its range.
+    /// A triangle was found that the ray does not hit, or not within its range.
     pub ghosts: u64,
-    /// As a ghost, but the triangle shares a vertex with the right one.
+    /// A ghost, but the triangle shares a vertex with the right one.
     pub wrong_neighbours: u64,
 }
 
 impl Defects {
-    /// Wrong answers of any kind.
-    pub fn all(&self) -> u64 {
-        self.false_misses + self.leaks + self.ghosts + self.wrong_neighbours
+    /// The kinds of wrong answers and their numbers.
+    pub(super) fn kinds(&self) -> [(&'static str, u64); 4] {
+        [
+            ("false_misses", self.false_misses),
+            ("leaks", self.leaks),
+            ("ghosts", self.ghosts),
+            ("wrong_neighbours", self.wrong_neighbours),
+        ]
     }
 
-    /// Adds the counts of other rays.
-    pub fn add(&mut self, other: &Defects) {
-        self.rays += other.rays;
-        self.false_misses += other.false_misses;
-        self.leaks += other.leaks;
-        self.ghosts += other.ghosts;
-        self.wrong_neighbours += other.wrong_neighbours;
-    }
-
-    fn count(&mut self, verdict: AnswerClass) {
-        self.rays += 1;
-        match verdict {
-            AnswerClass::Right => {}
-            AnswerClass::FalseMiss => self.false_misses += 1,
-            AnswerClass::Leak => self.leaks += 1,
-            AnswerClass::Ghost => self.ghosts += 1,
-            AnswerClass::WrongNeighbour => self.wrong_neighbours += 1,
+    /// Counts what is wrong with answers, relative to the geometry that was traced.
+    pub(super) fn count(
+        &mut self,
+        geometry: &Geometry,
+        neighbours: &Neighbours<'_>,
+        rays: &[Ray],
+        truth: &[Exact],
+        hits: &[Hit],
+    ) {
+        for ((ray, exact), hit) in rays.iter().zip(truth).zip(hits) {
+            self.rays += 1;
+            match classify(geometry, neighbours, ray, exact, hit) {
+                AnswerClass::Right => {}
+                AnswerClass::FalseMiss => self.false_misses += 1,
+                AnswerClass::Leak => self.leaks += 1,
+                AnswerClass::Ghost => self.ghosts += 1,
+                AnswerClass::WrongNeighbour => self.wrong_neighbours += 1,
+            }
         }
     }
 }
 
 /// Triangles that share vertices.
-pub struct Neighbours<'a>(pub &'a [[u32; 3]]);
+pub(super) struct Neighbours<'a>(pub &'a [[u32; 3]]);
 
 impl Neighbours<'_> {
-    /// Whether two triangles share a vertex.
+    /// Returns true if two triangles share a vertex.
     fn touch(&self, a: u32, b: u32) -> bool {
         let corners = |t: u32| self.0.get(t as usize);
         corners(a).zip(corners(b)).is_some_and(|(a, b)| a.iter().any(|v| b.contains(v)))
     }
-}
-
-/// Counts what is wrong with answers, all relative to the geometry that was traced.
-pub fn defects(
-    geometry: &Geometry,
-    neighbours: &Neighbours<'_>,
-    rays: &[Ray],
-    truth: &[Exact],
-    hits: &[Hit],
-) -> Defects {
-    let mut defects = Defects::default();
-    for ((ray, exact), hit) in rays.iter().zip(truth).zip(hits) {
-        defects.count(classify(geometry, neighbours, ray, exact, hit));
-    }
-    defects
 }
 
 fn classify(
@@ -99,40 +89,23 @@ fn classify(
     match (geometry.crossing(ray, right), geometry.crossing(ray, found)) {
         (Some(right), Some(found)) if found.t == right.t => AnswerClass::Right,
         (Some(right), Some(found)) if found.t > right.t => AnswerClass::Leak,
-        // It lies before the nearest hit within the range of the ray, so it is not within that range.
+        // It is before the nearest hit within the range of the ray, so it is not within that range.
         (_, Some(_)) => AnswerClass::Ghost,
         (_, None) if neighbours.touch(right, found) => AnswerClass::WrongNeighbour,
         (_, None) => AnswerClass::Ghost,
     }
 }
 
-/// Quantiles of an error.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct ErrorQuantiles {
-    /// Half of the errors are at most this.
-    pub median: f64,
-    /// 99 % are.
-    pub most: f64,
-    /// All are.
-    pub max: f64,
+/// The smallest error that this share of the errors does not exceed; zero if there are none.
+pub(super) fn quantile(mut errors: Vec<f64>, share: f64) -> f64 {
+    errors.sort_by(f64::total_cmp);
+    let rank = (share * errors.len() as f64).ceil() as usize;
+    errors.get(rank.max(1) - 1).copied().unwrap_or_default()
 }
 
-impl ErrorQuantiles {
-    /// The quantiles of these errors; zero if there are none.
-    pub fn of(mut errors: Vec<f64>) -> ErrorQuantiles {
-        errors.sort_by(f64::total_cmp);
-        // The least that so many of them do not exceed.
-        let at = |share: f64| {
-            let rank = (share * errors.len() as f64).ceil() as usize;
-            errors.get(rank.max(1) - 1).copied().unwrap_or_default()
-        };
-        ErrorQuantiles { median: at(0.5), most: at(0.99), max: at(1.0) }
-    }
-}
-
-/// Errors of t where the right triangle, one that touches it or one at the same t was found, relative to t and in units
-/// of the last place of the exact t.
-pub fn errors_of_t(neighbours: &Neighbours<'_>, truth: &[Exact], hits: &[Hit]) -> [Vec<f64>; 2] {
+/// Errors of t if the right triangle or one that touches it was found, relative to t and in units of the last place of
+/// the exact t.
+pub(super) fn errors_of_t(neighbours: &Neighbours<'_>, truth: &[Exact], hits: &[Hit]) -> [Vec<f64>; 2] {
     let (mut relative, mut ulp) = (Vec::new(), Vec::new());
     for (exact, hit) in truth.iter().zip(hits).filter(|(e, h)| e.hit.is_hit() && h.is_hit()) {
         let (right, found) = (exact.hit.primitive.triangle, hit.primitive.triangle);
@@ -149,15 +122,16 @@ pub fn errors_of_t(neighbours: &Neighbours<'_>, truth: &[Exact], hits: &[Hit]) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::accuracy::aimed_rays;
     use crate::model::Model;
     use crate::structures;
     use bth::rays::PrimitiveRef;
 
     #[test]
     fn quantiles_are_values_that_occur() {
-        let spread = ErrorQuantiles::of((1..=200).rev().map(f64::from).collect());
-        assert_eq!(spread, ErrorQuantiles { median: 100.0, most: 198.0, max: 200.0 });
-        assert_eq!(ErrorQuantiles::of(vec![]), ErrorQuantiles::default());
+        let errors: Vec<f64> = (1..=200).rev().map(f64::from).collect();
+        assert_eq!([0.5, 0.99, 1.0].map(|share| quantile(errors.clone(), share)), [100.0, 198.0, 200.0]);
+        assert_eq!(quantile(vec![], 0.5), 0.0);
     }
 
     /// Every kind of defect, made on purpose.
@@ -167,22 +141,21 @@ mod tests {
         let bytes = structures::compile(&model, &structures::BVH).unwrap().bytes;
         let geometry = Geometry::new(&bytes).unwrap();
         let neighbours = Neighbours(&model.mesh.triangles);
-        let set =
-            crate::accuracy::aimed_rays::set(&model, crate::accuracy::aimed_rays::Target::Vertices, 200);
+        let set = aimed_rays::set(&model, aimed_rays::Target::Vertices, 200);
         let truth = geometry.answers(&set, 1).unwrap();
         let i = (0..200).find(|&i| truth[i].hit.is_hit() && truth[i].hit.t < 0.9).unwrap();
         let (ray, exact) = (&set.rays[i], &truth[i]);
         let name = |triangle| Hit { primitive: PrimitiveRef { instance: 0, triangle }, ..exact.hit };
         let verdict = |hit: Hit| classify(&geometry, &neighbours, ray, exact, &hit);
         let all = 0..model.triangles() as u32;
-        let met = |t: &u32| geometry.crossing(ray, *t).is_some();
+        let is_hit = |t: &u32| geometry.crossing(ray, *t).is_some();
         let right = exact.hit.primitive.triangle;
         let behind = all
             .clone()
-            .filter(met)
+            .filter(is_hit)
             .find(|t| geometry.crossing(ray, *t).unwrap().t > geometry.crossing(ray, right).unwrap().t);
-        let beside = all.clone().find(|t| !met(t) && neighbours.touch(*t, right)).unwrap();
-        let elsewhere = all.clone().find(|t| !met(t) && !neighbours.touch(*t, right)).unwrap();
+        let beside = all.clone().find(|t| !is_hit(t) && neighbours.touch(*t, right)).unwrap();
+        let elsewhere = all.clone().find(|t| !is_hit(t) && !neighbours.touch(*t, right)).unwrap();
         assert_eq!(verdict(exact.hit), AnswerClass::Right);
         assert_eq!(verdict(Hit::MISS), AnswerClass::FalseMiss);
         assert_eq!(verdict(name(behind.expect("the target lies behind"))), AnswerClass::Leak);

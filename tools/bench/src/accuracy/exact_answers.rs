@@ -1,16 +1,16 @@
 //! The exact answers to a set of rays.
 
 use crate::rays::RaySet;
-use crate::tracer::{Batch, Tracer};
+use crate::structures::SceneTracer;
+use crate::tracer::Tracer;
 use anyhow::{Result, ensure};
-use bth::Scene;
 use bth::rays::{Hit, Ray};
 use bth_oracle::Intersection;
 use rayon::prelude::*;
 
 /// Triangles as they are stored in a compiled file, and the scene that finds the nearest one.
-pub struct Geometry {
-    scene: Scene,
+pub(super) struct Geometry {
+    scene: SceneTracer,
     /// Ids of the triangles that can be hit, ascending.
     ids: Vec<u32>,
     /// Corners of these triangles.
@@ -19,11 +19,11 @@ pub struct Geometry {
 
 /// The exact nearest hit of a ray.
 #[derive(Clone, Copy, Debug)]
-pub struct Exact {
+pub(super) struct Exact {
     /// As our runtime reports it.
-    pub hit: Hit,
+    pub(super) hit: Hit,
     /// t before it is rounded to f32; infinite for a miss.
-    pub t: f64,
+    pub(super) t: f64,
 }
 
 impl Geometry {
@@ -31,15 +31,16 @@ impl Geometry {
     ///
     /// # Errors
     /// If the runtime refuses the file, which would be a fault of ours.
-    pub fn new(bytes: &[u8]) -> Result<Geometry> {
+    pub(super) fn new(bytes: &[u8]) -> Result<Geometry> {
         let scene = bth::from_bytes(bytes)?;
         let triangles = bth_oracle::triangles(&scene.object(0));
+        let scene = SceneTracer(scene);
         let (ids, corners) = triangles.into_iter().map(|t| (t.id, t.corners)).unzip();
         Ok(Geometry { scene, ids, corners })
     }
 
     /// Where the line of a ray meets a triangle.
-    pub fn crossing(&self, ray: &Ray, triangle: u32) -> Option<Intersection> {
+    pub(super) fn crossing(&self, ray: &Ray, triangle: u32) -> Option<Intersection> {
         let row = self.ids.binary_search(&triangle).ok()?;
         bth_oracle::intersection(ray, self.corners[row])
     }
@@ -49,9 +50,9 @@ impl Geometry {
     ///
     /// # Errors
     /// If one of those differs: our BVH would be wrong then, and this measurement worthless.
-    pub fn answers(&self, set: &RaySet, one_in: usize) -> Result<Vec<Exact>> {
+    pub(super) fn answers(&self, set: &RaySet, one_in: usize) -> Result<Vec<Exact>> {
         let mut hits = vec![Hit::MISS; set.rays.len()];
-        self.scene.batch(&set.rays).nearest(&mut hits);
+        self.scene.nearest(set.batch(), &mut hits);
         let wrong = (0..set.rays.len()).into_par_iter().step_by(one_in.max(1)).find_any(|&i| {
             let (ray, hit) = (&set.rays[i], &hits[i]);
             let Some(truth) = bth_oracle::nearest(&self.corners, ray) else { return hit.is_hit() };
@@ -71,16 +72,5 @@ impl Geometry {
             Exact { hit: *hit, t: at.map_or(f64::INFINITY, |at| bth_oracle::to_f64(&at.t)) }
         };
         Ok(set.rays.par_iter().zip(&hits).map(exact).collect())
-    }
-}
-
-/// Draws the exact picture.
-impl Tracer for Geometry {
-    fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
-        self.scene.batch(batch.rays).nearest(hits);
-    }
-
-    fn any(&self, batch: Batch<'_>, found: &mut [bool]) {
-        self.scene.batch(batch.rays).any(found);
     }
 }

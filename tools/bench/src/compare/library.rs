@@ -1,11 +1,13 @@
 //! A build of `libbth.so`, loaded at run time through the C interface.
 #![allow(unsafe_code)]
 
+use crate::tracer::Answers;
 use anyhow::{Context, Result, bail, ensure};
 use bth::rays::{Hit, Ray};
-use libloading::{Library, Symbol};
+use libloading::Library;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::path::Path;
+use std::ptr::null;
 
 /// `bth_open` with the flag `BTH_READ`.
 const READ: u32 = 0;
@@ -29,29 +31,27 @@ impl Build {
     /// Loads a build. It is never unloaded, so its functions stay valid.
     ///
     /// # Errors
-    /// If the file is no shared library, or lacks one of the functions.
+    /// If the file is not a shared library, or lacks one of the functions.
     pub(super) fn load(path: &Path) -> Result<Build> {
         let path = path.canonicalize().with_context(|| format!("{}: no such file", path.display()))?;
         // SAFETY: by the documentation of `compare` the user names a build of libbth, whose initializers are those of Rust's
         // standard library.
         let library = unsafe { Library::new(&path) }.with_context(|| path.display().to_string())?;
         let library: &'static Library = Box::leak(Box::new(library));
-        let lacks =
-            |name: &str| format!("{}: no function {name}: expected a build of libbth", path.display());
+        let lacks = |name| format!("{}: no function {name}: expected a build of libbth", path.display());
         // SAFETY: the types are those of bth.h for these names, which have not changed since the first version.
         unsafe {
-            let open: Symbol<'_, Open> = library.get(b"bth_open\0").with_context(|| lacks("bth_open"))?;
-            let close: Symbol<'_, Close> = library.get(b"bth_close\0").with_context(|| lacks("bth_close"))?;
-            let last_error: Symbol<'_, LastError> =
-                library.get(b"bth_last_error\0").with_context(|| lacks("bth_last_error"))?;
-            let nearest: Symbol<'_, Nearest> =
-                library.get(b"bth_nearest\0").with_context(|| lacks("bth_nearest"))?;
-            let any: Symbol<'_, Any> = library.get(b"bth_any\0").with_context(|| lacks("bth_any"))?;
-            Ok(Build { open: *open, close: *close, last_error: *last_error, nearest: *nearest, any: *any })
+            Ok(Build {
+                open: *library.get(b"bth_open\0").with_context(|| lacks("bth_open"))?,
+                close: *library.get(b"bth_close\0").with_context(|| lacks("bth_close"))?,
+                last_error: *library.get(b"bth_last_error\0").with_context(|| lacks("bth_last_error"))?,
+                nearest: *library.get(b"bth_nearest\0").with_context(|| lacks("bth_nearest"))?,
+                any: *library.get(b"bth_any\0").with_context(|| lacks("bth_any"))?,
+            })
         }
     }
 
-    /// Whether the builds were loaded from two files: each has its own choice of instruction set.
+    /// Returns true if the builds were loaded from two files: each chooses its instruction set separately.
     pub(super) fn is_other_than(&self, other: &Build) -> bool {
         self.nearest as usize != other.nearest as usize
     }
@@ -82,28 +82,22 @@ pub(super) struct OpenedByBuild<'a> {
 }
 
 impl OpenedByBuild<'_> {
-    /// Nearest hits, in calls of `batch` rays.
-    pub(super) fn nearest(&self, rays: &[Ray], hits: &mut [Hit], batch: usize) {
-        for (rays, hits) in rays.chunks(batch).zip(hits.chunks_mut(batch)) {
-            // SAFETY: rays and hits are slices of the length that is passed; the reserved argument is null; the scene is open.
-            unsafe {
-                (self.build.nearest)(
-                    self.scene,
-                    rays.as_ptr(),
-                    std::ptr::null(),
-                    hits.as_mut_ptr(),
-                    rays.len(),
-                );
+    /// Traces rays, in calls of `batch` rays.
+    pub(super) fn trace(&self, rays: &[Ray], answers: &mut Answers, batch: usize) {
+        let Build { nearest, any, .. } = self.build;
+        match answers {
+            Answers::Nearest(hits) => {
+                for (rays, hits) in rays.chunks(batch).zip(hits.chunks_mut(batch)) {
+                    // SAFETY: rays and hits are slices of the length that is passed; the reserved argument is null; the
+                    // scene is open.
+                    unsafe { nearest(self.scene, rays.as_ptr(), null(), hits.as_mut_ptr(), rays.len()) }
+                }
             }
-        }
-    }
-
-    /// Whether rays hit anything, as [`Self::nearest`].
-    pub(super) fn any(&self, rays: &[Ray], found: &mut [bool], batch: usize) {
-        for (rays, found) in rays.chunks(batch).zip(found.chunks_mut(batch)) {
-            // SAFETY: as above; the library writes 0 or 1 to each byte.
-            unsafe {
-                (self.build.any)(self.scene, rays.as_ptr(), std::ptr::null(), found.as_mut_ptr(), rays.len());
+            Answers::Any(found) => {
+                for (rays, found) in rays.chunks(batch).zip(found.chunks_mut(batch)) {
+                    // SAFETY: as above; the library writes 0 or 1 to each byte.
+                    unsafe { any(self.scene, rays.as_ptr(), null(), found.as_mut_ptr(), rays.len()) }
+                }
             }
         }
     }

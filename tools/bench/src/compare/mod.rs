@@ -1,33 +1,77 @@
-//! Whether one build of `libbth.so` is faster than another, measured in one interleaved run.
+//! Compares the speed of two builds of `libbth.so` in one interleaved run.
 //!
-//! Both builds are loaded into this process and trace the same rays through the same model in turn, so that other work of the
-//! machine affects both alike. The ratio of a round is the new build's CPU time over the old one's; a set's figure is the
-//! median over the rounds. The verdict is that of the geometric mean over the models, by the interval in which it lies with 95 %
-//! confidence (bootstrap over the rounds): builds that are the same must not be told apart by noise.
+//! Both builds are loaded into this process and trace the same rays through the same model in turn, so that other work of
+//! the machine affects both alike. The ratio of a round is the new build's CPU time over the old one's; a set's figure is
+//! the median over the rounds. The verdict is about the geometric mean over the models, by its 95 % confidence interval
+//! (bootstrap over the rounds): noise must not tell equal builds apart.
 
 mod compiled_model;
 mod library;
-mod report;
+mod verdict;
 
-pub use report::{Comparison, ModelComparison, SetComparison, Verdict};
+pub use verdict::Verdict;
 
 use self::compiled_model::CompiledModel;
 use self::library::{Build, OpenedByBuild};
-use crate::args::Compare;
+use self::verdict::SetRatios;
+use crate::args::{RunOptions, SeenFrom, at_least_one, share};
 use crate::clock::Clock;
 use crate::isa;
-use crate::output::{print_and_save, write};
+use crate::names::Names;
 use crate::progress::Progress;
 use crate::rays::{self, Finder, RaySet};
+use crate::report::{Head, Report, Subject};
 use crate::rounds::quartiles;
+use crate::tracer::Answers;
 use anyhow::{Result, bail, ensure};
-use bth::rays::{Hit, Ray};
+use bth::rays::Ray;
+use clap::Args;
+use serde_json::json;
+use std::path::PathBuf;
 
-/// Seconds of CPU time that a turn takes at least; small sets are traced several times a turn, as the clock is too coarse for
+/// `compare`.
+#[derive(Debug, Args)]
+pub struct Compare {
+    /// The build to compare with: a libbth.so.
+    pub old: PathBuf,
+    /// The build that may be faster.
+    pub new: PathBuf,
+    /// Model files, models of `bth-scenes list` by NAME or NAME:FACES, or compiled .bth files, which are used as they are.
+    /// If OLD and NEW read different versions of the format: `OLD.bth,NEW.bth`, the model as compiled for each of them.
+    #[arg(required = true, value_name = "MODEL")]
+    pub models: Vec<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub seen_from: SeenFrom,
+    /// Rays of a set, at most (about).
+    #[arg(long, value_name = "N", default_value_t = 65_536, value_parser = at_least_one)]
+    pub rays: usize,
+    /// Rounds of which the median counts; one more comes before and warms up.
+    #[arg(long, value_name = "N", default_value_t = 11, value_parser = at_least_one)]
+    pub rounds: usize,
+    /// Rays in a call; 1 for one ray a call.
+    #[arg(long, value_name = "N", default_value_t = 1024, value_parser = at_least_one)]
+    pub batch: usize,
+    /// Only these ray sets.
+    #[arg(long = "set", value_name = "NAME,…", default_value = "", hide_default_value = true)]
+    pub sets: Names,
+    /// A set is slower when its mean over the models is certainly (95 %) greater by more than this, such as `1%`.
+    #[arg(long, value_name = "P%", default_value = "1%", value_parser = share)]
+    pub worse: f64,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub run: RunOptions,
+}
+
+const ABOUT: &str = "\
+CPU time of a ray on one thread, medians of interleaved rounds, and the ratio new / old of these rounds. The verdict on a \
+set is by the 95 % interval of its geometric mean over the models.";
+
+/// Shortest turn, in seconds of CPU time. Small sets are traced several times a turn, as the clock is too coarse for
 /// shorter ones.
-const TURN_SECONDS: f64 = 0.02;
+const SHORTEST_TURN: f64 = 0.02;
 
-/// Measures, prints and writes the comparison; returns whether a set is slower than `--worse` allows.
+/// Measures, prints and writes the comparison; returns the verdict by `--worse`.
 ///
 /// # Errors
 /// If a library, model or option cannot be used, or if the builds give different answers.
@@ -35,70 +79,82 @@ pub fn run(arguments: &Compare) -> Result<Verdict> {
     if let Some(name) = arguments.sets.unknown(&rays::NAMES).first() {
         bail!("--set {name}: there are {}", rays::NAMES.join(", "));
     }
-    let names = arguments.isa.as_deref().map(|names| names.split_once(',').unwrap_or((names, names)));
-    let [old, new] = [Build::load(&arguments.old)?, Build::load(&arguments.new)?];
-    if let Some((first, second)) = names {
-        let any_model = CompiledModel::load("torus-knot:320")?;
-        let [old_file, new_file] = &any_model.files;
-        for (build, file, isa) in [(&old, old_file, first), (&new, new_file, second)] {
-            isa::select_for_libraries(isa)?;
-            // A build reads the environment when it traces for the first time.
-            build.open(file)?.any(&[Ray::new([0.0; 3], [1.0; 3])], &mut [false], 1);
-        }
-        ensure!(
-            first == second || old.is_other_than(&new),
-            "two instruction sets need two files: copy the library"
-        );
+    let builds = [Build::load(&arguments.old)?, Build::load(&arguments.new)?];
+    if let Some(names) = &arguments.run.isa {
+        choose_isas(names, &builds)?;
     }
+    let rounds = arguments.run.rounds(arguments.rounds);
+    let options = json!({ "rays": arguments.rays, "rounds": rounds, "batch": arguments.batch });
+    let isa = arguments.run.isa.clone().unwrap_or_else(|| "best".to_owned());
+    let mut report = Report::new(Head::now("compare", isa, options), rounds, ABOUT);
     let progress = Progress::new();
-    let mut comparison = Comparison { batch: arguments.batch, worse: arguments.worse, models: Vec::new() };
+    let mut ratios = SetRatios::default();
     for which in &arguments.models {
-        comparison.models.push(model(which, arguments, [&old, &new], &progress)?);
+        measure_model(which, arguments, &builds, &mut report, &mut ratios, &progress)?;
     }
     drop(progress);
-    print_and_save(&comparison.markdown(), || {
-        let Some(path) = &arguments.json else { return Ok(()) };
-        let text = format!("{:#}\n", serde_json::to_value(&comparison)?);
-        write(path, &text)
-    })?;
-    let differing = comparison.differing();
-    ensure!(differing.is_empty(), "the builds give different answers: {}", differing.join(", "));
-    Ok(comparison.verdict())
+    let verdict = ratios.judge(arguments.worse, &mut report.notes);
+    report.finish(&arguments.run)?;
+    Ok(verdict)
 }
 
-fn model(
+/// Makes the builds use an instruction set, or each its own.
+fn choose_isas(names: &str, builds: &[Build; 2]) -> Result<()> {
+    let (old, new) = names.split_once(',').unwrap_or((names, names));
+    let any_model = CompiledModel::load("torus-knot:320")?;
+    for ((build, file), isa) in builds.iter().zip(&any_model.files).zip([old, new]) {
+        isa::select_for_libraries(isa)?;
+        // A build reads the environment when it traces for the first time.
+        build.open(file)?.trace(&[Ray::new([0.0; 3], [1.0; 3])], &mut Answers::empty(true, 1), 1);
+    }
+    let apart = old == new || builds[0].is_other_than(&builds[1]);
+    ensure!(apart, "two instruction sets need two files: copy the library");
+    Ok(())
+}
+
+fn measure_model(
     which: &str,
     arguments: &Compare,
-    builds: [&Build; 2],
+    builds: &[Build; 2],
+    report: &mut Report,
+    ratios: &mut SetRatios,
     progress: &Progress,
-) -> Result<ModelComparison> {
+) -> Result<()> {
     progress.show(format!("{which}: compiling"));
     let compiled = CompiledModel::load(which)?;
     let model = &compiled.model;
     progress.show(format!("{}: making rays", model.name));
-    let size = if arguments.quick { rays::QUICK_PICTURE_SIZE } else { rays::PICTURE_SIZE };
+    let size = if arguments.run.quick { rays::QUICK_PICTURE_SIZE } else { rays::PICTURE_SIZE };
     let options = rays::Options { size, most: arguments.rays, view: arguments.seen_from.view() };
     let (_, mut sets) = rays::sets(&Finder::new(model, &compiled.scene), &options);
-    sets.retain(|set| {
-        set.name != "miss" && arguments.sets.select(set.name) && set.rays.len() >= rays::FEWEST_TIMED
-    });
-
-    let [old, new] = &compiled.files;
-    let opened = [builds[0].open(old)?, builds[1].open(new)?];
-    let mut out = ModelComparison { name: model.name.clone(), sets: Vec::new() };
+    sets.retain(|set| arguments.sets.select(set.name) && set.rays.len() >= rays::FEWEST_TIMED);
+    let opened = [builds[0].open(&compiled.files[0])?, builds[1].open(&compiled.files[1])?];
     for set in &sets {
         progress.show(format!("{}: {}", model.name, set.name));
-        out.sets.push(compare(set, &opened, arguments));
+        let (seconds, same) = time(set, &opened, arguments.batch, report.rounds);
+        let of = |engine| Subject { engine, ours: true, model: &model.name, threads: 1 };
+        for (engine, seconds) in ["old", "new"].into_iter().zip(&seconds) {
+            let median = quartiles(seconds.clone())[1];
+            report.add(&of(engine), set.name, median * 1e9 / set.rays.len() as f64, "ns/ray");
+        }
+        let each: Vec<f64> = seconds[1].iter().zip(&seconds[0]).map(|(new, old)| new / old).collect();
+        let [low, ratio, high] = quartiles(each.clone());
+        report.add(&of("new / old"), set.name, ratio, "ns/ray");
+        if let Some(row) = report.rows.last_mut() {
+            (row.unit, row.low, row.high) = ("ratio".to_owned(), Some(low), Some(high));
+        }
+        ratios.add(set.name, each);
+        if !same {
+            report.wrong.push(format!("the builds differ on {} {}", model.name, set.name));
+        }
     }
-    Ok(out)
+    Ok(())
 }
 
-/// Times one set with both builds, round by round.
-fn compare(set: &RaySet, builds: &[OpenedByBuild<'_>; 2], arguments: &Compare) -> SetComparison {
-    let (batch, rounds) = (arguments.batch, if arguments.quick { 1 } else { arguments.rounds });
-    let rays = &set.rays;
-    let mut hits = [vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]];
-    let mut found = [vec![false; rays.len()], vec![false; rays.len()]];
+/// Times one set with both builds, round by round. Returns the seconds of each round, and true if all answers have the same
+/// bits.
+fn time(set: &RaySet, builds: &[OpenedByBuild<'_>; 2], batch: usize, rounds: usize) -> ([Vec<f64>; 2], bool) {
+    let mut answers = [(); 2].map(|()| Answers::empty(set.any, set.rays.len()));
     let mut seconds = [Vec::new(), Vec::new()];
     let mut passes = 1;
     for round in 0..=rounds {
@@ -107,37 +163,15 @@ fn compare(set: &RaySet, builds: &[OpenedByBuild<'_>; 2], arguments: &Compare) -
         for turn in 0..2 {
             let which = (turn + round) % 2;
             of_round[which] = Clock::ThreadCpu.time(|| {
-                for _ in 0..passes {
-                    if set.any {
-                        builds[which].any(rays, &mut found[which], batch);
-                    } else {
-                        builds[which].nearest(rays, &mut hits[which], batch);
-                    }
-                }
+                (0..passes).for_each(|_| builds[which].trace(&set.rays, &mut answers[which], batch))
             }) / passes as f64;
         }
         // The first round warms up the caches; its time decides how many passes later turns take.
         if round > 0 {
-            seconds[0].push(of_round[0]);
-            seconds[1].push(of_round[1]);
-        } else if !arguments.quick {
-            passes = (TURN_SECONDS / of_round[0].max(1e-6)).ceil() as usize;
+            seconds.iter_mut().zip(of_round).for_each(|(all, time)| all.push(time));
+        } else if rounds > 1 {
+            passes = (SHORTEST_TURN / of_round[0].max(1e-6)).ceil() as usize;
         }
     }
-    let ratios: Vec<f64> = seconds[1].iter().zip(&seconds[0]).map(|(new, old)| new / old).collect();
-    let ns = |seconds: &[f64]| quartiles(seconds.to_vec())[1] * 1e9 / rays.len() as f64;
-    let bits =
-        |h: &Hit| [h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.primitive.instance, h.primitive.triangle];
-    let [low, ratio, high] = quartiles(ratios.clone());
-    SetComparison {
-        name: set.name.to_owned(),
-        rays: rays.len(),
-        old_ns: ns(&seconds[0]),
-        new_ns: ns(&seconds[1]),
-        ratio,
-        low,
-        high,
-        ratios,
-        same: found[0] == found[1] && hits[0].iter().zip(&hits[1]).all(|(a, b)| bits(a) == bits(b)),
-    }
+    (seconds, answers[0].compare(&answers[1], true) == [0, 0])
 }

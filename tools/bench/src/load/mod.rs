@@ -1,127 +1,206 @@
-//! Opening a compiled file and tracing the first rays, against building at the start.
+//! Opening a compiled model or scene and tracing the first rays, against building at the start.
 //!
-//! Every start runs in a process of its own ([`probe`]), so that nothing is left over from the one before.
+//! Every start runs in a separate process ([`probe`]), so that nothing is left over from the one before.
 
-mod files;
-mod first_rays;
 pub mod probe;
-mod results;
-mod scene_results;
-mod scene_tables;
-pub mod scenes;
 mod starts;
-mod tables;
 
-use results::StartCase;
-pub use results::{LoadResults, ModelStarts, StartsRun, Times};
-pub use scene_results::{SceneLoadResults, SceneStarts};
-pub use tables::{draw, markdown};
+pub use probe::{Probe, Start};
 
-use crate::args::{Load, Start};
-use crate::model::Model;
-use crate::output::{Head, Report, note};
+use crate::args::{RunOptions, SeenFrom, at_least_one};
+use crate::isa;
+use crate::model::{Model, position};
 use crate::progress::Progress;
-use crate::rays::{self, Finder, RaySet};
+use crate::rays::{self, Camera, Finder};
+use crate::report::{Head, Report, Subject};
 use crate::rivals::embree;
-use crate::{isa, structures};
+use crate::scenes::Source;
+use crate::structures;
 use anyhow::{Context, Result};
+use bth::Scene;
 use bth::rays::{Hit, Ray};
-use files::{PageCache, Scratch};
-use first_rays::{SIZE, first_of};
+use clap::Args;
+use glam::DVec3;
 use serde_json::json;
-use starts::StartRounds;
+use starts::{PageCache, StartCase, StartRounds};
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use zerocopy::IntoBytes;
 
-/// Measures, prints and writes the report.
-///
-/// # Errors
-/// If an option or model cannot be used, a start fails or a file cannot be written.
-pub fn run(arguments: &Load) -> Result<()> {
-    let results = measure(arguments)?;
-    for model in &results.models {
-        for (name, why) in &model.left_out {
-            note(&format!("{}: {name}: not measured: {why}", model.name));
-        }
-    }
-    Report {
-        head: &results.head,
-        title: "Load against rebuild",
-        body: markdown(&results),
-        json: serde_json::to_value(&results)?,
-        charts: draw(&results),
-    }
-    .write(&arguments.starts.output)
+/// `load`.
+#[derive(Debug, Args)]
+pub struct Load {
+    /// Models and scenes: files, NAME or NAME:FACES of `bth-scenes list`, or `objects:N` for N generated objects.
+    #[arg(required = true, value_name = "MODEL")]
+    pub models: Vec<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub seen_from: SeenFrom,
+    /// First rays to trace.
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = at_least_one)]
+    pub rays: usize,
+    /// Rounds of which the median counts; one more comes before.
+    #[arg(long, value_name = "N", default_value_t = 7, value_parser = at_least_one)]
+    pub rounds: usize,
+    /// Numbers of threads to build and trace on.
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "1,2", value_parser = at_least_one)]
+    pub threads: Vec<usize>,
+    /// Folder for the compiled files: a cold start reads from its storage.
+    #[arg(long, value_name = "DIR")]
+    pub scratch: Option<PathBuf>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub run: RunOptions,
 }
 
-/// Measures all models.
+const ABOUT: &str = "\
+Wall-clock times from before the file is opened, or from before Embree builds all objects (several at once) and their \
+instances from triangles in memory; each start in a separate process, medians of interleaved rounds. `ready`: until \
+rays can be traced; `first hit`: until the first ray, which hits, is answered; `total`: until the first camera rays are \
+traced; `CPU`: of all threads until then. `picture`: all camera rays, the faster of two rounds after that. `map`: \
+mapped; `read`: read and checked; `cold`: the file's pages were dropped from memory first. `storage`: MiB that were \
+read from storage. `times embree`: relative to Embree's start; below 1 is faster.";
+
+/// Pixels of the camera.
+const SIZE: (u32, u32) = (512, 288);
+
+/// Measures all models and scenes.
 ///
 /// # Errors
-/// If a model cannot be used or a start fails.
-pub fn measure(arguments: &Load) -> Result<LoadResults> {
-    let isa = isa::select(arguments.starts.isa.as_deref())?;
-    let options = json!({"rays": arguments.starts.rays, "rounds": arguments.starts.rounds});
-    let mut results = LoadResults {
-        head: Head::now("load", isa.clone(), options),
-        rays: arguments.starts.rays,
-        models: Vec::new(),
-    };
+/// If an option, model or scene cannot be used, or a start fails.
+pub fn measure(arguments: &Load) -> Result<Report> {
+    let isa = isa::select(arguments.run.isa.as_deref())?;
+    let rounds = arguments.run.rounds(arguments.rounds);
+    let options = json!({"rays": arguments.rays, "rounds": rounds});
+    let mut report = Report::new(Head::now("load", isa, options), rounds, ABOUT);
     let progress = Progress::new();
-    for which in &arguments.models.models {
-        results.models.push(measure_model(which, arguments, &isa, &progress)?);
+    for which in &arguments.models {
+        measure_one(which, arguments, &mut report, &progress)?;
     }
-    Ok(results)
+    report.add_ratios(embree::NAME, "ms");
+    Ok(report)
 }
 
-fn measure_model(which: &str, arguments: &Load, isa: &str, progress: &Progress) -> Result<ModelStarts> {
-    let model = Model::load(which)?;
-    let scratch = Scratch::new(arguments.starts.scratch.as_deref())?;
-    let mut cases = Vec::new();
-    let mut finder_scene = None;
-    for kind in [&structures::BTH, &structures::BVH] {
-        progress.show(format!("{}: compiling {}", model.name, kind.name));
-        let compiled = structures::compile(&model, kind)?;
-        let file = scratch.write(&format!("{}.bth", kind.name), &compiled.bytes)?;
+/// A model or a scene.
+enum Input {
+    Model(Box<Model>),
+    Scene(Source),
+}
+
+impl Input {
+    fn load(which: &str) -> Result<Input> {
+        let is_scene =
+            ["manifest", "glb", "gltf"].iter().any(|end| which.to_lowercase().ends_with(&format!(".{end}")));
+        if is_scene || which.starts_with("objects:") {
+            return Ok(Input::Scene(Source::load(which)?));
+        }
+        Ok(Input::Model(Box::new(Model::load(which)?)))
+    }
+
+    fn name(&self) -> &str {
+        match self {
+            Input::Model(model) => &model.name,
+            Input::Scene(source) => &source.name,
+        }
+    }
+
+    fn compile(&self, kind: &structures::Kind) -> Result<structures::Compiled> {
+        match self {
+            Input::Model(model) => structures::compile(model, kind),
+            Input::Scene(source) => source.compile(&kind.options()),
+        }
+    }
+
+    /// The rays of a picture, in tiles.
+    fn picture(&self, scene: &Scene, seen_from: &SeenFrom) -> Vec<Ray> {
+        match self {
+            Input::Model(model) => {
+                let options = rays::Options { size: SIZE, most: usize::MAX, view: seen_from.view() };
+                let (_, [rays, _]) = rays::cameras(&Finder::new(model, scene), &options);
+                rays
+            }
+            Input::Scene(_) => {
+                Camera::framing_instances(scene, SIZE).map_or(Vec::new(), |(camera, _)| camera.rays())
+            }
+        }
+    }
+}
+
+fn measure_one(which: &str, arguments: &Load, report: &mut Report, progress: &Progress) -> Result<()> {
+    let input = Input::load(which)?;
+    let name = input.name();
+    let scratch = match &arguments.scratch {
+        Some(place) => tempfile::tempdir_in(place).with_context(|| place.display().to_string())?,
+        None => tempfile::tempdir()?,
+    };
+    let (mut cases, mut opened) = (Vec::new(), None);
+    for kind in [structures::BTH, structures::BVH] {
+        progress.show(format!("{name}: compiling {}", kind.name));
+        let compiled = input.compile(&kind)?;
+        let file = scratch.path().join(format!("{}.bth", kind.name));
+        write(&file, &compiled.bytes)?;
         for start in [Start::Map, Start::Read] {
-            for cache in PageCache::ALL {
-                cases.push(StartCase::of_file(kind.name, start, cache, file.clone(), compiled.bytes.len()));
-            }
+            cases.extend(PageCache::ALL.map(|cache| {
+                let name = format!("{} {} {}", kind.name, start.name(), cache.name());
+                StartCase { name, ours: true, start, cache, file: file.clone() }
+            }));
         }
-        finder_scene = Some(bth::from_bytes(&compiled.bytes)?);
+        let of = Subject { engine: kind.name, ours: true, model: name, threads: 1 };
+        report.add(&of, "file", compiled.bytes.len() as f64 / 1048576.0, "MiB");
+        report.add(&of, "compile", compiled.seconds, "s");
+        opened = Some((bth::from_bytes(&compiled.bytes)?, file));
     }
-    let mut left_out = Vec::new();
+    let (scene, file) = opened.context("two files were compiled")?;
     match embree::available() {
-        Ok(()) => {
-            let file = scratch.write("mesh", &files::mesh_bytes(&model.mesh))?;
-            for start in [Start::Embree, Start::EmbreeRobust] {
-                cases.push(StartCase::of_rival(start, file.clone()));
-            }
-        }
-        Err(error) => left_out.push(("embree".to_owned(), format!("{error:#}"))),
+        Ok(()) => cases.extend([Start::Embree, Start::EmbreeRobust].map(|start| {
+            let name = start.name().replace('-', " ");
+            // Embree's triangles are in memory before the clock starts, so the page cache does not matter.
+            StartCase { name, ours: false, start, cache: PageCache::Warm, file: file.clone() }
+        })),
+        Err(error) => report.leave_out(name, embree::NAME, &error),
     }
-
-    progress.show(format!("{}: making rays", model.name));
-    let scene = finder_scene.expect("two files were compiled");
-    let options = rays::Options { size: SIZE, most: usize::MAX, view: arguments.models.seen_from.view() };
-    let (view, sets) = rays::sets(&Finder::new(&model, &scene), &options);
-    let rays = first_rays(&sets[0], &scene, arguments.starts.rays)
-        .with_context(|| format!("{}: the camera sees nothing", model.name))?;
-    let rays = scratch.write("rays", files::ray_bytes(&rays))?;
-
-    let starts = &arguments.starts;
-    let rounds = StartRounds { name: &model.name, cases: &cases, starts, first: None, isa, rays: &rays };
-    let runs = rounds.run(progress)?;
-    Ok(ModelStarts {
-        name: model.name.clone(),
-        triangles: model.triangles(),
-        view,
-        file_bytes: cases.iter().filter(|c| c.file_bytes > 0).map(|c| (c.structure, c.file_bytes)).collect(),
-        left_out,
-        runs,
-    })
+    progress.show(format!("{name}: making rays"));
+    let picture = input.picture(&scene, &arguments.seen_from);
+    let mut rays = first_of(&scene, &picture, arguments.rays)
+        .with_context(|| format!("{name}: the camera sees nothing"))?;
+    let first = rays.len();
+    rays.extend(&picture);
+    let file = scratch.path().join("rays");
+    write(&file, rays.as_bytes())?;
+    let rounds = StartRounds { name, cases: &cases, rounds: report.rounds, first, rays: &file };
+    for &threads in &arguments.threads {
+        rounds.run(threads, report, progress)?;
+    }
+    Ok(())
 }
 
-/// Rays of the camera, evenly spread over the picture, after one that hits.
-fn first_rays(primary: &RaySet, scene: &bth::Scene, count: usize) -> Option<Vec<Ray>> {
-    let mut hits = vec![Hit::MISS; primary.rays.len()];
-    scene.batch(&primary.rays).nearest(&mut hits);
-    first_of(&primary.rays, &hits, count)
+/// Writes a file to its storage: only clean pages can be dropped from the cache.
+fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    std::fs::write(path, bytes)?;
+    Ok(File::open(path)?.sync_all()?)
+}
+
+/// `count` of the rays, evenly spread over them, after one that hits; `None` if none hits.
+fn first_of(scene: &Scene, rays: &[Ray], count: usize) -> Option<Vec<Ray>> {
+    let mut hits = vec![Hit::MISS; rays.len()];
+    scene.batch(rays).nearest(&mut hits);
+    let first = hits.iter().position(Hit::is_hit)?;
+    let count = count.min(rays.len());
+    let spread = (1..count).map(|i| i * rays.len() / count);
+    Some([first].into_iter().chain(spread).map(|i| rays[i]).collect())
+}
+
+impl Camera {
+    /// The camera that frames all visible instances of a scene, and the diagonal of their box; `None` if there are none.
+    pub(crate) fn framing_instances(scene: &Scene, size: (u32, u32)) -> Option<(Camera, f64)> {
+        let boxes = (0..scene.instance_count()).filter_map(|i| scene.instance_bounds(i));
+        let boxes: Vec<[DVec3; 2]> = boxes.map(|(low, high)| [position(low), position(high)]).collect();
+        let [lower, upper] = boxes.iter().copied().reduce(|[l, u], [low, high]| [l.min(low), u.max(high)])?;
+        let corner =
+            |ends: &[DVec3; 2], i: usize| DVec3::new(ends[i & 1].x, ends[i >> 1 & 1].y, ends[i >> 2].z);
+        let corners: Vec<DVec3> = boxes.iter().flat_map(|ends| (0..8).map(|i| corner(ends, i))).collect();
+        let diagonal = (upper - lower).length();
+        let from = DVec3::new(0.8, 0.5, 1.0);
+        Some((Camera::framing(&corners, 0.5 * (lower + upper), diagonal, from, size), diagonal))
+    }
 }

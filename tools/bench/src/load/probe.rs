@@ -1,37 +1,84 @@
-//! One start: open or build, then trace the first rays. Runs in a process of its own and prints its times
-//! as JSON.
+//! One start: open or build, then trace the first rays. Runs in a separate process and prints its times as JSON.
 #![allow(unsafe_code)]
 
-use super::files;
-use crate::args::{Probe, Start};
 use crate::clock::process_cpu;
 use crate::isa;
 use crate::rivals::embree;
-use crate::structures::BATCH;
+use crate::scenes::Placed;
+use crate::structures::SceneTracer;
 use crate::tracer::{Batch, Tracer, spread};
-use anyhow::Result;
+use anyhow::{Context, Result, ensure};
 use bth::rays::{Hit, Ray};
+use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 use std::io::Write;
+use std::path::PathBuf;
 use std::time::Instant;
+use zerocopy::FromBytes;
 
-/// The times of a start: wall-clock seconds since the file was about to be opened or the build was about to begin.
+/// `probe`.
+#[derive(Debug, Args)]
+pub struct Probe {
+    /// How to start.
+    #[arg(long, value_enum)]
+    pub start: Start,
+    /// Number of threads to build and trace on.
+    #[arg(long)]
+    pub threads: usize,
+    /// Vector instructions of our kernels.
+    #[arg(long)]
+    pub isa: Option<String>,
+    /// How many of the rays are the first.
+    #[arg(long)]
+    pub first: usize,
+    /// Compiled file; Embree builds from its triangles.
+    pub file: PathBuf,
+    /// The rays, the first of which hits.
+    pub rays: PathBuf,
+}
+
+/// How a program gets a structure that it can trace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Start {
+    /// `bth::map`.
+    Map,
+    /// `bth::open`: reads and checks.
+    Read,
+    /// Embree builds from triangles in memory, with its defaults.
+    Embree,
+    /// The same, in Embree's robust mode.
+    EmbreeRobust,
+}
+
+impl Start {
+    /// The name on the command line and in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Start::Map => "map",
+            Start::Read => "read",
+            Start::Embree => "embree",
+            Start::EmbreeRobust => "embree-robust",
+        }
+    }
+}
+
+/// The times of a start: wall-clock seconds since just before the file was opened or the build began.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StartTimes {
     /// Until rays could be traced.
     pub ready_s: f64,
     /// Until the first hit.
     pub first_hit_s: f64,
-    /// Until all rays were traced.
+    /// Until the first rays were traced.
     pub total_s: f64,
     /// CPU seconds of all threads until then.
     pub cpu_s: f64,
-    /// Bytes that were read from storage until then, where the system counts them.
+    /// Bytes that were read from storage until then, if the system counts them.
     pub storage_bytes: Option<u64>,
     /// Rays that hit.
     pub hits: usize,
-    /// Seconds for all rays of the file, where only some of them were the first: the less of two rounds.
-    pub frame_s: Option<f64>,
+    /// Seconds for all rays of the file: the faster of two rounds.
+    pub picture_s: f64,
 }
 
 /// Starts once and prints the times as JSON.
@@ -40,52 +87,35 @@ pub struct StartTimes {
 /// If the file or library cannot be used.
 pub fn run(arguments: &Probe) -> Result<()> {
     isa::select(arguments.isa.as_deref())?;
-    let rays = files::read_rays(&arguments.rays)?;
-    let (file, threads) = (&arguments.file, arguments.threads);
-    let first = arguments.first.unwrap_or(rays.len()).min(rays.len());
+    let bytes = std::fs::read(&arguments.rays)?;
+    let rays = bytes.chunks(size_of::<Ray>()).map(|b| Ray::read_from_bytes(b).ok());
+    let rays = rays.collect::<Option<Vec<Ray>>>().context("not a file of rays")?;
+    let Probe { file, threads, first, .. } = arguments;
     let probed = match arguments.start {
-        // SAFETY: `load` wrote the file into a folder of its own and does not touch it while we run.
-        Start::Map => probe(&rays, first, threads, || Ok(OpenedFile(unsafe { bth::map(file)? })))?,
-        Start::Read => probe(&rays, first, threads, || Ok(OpenedFile(bth::open(file)?)))?,
-        Start::EmbreeScene | Start::EmbreeSceneRobust => {
-            embree::available()?;
-            let (objects, object_of, places) = files::read_scene(file)?;
-            let objects = objects.into_iter().map(|(p, t)| (embree::padded(&p), t)).collect();
-            let robust = arguments.start == Start::EmbreeSceneRobust;
-            let variant = if robust { &embree::ROBUST } else { &embree::DEFAULT };
-            probe(&rays, first, threads, || {
-                let mut scene = embree::build_instances(objects, &object_of, variant, threads)?;
-                scene.place(&places);
-                Ok(scene)
-            })?
-        }
+        // SAFETY: `load` wrote the file into a temporary folder and does not touch it while we run.
+        Start::Map => probe(&rays, *first, *threads, || Ok(SceneTracer(unsafe { bth::map(file)? })))?,
+        Start::Read => probe(&rays, *first, *threads, || Ok(SceneTracer(bth::open(file)?)))?,
         Start::Embree | Start::EmbreeRobust => {
             // Neither the library nor the triangles are part of a build.
             embree::available()?;
-            let (positions, triangles) = files::read_mesh(file)?;
-            let positions = embree::padded(&positions);
+            let scene = bth::open(file)?;
             let robust = arguments.start == Start::EmbreeRobust;
             let variant = if robust { &embree::ROBUST } else { &embree::DEFAULT };
-            probe(&rays, first, threads, || embree::build(positions, triangles, variant, threads))?
+            let mut placed = Placed::of(&scene);
+            if scene.description().is_some() {
+                probe(&rays, *first, *threads, || placed.build(variant, *threads))?
+            } else {
+                let (positions, triangles) = placed.objects.pop().context("an object")?;
+                probe(&rays, *first, *threads, || embree::build(positions, triangles, variant, *threads))?
+            }
         }
     };
     writeln!(std::io::stdout().lock(), "{}", serde_json::to_string(&probed)?)?;
     Ok(())
 }
 
-/// An opened file.
-struct OpenedFile(bth::Scene);
-
-impl Tracer for OpenedFile {
-    fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
-        for (batch, hits) in batch.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
-            self.0.batch(batch.rays).nearest(hits);
-        }
-    }
-
-    fn any(&self, batch: Batch<'_>, found: &mut [bool]) {
-        self.0.batch(batch.rays).any(found);
-    }
+fn batch(rays: &[Ray]) -> Batch<'_> {
+    Batch { rays, starts: None, coherent: true }
 }
 
 fn probe<T: Tracer>(
@@ -96,38 +126,32 @@ fn probe<T: Tracer>(
 ) -> Result<StartTimes> {
     let rays = &all[..first];
     let mut hits = vec![Hit::MISS; rays.len()];
-    let batch = |rays| Batch { rays, starts: None, coherent: true };
     let (before, cpu, clock) = (storage_bytes(), process_cpu(), Instant::now());
     let tracer = start()?;
     let ready_s = clock.elapsed().as_secs_f64();
     tracer.nearest(batch(&rays[..1]), &mut hits[..1]);
     let first_hit_s = clock.elapsed().as_secs_f64();
-    let share = rays.len().div_ceil(threads);
-    spread(batch(rays), &mut hits, threads, share, |batch, hits| tracer.nearest(batch, hits));
+    let trace = |rays: &[Ray], hits: &mut [Hit]| {
+        let share = rays.len().div_ceil(threads);
+        spread(batch(rays), hits, (threads, 1), share, |batch, hits| tracer.nearest(batch, hits));
+    };
+    trace(rays, &mut hits);
     let total_s = clock.elapsed().as_secs_f64();
     let cpu_s = process_cpu() - cpu;
-    anyhow::ensure!(hits[0].is_hit(), "the first ray hits nothing");
+    ensure!(hits[0].is_hit(), "the first ray hits nothing");
     let storage_bytes = storage_bytes().zip(before).map(|(after, before)| after - before);
-    let mut frame = vec![Hit::MISS; all.len()];
-    let mut frame_s = || {
+    let mut picture = vec![Hit::MISS; all.len()];
+    let mut picture_s = || {
         let clock = Instant::now();
-        let share = all.len().div_ceil(threads);
-        spread(batch(all), &mut frame, threads, share, |batch, hits| tracer.nearest(batch, hits));
+        trace(all, &mut picture);
         clock.elapsed().as_secs_f64()
     };
-    let frame_s = (first < all.len()).then(|| frame_s().min(frame_s()));
-    Ok(StartTimes {
-        ready_s,
-        first_hit_s,
-        total_s,
-        cpu_s,
-        storage_bytes,
-        hits: hits.iter().filter(|h| h.is_hit()).count(),
-        frame_s,
-    })
+    let picture_s = picture_s().min(picture_s());
+    let hits = hits.iter().filter(|h| h.is_hit()).count();
+    Ok(StartTimes { ready_s, first_hit_s, total_s, cpu_s, storage_bytes, hits, picture_s })
 }
 
-/// Bytes that this process has fetched from storage so far (Linux).
+/// Bytes that this process has read from storage so far (Linux).
 fn storage_bytes() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/self/io").ok()?;
     text.lines().find_map(|line| line.strip_prefix("read_bytes:"))?.trim().parse().ok()

@@ -2,7 +2,7 @@
 //! perpendicular to the ray; the fourth vertex is projected, and signs of cross products give the exit face.
 
 use super::tet_records::{FACE, HULL, TetRecord, Tets};
-use crate::triangle_tests::{cross, dot, moller_trumbore, sub};
+use crate::moller_trumbore::{cross, dot, moller_trumbore, sub};
 use bth::rays::Ray;
 
 /// A plane perpendicular to a ray, with the origin on the ray.

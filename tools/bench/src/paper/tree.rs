@@ -6,8 +6,8 @@
 
 use super::tet_records::{TetRecord, Tets};
 use super::tet_walk::{End, Plane};
+use crate::moller_trumbore::moller_trumbore;
 use crate::tracer::{Batch, Tracer};
-use crate::triangle_tests::moller_trumbore;
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_compile::bvh::{self, BinaryBvh};
 use bth_compile::tets::TetMesh;
@@ -239,7 +239,6 @@ impl<R: TetRecord> Tracer for PaperTree<R> {
 mod tests {
     use super::super::tet_records::{Tet20, Tet32};
     use super::*;
-    use crate::costs::rays;
     use bth_compile::{Silent, bvh, sampling, tets};
 
     /// Hits of a structure against those of trying all triangles; `eye`: rays from one point within.
@@ -266,7 +265,10 @@ mod tests {
         let mesh = Mesh { positions: model.positions, triangles: model.triangles, ..Mesh::default() };
         let (bvh, _) = bvh::build(&mesh, &bvh::BvhOptions::default(), &Silent).unwrap();
         let root = &bvh.nodes[0];
-        let outside = rays(&sampling::outside(root.lower, root.upper, 150, 1));
+        let outside: Vec<Ray> = sampling::outside(root.lower, root.upper, 150, 1)
+            .iter()
+            .map(|s| Ray::new(s.origin.map(|x| x as f32), s.direction.map(|x| x as f32)))
+            .collect();
         let eye: [f32; 3] = std::array::from_fn(|k| 0.43 * root.lower[k] + 0.57 * root.upper[k]);
         let inside: Vec<Ray> = outside.iter().map(|r| Ray { origin: eye, ..*r }).collect();
         agrees(&mesh, &PaperTree::<Tet20>::new(&mesh, &bvh, &[]), &outside);

@@ -39,18 +39,4 @@ mod tests {
         let mean = (0..20_000).map(|_| cosine_weighted(&mut rng, normal).dot(normal)).sum::<f64>() / 20_000.0;
         assert!((mean - 2.0 / 3.0).abs() < 0.01, "{mean}");
     }
-
-    #[test]
-    fn perpendicular_vectors_are_an_orthonormal_frame() {
-        let mut rng = Rng::new(1);
-        for _ in 0..1000 {
-            let normal = on_sphere(&mut rng);
-            let (side, up) = perpendicular(normal);
-            for (a, b, expected) in
-                [(normal, side, 0.0), (normal, up, 0.0), (side, up, 0.0), (side, side, 1.0), (up, up, 1.0)]
-            {
-                assert!((a.dot(b) - expected).abs() < 1e-12, "{normal}");
-            }
-        }
-    }
 }

@@ -30,7 +30,7 @@ impl<'a> Finder<'a> {
     pub(super) fn nearest(&self, rays: &[Ray]) -> Vec<Hit> {
         let mut hits = vec![Hit::MISS; rays.len()];
         let batch = Batch { rays, starts: None, coherent: false };
-        spread(batch, &mut hits, self.threads, BLOCK, |b, h| self.scene.batch(b.rays).nearest(h));
+        spread(batch, &mut hits, (self.threads, 1), BLOCK, |b, h| self.scene.batch(b.rays).nearest(h));
         hits
     }
 

@@ -9,10 +9,9 @@
 //! | `shadow` | any | from each primary hit that faces it to a point light |
 //! | `diffuse-beside`, `ao-beside`, `shadow-beside` | the same | the same, but the start is a little off the surface |
 //! | `random` | nearest | chords between random points of a sphere around the model |
-//! | `miss` | nearest | such chords that cross the bounding box and hit nothing |
 //!
-//! Rays of `diffuse`, `ao` and `shadow` start at the hit, rounded to f32, with a tmin of 0: they may hit the triangle that they
-//! leave. The sets know the exact starts, too.
+//! Rays of `diffuse`, `ao` and `shadow` start at the hit, rounded to f32, with a tmin of 0: they may hit the triangle that
+//! they leave. The sets have the exact starts, too.
 
 mod camera;
 mod directions;
@@ -34,7 +33,7 @@ use glam::DVec3;
 use viewpoint::CameraHits;
 
 /// Names of the sets, in order.
-pub const NAMES: [&str; 10] = [
+pub const NAMES: [&str; 9] = [
     "primary",
     "closeup",
     "diffuse",
@@ -44,7 +43,6 @@ pub const NAMES: [&str; 10] = [
     "shadow",
     "shadow-beside",
     "random",
-    "miss",
 ];
 
 /// Pixels of the cameras that rays are taken from.
@@ -64,13 +62,13 @@ pub(crate) const AO_RAYS: usize = 4;
 pub struct RaySet {
     /// One of [`NAMES`].
     pub name: &'static str,
-    /// Whether the query is any hit, not the nearest one.
+    /// True for any hit, false for the nearest one.
     pub any: bool,
-    /// Whether neighbouring rays have similar origins and directions.
+    /// True if neighbouring rays have similar origins and directions.
     pub coherent: bool,
     /// The rays, model space.
     pub rays: Vec<Ray>,
-    /// For each ray where it starts on the surface, if the rays start at hits.
+    /// The point of the surface at which each ray starts, if the rays start at hits.
     pub starts: Option<Vec<Start>>,
 }
 
@@ -80,10 +78,10 @@ impl RaySet {
         Batch { rays: &self.rays, starts: self.starts.as_deref(), coherent: self.coherent }
     }
 
-    /// About `most` of the rays at most: whole runs of neighbours, evenly spread over the set.
+    /// Keeps at most about `most` of the rays: whole runs of neighbours, evenly spread over the set.
     fn thinned(mut self, most: usize) -> RaySet {
         const RUN: usize = 64;
-        // An odd step: rows of tiles are often a power of two of runs long, of which an even one would take the same columns of the picture.
+        // An odd step: rows of tiles often have a power of two of runs, of which an even step would take the same columns.
         let step = self.rays.len().div_ceil(most.max(1)) | 1;
         let kept = |i: usize| (i / RUN).is_multiple_of(step);
         let keep = |index: &mut usize| {
@@ -124,7 +122,6 @@ pub fn sets(finder: &Finder<'_>, options: &Options) -> (View, Vec<RaySet>) {
     let closeup = viewpoint::close_up(finder, diagonal, &seen).rays();
     let secondary = secondary(finder, &seen, diagonal, light);
     let chords = chords(&bounds, count, &mut Rng::new(3));
-    let miss = misses(finder, &bounds, count, &mut Rng::new(4));
 
     let set = |name, any, coherent, rays, starts| RaySet { name, any, coherent, rays, starts };
     let mut sets =
@@ -141,7 +138,6 @@ pub fn sets(finder: &Finder<'_>, options: &Options) -> (View, Vec<RaySet>) {
         sets.push(set(beside, any, coherent, off, None));
     }
     sets.push(set("random", false, false, chords, None));
-    sets.push(set("miss", false, false, miss, None));
     (view, sets.into_iter().map(|s| s.thinned(options.most)).collect())
 }
 
@@ -207,26 +203,6 @@ fn chords(bounds: &Bounds, count: usize, rng: &mut Rng) -> Vec<Ray> {
         ray(p, (q - p).normalize(), f64::INFINITY)
     };
     (0..count).map(|_| chord()).collect()
-}
-
-/// Chords that cross the bounding box and hit nothing. In a closed room there are hardly any, so the set is small there.
-fn misses(finder: &Finder<'_>, bounds: &Bounds, count: usize, rng: &mut Rng) -> Vec<Ray> {
-    const ROUNDS: usize = 64;
-    let mut found = Vec::new();
-    for _ in 0..ROUNDS {
-        let rays = chords(bounds, count, rng);
-        let hits = finder.nearest(&rays);
-        let crosses =
-            |r: &Ray| bounds.meets(crate::model::position(r.origin), crate::model::position(r.direction));
-        let before = found.len();
-        found.extend(rays.iter().zip(&hits).filter(|(r, h)| !h.is_hit() && crosses(r)).map(|(r, _)| *r));
-        // A round that finds next to none means that 64 rounds find too few to time.
-        if found.len() >= count || found.len() - before < count / 10_000 + 1 {
-            break;
-        }
-    }
-    found.truncate(count);
-    found
 }
 
 #[cfg(test)]

@@ -7,16 +7,20 @@ use crate::model::Bounds;
 use bth::rays::{Hit, Ray};
 use bth_random::Rng;
 use glam::DVec3;
-use serde::Serialize;
 
 /// Where the cameras of a model stand.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum View {
     /// Around the model.
     Outside,
     /// Within the model, as is right for rooms and caves: from outside only their walls are visible.
     Inside,
+}
+
+impl std::fmt::Display for View {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(if *self == View::Inside { "inside" } else { "outside" })
+    }
 }
 
 /// A camera, its rays and what they hit.

@@ -1,6 +1,10 @@
-//! What is measured: a file of `benchmarks/definitions/`.
+//! A definition: a file of `benchmarks/definitions/`. It says how a benchmark is measured and which figures matter.
 
+use super::row::Row;
+use crate::args::Arguments;
+use crate::output::note;
 use anyhow::{Context, Result, ensure};
+use clap::Parser;
 use serde::Deserialize;
 use std::path::Path;
 
@@ -8,94 +12,71 @@ use std::path::Path;
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Definition {
-    /// Name of the benchmark, as rows have it.
+    /// Name of the benchmark, as in rows.
     pub benchmark: String,
-    /// What the benchmark measures, in a sentence.
+    /// What the benchmark measures.
     pub about: String,
-    /// How it is measured.
-    pub measurement: Measurement,
-    /// Models: files within the folder of models, or models of `bth-scenes list`.
+    /// The command of this program that measures, and its options. Without it, rows come from the tool that `about` names.
+    #[serde(default)]
+    pub command: Vec<String>,
+    /// Models or scenes of the command: files within the folder of models, or names of `bth-scenes list`.
     #[serde(default)]
     pub models: Vec<String>,
-    /// Ray sets; all when empty.
+    /// The figures that the summary shows, some with a bar.
     #[serde(default)]
-    pub sets: Vec<String>,
-    /// Tracers; all when empty.
-    #[serde(default)]
-    pub tracers: Vec<String>,
-    /// Rays of a set, at most.
-    #[serde(default = "rays")]
-    pub rays: usize,
-    /// Rounds of which the median counts.
-    #[serde(default = "rounds")]
-    pub rounds: usize,
-    /// Numbers of threads.
-    #[serde(default = "threads")]
-    pub threads: Vec<usize>,
-    /// The figures that have to be reached.
-    #[serde(default)]
-    pub bars: Vec<Bar>,
+    pub figures: Vec<Figures>,
 }
 
-/// The measurements that a definition can name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Measurement {
-    /// Rays per second and bytes a triangle (`bth-bench speed`).
-    Speed,
-    /// Measured by other means; rows are entered by hand or by the script that the definition names.
-    External,
-}
-
-/// A bar: the least value that the newest row may have, or with `at_most` the greatest.
+/// Selects figures; a name that is not given stands for any.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Bar {
-    /// Which tracer.
-    pub engine: String,
-    /// Which ray set or figure.
-    pub set: String,
-    /// Of which model, or `mean`; any when absent.
+pub struct Figures {
+    /// Names of tracers.
+    pub engines: Option<Vec<String>>,
+    /// Names of ray sets or other figures.
+    pub sets: Option<Vec<String>>,
+    /// Name of the model, or `mean`.
     pub model: Option<String>,
-    /// With which instruction set of our kernels; any when absent.
+    /// Instruction set of our kernels.
     pub isa: Option<String>,
-    /// In which unit; others are not compared.
-    pub unit: String,
-    /// At least so much.
+    /// Unit.
+    pub unit: Option<String>,
+    /// The bar: the value must be at least this.
     pub at_least: Option<f64>,
-    /// At most so much.
+    /// The bar: the value must be at most this.
     pub at_most: Option<f64>,
 }
 
-fn rays() -> usize {
-    200_000
-}
+impl Figures {
+    /// Returns true if a row is one of these figures.
+    pub fn select(&self, row: &Row) -> bool {
+        let is = |wanted: &Option<String>, name: &String| wanted.as_ref().is_none_or(|w| w == name);
+        let is_any = |wanted: &Option<Vec<String>>, name| wanted.as_ref().is_none_or(|w| w.contains(name));
+        is_any(&self.engines, &row.engine)
+            && is_any(&self.sets, &row.set)
+            && is(&self.model, &row.model)
+            && is(&self.isa, &row.isa)
+            && is(&self.unit, &row.unit)
+    }
 
-fn rounds() -> usize {
-    5
-}
-
-fn threads() -> Vec<usize> {
-    vec![1]
+    /// The bar, and true if a value meets it; `None` if there is no bar.
+    pub fn judge(&self, value: f64) -> Option<(String, bool)> {
+        match (self.at_least, self.at_most) {
+            (Some(bar), _) => Some((format!("≥ {bar}"), value >= bar)),
+            (_, Some(bar)) => Some((format!("≤ {bar}"), value <= bar)),
+            _ => None,
+        }
+    }
 }
 
 impl Definition {
     /// Reads a definition.
     ///
     /// # Errors
-    /// If the file cannot be read or is not a definition; the error names line and key. If it is one of which nothing can be measured.
+    /// If the file cannot be read or is not a definition; the error names line and key.
     pub fn read(path: &Path) -> Result<Definition> {
         let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
-        let definition: Definition = toml::from_str(&text).with_context(|| path.display().to_string())?;
-        let Definition { measurement, models, rays, rounds, threads, .. } = &definition;
-        let all_from_one = [rays, rounds].into_iter().chain(threads).all(|n| *n > 0);
-        let is_empty = *measurement == Measurement::Speed && (models.is_empty() || threads.is_empty());
-        ensure!(
-            all_from_one && !is_empty,
-            "{}: expected models, and rays, rounds and threads from 1",
-            path.display()
-        );
-        Ok(definition)
+        toml::from_str(&text).with_context(|| path.display().to_string())
     }
 
     /// All definitions of a folder, by name.
@@ -111,27 +92,38 @@ impl Definition {
         files.sort();
         files.iter().map(|file| Self::read(file)).collect()
     }
-}
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn definitions_of_nothing_are_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("speed.toml");
-        let read = |more: &str| {
-            let text = format!("benchmark = \"speed\"\nabout = \"Rays.\"\nmeasurement = \"speed\"\n{more}\n");
-            std::fs::write(&path, text).unwrap();
-            Definition::read(&path)
-        };
-        assert!(read("models = [\"blob\"]").is_ok());
-        for wrong in ["", "models = []", "rays = 0", "rounds = 0", "threads = []", "threads = [1, 0]"] {
-            let models =
-                if wrong.contains("models") || wrong.is_empty() { "" } else { "models = [\"blob\"]\n" };
-            let error = read(&format!("{models}{wrong}")).unwrap_err().to_string();
-            assert!(error.contains("speed.toml: expected models, and rays"), "{wrong:?}: {error}");
+    /// Measures the rows of the definition now; none if its models are folders of recorded rays that do not exist.
+    ///
+    /// # Errors
+    /// If it names no command, or the command cannot be run.
+    pub fn measure(&self, models: &Path, quick: bool) -> Result<Vec<Row>> {
+        ensure!(!self.command.is_empty(), "{}: not measured by this program: {}", self.benchmark, self.about);
+        let found = self.models.iter().filter_map(|name| {
+            let file = models.join(name);
+            if file.exists() {
+                return Some(file.to_string_lossy().into_owned());
+            }
+            let is_recording = name.ends_with('/');
+            if is_recording {
+                note(&format!(
+                    "{name}: skipped: no such folder of recorded rays (tools/bench/record_rays/run makes it)"
+                ));
+            }
+            (!is_recording).then(|| name.clone())
+        });
+        let found: Vec<String> = found.collect();
+        if found.is_empty() && !self.models.is_empty() {
+            return Ok(Vec::new());
         }
+        let program = "bth-bench".to_owned();
+        let quick = quick.then(|| "--quick".to_owned());
+        let words = std::iter::once(program).chain(self.command.iter().cloned()).chain(quick).chain(found);
+        let command = Arguments::try_parse_from(words).with_context(|| self.benchmark.clone())?.command;
+        let (report, _) = crate::measure(&command)?;
+        ensure!(report.wrong.is_empty(), "wrong answers: {}", report.wrong.join(", "));
+        report.notes.iter().for_each(|line| note(line));
+        let named = |row: Row| Row { benchmark: self.benchmark.clone(), ..row };
+        Ok(report.rows.into_iter().map(named).collect())
     }
 }

@@ -1,23 +1,50 @@
-//! The records of `benchmarks/`: definitions name what is measured, rows hold the figures, and the summary has the newest ones.
+//! The records of `benchmarks/`: definitions name what is measured, rows hold the figures, and the summary has the newest
+//! ones.
 //!
 //! A row is one figure; a file holds the rows of one kind of processor and one day, and is only ever appended to.
 
 mod definition;
-mod measure;
 mod row;
 mod summary;
 
-pub use definition::{Bar, Definition, Measurement};
+pub use definition::{Definition, Figures};
 pub use row::{HEAD, Row, cpu_folder};
 pub use summary::summarize;
 
-use crate::args::{RecordRows, Summary};
 use crate::machine::{self, Machine};
 use crate::output::{self, note};
 use anyhow::{Context, Result, ensure};
+use clap::Args;
 use std::fmt::Write as _;
 use std::io::{Read, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// `record`.
+#[derive(Debug, Args)]
+pub struct RecordRows {
+    /// Name of a file of benchmarks/definitions, without `.toml`.
+    pub definition: String,
+    /// Folder that holds `definitions/` and `record/`.
+    #[arg(long, value_name = "DIR", default_value = "benchmarks")]
+    pub folder: PathBuf,
+    /// Folder of the models that definitions name by file.
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub models: PathBuf,
+    /// Small pictures and one round; prints the rows and appends nothing.
+    #[arg(long)]
+    pub quick: bool,
+}
+
+/// `summary`.
+#[derive(Debug, Args)]
+pub struct Summary {
+    /// Folder that holds `definitions/` and `record/`; SUMMARY.md is written there.
+    #[arg(long, value_name = "DIR", default_value = "benchmarks")]
+    pub folder: PathBuf,
+    /// Only checks that SUMMARY.md is up to date.
+    #[arg(long)]
+    pub check: bool,
+}
 
 /// Measures what a definition names, and appends the rows to the file of this processor and day.
 ///
@@ -28,10 +55,10 @@ pub fn record(arguments: &RecordRows) -> Result<()> {
     let definition = Definition::read(&path)?;
     let folder = arguments.folder.join("record").join(cpu_folder(&Machine::this().cpu));
     if !arguments.quick {
-        // Before hours are spent on what could not be kept.
+        // Before hours are spent on rows that cannot be kept.
         std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     }
-    let rows = measure::measure(&definition, &arguments.models, arguments.quick)?;
+    let rows = definition.measure(&arguments.models, arguments.quick)?;
     if rows.is_empty() {
         return Ok(());
     }
@@ -44,7 +71,7 @@ pub fn record(arguments: &RecordRows) -> Result<()> {
     }
     let file = folder.join(format!("{}.csv", machine::today()));
     if let Err(error) = append(&file, &text) {
-        // What cannot be kept there is shown at least.
+        // Rows that cannot be kept are at least shown.
         print(&text)?;
         return Err(error).with_context(|| file.display().to_string());
     }
@@ -57,8 +84,8 @@ fn print(rows: &str) -> std::io::Result<()> {
     std::io::stdout().lock().write_all(format!("{HEAD}\n{rows}").as_bytes())
 }
 
-/// Appends rows to a file. An empty one gets the names of the columns, and a last line without an end, as a full disk leaves it, gets one,
-/// so that it does not become one line with the first row.
+/// Appends rows to a file. An empty one gets the names of the columns. A last line without an end, as a full disk leaves
+/// it, gets one, so that the first row does not continue it.
 fn append(file: &Path, rows: &str) -> std::io::Result<()> {
     let mut open = std::fs::OpenOptions::new().create(true).read(true).append(true).open(file)?;
     let mut found = Vec::new();
@@ -71,25 +98,19 @@ fn append(file: &Path, rows: &str) -> std::io::Result<()> {
     open.write_all((before + rows).as_bytes())
 }
 
-/// Writes SUMMARY.md from all records, and the charts if `--charts` is given.
+/// Writes SUMMARY.md from all records.
 ///
 /// # Errors
-/// If a record or definition cannot be read or a file cannot be written; with `--check`, if SUMMARY.md is not what it would be.
+/// If a record or definition cannot be read or the file cannot be written; with `--check`, if it is not up to date.
 pub fn run_summary(arguments: &Summary) -> Result<()> {
-    let summary = summarize(&arguments.folder)?;
+    let text = summarize(&arguments.folder)?;
     let file = arguments.folder.join("SUMMARY.md");
     if arguments.check {
         let found = std::fs::read_to_string(&file).with_context(|| file.display().to_string())?;
-        ensure!(found == summary.text, "{}: not up to date: run `bth-bench summary`", file.display());
+        ensure!(found == text, "{}: not up to date: run `bth-bench summary`", file.display());
         return Ok(());
     }
-    output::write(&file, &summary.text)?;
-    if let Some(folder) = &arguments.charts {
-        for chart in &summary.charts {
-            output::write(&folder.join(format!("{}.svg", chart.name)), &chart.svg)?;
-        }
-    }
-    Ok(())
+    output::write(&file, &text)
 }
 
 #[cfg(test)]
@@ -97,17 +118,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rows_are_lines_of_their_own_behind_whatever_the_file_holds() {
+    fn rows_are_separate_lines_after_whatever_the_file_holds() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("day.csv");
-        append(&file, "1\n").unwrap();
-        append(&file, "2\n").unwrap();
-        assert_eq!(std::fs::read_to_string(&file).unwrap(), format!("{HEAD}\n1\n2\n"));
-        std::fs::write(&file, "").unwrap();
-        append(&file, "1\n").unwrap();
-        assert_eq!(std::fs::read_to_string(&file).unwrap(), format!("{HEAD}\n1\n"));
-        std::fs::write(&file, format!("{HEAD}\ncut off")).unwrap();
-        append(&file, "1\n").unwrap();
-        assert_eq!(std::fs::read_to_string(&file).unwrap(), format!("{HEAD}\ncut off\n1\n"));
+        for (before, after) in [
+            (None, format!("{HEAD}\n1\n")),
+            (Some(String::new()), format!("{HEAD}\n1\n")),
+            (Some(format!("{HEAD}\n0\n")), format!("{HEAD}\n0\n1\n")),
+            (Some(format!("{HEAD}\ncut off")), format!("{HEAD}\ncut off\n1\n")),
+        ] {
+            before.into_iter().for_each(|text| std::fs::write(&file, text).unwrap());
+            append(&file, "1\n").unwrap();
+            assert_eq!(std::fs::read_to_string(&file).unwrap(), after);
+        }
     }
 }

@@ -1,8 +1,6 @@
-//! The rivals. One that is missing on a machine is left out, with the reason.
+//! The rivals. One that is missing on a machine is skipped, with the reason.
 
 pub mod embree;
-mod f32_tests;
-pub mod kd_tree;
 mod library;
 mod obvhs;
 mod tinybvh;
@@ -10,7 +8,6 @@ mod tinybvh;
 use crate::model::Model;
 use crate::tracer::Contender;
 use anyhow::Result;
-use f32_tests::TriangleTest;
 
 /// A rival that can be measured.
 pub struct Rival {
@@ -20,7 +17,7 @@ pub struct Rival {
 }
 
 /// All rivals, in the order of the tables.
-pub const RIVALS: [Rival; 12] = [
+pub const RIVALS: [Rival; 9] = [
     Rival { name: embree::NAME, build: |m, n, t| embree::contender(m, n, &embree::DEFAULT, t) },
     Rival { name: "embree robust", build: |m, n, t| embree::contender(m, n, &embree::ROBUST, t) },
     Rival { name: "embree own", build: |m, n, t| embree::contender(m, n, &embree::OWN, t) },
@@ -28,24 +25,12 @@ pub const RIVALS: [Rival; 12] = [
     Rival { name: "embree compact", build: |m, n, t| embree::contender(m, n, &embree::COMPACT, t) },
     Rival { name: "embree hq packet16", build: |m, n, t| embree::contender(m, n, &embree::PACKETS, t) },
     Rival { name: "embree sse4.2", build: |m, n, t| embree::contender(m, n, &embree::SSE4, t) },
-    Rival { name: "tinybvh bvh8 hq", build: |m, n, _| tinybvh::contender(m, n, tinybvh::Width::Eight) },
-    Rival { name: "tinybvh bvh4 hq", build: |m, n, _| tinybvh::contender(m, n, tinybvh::Width::Four) },
-    Rival { name: "obvhs cwbvh", build: |m, n, _| obvhs::cwbvh(m, n) },
-    Rival { name: "obvhs bvh2", build: |m, n, _| obvhs::bvh2(m, n) },
-    Rival { name: "k-d tree", build: |m, n, _| kd_tree::contender(m, n) },
-];
-
-/// Triangle tests in single precision over one BVH; `accuracy` measures their errors beside ours.
-pub const F32_TESTS: [Rival; 2] = [
-    Rival {
-        name: "f32 moller-trumbore",
-        build: |m, n, _| f32_tests::contender(m, n, TriangleTest::MollerTrumbore),
-    },
-    Rival { name: "f32 watertight", build: |m, n, _| f32_tests::contender(m, n, TriangleTest::Watertight) },
+    Rival { name: "tinybvh bvh8 hq", build: |m, n, _| tinybvh::contender(m, n) },
+    Rival { name: "obvhs cwbvh", build: |m, n, _| obvhs::contender(m, n) },
 ];
 
 impl Rival {
-    /// Builds the structure; on `threads` threads where the rival supports that.
+    /// Builds the structure, on `threads` threads if the rival supports that.
     ///
     /// # Errors
     /// If its library is missing or fails.

@@ -1,4 +1,4 @@
-//! tinybvh's own CPU layouts, through `shim/tinybvh_shim.cpp`. Built with spatial splits on one thread.
+//! tinybvh's CPU layout of nodes with 8 children, through `shim/tinybvh_shim.cpp`. Built with spatial splits on one thread.
 #![allow(unsafe_code)]
 
 use super::library;
@@ -11,14 +11,8 @@ use std::ffi::c_void;
 use std::sync::OnceLock;
 use std::time::Instant;
 
-/// Children of a node.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Width {
-    /// `BVH4_CPU`.
-    Four = 4,
-    /// `BVH8_CPU`.
-    Eight = 8,
-}
+/// Children of a node: the layout `BVH8_CPU`.
+const WIDTH: u32 = 8;
 
 /// An answer of the shim; for a miss t is infinite and the triangle [`NONE`].
 #[derive(Clone, Copy)]
@@ -41,10 +35,8 @@ struct TinybvhApi {
 impl TinybvhApi {
     fn get() -> Result<&'static TinybvhApi> {
         static TINYBVH_API: OnceLock<std::result::Result<TinybvhApi, String>> = OnceLock::new();
-        TINYBVH_API
-            .get_or_init(|| TinybvhApi::load().map_err(|e| format!("{e:#}")))
-            .as_ref()
-            .map_err(|e| anyhow!("{e}"))
+        let api = TINYBVH_API.get_or_init(|| TinybvhApi::load().map_err(|e| format!("{e:#}")));
+        api.as_ref().map_err(|e| anyhow!("{e}"))
     }
 
     fn load() -> Result<TinybvhApi> {
@@ -82,29 +74,23 @@ impl Drop for TinyBvh {
     }
 }
 
-pub(super) fn contender(model: &Model, name: &str, width: Width) -> Result<Contender> {
+pub(super) fn contender(model: &Model, name: &str) -> Result<Contender> {
     let api = TinybvhApi::get()?;
     let triangles = u32::try_from(model.triangles())?;
     let corners: Vec<[f32; 4]> =
         (0..triangles).flat_map(|t| model.mesh.corners(t)).map(|[x, y, z]| [x, y, z, 0.0]).collect();
     let start = Instant::now();
     // SAFETY: three corners for each triangle, which live as long as the structure.
-    let bvh = unsafe { (api.build)(corners.as_ptr(), triangles, width as u32, 1) };
+    let bvh = unsafe { (api.build)(corners.as_ptr(), triangles, WIDTH, 1) };
     ensure!(!bvh.is_null(), "the library builds nothing");
     let tracer = TinyBvh { api, bvh, _corners: corners };
     let build_s = start.elapsed().as_secs_f64();
     // SAFETY: just built.
     let bytes = unsafe { (api.bytes)(tracer.bvh) } as u64;
-    Ok(Contender {
-        name: name.to_owned(),
-        ours: false,
-        tracer: Box::new(tracer),
-        build_s,
-        bytes: Some(bytes),
-    })
+    Ok(Contender::rival(name, tracer, build_s, Some(bytes)))
 }
 
-/// Answers that are kept before they are turned into hits.
+/// Answers that are buffered before they become hits.
 const MOST_ANSWERS: usize = 1024;
 
 impl Tracer for TinyBvh {

@@ -1,67 +1,76 @@
-//! The contenders of `scenes`: our compiled files, and Embree's instances.
+//! The contenders of `scenes`: our compiled scenes, scenes whose instances the program places, and Embree's.
 
 use super::source::Source;
-use crate::rivals::embree::{self, InstancePlace, Variant};
-use crate::structures::BATCH;
+use crate::rivals::embree::{self, EmbreeMesh, EmbreeScene, InstancePlace, Variant};
+use crate::structures::{self, BATCH, Kind};
 use crate::tracer::{Batch, Tracer};
-use anyhow::{Context, Result, anyhow};
-use bth::Scene;
+use anyhow::{Context, Result, bail};
 use bth::rays::Hit;
-use bth_compile::costs::Select;
-use bth_compile::pipeline::{CompileOptions, Structure};
-use std::path::Path;
+use bth::{Scene, SceneBuilder};
 use std::time::Instant;
 
-/// A contender that can be built.
-pub(super) struct ContenderKind {
-    pub(super) name: &'static str,
-    how: How,
+/// All contenders. Those from the fourth on need scenes whose objects do not deform.
+pub(super) const NAMES: [&str; 7] =
+    ["bth", "bvh", "bth single", "bth placed", "embree", "embree robust", "embree hq packet16"];
+
+/// The contenders for a scene.
+pub(super) fn names(shown: &Scene) -> &'static [&'static str] {
+    let deforms = (0..shown.object_count()).any(|o| shown.positions(o) != shown.object(o).positions);
+    if deforms { &NAMES[..3] } else { &NAMES }
 }
 
-enum How {
-    /// Compiled like this, traced in batches of so many rays.
-    Ours(fn(&mut CompileOptions), usize),
-    Embree(Variant),
-}
-
-/// All contenders. The second is the plain BVH: its hits are what later rays start from, and others are compared with it.
-pub(super) const CONTENDERS: [ContenderKind; 7] = [
-    ContenderKind { name: "bth", how: How::Ours(|_| {}, BATCH) },
-    ContenderKind { name: "bvh", how: How::Ours(|options| options.structure = Structure::Bvh, BATCH) },
-    ContenderKind { name: "bth, paper's rule", how: How::Ours(by_the_paper, BATCH) },
-    ContenderKind { name: "bth single", how: How::Ours(|_| {}, 1) },
-    ContenderKind { name: "embree", how: How::Embree(embree::DEFAULT) },
-    ContenderKind { name: "embree robust", how: How::Embree(embree::ROBUST) },
-    ContenderKind { name: "embree hq packet16", how: How::Embree(embree::PACKETS) },
-];
-
-fn by_the_paper(options: &mut CompileOptions) {
-    options.costs.select = Select::Paper;
-}
-
-/// A frame, and the transforms of all instances in it.
+/// A frame and the transforms of all instances.
 pub(super) struct Frame {
     number: i32,
     places: Vec<InstancePlace>,
 }
 
 impl Frame {
-    /// The transforms of all instances of a scene at its current time.
+    /// The frame of a scene at its current time.
     pub(super) fn of(scene: &Scene, number: i32) -> Frame {
-        let place = |i: u32| {
-            let rows = Some(scene.instance(i)).filter(|v| v.visible).map(|v| v.to_world);
-            rows.map(|rows| rows.map(|row| row.map(|x| x as f32)))
-        };
-        Frame { number, places: (0..scene.instance_count()).map(place).collect() }
+        Frame { number, places: places(scene) }
+    }
+}
+
+fn places(scene: &Scene) -> Vec<InstancePlace> {
+    let instances = (0..scene.instance_count()).map(|i| scene.instance(i));
+    instances.map(|i| i.visible.then(|| i.to_world.map(|row| row.map(|x| x as f32)))).collect()
+}
+
+/// The objects and instances of a scene as Embree takes them.
+pub(crate) struct Placed {
+    pub(crate) objects: Vec<EmbreeMesh>,
+    object_of: Vec<u32>,
+    places: Vec<InstancePlace>,
+}
+
+impl Placed {
+    /// Those of a scene at its current time.
+    pub(crate) fn of(scene: &Scene) -> Placed {
+        let objects = (0..scene.object_count()).map(|i| scene.object(i));
+        Placed {
+            objects: objects.map(|o| (embree::padded(o.positions), o.triangles.to_vec())).collect(),
+            object_of: (0..scene.instance_count()).map(|i| scene.object_of(i)).collect(),
+            places: places(scene),
+        }
+    }
+
+    /// Builds Embree's scene of these instances.
+    pub(crate) fn build(self, variant: &Variant, threads: usize) -> Result<EmbreeScene> {
+        let mut scene = embree::build_instances(self.objects, &self.object_of, variant, threads)?;
+        scene.place(&self.places);
+        Ok(scene)
     }
 }
 
 /// A scene that can be set to a frame and traced.
-pub(super) trait Moving {
-    /// Sets another time, so that the next frame needs a whole update.
-    fn hide(&mut self) -> Result<()>;
-    /// Sets a frame.
-    fn show(&mut self, frame: &Frame) -> Result<()>;
+pub(super) trait Moving: Send {
+    /// Does what is not measured, so that the next frame needs a whole update.
+    fn prepare(&mut self) -> Result<()> {
+        Ok(())
+    }
+    /// Sets a frame; returns the seconds of its positions and refit, if known.
+    fn show(&mut self, frame: &Frame) -> Result<f64>;
     /// Nearest hits.
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]);
 }
@@ -70,99 +79,119 @@ pub(super) trait Moving {
 pub(super) struct MovingContender {
     pub(super) name: &'static str,
     pub(super) ours: bool,
+    /// True if its answers must be the plain BVH's, to the last bit.
+    pub(super) exact: bool,
     pub(super) moving: Box<dyn Moving>,
     pub(super) build_s: f64,
-    /// Share of the objects' triangles in tetrahedra.
-    pub(super) in_tets: f64,
 }
 
-/// A compiled scene.
-pub(super) struct CompiledScene {
-    pub(super) bytes: Vec<u8>,
-    in_tets: f64,
-    seconds: f64,
+/// The plain BVH of a scene. Its hits are what later rays start from, and others are compared with it.
+pub(super) fn plain(source: &Source) -> Result<Scene> {
+    opened(source, &structures::BVH)
 }
 
-/// Compiles a scene.
-pub(super) fn compile(source: &Source, kind: &ContenderKind) -> Result<CompiledScene> {
-    let How::Ours(set, _) = kind.how else { return Err(anyhow!("not one of ours")) };
-    let mut options = CompileOptions::default();
-    set(&mut options);
+fn opened(source: &Source, kind: &Kind) -> Result<Scene> {
+    bth::from_bytes(&source.compile(&kind.options())?.bytes).context("a file that was just compiled")
+}
+
+/// Builds a contender; those that do not compile the scene take its geometry from `shown`.
+pub(super) fn build(
+    source: &Source,
+    name: &'static str,
+    shown: &Scene,
+    threads: usize,
+) -> Result<MovingContender> {
     let start = Instant::now();
-    let (compiled, report) = bth_compile::scene::compile(
-        &source.manifest,
-        &source.folder,
-        Path::new(&source.name),
-        &options,
-        &bth_compile::Silent,
-    )?;
-    let seconds = start.elapsed().as_secs_f64();
-    let triangles: u64 = report.objects.iter().map(|o| o.triangles).sum();
-    let in_tets: u64 = report.objects.iter().map(|o| o.tet_triangles).sum();
-    Ok(CompiledScene { bytes: compiled.bytes, in_tets: in_tets as f64 / triangles.max(1) as f64, seconds })
-}
-
-/// Builds a contender; Embree takes the geometry of the objects from `shown`.
-pub(super) fn build(source: &Source, kind: &ContenderKind, shown: &Scene) -> Result<MovingContender> {
-    let batch = match &kind.how {
-        How::Ours(_, batch) => *batch,
-        How::Embree(variant) => return build_embree(variant, kind.name, shown),
+    let instances = |variant: &Variant| -> Result<Box<dyn Moving>> {
+        Ok(Box::new(Placed::of(shown).build(variant, threads)?))
     };
-    let compiled = compile(source, kind)?;
-    let scene = bth::from_bytes(&compiled.bytes).context("a file that was just compiled")?;
-    let (build_s, in_tets) = (compiled.seconds, compiled.in_tets);
-    Ok(MovingContender {
-        name: kind.name,
-        ours: true,
-        moving: Box::new(OurScene(scene, batch)),
-        build_s,
-        in_tets,
-    })
+    let moving: Box<dyn Moving> = match name {
+        "bth" => Box::new(CompiledScene { scene: opened(source, &structures::BTH)?, batch: BATCH }),
+        "bvh" => Box::new(CompiledScene { scene: plain(source)?, batch: BATCH }),
+        "bth single" => Box::new(CompiledScene { scene: opened(source, &structures::BTH)?, batch: 1 }),
+        "bth placed" => Box::new(PlacedScene::new(shown, &plain(source)?)?),
+        "embree" => instances(&embree::DEFAULT)?,
+        "embree robust" => instances(&embree::ROBUST)?,
+        "embree hq packet16" => instances(&embree::PACKETS)?,
+        _ => bail!("there is no {name}"),
+    };
+    let build_s = start.elapsed().as_secs_f64();
+    let exact = ["bth", "bvh", "bth single"].contains(&name);
+    Ok(MovingContender { name, ours: !name.starts_with("embree"), exact, moving, build_s })
 }
 
-/// Builds Embree's instances of the same objects.
-fn build_embree(variant: &Variant, name: &'static str, shown: &Scene) -> Result<MovingContender> {
-    let start = Instant::now();
-    let objects = (0..shown.object_count()).map(|i| {
-        let view = shown.object(i);
-        (embree::padded(view.positions), view.triangles.to_vec())
-    });
-    let object_of: Vec<u32> = (0..shown.instance_count()).map(|i| shown.object_of(i)).collect();
-    let instances = embree::build_instances(objects.collect(), &object_of, variant, 1)?;
-    let (build_s, moving) = (start.elapsed().as_secs_f64(), Box::new(instances));
-    Ok(MovingContender { name, ours: false, moving, build_s, in_tets: 0.0 })
+/// Traces rays in batches.
+fn trace(scene: &Scene, batch: Batch<'_>, hits: &mut [Hit], size: usize) {
+    for (batch, hits) in batch.chunks(size).zip(hits.chunks_mut(size)) {
+        scene.batch(batch.rays).nearest(hits);
+    }
 }
 
-/// One of our scenes, and how many rays are traced together.
-struct OurScene(Scene, usize);
+/// A compiled scene, and the number of rays that are traced together.
+struct CompiledScene {
+    scene: Scene,
+    batch: usize,
+}
 
-impl Moving for OurScene {
-    fn hide(&mut self) -> Result<()> {
+impl Moving for CompiledScene {
+    fn prepare(&mut self) -> Result<()> {
         // A time before the first frame.
-        self.0.set_seconds(-1e3)?;
+        self.scene.set_seconds(-1e3)?;
         Ok(())
     }
 
-    fn show(&mut self, frame: &Frame) -> Result<()> {
-        self.0.set_frame(frame.number)?;
-        Ok(())
+    fn show(&mut self, frame: &Frame) -> Result<f64> {
+        Ok(self.scene.set_frame(frame.number)?.refit.as_secs_f64())
     }
 
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
-        for (batch, hits) in batch.chunks(self.1).zip(hits.chunks_mut(self.1)) {
-            self.0.batch(batch.rays).nearest(hits);
-        }
+        trace(&self.scene, batch, hits, self.batch);
     }
 }
 
-impl Moving for embree::EmbreeScene {
-    fn hide(&mut self) -> Result<()> {
-        Ok(())
+/// A scene of compiled objects whose instances the program places.
+struct PlacedScene {
+    builder: SceneBuilder,
+    ids: Vec<u32>,
+}
+
+impl PlacedScene {
+    fn new(shown: &Scene, objects: &Scene) -> Result<PlacedScene> {
+        let mut builder = SceneBuilder::new();
+        let first = builder.add(objects);
+        let identity = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+        let instances = (0..shown.instance_count()).map(|i| first + shown.object_of(i));
+        let ids = instances.map(|object| builder.instance(object, &identity)).collect::<Result<_, _>>()?;
+        Ok(PlacedScene { builder, ids })
+    }
+}
+
+impl Moving for PlacedScene {
+    fn show(&mut self, frame: &Frame) -> Result<f64> {
+        let mut ids = Vec::with_capacity(self.ids.len());
+        let mut transforms = Vec::with_capacity(self.ids.len());
+        for (id, place) in self.ids.iter().zip(&frame.places) {
+            if let Some([[a, b, c, d], [e, f, g, h], [i, j, k, l]]) = *place {
+                ids.push(*id);
+                transforms.push([a, b, c, d, e, f, g, h, i, j, k, l]);
+            } else {
+                self.builder.set_visible(*id, false)?;
+            }
+        }
+        self.builder.set_transforms(&ids, &transforms)?;
+        self.builder.commit()?;
+        Ok(0.0)
     }
 
-    fn show(&mut self, frame: &Frame) -> Result<()> {
+    fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
+        trace(self.builder.scene(), batch, hits, BATCH);
+    }
+}
+
+impl Moving for EmbreeScene {
+    fn show(&mut self, frame: &Frame) -> Result<f64> {
         self.place(&frame.places);
-        Ok(())
+        Ok(0.0)
     }
 
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {

@@ -3,7 +3,7 @@
 use crate::model::position;
 use crate::rays::{Camera, LIFT, cosine_weighted, ray};
 use crate::tracer::Batch;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use bth::Scene;
 use bth::rays::{Hit, Ray};
 use bth_format::layout::NONE;
@@ -12,20 +12,20 @@ use glam::DVec3;
 
 /// Diffuse bounces after the camera rays: the default of `bth-play --mode path`.
 pub(super) const BOUNCES: u32 = 4;
-/// Answers of a tracer that rounds count as equal up to this relative difference of t.
+/// Answers of tracers that round are equal up to this relative difference of t.
 const SAME: f32 = 1e-4;
 
 /// Rays of one kind.
-pub(crate) struct FrameRaySet {
-    pub(crate) rays: Vec<Ray>,
+pub(super) struct FrameRaySet {
+    pub(super) rays: Vec<Ray>,
     coherent: bool,
     /// The answers of our plain BVH.
     expected: Vec<Hit>,
 }
 
 /// The rays of a frame, by [`super::SETS`].
-pub(crate) struct FrameRays {
-    pub(crate) sets: [FrameRaySet; 3],
+pub(super) struct FrameRays {
+    pub(super) sets: Vec<FrameRaySet>,
 }
 
 impl FrameRaySet {
@@ -35,31 +35,21 @@ impl FrameRaySet {
         FrameRaySet { rays, coherent, expected }
     }
 
-    pub(crate) fn batch(&self) -> Batch<'_> {
+    pub(super) fn batch(&self) -> Batch<'_> {
         Batch { rays: &self.rays, starts: None, coherent: self.coherent }
     }
 
-    /// Number of answers that differ: for ours in any bit, for rivals in whether or where something is hit.
-    pub(super) fn differences(&self, hits: &[Hit], ours: bool) -> u64 {
-        let same = |a: &Hit, b: &Hit| {
-            a == b || !ours && a.is_hit() && b.is_hit() && (a.t - b.t).abs() <= SAME * a.t.abs()
-        };
-        self.expected.iter().zip(hits).filter(|(a, b)| !same(a, b)).count() as u64
-    }
-
-    /// Number of answers that differ in whether or where something is hit: in any bit of the distance if it has to be exact.
-    pub(crate) fn other_distances(&self, hits: &[Hit], exact: bool) -> u64 {
-        let tolerance = if exact { 0.0 } else { SAME };
-        let same = |a: &Hit, b: &Hit| {
-            a.is_hit() == b.is_hit() && (!a.is_hit() || (a.t - b.t).abs() <= tolerance * a.t.abs())
-        };
+    /// Number of answers that differ: in any bit if they must be exact, else in hit or miss or in t.
+    pub(super) fn differences(&self, hits: &[Hit], exact: bool) -> u64 {
+        let near = |a: &Hit, b: &Hit| a.is_hit() && b.is_hit() && (a.t - b.t).abs() <= SAME * a.t.abs();
+        let same = |a: &Hit, b: &Hit| a == b || !exact && (near(a, b) || !a.is_hit() && !b.is_hit());
         self.expected.iter().zip(hits).filter(|(a, b)| !same(a, b)).count() as u64
     }
 }
 
 impl FrameRays {
     /// The rays of a scene's camera at the scene's time.
-    pub(crate) fn of(scene: &Scene, size: (u32, u32)) -> Result<FrameRays> {
+    pub(super) fn of(scene: &Scene, size: (u32, u32)) -> Result<FrameRays> {
         let (camera, diagonal) = camera(scene, size)?;
         let first = FrameRaySet::of(scene, camera.rays(), true);
         let mut rng = Rng::new(1);
@@ -75,28 +65,16 @@ impl FrameRays {
             (rays, hits) = (set.rays, set.expected);
         }
         let third = FrameRaySet::of(scene, later, false);
-        Ok(FrameRays { sets: [first, second, third] })
+        Ok(FrameRays { sets: vec![first, second, third] })
     }
 }
 
 /// The first camera of the scene, or one that frames all of it; and the diagonal of the visible instances' box.
 fn camera(scene: &Scene, size: (u32, u32)) -> Result<(Camera, f64)> {
     let view = scene.description().context("a scene")?;
-    let mut corners = Vec::new();
-    let (mut lower, mut upper) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for (low, high) in (0..scene.instance_count()).filter_map(|i| scene.instance_bounds(i)) {
-        let ends = [position(low), position(high)];
-        (lower, upper) = (lower.min(ends[0]), upper.max(ends[1]));
-        let corner = |i: usize| DVec3::new(ends[i & 1].x, ends[i >> 1 & 1].y, ends[i >> 2].z);
-        corners.extend((0..8).map(corner));
-    }
-    ensure!(!corners.is_empty(), "nothing is to be seen");
-    let diagonal = (upper - lower).length();
+    let (framing, diagonal) = Camera::framing_instances(scene, size).context("nothing is to be seen")?;
     let row = if view.scene[0].camera == NONE { 0 } else { view.scene[0].camera };
-    let Some(lens) = view.cameras.get(row as usize) else {
-        let from = DVec3::new(0.8, 0.5, 1.0);
-        return Ok((Camera::framing(&corners, (lower + upper) / 2.0, diagonal, from, size), diagonal));
-    };
+    let Some(lens) = view.cameras.get(row as usize) else { return Ok((framing, diagonal)) };
     let (rows, _) = scene.node(lens.node);
     let column = |k: usize| DVec3::new(rows[0][k], rows[1][k], rows[2][k]);
     let tangent = (lens.size / 2.0).to_radians().tan();
@@ -108,9 +86,9 @@ fn camera(scene: &Scene, size: (u32, u32)) -> Result<(Camera, f64)> {
 fn onward(scene: &Scene, rays: &[Ray], hits: &[Hit], lift: f64, rng: &mut Rng) -> Vec<Ray> {
     let onward = rays.iter().zip(hits).filter(|(_, hit)| hit.is_hit()).map(|(from, hit)| {
         let direction = position(from.direction);
-        let object = scene.object(scene.object_of(hit.primitive.instance));
-        let [a, b, c] =
-            object.triangles[hit.primitive.triangle as usize].map(|v| position(object.positions[v as usize]));
+        let object = scene.object_of(hit.primitive.instance);
+        let (triangles, positions) = (scene.object(object).triangles, scene.positions(object));
+        let [a, b, c] = triangles[hit.primitive.triangle as usize].map(|v| position(positions[v as usize]));
         let normal = scene.normal_to_world(hit.primitive.instance, (b - a).cross(c - a).to_array());
         let normal = DVec3::from_array(normal).normalize();
         let normal = if normal.dot(direction) > 0.0 { -normal } else { normal };

@@ -1,148 +1,201 @@
-//! Scenes that move, frame by frame: the paper's Table 3 on our animations, and Embree with the same instances.
+//! Scenes that move and objects that deform, frame by frame: the paper's Table 3 on our animations, and Embree with the
+//! same instances.
 //!
 //! `source` loads scenes, `frame_rays` makes the rays of a frame, and `contenders` traces them.
 
 mod contenders;
 mod frame_rays;
-mod results;
 mod source;
-mod tables;
 
-pub(crate) use frame_rays::FrameRays;
-pub use results::{ContenderRow, SceneTimes, ScenesResults};
-pub(crate) use source::{Source, compiled};
-pub use tables::markdown;
+pub(crate) use contenders::Placed;
+pub(crate) use source::Source;
 
-use crate::args::Scenes;
+use crate::args::{RunOptions, at_least_one};
 use crate::clock::Clock;
 use crate::isa;
-use crate::output::{Head, Report, note};
+use crate::names::Names;
 use crate::progress::Progress;
+use crate::report::{Head, Report, Subject};
+use crate::rivals::embree;
 use crate::rounds::median;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, bail};
 use bth::rays::Hit;
-use contenders::{CONTENDERS, Frame, MovingContender};
+use clap::Args;
+use contenders::{Frame, MovingContender, NAMES};
+use frame_rays::{FrameRaySet, FrameRays};
 use serde_json::json;
 
-/// Sets of rays of a frame.
-pub const SETS: [&str; 3] = ["camera", "diffuse", "later"];
+/// `scenes`.
+#[derive(Debug, Args)]
+pub struct Scenes {
+    /// Scenes of `bth-scenes list`, manifests, glTF files, or `instances:N` for N instances that move.
+    #[arg(required = true, value_name = "SCENE")]
+    pub scenes: Vec<String>,
+    /// Frames to measure, evenly over the range.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = at_least_one)]
+    pub frames: usize,
+    /// Rounds of which the median counts; one more comes before.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = at_least_one)]
+    pub rounds: usize,
+    /// Numbers of threads for updates; rays are traced on one.
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "1", value_parser = at_least_one)]
+    pub threads: Vec<usize>,
+    /// Width of the pictures, which are 16:9.
+    #[arg(long, value_name = "PIXELS", default_value_t = 640, value_parser = clap::value_parser!(u32).range(64..=8192))]
+    pub width: u32,
+    /// Only these tracers; a star at the end stands for any ending.
+    #[arg(long = "tracer", value_name = "NAME,…", default_value = "", hide_default_value = true)]
+    pub tracers: Names,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub run: RunOptions,
+}
 
-/// Measures, prints and writes the report.
+const ABOUT: &str = "\
+Medians of interleaved rounds, means over the frames; one thread by its CPU clock, several by the wall clock. `update`: \
+from another time to the frame: tracks, positions, refit and top level; for Embree and `bth placed`, whose instances the \
+program places, the given transforms and the commit. `positions and refit`: the part of it for objects that deform, by \
+the wall clock. Rays are the same for all: the camera's, one cosine-weighted bounce (`diffuse`), and those after it \
+(`later`). `bth` is compiled with the defaults, `bvh` with `--structure bvh`, so `bth` over `bvh` is the paper's BVH-BTH \
+over BVH-BVH. `differ`: answers that are not the BVH's, for compiled scenes in any bit, for others by hit or miss or by \
+more than 1e-4 of t. `times embree`: below 1 is faster.";
+
+/// Sets of rays of a frame.
+const SETS: [&str; 3] = ["camera", "diffuse", "later"];
+/// Unit of times.
+const TIME: &str = "ms/frame";
+
+/// Measures all scenes.
 ///
 /// # Errors
-/// If an option or scene cannot be used, an answer of ours differs from that of our plain BVH, or a file cannot be written.
-pub fn run(arguments: &Scenes) -> Result<()> {
+/// If an option or scene cannot be used.
+pub fn measure(arguments: &Scenes) -> Result<Report> {
+    if let Some(name) = arguments.tracers.unknown(&NAMES).first() {
+        bail!("--tracer {name}: there are {}", NAMES.join(", "));
+    }
     let isa = isa::select(arguments.run.isa.as_deref())?;
-    let size = if arguments.run.quick { (96, 64) } else { arguments.size() };
-    let progress = Progress::new();
+    let width = if arguments.run.quick { 64 } else { arguments.width.next_multiple_of(4) };
+    let size = (width, (width * 9 / 16).next_multiple_of(4));
+    let rounds = arguments.run.rounds(arguments.rounds);
     let options = json!({
-        "pixels": size, "frames": arguments.frames, "rounds": arguments.rounds, "bounces": frame_rays::BOUNCES,
-        "threads": 1, "quick": arguments.run.quick,
+        "pixels": size, "frames": arguments.frames, "rounds": rounds, "bounces": frame_rays::BOUNCES,
+        "quick": arguments.run.quick,
     });
-    let mut results = ScenesResults { head: Head::now("scenes", isa, options), scenes: Vec::new() };
+    let mut report = Report::new(Head::now("scenes", isa, options), rounds, ABOUT);
+    let progress = Progress::new();
     for name in &arguments.scenes {
         let source = Source::load(name)?;
-        results.scenes.push(scene(&source, arguments, size, &progress)?);
+        for &threads in &arguments.threads {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+            pool.install(|| measure_scene(&source, arguments, size, threads, &mut report, &progress))?;
+        }
     }
-    drop(progress);
-    for scene in &results.scenes {
-        scene.left_out.iter().for_each(|why| note(&format!("{}: {why}", scene.name)));
+    report.add_ratios(embree::NAME, TIME);
+    Ok(report)
+}
+
+/// The sums over the frames of a contender's seconds and differences.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    update: f64,
+    refit: f64,
+    rays: [f64; SETS.len()],
+    differ: u64,
+}
+
+fn measure_scene(
+    source: &Source,
+    arguments: &Scenes,
+    size: (u32, u32),
+    threads: usize,
+    report: &mut Report,
+    progress: &Progress,
+) -> Result<()> {
+    progress.show(format!("{}: compiling", source.name));
+    let mut shown = contenders::plain(source)?;
+    let frames = source.frames(arguments.frames);
+    shown.set_frame(frames[0])?;
+    let names = contenders::names(&shown).iter().filter(|name| arguments.tracers.select(name));
+    let mut built = Vec::new();
+    for name in names {
+        progress.show(format!("{}: {name}", source.name));
+        match contenders::build(source, name, &shown, threads) {
+            Ok(contender) => built.push(contender),
+            Err(why) => report.leave_out(&source.name, name, &why),
+        }
     }
-    let body = markdown(&results);
-    let json = serde_json::to_value(&results)?;
-    Report { head: &results.head, title: "Scenes that move", body, json, charts: Vec::new() }
-        .write(&arguments.run.output)?;
-    let wrong = results.scenes.iter().flat_map(|s| &s.rows).find(|r| r.ours && r.differ > 0);
-    ensure!(wrong.is_none(), "{} answers another than the plain BVH", wrong.map_or("", |r| r.name.as_str()));
+    let triangles = |i| u64::from(shown.object(shown.object_of(i)).header.triangles);
+    let (instances, objects) = (shown.instance_count(), shown.object_count());
+    let triangles: u64 = (0..instances).map(triangles).sum();
+    report.notes.push(format!(
+        "{}: {instances} instances of {objects} objects, {triangles} triangles; frames {frames:?}",
+        source.name
+    ));
+    let mut sums = vec![Sums::default(); built.len()];
+    for (i, &number) in frames.iter().enumerate() {
+        progress.show(format!("{}: frame {} of {}", source.name, i + 1, frames.len()));
+        shown.set_frame(number)?;
+        let frame = Frame::of(&shown, number);
+        let sets = if threads == 1 { FrameRays::of(&shown, size)?.sets } else { Vec::new() };
+        measure_frame(&mut built, &frame, &sets, threads, report.rounds, &mut sums)?;
+    }
+    for (contender, sums) in built.iter().zip(sums) {
+        let MovingContender { name, ours, build_s, .. } = contender;
+        let of = Subject { engine: name, ours: *ours, model: &source.name, threads };
+        let each = |seconds: f64| 1e3 * seconds / frames.len() as f64;
+        report.add(&of, "update", each(sums.update), TIME);
+        if sums.refit > 0.0 {
+            report.add(&of, "positions and refit", each(sums.refit), "ms");
+        }
+        if threads == 1 {
+            for (set, seconds) in SETS.iter().zip(sums.rays) {
+                report.add(&of, set, each(seconds), TIME);
+            }
+            report.add(&of, "differ", sums.differ as f64, "rays");
+        }
+        report.add(&of, "build", *build_s, "s");
+        if contender.exact && sums.differ > 0 {
+            report.wrong.push(format!("{name} in {}", source.name));
+        }
+    }
     Ok(())
 }
 
-fn scene(source: &Source, arguments: &Scenes, size: (u32, u32), progress: &Progress) -> Result<SceneTimes> {
-    progress.show(format!("{}: compiling", source.name));
-    let plain = contenders::compile(source, &CONTENDERS[1])?;
-    let mut shown = bth::from_bytes(&plain.bytes).context("a file that was just compiled")?;
-    let mut results = SceneTimes {
-        name: source.name.clone(),
-        instances: shown.instance_count(),
-        objects: shown.object_count(),
-        triangles: (0..shown.instance_count())
-            .map(|i| u64::from(shown.object(shown.object_of(i)).header.triangles))
-            .sum(),
-        frames: source.frames(arguments.frames),
-        rays: [0; 3],
-        rows: Vec::new(),
-        left_out: Vec::new(),
-    };
-    let mut contenders = Vec::new();
-    for kind in &CONTENDERS {
-        if !arguments.tracers.select(kind.name) {
-            continue;
-        }
-        progress.show(format!("{}: {}", source.name, kind.name));
-        match contenders::build(source, kind, &shown) {
-            Ok(contender) => contenders.push(contender),
-            Err(why) => results.left_out.push(format!("{}: {why:#}", kind.name)),
-        }
-    }
-    let mut taken = vec![[0.0; 4]; contenders.len()];
-    let mut differ = vec![0; contenders.len()];
-    for (i, number) in results.frames.clone().into_iter().enumerate() {
-        progress.show(format!("{}: frame {} of {}", source.name, i + 1, results.frames.len()));
-        shown.set_frame(number)?;
-        let frame = Frame::of(&shown, number);
-        let frame_rays = FrameRays::of(&shown, size)?;
-        for (sum, set) in results.rays.iter_mut().zip(&frame_rays.sets) {
-            *sum += set.rays.len() as u64;
-        }
-        let times = measure(&mut contenders, &frame, &frame_rays, arguments.rounds, &mut differ)?;
-        for (sums, times) in taken.iter_mut().zip(times) {
-            sums.iter_mut().zip(times).for_each(|(sum, time)| *sum += time);
-        }
-    }
-    let count = results.frames.len() as f64;
-    for ((contender, taken), differ) in contenders.iter().zip(&taken).zip(differ) {
-        results.rows.push(ContenderRow {
-            name: contender.name.to_owned(),
-            ours: contender.ours,
-            build_s: contender.build_s,
-            in_tets: contender.in_tets,
-            milliseconds: taken.map(|seconds| 1e3 * seconds / count),
-            differ,
-        });
-    }
-    Ok(results)
-}
-
-/// Median seconds of each contender: for the update of a frame and for each set of its rays. Rounds are interleaved: every
-/// contender comes once in each.
-fn measure(
+/// Adds the median seconds of each contender for a frame. Rounds are interleaved: each contender comes once in each.
+fn measure_frame(
     contenders: &mut [MovingContender],
     frame: &Frame,
-    frame_rays: &FrameRays,
+    sets: &[FrameRaySet],
+    threads: usize,
     rounds: usize,
-    differ: &mut [u64],
-) -> Result<Vec<[f64; 4]>> {
-    let mut times = vec![[const { Vec::new() }; 4]; contenders.len()];
+    sums: &mut [Sums],
+) -> Result<()> {
+    let clock = Clock::for_threads(threads);
+    let mut times = vec![[const { Vec::new() }; 2 + SETS.len()]; contenders.len()];
     // A round before those that count warms up.
     for round in 0..=rounds {
-        for (row, contender) in contenders.iter_mut().enumerate() {
-            contender.moving.hide()?;
-            let mut result = Ok(());
-            let update = Clock::ThreadCpu.time(|| result = contender.moving.show(frame));
-            result?;
-            let mut all = vec![update];
-            for set in &frame_rays.sets {
+        for ((contender, times), sums) in contenders.iter_mut().zip(&mut times).zip(&mut *sums) {
+            contender.moving.prepare()?;
+            let mut refit = Ok(0.0);
+            let update = clock.time(|| refit = contender.moving.show(frame));
+            let mut taken = vec![update, refit?];
+            for set in sets {
                 let mut hits = vec![Hit::MISS; set.rays.len()];
-                all.push(Clock::ThreadCpu.time(|| contender.moving.nearest(set.batch(), &mut hits)));
+                taken.push(Clock::ThreadCpu.time(|| contender.moving.nearest(set.batch(), &mut hits)));
                 if round == 0 {
-                    differ[row] += set.differences(&hits, contender.ours);
+                    sums.differ += set.differences(&hits, contender.exact);
                 }
             }
             if round > 0 {
-                times[row].iter_mut().zip(all).for_each(|(times, time)| times.push(time));
+                times.iter_mut().zip(taken).for_each(|(times, time)| times.push(time));
             }
         }
     }
-    let median = |times: Vec<f64>| median(times).unwrap_or(f64::NAN);
-    Ok(times.into_iter().map(|times| times.map(median)).collect())
+    for (sums, times) in sums.iter_mut().zip(times) {
+        let [update, refit, camera, diffuse, later] = times.map(|times| median(times).unwrap_or(0.0));
+        sums.update += update;
+        sums.refit += refit;
+        sums.rays.iter_mut().zip([camera, diffuse, later]).for_each(|(sum, time)| *sum += time);
+    }
+    Ok(())
 }

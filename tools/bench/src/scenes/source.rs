@@ -1,37 +1,39 @@
 //! Scenes to measure: our own animations by name, manifests, and glTF files.
 
-use crate::model::Model;
-use crate::twist::{TWIST, twisted};
+use crate::structures::Compiled;
 use anyhow::{Context, Result};
-use bth::Scene;
 use bth_compile::Silent;
-use bth_compile::pipeline::{CompileOptions, MotionOptions, Structure};
+use bth_compile::pipeline::CompileOptions;
 use bth_import::gltf::scene::ImportOptions;
+use bth_random::Rng;
 use bth_scene::Manifest;
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
-
-/// Frames of a twist, besides the first.
-const TWIST_FRAMES: i32 = 24;
+use std::time::Instant;
 
 /// A manifest, and the folder of its models.
 pub(crate) struct Source {
     /// Name without folder and extension.
     pub(crate) name: String,
     pub(crate) manifest: Manifest,
-    /// What paths of the manifest are relative to.
+    /// The folder of the manifest's paths.
     pub(crate) folder: PathBuf,
     /// Keeps the files of a generated scene until the end.
     _models: Option<tempfile::TempDir>,
 }
 
 impl Source {
-    /// Makes a scene of `bth-scenes list`, or of a model behind `twist:`, or reads a manifest or glTF file.
+    /// Makes a scene of `bth-scenes list`, `objects:N` or `instances:N`, or reads a manifest or glTF file.
     ///
     /// # Errors
     /// If there is no such scene or file, or the files of a generated one cannot be written.
     pub(crate) fn load(name: &str) -> Result<Source> {
-        if let Some(model) = name.strip_prefix("twist:") {
-            return Source::twisting(&Model::load(model)?);
+        let count = |text: &str| text.parse().with_context(|| format!("{name}: expected a number"));
+        if let Some(text) = name.strip_prefix("objects:") {
+            return Source::objects(count(text)?);
+        }
+        if let Some(text) = name.strip_prefix("instances:") {
+            return Source::instances(count(text)?);
         }
         if let Some(animation) = bth_scenes::animations::find(name) {
             let scene = (animation.make)();
@@ -57,32 +59,54 @@ impl Source {
         Ok(Source { name, manifest, folder, _models: None })
     }
 
-    /// A scene of a model whose vertices a vertex cache twists.
-    fn twisting(model: &Model) -> Result<Source> {
-        let folder = tempfile::tempdir()?;
-        let still = bth_scenes::Model {
-            positions: model.mesh.positions.clone(),
-            triangles: model.mesh.triangles.clone(),
-        };
-        bth_scenes::write::file(&still, &folder.path().join("model.ply"))?;
-        // A PC2 file of a sample for each frame.
-        let mut cache = b"POINTCACHE2\0".to_vec();
-        cache.extend([1, i32::try_from(still.positions.len())?].iter().flat_map(|x| x.to_le_bytes()));
-        cache.extend([0.0f32, 1.0].iter().flat_map(|x| x.to_le_bytes()));
-        cache.extend((TWIST_FRAMES + 1).to_le_bytes());
-        for frame in 0..=TWIST_FRAMES {
-            let positions = twisted(model, TWIST * frame as f32 / TWIST_FRAMES as f32);
-            cache.extend(positions.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
+    /// A scene of objects of different shapes, in rows.
+    fn objects(count: u32) -> Result<Source> {
+        let (folder, mut text) = (tempfile::tempdir()?, String::from("version = 1\n"));
+        let mut model = bth_scenes::blob::blob(800);
+        for i in 0..count {
+            model.positions.iter_mut().for_each(|p| p[0] *= 1.0 + 1.0 / 1024.0);
+            bth_scenes::write::file(&model, &folder.path().join(format!("{i}.ply")))?;
+            let place = [3 * (i % 40), 0, 3 * (i / 40)];
+            writeln!(text, "[[objects]]\nname = \"o{i}\"\nmodel = \"{i}.ply\"")?;
+            writeln!(text, "[[nodes]]\nname = \"n{i}\"\nobject = \"o{i}\"\ntranslation = {place:?}")?;
         }
-        std::fs::write(folder.path().join("model.pc2"), cache)?;
-        let text = format!(
-            "version = 1\nframes = {{ first = 0, last = {TWIST_FRAMES}, rate = 24 }}\n\
-             objects = [{{ name = \"model\", model = \"model.ply\", vertex_cache = \"model.pc2\" }}]\n\
-             nodes = [{{ name = \"model\", object = \"model\" }}]\n"
+        Source::parsed(format!("{count} objects"), &text, folder)
+    }
+
+    /// A scene of instances of one small object that drift through a cube with room for eight times as many.
+    fn instances(count: u32) -> Result<Source> {
+        let folder = tempfile::tempdir()?;
+        bth_scenes::write::file(&bth_scenes::blob::blob(80), &folder.path().join("blob.ply"))?;
+        let mut text = String::from(
+            "version = 1\nframes = { first = 0, last = 24, rate = 24 }\n\
+             [[objects]]\nname = \"blob\"\nmodel = \"blob.ply\"\n",
         );
-        let manifest = bth_scene::parse(&text, &folder.path().join("model.manifest"))?;
-        let name = format!("{}, twisted", model.name);
+        let (mut rng, side) = (Rng::new(1), 2.0 * f64::from(count).cbrt());
+        for i in 0..count {
+            let from = [(); 3].map(|()| rng.unit_f64() * side);
+            let to = from.map(|x| x + rng.unit_f64() - 0.5);
+            writeln!(text, "[[nodes]]\nname = \"n{i}\"\nobject = \"blob\"")?;
+            writeln!(text, "[[tracks]]\nnode = \"n{i}\"\nproperty = \"translation\"")?;
+            writeln!(text, "times = [0, 1]\nvalues = [{from:?}, {to:?}]")?;
+        }
+        Source::parsed(format!("{count} instances"), &text, folder)
+    }
+
+    /// A scene of a manifest's text; `folder` has its models.
+    fn parsed(name: String, text: &str, folder: tempfile::TempDir) -> Result<Source> {
+        let manifest = bth_scene::parse(text, &folder.path().join("scene.manifest"))?;
         Ok(Source { name, manifest, folder: folder.path().into(), _models: Some(folder) })
+    }
+
+    /// Compiles the scene.
+    ///
+    /// # Errors
+    /// As the compiler.
+    pub(crate) fn compile(&self, options: &CompileOptions) -> Result<Compiled> {
+        let (start, name) = (Instant::now(), Path::new(&self.name));
+        let (compiled, _) =
+            bth_compile::scene::compile(&self.manifest, &self.folder, name, options, &Silent)?;
+        Ok(Compiled { bytes: compiled.bytes, seconds: start.elapsed().as_secs_f64() })
     }
 
     /// At most so many frames, evenly spread over the range of the manifest.
@@ -92,13 +116,4 @@ impl Source {
         let count = (count as i64).min(last - first + 1);
         (0..count).map(|i| (first + (last - first) * (2 * i + 1) / (2 * count)) as i32).collect()
     }
-}
-
-/// Compiles a scene without tetrahedra.
-pub(crate) fn compiled(source: &Source, motion: MotionOptions) -> Result<Scene> {
-    let options = CompileOptions { structure: Structure::Bvh, motion, ..CompileOptions::default() };
-    let name = Path::new(&source.name);
-    let (compiled, _) =
-        bth_compile::scene::compile(&source.manifest, &source.folder, name, &options, &Silent)?;
-    bth::from_bytes(&compiled.bytes).context("a file that was just compiled")
 }

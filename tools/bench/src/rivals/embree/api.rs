@@ -146,86 +146,67 @@ unsafe extern "C" fn reject_own(arguments: *const FilterArguments) {
     }
 }
 
-/// Which lanes of a packet hold rays: -1, else 0.
+/// The lanes of a packet that hold rays: -1, else 0.
 #[repr(C, align(64))]
 pub(super) struct Lanes([c_int; 16]);
 
+pub(super) type Monitor = unsafe extern "C" fn(Handle, isize, bool) -> bool;
 pub(super) type Trace1 = unsafe extern "C" fn(Handle, *mut RayHit<1>, *mut QueryArguments);
 pub(super) type Trace16 = unsafe extern "C" fn(*const Lanes, Handle, *mut RayHit<16>, *mut QueryArguments);
 
-pub(super) struct EmbreeApi {
-    pub(super) new_device: unsafe extern "C" fn(*const c_char) -> Handle,
-    pub(super) release_device: unsafe extern "C" fn(Handle),
-    pub(super) device_error: unsafe extern "C" fn(Handle) -> c_int,
-    pub(super) monitor:
-        unsafe extern "C" fn(Handle, unsafe extern "C" fn(Handle, isize, bool) -> bool, Handle),
-    pub(super) new_scene: unsafe extern "C" fn(Handle) -> Handle,
-    pub(super) release_scene: unsafe extern "C" fn(Handle),
-    pub(super) scene_flags: unsafe extern "C" fn(Handle, c_int),
-    pub(super) scene_quality: unsafe extern "C" fn(Handle, c_int),
-    pub(super) commit_scene: unsafe extern "C" fn(Handle),
-    pub(super) new_geometry: unsafe extern "C" fn(Handle, c_int) -> Handle,
-    pub(super) geometry_quality: unsafe extern "C" fn(Handle, c_int),
-    pub(super) shared_buffer:
-        unsafe extern "C" fn(Handle, c_int, u32, c_int, *const c_void, usize, usize, usize),
-    pub(super) commit_geometry: unsafe extern "C" fn(Handle),
-    pub(super) attach_geometry: unsafe extern "C" fn(Handle, Handle) -> u32,
-    pub(super) release_geometry: unsafe extern "C" fn(Handle),
-    pub(super) intersect1: Trace1,
-    pub(super) occluded1: Trace1,
-    pub(super) intersect16: Trace16,
-    pub(super) occluded16: Trace16,
-    pub(super) instanced_scene: unsafe extern "C" fn(Handle, Handle),
-    pub(super) transform: unsafe extern "C" fn(Handle, u32, c_int, *const f32),
-    pub(super) enable_geometry: unsafe extern "C" fn(Handle),
-    pub(super) disable_geometry: unsafe extern "C" fn(Handle),
-    pub(super) geometry: unsafe extern "C" fn(Handle, u32) -> Handle,
-    pub(super) update_buffer: unsafe extern "C" fn(Handle, c_int, u32),
+/// Declares functions of the library, and how to load them.
+macro_rules! functions {
+    ($($field:ident $name:literal: ($($argument:ty),*) $(-> $returned:ty)?;)*) => {
+        pub(super) struct EmbreeApi {
+            $(pub(super) $field: unsafe extern "C" fn($($argument),*) $(-> $returned)?,)*
+        }
+
+        impl EmbreeApi {
+            fn load() -> Result<EmbreeApi> {
+                // SAFETY: EMBREE_LIB names Embree 4, whose initializers may run at any time, and whose functions have
+                // the types below (rtcore_device.h, rtcore_scene.h, rtcore_geometry.h). Occluded rays are passed as
+                // the `RTCRay` that a `RTCRayHit` begins with.
+                unsafe {
+                    let library = library::load("EMBREE_LIB", "libembree4.so")?;
+                    Ok(EmbreeApi { $($field: *library.get(concat!($name, "\0").as_bytes())?,)* })
+                }
+            }
+        }
+    };
+}
+
+functions! {
+    new_device "rtcNewDevice": (*const c_char) -> Handle;
+    release_device "rtcReleaseDevice": (Handle);
+    device_error "rtcGetDeviceError": (Handle) -> c_int;
+    monitor "rtcSetDeviceMemoryMonitorFunction": (Handle, Monitor, Handle);
+    new_scene "rtcNewScene": (Handle) -> Handle;
+    release_scene "rtcReleaseScene": (Handle);
+    scene_flags "rtcSetSceneFlags": (Handle, c_int);
+    scene_quality "rtcSetSceneBuildQuality": (Handle, c_int);
+    commit_scene "rtcCommitScene": (Handle);
+    new_geometry "rtcNewGeometry": (Handle, c_int) -> Handle;
+    geometry_quality "rtcSetGeometryBuildQuality": (Handle, c_int);
+    shared_buffer "rtcSetSharedGeometryBuffer":
+        (Handle, c_int, u32, c_int, *const c_void, usize, usize, usize);
+    commit_geometry "rtcCommitGeometry": (Handle);
+    attach_geometry "rtcAttachGeometry": (Handle, Handle) -> u32;
+    release_geometry "rtcReleaseGeometry": (Handle);
+    intersect1 "rtcIntersect1": (Handle, *mut RayHit<1>, *mut QueryArguments);
+    occluded1 "rtcOccluded1": (Handle, *mut RayHit<1>, *mut QueryArguments);
+    intersect16 "rtcIntersect16": (*const Lanes, Handle, *mut RayHit<16>, *mut QueryArguments);
+    occluded16 "rtcOccluded16": (*const Lanes, Handle, *mut RayHit<16>, *mut QueryArguments);
+    instanced_scene "rtcSetGeometryInstancedScene": (Handle, Handle);
+    transform "rtcSetGeometryTransform": (Handle, u32, c_int, *const f32);
+    enable_geometry "rtcEnableGeometry": (Handle);
+    disable_geometry "rtcDisableGeometry": (Handle);
 }
 
 impl EmbreeApi {
     pub(super) fn get() -> Result<&'static EmbreeApi> {
         static EMBREE_API: OnceLock<std::result::Result<EmbreeApi, String>> = OnceLock::new();
-        EMBREE_API
-            .get_or_init(|| EmbreeApi::load().map_err(|e| format!("{e:#}")))
-            .as_ref()
-            .map_err(|e| anyhow::anyhow!("{e}"))
-    }
-
-    fn load() -> Result<EmbreeApi> {
-        // SAFETY: EMBREE_LIB names Embree 4, whose initializers may run at any time, and whose
-        // functions have the types above (rtcore_device.h, rtcore_scene.h, rtcore_geometry.h).
-        // Occluded rays are passed as the `RTCRay` that a `RTCRayHit` begins with.
-        unsafe {
-            let library = library::load("EMBREE_LIB", "libembree4.so")?;
-            Ok(EmbreeApi {
-                new_device: *library.get(b"rtcNewDevice\0")?,
-                release_device: *library.get(b"rtcReleaseDevice\0")?,
-                device_error: *library.get(b"rtcGetDeviceError\0")?,
-                monitor: *library.get(b"rtcSetDeviceMemoryMonitorFunction\0")?,
-                new_scene: *library.get(b"rtcNewScene\0")?,
-                release_scene: *library.get(b"rtcReleaseScene\0")?,
-                scene_flags: *library.get(b"rtcSetSceneFlags\0")?,
-                scene_quality: *library.get(b"rtcSetSceneBuildQuality\0")?,
-                commit_scene: *library.get(b"rtcCommitScene\0")?,
-                new_geometry: *library.get(b"rtcNewGeometry\0")?,
-                geometry_quality: *library.get(b"rtcSetGeometryBuildQuality\0")?,
-                shared_buffer: *library.get(b"rtcSetSharedGeometryBuffer\0")?,
-                commit_geometry: *library.get(b"rtcCommitGeometry\0")?,
-                attach_geometry: *library.get(b"rtcAttachGeometry\0")?,
-                release_geometry: *library.get(b"rtcReleaseGeometry\0")?,
-                intersect1: *library.get(b"rtcIntersect1\0")?,
-                occluded1: *library.get(b"rtcOccluded1\0")?,
-                intersect16: *library.get(b"rtcIntersect16\0")?,
-                occluded16: *library.get(b"rtcOccluded16\0")?,
-                instanced_scene: *library.get(b"rtcSetGeometryInstancedScene\0")?,
-                transform: *library.get(b"rtcSetGeometryTransform\0")?,
-                enable_geometry: *library.get(b"rtcEnableGeometry\0")?,
-                disable_geometry: *library.get(b"rtcDisableGeometry\0")?,
-                geometry: *library.get(b"rtcGetGeometry\0")?,
-                update_buffer: *library.get(b"rtcUpdateGeometryBuffer\0")?,
-            })
-        }
+        let api = EMBREE_API.get_or_init(|| EmbreeApi::load().map_err(|e| format!("{e:#}")));
+        api.as_ref().map_err(|e| anyhow::anyhow!("{e}"))
     }
 }
 

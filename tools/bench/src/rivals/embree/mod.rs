@@ -19,8 +19,6 @@ pub const NAME: &str = "embree";
 #[derive(Clone, Copy, Debug)]
 pub struct Variant {
     quality: c_int,
-    /// Quality of the geometries.
-    geometry_quality: c_int,
     flags: c_int,
     packets: bool,
     /// Passes a filter with every ray that rejects the triangle on which it starts, as renderers do.
@@ -29,24 +27,15 @@ pub struct Variant {
     isa: Option<&'static str>,
 }
 
-const QUALITY_LOW: c_int = 0;
 const QUALITY_MEDIUM: c_int = 1;
 const QUALITY_HIGH: c_int = 2;
-const QUALITY_REFIT: c_int = 3;
-const FLAG_DYNAMIC: c_int = 1;
 const FLAG_COMPACT: c_int = 2;
 const FLAG_ROBUST: c_int = 4;
 const FLAG_FILTER: c_int = 8;
 
 /// The library's defaults; one ray a call.
-pub const DEFAULT: Variant = Variant {
-    quality: QUALITY_MEDIUM,
-    geometry_quality: QUALITY_MEDIUM,
-    flags: 0,
-    packets: false,
-    own: false,
-    isa: None,
-};
+pub const DEFAULT: Variant =
+    Variant { quality: QUALITY_MEDIUM, flags: 0, packets: false, own: false, isa: None };
 /// The robust mode, which has no high quality; one ray a call.
 pub const ROBUST: Variant = Variant { flags: FLAG_ROBUST, ..DEFAULT };
 /// The defaults, with a filter that rejects the triangle on which a ray starts; one ray a call.
@@ -55,16 +44,8 @@ pub const OWN: Variant = Variant { flags: FLAG_FILTER, own: true, ..DEFAULT };
 pub const ROBUST_OWN: Variant = Variant { flags: FLAG_ROBUST | FLAG_FILTER, own: true, ..DEFAULT };
 /// The mode that saves memory; one ray a call.
 pub const COMPACT: Variant = Variant { flags: FLAG_COMPACT, ..DEFAULT };
-/// What the library advises for scenes that change often: dynamic and of low quality; one ray a call.
-pub const DYNAMIC: Variant =
-    Variant { quality: QUALITY_LOW, geometry_quality: QUALITY_LOW, flags: FLAG_DYNAMIC, ..DEFAULT };
-/// What the library advises for vertices that move a little: a dynamic scene whose geometries are refitted; one ray a call. Only
-/// scenes of low quality heed the quality of their geometries; others build anew. The first build of a geometry that is
-/// refitted is one of medium quality.
-pub const REFIT: Variant = Variant { geometry_quality: QUALITY_REFIT, ..DYNAMIC };
 /// High quality (spatial splits); 16 rays a call.
-pub const PACKETS: Variant =
-    Variant { quality: QUALITY_HIGH, geometry_quality: QUALITY_HIGH, packets: true, ..DEFAULT };
+pub const PACKETS: Variant = Variant { quality: QUALITY_HIGH, packets: true, ..DEFAULT };
 /// The defaults on a machine without AVX; one ray a call.
 pub const SSE4: Variant = Variant { isa: Some("sse4.2"), ..DEFAULT };
 
@@ -87,7 +68,7 @@ pub fn contender(model: &Model, name: &str, variant: &Variant, threads: usize) -
     let scene = build(positions, triangles, variant, threads)?;
     let build_s = start.elapsed().as_secs_f64();
     let bytes = scene.bytes();
-    Ok(Contender { name: name.to_owned(), ours: false, tracer: Box::new(scene), build_s, bytes })
+    Ok(Contender::rival(name, scene, build_s, bytes))
 }
 
 /// Positions with the padding that [`EmbreeMesh`] needs.

@@ -158,7 +158,7 @@ impl EmbreeScene {
         unsafe {
             let scene = self.empty(variant);
             let geometry = (api.new_geometry)(self.device, TYPE_TRIANGLE);
-            (api.geometry_quality)(geometry, variant.geometry_quality);
+            (api.geometry_quality)(geometry, variant.quality);
             let (vertices, indices) = (positions.as_ptr().cast(), triangles.as_ptr().cast());
             let shared = api.shared_buffer;
             shared(geometry, BUFFER_VERTEX, 0, FORMAT_FLOAT3, vertices, 0, 12, count_of_positions);
@@ -168,29 +168,6 @@ impl EmbreeScene {
             (api.release_geometry)(geometry);
             (api.commit_scene)(scene);
             scene
-        }
-    }
-
-    /// Stores other positions of the vertices of a scene of one mesh, of which there are as many. [`Self::commit_positions`] makes them
-    /// visible.
-    ///
-    /// # Panics
-    /// If there are more or fewer.
-    pub fn store_positions(&mut self, positions: &[[f32; 3]]) {
-        let (stored, _) = &mut self._meshes[0];
-        let count = stored.len() - 1;
-        stored[..count].copy_from_slice(positions);
-    }
-
-    /// Builds or refits a scene of one mesh for the positions that were stored.
-    pub fn commit_positions(&mut self) {
-        // SAFETY: the scene has one geometry, which is of the mesh whose buffers live in `self`, and no other thread traces, as `self`
-        // is borrowed mutably.
-        unsafe {
-            let geometry = (self.api.geometry)(self.scene, 0);
-            (self.api.update_buffer)(geometry, BUFFER_VERTEX, 0);
-            (self.api.commit_geometry)(geometry);
-            (self.api.commit_scene)(self.scene);
         }
     }
 
@@ -207,23 +184,6 @@ impl EmbreeScene {
                     None => (self.api.disable_geometry)(*instance),
                 }
                 (self.api.commit_geometry)(*instance);
-            }
-        }
-        // SAFETY: no other thread traces, as `self` is borrowed mutably.
-        unsafe { (self.api.commit_scene)(self.scene) };
-    }
-
-    /// Places some instances by transforms in rows of four, and builds the scene over all of them.
-    ///
-    /// # Panics
-    /// If there is no such instance.
-    pub fn place_some(&mut self, instances: &[u32], transforms: &[[f32; 12]]) {
-        for (instance, rows) in instances.iter().zip(transforms) {
-            let instance = self.instances[*instance as usize];
-            // SAFETY: the instance is a geometry of the scene; the library copies twelve numbers in rows.
-            unsafe {
-                (self.api.transform)(instance, 0, FORMAT_ROWS, rows.as_ptr());
-                (self.api.commit_geometry)(instance);
             }
         }
         // SAFETY: no other thread traces, as `self` is borrowed mutably.

@@ -1,0 +1,121 @@
+//! The command line. Each command keeps its options in its own module; options of several commands are here.
+
+use crate::rays::View;
+use crate::{accuracy, compare, load, paper, records, scenes, speed, stress};
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
+
+/// Measures bth and other CPU ray tracers on identical rays.
+#[derive(Debug, Parser)]
+#[command(name = "bth-bench", version, max_term_width = 100)]
+pub struct Arguments {
+    /// What to measure.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Rays per second of our structures and the rivals.
+    Speed(speed::Speed),
+    /// Is a build of libbth faster than another? One interleaved run; exit code 3 if it is slower.
+    Compare(compare::Compare),
+    /// Measures what a definition names, and appends the rows to the record of this machine.
+    Record(records::RecordRows),
+    /// Writes the summary of all records.
+    Summary(records::Summary),
+    /// Run time and bytes against every kind of error, ours and rivals'.
+    Accuracy(accuracy::Accuracy),
+    /// Hard rays and points on hard surfaces, every answer checked exactly.
+    Stress(stress::Stress),
+    /// Opening a compiled model or scene and tracing the first rays, against building at the start.
+    Load(load::Load),
+    /// Scenes that move and objects that deform: updates and rays, ours and Embree's.
+    Scenes(scenes::Scenes),
+    /// The paper's tables on our models.
+    Paper(paper::Paper),
+    /// One start in a separate process; `load` calls this.
+    #[command(hide = true)]
+    Probe(load::Probe),
+}
+
+/// The models, and where the cameras stand.
+#[derive(Debug, Args)]
+pub struct Models {
+    /// Model files, folders of recorded rays, or models of `bth-scenes list` by NAME or NAME:FACES.
+    #[arg(required = true, value_name = "MODEL")]
+    pub models: Vec<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub seen_from: SeenFrom,
+}
+
+/// Where the cameras stand.
+#[derive(Clone, Copy, Debug, Default, Args)]
+pub struct SeenFrom {
+    /// Stand within the models, as is right for rooms; without this and --outside each model decides.
+    #[arg(long, conflicts_with = "outside")]
+    pub inside: bool,
+    /// Stand outside of the models.
+    #[arg(long)]
+    pub outside: bool,
+}
+
+impl SeenFrom {
+    /// The view that the options select.
+    pub fn view(&self) -> Option<View> {
+        match (self.inside, self.outside) {
+            (true, _) => Some(View::Inside),
+            (_, true) => Some(View::Outside),
+            _ => None,
+        }
+    }
+}
+
+/// How a command runs and where its report goes.
+#[derive(Clone, Debug, Default, Args)]
+pub struct RunOptions {
+    /// Vector instructions of our kernels; by default the best that the machine has.
+    #[arg(long, value_name = "NAME")]
+    pub isa: Option<String>,
+    /// Small pictures and one round: shows that it works, not how fast it is.
+    #[arg(long)]
+    pub quick: bool,
+    /// Write the figures there, as JSON.
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Keep a report in this folder: DATE-NAME.md, DATE-NAME.json and charts.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Name of the report; by default the command's.
+    #[arg(long, value_name = "NAME", value_parser = file_name)]
+    pub name: Option<String>,
+}
+
+impl RunOptions {
+    /// The number of rounds: 1 in a quick run.
+    pub fn rounds(&self, wanted: usize) -> usize {
+        if self.quick { 1 } else { wanted }
+    }
+}
+
+/// Parses a share given in percent, such as `1%`, as a fraction.
+pub(crate) fn share(text: &str) -> Result<f64, String> {
+    let number = text.strip_suffix('%').and_then(|n| n.trim().parse::<f64>().ok());
+    number
+        .filter(|p| (0.0..100.0).contains(p))
+        .map(|p| p / 100.0)
+        .ok_or_else(|| "expected a share such as 1%".to_owned())
+}
+
+/// Parses a part of a file's name.
+fn file_name(text: &str) -> Result<String, String> {
+    let is_name = !text.is_empty() && !text.contains(|c| std::path::is_separator(c) || c.is_control());
+    is_name.then(|| text.to_owned()).ok_or_else(|| "expected a name, without folders".to_owned())
+}
+
+/// Parses a whole number from 1.
+pub(crate) fn at_least_one(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a number from 1".to_owned())
+}

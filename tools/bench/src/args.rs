@@ -8,15 +8,15 @@ use std::path::PathBuf;
 /// Measures bth and other CPU ray tracers on identical rays.
 #[derive(Debug, Parser)]
 #[command(name = "bth-bench", version, max_term_width = 100)]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// What to measure.
     #[command(subcommand)]
-    pub command: Command,
+    pub(crate) command: Command,
 }
 
 /// The commands.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub(crate) enum Command {
     /// Rays per second of our structures and the rivals.
     Speed(speed::Speed),
     /// Is a build of libbth faster than another? One interleaved run; exit code 3 if it is slower.
@@ -42,29 +42,28 @@ pub enum Command {
 
 /// The models, and where the cameras stand.
 #[derive(Debug, Args)]
-pub struct Models {
+pub(crate) struct Models {
     /// Model files, folders of recorded rays, or models of `bth-scenes list` by NAME or NAME:FACES.
     #[arg(required = true, value_name = "MODEL")]
-    pub models: Vec<String>,
+    pub(crate) models: Vec<String>,
     #[command(flatten)]
-    #[allow(missing_docs)]
-    pub seen_from: SeenFrom,
+    pub(crate) seen_from: SeenFrom,
 }
 
 /// Where the cameras stand.
 #[derive(Clone, Copy, Debug, Default, Args)]
-pub struct SeenFrom {
+pub(crate) struct SeenFrom {
     /// Stand within the models, as is right for rooms; without this and --outside each model decides.
     #[arg(long, conflicts_with = "outside")]
-    pub inside: bool,
+    pub(crate) inside: bool,
     /// Stand outside of the models.
     #[arg(long)]
-    pub outside: bool,
+    pub(crate) outside: bool,
 }
 
 impl SeenFrom {
     /// The view that the options select.
-    pub fn view(&self) -> Option<View> {
+    pub(crate) fn view(&self) -> Option<View> {
         match (self.inside, self.outside) {
             (true, _) => Some(View::Inside),
             (_, true) => Some(View::Outside),
@@ -75,27 +74,27 @@ impl SeenFrom {
 
 /// How a command runs and where its report goes.
 #[derive(Clone, Debug, Default, Args)]
-pub struct RunOptions {
+pub(crate) struct RunOptions {
     /// Vector instructions of our kernels; by default the best that the machine has.
     #[arg(long, value_name = "NAME")]
-    pub isa: Option<String>,
+    pub(crate) isa: Option<String>,
     /// Small pictures and one round: shows that it works, not how fast it is.
     #[arg(long)]
-    pub quick: bool,
+    pub(crate) quick: bool,
     /// Write the figures there, as JSON.
     #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
+    pub(crate) json: Option<PathBuf>,
     /// Keep a report in this folder: DATE-NAME.md, DATE-NAME.json and charts.
     #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
+    pub(crate) out: Option<PathBuf>,
     /// Name of the report; by default the command's.
     #[arg(long, value_name = "NAME", value_parser = file_name)]
-    pub name: Option<String>,
+    pub(crate) name: Option<String>,
 }
 
 impl RunOptions {
     /// The number of rounds: 1 in a quick run.
-    pub fn rounds(&self, wanted: usize) -> usize {
+    pub(crate) fn rounds(&self, wanted: usize) -> usize {
         if self.quick { 1 } else { wanted }
     }
 }

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 /// A clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Clock {
+pub(crate) enum Clock {
     /// CPU time of the calling thread.
     ThreadCpu,
     /// Wall clock.
@@ -15,12 +15,12 @@ pub enum Clock {
 
 impl Clock {
     /// The clock for work on `threads` threads.
-    pub fn for_threads(threads: usize) -> Clock {
+    pub(crate) fn for_threads(threads: usize) -> Clock {
         if threads <= 1 { Clock::ThreadCpu } else { Clock::Wall }
     }
 
     /// Seconds that the work takes.
-    pub fn time(self, work: impl FnOnce()) -> f64 {
+    pub(crate) fn time(self, work: impl FnOnce()) -> f64 {
         match self {
             Clock::ThreadCpu => {
                 let start = thread_cpu();
@@ -41,7 +41,7 @@ fn thread_cpu() -> f64 {
 }
 
 /// CPU seconds of this process so far, over all its threads.
-pub fn process_cpu() -> f64 {
+pub(crate) fn process_cpu() -> f64 {
     read(ClockId::ProcessCPUTime)
 }
 

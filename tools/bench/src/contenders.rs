@@ -2,7 +2,7 @@
 
 use crate::model::Model;
 use crate::names::Names;
-use crate::progress::Progress;
+use crate::progress;
 use crate::report::{Report, Subject};
 use crate::rivals::RIVALS;
 use crate::structures::{self, Compiled, Kind};
@@ -10,9 +10,6 @@ use crate::tracer::Contender;
 use anyhow::Result;
 
 /// Builds the selected structures of ours and the selected rivals, which use `threads` threads if they can.
-///
-/// # Errors
-/// If the runtime refuses a file of ours.
 pub(crate) fn build(
     model: &Model,
     kinds: &[Kind],
@@ -20,7 +17,6 @@ pub(crate) fn build(
     names: &Names,
     threads: usize,
     report: &mut Report,
-    progress: &Progress,
 ) -> Result<Vec<Contender>> {
     let mut built = Vec::new();
     // A model that cannot be tetrahedralized as a whole cannot with any record.
@@ -29,7 +25,7 @@ pub(crate) fn build(
         if !kind.uses().any(|(name, _)| names.select(&name)) || no_tets && kind.is_tets() {
             continue;
         }
-        progress.show(format!("{}: compiling {}", model.name, kind.name));
+        progress::show(format!("{}: compiling {}", model.name, kind.name));
         let compiled = if kind.name == structures::BVH.name {
             Ok(bvh.clone())
         } else {
@@ -47,7 +43,7 @@ pub(crate) fn build(
         }
     }
     for rival in RIVALS.iter().filter(|r| names.select(r.name)) {
-        progress.show(format!("{}: building {}", model.name, rival.name));
+        progress::show(format!("{}: building {}", model.name, rival.name));
         match rival.build(model, threads) {
             Ok(contender) => built.push(contender),
             Err(error) => report.leave_out(&model.name, rival.name, &error),

@@ -5,10 +5,7 @@ use bth::Isa;
 
 /// Chooses the vector instructions that all tracing in this process uses, and returns their name: those that are wanted, else
 /// those that the runtime library takes by default.
-///
-/// # Errors
-/// If there is no such instruction set or this machine lacks it.
-pub fn select(wanted: Option<&str>) -> Result<String> {
+pub(crate) fn select(wanted: Option<&str>) -> Result<String> {
     match wanted {
         Some(name) => name.parse::<Isa>()?.choose()?,
         // The library ignores an unknown name in the environment; here it is an error.
@@ -20,11 +17,8 @@ pub fn select(wanted: Option<&str>) -> Result<String> {
 }
 
 /// As [`select`], for libraries of ours that are loaded later: they read the environment variable `BTH_ISA`.
-///
-/// # Errors
-/// As [`select`].
 #[allow(unsafe_code)]
-pub fn select_for_libraries(wanted: &str) -> Result<()> {
+pub(crate) fn select_for_libraries(wanted: &str) -> Result<()> {
     select(Some(wanted))?;
     // SAFETY: called at the start of the program, while no other thread runs anything that could read the environment.
     unsafe { std::env::set_var("BTH_ISA", wanted) };

@@ -1,44 +1,64 @@
 //! Measures bth and other CPU ray tracers on identical rays.
 //!
 //! `rays` makes the seeded ray sets; `structures` and `rivals` are the [`tracer::Contender`]s, which `contenders`
-//! builds. Each command of [`args::Command`] is a module. Those that measure return a [`report::Report`] of
-//! [`records::Row`]s, which become Markdown, JSON and lines of `benchmarks/record`.
+//! builds. Each command of `args` is a module. Those that measure return a report of rows, which become Markdown, JSON and lines of `benchmarks/record`.
 #![warn(missing_docs)]
 
-pub mod accuracy;
-pub mod args;
-pub mod clock;
-pub mod compare;
+mod accuracy;
+mod args;
+mod clock;
+mod compare;
 mod contenders;
-pub mod isa;
-pub mod load;
-pub mod machine;
-pub mod markdown;
+mod isa;
+mod load;
+mod machine;
+mod markdown;
 pub mod model;
 mod moller_trumbore;
-pub mod names;
-pub mod output;
-pub mod paper;
-pub mod progress;
+mod names;
+mod output;
+mod paper;
+mod progress;
 pub mod rays;
-pub mod records;
-pub mod report;
+mod records;
+mod report;
 pub mod rivals;
-pub mod rounds;
-pub mod scenes;
-pub mod speed;
-pub mod stress;
+mod rounds;
+mod scenes;
+mod speed;
+mod stress;
 pub mod structures;
 pub mod tracer;
 
-use args::{Command, RunOptions};
+use anyhow::{Result, bail};
+use args::{Arguments, Command, RunOptions};
+use clap::Parser;
 use report::Report;
+use std::process::ExitCode;
 
-/// Runs a command that measures; returns its report and where that goes.
-///
-/// # Errors
-/// If an option, model or scene cannot be used, or the command is not one that makes a report.
-pub fn measure(command: &Command) -> anyhow::Result<(Report, &RunOptions)> {
+/// Runs the program.
+pub fn run() -> ExitCode {
+    let done = match Arguments::parse().command {
+        Command::Compare(arguments) => match compare::run(&arguments) {
+            Ok(compare::Verdict::Slower) => return ExitCode::from(3),
+            other => other.map(drop),
+        },
+        Command::Record(arguments) => records::record(&arguments),
+        Command::Summary(arguments) => records::run_summary(&arguments),
+        Command::Probe(arguments) => load::probe::run(&arguments),
+        command => measure(&command).and_then(|(report, options)| report.finish(options)),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            output::note(&format!("error: {error:#}"));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Runs a command that makes a report; returns the report and where it goes.
+fn measure(command: &Command) -> Result<(Report, &RunOptions)> {
     Ok(match command {
         Command::Speed(arguments) => (speed::measure(arguments)?, &arguments.run),
         Command::Accuracy(arguments) => (accuracy::measure(arguments)?, &arguments.run),
@@ -46,8 +66,6 @@ pub fn measure(command: &Command) -> anyhow::Result<(Report, &RunOptions)> {
         Command::Load(arguments) => (load::measure(arguments)?, &arguments.run),
         Command::Scenes(arguments) => (scenes::measure(arguments)?, &arguments.run),
         Command::Paper(arguments) => (paper::measure(arguments)?, &arguments.run),
-        _ => {
-            anyhow::bail!("expected a command that measures: speed, accuracy, stress, load, scenes or paper")
-        }
+        _ => bail!("expected a command that makes a report: speed, accuracy, stress, load, scenes or paper"),
     })
 }

@@ -5,20 +5,20 @@ use std::process::Command;
 
 /// Type of machine.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Machine {
+pub(crate) struct Machine {
     /// The processor's name.
-    pub cpu: String,
+    pub(crate) cpu: String,
     /// Vector instructions that matter for ray tracing, best first.
-    pub isa: Vec<String>,
+    pub(crate) isa: Vec<String>,
     /// Logical cores that we may use.
-    pub logical_cores: usize,
+    pub(crate) logical_cores: usize,
     /// Operating system.
-    pub os: String,
+    pub(crate) os: String,
 }
 
 impl Machine {
     /// This machine.
-    pub fn this() -> Machine {
+    pub(crate) fn this() -> Machine {
         Machine {
             cpu: cpu().unwrap_or_else(|| std::env::consts::ARCH.to_owned()),
             isa: isa(),
@@ -55,7 +55,7 @@ fn isa() -> Vec<String> {
 }
 
 /// The commit that is measured, with a note when files differ from it; `None` outside a repository.
-pub fn commit() -> Option<String> {
+pub(crate) fn commit() -> Option<String> {
     let git = |arguments: &[&str]| {
         let output =
             Command::new("git").arg("-C").arg(env!("CARGO_MANIFEST_DIR")).args(arguments).output().ok()?;
@@ -67,6 +67,6 @@ pub fn commit() -> Option<String> {
 }
 
 /// Today, UTC, as `2026-11-21`.
-pub fn today() -> String {
+pub(crate) fn today() -> String {
     jiff::Timestamp::now().strftime("%Y-%m-%d").to_string()
 }

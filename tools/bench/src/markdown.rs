@@ -1,7 +1,7 @@
 //! Markdown tables and numbers.
 
 /// A table; the first column is aligned left, the others right.
-pub fn table(head: &[String], rows: &[Vec<String>]) -> String {
+pub(crate) fn table(head: &[String], rows: &[Vec<String>]) -> String {
     let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
     let mut text = line(head);
     text.push_str("|---");
@@ -15,13 +15,8 @@ pub fn table(head: &[String], rows: &[Vec<String>]) -> String {
     text
 }
 
-/// Cells of a row or of the head of a table.
-pub fn cells(texts: &[&str]) -> Vec<String> {
-    texts.iter().map(|text| (*text).to_owned()).collect()
-}
-
 /// A count with thousands separated: `1,234,567`.
-pub fn count(n: u64) -> String {
+pub(crate) fn count(n: u64) -> String {
     let digits = n.to_string();
     let mut text = String::new();
     for (i, digit) in digits.chars().enumerate() {
@@ -34,7 +29,7 @@ pub fn count(n: u64) -> String {
 }
 
 /// Three significant digits. Large numbers keep all digits before the point; tiny ones have an exponent.
-pub fn short(x: f64) -> String {
+pub(crate) fn short(x: f64) -> String {
     match x.abs() {
         size if size == 0.0 || !size.is_finite() => format!("{x}"),
         size if size < 1e-4 => format!("{x:.1e}"),
@@ -52,7 +47,8 @@ mod tests {
 
     #[test]
     fn tables_align_numbers_right_and_numbers_are_short() {
-        let text = table(&cells(&["tracer", "ao"]), &[cells(&["bth", "1.00"])]);
+        let text =
+            table(&["tracer", "ao"].map(str::to_owned), &[["bth", "1.00"].map(str::to_owned).to_vec()]);
         assert_eq!(text, "| tracer | ao |\n|---|---:|\n| bth | 1.00 |\n");
         assert_eq!([0, 999, 1000, 1234567].map(count), ["0", "999", "1,000", "1,234,567"]);
         let numbers = [0.0, 1.0, 0.12345, 1234.5, 1234567.8, 5.07e-8].map(short);

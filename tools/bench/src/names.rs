@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 /// Names separated by commas; one that ends in a star stands for all that begin so.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Names(Vec<String>);
+pub(crate) struct Names(Vec<String>);
 
 impl FromStr for Names {
     type Err = std::convert::Infallible;
@@ -16,12 +16,12 @@ impl FromStr for Names {
 
 impl Names {
     /// Returns true if the name is selected. An empty selection selects everything.
-    pub fn select(&self, name: &str) -> bool {
+    pub(crate) fn select(&self, name: &str) -> bool {
         self.0.is_empty() || self.0.iter().any(|pattern| matches(pattern, name))
     }
 
     /// Selected names that match none of `all`, most likely because they are misspelled.
-    pub fn unknown<'a>(&'a self, all: &[&str]) -> Vec<&'a str> {
+    pub(crate) fn unknown<'a>(&'a self, all: &[&str]) -> Vec<&'a str> {
         let known = |pattern: &&String| all.iter().any(|name| matches(pattern, name));
         self.0.iter().filter(|p| !known(p)).map(String::as_str).collect()
     }

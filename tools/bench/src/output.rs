@@ -5,20 +5,14 @@ use std::io::Write;
 use std::path::Path;
 
 /// Prints a page and saves files. Does each even if the other fails: what was measured may have taken hours.
-///
-/// # Errors
-/// If something cannot be written.
-pub fn print_and_save(page: &str, save: impl FnOnce() -> Result<()>) -> Result<()> {
+pub(crate) fn print_and_save(page: &str, save: impl FnOnce() -> Result<()>) -> Result<()> {
     let printed = std::io::stdout().lock().write_all(page.as_bytes());
     save()?;
     Ok(printed?)
 }
 
 /// Writes a file, whole or not at all, and the folders that it is in. On failure a former file stays.
-///
-/// # Errors
-/// If it cannot be written.
-pub fn write(path: &Path, text: &str) -> Result<()> {
+pub(crate) fn write(path: &Path, text: &str) -> Result<()> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     }
@@ -27,7 +21,7 @@ pub fn write(path: &Path, text: &str) -> Result<()> {
 }
 
 /// Prints a message to standard error.
-pub fn note(what: &str) {
+pub(crate) fn note(what: &str) {
     // Nothing can be done when standard error is closed.
     let _ = writeln!(std::io::stderr().lock(), "{what}");
 }

@@ -4,6 +4,7 @@ use crate::args::RunOptions;
 use crate::machine::{self, Machine};
 use crate::markdown::{short, table};
 use crate::output::{note, print_and_save, write};
+use crate::progress;
 use crate::records::Row;
 use crate::rounds::geometric_mean;
 use anyhow::{Result, ensure};
@@ -11,28 +12,28 @@ use serde::Serialize;
 use serde_json::Value;
 
 /// The name of the model in rows that are geometric means over all models.
-pub const MEAN: &str = "mean";
+pub(crate) const MEAN: &str = "mean";
 
 /// When, where and how a report was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Head {
+pub(crate) struct Head {
     /// Name of the command, such as `speed`.
-    pub measurement: &'static str,
+    pub(crate) measurement: &'static str,
     /// Day, UTC.
-    pub date: String,
+    pub(crate) date: String,
     /// The commit that was measured.
-    pub commit: Option<String>,
+    pub(crate) commit: Option<String>,
     /// Type of machine.
-    pub machine: Machine,
+    pub(crate) machine: Machine,
     /// Vector instructions that our kernels used.
-    pub isa: String,
+    pub(crate) isa: String,
     /// The options that matter.
-    pub options: Value,
+    pub(crate) options: Value,
 }
 
 impl Head {
     /// The head of a report that is made now.
-    pub fn now(measurement: &'static str, isa: String, options: Value) -> Head {
+    pub(crate) fn now(measurement: &'static str, isa: String, options: Value) -> Head {
         let (date, commit, machine) = (machine::today(), machine::commit(), Machine::this());
         Head { measurement, date, commit, machine, isa, options }
     }
@@ -53,57 +54,57 @@ impl Head {
 
 /// A chart and the name of its file, without extension.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Chart {
+pub(crate) struct Chart {
     /// Such as `wrong-against-time`.
-    pub name: String,
+    pub(crate) name: String,
     /// SVG text.
-    pub svg: String,
+    pub(crate) svg: String,
 }
 
 /// What some figures belong to.
 #[derive(Clone, Copy, Debug)]
-pub struct Subject<'a> {
+pub(crate) struct Subject<'a> {
     /// The tracer, or another thing that was measured.
-    pub engine: &'a str,
+    pub(crate) engine: &'a str,
     /// True if it ran our kernels, with the report's instruction set.
-    pub ours: bool,
+    pub(crate) ours: bool,
     /// The model or scene.
-    pub model: &'a str,
+    pub(crate) model: &'a str,
     /// Threads that traced.
-    pub threads: usize,
+    pub(crate) threads: usize,
 }
 
 /// A report.
 #[derive(Clone, Debug, Serialize)]
-pub struct Report {
+pub(crate) struct Report {
     /// When, where and how it was measured.
-    pub head: Head,
+    pub(crate) head: Head,
     /// What the figures are, in Markdown.
     #[serde(skip)]
-    pub about: &'static str,
+    pub(crate) about: &'static str,
     /// Rounds that figures are medians of.
     #[serde(skip)]
-    pub rounds: usize,
+    pub(crate) rounds: usize,
     /// All figures.
-    pub rows: Vec<Row>,
+    pub(crate) rows: Vec<Row>,
     /// Lines about the models, and what was not measured.
-    pub notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
     /// Answers that are wrong and must be right; the command fails if there are any.
-    pub wrong: Vec<String>,
+    pub(crate) wrong: Vec<String>,
     /// Charts.
     #[serde(skip)]
-    pub charts: Vec<Chart>,
+    pub(crate) charts: Vec<Chart>,
 }
 
 impl Report {
     /// A report without figures.
-    pub fn new(head: Head, rounds: usize, about: &'static str) -> Report {
+    pub(crate) fn new(head: Head, rounds: usize, about: &'static str) -> Report {
         let (rows, notes, wrong, charts) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         Report { head, about, rounds, rows, notes, wrong, charts }
     }
 
     /// Adds a figure.
-    pub fn add(&mut self, of: &Subject<'_>, set: &str, value: f64, unit: &str) {
+    pub(crate) fn add(&mut self, of: &Subject<'_>, set: &str, value: f64, unit: &str) {
         let commit = self.head.commit.as_deref().and_then(|commit| commit.split(' ').next());
         self.rows.push(Row {
             commit: commit.unwrap_or("?").to_owned(),
@@ -122,18 +123,18 @@ impl Report {
     }
 
     /// Notes something that cannot be measured.
-    pub fn leave_out(&mut self, model: &str, engine: &str, why: &anyhow::Error) {
+    pub(crate) fn leave_out(&mut self, model: &str, engine: &str, why: &anyhow::Error) {
         self.notes.push(format!("{model}: {engine}: not measured: {why:#}"));
     }
 
     /// Adds the geometric means over the models of all figures in a unit, with the smallest and the largest.
-    pub fn add_means(&mut self, unit: &str) {
+    pub(crate) fn add_means(&mut self, unit: &str) {
         let rows = self.rows.iter().filter(|row| row.unit == unit).cloned().collect();
         self.rows.extend(means(rows));
     }
 
     /// Adds the geometric means over the models of the ratios to an engine's figures in a unit.
-    pub fn add_ratios(&mut self, base: &str, unit: &str) {
+    pub(crate) fn add_ratios(&mut self, base: &str, unit: &str) {
         let figures = || self.rows.iter().filter(|row| row.unit == unit);
         let ratio = |row: &Row| {
             let place = |r: &Row| (r.model.clone(), r.set.clone(), r.threads);
@@ -147,7 +148,7 @@ impl Report {
     }
 
     /// The Markdown page.
-    pub fn markdown(&self) -> String {
+    pub(crate) fn markdown(&self) -> String {
         let Head { measurement, date, .. } = &self.head;
         let mut text = format!("# {measurement}, {date}\n\n{}\n{}\n", self.head.markdown(), self.about);
         let mut models = distinct(self.rows.iter().map(|row| row.model.as_str()));
@@ -167,10 +168,8 @@ impl Report {
     }
 
     /// Prints the page, writes the files and notes what was not measured.
-    ///
-    /// # Errors
-    /// If something cannot be written, or an answer was wrong.
-    pub fn finish(&self, to: &RunOptions) -> Result<()> {
+    pub(crate) fn finish(&self, to: &RunOptions) -> Result<()> {
+        progress::show("");
         self.notes.iter().for_each(|line| note(line));
         print_and_save(&self.markdown(), || self.save(to))?;
         ensure!(self.wrong.is_empty(), "wrong answers: {}", self.wrong.join(", "));
@@ -178,10 +177,7 @@ impl Report {
     }
 
     /// Writes the files.
-    ///
-    /// # Errors
-    /// If something cannot be written.
-    pub fn save(&self, to: &RunOptions) -> Result<()> {
+    pub(crate) fn save(&self, to: &RunOptions) -> Result<()> {
         let json = format!("{:#}\n", serde_json::to_value(self)?);
         if let Some(path) = &to.json {
             write(path, &json)?;

@@ -2,7 +2,7 @@
 
 /// Runs each measurement once per round, in turn, after a round that warms up and is not kept. Returns the median of each;
 /// `measure` returns `None` if a measurement does not apply.
-pub fn medians<T>(
+pub(crate) fn medians<T>(
     items: &[T],
     rounds: usize,
     measure: impl FnMut(usize, &T) -> Option<f64>,
@@ -11,7 +11,7 @@ pub fn medians<T>(
 }
 
 /// Returns the smallest of each instead, as other work of the machine can only add to a time; else like [`medians`].
-pub fn least<T>(
+pub(crate) fn least<T>(
     items: &[T],
     rounds: usize,
     measure: impl FnMut(usize, &T) -> Option<f64>,
@@ -37,14 +37,14 @@ fn interleaved<T>(
 }
 
 /// The median, between the middle two of an even number.
-pub fn median(mut values: Vec<f64>) -> Option<f64> {
+pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let (low, high) = (values.len().checked_sub(1)? / 2, values.len() / 2);
     Some((values[low] + values[high]) / 2.0)
 }
 
 /// Lower quartile, median and upper quartile, by linear interpolation; NaN if there are no values.
-pub fn quartiles(mut values: Vec<f64>) -> [f64; 3] {
+pub(crate) fn quartiles(mut values: Vec<f64>) -> [f64; 3] {
     values.sort_by(f64::total_cmp);
     [0.25, 0.5, 0.75].map(|share| {
         let at = share * values.len().saturating_sub(1) as f64;
@@ -58,7 +58,7 @@ pub fn quartiles(mut values: Vec<f64>) -> [f64; 3] {
 }
 
 /// The geometric mean of positive values.
-pub fn geometric_mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+pub(crate) fn geometric_mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let (sum, count) = values.into_iter().fold((0.0, 0), |(sum, n), value| (sum + value.ln(), n + 1));
     (count > 0).then(|| (sum / f64::from(count)).exp())
 }

@@ -6,7 +6,7 @@ use crate::contenders;
 use crate::isa;
 use crate::model::Model;
 use crate::names::Names;
-use crate::progress::Progress;
+use crate::progress;
 use crate::rays::{self, Finder, RaySet, recorded};
 use crate::records::Row;
 use crate::report::{Head, Report};
@@ -23,28 +23,26 @@ use std::path::Path;
 
 /// `speed`.
 #[derive(Debug, Args)]
-pub struct Speed {
+pub(crate) struct Speed {
     #[command(flatten)]
-    #[allow(missing_docs)]
-    pub models: Models,
+    pub(crate) models: Models,
     /// Rays of a set, at most (about).
     #[arg(long, value_name = "N", default_value_t = 200_000, value_parser = at_least_one)]
-    pub rays: usize,
+    pub(crate) rays: usize,
     /// Rounds of which the median counts; one more comes before and warms up.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = at_least_one)]
-    pub rounds: usize,
+    pub(crate) rounds: usize,
     /// Numbers of threads to trace on: CPU time is measured for 1, wall-clock time for more.
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "1", value_parser = at_least_one)]
-    pub threads: Vec<usize>,
+    pub(crate) threads: Vec<usize>,
     /// Only these tracers; a star at the end stands for any ending.
     #[arg(long = "tracer", value_name = "NAME,…", default_value = "", hide_default_value = true)]
-    pub tracers: Names,
+    pub(crate) tracers: Names,
     /// Only these ray sets.
     #[arg(long = "set", value_name = "NAME,…", default_value = "", hide_default_value = true)]
-    pub sets: Names,
+    pub(crate) sets: Names,
     #[command(flatten)]
-    #[allow(missing_docs)]
-    pub run: RunOptions,
+    pub(crate) run: RunOptions,
 }
 
 const ABOUT: &str = "\
@@ -60,10 +58,7 @@ const RATE: &str = "Mrays/s";
 const BESIDE: &str = "times beside";
 
 /// Measures all models.
-///
-/// # Errors
-/// If an option or model cannot be used.
-pub fn measure(arguments: &Speed) -> Result<Report> {
+pub(crate) fn measure(arguments: &Speed) -> Result<Report> {
     check_names(arguments)?;
     let isa = isa::select(arguments.run.isa.as_deref())?;
     let rounds = arguments.run.rounds(arguments.rounds);
@@ -71,9 +66,8 @@ pub fn measure(arguments: &Speed) -> Result<Report> {
         "rays": arguments.rays, "rounds": rounds, "quick": arguments.run.quick, "rays_per_batch": structures::BATCH,
     });
     let mut report = Report::new(Head::now("speed", isa, options), rounds, ABOUT);
-    let progress = Progress::new();
     for which in &arguments.models.models {
-        measure_model(which, arguments, &mut report, &progress)?;
+        measure_model(which, arguments, &mut report)?;
     }
     add_beside(&mut report);
     report.add_means(BESIDE);
@@ -95,13 +89,13 @@ fn check_names(arguments: &Speed) -> Result<()> {
     Ok(())
 }
 
-fn measure_model(which: &str, arguments: &Speed, report: &mut Report, progress: &Progress) -> Result<()> {
+fn measure_model(which: &str, arguments: &Speed, report: &mut Report) -> Result<()> {
     let model = Model::load(which)?;
-    progress.show(format!("{}: compiling the BVH", model.name));
+    progress::show(format!("{}: compiling the BVH", model.name));
     let bvh = structures::compile(&model, &structures::BVH)?;
     let scene = bth::from_bytes(&bvh.bytes)?;
 
-    progress.show(format!("{}: making rays", model.name));
+    progress::show(format!("{}: making rays", model.name));
     let is_recorded = Path::new(which).is_dir();
     let mut sets = if is_recorded {
         recorded::sets(Path::new(which), &model, &scene, arguments.rays)?
@@ -126,11 +120,10 @@ fn measure_model(which: &str, arguments: &Speed, report: &mut Report, progress: 
     }
 
     let most_threads = arguments.threads.iter().copied().max().unwrap_or(1);
-    let contenders =
-        contenders::build(&model, &KINDS, &bvh, &arguments.tracers, most_threads, report, progress)?;
+    let contenders = contenders::build(&model, &KINDS, &bvh, &arguments.tracers, most_threads, report)?;
     for &threads in &arguments.threads {
         for (set, expected) in sets.iter().zip(&expected) {
-            progress.show(format!("{}: {} on {threads} thread(s)", model.name, set.name));
+            progress::show(format!("{}: {} on {threads} thread(s)", model.name, set.name));
             for (contender, measured) in
                 contenders.iter().zip(measure_set(set, expected, &contenders, report.rounds, threads))
             {

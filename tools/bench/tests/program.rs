@@ -47,7 +47,7 @@ fn a_quick_speed_run_needs_no_rival() {
 }
 
 #[test]
-fn load_scenes_and_stress_measure_ours() {
+fn load_and_scenes_measure_ours() {
     let (_, rows) = report(&["load", "torus-knot:320", "objects:3", "--threads", "1", "--rays", "100"]);
     for start in ["bth map warm", "bth map cold", "bvh read warm"] {
         let times = ["ready", "first hit", "total"].map(|set| figure(&rows, start, set));
@@ -58,8 +58,6 @@ fn load_scenes_and_stress_measure_ours() {
         assert_eq!(figure(&rows, engine, "differ"), 0.0, "{engine}");
         assert!(figure(&rows, engine, "update") > 0.0 && figure(&rows, engine, "later") > 0.0);
     }
-    let (_, rows) = report(&["stress", "blob:320", "--millions", "0", "--one-in", "1000"]);
-    assert_eq!((figure(&rows, "blob", "triangles"), figure(&rows, "blob", "wrong")), (320.0, 0.0));
 }
 
 #[test]

@@ -17,15 +17,15 @@ enum AnswerClass {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Defects {
     /// Answers.
-    pub rays: u64,
+    pub(crate) rays: u64,
     /// Nothing was found though something is hit.
-    pub false_misses: u64,
+    pub(crate) false_misses: u64,
     /// The nearest triangle was passed through: another behind it was found.
-    pub leaks: u64,
+    pub(crate) leaks: u64,
     /// A triangle was found that the ray does not hit, or not within its range.
-    pub ghosts: u64,
+    pub(crate) ghosts: u64,
     /// A ghost, but the triangle shares a vertex with the right one.
-    pub wrong_neighbours: u64,
+    pub(crate) wrong_neighbours: u64,
 }
 
 impl Defects {

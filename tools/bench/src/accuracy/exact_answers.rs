@@ -28,9 +28,6 @@ pub(super) struct Exact {
 
 impl Geometry {
     /// The triangles of a compiled plain BVH.
-    ///
-    /// # Errors
-    /// If the runtime refuses the file, which would be a fault of ours.
     pub(super) fn new(bytes: &[u8]) -> Result<Geometry> {
         let scene = bth::from_bytes(bytes)?;
         let triangles = bth_oracle::triangles(&scene.object(0));
@@ -47,9 +44,6 @@ impl Geometry {
 
     /// The exact answers to a set. Our BVH finds them, as testing every triangle against every ray would take days; one in
     /// `one_in` rays is tested against every triangle in exact arithmetic.
-    ///
-    /// # Errors
-    /// If one of those differs: our BVH would be wrong then, and this measurement worthless.
     pub(super) fn answers(&self, set: &RaySet, one_in: usize) -> Result<Vec<Exact>> {
         let mut hits = vec![Hit::MISS; set.rays.len()];
         self.scene.nearest(set.batch(), &mut hits);

@@ -14,7 +14,7 @@ use crate::contenders;
 use crate::isa;
 use crate::model::Model;
 use crate::names::Names;
-use crate::progress::Progress;
+use crate::progress;
 use crate::rays::{self, Finder, RaySet};
 use crate::report::{Head, Report};
 use crate::rivals::RIVALS;
@@ -31,25 +31,23 @@ use serde_json::json;
 
 /// `accuracy`.
 #[derive(Debug, Args)]
-pub struct Accuracy {
+pub(crate) struct Accuracy {
     #[command(flatten)]
-    #[allow(missing_docs)]
-    pub models: Models,
+    pub(crate) models: Models,
     /// Rays of a set, at most (about).
     #[arg(long, value_name = "N", default_value_t = 50_000, value_parser = at_least_one)]
-    pub rays: usize,
+    pub(crate) rays: usize,
     /// Rounds of which the median time counts; one more comes before and warms up.
     #[arg(long, value_name = "N", default_value_t = 7, value_parser = at_least_one)]
-    pub rounds: usize,
+    pub(crate) rounds: usize,
     /// Only these tracers; a star at the end stands for any ending.
     #[arg(long = "tracer", value_name = "NAME,…", default_value = "", hide_default_value = true)]
-    pub tracers: Names,
+    pub(crate) tracers: Names,
     /// One of this many rays is compared with every triangle in exact arithmetic.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = at_least_one)]
-    pub one_in: usize,
+    pub(crate) one_in: usize,
     #[command(flatten)]
-    #[allow(missing_docs)]
-    pub run: RunOptions,
+    pub(crate) run: RunOptions,
 }
 
 const ABOUT: &str = "\
@@ -71,10 +69,7 @@ fn kinds() -> impl Iterator<Item = Kind> {
 }
 
 /// Measures all models.
-///
-/// # Errors
-/// If an option or model cannot be used.
-pub fn measure(arguments: &Accuracy) -> Result<Report> {
+pub(crate) fn measure(arguments: &Accuracy) -> Result<Report> {
     let names: Vec<&str> = kinds().map(|kind| kind.name).chain(RIVALS.iter().map(|r| r.name)).collect();
     if let Some(name) = arguments.tracers.unknown(&names).first() {
         bail!("--tracer {name}: there are {}", names.join(", "));
@@ -84,10 +79,9 @@ pub fn measure(arguments: &Accuracy) -> Result<Report> {
     let rays = if arguments.run.quick { QUICK_RAYS } else { arguments.rays };
     let options = json!({ "rays": rays, "rounds": rounds, "one_in": arguments.one_in });
     let mut report = Report::new(Head::now("accuracy", isa, options), rounds, ABOUT);
-    let progress = Progress::new();
     for which in &arguments.models.models {
         let model = Model::load(which)?;
-        measure_model(&model, arguments, rays, &names, &mut report, &progress)?;
+        measure_model(&model, arguments, rays, &names, &mut report)?;
     }
     report.charts = charts::draw(&report);
     for unit in ["ns/ray", "B/triangle"] {
@@ -108,18 +102,17 @@ fn measure_model(
     rays: usize,
     names: &[&str],
     report: &mut Report,
-    progress: &Progress,
 ) -> Result<()> {
-    progress.show(format!("{}: compiling the BVH", model.name));
+    progress::show(format!("{}: compiling the BVH", model.name));
     let bvh = structures::compile(model, &structures::BVH)?;
     let scene = bth::from_bytes(&bvh.bytes)?;
     let finder = Finder::new(model, &scene);
     let kinds: Vec<Kind> = kinds().collect();
-    let mut tracers = contenders::build(model, &kinds, &bvh, &arguments.tracers, 1, report, progress)?;
+    let mut tracers = contenders::build(model, &kinds, &bvh, &arguments.tracers, 1, report)?;
     tracers.retain(|tracer| names.contains(&&*tracer.name));
     let geometries = Geometries::new(model, &bvh, &tracers)?;
 
-    progress.show(format!("{}: making rays", model.name));
+    progress::show(format!("{}: making rays", model.name));
     let size = if arguments.run.quick { rays::QUICK_PICTURE_SIZE } else { rays::PICTURE_SIZE };
     let options = rays::Options { size, most: rays, view: arguments.models.seen_from.view() };
     let (_, mut sets) = rays::sets(&finder, &options);
@@ -127,13 +120,13 @@ fn measure_model(
     sets.extend([Target::Vertices, Target::Edges].map(|target| aimed_rays::set(model, target, rays)));
     let mut answered_sets = Vec::new();
     for set in sets.into_iter().filter(|set| !set.rays.is_empty()) {
-        progress.show(format!("{}: exact answers to {}", model.name, set.name));
+        progress::show(format!("{}: exact answers to {}", model.name, set.name));
         let answers = geometries.list.iter().map(|(_, g)| g.answers(&set, arguments.one_in));
         let exact_answers = answers.collect::<Result<_>>()?;
         answered_sets.push(AnsweredSet { set, exact_answers });
     }
     for AnsweredSet { set, .. } in &answered_sets {
-        progress.show(format!("{}: timing {}", model.name, set.name));
+        progress::show(format!("{}: timing {}", model.name, set.name));
         let mut answers = Answers::empty(false, set.rays.len());
         let seconds = medians(&tracers, report.rounds, |_, tracer| {
             Some(Clock::ThreadCpu.time(|| answers.trace(&*tracer.tracer, set.batch())))
@@ -144,7 +137,7 @@ fn measure_model(
         }
     }
     for tracer in &tracers {
-        progress.show(format!("{}: errors of {}", model.name, tracer.name));
+        progress::show(format!("{}: errors of {}", model.name, tracer.name));
         add_errors(model, tracer, &geometries, &answered_sets, report);
     }
     contenders::add_sizes(report, model, 1, &tracers);

@@ -29,9 +29,6 @@ pub(super) struct Build {
 
 impl Build {
     /// Loads a build. It is never unloaded, so its functions stay valid.
-    ///
-    /// # Errors
-    /// If the file is not a shared library, or lacks one of the functions.
     pub(super) fn load(path: &Path) -> Result<Build> {
         let path = path.canonicalize().with_context(|| format!("{}: no such file", path.display()))?;
         // SAFETY: by the documentation of `compare` the user names a build of libbth, whose initializers are those of Rust's
@@ -57,9 +54,6 @@ impl Build {
     }
 
     /// Opens a compiled file with this build.
-    ///
-    /// # Errors
-    /// What the build reports.
     pub(super) fn open(&self, file: &Path) -> Result<OpenedByBuild<'_>> {
         let name = CString::new(file.as_os_str().as_encoded_bytes()).context("a path without zero bytes")?;
         let mut scene = std::ptr::null_mut();

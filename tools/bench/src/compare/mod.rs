@@ -9,7 +9,7 @@ mod compiled_model;
 mod library;
 mod verdict;
 
-pub use verdict::Verdict;
+pub(crate) use verdict::Verdict;
 
 use self::compiled_model::CompiledModel;
 use self::library::{Build, OpenedByBuild};
@@ -18,7 +18,7 @@ use crate::args::{RunOptions, SeenFrom, at_least_one, share};
 use crate::clock::Clock;
 use crate::isa;
 use crate::names::Names;
-use crate::progress::Progress;
+use crate::progress;
 use crate::rays::{self, Finder, RaySet};
 use crate::report::{Head, Report, Subject};
 use crate::rounds::quartiles;
@@ -31,36 +31,34 @@ use std::path::PathBuf;
 
 /// `compare`.
 #[derive(Debug, Args)]
-pub struct Compare {
+pub(crate) struct Compare {
     /// The build to compare with: a libbth.so.
-    pub old: PathBuf,
+    pub(crate) old: PathBuf,
     /// The build that may be faster.
-    pub new: PathBuf,
+    pub(crate) new: PathBuf,
     /// Model files, models of `bth-scenes list` by NAME or NAME:FACES, or compiled .bth files, which are used as they are.
     /// If OLD and NEW read different versions of the format: `OLD.bth,NEW.bth`, the model as compiled for each of them.
     #[arg(required = true, value_name = "MODEL")]
-    pub models: Vec<String>,
+    pub(crate) models: Vec<String>,
     #[command(flatten)]
-    #[allow(missing_docs)]
-    pub seen_from: SeenFrom,
+    pub(crate) seen_from: SeenFrom,
     /// Rays of a set, at most (about).
     #[arg(long, value_name = "N", default_value_t = 65_536, value_parser = at_least_one)]
-    pub rays: usize,
+    pub(crate) rays: usize,
     /// Rounds of which the median counts; one more comes before and warms up.
     #[arg(long, value_name = "N", default_value_t = 11, value_parser = at_least_one)]
-    pub rounds: usize,
+    pub(crate) rounds: usize,
     /// Rays in a call; 1 for one ray a call.
     #[arg(long, value_name = "N", default_value_t = 1024, value_parser = at_least_one)]
-    pub batch: usize,
+    pub(crate) batch: usize,
     /// Only these ray sets.
     #[arg(long = "set", value_name = "NAME,…", default_value = "", hide_default_value = true)]
-    pub sets: Names,
+    pub(crate) sets: Names,
     /// A set is slower when its mean over the models is certainly (95 %) greater by more than this, such as `1%`.
     #[arg(long, value_name = "P%", default_value = "1%", value_parser = share)]
-    pub worse: f64,
+    pub(crate) worse: f64,
     #[command(flatten)]
-    #[allow(missing_docs)]
-    pub run: RunOptions,
+    pub(crate) run: RunOptions,
 }
 
 const ABOUT: &str = "\
@@ -72,10 +70,7 @@ set is by the 95 % interval of its geometric mean over the models.";
 const SHORTEST_TURN: f64 = 0.02;
 
 /// Measures, prints and writes the comparison; returns the verdict by `--worse`.
-///
-/// # Errors
-/// If a library, model or option cannot be used, or if the builds give different answers.
-pub fn run(arguments: &Compare) -> Result<Verdict> {
+pub(crate) fn run(arguments: &Compare) -> Result<Verdict> {
     if let Some(name) = arguments.sets.unknown(&rays::NAMES).first() {
         bail!("--set {name}: there are {}", rays::NAMES.join(", "));
     }
@@ -87,12 +82,10 @@ pub fn run(arguments: &Compare) -> Result<Verdict> {
     let options = json!({ "rays": arguments.rays, "rounds": rounds, "batch": arguments.batch });
     let isa = arguments.run.isa.clone().unwrap_or_else(|| "best".to_owned());
     let mut report = Report::new(Head::now("compare", isa, options), rounds, ABOUT);
-    let progress = Progress::new();
     let mut ratios = SetRatios::default();
     for which in &arguments.models {
-        measure_model(which, arguments, &builds, &mut report, &mut ratios, &progress)?;
+        measure_model(which, arguments, &builds, &mut report, &mut ratios)?;
     }
-    drop(progress);
     let verdict = ratios.judge(arguments.worse, &mut report.notes);
     report.finish(&arguments.run)?;
     Ok(verdict)
@@ -118,19 +111,18 @@ fn measure_model(
     builds: &[Build; 2],
     report: &mut Report,
     ratios: &mut SetRatios,
-    progress: &Progress,
 ) -> Result<()> {
-    progress.show(format!("{which}: compiling"));
+    progress::show(format!("{which}: compiling"));
     let compiled = CompiledModel::load(which)?;
     let model = &compiled.model;
-    progress.show(format!("{}: making rays", model.name));
+    progress::show(format!("{}: making rays", model.name));
     let size = if arguments.run.quick { rays::QUICK_PICTURE_SIZE } else { rays::PICTURE_SIZE };
     let options = rays::Options { size, most: arguments.rays, view: arguments.seen_from.view() };
     let (_, mut sets) = rays::sets(&Finder::new(model, &compiled.scene), &options);
     sets.retain(|set| arguments.sets.select(set.name) && set.rays.len() >= rays::FEWEST_TIMED);
     let opened = [builds[0].open(&compiled.files[0])?, builds[1].open(&compiled.files[1])?];
     for set in &sets {
-        progress.show(format!("{}: {}", model.name, set.name));
+        progress::show(format!("{}: {}", model.name, set.name));
         let (seconds, same) = time(set, &opened, arguments.batch, report.rounds);
         let of = |engine| Subject { engine, ours: true, model: &model.name, threads: 1 };
         for (engine, seconds) in ["old", "new"].into_iter().zip(&seconds) {

@@ -5,7 +5,7 @@ use bth_random::Rng;
 
 /// A comparison of the new build with the old one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
+pub(crate) enum Verdict {
     /// Faster by more than the threshold, with 95 % confidence.
     Faster,
     /// Within the threshold either way, with 95 % confidence.

@@ -2,15 +2,15 @@
 //!
 //! Every start runs in a separate process ([`probe`]), so that nothing is left over from the one before.
 
-pub mod probe;
+pub(crate) mod probe;
 mod starts;
 
-pub use probe::{Probe, Start};
+pub(crate) use probe::{Probe, Start};
 
 use crate::args::{RunOptions, SeenFrom, at_least_one};
 use crate::isa;
 use crate::model::{Model, position};
-use crate::progress::Progress;
+use crate::progress;
 use crate::rays::{self, Camera, Finder};
 use crate::report::{Head, Report, Subject};
 use crate::rivals::embree;
@@ -29,28 +29,26 @@ use zerocopy::IntoBytes;
 
 /// `load`.
 #[derive(Debug, Args)]
-pub struct Load {
+pub(crate) struct Load {
     /// Models and scenes: files, NAME or NAME:FACES of `bth-scenes list`, or `objects:N` for N generated objects.
     #[arg(required = true, value_name = "MODEL")]
-    pub models: Vec<String>,
+    pub(crate) models: Vec<String>,
     #[command(flatten)]
-    #[allow(missing_docs)]
-    pub seen_from: SeenFrom,
+    pub(crate) seen_from: SeenFrom,
     /// First rays to trace.
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = at_least_one)]
-    pub rays: usize,
+    pub(crate) rays: usize,
     /// Rounds of which the median counts; one more comes before.
     #[arg(long, value_name = "N", default_value_t = 7, value_parser = at_least_one)]
-    pub rounds: usize,
+    pub(crate) rounds: usize,
     /// Numbers of threads to build and trace on.
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "1,2", value_parser = at_least_one)]
-    pub threads: Vec<usize>,
+    pub(crate) threads: Vec<usize>,
     /// Folder for the compiled files: a cold start reads from its storage.
     #[arg(long, value_name = "DIR")]
-    pub scratch: Option<PathBuf>,
+    pub(crate) scratch: Option<PathBuf>,
     #[command(flatten)]
-    #[allow(missing_docs)]
-    pub run: RunOptions,
+    pub(crate) run: RunOptions,
 }
 
 const ABOUT: &str = "\
@@ -65,17 +63,13 @@ read from storage. `times embree`: relative to Embree's start; below 1 is faster
 const SIZE: (u32, u32) = (512, 288);
 
 /// Measures all models and scenes.
-///
-/// # Errors
-/// If an option, model or scene cannot be used, or a start fails.
-pub fn measure(arguments: &Load) -> Result<Report> {
+pub(crate) fn measure(arguments: &Load) -> Result<Report> {
     let isa = isa::select(arguments.run.isa.as_deref())?;
     let rounds = arguments.run.rounds(arguments.rounds);
     let options = json!({"rays": arguments.rays, "rounds": rounds});
     let mut report = Report::new(Head::now("load", isa, options), rounds, ABOUT);
-    let progress = Progress::new();
     for which in &arguments.models {
-        measure_one(which, arguments, &mut report, &progress)?;
+        measure_one(which, arguments, &mut report)?;
     }
     report.add_ratios(embree::NAME, "ms");
     Ok(report)
@@ -126,7 +120,7 @@ impl Input {
     }
 }
 
-fn measure_one(which: &str, arguments: &Load, report: &mut Report, progress: &Progress) -> Result<()> {
+fn measure_one(which: &str, arguments: &Load, report: &mut Report) -> Result<()> {
     let input = Input::load(which)?;
     let name = input.name();
     let scratch = match &arguments.scratch {
@@ -135,7 +129,7 @@ fn measure_one(which: &str, arguments: &Load, report: &mut Report, progress: &Pr
     };
     let (mut cases, mut opened) = (Vec::new(), None);
     for kind in [structures::BTH, structures::BVH] {
-        progress.show(format!("{name}: compiling {}", kind.name));
+        progress::show(format!("{name}: compiling {}", kind.name));
         let compiled = input.compile(&kind)?;
         let file = scratch.path().join(format!("{}.bth", kind.name));
         write(&file, &compiled.bytes)?;
@@ -159,7 +153,7 @@ fn measure_one(which: &str, arguments: &Load, report: &mut Report, progress: &Pr
         })),
         Err(error) => report.leave_out(name, embree::NAME, &error),
     }
-    progress.show(format!("{name}: making rays"));
+    progress::show(format!("{name}: making rays"));
     let picture = input.picture(&scene, &arguments.seen_from);
     let mut rays = first_of(&scene, &picture, arguments.rays)
         .with_context(|| format!("{name}: the camera sees nothing"))?;
@@ -169,7 +163,7 @@ fn measure_one(which: &str, arguments: &Load, report: &mut Report, progress: &Pr
     write(&file, rays.as_bytes())?;
     let rounds = StartRounds { name, cases: &cases, rounds: report.rounds, first, rays: &file };
     for &threads in &arguments.threads {
-        rounds.run(threads, report, progress)?;
+        rounds.run(threads, report)?;
     }
     Ok(())
 }

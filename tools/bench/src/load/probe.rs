@@ -18,28 +18,28 @@ use zerocopy::FromBytes;
 
 /// `probe`.
 #[derive(Debug, Args)]
-pub struct Probe {
+pub(crate) struct Probe {
     /// How to start.
     #[arg(long, value_enum)]
-    pub start: Start,
+    pub(crate) start: Start,
     /// Number of threads to build and trace on.
     #[arg(long)]
-    pub threads: usize,
+    pub(crate) threads: usize,
     /// Vector instructions of our kernels.
     #[arg(long)]
-    pub isa: Option<String>,
+    pub(crate) isa: Option<String>,
     /// How many of the rays are the first.
     #[arg(long)]
-    pub first: usize,
+    pub(crate) first: usize,
     /// Compiled file; Embree builds from its triangles.
-    pub file: PathBuf,
+    pub(crate) file: PathBuf,
     /// The rays, the first of which hits.
-    pub rays: PathBuf,
+    pub(crate) rays: PathBuf,
 }
 
 /// How a program gets a structure that it can trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Start {
+pub(crate) enum Start {
     /// `bth::map`.
     Map,
     /// `bth::open`: reads and checks.
@@ -52,7 +52,7 @@ pub enum Start {
 
 impl Start {
     /// The name on the command line and in tables.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Start::Map => "map",
             Start::Read => "read",
@@ -64,28 +64,25 @@ impl Start {
 
 /// The times of a start: wall-clock seconds since just before the file was opened or the build began.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct StartTimes {
+pub(crate) struct StartTimes {
     /// Until rays could be traced.
-    pub ready_s: f64,
+    pub(crate) ready_s: f64,
     /// Until the first hit.
-    pub first_hit_s: f64,
+    pub(crate) first_hit_s: f64,
     /// Until the first rays were traced.
-    pub total_s: f64,
+    pub(crate) total_s: f64,
     /// CPU seconds of all threads until then.
-    pub cpu_s: f64,
+    pub(crate) cpu_s: f64,
     /// Bytes that were read from storage until then, if the system counts them.
-    pub storage_bytes: Option<u64>,
+    pub(crate) storage_bytes: Option<u64>,
     /// Rays that hit.
-    pub hits: usize,
+    pub(crate) hits: usize,
     /// Seconds for all rays of the file: the faster of two rounds.
-    pub picture_s: f64,
+    pub(crate) picture_s: f64,
 }
 
 /// Starts once and prints the times as JSON.
-///
-/// # Errors
-/// If the file or library cannot be used.
-pub fn run(arguments: &Probe) -> Result<()> {
+pub(crate) fn run(arguments: &Probe) -> Result<()> {
     isa::select(arguments.isa.as_deref())?;
     let bytes = std::fs::read(&arguments.rays)?;
     let rays = bytes.chunks(size_of::<Ray>()).map(|b| Ray::read_from_bytes(b).ok());

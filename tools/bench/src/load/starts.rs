@@ -1,7 +1,7 @@
 //! Runs every way to start, each time in a new process, in interleaved rounds.
 
 use super::probe::{Start, StartTimes};
-use crate::progress::Progress;
+use crate::progress;
 use crate::report::{Report, Subject};
 use crate::rounds::median;
 use anyhow::{Context, Result, ensure};
@@ -79,14 +79,11 @@ pub(super) struct StartRounds<'a> {
 
 impl StartRounds<'_> {
     /// Measures all cases on `threads` threads.
-    ///
-    /// # Errors
-    /// If a start fails, or the starts disagree by more than 1 % on the number of rays that hit.
-    pub(super) fn run(&self, threads: usize, report: &mut Report, progress: &Progress) -> Result<()> {
+    pub(super) fn run(&self, threads: usize, report: &mut Report) -> Result<()> {
         let mut taken = vec![Vec::new(); self.cases.len()];
         for round in 0..=self.rounds {
             for (case, taken) in self.cases.iter().zip(&mut taken) {
-                progress.show(format!("{}: {}, {threads} thread(s), round {round}", self.name, case.name));
+                progress::show(format!("{}: {}, {threads} thread(s), round {round}", self.name, case.name));
                 case.cache.prepare(&case.file)?;
                 let probed =
                     self.start(case, threads, &report.head.isa).with_context(|| case.name.clone())?;

@@ -15,7 +15,7 @@ mod views;
 use crate::args::{RunOptions, at_least_one};
 use crate::isa;
 use crate::model::Model;
-use crate::progress::Progress;
+use crate::progress;
 use crate::report::{Head, Report, Subject};
 use crate::structures::{self, Use};
 use crate::tracer::Tracer;
@@ -33,16 +33,15 @@ use views::Views;
 
 /// `paper`.
 #[derive(Debug, Args)]
-pub struct Paper {
+pub(crate) struct Paper {
     /// Model files, or models of `bth-scenes list` by NAME or NAME:FACES.
     #[arg(required = true, value_name = "MODEL")]
-    pub models: Vec<String>,
+    pub(crate) models: Vec<String>,
     /// Rounds of which the fastest counts; one more comes before.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = at_least_one)]
-    pub rounds: usize,
+    pub(crate) rounds: usize,
     #[command(flatten)]
-    #[allow(missing_docs)]
-    pub run: RunOptions,
+    pub(crate) run: RunOptions,
 }
 
 const ABOUT: &str = "\
@@ -75,13 +74,9 @@ struct BuiltStructure {
 }
 
 /// Measures all models.
-///
-/// # Errors
-/// If an option or model cannot be used.
-pub fn measure(arguments: &Paper) -> Result<Report> {
+pub(crate) fn measure(arguments: &Paper) -> Result<Report> {
     let isa = isa::select(arguments.run.isa.as_deref())?;
-    let progress = Progress::new();
-    progress.show("calibrating the scalar traversals");
+    progress::show("calibrating the scalar traversals");
     let profile = calibrate::profile()?;
     let rounds = arguments.run.rounds(arguments.rounds);
     let size = if arguments.run.quick { QUICK_SIZE } else { SIZE };
@@ -95,30 +90,24 @@ pub fn measure(arguments: &Paper) -> Result<Report> {
         ));
     }
     for name in &arguments.models {
-        measure_model(&Model::load(name)?, &profile, size, &mut report, &progress)?;
+        measure_model(&Model::load(name)?, &profile, size, &mut report)?;
     }
     Ok(report)
 }
 
-fn measure_model(
-    model: &Model,
-    profile: &Profile,
-    size: (u32, u32),
-    report: &mut Report,
-    progress: &Progress,
-) -> Result<()> {
+fn measure_model(model: &Model, profile: &Profile, size: (u32, u32), report: &mut Report) -> Result<()> {
     let name = &model.name;
     let views = Views::of(model, size)?;
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let mut built: Vec<BuiltStructure> = Vec::new();
-    progress.show(format!("{name}: BTH32, Tet32"));
+    progress::show(format!("{name}: BTH32, Tet32"));
     one.install(|| scalar::<Tet32>(model, profile, &views, RecordKind::Tet32, &mut built, report))?;
-    progress.show(format!("{name}: BTH20, Tet20"));
+    progress::show(format!("{name}: BTH20, Tet20"));
     one.install(|| scalar::<Tet20>(model, profile, &views, RecordKind::Tet20, &mut built, report))?;
-    progress.show(format!("{name}: our files"));
+    progress::show(format!("{name}: our files"));
     one.install(|| own(model, &mut built))?;
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
-    progress.show(format!("{name}: rendering"));
+    progress::show(format!("{name}: rendering"));
     let tracers: Vec<&dyn Tracer> = built.iter().map(|b| &*b.tracer).collect();
     let rendered = [0, 1].map(|view| views.render(&tracers, view, report.rounds, threads));
     for (row, structure) in built.iter().enumerate() {

@@ -23,9 +23,6 @@ pub(super) struct Views {
 
 impl Views {
     /// Of a model, in pictures of this size.
-    ///
-    /// # Errors
-    /// If the model cannot be compiled.
     pub(super) fn of(model: &Model, size: (u32, u32)) -> Result<Views> {
         let plain = structures::compile(model, &structures::BVH)?;
         let scene = bth::from_bytes(&plain.bytes)?;

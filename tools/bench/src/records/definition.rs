@@ -11,45 +11,45 @@ use std::path::Path;
 /// A definition.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Definition {
+pub(crate) struct Definition {
     /// Name of the benchmark, as in rows.
-    pub benchmark: String,
+    pub(crate) benchmark: String,
     /// What the benchmark measures.
-    pub about: String,
+    pub(crate) about: String,
     /// The command of this program that measures, and its options. Without it, rows come from the tool that `about` names.
     #[serde(default)]
-    pub command: Vec<String>,
+    pub(crate) command: Vec<String>,
     /// Models or scenes of the command: files within the folder of models, or names of `bth-scenes list`.
     #[serde(default)]
-    pub models: Vec<String>,
+    pub(crate) models: Vec<String>,
     /// The figures that the summary shows, some with a bar.
     #[serde(default)]
-    pub figures: Vec<Figures>,
+    pub(crate) figures: Vec<Figures>,
 }
 
 /// Selects figures; a name that is not given stands for any.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Figures {
+pub(crate) struct Figures {
     /// Names of tracers.
-    pub engines: Option<Vec<String>>,
+    pub(crate) engines: Option<Vec<String>>,
     /// Names of ray sets or other figures.
-    pub sets: Option<Vec<String>>,
+    pub(crate) sets: Option<Vec<String>>,
     /// Name of the model, or `mean`.
-    pub model: Option<String>,
+    pub(crate) model: Option<String>,
     /// Instruction set of our kernels.
-    pub isa: Option<String>,
+    pub(crate) isa: Option<String>,
     /// Unit.
-    pub unit: Option<String>,
+    pub(crate) unit: Option<String>,
     /// The bar: the value must be at least this.
-    pub at_least: Option<f64>,
+    pub(crate) at_least: Option<f64>,
     /// The bar: the value must be at most this.
-    pub at_most: Option<f64>,
+    pub(crate) at_most: Option<f64>,
 }
 
 impl Figures {
     /// Returns true if a row is one of these figures.
-    pub fn select(&self, row: &Row) -> bool {
+    pub(crate) fn select(&self, row: &Row) -> bool {
         let is = |wanted: &Option<String>, name: &String| wanted.as_ref().is_none_or(|w| w == name);
         let is_any = |wanted: &Option<Vec<String>>, name| wanted.as_ref().is_none_or(|w| w.contains(name));
         is_any(&self.engines, &row.engine)
@@ -60,7 +60,7 @@ impl Figures {
     }
 
     /// The bar, and true if a value meets it; `None` if there is no bar.
-    pub fn judge(&self, value: f64) -> Option<(String, bool)> {
+    pub(crate) fn judge(&self, value: f64) -> Option<(String, bool)> {
         match (self.at_least, self.at_most) {
             (Some(bar), _) => Some((format!("≥ {bar}"), value >= bar)),
             (_, Some(bar)) => Some((format!("≤ {bar}"), value <= bar)),
@@ -71,19 +71,13 @@ impl Figures {
 
 impl Definition {
     /// Reads a definition.
-    ///
-    /// # Errors
-    /// If the file cannot be read or is not a definition; the error names line and key.
-    pub fn read(path: &Path) -> Result<Definition> {
+    pub(crate) fn read(path: &Path) -> Result<Definition> {
         let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
         toml::from_str(&text).with_context(|| path.display().to_string())
     }
 
     /// All definitions of a folder, by name.
-    ///
-    /// # Errors
-    /// As [`Self::read`].
-    pub fn read_all(folder: &Path) -> Result<Vec<Definition>> {
+    pub(crate) fn read_all(folder: &Path) -> Result<Vec<Definition>> {
         let mut files = Vec::new();
         for entry in std::fs::read_dir(folder).with_context(|| folder.display().to_string())? {
             files.push(entry?.path());
@@ -94,10 +88,7 @@ impl Definition {
     }
 
     /// Measures the rows of the definition now; none if its models are folders of recorded rays that do not exist.
-    ///
-    /// # Errors
-    /// If it names no command, or the command cannot be run.
-    pub fn measure(&self, models: &Path, quick: bool) -> Result<Vec<Row>> {
+    pub(crate) fn measure(&self, models: &Path, quick: bool) -> Result<Vec<Row>> {
         ensure!(!self.command.is_empty(), "{}: not measured by this program: {}", self.benchmark, self.about);
         let found = self.models.iter().filter_map(|name| {
             let file = models.join(name);

@@ -7,9 +7,9 @@ mod definition;
 mod row;
 mod summary;
 
-pub use definition::{Definition, Figures};
-pub use row::{HEAD, Row, cpu_folder};
-pub use summary::summarize;
+use definition::Definition;
+pub(crate) use row::{HEAD, Row, cpu_folder};
+pub(crate) use summary::summarize;
 
 use crate::machine::{self, Machine};
 use crate::output::{self, note};
@@ -21,36 +21,33 @@ use std::path::{Path, PathBuf};
 
 /// `record`.
 #[derive(Debug, Args)]
-pub struct RecordRows {
+pub(crate) struct RecordRows {
     /// Name of a file of benchmarks/definitions, without `.toml`.
-    pub definition: String,
+    pub(crate) definition: String,
     /// Folder that holds `definitions/` and `record/`.
     #[arg(long, value_name = "DIR", default_value = "benchmarks")]
-    pub folder: PathBuf,
+    pub(crate) folder: PathBuf,
     /// Folder of the models that definitions name by file.
     #[arg(long, value_name = "DIR", default_value = ".")]
-    pub models: PathBuf,
+    pub(crate) models: PathBuf,
     /// Small pictures and one round; prints the rows and appends nothing.
     #[arg(long)]
-    pub quick: bool,
+    pub(crate) quick: bool,
 }
 
 /// `summary`.
 #[derive(Debug, Args)]
-pub struct Summary {
+pub(crate) struct Summary {
     /// Folder that holds `definitions/` and `record/`; SUMMARY.md is written there.
     #[arg(long, value_name = "DIR", default_value = "benchmarks")]
-    pub folder: PathBuf,
+    pub(crate) folder: PathBuf,
     /// Only checks that SUMMARY.md is up to date.
     #[arg(long)]
-    pub check: bool,
+    pub(crate) check: bool,
 }
 
 /// Measures what a definition names, and appends the rows to the file of this processor and day.
-///
-/// # Errors
-/// If the definition, a model or the file cannot be used.
-pub fn record(arguments: &RecordRows) -> Result<()> {
+pub(crate) fn record(arguments: &RecordRows) -> Result<()> {
     let path = arguments.folder.join("definitions").join(format!("{}.toml", arguments.definition));
     let definition = Definition::read(&path)?;
     let folder = arguments.folder.join("record").join(cpu_folder(&Machine::this().cpu));
@@ -99,10 +96,7 @@ fn append(file: &Path, rows: &str) -> std::io::Result<()> {
 }
 
 /// Writes SUMMARY.md from all records.
-///
-/// # Errors
-/// If a record or definition cannot be read or the file cannot be written; with `--check`, if it is not up to date.
-pub fn run_summary(arguments: &Summary) -> Result<()> {
+pub(crate) fn run_summary(arguments: &Summary) -> Result<()> {
     let text = summarize(&arguments.folder)?;
     let file = arguments.folder.join("SUMMARY.md");
     if arguments.check {

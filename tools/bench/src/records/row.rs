@@ -4,35 +4,35 @@ use anyhow::{Context, Result, bail};
 use serde::Serialize;
 
 /// The columns.
-pub const HEAD: &str = "commit,benchmark,engine,model,set,threads,isa,value,unit,low,high,rounds";
+pub(crate) const HEAD: &str = "commit,benchmark,engine,model,set,threads,isa,value,unit,low,high,rounds";
 
 /// One figure.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub(crate) struct Row {
     /// The commit that was measured, 12 digits; `?` if it is not known.
-    pub commit: String,
+    pub(crate) commit: String,
     /// Name of the benchmark's definition.
-    pub benchmark: String,
+    pub(crate) benchmark: String,
     /// What was measured, such as `bth` or `embree`.
-    pub engine: String,
+    pub(crate) engine: String,
     /// Name of the model, or `mean` of all of the definition.
-    pub model: String,
+    pub(crate) model: String,
     /// Name of the ray set, or of another figure.
-    pub set: String,
+    pub(crate) set: String,
     /// Threads that traced.
-    pub threads: usize,
+    pub(crate) threads: usize,
     /// Instruction set of our kernels, or `-`.
-    pub isa: String,
+    pub(crate) isa: String,
     /// The figure.
-    pub value: f64,
+    pub(crate) value: f64,
     /// Its unit, such as `ns/ray`, `Mrays/s`, `times embree`.
-    pub unit: String,
+    pub(crate) unit: String,
     /// Smallest value or lower quartile, if known.
-    pub low: Option<f64>,
+    pub(crate) low: Option<f64>,
     /// Largest value or upper quartile, if known.
-    pub high: Option<f64>,
+    pub(crate) high: Option<f64>,
     /// Rounds of which the figure is the median; 0 if that is not known.
-    pub rounds: usize,
+    pub(crate) rounds: usize,
 }
 
 /// Five significant digits, without an exponent.
@@ -47,7 +47,7 @@ fn number(x: f64) -> String {
 
 impl Row {
     /// A line of the file. Commas within names become spaces.
-    pub fn line(&self) -> String {
+    pub(crate) fn line(&self) -> String {
         let name = |text: &str| text.replace([',', '\n', '"'], " ");
         let optional = |x: Option<f64>| x.map(number).unwrap_or_default();
         [
@@ -68,10 +68,7 @@ impl Row {
     }
 
     /// Reads a line.
-    ///
-    /// # Errors
-    /// If it does not have the columns of [`HEAD`], or a number cannot be read or is not finite.
-    pub fn parse(line: &str) -> Result<Row> {
+    pub(crate) fn parse(line: &str) -> Result<Row> {
         let cells: Vec<&str> = line.split(',').collect();
         let [commit, benchmark, engine, model, set, threads, isa, value, unit, low, high, rounds] = cells[..]
         else {
@@ -100,7 +97,7 @@ impl Row {
 }
 
 /// The folder of a processor's records, made of its name: `intel-xeon-family-6-model-167`.
-pub fn cpu_folder(cpu: &str) -> String {
+pub(crate) fn cpu_folder(cpu: &str) -> String {
     let mut out = String::new();
     let plain = cpu.replace("(R)", "").replace("(TM)", "").replace("Processor", "");
     for c in plain.to_lowercase().chars() {

@@ -22,10 +22,7 @@ const INTRODUCTION: &str = "# Benchmarks: summary\n\n\
 type Dated = (String, Row);
 
 /// Reads all records of a folder and makes the page. Rows of benchmarks without a definition are history, and skipped.
-///
-/// # Errors
-/// If a record or definition cannot be read.
-pub fn summarize(folder: &Path) -> Result<String> {
+pub(crate) fn summarize(folder: &Path) -> Result<String> {
     let definitions = Definition::read_all(&folder.join("definitions"))?;
     let records = folder.join("record");
     let mut text = String::from(INTRODUCTION);

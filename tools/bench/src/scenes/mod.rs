@@ -14,7 +14,7 @@ use crate::args::{RunOptions, at_least_one};
 use crate::clock::Clock;
 use crate::isa;
 use crate::names::Names;
-use crate::progress::Progress;
+use crate::progress;
 use crate::report::{Head, Report, Subject};
 use crate::rivals::embree;
 use crate::rounds::median;
@@ -27,28 +27,27 @@ use serde_json::json;
 
 /// `scenes`.
 #[derive(Debug, Args)]
-pub struct Scenes {
+pub(crate) struct Scenes {
     /// Scenes of `bth-scenes list`, manifests, glTF files, or `instances:N` for N instances that move.
     #[arg(required = true, value_name = "SCENE")]
-    pub scenes: Vec<String>,
+    pub(crate) scenes: Vec<String>,
     /// Frames to measure, evenly over the range.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = at_least_one)]
-    pub frames: usize,
+    pub(crate) frames: usize,
     /// Rounds of which the median counts; one more comes before.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = at_least_one)]
-    pub rounds: usize,
+    pub(crate) rounds: usize,
     /// Numbers of threads for updates; rays are traced on one.
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "1", value_parser = at_least_one)]
-    pub threads: Vec<usize>,
+    pub(crate) threads: Vec<usize>,
     /// Width of the pictures, which are 16:9.
     #[arg(long, value_name = "PIXELS", default_value_t = 640, value_parser = clap::value_parser!(u32).range(64..=8192))]
-    pub width: u32,
+    pub(crate) width: u32,
     /// Only these tracers; a star at the end stands for any ending.
     #[arg(long = "tracer", value_name = "NAME,…", default_value = "", hide_default_value = true)]
-    pub tracers: Names,
+    pub(crate) tracers: Names,
     #[command(flatten)]
-    #[allow(missing_docs)]
-    pub run: RunOptions,
+    pub(crate) run: RunOptions,
 }
 
 const ABOUT: &str = "\
@@ -66,10 +65,7 @@ const SETS: [&str; 3] = ["camera", "diffuse", "later"];
 const TIME: &str = "ms/frame";
 
 /// Measures all scenes.
-///
-/// # Errors
-/// If an option or scene cannot be used.
-pub fn measure(arguments: &Scenes) -> Result<Report> {
+pub(crate) fn measure(arguments: &Scenes) -> Result<Report> {
     if let Some(name) = arguments.tracers.unknown(&NAMES).first() {
         bail!("--tracer {name}: there are {}", NAMES.join(", "));
     }
@@ -82,12 +78,11 @@ pub fn measure(arguments: &Scenes) -> Result<Report> {
         "quick": arguments.run.quick,
     });
     let mut report = Report::new(Head::now("scenes", isa, options), rounds, ABOUT);
-    let progress = Progress::new();
     for name in &arguments.scenes {
         let source = Source::load(name)?;
         for &threads in &arguments.threads {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
-            pool.install(|| measure_scene(&source, arguments, size, threads, &mut report, &progress))?;
+            pool.install(|| measure_scene(&source, arguments, size, threads, &mut report))?;
         }
     }
     report.add_ratios(embree::NAME, TIME);
@@ -109,16 +104,15 @@ fn measure_scene(
     size: (u32, u32),
     threads: usize,
     report: &mut Report,
-    progress: &Progress,
 ) -> Result<()> {
-    progress.show(format!("{}: compiling", source.name));
+    progress::show(format!("{}: compiling", source.name));
     let mut shown = contenders::plain(source)?;
     let frames = source.frames(arguments.frames);
     shown.set_frame(frames[0])?;
     let names = contenders::names(&shown).iter().filter(|name| arguments.tracers.select(name));
     let mut built = Vec::new();
     for name in names {
-        progress.show(format!("{}: {name}", source.name));
+        progress::show(format!("{}: {name}", source.name));
         match contenders::build(source, name, &shown, threads) {
             Ok(contender) => built.push(contender),
             Err(why) => report.leave_out(&source.name, name, &why),
@@ -133,7 +127,7 @@ fn measure_scene(
     ));
     let mut sums = vec![Sums::default(); built.len()];
     for (i, &number) in frames.iter().enumerate() {
-        progress.show(format!("{}: frame {} of {}", source.name, i + 1, frames.len()));
+        progress::show(format!("{}: frame {} of {}", source.name, i + 1, frames.len()));
         shown.set_frame(number)?;
         let frame = Frame::of(&shown, number);
         let sets = if threads == 1 { FrameRays::of(&shown, size)?.sets } else { Vec::new() };

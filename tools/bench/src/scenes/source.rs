@@ -24,9 +24,6 @@ pub(crate) struct Source {
 
 impl Source {
     /// Makes a scene of `bth-scenes list`, `objects:N` or `instances:N`, or reads a manifest or glTF file.
-    ///
-    /// # Errors
-    /// If there is no such scene or file, or the files of a generated one cannot be written.
     pub(crate) fn load(name: &str) -> Result<Source> {
         let count = |text: &str| text.parse().with_context(|| format!("{name}: expected a number"));
         if let Some(text) = name.strip_prefix("objects:") {
@@ -99,9 +96,6 @@ impl Source {
     }
 
     /// Compiles the scene.
-    ///
-    /// # Errors
-    /// As the compiler.
     pub(crate) fn compile(&self, options: &CompileOptions) -> Result<Compiled> {
         let (start, name) = (Instant::now(), Path::new(&self.name));
         let (compiled, _) =

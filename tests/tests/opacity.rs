@@ -188,7 +188,7 @@ fn rays_pass_through_the_holes_of_leaves_in_every_structure_and_on_every_instruc
     let opaque = flat(AlphaMode::None, bvh.clone());
     let mut all = vec![("bvh", bvh)];
     if bth_tests::worker().is_some() {
-        all.push(("tets", options(Structure::Bth, RecordKind::Tet20, false)));
+        all.push(("tets", options(Structure::Bth, RecordKind::Tet16, false)));
     }
     let rays = rays(1500);
     for (name, options) in all {

@@ -31,7 +31,7 @@ KINDS = {
     LINES: ("LINES", (64,), 1 << 29),
     TRIANGLE_IDS: ("TRIANGLE_IDS", (4,), 1 << 30),
     TET_LEAVES: ("TET_LEAVES", (64,), 1 << 29),
-    TETS: ("TETS", (32, 20, 16), 1 << 30),
+    TETS: ("TETS", (32, 16), 1 << 30),
     TET_VERTICES: ("TET_VERTICES", (16,), (1 << 31) - 1),
     TET_FACES: ("TET_FACES", (32,), (1 << 31) - 1),
     HULL_FACES: ("HULL_FACES", (20,), (1 << 31) - 1),
@@ -162,6 +162,8 @@ class Container:
             need(e.stride * e.count == e.length, "F013", f"{e.count} x {e.stride} is not {e.length}", at, name)
             if e.kind in KINDS:
                 _, strides, most = KINDS[e.kind]
+                old = e.kind == TETS and e.stride == 20
+                need(not old, "F007", "tetrahedra of 20 bytes", at, name)
                 need(e.stride in strides, "F014", f"stride {e.stride}", at, name)
                 need(most is None or e.count <= most, "F022", f"{e.count} elements", at, name)
             else:

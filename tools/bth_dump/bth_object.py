@@ -7,7 +7,9 @@ from collections import namedtuple
 import bth_container as c
 from bth_container import Invalid, kind_name
 
-RECORDS = {1: ("Link32", 32), 2: ("Tet32", 32), 3: ("Tet20", 20), 4: ("Tet16", 16)}
+RECORDS = {1: ("Link32", 32), 4: ("Tet16", 16)}
+# Records of older files, of 32 and 20 bytes.
+OLD_RECORDS = (2, 3)
 
 TetLeaf = namedtuple(
     "TetLeaf", "lower upper first_tet tets first_vertex vertices first_face faces first_hull hulls subtree flags"
@@ -85,7 +87,8 @@ class ObjectView:
         else:
             good = expected is not None and stride == expected
         if not good:
-            raise self.invalid("F101", f"record {self.record_code} with a TETS stride of {stride}", c.OBJECT, 28)
+            number = "F007" if self.record_code in OLD_RECORDS else "F101"
+            raise self.invalid(number, f"record {self.record_code} with a TETS stride of {stride}", c.OBJECT, 28)
         self.stride = stride
         self.tets = [] if not self.record else self.rows(c.TETS, f"<{stride // 4}I")
 

@@ -28,8 +28,6 @@ def derive(view, leaf):
         record = view.tets[tet]
         if view.record == "Link32":
             return record[0::2]
-        if view.record in ("Tet32", "Tet20"):
-            return record[-4:]
         slot = four.index(fourth)
         last = entry if slot == 3 else record[1 + slot] ^ entry
         return (*(n ^ last for n in record[1:]), last)
@@ -59,7 +57,7 @@ def derive(view, leaf):
             if view.record == "Link32":
                 fourth = view.tets[tet][2 * slot + 1]
             else:
-                fourth = view.tets[other][3 if view.record == "Tet32" else 0] ^ face[0] ^ face[1] ^ face[2]
+                fourth = view.tets[other][0] ^ face[0] ^ face[1] ^ face[2]
         if fourth not in vertices or fourth in face:
             raise bad("F128", f"vertex {fourth} beyond tetrahedron {tet}", tet)
         return other, fourth, back, tuple(sorted((*face, fourth)))
@@ -99,13 +97,7 @@ def derive(view, leaf):
             if view.record == "Link32" and view.tets[tet][2 * slot + 1] != (NONE if step is None else step[1]):
                 raise bad("F129", f"opposite vertex of slot {slot}", tet)
         record, xor = view.tets[tet], four[0] ^ four[1] ^ four[2] ^ four[3]
-        right = {
-            "Link32": lambda: True,
-            "Tet32": lambda: record[:4] == (*four[:3], xor),
-            "Tet20": lambda: record[0] == xor,
-            "Tet16": lambda: record[0] == xor,
-        }
-        if not right[view.record]():
+        if view.record == "Tet16" and record[0] != xor:
             raise bad("F129", f"record {record} of {four}", tet)
     return found
 

@@ -36,7 +36,7 @@ codes! {
     HeaderHash "F004" "The header hash is that of the first 112 bytes."
     Length "F005" "The file length in the header is that of the file."
     Reserved "F006" "Reserved fields of the header and the section table are zero."
-    Features "F007" "The reader knows every required feature bit."
+    Features "F007" "The reader knows every required feature bit and record of tetrahedra."
     Table "F008" "The section table starts at 128, has at most 2^20 entries and lies within the file."
     TableHash "F009" "The table hash is that of the section table."
     Order "F010" "Section entries ascend strictly by (object, kind)."

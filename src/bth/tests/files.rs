@@ -10,7 +10,7 @@ macro_rules! files {
     };
 }
 
-const VALID: [(&str, &[u8]); 30] = files![
+const VALID: [(&str, &[u8]); 28] = files![
     "deformable",
     "deformers",
     "free-directions",
@@ -29,8 +29,6 @@ const VALID: [(&str, &[u8]); 30] = files![
     "sequence",
     "tets-link32",
     "tets-tet16",
-    "tets-tet20",
-    "tets-tet32",
     "triangle",
     "triangle-bare",
     "two-levels",

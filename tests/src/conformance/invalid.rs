@@ -120,6 +120,13 @@ fn container() -> Vec<Case> {
         broken("F007-tets-that-deform", "triangle", Seal::Header, |e| {
             e.put(offset_of!(Header, required_features), &8u64.to_le_bytes());
         }),
+        broken("F007-tets-of-20-bytes", "tets-tet16", Seal::Table, |e| {
+            // Ten rows of 16 bytes become eight of 20.
+            let entry = e.entry_at(0, kind::TETS);
+            e.put(entry + offset_of!(SectionEntry, stride), &20u32.to_le_bytes());
+            e.put(entry + offset_of!(SectionEntry, count), &8u64.to_le_bytes());
+        }),
+        field("F007-tets-with-three-vertices", "tets-link32", kind::OBJECT, offset_of!(Object, record), 2),
         broken("F007-unknown-feature", "triangle", Seal::Header, |e| {
             e.put(offset_of!(Header, required_features), &4u32.to_le_bytes());
         }),
@@ -235,7 +242,7 @@ fn tree() -> Vec<Case> {
     let grid = |name, kind, at, value| field(name, "grid-21", kind, at, value);
     vec![
         object("F101-record-without-tets", offset_of!(Object, record), 1),
-        field("F101-other-record", "tets-tet20", kind::OBJECT, offset_of!(Object, record), 4),
+        field("F101-other-record", "tets-link32", kind::OBJECT, offset_of!(Object, record), 4),
         object("F102-triangles", offset_of!(Object, triangles), 42),
         object("F102-dropped", offset_of!(Object, dropped), 42),
         object("F103-nan", offset_of!(Object, lower), nan),
@@ -440,9 +447,7 @@ fn tets() -> Vec<Case> {
         field("F128-other-neighbour", base, kind::TETS, 32 * middle, 3),
         field("F128-vertex-of-another-leaf", base, kind::TETS, 32 * middle + 4, 8),
         field("F128-tet16-xor", "tets-tet16", kind::TETS, 16 * 4, 8),
-        field("F128-tet20-xor", "tets-tet20", kind::TETS, 20 * 4, 8),
         field("F129-opposite-beyond-the-hull", base, kind::TETS, 12, 0),
-        field("F129-tet32-vertex", "tets-tet32", kind::TETS, 32 * 4, 0),
         broken("F130-nobody-leads-there", base, Seal::Sections, |e| {
             e.put_u32(kind::TETS, 32 * middle, NONE).put_u32(kind::TETS, 32 * middle + 4, NONE);
         }),

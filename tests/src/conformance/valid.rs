@@ -481,13 +481,10 @@ fn is_in_front(points: &[[f32; 3]], face: &[u32; 3], vertex: u32) -> bool {
 impl TetParts {
     /// Encodes a tetrahedron with its neighbours and the vertices opposite in them.
     fn push_record(&mut self, record: RecordKind, vertices: [u32; 4], next: [u32; 4], opposite: [u32; 4]) {
-        let [a, b, c, d] = vertices;
-        let xor = a ^ b ^ c ^ d;
+        let xor = vertices.iter().fold(0, |x, v| x ^ v);
         let link = std::array::from_fn(|i| Link { next: next[i], opposite: opposite[i] });
         match record {
             RecordKind::Link32 => self.records.extend(Link32 { link }.as_bytes()),
-            RecordKind::Tet32 => self.records.extend(Tet32 { vertex: [a, b, c], xor, next }.as_bytes()),
-            RecordKind::Tet20 => self.records.extend(Tet20 { xor, next }.as_bytes()),
             RecordKind::Tet16 => {
                 let next = [0, 1, 2].map(|i| next[i] ^ next[3]);
                 self.records.extend(Tet16 { xor, next }.as_bytes());

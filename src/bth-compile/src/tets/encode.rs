@@ -1,7 +1,7 @@
 //! The file's sections for tet leaves: rows numbered across all leaves, links in the chosen record.
 
 use bth_format::layout::{
-    FACE_BIT, HullFace, Link, Link32, NONE, RecordKind, Tet16, Tet20, Tet32, TetFace, TetLeaf, TetVertex,
+    FACE_BIT, HullFace, Link, Link32, NONE, RecordKind, Tet16, TetFace, TetLeaf, TetVertex,
 };
 use zerocopy::IntoBytes;
 
@@ -129,15 +129,11 @@ fn inwards(mesh: &TetMesh, tet: [u32; 4], k: usize) -> [u32; 3] {
 }
 
 fn push_record(to: &mut Vec<u8>, kind: RecordKind, vertex: [u32; 4], link: [Link; 4]) {
-    let [a, b, c, d] = vertex;
-    let xor = a ^ b ^ c ^ d;
-    let next = link.map(|l| l.next);
     match kind {
         RecordKind::Link32 => to.extend_from_slice(Link32 { link }.as_bytes()),
-        RecordKind::Tet32 => to.extend_from_slice(Tet32 { vertex: [a, b, c], xor, next }.as_bytes()),
-        RecordKind::Tet20 => to.extend_from_slice(Tet20 { xor, next }.as_bytes()),
         RecordKind::Tet16 => {
-            let next = [next[0] ^ next[3], next[1] ^ next[3], next[2] ^ next[3]];
+            let xor = vertex.iter().fold(0, |x, v| x ^ v);
+            let next = [0, 1, 2].map(|k| link[k].next ^ link[3].next);
             to.extend_from_slice(Tet16 { xor, next }.as_bytes());
         }
     }

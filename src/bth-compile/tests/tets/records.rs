@@ -2,7 +2,7 @@
 
 use bth_compile::Silent;
 use bth_compile::tets::{Behind, Encoded, Face, TetMesh, build, encode};
-use bth_format::layout::{FACE_BIT, Link32, NONE, RecordKind, Tet16, Tet20, Tet32};
+use bth_format::layout::{FACE_BIT, Link32, NONE, RecordKind, Tet16};
 use zerocopy::FromBytes;
 
 use crate::meshes::{bvh, nodes_of_at_most, torus};
@@ -67,17 +67,6 @@ fn assert_decodes(meshes: &[TetMesh], kind: RecordKind, encoded: &Encoded) {
             let xor = corner.iter().fold(0, |x, v| x ^ v);
             let next = match kind {
                 RecordKind::Link32 => Link32::read_from_bytes(bytes).unwrap().link.map(|l| l.next),
-                RecordKind::Tet32 => {
-                    let record = Tet32::read_from_bytes(bytes).unwrap();
-                    assert_eq!(record.vertex, corner[..3]);
-                    assert_eq!(record.xor ^ corner[0] ^ corner[1] ^ corner[2], corner[3]);
-                    record.next
-                }
-                RecordKind::Tet20 => {
-                    let record = Tet20::read_from_bytes(bytes).unwrap();
-                    assert_eq!(record.xor, xor);
-                    record.next
-                }
                 RecordKind::Tet16 => {
                     let record = Tet16::read_from_bytes(bytes).unwrap();
                     assert_eq!(record.xor, xor);

@@ -81,8 +81,6 @@ impl<'a> TetAdjacency<'a> {
         match self.view.records {
             Records::None => [NONE; 4],
             Records::Link32(r) => r[row].link.map(|l| l.next),
-            Records::Tet32(r) => r[row].next,
-            Records::Tet20(r) => r[row].next,
             Records::Tet16(r) => {
                 let last = self.last_link[(tet - self.tets.start) as usize];
                 let [a, b, c] = r[row].next.map(|n| n ^ last);
@@ -143,8 +141,6 @@ impl<'a> TetAdjacency<'a> {
         let opposite = match self.view.records {
             Records::None => NONE,
             Records::Link32(r) => r[tet as usize].link[slot].opposite,
-            Records::Tet32(r) => r[row].xor ^ a ^ b ^ c,
-            Records::Tet20(r) => r[row].xor ^ a ^ b ^ c,
             Records::Tet16(r) => r[row].xor ^ a ^ b ^ c,
         };
         Ok(Some(Neighbour { tet: link, opposite, back: tet }))

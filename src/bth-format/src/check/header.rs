@@ -23,8 +23,6 @@ fn record(view: &ObjectView) -> Result<()> {
     let fits = match view.records {
         Records::None => record == 0 && view.tet_leaves.is_empty(),
         Records::Link32(_) => record == RecordKind::Link32 as u32,
-        Records::Tet32(_) => record == RecordKind::Tet32 as u32,
-        Records::Tet20(_) => record == RecordKind::Tet20 as u32,
         Records::Tet16(_) => record == RecordKind::Tet16 as u32,
     };
     if !fits {

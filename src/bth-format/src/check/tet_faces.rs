@@ -101,8 +101,6 @@ fn check_record(tets: &TetAdjacency, tet: u32) -> Result<()> {
     let xor = vertices.iter().fold(0, |x, v| x ^ v);
     let right = match tets.view.records {
         Records::None | Records::Link32(_) => true,
-        Records::Tet32(r) => r[row].xor == xor && r[row].vertex[..] == vertices[..3],
-        Records::Tet20(r) => r[row].xor == xor,
         Records::Tet16(r) => r[row].xor == xor,
     };
     if right {

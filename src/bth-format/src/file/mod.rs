@@ -246,16 +246,17 @@ impl File {
         let records = match RecordKind::from_code(header.record) {
             Some(record) if entry.is_some() && record.stride() == stride => match record {
                 RecordKind::Link32 => Records::Link32(self.slice(object, kind::TETS)),
-                RecordKind::Tet32 => Records::Tet32(self.slice(object, kind::TETS)),
-                RecordKind::Tet20 => Records::Tet20(self.slice(object, kind::TETS)),
                 RecordKind::Tet16 => Records::Tet16(self.slice(object, kind::TETS)),
             },
             None if header.record == 0 && entry.is_none_or(|e| e.count == 0) => Records::None,
             _ => {
                 let found = format!("record kind {} and a TETS stride of {stride}", header.record);
+                let (code, found) = match OLD_RECORDS.contains(&header.record) {
+                    true => (Code::Features, found + ", which are no longer read; compile the model again"),
+                    false => (Code::Record, found),
+                };
                 let offset = std::mem::offset_of!(Object, record) as u64;
-                let error =
-                    Error::within(Code::Record, kind::OBJECT, offset, "a record kind that fits TETS", found);
+                let error = Error::within(code, kind::OBJECT, offset, "a record kind that fits TETS", found);
                 return Err(self.locate(error, object));
             }
         };

@@ -287,8 +287,12 @@ fn check_entry(
         None => {}
         Some(0) if RecordKind::ALL.iter().any(|r| r.stride() == e.stride as usize) => {}
         Some(stride) if stride == e.stride as usize && stride != 0 => {}
+        Some(0) if e.stride == 20 => {
+            let found = "20, which is no longer read; compile the model again".into();
+            return Err((Code::Features, offset_of!(SectionEntry, stride), "16 or 32".into(), found));
+        }
         Some(stride) => {
-            let expected = if stride == 0 { "16, 20 or 32".into() } else { format!("{}", stride) };
+            let expected = if stride == 0 { "16 or 32".into() } else { format!("{}", stride) };
             return Err((Code::Stride, offset_of!(SectionEntry, stride), expected, format!("{}", e.stride)));
         }
     }

@@ -24,7 +24,7 @@ kinds! {
     TRIANGLE_IDS = 3;
     /// [`super::TetLeaf`]s.
     TET_LEAVES = 4;
-    /// [`super::Link32`], [`super::Tet32`], [`super::Tet20`] or [`super::Tet16`] records.
+    /// [`super::Link32`] or [`super::Tet16`] records.
     TETS = 5;
     /// [`super::TetVertex`] positions.
     TET_VERTICES = 6;

@@ -9,17 +9,16 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 pub enum RecordKind {
     /// [`Link32`].
     Link32 = 1,
-    /// [`Tet32`].
-    Tet32 = 2,
-    /// [`Tet20`].
-    Tet20 = 3,
     /// [`Tet16`].
     Tet16 = 4,
 }
 
+/// Codes of the records of older files, of 32 and 20 bytes. Such files are refused.
+pub(crate) const OLD_RECORDS: [u32; 2] = [2, 3];
+
 impl RecordKind {
-    /// All of them, in order of their codes.
-    pub const ALL: [RecordKind; 4] = [Self::Link32, Self::Tet32, Self::Tet20, Self::Tet16];
+    /// All kinds, in order of their codes.
+    pub const ALL: [RecordKind; 2] = [Self::Link32, Self::Tet16];
 
     /// The kind with this code.
     pub fn from_code(code: u32) -> Option<Self> {
@@ -28,8 +27,7 @@ impl RecordKind {
     /// Bytes of a record.
     pub const fn stride(self) -> usize {
         match self {
-            Self::Link32 | Self::Tet32 => 32,
-            Self::Tet20 => 20,
+            Self::Link32 => 32,
             Self::Tet16 => 16,
         }
     }
@@ -37,8 +35,6 @@ impl RecordKind {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Link32 => "link32",
-            Self::Tet32 => "tet32",
-            Self::Tet20 => "tet20",
             Self::Tet16 => "tet16",
         }
     }
@@ -134,29 +130,8 @@ pub struct Link {
     pub opposite: u32,
 }
 
-/// The record of 32 bytes of Aman et al. 2021, arXiv 2103.02309.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct Tet32 {
-    /// The three lowest vertices, ascending.
-    pub vertex: [u32; 3],
-    /// Exclusive or of all four vertices.
-    pub xor: u32,
-    /// Links in ascending order of the opposite vertex: see [`FACE_BIT`].
-    pub next: [u32; 4],
-}
-
-/// The record of 20 bytes of Aman et al. 2021, as [`Tet32`].
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct Tet20 {
-    /// Exclusive or of all four vertices.
-    pub xor: u32,
-    /// Links in ascending order of the opposite vertex: see [`FACE_BIT`].
-    pub next: [u32; 4],
-}
-
-/// The record of 16 bytes of Aman et al. 2021, as [`Tet32`].
+/// Record of 16 bytes of Aman et al. 2021, arXiv 2103.02309. Links are in ascending order of the
+/// vertex opposite to the link's face: see [`FACE_BIT`].
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct Tet16 {
@@ -172,7 +147,5 @@ assert_layout! {
     TetFace 32 { triangle 12, tet 16, opposite 24 }
     HullFace 20 { tet 12, opposite 16 }
     Link32 32 {}
-    Tet32 32 { xor 12, next 16 }
-    Tet20 20 { next 4 }
     Tet16 16 { next 4 }
 }

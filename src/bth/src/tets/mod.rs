@@ -1,4 +1,4 @@
-//! Walks of rays through the tetrahedra of tet leaves, in any of the four record formats ([`records`]).
+//! Walks of rays through the tetrahedra of tet leaves, in either record ([`records`]).
 //!
 //! A single ray is walked in f64 ([`walk`], [`flood`], [`locate`]). The rays of a batch are walked in f32, sixteen to a vector
 //! ([`batch`], [`queue`], [`lanes`], [`rounds`]), and in f64 where f32 does not decide ([`decide`]).

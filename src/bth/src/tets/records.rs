@@ -1,14 +1,14 @@
-//! One interface to the four record formats of tetrahedra, for one tetrahedron and for sixteen.
+//! One interface to the two records of tetrahedra, for one tetrahedron and for sixteen.
 //!
 //! A record is read only after a walk has entered its tetrahedron through a face, so the three vertices of the face and the link
 //! behind it are known. The record yields the fourth vertex and the links behind the other faces.
 //!
-//! `Tet32`, `Tet20` and `Tet16` have 32, 20 and 16 bytes. They are the formats of A. Aman, S. Demirci and U. Güdükbay, "Compact
-//! tetrahedralization-based acceleration structures for ray tracing", 2021 (arXiv 2103.02309). `Link32`, of 32 bytes, is not from
-//! that paper.
+//! `Tet16` has 16 bytes: the exclusive or of the four vertices, and three words that combine the four links. It is from A. Aman,
+//! S. Demirci and U. Güdükbay, "Compact tetrahedralization-based acceleration structures for ray tracing", 2021 (arXiv
+//! 2103.02309). `Link32` has 32 bytes. Each of its links stores the fourth vertex of the tetrahedron that it leads to.
 
 use crate::simd::Simd;
-use bth_format::layout::{Link, Link32, NONE, Tet16, Tet20, Tet32};
+use bth_format::layout::{Link, NONE, Tet16};
 use bth_format::object::Records;
 use zerocopy::{FromBytes, IntoBytes};
 
@@ -33,77 +33,26 @@ impl Entered {
     }
 }
 
-/// A record of one tetrahedron. Links are stored in ascending order of the opposite vertex.
-pub(crate) trait Record: Copy {
-    /// The vertex that is not on `face`. `opposite` is that of the link that was followed to this tetrahedron.
-    fn apex(&self, face: [u32; 3], opposite: u32) -> u32;
-    /// The link behind the face opposite to `vertex`. Its `opposite` is `NONE` in formats whose [`Self::apex`] does not need it.
-    fn link(&self, entered: &Entered, vertex: u32) -> Link;
-}
-
-/// Each link stores the fourth vertex of the tetrahedron that it leads to.
-impl Record for Link32 {
-    #[inline(always)]
-    fn apex(&self, _face: [u32; 3], opposite: u32) -> u32 {
-        opposite
-    }
-    #[inline(always)]
-    fn link(&self, entered: &Entered, vertex: u32) -> Link {
-        self.link[entered.rank(vertex) & 3]
-    }
-}
-
 /// The fourth vertex of a tetrahedron, from the exclusive or of all four vertices and the vertices of a face.
 #[inline(always)]
 fn fourth_vertex(xor: u32, face: [u32; 3]) -> u32 {
     xor ^ face[0] ^ face[1] ^ face[2]
 }
 
-/// Tet32 of Aman et al. (2021): three of the vertices, the exclusive or of all four, and four links.
-impl Record for Tet32 {
-    #[inline(always)]
-    fn apex(&self, face: [u32; 3], _opposite: u32) -> u32 {
-        fourth_vertex(self.xor, face)
-    }
-    #[inline(always)]
-    fn link(&self, entered: &Entered, vertex: u32) -> Link {
-        Link { next: self.next[entered.rank(vertex) & 3], opposite: NONE }
-    }
+/// The link of a [`Tet16`] behind the face opposite to `vertex`. Each of the three words is the exclusive or of a link and the
+/// fourth link, so `entered.behind` yields the fourth link, and that yields any other.
+#[inline(always)]
+fn decode_link(record: &Tet16, entered: &Entered, vertex: u32) -> u32 {
+    let stored = |rank: usize| record.next.get(rank).copied().unwrap_or(0);
+    let fourth_link = entered.behind ^ stored(entered.rank(entered.apex));
+    fourth_link ^ stored(entered.rank(vertex))
 }
 
-/// Tet20 of Aman et al. (2021): the exclusive or of the four vertices, and four links.
-impl Record for Tet20 {
-    #[inline(always)]
-    fn apex(&self, face: [u32; 3], _opposite: u32) -> u32 {
-        fourth_vertex(self.xor, face)
-    }
-    #[inline(always)]
-    fn link(&self, entered: &Entered, vertex: u32) -> Link {
-        Link { next: self.next[entered.rank(vertex) & 3], opposite: NONE }
-    }
-}
-
-/// Tet16 of Aman et al. (2021): the exclusive or of the four vertices, and three words that combine the four links.
-impl Record for Tet16 {
-    #[inline(always)]
-    fn apex(&self, face: [u32; 3], _opposite: u32) -> u32 {
-        fourth_vertex(self.xor, face)
-    }
-    /// Each of the three words is the exclusive or of a link and the fourth link, so `entered.behind` yields the fourth link, and
-    /// that yields any other.
-    #[inline(always)]
-    fn link(&self, entered: &Entered, vertex: u32) -> Link {
-        let stored = |rank: usize| self.next.get(rank).copied().unwrap_or(0);
-        let fourth_link = entered.behind ^ stored(entered.rank(entered.apex));
-        Link { next: fourth_link ^ stored(entered.rank(vertex)), opposite: NONE }
-    }
-}
-
-/// Reads records of an object's tetrahedra in the format of the object.
+/// Reads records of an object's tetrahedra. Links are stored in ascending order of the opposite vertex.
 pub(crate) trait ReadRecords {
-    /// [`Record::apex`] of a tetrahedron.
+    /// The vertex of a tetrahedron that is not on `face`. `opposite` is from the link that was followed to the tetrahedron.
     fn apex(&self, tet: u32, face: [u32; 3], opposite: u32) -> u32;
-    /// [`Record::link`] of a tetrahedron.
+    /// The link behind the face opposite to `vertex`. Its `opposite` is `NONE` in records whose [`Self::apex`] does not need it.
     fn link(&self, tet: u32, entered: &Entered, vertex: u32) -> Link;
 }
 
@@ -112,9 +61,7 @@ impl ReadRecords for Records<'_> {
     fn apex(&self, tet: u32, face: [u32; 3], opposite: u32) -> u32 {
         match self {
             Records::Link32(_) => opposite,
-            Records::Tet32(records) => records[tet as usize].apex(face, opposite),
-            Records::Tet20(records) => records[tet as usize].apex(face, opposite),
-            Records::Tet16(records) => records[tet as usize].apex(face, opposite),
+            Records::Tet16(records) => fourth_vertex(records[tet as usize].xor, face),
             Records::None => NONE,
         }
     }
@@ -122,10 +69,10 @@ impl ReadRecords for Records<'_> {
     #[inline(always)]
     fn link(&self, tet: u32, entered: &Entered, vertex: u32) -> Link {
         match self {
-            Records::Link32(records) => records[tet as usize].link(entered, vertex),
-            Records::Tet32(records) => records[tet as usize].link(entered, vertex),
-            Records::Tet20(records) => records[tet as usize].link(entered, vertex),
-            Records::Tet16(records) => records[tet as usize].link(entered, vertex),
+            Records::Link32(records) => records[tet as usize].link[entered.rank(vertex) & 3],
+            Records::Tet16(records) => {
+                Link { next: decode_link(&records[tet as usize], entered, vertex), opposite: NONE }
+            }
             Records::None => Link { next: NONE, opposite: NONE },
         }
     }
@@ -163,13 +110,11 @@ fn fourth_vertices<S: Simd>(s: S, words: &[u32], m: S::M, entered: &EnteredLanes
     s.xor_u(s.xor_u(s.gather_u(m, words, xor), a), s.xor_u(b, c))
 }
 
-/// The words of [`Records`], for gathers in sixteen lanes. The format is tested at every step, so that one kernel serves all
-/// formats; the branch is well predicted.
+/// The words of [`Records`], for gathers in sixteen lanes. The record is tested at every step, so that one kernel serves both;
+/// the branch is well predicted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum LaneRecords<'a> {
     Link32(&'a [[u32; 2]]),
-    Tet32(&'a [u32]),
-    Tet20(&'a [u32]),
     Tet16(&'a [u32]),
 }
 
@@ -186,34 +131,26 @@ impl<'a> LaneRecords<'a> {
         Some(match records {
             Records::None => return None,
             Records::Link32(records) => LaneRecords::Link32(words(records)),
-            Records::Tet32(records) => LaneRecords::Tet32(words(records)),
-            Records::Tet20(records) => LaneRecords::Tet20(words(records)),
             Records::Tet16(records) => LaneRecords::Tet16(words(records)),
         })
     }
 
-    /// Whether the format needs [`EnteredLanes::behind`].
+    /// Returns true if the record needs [`EnteredLanes::behind`].
     #[inline(always)]
     pub(crate) fn needs_behind(&self) -> bool {
         matches!(self, LaneRecords::Tet16(_))
     }
 
-    /// As [`Record::apex`], in the lanes of the mask; those of other lanes are undefined.
+    /// As [`ReadRecords::apex`], in the lanes of the mask; those of other lanes are undefined.
     #[inline(always)]
     pub(crate) fn apex<S: Simd>(&self, s: S, m: S::M, entered: &EnteredLanes<S>) -> S::U {
         match self {
             LaneRecords::Link32(_) => entered.apex,
-            LaneRecords::Tet32(words) => {
-                fourth_vertices(s, words, m, entered, s.add_u(s.shl_u::<3>(entered.tet), s.splat_u(3)))
-            }
-            LaneRecords::Tet20(words) => {
-                fourth_vertices(s, words, m, entered, s.add_u(s.shl_u::<2>(entered.tet), entered.tet))
-            }
             LaneRecords::Tet16(words) => fourth_vertices(s, words, m, entered, s.shl_u::<2>(entered.tet)),
         }
     }
 
-    /// `next` and `opposite` of [`Record::link`], in the lanes of the mask; those of other lanes are undefined.
+    /// `next` and `opposite` of [`ReadRecords::link`], in the lanes of the mask; those of other lanes are undefined.
     #[inline(always)]
     pub(crate) fn link<S: Simd>(
         &self,
@@ -222,25 +159,18 @@ impl<'a> LaneRecords<'a> {
         entered: &EnteredLanes<S>,
         vertex: S::U,
     ) -> (S::U, S::U) {
-        let (words, first) = match self {
+        match self {
             LaneRecords::Link32(pairs) => {
-                return s.gather_pair(m, pairs, s.add_u(s.shl_u::<2>(entered.tet), entered.rank(s, vertex)));
+                s.gather_pair(m, pairs, s.add_u(s.shl_u::<2>(entered.tet), entered.rank(s, vertex)))
             }
-            LaneRecords::Tet16(words) => {
-                return (link_of_tet16(s, words, m, entered, vertex), s.splat_u(NONE));
-            }
-            LaneRecords::Tet32(words) => (words, s.add_u(s.shl_u::<3>(entered.tet), s.splat_u(4))),
-            LaneRecords::Tet20(words) => {
-                (words, s.add_u(s.add_u(s.shl_u::<2>(entered.tet), entered.tet), s.splat_u(1)))
-            }
-        };
-        (s.gather_u(m, words, s.add_u(first, entered.rank(s, vertex))), s.splat_u(NONE))
+            LaneRecords::Tet16(words) => (decode_links(s, words, m, entered, vertex), s.splat_u(NONE)),
+        }
     }
 }
 
-/// `next` of [`Record::link`] of [`Tet16`] in each lane.
+/// As [`decode_link`], in each lane.
 #[inline(always)]
-fn link_of_tet16<S: Simd>(s: S, words: &[u32], m: S::M, entered: &EnteredLanes<S>, vertex: S::U) -> S::U {
+fn decode_links<S: Simd>(s: S, words: &[u32], m: S::M, entered: &EnteredLanes<S>, vertex: S::U) -> S::U {
     let first = s.add_u(s.shl_u::<2>(entered.tet), s.splat_u(1));
     // The first round turns the link behind the entered face into the fourth link, the second round the fourth into the requested
     // one.

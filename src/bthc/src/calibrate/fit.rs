@@ -109,8 +109,8 @@ mod tests {
         let timed = |steps: f64, hits: f64, visits: f64, visit: f64, entry: f64| Timed {
             bvh: 14.0 + visit * visits,
             visits,
-            tets: [entry + 100.0 * hits + step * steps; 4],
-            single: [300.0 + 20.0 * steps; 4],
+            tets: [entry + 100.0 * hits + step * steps; RecordKind::ALL.len()],
+            single: [300.0 + 20.0 * steps; RecordKind::ALL.len()],
             steps,
             hits,
         };
@@ -125,7 +125,7 @@ mod tests {
             ],
             short: timed(19.0, 0.25, 30.0, 2.5, 30.0),
             wide: [4.0, 2.0],
-            bytes: [bytes; 4],
+            bytes: [bytes; RecordKind::ALL.len()],
             tetrahedralize: 12.0,
         }
     }

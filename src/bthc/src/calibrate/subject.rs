@@ -21,6 +21,8 @@ const RAYS_TO_LARGE: usize = 16384;
 /// Rays whose steps are counted.
 const COUNTED: usize = 4096;
 
+/// Number of records.
+const RECORDS: usize = RecordKind::ALL.len();
 /// Triangles of the largest small model.
 const SMALL_TRIANGLES: usize = 20_000;
 /// Number of times that small models are tetrahedralized to measure the time.
@@ -68,9 +70,9 @@ pub(crate) struct Timed {
     /// Entered nodes of the binary BVH.
     pub(crate) visits: f64,
     /// Nanoseconds through the tetrahedra, by record.
-    pub(crate) tets: [f64; 4],
+    pub(crate) tets: [f64; RECORDS],
     /// Nanoseconds through the tetrahedra one ray a call, by record.
-    pub(crate) single: [f64; 4],
+    pub(crate) single: [f64; RECORDS],
     /// Tetrahedra on the query.
     pub(crate) steps: f64,
     /// Share of the rays that end at a triangle.
@@ -91,7 +93,7 @@ pub(crate) struct Times {
     /// Wide nodes and leaves that lines from outside enter.
     pub(crate) wide: [f64; 2],
     /// Bytes of the tetrahedra and vertices, by record.
-    pub(crate) bytes: [f64; 4],
+    pub(crate) bytes: [f64; RECORDS],
     /// Tetrahedralization, microseconds a triangle; of a small model the mean of several.
     pub(crate) tetrahedralize: f64,
 }
@@ -105,7 +107,7 @@ pub(crate) struct Subject {
     bounces: [Kind; 4],
     short: Kind,
     wide: [f64; 2],
-    bytes: [f64; 4],
+    bytes: [f64; RECORDS],
     tetrahedralize: f64,
 }
 

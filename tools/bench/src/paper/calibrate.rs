@@ -30,10 +30,10 @@ pub(super) fn profile() -> Result<Profile> {
     let [small, large] = &found[..] else { bail!("two models were measured") };
     profile.bvh.ray = 0.0;
     profile.bvh.outside = 0.5 * (small.visit + large.visit);
-    for (row, name) in ["tet32", "tet20"].into_iter().enumerate() {
+    for (row, record) in super::PROFILE_RECORDS.into_iter().enumerate() {
         let (entry, step) = small.walks[row];
         let walk = Walk { entry, hit: 0.0, step: [step, large.walks[row].1.max(step)] };
-        profile.tets.insert(name.to_owned(), TetCosts { outside: walk, surface: walk, alone: walk });
+        profile.tets.insert(record.name().to_owned(), TetCosts { outside: walk, surface: walk, alone: walk });
     }
     profile.bytes = [small.bytes, large.bytes];
     Ok(profile)

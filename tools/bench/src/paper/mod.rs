@@ -58,6 +58,8 @@ const SIZE: (u32, u32) = (1920, 1080);
 const QUICK_SIZE: (u32, u32) = (192, 108);
 /// Nodes of fewer triangles are not tetrahedralized: their tetrahedra would have more hull faces than triangles.
 const FEWEST_TRIANGLES: u32 = 64;
+/// Rows of a profile that hold the costs of Tet32 and of Tet20: our records of about these sizes.
+const PROFILE_RECORDS: [RecordKind; 2] = [RecordKind::Link32, RecordKind::Tet16];
 
 /// A structure that is ready to render.
 struct BuiltStructure {
@@ -101,9 +103,9 @@ fn measure_model(model: &Model, profile: &Profile, size: (u32, u32), report: &mu
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let mut built: Vec<BuiltStructure> = Vec::new();
     progress::show(format!("{name}: BTH32, Tet32"));
-    one.install(|| scalar::<Tet32>(model, profile, &views, RecordKind::Tet32, &mut built, report))?;
+    one.install(|| scalar::<Tet32>(model, profile, &views, PROFILE_RECORDS[0], &mut built, report))?;
     progress::show(format!("{name}: BTH20, Tet20"));
-    one.install(|| scalar::<Tet20>(model, profile, &views, RecordKind::Tet20, &mut built, report))?;
+    one.install(|| scalar::<Tet20>(model, profile, &views, PROFILE_RECORDS[1], &mut built, report))?;
     progress::show(format!("{name}: our files"));
     one.install(|| own(model, &mut built))?;
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
@@ -141,12 +143,12 @@ fn scalar<R: TetRecord + 'static>(
     built: &mut Vec<BuiltStructure>,
     report: &mut Report,
 ) -> Result<()> {
-    let names = if kind == RecordKind::Tet32 { ["BTH32", "Tet32"] } else { ["BTH20", "Tet20"] };
+    let names = if kind == PROFILE_RECORDS[0] { ["BTH32", "Tet32"] } else { ["BTH20", "Tet20"] };
     let mesh = &model.mesh;
     let clock = Instant::now();
     let (tree, _) = bvh::build(mesh, &tree::bvh_options(), &Silent)?;
     let bvh_seconds = clock.elapsed().as_secs_f64();
-    if kind == RecordKind::Tet32 {
+    if kind == PROFILE_RECORDS[0] {
         let clock = Instant::now();
         let plain = PaperTree::<R>::new(mesh, &tree, &[]);
         let (seconds, bytes) = (bvh_seconds + clock.elapsed().as_secs_f64(), plain.bytes() as u64);
@@ -194,7 +196,7 @@ fn scalar<R: TetRecord + 'static>(
     views.eyes().for_each(|eye| tets.look_from(eye));
     let (bytes, in_tets) = (tets.bytes() as u64, model.triangles() as u64);
     built.push(BuiltStructure { name: names[1], tracer: Box::new(tets), seconds, bytes, in_tets, leaves: 1 });
-    if kind == RecordKind::Tet32 {
+    if kind == PROFILE_RECORDS[0] {
         steps::add(model, &tree, mesh_of_tets, report);
     }
     Ok(())

@@ -182,7 +182,7 @@ def test_outputs_replace_no_input(path, tmp_path):
     library.write_text("newmtl a\nKd 1 0 0\n")
     path.write_text("mtllib parts.mtl\n" + path.read_text())
     profile = tmp_path / "profile.json"
-    profile.write_bytes((PAGE.parents[1] / "src/bth-compile/src/costs/default-profile.json").read_bytes())
+    profile.write_bytes((PAGE.parents[1] / "src/bth-tets/src/costs/default-profile.json").read_bytes())
     before = [file.read_bytes() for file in (path, library, profile)]
     for output, options in ((path, {}), (library, {"materials": True}), (profile, {"profile": profile})):
         with pytest.raises(ValueError, match="output: .* would replace .*hint"):

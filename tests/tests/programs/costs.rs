@@ -130,7 +130,7 @@ fn a_profile_decides_by_its_content_alone() {
     let bad = bthc(folder.path(), &[&args[..], &["bad.json"]].concat()).expect(3);
     assert!(bad.stderr.contains("BTH-I060") && bad.stderr.contains("bthc calibrate"), "{bad:?}");
 
-    let profile = include_str!("../../../src/bth-compile/src/costs/default-profile.json");
+    let profile = include_str!("../../../src/bth-tets/src/costs/default-profile.json");
     std::fs::write(folder.path().join("same.json"), profile.replace("  ", " ")).unwrap();
     let bytes = |profile: &str| {
         let args = [&args[..], &[profile, "-o", "out.bth"]].concat();

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::bvh::{self, BvhOptions};
-use crate::marks::testing::{patch, sphere, weld};
 use bth::rays::Ray;
+use bth_bvh::testing::{patch, sphere, weld};
 use bth_format::layout::{FREE_MARGIN, FreeBins, FreeLevels, KnownFree, free_axes, free_bin};
 use bth_import::Silent;
 use bth_oracle::{intersection, to_f64};

@@ -1,0 +1,373 @@
+//! Top-down construction of the binary BVH.
+
+use super::binned_split::Centers;
+use super::bounds::Bounds;
+use super::extent::Extent;
+use super::split::Reference;
+use super::{BinaryBvh, Node, binned_split, linked_tree::LinkedTree, reinsertion, sweep_split};
+use bth_import::error::{Error, Result};
+use bth_import::monitor::Monitor;
+use bth_import::{Mesh, is_zero_area};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Edges on the longest path of a binary BVH that [`build`] makes; below `bth_format::limits::MAX_DEPTH`,
+/// since a wide node takes at least one level of the binary tree.
+pub const MAX_LEVELS: u32 = 90;
+
+/// Subtrees of more triangles are built as separate tasks, each of which first checks for cancellation.
+const BUILD_TASK: usize = 1 << 12;
+
+/// How much time to spend on the tree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Quality {
+    /// Binned SAH with 16 bins.
+    Fast,
+    /// Binned SAH with 32 bins, full sweep in small nodes, two passes of reinsertion of the largest nodes, three rounds in which
+    /// treelets are rebuilt; the wide nodes are chosen by what sample rays enter.
+    #[default]
+    Balanced,
+    /// Full-sweep SAH except in the topmost nodes, where 32 bins give trees as good; three passes of reinsertion, five rounds of
+    /// treelets.
+    Best,
+}
+
+/// Parameters of the builder that a [`Quality`] selects; benchmarks vary them one by one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Effort {
+    /// Bins per axis, at most 32.
+    pub bins: usize,
+    /// Nodes of at most this many triangles are split by a full sweep.
+    pub sweep_count: usize,
+    /// Share of the nodes, largest first, that each pass of reinsertion tries to move. Two short passes reduce the cost
+    /// more than a long one (measured on rooms and a car).
+    pub reinsertion: Vec<f64>,
+    /// Rounds in which treelets are rebuilt ([`rebuild_treelets`](super::rebuild_treelets)); with none the wide tree is chosen by areas
+    /// alone, unless rays are known.
+    pub treelets: usize,
+}
+
+impl Quality {
+    /// The parameters of this quality.
+    pub fn effort(self) -> Effort {
+        let (bins, sweep_count, reinsertion, treelets): (_, _, &[f64], _) = match self {
+            Quality::Fast => (16, 8, &[], 0),
+            Quality::Balanced => (32, 64, &[0.05, 0.1], 3),
+            Quality::Best => (32, 1 << 14, &[0.1, 0.5, 0.5], 5),
+        };
+        Effort { bins, sweep_count, reinsertion: reinsertion.to_vec(), treelets }
+    }
+}
+
+/// Options of [`build`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BvhOptions {
+    /// How much time to spend on the tree.
+    pub quality: Quality,
+    /// Whether triangles of zero area are kept in the tree: deformable objects may give them an area.
+    pub keep_zero_area: bool,
+}
+
+/// Report of [`build`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BvhReport {
+    /// Triangles in the tree.
+    pub triangles: u64,
+    /// Triangles of exactly zero area, which are not in the tree.
+    pub dropped: u64,
+    /// Nodes of the tree, leaves included.
+    pub nodes: u64,
+    /// Edges on the longest path from the root.
+    pub levels: u32,
+    /// Nodes that a random line through the root's box meets, on average, after the top-down build, then after each pass of reinsertion,
+    /// and at last after treelets were rebuilt, which lowers the cost of the wide tree and may raise this: the sum of the nodes' areas over
+    /// the root's.
+    pub visits: Vec<f64>,
+    /// Subtrees that each pass of reinsertion moved.
+    pub moved: Vec<u64>,
+    /// Treelets that each round rebuilt.
+    pub treelets: Vec<u64>,
+    /// Wall-clock time of the stage as the pipeline measures it, seconds; 0 where the stage is called on its own.
+    pub seconds: f64,
+}
+
+/// Builds the binary BVH of all triangles, those of zero area only if the options say so, down to single triangles. The result
+/// depends on mesh and options alone, not on the number of threads.
+///
+/// # Errors
+/// [`Error::Internal`] when the mesh breaks its own contract (indices in range, positions finite),
+/// [`Error::Limit`] beyond `bth_format::limits::MAX_TRIANGLES`, [`Error::Cancelled`].
+pub fn build(mesh: &Mesh, options: &BvhOptions, monitor: &dyn Monitor) -> Result<(BinaryBvh, BvhReport)> {
+    build_tree(mesh, &options.quality.effort(), options.keep_zero_area, monitor)
+}
+
+/// As [`build`], with any effort.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_with(mesh: &Mesh, effort: &Effort, monitor: &dyn Monitor) -> Result<(BinaryBvh, BvhReport)> {
+    build_tree(mesh, effort, false, monitor)
+}
+
+fn build_tree(
+    mesh: &Mesh,
+    effort: &Effort,
+    keep_zero_area: bool,
+    monitor: &dyn Monitor,
+) -> Result<(BinaryBvh, BvhReport)> {
+    check_mesh(mesh)?;
+    let ids = 0..mesh.triangles.len() as u32;
+    let kept: Vec<u32> =
+        ids.into_par_iter().filter(|&id| keep_zero_area || !is_zero_area(mesh.corners(id))).collect();
+    let reference = |&id: &u32| Reference { bounds: Bounds::of_points(&mesh.corners(id)), id };
+    let references: Vec<Reference<Bounds>> = kept.par_iter().map(reference).collect();
+    drop(kept);
+    let mut report = BvhReport {
+        triangles: references.len() as u64,
+        dropped: (mesh.triangles.len() - references.len()) as u64,
+        ..BvhReport::default()
+    };
+    if references.is_empty() {
+        return Ok((BinaryBvh::default(), report));
+    }
+
+    let mut bvh = split_all(references, effort, monitor)?;
+    report.visits.push(visits(&bvh));
+
+    bvh = reinsert(bvh, &effort.reinsertion, &mut report, monitor)?;
+    report.nodes = bvh.nodes.len() as u64;
+    report.levels = levels(&bvh);
+    Ok((bvh, report))
+}
+
+/// Splits the references, of which there is at least one, from the top down.
+pub(super) fn split_all<E: Extent>(
+    mut references: Vec<Reference<E>>,
+    effort: &Effort,
+    monitor: &dyn Monitor,
+) -> Result<BinaryBvh> {
+    monitor.stage("build", Some(references.len() as u64));
+    split_with(&mut references, effort, &mut sweep_split::Scratch::default(), monitor)
+}
+
+/// As [`split_all`], within another stage.
+pub(super) fn split_with<E: Extent>(
+    references: &mut [Reference<E>],
+    effort: &Effort,
+    scratch: &mut sweep_split::Scratch<E>,
+    monitor: &dyn Monitor,
+) -> Result<BinaryBvh> {
+    let mut nodes = super::zeroed(2 * references.len() - 1);
+    let builder = Builder { effort, monitor };
+    builder.subtree(references, &mut nodes, Destination::ROOT, scratch)?;
+    Ok(BinaryBvh { nodes, order: references.iter().map(|r| r.id).collect() })
+}
+
+/// Moves subtrees to positions of lower cost, in passes that each try a share of the nodes. Boxes of leaves do not change.
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub fn reinsert(
+    bvh: BinaryBvh,
+    passes: &[f64],
+    report: &mut BvhReport,
+    monitor: &dyn Monitor,
+) -> Result<BinaryBvh> {
+    if passes.is_empty() || bvh.nodes.len() <= 3 {
+        return Ok(bvh);
+    }
+    let tree = LinkedTree::new(&bvh);
+    reinsert_linked(tree, bvh, passes, report, monitor)
+}
+
+/// As [`reinsert`], for a BVH whose tree has been linked.
+pub(super) fn reinsert_linked<E: Extent>(
+    mut tree: LinkedTree<E>,
+    bvh: BinaryBvh,
+    passes: &[f64],
+    report: &mut BvhReport,
+    monitor: &dyn Monitor,
+) -> Result<BinaryBvh> {
+    monitor.stage("reinsertion", None);
+    for &share in passes {
+        report.moved.push(reinsertion::pass(&mut tree, share, monitor)?);
+        report.visits.push(tree.visits());
+    }
+    Ok(tree.into_preorder(bvh))
+}
+
+pub(super) fn check_mesh(mesh: &Mesh) -> Result<()> {
+    let internal = |message: String| Err(Error::Internal { code: "BTH-X201", message });
+    if mesh.triangles.len() > bth_format::limits::MAX_TRIANGLES as usize {
+        return Err(Error::Limit {
+            code: "BTH-L201",
+            message: format!(
+                "the mesh has {} triangles; an object can have {}",
+                mesh.triangles.len(),
+                bth_format::limits::MAX_TRIANGLES
+            ),
+        });
+    }
+    let rows = mesh.positions.len();
+    if let Some(t) = mesh.triangles.par_iter().position_first(|t| t.iter().any(|&v| v as usize >= rows)) {
+        return internal(format!("triangle {t} refers to a position beyond the last ({rows} positions)"));
+    }
+    if let Some(v) = mesh.positions.par_iter().position_first(|p| p.iter().any(|x| !x.is_finite())) {
+        return internal(format!("position {v} is not finite"));
+    }
+    Ok(())
+}
+
+/// Where the nodes and rows of a subtree go.
+#[derive(Clone, Copy)]
+struct Destination {
+    /// Index of its root.
+    node: u32,
+    /// First row of `order`.
+    first: u32,
+    /// Edges from the root.
+    level: u32,
+}
+
+impl Destination {
+    const ROOT: Destination = Destination { node: 0, first: 0, level: 0 };
+}
+
+struct Builder<'a> {
+    effort: &'a Effort,
+    monitor: &'a dyn Monitor,
+}
+
+impl Builder<'_> {
+    /// Fills `nodes` (of length `2 * references.len() - 1`) with the subtree over the references, in preorder.
+    fn subtree<E: Extent>(
+        &self,
+        references: &mut [Reference<E>],
+        nodes: &mut [Node],
+        to: Destination,
+        scratch: &mut sweep_split::Scratch<E>,
+    ) -> Result<()> {
+        let count = references.len();
+        let task = count > BUILD_TASK;
+        if task {
+            self.monitor.check()?;
+        }
+        let (bounds, centers) = binned_split::measure(references);
+        let Bounds { lower, upper } = bounds.node_box();
+        nodes[0] = Node { lower, upper, first: to.first, count: count as u32, right: 0 };
+        if count == 1 {
+            return Ok(());
+        }
+        let left = self.split(references, &centers, to.level, scratch);
+        let right = to.node + 2 * left as u32;
+        nodes[0].right = right;
+        let (left_references, right_references) = references.split_at_mut(left);
+        let (left_nodes, right_nodes) = nodes[1..].split_at_mut(2 * left - 1);
+        let level = to.level + 1;
+        let left_to = Destination { node: to.node + 1, first: to.first, level };
+        let right_to = Destination { node: right, first: to.first + left as u32, level };
+        if !task {
+            self.subtree(left_references, left_nodes, left_to, scratch)?;
+            return self.subtree(right_references, right_nodes, right_to, scratch);
+        }
+        let (a, b) = rayon::join(
+            || self.task(left_references, left_nodes, left_to),
+            || self.task(right_references, right_nodes, right_to),
+        );
+        a.and(b)
+    }
+
+    /// As [`Self::subtree`], with buffers of its own.
+    fn task<E: Extent>(
+        &self,
+        references: &mut [Reference<E>],
+        nodes: &mut [Node],
+        to: Destination,
+    ) -> Result<()> {
+        self.subtree(references, nodes, to, &mut sweep_split::Scratch::default())?;
+        if references.len() <= BUILD_TASK {
+            self.monitor.advance(references.len() as u64);
+        }
+        Ok(())
+    }
+
+    /// Partitions the references and returns the size of the left side, 1 to one less than all.
+    fn split<E: Extent>(
+        &self,
+        references: &mut [Reference<E>],
+        centers: &Centers<E>,
+        level: u32,
+        scratch: &mut sweep_split::Scratch<E>,
+    ) -> usize {
+        let count = references.len();
+        if count == 2 {
+            return 1;
+        }
+        // Halving needs ceil(log2(count)) levels. SAH may split as it likes while enough levels remain for halving; else
+        // the node is halved.
+        let halvings = usize::BITS - (count - 1).leading_zeros();
+        if level + 1 + halvings > MAX_LEVELS {
+            return split_median(references, centers);
+        }
+        if centers.coincide() {
+            return split_by_id(references);
+        }
+        if count <= self.effort.sweep_count {
+            return sweep_split::split(references, scratch);
+        }
+        binned_split::split(references, centers, self.effort.bins)
+            .unwrap_or_else(|| split_median(references, centers))
+    }
+}
+
+/// Halves the references by the order of their centres along the widest axis.
+fn split_median<E: Extent>(references: &mut [Reference<E>], centers: &Centers<E>) -> usize {
+    let axis = centers.widest();
+    let middle = references.len() / 2;
+    references.select_nth_unstable_by(middle, |a, b| {
+        let center = |r: &Reference<E>| r.bounds.half_center().as_ref()[axis];
+        let (x, y) = (center(a), center(b));
+        x.total_cmp(&y).then(a.id.cmp(&b.id))
+    });
+    middle
+}
+
+/// Halves references with equal centres by id.
+fn split_by_id<E: Extent>(references: &mut [Reference<E>]) -> usize {
+    let middle = references.len() / 2;
+    references.select_nth_unstable_by_key(middle, |r| r.id);
+    middle
+}
+
+/// Nodes that a random line through the root's box meets on average; see [`BvhReport::visits`].
+pub fn visits(bvh: &BinaryBvh) -> f64 {
+    let area = |node: &Node| Bounds::of_node(node).half_area();
+    let root = area(&bvh.nodes[0]);
+    // A deformable mesh may lie on one line.
+    if root > 0.0 { super::sum(bvh.nodes.len(), |at| area(&bvh.nodes[at as usize])) / root } else { 0.0 }
+}
+
+/// Edges on the longest path.
+pub(super) fn levels(bvh: &BinaryBvh) -> u32 {
+    levels_below(bvh, 0)
+}
+
+/// Edges on the longest path from a node.
+fn levels_below(bvh: &BinaryBvh, at: u32) -> u32 {
+    let node = &bvh.nodes[at as usize];
+    if node.is_leaf() {
+        return 0;
+    }
+    let [left, right] = [at + 1, node.right];
+    let (left, right) = if node.count as usize > BUILD_TASK {
+        rayon::join(|| levels_below(bvh, left), || levels_below(bvh, right))
+    } else {
+        (levels_below(bvh, left), levels_below(bvh, right))
+    };
+    1 + left.max(right)
+}
+
+#[cfg(test)]
+#[path = "build_tests.rs"]
+mod tests;

@@ -1,0 +1,146 @@
+//! The collapse of a binary BVH to the wide BVH: plans the nodes and leaves, and has their lines written.
+
+use super::plan::{Costs, Decision, Plan, Planner};
+use super::poses::Weighed;
+use super::slot_order::SlotOrder;
+use super::wide::{CollapseReport, Wide};
+use super::wide_lines::greatest_coordinate;
+use super::wide_tree::Writer;
+use super::{BinaryBvh, MAX_LEVELS};
+use bth_format::layout::NONE;
+use bth_format::object::{WIDENED_RANGE, far_away};
+use bth_import::Mesh;
+use bth_import::error::{Error, Result};
+use bth_import::monitor::Monitor;
+
+/// Options of [`collapse`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CollapseOptions {
+    /// Whether the BVH below each tet leaf is kept beside it.
+    pub keep_subtrees: bool,
+    /// Whether the vertices of leaves are recorded, and subtrees of tet leaves lie where these are in depth-first order. Demands kept
+    /// subtrees where nodes are cut.
+    pub leaf_vertices: bool,
+    /// Costs by which the tree is chosen.
+    pub costs: Costs,
+    /// Limits on the tree.
+    pub plan: Plan,
+}
+
+/// Collapses a binary BVH to the nodes and leaves of the file, chosen by the nodes' areas or by given probabilities. The nodes in `cut` (ascending, none
+/// below another) become tet leaves: the i-th is child `Child::Tets(i)`, in a slot with its node's exact box.
+///
+/// # Errors
+/// [`Error::Limit`] when the lines exceed what a child code can address or the tree is too deep,
+/// [`Error::Internal`] when `cut` is not as described or its subtrees are to be recorded and not kept, [`Error::Cancelled`].
+pub fn collapse<'a>(
+    mesh: &Mesh,
+    bvh: impl Into<Weighed<'a>>,
+    cut: &[u32],
+    options: &CollapseOptions,
+    monitor: &dyn Monitor,
+) -> Result<(Wide, CollapseReport)> {
+    collapse_by(mesh, bvh, cut, options, &|planner, cut| planner.run(cut), monitor)
+}
+
+/// Decides for each node of the binary BVH, given the cut nodes; also returns the cost of the tree without its tet leaves.
+pub type Decide<'a> = dyn Fn(&Planner<'_>, &[u32]) -> Result<(Vec<Decision>, f32)> + 'a;
+
+/// As [`collapse`], with the tree chosen by `decide`, for comparisons of methods.
+///
+/// # Errors
+/// As [`collapse`], and those of `decide`.
+pub fn collapse_by<'a>(
+    mesh: &Mesh,
+    bvh: impl Into<Weighed<'a>>,
+    cut: &[u32],
+    options: &CollapseOptions,
+    decide: &Decide<'_>,
+    monitor: &dyn Monitor,
+) -> Result<(Wide, CollapseReport)> {
+    let weighed = bvh.into();
+    let bvh = weighed.bvh;
+    check_cut(bvh, cut)?;
+    if options.leaf_vertices && !cut.is_empty() {
+        let message = "tet leaves of a deformable object".to_owned();
+        return Err(Error::Internal { code: "BTH-X203", message });
+    }
+    monitor.stage("collapse", None);
+    let greatest = bvh.nodes.first().map_or(0.0, greatest_coordinate);
+    // The boxes of an object that deforms are computed anew by readers, which do not widen them. Those of an object that is far from the
+    // origin would be widened by much for its size, and readers need not allow for it.
+    let is_far = bvh.nodes.first().is_some_and(|root| far_away(&root.lower, &root.upper).is_some());
+    let widened_boxes = !options.leaf_vertices && !is_far && WIDENED_RANGE.contains(&greatest);
+    let mut wide = Wide { root: NONE, subtrees: vec![NONE; cut.len()], widened_boxes, ..Wide::default() };
+    let mut report = CollapseReport::default();
+    if bvh.nodes.is_empty() {
+        return Ok((wide, report));
+    }
+    let planner = Planner::new(mesh, weighed, options.costs, options.plan, options.keep_subtrees, monitor);
+    let (decisions, cost) = decide(&planner, cut)?;
+    report.cost = f64::from(cost);
+    let root_area = weighed.area(0);
+    let mut writer = Writer {
+        mesh,
+        bvh,
+        weighed,
+        cut,
+        decisions: &decisions,
+        slot_order: SlotOrder::new(mesh, bvh),
+        plan: options.plan,
+        leaf_vertices: options.leaf_vertices,
+        monitor,
+        wide: &mut wide,
+        report: &mut report,
+    };
+    let (root, tets) = writer.tree(0, 0, true)?;
+    if options.keep_subtrees {
+        for (at, level) in tets {
+            let (code, _) = writer.tree(at, level, false)?;
+            let row = cut.binary_search(&at).expect("tet leaves are cut nodes");
+            writer.wide.subtrees[row] = code;
+        }
+    }
+    wide.root = root;
+    check_depth(wide.depth)?;
+
+    report.depth = wide.depth;
+    if root_area > 0.0 {
+        report.node_visits /= root_area;
+        report.leaf_visits /= root_area;
+    }
+    report.measure(&wide);
+    Ok((wide, report))
+}
+
+fn check_cut(bvh: &BinaryBvh, cut: &[u32]) -> Result<()> {
+    let mut free = 0u64;
+    for &at in cut {
+        let node = bvh.nodes.get(at as usize);
+        let Some(node) = node.filter(|_| u64::from(at) >= free) else {
+            return Err(Error::Internal {
+                code: "BTH-X202",
+                message: format!(
+                    "tet leaf {at} is no node, not in ascending order or below another tet leaf"
+                ),
+            });
+        };
+        free = u64::from(at) + 2 * u64::from(node.count) - 1;
+    }
+    Ok(())
+}
+
+fn check_depth(depth: u32) -> Result<()> {
+    const { assert!(MAX_LEVELS as usize <= bth_format::limits::MAX_DEPTH) };
+    if depth as usize <= bth_format::limits::MAX_DEPTH {
+        return Ok(());
+    }
+    Err(Error::Limit {
+        code: "BTH-L203",
+        message: format!("the BVH is {depth} nodes deep; {} can be traversed", bth_format::limits::MAX_DEPTH),
+    })
+}
+
+#[cfg(test)]
+#[path = "collapse_tests.rs"]
+mod tests;

@@ -1,0 +1,17 @@
+//! Sample rays that stand in for those of a renderer, and what they meet in a binary BVH.
+//!
+//! [`visits()`] says how probable it is that such a ray enters each node, by which the wide tree is chosen; the costs of tetrahedra and the
+//! worth of free directions are judged by the same rays.
+
+mod known;
+mod rays;
+mod visits;
+mod walk;
+
+pub use known::KnownRays;
+pub use rays::{SampleRay, along, from_surface, outside, within};
+pub use visits::visits;
+pub use walk::{Traced, affordable, crosses, walk};
+
+#[cfg(test)]
+pub(crate) use visits::entered;

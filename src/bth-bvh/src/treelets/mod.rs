@@ -1,0 +1,72 @@
+//! Rebuilds small parts of the binary BVH, treelets, where the wide tree that is collapsed from it then costs less.
+//!
+//! Reinsertion lowers the cost of the binary tree, most of whose nodes vanish in the collapse. Here the plan of the wide tree is made
+//! first. One round then rebuilds subtrees of few triangles (`small`), whose leaves may share more vertices; the others rebuild what lies
+//! below each wide node (`wide`), and join the children of each anew (`agglomerate`). The present plan remains possible in every new
+//! tree, so by areas the cost of the wide tree never rises.
+//!
+//! After the treelets of "Fast Parallel Construction of High-Quality Bounding Volume Hierarchies" (Karras and Aila 2013), with the cost of
+//! the wide tree in place of that of the binary one.
+
+mod agglomerate;
+mod small;
+mod wide;
+
+use super::build::levels;
+use super::plan::{Costs, Plan, Planner};
+use super::poses::Weighed;
+use super::{BinaryBvh, BvhReport, MAX_LEVELS};
+use bth_import::Mesh;
+use bth_import::error::Result;
+use bth_import::monitor::Monitor;
+
+/// Trees of fewer nodes are one or two wide nodes, whatever is done.
+const LEAST_NODES: usize = 64;
+
+/// Rebuilds treelets in so many rounds. `visits` gives for each node of a tree the probability that a ray enters it, by which its wide
+/// tree is planned.
+///
+/// # Errors
+/// [`bth_import::Error::Cancelled`].
+pub fn rebuild_treelets(
+    mesh: &Mesh,
+    mut bvh: BinaryBvh,
+    rounds: usize,
+    visits: &dyn Fn(&BinaryBvh) -> Vec<f64>,
+    report: &mut BvhReport,
+    monitor: &dyn Monitor,
+) -> Result<BinaryBvh> {
+    if rounds == 0 || bvh.nodes.len() < LEAST_NODES {
+        return Ok(bvh);
+    }
+    monitor.stage("treelets", Some(rounds as u64));
+    for round in 0..rounds {
+        monitor.check()?;
+        let probabilities = visits(&bvh);
+        let weighed = Weighed { bvh: &bvh, probabilities: Some(&probabilities) };
+        let planner = Planner::new(mesh, weighed, Costs::default(), Plan::default(), false, monitor);
+        let (decisions, _) = planner.run(&[])?;
+        let count = if round == 0 {
+            let found = small::find(&planner, &decisions)?;
+            drop((decisions, probabilities));
+            found.iter().for_each(|(at, part)| small::replace(&mut bvh, *at, part));
+            found.len() as u64
+        } else {
+            let (rebuilt, count) = wide::rebuild(&bvh, &decisions, monitor)?;
+            // A deeper tree could not be traversed.
+            if levels(&rebuilt) > MAX_LEVELS {
+                break;
+            }
+            bvh = rebuilt;
+            count
+        };
+        report.treelets.push(count);
+        monitor.advance(1);
+    }
+    report.visits.push(super::visits(&bvh));
+    report.levels = levels(&bvh);
+    Ok(bvh)
+}
+
+#[cfg(test)]
+mod tests;

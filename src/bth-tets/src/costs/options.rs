@@ -1,0 +1,224 @@
+//! Options of the selection, and the verdict on each node.
+
+use super::{Estimator, Profile};
+use bth_bvh::sampling::KnownRays;
+use serde::{Serialize, Serializer};
+use std::sync::Arc;
+
+/// How nodes are selected.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Select {
+    /// The selection of least expected time, over all suitable nodes, for the rays of [`OptimizeFor`].
+    #[default]
+    Best,
+    /// The paper's rule (§3.2): from the root down, the first nodes whose tetrahedra are the cheaper for
+    /// rays from outside.
+    Paper,
+    /// These nodes of the binary BVH, of which none lies below another. For measurements.
+    Nodes(Vec<u32>),
+}
+
+/// The mixture of rays for which the file is optimized.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum OptimizeFor {
+    /// Rays from outside only.
+    Camera,
+    /// Rays that start on known surfaces only.
+    Secondary,
+    /// Three rays from surfaces to one from outside.
+    #[default]
+    Balanced,
+}
+
+impl OptimizeFor {
+    /// Shares of rays from outside and from surfaces; their sum is 1.
+    pub fn weights(self) -> [f64; 2] {
+        match self {
+            OptimizeFor::Camera => [1.0, 0.0],
+            OptimizeFor::Secondary => [0.0, 1.0],
+            OptimizeFor::Balanced => [0.25, 0.75],
+        }
+    }
+}
+
+/// The criterion by which tetrahedra stay in the file after they are built.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Probe {
+    /// Steps of sampled rays, counted and priced by the profile, with the same result on every machine.
+    #[default]
+    Steps,
+    /// None: all tetrahedra that were built stay.
+    Off,
+}
+
+/// Costs of the structures, and limits on the nodes that are considered. Times are those of one ray on one thread.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CostOptions {
+    /// How nodes are selected.
+    pub select: Select,
+    /// The mixture of rays.
+    pub optimize_for: OptimizeFor,
+    /// How to estimate the steps through a tetrahedralization.
+    pub estimator: Estimator,
+    /// Costs of tracing. Files and cache keys contain its hash.
+    #[serde(serialize_with = "by_hash")]
+    pub profile: Profile,
+    /// Cost of a step from one tetrahedron to the next, nanoseconds, in place of the profile's; the other costs of
+    /// tetrahedra are scaled by the same factor.
+    pub c_tet: Option<f64>,
+    /// Nodes of fewer triangles are not tetrahedralized.
+    pub minimum_triangles: u32,
+    /// Nodes of more triangles are not tetrahedralized as a whole; nodes below them may be.
+    pub maximum_triangles: u32,
+    /// Least saving of all chosen nodes together, as a share of the cost of the model's BVH; below it no node is chosen,
+    /// because tet leaves take several times the memory of a BVH.
+    pub minimum_gain: f64,
+    /// Bytes that traversal may read for each triangle of the model, the BVH included. Sizes are estimated before
+    /// tetrahedra are built; afterwards those beyond the limit are left out.
+    pub max_bytes_per_triangle: Option<f64>,
+    /// Seconds of one thread that tetrahedralization may take, by the profile's estimate and not by the clock, so
+    /// that the same nodes are chosen on every machine.
+    pub budget: Option<f64>,
+    /// The criterion by which tetrahedra stay after they are built.
+    pub probe: Probe,
+    /// For objects of a scene: whether the rays of its cameras, lights and frames weight the nodes.
+    pub for_scene: bool,
+    /// Rays that weight the nodes of the object, those of the BVH beside and those of tetrahedra in place of sampled ones. Cache keys
+    /// contain their hash.
+    #[serde(serialize_with = "rays_by_hash")]
+    pub rays: Option<Arc<KnownRays>>,
+}
+
+fn rays_by_hash<S: Serializer>(rays: &Option<Arc<KnownRays>>, to: S) -> Result<S::Ok, S::Error> {
+    match rays {
+        Some(rays) => to.serialize_str(&rays.hash()),
+        None => to.serialize_none(),
+    }
+}
+
+fn by_hash<S: Serializer>(profile: &Profile, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_str(&profile.hash())
+}
+
+impl CostOptions {
+    /// Whether the gain of the selection cannot become less where more nodes are suitable. Without limits the selection of
+    /// greatest gain is found exactly; limits and the paper's rule promise nothing of the kind.
+    pub fn more_suitable_gain_more(&self) -> bool {
+        let limited = self.max_bytes_per_triangle.is_some() || self.budget.is_some();
+        !limited && matches!(self.select, Select::Best)
+    }
+}
+
+impl Default for CostOptions {
+    fn default() -> Self {
+        CostOptions {
+            select: Select::default(),
+            optimize_for: OptimizeFor::default(),
+            estimator: Estimator::default(),
+            profile: Profile::default(),
+            c_tet: None,
+            minimum_triangles: 2048,
+            maximum_triangles: 1 << 20,
+            minimum_gain: 0.02,
+            max_bytes_per_triangle: None,
+            budget: None,
+            probe: Probe::default(),
+            for_scene: false,
+            rays: None,
+        }
+    }
+}
+
+/// The reason for which a node was or was not chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SelectionOutcome {
+    /// It becomes a tet leaf.
+    Chosen,
+    /// Its BVH is estimated to cost less.
+    RefusedCost,
+    /// Nodes below it save more.
+    RefusedParts,
+    /// It has fewer triangles than the minimum.
+    RefusedSmall,
+    /// It has more triangles than the maximum.
+    RefusedLarge,
+    /// It would be chosen, but all such nodes together save less than the least gain.
+    RefusedGain,
+    /// It would be chosen without the limits on bytes and time.
+    RefusedLimit,
+    /// Some of its triangles are in bad contact.
+    Unsuitable,
+}
+
+impl std::fmt::Display for SelectionOutcome {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            SelectionOutcome::Chosen => "chosen",
+            SelectionOutcome::RefusedCost => "no: the BVH costs less",
+            SelectionOutcome::RefusedParts => "no: its parts save more",
+            SelectionOutcome::RefusedSmall => "no: too few triangles",
+            SelectionOutcome::RefusedLarge => "no: too many triangles",
+            SelectionOutcome::RefusedGain => "no: too little gained on the whole",
+            SelectionOutcome::RefusedLimit => "no: over the limit of bytes or time",
+            SelectionOutcome::Unsuitable => "no: bad contacts",
+        })
+    }
+}
+
+/// The costs of one node, and the decision on it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Verdict {
+    /// Index in the binary BVH.
+    pub node: u32,
+    /// Triangles below it.
+    pub count: u32,
+    /// Whether these triangles are free of bad contacts.
+    pub suitable: bool,
+    /// Estimated cost with the node's tetrahedralization, nanoseconds for each ray that may use it: by the paper's rule a
+    /// ray that meets the node's box, else a ray that starts on one of its triangles.
+    pub cost_tet: f64,
+    /// Estimated cost of the same ray with the node's BVH.
+    pub cost_bvh: f64,
+    /// Estimated steps of a ray through its tetrahedralization.
+    pub n_avg: f64,
+    /// Saving by the tetrahedra, nanoseconds for each ray of the model.
+    pub gain: f64,
+    /// The decision.
+    pub decision: SelectionOutcome,
+}
+
+/// The selection.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Choice {
+    /// Nodes that become tet leaves, ascending; none lies below another.
+    pub chosen: Vec<u32>,
+    /// The nodes that were examined, ascending; nodes below a chosen or a small node are not examined.
+    pub verdicts: Vec<Verdict>,
+}
+
+/// Report of the selection.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct CostReport {
+    /// The costs and limits that were used.
+    pub options: CostOptions,
+    /// Nodes examined.
+    pub examined: u64,
+    /// Nodes chosen.
+    pub chosen: u64,
+    /// Triangles in chosen nodes.
+    pub triangles: u64,
+    /// Share of the triangles of the BVH that are in chosen nodes, 0 to 1.
+    pub share: f64,
+    /// Suitable nodes of fitting size that were refused for their cost.
+    pub refused_for_cost: u64,
+    /// Expected cost of a ray through the BVH, nanoseconds.
+    pub cost_bvh: f64,
+    /// Expected cost of a ray with the chosen nodes tetrahedralized, nanoseconds.
+    pub cost_with_tets: f64,
+    /// Wall-clock time of the stage as the pipeline measures it, seconds; 0 where the stage is called on its own.
+    pub seconds: f64,
+}

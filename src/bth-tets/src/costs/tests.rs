@@ -1,0 +1,287 @@
+//! Tests of the selection and its parts against plain recursion and against meshes with known numbers of steps.
+
+use super::testing::{marks_beyond, tree};
+use super::*;
+use crate::marks::Marks;
+use crate::{Behind, TetMesh};
+use bth_bvh::BinaryBvh;
+use bth_bvh::sampling::{KnownRays, SampleRay, from_surface, outside, walk};
+use bth_format::layout::RecordKind;
+use bth_import::Mesh;
+use bth_import::monitor::Silent;
+
+const KEPT: Storage = Storage { record: RecordKind::Link32, keep_subtrees: true, plain_bytes: None };
+const PRUNED: Storage = Storage { record: RecordKind::Link32, keep_subtrees: false, plain_bytes: None };
+
+fn paper() -> CostOptions {
+    CostOptions { select: Select::Paper, minimum_gain: 0.0, ..CostOptions::default() }
+}
+
+fn chosen(bvh: &BinaryBvh, marks: &Marks, options: &CostOptions) -> (Choice, CostReport) {
+    choose(&Mesh::default(), bvh, marks, options, PRUNED, &Silent).unwrap()
+}
+
+/// The cost after the surface area heuristic, and the sum of depths, by plain recursion.
+fn cost_and_depths(bvh: &BinaryBvh, i: usize, depth: u32, visit: f64) -> (f64, u32) {
+    let node = &bvh.nodes[i];
+    if node.is_leaf() {
+        return (visit, depth);
+    }
+    let share = |child: usize| bvh.nodes[child].half_area() / node.half_area();
+    let (l, r) = (i + 1, node.right as usize);
+    let (a, b) = (cost_and_depths(bvh, l, depth + 1, visit), cost_and_depths(bvh, r, depth + 1, visit));
+    (visit + share(l) * a.0 + share(r) * b.0, a.1 + b.1)
+}
+
+fn by_recursion(bvh: &BinaryBvh, marks: &Marks, i: usize, options: &CostOptions, chosen: &mut Vec<u32>) {
+    let node = &bvh.nodes[i];
+    if node.count < options.minimum_triangles {
+        return;
+    }
+    let (sah, depths) = cost_and_depths(bvh, i, 0, options.profile.bvh.outside);
+    let depth = f64::from(depths) / f64::from(node.count);
+    let steps = options.estimator.steps(Start::Outside, node.count, depth);
+    // The tetrahedra fit the caches, so the first cost of a step applies.
+    let walk = options.profile.record(RecordKind::Link32).outside;
+    if marks.suitable[i]
+        && node.count <= options.maximum_triangles
+        && walk.cost(steps, 0.52, 0.0, options.profile.bytes) < sah
+    {
+        chosen.push(i as u32);
+    } else if !node.is_leaf() {
+        by_recursion(bvh, marks, i + 1, options, chosen);
+        by_recursion(bvh, marks, node.right as usize, options, chosen);
+    }
+}
+
+#[test]
+fn the_papers_rule_chooses_what_its_recursion_chooses() {
+    let mut outcomes = [0; 2];
+    for seed in 0..200 {
+        let bvh = tree(seed, 50 + 3 * seed as u32);
+        let marks = marks_beyond(&bvh, (seed % 40) as u32);
+        for estimator in [Estimator::FaceCount, Estimator::AverageDepth] {
+            let mut options =
+                CostOptions { estimator, minimum_triangles: 8, maximum_triangles: 200, ..paper() };
+            options.profile.bvh.outside = 3.4;
+            let c_tet = 0.5 + (seed % 7) as f64 * 0.2;
+            let costs = options.profile.tets.get_mut("link32").unwrap();
+            costs.outside = Walk { entry: 6.0, hit: 0.0, step: [c_tet, 2.0 * c_tet] };
+            let (choice, report) = chosen(&bvh, &marks, &options);
+            let mut expected = Vec::new();
+            by_recursion(&bvh, &marks, 0, &options, &mut expected);
+            assert_eq!(choice.chosen, expected, "seed {seed}");
+            assert_eq!(report.chosen, expected.len() as u64);
+            outcomes[0] += report.chosen;
+            outcomes[1] += report.refused_for_cost;
+        }
+    }
+    assert!(outcomes.iter().all(|&n| n > 200), "{outcomes:?}");
+}
+
+#[test]
+fn costs_of_the_papers_rule_are_those_of_the_definition() {
+    let bvh = tree(3, 300);
+    let mut options = CostOptions { minimum_triangles: 1, c_tet: Some(1e9), ..paper() };
+    options.profile.bvh.outside = 2.0;
+    let (choice, _) = chosen(&bvh, &marks_beyond(&bvh, 0), &options);
+    assert_eq!(choice.verdicts.len(), bvh.nodes.len());
+    for v in &choice.verdicts {
+        let (sah, _) = cost_and_depths(&bvh, v.node as usize, 0, 2.0);
+        assert!((v.cost_bvh - sah).abs() < 1e-9 * sah);
+        assert_eq!(v.decision, SelectionOutcome::RefusedCost);
+    }
+}
+
+#[test]
+fn nothing_is_chosen_for_a_gain_below_the_least_one() {
+    let bvh = tree(5, 2000);
+    let marks = marks_beyond(&bvh, 3);
+    let options = CostOptions { minimum_triangles: 2, c_tet: Some(1e-3), minimum_gain: 1.1, ..paper() };
+    let (choice, report) = chosen(&bvh, &marks, &options);
+    assert!(choice.chosen.is_empty() && report.triangles == 0);
+    assert!(choice.verdicts.iter().any(|v| v.decision == SelectionOutcome::RefusedGain));
+    assert_eq!(report.cost_with_tets, report.cost_bvh);
+}
+
+#[test]
+fn an_empty_bvh_chooses_nothing_and_foreign_marks_are_an_error() {
+    for options in [paper(), CostOptions::default()] {
+        let (choice, _) = chosen(&BinaryBvh::default(), &Marks::default(), &options);
+        assert!(choice.chosen.is_empty() && choice.verdicts.is_empty());
+        let bvh = tree(1, 9);
+        let error = choose(&Mesh::default(), &bvh, &Marks::default(), &options, KEPT, &Silent).unwrap_err();
+        assert!(error.to_string().contains("BTH-X030"));
+    }
+}
+
+/// A closed model, its BVH, and marks in which every node is suitable.
+fn blob() -> (Mesh, BinaryBvh, Marks) {
+    let model = bth_scenes::blob::blob(6000);
+    let mesh = Mesh { positions: model.positions, triangles: model.triangles, ..Mesh::default() };
+    let (bvh, _) = bth_bvh::build(&mesh, &bth_bvh::BvhOptions::default(), &Silent).unwrap();
+    let marks = Marks { suitable: vec![true; bvh.nodes.len()] };
+    (mesh, bvh, marks)
+}
+
+#[test]
+fn a_ray_meets_what_trying_all_triangles_meets_and_enters_the_nodes_above() {
+    let (mesh, bvh, _) = blob();
+    let root = bvh.nodes[0];
+    let mut hits = 0;
+    for ray in outside(root.lower, root.upper, 300, 7) {
+        let mut entered = vec![false; bvh.nodes.len()];
+        let met = walk(&mesh, &bvh, &ray, |node| entered[node as usize] = true);
+        let all = bvh.order.iter().enumerate().filter_map(|(row, &triangle)| {
+            Some((
+                bth_bvh::sampling::crosses(&ray, bth_bvh::vectors::corners(&mesh, triangle), f64::INFINITY)?,
+                row as u32,
+            ))
+        });
+        let nearest = all.min_by(|a, b| a.0.total_cmp(&b.0));
+        assert_eq!(met.hit.map(|(_, t)| t), nearest.map(|(t, _)| t));
+        assert_eq!(met.visits as usize, entered.iter().filter(|e| **e).count());
+        if let Some((row, _)) = met.hit {
+            hits += 1;
+            for (i, node) in bvh.nodes.iter().enumerate() {
+                assert!(entered[i] || !(node.first..node.first + node.count).contains(&row));
+            }
+        }
+    }
+    assert!(hits > 100, "{hits}");
+}
+
+#[test]
+fn cheap_tetrahedra_are_taken_whole_and_dear_ones_not_at_all() {
+    let (mesh, bvh, marks) = blob();
+    let choice = |c_tet: f64, options: CostOptions, storage: Storage| {
+        let options = CostOptions { c_tet: Some(c_tet), minimum_triangles: 64, ..options };
+        choose(&mesh, &bvh, &marks, &options, storage, &Silent).unwrap()
+    };
+    let (cheap, report) = choice(1e-3, CostOptions::default(), KEPT);
+    assert_eq!(cheap.chosen, [0]);
+    assert!(report.cost_with_tets < 0.5 * report.cost_bvh, "{report:?}");
+    assert!(choice(1e3, CostOptions::default(), KEPT).0.chosen.is_empty());
+
+    // With a BVH beside the tetrahedra, rays from outside use the BVH only; without one they walk through the tetrahedra.
+    let camera = CostOptions { optimize_for: OptimizeFor::Camera, ..CostOptions::default() };
+    assert!(choice(1e-3, camera.clone(), KEPT).0.chosen.is_empty());
+    assert_eq!(choice(1e-3, camera, PRUNED).0.chosen, [0]);
+}
+
+#[test]
+fn limits_on_bytes_and_time_leave_fewer_triangles_to_tetrahedra() {
+    let (mesh, bvh, marks) = blob();
+    let triangles = |options: CostOptions| {
+        let options = CostOptions { c_tet: Some(1e-3), minimum_triangles: 64, minimum_gain: 0.0, ..options };
+        choose(&mesh, &bvh, &marks, &options, KEPT, &Silent).unwrap().1.triangles
+    };
+    let all = triangles(CostOptions::default());
+    let by_bytes = [40.0, 80.0, 1e3]
+        .map(|b| triangles(CostOptions { max_bytes_per_triangle: Some(b), ..CostOptions::default() }));
+    assert!(by_bytes[0] < by_bytes[1] && by_bytes[1] < all && by_bytes[2] == all, "{by_bytes:?}");
+    let seconds = Profile::default().tetrahedralize * 1e-6 * all as f64;
+    let by_time = [0.1, 0.5, 2.0]
+        .map(|s| triangles(CostOptions { budget: Some(s * seconds), ..CostOptions::default() }));
+    assert!(by_time[0] < by_time[1] && by_time[1] < all && by_time[2] == all, "{by_time:?}");
+    assert!(by_time[1] as f64 <= 0.5 * all as f64);
+}
+
+#[test]
+fn rays_of_a_scene_decide_which_nodes_count() {
+    let (mesh, bvh, marks) = blob();
+    let nodes = |rays: KnownRays| {
+        let rays = Some(std::sync::Arc::new(rays));
+        let options =
+            CostOptions { c_tet: Some(1e-3), minimum_triangles: 64, rays, ..CostOptions::default() };
+        choose(&mesh, &bvh, &marks, &options, KEPT, &Silent).unwrap().0.chosen
+    };
+    assert!(nodes(KnownRays::default()).is_empty());
+    // Rays that all start below one child of the root and end there.
+    let right = bvh.nodes[0].right;
+    let rows = bvh.nodes[right as usize].first as usize..bvh.order.len();
+    let surface = from_surface(&mesh, &bvh, rows.clone(), 400, 5);
+    let surface: Vec<SampleRay> = surface.into_iter().filter(|r| r.tmax.is_finite()).collect();
+    let found = nodes(KnownRays { outside: Vec::new(), surface });
+    assert!(!found.is_empty());
+    assert!(found.iter().all(|&n| bvh.nodes[n as usize].first as usize >= rows.start || n == 0), "{found:?}");
+}
+
+#[test]
+fn what_all_nodes_cannot_gain_no_marks_can() {
+    let (mesh, bvh, _) = blob();
+    let (mut none, mut some) = (0, 0);
+    for (c_tet, minimum_gain) in
+        (0..12).flat_map(|k| [0.0, 0.02, 0.2].map(|gain| (0.5 * 1.3f64.powi(k), gain)))
+    {
+        let options =
+            CostOptions { c_tet: Some(c_tet), minimum_triangles: 64, minimum_gain, ..CostOptions::default() };
+        assert!(options.more_suitable_gain_more());
+        let (of_all, report) = choose_of_all(&mesh, &bvh, &options, KEPT, &Silent).unwrap();
+        let gain = report.cost_bvh - report.cost_with_tets;
+        for row in [0, 1, 100, bvh.order.len() as u32 / 2, bvh.order.len() as u32 - 300] {
+            let marks = marks_beyond(&bvh, row);
+            let (choice, report) = choose(&mesh, &bvh, &marks, &options, KEPT, &Silent).unwrap();
+            assert!(
+                report.cost_bvh - report.cost_with_tets <= gain + 1e-9 * report.cost_bvh,
+                "{c_tet}, {row}"
+            );
+            assert!(!of_all.chosen.is_empty() || choice.chosen.is_empty(), "{c_tet}, {row}");
+        }
+        *if of_all.chosen.is_empty() { &mut none } else { &mut some } += 1;
+    }
+    assert!(none > 5 && some > 5, "{none}, {some}");
+    let limited = CostOptions { budget: Some(1.0), ..CostOptions::default() };
+    assert!(!limited.more_suitable_gain_more() && !paper().more_suitable_gain_more());
+}
+
+/// Two tetrahedra over the triangle (0, 1, 2), which is a constrained face; the hull is not a box, which walks do not
+/// require.
+fn two_tets() -> TetMesh {
+    let face = crate::Face { triangle: 9, vertex: [0, 1, 2], tet: [0, 1] };
+    TetMesh {
+        lower: [0.0, 0.0, -1.0],
+        upper: [1.0, 1.0, 1.0],
+        vertices: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.2, 0.2, 1.0], [0.2, 0.2, -1.0]],
+        tets: vec![[0, 1, 2, 3], [0, 1, 2, 4]],
+        behind: vec![
+            [Behind::Hull, Behind::Hull, Behind::Hull, Behind::Face(0)],
+            [Behind::Hull, Behind::Hull, Behind::Hull, Behind::Face(0)],
+        ],
+        faces: vec![face],
+        steiner_points: 0,
+    }
+}
+
+#[test]
+fn walks_end_at_triangles_the_hull_or_the_rays_end() {
+    let mesh = two_tets();
+    let walker = TetWalker::new(&mesh);
+    let ray = |z: f64, down: f64, tmax: f64, from: Option<u32>| SampleRay {
+        origin: [0.25, 0.25, z],
+        direction: [0.0, 0.0, down],
+        tmax,
+        from,
+    };
+    let walked = |hit, left| Some(Walked { steps: 1, hit, left });
+    assert_eq!(walker.walk(&ray(5.0, -1.0, f64::INFINITY, None)), walked(true, false));
+    assert_eq!(walker.walk(&ray(0.0, 1.0, f64::INFINITY, Some(9))), walked(false, true));
+    assert_eq!(walker.walk(&ray(0.0, -1.0, f64::INFINITY, Some(9))), walked(false, true));
+    assert_eq!(walker.walk(&ray(0.0, 1.0, 0.01, Some(9))), walked(false, false));
+    assert_eq!(walker.walk(&ray(5.0, 1.0, f64::INFINITY, None)), None);
+}
+
+#[test]
+fn depths_of_some_nodes_are_those_of_all() {
+    for seed in 0..50 {
+        let bvh = tree(seed, 1 + 17 * seed as u32);
+        let all = subtree_sums::subtree_sums(&bvh);
+        for least in [1, 2, 7, 40, 5000] {
+            let top = choose::nodes_from(&bvh, least);
+            let large: Vec<u32> =
+                top.iter().copied().filter(|&i| bvh.nodes[i as usize].count >= least).collect();
+            let expected: Vec<u64> = large.iter().map(|&i| all[i as usize].depth).collect();
+            assert_eq!(subtree_sums::depths(&bvh, &top, &large), expected, "seed {seed}, {least}");
+        }
+    }
+}

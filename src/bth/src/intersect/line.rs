@@ -178,12 +178,6 @@ impl Line {
         depth * self.inverse_depth - shift * self.inverse_depth.abs() - self.t_error()
     }
 
-    /// Upper bound of that t.
-    pub(crate) fn t_after(&self, corners: [&Projected; 3], error: f64) -> f64 {
-        let (depth, shift) = Self::depth_of_crossing(corners, error);
-        depth * self.inverse_depth + shift * self.inverse_depth.abs() + self.t_error()
-    }
-
     /// The depth at which the line crosses a triangle that it certainly crosses, and a bound of its error.
     fn depth_of_crossing([a, b, c]: [&Projected; 3], error: f64) -> (f64, f64) {
         let weight = [cross(b, c), cross(c, a), cross(a, b)];

@@ -5,7 +5,7 @@ use crate::rays::Ray;
 use crate::simd::Isa;
 use crate::tets::batch::WalkBatch;
 use crate::tets::records::LaneRecords;
-use crate::tets::walks::{WalkLists, WalkRays, WalkState};
+use crate::tets::walks::{WalkLists, WalkState};
 use bth_format::layout::{Child, NONE};
 use bth_format::object::ObjectView;
 
@@ -24,8 +24,6 @@ pub(super) struct WalkScratch {
     pub(super) queries: Vec<EitherQuery>,
     /// For each ray the tet leaf whose hits its query already holds, or `NONE`.
     pub(super) walked: Vec<u32>,
-    /// For each ray the constrained face on which it starts, or `NONE`.
-    faces: Vec<u32>,
     /// For each ray the state of its walk.
     states: Vec<WalkState>,
     lists: WalkLists,
@@ -41,12 +39,17 @@ fn filled<T: Clone>(list: &mut Vec<T>, rays: usize, value: T) -> &mut [T] {
 /// Walks at most [`RAYS_PER_PART`] rays, which all enter the tet leaf that is the whole object.
 #[inline(never)]
 pub(super) fn walk(object: &ObjectView<'_>, rays: &[Ray], goal: EitherGoal, scratch: &mut WalkScratch) {
-    let WalkScratch { rest, done, queries, walked, faces, states, lists } = scratch;
-    let faces = filled(faces, rays.len(), NONE);
+    let WalkScratch { rest, done, queries, walked, states, lists } = scratch;
     queries.clear();
     queries.extend(rays.iter().map(|ray| EitherQuery::new(goal, ray)));
     let states = filled(states, rays.len(), WalkState::NotWalked);
-    walk_tets(object, rays, faces, queries, states, lists);
+    let records = LaneRecords::new(object.records).filter(|_| WalkBatch::fits(object));
+    if let Some(records) = records {
+        let of = (rays, sole_tet_leaf(object));
+        let mut batch = WalkBatch::new(object, records, of, queries, states, lists);
+        // Where no walks are compiled, no ray is walked here, and `states` stay `NotWalked`: rays are faster through the BVH.
+        let _ = Isa::chosen().run_long_vectors(&mut batch);
+    }
     filled(walked, rays.len(), NONE);
     done.clear();
     rest.clear();
@@ -60,26 +63,5 @@ pub(super) fn sole_tet_leaf(object: &ObjectView<'_>) -> u32 {
     match Child::from_code(object.header.root) {
         Some(Child::Tets(leaf)) if object.tet_leaves[leaf as usize].subtree == NONE => leaf,
         _ => NONE,
-    }
-}
-
-/// Walks the rays through tetrahedra: those that have a face in `faces`, or all if a tet leaf is the whole object. `states`
-/// receives the state of each ray's walk. All slices have one element per ray.
-fn walk_tets(
-    object: &ObjectView<'_>,
-    rays: &[Ray],
-    faces: &[u32],
-    queries: &mut [EitherQuery],
-    states: &mut [WalkState],
-    lists: &mut WalkLists,
-) {
-    let sole_leaf = sole_tet_leaf(object);
-    let has_walks = sole_leaf != NONE || faces.iter().any(|&face| face != NONE);
-    let records = LaneRecords::new(object.records).filter(|_| has_walks && WalkBatch::fits(object));
-    if let Some(records) = records {
-        let rays = WalkRays { rays, faces, sole_leaf };
-        let mut batch = WalkBatch::new(object, records, rays, queries, states, lists);
-        // Where no walks are compiled, no ray is walked here, and `states` stay `NotWalked`: rays are faster through the BVH.
-        let _ = Isa::chosen().run_long_vectors(&mut batch);
     }
 }

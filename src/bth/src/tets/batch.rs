@@ -1,4 +1,4 @@
-//! Tet walks of a batch of rays, in one or several tet leaves: the state of the batch, and the choice between rays that are prepared
+//! Tet walks of a batch of rays in one tet leaf: the state of the batch, and the choice between rays that are prepared
 //! and faces that are tested.
 //!
 //! The kernel is in [`super::rounds`]; the decisions that its f32 lanes leave open are made in [`super::decide`].
@@ -6,8 +6,9 @@
 use super::queue::PreparedQueue;
 use super::records::LaneRecords;
 use super::starts::Fill;
-use super::walks::{WalkLists, WalkRays, WalkState, Walks};
+use super::walks::{WalkLists, WalkState, Walks};
 use crate::query::{EitherQuery, Goal, Query};
+use crate::rays::Ray;
 use crate::simd::Simd;
 use bth_format::object::ObjectView;
 
@@ -26,17 +27,17 @@ impl<'a> WalkBatch<'a> {
     pub(crate) fn new(
         object: &'a ObjectView<'a>,
         records: LaneRecords<'a>,
-        rays: WalkRays<'a>,
+        (rays, leaf): (&'a [Ray], u32),
         queries: &'a mut [EitherQuery],
         states: &'a mut [WalkState],
         lists: &'a mut WalkLists,
     ) -> Self {
         let keeps_depths = queries.first().is_some_and(|query| query.goal().is_any());
-        let walks = Walks::new(object, records, rays, keeps_depths, states, lists);
+        let walks = Walks::new(object, records, rays, leaf, keeps_depths, states, lists);
         WalkBatch { walks, queries }
     }
 
-    /// Whether lanes can address the tetrahedra of an object: gathers need indices of words below 2^31.
+    /// Returns true if lanes can address the tetrahedra of an object: gathers need indices of words below 2^31.
     pub(crate) fn fits(object: &ObjectView<'_>) -> bool {
         const MAX_WORDS: usize = 1 << 31;
         object.records.len() < MAX_WORDS / 8

@@ -6,7 +6,6 @@
 
 use super::batch::WalkBatch;
 use super::lanes::UNCERTAIN;
-use super::leaf_of_face;
 use super::records::{Entered, ReadRecords};
 use super::walk::{TetPosition, TetWalker, WalkOutcome};
 use super::walks::{Reached, WalkStart, WalkState, Walks};
@@ -25,14 +24,9 @@ impl Walks<'_> {
         Line::new(&self.rays[ray as usize]).expect("a ray that was set up for lanes has a line")
     }
 
-    /// The walker for the tet leaf through which a ray walks.
-    pub(super) fn walker<'b>(&'b self, ray: u32, line: &'b Line) -> TetWalker<'b> {
-        let leaf = match (self.object.tet_leaves, self.sole_leaf) {
-            ([_], _) => 0,
-            (_, NONE) => leaf_of_face(self.object, self.faces[ray as usize]),
-            (_, leaf) => leaf,
-        };
-        TetWalker::new(self.object, leaf, line)
+    /// The walker of a ray with this line.
+    pub(super) fn walker<'b>(&'b self, line: &'b Line) -> TetWalker<'b> {
+        TetWalker::new(self.object, self.leaf, line)
     }
 
     /// Records how the walk of a ray has ended.
@@ -58,7 +52,7 @@ impl WalkBatch<'_> {
     #[inline(never)]
     pub(super) fn walk_in_f64(&mut self, ray: u32, position: TetPosition) {
         let (line, mut query) = (self.walks.line(ray), self.queries[ray as usize]);
-        let walker = self.walks.walker(ray, &line);
+        let walker = self.walks.walker(&line);
         let outcome = match walker.walk(position, &mut query, &mut ()) {
             WalkOutcome::Uncertain => walker.flood(&mut query, &mut ()),
             outcome => outcome,
@@ -71,7 +65,7 @@ impl WalkBatch<'_> {
     #[inline(never)]
     pub(super) fn flood(&mut self, ray: u32) {
         let (line, mut query) = (self.walks.line(ray), self.queries[ray as usize]);
-        let outcome = self.walks.walker(ray, &line).flood(&mut query, &mut ());
+        let outcome = self.walks.walker(&line).flood(&mut query, &mut ());
         self.queries[ray as usize] = query;
         self.walks.finish(ray, outcome);
     }
@@ -83,7 +77,7 @@ impl WalkBatch<'_> {
         if *returns > MAX_RETURNS {
             let WalkStart { ray, tet, entered } = start;
             let line = self.walks.line(ray);
-            let corner = entered.face.map(|v| self.walks.walker(ray, &line).project(v));
+            let corner = entered.face.map(|v| self.walks.walker(&line).project(v));
             self.walk_in_f64(ray, TetPosition { tet, entered, corner });
         } else {
             self.walks.starts.push(start);
@@ -95,7 +89,7 @@ impl WalkBatch<'_> {
     fn step_in_f64(&mut self, start: WalkStart) {
         let ray = start.ray;
         let line = self.walks.line(ray);
-        let walker = self.walks.walker(ray, &line);
+        let walker = self.walks.walker(&line);
         let mut entered = start.entered;
         entered.apex = self.walks.object.records.apex(start.tet, entered.face, entered.apex);
         let mut position =
@@ -119,7 +113,7 @@ impl WalkBatch<'_> {
     #[inline(never)]
     pub(super) fn test_face(&mut self, Reached { ray, face }: Reached) {
         let line = self.walks.line(ray);
-        let walker = self.walks.walker(ray, &line);
+        let walker = self.walks.walker(&line);
         let constrained: &TetFace = &self.walks.object.tet_faces[face as usize];
         let mut query = self.queries[ray as usize];
         let done = walker.offer(constrained, &mut query);

@@ -1,6 +1,6 @@
 //! Walks of rays through the tetrahedra of tet leaves, in either record ([`records`]).
 //!
-//! A single ray is walked in f64 ([`walk`], [`flood`], [`locate`]). The rays of a batch are walked in f32, sixteen to a vector
+//! A single ray is walked in f64 ([`walk`], [`flood`]). The rays of a batch are walked in f32, sixteen to a vector
 //! ([`batch`], [`queue`], [`lanes`], [`rounds`]), and in f64 where f32 does not decide ([`decide`]).
 
 pub(crate) mod batch;
@@ -8,7 +8,6 @@ pub(crate) mod decide;
 mod exit_lanes;
 pub(crate) mod flood;
 pub(crate) mod lanes;
-pub(crate) mod locate;
 pub(crate) mod queue;
 mod reached;
 pub(crate) mod records;
@@ -77,9 +76,4 @@ fn enter<C: Count>(
         outcome => outcome,
     };
     if outcome == WalkOutcome::Done { TetOutcome::Done } else { TetOutcome::Continue }
-}
-
-/// Index of the tet leaf to which the constrained face with index `face` belongs.
-pub(crate) fn leaf_of_face(object: &ObjectView<'_>, face: u32) -> u32 {
-    object.tet_leaves.partition_point(|leaf| leaf.first_face <= face) as u32 - 1
 }

@@ -4,8 +4,7 @@ use super::lanes::{Extent, Lanes, cross, float, three, word};
 use crate::intersect::prepare;
 use crate::rays::Ray;
 use crate::simd::{LANES, Part, Simd};
-use bth_format::layout::{HullFace, NONE, TetFace};
-use zerocopy::{FromBytes, IntoBytes};
+use bth_format::layout::{HullFace, NONE};
 
 /// Greatest |coordinate| of an origin, 2^59. Rays beyond this limit or those below are walked in f64, because products could
 /// overflow or underflow in f32.
@@ -18,10 +17,6 @@ const LEAST_DIRECTION: f32 = 1.0 / (1u64 << 40) as f32;
 const LANE_DEPTH_SLACK: f32 = 1.0 / (1 << 20) as f32;
 /// Absolute part of the slack, for depths near 0. It exceeds the least positive f32 times the greatest direction.
 const LEAST_DEPTH_SLACK: f32 = 1.0 / (1u128 << 100) as f32;
-/// Bound of lengths, 2^40, up to which products of three lengths do not overflow.
-const GREATEST_REACH: f32 = GREATEST_DIRECTION;
-/// Bound of the amount that underflow removes from such products, 2^-120.
-const LEAST_VOLUME: f32 = 1.0 / (1u128 << 120) as f32;
 
 /// Greatest number of queued rays.
 const QUEUE_CAPACITY: usize = 4 * LANES;
@@ -171,8 +166,6 @@ fn slack<S: Simd>(s: S, depth: S::F) -> S::F {
 /// Sixteen rays with the constants of their projections, and the projected faces through which their walks begin.
 pub(super) struct PreparedWalks<S: Simd> {
     pub(super) lanes: Lanes<S>,
-    /// Lower bound of the depth at tmin.
-    tmin_low: S::F,
     /// The lanes whose rays are within the limits of f32 and have tmin <= tmax.
     pub(super) representable: S::M,
 }
@@ -213,9 +206,9 @@ impl<S: Simd> PreparedWalks<S> {
         lanes.floats[float::SHEAR] = s.div(direction[0], per_t);
         lanes.floats[float::SHEAR + 1] = s.div(direction[1], per_t);
         lanes.words[word::RAY] = ray;
-        let (low, high) = (s.mul(tmin, per_t), s.mul(tmax, per_t));
-        lanes.floats[float::LIMIT] = s.add(high, slack(s, high));
-        PreparedWalks { lanes, tmin_low: s.sub(low, slack(s, low)), representable }
+        let depth = s.mul(tmax, per_t);
+        lanes.floats[float::LIMIT] = s.add(depth, slack(s, depth));
+        PreparedWalks { lanes, representable }
     }
 
     /// Projects faces with these vertices and sets them as the entered faces.
@@ -278,66 +271,5 @@ impl<S: Simd> PreparedWalks<S> {
         prepared.lanes.words[word::APEX] = apex;
         prepared.lanes.words[word::BEHIND] = s.splat_u(NONE);
         (prepared, entered, s.and_not(certain, entered))
-    }
-
-    /// Prepares the rays with indices `ray` to walk from the constrained faces with indices `face`, near which they start. Also
-    /// returns the lanes in which the walk from the face is valid: those whose line certainly crosses the face, at a depth that
-    /// is certainly less than that of tmin. Such a walk passes all tetrahedra of the leaf behind the face in order, and finds
-    /// every hit in the ray's range. This is a kernel with a parameter for each array that it gathers from.
-    #[inline(always)]
-    pub(super) fn from_faces(
-        s: S,
-        m: S::M,
-        rays: &[Ray],
-        vertices: &[[f32; 4]],
-        faces: &[TetFace],
-        ray: S::U,
-        face: S::U,
-    ) -> (Self, S::M) {
-        let faces = <[[u32; 8]]>::ref_from_bytes(faces.as_bytes()).ok().expect("a face is eight words");
-        // The fields of a `TetFace`, in their order.
-        let [v0, v1, v2, _, above, below, apex_above, apex_below] = s.rows8(m, faces, face);
-        let vertex = [v0, v1, v2];
-        let mut prepared = PreparedWalks::new(s, m, rays, vertices, ray, vertex);
-        let lanes = &mut prepared.lanes;
-        let corner = three!(|i| lanes.corner(i));
-        let extent = Extent { reach: lanes.floats[float::REACH], size: lanes.floats[float::SIZE] };
-        let bound = extent.bound(s, extent.size);
-        let minus_bound = s.sub(s.splat(0.0), bound);
-        let (mut along_normal, mut against_normal) = (prepared.representable, prepared.representable);
-        let (mut area, mut volume) = (s.splat(0.0), s.splat(0.0));
-        for i in 0..3 {
-            let value = cross(s, &corner[i], &corner[(i + 1) % 3]);
-            (along_normal, against_normal) =
-                (s.and(along_normal, s.lt(bound, value)), s.and(against_normal, s.lt(value, minus_bound)));
-            let weight = s.abs(value);
-            area = s.add(area, weight);
-            volume = s.fma(weight, corner[(i + 2) % 3].depth, volume);
-        }
-        // volume / area is the depth of the intersection; `error_factor` times the greatest |depth| bounds the errors of both.
-        let tmin_low = prepared.tmin_low;
-        let mut greatest_depth = s.abs(tmin_low);
-        for p in &corner {
-            greatest_depth = s.max(s.abs(p.depth), greatest_depth);
-        }
-        let error_factor = s.fma(area, s.splat(LANE_DEPTH_SLACK), s.mul(bound, s.splat(6.0)));
-        let before_tmin = s.lt(
-            s.fma(error_factor, greatest_depth, s.add(volume, s.splat(LEAST_VOLUME))),
-            s.mul(tmin_low, area),
-        );
-        let in_reach = s.le(lanes.floats[float::REACH], s.splat(GREATEST_REACH));
-        let representable = s.and(s.or(along_normal, against_normal), s.and(before_tmin, in_reach));
-        // For rays against the face's normal, the orientation of the face is reversed.
-        lanes.words[word::TET] = s.select_u(along_normal, above, below);
-        lanes.words[word::APEX] = s.select_u(along_normal, apex_above, apex_below);
-        lanes.words[word::BEHIND] = s.or_u(face, s.splat_u(bth_format::layout::FACE_BIT));
-        lanes.words[word::FACE + 1] = s.select_u(along_normal, v1, v2);
-        lanes.words[word::FACE + 2] = s.select_u(along_normal, v2, v1);
-        for k in [float::X, float::Y, float::DEPTH] {
-            let (p1, p2) = (lanes.floats[k + 1], lanes.floats[k + 2]);
-            lanes.floats[k + 1] = s.select(along_normal, p1, p2);
-            lanes.floats[k + 2] = s.select(along_normal, p2, p1);
-        }
-        (prepared, representable)
     }
 }

@@ -1,5 +1,4 @@
-//! Which rays of a batch are prepared next for the lanes: walks that return to them, or the next rays of the batch, whose starts
-//! are located.
+//! Chooses the rays of a batch that are prepared next for the lanes: walks that return to them, or the next rays of the batch.
 
 use super::lanes::{three, word};
 use super::queue::{PreparedQueue, PreparedWalks};
@@ -8,7 +7,6 @@ use super::walk::{TetPosition, WalkOutcome};
 use super::walks::{WalkStart, Walks, vertices};
 use crate::intersect::line::Line;
 use crate::simd::{LANES, Part, Simd};
-use bth_format::layout::NONE;
 
 /// Fills the empty queue with prepared rays, until it is full or no rays are left but those that reach a face which is not yet
 /// tested. It depends on no query, so it is compiled once per instruction set.
@@ -24,7 +22,7 @@ impl<S: Simd> Part<S> for Fill<'_, '_> {
         let Fill { walks, queue } = self;
         queue.rewind();
         while queue.has_space() {
-            if walks.starts.len() < LANES && walks.next < walks.faces.len() {
+            if walks.starts.len() < LANES && walks.next < walks.rays.len() {
                 walks.fill_from_batch(s, queue);
             } else if walks.starts.is_empty() {
                 return;
@@ -71,37 +69,24 @@ impl Walks<'_> {
         self.starts.truncate(first);
     }
 
-    /// Prepares the next sixteen rays of the batch, or the last ones. Starts that f32 does not decide are located in f64.
+    /// Prepares the next sixteen rays of the batch, or the last ones. Entries that f32 does not decide are found in f64.
     #[inline(always)]
     fn fill_from_batch<S: Simd>(&mut self, s: S, queue: &mut PreparedQueue) {
         let first = self.next;
-        let part = &self.faces[first..self.faces.len().min(first + LANES)];
-        self.next += part.len();
-        let mut face = [NONE; LANES];
-        face[..part.len()].copy_from_slice(part);
-        let face = s.load_u(&face);
-        let valid = s.lt_u(face, s.splat_u(NONE));
-        let mut rest = (1u32 << part.len()) - 1;
+        let count = (self.rays.len() - first).min(LANES);
+        self.next += count;
         let ray = s.load_u(&std::array::from_fn(|i| (first + i) as u32));
-        if s.mask_bits(valid) == 0 {
-            if self.sole_leaf != NONE {
-                rest = self.fill_from_outside(s, queue, s.mask(rest), ray);
-            }
-            return self.locate_all(first as u32, rest);
+        let mut rest = self.fill_from_outside(s, queue, s.mask((1u32 << count) - 1), ray);
+        while rest != 0 {
+            self.enter_hull(first as u32 + rest.trailing_zeros());
+            rest &= rest - 1;
         }
-        let faces = self.object.tet_faces;
-        let (prepared, representable) =
-            PreparedWalks::from_faces(s, valid, self.rays, vertices(self.object), faces, ray, face);
-        let representable = s.mask_bits(representable);
-        queue.push(s, representable, &prepared.lanes);
-        rest &= !representable;
-        self.locate_all(first as u32, rest);
     }
 
-    /// Prepares rays that enter the sole tet leaf from outside. Returns the bits of the rays that f32 does not decide.
+    /// Prepares rays that enter the tet leaf from outside. Returns the bits of the rays that f32 does not decide.
     #[inline(always)]
     fn fill_from_outside<S: Simd>(&mut self, s: S, queue: &mut PreparedQueue, m: S::M, ray: S::U) -> u32 {
-        let leaf = &self.object.tet_leaves[self.sole_leaf as usize];
+        let leaf = &self.object.tet_leaves[self.leaf as usize];
         let hull = &self.object.hull_faces[leaf.first_hull as usize..][..leaf.hulls as usize];
         let (prepared, entered, missed) =
             PreparedWalks::from_hull(s, m, self.rays, vertices(self.object), hull, ray);
@@ -117,32 +102,11 @@ impl Walks<'_> {
         rest
     }
 
-    /// Locates in f64 the starts of the rays `first + i` for which bit i is set.
-    fn locate_all(&mut self, first: u32, mut bits: u32) {
-        while bits != 0 {
-            let ray = first + bits.trailing_zeros();
-            bits &= bits - 1;
-            if (self.faces[ray as usize] & self.sole_leaf) != NONE {
-                self.locate(ray);
-            }
-        }
-    }
-
-    /// Locates in f64 the start of a ray's walk: near its face, or where the ray enters its leaf.
+    /// Finds in f64 where a ray enters the leaf.
     #[inline(never)]
-    fn locate(&mut self, ray: u32) {
-        let object_ray = &self.rays[ray as usize];
-        let Some(line) = Line::new(object_ray) else { return };
-        let walker = self.walker(ray, &line);
-        let face = self.faces[ray as usize];
-        // A walk from the origin would miss hits with t < 0.
-        let located = if face != NONE && object_ray.tmin >= 0.0 { walker.locate(face) } else { None };
-        let position = match located {
-            Some(position) => Ok(position),
-            None if self.sole_leaf == NONE => return,
-            None => walker.enter_hull(),
-        };
-        match position {
+    fn enter_hull(&mut self, ray: u32) {
+        let Some(line) = Line::new(&self.rays[ray as usize]) else { return };
+        match self.walker(&line).enter_hull() {
             Ok(position) => {
                 self.starts.push(WalkStart { ray, tet: position.tet, entered: position.entered });
             }

@@ -6,13 +6,6 @@ use crate::rays::Ray;
 use bth_format::object::ObjectView;
 use zerocopy::{FromBytes, IntoBytes};
 
-/// The rays of a batch and where their walks begin, as in the fields of [`Walks`].
-pub(crate) struct WalkRays<'a> {
-    pub(crate) rays: &'a [Ray],
-    pub(crate) faces: &'a [u32],
-    pub(crate) sole_leaf: u32,
-}
-
 /// State of a ray's walk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum WalkState {
@@ -52,17 +45,15 @@ pub(crate) struct WalkLists {
     without_lanes: Vec<(u32, Option<TetPosition>)>,
 }
 
-/// The walks of a batch of rays, but for the queries. All slices have one element per ray.
+/// The walks of a batch of rays through one tet leaf, without the queries. All slices have one element per ray.
 pub(super) struct Walks<'a> {
     pub(super) object: &'a ObjectView<'a>,
     pub(super) records: LaneRecords<'a>,
     /// The rays, in object space.
     pub(super) rays: &'a [Ray],
-    /// For each ray the constrained face near which it starts, or `NONE`.
-    pub(super) faces: &'a [u32],
-    /// The tet leaf that rays enter from outside if they do not start near a face, or `NONE`.
-    pub(super) sole_leaf: u32,
-    /// Whether the walks keep track of depths: they can end any-hit queries, whose rays are often short.
+    /// Index of the tet leaf that the rays enter from outside.
+    pub(super) leaf: u32,
+    /// True if the walks keep track of depths: they can end any-hit queries, whose rays are often short.
     pub(super) keeps_depths: bool,
     /// For each ray the state of its walk.
     pub(super) states: &'a mut [WalkState],
@@ -79,11 +70,12 @@ pub(super) struct Walks<'a> {
 }
 
 impl<'a> Walks<'a> {
-    /// Walks none of which has begun, as `states` say. All slices have one element per ray.
+    /// Returns walks that have not begun, as `states` say. All slices have one element per ray.
     pub(super) fn new(
         object: &'a ObjectView<'a>,
         records: LaneRecords<'a>,
-        WalkRays { rays, faces, sole_leaf }: WalkRays<'a>,
+        rays: &'a [Ray],
+        leaf: u32,
         keeps_depths: bool,
         states: &'a mut [WalkState],
         WalkLists { starts, reached, returns, without_lanes }: &'a mut WalkLists,
@@ -98,8 +90,7 @@ impl<'a> Walks<'a> {
             object,
             records,
             rays,
-            faces,
-            sole_leaf,
+            leaf,
             keeps_depths,
             states,
             next: 0,

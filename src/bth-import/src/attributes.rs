@@ -5,12 +5,13 @@ use std::collections::HashMap;
 use crate::error::Result;
 use crate::mesh::{Attributes, Keep};
 use crate::raw::{Raw, RowKind};
-use crate::rows::NONE;
 use crate::source::input_error;
+use bth_format::layout::NONE;
 
-/// Shading attributes with one row for each used pair of normal and texture coordinate, in order of first use. A corner
-/// without one gets zeros; a zero normal means that the geometric normal is to be used. `None` when the source has
-/// nothing of what `keep` names. The second value has for each row of normals its row in the source, or [`NONE`] for zeros.
+/// Shading attributes with one row for each used pair of normal and texture coordinate, in order of
+/// first use. A corner without one gets zeros; a zero normal means that the geometric normal is to
+/// be used. `None` when the source has nothing of what `keep` names. The second value has for each
+/// row of normals its row in the source, or [`NONE`] for zeros.
 ///
 /// # Errors
 /// `BTH-I008` for a used value that is not finite.

@@ -1,4 +1,5 @@
-//! Polygons whose fans are not the polygons themselves: concave ones, from whose first corner not all of the polygon is seen.
+//! Polygons whose fans are not the polygons themselves: concave ones, from whose first corner not
+//! all of the polygon is seen.
 
 use glam::DVec3;
 
@@ -8,14 +9,16 @@ use crate::mesh::Polygons;
 use crate::monitor::Monitor;
 use crate::polygon::fan_areas;
 
-/// A fan covers something twice or reaches beyond its polygon where more than one part in so many of the polygon's area is turned
-/// over. Less is what coordinates with few digits do to corners on a straight line.
+/// A fan covers something twice or reaches beyond its polygon where more than one part in so many
+/// of the polygon's area is turned over. Less is what coordinates with few digits do to corners on
+/// a straight line.
 const PARTS: f64 = 1000.0;
 
 /// The concave polygons of a mesh.
 #[derive(Default)]
 pub(super) struct ConcavePolygons {
-    /// Fans some of whose triangles are turned over, or that have corners whose positions were not known yet.
+    /// Fans some of whose triangles are turned over, or that have corners whose positions were not
+    /// known yet.
     suspects: Vec<Fan>,
     /// Number of concave polygons.
     count: u64,
@@ -53,13 +56,15 @@ impl ConcavePolygons {
         }
     }
 
-    /// Finds which polygons are concave, and triangles for them if they are wanted, once all positions are known.
+    /// Finds which polygons are concave, and triangles for them if they are wanted, once all
+    /// positions are known.
     ///
     /// # Errors
     /// Cancellation.
     pub(super) fn find(
         &mut self,
-        (positions, triangles): (&[[f32; 3]], &[[u32; 3]]),
+        positions: &[[f32; 3]],
+        triangles: &[[u32; 3]],
         polygons: Polygons,
         monitor: &dyn Monitor,
     ) -> Result<()> {
@@ -88,7 +93,8 @@ impl ConcavePolygons {
         Ok(())
     }
 
-    /// Replaces the fans for which triangles were found in a list of triangles of positions or of attributes; an empty one stays empty.
+    /// Replaces the fans for which triangles were found in a list of triangles of positions or of
+    /// attributes; an empty one stays empty.
     pub(super) fn replace(&self, triangles: &mut [[u32; 3]]) {
         if triangles.is_empty() {
             return;
@@ -126,8 +132,9 @@ impl ConcavePolygons {
     }
 }
 
-/// The part of a polygon's area that triangles of its fan cover which are turned over relative to the polygon; `None` if not all
-/// positions of its corners are known. What has no area has no such part.
+/// The part of a polygon's area that triangles of its fan cover which are turned over relative to
+/// the polygon; `None` if not all positions of its corners are known. What has no area has no such
+/// part.
 fn turned_part(positions: &[[f32; 3]], face: &[u32]) -> Option<f64> {
     let known = |row: &u32| positions.get(*row as usize).map(|p| DVec3::from_array(p.map(f64::from)));
     if face.iter().any(|row| known(row).is_none()) {
@@ -159,7 +166,7 @@ mod tests {
 
     #[test]
     fn fans_of_concave_polygons_turn_over_but_from_some_corners() {
-        // An arrow head, of which the notch and its opposite corner see everything.
+        // An arrow head, whose notch and opposite corner see everything.
         let arrow = [[0.0, 0.0, 1.0], [2.0, -1.0, 1.0], [1.0, 0.0, 1.0], [2.0, 1.0, 1.0]];
         assert_concave(&arrow, &[false, true, false, true]);
         // The letter C is seen from no corner.
@@ -173,7 +180,8 @@ mod tests {
         let square = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
         assert_concave(&square, &[false; 4]);
         assert_concave(&square.map(|[x, y, z]| [x, y, z + x * y]), &[false; 4]);
-        // Corners on a straight line, one of which rounding has moved into the polygon, and one that comes twice.
+        // Corners on a straight line, one moved into the polygon by rounding, and one that comes
+        // twice.
         let rounded = [
             [0.0, 0.0, 0.0],
             [0.3, 1e-6, 0.0],

@@ -6,23 +6,24 @@ use bth_format::object::GREATEST_IN_F32;
 
 /// Where no |coordinate| is greater, products of distances within a leaf are denormal in f32.
 const LEAST: f32 = 1.0 / (1u64 << 50) as f32;
-/// Ratio of the size of a mesh to that of the [`Bulk`] of it from which on a triangle to such a vertex is taken for a mistake: all rays pass
-/// close to it.
+/// From this ratio of the mesh's size to its [`Bulk`], a vertex far out counts as a mistake: all
+/// rays pass close to its triangles.
 const FAR: f64 = (1u64 << 30) as f64;
 /// Number of vertices by which the bulk is found.
 const SAMPLES: usize = 4096;
-/// Of the sampled coordinates along each axis, one in so many may lie beyond either end of the bulk.
+/// Of the sampled coordinates along each axis, one in so many may lie beyond either end of the
+/// bulk.
 const OUTSIDE: usize = 16;
 
 /// The box in which most vertices lie.
 struct Bulk {
     middle: [f64; 3],
-    /// Its greatest extent.
+    /// Its largest extent.
     size: f64,
 }
 
 impl Bulk {
-    /// That of positions, of which there is at least one.
+    /// Returns the bulk of positions, of which there is at least one.
     fn of(positions: &[[f32; 3]]) -> Bulk {
         let step = positions.len().div_ceil(SAMPLES);
         let mut bulk = Bulk { middle: [0.0; 3], size: 0.0 };
@@ -37,13 +38,14 @@ impl Bulk {
         bulk
     }
 
-    /// Whether a position is so far out that it is taken for a mistake.
+    /// Returns true if a position is so far out that it is taken for a mistake.
     fn is_far(&self, position: &[f32; 3]) -> bool {
         (0..3).any(|k| (f64::from(position[k]) - self.middle[k]).abs() > FAR * self.size)
     }
 }
 
-/// Warns of vertices far out and, if there are none, of coordinates that are too great or too small for f32.
+/// Warns of vertices far out and, if there are none, of coordinates that are too great or too small
+/// for f32.
 pub(crate) fn warn(mesh: &Mesh, monitor: &dyn Monitor) {
     if mesh.positions.is_empty() {
         return;
@@ -90,7 +92,8 @@ mod tests {
         }
     }
 
-    /// What is said of a square of 40 by 40 vertices, all coordinates times `scale`, and of more vertices.
+    /// What is said of a square of 40 by 40 vertices, all coordinates times `scale`, and of more
+    /// vertices.
     fn said(scale: f32, more: &[[f32; 3]]) -> Vec<String> {
         let mut positions: Vec<[f32; 3]> =
             (0..1600).map(|i| [(i % 40) as f32 * scale, (i / 40) as f32 * scale, scale]).collect();

@@ -46,7 +46,7 @@ impl CornerGrid {
     }
 }
 
-/// The least and the greatest coordinates of points.
+/// The smallest and the largest coordinates of points.
 fn bounds(points: &[[f64; 2]]) -> [[f64; 2]; 2] {
     let of = |pick: fn(f64, f64) -> f64, start| {
         [0, 1].map(|k| points.iter().map(|point| point[k]).fold(start, pick))

@@ -1,7 +1,8 @@
-//! What decides where triangles of cut-out materials have holes: alpha of textures, factors and vertices.
+//! What decides where triangles of cut-out materials have holes: alpha of textures, factors and
+//! vertices.
 //!
-//! alpha(u, v) = factor · texture(u, v) · vertex alpha; the surface is there where alpha is at least the cutoff (glTF 2.0
-//! specification, §3.9.4).
+//! alpha(u, v) = factor · texture(u, v) · vertex alpha; the surface is there where alpha is at
+//! least the cutoff (glTF 2.0 specification, §3.9.4).
 
 use serde::{Deserialize, Serialize};
 
@@ -12,9 +13,9 @@ pub enum AlphaMode {
     /// None: every triangle is opaque.
     #[default]
     None,
-    /// Those of alpha mode MASK.
+    /// Materials of alpha mode MASK.
     Mask,
-    /// Those of alpha mode MASK, and those of BLEND as if they had a cutoff of 0.5.
+    /// Materials of alpha mode MASK, and of BLEND with a cutoff of 0.5.
     Blend,
 }
 
@@ -48,12 +49,12 @@ pub struct CutoutMaterial {
     pub image: Option<usize>,
     /// How u and v find texels.
     pub wrap: [Wrap; 2],
-    /// Whether the nearest texel decides; else the four around are interpolated bilinearly. Centers of texels are at
-    /// (k + ½) / size.
+    /// True if the nearest texel decides; else the four around are interpolated bilinearly. Centers
+    /// of texels are at (k + ½) / size.
     pub nearest: bool,
     /// Alpha of the material's colour, from 0 to 1.
     pub factor: f64,
-    /// Least alpha at which there is a surface.
+    /// Smallest alpha at which there is a surface.
     pub cutoff: f64,
 }
 
@@ -62,7 +63,8 @@ pub struct CutoutMaterial {
 pub struct CutoutCorner {
     /// Texture coordinates, after the texture's transform.
     pub uv: [f32; 2],
-    /// Alpha of the vertex colour, from 0 to 1; 1 without one. Between the corners it is interpolated linearly.
+    /// Alpha of the vertex colour, from 0 to 1; 1 without one. Between the corners it is
+    /// interpolated linearly.
     pub alpha: f32,
 }
 

@@ -1,18 +1,19 @@
 //! What moves the vertices of a mesh: joints with weights, and morph targets.
 //!
-//! A reader records it for the source's own rows ([`RawDeformation`]). Vertices are then merged where both their positions and
-//! what moves them are equal ([`RawDeformation::weld`]), and the rest is brought into the form of the compiled file ([`Deformation`]).
+//! A reader records it for the source's own rows ([`RawDeformation`]). Vertices are merged where
+//! both their positions and what moves them are equal ([`RawDeformation::equal_vertices`]), and the
+//! rest is brought into the form of the compiled file ([`Deformation`]).
 
 use std::collections::HashMap;
+use std::sync::atomic::AtomicU32;
 
 use bth_format::layout::{self, MAX_INFLUENCE_SETS, Morph, NONE};
-
-use crate::weld::Welded;
 
 /// Joints of a vertex: at most this many.
 pub(crate) const MOST_INFLUENCES: usize = 4 * MAX_INFLUENCE_SETS as usize;
 
-/// A share of a sparse morph's rows from which a dense one is smaller: a sparse delta takes 16 bytes, a dense one 12.
+/// A share of a sparse morph's rows from which a dense one is smaller: a sparse delta takes 16
+/// bytes, a dense one 12.
 const DENSE_FROM: (usize, usize) = (3, 4);
 
 /// What moves the vertices of a mesh, as the deformation sections of a compiled file have it.
@@ -22,7 +23,7 @@ pub struct Deformation {
     pub counts: layout::Deformation,
     /// Joints that move a position, for each as many rows as there are sets.
     pub joints: Vec<[u16; 4]>,
-    /// Their weights, as in the source; those of a position without any are 1 for its first joint.
+    /// Their weights, as in the source. A position without weights follows its first joint.
     pub weights: Vec<[f32; 4]>,
     /// What the targets add to positions, then, if there is any such, what they add to normals.
     pub morphs: Vec<Morph>,
@@ -51,7 +52,7 @@ pub(crate) struct RawMorph {
 pub(crate) struct RawDeformation {
     /// Sets of four joints that the vertices have.
     pub(crate) sets: usize,
-    /// One more than the greatest joint.
+    /// One more than the largest joint.
     pub(crate) joint_count: u32,
     /// For each position, if there are sets.
     pub(crate) influences: Vec<Influences>,
@@ -96,39 +97,20 @@ impl RawDeformation {
             .collect()
     }
 
-    /// As [`crate::weld::weld`], for vertices that are equal only where also all that moves them is. The second value has for each
-    /// position that is left one of its rows in the source.
-    ///
-    /// # Errors
-    /// The row of the first used position that is not finite.
-    pub(crate) fn weld(
-        &self,
-        positions: &[[f32; 3]],
-        triangles: &mut [[u32; 3]],
-    ) -> Result<(Welded, Vec<u32>), usize> {
-        let classes = self.classes(positions.len());
-        let (mut left, mut sources) = (Vec::new(), Vec::new());
-        let mut found: HashMap<([u32; 3], u32), u32> = HashMap::new();
-        let mut used = vec![false; positions.len()];
-        for corner in triangles.as_flattened_mut() {
-            let row = *corner as usize;
-            let position = positions[row].map(|x| x + 0.0);
-            if !position.iter().all(|x| x.is_finite()) {
-                return Err(row);
-            }
-            used[row] = true;
-            *corner = *found.entry((position.map(f32::to_bits), classes[row])).or_insert_with(|| {
-                left.push(position);
-                sources.push(row as u32);
-                left.len() as u32 - 1
-            });
-        }
-        let unused = positions.iter().zip(&used).filter(|(_, used)| !**used);
-        let non_finite_unused = unused.filter(|(p, _)| !p.iter().all(|x| x.is_finite())).count() as u64;
-        Ok((Welded { positions: left, non_finite_unused }, sources))
+    /// Returns for each vertex the first row whose position and all that moves it are equal, bit
+    /// for bit; -0 of a position equals +0.
+    pub(crate) fn equal_vertices(&self, positions: &[[f32; 3]]) -> Vec<AtomicU32> {
+        let mut first = HashMap::new();
+        let rows = positions.iter().zip(self.classes(positions.len())).zip(0u32..);
+        rows.map(|((position, class), row)| {
+            let key = (position.map(|x| (x + 0.0).to_bits()), class);
+            AtomicU32::new(*first.entry(key).or_insert(row))
+        })
+        .collect()
     }
 
-    /// In the form of the compiled file, given for each of its positions and normals the row in the source.
+    /// In the form of the compiled file, given for each of its positions and normals the row in the
+    /// source.
     pub(crate) fn finish(&self, positions: &[u32], normals: &[u32]) -> Deformation {
         let sets = self.sets;
         let counts = layout::Deformation {

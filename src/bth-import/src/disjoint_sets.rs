@@ -22,8 +22,9 @@ impl DisjointSets {
         row
     }
 
-    /// Joins the sets of the corners of a triangle. Returns how many sets are gone. The smaller row becomes the root, which keeps the
-    /// forest shallow on meshes whose rows are in order of first use.
+    /// Joins the sets of the corners of a triangle. Returns how many sets are gone. The smaller row
+    /// becomes the root, which keeps the forest shallow on meshes whose rows are in order of first
+    /// use.
     pub(crate) fn join(&mut self, [a, b, c]: [u32; 3]) -> u64 {
         let mut gone = 0;
         let mut first = self.root(a);

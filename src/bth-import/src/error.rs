@@ -62,7 +62,8 @@ pub enum Error {
         /// Which limit, and the model's figure.
         message: String,
     },
-    /// The result failed the compiler's own checks, which is a defect of the compiler; programs exit with code 70.
+    /// The result failed the compiler's own checks, which is a defect of the compiler; programs
+    /// exit with code 70.
     #[error("{code}: internal error: {message}{}", hint_text(DEFECT))]
     Internal {
         /// Stable code, `BTH-X…`.

@@ -1,6 +1,6 @@
 //! Formats of models that are not read, told by their first bytes, so that an error can name them.
 
-use crate::number::without_mark;
+use crate::text::without_mark;
 
 /// What an error says of a file of another format.
 #[derive(Debug, PartialEq)]

@@ -8,9 +8,11 @@ use std::collections::HashMap;
 pub struct Groups {
     /// The groups that have triangles, in order of their first ones.
     pub groups: Vec<Group>,
-    /// Names of the materials that groups use, in order of first use; names may repeat and be empty.
+    /// Names of the materials that groups use, in order of first use; names may repeat and be
+    /// empty.
     pub materials: Vec<String>,
-    /// Successive triangles of one group, ascending: the first one of the run, and its group. Neighbours differ in their groups.
+    /// Successive triangles of one group, ascending: the first one of the run, and its group.
+    /// Neighbours differ in their groups.
     pub runs: Vec<[u32; 2]>,
 }
 
@@ -49,7 +51,7 @@ impl GroupRecorder {
         self.groups.len() as u32 - 1
     }
 
-    /// From the triangle `first` on, which is not below those of earlier calls, triangles belong to `group`.
+    /// Triangles from `first` on belong to `group`. `first` ascends from call to call.
     pub(super) fn start(&mut self, first: usize, group: u32) {
         let first = first as u32;
         self.runs.pop_if(|last| last[0] == first);
@@ -58,9 +60,10 @@ impl GroupRecorder {
         }
     }
 
-    /// The groups of a mesh of so many triangles. Those before the first start are of a group without a name; groups and
-    /// materials without triangles are left out. None at all, if there is but one without a name and a material. The second value
-    /// has the numbers of the materials that stay.
+    /// The groups of a mesh of so many triangles. Those before the first start are of a group
+    /// without a name; groups and materials without triangles are left out. None at all, if there
+    /// is but one without a name and a material. The second value has the numbers of the materials
+    /// that stay.
     pub(super) fn finish(mut self, triangles: usize) -> (Groups, Vec<u32>) {
         self.runs.retain(|run| (run[0] as usize) < triangles);
         if triangles > 0 && self.runs.first().is_none_or(|run| run[0] > 0) {
@@ -92,8 +95,8 @@ impl GroupRecorder {
     }
 }
 
-/// The groups of a source whose groups are told apart by their name and the name of their material: a pair that comes again is the
-/// same group.
+/// The groups of a source whose groups are told apart by their name and the name of their material:
+/// a pair that comes again is the same group.
 #[derive(Debug, Default)]
 pub(super) struct NamedGroups {
     pub(super) recorder: GroupRecorder,
@@ -110,7 +113,8 @@ impl NamedGroups {
         self.start(first);
     }
 
-    /// From the triangle `first` on, triangles are of the material of this name; an empty one is none.
+    /// From the triangle `first` on, triangles are of the material of this name; an empty one is
+    /// none.
     pub(super) fn material(&mut self, first: usize, name: String) {
         let recorder = &mut self.recorder;
         self.material = (!name.is_empty())

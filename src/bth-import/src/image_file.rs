@@ -1,13 +1,13 @@
-//! Image files, and what is checked of them without decoding them: format and size.
+//! Reads image files and checks their format and size without decoding them.
 
 use crate::error::{Error, Result as ImportResult};
 use crate::source::read_at_most;
 use imagesize::{ImageError, ImageType};
 use std::path::Path;
 
-/// Greatest number of texels of an image that is kept: 8,192 by 8,192.
+/// The largest number of texels of an image that is kept: 8,192 by 8,192.
 pub(crate) const MAX_TEXELS: u64 = 1 << 26;
-/// Greatest number of bytes of an image or a material library in a file of its own.
+/// The largest file of an image or a material library, in bytes.
 const MAX_FILE: u64 = 1 << 28;
 
 /// Why an image is not kept.
@@ -19,7 +19,7 @@ pub(crate) enum Refused {
     TooLarge(u64),
 }
 
-/// The bytes of an image or a material library beside a model.
+/// Reads an image or a material library next to a model.
 ///
 /// # Errors
 /// `BTH-O001` when it cannot be read or is no regular file, `BTH-L003` for one that is too large.
@@ -33,7 +33,7 @@ pub(crate) fn read(path: &Path) -> ImportResult<Vec<u8>> {
     }
 }
 
-/// Checks that the header of a file is that of a PNG, JPEG or WebP image of a size that is kept.
+/// Checks by its header that a file is a PNG, JPEG or WebP image of a size that is kept.
 pub(crate) fn check(bytes: &[u8]) -> Result<(), Refused> {
     let malformed = |what: &str| Err(Refused::Malformed(what.to_owned()));
     match imagesize::image_type(bytes) {
@@ -41,18 +41,27 @@ pub(crate) fn check(bytes: &[u8]) -> Result<(), Refused> {
         _ => return malformed("expected a PNG, JPEG or WebP image, found something else"),
     }
     match imagesize::blob_size(bytes) {
-        Ok(size) if size.width == 0 || size.height == 0 => {
-            malformed("expected an image with texels, found none")
-        }
-        Ok(size) => match size.width as u64 * size.height as u64 {
-            texels if texels > MAX_TEXELS => Err(Refused::TooLarge(texels)),
-            _ => Ok(()),
-        },
+        Ok(size) => check_size(size.width, size.height).map(|_| ()),
         Err(ImageError::CorruptedImage | ImageError::IoError(_)) => {
             malformed("expected a whole image, found one that is cut off or damaged")
         }
         Err(_) => malformed("expected a PNG, JPEG or WebP image, found something else"),
     }
+}
+
+/// Returns the number of texels of an image.
+pub(crate) fn check_size(width: usize, height: usize) -> Result<u64, Refused> {
+    match width as u64 * height as u64 {
+        0 => Err(Refused::Malformed("expected an image with texels, found none".to_owned())),
+        texels if texels > MAX_TEXELS => Err(Refused::TooLarge(texels)),
+        texels => Ok(texels),
+    }
+}
+
+/// Returns the error for an image of too many texels.
+pub(crate) fn too_large(image: impl std::fmt::Display, texels: u64) -> Error {
+    let message = format!("{image} has {texels} texels; up to {MAX_TEXELS} are kept");
+    Error::Limit { code: "BTH-L003", message }
 }
 
 #[cfg(test)]

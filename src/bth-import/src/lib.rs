@@ -1,9 +1,11 @@
-//! Reads models: OBJ, PLY, STL, OFF, glTF and GLB into welded triangle meshes, and glTF scenes into manifests.
+//! Reads models: OBJ, PLY, STL, OFF, glTF and GLB into welded triangle meshes, and glTF scenes into
+//! manifests.
 //!
-//! [`import()`] is the entry point; [`import_sequence`] and [`import_vertex_cache`] are those for meshes whose vertices move. It finds the format, and the format's reader (`obj`, `ply`, `stl`, `off` or [`gltf`])
-//! turns the file into a `raw` mesh with the source's own rows. Then `weld` merges bit-equal positions, `attributes`
-//! merges shading rows, and `topology` makes the counts of the report. [`gltf::scene`] reads nodes, animations, cameras
-//! and lights into a manifest instead.
+//! [`import()`] is the entry point, and [`import_sequence`] and [`import_vertex_cache`] for meshes
+//! whose vertices move. `formats` finds the format, whose reader turns the file into a `raw` mesh
+//! with the source's own rows. Then `weld` merges equal positions, `attributes` merges shading
+//! rows, and `topology` makes the counts of the report. [`gltf::scene`] reads nodes, animations,
+//! cameras and lights into a manifest instead.
 #![warn(missing_docs)]
 
 mod attributes;
@@ -16,6 +18,7 @@ mod disjoint_sets;
 mod ears;
 pub mod error;
 mod foreign;
+mod formats;
 pub mod gltf;
 mod groups;
 mod image_file;
@@ -24,18 +27,11 @@ mod materials;
 mod memory;
 mod mesh;
 pub mod monitor;
-mod mtl;
-mod number;
-mod obj;
-mod off;
-mod ply;
 mod polygon;
 mod raw;
-mod rows;
 mod sequence;
 mod source;
-mod statements;
-mod stl;
+mod text;
 mod topology;
 mod weld;
 mod zero_area;
@@ -43,11 +39,12 @@ mod zero_area;
 pub use cutout::{AlphaImage, AlphaMode, CutoutCorner, CutoutMaterial, CutoutTriangle, Cutouts, Wrap};
 pub use deformation::Deformation;
 pub use error::{Error, Place, Result};
+pub use formats::{extensions, source_files};
 pub use gltf::GltfPart;
 pub use groups::{Group, Groups};
 pub use import::{
     import, import_bytes, import_cutouts, import_cutouts_bytes, import_gltf_cutouts, import_gltf_parts,
-    import_gltf_parts_bytes, import_images, source_files,
+    import_gltf_parts_bytes, import_images,
 };
 pub use materials::{ImageFile, Looks, Materials, Unreadable};
 pub use memory::{MEMORY_FORMAT, import_triangles};

@@ -1,5 +1,5 @@
-//! How the materials of a mesh look, as the sections of a compiled file have it: parameters, textures, vertex colours, and a
-//! second set of texture coordinates.
+//! How the materials of a mesh look, as the sections of a compiled file have it: parameters,
+//! textures, vertex colours, and a second set of texture coordinates.
 
 use crate::cutout::AlphaMode;
 use crate::error::{Error, Result};
@@ -7,7 +7,7 @@ use crate::monitor::Monitor;
 use crate::source::IMAGE;
 use bth_format::file::hash128;
 use bth_format::layout::{MaterialParameters, NONE, Texture, UV_SET_SECOND};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::hash::Hash;
 
 /// The materials of a mesh's groups, and the colours of its vertices.
@@ -27,18 +27,21 @@ pub struct Materials {
     pub second_uvs: Vec<[f32; 2]>,
 }
 
-/// What becomes of images and material libraries that are missing, broken or too large (`--lenient-materials`).
+/// What becomes of images and material libraries that are missing, broken or too large
+/// (`--lenient-materials`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Unreadable {
     /// They are errors.
     #[default]
     Refused,
-    /// They are left out, each with a warning. A base colour counts as white then, and what would emit does not.
+    /// They are left out, each with a warning. A base colour counts as white then, and what would
+    /// emit does not.
     LeftOut,
 }
 
 impl Unreadable {
-    /// What was read. `None`, with a warning, for an image or a material library that cannot be read and is left out.
+    /// What was read. `None`, with a warning, for an image or a material library that cannot be
+    /// read and is left out.
     ///
     /// # Errors
     /// Other errors, and all where nothing is left out.
@@ -52,6 +55,14 @@ impl Unreadable {
         };
         monitor.warn(&format!("{what}; it is left out"));
         Ok(None)
+    }
+}
+
+/// Warns of what some material has and no file keeps.
+pub(crate) fn warn_left_out(names: &BTreeSet<String>, monitor: &dyn Monitor) {
+    if !names.is_empty() {
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        monitor.warn(&format!("materials: not kept are {}", names.join(", ")));
     }
 }
 
@@ -91,7 +102,8 @@ impl ImageFile {
 /// The colour of what has no vertex colour.
 const WHITE: [f32; 4] = [1.0; 4];
 
-/// The parameters of a material about which the source says nothing: white, opaque, seen from both sides.
+/// The parameters of a material about which the source says nothing: white, opaque, seen from both
+/// sides.
 pub(crate) const PLAIN: MaterialParameters = MaterialParameters {
     base_color: [1.0; 4],
     emissive: [0.0; 3],
@@ -118,7 +130,7 @@ pub(crate) struct MaterialRecorder {
 type TextureKey = ([u8; 16], [u32; 2], [u32; 2], [u32; 6]);
 
 impl MaterialRecorder {
-    /// The row of a texture, which is added if there is none like it.
+    /// Returns the row of a texture, which is added if it is new.
     pub(crate) fn texture(&mut self, texture: Texture) -> u32 {
         let mut bits = [0; 6];
         bits.iter_mut().zip(texture.transform.as_flattened()).for_each(|(to, x)| *to = x.to_bits());
@@ -131,7 +143,8 @@ impl MaterialRecorder {
         row
     }
 
-    /// The materials of a mesh of so many triangles. `kept` are the numbers of the materials that its groups have, in order.
+    /// The materials of a mesh of so many triangles. `kept` are the numbers of the materials that
+    /// its groups have, in order.
     pub(crate) fn finish(self, kept: &[u32], triangles: usize) -> Materials {
         let Self { parameters, textures, colors, second_uvs, .. } = self;
         let parameters: Vec<_> = match parameters.is_empty() {
@@ -145,7 +158,8 @@ impl MaterialRecorder {
     }
 }
 
-/// The materials without the textures that none of them refers to, and without a second set of coordinates that no texture has.
+/// The materials without the textures that none of them refers to, and without a second set of
+/// coordinates that no texture has.
 fn used(mut materials: Materials) -> Materials {
     let mut rows = HashMap::new();
     let mut used = Vec::new();
@@ -191,7 +205,8 @@ impl<T: Copy + Eq + Hash> CornerRecorder<T> {
         row
     }
 
-    /// Adds the rows of the corners of triangles from the triangle `first` on; those before without rows have `absent`.
+    /// Adds the rows of the corners of triangles from the triangle `first` on; those before without
+    /// rows have `absent`.
     pub(crate) fn add(&mut self, first: usize, corners: impl Iterator<Item = [u32; 3]>, absent: T) {
         self.fill(first, absent);
         self.corners.extend(corners);
@@ -235,7 +250,8 @@ impl ColorRecorder {
         self.row([r, g, b, 1.0])
     }
 
-    /// Adds the rows of the corners of triangles from the triangle `first` on; those before without colours are white.
+    /// Adds the rows of the corners of triangles from the triangle `first` on; those before without
+    /// colours are white.
     pub(crate) fn add(&mut self, first: usize, corners: impl Iterator<Item = [u32; 3]>) {
         self.0.add(first, corners, color(WHITE));
     }

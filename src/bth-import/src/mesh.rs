@@ -5,31 +5,36 @@ use crate::groups::Groups;
 use crate::materials::{Materials, Unreadable};
 use serde::{Deserialize, Serialize};
 
-/// A triangle mesh in object space, with bit-equal positions welded (-0 counts as +0) unless all vertices of the source are wanted.
+/// A triangle mesh in object space, with bit-equal positions welded (-0 counts as +0) unless all
+/// vertices of the source are wanted.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
-    /// Distinct finite positions, in order of first use by the faces; with [`Wanted::vertices`] those of the source in its order.
+    /// Distinct finite positions, in order of first use by the faces; with [`Wanted::vertices`] all
+    /// positions of the source in its order.
     pub positions: Vec<[f32; 3]>,
-    /// Rows of `positions`, in the source's face order after polygons have been triangulated. The index of a triangle here is its id
-    /// in the compiled file and in hits. Degenerate triangles are kept.
+    /// Rows of `positions`, in the source's face order after polygons have been triangulated. The
+    /// index of a triangle here is its id in the compiled file and in hits. Degenerate triangles
+    /// are kept.
     pub triangles: Vec<[u32; 3]>,
     /// Shading attributes, if the source has some and the caller keeps them.
     pub attributes: Option<Attributes>,
-    /// Where triangles let rays pass, in the form of the compiled file; `None` where all are opaque. The compiler fills it in.
+    /// Where triangles let rays pass, in the form of the compiled file; `None` where all are
+    /// opaque. The compiler fills it in.
     pub opacity: Option<TriangleOpacities>,
     /// Groups of triangles, if the caller wants them.
     pub groups: Option<Groups>,
     /// How the materials of the groups look, if the caller wants them.
     pub materials: Option<Materials>,
-    /// The positions at other times, if the mesh is a sequence; `positions` are then those of the first frame.
+    /// The positions at other times, if the mesh is a sequence; `positions` are then the first
+    /// frame.
     pub sequence: Option<Sequence>,
-    /// What moves its vertices, of a [`GltfPart::Deforming`](crate::GltfPart::Deforming). Positions are then distinct together with what
-    /// moves them.
+    /// What moves its vertices, of a [`GltfPart::Deforming`](crate::GltfPart::Deforming). Positions
+    /// are then distinct together with what moves them.
     pub deformation: Option<Deformation>,
 }
 
-/// Positions of a mesh at several times. Between two frames vertices move on straight lines at constant speed; before the first and
-/// after the last they stand still.
+/// Positions of a mesh at several times. Between two frames vertices move on straight lines at
+/// constant speed; before the first and after the last they stand still.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sequence {
     /// Seconds of the frames, strictly ascending; at least one.
@@ -47,7 +52,8 @@ pub struct TriangleOpacities {
     pub micro: Vec<u32>,
 }
 
-/// What the opacity of a mesh's triangles consists of. Shares are of the area of the triangles of cut-out materials.
+/// What the opacity of a mesh's triangles consists of. Shares are of the area of the triangles of
+/// cut-out materials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct OpacityReport {
     /// Triangles of cut-out materials.
@@ -60,7 +66,8 @@ pub struct OpacityReport {
     pub opaque: f64,
     /// Share of the area that is transparent.
     pub transparent: f64,
-    /// Share of the area that is neither: the edges of holes, where they are finer than micro-triangles.
+    /// Share of the area that is neither: the edges of holes, where they are finer than
+    /// micro-triangles.
     pub unknown: f64,
     /// Bytes of the sections.
     pub bytes: u64,
@@ -73,7 +80,8 @@ pub struct Attributes {
     pub corners: Vec<[u32; 3]>,
     /// Normals as in the source, or empty.
     pub normals: Vec<[f32; 3]>,
-    /// Texture coordinates, or empty. When there are normals too, both have the same number of rows.
+    /// Texture coordinates, or empty. When there are normals too, both have the same number of
+    /// rows.
     pub uvs: Vec<[f32; 2]>,
 }
 
@@ -90,14 +98,16 @@ pub enum Keep {
     All,
 }
 
-/// How polygons of more than three corners become triangles. There are two triangles fewer than corners either way.
+/// How polygons of more than three corners become triangles. There are two triangles fewer than
+/// corners either way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Polygons {
     /// Fans from the first corner, which cover more than the polygon where it is concave.
     #[default]
     Fans,
-    /// Fans where these cover nothing twice, and otherwise ears that are clipped one after the other, which cover the polygon exactly.
+    /// Fans where these cover nothing twice, and otherwise ears that are clipped one after the
+    /// other, which cover the polygon exactly.
     Ears,
 }
 
@@ -114,7 +124,8 @@ pub struct Wanted {
     pub unreadable: Unreadable,
     /// How polygons of OBJ, PLY, OFF and STL become triangles (`--polygons`).
     pub polygons: Polygons,
-    /// All vertices of the source, in its order, those at equal positions and unused ones too (`--deformable`).
+    /// All vertices of the source, in its order, those at equal positions and unused ones too
+    /// (`--deformable`).
     pub vertices: bool,
 }
 
@@ -137,13 +148,15 @@ pub struct Report {
     pub positions: u64,
     /// Faces of more than three corners.
     pub polygons: u64,
-    /// Those of them that are concave, so that the fan from the first corner covers more than the polygon.
+    /// Those of them that are concave, so that the fan from the first corner covers more than the
+    /// polygon.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub concave: u64,
-    /// Elements that were left out: faces of fewer than three corners, triangles of glTF that the number of indices leaves
-    /// incomplete, points and lines.
+    /// Elements that were left out: faces of fewer than three corners, triangles of glTF that the
+    /// number of indices leaves incomplete, points and lines.
     pub skipped: u64,
-    /// Triangles of exactly zero area, decided by exact arithmetic. They keep their ids, and no ray hits them.
+    /// Triangles of exactly zero area, decided by exact arithmetic. They keep their ids, and no ray
+    /// hits them.
     pub degenerate: u64,
     /// Triangles with the same three positions as an earlier one.
     pub duplicate: u64,

@@ -10,13 +10,14 @@ pub trait Monitor: Sync {
     fn stage(&self, _name: &'static str, _total: Option<u64>) {}
     /// `units` more units of the stage are done.
     fn advance(&self, _units: u64) {}
-    /// Whether the user cancelled. Stages call this a few times a second.
+    /// Returns true if the user cancelled. Stages call this a few times a second.
     fn cancelled(&self) -> bool {
         false
     }
     /// A message for the user about something that is not an error.
     fn warn(&self, _message: &str) {}
-    /// As [`Self::warn`], about this machine or this run and not about what is compiled, so that it is not kept with results.
+    /// As [`Self::warn`], about this machine or this run and not about what is compiled, so that it
+    /// is not kept with results.
     fn notice(&self, message: &str) {
         self.warn(message);
     }
@@ -34,8 +35,8 @@ impl dyn Monitor + '_ {
 pub struct Silent;
 impl Monitor for Silent {}
 
-/// A monitor that also keeps the warnings that it passes on. Of several with the same text the first counts: a document that holds many
-/// meshes is read more than once.
+/// A monitor that also keeps the warnings that it passes on. Of several with the same text the
+/// first counts: a document that holds many meshes is read more than once.
 pub struct Recording<'a> {
     to: &'a dyn Monitor,
     keeps_notices: bool,

@@ -8,7 +8,7 @@ use crate::materials::MaterialRecorder;
 use crate::mesh::Polygons;
 use crate::monitor::Monitor;
 use crate::polygon::fan;
-use crate::rows::NONE;
+use bth_format::layout::NONE;
 use bth_format::limits::MAX_TRIANGLES;
 
 /// The three kinds of rows of a [`Raw`] mesh.
@@ -22,7 +22,8 @@ pub(super) enum RowKind {
     Uv,
 }
 
-/// Finds the place of a row in the source. It may read the source again, so it is for error messages only.
+/// Finds the place of a row in the source. It may read the source again, so it is for error
+/// messages only.
 pub(super) type Locate<'a> = Box<dyn Fn(RowKind, usize) -> Place + 'a>;
 
 /// A mesh with the rows of its source. Its reader has checked that all indices are in range.
@@ -87,16 +88,27 @@ impl<'a> Raw<'a> {
         check_triangles(self.triangles.len() as u64)
     }
 
-    /// Finds which polygons are concave, and splits them as wanted, once all faces and positions are read.
+    /// Finds which polygons are concave, and splits them as wanted, once all faces and positions
+    /// are read.
     ///
     /// # Errors
     /// Cancellation.
     pub(super) fn finish_polygons(&mut self, polygons: Polygons, monitor: &dyn Monitor) -> Result<()> {
-        self.concave.find((&self.positions, &self.triangles), polygons, monitor)?;
+        self.concave.find(&self.positions, &self.triangles, polygons, monitor)?;
         for triangles in [&mut self.triangles, &mut self.normal_rows, &mut self.uv_rows] {
             self.concave.replace(triangles);
         }
         Ok(())
+    }
+
+    /// Forgets the rows of attributes that the source does not have.
+    pub(super) fn drop_unused_rows(&mut self) {
+        if self.normals.is_empty() {
+            self.normal_rows.clear();
+        }
+        if self.uvs.is_empty() {
+            self.uv_rows.clear();
+        }
     }
 
     /// Counts faces of more than three corners as polygons and of fewer as skipped.
@@ -130,8 +142,9 @@ pub(super) fn check_rows(count: u64) -> Result<()> {
     })
 }
 
-/// Triangles of a strip as OpenGL and glTF order them, every second one with its last two corners exchanged. Triangles
-/// that repeat a corner are kept, so that a triangle's id is its position in the strip.
+/// Triangles of a strip as OpenGL and glTF order them, every second one with its last two corners
+/// exchanged. Triangles that repeat a corner are kept, so that a triangle's id is its position in
+/// the strip.
 pub(super) fn strip(indices: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
     indices
         .windows(3)

@@ -22,12 +22,12 @@ pub(crate) struct Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// A source of which nothing is read yet.
+    /// Returns a source before anything is read.
     pub(crate) fn new(path: &'a Path, data: &'a [u8], monitor: &'a dyn Monitor) -> Self {
         Source { path, data, monitor, reported: Cell::new(0) }
     }
 
-    /// As [`Self::progress`], but only for one row in [`ROWS_BETWEEN_CHECKS`].
+    /// Does the same as [`Self::progress`], but only for one row in [`ROWS_BETWEEN_CHECKS`].
     #[inline]
     pub(crate) fn tick(&self, row: u64, bytes: usize) -> Result<()> {
         if row.is_multiple_of(ROWS_BETWEEN_CHECKS) { self.progress(bytes) } else { Ok(()) }
@@ -40,8 +40,8 @@ impl<'a> Source<'a> {
         self.monitor.check()
     }
 
-    /// Refuses the pointer that Git LFS puts in the place of a file that was not fetched. Its text would be a valid OBJ
-    /// without faces.
+    /// Refuses the pointer that Git LFS puts instead of a file that was not fetched. Its text would
+    /// be a valid OBJ without faces.
     pub(crate) fn fetched(&self) -> Result<()> {
         if !self.data.starts_with(b"version https://git-lfs.github.com/") {
             return Ok(());
@@ -112,7 +112,7 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>> {
     bth_files::regular_file(path).and_then(|_| std::fs::read(path)).map_err(|e| cannot_read(path, &e))
 }
 
-/// The first bytes of a file beside a model, at most `most`.
+/// The first bytes of a file next to a model, at most `most`.
 ///
 /// # Errors
 /// `BTH-O001` when it cannot be read or is no regular file.

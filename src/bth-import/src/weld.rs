@@ -1,42 +1,23 @@
 //! Merges bit-equal positions.
 
-use crate::rows::NONE;
+use bth_format::layout::NONE;
 use rayon::prelude::*;
 use std::sync::atomic::AtomicU32;
 use std::sync::atomic::Ordering::Relaxed;
 
-/// The result of [`weld`].
-#[derive(Debug, PartialEq)]
-pub(super) struct Welded {
-    /// Distinct positions in order of first use, with +0 in the place of -0.
-    pub(super) positions: Vec<[f32; 3]>,
-    /// Positions that are not finite and that no face uses.
-    pub(super) non_finite_unused: u64,
-}
-
-/// Replaces the rows of `triangles` by rows of distinct positions. These are in order of first use, so the result does
-/// not depend on unused positions. -0 equals +0.
-///
-/// # Errors
-/// The row of the first used position that is not finite.
-pub(super) fn weld(positions: &[[f32; 3]], triangles: &mut [[u32; 3]]) -> Result<Welded, usize> {
+/// Numbers the classes of equal rows that triangles use in order of first use, and replaces the
+/// rows of `triangles` by these numbers. So the result does not depend on unused rows. `same_as`
+/// has for each row the first row that is equal to it. Returns that row for each number.
+pub(super) fn number(same_as: &[AtomicU32], triangles: &mut [[u32; 3]]) -> Vec<u32> {
     let corners = triangles.as_flattened_mut();
-    let finite = |row: u32| positions[row as usize].iter().all(|x| x.is_finite());
-    let non_finite = (0..positions.len() as u32).into_par_iter().filter(|row| !finite(*row)).count() as u64;
-    if non_finite > 0
-        && let Some(row) = corners.par_iter().find_first(|row| !finite(**row))
-    {
-        return Err(*row as usize);
-    }
-    let same_as = first_equal_rows(positions);
-    let first_uses = first_uses(corners, &same_as);
-    let same_as = |row: u32| same_as[row as usize].load(Relaxed);
+    let first_uses = first_uses(corners, same_as);
+    let same = |row: u32| same_as[row as usize].load(Relaxed);
     let first_use = |row: u32| first_uses[row as usize].load(Relaxed);
 
-    // A distinct position is first used at one corner; counting these corners in order numbers the positions.
+    // Each class is first used at one corner. Counting these corners in order numbers the classes.
     let uses = |part: usize, corners: &[u32]| {
         let first = part * CORNERS_AT_ONCE;
-        let rows = corners.iter().map(|corner| same_as(*corner)).enumerate();
+        let rows = corners.iter().map(|corner| same(*corner)).enumerate();
         rows.filter(move |(at, row)| first_use(*row) == (first + at) as u32)
             .map(|(_, row)| row)
             .collect::<Vec<_>>()
@@ -44,25 +25,23 @@ pub(super) fn weld(positions: &[[f32; 3]], triangles: &mut [[u32; 3]]) -> Result
     let parts: Vec<Vec<u32>> =
         corners.par_chunks(CORNERS_AT_ONCE).enumerate().map(|(part, corners)| uses(part, corners)).collect();
     let used: Vec<u32> = parts.concat();
-    let welded_rows = atomics(positions.len());
-    used.par_iter()
-        .enumerate()
-        .for_each(|(welded, row)| welded_rows[*row as usize].store(welded as u32, Relaxed));
-    corners.par_iter_mut().for_each(|corner| *corner = welded_rows[same_as(*corner) as usize].load(Relaxed));
-    let positions = used.par_iter().map(|row| positive_zeros(positions[*row as usize])).collect();
-    Ok(Welded { positions, non_finite_unused: non_finite })
+    let numbers = atomics(same_as.len());
+    let keep = |(number, row): (usize, &u32)| numbers[*row as usize].store(number as u32, Relaxed);
+    used.par_iter().enumerate().for_each(keep);
+    corners.par_iter_mut().for_each(|corner| *corner = numbers[same(*corner) as usize].load(Relaxed));
+    used
 }
 
 /// Corners that one task numbers.
 const CORNERS_AT_ONCE: usize = 1 << 16;
 
-/// The position with +0 in the place of -0.
+/// Returns the position with +0 instead of -0.
 fn positive_zeros(position: [f32; 3]) -> [f32; 3] {
     position.map(|x| x + 0.0)
 }
 
-/// For each position the first row of one that is equal to it.
-fn first_equal_rows(positions: &[[f32; 3]]) -> Vec<AtomicU32> {
+/// Returns for each position the first row of one that is equal to it. -0 equals +0.
+pub(super) fn equal_positions(positions: &[[f32; 3]]) -> Vec<AtomicU32> {
     let key = |row: u32| positive_zeros(positions[row as usize]).map(f32::to_bits);
     // Equal positions are in the same share, and a share's table stays in a cache.
     let shares = (positions.len() / ROWS_OF_A_SHARE).next_power_of_two().min(MOST_SHARES);
@@ -84,11 +63,12 @@ fn first_equal_rows(positions: &[[f32; 3]]) -> Vec<AtomicU32> {
     first_equal
 }
 
-/// About how many rows one table holds, and the greatest number of tables.
+/// About how many rows one table holds, and the largest number of tables.
 const ROWS_OF_A_SHARE: usize = 1 << 14;
 const MOST_SHARES: usize = 1 << 10;
 
-/// A hash table with open addressing whose slots are rows. Its order does not depend on a random seed.
+/// A hash table with open addressing whose slots are rows. Its order does not depend on a random
+/// seed.
 struct Table {
     slots: Vec<u32>,
     shift: u32,
@@ -119,7 +99,8 @@ impl Table {
     }
 }
 
-/// Mixes all bits into the upper and lower ones: multiply and fold (as in Wang Yi's wyhash), then Fibonacci hashing.
+/// Mixes all bits into the upper and lower ones: multiply and fold (as in Wang Yi's wyhash), then
+/// Fibonacci hashing.
 #[inline]
 fn hash([x, y, z]: [u32; 3]) -> u64 {
     let a = (u64::from(x) | u64::from(y) << 32) ^ 0xa076_1d64_78bd_642f;
@@ -149,43 +130,90 @@ fn atomics(count: usize) -> Vec<AtomicU32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::deformation::{Influences, RawDeformation, RawMorph};
+    use crate::import::weld_and_count;
+    use crate::monitor::Silent;
     use proptest::prelude::*;
 
+    type Frames<'f> = &'f [&'f [[f32; 3]]];
+
+    /// Welds vertices of several frames; the error is the frame and the row.
+    fn weld(
+        frames: Frames<'_>,
+        triangles: &mut [[u32; 3]],
+        moved: Option<&RawDeformation>,
+    ) -> Result<(Vec<u32>, u64), [usize; 2]> {
+        let mut bad = [0; 2];
+        let found = weld_and_count(frames, triangles.to_vec(), moved, false, &Silent, |frame, row| {
+            bad = [frame, row];
+            crate::error::Error::Cancelled
+        });
+        let welded = found.map_err(|_| bad)?;
+        triangles.copy_from_slice(&welded.mesh.triangles);
+        Ok((welded.kept, welded.report.non_finite_unused))
+    }
+
     /// The definition, with linear searches.
-    fn slow_weld(positions: &[[f32; 3]], triangles: &mut [[u32; 3]]) -> Vec<[f32; 3]> {
-        let mut distinct: Vec<[f32; 3]> = Vec::new();
+    fn slow_weld(triangles: &mut [[u32; 3]], same: impl Fn(u32, u32) -> bool) -> Vec<u32> {
+        let mut kept: Vec<u32> = Vec::new();
         for corner in triangles.as_flattened_mut() {
-            let position = positions[*corner as usize];
-            *corner = match distinct.iter().position(|p| *p == position) {
-                Some(row) => row as u32,
-                None => {
-                    distinct.push(position);
-                    distinct.len() as u32 - 1
-                }
-            };
+            *corner = kept.iter().position(|row| same(*row, *corner)).unwrap_or_else(|| {
+                kept.push(*corner);
+                kept.len() - 1
+            }) as u32;
         }
-        distinct
+        kept
     }
 
     proptest! {
+        /// Positions alone, in several frames, and with a joint and a morph.
         #[test]
-        fn weld_agrees_with_linear_search(
-            grid in prop::collection::vec(prop::array::uniform3(-2i8..3), 1..40),
-            faces in prop::collection::vec(prop::array::uniform3(0usize..1000), 0..60),
+        fn welding_agrees_with_linear_search(
+            rows in 1usize..40,
+            values in prop::collection::vec(-2i8..3, 40 * 3 * 3),
+            faces in prop::collection::vec(prop::array::uniform3(0u32..1000), 0..60),
+            count in 1usize..4, moves: bool,
         ) {
             // A half keeps the sign of a zero: both zeros occur.
-            let positions: Vec<_> = grid.iter().map(|p| p.map(|x| (f32::from(x) * 0.4).trunc() * 0.5)).collect();
-            let triangles: Vec<_> = faces.iter().map(|f| f.map(|v| (v % positions.len()) as u32)).collect();
-            let (mut fast, mut slow) = (triangles.clone(), triangles);
-            let expected = slow_weld(&positions, &mut slow);
-            let welded = weld(&positions, &mut fast).unwrap();
-            prop_assert_eq!(welded.positions, expected);
+            let number = |k: usize| (f32::from(values[k]) * 0.4).trunc() * 0.5;
+            let at = |frame: usize, row: usize| [0, 1, 2].map(|k| number((frame * rows + row) * 3 + k));
+            let frames: Vec<Vec<_>> =
+                (0..count).map(|frame| (0..rows).map(|row| at(frame, row)).collect()).collect();
+            let all: Vec<&[_]> = frames.iter().map(Vec::as_slice).collect();
+            let (frames, moved) = if moves { (&all[..1], Some(moved(&all[count - 1]))) } else { (&all[..], None) };
+            let same = |a: u32, b: u32| {
+                let [a, b] = [a as usize, b as usize];
+                let joint = |row: usize| all[count - 1][row][0] > 0.0;
+                frames.iter().all(|frame| frame[a] == frame[b])
+                    && (!moves || joint(a) == joint(b) && all[count - 1][a] == all[count - 1][b])
+            };
+            let mut fast: Vec<_> = faces.iter().map(|f| f.map(|v| v % rows as u32)).collect();
+            let mut slow = fast.clone();
+            let expected = slow_weld(&mut slow, same);
+            let (kept, _) = weld(frames, &mut fast, moved.as_ref()).unwrap();
             prop_assert_eq!(fast, slow);
+            prop_assert!(kept.len() == expected.len() && kept.iter().zip(expected).all(|(a, b)| same(*a, b)));
         }
     }
 
+    /// Two joints and one morph, by the numbers of the vertices.
+    fn moved(deltas: &[[f32; 3]]) -> RawDeformation {
+        let mut moved = RawDeformation { sets: 1, joint_count: 2, ..RawDeformation::default() };
+        for delta in deltas {
+            let mut influences = Influences::default();
+            influences.joints[0] = u16::from(delta[0] > 0.0);
+            influences.weights[0] = 1.0;
+            moved.influences.push(influences);
+        }
+        let mut morph = RawMorph::default();
+        let deltas: Vec<_> = deltas.iter().map(|delta| delta.map(|x| x + 0.0)).collect();
+        morph.append(0, &deltas);
+        moved.positions.push(morph);
+        moved
+    }
+
     #[test]
-    fn weld_agrees_with_a_map_across_parts() {
+    fn welding_agrees_with_a_map_across_parts() {
         let mut random = bth_random::Rng::new(7);
         let positions: Vec<[f32; 3]> =
             (0..50_000).map(|_| [(); 3].map(|()| random.below(30) as f32 - 15.0)).collect();
@@ -204,26 +232,27 @@ mod tests {
                 })
             })
             .collect();
-        let welded = weld(&positions, &mut triangles).unwrap();
-        assert_eq!(welded.positions, expected);
+        let kept = number(&equal_positions(&positions), &mut triangles);
+        assert_eq!(kept.iter().map(|row| positions[*row as usize]).collect::<Vec<_>>(), expected);
         assert_eq!(triangles.as_flattened(), slow);
-    }
-
-    #[test]
-    fn negative_zero_welds_with_zero_and_is_written_as_zero() {
-        let positions = [[-0.0, 0.0, 1.0], [0.0, -0.0, 1.0], [2.0, 0.0, 0.0]];
-        let mut triangles = [[0, 1, 2]];
-        let welded = weld(&positions, &mut triangles).unwrap();
-        assert_eq!(triangles, [[0, 0, 1]]);
-        assert_eq!(welded.positions[0].map(f32::to_bits), [0, 0, 1.0f32.to_bits()]);
     }
 
     #[test]
     fn unused_positions_go_and_only_used_ones_must_be_finite() {
         let positions = [[f32::NAN; 3], [1.0; 3], [2.0; 3], [3.0; 3], [9.0; 3]];
-        let welded = weld(&positions, &mut [[3, 1, 2]]).unwrap();
-        assert_eq!(welded.positions, [[3.0; 3], [1.0; 3], [2.0; 3]]);
-        assert_eq!(welded.non_finite_unused, 1);
-        assert_eq!(weld(&positions, &mut [[3, 1, 0]]), Err(0));
+        assert_eq!(weld(&[&positions], &mut [[3, 1, 2]], None), Ok((vec![3, 1, 2], 1)));
+        assert_eq!(weld(&[&positions], &mut [[3, 1, 0]], None), Err([0, 0]));
+        // The first row in the order of use, and its first frame.
+        let later = [[1.0; 3], [f32::NAN; 3], [0.0; 3], [f32::INFINITY; 3], [0.0; 3]];
+        assert_eq!(weld(&[&positions, &later], &mut [[2, 3, 0]], None), Err([1, 3]));
+    }
+
+    #[test]
+    fn vertices_that_part_in_a_later_frame_stay_apart() {
+        let frames: [&[_]; 2] = [&[[0.0; 3], [-0.0; 3], [1.0; 3]], &[[0.0; 3], [2.0; 3], [1.0; 3]]];
+        let mut triangles = [[2, 0, 1]];
+        assert_eq!(weld(&frames[..1], &mut triangles.clone(), None), Ok((vec![2, 0], 0)));
+        assert_eq!(weld(&frames, &mut triangles, None), Ok((vec![2, 0, 1], 0)));
+        assert_eq!(triangles, [[0, 1, 2]]);
     }
 }

@@ -2,10 +2,10 @@
 
 use robust::{Coord, orient2d};
 
-/// Whether the corners are collinear, decided exactly (Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast
-/// Robust Geometric Predicates", 1997). The area is zero if and only if the projections onto all three coordinate planes
-/// have zero area. Corners must be finite. Coordinates in f32 keep the terms of the predicate far from overflow and
-/// underflow in f64.
+/// Returns true if the corners are collinear, decided exactly (Shewchuk, "Adaptive Precision
+/// Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997). The area is zero if and
+/// only if the projections onto all three coordinate planes have zero area. Corners must be finite.
+/// Coordinates in f32 keep the terms of the predicate far from overflow and underflow in f64.
 pub fn is_zero_area(corners: [[f32; 3]; 3]) -> bool {
     [[0, 1], [1, 2], [2, 0]].into_iter().all(|[i, j]| {
         let [a, b, c] = corners.map(|p| Coord { x: f64::from(p[i]), y: f64::from(p[j]) });

@@ -1,13 +1,14 @@
 //! The GLB container (glTF 2.0 specification, §4).
 
 use crate::error::Result;
-use crate::number::without_mark;
 use crate::source::{MALFORMED, Source, TRUNCATED, TRUNCATED_HINT, UNSUPPORTED};
+use crate::text::without_mark;
 
 const JSON_CHUNK: u32 = 0x4E4F_534A;
 const BIN_CHUNK: u32 = 0x004E_4942;
 
-/// Splits a GLB into its JSON and its binary chunk; a `.gltf` is all JSON, before which a byte order mark may stand.
+/// Splits a GLB into its JSON and its binary chunk; a `.gltf` is all JSON, before which a byte
+/// order mark may stand.
 pub(crate) fn split<'a>(source: &Source<'a>) -> Result<(&'a [u8], Option<&'a [u8]>)> {
     let data = source.data;
     if !data.starts_with(b"glTF") {
@@ -56,7 +57,8 @@ pub(crate) fn split<'a>(source: &Source<'a>) -> Result<(&'a [u8], Option<&'a [u8
     Ok((without_zeros(source, json), binary))
 }
 
-/// A JSON chunk without zeros at its end, with which some programs pad it, where the specification wants blanks (§4.4.3.2).
+/// A JSON chunk without zeros at its end, with which some programs pad it, where the specification
+/// wants blanks (§4.4.3.2).
 fn without_zeros<'a>(source: &Source<'_>, json: &'a [u8]) -> &'a [u8] {
     let end = json.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
     if end < json.len() {

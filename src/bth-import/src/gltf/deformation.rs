@@ -1,25 +1,26 @@
-//! Joints and morph targets of the vertices of a primitive (glTF 2.0 specification, §3.7.2.2 and §3.7.3.3).
+//! Joints and morph targets of the vertices of a primitive (glTF 2.0 specification, §3.7.2.2 and
+//! §3.7.3.3).
 
 use std::collections::BTreeMap;
 
 use crate::deformation::{Influences, MOST_INFLUENCES, RawDeformation};
 use crate::error::{Error, Result};
+use crate::gltf::file::{GRAPH, WEIGHTS};
 use crate::gltf::primitive::{PrimitiveReader, Triangles};
 use crate::source::{INDEX, UNSUPPORTED};
 
-/// A code for weights of joints or of morph targets that mean nothing.
-const WEIGHTS: &str = "BTH-I017";
-
-/// Rows of morph targets that any model may have; one with more may have as many as bytes were read.
+/// Rows of morph targets that any model may have; one with more may have as many as bytes were
+/// read.
 const FREE_ROWS: u64 = 1 << 24;
 
 impl PrimitiveReader<'_, '_> {
-    /// Appends what moves the vertices of a primitive. `first` are the rows of its first position and of its first normal.
+    /// Appends what moves the vertices of a primitive. `first` are the rows of its first position
+    /// and its first normal.
     ///
     /// # Errors
-    /// `BTH-I017` for weights that are negative or not finite and for more joints or morph targets than can be used, `BTH-I005`
-    /// for joints that are no integers, `BTH-I012` for a number of targets other than that of the mesh's other primitives, and
-    /// as for an accessor.
+    /// `BTH-I017` for weights that are negative or not finite and for more joints or morph targets
+    /// than can be used, `BTH-I005` for joints that are no integers, `BTH-I012` where primitives of
+    /// a mesh differ in their number of targets, and the errors of accessors.
     pub(super) fn deformation(
         &self,
         triangles: &Triangles,
@@ -34,7 +35,7 @@ impl PrimitiveReader<'_, '_> {
                 into.positions.len(),
                 targets.len()
             );
-            return Err(self.deformation_error(super::document::GRAPH, message));
+            return Err(self.deformation_error(GRAPH, message));
         }
         into.positions.resize_with(targets.len(), Default::default);
         into.normals.resize_with(targets.len(), Default::default);
@@ -68,7 +69,7 @@ impl PrimitiveReader<'_, '_> {
         targets: usize,
         so_far: &RawDeformation,
     ) -> Result<()> {
-        let bytes = self.accessors.source.data.len() as u64 + self.accessors.buffers.bytes_read();
+        let bytes = self.file.bytes_read();
         let stored = so_far.positions.iter().chain(&so_far.normals).map(|m| m.rows.len() as u64).sum::<u64>();
         let read = triangles.positions.len() as u64 * targets as u64;
         if stored <= FREE_ROWS.max(bytes) && read <= FREE_ROWS.max(64 * bytes) {
@@ -155,6 +156,6 @@ impl PrimitiveReader<'_, '_> {
 
     fn deformation_error(&self, code: &'static str, message: String) -> Error {
         let hint = "export the model again, or compile it at rest with --at-rest";
-        self.accessors.source.error_in_part(code, self.part.as_str(), message, hint)
+        self.file.source.error_in_part(code, self.part.as_str(), message, hint)
     }
 }

@@ -4,15 +4,16 @@ use draco_core::{DecodeLimits, DecoderBuffer, Mesh as DracoMesh, MeshDecoder};
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::error::{Error, Result};
-use crate::gltf::accessor::Accessors;
+use crate::error::Result;
 use crate::gltf::extensions::DRACO;
+use crate::gltf::file::GltfFile;
 use crate::gltf::schema::DracoCompression;
-use crate::source::{MALFORMED, Source};
+use crate::source::MALFORMED;
 use bth_format::limits::MAX_TRIANGLES;
 
-/// The decoder allocates for attributes at most this many bytes for each byte of a stream, and a little more. Equal values
-/// cost Draco nothing, so no ratio holds for all streams; models stay far below this one.
+/// The decoder allocates for attributes at most this many bytes for each byte of a stream, and a
+/// little more. Equal values cost Draco nothing, so no ratio holds for all streams; models stay far
+/// below this one.
 const MOST_BYTES_PER_BYTE: u64 = 4096;
 const MOST_EXTRA_BYTES: u64 = 1 << 20;
 
@@ -27,11 +28,11 @@ impl DracoPrimitive {
     ///
     /// # Errors
     /// `BTH-I002` where the value or the stream is malformed, and as for a buffer view.
-    pub(super) fn decode(accessors: &Accessors<'_>, value: &Value, part: &str) -> Result<Self> {
-        let source = accessors.source;
+    pub(super) fn decode(file: &GltfFile<'_>, value: &Value, part: &str) -> Result<Self> {
+        let error = |message: String| file.error(MALFORMED, part, message);
         let compression = DracoCompression::deserialize(value)
-            .map_err(|e| error(source, part, format!("expected the properties of {DRACO}, found: {e}")))?;
-        let (stream, _) = accessors.buffers.view(compression.buffer_view)?;
+            .map_err(|e| error(format!("expected the properties of {DRACO}, found: {e}")))?;
+        let (stream, _) = file.view(compression.buffer_view)?;
         let bytes = stream.len() as u64 * MOST_BYTES_PER_BYTE + MOST_EXTRA_BYTES;
         let limits = DecodeLimits::default()
             .with_max_points(u64::from(u32::MAX - 1))
@@ -41,7 +42,7 @@ impl DracoPrimitive {
         let mut buffer = DecoderBuffer::new(stream).with_limits(limits);
         MeshDecoder::new()
             .decode(&mut buffer, &mut mesh)
-            .map_err(|e| error(source, part, format!("expected a stream of Draco, found: {e}")))?;
+            .map_err(|e| error(format!("expected a stream of Draco, found: {e}")))?;
         Ok(DracoPrimitive { compression, mesh })
     }
 
@@ -55,13 +56,15 @@ impl DracoPrimitive {
         self.mesh.faces().as_flattened().iter().map(|point| point.0).collect()
     }
 
-    /// The vertices' values of a named attribute, which `accessor` describes; `None` if the stream does not have it.
+    /// Returns the vertices' values of a named attribute, which `accessor` describes; `None` if the
+    /// stream does not have it.
     ///
     /// # Errors
-    /// `BTH-I002` where the stream has no attribute of the given identifier and shape, `BTH-I013` for a bad accessor.
+    /// `BTH-I002` where the stream has no attribute of the given identifier and shape, `BTH-I013`
+    /// for a bad accessor.
     pub(super) fn attribute<const N: usize>(
         &self,
-        accessors: &Accessors<'_>,
+        file: &GltfFile<'_>,
         name: &str,
         accessor: usize,
         part: &str,
@@ -72,13 +75,9 @@ impl DracoPrimitive {
         else {
             let message =
                 format!("expected an attribute {id} of {N} components for {name} in the Draco stream");
-            return Err(error(accessors.source, part, message));
+            return Err(file.error(MALFORMED, part, message));
         };
         let numbers = attribute.read_f32s(self.mesh.num_points(), N);
-        accessors.decoded(accessor, &numbers).map(Some)
+        file.decoded(accessor, &numbers).map(Some)
     }
-}
-
-fn error(source: &Source<'_>, part: &str, message: String) -> Error {
-    source.error_in_part(MALFORMED, part, message, "export the model again")
 }

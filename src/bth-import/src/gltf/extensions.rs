@@ -3,29 +3,28 @@
 use crate::error::Error;
 use crate::source::Source;
 
-const EXTENSION: &str = "BTH-I011";
-
 /// Compresses the triangles of a primitive.
-pub(crate) const DRACO: &str = "KHR_draco_mesh_compression";
-
+pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
 /// Compress buffer views; the two have the same properties and streams.
-pub(crate) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
-
+pub(super) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 /// Changes the texture coordinates of a texture.
-pub(crate) const TEXTURE_TRANSFORM: &str = "KHR_texture_transform";
-
+pub(super) const TEXTURE_TRANSFORM: &str = "KHR_texture_transform";
 /// Hides nodes and all that are below them.
-pub(crate) const VISIBILITY: &str = "KHR_node_visibility";
+pub(super) const VISIBILITY: &str = "KHR_node_visibility";
+/// Places a mesh many times.
+pub(super) const INSTANCING: &str = "EXT_mesh_gpu_instancing";
+/// Moves any number of a document.
+const POINTER: &str = "KHR_animation_pointer";
 
-/// Required extensions that are read or that do not change where triangles are. A name that ends with `_` stands for all
-/// names that begin with it.
-pub(crate) const SUPPORTED: [&str; 21] = [
+/// Required extensions that are read or that do not change where triangles are. A name that ends
+/// with `_` stands for all names that begin with it.
+const SUPPORTED: [&str; 21] = [
     "KHR_mesh_quantization",
     VISIBILITY,
     DRACO,
     MESHOPT[0],
     MESHOPT[1],
-    "KHR_animation_pointer",
+    POINTER,
     "KHR_lights_punctual",
     "KHR_materials_",
     "KHR_texture_",
@@ -43,16 +42,31 @@ pub(crate) const SUPPORTED: [&str; 21] = [
     "KHR_audio",
 ];
 
-/// Extensions of nodes that scenes read and flat models cannot.
-pub(crate) const SCENE_EXTENSIONS: [&str; 1] = ["EXT_mesh_gpu_instancing"];
-
-/// Whether `name` is among `supported`.
-pub(crate) fn is_supported(name: &str, supported: &[&str]) -> bool {
-    supported.iter().any(|s| name == *s || s.ends_with('_') && name.starts_with(s))
+/// What a document is opened for.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Use {
+    /// One model of all meshes, which cannot read instancing.
+    Flat,
+    /// Single meshes.
+    Parts,
+    /// A scene. Its tracks cannot hold what animation pointers move.
+    Scene,
 }
 
-/// The error for an extension that is needed and not read.
-pub(crate) fn unsupported_extension(source: &Source<'_>, name: &str) -> Error {
+impl Use {
+    /// Returns true for a required extension that this use reads or need not read.
+    pub(super) fn reads(self, name: &str) -> bool {
+        let known = |s: &&str| name == *s || s.ends_with('_') && name.starts_with(*s);
+        match name {
+            INSTANCING => self != Use::Flat,
+            POINTER => self != Use::Scene,
+            _ => SUPPORTED.iter().any(known),
+        }
+    }
+}
+
+/// Returns the error for an extension that is needed and not read.
+pub(super) fn unsupported_extension(source: &Source<'_>, name: &str) -> Error {
     let message = format!("expected no required extension that changes geometry, found {name}");
     let hint = if MESHOPT.contains(&name) {
         "decompress the model, for example with gltf-transform copy, or build with the cargo feature meshopt"
@@ -61,5 +75,5 @@ pub(crate) fn unsupported_extension(source: &Source<'_>, name: &str) -> Error {
     } else {
         "export the model without this extension"
     };
-    source.error_in_part(EXTENSION, name, message, hint)
+    source.error_in_part("BTH-I011", name, message, hint)
 }

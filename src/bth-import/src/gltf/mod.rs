@@ -1,18 +1,22 @@
-//! glTF and GLB, in the order of the data: `container` splits a GLB, `document` reads its JSON into `schema`, `buffer`
-//! gives the bytes of views (`meshopt` decompresses them), `accessor` their rows, `primitive` triangles (`draco`
-//! decompresses them, `texture` chooses texture coordinates), `rigid_parts` what of them a joint moves alone, `placed_mesh` which
-//! meshes there are and where, and `flatten` a model. `cutout` reads which materials make holes. [`scene`] makes a manifest instead.
+//! glTF and GLB, in the order of the data.
+//!
+//! `container` splits a GLB, `file` opens its JSON (`schema`), `buffer` gives the bytes of views
+//! (`meshopt` decompresses them), `accessor` their rows, `primitive` triangles (`draco`
+//! decompresses them, `uv_set` chooses texture coordinates), `rigid_parts` which of them a joint
+//! moves alone, `placed_mesh` which meshes there are and where, and `flatten` a model. `materials`
+//! reads how they look, `cutout` which materials make holes. [`scene`] makes a manifest instead.
 
-pub(crate) mod accessor;
-mod base_color;
-pub(crate) mod buffer;
+mod accessor;
+mod alpha_image;
+mod buffer;
 mod container;
 pub(crate) mod cutout;
 mod deformation;
-pub(crate) mod document;
 mod draco;
 pub(crate) mod extensions;
+pub(crate) mod file;
 pub(crate) mod flatten;
+mod material;
 pub(crate) mod materials;
 mod meshopt;
 mod placed_mesh;
@@ -20,13 +24,13 @@ mod primitive;
 mod rest_pose;
 mod rigid_parts;
 pub mod scene;
-pub(crate) mod schema;
+mod schema;
 mod source_files;
-mod texture;
-mod texture_parts;
+mod texture_reader;
 mod transform;
-pub(crate) mod uri;
+mod uri;
+mod uv_set;
 
 pub use placed_mesh::GltfPart;
-pub use scene::options::Chosen;
-pub use source_files::external_files;
+pub use scene::Chosen;
+pub(crate) use source_files::files;

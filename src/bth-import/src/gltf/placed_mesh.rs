@@ -4,11 +4,9 @@ use bth_scene::JointSet;
 use glam::DAffine3;
 
 use crate::error::Result;
-use crate::gltf::document::GRAPH;
+use crate::gltf::file::{GRAPH, GltfFile};
 use crate::gltf::rigid_parts::KeptTriangles;
-use crate::gltf::schema::GltfDocument;
 use crate::gltf::transform;
-use crate::source::Source;
 
 /// A mesh at a place of the flat model.
 pub(super) struct PlacedMesh {
@@ -38,8 +36,9 @@ pub enum GltfPart {
         /// Number of the joint.
         joint: u32,
     },
-    /// The mesh of a node, by the node's number, at rest: with its default morph weights, and with its joints where the nodes
-    /// place them. With a skin it is in world space, else in that of the node.
+    /// The mesh of a node, by the node's number, at rest: with its default morph weights, and with
+    /// its joints where the nodes place them. With a skin it is in world space, else in the node's
+    /// space.
     AtRest(u32),
 }
 
@@ -48,7 +47,7 @@ impl GltfPart {
     ///
     /// # Errors
     /// `BTH-I012` where the node does not exist or has no mesh.
-    pub(super) fn placed(self, source: &Source<'_>, document: &GltfDocument) -> Result<PlacedMesh> {
+    pub(super) fn placed(self, file: &GltfFile<'_>) -> Result<PlacedMesh> {
         let kept = match self {
             GltfPart::Mesh(_) | GltfPart::AtRest(_) => KeptTriangles::All,
             GltfPart::Deforming { without, .. } => KeptTriangles::without(without),
@@ -59,10 +58,10 @@ impl GltfPart {
                 (None, mesh as usize)
             }
             GltfPart::AtRest(node) => {
-                let mesh = document.nodes.get(node as usize).and_then(|node| node.mesh);
+                let mesh = file.document.nodes.get(node as usize).and_then(|node| node.mesh);
                 let message = "it does not exist or has no mesh";
                 let part = format!("node {node}");
-                let error = || source.error_in_part(GRAPH, part, message, "name a node that has a mesh");
+                let error = || file.source.error_in_part(GRAPH, part, message, "name a node that has a mesh");
                 (Some(node as usize), mesh.ok_or_else(error)?)
             }
         };
@@ -70,15 +69,16 @@ impl GltfPart {
     }
 }
 
-/// The scene's visible nodes that have a mesh, in depth-first order, with their world transforms, and the number of those that
-/// KHR_node_visibility hides.
-pub(super) fn placed_meshes(source: &Source<'_>, document: &GltfDocument) -> Result<(Vec<PlacedMesh>, u64)> {
-    let error =
-        |part: String, message: &str| source.error_in_part(GRAPH, part, message, "export the model again");
+/// Returns the scene's visible nodes that have a mesh, in depth-first order, with their world
+/// transforms, and how many KHR_node_visibility hides.
+pub(super) fn placed_meshes(file: &GltfFile<'_>) -> Result<(Vec<PlacedMesh>, u64)> {
+    let document = &file.document;
     let roots = match document.scenes.get(document.scene.unwrap_or(0)) {
         Some(scene) => scene.nodes.clone(),
         None if document.scene.is_some() => {
-            return Err(error(format!("scene {}", document.scene.unwrap_or(0)), "it does not exist"));
+            return Err(
+                file.graph_error(format!("scene {}", document.scene.unwrap_or(0)), "it does not exist")
+            );
         }
         None => document.parentless_nodes(),
     };
@@ -87,12 +87,14 @@ pub(super) fn placed_meshes(source: &Source<'_>, document: &GltfDocument) -> Res
     let mut stack: Vec<_> = roots.into_iter().rev().map(|node| (node, DAffine3::IDENTITY, true)).collect();
     while let Some((index, parent, visible)) = stack.pop() {
         let part = || format!("node {index}");
-        let node = document.nodes.get(index).ok_or_else(|| error(part(), "it does not exist"))?;
+        let node = document.nodes.get(index).ok_or_else(|| file.graph_error(part(), "it does not exist"))?;
         if std::mem::replace(&mut visited[index], true) {
-            return Err(error(part(), "expected a node with one parent, found it twice in the scene"));
+            return Err(
+                file.graph_error(part(), "expected a node with one parent, found it twice in the scene")
+            );
         }
         let world = parent * transform::local(node);
-        let visible = node.is_visible(source, index)? && visible;
+        let visible = file.is_visible(index, node)? && visible;
         match node.mesh {
             Some(mesh) if visible => {
                 placed.push(PlacedMesh { node: Some(index), mesh, world, kept: KeptTriangles::All });

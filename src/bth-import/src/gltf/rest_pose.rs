@@ -1,25 +1,26 @@
-//! The rest pose of a mesh: its default morph weights, then its skin with the joints where the nodes place them at rest.
+//! The rest pose of a mesh: its default morph weights, then its skin with the joints where the
+//! nodes place them at rest.
 //!
-//! glTF 2.0 specification, §3.7.2.2 (morph targets) and §3.7.3 (skins): a vertex p becomes
-//! Σ wᵢ · G(jointᵢ) · IBMᵢ · (p + Σ mₖ Δpₖ), where G is the transform of a joint's node to world space through all its ancestors.
-//! The transform of the skinned node itself has no effect (§3.7.3.2).
+//! glTF 2.0 specification, §3.7.2.2 (morph targets) and §3.7.3 (skins): a vertex p becomes Σ wᵢ ·
+//! G(jointᵢ) · IBMᵢ · (p + Σ mₖ Δpₖ), where G is the transform of a joint's node to world space
+//! through all its ancestors. The transform of the skinned node itself has no effect (§3.7.3.2).
 
 use glam::{DAffine3, DMat3, DVec3};
 
-use crate::error::{Error, Result};
-use crate::gltf::accessor::Accessors;
-use crate::gltf::document::GRAPH;
+use crate::error::Result;
+use crate::gltf::file::GltfFile;
 use crate::gltf::primitive::{PrimitiveReader, Triangles};
-use crate::gltf::schema::GltfDocument;
+use crate::gltf::schema::GltfSkin;
 use crate::gltf::transform;
 use crate::source::INDEX;
 
 /// How a placed mesh deforms at rest.
 #[derive(Default)]
 pub(super) struct RestPose {
-    /// Weights of the morph targets, those of the node before those of the mesh.
+    /// Weights of the morph targets: of the node, else of the mesh.
     weights: Vec<f64>,
-    /// For each joint of the skin the transform from the mesh to world space; `None` without a skin.
+    /// For each joint of the skin the transform from the mesh to world space; `None` without a
+    /// skin.
     joints: Option<Vec<DAffine3>>,
 }
 
@@ -27,18 +28,19 @@ impl RestPose {
     /// The rest pose of the mesh of a node, or of a mesh on its own.
     ///
     /// # Errors
-    /// `BTH-I012` where a skin or a joint does not exist or nodes are their own ancestors, and as for an accessor.
-    pub(super) fn new(accessors: &Accessors<'_>, node: Option<usize>, mesh: usize) -> Result<RestPose> {
-        let document = accessors.document;
+    /// `BTH-I012` where a skin or a joint does not exist or nodes are their own ancestors, and as
+    /// for an accessor.
+    pub(super) fn new(file: &GltfFile<'_>, node: Option<usize>, mesh: usize) -> Result<RestPose> {
+        let document = &file.document;
         let of_node = node.and_then(|node| document.nodes[node].weights.as_ref());
         let of_mesh = document.meshes.get(mesh).and_then(|mesh| mesh.weights.as_ref());
         let weights = of_node.or(of_mesh).cloned().unwrap_or_default();
         let skin = node.and_then(|node| document.nodes[node].skin);
-        let joints = skin.map(|skin| joint_transforms(accessors, skin)).transpose()?;
+        let joints = skin.map(|skin| joint_transforms(file, skin)).transpose()?;
         Ok(RestPose { weights, joints })
     }
 
-    /// Whether positions are in world space after [`Self::apply`], as those of skinned meshes are.
+    /// Returns true if [`Self::apply`] brings positions to world space: for skinned meshes.
     pub(super) fn is_skinned(&self) -> bool {
         self.joints.is_some()
     }
@@ -88,54 +90,59 @@ impl RestPose {
     }
 }
 
-/// For each joint of a skin the transform from the bind pose of the mesh to world space. Without inverse bind matrices these are
-/// the identity.
-fn joint_transforms(accessors: &Accessors<'_>, skin: usize) -> Result<Vec<DAffine3>> {
-    let document = accessors.document;
-    let Some(found) = document.skins.get(skin) else {
-        return Err(graph_error(accessors, format!("skin {skin}"), "it does not exist"));
+/// For each joint of a skin the transform from the bind pose of the mesh to world space. Without
+/// inverse bind matrices these are the identity.
+fn joint_transforms(file: &GltfFile<'_>, skin: usize) -> Result<Vec<DAffine3>> {
+    let found = file.skin(skin)?;
+    let binds = file.inverse_binds(skin, found)?;
+    let parents = file.document.parents();
+    let joint = |(k, &node): (usize, &usize)| {
+        let world = to_world(file, &parents, node)?;
+        Ok(binds.as_ref().map_or(world, |binds| world * binds[k]))
     };
-    let inverse_binds = match found.inverse_bind_matrices {
-        Some(accessor) => accessors.matrices(accessor)?,
-        None => vec![DAffine3::IDENTITY; found.joints.len()],
-    };
-    if inverse_binds.len() < found.joints.len() {
-        let message = format!(
-            "expected an inverse bind matrix for each of {} joints, found {}",
-            found.joints.len(),
-            inverse_binds.len()
-        );
-        return Err(graph_error(accessors, format!("skin {skin}"), message));
-    }
-    let parents = parents(document);
-    let joint =
-        |(&node, inverse_bind): (&usize, &DAffine3)| Ok(to_world(accessors, &parents, node)? * *inverse_bind);
-    found.joints.iter().zip(&inverse_binds).map(joint).collect()
+    found.joints.iter().enumerate().map(joint).collect()
 }
 
-/// For each node its parent, or `None` for roots.
-pub(super) fn parents(document: &GltfDocument) -> Vec<Option<usize>> {
-    let mut parents = vec![None; document.nodes.len()];
-    for (index, node) in document.nodes.iter().enumerate() {
-        for &child in &node.children {
-            parents.get_mut(child).into_iter().for_each(|parent| *parent = Some(index));
-        }
+impl GltfFile<'_> {
+    /// Returns a skin.
+    ///
+    /// # Errors
+    /// `BTH-I012` where it does not exist.
+    pub(super) fn skin(&self, skin: usize) -> Result<&GltfSkin> {
+        let found = self.document.skins.get(skin);
+        found.ok_or_else(|| self.graph_error(format!("skin {skin}"), "it does not exist"))
     }
-    parents
+
+    /// Returns the inverse bind matrix of each joint of a skin, if it has some.
+    ///
+    /// # Errors
+    /// `BTH-I012` where there are too few, and the errors of accessors.
+    pub(super) fn inverse_binds(&self, skin: usize, found: &GltfSkin) -> Result<Option<Vec<DAffine3>>> {
+        let Some(accessor) = found.inverse_bind_matrices else { return Ok(None) };
+        let mut matrices = self.matrices(accessor)?;
+        let (joints, binds) = (found.joints.len(), matrices.len());
+        if binds < joints {
+            let message =
+                format!("expected an inverse bind matrix for each of {joints} joints, found {binds}");
+            return Err(self.graph_error(format!("skin {skin}"), message));
+        }
+        matrices.truncate(joints);
+        Ok(Some(matrices))
+    }
 }
 
 /// The transform of a node to world space, through all its ancestors.
-fn to_world(accessors: &Accessors<'_>, parents: &[Option<usize>], node: usize) -> Result<DAffine3> {
-    let document = accessors.document;
+fn to_world(file: &GltfFile<'_>, parents: &[Option<usize>], node: usize) -> Result<DAffine3> {
+    let document = &file.document;
     let mut world = DAffine3::IDENTITY;
     let (mut next, mut steps) = (Some(node), 0);
     while let Some(index) = next {
         let Some(found) = document.nodes.get(index) else {
-            return Err(graph_error(accessors, format!("node {index}"), "it does not exist"));
+            return Err(file.graph_error(format!("node {index}"), "it does not exist"));
         };
         steps += 1;
         if steps > document.nodes.len() {
-            return Err(graph_error(accessors, format!("node {node}"), "it is an ancestor of itself"));
+            return Err(file.graph_error(format!("node {node}"), "it is an ancestor of itself"));
         }
         world = transform::local(found) * world;
         next = parents[index];
@@ -143,8 +150,8 @@ fn to_world(accessors: &Accessors<'_>, parents: &[Option<usize>], node: usize) -
     Ok(world)
 }
 
-/// For each vertex the sum of the transforms of its joints by their weights, which are divided by their sum. A vertex without weights
-/// follows its first joint.
+/// For each vertex the sum of the transforms of its joints by their weights, which are divided by
+/// their sum. A vertex without weights follows its first joint.
 fn vertex_transforms(
     reader: &PrimitiveReader<'_, '_>,
     joints: &[DAffine3],
@@ -165,13 +172,7 @@ fn vertex_transforms(
                 let Some(joint) = joints.get(index as usize) else {
                     let message =
                         format!("row {row}: expected a joint below {}, found {index}", joints.len());
-                    let source = reader.accessors.source;
-                    return Err(source.error_in_part(
-                        INDEX,
-                        reader.part.as_str(),
-                        message,
-                        "export the model again",
-                    ));
+                    return Err(reader.file.error(INDEX, reader.part.as_str(), message));
                 };
                 first.get_or_insert(*joint);
                 let weight = f64::from(weight);
@@ -187,8 +188,4 @@ fn vertex_transforms(
         Some(_) => DAffine3 { matrix3: sum.matrix3 * (1.0 / total), translation: sum.translation / total },
     };
     Ok(blended.into_iter().map(blend).collect())
-}
-
-fn graph_error(accessors: &Accessors<'_>, part: String, message: impl Into<String>) -> Error {
-    accessors.source.error_in_part(GRAPH, part, message.into(), "export the model again")
 }

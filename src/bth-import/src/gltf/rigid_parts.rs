@@ -1,4 +1,5 @@
-//! The parts of a skinned mesh that one joint moves rigidly: whole connected components, so that no edge is shared between two parts.
+//! The parts of a skinned mesh that one joint moves rigidly: whole connected components, so that no
+//! two parts share an edge.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -7,14 +8,14 @@ use bth_scene::JointSet;
 use crate::deformation::{Influences, RawDeformation};
 use crate::disjoint_sets::DisjointSets;
 use crate::error::Result;
-use crate::gltf::accessor::Accessors;
+use crate::gltf::file::GltfFile;
 use crate::gltf::primitive::PrimitiveReader;
 use crate::mesh::Keep;
 
 /// The joint of a component that several joints or a morph target move.
 const SOFT: u32 = u32::MAX;
 
-/// For each triangle of a mesh the joint that alone moves its component.
+/// The joint that alone moves the component of each triangle of a mesh.
 pub(super) struct RigidParts {
     /// By primitive and triangle; [`SOFT`] for components that do not move rigidly.
     joints: Vec<Vec<u32>>,
@@ -48,11 +49,11 @@ impl KeptTriangles {
     /// The triangles of a mesh that are kept.
     ///
     /// # Errors
-    /// As [`RigidParts::of`].
-    pub(super) fn of_mesh(self, accessors: &Accessors<'_>, mesh: usize) -> Result<Selection> {
+    /// The same as [`RigidParts::of`].
+    pub(super) fn of_mesh(self, file: &GltfFile<'_>, mesh: usize) -> Result<Selection> {
         let parts = match self {
             KeptTriangles::All => None,
-            _ => Some(RigidParts::of(accessors, mesh)?),
+            _ => Some(RigidParts::of(file, mesh)?),
         };
         Ok(Selection { kept: self, parts })
     }
@@ -137,13 +138,11 @@ impl RigidParts {
     ///
     /// # Errors
     /// As for the import of the mesh.
-    pub(super) fn of(accessors: &Accessors<'_>, mesh: usize) -> Result<RigidParts> {
-        let primitives = accessors.document.meshes.get(mesh).map_or(&[][..], |mesh| &mesh.primitives);
+    pub(super) fn of(file: &GltfFile<'_>, mesh: usize) -> Result<RigidParts> {
         let mut vertices = Vertices::default();
-        for (index, primitive) in primitives.iter().enumerate() {
-            accessors.source.monitor.check()?;
-            let part = format!("mesh {mesh} primitive {index}");
-            vertices.add(&PrimitiveReader { accessors, primitive, part })?;
+        for reader in PrimitiveReader::of_mesh(file, mesh) {
+            file.source.monitor.check()?;
+            vertices.add(&reader)?;
         }
         let Vertices { triangles, joints, places, numbers } = vertices;
         let mut sets = DisjointSets::new(numbers.len());

@@ -1,6 +1,5 @@
-//! The parts of a glTF document that describe geometry, scenes and animations (glTF 2.0 specification, §5).
-//!
-//! Structures of our own rather than those of `gltf-json`: docs/decisions.md says why.
+//! The parts of a glTF document that describe geometry, scenes and animations (glTF 2.0
+//! specification, §5). docs/decisions.md says why these are not the structures of `gltf-json`.
 
 use std::collections::BTreeMap;
 
@@ -8,316 +7,274 @@ use serde::Deserialize;
 use serde_json::Value;
 
 /// Extensions by name, each parsed where it is read.
-pub(crate) type Extensions = BTreeMap<String, Value>;
+pub(super) type Extensions = BTreeMap<String, Value>;
 
 /// The document.
 #[derive(Deserialize, Default)]
 #[serde(default, rename_all = "camelCase")]
 pub(crate) struct GltfDocument {
-    pub(crate) asset: GltfAsset,
-    pub(crate) extensions_required: Vec<String>,
-    pub(crate) extensions_used: Vec<String>,
-    pub(crate) scene: Option<usize>,
-    pub(crate) scenes: Vec<GltfScene>,
-    pub(crate) nodes: Vec<GltfNode>,
-    pub(crate) meshes: Vec<GltfMesh>,
-    pub(crate) accessors: Vec<Accessor>,
-    pub(crate) buffer_views: Vec<BufferView>,
-    pub(crate) buffers: Vec<Buffer>,
-    pub(crate) skins: Vec<GltfSkin>,
-    /// Parsed as [`Animation`] lazily: a malformed animation must not fail mesh import.
-    pub(crate) animations: Vec<Value>,
-    /// Parsed as [`GltfCamera`] lazily, for the same reason.
-    pub(crate) cameras: Vec<Value>,
-    /// Parsed as [`Material`] lazily, for the same reason.
-    pub(crate) materials: Vec<Value>,
-    pub(crate) extensions: Extensions,
+    pub(super) asset: GltfAsset,
+    pub(super) extensions_required: Vec<String>,
+    pub(super) extensions_used: Vec<String>,
+    pub(super) scene: Option<usize>,
+    pub(super) scenes: Vec<GltfScene>,
+    pub(super) nodes: Vec<GltfNode>,
+    pub(super) meshes: Vec<GltfMesh>,
+    pub(super) accessors: Vec<Accessor>,
+    pub(super) buffer_views: Vec<BufferView>,
+    pub(super) buffers: Vec<Buffer>,
+    pub(super) skins: Vec<GltfSkin>,
+    // Parsed at use: what is malformed there must not fail the import of meshes.
+    pub(super) animations: Vec<Value>,
+    pub(super) cameras: Vec<Value>,
+    pub(super) materials: Vec<Value>,
+    pub(super) textures: Value,
+    pub(super) images: Value,
+    pub(super) samplers: Value,
+    pub(super) extensions: Extensions,
 }
 
 #[derive(Deserialize, Default)]
 #[serde(default, rename_all = "camelCase")]
-pub(crate) struct GltfAsset {
-    pub(crate) version: String,
-    /// The least version that readers of the document must know.
-    pub(crate) min_version: Option<String>,
+pub(super) struct GltfAsset {
+    pub(super) version: String,
+    /// The version that readers of the document must know.
+    pub(super) min_version: Option<String>,
 }
 
 #[derive(Deserialize, Default)]
 #[serde(default)]
-pub(crate) struct GltfScene {
-    pub(crate) name: String,
-    pub(crate) nodes: Vec<usize>,
+pub(super) struct GltfScene {
+    pub(super) name: String,
+    pub(super) nodes: Vec<usize>,
 }
 
 /// A node. Numbers are f64 so that world transforms round once, when positions become f32.
 #[derive(Deserialize, Default)]
 #[serde(default)]
-pub(crate) struct GltfNode {
-    pub(crate) name: String,
-    pub(crate) children: Vec<usize>,
-    pub(crate) camera: Option<usize>,
-    pub(crate) extensions: Extensions,
-    pub(crate) mesh: Option<usize>,
-    pub(crate) skin: Option<usize>,
-    pub(crate) matrix: Option<[f64; 16]>,
-    pub(crate) translation: Option<[f64; 3]>,
-    pub(crate) rotation: Option<[f64; 4]>,
-    pub(crate) scale: Option<[f64; 3]>,
-    /// Weights of the mesh's morph targets, in place of those of the mesh.
-    pub(crate) weights: Option<Vec<f64>>,
+pub(super) struct GltfNode {
+    pub(super) name: String,
+    pub(super) children: Vec<usize>,
+    pub(super) camera: Option<usize>,
+    pub(super) extensions: Extensions,
+    pub(super) mesh: Option<usize>,
+    pub(super) skin: Option<usize>,
+    pub(super) matrix: Option<[f64; 16]>,
+    pub(super) translation: Option<[f64; 3]>,
+    pub(super) rotation: Option<[f64; 4]>,
+    pub(super) scale: Option<[f64; 3]>,
+    /// Weights of the morph targets. They replace the mesh's own.
+    pub(super) weights: Option<Vec<f64>>,
 }
 
 /// A skin. Its skeleton root has no bearing on positions and is not read.
 #[derive(Deserialize, Default)]
 #[serde(default, rename_all = "camelCase")]
-pub(crate) struct GltfSkin {
-    pub(crate) name: String,
-    pub(crate) inverse_bind_matrices: Option<usize>,
-    pub(crate) joints: Vec<usize>,
+pub(super) struct GltfSkin {
+    pub(super) name: String,
+    pub(super) inverse_bind_matrices: Option<usize>,
+    pub(super) joints: Vec<usize>,
 }
 
 #[derive(Deserialize, Default)]
 #[serde(default)]
-pub(crate) struct GltfMesh {
-    pub(crate) name: String,
-    pub(crate) primitives: Vec<Primitive>,
+pub(super) struct GltfMesh {
+    pub(super) name: String,
+    pub(super) primitives: Vec<Primitive>,
     /// Default weights of the morph targets.
-    pub(crate) weights: Option<Vec<f64>>,
+    pub(super) weights: Option<Vec<f64>>,
 }
 
 #[derive(Deserialize, Default)]
 #[serde(default)]
-pub(crate) struct Primitive {
-    pub(crate) attributes: BTreeMap<String, usize>,
-    pub(crate) indices: Option<usize>,
-    pub(crate) material: Option<usize>,
-    pub(crate) mode: Option<u64>,
+pub(super) struct Primitive {
+    pub(super) attributes: BTreeMap<String, usize>,
+    pub(super) indices: Option<usize>,
+    pub(super) material: Option<usize>,
+    pub(super) mode: Option<u64>,
     /// Morph targets: accessors by the names of attributes, parsed where they are read.
-    pub(crate) targets: Vec<Value>,
-    pub(crate) extensions: Extensions,
+    pub(super) targets: Vec<Value>,
+    pub(super) extensions: Extensions,
 }
 
 /// KHR_draco_mesh_compression of a primitive.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(crate) struct DracoCompression {
-    pub(crate) buffer_view: usize,
+pub(super) struct DracoCompression {
+    pub(super) buffer_view: usize,
     /// Unique identifiers of the stream's attributes by the names of the primitive's attributes.
     #[serde(default)]
-    pub(crate) attributes: BTreeMap<String, u32>,
+    pub(super) attributes: BTreeMap<String, u32>,
 }
 
 #[derive(Deserialize, Default)]
 #[serde(default, rename_all = "camelCase")]
-pub(crate) struct Accessor {
-    pub(crate) buffer_view: Option<usize>,
-    pub(crate) byte_offset: u64,
-    pub(crate) component_type: u64,
-    pub(crate) normalized: bool,
-    pub(crate) count: u64,
+pub(super) struct Accessor {
+    pub(super) buffer_view: Option<usize>,
+    pub(super) byte_offset: u64,
+    pub(super) component_type: u64,
+    pub(super) normalized: bool,
+    pub(super) count: u64,
     #[serde(rename = "type")]
-    pub(crate) shape: String,
-    pub(crate) sparse: Option<Sparse>,
+    pub(super) shape: String,
+    pub(super) sparse: Option<Sparse>,
 }
 
 #[derive(Deserialize)]
-pub(crate) struct Sparse {
-    pub(crate) count: u64,
-    pub(crate) indices: SparseIndices,
-    pub(crate) values: SparseValues,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(crate) struct SparseIndices {
-    pub(crate) buffer_view: usize,
-    #[serde(default)]
-    pub(crate) byte_offset: u64,
-    pub(crate) component_type: u64,
+pub(super) struct Sparse {
+    pub(super) count: u64,
+    pub(super) indices: SparseIndices,
+    pub(super) values: SparseValues,
 }
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(crate) struct SparseValues {
-    pub(crate) buffer_view: usize,
+pub(super) struct SparseIndices {
+    pub(super) buffer_view: usize,
     #[serde(default)]
-    pub(crate) byte_offset: u64,
+    pub(super) byte_offset: u64,
+    pub(super) component_type: u64,
 }
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(crate) struct BufferView {
-    pub(crate) buffer: usize,
+pub(super) struct SparseValues {
+    pub(super) buffer_view: usize,
     #[serde(default)]
-    pub(crate) byte_offset: u64,
-    pub(crate) byte_length: u64,
-    pub(crate) byte_stride: Option<u64>,
-    #[serde(default)]
-    pub(crate) extensions: Extensions,
-}
-
-/// EXT_meshopt_compression (or KHR_meshopt_compression) of a buffer view: where its stream is and what it holds.
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(crate) struct MeshoptCompression {
-    pub(crate) buffer: usize,
-    #[serde(default)]
-    pub(crate) byte_offset: u64,
-    pub(crate) byte_length: u64,
-    pub(crate) byte_stride: u64,
-    pub(crate) count: u64,
-    pub(crate) mode: String,
-    pub(crate) filter: Option<String>,
+    pub(super) byte_offset: u64,
 }
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(crate) struct Buffer {
-    pub(crate) uri: Option<String>,
-    pub(crate) byte_length: u64,
+pub(super) struct BufferView {
+    pub(super) buffer: usize,
     #[serde(default)]
-    pub(crate) extensions: Extensions,
+    pub(super) byte_offset: u64,
+    pub(super) byte_length: u64,
+    pub(super) byte_stride: Option<u64>,
+    #[serde(default)]
+    pub(super) extensions: Extensions,
 }
 
-/// EXT_meshopt_compression of a buffer: whether it only stands in for compressed buffer views.
+/// EXT_meshopt_compression or KHR_meshopt_compression of a buffer view: where its stream is and
+/// what it holds.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct MeshoptCompression {
+    pub(super) buffer: usize,
+    #[serde(default)]
+    pub(super) byte_offset: u64,
+    pub(super) byte_length: u64,
+    pub(super) byte_stride: u64,
+    pub(super) count: u64,
+    pub(super) mode: String,
+    pub(super) filter: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Buffer {
+    pub(super) uri: Option<String>,
+    pub(super) byte_length: u64,
+    #[serde(default)]
+    pub(super) extensions: Extensions,
+}
+
+/// EXT_meshopt_compression of a buffer: true if it only stands in for compressed buffer views.
 #[derive(Deserialize, Default)]
 #[serde(default)]
-pub(crate) struct MeshoptFallback {
-    pub(crate) fallback: bool,
-}
-
-/// The textures of a material that texture coordinates can be for.
-#[derive(Deserialize, Default)]
-#[serde(default, rename_all = "camelCase")]
-pub(crate) struct Material {
-    pub(crate) pbr_metallic_roughness: MetallicRoughness,
-    pub(crate) normal_texture: Option<TextureReference>,
-    pub(crate) occlusion_texture: Option<TextureReference>,
-    pub(crate) emissive_texture: Option<TextureReference>,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(default, rename_all = "camelCase")]
-pub(crate) struct MetallicRoughness {
-    pub(crate) base_color_texture: Option<TextureReference>,
-    pub(crate) metallic_roughness_texture: Option<TextureReference>,
-}
-
-/// A material's use of a texture.
-#[derive(Deserialize, Default, Clone)]
-#[serde(default, rename_all = "camelCase")]
-pub(crate) struct TextureReference {
-    /// Number of the set of texture coordinates: n for `TEXCOORD_n`.
-    pub(crate) tex_coord: u32,
-    pub(crate) extensions: Extensions,
-}
-
-/// KHR_texture_transform of a texture reference.
-#[derive(Deserialize, Clone, Copy)]
-#[serde(default, rename_all = "camelCase")]
-pub(crate) struct TextureTransform {
-    pub(crate) offset: [f64; 2],
-    /// Radians, counter-clockwise in the image, whose second coordinate grows downwards.
-    pub(crate) rotation: f64,
-    pub(crate) scale: [f64; 2],
-    /// Replaces the reference's own set of texture coordinates.
-    pub(crate) tex_coord: Option<u32>,
-}
-
-impl Default for TextureTransform {
-    fn default() -> Self {
-        TextureTransform { offset: [0.0; 2], rotation: 0.0, scale: [1.0; 2], tex_coord: None }
-    }
+pub(super) struct MeshoptFallback {
+    pub(super) fallback: bool,
 }
 
 #[derive(Deserialize)]
-pub(crate) struct Animation {
+pub(super) struct Animation {
     #[serde(default)]
-    pub(crate) name: String,
-    pub(crate) channels: Vec<Channel>,
-    pub(crate) samplers: Vec<Sampler>,
+    pub(super) name: String,
+    pub(super) channels: Vec<Channel>,
+    pub(super) samplers: Vec<Sampler>,
 }
 
 #[derive(Deserialize)]
-pub(crate) struct Channel {
-    pub(crate) sampler: usize,
-    pub(crate) target: Target,
+pub(super) struct Channel {
+    pub(super) sampler: usize,
+    pub(super) target: Target,
 }
 
 #[derive(Deserialize)]
-pub(crate) struct Target {
-    pub(crate) node: Option<usize>,
-    pub(crate) path: String,
+pub(super) struct Target {
+    pub(super) node: Option<usize>,
+    pub(super) path: String,
 }
 
 #[derive(Deserialize)]
-pub(crate) struct Sampler {
-    pub(crate) input: usize,
-    pub(crate) output: usize,
-    pub(crate) interpolation: Option<String>,
+pub(super) struct Sampler {
+    pub(super) input: usize,
+    pub(super) output: usize,
+    pub(super) interpolation: Option<String>,
 }
 
 #[derive(Deserialize)]
-pub(crate) struct GltfCamera {
+pub(super) struct GltfCamera {
     #[serde(default)]
-    pub(crate) name: String,
-    pub(crate) perspective: Option<Perspective>,
-    pub(crate) orthographic: Option<Orthographic>,
+    pub(super) name: String,
+    pub(super) perspective: Option<Perspective>,
+    pub(super) orthographic: Option<Orthographic>,
 }
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(crate) struct Perspective {
-    pub(crate) aspect_ratio: Option<f64>,
-    pub(crate) yfov: f64,
-    pub(crate) znear: f64,
-    pub(crate) zfar: Option<f64>,
+pub(super) struct Perspective {
+    pub(super) aspect_ratio: Option<f64>,
+    pub(super) yfov: f64,
+    pub(super) znear: f64,
+    pub(super) zfar: Option<f64>,
 }
 
 #[derive(Deserialize)]
-pub(crate) struct Orthographic {
-    pub(crate) xmag: f64,
-    pub(crate) ymag: f64,
-    pub(crate) znear: f64,
-    pub(crate) zfar: f64,
+pub(super) struct Orthographic {
+    pub(super) xmag: f64,
+    pub(super) ymag: f64,
+    pub(super) znear: f64,
+    pub(super) zfar: f64,
 }
 
 /// A light of KHR_lights_punctual.
 #[derive(Deserialize)]
-pub(crate) struct GltfLight {
+pub(super) struct GltfLight {
     #[serde(default)]
-    pub(crate) name: String,
+    pub(super) name: String,
     #[serde(rename = "type")]
-    pub(crate) kind: String,
-    pub(crate) color: Option<[f64; 3]>,
-    pub(crate) intensity: Option<f64>,
-    pub(crate) range: Option<f64>,
+    pub(super) kind: String,
+    pub(super) color: Option<[f64; 3]>,
+    pub(super) intensity: Option<f64>,
+    pub(super) range: Option<f64>,
     #[serde(default)]
-    pub(crate) spot: Spot,
+    pub(super) spot: Spot,
 }
 
 #[derive(Deserialize, Default)]
 #[serde(default, rename_all = "camelCase")]
-pub(crate) struct Spot {
-    pub(crate) inner_cone_angle: Option<f64>,
-    pub(crate) outer_cone_angle: Option<f64>,
+pub(super) struct Spot {
+    pub(super) inner_cone_angle: Option<f64>,
+    pub(super) outer_cone_angle: Option<f64>,
 }
 
 /// KHR_lights_punctual of a node.
 #[derive(Deserialize)]
-pub(crate) struct LightReference {
-    pub(crate) light: usize,
+pub(super) struct LightReference {
+    pub(super) light: usize,
 }
 
 /// EXT_mesh_gpu_instancing of a node.
 #[derive(Deserialize)]
-pub(crate) struct Instancing {
+pub(super) struct Instancing {
     #[serde(default)]
-    pub(crate) attributes: BTreeMap<String, usize>,
+    pub(super) attributes: BTreeMap<String, usize>,
 }
 
 /// KHR_node_visibility of a node.
 #[derive(Deserialize)]
-pub(crate) struct Visibility {
-    pub(crate) visible: Option<bool>,
+pub(super) struct Visibility {
+    pub(super) visible: Option<bool>,
 }

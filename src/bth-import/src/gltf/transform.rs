@@ -4,10 +4,10 @@ use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 
 use crate::gltf::schema::GltfNode;
 
-/// The transform from a node's space to its parent's. The last row of a matrix counts as (0, 0, 0, 1); without a matrix
-/// the node scales, then rotates by a quaternion (x, y, z, w), then translates. The quaternion, which is not zero, is brought to unit
-/// length as in scenes: the numbers of a file are rounded, with others than those of a rotation a mesh would be sheared, and
-/// in a long chain of joints what they lack adds up.
+/// Returns the transform from a node's space to its parent's. The last row of a matrix counts as
+/// (0, 0, 0, 1). Without a matrix the node scales, then rotates by a quaternion (x, y, z, w), then
+/// translates. The quaternion, which is not zero, is normalized as in scenes: the numbers of a file
+/// are rounded, which would shear the mesh, and the error adds up in a long chain of joints.
 pub(super) fn local(node: &GltfNode) -> DAffine3 {
     match node.matrix {
         Some(columns) => DAffine3::from_mat4(DMat4::from_cols_array(&columns)),
@@ -34,14 +34,19 @@ pub(super) fn point(transform: &DAffine3, p: [f32; 3]) -> [f32; 3] {
     transform.transform_point3(DVec3::from_array(p.map(f64::from))).to_array().map(|x| x as f32)
 }
 
-/// Whether the transform exchanges left and right.
+/// Returns the corners of a triangle, with the last two exchanged where it is mirrored.
+pub(super) fn turned([a, b, c]: [u32; 3], mirrored: bool) -> [u32; 3] {
+    if mirrored { [a, c, b] } else { [a, b, c] }
+}
+
+/// Returns true if the transform exchanges left and right.
 pub(super) fn is_mirrored(transform: &DAffine3) -> bool {
     let linear = transform.matrix3;
     linear.row(0).dot(cofactors(linear).row(0)) < 0.0
 }
 
-/// A normal transformed by the inverse transpose and brought to unit length again; unchanged where the linear part is
-/// the identity, and zero where the transform leaves it no direction.
+/// Transforms a normal by the inverse transpose and normalizes it. It is unchanged where the linear
+/// part is the identity, and zero where the transform leaves it no direction.
 pub(super) fn normal(transform: &DAffine3, n: [f32; 3]) -> [f32; 3] {
     if transform.matrix3 == DMat3::IDENTITY {
         return n;
@@ -51,14 +56,16 @@ pub(super) fn normal(transform: &DAffine3, n: [f32; 3]) -> [f32; 3] {
     if length > 0.0 { (transformed / length).to_array().map(|x| x as f32) } else { [0.0; 3] }
 }
 
-/// A normal transformed by the inverse transpose, of any length; zero where the transform leaves it no direction.
+/// Transforms a normal by the inverse transpose, to any length; zero where the transform leaves it
+/// no direction.
 pub(super) fn direction_of_normal(transform: &DAffine3, n: DVec3) -> DVec3 {
     let sign = if is_mirrored(transform) { -1.0 } else { 1.0 };
     let cofactors = cofactors(transform.matrix3);
     DVec3::from_array([0, 1, 2].map(|k| sign * cofactors.row(k).dot(n)))
 }
 
-/// The cofactor matrix: the determinant times the inverse transpose, which exists for singular matrices too.
+/// Returns the cofactor matrix: the determinant times the inverse transpose, which exists for
+/// singular matrices too.
 fn cofactors(linear: DMat3) -> DMat3 {
     let [a, b, c] = [0, 1, 2].map(|k| linear.row(k));
     DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b)).transpose()

@@ -1,11 +1,11 @@
-//! URIs of glTF buffers: files beside the document and data: URIs (glTF 2.0 specification, §2.8).
+//! URIs of glTF buffers: files next to the document and data: URIs (glTF 2.0 specification, §2.8).
 
 use std::path::{self, Path, PathBuf};
 
-use crate::number::shown;
+use crate::text::shown;
 
-/// The file that a relative URI names; `None` for others.
-pub(crate) fn beside(document: &Path, uri: &str) -> Option<PathBuf> {
+/// Returns the file that a relative URI names; `None` for other URIs.
+pub(super) fn beside(document: &Path, uri: &str) -> Option<PathBuf> {
     let name = decode_percent(uri)?;
     let relative = Path::new(&name);
     let is_relative = !name.is_empty()
@@ -14,8 +14,8 @@ pub(crate) fn beside(document: &Path, uri: &str) -> Option<PathBuf> {
     is_relative.then(|| document.parent().unwrap_or(Path::new("")).join(relative))
 }
 
-/// Why [`beside`] finds no file: what was expected and found, and a hint.
-pub(crate) fn refusal(uri: &str) -> (String, &'static str) {
+/// Returns why [`next to`] finds no file: what was expected and found, and a hint.
+pub(super) fn refusal(uri: &str) -> (String, &'static str) {
     let found = shown(uri.as_bytes());
     match decode_percent(uri) {
         None => (
@@ -31,7 +31,8 @@ pub(crate) fn refusal(uri: &str) -> (String, &'static str) {
     }
 }
 
-/// Decodes percent escapes (RFC 3986, §2.1); `None` if that is malformed or the result is not UTF-8.
+/// Decodes percent escapes (RFC 3986, §2.1); `None` if that is malformed or the result is not
+/// UTF-8.
 fn decode_percent(uri: &str) -> Option<String> {
     let mut bytes = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();
@@ -50,8 +51,13 @@ fn decode_percent(uri: &str) -> Option<String> {
     String::from_utf8(bytes).ok()
 }
 
+/// Returns the bytes of a `data:` URI; `None` if they are not in base64.
+pub(super) fn decode_data(uri: &str) -> Option<Vec<u8>> {
+    decode_base64(uri.split_once(";base64,")?.1.as_bytes())
+}
+
 /// Decodes base64 (RFC 4648, §4 and §5), with or without padding.
-pub(crate) fn decode_base64(text: &[u8]) -> Option<Vec<u8>> {
+fn decode_base64(text: &[u8]) -> Option<Vec<u8>> {
     let text = text.trim_ascii();
     let text = text.strip_suffix(b"==").or_else(|| text.strip_suffix(b"=")).unwrap_or(text);
     let mut bytes = Vec::with_capacity(text.len() / 4 * 3 + 2);

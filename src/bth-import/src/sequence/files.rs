@@ -5,12 +5,13 @@ use crate::error::{Error, Place, Result};
 use crate::source::input_error;
 use std::path::{Path, PathBuf};
 
-/// The files whose names have a number in the place of a run of `#`, by number. The number has at least as many digits as there are
-/// `#`, and no more unless it needs them; numbers follow each other without gaps.
+/// The files whose names have a number instead of a run of `#`, by number. The number has at least
+/// as many digits as there are `#`, and no more unless it needs them; numbers follow each other
+/// without gaps.
 ///
 /// # Errors
-/// `BTH-O001` when the folder cannot be read, `BTH-I017` when the pattern has no run of `#` or several, when no file has such a
-/// name, or when a number is missing.
+/// `BTH-O001` when the folder cannot be read, `BTH-I017` when the pattern has no run of `#` or
+/// several, when no file has such a name, or when a number is missing.
 pub fn sequence_files(pattern: &Path) -> Result<Vec<PathBuf>> {
     let wrong = |message: String, hint: &str| {
         Err(input_error(MISMATCH, Place::File(pattern.to_owned()), message, hint))

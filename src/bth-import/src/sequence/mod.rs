@@ -1,20 +1,16 @@
-//! Meshes whose vertices move from frame to frame: numbered files of equal topology, and a model with a vertex cache.
-//!
-//! [`files`] finds the files of a numbered sequence, [`pc2`] and [`mdd`] read vertex caches, and [`weld`] merges vertices that
-//! coincide in every frame.
+//! Meshes whose vertices move from frame to frame: numbered files of equal topology, and a model
+//! with a vertex cache.
 
-mod cache;
 mod files;
 mod frames;
-mod mdd;
-mod pc2;
 mod vertex_cache;
-mod weld;
 
-pub use cache::{import_vertex_cache, import_vertex_cache_bytes, read_vertex_cache};
 pub use files::sequence_files;
-pub use frames::{import_sequence, import_sequence_bytes};
-pub use vertex_cache::VertexCache;
+pub use frames::{import_sequence, import_sequence_bytes, import_vertex_cache, import_vertex_cache_bytes};
+pub use vertex_cache::{VertexCache, read_vertex_cache};
+
+use std::collections::HashMap;
+use std::sync::atomic::AtomicU32;
 
 use crate::error::Result;
 use crate::source::Source;
@@ -37,7 +33,7 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// Frames a second of a sequence.
+    /// Returns the frames a second of a sequence.
     fn rate(&self) -> f64 {
         self.rate.unwrap_or(self.usual_rate)
     }
@@ -48,13 +44,33 @@ fn check_times(source: &Source<'_>, times: &[f64]) -> Result<()> {
     let in_order = |pair: &[f64]| pair[0] < pair[1];
     let wrong = times.iter().position(|t| !t.is_finite());
     let wrong = wrong.or_else(|| times.windows(2).position(|pair| !in_order(pair)).map(|row| row + 1));
-    match wrong {
-        None => Ok(()),
-        Some(row) => {
-            let before = row.checked_sub(1).map_or(f64::NEG_INFINITY, |row| times[row]);
-            let message =
-                format!("frame {row}: expected a finite time after {before} s, found {} s", times[row]);
-            Err(source.error(MISMATCH, message, "give another rate, or export the frames again"))
+    let Some(row) = wrong else { return Ok(()) };
+    let before = row.checked_sub(1).map_or(f64::NEG_INFINITY, |row| times[row]);
+    let message = format!("frame {row}: expected a finite time after {before} s, found {} s", times[row]);
+    Err(source.error(MISMATCH, message, "give another rate, or export the frames again"))
+}
+
+/// Returns for each vertex the first row that is equal to it in every frame. All frames have
+/// equally many rows. -0 equals +0.
+pub(crate) fn equal_vertices(frames: &[&[[f32; 3]]]) -> Vec<AtomicU32> {
+    // Vertices of the same hash are compared in every frame.
+    let mut of_hash: HashMap<u64, Vec<usize>> = HashMap::new();
+    let first = |row: usize| {
+        let same = of_hash.entry(hash(frames, row)).or_default();
+        let equal = |other: &&usize| frames.iter().all(|frame| frame[row] == frame[**other]);
+        let found = same.iter().find(equal).copied();
+        if found.is_none() {
+            same.push(row);
         }
-    }
+        AtomicU32::new(found.unwrap_or(row) as u32)
+    };
+    (0..frames[0].len()).map(first).collect()
+}
+
+/// Hashes a vertex's positions in all frames.
+fn hash(frames: &[&[[f32; 3]]], row: usize) -> u64 {
+    let mix = |hash: u64, x: f32| {
+        (hash.rotate_left(23) ^ u64::from((x + 0.0).to_bits())).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+    };
+    frames.iter().flat_map(|frame| frame[row]).fold(0, mix)
 }

@@ -1,5 +1,5 @@
-//! Compressed glTF: files that gltf-transform 4 wrote (with the meshoptimizer and Draco of their authors), and what other
-//! than files of the authors could be.
+//! Compressed glTF: files that gltf-transform 4 wrote (with the meshoptimizer and Draco of their
+//! authors), and what other than files of the authors could be.
 
 use super::*;
 use std::path::Path;
@@ -32,7 +32,8 @@ fn seed(name: &str) -> Vec<u8> {
     std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/seeds/gltf").join(name)).unwrap()
 }
 
-/// The sheet's vertex at a position, which may be off by the step of 12 bits over the sheet's height of 1.5.
+/// The sheet's vertex at a position, which may be off by the step of 12 bits over the sheet's
+/// height of 1.5.
 fn vertex(position: [f32; 3]) -> usize {
     let step = 1.5 / 4095.0;
     let near = |p: &[f64; 3]| (0..3).all(|k| (p[k] - f64::from(position[k])).abs() <= step);

@@ -1,7 +1,7 @@
 //! Polygons from whose first corner not all of them is seen.
 
 use super::*;
-use bth_import::{Polygons, Unreadable, Wanted, import_bytes as import_named};
+use bth_import::{Polygons, import_bytes as import_named};
 use std::path::Path;
 
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
@@ -39,18 +39,12 @@ fn concave_polygons_are_told_with_the_first_triangle() {
 fn concave_polygons_are_split_exactly_where_that_is_wanted() {
     let split = |name: &str, text: &str, polygons: Polygons| {
         let listener = Listener::default();
-        let wanted = Wanted {
-            attributes: Keep::All,
-            groups: true,
-            materials: true,
-            polygons,
-            vertices: false,
-            unreadable: Unreadable::Refused,
-        };
+        let wanted = Wanted { polygons, ..everything() };
         let (mesh, report) = import_named(Path::new(name), text.as_bytes(), wanted, &listener).unwrap();
         (mesh, report.concave, listener.0.into_inner().unwrap())
     };
-    // Convex polygons are fans either way. The corners of the arrow head have attributes and, in one file, positions of later lines.
+    // Convex polygons are fans either way. The corners of the arrow head have attributes and, in
+    // one file, positions of later lines.
     let attributes = "vt 0 0\nvt 1 0\nvt 2 0\nvt 3 0\n";
     let faces = "f 5 6 7 8\nf 1/1 2/2 3/3 4/4\nf 5 6 7\n";
     let square = "v 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n";

@@ -1,6 +1,7 @@
-//! Cut-out materials of glTF models: which triangles have them, from which images, and what is refused.
+//! Cut-out materials of glTF models: which triangles have them, from which images, and what is
+//! refused.
 
-use super::gltf::glb;
+use super::gltf::Model;
 use super::*;
 use bth_import::{AlphaMode, Cutouts, Wrap, import_cutouts, source_files};
 use serde_json::{Value, json};
@@ -24,16 +25,9 @@ fn base64(bytes: &[u8]) -> String {
     bytes.chunks(3).flat_map(group).collect()
 }
 
-/// A triangle of an opaque material, then one of the given material, the second in a mirrored node too. The binary chunk ends
-/// with the image.
-fn document(material: Value) -> (Value, Vec<u8>) {
-    let floats = |numbers: &[f32]| numbers.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
-    let mut bytes = floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
-    bytes.extend(floats(&[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]));
-    bytes.extend([255, 255, 255, 0, 255, 255, 255, 51, 255, 255, 255, 255]);
-    let image = image();
-    let start = bytes.len();
-    bytes.extend(&image);
+/// A triangle of an opaque material, then one of the given material, the second in a mirrored node
+/// too.
+fn document(material: Value) -> Model {
     let primitive = |material: u32, color: bool| {
         let mut attributes = json!({"POSITION": 0, "TEXCOORD_0": 1});
         if color {
@@ -41,23 +35,20 @@ fn document(material: Value) -> (Value, Vec<u8>) {
         }
         json!({"attributes": attributes, "material": material})
     };
-    let document = json!({
-        "asset": {"version": "2.0"},
+    let mut model = Model::new(json!({
         "nodes": [{"mesh": 0}, {"mesh": 1, "scale": [-1, 1, 1]}],
         "meshes": [{"primitives": [primitive(0, false), primitive(1, false)]}, {"primitives": [primitive(1, true)]}],
         "materials": [{}, material],
         "textures": [{"source": 0, "sampler": 0}],
         "samplers": [{"magFilter": 9728, "wrapS": 33071, "wrapT": 33648}],
         "images": [{"bufferView": 3, "mimeType": "image/png"}],
-        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
-            {"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC2"},
-            {"bufferView": 2, "componentType": 5121, "normalized": true, "count": 3, "type": "VEC4"}],
-        "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 24},
-            {"buffer": 0, "byteOffset": 60, "byteLength": 12},
-            {"buffer": 0, "byteOffset": start, "byteLength": image.len()}],
-        "buffers": [{"byteLength": bytes.len()}]
-    });
-    (document, bytes)
+    }))
+    .rows(&[[0f32, 0., 0.], [1., 0., 0.], [0., 1., 0.]])
+    .rows(&[[0f32, 0.], [1., 0.], [0., 1.]])
+    .rows(&[[255u8, 255, 255, 0], [255, 255, 255, 51], [255; 4]])
+    .view(&image());
+    model.document["accessors"][2]["normalized"] = true.into();
+    model
 }
 
 fn masked() -> Value {
@@ -66,9 +57,9 @@ fn masked() -> Value {
 }
 
 /// Writes the document and reads its cut-outs.
-fn read(folder: &Path, (document, bytes): &(Value, Vec<u8>), mode: AlphaMode) -> Result<Cutouts> {
+fn read(folder: &Path, model: &Model, mode: AlphaMode) -> Result<Cutouts> {
     let path = folder.join("a.glb");
-    std::fs::write(&path, glb(document, bytes)).unwrap();
+    std::fs::write(&path, model.glb()).unwrap();
     let mesh = import(&path, Keep::None, &Silent)?.0;
     let cutouts = import_cutouts(&path, mode, &Silent)?;
     if mode != AlphaMode::None {
@@ -77,7 +68,7 @@ fn read(folder: &Path, (document, bytes): &(Value, Vec<u8>), mode: AlphaMode) ->
     Ok(cutouts)
 }
 
-fn cutouts(model: &(Value, Vec<u8>), mode: AlphaMode) -> Result<Cutouts> {
+fn cutouts(model: &Model, mode: AlphaMode) -> Result<Cutouts> {
     read(tempfile::tempdir().unwrap().path(), model, mode)
 }
 
@@ -97,7 +88,8 @@ fn materials_of_the_mode_are_read_with_their_corners() {
     assert_eq!(cutouts(&document(masked()), AlphaMode::None).unwrap(), Cutouts::default());
 }
 
-/// The alpha of an older model of materials is that of its diffuse colour, at the coordinates of its texture, whichever set is kept.
+/// The alpha of an older model of materials is that of its diffuse colour, at the coordinates of
+/// its texture, whichever set is kept.
 #[test]
 fn older_models_have_holes_by_the_alpha_of_their_diffuse_colors() {
     let expected = cutouts(&document(masked()), AlphaMode::Mask).unwrap();
@@ -106,7 +98,7 @@ fn older_models_have_holes_by_the_alpha_of_their_diffuse_colors() {
         "extensions": {"KHR_materials_pbrSpecularGlossiness": older}});
     assert_eq!(cutouts(&document(older.clone()), AlphaMode::Mask).unwrap(), expected);
     let mut model = document(older);
-    model.0["images"][0] = json!({"uri": "a leaf.png"});
+    model.document["images"][0] = json!({"uri": "a leaf.png"});
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a leaf.png"), image()).unwrap();
     assert_eq!(read(folder.path(), &model, AlphaMode::Mask).unwrap(), expected);
@@ -144,10 +136,10 @@ fn texture_coordinates_are_transformed_and_may_be_missing() {
 fn images_come_from_files_and_data_uris_too() {
     let folder = tempfile::tempdir().unwrap();
     let mut model = document(masked());
-    model.0["images"][0] = json!({"uri": format!("data:image/png;base64,{}", base64(&image()))});
+    model.document["images"][0] = json!({"uri": format!("data:image/png;base64,{}", base64(&image()))});
     let expected = cutouts(&document(masked()), AlphaMode::Mask).unwrap();
     assert_eq!(read(folder.path(), &model, AlphaMode::Mask).unwrap(), expected);
-    model.0["images"][0] = json!({"uri": "a%20leaf.png"});
+    model.document["images"][0] = json!({"uri": "a%20leaf.png"});
     let missing = read(folder.path(), &model, AlphaMode::Mask).unwrap_err();
     assert!(matches!(missing, Error::Input { code: "BTH-I016", .. }), "{missing}");
     std::fs::write(folder.path().join("a leaf.png"), image()).unwrap();
@@ -162,7 +154,7 @@ fn images_come_from_files_and_data_uris_too() {
 fn an_image_file_that_is_too_large_is_refused_and_not_cut_off() {
     let folder = tempfile::tempdir().unwrap();
     let mut model = document(masked());
-    model.0["images"][0] = json!({"uri": "large.png"});
+    model.document["images"][0] = json!({"uri": "large.png"});
     let path = folder.path().join("large.png");
     std::fs::write(&path, image()).unwrap();
     std::fs::File::options().write(true).open(&path).unwrap().set_len((1 << 28) + 1).unwrap();
@@ -174,7 +166,7 @@ fn an_image_file_that_is_too_large_is_refused_and_not_cut_off() {
 #[test]
 fn an_uri_that_is_no_file_is_not_shown_whole() {
     let mut model = document(masked());
-    model.0["images"][0] = json!({"uri": format!("blob:\u{1b}{}", "A".repeat(1 << 20))});
+    model.document["images"][0] = json!({"uri": format!("blob:\u{1b}{}", "A".repeat(1 << 20))});
     let text = cutouts(&model, AlphaMode::Mask).unwrap_err().to_string();
     assert!(
         text.len() < 400 && !text.contains('\u{1b}') && text.contains("beside the model"),
@@ -201,7 +193,7 @@ fn what_cannot_be_read_is_an_error_with_a_code_only_where_it_is_asked_for() {
     ];
     for (code, change) in changes {
         let mut model = document(masked());
-        change(&mut model.0);
+        change(&mut model.document);
         let error = cutouts(&model, AlphaMode::Mask).expect_err(code);
         assert!(matches!(&error, Error::Input { code: found, .. } if *found == code), "{code}: {error}");
         cutouts(&model, AlphaMode::None).unwrap();
@@ -211,17 +203,18 @@ fn what_cannot_be_read_is_an_error_with_a_code_only_where_it_is_asked_for() {
 #[test]
 fn jpeg_images_have_no_alpha() {
     let mut model = document(masked());
-    model.0["images"][0] = json!({"uri": format!("data:image/jpeg;base64,{}", base64(b"\xff\xd8\xff\xe0"))});
+    model.document["images"][0] =
+        json!({"uri": format!("data:image/jpeg;base64,{}", base64(b"\xff\xd8\xff\xe0"))});
     let found = cutouts(&model, AlphaMode::Mask).unwrap();
     assert_eq!((found.materials[0].image, found.images.len()), (None, 0));
 }
 
 #[test]
 fn hidden_nodes_have_no_cutouts_and_unknown_alpha_modes_are_told() {
-    let (mut json, bytes) = document(masked());
-    let visible = cutouts(&(json.clone(), bytes.clone()), AlphaMode::Mask).unwrap();
-    json["nodes"][0]["extensions"] = json!({"KHR_node_visibility": {"visible": false}});
-    let hidden = cutouts(&(json, bytes), AlphaMode::Mask).unwrap();
+    let mut model = document(masked());
+    let visible = cutouts(&model, AlphaMode::Mask).unwrap();
+    model.document["nodes"][0]["extensions"] = json!({"KHR_node_visibility": {"visible": false}});
+    let hidden = cutouts(&model, AlphaMode::Mask).unwrap();
     // The mesh of the second node has one triangle.
     assert_eq!((visible.triangles.len(), hidden.triangles.len()), (2, 1));
     assert_eq!((hidden.mesh_triangles, hidden.triangles[0].triangle), (1, 0));
@@ -230,8 +223,7 @@ fn hidden_nodes_have_no_cutouts_and_unknown_alpha_modes_are_told() {
     material["alphaMode"] = "mask".into();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.glb");
-    let (json, bytes) = document(material);
-    std::fs::write(&path, glb(&json, &bytes)).unwrap();
+    std::fs::write(&path, document(material).glb()).unwrap();
     let listener = Listener::default();
     assert!(import_cutouts(&path, AlphaMode::Mask, &listener).unwrap().triangles.is_empty());
     assert!(listener.heard("expected an alphaMode of OPAQUE, MASK, BLEND, found \"mask\"; it has no holes"));

@@ -1,5 +1,6 @@
-//! Scenes whose glTF documents are damaged at random, from the seeds of the fuzz target `gltf_scene`: they are refused, or give manifests
-//! that read back equal and meshes with all that moves them in range.
+//! Scenes whose glTF documents are damaged at random, from the seeds of the fuzz target
+//! `gltf_scene`: they are refused, or give manifests that read back equal and meshes with all that
+//! moves them in range.
 
 use std::path::Path;
 
@@ -18,7 +19,8 @@ fn seed(name: &str) -> Vec<u8> {
     std::fs::read(path).unwrap()
 }
 
-/// A document with a number replaced, a part left out or doubled, or a character of the binary data changed.
+/// A document with a number replaced, a part left out or doubled, or a character of the binary data
+/// changed.
 fn damaged(bytes: &[u8], rng: &mut Rng) -> Vec<u8> {
     let mut out = bytes.to_vec();
     let below = |rng: &mut Rng, n: usize| rng.below(n.max(1) as u64) as usize;

@@ -66,8 +66,8 @@ fn told(topology: &str, word: &str) -> u64 {
     values.next().unwrap_or(0)
 }
 
-/// Models that the index's own loader read otherwise than the format says or than we do, with what is
-/// right: positions, boundary, non-manifold, zero-area, duplicate.
+/// Models that the index's own loader read otherwise than the format says or than we do, with what
+/// is right: positions, boundary, non-manifold, zero-area, duplicate.
 const OTHERWISE: [(&str, [u64; 5]); 7] = [
     // Positions that no face uses are counted there.
     ("static/stanford-bunny.ply", [34834, 223, 0, 0, 0]),
@@ -159,8 +159,8 @@ fn messy_models_are_read_or_refused_with_their_place() {
     );
 }
 
-/// Triangles, and the smallest and the largest corner in world space, as gltf-transform 4.5.1 (Node.js, with the
-/// meshoptimizer of its authors) reads them.
+/// Triangles, and the smallest and the largest corner in world space, as gltf-transform 4.5.1
+/// (Node.js, with the meshoptimizer of its authors) reads them.
 #[cfg(feature = "meshopt")]
 const COMPRESSED: [(&str, u64, [[f64; 3]; 2]); 2] = [
     (
@@ -243,7 +243,7 @@ fn cuts_and_flipped_bits_of_models_never_panic() {
     }
 }
 
-/// A vertex far out of a scan, as a number in place of one that is missing would be.
+/// A vertex far out of a scan, as a number instead of one that is missing would be.
 #[test]
 fn a_vertex_far_out_of_a_scan_is_warned_of_and_the_scan_is_not() {
     let Some(folder) = folder() else { return };

@@ -1,8 +1,8 @@
 //! Groups of triangles: what each format yields.
 
-use super::gltf::glb;
+use super::gltf::Model;
 use super::*;
-use bth_import::{Groups, Polygons, Unreadable, Wanted};
+use bth_import::Groups;
 use serde_json::json;
 
 const CORNERS: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
@@ -11,22 +11,7 @@ fn groups(name: &str, bytes: &[u8]) -> (Mesh, Groups) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     std::fs::write(&path, bytes).unwrap();
-    let read = |groups| {
-        import(
-            &path,
-            Wanted {
-                attributes: Keep::None,
-                groups,
-                materials: false,
-                polygons: Polygons::Fans,
-                vertices: false,
-                unreadable: Unreadable::Refused,
-            },
-            &Silent,
-        )
-        .unwrap()
-        .0
-    };
+    let read = |groups| import(&path, Wanted { groups, ..Wanted::default() }, &Silent).unwrap().0;
     let (mut mesh, plain) = (read(true), read(false));
     let groups = mesh.groups.take().expect("wanted groups");
     assert_eq!(mesh, plain, "groups change nothing else");
@@ -106,14 +91,12 @@ fn a_format_without_groups_has_none() {
 
 #[test]
 fn primitives_of_gltf_are_groups() {
-    let positions: Vec<u8> = SQUARE.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect();
     let primitive = |material: Option<u32>| match material {
         Some(m) => json!({"attributes": {"POSITION": 0}, "mode": 5, "material": m}),
         None => json!({"attributes": {"POSITION": 0}, "mode": 5}),
     };
     let lines = json!({"attributes": {"POSITION": 0}, "mode": 1});
     let document = json!({
-        "asset": {"version": "2.0"},
         "scenes": [{"nodes": [0, 1, 2]}],
         "nodes": [{"mesh": 1}, {"mesh": 0, "translation": [5, 0, 0]}, {"mesh": 1, "scale": [-1, 1, 1]}],
         "materials": [{"name": "unused"}, {}, {"name": "glass"}],
@@ -121,25 +104,15 @@ fn primitives_of_gltf_are_groups() {
             {"primitives": [primitive(Some(1))]},
             {"name": "door", "primitives": [primitive(Some(2)), lines, primitive(None)]}
         ],
-        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"}],
-        "bufferViews": [{"buffer": 0, "byteLength": 48}],
-        "buffers": [{"byteLength": 48}]
     });
-    let bytes = glb(&document, &positions);
+    let bytes = Model::new(document).rows(&SQUARE).glb();
     let (_, groups) = groups("a.glb", &bytes);
     assert_eq!(shown(&groups), ["door/0|glass|0,6", "door/2|-|2,8", "mesh 0|material 1|4"]);
 
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.glb");
     std::fs::write(&path, &bytes).unwrap();
-    let wanted = Wanted {
-        attributes: Keep::None,
-        groups: true,
-        materials: false,
-        polygons: Polygons::Fans,
-        vertices: false,
-        unreadable: Unreadable::Refused,
-    };
+    let wanted = Wanted { groups: true, ..Wanted::default() };
     let meshes =
         bth_import::import_gltf_parts(&path, &[0, 1].map(bth_import::GltfPart::Mesh), wanted, &Silent)
             .unwrap();

@@ -1,14 +1,16 @@
 //! Images and material libraries that are missing, broken or too large, where they are left out.
 
-use super::gltf::glb;
-use super::materials::WANTED;
+use super::gltf::Model;
 use super::*;
 use bth_format::layout::NONE;
-use bth_import::{AlphaMode, Looks, Unreadable, Wanted, import_cutouts, import_images};
+use bth_import::{AlphaMode, Looks, Unreadable, import_cutouts, import_images};
 use serde_json::json;
 use std::path::Path;
 
-const LENIENT: Wanted = Wanted { unreadable: Unreadable::LeftOut, ..WANTED };
+fn lenient_wanted() -> Wanted {
+    Wanted { unreadable: Unreadable::LeftOut, ..everything() }
+}
+
 const LOOKS: Looks = Looks { alpha: AlphaMode::Mask, materials: true, unreadable: Unreadable::LeftOut };
 
 /// A PNG image of one texel, as far as its header tells.
@@ -17,14 +19,15 @@ fn image(width: u32) -> Vec<u8> {
     [b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR".as_slice(), &width, &width, b"\x08\x06\0\0\0\0\0\0\0"].concat()
 }
 
-/// Checks that a model is refused unless images are left out; its mesh and the warnings without the folder's name.
+/// Checks that a model is refused unless images are left out; its mesh and the warnings without the
+/// folder's name.
 fn lenient(folder: &Path, name: &str) -> (Mesh, Vec<String>) {
     let path = folder.join(name);
-    let refused = import(&path, WANTED, &Silent).unwrap_err();
+    let refused = import(&path, everything(), &Silent).unwrap_err();
     assert!(matches!(refused, Error::Input { code: "BTH-I016", .. }), "{refused}");
     assert!(refused.hint().contains("--lenient-materials"), "{refused}");
     let heard = Listener::default();
-    let (mesh, _) = import(&path, LENIENT, &heard).unwrap();
+    let (mesh, _) = import(&path, lenient_wanted(), &heard).unwrap();
     let warnings = heard.0.into_inner().unwrap();
     let prefix = format!("{}/", folder.display());
     (mesh, warnings.iter().map(|warning| warning.replace(&prefix, "")).collect())
@@ -75,7 +78,7 @@ fn obj_materials_keep_what_can_be_read() {
     assert!(images.iter().any(|image| image.name == materials.textures[0].image));
     // What is malformed is an error still.
     std::fs::write(at("a b.mtl"), "newmtl lost\nKd 1 x 0\n").unwrap();
-    let refused = import(&at("a.obj"), LENIENT, &Silent).unwrap_err();
+    let refused = import(&at("a.obj"), lenient_wanted(), &Silent).unwrap_err();
     assert!(matches!(refused, Error::Input { code: "BTH-I002", .. }), "{refused}");
 }
 
@@ -84,19 +87,13 @@ fn gltf_materials_and_holes_do_without_images_that_cannot_be_read() {
     let folder = tempfile::tempdir().unwrap();
     let material = json!({"alphaMode": "MASK", "emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 1},
         "pbrMetallicRoughness": {"baseColorFactor": [0.25, 0, 0, 0.75], "baseColorTexture": {"index": 0}}});
-    let numbers: [f32; 15] = [0., 0., 0., 1., 0., 0., 0., 1., 0., 0., 0., 1., 0., 0., 1.];
-    let mut bytes: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
-    bytes.extend(image(1));
-    let view =
-        |offset: usize, length: usize| json!({"buffer": 0, "byteOffset": offset, "byteLength": length});
-    let accessor =
-        |view: u32, kind: &str| json!({"bufferView": view, "componentType": 5126, "count": 3, "type": kind});
-    let document = json!({"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}], "materials": [material],
+    let model = Model::new(json!({"nodes": [{"mesh": 0}], "materials": [material],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "material": 0}]}],
-        "textures": [{"source": 0}, {"source": 1}], "images": [{"uri": "lost.png"}, {"bufferView": 2}],
-        "accessors": [accessor(0, "VEC3"), accessor(1, "VEC2")], "buffers": [{"byteLength": bytes.len()}],
-        "bufferViews": [view(0, 36), view(36, 24), view(60, bytes.len() - 60)]});
-    std::fs::write(folder.path().join("a.glb"), glb(&document, &bytes)).unwrap();
+        "textures": [{"source": 0}, {"source": 1}], "images": [{"uri": "lost.png"}, {"bufferView": 2}]}))
+    .rows(&[[0f32, 0., 0.], [1., 0., 0.], [0., 1., 0.]])
+    .rows(&[[0f32, 0.], [1., 0.], [0., 1.]])
+    .view(&image(1));
+    std::fs::write(folder.path().join("a.glb"), model.glb()).unwrap();
     let (mesh, warnings) = lenient(folder.path(), "a.glb");
     let materials = mesh.materials.unwrap();
     let parameters = &materials.parameters[0];

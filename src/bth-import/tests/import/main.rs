@@ -1,4 +1,5 @@
-//! Import of models: what each format yields, what is refused and where, and the collected test models.
+//! Import of models: what each format yields, what is refused and where, and the collected test
+//! models.
 
 mod compressed;
 mod concave;
@@ -26,8 +27,8 @@ mod textures;
 use std::sync::Mutex;
 
 use bth_import::error::{Error, Place, Result};
-use bth_import::{Keep, Mesh, Report, import};
-use bth_import::{Monitor, Silent};
+use bth_import::{Keep, Mesh, Monitor, Report, Silent, Wanted, import};
+use std::path::Path;
 
 /// The outcome of importing bytes from a file of this name.
 fn import_bytes(name: &str, bytes: &[u8], keep: Keep) -> Result<(Mesh, Report)> {
@@ -63,6 +64,29 @@ fn assert_refused(name: &str, bytes: &[u8], code: &str, place: &str, message_par
     assert!(found.2.contains(message_part), "{}", found.2);
 }
 
+/// Checks that a text is refused after each edit: what is replaced by what, code, place, part of
+/// the message.
+#[track_caller]
+fn assert_edits_refused(name: &str, text: &str, edits: &[[&str; 5]]) {
+    for [from, to, code, place, message] in edits {
+        let edited = text.replace(from, to);
+        assert_ne!(edited, text, "{from} does not occur");
+        assert_refused(name, edited.as_bytes(), code, place, message);
+    }
+}
+
+/// Everything that a mesh can have, with polygons as fans.
+fn everything() -> Wanted {
+    Wanted { attributes: Keep::All, groups: true, materials: true, ..Wanted::default() }
+}
+
+/// Imports with these wishes; also returns the warnings.
+fn told(path: &Path, wanted: impl Into<Wanted>) -> Result<(Mesh, Vec<String>)> {
+    let listener = Listener::default();
+    let (mesh, _) = import(path, wanted, &listener)?;
+    Ok((mesh, listener.0.into_inner().unwrap()))
+}
+
 /// Collects warnings.
 #[derive(Default)]
 struct Listener(Mutex<Vec<String>>);
@@ -84,7 +108,7 @@ const SQUARE: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]
 
 #[test]
 fn a_missing_file_is_a_file_error() {
-    let error = import(std::path::Path::new("no/such/model.obj"), Keep::None, &Silent).unwrap_err();
+    let error = import(Path::new("no/such/model.obj"), Keep::None, &Silent).unwrap_err();
     assert!(matches!(error, Error::File { code: "BTH-O001", .. }), "{error}");
 }
 
@@ -136,7 +160,6 @@ fn the_report_counts_what_was_read_and_found() {
             positions_read: 6,
             positions: 4,
             polygons: 1,
-            concave: 0,
             skipped: 4,
             degenerate: 1,
             duplicate: 1,
@@ -144,8 +167,7 @@ fn the_report_counts_what_was_read_and_found() {
             non_manifold_edges: 1,
             components: 1,
             non_finite_unused: 1,
-            frames: 0,
-            opacity: None,
+            ..Report::default()
         }
     );
     assert!(listener.heard("1 positions are not finite"));

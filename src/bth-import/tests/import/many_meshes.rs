@@ -1,8 +1,9 @@
-//! Documents of many meshes, each of which is imported as a model of its own: what they share is read once.
+//! Documents of many meshes, each of which is imported as a model of its own: what they share is
+//! read once.
 
 use super::gltf::{binary, edited};
 use super::*;
-use bth_import::{GltfPart, Polygons, Unreadable, Wanted, import_gltf_parts};
+use bth_import::{GltfPart, import_gltf_parts};
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -10,7 +11,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// Removes a file once a mesh has been read.
 struct Remover {
     file: PathBuf,
-    /// How often it was asked whether the import is cancelled: twice for a mesh of one primitive before its vertices are read.
+    /// How often it was asked whether the import is cancelled: twice for a mesh of one primitive
+    /// before its vertices are read.
     asked: AtomicU32,
 }
 
@@ -53,14 +55,7 @@ fn a_material_for_each_of_many_meshes_is_quick() {
     });
     std::fs::write(&path, gltf::glb(&document, &binary())).unwrap();
     let parts: Vec<_> = (0..4000).map(GltfPart::Mesh).collect();
-    let wanted = Wanted {
-        attributes: Keep::All,
-        groups: true,
-        materials: true,
-        polygons: Polygons::Fans,
-        vertices: false,
-        unreadable: Unreadable::Refused,
-    };
+    let wanted = everything();
     let start = std::time::Instant::now();
     let meshes = import_gltf_parts(&path, &parts, wanted, &Silent).unwrap();
     // Reading the document again for each mesh takes longer.

@@ -1,21 +1,12 @@
-//! Materials of glTF documents and colours of PLY files: what is read, what is left out with a warning, and the sets of texture coordinates.
+//! Materials of glTF documents and colours of PLY files: what is read, what is left out with a
+//! warning, and the sets of texture coordinates.
 
-use super::gltf::glb;
+use super::gltf::Model;
 use super::*;
 use bth_format::layout::*;
-use bth_import::{Looks, Materials, Polygons, Unreadable, Wanted, import_images};
+use bth_import::{Looks, Materials, import_images};
 use serde_json::{Value, json};
 use std::path::Path;
-
-/// Everything that says how surfaces look.
-pub(super) const WANTED: Wanted = Wanted {
-    attributes: Keep::All,
-    groups: true,
-    materials: true,
-    polygons: Polygons::Fans,
-    vertices: false,
-    unreadable: Unreadable::Refused,
-};
 
 /// The smallest file that begins as a PNG image of one texel.
 fn image(seed: u8) -> Vec<u8> {
@@ -25,49 +16,33 @@ fn image(seed: u8) -> Vec<u8> {
 }
 
 /// A triangle with two sets of texture coordinates and two images.
-fn document(materials: Value) -> (Value, Vec<u8>) {
-    let floats = |numbers: &[f32]| numbers.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
-    let mut bytes = floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
-    bytes.extend(floats(&[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]));
-    bytes.extend(floats(&[0.5, 0.5, 0.25, 0.5, 0.5, 0.75]));
-    let (first, second) = (image(1), image(2));
-    let start = bytes.len();
-    bytes.extend(&first);
-    bytes.extend([0; 3]);
-    let next = bytes.len();
-    bytes.extend(&second);
-    let view =
-        |offset: usize, length: usize| json!({"buffer": 0, "byteOffset": offset, "byteLength": length});
-    let accessor =
-        |view: u32, kind: &str| json!({"bufferView": view, "componentType": 5126, "count": 3, "type": kind});
-    let document = json!({
-        "asset": {"version": "2.0"},
+fn document(material: Value) -> Model {
+    let attributes = json!({"POSITION": 0, "TEXCOORD_0": 1, "TEXCOORD_1": 2});
+    Model::new(json!({
         "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1, "TEXCOORD_1": 2}, "material": 0}]}],
-        "materials": materials,
+        "meshes": [{"primitives": [{"attributes": attributes, "material": 0}]}],
+        "materials": [material],
         "textures": [{"source": 0}, {"source": 1, "sampler": 0}, {"extensions": {"KHR_texture_basisu": {"source": 1}}}],
         "samplers": [{"magFilter": 9728, "wrapS": 33071, "wrapT": 33648}],
         "images": [{"bufferView": 3, "mimeType": "image/png"}, {"bufferView": 4, "mimeType": "image/png"}],
-        "accessors": [accessor(0, "VEC3"), accessor(1, "VEC2"), accessor(2, "VEC2")],
-        "bufferViews": [view(0, 36), view(36, 24), view(60, 24), view(start, first.len()), view(next, second.len())],
-        "buffers": [{"byteLength": bytes.len()}]
-    });
-    (document, bytes)
+    }))
+    .rows(&[[0f32, 0., 0.], [1., 0., 0.], [0., 1., 0.]])
+    .rows(&[[0f32, 0.], [1., 0.], [0., 1.]])
+    .rows(&[[0.5f32, 0.5], [0.25, 0.5], [0.5, 0.75]])
+    .view(&image(1))
+    .view(&image(2))
 }
 
 /// Writes a document with one material; its materials and what was warned of.
 fn read(folder: &Path, material: Value) -> Result<(Mesh, Vec<String>)> {
     let path = folder.join("a.glb");
-    let (document, bytes) = document(json!([material]));
-    std::fs::write(&path, glb(&document, &bytes)).unwrap();
-    let heard = Listener::default();
-    let (mesh, _) = import(&path, WANTED, &heard)?;
+    std::fs::write(&path, document(material).glb()).unwrap();
+    let (mesh, warnings) = told(&path, everything())?;
     for texture in &mesh.materials.as_ref().unwrap().textures {
-        assert!(
-            import_images(&path, Looks::default(), &heard)?.iter().any(|image| image.name == texture.image)
-        );
+        let images = import_images(&path, Looks::default(), &Silent)?;
+        assert!(images.iter().any(|image| image.name == texture.image));
     }
-    Ok((mesh, heard.0.into_inner().unwrap()))
+    Ok((mesh, warnings))
 }
 
 fn materials(material: Value) -> (Materials, Vec<String>) {
@@ -124,7 +99,8 @@ fn textures_of_one_set_share_it_by_a_transform() {
 
 #[test]
 fn what_is_left_out_is_reported() {
-    // The normal texture decides which set is kept for all purposes; the diffuse texture has the second one.
+    // The normal texture decides which set is kept for all purposes; the diffuse texture has the
+    // second one.
     let (read, warnings) = materials(json!({"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0},
         "normalTexture": {"index": 1, "texCoord": 2}, "extensions": {"KHR_materials_clearcoat": {},
         "KHR_materials_pbrSpecularGlossiness": {"diffuseTexture": {"index": 1, "texCoord": 1}}}}));
@@ -146,7 +122,8 @@ fn what_is_left_out_is_reported() {
     assert_eq!(warnings, ["materials: not kept are alphaMode \"mask\""]);
 }
 
-/// The texture coordinates of the corners of the triangle for a texture, by the rows that the materials keep.
+/// The texture coordinates of the corners of the triangle for a texture, by the rows that the
+/// materials keep.
 fn coordinates(mesh: &Mesh, texture: u32) -> [[f32; 2]; 3] {
     let looks = mesh.materials.as_ref().unwrap();
     let Texture { uv_set, transform, .. } = looks.textures[texture as usize];
@@ -230,13 +207,12 @@ fn two_textures_have_sets_of_their_own() {
 #[test]
 fn a_second_set_that_is_not_finite_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
-    let (document, mut bytes) =
-        document(json!([{"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0, "texCoord": 1},
-        "pbrMetallicRoughness": {"baseColorTexture": {"index": 1}}}]));
-    bytes[60 + 8..60 + 12].copy_from_slice(&f32::NAN.to_le_bytes());
+    let mut model = document(json!({"emissiveFactor": [1, 1, 1],
+        "emissiveTexture": {"index": 0, "texCoord": 1}, "pbrMetallicRoughness": {"baseColorTexture": {"index": 1}}}));
+    model.binary[60 + 8..60 + 12].copy_from_slice(&f32::NAN.to_le_bytes());
     let path = folder.path().join("a.glb");
-    std::fs::write(&path, glb(&document, &bytes)).unwrap();
-    let error = import(&path, WANTED, &Listener::default()).unwrap_err().to_string();
+    std::fs::write(&path, model.glb()).unwrap();
+    let error = import(&path, everything(), &Listener::default()).unwrap_err().to_string();
     assert!(error.contains("BTH-I008") && error.contains("TEXCOORD_1 row 1"), "{error}");
 }
 
@@ -262,7 +238,8 @@ fn older_models_have_diffuse_colors() {
     assert_eq!(read.textures.len(), 1);
 }
 
-/// Colours of vertices in PLY and OBJ are sRGB; 188 of 255 is half the light. A vertex without a colour is white.
+/// Colours of vertices in PLY and OBJ are sRGB; 188 of 255 is half the light. A vertex without a
+/// colour is white.
 #[test]
 fn vertices_of_ply_and_obj_have_colors() {
     let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
@@ -273,7 +250,7 @@ fn vertices_of_ply_and_obj_have_colors() {
     let read = |name: &str, text: &str| {
         let path = folder.path().join(name);
         std::fs::write(&path, text).unwrap();
-        import(&path, WANTED, &Silent).unwrap().0.materials.unwrap()
+        import(&path, everything(), &Silent).unwrap().0.materials.unwrap()
     };
     let of_ply = read("a.ply", ply);
     assert_eq!(of_ply.color_corners, [[0, 1, 0]]);
@@ -309,13 +286,16 @@ fn colors_of_ply_that_are_not_kept_are_told() {
     };
     let of_faces =
         "1 rows of element face: the colours red, green, blue are not kept, only those of vertices are";
-    assert_eq!(told("", &colors("uchar"), WANTED), [of_faces]);
-    assert_eq!(told(&colors("uchar"), &colors("uchar"), WANTED), [of_faces]);
-    assert_eq!(told(&colors("uchar"), "", WANTED), [""; 0]);
-    assert_eq!(told(&colors("uchar"), &colors("uchar"), Wanted { materials: false, ..WANTED }), [""; 0]);
+    assert_eq!(told("", &colors("uchar"), everything()), [of_faces]);
+    assert_eq!(told(&colors("uchar"), &colors("uchar"), everything()), [of_faces]);
+    assert_eq!(told(&colors("uchar"), "", everything()), [""; 0]);
+    assert_eq!(
+        told(&colors("uchar"), &colors("uchar"), Wanted { materials: false, ..everything() }),
+        [""; 0]
+    );
     let of_vertices = "3 rows of element vertex: the colours red, green, blue are not kept, of vertices the first red, green and \
         blue of one type are, uchar, ushort or float";
-    assert_eq!(told(&colors("int"), "", WANTED), [of_vertices]);
+    assert_eq!(told(&colors("int"), "", everything()), [of_vertices]);
 }
 
 #[cfg(unix)]
@@ -337,7 +317,7 @@ fn named_pipes_and_folders_in_place_of_files_are_refused() {
         std::thread::spawn(move || {
             let looks = bth_import::Looks { materials: true, ..Default::default() };
             let files = bth_import::source_files(&path, looks).unwrap();
-            let _ = send.send((import(&path, WANTED, &Silent), files.len()));
+            let _ = send.send((import(&path, everything(), &Silent), files.len()));
         });
         receive.recv_timeout(std::time::Duration::from_secs(60)).expect("this should not wait for a writer")
     };

@@ -1,18 +1,18 @@
-//! Material libraries of OBJ files: names, what is told of what is not kept, and how often they are read.
+//! Material libraries of OBJ files: names, what is told of what is not kept, and how often they are
+//! read.
 
-use super::materials::WANTED;
 use super::*;
 use bth_import::import_images;
 use std::path::Path;
 
-/// The red parts of the materials of an OBJ file with one triangle of each of these materials, beside a library of this text, and
-/// the warnings.
+/// The red parts of the materials of an OBJ file with one triangle of each of these materials, next
+/// to a library of this text, and the warnings.
 fn obj_materials(folder: &Path, statements: &str, library: &[u8]) -> (Vec<f32>, Vec<String>) {
     let path = folder.join("a.obj");
     std::fs::write(folder.join("a.mtl"), library).unwrap();
     std::fs::write(&path, format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{statements}")).unwrap();
     let heard = Listener::default();
-    let (mesh, _) = import(&path, WANTED, &heard).unwrap();
+    let (mesh, _) = import(&path, everything(), &heard).unwrap();
     let red = mesh.materials.unwrap().parameters.iter().map(|material| material.base_color[0]).collect();
     (red, heard.0.into_inner().unwrap())
 }
@@ -52,7 +52,7 @@ fn materials_whose_names_are_not_utf8_are_told_apart() {
     ]
     .concat();
     std::fs::write(&path, text).unwrap();
-    let parameters = import(&path, WANTED, &Silent).unwrap().0.materials.unwrap().parameters;
+    let parameters = import(&path, everything(), &Silent).unwrap().0.materials.unwrap().parameters;
     let colors: Vec<_> = parameters.iter().map(|material| material.base_color).collect();
     assert_eq!(colors, [[1.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0]]);
 }

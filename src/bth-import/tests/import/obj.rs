@@ -2,41 +2,29 @@ use super::*;
 
 const CORNERS: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 
-#[track_caller]
-fn triangles(faces: &str) -> Vec<[u32; 3]> {
-    import_bytes("a.obj", format!("{CORNERS}{faces}").as_bytes(), Keep::All).unwrap().0.triangles
-}
-
-#[track_caller]
-fn assert_bad(faces: &str, code: &str, place: &str, message: &str) {
-    assert_refused("a.obj", format!("{CORNERS}{faces}").as_bytes(), code, place, message);
-}
-
 #[test]
-fn polygons_are_fans_in_file_order() {
-    assert_eq!(triangles("f 1 2 3 4\nf 4 2 1\n"), [[0, 1, 2], [0, 2, 3], [3, 1, 0]]);
-}
-
-#[test]
-fn negative_indices_count_back_from_the_last_vertex_so_far() {
-    assert_eq!(triangles("f -4 -3 -2\nv 9 9 9\nf 1 2 -1\n"), [[0, 1, 2], [0, 1, 3]]);
-}
-
-#[test]
-fn corners_may_leave_parts_empty() {
-    let faces = "vt 0 0\nvn 0 0 1\nf 1/1/1 2//1 3/1\nf 1// 2/ 3\n";
-    assert_eq!(triangles(faces), [[0, 1, 2], [0, 1, 2]]);
+fn faces_are_fans_in_file_order() {
+    for (faces, expected) in [
+        ("f 1 2 3 4\nf 4 2 1\n", vec![[0, 1, 2], [0, 2, 3], [3, 1, 0]]),
+        // Negative indices count back from the last vertex so far.
+        ("f -4 -3 -2\nv 9 9 9\nf 1 2 -1\n", vec![[0, 1, 2], [0, 1, 3]]),
+        // Corners may leave parts empty.
+        ("vt 0 0\nvn 0 0 1\nf 1/1/1 2//1 3/1\nf 1// 2/ 3\n", vec![[0, 1, 2], [0, 1, 2]]),
+        // Lines go on after a backslash, and comments end them, also with a backslash.
+        ("f 1 2 \\\r\n 3 \\\n 4 # four corners\n", vec![[0, 1, 2], [0, 2, 3]]),
+        ("# C:\\models\\\nf 1 2 3\n  # again \\\nf 1 3 4\n", vec![[0, 1, 2], [0, 2, 3]]),
+        ("f 1 2 \\\n 3 \\\n# inside \\\nf 1 3 4\n", vec![[0, 1, 2], [0, 2, 3]]),
+    ] {
+        let text = format!("{CORNERS}{faces}");
+        let mesh = import_bytes("a.obj", text.as_bytes(), Keep::All).unwrap().0;
+        assert_eq!(mesh.triangles, expected, "{faces}");
+    }
 }
 
 #[test]
 fn faces_may_come_before_their_vertices() {
     let mesh = import_bytes("a.obj", b"f 1 2 3\nv 0 0 0\nv 1 0 0\nv 0 1 0", Keep::None).unwrap().0;
     assert_eq!(mesh.triangles, [[0, 1, 2]]);
-}
-
-#[test]
-fn lines_go_on_after_a_backslash_and_comments_end_them() {
-    assert_eq!(triangles("f 1 2 \\\r\n 3 \\\n 4 # four corners\n"), [[0, 1, 2], [0, 2, 3]]);
 }
 
 #[test]
@@ -75,53 +63,23 @@ fn a_file_without_faces_is_an_empty_mesh() {
 }
 
 #[test]
-fn refuses_index_zero() {
-    assert_bad("f 0 1 2\n", "BTH-I005", "line 5", "from 1 to 4, found 0");
-}
-
-#[test]
-fn refuses_an_index_beyond_the_last_vertex() {
-    assert_bad("f 1 2 3\nf 1 2 5\nf 1 2 9\n", "BTH-I005", "line 6", "found 5");
-}
-
-#[test]
-fn refuses_a_negative_index_before_the_first_vertex() {
-    assert_bad("f -5 1 2\n", "BTH-I005", "line 5", "found -5");
-}
-
-#[test]
-fn refuses_attribute_indices_out_of_range_when_they_are_kept() {
-    assert_bad("vt 0 0\nf 1/1 2/2 3/1\n", "BTH-I005", "line 6", "vt line, from 1 to 1, found 2");
-    assert_bad("vn 0 0 1\nf 1//1 2//1 3//3\n", "BTH-I005", "line 6", "vn line, from 1 to 1, found 3");
-}
-
-#[test]
-fn refuses_words_that_are_no_numbers() {
-    assert_bad("v 1 2,5 3\n", "BTH-I002", "line 5", "found \"2,5\"");
-    assert_bad("v 1 2\n", "BTH-I002", "line 5", "expected 3 or more numbers, found \"\"");
-    assert_bad("f 1 x 3\n", "BTH-I002", "line 5", "found \"x\"");
-}
-
-#[test]
-fn refuses_coordinates_that_are_not_finite_where_they_stand() {
-    assert_bad("v 0 nan 0\nf 1 2 5\n", "BTH-I004", "line 5", "NaN");
-    assert_bad("# c\nv 0 1.#INF 0\nf 1 2 5\n", "BTH-I004", "line 6", "NaN");
-    assert_bad("v 0 1e39 0\nf 1 2 5\n", "BTH-I004", "line 5", "inf");
-}
-
-#[test]
-fn refuses_a_used_normal_that_is_not_finite() {
-    assert_bad("vn 0 0 1\nvn 0 inf 1\nf 1//1 2//2 3//1\n", "BTH-I008", "line 6", "finite normal");
-}
-
-#[test]
-fn refuses_binary_content() {
-    assert_bad("\0\0", "BTH-I006", "byte 32", "expected text");
-}
-
-#[test]
-fn comments_end_with_their_line_also_after_a_backslash() {
-    assert_eq!(triangles("# C:\\models\\\nf 1 2 3\n  # again \\\nf 1 3 4\n"), [[0, 1, 2], [0, 2, 3]]);
-    assert_eq!(triangles("f 1 2 \\\n 3 \\\n# inside \\\nf 1 3 4\n"), [[0, 1, 2], [0, 2, 3]]);
-    assert_bad("# \\\nv nan 0 0\nf 1 2 5\n", "BTH-I004", "line 6", "NaN");
+fn refuses_what_is_wrong_at_its_line() {
+    for [faces, code, place, message] in [
+        ["f 0 1 2\n", "BTH-I005", "line 5", "from 1 to 4, found 0"],
+        ["f 1 2 3\nf 1 2 5\nf 1 2 9\n", "BTH-I005", "line 6", "found 5"],
+        ["f -5 1 2\n", "BTH-I005", "line 5", "found -5"],
+        ["vt 0 0\nf 1/1 2/2 3/1\n", "BTH-I005", "line 6", "vt line, from 1 to 1, found 2"],
+        ["vn 0 0 1\nf 1//1 2//1 3//3\n", "BTH-I005", "line 6", "vn line, from 1 to 1, found 3"],
+        ["v 1 2,5 3\n", "BTH-I002", "line 5", "found \"2,5\""],
+        ["v 1 2\n", "BTH-I002", "line 5", "expected 3 or more numbers, found \"\""],
+        ["f 1 x 3\n", "BTH-I002", "line 5", "found \"x\""],
+        ["v 0 nan 0\nf 1 2 5\n", "BTH-I004", "line 5", "NaN"],
+        ["# c\nv 0 1.#INF 0\nf 1 2 5\n", "BTH-I004", "line 6", "NaN"],
+        ["v 0 1e39 0\nf 1 2 5\n", "BTH-I004", "line 5", "inf"],
+        ["vn 0 0 1\nvn 0 inf 1\nf 1//1 2//2 3//1\n", "BTH-I008", "line 6", "finite normal"],
+        ["\0\0", "BTH-I006", "byte 32", "expected text"],
+        ["# \\\nv nan 0 0\nf 1 2 5\n", "BTH-I004", "line 6", "NaN"],
+    ] {
+        assert_refused("a.obj", format!("{CORNERS}{faces}").as_bytes(), code, place, message);
+    }
 }

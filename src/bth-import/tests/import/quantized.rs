@@ -1,10 +1,11 @@
-//! KHR_mesh_quantization: integers in the place of floats, normalized or not.
+//! KHR_mesh_quantization: integers instead of floats, normalized or not.
 
 use super::gltf::glb;
 use super::*;
 use serde_json::json;
 
-/// Corner 1 of a triangle whose positions, normals and texture coordinates have this type, each row padded to four bytes.
+/// Corner 1 of a triangle whose positions, normals and texture coordinates have this type, each row
+/// padded to four bytes.
 fn corner(component_type: u32, normalized: bool, row: &[u8]) -> ([f32; 3], [f32; 3], [f32; 2]) {
     let size = row.len().next_multiple_of(4);
     let mut bytes = vec![0; 3 * size];

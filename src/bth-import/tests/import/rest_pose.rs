@@ -1,12 +1,13 @@
 //! Skins and morph targets of glTF models at rest (glTF 2.0 specification, §3.7.2.2 and §3.7.3).
 
-use super::gltf::glb;
+use super::gltf::Model;
 use super::*;
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::Command;
 
-/// A triangle whose vertices follow different joints: positions, joints (u8), weights, one morph target, inverse bind matrices.
+/// A triangle whose vertices follow different joints: positions, joints (u8), weights, one morph
+/// target, inverse bind matrices.
 struct SkinnedTriangle {
     weights: [[f32; 4]; 3],
     joints: [[u8; 4]; 3],
@@ -17,29 +18,12 @@ const POSITIONS: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0
 const MORPH: [[f32; 3]; 3] = [[0.0, 0.0, 1.0], [0.0, 0.0, 2.0], [0.0, 0.0, 4.0]];
 
 impl SkinnedTriangle {
-    fn floats<const N: usize>(rows: &[[f32; N]]) -> Vec<u8> {
-        rows.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect()
-    }
-
-    /// A file whose skinned node is moved and scaled, which must have no effect, and whose joints hang below a moved ancestor.
+    /// A file whose skinned node is moved and scaled, which must have no effect, and whose joints
+    /// hang below a moved ancestor.
     fn file(&self, edit: impl FnOnce(&mut Value)) -> Vec<u8> {
-        let translation = |t: [f32; 3]| {
-            let mut columns = [0.0f32; 16];
-            (0..4).for_each(|i| columns[i * 5] = 1.0);
-            columns[12..15].copy_from_slice(&t);
-            columns
-        };
+        let translation = |[x, y, z]: [f32; 3]| [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., x, y, z, 1.];
         let binds = self.inverse_binds.unwrap_or_default().map(translation);
-        let mut binary = [
-            Self::floats(&POSITIONS),
-            self.joints.as_flattened().to_vec(),
-            Self::floats(&self.weights),
-            Self::floats(&MORPH),
-        ]
-        .concat();
-        binary.extend(Self::floats(&binds));
-        let mut document = json!({
-            "asset": {"version": "2.0"},
+        let mut model = Model::new(json!({
             "scene": 0,
             "scenes": [{"nodes": [0, 1]}],
             "nodes": [
@@ -53,27 +37,17 @@ impl SkinnedTriangle {
                 "attributes": {"POSITION": 0, "JOINTS_0": 1, "WEIGHTS_0": 2},
                 "targets": [{"POSITION": 3}]
             }]}],
-            "accessors": [
-                {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
-                {"bufferView": 1, "componentType": 5121, "count": 3, "type": "VEC4"},
-                {"bufferView": 2, "componentType": 5126, "count": 3, "type": "VEC4"},
-                {"bufferView": 3, "componentType": 5126, "count": 3, "type": "VEC3"},
-                {"bufferView": 4, "componentType": 5126, "count": 2, "type": "MAT4"}
-            ],
-            "bufferViews": [
-                {"buffer": 0, "byteLength": 36},
-                {"buffer": 0, "byteOffset": 36, "byteLength": 12},
-                {"buffer": 0, "byteOffset": 48, "byteLength": 48},
-                {"buffer": 0, "byteOffset": 96, "byteLength": 36},
-                {"buffer": 0, "byteOffset": 132, "byteLength": 128}
-            ],
-            "buffers": [{"byteLength": 260}]
-        });
+        }))
+        .rows(&POSITIONS)
+        .rows(&self.joints)
+        .rows(&self.weights)
+        .rows(&MORPH)
+        .rows(&binds);
         if self.inverse_binds.is_none() {
-            document["skins"][0].as_object_mut().unwrap().remove("inverseBindMatrices");
+            model.document["skins"][0].as_object_mut().unwrap().remove("inverseBindMatrices");
         }
-        edit(&mut document);
-        glb(&document, &binary)
+        edit(&mut model.document);
+        model.glb()
     }
 
     fn corners(&self, edit: impl FnOnce(&mut Value)) -> [[f32; 3]; 3] {
@@ -180,7 +154,8 @@ fn animations_of_what_deforms_are_told() {
     assert!(!listener.heard("at rest"));
 }
 
-/// Compares the sample models that deform with `tools/crosscheck/gltf_rest.py`, to 1e-5 of their size.
+/// Compares the sample models that deform with `tools/crosscheck/gltf_rest.py`, to 1e-5 of their
+/// size.
 #[test]
 #[allow(clippy::print_stdout, reason = "a skipped test says so")]
 fn sample_models_are_where_an_independent_evaluation_puts_them() {

@@ -1,23 +1,13 @@
 //! Meshes whose vertices move: numbered files, PC2 and MDD.
 
 use super::*;
-use bth_import::{
-    Polygons, Timing, Unreadable, Wanted, import_sequence, import_vertex_cache, read_vertex_cache,
-    sequence_files,
-};
+use bth_import::{Polygons, Timing, import_sequence, import_vertex_cache, read_vertex_cache, sequence_files};
 use std::path::{Path, PathBuf};
 
 const TIMING: Timing = Timing { rate: Some(10.0), usual_rate: 24.0, start: 0.5 };
-const PLAIN: Wanted = Wanted {
-    attributes: Keep::None,
-    groups: false,
-    materials: false,
-    polygons: Polygons::Fans,
-    vertices: false,
-    unreadable: Unreadable::Refused,
-};
 
-/// Two triangles whose shared edge comes as vertices of its own for each, and which part in the second frame if `lift` is not 0.
+/// Two triangles whose shared edge comes as vertices of its own for each, and which part in the
+/// second frame if `lift` is not 0.
 fn frame(lift: f32) -> String {
     format!(
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 {lift}\nv 0 1 {lift}\nv 1 1 {lift}\nvt 0 0\nvn 0 0 1\n\
@@ -39,16 +29,17 @@ fn write(folder: &Path, files: &[(&str, &[u8])]) -> Vec<PathBuf> {
 #[test]
 fn concave_polygons_are_split_as_in_the_first_frame() {
     let folder = tempfile::tempdir().unwrap();
-    // In the second frame the arrow head has become a square, whose fan would have the other diagonal.
+    // In the second frame the arrow head has become a square, whose fan would have the other
+    // diagonal.
     let frame = |notch: &str| format!("v 2 -1 0\nv {notch} 0\nv 2 1 0\nv 0 0 0\nf 1 2 3 4\n");
     let frames = [frame("1 0"), frame("4 0")];
     let files = write(folder.path(), &[("1.obj", frames[0].as_bytes()), ("2.obj", frames[1].as_bytes())]);
-    let wanted = Wanted { polygons: Polygons::Ears, ..PLAIN };
+    let wanted = Wanted { polygons: Polygons::Ears, ..Wanted::default() };
     let (mesh, report) = import_sequence(&files, &TIMING, wanted, &Silent).unwrap();
     assert_eq!((mesh.triangles, report.concave), (vec![[0, 1, 2], [2, 3, 0]], 1));
     // As fans they are told.
     let listener = Listener::default();
-    import_sequence(&files, &TIMING, PLAIN, &listener).unwrap();
+    import_sequence(&files, &TIMING, Wanted::default(), &listener).unwrap();
     assert!(listener.0.into_inner().unwrap()[0].starts_with("1 polygon is concave: "));
 }
 
@@ -64,7 +55,7 @@ fn what_no_face_uses_and_is_not_finite_is_told_and_so_are_coordinates_far_out() 
     for (vertices, fate) in [(false, "are left out"), (true, "are kept as zeros")] {
         let listener = Listener::default();
         let (mesh, report) =
-            import_sequence(&files, &TIMING, Wanted { vertices, ..PLAIN }, &listener).unwrap();
+            import_sequence(&files, &TIMING, Wanted { vertices, ..Wanted::default() }, &listener).unwrap();
         assert_eq!((mesh.positions.len(), report.non_finite_unused), (if vertices { 4 } else { 3 }, 1));
         assert!(listener.heard(&format!("1 positions are not finite; no face uses them, they {fate}")));
         assert!(listener.heard("1.1e12 (2^40)"), "{:?}", listener.0);
@@ -84,7 +75,7 @@ fn frames_become_one_mesh_whose_vertices_are_welded_where_all_frames_agree() {
         ],
     );
     let files = sequence_files(&folder.path().join("w_##.obj")).unwrap();
-    let wanted = Wanted { attributes: Keep::All, groups: true, ..PLAIN };
+    let wanted = Wanted { attributes: Keep::All, groups: true, ..Wanted::default() };
     let (mesh, report) = import_sequence(&files, &TIMING, wanted, &Silent).unwrap();
     assert_eq!(mesh.triangles, [[0, 1, 2], [3, 4, 5]]);
     let sequence = mesh.sequence.unwrap();
@@ -97,11 +88,11 @@ fn frames_become_one_mesh_whose_vertices_are_welded_where_all_frames_agree() {
     assert!(attributes.normals.is_empty() && attributes.uvs == [[0.0; 2]]);
     assert_eq!((report.format.as_str(), report.frames, report.positions_read), ("sequence of obj", 3, 6));
     // All vertices of the source stay where they are wanted.
-    let wanted = Wanted { vertices: true, ..PLAIN };
+    let wanted = Wanted { vertices: true, ..Wanted::default() };
     let (all, _) = import_sequence(&files[..2], &TIMING, wanted, &Silent).unwrap();
     assert_eq!((all.triangles, all.positions.len()), (vec![[0, 1, 2], [3, 5, 4]], 6));
     // Without the third frame the shared edge is welded.
-    let (mesh, report) = import_sequence(&files[..2], &TIMING, PLAIN, &Silent).unwrap();
+    let (mesh, report) = import_sequence(&files[..2], &TIMING, Wanted::default(), &Silent).unwrap();
     assert_eq!((mesh.triangles, report.positions), (vec![[0, 1, 2], [1, 3, 2]], 4));
 }
 
@@ -119,7 +110,7 @@ fn frames_of_other_topology_are_refused_with_file_expected_and_found() {
     let paths = write(folder.path(), &files);
     let error = |other: usize| {
         let pair = [paths[0].clone(), paths[other].clone()];
-        import_sequence(&pair, &TIMING, PLAIN, &Silent).unwrap_err().to_string()
+        import_sequence(&pair, &TIMING, Wanted::default(), &Silent).unwrap_err().to_string()
     };
     assert!(
         error(1).contains("1.obj: BTH-I017: expected the faces of")
@@ -129,10 +120,15 @@ fn frames_of_other_topology_are_refused_with_file_expected_and_found() {
     assert!(error(3).contains("triangle 0 has the vertices [0, 1, 2]; found [1, 0, 2]"), "{}", error(3));
     assert!(error(4).contains("4.obj: vertex 5 of frame 1: BTH-I004"), "{}", error(4));
     let glb = write(folder.path(), &[("a.glb", b"glTF")]);
-    assert!(import_sequence(&glb, &TIMING, PLAIN, &Silent).unwrap_err().to_string().contains("BTH-I006"));
+    assert!(
+        import_sequence(&glb, &TIMING, Wanted::default(), &Silent)
+            .unwrap_err()
+            .to_string()
+            .contains("BTH-I006")
+    );
     let zero = Timing { rate: Some(f64::INFINITY), ..TIMING };
     let same = [paths[0].clone(), paths[0].clone()];
-    let stands = import_sequence(&same, &zero, PLAIN, &Silent).unwrap_err().to_string();
+    let stands = import_sequence(&same, &zero, Wanted::default(), &Silent).unwrap_err().to_string();
     assert!(stands.contains("frame 1: expected a finite time after 0.5 s, found 0.5 s"), "{stands}");
 }
 
@@ -223,7 +219,8 @@ fn a_vertex_cache_moves_the_vertices_of_its_model() {
             ("b.pc2", &pc2(5, &[[0.0; 3]; 5], 0.0, 1.0)),
         ],
     );
-    let (mesh, report) = import_vertex_cache(&paths[0], &paths[1], &untimed, PLAIN, &Silent).unwrap();
+    let (mesh, report) =
+        import_vertex_cache(&paths[0], &paths[1], &untimed, Wanted::default(), &Silent).unwrap();
     assert_eq!(report.format, "obj and mdd");
     assert_eq!(mesh.triangles, [[0, 1, 2], [3, 4, 5]]);
     assert_eq!(mesh.positions, still);
@@ -231,7 +228,9 @@ fn a_vertex_cache_moves_the_vertices_of_its_model() {
         mesh.sequence.unwrap().positions[6..],
         [moved[6], moved[7], moved[8], moved[9], moved[11], moved[10]]
     );
-    let error = import_vertex_cache(&paths[0], &paths[2], &untimed, PLAIN, &Silent).unwrap_err().to_string();
+    let error = import_vertex_cache(&paths[0], &paths[2], &untimed, Wanted::default(), &Silent)
+        .unwrap_err()
+        .to_string();
     assert!(
         error.contains("b.pc2: BTH-I017: expected the 6 vertices of") && error.contains("found 5"),
         "{error}"

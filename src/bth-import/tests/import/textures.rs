@@ -1,36 +1,25 @@
 //! Texture coordinates of glTF models: which set is kept, and how KHR_texture_transform changes it.
 
-use super::gltf::glb;
+use super::gltf::Model;
 use super::*;
 use serde_json::{Value, json};
 
-/// A triangle with two sets of texture coordinates: (0, 0), (1, 0), (0, 1) and their halves.
-fn textured(material: Value) -> Vec<u8> {
-    with_material(material, 0)
-}
-
-/// As [`textured`], with a primitive that refers to a material by this number.
-fn with_material(material: Value, number: u32) -> Vec<u8> {
-    let numbers = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0f32];
-    let (first, second) = ([0.0, 0.0, 1.0, 0.0, 0.0, 1.0f32], [0.0, 0.0, 0.5, 0.0, 0.0, 0.5f32]);
-    let bytes: Vec<u8> = numbers.iter().chain(&first).chain(&second).flat_map(|x| x.to_le_bytes()).collect();
-    let vec2 = |view: usize| json!({"bufferView": view, "componentType": 5126, "count": 3, "type": "VEC2"});
+/// A triangle with two sets of texture coordinates, [`FIRST`] and [`SECOND`], and the material of
+/// this number; there is one.
+fn textured(material: Value, number: u32) -> Vec<u8> {
+    let attributes = json!({"POSITION": 0, "TEXCOORD_0": 1, "TEXCOORD_1": 2});
     let document = json!({
-        "asset": {"version": "2.0"},
         "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1, "TEXCOORD_1": 2}, "material": number}]}],
+        "meshes": [{"primitives": [{"attributes": attributes, "material": number}]}],
         "materials": [material],
-        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}, vec2(1), vec2(2)],
-        "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 24},
-            {"buffer": 0, "byteOffset": 60, "byteLength": 24}],
-        "buffers": [{"byteLength": 84}]
     });
-    glb(&document, &bytes)
+    let positions = [[0f32, 0., 0.], [1., 0., 0.], [0., 1., 0.]];
+    Model::new(document).rows(&positions).rows(&FIRST).rows(&SECOND).glb()
 }
 
 #[track_caller]
 fn uvs(material: Value) -> Vec<[f32; 2]> {
-    let mesh = import_bytes("a.glb", &textured(material), Keep::All).unwrap().0;
+    let mesh = import_bytes("a.glb", &textured(material, 0), Keep::All).unwrap().0;
     mesh.attributes.map_or(Vec::new(), |a| a.uvs)
 }
 
@@ -58,7 +47,8 @@ fn the_base_colour_texture_chooses_the_set() {
 #[test]
 fn a_transform_scales_then_rotates_then_offsets() {
     let transform = json!({"offset": [0.25, 0.5], "rotation": std::f64::consts::FRAC_PI_2, "scale": [2, 4]});
-    // (1, 0) becomes (2, 0), turns counter-clockwise in the image to (0, -2); (0, 1) becomes (0, 4), then (4, 0).
+    // (1, 0) becomes (2, 0), turns counter-clockwise in the image to (0, -2); (0, 1) becomes (0,
+    // 4), then (4, 0).
     assert_eq!(uvs(transformed(transform)), [[0.25, 0.5], [0.25, -1.5], [4.25, 0.5]]);
     assert_eq!(uvs(transformed(json!({"scale": [0.5, 0.25]}))), [[0.0, 0.0], [0.5, 0.0], [0.0, 0.25]]);
     assert_eq!(uvs(transformed(json!({}))), FIRST);
@@ -74,7 +64,7 @@ fn a_transform_overrides_the_set() {
 
 #[test]
 fn refuses_a_malformed_transform_and_a_missing_material() {
-    let bytes = textured(transformed(json!({"offset": [1]})));
+    let bytes = textured(transformed(json!({"offset": [1]})), 0);
     assert_refused("a.glb", &bytes, "BTH-I002", "material 0", "expected a glTF material");
-    assert_refused("a.glb", &with_material(json!({}), 9), "BTH-I002", "material 9", "does not exist");
+    assert_refused("a.glb", &textured(json!({}), 9), "BTH-I002", "material 9", "does not exist");
 }

@@ -104,8 +104,9 @@ fn stride(compression: &MeshoptCompression, mode: Mode, filter: Filter) -> Resul
     }
 }
 
-/// Bytes of the smallest stream of `count` attribute rows, by the version in its header: a header, for each block of rows
-/// at least the control bits of its byte columns, and the tail with the first row.
+/// Bytes of the smallest stream of `count` attribute rows, by the version in its header: a header,
+/// for each block of rows at least the control bits of its byte columns, and the tail with the
+/// first row.
 fn smallest_attributes(stream: &[u8], count: u64, stride: u64) -> u64 {
     let version = stream.first().map_or(0, |header| header & 0x0f);
     let block = ((8192 / stride) & !15).min(256);

@@ -1,22 +1,21 @@
-//! Deformers of a manifest from the skins and morph targets of a glTF scene (glTF 2.0 specification, §3.7.2.2 and §3.7.3).
+//! Deformers of a manifest from the skins and morph targets of a glTF scene (glTF 2.0
+//! specification, §3.7.2.2 and §3.7.3).
 
+use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
 
 use bth_scene::{Deformer, JointSet, Node, Skin, Source, Transform};
 
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::gltf::file::WEIGHTS;
 use crate::gltf::placed_mesh::GltfPart;
-use crate::gltf::scene::animated::Deforming;
-use crate::gltf::scene::importer::Importer;
+use crate::gltf::scene::importer::{Deforming, Importer};
 use crate::gltf::schema::GltfNode;
 use crate::gltf::transform;
 
-/// A code for weights of joints or of morph targets that mean nothing.
-const WEIGHTS: &str = "BTH-I017";
-
-impl Importer<'_> {
-    /// Places the mesh of a node that has morph targets or a skin: as an object that deforms if an animation moves it, else
-    /// as one at rest.
+impl Importer<'_, '_> {
+    /// Places the mesh of a node that has morph targets or a skin: as an object that deforms if an
+    /// animation moves it, else as one at rest.
     pub(super) fn deforming(
         &mut self,
         index: usize,
@@ -27,9 +26,9 @@ impl Importer<'_> {
         let part = format!("node {index}");
         let weights = self.weights(node, mesh, &part)?;
         let moves = self.is_moved(index, node)?;
-        let name = self.document.meshes[mesh].name.clone();
-        if moves && self.deform {
-            let (path, mesh) = (self.file.to_owned(), mesh as u32);
+        let name = self.file.document.meshes[mesh].name.clone();
+        if moves && self.options.deform {
+            let (path, mesh) = (self.path.to_owned(), mesh as u32);
             let source = Source::Deforming { path, mesh, without: JointSet::default() };
             let object = self.new_object(&name, mesh as usize, source);
             self.deforming.push(Deforming { node: index, row, object, weights });
@@ -45,13 +44,14 @@ impl Importer<'_> {
         if let Some(object) = self.objects.get(&key) {
             return Ok(*object);
         }
-        let source = Source::AtRest { path: self.file.to_owned(), node: index as u32 };
+        let source = Source::AtRest { path: self.path.to_owned(), node: index as u32 };
         let object = self.new_object(&name, mesh, source);
         self.objects.insert(key, object);
         Ok(object)
     }
 
-    /// A node in world space for an object with a skin at rest, since the transform of its own node has no effect (§3.7.3.2).
+    /// A node in world space for an object with a skin at rest, since the transform of its own node
+    /// has no effect (§3.7.3.2).
     pub(super) fn place_in_world(&mut self, row: usize, object: usize) {
         let mut visible = true;
         let mut next = Some(row);
@@ -61,21 +61,21 @@ impl Importer<'_> {
             next = node.parent;
         }
         let name = format!("{}/at rest", self.manifest.nodes[row].name);
-        let name = self.node_names.unique(&name, String::new());
+        let name = self.names.nodes.unique(&name, String::new());
         let transform = Transform::default();
         self.manifest.nodes.push(Node { name, parent: None, transform, object: Some(object), visible });
     }
 
     /// A further object of the manifest.
     pub(super) fn new_object(&mut self, name: &str, mesh: usize, source: Source) -> usize {
-        let name = self.object_names.unique(name, format!("mesh {mesh}"));
+        let name = self.names.objects.unique(name, format!("mesh {mesh}"));
         self.manifest.objects.push(bth_scene::Object { name, source });
         self.manifest.objects.len() - 1
     }
 
-    /// The weights of the morph targets of a node's mesh: its own, else those of the mesh, else zeros.
+    /// Returns the morph weights of a node: its own, else of its mesh, else zeros.
     fn weights(&self, node: &GltfNode, mesh: usize, part: &str) -> Result<Vec<f64>> {
-        let found = &self.document.meshes[mesh];
+        let found = &self.file.document.meshes[mesh];
         let targets = found.primitives.first().map_or(0, |primitive| primitive.targets.len());
         let weights = node.weights.as_ref().or(found.weights.as_ref());
         let weights = weights.filter(|weights| !weights.is_empty()).cloned();
@@ -83,24 +83,22 @@ impl Importer<'_> {
         if weights.len() != targets {
             let message =
                 format!("expected a weight for each of {targets} morph targets, found {}", weights.len());
-            return Err(self.weight_error(part, message));
+            return Err(self.file.error(WEIGHTS, part, message));
         }
         Ok(weights)
     }
 
-    /// Whether the chosen animations change the weights of a node or move a joint of its skin.
+    /// Returns true if the chosen animations change the weights of a node or move a joint of its
+    /// skin.
     fn is_moved(&self, index: usize, node: &GltfNode) -> Result<bool> {
-        if self.animated.weights[index] && node.mesh.is_some_and(|mesh| self.document.has_targets(mesh)) {
+        if self.morphed[index] && node.mesh.is_some_and(|mesh| self.file.document.has_targets(mesh)) {
             return Ok(true);
         }
         let Some(skin) = node.skin else { return Ok(false) };
-        let Some(found) = self.document.skins.get(skin) else {
-            return Err(self.error(format!("skin {skin}"), "it does not exist"));
-        };
         let mut at_rest = HashSet::new();
-        for &joint in &found.joints {
+        for &joint in &self.file.skin(skin)?.joints {
             let path = self.ancestors_until(joint, |node| at_rest.contains(&node))?;
-            if path.iter().any(|node| self.animated.transforms[*node]) {
+            if path.iter().any(|node| self.moved[*node]) {
                 return Ok(true);
             }
             at_rest.extend(path);
@@ -113,14 +111,14 @@ impl Importer<'_> {
         let mut path = Vec::new();
         let mut next = Some(node);
         while let Some(index) = next {
-            if index >= self.document.nodes.len() {
-                return Err(self.error(format!("node {index}"), "it does not exist"));
+            if index >= self.file.document.nodes.len() {
+                return Err(self.file.graph_error(format!("node {index}"), "it does not exist"));
             }
             if is_known(index) {
                 break;
             }
-            if path.len() > self.document.nodes.len() {
-                return Err(self.error(format!("node {node}"), "it is an ancestor of itself"));
+            if path.len() > self.file.document.nodes.len() {
+                return Err(self.file.graph_error(format!("node {node}"), "it is an ancestor of itself"));
             }
             path.push(index);
             next = self.parents[index];
@@ -132,55 +130,35 @@ impl Importer<'_> {
     pub(super) fn deformers(&mut self) -> Result<()> {
         let mut skins = HashMap::new();
         for Deforming { node, row, object, weights } in std::mem::take(&mut self.deforming) {
-            let skin = match self.document.nodes[node].skin {
-                None => None,
-                Some(number) => Some(match skins.get(&number) {
-                    Some(skin) => *skin,
-                    None => {
-                        let skin = self.skin(number)?;
-                        skins.insert(number, skin);
-                        skin
-                    }
-                }),
-            };
+            let mut skin = None;
+            if let Some(number) = self.file.document.nodes[node].skin {
+                if let Entry::Vacant(entry) = skins.entry(number) {
+                    entry.insert(self.skin(number)?);
+                }
+                skin = skins.get(&number).copied();
+            }
             self.manifest.deformers.push(Deformer { node: row, object, skin, weights });
         }
         self.manifest.deformers.sort_by_key(|deformer| deformer.node);
         Ok(())
     }
 
-    /// Adds a skin to the manifest. Joints outside of the scene get nodes with the transforms of the document's.
+    /// Adds a skin to the manifest. Joints outside of the scene get nodes with the transforms of
+    /// the document's.
     fn skin(&mut self, number: usize) -> Result<usize> {
         let part = format!("skin {number}");
-        // Not seen before where animated weights alone make the mesh deform.
-        let Some(found) = self.document.skins.get(number) else {
-            return Err(self.error(part, "it does not exist"));
-        };
+        let found = self.file.skin(number)?;
         if found.joints.is_empty() {
-            return Err(self.error(part, "expected at least one joint"));
+            return Err(self.file.graph_error(part, "expected at least one joint"));
         }
-        let inverse_binds = match found.inverse_bind_matrices {
-            None => None,
-            Some(accessor) => {
-                let matrices = self.accessors.matrices(accessor)?;
-                let (joints, binds) = (found.joints.len(), matrices.len());
-                if binds < joints {
-                    let message =
-                        format!("expected an inverse bind matrix for each of {joints} joints, found {binds}");
-                    return Err(self.error(part, message));
-                }
-                Some(matrices[..joints].iter().map(transform::rows).collect::<Vec<_>>())
-            }
-        };
+        let inverse_binds = self.file.inverse_binds(number, found)?;
+        let inverse_binds = inverse_binds.map(|all| all.iter().map(transform::rows).collect::<Vec<_>>());
         let finite = |matrix: &[[f64; 4]; 3]| matrix.as_flattened().iter().all(|x| x.is_finite());
         if inverse_binds.as_ref().is_some_and(|all| !all.iter().all(finite)) {
-            return Err(self.error(part, "expected finite inverse bind matrices"));
+            return Err(self.file.graph_error(part, "expected finite inverse bind matrices"));
         }
-        let mut joints = Vec::with_capacity(found.joints.len());
-        for &joint in &found.joints {
-            joints.push(self.joint(joint)?);
-        }
-        let name = self.skin_names.unique(&found.name, part);
+        let joints = found.joints.iter().map(|joint| self.joint(*joint)).collect::<Result<_>>()?;
+        let name = self.names.skins.unique(&found.name, part);
         self.manifest.skins.push(Skin { name, joints, inverse_binds });
         Ok(self.manifest.skins.len() - 1)
     }
@@ -191,17 +169,13 @@ impl Importer<'_> {
         let above = without_row.last().map_or(Some(joint), |last| self.parents[*last]);
         let mut row = above.and_then(|node| self.report.node_rows[node]);
         for &index in without_row.iter().rev() {
-            let node = &self.document.nodes[index];
+            let node = &self.file.document.nodes[index];
             let transform = self.transform(node, &format!("node {index}"))?;
-            let name = self.node_names.unique(&node.name, format!("node {index}"));
+            let name = self.names.nodes.unique(&node.name, format!("node {index}"));
             let parent = row.replace(self.manifest.nodes.len());
             self.manifest.nodes.push(Node { name, parent, transform, object: None, visible: true });
             self.report.node_rows[index] = row;
         }
-        row.ok_or_else(|| self.error(format!("node {joint}"), "it does not exist"))
-    }
-
-    fn weight_error(&self, part: &str, message: String) -> Error {
-        self.source.error_in_part(WEIGHTS, part, message, "export the model again")
+        row.ok_or_else(|| self.file.graph_error(format!("node {joint}"), "it does not exist"))
     }
 }

@@ -1,38 +1,102 @@
 //! A manifest from a glTF scene: nodes, animations, cameras, lights, instancing.
 
-mod animated;
-mod cameras;
+mod cameras_and_lights;
 mod deformers;
 mod importer;
-mod lights;
-mod names;
 mod nodes;
-pub(crate) mod options;
 mod rigid_parts;
 mod tracks;
 
-use std::collections::HashMap;
 use std::path::Path;
 
 use bth_scene::{Frames, Manifest};
+use serde::Serialize;
 
-use self::animated::Animated;
 use self::importer::Importer;
-use self::names::Names;
-pub use self::options::{ImportOptions, ImportReport};
 use crate::error::{Place, Result};
-use crate::gltf::accessor::Accessors;
-use crate::gltf::buffer::Buffers;
-use crate::gltf::document;
-use crate::gltf::extensions::{SCENE_EXTENSIONS, SUPPORTED};
-use crate::gltf::rest_pose::parents;
+use crate::gltf::extensions::Use;
+use crate::gltf::file::GltfFile;
 use crate::monitor::Monitor;
 use crate::source::{Source, UNSUPPORTED, input_error, read_file};
 
 /// The longest animation in frames.
 const MAX_FRAMES: u32 = 1 << 24;
 
-/// The name of a glTF file, by which the objects of a manifest in its folder refer to it.
+/// Which animations of a document are read.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Chosen {
+    /// The first of the document, if it has some.
+    #[default]
+    First,
+    /// All; of two that move the same property of a node, the first.
+    All,
+    /// None: nodes stay at rest.
+    None,
+    /// One, by name or number.
+    One(String),
+}
+
+/// What of a glTF file becomes a manifest.
+#[derive(Clone, Debug)]
+pub struct ImportOptions {
+    /// Scene by name or number; by default the document's.
+    pub scene: Option<String>,
+    /// Animations.
+    pub animation: Chosen,
+    /// Frames per second.
+    pub rate: f64,
+    /// True if skins and morph targets that the animations move deform their meshes; else these
+    /// stay at rest.
+    pub deform: bool,
+    /// True if the parts of deforming meshes that a joint moves rigidly become instances, which are
+    /// placed and never refitted.
+    pub rigid_parts: bool,
+    /// True if what would be ignored with a warning is an error: animations of other things than
+    /// nodes and weights.
+    pub strict: bool,
+}
+
+impl Default for ImportOptions {
+    fn default() -> Self {
+        let rate = Frames::default().rate;
+        let (scene, animation) = (None, Chosen::First);
+        Self { scene, animation, rate, deform: true, rigid_parts: false, strict: false }
+    }
+}
+
+/// What was found in a scene.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ImportReport {
+    /// Name or number of the scene.
+    pub scene: String,
+    /// Nodes of the manifest.
+    pub nodes: u64,
+    /// Nodes that place an object.
+    pub instances: u64,
+    /// Meshes that are used.
+    pub objects: u64,
+    /// Names or numbers of the animations that are read.
+    pub animations: Vec<String>,
+    /// Names or numbers of the animations that are left out.
+    pub animations_left_out: Vec<String>,
+    /// Objects that deform.
+    pub deformers: u64,
+    /// Instances of parts that joints move rigidly.
+    pub rigid_parts: u64,
+    /// Animated properties of nodes.
+    pub tracks: u64,
+    /// Cameras.
+    pub cameras: u64,
+    /// Lights.
+    pub lights: u64,
+    /// Messages about what was ignored.
+    pub ignored: Vec<String>,
+    /// Row of the manifest's nodes for each node of the document.
+    #[serde(skip)]
+    pub node_rows: Vec<Option<usize>>,
+}
+
+/// Returns the name of a glTF file, by which the objects of a manifest in its folder refer to it.
 ///
 /// # Errors
 /// `BTH-I006` when it is not UTF-8, which manifests are.
@@ -44,11 +108,12 @@ pub fn file_name(path: &Path) -> Result<&str> {
     })
 }
 
-/// Reads the scene of a glTF or GLB file. `name` is the file's path as it is to stand in the manifest.
+/// Reads the scene of a glTF or GLB file. `name` is the file's path as it is to stand in the
+/// manifest.
 ///
 /// # Errors
-/// `BTH-O001` when it cannot be read, `BTH-I…` with the place when it cannot be used; with `strict` `BTH-I015` for
-/// what would be ignored.
+/// `BTH-O001` when it cannot be read, `BTH-I…` with the place when it cannot be used; with `strict`
+/// `BTH-I015` for what would be ignored.
 pub fn import(
     path: &Path,
     name: &str,
@@ -58,10 +123,11 @@ pub fn import(
     import_bytes(path, &read_file(path)?, name, options, monitor)
 }
 
-/// As [`import`], from the bytes of a file, whose external buffers are in the folder of `path`.
+/// Does the same as [`import`] with the bytes of a file. External buffers are in the folder of
+/// `path`.
 ///
 /// # Errors
-/// As [`import`].
+/// The same as [`import`].
 pub fn import_bytes(
     path: &Path,
     data: &[u8],
@@ -71,33 +137,9 @@ pub fn import_bytes(
 ) -> Result<(Manifest, ImportReport)> {
     monitor.stage("import", Some(data.len() as u64));
     let source = Source::new(path, data, monitor);
-    // Animation pointers move what tracks cannot, so a document that requires them cannot be read.
-    let known = SUPPORTED.iter().filter(|s| **s != "KHR_animation_pointer");
-    let known: Vec<&str> = known.chain(&SCENE_EXTENSIONS).copied().collect();
-    let (document, binary) = document::read(&source, &known)?;
-    let accessors =
-        Accessors { source: &source, document: &document, buffers: Buffers::new(&source, &document, binary) };
-    let mut importer = Importer {
-        source: &source,
-        document: &document,
-        accessors,
-        strict: options.strict,
-        file: name,
-        manifest: Manifest::default(),
-        report: ImportReport { node_rows: vec![None; document.nodes.len()], ..ImportReport::default() },
-        node_names: Names::default(),
-        object_names: Names::default(),
-        objects: HashMap::new(),
-        skin_names: Names::default(),
-        camera_names: Names::default(),
-        light_names: Names::default(),
-        parents: parents(&document),
-        animated: Animated::default(),
-        deform: options.deform,
-        deforming: Vec::new(),
-    };
+    let file = GltfFile::open(&source, Use::Scene)?;
+    let mut importer = Importer::new(&file, name, options);
     let animations = importer.animations(&options.animation)?;
-    importer.animated = Animated::of(&animations, document.nodes.len());
     importer.nodes(options)?;
     importer.deformers()?;
     let (tracks, last) = importer.tracks(&animations)?;
@@ -117,8 +159,9 @@ pub fn import_bytes(
     Ok(finish(importer))
 }
 
-/// The first frame that is not before the last key. Times of keys are f32, so that a key of frame 49 at 24 frames a second lies a little
-/// behind that frame; the times of frames are rounded as well before the two are compared.
+/// Returns the first frame that is not before the last key. Times of keys are f32, so that a key of
+/// frame 49 at 24 frames a second lies a little behind that frame. The times of frames are rounded
+/// as well before the two are compared.
 fn last_frame(last_key: f64, rate: f64) -> i32 {
     let before = (last_key * rate).floor();
     let is_last = (before / rate) as f32 >= last_key as f32;
@@ -127,7 +170,7 @@ fn last_frame(last_key: f64, rate: f64) -> i32 {
 }
 
 /// Adds the totals to the report.
-fn finish(importer: Importer<'_>) -> (Manifest, ImportReport) {
+fn finish(importer: Importer<'_, '_>) -> (Manifest, ImportReport) {
     let manifest = importer.manifest;
     let report = ImportReport {
         nodes: manifest.nodes.len() as u64,

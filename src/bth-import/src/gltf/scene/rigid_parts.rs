@@ -1,5 +1,6 @@
-//! Parts of deforming meshes that a joint moves rigidly, as instances below its node: its transform to world space times the inverse
-//! bind matrix, which is what the skin does to their vertices (glTF 2.0 specification, §3.7.3.1).
+//! Parts of deforming meshes that a joint moves rigidly, as instances below its node: its transform
+//! to world space times the inverse bind matrix, which is what the skin does to their vertices
+//! (glTF 2.0 specification, §3.7.3.1).
 
 use bth_scene::{Deformer, Interpolation, JointSet, Node, Object, Property, Source, Transform};
 use glam::{DMat3, DVec3};
@@ -9,21 +10,23 @@ use crate::gltf::placed_mesh::GltfPart;
 use crate::gltf::rigid_parts::RigidParts;
 use crate::gltf::scene::importer::Importer;
 
-/// Triangles from which a part is an instance, where something else is left in the object that deforms: placing an instance takes about
-/// as long as 100 to 150 triangles do that are deformed and refitted (`docs/notes/scenes.md`).
+/// Triangles from which a part is an instance, where something else is left in the object that
+/// deforms: placing an instance takes about as long as 100 to 150 triangles do that are deformed
+/// and refitted (`docs/notes/scenes.md`).
 const LEAST_TRIANGLES: u64 = 128;
 
-/// The greatest condition number of the transform of a part; those of instances may reach 2^24.
+/// The largest condition number of a part's transform; instances may reach 2^24.
 const MOST_CONDITION: f64 = (1u64 << 20) as f64;
-/// The greatest norm of the transform of a part and of its inverse, so that both stay in the range of f32.
+/// The largest norm of the transform of a part and of its inverse, so that both stay in the range
+/// of f32.
 const MOST_NORM: f64 = (1u64 << 60) as f64;
 
 /// Rows of a matrix that is applied to columns (x, y, z, 1).
 type Rows = [[f64; 4]; 3];
 
-impl Importer<'_> {
-    /// Takes the parts that joints move rigidly out of the objects that deform. The nodes, tracks and deformers of the manifest are
-    /// complete.
+impl Importer<'_, '_> {
+    /// Takes the parts that joints move rigidly out of the objects that deform. The nodes, tracks
+    /// and deformers of the manifest are complete.
     ///
     /// # Errors
     /// As for the import of the meshes.
@@ -50,7 +53,7 @@ impl Importer<'_> {
             return Ok(true);
         };
         let Some(skin) = deformer.skin else { return Ok(true) };
-        let parts = RigidParts::of(&self.accessors, mesh as usize)?;
+        let parts = RigidParts::of(self.file, mesh as usize)?;
         let (counts, mut others) = parts.counts();
         let mut taken = Vec::new();
         for (joint, triangles) in counts {
@@ -63,17 +66,17 @@ impl Importer<'_> {
             taken.retain(|(_, triangles)| *triangles >= LEAST_TRIANGLES);
         }
         for (joint, _) in &taken {
-            self.place_part(deformer, (skin, mesh), *joint);
+            self.place_part(deformer, skin, mesh, *joint);
         }
         self.report.rigid_parts += taken.len() as u64;
         let without: JointSet = taken.iter().map(|(joint, _)| *joint).collect();
-        let path = self.file.to_owned();
+        let path = self.path.to_owned();
         self.manifest.objects[deformer.object].source = Source::Deforming { path, mesh, without };
         Ok(others > 0 || taken.is_empty())
     }
 
     /// Adds the instance of a part.
-    fn place_part(&mut self, deformer: &Deformer, (skin, mesh): (usize, u32), joint: u32) {
+    fn place_part(&mut self, deformer: &Deformer, skin: usize, mesh: u32, joint: u32) {
         let skin = &self.manifest.skins[skin];
         let parent = skin.joints[joint as usize];
         let inverse_bind = skin.inverse_binds.as_ref().map(|all| all[joint as usize]);
@@ -83,23 +86,18 @@ impl Importer<'_> {
             Some(object) => *object,
             None => {
                 let name = format!("{}/{joint_name}", self.manifest.objects[deformer.object].name);
-                let source = Source::RigidPart { path: self.file.to_owned(), mesh, joint };
+                let source = Source::RigidPart { path: self.path.to_owned(), mesh, joint };
                 let object = self.new_object(&name, mesh as usize, source);
                 self.objects.insert(key, object);
                 object
             }
         };
         let name = format!("{}/{joint_name}", self.manifest.nodes[deformer.node].name);
-        let name = self.node_names.unique(&name, String::new());
+        let name = self.names.nodes.unique(&name, String::new());
         let visible = self.chain(deformer.node).all(|node| node.visible);
         let transform = inverse_bind.map_or_else(Transform::default, Transform::Matrix);
-        self.manifest.nodes.push(Node {
-            name,
-            parent: Some(parent),
-            transform,
-            object: Some(object),
-            visible,
-        });
+        let (parent, object) = (Some(parent), Some(object));
+        self.manifest.nodes.push(Node { name, parent, transform, object, visible });
     }
 
     /// A node of the manifest and all above it, upwards.
@@ -109,8 +107,9 @@ impl Importer<'_> {
         })
     }
 
-    /// Whether an instance can take the place of what a joint moves, at all times: the joint is visible, and its transform has an
-    /// inverse that is accurate enough for rays and keeps left and right.
+    /// Returns true if an instance can take the place of what a joint moves, at all times: the
+    /// joint is visible, and its transform has an inverse that is accurate enough for rays and
+    /// keeps left and right.
     fn can_be_placed(&self, skin: usize, joint: usize) -> bool {
         let skin = &self.manifest.skins[skin];
         let Some(&row) = skin.joints.get(joint) else { return false };
@@ -147,7 +146,7 @@ impl Importer<'_> {
     /// Removes an object to which no node and no deformer refers.
     fn remove_object(&mut self, row: usize) {
         let Object { name, .. } = self.manifest.objects.remove(row);
-        self.object_names.remove(&name);
+        self.names.objects.remove(&name);
         let nodes = self.manifest.nodes.iter_mut().filter_map(|node| node.object.as_mut());
         let deformers = self.manifest.deformers.iter_mut().map(|deformer| &mut deformer.object);
         for object in nodes.chain(deformers).chain(self.objects.values_mut()).filter(|object| **object > row)
@@ -160,10 +159,10 @@ impl Importer<'_> {
 /// Bounds of the linear part of a transform that changes with time.
 #[derive(Clone, Copy)]
 struct Bounds {
-    /// Of the spectral norm, and of that of the inverse.
+    /// Of the spectral norm, and of the inverse's spectral norm.
     norm: f64,
     inverse: f64,
-    /// Whether it exchanges left and right.
+    /// True if it exchanges left and right.
     mirrors: bool,
 }
 
@@ -203,8 +202,8 @@ impl Bounds {
     }
 }
 
-/// The greatest factor by which a matrix lengthens a vector, from above by at most 1 %: the Frobenius norm of a power of AᵀA, whose
-/// eigenvalues are the squares of the singular values of A.
+/// The largest factor by which a matrix lengthens a vector, from above by at most 1 %: the
+/// Frobenius norm of a power of AᵀA, whose eigenvalues are the squares of the singular values of A.
 fn spectral_norm(a: DMat3) -> f64 {
     const SQUARINGS: i32 = 6;
     let frobenius = |m: &DMat3| m.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();

@@ -5,12 +5,11 @@ use std::collections::HashSet;
 use bth_scene::{Interpolation, Property, Track, Transform};
 
 use crate::error::Result;
+use crate::gltf::scene::Chosen;
 use crate::gltf::scene::importer::Importer;
-use crate::gltf::scene::options::Chosen;
 use crate::gltf::schema::{Animation, Channel, Sampler};
-use crate::source::UNSUPPORTED;
 
-impl Importer<'_> {
+impl Importer<'_, '_> {
     /// The tracks of animations, by node and property, and the last time of any in seconds.
     pub(super) fn tracks(&mut self, animations: &[(usize, Animation)]) -> Result<(Vec<Track>, f64)> {
         let mut tracks: Vec<Track> = Vec::new();
@@ -34,7 +33,8 @@ impl Importer<'_> {
         Ok((tracks, last))
     }
 
-    /// The chosen animations with their numbers; the report lists these and the others.
+    /// Returns the chosen animations with their numbers, and notes which nodes they change. The
+    /// report lists these and the others.
     pub(super) fn animations(&mut self, chosen: &Chosen) -> Result<Vec<(usize, Animation)>> {
         let all = self.all_animations()?;
         let name = |(index, animation): &(usize, Animation)| {
@@ -50,14 +50,18 @@ impl Importer<'_> {
             };
             list.push(name);
         }
+        for channel in chosen.iter().flat_map(|(_, animation)| &animation.channels) {
+            let list = if channel.target.path == "weights" { &mut self.morphed } else { &mut self.moved };
+            channel.target.node.and_then(|node| list.get_mut(node)).into_iter().for_each(|x| *x = true);
+        }
         Ok(chosen)
     }
 
     /// All animations of the document with their numbers.
     fn all_animations(&self) -> Result<Vec<(usize, Animation)>> {
         let mut animations = Vec::new();
-        for (index, value) in self.document.animations.iter().enumerate() {
-            let animation: Animation = self.typed(value, &format!("animation {index}"))?;
+        for (index, value) in self.file.document.animations.iter().enumerate() {
+            let animation: Animation = self.file.typed(value, &format!("animation {index}"))?;
             animations.push((index, animation));
         }
         Ok(animations)
@@ -80,12 +84,8 @@ impl Importer<'_> {
                 let by_name = animations.iter().position(|(_, a)| a.name == *wanted);
                 let by_number = || wanted.parse().ok().filter(|n: &usize| *n < animations.len());
                 let Some(found) = by_name.or_else(by_number) else {
-                    let names: Vec<_> =
-                        animations.iter().map(|(i, a)| format!("{i} \"{}\"", a.name)).collect();
-                    let message =
-                        format!("expected one of its animations ({}), found {wanted}", names.join(", "));
-                    let hint = "name one of these, or its number";
-                    return Err(self.source.error_in_part(UNSUPPORTED, "animations", message, hint));
+                    let names = animations.iter().map(|(_, animation)| animation.name.as_str());
+                    return Err(self.no_such("animations", names, wanted));
                 };
                 Ok(vec![animations.swap_remove(found)])
             }
@@ -107,30 +107,34 @@ impl Importer<'_> {
         // Without a node the channel moves nothing.
         let Some(target) = channel.target.node else { return Ok(None) };
         let Some(row) = self.report.node_rows.get(target) else {
-            return Err(self.error(part, format!("its node {target} does not exist")));
+            return Err(self.file.graph_error(part, format!("its node {target} does not exist")));
         };
         // Nodes of other scenes have no row.
         let Some(node) = *row else { return Ok(None) };
         let moves = property != Property::Weights;
         if moves && matches!(self.manifest.nodes[node].transform, Transform::Matrix(_)) {
             let message = format!("its node {target} has a matrix, which cannot be animated");
-            return Err(self.error(part, message));
+            return Err(self.file.graph_error(part, message));
         }
         let Some(sampler) = animation.samplers.get(channel.sampler) else {
-            return Err(self.error(part, format!("its sampler {} does not exist", channel.sampler)));
+            return Err(self
+                .file
+                .graph_error(part, format!("its sampler {} does not exist", channel.sampler)));
         };
         let interpolation = match sampler.interpolation.as_deref() {
             None | Some("LINEAR") => Interpolation::Linear,
             Some("STEP") => Interpolation::Step,
             Some("CUBICSPLINE") => Interpolation::Cubic,
-            Some(other) => return Err(self.error(part, format!("unknown interpolation \"{other}\""))),
+            Some(other) => {
+                return Err(self.file.graph_error(part, format!("unknown interpolation \"{other}\"")));
+            }
         };
         let deformer = |row: usize| self.manifest.deformers.iter().find(|deformer| deformer.node == row);
         let width = match property.width() {
             Some(width) => width,
             // Nodes whose mesh stays at rest have no deformer, which has been said before.
             None => match deformer(node).map_or(0, |deformer| deformer.weights.len()) {
-                0 if self.deform => {
+                0 if self.options.deform => {
                     self.ignore(part, format!("node {target} has no morph targets that could be animated"))?;
                     return Ok(None);
                 }
@@ -138,7 +142,7 @@ impl Importer<'_> {
                 width => width,
             },
         };
-        let (times, values) = self.keys(sampler, (property, width), interpolation, part)?;
+        let (times, values) = self.keys(sampler, property, width, interpolation, part)?;
         Ok(Some(Track { node, property, interpolation, times, values }))
     }
 
@@ -146,19 +150,20 @@ impl Importer<'_> {
     fn keys(
         &self,
         sampler: &Sampler,
-        (property, width): (Property, usize),
+        property: Property,
+        width: usize,
         interpolation: Interpolation,
         part: &str,
     ) -> Result<(Vec<f64>, Vec<f64>)> {
-        let times: Vec<f64> = self.accessors.scalars(sampler.input)?.into_iter().map(f64::from).collect();
+        let times: Vec<f64> = self.file.scalars(sampler.input)?.into_iter().map(f64::from).collect();
         let values = match property {
-            Property::Rotation => widened(self.accessors.vectors::<4>(sampler.output)?),
-            Property::Weights => self.accessors.scalars(sampler.output)?.into_iter().map(f64::from).collect(),
-            _ => widened(self.accessors.vectors::<3>(sampler.output)?),
+            Property::Rotation => widened(self.file.vectors::<4>(sampler.output)?),
+            Property::Weights => self.file.scalars(sampler.output)?.into_iter().map(f64::from).collect(),
+            _ => widened(self.file.vectors::<3>(sampler.output)?),
         };
         let ascending = times.iter().all(|t| t.is_finite()) && times.windows(2).all(|w| w[0] < w[1]);
         if times.is_empty() || !ascending {
-            return Err(self.error(part, "expected finite times that ascend, at least one"));
+            return Err(self.file.graph_error(part, "expected finite times that ascend, at least one"));
         }
         let rows = interpolation.values_per_key();
         if values.len() != times.len() * width * rows {
@@ -168,14 +173,16 @@ impl Importer<'_> {
                 times.len(),
                 values.len() / width
             );
-            return Err(self.error(part, message));
+            return Err(self.file.graph_error(part, message));
         }
         // A cubic key has its value between two tangents.
         let main = rows / 2 * width;
         let zero =
             |key: &[f64]| property == Property::Rotation && key[main..main + width].iter().all(|x| *x == 0.0);
         if !values.iter().all(|x| x.is_finite()) || values.chunks(width * rows).any(zero) {
-            return Err(self.error(part, "expected finite values, and rotations that are not zero"));
+            return Err(self
+                .file
+                .graph_error(part, "expected finite values, and rotations that are not zero"));
         }
         Ok((times, values))
     }

@@ -1,60 +1,50 @@
-//! Reads Wavefront OBJ: polygons with normals and texture coordinates, and groups of them. What materials are is in
-//! [`mod@crate::mtl`]; smoothing is ignored.
+//! Reads Wavefront OBJ: polygons with normals and texture coordinates, and groups of them. What
+//! materials are is in [`super::mtl`]; smoothing is ignored.
 //!
 //! A reader of our own rather than `tobj`: docs/decisions.md says why.
 
+use super::Format;
+use super::mtl::{self, Library};
 use crate::error::{Error, Result};
 use crate::groups::NamedGroups;
 use crate::mesh::{Keep, Wanted};
-use crate::mtl::{self, Library};
-use crate::number::{Lines, float, integer, shown, words};
 use crate::polygon::fan;
 use crate::raw::{Raw, RowKind, check_rows};
-use crate::rows::NONE;
-use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, UNSUPPORTED};
-use crate::statements::{file_name, name, next_statement, statements};
+use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, UNSUPPORTED, read_file};
+use crate::text::{Lines, float, integer, shown, words};
+use crate::text::{file_name, name, next_statement, statements};
+use bth_format::layout::NONE;
 
 const ATTRIBUTE_HINT: &str = "correct the file, or compile without attributes (--attributes none)";
 
 /// Keywords of OBJ that do not change the polygons.
-const KNOWN: [&[u8]; 30] = [
-    b"g",
-    b"s",
-    b"o",
-    b"mg",
-    b"usemtl",
-    b"mtllib",
-    b"usemap",
-    b"maplib",
-    b"lod",
-    b"bevel",
-    b"c_interp",
-    b"d_interp",
-    b"shadow_obj",
-    b"trace_obj",
-    b"ctech",
-    b"stech",
-    b"vp",
-    b"cstype",
-    b"deg",
-    b"bmat",
-    b"step",
-    b"parm",
-    b"trim",
-    b"hole",
-    b"scrv",
-    b"sp",
-    b"end",
-    b"con",
-    b"vn",
-    b"vt",
-];
+const KNOWN: &str = "g s o mg usemtl mtllib usemap maplib lod bevel c_interp d_interp shadow_obj trace_obj ctech \
+    stech vp cstype deg bmat step parm trim hole scrv sp end con vn vt";
 
-/// Whether the first statement of a text has a keyword of OBJ.
-pub(super) fn looks_like_obj(data: &[u8]) -> bool {
+/// Returns true for a keyword that does not change the polygons.
+fn is_known(keyword: &[u8]) -> bool {
+    KNOWN.split(' ').any(|known| known.as_bytes() == keyword)
+}
+
+/// Wavefront OBJ, with materials of MTL.
+pub(super) const FORMAT: Format = Format {
+    name: "obj",
+    titles: &["OBJ"],
+    extensions: &["obj"],
+    is_like,
+    read,
+    files: |path, looks| match looks.materials {
+        true => Ok(mtl::files(path, &read_file(path)?)),
+        false => Ok(Vec::new()),
+    },
+    images: |source, looks| mtl::images(source, looks.unreadable),
+};
+
+/// Returns true if the first statement of a text has a keyword of OBJ.
+fn is_like(data: &[u8]) -> bool {
     let mut keywords = Lines::new(data).filter_map(|(_, line)| words(line).next());
     let first = keywords.find(|word| !word.starts_with(b"#"));
-    first.is_some_and(|word| [&b"v"[..], b"f"].contains(&word) || KNOWN.contains(&word))
+    first.is_some_and(|word| matches!(word, b"v" | b"f") || is_known(word))
 }
 
 /// A use of a row before its definition, which is allowed if the definition follows.
@@ -79,9 +69,10 @@ struct Reader<'a, 's> {
     face_uvs: Vec<u32>,
 }
 
-/// Reads an OBJ file. A group is what has the same name, by the last statement `o` or `g`, and the same material. A polyline counts as one skipped element, as does a free-form curve or surface; each point of a
-/// point statement counts as one.
-pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
+/// Reads an OBJ file. A group is what has the same name, by the last statement `o` or `g`, and the
+/// same material. A polyline counts as one skipped element, as does a free-form curve or surface;
+/// each point of a point statement counts as one.
+fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
     if let Some(byte) = source.data.iter().take(4096).position(|&c| c == 0) {
         let hint = "save it as UTF-8 or ASCII text, or give it the extension of its format";
         return Err(source.error_at_byte(UNSUPPORTED, byte, "expected text, found a zero byte", hint));
@@ -135,7 +126,7 @@ pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>
             }
             Some(b"p") => reader.raw.skipped += until_comment(words).count() as u64,
             Some(b"l" | b"curv" | b"curv2" | b"surf") => reader.raw.skipped += 1,
-            Some(keyword) if KNOWN.contains(&keyword) => {}
+            Some(keyword) if is_known(keyword) => {}
             Some(keyword) => {
                 unknown.get_or_insert_with(|| (number, shown(keyword), 0)).2 += 1;
             }
@@ -150,12 +141,7 @@ pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>
         source.monitor.warn(&message);
     }
     let mut raw = reader.finish(wanted)?;
-    if raw.normals.is_empty() {
-        raw.normal_rows.clear();
-    }
-    if raw.uvs.is_empty() {
-        raw.uv_rows.clear();
-    }
+    raw.drop_unused_rows();
     Ok(raw)
 }
 
@@ -166,8 +152,8 @@ impl<'a> Reader<'a, '_> {
         raw.groups = groups.recorder;
         raw.finish_polygons(wanted.polygons, source.monitor)?;
         if wanted.materials {
-            let looks = (wanted.unreadable, &mut raw.materials);
-            mtl::read(source, &libraries, raw.groups.material_names(), looks)?;
+            let names = raw.groups.material_names();
+            mtl::read(source, &libraries, names, wanted.unreadable, &mut raw.materials)?;
         }
         if !colors.is_empty() {
             // A position without a colour is white.
@@ -180,7 +166,7 @@ impl<'a> Reader<'a, '_> {
 }
 
 impl Reader<'_, '_> {
-    /// Parses up to three numbers, of which the first `needed` are mandatory; the others default to 0.
+    /// Parses up to three numbers. The first `needed` are mandatory; the others default to 0.
     fn numbers<'w>(
         &self,
         line: u64,
@@ -236,7 +222,8 @@ impl Reader<'_, '_> {
         self.raw.push_face(&self.face)
     }
 
-    /// The row that an index means. Indices count from 1; negative ones count back from the last row so far.
+    /// The row that an index means. Indices count from 1; negative ones count back from the last
+    /// row so far.
     #[inline]
     fn index(&mut self, line: u64, kind: RowKind, word: &[u8], index: &[u8]) -> Result<u32> {
         let rows = self.rows(kind);

@@ -1,24 +1,30 @@
 //! Reads OFF (the object file format of Geomview) as text.
 
+use super::{Format, first_word};
 use crate::error::Result;
 use crate::mesh::Wanted;
-use crate::number::{Lines, float, integer, shown, words};
 use crate::raw::{Raw, check_rows};
 use crate::source::{
     INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT, UNSUPPORTED,
 };
+use crate::text::{self, Lines, integer, point, shown, words};
 
-/// Hint for a file that ends early and has lines with more numbers than those of a position.
+/// Hint for a file that ends early and has lines with more than three numbers.
 const LINES_HINT: &str =
     "write each vertex and each face on a line of its own, or copy the file again if it is cut off";
 
-/// Whether a word is the keyword of a variant of OFF: `[ST][C][N][4][n]OFF`. Files have the letters before `OFF` in other orders,
-/// too.
-pub(super) fn is_keyword(word: &[u8]) -> bool {
-    variant(word).is_some()
-}
+/// Text of Geomview.
+pub(super) const FORMAT: Format = Format {
+    name: "off",
+    titles: &["OFF"],
+    extensions: &["off"],
+    is_like: |data| variant(first_word(data)).is_some(),
+    read,
+    ..Format::ALONE
+};
 
-/// The prefix of a keyword; `None` for other words.
+/// Returns the prefix of the keyword of a variant of OFF: `[ST][C][N][4][n]OFF`, with the letters
+/// before `OFF` in any order; `None` for other words.
 fn variant(word: &[u8]) -> Option<&[u8]> {
     let prefix = word.strip_suffix(b"OFF")?;
     let (mut rest, mut parts) = (prefix, vec![&b"ST"[..], b"C", b"N", b"4", b"n"]);
@@ -61,9 +67,9 @@ impl<'a> Statements<'a, '_> {
     }
 }
 
-/// Reads an OFF file. Colours, normals and texture coordinates at the ends of lines are ignored, which is why each vertex and each face
-/// must have a line of its own.
-pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
+/// Reads an OFF file. Colours, normals and texture coordinates at the ends of lines are ignored,
+/// which is why each vertex and each face must have a line of its own.
+fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
     let mut statements = Statements { source, lines: Lines::new(source.data), long_line: None };
     let malformed =
         |number, message: String| source.error_at_line(MALFORMED, number, message, MALFORMED_HINT);
@@ -84,7 +90,7 @@ pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>
     let mut count_words = words(line);
     for (count, what) in counts.iter_mut().zip(["vertices", "faces"]) {
         let word = count_words.next().unwrap_or_default();
-        *count = integer(word).and_then(|n| u64::try_from(n).ok()).ok_or_else(|| {
+        *count = text::count(word).ok_or_else(|| {
             malformed(number, format!("expected the number of {what}, found \"{}\"", shown(word)))
         })?;
     }
@@ -95,14 +101,10 @@ pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>
     for row in 0..vertices {
         source.tick(row, statements.lines.position())?;
         let (number, line) = statements.expect(&format!("vertex {row} of {vertices}"))?;
-        let mut position = [0.0; 3];
         let mut line = words(line);
-        for x in &mut position {
-            let word = line.next().unwrap_or_default();
-            *x = float(word).ok_or_else(|| {
-                malformed(number, format!("expected three coordinates, found \"{}\"", shown(word)))
-            })?;
-        }
+        let position = point(&mut line).map_err(|word| {
+            malformed(number, format!("expected three coordinates, found \"{}\"", shown(word)))
+        })?;
         if statements.long_line.is_none() && line.count() >= 3 {
             statements.long_line = Some(number);
         }
@@ -114,7 +116,7 @@ pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>
         let (number, line) = statements.expect(&format!("face {row} of {faces}"))?;
         let mut line = words(line);
         let word = line.next().unwrap_or_default();
-        let corners = integer(word).and_then(|n| u64::try_from(n).ok()).ok_or_else(|| {
+        let corners = text::count(word).ok_or_else(|| {
             malformed(number, format!("expected a number of corners, found \"{}\"", shown(word)))
         })?;
         face.clear();
@@ -142,7 +144,7 @@ fn line_of_vertex(source: &Source<'_>, row: usize) -> u64 {
     let mut statements = Statements { source, lines: Lines::new(source.data), long_line: None };
     let Some((_, first)) = statements.next() else { return 0 };
     let word = words(first).next().unwrap_or_default();
-    if is_keyword(word) && word.len() == first.len() {
+    if variant(word).is_some() && word.len() == first.len() {
         statements.next();
     }
     (0..=row).map_while(|_| statements.next()).last().map_or(0, |(number, _)| number)

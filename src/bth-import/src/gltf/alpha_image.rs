@@ -3,28 +3,18 @@
 use std::io::Cursor;
 
 use crate::cutout::AlphaImage;
+use crate::image_file::{MAX_TEXELS, Refused, check_size};
 
-/// Greatest number of texels of an image that is read: 8,192 by 8,192.
-pub(super) const MAX_TEXELS: u64 = 1 << 26;
-
-/// Greatest ratio of what deflate expands to (RFC 1951: 258 bytes from two bits), rounded up.
+/// The largest ratio to which deflate expands bytes (RFC 1951: 258 bytes from two bits), rounded
+/// up.
 const DEFLATE_RATIO: u64 = 1040;
 
 /// Bytes of a texel that decoders write.
 const RGBA: usize = 4;
 
-/// Why an image is not read.
-#[derive(Debug, PartialEq)]
-pub(super) enum ImageError {
-    /// It is malformed, cut off or of another format.
-    Malformed(String),
-    /// It has this many texels, more than [`MAX_TEXELS`].
-    TooLarge(u64),
-}
+type Result<T> = std::result::Result<T, Refused>;
 
-type Result<T> = std::result::Result<T, ImageError>;
-
-/// The alpha channel of an image file; `None` where it has none, so that alpha is 1 everywhere.
+/// Returns the alpha channel of an image file; `None` where it has none: alpha is 1 everywhere.
 ///
 /// # Errors
 /// When the image is malformed, too large or of another format.
@@ -39,12 +29,12 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Option<AlphaImage>> {
     if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") {
         return webp(bytes);
     }
-    Err(ImageError::Malformed("expected a PNG, JPEG or WebP image, found something else".to_owned()))
+    Err(Refused::Malformed("expected a PNG, JPEG or WebP image, found something else".to_owned()))
 }
 
-/// 16-bit channels are read at 8 bits, palettes and transparent colours as the alpha that they stand for.
+/// Reads 16-bit channels at 8 bits, palettes and transparent colours as the alpha that they mean.
 fn png(bytes: &[u8]) -> Result<Option<AlphaImage>> {
-    let malformed = |e: png::DecodingError| ImageError::Malformed(format!("malformed PNG: {e}"));
+    let malformed = |e: png::DecodingError| Refused::Malformed(format!("malformed PNG: {e}"));
     let limits = png::Limits { bytes: MAX_TEXELS as usize * RGBA };
     let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), limits);
     decoder.set_ignore_text_chunk(true);
@@ -52,10 +42,10 @@ fn png(bytes: &[u8]) -> Result<Option<AlphaImage>> {
     decoder.set_transformations(png::Transformations::EXPAND | png::Transformations::STRIP_16);
     let mut reader = decoder.read_info().map_err(malformed)?;
     let (width, height) = reader.info().size();
-    let texels = texels(width, height)?;
+    let texels = check_size(width as usize, height as usize)?;
     let bits = reader.info().color_type.samples() as u64 * reader.info().bit_depth as u64;
     if texels * bits / 8 > DEFLATE_RATIO * bytes.len() as u64 {
-        return Err(ImageError::Malformed(format!("malformed PNG: cut off, {} bytes", bytes.len())));
+        return Err(Refused::Malformed(format!("malformed PNG: cut off, {} bytes", bytes.len())));
     }
     let channels = match reader.output_color_type().0 {
         png::ColorType::GrayscaleAlpha => 2,
@@ -68,13 +58,13 @@ fn png(bytes: &[u8]) -> Result<Option<AlphaImage>> {
     Ok(Some(AlphaImage { width, height, alpha }))
 }
 
-/// Of an animation the first frame is read.
+/// Reads the first frame of an animation.
 fn webp(bytes: &[u8]) -> Result<Option<AlphaImage>> {
-    let malformed = |e: image_webp::DecodingError| ImageError::Malformed(format!("malformed WebP: {e}"));
+    let malformed = |e: image_webp::DecodingError| Refused::Malformed(format!("malformed WebP: {e}"));
     let mut decoder = image_webp::WebPDecoder::new(Cursor::new(bytes)).map_err(malformed)?;
     decoder.set_memory_limit(MAX_TEXELS as usize * RGBA);
     let (width, height) = decoder.dimensions();
-    let texels = texels(width, height)?;
+    let texels = check_size(width as usize, height as usize)?;
     if !decoder.has_alpha() {
         return Ok(None);
     }
@@ -82,15 +72,6 @@ fn webp(bytes: &[u8]) -> Result<Option<AlphaImage>> {
     decoder.read_image(&mut decoded).map_err(malformed)?;
     let alpha = decoded.chunks_exact(RGBA).map(|texel| texel[RGBA - 1]).collect();
     Ok(Some(AlphaImage { width, height, alpha }))
-}
-
-/// The number of texels, which is checked.
-fn texels(width: u32, height: u32) -> Result<u64> {
-    match u64::from(width) * u64::from(height) {
-        0 => Err(ImageError::Malformed("expected an image with texels, found none".to_owned())),
-        texels if texels > MAX_TEXELS => Err(ImageError::TooLarge(texels)),
-        texels => Ok(texels),
-    }
 }
 
 #[cfg(test)]
@@ -131,11 +112,12 @@ mod tests {
         for end in 0..good.len() - 12 {
             assert!(decode(&good[..end]).is_err(), "{end} bytes");
         }
-        // A header that claims 2^31 - 1 by 2^31 - 1 texels, and one of 8,192 by 8,192 in some dozen bytes.
+        // A header that claims 2^31 - 1 by 2^31 - 1 texels, and one of 8,192 by 8,192 in some dozen
+        // bytes.
         let mut huge = good.clone();
         huge[16..24].copy_from_slice(&[0x7f, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff]);
         assert!(decode(&huge).is_err());
-        assert!(matches!(texels(8193, 8193), Err(ImageError::TooLarge(_))));
+        assert!(matches!(check_size(8193, 8193), Err(Refused::TooLarge(_))));
         for bytes in [&b""[..], b"RIFF\0\0\0\0WEBP", b"RIFF\0\0\0\0WEBPVP8L", b"\xabKTX 20\xbb\r\n\x1a\n"] {
             assert!(decode(bytes).is_err());
         }

@@ -1,7 +1,10 @@
-//! Numbers, words and lines of text sources.
+//! Numbers, words, names, lines and statements of text sources.
 
-/// Parses a number; `None` if the word is none. What some C libraries write for numbers that are not finite, such as
-/// `-nan(ind)` and `1.#INF`, becomes NaN, so that it is an error only where a face uses it.
+use std::borrow::Cow;
+
+/// Parses a number; `None` for other words. What some C libraries write for numbers that are not
+/// finite, such as `-nan(ind)` and `1.#INF`, becomes NaN, so that it is an error only where a face
+/// uses it.
 #[inline]
 pub(super) fn float<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
     let text = std::str::from_utf8(word).ok()?;
@@ -14,7 +17,23 @@ fn foreign_nan(text: &str) -> Option<&'static str> {
     (text.starts_with("1.#") || text.starts_with("nan(")).then_some("nan")
 }
 
-/// Parses a decimal integer; `None` if the word is none or has more than 18 digits.
+/// Parses three numbers; the error is the first word that is not a number.
+#[inline]
+pub(super) fn point<'w>(words: &mut impl Iterator<Item = &'w [u8]>) -> Result<[f32; 3], &'w [u8]> {
+    let mut point = [0.0; 3];
+    for x in &mut point {
+        let word = words.next().unwrap_or_default();
+        *x = float(word).ok_or(word)?;
+    }
+    Ok(point)
+}
+
+/// Parses a count; `None` if the word is not one.
+pub(super) fn count(word: &[u8]) -> Option<u64> {
+    u64::try_from(integer(word)?).ok()
+}
+
+/// Parses a decimal integer; `None` for other words and for more than 18 digits.
 #[inline]
 pub(super) fn integer(word: &[u8]) -> Option<i64> {
     let (negative, digits) = match word {
@@ -47,6 +66,20 @@ pub(super) fn shown(word: &[u8]) -> String {
     String::from_utf8_lossy(cut).escape_debug().to_string()
 }
 
+/// The characters of the bytes 0x80 to 0x9F in Windows-1252. Bytes without one are control
+/// characters.
+const WINDOWS_1252: &str = "€\u{81}‚ƒ„…†‡ˆ‰Š‹Œ\u{8D}Ž\u{8F}\u{90}‘’“”•–—˜™š›œ\u{9D}žŸ";
+
+/// Reads bytes as UTF-8, or else as Windows-1252. That gives different bytes different text, so
+/// that names in any encoding are told apart.
+pub(super) fn text(bytes: Vec<u8>) -> String {
+    let character = |byte: &u8| match byte {
+        0x80..0xA0 => WINDOWS_1252.chars().nth(usize::from(byte - 0x80)).unwrap_or_default(),
+        _ => char::from(*byte),
+    };
+    String::from_utf8(bytes).unwrap_or_else(|e| e.as_bytes().iter().map(character).collect())
+}
+
 /// What some editors write at the start of UTF-8 text: U+FEFF, the byte order mark.
 const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
 
@@ -63,8 +96,8 @@ pub(super) struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    /// Lines of a text, numbered from 1. The first one begins behind the byte order mark, if there is one; [`Self::position`]
-    /// counts its bytes.
+    /// Lines of a text, numbered from 1. The first one begins behind the byte order mark, if there
+    /// is one; [`Self::position`] counts its bytes.
     pub(super) fn new(data: &'a [u8]) -> Self {
         Lines::after(data, data.len() - without_mark(data).len(), 0)
     }
@@ -101,6 +134,53 @@ impl<'a> Iterator for Lines<'a> {
         self.number += 1;
         Some((self.number, &rest[..end]))
     }
+}
+
+/// The words of a name, with single spaces between them, as [`text`] reads them. Names go on to the
+/// end of the line, and a word such as `#12` belongs to them, as other readers have it (Blender,
+/// tinyobjloader). Only `#` as a word of its own begins a comment.
+pub(super) fn name<'w>(words: impl Iterator<Item = &'w [u8]>) -> String {
+    let words: Vec<_> = words.take_while(|word| *word != b"#").collect();
+    text(words.join(&b' '))
+}
+
+/// The name of a file, which some programs write in double quotes.
+pub(super) fn file_name<'w>(words: impl Iterator<Item = &'w [u8]>) -> String {
+    let name = name(words);
+    let within = name.strip_prefix('"').and_then(|rest| rest.strip_suffix('"'));
+    within.filter(|within| !within.contains('"')).map_or_else(|| name.clone(), str::to_owned)
+}
+
+/// The statements of a text with the numbers of their first lines, as [`next_statement`] joins
+/// them.
+pub(super) fn statements(data: &[u8]) -> impl Iterator<Item = (u64, Cow<'_, [u8]>)> {
+    let mut lines = Lines::new(data);
+    std::iter::from_fn(move || next_statement(&mut lines))
+}
+
+/// Returns true if a line goes on in the next one: it ends in a backslash that is not in a comment.
+fn goes_on(line: &[u8]) -> bool {
+    line.last() == Some(&b'\\') && !words(line).next().is_some_and(|word| word.starts_with(b"#"))
+}
+
+/// The next line and its number. While a line ends in a backslash, the following line is joined to
+/// it, but for lines that are comments.
+#[inline]
+pub(super) fn next_statement<'a>(lines: &mut Lines<'a>) -> Option<(u64, Cow<'a, [u8]>)> {
+    let (number, line) = lines.next()?;
+    if !goes_on(line) {
+        return Some((number, Cow::Borrowed(line)));
+    }
+    let mut joined = line.to_vec();
+    let mut open = true;
+    while open {
+        joined.pop();
+        joined.push(b' ');
+        let next = lines.next().map_or(&b""[..], |(_, line)| line);
+        joined.extend_from_slice(next);
+        open = goes_on(next);
+    }
+    Some((number, Cow::Owned(joined)))
 }
 
 #[cfg(test)]

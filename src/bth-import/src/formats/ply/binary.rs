@@ -1,11 +1,11 @@
 //! Reads the body of a binary PLY.
 
 use crate::error::{Error, Result};
-use crate::ply::header::{Element, ElementKind, Header, Meaning, Scalar};
-use crate::ply::sink::{BadIndex, Refused, Sink, Vertex, slot};
-use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
+use crate::formats::ply::header::{Element, ElementKind, Header, Meaning, Scalar};
+use crate::formats::ply::sink::{Sink, Vertex, slot};
+use crate::source::{MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
 
-/// Reads all elements; `BIG` is whether the byte order is big-endian.
+/// Reads all elements; `BIG` is true for the big-endian byte order.
 pub(super) fn read<const BIG: bool>(source: &Source<'_>, header: &Header, sink: &mut Sink<'_>) -> Result<()> {
     let mut cursor = Cursor::<BIG> { source, at: header.body };
     for element in &header.elements {
@@ -105,16 +105,8 @@ impl<'d, const BIG: bool> Cursor<'_, 'd, BIG> {
                         indices.extend(items.map(|item| integer::<BIG>(scalar, item)));
                     }
                 }
-                sink.list(element.kind, &indices).map_err(|refused| match refused {
-                    Refused::Limit(error) => error,
-                    Refused::Index(BadIndex { found, vertices }) => {
-                        let message = format!(
-                            "expected an index from 0 and below {vertices}, found {found} in row {row} of element {}",
-                            element.name
-                        );
-                        self.source.error_at_byte(INDEX, start, message, INDEX_HINT)
-                    }
-                })?;
+                let of_row = || format!(" in row {row} of element {}", element.name);
+                sink.list(element.kind, &indices, || (self.source.byte(start), of_row()))?;
             }
         }
         Ok(())

@@ -2,36 +2,47 @@
 //!
 //! A reader of our own rather than `stl_io`: docs/decisions.md says why.
 
+use super::{Format, first_word};
 use crate::error::Result;
 use crate::mesh::Wanted;
-use crate::number::{Lines, float, shown, without_mark, words};
-use crate::raw::{Raw, RowKind, check_triangles};
+use crate::raw::{Raw, RowKind, check_rows, check_triangles};
 use crate::source::{MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
-use crate::statements::text;
+use crate::text::{Lines, point, shown, text, without_mark, words};
 
 /// Bytes before the first facet: 80 of any content and the count of facets.
 const HEADER: usize = 84;
 /// Bytes of a facet: a normal, three corners, and two bytes that some programs use for colour.
 const FACET: usize = 50;
 
+/// STL, text and binary.
+pub(super) const FORMAT: Format = Format {
+    name: "stl",
+    titles: &["STL"],
+    extensions: &["stl"],
+    is_like: |data| first_word(data).eq_ignore_ascii_case(b"solid") || is_binary_size(data),
+    read,
+    ..Format::ALONE
+};
+
 /// The count of facets in a binary header; `None` if the file is too short for a header.
 fn binary_count(data: &[u8]) -> Option<u32> {
     Some(u32::from_le_bytes(data.get(80..HEADER)?.try_into().ok()?))
 }
 
-/// Whether the file has exactly the length that its binary header implies. This distinguishes binary files whose header
-/// begins with "solid" from text files.
-pub(super) fn is_binary_size(data: &[u8]) -> bool {
+/// Returns true if the file has exactly the length that its binary header implies. This
+/// distinguishes binary files whose header begins with "solid" from text files.
+fn is_binary_size(data: &[u8]) -> bool {
     binary_count(data).is_some_and(|n| data.len() as u64 == HEADER as u64 + FACET as u64 * u64::from(n))
 }
 
-/// Whether the first word of a text begins with "solid" in letters of any case.
+/// Returns true if the first word of a text begins with "solid" in letters of any case.
 fn begins_with_solid(data: &[u8]) -> bool {
     without_mark(data).trim_ascii_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
 }
 
-/// Reads an STL file. Each solid of a text is a group. Facet normals are not shading attributes and are ignored.
-pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
+/// Reads an STL file. Each solid of a text is a group. Facet normals are not shading attributes and
+/// are ignored.
+fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
     let data = source.data;
     let is_text =
         !is_binary_size(data) && begins_with_solid(data) && !data[..data.len().min(1024)].contains(&0);
@@ -90,14 +101,10 @@ fn read_text<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
             (b"facet" | b"endfacet", None) if in_solid => {}
             (b"outer", None) if in_solid => open = Some(Vec::with_capacity(3)),
             (b"vertex", Some(corners)) => {
-                let mut position = [0.0; 3];
-                for x in &mut position {
-                    let word = words.next().unwrap_or_default();
-                    *x = float(word).ok_or_else(|| {
-                        malformed(format!("expected three numbers, found \"{}\"", shown(word)))
-                    })?;
-                }
-                crate::raw::check_rows(raw.positions.len() as u64 + 1)?;
+                let position = point(&mut words).map_err(|word| {
+                    malformed(format!("expected three numbers, found \"{}\"", shown(word)))
+                })?;
+                check_rows(raw.positions.len() as u64 + 1)?;
                 corners.push(raw.positions.len() as u32);
                 raw.positions.push(position);
             }

@@ -1,8 +1,8 @@
 //! The header of a PLY file: elements and their properties.
 
 use crate::error::{Error, Result};
-use crate::number::{Lines, integer, shown, words};
 use crate::source::{MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT, UNSUPPORTED};
+use crate::text::{self, Lines, shown, words};
 
 /// How the body is encoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +50,7 @@ impl Scalar {
         }
     }
 
-    /// Whether values are integers, as counts and indices must be.
+    /// Returns true if values are integers, as counts and indices must be.
     pub(super) fn is_integer(self) -> bool {
         !matches!(self, Scalar::F32 | Scalar::F64)
     }
@@ -123,7 +123,8 @@ impl Header {
         self.elements.iter().find(|element| element.kind == ElementKind::Vertices)
     }
 
-    /// The greatest value of a component of vertex colours, 1 for numbers with a fraction; `None` without all three of one type.
+    /// The largest value of a component of vertex colours, 1 for numbers with a fraction; `None`
+    /// without all three of one type.
     pub(super) fn color_scale(&self) -> Option<f32> {
         let properties = self.vertices()?.properties.iter();
         let mut types = properties.filter(|p| matches!(p.meaning, Meaning::Color(_))).map(|p| p.scalar);
@@ -146,7 +147,7 @@ impl Header {
         }
     }
 
-    /// Whether vertices have all of the `N` properties of a meaning.
+    /// Returns true if vertices have all of the `N` properties of a meaning.
     pub(super) fn has<const N: usize>(&self, meaning: impl Fn(usize) -> Meaning) -> bool {
         let properties = self.vertices().map_or(&[][..], |vertices| &vertices.properties);
         (0..N).all(|k| properties.iter().any(|p| p.meaning == meaning(k)))
@@ -186,7 +187,8 @@ struct HeaderReader<'s, 'd> {
 /// Reads the header.
 ///
 /// # Errors
-/// `BTH-I002`, `BTH-I003` or `BTH-I006` with the line that does not follow the format, is missing, or is not supported.
+/// `BTH-I002`, `BTH-I003` or `BTH-I006` with the line that does not follow the format, is missing,
+/// or is not supported.
 pub(super) fn read(source: &Source<'_>) -> Result<Header> {
     let mut lines = Lines::new(source.data);
     let mut reader = HeaderReader { source, number: 0, line: b"", encoding: None, elements: Vec::new() };
@@ -213,8 +215,9 @@ pub(super) fn read(source: &Source<'_>) -> Result<Header> {
     }
 }
 
-/// The byte at which the body begins, given that behind the line `end_header`. Where the lines of a header end with CR alone, so does
-/// that one, and an LF behind it is the first byte of a binary body.
+/// The byte at which the body begins, given that behind the line `end_header`. Where the lines of a
+/// header end with CR alone, so does that one, and an LF behind it is the first byte of a binary
+/// body.
 fn body(data: &[u8], after: usize, encoding: Option<Encoding>) -> usize {
     let first = data.iter().position(|c| matches!(c, b'\r' | b'\n')).unwrap_or(data.len());
     let ends_with_cr = data[first..].starts_with(b"\r") && !data[first..].starts_with(b"\r\n");
@@ -253,8 +256,7 @@ impl HeaderReader<'_, '_> {
         if kind == ElementKind::Vertices && self.elements.iter().any(|e| e.kind == kind) {
             return Err(self.malformed("one element vertex"));
         }
-        let count = integer(count).and_then(|n| u64::try_from(n).ok());
-        let count = count.ok_or_else(|| self.malformed("a number of rows"))?;
+        let count = text::count(count).ok_or_else(|| self.malformed("a number of rows"))?;
         self.elements.push(Element { name: shown(name), kind, count, properties: Vec::new() });
         Ok(())
     }
@@ -273,7 +275,8 @@ impl HeaderReader<'_, '_> {
             return Err(self.malformed("an integer type for the count of a list"));
         }
         let mut meaning = meaning(element.kind, name, list.is_some());
-        // Of several colours or texture coordinates, such as u and v beside s and t, the first counts.
+        // Of several colours or texture coordinates, such as u and v next to s and t, the first
+        // counts.
         let again = |p: &Property| {
             p.meaning == meaning && (matches!(meaning, Meaning::Color(_)) || p.name != shown(name))
         };

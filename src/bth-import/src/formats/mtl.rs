@@ -1,12 +1,13 @@
-//! Material libraries of OBJ files (MTL): diffuse colour, emission, opacity and their images. Colours count as linear.
+//! Material libraries of OBJ files (MTL): diffuse colour, emission, opacity and their images.
+//! Colours count as linear.
 
 use crate::error::{Error, Place, Result};
-use crate::image_file::{self, MAX_TEXELS, Refused};
-use crate::materials::{ImageFile, MaterialRecorder, PLAIN, Unreadable};
+use crate::image_file::{self, Refused};
+use crate::materials::{ImageFile, MaterialRecorder, PLAIN, Unreadable, warn_left_out};
 use crate::monitor::{Monitor, Silent};
-use crate::number::{Lines, float, shown, words};
 use crate::source::{IMAGE, MALFORMED, MALFORMED_HINT, Source, input_error};
-use crate::statements::{file_name, name, statements};
+use crate::text::{Lines, float, shown, words};
+use crate::text::{file_name, name, statements};
 use bth_format::layout::*;
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Component, Path, PathBuf};
@@ -51,15 +52,18 @@ struct Libraries {
     left_out: BTreeSet<String>,
 }
 
-/// Reads the libraries of an OBJ file: the parameters of the materials of these names, in order. Without libraries there are none.
+/// Reads the libraries of an OBJ file: the parameters of the materials of these names, in order.
+/// Without libraries there are none.
 ///
 /// # Errors
-/// `BTH-I016` for a library or image that cannot be read, `BTH-I002` for a malformed library, `BTH-L003` for too large an image.
+/// `BTH-I016` for a library or image that cannot be read, `BTH-I002` for a malformed library,
+/// `BTH-L003` for too large an image.
 pub(super) fn read(
     source: &Source<'_>,
     libraries: &[Library],
     names: &[String],
-    (unreadable, recorder): (Unreadable, &mut MaterialRecorder),
+    unreadable: Unreadable,
+    recorder: &mut MaterialRecorder,
 ) -> Result<()> {
     if libraries.is_empty() {
         return Ok(());
@@ -77,14 +81,12 @@ pub(super) fn read(
         };
         recorder.parameters.push(parameters);
     }
-    if !found.left_out.is_empty() {
-        let names: Vec<&str> = found.left_out.iter().map(String::as_str).collect();
-        source.monitor.warn(&format!("materials: not kept are {}", names.join(", ")));
-    }
+    warn_left_out(&found.left_out, source.monitor);
     Ok(())
 }
 
-/// The files that the libraries of an OBJ file are, and their images, as far as they exist and can be read.
+/// The files that the libraries of an OBJ file are, and their images, as far as they exist and can
+/// be read.
 pub(super) fn files(path: &Path, data: &[u8]) -> Vec<PathBuf> {
     let (mut files, mut read, mut listed) = (Vec::new(), LibrariesRead::default(), HashSet::new());
     for library in libraries_of(data) {
@@ -128,7 +130,8 @@ fn libraries_of(data: &[u8]) -> impl Iterator<Item = Library> + '_ {
     })
 }
 
-/// The libraries that are read already. Programs may write the statement `mtllib` before every face; a library is parsed once.
+/// The libraries that are read already. Programs may write the statement `mtllib` before every
+/// face; a library is parsed once.
 #[derive(Default)]
 struct LibrariesRead {
     /// Names of statements.
@@ -217,7 +220,7 @@ fn parse(path: &Path, text: &[u8], found: &mut Libraries) -> Result<()> {
                 let Some(number) = number.filter(|x| (0.0..=1.0).contains(x)) else {
                     return Err(malformed(place, "expected a number from 0 to 1"));
                 };
-                // An opacity counts more than a transparency, of which some programs write the opposite.
+                // An opacity counts more than a transparency: some programs write the opposite.
                 match keyword == b"d" {
                     true => material.opacity = Some(number),
                     false => material.opacity = material.opacity.or(Some(1.0 - number)),
@@ -256,7 +259,7 @@ fn keep(found: &mut Libraries, material: Option<(String, MtlMaterial)>) {
     found.materials.entry(name).or_insert(material);
 }
 
-/// Whether the opacity of a material is the alpha of its colour image.
+/// Returns true if the opacity of a material is the alpha of its colour image.
 fn has_alpha_in_color(material: &MtlMaterial) -> bool {
     let file = |map: &Option<Map>| map.as_ref().map(|map| map.file.clone());
     material.opacity_map.is_some() && file(&material.opacity_map) == file(&material.diffuse_map)
@@ -281,7 +284,8 @@ fn color<'w>(place: &Place, words: impl Iterator<Item = &'w [u8]>) -> Result<Opt
     }
 }
 
-/// The image of a statement, behind its options; `None` where it names none, as programs write it for materials without an image.
+/// The image of a statement, behind its options; `None` where it names none, as programs write it
+/// for materials without an image.
 fn map<'w>(library: &Path, place: Place, words: impl Iterator<Item = &'w [u8]>) -> Result<Option<Map>> {
     let words: Vec<&[u8]> = words.collect();
     let (mut scale, mut offset, mut clamp, mut at) = ([1.0; 2], [0.0; 2], false, 0);
@@ -402,10 +406,7 @@ fn image_name(map: &Map) -> Result<[u8; 16]> {
                 "save the image as PNG, JPEG or WebP, or compile with --lenient-materials or without --materials";
             input_error(IMAGE, map.place.clone(), format!("{shown}: {message}"), hint)
         }
-        Refused::TooLarge(texels) => Error::Limit {
-            code: "BTH-L003",
-            message: format!("{shown} has {texels} texels; up to {MAX_TEXELS} are kept"),
-        },
+        Refused::TooLarge(texels) => image_file::too_large(shown, texels),
     })?;
     Ok(ImageFile::new(bytes).name)
 }

@@ -1,28 +1,38 @@
 //! Reads PLY: vertices with faces or triangle strips, in text or binary of either byte order.
 //!
-//! `header` reads the elements and their properties, `ascii` or `binary` the body, `sink` collects the rows, and `left_out` warns of
-//! what is not kept. Readers of our own rather than `ply-rs-bw`: docs/decisions.md says why.
+//! `header` reads the elements and their properties, `ascii` or `binary` the body, and `sink`
+//! collects the rows. docs/decisions.md says why these are not the readers of `ply-rs-bw`.
 
 mod ascii;
 mod binary;
 mod header;
-mod left_out;
 mod sink;
 
 use self::header::{ElementKind, Encoding, Header};
-use self::sink::Sink;
+use self::sink::{Sink, warn_left_out};
+use super::{Format, first_word};
 use crate::error::{Place, Result};
 use crate::mesh::Wanted;
 use crate::raw::{Raw, check_rows};
 use crate::source::Source;
 
+/// PLY, text and binary.
+pub(super) const FORMAT: Format = Format {
+    name: "ply",
+    titles: &["PLY"],
+    extensions: &["ply"],
+    is_like: |data| first_word(data) == b"ply",
+    read,
+    ..Format::ALONE
+};
+
 /// Reads a PLY file. Edges count as skipped elements.
-pub(crate) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
+fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
     let mut header = header::read(source)?;
     if !wanted.materials || header.color_scale().is_none() {
         header.skip_colors();
     }
-    left_out::warn(source, &header, wanted);
+    warn_left_out(source, &header, wanted);
     check_rows(header.vertices().map_or(0, |v| v.count))?;
     let raw = Raw::new("ply", Box::new(|_, _| Place::File(source.path.to_owned())));
     let mut sink = Sink::new(raw, &header, wanted);

@@ -1,10 +1,10 @@
 //! Reads the body of a text PLY, which has one row a line.
 
 use crate::error::Result;
-use crate::number::{Lines, float, integer, shown, words};
-use crate::ply::header::{Element, ElementKind, Header, Meaning, Scalar};
-use crate::ply::sink::{BadIndex, Refused, Sink, Vertex, slot};
-use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
+use crate::formats::ply::header::{Element, ElementKind, Header, Meaning, Scalar};
+use crate::formats::ply::sink::{Sink, Vertex, slot};
+use crate::source::{MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
+use crate::text::{self, Lines, float, integer, shown, words};
 
 /// Reads all elements.
 pub(super) fn read(source: &Source<'_>, header: &Header, sink: &mut Sink<'_>) -> Result<()> {
@@ -40,7 +40,7 @@ pub(super) fn read(source: &Source<'_>, header: &Header, sink: &mut Sink<'_>) ->
     Ok(())
 }
 
-/// Reads a row. The result is whether it has as many values as the header announces.
+/// Reads a row. Returns true if it has as many values as the header announces.
 fn read_row(
     source: &Source<'_>,
     element: &Element,
@@ -59,8 +59,7 @@ fn read_row(
         let mut count = 1;
         if property.list.is_some() {
             let word = words.next().unwrap_or_default();
-            let found = integer(word).and_then(|n| u64::try_from(n).ok());
-            count = found.ok_or_else(|| malformed("the count of a list", word))?;
+            count = text::count(word).ok_or_else(|| malformed("the count of a list", word))?;
         }
         let place = slot(property.meaning);
         indices.clear();
@@ -79,13 +78,7 @@ fn read_row(
             }
         }
         if property.meaning == Meaning::Indices {
-            sink.list(element.kind, indices).map_err(|refused| match refused {
-                Refused::Limit(error) => error,
-                Refused::Index(BadIndex { found, vertices }) => {
-                    let message = format!("expected an index from 0 and below {vertices}, found {found}");
-                    source.error_at_line(INDEX, number, message, INDEX_HINT)
-                }
-            })?;
+            sink.list(element.kind, indices, || (source.line(number), String::new()))?;
         }
     }
     if element.kind == ElementKind::Vertices {

@@ -21,25 +21,27 @@ pub(crate) const SCREENSHOT: &str = "bth-play.png";
 #[derive(Clone, Debug, Parser)]
 #[command(name = "bth-play", version, after_help = EXIT_CODES, max_term_width = 100)]
 pub(crate) struct Args {
-    /// The compiled file; or a scene manifest (.manifest, .toml) or model, which is compiled first with the bthc beside this
-    /// program and mapped from the cache.
+    /// The compiled file; or a scene manifest (.manifest, .toml) or model, which is compiled first
+    /// with the bthc next to this program and mapped from the cache.
     #[arg(required_unless_present_any = ["completions", "man"])]
     file: Option<PathBuf>,
-    /// A picture (.png); numbered pictures (such as frames/####.png); an animation (.apng, .gif or .y4m); or `-` for
-    /// YUV4MPEG2 on standard output.
+    /// A picture (.png); numbered pictures (such as frames/####.png); an animation (.apng, .gif or
+    /// .y4m); or `-` for YUV4MPEG2 on standard output.
     #[arg(short, long, value_name = "FILE", required_unless_present_any = ["completions", "man", "window"])]
     output: Option<PathBuf>,
-    /// Show the file in a window: orbit, fly, play, scrub, change the mode; the picture is refined to --spp samples while
-    /// nothing moves. H prints the keys.
+    /// Show the file in a window: orbit, fly, play, scrub, change the mode; the picture is refined
+    /// to --spp samples while nothing moves. H prints the keys.
     #[arg(long, conflicts_with_all = ["output", "shard", "force"])]
     pub(crate) window: bool,
     /// Where the key P of the window writes the picture; by default bth-play.png.
     #[arg(long, value_name = "FILE", requires = "window", conflicts_with = "output")]
     pub(crate) screenshot: Option<PathBuf>,
-    /// Close the window after it has shown N pictures, and write the last to the file of --screenshot.
+    /// Close the window after it has shown N pictures, and write the last to the file of
+    /// --screenshot.
     #[arg(long, value_name = "N", requires = "window", conflicts_with = "output", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) window_frames: Option<u32>,
-    /// Frames of a scene, both included, or one; by default the first for a picture, else all of them.
+    /// Frames of a scene, both included, or one; by default the first for a picture, else all of
+    /// them.
     #[arg(long, value_name = "A..B", value_parser = parse_frames, allow_hyphen_values = true)]
     pub(crate) frames: Option<(i32, i32)>,
     /// Render part I of N of the frames, from 1, for many machines; needs numbered pictures.
@@ -48,8 +50,8 @@ pub(crate) struct Args {
     /// Render frames again whose pictures are there and whole.
     #[arg(long)]
     pub(crate) force: bool,
-    /// Instruction set: scalar, sse4, neon, simd128, avx2 or avx512. By default what BTH_ISA says, else the best of this
-    /// machine. Pictures do not depend on it.
+    /// Instruction set: scalar, sse4, neon, simd128, avx2 or avx512. By default what BTH_ISA says,
+    /// else the best of this machine. Pictures do not depend on it.
     #[arg(long, value_name = "ISA")]
     pub(crate) isa: Option<bth::Isa>,
     /// Width and height of the picture.
@@ -58,8 +60,8 @@ pub(crate) struct Args {
     /// What to show.
     #[arg(long, value_enum, default_value_t = Mode::Shaded)]
     pub(crate) mode: Mode,
-    /// Eye and target in world space, or the name of a camera of the scene. By default the scene's first choice; without
-    /// one the camera shows the whole model.
+    /// Eye and target in world space, or the name of a camera of the scene. By default the scene's
+    /// first choice; without one the camera shows the whole model.
     #[arg(long, value_name = "NAME|EX,EY,EZ,TX,TY,TZ", value_parser = parse_camera, allow_hyphen_values = true, conflicts_with_all = ["yaw", "pitch", "inside"])]
     pub(crate) camera: Option<View>,
     /// Degrees around the model, from its front; 35 by default.
@@ -83,8 +85,8 @@ pub(crate) struct Args {
     /// Samples per pixel.
     #[arg(long, default_value_t = 16, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     pub(crate) spp: u32,
-    /// Motion blur: frames for which the shutter is open, around the time of each picture, such as 0.5. Each sample sees the scene
-    /// at a time of its own. By default pictures show an instant.
+    /// Motion blur: frames for which the shutter is open, around the time of each picture, such as
+    /// 0.5. Each sample sees the scene at a time of its own. By default pictures show an instant.
     #[arg(long, value_name = "FRAMES", value_parser = parse_positive)]
     pub(crate) shutter: Option<f64>,
     /// No ground under the model. Scenes never have one but their own.
@@ -93,8 +95,8 @@ pub(crate) struct Args {
     /// Times that light is reflected, in mode path; 4 by default.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=64))]
     pub(crate) bounces: Option<u32>,
-    /// Light from all around in mode path, a picture in Radiance format (.hdr) over longitude and latitude; by default a sky,
-    /// and a sun where the scene has no lights.
+    /// Light from all around in mode path, a picture in Radiance format (.hdr) over longitude and
+    /// latitude; by default a sky, and a sun where the scene has no lights.
     #[arg(long, value_name = "FILE")]
     pub(crate) env: Option<PathBuf>,
     /// Upper end of the heat map of mode steps; by default according to each picture.
@@ -124,6 +126,7 @@ pub(crate) struct Args {
     pub(crate) man: bool,
 }
 
+/// What is shown, in the order of the keys in the window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Mode {
     /// The materials of the file under two lights; what has none is clay.
@@ -173,7 +176,7 @@ impl Args {
         Self { spp, ..self.clone() }
     }
 
-    /// Whether the pictures go to standard output.
+    /// Returns true if the pictures go to standard output.
     pub(crate) fn takes_stdout(&self) -> bool {
         self.output.as_deref() == Some(Path::new("-"))
     }
@@ -185,26 +188,14 @@ impl Args {
 }
 
 impl Mode {
-    /// All of them, in the order of their keys in the window.
-    pub(crate) const ALL: [Mode; 7] =
-        [Mode::Shaded, Mode::Normals, Mode::Ao, Mode::Steps, Mode::Path, Mode::Instances, Mode::Clay];
-
-    /// Whether it shows how materials look.
+    /// Returns true if it shows how materials look.
     pub(crate) fn shows_materials(self) -> bool {
         matches!(self, Mode::Shaded | Mode::Path)
     }
 
-    /// As on the command line.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Mode::Shaded => "shaded",
-            Mode::Normals => "normals",
-            Mode::Ao => "ao",
-            Mode::Steps => "steps",
-            Mode::Path => "path",
-            Mode::Instances => "instances",
-            Mode::Clay => "clay",
-        }
+    /// Returns the name on the command line.
+    pub(crate) fn name(self) -> String {
+        format!("{self:?}").to_ascii_lowercase()
     }
 }
 
@@ -224,7 +215,8 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
     Ok((parse(parts.0)?, parse(parts.1)?))
 }
 
-/// Six numbers, or else a name. A list of fewer or more numbers is an error, since it is hardly the name of a camera.
+/// Six numbers, or else a name. A list of fewer or more numbers is an error, since it is hardly the
+/// name of a camera.
 fn parse_camera(text: &str) -> Result<View, String> {
     let parts: Vec<&str> = text.split(',').collect();
     let numbers: Vec<f64> = parts.iter().map_while(|s| s.trim().parse().ok()).collect();

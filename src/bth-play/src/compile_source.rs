@@ -1,14 +1,15 @@
-//! Scene manifests and models as input: `bthc`, in the folder of this program, compiles them into the cache, from which they
-//! are mapped.
+//! Scene manifests and models as input: `bthc`, in the folder of this program, compiles them into
+//! the cache, from which they are mapped.
 
 use crate::failure::Failure;
 use crate::interrupt::Part;
 use crate::messages;
 use bth_cache::{DEFAULT_CAP, Digest, Pin, Store};
 use bth_files::Diagnosis;
+use bth_format::layout::IDENTIFIER;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::Value;
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::{Condvar, Mutex, PoisonError};
@@ -16,13 +17,15 @@ use std::time::Duration;
 
 /// Time between two changes of what a terminal shows.
 const INTERVAL: Duration = Duration::from_millis(100);
-/// Extensions of the files that `bthc` compiles.
-const SOURCES: [&str; 8] = ["manifest", "toml", "gltf", "glb", "obj", "ply", "stl", "off"];
-
-/// Whether a file must be compiled first, by its extension.
+/// Returns true for a file that must be compiled first: by its name and content it is not a
+/// compiled file. `bthc` finds out what it is.
 pub(crate) fn is_source(path: &Path) -> bool {
-    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    extension.is_some_and(|e| SOURCES.contains(&e.as_str()))
+    let mut start = [0; IDENTIFIER.len()];
+    let read = bth_files::regular_file(path)
+        .and_then(|_| std::fs::File::open(path))
+        .and_then(|mut file| file.read_exact(&mut start));
+    let is_named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("bth"));
+    !is_named && !(read.is_ok() && start == IDENTIFIER)
 }
 
 /// A compiled source.
@@ -31,7 +34,7 @@ pub(crate) struct Compiled {
     pub(crate) pin: Pin,
     /// All files that were read for it.
     pub(crate) inputs: Vec<PathBuf>,
-    /// The cache where there is none that stays; it is removed with this.
+    /// The cache, if it is a temporary one; it is removed with this.
     _folder: Option<TemporaryCache>,
 }
 
@@ -49,9 +52,10 @@ impl TemporaryCache {
     }
 }
 
-/// The compiled file of a scene or model in the cache, checked; compiled now if the cache lacks it. With `materials` it is compiled with
-/// these and with holes by alpha, or without where its materials cannot be read. Where no folder is given and `BTH_NO_CACHE` is set, or the
-/// usual folder is not known or cannot be used, the cache is a temporary one.
+/// The compiled file of a scene or model in the cache, checked; compiled now if the cache lacks it.
+/// With `materials` it is compiled with these and with holes by alpha, or without where its
+/// materials cannot be read. Where no folder is given and `BTH_NO_CACHE` is set, or the usual
+/// folder is not known or cannot be used, the cache is a temporary one.
 ///
 /// # Errors
 /// If the source cannot be compiled, or the cache cannot be used.
@@ -75,7 +79,7 @@ pub(crate) fn compiled(source: &Path, cache: Option<&Path>, materials: bool) -> 
     // An entry that is damaged, or evicted before it is pinned, is compiled again.
     for _ in 0..3 {
         let done = match compile(source, &folder, materials) {
-            Err(with) if materials && with.is_of_source() => {
+            Err(with) if materials && is_of_source(&with) => {
                 let done = compile(source, &folder, false)?;
                 let what = "its materials cannot be read, so it is shown without them";
                 messages::warn(&format!("{}: {what}: {with}", source.display()));
@@ -104,42 +108,10 @@ struct Done {
     inputs: Vec<PathBuf>,
 }
 
-/// Why `bthc` made nothing.
-enum CompileError {
-    /// It could not be run.
-    Started(Failure),
-    /// What it reported.
-    Reported(Diagnosis),
-}
-
-impl CompileError {
-    /// Whether something that is read is at fault, and not the cache.
-    fn is_of_source(&self) -> bool {
-        match self {
-            CompileError::Reported(error) => {
-                error.exit_code == 3 || matches!(error.code.as_str(), "BTH-O001" | "BTH-O002")
-            }
-            CompileError::Started(_) => false,
-        }
-    }
-}
-
-impl From<CompileError> for Failure {
-    fn from(error: CompileError) -> Failure {
-        match error {
-            CompileError::Started(failure) => failure,
-            CompileError::Reported(error) => Failure::Compiler(error),
-        }
-    }
-}
-
-impl std::fmt::Display for CompileError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            CompileError::Started(_) => Ok(()),
-            CompileError::Reported(error) => error.fmt(f),
-        }
-    }
+/// Returns true if something that is read is at fault, and not the cache.
+fn is_of_source(failure: &Failure) -> bool {
+    let Failure::Compiler(error) = failure else { return false };
+    error.exit_code == 3 || matches!(error.code.as_str(), "BTH-O001" | "BTH-O002")
 }
 
 /// Does work, and shows on a terminal for how long.
@@ -173,9 +145,10 @@ fn showing_time<T: Send>(what: &str, work: impl FnOnce() -> T + Send) -> T {
     done
 }
 
-/// Runs `bthc` to compile into the cache. It ends when this program does, however that ends, since its standard input is closed then.
-fn compile(source: &Path, cache: &Path, materials: bool) -> Result<Done, CompileError> {
-    let failed = |message: String| CompileError::Started(Failure::Source { path: source.into(), message });
+/// Runs `bthc` to compile into the cache. It ends when this program does, however that ends, since
+/// its standard input is closed then.
+fn compile(source: &Path, cache: &Path, materials: bool) -> Result<Done, Failure> {
+    let failed = |message: String| Failure::Source { path: source.into(), message };
     let bthc = std::env::current_exe()
         .ok()
         .map(|exe| exe.with_file_name(format!("bthc{}", std::env::consts::EXE_SUFFIX)))
@@ -201,7 +174,7 @@ fn compile(source: &Path, cache: &Path, materials: bool) -> Result<Done, Compile
     let is_new = |line: &&str| reported.is_none() || !line.starts_with("error: ");
     stderr.lines().filter(is_new).for_each(messages::note);
     if let Some(error) = reported {
-        return Err(CompileError::Reported(error));
+        return Err(Failure::Compiler(error));
     }
     if !output.status.success() {
         return Err(failed(format!("{} ended with {}", bthc.display(), output.status)));

@@ -1,4 +1,5 @@
-//! Light from all around, given by a picture over longitude and latitude, and sampling of directions by its brightness.
+//! Light from all around, given by a picture over longitude and latitude, and sampling of
+//! directions by its brightness.
 
 use crate::failure::Failure;
 use glam::{DVec2, DVec3, Vec3};
@@ -6,14 +7,15 @@ use image::{ImageDecoder, ImageReader, Limits};
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
-/// Mean luminance over all directions to which a picture is scaled: about that of the built-in sky.
+/// Pictures are scaled to this mean luminance over all directions, about the built-in sky's.
 const MEAN_LUMINANCE: f64 = 0.6;
-/// Greatest number of texels of a picture.
+/// Largest number of texels of a picture.
 const MAX_TEXELS: u64 = 1 << 26;
-/// Greatest size of its file, bytes.
+/// Largest size of its file, bytes.
 const MAX_FILE: u64 = 1 << 30;
 
-/// A picture of the surroundings. The upper edge is the vertical; the middle column is in the direction of the model's front.
+/// A picture of the surroundings. The upper edge is the vertical; the middle column is in the
+/// direction of the model's front.
 #[derive(Clone, Debug)]
 pub(crate) struct Environment {
     width: usize,
@@ -191,7 +193,8 @@ mod tests {
         assert_eq!(at(DVec3::new(-1.0, 0.01, 0.05)).0, 5);
     }
 
-    /// The mean of radiance / density is the integral over all directions, and that of 1 / density their solid angle.
+    /// The mean of radiance / density is the integral over all directions; the mean of 1 / density
+    /// is their solid angle.
     #[test]
     fn samples_integrate_the_picture() {
         let picture = environment(16, 8, |i, j| if (i, j) == (11, 2) { 900.0 } else { 0.5 + j as f32 });

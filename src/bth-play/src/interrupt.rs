@@ -15,7 +15,8 @@ fn parts() -> MutexGuard<'static, Vec<PathBuf>> {
     PARTS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Listens for Ctrl-C and the signals that are like it from now on. With `json` the end is reported on standard output.
+/// Listens for Ctrl-C and the signals that are like it from now on. With `json` the end is reported
+/// on standard output.
 ///
 /// # Errors
 /// `BTH-L090` if the thread that waits for signals cannot be started.
@@ -37,7 +38,8 @@ pub(crate) fn listen(json: bool) -> Result<(), Failure> {
         Err(ctrlc::Error::System(e)) => {
             Err(Failure::Threads(format!("cannot start a thread that waits for signals: {e}")))
         }
-        // Else it fails only when a handler is there already, and then Ctrl-C ends the program anyway.
+        // Else it fails only when a handler is there already, and then Ctrl-C ends the program
+        // anyway.
         _ => Ok(()),
     }
 }

@@ -1,6 +1,6 @@
 //! `bth-play`: renders compiled BTH files and scenes to pictures and animations.
 
-// The window alone moves cameras, changes modes and renders parts of a picture anew.
+// The window alone moves cameras, changes modes and renders parts of a picture again.
 #![cfg_attr(not(feature = "window"), allow(dead_code, unused_imports, unused_variables))]
 
 mod args;
@@ -106,10 +106,11 @@ fn show_window(
 #[allow(unsafe_code)]
 fn open(file: &Path, map: bool) -> Result<bth::Scene, bth::Error> {
     if map {
-        // SAFETY: `map` requires that bthc wrote the file, and that nobody changes or shrinks it while it
-        // is mapped. With `--map` the user guarantees this, as its help tells. Entries of the cache are
-        // read-only and are created by linking a finished file; no program of the workspace opens one for
-        // writing, and the hash of this one was compared with what bthc wrote.
+        // SAFETY: `map` requires that bthc wrote the file, and that nobody changes or shrinks it
+        // while it is mapped. With `--map` the user guarantees this, as its help tells. Entries of
+        // the cache are read-only and are created by linking a finished file; no program of the
+        // workspace opens one for writing, and the hash of this one was compared with what bthc
+        // wrote.
         unsafe { bth::map(file) }
     } else {
         bth::open(file)

@@ -65,8 +65,8 @@ fn resident(file: &Path) -> Option<u64> {
     line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib << 10)
 }
 
-/// Prints time and rays of the frames, for people or as JSON; on standard error when the pictures went to standard output.
-/// `mapped` is the path of the file, if it is mapped.
+/// Prints time and rays of the frames, for people or as JSON; on standard error when the pictures
+/// went to standard output. `mapped` is the path of the file, if it is mapped.
 pub(crate) fn show(
     args: &Args,
     scene: &Scene,
@@ -91,7 +91,7 @@ pub(crate) fn show(
 fn totals(report: &Report) -> (f64, f64) {
     let sum =
         |field: fn(&FrameReport) -> f64| report.frames.iter().map(field).fold(0.0, |sum, value| sum + value);
-    (sum(|f| f.summary.seconds), sum(|f| (f.summary.nearest_rays + f.summary.any_rays) as f64))
+    (sum(|f| f.seconds), sum(|f| (f.nearest_rays + f.any_rays) as f64))
 }
 
 fn rate(rays: f64, seconds: f64) -> f64 {
@@ -135,7 +135,7 @@ fn text(args: &Args, report: &Report, threads: usize, stats: Option<Stats>) -> S
         text = format!("{} frames ({} were there already), {text}", report.frames.len(), report.skipped);
     }
     if let [frame] = report.frames.as_slice()
-        && let Some(steps) = &frame.summary.steps
+        && let Some(steps) = &frame.steps
     {
         text.push_str(&format!(
             "per camera ray: {:.1} nodes, {:.1} leaves, {:.1} triangles, {:.1} tetrahedra\n",
@@ -152,14 +152,14 @@ fn text(args: &Args, report: &Report, threads: usize, stats: Option<Stats>) -> S
 fn table(report: &Report, stats: &Stats) -> String {
     let mut text = String::from("frame    update  top level     trace   rays/s  placed\n");
     for f in &report.frames {
-        let rays = (f.summary.nearest_rays + f.summary.any_rays) as f64;
+        let rays = (f.nearest_rays + f.any_rays) as f64;
         text.push_str(&format!(
             "{:>5}  {:>5.2} ms  {:>6.2} ms  {:>5.1} ms  {:>5.2} M  {:>6}\n",
             f.frame,
             1e3 * f.update_seconds,
             1e3 * f.top_level_seconds,
-            1e3 * f.summary.seconds,
-            rate(rays, f.summary.seconds) / 1e6,
+            1e3 * f.seconds,
+            rate(rays, f.seconds) / 1e6,
             f.instances_placed,
         ));
     }

@@ -1,5 +1,6 @@
-//! Sample points: a low-discrepancy sequence, rotated by a hash of the pixel, so that a picture is the same on every run and
-//! with any number of threads; and maps from the unit square to directions.
+//! Sample points: a low-discrepancy sequence, rotated by a hash of the pixel, so that a picture is
+//! the same on every run and with any number of threads; and maps from the unit square to
+//! directions.
 
 use bth_random::mix;
 use glam::{DVec2, DVec3};
@@ -15,9 +16,10 @@ impl Sampler {
         Self { pixel: mix((u64::from(y) << 32) | u64::from(x)) }
     }
 
-    /// Point `index` in the unit square of the sequence for one dimension pair, such as the lens or a bounce: the R2 sequence
-    /// of Roberts ("The unreasonable effectiveness of quasirandom sequences", 2018), with a Cranley-Patterson rotation that
-    /// decorrelates pixels and dimension pairs.
+    /// Point `index` in the unit square of the sequence for one dimension pair, such as the lens or
+    /// a bounce: the R2 sequence of Roberts ("The unreasonable effectiveness of quasirandom
+    /// sequences", 2018), with a Cranley-Patterson rotation that decorrelates pixels and dimension
+    /// pairs.
     pub(crate) fn point(&self, dimension: u64, index: u32) -> DVec2 {
         const STEP: DVec2 = DVec2::new(0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
         let shift = mix(self.pixel ^ mix(dimension + 1));
@@ -26,7 +28,8 @@ impl Sampler {
     }
 }
 
-/// A unit direction around the unit `normal`, with a density proportional to the cosine of the angle to it.
+/// A unit direction around the unit `normal`, with a density proportional to the cosine of the
+/// angle to it.
 pub(crate) fn cosine_hemisphere(normal: DVec3, point: DVec2) -> DVec3 {
     let (radius, angle) = (point.x.sqrt(), std::f64::consts::TAU * point.y);
     let (tangent, bitangent) = normal.any_orthonormal_pair();

@@ -3,7 +3,8 @@
 use bth::Scene;
 use glam::{DVec3, Vec3};
 
-/// Frames of an animated scene whose bounds are united: enough to follow motion, few enough to be quick.
+/// Frames of an animated scene whose bounds are united: enough to follow motion, few enough to be
+/// quick.
 const SAMPLED_FRAMES: i64 = 24;
 
 /// World bounds of everything that some frame shows.
@@ -11,13 +12,15 @@ const SAMPLED_FRAMES: i64 = 24;
 pub(crate) struct SceneBounds {
     pub(crate) lower: DVec3,
     pub(crate) upper: DVec3,
-    /// Points that a picture should show: the vertices of a model, or the corners of the bounds of instances.
+    /// Points that a picture should show: the vertices of a model, or the corners of the bounds of
+    /// instances.
     points: Vec<DVec3>,
 }
 
 impl SceneBounds {
-    /// The bounds of an animated scene, from frames spread evenly over `(first, last)`. They depend on the range of the
-    /// whole scene only, so that every part of it is rendered with the same camera.
+    /// The bounds of an animated scene, from frames spread evenly over `(first, last)`. They depend
+    /// on the range of the whole scene only, so that every part of it is rendered with the same
+    /// camera.
     pub(super) fn of_scene(scene: &mut Scene, (first, last): (i32, i32)) -> Self {
         let count = (i64::from(last) - i64::from(first) + 1).min(SAMPLED_FRAMES);
         let mut bounds =
@@ -60,7 +63,7 @@ impl SceneBounds {
         }
     }
 
-    /// Whether no frame shows anything.
+    /// Returns true if no frame shows anything.
     pub(crate) fn is_empty(&self) -> bool {
         self.points.is_empty()
     }
@@ -89,7 +92,7 @@ impl SceneBounds {
         &self.points
     }
 
-    /// Whether a point lies strictly inside the bounds.
+    /// Returns true if a point lies strictly inside the bounds.
     pub(super) fn contains(&self, point: DVec3) -> bool {
         (point.cmpgt(self.lower) & point.cmplt(self.upper)).all()
     }

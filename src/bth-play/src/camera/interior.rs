@@ -1,5 +1,5 @@
-//! A camera inside the model, for rooms: of a number of candidate eyes, the one that sees the most surface, farthest away
-//! and in most detail.
+//! A camera inside the model, for rooms: of a number of candidate eyes, the one that sees the most
+//! surface, farthest away and in most detail.
 
 use super::bounds::SceneBounds;
 use super::projection::{Camera, half_extent, up_vector};
@@ -36,7 +36,8 @@ pub(super) fn interior_camera(scene: &Scene, bounds: &SceneBounds, args: &Args) 
     Camera::look_along(eyes[best], forward, vertical, half_extent(args, INTERIOR_FOV) / args.zoom)
 }
 
-/// A point in the middle eight tenths of the bounds, in height between a quarter and six tenths, as of a standing person.
+/// A point in the middle eight tenths of the bounds, in height between a quarter and six tenths, as
+/// of a standing person.
 fn candidate(bounds: &SceneBounds, up: Axis, index: u32) -> DVec3 {
     let sampler = Sampler::new(0, 0);
     let flat = sampler.point(0, index) * 0.8 + 0.1;
@@ -73,8 +74,8 @@ fn detail<'a>(probes: impl Iterator<Item = &'a Probe>) -> f64 {
     triangles.len() as f64 / total
 }
 
-/// Product of mean distance and detail, reduced by the share of directions in which nothing is hit, and where the nearest
-/// twentieth of the hits is closer than a twentieth of the diagonal.
+/// Product of mean distance and detail, reduced by the share of directions in which nothing is hit,
+/// and where the nearest twentieth of the hits is closer than a twentieth of the diagonal.
 fn score(probes: &[Probe], diagonal: f64) -> f64 {
     let mut hit: Vec<f64> = probes.iter().map(|s| s.distance).filter(|t| t.is_finite()).collect();
     if hit.is_empty() {
@@ -87,7 +88,8 @@ fn score(probes: &[Probe], diagonal: f64) -> f64 {
     share.powi(4) * mean * close * (0.1 + detail(probes.iter()))
 }
 
-/// The direction, slightly below the horizon, whose cone of view has the greatest product of mean distance and detail.
+/// The direction, slightly below the horizon, whose cone of view has the largest product of mean
+/// distance and detail.
 fn best_direction(probes: &[Probe], vertical: DVec3, diagonal: f64) -> DVec3 {
     let (side, front) = vertical.any_orthonormal_pair();
     let value = |forward: DVec3| {

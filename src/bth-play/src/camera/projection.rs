@@ -12,7 +12,8 @@ pub(crate) struct Camera {
     pub(crate) right: DVec3,
     pub(crate) up: DVec3,
     pub(crate) forward: DVec3,
-    /// Half the width and height of the picture: at distance 1 of a pinhole camera, in world units of an orthographic one.
+    /// Half the width and height of the picture: at distance 1 of a pinhole camera, in world units
+    /// of an orthographic one.
     pub(crate) half_extent: DVec2,
     pub(super) projection: Projection,
     /// Distance along `forward` of the near plane.
@@ -36,7 +37,7 @@ pub(crate) struct CameraRay {
     pub(crate) origin: DVec3,
     /// Unit length.
     pub(crate) direction: DVec3,
-    /// Least and greatest t.
+    /// Smallest and largest t.
     range: (f64, f64),
 }
 
@@ -57,19 +58,12 @@ impl Camera {
     pub(crate) fn look_along(eye: DVec3, forward: DVec3, vertical: DVec3, half_extent: DVec2) -> Self {
         let forward = forward.normalize();
         let side = forward.cross(vertical);
-        // Straight up or down every perpendicular direction can be `right`. Both vectors are unit, so the bound is relative.
+        // Straight up or down every perpendicular direction can be `right`. Both vectors are unit,
+        // so the bound is relative.
         let right = if side.length() > 1e-9 { side.normalize() } else { forward.any_orthonormal_vector() };
         let up = right.cross(forward);
-        Self {
-            eye,
-            right,
-            up,
-            forward,
-            half_extent,
-            projection: Projection::Perspective,
-            near: 0.0,
-            far: f64::INFINITY,
-        }
+        let (projection, near, far) = (Projection::Perspective, 0.0, f64::INFINITY);
+        Self { eye, right, up, forward, half_extent, projection, near, far }
     }
 
     /// The camera with the same lens at another place.
@@ -92,7 +86,8 @@ impl Camera {
         }
     }
 
-    /// Scales what an orthographic camera shows; a pinhole camera zooms by moving and stays as it is.
+    /// Scales what an orthographic camera shows; a pinhole camera zooms by moving and stays as it
+    /// is.
     pub(crate) fn zoomed(self, factor: f64) -> Self {
         match self.projection {
             Projection::Perspective => self,
@@ -100,7 +95,8 @@ impl Camera {
         }
     }
 
-    /// The ray through a point of the picture: (-1, -1) is the lower left corner, (1, 1) the upper right.
+    /// The ray through a point of the picture: (-1, -1) is the lower left corner, (1, 1) the upper
+    /// right.
     pub(crate) fn ray(&self, at: DVec2) -> CameraRay {
         let at = at * self.half_extent;
         let shift = self.right * at.x + self.up * at.y;
@@ -115,15 +111,21 @@ impl Camera {
     }
 }
 
-/// The unit vector that points up.
-pub(crate) fn up_vector(axis: Axis) -> DVec3 {
+/// Returns the unit vectors to the front of a model and up.
+pub(crate) fn front_and_up(axis: Axis) -> [DVec3; 2] {
     match axis {
-        Axis::Y => DVec3::Y,
-        Axis::Z => DVec3::Z,
+        Axis::Y => [DVec3::Z, DVec3::Y],
+        Axis::Z => [DVec3::NEG_Y, DVec3::Z],
     }
 }
 
-/// Half the width and height of the picture at distance 1, for the vertical field of view of the options, in degrees.
+/// Returns the unit vector that points up.
+pub(crate) fn up_vector(axis: Axis) -> DVec3 {
+    front_and_up(axis)[1]
+}
+
+/// Half the width and height of the picture at distance 1, for the vertical field of view of the
+/// options, in degrees.
 pub(super) fn half_extent(args: &Args, default_fov: f64) -> DVec2 {
     let half = (args.fov.unwrap_or(default_fov) / 2.0).to_radians().tan();
     DVec2::new(half * f64::from(args.size.0) / f64::from(args.size.1), half)

@@ -1,11 +1,11 @@
 //! What all frames of a sequence share: the bounds of the scene and the choice of the camera.
 
 use super::bounds::SceneBounds;
-use super::exterior::exterior_camera;
 use super::interior::interior_camera;
-use super::projection::Camera;
-use super::scene_camera::scene_camera;
-use crate::args::{Args, Axis, Mode, View};
+use super::placement::exterior_camera;
+use super::placement::scene_camera;
+use super::projection::{Camera, front_and_up};
+use crate::args::{Args, Mode, View};
 use crate::environment::Environment;
 use crate::failure::Failure;
 use crate::materials::SceneMaterials;
@@ -31,7 +31,7 @@ enum CameraSource {
 pub(crate) struct SceneSetup {
     pub(crate) bounds: SceneBounds,
     source: CameraSource,
-    /// Whether the camera is inside a room.
+    /// True if the camera is inside a room.
     pub(crate) interior: bool,
     /// Materials, for modes that show them.
     pub(crate) materials: Arc<SceneMaterials>,
@@ -43,7 +43,8 @@ impl SceneSetup {
     /// Chooses bounds and camera for the frames of `range`; the scene is left at the first of them.
     ///
     /// # Errors
-    /// If the file has nothing to show, has no camera of the wanted name, or its first frame cannot be set.
+    /// If the file has nothing to show, has no camera of the wanted name, or its first frame cannot
+    /// be set.
     pub(crate) fn new(
         scene: &mut Scene,
         file: &Path,
@@ -70,7 +71,8 @@ impl SceneSetup {
         let (materials, environment) = (Arc::new(materials), environment.map(Arc::new));
         let mut setup = SceneSetup { bounds, source, interior: false, materials, environment };
         let eye = setup.camera(scene, args).eye;
-        // The floor of a scene may extend far beyond its objects, so being within the bounds does not make a room.
+        // The floor of a scene may extend far beyond its objects, so being within the bounds does
+        // not make a room.
         setup.interior = args.inside || setup.bounds.contains(eye) && (!is_scene || is_enclosed(scene, eye));
         Ok(setup)
     }
@@ -83,7 +85,7 @@ impl SceneSetup {
         }
     }
 
-    /// Whether the camera of the scene that is used has no field of view.
+    /// Returns true if the camera of the scene that is used has no field of view.
     pub(crate) fn is_orthographic(&self, scene: &Scene) -> bool {
         let lens = |row: u32| scene.description().map(|view| view.cameras[row as usize].projection == 1);
         self.scene_camera_row().and_then(lens).unwrap_or(false)
@@ -103,10 +105,7 @@ fn read_environment(path: &Path, args: &Args) -> Result<Environment, Failure> {
     if !args.window && args.mode != Mode::Path {
         return Err(Failure::Usage(format!("--env is for --mode path, found --mode {}", args.mode.name())));
     }
-    let (front, vertical) = match args.up {
-        Axis::Y => (DVec3::Z, DVec3::Y),
-        Axis::Z => (DVec3::NEG_Y, DVec3::Z),
-    };
+    let [front, vertical] = front_and_up(args.up);
     Environment::read(path, front, vertical)
 }
 
@@ -138,15 +137,11 @@ fn chosen_scene_camera(scene: &Scene, file: &Path, args: &Args) -> Result<Option
     }
 }
 
-/// Whether rays in more than nine tenths of all directions hit something, as between walls and a ceiling.
+/// Returns true if rays in more than nine tenths of all directions hit something, as between walls
+/// and a ceiling.
 fn is_enclosed(scene: &Scene, eye: DVec3) -> bool {
     const DIRECTIONS: u32 = 256;
-    let ray = |d: DVec3| Ray {
-        origin: eye.as_vec3().to_array(),
-        tmin: 0.0,
-        direction: d.as_vec3().to_array(),
-        tmax: f32::INFINITY,
-    };
+    let ray = |d: DVec3| Ray::new(eye.as_vec3().to_array(), d.as_vec3().to_array());
     let rays: Vec<Ray> = fibonacci_sphere(DIRECTIONS).map(ray).collect();
     let mut blocked = vec![false; rays.len()];
     scene.batch(&rays).any(&mut blocked);

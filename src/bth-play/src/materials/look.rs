@@ -1,28 +1,33 @@
-//! How the surface at a hit looks: base colour, alpha and emission, from factors, textures and vertex colours.
+//! How the surface at a hit looks: base colour, alpha and emission, from factors, textures and
+//! vertex colours.
 
-use super::texels::Texels;
+use super::texels::{Texels, decode};
+use crate::messages::warn;
 use bth::rays::Hit;
 use bth::{Alpha, Material, Scene, Wrap};
 use bth_format::object::ObjectView;
 use glam::{Vec3, Vec4};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 
 /// The materials of all objects.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SceneMaterials {
     pub(super) objects: Vec<ObjectMaterials>,
-    /// Whether no object has any material or vertex colour.
+    /// True if no object has any material or vertex colour.
     pub(super) is_empty: bool,
-    /// Whether some material lets rays pass by its alpha.
+    /// True if some material lets rays pass by its alpha.
     pub(super) has_alpha: bool,
-    /// Whether some material is seen from the front only.
+    /// True if some material is seen from the front only.
     pub(super) has_single_sided: bool,
 }
 
 /// The materials of an object.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ObjectMaterials {
-    /// `None` for materials of which no more than the name is known.
+    /// `None` for materials with nothing but a name.
     pub(super) materials: Vec<Option<Material>>,
     /// `None` for textures whose image cannot be decoded.
     pub(super) textures: Vec<Option<LoadedTexture>>,
@@ -46,7 +51,7 @@ pub(crate) struct Look {
     pub(crate) base_color: Vec3,
     /// Radiance that it emits.
     pub(crate) emissive: Vec3,
-    /// Whether the base colour is shown as it is, without light.
+    /// True if the base colour is shown as it is, without light.
     pub(crate) unlit: bool,
 }
 
@@ -80,12 +85,13 @@ const WHITE: Material = Material {
 };
 
 impl SceneMaterials {
-    /// Whether nothing has a material or a vertex colour.
+    /// Returns true if nothing has a material or a vertex colour.
     pub(crate) fn is_empty(&self) -> bool {
         self.is_empty
     }
 
-    /// Whether rays may pass where a surface is hit: by alpha, and those of the camera at the backs of surfaces.
+    /// Returns true if rays may pass where a surface is hit: by alpha, and rays of the camera from
+    /// the back.
     pub(crate) fn lets_pass(&self, camera: bool) -> bool {
         self.has_alpha || camera && self.has_single_sided
     }
@@ -128,5 +134,68 @@ impl SceneMaterials {
             _ => emissive,
         };
         Some(Look { base_color, emissive, unlit: material.unlit })
+    }
+}
+
+impl SceneMaterials {
+    /// The materials of all objects of a scene. An image that cannot be decoded is left out with a
+    /// warning.
+    pub(crate) fn load(scene: &Scene, file: &Path) -> Self {
+        let images = decoded_images(scene, file);
+        let objects: Vec<ObjectMaterials> =
+            (0..scene.object_count()).map(|object| object_materials(scene, object, &images)).collect();
+        let all = || objects.iter().flat_map(|object| &object.materials).flatten();
+        let has = |holds: fn(&Material) -> bool| all().any(holds);
+        Self {
+            is_empty: objects.iter().all(ObjectMaterials::is_empty),
+            has_alpha: has(|material| material.alpha != Alpha::Opaque),
+            has_single_sided: has(|material| !material.double_sided),
+            objects,
+        }
+    }
+}
+
+/// The images of all textures, by their indices, decoded in parallel.
+fn decoded_images(scene: &Scene, file: &Path) -> BTreeMap<u32, Arc<Texels>> {
+    let mut files: BTreeMap<u32, &[u8]> = BTreeMap::new();
+    for object in 0..scene.object_count() {
+        for texture in (0..scene.texture_count(object)).filter_map(|row| scene.texture(object, row)) {
+            files.insert(texture.image, texture.bytes);
+        }
+    }
+    let files: Vec<(u32, &[u8])> = files.into_iter().collect();
+    let decoded: Vec<_> = files.par_iter().map(|(image, bytes)| (*image, decode(bytes))).collect();
+    let mut images = BTreeMap::new();
+    for (image, decoded) in decoded {
+        match decoded {
+            Ok(texels) => {
+                images.insert(image, Arc::new(texels));
+            }
+            Err(what) => warn(&format!(
+                "{}: image {image}: BTH-P005: it cannot be decoded and is left out: {what} (hint: save it again as PNG, or use \
+                 --mode clay)",
+                file.display()
+            )),
+        }
+    }
+    images
+}
+
+fn object_materials(scene: &Scene, object: u32, images: &BTreeMap<u32, Arc<Texels>>) -> ObjectMaterials {
+    let texture = |row: u32| {
+        let texture = scene.texture(object, row)?;
+        Some(LoadedTexture {
+            texels: images.get(&texture.image)?.clone(),
+            wrap: texture.wrap,
+            nearest: texture.nearest,
+            uv_set: texture.uv_set,
+            transform: texture.transform,
+        })
+    };
+    let (file, row) = scene.file_of(object);
+    ObjectMaterials {
+        materials: (0..scene.material_count(object)).map(|row| scene.material(object, row)).collect(),
+        textures: (0..scene.texture_count(object)).map(texture).collect(),
+        has_colors: !file.materials(row).colors.is_empty(),
     }
 }

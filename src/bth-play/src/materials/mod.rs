@@ -1,7 +1,5 @@
 //! Materials of the scene: textures decoded, and how the surface at a hit looks.
 
-mod decode;
-mod load;
 mod look;
 mod texels;
 

@@ -1,15 +1,9 @@
 //! Pictures and where they go: tone mapping, the color bar, PNG files, animations and streams.
 
 mod animation;
-mod color_bar;
-mod color_map;
-mod numbered;
+mod heat_map;
 mod picture;
 mod sink;
-mod tone_mapping;
-mod y4m;
 
-pub(crate) use numbered::Pattern;
-pub(crate) use picture::Picture;
-pub(crate) use sink::{Sink, refuse_inputs};
-pub(crate) use tone_mapping::{shoulder, to_picture};
+pub(crate) use picture::{Picture, shoulder, to_picture};
+pub(crate) use sink::{Pattern, Sink, refuse_inputs};

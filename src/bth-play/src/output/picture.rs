@@ -1,7 +1,10 @@
-//! The finished picture and its PNG file.
+//! The finished picture: tone mapping of mean colours, and its PNG file.
 
+use super::heat_map;
+use crate::args::{Args, Mode};
 use crate::failure::Failure;
 use crate::interrupt::Part;
+use glam::Vec3;
 use std::io::Write;
 use std::path::Path;
 
@@ -63,7 +66,7 @@ pub(super) fn set_format<W: Write>(encoder: &mut png::Encoder<'_, W>) {
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
 }
 
-/// Whether a file is a complete PNG file of this size.
+/// Returns true if a file is a complete PNG file of this size.
 pub(super) fn is_complete(path: &Path, (width, height): (u32, u32)) -> bool {
     let Ok(bytes) = std::fs::read(path) else { return false };
     let end = [0, 0, 0, 0, b'I', b'E', b'N', b'D', 0xae, 0x42, 0x60, 0x82];
@@ -88,7 +91,8 @@ pub(super) fn create_folder(path: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder).map_err(|e| Failure::file(folder, &e))
 }
 
-/// As [`create_folder`]; also fails if no file can be written there: before hours of rendering, not after them.
+/// The same as [`create_folder`]; also fails if no file can be written there: before hours of
+/// rendering, not after them.
 ///
 /// # Errors
 /// `BTH-P002` if it cannot be written.
@@ -103,14 +107,16 @@ fn temporary_in(path: &Path) -> Result<tempfile::NamedTempFile, Failure> {
     builder.prefix(".bth-play-").suffix(".tmp");
     #[cfg(unix)]
     {
-        // The permissions of any new file, which the umask reduces; temporary files get fewer by default.
+        // The permissions of any new file, which the umask reduces; temporary files get fewer by
+        // default.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
     builder.tempfile_in(folder_of(path)).map_err(|e| cannot_write(path, &e))
 }
 
-/// The message has the kind alone where the system gives no number: errors of temporary files name these.
+/// The message has the kind alone where the system gives no number: errors of temporary files name
+/// these.
 fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
     let reason = match error.raw_os_error() {
         Some(number) => std::io::Error::from_raw_os_error(number).to_string(),
@@ -130,4 +136,48 @@ pub(super) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), Failure>
     file.write_all(bytes).map_err(|e| cannot_write(path, &e))?;
     file.persist(path).map_err(|e| cannot_write(path, &e.error))?;
     Ok(())
+}
+
+/// Compresses linear values above 0.6 towards 1 instead of clipping them.
+pub(crate) fn shoulder(color: Vec3) -> Vec3 {
+    let compressed = |c: f32| if c <= 0.6 { c } else { 0.6 + 0.4 * (1.0 - (-(c - 0.6) / 0.4).exp()) };
+    Vec3::new(compressed(color.x), compressed(color.y), compressed(color.z))
+}
+
+/// The extended operator of Reinhard et al. ("Photographic Tone Reproduction for Digital Images",
+/// 2002, equation 4), which maps 4 to white. It is for mean colours: the curve is concave, so that
+/// means of compressed samples would be the darker the more these differ.
+fn reinhard(color: Vec3) -> Vec3 {
+    color * (Vec3::ONE + color / 16.0) / (Vec3::ONE + color)
+}
+
+/// The picture of the mean colours of the pixels, in rows from the top.
+pub(crate) fn to_picture(colors: &[Vec3], args: &Args) -> Picture {
+    let (width, height) = args.size;
+    let maximum = match args.mode {
+        Mode::Steps => args.scale.unwrap_or_else(|| upper_end(colors)),
+        _ => 0,
+    };
+    let display = |color: &Vec3| match args.mode {
+        Mode::Shaded | Mode::Ao | Mode::Instances | Mode::Clay => color.to_array().map(srgb),
+        Mode::Path => reinhard(*color).to_array().map(srgb),
+        Mode::Normals => color.to_array(),
+        Mode::Steps => heat_map::color(color.x / maximum as f32),
+    };
+    let pixels = colors.iter().map(|color| quantized(display(color))).collect();
+    let mut picture = Picture { width, height, pixels };
+    if args.mode == Mode::Steps {
+        heat_map::draw_bar(&mut picture, maximum);
+    }
+    picture
+}
+
+/// The upper end of the heat map: the 99.8th percentile, so that single pixels do not darken the
+/// rest, rounded up to a multiple of 4 so that the numbers next to the color bar are whole.
+fn upper_end(colors: &[Vec3]) -> u32 {
+    let mut values: Vec<f32> = colors.iter().map(|c| c.x).collect();
+    let Some(last) = values.len().checked_sub(1) else { return 4 };
+    let rank = last - last / 500;
+    let (_, value, _) = values.select_nth_unstable_by(rank, f32::total_cmp);
+    (value.ceil() as u32).max(1).next_multiple_of(4)
 }

@@ -1,15 +1,44 @@
 //! Where pictures go: one file, numbered files, an animation, or a stream.
 
-use super::animation::Animation;
-use super::numbered::Pattern;
+use super::animation::{Animation, Y4mEncoder};
 use super::picture::{self, Picture};
-use super::y4m;
 use crate::failure::Failure;
 use std::collections::HashSet;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Fails if one of these files that are to be written is one that is read, whatever the paths are spelled like.
+/// A path in which the number of the frame is to be inserted.
+pub(crate) struct Pattern {
+    before: String,
+    digits: usize,
+    after: String,
+}
+
+impl Pattern {
+    /// The pattern of a path: its last run of `#` stands for the number, padded with zeros to as
+    /// many digits. `None` for a path without `#`, and for one in a folder that is there and has
+    /// them in its name.
+    pub(crate) fn new(path: &Path) -> Option<Self> {
+        let text = path.to_str()?;
+        let end = text.rfind('#')? + 1;
+        let is_in_name = path.file_name()?.to_str()?.contains('#');
+        if !is_in_name && path.parent().is_some_and(Path::is_dir) {
+            return None;
+        }
+        let start = text[..end].trim_end_matches('#').len();
+        Some(Self { before: text[..start].to_owned(), digits: end - start, after: text[end..].to_owned() })
+    }
+
+    /// The path of a frame.
+    pub(super) fn path(&self, frame: i32) -> PathBuf {
+        let sign = if frame < 0 { "-" } else { "" };
+        let number = format!("{sign}{:0width$}", frame.unsigned_abs(), width = self.digits);
+        PathBuf::from(format!("{}{number}{}", self.before, self.after))
+    }
+}
+
+/// Fails if one of these files that are to be written is one that is read, whatever the paths are
+/// spelled like.
 ///
 /// # Errors
 /// Wrong usage (exit code 2).
@@ -35,18 +64,19 @@ pub(crate) enum Sink {
     /// An animation, which is written after the last frame.
     Animation(Animation),
     /// YUV4MPEG2 on standard output.
-    Stream(y4m::Y4mEncoder<BufWriter<std::io::Stdout>>),
+    Stream(Y4mEncoder<BufWriter<std::io::Stdout>>),
 }
 
 impl Sink {
-    /// The sink that the output option describes, for a number of frames at a rate in frames per second.
+    /// The sink that the output option describes, for a number of frames at a rate in frames per
+    /// second.
     ///
     /// # Errors
     /// If the extension names no format, or one that cannot hold these pictures.
     pub(crate) fn new(output: &Path, size: (u32, u32), frames: usize, rate: f64) -> Result<Self, Failure> {
         if output == Path::new("-") {
             let out = BufWriter::with_capacity(1 << 20, std::io::stdout());
-            return Ok(Sink::Stream(y4m::Y4mEncoder::new(out, size, rate)?));
+            return Ok(Sink::Stream(Y4mEncoder::new(out, size, rate)?));
         }
         if let Some(animation) = Animation::new(output, size, frames, rate)? {
             return Ok(Sink::Animation(animation));
@@ -77,7 +107,8 @@ impl Sink {
         }
     }
 
-    /// Fails if the files of these frames cannot be written, or would replace one of the files that are read.
+    /// Fails if the files of these frames cannot be written, or would replace one of the files that
+    /// are read.
     ///
     /// # Errors
     /// `BTH-P002` and wrong usage (exit code 2).
@@ -87,17 +118,18 @@ impl Sink {
         files.first().map_or(Ok(()), |file| picture::prepare_folder(file))
     }
 
-    /// Whether the pictures go to standard output.
+    /// Returns true if the pictures go to standard output.
     pub(crate) fn takes_stdout(&self) -> bool {
         matches!(self, Sink::Stream(_))
     }
 
-    /// Whether each frame is a file of its own, so that frames can be skipped or rendered on several machines.
+    /// Returns true if each frame is a file of its own, so that frames can be skipped or rendered
+    /// on several machines.
     pub(crate) fn is_numbered(&self) -> bool {
         matches!(self, Sink::Numbered(_))
     }
 
-    /// Whether the picture of a frame exists already, complete and of this size.
+    /// Returns true if the picture of a frame exists already, complete and of this size.
     pub(crate) fn has(&self, frame: i32, size: (u32, u32)) -> bool {
         matches!(self, Sink::Numbered(pattern) if picture::is_complete(&pattern.path(frame), size))
     }
@@ -124,5 +156,29 @@ impl Sink {
             Sink::Animation(animation) => animation.finish(),
             Sink::Stream(encoder) => Ok(encoder.finish()?.flush()?),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_replace_the_last_run_of_number_signs() {
+        let path = |text: &str, frame| Pattern::new(Path::new(text)).map(|p| p.path(frame));
+        assert_eq!(path("a#/b####.png", 7), Some("a#/b0007.png".into()));
+        assert_eq!(path("####.png", 12345), Some("12345.png".into()));
+        assert_eq!(path("x##.png", -3), Some("x-03.png".into()));
+        assert_eq!(path("x.png", 0), None);
+        assert_eq!(path("a#/x.png", 7), Some("a7/x.png".into()));
+    }
+
+    #[test]
+    fn a_folder_that_is_there_is_not_numbered() {
+        let folder = tempfile::tempdir().unwrap();
+        let there = folder.path().join("c#");
+        std::fs::create_dir(&there).unwrap();
+        assert!(Pattern::new(&there.join("x.png")).is_none());
+        assert_eq!(Pattern::new(&there.join("#.png")).unwrap().path(3), there.join("3.png"));
     }
 }

@@ -1,26 +1,41 @@
-//! One frame: its exposures one after the other, the tiles of each in parallel.
+//! One frame: its exposures one after the other, the tiles of each in parallel. Tiles are squares
+//! of pixels that are rendered together, so that their rays are traced in coherent batches.
 
-use super::progress::Progress;
+use super::sequence::Progress;
 use super::shutter::{Exposure, Shutter};
-use super::tile::{Tile, pixel_count, render_tile, tile_count};
 use crate::args::{Args, Mode};
 use crate::camera::SceneSetup;
 use crate::failure::Failure;
 use crate::output::{Picture, to_picture};
-use crate::shading::{Counters, FrameContext, Shader, Steps};
+use crate::shading::{Counters, FrameContext, Sample, Shader};
 use bth::Scene;
 use glam::Vec3;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-/// Time and rays of a frame.
+/// Time and work of a frame: the sums over the times at which the scene is sampled.
 #[derive(Clone, Debug, Default, Serialize)]
-pub(crate) struct Summary {
-    /// Wall clock of the rendering, without opening the file, setting the time and writing the picture.
+pub(crate) struct FrameReport {
+    /// Number of the frame.
+    pub(crate) frame: i32,
+    /// Times at which the scene is sampled: 1 without a shutter.
+    pub(crate) times: usize,
+    /// Time to evaluate tracks, hierarchy and instances, without the top level.
+    pub(crate) update_seconds: f64,
+    /// Time to build or refit the top level.
+    pub(crate) top_level_seconds: f64,
+    /// Nodes that moved.
+    pub(crate) nodes_moved: usize,
+    /// Instances whose transforms changed.
+    pub(crate) instances_placed: usize,
+    /// Instances that are visible, at the last of the times.
+    pub(crate) instances_visible: usize,
+    /// Wall clock of the rendering, without opening the file, setting the time and writing the
+    /// picture.
     pub(crate) seconds: f64,
-    /// Camera rays and those of bounces.
+    /// Rays of the camera and of bounces.
     pub(crate) nearest_rays: u64,
     /// Shadow and occlusion rays.
     pub(crate) any_rays: u64,
@@ -28,16 +43,13 @@ pub(crate) struct Summary {
     pub(crate) steps: Option<Steps>,
 }
 
-/// Work of setting the scene to the times of a frame: one without a shutter.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Updates {
-    /// Without the top level.
-    pub(crate) time: Duration,
-    pub(crate) top_level: Duration,
-    pub(crate) nodes: usize,
-    pub(crate) placed: usize,
-    /// At the last of the times.
-    pub(crate) visible: usize,
+/// Traversal steps of camera rays.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub(crate) struct Steps {
+    pub(crate) nodes: f64,
+    pub(crate) leaves: f64,
+    pub(crate) triangles: f64,
+    pub(crate) tets: f64,
 }
 
 /// What all frames of a sequence are rendered with.
@@ -56,21 +68,19 @@ impl FrameRenderer<'_> {
     ///
     /// # Errors
     /// If a time cannot be set, or the file lacks what the mode needs.
-    pub(super) fn render(
-        &self,
-        scene: &mut Scene,
-        number: i32,
-    ) -> Result<(Picture, Summary, Updates), Failure> {
-        let mut sums = vec![Vec3::ZERO; pixel_count(self.args.size)];
-        let (mut total, mut updates, mut seconds) = (Counters::default(), Updates::default(), 0.0);
+    pub(super) fn render(&self, scene: &mut Scene, number: i32) -> Result<(Picture, FrameReport), Failure> {
+        let pixels = pixel_count(self.args.size);
+        let (mut sums, mut total) = (vec![Vec3::ZERO; pixels], Counters::default());
+        let mut report = FrameReport { frame: number, ..FrameReport::default() };
         for exposure in self.shutter.exposures() {
             let start = Instant::now();
             let update = scene.set_seconds((f64::from(number) + exposure.offset) / self.rate)?;
-            updates.time += start.elapsed().saturating_sub(update.top_level);
-            updates.top_level += update.top_level;
-            updates.nodes += update.nodes;
-            updates.placed += update.placed;
-            updates.visible = update.visible;
+            report.times += 1;
+            report.update_seconds += start.elapsed().saturating_sub(update.top_level).as_secs_f64();
+            report.top_level_seconds += update.top_level.as_secs_f64();
+            report.nodes_moved += update.nodes;
+            report.instances_placed += update.placed;
+            report.instances_visible = update.visible;
             let camera = self.setup.camera(scene, self.args);
             let frame = FrameContext::new(scene, self.file, self.setup, camera, self.args)?;
             let start = Instant::now();
@@ -78,10 +88,15 @@ impl FrameRenderer<'_> {
                 tile.write_to(&mut sums, self.args.size.0, |sum, color| *sum += color);
                 total += tile.counters;
             }
-            seconds += start.elapsed().as_secs_f64();
+            report.seconds += start.elapsed().as_secs_f64();
         }
+        let camera_rays = pixels as u64 * u64::from(self.args.spp);
+        report.nearest_rays = camera_rays + total.nearest_rays;
+        report.any_rays = total.any_rays;
+        let [nodes, leaves, triangles, tets] = (total.steps / camera_rays as f64).to_array();
+        report.steps = (self.args.mode == Mode::Steps).then_some(Steps { nodes, leaves, triangles, tets });
         let means: Vec<Vec3> = sums.into_iter().map(|sum| sum / self.args.spp as f32).collect();
-        Ok((to_picture(&means, self.args), summary(self.args, &total, seconds), updates))
+        Ok((to_picture(&means, self.args), report))
     }
 
     /// All tiles at the time to which the scene is set.
@@ -96,15 +111,66 @@ impl FrameRenderer<'_> {
     }
 }
 
-fn summary(args: &Args, total: &Counters, seconds: f64) -> Summary {
-    let camera_rays = pixel_count(args.size) as u64 * u64::from(args.spp);
-    let mean = |sum: f64| sum / camera_rays as f64;
-    let steps = (args.mode == Mode::Steps).then(|| Steps {
-        nodes: mean(total.steps.nodes),
-        leaves: mean(total.steps.leaves),
-        triangles: mean(total.steps.triangles),
-        tets: mean(total.steps.tets),
-    });
-    let nearest_rays = camera_rays + total.nearest_rays;
-    Summary { seconds, nearest_rays, any_rays: total.any_rays, steps }
+/// Pixels along the side of a tile.
+const TILE: u32 = 16;
+
+/// A rendered part of the picture.
+#[derive(Default)]
+pub(crate) struct Tile {
+    pixels: Vec<(u32, u32)>,
+    /// Sums of the samples of each pixel.
+    sums: Vec<Vec3>,
+    pub(super) counters: Counters,
+}
+
+/// Renders the samples of the tile of a number that are taken at the time of an exposure, to which
+/// the scene is set. If pixels get no more than one sample (`--spp 1`), its rays go through their
+/// middles.
+pub(crate) fn render_tile(
+    frame: &FrameContext<'_>,
+    number: u32,
+    exposure: &Exposure,
+    shader: &Shader<'_>,
+) -> Tile {
+    let columns = frame.args.size.0.div_ceil(TILE);
+    let mut pixels = pixels(frame.args.size, number % columns * TILE, number / columns * TILE);
+    pixels.retain(|pixel| exposure.takes(*pixel));
+    let mut tile = Tile { sums: vec![Vec3::ZERO; pixels.len()], pixels, ..Tile::default() };
+    let centered = frame.args.spp == 1;
+    for index in exposure.samples.clone() {
+        let samples: Vec<Sample> =
+            tile.pixels.iter().map(|&pixel| frame.sample(pixel, index, centered)).collect();
+        let colors = shader.shade(frame, &samples, &mut tile.counters);
+        tile.sums.iter_mut().zip(colors).for_each(|(sum, color)| *sum += color);
+    }
+    tile
+}
+
+/// Pixels of a tile in Morton order, so that successive camera rays are close to each other.
+fn pixels((width, height): (u32, u32), left: u32, top: u32) -> Vec<(u32, u32)> {
+    let even_bits = |n: u32| (0..4).fold(0, |sum, bit| sum | (n >> (2 * bit) & 1) << bit);
+    (0..TILE * TILE)
+        .map(|i| (left + even_bits(i), top + even_bits(i >> 1)))
+        .filter(|&(x, y)| x < width && y < height)
+        .collect()
+}
+
+impl Tile {
+    /// Calls `update` with each pixel of a picture, in rows of `width` from the top, and the sum of
+    /// its samples in the tile.
+    pub(crate) fn write_to(&self, picture: &mut [Vec3], width: u32, update: impl Fn(&mut Vec3, Vec3)) {
+        for (&(x, y), &sum) in self.pixels.iter().zip(&self.sums) {
+            update(&mut picture[y as usize * width as usize + x as usize], sum);
+        }
+    }
+}
+
+/// Tiles of a picture.
+pub(crate) fn tile_count((width, height): (u32, u32)) -> u32 {
+    width.div_ceil(TILE) * height.div_ceil(TILE)
+}
+
+/// Pixels of a picture.
+pub(crate) fn pixel_count((width, height): (u32, u32)) -> usize {
+    width as usize * height as usize
 }

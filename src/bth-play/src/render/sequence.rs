@@ -1,54 +1,17 @@
-//! A sequence of frames: which ones are rendered, one after another, and the time that each took.
+//! A sequence of frames: which ones are rendered, one after another, with progress on a terminal,
+//! and the time that each took.
 
-use super::frame::{FrameRenderer, Summary, Updates};
-use super::progress::Progress;
+use super::frame::{FrameRenderer, FrameReport, tile_count};
 use super::shutter::Shutter;
-use super::warnings;
-use crate::args::Args;
+use crate::args::{Args, Mode};
 use crate::camera::SceneSetup;
 use crate::failure::Failure;
 use crate::messages::warn;
 use crate::output::{Pattern, Sink};
 use bth::Scene;
-use serde::Serialize;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
-
-/// Time and work of a frame.
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct FrameReport {
-    /// Number of the frame.
-    pub(crate) frame: i32,
-    /// Times at which the scene is sampled: 1 without a shutter. What follows is the sum over all of them.
-    pub(crate) times: usize,
-    /// Time to evaluate tracks, hierarchy and instances, without the top level.
-    pub(crate) update_seconds: f64,
-    /// Time to build or refit the top level.
-    pub(crate) top_level_seconds: f64,
-    /// Nodes that moved.
-    pub(crate) nodes_moved: usize,
-    /// Instances whose transforms changed.
-    pub(crate) instances_placed: usize,
-    /// Instances that are visible, at the last of the times.
-    pub(crate) instances_visible: usize,
-    /// Time and rays of the rendering.
-    #[serde(flatten)]
-    pub(crate) summary: Summary,
-}
-
-impl FrameReport {
-    fn new(frame: i32, times: usize, updates: &Updates, summary: Summary) -> Self {
-        Self {
-            frame,
-            times,
-            update_seconds: updates.time.as_secs_f64(),
-            top_level_seconds: updates.top_level.as_secs_f64(),
-            nodes_moved: updates.nodes,
-            instances_placed: updates.placed,
-            instances_visible: updates.visible,
-            summary,
-        }
-    }
-}
 
 /// Time and work of all frames.
 #[derive(Clone, Debug, Default)]
@@ -58,7 +21,8 @@ pub(crate) struct Report {
     pub(crate) skipped: usize,
 }
 
-/// The first and last frame of a file and its frames per second; frame 0 alone for files without a scene.
+/// The first and last frame of a file and its frames per second; frame 0 alone for files without a
+/// scene.
 pub(crate) fn frame_range(scene: &Scene) -> ((i32, i32), f64) {
     scene.description().map_or(((0, 0), 24.0), |view| {
         let scene = &view.scene[0];
@@ -66,7 +30,8 @@ pub(crate) fn frame_range(scene: &Scene) -> ((i32, i32), f64) {
     })
 }
 
-/// The shutter of the options. In a file where nothing can move it makes no difference, so that one time is enough.
+/// The shutter of the options. In a file where nothing can move it makes no difference, so that one
+/// time is enough.
 pub(crate) fn shutter(scene: &Scene, args: &Args) -> Shutter {
     Shutter::new(args.shutter.filter(|_| scene.description().is_some()), args.spp)
 }
@@ -104,11 +69,12 @@ fn is_one_picture(output: &Path) -> bool {
     output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) && Pattern::new(output).is_none()
 }
 
-/// Renders the frames that the options choose; `inputs` are the files that no picture may replace. The second value tells whether the pictures went to standard output, so that
-/// the report must not.
+/// Renders the frames that the options choose; `inputs` are the files that no picture may replace.
+/// The second value is true if the pictures went to standard output, so that the report must not.
 ///
 /// # Errors
-/// If the options do not fit the file or the output, the file lacks what the mode needs, or a picture cannot be written.
+/// If the options do not fit the file or the output, the file lacks what the mode needs, or a
+/// picture cannot be written.
 pub(crate) fn render_sequence(
     scene: &mut Scene,
     file: &Path,
@@ -141,7 +107,7 @@ pub(crate) fn render_sequence(
     report.skipped = before - frames.len();
     // Made also where no frame is left, since it checks the options.
     let setup = SceneSetup::new(scene, file, args, whole)?;
-    warnings::of(scene, args, &setup).iter().for_each(|text| warn(&format!("{}: {text}", file.display())));
+    warnings(scene, args, &setup).iter().for_each(|text| warn(&format!("{}: {text}", file.display())));
     if !frames.is_empty() {
         let shutter = shutter(scene, args);
         let times = shutter.exposures().len();
@@ -149,12 +115,78 @@ pub(crate) fn render_sequence(
         let (setup, shutter) = (&setup, &shutter);
         let renderer = FrameRenderer { file, setup, args, shutter, rate, progress: &progress };
         for number in frames {
-            let (picture, summary, updates) = renderer.render(scene, number)?;
+            let (picture, frame) = renderer.render(scene, number)?;
             sink.write(number, &picture)?;
             progress.frame_done();
-            report.frames.push(FrameReport::new(number, times, &updates, summary));
+            report.frames.push(frame);
         }
     }
     sink.finish()?;
     Ok((report, quiet))
+}
+
+/// Returns what a person who looks at the pictures might wonder about.
+fn warnings(scene: &Scene, args: &Args, setup: &SceneSetup) -> Vec<String> {
+    let mode = args.mode.name();
+    let mut warnings = Vec::new();
+    if setup.bounds.is_empty() {
+        warnings.push(match scene.description() {
+            Some(_) => "no frame shows a triangle, so the pictures are empty".to_owned(),
+            None => "the model has no triangles, so the picture is empty".to_owned(),
+        });
+    }
+    // Rays have origins of f32.
+    if !setup.camera(scene, args).eye.as_vec3().is_finite() {
+        warnings.push(format!(
+            "the camera is farther from the origin than f32 numbers reach ({:e}), so it sees nothing",
+            f32::MAX
+        ));
+    }
+    if args.bounces.is_some() && args.mode != Mode::Path {
+        warnings.push(format!("--bounces changes nothing: it is for --mode path, found --mode {mode}"));
+    }
+    if args.scale.is_some() && args.mode != Mode::Steps {
+        warnings.push(format!("--scale changes nothing: it is for --mode steps, found --mode {mode}"));
+    }
+    if args.fov.is_some() && setup.is_orthographic(scene) {
+        warnings.push("--fov changes nothing: the scene's camera is orthographic".to_owned());
+    }
+    warnings
+}
+
+/// A bar that counts tiles, shown only where standard error is a terminal.
+pub(super) struct Progress(ProgressBar);
+
+impl Progress {
+    /// A bar for the tiles of a number of frames, each sampled at a number of times.
+    pub(super) fn new(frames: usize, times: usize, args: &Args) -> Self {
+        let tiles = u64::from(tile_count(args.size)) * frames as u64 * times as u64;
+        let visible = std::io::stderr().is_terminal();
+        let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let bar = ProgressBar::with_draw_target(Some(tiles), target);
+        let style = ProgressStyle::with_template(
+            "rendering {bar:30} {human_pos}/{human_len} tiles  {msg}  {eta} left",
+        );
+        let bar = if let Ok(style) = style { bar.with_style(style) } else { bar };
+        if frames > 1 {
+            bar.set_message(format!("{frames} frames"));
+        }
+        Self(bar)
+    }
+
+    /// Counts a finished tile.
+    pub(super) fn tile_done(&self) {
+        self.0.inc(1);
+    }
+
+    /// Redraws the bar after a frame.
+    pub(super) fn frame_done(&self) {
+        self.0.tick();
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
 }

@@ -1,19 +1,20 @@
-//! Motion blur: the times within an open shutter at which a frame is sampled, and which pixels are sampled at which of them.
+//! Motion blur: the times within an open shutter at which a frame is sampled, and which pixels are
+//! sampled at which of them.
 //!
-//! A frame is the mean of its samples, and each sample sees the scene at a time of its own. The scene is set to one of these
-//! times after the other; at each of them the tracks are evaluated, and the boxes of the top level bound what is there at that
-//! time. So every sample is exact for its time.
-//! The times of a pixel are stratified; pixels next to each other take different ones, so that motion becomes fine noise rather
-//! than a row of copies.
+//! A frame is the mean of its samples, and each sample sees the scene at a time of its own. The
+//! scene is set to one of these times after the other; at each of them the tracks are evaluated,
+//! and the boxes of the top level bound what is there at that time. So every sample is exact for
+//! its time. The times of a pixel are stratified; pixels next to each other take different ones, so
+//! that motion becomes fine noise rather than a row of copies.
 
 use bth_random::mix;
 use std::ops::Range;
 
-/// Number of times per frame that is aimed at where a pixel has fewer samples: enough that copies of what moves over the picture
-/// lie close together.
+/// Number of times per frame that is aimed at where a pixel has fewer samples: enough that copies
+/// of what moves over the picture lie close together.
 const TIMES: u32 = 64;
-/// Most times among which each sample of a pixel is chosen. More would leave few samples for each time, which cost more than a
-/// batch of many.
+/// Most times among which each sample of a pixel is chosen. More would leave few samples for each
+/// time, which cost more than a batch of many.
 const MAX_SLOTS: u32 = 16;
 
 /// For how long a frame is exposed, and at which times.
@@ -25,15 +26,15 @@ pub(crate) struct Shutter {
     samples: u32,
     /// Number of times in each stratum. Each pixel takes one of them.
     slots: u32,
-    /// For each sample its stratum. Every so many samples from the first on are spread over the whole of the open time, which
-    /// serves pictures that are refined over time.
+    /// For each sample its stratum. Every so many samples from the first on are spread over the
+    /// whole of the open time, which serves pictures that are refined over time.
     strata: Vec<u32>,
 }
 
 /// A time at which some samples are taken.
 #[derive(Clone, Debug)]
 pub(crate) struct Exposure {
-    /// The time relative to that of the frame, in frames.
+    /// The time relative to the frame's time, in frames.
     pub(crate) offset: f64,
     /// Numbers of the samples of a pixel.
     pub(crate) samples: Range<u32>,
@@ -42,8 +43,8 @@ pub(crate) struct Exposure {
 }
 
 impl Shutter {
-    /// A shutter that is open for a number of frames around the time of the frame, or for an instant, and pictures of a number of
-    /// samples per pixel.
+    /// A shutter that is open for a number of frames around the time of the frame, or for an
+    /// instant, and pictures of a number of samples per pixel.
     pub(crate) fn new(open: Option<f64>, samples: u32) -> Self {
         if open.is_none() {
             return Self { open, samples, slots: 1, strata: Vec::new() };
@@ -57,7 +58,7 @@ impl Shutter {
         Self { open, samples, slots: TIMES.div_ceil(samples.max(1)).min(MAX_SLOTS), strata }
     }
 
-    /// Whether it is open for more than an instant.
+    /// Returns true if it is open for more than an instant.
     pub(crate) fn is_open(&self) -> bool {
         self.open.is_some()
     }
@@ -67,8 +68,8 @@ impl Shutter {
         self.slots
     }
 
-    /// The time of the samples with a number in the pixels of a slot. `sample` is below the number of samples and `slot` below
-    /// [`Self::slots`].
+    /// The time of the samples with a number in the pixels of a slot. `sample` is below the number
+    /// of samples and `slot` below [`Self::slots`].
     pub(crate) fn exposure(&self, sample: u32, slot: u32) -> Exposure {
         let offset = self.open.map_or(0.0, |open| {
             let row = u64::from(self.strata[sample as usize]) * u64::from(self.slots) + u64::from(slot);
@@ -78,7 +79,8 @@ impl Shutter {
         Exposure { offset, samples: sample..sample + 1, slot: (slot, self.slots) }
     }
 
-    /// All times of a frame. Taken one after the other, they give the samples of each pixel in order.
+    /// All times of a frame. Taken one after the other, they give the samples of each pixel in
+    /// order.
     pub(crate) fn exposures(&self) -> Vec<Exposure> {
         if self.open.is_none() {
             return vec![Exposure { offset: 0.0, samples: 0..self.samples, slot: (0, 1) }];
@@ -89,11 +91,12 @@ impl Shutter {
 }
 
 impl Exposure {
-    /// Whether the samples of a pixel are taken at this time.
+    /// Returns true if the samples of a pixel are taken at this time.
     pub(crate) fn takes(&self, (x, y): (u32, u32)) -> bool {
         let (slot, slots) = self.slot;
         let pixel = (u64::from(y) << 32) | u64::from(x);
-        // Another constant than those of sample points, whose rotations would otherwise go with the times.
+        // Another constant than those of sample points, whose rotations would otherwise go with the
+        // times.
         slots == 1
             || mix(mix(pixel ^ 0x7368_7574_7465_7200) ^ u64::from(self.samples.start)) % u64::from(slots)
                 == u64::from(slot)

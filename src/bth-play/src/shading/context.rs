@@ -1,7 +1,7 @@
 //! What all samples of a frame share, and what is counted while they are shaded.
 
-use super::chance::Chance;
 use super::geometry::ShadingGeometry;
+use super::visibility::Chance;
 use crate::args::{Args, Mode};
 use crate::camera::{Camera, CameraRay, SceneBounds, SceneSetup};
 use crate::environment::Environment;
@@ -10,8 +10,7 @@ use crate::materials::SceneMaterials;
 use crate::sampling::Sampler;
 use bth::Scene;
 use bth::rays::Hit;
-use glam::{DVec2, DVec3};
-use serde::Serialize;
+use glam::{DVec2, DVec3, DVec4};
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -29,7 +28,7 @@ pub(crate) struct FrameContext<'a> {
     /// Bounds of all frames of the sequence.
     pub(crate) bounds: &'a SceneBounds,
     pub(crate) camera: Camera,
-    /// Whether the camera is inside a room.
+    /// True if the camera is inside a room.
     pub(crate) interior: bool,
     /// Length of ambient-occlusion rays, in world units.
     pub(crate) occlusion_distance: f64,
@@ -50,21 +49,12 @@ pub(crate) struct Sample {
 /// Rays and traversal steps, summed over the samples of a tile or frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Counters {
-    /// Nearest-hit rays beyond those of the camera.
+    /// Nearest-hit rays of bounces.
     pub(crate) nearest_rays: u64,
     /// Any-hit rays: shadow and occlusion rays.
     pub(crate) any_rays: u64,
-    /// Steps of camera rays, in mode steps only.
-    pub(crate) steps: Steps,
-}
-
-/// Traversal steps of camera rays.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
-pub(crate) struct Steps {
-    pub(crate) nodes: f64,
-    pub(crate) leaves: f64,
-    pub(crate) triangles: f64,
-    pub(crate) tets: f64,
+    /// Nodes, leaves, triangles and tetrahedra of camera rays, in mode steps only.
+    pub(crate) steps: DVec4,
 }
 
 impl<'a> FrameContext<'a> {
@@ -89,8 +79,7 @@ impl<'a> FrameContext<'a> {
             Mode::Shaded | Mode::Path => &setup.materials,
             _ => NO_MATERIALS.get_or_init(SceneMaterials::default),
         };
-        let environment = setup.environment.as_deref();
-        let bounds = &setup.bounds;
+        let (environment, bounds) = (setup.environment.as_deref(), &setup.bounds);
         Ok(Self {
             scene,
             geometry,
@@ -104,7 +93,8 @@ impl<'a> FrameContext<'a> {
         })
     }
 
-    /// The sample of a pixel; the ray goes through the middle of the pixel, or through a random point of it.
+    /// The sample of a pixel; the ray goes through the middle of the pixel, or through a random
+    /// point of it.
     pub(crate) fn sample(&self, (x, y): (u32, u32), index: u32, centered: bool) -> Sample {
         let sampler = Sampler::new(x, y);
         let within = if centered { DVec2::splat(0.5) } else { sampler.point(0, index) };
@@ -133,9 +123,6 @@ impl std::ops::AddAssign for Counters {
     fn add_assign(&mut self, other: Self) {
         self.nearest_rays += other.nearest_rays;
         self.any_rays += other.any_rays;
-        self.steps.nodes += other.steps.nodes;
-        self.steps.leaves += other.steps.leaves;
-        self.steps.triangles += other.steps.triangles;
-        self.steps.tets += other.steps.tets;
+        self.steps += other.steps;
     }
 }

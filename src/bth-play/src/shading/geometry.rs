@@ -7,12 +7,13 @@ use bth_format::object::ObjectView;
 use glam::{DVec3, Vec3};
 use std::path::Path;
 
-/// The geometry of a scene at the time to which it is set. Normals are computed in f64, so that no product of two f32
-/// lengths overflows or underflows.
+/// The geometry of a scene at the time to which it is set. Normals are computed in f64, so that no
+/// product of two f32 lengths overflows or underflows.
 pub(crate) struct ShadingGeometry<'a> {
     scene: &'a Scene,
     objects: Vec<ObjectView<'a>>,
-    /// Whether the vertices of each object can be elsewhere than in the file, so that its normals are, too.
+    /// True if the vertices of each object can be elsewhere than in the file, so that its normals
+    /// are, too.
     deformable: Vec<bool>,
     /// The object of each instance.
     object_of: Vec<u32>,
@@ -32,7 +33,8 @@ impl<'a> ShadingGeometry<'a> {
         }
     }
 
-    /// Fails when the file was compiled without the source's positions and triangles, which normals need.
+    /// Fails when the file was compiled without the source's positions and triangles, which normals
+    /// need.
     pub(crate) fn require_triangles(&self, file: &Path) -> Result<(), Failure> {
         if self.objects.iter().all(|view| view.triangles.len() == view.header.triangles as usize) {
             return Ok(());
@@ -55,20 +57,22 @@ impl<'a> ShadingGeometry<'a> {
         (normal / normal.abs().max_element()).try_normalize()
     }
 
-    /// The geometric normal of a hit triangle in the world: unit, on the side that `towards` points to.
+    /// The geometric normal of a hit triangle in the world: unit, on the side that `towards` points
+    /// to.
     pub(crate) fn geometric_normal(&self, primitive: PrimitiveRef, towards: DVec3) -> DVec3 {
         let normal = self.front_normal(primitive).unwrap_or(towards);
         if normal.dot(towards) < 0.0 { -normal } else { normal }
     }
 
-    /// Whether a ray in a direction hits the front of a triangle: the side from which its vertices are seen counter-clockwise, in the space of
-    /// the object.
+    /// Returns true if a ray in a direction hits the front of a triangle: the side from which its
+    /// vertices are seen counter-clockwise, in the space of the object.
     pub(super) fn is_front(&self, primitive: PrimitiveRef, direction: [f32; 3]) -> bool {
         let direction = to_f64(direction);
         self.front_normal(primitive).is_none_or(|normal| normal.dot(direction) < 0.0)
     }
 
-    /// The unit normal of a triangle's plane in the world on the side of its front; `None` where it cannot be computed.
+    /// The unit normal of a triangle's plane in the world on the side of its front; `None` where it
+    /// cannot be computed.
     fn front_normal(&self, primitive: PrimitiveRef) -> Option<DVec3> {
         let object = self.object(primitive);
         let [a, b, c] =

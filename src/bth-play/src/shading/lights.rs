@@ -1,16 +1,19 @@
-//! The light of mode path: the scene's lights, or else a sun, and a sky or the surroundings of `--env`. Brightness is relative
-//! to the brightest light and to the size of the scene, so that no exposure is needed and frames do not flicker.
+//! The light of mode path: the scene's lights, or else a sun or the lamp of a room, and a sky or
+//! the surroundings of `--env`. Brightness is relative to the brightest light and to the size of
+//! the scene, so that no exposure is needed and frames do not flicker.
 
 use super::context::FrameContext;
 use crate::camera::SceneBounds;
 use crate::environment::{Environment, EnvironmentSample};
 use crate::sampling::uniform_disc;
 use bth::Scene;
+use bth::rays::{Hit, Ray};
 use bth_format::layout;
 use glam::{DVec2, DVec3, Vec3};
 use std::f64::consts::PI;
 
-/// Tangent of half the angle under which the sun is seen: larger than the real one, for softer shadows.
+/// Tangent of half the angle under which the sun is seen: larger than the real one, for softer
+/// shadows.
 const SUN_RADIUS: f64 = 0.02;
 /// Irradiance of the sun, or of the brightest directional light.
 const SUN: Vec3 = Vec3::new(2.1, 1.95, 1.7);
@@ -55,8 +58,9 @@ pub(crate) struct Lights<'a> {
 }
 
 impl<'a> Lights<'a> {
-    /// The lights of a scene at the time to which it is set. A scene without lights gets a sun, or in a room a lamp, given by
-    /// its position and the distance at which it is as bright as [`LAMP`].
+    /// The lights of a scene at the time to which it is set. A scene without lights gets a sun, or
+    /// in a room a lamp, given by its position and the distance at which it is as bright as
+    /// [`LAMP`].
     pub(crate) fn new(frame: &FrameContext<'a>, vertical: DVec3, lamp: Option<(DVec3, f64)>) -> Self {
         let FrameContext { scene, bounds, environment, .. } = *frame;
         let mut lights = of_scene(scene, bounds);
@@ -86,8 +90,9 @@ impl<'a> Lights<'a> {
         }
     }
 
-    /// A sample of the surroundings for a point of the unit square, and its density with regard to solid angle. The light is
-    /// radiance divided by that density and by π. `None` for the built-in sky, which is the same nearly everywhere.
+    /// A sample of the surroundings for a point of the unit square, and its density with regard to
+    /// solid angle. The light is radiance divided by that density and by π. `None` for the built-in
+    /// sky, which is the same nearly everywhere.
     pub(crate) fn surroundings(&self, point: DVec2) -> Option<(LightSample, f64)> {
         let EnvironmentSample { direction, radiance, density } = self.environment?.sample(point)?;
         let light = (radiance.as_dvec3() / (density * PI)).as_vec3();
@@ -99,8 +104,9 @@ impl<'a> Lights<'a> {
         self.environment.map_or(0.0, |environment| environment.density(direction))
     }
 
-    /// Samples of the lights as seen from a point: one of each directional light, and one of a point light that is chosen
-    /// uniformly at random. `spread` and `choice` are points of the unit square.
+    /// Samples of the lights as seen from a point: one of each directional light, and one of a
+    /// point light that is chosen uniformly at random. `spread` and `choice` are points of the unit
+    /// square.
     pub(crate) fn samples(
         &self,
         point: DVec3,
@@ -164,8 +170,8 @@ fn of_scene(scene: &Scene, bounds: &SceneBounds) -> Vec<Light> {
 }
 
 impl Light {
-    /// The sample of a point light as seen from a point, weighted with the number of lights among which it was chosen. `None`
-    /// beyond its range or cone.
+    /// The sample of a point light as seen from a point, weighted with the number of lights among
+    /// which it was chosen. `None` beyond its range or cone.
     fn seen_from(&self, point: DVec3, lights: f64) -> Option<LightSample> {
         let Light::Point { position, light, range, cone } = self else { return None };
         let (direction, distance) = (*position - point).normalize_and_length();
@@ -180,4 +186,21 @@ impl Light {
         let scale = lights * spot * window / (distance * distance);
         (scale > 0.0).then(|| LightSample { direction, distance, light: *light * scale as f32 })
     }
+}
+
+/// The position of a lamp above and next to the camera, in front of the nearest wall in that
+/// direction.
+pub(super) fn room_lamp(frame: &FrameContext<'_>, vertical: DVec3) -> DVec3 {
+    let camera = &frame.camera;
+    let direction = (vertical * 0.7 - camera.right * 0.6).normalize();
+    let ray = Ray {
+        origin: camera.eye.as_vec3().to_array(),
+        tmin: 0.0,
+        direction: direction.as_vec3().to_array(),
+        tmax: (0.15 * frame.bounds.diagonal()) as f32,
+    };
+    let mut hit = [Hit::MISS];
+    frame.scene.batch(&[ray]).nearest(&mut hit);
+    let free = f64::from(hit[0].t).min(f64::from(ray.tmax));
+    camera.eye + direction * (0.6 * free)
 }

@@ -1,11 +1,11 @@
-//! Mode path: diffuse path tracing with the scene's lights, sun and sky, or surroundings. Each bounce of all samples of a tile
-//! is one batch of rays, which start at the hits of the last one.
+//! Mode path: diffuse path tracing with the scene's lights, sun and sky, or surroundings. Each
+//! bounce of all samples of a tile is one batch of rays, which start at the hits of the last one.
 
 use super::context::{Counters, FrameContext, Sample};
 use super::lights::{LightSample, Lights};
-use super::occlusion_rays::OcclusionRays;
-use super::surface_colors::instance_color;
+use super::surface_modes::instance_color;
 use super::visibility;
+use super::visibility::OcclusionRays;
 use crate::materials::Look;
 use crate::sampling::cosine_hemisphere;
 use bth::rays::{Hit, PrimitiveRef, Start, StartRay};
@@ -29,7 +29,8 @@ struct PathState {
     origin: DVec3,
     start: Start,
     direction: DVec3,
-    /// Density with which its direction was chosen, with regard to solid angle; `None` for rays of the camera.
+    /// Density with which its direction was chosen, with regard to solid angle; `None` for rays of
+    /// the camera.
     density: Option<f64>,
 }
 
@@ -98,8 +99,8 @@ impl<'a> Bounce<'a> {
         Self { frame, lights, samples, number, shadow_rays, contributions, next: Vec::new() }
     }
 
-    /// Adds the shadow rays and the next ray of a path that meets a surface. Returns the radiance that it finds there, or in the
-    /// surroundings.
+    /// Adds the shadow rays and the next ray of a path that meets a surface. Returns the radiance
+    /// that it finds there, or in the surroundings.
     fn meet(&mut self, path: &PathState, hit: &Hit) -> Vec3 {
         let Self { frame, lights, number, .. } = *self;
         if !hit.is_hit() {
@@ -123,7 +124,8 @@ impl<'a> Bounce<'a> {
         });
         let of_scene = lights.samples(point, sample(0), sample(1));
         for (ray, light) in of_scene.chain(surroundings).enumerate() {
-            // The cosine at the shading normal, faded to 0 where the light goes below the geometric surface.
+            // The cosine at the shading normal, faded to 0 where the light goes below the geometric
+            // surface.
             let cosine = shading.dot(light.direction).min(normal.dot(light.direction) * 1e3);
             if cosine > 0.0 {
                 let chance = self.samples[path.sample].chance(RAYS * u64::from(number) + 1 + ray as u64);
@@ -151,9 +153,10 @@ fn scattered(shading: DVec3, normal: DVec3, point: DVec2) -> DVec3 {
     if depth >= 0.0 { direction } else { direction - normal * (2.0 * depth) }
 }
 
-/// The share of light from the surroundings that is taken of a direction chosen with a density, if another way to choose it has
-/// the density `other` (the balance heuristic; Veach and Guibas, "Optimally combining sampling techniques for Monte Carlo
-/// rendering", 1995). All of it where there is no choice.
+/// The share of light from the surroundings that is taken of a direction chosen with a density, if
+/// another way to choose it has the density `other` (the balance heuristic; Veach and Guibas,
+/// "Optimally combining sampling techniques for Monte Carlo rendering", 1995). All of it where
+/// there is no choice.
 fn share(chosen: Option<f64>, other: f64) -> f32 {
     match chosen {
         Some(chosen) if other > 0.0 => (chosen / (chosen + other)) as f32,
@@ -183,8 +186,8 @@ impl Surface {
     }
 }
 
-/// The albedo of an instance in a file without materials. Instances differ in hue, so that they can be told apart; the first is
-/// neutral.
+/// The albedo of an instance in a file without materials. Instances differ in hue, so that they can
+/// be told apart; the first is neutral.
 fn instance_albedo(primitive: PrimitiveRef) -> Vec3 {
     match primitive.instance {
         0 => CLAY_ALBEDO,

@@ -1,10 +1,9 @@
 //! The shader of each mode.
 
 use super::context::{Counters, FrameContext, Sample};
-use super::lights::Lights;
-use super::room_lamp::room_lamp;
+use super::lights::{Lights, room_lamp};
 use super::studio::Studio;
-use super::{ambient_occlusion, path_tracer, step_counts, surface_colors, visibility};
+use super::{path_tracer, surface_modes, visibility};
 use crate::args::Mode;
 use crate::camera::up_vector;
 use bth::rays::{Hit, Ray};
@@ -43,9 +42,9 @@ impl<'a> Shader<'a> {
         }
     }
 
-    /// Traces the camera rays of a batch of samples and shades their hits. The colours are linear, but for
-    /// [`Shader::Normals`], whose components are shown as they are, and [`Shader::Steps`], whose first component is the
-    /// number of steps.
+    /// Traces the camera rays of a batch of samples and shades their hits. The colours are linear,
+    /// but for [`Shader::Normals`], whose components are shown as they are, and [`Shader::Steps`],
+    /// whose first component is the number of steps.
     pub(crate) fn shade(
         &self,
         frame: &FrameContext<'_>,
@@ -54,7 +53,7 @@ impl<'a> Shader<'a> {
     ) -> Vec<Vec3> {
         let rays: Vec<Ray> = samples.iter().map(|sample| sample.ray.to_ray()).collect();
         if let Shader::Steps = self {
-            return step_counts::shade(frame.scene, &rays, &mut counters.steps);
+            return surface_modes::steps(frame.scene, &rays, &mut counters.steps);
         }
         let mut hits = vec![Hit::MISS; rays.len()];
         let direction = |ray: &Ray| ray.direction;
@@ -62,11 +61,11 @@ impl<'a> Shader<'a> {
         match self {
             Shader::Studio(studio) => studio.shade(frame, samples, &hits, &mut counters.any_rays),
             Shader::Path(lights) => path_tracer::shade(frame, lights, samples, &hits, counters),
-            Shader::Normals => surface_colors::normals(frame, samples, &hits),
+            Shader::Normals => surface_modes::normals(frame, samples, &hits),
             Shader::AmbientOcclusion => {
-                ambient_occlusion::shade(frame, samples, &hits, &mut counters.any_rays)
+                surface_modes::ambient_occlusion(frame, samples, &hits, &mut counters.any_rays)
             }
-            Shader::Instances => surface_colors::instances(frame, samples, &hits),
+            Shader::Instances => surface_modes::instances(frame, samples, &hits),
             Shader::Steps => unreachable!("handled above"),
         }
     }

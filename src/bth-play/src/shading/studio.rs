@@ -1,9 +1,9 @@
-//! The studio shader of modes shaded and clay: base colours, or a matte clay, under a soft key light and a fill light, with ambient
-//! occlusion, on a ground that only catches shadows.
+//! The studio shader of modes shaded and clay: base colours, or a matte clay, under a soft key
+//! light and a fill light, with ambient occlusion, on a ground that only catches shadows.
 
 use super::context::{FrameContext, Sample};
-use super::occlusion_rays::OcclusionRays;
-use super::room_lamp::room_lamp;
+use super::lights::room_lamp;
+use super::visibility::OcclusionRays;
 use crate::materials::Look;
 use crate::output::shoulder;
 use crate::sampling::{cosine_hemisphere, uniform_disc};
@@ -17,7 +17,8 @@ const AMBIENT_RAYS: u32 = 2;
 const KEY_RADIUS: f64 = 0.16;
 /// Albedo of the clay.
 const STUDIO_ALBEDO: Vec3 = Vec3::new(0.57, 0.515, 0.465);
-/// Irradiance of the key light, of the fill light, and of the ambient light from above and from below.
+/// Irradiance of the key light, of the fill light, and of the ambient light from above and from
+/// below.
 const KEY: Vec3 = Vec3::new(1.15, 1.08, 0.97);
 const FILL: Vec3 = Vec3::new(0.12, 0.145, 0.19);
 const SKY: Vec3 = Vec3::new(0.33, 0.37, 0.43);
@@ -157,8 +158,8 @@ impl Studio {
         }
     }
 
-    /// Adds the key ray and the ambient rays of a point with its normal, made of direction and length by `ray`; returns the
-    /// direction to the key light.
+    /// Adds the key ray and the ambient rays of a point with its normal, made of direction and
+    /// length by `ray`; returns the direction to the key light.
     fn push<R: TraceRay>(
         &self,
         rays: &mut OcclusionRays<R>,
@@ -187,7 +188,8 @@ impl Studio {
         to_key
     }
 
-    /// The light that falls on a point of the model; `key` is the visible share of the key light, `open` that of the hemisphere.
+    /// The light that falls on a point of the model; `key` is the visible share of the key light,
+    /// `open` that of the hemisphere.
     fn light(&self, point: &ShadingPoint, key: f32, open: f32) -> Vec3 {
         let facing = |towards: DVec3| point.normal.dot(towards).max(0.0) as f32;
         let height = (point.normal.dot(self.vertical) * 0.5 + 0.5) as f32;
@@ -195,7 +197,8 @@ impl Studio {
         KEY * (key * facing(point.to_key)) + FILL * (facing(self.fill) * (0.4 + 0.6 * open)) + ambient
     }
 
-    /// A weak specular term (Blinn), which shows curvature in the lit parts of clay; `direction` is that of the camera ray.
+    /// A weak specular term (Blinn), which shows curvature in the lit parts of clay; `direction` is
+    /// that of the camera ray.
     fn gloss(&self, point: &ShadingPoint, direction: DVec3, key: f32) -> Vec3 {
         let half = (point.to_key - direction).normalize_or(point.normal);
         let facing = point.normal.dot(half).max(0.0) as f32;

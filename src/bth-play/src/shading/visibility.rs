@@ -1,15 +1,37 @@
-//! What rays meet: surfaces, but not the holes that alpha makes in them, and for rays of the camera not the backs of surfaces
-//! that are seen from the front only.
+//! What rays hit: surfaces, but not the holes that alpha makes in them, and for rays of the camera
+//! not the backs of surfaces that are seen from the front only.
 //!
-//! Rays are traced in batches first. Only those that meet such a surface are traced again, one at a time, with a filter that
-//! asks for the alpha of the texture. The file's own opacity (`bthc compile --alpha`) saves that work where it is certain.
+//! Rays are traced in batches first. Only those that hit such a surface are traced again, one at a
+//! time, with a filter that asks for the alpha of the texture. The file's own opacity (`bthc
+//! compile --alpha`) saves that work where it is certain.
 
-use super::chance::Chance;
 use super::context::FrameContext;
-use bth::rays::Hit;
+use crate::sampling::Sampler;
+use bth::rays::{Hit, PrimitiveRef};
 use bth::{Accept, Alpha, TraceRay};
+use bth_random::mix;
 
-/// Returns true if a ray is stopped where it hits a surface. `camera` is the direction of a ray of the camera.
+/// Decides by chance if a ray passes a surface of alpha mode BLEND: a sample of a pixel, and a
+/// number for each ray of the sample.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Chance {
+    pub(crate) sampler: Sampler,
+    /// Number of the sample within its pixel.
+    pub(crate) index: u32,
+    /// Number of the ray within its sample.
+    pub(crate) ray: u64,
+}
+
+impl Chance {
+    /// A number from 0 to below 1 for a surface: low-discrepancy over the samples of a pixel.
+    pub(crate) fn at(&self, primitive: PrimitiveRef) -> f32 {
+        let surface = mix(u64::from(primitive.instance) << 32 | u64::from(primitive.triangle));
+        self.sampler.point(surface ^ mix(self.ray), self.index).x as f32
+    }
+}
+
+/// Returns true if a ray is stopped where it hits a surface. `camera` is the direction of a ray of
+/// the camera.
 fn stops(frame: &FrameContext<'_>, camera: Option<[f32; 3]>, hit: &Hit, chance: Chance) -> bool {
     let (materials, view) = (frame.materials, frame.geometry.object(hit.primitive));
     let Some(material) = materials.material(frame.scene, view, hit) else { return true };
@@ -24,7 +46,8 @@ fn stops(frame: &FrameContext<'_>, camera: Option<[f32; 3]>, hit: &Hit, chance: 
     }
 }
 
-/// Stores what each ray hits first. `camera` gives the directions of rays of the camera, and `chance` the chance of each ray.
+/// Stores what each ray hits first. `camera` gives the directions of rays of the camera, and
+/// `chance` the chance of each ray.
 pub(super) fn nearest<R: TraceRay>(
     frame: &FrameContext<'_>,
     rays: &[R],
@@ -47,22 +70,39 @@ pub(super) fn nearest<R: TraceRay>(
     }
 }
 
-/// Stores whether each ray is stopped by anything.
-pub(super) fn any<R: TraceRay>(
-    frame: &FrameContext<'_>,
-    rays: &[R],
-    chances: &[Chance],
-    blocked: &mut [bool],
-) {
-    frame.scene.batch(rays).any(blocked);
-    if !frame.materials.lets_pass(false) {
-        return;
+/// A batch of any-hit rays: from hits, or from points that no triangle holds.
+#[derive(Debug)]
+pub(crate) struct OcclusionRays<R> {
+    rays: Vec<R>,
+    chances: Vec<Chance>,
+}
+
+impl<R: TraceRay> OcclusionRays<R> {
+    pub(crate) fn new() -> Self {
+        Self { rays: Vec::new(), chances: Vec::new() }
     }
-    for ((ray, blocked), chance) in rays.iter().zip(blocked).zip(chances) {
-        if *blocked {
-            let filter: &bth::Filter<'_> = &|_, hit| stops(frame, None, hit, *chance);
-            let accept = Accept { filter: Some(filter), ..Accept::default() };
-            *blocked = frame.scene.any_accepted(ray, &accept);
+
+    pub(crate) fn push(&mut self, ray: R, chance: Chance) {
+        self.rays.push(ray);
+        self.chances.push(chance);
+    }
+
+    /// Number of rays.
+    pub(crate) fn len(&self) -> usize {
+        self.rays.len()
+    }
+
+    /// Returns for each ray true if it is blocked.
+    pub(super) fn trace(&self, frame: &FrameContext<'_>) -> Vec<bool> {
+        let mut all = vec![false; self.rays.len()];
+        frame.scene.batch(&self.rays).any(&mut all);
+        if frame.materials.lets_pass(false) {
+            for ((ray, blocked), chance) in self.rays.iter().zip(&mut all).zip(&self.chances) {
+                let filter: &bth::Filter<'_> = &|_, hit| stops(frame, None, hit, *chance);
+                let accept = Accept { filter: Some(filter), ..Accept::default() };
+                *blocked = *blocked && frame.scene.any_accepted(ray, &accept);
+            }
         }
+        all
     }
 }

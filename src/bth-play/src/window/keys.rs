@@ -35,17 +35,18 @@ pub(crate) enum Action {
     Close,
 }
 
-/// The action of a key. Keys are identified by their position, named as on a keyboard of the United States.
+/// The action of a key. Keys are identified by their position, named as on a keyboard of the United
+/// States.
 pub(crate) fn action(key: KeyCode, shift: bool) -> Option<Action> {
     let step = if shift { 10 } else { 1 };
     Some(match key {
-        KeyCode::Digit1 | KeyCode::Numpad1 => Action::Mode(Mode::ALL[0]),
-        KeyCode::Digit2 | KeyCode::Numpad2 => Action::Mode(Mode::ALL[1]),
-        KeyCode::Digit3 | KeyCode::Numpad3 => Action::Mode(Mode::ALL[2]),
-        KeyCode::Digit4 | KeyCode::Numpad4 => Action::Mode(Mode::ALL[3]),
-        KeyCode::Digit5 | KeyCode::Numpad5 => Action::Mode(Mode::ALL[4]),
-        KeyCode::Digit6 | KeyCode::Numpad6 => Action::Mode(Mode::ALL[5]),
-        KeyCode::Digit7 | KeyCode::Numpad7 => Action::Mode(Mode::ALL[6]),
+        KeyCode::Digit1 | KeyCode::Numpad1 => Action::Mode(Mode::Shaded),
+        KeyCode::Digit2 | KeyCode::Numpad2 => Action::Mode(Mode::Normals),
+        KeyCode::Digit3 | KeyCode::Numpad3 => Action::Mode(Mode::Ao),
+        KeyCode::Digit4 | KeyCode::Numpad4 => Action::Mode(Mode::Steps),
+        KeyCode::Digit5 | KeyCode::Numpad5 => Action::Mode(Mode::Path),
+        KeyCode::Digit6 | KeyCode::Numpad6 => Action::Mode(Mode::Instances),
+        KeyCode::Digit7 | KeyCode::Numpad7 => Action::Mode(Mode::Clay),
         KeyCode::Space => Action::TogglePlayback,
         KeyCode::ArrowLeft => Action::Step(-step),
         KeyCode::ArrowRight => Action::Step(step),
@@ -76,10 +77,11 @@ pub(crate) fn fly_direction(key: KeyCode) -> Option<[f64; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use clap::ValueEnum;
 
     #[test]
     fn help_names_every_mode_in_the_order_of_its_keys() {
-        let names: Vec<&str> = Mode::ALL.iter().map(|m| m.name()).collect();
+        let names: Vec<String> = Mode::value_variants().iter().map(|m| m.name()).collect();
         assert!(HELP.contains(&names.join(", ")), "{HELP}");
         assert_eq!(action(KeyCode::Digit4, false), Some(Action::Mode(Mode::Steps)));
         assert_eq!(action(KeyCode::ArrowLeft, true), Some(Action::Step(-10)));

@@ -1,8 +1,8 @@
-//! The interactive viewer: frames are rendered as for pictures, one sample of each pixel at a time, in a window.
+//! The interactive viewer: frames are rendered as for pictures, one sample of each pixel at a time,
+//! in a window.
 
 mod app;
-mod camera_controller;
-mod content;
+mod camera;
 mod keys;
 mod playback;
 mod progressive;
@@ -17,7 +17,7 @@ use crate::failure::Failure;
 use crate::render::{frame_range, frames_to_show};
 use app::App;
 use bth::Scene;
-use content::Content;
+use camera::Content;
 use rayon::ThreadPool;
 use std::path::Path;
 use winit::event_loop::EventLoop;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-/// The frames of a scene, one of which is shown.
+/// The frames of a scene, and which one is shown.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Playback {
     first: i32,
@@ -30,12 +30,12 @@ impl Playback {
         (self.first, self.last)
     }
 
-    /// Whether there is more than one frame.
+    /// Returns true if there is more than one frame.
     pub(crate) fn is_animated(&self) -> bool {
         self.first < self.last
     }
 
-    /// Whether it plays.
+    /// Returns true if it plays.
     pub(crate) fn is_playing(&self) -> bool {
         self.playing.is_some()
     }
@@ -48,15 +48,16 @@ impl Playback {
         };
     }
 
-    /// While playing, goes to the frame of a time, in a loop; frames are skipped where they come faster than they are shown.
-    /// Returns whether the frame changed.
+    /// While playing, goes to the frame of a time, in a loop; frames are skipped where they come
+    /// faster than they are shown. Returns whether the frame changed.
     pub(crate) fn advance(&mut self, now: Duration) -> bool {
         let Some((since, from)) = self.playing else { return false };
         let elapsed_frames = (now.saturating_sub(since).as_secs_f64() * self.rate) as i64;
         self.set(i64::from(from) + elapsed_frames)
     }
 
-    /// Pauses, and goes forward or back by a number of frames, in a loop. Returns whether the frame changed.
+    /// Pauses, and goes forward or back by a number of frames, in a loop. Returns whether the frame
+    /// changed.
     pub(crate) fn step(&mut self, by: i32) -> bool {
         self.playing = None;
         self.set(i64::from(self.frame) + i64::from(by))

@@ -1,6 +1,7 @@
-//! Progressive rendering for the window: coarse while camera or scene move, refined sample by sample while they do not.
+//! Progressive rendering for the window: coarse while camera or scene move, refined sample by
+//! sample while they do not.
 
-use super::content::{Content, ViewCamera};
+use super::camera::{Content, ViewCamera};
 use crate::args::Args;
 use crate::failure::Failure;
 use crate::output::{Picture, to_picture};
@@ -15,12 +16,13 @@ use std::time::{Duration, Instant};
 const MOVING: Duration = Duration::from_millis(40);
 /// Time that is spent on rendering before the window handles its events.
 const SLICE: Duration = Duration::from_millis(25);
-/// Greatest side of the squares of pixels that share a sample.
+/// Largest side of the squares of pixels that share a sample.
 const COARSEST: u32 = 8;
 
 /// A picture that is refined over time.
 pub(super) struct ProgressiveRenderer {
-    /// The options of the program, but with the mode and size of the picture that is being rendered.
+    /// The options of the program, but with the mode and size of the picture that is being
+    /// rendered.
     args: Args,
     /// Width and height of the window, pixels.
     size: (u32, u32),
@@ -91,8 +93,8 @@ impl ProgressiveRenderer {
         }
     }
 
-    /// Discards all samples, since camera, scene or mode changed. While something moves, pictures become coarse enough to be
-    /// rendered in about [`MOVING`].
+    /// Discards all samples, since camera, scene or mode changed. While something moves, pictures
+    /// become coarse enough to be rendered in about [`MOVING`].
     pub(super) fn restart(&mut self, moving: bool) {
         self.block = 1;
         let pixels = pixel_count(self.size) as f64;
@@ -111,13 +113,13 @@ impl ProgressiveRenderer {
         (self.passes, self.slots, self.tiles, self.spent) = (0, 0, 0, Duration::ZERO);
     }
 
-    /// Whether every pixel of the fine picture has so many samples.
+    /// Returns true if every pixel of the fine picture has so many samples.
     pub(super) fn is_done(&self, samples: u32) -> bool {
         self.block == 1 && self.passes >= samples
     }
 
-    /// Renders for about [`SLICE`]; returns the picture when all pixels have got another sample. The scene is set to a frame, and is
-    /// so again afterwards.
+    /// Renders for about [`SLICE`]; returns the picture when all pixels have got another sample.
+    /// The scene is set to a frame, and is so again afterwards.
     ///
     /// # Errors
     /// If the file lacks what the mode needs, or a time within the shutter cannot be set.
@@ -158,7 +160,8 @@ impl ProgressiveRenderer {
         Ok(Some(to_picture(&means, &self.args)))
     }
 
-    /// Renders tiles at the time to which the scene is set, until all are finished or [`SLICE`] has passed since `start`.
+    /// Renders tiles at the time to which the scene is set, until all are finished or [`SLICE`] has
+    /// passed since `start`.
     fn render_exposure(
         &mut self,
         content: &Content<'_>,

@@ -32,7 +32,8 @@ impl Screen {
         Ok(Self { window, surface })
     }
 
-    /// Shows a picture, scaled to a size, with a bar that is filled to the fraction `bar` of its width.
+    /// Shows a picture, scaled to a size, with a bar that is filled to the fraction `bar` of its
+    /// width.
     ///
     /// # Errors
     /// If the display fails.

@@ -12,7 +12,7 @@ pub(crate) struct WindowSummary {
     /// Frame of the last picture.
     pub(crate) frame: i32,
     /// Mode of the last picture.
-    pub(crate) mode: &'static str,
+    pub(crate) mode: String,
     /// Width of the window, pixels.
     pub(crate) width: u32,
     /// Height of the window, pixels.

@@ -2,7 +2,7 @@
 
 use super::state::App;
 use crate::messages::note;
-use crate::window::content::ViewCamera;
+use crate::window::camera::ViewCamera;
 use crate::window::keys::{self, Action};
 use crate::window::playback::Playback;
 use glam::DVec3;

@@ -5,8 +5,8 @@ use crate::camera::{Camera, up_vector};
 use crate::failure::Failure;
 use crate::output::Picture;
 use crate::render::shutter;
-use crate::window::camera_controller::CameraController;
-use crate::window::content::{Content, ViewCamera};
+use crate::window::camera::CameraController;
+use crate::window::camera::{Content, ViewCamera};
 use crate::window::playback::Playback;
 use crate::window::progressive::ProgressiveRenderer;
 use crate::window::screen::Screen;
@@ -44,7 +44,7 @@ pub(crate) struct App<'a> {
     /// Pictures after which the window closes.
     pub(super) picture_limit: Option<u64>,
     pub(super) screenshot: Option<PathBuf>,
-    /// Whether the next finished picture is to be saved.
+    /// True if the next finished picture is to be saved.
     pub(super) save_requested: bool,
     /// Keys that are down and move the camera.
     pub(super) keys_down: Vec<KeyCode>,
@@ -69,7 +69,7 @@ pub(crate) struct App<'a> {
 impl<'a> App<'a> {
     /// A window that plays the frames of `range` at `rate` frames per second.
     pub(crate) fn new(content: Content<'a>, args: &Args, pool: &'a ThreadPool, range: (i32, i32)) -> Self {
-        // Samples are those of a picture with as many of them, so that the window converges to what -o writes.
+        // Samples are the same as for -o, so that the window converges to what it writes.
         let samples = args.spp.max(args.window_frames.unwrap_or(0));
         let args = args.with_samples(samples);
         let renderer = ProgressiveRenderer::new(&args, shutter(content.scene, &args));
@@ -132,7 +132,8 @@ impl<'a> App<'a> {
         self.view.camera(&self.content, &self.renderer.args())
     }
 
-    /// The controller of the camera; the user takes over the current camera if another one was in use.
+    /// The controller of the camera; the user takes over the current camera if another one was in
+    /// use.
     pub(super) fn controller(&mut self) -> &mut CameraController {
         if !matches!(self.view, ViewCamera::Free(_)) {
             let camera = self.camera();

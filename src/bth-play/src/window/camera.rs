@@ -1,9 +1,44 @@
-//! The camera controller of the window: orbit, pan, dolly and fly.
+//! The camera of the window: the camera of the options, of the scene, or one that the user moves.
 
-use crate::camera::Camera;
+use crate::args::Args;
+use crate::camera::{Camera, SceneSetup, scene_camera};
+use bth::Scene;
 use glam::{DVec2, DVec3};
+use std::path::Path;
 
-/// Greatest cosine of the angle between the view direction and the vertical: the camera never turns upside down.
+/// The camera in use.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum ViewCamera {
+    /// The camera that the options chose, which may move with the scene.
+    Initial,
+    /// The camera in this row of the scene's table.
+    Scene(u32),
+    /// The camera that the user moves.
+    Free(CameraController),
+}
+
+/// What the window shows.
+pub(crate) struct Content<'a> {
+    pub(crate) scene: &'a mut Scene,
+    pub(crate) file: &'a Path,
+    pub(crate) setup: SceneSetup,
+    /// Frames per second.
+    pub(crate) rate: f64,
+}
+
+impl ViewCamera {
+    /// The camera at the time to which the scene is set, for the size of the options.
+    pub(super) fn camera(self, content: &Content<'_>, args: &Args) -> Camera {
+        match self {
+            ViewCamera::Initial => content.setup.camera(content.scene, args).with_aspect_of(args.size),
+            ViewCamera::Scene(row) => scene_camera(content.scene, row, args),
+            ViewCamera::Free(controller) => controller.camera(args.size),
+        }
+    }
+}
+
+/// Largest cosine of the angle between the view direction and the vertical: the camera never turns
+/// upside down.
 const MAX_COSINE: f64 = 0.999;
 /// Radians that a drag over the height of the window turns the camera.
 const TURN: f64 = 3.0;
@@ -15,7 +50,8 @@ const ZOOM_PER_NOTCH: f64 = 0.15;
 pub(super) struct CameraController {
     camera: Camera,
     vertical: DVec3,
-    /// Distance from the eye to the target, the point in the middle of the picture around which the camera orbits.
+    /// Distance from the eye to the target, the point in the middle of the picture around which the
+    /// camera orbits.
     distance: f64,
 }
 
@@ -40,7 +76,8 @@ impl CameraController {
         self.set(target - forward * self.distance, forward);
     }
 
-    /// Pans, so that the target follows the pointer; `by` is the drag in heights of the window, to the right and down.
+    /// Pans, so that the target follows the pointer; `by` is the drag in heights of the window, to
+    /// the right and down.
     pub(super) fn pan(&mut self, by: DVec2) {
         let unit = 2.0 * self.camera.half_height(self.distance);
         let eye = self.camera.eye + (self.camera.up * by.y - self.camera.right * by.x) * unit;

@@ -66,8 +66,8 @@ pub(crate) fn evict(files: &Files, cap: u64) -> Evicted {
     done
 }
 
-/// Whether a record's content is gone, or the record is damaged. One whose content is not kept goes with contents of its
-/// age.
+/// Returns true if a record's content is gone, or the record is damaged. One whose content is not
+/// kept goes with contents of its age.
 fn is_useless(files: &Files, entry: &DirEntry, oldest_left: Option<SystemTime>) -> bool {
     let path = entry.path();
     let (Some(id), Ok(text)) = (named(&path), std::fs::read(&path)) else { return false };
@@ -81,7 +81,8 @@ fn is_useless(files: &Files, entry: &DirEntry, oldest_left: Option<SystemTime>) 
     }
 }
 
-/// Whether another process has a lock on a file. Where there are no locks nothing is locked.
+/// Returns true if another process has a lock on a file. Where there are no locks nothing is
+/// locked.
 pub(crate) fn is_locked(path: &Path) -> bool {
     let file = File::open(path);
     file.is_ok_and(|file| matches!(file.try_lock(), Err(TryLockError::WouldBlock)))

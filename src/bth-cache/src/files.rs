@@ -40,7 +40,8 @@ impl Files {
         Ok(files)
     }
 
-    /// Whether a folder is a store or may become one: whether it has the store's folder, or is empty.
+    /// Returns true if a folder is a store or may become one: whether it has the store's folder, or
+    /// is empty.
     pub(crate) fn may_be_in(folder: &Path) -> std::io::Result<bool> {
         let mut is_empty = true;
         for entry in std::fs::read_dir(folder)? {
@@ -84,7 +85,7 @@ impl Files {
         while let Some(folder) = folders.pop() {
             for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
                 match entry.file_type() {
-                    // A folder in the place of an entry is one that cannot be used.
+                    // A folder instead of an entry is one that cannot be used.
                     Ok(kind) if kind.is_dir() && named(&entry.path()).is_none() => folders.push(entry.path()),
                     Ok(_) => found.push(entry),
                     // It went away meanwhile.
@@ -95,7 +96,8 @@ impl Files {
         found
     }
 
-    /// Spread over folders by the first two digits, since some file systems are slow with many files in one.
+    /// Spread over folders by the first two digits, since some file systems are slow with many
+    /// files in one.
     fn sharded(&self, name: &str, digest: &Digest) -> PathBuf {
         let hex = digest.hex();
         self.root.join(name).join(&hex[..2]).join(hex)
@@ -107,12 +109,14 @@ pub(crate) fn named(path: &Path) -> Option<Digest> {
     Digest::parse(path.file_name()?.to_str()?)
 }
 
-/// Removes a file; whether this call removed it. Except on Windows, read-only files need no other rights.
+/// Removes a file; whether this call removed it. Except on Windows, read-only files need no other
+/// rights.
 pub(crate) fn remove(path: &Path) -> bool {
     std::fs::remove_file(path).is_ok()
 }
 
-/// Renews the time of use. Ignores failures, so that a store that cannot be written can still be read.
+/// Renews the time of use. Ignores failures, so that a store that cannot be written can still be
+/// read.
 pub(crate) fn touch(path: &Path) {
     let Ok(file) = File::open(path) else { return };
     let used = file.metadata().and_then(|m| m.modified()).ok().and_then(|t| t.elapsed().ok());

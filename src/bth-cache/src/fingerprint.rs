@@ -1,5 +1,5 @@
-//! Fingerprints of output files: identity, length and time of change of a file with the hash of its content, so that a
-//! large file need not be read to find out that it is unchanged.
+//! Fingerprints of output files: identity, length and time of change of a file with the hash of its
+//! content, so that a large file need not be read to find out that it is unchanged.
 
 use crate::files::Files;
 use crate::record::{seal, unseal};
@@ -25,13 +25,15 @@ struct Fingerprint {
 }
 
 impl Store {
-    /// The hash of a file's content, if a fingerprint was stored for it and the file has not been changed since.
+    /// The hash of a file's content, if a fingerprint was stored for it and the file has not been
+    /// changed since.
     pub fn content_of(&self, path: &Path) -> Option<Digest> {
         let fingerprint = read(&self.files, path)?;
         (Fingerprint::of(path, fingerprint.blob) == Some(fingerprint)).then_some(fingerprint.blob)
     }
 
-    /// As [`Store::content_of`] for a file already opened by that path, which may have been replaced since.
+    /// As [`Store::content_of`] for a file already opened by that path, which may have been
+    /// replaced since.
     pub fn content_of_open(&self, path: &Path, opened: &OpenFile) -> Option<Digest> {
         let fingerprint = read(&self.files, path)?;
         (Fingerprint::from_state(opened.state(), fingerprint.blob) == Some(fingerprint))
@@ -41,7 +43,8 @@ impl Store {
     /// Stores the fingerprint of a large file that has just been written.
     pub fn store_fingerprint(&self, path: &Path, blob: Digest) {
         let Some(fingerprint) = Fingerprint::of(path, blob).filter(|s| s.bytes >= LARGE) else { return };
-        // A change within the same clock step would get the same time of change: wait until the step is over.
+        // A change within the same clock step would get the same time of change: wait until the
+        // step is over.
         std::thread::sleep(STEP.saturating_sub(fingerprint.age()));
         if Fingerprint::of(path, blob) != Some(fingerprint) {
             return;
@@ -69,11 +72,13 @@ impl Fingerprint {
     }
 
     fn from_state(FileState { device, inode, bytes, changed }: FileState, blob: Digest) -> Option<Self> {
-        // Times in whole seconds are too coarse, and on systems other than Unix programs can set them.
+        // Times in whole seconds are too coarse, and on systems other than Unix programs can set
+        // them.
         (cfg!(unix) && changed.1 != 0).then_some(Self { device, inode, bytes, changed, blob })
     }
 
-    /// Time since the change; zero when the clock of a remote file system is ahead of this machine's.
+    /// Time since the change; zero when the clock of a remote file system is ahead of this
+    /// machine's.
     fn age(&self) -> Duration {
         let (seconds, nanos) = self.changed;
         let changed =

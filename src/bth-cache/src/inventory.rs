@@ -55,7 +55,8 @@ pub struct Verification {
     pub bytes: u64,
     /// Damaged records and contents, which were removed.
     pub damaged: Vec<String>,
-    /// Damaged records and contents that could not be removed, and those that may not be read, each with the reason.
+    /// Damaged records and contents that could not be removed, and those that may not be read, each
+    /// with the reason.
     pub not_removed: Vec<String>,
     /// Files left by killed processes, which were removed.
     pub leftovers: u64,
@@ -73,7 +74,7 @@ pub struct Cleared {
 }
 
 impl Verification {
-    /// Whether nothing is damaged.
+    /// Returns true if nothing is damaged.
     pub fn is_clean(&self) -> bool {
         self.damaged.is_empty() && self.not_removed.is_empty()
     }
@@ -141,8 +142,8 @@ impl Store {
         inventory
     }
 
-    /// Reads everything, and removes damaged entries and files left by killed processes. Stops early when `go_on`, which gets
-    /// the bytes read, returns false.
+    /// Reads everything, and removes damaged entries and files left by killed processes. Stops
+    /// early when `go_on`, which gets the bytes read, returns false.
     pub fn verify(&self, go_on: &dyn Fn(u64) -> bool) -> Verification {
         let mut found = Verification { leftovers: sweep(&self.files), ..Verification::default() };
         for entry in self.files.below("keys") {

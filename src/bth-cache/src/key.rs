@@ -3,8 +3,8 @@
 use crate::Digest;
 use serde::{Deserialize, Serialize};
 
-/// A stage, and by name all that its result depends on: content hashes, canonical options, versions.
-/// Never paths, times or the order of arguments.
+/// A stage, and by name all that its result depends on: content hashes, canonical options,
+/// versions. Never paths, times or the order of arguments.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Key {
     stage: String,
@@ -60,7 +60,8 @@ impl Key {
         hasher.finalize().into()
     }
 
-    /// What differs from an earlier key, as `name: old -> new`; hashes and long values are only named.
+    /// What differs from an earlier key, as `name: old -> new`; hashes and long values are only
+    /// named.
     pub fn differences(&self, earlier: &Key) -> Vec<String> {
         let find = |key: &Key, name: &str| -> Option<String> {
             key.components.iter().find(|(n, _)| n == name).map(|(_, v)| v.clone())

@@ -1,9 +1,9 @@
 //! A content-addressed store of compiled results.
 //!
-//! A [`Key`] names everything that a result depends on and nothing else; a [`Record`] names the content of
-//! a key; the content is named by its own hash. Both are written once, whole, and checked
-//! whenever they are read, so any number of processes may use one folder, also on network file
-//! systems, and no damaged entry is served. Locks only save work that another process is doing
+//! A [`Key`] names everything that a result depends on and nothing else; a [`Record`] names the
+//! content of a key; the content is named by its own hash. Both are written once, whole, and
+//! checked whenever they are read, so any number of processes may use one folder, also on network
+//! file systems, and no damaged entry is served. Locks only save work that another process is doing
 //! already, and keep what is mapped from being evicted.
 //!
 //! ```text

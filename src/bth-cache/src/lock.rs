@@ -7,24 +7,26 @@ use std::time::Duration;
 /// Between two tries to get a lock that another process has.
 const PAUSE: Duration = Duration::from_millis(20);
 
-/// Exclusive lock on the work for a key; released when dropped, or when the process ends in any way.
+/// Exclusive lock on the work for a key; released when dropped, or when the process ends in any
+/// way.
 #[derive(Debug)]
 pub struct WorkLock {
     path: PathBuf,
-    /// Whether another process held the lock before: it may have stored the result.
+    /// True if another process held the lock before: it may have stored the result.
     pub waited: bool,
     _file: File,
 }
 
 impl WorkLock {
-    /// Waits for the lock. `None` when cancelled, or where there are no locks: then work may be done twice,
-    /// which costs time and nothing else.
+    /// Waits for the lock. `None` when cancelled, or where there are no locks: then work may be
+    /// done twice, which costs time and nothing else.
     pub(crate) fn take(path: &Path, cancelled: &dyn Fn() -> bool) -> Option<Self> {
         let mut waited = false;
         loop {
             let file = File::options().write(true).create(true).truncate(false).open(path).ok()?;
             match file.try_lock() {
-                // The previous holder may have removed the name meanwhile; then other processes lock another file.
+                // The previous holder may have removed the name meanwhile; then other processes
+                // lock another file.
                 Ok(()) if same_file(&file, path) => {
                     return Some(Self { path: path.to_owned(), waited, _file: file });
                 }
@@ -44,12 +46,13 @@ impl WorkLock {
 
 impl Drop for WorkLock {
     fn drop(&mut self) {
-        // Before the lock is released with the file: no process can hold the locks of both the old and a new file.
+        // Before the lock is released with the file: no process can hold the locks of both the old
+        // and a new file.
         let _ = std::fs::remove_file(&self.path);
     }
 }
 
-/// Whether a name still leads to an open file.
+/// Returns true if a name still leads to an open file.
 #[cfg(unix)]
 pub(crate) fn same_file(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;

@@ -14,7 +14,8 @@ pub struct Record {
     pub blob: Digest,
     /// Bytes of the content.
     pub bytes: u64,
-    /// Whether the content itself is kept; else it is put together from other entries when it is needed.
+    /// True if the content itself is kept; else it is put together from other entries when it is
+    /// needed.
     pub whole: bool,
     /// The report of the stage.
     pub report: Value,

@@ -3,8 +3,8 @@
 use std::io::{Error, ErrorKind, Result};
 use std::path::PathBuf;
 
-/// A store of named bytes. Names are such as `keys/ab/abcd…`; the bytes of a name never change, and readers check what they
-/// read.
+/// A store of named bytes. Names are such as `keys/ab/abcd…`; the bytes of a name never change, and
+/// readers check what they read.
 pub trait Remote: Send + Sync {
     /// The bytes of a name, if the store has it.
     ///
@@ -20,7 +20,8 @@ pub trait Remote: Send + Sync {
     fn name(&self) -> String;
 }
 
-/// A folder that machines share. It needs no locks: files are written under another name and then linked.
+/// A folder that machines share. It needs no locks: files are written under another name and then
+/// linked.
 #[derive(Clone, Debug)]
 pub struct Folder(pub PathBuf);
 

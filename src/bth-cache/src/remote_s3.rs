@@ -9,11 +9,12 @@ use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
 use tokio::time::timeout;
 
-/// Time limits of one try and of all tries together: a machine that is offline goes on without the store soon.
+/// Time limits of one try and of all tries together: a machine that is offline goes on without the
+/// store soon.
 const CONNECT: Duration = Duration::from_secs(5);
 const TRIES: usize = 2;
 const ALL_TRIES: Duration = Duration::from_secs(30);
-/// Least bytes a second of a transfer: a slower server counts as one that does not answer.
+/// Smallest bytes a second of a transfer: a slower server counts as one that does not answer.
 const SLOWEST: u64 = 1 << 20;
 
 /// Time between two looks at whether the user cancelled.
@@ -30,9 +31,9 @@ pub struct S3 {
 }
 
 impl S3 {
-    /// A place such as `s3://bucket/prefix`; how to reach it stands in the variables `AWS_ACCESS_KEY_ID`,
-    /// `AWS_SECRET_ACCESS_KEY`, `AWS_REGION`, `AWS_ENDPOINT_URL` and `AWS_ALLOW_HTTP`. Nothing is sent yet. When `cancelled` says so,
-    /// nothing more is waited for.
+    /// A place such as `s3://bucket/prefix`; how to reach it stands in the variables
+    /// `AWS_ACCESS_KEY_ID`, `AWS_SECRET_ACCESS_KEY`, `AWS_REGION`, `AWS_ENDPOINT_URL` and
+    /// `AWS_ALLOW_HTTP`. Nothing is sent yet. When `cancelled` says so, nothing more is waited for.
     ///
     /// # Errors
     /// When it is no such place, or a variable is none.
@@ -85,7 +86,8 @@ impl Remote for S3 {
                 found => found.map_err(Error::other)?,
             };
             let size = found.meta.size;
-            // The client takes memory for as many bytes as the server says, and ends the program where there is none.
+            // The client takes memory for as many bytes as the server says, and ends the program
+            // where there is none.
             let has_memory =
                 usize::try_from(size).is_ok_and(|n| Vec::<u8>::new().try_reserve_exact(n).is_ok());
             if !has_memory {
@@ -97,7 +99,8 @@ impl Remote for S3 {
     }
 
     fn put(&self, name: &str, bytes: &[u8], _over: bool) -> Result<()> {
-        // What is there under the name of a content is that content: writing it again changes nothing.
+        // What is there under the name of a content is that content: writing it again changes
+        // nothing.
         let place = self.place(name);
         self.runtime.block_on(async {
             let put = self.bucket.put(&place, bytes.to_vec().into());

@@ -15,8 +15,9 @@ const LONG: u64 = 64 << 10;
 pub struct Statistics {
     /// Results that the store had, by stage.
     pub hits: BTreeMap<String, u64>,
-    /// Results that the store did not have, by stage and by the component of the key that differed from the source's last
-    /// key; `new` for sources never seen, `evicted` for keys that had been there.
+    /// Results that the store did not have, by stage and by the component of the key that differed
+    /// from the source's last key; `new` for sources never seen, `evicted` for keys that had been
+    /// there.
     pub misses: BTreeMap<String, BTreeMap<String, u64>>,
     /// Hits that the shared store answered.
     pub shared_hits: u64,

@@ -28,7 +28,8 @@ pub struct Store {
     pub(crate) files: Files,
     pub(crate) cap: u64,
     remote: Mutex<Option<Box<dyn Remote>>>,
-    /// Names of contents in the shared store that were found damaged, and are replaced when they are made again.
+    /// Names of contents in the shared store that were found damaged, and are replaced when they
+    /// are made again.
     damaged_there: Mutex<HashSet<String>>,
     notes: Mutex<Vec<String>>,
     statistics: Mutex<Statistics>,
@@ -61,7 +62,8 @@ impl Store {
         })
     }
 
-    /// As [`Store::open`] of a folder that is a store already, or empty: what is named by mistake is left as it is.
+    /// As [`Store::open`] of a folder that is a store already, or empty: what is named by mistake
+    /// is left as it is.
     ///
     /// # Errors
     /// When it is neither, or cannot be read.
@@ -72,8 +74,8 @@ impl Store {
         }
     }
 
-    /// With a shared store behind it, which is read on a miss and to which every put is copied. When it fails, there is a note,
-    /// and this process goes on without it.
+    /// With a shared store behind it, which is read on a miss and to which every put is copied.
+    /// When it fails, there is a note, and this process goes on without it.
     #[must_use]
     pub fn with_remote(self, remote: Box<dyn Remote>) -> Self {
         *lock(&self.remote) = Some(remote);
@@ -113,7 +115,8 @@ impl Store {
         Record::from_text(&text, id).map_err(|why| self.drop_damaged(&path, why)).ok()
     }
 
-    /// The content of a record, checked. `None` when it was evicted or is damaged; damaged content is removed, with a note.
+    /// The content of a record, checked. `None` when it was evicted or is damaged; damaged content
+    /// is removed, with a note.
     pub fn read(&self, record: &Record) -> Option<Vec<u8>> {
         let path = self.files.blob(&record.blob);
         if let Ok(bytes) = std::fs::read(&path) {
@@ -139,8 +142,9 @@ impl Store {
         Some(bytes)
     }
 
-    /// As [`Store::read`], into memory that `read` takes from the file's path and `bytes` shows: for contents that need
-    /// another alignment than bytes do. `copy` takes what comes from the shared store.
+    /// As [`Store::read`], into memory that `read` takes from the file's path and `bytes` shows:
+    /// for contents that need another alignment than bytes do. `copy` takes what comes from the
+    /// shared store.
     pub fn read_as<T>(
         &self,
         record: &Record,
@@ -165,7 +169,8 @@ impl Store {
         // Once from here, once from the shared store.
         for attempt in 0..2 {
             if let Ok(file) = File::open(&path) {
-                // Without locks what is mapped may lose its name, which local file systems take well.
+                // Without locks what is mapped may lose its name, which local file systems take
+                // well.
                 let _ = file.lock_shared();
                 if same_file(&file, &path) {
                     match Digest::of_reader(&file) {
@@ -194,7 +199,7 @@ impl Store {
         self.files.blob(&record.blob)
     }
 
-    /// Whether the content of a record is there; not whether it is whole.
+    /// Returns true if the content of a record is there; not whether it is whole.
     pub fn holds(&self, record: &Record) -> bool {
         self.files.blob(&record.blob).is_file()
     }
@@ -212,19 +217,20 @@ impl Store {
         Ok(record)
     }
 
-    /// As [`Store::put`], but not in the shared store: for what is of use on this machine only.
+    /// Does the same as [`Store::put`], but not in the shared store: for what is of use on this
+    /// machine only.
     ///
     /// # Errors
-    /// As [`Store::put`].
+    /// The same as [`Store::put`].
     pub fn put_here(&self, key: &Key, bytes: &[u8], report: Value) -> Result<Record> {
         self.put_both(key, bytes, report).map(|(record, _)| record)
     }
 
-    /// Keeps only the name and length of a key's content, for contents that are quickly put together from others. `blob` is a
-    /// hash that determines the content.
+    /// Keeps only the name and length of a key's content, for contents that are quickly put
+    /// together from others. `blob` is a hash that determines the content.
     ///
     /// # Errors
-    /// As [`Store::put`].
+    /// The same as [`Store::put`].
     pub fn put_name(&self, key: &Key, blob: Digest, bytes: u64, report: Value) -> Result<Record> {
         let record = Record { key: key.clone(), blob, bytes, whole: false, report };
         let text = self.put_record(&record)?;
@@ -302,7 +308,8 @@ impl Store {
         WorkLock::take(&self.files.lock(&key.id()), cancelled)
     }
 
-    /// Renews the time of use of a record whose content is not kept; others have that of their contents.
+    /// Renews the time of use of a record whose content is not kept; others have that of their
+    /// contents.
     pub fn touch(&self, record: &Record) {
         if !record.whole {
             touch(&self.files.key(&record.key.id()));
@@ -314,8 +321,8 @@ impl Store {
         lock(&self.statistics).hit(stage, hits);
     }
 
-    /// Why a key is missing: its differences from the last key of the same source. `source` may be a path: only a hash of
-    /// it is kept.
+    /// Why a key is missing: its differences from the last key of the same source. `source` may be
+    /// a path: only a hash of it is kept.
     pub fn reasons(&self, key: &Key, source: &str) -> Vec<String> {
         last_keys::reasons(&self.files, key, source)
     }
@@ -337,7 +344,8 @@ impl Store {
         std::mem::take(&mut lock(&self.notes))
     }
 
-    /// Removes the least recently used contents until `cap` bytes are left, and files left by killed processes.
+    /// Removes the least recently used contents until `cap` bytes are left, and files left by
+    /// killed processes.
     pub fn evict(&self, cap: u64) -> Evicted {
         self.written.store(0, Ordering::Relaxed);
         let evicted = evict(&self.files, cap);

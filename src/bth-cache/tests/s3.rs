@@ -1,5 +1,5 @@
-//! A shared cache in a real S3-compatible server. `tools/s3/run` starts one and sets its address; without it there is nothing to
-//! test.
+//! A shared cache in a real S3-compatible server. `tools/s3/run` starts one and sets its address;
+//! without it there is nothing to test.
 #![allow(clippy::print_stdout)]
 
 use bth_cache::{Digest, Key, Remote, S3, Store};
@@ -8,7 +8,8 @@ use std::time::{Duration, Instant};
 
 const LARGE: u64 = 1 << 30;
 
-/// A new store with the server as its shared cache. Without a server prints that, and returns `None`.
+/// A new store with the server as its shared cache. Without a server prints that, and returns
+/// `None`.
 fn store(folder: &tempfile::TempDir) -> Option<(Store, String)> {
     let Ok(url) = std::env::var("BTH_TEST_S3") else {
         println!("skipped: BTH_TEST_S3 names no bucket (tools/s3/run does)");

@@ -1,5 +1,5 @@
-//! What the store guarantees: damage is detected, the size limit holds, entries in use are kept, and a failing shared store
-//! does no harm.
+//! What the store guarantees: damage is detected, the size limit holds, entries in use are kept,
+//! and a failing shared store does no harm.
 #![allow(clippy::print_stdout)]
 
 use bth_cache::{Digest, Folder, Key, Record, Store};

@@ -14,8 +14,8 @@ use crate::mesh::{Attributes, Mesh, Report, Sequence, Wanted};
 use crate::monitor::Monitor;
 use crate::raw::{Raw, RowKind, check_rows, check_triangles};
 use crate::source::{NON_FINITE, Source, input_error, read_file};
-use crate::weld::{equal_positions, number};
-use crate::{attributes, coordinate_range, gltf, sequence, topology};
+use crate::weld::{equal_in_all_frames, equal_positions, number};
+use crate::{attributes, coordinate_range, gltf, topology};
 use rayon::prelude::*;
 
 /// Reads an OBJ, glTF, GLB, PLY, STL or OFF file. The extension decides about the format, or else
@@ -258,7 +258,7 @@ pub(crate) fn weld_and_count(
     let same_as = match moved {
         Some(moved) => moved.equal_vertices(frames[0]),
         None if frames.len() == 1 => equal_positions(frames[0]),
-        None => sequence::equal_vertices(frames),
+        None => equal_in_all_frames(frames),
     };
     let mut kept = number(&same_as, &mut triangles);
     // -0 becomes 0. What is not finite is used by no triangle.

@@ -2,6 +2,7 @@
 
 use bth_format::layout::NONE;
 use rayon::prelude::*;
+use std::collections::HashMap;
 use std::sync::atomic::AtomicU32;
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -107,6 +108,31 @@ fn hash([x, y, z]: [u32; 3]) -> u64 {
     let b = u64::from(z) ^ 0xe703_7ed1_a0b4_28db;
     let product = u128::from(a) * u128::from(b);
     ((product as u64) ^ (product >> 64) as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+}
+
+/// Returns for each vertex the first row that is equal to it in every frame. All frames have
+/// equally many rows. -0 equals +0.
+pub(super) fn equal_in_all_frames(frames: &[&[[f32; 3]]]) -> Vec<AtomicU32> {
+    // Vertices of the same hash are compared in every frame.
+    let mut of_hash: HashMap<u64, Vec<usize>> = HashMap::new();
+    let first = |row: usize| {
+        let same = of_hash.entry(hash_in_all_frames(frames, row)).or_default();
+        let equal = |other: &&usize| frames.iter().all(|frame| frame[row] == frame[**other]);
+        let found = same.iter().find(equal).copied();
+        if found.is_none() {
+            same.push(row);
+        }
+        AtomicU32::new(found.unwrap_or(row) as u32)
+    };
+    (0..frames[0].len()).map(first).collect()
+}
+
+/// Hashes a vertex's positions in all frames.
+fn hash_in_all_frames(frames: &[&[[f32; 3]]], row: usize) -> u64 {
+    let mix = |hash: u64, x: f32| {
+        (hash.rotate_left(23) ^ u64::from((x + 0.0).to_bits())).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+    };
+    frames.iter().flat_map(|frame| frame[row]).fold(0, mix)
 }
 
 /// For each first row of equal positions the first corner that has one of them, or `NONE`.

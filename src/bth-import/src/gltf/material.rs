@@ -5,7 +5,6 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use crate::gltf::schema::Extensions;
-use crate::gltf::uv_set::UvSet;
 
 /// The extension with the older model of materials.
 pub(super) const SPECULAR_GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
@@ -108,19 +107,6 @@ impl Material {
     pub(super) fn kept_textures(&self) -> impl Iterator<Item = UsedTexture> + use<> {
         let base = self.base().ok().and_then(|base| base.texture);
         base.into_iter().chain(self.textures.emissive_texture.clone())
-    }
-
-    /// Returns the number of the second set of texture coordinates: the set of the first kept
-    /// texture that cannot use the first set.
-    pub(super) fn second_set(&self) -> Option<u32> {
-        let first = UvSet::of_material(&self.textures).ok()?;
-        let is_lit = self.emissive_factor.is_some_and(|factor| factor != [0.0; 3]);
-        let base = self.base().ok().and_then(|base| base.texture);
-        let emissive = self.textures.emissive_texture.clone().filter(|_| is_lit);
-        [base, emissive].into_iter().flatten().find_map(|used| {
-            let set = UvSet::of(&used).ok()?;
-            (first.relative(&set).is_none() && set.rows().is_some()).then_some(set.number)
-        })
     }
 
     /// Returns the names of what it has and no file keeps.

@@ -12,7 +12,7 @@ use serde::Deserialize;
 use crate::error::{Error, Result};
 use crate::gltf::extensions::TEXTURE_TRANSFORM;
 use crate::gltf::file::GltfFile;
-use crate::gltf::material::{Textures, UsedTexture};
+use crate::gltf::material::{Material, Textures, UsedTexture};
 use crate::source::MALFORMED;
 
 /// A set of texture coordinates and its transform.
@@ -105,6 +105,21 @@ fn rows(transform: DAffine2) -> Option<[[f32; 3]; 2]> {
     let [x, y, z] = transform.to_cols_array_2d();
     let rows = [0, 1].map(|k| [x[k], y[k], z[k]].map(|number| number as f32));
     rows.as_flattened().iter().all(|x| x.is_finite()).then_some(rows)
+}
+
+impl Material {
+    /// Returns the number of the second set of texture coordinates: the set of the first kept
+    /// texture that cannot use the first set.
+    pub(super) fn second_set(&self) -> Option<u32> {
+        let first = UvSet::of_material(&self.textures).ok()?;
+        let is_lit = self.emissive_factor.is_some_and(|factor| factor != [0.0; 3]);
+        let base = self.base().ok().and_then(|base| base.texture);
+        let emissive = self.textures.emissive_texture.clone().filter(|_| is_lit);
+        [base, emissive].into_iter().flatten().find_map(|used| {
+            let set = UvSet::of(&used).ok()?;
+            (first.relative(&set).is_none() && set.rows().is_some()).then_some(set.number)
+        })
+    }
 }
 
 impl GltfFile<'_> {

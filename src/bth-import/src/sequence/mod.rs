@@ -9,9 +9,6 @@ pub use files::sequence_files;
 pub use frames::{import_sequence, import_sequence_bytes, import_vertex_cache, import_vertex_cache_bytes};
 pub use vertex_cache::{VertexCache, read_vertex_cache};
 
-use std::collections::HashMap;
-use std::sync::atomic::AtomicU32;
-
 use crate::error::Result;
 use crate::source::Source;
 
@@ -48,29 +45,4 @@ fn check_times(source: &Source<'_>, times: &[f64]) -> Result<()> {
     let before = row.checked_sub(1).map_or(f64::NEG_INFINITY, |row| times[row]);
     let message = format!("frame {row}: expected a finite time after {before} s, found {} s", times[row]);
     Err(source.error(MISMATCH, message, "give another rate, or export the frames again"))
-}
-
-/// Returns for each vertex the first row that is equal to it in every frame. All frames have
-/// equally many rows. -0 equals +0.
-pub(crate) fn equal_vertices(frames: &[&[[f32; 3]]]) -> Vec<AtomicU32> {
-    // Vertices of the same hash are compared in every frame.
-    let mut of_hash: HashMap<u64, Vec<usize>> = HashMap::new();
-    let first = |row: usize| {
-        let same = of_hash.entry(hash(frames, row)).or_default();
-        let equal = |other: &&usize| frames.iter().all(|frame| frame[row] == frame[**other]);
-        let found = same.iter().find(equal).copied();
-        if found.is_none() {
-            same.push(row);
-        }
-        AtomicU32::new(found.unwrap_or(row) as u32)
-    };
-    (0..frames[0].len()).map(first).collect()
-}
-
-/// Hashes a vertex's positions in all frames.
-fn hash(frames: &[&[[f32; 3]]], row: usize) -> u64 {
-    let mix = |hash: u64, x: f32| {
-        (hash.rotate_left(23) ^ u64::from((x + 0.0).to_bits())).wrapping_mul(0x9e37_79b9_7f4a_7c15)
-    };
-    frames.iter().flat_map(|frame| frame[row]).fold(0, mix)
 }

@@ -4,6 +4,8 @@ mod animation;
 mod heat_map;
 mod picture;
 mod sink;
+mod tone_mapping;
 
-pub(crate) use picture::{Picture, shoulder, to_picture};
+pub(crate) use picture::Picture;
 pub(crate) use sink::{Pattern, Sink, refuse_inputs};
+pub(crate) use tone_mapping::{shoulder, to_picture};

@@ -1,7 +1,6 @@
 //! What all samples of a frame share, and what is counted while they are shaded.
 
 use super::geometry::ShadingGeometry;
-use super::visibility::Chance;
 use crate::args::{Args, Mode};
 use crate::camera::{Camera, CameraRay, SceneBounds, SceneSetup};
 use crate::environment::Environment;
@@ -9,7 +8,8 @@ use crate::failure::Failure;
 use crate::materials::SceneMaterials;
 use crate::sampling::Sampler;
 use bth::Scene;
-use bth::rays::Hit;
+use bth::rays::{Hit, PrimitiveRef};
+use bth_random::mix;
 use glam::{DVec2, DVec3, DVec4};
 use std::path::Path;
 use std::sync::OnceLock;
@@ -44,6 +44,25 @@ pub(crate) struct Sample {
     /// Point of the picture, from (-1, -1) lower left to (1, 1) upper right.
     pub(crate) at: DVec2,
     pub(crate) ray: CameraRay,
+}
+
+/// Decides by chance if a ray passes a surface of alpha mode BLEND: a sample of a pixel, and a
+/// number for each ray of the sample.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Chance {
+    pub(crate) sampler: Sampler,
+    /// Number of the sample within its pixel.
+    pub(crate) index: u32,
+    /// Number of the ray within its sample.
+    pub(crate) ray: u64,
+}
+
+impl Chance {
+    /// A number from 0 to below 1 for a surface: low-discrepancy over the samples of a pixel.
+    pub(crate) fn at(&self, primitive: PrimitiveRef) -> f32 {
+        let surface = mix(u64::from(primitive.instance) << 32 | u64::from(primitive.triangle));
+        self.sampler.point(surface ^ mix(self.ray), self.index).x as f32
+    }
 }
 
 /// Rays and traversal steps, summed over the samples of a tile or frame.

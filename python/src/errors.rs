@@ -1,7 +1,9 @@
 //! Exceptions.
 
 use pyo3::create_exception;
-use pyo3::exceptions::{PyKeyboardInterrupt, PyOSError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{
+    PyIndexError, PyKeyboardInterrupt, PyLookupError, PyOSError, PyRuntimeError, PyValueError,
+};
 use pyo3::prelude::*;
 use std::path::Path;
 
@@ -57,4 +59,19 @@ pub(crate) fn compile_error(error: bth_compile::Error) -> PyErr {
         Failure::Internal { .. } => PyRuntimeError::new_err(text),
         Failure::Cancelled => PyKeyboardInterrupt::new_err("cancelled"),
     }
+}
+
+/// Fails unless an index is below a count.
+pub(crate) fn check_index(name: &str, index: u32, count: u32) -> PyResult<()> {
+    match index < count {
+        true => Ok(()),
+        false => Err(PyIndexError::new_err(format!("{name} {index} of {count}"))),
+    }
+}
+
+/// The exception where a file does not keep the positions of triangles.
+pub(crate) fn no_geometry() -> PyErr {
+    PyLookupError::new_err(
+        "the file has no positions of triangles: compile it without geometry=False (--no-geometry)",
+    )
 }

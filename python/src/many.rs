@@ -2,7 +2,7 @@
 
 use crate::conditions::Conditions;
 use crate::output::{Part, Parts, chunks, chunks_of, numbers};
-use crate::rays::{Given, RayArrays, Rays};
+use crate::rays::{RayArrays, Rays, with_rays};
 use crate::scene::NativeScene;
 use crate::work::Watch;
 use bth::Crossings;
@@ -29,60 +29,40 @@ pub(crate) fn all_hits<'py>(
     most: Option<usize>,
     conditions: Conditions,
     threads: usize,
-    counts: PyReadwriteArray1<'_, u64>,
-) -> PyResult<Columns<'py>> {
-    match rays.given()? {
-        Given::Origins(rays) => all_hits_of(py, scene, rays, most, conditions, threads, counts),
-        Given::Starts(rays) => all_hits_of(py, scene, rays, most, conditions, threads, counts),
-    }
-}
-
-fn all_hits_of<'py, R: Rays>(
-    py: Python<'py>,
-    scene: &NativeScene,
-    rays: R,
-    most: Option<usize>,
-    conditions: Conditions,
-    threads: usize,
     mut counts: PyReadwriteArray1<'_, u64>,
 ) -> PyResult<Columns<'py>> {
-    let (scene, conditions) = (scene.get()?, conditions.checked()?);
-    let counts = numbers(&mut counts, rays.len())?;
-    let mut parts = Parts::new(rays.len());
-    let mut rows = counts;
-    let jobs = {
-        let mut rest = parts.each();
-        chunks(rays.len(), |count| {
-            let counts = rows.split_off_mut(..count).expect("a count for each ray");
-            (counts, rest.next().expect("a part for each chunk"))
-        })
-    };
-    let each = |scene: &bth::Scene,
-                (range, (counts, mut hits)): (Range<usize>, (&mut [u64], Part<'_, Hit>)),
-                watch: &Watch<'_>| {
-        if hits.is_full() {
-            return;
-        }
-        let (mut read, mut of_ray) = (Vec::new(), Vec::new());
-        rays.read(range.clone(), &mut read);
-        conditions.each(scene, range.start, &read, watch, |i, ray, accept| {
-            match most {
-                None => scene.all_hits(ray, accept, &mut of_ray),
-                Some(most) => scene.nearest_hits(ray, most, accept, &mut of_ray),
+    with_rays!(rays, rays => {
+        let (scene, conditions) = (scene.get()?, conditions.checked()?);
+        let counts = numbers(&mut counts, rays.len())?;
+        let mut parts = Parts::new(rays.len());
+        let jobs = parts.jobs(counts);
+        let each = |scene: &bth::Scene,
+                    (range, (counts, mut hits)): (Range<usize>, (&mut [u64], Part<'_, Hit>)),
+                    watch: &Watch<'_>| {
+            if hits.is_full() {
+                return;
             }
-            counts[i] = of_ray.len() as u64;
-            hits.append(&of_ray);
-        });
-    };
-    scene.run(py, conditions.threads(threads), jobs, each)?;
-    conditions.finish()?;
-    Ok((
-        parts.column(py, |h| h.t)?,
-        parts.column(py, |h| h.u)?,
-        parts.column(py, |h| h.v)?,
-        parts.column(py, |h| h.primitive.instance)?,
-        parts.column(py, |h| h.primitive.triangle)?,
-    ))
+            let (mut read, mut of_ray) = (Vec::new(), Vec::new());
+            rays.read(range.clone(), &mut read);
+            conditions.each(scene, range.start, &read, watch, |i, ray, accept| {
+                match most {
+                    None => scene.all_hits(ray, accept, &mut of_ray),
+                    Some(most) => scene.nearest_hits(ray, most, accept, &mut of_ray),
+                }
+                counts[i] = of_ray.len() as u64;
+                hits.append(&of_ray);
+            });
+        };
+        scene.run(py, conditions.threads(threads), jobs, each)?;
+        conditions.finish()?;
+        Ok((
+            parts.column(py, |h| h.t)?,
+            parts.column(py, |h| h.u)?,
+            parts.column(py, |h| h.v)?,
+            parts.column(py, |h| h.primitive.instance)?,
+            parts.column(py, |h| h.primitive.triangle)?,
+        ))
+    })
 }
 
 /// Number of hits of rays.
@@ -93,32 +73,20 @@ pub(crate) fn count(
     rays: RayArrays<'_>,
     conditions: Conditions,
     threads: usize,
-    out: PyReadwriteArray1<'_, u64>,
-) -> PyResult<()> {
-    match rays.given()? {
-        Given::Origins(rays) => count_of(py, scene, rays, conditions, threads, out),
-        Given::Starts(rays) => count_of(py, scene, rays, conditions, threads, out),
-    }
-}
-
-fn count_of<R: Rays>(
-    py: Python<'_>,
-    scene: &NativeScene,
-    rays: R,
-    conditions: Conditions,
-    threads: usize,
     mut out: PyReadwriteArray1<'_, u64>,
 ) -> PyResult<()> {
-    let (scene, conditions) = (scene.get()?, conditions.checked()?);
-    let jobs = chunks_of(numbers(&mut out, rays.len())?);
-    scene.run(py, conditions.threads(threads), jobs, |scene, (range, counts), watch| {
-        let mut read = Vec::new();
-        rays.read(range.clone(), &mut read);
-        conditions.each(scene, range.start, &read, watch, |i, ray, accept| {
-            counts[i] = scene.count_hits(ray, accept) as u64;
-        });
-    })?;
-    conditions.finish()
+    with_rays!(rays, rays => {
+        let (scene, conditions) = (scene.get()?, conditions.checked()?);
+        let jobs = chunks_of(numbers(&mut out, rays.len())?);
+        scene.run(py, conditions.threads(threads), jobs, |scene, (range, counts), watch| {
+            let mut read = Vec::new();
+            rays.read(range.clone(), &mut read);
+            conditions.each(scene, range.start, &read, watch, |i, ray, accept| {
+                counts[i] = scene.count_hits(ray, accept) as u64;
+            });
+        })?;
+        conditions.finish()
+    })
 }
 
 /// Crossings of surfaces by rays: their numbers, and outward ones minus inward ones.
@@ -128,36 +96,24 @@ pub(crate) fn crossings(
     scene: &NativeScene,
     rays: RayArrays<'_>,
     threads: usize,
-    count: PyReadwriteArray1<'_, u32>,
-    winding: PyReadwriteArray1<'_, i32>,
-) -> PyResult<()> {
-    match rays.given()? {
-        Given::Origins(rays) => crossings_of(py, scene, rays, threads, count, winding),
-        Given::Starts(rays) => crossings_of(py, scene, rays, threads, count, winding),
-    }
-}
-
-fn crossings_of<R: Rays>(
-    py: Python<'_>,
-    scene: &NativeScene,
-    rays: R,
-    threads: usize,
     mut count: PyReadwriteArray1<'_, u32>,
     mut winding: PyReadwriteArray1<'_, i32>,
 ) -> PyResult<()> {
-    let scene = scene.get()?;
-    let (mut count, mut winding) = (numbers(&mut count, rays.len())?, numbers(&mut winding, rays.len())?);
-    let jobs = chunks(rays.len(), |rows| {
-        let part = "a result for each ray";
-        (count.split_off_mut(..rows).expect(part), winding.split_off_mut(..rows).expect(part))
-    });
-    scene.run(py, threads, jobs, |scene, (range, (count, winding)), watch| {
-        let mut read = Vec::new();
-        rays.read(range, &mut read);
-        let mut found = vec![Crossings::default(); read.len()];
-        watch.in_parts(read.len(), |part| scene.crossings_batch(&read[part.clone()], &mut found[part]));
-        for (i, found) in found.iter().enumerate() {
-            (count[i], winding[i]) = (found.count, found.winding);
-        }
+    with_rays!(rays, rays => {
+        let scene = scene.get()?;
+        let (mut count, mut winding) = (numbers(&mut count, rays.len())?, numbers(&mut winding, rays.len())?);
+        let jobs = chunks(rays.len(), |rows| {
+            let part = "a result for each ray";
+            (count.split_off_mut(..rows).expect(part), winding.split_off_mut(..rows).expect(part))
+        });
+        scene.run(py, threads, jobs, |scene, (range, (count, winding)), watch| {
+            let mut read = Vec::new();
+            rays.read(range, &mut read);
+            let mut found = vec![Crossings::default(); read.len()];
+            watch.in_parts(read.len(), |part| scene.crossings_batch(&read[part.clone()], &mut found[part]));
+            for (i, found) in found.iter().enumerate() {
+                (count[i], winding[i]) = (found.count, found.winding);
+            }
+        })
     })
 }

@@ -1,6 +1,6 @@
 //! How surfaces look: the materials and textures of objects.
 
-use crate::parts::check_index;
+use crate::errors::check_index;
 use crate::scene::NativeScene;
 use bth::{Alpha, Scene, Wrap};
 use pyo3::prelude::*;

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A mutable array of so many numbers.
+/// A mutable array of `count` numbers.
 pub(crate) fn numbers<'a, T: Element>(
     array: &'a mut PyReadwriteArray1<'_, T>,
     count: usize,
@@ -115,6 +115,9 @@ pub(crate) struct Part<'a, T> {
     is_full: &'a AtomicBool,
 }
 
+/// A chunk of a call that counts and lists results.
+pub(crate) type Job<'a, T> = (Range<usize>, (&'a mut [u64], Part<'a, T>));
+
 impl<T: Copy> Parts<T> {
     /// No results of so many rays or regions.
     pub(crate) fn new(count: usize) -> Parts<T> {
@@ -124,10 +127,13 @@ impl<T: Copy> Parts<T> {
         }
     }
 
-    /// The parts of the chunks, in their order.
-    pub(crate) fn each(&mut self) -> impl Iterator<Item = Part<'_, T>> {
+    /// The chunks of a call, each with its part of the counts and of the results.
+    pub(crate) fn jobs<'a>(&'a mut self, mut counts: &'a mut [u64]) -> Vec<Job<'a, T>> {
         let is_full = &self.is_full;
-        self.parts.iter_mut().map(move |found| Part { found, is_full })
+        let mut rest = self.parts.iter_mut().map(|found| Part { found, is_full });
+        chunks(counts.len(), |rows| {
+            (split_off(&mut counts, rows), rest.next().expect("a part for each chunk"))
+        })
     }
 
     /// One number of each result. Fails if there was or is not enough memory.

@@ -1,6 +1,6 @@
 //! Overlaps of triangles with boxes and balls.
 
-use crate::output::{Part, Parts, chunks, chunks_of, numbers};
+use crate::output::{Part, Parts, chunks_of, numbers};
 use crate::rays::{Bound1, Numbers, Rows, Vectors};
 use crate::scene::NativeScene;
 use crate::work::Watch;
@@ -123,15 +123,9 @@ pub(crate) fn triangles_in<'py>(
     mut counts: PyReadwriteArray1<'_, u64>,
 ) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>)> {
     let (scene, regions) = (scene.get()?, regions.regions()?);
-    let mut rows = numbers(&mut counts, regions.len())?;
+    let rows = numbers(&mut counts, regions.len())?;
     let mut parts = Parts::new(regions.len());
-    let jobs = {
-        let mut rest = parts.each();
-        chunks(regions.len(), |count| {
-            let counts = rows.split_off_mut(..count).expect("a count for each region");
-            (counts, rest.next().expect("a part for each chunk"))
-        })
-    };
+    let jobs = parts.jobs(rows);
     let each = |scene: &bth::Scene,
                 (range, (counts, mut all)): (Range<usize>, (&mut [u64], Part<'_, PrimitiveRef>)),
                 watch: &Watch<'_>| {

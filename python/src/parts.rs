@@ -1,16 +1,8 @@
 //! The parts of a scene (instances, and the objects' groups and materials): their names and masks.
 
+use crate::errors::check_index;
 use crate::scene::NativeScene;
-use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
-
-/// Fails unless an index is below a count.
-pub(crate) fn check_index(name: &str, index: u32, count: u32) -> PyResult<()> {
-    match index < count {
-        true => Ok(()),
-        false => Err(PyIndexError::new_err(format!("{name} {index} of {count}"))),
-    }
-}
 
 /// Names of objects; empty for those that have none.
 #[pyfunction]

@@ -3,8 +3,9 @@
 use crate::output::{HitArrays, chunks, chunks_of, numbers, split_off};
 use crate::rays::Vectors;
 use crate::scene::NativeScene;
+use bth::Scene;
 use bth::rays::{Hit, PrimitiveRef};
-use numpy::PyReadwriteArray1;
+use numpy::{Element, PyReadwriteArray1};
 use pyo3::prelude::*;
 use std::ops::Range;
 
@@ -15,7 +16,24 @@ fn read(points: crate::rays::Rows<'_>, range: Range<usize>) -> Vec<[f32; 3]> {
     read
 }
 
-/// Whether points lie inside of closed surfaces.
+/// Stores a number for each point.
+fn store_each<T: Element + Send>(
+    py: Python<'_>,
+    scene: &NativeScene,
+    points: &Vectors<'_>,
+    threads: usize,
+    out: &mut PyReadwriteArray1<'_, T>,
+    query: impl Fn(&Scene, &[[f32; 3]], &mut [T]) + Sync,
+) -> PyResult<()> {
+    let (scene, points) = (scene.get()?, points.rows()?);
+    let jobs = chunks_of(numbers(out, points.len())?);
+    scene.run(py, threads, jobs, |scene, (range, out), watch| {
+        let points = read(points, range);
+        watch.in_parts(points.len(), |part| query(scene, &points[part.clone()], &mut out[part]));
+    })
+}
+
+/// Stores which points lie inside of closed surfaces.
 #[pyfunction]
 pub(crate) fn contains(
     py: Python<'_>,
@@ -24,15 +42,10 @@ pub(crate) fn contains(
     threads: usize,
     mut out: PyReadwriteArray1<'_, bool>,
 ) -> PyResult<()> {
-    let (scene, points) = (scene.get()?, points.rows()?);
-    let jobs = chunks_of(numbers(&mut out, points.len())?);
-    scene.run(py, threads, jobs, |scene, (range, inside), watch| {
-        let points = read(points, range);
-        watch.in_parts(points.len(), |part| scene.contains_batch(&points[part.clone()], &mut inside[part]));
-    })
+    store_each(py, scene, &points, threads, &mut out, Scene::contains_batch)
 }
 
-/// Winding numbers of points.
+/// Stores winding numbers of points.
 #[pyfunction]
 pub(crate) fn winding(
     py: Python<'_>,
@@ -41,15 +54,10 @@ pub(crate) fn winding(
     threads: usize,
     mut out: PyReadwriteArray1<'_, i32>,
 ) -> PyResult<()> {
-    let (scene, points) = (scene.get()?, points.rows()?);
-    let jobs = chunks_of(numbers(&mut out, points.len())?);
-    scene.run(py, threads, jobs, |scene, (range, winding), watch| {
-        let points = read(points, range);
-        watch.in_parts(points.len(), |part| scene.winding_batch(&points[part.clone()], &mut winding[part]));
-    })
+    store_each(py, scene, &points, threads, &mut out, Scene::winding_batch)
 }
 
-/// Signed distances of points, negative inside.
+/// Stores signed distances of points, negative inside.
 #[pyfunction]
 pub(crate) fn signed_distance(
     py: Python<'_>,
@@ -58,18 +66,11 @@ pub(crate) fn signed_distance(
     threads: usize,
     mut out: PyReadwriteArray1<'_, f32>,
 ) -> PyResult<()> {
-    let (scene, points) = (scene.get()?, points.rows()?);
-    let jobs = chunks_of(numbers(&mut out, points.len())?);
-    scene.run(py, threads, jobs, |scene, (range, distances), watch| {
-        let points = read(points, range);
-        watch.in_parts(points.len(), |part| {
-            scene.signed_distance_batch(&points[part.clone()], &mut distances[part]);
-        });
-    })
+    store_each(py, scene, &points, threads, &mut out, Scene::signed_distance_batch)
 }
 
-/// Closest points within a radius: in the place of t their distances; their positions, three numbers a point; and on what of the
-/// triangle they lie, as [`bth::Feature::code`] numbers it.
+/// Stores closest points within a radius: their distances in the column of t; their positions, three
+/// numbers a point; and on what of the triangle they lie, a [`bth::Feature::code`].
 #[pyfunction]
 pub(crate) fn closest(
     py: Python<'_>,

@@ -3,7 +3,7 @@
 use crate::conditions::Conditions;
 use crate::errors::start_error;
 use crate::output::{HitArrays, chunks, chunks_of, numbers};
-use crate::rays::{Buffers, Given, RayArrays, Rays, StartArrays};
+use crate::rays::{Buffers, RayArrays, Rays, StartArrays, with_rays};
 use crate::scene::NativeScene;
 use bth::rays::Hit;
 use numpy::PyReadwriteArray1;
@@ -29,42 +29,30 @@ pub(crate) fn nearest(
     rays: RayArrays<'_>,
     conditions: Conditions,
     threads: usize,
-    out: HitArrays<'_>,
-) -> PyResult<()> {
-    match rays.given()? {
-        Given::Origins(rays) => nearest_of(py, scene, rays, conditions, threads, out),
-        Given::Starts(rays) => nearest_of(py, scene, rays, conditions, threads, out),
-    }
-}
-
-fn nearest_of<R: Rays>(
-    py: Python<'_>,
-    scene: &NativeScene,
-    rays: R,
-    conditions: Conditions,
-    threads: usize,
     mut out: HitArrays<'_>,
 ) -> PyResult<()> {
-    let (scene, conditions) = (scene.get()?, conditions.checked()?);
-    let mut columns = out.columns(rays.len())?;
-    let jobs = chunks(rays.len(), |rows| columns.split_off(rows));
-    scene.run(py, conditions.threads(threads), jobs, |scene, (range, mut columns), watch| {
-        let mut scratch = SCRATCH.take();
-        let Scratch { buffers, hits } = &mut scratch;
-        let read = R::buffer(buffers);
-        rays.read(range.clone(), read);
-        hits.resize(range.len(), Hit::MISS);
-        if conditions.filter.is_none() {
-            scene.batch(read).accept(&conditions.accept).nearest(hits);
-        } else {
-            conditions.each(scene, range.start, read, watch, |i, ray, accept| {
-                hits[i] = scene.nearest_accepted(ray, accept).unwrap_or(Hit::MISS);
-            });
-        }
-        columns.store(hits);
-        SCRATCH.set(scratch);
-    })?;
-    conditions.finish()
+    with_rays!(rays, rays => {
+        let (scene, conditions) = (scene.get()?, conditions.checked()?);
+        let mut columns = out.columns(rays.len())?;
+        let jobs = chunks(rays.len(), |rows| columns.split_off(rows));
+        scene.run(py, conditions.threads(threads), jobs, |scene, (range, mut columns), watch| {
+            let mut scratch = SCRATCH.take();
+            let Scratch { buffers, hits } = &mut scratch;
+            let read = rays.buffer(buffers);
+            rays.read(range.clone(), read);
+            hits.resize(range.len(), Hit::MISS);
+            if conditions.filter.is_none() {
+                scene.batch(read).accept(&conditions.accept).nearest(hits);
+            } else {
+                conditions.each(scene, range.start, read, watch, |i, ray, accept| {
+                    hits[i] = scene.nearest_accepted(ray, accept).unwrap_or(Hit::MISS);
+                });
+            }
+            columns.store(hits);
+            SCRATCH.set(scratch);
+        })?;
+        conditions.finish()
+    })
 }
 
 /// Stores which rays hit anything.
@@ -75,38 +63,26 @@ pub(crate) fn any(
     rays: RayArrays<'_>,
     conditions: Conditions,
     threads: usize,
-    out: PyReadwriteArray1<'_, bool>,
-) -> PyResult<()> {
-    match rays.given()? {
-        Given::Origins(rays) => any_of(py, scene, rays, conditions, threads, out),
-        Given::Starts(rays) => any_of(py, scene, rays, conditions, threads, out),
-    }
-}
-
-fn any_of<R: Rays>(
-    py: Python<'_>,
-    scene: &NativeScene,
-    rays: R,
-    conditions: Conditions,
-    threads: usize,
     mut out: PyReadwriteArray1<'_, bool>,
 ) -> PyResult<()> {
-    let (scene, conditions) = (scene.get()?, conditions.checked()?);
-    let jobs = chunks_of(numbers(&mut out, rays.len())?);
-    scene.run(py, conditions.threads(threads), jobs, |scene, (range, found), watch| {
-        let mut scratch = SCRATCH.take();
-        let read = R::buffer(&mut scratch.buffers);
-        rays.read(range.clone(), read);
-        if conditions.filter.is_none() {
-            scene.batch(read).accept(&conditions.accept).any(found);
-        } else {
-            conditions.each(scene, range.start, read, watch, |i, ray, accept| {
-                found[i] = scene.any_accepted(ray, accept);
-            });
-        }
-        SCRATCH.set(scratch);
-    })?;
-    conditions.finish()
+    with_rays!(rays, rays => {
+        let (scene, conditions) = (scene.get()?, conditions.checked()?);
+        let jobs = chunks_of(numbers(&mut out, rays.len())?);
+        scene.run(py, conditions.threads(threads), jobs, |scene, (range, found), watch| {
+            let mut scratch = SCRATCH.take();
+            let read = rays.buffer(&mut scratch.buffers);
+            rays.read(range.clone(), read);
+            if conditions.filter.is_none() {
+                scene.batch(read).accept(&conditions.accept).any(found);
+            } else {
+                conditions.each(scene, range.start, read, watch, |i, ray, accept| {
+                    found[i] = scene.any_accepted(ray, accept);
+                });
+            }
+            SCRATCH.set(scratch);
+        })?;
+        conditions.finish()
+    })
 }
 
 /// Fails if rays cannot start at one of the points, and says why.

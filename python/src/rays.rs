@@ -154,6 +154,17 @@ pub(crate) struct StartArrays<'py> {
     v: PyReadonlyArray1<'py, f32>,
 }
 
+/// Evaluates an expression with the rays of a call, of whichever kind they are.
+macro_rules! with_rays {
+    ($given:expr, $rays:ident => $do:expr) => {
+        match $given.given()? {
+            crate::rays::Given::Origins($rays) => $do,
+            crate::rays::Given::Starts($rays) => $do,
+        }
+    };
+}
+pub(crate) use with_rays;
+
 /// The rays of a call, of either kind.
 pub(crate) enum Given<'a> {
     Origins(OriginRays<'a>),
@@ -171,7 +182,7 @@ pub(crate) trait Rays: Copy + Sync {
     fn read(&self, range: Range<usize>, rays: &mut Vec<Self::Ray>);
 
     /// The buffer for rays of this kind.
-    fn buffer(buffers: &mut Buffers) -> &mut Vec<Self::Ray>;
+    fn buffer<'b>(&self, buffers: &'b mut Buffers) -> &'b mut Vec<Self::Ray>;
 }
 
 /// Buffers for the rays of a chunk.
@@ -275,7 +286,7 @@ impl Rays for OriginRays<'_> {
         self.tmax.each(range, |i, t| rays[i].tmax = t);
     }
 
-    fn buffer(buffers: &mut Buffers) -> &mut Vec<Ray> {
+    fn buffer<'b>(&self, buffers: &'b mut Buffers) -> &'b mut Vec<Ray> {
         &mut buffers.rays
     }
 }
@@ -294,7 +305,7 @@ impl Rays for StartRays<'_> {
         self.tmax.each(range, |i, t| rays[i].tmax = t);
     }
 
-    fn buffer(buffers: &mut Buffers) -> &mut Vec<StartRay> {
+    fn buffer<'b>(&self, buffers: &'b mut Buffers) -> &'b mut Vec<StartRay> {
         &mut buffers.starts
     }
 }

@@ -1,6 +1,6 @@
 //! The class of scenes: opening, closing, what a scene consists of, and its time.
 
-use crate::errors::{format_error, write_error};
+use crate::errors::{check_index, format_error, no_geometry, write_error};
 use crate::shared::{Handle, OpenScene};
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray2, PyArray3, PyReadonlyArray2};
@@ -137,7 +137,7 @@ impl NativeScene {
     /// Number of vertices of an object that can be given new positions.
     fn vertex_count(&self, py: Python<'_>, object: u32) -> PyResult<Option<usize>> {
         self.with(py, |scene| {
-            crate::parts::check_index("object", object, scene.object_count())?;
+            check_index("object", object, scene.object_count())?;
             Ok(scene.vertex_count(object))
         })?
     }
@@ -152,7 +152,7 @@ impl NativeScene {
         let (rows, _) = positions.as_slice()?.as_chunks::<3>();
         let rows = rows.to_vec();
         self.get()?.change(py, |scene| {
-            crate::parts::check_index("object", object, scene.object_count())?;
+            check_index("object", object, scene.object_count())?;
             let update = scene.set_positions(object, &rows).map_err(|e| format_error(&e))?;
             Ok(update.deformed_cost_ratio)
         })?
@@ -170,7 +170,7 @@ impl NativeScene {
         let [open, close] =
             [open.as_slice()?, close.as_slice()?].map(|rows| rows.as_chunks::<3>().0.to_vec());
         self.get()?.change(py, |scene| {
-            crate::parts::check_index("object", object, scene.object_count())?;
+            check_index("object", object, scene.object_count())?;
             let update = scene.set_positions_between(object, [&open, &close], share);
             Ok(update.map_err(|e| format_error(&e))?.deformed_cost_ratio)
         })?
@@ -216,7 +216,7 @@ impl NativeScene {
     /// Lower and upper end of a box in world space that contains an instance, if it is visible.
     fn instance_bounds(&self, py: Python<'_>, instance: u32) -> PyResult<Option<bth::Bounds>> {
         self.with(py, |scene| {
-            crate::parts::check_index("instance", instance, scene.instance_count())?;
+            check_index("instance", instance, scene.instance_count())?;
             Ok(scene.instance_bounds(instance))
         })?
     }
@@ -224,7 +224,7 @@ impl NativeScene {
     /// Lower and upper end of a box of an object in its own space, if anything of it can be hit.
     fn object_bounds(&self, py: Python<'_>, object: u32) -> PyResult<Option<bth::Bounds>> {
         self.with(py, |scene| {
-            crate::parts::check_index("object", object, scene.object_count())?;
+            check_index("object", object, scene.object_count())?;
             Ok(scene.object_bounds(object))
         })?
     }
@@ -232,10 +232,10 @@ impl NativeScene {
     /// Positions and triangles of an object, if the file has them.
     fn geometry<'py>(&self, py: Python<'py>, object: u32) -> PyResult<Geometry<'py>> {
         let (positions, triangles) = self.with(py, |scene| {
-            crate::parts::check_index("object", object, scene.object_count())?;
+            check_index("object", object, scene.object_count())?;
             let view = scene.object(object);
             if view.triangles.is_empty() && view.header.triangles > 0 {
-                return Err(crate::surface::no_geometry());
+                return Err(no_geometry());
             }
             let rows = |rows: usize| (rows, 3);
             let positions =

@@ -1,12 +1,13 @@
 //! The surface at hits: positions, normals, texture coordinates, vertex colours, groups, materials and opacity.
 
+use crate::errors::no_geometry;
 use crate::output::{numbers, split_off};
 use crate::rays::CHUNK;
 use crate::scene::NativeScene;
 use bth::rays::{Hit, PrimitiveRef};
 use numpy::ndarray::ArrayView1;
 use numpy::{PyReadonlyArray1, PyReadwriteArray1};
-use pyo3::exceptions::{PyIndexError, PyLookupError, PyValueError};
+use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use std::ops::Range;
 
@@ -82,13 +83,6 @@ impl Points<'_> {
         }
         Ok(())
     }
-}
-
-/// The exception where a file does not keep the positions of triangles.
-pub(crate) fn no_geometry() -> PyErr {
-    PyLookupError::new_err(
-        "the file has no positions of triangles: compile it without geometry=False (--no-geometry)",
-    )
 }
 
 /// The arrays that are asked for, each `None` or as long as there are points, times the numbers of one. What stands in them remains

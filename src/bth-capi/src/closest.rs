@@ -1,5 +1,6 @@
-//! The part of the C interface for closest points and for triangles in boxes and balls.
+//! Closest points, and triangles in boxes and balls.
 
+use crate::query::Arguments;
 use crate::{ERROR_ARGUMENT, ERROR_INTERNAL, OK, fail};
 use runtime::Scene;
 use runtime::rays::PrimitiveRef;
@@ -42,39 +43,11 @@ impl Closest {
     }
 }
 
-/// Number of points that are searched together.
-const CHUNK: usize = 1024;
-
-/// Calls `answer` for chunks of the points and of the results, with an offset of both.
-///
-/// # Safety
-/// `scene` is null or open, `points` is null or points to `count` elements, and they are not written to during the call.
-unsafe fn in_chunks(
-    name: &str,
-    scene: *const Scene,
-    points: *const [f32; 3],
-    count: usize,
-    mut answer: impl FnMut(&Scene, &[[f32; 3]], usize),
-) -> i32 {
-    if count == 0 {
-        return OK;
-    }
-    if scene.is_null() || points.is_null() {
-        return fail(ERROR_ARGUMENT, format!("{name}: pointers must not be null"));
-    }
-    // SAFETY: they are not null, so by contract the scene is open and there are `count` points.
-    let (scene, points) = unsafe { (&*scene, std::slice::from_raw_parts(points, count)) };
-    let all = AssertUnwindSafe(|| {
-        points.chunks(CHUNK).enumerate().for_each(|(i, points)| answer(scene, points, i * CHUNK));
-    });
-    catch_unwind(all).map_or_else(|_| fail(ERROR_INTERNAL, format!("{name}: internal error")), |()| OK)
-}
-
 /// Closest points; see `bth.h`.
 ///
 /// # Safety
-/// `scene` is null or open. `points` and `closest` are each null or point to `count` elements; those of `closest` are valid for
-/// writes and do not overlap the others.
+/// `scene` is null or open. `points` and `closest` are each null or point to `count` elements. The
+/// elements of `closest` are valid for writes and do not overlap the others.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_closest_points(
     scene: *const Scene,
@@ -83,27 +56,21 @@ pub unsafe extern "C" fn bth_closest_points(
     closest: *mut Closest,
     count: usize,
 ) -> i32 {
-    if closest.is_null() && count > 0 {
-        return fail(ERROR_ARGUMENT, "bth_closest_points: pointers must not be null".into());
-    }
-    let mut found = [None; CHUNK];
-    // SAFETY: the contract of `in_chunks` is part of that of this function. `closest` is valid for `count` writes by contract, and
-    // `first + i` is below `count`.
+    let arguments = Arguments { scene, asked: points, answers: closest, count };
+    // SAFETY: the contract of this function includes that of `store_as`.
     unsafe {
-        in_chunks("bth_closest_points", scene, points, count, |scene, points, first| {
-            let found = &mut found[..points.len()];
-            scene.closest_batch(points, radius, found);
-            for (i, found) in found.iter().enumerate() {
-                closest.add(first + i).write(Closest::new(*found));
-            }
-        })
+        arguments.store_as(
+            None,
+            |scene, points, found| scene.closest_batch(points, radius, found),
+            Closest::new,
+        )
     }
 }
 
 /// Signed distances; see `bth.h`.
 ///
 /// # Safety
-/// As for [`bth_closest_points`], with `distances` in place of `closest`.
+/// The contract of [`bth_closest_points`], with `distances` for `closest`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_signed_distances(
     scene: *const Scene,
@@ -111,18 +78,9 @@ pub unsafe extern "C" fn bth_signed_distances(
     distances: *mut f32,
     count: usize,
 ) -> i32 {
-    if distances.is_null() && count > 0 {
-        return fail(ERROR_ARGUMENT, "bth_signed_distances: pointers must not be null".into());
-    }
-    let mut found = [0.0; CHUNK];
-    // SAFETY: as in `bth_closest_points`.
-    unsafe {
-        in_chunks("bth_signed_distances", scene, points, count, |scene, points, first| {
-            let found = &mut found[..points.len()];
-            scene.signed_distance_batch(points, found);
-            ptr::copy_nonoverlapping(found.as_ptr(), distances.add(first), found.len());
-        })
-    }
+    let arguments = Arguments { scene, asked: points, answers: distances, count };
+    // SAFETY: the contract of this function includes that of `store`.
+    unsafe { arguments.store(f32::NAN, Scene::signed_distance_batch) }
 }
 
 /// Stores triangles that a query finds; see `bth.h`.

@@ -9,14 +9,16 @@ pub mod inside;
 pub mod materials;
 pub mod memory;
 pub mod motion;
+mod query;
 pub mod starts;
 pub mod surface;
 
+use query::{Arguments, guarded};
 use runtime::rays::{Hit, PrimitiveRef, Ray};
 use runtime::{Code, Error, Scene};
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char};
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::catch_unwind;
 use std::path::Path;
 use std::slice::{from_mut, from_ref};
 
@@ -116,32 +118,10 @@ pub extern "C" fn bth_last_error() -> *const c_char {
     LAST_ERROR.with(|last| last.borrow().as_ptr())
 }
 
-/// The arguments of a query: the scene and the rays.
-type Batch<'a> = (&'a Scene, &'a [Ray]);
-
-/// The arguments of a query as slices. `Err` is the result of the query if there are no rays, or `scene` or `rays` is null.
-///
-/// # Safety
-/// `scene` is null or open. `rays` is null or points to `count` elements. Both outlive the result and are not written to during its life.
-unsafe fn batch<'a>(scene: *const Scene, rays: *const Ray, count: usize) -> Result<Batch<'a>, i32> {
-    if scene.is_null() || rays.is_null() || count == 0 {
-        return Err(if count == 0 { OK } else { null_argument() });
-    }
-    // SAFETY: the pointers are not null, so by contract `scene` is an open scene, and `rays` points to `count` elements. `Ray` has the
-    // layout of the C struct, and all bit patterns are valid for it.
-    unsafe { Ok((&*scene, std::slice::from_raw_parts(rays, count))) }
-}
-
 /// The result of a query without a scene, rays or room for results.
 #[cold]
 fn null_argument() -> i32 {
-    fail(ERROR_ARGUMENT, "scene, rays and results of a query must not be null".into())
-}
-
-/// The result of a query that panicked, which would be a defect of the library.
-#[cold]
-fn defect() -> i32 {
-    fail(ERROR_INTERNAL, "internal error of a query".into())
+    fail(ERROR_ARGUMENT, "scene, rays or points, and results of a query must not be null".into())
 }
 
 /// Nearest hits; see `bth.h`.
@@ -164,37 +144,24 @@ pub unsafe extern "C" fn bth_nearest(
         if let (Some(scene), Some(ray), Some(hit)) = one {
             // With nothing but the kernel behind it, no registers are saved for what only batches need.
             let (ray, hits) = (from_ref(ray), from_mut(hit));
-            if catch_unwind(AssertUnwindSafe(|| scene.batch(ray).nearest(hits))).is_err() {
+            if guarded(|| scene.batch(ray).nearest(hits)).is_err() {
                 hits.fill(Hit::MISS);
-                defect();
             }
             return;
         }
     }
     // SAFETY: the contract is the same.
-    unsafe { nearest_of_batch(scene, rays, hits, count) }
+    unsafe { nearest_of_batch(Arguments { scene, asked: rays, answers: hits, count }) }
 }
 
 /// [`bth_nearest`] for any number of rays.
 ///
 /// # Safety
-/// As for [`bth_nearest`].
+/// The arguments are as in [`Arguments`].
 #[inline(never)]
-unsafe fn nearest_of_batch(scene: *const Scene, rays: *const Ray, hits: *mut Hit, count: usize) {
-    // SAFETY: the contract of `batch` is part of that of this function.
-    let Ok((scene, rays)) = (unsafe { batch(scene, rays, count) }) else { return };
-    if hits.is_null() {
-        null_argument();
-        return;
-    }
-    // SAFETY: it is not null, so by contract it points to `count` elements, which are valid for writes and do not overlap the
-    // slices above. All bit patterns are valid for `Hit`.
-    let hits = unsafe { std::slice::from_raw_parts_mut(hits, count) };
-    // A panic must not unwind into C. After a panic, which would be a defect of the library, all rays are reported as misses.
-    if catch_unwind(AssertUnwindSafe(|| scene.batch(rays).nearest(hits))).is_err() {
-        hits.fill(Hit::MISS);
-        defect();
-    }
+unsafe fn nearest_of_batch(arguments: Arguments<Ray, Hit>) {
+    // SAFETY: the contract is the same. `Ray` and `Hit` have the layout of the C structs.
+    unsafe { arguments.store(Hit::MISS, |scene, rays, hits| scene.batch(rays).nearest(hits)) };
 }
 
 /// Whether rays hit anything; see `bth.h`.
@@ -214,52 +181,24 @@ pub unsafe extern "C" fn bth_any(
         let one = unsafe { (scene.as_ref(), rays.as_ref(), hit.as_mut()) };
         if let (Some(scene), Some(ray), Some(hit)) = one {
             let (ray, mut found) = (from_ref(ray), [false]);
-            let traced = catch_unwind(AssertUnwindSafe(|| scene.batch(ray).any(&mut found)));
+            let traced = guarded(|| scene.batch(ray).any(&mut found));
             *hit = (traced.is_ok() && found[0]).into();
-            if traced.is_err() {
-                defect();
-            }
             return;
         }
     }
     // SAFETY: the contract is the same.
-    unsafe { any_of_batch(scene, rays, hit, count) }
+    unsafe { any_of_batch(Arguments { scene, asked: rays, answers: hit, count }) }
 }
 
 /// [`bth_any`] for any number of rays.
 ///
 /// # Safety
-/// As for [`bth_any`].
+/// The arguments are as in [`Arguments`].
 #[inline(never)]
-unsafe fn any_of_batch(scene: *const Scene, rays: *const Ray, hit: *mut u8, count: usize) {
-    // SAFETY: the contract of `batch` is part of that of this function.
-    let Ok((scene, rays)) = (unsafe { batch(scene, rays, count) }) else { return };
-    if hit.is_null() {
-        null_argument();
-        return;
-    }
-    // SAFETY: it is not null, so by contract it points to `count` bytes, which are valid for writes and do not overlap the slices
-    // above. The caller's bytes are not used as a slice of `bool`, because `bool` has invalid bit patterns.
-    any_in_chunks(scene, rays, unsafe { std::slice::from_raw_parts_mut(hit, count) });
-}
-
-/// Number of rays that [`any_in_chunks`] traces together.
-const CHUNK: usize = 1024;
-
-/// Whether rays hit anything, for [`CHUNK`] rays at a time. After a panic, the rays of a chunk are reported as misses.
-#[inline(never)]
-fn any_in_chunks(scene: &Scene, rays: &[Ray], hit: &mut [u8]) {
-    let mut buffer = [false; CHUNK];
-    for (rays, hit) in rays.chunks(CHUNK).zip(hit.chunks_mut(CHUNK)) {
-        let found = &mut buffer[..rays.len()];
-        if catch_unwind(AssertUnwindSafe(|| scene.batch(rays).any(found))).is_err() {
-            found.fill(false);
-            defect();
-        }
-        for (out, found) in hit.iter_mut().zip(found) {
-            *out = (*found).into();
-        }
-    }
+unsafe fn any_of_batch(arguments: Arguments<Ray, u8>) {
+    // SAFETY: the contract is the same. The caller's bytes are not used as a slice of `bool`, which
+    // has invalid bit patterns.
+    unsafe { arguments.store_as(false, |scene, rays, found| scene.batch(rays).any(found), u8::from) };
 }
 
 /// Bytes of the sections that traversal reads; see `bth.h`.

@@ -1,5 +1,5 @@
-//! Enumeration of the instances of a scene that a ray may hit. That of the triangles of an object is
-//! [`bvh::enumerate`](crate::bvh::enumerate).
+//! Enumerates the instances of a scene that a ray may hit. [`bvh::enumerate`](crate::bvh::enumerate)
+//! does the same for the triangles of an object.
 
 use crate::instances::Placement;
 use crate::nodes::ObjectRay;
@@ -19,8 +19,20 @@ pub(crate) struct EnteredInstance<'a> {
     placement: Option<&'a Placement>,
 }
 
-impl EnteredInstance<'_> {
-    /// A ray in the space of the object. All queries transform rays as here, so t has the same bits in all of them.
+impl<'a> EnteredInstance<'a> {
+    /// A visible instance.
+    pub(crate) fn new(scene: &'a Scene, instance: u32) -> EnteredInstance<'a> {
+        let sole = scene.sole().filter(|(_, sole)| *sole == instance);
+        let placement = scene.world().filter(|_| sole.is_none()).map(|world| world.placement(instance));
+        let object_index = scene.object_of(instance);
+        if let Some(world) = scene.world() {
+            world.mark_traced(object_index);
+        }
+        EnteredInstance { instance, object_index, object: scene.view(object_index), placement }
+    }
+
+    /// A ray in the space of the object. All queries transform rays here, so t has the same bits in
+    /// all of them.
     pub(crate) fn object_ray(&self, ray: WorldRay<'_>) -> ObjectRay {
         match self.placement {
             None => ObjectRay { ray: *ray.ray, t_scale: 1.0 },
@@ -29,43 +41,30 @@ impl EnteredInstance<'_> {
     }
 }
 
-impl Scene {
-    /// A visible instance.
-    pub(crate) fn entered(&self, instance: u32) -> EnteredInstance<'_> {
-        let sole = self.sole().filter(|(_, sole)| *sole == instance);
-        let placement = self.world().filter(|_| sole.is_none()).map(|world| world.placement(instance));
-        let object_index = self.object_of(instance);
-        if let Some(world) = self.world() {
-            world.mark_traced(object_index);
-        }
-        EnteredInstance { instance, object_index, object: self.view(object_index), placement }
+/// Calls `visit` with each visible instance that a ray in world space may hit within its range of t.
+/// `visit` returns the max t, in world space and rounded to f32, of hits that can still change the
+/// result, or `None` to end; instances beyond may be skipped. Returns true if `visit` has ended the
+/// enumeration.
+pub(crate) fn enumerate_instances(
+    scene: &Scene,
+    ray: &Ray,
+    visit: &mut dyn FnMut(EnteredInstance<'_>) -> Option<f32>,
+) -> bool {
+    if let Some((object, instance)) = scene.sole() {
+        let object_index = scene.world().map_or(0, |world| world.placement(instance).object());
+        return visit(EnteredInstance { instance, object_index, object, placement: None }).is_none();
     }
-
-    /// Calls `visit` with each visible instance that a ray in world space may hit within its range of t. `visit` returns the
-    /// greatest t, in world space and rounded to f32, of hits that can still change the result, or `None` to end; instances that
-    /// lie beyond may be left out. Returns whether `visit` has ended the enumeration.
-    pub(crate) fn enumerate_instances(
-        &self,
-        ray: &Ray,
-        visit: &mut dyn FnMut(EnteredInstance<'_>) -> Option<f32>,
-    ) -> bool {
-        if let Some((object, instance)) = self.sole() {
-            let object_index = self.world().map_or(0, |world| world.placement(instance).object());
-            return visit(EnteredInstance { instance, object_index, object, placement: None }).is_none();
-        }
-        let Some(world) = self.world() else {
-            return (0..self.object_count()).any(|object_index| {
-                let object = self.view(object_index);
-                visit(EnteredInstance { instance: object_index, object_index, object, placement: None })
-                    .is_none()
-            });
-        };
-        world.enumerate(ray, &mut |instance| {
-            let placement = world.placement(instance);
-            let object_index = placement.object();
-            world.mark_traced(object_index);
-            let object = self.view(object_index);
-            visit(EnteredInstance { instance, object_index, object, placement: Some(placement) })
-        })
-    }
+    let Some(world) = scene.world() else {
+        return (0..scene.object_count()).any(|object_index| {
+            let object = scene.view(object_index);
+            visit(EnteredInstance { instance: object_index, object_index, object, placement: None }).is_none()
+        });
+    };
+    world.enumerate(ray, &mut |instance| {
+        let placement = world.placement(instance);
+        let object_index = placement.object();
+        world.mark_traced(object_index);
+        let object = scene.view(object_index);
+        visit(EnteredInstance { instance, object_index, object, placement: Some(placement) })
+    })
 }

@@ -1,4 +1,4 @@
-//! The masks of instances and of groups of triangles, which decide what rays with a mask meet.
+//! The masks of instances and of groups of triangles, which decide what rays with a mask can hit.
 
 /// A mask of 32 bits for each instance and for each group of triangles of an object. All bits are set unless a mask was set; no
 /// memory is used for masks behind the last one that lacks a bit.
@@ -35,7 +35,7 @@ fn read(masks: &[u32], index: u32) -> u32 {
 }
 
 impl Masks {
-    /// Whether all masks have all bits set.
+    /// Returns true if all masks have all bits set.
     pub(crate) fn is_empty(&self) -> bool {
         self.instances.is_empty() && self.groups.is_empty()
     }

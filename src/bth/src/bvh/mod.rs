@@ -10,7 +10,7 @@
 //! Which rays are coherent is told by [`coherence`]; a [`shaft`] bounds them. In large objects those that are interleaved begin below the
 //! root ([`entry_node`]).
 //!
-//! A fourth one, [`enumerate`], passes every triangle that a ray may hit to a receiver, for queries that report more than one hit.
+//! All other queries take one walk ([`walk`]); [`enumerate`] passes every triangle that a ray may hit to a receiver.
 
 #[cfg(test)]
 pub(crate) mod box_oracle;
@@ -32,3 +32,4 @@ pub(crate) mod shaft;
 pub(crate) mod single;
 pub(crate) mod single_stack;
 pub(crate) mod stack;
+pub(crate) mod walk;

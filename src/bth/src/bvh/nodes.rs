@@ -1,5 +1,7 @@
 //! Leaves by child code, in each of their formats. Kernels read leaves of f32; parts that they call unpack the others.
 
+use crate::intersect::filter::TriangleBlock;
+use crate::intersect::point_lanes::CornerLanes;
 use crate::simd::{CacheLevel, Part, Simd};
 use bth_format::layout::{Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, RawLeaf};
 use bth_format::object::Unpacked;
@@ -61,6 +63,37 @@ pub(crate) fn indexed_leaf<'r, S: Simd>(
     match Child::from_code(code) {
         Some(Child::Indexed(index)) => Some(indexed(s, object, index, unpacked)),
         _ => None,
+    }
+}
+
+/// A visitor of what a child code leads to if that is not a node.
+pub(crate) trait LeafVisitor<S: Simd>: Sized {
+    type Output;
+    /// Visits a leaf of triangles, in either record format.
+    fn triangles<B: TriangleBlock + CornerLanes>(self, s: S, block: &B) -> Self::Output;
+    /// Visits the tet leaf with this row.
+    fn tets(self, s: S, row: u32) -> Self::Output;
+    /// Visits nothing: the code is that of an empty slot, of a node or of a file that was not checked.
+    fn nothing(self) -> Self::Output;
+}
+
+/// Passes the leaf with a child code to a visitor. Leaves on a grid are unpacked.
+#[inline(always)]
+pub(crate) fn visit_leaf<S: Simd, V: LeafVisitor<S>>(
+    s: S,
+    object: &ObjectView<'_>,
+    node_base: NodeBase<'_>,
+    code: u32,
+    visitor: V,
+) -> V::Output {
+    let (mut unpacked, mut unpacked_raw) = (None, None);
+    if let Some(leaf) = indexed_leaf(s, object, node_base, code, &mut unpacked) {
+        return visitor.triangles(s, leaf);
+    }
+    match Child::from_code(code) {
+        Some(Child::Raw(at)) => visitor.triangles(s, raw(s, object, at, &mut unpacked_raw)),
+        Some(Child::Tets(row)) => visitor.tets(s, row),
+        _ => visitor.nothing(),
     }
 }
 

@@ -105,13 +105,13 @@ mod tests {
     use zerocopy::FromZeros;
 
     /// The children of a node that the shaft of rays reaches, a bit each, if the rays have a shaft.
-    struct Reached<'a>(&'a [Ray], &'a WideNode, ObjectBounds);
+    struct ReachedByShaft<'a>(&'a [Ray], &'a WideNode, ObjectBounds);
 
-    impl Kernel for Reached<'_> {
+    impl Kernel for ReachedByShaft<'_> {
         type Output = Option<u32>;
         #[inline(always)]
         fn run<S: Simd>(self, s: S) -> Option<u32> {
-            let Reached(rays, node, bounds) = self;
+            let ReachedByShaft(rays, node, bounds) = self;
             let (shaft, limit) = Shaft::of(s, &bounds, &Span::of(s, rays))?;
             Some(shaft.children(s, node, limit).0)
         }
@@ -159,7 +159,7 @@ mod tests {
                 }
             }
             for isa in Isa::ALL {
-                let Some(reached) = isa.run(Reached(&rays, &node, bounds)) else { continue };
+                let Some(reached) = isa.run(ReachedByShaft(&rays, &node, bounds)) else { continue };
                 assert_eq!(reached >> used, 0, "{isa}: unused slots are not reached");
                 for slot in 0..used {
                     let [lower, upper] = [0, 1].map(|end| [0, 1, 2].map(|k| node.bounds[k][end][slot]));
@@ -185,8 +185,9 @@ mod tests {
     fn rays_that_are_not_coherent_or_not_prepared_in_f32_have_no_shaft() {
         let ray = |direction| Ray { origin: [0.0; 3], tmin: 0.0, direction, tmax: f32::INFINITY };
         let node = WideNode { bounds: [[[0.0; WIDTH]; 2]; 3], child: [NONE; WIDTH] };
-        let shaft =
-            |rays: [Ray; 2], greatest| Isa::best().run(Reached(&rays, &node, ObjectBounds::around(greatest)));
+        let shaft = |rays: [Ray; 2], greatest| {
+            Isa::best().run(ReachedByShaft(&rays, &node, ObjectBounds::around(greatest)))
+        };
         let coherent = [ray([1.0, 2.0, 3.0]), ray([1.1, 2.0, 3.0])];
         assert!(shaft(coherent, 1.0).is_some());
         assert!(shaft(coherent, 1e30).is_none());

@@ -6,17 +6,17 @@ use std::collections::BinaryHeap;
 
 /// A hit with its t before it is rounded.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Found {
+pub(super) struct FoundHit {
     /// As it is reported; t in world space.
     pub(super) hit: Hit,
-    /// t in the space of the object, not rounded to f32. It is compared only with that of hits in the same instance.
+    /// t in the space of the object, not rounded to f32. It is compared only in the same instance.
     pub(super) t: f64,
 }
 
-/// Hits are ordered by t as it is reported, then by instance, then by t before it is rounded, then by triangle. The first hit is
-/// then that of [`Scene::nearest`](crate::Scene::nearest).
-impl Ord for Found {
-    fn cmp(&self, other: &Found) -> Ordering {
+/// Hits are ordered by the reported t, then by instance, then by t before rounding, then by triangle.
+/// The first hit is the result of [`Scene::nearest`](crate::Scene::nearest).
+impl Ord for FoundHit {
+    fn cmp(&self, other: &FoundHit) -> Ordering {
         // The additions turn -0.0 to 0.0; no t is NaN.
         let (a, b) = (&self.hit, &other.hit);
         (a.t + 0.0)
@@ -27,40 +27,40 @@ impl Ord for Found {
     }
 }
 
-impl PartialOrd for Found {
-    fn partial_cmp(&self, other: &Found) -> Option<Ordering> {
+impl PartialOrd for FoundHit {
+    fn partial_cmp(&self, other: &FoundHit) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl PartialEq for Found {
-    fn eq(&self, other: &Found) -> bool {
+impl PartialEq for FoundHit {
+    fn eq(&self, other: &FoundHit) -> bool {
         self.cmp(other) == Ordering::Equal
     }
 }
 
-impl Eq for Found {}
+impl Eq for FoundHit {}
 
 /// What a query keeps of the hits of a ray.
 pub(super) trait Collector {
-    /// Greatest t, as it is reported, of hits that can still change the result.
+    /// Max reported t of hits that can still change the result.
     fn limit(&self) -> f32 {
         f32::INFINITY
     }
-    /// Whether a hit would change the result.
-    fn wants(&self, _found: &Found) -> bool {
+    /// Returns true if a hit would change the result.
+    fn wants(&self, _found: &FoundHit) -> bool {
         true
     }
-    /// Takes a hit that it wants and that is accepted. Returns whether the result is complete.
-    fn take(&mut self, found: Found) -> bool;
+    /// Takes a hit that it wants and that is accepted. Returns true if the result is complete.
+    fn take(&mut self, found: FoundHit) -> bool;
 }
 
-/// Whether there is a hit.
+/// True if there is a hit.
 #[derive(Default)]
-pub(super) struct Any(pub(super) bool);
+pub(super) struct AnyFound(pub(super) bool);
 
-impl Collector for Any {
-    fn take(&mut self, _: Found) -> bool {
+impl Collector for AnyFound {
+    fn take(&mut self, _: FoundHit) -> bool {
         self.0 = true;
         true
     }
@@ -68,18 +68,18 @@ impl Collector for Any {
 
 /// The number of hits.
 #[derive(Default)]
-pub(super) struct Count(pub(super) usize);
+pub(super) struct HitCount(pub(super) usize);
 
-impl Collector for Count {
-    fn take(&mut self, _: Found) -> bool {
+impl Collector for HitCount {
+    fn take(&mut self, _: FoundHit) -> bool {
         self.0 += 1;
         false
     }
 }
 
 /// All hits, in no particular order.
-impl Collector for Vec<Found> {
-    fn take(&mut self, found: Found) -> bool {
+impl Collector for Vec<FoundHit> {
+    fn take(&mut self, found: FoundHit) -> bool {
         self.push(found);
         false
     }
@@ -87,37 +87,37 @@ impl Collector for Vec<Found> {
 
 /// The nearest hit.
 #[derive(Default)]
-pub(super) struct First(pub(super) Option<Found>);
+pub(super) struct FirstHit(pub(super) Option<FoundHit>);
 
-impl Collector for First {
+impl Collector for FirstHit {
     fn limit(&self) -> f32 {
         self.0.map_or(f32::INFINITY, |best| best.hit.t)
     }
-    fn wants(&self, found: &Found) -> bool {
+    fn wants(&self, found: &FoundHit) -> bool {
         self.0.is_none_or(|best| *found < best)
     }
-    fn take(&mut self, found: Found) -> bool {
+    fn take(&mut self, found: FoundHit) -> bool {
         self.0 = Some(found);
         false
     }
 }
 
 /// The `count` nearest hits; `count` is not 0.
-pub(super) struct FirstOf {
+pub(super) struct FirstHits {
     pub(super) count: usize,
     /// The nearest hits so far, the farthest of them on top.
-    pub(super) hits: BinaryHeap<Found>,
+    pub(super) hits: BinaryHeap<FoundHit>,
 }
 
-impl Collector for FirstOf {
+impl Collector for FirstHits {
     fn limit(&self) -> f32 {
         let farthest = self.hits.peek().filter(|_| self.hits.len() >= self.count);
         farthest.map_or(f32::INFINITY, |found| found.hit.t)
     }
-    fn wants(&self, found: &Found) -> bool {
+    fn wants(&self, found: &FoundHit) -> bool {
         self.hits.len() < self.count || self.hits.peek().is_none_or(|farthest| found < farthest)
     }
-    fn take(&mut self, found: Found) -> bool {
+    fn take(&mut self, found: FoundHit) -> bool {
         if self.hits.len() >= self.count {
             self.hits.pop();
         }

@@ -1,11 +1,11 @@
-//! The search for the hits of a ray: all triangles that the f32 tests do not exclude are decided exactly, tested against what the
-//! ray is allowed to hit, and passed to a collector.
+//! The search for the hits of a ray: all triangles that the f32 tests do not exclude are decided
+//! exactly, tested against what the ray is allowed to hit, and passed to a collector.
 
 use super::accept::Accept;
-use super::collect::{Collector, Found};
+use super::collect::{Collector, FoundHit};
 use crate::bvh::candidate::intersect_exactly;
 use crate::bvh::enumerate::{Receiver, enumerate};
-use crate::enumerate::EnteredInstance;
+use crate::enumerate::{EnteredInstance, enumerate_instances};
 use crate::intersect::exact::{Estimate, Intersection, estimate, reported};
 use crate::intersect::line::widened;
 use crate::intersect::origin::wide;
@@ -31,7 +31,7 @@ pub(super) fn search(
     let (masks, ray) = (scene.masks(), world_ray.ray);
     // Not `f32::min`, which would replace a `tmax` of NaN by a number.
     let tmax = |limit: f32| if limit < ray.tmax { limit } else { ray.tmax };
-    scene.enumerate_instances(ray, &mut |entered| {
+    enumerate_instances(scene, ray, &mut |entered| {
         if accept.mask & masks.of_instance(entered.instance) != 0
             && search_instance(&entered, (world_ray, tmax(collector.limit())), (accept, masks), collector)
         {
@@ -41,7 +41,7 @@ pub(super) fn search(
     });
 }
 
-/// As [`search`], for the hits in an instance up to a greatest t. Returns whether the collector's result is complete.
+/// Passes the hits in an instance up to `tmax`. Returns true if the collector's result is complete.
 fn search_instance(
     entered: &EnteredInstance<'_>,
     (world_ray, tmax): (WorldRay<'_>, f32),
@@ -84,8 +84,8 @@ struct InstanceHits<'a> {
 }
 
 impl InstanceHits<'_> {
-    /// The intersection of the ray's line with a triangle, unless its t certainly lies out of the range of hits that can change
-    /// the result.
+    /// The intersection of the ray's line with a triangle, unless its t certainly lies out of the range
+    /// of hits that can change the result.
     fn intersection(&self, corners: [[f32; 3]; 3]) -> Option<Intersection> {
         let ray = &self.object_ray.ray;
         if let Some((point, start)) = self.start {
@@ -119,7 +119,7 @@ impl InstanceHits<'_> {
         in_range(t, self.ray.tmin, self.ray.tmax).then_some(t)
     }
 
-    /// Whether the mask of a triangle's group has a bit in common with that of the ray.
+    /// Returns true if the mask of a triangle's group and the ray's mask have a bit in common.
     fn meets_group(&self, triangle: TriangleRef<'_>) -> bool {
         self.groups.is_none_or(|groups| {
             let group = self.object.group_of(triangle.read());
@@ -152,7 +152,7 @@ impl Receiver for InstanceHits<'_> {
         if self.object.opacity_at(primitive.triangle, u, v) == Opacity::Transparent {
             return false;
         }
-        let found = Found { hit: Hit { t, u, v, primitive }, t: intersection.t };
+        let found = FoundHit { hit: Hit { t, u, v, primitive }, t: intersection.t };
         if !self.collector.wants(&found)
             || self.accept.filter.is_some_and(|accepts| !accepts(self.ray, &found.hit))
         {

@@ -1,36 +1,85 @@
-//! Enumeration of the instances whose boxes one ray may enter.
+//! The instances that a query may reach, by the same walk as through objects: those whose boxes a
+//! ray may enter, lie near a point, or overlap a box.
 
 use super::World;
 use super::box_tests::{entered, limit, widened_slabs};
-use super::instance_list::{InstanceList, Visit};
 use super::top_level::TopLevel;
 use super::top_nodes::INSTANCE;
 use crate::bvh::ray_state::key_limit;
 use crate::bvh::single_stack::SingleStack;
+use crate::bvh::stack::BOTTOM;
+use crate::bvh::walk::{AfterLeaf, BoxQuery, Tree, run_walk, walk};
 use crate::intersect::boxes::{RaySlabLanes, RaySlabs};
+use crate::intersect::point_lanes::{LanePoint, PointLanes};
 use crate::intersect::prepare::PreparedRay;
-use crate::query::NearestHit;
+use crate::intersect::region_box::{RegionBox, RegionLanes};
 use crate::rays::Ray;
-use crate::simd::{Isa, Kernel, LANES, Scalar, Simd};
-use bth_format::layout::{WIDTH, WideNode};
-use bth_format::limits::MAX_DEPTH;
+use crate::simd::{Isa, Kernel, Simd};
+use bth_format::layout::WideNode;
 use std::hint::black_box;
 
+/// Receiver of instances: returns the max t, rounded to f32, of hits that can still change the
+/// result, or `None` to end.
+type Receive<'a> = &'a mut dyn FnMut(u32) -> Option<f32>;
+
 impl World {
-    /// Calls `visit` with each visible instance whose box a ray in world space may enter within its range of t, nearer boxes
-    /// first. Instances beyond what `visit` returns are left out. Returns whether `visit` has ended the enumeration.
-    pub(crate) fn enumerate(&self, ray: &Ray, visit: Visit<'_>) -> bool {
+    /// Calls `visit` with each visible instance whose box a ray in world space may enter within its
+    /// range of t, nearer boxes first. Instances beyond what `visit` returns may be skipped. Returns
+    /// true if `visit` has ended the enumeration.
+    pub(crate) fn enumerate(&self, ray: &Ray, visit: Receive<'_>) -> bool {
         let top = &self.top;
         // False for NaN, too.
         let has_range = ray.tmin <= ray.tmax;
-        if top.is_empty() || !has_range {
-            return false;
+        has_range && !top.is_empty() && Isa::chosen().run(RayKernel { top, ray, visit })
+    }
+
+    /// Calls `visit` with each visible instance whose box may have a point within a squared distance
+    /// of a finite point, nearer boxes first. `visit` returns the squared distance from then on, or
+    /// `None` to end. Returns true if it has ended the enumeration.
+    pub(crate) fn enumerate_near(
+        &self,
+        point: [f32; 3],
+        squared: f64,
+        visit: &mut dyn FnMut(u32) -> Option<f64>,
+    ) -> bool {
+        let point = LanePoint::new(point, self.top.greatest_coordinate());
+        !self.top.is_empty() && run_walk(&self.top, &mut PointInstances { point, squared, visit })
+    }
+
+    /// Calls `visit` with each visible instance whose box may overlap a region, until it returns
+    /// true. Returns true then.
+    pub(crate) fn enumerate_in_box(&self, region: RegionBox, visit: &mut dyn FnMut(u32) -> bool) -> bool {
+        !self.top.is_empty() && run_walk(&self.top, &mut BoxInstances { region, visit })
+    }
+
+    /// Max |coordinate| of the boxes of instances.
+    pub(crate) fn max_coordinate(&self) -> f32 {
+        self.top.greatest_coordinate()
+    }
+}
+
+/// A query about the instances of a scene.
+trait InstanceQuery: BoxQuery {
+    /// Visits an instance. Returns true if the query is complete.
+    fn instance(&mut self, instance: u32) -> bool;
+}
+
+impl<Q: InstanceQuery> Tree<Q> for TopLevel {
+    #[inline(always)]
+    fn root(&self) -> u32 {
+        0
+    }
+    #[inline(always)]
+    fn node(&self, code: u32) -> &WideNode {
+        TopLevel::node(self, code)
+    }
+    #[inline(always)]
+    fn leaf<S: Simd>(&self, _: S, _: &Q::Constants<S>, code: u32, query: &mut Q, _limit: f32) -> AfterLeaf {
+        // Boxes of empty slots may pass the test.
+        match code < BOTTOM && query.instance(code & !INSTANCE) {
+            true => AfterLeaf::Done,
+            false => AfterLeaf::Pop,
         }
-        // Instances whose distances differ by hundreds of powers of two may make a deep tree.
-        if top.depth as usize > MAX_DEPTH {
-            return enumerate_deep(top, ray, visit);
-        }
-        Isa::chosen().run(EnumerateKernel { top, ray, visit })
     }
 }
 
@@ -45,118 +94,129 @@ fn slabs<S: Simd>(s: S, ray: &Ray, top: &TopLevel) -> Option<RaySlabs> {
     widened_slabs(ray, top)
 }
 
-/// The kernel of [`World::enumerate`]. The receiver is called through a table, so that there is one kernel per instruction set.
-struct EnumerateKernel<'a> {
+/// The kernel of [`World::enumerate`]. The receiver is called through a table, so that there is one
+/// kernel per instruction set.
+struct RayKernel<'a> {
     top: &'a TopLevel,
     ray: &'a Ray,
-    visit: Visit<'a>,
+    visit: Receive<'a>,
 }
 
-impl Kernel for EnumerateKernel<'_> {
+impl Kernel for RayKernel<'_> {
     type Output = bool;
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> bool {
-        let EnumerateKernel { top, ray, visit } = self;
+        let RayKernel { top, ray, visit } = self;
         let Some(slabs) = slabs(s, ray, top) else { return false };
         // Kept in memory: vectors of its numbers would be stored before each visit and loaded after it.
         let slabs = black_box(&slabs);
-        let (mut tmax, mut last) = (ray.tmax, limit(slabs.scale, ray.tmax));
-        // Lists save visits, but elsewhere they take longer than that.
-        if S::HAS_FAST_COMPRESS
-            && ray.tmin >= 0.0
-            && let Some(list) = InstanceList::of(s, top, slabs, last)
-        {
-            return list.visit(slabs.scale, tmax, visit);
-        }
-        // Stack entries with a greater key are dropped.
-        let mut keys = key_limit(last);
-        let mut stack = SingleStack::new();
-        let mut stack = stack.start(0);
-        let mut code = 0;
-        loop {
-            let planes = RaySlabLanes::new(s, slabs);
-            // Neither instances nor the bottom of the stack are nodes.
-            while code & INSTANCE == 0 {
-                let node = top.node(code);
-                let (bits, enter) = entered(s, &planes, node, last);
-                if bits == 0 {
-                    code = stack.pop(keys, NearestHit);
-                    continue;
-                }
-                let free = stack.free_entries();
-                let children = s.load_u(&node.child);
-                let (count, nearest) = s.sort_far_to_near(bits, enter, children, free.codes, free.keys);
-                code = node.child[nearest % WIDTH];
-                free.push(count);
-            }
-            if stack.is_empty() {
-                return false;
-            }
-            match visit(code & !INSTANCE) {
-                None => return true,
-                Some(t) if t < tmax => {
-                    (tmax, last) = (t, limit(slabs.scale, t));
-                    keys = key_limit(last);
-                }
-                Some(_) => {}
-            }
-            if stack.is_last() {
-                return false;
-            }
-            code = stack.pop(keys, NearestHit);
-        }
+        let last = limit(slabs.scale, ray.tmax);
+        let mut query = RayInstances { slabs, tmax: ray.tmax, last, visit };
+        walk(s, top, &mut query, &mut SingleStack::new())
     }
 }
 
-/// As [`World::enumerate`], for a tree of any depth.
-#[cold]
-#[inline(never)]
-fn enumerate_deep(top: &TopLevel, ray: &Ray, visit: Visit<'_>) -> bool {
-    let isa = Isa::chosen();
-    let Some(slabs) = slabs(Scalar, ray, top) else { return false };
-    let (mut tmax, mut last) = (ray.tmax, limit(slabs.scale, ray.tmax));
-    let (mut codes, mut keys) = ([0; LANES], [0.0; LANES]);
-    // For each instance or node its code and a lower bound of the depth at which the ray enters it.
-    let mut stack = vec![(0, f32::NEG_INFINITY)];
-    while let Some((code, key)) = stack.pop() {
-        if key_limit(last) < key {
-            continue;
-        }
-        if code & INSTANCE == 0 {
-            let (codes, keys) = (&mut codes, &mut keys);
-            let kernel = ChildrenKernel { slabs: &slabs, node: top.node(code), last, codes, keys };
-            let count = isa.run(kernel).min(LANES);
-            stack.extend(codes[..count].iter().copied().zip(keys[..count].iter().copied()));
-            continue;
-        }
-        match visit(code & !INSTANCE) {
+/// The instances that a ray may enter.
+struct RayInstances<'a> {
+    slabs: &'a RaySlabs,
+    /// Max t of hits that can still change the result, and their max depth.
+    tmax: f32,
+    last: f32,
+    visit: Receive<'a>,
+}
+
+impl BoxQuery for RayInstances<'_> {
+    type Constants<S: Simd> = ();
+    const NEAREST_FIRST: bool = true;
+    #[inline(always)]
+    fn lanes<S: Simd>(&self, _: S) {}
+    #[inline(always)]
+    fn children<S: Simd>(&self, s: S, _: &(), node: &WideNode, limit: f32) -> (u32, S::F) {
+        entered(s, &RaySlabLanes::new(s, self.slabs), node, limit)
+    }
+    #[inline(always)]
+    fn limit(&self) -> f32 {
+        self.last
+    }
+    #[inline(always)]
+    fn max_key(limit: f32) -> f32 {
+        key_limit(limit)
+    }
+}
+
+impl InstanceQuery for RayInstances<'_> {
+    #[inline(always)]
+    fn instance(&mut self, instance: u32) -> bool {
+        match (self.visit)(instance) {
             None => return true,
-            Some(t) if t < tmax => (tmax, last) = (t, limit(slabs.scale, t)),
+            Some(t) if t < self.tmax => (self.tmax, self.last) = (t, limit(self.slabs.scale, t)),
             Some(_) => {}
         }
+        false
     }
-    false
 }
 
-/// Kernel that writes codes and keys of the children of a node that the ray may enter before the depth `last`, the nearest last,
-/// and returns their number.
-struct ChildrenKernel<'a> {
-    slabs: &'a RaySlabs,
-    node: &'a WideNode,
-    last: f32,
-    codes: &'a mut [u32; LANES],
-    keys: &'a mut [f32; LANES],
+/// The instances near a point.
+struct PointInstances<'a> {
+    point: LanePoint,
+    squared: f64,
+    visit: &'a mut dyn FnMut(u32) -> Option<f64>,
 }
 
-impl Kernel for ChildrenKernel<'_> {
-    type Output = usize;
-
+impl BoxQuery for PointInstances<'_> {
+    type Constants<S: Simd> = PointLanes<S>;
+    const NEAREST_FIRST: bool = true;
     #[inline(always)]
-    fn run<S: Simd>(self, s: S) -> usize {
-        let ChildrenKernel { slabs, node, last, codes, keys } = self;
-        let (bits, enter) = entered(s, &RaySlabLanes::new(s, slabs), node, last);
-        s.compress_far_to_near(bits, enter, s.load_u(&node.child), codes, keys)
+    fn lanes<S: Simd>(&self, s: S) -> PointLanes<S> {
+        self.point.lanes(s)
+    }
+    #[inline(always)]
+    fn children<S: Simd>(&self, s: S, lanes: &PointLanes<S>, node: &WideNode, limit: f32) -> (u32, S::F) {
+        lanes.children(s, node, limit)
+    }
+    #[inline(always)]
+    fn limit(&self) -> f32 {
+        self.point.limit(self.squared)
+    }
+}
+
+impl InstanceQuery for PointInstances<'_> {
+    #[inline(always)]
+    fn instance(&mut self, instance: u32) -> bool {
+        let Some(squared) = (self.visit)(instance) else { return true };
+        self.squared = squared;
+        false
+    }
+}
+
+/// The instances that overlap a region.
+struct BoxInstances<'a> {
+    region: RegionBox,
+    visit: &'a mut dyn FnMut(u32) -> bool,
+}
+
+impl BoxQuery for BoxInstances<'_> {
+    type Constants<S: Simd> = RegionLanes<S>;
+    const NEAREST_FIRST: bool = false;
+    #[inline(always)]
+    fn lanes<S: Simd>(&self, s: S) -> RegionLanes<S> {
+        self.region.lanes(s)
+    }
+    #[inline(always)]
+    fn children<S: Simd>(&self, s: S, lanes: &RegionLanes<S>, node: &WideNode, _limit: f32) -> (u32, S::F) {
+        (lanes.children(s, node), s.splat(0.0))
+    }
+    #[inline(always)]
+    fn limit(&self) -> f32 {
+        0.0
+    }
+}
+
+impl InstanceQuery for BoxInstances<'_> {
+    #[inline(always)]
+    fn instance(&mut self, instance: u32) -> bool {
+        (self.visit)(instance)
     }
 }
 

@@ -8,7 +8,7 @@
 //! [`met_by_lanes`]) and the rest with stacks ([`traverse`]); the answers so far end them ([`progress`]). Each visit of an instance by a
 //! ray is queued ([`visit_queue`]); the rays of an object's visits are transformed into its space ([`enter_object`]) and traced there
 //! together, with t unchanged. A single ray ([`one_ray`]), and one whose query reports several hits, goes through the top level alone
-//! ([`enumerate`], [`instance_list`]).
+//! ([`enumerate`]).
 
 mod batch;
 mod box_tests;
@@ -45,5 +45,6 @@ pub(crate) use placement::PartBoxes;
 pub(crate) use placement::Placement;
 #[cfg(test)]
 pub(crate) use top_level::TopLevel;
+#[cfg(test)]
 pub(crate) use top_nodes::INSTANCE;
 pub(crate) use world::{Placed, World};

@@ -7,6 +7,7 @@
 use super::placement::Placement;
 use super::top_nodes::{Bounds, CostRatio, INSTANCE, node, node_mut, put_bounds};
 use bth_format::layout::{CacheLine, NODE_LINES, NONE, WIDTH, WideNode};
+use bth_format::limits::MAX_DEPTH;
 use bth_format::object::ObjectBounds;
 use glam::Vec4;
 
@@ -33,6 +34,11 @@ pub(crate) struct TopLevel {
     pub(crate) depth: u32,
     pub(super) cost: CostRatio,
 }
+
+/// From this level on, ranges are halved by their number of instances: instances whose distances
+/// differ by hundreds of powers of two would otherwise make a tree that is deeper than stacks allow.
+/// Each of the levels below at least halves the up to 2^30 instances.
+const HALVED_LEVEL: u32 = MAX_DEPTH as u32 - 28;
 
 /// From this number of visible instances on, the subtrees of the root are built by several threads.
 #[cfg(feature = "rayon")]
@@ -169,7 +175,7 @@ impl TopLevel {
     fn build_in_parallel(&mut self, items: &mut [BuildItem], range: ItemRange) {
         use rayon::iter::{IntoParallelIterator, ParallelIterator};
         let mut ranges = [range; WIDTH];
-        let count = split_into(items, &mut ranges);
+        let count = split_into(items, &mut ranges, false);
         // The ranges follow each other, once sorted.
         let mut order: Vec<u64> =
             (0..count).map(|slot| u64::from(ranges[slot].first) << 32 | slot as u64).collect();
@@ -237,7 +243,7 @@ fn build_subtree(lines: &mut Vec<CacheLine>, items: &mut [BuildItem], range: Ite
             continue;
         }
         let mut ranges = [range; WIDTH];
-        let count = split_into(items, &mut ranges);
+        let count = split_into(items, &mut ranges, level >= HALVED_LEVEL);
         for (slot, range) in ranges[..count].iter().enumerate() {
             let child = add_node(lines);
             put(lines, node, slot, child, &range.bounds);
@@ -263,8 +269,8 @@ fn put(lines: &mut [CacheLine], node: u32, slot: usize, code: u32, bounds: &Boun
 }
 
 /// Splits the first range into up to 16, always the one of greatest area among those with more items than a node has children.
-/// Returns the number of ranges.
-fn split_into(items: &mut [BuildItem], ranges: &mut [ItemRange; WIDTH]) -> usize {
+/// Returns the number of ranges. With `halved` they are split by number, not by place.
+fn split_into(items: &mut [BuildItem], ranges: &mut [ItemRange; WIDTH], halved: bool) -> usize {
     let priority =
         |range: &ItemRange| if range.len() > WIDTH as u32 { range.bounds.area() } else { f64::NEG_INFINITY };
     let mut areas = [f64::NEG_INFINITY; WIDTH];
@@ -275,7 +281,7 @@ fn split_into(items: &mut [BuildItem], ranges: &mut [ItemRange; WIDTH]) -> usize
         if areas[largest] == f64::NEG_INFINITY {
             break;
         }
-        let (left, right) = split(items, ranges[largest]);
+        let (left, right) = split(items, ranges[largest], halved);
         (ranges[largest], areas[largest]) = (left, priority(&left));
         (ranges[count], areas[count]) = (right, priority(&right));
         count += 1;
@@ -284,8 +290,8 @@ fn split_into(items: &mut [BuildItem], ranges: &mut [ItemRange; WIDTH]) -> usize
 }
 
 /// Splits a range of at least two items at the middle of their centres, along the axis on which the centres have the greatest
-/// extent. If all centres lie on one side, the range is halved.
-fn split(items: &mut [BuildItem], range: ItemRange) -> (ItemRange, ItemRange) {
+/// extent. If all centres lie on one side, or if `halved` is set, the range is halved.
+fn split(items: &mut [BuildItem], range: ItemRange, halved: bool) -> (ItemRange, ItemRange) {
     let items = &mut items[range.first as usize..range.end as usize];
     // Differences may overflow to infinity, which is then the greatest extent.
     let spread = (range.greatest + range.least).to_array();
@@ -308,7 +314,7 @@ fn split(items: &mut [BuildItem], range: ItemRange) -> (ItemRange, ItemRange) {
         left.enclose(&item.bounds, limit);
         right.enclose(&item.bounds, -limit);
     }
-    if count == 0 || count == items.len() {
+    if halved || count == 0 || count == items.len() {
         let half = items.len() / 2;
         return (
             ItemRange::of(range.first, &items[..half]),
@@ -323,3 +329,28 @@ fn split(items: &mut [BuildItem], range: ItemRange) -> (ItemRange, ItemRange) {
 /// A node without children.
 const EMPTY: WideNode =
     WideNode { bounds: [[[f32::MAX; WIDTH], [f32::MIN; WIDTH]]; 3], child: [NONE; WIDTH] };
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn subtrees_on_deep_levels_are_halved_and_stay_within_the_depth_of_stacks() {
+        // Each instance is twice as far away as the one before, a hundred times over.
+        let place = |i: u32| Vec4::splat((0.5f32).powi(i as i32 / 100) * (i % 100 + 1) as f32);
+        let items: Vec<BuildItem> =
+            (0..10_000).map(|i| BuildItem::new(Bounds { lower: -place(i), upper: place(i) }, i)).collect();
+        for (level, most) in [(1, HALVED_LEVEL), (HALVED_LEVEL, MAX_DEPTH as u32 - 10)] {
+            let (mut items, mut lines) = (items.clone(), Vec::new());
+            let range = ItemRange::of(0, &items);
+            assert!(build_subtree(&mut lines, &mut items, range, level) <= most);
+            let mut found: Vec<u32> = lines
+                .chunks_exact(NODE_LINES)
+                .flat_map(|lines| node(lines).child)
+                .filter(|code| *code != NONE && code & INSTANCE != 0)
+                .collect();
+            found.sort_unstable();
+            assert!(found.into_iter().eq((0..10_000).map(|i| i | INSTANCE)));
+        }
+    }
+}

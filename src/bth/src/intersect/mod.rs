@@ -23,6 +23,7 @@ pub(crate) mod point_exact;
 pub(crate) mod point_lanes;
 pub(crate) mod point_triangle;
 pub(crate) mod prepare;
+pub(crate) mod region_box;
 pub(crate) mod segment;
 pub(crate) mod start;
 pub(crate) mod start_point;

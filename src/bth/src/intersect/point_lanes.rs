@@ -78,13 +78,13 @@ pub(crate) struct PointLanes<S: Simd> {
 }
 
 /// [`PointLanes::children`] as a part of kernels.
-struct Children<'a, S: Simd> {
+struct NearChildren<'a, S: Simd> {
     point: &'a PointLanes<S>,
     node: &'a WideNode,
     limit: f32,
 }
 
-impl<S: Simd> Part<S> for Children<'_, S> {
+impl<S: Simd> Part<S> for NearChildren<'_, S> {
     type Output = (u32, S::F);
     #[inline(always)]
     fn run(self, s: S) -> (u32, S::F) {
@@ -97,7 +97,7 @@ impl<S: Simd> PointLanes<S> {
     /// bounds of the scaled squared distances. Empty slots may be among them.
     #[inline(always)]
     pub(crate) fn children(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
-        Children { point: self, node, limit }.inline_or_call(s)
+        NearChildren { point: self, node, limit }.inline_or_call(s)
     }
 
     #[inline(always)]

@@ -6,7 +6,7 @@
 //! ([`mod@crate::intersect::start`]). Triangles through A or B, or in a plane with both, do not block.
 
 use crate::bvh::enumerate::{Receiver, enumerate_within};
-use crate::enumerate::EnteredInstance;
+use crate::enumerate::{EnteredInstance, enumerate_instances};
 use crate::intersect::origin::wide;
 use crate::intersect::segment::{ExactEnd, Segment};
 use crate::intersect::start::start_on;
@@ -90,12 +90,12 @@ impl Scene {
         for (i, end) in ends.into_iter().enumerate() {
             let is_new = i == 0 || end != ends[0];
             if let (Some(instance), true) = (end, is_new)
-                && self.blocks_in(&self.entered(instance), &a, &b)
+                && self.blocks_in(&EnteredInstance::new(self, instance), &a, &b)
             {
                 return false;
             }
         }
-        let is_blocked = self.enumerate_instances(&ray, &mut |entered| {
+        let is_blocked = enumerate_instances(self, &ray, &mut |entered| {
             let was_met = ends.contains(&Some(entered.instance));
             let blocks = !was_met && self.blocks_in(&entered, &a, &b);
             (!blocks).then_some(1.0)

@@ -1,17 +1,21 @@
-//! An instance for searches of closest points: its corners in world space, and bounds of distances in the space of its object.
+//! An instance for searches of closest points: its corners in world space, and bounds of distances in
+//! the space of its object.
 //!
-//! An affine transform does not preserve distances, so triangles are measured in world space: each coordinate of a corner is
-//! computed in f64 and rounded to f32, as if the instance had been written to a file as a mesh of its own. The BVH is walked in
-//! object space. Let A be the linear part of the inverse transform and |A| its spectral norm: a triangle within the distance d in
-//! world space lies within |A| d in object space, plus a slack for the roundings of the point, the corners and the inverse.
+//! An affine transform does not preserve distances, so triangles are measured in world space. Each
+//! coordinate of a corner is computed in f64 and rounded to f32, as if the instance had been written
+//! to a file as a mesh. The BVH is walked in object space. Let A be the linear part of the inverse
+//! transform and |A| its spectral norm. A triangle within the distance d in world space lies within
+//! |A| d in object space, plus a slack for the roundings of the point, the corners and the inverse.
 
 use crate::instances::Placed;
 use bth_format::object::ObjectView;
 
-/// Bound of all roundings relative to the magnitudes given at [`PlacedObject::new`]: that of world corners and of the point in
-/// object space, 2^-24 · √3 each, and the error of the inverse, 10 · 2^24 · 2^-53 (see `instances/placement.rs`).
+/// Bounds all roundings relative to the magnitudes in [`PlacedObject::new`]: 2^-24 · √3 for world
+/// corners, the same for the point in object space, and 10 · 2^24 · 2^-53 for the error of the inverse
+/// (see `instances/placement.rs`).
 const ROUNDING: f64 = 1.0 / (1 << 21) as f64;
-/// The least magnitude that roundings are relative to: those of denormal numbers are as large as those of the least normal one.
+/// The min magnitude that roundings are relative to: denormal numbers are rounded by as much as the
+/// smallest normal one.
 const LEAST: f64 = f32::MIN_POSITIVE as f64;
 
 /// An instance for a search.
@@ -20,7 +24,7 @@ pub(super) struct PlacedObject {
     placed: Placed,
     /// Upper bound of |A|.
     norm: f64,
-    /// Greatest |coordinate| of the world box, at least [`LEAST`].
+    /// Max |coordinate| of the world box, at least [`LEAST`].
     extent: f64,
     /// Magnitude of the roundings in object space for a point at the origin of world space.
     magnitude: f64,
@@ -31,7 +35,7 @@ impl PlacedObject {
         let norm = spectral_norm(&placed.inverse);
         let world = placed.lower.iter().chain(&placed.upper).fold(LEAST, |m, x| m.max(f64::from(x.abs())));
         let origin = placed.origin.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-        // Three coordinates of at most the greatest one have at most twice its length.
+        // The length of a vector is less than twice its max |coordinate|.
         let magnitude = 2.0 * (norm * (world + origin) + f64::from(object.bounds.greatest).max(LEAST));
         PlacedObject { placed, norm, extent: world, magnitude }
     }
@@ -41,8 +45,9 @@ impl PlacedObject {
         self.placed.object
     }
 
-    /// The point in object space. Coordinates that exceed the range of f32 are limited to it: that moves the point to the closest
-    /// one of a cube that contains the object, and no part of the object gets farther.
+    /// The point in object space. Coordinates beyond the range of f32 are limited to it: that moves
+    /// the point to the closest one of a cube that contains the object, and no part of the object gets
+    /// farther.
     pub(super) fn point(&self, point: [f32; 3]) -> [f32; 3] {
         let mut relative = [0.0; 3];
         for k in 0..3 {
@@ -66,19 +71,14 @@ impl PlacedObject {
         distance * distance
     }
 
-    /// A box in world space that contains all triangles of a box in object space.
-    pub(super) fn box_in_world(&self, lower: [f64; 3], upper: [f64; 3]) -> [[f64; 3]; 2] {
-        let pad = ROUNDING * self.extent;
-        let mut world = [[0.0; 3]; 2];
-        for (i, row) in self.placed.to_world.iter().enumerate() {
-            (world[0][i], world[1][i]) = (row[3] - pad, row[3] + pad);
-            for k in 0..3 {
-                let (x, y) = (row[k] * lower[k], row[k] * upper[k]);
-                world[0][i] += x.min(y);
-                world[1][i] += x.max(y);
-            }
-        }
-        world
+    /// The transform from object space to world space: rows of four.
+    pub(super) fn to_world(&self) -> &[[f64; 4]; 3] {
+        &self.placed.to_world
+    }
+
+    /// Max |coordinate| of the world box.
+    pub(super) fn extent(&self) -> f64 {
+        self.extent
     }
 
     /// Corners in world space.
@@ -90,9 +90,9 @@ impl PlacedObject {
     }
 }
 
-/// Upper bound of the greatest factor by which a matrix stretches a vector, at most 1.04 times that factor. The square of the
-/// factor is the greatest eigenvalue of the symmetric matrix B = AᵀA, which is at most the n-th root of any norm of the n-th power
-/// of B.
+/// Upper bound of the max factor by which a matrix A stretches a vector, at most 1.04 times that factor.
+/// The square of the factor is the max eigenvalue of the symmetric matrix B = AᵀA, which is at most the
+/// n-th root of any norm of the n-th power of B.
 fn spectral_norm(rows: &[[f64; 3]; 3]) -> f64 {
     let greatest = rows.iter().flatten().fold(0.0f64, |m, x| m.max(x.abs()));
     if greatest == 0.0 {
@@ -106,7 +106,7 @@ fn spectral_norm(rows: &[[f64; 3]; 3]) -> f64 {
     let scaled = rows.map(|row| row.map(|x| x / greatest));
     let transposed = [0, 1, 2].map(|i| [0, 1, 2].map(|k| scaled[k][i]));
     let mut power = product(&transposed, &scaled);
-    // After k steps the norm of the power of B with the exponent 2^k is that of `power` times `factor` to this exponent.
+    // After k steps the power of B with the exponent 2^k is `power` times `factor` to this exponent.
     const STEPS: usize = 5;
     let root = |x: f64, steps: usize| (0..steps).fold(x, |x, _| x.sqrt());
     let mut factor = 1.0;

@@ -1,34 +1,58 @@
-//! Winding numbers of points in an object: the crossings of a ray from each point along an axis, towards the nearest side of the
-//! object's bounds.
+//! Winding numbers of points: the crossings of a ray from each point along an axis, towards the nearest
+//! side of the object's bounds.
 //!
-//! Along an axis the tests of boxes are comparisons of f32 values and exclude exactly the boxes that the closed ray does not touch.
-//! Sixteen triangles at a time are projected along the axis. Their f32 coordinates relative to the point have exact signs and a
-//! relative error of u = 2^-24. For |x| <= X and |y| <= Y, the weight x₁y₂ - y₁x₂ is off by less than 10u·XY because of them
-//! and its own roundings, and by less than the least normal number because of underflow. Most triangles are decided so; those with
-//! a weight within the bound, or with corners before and behind the point, are decided by [`crossing`].
+//! Along an axis the tests of boxes are comparisons of f32 values. They exclude exactly the boxes that
+//! the closed ray does not touch. Sixteen triangles at a time are projected along the axis. Their f32
+//! coordinates relative to the point have exact signs and a relative error of u = 2^-24. For |x| <= X
+//! and |y| <= Y, the weight x₁y₂ - y₁x₂ is off by less than 10u·XY because of roundings, and by less
+//! than the smallest normal number because of underflow. Most triangles are decided so. [`crossing`]
+//! decides those with a weight within the bound, or with corners before and behind the point.
 //!
-//! That rule moves the ray by infinitely little. What the moved ray crosses, the ray touches, so no crossing is missed by
-//! tests that exclude only what the closed ray certainly does not touch; and a weight or depth of certain sign keeps it.
+//! That rule moves the ray by infinitely little. What the moved ray crosses, the ray touches. So tests
+//! that exclude only what the closed ray certainly does not touch miss no crossing. A weight or depth
+//! of certain sign keeps its sign.
 
-use crate::bvh::nodes::{indexed_leaf, raw as raw_leaf};
 use crate::bvh::single_stack::SingleStack;
-use crate::bvh::stack::BOTTOM;
+use crate::bvh::walk::{BoxQuery, ObjectTree, TriangleQuery, all_triangles, walk};
+use crate::enumerate::enumerate_instances;
 use crate::intersect::boxes::{FAR, planes};
 use crate::intersect::crossing::crossing;
 use crate::intersect::edge_functions::cross;
 use crate::intersect::filter::{TriangleBlock, TriangleFilter};
-use crate::query::AnyHit;
 use crate::rays::Ray;
+use crate::scene::Scene;
 use crate::simd::{Isa, Kernel, Part, Simd};
-use bth_format::layout::{Child, NONE, TetLeaf, WIDTH, WideNode};
+use crate::starts::world_ray::WorldRay;
+use bth_format::layout::{NONE, WIDTH, WideNode};
 use bth_format::object::ObjectView;
+use std::cmp::Ordering;
 
 /// 12u: bounds the error of a weight relative to XY, with the roundings of the bound.
 const WEIGHT_ERROR: f32 = 12.0 / (1 << 24) as f32;
 
-/// Adds to `winding` for each point in object space its winding number in an object. It is 0 outside of the object's bounds and
-/// for points that are not finite.
-pub(crate) fn add_windings(object: &ObjectView<'_>, points: &[[f32; 3]], winding: &mut [i32]) {
+/// Stores the winding number of each point in a scene.
+pub(super) fn windings(scene: &Scene, points: &[[f32; 3]], winding: &mut [i32]) {
+    winding.fill(0);
+    if scene.world().is_none() {
+        for object in 0..scene.object_count() {
+            add_windings(scene.view(object), points, winding);
+        }
+        return;
+    }
+    for (point, winding) in points.iter().zip(winding) {
+        // The boxes at t = 0 are those that contain the point.
+        let ray = Ray { origin: *point, tmin: 0.0, direction: [1.0, 0.0, 0.0], tmax: 0.0 };
+        enumerate_instances(scene, &ray, &mut |entered| {
+            let point = entered.object_ray(WorldRay::plain(&ray)).ray.origin;
+            add_windings(entered.object, &[point], std::slice::from_mut(winding));
+            Some(0.0)
+        });
+    }
+}
+
+/// Adds the winding number of each point in object space to `winding`: 0 outside of the object's bounds
+/// and for points that are not finite.
+fn add_windings(object: &ObjectView<'_>, points: &[[f32; 3]], winding: &mut [i32]) {
     if object.header.root != NONE {
         let stack = &mut SingleStack::new();
         Isa::chosen().run(WindingKernel { object, points, winding, stack });
@@ -49,9 +73,12 @@ impl Kernel for WindingKernel<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let WindingKernel { object, points, winding, stack } = self;
+        let tree = ObjectTree::new(object);
         for (point, winding) in points.iter().zip(winding) {
             if let Some(ray) = AxisRay::new(object, *point) {
-                *winding += ray.winding(s, object, stack);
+                let mut query = AxisCrossings { ray, winding: 0 };
+                walk(s, &tree, &mut query, stack);
+                *winding += query.winding;
             }
         }
     }
@@ -60,8 +87,6 @@ impl Kernel for WindingKernel<'_> {
 /// A ray along an axis.
 struct AxisRay {
     ray: Ray,
-    /// Index of the axis.
-    axis: usize,
     /// 1 or -1, the direction along the axis.
     forward: f32,
     /// Projects triangles along the axis.
@@ -69,13 +94,13 @@ struct AxisRay {
 }
 
 /// [`AxisRay::crossings`] as a part of kernels.
-struct Crossings<'a, B> {
+struct CrossedTriangles<'a, B> {
     ray: &'a AxisRay,
     block: &'a B,
     valid: u32,
 }
 
-impl<S: Simd, B: TriangleBlock> Part<S> for Crossings<'_, B> {
+impl<S: Simd, B: TriangleBlock> Part<S> for CrossedTriangles<'_, B> {
     type Output = i32;
     #[inline(always)]
     fn run(self, s: S) -> i32 {
@@ -84,8 +109,8 @@ impl<S: Simd, B: TriangleBlock> Part<S> for Crossings<'_, B> {
 }
 
 impl AxisRay {
-    /// The ray from a point in the bounds of an object to their nearest side; of equally near ones the first of the lower sides
-    /// in x, y and z, then of the upper ones. `None` for a point outside.
+    /// The ray from a point in the bounds of an object to their nearest side. Of equally near ones it is
+    /// the first of the lower sides in x, y and z, then of the upper ones. `None` for a point outside.
     #[inline(always)]
     fn new(object: &ObjectView<'_>, point: [f32; 3]) -> Option<AxisRay> {
         let (lower, upper) = (&object.header.lower, &object.header.upper);
@@ -118,7 +143,7 @@ impl AxisRay {
             last: 0.0,
             error_slope: 0.0,
         };
-        Some(AxisRay { ray: Ray::new(point, direction), axis, forward, filter })
+        Some(AxisRay { ray: Ray::new(point, direction), forward, filter })
     }
 
     /// The children of a node whose boxes the ray touches, as bits.
@@ -138,13 +163,12 @@ impl AxisRay {
     /// The signed number of crossings with the triangles of a leaf.
     #[inline(always)]
     fn leaf<S: Simd, B: TriangleBlock>(&self, s: S, block: &B) -> i32 {
-        // At most as many triangles as lanes, even if an unchecked file has a greater count.
-        let valid = 1u32.wrapping_shl(block.triangles()).wrapping_sub(1) & (u32::MAX >> WIDTH);
+        let valid = all_triangles(block);
         // Without vectors, the filter in lanes takes as long as decisions, and much code.
         if !S::HAS_VECTORS {
             return decide(&self.ray, block, valid);
         }
-        Crossings { ray: self, block, valid }.inline_or_call(s)
+        CrossedTriangles { ray: self, block, valid }.inline_or_call(s)
     }
 
     /// The signed number of crossings with the triangles of `valid`.
@@ -177,71 +201,41 @@ impl AxisRay {
         }
         certain + decide(&self.ray, block, doubtful)
     }
+}
 
-    /// The winding number of the ray's origin in an object.
+/// The crossings of a ray along an axis.
+struct AxisCrossings {
+    ray: AxisRay,
+    winding: i32,
+}
+
+impl BoxQuery for AxisCrossings {
+    type Constants<S: Simd> = ();
+    const NEAREST_FIRST: bool = false;
     #[inline(always)]
-    fn winding<S: Simd>(&self, s: S, object: &ObjectView<'_>, stack: &mut SingleStack) -> i32 {
-        let node_base = object.node_base();
-        let mut code = object.header.root;
-        let mut stack = stack.start(code);
-        let mut winding = 0;
-        while code != BOTTOM {
-            if code & Child::LEAF_BIT == 0 {
-                let node = node_base.node(code);
-                let (bits, children) = (self.children(s, node), &node.child);
-                if bits == 0 {
-                    code = stack.pop(0.0, AnyHit);
-                    continue;
-                }
-                code = children[bits.trailing_zeros() as usize % WIDTH];
-                let others = bits & (bits - 1);
-                if others != 0 {
-                    let free = stack.free_entries();
-                    let count = s.compress(others, s.load_u(children), free.codes);
-                    free.push(count + 1);
-                }
-                continue;
-            }
-            let mut unpacked = None;
-            if let Some(leaf) = indexed_leaf(s, object, node_base, code, &mut unpacked) {
-                winding += self.leaf(s, leaf);
-            } else {
-                let mut unpacked = None;
-                match Child::from_code(code) {
-                    Some(Child::Raw(at)) => winding += self.leaf(s, raw_leaf(s, object, at, &mut unpacked)),
-                    Some(Child::Tets(row)) => {
-                        let leaf = &object.tet_leaves[row as usize];
-                        if leaf.subtree != NONE {
-                            code = leaf.subtree;
-                            continue;
-                        }
-                        winding += self.faces(object, leaf);
-                    }
-                    _ => {}
-                }
-            }
-            code = stack.pop(0.0, AnyHit);
-        }
-        winding
+    fn lanes<S: Simd>(&self, _: S) {}
+    #[inline(always)]
+    fn children<S: Simd>(&self, s: S, _: &(), node: &WideNode, _limit: f32) -> (u32, S::F) {
+        (self.ray.children(s, node), s.splat(0.0))
     }
-
-    /// The signed number of crossings with the constrained faces of a tet leaf that has no subtree.
-    #[cold]
-    #[inline(never)]
-    fn faces(&self, object: &ObjectView<'_>, leaf: &TetLeaf) -> i32 {
-        let faces = &object.tet_faces[leaf.first_face as usize..][..leaf.faces as usize];
-        let corners = faces.iter().map(|face| face.vertex.map(|v| object.tet_vertices[v as usize].position));
-        corners.filter(|corners| self.touches(corners)).map(|corners| crossing(&self.ray, corners)).sum()
+    #[inline(always)]
+    fn limit(&self) -> f32 {
+        0.0
     }
+}
 
-    /// Whether the ray touches the box of a triangle.
-    fn touches(&self, corners: &[[f32; 3]; 3]) -> bool {
-        let on_both_sides = |k: usize| {
-            let at = self.ray.origin[k];
-            corners.iter().any(|p| p[k] <= at) && corners.iter().any(|p| at <= p[k])
-        };
-        let ahead = |p: &[f32; 3]| self.filter.start + self.forward * p[self.axis] >= 0.0;
-        on_both_sides((self.axis + 1) % 3) && on_both_sides((self.axis + 2) % 3) && corners.iter().any(ahead)
+impl TriangleQuery for AxisCrossings {
+    #[inline(always)]
+    fn triangles<S: Simd, B: TriangleBlock>(
+        &mut self,
+        s: S,
+        _: &(),
+        block: &B,
+        _ids: &[u32],
+        _limit: f32,
+    ) -> bool {
+        self.winding += self.ray.leaf(s, block);
+        false
     }
 }
 
@@ -254,4 +248,43 @@ fn decide<B: TriangleBlock>(ray: &Ray, block: &B, mut triangles: u32) -> i32 {
         triangles &= triangles - 1;
     }
     signed
+}
+
+/// Returns true if every edge of an object has as many triangles in one direction as in the other.
+/// The object must have the triangles of its source.
+pub(super) fn is_closed(view: &ObjectView<'_>) -> bool {
+    // Positions are distinct in other objects.
+    let vertices = view.is_deformable().then(|| vertices_by_place(view.positions));
+    // The edges from lower to higher vertices, and the others, turned round.
+    let (mut up, mut down) = (Vec::new(), Vec::new());
+    for rows in view.triangles {
+        let [a, b, c] = vertices.as_ref().map_or(*rows, |vertices| rows.map(|row| vertices[row as usize]));
+        for (p, q) in [(a, b), (b, c), (c, a)] {
+            let edge = |low: u32, high: u32| u64::from(low) << 32 | u64::from(high);
+            match p.cmp(&q) {
+                Ordering::Less => up.push(edge(p, q)),
+                Ordering::Greater => down.push(edge(q, p)),
+                Ordering::Equal => {}
+            }
+        }
+    }
+    if up.len() != down.len() {
+        return false;
+    }
+    up.sort_unstable();
+    down.sort_unstable();
+    up == down
+}
+
+/// For each position a number that it shares with those that are equal to it, and with no others.
+fn vertices_by_place(positions: &[[f32; 3]]) -> Vec<u32> {
+    // The sum has the same bits for zeros of either sign.
+    let place = |row: &u32| positions[*row as usize].map(|x| (x + 0.0).to_bits());
+    let mut rows: Vec<u32> = (0..positions.len() as u32).collect();
+    rows.sort_unstable_by_key(place);
+    let mut vertices = vec![0; rows.len()];
+    for equal in rows.chunk_by(|a, b| place(a) == place(b)) {
+        equal.iter().for_each(|row| vertices[*row as usize] = equal[0]);
+    }
+    vertices
 }

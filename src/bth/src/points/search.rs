@@ -4,18 +4,20 @@ use super::Closest;
 use crate::intersect::point_triangle::{Feature, locate, squared_distance};
 use crate::rays::PrimitiveRef;
 
-/// Slack of the squared radius relative to itself. It covers the rounding of the distance to f32, by which the radius is decided,
-/// and the error of squared distances.
+/// Slack of the squared radius relative to itself. It covers the rounding of the distance to f32, by
+/// which the radius is decided, and the error of squared distances.
 const RADIUS_SLACK: f64 = 1.0 / (1 << 20) as f64;
 
 /// The search of the closest triangle to a point.
 ///
-/// Triangles are ordered by their squared distances as [`squared_distance`] computes them from the point and the corners alone,
-/// then by their ids. The result is therefore the same whatever the order in which they are offered.
+/// Triangles are ordered by their squared distances, which [`squared_distance`] computes from the
+/// point and the corners alone, then by their ids. So the result does not depend on the order in
+/// which they are offered.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Search {
     pub(super) point: [f32; 3],
-    /// Squared distance of the best triangle; before one is found, an upper bound of squared distances within the radius.
+    /// Squared distance of the best triangle; before one is found, an upper bound of squared distances
+    /// within the radius.
     pub(super) squared: f64,
     primitive: PrimitiveRef,
     /// The corners in world space.
@@ -55,7 +57,13 @@ impl Search {
         }
     }
 
-    /// Whether a point is nearer to the point of this search than that to the best triangle.
+    /// Returns true if the distance of a triangle, rounded to f32 as it is reported, does not exceed
+    /// a radius.
+    pub(super) fn is_in_ball(&self, corners: [[f32; 3]; 3], radius: f32) -> bool {
+        squared_distance(self.point, corners).0.sqrt() as f32 <= radius
+    }
+
+    /// Returns true if another point is nearer to this search's point than the best triangle is.
     pub(super) fn is_near(&self, point: &[f32; 3]) -> bool {
         let difference = [0, 1, 2].map(|k| f64::from(point[k]) - f64::from(self.point[k]));
         difference.iter().map(|x| x * x).sum::<f64>() < self.squared
@@ -68,7 +76,7 @@ impl Search {
         }
     }
 
-    /// The result within the radius: the distance, rounded to f32 as it is reported, does not exceed it.
+    /// The result, unless its distance, rounded to f32 as it is reported, exceeds the radius.
     pub(super) fn answer(&self, radius: f32) -> Option<Closest> {
         let distance = self.squared.sqrt() as f32;
         if self.primitive == PrimitiveRef::NONE || distance > radius {

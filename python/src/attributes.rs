@@ -6,8 +6,8 @@ use numpy::{IntoPyArray, PyArray3};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
-/// Texture coordinates of the corners of an object's triangles, (triangles, 3, 2) as the source has them; `None` where the
-/// file keeps none.
+/// Texture coordinates of the corners of an object's triangles, (triangles, 3, 2) as the source has
+/// them; `None` where the file keeps none.
 #[pyfunction]
 pub(crate) fn texture_coordinates<'py>(
     py: Python<'py>,

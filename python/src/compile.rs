@@ -75,7 +75,8 @@ fn gltf_options(keywords: &Keywords<'_, '_>) -> PyResult<ImportOptions> {
     })
 }
 
-/// Runs a compilation on threads of the pool; calls `progress` with stage, units done and units in all.
+/// Runs a compilation on threads of the pool; calls `progress` with stage, units done and units in
+/// all.
 pub(crate) fn monitored<T: Send>(
     py: Python<'_>,
     keywords: &Keywords<'_, '_>,
@@ -207,7 +208,8 @@ fn deliver(content: &write::Content, output: Option<&Path>) -> bth_compile::Resu
     Ok(bytes)
 }
 
-/// Compiles a scene: pairs of positions and triangles, and for each instance its mesh and the 3×4 matrix that places it.
+/// Compiles a scene: pairs of positions and triangles, and for each instance its mesh and the 3×4
+/// matrix that places it.
 #[pyfunction]
 pub(crate) fn compile_scene(
     py: Python<'_>,

@@ -70,13 +70,15 @@ pub(crate) struct Checked {
 }
 
 impl Checked {
-    /// How many threads a call uses that was given so many: one with a filter, which needs the interpreter's lock for each hit.
+    /// How many threads a call uses that was given so many: one with a filter, which needs the
+    /// interpreter's lock for each hit.
     pub(crate) fn threads(&self, threads: usize) -> usize {
         if self.filter.is_some() { 1 } else { threads }
     }
 
-    /// Calls `query` for each ray with its index within the rays and what it may hit. `first` is the index of the first ray in the
-    /// call. After an exception of the filter, and when the call ends early, the rest is left out.
+    /// Calls `query` for each ray with its index within the rays and what it may hit. `first` is
+    /// the index of the first ray in the call. After an exception of the filter, and when the call
+    /// ends early, the rest is left out.
     pub(crate) fn each<R>(
         &self,
         scene: &bth::Scene,

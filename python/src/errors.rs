@@ -24,7 +24,8 @@ fn coded(code: &str, message: String) -> PyErr {
     error
 }
 
-/// The exception for an error of the file format: `OSError` where a file cannot be read, else `bth.Error`.
+/// The exception for an error of the file format: `OSError` where a file cannot be read, else
+/// `bth.Error`.
 pub(crate) fn format_error(error: &bth_format::Error) -> PyErr {
     let code = error.code().as_str();
     let text = error.to_string();
@@ -37,7 +38,8 @@ pub(crate) fn start_error(row: Option<usize>, error: &bth_format::Error) -> PyEr
     coded(error.code().as_str(), format!("start{place}: {error}"))
 }
 
-/// The exception for a file that cannot be written: the subclass of `OSError` for the number that the system gives.
+/// The exception for a file that cannot be written: the subclass of `OSError` for the number that
+/// the system gives.
 pub(crate) fn write_error(path: &Path, error: &std::io::Error) -> PyErr {
     match error.raw_os_error() {
         Some(number) => {

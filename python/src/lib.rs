@@ -1,5 +1,5 @@
-//! The native module of the Python package `bth`. It holds what must be fast or needs the library; shapes, defaults and
-//! documentation are in the Python modules above it (`python/bth`).
+//! The native module of the Python package `bth`. It holds what must be fast or needs the library;
+//! shapes, defaults and documentation are in the Python modules above it (`python/bth`).
 //!
 //! | file | |
 //! |---|---|
@@ -84,7 +84,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     Ok(())
 }
 
-/// Name of the instruction set that queries use, such as `avx512`, `sse4` or `neon`. The environment variable BTH_ISA names another.
+/// Name of the instruction set that queries use, such as `avx512`, `sse4` or `neon`. The
+/// environment variable BTH_ISA names another.
 #[pyfunction]
 fn isa() -> String {
     bth::Isa::chosen().to_string()

@@ -6,10 +6,12 @@ use bth::{Alpha, Scene, Wrap};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-/// Name, base colour, its texture, emission, its texture, what alpha means, cutoff, whether double-sided, whether unlit.
+/// Name, base colour, its texture, emission, its texture, what alpha means, cutoff, whether
+/// double-sided, whether unlit.
 type MaterialRow = (String, [f32; 4], Option<u32>, [f32; 3], Option<u32>, &'static str, f32, bool, bool);
 
-/// Image, bytes of its file, wrap modes, whether the nearest texel is taken, set of coordinates, rows of the transform.
+/// Image, bytes of its file, wrap modes, whether the nearest texel is taken, set of coordinates,
+/// rows of the transform.
 type TextureRow<'py> = (u32, Bound<'py, PyBytes>, (&'static str, &'static str), bool, u32, [[f32; 3]; 2]);
 
 fn row(scene: &Scene, object: u32, material: u32) -> Option<MaterialRow> {

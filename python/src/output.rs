@@ -46,7 +46,7 @@ pub(crate) struct HitColumns<'a> {
 }
 
 impl HitArrays<'_> {
-    /// The columns for so many hits.
+    /// The columns for `count` hits.
     pub(crate) fn columns(&mut self, count: usize) -> PyResult<HitColumns<'_>> {
         Ok(HitColumns {
             t: numbers(&mut self.t, count)?,
@@ -86,7 +86,7 @@ pub(crate) fn split_off<'a, T>(rows: &mut &'a mut [T], count: usize) -> &'a mut 
     rows.split_off_mut(..count).expect("as many rows as the caller has counted")
 }
 
-/// The chunks of so many rays, each with its part of the results, which `part` splits off.
+/// The chunks of `count` rays, each with its part of the results, which `part` splits off.
 pub(crate) fn chunks<T>(count: usize, mut part: impl FnMut(usize) -> T) -> Vec<(Range<usize>, T)> {
     (0..count)
         .step_by(CHUNK)
@@ -98,7 +98,7 @@ pub(crate) fn chunks<T>(count: usize, mut part: impl FnMut(usize) -> T) -> Vec<(
         .collect()
 }
 
-/// As [`chunks`], for results in one array.
+/// The chunks of a call with results in one array.
 pub(crate) fn chunks_of<T>(mut results: &mut [T]) -> Vec<(Range<usize>, &mut [T])> {
     chunks(results.len(), |rows| split_off(&mut results, rows))
 }
@@ -119,7 +119,7 @@ pub(crate) struct Part<'a, T> {
 pub(crate) type Job<'a, T> = (Range<usize>, (&'a mut [u64], Part<'a, T>));
 
 impl<T: Copy> Parts<T> {
-    /// No results of so many rays or regions.
+    /// No results yet of `count` rays or regions.
     pub(crate) fn new(count: usize) -> Parts<T> {
         Parts {
             parts: (0..count.div_ceil(CHUNK)).map(|_| Vec::new()).collect(),
@@ -154,12 +154,12 @@ impl<T: Copy> Parts<T> {
 }
 
 impl<T: Copy> Part<'_, T> {
-    /// Whether the call fails anyway, since there is not enough memory.
+    /// True if there was not enough memory, so that the call fails anyway.
     pub(crate) fn is_full(&self) -> bool {
         self.is_full.load(Ordering::Relaxed)
     }
 
-    /// Appends results. If there is no memory for them, those of the chunk are freed.
+    /// Appends results. If there is no memory for them, frees all of the chunk.
     pub(crate) fn append(&mut self, found: &[T]) {
         if self.is_full() {
             return;

@@ -27,8 +27,8 @@ pub(crate) enum RegionArrays<'py> {
     },
 }
 
-/// Greatest numbers of regions, and of triangles in them, between two looks at whether the call ends early. Most regions take little more
-/// time than a look at the clock.
+/// Greatest numbers of regions, and of triangles in them, between two looks at whether the call
+/// ends early. Most regions take little more time than a look at the clock.
 const REGIONS: usize = 16;
 const TRIANGLES: usize = 4096;
 
@@ -113,7 +113,8 @@ pub(crate) fn overlaps(
     })
 }
 
-/// The triangles that overlap regions: the number of each region's, and instances and triangles of all one after the other.
+/// The triangles that overlap regions: the number of each region's, and instances and triangles of
+/// all one after the other.
 #[pyfunction]
 pub(crate) fn triangles_in<'py>(
     py: Python<'py>,

@@ -22,7 +22,8 @@ pub(crate) fn instance_names(py: Python<'_>, scene: &NativeScene) -> PyResult<Ve
     })
 }
 
-/// Names of an object's groups, for each of them the index of its material, and names of the object's materials.
+/// Names of an object's groups, for each of them the index of its material, and names of the
+/// object's materials.
 #[pyfunction]
 pub(crate) fn groups(
     py: Python<'_>,

@@ -69,8 +69,8 @@ pub(crate) fn signed_distance(
     store_each(py, scene, &points, threads, &mut out, Scene::signed_distance_batch)
 }
 
-/// Stores closest points within a radius: their distances in the column of t; their positions, three
-/// numbers a point; and on what of the triangle they lie, a [`bth::Feature::code`].
+/// Stores closest points within a radius: their distances in the column of t; their positions,
+/// three numbers a point; and on what of the triangle they lie, a [`bth::Feature::code`].
 #[pyfunction]
 pub(crate) fn closest(
     py: Python<'_>,

@@ -1,4 +1,5 @@
-//! Arrays of numpy to rays and points, a chunk at a time, so that what is converted stays in the cache until it is traced.
+//! Arrays of numpy to rays and points, a chunk at a time, so that what is converted stays in the
+//! cache until it is traced.
 
 use bth::TraceRay;
 use bth::rays::{PrimitiveRef, Ray, Start, StartRay};
@@ -8,8 +9,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::ops::Range;
 
-/// Number of rays or points of a chunk: enough that rays are traced together well, and few enough that they and their hits fit
-/// into a core's cache.
+/// Number of rays or points of a chunk: enough that rays are traced together well, and few enough
+/// that they and their hits fit into a core's cache.
 pub(crate) const CHUNK: usize = 4096;
 
 /// A borrowed array of three numbers a row, in either precision.
@@ -65,7 +66,8 @@ impl Rows<'_> {
         }
     }
 
-    /// Calls `put` with the row within the range and the three numbers of each row of it, rounded to f32.
+    /// Calls `put` with the row within the range and the three numbers of each row of it, rounded
+    /// to f32.
     #[inline(always)]
     pub(crate) fn each(&self, range: Range<usize>, put: impl FnMut(usize, [f32; 3])) {
         match self {

@@ -23,8 +23,8 @@ pub(crate) fn open(py: Python<'_>, path: PathBuf, mapped: bool) -> PyResult<Nati
 
 #[allow(unsafe_code)]
 fn map(path: &std::path::Path) -> Result<bth::Scene, bth::Error> {
-    // SAFETY: the documentation of `bth.open` passes the requirement that nobody changes the file on to the caller, who has to
-    // ask for mapping.
+    // SAFETY: the documentation of `bth.open` passes the requirement that nobody changes the file
+    // on to the caller, who has to ask for mapping.
     unsafe { bth::map(path) }
 }
 
@@ -142,7 +142,8 @@ impl NativeScene {
         })?
     }
 
-    /// Gives an object new positions, rows of three; returns the expected cost of rays relative to that of the compiled pose.
+    /// Gives an object new positions, rows of three; returns the expected cost of rays relative to
+    /// that of the compiled pose.
     fn set_positions(
         &self,
         py: Python<'_>,
@@ -187,7 +188,8 @@ impl NativeScene {
         })
     }
 
-    /// For each instance the 3×4 matrix that transforms its object's space to world space, its object, and whether it is visible.
+    /// For each instance the 3×4 matrix that transforms its object's space to world space, its
+    /// object, and whether it is visible.
     fn placements<'py>(&self, py: Python<'py>) -> PyResult<Placements<'py>> {
         let (matrices, objects, visible) = self.with(py, |scene| {
             let count = scene.instance_count();

@@ -18,17 +18,19 @@ impl OpenScene {
         Arc::new(OpenScene { scene: RwLock::new(scene), changing: AtomicU32::new(0) })
     }
 
-    /// The scene for queries. Not for threads that hold the interpreter's lock: whoever changes the scene needs it.
-    /// Fails with the exception that the handler of a signal raises while others change the scene.
+    /// The scene for queries. Not for threads that hold the interpreter's lock: whoever changes the
+    /// scene needs it. Fails with the exception that the handler of a signal raises while others
+    /// change the scene.
     pub(crate) fn read(&self) -> PyResult<RwLockReadGuard<'_, bth::Scene>> {
         let mut pauses = Pauses::new();
-        // A filter or the handler of a signal is inside of a call, perhaps of this scene: it must not wait for whom that call
-        // keeps waiting.
+        // A filter or the handler of a signal is inside of a call, perhaps of this scene: it must
+        // not wait for whom that call keeps waiting.
         while self.changing.load(Ordering::Relaxed) > 0 && !work::is_inside_call() {
             pauses.pause()?;
         }
         loop {
-            // Not `read`, which may panic or wait for ever on a thread that has the lock already, as that of a filter.
+            // Not `read`, which may panic or wait for ever on a thread that has the lock already,
+            // as that of a filter.
             if let Some(scene) = self.try_read() {
                 return Ok(scene);
             }
@@ -44,7 +46,7 @@ impl OpenScene {
         }
     }
 
-    /// As [`Self::read`], for a thread that holds the interpreter's lock.
+    /// Does the same as [`Self::read`] for a thread that holds the interpreter's lock.
     pub(crate) fn read_attached(&self, py: Python<'_>) -> PyResult<RwLockReadGuard<'_, bth::Scene>> {
         work::note_thread(py);
         loop {
@@ -55,8 +57,8 @@ impl OpenScene {
         }
     }
 
-    /// Calls `work` with the scene and each of the jobs, on up to so many threads, as [`work::run`] does. The scene does not change
-    /// before all are done.
+    /// Calls `work` with the scene and each of the jobs, on up to so many threads, as [`work::run`]
+    /// does. The scene does not change before all are done.
     pub(crate) fn run<J: Send>(
         &self,
         py: Python<'_>,

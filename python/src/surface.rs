@@ -1,4 +1,5 @@
-//! The surface at hits: positions, normals, texture coordinates, vertex colours, groups, materials and opacity.
+//! The surface at hits: positions, normals, texture coordinates, vertex colours, groups, materials
+//! and opacity.
 
 use crate::errors::no_geometry;
 use crate::output::{numbers, split_off};
@@ -85,8 +86,9 @@ impl Points<'_> {
     }
 }
 
-/// The arrays that are asked for, each `None` or as long as there are points, times the numbers of one. What stands in them remains
-/// for points of no triangle, and where the file has nothing to say.
+/// The arrays that are asked for, each `None` or as long as there are points, times the numbers of
+/// one. What stands in them remains for points of no triangle, and where the file has nothing to
+/// say.
 #[derive(FromPyObject)]
 pub(crate) struct SurfaceArrays<'py> {
     #[pyo3(item)]
@@ -119,7 +121,8 @@ pub(crate) struct SurfaceArrays<'py> {
 
 /// Where the surfaces at some points go.
 struct Columns<'a> {
-    /// Position, geometric normal and shading normal, each in world space and in that of the object.
+    /// Position, geometric normal and shading normal, each in world space and in that of the
+    /// object.
     vectors: [Option<&'a mut [f64]>; 6],
     texcoord: Option<&'a mut [f32]>,
     second_texcoord: Option<&'a mut [f32]>,
@@ -169,7 +172,8 @@ fn put<T: Copy, const N: usize>(array: &mut Option<&mut [T]>, row: usize, number
 }
 
 impl<'a> Columns<'a> {
-    /// Whether what is asked for needs the positions of triangles, or their interpolated attributes.
+    /// Whether what is asked for needs the positions of triangles, or their interpolated
+    /// attributes.
     fn needs_surface(&self) -> bool {
         self.texcoord.is_some() || self.vectors.iter().any(Option::is_some)
     }
@@ -249,7 +253,8 @@ pub(crate) fn surface(
     })
 }
 
-/// The vertices of triangles in world space, nine numbers for each, into an array; those of no triangle are left as they are.
+/// The vertices of triangles in world space, nine numbers for each, into an array; those of no
+/// triangle are left as they are.
 #[pyfunction]
 pub(crate) fn triangle_positions(
     py: Python<'_>,

@@ -9,22 +9,27 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
-/// How often a call looks for signals such as that of Ctrl-C. It takes the interpreter's lock for this.
+/// How often a call looks for signals such as that of Ctrl-C. It takes the interpreter's lock for
+/// this.
 const SIGNALS_EVERY: Duration = Duration::from_millis(50);
 
 thread_local! {
-    /// Whether this thread is the one on which handlers of signals run, as it was found out in the process of this number.
+    /// Whether this thread is the one on which handlers of signals run, as it was found out in the
+    /// process of this number.
     static HANDLES_SIGNALS: Cell<Option<(u32, bool)>> = const { Cell::new(None) };
-    /// How many calls this thread is in: more than one where a filter or the handler of a signal uses a scene.
+    /// How many calls this thread is in: more than one where a filter or the handler of a signal
+    /// uses a scene.
     static DEPTH: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Whether this thread is inside of a call, as a filter, or the handler of a signal that interrupts one.
+/// Whether this thread is inside of a call, as a filter, or the handler of a signal that interrupts
+/// one.
 pub(crate) fn is_inside_call() -> bool {
     DEPTH.get() > 0
 }
 
-/// How many calls may be inside of one another. Each takes up to 30 KiB of the stack, less than Python's own limit assumes.
+/// How many calls may be inside of one another. Each takes up to 30 KiB of the stack, less than
+/// Python's own limit assumes.
 const DEEPEST: u32 = 32;
 
 /// Counts a call for as long as it exists.
@@ -61,7 +66,8 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
-/// The threads that all calls share, as many as processors. A child process after a fork has none of its parent's threads, so it starts its own.
+/// The threads that all calls share, as many as processors. A child process after a fork has none
+/// of its parent's threads, so it starts its own.
 pub(crate) fn pool() -> Arc<ThreadPool> {
     static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
     let process = std::process::id();
@@ -78,8 +84,9 @@ pub(crate) fn pool() -> Arc<ThreadPool> {
     new
 }
 
-/// Notes whether handlers of signals run on this thread: on Python's main thread, which after a fork is the one that forked. To be
-/// called before [`check_signals`], while the thread has the interpreter's lock.
+/// Notes whether handlers of signals run on this thread: on Python's main thread, which after a
+/// fork is the one that forked. To be called before [`check_signals`], while the thread has the
+/// interpreter's lock.
 pub(crate) fn note_thread(py: Python<'_>) {
     let process = std::process::id();
     if HANDLES_SIGNALS.get().is_none_or(|(of, _)| of != process) {
@@ -95,8 +102,9 @@ fn is_main_thread(py: Python<'_>) -> PyResult<bool> {
     main.eq(threading.call_method0("get_ident")?)
 }
 
-/// Lets the handlers of signals run, if this is the thread on which they do. Fails with the exception that one raises. Other threads
-/// stay away from the interpreter, which may have ended by now.
+/// Lets the handlers of signals run, if this is the thread on which they do. Fails with the
+/// exception that one raises. Other threads stay away from the interpreter, which may have ended by
+/// now.
 pub(crate) fn check_signals() -> PyResult<()> {
     match HANDLES_SIGNALS.get() {
         Some((_, false)) => Ok(()),
@@ -128,11 +136,13 @@ impl Pauses {
     }
 }
 
-/// What a job asks while it works, since some take much longer than the time after which a call looks for signals.
+/// What a job asks while it works, since some take much longer than the time after which a call
+/// looks for signals.
 pub(crate) struct Watch<'a>(Kind<'a>);
 
 enum Kind<'a> {
-    /// The job is on the caller's thread, which looks for signals itself: when it last did, and the exception that a handler has raised.
+    /// The job is on the caller's thread, which looks for signals itself: when it last did, and the
+    /// exception that a handler has raised.
     Caller { looked: Cell<Instant>, failure: RefCell<Option<PyErr>> },
     /// The job is on a thread of the pool, to which the caller's says that it stops.
     Pool(&'a AtomicBool),
@@ -161,8 +171,9 @@ impl Watch<'_> {
         }
     }
 
-    /// Calls `work` with one part of so many rows after the other, until the call ends early. Rows that lie together are answered
-    /// fastest in one part, so parts grow as long as they take little time.
+    /// Calls `work` with one part of so many rows after the other, until the call ends early. Rows
+    /// that lie together are answered fastest in one part, so parts grow as long as they take
+    /// little time.
     pub(crate) fn in_parts(&self, rows: usize, mut work: impl FnMut(Range<usize>)) {
         let mut part = 0..rows.min(4);
         while !part.is_empty() && !self.is_over() {
@@ -182,9 +193,10 @@ impl Watch<'_> {
     }
 }
 
-/// Calls `work` with each of the jobs, on up to so many threads, none of which has the interpreter's lock. One thread is the caller's
-/// own, which must not have the lock either. Ends early with the exception that the handler of a signal raises; then some of the
-/// jobs have not been done, or not to their ends.
+/// Calls `work` with each of the jobs, on up to so many threads, none of which has the
+/// interpreter's lock. One thread is the caller's own, which must not have the lock either. Ends
+/// early with the exception that the handler of a signal raises; then some of the jobs have not
+/// been done, or not to their ends.
 pub(crate) fn run<J: Send>(
     threads: usize,
     jobs: Vec<J>,
@@ -271,8 +283,9 @@ fn wait(working: &Working, stop: &AtomicBool) -> PyResult<()> {
     outcome
 }
 
-/// Runs something that stops soon after `cancelled` is set on a thread of its own, without the interpreter's lock. `look` is called
-/// every now and then with the interpreter; if it fails, or the handler of a signal does, `cancelled` is set.
+/// Runs something that stops soon after `cancelled` is set on a thread of its own, without the
+/// interpreter's lock. `look` is called every now and then with the interpreter; if it fails, or
+/// the handler of a signal does, `cancelled` is set.
 pub(crate) fn run_cancellable<T: Send>(
     py: Python<'_>,
     cancelled: &AtomicBool,

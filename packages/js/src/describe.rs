@@ -6,14 +6,16 @@ use bth::Scene;
 /// Numbers of [`bth_describe`].
 const NUMBERS: usize = 14;
 
-/// Writes 14 numbers: objects, instances, triangles of all objects, lower and upper end of the bounds in world space (3 each, NaN if
-/// nothing is visible), whether the file is a scene (0 or 1), first frame, last frame, frames per second, seconds.
+/// Writes 14 numbers: objects, instances, triangles of all objects, lower and upper end of the
+/// bounds in world space (3 each, NaN if nothing is visible), whether the file is a scene (0 or 1),
+/// first frame, last frame, frames per second, seconds.
 ///
 /// # Safety
 /// `scene` is open, and `numbers` points to 14 numbers at a multiple of 4 bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_describe(scene: *const Scene, numbers: *mut [u8; 8]) {
-    // SAFETY: by contract the scene is open, and the address is that of an array of this length; bytes need no alignment.
+    // SAFETY: by contract the scene is open, and the address is that of an array of this length;
+    // bytes need no alignment.
     let (scene, to) = unsafe { (&*scene, std::slice::from_raw_parts_mut(numbers, NUMBERS)) };
     let objects = scene.object_count();
     // From +0 on: the sum of no numbers is -0.

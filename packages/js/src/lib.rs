@@ -1,8 +1,9 @@
-//! The WebAssembly module of the npm package. Its only caller is `index.js`, which documents the queries.
+//! The WebAssembly module of the npm package. Its only caller is `index.js`, which documents the
+//! queries.
 //!
-//! Functions take and return numbers: addresses in the module's memory, counts, and 0 or null for an error, whose text
-//! [`bth_error`] holds. Results of several rays are columns, one after the other, of one number a ray, since that is what typed arrays
-//! are cut from.
+//! Functions take and return numbers: addresses in the module's memory, counts, and 0 or null for
+//! an error, whose text [`bth_error`] holds. Results of several rays are columns, one after the
+//! other, of one number a ray, since that is what typed arrays are cut from.
 #![allow(unsafe_code)] // All functions are called from outside, and most take addresses.
 
 pub mod describe;

@@ -8,9 +8,10 @@ const MATERIAL_WORDS: usize = 12;
 /// Words of [`bth_texture`].
 const TEXTURE_WORDS: usize = 13;
 
-/// Writes how a material of an object looks, [`MATERIAL_WORDS`] words: red, green, blue and alpha of the base colour, red, green and blue
-/// of the emission and the cutoff, as f32; what alpha means (0 nothing, 1 a mask, 2 a share); the bits 1 for both sides and 2 for no light;
-/// textures of the base colour and of the emission, 2^32 - 1 for none. Returns 0 if the file does not keep it.
+/// Writes how a material of an object looks, [`MATERIAL_WORDS`] words: red, green, blue and alpha
+/// of the base colour, red, green and blue of the emission and the cutoff, as f32; what alpha means
+/// (0 nothing, 1 a mask, 2 a share); the bits 1 for both sides and 2 for no light; textures of the
+/// base colour and of the emission, 2^32 - 1 for none. Returns 0 if the file does not keep it.
 ///
 /// # Safety
 /// `scene` is open, and `words` points to as many words as stated, which overlap nothing else.
@@ -38,12 +39,13 @@ pub unsafe extern "C" fn bth_material(
     1
 }
 
-/// Writes a texture of an object, [`TEXTURE_WORDS`] words: the address and the bytes of its image file, the index of the image, wrap modes
-/// for u and v (0 repeat, 1 mirror, 2 clamp), whether the nearest texel is taken, the set of its texture coordinates, and the rows of
-/// their transform as f32. Returns 0 if there is no such texture.
+/// Writes a texture of an object, [`TEXTURE_WORDS`] words: the address and the bytes of its image
+/// file, the index of the image, wrap modes for u and v (0 repeat, 1 mirror, 2 clamp), whether the
+/// nearest texel is taken, the set of its texture coordinates, and the rows of their transform as
+/// f32. Returns 0 if there is no such texture.
 ///
 /// # Safety
-/// As for [`bth_material`], with as many words as stated.
+/// The contract of [`bth_material`], with as many words as stated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_texture(
     scene: *const Scene,

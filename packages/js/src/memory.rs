@@ -22,11 +22,13 @@ pub extern "C" fn bth_file_new(length: usize) -> *mut FileMemory {
 /// `file` comes from [`bth_file_new`] and has not been opened.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_file_bytes(file: *mut FileMemory) -> *mut u8 {
-    // SAFETY: by contract the pointer comes from `Box::into_raw` and is still owned by the caller, who uses it nowhere else.
+    // SAFETY: by contract the pointer comes from `Box::into_raw` and is still owned by the caller,
+    // who uses it nowhere else.
     unsafe { &mut *file }.bytes_mut().as_mut_ptr()
 }
 
-/// Checks and opens the file whose bytes were written to the memory, which must not be used any more; null if it cannot be opened.
+/// Checks and opens the file whose bytes were written to the memory, which must not be used any
+/// more; null if it cannot be opened.
 ///
 /// # Safety
 /// `file` comes from [`bth_file_new`] and has not been opened.
@@ -53,7 +55,8 @@ pub unsafe extern "C" fn bth_close(scene: *mut Scene) {
     drop(unsafe { Box::from_raw(scene) });
 }
 
-/// Words of memory for rays and results, zeros, at a multiple of 4 bytes. It is kept until the module ends.
+/// Words of memory for rays and results, zeros, at a multiple of 4 bytes. It is kept until the
+/// module ends.
 #[unsafe(no_mangle)]
 pub extern "C" fn bth_words(count: usize) -> *mut u32 {
     Box::leak(vec![0u32; count].into_boxed_slice()).as_mut_ptr()

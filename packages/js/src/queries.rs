@@ -22,7 +22,8 @@ pub(crate) fn hit(columns: &[u32], count: usize, i: usize) -> Hit {
 /// Nearest hits: columns of [`HIT_COLUMNS`] words a ray. t, u and v are the bits of f32 numbers.
 ///
 /// # Safety
-/// `scene` is open, `rays` points to `count` rays, and `hits` to as many words as stated, which overlap nothing else.
+/// `scene` is open, `rays` points to `count` rays, and `hits` to as many words as stated, which
+/// overlap nothing else.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_nearest(scene: *const Scene, rays: *const Ray, count: usize, hits: *mut u32) {
     // SAFETY: the contract is the same.
@@ -32,7 +33,7 @@ pub unsafe extern "C" fn bth_nearest(scene: *const Scene, rays: *const Ray, coun
 /// Nearest hits of rays that start on surfaces, as by [`bth_nearest`].
 ///
 /// # Safety
-/// As for [`bth_nearest`].
+/// The contract of [`bth_nearest`].
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_nearest_starts(
     scene: *const Scene,
@@ -47,10 +48,10 @@ pub unsafe extern "C" fn bth_nearest_starts(
 /// Nearest hits of rays of a kind.
 ///
 /// # Safety
-/// As for [`bth_nearest`].
+/// The contract of [`bth_nearest`].
 unsafe fn nearest<R: TraceRay>(scene: *const Scene, rays: *const R, count: usize, hits: *mut u32) {
-    // SAFETY: by contract the scene is open, and the addresses are those of arrays of these lengths that do not overlap. All bit
-    // patterns are valid for their elements.
+    // SAFETY: by contract the scene is open, and the addresses are those of arrays of these lengths
+    // that do not overlap. All bit patterns are valid for their elements.
     let (scene, rays, columns) = unsafe {
         let columns = std::slice::from_raw_parts_mut(hits, HIT_COLUMNS * count);
         (&*scene, std::slice::from_raw_parts(rays, count), columns)
@@ -72,7 +73,7 @@ unsafe fn nearest<R: TraceRay>(scene: *const Scene, rays: *const R, count: usize
 /// Which rays hit anything: a byte a ray, 0 or 1.
 ///
 /// # Safety
-/// As for [`bth_nearest`], with `count` bytes at `found`.
+/// The contract of [`bth_nearest`], with `count` bytes at `found`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_any(scene: *const Scene, rays: *const Ray, count: usize, found: *mut u8) {
     // SAFETY: the contract is the same.
@@ -82,7 +83,7 @@ pub unsafe extern "C" fn bth_any(scene: *const Scene, rays: *const Ray, count: u
 /// Which rays that start on surfaces hit anything, as by [`bth_any`].
 ///
 /// # Safety
-/// As for [`bth_any`].
+/// The contract of [`bth_any`].
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_any_starts(
     scene: *const Scene,
@@ -97,7 +98,7 @@ pub unsafe extern "C" fn bth_any_starts(
 /// Which rays of a kind hit anything.
 ///
 /// # Safety
-/// As for [`bth_any`].
+/// The contract of [`bth_any`].
 unsafe fn any<R: TraceRay>(scene: *const Scene, rays: *const R, count: usize, found: *mut u8) {
     // SAFETY: as in `nearest`.
     let (scene, rays, found) = unsafe {
@@ -117,7 +118,7 @@ unsafe fn any<R: TraceRay>(scene: *const Scene, rays: *const R, count: usize, fo
 /// Steps of the search for nearest hits: columns of [`STEP_COLUMNS`] words a ray.
 ///
 /// # Safety
-/// As for [`bth_nearest`], with as many words at `steps` as stated.
+/// The contract of [`bth_nearest`], with as many words at `steps` as stated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_steps(scene: *const Scene, rays: *const Ray, count: usize, steps: *mut u32) {
     // SAFETY: as in `nearest`.

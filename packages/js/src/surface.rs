@@ -4,17 +4,20 @@ use crate::queries::{HIT_COLUMNS, hit};
 use bth::Scene;
 use bth::rays::Hit;
 
-/// Numbers of a hit's surface: position, normal and geometric normal (3 each, world space), texture coordinates (2), linear red,
-/// green, blue and alpha, texture coordinates of the second set (2), as f32; object, group and material, as words.
+/// Numbers of a hit's surface: position, normal and geometric normal (3 each, world space), texture
+/// coordinates (2), linear red, green, blue and alpha, texture coordinates of the second set (2),
+/// as f32; object, group and material, as words.
 const SURFACE_COLUMNS: usize = 20;
 
-/// The surface at hits: columns of [`SURFACE_COLUMNS`] words a hit. A miss, and all hits if the file does not keep the vertices of
-/// triangles, have numbers of NaN and indices of 2^32 - 1. So have texture coordinates and materials that the file does not keep. The
-/// colour is that of the material's factor times that at the vertices, without textures, and white where there is neither.
+/// The surface at hits: columns of [`SURFACE_COLUMNS`] words a hit. A miss, and all hits if the
+/// file does not keep the vertices of triangles, have numbers of NaN and indices of 2^32 - 1. So
+/// have texture coordinates and materials that the file does not keep. The colour is that of the
+/// material's factor times that at the vertices, without textures, and white where there is
+/// neither.
 ///
 /// # Safety
-/// `scene` is open, `hits` points to the columns that `bth_nearest` wrote for `count` rays, and `surfaces` to as many words as stated,
-/// which overlap nothing else.
+/// `scene` is open, `hits` points to the columns that `bth_nearest` wrote for `count` rays, and
+/// `surfaces` to as many words as stated, which overlap nothing else.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_surface(
     scene: *const Scene,
@@ -22,7 +25,8 @@ pub unsafe extern "C" fn bth_surface(
     count: usize,
     surfaces: *mut u32,
 ) {
-    // SAFETY: by contract the scene is open, and the addresses are those of arrays of these lengths that do not overlap.
+    // SAFETY: by contract the scene is open, and the addresses are those of arrays of these lengths
+    // that do not overlap.
     let (scene, hits, columns) = unsafe {
         let columns = std::slice::from_raw_parts_mut(surfaces, SURFACE_COLUMNS * count);
         (&*scene, std::slice::from_raw_parts(hits, HIT_COLUMNS * count), columns)

@@ -1,8 +1,9 @@
-//! The part of the C interface that builds scenes of several files, whose instances the caller places.
+//! The part of the C interface that builds scenes of several files, whose instances the caller
+//! places.
 
-use crate::{ERROR_ARGUMENT, ERROR_INTERNAL, OK, code_of, fail};
+use crate::query::attempt;
+use crate::{ERROR_ARGUMENT, OK, fail};
 use runtime::{Error, Scene, SceneBuilder, Update};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// `bth_update` of `bth.h`.
 #[derive(Clone, Copy, Debug)]
@@ -37,8 +38,8 @@ impl UpdateC {
     }
 }
 
-/// Calls a function with the builder, and returns its error or panic as a code. `name` is that of the C function, for error
-/// messages.
+/// Calls a function with the builder. Returns its error or panic as a code. `name` is the name of
+/// the C function, for error messages.
 ///
 /// # Safety
 /// `builder` is null or was not freed, and no other call uses it or its scene at the same time.
@@ -51,12 +52,7 @@ pub(crate) unsafe fn with(
     let Some(builder) = (unsafe { builder.as_mut() }) else {
         return fail(ERROR_ARGUMENT, format!("{name}: builder must not be null"));
     };
-    // A panic must not unwind into C.
-    match catch_unwind(AssertUnwindSafe(|| call(builder))) {
-        Ok(Ok(())) => OK,
-        Ok(Err(error)) => fail(code_of(&error), format!("{name}: {error}")),
-        Err(_) => fail(ERROR_INTERNAL, format!("{name}: internal error")),
-    }
+    attempt(name, || call(builder)).map_or_else(|code| code, |()| OK)
 }
 
 /// The error of a function that was given a null pointer.
@@ -73,12 +69,13 @@ pub extern "C" fn bth_builder_new() -> *mut SceneBuilder {
 /// Frees a builder; see `bth.h`.
 ///
 /// # Safety
-/// `builder` is null, or it comes from [`bth_builder_new`], was not freed, and no other call uses it or its scene now or later.
+/// `builder` is null, or it comes from [`bth_builder_new`], was not freed, and no other call uses
+/// it or its scene now or later.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_builder_free(builder: *mut SceneBuilder) {
     if !builder.is_null() {
-        // SAFETY: `bth_builder_new` obtained the pointer from `Box::into_raw`, and by the contract of this function it has not been
-        // freed and is not used by another call.
+        // SAFETY: `bth_builder_new` obtained the pointer from `Box::into_raw`, and by the contract
+        // of this function it has not been freed and is not used by another call.
         drop(unsafe { Box::from_raw(builder) });
     }
 }
@@ -96,8 +93,8 @@ pub unsafe extern "C" fn bth_builder_scene(builder: *const SceneBuilder) -> *con
 /// Adds the objects of a scene; see `bth.h`.
 ///
 /// # Safety
-/// `builder` is null or was not freed, and no other call uses it or its scene at the same time. `scene` is null or
-/// open; `first_object` is null or valid for writes.
+/// `builder` is null or was not freed, and no other call uses it or its scene at the same time.
+/// `scene` is null or open; `first_object` is null or valid for writes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_builder_add(
     builder: *mut SceneBuilder,
@@ -118,14 +115,15 @@ pub unsafe extern "C" fn bth_builder_add(
         *out = builder.add(scene);
         Ok(())
     };
-    // SAFETY: the contract of `with` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `with`.
     unsafe { with(builder, name, add) }
 }
 
 /// Adds an instance or a subscene; stores its id.
 ///
 /// # Safety
-/// `builder` is as for [`with`]. `transform` is null or points to 12 numbers, `id` is null or valid for writes.
+/// `builder` is as for [`with`]. `transform` is null or points to 12 numbers, `id` is null or valid
+/// for writes.
 unsafe fn add(
     builder: *mut SceneBuilder,
     name: &str,
@@ -137,15 +135,15 @@ unsafe fn add(
     let (Some(transform), Some(out)) = (unsafe { transform.as_ref() }, unsafe { id.as_mut() }) else {
         return null(name, "transform and id");
     };
-    // SAFETY: the contract of `with` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `with`.
     unsafe { with(builder, name, |builder| call(builder, transform).map(|id| *out = id)) }
 }
 
 /// Adds an instance; see `bth.h`.
 ///
 /// # Safety
-/// `builder` is null or was not freed, and no other call uses it or its scene at the same time. `transform` is null or points to 12
-/// numbers, `instance` is null or valid for writes.
+/// `builder` is null or was not freed, and no other call uses it or its scene at the same time.
+/// `transform` is null or points to 12 numbers, `instance` is null or valid for writes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_builder_instance(
     builder: *mut SceneBuilder,
@@ -154,14 +152,14 @@ pub unsafe extern "C" fn bth_builder_instance(
     instance: *mut u32,
 ) -> i32 {
     let name = "bth_builder_instance";
-    // SAFETY: the contract of `add` is that of this function.
+    // SAFETY: the contract of this function is the contract of `add`.
     unsafe { add(builder, name, transform, instance, |builder, m| builder.instance(object, m)) }
 }
 
 /// Adds a subscene; see `bth.h`.
 ///
 /// # Safety
-/// As for [`bth_builder_instance`], with `subscene` in place of `instance`.
+/// The contract of [`bth_builder_instance`], with `subscene` for `instance`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_builder_subscene(
     builder: *mut SceneBuilder,
@@ -170,15 +168,15 @@ pub unsafe extern "C" fn bth_builder_subscene(
     subscene: *mut u32,
 ) -> i32 {
     let name = "bth_builder_subscene";
-    // SAFETY: the contract of `add` is that of this function.
+    // SAFETY: the contract of this function is the contract of `add`.
     unsafe { add(builder, name, transform, subscene, |builder, m| builder.subscene(first_object, m)) }
 }
 
 /// Sets the transforms of instances; see `bth.h`.
 ///
 /// # Safety
-/// `builder` is null or was not freed, and no other call uses it or its scene at the same time. `instances` and `transforms` are each
-/// null or point to `count` elements.
+/// `builder` is null or was not freed, and no other call uses it or its scene at the same time.
+/// `instances` and `transforms` are each null or point to `count` elements.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_builder_set_transforms(
     builder: *mut SceneBuilder,
@@ -188,7 +186,7 @@ pub unsafe extern "C" fn bth_builder_set_transforms(
 ) -> i32 {
     let name = "bth_builder_set_transforms";
     if count == 0 {
-        // SAFETY: the contract of `with` is part of that of this function.
+        // SAFETY: the contract of this function includes the contract of `with`.
         return unsafe { with(builder, name, |_| Ok(())) };
     }
     if instances.is_null() || transforms.is_null() {
@@ -198,39 +196,47 @@ pub unsafe extern "C" fn bth_builder_set_transforms(
     let (instances, transforms) = unsafe {
         (std::slice::from_raw_parts(instances, count), std::slice::from_raw_parts(transforms, count))
     };
-    // SAFETY: the contract of `with` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `with`.
     unsafe { with(builder, name, |builder| builder.set_transforms(instances, transforms)) }
 }
 
-/// Hides or shows an instance; see `bth.h`.
-///
-/// # Safety
-/// `builder` is null or was not freed, and no other call uses it or its scene at the same time.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_builder_set_visible(
-    builder: *mut SceneBuilder,
-    instance: u32,
-    visible: u32,
-) -> i32 {
-    // SAFETY: the contract of `with` is that of this function.
-    unsafe { with(builder, "bth_builder_set_visible", |builder| builder.set_visible(instance, visible != 0)) }
+/// Defines functions that call a method of the builder and take nothing but numbers.
+macro_rules! builder_functions {
+    ($($(#[$doc:meta])* fn $name:ident($($argument:ident),+) = |$builder:ident| $call:expr;)+) => { $(
+        $(#[$doc])*
+        ///
+        /// # Safety
+        /// `builder` is null or was not freed, and no other call uses it or its scene at the same
+        /// time.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $name(builder: *mut SceneBuilder, $($argument: u32),+) -> i32 {
+            // SAFETY: the contract of this function is the contract of `with`.
+            unsafe { with(builder, stringify!($name), |$builder| $call) }
+        }
+    )+ };
 }
 
-/// Removes an instance; see `bth.h`.
-///
-/// # Safety
-/// As for [`bth_builder_set_visible`].
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_builder_remove(builder: *mut SceneBuilder, instance: u32) -> i32 {
-    // SAFETY: the contract of `with` is that of this function.
-    unsafe { with(builder, "bth_builder_remove", |builder| builder.remove(instance)) }
+builder_functions! {
+    /// Hides or shows an instance; see `bth.h`.
+    fn bth_builder_set_visible(instance, visible) = |builder| builder.set_visible(instance, visible != 0);
+    /// Removes an instance; see `bth.h`.
+    fn bth_builder_remove(instance) = |builder| builder.remove(instance);
+    /// Hides or shows a subscene; see `bth.h`.
+    fn bth_builder_set_subscene_visible(subscene, visible) =
+        |builder| builder.set_subscene_visible(subscene, visible != 0);
+    /// Removes a subscene; see `bth.h`.
+    fn bth_builder_remove_subscene(subscene) = |builder| builder.remove_subscene(subscene);
+    /// Sets the mask of an instance; see `bth.h`.
+    fn bth_builder_set_instance_mask(instance, mask) = |builder| builder.set_instance_mask(instance, mask);
+    /// Sets the mask of a group; see `bth.h`.
+    fn bth_builder_set_group_mask(object, group, mask) = |builder| builder.set_group_mask(object, group, mask);
 }
 
 /// Ids of a subscene's instances; see `bth.h`.
 ///
 /// # Safety
-/// As for [`bth_builder_set_visible`]. `instances` is null or valid for writes of `capacity` elements, `count` is null or valid for
-/// writes.
+/// The contract of [`bth_builder_set_subscene_transform`]. `instances` is null or valid for writes
+/// of `capacity` elements, `count` is null or valid for writes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_builder_subscene_instances(
     builder: *mut SceneBuilder,
@@ -249,19 +255,21 @@ pub unsafe extern "C" fn bth_builder_subscene_instances(
         let ids = builder.subscene_instances(subscene)?;
         *count = ids.len();
         for (i, id) in ids.iter().take(capacity).enumerate() {
-            // SAFETY: it is not null where the capacity is not 0, so by contract it is valid for `capacity` writes.
+            // SAFETY: it is not null where the capacity is not 0, so by contract it is valid for
+            // `capacity` writes.
             unsafe { instances.add(i).write(*id) };
         }
         Ok(())
     };
-    // SAFETY: the contract of `with` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `with`.
     unsafe { with(builder, name, store) }
 }
 
 /// Places a subscene; see `bth.h`.
 ///
 /// # Safety
-/// As for [`bth_builder_set_visible`]. `transform` is null or points to 12 numbers.
+/// `builder` is null or was not freed, and no other call uses it or its scene at the same time.
+/// `transform` is null or points to 12 numbers.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_builder_set_subscene_transform(
     builder: *mut SceneBuilder,
@@ -271,14 +279,14 @@ pub unsafe extern "C" fn bth_builder_set_subscene_transform(
     let name = "bth_builder_set_subscene_transform";
     // SAFETY: by contract it is null or points to 12 numbers.
     let Some(transform) = (unsafe { transform.as_ref() }) else { return null(name, "transform") };
-    // SAFETY: the contract of `with` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `with`.
     unsafe { with(builder, name, |builder| builder.set_subscene_transform(subscene, transform)) }
 }
 
 /// Sets the time of a subscene; see `bth.h`.
 ///
 /// # Safety
-/// As for [`bth_builder_set_visible`].
+/// The contract of [`bth_builder_set_subscene_transform`].
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_builder_set_subscene_seconds(
     builder: *mut SceneBuilder,
@@ -289,70 +297,14 @@ pub unsafe extern "C" fn bth_builder_set_subscene_seconds(
     if !seconds.is_finite() {
         return fail(ERROR_ARGUMENT, format!("{name}: expected a finite time, found {seconds}"));
     }
-    // SAFETY: the contract of `with` is that of this function.
+    // SAFETY: the contract of this function is the contract of `with`.
     unsafe { with(builder, name, |builder| builder.set_subscene_seconds(subscene, seconds)) }
-}
-
-/// Hides or shows a subscene; see `bth.h`.
-///
-/// # Safety
-/// As for [`bth_builder_set_visible`].
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_builder_set_subscene_visible(
-    builder: *mut SceneBuilder,
-    subscene: u32,
-    visible: u32,
-) -> i32 {
-    let name = "bth_builder_set_subscene_visible";
-    // SAFETY: the contract of `with` is that of this function.
-    unsafe { with(builder, name, |builder| builder.set_subscene_visible(subscene, visible != 0)) }
-}
-
-/// Removes a subscene; see `bth.h`.
-///
-/// # Safety
-/// As for [`bth_builder_set_visible`].
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_builder_remove_subscene(builder: *mut SceneBuilder, subscene: u32) -> i32 {
-    // SAFETY: the contract of `with` is that of this function.
-    unsafe { with(builder, "bth_builder_remove_subscene", |builder| builder.remove_subscene(subscene)) }
-}
-
-/// Sets the mask of an instance; see `bth.h`.
-///
-/// # Safety
-/// As for [`bth_builder_set_visible`].
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_builder_set_instance_mask(
-    builder: *mut SceneBuilder,
-    instance: u32,
-    mask: u32,
-) -> i32 {
-    let name = "bth_builder_set_instance_mask";
-    // SAFETY: the contract of `with` is that of this function.
-    unsafe { with(builder, name, |builder| builder.set_instance_mask(instance, mask)) }
-}
-
-/// Sets the mask of a group; see `bth.h`.
-///
-/// # Safety
-/// As for [`bth_builder_set_visible`].
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_builder_set_group_mask(
-    builder: *mut SceneBuilder,
-    object: u32,
-    group: u32,
-    mask: u32,
-) -> i32 {
-    let name = "bth_builder_set_group_mask";
-    // SAFETY: the contract of `with` is that of this function.
-    unsafe { with(builder, name, |builder| builder.set_group_mask(object, group, mask)) }
 }
 
 /// Makes all changes visible; see `bth.h`.
 ///
 /// # Safety
-/// As for [`bth_builder_set_visible`]. `update` is null or valid for writes.
+/// The contract of [`bth_builder_set_subscene_transform`]. `update` is null or valid for writes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_builder_commit(builder: *mut SceneBuilder, update: *mut UpdateC) -> i32 {
     let commit = |builder: &mut SceneBuilder| {
@@ -363,6 +315,6 @@ pub unsafe extern "C" fn bth_builder_commit(builder: *mut SceneBuilder, update: 
         }
         Ok(())
     };
-    // SAFETY: the contract of `with` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `with`.
     unsafe { with(builder, "bth_builder_commit", commit) }
 }

@@ -57,7 +57,7 @@ pub unsafe extern "C" fn bth_closest_points(
     count: usize,
 ) -> i32 {
     let arguments = Arguments { scene, asked: points, answers: closest, count };
-    // SAFETY: the contract of this function includes that of `store_as`.
+    // SAFETY: the contract of this function includes the contract of `store_as`.
     unsafe {
         arguments.store_as(
             None,
@@ -79,15 +79,15 @@ pub unsafe extern "C" fn bth_signed_distances(
     count: usize,
 ) -> i32 {
     let arguments = Arguments { scene, asked: points, answers: distances, count };
-    // SAFETY: the contract of this function includes that of `store`.
+    // SAFETY: the contract of this function includes the contract of `store`.
     unsafe { arguments.store(f32::NAN, Scene::signed_distance_batch) }
 }
 
 /// Stores triangles that a query finds; see `bth.h`.
 ///
 /// # Safety
-/// `scene` is null or open, `triangles` is null or valid for writes of `capacity` elements, and `count` is null or valid for
-/// writes.
+/// `scene` is null or open, `triangles` is null or valid for writes of `capacity` elements, and
+/// `count` is null or valid for writes.
 unsafe fn store_found(
     name: &str,
     scene: *const Scene,
@@ -110,7 +110,8 @@ unsafe fn store_found(
     *count = found.len();
     let stored = found.len().min(capacity);
     if stored > 0 {
-        // SAFETY: it is not null as the capacity is not 0, so by contract it is valid for writes of that many elements.
+        // SAFETY: it is not null as the capacity is not 0, so by contract it is valid for writes of
+        // that many elements.
         unsafe { ptr::copy_nonoverlapping(found.as_ptr(), triangles, stored) };
     }
     OK
@@ -119,8 +120,8 @@ unsafe fn store_found(
 /// Triangles in a box; see `bth.h`.
 ///
 /// # Safety
-/// `scene` is null or open, `lower` and `upper` are null or point to three numbers, `triangles` is null or valid for writes of
-/// `capacity` elements, and `count` is null or valid for writes.
+/// `scene` is null or open, `lower` and `upper` are null or point to three numbers, `triangles` is
+/// null or valid for writes of `capacity` elements, and `count` is null or valid for writes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_triangles_in_box(
     scene: *const Scene,
@@ -134,7 +135,7 @@ pub unsafe extern "C" fn bth_triangles_in_box(
     let (Some(lower), Some(upper)) = (unsafe { lower.as_ref() }, unsafe { upper.as_ref() }) else {
         return fail(ERROR_ARGUMENT, "bth_triangles_in_box: lower and upper must not be null".into());
     };
-    // SAFETY: the contract of `store_found` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `store_found`.
     unsafe {
         store_found("bth_triangles_in_box", scene, (triangles, capacity), count, |scene, found| {
             scene.triangles_in_box(*lower, *upper, found);
@@ -145,7 +146,7 @@ pub unsafe extern "C" fn bth_triangles_in_box(
 /// Triangles in a ball; see `bth.h`.
 ///
 /// # Safety
-/// As for [`bth_triangles_in_box`], with `center` in place of `lower` and `upper`.
+/// The contract of [`bth_triangles_in_box`], with `center` for `lower` and `upper`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_triangles_in_sphere(
     scene: *const Scene,
@@ -159,7 +160,7 @@ pub unsafe extern "C" fn bth_triangles_in_sphere(
     let Some(center) = (unsafe { center.as_ref() }) else {
         return fail(ERROR_ARGUMENT, "bth_triangles_in_sphere: center must not be null".into());
     };
-    // SAFETY: the contract of `store_found` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `store_found`.
     unsafe {
         store_found("bth_triangles_in_sphere", scene, (triangles, capacity), count, |scene, found| {
             scene.triangles_in_sphere(*center, radius, found);

@@ -1,4 +1,5 @@
-//! The part of the C interface that reports several hits and hits under conditions, and that sets masks.
+//! The part of the C interface that reports several hits and hits under conditions, and that sets
+//! masks.
 
 use crate::query::Arguments;
 use crate::{ERROR_ARGUMENT, OK, fail};
@@ -35,14 +36,14 @@ struct CallerFilter {
     user: *mut c_void,
 }
 
-// SAFETY: the pointer is only passed to the function. By the contract in `bth.h` the function may be called on any thread, and on
-// several at the same time.
+// SAFETY: the pointer is only passed to the function. By the contract in `bth.h` the function may
+// be called on any thread, and on several at the same time.
 unsafe impl Sync for CallerFilter {}
 
 impl CallerFilter {
     fn accepts(&self, ray: &Ray, hit: &Hit) -> bool {
-        // SAFETY: by the contract in `bth.h` the function may be called with the argument that was given with it and with pointers
-        // that are valid during the call.
+        // SAFETY: by the contract in `bth.h` the function may be called with the argument that was
+        // given with it and with pointers that are valid during the call.
         unsafe { (self.function)(self.user, ray, hit) != 0 }
     }
 }
@@ -80,9 +81,9 @@ unsafe fn with_accept(
 /// The nearest hit of each ray that is accepted; see `bth.h`.
 ///
 /// # Safety
-/// `scene` is null or open. `rays` and `hits` are null or point to `count` elements. The elements of
-/// `hits` are valid for writes and do not overlap the others. `accept` is null or points to a struct
-/// whose filter is null or meets the contract in `bth.h`.
+/// `scene` is null or open. `rays` and `hits` are null or point to `count` elements. The elements
+/// of `hits` are valid for writes and do not overlap the others. `accept` is null or points to a
+/// struct whose filter is null or meets the contract in `bth.h`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_nearest_accepted(
     scene: *const Scene,
@@ -92,7 +93,7 @@ pub unsafe extern "C" fn bth_nearest_accepted(
     count: usize,
 ) -> i32 {
     let arguments = Arguments { scene, asked: rays, answers: hits, count };
-    // SAFETY: the contract of this function includes those of `with_accept` and `store`.
+    // SAFETY: the contract of this function includes the contracts of `with_accept` and `store`.
     unsafe {
         with_accept("bth_nearest_accepted", accept, count, |accept| {
             arguments.store(Hit::MISS, |scene, rays, hits| scene.nearest_accepted_batch(rays, accept, hits))
@@ -113,7 +114,7 @@ pub unsafe extern "C" fn bth_any_accepted(
     count: usize,
 ) -> i32 {
     let arguments = Arguments { scene, asked: rays, answers: found, count };
-    // SAFETY: the contract of this function includes those of `with_accept` and `store_as`.
+    // SAFETY: the contract of this function includes the contracts of `with_accept` and `store_as`.
     unsafe {
         with_accept("bth_any_accepted", accept, count, |accept| {
             let query = |scene: &Scene, rays: &[Ray], found: &mut [bool]| {
@@ -137,7 +138,7 @@ pub unsafe extern "C" fn bth_count_hits(
     count: usize,
 ) -> i32 {
     let arguments = Arguments { scene, asked: rays, answers: counts, count };
-    // SAFETY: the contract of this function includes those of `with_accept` and `store_as`.
+    // SAFETY: the contract of this function includes the contracts of `with_accept` and `store_as`.
     unsafe {
         with_accept("bth_count_hits", accept, count, |accept| {
             let query = |scene: &Scene, rays: &[Ray], counts: &mut [usize]| {
@@ -151,9 +152,9 @@ pub unsafe extern "C" fn bth_count_hits(
 /// All hits of each ray that are accepted, or the nearest of them; see `bth.h`.
 ///
 /// # Safety
-/// The contract of [`bth_nearest_accepted`], with `list` for `hits`: it is null or points to a struct
-/// whose `offsets` is null or points to `count + 1` numbers, and whose `hits` is null or points to
-/// `capacity` elements, all valid for writes.
+/// The contract of [`bth_nearest_accepted`], with `list` for `hits`: it is null or points to a
+/// struct whose `offsets` is null or points to `count + 1` numbers, and whose `hits` is null or
+/// points to `capacity` elements, all valid for writes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_all_hits(
     scene: *const Scene,
@@ -182,7 +183,7 @@ pub unsafe extern "C" fn bth_all_hits(
     let answers = list.offsets.wrapping_add(1);
     let arguments = Arguments { scene, asked: rays, answers, count };
     let most = usize::try_from(most).unwrap_or(usize::MAX);
-    let store = |scene: &Scene, rays: &[Ray], accept: &Accept<'_>, offsets: &mut [u64]| {
+    let mut store = |scene: &Scene, rays: &[Ray], accept: &Accept<'_>, offsets: &mut [u64]| {
         let mut hits = Vec::new();
         let mut needed = 0u64;
         for (ray, offset) in rays.iter().zip(offsets) {
@@ -193,8 +194,8 @@ pub unsafe extern "C" fn bth_all_hits(
             }
             for hit in &hits {
                 if needed < list.capacity {
-                    // SAFETY: `hits` is not null, because `capacity` is greater than 0, so by contract
-                    // it points to `capacity` elements.
+                    // SAFETY: `hits` is not null, because `capacity` is greater than 0, so by
+                    // contract it points to `capacity` elements.
                     unsafe { list.hits.add(needed as usize).write(*hit) };
                 }
                 needed += 1;
@@ -203,8 +204,8 @@ pub unsafe extern "C" fn bth_all_hits(
         }
         list.needed = needed;
     };
-    // SAFETY: the contract of this function includes those of `with_accept` and `store`. From the
-    // second number on `offsets` has as many as there are rays.
+    // SAFETY: the contract of this function includes the contracts of `with_accept` and `store`.
+    // From the second number on `offsets` has as many as there are rays.
     unsafe {
         with_accept("bth_all_hits", accept, count, |accept| {
             arguments.store(0, |scene, rays, offsets| store(scene, rays, accept, offsets))
@@ -234,7 +235,7 @@ pub unsafe extern "C" fn bth_set_instance_mask(scene: *mut Scene, instance: u32,
 /// Sets the mask of a group of triangles; see `bth.h`.
 ///
 /// # Safety
-/// As for [`bth_set_instance_mask`].
+/// The contract of [`bth_set_instance_mask`].
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_set_group_mask(scene: *mut Scene, object: u32, group: u32, mask: u32) -> i32 {
     // SAFETY: by contract it is null or open, and not used by another call at the same time.

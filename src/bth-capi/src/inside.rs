@@ -19,15 +19,15 @@ pub unsafe extern "C" fn bth_crossings(
     count: usize,
 ) -> i32 {
     let arguments = Arguments { scene, asked: rays, answers: crossings, count };
-    // SAFETY: the contract of this function includes that of `store`.
+    // SAFETY: the contract of this function includes the contract of `store`.
     unsafe { arguments.store(Crossings::default(), Scene::crossings_batch) }
 }
 
 /// Winding numbers of points; see `bth.h`.
 ///
 /// # Safety
-/// `scene` is null or open. `at` is null or points to `count` points, and `winding` is null or points
-/// to `count` numbers, which are valid for writes and do not overlap the others.
+/// `scene` is null or open. `at` is null or points to `count` points, and `winding` is null or
+/// points to `count` numbers, which are valid for writes and do not overlap the others.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_winding(
     scene: *const Scene,
@@ -35,7 +35,7 @@ pub unsafe extern "C" fn bth_winding(
     winding: *mut i32,
     count: usize,
 ) -> i32 {
-    // SAFETY: the contract of this function includes that of `store`.
+    // SAFETY: the contract of this function includes the contract of `store`.
     unsafe { Arguments { scene, asked: at, answers: winding, count }.store(0, Scene::winding_batch) }
 }
 
@@ -52,6 +52,6 @@ pub unsafe extern "C" fn bth_contains(
     count: usize,
 ) -> i32 {
     let arguments = Arguments { scene, asked: at, answers: inside, count };
-    // SAFETY: the contract of this function includes that of `store_as`.
+    // SAFETY: the contract of this function includes the contract of `store_as`.
     unsafe { arguments.store_as(false, Scene::contains_batch, u8::from) }
 }

@@ -1,4 +1,5 @@
-//! C interface of bth. Its documentation is the header `include/bth.h`, which must be kept consistent with this crate.
+//! C interface of bth. Its documentation is the header `include/bth.h`, which must be kept
+//! consistent with this crate.
 #![allow(unsafe_code)] // Most functions take pointers from C.
 
 pub mod builder;
@@ -68,8 +69,8 @@ fn code_of(error: &Error) -> i32 {
 /// Opens a file; see `bth.h`.
 ///
 /// # Safety
-/// `path` is null or points to a C string; `scene` is null or valid for writes. With the flag `BTH_MAP` the file must meet the
-/// contract of [`runtime::map`] until the scene is closed.
+/// `path` is null or points to a C string; `scene` is null or valid for writes. With the flag
+/// `BTH_MAP` the file must meet the contract of [`runtime::map`] until the scene is closed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_open(path: *const c_char, flags: u32, scene: *mut *mut Scene) -> i32 {
     if scene.is_null() || path.is_null() {
@@ -83,7 +84,7 @@ pub unsafe extern "C" fn bth_open(path: *const c_char, flags: u32, scene: *mut *
     };
     let opened = catch_unwind(|| match flags {
         READ => Some(runtime::open(Path::new(path))),
-        // SAFETY: with this flag the contract of this function includes that of `map`.
+        // SAFETY: with this flag the contract of this function includes the contract of `map`.
         MAP => Some(unsafe { runtime::map(Path::new(path)) }),
         _ => None,
     });
@@ -102,12 +103,13 @@ pub unsafe extern "C" fn bth_open(path: *const c_char, flags: u32, scene: *mut *
 /// Closes a scene; see `bth.h`.
 ///
 /// # Safety
-/// `scene` is null, or it comes from [`bth_open`], has not been closed, and no other call uses it now or later.
+/// `scene` is null, or it comes from [`bth_open`], has not been closed, and no other call uses it
+/// now or later.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_close(scene: *mut Scene) {
     if !scene.is_null() {
-        // SAFETY: `bth_open` obtained the pointer from `Box::into_raw`, and by the contract of this function it has not been
-        // freed and is not used by another call.
+        // SAFETY: `bth_open` obtained the pointer from `Box::into_raw`, and by the contract of this
+        // function it has not been freed and is not used by another call.
         drop(unsafe { Box::from_raw(scene) });
     }
 }
@@ -127,8 +129,8 @@ fn null_argument() -> i32 {
 /// Nearest hits; see `bth.h`.
 ///
 /// # Safety
-/// `scene` is null or open. `rays` and `hits` are each null or point to `count` elements; those of `hits` are valid for
-/// writes and do not overlap the others.
+/// `scene` is null or open. `rays` and `hits` are each null or point to `count` elements; those of
+/// `hits` are valid for writes and do not overlap the others.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_nearest(
     scene: *const Scene,
@@ -138,11 +140,13 @@ pub unsafe extern "C" fn bth_nearest(
     count: usize,
 ) {
     if count == 1 {
-        // SAFETY: by contract each pointer is null or points to one element, and `hits` is valid for writes. `Ray` and `Hit` have the
-        // layout of the C structs, and all bit patterns are valid for them.
+        // SAFETY: by contract each pointer is null or points to one element, and `hits` is valid
+        // for writes. `Ray` and `Hit` have the layout of the C structs, and all bit patterns are
+        // valid for them.
         let one = unsafe { (scene.as_ref(), rays.as_ref(), hits.as_mut()) };
         if let (Some(scene), Some(ray), Some(hit)) = one {
-            // With nothing but the kernel behind it, no registers are saved for what only batches need.
+            // With nothing but the kernel behind it, no registers are saved for what only batches
+            // need.
             let (ray, hits) = (from_ref(ray), from_mut(hit));
             if guarded(|| scene.batch(ray).nearest(hits)).is_err() {
                 hits.fill(Hit::MISS);
@@ -167,7 +171,7 @@ unsafe fn nearest_of_batch(arguments: Arguments<Ray, Hit>) {
 /// Whether rays hit anything; see `bth.h`.
 ///
 /// # Safety
-/// As for [`bth_nearest`], with `hit` in place of `hits`: it is null or points to `count` bytes.
+/// The contract of [`bth_nearest`], with `hit` for `hits`: it is null or points to `count` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_any(
     scene: *const Scene,

@@ -1,4 +1,5 @@
-//! The part of the C interface that tells how surfaces look: materials, textures and vertex colours.
+//! The part of the C interface that tells how surfaces look: materials, textures and vertex
+//! colours.
 
 use crate::surface::{check_triangle, store};
 use crate::{ERROR_ARGUMENT, ERROR_MISSING, fail};
@@ -90,7 +91,7 @@ pub unsafe extern "C" fn bth_material(
         });
         found.map(|found| MaterialC::new(&found))
     };
-    // SAFETY: the contract of `store` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `store`.
     unsafe { store("bth_material", scene, look, find) }
 }
 
@@ -135,14 +136,15 @@ pub unsafe extern "C" fn bth_texture(
             reserved: 0,
         })
     };
-    // SAFETY: the contract of `store` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `store`.
     unsafe { store("bth_texture", scene, image, find) }
 }
 
 /// The texture coordinates of a set at a hit; see `bth.h`.
 ///
 /// # Safety
-/// `scene` is null or open; `hit` is null or valid for reads; `uv` is null or points to two numbers that are valid for writes.
+/// `scene` is null or open; `hit` is null or valid for reads; `uv` is null or points to two numbers
+/// that are valid for writes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_texture_coordinates(
     scene: *const Scene,
@@ -165,14 +167,15 @@ pub unsafe extern "C" fn bth_texture_coordinates(
         let nothing = || (ERROR_MISSING, format!("the file keeps no set {uv_set} for the triangle"));
         scene.texture_coordinates(hit, uv_set).ok_or_else(nothing)
     };
-    // SAFETY: the contract of `store` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `store`.
     unsafe { store("bth_texture_coordinates", scene, uv, find) }
 }
 
 /// The vertex colour at a hit; see `bth.h`.
 ///
 /// # Safety
-/// `scene` is null or open; `hit` is null or valid for reads; `color` is null or points to four numbers that are valid for writes.
+/// `scene` is null or open; `hit` is null or valid for reads; `color` is null or points to four
+/// numbers that are valid for writes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_vertex_color(scene: *const Scene, hit: *const Hit, color: *mut [f32; 4]) -> i32 {
     // SAFETY: by contract it is null or valid for reads.
@@ -184,6 +187,6 @@ pub unsafe extern "C" fn bth_vertex_color(scene: *const Scene, hit: *const Hit, 
         let nothing = || (ERROR_MISSING, "the file keeps no vertex colors of the triangle".to_owned());
         scene.vertex_color(hit).ok_or_else(nothing)
     };
-    // SAFETY: the contract of `store` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `store`.
     unsafe { store("bth_vertex_color", scene, color, find) }
 }

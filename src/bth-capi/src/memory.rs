@@ -7,7 +7,8 @@ use std::panic::catch_unwind;
 /// Opens the contents of a file; see `bth.h`.
 ///
 /// # Safety
-/// `bytes` is null or points to `length` bytes, which nobody writes to during the call; `scene` is null or valid for writes.
+/// `bytes` is null or points to `length` bytes, which nobody writes to during the call; `scene` is
+/// null or valid for writes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_open_memory(
     bytes: *const u8,
@@ -26,7 +27,8 @@ pub unsafe extern "C" fn bth_open_memory(
     if flags != READ {
         return fail(ERROR_ARGUMENT, format!("bth_open_memory: unknown flags {flags:#x}"));
     }
-    // SAFETY: it is not null, so by contract it points to `length` bytes, which do not change during the call.
+    // SAFETY: it is not null, so by contract it points to `length` bytes, which do not change
+    // during the call.
     let bytes = unsafe { std::slice::from_raw_parts(bytes, length) };
     match catch_unwind(|| runtime::from_bytes(bytes)) {
         Ok(Ok(opened)) => {

@@ -1,8 +1,8 @@
 //! The part of the C interface that sets the time of scenes and returns their instances.
 
-use crate::{ERROR_ARGUMENT, ERROR_INTERNAL, OK, code_of, fail};
+use crate::query::attempt;
+use crate::{ERROR_ARGUMENT, OK, fail};
 use runtime::{Error, Scene};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// `bth_instance` of `bth.h`.
 #[derive(Clone, Copy, Debug)]
@@ -54,25 +54,25 @@ pub unsafe extern "C" fn bth_set_seconds(scene: *mut Scene, seconds: f64) -> i32
     if !seconds.is_finite() {
         return fail(ERROR_ARGUMENT, format!("bth_set_seconds: expected a finite time, found {seconds}"));
     }
-    // SAFETY: the contract of `update` is that of this function.
+    // SAFETY: the contract of this function is the contract of `update`.
     unsafe { update(scene, "bth_set_seconds", |scene| scene.set_seconds(seconds).map(drop)) }
 }
 
 /// Moves a scene to a frame; see `bth.h`.
 ///
 /// # Safety
-/// As for [`bth_set_seconds`].
+/// The contract of [`bth_set_seconds`].
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_set_frame(scene: *mut Scene, frame: i32) -> i32 {
-    // SAFETY: the contract of `update` is that of this function.
+    // SAFETY: the contract of this function is the contract of `update`.
     unsafe { update(scene, "bth_set_frame", |scene| scene.set_frame(frame).map(drop)) }
 }
 
-/// Calls `set_time` with the scene, and returns its error or panic as a code. `name` is that of the C function, for error
-/// messages.
+/// Calls `set_time` with the scene. Returns its error or panic as a code. `name` is the name of the
+/// C function, for error messages.
 ///
 /// # Safety
-/// As for [`bth_set_seconds`].
+/// The contract of [`bth_set_seconds`].
 unsafe fn update(
     scene: *mut Scene,
     name: &str,
@@ -82,12 +82,7 @@ unsafe fn update(
     let Some(scene) = (unsafe { scene.as_mut() }) else {
         return fail(ERROR_ARGUMENT, format!("{name}: scene must not be null"));
     };
-    // A panic must not unwind into C.
-    match catch_unwind(AssertUnwindSafe(|| set_time(scene))) {
-        Ok(Ok(())) => OK,
-        Ok(Err(error)) => fail(code_of(&error), error.to_string()),
-        Err(_) => fail(ERROR_INTERNAL, format!("{name}: internal error")),
-    }
+    attempt(name, || set_time(scene)).map_or_else(|code| code, |()| OK)
 }
 
 /// Number of instances; see `bth.h`.

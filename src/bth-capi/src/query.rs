@@ -1,7 +1,7 @@
 //! What queries have in common: arrays of what is asked, and arrays for the answers.
 
-use crate::{ERROR_INTERNAL, OK, fail, null_argument};
-use runtime::Scene;
+use crate::{ERROR_INTERNAL, OK, code_of, fail, null_argument};
+use runtime::{Error, Scene};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Number of answers that are converted together.
@@ -9,9 +9,9 @@ pub(crate) const CHUNK: usize = 1024;
 
 /// The arguments of a query.
 ///
-/// `scene` is null or open. `asked` and `answers` are each null or point to `count` elements. All bit
-/// patterns are valid for their types. The elements of `answers` are valid for writes and do not
-/// overlap the others. Nobody else uses any of them during the call.
+/// `scene` is null or open. `asked` and `answers` are each null or point to `count` elements. All
+/// bit patterns are valid for their types. The elements of `answers` are valid for writes and do
+/// not overlap the others. Nobody else uses any of them during the call.
 pub(crate) struct Arguments<Q, A> {
     pub(crate) scene: *const Scene,
     pub(crate) asked: *const Q,
@@ -20,8 +20,8 @@ pub(crate) struct Arguments<Q, A> {
 }
 
 impl<Q, A: Copy> Arguments<Q, A> {
-    /// The arguments as a scene and slices. `Err` is the result of the query if nothing is asked or a
-    /// pointer is null.
+    /// The arguments as a scene and slices. `Err` is the result of the query if nothing is asked or
+    /// a pointer is null.
     ///
     /// # Safety
     /// The arguments are as in [`Arguments`] for as long as the result lives.
@@ -34,7 +34,8 @@ impl<Q, A: Copy> Arguments<Q, A> {
             return Err(null_argument());
         }
         // SAFETY: the pointers are not null, so by contract `scene` is an open scene and the others
-        // point to `count` elements, and those of `answers` are valid for writes and overlap nothing.
+        // point to `count` elements, and those of `answers` are valid for writes and overlap
+        // nothing.
         unsafe {
             let answers = std::slice::from_raw_parts_mut(answers, count);
             Ok((&*scene, std::slice::from_raw_parts(asked, count), answers))
@@ -57,8 +58,8 @@ impl<Q, A: Copy> Arguments<Q, A> {
         }
     }
 
-    /// Stores the answers of a query that have another type in C; returns its code. After a panic the
-    /// answers of a chunk are all `none`.
+    /// Stores the answers of a query that have another type in C; returns its code. After a panic
+    /// the answers of a chunk are all `none`.
     ///
     /// # Safety
     /// The arguments are as in [`Arguments`].
@@ -91,6 +92,16 @@ impl<Q, A: Copy> Arguments<Q, A> {
 #[inline(always)]
 pub(crate) fn guarded(query: impl FnOnce()) -> Result<i32, i32> {
     catch_unwind(AssertUnwindSafe(query)).map_or_else(|_| Err(defect()), |()| Ok(OK))
+}
+
+/// Calls a function that may fail. Its error or panic becomes a code. `name` is the name of the C
+/// function, for error messages.
+pub(crate) fn attempt<T>(name: &str, call: impl FnOnce() -> Result<T, Error>) -> Result<T, i32> {
+    match catch_unwind(AssertUnwindSafe(call)) {
+        Ok(Ok(value)) => Ok(value),
+        Ok(Err(error)) => Err(fail(code_of(&error), format!("{name}: {error}"))),
+        Err(_) => Err(fail(ERROR_INTERNAL, format!("{name}: internal error"))),
+    }
 }
 
 /// The result of a query that panicked.

@@ -1,10 +1,9 @@
 //! Rays that start on surfaces.
 
-use crate::query::{CHUNK, guarded};
-use crate::{ERROR_ARGUMENT, ERROR_INTERNAL, OK, code_of, fail, null_argument};
+use crate::query::{CHUNK, attempt, guarded};
+use crate::{ERROR_ARGUMENT, OK, fail, null_argument};
 use runtime::Scene;
 use runtime::rays::{Hit, PrimitiveRef, Start, StartRay};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// The arguments of a query by rays that start on surfaces.
 ///
@@ -25,7 +24,8 @@ impl StartArguments {
     ///
     /// # Safety
     /// The arguments are as in [`StartArguments`]. `answers` is null or points to `count` elements,
-    /// which are valid for writes and do not overlap the others. All bit patterns are valid for them.
+    /// which are valid for writes and do not overlap the others. All bit patterns are valid for
+    /// them.
     unsafe fn store<T: Copy, A>(
         self,
         answers: *mut A,
@@ -41,9 +41,9 @@ impl StartArguments {
             return null_argument();
         }
         // SAFETY: the pointers are not null, so by contract `scene` is an open scene and the others
-        // point to `count` elements. `Start` has the layout of `bth_start`, and all bit patterns are
-        // valid for it and for numbers. The elements of `answers` are valid for writes and overlap
-        // nothing.
+        // point to `count` elements. `Start` has the layout of `bth_start`, and all bit patterns
+        // are valid for it and for numbers. The elements of `answers` are valid for writes and
+        // overlap nothing.
         let (scene, starts, directions, tmax, answers) = unsafe {
             let tmax = (!tmax.is_null()).then(|| std::slice::from_raw_parts(tmax, count));
             let starts = std::slice::from_raw_parts(starts, count);
@@ -96,7 +96,7 @@ pub unsafe extern "C" fn bth_nearest_starts(
 ) -> i32 {
     let arguments = StartArguments { scene, starts, directions, tmax, count };
     let query = |scene: &Scene, rays: &[StartRay], hits: &mut [Hit]| scene.batch(rays).nearest(hits);
-    // SAFETY: the contract of this function includes that of `store`.
+    // SAFETY: the contract of this function includes the contract of `store`.
     unsafe { arguments.store(hits, Hit::MISS, query, |hit| hit) }
 }
 
@@ -116,7 +116,7 @@ pub unsafe extern "C" fn bth_any_starts(
 ) -> i32 {
     let arguments = StartArguments { scene, starts, directions, tmax, count };
     let query = |scene: &Scene, rays: &[StartRay], found: &mut [bool]| scene.batch(rays).any(found);
-    // SAFETY: the contract of this function includes that of `store`.
+    // SAFETY: the contract of this function includes the contract of `store`.
     unsafe { arguments.store(hit, false, query, u8::from) }
 }
 
@@ -131,9 +131,5 @@ pub unsafe extern "C" fn bth_check_start(scene: *const Scene, start: *const Star
     let (Some(scene), Some(start)) = (unsafe { (scene.as_ref(), start.as_ref()) }) else {
         return fail(ERROR_ARGUMENT, "bth_check_start: scene and start must not be null".into());
     };
-    match catch_unwind(AssertUnwindSafe(|| scene.check_start(start))) {
-        Ok(Ok(())) => OK,
-        Ok(Err(error)) => fail(code_of(&error), format!("bth_check_start: {error}")),
-        Err(_) => fail(ERROR_INTERNAL, "bth_check_start: internal error".into()),
-    }
+    attempt("bth_check_start", || scene.check_start(start)).map_or_else(|code| code, |()| OK)
 }

@@ -1,4 +1,5 @@
-//! The part of the C interface that describes what hits lead to: surfaces, triangles, bounds and names.
+//! The part of the C interface that describes what hits lead to: surfaces, triangles, bounds and
+//! names.
 
 use crate::{ERROR_ARGUMENT, ERROR_INTERNAL, ERROR_MISSING, OK, fail};
 use runtime::Scene;
@@ -27,7 +28,8 @@ pub struct SurfacePointC {
 
 const _: () = assert!(size_of::<SurfacePointC>() == 96);
 
-/// Calls a function with the scene and stores its result; returns a code. The function returns an error's code and text.
+/// Calls a function with the scene and stores its result; returns a code. The function returns an
+/// error's code and text.
 ///
 /// # Safety
 /// `scene` is null or open; `out` is null or valid for writes.
@@ -97,7 +99,7 @@ pub extern "C" fn bth_version() -> *const c_char {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_bounds(scene: *const Scene, bounds: *mut [[f32; 3]; 2]) -> i32 {
     let nothing = || (ERROR_MISSING, "nothing is visible".to_owned());
-    // SAFETY: the contract of `store` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `store`.
     unsafe { store("bth_bounds", scene, bounds, |scene| scene.bounds().map(Into::into).ok_or_else(nothing)) }
 }
 
@@ -136,14 +138,15 @@ pub unsafe extern "C" fn bth_material_count(scene: *const Scene, object: u32) ->
 /// Vertices of a triangle in world space; see `bth.h`.
 ///
 /// # Safety
-/// `scene` is null or open; `positions` is null or points to nine numbers that are valid for writes.
+/// `scene` is null or open; `positions` is null or points to nine numbers that are valid for
+/// writes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_triangle_positions(
     scene: *const Scene,
     triangle: PrimitiveRef,
     positions: *mut [[f64; 3]; 3],
 ) -> i32 {
-    // SAFETY: the contract of `store` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `store`.
     unsafe {
         store("bth_triangle_positions", scene, positions, |scene| {
             scene.triangle_in_world(triangle).ok_or_else(|| no_triangle(scene, triangle))
@@ -165,7 +168,7 @@ pub unsafe extern "C" fn bth_surface_at(
     let Some(hit) = (unsafe { hit.as_ref() }) else {
         return fail(ERROR_ARGUMENT, "bth_surface_at: hit must not be null".into());
     };
-    // SAFETY: the contract of `store` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `store`.
     unsafe {
         store("bth_surface_at", scene, point, |scene| {
             let found = scene.surface(hit).ok_or_else(|| no_triangle(scene, hit.primitive))?;
@@ -183,7 +186,8 @@ pub unsafe extern "C" fn bth_surface_at(
     }
 }
 
-/// Copies a name with a zero behind it to a buffer, as much of it as fits; returns its length in bytes without the zero.
+/// Copies a name with a zero behind it to a buffer, as much of it as fits; returns its length in
+/// bytes without the zero.
 ///
 /// # Safety
 /// `buffer` is null or points to `capacity` bytes that are valid for writes.
@@ -191,7 +195,8 @@ unsafe fn copy_name(name: Option<&str>, buffer: *mut c_char, capacity: usize) ->
     let name = name.unwrap_or_default();
     if !buffer.is_null() && capacity > 0 {
         let stored = name.floor_char_boundary(capacity - 1);
-        // SAFETY: it is not null, so by contract it points to `capacity` bytes, of which `stored + 1` are written.
+        // SAFETY: it is not null, so by contract it points to `capacity` bytes, of which `stored +
+        // 1` are written.
         unsafe {
             buffer.cast::<u8>().copy_from_nonoverlapping(name.as_ptr(), stored);
             buffer.add(stored).write(0);
@@ -213,14 +218,14 @@ pub unsafe extern "C" fn bth_object_name(
 ) -> usize {
     // SAFETY: by contract it is null or open, hence valid for reads.
     let found = unsafe { scene.as_ref() }.map(|scene| scene.object_name(object));
-    // SAFETY: the contract of `copy_name` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `copy_name`.
     unsafe { copy_name(found, name, capacity) }
 }
 
 /// Name of a group; see `bth.h`.
 ///
 /// # Safety
-/// As for [`bth_object_name`].
+/// The contract of [`bth_object_name`].
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_group_name(
     scene: *const Scene,
@@ -231,14 +236,14 @@ pub unsafe extern "C" fn bth_group_name(
 ) -> usize {
     // SAFETY: by contract it is null or open, hence valid for reads.
     let scene = unsafe { scene.as_ref() }.filter(|scene| object < scene.object_count());
-    // SAFETY: the contract of `copy_name` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `copy_name`.
     unsafe { copy_name(scene.map(|scene| scene.group_name(object, group)), name, capacity) }
 }
 
 /// Name of a material; see `bth.h`.
 ///
 /// # Safety
-/// As for [`bth_object_name`].
+/// The contract of [`bth_object_name`].
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_material_name(
     scene: *const Scene,
@@ -249,6 +254,6 @@ pub unsafe extern "C" fn bth_material_name(
 ) -> usize {
     // SAFETY: by contract it is null or open, hence valid for reads.
     let scene = unsafe { scene.as_ref() }.filter(|scene| object < scene.object_count());
-    // SAFETY: the contract of `copy_name` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `copy_name`.
     unsafe { copy_name(scene.map(|scene| scene.material_name(object, material)), name, capacity) }
 }

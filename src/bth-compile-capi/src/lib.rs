@@ -1,5 +1,6 @@
-//! C interface of the compiler. Its documentation is the header `include/bth_compile.h`, which must be kept consistent with this
-//! crate. It is a library of its own because the runtime does not depend on the compiler.
+//! C interface of the compiler. Its documentation is the header `include/bth_compile.h`, which must
+//! be kept consistent with this crate. It is a library of its own because the runtime does not
+//! depend on the compiler.
 #![allow(unsafe_code)] // Functions take pointers from C.
 
 mod monitor;
@@ -87,8 +88,8 @@ const NO_BYTES: Bytes = Bytes { data: std::ptr::null_mut(), length: 0 };
 /// Compiles a mesh; see `bth_compile.h`.
 ///
 /// # Safety
-/// Each pointer, those in structures included, is null or valid as `bth_compile.h` says, and nobody writes to what they point to
-/// during the call; `bytes` is null or valid for writes.
+/// Each pointer, those in structures included, is null or valid as `bth_compile.h` says, and nobody
+/// writes to what they point to during the call; `bytes` is null or valid for writes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_compile_mesh(
     mesh: *const Mesh,
@@ -99,7 +100,7 @@ pub unsafe extern "C" fn bth_compile_mesh(
     let input = unsafe {
         mesh.as_ref().ok_or_else(|| argument("mesh must not be null".into())).and_then(|mesh| mesh.view())
     };
-    // SAFETY: the contract of `with_bytes` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `with_bytes`.
     unsafe {
         with_bytes(options, bytes, input, |mesh, options, cache, monitor| {
             Ok(memory::compile_cached(*mesh, options, cache, &|_| true, monitor)?.content)
@@ -110,7 +111,7 @@ pub unsafe extern "C" fn bth_compile_mesh(
 /// Compiles a scene; see `bth_compile.h`.
 ///
 /// # Safety
-/// As [`bth_compile_mesh`].
+/// The contract of [`bth_compile_mesh`].
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_compile_scene(
     meshes: *const Mesh,
@@ -122,7 +123,7 @@ pub unsafe extern "C" fn bth_compile_scene(
 ) -> i32 {
     // SAFETY: by contract the arrays, and those of the meshes, are null or valid for reads.
     let input = unsafe { scene(meshes, mesh_count, instances, instance_count) };
-    // SAFETY: the contract of `with_bytes` is part of that of this function.
+    // SAFETY: the contract of this function includes the contract of `with_bytes`.
     unsafe {
         with_bytes(options, bytes, input, |(meshes, instances), options, cache, monitor| {
             Ok(memory::compile_scene(meshes, instances, options, cache, monitor)?.content)
@@ -133,7 +134,7 @@ pub unsafe extern "C" fn bth_compile_scene(
 /// The meshes and instances of a scene.
 ///
 /// # Safety
-/// As [`Mesh::view`], for these arrays and those of the meshes.
+/// The contract of [`Mesh::view`], for these arrays and those of the meshes.
 unsafe fn scene<'a>(
     meshes: *const Mesh,
     mesh_count: usize,
@@ -161,7 +162,7 @@ impl Mesh {
     /// # Safety
     /// Each array is null or valid for reads, and not written to during the life of the result.
     unsafe fn view<'a>(&self) -> Result<TriangleMesh<'a>, Failure> {
-        // SAFETY: the contract of this function is that of `slice`.
+        // SAFETY: the contract of this function is the contract of `slice`.
         unsafe {
             Ok(TriangleMesh {
                 positions: slice(self.positions, self.position_count, "positions")?,
@@ -174,7 +175,8 @@ impl Mesh {
 /// An array as a slice; null is one without elements.
 ///
 /// # Safety
-/// `first` is null or points to `count` elements, which are not written to during the life of the result.
+/// `first` is null or points to `count` elements, which are not written to during the life of the
+/// result.
 unsafe fn slice<'a, T>(first: *const T, count: usize, name: &str) -> Result<&'a [T], Failure> {
     if count == 0 {
         return Ok(&[]);
@@ -182,16 +184,16 @@ unsafe fn slice<'a, T>(first: *const T, count: usize, name: &str) -> Result<&'a 
     if first.is_null() || count.checked_mul(size_of::<T>()).is_none_or(|bytes| bytes > isize::MAX as usize) {
         return Err(argument(format!("{count} {name} expected, found null or more than fit into memory")));
     }
-    // SAFETY: it is not null and the bytes fit into an `isize`; by contract it points to `count` elements. All bit patterns are
-    // valid for the types of this crate that C fills.
+    // SAFETY: it is not null and the bytes fit into an `isize`; by contract it points to `count`
+    // elements. All bit patterns are valid for the types of this crate that C fills.
     Ok(unsafe { std::slice::from_raw_parts(first, count) })
 }
 
 /// Runs a compilation with options of C and stores what it makes, or the error.
 ///
 /// # Safety
-/// `options` is null or valid for reads, its paths are null or C strings, and its functions may be called by any thread; `bytes` is
-/// null or valid for writes.
+/// `options` is null or valid for reads, its paths are null or C strings, and its functions may be
+/// called by any thread; `bytes` is null or valid for writes.
 unsafe fn with_bytes<T: Sync>(
     options: *const Options,
     bytes: *mut Bytes,
@@ -263,7 +265,8 @@ fn in_threads<T: Send>(threads: u32, work: impl FnOnce() -> Result<T, Failure> +
     pool.map_err(|e| no_threads(&format!("{threads} threads"), &e.to_string()))?.install(work)
 }
 
-/// Why the pool that all share could not be started, which is tried once: what needs it panics then.
+/// Why the pool that all share could not be started, which is tried once: what needs it panics
+/// then.
 fn why_there_is_no_shared_pool() -> Option<&'static str> {
     static WHY: OnceLock<Option<String>> = OnceLock::new();
     let failed = || {
@@ -284,7 +287,8 @@ pub unsafe extern "C" fn bth_free_bytes(bytes: *mut Bytes) {
     let Some(bytes) = (unsafe { bytes.as_mut() }) else { return };
     let Bytes { data, length } = std::mem::replace(bytes, NO_BYTES);
     if !data.is_null() {
-        // SAFETY: `with_bytes` leaked a boxed slice of this address and length, which by contract has not been freed.
+        // SAFETY: `with_bytes` leaked a boxed slice of this address and length, which by contract
+        // has not been freed.
         drop(unsafe { Box::from_raw(std::ptr::slice_from_raw_parts_mut(data, length)) });
     }
 }

@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError, TryLockError};
 use std::time::{Duration, Instant};
 
-/// Least time between two calls of the progress function within a stage. Stages ask some thousand times a second whether they are cancelled.
+/// Least time between two calls of the progress function within a stage. Stages ask some thousand
+/// times a second whether they are cancelled.
 const INTERVAL: Duration = Duration::from_millis(100);
 
 /// Calls the functions of C one at a time.
@@ -28,8 +29,9 @@ struct State {
     reported: Instant,
 }
 
-// SAFETY: `user` is the only field that is not `Send`. It is only passed to the caller's functions, which by the contract of
-// `bth_compile.h` may be called by any thread, and under the lock of `state`, so by one at a time.
+// SAFETY: `user` is the only field that is not `Send`. It is only passed to the caller's functions,
+// which by the contract of `bth_compile.h` may be called by any thread, and under the lock of
+// `state`, so by one at a time.
 unsafe impl Send for State {}
 
 impl Callbacks {

@@ -113,7 +113,7 @@ impl Options {
         if self.threads > MOST_THREADS {
             return unknown("threads", &format!("at most {MOST_THREADS}"), self.threads);
         }
-        // SAFETY: the contract of this function is that of `path`.
+        // SAFETY: the contract of this function is the contract of `path`.
         options.tets.worker = unsafe { path(self.tetgen, "tetgen") }?;
         Ok(options)
     }
@@ -123,7 +123,7 @@ impl Options {
     /// # Safety
     /// `cache` is null or points to a C string.
     pub(crate) unsafe fn cache(&self) -> Result<Option<PathBuf>, Failure> {
-        // SAFETY: the contract of this function is that of `path`.
+        // SAFETY: the contract of this function is the contract of `path`.
         unsafe { path(self.cache, "cache") }
     }
 }

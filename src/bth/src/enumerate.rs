@@ -1,5 +1,5 @@
-//! Enumerates the instances of a scene that a ray may hit. [`bvh::enumerate`](crate::bvh::enumerate)
-//! does the same for the triangles of an object.
+//! Enumerates the instances of a scene that a ray may hit.
+//! [`bvh::enumerate`](crate::bvh::enumerate) does the same for the triangles of an object.
 
 use crate::instances::Placement;
 use crate::nodes::ObjectRay;
@@ -41,10 +41,10 @@ impl<'a> EnteredInstance<'a> {
     }
 }
 
-/// Calls `visit` with each visible instance that a ray in world space may hit within its range of t.
-/// `visit` returns the max t, in world space and rounded to f32, of hits that can still change the
-/// result, or `None` to end; instances beyond may be skipped. Returns true if `visit` has ended the
-/// enumeration.
+/// Calls `visit` with each visible instance that a ray in world space may hit within its range of
+/// t. `visit` returns the max t, in world space and rounded to f32, of hits that can still change
+/// the result, or `None` to end; instances beyond may be skipped. Returns true if `visit` has ended
+/// the enumeration.
 pub(crate) fn enumerate_instances(
     scene: &Scene,
     ray: &Ray,

@@ -1,7 +1,7 @@
 //! The masks of instances and of groups of triangles, which decide what rays with a mask can hit.
 
-/// A mask of 32 bits for each instance and for each group of triangles of an object. All bits are set unless a mask was set; no
-/// memory is used for masks behind the last one that lacks a bit.
+/// A mask of 32 bits for each instance and for each group of triangles of an object. All bits are
+/// set unless a mask was set; no memory is used for masks behind the last one that lacks a bit.
 #[derive(Debug, Default)]
 pub(crate) struct Masks {
     /// By instance; shorter than the number of instances where the rest has all bits set.

@@ -1,5 +1,6 @@
-//! How surfaces look: parameters of materials, textures as the image files that they are, a second set of texture
-//! coordinates, and vertex colours, from the sections that a file keeps with `bthc compile --materials`. Nothing is decoded here.
+//! How surfaces look: parameters of materials, textures as image files, a second set of texture
+//! coordinates, and vertex colours. A file keeps them with `bthc compile --materials`. Nothing is
+//! decoded here.
 
 use crate::rays::Hit;
 use crate::scene::Scene;
@@ -9,8 +10,8 @@ use bth_format::layout::{
     UV_SET_SECOND, WRAP_CLAMP, WRAP_MIRROR,
 };
 
-/// What the alpha of a material means: the fourth component of its base colour, times that of the base colour texture, times
-/// that of the vertex colour.
+/// What the alpha of a material means. Alpha is the product of the fourth components of the base colour,
+/// the base colour texture and the vertex colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Alpha {
     /// Nothing.
@@ -34,9 +35,9 @@ pub struct Material {
     pub emissive_texture: Option<u32>,
     /// What alpha means.
     pub alpha: Alpha,
-    /// Whether the back of triangles is seen too.
+    /// True if the back of triangles is seen too.
     pub double_sided: bool,
-    /// Whether the base colour is shown as it is, without light.
+    /// True if the base colour is shown as it is, without light.
     pub unlit: bool,
 }
 
@@ -47,33 +48,35 @@ pub enum Wrap {
     Repeat,
     /// The image repeats, every second time mirrored.
     Mirror,
-    /// The texels at the edge go on.
+    /// The texels at the edge continue.
     Clamp,
 }
 
 /// A texture of an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Texture<'a> {
-    /// Index of its image: equal for textures of the same image of a file, whichever of the file's objects they belong to.
+    /// Index of its image: equal for all textures with the same image of a file.
     pub image: u32,
     /// The image file: PNG, JPEG or WebP. Red, green and blue of its texels are sRGB, alpha is linear.
     pub bytes: &'a [u8],
     /// For u and for v.
     pub wrap: [Wrap; 2],
-    /// Whether the nearest texel is taken; else four are interpolated bilinearly, after they have been made linear.
+    /// True if the nearest texel is taken. Otherwise four texels are made linear and interpolated
+    /// bilinearly.
     pub nearest: bool,
     /// The set of its texture coordinates: 0 for [`SurfacePoint::uv`](crate::SurfacePoint::uv), 1 for a second one;
     /// [`Scene::texture_coordinates`] has both.
     pub uv_set: u32,
     /// Rows of the transform from (u, v, 1), where u and v are the coordinates of its set, to
-    /// coordinates of the image. There (0, 0) is the upper left corner, (1, 1) the lower right one, and the center of texel (i,
-    /// j) is at ((i + ½) / width, (j + ½) / height).
+    /// coordinates of the image. There (0, 0) is the upper left corner, (1, 1) the lower right one, and
+    /// the center of texel (i, j) is at ((i + ½) / width, (j + ½) / height).
     pub transform: [[f32; 3]; 2],
 }
 
 impl Scene {
-    /// How a material of an object looks. `None` if the file keeps no more of it than its name, or if there is no such object or
-    /// material. The material of a hit is [`SurfacePoint::material`](crate::SurfacePoint::material).
+    /// How a material of an object looks. `None` if the file keeps only its name, or if there is no such
+    /// object or material. The material of a hit is
+    /// [`SurfacePoint::material`](crate::SurfacePoint::material).
     ///
     /// ```no_run
     /// let scene = bth::open("house.bth")?;
@@ -130,8 +133,9 @@ impl Scene {
         })
     }
 
-    /// The texture coordinates of a set at a hit, interpolated; set 0 is that of [`SurfacePoint::uv`](crate::SurfacePoint::uv). `None`
-    /// if the file keeps none of that set, or if there is no such instance, triangle or set.
+    /// The texture coordinates of a set at a hit, interpolated. Set 0 is the set of
+    /// [`SurfacePoint::uv`](crate::SurfacePoint::uv). `None` if the file keeps none of the set, or if
+    /// there is no such instance, triangle or set.
     pub fn texture_coordinates(&self, hit: &Hit, uv_set: u32) -> Option<[f32; 2]> {
         let object = self.object_at(hit.primitive)?;
         let triangle = hit.primitive.triangle;
@@ -148,8 +152,8 @@ impl Scene {
         }
     }
 
-    /// The vertex colour at a hit, interpolated linearly: linear red, green, blue and alpha. `None` if the file keeps none, or
-    /// if there is no such instance or triangle.
+    /// The vertex colour at a hit, interpolated linearly: linear red, green, blue and alpha. `None` if
+    /// the file keeps none, or if there is no such instance or triangle.
     pub fn vertex_color(&self, hit: &Hit) -> Option<[f32; 4]> {
         let object = self.object_at(hit.primitive)?;
         let (file, row) = self.objects().locate(object)?;

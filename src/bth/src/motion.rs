@@ -1,4 +1,4 @@
-//! The part of [`Scene`] that sets the time and returns the transforms of instances and nodes at that time.
+//! The time of a scene, and the transforms of instances and nodes at that time.
 
 use crate::instances::World;
 use crate::objects::Objects;
@@ -11,21 +11,22 @@ use bth_format::{Code, Error, File, SceneView};
 pub struct InstanceView {
     /// Index of its object; `u32::MAX` if a scene builder has removed the instance.
     pub object: u32,
-    /// Index of the node to which it is attached, in the file of its object; `u32::MAX` in a file without scene sections and for
-    /// instances that the caller of a scene builder has placed.
+    /// Index of the node to which it is attached, in the file of its object; `u32::MAX` in a file
+    /// without scene sections and for instances that the caller of a scene builder has placed.
     pub node: u32,
-    /// Transform from object space to world space: the rows of a 3×4 matrix that is applied to columns (x, y, z, 1).
+    /// Transform from object space to world space: the rows of a 3×4 matrix that is applied to
+    /// columns (x, y, z, 1).
     pub to_world: [[f64; 4]; 3],
-    /// Whether rays can hit it: it is neither hidden nor scaled to zero, and its object has triangles. Always true in a file
-    /// without scene sections.
+    /// True if rays can hit it: it is neither hidden nor scaled to zero, and its object has
+    /// triangles. Always true in a file without scene sections.
     pub visible: bool,
 }
 
-/// Checks the scene sections of a file, and that every visible instance can be placed at the first frame. The sections of objects
-/// are not checked.
+/// Checks the scene sections of a file, and that every visible instance can be placed at the first
+/// frame. Does not check the sections of objects.
 ///
 /// # Errors
-/// Those of [`File::check_scene`], and `BTH-S001` or `BTH-S002` as for [`Scene::set_seconds`].
+/// The errors of [`File::check_scene`], and `BTH-S001` or `BTH-S002` as in [`Scene::set_seconds`].
 pub fn check_first_frame(file: &File) -> Result<(), Error> {
     World::new(&Objects::of_file(file.clone())).map(drop)
 }
@@ -44,35 +45,39 @@ impl Scene {
         self.world().and_then(|_| self.objects().sole_file()?.scene())
     }
 
-    /// Time of the scene in seconds: after opening, that of its first frame; 0 without scene sections.
+    /// Time of the scene in seconds. After opening it is the time of the first frame; 0 without
+    /// scene sections.
     pub fn seconds(&self) -> f64 {
         self.world().map_or(0.0, |world| world.seconds)
     }
 
-    /// Sets the time of the scene in seconds: evaluates the animation, refits the objects that skins and morph targets deform, places the
-    /// instances that moved and rebuilds the top-level BVH. The time may lie outside of the range of frames; tracks are constant beyond their keys. Without scene sections, and in
-    /// scenes of a scene builder, this has no effect.
+    /// Sets the time of the scene in seconds: evaluates the animation, refits the objects that
+    /// skins and morph targets deform, places the instances that moved and rebuilds the top-level
+    /// BVH. The time may lie outside of the range of frames; tracks are constant beyond their keys.
+    /// Does nothing without scene sections and in scenes of a scene builder.
     ///
     /// # Errors
-    /// `BTH-S001` if the transform of a visible instance cannot be inverted, `BTH-S002` if the transform, the world box or the position of
-    /// a vertex that deforms is not finite in `f32`, or the time is not finite. The error gives the node. The scene is then unchanged.
+    /// `BTH-S001` if the transform of a visible instance cannot be inverted. `BTH-S002` if the
+    /// time, or in `f32` a transform, a world box or the position of a vertex that deforms, is not
+    /// finite. The error gives the node. The scene is then unchanged.
     pub fn set_seconds(&mut self, seconds: f64) -> Result<Update, Error> {
         check_time(seconds)?;
         let (objects, world) = self.parts_mut();
         world.as_mut().map_or(Ok(Update::default()), |world| world.update(objects, seconds))
     }
 
-    /// Sets the time of the scene to that of a frame, which may lie outside of the range of frames.
+    /// Sets the time of the scene to the time of a frame, which may lie outside of the range of
+    /// frames.
     ///
     /// # Errors
-    /// As [`Self::set_seconds`].
+    /// The errors of [`Self::set_seconds`].
     pub fn set_frame(&mut self, frame: i32) -> Result<Update, Error> {
         let rate = self.description().map_or(1.0, |view| view.scene[0].rate);
         self.set_seconds(f64::from(frame) / rate)
     }
 
-    /// Number of instances in the scene, visible or not; in a scene of a scene builder, one more than the greatest id that was ever
-    /// committed.
+    /// Number of instances in the scene, visible or not; in a scene of a scene builder, one more
+    /// than the max id that was ever committed.
     pub fn instance_count(&self) -> u32 {
         self.world().map_or(self.object_count(), |world| world.placements.len() as u32)
     }
@@ -110,8 +115,8 @@ impl Scene {
         InstanceView { object: row.object, node: row.node, to_world: row.to_world.rows(), visible }
     }
 
-    /// The transform from a node's space to world space at the scene's time, as in [`InstanceView::to_world`], and whether the
-    /// node is visible.
+    /// The transform from a node's space to world space at the scene's time, as in
+    /// [`InstanceView::to_world`], and true if the node is visible.
     ///
     /// # Panics
     /// If there is no such node, as in a file without scene sections or a scene of a scene builder.
@@ -119,8 +124,8 @@ impl Scene {
         self.world().expect("a file with nodes").node(self.objects(), node)
     }
 
-    /// Transforms a normal from an instance's object space to world space, by the transpose of the inverse. The result is not
-    /// normalized.
+    /// Transforms a normal from an instance's object space to world space, by the transpose of the
+    /// inverse. Does not normalize the result.
     ///
     /// # Panics
     /// In a file with scene sections, if there is no such instance or it is not visible.
@@ -130,8 +135,8 @@ impl Scene {
         placement.inverse.normal(normal)
     }
 
-    /// Lower and upper end of a box in world space that contains an instance and is slightly enlarged to cover roundings; `None`
-    /// if the instance is not visible.
+    /// Lower and upper end of a box in world space that contains an instance, slightly enlarged to
+    /// cover roundings; `None` if the instance is not visible.
     ///
     /// # Panics
     /// If there is no such instance.
@@ -143,13 +148,15 @@ impl Scene {
         world.bounds(self.objects(), instance)
     }
 
-    /// Number of objects in which rays have been traced since the scene was opened; without scene sections, of all objects.
+    /// Number of objects in which rays were traced since the scene was opened; without scene
+    /// sections, the number of all objects.
     pub fn touched_objects(&self) -> usize {
         self.world().map_or(self.object_count() as usize, |world| world.traced_objects())
     }
 
-    /// Bytes on the heap: of the placed instances with the top-level BVH, and of the node hierarchy or the transforms that a scene
-    /// builder was given. Both are 0 for a file without scene sections.
+    /// Bytes on the heap: of the placed instances with the top-level BVH, and of the node hierarchy
+    /// or the transforms that a scene builder was given. Both are 0 for a file without scene
+    /// sections.
     pub fn heap_bytes(&self) -> (usize, usize) {
         self.world().map_or((0, 0), |world| world.bytes())
     }

@@ -1,6 +1,6 @@
 //! Candidates: triangles that the f32 filter does not exclude, and their decision in f64 or in exact arithmetic.
 
-use super::nodes;
+use super::nodes::{self, LeafVisitor};
 use crate::intersect::exact::{Estimate, Intersection, estimate, in_pairs};
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::line::Line;
@@ -12,7 +12,7 @@ use crate::intersect::start_point::StartPoint;
 use crate::query::{Query, TriangleRef};
 use crate::rays::Ray;
 use crate::simd::{Part, Scalar, Simd};
-use bth_format::layout::{Child, NONE};
+use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 
 /// A triangle that a ray may hit.
@@ -46,19 +46,31 @@ impl Candidate {
         object: &ObjectView<'_>,
         reader: impl Reader<Output = C>,
     ) -> Option<(u32, C)> {
-        let at = self.triangle as usize;
-        let (mut indexed, mut raw) = (None, None);
-        match Child::from_code(self.leaf)? {
-            Child::Indexed(line) => {
-                let leaf = nodes::indexed(s, object, line, &mut indexed);
-                Some((leaf.first + at as u32, reader.read(leaf, at)))
-            }
-            Child::Raw(line) => {
-                let leaf = nodes::raw(s, object, line, &mut raw);
-                Some((leaf.first + at as u32, reader.read(leaf, at)))
-            }
-            Child::Node(_) | Child::Tets(_) => None,
-        }
+        let visitor = ReadTriangle { reader, triangle: self.triangle as usize };
+        nodes::visit_leaf(s, object, object.node_base(), self.leaf, visitor)
+    }
+}
+
+/// Reads a triangle of a leaf, and its index in the object's leaf order.
+struct ReadTriangle<R> {
+    reader: R,
+    triangle: usize,
+}
+
+impl<S: Simd, R: Reader> LeafVisitor<S> for ReadTriangle<R> {
+    type Output = Option<(u32, R::Output)>;
+    #[inline(always)]
+    fn triangles<B: TriangleBlock>(self, _: S, block: &B) -> Self::Output {
+        let index = block.first().wrapping_add(self.triangle as u32);
+        Some((index, self.reader.read(block, self.triangle)))
+    }
+    #[inline(always)]
+    fn tets(self, _: S, _row: u32) -> Self::Output {
+        None
+    }
+    #[inline(always)]
+    fn nothing(self) -> Self::Output {
+        None
     }
 }
 

@@ -1,9 +1,10 @@
 //! Entry nodes: where coherent rays begin below the root.
 //!
-//! Rays of neighbouring pixels pass the same nodes near the root. A shaft around them ([`Shaft`]) finds the children that any of them may
-//! meet, and below these the children of children, as long as there are no more than a node has slots. These boxes make a node of their
-//! own, against which each ray is tested in place of the root. It holds a set of the entry points of Reshetov, Soupikov and Hurley,
-//! "Multi-Level Ray Tracing Algorithm", SIGGRAPH 2005, in place of one.
+//! Rays of neighbouring pixels pass the same nodes near the root. A shaft around them ([`Shaft`])
+//! finds the children that any of them may enter, and below these the children of children, as long
+//! as there are no more than a node has slots. These boxes make an entry node. Each ray is tested
+//! against it instead of the root. It holds several of the entry points of Reshetov, Soupikov and
+//! Hurley, "Multi-Level Ray Tracing Algorithm", SIGGRAPH 2005.
 
 use super::coherence::Span;
 use super::shaft::Shaft;
@@ -16,12 +17,13 @@ use bth_format::object::{NodeBase, ObjectBounds};
 /// Number of consecutive rays that have an entry node in common.
 pub(super) const ENTRY_RAYS: usize = 64;
 
-/// Boxes with their child codes, at most [`WIDTH`] between two operations, and room for the children of one more node.
+/// Boxes with their child codes, at most [`WIDTH`] between two operations, and room for the
+/// children of one more node.
 struct Boxes {
-    /// As [`WideNode::bounds`]: for each axis the lower bounds, then the upper ones.
+    /// For each axis the lower bounds, then the upper ones, like [`WideNode::bounds`].
     bounds: [[f32; 2 * WIDTH]; 6],
     child: [u32; 2 * WIDTH],
-    /// Whether the box is a leaf's, or that of a node whose children there is no room for.
+    /// True for the box of a leaf, and of a node whose children there is no room for.
     is_final: [bool; 2 * WIDTH],
     count: usize,
 }
@@ -77,8 +79,8 @@ impl Boxes {
     }
 }
 
-/// The search for the entry node of rays, as a part of kernels. Its output is whether they have one: they are coherent, and the root is a
-/// wide node.
+/// The search for the entry node of rays, as a part of kernels. Its output is true if they have
+/// one: if they are coherent, and the root is a wide node.
 pub(super) struct FindEntryNode<'a> {
     pub(super) node_base: NodeBase<'a>,
     /// Child code of the root.
@@ -97,10 +99,12 @@ impl<S: Simd> Part<S> for FindEntryNode<'_> {
         let FindEntryNode { node_base, root, bounds, rays, node } = self;
         let Some((shaft, limit)) = Shaft::of(s, bounds, &Span::of(s, rays)) else { return false };
         let mut boxes = Boxes::of(root);
-        // In each round the boxes of a level are opened where there is room; a file that was not checked may have more levels.
+        // In each round the boxes of a level are opened where there is room. An unchecked file may
+        // have more levels.
         for _ in 0..MAX_DEPTH {
             let mut is_opened = false;
-            // From the last to the first, so that a box that moves to a free place has had its turn.
+            // From the last to the first, so that a box that moves to a free place has had its
+            // turn.
             for at in (0..boxes.count).rev() {
                 if boxes.is_final[at] {
                     continue;
@@ -193,7 +197,8 @@ mod tests {
             .collect()
     }
 
-    /// The leaves below a child code whose boxes, and those of the nodes above, a ray meets, in f64.
+    /// The leaves below a child code whose boxes, and those of the nodes above, a ray meets, in
+    /// f64.
     fn leaves(object: &ObjectView<'_>, ray: &Ray, code: u32, out: &mut Vec<u32>) {
         let Some(node) = object.node_base().wide_node(code) else { return out.push(code) };
         for slot in 0..WIDTH {
@@ -272,7 +277,8 @@ mod tests {
             let mut rng = Rng::new(6);
             let mut rays: Vec<Ray> =
                 (0..if cfg!(miri) { 2 } else { 24 }).flat_map(|_| run(&surface, scale, &mut rng)).collect();
-            // A run that ends before it is complete, one that other rays interrupt, and rays that cannot be prepared.
+            // A run that ends before it is complete, one that other rays interrupt, and rays that
+            // cannot be prepared.
             rays.truncate(rays.len() - 9);
             (rays[70].direction, rays[3].origin[0]) = ([-1.0, 1.0, 1.0].map(|x| x * scale), f32::NAN);
             let order: Vec<u32> = (0..rays.len() as u32).filter(|i| i % 97 != 5).collect();

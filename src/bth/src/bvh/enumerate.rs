@@ -1,11 +1,12 @@
-//! Enumerates the triangles of an object that a ray may hit, for queries that report several hits or
-//! that decide about triangles by another rule.
+//! Enumerates the triangles of an object that a ray may hit, for queries that report several hits
+//! or that decide about triangles by another rule.
 //!
 //! The conservative f32 tests of boxes and triangles exclude what the line certainly misses, and
-//! triangles whose depths all lie out of range. Every other triangle is passed once to a [`Receiver`],
-//! which decides exactly. A triangle that the line touches is never excluded, even if it is touched at
-//! an edge, at a vertex or in its plane: its exact weights are then all of one sign or zero, and the
-//! filter excludes only triangles with two weights of certain and opposite signs.
+//! triangles whose depths all lie out of range. Every other triangle is passed once to a
+//! [`Receiver`], which decides exactly. A triangle that the line touches is never excluded, even if
+//! it is touched at an edge, at a vertex or in its plane: its exact weights are then all of one
+//! sign or zero, and the filter excludes only triangles with two weights of certain and opposite
+//! signs.
 
 use super::ray_state::key_limit;
 use super::walk::{BoxQuery, ObjectTree, TriangleQuery, any_in_set, run_walk};
@@ -22,18 +23,18 @@ use bth_format::object::{ObjectBounds, ObjectView};
 
 /// Receiver of the triangles that a ray may hit.
 pub(crate) trait Receiver {
-    /// Receives a triangle and its corners in object space, in the order of the source. Returns true if
-    /// the query is complete, which ends the enumeration.
+    /// Receives a triangle and its corners in object space, in the order of the source. Returns
+    /// true if the query is complete, which ends the enumeration.
     fn receive(&mut self, triangle: TriangleRef<'_>, corners: [[f32; 3]; 3]) -> bool;
-    /// Upper bound of the exact t, in the units of the ray, of further intersections that can change
-    /// the result. It may shrink with every triangle. Triangles beyond it may be skipped.
+    /// Upper bound of the exact t, in the units of the ray, of further intersections that can
+    /// change the result. It may shrink with every triangle. Triangles beyond it may be skipped.
     fn limit(&self) -> f64;
 }
 
-/// Passes to a receiver each triangle of an object that the line of a ray touches at a t from `tmin` to
-/// `tmax` and the receiver's limit, and some others. Nearer boxes come first, but triangles come in no
-/// particular order. A ray that starts on a triangle passes all that it touches at t >= 0. Returns true
-/// if the receiver has ended the enumeration.
+/// Passes to a receiver each triangle of an object that the line of a ray touches at a t from
+/// `tmin` to `tmax` and the receiver's limit, and some others. Nearer boxes come first, but
+/// triangles come in no particular order. A ray that starts on a triangle passes all that it
+/// touches at t >= 0. Returns true if the receiver has ended the enumeration.
 pub(crate) fn enumerate(
     object: &ObjectView<'_>,
     (ray, start): ExactRay<'_>,
@@ -123,9 +124,9 @@ fn pass_triangles(
     })
 }
 
-/// Passes the constrained faces of a tet leaf without a subtree that the line may touch. Returns true if
-/// the query is complete. A flood fill finds every face that the line touches, even where it passes
-/// through edges and vertices or lies in the plane of a face.
+/// Passes the constrained faces of a tet leaf without a subtree that the line may touch. Returns
+/// true if the query is complete. A flood fill finds every face that the line touches, even where
+/// it passes through edges and vertices or lies in the plane of a face.
 #[cold]
 #[inline(never)]
 fn pass_faces(

@@ -13,7 +13,8 @@ use zerocopy::{FromZeros, IntoBytes};
 const QUADS: [usize; 2] = [32, 64];
 const LEAF_QUADS: [usize; 2] = [2, 4];
 
-/// A surface over a grid, in 256 leaves of 16 triangles, some of them raw, below two levels of nodes.
+/// A surface over a grid, in 256 leaves of 16 triangles, some of them raw, below two levels of
+/// nodes.
 pub(crate) struct HeightField {
     identity: Identity,
     pub(crate) header: Object,

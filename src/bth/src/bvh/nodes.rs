@@ -1,4 +1,5 @@
-//! Leaves by child code, in each of their formats. Kernels read leaves of f32; parts that they call unpack the others.
+//! Leaves by child code, in each of their formats. Kernels read leaves of f32. Parts that they call
+//! unpack the others.
 
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::point_lanes::CornerLanes;
@@ -7,7 +8,8 @@ use bth_format::layout::{Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, RawLeaf}
 use bth_format::object::Unpacked;
 use bth_format::object::{NodeBase, ObjectView};
 
-/// Unpacking of the leaf on a grid at an index of a child code, as a part of kernels: it is long, and rarely needed.
+/// Unpacking of the leaf on a grid at an index of a child code, as a part of kernels: it is long,
+/// and rarely needed.
 struct Unpack<'r, 'o, T>(&'r ObjectView<'o>, u32, &'r mut Option<Unpacked<T>>);
 
 impl<'r, S: Simd> Part<S> for Unpack<'r, '_, IndexedLeaf> {
@@ -26,7 +28,8 @@ impl<'r, S: Simd> Part<S> for Unpack<'r, '_, RawLeaf> {
     }
 }
 
-/// The indexed leaf at an index of a child code: in place or, for objects with coordinates on a grid, unpacked into `unpacked`.
+/// The indexed leaf at an index of a child code: in place or, for objects with coordinates on a
+/// grid, unpacked into `unpacked`.
 #[inline(always)]
 pub(crate) fn indexed<'r, S: Simd>(
     s: S,
@@ -73,7 +76,7 @@ pub(crate) trait LeafVisitor<S: Simd>: Sized {
     fn triangles<B: TriangleBlock + CornerLanes>(self, s: S, block: &B) -> Self::Output;
     /// Visits the tet leaf with this row.
     fn tets(self, s: S, row: u32) -> Self::Output;
-    /// Visits nothing: the code is that of an empty slot, of a node or of a file that was not checked.
+    /// Visits nothing: the code belongs to an empty slot, a node or an unchecked file.
     fn nothing(self) -> Self::Output;
 }
 
@@ -97,7 +100,8 @@ pub(crate) fn visit_leaf<S: Simd, V: LeafVisitor<S>>(
     }
 }
 
-/// Whether nodes and leaves of an object take at least 64 MiB, more than most caches. A model of 23 MiB, of which rays visit a small part, would be slower.
+/// Returns true if nodes and leaves of an object take at least 64 MiB, more than most caches. A
+/// model of 23 MiB, of which rays visit a small part, would be slower.
 #[inline(always)]
 pub(crate) fn is_large(object: &ObjectView<'_>) -> bool {
     const LINES: usize = 1 << 20;
@@ -116,7 +120,7 @@ pub(crate) fn prefetch<S: Simd>(s: S, node_base: NodeBase<'_>, code: u32) {
     }
 }
 
-/// As [`prefetch`], for a node or leaf that is needed only after many other steps.
+/// Prefetches a node or leaf that is needed only after many other steps.
 #[inline(always)]
 pub(crate) fn prefetch_into<S: Simd>(s: S, level: CacheLevel, node_base: NodeBase<'_>, code: u32) {
     s.prefetch_into::<LINES, _>(level, node_base.block_address(code));

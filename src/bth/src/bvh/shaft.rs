@@ -7,30 +7,35 @@ use crate::simd::Simd;
 use bth_format::layout::WideNode;
 use bth_format::object::ObjectBounds;
 
-/// Bounds of rays whose directions lie in one octant, by interval arithmetic over their origins and directions, as for the boxes of
-/// Wald, Boulos and Shirley, "Ray Tracing Deformable Scenes Using Dynamic Bounding Volume Hierarchies", TOG 2007.
+/// Bounds of rays whose directions lie in one octant, by interval arithmetic over their origins and
+/// directions (Wald, Boulos and Shirley, "Ray Tracing Deformable Scenes Using Dynamic Bounding
+/// Volume Hierarchies", TOG 2007).
 ///
-/// The depth at which ray l meets a plane is (plane - o)·r: an interval of o, widened by a pad on both sides, and
-/// one of r bound it. As all operations round monotonically, only roundings need the pad. With u = 2^-24 and P a plane, they come to at most 2u|o||r| for the
-/// padded end, and u|P - o||r| each for the reciprocal, the difference and the product; clamped components to 4u|P - o||r|. With the
-/// distances from c of [`boxes::PAD`] together 7u|P - c| + 9u|o - c| + 2u|c|: the pad is 2 · PAD of what it is there.
+/// A ray meets a plane at the depth (plane - o)·r. An interval of o, widened by a pad on both
+/// sides, and an interval of r bound it. All operations round monotonically, so only roundings need
+/// the pad. With u = 2^-24 and P a plane, they come to at most 2u|o||r| for the padded end, and to
+/// u|P - o||r| each for the reciprocal, the difference and the product. Clamped components add 4u|P
+/// - o||r|. With the distances from c of [`boxes::PAD`] these are 7u|P - c| + 9u|o - c| + 2u|c|: 2
+/// · PAD of the lengths there.
 #[derive(Clone, Copy)]
 pub(crate) struct Shaft<S: Simd> {
-    /// For each axis the end of the origins' interval that is nearest to the planes at which rays enter boxes.
+    /// For each axis the end of the origins' interval that is nearest to the planes at which rays
+    /// enter boxes.
     pub(crate) near_origin: [f32; 3],
     /// For each axis the end that is nearest to the planes at which rays leave boxes.
     pub(crate) far_origin: [f32; 3],
-    /// For each axis the least and the greatest reciprocal of the directions' components.
+    /// For each axis the min and the max reciprocal of the directions' components.
     reciprocal: [[S::F; 2]; 3],
     /// For each axis the offset of the row of a node with the planes at which rays enter boxes.
     pub(crate) near: [u32; 3],
-    /// Least depth of the rays' ranges.
+    /// Min depth of the rays' ranges.
     first: S::F,
 }
 
 impl<S: Simd> Shaft<S> {
-    /// The shaft of coherent rays ([`Span::is_coherent`]), given for each axis the least and the greatest reciprocal of the directions' components
-    /// in the unit of depth, the least depth of the rays' ranges, and E.
+    /// The shaft of coherent rays ([`Span::is_coherent`]), given for each axis the min and the max
+    /// reciprocal of the directions' components in the unit of depth, the min depth of the rays'
+    /// ranges, and E.
     #[inline(always)]
     pub(crate) fn new(s: S, span: &Span, reciprocal: [[f32; 2]; 3], first: f32, padded: f32) -> Self {
         let zero = s.splat(0.0);
@@ -52,15 +57,15 @@ impl<S: Simd> Shaft<S> {
         shaft
     }
 
-    /// The shaft of rays with t as their depth, and the greatest t of their ranges. None if they are not coherent or if f32 may not be able to
-    /// prepare them.
+    /// The shaft of rays with t as their depth, and the max t of their ranges. `None` if they are
+    /// not coherent or if f32 may not be able to prepare them.
     #[inline(always)]
     pub(crate) fn of(s: S, bounds: &ObjectBounds, span: &Span) -> Option<(Self, f32)> {
         let ((padded, is_prepared), main) = (span.padded_extent(bounds), span.main_axis().1);
         if !(span.is_coherent() && is_prepared && 1.0 / prepare::LARGEST < main && main < prepare::LARGEST) {
             return None;
         }
-        // The least component of a single ray is relative to its greatest one, which is no less than `main`.
+        // The min component of a ray is relative to its max component, which is at least `main`.
         let least = main * LEAST_COMPONENT as f32;
         let mut reciprocal = [[0.0; 2]; 3];
         for k in 0..3 {
@@ -76,8 +81,8 @@ impl<S: Simd> Shaft<S> {
         Some((Shaft::new(s, span, reciprocal, first, padded), last + last_slack))
     }
 
-    /// The children of a node that any ray may meet before the depth `limit`, a bit each, and lower bounds of the depths at which any of
-    /// the rays enters them.
+    /// The children of a node that any ray may enter before the depth `limit`, one bit each, and
+    /// lower bounds of the depths at which the rays enter them.
     #[inline(always)]
     pub(crate) fn children(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
         let (mut enter, mut leave) = (self.first, s.splat(limit));

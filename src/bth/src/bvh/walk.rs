@@ -267,14 +267,15 @@ impl<S: Simd, Q: TriangleQuery> Part<S> for FacesAsLeaves<'_, S, Q> {
     }
 }
 
-/// The triangles of a leaf as bits: at most as many as lanes, even if the count in an unchecked file
-/// is larger.
+/// The triangles of a leaf as bits: at most as many as lanes, even if the count in an unchecked
+/// file is larger.
 #[inline(always)]
 pub(crate) fn all_triangles(block: &impl TriangleBlock) -> u32 {
     1u32.wrapping_shl(block.triangles()).wrapping_sub(1) & (u32::MAX >> WIDTH)
 }
 
-/// Calls `visit` with the index of each triangle in a set, until it returns true. Returns true then.
+/// Calls `visit` with the index of each triangle in a set, until it returns true. Returns true
+/// then.
 #[inline(always)]
 pub(crate) fn any_in_set(mut triangles: u32, mut visit: impl FnMut(usize) -> bool) -> bool {
     while triangles != 0 {

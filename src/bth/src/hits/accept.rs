@@ -3,9 +3,9 @@
 use crate::rays::{Hit, Ray};
 use std::fmt::{self, Debug, Formatter};
 
-/// The sides of triangles that are ignored. The front of a triangle is the side from which its vertices
-/// appear counter-clockwise in the space of its object. A ray that travels against the normal of that
-/// side hits the front. The side is decided exactly.
+/// The sides of triangles that are ignored. The front of a triangle is the side from which its
+/// vertices appear counter-clockwise in the space of its object. A ray that travels against the
+/// normal of that side hits the front. The side is decided exactly.
 ///
 /// A transform that mirrors an instance does not exchange front and back: the outside of a closed
 /// surface stays its front. This is the rule of glTF (the determinant of a node's transform decides
@@ -22,8 +22,8 @@ pub enum Cull {
 }
 
 impl Cull {
-    /// Returns true if a hit remains, given the scalar product of the ray's direction and (b-a)×(c-a),
-    /// which is never 0 and whose sign is exact.
+    /// Returns true if a hit remains, given the scalar product of the ray's direction and
+    /// (b-a)×(c-a), which is never 0 and whose sign is exact.
     pub(super) fn keeps(self, determinant: f64) -> bool {
         match self {
             Cull::None => true,
@@ -36,7 +36,8 @@ impl Cull {
 /// Returns true if a hit counts.
 pub type Filter<'a> = dyn Fn(&Ray, &Hit) -> bool + Sync + 'a;
 
-/// What a ray is allowed to hit: conditions on the instance and the triangle. By default everything.
+/// What a ray is allowed to hit: conditions on the instance and the triangle. By default
+/// everything.
 ///
 /// ```no_run
 /// use bth::{Accept, Cull};
@@ -57,17 +58,18 @@ pub struct Accept<'a> {
     /// Instances and groups of triangles whose mask has no bit in common with this one are not hit.
     /// Their masks have all bits set unless
     /// [`Scene::set_instance_mask`](crate::Scene::set_instance_mask) or
-    /// [`Scene::set_group_mask`](crate::Scene::set_group_mask) was called. With a mask of 0 nothing is
-    /// hit.
+    /// [`Scene::set_group_mask`](crate::Scene::set_group_mask) was called. With a mask of 0 nothing
+    /// is hit.
     pub mask: u32,
     /// The sides of triangles that are ignored.
     pub cull: Cull,
     /// If set, it is called with the ray and with a hit in the ray's range that passes the other
-    /// conditions. It returns true if the hit counts. The hit has the t, u and v, the instance and the
-    /// triangle with which it is reported. Calls come in any order and on any thread. There are none for
-    /// transparent parts of triangles (see [`Scene::opacity`](crate::Scene::opacity)) and for hits that
-    /// cannot change the result, such as hits behind the nearest so far. No hit is passed twice. The
-    /// result of a query does not depend on the order if the filter depends only on its arguments.
+    /// conditions. It returns true if the hit counts. The hit has the t, u and v, the instance and
+    /// the triangle with which it is reported. Calls come in any order and on any thread. There are
+    /// none for transparent parts of triangles (see [`Scene::opacity`](crate::Scene::opacity)) and
+    /// for hits that cannot change the result, such as hits behind the nearest so far. No hit is
+    /// passed twice. The result of a query does not depend on the order if the filter depends only
+    /// on its arguments.
     pub filter: Option<&'a Filter<'a>>,
 }
 

@@ -19,9 +19,9 @@ use crate::starts::world_ray::WorldRay;
 pub struct Crossings {
     /// Number of crossings in the ray's range.
     pub count: u32,
-    /// Crossings from the back of a triangle to its front minus crossings from the front to the back.
-    /// The front is the side from which the vertices are seen counterclockwise, in the space of the
-    /// object.
+    /// Crossings from the back of a triangle to its front minus crossings from the front to the
+    /// back. The front is the side from which the vertices are seen counterclockwise, in the space
+    /// of the object.
     pub winding: i32,
 }
 

@@ -1,10 +1,10 @@
 //! Queries that report hits under conditions ([`Accept`]): the nearest, any, the k nearest, all in
 //! order, and their number; and crossings of surfaces ([`crossings`]).
 //!
-//! Each query enumerates the instances and the triangles that the conservative f32 tests do not exclude
-//! ([`mod@search`]), nearer boxes first. It decides each exactly as the other queries do, and keeps what
-//! its collector wants ([`collect`]). So results depend neither on the instruction set nor on the
-//! acceleration structures, and t, u and v have the same bits in all queries.
+//! Each query enumerates the instances and the triangles that the conservative f32 tests do not
+//! exclude ([`mod@search`]), nearer boxes first. It decides each exactly as the other queries do,
+//! and keeps what its collector wants ([`collect`]). So results depend neither on the instruction
+//! set nor on the acceleration structures, and t, u and v have the same bits in all queries.
 //!
 //! These queries trace one ray at a time. Where nothing is excluded, the queries without conditions
 //! find the nearest hit and any hit.
@@ -27,13 +27,13 @@ use crate::start_queries::TraceRay;
 use crate::starts::world_ray::WorldRay;
 use std::collections::BinaryHeap;
 
-/// Queries for several hits, and with conditions. Hits are ordered by ascending t, then instance, then
-/// triangle. Reported t are rounded to f32: among equal ones in one instance, the hit that is nearer
-/// before rounding comes first. A closed triangle is hit at most once. A ray through an edge or a vertex
-/// hits every triangle at it, so the number of hits on a closed surface may be odd.
+/// Queries for several hits, and with conditions. Hits are ordered by ascending t, then instance,
+/// then triangle. Reported t are rounded to f32: among equal ones in one instance, the hit that is
+/// nearer before rounding comes first. A closed triangle is hit at most once. A ray through an edge
+/// or a vertex hits every triangle at it, so the number of hits on a closed surface may be odd.
 impl Scene {
-    /// The nearest hit of a ray in world space that is accepted. If everything is accepted, it is the
-    /// result of [`Self::nearest`] to the bit.
+    /// The nearest hit of a ray in world space that is accepted. If everything is accepted, it is
+    /// the result of [`Self::nearest`] to the bit.
     pub fn nearest_accepted<R: TraceRay>(&self, ray: &R, accept: &Accept<'_>) -> Option<Hit> {
         if self.accepts_everything(accept) {
             return self.nearest(ray);
@@ -49,8 +49,8 @@ impl Scene {
         ray.placed(self).is_some_and(|placed| self.search_any(placed.world_ray(), accept))
     }
 
-    /// Replaces `hits` by all hits of a ray in world space that are accepted, in order. The time grows
-    /// with the number of triangles that the ray passes closely.
+    /// Replaces `hits` by all hits of a ray in world space that are accepted, in order. The time
+    /// grows with the number of triangles that the ray passes closely.
     ///
     /// ```no_run
     /// use bth::Accept;
@@ -70,8 +70,8 @@ impl Scene {
         self.append_all(ray, accept, &mut Vec::new(), hits);
     }
 
-    /// Replaces `hits` by the first `k` of the hits that [`Self::all_hits`] returns, or by all if there
-    /// are fewer. Nothing beyond is searched.
+    /// Replaces `hits` by the first `k` of the hits that [`Self::all_hits`] returns, or by all if
+    /// there are fewer. Nothing beyond is searched.
     pub fn nearest_hits<R: TraceRay>(&self, ray: &R, k: usize, accept: &Accept<'_>, hits: &mut Vec<Hit>) {
         hits.clear();
         self.append_nearest(ray, k, accept, hits);
@@ -143,22 +143,23 @@ impl Scene {
         append_each(rays, offsets, hits, |ray, hits| self.append_nearest(ray, k, accept, hits));
     }
 
-    /// Counts the crossings of triangles by a ray in world space. Each passage through a closed surface
-    /// counts once.
+    /// Counts the crossings of triangles by a ray in world space. Each passage through a closed
+    /// surface counts once.
     ///
-    /// Hits are not suited for this: a ray through an edge or a vertex hits all triangles at it, and a
-    /// ray in the plane of a triangle does not hit it. Crossings are counted for the ray with its origin
-    /// moved by (ε, ε², ε³) in the space of the object, for an infinitely small ε > 0. This exact rule
-    /// never meets an edge, a vertex or a plane. So a line crosses a surface without boundary as often
-    /// in as out. Of two ranges of t that share an end, `[a, b]` and `[b, c]`, each crossing is in
-    /// exactly one: t is compared with the ends exactly, without rounding. A ray without a line (see
-    /// [`Scene`]) has no crossings, nor does a ray whose range is empty or a single t.
+    /// Hits are not suited for this: a ray through an edge or a vertex hits all triangles at it,
+    /// and a ray in the plane of a triangle does not hit it. Crossings are counted for the ray with
+    /// its origin moved by (ε, ε², ε³) in the space of the object, for an infinitely small ε > 0.
+    /// This exact rule never meets an edge, a vertex or a plane. So a line crosses a surface
+    /// without boundary as often in as out. Of two ranges of t that share an end, `[a, b]` and `[b,
+    /// c]`, each crossing is in exactly one: t is compared with the ends exactly, without rounding.
+    /// A ray without a line (see [`Scene`]) has no crossings, nor does a ray whose range is empty
+    /// or a single t.
     ///
-    /// A [`StartRay`](crate::rays::StartRay) counts the crossings of the moved line with a t above 0 on
-    /// the line through the start itself, and none of a triangle through the start.
+    /// A [`StartRay`](crate::rays::StartRay) counts the crossings of the moved line with a t above
+    /// 0 on the line through the start itself, and none of a triangle through the start.
     ///
-    /// Each instance is counted in the space of its object, into which the ray is rounded as for other
-    /// queries. A mirrored instance keeps its front and back.
+    /// Each instance is counted in the space of its object, into which the ray is rounded as for
+    /// other queries. A mirrored instance keeps its front and back.
     ///
     /// ```no_run
     /// use bth::rays::Ray;
@@ -181,8 +182,9 @@ impl Scene {
         store_each(rays, crossings, |ray| self.crossings(ray));
     }
 
-    /// Sets the mask of an instance. A ray can hit the instance only if its [`Accept::mask`] and this
-    /// mask have a bit in common. At first all bits are set. Queries without [`Accept`] ignore masks.
+    /// Sets the mask of an instance. A ray can hit the instance only if its [`Accept::mask`] and
+    /// this mask have a bit in common. At first all bits are set. Queries without [`Accept`] ignore
+    /// masks.
     ///
     /// # Panics
     /// If there is no such instance.
@@ -192,8 +194,8 @@ impl Scene {
         self.masks_mut().set_instance(instance, mask);
     }
 
-    /// Sets the mask of a group of triangles of an object, in all its instances. A ray must have a bit
-    /// in common with the instance and a bit in common with the group.
+    /// Sets the mask of a group of triangles of an object, in all its instances. A ray must have a
+    /// bit in common with the instance and a bit in common with the group.
     ///
     /// # Panics
     /// If there is no such object, or if it has no such group.
@@ -213,7 +215,8 @@ impl Scene {
         self.masks().of_instance(instance)
     }
 
-    /// The mask of a group of triangles of an object; all bits are set unless [`Self::set_group_mask`] was called.
+    /// The mask of a group of triangles of an object; all bits are set unless
+    /// [`Self::set_group_mask`] was called.
     ///
     /// # Panics
     /// If there is no such object, or if it has no such group.
@@ -263,7 +266,8 @@ impl Scene {
         if let Some(placed) = ray.placed(self) {
             search(self, placed.world_ray(), accept, found);
         }
-        // The heap of `append_nearest` sorts these few hits, too, which saves the code of another sort.
+        // The heap of `append_nearest` sorts these few hits, too, which saves the code of another
+        // sort.
         *found = BinaryHeap::from(std::mem::take(found)).into_sorted_vec();
         hits.extend(found.iter().map(|found| found.hit));
     }
@@ -286,7 +290,8 @@ fn store_each<R, T>(rays: &[R], results: &mut [T], query: impl Fn(&R) -> T) {
     }
 }
 
-/// Replaces `hits` by those that a query appends for each ray, and `offsets` by their first indices and the number of all.
+/// Replaces `hits` by those that a query appends for each ray, and `offsets` by their first indices
+/// and the number of all.
 fn append_each<R>(
     rays: &[R],
     offsets: &mut Vec<usize>,

@@ -84,8 +84,8 @@ struct InstanceHits<'a> {
 }
 
 impl InstanceHits<'_> {
-    /// The intersection of the ray's line with a triangle, unless its t certainly lies out of the range
-    /// of hits that can change the result.
+    /// The intersection of the ray's line with a triangle, unless its t certainly lies out of the
+    /// range of hits that can change the result.
     fn intersection(&self, corners: [[f32; 3]; 3]) -> Option<Intersection> {
         let ray = &self.object_ray.ray;
         if let Some((point, start)) = self.start {
@@ -131,7 +131,8 @@ impl InstanceHits<'_> {
     fn shrink(&mut self) {
         let (t, t_scale) = (self.collector.limit(), self.object_ray.t_scale);
         if t < f32::INFINITY {
-            // The product of t in the object and the factor may have been rounded where it is denormal.
+            // The product of t in the object and the factor may have been rounded where it is
+            // denormal.
             let t = if t_scale == 1.0 { f64::from(t) } else { f64::from(t.next_up()) / f64::from(t_scale) };
             self.limit = widened(t).min(self.limit);
         }

@@ -24,8 +24,8 @@ type Receive<'a> = &'a mut dyn FnMut(u32) -> Option<f32>;
 
 impl World {
     /// Calls `visit` with each visible instance whose box a ray in world space may enter within its
-    /// range of t, nearer boxes first. Instances beyond what `visit` returns may be skipped. Returns
-    /// true if `visit` has ended the enumeration.
+    /// range of t, nearer boxes first. Instances beyond what `visit` returns may be skipped.
+    /// Returns true if `visit` has ended the enumeration.
     pub(crate) fn enumerate(&self, ray: &Ray, visit: Receive<'_>) -> bool {
         let top = &self.top;
         // False for NaN, too.
@@ -33,9 +33,9 @@ impl World {
         has_range && !top.is_empty() && Isa::chosen().run(RayKernel { top, ray, visit })
     }
 
-    /// Calls `visit` with each visible instance whose box may have a point within a squared distance
-    /// of a finite point, nearer boxes first. `visit` returns the squared distance from then on, or
-    /// `None` to end. Returns true if it has ended the enumeration.
+    /// Calls `visit` with each visible instance whose box may have a point within a squared
+    /// distance of a finite point, nearer boxes first. `visit` returns the squared distance from
+    /// then on, or `None` to end. Returns true if it has ended the enumeration.
     pub(crate) fn enumerate_near(
         &self,
         point: [f32; 3],
@@ -83,7 +83,8 @@ impl<Q: InstanceQuery> Tree<Q> for TopLevel {
     }
 }
 
-/// The constants of a ray for tests of the boxes in the top level; `None` for rays that cannot hit anything.
+/// The constants of a ray for tests of the boxes in the top level; `None` for rays that cannot hit
+/// anything.
 #[inline(always)]
 fn slabs<S: Simd>(s: S, ray: &Ray, top: &TopLevel) -> Option<RaySlabs> {
     if ray.origin.iter().all(|x| x.abs() <= top.reach)
@@ -109,7 +110,8 @@ impl Kernel for RayKernel<'_> {
     fn run<S: Simd>(self, s: S) -> bool {
         let RayKernel { top, ray, visit } = self;
         let Some(slabs) = slabs(s, ray, top) else { return false };
-        // Kept in memory: vectors of its numbers would be stored before each visit and loaded after it.
+        // Kept in memory: vectors of its numbers would be stored before each visit and loaded after
+        // it.
         let slabs = black_box(&slabs);
         let last = limit(slabs.scale, ray.tmax);
         let mut query = RayInstances { slabs, tmax: ray.tmax, last, visit };

@@ -70,7 +70,8 @@ fn rays_visit_every_box_that_they_meet_in_order_until_they_end() {
         }
     }
     assert!(visited > 5000 && missed > 5000 && ends > 50, "{visited} visits, {missed} missed, {ends} ended");
-    // The children of a node come in order, but a node after a nearer one may hold nearer instances.
+    // The children of a node come in order, but a node after a nearer one may hold nearer
+    // instances.
     assert!(wrong_pairs * 4 < pairs && pairs > 1000, "{wrong_pairs} of {pairs} pairs are not in order");
 }
 

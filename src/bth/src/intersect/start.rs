@@ -258,15 +258,8 @@ fn other_corners(object: &ObjectView<'_>, leaf: u32, slot: u32) -> Option<[[f32;
     let at = slot as usize;
     let (mut indexed, mut raw) = (None, None);
     match Child::from_code(leaf)? {
-        Child::Indexed(index) => {
-            let leaf = object.indexed(index, &mut indexed);
-            let vertex = |corner: usize| usize::from(leaf.corner[corner][at % WIDTH]) % WIDTH;
-            Some([0, 1, 2].map(|corner| [0, 1, 2].map(|axis| leaf.vertex[axis][vertex(corner)])))
-        }
-        Child::Raw(index) => {
-            let leaf = object.raw(index, &mut raw);
-            Some([0, 1, 2].map(|corner| [0, 1, 2].map(|axis| leaf.corner[corner][axis][at % WIDTH])))
-        }
+        Child::Indexed(index) => Some(object.indexed(index, &mut indexed).corners(at)),
+        Child::Raw(index) => Some(object.raw(index, &mut raw).corners(at)),
         Child::Tets(_) => {
             let face = object.tet_faces.get(at)?;
             Some(face.vertex.map(|v| object.tet_vertices[v as usize].position))

@@ -45,17 +45,17 @@ const MIN_ORDERED: usize = 32;
 
 /// Queries about points in world space.
 impl Scene {
-    /// The closest point of the scene's triangles to a point in world space. `None` if its distance,
-    /// rounded to f32 as reported, exceeds `radius`, if the point is not finite, or if the radius is
-    /// negative or NaN.
+    /// The closest point of the scene's triangles to a point in world space. `None` if its
+    /// distance, rounded to f32 as reported, exceeds `radius`, if the point is not finite, or if
+    /// the radius is negative or NaN.
     ///
     /// Distances are exact to 0.55 units in the last place. Triangles are compared by their squared
     /// distances, computed in f64 from the point and the triangle alone with a relative error below
-    /// 2^-27. Among equal ones the min instance wins, then the min id. Distances to a shared edge or
-    /// vertex are equal for all triangles that share it. So the result does not depend on the
-    /// acceleration structures in the file, the instruction set or the batch. Triangles without area
-    /// do not count, as for rays. The corners of instances are transformed in f64 and rounded to f32
-    /// in world space.
+    /// 2^-27. Among equal ones the min instance wins, then the min id. Distances to a shared edge
+    /// or vertex are equal for all triangles that share it. So the result does not depend on the
+    /// acceleration structures in the file, the instruction set or the batch. Triangles without
+    /// area do not count, as for rays. The corners of instances are transformed in f64 and rounded
+    /// to f32 in world space.
     ///
     /// ```no_run
     /// let scene = bth::open("bunny.bth")?;
@@ -70,8 +70,8 @@ impl Scene {
         closest
     }
 
-    /// Stores for each point what [`Self::closest`] returns. Many points in one call are faster: they
-    /// are searched in an order in which each is close to the one before.
+    /// Stores for each point what [`Self::closest`] returns. Many points in one call are faster:
+    /// they are searched in an order in which each is close to the one before.
     ///
     /// # Panics
     /// If the slices differ in length.
@@ -93,8 +93,8 @@ impl Scene {
     }
 
     /// The distance of a point in world space to the closest triangle, as [`Self::closest`] reports
-    /// it, negative if the scene contains the point ([`Self::contains`]). Infinite in an empty scene;
-    /// NaN if the point is not finite. The sign is reliable where the meshes are closed.
+    /// it, negative if the scene contains the point ([`Self::contains`]). Infinite in an empty
+    /// scene; NaN if the point is not finite. The sign is reliable where the meshes are closed.
     pub fn signed_distance(&self, point: [f32; 3]) -> f32 {
         let mut distance = 0.0;
         self.signed_distance_batch(&[point], std::slice::from_mut(&mut distance));
@@ -125,10 +125,10 @@ impl Scene {
         }
     }
 
-    /// Returns true if a triangle and an axis-aligned box in world space have a point in common. Both
-    /// are closed, so touching counts; the answer is exact. A box may be infinite. A box with a
-    /// `lower` above its `upper` or a NaN is empty. The corners of instances are transformed in f64
-    /// and rounded to f32 in world space.
+    /// Returns true if a triangle and an axis-aligned box in world space have a point in common.
+    /// Both are closed, so touching counts; the answer is exact. A box may be infinite. A box with
+    /// a `lower` above its `upper` or a NaN is empty. The corners of instances are transformed in
+    /// f64 and rounded to f32 in world space.
     pub fn overlaps_box(&self, lower: [f32; 3], upper: [f32; 3]) -> bool {
         overlap::visit_box(self, lower, upper, &mut |_| true)
     }
@@ -153,18 +153,18 @@ impl Scene {
     }
 
     /// The winding number of the scene's surfaces around a point in world space: how often a closed
-    /// mesh encloses the point if its triangles are counterclockwise as seen from outside. 0 outside,
-    /// 1 inside, 2 where two solids overlap; negative where the triangles are counterclockwise as
-    /// seen from inside.
+    /// mesh encloses the point if its triangles are counterclockwise as seen from outside. 0
+    /// outside, 1 inside, 2 where two solids overlap; negative where the triangles are
+    /// counterclockwise as seen from inside.
     ///
-    /// It is exact for closed meshes, even if they intersect themselves. A point on the surface counts
-    /// as if it were moved by (ε, ε², ε³) for an infinitely small ε > 0, so of solids that fill space
-    /// without gaps exactly one contains it. For other meshes it is the number of crossings of a ray
-    /// from the point along an axis to the nearest side of the object's bounds. Outside of the bounds
-    /// of an instance, and for a point that is not finite, it is 0.
+    /// It is exact for closed meshes, even if they intersect themselves. A point on the surface
+    /// counts as if it were moved by (ε, ε², ε³) for an infinitely small ε > 0, so of solids that
+    /// fill space without gaps exactly one contains it. For other meshes it is the number of
+    /// crossings of a ray from the point along an axis to the nearest side of the object's bounds.
+    /// Outside of the bounds of an instance, and for a point that is not finite, it is 0.
     ///
-    /// The numbers of all instances are added. Each is counted in the space of its object, into which
-    /// the point is rounded.
+    /// The numbers of all instances are added. Each is counted in the space of its object, into
+    /// which the point is rounded.
     pub fn winding(&self, point: [f32; 3]) -> i32 {
         let mut winding = [0];
         winding::windings(self, &[point], &mut winding);
@@ -180,9 +180,9 @@ impl Scene {
         winding::windings(self, points, winding);
     }
 
-    /// Returns true if a point in world space lies inside: if [`Self::winding`] is not 0. Where shells
-    /// overlap, points in both are inside. A cavity is outside if its triangles are counterclockwise
-    /// as seen from within it, as they are in models of solids.
+    /// Returns true if a point in world space lies inside: if [`Self::winding`] is not 0. Where
+    /// shells overlap, points in both are inside. A cavity is outside if its triangles are
+    /// counterclockwise as seen from within it, as they are in models of solids.
     ///
     /// ```no_run
     /// let scene = bth::open("bunny.bth")?;
@@ -213,10 +213,10 @@ impl Scene {
         }
     }
 
-    /// Returns true if the triangles of an object form a surface without boundary: if every edge has as
-    /// many triangles in one direction as in the other. Winding numbers are then exact. `None` if the
-    /// file was compiled without the triangles of its source. Vertices with equal positions count as
-    /// one. Takes as long as sorting the edges.
+    /// Returns true if the triangles of an object form a surface without boundary: if every edge
+    /// has as many triangles in one direction as in the other. Winding numbers are then exact.
+    /// `None` if the file was compiled without the triangles of its source. Vertices with equal
+    /// positions count as one. Takes as long as sorting the edges.
     ///
     /// # Panics
     /// If `object` is not less than [`Self::object_count`].

@@ -154,7 +154,8 @@ impl TriangleQuery for PointTriangles<'_, '_, '_> {
     }
 }
 
-/// The triangles of `valid` that may be closer than `limit` and, with `only_closest`, than the others.
+/// The triangles of `valid` that may be closer than `limit` and, with `only_closest`, than the
+/// others.
 struct NearTriangles<'a, S: Simd, B> {
     point: &'a PointLanes<S>,
     block: &'a B,
@@ -195,7 +196,8 @@ impl<S: Simd> Part<S> for NearCorners<'_, S> {
     }
 }
 
-/// [`CornerLanes::is_beyond`] as a function, because unrolled in all scalar code it would take much code.
+/// [`CornerLanes::is_beyond`] as a function, because unrolled in all scalar code it would take much
+/// code.
 #[inline(never)]
 fn is_beyond_called<S: Simd>(s: S, point: &PointLanes<S>, block: &impl CornerLanes, limit: f32) -> bool {
     block.is_beyond(s, point, limit)

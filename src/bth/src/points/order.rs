@@ -1,5 +1,6 @@
-//! The order in which the points of a batch are searched: along a Morton curve, so that each point is close to the one before.
-//! Its triangle then gives a good bound, and the nodes that it visited are in the cache. The order never changes a result.
+//! The order in which the points of a batch are searched: along a Morton curve, so that each point
+//! is close to the one before. Its triangle then gives a good bound, and the nodes that it visited
+//! are in the cache. The order never changes a result.
 
 /// Bits of each coordinate on the curve.
 const BITS: u32 = 10;
@@ -12,8 +13,9 @@ fn spread(x: u64) -> u64 {
     (x | x << 2) & 0x0924_9249
 }
 
-/// The points of a batch by their place on the curve through the box of all finite ones: `order` receives the place in the high
-/// half and the index of the point in the low half of each number. There are at most 2^32 points.
+/// The points of a batch by their place on the curve through the box of all finite ones: `order`
+/// receives the place in the high half and the index of the point in the low half of each number.
+/// There are at most 2^32 points.
 pub(super) fn along_curve(points: &[[f32; 3]], order: &mut Vec<u64>) {
     let (mut lower, mut upper) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
     for point in points.iter().filter(|point| point.iter().all(|x| x.is_finite())) {

@@ -20,8 +20,8 @@ fn finite_box(lower: [f32; 3], upper: [f32; 3]) -> Option<[[f32; 3]; 2]> {
     (is_number && (0..3).all(|k| lower[k] <= upper[k])).then_some([lower, upper])
 }
 
-/// Visits the triangles of an instance that overlap a box in world space. Returns true if the visitor
-/// has ended the query.
+/// Visits the triangles of an instance that overlap a box in world space. Returns true if the
+/// visitor has ended the query.
 fn visit_in_box(at: PointInstance<'_>, region: [[f32; 3]; 2], visit: &mut Visitor<'_>) -> bool {
     let object = at.object;
     let greatest = object.bounds.greatest;

@@ -1,18 +1,19 @@
-//! An instance for searches of closest points: its corners in world space, and bounds of distances in
-//! the space of its object.
+//! An instance for searches of closest points: its corners in world space, and bounds of distances
+//! in the space of its object.
 //!
 //! An affine transform does not preserve distances, so triangles are measured in world space. Each
-//! coordinate of a corner is computed in f64 and rounded to f32, as if the instance had been written
-//! to a file as a mesh. The BVH is walked in object space. Let A be the linear part of the inverse
-//! transform and |A| its spectral norm. A triangle within the distance d in world space lies within
+//! coordinate of a corner is computed in f64 and rounded to f32, as if the instance had been
+//! written to a file as a mesh. The BVH is walked in object space. Let A be the linear part of the
+//! inverse transform and |A| its spectral norm. A triangle within the distance d in world space
+//! lies within
 //! |A| d in object space, plus a slack for the roundings of the point, the corners and the inverse.
 
 use crate::instances::Placed;
 use bth_format::object::ObjectView;
 
 /// Bounds all roundings relative to the magnitudes in [`PlacedObject::new`]: 2^-24 · √3 for world
-/// corners, the same for the point in object space, and 10 · 2^24 · 2^-53 for the error of the inverse
-/// (see `instances/placement.rs`).
+/// corners, the same for the point in object space, and 10 · 2^24 · 2^-53 for the error of the
+/// inverse (see `instances/placement.rs`).
 const ROUNDING: f64 = 1.0 / (1 << 21) as f64;
 /// The min magnitude that roundings are relative to: denormal numbers are rounded by as much as the
 /// smallest normal one.
@@ -46,8 +47,8 @@ impl PlacedObject {
     }
 
     /// The point in object space. Coordinates beyond the range of f32 are limited to it: that moves
-    /// the point to the closest one of a cube that contains the object, and no part of the object gets
-    /// farther.
+    /// the point to the closest one of a cube that contains the object, and no part of the object
+    /// gets farther.
     pub(super) fn point(&self, point: [f32; 3]) -> [f32; 3] {
         let mut relative = [0.0; 3];
         for k in 0..3 {
@@ -65,7 +66,8 @@ impl PlacedObject {
         ROUNDING * (self.magnitude + 2.0 * self.norm * greatest)
     }
 
-    /// Upper bound of the squared distance in object space of what lies within a squared distance in world space.
+    /// Upper bound of the squared distance in object space of what lies within a squared distance
+    /// in world space.
     pub(super) fn squared_in_object(&self, squared: f64, slack: f64) -> f64 {
         let distance = squared.sqrt() * self.norm + slack;
         distance * distance
@@ -90,9 +92,9 @@ impl PlacedObject {
     }
 }
 
-/// Upper bound of the max factor by which a matrix A stretches a vector, at most 1.04 times that factor.
-/// The square of the factor is the max eigenvalue of the symmetric matrix B = AᵀA, which is at most the
-/// n-th root of any norm of the n-th power of B.
+/// Upper bound of the max factor by which a matrix A stretches a vector, at most 1.04 times that
+/// factor. The square of the factor is the max eigenvalue of the symmetric matrix B = AᵀA, which is
+/// at most the n-th root of any norm of the n-th power of B.
 fn spectral_norm(rows: &[[f64; 3]; 3]) -> f64 {
     let greatest = rows.iter().flatten().fold(0.0f64, |m, x| m.max(x.abs()));
     if greatest == 0.0 {
@@ -106,7 +108,8 @@ fn spectral_norm(rows: &[[f64; 3]; 3]) -> f64 {
     let scaled = rows.map(|row| row.map(|x| x / greatest));
     let transposed = [0, 1, 2].map(|i| [0, 1, 2].map(|k| scaled[k][i]));
     let mut power = product(&transposed, &scaled);
-    // After k steps the power of B with the exponent 2^k is `power` times `factor` to this exponent.
+    // After k steps the power of B with the exponent 2^k is `power` times `factor` to this
+    // exponent.
     const STEPS: usize = 5;
     let root = |x: f64, steps: usize| (0..steps).fold(x, |x, _| x.sqrt());
     let mut factor = 1.0;

@@ -4,8 +4,8 @@ use super::Closest;
 use crate::intersect::point_triangle::{Feature, locate, squared_distance};
 use crate::rays::PrimitiveRef;
 
-/// Slack of the squared radius relative to itself. It covers the rounding of the distance to f32, by
-/// which the radius is decided, and the error of squared distances.
+/// Slack of the squared radius relative to itself. It covers the rounding of the distance to f32,
+/// by which the radius is decided, and the error of squared distances.
 const RADIUS_SLACK: f64 = 1.0 / (1 << 20) as f64;
 
 /// The search of the closest triangle to a point.
@@ -16,8 +16,8 @@ const RADIUS_SLACK: f64 = 1.0 / (1 << 20) as f64;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Search {
     pub(super) point: [f32; 3],
-    /// Squared distance of the best triangle; before one is found, an upper bound of squared distances
-    /// within the radius.
+    /// Squared distance of the best triangle; before one is found, an upper bound of squared
+    /// distances within the radius.
     pub(super) squared: f64,
     primitive: PrimitiveRef,
     /// The corners in world space.
@@ -26,7 +26,8 @@ pub(super) struct Search {
 }
 
 impl Search {
-    /// A search within a radius. `None` if the point is not finite or the radius is negative or NaN.
+    /// A search within a radius. `None` if the point is not finite or the radius is negative or
+    /// NaN.
     #[inline(always)]
     pub(super) fn new(point: [f32; 3], radius: f32) -> Option<Search> {
         let finite = point[0].is_finite() && point[1].is_finite() && point[2].is_finite();
@@ -57,8 +58,8 @@ impl Search {
         }
     }
 
-    /// Returns true if the distance of a triangle, rounded to f32 as it is reported, does not exceed
-    /// a radius.
+    /// Returns true if the distance of a triangle, rounded to f32 as it is reported, does not
+    /// exceed a radius.
     pub(super) fn is_in_ball(&self, corners: [[f32; 3]; 3], radius: f32) -> bool {
         squared_distance(self.point, corners).0.sqrt() as f32 <= radius
     }

@@ -48,8 +48,8 @@ impl<'a> Searcher<'a> {
     /// As [`Scene::closest`].
     pub(super) fn closest(&mut self, point: [f32; 3], radius: f32) -> Option<Closest> {
         let mut search = Search::new(point, radius)?;
-        // The triangle of the point before gives a bound, which never changes the result. It is of no
-        // use for points farther from each other than from the surface.
+        // The triangle of the point before gives a bound, which never changes the result. It is of
+        // no use for points farther from each other than from the surface.
         if let Some(previous) = self.previous.as_ref().filter(|previous| previous.is_near(&point)) {
             search.offer_result(previous);
         }

@@ -1,16 +1,17 @@
-//! Winding numbers of points: the crossings of a ray from each point along an axis, towards the nearest
-//! side of the object's bounds.
+//! Winding numbers of points: the crossings of a ray from each point along an axis, towards the
+//! nearest side of the object's bounds.
 //!
-//! Along an axis the tests of boxes are comparisons of f32 values. They exclude exactly the boxes that
-//! the closed ray does not touch. Sixteen triangles at a time are projected along the axis. Their f32
-//! coordinates relative to the point have exact signs and a relative error of u = 2^-24. For |x| <= X
-//! and |y| <= Y, the weight x₁y₂ - y₁x₂ is off by less than 10u·XY because of roundings, and by less
-//! than the smallest normal number because of underflow. Most triangles are decided so. [`crossing`]
-//! decides those with a weight within the bound, or with corners before and behind the point.
+//! Along an axis the tests of boxes are comparisons of f32 values. They exclude exactly the boxes
+//! that the closed ray does not touch. Sixteen triangles at a time are projected along the axis.
+//! Their f32 coordinates relative to the point have exact signs and a relative error of u = 2^-24.
+//! For |x| <= X and |y| <= Y, the weight x₁y₂ - y₁x₂ is off by less than 10u·XY because of
+//! roundings, and by less than the smallest normal number because of underflow. Most triangles are
+//! decided so. [`crossing`] decides those with a weight within the bound, or with corners before
+//! and behind the point.
 //!
-//! That rule moves the ray by infinitely little. What the moved ray crosses, the ray touches. So tests
-//! that exclude only what the closed ray certainly does not touch miss no crossing. A weight or depth
-//! of certain sign keeps its sign.
+//! That rule moves the ray by infinitely little. What the moved ray crosses, the ray touches. So
+//! tests that exclude only what the closed ray certainly does not touch miss no crossing. A weight
+//! or depth of certain sign keeps its sign.
 
 use crate::bvh::single_stack::SingleStack;
 use crate::bvh::walk::{BoxQuery, ObjectTree, TriangleQuery, all_triangles, walk};
@@ -50,8 +51,8 @@ pub(super) fn windings(scene: &Scene, points: &[[f32; 3]], winding: &mut [i32]) 
     }
 }
 
-/// Adds the winding number of each point in object space to `winding`: 0 outside of the object's bounds
-/// and for points that are not finite.
+/// Adds the winding number of each point in object space to `winding`: 0 outside of the object's
+/// bounds and for points that are not finite.
 fn add_windings(object: &ObjectView<'_>, points: &[[f32; 3]], winding: &mut [i32]) {
     if object.header.root != NONE {
         let stack = &mut SingleStack::new();
@@ -109,8 +110,9 @@ impl<S: Simd, B: TriangleBlock> Part<S> for CrossedTriangles<'_, B> {
 }
 
 impl AxisRay {
-    /// The ray from a point in the bounds of an object to their nearest side. Of equally near ones it is
-    /// the first of the lower sides in x, y and z, then of the upper ones. `None` for a point outside.
+    /// The ray from a point in the bounds of an object to their nearest side. Of equally near ones
+    /// it is the first of the lower sides in x, y and z, then of the upper ones. `None` for a point
+    /// outside.
     #[inline(always)]
     fn new(object: &ObjectView<'_>, point: [f32; 3]) -> Option<AxisRay> {
         let (lower, upper) = (&object.header.lower, &object.header.upper);
@@ -182,7 +184,8 @@ impl AxisRay {
         let weight = [cross(s, b, c), cross(s, c, a), cross(s, a, b)];
         let least = s.min(s.min(weight[0], weight[1]), weight[2]);
         let greatest = s.max(s.max(weight[0], weight[1]), weight[2]);
-        // Comparisons with NaN, which an overflow may give, are false, and leave a triangle in doubt.
+        // Comparisons with NaN, which an overflow may give, are false, and leave a triangle in
+        // doubt.
         let missed = s.and(s.lt(least, minus_error), s.lt(error, greatest));
         if valid & !s.mask_bits(missed) == 0 {
             return 0;

@@ -1,33 +1,39 @@
-//! The surface at a hit: positions, normals, texture coordinates, group, material and names, from the sections of the source that
-//! a file keeps. And bounds.
+//! The surface at a hit: positions, normals, texture coordinates, group, material and names, from
+//! the sections of the source that a file keeps. And bounds.
 //!
-//! What a file keeps is decided when it is compiled: positions of triangles by default (not with `--no-geometry`), normals and
-//! texture coordinates with `--attributes`, groups, materials and names with `--names`. How materials look is in
-//! [`mod@crate::materials`].
+//! Compiling decides what a file keeps: positions of triangles by default (not with
+//! `--no-geometry`), normals and texture coordinates with `--attributes`, groups, materials and
+//! names with `--names`, how materials look with `--materials`.
 
 use crate::intersect::point_exact::exact_normal;
+use crate::materials::{Alpha, Material, Texture, Wrap};
 use crate::rays::{Hit, PrimitiveRef};
 use crate::scene::Scene;
-use bth_format::layout::NONE;
+use bth_format::layout::{
+    ALPHA_BLEND, ALPHA_MASK, FILTER_NEAREST, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE, UV_SET_FIRST,
+    UV_SET_SECOND, WRAP_CLAMP, WRAP_MIRROR,
+};
 use bth_format::object::ObjectView;
 
-/// The surface at a point of a triangle, as [`Scene::surface`] finds it. Positions and normals are in world space unless their name
-/// says otherwise, normals have length 1.
+/// The surface at a point of a triangle, as [`Scene::surface`] finds it. Positions and normals are
+/// in world space unless their name says otherwise, normals have length 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// The point: the triangle's vertices weighted by the hit's barycentric coordinates, in f64. It lies on the triangle but for
-    /// the rounding of these coordinates to f32, which the ray's `origin + t * direction` does not.
+    /// The point: the triangle's vertices weighted by the hit's barycentric coordinates, in f64. It
+    /// lies on the triangle but for the rounding of these coordinates to f32, which the ray's
+    /// `origin + t * direction` does not.
     pub position: [f64; 3],
     /// The point in the space of the object.
     pub object_position: [f64; 3],
-    /// The normal of the triangle's plane, on the side from which the object's vertices are seen counterclockwise. A mirrored
-    /// instance shows the same sides of its object as others do.
+    /// The normal of the triangle's plane, on the side from which the object's vertices are seen
+    /// counterclockwise. A mirrored instance shows the same sides of its object as others do.
     pub geometric_normal: [f64; 3],
     /// As [`Self::geometric_normal`], in the space of the object.
     pub object_geometric_normal: [f64; 3],
-    /// The normals of the source at the vertices, interpolated, on whatever side the source has them. The geometric normal where
-    /// the file keeps none, where the object has got new positions, where those of the vertices cancel out, and in place of a
-    /// vertex's normal of zeros.
+    /// The normals of the source at the vertices, interpolated, on whatever side the source has
+    /// them. The geometric normal where the file keeps none, where the object has got new
+    /// positions, where those of the vertices cancel out, and in place of a vertex's normal of
+    /// zeros.
     pub normal: [f64; 3],
     /// As [`Self::normal`], in the space of the object.
     pub object_normal: [f64; 3],
@@ -35,10 +41,11 @@ pub struct SurfacePoint {
     pub uv: Option<[f32; 2]>,
     /// Index of the object.
     pub object: u32,
-    /// Index of the group of the object's triangles; 0 if the file keeps no groups. Its name is [`Scene::group_name`].
+    /// Index of the group of the object's triangles; 0 if the file keeps no groups. Its name is
+    /// [`Scene::group_name`].
     pub group: u32,
-    /// Index of the object's material; `None` if the group has none or the file keeps none. Its name is
-    /// [`Scene::material_name`].
+    /// Index of the object's material; `None` if the group has none or the file keeps none. Its
+    /// name is [`Scene::material_name`].
     pub material: Option<u32>,
 }
 
@@ -46,23 +53,24 @@ pub struct SurfacePoint {
 pub type Bounds = ([f32; 3], [f32; 3]);
 
 impl Scene {
-    /// The vertices of a triangle in the space of its object, as rays are tested against them: on the grid, if the file has one.
-    /// `None` if the file does not keep them (it was compiled with `--no-geometry`), or if there is no such instance or triangle.
+    /// The vertices of a triangle in the space of its object, as rays are tested against them: on
+    /// the grid, if the file has one. `None` if the file does not keep them (it was compiled with
+    /// `--no-geometry`), or if there is no such instance or triangle.
     pub fn triangle(&self, primitive: PrimitiveRef) -> Option<[[f32; 3]; 3]> {
         triangle(&self.object(self.object_at(primitive)?), primitive.triangle)
     }
 
-    /// The vertices of a triangle in world space, at the scene's time. In a mirrored instance they are seen clockwise from the
-    /// front. `None` as for [`Self::triangle`].
+    /// The vertices of a triangle in world space, at the scene's time. In a mirrored instance they
+    /// are seen clockwise from the front. `None` as for [`Self::triangle`].
     pub fn triangle_in_world(&self, primitive: PrimitiveRef) -> Option<[[f64; 3]; 3]> {
         let corners = self.triangle(primitive)?;
         let to_world = self.instance(primitive.instance).to_world;
         Some(corners.map(|corner| transformed(&to_world, corner.map(f64::from))))
     }
 
-    /// The surface at a hit of this scene, at the scene's time. `None` for a miss, if the file does not keep the vertices of
-    /// triangles (it was compiled with `--no-geometry`), if there is no such instance or triangle, or if the instance is hidden
-    /// by now.
+    /// The surface at a hit of this scene, at the scene's time. `None` for a miss, if the file does
+    /// not keep the vertices of triangles (it was compiled with `--no-geometry`), if there is no
+    /// such instance or triangle, or if the instance is hidden by now.
     ///
     /// ```no_run
     /// use bth::rays::Ray;
@@ -107,8 +115,8 @@ impl Scene {
         })
     }
 
-    /// The group of a triangle of an object: 0 if the file keeps no groups. Costs O(log runs), where a run is a sequence of
-    /// triangles of one group in the source.
+    /// The group of a triangle of an object: 0 if the file keeps no groups. Costs O(log runs),
+    /// where a run is a sequence of triangles of one group in the source.
     ///
     /// # Panics
     /// If there is no such object.
@@ -148,12 +156,14 @@ impl Scene {
         self.object(object).material_name(material)
     }
 
-    /// The name of an object, that of the scene manifest or of the glTF mesh; empty if the file keeps none.
+    /// The name of an object, that of the scene manifest or of the glTF mesh; empty if the file
+    /// keeps none.
     pub fn object_name(&self, object: u32) -> &str {
         self.objects().locate(object).map_or("", |(file, row)| file.object_name(row))
     }
 
-    /// Box of the triangles of an object that can be hit, in the space of the object; `None` if there are none.
+    /// Box of the triangles of an object that can be hit, in the space of the object; `None` if
+    /// there are none.
     ///
     /// # Panics
     /// If there is no such object.
@@ -162,8 +172,9 @@ impl Scene {
         (header.root != NONE).then_some((header.lower, header.upper))
     }
 
-    /// Box in world space that contains all visible instances at the scene's time, slightly enlarged to cover roundings of
-    /// transforms; `None` if nothing is visible. It is the union of all [`Self::instance_bounds`].
+    /// Box in world space that contains all visible instances at the scene's time, slightly
+    /// enlarged to cover roundings of transforms; `None` if nothing is visible. It is the union of
+    /// all [`Self::instance_bounds`].
     pub fn bounds(&self) -> Option<Bounds> {
         let boxes = (0..self.instance_count()).filter_map(|instance| self.instance_bounds(instance));
         boxes.reduce(|(lower, upper), (l, u)| {
@@ -174,8 +185,94 @@ impl Scene {
         })
     }
 
-    /// The interpolated normal at barycentric weights of a triangle, in the space of the object. What deforms the object turns
-    /// normals, too.
+    /// How a material of an object looks. `None` if the file keeps only its name, or if there is no
+    /// such object or material. The material of a hit is
+    /// [`SurfacePoint::material`](crate::SurfacePoint::material).
+    ///
+    /// ```no_run
+    /// let scene = bth::open("house.bth")?;
+    /// for material in 0..scene.material_count(0) {
+    ///     let name = scene.material_name(0, material);
+    ///     if let Some(look) = scene.material(0, material) {
+    ///         let image = look.base_color_texture.and_then(|texture| scene.texture(0, texture));
+    ///         println!("{name}: {:?}, image of {} bytes", look.base_color, image.map_or(0, |i| i.bytes.len()));
+    ///     }
+    /// }
+    /// # Ok::<(), bth::Error>(())
+    /// ```
+    pub fn material(&self, object: u32, material: u32) -> Option<Material> {
+        let (file, row) = self.objects().locate(object)?;
+        let row = *file.materials(row).parameters.get(material as usize)?;
+        let texture = |row: u32| (row != NONE).then_some(row);
+        Some(Material {
+            base_color: row.base_color,
+            base_color_texture: texture(row.base_color_texture),
+            emissive: row.emissive,
+            emissive_texture: texture(row.emissive_texture),
+            alpha: match row.alpha_mode {
+                ALPHA_MASK => Alpha::Mask(row.alpha_cutoff),
+                ALPHA_BLEND => Alpha::Blend,
+                _ => Alpha::Opaque,
+            },
+            double_sided: row.flags & MATERIAL_DOUBLE_SIDED != 0,
+            unlit: row.flags & MATERIAL_UNLIT != 0,
+        })
+    }
+
+    /// Number of textures of an object; 0 if the file keeps none or there is no such object.
+    pub fn texture_count(&self, object: u32) -> u32 {
+        self.objects().locate(object).map_or(0, |(file, row)| file.materials(row).textures.len() as u32)
+    }
+
+    /// A texture of an object; `None` if there is no such object or texture.
+    pub fn texture(&self, object: u32, texture: u32) -> Option<Texture<'_>> {
+        let (file, row) = self.objects().locate(object)?;
+        let row = file.materials(row).textures.get(texture as usize)?;
+        let images = file.images();
+        let image = images.row_of(row.image)?;
+        Some(Texture {
+            image,
+            bytes: images.file(image)?,
+            wrap: row.wrap.map(|wrap| match wrap {
+                WRAP_MIRROR => Wrap::Mirror,
+                WRAP_CLAMP => Wrap::Clamp,
+                _ => Wrap::Repeat,
+            }),
+            nearest: row.filter == FILTER_NEAREST,
+            uv_set: row.uv_set,
+            transform: row.transform,
+        })
+    }
+
+    /// The texture coordinates of a set at a hit, interpolated. Set 0 is the set of
+    /// [`SurfacePoint::uv`](crate::SurfacePoint::uv). `None` if the file keeps none of the set, or
+    /// if there is no such instance, triangle or set.
+    pub fn texture_coordinates(&self, hit: &Hit, uv_set: u32) -> Option<[f32; 2]> {
+        let object = self.object_at(hit.primitive)?;
+        let triangle = hit.primitive.triangle;
+        match uv_set {
+            UV_SET_FIRST => {
+                let (u, v) = (f64::from(hit.u), f64::from(hit.v));
+                interpolated_uv(self.view(object), triangle, [1.0 - u - v, u, v])
+            }
+            UV_SET_SECOND => {
+                let (file, row) = self.objects().locate(object)?;
+                file.materials(row).second_uv_at(triangle, hit.u, hit.v)
+            }
+            _ => None,
+        }
+    }
+
+    /// The vertex colour at a hit, interpolated linearly: linear red, green, blue and alpha. `None`
+    /// if the file keeps none, or if there is no such instance or triangle.
+    pub fn vertex_color(&self, hit: &Hit) -> Option<[f32; 4]> {
+        let object = self.object_at(hit.primitive)?;
+        let (file, row) = self.objects().locate(object)?;
+        file.materials(row).color_at(hit.primitive.triangle, hit.u, hit.v)
+    }
+
+    /// The interpolated normal at barycentric weights of a triangle, in the space of the object.
+    /// What deforms the object turns normals, too.
     fn interpolated_normal(
         &self,
         (object, id): (u32, u32),
@@ -204,7 +301,8 @@ impl Scene {
     }
 }
 
-/// The vertices of a triangle as they are traced; `None` if the file does not keep them or there is no such triangle.
+/// The vertices of a triangle as they are traced; `None` if the file does not keep them or there is
+/// no such triangle.
 fn triangle(view: &ObjectView<'_>, id: u32) -> Option<[[f32; 3]; 3]> {
     let rows = view.triangles.get(id as usize)?;
     let [a, b, c] = rows.map(|row| view.positions.get(row as usize).copied());
@@ -212,7 +310,8 @@ fn triangle(view: &ObjectView<'_>, id: u32) -> Option<[[f32; 3]; 3]> {
     Some(view.grid.map_or(corners, |grid| corners.map(|corner| grid.nearest(corner))))
 }
 
-/// Normals are computed exactly if the error bound of f64 exceeds this share of their greatest component.
+/// Normals are computed exactly if the error bound of f64 exceeds this share of their greatest
+/// component.
 const NORMAL_ERROR: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// The normal of a triangle's plane; `None` for a triangle of zero area, which is never hit.
@@ -222,7 +321,8 @@ fn plane_normal(corners: [[f32; 3]; 3]) -> Option<[f64; 3]> {
     let (e, f) = (edge(b), edge(c));
     let products = [[1, 2], [2, 0], [0, 1]].map(|[i, j]| (e[i] * f[j], e[j] * f[i]));
     let normal = products.map(|(p, q)| p - q);
-    // The products of differences of f32 neither overflow nor underflow in f64. Each component has at most 7 roundings.
+    // The products of differences of f32 neither overflow nor underflow in f64. Each component has
+    // at most 7 roundings.
     let error =
         products.iter().fold(0.0, |most: f64, (p, q)| most.max(p.abs() + q.abs())) * 8.0 * f64::EPSILON;
     let greatest = normal.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
@@ -230,7 +330,7 @@ fn plane_normal(corners: [[f32; 3]; 3]) -> Option<[f64; 3]> {
 }
 
 /// The interpolated texture coordinates at barycentric weights.
-pub(crate) fn interpolated_uv(view: &ObjectView<'_>, id: u32, weights: [f64; 3]) -> Option<[f32; 2]> {
+fn interpolated_uv(view: &ObjectView<'_>, id: u32, weights: [f64; 3]) -> Option<[f32; 2]> {
     let corners = attribute(view, view.uvs, id)?;
     Some(weighted(weights, corners.map(|uv| uv.map(f64::from))).map(|x| x as f32))
 }
@@ -251,8 +351,8 @@ fn transformed(rows: &[[f64; 4]; 3], p: [f64; 3]) -> [f64; 3] {
     rows.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3])
 }
 
-/// A vector divided by its length; `None` for zero and for what is not finite. It is divided by its greatest component first, since
-/// the squares of components may overflow or underflow.
+/// A vector divided by its length; `None` for zero and for what is not finite. It is divided by its
+/// greatest component first, since the squares of components may overflow or underflow.
 fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
     let greatest = v.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     let v = v.map(|x| x / greatest);

@@ -70,7 +70,6 @@ struct RayTriangles<'a> {
 
 impl BoxQuery for RayTriangles<'_> {
     type Constants<S: Simd> = ();
-    const NEAREST_FIRST: bool = true;
     #[inline(always)]
     fn lanes<S: Simd>(&self, _: S) {}
     #[inline(always)]

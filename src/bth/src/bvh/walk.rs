@@ -18,15 +18,18 @@ use bth_format::object::{NodeBase, ObjectView};
 pub(crate) trait BoxQuery {
     /// Constants of the query in lanes, which a walk keeps at hand.
     type Constants<S: Simd>: Copy;
-    /// True if nearer boxes are entered first. Otherwise keys are not used.
-    const NEAREST_FIRST: bool;
+    /// True if nearer boxes are entered first. Otherwise keys and limits are not used.
+    const NEAREST_FIRST: bool = true;
     fn lanes<S: Simd>(&self, s: S) -> Self::Constants<S>;
     /// The children of a node whose boxes may matter, one bit each, and their keys: lower bounds of
     /// the distances of the boxes. Empty slots may be among them.
     fn children<S: Simd>(&self, s: S, lanes: &Self::Constants<S>, node: &WideNode, limit: f32)
     -> (u32, S::F);
     /// Upper bound of the distances of boxes that can still change the result.
-    fn limit(&self) -> f32;
+    #[inline(always)]
+    fn limit(&self) -> f32 {
+        0.0
+    }
     /// The max key of stacked boxes within a limit. Sorting changes the four lowest bits of keys.
     #[inline(always)]
     fn max_key(limit: f32) -> f32 {

@@ -130,7 +130,6 @@ struct RayInstances<'a> {
 
 impl BoxQuery for RayInstances<'_> {
     type Constants<S: Simd> = ();
-    const NEAREST_FIRST: bool = true;
     #[inline(always)]
     fn lanes<S: Simd>(&self, _: S) {}
     #[inline(always)]
@@ -168,7 +167,6 @@ struct PointInstances<'a> {
 
 impl BoxQuery for PointInstances<'_> {
     type Constants<S: Simd> = PointLanes<S>;
-    const NEAREST_FIRST: bool = true;
     #[inline(always)]
     fn lanes<S: Simd>(&self, s: S) -> PointLanes<S> {
         self.point.lanes(s)
@@ -208,10 +206,6 @@ impl BoxQuery for BoxInstances<'_> {
     #[inline(always)]
     fn children<S: Simd>(&self, s: S, lanes: &RegionLanes<S>, node: &WideNode, _limit: f32) -> (u32, S::F) {
         (lanes.children(s, node), s.splat(0.0))
-    }
-    #[inline(always)]
-    fn limit(&self) -> f32 {
-        0.0
     }
 }
 

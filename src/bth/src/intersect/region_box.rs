@@ -2,8 +2,8 @@
 //! *exclude* boxes; triangles are decided by [`super::triangle_box`].
 //!
 //! The boxes of an instance are in the space of its object. Along each axis of world space the
-//! extent of a box is a sum of one interval per axis of the object: the least and the greatest of
-//! the products of the box's ends with an element of the transform.
+//! extent of a box is a sum of one interval per axis of the object: from the min to the max of the
+//! products of the box's ends with an element of the transform.
 
 use super::boxes::{FAR, planes};
 use crate::simd::{Part, Simd};
@@ -39,9 +39,10 @@ impl RegionBox {
             RegionBox { lower, upper, rows: [[0.0; 3]; 3], translation: [[f32::MIN, f32::MAX]; 3] };
         let greatest = f64::from(greatest);
         for (i, [x, y, z, t]) in to_world.iter().enumerate() {
-            let sum = (x.abs() + y.abs() + z.abs()) * greatest + t.abs();
-            // Denormal numbers are rounded by up to 2^-150: products, and elements of the transform.
-            let denormal = f64::from(f32::from_bits(1)) * (4.0 + 3.0 * greatest);
+            let stretch = x.abs() + y.abs() + z.abs();
+            let sum = stretch * greatest + t.abs();
+            // The processor may take denormal numbers for zero: coordinates, elements and products.
+            let denormal = f64::from(f32::MIN_POSITIVE) * (stretch + 3.0 * greatest + 4.0);
             let pad = ROUNDING * (sum + extent) + denormal;
             if sum + pad < LARGEST {
                 region.rows[i] = [*x as f32, *y as f32, *z as f32];

@@ -97,7 +97,6 @@ struct PointTriangles<'a, 'g, 'v> {
 
 impl BoxQuery for PointTriangles<'_, '_, '_> {
     type Constants<S: Simd> = PointLanes<S>;
-    const NEAREST_FIRST: bool = true;
     #[inline(always)]
     fn lanes<S: Simd>(&self, s: S) -> PointLanes<S> {
         self.point.lanes(s)

@@ -53,10 +53,6 @@ impl BoxQuery for BoxTriangles<'_, '_> {
     fn children<S: Simd>(&self, s: S, lanes: &RegionLanes<S>, node: &WideNode, _limit: f32) -> (u32, S::F) {
         (lanes.children(s, node), s.splat(0.0))
     }
-    #[inline(always)]
-    fn limit(&self) -> f32 {
-        0.0
-    }
 }
 
 impl TriangleQuery for BoxTriangles<'_, '_> {

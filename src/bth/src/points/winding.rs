@@ -221,10 +221,6 @@ impl BoxQuery for AxisCrossings {
     fn children<S: Simd>(&self, s: S, _: &(), node: &WideNode, _limit: f32) -> (u32, S::F) {
         (self.ray.children(s, node), s.splat(0.0))
     }
-    #[inline(always)]
-    fn limit(&self) -> f32 {
-        0.0
-    }
 }
 
 impl TriangleQuery for AxisCrossings {

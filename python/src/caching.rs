@@ -79,7 +79,7 @@ pub(crate) fn store(keywords: &Keywords<'_, '_>, default: bool) -> PyResult<Opti
 /// Warns the caller, which fails where warnings are errors.
 pub(crate) fn warn(py: Python<'_>, message: &str) -> PyResult<()> {
     let text = CString::new(message.replace('\0', " ")).unwrap_or_default();
-    // The frame of the package is 1, that of its caller 2.
+    // The frame of the package is 1, the frame of its caller 2.
     PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 2)
 }
 

@@ -280,7 +280,7 @@ fn refuse_input(output: &Path, inputs: &[PathBuf]) -> PyResult<()> {
     }
 }
 
-/// Whether a file is compiled as a scene.
+/// Returns true if a file is compiled as a scene.
 fn is_scene(path: &Path, flatten: bool) -> bool {
     has_extension(path, &["manifest", "toml"]) || has_extension(path, &["gltf", "glb"]) && !flatten
 }

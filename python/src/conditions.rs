@@ -70,7 +70,7 @@ pub(crate) struct Checked {
 }
 
 impl Checked {
-    /// How many threads a call uses that was given so many: one with a filter, which needs the
+    /// Number of threads that a call uses of those it was given: one with a filter, which needs the
     /// interpreter's lock for each hit.
     pub(crate) fn threads(&self, threads: usize) -> usize {
         if self.filter.is_some() { 1 } else { threads }
@@ -78,7 +78,7 @@ impl Checked {
 
     /// Calls `query` for each ray with its index within the rays and what it may hit. `first` is
     /// the index of the first ray in the call. After an exception of the filter, and when the call
-    /// ends early, the rest is left out.
+    /// ends early, skips the rest.
     pub(crate) fn each<R>(
         &self,
         scene: &bth::Scene,
@@ -120,7 +120,7 @@ pub(crate) struct Filter {
 }
 
 impl Filter {
-    /// Whether a hit counts. After an exception none does.
+    /// Returns true if a hit counts. After an exception none does.
     fn accepts(&self, scene: &bth::Scene, ray: usize, hit: &Hit) -> bool {
         if self.failed.load(Ordering::Relaxed) {
             return false;

@@ -3,7 +3,7 @@
 //!
 //! | file | |
 //! |---|---|
-//! | `work` | runs a call's chunks on threads without the interpreter's lock, and lets signals through |
+//! | `work` | runs chunks on threads without the interpreter's lock, and lets signals through |
 //! | `rays`, `output` | arrays to rays, and hits to arrays, chunk by chunk |
 //! | `scene`, `shared` | a scene that threads share |
 //! | `queries`, `many`, `points`, `overlaps` | its queries |

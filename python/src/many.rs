@@ -20,8 +20,8 @@ type Columns<'py> = (
     Bound<'py, PyArray1<u32>>,
 );
 
-/// All hits of rays, or the nearest `most` of each: the number of each ray's, and those of all rays
-/// one after the other.
+/// All hits of rays, or the nearest `most` of each: their number for each ray, and the hits of all
+/// rays one after the other.
 #[pyfunction]
 pub(crate) fn all_hits<'py>(
     py: Python<'py>,

@@ -35,7 +35,7 @@ fn row(scene: &Scene, object: u32, material: u32) -> Option<MaterialRow> {
     ))
 }
 
-/// The materials of an object; `None` for those of which the file keeps no more than the name.
+/// The materials of an object; `None` where the file keeps only the name.
 #[pyfunction]
 pub(crate) fn materials(
     py: Python<'_>,

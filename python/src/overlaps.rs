@@ -89,7 +89,7 @@ impl Regions<'_> {
     }
 }
 
-/// Whether triangles overlap regions, into an array.
+/// Stores which regions overlap triangles.
 #[pyfunction]
 pub(crate) fn overlaps(
     py: Python<'_>,

@@ -143,7 +143,7 @@ impl NativeScene {
     }
 
     /// Gives an object new positions, rows of three; returns the expected cost of rays relative to
-    /// that of the compiled pose.
+    /// the cost in the compiled pose.
     fn set_positions(
         &self,
         py: Python<'_>,
@@ -159,7 +159,7 @@ impl NativeScene {
         })?
     }
 
-    /// As `set_positions`, at a share of the way from the positions of `open` to those of `close`.
+    /// As `set_positions`, at a share of the way from `open` to `close`.
     fn set_positions_between(
         &self,
         py: Python<'_>,
@@ -177,7 +177,7 @@ impl NativeScene {
         })?
     }
 
-    /// Objects whose positions are not those of the file, by their index.
+    /// Indices of the objects whose positions differ from the file.
     fn deformed(&self, py: Python<'_>) -> PyResult<Vec<u32>> {
         self.with(py, |scene| {
             let is_deformed = |object: &u32| {

@@ -30,7 +30,7 @@ impl OpenScene {
         }
         loop {
             // Not `read`, which may panic or wait for ever on a thread that has the lock already,
-            // as that of a filter.
+            // such as the thread of a filter.
             if let Some(scene) = self.try_read() {
                 return Ok(scene);
             }
@@ -57,8 +57,8 @@ impl OpenScene {
         }
     }
 
-    /// Calls `work` with the scene and each of the jobs, on up to so many threads, as [`work::run`]
-    /// does. The scene does not change before all are done.
+    /// Calls `work` with the scene and each of the jobs, on up to `threads` threads, as
+    /// [`work::run`] does. The scene does not change before all are done.
     pub(crate) fn run<J: Send>(
         &self,
         py: Python<'_>,

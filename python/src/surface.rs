@@ -55,7 +55,7 @@ impl Points<'_> {
         self.instance.len()
     }
 
-    /// The triangle of a row; `None` where the array says that there is none.
+    /// The triangle of a row; `None` where the array says so.
     fn primitive(&self, row: usize) -> Option<PrimitiveRef> {
         let primitive = PrimitiveRef { instance: self.instance[row], triangle: self.triangle[row] };
         (primitive != PrimitiveRef::NONE).then_some(primitive)
@@ -87,7 +87,7 @@ impl Points<'_> {
 }
 
 /// The arrays that are asked for, each `None` or as long as there are points, times the numbers of
-/// one. What stands in them remains for points of no triangle, and where the file has nothing to
+/// one. Their contents remain for points of no triangle, and where the file has nothing to
 /// say.
 #[derive(FromPyObject)]
 pub(crate) struct SurfaceArrays<'py> {
@@ -121,7 +121,7 @@ pub(crate) struct SurfaceArrays<'py> {
 
 /// Where the surfaces at some points go.
 struct Columns<'a> {
-    /// Position, geometric normal and shading normal, each in world space and in that of the
+    /// Position, geometric normal and shading normal, each in world space and in the space of the
     /// object.
     vectors: [Option<&'a mut [f64]>; 6],
     texcoord: Option<&'a mut [f32]>,
@@ -132,7 +132,7 @@ struct Columns<'a> {
     opacity: Option<&'a mut [u8]>,
 }
 
-/// An array that is asked for, with so many numbers.
+/// An array that is asked for, with `count` numbers.
 fn column<'a, T: numpy::Element>(
     array: &'a mut Option<PyReadwriteArray1<'_, T>>,
     count: usize,
@@ -172,7 +172,7 @@ fn put<T: Copy, const N: usize>(array: &mut Option<&mut [T]>, row: usize, number
 }
 
 impl<'a> Columns<'a> {
-    /// Whether what is asked for needs the positions of triangles, or their interpolated
+    /// Returns true if what is asked for needs the positions of triangles, or their interpolated
     /// attributes.
     fn needs_surface(&self) -> bool {
         self.texcoord.is_some() || self.vectors.iter().any(Option::is_some)
@@ -253,7 +253,7 @@ pub(crate) fn surface(
     })
 }
 
-/// The vertices of triangles in world space, nine numbers for each, into an array; those of no
+/// The vertices of triangles in world space, nine numbers for each, into an array; rows of no
 /// triangle are left as they are.
 #[pyfunction]
 pub(crate) fn triangle_positions(

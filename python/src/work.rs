@@ -9,21 +9,20 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
-/// How often a call looks for signals such as that of Ctrl-C. It takes the interpreter's lock for
+/// How often a call looks for signals such as Ctrl-C. It takes the interpreter's lock for
 /// this.
 const SIGNALS_EVERY: Duration = Duration::from_millis(50);
 
 thread_local! {
-    /// Whether this thread is the one on which handlers of signals run, as it was found out in the
-    /// process of this number.
+    /// The number of the process, and true if handlers of signals run on this thread there.
     static HANDLES_SIGNALS: Cell<Option<(u32, bool)>> = const { Cell::new(None) };
     /// How many calls this thread is in: more than one where a filter or the handler of a signal
     /// uses a scene.
     static DEPTH: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Whether this thread is inside of a call, as a filter, or the handler of a signal that interrupts
-/// one.
+/// Returns true if this thread is inside of a call, as a filter, or the handler of a signal that
+/// interrupts one.
 pub(crate) fn is_inside_call() -> bool {
     DEPTH.get() > 0
 }
@@ -66,7 +65,7 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
-/// The threads that all calls share, as many as processors. A child process after a fork has none
+/// The threads that all calls share, one for each processor. A child process after a fork has none
 /// of its parent's threads, so it starts its own.
 pub(crate) fn pool() -> Arc<ThreadPool> {
     static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
@@ -153,7 +152,7 @@ impl Watch<'_> {
         Watch(Kind::Caller { looked: Cell::new(Instant::now()), failure: RefCell::new(None) })
     }
 
-    /// Whether the call ends early, so that what remains of the job has no use.
+    /// Returns true if the call ends early, so that the rest of the job has no use.
     pub(crate) fn is_over(&self) -> bool {
         match &self.0 {
             Kind::Pool(stop) => stop.load(Ordering::Relaxed),
@@ -171,8 +170,8 @@ impl Watch<'_> {
         }
     }
 
-    /// Calls `work` with one part of so many rows after the other, until the call ends early. Rows
-    /// that lie together are answered fastest in one part, so parts grow as long as they take
+    /// Calls `work` with the parts of `count` rows one after the other, until the call ends early.
+    /// Rows that lie together are answered fastest in one part, so parts grow as long as they take
     /// little time.
     pub(crate) fn in_parts(&self, rows: usize, mut work: impl FnMut(Range<usize>)) {
         let mut part = 0..rows.min(4);
@@ -193,10 +192,10 @@ impl Watch<'_> {
     }
 }
 
-/// Calls `work` with each of the jobs, on up to so many threads, none of which has the
-/// interpreter's lock. One thread is the caller's own, which must not have the lock either. Ends
-/// early with the exception that the handler of a signal raises; then some of the jobs have not
-/// been done, or not to their ends.
+/// Calls `work` with each of the jobs, on up to `threads` threads without the interpreter's lock.
+/// One thread is the caller's own, which must not have the lock either. Ends early with the
+/// exception that the handler of a signal raises; then some of the jobs have not been done, or not
+/// to their ends.
 pub(crate) fn run<J: Send>(
     threads: usize,
     jobs: Vec<J>,
@@ -283,7 +282,7 @@ fn wait(working: &Working, stop: &AtomicBool) -> PyResult<()> {
     outcome
 }
 
-/// Runs something that stops soon after `cancelled` is set on a thread of its own, without the
+/// Runs something that stops soon after `cancelled` is set on another thread, without the
 /// interpreter's lock. `look` is called every now and then with the interpreter; if it fails, or
 /// the handler of a signal does, `cancelled` is set.
 pub(crate) fn run_cancellable<T: Send>(

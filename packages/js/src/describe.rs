@@ -14,7 +14,7 @@ const NUMBERS: usize = 14;
 /// `scene` is open, and `numbers` points to 14 numbers at a multiple of 4 bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_describe(scene: *const Scene, numbers: *mut [u8; 8]) {
-    // SAFETY: by contract the scene is open, and the address is that of an array of this length;
+    // SAFETY: by contract the scene is open, and `numbers` points to an array of this length;
     // bytes need no alignment.
     let (scene, to) = unsafe { (&*scene, std::slice::from_raw_parts_mut(numbers, NUMBERS)) };
     let objects = scene.object_count();

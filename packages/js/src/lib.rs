@@ -36,7 +36,7 @@ pub extern "C" fn bth_error_length() -> usize {
     LAST_ERROR.with(|last| last.borrow().len())
 }
 
-/// Whether the module was compiled with vector instructions.
+/// Says if the module was compiled with vector instructions.
 #[unsafe(no_mangle)]
 pub extern "C" fn bth_has_vectors() -> u32 {
     (bth::Isa::chosen() != bth::Isa::Scalar).into()

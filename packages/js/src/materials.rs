@@ -22,7 +22,7 @@ pub unsafe extern "C" fn bth_material(
     material: u32,
     words: *mut [u32; MATERIAL_WORDS],
 ) -> u32 {
-    // SAFETY: by contract the scene is open, and the address is that of an array of this length.
+    // SAFETY: by contract the scene is open, and `words` points to an array of this length.
     let (scene, words) = unsafe { (&*scene, &mut *words) };
     let Some(found) = scene.material(object, material) else { return 0 };
     let [r, g, b, a] = found.base_color.map(f32::to_bits);

@@ -50,8 +50,8 @@ pub unsafe extern "C" fn bth_nearest_starts(
 /// # Safety
 /// The contract of [`bth_nearest`].
 unsafe fn nearest<R: TraceRay>(scene: *const Scene, rays: *const R, count: usize, hits: *mut u32) {
-    // SAFETY: by contract the scene is open, and the addresses are those of arrays of these lengths
-    // that do not overlap. All bit patterns are valid for their elements.
+    // SAFETY: by contract the scene is open, and the addresses belong to arrays of these lengths,
+    // which do not overlap. All bit patterns are valid for their elements.
     let (scene, rays, columns) = unsafe {
         let columns = std::slice::from_raw_parts_mut(hits, HIT_COLUMNS * count);
         (&*scene, std::slice::from_raw_parts(rays, count), columns)

@@ -11,9 +11,8 @@ const SURFACE_COLUMNS: usize = 20;
 
 /// The surface at hits: columns of [`SURFACE_COLUMNS`] words a hit. A miss, and all hits if the
 /// file does not keep the vertices of triangles, have numbers of NaN and indices of 2^32 - 1. So
-/// have texture coordinates and materials that the file does not keep. The colour is that of the
-/// material's factor times that at the vertices, without textures, and white where there is
-/// neither.
+/// have texture coordinates and materials that the file does not keep. The colour is the material's
+/// factor times the colour at the vertices, without textures. It is white where there is neither.
 ///
 /// # Safety
 /// `scene` is open, `hits` points to the columns that `bth_nearest` wrote for `count` rays, and
@@ -25,8 +24,8 @@ pub unsafe extern "C" fn bth_surface(
     count: usize,
     surfaces: *mut u32,
 ) {
-    // SAFETY: by contract the scene is open, and the addresses are those of arrays of these lengths
-    // that do not overlap.
+    // SAFETY: by contract the scene is open, and the addresses belong to arrays of these lengths,
+    // which do not overlap.
     let (scene, hits, columns) = unsafe {
         let columns = std::slice::from_raw_parts_mut(surfaces, SURFACE_COLUMNS * count);
         (&*scene, std::slice::from_raw_parts(hits, HIT_COLUMNS * count), columns)

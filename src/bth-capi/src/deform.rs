@@ -128,7 +128,7 @@ pub unsafe extern "C" fn bth_builder_set_positions_between(
 /// Positions at two times from C; `None` if a pointer is null.
 ///
 /// # Safety
-/// `ends` is null or points to two pointers, each of which is as [`slice`] expects it.
+/// `ends` is null or points to two pointers, each as [`slice`] expects it.
 unsafe fn both<'a>(ends: *const [*const [f32; 3]; 2], count: usize) -> Option<[&'a [[f32; 3]]; 2]> {
     // SAFETY: by contract it is null or valid for reads.
     let [open, close] = *unsafe { ends.as_ref() }?;

@@ -83,7 +83,7 @@ unsafe fn with_accept(
 /// # Safety
 /// `scene` is null or open. `rays` and `hits` are null or point to `count` elements. The elements
 /// of `hits` are valid for writes and do not overlap the others. `accept` is null or points to a
-/// struct whose filter is null or meets the contract in `bth.h`.
+/// struct whose filter is null or keeps the contract in `bth.h`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_nearest_accepted(
     scene: *const Scene,
@@ -205,7 +205,7 @@ pub unsafe extern "C" fn bth_all_hits(
         list.needed = needed;
     };
     // SAFETY: the contract of this function includes the contracts of `with_accept` and `store`.
-    // From the second number on `offsets` has as many as there are rays.
+    // After its first number `offsets` has one for each ray.
     unsafe {
         with_accept("bth_all_hits", accept, count, |accept| {
             arguments.store(0, |scene, rays, offsets| store(scene, rays, accept, offsets))

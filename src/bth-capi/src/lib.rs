@@ -70,7 +70,7 @@ fn code_of(error: &Error) -> i32 {
 ///
 /// # Safety
 /// `path` is null or points to a C string; `scene` is null or valid for writes. With the flag
-/// `BTH_MAP` the file must meet the contract of [`runtime::map`] until the scene is closed.
+/// `BTH_MAP` the file must keep the contract of [`runtime::map`] until the scene is closed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_open(path: *const c_char, flags: u32, scene: *mut *mut Scene) -> i32 {
     if scene.is_null() || path.is_null() {
@@ -129,8 +129,8 @@ fn null_argument() -> i32 {
 /// Nearest hits; see `bth.h`.
 ///
 /// # Safety
-/// `scene` is null or open. `rays` and `hits` are each null or point to `count` elements; those of
-/// `hits` are valid for writes and do not overlap the others.
+/// `scene` is null or open. `rays` and `hits` are each null or point to `count` elements. The
+/// elements of `hits` are valid for writes and do not overlap the others.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_nearest(
     scene: *const Scene,
@@ -168,7 +168,7 @@ unsafe fn nearest_of_batch(arguments: Arguments<Ray, Hit>) {
     unsafe { arguments.store(Hit::MISS, |scene, rays, hits| scene.batch(rays).nearest(hits)) };
 }
 
-/// Whether rays hit anything; see `bth.h`.
+/// Stores which rays hit anything; see `bth.h`.
 ///
 /// # Safety
 /// The contract of [`bth_nearest`], with `hit` for `hits`: it is null or points to `count` bytes.

@@ -34,7 +34,7 @@ impl<Q, A: Copy> Arguments<Q, A> {
             return Err(null_argument());
         }
         // SAFETY: the pointers are not null, so by contract `scene` is an open scene and the others
-        // point to `count` elements, and those of `answers` are valid for writes and overlap
+        // point to `count` elements, and the elements of `answers` are valid for writes and overlap
         // nothing.
         unsafe {
             let answers = std::slice::from_raw_parts_mut(answers, count);

@@ -195,8 +195,8 @@ unsafe fn copy_name(name: Option<&str>, buffer: *mut c_char, capacity: usize) ->
     let name = name.unwrap_or_default();
     if !buffer.is_null() && capacity > 0 {
         let stored = name.floor_char_boundary(capacity - 1);
-        // SAFETY: it is not null, so by contract it points to `capacity` bytes, of which `stored +
-        // 1` are written.
+        // SAFETY: it is not null, so by contract it points to `capacity` bytes. `stored + 1` are
+        // written.
         unsafe {
             buffer.cast::<u8>().copy_from_nonoverlapping(name.as_ptr(), stored);
             buffer.add(stored).write(0);

@@ -1,5 +1,5 @@
 //! C interface of the compiler. Its documentation is the header `include/bth_compile.h`, which must
-//! be kept consistent with this crate. It is a library of its own because the runtime does not
+//! be kept consistent with this crate. It is a separate library because the runtime does not
 //! depend on the compiler.
 #![allow(unsafe_code)] // Functions take pointers from C.
 
@@ -121,7 +121,7 @@ pub unsafe extern "C" fn bth_compile_scene(
     options: *const Options,
     bytes: *mut Bytes,
 ) -> i32 {
-    // SAFETY: by contract the arrays, and those of the meshes, are null or valid for reads.
+    // SAFETY: by contract the arrays, and the arrays of the meshes, are null or valid for reads.
     let input = unsafe { scene(meshes, mesh_count, instances, instance_count) };
     // SAFETY: the contract of this function includes the contract of `with_bytes`.
     unsafe {
@@ -134,7 +134,7 @@ pub unsafe extern "C" fn bth_compile_scene(
 /// The meshes and instances of a scene.
 ///
 /// # Safety
-/// The contract of [`Mesh::view`], for these arrays and those of the meshes.
+/// The contract of [`Mesh::view`], for these arrays and the arrays of the meshes.
 unsafe fn scene<'a>(
     meshes: *const Mesh,
     mesh_count: usize,
@@ -250,7 +250,7 @@ unsafe fn with_bytes<T: Sync>(
     code
 }
 
-/// Runs a function in a pool of so many threads; 0 for the pool that all share.
+/// Runs a function in a pool of `threads` threads; 0 for the pool that all share.
 fn in_threads<T: Send>(threads: u32, work: impl FnOnce() -> Result<T, Failure> + Send) -> Result<T, Failure> {
     let no_threads = |which: &str, why: &str| {
         Failure::from(Error::Limit { code: "BTH-L090", message: format!("cannot start {which}: {why}") })

@@ -31,9 +31,8 @@ pub struct SurfacePoint {
     /// As [`Self::geometric_normal`], in the space of the object.
     pub object_geometric_normal: [f64; 3],
     /// The normals of the source at the vertices, interpolated, on whatever side the source has
-    /// them. The geometric normal where the file keeps none, where the object has got new
-    /// positions, where those of the vertices cancel out, and in place of a vertex's normal of
-    /// zeros.
+    /// them. The geometric normal where the file keeps none, where the object has new positions,
+    /// where the normals of the vertices cancel out, and instead of a vertex's normal of zeros.
     pub normal: [f64; 3],
     /// As [`Self::normal`], in the space of the object.
     pub object_normal: [f64; 3],
@@ -156,14 +155,14 @@ impl Scene {
         self.object(object).material_name(material)
     }
 
-    /// The name of an object, that of the scene manifest or of the glTF mesh; empty if the file
-    /// keeps none.
+    /// The name of an object in the scene manifest, or of the glTF mesh; empty if the file keeps
+    /// none.
     pub fn object_name(&self, object: u32) -> &str {
         self.objects().locate(object).map_or("", |(file, row)| file.object_name(row))
     }
 
-    /// Box of the triangles of an object that can be hit, in the space of the object; `None` if
-    /// there are none.
+    /// Box of the triangles of an object that can be hit, in the space of the object; `None` if it
+    /// has no such triangle.
     ///
     /// # Panics
     /// If there is no such object.
@@ -310,7 +309,7 @@ fn triangle(view: &ObjectView<'_>, id: u32) -> Option<[[f32; 3]; 3]> {
     Some(view.grid.map_or(corners, |grid| corners.map(|corner| grid.nearest(corner))))
 }
 
-/// Normals are computed exactly if the error bound of f64 exceeds this share of their greatest
+/// Normals are computed exactly if the error bound of f64 exceeds this share of their largest
 /// component.
 const NORMAL_ERROR: f64 = 1.0 / (1u64 << 40) as f64;
 
@@ -352,7 +351,7 @@ fn transformed(rows: &[[f64; 4]; 3], p: [f64; 3]) -> [f64; 3] {
 }
 
 /// A vector divided by its length; `None` for zero and for what is not finite. It is divided by its
-/// greatest component first, since the squares of components may overflow or underflow.
+/// largest component first, since the squares of components may overflow or underflow.
 fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
     let greatest = v.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     let v = v.map(|x| x / greatest);

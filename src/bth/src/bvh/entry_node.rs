@@ -197,8 +197,7 @@ mod tests {
             .collect()
     }
 
-    /// The leaves below a child code whose boxes, and those of the nodes above, a ray meets, in
-    /// f64.
+    /// The leaves below a child code that a ray reaches through the boxes of nodes, in f64.
     fn leaves(object: &ObjectView<'_>, ray: &Ray, code: u32, out: &mut Vec<u32>) {
         let Some(node) = object.node_base().wide_node(code) else { return out.push(code) };
         for slot in 0..WIDTH {

@@ -100,8 +100,8 @@ pub(crate) fn visit_leaf<S: Simd, V: LeafVisitor<S>>(
     }
 }
 
-/// Returns true if nodes and leaves of an object take at least 64 MiB, more than most caches. A
-/// model of 23 MiB, of which rays visit a small part, would be slower.
+/// Returns true if nodes and leaves of an object take at least 64 MiB, more than most caches. Rays
+/// that visit a small part of a model of 23 MiB would be slower.
 #[inline(always)]
 pub(crate) fn is_large(object: &ObjectView<'_>) -> bool {
     const LINES: usize = 1 << 20;

@@ -11,7 +11,7 @@ use bth_format::object::ObjectBounds;
 /// directions (Wald, Boulos and Shirley, "Ray Tracing Deformable Scenes Using Dynamic Bounding
 /// Volume Hierarchies", TOG 2007).
 ///
-/// A ray meets a plane at the depth (plane - o)·r. An interval of o, widened by a pad on both
+/// A ray reaches a plane at the depth (plane - o)·r. An interval of o, widened by a pad on both
 /// sides, and an interval of r bound it. All operations round monotonically, so only roundings need
 /// the pad. With u = 2^-24 and P a plane, they come to at most 2u|o||r| for the padded end, and to
 /// u|P - o||r| each for the reciprocal, the difference and the product. Clamped components add 4u|P
@@ -109,7 +109,8 @@ mod tests {
     use bth_random::Rng;
     use zerocopy::FromZeros;
 
-    /// The children of a node that the shaft of rays reaches, a bit each, if the rays have a shaft.
+    /// The children of a node that the shaft of rays reaches, one bit each, if the rays have a
+    /// shaft.
     struct ReachedByShaft<'a>(&'a [Ray], &'a WideNode, ObjectBounds);
 
     impl Kernel for ReachedByShaft<'_> {

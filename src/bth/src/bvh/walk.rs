@@ -270,8 +270,8 @@ impl<S: Simd, Q: TriangleQuery> Part<S> for FacesAsLeaves<'_, S, Q> {
     }
 }
 
-/// The triangles of a leaf as bits: at most as many as lanes, even if the count in an unchecked
-/// file is larger.
+/// The triangles of a leaf as bits, at most sixteen even if the count in an unchecked file is
+/// larger.
 #[inline(always)]
 pub(crate) fn all_triangles(block: &impl TriangleBlock) -> u32 {
     1u32.wrapping_shl(block.triangles()).wrapping_sub(1) & (u32::MAX >> WIDTH)

@@ -149,7 +149,7 @@ impl Scene {
     /// Hits are not suited for this: a ray through an edge or a vertex hits all triangles at it,
     /// and a ray in the plane of a triangle does not hit it. Crossings are counted for the ray with
     /// its origin moved by (ε, ε², ε³) in the space of the object, for an infinitely small ε > 0.
-    /// This exact rule never meets an edge, a vertex or a plane. So a line crosses a surface
+    /// This exact rule never hits an edge, a vertex or a plane. So a line crosses a surface
     /// without boundary as often in as out. Of two ranges of t that share an end, `[a, b]` and `[b,
     /// c]`, each crossing is in exactly one: t is compared with the ends exactly, without rounding.
     /// A ray without a line (see [`Scene`]) has no crossings, nor does a ray whose range is empty

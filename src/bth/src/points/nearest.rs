@@ -77,8 +77,8 @@ pub(super) fn search_instance(at: PointInstance<'_>, goal: PointGoal<'_, '_>) ->
         Some(placed) => (placed.point(world_point), placed.slack(world_point)),
     };
     let point = LanePoint::new(point, object.bounds.greatest);
-    // In object space, the least upper bound says nothing about which triangle is closest in world
-    // space; nor does the bound of a triangle of zero area, which is not offered.
+    // In object space, the smallest upper bound says nothing about which triangle is closest in
+    // world space; nor does the bound of a triangle of zero area, which is not offered.
     let only_closest = matches!(goal, PointGoal::Closest(_)) && placed.is_none() && !object.is_deformable();
     run_walk(&ObjectTree::new(object), &mut PointTriangles { at, slack, point, only_closest, goal })
 }

@@ -31,11 +31,11 @@ use bth_format::object::ObjectView;
 /// Results are exact: a ray hits a closed triangle if and only if its line intersects the triangle
 /// in real arithmetic at a t that, rounded to f32 as reported, lies in the closed interval from
 /// `tmin` to `tmax`. Lines in the plane of a triangle do not hit it. Hits in an object are ordered
-/// by t in f64, which is within 2^-28 of the exact one; among equal ones the triangle of least id
-/// is reported. Results depend neither on hints nor on the acceleration structures in the file. In
-/// a file with scene sections, a ray is first transformed into the object's space, where each
-/// component of its origin and direction is rounded to f32 (relative error 2^-24). Among hits of
-/// equal t in several instances that of least index is reported.
+/// by t in f64, which is within 2^-28 of the exact one; among equal ones the triangle with the
+/// smallest id is reported. Results depend neither on hints nor on the acceleration structures in
+/// the file. In a file with scene sections, a ray is first transformed into the object's space,
+/// where each component of its origin and direction is rounded to f32 (relative error 2^-24). Among
+/// hits of equal t in several instances the smallest index is reported.
 ///
 /// In files with opacity (`bthc compile --alpha`) rays pass through the transparent parts of
 /// triangles: nearest and any hits, counts, and all other hits are those on parts that are not
@@ -46,7 +46,7 @@ pub struct Scene {
     objects: Objects,
     /// The instances at the scene's time; `None` if the scene is a file without scene sections.
     world: Option<World>,
-    /// Whether some triangle of some object may let rays pass.
+    /// True if some triangle of some object may let rays pass.
     has_opacity: bool,
     /// The masks of instances and of groups of triangles.
     masks: Masks,
@@ -82,7 +82,7 @@ impl Scene {
         self.world.as_ref()
     }
 
-    /// Whether some triangle of some object may let rays pass.
+    /// Returns true if some triangle of some object may let rays pass.
     pub(crate) fn has_opacity(&self) -> bool {
         self.has_opacity
     }
@@ -312,18 +312,16 @@ impl Scene {
     }
 
     /// Gives an object new positions: one for each vertex of its source, in the source's order, in
-    /// the space of the object. That order is the one of the vertices of a PLY or OFF file and of
-    /// the `v` lines of an OBJ file, that of the corners of an STL file's triangles, that of the
-    /// arrays for triangles from memory, and for glTF that of the vertices of one primitive after
-    /// the other.
+    /// the space of the object. That is the order of the vertices of a PLY or OFF file, of the `v`
+    /// lines of an OBJ file, of the corners of an STL file's triangles, of arrays in memory, and
+    /// for glTF of the vertices of one primitive after the other.
     ///
     /// The boxes of the object's nodes are computed again, by the threads of the current pool with
     /// the feature `rayon`, in memory of the scene's own; the file is not touched, and other scenes
     /// with the same file are not either. All queries of this scene then answer for the new
     /// positions, as exactly as before. Triangles of zero area are not hit and are no part of the
-    /// surface, as in a file that is compiled with these positions. The tree remains that of the
-    /// pose that was compiled: [`Update::deformed_cost_ratio`] tells how much worse it is for the
-    /// new one.
+    /// surface, as in a file that is compiled with these positions. The tree stays as it was
+    /// compiled: [`Update::deformed_cost_ratio`] says how much worse it is for the new pose.
     ///
     /// # Errors
     /// `BTH-O003` if there is no such object, `BTH-S006` if it was not compiled with
@@ -387,11 +385,10 @@ impl Scene {
         }
     }
 
-    /// The positions of an object's vertices at the scene's time: those of the file, or those that
-    /// skins and morph targets or [`Self::set_positions`] have given the object. They are in the
-    /// space of the object, of an object with a skin in world space.
-    /// [`ObjectView::triangles`](bth_format::ObjectView::triangles) refers to them. Empty if the
-    /// file does not keep them (it was compiled with `--no-geometry`).
+    /// The positions of an object's vertices at the scene's time: from the file, or from skins,
+    /// morph targets or [`Self::set_positions`]. They are in the space of the object, of an object
+    /// with a skin in world space. [`ObjectView::triangles`](bth_format::ObjectView::triangles)
+    /// refers to them. Empty if the file does not keep them (it was compiled with `--no-geometry`).
     ///
     /// # Panics
     /// If there is no such object.
@@ -399,8 +396,8 @@ impl Scene {
         self.view(object).positions
     }
 
-    /// The normals at the corners of a triangle, given those of the file, as the deformer of its
-    /// object turns them; of any length. `None` if none deforms the object.
+    /// The file's normals at the corners of a triangle, turned by the deformer of its object; of
+    /// any length. `None` if none deforms the object.
     pub(crate) fn deformed_normals(
         &self,
         object: u32,

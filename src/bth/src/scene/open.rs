@@ -53,7 +53,7 @@ pub fn from_file(file: File) -> Result<Scene, Error> {
 #[allow(unsafe_code)]
 pub unsafe fn map(path: impl AsRef<Path>) -> Result<Scene, Error> {
     let path = path.as_ref();
-    // SAFETY: the caller's contract includes that of `File::map`.
+    // SAFETY: the caller's contract includes the contract of `File::map`.
     let file = unsafe { File::map(path)? };
     with_world(file).map_err(|e| e.in_file(path))
 }

@@ -10,6 +10,7 @@
 
 use super::ray_state::key_limit;
 use super::walk::{BoxQuery, ObjectTree, TriangleQuery, any_in_set, run_walk};
+use crate::intersect::boxes::RaySlabLanes;
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::line::Line;
 use crate::intersect::prepare::PreparedRay;
@@ -69,12 +70,14 @@ struct RayTriangles<'a> {
 }
 
 impl BoxQuery for RayTriangles<'_> {
-    type Constants<S: Simd> = ();
+    type Constants<S: Simd> = RaySlabLanes<S>;
     #[inline(always)]
-    fn lanes<S: Simd>(&self, _: S) {}
+    fn lanes<S: Simd>(&self, s: S) -> RaySlabLanes<S> {
+        RaySlabLanes::new(s, &self.prepared.slabs)
+    }
     #[inline(always)]
-    fn children<S: Simd>(&self, s: S, _: &(), node: &WideNode, limit: f32) -> (u32, S::F) {
-        self.prepared.slabs.children(s, node, limit)
+    fn children<S: Simd>(&self, s: S, lanes: &RaySlabLanes<S>, node: &WideNode, limit: f32) -> (u32, S::F) {
+        lanes.children(s, node, limit)
     }
     #[inline(always)]
     fn limit(&self) -> f32 {
@@ -94,7 +97,7 @@ impl TriangleQuery for RayTriangles<'_> {
     fn triangles<S: Simd, B: TriangleBlock>(
         &mut self,
         s: S,
-        _: &(),
+        _: &RaySlabLanes<S>,
         block: &B,
         ids: &[u32],
         limit: f32,
@@ -104,7 +107,7 @@ impl TriangleQuery for RayTriangles<'_> {
         found.maybe != 0 && pass_triangles(block, found.maybe, ids, self.receiver)
     }
     #[inline(always)]
-    fn tets<S: Simd>(&mut self, _: S, _: &(), object: &ObjectView<'_>, row: u32) -> bool {
+    fn tets<S: Simd>(&mut self, _: S, _: &RaySlabLanes<S>, object: &ObjectView<'_>, row: u32) -> bool {
         pass_faces(object, row, self.ray, self.receiver)
     }
 }

@@ -129,12 +129,14 @@ struct RayInstances<'a> {
 }
 
 impl BoxQuery for RayInstances<'_> {
-    type Constants<S: Simd> = ();
+    type Constants<S: Simd> = RaySlabLanes<S>;
     #[inline(always)]
-    fn lanes<S: Simd>(&self, _: S) {}
+    fn lanes<S: Simd>(&self, s: S) -> RaySlabLanes<S> {
+        RaySlabLanes::new(s, self.slabs)
+    }
     #[inline(always)]
-    fn children<S: Simd>(&self, s: S, _: &(), node: &WideNode, limit: f32) -> (u32, S::F) {
-        entered(s, &RaySlabLanes::new(s, self.slabs), node, limit)
+    fn children<S: Simd>(&self, s: S, lanes: &RaySlabLanes<S>, node: &WideNode, limit: f32) -> (u32, S::F) {
+        entered(s, lanes, node, limit)
     }
     #[inline(always)]
     fn limit(&self) -> f32 {

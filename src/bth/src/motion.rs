@@ -1,31 +1,31 @@
-//! Instances at a scene's time.
+//! The part of [`Scene`] that sets the time and returns the transforms of instances and nodes at that time.
 
 use crate::instances::World;
 use crate::objects::Objects;
-use bth_format::{Code, Error, File};
+use crate::scene::Scene;
+use crate::update::Update;
+use bth_format::{Code, Error, File, SceneView};
 
 /// An instance at the scene's time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InstanceView {
     /// Index of its object; `u32::MAX` if a scene builder has removed the instance.
     pub object: u32,
-    /// Index of the node to which it is attached, in the file of its object; `u32::MAX` in a file
-    /// without scene sections and for instances that the caller of a scene builder has placed.
+    /// Index of the node to which it is attached, in the file of its object; `u32::MAX` in a file without scene sections and for
+    /// instances that the caller of a scene builder has placed.
     pub node: u32,
-    /// Transform from object space to world space: the rows of a 3×4 matrix that is applied to
-    /// columns (x, y, z, 1).
+    /// Transform from object space to world space: the rows of a 3×4 matrix that is applied to columns (x, y, z, 1).
     pub to_world: [[f64; 4]; 3],
-    /// True if rays can hit it: it is neither hidden nor scaled to zero, and its object has
-    /// triangles. Always true in a file without scene sections.
+    /// Whether rays can hit it: it is neither hidden nor scaled to zero, and its object has triangles. Always true in a file
+    /// without scene sections.
     pub visible: bool,
 }
 
-/// Checks the scene sections of a file, and that every visible instance can be placed at the first
-/// frame. Does not check the sections of objects.
+/// Checks the scene sections of a file, and that every visible instance can be placed at the first frame. The sections of objects
+/// are not checked.
 ///
 /// # Errors
-/// The errors of [`File::check_scene`], and `BTH-S001` or `BTH-S002` as in
-/// [`Scene::set_seconds`](crate::Scene::set_seconds).
+/// Those of [`File::check_scene`], and `BTH-S001` or `BTH-S002` as for [`Scene::set_seconds`].
 pub fn check_first_frame(file: &File) -> Result<(), Error> {
     World::new(&Objects::of_file(file.clone())).map(drop)
 }
@@ -36,4 +36,121 @@ pub(crate) fn check_time(seconds: f64) -> Result<(), Error> {
         return Ok(());
     }
     Err(Error::of_call(Code::NotFinite, "a finite time", format!("{seconds}")))
+}
+
+impl Scene {
+    /// The scene sections; `None` if the file has none or a scene builder made the scene.
+    pub fn description(&self) -> Option<SceneView<'_>> {
+        self.world().and_then(|_| self.objects().sole_file()?.scene())
+    }
+
+    /// Time of the scene in seconds: after opening, that of its first frame; 0 without scene sections.
+    pub fn seconds(&self) -> f64 {
+        self.world().map_or(0.0, |world| world.seconds)
+    }
+
+    /// Sets the time of the scene in seconds: evaluates the animation, refits the objects that skins and morph targets deform, places the
+    /// instances that moved and rebuilds the top-level BVH. The time may lie outside of the range of frames; tracks are constant beyond their keys. Without scene sections, and in
+    /// scenes of a scene builder, this has no effect.
+    ///
+    /// # Errors
+    /// `BTH-S001` if the transform of a visible instance cannot be inverted, `BTH-S002` if the transform, the world box or the position of
+    /// a vertex that deforms is not finite in `f32`, or the time is not finite. The error gives the node. The scene is then unchanged.
+    pub fn set_seconds(&mut self, seconds: f64) -> Result<Update, Error> {
+        check_time(seconds)?;
+        let (objects, world) = self.parts_mut();
+        world.as_mut().map_or(Ok(Update::default()), |world| world.update(objects, seconds))
+    }
+
+    /// Sets the time of the scene to that of a frame, which may lie outside of the range of frames.
+    ///
+    /// # Errors
+    /// As [`Self::set_seconds`].
+    pub fn set_frame(&mut self, frame: i32) -> Result<Update, Error> {
+        let rate = self.description().map_or(1.0, |view| view.scene[0].rate);
+        self.set_seconds(f64::from(frame) / rate)
+    }
+
+    /// Number of instances in the scene, visible or not; in a scene of a scene builder, one more than the greatest id that was ever
+    /// committed.
+    pub fn instance_count(&self) -> u32 {
+        self.world().map_or(self.object_count(), |world| world.placements.len() as u32)
+    }
+
+    /// Index of an instance's object; `u32::MAX` if a scene builder has removed the instance.
+    ///
+    /// # Panics
+    /// If there is no such instance.
+    pub fn object_of(&self, instance: u32) -> u32 {
+        let Some(world) = self.world() else {
+            assert!(instance < self.object_count(), "an instance below instance_count");
+            return instance;
+        };
+        world.object_of(self.objects(), instance)
+    }
+
+    /// An instance at the scene's time.
+    ///
+    /// # Panics
+    /// If there is no such instance.
+    pub fn instance(&self, instance: u32) -> InstanceView {
+        let Some(world) = self.world() else {
+            assert!(instance < self.object_count(), "an instance below instance_count");
+            let row = |k: usize| std::array::from_fn(|j| f64::from(u8::from(j == k)));
+            let to_world = [row(0), row(1), row(2)];
+            return InstanceView {
+                object: instance,
+                node: bth_format::layout::NONE,
+                to_world,
+                visible: true,
+            };
+        };
+        let visible = world.placements[instance as usize].is_some();
+        let row = world.row(self.objects(), instance);
+        InstanceView { object: row.object, node: row.node, to_world: row.to_world.rows(), visible }
+    }
+
+    /// The transform from a node's space to world space at the scene's time, as in [`InstanceView::to_world`], and whether the
+    /// node is visible.
+    ///
+    /// # Panics
+    /// If there is no such node, as in a file without scene sections or a scene of a scene builder.
+    pub fn node(&self, node: u32) -> ([[f64; 4]; 3], bool) {
+        self.world().expect("a file with nodes").node(self.objects(), node)
+    }
+
+    /// Transforms a normal from an instance's object space to world space, by the transpose of the inverse. The result is not
+    /// normalized.
+    ///
+    /// # Panics
+    /// In a file with scene sections, if there is no such instance or it is not visible.
+    pub fn normal_to_world(&self, instance: u32, normal: [f64; 3]) -> [f64; 3] {
+        let Some(world) = self.world() else { return normal };
+        let placement = world.placements[instance as usize].as_ref().expect("an instance that can be seen");
+        placement.inverse.normal(normal)
+    }
+
+    /// Lower and upper end of a box in world space that contains an instance and is slightly enlarged to cover roundings; `None`
+    /// if the instance is not visible.
+    ///
+    /// # Panics
+    /// If there is no such instance.
+    pub fn instance_bounds(&self, instance: u32) -> Option<([f32; 3], [f32; 3])> {
+        let Some(world) = self.world() else {
+            let object = self.object(instance).header;
+            return (object.root != bth_format::layout::NONE).then_some((object.lower, object.upper));
+        };
+        world.bounds(self.objects(), instance)
+    }
+
+    /// Number of objects in which rays have been traced since the scene was opened; without scene sections, of all objects.
+    pub fn touched_objects(&self) -> usize {
+        self.world().map_or(self.object_count() as usize, |world| world.traced_objects())
+    }
+
+    /// Bytes on the heap: of the placed instances with the top-level BVH, and of the node hierarchy or the transforms that a scene
+    /// builder was given. Both are 0 for a file without scene sections.
+    pub fn heap_bytes(&self) -> (usize, usize) {
+        self.world().map_or((0, 0), |world| world.bytes())
+    }
 }

@@ -1,66 +1,124 @@
-//! Scenes: what they hold, their time, and new positions of their objects. [`open`](mod@open) opens
-//! compiled files.
+//! Scenes: opening of compiled files, what they hold, and new positions of their objects.
 
-mod open;
+mod deform;
+mod deformers;
 
-pub use self::open::{from_bytes, from_file, map, open};
-
-use crate::clock;
-use crate::deform::Deforming;
-use crate::deformers::normals::corner_normal;
 use crate::instances::World;
 use crate::masks::Masks;
-use crate::motion::{InstanceView, check_time};
 use crate::objects::Objects;
-use crate::update::Update;
-use bth_format::SceneView;
 use bth_format::error::Error;
 use bth_format::file::File;
-use bth_format::layout::NONE;
+use bth_format::layout::kind;
 use bth_format::object::ObjectView;
+use std::path::Path;
 
-/// An open file that can be traced. The instances of a file with scene sections are placed as at a
-/// given time (see [`Scene::set_frame`]). In a file without scene sections, each object has one
-/// instance with the same index, and object space is world space. A scene of several files, whose
-/// instances the caller places, comes from a [`SceneBuilder`](crate::SceneBuilder).
+/// An open file that can be traced. The instances of a file with scene sections are placed as at a given time (see
+/// [`Scene::set_frame`]). In a file without scene sections, each object has one instance with the same index, and object space is
+/// world space. A scene of several files, whose instances the caller places, comes from a
+/// [`SceneBuilder`](crate::SceneBuilder).
 ///
-/// Queries take `&self` and may run on any number of threads at once. A ray hits nothing if its
-/// origin or direction is not finite, its direction is zero, `tmin` or `tmax` is NaN, or `tmin`
-/// exceeds `tmax`.
+/// Queries take `&self` and may run on any number of threads at once. A ray hits nothing if its origin or direction is not
+/// finite, its direction is zero, `tmin` or `tmax` is NaN, or `tmin` exceeds `tmax`.
 ///
-/// Results are exact: a ray hits a closed triangle if and only if its line intersects the triangle
-/// in real arithmetic at a t that, rounded to f32 as reported, lies in the closed interval from
-/// `tmin` to `tmax`. Lines in the plane of a triangle do not hit it. Hits in an object are ordered
-/// by t in f64, which is within 2^-28 of the exact one; among equal ones the triangle with the
-/// smallest id is reported. Results depend neither on hints nor on the acceleration structures in
-/// the file. In a file with scene sections, a ray is first transformed into the object's space,
-/// where each component of its origin and direction is rounded to f32 (relative error 2^-24). Among
-/// hits of equal t in several instances the smallest index is reported.
+/// Results are exact: a ray hits a closed triangle if and only if its line intersects the triangle in real arithmetic at a t
+/// that, rounded to f32 as reported, lies in the closed interval from `tmin` to `tmax`. Lines in the plane of a triangle do not
+/// hit it. Hits in an object are ordered by t in f64, which is within 2^-28 of the exact one; among equal ones the triangle of
+/// least id is reported. Results depend neither on hints nor on the acceleration structures in the file. In a file with scene
+/// sections, a ray is first transformed into the object's space, where
+/// each component of its origin and direction is rounded to f32 (relative error 2^-24). Among hits of equal t in several
+/// instances that of least index is reported.
 ///
-/// In files with opacity (`bthc compile --alpha`) rays pass through the transparent parts of
-/// triangles: nearest and any hits, counts, and all other hits are those on parts that are not
-/// transparent. Crossings, winding numbers, [`Self::contains`] and closest points are about the
-/// surface itself and look at no opacity.
+/// In files with opacity (`bthc compile --alpha`) rays pass through the transparent parts of triangles: nearest and any hits,
+/// counts, and all other hits are those on parts that are not transparent. Crossings, winding numbers, [`Self::contains`] and
+/// closest points are about the surface itself and look at no opacity.
 #[derive(Debug)]
 pub struct Scene {
     objects: Objects,
     /// The instances at the scene's time; `None` if the scene is a file without scene sections.
     world: Option<World>,
-    /// True if some triangle of some object may let rays pass.
+    /// Whether some triangle of some object may let rays pass.
     has_opacity: bool,
     /// The masks of instances and of groups of triangles.
     masks: Masks,
 }
 
+/// Reads a compiled file into memory and checks every index, so that tracing is safe for any contents of the file. The time is
+/// linear in the size of the file. Hashes and geometry are not checked; see [`mod@bth_format::verify`].
+///
+/// # Errors
+/// - `BTH-O…` if the file cannot be read.
+/// - `BTH-F0…` if the header or the section table violates the specification, `BTH-F1…` if the contents of a section do. The error
+///   gives the section and the byte offset.
+/// - `BTH-S…` if an instance cannot be placed at the first frame of the scene.
+pub fn open(path: impl AsRef<Path>) -> Result<Scene, Error> {
+    let path = path.as_ref();
+    Scene::checked(File::read(path)?).map_err(|e| e.in_file(path))
+}
+
+/// As [`open`], for the contents of a file in memory, which are copied.
+///
+/// # Errors
+/// As [`open`].
+pub fn from_bytes(bytes: &[u8]) -> Result<Scene, Error> {
+    Scene::checked(File::from_bytes(bytes)?)
+}
+
+/// As [`open`], for an open file, which is neither copied nor read again.
+///
+/// # Errors
+/// As [`open`], except for those about reading, the header and the section table.
+pub fn from_file(file: File) -> Result<Scene, Error> {
+    Scene::checked(file)
+}
+
+/// Maps a compiled file into memory and checks only its header, section table and scene sections, so the time does not depend on
+/// the size of its objects.
+///
+/// # Safety
+/// Until the scene, and every scene that [`SceneBuilder`](crate::SceneBuilder) makes of it, is dropped, the file must not be written to or truncated (see [`File::map`]). Its contents must be such that
+/// [`open`] accepts them, as those of unchanged files that `bthc` has written. With other contents tracing may panic or not
+/// terminate, but it does not read out of bounds.
+///
+/// # Errors
+/// As [`open`], except for those about the contents of objects.
+#[allow(unsafe_code)]
+pub unsafe fn map(path: impl AsRef<Path>) -> Result<Scene, Error> {
+    let path = path.as_ref();
+    // SAFETY: the caller's contract includes that of `File::map`.
+    let file = unsafe { File::map(path)? };
+    Scene::with_world(file).map_err(|e| e.in_file(path))
+}
+
 impl Scene {
+    /// Checks all sections of a file and opens its scene.
+    fn checked(file: File) -> Result<Scene, Error> {
+        for object in 0..file.object_count() {
+            file.check(object)?;
+        }
+        file.check_object_names()?;
+        file.check_images()?;
+        file.check_segments()?;
+        Scene::with_world(file)
+    }
+
+    /// Checks only the scene sections of a file and opens its scene.
+    fn with_world(file: File) -> Result<Scene, Error> {
+        let has_opacity = file.table().iter().any(|e| e.kind == kind::OPACITY && e.count != 0);
+        let mut objects = Objects::of_file(file);
+        let mut world = World::new(&objects)?;
+        if let Some(world) = &mut world {
+            world.deform_first(&mut objects)?;
+        }
+        Ok(Scene { objects, world, has_opacity, masks: Masks::default() })
+    }
+
     /// A scene of the objects of several files, without objects and instances yet.
     pub(crate) fn of_several_files() -> Scene {
         let (objects, world) = (Objects::of_several_files(), Some(World::empty()));
         Scene { objects, world, has_opacity: false, masks: Masks::default() }
     }
 
-    /// Adds the objects of another scene to a scene of several files; returns the index of the
-    /// first.
+    /// Adds the objects of another scene to a scene of several files; returns the index of the first.
     pub(crate) fn add_objects(&mut self, other: &Scene) -> u32 {
         let first = self.object_count();
         self.objects.add(&other.objects);
@@ -82,7 +140,7 @@ impl Scene {
         self.world.as_ref()
     }
 
-    /// Returns true if some triangle of some object may let rays pass.
+    /// Whether some triangle of some object may let rays pass.
     pub(crate) fn has_opacity(&self) -> bool {
         self.has_opacity
     }
@@ -120,14 +178,13 @@ impl Scene {
     /// The file of the scene.
     ///
     /// # Panics
-    /// If the scene was made by a [`SceneBuilder`](crate::SceneBuilder): its objects come from any
-    /// number of files, see [`Self::file_of`].
+    /// If the scene was made by a [`SceneBuilder`](crate::SceneBuilder): its objects come from any number of files, see
+    /// [`Self::file_of`].
     pub fn file(&self) -> &File {
         self.objects.sole_file().expect("a scene that is a file; `file_of` is for scenes of several files")
     }
 
-    /// The file of an object, and the object's index there, which in a scene that is a file is the
-    /// same.
+    /// The file of an object, and the object's index there, which in a scene that is a file is the same.
     ///
     /// # Panics
     /// If `object` is not less than [`Self::object_count`].
@@ -165,16 +222,15 @@ impl Scene {
         }
     }
 
-    /// The object of a model whose only object was given no new positions and is opaque; `None`
-    /// elsewhere, and before something was traced.
+    /// The object of a model whose only object was given no new positions and is opaque; `None` elsewhere, and before something was
+    /// traced.
     #[inline(always)]
     pub(crate) fn sole_opaque(&self) -> Option<&ObjectView<'_>> {
         if self.world.is_none() && !self.has_opacity { self.objects.sole_view() } else { None }
     }
 
-    /// The object and the index of the only visible instance, if there is exactly one and its
-    /// object space is world space. Rays are then traced directly in the object, without the top
-    /// level.
+    /// The object and the index of the only visible instance, if there is exactly one and its object space is world space. Rays
+    /// are then traced directly in the object, without the top level.
     #[inline(never)]
     pub(crate) fn sole(&self) -> Option<(&ObjectView<'_>, u32)> {
         let Some(world) = &self.world else {
@@ -183,234 +239,6 @@ impl Scene {
         let (instance, object) = world.sole()?;
         world.mark_traced(object);
         Some((self.view(object), instance))
-    }
-
-    /// The scene sections; `None` if the file has none or a scene builder made the scene.
-    pub fn description(&self) -> Option<SceneView<'_>> {
-        self.world().and_then(|_| self.objects().sole_file()?.scene())
-    }
-
-    /// Time of the scene in seconds. After opening it is the time of the first frame; 0 without
-    /// scene sections.
-    pub fn seconds(&self) -> f64 {
-        self.world().map_or(0.0, |world| world.seconds)
-    }
-
-    /// Sets the time of the scene in seconds: evaluates the animation, refits the objects that
-    /// skins and morph targets deform, places the instances that moved and rebuilds the top-level
-    /// BVH. The time may lie outside of the range of frames; tracks are constant beyond their keys.
-    /// Does nothing without scene sections and in scenes of a scene builder.
-    ///
-    /// # Errors
-    /// `BTH-S001` if the transform of a visible instance cannot be inverted. `BTH-S002` if the
-    /// time, or in `f32` a transform, a world box or the position of a vertex that deforms, is not
-    /// finite. The error gives the node. The scene is then unchanged.
-    pub fn set_seconds(&mut self, seconds: f64) -> Result<Update, Error> {
-        check_time(seconds)?;
-        let (objects, world) = self.parts_mut();
-        world.as_mut().map_or(Ok(Update::default()), |world| world.update(objects, seconds))
-    }
-
-    /// Sets the time of the scene to the time of a frame, which may lie outside of the range of
-    /// frames.
-    ///
-    /// # Errors
-    /// The errors of [`Self::set_seconds`].
-    pub fn set_frame(&mut self, frame: i32) -> Result<Update, Error> {
-        let rate = self.description().map_or(1.0, |view| view.scene[0].rate);
-        self.set_seconds(f64::from(frame) / rate)
-    }
-
-    /// Number of instances in the scene, visible or not; in a scene of a scene builder, one more
-    /// than the max id that was ever committed.
-    pub fn instance_count(&self) -> u32 {
-        self.world().map_or(self.object_count(), |world| world.placements.len() as u32)
-    }
-
-    /// Index of an instance's object; `u32::MAX` if a scene builder has removed the instance.
-    ///
-    /// # Panics
-    /// If there is no such instance.
-    pub fn object_of(&self, instance: u32) -> u32 {
-        let Some(world) = self.world() else {
-            assert!(instance < self.object_count(), "an instance below instance_count");
-            return instance;
-        };
-        world.object_of(self.objects(), instance)
-    }
-
-    /// An instance at the scene's time.
-    ///
-    /// # Panics
-    /// If there is no such instance.
-    pub fn instance(&self, instance: u32) -> InstanceView {
-        let Some(world) = self.world() else {
-            assert!(instance < self.object_count(), "an instance below instance_count");
-            let row = |k: usize| std::array::from_fn(|j| f64::from(u8::from(j == k)));
-            let to_world = [row(0), row(1), row(2)];
-            return InstanceView { object: instance, node: NONE, to_world, visible: true };
-        };
-        let visible = world.placements[instance as usize].is_some();
-        let row = world.row(self.objects(), instance);
-        InstanceView { object: row.object, node: row.node, to_world: row.to_world.rows(), visible }
-    }
-
-    /// The transform from a node's space to world space at the scene's time, as in
-    /// [`InstanceView::to_world`], and true if the node is visible.
-    ///
-    /// # Panics
-    /// If there is no such node, as in a file without scene sections or a scene of a scene builder.
-    pub fn node(&self, node: u32) -> ([[f64; 4]; 3], bool) {
-        self.world().expect("a file with nodes").node(self.objects(), node)
-    }
-
-    /// Transforms a normal from an instance's object space to world space, by the transpose of the
-    /// inverse. Does not normalize the result.
-    ///
-    /// # Panics
-    /// In a file with scene sections, if there is no such instance or it is not visible.
-    pub fn normal_to_world(&self, instance: u32, normal: [f64; 3]) -> [f64; 3] {
-        let Some(world) = self.world() else { return normal };
-        let placement = world.placements[instance as usize].as_ref().expect("an instance that can be seen");
-        placement.inverse.normal(normal)
-    }
-
-    /// Lower and upper end of a box in world space that contains an instance, slightly enlarged to
-    /// cover roundings; `None` if the instance is not visible.
-    ///
-    /// # Panics
-    /// If there is no such instance.
-    pub fn instance_bounds(&self, instance: u32) -> Option<([f32; 3], [f32; 3])> {
-        let Some(world) = self.world() else {
-            let object = self.object(instance).header;
-            return (object.root != NONE).then_some((object.lower, object.upper));
-        };
-        world.bounds(self.objects(), instance)
-    }
-
-    /// Number of objects in which rays were traced since the scene was opened; without scene
-    /// sections, the number of all objects.
-    pub fn touched_objects(&self) -> usize {
-        self.world().map_or(self.object_count() as usize, |world| world.traced_objects())
-    }
-
-    /// Bytes on the heap: of the placed instances with the top-level BVH, and of the node hierarchy
-    /// or the transforms that a scene builder was given. Both are 0 for a file without scene
-    /// sections.
-    pub fn heap_bytes(&self) -> (usize, usize) {
-        self.world().map_or((0, 0), |world| world.bytes())
-    }
-
-    /// Number of vertices that [`Self::set_positions`] expects; `None` if the object was not
-    /// compiled with `--deformable`.
-    ///
-    /// # Panics
-    /// If there is no such object.
-    pub fn vertex_count(&self, object: u32) -> Option<usize> {
-        let view = self.view(object);
-        view.is_deformable().then_some(view.positions.len())
-    }
-
-    /// Gives an object new positions: one for each vertex of its source, in the source's order, in
-    /// the space of the object. That is the order of the vertices of a PLY or OFF file, of the `v`
-    /// lines of an OBJ file, of the corners of an STL file's triangles, of arrays in memory, and
-    /// for glTF of the vertices of one primitive after the other.
-    ///
-    /// The boxes of the object's nodes are computed again, by the threads of the current pool with
-    /// the feature `rayon`, in memory of the scene's own; the file is not touched, and other scenes
-    /// with the same file are not either. All queries of this scene then answer for the new
-    /// positions, as exactly as before. Triangles of zero area are not hit and are no part of the
-    /// surface, as in a file that is compiled with these positions. The tree stays as it was
-    /// compiled: [`Update::deformed_cost_ratio`] says how much worse it is for the new pose.
-    ///
-    /// # Errors
-    /// `BTH-O003` if there is no such object, `BTH-S006` if it was not compiled with
-    /// `--deformable`, `BTH-S007` if the number of positions is wrong or one is not finite,
-    /// `BTH-S002` if the world box of an instance would not be finite, `BTH-O001` if there is not
-    /// enough memory. The scene is then unchanged.
-    pub fn set_positions(&mut self, object: u32, positions: &[[f32; 3]]) -> Result<Update, Error> {
-        self.refit_object(object, |deforming| deforming.stage(positions))
-    }
-
-    /// As [`Self::set_positions`], with positions on the straight lines between those at two times:
-    /// at `share` of the way from the first to the second, from 0 to 1. For motion blur, where
-    /// positions are known when the shutter opens and when it closes: set the object to as many
-    /// shares as there are times at which the picture is sampled.
-    ///
-    /// A coordinate is (1 − `share`) · a + `share` · b in `f64`, rounded once to `f32`: exactly a
-    /// or b at the ends, and never beyond them, so that the boxes of both ends together contain all
-    /// that is between. Rays are traced as exactly as against any other positions.
-    ///
-    /// # Errors
-    /// As [`Self::set_positions`], for both ends, and `BTH-S007` if `share` is not from 0 to 1. The
-    /// scene is then unchanged.
-    pub fn set_positions_between(
-        &mut self,
-        object: u32,
-        ends: [&[[f32; 3]]; 2],
-        share: f64,
-    ) -> Result<Update, Error> {
-        self.refit_object(object, |deforming| deforming.stage_between(ends, share))
-    }
-
-    /// Stages positions of an object, refits it, and places its instances again; after an error the
-    /// scene is unchanged.
-    fn refit_object(
-        &mut self,
-        object: u32,
-        stage: impl FnOnce(&mut Deforming) -> Result<(), Error>,
-    ) -> Result<Update, Error> {
-        let start = clock::now();
-        stage(self.objects_mut().deforming(object)?)?;
-        self.refit_staged(object, start)
-    }
-
-    fn refit_staged(&mut self, object: u32, start: Option<std::time::Instant>) -> Result<Update, Error> {
-        let deforming = self.objects_mut().deforming(object)?;
-        deforming.refit_staged();
-        let (refit, deformed_cost_ratio) = (clock::elapsed(start), deforming.cost_ratio());
-        let (objects, world) = self.objects_and_world_mut();
-        let placed = match world {
-            Some(world) => world.place_again(objects, &[object]),
-            None => Ok(Update { visible: objects.count() as usize, ..Update::default() }),
-        };
-        match placed {
-            Ok(update) => Ok(Update { deformed: 1, deformed_cost_ratio, refit, ..update }),
-            Err(failed) => {
-                self.objects_mut().deforming(object)?.undo();
-                let (code, expected, found) = failed.error.words();
-                let found = format!("{found}: instance {}", failed.instance);
-                Err(Error::of_call(code, expected, found))
-            }
-        }
-    }
-
-    /// The positions of an object's vertices at the scene's time: from the file, or from skins,
-    /// morph targets or [`Self::set_positions`]. They are in the space of the object, of an object
-    /// with a skin in world space. [`ObjectView::triangles`](bth_format::ObjectView::triangles)
-    /// refers to them. Empty if the file does not keep them (it was compiled with `--no-geometry`).
-    ///
-    /// # Panics
-    /// If there is no such object.
-    pub fn positions(&self, object: u32) -> &[[f32; 3]] {
-        self.view(object).positions
-    }
-
-    /// The file's normals at the corners of a triangle, turned by the deformer of its object; of
-    /// any length. `None` if none deforms the object.
-    pub(crate) fn deformed_normals(
-        &self,
-        object: u32,
-        triangle: u32,
-        normals: [[f32; 3]; 3],
-    ) -> Option<[[f64; 3]; 3]> {
-        let pose = self.world()?.deformers.pose_of(object)?;
-        let (file, row) = self.file_of(object);
-        let view = self.view(object);
-        let (corners, vertices) =
-            (view.corners.get(triangle as usize)?, view.triangles.get(triangle as usize)?);
-        let deformation = file.deformation(row);
-        Some([0, 1, 2].map(|k| corner_normal(&deformation, pose, (corners[k], normals[k]), vertices[k])))
     }
 
     /// Size in bytes of the sections that traversal reads.

@@ -3,6 +3,7 @@
 
 use super::World;
 use super::box_tests::{entered, limit, widened_slabs};
+use super::instance_list::{InstanceList, Visit};
 use super::top_level::TopLevel;
 use super::top_nodes::INSTANCE;
 use crate::bvh::ray_state::key_limit;
@@ -18,15 +19,11 @@ use crate::simd::{Isa, Kernel, Simd};
 use bth_format::layout::WideNode;
 use std::hint::black_box;
 
-/// Receiver of instances: returns the max t, rounded to f32, of hits that can still change the
-/// result, or `None` to end.
-type Receive<'a> = &'a mut dyn FnMut(u32) -> Option<f32>;
-
 impl World {
     /// Calls `visit` with each visible instance whose box a ray in world space may enter within its
     /// range of t, nearer boxes first. Instances beyond what `visit` returns may be skipped.
     /// Returns true if `visit` has ended the enumeration.
-    pub(crate) fn enumerate(&self, ray: &Ray, visit: Receive<'_>) -> bool {
+    pub(crate) fn enumerate(&self, ray: &Ray, visit: Visit<'_>) -> bool {
         let top = &self.top;
         // False for NaN, too.
         let has_range = ray.tmin <= ray.tmax;
@@ -100,7 +97,7 @@ fn slabs<S: Simd>(s: S, ray: &Ray, top: &TopLevel) -> Option<RaySlabs> {
 struct RayKernel<'a> {
     top: &'a TopLevel,
     ray: &'a Ray,
-    visit: Receive<'a>,
+    visit: Visit<'a>,
 }
 
 impl Kernel for RayKernel<'_> {
@@ -114,6 +111,13 @@ impl Kernel for RayKernel<'_> {
         // it.
         let slabs = black_box(&slabs);
         let last = limit(slabs.scale, ray.tmax);
+        // Lists save visits, but elsewhere they take longer than that.
+        if S::HAS_FAST_COMPRESS
+            && ray.tmin >= 0.0
+            && let Some(list) = InstanceList::of(s, top, slabs, last)
+        {
+            return list.visit(slabs.scale, ray.tmax, visit);
+        }
         let mut query = RayInstances { slabs, tmax: ray.tmax, last, visit };
         walk(s, top, &mut query, &mut SingleStack::new())
     }
@@ -125,7 +129,7 @@ struct RayInstances<'a> {
     /// Max t of hits that can still change the result, and their max depth.
     tmax: f32,
     last: f32,
-    visit: Receive<'a>,
+    visit: Visit<'a>,
 }
 
 impl BoxQuery for RayInstances<'_> {

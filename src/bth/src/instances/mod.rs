@@ -8,7 +8,7 @@
 //! [`met_by_lanes`]) and the rest with stacks ([`traverse`]); the answers so far end them ([`progress`]). Each visit of an instance by a
 //! ray is queued ([`visit_queue`]); the rays of an object's visits are transformed into its space ([`enter_object`]) and traced there
 //! together, with t unchanged. A single ray ([`one_ray`]), and one whose query reports several hits, goes through the top level alone
-//! ([`enumerate`]).
+//! ([`enumerate`], [`instance_list`]).
 
 mod batch;
 mod box_tests;

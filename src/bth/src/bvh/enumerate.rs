@@ -10,7 +10,7 @@
 
 use super::ray_state::key_limit;
 use super::walk::{BoxQuery, ObjectTree, TriangleQuery, any_in_set, run_walk};
-use crate::intersect::boxes::RaySlabLanes;
+use crate::intersect::boxes::{RaySlabLanes, RaySlabs};
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::line::Line;
 use crate::intersect::prepare::PreparedRay;
@@ -69,15 +69,16 @@ struct RayTriangles<'a> {
     receiver: &'a mut dyn Receiver,
 }
 
-impl BoxQuery for RayTriangles<'_> {
-    type Constants<S: Simd> = RaySlabLanes<S>;
+impl<'a> BoxQuery for RayTriangles<'a> {
+    /// Numbers, not vectors: instructions broadcast them from memory, and no leaf stores and loads them.
+    type Constants<S: Simd> = &'a RaySlabs;
     #[inline(always)]
-    fn lanes<S: Simd>(&self, s: S) -> RaySlabLanes<S> {
-        RaySlabLanes::new(s, &self.prepared.slabs)
+    fn lanes<S: Simd>(&self, _: S) -> &'a RaySlabs {
+        &self.prepared.slabs
     }
     #[inline(always)]
-    fn children<S: Simd>(&self, s: S, lanes: &RaySlabLanes<S>, node: &WideNode, limit: f32) -> (u32, S::F) {
-        lanes.children(s, node, limit)
+    fn children<S: Simd>(&self, s: S, slabs: &&'a RaySlabs, node: &WideNode, limit: f32) -> (u32, S::F) {
+        RaySlabLanes::new(s, slabs).children(s, node, limit)
     }
     #[inline(always)]
     fn limit(&self) -> f32 {
@@ -92,12 +93,12 @@ impl BoxQuery for RayTriangles<'_> {
     }
 }
 
-impl TriangleQuery for RayTriangles<'_> {
+impl<'a> TriangleQuery for RayTriangles<'a> {
     #[inline(always)]
     fn triangles<S: Simd, B: TriangleBlock>(
         &mut self,
         s: S,
-        _: &RaySlabLanes<S>,
+        _: &&'a RaySlabs,
         block: &B,
         ids: &[u32],
         limit: f32,
@@ -107,7 +108,7 @@ impl TriangleQuery for RayTriangles<'_> {
         found.maybe != 0 && pass_triangles(block, found.maybe, ids, self.receiver)
     }
     #[inline(always)]
-    fn tets<S: Simd>(&mut self, _: S, _: &RaySlabLanes<S>, object: &ObjectView<'_>, row: u32) -> bool {
+    fn tets<S: Simd>(&mut self, _: S, _: &&'a RaySlabs, object: &ObjectView<'_>, row: u32) -> bool {
         pass_faces(object, row, self.ray, self.receiver)
     }
 }

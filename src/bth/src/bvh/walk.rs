@@ -16,7 +16,7 @@ use bth_format::object::{NodeBase, ObjectView};
 
 /// Which boxes of a tree may matter to a query.
 pub(crate) trait BoxQuery {
-    /// Constants of the query in lanes, which a walk keeps at hand from leaf to leaf.
+    /// Constants of the query in lanes, which a walk keeps at hand.
     type Constants<S: Simd>: Copy;
     /// True if nearer boxes are entered first. Otherwise keys and limits are not used.
     const NEAREST_FIRST: bool = true;
@@ -92,14 +92,12 @@ pub(crate) fn walk<S: Simd, Q: BoxQuery>(
     query: &mut Q,
     stack: &mut SingleStack,
 ) -> bool {
+    let lanes = query.lanes(s);
     let mut code = tree.root();
     let mut stack = stack.start(code);
     let mut limit = query.limit();
     let mut max_key = Q::max_key(limit);
     loop {
-        // Again after each leaf: the vectors then stay in registers from node to node, and are not
-        // stored before each leaf and loaded after it.
-        let lanes = query.lanes(s);
         while code & Child::LEAF_BIT == 0 {
             let node = tree.node(code);
             let (bits, keys) = query.children(s, &lanes, node, limit);

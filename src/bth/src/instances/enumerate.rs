@@ -132,15 +132,16 @@ struct RayInstances<'a> {
     visit: Visit<'a>,
 }
 
-impl BoxQuery for RayInstances<'_> {
-    type Constants<S: Simd> = RaySlabLanes<S>;
+impl<'a> BoxQuery for RayInstances<'a> {
+    /// Numbers, not vectors: instructions broadcast them from memory, and no leaf stores and loads them.
+    type Constants<S: Simd> = &'a RaySlabs;
     #[inline(always)]
-    fn lanes<S: Simd>(&self, s: S) -> RaySlabLanes<S> {
-        RaySlabLanes::new(s, self.slabs)
+    fn lanes<S: Simd>(&self, _: S) -> &'a RaySlabs {
+        self.slabs
     }
     #[inline(always)]
-    fn children<S: Simd>(&self, s: S, lanes: &RaySlabLanes<S>, node: &WideNode, limit: f32) -> (u32, S::F) {
-        entered(s, lanes, node, limit)
+    fn children<S: Simd>(&self, s: S, slabs: &&'a RaySlabs, node: &WideNode, limit: f32) -> (u32, S::F) {
+        entered(s, &RaySlabLanes::new(s, slabs), node, limit)
     }
     #[inline(always)]
     fn limit(&self) -> f32 {

@@ -1,4 +1,4 @@
-//! Crossings and winding numbers on hard surfaces, checked exactly; `bth-bench inside` asks for
+//! Crossings and winding numbers on hard surfaces, checked exactly; `bth-bench stress` asks for
 //! many more points, of scans.
 
 use bth::rays::Ray;

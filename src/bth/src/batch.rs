@@ -1,9 +1,10 @@
 //! Queries of many rays in one call.
 
 use crate::hits::Accept;
+use crate::query::sink::Answers;
 use crate::rays::{Hit, Ray};
 use crate::scene::Scene;
-use crate::start_queries::TraceRay;
+use crate::trace::TraceRay;
 
 /// Rays in world space that are traced together, with options: [`Ray`]s, or [`StartRay`](crate::rays::StartRay)s. Made by [`Scene::batch`].
 ///
@@ -38,21 +39,18 @@ pub struct RayBatch<'a, R: TraceRay = Ray> {
 #[cfg(feature = "rayon")]
 const TASK: usize = 4096;
 
-impl Scene {
-    /// A batch of rays, to be traced by [`RayBatch::nearest`] or [`RayBatch::any`].
+impl<'a, R: TraceRay> RayBatch<'a, R> {
     #[inline]
-    pub fn batch<'a, R: TraceRay>(&'a self, rays: &'a [R]) -> RayBatch<'a, R> {
+    pub(crate) fn new(scene: &'a Scene, rays: &'a [R]) -> Self {
         RayBatch {
-            scene: self,
+            scene,
             rays,
             accept: None,
             #[cfg(feature = "rayon")]
             parallel: false,
         }
     }
-}
 
-impl<'a, R: TraceRay> RayBatch<'a, R> {
     /// Sets what the rays are allowed to hit; by default everything, whatever the masks of the scene. Where something is excluded, rays
     /// are traced one at a time, as by [`Scene::nearest_accepted`].
     #[inline]
@@ -74,10 +72,10 @@ impl<'a, R: TraceRay> RayBatch<'a, R> {
     // What a single ray needs is inlined into the caller: what is not asked for, such as conditions, then takes no time.
     #[inline(always)]
     pub fn nearest(self, hits: &mut [Hit]) {
-        self.check_lengths(hits.len());
+        assert_eq!(self.rays.len(), hits.len(), "as many results as rays");
         match (self.rays, &mut *hits, self.accept) {
-            ([ray], [hit], None) => ray.store_nearest(self.scene, hit),
-            _ => self.nearest_of_many(hits),
+            ([ray], [hit], None) => self.scene.store_nearest(ray, hit),
+            _ => self.trace(Answers::Nearest(hits)),
         }
     }
 
@@ -87,47 +85,31 @@ impl<'a, R: TraceRay> RayBatch<'a, R> {
     /// As [`Self::nearest`].
     #[inline(always)]
     pub fn any(self, found: &mut [bool]) {
-        self.check_lengths(found.len());
+        assert_eq!(self.rays.len(), found.len(), "as many results as rays");
         match (self.rays, &mut *found, self.accept) {
-            ([ray], [found], None) => *found = ray.any(self.scene),
-            _ => self.any_of_many(found),
+            ([ray], [found], None) => *found = self.scene.hits_any(ray),
+            _ => self.trace(Answers::Any(found)),
         }
     }
 
-    /// As [`Self::nearest`], for any number of rays and any conditions.
+    /// Stores the answers of any number of rays under any conditions.
     #[inline(never)]
-    fn nearest_of_many(self, hits: &mut [Hit]) {
+    fn trace(self, answers: Answers<'_>) {
         #[cfg(feature = "rayon")]
         if self.parallel {
-            return self.in_tasks(hits, |part, hits| part.nearest_of_many(hits));
+            return match answers {
+                Answers::Nearest(hits) => {
+                    self.in_tasks(hits, |part, hits| part.trace(Answers::Nearest(hits)))
+                }
+                Answers::Any(found) => self.in_tasks(found, |part, found| part.trace(Answers::Any(found))),
+            };
         }
-        match self.conditions() {
-            None => R::nearest_of(self.scene, self.rays, hits),
-            Some(accept) => self.scene.nearest_accepted_batch(self.rays, accept, hits),
+        let (scene, rays) = (self.scene, self.rays);
+        match (self.accept.filter(|accept| !scene.accepts_everything(accept)), answers) {
+            (None, answers) => scene.trace(rays, answers),
+            (Some(accept), Answers::Nearest(hits)) => scene.nearest_accepted_batch(rays, accept, hits),
+            (Some(accept), Answers::Any(found)) => scene.any_accepted_batch(rays, accept, found),
         }
-    }
-
-    /// As [`Self::any`], for any number of rays and any conditions.
-    #[inline(never)]
-    fn any_of_many(self, found: &mut [bool]) {
-        #[cfg(feature = "rayon")]
-        if self.parallel {
-            return self.in_tasks(found, |part, found| part.any_of_many(found));
-        }
-        match self.conditions() {
-            None => R::any_of(self.scene, self.rays, found),
-            Some(accept) => self.scene.any_accepted_batch(self.rays, accept, found),
-        }
-    }
-
-    /// What the rays are allowed to hit; `None` if that is everything.
-    fn conditions(&self) -> Option<&'a Accept<'a>> {
-        self.accept.filter(|accept| !self.scene.accepts_everything(accept))
-    }
-
-    #[inline(always)]
-    fn check_lengths(&self, results: usize) {
-        assert_eq!(self.rays.len(), results, "as many results as rays");
     }
 
     /// Calls `trace` for each part of the rays and its results, in parallel.

@@ -145,6 +145,9 @@ impl Hit {
     /// The result for a ray that hits nothing.
     pub const MISS: Hit = Hit { t: f32::INFINITY, u: 0.0, v: 0.0, primitive: PrimitiveRef::NONE };
 
+    /// The result for a ray that hits something, where only that is asked.
+    pub(crate) const SOME: Hit = Hit { t: 0.0, ..Hit::MISS };
+
     /// The point of the surface that was hit, at which another ray may start; [`Start::NONE`] for a miss.
     pub const fn start(&self) -> Start {
         Start { primitive: self.primitive, u: self.u, v: self.v }

@@ -1,7 +1,6 @@
-//! Queries of rays whose components are arrays of their own, as other tracers and array languages keep them.
+//! Rays and hits whose components are separate arrays, as other tracers and array languages keep them.
 
-use crate::rays::{Hit, PrimitiveRef, Ray};
-use crate::scene::Scene;
+use crate::rays::{Hit, Ray};
 
 /// Rays in world space, each component an array with one element for each ray.
 #[derive(Clone, Copy, Debug)]
@@ -39,7 +38,7 @@ impl RayStreams<'_> {
     ///
     /// # Panics
     /// If the arrays differ in length.
-    fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         let len = self.origin[0].len();
         assert!(self.origin.iter().chain(&self.direction).all(|c| c.len() == len), "arrays of one length");
         assert!([self.tmin, self.tmax].iter().all(|c| c.is_empty() || c.len() == len), "one range a ray");
@@ -54,7 +53,7 @@ impl RayStreams<'_> {
     }
 
     /// Calls `trace` with the rays of each block and the index of the first.
-    fn in_blocks(&self, mut trace: impl FnMut(usize, &[Ray])) {
+    pub(crate) fn in_blocks(&self, mut trace: impl FnMut(usize, &[Ray])) {
         let mut rays = Vec::with_capacity(BLOCK);
         let len = self.len();
         for first in (0..len).step_by(BLOCK) {
@@ -65,47 +64,20 @@ impl RayStreams<'_> {
     }
 }
 
-impl Scene {
-    /// As [`RayBatch::nearest`](crate::RayBatch::nearest), from arrays into arrays.
-    ///
-    /// ```no_run
-    /// use bth::{HitStreams, RayStreams};
-    ///
-    /// let scene = bth::open("bunny.bth")?;
-    /// let (zero, one) = ([0.0; 4], [1.0; 4]);
-    /// let rays = RayStreams { origin: [&[0.1, 0.2, 0.3, 0.4], &zero, &zero], direction: [&zero, &zero, &one], tmin: &[], tmax: &[] };
-    /// let (mut t, mut u, mut v) = ([0.0; 4], [0.0; 4], [0.0; 4]);
-    /// let (mut instance, mut triangle) = ([0; 4], [0; 4]);
-    /// let hits = HitStreams { t: &mut t, u: &mut u, v: &mut v, instance: &mut instance, triangle: &mut triangle };
-    /// scene.nearest_streams(&rays, hits);
-    /// println!("{t:?}");
-    /// # Ok::<(), bth::Error>(())
-    /// ```
-    ///
+impl HitStreams<'_> {
     /// # Panics
-    /// If the arrays differ in length.
-    pub fn nearest_streams(&self, rays: &RayStreams<'_>, hits: HitStreams<'_>) {
-        let HitStreams { t, u, v, instance, triangle } = hits;
+    /// If the arrays do not all have this length.
+    pub(crate) fn check_lengths(&self, rays: usize) {
+        let HitStreams { t, u, v, instance, triangle } = self;
         let lengths = [t.len(), u.len(), v.len(), instance.len(), triangle.len()];
-        assert_eq!(lengths, [rays.len(); 5], "as many results as rays");
-        let mut block = vec![Hit::MISS; BLOCK];
-        rays.in_blocks(|first, rays| {
-            let block = &mut block[..rays.len()];
-            self.batch(rays).nearest(block);
-            for (i, hit) in block.iter().enumerate() {
-                let PrimitiveRef { instance: of_hit, triangle: id } = hit.primitive;
-                (t[first + i], u[first + i], v[first + i]) = (hit.t, hit.u, hit.v);
-                (instance[first + i], triangle[first + i]) = (of_hit, id);
-            }
-        });
+        assert_eq!(lengths, [rays; 5], "as many results as rays");
     }
 
-    /// As [`RayBatch::any`](crate::RayBatch::any), from arrays.
-    ///
-    /// # Panics
-    /// If the arrays differ in length.
-    pub fn any_streams(&self, rays: &RayStreams<'_>, found: &mut [bool]) {
-        assert_eq!(found.len(), rays.len(), "as many results as rays");
-        rays.in_blocks(|first, rays| self.batch(rays).any(&mut found[first..first + rays.len()]));
+    /// Stores the hits of the rays from `first` on.
+    pub(crate) fn store(&mut self, first: usize, hits: &[Hit]) {
+        for (i, &Hit { t, u, v, primitive }) in (first..).zip(hits) {
+            (self.t[i], self.u[i], self.v[i]) = (t, u, v);
+            (self.instance[i], self.triangle[i]) = (primitive.instance, primitive.triangle);
+        }
     }
 }

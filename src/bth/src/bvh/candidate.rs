@@ -9,7 +9,7 @@ use crate::intersect::start::start_on;
 use crate::intersect::start::{StartDecision, decide_start, decide_start_exactly};
 use crate::intersect::start_point::ExactRay;
 use crate::intersect::start_point::StartPoint;
-use crate::query::{Query, TriangleRef};
+use crate::query::{Goal, RayQuery, TriangleRef};
 use crate::rays::Ray;
 use crate::simd::{Part, Scalar, Simd};
 use bth_format::layout::NONE;
@@ -94,16 +94,16 @@ impl Reader for ReadCorners {
 /// Offers candidates of a ray to its query: the pending hit, then the triangles of the leaf with child code `leaf` whose bit is set
 /// in `triangles`. Its output is whether the query is complete. All traversals decide here, in f64 and where that is uncertain exactly,
 /// what the f32 filter leaves open.
-pub(crate) struct Settle<'a, Q> {
+pub(crate) struct Settle<'a, G> {
     pub(crate) object: &'a ObjectView<'a>,
     pub(crate) ray: ExactRay<'a>,
     pub(crate) pending: Candidate,
     /// `leaf` and `triangles`.
     pub(crate) of_leaf: (u32, u32),
-    pub(crate) query: &'a mut Q,
+    pub(crate) query: &'a mut RayQuery<G>,
 }
 
-impl<S: Simd, Q: Query> Part<S> for Settle<'_, Q> {
+impl<S: Simd, G: Goal> Part<S> for Settle<'_, G> {
     type Output = bool;
     #[inline(always)]
     fn run(self, s: S) -> bool {
@@ -130,12 +130,12 @@ impl<S: Simd, Q: Query> Part<S> for Settle<'_, Q> {
 
 /// Offers a candidate of a ray to its query; returns whether the query is complete.
 #[inline(always)]
-fn settle_one<S: Simd, Q: Query>(
+fn settle_one<S: Simd, G: Goal>(
     s: S,
     object: &ObjectView<'_>,
     ray: &Ray,
     candidate: Candidate,
-    query: &mut Q,
+    query: &mut RayQuery<G>,
 ) -> bool {
     let Some((index, corners)) = candidate.read(object, ReadCorners) else { return false };
     let mut wide_corners = [[0.0; 3]; 3];
@@ -159,11 +159,11 @@ fn settle_one<S: Simd, Q: Query>(
 
 /// As [`settle_one`], for a ray that starts on a triangle.
 #[inline(never)]
-fn settle_from_start<Q: Query>(
+fn settle_from_start<G: Goal>(
     object: &ObjectView<'_>,
     (ray, start): (&Ray, &StartPoint),
     candidate: Candidate,
-    query: &mut Q,
+    query: &mut RayQuery<G>,
 ) -> bool {
     let Some((index, corners)) = candidate.read(object, ReadCorners) else { return false };
     let intersection = match decide_start(start.origin, wide(ray.direction), corners.map(wide)) {

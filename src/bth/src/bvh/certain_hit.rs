@@ -5,8 +5,8 @@ use crate::intersect::exact::{reported, reported_barycentric};
 use crate::intersect::exact_quad::rounded_intersection;
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::start_point::ExactRay;
-use crate::query::Query;
-use crate::rays::PrimitiveRef;
+use crate::query::{Goal, RayQuery};
+use crate::rays::{Hit, PrimitiveRef};
 use crate::simd::Simd;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
@@ -14,13 +14,13 @@ use bth_format::object::ObjectView;
 /// Stores the answer of a ray of which the filter is sure that its nearest hit is this candidate, within the ray's range. `norm` is
 /// the greatest |component| of its direction, and `instance` is reported with the hit.
 #[inline(always)]
-pub(crate) fn store_certain_hit<S: Simd, Q: Query>(
+pub(crate) fn store_certain_hit<S: Simd, G: Goal>(
     s: S,
     object: &ObjectView<'_>,
     exact_ray: ExactRay<'_>,
     (candidate, norm): (Candidate, f32),
-    goal: Q::Goal,
-    (answer, instance): (&mut Q::Answer, u32),
+    goal: G,
+    (hit, instance): (&mut Hit, u32),
 ) {
     if let Some(leaf) = object.node_base().indexed_leaf(candidate.leaf) {
         let (corners, (ray, start)) = (leaf.corners(candidate.triangle as usize), exact_ray);
@@ -33,13 +33,13 @@ pub(crate) fn store_certain_hit<S: Simd, Q: Query>(
             let primitive = PrimitiveRef { instance, triangle: object.triangle_ids[index as usize] };
             let [second, third, _] = rounded.weight;
             let [u, v] = [second, third].map(|w| reported_barycentric(w * rounded.inverse));
-            *answer = Q::answer_of(primitive, reported(rounded.t), u, v);
+            *hit = Hit { t: reported(rounded.t), u, v, primitive };
             return;
         }
     }
     // Leaves of other formats, and where f64 leaves t, u or v inaccurate.
-    let mut query = Q::new(goal, exact_ray.0);
+    let mut query = RayQuery::new(goal, exact_ray.0);
     let (pending, of_leaf) = (candidate, (NONE, 0));
     s.call(Settle { object, ray: exact_ray, pending, of_leaf, query: &mut query });
-    *answer = query.answer(object.triangle_ids, instance);
+    *hit = query.answer(object.triangle_ids, instance);
 }

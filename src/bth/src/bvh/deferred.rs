@@ -8,7 +8,7 @@ use crate::intersect::filter::TriangleBlock;
 use crate::intersect::origin::RoundedOrigin;
 use crate::intersect::prepare::gather_rays;
 use crate::query::sink::Sink;
-use crate::query::{Goal, Query};
+use crate::query::{Goal, NearestHit, RayQuery};
 use crate::rays::Ray;
 use crate::simd::{LANES, Part, Simd};
 use bth_format::layout::{NONE, WIDTH};
@@ -45,14 +45,14 @@ impl Reader for StoreCorners<'_> {
 }
 
 /// [`DeferredHits::flush`] as a part of kernels.
-struct Flush<'a, 's, Q: Query> {
+struct Flush<'a, 's> {
     deferred: &'a mut DeferredHits,
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
-    sink: &'a mut Sink<'s, Q>,
+    sink: &'a mut Sink<'s>,
 }
 
-impl<S: Simd, Q: Query> Part<S> for Flush<'_, '_, Q> {
+impl<S: Simd> Part<S> for Flush<'_, '_> {
     type Output = ();
     #[inline(always)]
     fn run(self, s: S) {
@@ -74,16 +74,16 @@ impl DeferredHits {
 
     /// Adds a finished ray, or stores its answer at once if it has no pending hit.
     #[inline(always)]
-    pub(crate) fn add<S: Simd, Q: Query>(
+    pub(crate) fn add<S: Simd, G: Goal>(
         &mut self,
         s: S,
         object: &ObjectView<'_>,
         rays: &[Ray],
-        state: &RayState<Q>,
-        sink: &mut Sink<'_, Q>,
+        state: &RayState<G>,
+        sink: &mut Sink<'_>,
     ) {
         let (ray, candidate) = (state.ray(), state.pending());
-        if sink.goal().is_any() || candidate.leaf == NONE {
+        if state.goal().is_any() || candidate.leaf == NONE {
             return state.report(sink);
         }
         let lane = self.count % LANES;
@@ -100,15 +100,14 @@ impl DeferredHits {
 
     /// Computes the pending hits of all rays that were added, and stores their answers.
     #[inline(always)]
-    pub(crate) fn flush<S: Simd, Q: Query>(
+    pub(crate) fn flush<S: Simd>(
         &mut self,
         s: S,
         object: &ObjectView<'_>,
         rays: &[Ray],
-        sink: &mut Sink<'_, Q>,
+        sink: &mut Sink<'_>,
     ) {
-        // An any-hit query has no pending hits.
-        if sink.goal().is_any() || self.count == 0 {
+        if self.count == 0 {
             return;
         }
         Flush { deferred: self, object, rays, sink }.inline_or_call(s);
@@ -116,13 +115,7 @@ impl DeferredHits {
 
     /// Implements [`Self::flush`].
     #[inline(always)]
-    fn compute<S: Simd, Q: Query>(
-        &mut self,
-        s: S,
-        object: &ObjectView<'_>,
-        rays: &[Ray],
-        sink: &mut Sink<'_, Q>,
-    ) {
+    fn compute<S: Simd>(&mut self, s: S, object: &ObjectView<'_>, rays: &[Ray], sink: &mut Sink<'_>) {
         let all = ((1u64 << self.count) - 1) as u32;
         self.count = 0;
         // Gathering all rays here was measured to take half the time of storing each when it is added.
@@ -154,7 +147,7 @@ impl DeferredHits {
             rest &= rest - 1;
             let index = self.ray[lane] as usize;
             let (ray, start) = (&rays[index], starts.of(index));
-            let mut query = Q::new(sink.goal(), ray);
+            let mut query = RayQuery::new(NearestHit, ray);
             let (ray, pending, of_leaf) = ((ray, start), self.candidate[lane], (NONE, 0));
             s.call(Settle { object, ray, pending, of_leaf, query: &mut query });
             sink.query(self.ray[lane] as usize, &query);

@@ -141,9 +141,8 @@ mod tests {
     use crate::bvh::height_field::HeightField;
     use crate::bvh::interleaved::{Interleaved, RemainingRays};
     use crate::bvh::stack::Stacks;
-    use crate::object::single;
-    use crate::query::sink::Sink;
-    use crate::query::{Any, Nearest, NearestHit, Query};
+    use crate::query::sink::{Answers, Sink};
+    use crate::query::with_batch_goal;
     use crate::rays::Hit;
     use crate::simd::{Isa, Kernel, Simd};
     use bth_format::layout::Child;
@@ -158,28 +157,24 @@ mod tests {
         }
     }
 
-    /// A batch traced by the pool of rays alone.
-    struct ThroughPool<'a, 's, Q: Query>(Interleaved<'a, 's, Q>);
-
-    impl<Q: Query> Kernel for ThroughPool<'_, '_, Q> {
-        type Output = ();
-        #[inline(always)]
-        fn run<S: Simd>(self, s: S) {
-            self.0.run(s, |_, _, _| unreachable!("the object has no tet leaves"));
-        }
-    }
-
     /// Traces rays by the pool alone; false if it is not compiled for the instruction set.
-    fn through_pool<Q: Query>(
+    fn through_pool(
         isa: Isa,
         object: &ObjectView<'_>,
         (rays, order): (&[Ray], Option<&[u32]>),
         stacks: &mut Stacks,
-        sink: &mut Sink<'_, Q>,
+        answers: Answers<'_>,
     ) -> bool {
+        if isa == Isa::Scalar || !isa.is_available() {
+            return false;
+        }
         let remaining = RemainingRays { order, queries: None, walked: None };
-        let pool = Interleaved { object, rays, remaining, stacks, sink, entry_nodes: true };
-        isa.run_wide(ThroughPool(pool)).is_ok()
+        let either = answers.goal();
+        let sink = &mut Sink::new(object.triangle_ids, answers, 0);
+        with_batch_goal!(isa, either, goal => {
+            isa.run(Interleaved { object, rays, remaining, stacks, sink, goal, entry_nodes: true });
+        });
+        true
     }
 
     /// A run of rays from near a point above the surface to a small part of it.
@@ -291,17 +286,15 @@ mod tests {
                     let mut hits = vec![Hit::MISS; rays.len()];
                     let mut found = vec![false; rays.len()];
                     let (mut stacks, object) = (Stacks::default(), &object);
-                    let (answers, sink_ids) = (&mut hits, object.triangle_ids);
-                    let mut sink = Sink::<Nearest>::new(sink_ids, answers, 0);
-                    if !through_pool(isa, object, (&rays, order), &mut stacks, &mut sink) {
+                    let answers = Answers::Nearest(&mut hits);
+                    if !through_pool(isa, object, (&rays, order), &mut stacks, answers) {
                         continue;
                     }
-                    let mut sink = Sink::<Any>::new(sink_ids, &mut found, 0);
-                    assert!(through_pool(isa, object, (&rays, order), &mut stacks, &mut sink));
+                    let answers = Answers::Any(&mut found);
+                    assert!(through_pool(isa, object, (&rays, order), &mut stacks, answers));
                     let traced = |i: usize| order.is_none_or(|order| order.contains(&(i as u32)));
                     for (i, ray) in rays.iter().enumerate().filter(|&(i, _)| traced(i)) {
-                        let mut hit = Hit::MISS;
-                        single::trace::<Nearest, (), _>((object, NearestHit), ray, 0, &mut (), &mut hit);
+                        let hit = crate::object::nearest(object, ray, 0);
                         let is_hit = crate::object::any(object, ray);
                         assert_eq!(format!("{:?}", hits[i]), format!("{hit:?}"), "{isa}, {scale}: {ray:?}");
                         assert_eq!(found[i], is_hit, "{isa}, {scale}: {ray:?}");

@@ -11,9 +11,11 @@ use super::stack::{StackPosition, Stacks};
 use crate::intersect::prepare::Prepared;
 use crate::intersect::start_point::ExactRay;
 use crate::query::sink::Sink;
-use crate::query::{EitherQuery, Query};
+use crate::query::{EitherQuery, Goal, RayQuery};
+
 use crate::rays::Ray;
-use crate::simd::{CacheLevel, LANES, Scalar, Simd};
+use crate::simd::{CacheLevel, Kernel, LANES, Scalar, Simd};
+use crate::tets::{TetOutcome, enter_tets};
 use bth_format::layout::{Child, NONE, WIDTH, WideNode};
 use bth_format::object::ObjectBounds;
 use bth_format::object::ObjectView;
@@ -28,13 +30,14 @@ pub(crate) struct RemainingRays<'a> {
     pub(crate) walked: Option<&'a [u32]>,
 }
 
-/// Parameters of the traversal of a batch.
-pub(crate) struct Interleaved<'a, 's, Q: Query> {
+/// The kernel that traverses a batch and stores its answers.
+pub(crate) struct Interleaved<'a, 's, G: Goal> {
     pub(crate) object: &'a ObjectView<'a>,
     pub(crate) rays: &'a [Ray],
     pub(crate) remaining: RemainingRays<'a>,
     pub(crate) stacks: &'a mut Stacks,
-    pub(crate) sink: &'a mut Sink<'s, Q>,
+    pub(crate) sink: &'a mut Sink<'s>,
+    pub(crate) goal: G,
     /// Whether runs of coherent rays begin at entry nodes. It pays in [large](super::nodes::is_large) objects only.
     pub(crate) entry_nodes: bool,
 }
@@ -72,12 +75,14 @@ struct RaySource<'a> {
     taken: usize,
 }
 
-impl<Q: Query> Interleaved<'_, '_, Q> {
-    /// Traces all rays and stores their answers. `tets` intersects a tet leaf without a subtree, given its row, and returns whether the
-    /// query is complete.
+impl<G: Goal> Kernel for Interleaved<'_, '_, G> {
+    type Output = ();
+    const SCALAR: bool = false;
+    const QUADS: bool = G::QUADS;
+    const LONG_VECTORS: bool = G::LONG_VECTORS;
     #[inline(always)]
-    pub(crate) fn run<S: Simd>(self, s: S, mut tets: impl FnMut(u32, ExactRay<'_>, &mut Q) -> bool) {
-        let Interleaved { object, rays, remaining, stacks, sink, entry_nodes } = self;
+    fn run<S: Simd>(self, s: S) {
+        let Interleaved { object, rays, remaining, stacks, sink, goal, entry_nodes } = self;
         let (walked, starts) = (remaining.walked, sink.starts());
         let mut source = RaySource {
             object,
@@ -99,7 +104,6 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
             taken: 0,
         };
         let mut deferred = DeferredHits::new();
-        let goal = sink.goal();
         let mut slots = [Slot::vacant(goal); POOL_SIZE];
         let mut pool = RayPool::new(object, &mut slots, stacks, goal);
         let has_rare_steps = has_rare_steps(object);
@@ -120,17 +124,20 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
                 if walked.is_some_and(|walked| walked[ray] == row) {
                     return LeafOutcome::Nothing;
                 }
-                enter_tets(object, row, (&rays[ray], starts.of(ray)), (state, top), stacks, &mut tets)
+                enter_tet_leaf(object, row, (&rays[ray], starts.of(ray)), (state, top), stacks)
             });
         }
-        deferred.flush(s, object, rays, sink);
+        // An any-hit query has no pending hits.
+        if !goal.is_any() {
+            deferred.flush(s, object, rays, sink);
+        }
     }
 }
 
 impl RaySource<'_> {
     /// Starts the next ray that can hit anything in a slot, if there is one.
     #[inline(always)]
-    fn start<S: Simd, Q: Query>(&mut self, s: S, goal: Q::Goal, slot: usize, pool: &mut RayPool<'_, Q>) {
+    fn start<S: Simd, G: Goal>(&mut self, s: S, goal: G, slot: usize, pool: &mut RayPool<'_, G>) {
         loop {
             while self.used == self.filled {
                 if !self.refill(s) {
@@ -140,7 +147,7 @@ impl RaySource<'_> {
             let lane = usize::from(self.lane[self.used]) % LANES;
             self.used += 1;
             let index = self.ray[lane];
-            let query = self.remaining.queries.map(|queries| walked::<Q>(goal, &queries[index as usize]));
+            let query = self.remaining.queries.map(|queries| walked(goal, &queries[index as usize]));
             let prepared = self.prepared.prepared(lane);
             let state = pool.state(slot);
             if let Some(prepared) = prepared {
@@ -229,8 +236,8 @@ impl RaySource<'_> {
 /// The query of a ray that has been walked before.
 #[cold]
 #[inline(never)]
-fn walked<Q: Query>(goal: Q::Goal, query: &EitherQuery) -> Q {
-    Q::from_either(goal, query)
+fn walked<G: Goal>(goal: G, query: &EitherQuery) -> RayQuery<G> {
+    query.with_goal(goal)
 }
 
 /// Whether the rays from `taken` on in an order are as many as have an entry node in common, and those of the batch from `first` on.
@@ -252,16 +259,15 @@ fn root(object: &ObjectView<'_>) -> u32 {
     }
 }
 
-/// Enters a tet leaf: its stack entry is replaced by its subtree if it has one, otherwise `tets` intersects it.
+/// Enters a tet leaf: its stack entry is replaced by its subtree if it has one, otherwise the ray walks through it.
 #[cold]
 #[inline(never)]
-fn enter_tets<Q: Query>(
+fn enter_tet_leaf<G: Goal>(
     object: &ObjectView<'_>,
     row: u32,
     ray: ExactRay<'_>,
-    (state, top): (&mut RayState<Q>, StackPosition),
+    (state, top): (&mut RayState<G>, StackPosition),
     stacks: &mut Stacks,
-    tets: &mut impl FnMut(u32, ExactRay<'_>, &mut Q) -> bool,
 ) -> LeafOutcome {
     let subtree = object.tet_leaves[row as usize].subtree;
     if subtree != NONE {
@@ -269,7 +275,7 @@ fn enter_tets<Q: Query>(
         return LeafOutcome::Replaced;
     }
     decide(Scalar, object, ray, &object.bounds, state, (NONE, 0));
-    if tets(row, ray, state.query(ray.0)) {
+    if enter_tets(object, row, ray, state.query(ray.0), &mut ()) == TetOutcome::Done {
         LeafOutcome::Done
     } else {
         state.update_from_query(ray.0, object.bounds.origin_error)

@@ -10,7 +10,7 @@ use crate::bvh::candidate::{Candidate, Settle};
 use crate::intersect::filter::{Certain, TriangleBlock};
 use crate::intersect::prepare::PreparedRay;
 use crate::intersect::start_point::{ExactRay, own_triangle};
-use crate::query::{Goal, Query};
+use crate::query::{Goal, RayQuery};
 use crate::rays::Ray;
 use crate::simd::Simd;
 use bth_format::object::{ObjectBounds, ObjectView};
@@ -29,8 +29,8 @@ pub(crate) enum LeafOutcome {
 }
 
 /// State of a ray that leaves read and update.
-pub(crate) trait Progress<Q: Query> {
-    fn goal(&self) -> Q::Goal;
+pub(crate) trait Progress<G: Goal> {
+    fn goal(&self) -> G;
     fn prepared(&self) -> &PreparedRay;
     /// Upper limit of the depths of hits that can still change the result.
     fn last(&self) -> f32;
@@ -42,7 +42,7 @@ pub(crate) trait Progress<Q: Query> {
     fn pending(&self) -> Candidate;
     fn set_pending(&mut self, pending: Candidate);
     /// The query, which is constructed from `ray` at the first call.
-    fn query(&mut self, ray: &Ray) -> &mut Q;
+    fn query(&mut self, ray: &Ray) -> &mut RayQuery<G>;
     /// Records that some triangle is certainly hit, which completes an any-hit query.
     fn accept(&mut self);
 
@@ -65,12 +65,12 @@ pub(crate) trait Progress<Q: Query> {
 /// Intersects a ray with the triangles of a leaf, given as its record and its child code. `bounds` are those for which the ray was
 /// prepared.
 #[inline(always)]
-pub(crate) fn enter_leaf<S: Simd, Q: Query, B: TriangleBlock>(
+pub(crate) fn enter_leaf<S: Simd, G: Goal, B: TriangleBlock>(
     s: S,
-    (object, goal): (&ObjectView<'_>, Q::Goal),
+    (object, goal): (&ObjectView<'_>, G),
     bounds: &ObjectBounds,
     ray: ExactRay<'_>,
-    progress: &mut impl Progress<Q>,
+    progress: &mut impl Progress<G>,
     (block, code): (&B, u32),
 ) -> LeafOutcome {
     let prepared = progress.prepared();
@@ -104,12 +104,12 @@ pub(crate) fn enter_leaf<S: Simd, Q: Query, B: TriangleBlock>(
 
 /// Decides the triangles of a leaf, given as its child code and their bits, and before them the pending hit.
 #[inline(always)]
-pub(crate) fn decide<S: Simd, Q: Query>(
+pub(crate) fn decide<S: Simd, G: Goal>(
     s: S,
     object: &ObjectView<'_>,
     ray: ExactRay<'_>,
     bounds: &ObjectBounds,
-    progress: &mut impl Progress<Q>,
+    progress: &mut impl Progress<G>,
     triangles: (u32, u32),
 ) -> LeafOutcome {
     let pending = progress.pending();

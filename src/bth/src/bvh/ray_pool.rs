@@ -6,7 +6,7 @@ use super::nodes::{indexed_leaf, is_large, prefetch, prefetch_into, raw as raw_l
 use super::ray_state::{RayState, write_children};
 use super::stack::{BOTTOM, StackPosition, Stacks};
 use crate::intersect::start_point::Starts;
-use crate::query::{Goal, Query};
+use crate::query::{Goal, RayQuery};
 use crate::rays::Ray;
 use crate::simd::{CacheLevel, Part, Simd};
 use bth_format::layout::{Child, WIDTH};
@@ -92,14 +92,14 @@ impl StepLists {
 /// State of a ray, aligned to cache lines.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
-pub(super) struct Slot<Q>(RayState<Q>);
+pub(super) struct Slot<G>(RayState<G>);
 
-impl<Q: Query> Slot<Q> {
+impl<G: Goal> Slot<G> {
     /// A slot without a ray.
     #[inline(always)]
-    pub(super) fn vacant(goal: Q::Goal) -> Self {
+    pub(super) fn vacant(goal: G) -> Self {
         let ray = Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 };
-        Slot(RayState::vacant(Q::new(goal, &ray)))
+        Slot(RayState::vacant(RayQuery::new(goal, &ray)))
     }
 }
 
@@ -111,25 +111,25 @@ struct StackTops {
 }
 
 /// The pool: a slot for each ray. The caller makes the slots in their final place; as a part of this value they would be copied to it.
-pub(super) struct RayPool<'a, Q: Query> {
-    slots: &'a mut [Slot<Q>; POOL_SIZE],
+pub(super) struct RayPool<'a, G: Goal> {
+    slots: &'a mut [Slot<G>; POOL_SIZE],
     tops: StackTops,
     lists: StepLists,
     counts: StepCounts,
     stacks: &'a mut Stacks,
-    goal: Q::Goal,
+    goal: G,
     /// Position of the bottom of each slot's stack.
     bottoms: [StackPosition; POOL_SIZE],
 }
 
-impl<'a, Q: Query> RayPool<'a, Q> {
+impl<'a, G: Goal> RayPool<'a, G> {
     /// A pool of vacant slots, for the BVH of an object.
     #[inline(always)]
     pub(super) fn new(
         object: &ObjectView<'_>,
-        slots: &'a mut [Slot<Q>; POOL_SIZE],
+        slots: &'a mut [Slot<G>; POOL_SIZE],
         stacks: &'a mut Stacks,
-        goal: Q::Goal,
+        goal: G,
     ) -> Self {
         stacks.reserve(object, POOL_SIZE);
         let mut bottoms = [StackPosition::FIRST; POOL_SIZE];
@@ -160,7 +160,7 @@ impl<'a, Q: Query> RayPool<'a, Q> {
 
     /// The ray of a slot.
     #[inline(always)]
-    pub(super) fn state(&mut self, slot: usize) -> &mut RayState<Q> {
+    pub(super) fn state(&mut self, slot: usize) -> &mut RayState<G> {
         &mut self.slots[slot % POOL_SIZE].0
     }
 
@@ -244,7 +244,7 @@ impl<'a, Q: Query> RayPool<'a, Q> {
         &mut self,
         s: S,
         (object, rays, starts): (&ObjectView<'_>, &[Ray], Starts<'_>),
-        mut tets: impl FnMut(u32, &mut RayState<Q>, StackPosition, &mut Stacks) -> LeafOutcome,
+        mut tets: impl FnMut(u32, &mut RayState<G>, StackPosition, &mut Stacks) -> LeafOutcome,
     ) {
         let RayPool { slots, tops, lists, stacks, bottoms, goal, .. } = self;
         let (mut counts, node_base, goal) = (self.counts, object.node_base(), *goal);
@@ -287,12 +287,12 @@ impl<'a, Q: Query> RayPool<'a, Q> {
 
 /// [`RayPool::inner_steps`] through an object whose nodes wait in the second level of caches, as a part of kernels: apart from the loop
 /// for all other objects, whose constants then stay in registers.
-pub(super) struct RareSteps<'p, 'a, 'o, Q: Query>(
-    pub(super) &'p mut RayPool<'a, Q>,
+pub(super) struct RareSteps<'p, 'a, 'o, G: Goal>(
+    pub(super) &'p mut RayPool<'a, G>,
     pub(super) &'p ObjectView<'o>,
 );
 
-impl<S: Simd, Q: Query> Part<S> for RareSteps<'_, '_, '_, Q> {
+impl<S: Simd, G: Goal> Part<S> for RareSteps<'_, '_, '_, G> {
     type Output = ();
     #[inline(always)]
     fn run(self, s: S) {

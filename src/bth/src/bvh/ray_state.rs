@@ -5,7 +5,7 @@ use super::leaf::Progress;
 use crate::bvh::candidate::Candidate;
 use crate::intersect::prepare::{HitProgress, PreparedRay};
 use crate::query::sink::Sink;
-use crate::query::{Goal, Query};
+use crate::query::{Goal, RayQuery};
 use crate::rays::Ray;
 use crate::simd::{Scalar, Simd};
 use bth_format::layout::{WIDTH, WideNode};
@@ -27,14 +27,14 @@ pub(crate) fn key_limit(last: f32) -> f32 {
 /// State of a ray that is being traced.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
-pub(crate) struct RayState<Q> {
+pub(crate) struct RayState<G> {
     /// The prepared ray, with the hits found so far in `progress` and the limit of depth in `slabs.last`.
     prepared: PreparedRay,
     /// Valid if [`HitProgress::BY_QUERY`] is set; its goal always is. Most rays never need a decision in f64, and their query is never written.
-    query: Q,
+    query: RayQuery<G>,
 }
 
-impl<Q: Query> RayState<Q> {
+impl<G: Goal> RayState<G> {
     /// As [`Self::start`], for a ray with index `index` that f32 lanes could not prepare. Returns false if the ray cannot hit anything
     /// ([`PreparedRay::in_f64`]).
     #[cold]
@@ -43,7 +43,7 @@ impl<Q: Query> RayState<Q> {
         &mut self,
         object: &ObjectView<'_>,
         (index, ray): (u32, &Ray),
-        query: Option<Q>,
+        query: Option<RayQuery<G>>,
     ) -> bool {
         let prepared =
             PreparedRay::of(Scalar, &object.bounds, ray).or_else(|| PreparedRay::in_f64(&object.bounds, ray));
@@ -51,7 +51,7 @@ impl<Q: Query> RayState<Q> {
     }
 
     /// State without a ray.
-    pub(crate) fn vacant(query: Q) -> Self {
+    pub(crate) fn vacant(query: RayQuery<G>) -> Self {
         RayState {
             prepared: PreparedRay { progress: HitProgress::NOTHING, ..PreparedRay::new_zeroed() },
             query,
@@ -60,14 +60,14 @@ impl<Q: Query> RayState<Q> {
 
     /// Begins a prepared ray, with its query if that was constructed before.
     #[inline(always)]
-    pub(crate) fn start(&mut self, prepared: &PreparedRay, query: Option<Q>) {
+    pub(crate) fn start(&mut self, prepared: &PreparedRay, query: Option<RayQuery<G>>) {
         self.prepared = *prepared;
         if let Some(query) = query {
             self.set_query(query);
         }
     }
 
-    fn set_query(&mut self, query: Q) {
+    fn set_query(&mut self, query: RayQuery<G>) {
         (self.query, self.prepared.progress.decided) = (query, HitProgress::BY_QUERY);
     }
 
@@ -79,7 +79,7 @@ impl<Q: Query> RayState<Q> {
 
     /// Stores the answer of the ray, which must have no pending hit.
     #[inline(always)]
-    pub(crate) fn report(&self, sink: &mut Sink<'_, Q>) {
+    pub(crate) fn report(&self, sink: &mut Sink<'_>) {
         match self.prepared.progress.decided {
             HitProgress::UNDECIDED => {}
             HitProgress::ACCEPTED => sink.accepted(self.ray()),
@@ -98,7 +98,7 @@ impl<Q: Query> RayState<Q> {
     pub(crate) fn enter_node<S: Simd>(
         &self,
         s: S,
-        goal: Q::Goal,
+        goal: G,
         node: &WideNode,
         entries: (&mut [u32; WIDTH], &mut [f32; WIDTH]),
     ) -> usize {
@@ -107,9 +107,9 @@ impl<Q: Query> RayState<Q> {
     }
 }
 
-impl<Q: Query> Progress<Q> for RayState<Q> {
+impl<G: Goal> Progress<G> for RayState<G> {
     #[inline(always)]
-    fn goal(&self) -> Q::Goal {
+    fn goal(&self) -> G {
         self.query.goal()
     }
     #[inline(always)]
@@ -143,9 +143,9 @@ impl<Q: Query> Progress<Q> for RayState<Q> {
             (pending.leaf, pending.triangle as u16);
     }
     #[inline(always)]
-    fn query(&mut self, ray: &Ray) -> &mut Q {
+    fn query(&mut self, ray: &Ray) -> &mut RayQuery<G> {
         if self.prepared.progress.decided == HitProgress::UNDECIDED {
-            self.set_query(Q::new(self.query.goal(), ray));
+            self.set_query(RayQuery::new(self.query.goal(), ray));
         }
         &mut self.query
     }

@@ -12,10 +12,10 @@ use crate::bvh::candidate::Candidate;
 use crate::intersect::boxes::RaySlabLanes;
 use crate::intersect::prepare::PreparedRay;
 use crate::intersect::start_point::ExactRay;
-use crate::query::{Count, Goal, Query};
+use crate::query::{Count, Goal, RayQuery};
 use crate::rays::Ray;
 use crate::simd::Simd;
-use crate::tets::TetOutcome;
+use crate::tets::{TetOutcome, enter_tets};
 use bth_format::layout::{Child, NONE, WIDTH};
 use bth_format::object::{NodeBase, ObjectBounds, ObjectView};
 use std::hint::black_box;
@@ -32,11 +32,11 @@ pub(crate) enum SingleResult {
 }
 
 /// State of the ray. All fields but the query stay in registers.
-struct SingleState<'a, Q: Query> {
+struct SingleState<'a, G: Goal> {
     prepared: &'a PreparedRay,
-    goal: Q::Goal,
+    goal: G,
     /// Constructed by the first decision in f64, which most rays never need.
-    query: &'a mut Option<Q>,
+    query: &'a mut Option<RayQuery<G>>,
     accepted: bool,
     /// Upper limit of the depths of hits that can still change the result.
     last: f32,
@@ -46,9 +46,9 @@ struct SingleState<'a, Q: Query> {
     pending: Candidate,
 }
 
-impl<Q: Query> Progress<Q> for SingleState<'_, Q> {
+impl<G: Goal> Progress<G> for SingleState<'_, G> {
     #[inline(always)]
-    fn goal(&self) -> Q::Goal {
+    fn goal(&self) -> G {
         self.goal
     }
     #[inline(always)]
@@ -80,8 +80,8 @@ impl<Q: Query> Progress<Q> for SingleState<'_, Q> {
         self.pending = pending;
     }
     #[inline(always)]
-    fn query(&mut self, ray: &Ray) -> &mut Q {
-        self.query.get_or_insert_with(|| Q::new(self.goal, ray))
+    fn query(&mut self, ray: &Ray) -> &mut RayQuery<G> {
+        self.query.get_or_insert_with(|| RayQuery::new(self.goal, ray))
     }
     #[inline(always)]
     fn accept(&mut self) {
@@ -89,20 +89,18 @@ impl<Q: Query> Progress<Q> for SingleState<'_, Q> {
     }
 }
 
-/// Traverses the BVH of an object from its root. `tets` intersects a tet leaf without a subtree, given its row. `bounds` are
-/// those for which the ray was prepared.
+/// Traverses the BVH of an object from its root. `bounds` are those for which the ray was prepared.
 ///
 /// This is one kernel, longer than other functions and with more parameters: its variables must stay in registers across all steps,
 /// and a function boundary or a struct of parameters between the steps was measured to be slower.
 #[inline(always)]
-pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
+pub(crate) fn trace_single<S: Simd, G: Goal, C: Count>(
     s: S,
     (object, ray): (&ObjectView<'_>, ExactRay<'_>),
     (prepared, bounds): (&PreparedRay, &ObjectBounds),
-    (goal, query): (Q::Goal, &mut Option<Q>),
+    (goal, query): (G, &mut Option<RayQuery<G>>),
     stack: &mut SingleStack,
     count: &mut C,
-    mut tets: impl FnMut(u32, &mut Q, &mut C) -> TetOutcome,
 ) -> SingleResult {
     // Kept in memory: the compiler would otherwise broadcast each number to sixteen lanes before the loop and spill the vectors.
     let prepared = black_box(prepared);
@@ -150,7 +148,7 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
                     }
                     count.leaf();
                     decide(s, object, ray, bounds, &mut state, (NONE, 0));
-                    let done = tets(row, state.query(ray.0), count) == TetOutcome::Done;
+                    let done = enter_tets(object, row, ray, state.query(ray.0), count) == TetOutcome::Done;
                     state.update_from_query(ray.0, bounds.origin_error);
                     done
                 }

@@ -23,8 +23,8 @@ use self::search::search;
 use crate::masks::Masks;
 use crate::rays::Hit;
 use crate::scene::Scene;
-use crate::start_queries::TraceRay;
 use crate::starts::world_ray::WorldRay;
+use crate::trace::TraceRay;
 use std::collections::BinaryHeap;
 
 /// Queries for several hits, and with conditions. Hits are ordered by ascending t, then instance,

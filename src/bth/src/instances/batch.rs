@@ -15,8 +15,8 @@ use super::visit_queue::VisitQueue;
 use crate::intersect::start_point::Starts;
 use crate::object::{self, Scratch};
 use crate::objects::Objects;
-use crate::query::sink::{SceneRays, Sink, Visit};
-use crate::query::{AnswersOf, Any, Goal, Nearest, Query, better};
+use crate::query::better;
+use crate::query::sink::{Answers, SceneRays, Sink, Visit};
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use crate::starts::world_ray::InstanceStart;
@@ -210,14 +210,14 @@ impl World {
 }
 
 /// Traces visits of one object, given with their rays in its space, and merges the answers into those of the rays of the scene.
-fn trace_visits<Q: Query>(
+fn trace_visits(
     ObjectVisits { batch, object, visits }: ObjectVisits<'_>,
     object_rays: &ObjectRays,
     scratch: &mut Scratch,
-    mut answers: AnswersOf<'_, Q>,
+    answers: Answers<'_>,
 ) {
     let scene = SceneRays { rays: batch.rays, visits, t_scale: &object_rays.t_scale };
-    let sink = Sink::<Q>::of_scene(object.triangle_ids, Q::Goal::reborrow(&mut answers), scene);
+    let sink = Sink::of_scene(object.triangle_ids, answers, scene);
     let mut sink = sink.with_starts(Starts(&object_rays.starts));
     object::trace_batch(object, &object_rays.rays, None, scratch, &mut sink);
 }
@@ -245,7 +245,7 @@ impl SceneQuery for SceneNearest<'_> {
         }
     }
     fn trace_placed(&mut self, of_object: ObjectVisits<'_>, object_rays: &ObjectRays) {
-        trace_visits::<Nearest>(of_object, object_rays, self.scratch, self.hits);
+        trace_visits(of_object, object_rays, self.scratch, Answers::Nearest(self.hits));
     }
 }
 
@@ -272,7 +272,7 @@ impl SceneQuery for SceneAny<'_> {
         }
     }
     fn trace_placed(&mut self, of_object: ObjectVisits<'_>, object_rays: &ObjectRays) {
-        trace_visits::<Any>(of_object, object_rays, self.scratch, self.found);
+        trace_visits(of_object, object_rays, self.scratch, Answers::Any(self.found));
     }
 }
 

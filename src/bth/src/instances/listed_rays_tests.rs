@@ -22,6 +22,7 @@ type Listed = (Vec<Visit>, Vec<Visit>, BTreeSet<u32>);
 
 impl Kernel for ListKernel<'_> {
     type Output = Listed;
+    const SCALAR: bool = false;
     fn run<S: Simd>(self, s: S) -> Listed {
         let ListKernel { top, rays, hits } = self;
         let (mut lists, mut traversals) = (ListedRays::default(), RayTraversals::default());
@@ -54,7 +55,10 @@ fn rays_visit_what_is_enumerated_for_one_ray_or_are_not_listed() {
         let hits: Vec<Hit> =
             rays.iter().map(|ray| Hit { t: nearest_t(ray, rng.next()), ..Hit::MISS }).collect();
         let kernel = ListKernel { top: &world.top, rays: &rays, hits: &hits };
-        let Ok((nearest, later, without)) = Isa::chosen().run_wide(kernel) else { return };
+        if Isa::chosen() == Isa::Scalar {
+            return;
+        }
+        let (nearest, later, without) = Isa::chosen().run(kernel);
         for (i, ray) in rays.iter().enumerate().filter(|(i, _)| !without.contains(&(*i as u32))) {
             let enumerated = |tmax: f32| {
                 let mut all = BTreeSet::new();

@@ -6,12 +6,11 @@ use crate::bvh::single_stack::SingleStack;
 use crate::intersect::prepare::PreparedRay;
 use crate::intersect::start_point::ExactRay;
 use crate::intersect::start_point::StartPoint;
-use crate::query::{Answer, Count, Query};
-use crate::rays::{Ray, StartRay};
+use crate::query::{Count, Goal};
+use crate::rays::{Hit, Ray, StartRay};
 use crate::simd::{Isa, Kernel, Simd};
 use crate::starts::free;
 use crate::starts::locate::{locate, prefetch_leaf};
-use crate::tets::enter_tets;
 use bth_format::layout::NONE;
 use bth_format::object::{ObjectBounds, ObjectView};
 use glam::Vec4;
@@ -93,15 +92,16 @@ impl SingleRay for StartRay {
 
 /// Traces one ray and stores its answer. `instance` is reported with a hit.
 #[inline(always)]
-pub(crate) fn trace<Q: Query, C: Count, R: SingleRay>(
-    (object, goal): (&ObjectView<'_>, Q::Goal),
+pub(crate) fn trace<G: Goal, C: Count, R: SingleRay>(
+    object: &ObjectView<'_>,
+    goal: G,
     ray: &R,
     instance: u32,
     count: &mut C,
-    answer: &mut Q::Answer,
+    hit: &mut Hit,
 ) {
     // The kernel is passed by reference, because a copy of fields that were just written would stall.
-    let kernel = &mut SingleKernel::<Q, C, R> { object, goal, ray, instance, count, answer };
+    let kernel = &mut SingleKernel { object, goal, ray, instance, count, hit };
     // Where nothing but the kernel is called, the registers need not be saved a second time.
     match Isa::already_chosen() {
         Some(isa) => isa.run_found(kernel),
@@ -112,29 +112,29 @@ pub(crate) fn trace<Q: Query, C: Count, R: SingleRay>(
 /// Runs the kernel where no instruction set is chosen.
 #[cold]
 #[inline(never)]
-fn run_first<Q: Query, C: Count, R: SingleRay>(kernel: &mut SingleKernel<'_, Q, C, R>) {
+fn run_first<G: Goal, C: Count, R: SingleRay>(kernel: &mut SingleKernel<'_, G, C, R>) {
     Isa::chosen().run(kernel);
 }
 
 /// The kernel of [`trace`]: all that is done for a ray, so that little is passed through memory.
-struct SingleKernel<'a, Q: Query, C, R> {
+struct SingleKernel<'a, G, C, R> {
     object: &'a ObjectView<'a>,
-    goal: Q::Goal,
+    goal: G,
     ray: &'a R,
     instance: u32,
     count: &'a mut C,
-    answer: &'a mut Q::Answer,
+    hit: &'a mut Hit,
 }
 
-impl<Q: Query, C: Count, R: SingleRay> Kernel for &mut SingleKernel<'_, Q, C, R> {
+impl<G: Goal, C: Count, R: SingleRay> Kernel for &mut SingleKernel<'_, G, C, R> {
     type Output = ();
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let SingleKernel { object, goal, ray, instance, count, answer } = self;
+        let SingleKernel { object, goal, ray, instance, count, hit } = self;
         let (object, goal, instance) = (*object, *goal, *instance);
         let line = if object.header.root == NONE { None } else { ray.line(s, object) };
         let Some(line) = line else {
-            **answer = Answer::MISS;
+            **hit = Hit::MISS;
             return;
         };
         let (bounds, ray_of_line) = (R::bounds(object), ray.exact(&line));
@@ -143,25 +143,24 @@ impl<Q: Query, C: Count, R: SingleRay> Kernel for &mut SingleKernel<'_, Q, C, R>
             None => match PreparedRay::in_f64(bounds, ray_of_line.0) {
                 Some(prepared) => prepared,
                 None => {
-                    **answer = Answer::MISS;
+                    **hit = Hit::MISS;
                     return;
                 }
             },
         };
-        let (mut query, mut stack): (Option<Q>, _) = (None, SingleStack::new());
-        let tets = |leaf, query: &mut Q, count: &mut C| enter_tets(object, leaf, ray_of_line, query, count);
+        let (mut query, mut stack) = (None, SingleStack::new());
         let (of, prepared) = ((object, ray_of_line), (&prepared, bounds));
         // The answer is written in place: a copy of what was just written word by word would stall.
-        match trace_single(s, of, prepared, (goal, &mut query), &mut stack, *count, tets) {
-            SingleResult::Accepted => **answer = Q::ACCEPTED,
+        match trace_single(s, of, prepared, (goal, &mut query), &mut stack, *count) {
+            SingleResult::Accepted => **hit = Hit::SOME,
             SingleResult::Certain(candidate, norm) => {
-                let place = (&mut **answer, instance);
-                store_certain_hit::<S, Q>(s, object, ray_of_line, (candidate, norm), goal, place);
+                let place = (&mut **hit, instance);
+                store_certain_hit(s, object, ray_of_line, (candidate, norm), goal, place);
             }
             SingleResult::OfQuery => {
-                **answer = match &query {
+                **hit = match &query {
                     Some(query) => query.answer(object.triangle_ids, instance),
-                    None => Answer::MISS,
+                    None => Hit::MISS,
                 };
             }
         }

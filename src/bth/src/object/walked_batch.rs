@@ -1,6 +1,6 @@
 //! Walks of the rays of a batch through tetrahedra, before those that remain go through the BVH. They are compiled once for all queries.
 
-use crate::query::{EitherGoal, EitherQuery, Query};
+use crate::query::{EitherGoal, EitherQuery};
 use crate::rays::Ray;
 use crate::simd::Isa;
 use crate::tets::batch::WalkBatch;
@@ -47,8 +47,10 @@ pub(super) fn walk(object: &ObjectView<'_>, rays: &[Ray], goal: EitherGoal, scra
     if let Some(records) = records {
         let of = (rays, sole_tet_leaf(object));
         let mut batch = WalkBatch::new(object, records, of, queries, states, lists);
-        // Where no walks are compiled, no ray is walked here, and `states` stay `NotWalked`: rays are faster through the BVH.
-        let _ = Isa::chosen().run_long_vectors(&mut batch);
+        // Elsewhere no ray is walked here, and `states` stay `NotWalked`: rays are faster through the BVH.
+        if Isa::chosen().has_long_vectors() {
+            Isa::chosen().run(&mut batch);
+        }
     }
     filled(walked, rays.len(), NONE);
     done.clear();

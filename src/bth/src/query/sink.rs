@@ -1,9 +1,10 @@
-//! Destination of the answers of a batch: one type for models and for scenes, so that every kernel is compiled once for both.
+//! Destination of the answers of a batch: one type for models and for scenes, and for both goals, so that every kernel is
+//! compiled once for all.
 
-use super::{AnswerLanes, Answers, AnswersOf, EitherQuery, Goal, Query};
+use super::{EitherGoal, Goal, RayQuery, better};
 use crate::intersect::exact_lanes::Intersections;
 use crate::intersect::start_point::Starts;
-use crate::rays::{PrimitiveRef, Ray};
+use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::simd::{LANES, Simd};
 
 /// The traversal of one instance by one ray of a scene.
@@ -25,11 +26,64 @@ pub(crate) struct SceneRays<'a> {
     pub(crate) t_scale: &'a [f32],
 }
 
+/// The answers of the rays of a batch, all of them misses at first.
+pub(crate) enum Answers<'a> {
+    /// The nearest hits.
+    Nearest(&'a mut [Hit]),
+    /// True for rays that hit anything.
+    Any(&'a mut [bool]),
+}
+
+impl Answers<'_> {
+    /// The same answers for a shorter time.
+    #[inline(always)]
+    pub(crate) fn reborrow(&mut self) -> Answers<'_> {
+        match self {
+            Answers::Nearest(hits) => Answers::Nearest(hits),
+            Answers::Any(found) => Answers::Any(found),
+        }
+    }
+
+    /// What the answers are about.
+    #[inline(always)]
+    pub(crate) fn goal(&self) -> EitherGoal {
+        EitherGoal { is_any: matches!(self, Answers::Any(_)) }
+    }
+
+    /// Makes all answers misses.
+    pub(crate) fn clear(&mut self) {
+        match self {
+            Answers::Nearest(hits) => crate::object::fill_misses(hits),
+            Answers::Any(found) => found.fill(false),
+        }
+    }
+
+    /// Merges a hit in an object into the answer of the ray with this index in the scene. `t_scale` is the factor from t in
+    /// object space to t in world space.
+    pub(crate) fn merge(&mut self, index: usize, hit: &Hit, ray: &Ray, t_scale: f32) {
+        match self {
+            Answers::Nearest(hits) => {
+                let best = &mut hits[index];
+                *best = better(ray, best, hit, t_scale).unwrap_or(*best);
+            }
+            Answers::Any(found) => found[index] |= hit.is_hit(),
+        }
+    }
+
+    /// Exchanges the answers of two rays.
+    pub(crate) fn swap(&mut self, a: usize, b: usize) {
+        match self {
+            Answers::Nearest(hits) => hits.swap(a, b),
+            Answers::Any(found) => found.swap(a, b),
+        }
+    }
+}
+
 /// Stores the answers of the rays of a batch. Rays for which nothing is reported keep their initial answer, a miss.
-pub(crate) struct Sink<'a, Q: Query> {
+pub(crate) struct Sink<'a> {
     /// Ids of the object's triangles, in leaf order.
     ids: &'a [u32],
-    answers: AnswersOf<'a, Q>,
+    answers: Answers<'a>,
     /// Instance that is reported with a hit if there is no `scene`.
     instance: u32,
     /// If set, answers are merged into those of the scene's rays.
@@ -40,10 +94,15 @@ pub(crate) struct Sink<'a, Q: Query> {
     starts: Starts<'a>,
 }
 
-impl<'a, Q: Query> Sink<'a, Q> {
-    /// Stores the answer of ray i in `answers[i]`.
-    pub(crate) fn new(ids: &'a [u32], answers: AnswersOf<'a, Q>, instance: u32) -> Self {
+impl<'a> Sink<'a> {
+    /// Stores the answer of ray i as answer i.
+    pub(crate) fn new(ids: &'a [u32], answers: Answers<'a>, instance: u32) -> Self {
         Sink { ids, answers, instance, scene: None, first: 0, starts: Starts::NONE }
+    }
+
+    /// Merges the answer of each visit into the answer of its ray; `answers` are those of the scene's batch.
+    pub(crate) fn of_scene(ids: &'a [u32], answers: Answers<'a>, scene: SceneRays<'a>) -> Self {
+        Sink { scene: Some(scene), ..Sink::new(ids, answers, 0) }
     }
 
     /// The same sink for rays with these starts.
@@ -57,65 +116,50 @@ impl<'a, Q: Query> Sink<'a, Q> {
         self.starts.from(self.first)
     }
 
-    /// Merges the answer of each visit into the answer of its ray; `answers` are those of the scene's batch.
-    pub(crate) fn of_scene(ids: &'a [u32], answers: AnswersOf<'a, Q>, scene: SceneRays<'a>) -> Self {
-        Sink { ids, answers, instance: 0, scene: Some(scene), first: 0, starts: Starts::NONE }
-    }
-
     /// What the answers are about.
     #[inline(always)]
-    pub(crate) fn goal(&self) -> Q::Goal {
+    pub(crate) fn goal(&self) -> EitherGoal {
         self.answers.goal()
     }
 
     /// A sink for the rays from `first` on, whose indices in calls begin at 0.
     #[inline(always)]
-    pub(crate) fn part(&mut self, first: usize) -> Sink<'_, Q> {
+    pub(crate) fn part(&mut self, first: usize) -> Sink<'_> {
         let (ids, instance, scene, starts) = (self.ids, self.instance, self.scene, self.starts);
-        let answers = Q::Goal::reborrow(&mut self.answers);
+        let answers = self.answers.reborrow();
         Sink { ids, answers, instance, scene, first: self.first + first, starts }
     }
 
-    /// A sink for the same rays, to which queries of either goal report.
-    pub(crate) fn either(&mut self) -> Sink<'_, EitherQuery> {
-        let Sink { ids, instance, scene, first, starts, .. } = *self;
-        Sink { ids, answers: self.answers.either(), instance, scene, first, starts }
-    }
-
     /// The instance that is reported with a hit of a ray.
+    #[inline(always)]
     pub(crate) fn instance_of(&self, ray: usize) -> u32 {
         self.scene.as_ref().map_or(self.instance, |scene| scene.visits[self.first + ray].instance)
     }
 
     /// Stores the answer of a ray, which reports the instance of [`Self::instance_of`].
-    pub(crate) fn answer(&mut self, ray: usize, answer: Q::Answer) {
+    #[inline(always)]
+    pub(crate) fn answer(&mut self, ray: usize, hit: Hit) {
         let index = self.first + ray;
-        match &self.scene {
-            None => self.answers.put(index, answer),
-            Some(_) => self.merge(index, answer),
+        match (&self.scene, &mut self.answers) {
+            (None, Answers::Nearest(hits)) => hits[index] = hit,
+            (None, Answers::Any(found)) => found[index] = hit.is_hit(),
+            (Some(_), _) => self.merge(index, &hit),
         }
     }
 
     /// Stores the answer of a query that has ended.
     #[inline(always)]
-    pub(crate) fn query(&mut self, ray: usize, query: &Q) {
-        let index = self.first + ray;
-        match &self.scene {
-            None => self.answers.put(index, query.answer(self.ids, self.instance)),
-            Some(scene) => {
-                let answer = query.answer(self.ids, scene.visits[index].instance);
-                self.merge(index, answer);
-            }
-        }
+    pub(crate) fn query<G: Goal>(&mut self, ray: usize, query: &RayQuery<G>) {
+        self.answer(ray, query.answer(self.ids, self.instance_of(ray)));
     }
 
-    /// Records that `ray` hits something.
+    /// Records that `ray` hits something, which answers an any-hit query.
     #[inline(always)]
     pub(crate) fn accepted(&mut self, ray: usize) {
         let index = self.first + ray;
-        match &self.scene {
-            None => self.answers.put(index, Q::ACCEPTED),
-            Some(_) => self.merge(index, Q::ACCEPTED),
+        match (&self.scene, &mut self.answers) {
+            (None, Answers::Any(found)) => found[index] = true,
+            _ => self.merge(index, &Hit::SOME),
         }
     }
 
@@ -123,17 +167,8 @@ impl<'a, Q: Query> Sink<'a, Q> {
     /// would be passed through memory and stall the load that follows.
     #[inline(always)]
     pub(crate) fn hit(&mut self, ray: usize, triangle: u32, t: f32, u: f32, v: f32) {
-        let index = self.first + ray;
-        match &self.scene {
-            None => {
-                let primitive = PrimitiveRef { instance: self.instance, triangle };
-                self.answers.put(index, Q::answer_of(primitive, t, u, v));
-            }
-            Some(scene) => {
-                let instance = scene.visits[index].instance;
-                self.merge(index, Q::answer_of(PrimitiveRef { instance, triangle }, t, u, v));
-            }
-        }
+        let primitive = PrimitiveRef { instance: self.instance_of(ray), triangle };
+        self.answer(ray, Hit { t, u, v, primitive });
     }
 
     /// Stores the hits of up to sixteen consecutive rays from `ray` on. Bit i of `lanes` is set if ray i hits; nothing may have
@@ -141,10 +176,10 @@ impl<'a, Q: Query> Sink<'a, Q> {
     #[inline(always)]
     pub(crate) fn hits<S: Simd>(&mut self, s: S, ray: usize, mut lanes: u32, found: &Intersections) {
         if self.scene.is_none()
-            && let Some(answers) = self.answers.lanes(self.first + ray)
+            && let Answers::Nearest(hits) = &mut self.answers
+            && let Some(hits) = hits[self.first + ray..].first_chunk_mut()
         {
-            let hits = AnswerLanes { lanes, intersections: found, instance: self.instance };
-            return Q::answers_of(s, &hits, answers);
+            return store_hits(s, lanes, found, self.instance, hits);
         }
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize % LANES;
@@ -155,9 +190,28 @@ impl<'a, Q: Query> Sink<'a, Q> {
 
     /// Merges the answer of a visit into the answer of its ray.
     #[inline(never)]
-    fn merge(&mut self, visit: usize, answer: Q::Answer) {
+    fn merge(&mut self, visit: usize, hit: &Hit) {
         let Some(SceneRays { rays, visits, t_scale }) = &self.scene else { return };
         let ray = visits[visit].ray as usize;
-        self.answers.merge(ray, answer, &rays[ray], t_scale[visit]);
+        self.answers.merge(ray, hit, &rays[ray], t_scale[visit]);
     }
+}
+
+/// Stores the hits of sixteen rays in an instance; rays whose bit is not set in `lanes` are misses.
+#[inline(always)]
+pub(crate) fn store_hits<S: Simd>(
+    s: S,
+    lanes: u32,
+    found: &Intersections,
+    instance: u32,
+    hits: &mut [Hit; LANES],
+) {
+    let m = s.mask(lanes);
+    let Hit { t, u, v, primitive } = Hit::MISS;
+    let t = s.select(m, s.load(&found.t), s.splat(t));
+    let u = s.select(m, s.load(&found.u), s.splat(u));
+    let v = s.select(m, s.load(&found.v), s.splat(v));
+    let instance = s.select_u(m, s.splat_u(instance), s.splat_u(primitive.instance));
+    let triangle = s.select_u(m, s.load_u(&found.triangle), s.splat_u(primitive.triangle));
+    s.store_rows5([s.bits(t), s.bits(u), s.bits(v), instance, triangle], zerocopy::transmute_mut!(hits));
 }

@@ -83,47 +83,39 @@ const NEON: u8 = Isa::Neon as u8 + 1;
 const SIMD128: u8 = Isa::Simd128 as u8 + 1;
 const AVX2: u8 = Isa::Avx2 as u8 + 1;
 
-/// Evaluates the expression with the token of an instruction set with 128-bit vectors, if it is compiled for this target and this
-/// machine has it. `$detect` is the function that returns the token: `detect` or, where it is known which instruction sets there are, `found`.
-macro_rules! with_quads {
-    ($isa:expr, $detect:ident, $simd:ident => $do:expr) => {
+/// Evaluates the expression with the token of an instruction set if the kernel type is compiled for its vectors, it is compiled
+/// for this target, and this machine has it. `$detect` is the function that returns the token: `detect` or, where it is known
+/// which instruction sets there are, `found`.
+macro_rules! with_vectors {
+    ($isa:expr, $kernel:ident, $detect:ident, $simd:ident => $do:expr) => {
         match $isa {
             #[cfg(target_arch = "x86_64")]
-            Isa::Sse4 => {
-                if let Some($simd) = super::quads::sse4::Sse4::$detect() {
-                    $do;
-                }
-            }
-            #[cfg(target_arch = "aarch64")]
-            Isa::Neon => {
-                let $simd = super::quads::neon::Neon::new();
-                $do;
-            }
-            #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-            Isa::Simd128 => {
-                let $simd = super::quads::simd128::Simd128::new();
-                $do;
-            }
-            _ => {}
-        }
-    };
-}
-
-/// As [`with_quads`], for an instruction set with longer vectors.
-macro_rules! with_long_vectors {
-    ($isa:expr, $detect:ident, $simd:ident => $do:expr) => {
-        match $isa {
-            #[cfg(target_arch = "x86_64")]
-            Isa::Avx2 => {
+            Isa::Avx2 if $kernel::LONG_VECTORS => {
                 if let Some($simd) = super::avx2::Avx2::$detect() {
                     $do;
                 }
             }
             #[cfg(target_arch = "x86_64")]
-            Isa::Avx512 => {
+            Isa::Avx512 if $kernel::LONG_VECTORS => {
                 if let Some($simd) = super::avx512::Avx512::$detect() {
                     $do;
                 }
+            }
+            #[cfg(target_arch = "x86_64")]
+            Isa::Sse4 if $kernel::QUADS => {
+                if let Some($simd) = super::quads::sse4::Sse4::$detect() {
+                    $do;
+                }
+            }
+            #[cfg(target_arch = "aarch64")]
+            Isa::Neon if $kernel::QUADS => {
+                let $simd = super::quads::neon::Neon::new();
+                $do;
+            }
+            #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+            Isa::Simd128 if $kernel::QUADS => {
+                let $simd = super::quads::simd128::Simd128::new();
+                $do;
             }
             _ => {}
         }
@@ -134,34 +126,45 @@ macro_rules! with_long_vectors {
 #[cfg(not(all(target_arch = "wasm32", target_os = "unknown", target_feature = "simd128")))]
 #[inline(never)]
 fn run_scalar<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run(super::Scalar)
+    if K::SCALAR { kernel.run(super::Scalar) } else { panic!("the kernel is not compiled for scalar code") }
 }
 
 /// A module of WebAssembly for browsers that is compiled for SIMD128 has no scalar kernels, which would be half of its size.
 #[cfg(all(target_arch = "wasm32", target_os = "unknown", target_feature = "simd128"))]
 fn run_scalar<K: Kernel>(kernel: K) -> K::Output {
-    super::quads::simd128::Simd128::new().run(kernel)
+    if K::QUADS {
+        super::quads::simd128::Simd128::new().run(kernel)
+    } else {
+        panic!("not compiled for SIMD128")
+    }
 }
 
 impl Isa {
     /// All instruction sets, from the least to the most capable.
     pub const ALL: [Isa; 6] = [Isa::Scalar, Isa::Sse4, Isa::Neon, Isa::Simd128, Isa::Avx2, Isa::Avx512];
 
-    /// Whether this machine has the instruction set.
+    /// Returns true if this machine has the instruction set.
     pub fn is_available(self) -> bool {
-        struct Nothing;
-        impl Kernel for Nothing {
-            type Output = ();
+        struct IsCompiled;
+        impl Kernel for IsCompiled {
+            type Output = bool;
             #[inline(always)]
-            fn run<S: Simd>(self, _: S) {}
+            fn run<S: Simd>(self, _: S) -> bool {
+                S::HAS_VECTORS
+            }
         }
         match self {
             // See `run_scalar`.
             Isa::Scalar => {
                 !cfg!(all(target_arch = "wasm32", target_os = "unknown", target_feature = "simd128"))
             }
-            _ => self.run_wide(Nothing).is_ok(),
+            _ => self.run(IsCompiled),
         }
+    }
+
+    /// Returns true if its vectors have more than 128 bits.
+    pub(crate) fn has_long_vectors(self) -> bool {
+        matches!(self, Isa::Avx2 | Isa::Avx512)
     }
 
     /// The most capable instruction set of this machine.
@@ -230,12 +233,13 @@ impl Isa {
     }
 
     /// Runs a kernel with this instruction set, or in scalar code if the machine does not have it.
+    ///
+    /// # Panics
+    /// If the kernel is not compiled for it.
     #[doc(hidden)]
     #[inline(always)]
     pub fn run<K: Kernel>(self, kernel: K) -> K::Output {
-        // This repeats `run_wide`, because its `Result` would cost one more copy of the output.
-        with_long_vectors!(self, detect, simd => return simd.run(kernel));
-        with_quads!(self, detect, simd => return simd.run(kernel));
+        with_vectors!(self, K, detect, simd => return simd.run(kernel));
         run_scalar(kernel)
     }
 
@@ -243,32 +247,7 @@ impl Isa {
     /// kernel, so that callers save no registers.
     #[inline(always)]
     pub(crate) fn run_found<K: Kernel>(self, kernel: K) -> K::Output {
-        with_long_vectors!(self, found, simd => return simd.run(kernel));
-        with_quads!(self, found, simd => return simd.run(kernel));
+        with_vectors!(self, K, found, simd => return simd.run(kernel));
         run_scalar(kernel)
-    }
-
-    /// Runs a kernel with this instruction set; returns the kernel as the error if there are no vectors. For large kernels that
-    /// are no faster than other code without vectors: they are not compiled to scalar code.
-    #[inline(always)]
-    pub(crate) fn run_wide<K: Kernel>(self, kernel: K) -> Result<K::Output, K> {
-        with_long_vectors!(self, detect, simd => return Ok(simd.run(kernel)));
-        with_quads!(self, detect, simd => return Ok(simd.run(kernel)));
-        Err(kernel)
-    }
-
-    /// As [`Self::run_wide`], only with vectors of more than 128 bits. With [`Self::run_quads`] it serves kernels that are compiled for
-    /// another type where code is long.
-    #[inline(always)]
-    pub(crate) fn run_long_vectors<K: Kernel>(self, kernel: K) -> Result<K::Output, K> {
-        with_long_vectors!(self, detect, simd => return Ok(simd.run(kernel)));
-        Err(kernel)
-    }
-
-    /// As [`Self::run_wide`], only with vectors of 128 bits.
-    #[inline(always)]
-    pub(crate) fn run_quads<K: Kernel>(self, kernel: K) -> Result<K::Output, K> {
-        with_quads!(self, detect, simd => return Ok(simd.run(kernel)));
-        Err(kernel)
     }
 }

@@ -39,8 +39,13 @@ pub(crate) use scalar::Scalar;
 pub const LANES: usize = 16;
 
 /// A function that is generic over the instruction set, with its arguments.
-pub trait Kernel {
+pub trait Kernel: Sized {
     type Output;
+    /// Whether the kernel is compiled for scalar code, for vectors of 128 bits, and for longer ones. Large kernels that are no
+    /// faster than other code are not.
+    const SCALAR: bool = true;
+    const QUADS: bool = true;
+    const LONG_VECTORS: bool = true;
     /// Must be `#[inline(always)]`.
     fn run<S: Simd>(self, simd: S) -> Self::Output;
 }

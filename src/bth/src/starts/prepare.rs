@@ -43,11 +43,12 @@ impl PreparedStarts {
 
     fn fill_by<R: Row>(&mut self, object: &ObjectView<'_>, rows: &[R], of: (&[StartRay], u32)) {
         let (rays, instance) = of;
-        let whole = rays.len() / LANES * LANES;
-        // `run_wide` returns the kernel in scalar code.
-        let kernel = PrepareKernel { object, rows, rays: &rays[..whole], instance, prepared: self };
-        let first = if Isa::chosen().run_wide(kernel).is_ok() { whole } else { 0 };
-        for index in first..rays.len() {
+        let isa = Isa::chosen();
+        let whole = if isa == Isa::Scalar { 0 } else { rays.len() / LANES * LANES };
+        if whole > 0 {
+            isa.run(PrepareKernel { object, rows, rays: &rays[..whole], instance, prepared: &mut *self });
+        }
+        for index in whole..rays.len() {
             self.fill_one(object, &rays[index], instance, index);
         }
     }
@@ -95,6 +96,7 @@ fn ids<S: Simd>(s: S, groups: &[[StartRay; LANES]], group: usize, instance: u32)
 
 impl<R: Row> Kernel for PrepareKernel<'_, '_, R> {
     type Output = ();
+    const SCALAR: bool = false;
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let PrepareKernel { object, rows, rays, instance, prepared } = self;

@@ -7,7 +7,7 @@ use super::queue::PreparedQueue;
 use super::records::LaneRecords;
 use super::starts::Fill;
 use super::walks::{WalkLists, WalkState, Walks};
-use crate::query::{EitherQuery, Goal, Query};
+use crate::query::{EitherQuery, Goal};
 use crate::rays::Ray;
 use crate::simd::Simd;
 use bth_format::object::ObjectView;

@@ -10,7 +10,6 @@ use super::records::{Entered, ReadRecords};
 use super::walk::{TetPosition, TetWalker, WalkOutcome};
 use super::walks::{Reached, WalkStart, WalkState, Walks};
 use crate::intersect::line::Line;
-use crate::query::Query;
 use bth_format::layout::{FACE_BIT, NONE, TetFace};
 
 /// Greatest number of times that a ray returns to the lanes; after it, the ray is walked to its end in f64.

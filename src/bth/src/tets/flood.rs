@@ -9,7 +9,7 @@
 use super::records::{Entered, ReadRecords};
 use super::walk::{TetWalker, WalkOutcome};
 use crate::intersect::line::{Projected, Sign};
-use crate::query::{Count, EitherQuery, Query};
+use crate::query::{Count, EitherQuery};
 use bth_format::layout::{FACE_BIT, NONE, TetFace};
 use std::collections::BTreeSet;
 

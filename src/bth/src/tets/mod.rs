@@ -20,7 +20,7 @@ use self::walk::{TetWalker, WalkOutcome};
 use crate::intersect::line::Line;
 use crate::intersect::start::start_on;
 use crate::intersect::start_point::ExactRay;
-use crate::query::{Count, EitherQuery, Query};
+use crate::query::{Count, EitherQuery, Goal, RayQuery};
 use bth_format::layout::Child;
 use bth_format::object::ObjectView;
 
@@ -35,16 +35,16 @@ pub(crate) enum TetOutcome {
 
 /// Walks through a tet leaf that has no subtree, from the face of its hull through which the line enters.
 #[inline(never)]
-pub(crate) fn enter_tets<Q: Query, C: Count>(
+pub(crate) fn enter_tets<G: Goal, C: Count>(
     object: &ObjectView<'_>,
     leaf: u32,
     ray: ExactRay<'_>,
-    query: &mut Q,
+    query: &mut RayQuery<G>,
     count: &mut C,
 ) -> TetOutcome {
     let mut either = query.to_either();
     let outcome = enter(object, leaf, ray, &mut either, count);
-    *query = Q::from_either(query.goal(), &either);
+    *query = either.with_goal(query.goal());
     outcome
 }
 

@@ -11,7 +11,7 @@ use super::walk::WalkOutcome;
 use super::walks::{Reached, WalkStart, Walks, vertices};
 use crate::intersect::exact_lanes::{Estimates, F32Lanes, Pairs};
 use crate::intersect::prepare::gather_rays;
-use crate::query::{Query, TriangleRef};
+use crate::query::TriangleRef;
 use crate::simd::{LANES, Part, Simd};
 use bth_format::layout::FACE_BIT;
 use zerocopy::{FromBytes, IntoBytes};

@@ -116,6 +116,8 @@ impl WalkBatch<'_> {
 }
 
 impl Kernel for &mut WalkBatch<'_> {
+    const SCALAR: bool = false;
+    const QUADS: bool = false;
     type Output = ();
 
     /// Walks all rays of the batch.

@@ -9,7 +9,7 @@
 use super::records::{Entered, ReadRecords};
 use crate::intersect::line::{Line, Projected, Sign};
 use crate::intersect::start::ExactStart;
-use crate::query::{Count, EitherQuery, Query, TriangleRef};
+use crate::query::{Count, EitherQuery, TriangleRef};
 use bth_format::layout::{FACE_BIT, HullFace, Link, NONE, TetFace, TetLeaf, TetVertex};
 use bth_format::object::{ObjectView, Records};
 

@@ -16,7 +16,7 @@ use crate::bvh::candidate::Candidate;
 use crate::intersect::edge_functions::{self, Corners, FilteredTriangles};
 use crate::intersect::prepare::{Axes, CommonAxis};
 use crate::intersect::start_point::own_triangle;
-use crate::query::Query;
+use crate::query::Goal;
 use crate::simd::{LANES, Lanewise, Part, Simd, lanes_of_piece};
 use bth_format::layout::WIDTH;
 
@@ -107,7 +107,7 @@ pub(super) struct ReachedTriangles<'a> {
     rays: u64,
 }
 
-impl<Q: Query> PacketRays<'_, Q> {
+impl<G: Goal> PacketRays<'_, G> {
     /// Finds the triangles of a leaf that the rays whose bit is set may hit, if there are any. Where few rays of an any-hit group are left,
     /// it intersects them with the leaf. This is a part of the kernel of packets and inlined into it, once for each format of leaves.
     #[inline(always)]

@@ -7,19 +7,19 @@ use super::single_rays::SingleRays;
 use crate::bvh::candidate::{Candidate, Settle};
 use crate::intersect::boxes::{lower_depth, upper_depth};
 use crate::intersect::start_point::Starts;
-use crate::query::Query;
+use crate::query::{Goal, RayQuery};
 use crate::rays::Ray;
 use crate::simd::{LANES, Part, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 
 /// The rays of a packet with their queries and decided hits.
-pub(crate) struct PacketRays<'a, Q: Query> {
+pub(crate) struct PacketRays<'a, G: Goal> {
     pub(crate) object: &'a ObjectView<'a>,
     pub(crate) rays: &'a [Ray],
-    pub(crate) goal: Q::Goal,
+    pub(crate) goal: G,
     /// Queries of the rays whose bit is set in `queried`.
-    pub(crate) queries: &'a mut [Q],
+    pub(crate) queries: &'a mut [RayQuery<G>],
     /// A bit for each ray with a decision in f64.
     pub(crate) queried: u64,
     /// The rays as prepared single rays.
@@ -60,8 +60,8 @@ impl UncachedHits {
 }
 
 /// [`PacketRays::settle_lanes`] as a part of kernels: it is rare, so they call it on every instruction set.
-pub(super) struct SettleLanes<'p, 'a, S: Simd, Q: Query> {
-    pub(super) rays: &'p mut PacketRays<'a, Q>,
+pub(super) struct SettleLanes<'p, 'a, S: Simd, G: Goal> {
+    pub(super) rays: &'p mut PacketRays<'a, G>,
     pub(super) group: &'p mut RayGroup<S>,
     /// Index of the group.
     pub(super) at: usize,
@@ -70,7 +70,7 @@ pub(super) struct SettleLanes<'p, 'a, S: Simd, Q: Query> {
     pub(super) lanes: u32,
 }
 
-impl<S: Simd, Q: Query> Part<S> for SettleLanes<'_, '_, S, Q> {
+impl<S: Simd, G: Goal> Part<S> for SettleLanes<'_, '_, S, G> {
     type Output = ();
     #[inline(always)]
     fn run(self, s: S) {
@@ -78,7 +78,7 @@ impl<S: Simd, Q: Query> Part<S> for SettleLanes<'_, '_, S, Q> {
     }
 }
 
-impl<Q: Query> PacketRays<'_, Q> {
+impl<G: Goal> PacketRays<'_, G> {
     /// Decides a candidate for the rays of lanes, and before it their pending hits.
     #[inline(always)]
     fn settle_lanes<S: Simd>(
@@ -140,7 +140,7 @@ impl<Q: Query> PacketRays<'_, Q> {
         of_leaf: (u32, u32),
     ) -> bool {
         if self.queried >> ray & 1 == 0 {
-            self.queries[ray] = Q::new(self.goal, &self.rays[ray]);
+            self.queries[ray] = RayQuery::new(self.goal, &self.rays[ray]);
             self.queried |= 1 << ray;
         }
         let exact_ray = (&self.rays[ray], self.starts.of(ray));

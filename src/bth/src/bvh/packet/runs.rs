@@ -12,7 +12,7 @@ use super::traverse::{PacketOutcome, PacketTracer, TracePacket};
 use crate::bvh::coherence::{Span, is_same_octant};
 use crate::bvh::nodes::is_large;
 use crate::query::sink::Sink;
-use crate::query::{Goal, Query};
+use crate::query::{Goal, RayQuery};
 use crate::rays::{RAYS_PER_CACHE_LINE, Ray};
 use crate::simd::{CacheLevel, Kernel, LANES, Part, Simd};
 use bth_format::layout::NONE;
@@ -64,39 +64,44 @@ pub(crate) struct PacketCount {
 }
 
 /// Kernel that traces the coherent rays of a batch in packets; see [`trace`].
-pub(crate) struct Packets<'a, 's, Q: Query> {
+pub(crate) struct Packets<'a, 's, G: Goal> {
     pub object: &'a ObjectView<'a>,
     pub rays: &'a [Ray],
     pub scratch: &'a mut PacketScratch,
     /// The least use of packets for which they are made.
     pub least: MinimumUse,
-    pub sink: &'a mut Sink<'s, Q>,
+    pub sink: &'a mut Sink<'s>,
+    pub goal: G,
 }
 
-impl<Q: Query> Kernel for Packets<'_, '_, Q> {
+impl<G: Goal> Kernel for Packets<'_, '_, G> {
     type Output = PacketCount;
+    const SCALAR: bool = false;
+    const QUADS: bool = G::QUADS;
+    const LONG_VECTORS: bool = G::LONG_VECTORS;
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> PacketCount {
-        trace(s, self.object, self.rays, self.scratch, self.least, self.sink)
+        let Packets { object, rays, scratch, least, sink, goal } = self;
+        trace(s, object, rays, scratch, least, (sink, goal))
     }
 }
 
 /// Traces the coherent rays of a batch in packets, and stores the answers of those that hit something. The indices of the other rays
 /// are left in `scratch.rest`, unless no packets were tried; then the returned count is 0.
 #[inline(always)]
-fn trace<S: Simd, Q: Query>(
+fn trace<S: Simd, G: Goal>(
     s: S,
     object: &ObjectView<'_>,
     rays: &[Ray],
     scratch: &mut PacketScratch,
     least: MinimumUse,
-    sink: &mut Sink<'_, Q>,
+    (sink, goal): (&mut Sink<'_>, G),
 ) -> PacketCount {
     let mut count = PacketCount::default();
     if rays.len() < MIN_RAYS || !is_supported(object) {
         return count;
     }
-    let (bounds, goal) = (object.bounds, sink.goal());
+    let bounds = object.bounds;
     let PacketScratch { groups, buffers, backoffs, rest } = scratch;
     rest.clear();
     let backoffs = backoffs.of(object.identity, goal.is_any());
@@ -107,8 +112,12 @@ fn trace<S: Simd, Q: Query>(
         return count;
     };
     buffers.reserve(object);
-    let mut packets =
-        PacketTracer { groups: groups.of(s), queries: [Q::new(goal, &rays[0]); PACKET], buffers };
+    let mut packets = PacketTracer {
+        groups: groups.of(s),
+        goal,
+        queries: [RayQuery::new(goal, &rays[0]); PACKET],
+        buffers,
+    };
     loop {
         let (first, rays) = (run.first, run.rays);
         // The next rays are in the cache when this packet is done.
@@ -120,9 +129,9 @@ fn trace<S: Simd, Q: Query>(
             Kind::Coherent(span) => {
                 // Any-hit rays with the same origin are rare, so that kernel is compiled for nearest hits only.
                 let outcome = if !goal.is_any() && sink.starts().is_empty() && span.is_from_point() {
-                    frustum::<S, Q, true>(s, object, &bounds, &span, &mut packets, rays, sink)
+                    frustum::<S, G, true>(s, object, &bounds, &span, &mut packets, rays, sink)
                 } else {
-                    frustum::<S, Q, false>(s, object, &bounds, &span, &mut packets, rays, sink)
+                    frustum::<S, G, false>(s, object, &bounds, &span, &mut packets, rays, sink)
                 };
                 (outcome, &mut runs.backoffs.coherent, least.coherent, &mut count.coherent)
             }
@@ -133,9 +142,9 @@ fn trace<S: Simd, Q: Query>(
             Kind::Short(segments) => {
                 let ready = if !S::INLINES_PARTS {
                     // One part prepares both kinds.
-                    prepare::<S, Q, Frustum<S, false>>(s, &bounds, &mut packets, rays, false)
+                    prepare::<S, G, Frustum<S, false>>(s, &bounds, &mut packets, rays, false)
                 } else {
-                    prepare::<S, Q, SegmentBox<S>>(s, &bounds, &mut packets, rays, false)
+                    prepare::<S, G, SegmentBox<S>>(s, &bounds, &mut packets, rays, false)
                 };
                 let outcome = if ready {
                     let bounds = &SegmentBox::new(s, segments);
@@ -269,16 +278,16 @@ fn choose(
 
 /// Traces a run of coherent rays. The parameters are separate, because this is a part of the kernel [`trace`].
 #[inline(always)]
-fn frustum<S: Simd, Q: Query, const POINT: bool>(
+fn frustum<S: Simd, G: Goal, const POINT: bool>(
     s: S,
     object: &ObjectView<'_>,
     bounds: &ObjectBounds,
     span: &Span,
-    packets: &mut PacketTracer<'_, S, Q>,
+    packets: &mut PacketTracer<'_, S, G>,
     rays: &[Ray],
-    sink: &mut Sink<'_, Q>,
+    sink: &mut Sink<'_>,
 ) -> PacketOutcome {
-    if !prepare::<S, Q, Frustum<S, POINT>>(s, bounds, packets, rays, true) {
+    if !prepare::<S, G, Frustum<S, POINT>>(s, bounds, packets, rays, true) {
         return PacketOutcome::Refused;
     }
     let groups = &packets.groups[..rays.len().div_ceil(LANES)];
@@ -291,10 +300,10 @@ fn frustum<S: Simd, Q: Query, const POINT: bool>(
 
 /// Prepares the groups of a packet, with the lines of their rays where these are needed later on; false if a ray cannot be prepared in f32.
 #[inline(always)]
-fn prepare<S: Simd, Q: Query, H: PacketBounds<S>>(
+fn prepare<S: Simd, G: Goal, H: PacketBounds<S>>(
     s: S,
     bounds: &ObjectBounds,
-    packets: &mut PacketTracer<'_, S, Q>,
+    packets: &mut PacketTracer<'_, S, G>,
     rays: &[Ray],
     keeps_lines: bool,
 ) -> bool {

@@ -2,11 +2,9 @@
 
 use crate::bvh::height_field::HeightField;
 use crate::bvh::packet::runs::{MINIMUM_USE, MinimumUse, PacketCount, PacketScratch, Packets};
-use crate::object::{self, Scratch, single};
-use crate::query::sink::Sink;
-use crate::query::{
-    Answer, AnswersOf, Any, AnyHit, EitherAnswers, EitherGoal, Goal, Nearest, NearestHit, Query,
-};
+use crate::object::{self, Scratch};
+use crate::query::sink::{Answers, Sink};
+use crate::query::with_batch_goal;
 use crate::rays::{Hit, Ray};
 use crate::simd::Isa;
 use bth_format::object::ObjectView;
@@ -20,30 +18,32 @@ fn isas() -> impl Iterator<Item = Isa> {
     Isa::ALL.into_iter().filter(|isa| *isa != Isa::Scalar && isa.is_available())
 }
 
-fn packed<Q: Query>(
+fn packed(
     isa: Isa,
     object: &ObjectView<'_>,
     rays: &[Ray],
     least: MinimumUse,
-    answers: AnswersOf<'_, Q>,
+    answers: Answers<'_>,
 ) -> (PacketCount, Vec<u32>) {
     let mut scratch = PacketScratch::default();
-    let count = packed_in::<Q>(isa, &mut scratch, object, rays, least, answers);
+    let count = packed_in(isa, &mut scratch, object, rays, least, answers);
     (count, scratch.rest)
 }
 
 /// As [`packed`], with memory that other batches may have used.
-fn packed_in<Q: Query>(
+fn packed_in(
     isa: Isa,
     scratch: &mut PacketScratch,
     object: &ObjectView<'_>,
     rays: &[Ray],
     least: MinimumUse,
-    mut answers: AnswersOf<'_, Q>,
+    answers: Answers<'_>,
 ) -> PacketCount {
-    let mut sink = Sink::<Q>::new(object.triangle_ids, Q::Goal::reborrow(&mut answers), 0);
-    let kernel = Packets { object, rays, scratch, least, sink: &mut sink };
-    let Ok(count) = isa.run_wide(kernel) else { panic!("{isa} has packets") };
+    let either = answers.goal();
+    let sink = &mut Sink::new(object.triangle_ids, answers, 0);
+    let count = with_batch_goal!(isa, either, goal => {
+        isa.run(Packets { object, rays, scratch: &mut *scratch, least, goal, sink })
+    });
     assert_eq!(count.rays + scratch.rest.len(), rays.len(), "each ray goes one way");
     count
 }
@@ -54,46 +54,14 @@ fn bits(hit: &Hit) -> [u32; 4] {
 
 /// The answers of a single ray.
 fn alone(object: &ObjectView<'_>, ray: &Ray) -> (Hit, bool) {
-    let (mut hit, mut found) = (Hit::MISS, Answer::MISS);
-    single::trace::<Nearest, (), _>((object, NearestHit), ray, 0, &mut (), &mut hit);
-    single::trace::<Any, (), _>((object, AnyHit), ray, 0, &mut (), &mut found);
-    for is_any in [false, true] {
-        let (goal, mut either) = (EitherGoal { is_any }, Hit::MISS);
-        single::trace::<Nearest<EitherGoal>, (), _>((object, goal), ray, 0, &mut (), &mut either);
-        match is_any {
-            true => assert_eq!(either.is_hit(), Answer::is_hit(&found), "{ray:?}"),
-            false => assert_eq!(bits(&either), bits(&hit), "{ray:?}"),
-        }
-    }
-    (hit, Answer::is_hit(&found))
+    (object::nearest(object, ray, 0), object::any(object, ray))
 }
 
-/// Rays traced in packets: their statistics, the rest, and the answers.
-type Packed<'a, A> = (&'a PacketCount, &'a Vec<u32>, &'a Vec<A>);
-
-/// Checks that queries whose goal is known at run time only give the same as those whose goal is a type.
-fn check_either(
-    isa: Isa,
-    object: &ObjectView<'_>,
-    (rays, least): (&[Ray], MinimumUse),
-    (nearest, any): (Packed<'_, Hit>, Packed<'_, bool>),
-) {
-    let mut hits = vec![Hit::MISS; rays.len()];
-    let answers = EitherAnswers::Nearest(&mut hits);
-    let (count, rest) = packed::<Nearest<EitherGoal>>(isa, object, rays, least, answers);
-    assert_eq!((&count, &rest), (nearest.0, nearest.1), "{isa}");
-    assert!(hits.iter().map(bits).eq(nearest.2.iter().map(bits)), "{isa}");
-    let mut found = vec![false; rays.len()];
-    let answers = EitherAnswers::Any(&mut found);
-    let (count, rest) = packed::<Nearest<EitherGoal>>(isa, object, rays, least, answers);
-    assert_eq!((&count, &rest, &found), any, "{isa}");
-}
-
-/// The answers of a batch whose goal is known at run time only: in packets, the rest interleaved.
-fn batch_of_either(object: &ObjectView<'_>, rays: &[Ray]) -> Vec<(Hit, bool)> {
+/// The answers of a batch: in packets, the rest interleaved.
+fn batch(object: &ObjectView<'_>, rays: &[Ray]) -> Vec<(Hit, bool)> {
     let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-    for answers in [EitherAnswers::Nearest(&mut hits), EitherAnswers::Any(&mut found)] {
-        let mut sink = Sink::<Nearest<EitherGoal>>::new(object.triangle_ids, answers, 0);
+    for answers in [Answers::Nearest(&mut hits), Answers::Any(&mut found)] {
+        let mut sink = Sink::new(object.triangle_ids, answers, 0);
         object::trace_batch(object, rays, None, &mut Scratch::default(), &mut sink);
     }
     hits.into_iter().zip(found).collect()
@@ -104,16 +72,15 @@ fn check(surface: &HeightField, rays: &[Ray], least: MinimumUse) -> [(PacketCoun
     let object = surface.view();
     let (mut nearest, mut any) = Default::default();
     let expected: Vec<(Hit, bool)> = rays.iter().map(|ray| alone(&object, ray)).collect();
-    let batch = batch_of_either(&object, rays);
+    let batch = batch(&object, rays);
     for ((ray, (hit, is_hit)), (in_batch, found)) in rays.iter().zip(&expected).zip(&batch) {
         assert_eq!((bits(in_batch), found), (bits(hit), is_hit), "{ray:?}");
     }
     for isa in isas() {
         let mut hits = vec![Hit::MISS; rays.len()];
-        let (count, rest) = packed::<Nearest>(isa, &object, rays, least, &mut hits);
+        let (count, rest) = packed(isa, &object, rays, least, Answers::Nearest(&mut hits));
         let mut found = vec![false; rays.len()];
-        let (count_any, rest_any) = packed::<Any>(isa, &object, rays, least, &mut found);
-        check_either(isa, &object, (rays, least), ((&count, &rest, &hits), (&count_any, &rest_any, &found)));
+        let (count_any, rest_any) = packed(isa, &object, rays, least, Answers::Any(&mut found));
         for (i, (ray, (hit, is_hit))) in rays.iter().zip(&expected).enumerate() {
             if !rest.contains(&(i as u32)) {
                 assert_eq!(bits(&hits[i]), bits(hit), "{isa}, ray {i}, {ray:?}: {:?}, {hit:?}", hits[i]);
@@ -299,8 +266,8 @@ fn what_is_known_of_packets_is_kept_for_the_next_batch_through_the_same_object()
         let mut scratch = PacketScratch::default();
         let mut poor = |surface: &HeightField| {
             let mut hits = vec![Hit::MISS; rays.len()];
-            let (object, answers) = (surface.view(), &mut hits);
-            packed_in::<Nearest>(isa, &mut scratch, &object, &rays, MINIMUM_USE, answers).poor
+            let (object, answers) = (surface.view(), Answers::Nearest(&mut hits));
+            packed_in(isa, &mut scratch, &object, &rays, MINIMUM_USE, answers).poor
         };
         let first = poor(&surface);
         assert!(first > 2, "{isa}: {first}");
@@ -328,11 +295,11 @@ fn nothing_of_a_batch_is_left_for_the_next() {
     for isa in isas() {
         let mut scratch = PacketScratch::default();
         let mut hits = vec![Hit::MISS; before.len()];
-        let answers = &mut hits;
-        packed_in::<Nearest>(isa, &mut scratch, &surface.view(), &before, ALWAYS, answers);
+        let answers = Answers::Nearest(&mut hits);
+        packed_in(isa, &mut scratch, &surface.view(), &before, ALWAYS, answers);
         assert!(hits.iter().filter(|hit| hit.is_hit()).count() > 500);
         let mut found = vec![false; rays.len()];
-        let count = packed_in::<Any>(isa, &mut scratch, &leaf.view(), &rays, ALWAYS, &mut found);
+        let count = packed_in(isa, &mut scratch, &leaf.view(), &rays, ALWAYS, Answers::Any(&mut found));
         assert!(count.short == 2 && found.iter().all(|&found| found), "{isa}: {count:?}");
     }
 }

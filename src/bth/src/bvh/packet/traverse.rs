@@ -17,8 +17,8 @@ use super::single_rays::FEW_OF_PACKET;
 use crate::bvh::nodes::{self, prefetch_into};
 use crate::bvh::ray_state::key_limit;
 use crate::intersect::exact_lanes::{Intersections, OriginTermsLanes, Pairs};
-use crate::query::Query;
 use crate::query::sink::Sink;
+use crate::query::{Goal, RayQuery};
 use crate::rays::Ray;
 use crate::simd::{CacheLevel, LANES, Part, Simd};
 use bth_format::layout::{Child, NONE, WIDTH};
@@ -26,9 +26,10 @@ use bth_format::object::ObjectView;
 use std::marker::PhantomData;
 
 /// The state of a packet: its prepared rays, their queries and its memory. One value serves all packets of a batch.
-pub(crate) struct PacketTracer<'a, S: Simd, Q> {
+pub(crate) struct PacketTracer<'a, S: Simd, G> {
+    pub(super) goal: G,
     pub(crate) groups: &'a mut [RayGroup<S>; GROUPS],
-    pub(super) queries: [Q; PACKET],
+    pub(super) queries: [RayQuery<G>; PACKET],
     pub(crate) buffers: &'a mut PacketBuffers,
 }
 
@@ -43,22 +44,22 @@ pub(crate) enum PacketOutcome {
 
 /// Traces the rays for which the groups have been prepared, and stores the answers of those that hit something. It is a part of kernels,
 /// so that the variables of packets with one kind of bounds are not in the way of others.
-pub(super) struct TracePacket<'p, 'a, 's, S: Simd, Q: Query, H> {
-    pub(super) packets: &'p mut PacketTracer<'a, S, Q>,
+pub(super) struct TracePacket<'p, 'a, 's, S: Simd, G: Goal, H> {
+    pub(super) packets: &'p mut PacketTracer<'a, S, G>,
     pub(super) object: &'p ObjectView<'p>,
     pub(super) bounds: &'p H,
     pub(super) rays: &'p [Ray],
-    pub(super) sink: &'p mut Sink<'s, Q>,
+    pub(super) sink: &'p mut Sink<'s>,
 }
 
-impl<S: Simd, Q: Query, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, S, Q, H> {
+impl<S: Simd, G: Goal, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, S, G, H> {
     type Output = PacketOutcome;
     /// This is longer than other functions: all steps share code, mask, limit and the top of the stack.
     #[inline(always)]
     fn run(self, s: S) -> PacketOutcome {
         let TracePacket { packets, object, bounds, rays, sink } = self;
-        let PacketTracer { groups, queries, buffers } = packets;
-        let goal = sink.goal();
+        let PacketTracer { groups, goal, queries, buffers } = packets;
+        let goal = *goal;
         let PacketBuffers {
             stack,
             points,
@@ -166,7 +167,7 @@ impl<S: Simd, Q: Query, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, 
                 }
             }
         }
-        finish::<S, H, Q>(s, groups, (origin_terms, pairs, intersections), &mut rays, all, sink);
+        finish::<S, H, G>(s, groups, (origin_terms, pairs, intersections), &mut rays, all, sink);
         let steps = u64::from(steps);
         PacketOutcome::Lanes((u64::from(used) * 100 / (steps * rays.rays.len() as u64)) as u32)
     }
@@ -174,13 +175,13 @@ impl<S: Simd, Q: Query, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, 
 
 /// Computes the pending hits, and stores the answers of all rays that hit something.
 #[inline(always)]
-fn finish<S: Simd, H: PacketBounds<S>, Q: Query>(
+fn finish<S: Simd, H: PacketBounds<S>, G: Goal>(
     s: S,
     groups: &[RayGroup<S>],
     (origin_terms, pairs, intersections): (&mut OriginTermsLanes, &mut Pairs, &mut [Intersections; GROUPS]),
-    rays: &mut PacketRays<'_, Q>,
+    rays: &mut PacketRays<'_, G>,
     all: u64,
-    sink: &mut Sink<'_, Q>,
+    sink: &mut Sink<'_>,
 ) {
     if H::is_any(rays.goal) {
         let mut hit = all & !rays.alive;

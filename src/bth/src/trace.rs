@@ -1,0 +1,337 @@
+//! Queries for the nearest hit and for any hit: of one ray, of a batch, and of arrays of components.
+
+// `sealed::Traced` is out of reach for other crates, so its types may be private.
+#![allow(private_interfaces, private_bounds)]
+
+use self::sealed::Traced;
+use crate::batch::RayBatch;
+use crate::hits::Accept;
+use crate::instances::World;
+use crate::object::{self, Scratch};
+use crate::query::Steps;
+use crate::query::sink::{Answers, Sink};
+use crate::rays::{Hit, Ray, StartRay};
+use crate::scene::Scene;
+use crate::simd::Isa;
+use crate::starts::prepare::ENDED;
+use crate::starts::world_ray::{InstanceStart, PlacedRay, WorldRay};
+use crate::streams::{HitStreams, RayStreams};
+use bth_format::layout::Opacity;
+use bth_format::object::ObjectView;
+use std::cell::Cell;
+
+/// A ray that can be traced: a [`Ray`], or a [`StartRay`].
+pub trait TraceRay: sealed::Traced {}
+
+impl TraceRay for Ray {}
+impl TraceRay for StartRay {}
+
+pub(crate) mod sealed {
+    use super::{Answers, InstanceStart, ObjectView, PlacedRay, Ray, Scene, Scratch, World};
+    use crate::object::single::SingleRay;
+
+    /// How rays of a kind are traced.
+    pub trait Traced: SingleRay + Copy + Sync {
+        /// Returns true if the ray may hit something in a scene that is this instance, whose object's space is world space.
+        fn may_start_in(&self, instance: u32) -> bool;
+        /// The ray in the world; `None` if it has no place there.
+        fn placed(&self, scene: &Scene) -> Option<PlacedRay>;
+        /// Returns true if rays are traced together, through instances if there is a world.
+        fn go_together(rays: &[Self], world: Option<&World>) -> bool;
+        /// Stores the answers of rays that hit anything in an instance whose object's space is world space.
+        fn trace_in_object(
+            object: &ObjectView<'_>,
+            rays: &[Self],
+            instance: u32,
+            scratch: &mut Scratch,
+            answers: Answers<'_>,
+        );
+        /// Calls `trace` with the rays of a batch in world space, and with their starts if there are any.
+        fn with_placed(scene: &Scene, rays: &[Self], trace: impl FnOnce(&[Ray], &[InstanceStart]));
+    }
+}
+
+impl Traced for Ray {
+    #[inline(always)]
+    fn may_start_in(&self, _instance: u32) -> bool {
+        true
+    }
+    #[inline(always)]
+    fn placed(&self, _scene: &Scene) -> Option<PlacedRay> {
+        Some(PlacedRay { ray: *self, start: None })
+    }
+    fn go_together(rays: &[Ray], world: Option<&World>) -> bool {
+        world.is_none_or(|world| !world.go_one_by_one(rays))
+    }
+    fn trace_in_object(
+        object: &ObjectView<'_>,
+        rays: &[Ray],
+        instance: u32,
+        scratch: &mut Scratch,
+        answers: Answers<'_>,
+    ) {
+        object::trace_batch(
+            object,
+            rays,
+            None,
+            scratch,
+            &mut Sink::new(object.triangle_ids, answers, instance),
+        );
+    }
+    fn with_placed(_scene: &Scene, rays: &[Ray], trace: impl FnOnce(&[Ray], &[InstanceStart])) {
+        trace(rays, &[]);
+    }
+}
+
+thread_local! {
+    /// The rays of a batch in world space. A thread keeps their memory from one batch to the next.
+    static PLACED: Cell<(Vec<Ray>, Vec<InstanceStart>)> = const { Cell::new((Vec::new(), Vec::new())) };
+}
+
+impl Traced for StartRay {
+    #[inline(always)]
+    fn may_start_in(&self, instance: u32) -> bool {
+        self.start.primitive.instance == instance
+    }
+    fn placed(&self, scene: &Scene) -> Option<PlacedRay> {
+        scene.place(self)
+    }
+    fn go_together(_rays: &[StartRay], _world: Option<&World>) -> bool {
+        Isa::chosen() != Isa::Scalar
+    }
+    fn trace_in_object(
+        object: &ObjectView<'_>,
+        rays: &[StartRay],
+        instance: u32,
+        scratch: &mut Scratch,
+        answers: Answers<'_>,
+    ) {
+        object::trace_starts(object, rays, instance, scratch, answers);
+    }
+    fn with_placed(scene: &Scene, rays: &[StartRay], trace: impl FnOnce(&[Ray], &[InstanceStart])) {
+        let (mut world_rays, mut starts) = PLACED.take();
+        world_rays.clear();
+        starts.clear();
+        for ray in rays {
+            let (ray, start) = match scene.place(ray) {
+                Some(PlacedRay { ray, start: Some(start) }) => (ray, start),
+                _ => (ENDED, InstanceStart::none(ENDED.origin)),
+            };
+            world_rays.push(ray);
+            starts.push(start);
+        }
+        trace(&world_rays, &starts);
+        PLACED.set((world_rays, starts));
+    }
+}
+
+impl Scene {
+    /// Nearest hit of a ray in world space: a [`Ray`], or a [`StartRay`].
+    pub fn nearest<R: TraceRay>(&self, ray: &R) -> Option<Hit> {
+        let mut hit = Hit::MISS;
+        self.store_nearest(ray, &mut hit);
+        hit.is_hit().then_some(hit)
+    }
+
+    /// Returns true if a ray in world space hits anything: a [`Ray`], or a [`StartRay`].
+    pub fn any<R: TraceRay>(&self, ray: &R) -> bool {
+        self.hits_any(ray)
+    }
+
+    /// As [`Self::nearest`], with statistics of the traversal. A miss is [`Hit::MISS`].
+    pub fn nearest_counted<R: TraceRay>(&self, ray: &R) -> (Hit, Steps) {
+        let (mut hit, mut steps) = (Hit::MISS, Steps::default());
+        let Some(placed) = ray.placed(self) else { return (hit, steps) };
+        let world_ray = placed.world_ray();
+        match self.world() {
+            Some(world) if self.sole().is_none() => {
+                (hit, steps) = world.nearest_counted(self.objects(), world_ray);
+            }
+            _ => self.nearest_of_objects(world_ray, &mut hit, |object, instance, ray| {
+                let (hit, more) = world_ray.nearest_counted_in(object, instance, ray);
+                steps += more;
+                hit
+            }),
+        }
+        // The steps of the search behind holes are not counted.
+        self.go_on(ray, &mut hit);
+        (hit, steps)
+    }
+
+    /// A batch of rays, to be traced by [`RayBatch::nearest`] or [`RayBatch::any`].
+    #[inline]
+    pub fn batch<'a, R: TraceRay>(&'a self, rays: &'a [R]) -> RayBatch<'a, R> {
+        RayBatch::new(self, rays)
+    }
+
+    /// As [`RayBatch::nearest`], from arrays into arrays.
+    ///
+    /// ```no_run
+    /// use bth::{HitStreams, RayStreams};
+    ///
+    /// let scene = bth::open("bunny.bth")?;
+    /// let (zero, one) = ([0.0; 4], [1.0; 4]);
+    /// let origin = [&[0.1, 0.2, 0.3, 0.4][..], &zero, &zero];
+    /// let rays = RayStreams { origin, direction: [&zero, &zero, &one], tmin: &[], tmax: &[] };
+    /// let (mut t, mut u, mut v) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+    /// let (mut instance, mut triangle) = ([0; 4], [0; 4]);
+    /// let (instance, triangle) = (&mut instance, &mut triangle);
+    /// let hits = HitStreams { t: &mut t, u: &mut u, v: &mut v, instance, triangle };
+    /// scene.nearest_streams(&rays, hits);
+    /// println!("{t:?}");
+    /// # Ok::<(), bth::Error>(())
+    /// ```
+    ///
+    /// # Panics
+    /// If the arrays differ in length.
+    pub fn nearest_streams(&self, rays: &RayStreams<'_>, mut hits: HitStreams<'_>) {
+        hits.check_lengths(rays.len());
+        let mut block = Vec::new();
+        rays.in_blocks(|first, rays| {
+            block.resize(rays.len(), Hit::MISS);
+            self.batch(rays).nearest(&mut block);
+            hits.store(first, &block);
+        });
+    }
+
+    /// As [`RayBatch::any`], from arrays.
+    ///
+    /// # Panics
+    /// If the arrays differ in length.
+    pub fn any_streams(&self, rays: &RayStreams<'_>, found: &mut [bool]) {
+        assert_eq!(found.len(), rays.len(), "as many results as rays");
+        rays.in_blocks(|first, rays| self.batch(rays).any(&mut found[first..first + rays.len()]));
+    }
+
+    /// Stores the nearest hit of a ray, or [`Hit::MISS`].
+    ///
+    /// Inlined up to the kernel, which is not: every crate that traces single rays would hold kernels of its own. For a single
+    /// ray in a model every instruction on the way there counts.
+    #[inline(always)]
+    pub(crate) fn store_nearest<R: Traced>(&self, ray: &R, hit: &mut Hit) {
+        match self.sole_opaque() {
+            Some(object) if ray.may_start_in(0) => object::store_nearest(object, ray, 0, hit),
+            _ => self.store_nearest_elsewhere(ray, hit),
+        }
+    }
+
+    /// As [`Self::store_nearest`], in any scene.
+    #[inline(never)]
+    fn store_nearest_elsewhere<R: Traced>(&self, ray: &R, hit: &mut Hit) {
+        *hit = Hit::MISS;
+        if let Some((object, instance)) = self.sole() {
+            if ray.may_start_in(instance) {
+                object::store_nearest(object, ray, instance, hit);
+            }
+        } else if let Some(placed) = ray.placed(self) {
+            let world_ray = placed.world_ray();
+            match self.world() {
+                Some(world) => world.store_nearest_of_ray(self.objects(), world_ray, hit),
+                None => self.nearest_of_objects(world_ray, hit, |object, instance, ray| {
+                    world_ray.nearest_in(object, instance, ray)
+                }),
+            }
+        }
+        self.go_on(ray, hit);
+    }
+
+    /// Stores the nearest hit of a ray in all objects of a file without scene sections, each in world space, or in the only
+    /// visible instance. `trace` returns the nearest hit in one.
+    fn nearest_of_objects(
+        &self,
+        world_ray: WorldRay<'_>,
+        best: &mut Hit,
+        mut trace: impl FnMut(&ObjectView<'_>, u32, &Ray) -> Hit,
+    ) {
+        if let Some((object, instance)) = self.sole() {
+            *best = trace(object, instance, world_ray.ray);
+            return;
+        }
+        for instance in 0..self.object_count() {
+            // Not `f32::min`, which would replace a `tmax` of NaN by a number.
+            let tmax = if best.t < world_ray.ray.tmax { best.t } else { world_ray.ray.tmax };
+            let hit = trace(self.view(instance), instance, &Ray { tmax, ..*world_ray.ray });
+            if hit.t < best.t {
+                *best = hit;
+            }
+        }
+    }
+
+    /// Returns true if a ray hits anything.
+    #[inline(always)]
+    pub(crate) fn hits_any<R: Traced>(&self, ray: &R) -> bool {
+        match self.sole_opaque() {
+            Some(object) if ray.may_start_in(0) => object::any(object, ray),
+            _ => self.hits_any_elsewhere(ray),
+        }
+    }
+
+    /// As [`Self::hits_any`], in any scene.
+    #[inline(never)]
+    fn hits_any_elsewhere<R: Traced>(&self, ray: &R) -> bool {
+        let is_hit = if let Some((object, instance)) = self.sole() {
+            ray.may_start_in(instance) && object::any(object, ray)
+        } else if let Some(placed) = ray.placed(self) {
+            let world_ray = placed.world_ray();
+            match self.world() {
+                Some(world) => world.any_of_ray(self.objects(), world_ray),
+                None => (0..self.object_count())
+                    .any(|instance| world_ray.any_in(self.view(instance), instance, world_ray.ray)),
+            }
+        } else {
+            false
+        };
+        is_hit && self.hits_what_is_not_transparent(ray)
+    }
+
+    /// Stores the answers of a batch.
+    pub(crate) fn trace<R: Traced>(&self, rays: &[R], mut answers: Answers<'_>) {
+        let (sole, world) = (self.sole(), self.world());
+        let is_batch = rays.len() >= object::MIN_BATCH && (sole.is_some() || world.is_some());
+        if !is_batch || !R::go_together(rays, if sole.is_some() { None } else { world }) {
+            return match answers {
+                Answers::Nearest(hits) => {
+                    rays.iter().zip(hits).for_each(|(ray, hit)| self.store_nearest(ray, hit));
+                }
+                Answers::Any(found) => {
+                    rays.iter().zip(found).for_each(|(ray, found)| *found = self.hits_any(ray));
+                }
+            };
+        }
+        answers.clear();
+        if let Some((object, instance)) = sole {
+            object::with_scratch(|scratch| {
+                R::trace_in_object(object, rays, instance, scratch, answers.reborrow());
+            });
+        } else if let Some(world) = world {
+            R::with_placed(self, rays, |rays, starts| match answers.reborrow() {
+                Answers::Nearest(hits) => world.nearest(self.objects(), rays, starts, hits),
+                Answers::Any(found) => world.any(self.objects(), rays, starts, found),
+            });
+        }
+        if self.has_opacity() {
+            match answers {
+                Answers::Nearest(hits) => {
+                    rays.iter().zip(hits).for_each(|(ray, hit)| self.go_on(ray, hit));
+                }
+                Answers::Any(found) => rays.iter().zip(found).for_each(|(ray, found)| {
+                    *found = *found && self.hits_what_is_not_transparent(ray);
+                }),
+            }
+        }
+    }
+
+    /// Returns true if a ray that hits something hits anything that is not transparent.
+    fn hits_what_is_not_transparent<R: Traced>(&self, ray: &R) -> bool {
+        let search = |placed: PlacedRay| self.search_any(placed.world_ray(), &Accept::default());
+        !self.has_opacity() || ray.placed(self).is_some_and(search)
+    }
+
+    /// Replaces a ray's nearest hit by its nearest one that is not transparent.
+    fn go_on<R: Traced>(&self, ray: &R, hit: &mut Hit) {
+        if self.has_opacity() && hit.is_hit() && self.opacity(hit) == Opacity::Transparent {
+            let search = |placed: PlacedRay| self.search_nearest(placed.world_ray(), &Accept::default());
+            *hit = ray.placed(self).and_then(search).unwrap_or(Hit::MISS);
+        }
+    }
+}

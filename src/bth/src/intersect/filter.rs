@@ -279,32 +279,6 @@ impl TriangleFilter {
         CandidatesOf { filter: self, block, triangles, first, limit, origin_reach }.inline_or_call(s)
     }
 
-    #[inline(always)]
-    fn candidates_inlined<S: Simd, B: TriangleBlock>(
-        &self,
-        s: S,
-        (block, valid): (&B, u32),
-        first: f32,
-        limit: f32,
-        origin_reach: f32,
-    ) -> Candidates<S> {
-        let corners = block.project(s, self);
-        let mut sides = self.sides(s, &corners);
-        let mut crossed = valid & !s.mask_bits(sides.missed);
-        if crossed & !s.mask_bits(sides.certain) != 0 {
-            sides = self.closer(s, sides, &corners, origin_reach);
-            crossed &= !s.mask_bits(sides.missed);
-        }
-        // In most leaves that a ray enters, all triangles are missed: then depths need not be computed.
-        if crossed == 0 {
-            return Candidates { crossed, maybe: 0, sure: 0, nearest: sides.error, farthest: sides.error };
-        }
-        let tested = self.bound_depths(s, sides, &corners, (first, limit));
-        let maybe = valid & !s.mask_bits(tested.excluded);
-        let sure = maybe & s.mask_bits(tested.certain);
-        Candidates { crossed, maybe, sure, nearest: tested.nearest, farthest: tested.farthest }
-    }
-
     /// The sides on which the ray passes the edges of triangles.
     #[inline(always)]
     fn sides<S: Lanewise>(&self, s: S, corners: &Corners<S>) -> Sides<S> {
@@ -362,7 +336,28 @@ impl<S: Simd, B: TriangleBlock> Part<S> for CandidatesOf<'_, B> {
     fn run(self, s: S) -> Candidates<S> {
         let CandidatesOf { filter, block, triangles: valid, first, limit, origin_reach } = self;
         if S::PIECES == 1 {
-            return filter.candidates_inlined(s, (block, valid), first, limit, origin_reach);
+            let corners = block.project(s, filter);
+            let mut sides = filter.sides(s, &corners);
+            let mut crossed = valid & !s.mask_bits(sides.missed);
+            if crossed & !s.mask_bits(sides.certain) != 0 {
+                sides = filter.closer(s, sides, &corners, origin_reach);
+                crossed &= !s.mask_bits(sides.missed);
+            }
+            // In most leaves that a ray enters, all triangles are missed: then depths need not be computed.
+            if crossed == 0 {
+                return Candidates {
+                    crossed,
+                    maybe: 0,
+                    sure: 0,
+                    nearest: sides.error,
+                    farthest: sides.error,
+                };
+            }
+            let tested = filter.bound_depths(s, sides, &corners, (first, limit));
+            let maybe = valid & !s.mask_bits(tested.excluded);
+            let sure = maybe & s.mask_bits(tested.certain);
+            let FilteredTriangles { nearest, farthest, .. } = tested;
+            return Candidates { crossed, maybe, sure, nearest, farthest };
         }
         let (mut crossed, mut maybe, mut sure) = (0, 0, 0);
         let (mut nearest, mut farthest) = ([0.0; LANES], [0.0; LANES]);

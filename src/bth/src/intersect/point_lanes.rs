@@ -88,7 +88,15 @@ impl<S: Simd> Part<S> for NearChildren<'_, S> {
     type Output = (u32, S::F);
     #[inline(always)]
     fn run(self, s: S) -> (u32, S::F) {
-        self.point.children_inlined(s, self.node, self.limit)
+        let NearChildren { point, node, limit } = self;
+        let mut squared = s.splat(0.0);
+        for k in 0..3 {
+            let below = s.fma(planes(s, node, k, 0), point.scale, s.splat(-point.origin[k]));
+            let above = s.fnma(planes(s, node, k, FAR), point.scale, point.point[k]);
+            let outside = s.max(s.max(below, above), s.splat(0.0));
+            squared = s.fma(outside, outside, squared);
+        }
+        (s.mask_bits(s.le(squared, s.splat(limit))), squared)
     }
 }
 
@@ -98,18 +106,6 @@ impl<S: Simd> PointLanes<S> {
     #[inline(always)]
     pub(crate) fn children(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
         NearChildren { point: self, node, limit }.inline_or_call(s)
-    }
-
-    #[inline(always)]
-    fn children_inlined(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
-        let mut squared = s.splat(0.0);
-        for k in 0..3 {
-            let below = s.fma(planes(s, node, k, 0), self.scale, s.splat(-self.origin[k]));
-            let above = s.fnma(planes(s, node, k, FAR), self.scale, self.point[k]);
-            let outside = s.max(s.max(below, above), s.splat(0.0));
-            squared = s.fma(outside, outside, squared);
-        }
-        (s.mask_bits(s.le(squared, s.splat(limit))), squared)
     }
 
     /// Scaled coordinates relative to the point.

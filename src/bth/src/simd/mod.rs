@@ -406,6 +406,93 @@ macro_rules! plain_doubles {
 }
 use plain_doubles;
 
+/// Vectors of four f64 with AVX, and what else AVX2 and AVX-512 have in common.
+#[cfg(target_arch = "x86_64")]
+macro_rules! avx_doubles {
+    () => {
+        type Doubles = $crate::simd::avx2::doubles::AvxDoubles;
+        #[inline(always)]
+        fn doubles(self) -> Self::Doubles {
+            // SAFETY: self proves AVX2.
+            unsafe { $crate::simd::avx2::doubles::AvxDoubles::new() }
+        }
+        #[inline(always)]
+        fn greatest_of_three(self, a: [f32; 4]) -> [f32; 4] {
+            // SAFETY: self proves AVX2, and so SSE4.1.
+            unsafe { $crate::simd::quads::sse4::greatest_of_three(a) }
+        }
+        #[inline(always)]
+        fn call<P: Part<Self>>(self, part: P) -> P::Output {
+            // SAFETY: self proves that the machine has the features that `part_entry` enables.
+            unsafe { part_entry(self, part) }
+        }
+        #[inline(always)]
+        fn prefetch<T>(self, address: *const T) {
+            // SAFETY: a hint that never faults, whatever the address.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(address.cast()) }
+        }
+        #[inline(always)]
+        fn prefetch_second<T>(self, address: *const T) {
+            // SAFETY: as `prefetch`.
+            unsafe { _mm_prefetch::<_MM_HINT_T1>(address.cast()) }
+        }
+    };
+}
+#[cfg(target_arch = "x86_64")]
+use avx_doubles;
+
+/// Defines the token of an x86-64 instruction set, its detection, and the entries of kernels and of their parts, which enable the
+/// features. `$simd` is the implementation of [`Simd`] that `$make` makes of the token.
+#[cfg(target_arch = "x86_64")]
+macro_rules! x86_token {
+    ($(#[$doc:meta])* $token:ident, $simd:ty = $make:expr, $($feature:tt)*) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug)]
+        pub(in crate::simd) struct $token(());
+
+        /// Whether this machine has the features.
+        static IS_FOUND: $crate::simd::detected::Detected =
+            $crate::simd::detected::Detected::new(|| $(is_x86_feature_detected!($feature))&&*);
+
+        impl $token {
+            #[inline]
+            pub(in crate::simd) fn detect() -> Option<Self> {
+                IS_FOUND.get().then_some($token(()))
+            }
+
+            /// As [`Self::detect`]; `None` before that was called.
+            #[inline(always)]
+            pub(in crate::simd) fn found() -> Option<Self> {
+                IS_FOUND.is_found().then_some($token(()))
+            }
+
+            /// Runs a kernel compiled for these features.
+            #[inline]
+            pub(in crate::simd) fn run<K: $crate::simd::Kernel>(self, kernel: K) -> K::Output {
+                // SAFETY: self proves that the machine has the features that `entry` enables.
+                unsafe { entry($make(self), kernel) }
+            }
+        }
+
+        #[target_feature($(enable = $feature),*)]
+        fn entry<K: $crate::simd::Kernel>(simd: $simd, kernel: K) -> K::Output {
+            kernel.run(simd)
+        }
+
+        /// As [`entry`], for a part of kernels.
+        #[target_feature($(enable = $feature),*)]
+        #[inline(never)]
+        fn part_entry<P: $crate::simd::Part<$simd>>(simd: $simd, part: P) -> P::Output {
+            part.run(simd)
+        }
+    };
+}
+#[cfg(target_arch = "x86_64")]
+use x86_token;
+
+/// The lanes in order.
+const IN_ORDER: [u32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+
 /// Panics unless the indices of all lanes of the mask are below `len` and below 2^31, because gathers have signed 32-bit indices.
 #[inline(always)]
 #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]

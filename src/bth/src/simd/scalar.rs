@@ -127,11 +127,11 @@ fn gather_pair(m: &M, from: &[[u32; 2]], at: &U) -> (U, U) {
     (pair.map(|p| p[0]), pair.map(|p| p[1]))
 }
 
-/// Defines functions of whole vectors, each a loop over the lanes.
+/// Defines methods of whole vectors, each a loop over the lanes.
 macro_rules! loops {
     ($($name:ident($($arg:ident: $of:ty),*) -> $out:ty = $lane:expr;)*) => { $(
         #[inline(always)]
-        fn $name($($arg: &$of),*) -> $out {
+        fn $name(self, $($arg: $of),*) -> $out {
             from_fn(|i| {
                 $(let $arg = $arg[i];)*
                 $lane
@@ -140,63 +140,9 @@ macro_rules! loops {
     )* };
 }
 
-/// Defines methods of the trait that call the functions of the same names.
-macro_rules! methods {
-    ($($name:ident($($arg:ident: $of:ty),*) -> $out:ty;)*) => { $(
-        #[inline(always)]
-        fn $name(self, $($arg: $of),*) -> $out {
-            $name($(&$arg),*)
-        }
-    )* };
-}
-
-loops! {
-    add(a: F, b: F) -> F = a + b;
-    sub(a: F, b: F) -> F = a - b;
-    mul(a: F, b: F) -> F = a * b;
-    div(a: F, b: F) -> F = a / b;
-    fma(a: F, b: F, c: F) -> F = a * b + c;
-    fnma(a: F, b: F, c: F) -> F = c - a * b;
-    min(a: F, b: F) -> F = if a < b { a } else { b };
-    max(a: F, b: F) -> F = if a > b { a } else { b };
-    abs(a: F) -> F = a.abs();
-    max_abs(a: F, b: F) -> F = if a.abs() > b.abs() { a.abs() } else { b.abs() };
-    lt(a: F, b: F) -> M = all_bits(a < b);
-    le(a: F, b: F) -> M = all_bits(a <= b);
-    select_u(m: M, a: U, b: U) -> U = a & m | b & !m;
-    add_u(a: U, b: U) -> U = a.wrapping_add(b);
-    add_where(a: U, m: M, b: U) -> U = a.wrapping_add(b & m);
-    and_u(a: U, b: U) -> U = a & b;
-    or_u(a: U, b: U) -> U = a | b;
-    xor_u(a: U, b: U) -> U = a ^ b;
-    eq_u(a: U, b: U) -> M = all_bits(a == b);
-    lt_u(a: U, b: U) -> M = all_bits(a < b);
-    and_not_u(a: M, b: M) -> M = a & !b;
-}
-
 #[inline(always)]
 fn lookup(table: &U, at: &U) -> U {
     from_fn(|i| table[at[i] as usize % LANES])
-}
-
-#[inline(always)]
-fn shl(a: &U, by: u32) -> U {
-    from_fn(|i| a[i] << by)
-}
-
-#[inline(always)]
-fn mask(bits: u32) -> M {
-    from_fn(|i| all_bits(bits >> i & 1 != 0))
-}
-
-#[inline(always)]
-fn least(a: &F) -> f32 {
-    a.iter().fold(f32::INFINITY, |m, &x| if x < m { x } else { m })
-}
-
-#[inline(always)]
-fn columns_of_all(rows: &[[u32; 8]; LANES]) -> [U; 8] {
-    from_fn(|k| from_fn(|i| rows[i][k]))
 }
 
 #[inline(always)]
@@ -220,28 +166,34 @@ impl Lanewise for Scalar {
     type F = F;
     type U = U;
     type M = M;
-    methods! {
-        add(a: F, b: F) -> F;
-        sub(a: F, b: F) -> F;
-        mul(a: F, b: F) -> F;
-        div(a: F, b: F) -> F;
-        fma(a: F, b: F, c: F) -> F;
-        fnma(a: F, b: F, c: F) -> F;
-        min(a: F, b: F) -> F;
-        max(a: F, b: F) -> F;
-        abs(a: F) -> F;
-        max_abs(a: F, b: F) -> F;
-        lt(a: F, b: F) -> M;
-        le(a: F, b: F) -> M;
-        add_u(a: U, b: U) -> U;
-        add_where(a: U, m: M, b: U) -> U;
-        and_u(a: U, b: U) -> U;
-        or_u(a: U, b: U) -> U;
-        xor_u(a: U, b: U) -> U;
-        eq_u(a: U, b: U) -> M;
-        lt_u(a: U, b: U) -> M;
-        select_u(m: M, a: U, b: U) -> U;
-        mask_bits(m: M) -> u32;
+    loops! {
+        add(a: F, b: F) -> F = a + b;
+        sub(a: F, b: F) -> F = a - b;
+        mul(a: F, b: F) -> F = a * b;
+        div(a: F, b: F) -> F = a / b;
+        fma(a: F, b: F, c: F) -> F = a * b + c;
+        fnma(a: F, b: F, c: F) -> F = c - a * b;
+        min(a: F, b: F) -> F = if a < b { a } else { b };
+        max(a: F, b: F) -> F = if a > b { a } else { b };
+        abs(a: F) -> F = a.abs();
+        max_abs(a: F, b: F) -> F = if a.abs() > b.abs() { a.abs() } else { b.abs() };
+        lt(a: F, b: F) -> M = all_bits(a < b);
+        le(a: F, b: F) -> M = all_bits(a <= b);
+        select_u(m: M, a: U, b: U) -> U = a & m | b & !m;
+        add_u(a: U, b: U) -> U = a.wrapping_add(b);
+        add_where(a: U, m: M, b: U) -> U = a.wrapping_add(b & m);
+        and_u(a: U, b: U) -> U = a & b;
+        or_u(a: U, b: U) -> U = a | b;
+        xor_u(a: U, b: U) -> U = a ^ b;
+        eq_u(a: U, b: U) -> M = all_bits(a == b);
+        lt_u(a: U, b: U) -> M = all_bits(a < b);
+        and(a: M, b: M) -> M = a & b;
+        or(a: M, b: M) -> M = a | b;
+        and_not(a: M, b: M) -> M = a & !b;
+    }
+    #[inline(always)]
+    fn mask_bits(self, m: M) -> u32 {
+        mask_bits(&m)
     }
     #[inline(always)]
     fn splat(self, x: f32) -> F {
@@ -257,7 +209,7 @@ impl Lanewise for Scalar {
     }
     #[inline(always)]
     fn select(self, m: M, a: F, b: F) -> F {
-        floats(select_u(&m, &words(a), &words(b)))
+        floats(self.select_u(m, words(a), words(b)))
     }
     #[inline(always)]
     fn splat_u(self, x: u32) -> U {
@@ -277,7 +229,7 @@ impl Lanewise for Scalar {
     }
     #[inline(always)]
     fn shl_u<const K: u32>(self, a: U) -> U {
-        shl(&a, K)
+        from_fn(|i| a[i] << K)
     }
     #[inline(always)]
     fn bits(self, a: F) -> U {
@@ -289,19 +241,7 @@ impl Lanewise for Scalar {
     }
     #[inline(always)]
     fn mask(self, bits: u32) -> M {
-        mask(bits)
-    }
-    #[inline(always)]
-    fn and(self, a: M, b: M) -> M {
-        and_u(&a, &b)
-    }
-    #[inline(always)]
-    fn or(self, a: M, b: M) -> M {
-        or_u(&a, &b)
-    }
-    #[inline(always)]
-    fn and_not(self, a: M, b: M) -> M {
-        and_not_u(&a, &b)
+        from_fn(|i| all_bits(bits >> i & 1 != 0))
     }
 }
 
@@ -312,8 +252,9 @@ impl Simd for Scalar {
     const HAS_VECTORS: bool = false;
     const INLINES_PARTS: bool = false;
 
-    methods! {
-        least(a: F) -> f32;
+    #[inline(always)]
+    fn least(self, a: F) -> f32 {
+        a.iter().fold(f32::INFINITY, |m, &x| if x < m { x } else { m })
     }
     #[inline(never)]
     fn call<P: Part<Self>>(self, part: P) -> P::Output {
@@ -333,7 +274,7 @@ impl Simd for Scalar {
     }
     #[inline(always)]
     fn columns8(self, rows: &[[u32; 8]; LANES]) -> [U; 8] {
-        columns_of_all(rows)
+        from_fn(|k| from_fn(|i| rows[i][k]))
     }
     #[inline(always)]
     fn expand(self, a: F, m: M, from: &F) -> F {

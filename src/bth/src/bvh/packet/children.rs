@@ -8,39 +8,10 @@ use crate::simd::{LANES, Part, Simd, lanes_of_piece};
 use bth_format::layout::{WIDTH, WideNode};
 use std::marker::PhantomData;
 
-/// Writes the stack entries of the children of a node that the bounds of the packet meet before the depth `limit`, the nearest last;
-/// returns their number. Where directions lie in different octants, each entry gets only the rays that may meet its box. The
-/// parameters are separate, because this is a part of the kernel of packets.
-#[inline(always)]
-fn children<S: Simd, H: PacketBounds<S>, G: Goal>(
-    s: S,
-    (bounds, goal): (&H, G),
-    groups: &[RayGroup<S>],
-    rays: u64,
-    (parent, node): (u32, &WideNode),
-    limit: f32,
-    entries: &mut [StackEntry; WIDTH],
-) -> usize {
-    let slots = s.load_u(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
-    let (bits, keys) = bounds.children(s, node, limit);
-    let (mut slot, mut key) = ([0; LANES], [0.0; LANES]);
-    let count = if H::is_any(goal) {
-        s.compress(bits, slots, &mut slot)
-    } else {
-        s.compress_far_to_near(bits, keys, slots, &mut slot, &mut key)
-    };
-    let mut written = 0;
-    for i in 0..count {
-        let slot = slot[i];
-        let rays = if H::MIXED_OCTANTS { rays & meeting(s, bounds, groups, rays, node, slot) } else { rays };
-        entries[written % WIDTH] = StackEntry { rays, parent, slot, key: key[i] };
-        written += usize::from(rays != 0);
-    }
-    written
-}
-
-/// [`children`] as a part of kernels.
-pub(super) struct Children<'a, S: Simd, H, G> {
+/// Writes the stack entries of the children of a node that the bounds of the packet overlap before the depth `limit`, the nearest
+/// last, as a part of kernels. Its output is their number. Where directions lie in different octants, each entry gets only the
+/// rays that may hit its box.
+pub(super) struct PacketChildren<'a, S: Simd, H, G> {
     pub(super) bounds: &'a H,
     pub(super) groups: &'a [RayGroup<S>],
     pub(super) rays: u64,
@@ -50,12 +21,28 @@ pub(super) struct Children<'a, S: Simd, H, G> {
     pub(super) goal: G,
 }
 
-impl<S: Simd, H: PacketBounds<S>, G: Goal> Part<S> for Children<'_, S, H, G> {
+impl<S: Simd, H: PacketBounds<S>, G: Goal> Part<S> for PacketChildren<'_, S, H, G> {
     type Output = usize;
     #[inline(always)]
     fn run(self, s: S) -> usize {
-        let Children { bounds, groups, rays, node, limit, entries, goal } = self;
-        children::<S, H, G>(s, (bounds, goal), groups, rays, node, limit, entries)
+        let PacketChildren { bounds, groups, rays, node: (parent, node), limit, entries, goal } = self;
+        let slots = s.load_u(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
+        let (bits, keys) = bounds.children(s, node, limit);
+        let (mut slot, mut key) = ([0; LANES], [0.0; LANES]);
+        let count = if H::is_any(goal) {
+            s.compress(bits, slots, &mut slot)
+        } else {
+            s.compress_far_to_near(bits, keys, slots, &mut slot, &mut key)
+        };
+        let mut written = 0;
+        for i in 0..count {
+            let slot = slot[i];
+            let rays =
+                if H::MIXED_OCTANTS { rays & meeting(s, bounds, groups, rays, node, slot) } else { rays };
+            entries[written % WIDTH] = StackEntry { rays, parent, slot, key: key[i] };
+            written += usize::from(rays != 0);
+        }
+        written
     }
 }
 

@@ -28,10 +28,18 @@ pub(crate) struct Frustum<S: Simd, const POINT: bool> {
     lower: [f32; 2],
 }
 
-impl<S: Simd, const POINT: bool> Frustum<S, POINT> {
-    /// The frustum of coherent rays ([`Span::is_coherent`]) that are prepared in `groups`.
+/// Computes the frustum of coherent rays ([`Span::is_coherent`]) that are prepared in `groups`, as a part of kernels.
+pub(crate) struct FrustumOf<'a, S: Simd, const POINT: bool> {
+    pub(crate) bounds: &'a ObjectBounds,
+    pub(crate) span: &'a Span,
+    pub(crate) groups: &'a [RayGroup<S>],
+}
+
+impl<S: Simd, const POINT: bool> Part<S> for FrustumOf<'_, S, POINT> {
+    type Output = Frustum<S, POINT>;
     #[inline(always)]
-    pub(crate) fn new(s: S, bounds: &ObjectBounds, span: &Span, groups: &[RayGroup<S>]) -> Self {
+    fn run(self, s: S) -> Frustum<S, POINT> {
+        let FrustumOf { bounds, span, groups } = self;
         let zero = s.splat(0.0);
         let (padded, _) = span.padded_extent(bounds);
         let (main, _) = span.main_axis();
@@ -98,21 +106,6 @@ impl<S: Simd, const POINT: bool> Frustum<S, POINT> {
             frustum.lower[j] = pad + addend[1].abs() * SLACK + addend[1];
         }
         frustum
-    }
-}
-
-/// [`Frustum::new`] as a part of kernels.
-pub(crate) struct FrustumOf<'a, S: Simd, const POINT: bool> {
-    pub(crate) bounds: &'a ObjectBounds,
-    pub(crate) span: &'a Span,
-    pub(crate) groups: &'a [RayGroup<S>],
-}
-
-impl<S: Simd, const POINT: bool> Part<S> for FrustumOf<'_, S, POINT> {
-    type Output = Frustum<S, POINT>;
-    #[inline(always)]
-    fn run(self, s: S) -> Frustum<S, POINT> {
-        Frustum::new(s, self.bounds, self.span, self.groups)
     }
 }
 
@@ -189,7 +182,7 @@ mod tests {
                 assert!(PrepareGroup::<S, Frustum<S, POINT>>::of(group, bounds, rays, true).run(s));
             }
             let groups = &groups[..rays.len().div_ceil(LANES)];
-            let frustum = Frustum::<S, POINT>::new(s, bounds, &span, groups);
+            let frustum = FrustumOf::<S, POINT> { bounds, span: &span, groups }.run(s);
             let rows = [s.load(&points[0]), s.load(&points[1]), s.load(&points[2])];
             let mut sides = [0; LANES];
             s.store_u(frustum.sides(s, rows), &mut sides);

@@ -59,7 +59,8 @@ impl UncachedHits {
     }
 }
 
-/// [`PacketRays::settle_lanes`] as a part of kernels: it is rare, so they call it on every instruction set.
+/// Decides a candidate for the rays of lanes, and before it their pending hits, as a part of kernels. It is rare, so they call it
+/// on every instruction set.
 pub(super) struct SettleLanes<'p, 'a, S: Simd, G: Goal> {
     pub(super) rays: &'p mut PacketRays<'a, G>,
     pub(super) group: &'p mut RayGroup<S>,
@@ -74,21 +75,7 @@ impl<S: Simd, G: Goal> Part<S> for SettleLanes<'_, '_, S, G> {
     type Output = ();
     #[inline(always)]
     fn run(self, s: S) {
-        self.rays.settle_lanes(s, self.group, self.at, self.candidate, self.lanes);
-    }
-}
-
-impl<G: Goal> PacketRays<'_, G> {
-    /// Decides a candidate for the rays of lanes, and before it their pending hits.
-    #[inline(always)]
-    fn settle_lanes<S: Simd>(
-        &mut self,
-        s: S,
-        group: &mut RayGroup<S>,
-        at: usize,
-        candidate: Candidate,
-        mut lanes: u32,
-    ) {
+        let SettleLanes { rays, group, at, candidate, mut lanes } = self;
         let mut pending = [0; LANES];
         s.store_u(group.pending, &mut pending);
         let uncached = UncachedHits::of(s, group);
@@ -100,11 +87,11 @@ impl<G: Goal> PacketRays<'_, G> {
             let lane = lanes.trailing_zeros() as usize % LANES;
             lanes &= lanes - 1;
             let ray = at * LANES + lane;
-            let pending_hit = uncached.candidate(self.hit_cache, pending[lane], lane);
-            if self.settle_one(s, ray, pending_hit, (candidate.leaf, 1 << candidate.triangle)) {
-                self.alive &= !(1 << ray);
-            } else if let Some(t) = self.queries[ray].found_bounds() {
-                let off = f64::from(self.object.bounds.origin_error);
+            let pending_hit = uncached.candidate(rays.hit_cache, pending[lane], lane);
+            if rays.settle_one(s, ray, pending_hit, (candidate.leaf, 1 << candidate.triangle)) {
+                rays.alive &= !(1 << ray);
+            } else if let Some(t) = rays.queries[ray].found_bounds() {
+                let off = f64::from(rays.object.bounds.origin_error);
                 let [near, far] = t.map(|t| t * f64::from(scale[lane]));
                 nearest[lane] = lower_depth(near - off);
                 limit[lane] = limit[lane].min(upper_depth(far + off));
@@ -115,7 +102,9 @@ impl<G: Goal> PacketRays<'_, G> {
         group.limit = s.load(&limit);
         group.nearest = s.load(&nearest);
     }
+}
 
+impl<G: Goal> PacketRays<'_, G> {
     /// Decides the pending hits of the rays of lanes.
     #[inline(always)]
     pub(super) fn settle_last<S: Simd>(&mut self, s: S, group: &RayGroup<S>, at: usize, mut lanes: u32) {

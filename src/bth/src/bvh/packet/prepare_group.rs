@@ -18,58 +18,6 @@ fn put3<S: Simd>(p: S::Piece, to: &mut [S::F; 3], from: [<S::Piece as Lanewise>:
 }
 
 impl<S: Simd> RayGroup<S> {
-    /// Prepares the first sixteen of the rays; unused lanes repeat the last ray. Returns false if a ray cannot be prepared in f32.
-    #[inline(always)]
-    fn prepare<H: PacketBounds<S>>(
-        &mut self,
-        s: S,
-        bounds: &ObjectBounds,
-        rays: &[Ray],
-        keeps_lines: bool,
-    ) -> bool {
-        let mut field = match rays.first_chunk() {
-            Some(rays) => prepare::load_rays(s, rays),
-            None => {
-                let mut all = [rays[rays.len() - 1]; LANES];
-                all[..rays.len()].copy_from_slice(rays);
-                prepare::load_rays(s, &all)
-            }
-        };
-        self.mixed = MixedAxes::of(s, [field[4], field[5], field[6]]);
-        self.common = self.mixed.common(s);
-        // Only the needed fields are stored, because stores limit the speed of preparation.
-        if H::COMMON_ORIGIN {
-            for k in 0..3 {
-                field[k] = s.splat(rays[0].origin[k]);
-            }
-        }
-        let keeps_lines = keeps_lines && !H::MIXED_OCTANTS;
-        if keeps_lines && (!S::INLINES_PARTS || !H::COMMON_ORIGIN) {
-            self.origin = [field[0], field[1], field[2]];
-        }
-        if keeps_lines {
-            self.direction = [field[4], field[5], field[6]];
-        }
-        // Groups are kept from one batch to the next, so hits of an earlier batch are removed here.
-        self.nearest = s.splat(f32::INFINITY);
-        self.pending = s.splat_u(NONE);
-        // `set_prepared` is called in both branches: joining the results first would pass them through memory.
-        let mut ready = true;
-        for i in 0..S::PIECES {
-            let p = s.piece(i);
-            let field = prepare::pick_rays::<S>(p, &field);
-            let usable = match self.common {
-                Some(common) => self.set_prepared::<H>(p, prepare::prepare_lanes(p, bounds, field, &common)),
-                None => {
-                    let axes = self.mixed.pick(p);
-                    self.set_prepared::<H>(p, prepare::prepare_lanes(p, bounds, field, &axes))
-                }
-            };
-            ready &= usable == lanes_of_piece::<S>(i);
-        }
-        ready
-    }
-
     /// Stores prepared rays of a piece; returns those that are usable, a bit each.
     #[inline(always)]
     fn set_prepared<H: PacketBounds<S>>(
@@ -104,7 +52,8 @@ impl<S: Simd> RayGroup<S> {
     }
 }
 
-/// [`RayGroup::prepare`] as a part of kernels.
+/// Prepares the first sixteen of the rays, as a part of kernels; unused lanes repeat the last ray. Its output is false if a ray
+/// cannot be prepared in f32.
 pub(crate) struct PrepareGroup<'a, S: Simd, H> {
     group: &'a mut RayGroup<S>,
     bounds: &'a ObjectBounds,
@@ -130,6 +79,47 @@ impl<S: Simd, H: PacketBounds<S>> Part<S> for PrepareGroup<'_, S, H> {
     type Output = bool;
     #[inline(always)]
     fn run(self, s: S) -> bool {
-        self.group.prepare::<H>(s, self.bounds, self.rays, self.keeps_lines)
+        let PrepareGroup { group, bounds, rays, keeps_lines, .. } = self;
+        let mut field = match rays.first_chunk() {
+            Some(rays) => prepare::load_rays(s, rays),
+            None => {
+                let mut all = [rays[rays.len() - 1]; LANES];
+                all[..rays.len()].copy_from_slice(rays);
+                prepare::load_rays(s, &all)
+            }
+        };
+        group.mixed = MixedAxes::of(s, [field[4], field[5], field[6]]);
+        group.common = group.mixed.common(s);
+        // Only the needed fields are stored, because stores limit the speed of preparation.
+        if H::COMMON_ORIGIN {
+            for k in 0..3 {
+                field[k] = s.splat(rays[0].origin[k]);
+            }
+        }
+        let keeps_lines = keeps_lines && !H::MIXED_OCTANTS;
+        if keeps_lines && (!S::INLINES_PARTS || !H::COMMON_ORIGIN) {
+            group.origin = [field[0], field[1], field[2]];
+        }
+        if keeps_lines {
+            group.direction = [field[4], field[5], field[6]];
+        }
+        // Groups are kept from one batch to the next, so hits of an earlier batch are removed here.
+        group.nearest = s.splat(f32::INFINITY);
+        group.pending = s.splat_u(NONE);
+        // `set_prepared` is called in both branches: joining the results first would pass them through memory.
+        let mut ready = true;
+        for i in 0..S::PIECES {
+            let p = s.piece(i);
+            let field = prepare::pick_rays::<S>(p, &field);
+            let usable = match group.common {
+                Some(common) => group.set_prepared::<H>(p, prepare::prepare_lanes(p, bounds, field, &common)),
+                None => {
+                    let axes = group.mixed.pick(p);
+                    group.set_prepared::<H>(p, prepare::prepare_lanes(p, bounds, field, &axes))
+                }
+            };
+            ready &= usable == lanes_of_piece::<S>(i);
+        }
+        ready
     }
 }

@@ -250,60 +250,9 @@ impl<S: Simd> RayGroup<S> {
             depths: [S::pick(p, &self.first), S::pick(p, &self.limit)],
         }
     }
-
-    /// Computes the pending hits. Without any, only the bit masks of `intersections` are cleared.
-    #[inline(always)]
-    pub(crate) fn intersect<H: PacketBounds<S>>(
-        &self,
-        s: S,
-        cached: &mut CachedHits<'_>,
-        intersections: &mut Intersections,
-    ) {
-        let lanes = s.mask_bits(s.lt_u(self.pending, s.splat_u(NONE)));
-        (intersections.certain, intersections.open) = (0, 0);
-        if lanes == 0 {
-            return;
-        }
-        let uncached = s.eq_u(self.pending, s.splat_u(UNCACHED));
-        // For most kernels this is a constant.
-        let kept = if H::COMMON_ORIGIN && S::HAS_FAST_F64_LOOKUP { cached.hit_cache.kept() } else { 0 };
-        if kept > 0 && s.mask_bits(uncached) == 0 {
-            cached.compute();
-            let (hit_cache, terms) = (&*cached.hit_cache, &*cached.origin_terms);
-            let (mut direction, mut size) = ([[0.0; LANES]; 3], [0.0; LANES]);
-            for k in 0..3 {
-                s.store(self.direction[k], &mut direction[k]);
-            }
-            s.store(self.scale, &mut size);
-            s.store_u(s.lookup_u(s.load_u(&hit_cache.id), self.pending), &mut intersections.triangle);
-            let pending = self.pending;
-            return if hit_cache.is_at_most_half_full() {
-                intersections.compute_from_point::<S, true>(s, lanes, &direction, &size, terms, pending)
-            } else {
-                intersections.compute_from_point::<S, false>(s, lanes, &direction, &size, terms, pending)
-            };
-        }
-        let (hit_cache, ids, pairs) = (&*cached.hit_cache, cached.ids, &mut *cached.pairs);
-        for k in 0..3 {
-            let origin = if H::COMMON_ORIGIN { s.splat(cached.origin[k]) } else { self.origin[k] };
-            s.store(origin, &mut pairs.origin[k]);
-            s.store(self.direction[k], &mut pairs.direction[k]);
-            for c in 0..3 {
-                let mut corner = self.corner[c][k];
-                if kept > 0 {
-                    corner =
-                        s.select(uncached, corner, s.lookup(s.load(&hit_cache.corner[c][k]), self.pending));
-                }
-                s.store(corner, &mut pairs.corner[c][k]);
-            }
-        }
-        let index = s.select_u(uncached, self.index, s.lookup_u(s.load_u(&hit_cache.index), self.pending));
-        s.store_u(s.gather_u(s.mask(lanes), ids, index), &mut intersections.triangle);
-        intersections.compute(s, lanes, pairs);
-    }
 }
 
-/// [`RayGroup::intersect`] as a part of kernels.
+/// Computes the pending hits of a group, as a part of kernels. Without any, only the bit masks of `intersections` are cleared.
 pub(crate) struct IntersectGroup<'a, 'c, S: Simd, H> {
     pub(crate) group: &'a RayGroup<S>,
     pub(crate) cached: &'a mut CachedHits<'c>,
@@ -315,6 +264,47 @@ impl<S: Simd, H: PacketBounds<S>> Part<S> for IntersectGroup<'_, '_, S, H> {
     type Output = ();
     #[inline(always)]
     fn run(self, s: S) {
-        self.group.intersect::<H>(s, self.cached, self.intersections);
+        let IntersectGroup { group, cached, intersections, .. } = self;
+        let lanes = s.mask_bits(s.lt_u(group.pending, s.splat_u(NONE)));
+        (intersections.certain, intersections.open) = (0, 0);
+        if lanes == 0 {
+            return;
+        }
+        let uncached = s.eq_u(group.pending, s.splat_u(UNCACHED));
+        // For most kernels this is a constant.
+        let kept = if H::COMMON_ORIGIN && S::HAS_FAST_F64_LOOKUP { cached.hit_cache.kept() } else { 0 };
+        if kept > 0 && s.mask_bits(uncached) == 0 {
+            cached.compute();
+            let (hit_cache, terms) = (&*cached.hit_cache, &*cached.origin_terms);
+            let (mut direction, mut size) = ([[0.0; LANES]; 3], [0.0; LANES]);
+            for k in 0..3 {
+                s.store(group.direction[k], &mut direction[k]);
+            }
+            s.store(group.scale, &mut size);
+            s.store_u(s.lookup_u(s.load_u(&hit_cache.id), group.pending), &mut intersections.triangle);
+            let pending = group.pending;
+            return if hit_cache.is_at_most_half_full() {
+                intersections.compute_from_point::<S, true>(s, lanes, &direction, &size, terms, pending)
+            } else {
+                intersections.compute_from_point::<S, false>(s, lanes, &direction, &size, terms, pending)
+            };
+        }
+        let (hit_cache, ids, pairs) = (&*cached.hit_cache, cached.ids, &mut *cached.pairs);
+        for k in 0..3 {
+            let origin = if H::COMMON_ORIGIN { s.splat(cached.origin[k]) } else { group.origin[k] };
+            s.store(origin, &mut pairs.origin[k]);
+            s.store(group.direction[k], &mut pairs.direction[k]);
+            for c in 0..3 {
+                let mut corner = group.corner[c][k];
+                if kept > 0 {
+                    corner =
+                        s.select(uncached, corner, s.lookup(s.load(&hit_cache.corner[c][k]), group.pending));
+                }
+                s.store(corner, &mut pairs.corner[c][k]);
+            }
+        }
+        let index = s.select_u(uncached, group.index, s.lookup_u(s.load_u(&hit_cache.index), group.pending));
+        s.store_u(s.gather_u(s.mask(lanes), ids, index), &mut intersections.triangle);
+        intersections.compute(s, lanes, pairs);
     }
 }

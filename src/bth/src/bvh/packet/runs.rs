@@ -63,7 +63,8 @@ pub(crate) struct PacketCount {
     pub(crate) poor: usize,
 }
 
-/// Kernel that traces the coherent rays of a batch in packets; see [`trace`].
+/// Kernel that traces the coherent rays of a batch in packets and stores the answers of those that hit something. The indices of
+/// the other rays are left in `scratch.rest`, unless no packets were tried; then the returned count is 0.
 pub(crate) struct Packets<'a, 's, G: Goal> {
     pub object: &'a ObjectView<'a>,
     pub rays: &'a [Ray],
@@ -82,93 +83,79 @@ impl<G: Goal> Kernel for Packets<'_, '_, G> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> PacketCount {
         let Packets { object, rays, scratch, least, sink, goal } = self;
-        trace(s, object, rays, scratch, least, (sink, goal))
-    }
-}
-
-/// Traces the coherent rays of a batch in packets, and stores the answers of those that hit something. The indices of the other rays
-/// are left in `scratch.rest`, unless no packets were tried; then the returned count is 0.
-#[inline(always)]
-fn trace<S: Simd, G: Goal>(
-    s: S,
-    object: &ObjectView<'_>,
-    rays: &[Ray],
-    scratch: &mut PacketScratch,
-    least: MinimumUse,
-    (sink, goal): (&mut Sink<'_>, G),
-) -> PacketCount {
-    let mut count = PacketCount::default();
-    if rays.len() < MIN_RAYS || !is_supported(object) {
-        return count;
-    }
-    let bounds = object.bounds;
-    let PacketScratch { groups, buffers, backoffs, rest } = scratch;
-    rest.clear();
-    let backoffs = backoffs.of(object.identity, goal.is_any());
-    let mut runs = Runs { bounds: &bounds, rays, next: 0, backoffs: *backoffs, rest };
-    // The first run is found before the loop, so that `packets` is made only if there are any.
-    let Some(mut run) = runs.next(s, goal) else {
-        *backoffs = runs.backoffs;
-        return count;
-    };
-    buffers.reserve(object);
-    let mut packets = PacketTracer {
-        groups: groups.of(s),
-        goal,
-        queries: [RayQuery::new(goal, &rays[0]); PACKET],
-        buffers,
-    };
-    loop {
-        let (first, rays) = (run.first, run.rays);
-        // The next rays are in the cache when this packet is done.
-        let next = rays.as_ptr().wrapping_add(PACKET);
-        let next = next.cast::<[Ray; RAYS_PER_CACHE_LINE]>();
-        s.prefetch_into::<{ PACKET / RAYS_PER_CACHE_LINE }, _>(CacheLevel::waiting(), next);
-        let sink = &mut sink.part(first);
-        let (outcome, backoff, least_use, kind) = match run.kind {
-            Kind::Coherent(span) => {
-                // Any-hit rays with the same origin are rare, so that kernel is compiled for nearest hits only.
-                let outcome = if !goal.is_any() && sink.starts().is_empty() && span.is_from_point() {
-                    frustum::<S, G, true>(s, object, &bounds, &span, &mut packets, rays, sink)
-                } else {
-                    frustum::<S, G, false>(s, object, &bounds, &span, &mut packets, rays, sink)
-                };
-                (outcome, &mut runs.backoffs.coherent, least.coherent, &mut count.coherent)
-            }
-            // Runs of short rays are found for any-hit queries only, so no kernel is compiled for others.
-            Kind::Short(_) if !goal.is_any() => {
-                (PacketOutcome::Refused, &mut runs.backoffs.short, least.short, &mut count.short)
-            }
-            Kind::Short(segments) => {
-                let ready = if !S::INLINES_PARTS {
-                    // One part prepares both kinds.
-                    prepare::<S, G, Frustum<S, false>>(s, &bounds, &mut packets, rays, false)
-                } else {
-                    prepare::<S, G, SegmentBox<S>>(s, &bounds, &mut packets, rays, false)
-                };
-                let outcome = if ready {
-                    let bounds = &SegmentBox::new(s, segments);
-                    TracePacket { packets: &mut packets, object, bounds, rays, sink }.inline_or_call(s)
-                } else {
-                    PacketOutcome::Refused
-                };
-                (outcome, &mut runs.backoffs.short, least.short, &mut count.short)
-            }
-        };
-        match outcome {
-            PacketOutcome::Refused => runs.skip(first, rays.len()),
-            PacketOutcome::Lanes(share) => {
-                backoff.record(share >= least_use);
-                count.rays += rays.len();
-                *kind += 1;
-                count.poor += usize::from(share < least_use);
-            }
+        let mut count = PacketCount::default();
+        if rays.len() < MIN_RAYS || !is_supported(object) {
+            return count;
         }
-        let Some(next) = runs.next(s, goal) else { break };
-        run = next;
+        let bounds = object.bounds;
+        let PacketScratch { groups, buffers, backoffs, rest } = scratch;
+        rest.clear();
+        let backoffs = backoffs.of(object.identity, goal.is_any());
+        let mut runs = Runs { bounds: &bounds, rays, next: 0, backoffs: *backoffs, rest };
+        // The first run is found before the loop, so that `packets` is made only if there are any.
+        let Some(mut run) = runs.next(s, goal) else {
+            *backoffs = runs.backoffs;
+            return count;
+        };
+        buffers.reserve(object);
+        let mut packets = PacketTracer {
+            groups: groups.of(s),
+            goal,
+            queries: [RayQuery::new(goal, &rays[0]); PACKET],
+            buffers,
+        };
+        loop {
+            let (first, rays) = (run.first, run.rays);
+            // The next rays are in the cache when this packet is done.
+            let next = rays.as_ptr().wrapping_add(PACKET);
+            let next = next.cast::<[Ray; RAYS_PER_CACHE_LINE]>();
+            s.prefetch_into::<{ PACKET / RAYS_PER_CACHE_LINE }, _>(CacheLevel::waiting(), next);
+            let sink = &mut sink.part(first);
+            let (outcome, backoff, least_use, kind) = match run.kind {
+                Kind::Coherent(span) => {
+                    // Any-hit rays with the same origin are rare, so that kernel is compiled for nearest hits only.
+                    let outcome = if !goal.is_any() && sink.starts().is_empty() && span.is_from_point() {
+                        frustum::<S, G, true>(s, object, &bounds, &span, &mut packets, rays, sink)
+                    } else {
+                        frustum::<S, G, false>(s, object, &bounds, &span, &mut packets, rays, sink)
+                    };
+                    (outcome, &mut runs.backoffs.coherent, least.coherent, &mut count.coherent)
+                }
+                // Runs of short rays are found for any-hit queries only, so no kernel is compiled for others.
+                Kind::Short(_) if !goal.is_any() => {
+                    (PacketOutcome::Refused, &mut runs.backoffs.short, least.short, &mut count.short)
+                }
+                Kind::Short(segments) => {
+                    let ready = if !S::INLINES_PARTS {
+                        // One part prepares both kinds.
+                        prepare::<S, G, Frustum<S, false>>(s, &bounds, &mut packets, rays, false)
+                    } else {
+                        prepare::<S, G, SegmentBox<S>>(s, &bounds, &mut packets, rays, false)
+                    };
+                    let outcome = if ready {
+                        let bounds = &SegmentBox::new(s, segments);
+                        TracePacket { packets: &mut packets, object, bounds, rays, sink }.inline_or_call(s)
+                    } else {
+                        PacketOutcome::Refused
+                    };
+                    (outcome, &mut runs.backoffs.short, least.short, &mut count.short)
+                }
+            };
+            match outcome {
+                PacketOutcome::Refused => runs.skip(first, rays.len()),
+                PacketOutcome::Lanes(share) => {
+                    backoff.record(share >= least_use);
+                    count.rays += rays.len();
+                    *kind += 1;
+                    count.poor += usize::from(share < least_use);
+                }
+            }
+            let Some(next) = runs.next(s, goal) else { break };
+            run = next;
+        }
+        *backoffs = runs.backoffs;
+        count
     }
-    *backoffs = runs.backoffs;
-    count
 }
 
 /// Whether packets support an object: no tet leaf lacks a subtree.
@@ -276,7 +263,7 @@ fn choose(
     Choose { bounds, rays, try_coherent, try_short }.inline_or_call(s)
 }
 
-/// Traces a run of coherent rays. The parameters are separate, because this is a part of the kernel [`trace`].
+/// Traces a run of coherent rays. The parameters are separate, because this is a part of the kernel [`Packets`].
 #[inline(always)]
 fn frustum<S: Simd, G: Goal, const POINT: bool>(
     s: S,

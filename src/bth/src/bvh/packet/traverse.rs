@@ -7,7 +7,7 @@
 
 use super::bounds::PacketBounds;
 use super::buffers::PacketBuffers;
-use super::children::{Children, meeting};
+use super::children::{PacketChildren, meeting};
 use super::entry::{GROUPS, PACKET};
 use super::frustum::Frustum;
 use super::hit_cache::CachedHits;
@@ -115,7 +115,7 @@ impl<S: Simd, G: Goal, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, S
                         rays.single_rays.children(s, groups, mask, (line, node), entries)
                     } else {
                         let (rays, node) = (mask, (line, node));
-                        Children { bounds, groups, rays, node, limit, entries, goal }.inline_or_call(s)
+                        PacketChildren { bounds, groups, rays, node, limit, entries, goal }.inline_or_call(s)
                     };
                     None
                 }

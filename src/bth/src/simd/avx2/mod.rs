@@ -8,52 +8,25 @@ pub(super) mod doubles;
 mod packing;
 mod rows;
 
-use self::doubles::AvxDoubles;
 use self::packing::{compression, expansion};
-use self::rows::{IN_ORDER, columns8, transpose4, transpose8};
-use super::detected::Detected;
-use super::quads::sse4;
-use super::{Kernel, LANES, Lanewise, Part, Simd, assert_indices, one_piece, scalar, valid_indices};
+use self::rows::{columns8, transpose4, transpose8};
+use super::{
+    IN_ORDER, LANES, Lanewise, Part, Simd, assert_indices, avx_doubles, one_piece, scalar, valid_indices,
+    x86_token,
+};
 use std::arch::x86_64::*;
 
-/// Proof that this machine has AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Avx2(());
+x86_token!(
+    /// Proof that this machine has AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT.
+    Avx2, Avx2 = std::convert::identity, "avx2" "fma" "bmi1" "bmi2" "lzcnt" "popcnt"
+);
 
 type F = [__m256; 2];
 type U = [__m256i; 2];
 /// All bits of a lane are set, or none.
 type M = [__m256i; 2];
 
-/// Whether this machine has the features.
-static AVX2_FOUND: Detected = Detected::new(|| {
-    is_x86_feature_detected!("avx2")
-        && is_x86_feature_detected!("fma")
-        && is_x86_feature_detected!("bmi1")
-        && is_x86_feature_detected!("bmi2")
-        && is_x86_feature_detected!("lzcnt")
-        && is_x86_feature_detected!("popcnt")
-});
-
 impl Avx2 {
-    #[inline]
-    pub(super) fn detect() -> Option<Self> {
-        AVX2_FOUND.get().then_some(Avx2(()))
-    }
-
-    /// As [`Self::detect`]; `None` before that was called.
-    #[inline(always)]
-    pub(super) fn found() -> Option<Self> {
-        AVX2_FOUND.is_found().then_some(Avx2(()))
-    }
-
-    /// Runs a kernel compiled for these features.
-    #[inline]
-    pub(super) fn run<K: Kernel>(self, kernel: K) -> K::Output {
-        // SAFETY: self proves that the machine has the features that `entry` enables.
-        unsafe { entry(self, kernel) }
-    }
-
     /// Elements `at[i] % 16` of the table, for half of the lanes.
     #[inline(always)]
     fn lookup_half(self, table: F, at: __m256i) -> __m256 {
@@ -74,18 +47,6 @@ impl Avx2 {
         self.store_u(b, &mut out.1);
         out
     }
-}
-
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-fn entry<K: Kernel>(simd: Avx2, kernel: K) -> K::Output {
-    kernel.run(simd)
-}
-
-/// As [`entry`], for a part of kernels.
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-#[inline(never)]
-fn part_entry<P: Part<Avx2>>(simd: Avx2, part: P) -> P::Output {
-    part.run(simd)
 }
 
 /// Methods that apply the same intrinsics to both halves.
@@ -243,26 +204,11 @@ impl Lanewise for Avx2 {
 
 impl Simd for Avx2 {
     one_piece!();
-    type Doubles = AvxDoubles;
-    #[inline(always)]
-    fn doubles(self) -> AvxDoubles {
-        // SAFETY: self proves AVX2.
-        unsafe { AvxDoubles::new() }
-    }
-    #[inline(always)]
-    fn greatest_of_three(self, a: [f32; 4]) -> [f32; 4] {
-        // SAFETY: self proves AVX2, and so SSE4.1.
-        unsafe { sse4::greatest_of_three(a) }
-    }
+    avx_doubles!();
 
     // With two registers for each vector, these parts are long, and calls take no measurable time.
     const INLINES_SHARED_PARTS: bool = false;
 
-    #[inline(always)]
-    fn call<P: Part<Self>>(self, part: P) -> P::Output {
-        // SAFETY: self proves that the machine has the features that `part_entry` enables.
-        unsafe { part_entry(self, part) }
-    }
     #[inline(always)]
     fn lookup(self, table: F, at: U) -> F {
         [self.lookup_half(table, at[0]), self.lookup_half(table, at[1])]
@@ -404,15 +350,5 @@ impl Simd for Avx2 {
             }
         }
         out
-    }
-    #[inline(always)]
-    fn prefetch<T>(self, address: *const T) {
-        // SAFETY: a hint that never faults, whatever the address.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(address.cast()) }
-    }
-    #[inline(always)]
-    fn prefetch_second<T>(self, address: *const T) {
-        // SAFETY: as `prefetch`.
-        unsafe { _mm_prefetch::<_MM_HINT_T1>(address.cast()) }
     }
 }

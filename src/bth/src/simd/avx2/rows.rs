@@ -43,9 +43,6 @@ pub(super) unsafe fn transpose8(rows: [__m256; 8]) -> [__m256; 8] {
     out
 }
 
-/// Row indices of sixteen consecutive rows.
-pub(super) const IN_ORDER: [u32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
-
 /// Loads the rows with the indices `row` and transposes them, see [`crate::simd::Simd::rows8`].
 ///
 /// # Safety

@@ -11,62 +11,19 @@ mod transpose;
 use self::rows::{COLUMNS5, ROWS5, columns8, concat_quarters};
 use self::sort::{keys_with_lanes, nearest_of_four, store_far_to_near};
 use self::transpose::{transpose4, transpose16};
-use super::avx2::doubles::AvxDoubles;
-use super::detected::Detected;
-use super::quads::sse4;
-use super::{Kernel, LANES, Lanewise, Part, Simd, assert_indices, one_piece, valid_indices};
+use super::{
+    IN_ORDER, LANES, Lanewise, Part, Simd, assert_indices, avx_doubles, one_piece, valid_indices, x86_token,
+};
 use std::arch::x86_64::*;
 
-/// Proof that this machine has AVX-512 F, BW, CD, DQ and VL, AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Avx512(());
+x86_token!(
+    /// Proof that this machine has AVX-512 F, BW, CD, DQ and VL, AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT.
+    Avx512, Avx512 = std::convert::identity, "avx512f" "avx512bw" "avx512cd" "avx512dq" "avx512vl"
+    "avx2" "fma" "bmi1" "bmi2" "lzcnt" "popcnt"
+);
 
-/// Whether this machine has the features.
-static AVX512_FOUND: Detected = Detected::new(|| {
-    is_x86_feature_detected!("avx512f")
-        && is_x86_feature_detected!("avx512bw")
-        && is_x86_feature_detected!("avx512cd")
-        && is_x86_feature_detected!("avx512dq")
-        && is_x86_feature_detected!("avx512vl")
-        && is_x86_feature_detected!("avx2")
-        && is_x86_feature_detected!("fma")
-        && is_x86_feature_detected!("bmi1")
-        && is_x86_feature_detected!("bmi2")
-        && is_x86_feature_detected!("lzcnt")
-        && is_x86_feature_detected!("popcnt")
-});
-
-impl Avx512 {
-    #[inline]
-    pub(super) fn detect() -> Option<Self> {
-        AVX512_FOUND.get().then_some(Avx512(()))
-    }
-
-    /// As [`Self::detect`]; `None` before that was called.
-    #[inline(always)]
-    pub(super) fn found() -> Option<Self> {
-        AVX512_FOUND.is_found().then_some(Avx512(()))
-    }
-
-    /// Runs a kernel compiled for these features.
-    #[inline]
-    pub(super) fn run<K: Kernel>(self, kernel: K) -> K::Output {
-        // SAFETY: self proves that the machine has the features that `entry` enables.
-        unsafe { entry(self, kernel) }
-    }
-}
-
-#[target_feature(enable = "avx512f,avx512bw,avx512cd,avx512dq,avx512vl,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-fn entry<K: Kernel>(simd: Avx512, kernel: K) -> K::Output {
-    kernel.run(simd)
-}
-
-/// As [`entry`], for a part of kernels.
-#[target_feature(enable = "avx512f,avx512bw,avx512cd,avx512dq,avx512vl,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-#[inline(never)]
-fn part_entry<P: Part<Avx512>>(simd: Avx512, part: P) -> P::Output {
-    part.run(simd)
-}
+type F = __m512;
+type U = __m512i;
 
 /// Methods that are one intrinsic on registers.
 macro_rules! intrinsics {
@@ -80,64 +37,64 @@ macro_rules! intrinsics {
 }
 
 impl Lanewise for Avx512 {
-    type F = __m512;
-    type U = __m512i;
-    type M = __mmask16;
+    type F = F;
+    type U = U;
+    type M = u16;
     intrinsics! {
-        splat(x: f32) -> __m512 = _mm512_set1_ps(x);
-        add(a: __m512, b: __m512) -> __m512 = _mm512_add_ps(a, b);
-        sub(a: __m512, b: __m512) -> __m512 = _mm512_sub_ps(a, b);
-        mul(a: __m512, b: __m512) -> __m512 = _mm512_mul_ps(a, b);
-        div(a: __m512, b: __m512) -> __m512 = _mm512_div_ps(a, b);
-        fma(a: __m512, b: __m512, c: __m512) -> __m512 = _mm512_fmadd_ps(a, b, c);
-        fnma(a: __m512, b: __m512, c: __m512) -> __m512 = _mm512_fnmadd_ps(a, b, c);
-        min(a: __m512, b: __m512) -> __m512 = _mm512_min_ps(a, b);
-        max(a: __m512, b: __m512) -> __m512 = _mm512_max_ps(a, b);
-        abs(a: __m512) -> __m512 = _mm512_abs_ps(a);
+        splat(x: f32) -> F = _mm512_set1_ps(x);
+        add(a: F, b: F) -> F = _mm512_add_ps(a, b);
+        sub(a: F, b: F) -> F = _mm512_sub_ps(a, b);
+        mul(a: F, b: F) -> F = _mm512_mul_ps(a, b);
+        div(a: F, b: F) -> F = _mm512_div_ps(a, b);
+        fma(a: F, b: F, c: F) -> F = _mm512_fmadd_ps(a, b, c);
+        fnma(a: F, b: F, c: F) -> F = _mm512_fnmadd_ps(a, b, c);
+        min(a: F, b: F) -> F = _mm512_min_ps(a, b);
+        max(a: F, b: F) -> F = _mm512_max_ps(a, b);
+        abs(a: F) -> F = _mm512_abs_ps(a);
         // Immediate 0b1011: the greater in magnitude, with the sign bit cleared.
-        max_abs(a: __m512, b: __m512) -> __m512 = _mm512_range_ps::<0b1011>(a, b);
-        lt(a: __m512, b: __m512) -> u16 = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b);
-        le(a: __m512, b: __m512) -> u16 = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b);
-        select(m: u16, a: __m512, b: __m512) -> __m512 = _mm512_mask_mov_ps(b, m, a);
-        splat_u(x: u32) -> __m512i = _mm512_set1_epi32(x as i32);
-        add_u(a: __m512i, b: __m512i) -> __m512i = _mm512_add_epi32(a, b);
-        add_where(a: __m512i, m: u16, b: __m512i) -> __m512i = _mm512_mask_add_epi32(a, m, a, b);
-        and_u(a: __m512i, b: __m512i) -> __m512i = _mm512_and_si512(a, b);
-        or_u(a: __m512i, b: __m512i) -> __m512i = _mm512_or_si512(a, b);
-        xor_u(a: __m512i, b: __m512i) -> __m512i = _mm512_xor_si512(a, b);
-        eq_u(a: __m512i, b: __m512i) -> u16 = _mm512_cmpeq_epi32_mask(a, b);
-        lt_u(a: __m512i, b: __m512i) -> u16 = _mm512_cmplt_epu32_mask(a, b);
-        select_u(m: u16, a: __m512i, b: __m512i) -> __m512i = _mm512_mask_mov_epi32(b, m, a);
-        bits(a: __m512) -> __m512i = _mm512_castps_si512(a);
-        floats(a: __m512i) -> __m512 = _mm512_castsi512_ps(a);
+        max_abs(a: F, b: F) -> F = _mm512_range_ps::<0b1011>(a, b);
+        lt(a: F, b: F) -> u16 = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b);
+        le(a: F, b: F) -> u16 = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b);
+        select(m: u16, a: F, b: F) -> F = _mm512_mask_mov_ps(b, m, a);
+        splat_u(x: u32) -> U = _mm512_set1_epi32(x as i32);
+        add_u(a: U, b: U) -> U = _mm512_add_epi32(a, b);
+        add_where(a: U, m: u16, b: U) -> U = _mm512_mask_add_epi32(a, m, a, b);
+        and_u(a: U, b: U) -> U = _mm512_and_si512(a, b);
+        or_u(a: U, b: U) -> U = _mm512_or_si512(a, b);
+        xor_u(a: U, b: U) -> U = _mm512_xor_si512(a, b);
+        eq_u(a: U, b: U) -> u16 = _mm512_cmpeq_epi32_mask(a, b);
+        lt_u(a: U, b: U) -> u16 = _mm512_cmplt_epu32_mask(a, b);
+        select_u(m: u16, a: U, b: U) -> U = _mm512_mask_mov_epi32(b, m, a);
+        bits(a: F) -> U = _mm512_castps_si512(a);
+        floats(a: U) -> F = _mm512_castsi512_ps(a);
     }
     #[inline(always)]
-    fn load(self, from: &[f32; LANES]) -> __m512 {
+    fn load(self, from: &[f32; LANES]) -> F {
         // SAFETY: sixteen readable floats; unaligned loads.
         unsafe { _mm512_loadu_ps(from.as_ptr()) }
     }
     #[inline(always)]
-    fn store(self, a: __m512, to: &mut [f32; LANES]) {
+    fn store(self, a: F, to: &mut [f32; LANES]) {
         // SAFETY: sixteen writable floats; unaligned stores.
         unsafe { _mm512_storeu_ps(to.as_mut_ptr(), a) }
     }
     #[inline(always)]
-    fn load_u(self, from: &[u32; LANES]) -> __m512i {
+    fn load_u(self, from: &[u32; LANES]) -> U {
         // SAFETY: as `load`.
         unsafe { _mm512_loadu_si512(from.as_ptr().cast()) }
     }
     #[inline(always)]
-    fn load_bytes(self, from: &[u8; LANES]) -> __m512i {
+    fn load_bytes(self, from: &[u8; LANES]) -> U {
         // SAFETY: sixteen readable bytes; an unaligned load.
         unsafe { _mm512_cvtepu8_epi32(_mm_loadu_si128(from.as_ptr().cast())) }
     }
     #[inline(always)]
-    fn store_u(self, a: __m512i, to: &mut [u32; LANES]) {
+    fn store_u(self, a: U, to: &mut [u32; LANES]) {
         // SAFETY: as `store`.
         unsafe { _mm512_storeu_si512(to.as_mut_ptr().cast(), a) }
     }
     #[inline(always)]
-    fn shl_u<const K: u32>(self, a: __m512i) -> __m512i {
+    fn shl_u<const K: u32>(self, a: U) -> U {
         // SAFETY: registers only.
         unsafe { _mm512_slli_epi32::<K>(a) }
     }
@@ -165,31 +122,16 @@ impl Lanewise for Avx512 {
 
 impl Simd for Avx512 {
     one_piece!();
-    type Doubles = AvxDoubles;
-    #[inline(always)]
-    fn doubles(self) -> AvxDoubles {
-        // SAFETY: self proves AVX2.
-        unsafe { AvxDoubles::new() }
-    }
-    #[inline(always)]
-    fn greatest_of_three(self, a: [f32; 4]) -> [f32; 4] {
-        // SAFETY: self proves AVX2, and so SSE4.1.
-        unsafe { sse4::greatest_of_three(a) }
-    }
+    avx_doubles!();
 
     intrinsics! {
-        lookup(table: __m512, at: __m512i) -> __m512 = _mm512_permutexvar_ps(at, table);
-        least(a: __m512) -> f32 = _mm512_reduce_min_ps(a);
-        lookup_u(table: __m512i, at: __m512i) -> __m512i = _mm512_permutexvar_epi32(at, table);
+        lookup(table: F, at: U) -> F = _mm512_permutexvar_ps(at, table);
+        least(a: F) -> f32 = _mm512_reduce_min_ps(a);
+        lookup_u(table: U, at: U) -> U = _mm512_permutexvar_epi32(at, table);
     }
 
     #[inline(always)]
-    fn call<P: Part<Self>>(self, part: P) -> P::Output {
-        // SAFETY: self proves that the machine has the features that `part_entry` enables.
-        unsafe { part_entry(self, part) }
-    }
-    #[inline(always)]
-    fn rows4(self, m: u16, from: &[[f32; 4]], row: __m512i) -> [__m512; 4] {
+    fn rows4(self, m: u16, from: &[[f32; 4]], row: U) -> [F; 4] {
         let row = valid_indices(self, m, row, from.len());
         // SAFETY: `valid_indices` returns indices of rows of the slice; unaligned loads.
         unsafe {
@@ -208,18 +150,18 @@ impl Simd for Avx512 {
         }
     }
     #[inline(always)]
-    fn rows8(self, m: u16, from: &[[u32; 8]], row: __m512i) -> [__m512i; 8] {
+    fn rows8(self, m: u16, from: &[[u32; 8]], row: U) -> [U; 8] {
         let row = valid_indices(self, m, row, from.len());
         // SAFETY: `valid_indices` returns indices of rows of the slice.
         unsafe { columns8(self, from.as_ptr(), row) }
     }
     #[inline(always)]
-    fn columns8(self, rows: &[[u32; 8]; LANES]) -> [__m512i; 8] {
+    fn columns8(self, rows: &[[u32; 8]; LANES]) -> [U; 8] {
         // SAFETY: there are sixteen rows.
-        unsafe { columns8(self, rows.as_ptr(), [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]) }
+        unsafe { columns8(self, rows.as_ptr(), IN_ORDER) }
     }
     #[inline(always)]
-    fn store_rows5(self, columns: [__m512i; 5], to: &mut [[u32; 5]; LANES]) {
+    fn store_rows5(self, columns: [U; 5], to: &mut [[u32; 5]; LANES]) {
         let to = to.as_flattened_mut();
         for (part, to) in to.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
             let row = self.load_u(&ROWS5[part]);
@@ -233,7 +175,7 @@ impl Simd for Avx512 {
     }
     const HAS_FAST_F64_LOOKUP: bool = true;
     #[inline(always)]
-    fn lookup_f64<const FIRST_HALF: bool>(self, table: &[f64; LANES], at: __m512i) -> [f64; LANES] {
+    fn lookup_f64<const FIRST_HALF: bool>(self, table: &[f64; LANES], at: U) -> [f64; LANES] {
         let mut out = [0.0; LANES];
         // SAFETY: self proves the features; the first and the last eight elements of arrays of sixteen are read and written.
         unsafe {
@@ -252,13 +194,13 @@ impl Simd for Avx512 {
         out
     }
     #[inline(always)]
-    fn gather_u(self, m: u16, from: &[u32], at: __m512i) -> __m512i {
+    fn gather_u(self, m: u16, from: &[u32], at: U) -> U {
         assert_indices(self, m, at, from.len());
         // SAFETY: the indices of set lanes lie in the slice and are not negative as i32; clear lanes are not accessed.
         unsafe { _mm512_mask_i32gather_epi32::<4>(_mm512_setzero_si512(), m, at, from.as_ptr().cast()) }
     }
     #[inline(always)]
-    fn gather_pair(self, m: u16, from: &[[u32; 2]], at: __m512i) -> (__m512i, __m512i) {
+    fn gather_pair(self, m: u16, from: &[[u32; 2]], at: U) -> (U, U) {
         let at = valid_indices(self, m, at, from.len());
         // SAFETY: `valid_indices` returns indices of elements of the slice; unaligned loads of eight bytes.
         unsafe {
@@ -283,19 +225,19 @@ impl Simd for Avx512 {
         }
     }
     #[inline(always)]
-    fn expand(self, a: __m512, m: u16, from: &[f32; LANES]) -> __m512 {
+    fn expand(self, a: F, m: u16, from: &[f32; LANES]) -> F {
         // Expanding loads are slow on some machines, so the elements are loaded first.
         // SAFETY: registers only.
         unsafe { _mm512_mask_expand_ps(a, m, self.load(from)) }
     }
     #[inline(always)]
-    fn expand_u(self, a: __m512i, m: u16, from: &[u32; LANES]) -> __m512i {
+    fn expand_u(self, a: U, m: u16, from: &[u32; LANES]) -> U {
         // SAFETY: as `expand`.
         unsafe { _mm512_mask_expand_epi32(a, m, self.load_u(from)) }
     }
     const HAS_FAST_COMPRESS: bool = true;
     #[inline(always)]
-    fn compress(self, bits: u32, a: __m512i, to: &mut [u32; LANES]) -> usize {
+    fn compress(self, bits: u32, a: U, to: &mut [u32; LANES]) -> usize {
         // SAFETY: all sixteen lanes are stored to an array of sixteen.
         unsafe {
             // Compression to a register and a store of all lanes are much faster than a compressing store.
@@ -304,7 +246,7 @@ impl Simd for Avx512 {
         (bits & 0xffff).count_ones() as usize
     }
     #[inline(always)]
-    fn compress_f(self, bits: u32, a: __m512, to: &mut [f32; LANES]) -> usize {
+    fn compress_f(self, bits: u32, a: F, to: &mut [f32; LANES]) -> usize {
         // SAFETY: as `compress`.
         unsafe { _mm512_storeu_ps(to.as_mut_ptr(), _mm512_maskz_compress_ps(bits as u16, a)) };
         (bits & 0xffff).count_ones() as usize
@@ -313,8 +255,8 @@ impl Simd for Avx512 {
     fn compress_far_to_near(
         self,
         bits: u32,
-        key: __m512,
-        a: __m512i,
+        key: F,
+        a: U,
         to: &mut [u32; LANES],
         keys: &mut [f32; LANES],
     ) -> usize {
@@ -325,8 +267,8 @@ impl Simd for Avx512 {
     fn sort_far_to_near(
         self,
         bits: u32,
-        key: __m512,
-        a: __m512i,
+        key: F,
+        a: U,
         to: &mut [u32; LANES],
         keys: &mut [f32; LANES],
     ) -> (usize, usize) {
@@ -369,23 +311,13 @@ impl Simd for Avx512 {
         kept
     }
     #[inline(always)]
-    fn transpose(self, rows: [__m512; LANES]) -> [__m512; LANES] {
+    fn transpose(self, rows: [F; LANES]) -> [F; LANES] {
         // SAFETY: self proves the features; registers only.
         unsafe { transpose16(rows) }
     }
     #[inline(always)]
-    fn least_of_each(self, rows: [__m512; LANES]) -> __m512 {
+    fn least_of_each(self, rows: [F; LANES]) -> F {
         // SAFETY: as `transpose`.
         unsafe { transpose::least_of_each(rows) }
-    }
-    #[inline(always)]
-    fn prefetch<T>(self, address: *const T) {
-        // SAFETY: a hint that never faults, whatever the address.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(address.cast()) }
-    }
-    #[inline(always)]
-    fn prefetch_second<T>(self, address: *const T) {
-        // SAFETY: as `prefetch`.
-        unsafe { _mm_prefetch::<_MM_HINT_T1>(address.cast()) }
     }
 }

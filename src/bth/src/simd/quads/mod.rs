@@ -15,12 +15,49 @@ pub(super) mod simd128;
 pub(super) mod sse4;
 
 use self::register::Register;
-use super::{LANES, Lanewise, Part, Simd, assert_indices, plain_doubles, scalar, valid_indices};
+use super::{IN_ORDER, LANES, Lanewise, Part, Simd, assert_indices, plain_doubles, scalar, valid_indices};
 
 /// Lanes of a register.
 const QUAD: usize = 4;
 /// Registers of a vector.
 const QUADS: usize = LANES / QUAD;
+
+/// Passes the operations that treat each lane alone to another macro: one list for one register, all four, and a piece.
+macro_rules! lane_operations {
+    ($then:ident) => {
+        $then! {
+            add(a: F, b: F) -> F;
+            sub(a: F, b: F) -> F;
+            mul(a: F, b: F) -> F;
+            div(a: F, b: F) -> F;
+            fma(a: F, b: F, c: F) -> F;
+            fnma(a: F, b: F, c: F) -> F;
+            min(a: F, b: F) -> F;
+            max(a: F, b: F) -> F;
+            abs(a: F) -> F;
+            lt(a: F, b: F) -> U;
+            le(a: F, b: F) -> U;
+            select(m: U, a: F, b: F) -> F;
+            add_u(a: U, b: U) -> U;
+            and_u(a: U, b: U) -> U;
+            or_u(a: U, b: U) -> U;
+            xor_u(a: U, b: U) -> U;
+            eq_u(a: U, b: U) -> U;
+            lt_u(a: U, b: U) -> U;
+            and_not(a: U, b: U) -> U;
+            bits(a: F) -> U;
+            floats(a: U) -> F;
+        }
+    };
+}
+use lane_operations;
+
+/// Methods of one register without a body.
+macro_rules! declared {
+    ($($name:ident($($arg:ident: $of:ident),*) -> $out:ident;)*) => {
+        $(fn $name(self, $($arg: Self::$of),*) -> Self::$out;)*
+    };
+}
 
 /// A token of an instruction set with registers of four lanes, and its operations on them. Where nothing else is said, they are those
 /// of the same name in [`Simd`].
@@ -36,18 +73,7 @@ pub(super) trait Quad: Copy + 'static {
     fn splat(self, x: f32) -> Self::F;
     fn load(self, from: &[f32; QUAD]) -> Self::F;
     fn store(self, a: Self::F, to: &mut [f32; QUAD]);
-    fn add(self, a: Self::F, b: Self::F) -> Self::F;
-    fn sub(self, a: Self::F, b: Self::F) -> Self::F;
-    fn mul(self, a: Self::F, b: Self::F) -> Self::F;
-    fn div(self, a: Self::F, b: Self::F) -> Self::F;
-    fn fma(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
-    fn fnma(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
-    fn min(self, a: Self::F, b: Self::F) -> Self::F;
-    fn max(self, a: Self::F, b: Self::F) -> Self::F;
-    fn abs(self, a: Self::F) -> Self::F;
-    fn lt(self, a: Self::F, b: Self::F) -> Self::U;
-    fn le(self, a: Self::F, b: Self::F) -> Self::U;
-    fn select(self, m: Self::U, a: Self::F, b: Self::F) -> Self::F;
+    lane_operations!(declared);
     /// The least of the four lanes, none of which may be NaN.
     fn least(self, a: Self::F) -> f32;
     /// Transposes: lane k of row i becomes lane i of row k.
@@ -61,17 +87,7 @@ pub(super) trait Quad: Copy + 'static {
     fn store_u(self, a: Self::U, to: &mut [u32; QUAD]);
     /// Loads four bytes, each zero-extended to a lane.
     fn load_bytes(self, from: &[u8; QUAD]) -> Self::U;
-    fn add_u(self, a: Self::U, b: Self::U) -> Self::U;
-    fn and_u(self, a: Self::U, b: Self::U) -> Self::U;
-    fn or_u(self, a: Self::U, b: Self::U) -> Self::U;
-    fn xor_u(self, a: Self::U, b: Self::U) -> Self::U;
-    /// a and not b.
-    fn and_not(self, a: Self::U, b: Self::U) -> Self::U;
     fn shl_u<const K: u32>(self, a: Self::U) -> Self::U;
-    fn eq_u(self, a: Self::U, b: Self::U) -> Self::U;
-    fn lt_u(self, a: Self::U, b: Self::U) -> Self::U;
-    fn bits(self, a: Self::F) -> Self::U;
-    fn floats(self, a: Self::U) -> Self::F;
     /// Byte i of the result is byte `at[i]` of `a`; each `at[i]` must be below 16.
     fn bytes(self, a: Self::U, at: &[u8; LANES]) -> Self::U;
     /// A bit for each lane of a mask of four.
@@ -140,29 +156,7 @@ impl<Q: Quad> Lanewise for Quads<Q> {
     type F = F<Q>;
     type U = U<Q>;
     type M = U<Q>;
-    quads! {
-        add(a: F, b: F) -> F;
-        sub(a: F, b: F) -> F;
-        mul(a: F, b: F) -> F;
-        div(a: F, b: F) -> F;
-        fma(a: F, b: F, c: F) -> F;
-        fnma(a: F, b: F, c: F) -> F;
-        min(a: F, b: F) -> F;
-        max(a: F, b: F) -> F;
-        abs(a: F) -> F;
-        lt(a: F, b: F) -> U;
-        le(a: F, b: F) -> U;
-        select(m: U, a: F, b: F) -> F;
-        add_u(a: U, b: U) -> U;
-        and_u(a: U, b: U) -> U;
-        or_u(a: U, b: U) -> U;
-        xor_u(a: U, b: U) -> U;
-        eq_u(a: U, b: U) -> U;
-        lt_u(a: U, b: U) -> U;
-        and_not(a: U, b: U) -> U;
-        bits(a: F) -> U;
-        floats(a: U) -> F;
-    }
+    lane_operations!(quads);
     #[inline(always)]
     fn splat(self, x: f32) -> F<Q> {
         [self.0.splat(x); QUADS]
@@ -315,7 +309,7 @@ impl<Q: Quad> Simd for Quads<Q> {
     }
     #[inline(always)]
     fn columns8(self, rows: &[[u32; 8]; LANES]) -> [U<Q>; 8] {
-        rows::rows8(self, rows, rows::IN_ORDER)
+        rows::rows8(self, rows, IN_ORDER)
     }
     #[inline(always)]
     fn store_rows5(self, columns: [U<Q>; 5], to: &mut [[u32; 5]; LANES]) {

@@ -1,6 +1,6 @@
 //! One of the four registers of a vector, as a piece of its own.
 
-use super::{LANES, QUAD, QUADS, Quad, split, split_mut};
+use super::{LANES, QUAD, QUADS, Quad, lane_operations, split, split_mut};
 use crate::simd::Lanewise;
 
 /// The token of an instruction set, for the four lanes from `4 * index` on.
@@ -28,29 +28,7 @@ impl<Q: Quad> Lanewise for Register<Q> {
     type U = Q::U;
     type M = Q::U;
 
-    operations! {
-        add(a: F, b: F) -> F;
-        sub(a: F, b: F) -> F;
-        mul(a: F, b: F) -> F;
-        div(a: F, b: F) -> F;
-        fma(a: F, b: F, c: F) -> F;
-        fnma(a: F, b: F, c: F) -> F;
-        min(a: F, b: F) -> F;
-        max(a: F, b: F) -> F;
-        abs(a: F) -> F;
-        lt(a: F, b: F) -> U;
-        le(a: F, b: F) -> U;
-        select(m: U, a: F, b: F) -> F;
-        add_u(a: U, b: U) -> U;
-        and_u(a: U, b: U) -> U;
-        or_u(a: U, b: U) -> U;
-        xor_u(a: U, b: U) -> U;
-        eq_u(a: U, b: U) -> U;
-        lt_u(a: U, b: U) -> U;
-        and_not(a: U, b: U) -> U;
-        bits(a: F) -> U;
-        floats(a: U) -> F;
-    }
+    lane_operations!(operations);
 
     #[inline(always)]
     fn splat(self, x: f32) -> Q::F {

@@ -4,9 +4,6 @@ use super::register::Register;
 use super::{F, LANES, QUAD, QUADS, Quad, Quads, U, split_mut};
 use crate::simd::Lanewise;
 
-/// Row indices of sixteen consecutive rows.
-pub(super) const IN_ORDER: [u32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
-
 /// Implements [`crate::simd::Simd::rows4`] for indices of all lanes.
 #[inline(always)]
 pub(super) fn rows4<Q: Quad>(s: Quads<Q>, from: &[[f32; 4]], row: [u32; LANES]) -> [F<Q>; 4] {

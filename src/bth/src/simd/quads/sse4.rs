@@ -5,52 +5,13 @@
 #![allow(unsafe_code)]
 
 use super::{LANES, QUAD, QUADS, Quad, Quads};
-use crate::simd::detected::Detected;
-use crate::simd::{Kernel, Part};
+use crate::simd::{Part, x86_token};
 use std::arch::x86_64::*;
 
-/// Proof that this machine has SSE4.1, SSSE3 and POPCNT.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::simd) struct Sse4(());
-
-/// Whether this machine has the features.
-static SSE4_FOUND: Detected = Detected::new(|| {
-    is_x86_feature_detected!("sse4.1")
-        && is_x86_feature_detected!("ssse3")
-        && is_x86_feature_detected!("popcnt")
-});
-
-impl Sse4 {
-    #[inline]
-    pub(in crate::simd) fn detect() -> Option<Self> {
-        SSE4_FOUND.get().then_some(Sse4(()))
-    }
-
-    /// As [`Self::detect`]; `None` before that was called.
-    #[inline(always)]
-    pub(in crate::simd) fn found() -> Option<Self> {
-        SSE4_FOUND.is_found().then_some(Sse4(()))
-    }
-
-    /// Runs a kernel compiled for these features.
-    #[inline]
-    pub(in crate::simd) fn run<K: Kernel>(self, kernel: K) -> K::Output {
-        // SAFETY: self proves that the machine has the features that `entry` enables.
-        unsafe { entry(Quads(self), kernel) }
-    }
-}
-
-#[target_feature(enable = "sse4.1,ssse3,popcnt")]
-fn entry<K: Kernel>(simd: Quads<Sse4>, kernel: K) -> K::Output {
-    kernel.run(simd)
-}
-
-/// As [`entry`], for a part of kernels.
-#[target_feature(enable = "sse4.1,ssse3,popcnt")]
-#[inline(never)]
-fn part_entry<P: Part<Quads<Sse4>>>(simd: Quads<Sse4>, part: P) -> P::Output {
-    part.run(simd)
-}
+x86_token!(
+    /// Proof that this machine has SSE4.1, SSSE3 and POPCNT.
+    Sse4, Quads<Sse4> = Quads, "sse4.1" "ssse3" "popcnt"
+);
 
 type F = __m128;
 type U = __m128i;

@@ -6,6 +6,7 @@
 //! that depths are of the magnitude of coordinates.
 
 use crate::intersect::line::{Line, widened};
+use crate::intersect::vector::splat3;
 use crate::rays::Ray;
 use crate::simd::Simd;
 use bth_format::layout::{WIDTH, WideNode};
@@ -160,12 +161,6 @@ pub(crate) struct RaySlabLanes<S: Simd> {
     far_addend: [S::F; 3],
     first: S::F,
     near: [u32; 3],
-}
-
-/// Broadcasts three numbers.
-#[inline(always)]
-fn splat3<S: Simd>(s: S, [x, y, z]: [f32; 3]) -> [S::F; 3] {
-    [s.splat(x), s.splat(y), s.splat(z)]
 }
 
 impl<S: Simd> RaySlabLanes<S> {

@@ -32,9 +32,9 @@
 //! most four factors of f32, so they lie between 2^-596 and 2^520.
 
 use crate::intersect::exact::{Estimate, RATIO_ERROR, estimate};
-use crate::intersect::origin::wide;
 use crate::intersect::start::ExactStart;
 use crate::intersect::start_point::StartPoint;
+use crate::intersect::vector::wide;
 use crate::rays::Ray;
 use bth_format::exact::{EDGE_PARTS, Expansion, VOLUME_PARTS};
 

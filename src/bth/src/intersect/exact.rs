@@ -16,8 +16,9 @@
 
 use crate::intersect::line::Line;
 pub(crate) use crate::intersect::line::RATIO_ERROR;
-use crate::intersect::origin::{Origin, greater, lesser, max_norm, wide};
+use crate::intersect::origin::Origin;
 use crate::intersect::pairs;
+use crate::intersect::vector::{cross, dot, greater, lesser, max_norm, minus, wide};
 use crate::simd::{Doubles, PlainDoubles};
 use bth_format::exact::{EDGE_PARTS, Expansion, VOLUME_PARTS};
 
@@ -78,21 +79,6 @@ pub(crate) struct UncertainWeights {
     bound: f64,
 }
 
-#[inline(always)]
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-#[inline(always)]
-fn vector_product(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-#[inline(always)]
-fn scalar_product(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
 /// Scalar product that does not depend on the order of the axes: the greatest of the sums in three orders. t is computed from
 /// such products, so it has the same bits after model and rays are rotated by a multiple of 90° about a coordinate axis, and
 /// the choice between equal hits does not change. u and v need not have this property, because no decision depends on them.
@@ -128,7 +114,7 @@ impl OriginTerms {
     #[inline(always)]
     fn with_errors(origin: impl Origin, [a, b, c]: [[f64; 3]; 3]) -> (OriginTerms, [f64; 2]) {
         let (offset, second, third) = (minus(a, origin.point()), minus(b, a), minus(c, a));
-        let normal = vector_product(second, third);
+        let normal = cross(second, third);
         let volume = unordered_scalar_product(offset, normal);
         let (distance, edge) = (max_norm(offset), greater(max_norm(second), max_norm(third)));
         let error = [WEIGHT_ERROR * (edge * (edge + distance)), WEIGHT_ERROR * (distance * (edge * edge))];
@@ -136,8 +122,8 @@ impl OriginTerms {
         let is_accurate = INVERSE_RATIO_ERROR * error[1] < volume.abs();
         let terms = OriginTerms {
             normal,
-            second: vector_product(third, offset),
-            third: vector_product(offset, second),
+            second: cross(third, offset),
+            third: cross(offset, second),
             volume,
             min_determinant: if is_accurate { INVERSE_RATIO_ERROR * error[0] } else { f64::INFINITY },
         };
@@ -163,8 +149,7 @@ impl RoundedIntersection {
     #[inline(always)]
     pub(crate) fn new(terms: &OriginTerms, direction: [f64; 3], norm: f64) -> RoundedIntersection {
         let determinant = unordered_scalar_product(direction, terms.normal);
-        let weight =
-            [scalar_product(direction, terms.second), scalar_product(direction, terms.third), determinant];
+        let weight = [dot(direction, terms.second), dot(direction, terms.third), determinant];
         let inverse = 1.0 / determinant;
         RoundedIntersection {
             weight,

@@ -3,7 +3,8 @@
 use crate::intersect::exact::{
     Intersection, OriginTerms, RoundedIntersection, certain_intersection, reported, reported_barycentric,
 };
-use crate::intersect::origin::{RoundedOrigin, max_norm, wide};
+use crate::intersect::origin::RoundedOrigin;
+use crate::intersect::vector::{max_norm, wide};
 use crate::simd::{LANES, Simd};
 
 /// A number of each of sixteen rays or triangles.

@@ -74,7 +74,7 @@ pub(crate) fn rounded_intersection<D: Doubles>(
 mod tests {
     use super::*;
     use crate::intersect::exact::OriginTerms;
-    use crate::intersect::origin::{max_norm, wide};
+    use crate::intersect::vector::{max_norm, wide};
     use crate::simd::{Isa, Kernel, Simd};
     use bth_random::Rng;
 

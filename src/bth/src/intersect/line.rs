@@ -7,6 +7,7 @@
 
 use super::origin::RoundedOrigin;
 use super::start_point::StartPoint;
+use super::vector::wide;
 use crate::rays::Ray;
 
 /// Error up to which f64 values are taken: 2^-28, an eighth of the rounding of f32, relative to 1 for u and v and to itself for
@@ -63,10 +64,6 @@ pub(crate) enum Sign {
     /// The value lies within its error bound of 0.
     Uncertain,
     Positive,
-}
-
-fn wide(v: [f32; 3]) -> [f64; 3] {
-    v.map(f64::from)
 }
 
 /// Twice the signed area of the triangle (origin, p, q) in the plane of projection. Antisymmetric

@@ -28,3 +28,4 @@ pub(crate) mod segment;
 pub(crate) mod start;
 pub(crate) mod start_point;
 pub(crate) mod triangle_box;
+pub(crate) mod vector;

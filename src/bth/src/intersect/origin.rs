@@ -1,27 +1,4 @@
-//! Origins of rays in f64, as far as they are known there, and small functions of numbers and vectors.
-
-#[inline(always)]
-pub(crate) fn wide(v: [f32; 3]) -> [f64; 3] {
-    v.map(f64::from)
-}
-
-/// The lesser of two numbers, neither of which is NaN; this comparison compiles to a single vector instruction.
-#[inline(always)]
-pub(crate) fn lesser(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
-}
-
-/// The greater of two numbers; see [`lesser`].
-#[inline(always)]
-pub(crate) fn greater(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
-}
-
-/// The greatest |component| of a vector.
-#[inline(always)]
-pub(crate) fn max_norm([x, y, z]: [f64; 3]) -> f64 {
-    greater(greater(x.abs(), y.abs()), z.abs())
-}
+//! Origins of rays in f64, as far as they are known there.
 
 /// The origin of a ray in f64, as far as it is known there.
 pub(crate) trait Origin: Copy {

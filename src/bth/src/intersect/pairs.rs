@@ -10,7 +10,7 @@
 //! together, are rounded twice. Its product with a component of a-o adds 10u²rm². The three low parts are at most 18urm² together and
 //! rounded six times, and the high parts add two roundings of their errors, at most 30urm²: together less than 2^8 u²rm² = 2^-98 rm².
 
-use crate::intersect::origin::{greater, max_norm};
+use crate::intersect::vector::{greater, max_norm};
 use crate::simd::Doubles;
 
 /// 2^-68: a volume of at least this times rm² has a relative error below 2^-29.

@@ -1,16 +1,13 @@
 //! Terms of the distance of a point to a triangle as exact sums of products of f32 coordinates, for the few points and triangles
 //! for which f64 loses too many digits ([`super::point_triangle`]).
 
+use super::vector::{dot, wide};
 use bth_format::exact::{Expansion, VOLUME_PARTS};
 
 /// Parts of a component of a vector product: six products of two numbers, each exact in f64.
 const AREA_PARTS: usize = 6;
 /// Parts of a scalar product of two vector products.
 const WEIGHT_PARTS: usize = 3 * 2 * AREA_PARTS * AREA_PARTS;
-
-fn wide(v: [f32; 3]) -> [f64; 3] {
-    v.map(f64::from)
-}
 
 /// (q - p) × (r - p).
 fn area(p: [f64; 3], q: [f64; 3], r: [f64; 3]) -> [Expansion<AREA_PARTS>; 3] {
@@ -87,9 +84,4 @@ impl ExactTriangle {
             weight.value() > 0.0
         })
     }
-}
-
-/// The scalar product, rounded.
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

@@ -11,6 +11,7 @@
 //! the triangle, |q| is an upper bound.
 
 use super::boxes::{FAR, planes};
+use super::vector::dot_lanes;
 use crate::simd::{LANES, Lanewise, Part, Simd};
 use bth_format::layout::{IndexedLeaf, RawLeaf, WIDTH, WideNode};
 
@@ -146,7 +147,7 @@ fn common_bounds<S: Simd>(s: S, points: &[[S::F; 3]]) -> TriangleLanes<S> {
     }
     let (mut support, mut reach) = (square, zero);
     for point in points {
-        support = s.min(support, dot(s, q, *point));
+        support = s.min(support, dot_lanes(s, q, *point));
         reach = s.max(reach, s.add(s.add(s.abs(point[0]), s.abs(point[1])), s.abs(point[2])));
     }
     TriangleLanes { square, support, reach }
@@ -205,11 +206,6 @@ pub(crate) struct TriangleLanes<S: Lanewise> {
     reach: S::F,
 }
 
-#[inline(always)]
-fn dot<S: Lanewise>(s: S, a: [S::F; 3], b: [S::F; 3]) -> S::F {
-    s.fma(a[2], b[2], s.fma(a[1], b[1], s.mul(a[0], b[0])))
-}
-
 impl<L: Lanewise> TriangleLanes<L> {
     /// [`TriangleLanes::new`] for the triangles of a piece.
     #[inline(always)]
@@ -223,8 +219,8 @@ impl<L: Lanewise> TriangleLanes<L> {
             reach = s.add(reach, s.max_abs(s.max_abs(a[k], b[k]), c[k]));
         }
         let q = closest(s, corners, ab, ac);
-        let support = s.min(s.min(dot(s, q, a), dot(s, q, b)), dot(s, q, c));
-        TriangleLanes { square: dot(s, q, q), support, reach }
+        let support = s.min(s.min(dot_lanes(s, q, a), dot_lanes(s, q, b)), dot_lanes(s, q, c));
+        TriangleLanes { square: dot_lanes(s, q, q), support, reach }
     }
 }
 
@@ -278,9 +274,9 @@ fn closest<S: Lanewise>(s: S, corners: &[[S::F; 3]; 3], ab: [S::F; 3], ac: [S::F
     let [a, b, c] = *corners;
     let (zero, one) = (s.splat(0.0), s.splat(1.0));
     // Scalar products of the edges with the vectors from the corners to the point, with the sign changed.
-    let (d1, d2) = (dot(s, ab, a), dot(s, ac, a));
-    let (d3, d4) = (dot(s, ab, b), dot(s, ac, b));
-    let (d5, d6) = (dot(s, ab, c), dot(s, ac, c));
+    let (d1, d2) = (dot_lanes(s, ab, a), dot_lanes(s, ac, a));
+    let (d3, d4) = (dot_lanes(s, ab, b), dot_lanes(s, ac, b));
+    let (d5, d6) = (dot_lanes(s, ab, c), dot_lanes(s, ac, c));
     let va = s.fnma(d5, d4, s.mul(d3, d6));
     let vb = s.fnma(d1, d6, s.mul(d5, d2));
     let vc = s.fnma(d3, d2, s.mul(d1, d4));

@@ -16,7 +16,8 @@
 //!
 //! The range of f64 holds all these products of f32 coordinates, whose exponents lie between -149 and 128.
 
-use super::point_exact::{ExactTriangle, dot, exact_edge_cross};
+use super::point_exact::{ExactTriangle, exact_edge_cross};
+use super::vector::{cross, dot, max_norm};
 use std::cmp::Ordering;
 
 /// Bound of the relative error of computed squared distances.
@@ -78,15 +79,6 @@ fn difference(a: [f32; 3], b: [f32; 3]) -> [f64; 3] {
     out
 }
 
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-/// Greatest |component|.
-fn greatest(a: [f64; 3]) -> f64 {
-    a[0].abs().max(a[1].abs()).max(a[2].abs())
-}
-
 /// The squared distance of a point to a closed triangle, with a relative error of at most [`ACCURACY`], and the feature on which
 /// the closest point lies. All coordinates are finite. A triangle without area is the edge or the point that its corners span.
 #[inline(never)]
@@ -97,7 +89,7 @@ pub(crate) fn squared_distance(point: [f32; 3], corners: [[f32; 3]; 3]) -> (f64,
         edge: [difference(b, a), difference(c, b), difference(a, c)],
     };
     let normal = cross(relative.edge[2], relative.edge[0]);
-    let size = greatest(relative.edge[0]) * greatest(relative.edge[2]);
+    let size = max_norm(relative.edge[0]) * max_norm(relative.edge[2]);
     let [outside, inside] = relative.sides(normal, size);
     if inside {
         return (relative.plane(normal, size, point, corners), Feature::Face);
@@ -121,7 +113,7 @@ impl Relative {
     #[inline(always)]
     fn sides(&self, normal: [f64; 3], size: f64) -> [bool; 2] {
         let [a, b, c] = self.corner;
-        let far = [greatest(a), greatest(b), greatest(c)];
+        let far = [max_norm(a), max_norm(b), max_norm(c)];
         let (mut outside, mut inside) = (false, true);
         for (p, q, i, j) in [(b, c, 1, 2), (c, a, 2, 0), (a, b, 0, 1)] {
             let weight = dot(normal, cross(p, q));
@@ -135,11 +127,11 @@ impl Relative {
     /// Squared distance of the point to the plane; 0 for a triangle without area.
     #[inline(always)]
     fn plane(&self, mut normal: [f64; 3], size: f64, point: [f32; 3], corners: [[f32; 3]; 3]) -> f64 {
-        if greatest(normal) < CERTAIN * CROSS_ERROR * size {
+        if max_norm(normal) < CERTAIN * CROSS_ERROR * size {
             normal = ExactTriangle::new(corners).normal();
         }
         let [a, b, c] = self.corner;
-        let far = [greatest(a), greatest(b), greatest(c)];
+        let far = [max_norm(a), max_norm(b), max_norm(c)];
         let nearest = if far[0] <= far[1] && far[0] <= far[2] {
             0
         } else if far[1] <= far[2] {
@@ -203,7 +195,7 @@ fn line(p: [f64; 3], q: [f64; 3], edge: [f64; 3], nearer: Option<Ordering>) -> O
 #[inline(always)]
 fn squared_area(p: [f64; 3], edge: [f64; 3]) -> Option<f64> {
     let area = cross(p, edge);
-    (greatest(area) >= CERTAIN * CROSS_ERROR * greatest(p) * greatest(edge)).then_some(dot(area, area))
+    (max_norm(area) >= CERTAIN * CROSS_ERROR * max_norm(p) * max_norm(edge)).then_some(dot(area, area))
 }
 
 /// The closest point of a triangle, given the feature on which it lies.
@@ -240,7 +232,7 @@ pub(crate) fn locate(point: [f32; 3], corners: [[f32; 3]; 3], feature: Feature) 
 fn face_weights(point: [f32; 3], corners: [[f32; 3]; 3]) -> [f64; 3] {
     let [ab, ac] = [difference(corners[1], corners[0]), difference(corners[2], corners[0])];
     let mut normal = cross(ab, ac);
-    if greatest(normal) < CERTAIN * CROSS_ERROR * greatest(ab) * greatest(ac) {
+    if max_norm(normal) < CERTAIN * CROSS_ERROR * max_norm(ab) * max_norm(ac) {
         normal = ExactTriangle::new(corners).normal();
     }
     let squared = dot(normal, normal);

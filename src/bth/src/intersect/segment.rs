@@ -2,6 +2,7 @@
 
 use super::origin::RoundedOrigin;
 use super::start::{ExactStart, START_VOLUME_PARTS};
+use super::vector::minus;
 use crate::rays::Ray;
 use bth_format::exact::{Expansion, VOLUME_PARTS};
 
@@ -41,10 +42,6 @@ pub(crate) struct Segment {
     pub(crate) to: ExactEnd,
     /// Both ends in f64.
     pub(crate) rounded: [RoundedOrigin; 2],
-}
-
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// det[p-o, q-o, r-o] in f64, and a bound of its error where each point is off by at most `off` along an axis.

@@ -15,8 +15,9 @@
 use super::exact::{Estimate, Intersection, UncertainWeights, decide_exactly, estimate};
 use super::filter::TriangleBlock;
 use super::line::Line;
-use super::origin::{RoundedOrigin, wide};
+use super::origin::RoundedOrigin;
 use super::start_point::StartPoint;
+use super::vector::wide;
 use bth_format::exact::{EDGE_PARTS, Expansion, VOLUME_PARTS};
 use bth_format::layout::{Child, IndexedLeaf, WIDTH};
 use bth_format::object::ObjectView;

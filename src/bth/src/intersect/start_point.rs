@@ -1,6 +1,7 @@
 //! Where rays start: data that traversals pass on. [`super::start`] decides about them.
 
-use super::origin::{RoundedOrigin, wide};
+use super::origin::RoundedOrigin;
+use super::vector::wide;
 use crate::rays::Ray;
 use bth_format::layout::{NONE, WIDTH};
 

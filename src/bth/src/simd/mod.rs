@@ -491,7 +491,7 @@ macro_rules! x86_token {
 use x86_token;
 
 /// The lanes in order.
-const IN_ORDER: [u32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+pub(crate) const IN_ORDER: [u32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
 /// Panics unless the indices of all lanes of the mask are below `len` and below 2^31, because gathers have signed 32-bit indices.
 #[inline(always)]

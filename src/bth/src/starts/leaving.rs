@@ -1,5 +1,6 @@
 //! On which side rays leave the triangles on which they start, and the bins of their directions, in f32.
 
+use crate::intersect::vector::dot_lanes;
 use crate::simd::{LANES, Lanewise};
 use bth_format::layout::{FREE_BORDERS, FREE_SIDE, FREE_STEEPEST};
 
@@ -41,7 +42,7 @@ impl<S: Lanewise> Leaving<S> {
         let sizes = [s.abs(d[0]), s.abs(d[1]), s.abs(d[2])];
         let size = s.add(s.add(sizes[0], sizes[1]), sizes[2]);
         let normal = cross(s, e, f);
-        let height = dot(s, d, normal);
+        let height = dot_lanes(s, d, normal);
         let one = s.splat(1.0);
         let underflow = s.mul(s.add(s.add(size, far), one), s.splat(UNDERFLOW));
         let error = s.fma(s.mul(s.mul(far, far), size), s.splat(32.0 * U), underflow);
@@ -53,11 +54,6 @@ impl<S: Lanewise> Leaving<S> {
             columns: columns(s, [e, normal], d, height),
         }
     }
-}
-
-#[inline(always)]
-fn dot<S: Lanewise>(s: S, a: [S::F; 3], b: [S::F; 3]) -> S::F {
-    s.fma(a[2], b[2], s.fma(a[1], b[1], s.mul(a[0], b[0])))
 }
 
 #[inline(always)]
@@ -78,11 +74,11 @@ fn cross<S: Lanewise>(s: S, a: [S::F; 3], b: [S::F; 3]) -> [S::F; 3] {
 #[inline(always)]
 fn columns<S: Lanewise>(s: S, [e, normal]: [[S::F; 3]; 2], d: [S::F; 3], height: S::F) -> [S::U; 2] {
     let per_height = s.div(s.splat(1.0), height);
-    let per_square = s.div(s.splat(1.0), dot(s, e, e));
-    let x = s.mul(dot(s, d, e), per_height);
-    let y = s.mul(dot(s, d, cross(s, normal, e)), per_height);
+    let per_square = s.div(s.splat(1.0), dot_lanes(s, e, e));
+    let x = s.mul(dot_lanes(s, d, e), per_height);
+    let y = s.mul(dot_lanes(s, d, cross(s, normal, e)), per_height);
     // Squares of the slopes. Signs are those of the components, not of the slopes, which are negated on the back.
-    let x_square = s.mul(s.mul(s.mul(x, x), per_square), dot(s, normal, normal));
+    let x_square = s.mul(s.mul(s.mul(x, x), per_square), dot_lanes(s, normal, normal));
     let y_square = s.mul(s.mul(y, y), per_square);
     let upwards = s.lt(s.splat(0.0), height);
     let flat = s.and(s.lt(x_square, s.splat(STEEPEST)), s.lt(y_square, s.splat(STEEPEST)));

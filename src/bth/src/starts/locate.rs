@@ -1,9 +1,9 @@
 //! Where the triangle of a start lies in its object, and the start in f64.
 
-use crate::intersect::origin::wide;
 use crate::intersect::start::start_corners;
 use crate::intersect::start::{are_weights, rounded_start};
 use crate::intersect::start_point::StartPoint;
+use crate::intersect::vector::wide;
 use crate::rays::{PrimitiveRef, Start};
 use crate::simd::Simd;
 use bth_format::exact::is_zero_area;

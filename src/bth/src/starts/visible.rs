@@ -7,10 +7,10 @@
 
 use crate::bvh::enumerate::{Receiver, enumerate_within};
 use crate::enumerate::{EnteredInstance, enumerate_instances};
-use crate::intersect::origin::wide;
 use crate::intersect::segment::{ExactEnd, Segment};
 use crate::intersect::start::start_on;
 use crate::intersect::start_point::StartPoint;
+use crate::intersect::vector::wide;
 use crate::query::TriangleRef;
 use crate::rays::{Ray, Start};
 use crate::scene::Scene;

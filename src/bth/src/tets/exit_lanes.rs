@@ -7,7 +7,7 @@
 use crate::intersect::exact::RATIO_ERROR;
 use crate::intersect::exact_lanes::F32Lanes;
 use crate::intersect::line::Line;
-use crate::intersect::origin::{greater, max_norm};
+use crate::intersect::vector::{greater, max_norm};
 use crate::simd::LANES;
 
 /// Sixteen rays and tetrahedra, by lane. Coordinates are along the axes of a ray's projection, of which the third is that of the depth.

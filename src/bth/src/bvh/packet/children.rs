@@ -4,7 +4,7 @@ use super::bounds::PacketBounds;
 use super::entry::StackEntry;
 use super::ray_group::RayGroup;
 use crate::query::Goal;
-use crate::simd::{LANES, Part, Simd, lanes_of_piece};
+use crate::simd::{IN_ORDER, LANES, Part, Simd, lanes_of_piece};
 use bth_format::layout::{WIDTH, WideNode};
 use std::marker::PhantomData;
 
@@ -26,7 +26,7 @@ impl<S: Simd, H: PacketBounds<S>, G: Goal> Part<S> for PacketChildren<'_, S, H, 
     #[inline(always)]
     fn run(self, s: S) -> usize {
         let PacketChildren { bounds, groups, rays, node: (parent, node), limit, entries, goal } = self;
-        let slots = s.load_u(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
+        let slots = s.load_u(&IN_ORDER);
         let (bits, keys) = bounds.children(s, node, limit);
         let (mut slot, mut key) = ([0; LANES], [0.0; LANES]);
         let count = if H::is_any(goal) {

@@ -3,6 +3,7 @@
 use super::bounds::PacketBounds;
 use super::points::{POINTS, RelativePoints};
 use crate::intersect::filter::TriangleBlock;
+use crate::intersect::vector::load3;
 use crate::simd::{Part, Simd};
 use bth_format::layout::{IndexedLeaf, RawLeaf, WIDTH};
 use std::slice;
@@ -50,7 +51,7 @@ impl LeafPoints<'_> {
     #[inline(always)]
     pub(crate) fn relative<S: Simd>(&self, s: S, origin: [f32; 3], points: &mut RelativePoints) {
         for (part, rows) in self.parts.iter().enumerate() {
-            points.put(s, part, load(s, rows), origin);
+            points.put(s, part, load3(s, rows), origin);
         }
     }
 }
@@ -83,12 +84,6 @@ fn common<S: Simd>(s: S, [a, b, c]: [S::U; 3]) -> u32 {
     s.mask_bits(s.lt_u(s.splat_u(0), s.and_u(a, s.and_u(b, c))))
 }
 
-/// Three rows of lanes.
-#[inline(always)]
-fn load<S: Simd>(s: S, rows: &[[f32; WIDTH]; 3]) -> [S::F; 3] {
-    [s.load(&rows[0]), s.load(&rows[1]), s.load(&rows[2])]
-}
-
 impl LeafMesh for IndexedLeaf {
     #[inline(always)]
     fn points(&self, code: u32) -> LeafPoints<'_> {
@@ -97,7 +92,7 @@ impl LeafMesh for IndexedLeaf {
     }
     #[inline(always)]
     fn outside<S: Simd, H: PacketBounds<S>>(&self, s: S, bounds: &H) -> u32 {
-        let sides = bounds.sides(s, load(s, &self.vertex));
+        let sides = bounds.sides(s, load3(s, &self.vertex));
         let [a, b, c] = &self.corner;
         let of = [s.load_bytes(a), s.load_bytes(b), s.load_bytes(c)];
         common(s, [s.lookup_u(sides, of[0]), s.lookup_u(sides, of[1]), s.lookup_u(sides, of[2])])
@@ -112,7 +107,8 @@ impl LeafMesh for RawLeaf {
     #[inline(always)]
     fn outside<S: Simd, H: PacketBounds<S>>(&self, s: S, bounds: &H) -> u32 {
         let [a, b, c] = &self.corner;
-        let sides = [bounds.sides(s, load(s, a)), bounds.sides(s, load(s, b)), bounds.sides(s, load(s, c))];
+        let sides =
+            [bounds.sides(s, load3(s, a)), bounds.sides(s, load3(s, b)), bounds.sides(s, load3(s, c))];
         common(s, sides)
     }
 }

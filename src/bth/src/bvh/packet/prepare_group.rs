@@ -3,19 +3,12 @@
 use super::bounds::PacketBounds;
 use super::ray_group::RayGroup;
 use crate::intersect::prepare::{self, MixedAxes};
+use crate::intersect::vector::put3;
 use crate::rays::Ray;
 use crate::simd::{LANES, Lanewise, Part, Simd, lanes_of_piece};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectBounds;
 use std::marker::PhantomData;
-
-/// [`Simd::put`] of three vectors.
-#[inline(always)]
-fn put3<S: Simd>(p: S::Piece, to: &mut [S::F; 3], from: [<S::Piece as Lanewise>::F; 3]) {
-    for k in 0..3 {
-        S::put(p, &mut to[k], from[k]);
-    }
-}
 
 impl<S: Simd> RayGroup<S> {
     /// Stores prepared rays of a piece; returns those that are usable, a bit each.

@@ -10,6 +10,7 @@ use super::leaf_mesh::LeafPoints;
 use super::projection::Projection;
 use crate::intersect::exact_lanes::Intersections;
 use crate::intersect::prepare::{self, Axes, CommonAxis, MixedAxes, PreparedLanes};
+use crate::intersect::vector::pick3;
 use crate::simd::{LANES, Lanewise, Part, Simd};
 use bth_format::layout::NONE;
 use std::marker::PhantomData;
@@ -120,12 +121,6 @@ impl<S: Lanewise> GroupSlabs<S> {
         }
         (enter, s.le(enter, leave))
     }
-}
-
-/// [`Simd::pick`] of three vectors.
-#[inline(always)]
-fn pick3<S: Simd>(p: S::Piece, [x, y, z]: &[S::F; 3]) -> [<S::Piece as Lanewise>::F; 3] {
-    [S::pick(p, x), S::pick(p, y), S::pick(p, z)]
 }
 
 impl<S: Simd> RayGroup<S> {

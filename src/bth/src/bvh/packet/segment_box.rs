@@ -1,6 +1,7 @@
 //! Packet bounds of short rays that lie close together: a box.
 
 use super::bounds::{FrustumView, PacketBounds};
+use crate::intersect::vector::splat3;
 use crate::simd::Simd;
 use bth_format::layout::{WIDTH, WideNode};
 
@@ -13,10 +14,7 @@ pub(crate) struct SegmentBox<S: Simd> {
 impl<S: Simd> SegmentBox<S> {
     #[inline(always)]
     pub(crate) fn new(s: S, [lower, upper]: [[f32; 3]; 2]) -> Self {
-        SegmentBox {
-            lower: [s.splat(lower[0]), s.splat(lower[1]), s.splat(lower[2])],
-            upper: [s.splat(upper[0]), s.splat(upper[1]), s.splat(upper[2])],
-        }
+        SegmentBox { lower: splat3(s, lower), upper: splat3(s, upper) }
     }
 }
 

@@ -305,7 +305,7 @@ fn compile_file(
         let policy = CachePolicy { whole: false, needed: &|_| true, target: None };
         bth_compile::scene::compile_cached(&manifest, source, options, &cache, policy, monitor)?.content
     } else {
-        bth_compile::cached::compile(path, options, &cache, &|_| true, monitor)?.content
+        bth_compile::pipeline::compile_cached(path, options, &cache, &|_| true, monitor)?.content
     };
     content.ok_or_else(no_content)
 }

@@ -84,7 +84,6 @@ fn byte_tables_are_those_of_the_structures() {
         Deformer { node object skin weights first_weight reserved }
         Skin { first_joint joints reserved }
         SkinJoint { inverse_bind node reserved }
-        Segment { first object reserved }
         TetLeaf { lower upper first_tet tets first_vertex vertices first_face faces first_hull hulls subtree flags }
         TetVertex { position reserved }
         TetFace { vertex triangle tet opposite }

@@ -15,7 +15,7 @@ OBJECT, LINES, TRIANGLE_IDS, TET_LEAVES, TETS, TET_VERTICES, TET_FACES, HULL_FAC
 LEAF_VERTICES = 10
 TRIANGLE_PLACES, FREE_DIRECTIONS, FREE_LEVELS, FREE_DISTANCES = range(11, 15)
 POSITIONS, TRIANGLES, CORNERS, NORMALS, UVS, GROUPS, GROUP_RUNS, MATERIALS, LABELS = range(16, 25)
-SEQUENCE_TIMES, SEQUENCE_POSITIONS, SEGMENTS = range(25, 28)
+SEQUENCE_TIMES, SEQUENCE_POSITIONS, FORMER_SEGMENTS = range(25, 28)
 OPACITY, OPACITY_MICRO = 28, 29
 PROVENANCE, OBJECT_NAMES, OBJECT_LABELS = range(32, 35)
 MATERIAL_PARAMETERS, TEXTURES, COLOR_CORNERS, COLORS, IMAGES, IMAGE_BYTES = range(35, 41)
@@ -52,7 +52,6 @@ KINDS = {
     LABELS: ("LABELS", (1,), (1 << 32) - 2),
     SEQUENCE_TIMES: ("SEQUENCE_TIMES", (8,), (1 << 32) - 2),
     SEQUENCE_POSITIONS: ("SEQUENCE_POSITIONS", (12,), (1 << 32) - 2),
-    SEGMENTS: ("SEGMENTS", (16,), (1 << 32) - 2),
     OPACITY: ("OPACITY", (4,), 1 << 30),
     OPACITY_MICRO: ("OPACITY_MICRO", (4,), 1 << 28),
     PROVENANCE: ("PROVENANCE", (1,), None),
@@ -160,6 +159,7 @@ class Container:
             need(inside, "F012", f"{e.length} bytes at {e.offset}", at, name)
             end = e.offset + e.length
             need(e.stride * e.count == e.length, "F013", f"{e.count} x {e.stride} is not {e.length}", at, name)
+            need(e.kind != FORMER_SEGMENTS, "F007", "trees for ranges of time of older files", at, name)
             if e.kind in KINDS:
                 _, strides, most = KINDS[e.kind]
                 old = e.kind == TETS and e.stride == 20

@@ -19,7 +19,7 @@ from bth_indices import check_indices  # noqa: E402
 from bth_materials import MaterialsView, check_images  # noqa: E402
 from bth_object import ObjectView  # noqa: E402
 from bth_scene import SceneView, check_scene  # noqa: E402
-from bth_sequences import SequenceView, check_segments  # noqa: E402
+from bth_sequences import SequenceView  # noqa: E402
 
 
 def describe(container):
@@ -41,7 +41,6 @@ def describe(container):
                 "tet_leaves": len(view.tet_leaves),
                 "tets": len(view.tets),
                 "frames": len(SequenceView(view).times),
-                "segments": len(SequenceView(view).segments),
                 "groups": GroupsView(view).describe(),
                 "materials": MaterialsView(view).describe(),
             }
@@ -92,7 +91,7 @@ def check(data, level):
     if level == "verify":
         container.check_bytes()
     if level != "open":
-        materials, sequences = [], []
+        materials = []
         for i in range(container.objects):
             view = ObjectView(container, i)
             GroupsView(view).check()
@@ -100,13 +99,11 @@ def check(data, level):
             materials[-1].check()
             DeformationView(view).check()
             tets = check_indices(view)
-            sequences.append(SequenceView(view))
-            sequences[-1].check()
+            SequenceView(view).check()
             if level == "verify":
                 check_geometry(view, tets)
         object_names(container)
         check_images(container, materials)
-        check_segments(sequences, {row.object for row in SceneView(container).instances})
         check_scene(SceneView(container))
     return container
 
@@ -126,8 +123,8 @@ def show(description):
         print(f"  bounds {o['lower']} to {o['upper']}")
         if o["tet_leaves"]:
             print(f"  {o['tet_leaves']} tet leaves with {o['tets']} tetrahedra ({o['record']})")
-        if o["frames"] or o["segments"]:
-            print(f"  {o['frames']} frames of its vertices, {o['segments']} segments")
+        if o["frames"]:
+            print(f"  {o['frames']} frames of its vertices")
         if o["groups"]:
             print(f"  {len(o['groups'])} groups of triangles")
         if o["materials"]["parameters"]:

@@ -4,7 +4,7 @@ use super::extent::Extent;
 use super::split::{Reference, Split};
 use rayon::prelude::*;
 
-/// Greatest number of bins.
+/// Largest number of bins.
 pub(super) const MAX_BINS: usize = 32;
 /// Nodes of more triangles are binned in parallel, in chunks.
 const PARALLEL_COUNT: usize = 1 << 15;
@@ -16,8 +16,8 @@ struct Bin<E> {
     count: u32,
 }
 
-/// The bins of each axis, or of each order of several poses. On the heap: those of 16 poses take 150 KiB, and a thread that waits for others
-/// splits further nodes on top of its stack.
+/// The bins of each axis, or of each order of several poses. On the heap: those of 16 poses take
+/// 150 KiB, and a thread that waits for others splits further nodes on top of its stack.
 type Bins<E> = Vec<[Bin<E>; MAX_BINS]>;
 
 fn empty<E: Extent>() -> Bins<E> {
@@ -51,7 +51,7 @@ impl<E: Extent> Centers<E> {
         }
     }
 
-    /// Whether all centres are equal.
+    /// Returns true if all centres are equal.
     pub(super) fn coincide(&self) -> bool {
         self.lower.as_ref() == self.upper.as_ref()
     }
@@ -63,7 +63,8 @@ impl<E: Extent> Centers<E> {
     }
 }
 
-/// Maps centres to bins. The partition uses the same arithmetic, so its counts agree with those of the bins.
+/// Maps centres to bins. The partition uses the same arithmetic, so its counts agree with those of
+/// the bins.
 struct Grid<E: Extent> {
     origin: E::Orders<f32>,
     scale: E::Orders<f32>,
@@ -128,7 +129,8 @@ pub(super) fn measure<E: Extent>(references: &[Reference<E>]) -> (E, Centers<E>)
 }
 
 /// Partitions the references at the best of the boundaries between `bins` equal slabs per axis and
-/// returns the size of the left side; `None`, with nothing changed, when no boundary separates them.
+/// returns the size of the left side; `None`, with nothing changed, when no boundary separates
+/// them.
 // Its frame must not become part of that of the recursion.
 #[inline(never)]
 pub(super) fn split<E: Extent>(
@@ -148,7 +150,8 @@ pub(super) fn split<E: Extent>(
         if centers.lower.as_ref()[axis] >= centers.upper.as_ref()[axis] {
             continue;
         }
-        // Costs of all triangles from each bin on; the sweep from the left then adds the costs of those before.
+        // Costs of all triangles from each bin on; the sweep from the left then adds the costs of
+        // those before.
         let mut right_cost = [f64::INFINITY; MAX_BINS];
         let (mut bounds, mut count) = (E::EMPTY, 0u32);
         for (bin, cost) in row[..bins].iter().zip(&mut right_cost).rev() {
@@ -175,7 +178,8 @@ pub(super) fn split<E: Extent>(
     Some(found.left)
 }
 
-/// Moves the references that are `is_left` to the front, in place. The order depends on the input order alone.
+/// Moves the references that are `is_left` to the front, in place. The order depends on the input
+/// order alone.
 fn partition<E>(references: &mut [Reference<E>], is_left: impl Fn(&Reference<E>) -> bool) {
     let (mut i, mut j) = (0, references.len());
     loop {

@@ -27,7 +27,8 @@ impl Bounds {
         Bounds { lower: node.lower, upper: node.upper }
     }
 
-    /// Extends to contain `other`. Written with comparisons instead of `f32::min`, which also handles NaN and is slower.
+    /// Extends to contain `other`. Written with comparisons instead of `f32::min`, which also
+    /// handles NaN and is slower.
     #[inline(always)]
     pub(super) fn grow(&mut self, other: &Bounds) {
         for k in 0..3 {

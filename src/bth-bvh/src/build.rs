@@ -11,11 +11,12 @@ use bth_import::{Mesh, is_zero_area};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Edges on the longest path of a binary BVH that [`build`] makes; below `bth_format::limits::MAX_DEPTH`,
-/// since a wide node takes at least one level of the binary tree.
+/// Edges on the longest path of a binary BVH that [`build`] makes; below
+/// `bth_format::limits::MAX_DEPTH`, since a wide node takes at least one level of the binary tree.
 pub const MAX_LEVELS: u32 = 90;
 
-/// Subtrees of more triangles are built as separate tasks, each of which first checks for cancellation.
+/// Subtrees of more triangles are built as separate tasks, each of which first checks for
+/// cancellation.
 const BUILD_TASK: usize = 1 << 12;
 
 /// How much time to spend on the tree.
@@ -24,27 +25,28 @@ const BUILD_TASK: usize = 1 << 12;
 pub enum Quality {
     /// Binned SAH with 16 bins.
     Fast,
-    /// Binned SAH with 32 bins, full sweep in small nodes, two passes of reinsertion of the largest nodes, three rounds in which
-    /// treelets are rebuilt; the wide nodes are chosen by what sample rays enter.
+    /// Binned SAH with 32 bins, full sweep in small nodes, two passes of reinsertion of the largest
+    /// nodes, three rounds in which treelets are rebuilt; the wide nodes are chosen by what sample
+    /// rays enter.
     #[default]
     Balanced,
-    /// Full-sweep SAH except in the topmost nodes, where 32 bins give trees as good; three passes of reinsertion, five rounds of
-    /// treelets.
+    /// Full-sweep SAH except in the topmost nodes, where 32 bins give trees as good; three passes
+    /// of reinsertion, five rounds of treelets.
     Best,
 }
 
-/// Parameters of the builder that a [`Quality`] selects; benchmarks vary them one by one.
+/// Parameters of the builder that a [`Quality`] selects.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Effort {
     /// Bins per axis, at most 32.
     pub bins: usize,
     /// Nodes of at most this many triangles are split by a full sweep.
     pub sweep_count: usize,
-    /// Share of the nodes, largest first, that each pass of reinsertion tries to move. Two short passes reduce the cost
-    /// more than a long one (measured on rooms and a car).
+    /// Share of the nodes, largest first, that each pass of reinsertion tries to move. Two short
+    /// passes reduce the cost more than a long one (measured on rooms and a car).
     pub reinsertion: Vec<f64>,
-    /// Rounds in which treelets are rebuilt ([`rebuild_treelets`](super::rebuild_treelets)); with none the wide tree is chosen by areas
-    /// alone, unless rays are known.
+    /// Rounds in which treelets are rebuilt ([`rebuild_treelets`](super::rebuild_treelets)); with
+    /// none the wide tree is chosen by areas alone, unless rays are known.
     pub treelets: usize,
 }
 
@@ -65,7 +67,8 @@ impl Quality {
 pub struct BvhOptions {
     /// How much time to spend on the tree.
     pub quality: Quality,
-    /// Whether triangles of zero area are kept in the tree: deformable objects may give them an area.
+    /// True if triangles of zero area are kept in the tree: deformable objects may give them an
+    /// area.
     pub keep_zero_area: bool,
 }
 
@@ -80,62 +83,62 @@ pub struct BvhReport {
     pub nodes: u64,
     /// Edges on the longest path from the root.
     pub levels: u32,
-    /// Nodes that a random line through the root's box meets, on average, after the top-down build, then after each pass of reinsertion,
-    /// and at last after treelets were rebuilt, which lowers the cost of the wide tree and may raise this: the sum of the nodes' areas over
-    /// the root's.
+    /// Nodes that a random line through the root's box meets, on average, after the top-down build,
+    /// then after each pass of reinsertion, and at last after treelets were rebuilt, which lowers
+    /// the cost of the wide tree and may raise this: the sum of the nodes' areas over the root's.
     pub visits: Vec<f64>,
     /// Subtrees that each pass of reinsertion moved.
     pub moved: Vec<u64>,
     /// Treelets that each round rebuilt.
     pub treelets: Vec<u64>,
-    /// Wall-clock time of the stage as the pipeline measures it, seconds; 0 where the stage is called on its own.
-    pub seconds: f64,
 }
 
-/// Builds the binary BVH of all triangles, those of zero area only if the options say so, down to single triangles. The result
-/// depends on mesh and options alone, not on the number of threads.
+/// Builds the binary BVH of all triangles, those of zero area only if the options say so, down to
+/// single triangles. The result depends on mesh and options alone, not on the number of threads.
 ///
 /// # Errors
 /// [`Error::Internal`] when the mesh breaks its own contract (indices in range, positions finite),
 /// [`Error::Limit`] beyond `bth_format::limits::MAX_TRIANGLES`, [`Error::Cancelled`].
 pub fn build(mesh: &Mesh, options: &BvhOptions, monitor: &dyn Monitor) -> Result<(BinaryBvh, BvhReport)> {
-    build_tree(mesh, &options.quality.effort(), options.keep_zero_area, monitor)
+    build_with(mesh, &options.quality.effort(), options.keep_zero_area, monitor)
 }
 
 /// As [`build`], with any effort.
-///
-/// # Errors
-/// As [`build`].
-pub fn build_with(mesh: &Mesh, effort: &Effort, monitor: &dyn Monitor) -> Result<(BinaryBvh, BvhReport)> {
-    build_tree(mesh, effort, false, monitor)
-}
-
-fn build_tree(
+pub(super) fn build_with(
     mesh: &Mesh,
     effort: &Effort,
     keep_zero_area: bool,
     monitor: &dyn Monitor,
 ) -> Result<(BinaryBvh, BvhReport)> {
+    over_used(mesh, keep_zero_area, |used, report| {
+        let reference = |&id: &u32| Reference { bounds: Bounds::of_points(&mesh.corners(id)), id };
+        let bvh = split_all(used.par_iter().map(reference).collect(), effort, monitor)?;
+        report.visits.push(visits(&bvh));
+        if effort.reinsertion.is_empty() || bvh.nodes.len() <= 3 {
+            return Ok(bvh);
+        }
+        reinsert(LinkedTree::new(&bvh), bvh, &effort.reinsertion, report, monitor)
+    })
+}
+
+/// The tree that `build` makes over the triangles that it holds, of which there is at least one.
+pub(super) fn over_used(
+    mesh: &Mesh,
+    keep_zero_area: bool,
+    build: impl FnOnce(Vec<u32>, &mut BvhReport) -> Result<BinaryBvh>,
+) -> Result<(BinaryBvh, BvhReport)> {
     check_mesh(mesh)?;
-    let ids = 0..mesh.triangles.len() as u32;
-    let kept: Vec<u32> =
-        ids.into_par_iter().filter(|&id| keep_zero_area || !is_zero_area(mesh.corners(id))).collect();
-    let reference = |&id: &u32| Reference { bounds: Bounds::of_points(&mesh.corners(id)), id };
-    let references: Vec<Reference<Bounds>> = kept.par_iter().map(reference).collect();
-    drop(kept);
+    let ids = (0..mesh.triangles.len() as u32).into_par_iter();
+    let used: Vec<u32> = ids.filter(|id| keep_zero_area || !is_zero_area(mesh.corners(*id))).collect();
     let mut report = BvhReport {
-        triangles: references.len() as u64,
-        dropped: (mesh.triangles.len() - references.len()) as u64,
+        triangles: used.len() as u64,
+        dropped: (mesh.triangles.len() - used.len()) as u64,
         ..BvhReport::default()
     };
-    if references.is_empty() {
+    if used.is_empty() {
         return Ok((BinaryBvh::default(), report));
     }
-
-    let mut bvh = split_all(references, effort, monitor)?;
-    report.visits.push(visits(&bvh));
-
-    bvh = reinsert(bvh, &effort.reinsertion, &mut report, monitor)?;
+    let bvh = build(used, &mut report)?;
     report.nodes = bvh.nodes.len() as u64;
     report.levels = levels(&bvh);
     Ok((bvh, report))
@@ -164,25 +167,9 @@ pub(super) fn split_with<E: Extent>(
     Ok(BinaryBvh { nodes, order: references.iter().map(|r| r.id).collect() })
 }
 
-/// Moves subtrees to positions of lower cost, in passes that each try a share of the nodes. Boxes of leaves do not change.
-///
-/// # Errors
-/// [`Error::Cancelled`].
-pub fn reinsert(
-    bvh: BinaryBvh,
-    passes: &[f64],
-    report: &mut BvhReport,
-    monitor: &dyn Monitor,
-) -> Result<BinaryBvh> {
-    if passes.is_empty() || bvh.nodes.len() <= 3 {
-        return Ok(bvh);
-    }
-    let tree = LinkedTree::new(&bvh);
-    reinsert_linked(tree, bvh, passes, report, monitor)
-}
-
-/// As [`reinsert`], for a BVH whose tree has been linked.
-pub(super) fn reinsert_linked<E: Extent>(
+/// Moves subtrees of a linked tree to positions of lower cost, in passes that each try a share of
+/// the nodes. Boxes of leaves do not change.
+pub(super) fn reinsert<E: Extent>(
     mut tree: LinkedTree<E>,
     bvh: BinaryBvh,
     passes: &[f64],
@@ -197,7 +184,7 @@ pub(super) fn reinsert_linked<E: Extent>(
     Ok(tree.into_preorder(bvh))
 }
 
-pub(super) fn check_mesh(mesh: &Mesh) -> Result<()> {
+fn check_mesh(mesh: &Mesh) -> Result<()> {
     let internal = |message: String| Err(Error::Internal { code: "BTH-X201", message });
     if mesh.triangles.len() > bth_format::limits::MAX_TRIANGLES as usize {
         return Err(Error::Limit {
@@ -240,7 +227,8 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    /// Fills `nodes` (of length `2 * references.len() - 1`) with the subtree over the references, in preorder.
+    /// Fills `nodes` (of length `2 * references.len() - 1`) with the subtree over the references,
+    /// in preorder.
     fn subtree<E: Extent>(
         &self,
         references: &mut [Reference<E>],
@@ -304,8 +292,8 @@ impl Builder<'_> {
         if count == 2 {
             return 1;
         }
-        // Halving needs ceil(log2(count)) levels. SAH may split as it likes while enough levels remain for halving; else
-        // the node is halved.
+        // Halving needs ceil(log2(count)) levels. SAH may split as it likes while enough levels
+        // remain for halving; else the node is halved.
         let halvings = usize::BITS - (count - 1).leading_zeros();
         if level + 1 + halvings > MAX_LEVELS {
             return split_median(references, centers);
@@ -341,7 +329,7 @@ fn split_by_id<E: Extent>(references: &mut [Reference<E>]) -> usize {
 }
 
 /// Nodes that a random line through the root's box meets on average; see [`BvhReport::visits`].
-pub fn visits(bvh: &BinaryBvh) -> f64 {
+pub(super) fn visits(bvh: &BinaryBvh) -> f64 {
     let area = |node: &Node| Bounds::of_node(node).half_area();
     let root = area(&bvh.nodes[0]);
     // A deformable mesh may lie on one line.

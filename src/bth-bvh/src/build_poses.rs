@@ -1,18 +1,21 @@
 //! Construction of one BVH for several poses of a mesh that deforms.
 //!
-//! After "T-SAH: Animation Optimized Bounding Volume Hierarchies" (Bittner and Meister 2015): the cost of a tree is the mean of its
-//! SAH costs over poses, each relative to the area of the root in that pose. The paper builds for one pose and then optimizes by
-//! insertion; here the top-down splits are chosen by the summed cost as well, so that triangles that part in any pose part early.
+//! After "T-SAH: Animation Optimized Bounding Volume Hierarchies" (Bittner and Meister 2015): the
+//! cost of a tree is the mean of its SAH costs over poses, each relative to the area of the root in
+//! that pose. The paper builds for one pose and then optimizes by insertion; here the top-down
+//! splits are chosen by the summed cost as well, so that triangles that part in any pose part
+//! early.
 
-use super::build::{BvhReport, Effort, check_mesh, levels, reinsert_linked, split_all};
+use super::bounds::Bounds;
+use super::build::{BvhReport, Effort, over_used, reinsert, split_all};
 use super::linked_tree::LinkedTree;
 use super::pose_bounds::ScaledPoses;
 use super::poses::{Poses, refit};
 use super::split::Reference;
 use super::{BinaryBvh, MAX_POSES};
+use bth_import::Mesh;
 use bth_import::error::Result;
 use bth_import::monitor::Monitor;
-use bth_import::{Mesh, is_zero_area};
 use rayon::prelude::*;
 
 /// Options of [`build_poses`].
@@ -20,13 +23,15 @@ use rayon::prelude::*;
 pub struct PoseOptions {
     /// Parameters of the builder.
     pub effort: Effort,
-    /// Whether the tree has the triangles of zero area, too, as that of a mesh does whose vertices move at run time.
+    /// True if the tree has the triangles of zero area, too, as that of a mesh does whose vertices
+    /// move at run time.
     pub keep_zero_area: bool,
 }
 
-/// Builds the binary BVH of least cost over all poses; the boxes of its nodes are those of the mesh's own positions. The report's
-/// visits are means over the poses. With one pose that equals the mesh's positions, and without `keep_zero_area`, the tree is that of
-/// [`build_with`](super::build_with).
+/// Builds the binary BVH of smallest cost over all poses; the boxes of its nodes are those of the
+/// mesh's own positions. The report's visits are means over the poses. With one pose that equals
+/// the mesh's positions, and without `keep_zero_area`, the tree is that of
+/// [`build()`](super::build()).
 ///
 /// # Errors
 /// As [`build()`](super::build()).
@@ -36,32 +41,15 @@ pub fn build_poses(
     options: &PoseOptions,
     monitor: &dyn Monitor,
 ) -> Result<(BinaryBvh, BvhReport)> {
-    check_mesh(mesh)?;
-    let used: Vec<u32> = (0..mesh.triangles.len() as u32)
-        .into_par_iter()
-        .filter(|id| options.keep_zero_area || !is_zero_area(mesh.corners(*id)))
-        .collect();
-    let mut report = BvhReport {
-        triangles: used.len() as u64,
-        dropped: (mesh.triangles.len() - used.len()) as u64,
-        ..BvhReport::default()
-    };
-    if used.is_empty() {
-        return Ok((BinaryBvh::default(), report));
-    }
     let effort = &options.effort;
-    let bvh = match poses.len() {
+    over_used(mesh, options.keep_zero_area, |used, report| match poses.len() {
         1 if poses.positions(0) == mesh.positions => {
-            let leaf = |id: u32| super::bounds::Bounds::of_points(&mesh.corners(id));
-            over(&used, leaf, effort, &mut report, monitor)?
+            over(&used, |id| Bounds::of_points(&mesh.corners(id)), effort, report, monitor)
         }
-        ..=4 => scaled::<4>(mesh, poses, &used, effort, &mut report, monitor)?,
-        5..=8 => scaled::<8>(mesh, poses, &used, effort, &mut report, monitor)?,
-        _ => scaled::<MAX_POSES>(mesh, poses, &used, effort, &mut report, monitor)?,
-    };
-    report.nodes = bvh.nodes.len() as u64;
-    report.levels = levels(&bvh);
-    Ok((bvh, report))
+        ..=4 => scaled::<4>(mesh, poses, &used, effort, report, monitor),
+        5..=8 => scaled::<8>(mesh, poses, &used, effort, report, monitor),
+        _ => scaled::<MAX_POSES>(mesh, poses, &used, effort, report, monitor),
+    })
 }
 
 /// The tree over bounds in up to `P` poses.
@@ -94,7 +82,7 @@ fn over<E: super::extent::Extent>(
     if effort.reinsertion.is_empty() || bvh.nodes.len() <= 3 {
         return Ok(bvh);
     }
-    reinsert_linked(tree, bvh, &effort.reinsertion, report, monitor)
+    reinsert(tree, bvh, &effort.reinsertion, report, monitor)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@ use super::super::collapse::{CollapseOptions, collapse};
 use super::super::poses::Weighed;
 use super::super::samples::{clutter, grid, soup};
 use super::super::validate::{validate_binary, validate_wide};
-use super::super::{Costs, MAX_LEVELS, pose_costs};
+use super::super::{Costs, MAX_LEVELS, Wide};
 use super::*;
 use bth_format::layout::{Child, NONE, WideNode};
 use bth_import::monitor::Silent;
@@ -98,7 +98,7 @@ fn one_pose_gives_the_tree_of_the_mesh() {
             let positions = [mesh.positions.clone()];
             let poses = Poses::new(&mesh, &positions).unwrap();
             let several = build_poses(&mesh, &poses, &options(quality, false), &Silent).unwrap();
-            assert_eq!(several, build_with(&mesh, &quality.effort(), &Silent).unwrap());
+            assert_eq!(several, build_with(&mesh, &quality.effort(), false, &Silent).unwrap());
         }
     }
 }
@@ -118,7 +118,7 @@ fn parts_that_separate_in_some_pose_are_separate_in_the_tree() {
     };
     let positions = [apart(0.0), apart(30.0), apart(60.0), apart(90.0)];
     let bvh = check(&mesh, &positions, Quality::Balanced);
-    let (still, _) = build_with(&mesh, &Quality::Balanced.effort(), &Silent).unwrap();
+    let (still, _) = build_with(&mesh, &Quality::Balanced.effort(), false, &Silent).unwrap();
     let (ours, theirs) = (slow_visits(&mesh, &bvh, &positions), slow_visits(&mesh, &still, &positions));
     assert!(ours < 0.7 * theirs, "a tree for all poses costs {ours}, that of the first {theirs}");
 }
@@ -163,9 +163,9 @@ fn poses_without_area_and_with_extreme_extents_count_for_nothing_or_little() {
 }
 
 /// Cost of a wide tree in a pose, from the ids below each child.
-fn slow_cost(mesh: &Mesh, wide: &super::super::Wide, costs: &Costs, positions: &[[f32; 3]]) -> f64 {
+fn slow_cost(mesh: &Mesh, wide: &Wide, costs: &Costs, positions: &[[f32; 3]]) -> f64 {
     fn below(
-        (mesh, wide, costs, positions): (&Mesh, &super::super::Wide, &Costs, &[[f32; 3]]),
+        (mesh, wide, costs, positions): (&Mesh, &Wide, &Costs, &[[f32; 3]]),
         code: u32,
     ) -> (Vec<u32>, f64) {
         let all = (mesh, wide, costs, positions);
@@ -217,16 +217,14 @@ fn the_wide_tree_is_chosen_by_the_mean_cost_over_the_poses() {
     let options = CollapseOptions { costs, ..CollapseOptions::default() };
     let (wide, report) = collapse(&mesh, weighed, &[], &options, &Silent).unwrap();
     validate_wide(&mesh, &bvh, &[], false, &wide);
-    let of_poses = pose_costs(&mesh, &wide, &costs, &poses);
-    for (found, positions) in of_poses.iter().zip(&positions) {
-        let slow = slow_cost(&mesh, &wide, &costs, positions);
-        assert!((found.cost - slow).abs() <= 1e-9 * slow, "{found:?} {slow}");
-    }
-    let mean = of_poses.iter().map(|pose| pose.cost).sum::<f64>() / of_poses.len() as f64;
+    let mean_cost = |wide: &Wide| {
+        let costs = positions.iter().map(|positions| slow_cost(&mesh, wide, &costs, positions));
+        costs.sum::<f64>() / positions.len() as f64
+    };
+    let mean = mean_cost(&wide);
     assert!(near(report.cost, mean), "{} {mean}", report.cost);
     let (plain, _) = collapse(&mesh, &bvh, &[], &options, &Silent).unwrap();
-    let plain = pose_costs(&mesh, &plain, &costs, &poses);
-    let plain = plain.iter().map(|pose| pose.cost).sum::<f64>() / plain.len() as f64;
+    let plain = mean_cost(&plain);
     assert!(mean <= plain * (1.0 + 1e-6), "{mean} {plain}");
 }
 

@@ -133,7 +133,7 @@ fn a_build_can_be_cancelled_anywhere() {
     }
 }
 
-/// Oracle: the least sum of areas over all splits of a few triangles, tried one by one.
+/// Oracle: the smallest sum of areas over all splits of a few triangles, tried one by one.
 fn best_split_by_trial(references: &[Reference<Bounds>]) -> f64 {
     let mut best = f64::INFINITY;
     for axis in 0..3 {

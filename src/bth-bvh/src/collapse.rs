@@ -1,6 +1,7 @@
-//! The collapse of a binary BVH to the wide BVH: plans the nodes and leaves, and has their lines written.
+//! The collapse of a binary BVH to the wide BVH: plans the nodes and leaves, and has their lines
+//! written.
 
-use super::plan::{Costs, Decision, Plan, Planner};
+use super::plan::{Costs, Decision, Planner};
 use super::poses::Weighed;
 use super::slot_order::SlotOrder;
 use super::wide::{CollapseReport, Wide};
@@ -16,23 +17,23 @@ use bth_import::monitor::Monitor;
 /// Options of [`collapse`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CollapseOptions {
-    /// Whether the BVH below each tet leaf is kept beside it.
+    /// True if the BVH below each tet leaf is kept next to it.
     pub keep_subtrees: bool,
-    /// Whether the vertices of leaves are recorded, and subtrees of tet leaves lie where these are in depth-first order. Demands kept
-    /// subtrees where nodes are cut.
+    /// True if the vertices of leaves are recorded, and subtrees of tet leaves lie where these are
+    /// in depth-first order. Demands kept subtrees where nodes are cut.
     pub leaf_vertices: bool,
     /// Costs by which the tree is chosen.
     pub costs: Costs,
-    /// Limits on the tree.
-    pub plan: Plan,
 }
 
-/// Collapses a binary BVH to the nodes and leaves of the file, chosen by the nodes' areas or by given probabilities. The nodes in `cut` (ascending, none
-/// below another) become tet leaves: the i-th is child `Child::Tets(i)`, in a slot with its node's exact box.
+/// Collapses a binary BVH to the nodes and leaves of the file, chosen by the nodes' areas or by
+/// given probabilities. The nodes in `cut` (ascending, none below another) become tet leaves: the
+/// i-th is child `Child::Tets(i)`, in a slot with its node's exact box.
 ///
 /// # Errors
 /// [`Error::Limit`] when the lines exceed what a child code can address or the tree is too deep,
-/// [`Error::Internal`] when `cut` is not as described or its subtrees are to be recorded and not kept, [`Error::Cancelled`].
+/// [`Error::Internal`] when `cut` is not as described or its subtrees are to be recorded and not
+/// kept, [`Error::Cancelled`].
 pub fn collapse<'a>(
     mesh: &Mesh,
     bvh: impl Into<Weighed<'a>>,
@@ -43,14 +44,15 @@ pub fn collapse<'a>(
     collapse_by(mesh, bvh, cut, options, &|planner, cut| planner.run(cut), monitor)
 }
 
-/// Decides for each node of the binary BVH, given the cut nodes; also returns the cost of the tree without its tet leaves.
-pub type Decide<'a> = dyn Fn(&Planner<'_>, &[u32]) -> Result<(Vec<Decision>, f32)> + 'a;
+/// Decides for each node of the binary BVH, given the cut nodes; also returns the cost of the tree
+/// without its tet leaves.
+pub(super) type Decide<'a> = dyn Fn(&Planner<'_>, &[u32]) -> Result<(Vec<Decision>, f32)> + 'a;
 
-/// As [`collapse`], with the tree chosen by `decide`, for comparisons of methods.
+/// As [`collapse`], with the tree chosen by `decide`.
 ///
 /// # Errors
 /// As [`collapse`], and those of `decide`.
-pub fn collapse_by<'a>(
+pub(super) fn collapse_by<'a>(
     mesh: &Mesh,
     bvh: impl Into<Weighed<'a>>,
     cut: &[u32],
@@ -67,8 +69,9 @@ pub fn collapse_by<'a>(
     }
     monitor.stage("collapse", None);
     let greatest = bvh.nodes.first().map_or(0.0, greatest_coordinate);
-    // The boxes of an object that deforms are computed anew by readers, which do not widen them. Those of an object that is far from the
-    // origin would be widened by much for its size, and readers need not allow for it.
+    // The boxes of an object that deforms are computed anew by readers, which do not widen them.
+    // Those of an object that is far from the origin would be widened by much for its size, and
+    // readers need not allow for it.
     let is_far = bvh.nodes.first().is_some_and(|root| far_away(&root.lower, &root.upper).is_some());
     let widened_boxes = !options.leaf_vertices && !is_far && WIDENED_RANGE.contains(&greatest);
     let mut wide = Wide { root: NONE, subtrees: vec![NONE; cut.len()], widened_boxes, ..Wide::default() };
@@ -76,7 +79,7 @@ pub fn collapse_by<'a>(
     if bvh.nodes.is_empty() {
         return Ok((wide, report));
     }
-    let planner = Planner::new(mesh, weighed, options.costs, options.plan, options.keep_subtrees, monitor);
+    let planner = Planner::new(mesh, weighed, options.costs, options.keep_subtrees, monitor);
     let (decisions, cost) = decide(&planner, cut)?;
     report.cost = f64::from(cost);
     let root_area = weighed.area(0);
@@ -87,7 +90,6 @@ pub fn collapse_by<'a>(
         cut,
         decisions: &decisions,
         slot_order: SlotOrder::new(mesh, bvh),
-        plan: options.plan,
         leaf_vertices: options.leaf_vertices,
         monitor,
         wide: &mut wide,

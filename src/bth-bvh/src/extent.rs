@@ -2,10 +2,12 @@
 
 use super::bounds::Bounds;
 
-/// Bounds whose area the builder sums up. Every stage of the builder is written once over this trait; [`Bounds`] are those of one
-/// pose, [`PoseBounds`](super::pose_bounds::PoseBounds) those of several.
+/// Bounds whose area the builder sums up. Every stage of the builder is written once over this
+/// trait; [`Bounds`] are those of one pose, [`PoseBounds`](super::pose_bounds::PoseBounds) those of
+/// several.
 pub(super) trait Extent: Copy + PartialEq + Send + Sync {
-    /// A value for each order in which triangles are sorted and binned: the axes of one pose or of several.
+    /// A value for each order in which triangles are sorted and binned: the axes of one pose or of
+    /// several.
     type Orders<T: Clone + Send + Sync>: Clone + Send + Sync + AsRef<[T]> + AsMut<[T]>;
 
     /// Contains nothing; the neutral element of [`Extent::grow`].

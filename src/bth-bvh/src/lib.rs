@@ -1,15 +1,16 @@
 //! The binary BVH, input of the stages marks, costs and tets, and its collapse to the wide BVH.
 //!
-//! [`build()`] splits top-down (binned or full-sweep SAH), then moves subtrees to positions of lower cost.
-//! [`rebuild_treelets()`] rebuilds small parts of the tree where the wide tree then costs less.
-//! [`collapse()`] plans the wide tree by dynamic programming and writes its lines.
+//! [`build()`] splits top-down (binned or full-sweep SAH), then moves subtrees to positions of
+//! lower cost. [`rebuild_treelets()`] rebuilds small parts of the tree where the wide tree then
+//! costs less. [`collapse()`] plans the wide tree by dynamic programming and writes its lines.
 //!
-//! [`build_poses()`] builds one tree for several poses of a mesh that deforms, with the cost summed over them.
+//! [`build_poses()`] builds one tree for several poses of a mesh that deforms, with the cost summed
+//! over them.
 //!
 //! [`sampling`] draws sample rays and walks them through the binary BVH.
 //!
-//! `bth-bench quality` measures the gain of each step. Spatial splits are not made: with nodes of 16 children the few large
-//! triangles of much overlap end up in one leaf near the root, and splitting them gained nothing.
+//! Spatial splits are not made: with nodes of 16 children the few large triangles of much overlap end
+//! up in one leaf near the root, and splitting them gained nothing.
 #![warn(missing_docs)]
 
 mod binned_split;
@@ -22,7 +23,6 @@ mod linked_tree;
 mod places;
 mod plan;
 mod pose_bounds;
-mod pose_costs;
 mod poses;
 mod reinsertion;
 pub mod sampling;
@@ -42,12 +42,12 @@ pub mod testing;
 #[cfg(test)]
 mod validate;
 
-pub use build::{BvhOptions, BvhReport, Effort, MAX_LEVELS, Quality, build, build_with, reinsert, visits};
+use build::visits;
+pub use build::{BvhOptions, BvhReport, Effort, MAX_LEVELS, Quality, build};
 pub use build_poses::{PoseOptions, build_poses};
-pub use collapse::{CollapseOptions, Decide, collapse, collapse_by};
+pub use collapse::{CollapseOptions, collapse};
 pub use places::triangle_places;
-pub use plan::{Costs, Decision, Plan, Planner, Role, Vertices};
-pub use pose_costs::{PoseCost, pose_costs};
+pub use plan::Costs;
 pub use poses::{Poses, Weighed};
 pub use treelets::rebuild_treelets;
 pub use wide::{CollapseReport, Wide};
@@ -56,7 +56,7 @@ use bounds::Bounds;
 use rayon::prelude::*;
 use zerocopy::FromZeros;
 
-/// Greatest number of poses over which the cost of a tree is summed.
+/// Largest number of poses over which the cost of a tree is summed.
 pub const MAX_POSES: usize = 16;
 
 /// Node of a [`BinaryBvh`].
@@ -75,14 +75,15 @@ pub struct Node {
 }
 
 impl Node {
-    /// Whether the node has no children.
+    /// Returns true if the node has no children.
     #[inline]
     pub fn is_leaf(&self) -> bool {
         self.right == 0
     }
 
-    /// Half the surface area of the box. A triangle of non-zero area extends along two axes, and f64 holds the product of any two
-    /// extents, so this is zero only if all triangles below have no area.
+    /// Half the surface area of the box. A triangle of non-zero area extends along two axes, and
+    /// f64 holds the product of any two extents, so this is zero only if all triangles below have
+    /// no area.
     pub fn half_area(&self) -> f64 {
         Bounds::of_node(self).half_area()
     }
@@ -99,7 +100,8 @@ pub struct BinaryBvh {
     pub order: Vec<u32>,
 }
 
-/// Nodes that one task sums; a constant, so that the rounding does not depend on the number of threads.
+/// Nodes that one task sums; a constant, so that the rounding does not depend on the number of
+/// threads.
 const SUMMED_AT_ONCE: usize = 1 << 16;
 
 /// The sum of a value over so many nodes.
@@ -112,7 +114,8 @@ fn sum(nodes: usize, value: impl Fn(u32) -> f64 + Sync) -> f64 {
     parts.map(part).collect::<Vec<f64>>().into_iter().sum()
 }
 
-/// So many zero elements. The system makes their pages when they are first written, which several threads may do.
+/// So many zero elements. The system makes their pages when they are first written, which several
+/// threads may do.
 fn zeroed<T: FromZeros>(count: usize) -> Vec<T> {
     let no_memory = |_| std::alloc::handle_alloc_error(std::alloc::Layout::new::<T>());
     T::new_vec_zeroed(count).unwrap_or_else(no_memory)

@@ -52,8 +52,8 @@ impl<E: Extent> LinkedTree<E> {
         Self::linked(bvh, bounds, |_, left, right| left.union(right))
     }
 
-    /// The tree of a BVH. `bounds` gives those of a node, which for a leaf is told its triangle; `inner` those of an inner
-    /// node from these and the ones of its children.
+    /// The tree of a BVH. `bounds` gives those of a node, which for a leaf is told its triangle;
+    /// `inner` those of an inner node from these and the ones of its children.
     fn linked(
         bvh: &BinaryBvh,
         bounds: impl Fn(&Node, u32) -> E + Sync,
@@ -94,8 +94,9 @@ impl<E: Extent> LinkedTree<E> {
         sum(self.nodes.len(), |at| self.node(at).bounds.half_area()) / self.node(self.root).bounds.half_area()
     }
 
-    /// Whether `moved`, which has a grandparent, may become the sibling of `target`: the move must change the tree, must
-    /// not place a subtree below itself, and must keep within [`MAX_LEVELS`].
+    /// Returns true if `moved`, which has a grandparent, may become the sibling of `target`: the
+    /// move must change the tree, must not place a subtree below itself, and must keep within
+    /// [`MAX_LEVELS`].
     pub(super) fn can_move(&self, moved: u32, target: u32) -> bool {
         let parent = self.node(moved).parent;
         if parent == NONE || self.node(parent).parent == NONE {
@@ -117,8 +118,9 @@ impl<E: Extent> LinkedTree<E> {
         level + u32::from(height) <= MAX_LEVELS
     }
 
-    /// Makes `moved` the sibling of `target` where [`LinkedTree::can_move`]. Its former parent, which has no other child
-    /// then, becomes the parent of both. Returns the change of the sum of all areas.
+    /// Makes `moved` the sibling of `target` where [`LinkedTree::can_move`]. Its former parent,
+    /// which has no other child then, becomes the parent of both. Returns the change of the sum of
+    /// all areas.
     pub(super) fn move_beside(&mut self, moved: u32, target: u32) -> f64 {
         let parent = self.node(moved).parent;
         let grandparent = self.node(parent).parent;
@@ -179,7 +181,8 @@ impl<E: Extent> LinkedTree<E> {
         bvh
     }
 
-    /// Counts the triangles below a node and below each node of its subtree. `level` edges lie above it.
+    /// Counts the triangles below a node and below each node of its subtree. `level` edges lie
+    /// above it.
     fn count(&self, at: u32, level: u32, counts: &[AtomicU32]) -> u32 {
         let node = self.node(at);
         if node.is_leaf() {
@@ -237,8 +240,8 @@ struct Place {
     first: u32,
 }
 
-/// Sets the parents, heights and bounds of a subtree, given its nodes in preorder of which the first has index `at`. The
-/// parent of that one is left as it is. Returns its height.
+/// Sets the parents, heights and bounds of a subtree, given its nodes in preorder of which the
+/// first has index `at`. The parent of that one is left as it is. Returns its height.
 fn link<E: Extent>(
     nodes: &mut [LinkedNode<E>],
     heights: &mut [u8],

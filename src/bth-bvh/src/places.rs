@@ -6,9 +6,9 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// The rows of `TRIANGLE_PLACES` for a mesh with so many triangles; no rows without a root.
 ///
-/// A triangle that lies in several leaves gets the place in the first of them, in the order of their
-/// lines. A triangle without a place gets [`NONE`]: it lies in no triangle leaf, or beyond the indices
-/// that a place can hold.
+/// A triangle that lies in several leaves gets the place in the first of them, in the order of
+/// their lines. A triangle without a place gets [`NONE`]: it lies in no triangle leaf, or beyond
+/// the indices that a place can hold.
 pub fn triangle_places(wide: &Wide, grid: Option<&Grid>, triangles: usize) -> Vec<u32> {
     if wide.root == NONE {
         return Vec::new();

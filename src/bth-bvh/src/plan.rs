@@ -1,8 +1,9 @@
-//! Plans which nodes of the binary BVH become wide nodes and leaves, by dynamic programming over SAH costs.
+//! Plans which nodes of the binary BVH become wide nodes and leaves, by dynamic programming over
+//! SAH costs.
 //!
 //! As in "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs" (Ylitie et al.
-//! 2017, §3.1): `cost[k]` of a node is the least cost of its subtree as at most `k` children of one
-//! wide node. The costs of a node are needed by its parent alone, so only decisions are stored.
+//! 2017, §3.1): `cost[k]` of a node is the smallest cost of its subtree as at most `k` children of
+//! one wide node. The costs of a node are needed by its parent alone, so only decisions are stored.
 
 use super::BinaryBvh;
 use super::poses::Weighed;
@@ -12,7 +13,8 @@ use bth_import::error::Result;
 use bth_import::monitor::Monitor;
 use zerocopy::FromZeros;
 
-/// Costs of a ray's visits, relative to that of a wide node. A visit's probability is the node's area over the root's.
+/// Costs of a ray's visits, relative to that of a wide node. A visit's probability is the node's
+/// area over the root's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Costs {
     /// A wide node.
@@ -21,8 +23,8 @@ pub struct Costs {
     pub indexed: [f32; 2],
     /// A leaf without sharing, which is 10 lines, and each of its triangles.
     pub raw: [f32; 2],
-    /// Price of one more line of 64 bytes for each triangle of the model, visited or not, as a share of the visits to the
-    /// binary BVH. Weighs the size of the file against visits.
+    /// Price of one more line of 64 bytes for each triangle of the model, visited or not, as a
+    /// share of the visits to the binary BVH. Weighs the size of the file against visits.
     pub line: f32,
 }
 
@@ -35,24 +37,9 @@ impl Default for Costs {
     }
 }
 
-/// Limits on wide trees below those of the format. Benchmarks vary them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Plan {
-    /// Most children of a wide node, 2 to 16.
-    pub children: usize,
-    /// Most triangles of a leaf, 1 to 16.
-    pub triangles: usize,
-}
-
-impl Default for Plan {
-    fn default() -> Self {
-        Plan { children: WIDTH, triangles: WIDTH }
-    }
-}
-
 /// The role of a node that takes one slot of a wide node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
+pub(super) enum Role {
     /// A wide node.
     Node,
     /// A leaf with shared vertices.
@@ -61,10 +48,11 @@ pub enum Role {
     Raw,
 }
 
-/// A node's decisions in 4 bits each: at bit 4 k for k in 2..16, the number of k slots that its left child takes, 0 for the
-/// same as with k - 1; at bit 0, the number of 16 slots when it is itself a wide node; at bit 4, its role.
+/// A node's decisions in 4 bits each: at bit 4 k for k in 2..16, the number of k slots that its
+/// left child takes, 0 for the same as with k - 1; at bit 0, the number of 16 slots when it is
+/// itself a wide node; at bit 4, its role.
 #[derive(Clone, Copy, Debug, Default, FromZeros)]
-pub struct Decision(u64);
+pub(super) struct Decision(u64);
 
 impl Decision {
     const CUT: u64 = 8 << 4;
@@ -74,17 +62,17 @@ impl Decision {
     }
 
     /// Sets how many of `slots` slots the left child takes.
-    pub fn set_share(&mut self, slots: usize, left: usize) {
+    pub(super) fn set_share(&mut self, slots: usize, left: usize) {
         self.0 |= (left as u64) << (4 * (slots % WIDTH));
     }
 
     /// Sets the role of a node whose role has not been set.
-    pub fn set_role(&mut self, role: Role) {
+    fn set_role(&mut self, role: Role) {
         self.0 |= role as u64 * 16;
     }
 
     /// Makes the node a tet leaf.
-    pub fn set_cut(&mut self) {
+    fn set_cut(&mut self) {
         self.0 |= Self::CUT;
     }
 
@@ -96,15 +84,16 @@ impl Decision {
         }
     }
 
-    /// Whether the node is a tet leaf; its role is then that of the subtree kept beside it.
-    pub fn is_cut(self) -> bool {
+    /// Returns true if the node is a tet leaf; its role is then that of the subtree kept next to
+    /// it.
+    pub(super) fn is_cut(self) -> bool {
         self.0 & Self::CUT != 0
     }
 }
 
 /// Costs and vertices of a subtree, the input of the planning of its parent.
 struct Summary {
-    /// Least cost in at most as many slots as the row; rows 1 to 15.
+    /// Smallest cost in at most as many slots as the row; rows 1 to 15.
     cost: [f32; WIDTH],
     /// Distinct vertices, ascending, when there are at most 16.
     vertices: Option<Vertices>,
@@ -112,14 +101,14 @@ struct Summary {
 
 /// At most 16 ascending vertex indices.
 #[derive(Clone, Copy)]
-pub struct Vertices {
+struct Vertices {
     index: [u32; WIDTH],
     count: usize,
 }
 
 impl Vertices {
     /// The vertices of a triangle.
-    pub fn of_triangle(mut triangle: [u32; 3]) -> Vertices {
+    fn of_triangle(mut triangle: [u32; 3]) -> Vertices {
         triangle.sort_unstable();
         let mut vertices = Vertices { index: [0; WIDTH], count: 0 };
         for v in triangle {
@@ -132,7 +121,7 @@ impl Vertices {
     }
 
     /// The union, if it has at most 16 vertices.
-    pub fn join(&self, other: &Vertices) -> Option<Vertices> {
+    fn join(&self, other: &Vertices) -> Option<Vertices> {
         let mut joined = Vertices { index: [0; WIDTH], count: 0 };
         let (a, b) = (&self.index[..self.count], &other.index[..other.count]);
         let (mut i, mut j) = (0, 0);
@@ -153,23 +142,18 @@ impl Vertices {
 
 /// Input of the planning.
 #[derive(Clone, Copy)]
-pub struct Planner<'a> {
-    /// The mesh.
-    pub mesh: &'a Mesh,
-    /// Its binary BVH, of at least one node.
-    pub bvh: &'a BinaryBvh,
-    /// Costs that the tree is chosen by.
-    pub costs: Costs,
-    /// Limits on the tree.
-    pub plan: Plan,
-    /// Whether the subtrees below cut nodes are planned, too.
-    pub below_cut: bool,
-    /// Receives warnings and cancels.
-    pub monitor: &'a dyn Monitor,
+pub(super) struct Planner<'a> {
+    pub(super) mesh: &'a Mesh,
+    /// Binary BVH of at least one node.
+    pub(super) bvh: &'a BinaryBvh,
+    pub(super) costs: Costs,
+    /// True if the subtrees below cut nodes are planned, too.
+    below_cut: bool,
+    pub(super) monitor: &'a dyn Monitor,
     weighed: Weighed<'a>,
     inverse_area: f64,
     /// Price of a line.
-    pub line: f32,
+    pub(super) line: f32,
 }
 
 /// Subtrees of more triangles are planned as separate tasks.
@@ -181,7 +165,6 @@ impl<'a> Planner<'a> {
         mesh: &'a Mesh,
         weighed: Weighed<'a>,
         costs: Costs,
-        plan: Plan,
         below_cut: bool,
         monitor: &'a dyn Monitor,
     ) -> Self {
@@ -191,10 +174,11 @@ impl<'a> Planner<'a> {
         let inverse_area = if area > 0.0 { 1.0 / area } else { 0.0 };
         let visits = weighed.total() * inverse_area;
         let line = (f64::from(costs.line) * visits / bvh.order.len() as f64) as f32;
-        Planner { mesh, bvh, costs, plan, below_cut, monitor, weighed, inverse_area, line }
+        Planner { mesh, bvh, costs, below_cut, monitor, weighed, inverse_area, line }
     }
 
-    /// Decisions for all nodes, and the cost of the tree without its tet leaves; `cut` holds these, ascending.
+    /// Decisions for all nodes, and the cost of the tree without its tet leaves; `cut` holds these,
+    /// ascending.
     pub(super) fn run(&self, cut: &[u32]) -> Result<(Vec<Decision>, f32)> {
         let mut decisions: Vec<Decision> = super::zeroed(self.bvh.nodes.len());
         let summary = self.subtree(0, cut, &mut decisions)?;
@@ -202,11 +186,12 @@ impl<'a> Planner<'a> {
     }
 
     /// Probability that a ray through the root meets the node.
-    pub fn area(&self, at: u32) -> f32 {
+    pub(super) fn area(&self, at: u32) -> f32 {
         (self.weighed.area(at) * self.inverse_area) as f32
     }
 
-    /// The least cost of a small BVH of some triangles of the mesh as one child of a wide node. Probabilities are areas times `scale`.
+    /// The smallest cost of a small BVH of some triangles of the mesh as one child of a wide node.
+    /// Probabilities are areas times `scale`.
     pub(super) fn cost_of_part(&self, part: &BinaryBvh, scale: f64) -> Result<f32> {
         let planner = Planner { bvh: part, weighed: part.into(), inverse_area: scale, ..*self };
         Ok(planner.subtree(0, &[], &mut vec![Decision::default(); part.nodes.len()])?.cost[1])
@@ -220,7 +205,8 @@ impl<'a> Planner<'a> {
             self.plain(at, &[], decisions)?;
         }
         decisions[0].set_cut();
-        // The cut nodes are given, and the cost of the slot of a tet leaf is the same in every tree, so it is left out.
+        // The cut nodes are given, and the cost of the slot of a tet leaf is the same in every
+        // tree, so it is left out.
         Ok(Summary { cost: [0.0; WIDTH], vertices: None })
     }
 
@@ -256,12 +242,12 @@ impl<'a> Planner<'a> {
         let leaves =
             [at + 1, node.right].map(|at| (self.bvh.nodes[at as usize].count as usize).min(WIDTH - 1));
         let pair = Pair { costs: [&left.cost, &right.cost], leaves };
-        let (children, share) = pair.distribute(self.plan.children);
+        let (children, share) = pair.distribute(WIDTH);
         decision.set_share(WIDTH, share);
         let mut summary = Summary { cost: [f32::INFINITY; WIDTH], vertices: None };
         let mut role = (area * self.costs.node + self.line * NODE_LINES as f32 + children, Role::Node);
         // A subtree with a cut node cannot be a triangle leaf.
-        if node.count as usize <= self.plan.triangles && cut.is_empty() {
+        if node.count as usize <= WIDTH && cut.is_empty() {
             if let (Some(a), Some(b)) = (&left.vertices, &right.vertices) {
                 summary.vertices = a.join(b);
             }
@@ -279,20 +265,20 @@ impl<'a> Planner<'a> {
         }
         decision.set_role(role.1);
         summary.cost[1] = role.0;
-        pair.in_several_slots(decision, &mut summary.cost, self.plan.children);
+        pair.in_several_slots(decision, &mut summary.cost);
         Ok(summary)
     }
 }
 
-/// The least costs of the two subtrees of a node in 1 to 15 slots each, and the numbers of their leaves, in more slots than which they
-/// cost no less.
+/// The smallest costs of the two subtrees of a node in 1 to 15 slots each, and the numbers of their
+/// leaves, in more slots than which they cost no less.
 pub(super) struct Pair<'a> {
     pub(super) costs: [&'a [f32; WIDTH]; 2],
     pub(super) leaves: [usize; 2],
 }
 
 impl Pair<'_> {
-    /// The least cost of both in so many slots, and how many of these the left one takes.
+    /// The smallest cost of both in so many slots, and how many of these the left one takes.
     #[inline(always)]
     pub(super) fn distribute(&self, slots: usize) -> (f32, usize) {
         let [left, right] = self.leaves;
@@ -307,12 +293,11 @@ impl Pair<'_> {
         best
     }
 
-    /// Decides how a node whose cost in one slot is known shares more slots, fewer than `most`, between its children.
+    /// Decides how a node whose cost in one slot is known shares more slots between its children.
     #[inline(always)]
-    pub(super) fn in_several_slots(&self, decision: &mut Decision, cost: &mut [f32; WIDTH], most: usize) {
-        let end = most.min(WIDTH);
+    pub(super) fn in_several_slots(&self, decision: &mut Decision, cost: &mut [f32; WIDTH]) {
         let leaves = self.leaves[0] + self.leaves[1];
-        for slots in 2..end.min(leaves + 1) {
+        for slots in 2..WIDTH.min(leaves + 1) {
             let (shared, share) = self.distribute(slots);
             cost[slots] = cost[slots - 1];
             if shared < cost[slots] {
@@ -320,18 +305,18 @@ impl Pair<'_> {
                 decision.set_share(slots, share);
             }
         }
-        for slots in (leaves + 1)..end {
+        for slots in (leaves + 1)..WIDTH {
             cost[slots] = cost[leaves];
         }
     }
 }
 
-/// The children, as nodes of the binary BVH, of a wide node of at most `most` children.
-pub(super) fn children(bvh: &BinaryBvh, decisions: &[Decision], at: u32, most: usize) -> Vec<u32> {
-    let mut children = Vec::with_capacity(most);
+/// The children, as nodes of the binary BVH, of a wide node.
+pub(super) fn children(bvh: &BinaryBvh, decisions: &[Decision], at: u32) -> Vec<u32> {
+    let mut children = Vec::with_capacity(WIDTH);
     let share = decisions[at as usize].share(WIDTH);
     gather(bvh, decisions, at + 1, share, &mut children);
-    gather(bvh, decisions, bvh.nodes[at as usize].right, most - share, &mut children);
+    gather(bvh, decisions, bvh.nodes[at as usize].right, WIDTH - share, &mut children);
     children
 }
 

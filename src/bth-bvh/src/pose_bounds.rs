@@ -5,14 +5,15 @@ use super::extent::Extent;
 use super::poses::Poses;
 use rayon::prelude::*;
 
-/// Poses whose axes are orders in which triangles are sorted and binned. The axes of all poses find little better splits, and take
-/// longer by the number of poses.
+/// Poses whose axes are orders in which triangles are sorted and binned. The axes of all poses find
+/// little better splits, and take longer by the number of poses.
 const ORDER_POSES: usize = 4;
-/// Greatest scaled coordinate.
+/// Largest scaled coordinate.
 const GREATEST: f64 = (1u64 << 40) as f64;
 
-/// Bounds in up to `P` poses. Each pose is scaled so that the root's half area is 1 in it, so that the sum of areas is the sum of
-/// probabilities that a ray meets the node, as T-SAH has it. Places without a pose hold points, whose area is 0.
+/// Bounds in up to `P` poses. Each pose is scaled so that the root's half area is 1 in it, so that
+/// the sum of areas is the sum of probabilities that a ray meets the node, as T-SAH has it. Places
+/// without a pose hold points, whose area is 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PoseBounds<const P: usize> {
     /// Lower end per axis, then pose.
@@ -88,7 +89,8 @@ impl<'a, const P: usize> ScaledPoses<'a, P> {
     pub(super) fn new(triangles: &'a [[u32; 3]], poses: &Poses<'a>, used: &[u32]) -> Self {
         const { assert!(P >= ORDER_POSES) };
         let count = poses.len().min(P);
-        // The first places are those whose axes are orders, so they hold poses that are spread over all.
+        // The first places are those whose axes are orders, so they hold poses that are spread over
+        // all.
         let mut rows: Vec<usize> = (0..ORDER_POSES).map(|order| order * count / ORDER_POSES).collect();
         rows.dedup();
         rows.extend((0..count).filter(|row| !rows.contains(row)).collect::<Vec<_>>());
@@ -120,7 +122,8 @@ impl<'a> Scaled<'a> {
         let of = |id: &u32| Bounds::of_points(&triangles[*id as usize].map(|row| positions[row as usize]));
         let root = used.par_iter().map(of).reduce(|| Bounds::EMPTY, |a, b| a.union(&b));
         let area = root.half_area();
-        // Of boxes that are extremely thin the area stays below 1, so that no scaled coordinate overflows.
+        // Of boxes that are extremely thin the area stays below 1, so that no scaled coordinate
+        // overflows.
         let extent = (0..3).map(|k| f64::from(root.upper[k]) - f64::from(root.lower[k])).fold(0.0, f64::max);
         let scale = if area > 0.0 { (1.0 / area.sqrt()).min(GREATEST / extent) } else { 0.0 };
         Scaled { positions, origin: root.lower.map(f64::from), scale }

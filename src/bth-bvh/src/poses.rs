@@ -13,7 +13,8 @@ pub struct Poses<'a> {
 }
 
 impl<'a> Poses<'a> {
-    /// One to [`MAX_POSES`] poses, each with a finite position for each row of the mesh's positions.
+    /// One to [`MAX_POSES`] poses, each with a finite position for each row of the mesh's
+    /// positions.
     ///
     /// # Errors
     /// [`Error::Internal`] when they are not.
@@ -60,8 +61,9 @@ impl<'a> Poses<'a> {
         boxes
     }
 
-    /// For each node of a BVH the probability that a random line through the root meets it, as the mean over the poses (Bittner and
-    /// Meister 2015, equation 4, with equal weights). Poses in which the root has no area do not count.
+    /// For each node of a BVH the probability that a random line through the root meets it, as the
+    /// mean over the poses (Bittner and Meister 2015, equation 4, with equal weights). Poses in
+    /// which the root has no area do not count.
     pub fn probabilities(&self, mesh: &Mesh, bvh: &BinaryBvh) -> Vec<f64> {
         let mut sum = vec![0.0; bvh.nodes.len()];
         let mut counted = 0u32;
@@ -85,8 +87,9 @@ impl<'a> Poses<'a> {
 pub struct Weighed<'a> {
     /// The BVH.
     pub bvh: &'a BinaryBvh,
-    /// For each node the probability that a sample ray enters it ([`crate::sampling::visits`]), or the mean of that of lines over poses
-    /// ([`Poses::probabilities`]); `None` for those of the boxes.
+    /// For each node the probability that a sample ray enters it ([`crate::sampling::visits`]), or
+    /// the mean of that of lines over poses ([`Poses::probabilities`]); `None` for those of the
+    /// boxes.
     pub probabilities: Option<&'a [f64]>,
 }
 

@@ -1,4 +1,4 @@
-//! Optimization of the tree by reinsertion: subtrees move to the positions of least cost.
+//! Optimization of the tree by reinsertion: subtrees move to the positions of smallest cost.
 //!
 //! After "Parallel Reinsertion for Bounding Volume Hierarchy Optimization" (Meister and Bittner
 //! 2018): the best places of a batch of subtrees are searched in parallel in the unchanged tree.
@@ -12,7 +12,8 @@ use bth_import::error::Result;
 use bth_import::monitor::Monitor;
 use rayon::prelude::*;
 
-/// Size of the first batch. It is small because it holds the largest nodes, whose moves affect each other most.
+/// Size of the first batch. It is small because it holds the largest nodes, whose moves affect each
+/// other most.
 const FIRST_BATCH: usize = 16;
 /// Later batches have this share of what was tried before, so that there are few of them.
 const BATCH_GROWTH: usize = 16;
@@ -49,12 +50,13 @@ pub(super) fn pass<E: Extent>(tree: &mut LinkedTree<E>, share: f64, monitor: &dy
     Ok(moved)
 }
 
-/// Least nodes whose areas one task counts.
+/// Smallest nodes whose areas one task counts.
 const COUNTED_AT_ONCE: usize = 1 << 14;
 /// Bits of an area that do not count where areas are counted.
 const LESS_BITS: u32 = 20;
 
-/// The power of two by which areas are multiplied, exactly, so that f32 holds those of meshes of any size.
+/// The power of two by which areas are multiplied, exactly, so that f32 holds those of meshes of
+/// any size.
 fn scale<E: Extent>(tree: &LinkedTree<E>) -> f64 {
     let greatest = (0..tree.len() as u32)
         .find(|&at| tree.node(at).parent == NONE)
@@ -73,7 +75,8 @@ fn largest<E: Extent>(tree: &LinkedTree<E>, share: f64) -> Vec<u32> {
         let may_move = node.parent != NONE && tree.node(node.parent).parent != NONE;
         may_move.then(|| ((node.bounds.half_area() * scale) as f32, at))
     });
-    // Areas are counted by their leading bits, which are ordered as they are, so that not all of them need be sorted.
+    // Areas are counted by their leading bits, which are ordered as they are, so that not all of
+    // them need be sorted.
     let leading = |area: f32| (area.to_bits() >> LESS_BITS) as usize;
     let none = || vec![0u32; 1 << (u32::BITS - LESS_BITS)];
     let add = |mut counts: Vec<u32>, (area, _): (f32, u32)| {
@@ -112,8 +115,8 @@ fn search<E: Extent>(tree: &LinkedTree<E>, subtree: u32, stack: &mut Vec<(u32, f
     let area = bounds.half_area();
     let parent = tree.node(subtree).parent;
     let mut best = Move { subtree, target: NONE, gain: 0.0 };
-    // The area that removing the subtree saves: its parent's, and the decrease of each ancestor below the one under which
-    // it is inserted again.
+    // The area that removing the subtree saves: its parent's, and the decrease of each ancestor
+    // below the one under which it is inserted again.
     let mut saved = tree.node(parent).bounds.half_area();
     let mut remaining = E::EMPTY;
     let mut below = subtree;

@@ -2,6 +2,7 @@
 
 pub(super) use crate::testing::weld;
 use bth_import::Mesh;
+use bth_import::monitor::Silent;
 use bth_random::Rng;
 use std::path::PathBuf;
 
@@ -62,31 +63,11 @@ pub(super) fn exponential(count: usize) -> Mesh {
     weld(&corners)
 }
 
-/// A model of the shared test data (binary little-endian PLY of triangles), if it is there.
+/// A model of the shared test data, if it is there.
 pub(super) fn model(name: &str) -> Option<Mesh> {
     let data = std::env::var_os("BTH_DATA")
         .map(PathBuf::from)
         .unwrap_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"));
-    let bytes = std::fs::read(data.join("static").join(name)).ok()?;
-    let end = bytes.windows(11).position(|w| w == b"end_header\n")? + 11;
-    let header = std::str::from_utf8(&bytes[..end]).ok()?;
-    let count = |element: &str| -> Option<usize> {
-        header.lines().find_map(|l| l.strip_prefix(element))?.trim().parse().ok()
-    };
-    let (vertices, faces) = (count("element vertex")?, count("element face")?);
-    let vertex_properties = header.split("element face").next()?.matches("property float ").count();
-    assert!(header.contains("format binary_little_endian"), "{name}: {header}");
-    let number = |at: usize| f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
-    let index = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
-    let position =
-        |v: usize| -> [f32; 3] { std::array::from_fn(|k| number(end + 4 * (v * vertex_properties + k))) };
-    let start = end + 4 * vertices * vertex_properties;
-    let corners: Vec<_> = (0..faces)
-        .map(|f| {
-            let at = start + 13 * f;
-            assert_eq!(bytes[at], 3, "{name}: face {f} is no triangle");
-            std::array::from_fn(|c| position(index(at + 1 + 4 * c)))
-        })
-        .collect();
-    Some(weld(&corners))
+    let path = data.join("static").join(name);
+    path.exists().then(|| bth_import::import(&path, bth_import::Wanted::default(), &Silent).unwrap().0)
 }

@@ -1,8 +1,9 @@
 //! The order of a wide node's children in its slots.
 //!
-//! Queries for the nearest hit sort children by depth. Those for any hit enter them as they lie, the last slot first, so the child lies last
-//! in which a ray most probably meets a triangle, as in "SATO: Surface Area Traversal Order for Shadow Ray Tracing" (Nah and Manocha
-//! 2014). A line that meets a box of surface S meets triangles of area A in it 2 A / S times in the mean (Crofton).
+//! Queries for the nearest hit sort children by depth. Those for any hit enter them as they lie,
+//! the last slot first, so the child lies last in which a ray most probably meets a triangle, as in
+//! "SATO: Surface Area Traversal Order for Shadow Ray Tracing" (Nah and Manocha 2014). A line that
+//! meets a box of surface S meets triangles of area A in it 2 A / S times in the mean (Crofton).
 
 use super::BinaryBvh;
 use crate::vectors::{corners, double_area};
@@ -12,7 +13,8 @@ use rayon::prelude::*;
 /// Sorts children by the area of their triangles over that of their boxes.
 pub(super) struct SlotOrder<'a> {
     bvh: &'a BinaryBvh,
-    /// For each row of the BVH's order the sum of the areas of the triangles before it, doubled; and the sum of all.
+    /// For each row of the BVH's order the sum of the areas of the triangles before it, doubled;
+    /// and the sum of all.
     before: Vec<f64>,
 }
 
@@ -30,7 +32,8 @@ impl<'a> SlotOrder<'a> {
         Self { bvh, before }
     }
 
-    /// Sorts children, nodes of the BVH, so that the one in which something is met most probably is the last one.
+    /// Sorts children, nodes of the BVH, so that the one in which something is met most probably is
+    /// the last one.
     pub(super) fn sort(&self, children: &mut [u32]) {
         children.sort_by(|a, b| self.density(*a).total_cmp(&self.density(*b)));
     }

@@ -28,8 +28,8 @@ impl Split {
         self.left > 0
     }
 
-    /// Replaces the split by another one that is cheaper, or equally cheap and better balanced, so that stacks of equal
-    /// triangles do not become long chains.
+    /// Replaces the split by another one that is cheaper, or equally cheap and better balanced, so
+    /// that stacks of equal triangles do not become long chains.
     #[inline(always)]
     pub(super) fn improve(&mut self, cost: f64, axis: usize, position: usize, left: usize, total: usize) {
         if cost <= self.cost {

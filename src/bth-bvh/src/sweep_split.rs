@@ -23,7 +23,8 @@ fn ordered_bits(value: f32) -> u32 {
     if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
 }
 
-/// Sorts the references along the best axis and returns the size of the best left side. At least two references.
+/// Sorts the references along the best axis and returns the size of the best left side. At least
+/// two references.
 pub(super) fn split<E: Extent>(references: &mut [Reference<E>], scratch: &mut Scratch<E>) -> usize {
     let total = references.len();
     let Scratch { keys, right_cost, sorted } = scratch;

@@ -23,7 +23,8 @@ fn hittable(mesh: &Mesh) -> Vec<u32> {
     (0..mesh.triangles.len() as u32).filter(|&id| !is_zero_area(mesh.corners(id))).collect()
 }
 
-/// Asserts the contract of `BinaryBvh`. Quadratic in the depth of the tree. Returns the edges on the longest path.
+/// Asserts the contract of `BinaryBvh`. Quadratic in the depth of the tree. Returns the edges on
+/// the longest path.
 pub(super) fn validate_binary(mesh: &Mesh, bvh: &BinaryBvh) -> u32 {
     let mut sorted = bvh.order.clone();
     sorted.sort_unstable();
@@ -66,8 +67,8 @@ struct Reader<'a> {
     deepest: u32,
 }
 
-/// Asserts the contract of `Wide`: every triangle in exactly one leaf or cut node, boxes exact, corners
-/// bit for bit and in order, every line used once.
+/// Asserts the contract of `Wide`: every triangle in exactly one leaf or cut node, boxes exact,
+/// corners bit for bit and in order, every line used once.
 pub(super) fn validate_wide(mesh: &Mesh, bvh: &BinaryBvh, cut: &[u32], keep_subtrees: bool, wide: &Wide) {
     let lines = BTreeSet::new();
     let mut reader =
@@ -181,7 +182,8 @@ impl Reader<'_> {
     }
 }
 
-/// A box is widened by the room that its greatest |coordinate| asks for, and a few roundings at most.
+/// A box is widened by the room that its largest |coordinate| asks for, and a few roundings at
+/// most.
 fn assert_widened((lower, upper): ([f32; 3], [f32; 3]), exact: ([f32; 3], [f32; 3])) {
     let greatest = exact.0.iter().chain(&exact.1).fold(0.0, |m: f64, x| m.max(f64::from(*x).abs()));
     let room = greatest * BOX_MARGIN;

@@ -9,15 +9,16 @@ use serde::Serialize;
 /// The wide BVH, ready for the `LINES` and `TRIANGLE_IDS` sections.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Wide {
-    /// Nodes in depth-first order, then leaves; after them the nodes and leaves of each kept subtree, which lie among the others where
-    /// the vertices of leaves are recorded.
+    /// Nodes in depth-first order, then leaves; after them the nodes and leaves of each kept
+    /// subtree, which lie among the others where the vertices of leaves are recorded.
     pub lines: Vec<CacheLine>,
     /// Ids of the leaves' triangles, in order of the leaves' lines.
     pub triangle_ids: Vec<u32>,
-    /// For each leaf, in order of the leaves' lines, the rows of the mesh's positions in its slots: one array for an indexed leaf, one
-    /// for each corner of a raw one. Empty if they are not recorded.
+    /// For each leaf, in order of the leaves' lines, the rows of the mesh's positions in its slots:
+    /// one array for an indexed leaf, one for each corner of a raw one. Empty if they are not
+    /// recorded.
     pub leaf_vertices: Vec<[u32; WIDTH]>,
-    /// Whether child boxes are widened ([`WIDENED_BOXES`](bth_format::layout::WIDENED_BOXES)).
+    /// True if child boxes are widened ([`WIDENED_BOXES`](bth_format::layout::WIDENED_BOXES)).
     pub widened_boxes: bool,
     /// [`Child`] code of the root, `NONE` when no triangle can be hit.
     pub root: u32,
@@ -46,10 +47,11 @@ pub struct CollapseReport {
     pub tet_leaves: u64,
     /// Wide nodes on the longest path.
     pub depth: u32,
-    /// Cost of the tree without its tet leaves, which the choice of the tree minimizes; see [`Costs`](super::Costs).
+    /// Cost of the tree without its tet leaves, which the choice of the tree minimizes; see
+    /// [`Costs`](super::Costs).
     pub cost: f64,
-    /// Wide nodes that a sample ray enters on average, or a random line through the root's box where the tree was chosen by areas; kept
-    /// subtrees not counted.
+    /// Wide nodes that a sample ray enters on average, or a random line through the root's box
+    /// where the tree was chosen by areas; kept subtrees not counted.
     pub node_visits: f64,
     /// The same for triangle leaves.
     pub leaf_visits: f64,
@@ -57,8 +59,6 @@ pub struct CollapseReport {
     pub bytes: u64,
     /// Bytes of lines and ids for each triangle in a triangle leaf.
     pub bytes_per_triangle: f64,
-    /// Wall-clock time of the stage as the pipeline measures it, seconds; 0 where the stage is called on its own.
-    pub seconds: f64,
 }
 
 impl CollapseReport {

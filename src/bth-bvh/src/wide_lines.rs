@@ -11,7 +11,8 @@ pub(super) fn put<T: IntoBytes + Immutable>(lines: &mut [CacheLine], at: usize, 
     lines[at..at + bytes.len() / size_of::<CacheLine>()].as_mut_bytes().copy_from_slice(bytes);
 }
 
-/// A wide node over at most 16 nodes of the binary BVH and their child codes, with their boxes or these widened.
+/// A wide node over at most 16 nodes of the binary BVH and their child codes, with their boxes or
+/// these widened.
 pub(super) fn wide_node<'a>(children: impl Iterator<Item = (&'a Node, u32)>, widened: bool) -> WideNode {
     let empty = [[f32::MAX; WIDTH], [-f32::MAX; WIDTH]];
     let mut wide = WideNode { bounds: [empty; 3], child: [NONE; WIDTH] };
@@ -28,7 +29,7 @@ pub(super) fn wide_node<'a>(children: impl Iterator<Item = (&'a Node, u32)>, wid
     wide
 }
 
-/// The greatest |coordinate| of a node's box.
+/// The largest |coordinate| of a node's box.
 pub(super) fn greatest_coordinate(node: &Node) -> f32 {
     node.lower.iter().chain(&node.upper).fold(0.0, |greatest, x| x.abs().max(greatest))
 }

@@ -1,6 +1,6 @@
 //! Writes the lines of wide trees as planned.
 
-use super::plan::{Decision, Plan, Role, children};
+use super::plan::{Decision, Role, children};
 use super::poses::Weighed;
 use super::slot_order::SlotOrder;
 use super::wide::{CollapseReport, Wide};
@@ -42,7 +42,7 @@ const LEAVES_AT_ONCE: usize = 1 << 10;
 struct Leaf {
     /// Node of the binary BVH.
     node: u32,
-    /// Whether its triangles do not share vertices.
+    /// True if its triangles do not share vertices.
     raw: bool,
 }
 
@@ -73,7 +73,6 @@ pub(super) struct Writer<'a> {
     pub(super) cut: &'a [u32],
     pub(super) decisions: &'a [Decision],
     pub(super) slot_order: SlotOrder<'a>,
-    pub(super) plan: Plan,
     pub(super) leaf_vertices: bool,
     pub(super) monitor: &'a dyn Monitor,
     pub(super) wide: &'a mut Wide,
@@ -82,7 +81,8 @@ pub(super) struct Writer<'a> {
 
 impl Writer<'_> {
     /// Appends the tree below a node, nodes before leaves. `level` wide nodes lie above; `outer` is
-    /// false for the subtree of a tet leaf. Returns the root's code and the tet leaves with the wide nodes above each.
+    /// false for the subtree of a tet leaf. Returns the root's code and the tet leaves with the
+    /// wide nodes above each.
     pub(super) fn tree(&mut self, root: u32, level: u32, outer: bool) -> Result<(u32, Vec<(u32, u32)>)> {
         let base = self.wide.lines.len();
         // First the shape is determined: slot 0 holds the root, every other slot belongs to a node.
@@ -107,7 +107,7 @@ impl Writer<'_> {
             }
             slots[slot].code = Child::Node((base + inner.len() * NODE_LINES) as u32).code();
             let first = slots.len();
-            let mut children = children(self.bvh, self.decisions, at, self.plan.children);
+            let mut children = children(self.bvh, self.decisions, at);
             self.slot_order.sort(&mut children);
             slots.extend(children.into_iter().map(|node| Slot { node, code: NONE }));
             inner.push(Inner { first, count: slots.len() - first });

@@ -1,4 +1,4 @@
-//! Hooks for comparisons with other methods, which the benchmarks make; the compiler itself does not use them.
+//! Hooks for comparisons with other methods, which the benchmarks make. The compiler does not use
+//! them.
 
-pub use crate::bvh::{Decide, Decision, Planner, Role, Vertices, collapse_by};
 pub use crate::costs::{area_steps, mean_steps};

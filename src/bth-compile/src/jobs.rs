@@ -1,13 +1,14 @@
 //! A pool of jobs that share threads and memory.
 //!
-//! Jobs run on separate threads, not in the shared pool of rayon, where a job that waits for another process could block
-//! the job for which that process waits.
+//! Jobs run on separate threads, not in the shared pool of rayon, where a job that waits for
+//! another process could block the job for which that process waits.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 
-/// Runs the jobs, at most `parallel` at a time, and only as many as together need at most `memory` bytes by the `estimate`;
-/// a job that needs more runs alone. Results are in the order of the jobs. Where the system starts fewer threads, fewer jobs run at a time.
+/// Runs the jobs, at most `parallel` at a time, and only as many as together need at most `memory`
+/// bytes by the `estimate`; a job that needs more runs alone. Results are in the order of the jobs.
+/// Where the system starts fewer threads, fewer jobs run at a time.
 ///
 /// `within` runs the work of each thread, for example in a pool of its own.
 pub fn run<J: Send, T: Send>(

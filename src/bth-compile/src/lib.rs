@@ -1,17 +1,18 @@
-//! The BTH compiler: mesh → coordinates → bvh → marks → costs → tets → write.
+//! The BTH compiler: mesh → coordinates → bvh → marks → costs → tets → free → write.
 //!
-//! Each stage is `fn(&Input, &CompileOptions, &dyn Monitor) -> Result<(Output, CompileReport)>`: it depends on neither files, terminals
-//! nor the cache, and its output is the same at any number of threads. From the bottom up:
+//! The output of each stage depends on its inputs and options alone: not on files, terminals, the
+//! cache or the number of threads. From the bottom up:
 //!
 //! | modules | |
 //! |---|---|
 //! | [`bvh`], [`sampling`] | crate `bth-bvh`: the binary BVH, its collapse to the wide BVH, sample rays |
 //! | [`marks`], [`costs`], [`tets`] | crate `bth-tets`: which nodes become tetrahedralizations, and how |
-//! | [`opacity`], [`coordinates`], [`free`], [`mod@write`] | the other stages |
-//! | [`pipeline`] | calls the stages in order, from a model to a file |
-//! | [`cached`] | the same through a cache of results, which wraps the stages from outside |
-//! | [`memory`] | the pipeline and the scenes for triangles that are in memory |
-//! | [`scene`] | many objects, each by the pipeline, into one file |
+//! | [`opacity`], [`coordinates`], [`free`], [`mod@write`] | the work of the other stages |
+//! | `stage` | what all stages have: name, version, key, run |
+//! | [`cached`] | the cache, which runs stages and keeps their results |
+//! | [`pipeline`] | the list of stages: from a model to a file |
+//! | [`scene`] | many objects, each by the same stages, into one file |
+//! | [`memory`] | both for triangles that are in memory |
 #![warn(missing_docs)]
 
 pub mod cached;
@@ -26,6 +27,7 @@ pub mod pipeline;
 pub mod scene;
 pub mod settings;
 pub mod source;
+mod stage;
 pub mod write;
 
 pub use bth_bvh as bvh;

@@ -1,8 +1,9 @@
 //! Compilation of triangles that are in memory, without files.
 //!
-//! The result is that of a model file with the same vertices and faces, for example a PLY file: all sections but PROVENANCE are
-//! the same bytes, and so is the content id. PROVENANCE names the format `memory` and the hash of the arrays in place of those of
-//! the file. A scene is that of a manifest whose nodes are called `instance 0`, `instance 1` and so on.
+//! The result is that of a model file with the same vertices and faces, for example a PLY file: all
+//! sections but PROVENANCE are the same bytes, and so is the content id. PROVENANCE names the
+//! format `memory` and the hash of the arrays in place of those of the file. A scene is that of a
+//! manifest whose nodes are called `instance 0`, `instance 1` and so on.
 //!
 //! ```
 //! use bth_compile::memory::{TriangleMesh, open};
@@ -18,30 +19,29 @@
 pub use crate::scene::Instance;
 pub use crate::source::TriangleMesh;
 
-use crate::cached::{self, Cache, CachedCompilation};
+use crate::cached::Cache;
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
 use crate::pipeline::{
-    Clock, CompileOptions, CompileReport, Compiled, Direct, compile_imported, warn_over_limit,
+    CachedCompilation, CompileOptions, CompileReport, Compiled, Source, compile_source, joined,
 };
 use crate::scene::{self, SceneReport};
-use crate::source::{MESH_NAME, Model, SourceDigest};
+use crate::write::Content;
 use bth_cache::Record;
-use bth_import::import_triangles;
-use std::path::Path;
 
 /// Compiles a mesh.
 ///
 /// # Errors
-/// `BTH-I005` for an index that is not a row of the positions, `BTH-I004` for a corner that is not finite, both with the row of
-/// the triangle; else those of the stages: a limit of the format, cancellation.
+/// `BTH-I005` for an index that is not a row of the positions, `BTH-I004` for a corner that is not
+/// finite, both with the row of the triangle; else those of the stages: a limit of the format,
+/// cancellation.
 pub fn compile(
     mesh: TriangleMesh<'_>,
     options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<(Compiled, CompileReport)> {
-    let (file, report) = compile_checked(mesh, options, monitor)?;
-    Ok((file.into(), report))
+    let (content, report) = compile_cached(mesh, options, &Cache::none(), &|_| true, monitor)?.into_built();
+    Ok((Compiled { bytes: joined(&content)?.into_owned() }, report))
 }
 
 /// Compiles a mesh and opens the result. The bytes are not copied.
@@ -49,12 +49,12 @@ pub fn compile(
 /// # Errors
 /// As [`compile`].
 pub fn open(mesh: TriangleMesh<'_>, options: &CompileOptions, monitor: &dyn Monitor) -> Result<bth::Scene> {
-    let (file, _) = compile_checked(mesh, options, monitor)?;
-    opened(bth::from_file(file))
+    let (content, _) = compile_cached(mesh, options, &Cache::none(), &|_| true, monitor)?.into_built();
+    opened(content)
 }
 
-/// Compiles a mesh through a cache. `needed` decides whether the bytes of a file in the cache are read; with
-/// `&|_| true` the result always has the content.
+/// Compiles a mesh through a cache. `needed` decides whether the bytes of a file in the cache are
+/// read; with `&|_| true` the result always has the content.
 ///
 /// # Errors
 /// As [`compile`].
@@ -65,16 +65,17 @@ pub fn compile_cached(
     needed: &dyn Fn(&Record) -> bool,
     monitor: &dyn Monitor,
 ) -> Result<CachedCompilation<CompileReport>> {
-    cached::compile_triangles(mesh, options, cache, needed, monitor)
+    compile_source(Source::Triangles(mesh), options, cache, needed, monitor)
 }
 
-/// Compiles a scene of meshes, each of which may have any number of instances; with [`Cache::none`] without a cache. Row i of
-/// `instances` is instance i of the scene. Meshes without an instance are left out and equal ones are stored once, so the file
-/// may have fewer objects than there are meshes. The result always has the content.
+/// Compiles a scene of meshes, each of which may have any number of instances; with [`Cache::none`]
+/// without a cache. Row i of `instances` is instance i of the scene. Meshes without an instance are
+/// left out and equal ones are stored once, so the file may have fewer objects than there are
+/// meshes. The result always has the content.
 ///
 /// # Errors
-/// As [`compile`], for each mesh; `BTH-I005` for an instance of no mesh, `BTH-I004` and `BTH-I050` for one whose transform is not
-/// finite or flattens the mesh.
+/// As [`compile`], for each mesh; `BTH-I005` for an instance of no mesh, `BTH-I004` and `BTH-I050`
+/// for one whose transform is not finite or flattens the mesh.
 pub fn compile_scene(
     meshes: &[TriangleMesh<'_>],
     instances: &[Instance],
@@ -95,26 +96,14 @@ pub fn open_scene(
     options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<bth::Scene> {
-    let outcome = compile_scene(meshes, instances, options, &Cache::none(), monitor)?;
-    let content = outcome.content.unwrap_or_else(|| unreachable!("the content was asked for"));
-    opened(bth::from_bytes(&cached::joined(&content)?))
+    let (content, _) = compile_scene(meshes, instances, options, &Cache::none(), monitor)?.into_built();
+    opened(content)
 }
 
-fn compile_checked(
-    mesh: TriangleMesh<'_>,
-    options: &CompileOptions,
-    monitor: &dyn Monitor,
-) -> Result<(bth_format::File, CompileReport)> {
-    let mut clock = Clock::default();
-    let digest = clock.time("hash", || SourceDigest::of_triangles(mesh));
-    let model = Model { path: Path::new(MESH_NAME), digest: &digest };
-    let import = || import_triangles(model.path, mesh.positions, mesh.triangles, options.wanted(), monitor);
-    let imported = clock.time("mesh", import)?;
-    let (file, report) = compile_imported(&model, imported, options, &mut Direct, clock, monitor)?;
-    warn_over_limit(&report.file, options, monitor);
-    Ok((file, report))
-}
-
-fn opened(scene: std::result::Result<bth::Scene, bth::Error>) -> Result<bth::Scene> {
+fn opened(content: Content) -> Result<bth::Scene> {
+    let scene = match content.file() {
+        Some(file) => bth::from_file(file.clone()),
+        None => bth::from_bytes(&joined(&content)?),
+    };
     scene.map_err(|e| Error::Internal { code: "BTH-X030", message: format!("the written file fails: {e}") })
 }

@@ -9,7 +9,8 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Structure {
-    /// A BVH, some nodes of which are tetrahedralized where that saves time according to the cost model.
+    /// A BVH, some nodes of which are tetrahedralized where that saves time according to the cost
+    /// model.
     #[default]
     Bth,
     /// A BVH only.
@@ -29,18 +30,18 @@ pub struct CompileOptions {
     pub polygons: mesh::Polygons,
     /// Materials whose alpha makes holes.
     pub alpha: mesh::AlphaMode,
-    /// Whether to keep groups of triangles, materials, and the names of these and of objects.
+    /// True to keep groups of triangles, materials, and the names of these and of objects.
     pub names: bool,
-    /// Whether to keep how materials look, with textures and vertex colours. Includes all attributes and the groups of triangles.
+    /// True to keep how materials look, with textures and vertex colours. Includes all
+    /// attributes and the groups of triangles.
     pub materials: bool,
-    /// Whether images and material libraries that are missing, broken or too large are left out, each with a warning.
+    /// True if images and material libraries that are missing, broken or too large are left out,
+    /// each with a warning.
     pub lenient_materials: bool,
     /// Coordinates that triangle leaves store.
     pub coordinates: coordinates::CoordinateOptions,
     /// Builder of the binary BVH.
     pub bvh: bvh::BvhOptions,
-    /// Collapse to the wide BVH; its field `keep_subtrees` is overridden by the one below.
-    pub collapse: bvh::CollapseOptions,
     /// Directions in which rays from a triangle meet nothing.
     pub free: free::FreeOptions,
     /// Selection of the nodes to tetrahedralize.
@@ -49,19 +50,19 @@ pub struct CompileOptions {
     pub tets: tets::TetOptions,
     /// Record that stores a tetrahedron.
     pub record: RecordKind,
-    /// Whether to keep a BVH under each tet leaf.
+    /// True to keep a BVH under each tet leaf.
     pub keep_subtrees: bool,
-    /// Whether to store the positions and triangles of the source.
+    /// True to store the positions and triangles of the source.
     pub geometry: bool,
-    /// Whether to keep what new positions at run time need (`bth::Scene::set_positions`). All vertices of the source are kept in its
-    /// order, and triangles of zero area are not dropped. Excludes `coordinates` other than f32, leaving out the geometry, and
-    /// `Structure::Tets`. `Structure::Bth` stands for a BVH.
+    /// True to keep what new positions at run time need (`bth::Scene::set_positions`). All
+    /// vertices of the source are kept in its order, and triangles of zero area are not dropped.
+    /// Excludes `coordinates` other than f32, leaving out the geometry, and `Structure::Tets`.
+    /// `Structure::Bth` stands for a BVH.
     pub deformable: bool,
     /// How objects whose vertices move by themselves are compiled.
     pub motion: MotionOptions,
-    /// Limit on the estimated bytes of memory of the objects of a scene that are compiled at the same time; a single object
-    /// may exceed it.
-    /// The result does not depend on it.
+    /// Limit on the estimated bytes of memory of the objects of a scene that are compiled at the
+    /// same time; a single object may exceed it. The result does not depend on it.
     pub objects_memory: u64,
 }
 
@@ -77,7 +78,6 @@ impl Default for CompileOptions {
             alpha: mesh::AlphaMode::default(),
             coordinates: coordinates::CoordinateOptions::default(),
             bvh: bvh::BvhOptions::default(),
-            collapse: bvh::CollapseOptions::default(),
             free: free::FreeOptions::default(),
             costs: costs::CostOptions::default(),
             tets: tets::TetOptions::default(),
@@ -105,8 +105,8 @@ impl CompileOptions {
         }
     }
 
-    /// The options of an object whose vertices move by themselves: a BVH over coordinates that stay as they are, which keeps the
-    /// source's positions and triangles.
+    /// The options of an object whose vertices move by themselves: a BVH over coordinates that stay
+    /// as they are, which keeps the source's positions and triangles.
     pub fn of_deforming(&self) -> Self {
         Self {
             structure: Structure::Bvh,
@@ -166,14 +166,13 @@ impl CompileOptions {
 /// How objects whose vertices move by themselves are compiled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct MotionOptions {
-    /// Poses over which the cost of a tree is summed, 1 to [`MAX_POSES`](crate::bvh::MAX_POSES). 1 builds the tree for the first pose.
+    /// Poses over which the cost of a tree is summed, 1 to [`MAX_POSES`](crate::bvh::MAX_POSES). 1
+    /// builds the tree for the first pose.
     pub poses: u32,
-    /// Most ranges of time that get a tree of their own.
-    pub segments: u32,
 }
 
 impl Default for MotionOptions {
     fn default() -> Self {
-        Self { poses: 8, segments: 4 }
+        Self { poses: 8 }
     }
 }

@@ -1,4 +1,5 @@
-//! The files of a model, or the triangles in memory that take their place, and the hashes of their contents.
+//! The files of a model, or the triangles in memory that take their place, and the hashes of their
+//! contents.
 
 use crate::error::{Error, Result};
 use bth_files::Digest;
@@ -13,8 +14,8 @@ use zerocopy::IntoBytes;
 pub struct TriangleMesh<'a> {
     /// The positions of vertices; equal ones are merged. Those of triangles must be finite.
     pub positions: &'a [[f32; 3]],
-    /// For each triangle the rows of its corners in `positions`, counter-clockwise seen from the front. The row of a triangle
-    /// here is its id in hits.
+    /// For each triangle the rows of its corners in `positions`, counter-clockwise seen from the
+    /// front. The row of a triangle here is its id in hits.
     pub triangles: &'a [[u32; 3]],
 }
 
@@ -59,7 +60,8 @@ impl SourceDigest {
         Ok(Self { file: digest(path)?, others, looks })
     }
 
-    /// Hashes a mesh in memory: the numbers of positions and triangles, then their little-endian bytes.
+    /// Hashes a mesh in memory: the numbers of positions and triangles, then their little-endian
+    /// bytes.
     pub(crate) fn of_triangles(mesh: TriangleMesh<'_>) -> Self {
         let mut hasher = blake3::Hasher::new();
         hasher.update(b"triangles in memory");
@@ -72,7 +74,8 @@ impl SourceDigest {
         Self { file: hasher.finalize().into(), others: Vec::new(), looks: Looks::default() }
     }
 
-    /// Returns `read` if the files still have these hashes, which proves that it was read from the hashed content.
+    /// Returns `read` if the files still have these hashes, which proves that it was read from the
+    /// hashed content.
     ///
     /// # Errors
     /// `BTH-O002` when they do not.
@@ -88,6 +91,13 @@ impl SourceDigest {
         let all: Vec<String> = std::iter::once(&self.file).chain(&self.others).map(Digest::hex).collect();
         all.join("+")
     }
+}
+
+/// The extension of a model, lower-case, if it is supported; else empty.
+pub(crate) fn extension(path: &Path) -> String {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    let is_supported = |e: &String| ["obj", "gltf", "glb", "ply", "stl", "off"].contains(&e.as_str());
+    extension.filter(is_supported).unwrap_or_default()
 }
 
 /// The files of a model: the model itself, then those to which it refers.

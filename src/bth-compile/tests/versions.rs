@@ -1,15 +1,16 @@
-//! A stage whose results change gets a new version in `cached/keys.rs`: otherwise caches would serve the old results.
+//! A stage whose results change gets a new version in its file in `pipeline/`: otherwise caches
+//! would serve the old results.
 // Tests print what they skip.
 #![allow(clippy::print_stdout)]
 
 use bth_cache::Store;
-use bth_compile::cached::{Cache, compile};
-use bth_compile::pipeline::{CompileOptions, Structure};
+use bth_compile::cached::Cache;
+use bth_compile::pipeline::{CompileOptions, Structure, compile_cached};
 use std::fmt::Write;
 use std::path::Path;
 
-/// What the stages made of the model below, as `stage version BLAKE3`. If this test fails because a stage was changed on
-/// purpose, raise the stage's version and note what the test prints.
+/// What the stages made of the model below, as `stage version BLAKE3`. If this test fails because a
+/// stage was changed on purpose, raise the stage's version and note what the test prints.
 const NOTED: &str = "\
 bvh 3 85ced845a2e06b3c60ec6905522a8ae3914e4cb9826bc17089f4ec97abdefd04
 file 4.65536 ac1ef9fac53d0117947e01d17618a19a4761aa4ee1e8984b10d658c3e46d9347
@@ -17,8 +18,8 @@ marks 1 f1700307c15a7f23fface5b89ee0ce399fac1b93c7dd43e36616475cc7f08b70
 mesh 7 2e8a3f74b02f7e74274f8b5c919979e536ff7bd5ca1ddeb6ece7be4e5c5f6c10
 ";
 
-/// As above for the tetrahedralization of a whole model, by the TetGen that made it: others make others, as do other
-/// processors' floating-point instructions.
+/// As above for the tetrahedralization of a whole model, by the TetGen that made it: others make
+/// others, as do other processors' floating-point instructions.
 const NOTED_TETS: &str = "tets 1 by 1.5: 31de18e7856ad5bd3674f79c451457618bfa5c7f03af3f47b6363bcdfb702072";
 
 /// A bumpy field of 32 by 32 squares and a triangle through it, in small whole numbers.
@@ -47,7 +48,7 @@ fn made(folder: &Path) -> String {
         // Under a limit nodes are marked whatever they can gain.
         options.costs.budget = (structure == Structure::Bth).then_some(1.0);
         let cache = Cache::new(&store, "model");
-        compile(&source, &options, &cache, &|_| true, &bth_compile::Silent).unwrap();
+        compile_cached(&source, &options, &cache, &|_| true, &bth_compile::Silent).unwrap();
     }
     let mut text = String::new();
     for entry in store.list() {
@@ -90,7 +91,7 @@ fn torus() -> String {
     text
 }
 
-/// The worker that is built beside the tests, if there is one.
+/// The worker that is built next to the tests, if there is one.
 fn worker() -> Option<std::path::PathBuf> {
     let tests = std::env::current_exe().ok()?;
     let beside = tests.parent()?.parent()?.join("bth-tetgen");
@@ -111,7 +112,7 @@ fn tetrahedralizations_that_are_other_ones_have_another_version() {
     let mut options = CompileOptions { structure: Structure::Tets, ..CompileOptions::default() };
     options.tets.worker = Some(worker);
     let cache = Cache::new(&store, "model");
-    compile(&source, &options, &cache, &|_| true, &bth_compile::Silent).unwrap();
+    compile_cached(&source, &options, &cache, &|_| true, &bth_compile::Silent).unwrap();
     let entries = store.list();
     let tets: Vec<_> = entries.iter().filter(|entry| entry.stage == "tets").collect();
     assert_eq!(tets.len(), 1, "the whole model");

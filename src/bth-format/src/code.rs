@@ -36,7 +36,7 @@ codes! {
     HeaderHash "F004" "The header hash is that of the first 112 bytes."
     Length "F005" "The file length in the header is that of the file."
     Reserved "F006" "Reserved fields of the header and the section table are zero."
-    Features "F007" "The reader knows every required feature bit and record of tetrahedra."
+    Features "F007" "The reader knows every required feature bit and record of tetrahedra, and no section is of kind 27, which older files have."
     Table "F008" "The section table starts at 128, has at most 2^20 entries and lies within the file."
     TableHash "F009" "The table hash is that of the section table."
     Order "F010" "Section entries ascend strictly by (object, kind)."
@@ -136,8 +136,6 @@ codes! {
     SequenceRows "F190" "SEQUENCE_POSITIONS has a row for each time of SEQUENCE_TIMES and each row of POSITIONS; an object with times is deformable."
     SequenceTimes "F191" "Times of SEQUENCE_TIMES are finite and ascend strictly."
     SequencePositions "F192" "Positions of SEQUENCE_POSITIONS are finite; those of the first time are POSITIONS, bit for bit."
-    Segments "F193" "SEGMENTS is empty or has at least two rows; their times are finite and ascend strictly, the first row and no other is of the object itself, and reserved fields are zero."
-    SegmentObjects "F194" "The objects of SEGMENTS exist; each but the first is in one row of one object, has neither SEGMENTS nor SEQUENCE_TIMES and no instance; all are deformable and have equal POSITIONS and TRIANGLES, bit for bit."
     SecondCorners "F220" "SECOND_CORNERS has as many rows as the object has triangles, or none, and its rows lie within SECOND_UVS."
     SecondUvs "F221" "Coordinates of SECOND_UVS are finite."
 

@@ -1,6 +1,4 @@
-//! The positions of an object at several times, and the hierarchies that it has for ranges of time, as typed slices, zero-copy.
-
-use crate::layout::Segment;
+//! The positions of an object at several times, as typed slices, zero-copy.
 
 /// What an object whose vertices move by itself has besides its other sections. Sections that the file lacks are empty.
 /// Specification: "Sequences".
@@ -10,8 +8,6 @@ pub struct SequenceView<'a> {
     pub times: &'a [f64],
     /// Positions by frame, then by row of `POSITIONS`; object space.
     pub positions: &'a [[f32; 3]],
-    /// Objects with hierarchies for ranges of time, by time.
-    pub segments: &'a [Segment],
 }
 
 /// Where a time lies among frames.
@@ -60,12 +56,6 @@ impl<'a> SequenceView<'a> {
             *into = (a + (b - a) * at.share) as f32 + 0.0;
         }
     }
-
-    /// The row of the segment that applies at a time; `None` without segments.
-    pub fn segment(&self, seconds: f64) -> Option<usize> {
-        let after = self.segments.partition_point(|segment| segment.first <= seconds);
-        (!self.segments.is_empty()).then(|| after.saturating_sub(1))
-    }
 }
 
 #[cfg(test)]
@@ -99,7 +89,7 @@ mod tests {
     fn positions_move_on_straight_lines_and_are_rounded_once() {
         let positions =
             [[0.0, 1.0, -3e38], [1.0, 1.0, 1.0], [1.0, -0.0, 3e38], [1.0, 2.0, f32::MIN_POSITIVE]];
-        let view = SequenceView { times: &[0.0, 1.0], positions: &positions, segments: &[] };
+        let view = SequenceView { times: &[0.0, 1.0], positions: &positions };
         let at = |seconds: f64, first: usize| {
             let mut into = vec![[9.0; 3]; 2 - first];
             view.positions_at(view.locate(seconds), (2, first), &mut into);
@@ -112,16 +102,5 @@ mod tests {
         let mut other = [[7.0; 3]; 3];
         view.positions_at(FramePosition { frame: 5, share: 0.5 }, (2, 0), &mut other);
         assert_eq!(other, [[7.0; 3]; 3]);
-    }
-
-    #[test]
-    fn the_segment_is_the_last_that_has_begun() {
-        let segment = |first| Segment { first, object: 0, reserved: 0 };
-        let segments = [segment(-1.0), segment(2.0), segment(3.0)];
-        let view = SequenceView { segments: &segments, ..SequenceView::default() };
-        for (seconds, row) in [(-9.0, 0), (-1.0, 0), (1.9, 0), (2.0, 1), (3.5, 2), (f64::NAN, 0)] {
-            assert_eq!(view.segment(seconds), Some(row), "{seconds}");
-        }
-        assert_eq!(SequenceView::default().segment(0.0), None);
     }
 }

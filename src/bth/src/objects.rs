@@ -167,19 +167,6 @@ impl Objects {
         }
     }
 
-    /// Replaces the own positions, boxes and leaves of an object, which may be none; returns the former ones.
-    pub(crate) fn replace_deforming(
-        &mut self,
-        object: u32,
-        deforming: Option<Box<Deforming>>,
-    ) -> Option<Box<Deforming>> {
-        let index = object as usize;
-        if self.deforming.len() <= index {
-            self.deforming.resize_with(index + 1, || None);
-        }
-        std::mem::replace(&mut self.deforming[index], deforming)
-    }
-
     /// The own positions, boxes and leaves of an object, which are made if it has none yet.
     ///
     /// # Errors

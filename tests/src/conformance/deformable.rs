@@ -99,42 +99,27 @@ fn with_parts<T>(make: impl FnOnce(&ObjectParts<'_>) -> T) -> T {
     })
 }
 
-/// The object with frames and a second hierarchy, which is equal here, and an instance of it.
+/// The object with frames, and an instance of it.
 pub(super) fn sequence() -> Vec<u8> {
     let moved = POSITIONS.map(|[x, y, z]| [x, y + 0.25 * x, z - 1.5]);
     let frames = [POSITIONS, moved, POSITIONS].concat();
-    let segments = [(-1.0, 0), (0.75, 2)].map(|(first, object)| Segment { first, object, reserved: 0 });
     with_parts(|parts| {
         let mut builder = FileBuilder::new();
-        let moving = ObjectParts {
-            sequence_times: &[0.0, 0.5, 1.5],
-            sequence_positions: &frames,
-            segments: &segments,
-            ..*parts
-        };
+        let moving = ObjectParts { sequence_times: &[0.0, 0.5, 1.5], sequence_positions: &frames, ..*parts };
         object(&mut builder, 0, &moving).unwrap();
         object(&mut builder, 1, parts).unwrap();
-        object(&mut builder, 2, parts).unwrap();
         let still = super::scenes::still();
         scene(&mut builder, &still).unwrap();
         builder.finish()
     })
 }
 
-/// Faults of sequences and segments.
+/// Faults of sequences.
 pub(super) fn invalid_sequences() -> Vec<Case> {
     let base = "sequence";
     let bits = |x: f32| x.to_bits();
     let high = |x: f64| (x.to_bits() >> 32) as u32;
     let case = |name, kind, at: usize, value| field(name, base, kind, at, value);
-    let (object_at, row) = (offset_of!(Segment, object), size_of::<Segment>());
-    let other = |name: &str, object: u32, kind: u32, at: usize, value: u32| {
-        broken(name, base, Seal::Sections, |e| {
-            let entry = e.entry_at(object, kind) + offset_of!(SectionEntry, offset);
-            let start = e.bytes_at(entry) + at;
-            e.put(start, &value.to_le_bytes());
-        })
-    };
     vec![
         broken("F190-rows", base, Seal::Sections, |e| {
             let (at, start) = (e.entry_at(0, kind::SEQUENCE_TIMES), e.section_at(kind::SEQUENCE_TIMES));
@@ -146,13 +131,6 @@ pub(super) fn invalid_sequences() -> Vec<Case> {
         case("F191-infinite", kind::SEQUENCE_TIMES, 20, high(f64::INFINITY)),
         case("F192-infinite", kind::SEQUENCE_POSITIONS, 12 * 25, bits(f32::NAN)),
         case("F192-other-first-frame", kind::SEQUENCE_POSITIONS, 12 * 9, bits(9.5)),
-        case("F193-not-ascending", kind::SEGMENTS, row + 4, high(-1.0)),
-        case("F193-first-of-another", kind::SEGMENTS, object_at, 1),
-        case("F193-second-of-itself", kind::SEGMENTS, row + object_at, 0),
-        case("F193-reserved", kind::SEGMENTS, row + offset_of!(Segment, reserved), 1),
-        case("F194-no-object", kind::SEGMENTS, row + object_at, 3),
-        other("F194-other-positions", 2, kind::POSITIONS, 12 * 9, bits(9.5)),
-        other("F194-instance", NONE, kind::INSTANCES, offset_of!(Instance, object), 2),
     ]
 }
 

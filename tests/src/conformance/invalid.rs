@@ -127,6 +127,7 @@ fn container() -> Vec<Case> {
             e.put(entry + offset_of!(SectionEntry, count), &8u64.to_le_bytes());
         }),
         field("F007-tets-with-three-vertices", "tets-link32", kind::OBJECT, offset_of!(Object, record), 2),
+        entry("F007-trees-for-ranges-of-time", "sequence", Seal::Table, kind::SEQUENCE_POSITIONS, 0, 27, 4),
         broken("F007-unknown-feature", "triangle", Seal::Header, |e| {
             e.put(offset_of!(Header, required_features), &4u32.to_le_bytes());
         }),

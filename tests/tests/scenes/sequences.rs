@@ -122,8 +122,7 @@ fn sequences_have_the_answers_of_their_frames_and_of_what_lies_between() {
         let text = format!("frames = {{ first = 0, last = 30, rate = 8 }}\n{text}\n{NODE}");
         let (file, report) = built(&text, folder.path(), &options());
         let motion = report.objects[0].motion.as_ref().unwrap();
-        assert_eq!((motion.frames, motion.segments.len()), (5, 1));
-        assert!((1.0..1.1).contains(&motion.cost_ratio), "{motion:?}");
+        assert_eq!((motion.frames, motion.poses), (5, 8));
         let sequence = file.sequence(0);
         assert_eq!(sequence.times, [1.0, 1.125, 1.25, 1.375, 1.5]);
         let mut scene = bth::from_file(file).unwrap();
@@ -139,50 +138,24 @@ fn sequences_have_the_answers_of_their_frames_and_of_what_lies_between() {
 }
 
 #[test]
-fn clips_that_one_topology_would_make_dear_are_divided_and_answer_the_same() {
+fn an_object_with_frames_is_copied_from_a_compiled_file() {
     let (frames, triangles) = exchanging(24);
     let folder = folder(&frames, &triangles);
     let text = format!(
         "frames = {{ first = 0, last = 8, rate = 2 }}\nobjects = [{{ name = \"knot\", sequence = \"knot_###.obj\", rate = 1 }}]\n{NODE}"
     );
-    let many = CompileOptions { motion: MotionOptions { poses: 4, segments: 4 }, ..options() };
-    let (file, report) = built(&text, folder.path(), &many);
-    let motion = report.objects[0].motion.as_ref().unwrap();
-    assert!(motion.segments.len() > 1, "{motion:?}");
-    assert_eq!(report.objects.len(), motion.segments.len());
-    // Trees for later times are no objects and triangles of their own.
-    let counted = |report: &SceneReport| {
-        let segments = report.objects.iter().filter(|object| object.segment_from.is_some()).count();
-        (report.triangles, report.objects.len() - segments)
-    };
-    assert_eq!(counted(&report), (triangles.len() as u64, 1));
-    assert_eq!(file.sequence(0).segments.len(), motion.segments.len());
-    let one = CompileOptions { motion: MotionOptions { poses: 4, segments: 1 }, ..options() };
-    let (_, whole) = built(&text, folder.path(), &one);
-    let whole = whole.objects[0].motion.as_ref().unwrap();
-    assert!(whole.cost_ratio > 1.3 && motion.cost_ratio < 0.9 * whole.cost_ratio, "{motion:?} {whole:?}");
-    let bytes = file.bytes().to_vec();
-    let mut scene = bth::from_file(file).unwrap();
-    let rng = &mut Rng::new(6);
-    for seconds in [0.0, 3.0, 1.0, 2.5, 1.4, 0.5, 1.6, 0.0] {
-        scene.set_seconds(seconds).unwrap();
-        assert_eq!(scene.instance(0).object, 0);
-        check_at(&scene, &between(&frames, seconds), &triangles, rng);
-    }
-    // An object with segments is copied from a compiled file with all of them.
-    std::fs::write(folder.path().join("done.bth"), &bytes).unwrap();
+    let (file, _) = built(&text, folder.path(), &options());
+    std::fs::write(folder.path().join("done.bth"), file.bytes()).unwrap();
     let copy = format!(
         "objects = [{{ name = \"quad\", file = \"done.bth\" }}, {{ name = \"knot\", file = \"done.bth\" }}]\n{NODE}"
     );
     let (copied, report) = built(&copy, folder.path(), &options());
-    assert_eq!(counted(&report), (triangles.len() as u64, 1));
-    assert_eq!(
-        copied.sequence(0).segments,
-        bth_format::File::from_bytes(&bytes).unwrap().sequence(0).segments
-    );
-    let mut scene = bth::from_file(copied).unwrap();
-    scene.set_seconds(2.5).unwrap();
-    check_at(&scene, &between(&frames, 2.5), &triangles, rng);
+    assert_eq!((report.triangles, report.objects.len()), (triangles.len() as u64, 1));
+    let (mut scene, rng) = (bth::from_file(copied).unwrap(), &mut Rng::new(6));
+    for seconds in [0.0, 3.0, 1.4, 2.5] {
+        scene.set_seconds(seconds).unwrap();
+        check_at(&scene, &between(&frames, seconds), &triangles, rng);
+    }
 }
 
 #[test]
@@ -208,15 +181,13 @@ fn a_time_that_cannot_be_shown_leaves_the_scene_as_it_was() {
 }
 
 #[test]
-fn subscenes_move_vertices_and_change_trees_as_their_file_does() {
+fn subscenes_move_vertices_as_their_file_does() {
     let (frames, triangles) = exchanging(24);
     let folder = folder(&frames, &triangles);
     let text = format!(
         "frames = {{ first = 0, last = 8, rate = 2 }}\nobjects = [{{ name = \"knot\", sequence = \"knot_###.obj\", rate = 1 }}]\n{NODE}"
     );
-    let many = CompileOptions { motion: MotionOptions { poses: 4, segments: 4 }, ..options() };
-    let (file, report) = built(&text, folder.path(), &many);
-    assert!(report.objects[0].motion.as_ref().unwrap().segments.len() > 1);
+    let (file, _) = built(&text, folder.path(), &options());
     let mut alone = bth::from_file(file).unwrap();
     let identity = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     let mut builder = bth::SceneBuilder::new();
@@ -231,7 +202,7 @@ fn subscenes_move_vertices_and_change_trees_as_their_file_does() {
         assert!(compare(&alone, builder.scene(), 0, rng) > 100);
         assert_eq!(builder.commit().unwrap().deformed, 0, "nothing moved");
     }
-    // A commit that fails leaves positions and trees as they were.
+    // A commit that fails leaves positions as they were.
     builder.set_subscene_seconds(whole, 0.0).unwrap();
     builder.set_subscene_transform(whole, &[0.0; 12]).unwrap();
     assert_eq!(builder.commit().unwrap_err().code(), bth::Code::Singular);
@@ -304,24 +275,23 @@ fn morphing(side: usize) -> tempfile::TempDir {
 }
 
 #[test]
-fn objects_that_a_file_deforms_get_trees_for_their_poses_and_answer_the_same() {
+fn objects_that_a_file_deforms_get_a_tree_for_their_poses_and_answer_the_same() {
     let folder = morphing(24);
     let (manifest, _) =
         import(&folder.path().join("a.gltf"), "a.gltf", &ImportOptions::default(), &Silent).unwrap();
-    let compiled = |poses: u32, segments: u32| {
-        let options = CompileOptions { motion: MotionOptions { poses, segments }, ..options() };
+    let compiled = |poses: u32| {
+        let options = CompileOptions { motion: MotionOptions { poses }, ..options() };
         let (compiled, report) =
             scene::compile(&manifest, folder.path(), Path::new("x"), &options, &Silent).unwrap();
         let file = bth_format::File::from_bytes(&compiled.bytes).unwrap();
         bth_format::verify::verify(&file).unwrap_or_else(|e| panic!("{}", e[0]));
         (file, report)
     };
-    let (_, still) = compiled(1, 1);
-    assert!(still.objects[0].motion.is_none(), "the tree is for the positions at rest");
-    let (_, one) = compiled(4, 1);
-    let (file, many) = compiled(4, 4);
-    let [one, many] = [&one, &many].map(|report| report.objects[0].motion.as_ref().unwrap());
-    assert!(many.segments.len() > 1 && many.cost_ratio < 0.9 * one.cost_ratio, "{many:?} {one:?}");
+    let (still, report) = compiled(1);
+    assert!(report.objects[0].motion.is_none(), "the tree is for the positions at rest");
+    let (file, report) = compiled(4);
+    assert_eq!(report.objects[0].motion.as_ref().map(|motion| motion.poses), Some(4));
+    assert_ne!(file.content_id(), still.content_id());
     let triangles = file.object(0).unwrap().triangles.to_vec();
     let mut scene = bth::from_file(file).unwrap();
     let rng = &mut Rng::new(9);

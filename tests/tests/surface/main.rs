@@ -292,7 +292,8 @@ fn the_cache_keeps_groups() {
     let plain = compile(&path, &options(), &Silent).unwrap().0.bytes;
     let cache = bth_compile::cached::Cache::new(&store, "model");
     let through = |options: &CompileOptions| {
-        let found = bth_compile::cached::compile(&path, options, &cache, &|_| true, &Silent).unwrap();
+        let found =
+            bth_compile::pipeline::compile_cached(&path, options, &cache, &|_| true, &Silent).unwrap();
         found.content.unwrap().bytes().unwrap().into_owned()
     };
     let without = CompileOptions { names: false, ..options() };

@@ -1,12 +1,12 @@
-//! Rays that will be traced through an object, as far as they are known when it is compiled: those of a scene's cameras, lights and
-//! frames, or those that a user gives.
+//! Rays that will be traced through an object, as far as they are known when it is compiled: those
+//! of a scene's cameras, lights and frames, or those that a user gives.
 
 use super::SampleRay;
 use bth::rays::Ray;
 use glam::DVec3;
 
-/// Most rays that are kept of those that a user gives. The trees of five models that were made for 16,384 and for 65,536 bounces take as
-/// many steps of other bounces, to 1 %.
+/// Most rays that are kept of those that a user gives. The trees of five models that were made for
+/// 16,384 and for 65,536 bounces take as many steps of other bounces, to 1 %.
 const MOST: usize = 1 << 16;
 
 /// Rays that are known when an object is compiled, in its space. Nodes are weighted by them.
@@ -19,8 +19,9 @@ pub struct KnownRays {
 }
 
 impl KnownRays {
-    /// Those rays of a file that can be traced, and the number of the others: rays with numbers that are not finite (but for an infinite
-    /// tmax), without direction, or with an empty range. Of more than 65,536 some are taken, evenly spaced.
+    /// Those rays of a file that can be traced, and the number of the others: rays with numbers
+    /// that are not finite (but for an infinite tmax), without direction, or with an empty range.
+    /// Of more than 65,536 some are taken, evenly spaced.
     pub fn of(rays: &[Ray]) -> (Self, usize) {
         let usable: Vec<SampleRay> = rays.iter().filter_map(sample_ray).collect();
         let left_out = rays.len() - usable.len();

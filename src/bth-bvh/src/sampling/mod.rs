@@ -1,7 +1,7 @@
 //! Sample rays that stand in for those of a renderer, and what they meet in a binary BVH.
 //!
-//! [`visits()`] says how probable it is that such a ray enters each node, by which the wide tree is chosen; the costs of tetrahedra and the
-//! worth of free directions are judged by the same rays.
+//! [`visits()`] says how probable it is that such a ray enters each node, by which the wide tree is
+//! chosen; the costs of tetrahedra and the worth of free directions are judged by the same rays.
 
 mod known;
 mod rays;

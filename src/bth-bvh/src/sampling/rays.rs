@@ -1,4 +1,5 @@
-//! Sample rays that stand in for those of a renderer: uniform lines from outside, rays from surfaces, and rays from points within.
+//! Sample rays that stand in for those of a renderer: uniform lines from outside, rays from
+//! surfaces, and rays from points within.
 
 use crate::vectors::{corners, double_area, uniform_direction, unit};
 use crate::{BinaryBvh, Node};
@@ -22,7 +23,8 @@ pub struct SampleRay {
 
 /// Length of rays for ambient occlusion, relative to the diagonal of the bounds.
 const SHORT: f64 = 0.05;
-/// Offset of ray origins from the surface that they start on, relative to the diagonal of the bounds.
+/// Offset of ray origins from the surface that they start on, relative to the diagonal of the
+/// bounds.
 const BOUNCE_LIFT: f64 = 2e-5;
 
 /// The point at `t` on a ray.
@@ -35,8 +37,8 @@ fn diagonal(node: &Node) -> f64 {
     (DVec3::from(node.upper.map(f64::from)) - DVec3::from(node.lower.map(f64::from))).length()
 }
 
-/// Lines that are uniform in space (chords of the ball around the box), which start outside of it and
-/// meet it: the rays of the surface area heuristic and of Cauchy and Crofton.
+/// Lines that are uniform in space (chords of the ball around the box), which start outside of it
+/// and meet it: the rays of the surface area heuristic and of Cauchy and Crofton.
 pub fn outside(lower: [f32; 3], upper: [f32; 3], count: usize, seed: u64) -> Vec<SampleRay> {
     let mut random = Rng::new(seed);
     let ends = [lower, upper].map(|end| DVec3::from(end.map(f64::from)));
@@ -58,7 +60,8 @@ pub fn outside(lower: [f32; 3], upper: [f32; 3], count: usize, seed: u64) -> Vec
     rays
 }
 
-/// Rays in uniform directions from uniform points of a box, so many from each point one after the other.
+/// Rays in uniform directions from uniform points of a box, so many from each point one after the
+/// other.
 pub fn within(
     lower: [f32; 3],
     upper: [f32; 3],
@@ -77,10 +80,10 @@ pub fn within(
     rays
 }
 
-/// Rays from the fronts of triangles of these rows of the BVH's order, chosen by area, cosine-weighted
-/// about the normal; every second one as short as rays for ambient occlusion. Closed models and rooms are seen from the
-/// fronts of their triangles. The rays are stratified along the order, so that consecutive rays start close together, as in
-/// a renderer.
+/// Rays from the fronts of triangles of these rows of the BVH's order, chosen by area,
+/// cosine-weighted about the normal; every second one as short as rays for ambient occlusion.
+/// Closed models and rooms are seen from the fronts of their triangles. The rays are stratified
+/// along the order, so that consecutive rays start close together, as in a renderer.
 pub fn from_surface(
     mesh: &Mesh,
     bvh: &BinaryBvh,
@@ -124,8 +127,8 @@ pub fn from_surface(
     rays
 }
 
-/// The t at which a ray enters a box; `None` if it misses the box or enters it beyond `limit`. The origin may lie in the
-/// box.
+/// The t at which a ray enters a box; `None` if it misses the box or enters it beyond `limit`. The
+/// origin may lie in the box.
 pub(super) fn enters(ray: &SampleRay, lower: [f32; 3], upper: [f32; 3], limit: f64) -> Option<f64> {
     let (mut near, mut far) = (0.0f64, limit.min(ray.tmax));
     for k in 0..3 {

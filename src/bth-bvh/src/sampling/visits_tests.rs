@@ -3,7 +3,8 @@ use crate::{BvhOptions, build};
 use bth_import::monitor::Silent;
 use bth_random::Rng;
 
-/// Two clusters of the same small triangles, one in the open, and one in the middle of a closed box, which stands beside it.
+/// Two clusters of the same small triangles, one in the open, and one in the middle of a closed
+/// box, which stands next to it.
 fn open_and_enclosed() -> Mesh {
     let mut mesh = Mesh::default();
     let mut add = |corners: [[f32; 3]; 3]| {

@@ -1,5 +1,5 @@
-//! Rays through the binary BVH in double precision: their nearest hits and the nodes that they enter. The counts are the
-//! same on every machine, whatever its vector instructions.
+//! Rays through the binary BVH in double precision: their nearest hits and the nodes that they
+//! enter. The counts are the same on every machine, whatever its vector instructions.
 
 use super::rays::{SampleRay, enters};
 use crate::BinaryBvh;
@@ -16,7 +16,8 @@ pub struct Traced {
     pub visits: u32,
 }
 
-/// Traces a ray from the root, the nearer child first, to the nearest hit; `entered` is called with every node entered.
+/// Traces a ray from the root, the nearer child first, to the nearest hit; `entered` is called with
+/// every node entered.
 pub fn walk(mesh: &Mesh, bvh: &BinaryBvh, ray: &SampleRay, mut entered: impl FnMut(u32)) -> Traced {
     let mut traced = Traced { hit: None, visits: 0 };
     let mut best = ray.tmax;
@@ -54,13 +55,14 @@ pub fn walk(mesh: &Mesh, bvh: &BinaryBvh, ray: &SampleRay, mut entered: impl FnM
     traced
 }
 
-/// Nodes that all sample rays of a stage together may enter; those of ordinary models enter a fifth of them.
+/// Nodes that all sample rays of a stage together may enter; those of ordinary models enter a fifth
+/// of them.
 const MOST_ENTERED: u64 = 1 << 24;
 /// Rays by which it is estimated how many nodes all enter.
 const ESTIMATED_BY: usize = 64;
 
-/// The rays, or so many of them, evenly spaced, as enter no more nodes than a stage has time for. Where many triangles lie in one place,
-/// each ray enters the nodes of all.
+/// The rays, or so many of them, evenly spaced, as enter no more nodes than a stage has time for.
+/// Where many triangles lie in one place, each ray enters the nodes of all.
 pub fn affordable(mesh: &Mesh, bvh: &BinaryBvh, rays: Vec<SampleRay>) -> Vec<SampleRay> {
     let spaced = rays.iter().step_by(rays.len().div_ceil(ESTIMATED_BY).max(1));
     let (count, entered) = spaced.fold((0u64, 0u64), |(count, entered), ray| {
@@ -73,8 +75,8 @@ pub fn affordable(mesh: &Mesh, bvh: &BinaryBvh, rays: Vec<SampleRay>) -> Vec<Sam
     }
 }
 
-/// t of the intersection of a ray and a triangle within (0, best] (Möller and Trumbore 1997, "Fast, Minimum Storage
-/// Ray-Triangle Intersection").
+/// t of the intersection of a ray and a triangle within (0, best] (Möller and Trumbore 1997, "Fast,
+/// Minimum Storage Ray-Triangle Intersection").
 pub fn crosses(ray: &SampleRay, [a, b, c]: [DVec3; 3], best: f64) -> Option<f64> {
     let (e1, e2) = (b - a, c - a);
     let direction = DVec3::from(ray.direction);

@@ -1,5 +1,5 @@
-//! Joins boxes to a binary tree from the bottom up, always the two whose common box is smallest ("Fast Agglomerative Clustering for
-//! Rendering", Walter et al. 2008).
+//! Joins boxes to a binary tree from the bottom up, always the two whose common box is smallest
+//! ("Fast Agglomerative Clustering for Rendering", Walter et al. 2008).
 
 use super::super::bounds::Bounds;
 use bth_format::layout::WIDTH;

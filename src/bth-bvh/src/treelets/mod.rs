@@ -1,21 +1,23 @@
-//! Rebuilds small parts of the binary BVH, treelets, where the wide tree that is collapsed from it then costs less.
+//! Rebuilds small parts of the binary BVH, treelets, where the wide tree that is collapsed from it
+//! then costs less.
 //!
-//! Reinsertion lowers the cost of the binary tree, most of whose nodes vanish in the collapse. Here the plan of the wide tree is made
-//! first. One round then rebuilds subtrees of few triangles (`small`), whose leaves may share more vertices; the others rebuild what lies
-//! below each wide node (`wide`), and join the children of each anew (`agglomerate`). The present plan remains possible in every new
-//! tree, so by areas the cost of the wide tree never rises.
+//! Reinsertion lowers the cost of the binary tree, most of whose nodes vanish in the collapse. Here
+//! the plan of the wide tree is made first. One round then rebuilds subtrees of few triangles
+//! (`small`), whose leaves may share more vertices; the others rebuild what lies below each wide
+//! node (`wide`), and join the children of each anew (`agglomerate`). The present plan remains
+//! possible in every new tree, so by areas the cost of the wide tree never rises.
 //!
-//! After the treelets of "Fast Parallel Construction of High-Quality Bounding Volume Hierarchies" (Karras and Aila 2013), with the cost of
-//! the wide tree in place of that of the binary one.
+//! After the treelets of "Fast Parallel Construction of High-Quality Bounding Volume Hierarchies"
+//! (Karras and Aila 2013), with the cost of the wide tree in place of that of the binary one.
 
 mod agglomerate;
 mod small;
 mod wide;
 
 use super::build::levels;
-use super::plan::{Costs, Plan, Planner};
+use super::plan::{Costs, Planner};
 use super::poses::Weighed;
-use super::{BinaryBvh, BvhReport, MAX_LEVELS};
+use super::{BinaryBvh, BvhReport, MAX_LEVELS, Node};
 use bth_import::Mesh;
 use bth_import::error::Result;
 use bth_import::monitor::Monitor;
@@ -23,8 +25,8 @@ use bth_import::monitor::Monitor;
 /// Trees of fewer nodes are one or two wide nodes, whatever is done.
 const LEAST_NODES: usize = 64;
 
-/// Rebuilds treelets in so many rounds. `visits` gives for each node of a tree the probability that a ray enters it, by which its wide
-/// tree is planned.
+/// Rebuilds treelets in so many rounds. `visits` gives for each node of a tree the probability that
+/// a ray enters it, by which its wide tree is planned.
 ///
 /// # Errors
 /// [`bth_import::Error::Cancelled`].
@@ -44,7 +46,7 @@ pub fn rebuild_treelets(
         monitor.check()?;
         let probabilities = visits(&bvh);
         let weighed = Weighed { bvh: &bvh, probabilities: Some(&probabilities) };
-        let planner = Planner::new(mesh, weighed, Costs::default(), Plan::default(), false, monitor);
+        let planner = Planner::new(mesh, weighed, Costs::default(), false, monitor);
         let (decisions, _) = planner.run(&[])?;
         let count = if round == 0 {
             let found = small::find(&planner, &decisions)?;
@@ -66,6 +68,19 @@ pub fn rebuild_treelets(
     report.visits.push(super::visits(&bvh));
     report.levels = levels(&bvh);
     Ok(bvh)
+}
+
+/// Copies a subtree of a BVH behind the nodes and rows of another one.
+fn copy_subtree(bvh: &BinaryBvh, at: u32, to: &mut BinaryBvh) {
+    let Node { first, count, .. } = bvh.nodes[at as usize];
+    let (new_at, new_first) = (to.nodes.len() as u32, to.order.len() as u32);
+    let moved = |node: &Node| Node {
+        first: node.first - first + new_first,
+        right: if node.is_leaf() { 0 } else { node.right - at + new_at },
+        ..*node
+    };
+    to.nodes.extend(bvh.nodes[at as usize..][..2 * count as usize - 1].iter().map(moved));
+    to.order.extend_from_slice(&bvh.order[first as usize..][..count as usize]);
 }
 
 #[cfg(test)]

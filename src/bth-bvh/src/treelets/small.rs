@@ -6,11 +6,13 @@ use super::super::plan::{Decision, Planner, Role};
 use super::super::split::Reference;
 use super::super::sweep_split::Scratch;
 use super::super::{BinaryBvh, MAX_LEVELS, Node, Quality};
+use super::copy_subtree;
 use bth_format::layout::WIDTH;
 use bth_import::error::Result;
 use rayon::prelude::*;
 
-/// Greatest number of triangles of a subtree that is split anew. With half of it sponza_dabrovic keeps a quarter of the gain.
+/// Largest number of triangles of a subtree that is split anew. With half of it sponza_dabrovic
+/// keeps a quarter of the gain.
 const MOST_TRIANGLES: u32 = 200;
 
 /// A subtree, by its root, and what replaces it.
@@ -22,7 +24,8 @@ pub(super) fn find(planner: &Planner<'_>, decisions: &[Decision]) -> Result<Vec<
     let effort = Effort { sweep_count: usize::MAX, ..Quality::Balanced.effort() };
     let cheaper = |scratch: &mut Scratch<Bounds>, Root { at, level }: Root| -> Result<Option<Replaced>> {
         planner.monitor.check()?;
-        let before = part(bvh, at);
+        let mut before = BinaryBvh::default();
+        copy_subtree(bvh, at, &mut before);
         let mesh = planner.mesh;
         let reference = |&id: &u32| Reference { bounds: Bounds::of_points(&mesh.corners(id)), id };
         let mut references: Vec<_> = before.order.iter().map(reference).collect();
@@ -51,7 +54,8 @@ struct Root {
     level: u32,
 }
 
-/// The topmost wide nodes of at most [`MOST_TRIANGLES`] triangles, of which there are more than one leaf holds.
+/// The topmost wide nodes of at most [`MOST_TRIANGLES`] triangles, of which there are more than one
+/// leaf holds.
 fn small_subtrees(bvh: &BinaryBvh, decisions: &[Decision]) -> Vec<Root> {
     let mut found = Vec::new();
     let mut stack = vec![Root { at: 0, level: 0 }];
@@ -68,19 +72,6 @@ fn small_subtrees(bvh: &BinaryBvh, decisions: &[Decision]) -> Vec<Root> {
         }
     }
     found
-}
-
-/// A subtree as a BVH of its own.
-fn part(bvh: &BinaryBvh, at: u32) -> BinaryBvh {
-    let Node { first, count, .. } = bvh.nodes[at as usize];
-    let range = at as usize..at as usize + 2 * count as usize - 1;
-    let moved = |node: &Node| Node {
-        first: node.first - first,
-        right: if node.is_leaf() { 0 } else { node.right - at },
-        ..*node
-    };
-    let order = bvh.order[first as usize..][..count as usize].to_vec();
-    BinaryBvh { nodes: bvh.nodes[range].iter().map(moved).collect(), order }
 }
 
 /// Replaces a subtree by another one over the same triangles.

@@ -1,7 +1,8 @@
 use super::super::bounds::Bounds;
+use super::super::collapse::collapse_by;
 use super::super::samples::{clutter, exponential, grid, model, soup};
 use super::super::validate::validate_binary;
-use super::super::{CollapseOptions, Quality, build, collapse_by};
+use super::super::{CollapseOptions, Quality, build};
 use super::agglomerate::agglomerate;
 use super::wide::TreeletPlan;
 use super::*;
@@ -17,10 +18,10 @@ fn by_areas(bvh: &BinaryBvh) -> Vec<f64> {
     bvh.nodes.iter().map(|node| node.half_area() / root).collect()
 }
 
-/// The least cost of a wide tree over a BVH, by areas, with lines at the price that they have over another BVH.
+/// The smallest cost of a wide tree over a BVH, by areas, with lines at the price that they have
+/// over another BVH.
 fn cost(mesh: &Mesh, bvh: &BinaryBvh, priced: &BinaryBvh) -> f32 {
-    let planner =
-        |bvh| Planner::new(mesh, Weighed::from(bvh), Costs::default(), Plan::default(), false, &Silent);
+    let planner = |bvh| Planner::new(mesh, Weighed::from(bvh), Costs::default(), false, &Silent);
     let mut planned = planner(bvh);
     planned.line = planner(priced).line;
     planned.run(&[]).unwrap().1
@@ -68,8 +69,8 @@ fn wide_trees_cost_less_and_never_more() {
     }
 }
 
-/// Wide nodes and leaves that rays from surfaces enter, in the mean, if the tree is planned by these probabilities or by areas. The rays
-/// are others than those that plans follow.
+/// Wide nodes and leaves that rays from surfaces enter, in the mean, if the tree is planned by
+/// these probabilities or by areas. The rays are others than those that plans follow.
 fn entered_by_others(mesh: &Mesh, bvh: &BinaryBvh, probabilities: Option<&[f64]>) -> f64 {
     let mut rays = from_surface(mesh, bvh, 0..bvh.order.len(), 60_000, 97);
     rays.retain(|ray| ray.tmax == f64::INFINITY);
@@ -78,7 +79,7 @@ fn entered_by_others(mesh: &Mesh, bvh: &BinaryBvh, probabilities: Option<&[f64]>
     let planned_by = Weighed { bvh, probabilities };
     let decide = |planner: &Planner<'_>, cut: &[u32]| {
         let (mesh, costs) = (planner.mesh, Costs::default());
-        Planner::new(mesh, planned_by, costs, Plan::default(), false, &Silent).run(cut)
+        Planner::new(mesh, planned_by, costs, false, &Silent).run(cut)
     };
     let judged = Weighed { bvh, probabilities: Some(&judge) };
     let options = CollapseOptions::default();
@@ -131,7 +132,7 @@ fn rounds_can_be_cancelled() {
     assert!(matches!(result, Err(bth_import::Error::Cancelled)));
 }
 
-/// The least area of wide nodes of a subtree in at most so many slots, by trying everything.
+/// The smallest area of wide nodes of a subtree in at most so many slots, by trying everything.
 fn least_area(treelet: &BinaryBvh, at: usize, slots: usize) -> f64 {
     let node = &treelet.nodes[at];
     if node.is_leaf() {
@@ -163,7 +164,8 @@ fn treelet_plans_have_the_least_area() {
     }
 }
 
-/// As [`agglomerate`], with all areas computed anew before each step; returns the boxes of the inner nodes.
+/// As [`agglomerate`], with all areas computed anew before each step; returns the boxes of the
+/// inner nodes.
 fn joined_slowly(boxes: &[Bounds]) -> Vec<Bounds> {
     let (mut open, mut inner) = (boxes.to_vec(), Vec::new());
     while open.len() > 1 {

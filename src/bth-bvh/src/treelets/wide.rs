@@ -7,11 +7,13 @@ use super::super::split::Reference;
 use super::super::sweep_split::Scratch;
 use super::super::{BinaryBvh, Node, Quality};
 use super::agglomerate::agglomerate;
+use super::copy_subtree;
 use bth_format::layout::WIDTH;
 use bth_import::error::Result;
 use bth_import::monitor::Monitor;
 
-/// Greatest number of subtrees into which a wide node is opened. With twice to sixteen times as many nothing more is gained.
+/// Largest number of subtrees into which a wide node is opened. With twice to sixteen times as
+/// many nothing more is gained.
 const MOST_ENTRIES: usize = 64;
 
 /// A child of a wide node.
@@ -30,7 +32,8 @@ struct Entry {
     child: Child,
 }
 
-/// The planned BVH with treelets below wide nodes replaced where that leaves less area to wide nodes, and the number of these.
+/// The planned BVH with treelets below wide nodes replaced where that leaves less area to wide
+/// nodes, and the number of these.
 pub(super) fn rebuild(
     bvh: &BinaryBvh,
     decisions: &[Decision],
@@ -60,7 +63,7 @@ impl WideTree<'_> {
         }
         let index = self.nodes.len();
         self.nodes.push(Vec::new());
-        let entries = children(self.bvh, decisions, at, WIDTH);
+        let entries = children(self.bvh, decisions, at);
         self.nodes[index] = entries.into_iter().map(|child| self.add(decisions, child)).collect();
         Entry { bounds, child: Child::Wide(index) }
     }
@@ -92,7 +95,8 @@ impl WideTree<'_> {
         Ok(rebuilt)
     }
 
-    /// What lies below a wide node when wide nodes below it are opened, the largest first, and the half area of those.
+    /// What lies below a wide node when wide nodes below it are opened, the largest first, and the
+    /// half area of those.
     fn opened(&self, at: usize) -> (Vec<Entry>, f64) {
         let mut entries = self.nodes[at].clone();
         let mut area = 0.0;
@@ -116,7 +120,7 @@ impl WideTree<'_> {
     /// The children of a wide node of the plan, below which new wide nodes are added.
     fn replaced(&mut self, plan: &TreeletPlan<'_>, entries: &[Entry], at: u32) -> Vec<Entry> {
         let mut replaced = Vec::with_capacity(WIDTH);
-        for child in children(plan.treelet, &plan.decisions, at, WIDTH) {
+        for child in children(plan.treelet, &plan.decisions, at) {
             let node = &plan.treelet.nodes[child as usize];
             replaced.push(if node.is_leaf() {
                 entries[plan.treelet.order[node.first as usize] as usize]
@@ -130,12 +134,12 @@ impl WideTree<'_> {
         replaced
     }
 
-    /// Writes the binary tree below a child. The children of a wide node are joined by agglomeration: any tree over them serves the
-    /// present plan, and one of small nodes the next.
+    /// Writes the binary tree below a child. The children of a wide node are joined by
+    /// agglomeration: any tree over them serves the present plan, and one of small nodes the next.
     fn write(&self, entry: Entry, to: &mut BinaryBvh) {
         let index = match entry.child {
             Child::Wide(index) => index,
-            Child::Leaf(at) => return self.copy(at, to),
+            Child::Leaf(at) => return copy_subtree(self.bvh, at, to),
         };
         let entries = &self.nodes[index];
         let boxes: Vec<Bounds> = entries.iter().map(|entry| entry.bounds).collect();
@@ -158,7 +162,8 @@ impl WideTree<'_> {
             let [left, right] = joined.children[inner];
             stack.extend([(right, Some(at)), (left, None)]);
         }
-        // Only the nodes that were joined here have no count yet; children come after their parents.
+        // Only the nodes that were joined here have no count yet; children come after their
+        // parents.
         for at in (from..to.nodes.len()).rev() {
             if to.nodes[at].count == 0 {
                 let right = to.nodes[at].right as usize;
@@ -166,23 +171,9 @@ impl WideTree<'_> {
             }
         }
     }
-
-    /// Copies a subtree of the BVH.
-    fn copy(&self, at: u32, to: &mut BinaryBvh) {
-        let Node { first, count, .. } = self.bvh.nodes[at as usize];
-        let (new_at, new_first) = (to.nodes.len() as u32, to.order.len() as u32);
-        let moved = |node: &Node| Node {
-            first: node.first - first + new_first,
-            right: if node.is_leaf() { 0 } else { node.right - at + new_at },
-            ..*node
-        };
-        let nodes = &self.bvh.nodes[at as usize..][..2 * count as usize - 1];
-        to.nodes.extend(nodes.iter().map(moved));
-        to.order.extend_from_slice(&self.bvh.order[first as usize..][..count as usize]);
-    }
 }
 
-/// The plan of least area of wide nodes over a treelet, of which each leaf takes one slot.
+/// The plan of smallest area of wide nodes over a treelet, of which each leaf takes one slot.
 pub(super) struct TreeletPlan<'a> {
     treelet: &'a BinaryBvh,
     decisions: Vec<Decision>,
@@ -193,7 +184,8 @@ pub(super) struct TreeletPlan<'a> {
 impl<'a> TreeletPlan<'a> {
     pub(super) fn new(treelet: &'a BinaryBvh) -> Self {
         let mut decisions = vec![Decision::default(); treelet.nodes.len()];
-        // Leaves cost nothing in any number of slots. Areas are relative to the root's, so that they keep within f32.
+        // Leaves cost nothing in any number of slots. Areas are relative to the root's, so that
+        // they keep within f32.
         let mut costs = vec![[0.0; WIDTH]; treelet.nodes.len()];
         let root = treelet.nodes[0].half_area();
         let mut below_root = 0.0;
@@ -206,7 +198,7 @@ impl<'a> TreeletPlan<'a> {
             let (decision, cost) = (&mut decisions[at], &mut costs[at]);
             decision.set_share(WIDTH, share);
             cost[1] = (node.half_area() / root) as f32 + below;
-            pair.in_several_slots(decision, cost, WIDTH);
+            pair.in_several_slots(decision, cost);
             below_root = below;
         }
         Self { treelet, decisions, area: f64::from(below_root) * root }

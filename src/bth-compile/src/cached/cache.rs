@@ -4,6 +4,7 @@ use super::log::{Log, Miss};
 use super::warnings::{replay, with_warnings};
 use crate::error::Result;
 use crate::monitor::{Monitor, Recording};
+use crate::stage::Kept;
 use crate::tets;
 use bth_cache::{Key, Record, Store, WorkLock};
 use bth_files::Digest;
@@ -26,8 +27,8 @@ impl<'a> Cache<'a> {
         Self { store: None, subject: String::new(), log: Mutex::default(), tetgen: OnceLock::new() }
     }
 
-    /// Keeps results in a store. `subject` names what is compiled, such as its absolute path: a miss is explained by the last
-    /// key of the same subject; no result depends on it.
+    /// Keeps results in a store. `subject` names what is compiled, such as its absolute path: a
+    /// miss is explained by the last key of the same subject; no result depends on it.
     pub fn new(store: &'a Store, subject: impl Into<String>) -> Self {
         Self { store: Some(store), subject: subject.into(), ..Self::none() }
     }
@@ -42,8 +43,9 @@ impl<'a> Cache<'a> {
         self.store
     }
 
-    /// The name of the tetrahedralizer in keys, determined once because starting the worker takes some milliseconds. `None`
-    /// when the worker fails; results that depend on it are not kept then.
+    /// The name of the tetrahedralizer in keys, determined once because starting the worker takes
+    /// some milliseconds. `None` when the worker fails; results that depend on it are not kept
+    /// then.
     pub(crate) fn tetgen(&self, options: &tets::TetOptions, monitor: &dyn Monitor) -> Result<Option<&str>> {
         if self.tetgen.get().is_none() {
             let found = tets::version(options, monitor)?;
@@ -73,7 +75,8 @@ impl<'a> Cache<'a> {
         bytes
     }
 
-    /// The content of a record as a file, of which nothing but its hash, header and table has been checked.
+    /// The content of a record as a file, of which nothing but its hash, header and table has been
+    /// checked.
     pub(crate) fn open(&self, record: &Record, monitor: &dyn Monitor) -> Option<bth_format::File> {
         let store = self.store?;
         let copy = |bytes: &[u8]| bth_format::File::from_bytes(bytes).ok();
@@ -83,12 +86,13 @@ impl<'a> Cache<'a> {
         file
     }
 
-    /// Whether the store has the content of a record.
+    /// Returns true if the store has the content of a record.
     pub(crate) fn holds(&self, record: &Record) -> bool {
         self.store.is_some_and(|store| store.holds(record))
     }
 
-    /// Record and content of a key, counted as hit or miss. `part` tells apart what has the same subject.
+    /// Record and content of a key, counted as hit or miss. `part` tells apart what has the same
+    /// subject.
     pub(crate) fn fetch(&self, key: &Key, part: &str, monitor: &dyn Monitor) -> Option<(Record, Vec<u8>)> {
         let found = self.find(key, monitor).and_then(|record| {
             let bytes = self.read(&record, monitor)?;
@@ -101,7 +105,8 @@ impl<'a> Cache<'a> {
         found
     }
 
-    /// Keeps a content, with the warnings that were given while it was made; a failure is a warning.
+    /// Keeps a content, with the warnings that were given while it was made; a failure is a
+    /// warning.
     pub(crate) fn put(
         &self,
         key: &Key,
@@ -145,7 +150,8 @@ impl<'a> Cache<'a> {
         self.warn_once(put, monitor)
     }
 
-    /// The record. The first failure of a compilation is reported as a warning, later ones are not reported.
+    /// The record. The first failure of a compilation is reported as a warning, later ones are not
+    /// reported.
     fn warn_once(&self, put: std::io::Result<Record>, monitor: &dyn Monitor) -> Option<Record> {
         let store = self.store?;
         pass_notes(store, monitor);
@@ -168,32 +174,31 @@ impl<'a> Cache<'a> {
         Ok(lock)
     }
 
-    /// The result of a stage: from the cache if it has the result and `decode` accepts it, else built and kept. `part` as
-    /// in
+    /// The result of a stage: from the cache if it has the result, else made and kept. `part` as in
     /// [`Cache::fetch`].
-    pub(super) fn get_or_build<T, R: Serialize + DeserializeOwned>(
+    pub(crate) fn run<T, R: Serialize + DeserializeOwned, S: Kept<T, R>>(
         &self,
-        (key, part): (Key, &str),
+        stage: S,
+        part: &str,
         monitor: &dyn Monitor,
-        decode: impl FnOnce(&[u8]) -> Option<T>,
-        encode: impl FnOnce(&T) -> Vec<u8>,
-        build: impl FnOnce(&dyn Monitor) -> Result<(T, R)>,
     ) -> Result<(T, R)> {
+        let Some(key) = self.store.map(|_| stage.key()) else { return stage.run(monitor) };
         if let Some((record, bytes)) = self.fetch(&key, part, monitor)
-            && let Some(value) = decode(&bytes)
+            && let Some(value) = stage.decode(&bytes)
             && let Ok(report) = R::deserialize(&record.report)
         {
             replay(&record.report, monitor);
             return Ok((value, report));
         }
         let recording = Recording::new(monitor);
-        let (value, report) = build(&recording)?;
-        self.put(&key, part, &encode(&value), &report, &recording);
+        let (value, report) = stage.run(&recording)?;
+        self.put(&key, part, &S::encode(&value), &report, &recording);
         Ok((value, report))
     }
 
-    /// The value that `fetched` finds for a key, else the lock for building it, if the result may be kept. If another
-    /// process holds the lock, this one waits for it and then looks the key up again.
+    /// The value that `fetched` finds for a key, else the lock for building it, if the result may
+    /// be kept. If another process holds the lock, this one waits for it and then looks the key up
+    /// again.
     pub(crate) fn find_or_lock<T>(
         &self,
         (key, part): (Option<&Key>, &str),

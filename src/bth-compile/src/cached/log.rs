@@ -10,7 +10,7 @@ pub struct Log {
     pub hits: BTreeMap<String, u64>,
     /// Results that the cache did not have.
     pub misses: Vec<Miss>,
-    /// Whether a result could not be written.
+    /// True if a result could not be written.
     pub failed: bool,
 }
 
@@ -21,7 +21,7 @@ pub struct Miss {
     pub stage: String,
     /// The object or mesh, where the source has several.
     pub part: String,
-    /// Differences from the last key of the same source; `new` for a source without one, `evicted` where the key is the
-    /// same.
+    /// Differences from the last key of the same source; `new` for a source without one, `evicted`
+    /// where the key is the same.
     pub because: Vec<String>,
 }

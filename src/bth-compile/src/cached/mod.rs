@@ -1,28 +1,25 @@
-//! Compilation through the cache: results that were made from the same content are taken from there.
+//! The cache of results: what was made from the same content is taken from there.
 //!
-//! This module wraps the pipeline from outside; no stage depends on it. `cache` accesses the store, `keys` lists what each
-//! result depends on, `warnings` keeps what the user has been told with the results, `codec`, `rows` and `topology` turn results into bytes, `stages` and `nodes` are the decorators of the
-//! pipeline and of the tetrahedralization, and `compile` runs the pipeline through them. A damaged result is built again; a
-//! cache that cannot be written costs time and nothing else.
+//! [`Cache`] accesses the store and runs stages; `codec`, `rows` and `topology` turn results into
+//! bytes; `warnings` keeps what the user was told with the results; `nodes` keeps
+//! tetrahedralizations of single nodes. A damaged result is made again; a cache that cannot be
+//! written costs time and nothing else.
 
 mod cache;
 mod codec;
-mod compile;
-mod keys;
 mod log;
 mod nodes;
 mod rows;
-mod stages;
+mod text;
 mod topology;
 mod warnings;
 
 pub use cache::Cache;
-pub use compile::{CachedCompilation, DryRun, compile, dry_run};
 pub use log::{Log, Miss};
 
-pub(crate) use codec::{Codec, MeshSummary, decode, encode};
-pub(crate) use compile::{compile_or_fetch, compile_triangles, joined, tetgen_in_keys};
-pub(crate) use keys::{MOTION, ObjectKeys, extension, file_index, mesh, scene};
-pub(crate) use rows::{HashedRows, RowReader, RowWriter};
-pub(crate) use stages::CachedStages;
-pub(crate) use warnings::{replay, warnings};
+pub(crate) use codec::{Codec, MeshSummary, decode, encode, geometry};
+pub(crate) use nodes::CachedNodes;
+pub(crate) use rows::{HashedRows, RowReader, Sink};
+pub(crate) use text::{fields, text};
+pub(crate) use topology::Topology;
+pub(crate) use warnings::{replay, warnings, with_warnings};

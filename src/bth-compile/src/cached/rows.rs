@@ -1,24 +1,31 @@
-//! Encodes slices of numbers as bytes (for each slice its length in bytes, then its bytes, padded to a multiple of eight),
-//! decodes them, and hashes them.
+//! Encodes slices of numbers as bytes (for each slice its length in bytes, then its bytes, padded
+//! to a multiple of eight), decodes them, and hashes them.
 
 use bth_files::Digest;
 use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 const PAD: usize = 8;
 
+/// Receives the slices of a value.
+pub(crate) trait Sink {
+    /// Adds a slice.
+    fn add<T: IntoBytes + Immutable>(&mut self, rows: &[T]);
+}
+
 /// Turns slices into bytes.
 #[derive(Default)]
 pub(crate) struct RowWriter(Vec<u8>);
 
-impl RowWriter {
-    /// Adds a slice.
-    pub(crate) fn add<T: IntoBytes + Immutable>(&mut self, rows: &[T]) {
+impl Sink for RowWriter {
+    fn add<T: IntoBytes + Immutable>(&mut self, rows: &[T]) {
         let bytes = rows.as_bytes();
         self.0.extend_from_slice(&(bytes.len() as u64).to_le_bytes());
         self.0.extend_from_slice(bytes);
         self.0.resize(self.0.len().next_multiple_of(PAD), 0);
     }
+}
 
+impl RowWriter {
     pub(crate) fn finish(self) -> Vec<u8> {
         self.0
     }
@@ -66,13 +73,15 @@ impl HashedRows {
         rows
     }
 
-    pub(crate) fn add<T: IntoBytes + Immutable>(&mut self, rows: &[T]) {
-        let bytes = rows.as_bytes();
-        self.0.update(&(bytes.len() as u64).to_le_bytes()).update(bytes);
-    }
-
     pub(crate) fn finish(self) -> Digest {
         self.0.finalize().into()
+    }
+}
+
+impl Sink for HashedRows {
+    fn add<T: IntoBytes + Immutable>(&mut self, rows: &[T]) {
+        let bytes = rows.as_bytes();
+        self.0.update(&(bytes.len() as u64).to_le_bytes()).update(bytes);
     }
 }
 

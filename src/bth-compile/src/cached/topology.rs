@@ -1,7 +1,8 @@
-//! A binary BVH without its boxes, which follow from the triangles: 8 bytes a triangle instead of 80.
+//! A binary BVH without its boxes, which follow from the triangles: 8 bytes a triangle instead of
+//! 80.
 
 use super::codec::Codec;
-use super::rows::{RowReader, RowWriter};
+use super::rows::{RowReader, Sink};
 use crate::bvh::{BinaryBvh, Node};
 use bth_import::Mesh;
 
@@ -77,7 +78,7 @@ impl Topology {
 }
 
 impl Codec for Topology {
-    fn write(&self, to: &mut RowWriter) {
+    fn write(&self, to: &mut impl Sink) {
         to.add(&self.left);
         to.add(&self.order);
     }

@@ -1,4 +1,5 @@
-//! Warnings about what is compiled, kept with the results in the cache, so that who takes a result from there gets them, too.
+//! Warnings about what is compiled, kept with the results in the cache, so that who takes a result
+//! from there gets them, too.
 
 use crate::monitor::{Monitor, Recording};
 use serde::Serialize;
@@ -8,7 +9,7 @@ use serde_json::Value;
 const KEY: &str = "warnings";
 
 /// A report as JSON with the warnings that were given meanwhile.
-pub(super) fn with_warnings(report: &impl Serialize, recording: &Recording<'_>) -> serde_json::Result<Value> {
+pub(crate) fn with_warnings(report: &impl Serialize, recording: &Recording<'_>) -> serde_json::Result<Value> {
     let mut report = serde_json::to_value(report)?;
     let warnings = recording.warnings();
     if !warnings.is_empty()

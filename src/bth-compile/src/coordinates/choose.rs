@@ -51,11 +51,11 @@ impl MaxError {
 /// The form of coordinates in triangle leaves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct CoordinateOptions {
-    /// Bits of a coordinate. If absent, coordinates are `f32`, or have the fewest bits that keep within `max_error` if that
-    /// is given.
+    /// Bits of a coordinate. If absent, coordinates are `f32`, or have the fewest bits that keep
+    /// within `max_error` if that is given.
     #[serde(serialize_with = "number_of_bits")]
     pub bits: Option<GridBits>,
-    /// Greatest distance that a vertex may move.
+    /// Largest distance that a vertex may move.
     pub max_error: Option<MaxError>,
 }
 
@@ -68,7 +68,7 @@ fn number_of_bits<S: Serializer>(bits: &Option<GridBits>, to: S) -> std::result:
 pub struct CoordinateReport {
     /// Bits of a coordinate.
     pub bits: u32,
-    /// Greatest distance that a vertex moved, object space.
+    /// Largest distance that a vertex moved, object space.
     pub displacement: f32,
     /// Distance between neighbouring points of the grid on each axis.
     pub step: [f32; 3],
@@ -78,7 +78,7 @@ pub struct CoordinateReport {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct OnGrid {
     pub(crate) grid: Grid,
-    /// Greatest distance that a position moved, rounded up.
+    /// Largest distance that a position moved, rounded up.
     pub(crate) displacement: f32,
     /// Original positions of the mesh.
     pub(crate) source: Vec<[f32; 3]>,
@@ -94,8 +94,8 @@ impl OnGrid {
 /// Moves the positions of a mesh to a grid, if the options have one.
 ///
 /// # Errors
-/// `BTH-I070` when `bits` move a vertex farther than `max_error` allows, `BTH-I071` when the object has no grid of so many
-/// bits, as its coordinates are too great or too close together.
+/// `BTH-I070` when `bits` move a vertex farther than `max_error` allows, `BTH-I071` when the object
+/// has no grid of so many bits, as its coordinates are too great or too close together.
 pub(crate) fn place(source: &Path, mesh: &mut Mesh, options: &CoordinateOptions) -> Result<Option<OnGrid>> {
     let Some(bounds) = bounds(&mesh.positions) else { return Ok(None) };
     let found = |bits: GridBits| {
@@ -162,7 +162,7 @@ fn out_of_range(source: &Path, bits: GridBits, coordinates: &str) -> Error {
     }
 }
 
-/// Least and greatest coordinates.
+/// Smallest and largest coordinates.
 type AxisRanges = [[f32; 2]; 3];
 
 fn bounds(positions: &[[f32; 3]]) -> Option<AxisRanges> {
@@ -180,7 +180,8 @@ fn diagonal(bounds: AxisRanges) -> f64 {
     bounds.iter().map(|[low, high]| (f64::from(*high) - f64::from(*low)).powi(2)).sum::<f64>().sqrt()
 }
 
-/// The finest grid of this many bits that contains a box; `None` where coordinates are near the greatest `f32`.
+/// The finest grid of this many bits that contains a box; `None` where coordinates are near the
+/// largest `f32`.
 fn grid(bits: GridBits, bounds: AxisRanges) -> Option<Grid> {
     let mut grid = Grid { bits, origin: [0.0; 3], step: [1.0; 3] };
     for (axis, ends) in bounds.into_iter().enumerate() {
@@ -195,8 +196,9 @@ fn grid(bits: GridBits, bounds: AxisRanges) -> Option<Grid> {
     Some(grid)
 }
 
-/// Whether the least step of a file is too great for a box: its longest side then has less than half of the steps that its bits
-/// stand for, and none at the least extents, where the surface would be a point.
+/// Returns true if the smallest step of a file is too great for a box: its longest side then has
+/// less than half of the steps that its bits stand for, and none at the smallest extents, where the
+/// surface would be a point.
 fn is_too_coarse(grid: &Grid, bounds: AxisRanges) -> bool {
     let extent = |axis: usize| f64::from(bounds[axis][1]) - f64::from(bounds[axis][0]);
     let longest = (0..3).fold(0, |longest, axis| if extent(axis) > extent(longest) { axis } else { longest });
@@ -209,13 +211,13 @@ fn first_exponent(bits: GridBits, [low, high]: [f32; 2]) -> i32 {
     let extent = f64::from(high) - f64::from(low);
     let floor = |x: f64| ((x.to_bits() >> 52) as i32 & 0x7ff) - 1023;
     let steps = if extent > 0.0 { floor(extent) - bits as i32 - 1 } else { i32::MIN };
-    // Below it the greatest coordinate is also more than 2^24 steps.
+    // Below it the largest coordinate is also more than 2^24 steps.
     let greatest = f64::from(low.abs().max(high.abs()));
     let multiples = if greatest > 0.0 { floor(greatest) - 24 } else { i32::MIN };
     steps.max(multiples).max(-126)
 }
 
-/// Greatest distance of a position from its grid point, rounded up.
+/// Largest distance of a position from its grid point, rounded up.
 fn displacement(grid: &Grid, positions: &[[f32; 3]]) -> f32 {
     let square = |p: &[f32; 3]| {
         let q = grid.nearest(*p);
@@ -223,7 +225,8 @@ fn displacement(grid: &Grid, positions: &[[f32; 3]]) -> f32 {
     };
     let exact = positions.iter().map(square).fold(0.0, f64::max).sqrt();
     let rounded = exact as f32;
-    // One unit in the last place beyond rounding up covers the rounding of the f64 operations above.
+    // One unit in the last place beyond rounding up covers the rounding of the f64 operations
+    // above.
     if exact == 0.0 { 0.0 } else { rounded.next_up() }
 }
 
@@ -247,8 +250,8 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(500))]
-        /// At any scale every vertex lies on the grid afterwards, no farther than stated; the bound is at most half the
-        /// diagonal of a cell; points of the grid do not move.
+        /// At any scale every vertex lies on the grid afterwards, no farther than stated; the bound
+        /// is at most half the diagonal of a cell; points of the grid do not move.
         #[test]
         fn no_vertex_moves_farther_than_is_said(points in prop::collection::vec(prop::array::uniform3(number()), 1..40)) {
             for bits in GridBits::ALL {
@@ -320,7 +323,7 @@ mod tests {
         );
     }
 
-    /// The grid of a tiny model would have steps below the least of a file, down to none at all.
+    /// The grid of a tiny model would have steps below the smallest of a file, down to none at all.
     #[test]
     fn bits_that_would_lose_a_tiny_surface_are_refused() {
         let corners = |size: f32| vec![[0.0; 3], [size, 0.0, 0.0], [0.0, size, 0.0]];

@@ -33,8 +33,9 @@ pub(super) const SECTORS: [BinSet; FREE_SECTORS] = {
     sectors
 };
 
-/// Least and greatest slopes of columns, in f32: those of the promise, and a 2^-19 (1 + s²) beyond, which is more than the rounding
-/// errors of sums of two products with them. Lanes from the eleventh on are empty.
+/// Smallest and largest slopes of columns, in f32: those of the promise, and a 2^-19 (1 + s²)
+/// beyond, which is more than the rounding errors of sums of two products with them. Lanes from the
+/// eleventh on are empty.
 #[repr(align(64))]
 pub(super) struct Columns {
     pub(super) least: [f32; LANES],
@@ -54,7 +55,8 @@ pub(super) static COLUMNS: LazyLock<Columns> = LazyLock::new(|| {
 
 /// Share of the cosine-weighted directions of a side that lie in each bin.
 static SHARES: LazyLock<[f64; FREE_BINS]> = LazyLock::new(|| {
-    // Form factor of the rectangle from (0, 0) to (x, y) in the plane at distance 1, seen from the origin.
+    // Form factor of the rectangle from (0, 0) to (x, y) in the plane at distance 1, seen from the
+    // origin.
     let factor = |x: f64, y: f64| {
         let part = |x: f64, y: f64| x / x.hypot(1.0) * (y / x.hypot(1.0)).atan();
         (part(x, y) + part(y, x)) / std::f64::consts::TAU
@@ -79,7 +81,8 @@ pub(super) fn share(mut bins: BinSet) -> f64 {
     sum
 }
 
-/// Share of the cosine-weighted directions of a side that lie in sectors of a level or a greater one.
+/// Share of the cosine-weighted directions of a side that lie in sectors of a level or a greater
+/// one.
 pub(super) fn beyond(sectors: FreeSectors, level: usize) -> f64 {
     (0..FREE_SECTORS)
         .filter(|sector| sectors.level(*sector) >= level)
@@ -87,7 +90,8 @@ pub(super) fn beyond(sectors: FreeSectors, level: usize) -> f64 {
         .sum()
 }
 
-/// Unit axes at the first corner of a triangle: along its first edge, across, and along the normal of the side from which rays start.
+/// Unit axes at the first corner of a triangle: along its first edge, across, and along the normal
+/// of the side from which rays start.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame {
     pub(super) axes: [[f64; 3]; 3],

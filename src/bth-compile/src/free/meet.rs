@@ -10,16 +10,19 @@ use bth_format::layout::FREE_SIDE;
 /// Sixteen triangles as a start triangle sees them.
 #[repr(align(64))]
 pub(super) struct Met {
-    /// Greatest w, for each line of the start triangle, with which its plane holds the triangle on the lower side; less than all others
-    /// where there is none.
+    /// Largest w, for each line of the start triangle, with which its plane holds the triangle on
+    /// the lower side; less than all others where there is none.
     most: [[f32; LANES]; LINES],
-    /// Normals of the triangles' planes, towards the side on which the whole start triangle lies, in its frame.
+    /// Normals of the triangles' planes, towards the side on which the whole start triangle lies,
+    /// in its frame.
     normal: [[f32; LANES]; 3],
-    /// What products of normals with directions must exceed to be certainly positive; infinite if the start triangle lies on both sides.
+    /// What products of normals with directions must exceed to be certainly positive; infinite if
+    /// the start triangle lies on both sides.
     least_product: [f32; LANES],
     /// Lower bounds of the squared distances.
     pub(super) squared_gap: [f32; LANES],
-    /// Bits of the triangles that may have a point on the side from which rays start, and of those that certainly have.
+    /// Bits of the triangles that may have a point on the side from which rays start, and of those
+    /// that certainly have.
     pub(super) above: u32,
     pub(super) certainly_above: u32,
     /// Bits of those that are [small](super::see::SMALL).
@@ -30,7 +33,8 @@ pub(super) struct Met {
 struct Corners<S: Simd, const TOUCHES: bool> {
     /// By corner and axis.
     at: [[S::F; 3]; 3],
-    /// Bounds of the errors of coordinates, and sums of the absolute values of those from which they were computed.
+    /// Bounds of the errors of coordinates, and sums of the absolute values of those from which
+    /// they were computed.
     error: [S::F; 3],
     size: [S::F; 3],
     /// Where a corner is a corner of the start triangle, by both; nowhere without `TOUCHES`.
@@ -38,8 +42,8 @@ struct Corners<S: Simd, const TOUCHES: bool> {
 }
 
 impl<S: Simd, const TOUCHES: bool> Corners<S, TOUCHES> {
-    /// An error is at most 5 units of the size: one of the difference, one of the axis, three of the product and the sums. The bound is
-    /// 16.
+    /// An error is at most 5 units of the size: one of the difference, one of the axis, three of
+    /// the product and the sums. The bound is 16.
     #[inline(always)]
     fn new(s: S, start: &Start, block: &Block) -> Self {
         let zero = s.splat(0.0);
@@ -83,8 +87,9 @@ impl<S: Simd, const TOUCHES: bool> Corners<S, TOUCHES> {
     }
 }
 
-/// What a start triangle sees of those triangles of a block that may be seen in some `bins`, given whether the block's box `TOUCHES` that
-/// triangle, so that corners may be shared. There are no fused operations, so that all instruction sets agree.
+/// What a start triangle sees of those triangles of a block that may be seen in some `bins`, given
+/// whether the block's box `TOUCHES` that triangle, so that corners may be shared. There are no
+/// fused operations, so that all instruction sets agree.
 #[inline(always)]
 pub(super) fn meet<S: Simd, const TOUCHES: bool>(s: S, start: &Start, block: &Block, bins: BinSet) -> Met {
     let corners = Corners::<S, TOUCHES>::new(s, start, block);
@@ -142,7 +147,8 @@ fn seen_in<S: Simd>(s: S, bins: BinSet, ranges: &[[S::F; 2]; 3]) -> u32 {
     found
 }
 
-/// Ranges of the coordinates of triangles relative to points of the start triangle. Stores distances, and what is small for them.
+/// Ranges of the coordinates of triangles relative to points of the start triangle. Stores
+/// distances, and what is small for them.
 #[inline(always)]
 fn distances<S: Simd, const TOUCHES: bool>(
     s: S,
@@ -172,7 +178,8 @@ fn distances<S: Simd, const TOUCHES: bool>(
 
 /// Factors of the heights of corners above a line in its plane, whose products bound w, by corner.
 struct Factors<S: Simd> {
-    /// Where the corner may lie above the start triangle's plane: the product is an upper bound, else a lower one.
+    /// Where the corner may lie above the start triangle's plane: the product is an upper bound,
+    /// else a lower one.
     is_above: [S::M; 3],
     /// For corners that lie on the side of the start triangle, or on the other.
     inside: [S::F; 3],
@@ -180,8 +187,9 @@ struct Factors<S: Simd> {
 }
 
 impl<S: Simd> Factors<S> {
-    /// A corner at the height a above the line and z above the plane lies below a plane with w if a + w z <= 0. With z known to lie
-    /// between two bounds, w <= -a / z or w >= -a / z for that one of them which makes it harder.
+    /// A corner at the height a above the line and z above the plane lies below a plane with w if a
+    /// + w z <= 0. With z known to lie between two bounds, w <= -a / z or w >= -a / z for that one
+    /// of them which makes it harder.
     #[inline(always)]
     fn new<const TOUCHES: bool>(s: S, corners: &Corners<S, TOUCHES>) -> Self {
         let zero = s.splat(0.0);
@@ -206,10 +214,12 @@ impl<S: Simd> Factors<S> {
         out
     }
 
-    /// Greatest w with which the plane along a line holds triangles on the lower side; -∞ where there is none.
+    /// Largest w with which the plane along a line holds triangles on the lower side; -∞ where
+    /// there is none.
     ///
-    /// The error of heights above the line is at most 18 units of the size of the corner and 2 of that of the start triangle, those of
-    /// the quotients 3 units of both: the bounds are 32 and 16.
+    /// The error of heights above the line is at most 18 units of the size of the corner and 2 of
+    /// that of the start triangle, those of the quotients 3 units of both: the bounds are 32 and
+    /// 16.
     #[inline(always)]
     fn most<const TOUCHES: bool>(
         &self,
@@ -231,7 +241,8 @@ impl<S: Simd> Factors<S> {
             let height = s.add(s.sub(along, offset), error);
             let factor = s.select(s.le(height, zero), self.outside[k], self.inside[k]);
             let bound = s.sub(zero, s.mul(height, factor));
-            // Corners that lie on the line bound nothing; other corners of the start triangle lie above all planes.
+            // Corners that lie on the line bound nothing; other corners of the start triangle lie
+            // above all planes.
             let on = corners.shared_with(s, k, line.on);
             let off = corners.shared_with(s, k, !line.on & 0b111);
             let upper = s.select(self.is_above[k], bound, infinite);
@@ -243,7 +254,8 @@ impl<S: Simd> Factors<S> {
     }
 }
 
-/// Planes of the triangles that hold the start triangle on one side: rays that leave it away from them meet nothing there.
+/// Planes of the triangles that hold the start triangle on one side: rays that leave it away from
+/// them meet nothing there.
 #[inline(always)]
 fn away<S: Simd, const TOUCHES: bool>(s: S, start: &Start, corners: &Corners<S, TOUCHES>, met: &mut Met) {
     let zero = s.splat(0.0);
@@ -257,7 +269,8 @@ fn away<S: Simd, const TOUCHES: bool>(s: S, start: &Start, corners: &Corners<S, 
         let [a, b] = [(k + 1) % 3, (k + 2) % 3];
         normal[k] = s.sub(s.mul(e[a], f[b]), s.mul(e[b], f[a]));
     }
-    // Errors of the edges, of the components of the normal, and of the heights of the start triangle's corners above the plane.
+    // Errors of the edges, of the components of the normal, and of the heights of the start
+    // triangle's corners above the plane.
     let (e_size, f_size) = (sum_abs(s, &e), sum_abs(s, &f));
     let e_error = s.add(corners.error[0], corners.error[1]);
     let f_error = s.add(corners.error[0], corners.error[2]);

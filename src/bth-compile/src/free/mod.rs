@@ -1,14 +1,18 @@
-//! Free directions: what a ray that starts on a triangle certainly cannot meet, by bins of directions.
+//! Free directions: what a ray that starts on a triangle certainly cannot meet, by bins of
+//! directions.
 //!
-//! For each triangle and bin the *shaft* holds all points that rays reach from any point of the triangle in any direction of the bin. If
-//! no other triangle meets the shaft, the bin is free. Bins are joined to *sectors*, and a sector has a distance within which no other
-//! triangle meets the shafts of its bins. A row tells either the free bins and the sectors of one side of the triangle, nearly always
-//! its front, or the sectors of both sides.
+//! For each triangle and bin the *shaft* holds all points that rays reach from any point of the
+//! triangle in any direction of the bin. If no other triangle meets the shaft, the bin is free.
+//! Bins are joined to *sectors*, and a sector has a distance within which no other triangle meets
+//! the shafts of its bins. A row tells either the free bins and the sectors of one side of the
+//! triangle, nearly always its front, or the sectors of both sides.
 //!
-//! A proof for each pair of bin and triangle would take too long: nodes of the BVH are left out by conservative tests of boxes, what is
-//! small for its distance blocks without a proof, and bins that are blocked are not asked again.
+//! A proof for each pair of bin and triangle would take too long: nodes of the BVH are left out by
+//! conservative tests of boxes, what is small for its distance blocks without a proof, and bins
+//! that are blocked are not asked again.
 
-// Kernels loop over lanes by index: closures could be compiled as functions without the kernel's instruction set.
+// Kernels loop over lanes by index: closures could be compiled as functions without the kernel's
+// instruction set.
 #![allow(clippy::needless_range_loop)]
 
 mod frame;
@@ -40,7 +44,7 @@ use serde::Serialize;
 use std::ops::Range;
 use tree::Tree;
 
-/// Whether free directions and distances are decided and kept.
+/// Selects which free directions and distances are decided and kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum KeepFree {
@@ -56,7 +60,7 @@ pub enum KeepFree {
 }
 
 impl KeepFree {
-    /// Whether they are to be kept whatever they are worth.
+    /// Returns true if they are to be kept whatever they are worth.
     pub(crate) fn always(self) -> bool {
         matches!(self, KeepFree::Distances | KeepFree::All)
     }
@@ -65,14 +69,16 @@ impl KeepFree {
 /// Options of [`find`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct FreeOptions {
-    /// Whether and where they are kept.
+    /// Which of them are kept.
     pub keep: KeepFree,
-    /// The second of three distances that are told apart, an eighth of it, it and four times it, relative to the diagonal of the object's
-    /// box.
+    /// The second of three distances that are told apart, an eighth of it, it and four times it,
+    /// relative to the diagonal of the object's box.
     pub reach: f64,
-    /// Greatest size of a row in bytes: [`KeepFree::Auto`] keeps nothing that takes more for each triangle.
+    /// Largest size of a row in bytes: [`KeepFree::Auto`] keeps nothing that takes more for each
+    /// triangle.
     pub row_bytes: usize,
-    /// Greatest number of triangles for which [`KeepFree::Auto`] decides anything: more take minutes.
+    /// Largest number of triangles for which [`KeepFree::Auto`] decides anything: more take
+    /// minutes.
     pub most_triangles: usize,
 }
 
@@ -87,8 +93,8 @@ impl Default for FreeOptions {
     }
 }
 
-/// What is known of the directions of all triangles. At most one of the lists has rows, one for each triangle of the mesh, zeros where
-/// nothing is known.
+/// What is known of the directions of all triangles. At most one of the lists has rows, one for
+/// each triangle of the mesh, zeros where nothing is known.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Free {
     /// Distances of the levels of sectors, object space.
@@ -100,7 +106,7 @@ pub struct Free {
 }
 
 impl Free {
-    /// Whether the rows are those of a mesh with so many triangles.
+    /// Returns true if the rows are those of a mesh with so many triangles.
     pub(crate) fn is_of(&self, triangles: usize) -> bool {
         let [directions, distances] = [self.directions.len(), self.distances.len()];
         [directions, distances].iter().all(|rows| [0, triangles].contains(rows))
@@ -111,7 +117,8 @@ impl Free {
 /// Rows that one task decides.
 const TASK: usize = 512;
 
-/// Decides what is known of the directions of all triangles of a mesh, as far as it is to be kept. Only what is certain is told.
+/// Decides what is known of the directions of all triangles of a mesh, as far as it is to be kept.
+/// Only what is certain is told.
 ///
 /// # Errors
 /// Only [`crate::Error::Cancelled`].
@@ -200,7 +207,8 @@ fn decide(
     Ok(parts.collect::<Result<Vec<_>>>()?.into_iter().flatten().collect())
 }
 
-/// The distances of the levels in object space; zeros, within which nothing lies, where they would not be in the range of the format.
+/// The distances of the levels in object space; zeros, within which nothing lies, where they would
+/// not be in the range of the format.
 fn levels(tree: &BinaryBvh, reach: f64) -> [f32; FreeSectors::LEVELS] {
     /// Shares of the reach.
     const LEVELS: [f64; FreeSectors::LEVELS] = [1.0 / 8.0, 1.0, 4.0];

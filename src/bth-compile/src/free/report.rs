@@ -21,25 +21,27 @@ pub enum Kept {
     Directions,
 }
 
-/// Report of [`super::find`]. Shares are those of cosine-weighted rays from triangles, by area, of what is kept.
+/// Report of [`super::find`]. Shares are those of cosine-weighted rays from triangles, by area, of
+/// what is kept.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FreeReport {
     /// Triangles that rays may start on.
     pub triangles: u64,
     /// Share of the rays that certainly meet nothing; 0 where distances alone were decided.
     pub free: f64,
-    /// For each level the share of the rays that certainly meet nothing within its distance, from the sides that are told.
+    /// For each level the share of the rays that certainly meet nothing within its distance, from
+    /// the sides that are told.
     pub beyond: [f64; FreeSectors::LEVELS],
     /// The distances of the levels, object space.
     pub levels: [f32; FreeSectors::LEVELS],
     /// What is kept.
     pub kept: Kept,
-    /// What [`super::KeepFree::Auto`] decided by: of what is kept, or of distances where nothing is.
+    /// What [`super::KeepFree::Auto`] decided by: of what is kept, or of distances where nothing
+    /// is.
     pub worth: Option<Worth>,
-    /// Whether nothing was decided, since there are too many triangles ([`super::FreeOptions::most_triangles`]).
+    /// True if nothing was decided, since there are too many triangles
+    /// ([`super::FreeOptions::most_triangles`]).
     pub undecided: bool,
-    /// Wall-clock time of the stage as the pipeline measures it, seconds; 0 where the stage is called on its own.
-    pub seconds: f64,
 }
 
 impl FreeReport {

@@ -1,4 +1,5 @@
-//! What is known of the directions of a triangle: a traversal of the BVH that stops at what no open bin may see.
+//! What is known of the directions of a triangle: a traversal of the BVH that stops at what no open
+//! bin may see.
 
 use super::Kept;
 use super::frame::{BinSet, Frame, IN_SECTORS, SECTORS, share};
@@ -24,9 +25,10 @@ pub(super) struct Surroundings<'a> {
 }
 
 impl Surroundings<'_> {
-    /// Runs of rows that follow each other and whose triangles have the same corners in the same order. What is known of one of them is
-    /// known of all, since triangles with the same three corners do not block each other. Without this, a pile of coincident triangles
-    /// would take quadratic time: none of them ends the search of another.
+    /// Runs of rows that follow each other and whose triangles have the same corners in the same
+    /// order. What is known of one of them is known of all, since triangles with the same three
+    /// corners do not block each other. Without this, a pile of coincident triangles would take
+    /// quadratic time: none of them ends the search of another.
     pub(super) fn coincident(&self, rows: Range<usize>) -> impl Iterator<Item = Range<usize>> {
         let corners = |row: usize| self.mesh.corners(self.order[row]).map(|p| p.map(f32::to_bits));
         let mut rest = rows;
@@ -50,7 +52,8 @@ pub(super) struct Found {
     pub(super) sectors: [FreeSectors; 2],
 }
 
-/// Share of the directions of the front that are free, or beyond a level, in the mean of the levels, from which on the back is not searched.
+/// Share of the directions of the front that are free, or beyond a level, in the mean of the
+/// levels, from which on the back is not searched.
 const ENOUGH: f64 = 1.0 / 8.0;
 
 /// Decides the directions of some triangles, by rows of the order of the BVH.
@@ -184,7 +187,8 @@ impl Search<'_> {
         found
     }
 
-    /// What is known of one side of a triangle, given the bins of which it is asked whether they are free; `None` without axes.
+    /// What is known of one side of a triangle, given the bins of which it is asked whether they
+    /// are free; `None` without axes.
     #[inline(always)]
     fn search<S: Simd>(&mut self, s: S, row: usize, (is_back, free): (bool, BinSet)) -> Option<State> {
         let corners = self.around.mesh.corners(self.around.order[row]);
@@ -201,8 +205,9 @@ impl Search<'_> {
         Some(state)
     }
 
-    /// Blocks the bins in which a triangle of the mesh may be met. What is found does not depend on the order of the visits: children are
-    /// sorted by distance where distances alone are open, since near ones block these, but not where all in a free bin must be visited.
+    /// Blocks the bins in which a triangle of the mesh may be met. What is found does not depend on
+    /// the order of the visits: children are sorted by distance where distances alone are open,
+    /// since near ones block these, but not where all in a free bin must be visited.
     #[inline(always)]
     fn block_all<S: Simd>(&mut self, s: S, state: &mut State) {
         let tree = &self.around.tree;

@@ -8,8 +8,8 @@ use bth_format::layout::FREE_SIDE;
 
 /// Relative bound of rounding errors: 16 units, for eight roundings of coordinates.
 pub(super) const ERROR: f32 = 1.0 / (1 << 20) as f32;
-/// Boxes and triangles whose size, relative to their distance, is at most this block the bins in which they may be seen, without proof
-/// that they are met: six degrees.
+/// Boxes and triangles whose size, relative to their distance, is at most this block the bins in
+/// which they may be seen, without proof that they are met: six degrees.
 pub(super) const SMALL: f32 = 1.0 / 10.0;
 /// As [`SMALL`], where only sectors are decided, which are wider than bins.
 pub(super) const SMALL_FOR_SECTORS: f32 = 1.0 / 6.0;
@@ -65,7 +65,8 @@ pub(super) fn squared_gap<S: Simd>(s: S, ranges: &[[S::F; 2]; 3]) -> S::F {
     sum
 }
 
-/// What a start triangle may see of the boxes of a node. There are no fused operations, so that all instruction sets agree.
+/// What a start triangle may see of the boxes of a node. There are no fused operations, so that all
+/// instruction sets agree.
 #[inline(always)]
 pub(super) fn see<S: Simd>(s: S, start: &Start, node: &Node) -> Seen {
     let zero = s.splat(0.0);
@@ -80,7 +81,7 @@ pub(super) fn see<S: Simd>(s: S, start: &Start, node: &Node) -> Seen {
     }
     let size = s.add(sum_abs(s, &middle), s.add(s.add(side[0], side[1]), side[2]));
     let slack = s.add(s.mul(size, s.splat(ERROR)), s.splat(f32::MIN_POSITIVE));
-    // Least and greatest coordinates along an axis, relative to points of the start triangle.
+    // Smallest and largest coordinates along an axis, relative to points of the start triangle.
     let mut ranges = [[zero; 2]; 3];
     for k in 0..3 {
         let axis = &start.axes[k];
@@ -105,7 +106,8 @@ pub(super) fn see<S: Simd>(s: S, start: &Start, node: &Node) -> Seen {
     out
 }
 
-/// Columns and rows in which points with coordinates in ranges may be seen, as [`Seen`] stores them, and where there are any.
+/// Columns and rows in which points with coordinates in ranges may be seen, as [`Seen`] stores
+/// them, and where there are any.
 #[inline(always)]
 pub(super) fn columns_and_rows<S: Simd>(s: S, ranges: &[[S::F; 2]; 3]) -> (S::U, S::M) {
     let zero_u = s.splat_u(0);

@@ -1,14 +1,17 @@
 //! The triangle from which rays start, and planes that bound what they reach from it.
 //!
-//! All points that rays in the directions of a bin reach from any point of the triangle are its *shaft*. A plane proves that another
-//! triangle is not met if the start triangle lies on its upper side, the other one on its lower side, and every direction of the
-//! bin points strictly upwards: then no point p + s d of the shaft with s > 0 is a point of the other triangle, also where both share
-//! corners on the plane.
+//! All points that rays in the directions of a bin reach from any point of the triangle are its
+//! *shaft*. A plane proves that another triangle is not met if the start triangle lies on its upper
+//! side, the other one on its lower side, and every direction of the bin points strictly upwards:
+//! then no point p + s d of the shaft with s > 0 is a point of the other triangle, also where both
+//! share corners on the plane.
 //!
-//! In the frame of the start triangle, whose z is 0, directions are (X, Y, 1) with the slopes X and Y of the bin. The planes tried have
-//! normals (m, w): a line in the plane of the triangle that holds it on the side of the unit vector m, tilted around that line.
-//! Directions point upwards from it if w > -m · (X, Y) for all slopes of the bin, which is the sum of a bound for the column and one for
-//! the row; a greater w keeps all that was said. Six lines are used: those along the axes through the outermost corners, and the edges.
+//! In the frame of the start triangle, whose z is 0, directions are (X, Y, 1) with the slopes X and
+//! Y of the bin. The planes tried have normals (m, w): a line in the plane of the triangle that
+//! holds it on the side of the unit vector m, tilted around that line. Directions point upwards
+//! from it if w > -m · (X, Y) for all slopes of the bin, which is the sum of a bound for the column
+//! and one for the row; a greater w keeps all that was said. Six lines are used: those along the
+//! axes through the outermost corners, and the edges.
 
 use super::frame::{ALL_COLUMNS, COLUMNS, Frame};
 use bth::simd::LANES;
@@ -17,7 +20,8 @@ use std::cmp::Ordering;
 
 /// Number of lines.
 pub(super) const LINES: usize = 6;
-/// Lines whose planes depend on the column alone, and those on the row alone: the other two are edges.
+/// Lines whose planes depend on the column alone, and those on the row alone: the other two are
+/// edges.
 pub(super) const BY_COLUMN: [usize; 2] = [0, 1];
 pub(super) const BY_ROW: [usize; 2] = [2, 3];
 pub(super) const BY_BOTH: [usize; 2] = [4, 5];
@@ -31,7 +35,8 @@ pub(super) struct Line {
     pub(super) offset: f32,
     /// Bits of the corners that lie exactly on it; all others are above.
     pub(super) on: u8,
-    /// Least w, for each column and row, for which the directions of bins point upwards; to be added.
+    /// Smallest w, for each column and row, for which the directions of bins point upwards; to be
+    /// added.
     pub(super) of_column: [f32; LANES],
     pub(super) of_row: [f32; LANES],
 }
@@ -43,9 +48,9 @@ pub(super) struct Start {
     pub(super) axes: [[f32; 3]; 3],
     /// Coordinates of the corners along the first two axes.
     pub(super) local: [[f32; 2]; 3],
-    /// Least and greatest of these, rounded outwards.
+    /// Smallest and largest of these, rounded outwards.
     pub(super) extent: [[f32; 2]; 2],
-    /// The greatest in absolute value.
+    /// The largest in absolute value.
     pub(super) size: f32,
     /// What is small, relative to its distance ([`super::see::SMALL`]).
     pub(super) small: f32,
@@ -85,7 +90,8 @@ impl Start {
         }
     }
 
-    /// Whether another triangle has a point on the side of the plane from which rays start. Exact.
+    /// Returns true if another triangle has a point on the side of the plane from which rays start.
+    /// Exact.
     #[cold]
     pub(super) fn is_below(&self, other: &[[f32; 3]; 3]) -> bool {
         let [a, b, c] = self.corners;
@@ -118,8 +124,8 @@ impl Line {
         Line::new(inward, offset, 1 << k | 1 << ((k + 1) % 3))
     }
 
-    /// The line through the corner that lies farthest against a direction along an axis. Where two corners lie equally far, within
-    /// rounding errors, none counts as lying on it.
+    /// The line through the corner that lies farthest against a direction along an axis. Where two
+    /// corners lie equally far, within rounding errors, none counts as lying on it.
     fn through_outermost(local: &[[f64; 2]; 3], inward: [f64; 2], size: f64) -> Self {
         let heights = local.map(|p| inward[0] * p[0] + inward[1] * p[1]);
         let least = heights.into_iter().fold(f64::INFINITY, f64::min);

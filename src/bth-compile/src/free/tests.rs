@@ -66,7 +66,8 @@ fn soup(count: usize, seed: u64) -> Mesh {
     weld(&corners)
 }
 
-/// Triangles with the same corners in the same order are decided once, with what each would find by itself.
+/// Triangles with the same corners in the same order are decided once, with what each would find by
+/// itself.
 #[test]
 fn coincident_triangles_are_decided_together() {
     let pile: Vec<u32> = (0..600).map(|i| [0, 0, 0, 1, 1, 2][i % 6]).collect();
@@ -88,7 +89,8 @@ fn coincident_triangles_are_decided_together() {
     }
 }
 
-/// A start on a triangle: a corner, a point of an edge, or one inside, moved a little along the direction or not at all.
+/// A start on a triangle: a corner, a point of an edge, or one inside, moved a little along the
+/// direction or not at all.
 fn start(random: &mut Rng, corners: [[f32; 3]; 3], direction: [f32; 3]) -> [f32; 3] {
     let mut weights = match random.below(3) {
         0 => [1.0, 0.0, 0.0],
@@ -107,7 +109,8 @@ fn start(random: &mut Rng, corners: [[f32; 3]; 3], direction: [f32; 3]) -> [f32;
     })
 }
 
-/// Traces rays through the triangles of a mesh in directions that are called free, at all or up to a distance, and returns how many were.
+/// Traces rays through the triangles of a mesh in directions that are called free, at all or up to
+/// a distance, and returns how many were.
 fn check(mesh: &Mesh, rays: usize, seed: u64) -> usize {
     let both = [KeepFree::All, KeepFree::Distances];
     both.map(|keep| check_found(mesh, &found(mesh, keep).0, rays, seed)).into_iter().sum()
@@ -180,7 +183,8 @@ fn a_convex_solid_is_free_outside() {
             bins.count_ones()
         })
         .collect();
-    // Boxes reach beyond the solid, and what is small for its distance blocks bins close to the horizon without a proof.
+    // Boxes reach beyond the solid, and what is small for its distance blocks bins close to the
+    // horizon without a proof.
     let all = open.iter().filter(|bins| **bins == FreeBins::ALL.count_ones()).count();
     assert!(all * 3 >= open.len() * 2, "{all} of {} triangles are free in all directions", open.len());
     assert!(open.iter().all(|bins| bins * 3 >= FreeBins::ALL.count_ones() * 2), "{open:?}");
@@ -190,7 +194,8 @@ fn a_convex_solid_is_free_outside() {
 fn a_solid_that_is_inside_out_is_free_on_the_back() {
     let mut mesh = sphere(8, [0.0; 3]);
     mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
-    // On the back nothing is met at all; where before the front nothing is met up to some distance, that may be told instead.
+    // On the back nothing is met at all; where before the front nothing is met up to some distance,
+    // that may be told instead.
     let free = free_of(&mesh);
     let is_open = |t: usize| free.bins(t).0 & FreeBins::ALL == FreeBins::ALL;
     let is_told =
@@ -227,7 +232,7 @@ fn distant_triangles_block_beyond_their_distance_only() {
     for height in [0.01, 0.5, 1.0, 3.0, 10.0, 25.0, 50.0] {
         let mesh = weld(&[corners, above(height)]);
         let free = found(&mesh, KeepFree::Distances).0;
-        // The greatest level below the height, since nothing else is there.
+        // The largest level below the height, since nothing else is there.
         let levels = free.levels.map(f64::from);
         let expected =
             levels.into_iter().filter(|level| *level < f64::from(height) * 0.999).fold(0.0, f64::max);
@@ -329,7 +334,8 @@ fn what_no_ray_sees_does_not_count() {
 
 #[test]
 fn solids_are_seen_from_outside_and_rooms_from_within() {
-    // Large triangles that touch others are closed to the other side. Four corners of a tetrahedron, each face turned outwards.
+    // Large triangles that touch others are closed to the other side. Four corners of a
+    // tetrahedron, each face turned outwards.
     let [a, b, c, d] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let outwards = [[a, c, b], [a, b, d], [a, d, c], [b, c, d]];
     assert_eq!(found(&weld(&outwards), KeepFree::Auto).1.kept, Kept::Directions);

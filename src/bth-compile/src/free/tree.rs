@@ -7,7 +7,8 @@ use bth_import::Mesh;
 
 /// Bit of a child that is a block.
 pub(super) const BLOCK: u32 = 1 << 31;
-/// The greatest coordinate in absolute value: products of three differences of coordinates do not overflow.
+/// The largest coordinate in absolute value: products of three differences of coordinates do not
+/// overflow.
 const GREATEST: f32 = (1u64 << 36) as f32;
 
 /// The children of a node with their boxes. Lanes after the last child repeat its box.
@@ -76,7 +77,8 @@ fn is_block(binary: &BinaryBvh, node: u32) -> bool {
     binary.nodes[node as usize].count as usize <= LANES
 }
 
-/// At most sixteen nodes below a node, or the node itself if it is a block: the largest are replaced by their children.
+/// At most sixteen nodes below a node, or the node itself if it is a block: the largest are
+/// replaced by their children.
 fn children(binary: &BinaryBvh, node: u32) -> Vec<u32> {
     let mut found = vec![node];
     while found.len() < LANES {

@@ -1,8 +1,10 @@
-//! Whether free directions are worth their bytes: by what rays that meet the mesh from everywhere would know where they start again.
+//! Whether free directions are worth their bytes: by what rays that meet the mesh from everywhere
+//! would know where they start again.
 //!
-//! Many triangles of a mesh may be where no ray comes, as the inner ones of parts that stand in each other, and a room's walls are seen
-//! from one side. So triangles are not sampled by themselves, but by rays: from outside, as an object is seen, and from points within its
-//! box, as a room is.
+//! Many triangles of a mesh may be where no ray comes, as the inner ones of parts that stand in
+//! each other, and a room's walls are seen from one side. So triangles are not sampled by
+//! themselves, but by rays: from outside, as an object is seen, and from points within its box, as
+//! a room is.
 
 use super::frame::{beyond, share};
 use super::search::{Found, Surroundings};
@@ -20,10 +22,11 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeSet, HashMap};
 use std::fmt;
 
-/// Least share of directions beyond the first level, from outside and from within, for which [`super::KeepFree::Auto`] keeps anything.
+/// Smallest share of directions beyond the first level, from outside and from within, for which
+/// [`super::KeepFree::Auto`] keeps anything.
 const LEAST_OPEN: f64 = 0.5;
-/// Least share of free directions from outside for which it keeps them, and not distances alone. Terrain is met on its back by half of
-/// the lines, of which rows then tell nothing.
+/// Smallest share of free directions from outside for which it keeps them, and not distances alone.
+/// Terrain is met on its back by half of the lines, of which rows then tell nothing.
 const LEAST_FREE: f64 = 1.0 / 3.0;
 /// Rays of each kind: one for so many triangles, but at least and at most so many.
 const TRIANGLES_A_RAY: usize = 16;
@@ -31,12 +34,14 @@ const RAYS: [usize; 2] = [256, 2048];
 /// Rays from each point within the box.
 const RAYS_A_POINT: usize = 8;
 
-/// What is known, in the mean, of the directions from where rays meet the mesh, on the side that they meet.
+/// What is known, in the mean, of the directions from where rays meet the mesh, on the side that
+/// they meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Seen {
     /// Rays that meet the mesh.
     pub rays: u64,
-    /// Share of cosine-weighted directions in which certainly nothing is met within the distance of the first level.
+    /// Share of cosine-weighted directions in which certainly nothing is met within the distance of
+    /// the first level.
     pub open: f64,
 }
 
@@ -47,13 +52,14 @@ pub struct Worth {
     pub from_outside: Seen,
     /// By rays in uniform directions from uniform points of the box that are not in solids.
     pub from_within: Seen,
-    /// Share of cosine-weighted directions in which certainly nothing is met, where lines from outside meet the mesh; 0 where too few
-    /// are open, or where there is no room for free directions.
+    /// Share of cosine-weighted directions in which certainly nothing is met, where lines from
+    /// outside meet the mesh; 0 where too few are open, or where there is no room for free
+    /// directions.
     pub free: f64,
 }
 
 impl Worth {
-    /// Whether anything is worth its bytes.
+    /// Returns true if anything is worth its bytes.
     fn is_open(&self) -> bool {
         let kinds = [self.from_outside, self.from_within];
         kinds.iter().all(|seen| seen.rays == 0 || seen.open >= LEAST_OPEN)
@@ -62,7 +68,7 @@ impl Worth {
 }
 
 impl Worth {
-    /// Whether no ray was judged.
+    /// Returns true if no ray was judged.
     pub fn is_unmeasured(&self) -> bool {
         self.from_outside.rays == 0 && self.from_within.rays == 0
     }
@@ -130,8 +136,8 @@ pub(super) fn worth(
     Ok((if worth.free >= LEAST_FREE { Kept::Directions } else { Kept::Distances }, worth))
 }
 
-/// The triangles that rays in uniform directions meet from uniform points of the box, but not from points in solids, from which only backs
-/// are seen: what is in a room shows its front.
+/// The triangles that rays in uniform directions meet from uniform points of the box, but not from
+/// points in solids, from which only backs are seen: what is in a room shows its front.
 fn met_from_within(mesh: &Mesh, tree: &BinaryBvh, count: usize) -> Vec<Met> {
     let root = &tree.nodes[0];
     let rays = within(root.lower, root.upper, [count.div_ceil(RAYS_A_POINT), RAYS_A_POINT], 2);

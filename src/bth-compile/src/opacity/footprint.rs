@@ -1,17 +1,19 @@
-//! The state of a part of a triangle, decided conservatively from all texels that its texture coordinates can touch.
+//! The state of a part of a triangle, decided conservatively from all texels that its texture
+//! coordinates can touch.
 
 use super::texture::{Pyramid, Range, wrapped};
 use bth_format::layout::Opacity;
 use bth_import::{CutoutCorner, CutoutMaterial};
 
-/// Relative bound on the difference between the coordinates of texels here and those that a renderer computes in `f32` from
-/// the weights of the corners: eight roundings.
+/// Relative bound on the difference between the coordinates of texels here and those that a
+/// renderer computes in `f32` from the weights of the corners: eight roundings.
 const ROUNDING: f64 = 1.0 / (1 << 21) as f64;
 
 /// Relative bound on what rounding changes in a product of interpolated alpha.
 const PRODUCT_ROUNDING: f64 = 1.0 / (1u64 << 40) as f64;
 
-/// Rows of texels up to which a part is followed row by row; of larger ones the bounding box is taken.
+/// Rows of texels up to which a part is followed row by row; of larger ones the bounding box is
+/// taken.
 const MAX_ROWS: f64 = 64.0;
 
 /// Cells beyond this are not told apart well enough to be followed one by one.
@@ -26,8 +28,8 @@ pub(super) struct Surface<'a> {
 /// A triangle in the texels of its material.
 pub(super) struct Footprint<'a> {
     surface: &'a Surface<'a>,
-    /// Coordinates of the corners: the cell of texels between centers k and k + 1 (of the nearest texel: from edge k to edge
-    /// k + 1) goes from k to k + 1.
+    /// Coordinates of the corners: the cell of texels between centers k and k + 1 (of the nearest
+    /// texel: from edge k to edge k + 1) goes from k to k + 1.
     corners: [[f64; 2]; 3],
     /// Bound on rounding, in texels.
     margin: [f64; 2],
@@ -48,7 +50,7 @@ impl<'a> Footprint<'a> {
         }
     }
 
-    /// Whether all coordinates are numbers.
+    /// Returns true if all coordinates are numbers.
     pub(super) fn is_finite(&self) -> bool {
         self.corners.as_flattened().iter().all(|x| x.is_finite())
     }
@@ -61,8 +63,9 @@ impl<'a> Footprint<'a> {
         0.5 * cross.abs() + side(a, b).max(side(b, c)).max(side(c, a))
     }
 
-    /// State of a part of the triangle, whose corners are given by the weights of the triangle's second and third corner.
-    /// `thorough` follows it row by row where the bounding box does not decide.
+    /// State of a part of the triangle, whose corners are given by the weights of the triangle's
+    /// second and third corner. `thorough` follows it row by row where the bounding box does not
+    /// decide.
     pub(super) fn state(&self, part: [[f64; 2]; 3], thorough: bool) -> Opacity {
         let [a, b, c] = self.corners;
         let corners = part.map(|[u, v]| [0, 1].map(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k])));
@@ -142,7 +145,8 @@ fn bounds(corners: &[[f64; 2]; 3], axis: usize) -> [f64; 2] {
     [of(f64::min), of(f64::max)]
 }
 
-/// The least and greatest x of a triangle between two values of y; `None` where it has no point there.
+/// The smallest and largest x of a triangle between two values of y; `None` where it has no point
+/// there.
 fn across(corners: &[[f64; 2]; 3], [top, bottom]: [f64; 2]) -> Option<[f64; 2]> {
     let mut found: Option<[f64; 2]> = None;
     let mut add = |x: f64| {

@@ -1,10 +1,12 @@
-//! Where cut-out triangles let rays pass: cut-outs → a state for each triangle, or for each micro-triangle of it.
+//! Where cut-out triangles let rays pass: cut-outs → a state for each triangle, or for each
+//! micro-triangle of it.
 //!
-//! A part is opaque (transparent) only if alpha is at least (below) the cutoff at all of its points; the part includes its
-//! boundary. What is both, or not decided by the texels around it, is unknown. So the states are right for every sampling
-//! that interpolates the same texels; they cannot be right for mipmaps, which whether a ray hits must not depend on.
-//! The states follow opacity micromaps (VK_EXT_opacity_micromap; Gruen, Benthin and Woop, "Sub-triangle opacity masks for
-//! faster ray tracing of transparent objects", 2020).
+//! A part is opaque (transparent) only if alpha is at least (below) the cutoff at all of its
+//! points; the part includes its boundary. What is both, or not decided by the texels around it, is
+//! unknown. So the states are right for every sampling that interpolates the same texels; they
+//! cannot be right for mipmaps, which whether a ray hits must not depend on. The states follow
+//! opacity micromaps (VK_EXT_opacity_micromap; Gruen, Benthin and Woop, "Sub-triangle opacity masks
+//! for faster ray tracing of transparent objects", 2020).
 
 mod footprint;
 mod subdivide;
@@ -23,7 +25,8 @@ use std::collections::HashMap;
 use subdivide::{Pattern, Plan};
 use texture::Pyramid;
 
-/// Words of the micro-triangles of a mesh, before equal patterns are merged: 256 MiB. Beyond it levels are lowered.
+/// Words of the micro-triangles of a mesh, before equal patterns are merged: 256 MiB. Beyond it
+/// levels are lowered.
 const MAX_WORDS: usize = 1 << 26;
 
 /// Triangles whose patterns are made between two looks at whether the user cancelled.
@@ -90,7 +93,8 @@ pub fn compile(
     Ok(writer.finish())
 }
 
-/// The triangles that differ in more than their number, and for each triangle which of them it is like.
+/// The triangles that differ in more than their number, and for each triangle which of them it is
+/// like.
 fn distinct(triangles: &[CutoutTriangle]) -> (Vec<CutoutTriangle>, Vec<usize>) {
     let mut known = HashMap::new();
     let mut distinct = Vec::new();
@@ -105,7 +109,7 @@ fn distinct(triangles: &[CutoutTriangle]) -> (Vec<CutoutTriangle>, Vec<usize>) {
     (distinct, kinds)
 }
 
-/// The greatest level for which all patterns have room.
+/// The largest level for which all patterns have room.
 fn most_levels(plans: &[Plan]) -> u32 {
     let words = |most: u32| {
         let of = |plan: &Plan| match plan {

@@ -35,7 +35,8 @@ impl Pattern {
     }
 }
 
-/// A part of a subdivided triangle: the corner at (column, row) of those of its level, upright or upside down.
+/// A part of a subdivided triangle: the corner at (column, row) of those of its level, upright or
+/// upside down.
 #[derive(Clone, Copy)]
 struct Part {
     level: u32,
@@ -45,7 +46,8 @@ struct Part {
 }
 
 impl Part {
-    /// The number of its micro-triangle among those of its level; see [`bth_format::layout::micro_triangle`].
+    /// The number of its micro-triangle among those of its level; see
+    /// [`bth_format::layout::micro_triangle`].
     fn number(self) -> usize {
         let n = 1usize << self.level;
         let (i, j) = (self.column as usize, self.row as usize);
@@ -90,7 +92,7 @@ pub(super) fn plan(footprint: &Footprint<'_>) -> Plan {
     Plan::Micro((1..MAX_OPACITY_LEVEL).find(enough).unwrap_or(MAX_OPACITY_LEVEL))
 }
 
-/// The states of the micro-triangles of a level, at the least level that expresses them.
+/// The states of the micro-triangles of a level, at the smallest level that expresses them.
 pub(super) fn pattern(footprint: &Footprint<'_>, level: u32) -> Pattern {
     let mut states = vec![Opacity::Unknown as u8; 1 << (2 * level)];
     decide(footprint, level, ROOT, &mut states);

@@ -5,7 +5,8 @@ use bth_format::layout::{micro_corners, micro_triangle};
 use bth_import::{AlphaImage, CutoutCorner, CutoutMaterial, Silent, Wrap};
 use bth_random::Rng;
 
-/// Alpha of a material at texture coordinates by the definition (glTF 2.0 specification, §3.8.4 and §3.9.4), in f64.
+/// Alpha of a material at texture coordinates by the definition (glTF 2.0 specification, §3.8.4 and
+/// §3.9.4), in f64.
 pub(super) fn alpha_at(images: &[AlphaImage], material: &CutoutMaterial, uv: [f64; 2], vertex: f64) -> f64 {
     let Some(image) = material.image.map(|row| &images[row]) else { return material.factor * vertex };
     let size = [image.width, image.height].map(i64::from);
@@ -107,7 +108,8 @@ fn random_material(random: &mut Rng, images: usize) -> CutoutMaterial {
     }
 }
 
-/// Corners of every kind: small and large, far away, on one line, all at one point, at the edges of texels.
+/// Corners of every kind: small and large, far away, on one line, all at one point, at the edges of
+/// texels.
 fn random_corners(random: &mut Rng) -> [CutoutCorner; 3] {
     let scale = [0.05, 1.0, 6.0, 300.0, 1e6][random.below(5) as usize];
     let kind = random.below(6);

@@ -1,8 +1,8 @@
-//! The least and greatest alpha of rectangles of texels.
+//! The smallest and largest alpha of rectangles of texels.
 
 use bth_import::{AlphaImage, Wrap};
 
-/// Least and greatest value of some texels.
+/// Smallest and largest value of some texels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Range {
     pub(super) least: u8,
@@ -23,7 +23,8 @@ impl Range {
 /// Rows or columns of texels: the first and the last.
 pub(super) type Interval = [usize; 2];
 
-/// The ranges of an image's texels, of the squares of 2 by 2 of them, and so on up to the whole image.
+/// The ranges of an image's texels, of the squares of 2 by 2 of them, and so on up to the whole
+/// image.
 pub(super) struct Pyramid {
     /// From the image itself to one row of the whole: columns, rows and a range for each square.
     levels: Vec<(usize, usize, Vec<Range>)>,
@@ -55,8 +56,8 @@ impl Pyramid {
         self.levels.first().map_or([1; 2], |(width, height, _)| [*width, *height])
     }
 
-    /// The range of a rectangle of texels, joined to `found`. The search ends early, with some range between `found` and that,
-    /// once `enough` is true of a range.
+    /// The range of a rectangle of texels, joined to `found`. The search ends early, with some
+    /// range between `found` and that, once `enough` is true of a range.
     pub(super) fn range(
         &self,
         [columns, rows]: [Interval; 2],
@@ -103,8 +104,8 @@ impl Search<'_> {
     }
 }
 
-/// The texels of an axis that the numbers from `first` to `last` wrap to; `size` is the number of texels. What is no number
-/// wraps to all.
+/// The texels of an axis that the numbers from `first` to `last` wrap to; `size` is the number of
+/// texels. What is no number wraps to all.
 pub(super) fn wrapped(wrap: Wrap, first: f64, last: f64, size: usize) -> impl Iterator<Item = Interval> {
     let all = [0, size - 1];
     let n = size as f64;

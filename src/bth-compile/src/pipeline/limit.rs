@@ -1,16 +1,20 @@
-//! The limit on the bytes that tracing reads: the size of the BVH, which is determined before nodes are chosen, and the
-//! selection of the tetrahedralizations to leave out when they are larger than estimated.
+//! The limit on the bytes that tracing reads: the size of the BVH, which is determined before nodes
+//! are chosen, and the selection of the tetrahedralizations to leave out when they are larger than
+//! estimated.
 
-use super::object::{TracedMesh, TracedRef, collapse};
-use super::{CompileOptions, FileReport, Structure};
+use super::report::FileReport;
+use super::traced::{TracedMesh, TracedRef, collapse};
 use crate::costs::{self, Choice, ProbeReport, Weighed, least_useful};
 use crate::error::Result;
 use crate::monitor::Monitor;
+use crate::options::{CompileOptions, Structure};
+use crate::stage::Stage;
 use crate::{bvh, tets};
 use bth_format::layout::{FreeLevels, NONE, Object as Header};
 use bth_import::Mesh;
 
-/// How the tetrahedra of a mesh will be stored; under a limit on bytes also the size of the object without them.
+/// How the tetrahedra of a mesh will be stored; under a limit on bytes also the size of the object
+/// without them.
 ///
 /// # Errors
 /// A limit of the format, cancellation.
@@ -41,42 +45,53 @@ pub(super) fn bytes_per_triangle(options: &CompileOptions) -> Option<f64> {
     options.costs.max_bytes_per_triangle.filter(|_| options.structure == Structure::Bth)
 }
 
-/// Leaves out tetrahedralizations, those of least gain for a byte first, until tracing reads at most `most` bytes a
-/// triangle; all of them if the rest saves less than the least gain. The probe's report is updated.
-pub(super) fn fit(
-    traced: &TracedMesh,
-    most: f64,
-    mut leaves: Vec<tets::Leaf>,
-    (choice, mut probe): (&Choice, Option<&mut ProbeReport>),
-    options: &CompileOptions,
-    monitor: &dyn Monitor,
-) -> Result<Vec<tets::Leaf>> {
-    let traced = traced.by_ref();
-    let most = most * traced.mesh.triangles.len() as f64;
-    let before = leaves.len();
-    while !leaves.is_empty() {
-        let excess = bytes(traced, &leaves, options, monitor)? as f64 - most;
-        if excess <= 0.0 {
-            break;
-        }
-        let weigh = |(node, tets): &tets::Leaf| Weighed {
-            gain: gain(traced.tree, choice, probe.as_deref(), *node),
-            takes: tets::encoded_bytes(tets, options.record) as f64,
-        };
-        let items: Vec<Weighed> = leaves.iter().map(weigh).collect();
-        let out = least_useful(&items, excess);
-        let mut row = 0..;
-        leaves.retain(|_| row.next().is_some_and(|row| out.binary_search(&row).is_err()));
-    }
-    if let Some(probe) = &mut probe
-        && leaves.len() < before
-    {
-        follow(probe, &mut leaves, &options.costs);
-    }
-    Ok(leaves)
+/// Leaves out tetrahedralizations, the least useful for their bytes first, until tracing reads
+/// at most `most` bytes a triangle; all of them if the rest saves less than the smallest gain. The
+/// probe's report is updated.
+pub(super) struct FitLimit<'a> {
+    pub(super) traced: &'a TracedMesh,
+    pub(super) most: f64,
+    pub(super) leaves: Vec<tets::Leaf>,
+    pub(super) choice: &'a Choice,
+    pub(super) probe: Option<ProbeReport>,
+    pub(super) options: &'a CompileOptions,
 }
 
-/// Brings the probe's report up to date after leaves were left out, and leaves out the rest if it saves too little.
+impl Stage for FitLimit<'_> {
+    type Output = (Vec<tets::Leaf>, Option<ProbeReport>);
+    const NAME: &'static str = "limit";
+    const VERSION: &'static str = "1";
+
+    fn run(self, monitor: &dyn Monitor) -> Result<Self::Output> {
+        let Self { traced, most, mut leaves, choice, mut probe, options } = self;
+        let traced = traced.by_ref();
+        let most = most * traced.mesh.triangles.len() as f64;
+        let before = leaves.len();
+        while !leaves.is_empty() {
+            let excess = bytes(traced, &leaves, options, monitor)? as f64 - most;
+            if excess <= 0.0 {
+                break;
+            }
+            let weigh = |(node, tets): &tets::Leaf| Weighed {
+                gain: gain(traced.tree, choice, probe.as_ref(), *node),
+                takes: tets::encoded_bytes(tets, options.record) as f64,
+            };
+            let items: Vec<Weighed> = leaves.iter().map(weigh).collect();
+            let out = least_useful(&items, excess);
+            let mut row = 0..;
+            leaves.retain(|_| row.next().is_some_and(|row| out.binary_search(&row).is_err()));
+        }
+        if let Some(probe) = &mut probe
+            && leaves.len() < before
+        {
+            follow(probe, &mut leaves, &options.costs);
+        }
+        Ok((leaves, probe))
+    }
+}
+
+/// Brings the probe's report up to date after leaves were left out, and leaves out the rest if it
+/// saves too little.
 fn follow(probe: &mut ProbeReport, leaves: &mut Vec<tets::Leaf>, costs: &costs::CostOptions) {
     let is_left = |node: u32| leaves.iter().any(|(n, _)| *n == node);
     probe.leaves.iter_mut().for_each(|leaf| leaf.kept = leaf.kept && is_left(leaf.node));
@@ -120,8 +135,9 @@ fn bytes(
     Ok((rest + face_of_triangle + places) as u64 + tets.sum::<u64>())
 }
 
-/// The gain of a tet leaf as probed, or without a probe as estimated when the node was chosen. A cell of a chosen node that
-/// could not be built whole is assigned a share of the node's gain by its triangles.
+/// The gain of a tet leaf as probed, or without a probe as estimated when the node was chosen. A
+/// cell of a chosen node that could not be built whole is assigned a share of the node's gain by
+/// its triangles.
 fn gain(tree: &bvh::BinaryBvh, choice: &Choice, probe: Option<&ProbeReport>, node: u32) -> f64 {
     if let Some(probe) = probe {
         return probe.leaves.iter().find(|leaf| leaf.node == node).map_or(0.0, |leaf| leaf.gain);

@@ -1,6 +1,6 @@
 //! Reports of a compilation.
 
-use super::{Clock, StageTime};
+use crate::stage::{Clock, StageTime};
 use crate::{bvh, coordinates, costs, free, marks, tets};
 use bth_import as mesh;
 use serde::{Deserialize, Serialize};
@@ -51,16 +51,25 @@ pub struct FileReport {
     pub resident_bytes_per_triangle: f64,
 }
 
+/// How an object whose vertices move was compiled.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MotionReport {
+    /// Frames of the sequence.
+    pub frames: u64,
+    /// Poses over which the cost of the tree is summed.
+    pub poses: u32,
+    /// Bytes of the positions of all frames.
+    pub position_bytes: u64,
+}
+
 /// Reports of the stages between the mesh and the wide BVH; see [`CompileReport`].
+#[derive(Default)]
 pub(crate) struct StageReports {
-    coordinates: Option<coordinates::CoordinateReport>,
-    bvh: bvh::BvhReport,
-    pub(crate) free: Option<free::FreeReport>,
-    marks: Option<marks::MarkReport>,
-    costs: Option<costs::CostReport>,
-    pub(crate) tets: Option<tets::TetReport>,
-    probe: Option<costs::ProbeReport>,
-    collapse: bvh::CollapseReport,
+    pub(super) coordinates: Option<coordinates::CoordinateReport>,
+    pub(super) bvh: bvh::BvhReport,
+    pub(super) free: Option<free::FreeReport>,
+    pub(super) tets: TetReports,
+    pub(super) collapse: bvh::CollapseReport,
 }
 
 /// Reports of the stages that lead to tet leaves.
@@ -73,13 +82,10 @@ pub(super) struct TetReports {
 }
 
 impl StageReports {
-    pub(super) fn new(
-        coordinates: Option<coordinates::CoordinateReport>,
-        (bvh, free): (bvh::BvhReport, Option<free::FreeReport>),
-        TetReports { marks, costs, tets, probe }: TetReports,
-        collapse: bvh::CollapseReport,
-    ) -> Self {
-        Self { coordinates, bvh, free, marks, costs, tets, probe, collapse }
+    /// The status of the worker, if one was needed.
+    pub(crate) fn worker(&self) -> Option<&tets::WorkerStatus> {
+        let worker = self.tets.tets.as_ref().map(|report| &report.worker);
+        worker.filter(|worker| **worker != tets::WorkerStatus::NotNeeded)
     }
 }
 
@@ -91,7 +97,8 @@ impl CompileReport {
         stages: StageReports,
         file: FileReport,
     ) -> Self {
-        let StageReports { coordinates, bvh, free, marks, costs, tets, probe, collapse } = stages;
+        let StageReports { coordinates, bvh, free, tets, collapse } = stages;
+        let TetReports { marks, costs, tets, probe } = tets;
         let seconds = clock.into_times();
         Self {
             source_blake3,

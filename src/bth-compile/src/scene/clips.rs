@@ -1,7 +1,8 @@
-//! What the animation of a scene makes of the vertices of the objects that its skins and morph targets deform.
+//! What the animation of a scene makes of the vertices of the objects that its skins and morph
+//! targets deform.
 
 use super::encode;
-use crate::cached::HashedRows;
+use crate::cached::{HashedRows, Sink};
 use crate::error::Result;
 use crate::pipeline::PoseSource;
 use crate::write::SceneParts;
@@ -13,8 +14,8 @@ use bth_import::{Deformation, Mesh};
 use bth_scene::Manifest;
 use std::collections::HashMap;
 
-/// The clips of a scene's deformers: how each moves its object over all frames. A clip is named by a hash of all that it depends on
-/// besides the object, so deformers that do the same have one.
+/// The clips of a scene's deformers: how each moves its object over all frames. A clip is named by
+/// a hash of all that it depends on besides the object, so deformers that do the same have one.
 #[derive(Default)]
 pub(super) struct Clips {
     /// The scene's rows, with the numbers that objects have in the manifest.
@@ -26,7 +27,8 @@ pub(super) struct Clips {
 }
 
 impl Clips {
-    /// The clips of a manifest; `order` has parents before children, `visible` is as for [`encode::encode`].
+    /// The clips of a manifest; `order` has parents before children, `visible` is as for
+    /// [`encode::encode`].
     ///
     /// # Errors
     /// `BTH-L050` beyond the limits of the format.
@@ -52,7 +54,8 @@ impl Clips {
         self.of_object.get(&object).copied()
     }
 
-    /// The poses of a mesh in a clip; `None` if the mesh does not fit the deformer, which is an error found later.
+    /// The poses of a mesh in a clip; `None` if the mesh does not fit the deformer, which is an
+    /// error found later.
     pub(super) fn poses(&self, clip: &Digest, mesh: &Mesh) -> Option<ClipPoses<'_>> {
         let (parts, deformer) = (self.parts.as_ref()?, *self.deformers.get(clip)?);
         let deformation = mesh.deformation.clone()?;
@@ -174,7 +177,8 @@ mod tests {
     use super::*;
     use bth_scene::Transform;
 
-    /// A node "arm" under a node "body", which deforms an object by two targets, with a track of their weights.
+    /// A node "arm" under a node "body", which deforms an object by two targets, with a track of
+    /// their weights.
     const TEXT: &str = "version = 1\n\
         frames = { first = 0, last = 8, rate = 4 }\n\
         objects = [{ name = \"face\", model = \"face.gltf\", mesh = 0, deforms = true }]\n\

@@ -1,4 +1,5 @@
-//! The compilation of a manifest into a file: first the objects that may be visible, then the scene.
+//! The compilation of a manifest into a file: first the objects that may be visible, then the
+//! scene.
 
 use super::context::Context;
 use super::file_index::FileIndex;
@@ -8,15 +9,15 @@ use super::previous::Previous;
 use super::report::{ObjectReport, SceneReport};
 use super::{deformers, encode, known_rays, meshes, sources, visible};
 use crate::bvh::{BvhOptions, Quality};
-use crate::cached::{self, Cache, CachedCompilation, DryRun};
+use crate::cached::{self, Cache};
 use crate::costs;
 use crate::error::{self, Error, Result};
 use crate::free::FreeOptions;
 use crate::monitor::Monitor;
 use crate::options::{CompileOptions, Structure};
-use crate::pipeline::{Clock, Compiled, provenance};
+use crate::pipeline::{self, CachedCompilation, Compiled, DryRun, compile_or_fetch, joined};
 use crate::sampling::KnownRays;
-use crate::tets::WorkerStatus;
+use crate::stage::Clock;
 use crate::write::{self, Content, FileBuilder, SceneParts};
 use bth_cache::{Key, Record};
 use bth_files::Digest;
@@ -36,13 +37,10 @@ pub fn compile(
     options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<(Compiled, SceneReport)> {
-    let cache = Cache::none();
-    let context = Context::of(options, &cache, None, monitor);
-    let mut clock = Clock::default();
-    let plan = ScenePlan::of(manifest, folder, options, &mut clock)?;
-    let (content, report, _) = build(manifest, &plan, name, &context, clock)?;
-    warn_over_limit(&report.objects, options, monitor);
-    Ok((Compiled { bytes: cached::joined(&content)?.into_owned() }, report))
+    let (source, cache) = (SceneSource { folder, name }, Cache::none());
+    let policy = CachePolicy { whole: true, needed: &|_| true, target: None };
+    let (content, report) = compile_cached(manifest, source, options, &cache, policy, monitor)?.into_built();
+    Ok((Compiled { bytes: joined(&content)?.into_owned() }, report))
 }
 
 /// The folder and the name of a scene.
@@ -54,16 +52,17 @@ pub struct SceneSource<'a> {
     pub name: &'a Path,
 }
 
-/// The contents that the cache keeps of a scene besides its objects, and those that the caller needs.
+/// The contents that the cache keeps of a scene besides its objects, and those that the caller
+/// needs.
 #[derive(Clone, Copy)]
 pub struct CachePolicy<'a> {
-    /// Whether the cache keeps the whole file, so that it can be mapped. Else the file is assembled from its objects when
-    /// it is needed.
+    /// True if the cache keeps the whole file, so that it can be mapped. Else the file is assembled
+    /// from its objects when it is needed.
     pub whole: bool,
-    /// Whether the bytes of a file that the cache has are needed.
+    /// True if the bytes of a file that the cache has are needed.
     pub needed: &'a dyn Fn(&Record) -> bool,
-    /// The path to which the file will be written. Objects that have not changed are copied from an existing file of that
-    /// path.
+    /// The path to which the file will be written. Objects that have not changed are copied from an
+    /// existing file of that path.
     pub target: Option<&'a Path>,
 }
 
@@ -83,11 +82,24 @@ pub fn compile_cached(
     let mut clock = Clock::default();
     let plan = ScenePlan::of(manifest, source.folder, options, &mut clock)?;
     warn_of_flattened(manifest, monitor);
-    let key = key(manifest, &plan, &context)?;
-    let outcome = cached::compile_or_fetch(cache, key.as_ref(), policy.needed, monitor, |monitor| {
+    through_cache(manifest, &plan, source.name, &context, clock, policy)
+}
+
+/// Takes the file of a plan from the cache, or builds and keeps it.
+pub(super) fn through_cache(
+    manifest: &Manifest,
+    plan: &ScenePlan<'_>,
+    name: &Path,
+    context: &Context<'_>,
+    clock: Clock,
+    policy: CachePolicy<'_>,
+) -> Result<CachedCompilation<SceneReport>> {
+    let Context { options, cache, monitor, .. } = *context;
+    let key = key(manifest, plan, context)?;
+    let outcome = compile_or_fetch(cache, key.as_ref(), policy.needed, monitor, |monitor| {
         let mut context = context.with_monitor(monitor);
         context.previous = previous(policy.target, &context);
-        let (content, report, index) = build(manifest, &plan, source.name, &context, clock)?;
+        let (content, report, index) = build(manifest, plan, name, &context, clock)?;
         if policy.target.is_some() && !options.costs.for_scene {
             keep_index(&content.name(), &index, &context);
         }
@@ -112,7 +124,7 @@ fn warn_of_flattened(manifest: &Manifest, monitor: &dyn Monitor) {
 }
 
 /// Warns if objects are over the limit on bytes.
-pub(super) fn warn_over_limit(objects: &[ObjectReport], options: &CompileOptions, monitor: &dyn Monitor) {
+fn warn_over_limit(objects: &[ObjectReport], options: &CompileOptions, monitor: &dyn Monitor) {
     let Some(most) = options.costs.max_bytes_per_triangle else { return };
     let each = |o: &ObjectReport| o.resident_bytes as f64 / o.triangles.max(1) as f64;
     let over: Vec<&ObjectReport> = objects.iter().filter(|o| each(o) > most).collect();
@@ -127,8 +139,8 @@ pub(super) fn warn_over_limit(objects: &[ObjectReport], options: &CompileOptions
     ));
 }
 
-/// Compiles part `shard.0` (from 1) of `shard.1` parts of a scene's objects into the cache. Returns the number of objects
-/// in this part.
+/// Compiles part `shard.0` (from 1) of `shard.1` parts of a scene's objects into the cache. Returns
+/// the number of objects in this part.
 ///
 /// # Errors
 /// As [`compile_cached`].
@@ -155,7 +167,8 @@ pub fn compile_objects(
     Ok(objects.reports.len() as u64)
 }
 
-/// What [`compile_cached`] would do; `target` as in [`CachePolicy`]. Only reads and hashes the sources.
+/// What [`compile_cached`] would do; `target` as in [`CachePolicy`]. Only reads and hashes the
+/// sources.
 ///
 /// # Errors
 /// When a source cannot be read.
@@ -185,8 +198,8 @@ pub fn dry_run(
     Ok(found)
 }
 
-/// The file of an earlier compilation at the target. Not used where the scene's rays weight the costs, because an object
-/// then depends on all others.
+/// The file of an earlier compilation at the target. Not used where the scene's rays weight the
+/// costs, because an object then depends on all others.
 fn previous(target: Option<&Path>, context: &Context<'_>) -> Option<Arc<Previous>> {
     let target = target.filter(|_| !context.options.costs.for_scene)?;
     let tetgen = context.tetgen.as_ref()?;
@@ -196,13 +209,13 @@ fn previous(target: Option<&Path>, context: &Context<'_>) -> Option<Arc<Previous
 /// Keeps the index of a file under the name of its content.
 fn keep_index(named: &Digest, index: &FileIndex, context: &Context<'_>) {
     if let Some(tetgen) = &context.tetgen {
-        let key = cached::file_index(named, context.options, tetgen);
+        let key = pipeline::file_index(named, context.options, tetgen);
         context.cache.put_here(&key, &cached::encode(index), context.monitor);
     }
 }
 
 /// The key of a scene, if it may be kept.
-pub(super) fn key(manifest: &Manifest, plan: &ScenePlan<'_>, context: &Context<'_>) -> Result<Option<Key>> {
+fn key(manifest: &Manifest, plan: &ScenePlan<'_>, context: &Context<'_>) -> Result<Option<Key>> {
     let Some(tetgen) = &context.tetgen else { return Ok(None) };
     let as_they_are: Vec<_> = (0..manifest.objects.len() as u32).map(Some).collect();
     let parts = encode::encode(manifest, &plan.order, &plan.visible, &as_they_are)?;
@@ -210,11 +223,11 @@ pub(super) fn key(manifest: &Manifest, plan: &ScenePlan<'_>, context: &Context<'
     if context.options.names {
         contents.extend(manifest.objects.iter().map(|object| object.name.clone()));
     }
-    Ok(Some(cached::scene(&parts, &contents, context.options, tetgen)))
+    Ok(Some(pipeline::scene(&parts, &contents, context.options, tetgen)))
 }
 
 /// Compiles the objects and assembles the file.
-pub(super) fn build(
+fn build(
     manifest: &Manifest,
     plan: &ScenePlan<'_>,
     name: &Path,
@@ -240,11 +253,7 @@ pub(super) fn build(
     deformers::check(manifest, &objects.number, name, &|object| objects.deformation(object))?;
     let parts = encode::encode(manifest, &plan.order, &plan.visible, &objects.number)?;
 
-    let tetgen = match &objects.worker {
-        Some(WorkerStatus::Ready { tetgen }) => Some(tetgen.as_str()),
-        _ => None,
-    };
-    let provenance = provenance::of_scene(&objects.sources, tetgen, options)?;
+    let provenance = pipeline::provenance_of_scene(&objects.sources, objects.worker.as_ref(), options)?;
     let (content, index) = clock.time("file", || {
         let mut builder = FileBuilder::new();
         objects.write(&mut builder)?;
@@ -287,7 +296,7 @@ fn report(
         first_frame: manifest.frames.first,
         last_frame: manifest.frames.last,
         rate: manifest.frames.rate,
-        triangles: objects.reports.iter().filter(|o| o.segment_from.is_none()).map(|o| o.triangles).sum(),
+        triangles: objects.reports.iter().map(|o| o.triangles).sum(),
         instanced_triangles: parts.instances.iter().map(|i| triangles(i.object)).sum(),
         bytes,
         resident_bytes: objects.reports.iter().map(|o| o.resident_bytes).sum(),
@@ -296,22 +305,25 @@ fn report(
     }
 }
 
-/// Checks the first frame as a reader does. The sections of the objects have been checked one by one before, so the check
-/// reads a file with their OBJECT rows only; the whole file where objects deform.
+/// Checks the first frame as a reader does. The sections of the objects have been checked one by
+/// one before, so the check reads a file with their OBJECT rows only; the whole file where objects
+/// deform.
 fn check(objects: &Objects, parts: &SceneParts, content: &Content, name: &Path) -> Result<()> {
     if !parts.deformers.deformers.is_empty() {
-        return bth::from_bytes(&cached::joined(content)?).map(drop).map_err(|e| refused(name, &e));
+        return bth::from_bytes(&joined(content)?).map(drop).map_err(|e| refused(name, &e));
     }
     let mut rows_only = FileBuilder::new();
     objects.write_rows(&mut rows_only)?;
     write::scene(&mut rows_only, parts)?;
     let first_frame = |bytes: &[u8]| bth::check_first_frame(&bth_format::File::from_bytes(bytes)?);
-    // The error is replaced by that of the whole file, so that offsets in messages are those of the whole file.
+    // The error is replaced by that of the whole file, so that offsets in messages are those of the
+    // whole file.
     let whole = |error| content.bytes().ok().and_then(|bytes| first_frame(&bytes).err()).unwrap_or(error);
     first_frame(&rows_only.finish()).map_err(|e| refused(name, &whole(e)))
 }
 
-/// The rays of the scene that reach each object of the file, traced through a file that is compiled for that: with BVHs that are quickly built.
+/// The rays of the scene that reach each object of the file, traced through a file that is compiled
+/// for that: with BVHs that are quickly built.
 fn rays(
     manifest: &Manifest,
     plan: &ScenePlan<'_>,
@@ -333,12 +345,12 @@ fn rays(
     let tetgen = context.tetgen.as_ref().map(|_| String::new());
     let plain = Context::of(&options, cache, tetgen, monitor);
     let (content, ..) = build(manifest, plan, name, &plain, Clock::default())?;
-    let mut scene = bth::from_bytes(&cached::joined(&content)?).map_err(|e| refused(name, &e))?;
+    let mut scene = bth::from_bytes(&joined(&content)?).map_err(|e| refused(name, &e))?;
     Ok(known_rays::known_rays(&mut scene, name)?.into_iter().map(Arc::new).collect())
 }
 
-/// The error for a file that fails the reader's check: an input error when the first frame cannot be shown, else a defect
-/// of the compiler.
+/// The error for a file that fails the reader's check: an input error when the first frame cannot
+/// be shown, else a defect of the compiler.
 fn refused(name: &Path, error: &bth::Error) -> Error {
     match error.code() {
         bth::Code::Singular | bth::Code::NotFinite => Error::Input {

@@ -1,10 +1,11 @@
 //! What all parts of a scene's compilation share.
 
 use super::previous::Previous;
-use crate::cached::{self, Cache, ObjectKeys};
+use crate::cached::Cache;
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::options::CompileOptions;
+use crate::pipeline::{ObjectKeys, tetgen_in_keys};
 use crate::sampling::KnownRays;
 use std::sync::Arc;
 
@@ -33,7 +34,7 @@ impl<'a> Context<'a> {
         cache: &'a Cache<'a>,
         monitor: &'a dyn Monitor,
     ) -> Result<Self> {
-        Ok(Self::of(options, cache, cached::tetgen_in_keys(options, cache, monitor)?, monitor))
+        Ok(Self::of(options, cache, tetgen_in_keys(options, cache, monitor)?, monitor))
     }
 
     /// The context of a compilation whose tetrahedralizer is known.

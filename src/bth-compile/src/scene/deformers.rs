@@ -1,4 +1,5 @@
-//! The rows of deformers and skins, from a manifest, and whether they fit the objects that they deform.
+//! The rows of deformers and skins, from a manifest, and whether they fit the objects that they
+//! deform.
 
 use crate::error::{Error, Place, Result};
 use crate::write::DeformerParts;
@@ -9,8 +10,8 @@ use std::path::Path;
 /// The identity, as rows of four.
 const IDENTITY: [[f64; 4]; 3] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
-/// Encodes the deformers of objects that are in the file, with all skins if there are any such. `row_of` gives the rows of
-/// nodes, `objects` the numbers of objects in the file.
+/// Encodes the deformers of objects that are in the file, with all skins if there are any such.
+/// `row_of` gives the rows of nodes, `objects` the numbers of objects in the file.
 pub(super) fn encode(manifest: &Manifest, row_of: &[u32], objects: &[Option<u32>]) -> DeformerParts {
     let used = manifest.deformers.iter().filter_map(|d| Some((d, objects[d.object]?)));
     let mut used: Vec<_> = used.collect();
@@ -43,8 +44,8 @@ pub(super) fn encode(manifest: &Manifest, row_of: &[u32], objects: &[Option<u32>
     parts
 }
 
-/// Refuses deformers that do not fit their objects. `deformation` gives for an object of the file what can move its vertices;
-/// `name` is that of the scene in messages.
+/// Refuses deformers that do not fit their objects. `deformation` gives for an object of the file
+/// what can move its vertices; `name` is that of the scene in messages.
 ///
 /// # Errors
 /// `BTH-I052`, with the node of the deformer.

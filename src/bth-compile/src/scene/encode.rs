@@ -2,13 +2,13 @@
 
 use super::deformers;
 use crate::error::{Error, Result};
-use crate::write::SceneParts;
+use crate::write::{Names, SceneParts};
 use bth_format::layout as on_disk;
 use bth_format::layout::NONE;
 use bth_scene::{Lens, LightKind, Manifest, Track, Transform};
-use std::collections::HashMap;
 
-/// The order of the nodes with parents before children: that of the manifest where it has this property, else by depth.
+/// The order of the nodes with parents before children: that of the manifest where it has this
+/// property, else by depth.
 pub(super) fn order(manifest: &Manifest) -> Vec<usize> {
     let nodes = &manifest.nodes;
     let mut order: Vec<usize> = (0..nodes.len()).collect();
@@ -33,28 +33,9 @@ pub(super) fn order(manifest: &Manifest) -> Vec<usize> {
     order
 }
 
-/// The bytes of the section NAMES, which contains each name once.
-#[derive(Default)]
-struct Names<'a> {
-    bytes: Vec<u8>,
-    found: HashMap<&'a str, u32>,
-}
-
-impl<'a> Names<'a> {
-    /// Adds a name. Returns its first byte and its length.
-    fn add(&mut self, name: &'a str) -> (u32, u32) {
-        let bytes = &mut self.bytes;
-        let first = *self.found.entry(name).or_insert_with(|| {
-            let first = bytes.len() as u32;
-            bytes.extend_from_slice(name.as_bytes());
-            first
-        });
-        (first, name.len() as u32)
-    }
-}
-
-/// Encodes the scene sections. `objects` gives the object of the file for each of the manifest, `None` for those that no
-/// instance uses; `visible` tells for each node whether it may be seen; instances at other nodes are left out.
+/// Encodes the scene sections. `objects` gives the object of the file for each of the manifest,
+/// `None` for those that no instance uses; `visible` tells for each node whether it may be seen;
+/// instances at other nodes are left out.
 ///
 /// # Errors
 /// `BTH-L050` beyond the limits of the format.
@@ -112,7 +93,7 @@ pub(super) fn encode(
 }
 
 /// Adds the cameras.
-fn add_cameras<'a>(parts: &mut SceneParts, names: &mut Names<'a>, manifest: &'a Manifest, row_of: &[u32]) {
+fn add_cameras(parts: &mut SceneParts, names: &mut Names, manifest: &Manifest, row_of: &[u32]) {
     for camera in &manifest.cameras {
         let (name, name_length) = names.add(&camera.name);
         let (projection, size) = match camera.lens {
@@ -134,7 +115,7 @@ fn add_cameras<'a>(parts: &mut SceneParts, names: &mut Names<'a>, manifest: &'a 
 }
 
 /// Adds the lights.
-fn add_lights<'a>(parts: &mut SceneParts, names: &mut Names<'a>, manifest: &'a Manifest, row_of: &[u32]) {
+fn add_lights(parts: &mut SceneParts, names: &mut Names, manifest: &Manifest, row_of: &[u32]) {
     for light in &manifest.lights {
         let (name, name_length) = names.add(&light.name);
         let (kind, inner, outer) = match light.kind {

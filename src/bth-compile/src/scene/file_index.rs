@@ -1,8 +1,8 @@
-//! The index of a scene file: its objects, their sections, and the hashes of the sources of each. By it the next
-//! compilation copies unchanged objects from the file.
+//! The index of a scene file: its objects, their sections, and the hashes of the sources of each.
+//! By it the next compilation copies unchanged objects from the file.
 
 use super::report::ObjectReport;
-use crate::cached::{Codec, RowReader, RowWriter};
+use crate::cached::{Codec, RowReader, Sink};
 use crate::tets::WorkerStatus;
 use bth_format::layout as on_disk;
 use bth_format::layout::ALIGNMENT;
@@ -116,7 +116,7 @@ impl FileIndex {
         }
     }
 
-    /// Whether all rows are in range and each object's sections follow each other.
+    /// Returns true if all rows are in range and each object's sections follow each other.
     fn is_valid(&self) -> bool {
         let sections = |row: &ObjectRow| {
             let end = row.first.checked_add(row.sections)?;
@@ -138,7 +138,7 @@ impl FileIndex {
 }
 
 impl Codec for FileIndex {
-    fn write(&self, to: &mut RowWriter) {
+    fn write(&self, to: &mut impl Sink) {
         to.add(&self.objects);
         to.add(&self.sections);
         to.add(&self.parts);

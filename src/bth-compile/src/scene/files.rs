@@ -7,7 +7,8 @@ use bth_import::Looks;
 use bth_scene::Manifest;
 use std::path::{Path, PathBuf};
 
-/// All files that a scene is made from whose manifest was read from `path`: the manifest, then the models and those to which they refer.
+/// All files that a scene is made from whose manifest was read from `path`: the manifest, then the
+/// models and those to which they refer.
 ///
 /// # Errors
 /// `BTH-O001` when a model that is there cannot be read.

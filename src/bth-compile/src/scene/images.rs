@@ -11,7 +11,8 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Adds the images that textures of the objects refer to, from the files of their sources.
 ///
 /// # Errors
-/// `BTH-O002` where a file has changed since its materials were read, so that an image is not there any more.
+/// `BTH-O002` where a file has changed since its materials were read, so that an image is not there
+/// any more.
 pub(super) fn write(
     builder: &mut FileBuilder<'_>,
     sources: &[File<'_>],

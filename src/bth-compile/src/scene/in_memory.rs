@@ -1,19 +1,19 @@
 //! The compilation of a scene whose meshes and instances are in memory.
 
-use super::compile::{build, key, warn_over_limit};
+use super::compile::{CachePolicy, through_cache};
 use super::context::Context;
 use super::plan::ScenePlan;
-use super::report::{ObjectReport, SceneReport};
+use super::report::SceneReport;
 use super::sources::{File, SourcePart};
-use crate::cached::{self, Cache, CachedCompilation};
+use crate::cached::Cache;
 use crate::error::{Error, Place, Result};
 use crate::monitor::Monitor;
 use crate::options::CompileOptions;
-use crate::pipeline::Clock;
+use crate::pipeline::CachedCompilation;
 use crate::source::{SourceDigest, TriangleMesh};
+use crate::stage::Clock;
 use bth_scene::{Manifest, Node, Object, Source, Transform};
 use rayon::prelude::*;
-use serde::Deserialize;
 use std::path::Path;
 
 /// A mesh at a place in the world.
@@ -21,8 +21,8 @@ use std::path::Path;
 pub struct Instance {
     /// Row of the mesh.
     pub mesh: u32,
-    /// Rows of the transform from the mesh's space to the world, applied to columns (x, y, z, 1): finite and either
-    /// invertible or, for an invisible instance, without size.
+    /// Rows of the transform from the mesh's space to the world, applied to columns (x, y, z, 1):
+    /// finite and either invertible or, for an invisible instance, without size.
     pub to_world: [[f64; 4]; 3],
 }
 
@@ -42,15 +42,8 @@ pub(crate) fn compile_meshes(
     let context = Context::new(options, cache, monitor)?;
     let mut clock = Clock::default();
     let plan = plan(&manifest, meshes, &mut clock);
-    let key = key(&manifest, &plan, &context)?;
-    let outcome = cached::compile_or_fetch(cache, key.as_ref(), &|_| true, monitor, |monitor| {
-        let context = context.with_monitor(monitor);
-        let (content, report, _) = build(&manifest, &plan, Path::new(SCENE_NAME), &context, clock)?;
-        Ok((content, report, false))
-    })?;
-    let objects = Vec::<ObjectReport>::deserialize(&outcome.report["objects"]).unwrap_or_default();
-    warn_over_limit(&objects, options, monitor);
-    Ok(outcome)
+    let policy = CachePolicy { whole: false, needed: &|_| true, target: None };
+    through_cache(&manifest, &plan, Path::new(SCENE_NAME), &context, clock, policy)
 }
 
 /// Refuses instances of no mesh and transforms that are not finite.
@@ -91,8 +84,8 @@ fn manifest(meshes: usize, instances: &[Instance]) -> Manifest {
     }
 }
 
-/// The plan of a manifest made by [`manifest`]. All instances count as visible: if one without size were left out, those behind it
-/// would be renumbered.
+/// The plan of a manifest made by [`manifest`]. All instances count as visible: if one without size
+/// were left out, those behind it would be renumbered.
 fn plan<'a>(manifest: &'a Manifest, meshes: &[TriangleMesh<'a>], clock: &mut Clock) -> ScenePlan<'a> {
     let count = manifest.nodes.len();
     let mut used = vec![false; meshes.len()];

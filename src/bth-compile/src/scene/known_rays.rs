@@ -1,5 +1,5 @@
-//! The objects and triangles that the rays of a scene hit (`--for-scene`): rays from its cameras at some of its frames,
-//! bounces from what they hit, and rays from there to its lights.
+//! The objects and triangles that the rays of a scene hit (`--for-scene`): rays from its cameras at
+//! some of its frames, bounces from what they hit, and rays from there to its lights.
 
 use crate::error::{Error, Place, Result};
 use crate::sampling::{KnownRays, SampleRay};
@@ -11,13 +11,14 @@ use bth_random::Rng;
 use glam::DVec3;
 use std::path::Path;
 
-/// Greatest number of frames, which are spread evenly over the range, and columns and rows of the grid of camera rays at
-/// each frame.
+/// Largest number of frames, which are spread evenly over the range, and columns and rows of the
+/// grid of camera rays at each frame.
 const FRAMES: i64 = 8;
 const GRID: [u32; 2] = [96, 54];
 /// Bounces after a camera ray.
 const BOUNCES: usize = 2;
-/// Offset of ray origins from the surface that they start on, relative to the magnitude of the coordinates there.
+/// Offset of ray origins from the surface that they start on, relative to the magnitude of the
+/// coordinates there.
 const VISIBILITY_LIFT: f64 = 1e-5;
 
 type Rows = [[f64; 4]; 3];
@@ -113,7 +114,8 @@ fn ray(origin: DVec3, direction: DVec3, tmax: f64) -> Option<Ray> {
     finite.then(|| Ray { origin: single(origin), tmin: 0.0, direction: single(direction), tmax: tmax as f32 })
 }
 
-/// Traces camera rays, their bounces and the shadow rays, and records each at the objects that it starts on and hits.
+/// Traces camera rays, their bounces and the shadow rays, and records each at the objects that it
+/// starts on and hits.
 fn follow(scene: &Scene, camera_rays: Vec<Ray>, lights: &[Light], random: &mut Rng, known: &mut [KnownRays]) {
     let mut rays: Vec<(Ray, PrimitiveRef)> =
         camera_rays.into_iter().map(|ray| (ray, PrimitiveRef::NONE)).collect();
@@ -146,7 +148,8 @@ fn follow(scene: &Scene, camera_rays: Vec<Ray>, lights: &[Light], random: &mut R
     }
 }
 
-/// Origin of the rays that follow a hit, offset from the surface, and the normal on that side; world space.
+/// Origin of the rays that follow a hit, offset from the surface, and the normal on that side;
+/// world space.
 fn start(scene: &Scene, ray: &Ray, hit: &Hit) -> Option<(DVec3, DVec3)> {
     if !hit.is_hit() {
         return None;
@@ -171,7 +174,8 @@ fn record(scene: &Scene, ray: &Ray, from: PrimitiveRef, hit: &Hit, known: &mut [
     {
         known[scene.object_of(from.instance) as usize].surface.push(sample);
     }
-    // A ray from elsewhere is recorded only at the object that it hits, not at objects that it misses.
+    // A ray from elsewhere is recorded only at the object that it hits, not at objects that it
+    // misses.
     if hit.is_hit()
         && hit.primitive.instance != from.instance
         && let Some(sample) = local(scene, ray, hit.primitive.instance, None)

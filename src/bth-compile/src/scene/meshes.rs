@@ -1,20 +1,20 @@
 //! The meshes of a source file, from the cache or imported.
 
 use super::context::Context;
-use super::object_key::object_key;
 use super::of_file::OfFile;
 use super::sources::{File, SourcePart};
 use crate::cached::{self, MeshSummary, Miss};
 use crate::error::Result;
 use crate::monitor::{Monitor, Recording};
 use crate::opacity;
+use crate::pipeline::{Import, ObjectKeys};
 use crate::source::TriangleMesh;
 use bth_cache::Key;
-use bth_files::Digest;
 use bth_import::{self as mesh, GltfPart, Mesh};
 use serde::Deserialize;
 
-/// A mesh of a source. The mesh itself is absent while the cache has it; the summary is always present.
+/// A mesh of a source. The mesh itself is absent while the cache has it; the summary is always
+/// present.
 pub(super) struct SourceMesh {
     pub(super) summary: MeshSummary,
     /// The part of the file.
@@ -62,8 +62,8 @@ pub(super) fn read(file: &File<'_>, context: &Context<'_>) -> Result<Vec<SourceM
 }
 
 impl SourceMesh {
-    /// What to warn of where elements of the source became no triangles. It is not kept with the mesh: reports on single models have
-    /// the number.
+    /// What to warn of where elements of the source became no triangles. It is not kept with the
+    /// mesh: reports on single models have the number.
     fn left_out(&self) -> Option<String> {
         let count = Some(self.summary.report.skipped).filter(|count| *count > 0)?;
         let of = self.part.gltf().map_or_else(String::new, |_| format!("{}: ", self.part.name()));
@@ -91,7 +91,17 @@ impl SourceMesh {
 }
 
 fn key(file: &File<'_>, part: SourcePart, context: &Context<'_>) -> Key {
-    cached::mesh(&file.digest, &file.full, &file.part(part), context.options.wanted())
+    Import::key_of(&file.digest, &file.full, &file.part(part), context.options.wanted())
+}
+
+/// The key of an object, if it may be kept, whose costs the scene's rays do not weight.
+pub(super) fn object_key(mesh: &MeshSummary, part: SourcePart, context: &Context<'_>) -> Option<Key> {
+    if !mesh.deforms() {
+        return context.keys.as_ref().map(|keys| keys.of(mesh, None));
+    }
+    let options = context.options.of_deforming();
+    let clip = part.clip();
+    context.tetgen.as_ref().map(|tetgen| ObjectKeys::new(&options, tetgen).of(mesh, clip.as_ref()))
 }
 
 /// A mesh that the cache has.
@@ -117,7 +127,7 @@ pub(super) fn missing(file: &File<'_>, context: &Context<'_>) -> Vec<Miss> {
         let old = context
             .previous
             .as_ref()
-            .and_then(|p| Some((p, p.index.object_of(content(&summary, source_part).as_bytes())?)));
+            .and_then(|p| Some((p, p.index.object_of(summary.content(source_part.clip()).as_bytes())?)));
         if old.is_some_and(|(previous, object)| previous.has(object)) {
             return None;
         }
@@ -129,24 +139,6 @@ pub(super) fn missing(file: &File<'_>, context: &Context<'_>) -> Vec<Miss> {
         Some(Miss { stage: object.stage().to_owned(), part, because })
     };
     file.parts.iter().filter_map(|(part, _)| one(*part)).collect()
-}
-
-/// A hash of the content of a mesh and of what poses it, which does not depend on the file of the mesh.
-pub(super) fn content(mesh: &MeshSummary, part: SourcePart) -> blake3::Hash {
-    let clip = part.clip().map_or_else(String::new, |clip| format!(" clip {}", clip.hex()));
-    let shading = mesh.shading.as_ref().map(Digest::hex);
-    let opacity =
-        mesh.opacity.as_ref().map_or_else(String::new, |opacity| format!(" opacity {}", opacity.hex()));
-    let groups = mesh.groups.as_ref().map_or_else(String::new, |groups| format!(" groups {}", groups.hex()));
-    let materials = mesh.materials.as_ref();
-    let materials = materials.map_or_else(String::new, |materials| format!(" materials {}", materials.hex()));
-    let deformation =
-        mesh.deformation.as_ref().map_or_else(String::new, |d| format!(" deformation {}", d.hex()));
-    let sequence = mesh.sequence.as_ref().map_or_else(String::new, |s| format!(" sequence {}", s.hex()));
-    let geometry = mesh.geometry.hex();
-    let text =
-        format!("mesh {geometry} {shading:?}{opacity}{groups}{materials}{deformation}{sequence}{clip}");
-    blake3::hash(text.as_bytes())
 }
 
 /// Adds the opacity of triangles to meshes of a file: the whole file's without parts.

@@ -1,8 +1,11 @@
-//! The compilation of scenes: manifest → plan (visible nodes, source files) → meshes → objects → file.
+//! The compilation of scenes: manifest → plan (visible nodes, source files) → meshes → objects →
+//! file.
 //!
-//! `compile` is the entry, `in_memory` that for meshes in memory; `objects` compiles all objects and `object` one; `sources` and `meshes` read the source files, `of_file` names them in warnings; `clips` gives the
-//! poses of objects that skins and morph targets deform;
-//! `previous`, `file_index` and `sections` reuse the file of an earlier compilation; `encode` lays out the scene itself.
+//! `compile` is the entry, `in_memory` that for meshes in memory; `objects` compiles all objects
+//! and `object` one; `sources` and `meshes` read the source files, `of_file` names them in
+//! warnings; `clips` gives the poses of objects that skins and morph targets deform; `previous`,
+//! `file_index` and `sections` reuse the file of an earlier compilation; `encode` lays out the
+//! scene itself.
 
 mod clips;
 mod compile;
@@ -17,7 +20,6 @@ mod known_rays;
 mod meshes;
 mod moving;
 mod object;
-mod object_key;
 mod objects;
 mod of_file;
 mod parallel;

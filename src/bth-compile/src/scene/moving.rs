@@ -1,8 +1,8 @@
 //! Sources of meshes whose vertices move: numbered files, and models with a vertex cache.
 
 use super::context::Context;
-use crate::cached;
 use crate::error::Result;
+use crate::pipeline;
 use crate::source::{SourceDigest, changed};
 use bth_files::Digest;
 use bth_import::{self as mesh, Looks, Mesh, Timing};
@@ -13,12 +13,13 @@ use std::path::{Path, PathBuf};
 pub(super) struct Moving {
     /// The files: the frames, or a model and its vertex cache.
     files: Vec<PathBuf>,
-    /// Whether the second file is a vertex cache.
+    /// True if the second file is a vertex cache.
     is_cache: bool,
     timing: Timing,
 }
 
-/// The files whose contents an object is made from, in order; empty for objects whose vertices do not move by themselves.
+/// The files whose contents an object is made from, in order; empty for objects whose vertices do
+/// not move by themselves.
 ///
 /// # Errors
 /// As [`mesh::sequence_files`].
@@ -71,7 +72,7 @@ impl Moving {
     pub(super) fn part(&self) -> String {
         let kind = if self.is_cache { "vertex cache" } else { "sequence" };
         let Timing { rate, usual_rate, start } = self.timing;
-        format!("{kind} rate {rate:?} of {usual_rate:?} start {start:?} motion {}", cached::MOTION)
+        format!("{kind} rate {rate:?} of {usual_rate:?} start {start:?} motion {}", pipeline::MOTION)
     }
 
     /// Reads the mesh with its frames. `digest` is what [`Self::digest`] gave before.

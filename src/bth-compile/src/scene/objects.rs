@@ -1,4 +1,5 @@
-//! The objects of a scene: each source is read once, equal geometry is stored once, and several are compiled in parallel.
+//! The objects of a scene: each source is read once, equal geometry is stored once, and several are
+//! compiled in parallel.
 
 use super::context::Context;
 use super::file_index::{FileIndex, Hash, ObjectRow, PartRow, SectionRow};
@@ -6,13 +7,13 @@ use super::meshes;
 use super::object::{self, BuiltObject};
 use super::of_file::OfFile;
 use super::parallel::run_parallel;
-use super::places::{Part, Places, Stored, Task, place_of};
+use super::places::{Part, Places, Task};
 use super::report::ObjectReport;
 use super::sections::ObjectSections;
 use super::sources::{File, SourcePart};
 use crate::error::{Error, Place, Result};
 use crate::monitor::Monitor;
-use crate::pipeline::Clock;
+use crate::stage::Clock;
 use crate::tets;
 use crate::write::FileBuilder;
 use bth_format::layout::{self, SectionEntry, kind};
@@ -83,13 +84,14 @@ pub(super) fn build(
     context.cache.hits("object", taken);
     for (number, content, built) in build_all(tasks, context, clock)? {
         objects.note_worker(built.record.worker.clone());
-        let made = (content, built.record.worker);
-        stored[number] = Some(place_of(built.file, built.record.object, made));
+        let made = Some((*content.as_bytes(), built.record.worker));
+        let sections = ObjectSections::in_file(&Arc::new(built.file), 0, made);
+        stored[number] = Some((sections, built.record.object));
     }
     for (copy, of) in copies {
         stored[copy] = stored[of as usize].clone();
     }
-    objects.fill(stored);
+    (objects.stored, objects.reports) = stored.into_iter().flatten().unzip();
     for (stored, report) in objects.stored.iter().zip(&mut objects.reports) {
         report.resident_bytes = stored.resident_bytes();
     }
@@ -129,7 +131,8 @@ fn read(sources: &[File<'_>], context: &Context<'_>, clock: &mut Clock) -> Resul
     Ok(all.into_iter().flatten().collect())
 }
 
-/// The parts of a file that need not be read, because it is a compiled one or the previous file has all of them.
+/// The parts of a file that need not be read, because it is a compiled one or the previous file has
+/// all of them.
 pub(super) fn parts_without_reading(file: &File<'_>, context: &Context<'_>) -> Option<Vec<Part>> {
     if file.compiled {
         return Some(Vec::new());
@@ -148,7 +151,8 @@ fn part_hash(file: &File<'_>, part: SourcePart) -> Hash {
     *blake3::hash(file.content(part).as_bytes()).as_bytes()
 }
 
-/// Builds objects: large ones one after another, the others in parallel. Returns the number of each.
+/// Builds objects: large ones one after another, the others in parallel. Returns the number of
+/// each.
 fn build_all(
     tasks: Vec<Task<'_>>,
     context: &Context<'_>,
@@ -193,12 +197,6 @@ fn copy(objects: &mut Objects, places: &mut Places<'_>, manifest: &Manifest, fil
             let names: Vec<_> = rows.iter().map(|row| manifest.objects[*row].name.as_str()).collect();
             unusable(&format!("object \"{}\": {}", names.join("\", \""), e.without_hint()), e.hint())
         })?;
-        let in_order = |(row, segment): (usize, &layout::Segment)| segment.object as usize == row;
-        let segments = read.sequence(object).segments;
-        if !segments.iter().enumerate().all(in_order) || read.check_segments().is_err() {
-            let found = format!("object {object} has segments that do not follow it");
-            return Err(unusable(&found, "compile it again"));
-        }
         let mut hasher = blake3::Hasher::new();
         hasher.update(b"compiled");
         for section in read.sections().filter(|s| s.entry.object == object) {
@@ -215,15 +213,8 @@ fn copy(objects: &mut Objects, places: &mut Places<'_>, manifest: &Manifest, fil
                 copied: true,
                 ..ObjectReport::default()
             };
-            let one = |object: u32, report| {
-                (ObjectSections::InFile { file: read.clone(), object, made: None }, report)
-            };
-            let behind = (1..).zip(segments.iter().skip(1)).map(|(number, segment)| {
-                let segment_from = Some(segment.first);
-                one(object + number, ObjectReport { segment_from, copied: true, ..ObjectReport::default() })
-            });
-            let first = one(object, report);
-            places.stored.push(Some(std::iter::once(first).chain(behind).collect()));
+            let sections = ObjectSections::in_file(&read, object, None);
+            places.stored.push(Some((sections, report)));
             places.stored.len() as u32 - 1
         });
         rows.iter().for_each(|row| objects.number[*row] = Some(number));
@@ -232,19 +223,6 @@ fn copy(objects: &mut Objects, places: &mut Places<'_>, manifest: &Manifest, fil
 }
 
 impl Objects {
-    /// Stores the objects of all places and numbers them; `number` and `parts` hold numbers of places before.
-    fn fill(&mut self, places: Vec<Option<Stored>>) {
-        let mut first = Vec::with_capacity(places.len());
-        for place in places {
-            first.push(self.stored.len() as u32);
-            let (stored, reports): (Vec<_>, Vec<_>) = place.into_iter().flatten().unzip();
-            self.stored.extend(stored);
-            self.reports.extend(reports);
-        }
-        self.number.iter_mut().flatten().for_each(|number| *number = first[*number as usize]);
-        self.parts.iter_mut().for_each(|part| part.object = first[part.object as usize]);
-    }
-
     /// Keeps the first status of a worker that was needed.
     fn note_worker(&mut self, needed: Option<tets::WorkerStatus>) {
         if self.worker.is_none() {
@@ -283,21 +261,19 @@ impl Objects {
     /// Adds the OBJECT rows only, which suffice to place instances.
     pub(super) fn write_rows(&self, builder: &mut FileBuilder<'_>) -> Result<()> {
         for (number, stored) in self.stored.iter().enumerate() {
-            if let Some(row) = stored.row() {
-                let stride = size_of::<layout::Object>() as u32;
-                builder.section(kind::OBJECT, number as u32, stride, row.as_bytes().to_vec())?;
-            }
+            let (stride, row) = (size_of::<layout::Object>() as u32, stored.row.as_bytes().to_vec());
+            builder.section(kind::OBJECT, number as u32, stride, row)?;
         }
         Ok(())
     }
 
-    /// The index of the file with this section table, for the next compilation. Without objects that were copied from
-    /// compiled files.
+    /// The index of the file with this section table, for the next compilation. Without objects
+    /// that were copied from compiled files.
     pub(super) fn file_index(&self, table: &[SectionEntry]) -> FileIndex {
         let mut index = FileIndex::default();
         let mut rows = vec![None; self.stored.len()];
         for (number, (stored, report)) in self.stored.iter().zip(&self.reports).enumerate() {
-            let (Some((content, worker)), Some(object)) = (stored.made(), stored.row()) else { continue };
+            let Some((content, worker)) = &stored.made else { continue };
             let first = index.sections.len() as u32;
             let start = table.partition_point(|e| e.object < number as u32);
             let sections = table[start..].iter().take_while(|e| e.object == number as u32);
@@ -310,12 +286,12 @@ impl Objects {
             }));
             rows[number] = Some(index.objects.len() as u32);
             index.objects.push(ObjectRow {
-                content,
+                content: *content,
                 triangles: report.triangles,
                 degenerate: report.degenerate,
                 tet_leaves: report.tet_leaves,
                 tet_triangles: report.tet_triangles,
-                object,
+                object: stored.row,
                 first,
                 sections: index.sections.len() as u32 - first,
                 worker: FileIndex::row_of(&mut index.workers, worker),

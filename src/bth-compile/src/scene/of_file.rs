@@ -3,8 +3,8 @@
 use super::sources::File;
 use crate::monitor::Monitor;
 
-/// Passes warnings about a file on with its name, where the scene has several. What is kept has them without: it is found by content,
-/// whatever the file is called.
+/// Passes warnings about a file on with its name, where the scene has several. What is kept has
+/// them without: it is found by content, whatever the file is called.
 pub(super) struct OfFile<'a> {
     to: &'a dyn Monitor,
     name: Option<&'a str>,

@@ -4,12 +4,13 @@ use super::context::Context;
 use crate::error::Result;
 use crate::jobs;
 use crate::monitor::Monitor;
-use crate::pipeline::Clock;
+use crate::stage::Clock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// Runs `work` on all items, at most as many at a time as there are threads and as fit in memory by the `estimate` in
-/// bytes. Fails with the first failure in the order of the items, and warns in that order, whichever item is ready first.
+/// Runs `work` on all items, at most as many at a time as there are threads and as fit in memory by
+/// the `estimate` in bytes. Fails with the first failure in the order of the items, and warns in
+/// that order, whichever item is ready first.
 pub(super) fn run_parallel<J: Send, T: Send>(
     items: Vec<J>,
     context: &Context<'_>,
@@ -47,9 +48,9 @@ pub(super) fn run_parallel<J: Send, T: Send>(
     results.collect()
 }
 
-/// A pool of one thread for one item at a time; `None` where a single item runs at a time. In the shared pool an item that
-/// waits for another process could block the item that
-/// this process waits for.
+/// A pool of one thread for one item at a time; `None` where a single item runs at a time. In the
+/// shared pool an item that waits for another process could block the item that this process waits
+/// for.
 fn own_pool(threads: usize) -> Option<rayon::ThreadPool> {
     let pool = || rayon::ThreadPoolBuilder::new().num_threads(1).build();
     // If no pool can be made, the work runs in the global pool, which only uses more threads.

@@ -1,7 +1,7 @@
 //! The places of objects in the file of a scene while they are collected: equal geometry has one.
 
 use super::context::Context;
-use super::meshes::{SourceMesh, content};
+use super::meshes::SourceMesh;
 use super::previous::Previous;
 use super::report::ObjectReport;
 use super::sections::ObjectSections;
@@ -13,7 +13,8 @@ use std::sync::Arc;
 
 /// A part of a source.
 pub(super) enum Part {
-    /// In the previous file: the format of the source, the object in that file, and what was warned of when it was read.
+    /// In the previous file: the format of the source, the object in that file, and what was warned
+    /// of when it was read.
     InPrevious(String, u32, Vec<String>),
     Mesh(Box<SourceMesh>),
 }
@@ -44,31 +45,8 @@ pub(super) struct Task<'a> {
     pub(super) content: blake3::Hash,
 }
 
-/// An object of a source and the objects of its segments, which follow it in the file.
-pub(super) type Stored = Vec<(ObjectSections, ObjectReport)>;
-
-/// What is stored of a built object: the first of a file, which holds nothing but it and its segments.
-pub(super) fn place_of(
-    file: bth_format::File,
-    report: ObjectReport,
-    made: (blake3::Hash, Option<tets::WorkerStatus>),
-) -> Stored {
-    let file = Arc::new(file);
-    // An object with segments is not taken from the previous file, whose index has single objects.
-    let made = (file.object_count() == 1).then_some(made);
-    let segments = report.motion.as_ref().map_or(&[][..], |motion| &motion.segments);
-    let of_segment = |object: u32| ObjectReport {
-        triangles: report.triangles,
-        segment_from: segments.get(object as usize).map(|segment| segment.first),
-        ..ObjectReport::default()
-    };
-    let behind: Vec<_> = (1..file.object_count())
-        .map(|object| (ObjectSections::InFile { file: file.clone(), object, made: None }, of_segment(object)))
-        .collect();
-    let mut place = vec![(ObjectSections::InFile { file, object: 0, made }, report)];
-    place.extend(behind);
-    place
-}
+/// An object that has a place, and its report.
+pub(super) type Stored = (ObjectSections, ObjectReport);
 
 /// The places of objects while they are collected.
 #[derive(Default)]
@@ -90,7 +68,8 @@ pub(super) struct Places<'a> {
 }
 
 impl<'a> Places<'a> {
-    /// The place of a part: that of equal geometry, or a new one, which is filled from the previous file or by a task.
+    /// The place of a part: that of equal geometry, or a new one, which is filled from the previous
+    /// file or by a task.
     pub(super) fn of_part(&mut self, file: &'a File<'a>, part: Part, context: &Context<'_>) -> u32 {
         let (old, content) = find(&part, context);
         let free = match self.of_content.entry(content) {
@@ -102,8 +81,8 @@ impl<'a> Places<'a> {
             (Some((file, object)), _) => {
                 self.taken += 1;
                 self.worker = self.worker.take().or_else(|| file.index.worker_of(object).clone());
-                let sections = ObjectSections::InPrevious { file: file.clone(), object };
-                self.stored.push(Some(vec![(sections, file.index.report_of(object))]));
+                let sections = ObjectSections::in_previous(file, object);
+                self.stored.push(Some((sections, file.index.report_of(object))));
             }
             (None, Part::Mesh(mesh)) => {
                 self.tasks.push(Task { file, mesh: *mesh, number, content });
@@ -114,7 +93,8 @@ impl<'a> Places<'a> {
         *free.insert(number as u32)
     }
 
-    /// The place for an object of the manifest whose part has a place: each deformer moves an object of its own.
+    /// The place for an object of the manifest whose part has a place: each deformer moves an
+    /// object of its own.
     pub(super) fn for_row(&mut self, part: SourcePart, number: u32) -> u32 {
         if !part.deforms() || self.deforming.insert(number) {
             return number;
@@ -135,7 +115,7 @@ fn find<'a>(part: &Part, context: &'a Context<'_>) -> (Option<(&'a Arc<Previous>
             (previous.map(|p| (p, *object)), blake3::Hash::from_bytes(hash))
         }
         Part::Mesh(mesh) => {
-            let content = content(&mesh.summary, mesh.part);
+            let content = mesh.summary.content(mesh.part.clip());
             let old = previous.and_then(|p| Some((p, p.index.object_of(content.as_bytes())?)));
             (old.filter(|(p, object)| p.has(*object)), content)
         }

@@ -4,7 +4,7 @@ use super::clips::Clips;
 use super::{encode, sources, visible};
 use crate::error::Result;
 use crate::options::CompileOptions;
-use crate::pipeline::Clock;
+use crate::stage::Clock;
 use bth_scene::Manifest;
 use std::path::Path;
 use std::sync::Arc;

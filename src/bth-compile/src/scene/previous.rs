@@ -1,23 +1,24 @@
-//! The file of an earlier compilation of a scene at the path of this one's output. Its unchanged objects are copied by the
-//! operating system, without being read from the cache or written from memory.
+//! The file of an earlier compilation of a scene at the path of this one's output. Its unchanged
+//! objects are copied by the operating system, without being read from the cache or written from
+//! memory.
 
 use super::file_index::{FileIndex, SectionRow};
 use crate::cached::{self, Cache};
-use crate::error::{Error, Result};
 use crate::monitor::Monitor;
 use crate::options::CompileOptions;
+use crate::pipeline;
 use crate::write::{Bytes, HEADER, are_zeros, name};
 use bth_files::OpenFile;
 use bth_format::file::hash128;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 /// An earlier file with its index.
 pub(super) struct Previous {
     pub(super) index: FileIndex,
-    path: PathBuf,
     file: Arc<OpenFile>,
-    /// Whether the file is known to be unchanged since it was written; else each section is read and checked.
+    /// True if the file is known to be unchanged since it was written; else each section is read
+    /// and checked.
     untouched: bool,
 }
 
@@ -35,13 +36,13 @@ impl Previous {
         let mut head = [0; HEADER];
         file.read_at(0, &mut head).ok()?;
         let named = name(&head);
-        let record = cache.find(&cached::file_index(&named, options, tetgen), monitor)?;
+        let record = cache.find(&pipeline::file_index(&named, options, tetgen), monitor)?;
         let index = cached::decode(&cache.read(&record, monitor)?)?;
         let untouched = store.content_of_open(path, &file) == Some(named);
-        Some(Self { index, path: path.to_owned(), file: Arc::new(file), untouched })
+        Some(Self { index, file: Arc::new(file), untouched })
     }
 
-    /// Whether an object of the index is whole in the file.
+    /// Returns true if an object of the index is whole in the file.
     pub(super) fn has(&self, object: u32) -> bool {
         let sections = self.index.sections_of(object);
         let (Some(first), Some(last)) = (sections.first(), sections.last()) else { return false };
@@ -66,20 +67,6 @@ impl Previous {
             at = last;
             whole
         })
-    }
-
-    /// The bytes of a section.
-    ///
-    /// # Errors
-    /// `BTH-O001` when they cannot be read.
-    pub(super) fn read(&self, section: &SectionRow) -> Result<Vec<u8>> {
-        let mut bytes = vec![0; section.length as usize];
-        self.file.read_at(section.offset, &mut bytes).map_err(|e| Error::File {
-            code: "BTH-O001",
-            path: self.path.clone(),
-            message: format!("cannot read: {e}"),
-        })?;
-        Ok(bytes)
     }
 
     /// Range of a section's bytes in the file.

@@ -1,6 +1,7 @@
 //! Reports of a scene's compilation.
 
-use crate::pipeline::{MotionReport, StageTime};
+use crate::pipeline::MotionReport;
+use crate::stage::StageTime;
 use crate::tets::WorkerStatus;
 use bth_import::OpacityReport;
 use serde::{Deserialize, Serialize};
@@ -21,16 +22,15 @@ pub struct ObjectReport {
     /// Bytes of its sections that tracing reads.
     #[serde(default)]
     pub resident_bytes: u64,
-    /// Opacity of its triangles, where some are not opaque; not known of objects that were taken from an earlier file.
+    /// Opacity of its triangles, where some are not opaque; not known of objects that were taken
+    /// from an earlier file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub opacity: Option<OpacityReport>,
-    /// What its trees cost where its vertices move by themselves; not known of objects that were taken from an earlier file.
+    /// How it was compiled if its vertices move by themselves; not known of objects that were taken
+    /// from an earlier file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<MotionReport>,
-    /// Seconds from which it applies, if it is a segment of the object before it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub segment_from: Option<f64>,
-    /// Whether it was copied unchanged from a compiled file.
+    /// True if it was copied unchanged from a compiled file.
     pub copied: bool,
 }
 
@@ -61,7 +61,7 @@ pub struct SceneReport {
     pub last_frame: i32,
     /// Frames per second.
     pub rate: f64,
-    /// Triangles of all objects; those of segments are the same as of the objects before them.
+    /// Triangles of all objects.
     pub triangles: u64,
     /// Triangles of all instances.
     pub instanced_triangles: u64,

@@ -1,66 +1,98 @@
-//! The sections of a scene's objects in memory or in the previous file, before they are added to the new file.
+//! The sections of a scene's objects in memory or in the previous file, before they are added to
+//! the new file.
 
-use super::file_index::Hash;
+use super::file_index::{Hash, SectionRow};
 use super::previous::Previous;
-use crate::error::Result;
-use crate::tets;
+use crate::error::{Error, Result};
+use crate::tets::WorkerStatus;
 use crate::write::{Bytes, FileBuilder, SectionHead, named_images};
-use bth_format::layout::{self, SectionEntry, kind};
+use bth_format::file::{hash128, kind_stride};
+use bth_format::layout::{Deformation, Object, kind};
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use zerocopy::FromBytes;
 
+/// Hash by which equal objects are found, and status of the worker.
+pub(super) type Made = (Hash, Option<WorkerStatus>);
+
 /// The sections of an object, of which every index has been checked.
 #[derive(Clone)]
-pub(super) enum ObjectSections {
-    /// In a file in memory.
-    InFile {
-        file: Arc<bth_format::File>,
-        object: u32,
-        /// Hash by which equal objects are found and status of the worker. Absent for objects copied from compiled files,
-        /// which are untrusted, so that the hashes of their sections are computed again.
-        made: Option<(blake3::Hash, Option<tets::WorkerStatus>)>,
-    },
-    /// In the previous file.
-    InPrevious { file: Arc<Previous>, object: u32 },
+pub(super) struct ObjectSections {
+    /// Its OBJECT row.
+    pub(super) row: Object,
+    /// Absent for objects copied from compiled files, which are not trusted.
+    pub(super) made: Option<Made>,
+    sections: Vec<Section>,
+}
+
+#[derive(Clone)]
+struct Section {
+    kind: u32,
+    stride: u32,
+    hash: [u8; 16],
+    bytes: Bytes<'static>,
 }
 
 impl ObjectSections {
-    /// Its sections in a file in memory. Sections of unknown kinds are left out, because their meaning could depend on
-    /// other parts of the file.
-    fn sections(
-        file: &bth_format::File,
-        object: u32,
-    ) -> impl Iterator<Item = bth_format::file::SectionView<'_>> {
-        let known = |e: &SectionEntry| bth_format::file::kind_stride(e.kind).is_some();
-        file.sections().filter(move |s| s.entry.object == object && known(s.entry))
+    /// An object of a file in memory. Skips sections of unknown kinds, because their meaning could
+    /// depend on other parts of the file. The hashes of an object that is not trusted are computed
+    /// again.
+    pub(super) fn in_file(file: &Arc<bth_format::File>, object: u32, made: Option<Made>) -> Self {
+        let sections = file.sections().filter(|s| s.entry.object == object);
+        let sections = sections.filter(|s| kind_stride(s.entry.kind).is_some()).map(|section| {
+            let e = section.entry;
+            let range = e.offset as usize..(e.offset + e.length) as usize;
+            Section {
+                kind: e.kind,
+                stride: e.stride,
+                hash: if made.is_some() { e.hash } else { hash128(section.bytes) },
+                bytes: Bytes::InFile(file.clone(), range),
+            }
+        });
+        let sections = sections.collect();
+        Self { row: *file.object_header(object), made, sections }
+    }
+
+    /// An object of the previous file.
+    pub(super) fn in_previous(previous: &Previous, object: u32) -> Self {
+        let index = &previous.index;
+        let row = &index.objects[object as usize];
+        let section = |row: &SectionRow| Section {
+            kind: row.kind,
+            stride: row.stride,
+            hash: row.hash,
+            bytes: previous.bytes(row),
+        };
+        Self {
+            row: row.object,
+            made: Some((row.content, index.worker_of(object).clone())),
+            sections: index.sections_of(object).iter().map(section).collect(),
+        }
     }
 
     /// Adds its sections.
     pub(super) fn write(&self, number: u32, builder: &mut FileBuilder<'_>) -> Result<()> {
-        match self {
-            Self::InFile { file, object, made } => {
-                for section in Self::sections(file, *object) {
-                    let e = section.entry;
-                    let hash = if made.is_some() { e.hash } else { bth_format::file::hash128(section.bytes) };
-                    let head = SectionHead { kind: e.kind, object: number, stride: e.stride, hash };
-                    let range = e.offset as usize..(e.offset + e.length) as usize;
-                    builder.hashed_section(
-                        head,
-                        self.coordinates(e.kind),
-                        Bytes::InFile(file.clone(), range),
-                    )?;
-                }
-            }
-            Self::InPrevious { file, object } => {
-                for row in file.index.sections_of(*object) {
-                    let head =
-                        SectionHead { kind: row.kind, object: number, stride: row.stride, hash: row.hash };
-                    builder.hashed_section(head, self.coordinates(row.kind), file.bytes(row))?;
-                }
-            }
+        for Section { kind, stride, hash, bytes } in &self.sections {
+            let head = SectionHead { kind: *kind, object: number, stride: *stride, hash: *hash };
+            let coordinates = (*kind == kind::OBJECT).then_some(self.row.coordinates);
+            builder.hashed_section(head, coordinates, bytes.clone())?;
         }
         Ok(())
+    }
+
+    /// The bytes of a section; none if the object lacks it.
+    ///
+    /// # Errors
+    /// `BTH-O001` when the previous file cannot be read.
+    fn bytes(&self, kind: u32) -> Result<Cow<'_, [u8]>> {
+        let section = self.sections.iter().find(|section| section.kind == kind);
+        let bytes = section.map_or(Ok(Cow::default()), |section| section.bytes.read());
+        bytes.map_err(|e| Error::File {
+            code: "BTH-O001",
+            path: "the file that was there".into(),
+            message: format!("cannot read: {e}"),
+        })
     }
 
     /// Names of the images that its textures refer to.
@@ -68,67 +100,20 @@ impl ObjectSections {
     /// # Errors
     /// When the previous file cannot be read.
     pub(super) fn image_names(&self) -> Result<BTreeSet<[u8; 16]>> {
-        match self {
-            Self::InFile { file, object, .. } => {
-                Ok(file.materials(*object).textures.iter().map(|texture| texture.image).collect())
-            }
-            Self::InPrevious { file, object } => {
-                let rows = file.index.sections_of(*object);
-                let bytes = rows.iter().find(|row| row.kind == kind::TEXTURES).map(|row| file.read(row));
-                Ok(named_images(&bytes.transpose()?.unwrap_or_default()))
-            }
-        }
-    }
-
-    /// Its OBJECT row.
-    pub(super) fn row(&self) -> Option<layout::Object> {
-        match self {
-            Self::InFile { file, object, .. } => {
-                layout::Object::read_from_bytes(file.section(*object, kind::OBJECT)?.bytes).ok()
-            }
-            Self::InPrevious { file, object } => Some(file.index.objects[*object as usize].object),
-        }
+        Ok(named_images(&self.bytes(kind::TEXTURES)?))
     }
 
     /// Its DEFORMATION row, if its vertices can be moved.
     ///
     /// # Errors
     /// When the previous file cannot be read.
-    pub(super) fn deformation(&self) -> Result<Option<layout::Deformation>> {
-        match self {
-            Self::InFile { file, object, .. } => Ok(file.deformation(*object).rows.first().copied()),
-            Self::InPrevious { file, object } => {
-                let rows = file.index.sections_of(*object);
-                let bytes = rows.iter().find(|row| row.kind == kind::DEFORMATION).map(|row| file.read(row));
-                Ok(bytes.transpose()?.and_then(|bytes| layout::Deformation::read_from_bytes(&bytes).ok()))
-            }
-        }
-    }
-
-    fn coordinates(&self, kind: u32) -> Option<u32> {
-        (kind == kind::OBJECT).then(|| self.row().map(|row| row.coordinates)).flatten()
-    }
-
-    /// Hash by which equal objects are found, and the status of the worker.
-    pub(super) fn made(&self) -> Option<(Hash, &Option<tets::WorkerStatus>)> {
-        match self {
-            Self::InFile { made, .. } => made.as_ref().map(|(content, worker)| (*content.as_bytes(), worker)),
-            Self::InPrevious { file, object } => {
-                Some((file.index.objects[*object as usize].content, file.index.worker_of(*object)))
-            }
-        }
+    pub(super) fn deformation(&self) -> Result<Option<Deformation>> {
+        Ok(Deformation::read_from_bytes(&self.bytes(kind::DEFORMATION)?).ok())
     }
 
     /// Bytes of the sections that tracing reads.
     pub(super) fn resident_bytes(&self) -> u64 {
-        let resident = |kind: u32, length: u64| if kind::is_traced(kind) { length } else { 0 };
-        match self {
-            Self::InFile { file, object, .. } => {
-                Self::sections(file, *object).map(|s| resident(s.entry.kind, s.entry.length)).sum()
-            }
-            Self::InPrevious { file, object } => {
-                file.index.sections_of(*object).iter().map(|s| resident(s.kind, s.length)).sum()
-            }
-        }
+        let traced = self.sections.iter().filter(|section| kind::is_traced(section.kind));
+        traced.map(|section| section.bytes.length()).sum()
     }
 }

@@ -2,9 +2,8 @@
 
 use super::clips::Clips;
 use super::moving::{Moving, unhashed};
-use crate::cached;
 use crate::error::Result;
-use crate::source::{SourceDigest, TriangleMesh};
+use crate::source::{SourceDigest, TriangleMesh, extension};
 use bth_files::Digest;
 use bth_import::{AlphaMode, GltfPart, Looks, Unreadable};
 use bth_scene::{JointSet, Manifest, Source};
@@ -82,7 +81,7 @@ impl SourcePart {
         }
     }
 
-    /// Whether its vertices can be moved, so that each deformer needs an object of its own.
+    /// Returns true if its vertices can be moved, so that each deformer needs an object of its own.
     pub(super) fn deforms(self) -> bool {
         matches!(self, SourcePart::Gltf(GltfPart::Deforming { .. }) | SourcePart::Posed(..))
     }
@@ -127,7 +126,7 @@ impl File<'_> {
             "{} {} {}{alpha}{materials}{lenient}{clip}",
             self.digest.text(),
             self.part(part),
-            cached::extension(&self.full)
+            extension(&self.full)
         )
     }
 
@@ -137,7 +136,8 @@ impl File<'_> {
     }
 }
 
-/// For each object of the manifest the identity of its source in keys; `unused` for those that are not used.
+/// For each object of the manifest the identity of its source in keys; `unused` for those that are
+/// not used.
 pub(super) fn contents(manifest: &Manifest, sources: &[File<'_>]) -> Vec<String> {
     let mut contents = vec!["unused".to_owned(); manifest.objects.len()];
     for file in sources {
@@ -166,7 +166,8 @@ pub(super) fn files<'a>(
         let part = SourcePart::of(&object.source, clips.of_object(row));
         let compiled = matches!(part, SourcePart::Object(_));
         let path = object.source.path();
-        // A glTF file as a whole and its single meshes are read in different ways, so they count as different sources.
+        // A glTF file as a whole and its single meshes are read in different ways, so they count as
+        // different sources.
         let moving = Moving::of(manifest, &object.source, folder)?;
         let own = moving.is_some().then_some(row);
         let whole = part == SourcePart::Whole;
@@ -188,7 +189,8 @@ pub(super) fn files<'a>(
     if files.len() > 1 {
         files.iter_mut().for_each(|file| file.shown = Some(file.path));
     }
-    // The first error in the order of the files is returned, so that the message does not depend on timing.
+    // The first error in the order of the files is returned, so that the message does not depend on
+    // timing.
     let digest = |file: &File<'_>| match &file.moving {
         Some(moving) => moving.digest(looks),
         None => SourceDigest::of(&file.full, looks),

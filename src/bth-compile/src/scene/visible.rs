@@ -2,9 +2,10 @@
 
 use bth_scene::{Manifest, Property, Track, Transform};
 
-/// For each node whether it, or what stands at it, may be visible. True for every node that some frame shows; also true for some that no
-/// frame shows, when a node and its parent are visible at different times. Scales of zero do not hide an object with a skin,
-/// which the transform of its node does not move.
+/// For each node whether it, or what stands at it, may be visible. True for every node that some
+/// frame shows; also true for some that no frame shows, when a node and its parent are visible at
+/// different times. Scales of zero do not hide an object with a skin, which the transform of its
+/// node does not move.
 pub(super) fn visible(manifest: &Manifest, order: &[usize]) -> Vec<bool> {
     let frames = manifest.frames;
     let range = [frames.first, frames.last].map(|f| f64::from(f) / frames.rate);
@@ -13,8 +14,8 @@ pub(super) fn visible(manifest: &Manifest, order: &[usize]) -> Vec<bool> {
     for track in &manifest.tracks {
         match track.property {
             Property::Visible => shown[track.node] = some_value(track, range, |v| v[0] != 0.0),
-            // A scale track is assumed to give the node a size at some time. Where it passes through zero between two keys,
-            // it does so for an instant only.
+            // A scale track is assumed to give the node a size at some time. Where it passes
+            // through zero between two keys, it does so for an instant only.
             Property::Scale => scaled[track.node] = true,
             Property::Translation | Property::Rotation | Property::Weights => {}
         }
@@ -34,7 +35,8 @@ pub(super) fn visible(manifest: &Manifest, order: &[usize]) -> Vec<bool> {
         .collect()
 }
 
-/// The nodes that are hidden because they have no size along some axis, though they have one along another: a file may mean flat surfaces.
+/// The nodes that are hidden because they have no size along some axis, though they have one along
+/// another: a file may mean flat surfaces.
 pub(super) fn flattened(manifest: &Manifest) -> Vec<&str> {
     let mut has_track = vec![false; manifest.nodes.len()];
     let of_scale = manifest.tracks.iter().filter(|track| track.property == Property::Scale);
@@ -55,7 +57,8 @@ fn has_size(transform: &Transform) -> bool {
     }
 }
 
-/// Whether a track with step interpolation has a value that satisfies the condition at some time of a range.
+/// Returns true if a track with step interpolation has a value that satisfies the condition at some
+/// time of a range.
 fn some_value(track: &Track, [from, to]: [f64; 2], holds: impl Fn(&[f64]) -> bool) -> bool {
     let first = track.times.partition_point(|t| *t <= from).saturating_sub(1);
     let end = track.times.partition_point(|t| *t <= to).max(first + 1);

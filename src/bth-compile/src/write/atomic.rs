@@ -24,7 +24,8 @@ pub fn write_atomically_with(
     bth_files::replace(path, write).map_err(|e| cannot(path, &e))
 }
 
-/// As [`write_atomically`], for a content with pieces in other files, which the operating system copies.
+/// As [`write_atomically`], for a content with pieces in other files, which the operating system
+/// copies.
 ///
 /// # Errors
 /// As [`write_atomically`]; also when such a file cannot be read or has changed.

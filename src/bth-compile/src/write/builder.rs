@@ -35,8 +35,8 @@ impl<'a> FileBuilder<'a> {
         Self::default()
     }
 
-    /// Adds a section of elements of `stride` bytes; `object` is `NONE` for sections of the whole file.
-    /// Sections that tracing reads or that describe the scene are flagged as required.
+    /// Adds a section of elements of `stride` bytes; `object` is `NONE` for sections of the whole
+    /// file. Sections that tracing reads or that describe the scene are flagged as required.
     ///
     /// # Errors
     /// `BTH-X031` when the bytes are not whole elements or the section exists already.
@@ -59,8 +59,8 @@ impl<'a> FileBuilder<'a> {
         self.hashed_section(SectionHead { kind, object, stride, hash }, coordinates, Bytes::Owned(bytes))
     }
 
-    /// As [`Self::section`], for a section whose hash is known already. `coordinates` is that field of the row, if it is an
-    /// OBJECT section.
+    /// As [`Self::section`], for a section whose hash is known already. `coordinates` is that field
+    /// of the row, if it is an OBJECT section.
     ///
     /// # Errors
     /// As [`Self::section`].
@@ -137,8 +137,8 @@ impl<'a> FileBuilder<'a> {
         bytes
     }
 
-    /// Writes header and table into as many zero bytes as the file has. Returns where which bytes of the sections are to be
-    /// copied.
+    /// Writes header and table into as many zero bytes as the file has. Returns where which bytes
+    /// of the sections are to be copied.
     ///
     /// # Panics
     /// When a section is still in another file.

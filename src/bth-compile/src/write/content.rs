@@ -20,11 +20,23 @@ pub(crate) enum Bytes<'a> {
 
 impl Bytes<'_> {
     /// Number of bytes.
-    pub(super) fn length(&self) -> u64 {
+    pub(crate) fn length(&self) -> u64 {
         match self {
             Self::Owned(bytes) => bytes.len() as u64,
             Self::InFile(_, range) => range.len() as u64,
             Self::OnDisk(_, range) => range.end - range.start,
+        }
+    }
+
+    /// The bytes, read from disk if they are there.
+    pub(crate) fn read(&self) -> Result<Cow<'_, [u8]>> {
+        match self {
+            Self::OnDisk(file, range) => {
+                let mut bytes = vec![0; self.length() as usize];
+                file.read_at(range.start, &mut bytes)?;
+                Ok(bytes.into())
+            }
+            _ => Ok(self.in_memory().unwrap_or_default().into()),
         }
     }
 
@@ -70,7 +82,8 @@ impl Content {
     pub(super) fn pad_to(&mut self, end: u64) {
         self.pad += (end - self.length) as usize;
         self.length = end;
-        // A source in memory often has the same zeros, so the range is extended instead of starting a new piece.
+        // A source in memory often has the same zeros, so the range is extended instead of starting
+        // a new piece.
         if let Some(Bytes::InFile(file, range)) = self.pieces.last_mut()
             && file.bytes().get(range.end..range.end + self.pad).is_some_and(are_zeros)
         {
@@ -88,8 +101,8 @@ impl Content {
             {
                 old.end = new.end;
             }
-            // Sections of a compiled file are separated by zeros, so the zeros between adjacent ranges are copied with
-            // them.
+            // Sections of a compiled file are separated by zeros, so the zeros between adjacent
+            // ranges are copied with them.
             (Some(Bytes::OnDisk(file, old)), Bytes::OnDisk(other, new))
                 if Arc::ptr_eq(file, &other) && old.end + pad as u64 == new.start =>
             {
@@ -122,13 +135,21 @@ impl Content {
         }
     }
 
+    /// The file in memory that the content is, if it is one.
+    pub(crate) fn file(&self) -> Option<&bth_format::File> {
+        match &self.pieces[..] {
+            [Bytes::InFile(file, range)] if range.len() == file.bytes().len() => Some(file),
+            _ => None,
+        }
+    }
+
     /// Length in bytes.
     pub fn length(&self) -> u64 {
         self.length
     }
 
-    /// The name of the content: the hash of the header, which contains that of the section table, which contains those of the
-    /// sections.
+    /// The name of the content: the hash of the header, which contains that of the section table,
+    /// which contains those of the sections.
     pub fn name(&self) -> Digest {
         let head = self.pieces.first().and_then(Bytes::in_memory).unwrap_or_default();
         name(head)
@@ -137,7 +158,8 @@ impl Content {
     /// Writes the content.
     ///
     /// # Errors
-    /// Those of the writer, and when an old file that it takes sections from cannot be read or has changed.
+    /// Those of the writer, and when an old file that it takes sections from cannot be read or has
+    /// changed.
     pub fn write_to(&self, out: &mut (impl Write + ?Sized)) -> Result<()> {
         let mut at = 0;
         let mut used: Option<&Arc<OpenFile>> = None;

@@ -1,10 +1,9 @@
 //! The sections of groups of triangles, and of the names of objects.
 
-use super::FileBuilder;
+use super::{FileBuilder, Names};
 use crate::error::Result;
 use bth_format::layout::*;
 use bth_import::Groups;
-use std::collections::HashMap;
 
 /// The rows of an object's groups.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -22,19 +21,19 @@ pub struct GroupParts {
 impl GroupParts {
     /// The rows of a mesh's groups.
     pub fn of(groups: &Groups) -> Self {
-        let mut text = Text::default();
-        let group = |group: &bth_import::Group, text: &mut Text| {
-            let (name, name_length) = text.add(&group.name);
+        let mut names = Names::default();
+        let group = |group: &bth_import::Group, names: &mut Names| {
+            let (name, name_length) = names.add(&group.name);
             Group { name, name_length, material: group.material.unwrap_or(NONE), reserved: 0 }
         };
-        let material = |name: &String, text: &mut Text| {
-            let (name, name_length) = text.add(name);
+        let material = |name: &String, names: &mut Names| {
+            let (name, name_length) = names.add(name);
             Material { name, name_length, reserved: [0; 2] }
         };
-        let rows = groups.groups.iter().map(|row| group(row, &mut text)).collect();
-        let materials = groups.materials.iter().map(|name| material(name, &mut text)).collect();
+        let rows = groups.groups.iter().map(|row| group(row, &mut names)).collect();
+        let materials = groups.materials.iter().map(|name| material(name, &mut names)).collect();
         let runs = groups.runs.iter().map(|&[first, group]| GroupRun { first, group }).collect();
-        Self { groups: rows, runs, materials, labels: text.bytes }
+        Self { groups: rows, runs, materials, labels: names.bytes }
     }
 
     /// Adds the sections of an object; those without rows are left out.
@@ -55,7 +54,7 @@ pub fn object_names(
     builder: &mut FileBuilder<'_>,
     names: impl IntoIterator<Item = impl AsRef<str>>,
 ) -> Result<()> {
-    let mut text = Text::default();
+    let mut text = Names::default();
     let mut rows = Vec::new();
     for name in names {
         let (first, length) = text.add(name.as_ref());
@@ -69,25 +68,4 @@ pub fn object_names(
         builder.section(kind::OBJECT_LABELS, NONE, 1, text.bytes)?;
     }
     Ok(())
-}
-
-/// Names one behind the other; each different one stands once.
-#[derive(Default)]
-struct Text {
-    bytes: Vec<u8>,
-    first: HashMap<String, u32>,
-}
-
-impl Text {
-    /// Adds a name. Returns its first byte and its length.
-    fn add(&mut self, name: &str) -> (u32, u32) {
-        let length = name.len() as u32;
-        if let Some(first) = self.first.get(name) {
-            return (*first, length);
-        }
-        let first = self.bytes.len() as u32;
-        self.bytes.extend_from_slice(name.as_bytes());
-        self.first.insert(name.to_owned(), first);
-        (first, length)
-    }
 }

@@ -5,6 +5,7 @@ mod builder;
 mod content;
 mod groups;
 mod images;
+mod names;
 mod object;
 mod open;
 mod scene;
@@ -18,6 +19,7 @@ pub use content::Content;
 pub use groups::{GroupParts, object_names};
 pub use images::images;
 pub(crate) use images::named_images;
+pub(crate) use names::Names;
 pub use object::{ObjectParts, Source, object};
 pub(crate) use open::open;
 pub use scene::{DeformerParts, SceneParts, scene};
@@ -34,7 +36,6 @@ pub fn checked(file: bth_format::File) -> Result<bth_format::File> {
     (0..file.object_count()).try_for_each(|i| file.check(i).map(drop).map_err(defect))?;
     file.check_object_names().map_err(defect)?;
     file.check_scene().map_err(defect)?;
-    file.check_segments().map_err(defect)?;
     Ok(file)
 }
 

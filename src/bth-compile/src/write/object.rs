@@ -19,9 +19,10 @@ pub struct ObjectParts<'a> {
     pub triangles: u32,
     /// Triangles of zero area, which no leaf holds.
     pub dropped: u32,
-    /// Grid of the coordinates in triangle leaves, and the greatest distance that a vertex moved; `None` for `f32`.
+    /// Grid of the coordinates in triangle leaves, and the largest distance that a vertex moved;
+    /// `None` for `f32`.
     pub grid: Option<(Grid, f32)>,
-    /// Whether child boxes are widened ([`WIDENED_BOXES`]).
+    /// True if child boxes are widened ([`WIDENED_BOXES`]).
     pub widened_boxes: bool,
     /// Nodes and triangle leaves.
     pub lines: &'a [CacheLine],
@@ -45,7 +46,8 @@ pub struct ObjectParts<'a> {
     pub triangle_faces: &'a [u32],
     /// The place of each triangle in the leaves; empty if it is not kept.
     pub places: &'a [u32],
-    /// In which directions rays that start on each triangle meet nothing; empty where nothing is known.
+    /// In which directions rays that start on each triangle meet nothing; empty where nothing is
+    /// known.
     pub free: &'a [FreeDirections],
     /// Within which distances they meet nothing, in place of `free`.
     pub free_distances: &'a [FreeDistances],
@@ -63,8 +65,6 @@ pub struct ObjectParts<'a> {
     pub sequence_times: &'a [f64],
     /// Positions of the frames of a sequence.
     pub sequence_positions: &'a [[f32; 3]],
-    /// Hierarchies for ranges of time.
-    pub segments: &'a [Segment],
     /// What moves the vertices.
     pub deformation: Option<&'a Deformation>,
     /// Positions and attributes to keep.
@@ -89,7 +89,8 @@ pub struct Source<'a> {
 /// Adds the sections of an object; its depth is measured here.
 ///
 /// # Errors
-/// `BTH-L031` when a path has more nodes than the format allows; `BTH-X031` when the parts do not fit together.
+/// `BTH-L031` when a path has more nodes than the format allows; `BTH-X031` when the parts do not
+/// fit together.
 pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts<'a>) -> Result<()> {
     let depth = depth(parts)?;
     if depth > bth_format::limits::MAX_DEPTH as u32 {
@@ -148,7 +149,6 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
     }
     builder.rows(kind::SEQUENCE_TIMES, index, parts.sequence_times)?;
     builder.rows(kind::SEQUENCE_POSITIONS, index, parts.sequence_positions)?;
-    builder.rows(kind::SEGMENTS, index, parts.segments)?;
     builder.rows(kind::OPACITY, index, parts.opacity)?;
     builder.rows(kind::OPACITY_MICRO, index, parts.opacity_micro)?;
     if let Some(materials) = parts.materials {
@@ -170,7 +170,7 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
     Ok(())
 }
 
-/// Wide nodes on the longest path, through the subtrees beside tet leaves too.
+/// Wide nodes on the longest path, through the subtrees next to tet leaves too.
 fn depth(parts: &ObjectParts) -> Result<u32> {
     let mut deepest = 0;
     let mut stack = vec![(parts.root, 0)];

@@ -5,10 +5,12 @@ use crate::error::{Error, Result};
 use bth_format::{File, FileMemory};
 use rayon::prelude::*;
 
-/// The file of a builder, after the checks of a reader ([`super::checked`]). Sections are copied on several threads.
+/// The file of a builder, after the checks of a reader ([`super::checked`]). Sections are copied on
+/// several threads.
 ///
 /// # Errors
-/// `BTH-L034` when there is not enough memory; `BTH-X030` when the bytes violate the format, which is a defect of the compiler.
+/// `BTH-L034` when there is not enough memory; `BTH-X030` when the bytes violate the format, which
+/// is a defect of the compiler.
 ///
 /// # Panics
 /// When a section is still in another file.

@@ -1,4 +1,5 @@
-//! The name of a file's content, which its header determines, and the check of a whole file against it.
+//! The name of a file's content, which its header determines, and the check of a whole file against
+//! it.
 
 use bth_files::Digest;
 use bth_format::file::hash128;
@@ -7,13 +8,14 @@ use std::path::Path;
 /// Bytes of the header; their hash is the name of the content.
 pub(crate) const HEADER: usize = size_of::<bth_format::layout::Header>();
 
-/// The name of a file's content: the hash of the header, which contains that of the section table, which contains those of
-/// the sections. The bytes between sections are zeros.
+/// The name of a file's content: the hash of the header, which contains that of the section table,
+/// which contains those of the sections. The bytes between sections are zeros.
 pub(crate) fn name(head: &[u8]) -> Digest {
     Digest::of(head.get(..HEADER).unwrap_or(head))
 }
 
-/// The name of a compiled file's content, if every byte of the file agrees with the hashes; else `None`.
+/// The name of a compiled file's content, if every byte of the file agrees with the hashes; else
+/// `None`.
 pub fn name_if_whole(path: &Path) -> Option<Digest> {
     let file = bth_format::File::read(path).ok()?;
     let bytes = file.bytes();

@@ -31,7 +31,7 @@ pub(crate) use adjacency::TetAdjacency;
 pub(crate) use deformation::check as deformation;
 pub(crate) use materials::{image_names, images, materials};
 pub(crate) use scene::check as scene;
-pub(crate) use sequence::{Segmented, segments, sequence};
+pub(crate) use sequence::sequence;
 
 use crate::error::Result;
 use crate::object::ObjectView;

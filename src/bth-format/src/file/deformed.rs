@@ -21,8 +21,6 @@ pub struct DeformedObject {
     header: Arc<Object>,
     file: File,
     object: u32,
-    /// The object that the nodes and leaves are of: `object`, or a segment of it.
-    segment: u32,
 }
 
 /// Normals of a deformed object, in the rows of NORMALS.
@@ -44,17 +42,9 @@ impl DeformedObject {
     ///
     /// # Errors
     /// As [`File::object`]; `BTH-S006` if the object is not deformable; `BTH-O001` if there is not enough memory.
-    pub fn new(file: &File, object: u32) -> Result<Self> {
-        Self::of_segment(file, object, object)
-    }
-
-    /// As [`Self::new`], with the nodes and leaves of a segment of the object ([`SequenceView::segments`](crate::SequenceView)).
-    ///
-    /// # Errors
-    /// As [`Self::new`].
     #[allow(unsafe_code)]
-    pub fn of_segment(file: &File, object: u32, segment: u32) -> Result<Self> {
-        let view = file.object(segment)?;
+    pub fn new(file: &File, object: u32) -> Result<Self> {
+        let view = file.object(object)?;
         if !view.is_deformable() {
             return Err(Error::of_call(
                 Code::NotDeformable,
@@ -69,8 +59,7 @@ impl DeformedObject {
         let header = Arc::new(*view.header);
         // SAFETY: `file`, which the view borrows from, is held beside it; see `extended`.
         let view = unsafe { extended(ObjectView { identity: Identity::new(), ..view }) };
-        let mut deformed =
-            Self { view, lines, positions, normals: None, header, file: file.clone(), object, segment };
+        let mut deformed = Self { view, lines, positions, normals: None, header, file: file.clone(), object };
         deformed.set_view(true)?;
         Ok(deformed)
     }
@@ -117,19 +106,7 @@ impl DeformedObject {
     /// Makes the view anew: with the object's own memory, or as the file has it.
     #[allow(unsafe_code)]
     fn set_view(&mut self, own: bool) -> Result<()> {
-        let object = self.file.object(self.object)?;
-        let tree = self.file.object(self.segment)?;
-        let mut view = ObjectView {
-            identity: self.view.identity,
-            header: tree.header,
-            bounds: tree.bounds,
-            start_bounds: tree.start_bounds,
-            lines: tree.lines,
-            triangle_ids: tree.triangle_ids,
-            leaf_vertices: tree.leaf_vertices,
-            places: tree.places,
-            ..object
-        };
+        let mut view = ObjectView { identity: self.view.identity, ..self.file.object(self.object)? };
         if own {
             let lines =
                 <[CacheLine]>::ref_from_bytes(self.lines.bytes()).ok().expect("a whole number of lines");

@@ -44,24 +44,7 @@ impl File {
         SequenceView {
             times: self.slice(object, kind::SEQUENCE_TIMES),
             positions: self.slice(object, kind::SEQUENCE_POSITIONS),
-            segments: self.slice(object, kind::SEGMENTS),
         }
-    }
-
-    /// Checks the segments of all objects. Costs O(bytes of the objects with segments).
-    ///
-    /// # Errors
-    /// `BTH-F193` and `BTH-F194`.
-    pub fn check_segments(&self) -> Result<()> {
-        let object =
-            |object: u32| Ok(check::Segmented { view: self.view(object)?, sequence: self.sequence(object) });
-        check::segments(self.object_count(), self.instances(), object, |object| {
-            self.slice(object, kind::SEGMENTS)
-        })
-        .map_err(|e| match e.section() {
-            Some(section) => self.locate(e, section.object),
-            None => e,
-        })
     }
 
     /// The images of all textures, whose **indices are not checked**.

@@ -60,7 +60,6 @@ pub fn kind_stride(kind: u32) -> Option<usize> {
         kind::MATERIALS => size_of::<Material>(),
         kind::SEQUENCE_TIMES => 8,
         kind::SEQUENCE_POSITIONS => 12,
-        kind::SEGMENTS => size_of::<Segment>(),
         kind::OBJECT_NAMES => size_of::<ObjectName>(),
         kind::PROVENANCE | kind::NAMES | kind::LABELS | kind::OBJECT_LABELS | kind::IMAGE_BYTES => 1,
         kind::MATERIAL_PARAMETERS => size_of::<MaterialParameters>(),
@@ -110,7 +109,7 @@ fn max_count(kind: u32) -> u64 {
         kind::POSITIONS | kind::NORMALS | kind::UVS | kind::SECOND_UVS => (NONE - 1) as u64,
         kind::GROUP_RUNS | kind::COLOR_CORNERS | kind::SECOND_CORNERS => limits::MAX_TRIANGLES as u64,
         kind::GROUPS | kind::MATERIALS | kind::LABELS => (NONE - 1) as u64,
-        kind::SEQUENCE_TIMES | kind::SEQUENCE_POSITIONS | kind::SEGMENTS => (NONE - 1) as u64,
+        kind::SEQUENCE_TIMES | kind::SEQUENCE_POSITIONS => (NONE - 1) as u64,
         kind::OBJECT_NAMES | kind::OBJECT_LABELS => (NONE - 1) as u64,
         kind::MATERIAL_PARAMETERS | kind::TEXTURES | kind::COLORS | kind::IMAGES => (NONE - 1) as u64,
         kind::DEFORMATION..=kind::MORPH_DELTAS => (NONE - 1) as u64,
@@ -227,7 +226,7 @@ pub(super) fn check(bytes: &[u8]) -> Result<u32> {
 /// A violation in an entry: the code, the field's offset in the entry, what is expected and what was found.
 type Mismatch = (Code, usize, String, String);
 
-/// BTH-F006, BTH-F010 to BTH-F016 and BTH-F022 of an entry. `end` is where the section before ends, `length` that of the
+/// BTH-F006, BTH-F007, BTH-F010 to BTH-F016 and BTH-F022 of an entry. `end` is where the section before ends, `length` that of the
 /// file; returns where this section ends.
 fn check_entry(
     e: &SectionEntry,
@@ -279,6 +278,10 @@ fn check_entry(
             format!("{} times {} bytes", e.count, e.stride),
             found,
         ));
+    }
+    if e.kind == kind::FORMER_SEGMENTS {
+        let found = "27: trees for ranges of time, which are no longer read; compile the scene again";
+        return Err((Code::Features, 0, "a known kind".into(), found.into()));
     }
     match kind_stride(e.kind) {
         None if e.flags & SECTION_REQUIRED != 0 => {

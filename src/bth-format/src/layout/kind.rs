@@ -67,8 +67,6 @@ kinds! {
     SEQUENCE_TIMES = 25;
     /// `[f32; 3]`: the positions of a sequence, by frame, then by row of `POSITIONS`.
     SEQUENCE_POSITIONS = 26;
-    /// [`super::Segment`]s: hierarchies of the object for ranges of time.
-    SEGMENTS = 27;
     /// `u32` per source triangle: a [`super::TriangleOpacity`].
     OPACITY = 28;
     /// `u32`: states of micro-triangles, two bits each.
@@ -135,6 +133,9 @@ kinds! {
     SECOND_UVS = 69;
 }
 
+/// Kind of trees for ranges of time in older files, which are refused (BTH-F007).
+pub(crate) const FORMER_SEGMENTS: u32 = 27;
+
 /// Whether sections of this kind are part of the scene.
 pub const fn is_scene(kind: u32) -> bool {
     SCENE <= kind && kind <= MORPH_WEIGHTS
@@ -145,7 +146,7 @@ pub const fn is_of_file(kind: u32) -> bool {
 }
 /// Whether sections of this kind say how an object's vertices move by themselves.
 pub const fn is_sequence(kind: u32) -> bool {
-    SEQUENCE_TIMES <= kind && kind <= SEGMENTS
+    kind == SEQUENCE_TIMES || kind == SEQUENCE_POSITIONS
 }
 /// Whether tracing reads sections of this kind of an object.
 pub const fn is_traced(kind: u32) -> bool {

@@ -17,7 +17,6 @@ mod object;
 mod opacity;
 mod places;
 mod scene;
-mod sequence;
 mod tets;
 
 pub use bvh::*;
@@ -32,7 +31,6 @@ pub use object::*;
 pub use opacity::*;
 pub use places::*;
 pub use scene::*;
-pub use sequence::*;
 pub use tets::*;
 
 /// No index: the reference leads nowhere.

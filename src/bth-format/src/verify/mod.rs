@@ -42,7 +42,6 @@ pub fn verify(file: &File) -> std::result::Result<Report, Vec<Error>> {
     }
     errors.extend(file.check_object_names().err());
     errors.extend(file.check_images().err());
-    errors.extend(file.check_segments().err());
     errors.extend(file.check_scene().err());
     if errors.is_empty() { Ok(report) } else { Err(errors) }
 }

@@ -80,7 +80,6 @@ pub fn choose(
         refused_for_cost: choice.verdicts.iter().filter(refused).count() as u64,
         cost_bvh,
         cost_with_tets,
-        seconds: 0.0,
     };
     Ok((choice, report))
 }

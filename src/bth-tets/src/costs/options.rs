@@ -219,6 +219,4 @@ pub struct CostReport {
     pub cost_bvh: f64,
     /// Expected cost of a ray with the chosen nodes tetrahedralized, nanoseconds.
     pub cost_with_tets: f64,
-    /// Wall-clock time of the stage as the pipeline measures it, seconds; 0 where the stage is called on its own.
-    pub seconds: f64,
 }

@@ -29,8 +29,6 @@ pub struct MarkReport {
     pub pairs_bad: u64,
     /// Share of the triangles in maximal suitable nodes of at least some sizes.
     pub coverage: Vec<Coverage>,
-    /// Wall-clock time of the stage as the pipeline measures it, seconds; 0 where the stage is called on its own.
-    pub seconds: f64,
 }
 
 /// How much of a model its large suitable nodes cover.
@@ -189,7 +187,6 @@ fn summarize(bvh: &BinaryBvh, marks: &Marks, contacts: Contacts) -> MarkReport {
         pairs_tested: contacts.tested,
         pairs_bad: contacts.bad,
         coverage: coverage.to_vec(),
-        seconds: 0.0,
     }
 }
 
@@ -257,7 +254,7 @@ mod tests {
         let run = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let (marks, report) = pool.install(|| mark(&mesh, &bvh, &Silent)).unwrap();
-            (marks, MarkReport { seconds: 0.0, ..report })
+            (marks, report)
         };
         let one = run(1);
         assert_eq!(one, run(2));

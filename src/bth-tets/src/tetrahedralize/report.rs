@@ -39,8 +39,6 @@ pub struct TetReport {
     pub nudged: u64,
     /// Worker processes that were started.
     pub workers_started: u64,
-    /// Wall-clock time of the stage as the pipeline measures it, seconds; 0 where the stage is called on its own.
-    pub seconds: f64,
     /// Every node that was tried, ascending by node.
     pub nodes: Vec<NodeReport>,
 }

@@ -68,22 +68,16 @@ impl SceneBuilder {
             let file = objects.locate(subscene.first_object).map(|(file, _)| file.clone());
             let (Some(world), Some(file)) = (world, file) else { continue };
             let skips = |object: u32| by_caller.contains(&object);
-            match world.deformers.stage(objects, (&file, subscene.first_object), evaluated, &skips) {
-                Ok(more) => posed.extend(more),
-                Err(error) => {
-                    posed.put_back(objects);
-                    return Err(error);
-                }
-            }
+            let file = (&file, subscene.first_object);
+            posed.extend(world.deformers.stage(objects, file, evaluated, &skips)?);
         }
         self.deformed.extend(&posed.objects);
         Ok(posed)
     }
 
     /// Forgets what [`Self::stage_poses`] has staged.
-    pub(super) fn unstage_poses(&mut self, mut posed: Posed) {
+    pub(super) fn unstage_poses(&mut self, posed: &Posed) {
         self.deformed.retain(|object| !posed.objects.contains(object));
-        posed.put_back(self.scene.objects_mut());
     }
 
     /// Refits the objects that get new positions, and notes that their instances have changed.

@@ -158,7 +158,7 @@ impl SceneBuilder {
             },
             Err(failed) => {
                 self.undo_refit();
-                self.unstage_poses(posed);
+                self.unstage_poses(&posed);
                 let (code, expected, found) = failed.error.words();
                 let found = format!("{found}: {}", self.describe(failed.instance));
                 return Err(Error::of_call(code, expected, found));

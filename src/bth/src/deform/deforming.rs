@@ -35,15 +35,7 @@ impl Deforming {
     /// # Errors
     /// `BTH-S006` if the object is not deformable, `BTH-O001` if there is not enough memory.
     pub(crate) fn new(file: &File, object: u32) -> Result<Deforming, Error> {
-        Deforming::of_segment(file, object, object)
-    }
-
-    /// An object with the positions of its file and the hierarchy of a segment, which is an object of equal source.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
-    pub(crate) fn of_segment(file: &File, object: u32, segment: u32) -> Result<Deforming, Error> {
-        let object = DeformedObject::of_segment(file, object, segment)?;
+        let object = DeformedObject::new(file, object)?;
         let view = object.view();
         let plan = RefitPlan::new(view);
         let compiled_cost = cost(&view.lines[..plan.node_lines as usize]);

@@ -3,13 +3,13 @@
 use super::by_object::ByObject;
 use super::evaluate::{self, Vertices};
 use super::pose::{Pose, SkinMatrices};
-use super::sequences::{Moved, Sequences};
+use super::sequences::Sequences;
 use crate::clock;
 use crate::nodes::NodeHierarchy;
 use crate::objects::Objects;
-use bth_format::File;
 use bth_format::error::{Code, Error, Result};
 use bth_format::layout::*;
+use bth_format::{File, FramePosition};
 use std::collections::HashSet;
 use std::time::Duration;
 
@@ -24,13 +24,13 @@ pub(crate) struct Deformers {
     sequences: Sequences,
 }
 
-/// Objects that are to be refitted: their positions are staged. Either [`Deformers::keep`] or [`Self::put_back`] has to follow.
+/// Objects that are to be refitted: their positions are staged.
 #[derive(Debug, Default)]
 pub(crate) struct Posed {
     /// The objects, each once.
     pub(crate) objects: Vec<u32>,
     poses: Vec<(u32, Pose)>,
-    moved: Moved,
+    moved: Vec<(u32, FramePosition)>,
 }
 
 /// What an update of a file's deformers did.
@@ -49,11 +49,6 @@ impl Posed {
         self.objects.extend(other.objects);
         self.poses.extend(other.poses);
         self.moved.extend(other.moved);
-    }
-
-    /// Gives objects the hierarchies that they had before.
-    pub(crate) fn put_back(&mut self, objects: &mut Objects) {
-        self.moved.put_back(objects);
     }
 }
 
@@ -93,12 +88,13 @@ impl Deformers {
         size_of_val(skinned) + size_of_val(poses) + of_poses + self.sequences.bytes()
     }
 
-    /// Stages new positions of the objects of a file that have others than at the last update, and gives them the hierarchies of
-    /// their segments, by the nodes of a hierarchy as at a time. The objects of the file start at `first_object`; those that `skips`
-    /// names keep what they have.
+    /// Stages new positions of the objects of a file whose pose or time has changed since the last
+    /// update, by the nodes of a hierarchy as at a time. The objects of the file start at
+    /// `first_object`; those that `skips` names keep their positions.
     ///
     /// # Errors
-    /// `BTH-S002` if a position would not be finite, with the node; `BTH-O001` if there is not enough memory. Nothing has changed then.
+    /// `BTH-S002` if a position would not be finite, with the node; `BTH-O001` if there is not enough
+    /// memory. No positions but the staged ones have changed then.
     pub(crate) fn stage(
         &self,
         objects: &mut Objects,
@@ -107,7 +103,7 @@ impl Deformers {
         skips: &dyn Fn(u32) -> bool,
     ) -> Result<Posed> {
         let moved = self.sequences.stage(objects, (file, first_object), seconds, skips)?;
-        let mut posed = Posed { objects: moved.objects().collect(), poses: Vec::new(), moved };
+        let mut posed = Posed { objects: moved.iter().map(|row| row.0).collect(), poses: Vec::new(), moved };
         let Some(view) = file.scene() else { return Ok(posed) };
         let mut matrices = SkinMatrices::new(&view, hierarchy);
         for (row, deformer) in view.deformers.iter().enumerate() {
@@ -117,11 +113,10 @@ impl Deformers {
                 continue;
             }
             let pose = Pose::of(&mut matrices, deformer, seconds);
-            if self.poses.get(object) == Some(&pose) && !posed.moved.is_replaced(object) {
+            if self.poses.get(object) == Some(&pose) {
                 continue;
             }
             if let Err(error) = stage_pose(objects, (file, deformer.object), object, &pose) {
-                posed.put_back(objects);
                 if error.code() != Code::NewPositions {
                     return Err(error);
                 }
@@ -133,10 +128,8 @@ impl Deformers {
                 return Err(file.locate(error, NONE));
             }
             posed.poses.push((object, pose));
-            // No other deformer has the object (BTH-F180).
-            if !posed.moved.has(object) {
-                posed.objects.push(object);
-            }
+            // No other deformer has the object (BTH-F180), and it has no frames (BTH-F186).
+            posed.objects.push(object);
         }
         Ok(posed)
     }
@@ -184,15 +177,12 @@ fn stage_pose(objects: &mut Objects, (file, row): (&File, u32), object: u32, pos
 }
 
 impl Deformed {
-    /// Gives the objects the positions and hierarchies that they had before the update.
-    pub(crate) fn undo(mut self, objects: &mut Objects) {
-        for object in &self.posed.objects {
-            if !self.posed.moved.is_replaced(*object)
-                && let Ok(deforming) = objects.deforming(*object)
-            {
+    /// Gives the objects the positions that they had before the update.
+    pub(crate) fn undo(self, objects: &mut Objects) {
+        for object in self.posed.objects {
+            if let Ok(deforming) = objects.deforming(object) {
                 deforming.undo();
             }
         }
-        self.posed.put_back(objects);
     }
 }

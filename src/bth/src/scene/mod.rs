@@ -97,7 +97,6 @@ impl Scene {
         }
         file.check_object_names()?;
         file.check_images()?;
-        file.check_segments()?;
         Scene::with_world(file)
     }
 

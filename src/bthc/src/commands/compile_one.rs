@@ -29,7 +29,8 @@ fn compile_job(context: &JobContext<'_>, job: &Job, monitor: &dyn Monitor) -> Re
     }
     let cache = cache(context, job);
     let needed = |record: &_| job.target.needs(record, context.store.as_ref());
-    let outcome = bth_compile::cached::compile(&job.model, &context.options, &cache, &needed, monitor)?;
+    let outcome =
+        bth_compile::pipeline::compile_cached(&job.model, &context.options, &cache, &needed, monitor)?;
     let files = || {
         let mut files = bth_compile::source::files(&job.model, context.options.looks())?;
         files.extend(context.args.selection.files().cloned());

@@ -5,7 +5,7 @@ use super::scene;
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Progress;
-use bth_compile::cached::{self, DryRun};
+use bth_compile::pipeline::{self, DryRun};
 use serde_json::json;
 
 /// Prints for each job what would be done.
@@ -19,7 +19,9 @@ pub(super) fn show(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -
         let cache = cache(context, job);
         let found = match scene::is_scene(&job.model, context.args) {
             true => scene::dry_run(context, job, &cache, &progress),
-            false => cached::dry_run(&job.model, &context.options, &cache, &progress).map_err(Failure::from),
+            false => {
+                pipeline::dry_run(&job.model, &context.options, &cache, &progress).map_err(Failure::from)
+            }
         };
         let found = found.map_err(|failure| job.failure(failure))?;
         let (what, why) = action(context, job, &found);

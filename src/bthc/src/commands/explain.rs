@@ -17,7 +17,6 @@ use bth_import::{Keep, Mesh};
 use serde_json::{Value, json};
 use std::cmp::Reverse;
 use std::path::Path;
-use std::time::Instant;
 
 pub(crate) fn run(args: &Explain) -> Result<(), Failure> {
     let mut options = pipeline::CompileOptions { geometry: false, ..pipeline::CompileOptions::default() };
@@ -151,10 +150,8 @@ fn free_directions(
     path: &Path,
     progress: &Progress,
 ) -> Result<FreeReport, Failure> {
-    let start = Instant::now();
     let all = FreeOptions { keep: KeepFree::All, ..FreeOptions::default() };
     let (free, mut report) = free::find(mesh, tree, &all, progress)?;
-    report.seconds = start.elapsed().as_secs_f64();
     let (kept, worth) = free::worthwhile(mesh, tree, &all, progress)?;
     (report.kept, report.worth) = (kept, Some(worth));
     progress.stage("picture", None);
@@ -177,7 +174,7 @@ fn free_line(path: &Path, free: &FreeReport) -> String {
     let bytes = |row: usize| count(free.triangles * row as u64);
     format!(
         "wrote {}: from dark, where rays of no direction are known to meet nothing, to yellow, where all are; directions that are free up to a \
-         distance count in part\n{:.0} % of directions free; up to the distances {} {:.0} %, {:.0} %, {:.0} %; {:.1} s\n\
+         distance count in part\n{:.0} % of directions free; up to the distances {} {:.0} %, {:.0} %, {:.0} %\n\
          {}: {} by --free-directions auto\n",
         path.display(),
         100.0 * free.free,
@@ -185,7 +182,6 @@ fn free_line(path: &Path, free: &FreeReport) -> String {
         100.0 * free.beyond[0],
         100.0 * free.beyond[1],
         100.0 * free.beyond[2],
-        free.seconds,
         free.worth.unwrap_or_default(),
         match free.kept {
             Kept::None => "not kept".to_owned(),

@@ -86,7 +86,7 @@ fn describe(file: &File) -> Result<Value, Failure> {
             "tets": view.records.len(), "tet_triangles": view.tet_faces.len(),
             "holes": holes(&view).map(|h| json!({"triangles": h.triangles, "opaque": h.shares[0],
                 "transparent": h.shares[1], "unknown": h.shares[2]})),
-            "frames": file.sequence(i).times.len(), "segments": segments(file, i),
+            "frames": file.sequence(i).times.len(),
             "free_directions": free_directions(&view),
             "name": file.object_name(i), "groups": groups(&view),
             "materials": (0..view.materials.len() as u32).map(|m| view.material_name(m)).collect::<Vec<_>>(),
@@ -127,13 +127,6 @@ fn free_directions(view: &ObjectView<'_>) -> Value {
     json!({"triangles": known as f64 / triangles, "bins": bins as f64 / (triangles * FREE_BINS as f64),
         "beyond": beyond.map(|count| count as f64 / (sides * triangles * FREE_SECTORS as f64)),
         "levels": levels.distance, "bytes": rows as usize * view.free_kind().1})
-}
-
-/// Seconds from which the hierarchies of an object apply, and the objects that hold them; empty
-/// where one applies always.
-fn segments(file: &File, object: u32) -> Vec<Value> {
-    let rows = file.sequence(object).segments.iter();
-    rows.map(|row| json!({"first": row.first, "object": object.saturating_add(row.object)})).collect()
 }
 
 /// The groups of an object with their numbers of triangles; empty where the file keeps none.
@@ -268,10 +261,6 @@ fn add_object(facts: &mut Table, file: &File, object: u32) -> Result<(), Failure
     if let ([first, ..], [.., last]) = (sequence.times, sequence.times) {
         let frames = format!("{} from {first} to {last} s", sequence.times.len());
         facts.row(["frames of its vertices", &frames]);
-    }
-    for segment in sequence.segments {
-        let of = object.saturating_add(segment.object);
-        facts.row(["tree of", &format!("object {of} from {} s", segment.first)]);
     }
     facts.row(["tet leaves", &count(view.tet_leaves.len() as u64)]);
     facts.row(["triangles in tet leaves", &count(view.tet_faces.len() as u64)]);

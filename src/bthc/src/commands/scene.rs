@@ -7,7 +7,8 @@ use crate::args::{Compile, Gltf};
 use crate::failure::Failure;
 use crate::table::{Table, bytes, count, seconds};
 use bth_compile::Monitor;
-use bth_compile::cached::{Cache, DryRun};
+use bth_compile::cached::Cache;
+use bth_compile::pipeline::DryRun;
 use bth_compile::scene::{self, CachePolicy, SceneReport, SceneSource};
 use bth_compile::source;
 use bth_import::Looks;
@@ -147,16 +148,7 @@ fn motion(facts: &mut Table, report: &SceneReport) {
             facts.row([format!("frames of {name}, positions"), frames].each_ref().map(String::as_str));
         }
         if motion.poses > 1 {
-            let label = format!("cost of rays to {name}, over trees for each pose");
-            let cost = format!("{:.2}, at most {:.2}", motion.cost_ratio, motion.worst_cost_ratio);
-            facts.row([label, cost].each_ref().map(String::as_str));
-        }
-        if let [_, later @ ..] = &motion.segments[..]
-            && !later.is_empty()
-        {
-            let times: Vec<_> = later.iter().map(|segment| format!("{:.3} s", segment.first)).collect();
-            let text = format!("{}, from {}", motion.segments.len(), times.join(", "));
-            facts.row([format!("trees of {name} for ranges of time"), text].each_ref().map(String::as_str));
+            facts.row([format!("poses for the tree of {name}").as_str(), &motion.poses.to_string()]);
         }
     }
 }
@@ -172,9 +164,7 @@ fn summary(report: &SceneReport) -> String {
     let mut facts = Table::default();
     facts.row(["nodes", &count(report.nodes)]);
     facts.row(["instances", &count(report.instances)]);
-    // Objects of later ranges of time are not counted, and have no name of their own.
-    let objects = report.objects.iter().filter(|object| object.segment_from.is_none()).count();
-    facts.row(["objects", &count(objects as u64)]);
+    facts.row(["objects", &count(report.objects.len() as u64)]);
     let stored_once = report.objects.iter().map(|object| object.names.len().saturating_sub(1) as u64).sum();
     row_unless_zero(&mut facts, "objects of equal geometry, stored once", stored_once);
     row_unless_zero(&mut facts, "objects that nobody sees, left out", report.unused.len() as u64);

@@ -31,22 +31,20 @@ pub(super) fn summary(report: &CompileReport, known_rays: u64) -> String {
     row_unless_zero(&mut facts, "known rays", known_rays);
     if let Some(free) = &report.free {
         let [near, middle, far] = free.beyond.map(|share| 100.0 * share);
-        let (all, seconds) = (100.0 * free.free, free.seconds);
-        let shares = format!("{all:.0} %, up to distances {near:.0} %, {middle:.0} %, {far:.0} %");
+        let shares =
+            format!("{:.0} %, up to distances {near:.0} %, {middle:.0} %, {far:.0} %", 100.0 * free.free);
         let told = match free.kept {
             Kept::None if free.undecided => {
                 "left out of objects so large; --free-directions auto finds them".to_owned()
             }
             Kept::None if free.worth.is_none_or(|worth| worth.is_unmeasured()) => {
-                format!(
-                    "none kept: no ray met the model, or the limit on bytes leaves no room, {seconds:.1} s"
-                )
+                "none kept: no ray met the model, or the limit on bytes leaves no room".to_owned()
             }
             Kept::None => {
-                format!("not worth their bytes, {seconds:.1} s: {}", free.worth.unwrap_or_default())
+                format!("not worth their bytes: {}", free.worth.unwrap_or_default())
             }
-            Kept::Distances => format!("{shares}; distances kept, {seconds:.1} s"),
-            Kept::Directions => format!("{shares}; kept, {seconds:.1} s"),
+            Kept::Distances => format!("{shares}; distances kept"),
+            Kept::Directions => format!("{shares}; kept"),
         };
         facts.row(["free directions", &told]);
     }

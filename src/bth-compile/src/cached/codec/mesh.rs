@@ -1,169 +1,65 @@
 //! Bytes of a mesh and of all that belongs to it.
 
-use super::super::rows::{RowReader, RowWriter};
-use super::Codec;
-use bth_format::layout::{MaterialParameters, NONE, Texture};
+use super::super::rows::{RowReader, Sink};
+use super::{Codec, by_fields};
+use bth_format::layout::{self, NONE};
 use bth_import::{Attributes, Deformation, Group, Groups, Materials, Mesh, Sequence, TriangleOpacities};
 
-impl Codec for Mesh {
-    fn write(&self, to: &mut RowWriter) {
-        to.add(&self.positions);
-        to.add(&self.triangles);
-        let has_groups = if self.groups.is_some() { HAS_GROUPS } else { 0 };
-        let has_materials = if self.materials.is_some() { HAS_MATERIALS } else { 0 };
-        let has_sequence = if self.sequence.is_some() { HAS_SEQUENCE } else { 0 };
-        let has_deformation = if self.deformation.is_some() { HAS_DEFORMATION } else { 0 };
-        let has_attributes = u8::from(self.attributes.is_some());
-        to.add(&[has_attributes | has_groups | has_materials | has_sequence | has_deformation]);
-        if let Some(attributes) = &self.attributes {
-            to.add(&attributes.corners);
-            to.add(&attributes.normals);
-            to.add(&attributes.uvs);
-        }
-        if let Some(groups) = &self.groups {
-            groups.write(to);
-        }
-        if let Some(materials) = &self.materials {
-            materials.write(to);
-        }
-        if let Some(sequence) = &self.sequence {
-            to.add(&sequence.times);
-            to.add(&sequence.positions);
-        }
-        if let Some(deformation) = &self.deformation {
-            deformation.write(to);
-        }
-        // Without opacity nothing is added, so that such meshes are the bytes that they were before there was any.
-        if let Some(opacity) = &self.opacity {
-            to.add(&opacity.rows);
-            to.add(&opacity.micro);
-        }
+by_fields! {
+    Mesh { positions, triangles, attributes, opacity, groups, materials, sequence, deformation } fits;
+    Attributes { corners, normals, uvs } |_| true;
+    TriangleOpacities { rows, micro } |_| true;
+    Materials { parameters, textures, color_corners, colors, second_corners, second_uvs } textures_exist;
+    Sequence { times, positions } |_| true;
+    // Rows that do not fit each other are found in the file that is made from them.
+    Deformation { counts, joints, weights, morphs, morph_rows, deltas } |_| true;
+}
+
+impl Codec for layout::Deformation {
+    fn write(&self, to: &mut impl Sink) {
+        to.add(std::slice::from_ref(self));
     }
 
     fn read(from: &mut RowReader<'_>) -> Option<Self> {
-        let (positions, triangles): (Vec<[f32; 3]>, Vec<[u32; 3]>) = (from.take()?, from.take()?);
-        let parts = from.one::<u8>()?;
-        let attributes = match parts & 1 {
-            0 => None,
-            _ => Some(Attributes { corners: from.take()?, normals: from.take()?, uvs: from.take()? }),
-        };
-        let groups = match parts & HAS_GROUPS {
-            0 => None,
-            _ => Some(Groups::read(from)?),
-        };
-        let materials = match parts & HAS_MATERIALS {
-            0 => None,
-            _ => Some(Materials::read(from)?),
-        };
-        let sequence = match parts & HAS_SEQUENCE {
-            0 => None,
-            _ => Some(Sequence { times: from.take()?, positions: from.take()? }),
-        };
-        let deformation = match parts & HAS_DEFORMATION {
-            0 => None,
-            _ => Some(Deformation::read(from)?),
-        };
-        let opacity = match from.is_empty() {
-            true => None,
-            false => Some(TriangleOpacities { rows: from.take()?, micro: from.take()? }),
-        };
-        let within =
-            |rows: &[[u32; 3]], count: usize| rows.as_flattened().iter().all(|r| (*r as usize) < count);
-        let attributes_fit = attributes.as_ref().is_none_or(|a| {
-            a.corners.len() == triangles.len()
+        from.one()
+    }
+}
+
+/// Returns true if all rows of a mesh are in range and fit each other.
+fn fits(mesh: &Mesh) -> bool {
+    let Mesh { positions, triangles, attributes, opacity, groups, materials, sequence, deformation: _ } =
+        mesh;
+    let within = |rows: &[[u32; 3]], count: usize| rows.as_flattened().iter().all(|r| (*r as usize) < count);
+    let one_each = |rows: usize| rows == triangles.len();
+    let none_or_one_each = |rows: usize| rows == 0 || one_each(rows);
+    let known = groups.as_ref().map_or(0, |g| g.materials.len());
+    within(triangles, positions.len())
+        && attributes.as_ref().is_none_or(|a| {
+            one_each(a.corners.len())
                 && [a.normals.len(), a.uvs.len()].iter().all(|&n| n == 0 || within(&a.corners, n))
-        });
-        let opacity_fits = opacity.as_ref().is_none_or(|o| o.rows.len() == triangles.len());
-        let groups_fit = groups
-            .as_ref()
-            .is_none_or(|g| g.runs.last().is_none_or(|run| (run[0] as usize) < triangles.len()));
-        let known = groups.as_ref().map_or(0, |g: &Groups| g.materials.len());
-        let materials_fit = materials.as_ref().is_none_or(|m: &Materials| {
+        })
+        && opacity.as_ref().is_none_or(|o| one_each(o.rows.len()))
+        && groups.as_ref().is_none_or(|g| g.runs.last().is_none_or(|run| (run[0] as usize) < triangles.len()))
+        && materials.as_ref().is_none_or(|m| {
             (m.parameters.is_empty() || m.parameters.len() == known)
-                && (m.color_corners.is_empty() || m.color_corners.len() == triangles.len())
+                && none_or_one_each(m.color_corners.len())
                 && within(&m.color_corners, m.colors.len())
-                && (m.second_corners.is_empty() || m.second_corners.len() == triangles.len())
+                && none_or_one_each(m.second_corners.len())
                 && within(&m.second_corners, m.second_uvs.len())
-        });
-        let sequence_fits = sequence.as_ref().is_none_or(|s: &Sequence| {
+        })
+        && sequence.as_ref().is_none_or(|s| {
             !s.times.is_empty() && s.times.len().checked_mul(positions.len()) == Some(s.positions.len())
-        });
-        let fits = attributes_fit
-            && sequence_fits
-            && opacity_fits
-            && groups_fit
-            && materials_fit
-            && within(&triangles, positions.len());
-        fits.then_some(Mesh {
-            positions,
-            triangles,
-            attributes,
-            opacity,
-            groups,
-            materials,
-            sequence,
-            deformation,
         })
-    }
 }
 
-/// Bit of the byte that says what follows the triangles of a mesh; the lowest stands for attributes.
-const HAS_GROUPS: u8 = 2;
-/// As [`HAS_GROUPS`], for how materials look.
-const HAS_MATERIALS: u8 = 4;
-/// As [`HAS_GROUPS`], for the frames of a sequence.
-const HAS_SEQUENCE: u8 = 16;
-
-/// As [`HAS_GROUPS`], for what moves the vertices.
-const HAS_DEFORMATION: u8 = 8;
-
-// Whether the rows fit each other is not checked here: the file that is made from them is.
-impl Codec for Deformation {
-    fn write(&self, to: &mut RowWriter) {
-        to.add(std::slice::from_ref(&self.counts));
-        to.add(&self.joints);
-        to.add(&self.weights);
-        to.add(&self.morphs);
-        to.add(&self.morph_rows);
-        to.add(&self.deltas);
-    }
-
-    fn read(from: &mut RowReader<'_>) -> Option<Self> {
-        Some(Deformation {
-            counts: from.one()?,
-            joints: from.take()?,
-            weights: from.take()?,
-            morphs: from.take()?,
-            morph_rows: from.take()?,
-            deltas: from.take()?,
-        })
-    }
-}
-
-impl Codec for Materials {
-    fn write(&self, to: &mut RowWriter) {
-        to.add(&self.parameters);
-        to.add(&self.textures);
-        to.add(&self.color_corners);
-        to.add(&self.colors);
-        to.add(&self.second_corners);
-        to.add(&self.second_uvs);
-    }
-
-    fn read(from: &mut RowReader<'_>) -> Option<Self> {
-        let (parameters, textures): (Vec<MaterialParameters>, Vec<Texture>) = (from.take()?, from.take()?);
-        let known = |row: u32| row == NONE || (row as usize) < textures.len();
-        let fits = |p: &MaterialParameters| known(p.base_color_texture) && known(p.emissive_texture);
-        let fits = parameters.iter().all(fits);
-        let (color_corners, colors) = (from.take()?, from.take()?);
-        let (second_corners, second_uvs) = (from.take()?, from.take()?);
-        let all = Materials { parameters, textures, color_corners, colors, second_corners, second_uvs };
-        fits.then_some(all)
-    }
+/// Returns true if all textures that parameters refer to exist.
+fn textures_exist(materials: &Materials) -> bool {
+    let known = |row: u32| row == NONE || (row as usize) < materials.textures.len();
+    materials.parameters.iter().all(|p| known(p.base_color_texture) && known(p.emissive_texture))
 }
 
 impl Codec for Groups {
-    fn write(&self, to: &mut RowWriter) {
+    fn write(&self, to: &mut impl Sink) {
         let names = self.groups.iter().map(|group| group.name.as_str());
         let names: Vec<&str> = names.chain(self.materials.iter().map(String::as_str)).collect();
         let material = |group: &Group| group.material.unwrap_or(u32::MAX);
@@ -200,7 +96,7 @@ impl Codec for Groups {
 mod tests {
     use super::super::{decode, encode};
     use super::*;
-    use bth_format::layout::Morph;
+    use bth_format::layout::{MaterialParameters, Morph, Texture};
 
     fn parameters(base_color_texture: u32) -> MaterialParameters {
         MaterialParameters {

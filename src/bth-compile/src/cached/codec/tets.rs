@@ -1,17 +1,18 @@
 //! Bytes of a tetrahedralization.
 
-use super::super::rows::{RowReader, RowWriter};
+use super::super::rows::{RowReader, Sink};
 use super::Codec;
 use crate::tets::{Behind, Face, TetMesh};
 
-/// The flag of a constrained face in the number that encodes the neighbour across a face: a tetrahedron, 2³¹ + a
-/// constrained face, or all bits set for the hull.
+/// The flag of a constrained face in the number that encodes the neighbour across a face: a
+/// tetrahedron, 2³¹ + a constrained face, or all bits set for the hull.
 const FACE: u32 = 1 << 31;
 const HULL: u32 = u32::MAX;
 
-/// In the cache the faces of a tetrahedralization refer to triangles by their number within the node.
+/// In the cache the faces of a tetrahedralization refer to triangles by their number within the
+/// node.
 impl Codec for TetMesh {
-    fn write(&self, to: &mut RowWriter) {
+    fn write(&self, to: &mut impl Sink) {
         let code = |behind: &Behind| match *behind {
             Behind::Tet(tet) => tet,
             Behind::Face(face) => FACE | face,

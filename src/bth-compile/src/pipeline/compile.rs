@@ -1,18 +1,23 @@
-//! The compilation of a model through the cache.
+//! The compilation of a model through the cache, from a file or from memory.
 
-use super::warnings::with_warnings;
-use super::{Cache, CachedStages, Miss, keys, replay};
+use super::compiler::Compiler;
+use super::keys;
+use super::limit::warn_over_limit;
+use super::object::Compiled;
+use super::report::{CompileReport, FileReport};
+use crate::cached::{Cache, Miss, replay, with_warnings};
 use crate::error::{Error, Result};
 use crate::monitor::{Monitor, Recording};
 use crate::options::{CompileOptions, Structure};
-use crate::pipeline::{Clock, CompileReport, FileReport, compile_imported, compile_model, warn_over_limit};
 use crate::source::{MESH_NAME, Model, SourceDigest, TriangleMesh};
+use crate::stage::Clock;
 use crate::write::Content;
 use bth_cache::{Key, Record};
 use bth_import::import_triangles;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::borrow::Cow;
+use std::cell::OnceCell;
 use std::path::Path;
 
 /// Result of a compilation through the cache.
@@ -28,12 +33,23 @@ pub struct CachedCompilation<R> {
     pub report: Value,
 }
 
+impl<R> CachedCompilation<R> {
+    /// The content and the report of a compilation without a cache.
+    pub(crate) fn into_built(self) -> (Content, R) {
+        match (self.content, self.built) {
+            (Some(content), Some(report)) => (content, report),
+            _ => unreachable!("without a cache everything is built"),
+        }
+    }
+}
+
 /// Prediction of a compilation through the cache.
 #[derive(Clone, Debug, Default)]
 pub struct DryRun {
     /// The record of the compiled file, if the cache has it.
     pub record: Option<Record>,
-    /// Differences from the last compilation of the same source, if the cache does not have the file.
+    /// Differences from the last compilation of the same source, if the cache does not have the
+    /// file.
     pub because: Vec<String>,
     /// Objects of a scene that would be built.
     pub parts: Vec<Miss>,
@@ -54,7 +70,62 @@ impl DryRun {
     }
 }
 
-/// What [`compile`] would do. Only reads and hashes the model.
+/// What a file with one object is made from.
+#[derive(Clone, Copy)]
+pub(crate) enum Source<'a> {
+    /// A model file.
+    Model(&'a Path),
+    /// Triangles in memory. Their imported mesh is not kept in the cache.
+    Triangles(TriangleMesh<'a>),
+}
+
+impl<'a> Source<'a> {
+    /// Its path, or its name in messages.
+    fn path(self) -> &'a Path {
+        match self {
+            Source::Model(path) => path,
+            Source::Triangles(_) => Path::new(MESH_NAME),
+        }
+    }
+
+    /// Reads and hashes it.
+    fn digest(self, options: &CompileOptions) -> Result<SourceDigest> {
+        match self {
+            Source::Model(path) => SourceDigest::of(path, options.looks()),
+            Source::Triangles(mesh) => Ok(SourceDigest::of_triangles(mesh)),
+        }
+    }
+}
+
+/// Compiles a model.
+///
+/// # Errors
+/// Those of the stages: a source that cannot be used or read, a limit of the format, cancellation.
+pub fn compile(
+    source: &Path,
+    options: &CompileOptions,
+    monitor: &dyn Monitor,
+) -> Result<(Compiled, CompileReport)> {
+    let (content, report) = compile_cached(source, options, &Cache::none(), &|_| true, monitor)?.into_built();
+    Ok((Compiled { bytes: joined(&content)?.into_owned() }, report))
+}
+
+/// Compiles a model, or takes results from the cache that were made from the same content. `needed`
+/// decides whether the bytes of a file in the cache are read.
+///
+/// # Errors
+/// As [`compile`]; `BTH-O002` when the model changes meanwhile.
+pub fn compile_cached(
+    source: &Path,
+    options: &CompileOptions,
+    cache: &Cache<'_>,
+    needed: &dyn Fn(&Record) -> bool,
+    monitor: &dyn Monitor,
+) -> Result<CachedCompilation<CompileReport>> {
+    compile_source(Source::Model(source), options, cache, needed, monitor)
+}
+
+/// What [`compile_cached`] would do. Only reads and hashes the model.
 ///
 /// # Errors
 /// When the model cannot be read.
@@ -64,17 +135,13 @@ pub fn dry_run(
     cache: &Cache<'_>,
     monitor: &dyn Monitor,
 ) -> Result<DryRun> {
-    let (_, key) = identify(source, options, cache, monitor, &mut Clock::default())?;
+    let (_, key) = identify(Source::Model(source), options, cache, monitor, &mut Clock::default())?;
     Ok(DryRun::of(key.as_ref(), cache, monitor))
 }
 
-/// Compiles a model, or takes results from the cache that were made from the same content. `needed` decides whether the bytes
-/// of a file in the cache are read.
-///
-/// # Errors
-/// As [`crate::pipeline::compile`]; `BTH-O002` when the model changes meanwhile.
-pub fn compile(
-    source: &Path,
+/// As [`compile_cached`], also for triangles in memory.
+pub(crate) fn compile_source(
+    source: Source<'_>,
     options: &CompileOptions,
     cache: &Cache<'_>,
     needed: &dyn Fn(&Record) -> bool,
@@ -82,74 +149,54 @@ pub fn compile(
 ) -> Result<CachedCompilation<CompileReport>> {
     let mut clock = Clock::default();
     let (digest, key) = identify(source, options, cache, monitor, &mut clock)?;
-    let model = Model { path: source, digest: &digest };
+    let model = Model { path: source.path(), digest: &digest };
     let outcome = compile_or_fetch(cache, key.as_ref(), needed, monitor, |monitor| {
-        let stages = &mut CachedStages::of_model(cache);
-        let (file, report) = compile_model(&model, options, stages, clock, monitor)?;
+        let mut compiler =
+            Compiler { source: model.path, part: "", options, cache, clock: &mut clock, monitor };
+        let imported = match source {
+            Source::Model(_) => compiler.import(&model)?,
+            Source::Triangles(TriangleMesh { positions, triangles }) => {
+                let import = || import_triangles(model.path, positions, triangles, options.wanted(), monitor);
+                let (mesh, report) = compiler.clock.time("mesh", import)?;
+                (mesh, report, OnceCell::new())
+            }
+        };
+        let (file, report) = compiler.file(&model, imported)?;
         Ok((file.into(), report, true))
     })?;
-    warn_if_over_limit(&outcome.report, options, monitor);
-    Ok(outcome)
-}
-
-/// As [`compile`], for triangles in memory. The imported mesh itself is not kept.
-///
-/// # Errors
-/// As [`crate::memory::compile`].
-pub(crate) fn compile_triangles(
-    mesh: TriangleMesh<'_>,
-    options: &CompileOptions,
-    cache: &Cache<'_>,
-    needed: &dyn Fn(&Record) -> bool,
-    monitor: &dyn Monitor,
-) -> Result<CachedCompilation<CompileReport>> {
-    let mut clock = Clock::default();
-    let digest = clock.time("hash", || SourceDigest::of_triangles(mesh));
-    let model = Model { path: Path::new(MESH_NAME), digest: &digest };
-    let tetgen = tetgen_in_keys(options, cache, monitor)?;
-    let key = tetgen.map(|tetgen| keys::file(&digest, model.path, options, &tetgen));
-    let outcome = compile_or_fetch(cache, key.as_ref(), needed, monitor, |monitor| {
-        let import =
-            || import_triangles(model.path, mesh.positions, mesh.triangles, options.wanted(), monitor);
-        let imported = clock.time("mesh", import)?;
-        let stages = &mut CachedStages::of_model(cache);
-        let (file, report) = compile_imported(&model, imported, options, stages, clock, monitor)?;
-        Ok((file.into(), report, true))
-    })?;
-    warn_if_over_limit(&outcome.report, options, monitor);
-    Ok(outcome)
-}
-
-/// Warns if the file that a report is about is over the limit on bytes.
-fn warn_if_over_limit(report: &Value, options: &CompileOptions, monitor: &dyn Monitor) {
-    if let Ok(file) = FileReport::deserialize(&report["file"]) {
+    if let Ok(file) = FileReport::deserialize(&outcome.report["file"]) {
         warn_over_limit(&file, options, monitor);
     }
+    Ok(outcome)
 }
 
-/// Hashes a model. Returns its key too, if the compiled file may be kept.
+/// Hashes a source. Returns its key too, if the compiled file may be kept.
 fn identify(
-    source: &Path,
+    source: Source<'_>,
     options: &CompileOptions,
     cache: &Cache<'_>,
     monitor: &dyn Monitor,
     clock: &mut Clock,
 ) -> Result<(SourceDigest, Option<Key>)> {
+    if cache.store().is_none() {
+        return Ok((clock.time("hash", || source.digest(options))?, None));
+    }
     // In parallel, because starting the worker takes as long as hashing a small model.
     let (digest, tetgen) = std::thread::scope(|scope| {
         let name = || tetgen_in_keys(options, cache, monitor);
         let tetgen = std::thread::Builder::new().spawn_scoped(scope, name);
-        let digest = clock.time("hash", || SourceDigest::of(source, options.looks()));
+        let digest = clock.time("hash", || source.digest(options));
         // Where the system gives no more threads, one after the other.
         (digest, tetgen.map_or_else(|_| Ok(name()), |tetgen| tetgen.join()))
     });
     let digest = digest?;
     let tetgen = tetgen.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
-    let key = tetgen.map(|tetgen| keys::file(&digest, source, options, &tetgen));
+    let key = tetgen.map(|tetgen| keys::file(&digest, source.path(), options, &tetgen));
     Ok((digest, key))
 }
 
-/// The name of the tetrahedralizer in keys, empty if none is needed; `None` when nothing may be kept.
+/// The name of the tetrahedralizer in keys, empty if none is needed; `None` when nothing may be
+/// kept.
 pub(crate) fn tetgen_in_keys(
     options: &CompileOptions,
     cache: &Cache<'_>,
@@ -164,8 +211,8 @@ pub(crate) fn tetgen_in_keys(
     }
 }
 
-/// The file of a key: from the cache if it is there, else built, by one process if several want the same. `build` also
-/// returns whether the bytes are to be kept.
+/// The file of a key: from the cache if it is there, else built, by one process if several want the
+/// same. `build` also returns whether the bytes are to be kept.
 pub(crate) fn compile_or_fetch<R: Serialize>(
     cache: &Cache<'_>,
     key: Option<&Key>,

@@ -15,7 +15,7 @@ const NOTED: &str = "\
 bvh 3 85ced845a2e06b3c60ec6905522a8ae3914e4cb9826bc17089f4ec97abdefd04
 file 4.65536 ac1ef9fac53d0117947e01d17618a19a4761aa4ee1e8984b10d658c3e46d9347
 marks 1 f1700307c15a7f23fface5b89ee0ce399fac1b93c7dd43e36616475cc7f08b70
-mesh 7 2e8a3f74b02f7e74274f8b5c919979e536ff7bd5ca1ddeb6ece7be4e5c5f6c10
+mesh 8 08ac41aea839d3293886f59a13ccf58fcd23985d2d78e04e183f8aa68bed18fd
 ";
 
 /// As above for the tetrahedralization of a whole model, by the TetGen that made it: others make

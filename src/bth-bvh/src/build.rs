@@ -4,16 +4,12 @@ use super::binned_split::Centers;
 use super::bounds::Bounds;
 use super::extent::Extent;
 use super::split::Reference;
-use super::{BinaryBvh, Node, binned_split, linked_tree::LinkedTree, reinsertion, sweep_split};
+use super::{BinaryBvh, MAX_LEVELS, Node, binned_split, linked_tree::LinkedTree, reinsertion, sweep_split};
 use bth_import::error::{Error, Result};
 use bth_import::monitor::Monitor;
 use bth_import::{Mesh, is_zero_area};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-
-/// Edges on the longest path of a binary BVH that [`build`] makes; below
-/// `bth_format::limits::MAX_DEPTH`, since a wide node takes at least one level of the binary tree.
-pub const MAX_LEVELS: u32 = 90;
 
 /// Subtrees of more triangles are built as separate tasks, each of which first checks for
 /// cancellation.

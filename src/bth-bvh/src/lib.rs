@@ -43,7 +43,7 @@ pub mod testing;
 mod validate;
 
 use build::visits;
-pub use build::{BvhOptions, BvhReport, Effort, MAX_LEVELS, Quality, build};
+pub use build::{BvhOptions, BvhReport, Effort, Quality, build};
 pub use build_poses::{PoseOptions, build_poses};
 pub use collapse::{CollapseOptions, collapse};
 pub use places::triangle_places;
@@ -55,6 +55,10 @@ pub use wide::{CollapseReport, Wide};
 use bounds::Bounds;
 use rayon::prelude::*;
 use zerocopy::FromZeros;
+
+/// Edges on the longest path of a binary BVH that [`build()`] makes; below
+/// `bth_format::limits::MAX_DEPTH`, since a wide node takes at least one level of the binary tree.
+pub const MAX_LEVELS: u32 = 90;
 
 /// Largest number of poses over which the cost of a tree is summed.
 pub const MAX_POSES: usize = 16;

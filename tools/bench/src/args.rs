@@ -1,4 +1,5 @@
-//! The command line. Each command keeps its options in its own module; options of several commands are here.
+//! The command line. Each command keeps its options in its own module; options of several commands
+//! are here.
 
 use crate::rays::View;
 use crate::{accuracy, compare, load, paper, records, scenes, speed, stress};
@@ -40,36 +41,16 @@ pub(crate) enum Command {
     Probe(load::Probe),
 }
 
-/// The models, and where the cameras stand.
+/// The models, and the place of the cameras.
 #[derive(Debug, Args)]
 pub(crate) struct Models {
     /// Model files, folders of recorded rays, or models of `bth-scenes list` by NAME or NAME:FACES.
     #[arg(required = true, value_name = "MODEL")]
     pub(crate) models: Vec<String>,
-    #[command(flatten)]
-    pub(crate) seen_from: SeenFrom,
-}
-
-/// Where the cameras stand.
-#[derive(Clone, Copy, Debug, Default, Args)]
-pub(crate) struct SeenFrom {
-    /// Stand within the models, as is right for rooms; without this and --outside each model decides.
-    #[arg(long, conflicts_with = "outside")]
-    pub(crate) inside: bool,
-    /// Stand outside of the models.
-    #[arg(long)]
-    pub(crate) outside: bool,
-}
-
-impl SeenFrom {
-    /// The view that the options select.
-    pub(crate) fn view(&self) -> Option<View> {
-        match (self.inside, self.outside) {
-            (true, _) => Some(View::Inside),
-            (_, true) => Some(View::Outside),
-            _ => None,
-        }
-    }
+    /// Put the cameras outside of the models, or inside as is right for rooms; by default each
+    /// model decides.
+    #[arg(long, value_name = "WHERE")]
+    pub(crate) view: Option<View>,
 }
 
 /// How a command runs and where its report goes.
@@ -84,7 +65,7 @@ pub(crate) struct RunOptions {
     /// Write the figures there, as JSON.
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
-    /// Keep a report in this folder: DATE-NAME.md, DATE-NAME.json and charts.
+    /// Keep a report in this folder: DATE-NAME.md and DATE-NAME.json.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Name of the report; by default the command's.
@@ -102,10 +83,8 @@ impl RunOptions {
 /// Parses a share given in percent, such as `1%`, as a fraction.
 pub(crate) fn share(text: &str) -> Result<f64, String> {
     let number = text.strip_suffix('%').and_then(|n| n.trim().parse::<f64>().ok());
-    number
-        .filter(|p| (0.0..100.0).contains(p))
-        .map(|p| p / 100.0)
-        .ok_or_else(|| "expected a share such as 1%".to_owned())
+    let share = number.filter(|p| (0.0..100.0).contains(p)).map(|p| p / 100.0);
+    share.ok_or_else(|| "expected a share such as 1%".to_owned())
 }
 
 /// Parses a part of a file's name.

@@ -1,5 +1,5 @@
-//! Clocks. One thread is timed by its CPU clock, which skips the time of other jobs; several threads by the wall
-//! clock.
+//! Clocks. One thread is timed by its CPU clock, which skips the time of other jobs; several
+//! threads by the wall clock.
 
 use rustix::time::{ClockId, clock_gettime};
 use std::time::Instant;
@@ -23,9 +23,9 @@ impl Clock {
     pub(crate) fn time(self, work: impl FnOnce()) -> f64 {
         match self {
             Clock::ThreadCpu => {
-                let start = thread_cpu();
+                let start = read(ClockId::ThreadCPUTime);
                 work();
-                thread_cpu() - start
+                read(ClockId::ThreadCPUTime) - start
             }
             Clock::Wall => {
                 let start = Instant::now();
@@ -34,10 +34,6 @@ impl Clock {
             }
         }
     }
-}
-
-fn thread_cpu() -> f64 {
-    read(ClockId::ThreadCPUTime)
 }
 
 /// CPU seconds of this process so far, over all its threads.

@@ -2,14 +2,15 @@
 
 use crate::model::Model;
 use crate::names::Names;
-use crate::progress;
+use crate::output::progress;
 use crate::report::{Report, Subject};
 use crate::rivals::RIVALS;
 use crate::structures::{self, Compiled, Kind};
 use crate::tracer::Contender;
 use anyhow::Result;
 
-/// Builds the selected structures of ours and the selected rivals, which use `threads` threads if they can.
+/// Builds the selected structures of ours and the selected rivals, which use `threads` threads if
+/// they can.
 pub(crate) fn build(
     model: &Model,
     kinds: &[Kind],
@@ -25,7 +26,7 @@ pub(crate) fn build(
         if !kind.uses().any(|(name, _)| names.select(&name)) || no_tets && kind.is_tets() {
             continue;
         }
-        progress::show(format!("{}: compiling {}", model.name, kind.name));
+        progress(format!("{}: compiling {}", model.name, kind.name));
         let compiled = if kind.name == structures::BVH.name {
             Ok(bvh.clone())
         } else {
@@ -43,7 +44,7 @@ pub(crate) fn build(
         }
     }
     for rival in RIVALS.iter().filter(|r| names.select(r.name)) {
-        progress::show(format!("{}: building {}", model.name, rival.name));
+        progress(format!("{}: building {}", model.name, rival.name));
         match rival.build(model, threads) {
             Ok(contender) => built.push(contender),
             Err(error) => report.leave_out(&model.name, rival.name, &error),

@@ -1,7 +1,8 @@
 //! Measures bth and other CPU ray tracers on identical rays.
 //!
-//! `rays` makes the seeded ray sets; `structures` and `rivals` are the [`tracer::Contender`]s, which `contenders`
-//! builds. Each command of `args` is a module. Those that measure return a report of rows, which become Markdown, JSON and lines of `benchmarks/record`.
+//! `rays` makes the seeded ray sets; `structures` and `rivals` are the [`tracer::Contender`]s,
+//! which `contenders` builds. Each command of `args` is a module. Those that measure return a
+//! report of rows, which become Markdown, JSON and lines of `benchmarks/record`.
 #![warn(missing_docs)]
 
 mod accuracy;
@@ -18,7 +19,6 @@ mod moller_trumbore;
 mod names;
 mod output;
 mod paper;
-mod progress;
 pub mod rays;
 mod records;
 mod report;

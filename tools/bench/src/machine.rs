@@ -1,34 +1,21 @@
 //! Day, commit and type of machine for reports and rows, which hold no host names and no paths.
 
-use serde::Serialize;
 use std::process::Command;
 
-/// Type of machine.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct Machine {
-    /// The processor's name.
-    pub(crate) cpu: String,
-    /// Vector instructions that matter for ray tracing, best first.
-    pub(crate) isa: Vec<String>,
-    /// Logical cores that we may use.
-    pub(crate) logical_cores: usize,
-    /// Operating system.
-    pub(crate) os: String,
+/// Processor, vector instructions that our kernels can use, cores and operating system.
+pub(crate) fn describe() -> String {
+    let isas = bth::Isa::ALL.iter().filter(|isa| isa.is_available()).map(ToString::to_string);
+    let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
+    let (isas, os) = (isas.collect::<Vec<_>>().join("/"), std::env::consts::OS);
+    format!("{}, {isas}, {cores} logical cores, {os}", cpu())
 }
 
-impl Machine {
-    /// This machine.
-    pub(crate) fn this() -> Machine {
-        Machine {
-            cpu: cpu().unwrap_or_else(|| std::env::consts::ARCH.to_owned()),
-            isa: isa(),
-            logical_cores: std::thread::available_parallelism().map_or(1, |n| n.get()),
-            os: std::env::consts::OS.to_owned(),
-        }
-    }
+/// The processor's name.
+pub(crate) fn cpu() -> String {
+    cpu_of_linux().unwrap_or_else(|| std::env::consts::ARCH.to_owned())
 }
 
-fn cpu() -> Option<String> {
+fn cpu_of_linux() -> Option<String> {
     let text = std::fs::read_to_string("/proc/cpuinfo").ok()?;
     let field = |name: &str| {
         let line = text.lines().find(|l| l.split(':').next().is_some_and(|key| key.trim() == name))?;
@@ -40,18 +27,6 @@ fn cpu() -> Option<String> {
         (Some(family), Some(model)) => Some(format!("{name} (family {family}, model {model})")),
         _ => Some(name),
     }
-}
-
-fn isa() -> Vec<String> {
-    #[cfg(target_arch = "x86_64")]
-    let found = [
-        ("avx512", is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl")),
-        ("avx2", is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")),
-        ("sse4.2", is_x86_feature_detected!("sse4.2")),
-    ];
-    #[cfg(not(target_arch = "x86_64"))]
-    let found = [(std::env::consts::ARCH, true)];
-    found.iter().filter(|(_, has)| *has).map(|(name, _)| (*name).to_owned()).collect()
 }
 
 /// The commit that is measured, with a note when files differ from it; `None` outside a repository.

@@ -28,7 +28,8 @@ pub(crate) fn count(n: u64) -> String {
     text
 }
 
-/// Three significant digits. Large numbers keep all digits before the point; tiny ones have an exponent.
+/// Three significant digits. Large numbers keep all digits before the point; tiny ones have an
+/// exponent.
 pub(crate) fn short(x: f64) -> String {
     match x.abs() {
         size if size == 0.0 || !size.is_finite() => format!("{x}"),

@@ -1,4 +1,5 @@
-//! The models that are measured: files, folders of recorded rays, or models that `bth-scenes` makes by name.
+//! The models that are measured: files, folders of recorded rays, or models that `bth-scenes` makes
+//! by name.
 
 use crate::rays::recorded;
 use anyhow::{Context, Result, anyhow, ensure};
@@ -22,7 +23,8 @@ pub struct Model {
 }
 
 impl Model {
-    /// Imports a file or the model of a folder of recorded rays, or generates the model `NAME` or `NAME:FACES` of `bth-scenes list`.
+    /// Imports a file or the model of a folder of recorded rays, or generates `NAME` or
+    /// `NAME:FACES` of `bth-scenes list`.
     ///
     /// # Errors
     /// If there is neither, or the file cannot be imported or has no triangles.
@@ -65,12 +67,9 @@ impl Model {
         let is_scene = scene.description().is_some() || scene.object_count() != 1;
         ensure!(!is_scene, "{}: a compiled scene: expected a compiled model", path.display());
         let object = scene.object(0);
-        ensure!(object.header.triangles > 0, "{}: no triangles", path.display());
-        ensure!(
-            object.triangles.len() == object.header.triangles as usize,
-            "{}: compiled with --no-geometry: rays that start on surfaces need the triangles of the source",
-            path.display()
-        );
+        let is_whole =
+            object.header.triangles > 0 && object.triangles.len() == object.header.triangles as usize;
+        ensure!(is_whole, "{}: expected the triangles of the source (no --no-geometry)", path.display());
         let (positions, triangles) = (object.positions.to_vec(), object.triangles.to_vec());
         let mesh = Mesh { positions, triangles, ..Mesh::default() };
         Ok(Model { name, path: path.to_owned(), mesh, _folder: None })
@@ -86,7 +85,8 @@ impl Model {
         self.mesh.corners(triangle).map(position)
     }
 
-    /// Unit normal of a triangle, on the side from which its corners run counterclockwise; zero if it has no area.
+    /// Unit normal of a triangle, on the side from which its corners run counterclockwise; zero if
+    /// it has no area.
     pub fn normal(&self, triangle: u32) -> DVec3 {
         let [a, b, c] = self.corners(triangle);
         (b - a).cross(c - a).normalize_or_zero()
@@ -111,9 +111,9 @@ pub fn position(p: [f32; 3]) -> DVec3 {
 /// An axis-aligned box, object space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
-    /// Least corner.
+    /// Smallest corner.
     pub lower: DVec3,
-    /// Greatest corner.
+    /// Largest corner.
     pub upper: DVec3,
 }
 
@@ -128,25 +128,8 @@ impl Bounds {
         (self.upper - self.lower).length()
     }
 
-    /// Whether a point lies inside or on it.
+    /// Returns true if a point is inside or on it.
     pub fn holds(&self, p: DVec3) -> bool {
         p.cmpge(self.lower).all() && p.cmple(self.upper).all()
-    }
-
-    /// Whether the ray from `origin`, t >= 0, meets the box (slab method).
-    pub fn meets(&self, origin: DVec3, direction: DVec3) -> bool {
-        let (mut near, mut far) = (0.0f64, f64::INFINITY);
-        for k in 0..3 {
-            if direction[k] == 0.0 {
-                if origin[k] < self.lower[k] || origin[k] > self.upper[k] {
-                    return false;
-                }
-                continue;
-            }
-            let (a, b) =
-                ((self.lower[k] - origin[k]) / direction[k], (self.upper[k] - origin[k]) / direction[k]);
-            (near, far) = (near.max(a.min(b)), far.min(a.max(b)));
-        }
-        near <= far
     }
 }

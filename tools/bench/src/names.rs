@@ -1,15 +1,16 @@
 //! Selections of tracers and ray sets by name (`--tracer`, `--set`).
 
+use anyhow::{Result, ensure};
 use std::str::FromStr;
 
-/// Names separated by commas; one that ends in a star stands for all that begin so.
+/// Names separated by commas; a star at the end matches any ending.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Names(Vec<String>);
 
 impl FromStr for Names {
     type Err = std::convert::Infallible;
 
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
+    fn from_str(text: &str) -> std::result::Result<Self, Self::Err> {
         Ok(Names(text.split(',').map(|n| n.trim().to_owned()).filter(|n| !n.is_empty()).collect()))
     }
 }
@@ -20,10 +21,12 @@ impl Names {
         self.0.is_empty() || self.0.iter().any(|pattern| matches(pattern, name))
     }
 
-    /// Selected names that match none of `all`, most likely because they are misspelled.
-    pub(crate) fn unknown<'a>(&'a self, all: &[&str]) -> Vec<&'a str> {
-        let known = |pattern: &&String| all.iter().any(|name| matches(pattern, name));
-        self.0.iter().filter(|p| !known(p)).map(String::as_str).collect()
+    /// Fails for a selected name that matches none of `all`, most likely because it is misspelled.
+    pub(crate) fn check(&self, option: &str, all: &[&str]) -> Result<()> {
+        let is_known = |pattern: &&String| all.iter().any(|name| matches(pattern, name));
+        let unknown = self.0.iter().find(|pattern| !is_known(pattern));
+        ensure!(unknown.is_none(), "{option} {}: there are {}", unknown.map_or("", |n| n), all.join(", "));
+        Ok(())
     }
 }
 
@@ -43,7 +46,9 @@ mod tests {
         let names: Names = "embree, bth*, tinybv".parse().unwrap();
         let all = ["embree", "embree robust", "bth", "bth start", "bvh"];
         assert_eq!(all.map(|n| names.select(n)), [true, false, true, true, false]);
-        assert_eq!(names.unknown(&all), ["tinybv"]);
+        assert!(
+            names.check("--tracer", &all).unwrap_err().to_string().starts_with("--tracer tinybv: there are")
+        );
         assert!(Names::default().select("embree"));
     }
 }

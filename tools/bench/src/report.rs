@@ -1,10 +1,9 @@
 //! A report: the rows of a measurement, and how they become Markdown and JSON.
 
 use crate::args::RunOptions;
-use crate::machine::{self, Machine};
+use crate::machine;
 use crate::markdown::{short, table};
-use crate::output::{note, print_and_save, write};
-use crate::progress;
+use crate::output::{note, print_and_save, progress, write};
 use crate::records::Row;
 use crate::rounds::geometric_mean;
 use anyhow::{Result, ensure};
@@ -24,7 +23,7 @@ pub(crate) struct Head {
     /// The commit that was measured.
     pub(crate) commit: Option<String>,
     /// Type of machine.
-    pub(crate) machine: Machine,
+    pub(crate) machine: String,
     /// Vector instructions that our kernels used.
     pub(crate) isa: String,
     /// The options that matter.
@@ -34,31 +33,18 @@ pub(crate) struct Head {
 impl Head {
     /// The head of a report that is made now.
     pub(crate) fn now(measurement: &'static str, isa: String, options: Value) -> Head {
-        let (date, commit, machine) = (machine::today(), machine::commit(), Machine::this());
+        let (date, commit, machine) = (machine::today(), machine::commit(), machine::describe());
         Head { measurement, date, commit, machine, isa, options }
     }
 
     fn markdown(&self) -> String {
+        let Head { date, machine, isa, options, .. } = self;
         let commit = self.commit.as_deref().unwrap_or("unknown");
-        let Machine { cpu, isa, logical_cores, os } = &self.machine;
         format!(
-            "{}; commit {commit}. {cpu}, {}, {logical_cores} logical cores, {os}. Our kernels: {}. \
-             Options: `{}`. Only ratios within this report mean something.\n",
-            self.date,
-            isa.join("/"),
-            self.isa,
-            self.options,
+            "{date}; commit {commit}. {machine}. Our kernels: {isa}. Options: `{options}`. Only ratios within this report \
+             mean something.\n"
         )
     }
-}
-
-/// A chart and the name of its file, without extension.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Chart {
-    /// Such as `wrong-against-time`.
-    pub(crate) name: String,
-    /// SVG text.
-    pub(crate) svg: String,
 }
 
 /// What some figures belong to.
@@ -91,16 +77,12 @@ pub(crate) struct Report {
     pub(crate) notes: Vec<String>,
     /// Answers that are wrong and must be right; the command fails if there are any.
     pub(crate) wrong: Vec<String>,
-    /// Charts.
-    #[serde(skip)]
-    pub(crate) charts: Vec<Chart>,
 }
 
 impl Report {
     /// A report without figures.
     pub(crate) fn new(head: Head, rounds: usize, about: &'static str) -> Report {
-        let (rows, notes, wrong, charts) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Report { head, about, rounds, rows, notes, wrong, charts }
+        Report { head, about, rounds, rows: Vec::new(), notes: Vec::new(), wrong: Vec::new() }
     }
 
     /// Adds a figure.
@@ -127,7 +109,8 @@ impl Report {
         self.notes.push(format!("{model}: {engine}: not measured: {why:#}"));
     }
 
-    /// Adds the geometric means over the models of all figures in a unit, with the smallest and the largest.
+    /// Adds the geometric means over the models of all figures in a unit, with the smallest and the
+    /// largest.
     pub(crate) fn add_means(&mut self, unit: &str) {
         let rows = self.rows.iter().filter(|row| row.unit == unit).cloned().collect();
         self.rows.extend(means(rows));
@@ -169,7 +152,7 @@ impl Report {
 
     /// Prints the page, writes the files and notes what was not measured.
     pub(crate) fn finish(&self, to: &RunOptions) -> Result<()> {
-        progress::show("");
+        progress("");
         self.notes.iter().for_each(|line| note(line));
         print_and_save(&self.markdown(), || self.save(to))?;
         ensure!(self.wrong.is_empty(), "wrong answers: {}", self.wrong.join(", "));
@@ -184,26 +167,19 @@ impl Report {
         }
         let Some(folder) = &to.out else { return Ok(()) };
         let stem = format!("{}-{}", self.head.date, to.name.as_deref().unwrap_or(self.head.measurement));
-        let mut page = self.markdown();
-        for chart in &self.charts {
-            let file = format!("{stem}-{}.svg", chart.name);
-            write(&folder.join(&file), &chart.svg)?;
-            page.push_str(&format!("\n![{}]({file})\n", chart.name));
-        }
         write(&folder.join(format!("{stem}.json")), &json)?;
-        write(&folder.join(format!("{stem}.md")), &page)
+        write(&folder.join(format!("{stem}.md")), &self.markdown())
     }
 }
 
 /// The distinct items, in order.
 pub(crate) fn distinct<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<T> {
-    let mut out = Vec::new();
-    items.into_iter().for_each(|item| {
+    items.into_iter().fold(Vec::new(), |mut out, item| {
         if !out.contains(&item) {
             out.push(item);
         }
-    });
-    out
+        out
+    })
 }
 
 /// Geometric means over the models.
@@ -251,8 +227,8 @@ mod tests {
 
     #[test]
     fn rows_become_tables_and_ratios_become_means() {
-        let machine = Machine { cpu: "A".into(), isa: vec![], logical_cores: 2, os: "linux".into() };
-        let (date, commit, isa) = ("2026-01-02".into(), Some("0123 with changes".into()), "avx2".into());
+        let (date, commit) = ("2026-01-02".into(), Some("0123 with changes".into()));
+        let (machine, isa) = ("A".into(), "avx2".into());
         let head = Head { measurement: "speed", date, commit, machine, isa, options: Value::Null };
         let mut report = Report::new(head, 5, "About.");
         for (model, ours, theirs) in [("a", 8.0, 4.0), ("b", 8.0, 1.0)] {

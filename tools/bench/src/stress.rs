@@ -1,9 +1,10 @@
-//! The large version of the stress tests: hard rays on hard surfaces, and points inside and outside of them.
+//! The large version of the stress tests: hard rays on hard surfaces, and points inside and outside
+//! of them.
 
 use crate::args::{RunOptions, at_least_one};
 use crate::isa;
 use crate::markdown::count;
-use crate::progress;
+use crate::output::progress;
 use crate::report::{Head, Report, Subject};
 use anyhow::{Result, ensure};
 use bth::Isa;
@@ -16,8 +17,9 @@ use serde_json::json;
 /// `stress`.
 #[derive(Debug, Args)]
 pub(crate) struct Stress {
-    /// Rays to trace in all, in millions; each counts once for every structure and query that it goes through. At least one
-    /// round is traced: 12,288 rays of each shape through every structure, which takes minutes.
+    /// Rays to trace in all, in millions; each counts once for every structure and query that it
+    /// goes through. At least one round is traced: 12,288 rays of each shape through every
+    /// structure, which takes minutes.
     #[arg(long, value_name = "N", default_value_t = 100)]
     pub(crate) millions: u64,
     /// Size of the shapes: the number of their triangles grows with its square.
@@ -37,14 +39,10 @@ pub(crate) struct Stress {
 }
 
 const ABOUT: &str = "\
-Every ray goes through every structure of its shape, as nearest and any hit, a part also from starts and alone, with the \
-instruction sets in turn: `traced` counts all of these. Each tenth of the rays is of a kind: exactly at vertices; at \
-middles of edges; along edges; in planes of faces; along axes with zeros of either sign; with directions of 2^±60 and \
-2^-149; with ranges that end at, just before and just behind a vertex; from the surface; from inside; from anywhere. \
-`misses`: a triangle that the line surely hits was not found; `leaks`: a ray from inside hit nothing; `ghosts`: a triangle \
-that the line does not hit; `different`: bits that depend on structure, instruction set or batch; `wrong`: not the answer \
-of all triangles, of `compared` rays. Points are at vertices, on edges, near faces and anywhere; their winding numbers are \
-counted along two rays, and compared with all triangles. Integers decide about rays, exact arithmetic about points.";
+`traced`: rays over structures, queries and instruction sets. `misses`: a triangle that the line surely hits was not found; \
+`leaks`: a ray from inside hit nothing; `ghosts`: a triangle that the line does not hit; `different`: bits that depend on \
+structure, instruction set or batch, for points an answer that differs along another ray; `wrong`: not the answer of all \
+triangles, of `compared` rays.";
 
 /// Rays of a shape in a round: a number of batches that the instruction sets divide.
 const ROUND: usize = 12 * 1024;
@@ -58,13 +56,13 @@ struct ShapeRun {
     points: InsideStatistics,
 }
 
-/// Traces rounds until there are enough rays of each shape. Saves the report after every round, so that it is there if the
-/// run is stopped.
+/// Traces rounds until there are enough rays of each shape. Saves the report after every round, so
+/// that it is there if the run is stopped.
 pub(crate) fn measure(arguments: &Stress) -> Result<Report> {
     isa::select(arguments.run.isa.as_deref())?;
     let mut runs = Vec::new();
     for shape in shapes(arguments.size) {
-        progress::show(format!("{}: compiling", shape.name));
+        progress(format!("{}: compiling", shape.name));
         let model = shape.grid.model();
         let is_wanted = |name: &str| name.contains(&arguments.structure);
         let mut structures = structures_named(&model, shape.whole, is_wanted);
@@ -94,11 +92,7 @@ pub(crate) fn measure(arguments: &Stress) -> Result<Report> {
         }
         report.save(&arguments.run)?;
         let traced = runs.iter().map(|of| of.rays.traced).sum();
-        progress::show(format!(
-            "{} of {} rays",
-            count(traced),
-            count(share.saturating_mul(runs.len() as u64))
-        ));
+        progress(format!("{} of {} rays", count(traced), count(share.saturating_mul(runs.len() as u64))));
         round += 1;
     }
 }

@@ -5,10 +5,9 @@ use crate::tracer::{Batch, Contender, Starting, Tracer};
 use anyhow::{Context, Result};
 use bth::rays::{Hit, Ray, Start, StartRay};
 use bth::{Accept, Scene};
-use bth_compile::coordinates;
 use bth_compile::free::{FreeOptions, KeepFree};
 use bth_compile::pipeline::{self, CompileOptions, Structure};
-use bth_format::layout::{GridBits, RecordKind};
+use bth_format::layout::RecordKind;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -22,20 +21,14 @@ pub struct Kind {
     pub name: &'static str,
     structure: Structure,
     record: RecordKind,
-    bits: Option<GridBits>,
     free: KeepFree,
 }
 
-const LINK32: Kind = Kind {
-    name: "",
-    structure: Structure::Tets,
-    record: RecordKind::Link32,
-    bits: None,
-    free: KeepFree::None,
-};
+const LINK32: Kind =
+    Kind { name: "", structure: Structure::Tets, record: RecordKind::Link32, free: KeepFree::None };
 
-/// The structures. The default file comes first, then the plain BVH, which also finds the hits that secondary rays
-/// start from.
+/// The structures. The default file comes first, then the plain BVH, which also finds the hits that
+/// secondary rays start from.
 pub const KINDS: [Kind; 6] = [
     Kind { name: "bth", structure: Structure::Bth, ..LINK32 },
     Kind { name: "bvh", structure: Structure::Bvh, ..LINK32 },
@@ -59,18 +52,7 @@ pub const BTH: Kind = KINDS[0];
 /// The plain BVH.
 pub const BVH: Kind = KINDS[1];
 
-/// The plain BVH with coordinates of fewer bits: other triangles, so other answers.
-pub const ON_GRID: [Kind; 2] = [
-    Kind { name: "bvh 21 bits", bits: Some(GridBits::B21), ..BVH },
-    Kind { name: "bvh 16 bits", bits: Some(GridBits::B16), ..BVH },
-];
-
 impl Kind {
-    /// Returns true if it stores rounded corners.
-    pub fn is_on_grid(&self) -> bool {
-        self.bits.is_some()
-    }
-
     /// Returns true if it is a tetrahedralization of the whole model, which not every model has.
     pub fn is_tets(&self) -> bool {
         self.structure == Structure::Tets
@@ -88,13 +70,12 @@ impl Kind {
         USES[..count].iter().map(|(of, usage)| (format!("{}{of}", self.name), *usage))
     }
 
-    /// Compiler options. Tetrahedra of the whole model come without a BVH below them, which would be traced instead of
-    /// them; all else is the default.
+    /// Compiler options. Tetrahedra of the whole model come without a BVH below them, which would
+    /// be traced instead of them; all else is the default.
     pub(crate) fn options(&self) -> CompileOptions {
         CompileOptions {
             structure: self.structure,
             record: self.record,
-            coordinates: coordinates::CoordinateOptions { bits: self.bits, max_error: None },
             keep_subtrees: !self.is_tets(),
             free: FreeOptions { keep: self.free, ..FreeOptions::default() },
             ..CompileOptions::default()
@@ -251,7 +232,8 @@ fn start_ray(ray: &Ray, start: &Start) -> StartRay {
     start.ray(ray.direction).with_tmax(ray.tmax)
 }
 
-/// Calls `trace` with the rays of each batch and its answers. The time to make the rays counts, as for rivals.
+/// Calls `trace` with the rays of each batch and its answers. The time to make the rays counts, as
+/// for rivals.
 fn in_start_batches<T>(batch: Batch<'_>, answers: &mut [T], trace: impl Fn(&[StartRay], &mut [T])) {
     let mut rays = Vec::with_capacity(BATCH);
     for (batch, answers) in batch.chunks(BATCH).zip(answers.chunks_mut(BATCH)) {

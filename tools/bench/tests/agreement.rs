@@ -1,4 +1,5 @@
-//! The rays are the same for every tracer and run, and rivals answer them as we do, up to their own errors.
+//! The rays are the same for every tracer and run, and rivals answer them as we do, up to their own
+//! errors.
 
 use bth::Scene;
 use bth::rays::{Hit, Ray};
@@ -92,8 +93,8 @@ fn our_structures_answer_with_the_same_bits_in_every_use() {
     }
 }
 
-/// Rivals that are not crates take part if they are installed; the others always. At the hits from which rays start, rivals
-/// hit or miss the surface as they round.
+/// Rivals that are not crates take part if they are installed; the others always. At the hits from
+/// which rays start, rivals hit or miss the surface as they round.
 #[test]
 fn rivals_agree_with_the_exact_answers_up_to_their_errors() {
     let (model, _, scene) = compiled("torus-knot:720");
@@ -111,7 +112,7 @@ fn rivals_agree_with_the_exact_answers_up_to_their_errors() {
         for set in sets.iter().filter(|set| set.starts.is_none()) {
             let (found, expected) = (traced(&*contender.tracer, set), traced(&exact, set));
             for (found, expected) in found.iter().zip(&expected) {
-                let [wrong, _] = expected.compare(found, false);
+                let wrong = expected.differences(found, false);
                 assert!(wrong <= set.rays.len() / 1000, "{}, {}: {wrong}", rival.name, set.name);
             }
             let [Answers::Nearest(found), Answers::Nearest(expected)] = [&found[0], &expected[0]] else {

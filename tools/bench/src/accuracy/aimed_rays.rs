@@ -5,7 +5,8 @@ use crate::rays::RaySet;
 use bth::rays::Ray;
 use bth_random::Rng;
 
-/// Tries to find an edge whose middle is a point in f32: every axis succeeds about every other time.
+/// Tries to find an edge whose middle is a point in f32: every axis succeeds about every other
+/// time.
 const EDGE_TRIES: usize = 1000;
 
 /// What is aimed at.
@@ -55,8 +56,9 @@ fn point(model: &Model, target: Target, rng: &mut Rng) -> Option<[f32; 3]> {
     }
 }
 
-/// A ray that meets a point at t = 1 exactly: origin and direction are multiples of the least bit of the
-/// point's coordinate, and few enough of them to be f32. So it starts no farther than about the coordinate itself.
+/// A ray through a point at exactly t = 1: origin and direction are multiples of the lowest bit of
+/// the point's coordinate, and few enough of them to be f32. So it starts no farther than about the
+/// coordinate itself.
 fn through(point: [f32; 3], diagonal: f64, rng: &mut Rng) -> Option<Ray> {
     let (mut origin, mut direction) = ([0.0; 3], [0.0; 3]);
     for k in 0..3 {
@@ -72,7 +74,7 @@ fn through(point: [f32; 3], diagonal: f64, rng: &mut Rng) -> Option<Ray> {
     (direction != [0.0; 3]).then_some(Ray::new(origin, direction))
 }
 
-/// The greatest power of two that a number is a multiple of; none for zero.
+/// The largest power of two that divides a number; `None` for zero.
 fn least_bit(x: f32) -> Option<f64> {
     let bits = x.abs().to_bits();
     let (exponent, fraction) = (bits >> 23, bits & 0x7f_ffff);

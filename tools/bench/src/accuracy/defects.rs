@@ -3,60 +3,27 @@
 use super::exact_answers::{Exact, Geometry};
 use bth::rays::{Hit, Ray};
 
-/// The class of an answer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum AnswerClass {
-    Right,
-    FalseMiss,
-    Leak,
-    Ghost,
-    WrongNeighbour,
-}
+/// The kinds of wrong answers: nothing was found though something is hit; the nearest triangle was
+/// passed through and another behind it was found; a triangle was found that the ray does not hit,
+/// or not within its range; the same, but the triangle shares a vertex with the right one.
+pub(super) const KINDS: [&str; 4] = ["false_misses", "leaks", "ghosts", "wrong_neighbours"];
+const FALSE_MISS: Option<usize> = Some(0);
+const LEAK: Option<usize> = Some(1);
+const GHOST: Option<usize> = Some(2);
+const WRONG_NEIGHBOUR: Option<usize> = Some(3);
 
-/// Numbers of answers by what is wrong with them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Defects {
-    /// Answers.
-    pub(crate) rays: u64,
-    /// Nothing was found though something is hit.
-    pub(crate) false_misses: u64,
-    /// The nearest triangle was passed through: another behind it was found.
-    pub(crate) leaks: u64,
-    /// A triangle was found that the ray does not hit, or not within its range.
-    pub(crate) ghosts: u64,
-    /// A ghost, but the triangle shares a vertex with the right one.
-    pub(crate) wrong_neighbours: u64,
-}
-
-impl Defects {
-    /// The kinds of wrong answers and their numbers.
-    pub(super) fn kinds(&self) -> [(&'static str, u64); 4] {
-        [
-            ("false_misses", self.false_misses),
-            ("leaks", self.leaks),
-            ("ghosts", self.ghosts),
-            ("wrong_neighbours", self.wrong_neighbours),
-        ]
-    }
-
-    /// Counts what is wrong with answers, relative to the geometry that was traced.
-    pub(super) fn count(
-        &mut self,
-        geometry: &Geometry,
-        neighbours: &Neighbours<'_>,
-        rays: &[Ray],
-        truth: &[Exact],
-        hits: &[Hit],
-    ) {
-        for ((ray, exact), hit) in rays.iter().zip(truth).zip(hits) {
-            self.rays += 1;
-            match classify(geometry, neighbours, ray, exact, hit) {
-                AnswerClass::Right => {}
-                AnswerClass::FalseMiss => self.false_misses += 1,
-                AnswerClass::Leak => self.leaks += 1,
-                AnswerClass::Ghost => self.ghosts += 1,
-                AnswerClass::WrongNeighbour => self.wrong_neighbours += 1,
-            }
+/// Adds the number of wrong answers of each kind, relative to the geometry that was traced.
+pub(super) fn count(
+    counts: &mut [u64; 4],
+    geometry: &Geometry,
+    neighbours: &Neighbours<'_>,
+    rays: &[Ray],
+    truth: &[Exact],
+    hits: &[Hit],
+) {
+    for ((ray, exact), hit) in rays.iter().zip(truth).zip(hits) {
+        if let Some(kind) = classify(geometry, neighbours, ray, exact, hit) {
+            counts[kind] += 1;
         }
     }
 }
@@ -72,39 +39,40 @@ impl Neighbours<'_> {
     }
 }
 
+/// The kind of a wrong answer; `None` if it is right.
 fn classify(
     geometry: &Geometry,
     neighbours: &Neighbours<'_>,
     ray: &Ray,
     exact: &Exact,
     hit: &Hit,
-) -> AnswerClass {
+) -> Option<usize> {
     let (right, found) = (exact.hit.primitive.triangle, hit.primitive.triangle);
     match (exact.hit.is_hit(), hit.is_hit()) {
-        (false, false) => return AnswerClass::Right,
-        (true, false) => return AnswerClass::FalseMiss,
-        _ if right == found => return AnswerClass::Right,
+        (false, false) => return None,
+        (true, false) => return FALSE_MISS,
+        _ if right == found => return None,
         _ => {}
     }
     match (geometry.crossing(ray, right), geometry.crossing(ray, found)) {
-        (Some(right), Some(found)) if found.t == right.t => AnswerClass::Right,
-        (Some(right), Some(found)) if found.t > right.t => AnswerClass::Leak,
+        (Some(right), Some(found)) if found.t == right.t => None,
+        (Some(right), Some(found)) if found.t > right.t => LEAK,
         // It is before the nearest hit within the range of the ray, so it is not within that range.
-        (_, Some(_)) => AnswerClass::Ghost,
-        (_, None) if neighbours.touch(right, found) => AnswerClass::WrongNeighbour,
-        (_, None) => AnswerClass::Ghost,
+        (_, Some(_)) => GHOST,
+        (_, None) if neighbours.touch(right, found) => WRONG_NEIGHBOUR,
+        (_, None) => GHOST,
     }
 }
 
-/// The smallest error that this share of the errors does not exceed; zero if there are none.
+/// The smallest error that this share of the errors does not exceed; zero without errors.
 pub(super) fn quantile(mut errors: Vec<f64>, share: f64) -> f64 {
     errors.sort_by(f64::total_cmp);
     let rank = (share * errors.len() as f64).ceil() as usize;
     errors.get(rank.max(1) - 1).copied().unwrap_or_default()
 }
 
-/// Errors of t if the right triangle or one that touches it was found, relative to t and in units of the last place of
-/// the exact t.
+/// Errors of t if the right triangle or one that touches it was found, relative to t and in units
+/// of the last place of the exact t.
 pub(super) fn errors_of_t(neighbours: &Neighbours<'_>, truth: &[Exact], hits: &[Hit]) -> [Vec<f64>; 2] {
     let (mut relative, mut ulp) = (Vec::new(), Vec::new());
     for (exact, hit) in truth.iter().zip(hits).filter(|(e, h)| e.hit.is_hit() && h.is_hit()) {
@@ -156,10 +124,10 @@ mod tests {
             .find(|t| geometry.crossing(ray, *t).unwrap().t > geometry.crossing(ray, right).unwrap().t);
         let beside = all.clone().find(|t| !is_hit(t) && neighbours.touch(*t, right)).unwrap();
         let elsewhere = all.clone().find(|t| !is_hit(t) && !neighbours.touch(*t, right)).unwrap();
-        assert_eq!(verdict(exact.hit), AnswerClass::Right);
-        assert_eq!(verdict(Hit::MISS), AnswerClass::FalseMiss);
-        assert_eq!(verdict(name(behind.expect("the target lies behind"))), AnswerClass::Leak);
-        assert_eq!(verdict(name(beside)), AnswerClass::WrongNeighbour);
-        assert_eq!(verdict(name(elsewhere)), AnswerClass::Ghost);
+        assert_eq!(verdict(exact.hit), None);
+        assert_eq!(verdict(Hit::MISS), FALSE_MISS);
+        assert_eq!(verdict(name(behind.expect("the target lies behind"))), LEAK);
+        assert_eq!(verdict(name(beside)), WRONG_NEIGHBOUR);
+        assert_eq!(verdict(name(elsewhere)), GHOST);
     }
 }

@@ -36,14 +36,14 @@ impl Geometry {
         Ok(Geometry { scene, ids, corners })
     }
 
-    /// Where the line of a ray meets a triangle.
+    /// The intersection of a ray's line and a triangle.
     pub(super) fn crossing(&self, ray: &Ray, triangle: u32) -> Option<Intersection> {
         let row = self.ids.binary_search(&triangle).ok()?;
         bth_oracle::intersection(ray, self.corners[row])
     }
 
-    /// The exact answers to a set. Our BVH finds them, as testing every triangle against every ray would take days; one in
-    /// `one_in` rays is tested against every triangle in exact arithmetic.
+    /// The exact answers to a set. Our BVH finds them, as testing every triangle against every ray
+    /// would take days; one in `one_in` rays is tested against every triangle in exact arithmetic.
     pub(super) fn answers(&self, set: &RaySet, one_in: usize) -> Result<Vec<Exact>> {
         let mut hits = vec![Hit::MISS; set.rays.len()];
         self.scene.nearest(set.batch(), &mut hits);

@@ -1,10 +1,9 @@
 //! Run time and bytes against every kind of error, ours and rivals', on identical rays.
 //!
-//! `aimed_rays` makes rays through vertices and edges, `exact_answers` has the right answers, `defects` classifies the
-//! others, and `charts` draws errors against time and bytes.
+//! `aimed_rays` makes rays through vertices and edges, `exact_answers` has the right answers, and
+//! `defects` classifies the others.
 
 mod aimed_rays;
-mod charts;
 mod defects;
 mod exact_answers;
 
@@ -14,18 +13,18 @@ use crate::contenders;
 use crate::isa;
 use crate::model::Model;
 use crate::names::Names;
-use crate::progress;
+use crate::output::progress;
 use crate::rays::{self, Finder, RaySet};
 use crate::report::{Head, Report};
 use crate::rivals::RIVALS;
 use crate::rounds::medians;
-use crate::structures::{self, Compiled, KINDS, Kind, ON_GRID};
+use crate::structures::{self, KINDS, Kind};
 use crate::tracer::{Answers, Contender};
 use aimed_rays::Target;
-use anyhow::{Result, bail};
+use anyhow::Result;
 use bth::rays::Hit;
 use clap::Args;
-use defects::{Defects, Neighbours, quantile};
+use defects::{KINDS as DEFECTS, Neighbours, quantile};
 use exact_answers::{Exact, Geometry};
 use serde_json::json;
 
@@ -37,10 +36,10 @@ pub(crate) struct Accuracy {
     /// Rays of a set, at most (about).
     #[arg(long, value_name = "N", default_value_t = 50_000, value_parser = at_least_one)]
     pub(crate) rays: usize,
-    /// Rounds of which the median time counts; one more comes before and warms up.
+    /// Rounds, after one that warms up; the median counts.
     #[arg(long, value_name = "N", default_value_t = 7, value_parser = at_least_one)]
     pub(crate) rounds: usize,
-    /// Only these tracers; a star at the end stands for any ending.
+    /// Only these tracers; a star at the end matches any ending.
     #[arg(long = "tracer", value_name = "NAME,…", default_value = "", hide_default_value = true)]
     pub(crate) tracers: Names,
     /// One of this many rays is compared with every triangle in exact arithmetic.
@@ -51,29 +50,26 @@ pub(crate) struct Accuracy {
 }
 
 const ABOUT: &str = "\
-`ns/ray`: CPU time for the nearest hit, medians of interleaved rounds. Wrong answers are per million rays, for \
-`ordinary` rays (`primary`, `diffuse-beside`, `random`) and for rays `aimed` exactly at vertices and middles of edges. \
-`false_misses`: nothing was found though something is hit; `leaks`: the nearest triangle was passed through, one behind \
-it was found; `ghosts`: a triangle that the ray does not hit; `wrong_neighbours`: the same, but it shares a vertex with \
-the right one. Exact arithmetic decides, against the triangles as they are stored. `error of t`: against the source, \
-over all sets.";
+CPU time for the nearest hit, medians of interleaved rounds. Wrong answers, for ordinary rays and for rays aimed exactly at \
+vertices and middles of edges, by exact arithmetic. `false_misses`: nothing was \
+found; `leaks`: the nearest triangle was passed through; `ghosts`: a triangle that the ray does not hit; `wrong_neighbours`: \
+the same, but it shares a vertex with the right one. `error of t`: against the source, over all sets.";
 
 /// Ordinary sets: the run time of a tracer is the geometric mean over these.
 const ORDINARY: [&str; 3] = ["primary", "diffuse-beside", "random"];
 /// Rays of a set in a quick run.
 const QUICK_RAYS: usize = 2000;
 
-/// The structures that are measured: those that have the source's triangles, and those that round corners.
-fn kinds() -> impl Iterator<Item = Kind> {
-    KINDS.into_iter().filter(|kind| !kind.is_free()).chain(ON_GRID)
+/// The structures that are measured; free directions serve only rays from starts.
+fn kinds() -> Vec<Kind> {
+    KINDS.into_iter().filter(|kind| !kind.is_free()).collect()
 }
 
 /// Measures all models.
 pub(crate) fn measure(arguments: &Accuracy) -> Result<Report> {
-    let names: Vec<&str> = kinds().map(|kind| kind.name).chain(RIVALS.iter().map(|r| r.name)).collect();
-    if let Some(name) = arguments.tracers.unknown(&names).first() {
-        bail!("--tracer {name}: there are {}", names.join(", "));
-    }
+    let names: Vec<&str> =
+        kinds().iter().map(|kind| kind.name).chain(RIVALS.iter().map(|r| r.name)).collect();
+    arguments.tracers.check("--tracer", &names)?;
     let isa = isa::select(arguments.run.isa.as_deref())?;
     let rounds = arguments.run.rounds(arguments.rounds);
     let rays = if arguments.run.quick { QUICK_RAYS } else { arguments.rays };
@@ -83,18 +79,14 @@ pub(crate) fn measure(arguments: &Accuracy) -> Result<Report> {
         let model = Model::load(which)?;
         measure_model(&model, arguments, rays, &names, &mut report)?;
     }
-    report.charts = charts::draw(&report);
     for unit in ["ns/ray", "B/triangle"] {
         report.add_means(unit);
     }
     Ok(report)
 }
 
-/// A ray set and its exact answers for each geometry.
-struct AnsweredSet {
-    set: RaySet,
-    exact_answers: Vec<Vec<Exact>>,
-}
+/// A ray set and its exact answers.
+type AnsweredSet = (RaySet, Vec<Exact>);
 
 fn measure_model(
     model: &Model,
@@ -103,30 +95,28 @@ fn measure_model(
     names: &[&str],
     report: &mut Report,
 ) -> Result<()> {
-    progress::show(format!("{}: compiling the BVH", model.name));
+    progress(format!("{}: compiling the BVH", model.name));
     let bvh = structures::compile(model, &structures::BVH)?;
     let scene = bth::from_bytes(&bvh.bytes)?;
     let finder = Finder::new(model, &scene);
-    let kinds: Vec<Kind> = kinds().collect();
-    let mut tracers = contenders::build(model, &kinds, &bvh, &arguments.tracers, 1, report)?;
+    let mut tracers = contenders::build(model, &kinds(), &bvh, &arguments.tracers, 1, report)?;
     tracers.retain(|tracer| names.contains(&&*tracer.name));
-    let geometries = Geometries::new(model, &bvh, &tracers)?;
+    let geometry = Geometry::new(&bvh.bytes)?;
 
-    progress::show(format!("{}: making rays", model.name));
+    progress(format!("{}: making rays", model.name));
     let size = if arguments.run.quick { rays::QUICK_PICTURE_SIZE } else { rays::PICTURE_SIZE };
-    let options = rays::Options { size, most: rays, view: arguments.models.seen_from.view() };
+    let options = rays::Options { size, most: rays, view: arguments.models.view };
     let (_, mut sets) = rays::sets(&finder, &options);
     sets.retain(|set| ORDINARY.contains(&set.name));
     sets.extend([Target::Vertices, Target::Edges].map(|target| aimed_rays::set(model, target, rays)));
     let mut answered_sets = Vec::new();
     for set in sets.into_iter().filter(|set| !set.rays.is_empty()) {
-        progress::show(format!("{}: exact answers to {}", model.name, set.name));
-        let answers = geometries.list.iter().map(|(_, g)| g.answers(&set, arguments.one_in));
-        let exact_answers = answers.collect::<Result<_>>()?;
-        answered_sets.push(AnsweredSet { set, exact_answers });
+        progress(format!("{}: exact answers to {}", model.name, set.name));
+        let exact = geometry.answers(&set, arguments.one_in)?;
+        answered_sets.push((set, exact));
     }
-    for AnsweredSet { set, .. } in &answered_sets {
-        progress::show(format!("{}: timing {}", model.name, set.name));
+    for (set, _) in &answered_sets {
+        progress(format!("{}: timing {}", model.name, set.name));
         let mut answers = Answers::empty(false, set.rays.len());
         let seconds = medians(&tracers, report.rounds, |_, tracer| {
             Some(Clock::ThreadCpu.time(|| answers.trace(&*tracer.tracer, set.batch())))
@@ -137,59 +127,38 @@ fn measure_model(
         }
     }
     for tracer in &tracers {
-        progress::show(format!("{}: errors of {}", model.name, tracer.name));
-        add_errors(model, tracer, &geometries, &answered_sets, report);
+        progress(format!("{}: errors of {}", model.name, tracer.name));
+        add_errors(model, tracer, &geometry, &answered_sets, report);
     }
     contenders::add_sizes(report, model, 1, &tracers);
     Ok(())
-}
-
-/// The triangles that tracers have: first those of the source, then those with rounded corners.
-struct Geometries {
-    list: Vec<(&'static str, Geometry)>,
-}
-
-impl Geometries {
-    fn new(model: &Model, bvh: &Compiled, tracers: &[Contender]) -> Result<Geometries> {
-        let mut list = vec![(structures::BVH.name, Geometry::new(&bvh.bytes)?)];
-        for kind in ON_GRID.iter().filter(|kind| tracers.iter().any(|tracer| tracer.name == kind.name)) {
-            list.push((kind.name, Geometry::new(&structures::compile(model, kind)?.bytes)?));
-        }
-        Ok(Geometries { list })
-    }
-
-    /// The row of the triangles of a tracer.
-    fn row(&self, tracer: &Contender) -> usize {
-        self.list.iter().position(|(name, _)| *name == tracer.name).unwrap_or(0)
-    }
 }
 
 /// Adds wrong answers and errors of t.
 fn add_errors(
     model: &Model,
     tracer: &Contender,
-    geometries: &Geometries,
+    geometry: &Geometry,
     answered_sets: &[AnsweredSet],
     report: &mut Report,
 ) {
     let of = tracer.subject(model, 1);
     let neighbours = Neighbours(&model.mesh.triangles);
-    let mut counts = [("ordinary", Defects::default()), ("aimed", Defects::default())];
+    let (mut counts, mut rays) = ([[0; 4]; 2], [0; 2]);
     let [mut relative, mut ulp] = [Vec::new(), Vec::new()];
-    for AnsweredSet { set, exact_answers } in answered_sets {
+    for (set, exact) in answered_sets {
         let mut hits = vec![Hit::MISS; set.rays.len()];
         tracer.tracer.nearest(set.batch(), &mut hits);
-        let row = geometries.row(tracer);
         let aimed = usize::from(!ORDINARY.contains(&set.name));
-        counts[aimed].1.count(&geometries.list[row].1, &neighbours, &set.rays, &exact_answers[row], &hits);
-        // Errors of t are relative to the source, so that moved vertices count as errors.
-        let [r, u] = defects::errors_of_t(&neighbours, &exact_answers[0], &hits);
+        rays[aimed] += set.rays.len();
+        defects::count(&mut counts[aimed], geometry, &neighbours, &set.rays, exact, &hits);
+        let [r, u] = defects::errors_of_t(&neighbours, exact, &hits);
         relative.extend(r);
         ulp.extend(u);
     }
-    for (name, defects) in counts {
-        for (kind, count) in defects.kinds() {
-            let per_million = count as f64 * 1e6 / defects.rays.max(1) as f64;
+    for ((name, counts), rays) in ["ordinary", "aimed"].into_iter().zip(counts).zip(rays) {
+        for (kind, count) in DEFECTS.into_iter().zip(counts) {
+            let per_million = count as f64 * 1e6 / rays.max(1) as f64;
             report.add(&of, &format!("{kind} {name}"), per_million, "per million rays");
             if tracer.ours && count > 0 {
                 report.wrong.push(format!("{} on {}: {kind}", tracer.name, model.name));

@@ -19,7 +19,8 @@ pub(super) struct CompiledModel {
 }
 
 impl CompiledModel {
-    /// Uses a `.bth` file, or two with a comma between them, as they are; compiles other models with the default options.
+    /// Uses a `.bth` file, or two with a comma between them, as they are; compiles other models
+    /// with the default options.
     pub(super) fn load(which: &str) -> Result<CompiledModel> {
         let is_compiled = |path: &Path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("bth"));
         let two = which.split_once(',').filter(|(old, _)| is_compiled(Path::new(old)));

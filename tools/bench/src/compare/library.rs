@@ -31,12 +31,13 @@ impl Build {
     /// Loads a build. It is never unloaded, so its functions stay valid.
     pub(super) fn load(path: &Path) -> Result<Build> {
         let path = path.canonicalize().with_context(|| format!("{}: no such file", path.display()))?;
-        // SAFETY: by the documentation of `compare` the user names a build of libbth, whose initializers are those of Rust's
-        // standard library.
+        // SAFETY: by the documentation of `compare` the user names a build of libbth, whose
+        // only initializers are of Rust's standard library.
         let library = unsafe { Library::new(&path) }.with_context(|| path.display().to_string())?;
         let library: &'static Library = Box::leak(Box::new(library));
         let lacks = |name| format!("{}: no function {name}: expected a build of libbth", path.display());
-        // SAFETY: the types are those of bth.h for these names, which have not changed since the first version.
+        // SAFETY: bth.h has these types for these names, which have not changed since the
+        // first version.
         unsafe {
             Ok(Build {
                 open: *library.get(b"bth_open\0").with_context(|| lacks("bth_open"))?,
@@ -48,7 +49,8 @@ impl Build {
         }
     }
 
-    /// Returns true if the builds were loaded from two files: each chooses its instruction set separately.
+    /// Returns true if the builds were loaded from two files: each chooses its instruction set
+    /// separately.
     pub(super) fn is_other_than(&self, other: &Build) -> bool {
         self.nearest as usize != other.nearest as usize
     }
@@ -60,7 +62,8 @@ impl Build {
         // SAFETY: a zero-terminated path and a place for the scene, as bth.h demands.
         let code = unsafe { (self.open)(name.as_ptr(), READ, &mut scene) };
         if code != 0 {
-            // SAFETY: bth_last_error returns a zero-terminated text that stays until the next call of this thread.
+            // SAFETY: bth_last_error returns a zero-terminated text that stays until the next call
+            // of this thread.
             let text = unsafe { CStr::from_ptr((self.last_error)()) };
             bail!("{}: {}", file.display(), text.to_string_lossy());
         }
@@ -82,8 +85,8 @@ impl OpenedByBuild<'_> {
         match answers {
             Answers::Nearest(hits) => {
                 for (rays, hits) in rays.chunks(batch).zip(hits.chunks_mut(batch)) {
-                    // SAFETY: rays and hits are slices of the length that is passed; the reserved argument is null; the
-                    // scene is open.
+                    // SAFETY: rays and hits are slices of the length that is passed; the reserved
+                    // argument is null; the scene is open.
                     unsafe { nearest(self.scene, rays.as_ptr(), null(), hits.as_mut_ptr(), rays.len()) }
                 }
             }

@@ -1,9 +1,7 @@
 //! Compares the speed of two builds of `libbth.so` in one interleaved run.
 //!
-//! Both builds are loaded into this process and trace the same rays through the same model in turn, so that other work of
-//! the machine affects both alike. The ratio of a round is the new build's CPU time over the old one's; a set's figure is
-//! the median over the rounds. The verdict is about the geometric mean over the models, by its 95 % confidence interval
-//! (bootstrap over the rounds): noise must not tell equal builds apart.
+//! Both builds are loaded into this process and trace the same rays through the same model in turn,
+//! so that other work of the machine affects both alike. Noise must not tell equal builds apart.
 
 mod compiled_model;
 mod library;
@@ -14,16 +12,16 @@ pub(crate) use verdict::Verdict;
 use self::compiled_model::CompiledModel;
 use self::library::{Build, OpenedByBuild};
 use self::verdict::SetRatios;
-use crate::args::{RunOptions, SeenFrom, at_least_one, share};
+use crate::args::{RunOptions, at_least_one, share};
 use crate::clock::Clock;
 use crate::isa;
 use crate::names::Names;
-use crate::progress;
-use crate::rays::{self, Finder, RaySet};
+use crate::output::progress;
+use crate::rays::{self, Finder, RaySet, View};
 use crate::report::{Head, Report, Subject};
 use crate::rounds::quartiles;
 use crate::tracer::Answers;
-use anyhow::{Result, bail, ensure};
+use anyhow::{Result, ensure};
 use bth::rays::Ray;
 use clap::Args;
 use serde_json::json;
@@ -36,16 +34,19 @@ pub(crate) struct Compare {
     pub(crate) old: PathBuf,
     /// The build that may be faster.
     pub(crate) new: PathBuf,
-    /// Model files, models of `bth-scenes list` by NAME or NAME:FACES, or compiled .bth files, which are used as they are.
-    /// If OLD and NEW read different versions of the format: `OLD.bth,NEW.bth`, the model as compiled for each of them.
+    /// Model files, models of `bth-scenes list` by NAME or NAME:FACES, or compiled .bth files,
+    /// which are used as they are. If OLD and NEW read different versions of the format:
+    /// `OLD.bth,NEW.bth`, the model as compiled for each of them.
     #[arg(required = true, value_name = "MODEL")]
     pub(crate) models: Vec<String>,
-    #[command(flatten)]
-    pub(crate) seen_from: SeenFrom,
+    /// Put the cameras outside of the models, or inside as is right for rooms; by default each
+    /// model decides.
+    #[arg(long, value_name = "WHERE")]
+    pub(crate) view: Option<View>,
     /// Rays of a set, at most (about).
     #[arg(long, value_name = "N", default_value_t = 65_536, value_parser = at_least_one)]
     pub(crate) rays: usize,
-    /// Rounds of which the median counts; one more comes before and warms up.
+    /// Rounds, after one that warms up; the median counts.
     #[arg(long, value_name = "N", default_value_t = 11, value_parser = at_least_one)]
     pub(crate) rounds: usize,
     /// Rays in a call; 1 for one ray a call.
@@ -54,7 +55,8 @@ pub(crate) struct Compare {
     /// Only these ray sets.
     #[arg(long = "set", value_name = "NAME,…", default_value = "", hide_default_value = true)]
     pub(crate) sets: Names,
-    /// A set is slower when its mean over the models is certainly (95 %) greater by more than this, such as `1%`.
+    /// A set is slower when its mean over the models is certainly (95 %) greater by more than this,
+    /// such as `1%`.
     #[arg(long, value_name = "P%", default_value = "1%", value_parser = share)]
     pub(crate) worse: f64,
     #[command(flatten)]
@@ -65,15 +67,13 @@ const ABOUT: &str = "\
 CPU time of a ray on one thread, medians of interleaved rounds, and the ratio new / old of these rounds. The verdict on a \
 set is by the 95 % interval of its geometric mean over the models.";
 
-/// Shortest turn, in seconds of CPU time. Small sets are traced several times a turn, as the clock is too coarse for
-/// shorter ones.
+/// Shortest turn, in seconds of CPU time. Small sets are traced several times a turn, as the clock
+/// is too coarse for shorter ones.
 const SHORTEST_TURN: f64 = 0.02;
 
 /// Measures, prints and writes the comparison; returns the verdict by `--worse`.
 pub(crate) fn run(arguments: &Compare) -> Result<Verdict> {
-    if let Some(name) = arguments.sets.unknown(&rays::NAMES).first() {
-        bail!("--set {name}: there are {}", rays::NAMES.join(", "));
-    }
+    arguments.sets.check("--set", &rays::NAMES)?;
     let builds = [Build::load(&arguments.old)?, Build::load(&arguments.new)?];
     if let Some(names) = &arguments.run.isa {
         choose_isas(names, &builds)?;
@@ -112,17 +112,17 @@ fn measure_model(
     report: &mut Report,
     ratios: &mut SetRatios,
 ) -> Result<()> {
-    progress::show(format!("{which}: compiling"));
+    progress(format!("{which}: compiling"));
     let compiled = CompiledModel::load(which)?;
     let model = &compiled.model;
-    progress::show(format!("{}: making rays", model.name));
+    progress(format!("{}: making rays", model.name));
     let size = if arguments.run.quick { rays::QUICK_PICTURE_SIZE } else { rays::PICTURE_SIZE };
-    let options = rays::Options { size, most: arguments.rays, view: arguments.seen_from.view() };
+    let options = rays::Options { size, most: arguments.rays, view: arguments.view };
     let (_, mut sets) = rays::sets(&Finder::new(model, &compiled.scene), &options);
     sets.retain(|set| arguments.sets.select(set.name) && set.rays.len() >= rays::FEWEST_TIMED);
     let opened = [builds[0].open(&compiled.files[0])?, builds[1].open(&compiled.files[1])?];
     for set in &sets {
-        progress::show(format!("{}: {}", model.name, set.name));
+        progress(format!("{}: {}", model.name, set.name));
         let (seconds, same) = time(set, &opened, arguments.batch, report.rounds);
         let of = |engine| Subject { engine, ours: true, model: &model.name, threads: 1 };
         for (engine, seconds) in ["old", "new"].into_iter().zip(&seconds) {
@@ -143,8 +143,8 @@ fn measure_model(
     Ok(())
 }
 
-/// Times one set with both builds, round by round. Returns the seconds of each round, and true if all answers have the same
-/// bits.
+/// Times one set with both builds, round by round. Returns the seconds of each round, and true if
+/// all answers have the same bits.
 fn time(set: &RaySet, builds: &[OpenedByBuild<'_>; 2], batch: usize, rounds: usize) -> ([Vec<f64>; 2], bool) {
     let mut answers = [(); 2].map(|()| Answers::empty(set.any, set.rays.len()));
     let mut seconds = [Vec::new(), Vec::new()];
@@ -165,5 +165,5 @@ fn time(set: &RaySet, builds: &[OpenedByBuild<'_>; 2], batch: usize, rounds: usi
             passes = (SHORTEST_TURN / of_round[0].max(1e-6)).ceil() as usize;
         }
     }
-    (seconds, answers[0].compare(&answers[1], true) == [0, 0])
+    (seconds, answers[0].differences(&answers[1], true) == 0)
 }

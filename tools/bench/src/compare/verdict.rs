@@ -43,7 +43,8 @@ impl SetRatios {
         }
     }
 
-    /// Notes the verdict on each set. Returns slower if any is, else undecided if any is, else faster if any is.
+    /// Notes the verdict on each set. Returns slower if any is, else undecided if any is, else
+    /// faster if any is.
     pub(super) fn judge(&self, worse: f64, notes: &mut Vec<String>) -> Verdict {
         let mut verdicts = Vec::new();
         for (set, models) in &self.0 {
@@ -62,8 +63,8 @@ impl SetRatios {
     }
 }
 
-/// The 95 % confidence interval of the geometric mean of the medians, by resampling each model's rounds (percentile
-/// bootstrap, Efron 1979). A single round allows any value.
+/// The 95 % confidence interval of the geometric mean of the medians, by resampling each model's
+/// rounds (percentile bootstrap, Efron 1979). A single round allows any value.
 fn interval(models: &[Vec<f64>]) -> [f64; 2] {
     const RESAMPLES: usize = 1000;
     if models.iter().any(|rounds| rounds.len() < 2) {

@@ -1,17 +1,18 @@
 //! Opening a compiled model or scene and tracing the first rays, against building at the start.
 //!
-//! Every start runs in a separate process ([`probe`]), so that nothing is left over from the one before.
+//! Every start runs in a separate process ([`probe`]), so that nothing is left over from the one
+//! before.
 
 pub(crate) mod probe;
 mod starts;
 
 pub(crate) use probe::{Probe, Start};
 
-use crate::args::{RunOptions, SeenFrom, at_least_one};
+use crate::args::{RunOptions, at_least_one};
 use crate::isa;
 use crate::model::{Model, position};
-use crate::progress;
-use crate::rays::{self, Camera, Finder};
+use crate::output::progress;
+use crate::rays::{self, Camera, Finder, View};
 use crate::report::{Head, Report, Subject};
 use crate::rivals::embree;
 use crate::scenes::Source;
@@ -30,15 +31,18 @@ use zerocopy::IntoBytes;
 /// `load`.
 #[derive(Debug, Args)]
 pub(crate) struct Load {
-    /// Models and scenes: files, NAME or NAME:FACES of `bth-scenes list`, or `objects:N` for N generated objects.
+    /// Models and scenes: files, NAME or NAME:FACES of `bth-scenes list`, or `objects:N` for N
+    /// generated objects.
     #[arg(required = true, value_name = "MODEL")]
     pub(crate) models: Vec<String>,
-    #[command(flatten)]
-    pub(crate) seen_from: SeenFrom,
+    /// Put the cameras outside of the models, or inside as is right for rooms; by default each
+    /// model decides.
+    #[arg(long, value_name = "WHERE")]
+    pub(crate) view: Option<View>,
     /// First rays to trace.
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = at_least_one)]
     pub(crate) rays: usize,
-    /// Rounds of which the median counts; one more comes before.
+    /// Rounds, after one that warms up; the median counts.
     #[arg(long, value_name = "N", default_value_t = 7, value_parser = at_least_one)]
     pub(crate) rounds: usize,
     /// Numbers of threads to build and trace on.
@@ -52,12 +56,10 @@ pub(crate) struct Load {
 }
 
 const ABOUT: &str = "\
-Wall-clock times from before the file is opened, or from before Embree builds all objects (several at once) and their \
-instances from triangles in memory; each start in a separate process, medians of interleaved rounds. `ready`: until \
-rays can be traced; `first hit`: until the first ray, which hits, is answered; `total`: until the first camera rays are \
-traced; `CPU`: of all threads until then. `picture`: all camera rays, the faster of two rounds after that. `map`: \
-mapped; `read`: read and checked; `cold`: the file's pages were dropped from memory first. `storage`: MiB that were \
-read from storage. `times embree`: relative to Embree's start; below 1 is faster.";
+Wall-clock times from before the file is opened, or from before Embree builds all objects and instances from triangles in \
+memory; medians of interleaved rounds. `ready`: until rays can be traced; `first hit`: until the first ray is answered; \
+`total`: until the first camera rays are traced; `CPU`: of all threads until then. `cold`: the file's pages were dropped from \
+memory first; `storage`: MiB that were read. `times embree`: below 1 is faster.";
 
 /// Pixels of the camera.
 const SIZE: (u32, u32) = (512, 288);
@@ -78,7 +80,7 @@ pub(crate) fn measure(arguments: &Load) -> Result<Report> {
 /// A model or a scene.
 enum Input {
     Model(Box<Model>),
-    Scene(Source),
+    Scene(Box<Source>),
 }
 
 impl Input {
@@ -86,7 +88,7 @@ impl Input {
         let is_scene =
             ["manifest", "glb", "gltf"].iter().any(|end| which.to_lowercase().ends_with(&format!(".{end}")));
         if is_scene || which.starts_with("objects:") {
-            return Ok(Input::Scene(Source::load(which)?));
+            return Ok(Input::Scene(Box::new(Source::load(which)?)));
         }
         Ok(Input::Model(Box::new(Model::load(which)?)))
     }
@@ -106,10 +108,10 @@ impl Input {
     }
 
     /// The rays of a picture, in tiles.
-    fn picture(&self, scene: &Scene, seen_from: &SeenFrom) -> Vec<Ray> {
+    fn picture(&self, scene: &Scene, view: Option<View>) -> Vec<Ray> {
         match self {
             Input::Model(model) => {
-                let options = rays::Options { size: SIZE, most: usize::MAX, view: seen_from.view() };
+                let options = rays::Options { size: SIZE, most: usize::MAX, view };
                 let (_, [rays, _]) = rays::cameras(&Finder::new(model, scene), &options);
                 rays
             }
@@ -129,13 +131,13 @@ fn measure_one(which: &str, arguments: &Load, report: &mut Report) -> Result<()>
     };
     let (mut cases, mut opened) = (Vec::new(), None);
     for kind in [structures::BTH, structures::BVH] {
-        progress::show(format!("{name}: compiling {}", kind.name));
+        progress(format!("{name}: compiling {}", kind.name));
         let compiled = input.compile(&kind)?;
         let file = scratch.path().join(format!("{}.bth", kind.name));
         write(&file, &compiled.bytes)?;
         for start in [Start::Map, Start::Read] {
             cases.extend(PageCache::ALL.map(|cache| {
-                let name = format!("{} {} {}", kind.name, start.name(), cache.name());
+                let name = format!("{} {} {}", kind.name, start.name(), format!("{cache:?}").to_lowercase());
                 StartCase { name, ours: true, start, cache, file: file.clone() }
             }));
         }
@@ -148,20 +150,19 @@ fn measure_one(which: &str, arguments: &Load, report: &mut Report) -> Result<()>
     match embree::available() {
         Ok(()) => cases.extend([Start::Embree, Start::EmbreeRobust].map(|start| {
             let name = start.name().replace('-', " ");
-            // Embree's triangles are in memory before the clock starts, so the page cache does not matter.
+            // Embree's triangles are in memory before the clock starts, so the page cache does not
+            // matter.
             StartCase { name, ours: false, start, cache: PageCache::Warm, file: file.clone() }
         })),
         Err(error) => report.leave_out(name, embree::NAME, &error),
     }
-    progress::show(format!("{name}: making rays"));
-    let picture = input.picture(&scene, &arguments.seen_from);
-    let mut rays = first_of(&scene, &picture, arguments.rays)
+    progress(format!("{name}: making rays"));
+    let picture = input.picture(&scene, arguments.view);
+    let rays = first_of(&scene, &picture, arguments.rays)
         .with_context(|| format!("{name}: the camera sees nothing"))?;
-    let first = rays.len();
-    rays.extend(&picture);
     let file = scratch.path().join("rays");
     write(&file, rays.as_bytes())?;
-    let rounds = StartRounds { name, cases: &cases, rounds: report.rounds, first, rays: &file };
+    let rounds = StartRounds { name, cases: &cases, rounds: report.rounds, rays: &file };
     for &threads in &arguments.threads {
         rounds.run(threads, report)?;
     }
@@ -185,7 +186,8 @@ fn first_of(scene: &Scene, rays: &[Ray], count: usize) -> Option<Vec<Ray>> {
 }
 
 impl Camera {
-    /// The camera that frames all visible instances of a scene, and the diagonal of their box; `None` if there are none.
+    /// The camera that frames all visible instances of a scene, and the diagonal of their box;
+    /// `None` without instances.
     pub(crate) fn framing_instances(scene: &Scene, size: (u32, u32)) -> Option<(Camera, f64)> {
         let boxes = (0..scene.instance_count()).filter_map(|i| scene.instance_bounds(i));
         let boxes: Vec<[DVec3; 2]> = boxes.map(|(low, high)| [position(low), position(high)]).collect();

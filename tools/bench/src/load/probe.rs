@@ -1,4 +1,5 @@
-//! One start: open or build, then trace the first rays. Runs in a separate process and prints its times as JSON.
+//! One start: open or build, then trace the first rays. Runs in a separate process and prints its
+//! times as JSON.
 #![allow(unsafe_code)]
 
 use crate::clock::process_cpu;
@@ -28,12 +29,9 @@ pub(crate) struct Probe {
     /// Vector instructions of our kernels.
     #[arg(long)]
     pub(crate) isa: Option<String>,
-    /// How many of the rays are the first.
-    #[arg(long)]
-    pub(crate) first: usize,
     /// Compiled file; Embree builds from its triangles.
     pub(crate) file: PathBuf,
-    /// The rays, the first of which hits.
+    /// The rays; the first hits.
     pub(crate) rays: PathBuf,
 }
 
@@ -52,17 +50,13 @@ pub(crate) enum Start {
 
 impl Start {
     /// The name on the command line and in tables.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Start::Map => "map",
-            Start::Read => "read",
-            Start::Embree => "embree",
-            Start::EmbreeRobust => "embree-robust",
-        }
+    pub(crate) fn name(self) -> String {
+        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
     }
 }
 
-/// The times of a start: wall-clock seconds since just before the file was opened or the build began.
+/// The times of a start: wall-clock seconds since just before the file was opened or the build
+/// began.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct StartTimes {
     /// Until rays could be traced.
@@ -77,8 +71,6 @@ pub(crate) struct StartTimes {
     pub(crate) storage_bytes: Option<u64>,
     /// Rays that hit.
     pub(crate) hits: usize,
-    /// Seconds for all rays of the file: the faster of two rounds.
-    pub(crate) picture_s: f64,
 }
 
 /// Starts once and prints the times as JSON.
@@ -87,11 +79,11 @@ pub(crate) fn run(arguments: &Probe) -> Result<()> {
     let bytes = std::fs::read(&arguments.rays)?;
     let rays = bytes.chunks(size_of::<Ray>()).map(|b| Ray::read_from_bytes(b).ok());
     let rays = rays.collect::<Option<Vec<Ray>>>().context("not a file of rays")?;
-    let Probe { file, threads, first, .. } = arguments;
+    let Probe { file, threads, .. } = arguments;
     let probed = match arguments.start {
         // SAFETY: `load` wrote the file into a temporary folder and does not touch it while we run.
-        Start::Map => probe(&rays, *first, *threads, || Ok(SceneTracer(unsafe { bth::map(file)? })))?,
-        Start::Read => probe(&rays, *first, *threads, || Ok(SceneTracer(bth::open(file)?)))?,
+        Start::Map => probe(&rays, *threads, || Ok(SceneTracer(unsafe { bth::map(file)? })))?,
+        Start::Read => probe(&rays, *threads, || Ok(SceneTracer(bth::open(file)?)))?,
         Start::Embree | Start::EmbreeRobust => {
             // Neither the library nor the triangles are part of a build.
             embree::available()?;
@@ -100,10 +92,10 @@ pub(crate) fn run(arguments: &Probe) -> Result<()> {
             let variant = if robust { &embree::ROBUST } else { &embree::DEFAULT };
             let mut placed = Placed::of(&scene);
             if scene.description().is_some() {
-                probe(&rays, *first, *threads, || placed.build(variant, *threads))?
+                probe(&rays, *threads, || placed.build(variant, *threads))?
             } else {
                 let (positions, triangles) = placed.objects.pop().context("an object")?;
-                probe(&rays, *first, *threads, || embree::build(positions, triangles, variant, *threads))?
+                probe(&rays, *threads, || embree::build(positions, triangles, variant, *threads))?
             }
         }
     };
@@ -115,37 +107,21 @@ fn batch(rays: &[Ray]) -> Batch<'_> {
     Batch { rays, starts: None, coherent: true }
 }
 
-fn probe<T: Tracer>(
-    all: &[Ray],
-    first: usize,
-    threads: usize,
-    start: impl FnOnce() -> Result<T>,
-) -> Result<StartTimes> {
-    let rays = &all[..first];
+fn probe<T: Tracer>(rays: &[Ray], threads: usize, start: impl FnOnce() -> Result<T>) -> Result<StartTimes> {
     let mut hits = vec![Hit::MISS; rays.len()];
     let (before, cpu, clock) = (storage_bytes(), process_cpu(), Instant::now());
     let tracer = start()?;
     let ready_s = clock.elapsed().as_secs_f64();
     tracer.nearest(batch(&rays[..1]), &mut hits[..1]);
     let first_hit_s = clock.elapsed().as_secs_f64();
-    let trace = |rays: &[Ray], hits: &mut [Hit]| {
-        let share = rays.len().div_ceil(threads);
-        spread(batch(rays), hits, (threads, 1), share, |batch, hits| tracer.nearest(batch, hits));
-    };
-    trace(rays, &mut hits);
+    let share = rays.len().div_ceil(threads);
+    spread(batch(rays), &mut hits, (threads, 1), share, |batch, hits| tracer.nearest(batch, hits));
     let total_s = clock.elapsed().as_secs_f64();
     let cpu_s = process_cpu() - cpu;
     ensure!(hits[0].is_hit(), "the first ray hits nothing");
     let storage_bytes = storage_bytes().zip(before).map(|(after, before)| after - before);
-    let mut picture = vec![Hit::MISS; all.len()];
-    let mut picture_s = || {
-        let clock = Instant::now();
-        trace(all, &mut picture);
-        clock.elapsed().as_secs_f64()
-    };
-    let picture_s = picture_s().min(picture_s());
     let hits = hits.iter().filter(|h| h.is_hit()).count();
-    Ok(StartTimes { ready_s, first_hit_s, total_s, cpu_s, storage_bytes, hits, picture_s })
+    Ok(StartTimes { ready_s, first_hit_s, total_s, cpu_s, storage_bytes, hits })
 }
 
 /// Bytes that this process has read from storage so far (Linux).

@@ -1,7 +1,7 @@
 //! Runs every way to start, each time in a new process, in interleaved rounds.
 
 use super::probe::{Start, StartTimes};
-use crate::progress;
+use crate::output::progress;
 use crate::report::{Report, Subject};
 use crate::rounds::median;
 use anyhow::{Context, Result, ensure};
@@ -20,14 +20,6 @@ pub(super) enum PageCache {
 
 impl PageCache {
     pub(super) const ALL: [PageCache; 2] = [PageCache::Warm, PageCache::Cold];
-
-    /// The name in tables.
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            PageCache::Cold => "cold",
-            PageCache::Warm => "warm",
-        }
-    }
 
     /// Brings a file into this state.
     fn prepare(self, path: &Path) -> Result<()> {
@@ -71,8 +63,6 @@ pub(super) struct StartRounds<'a> {
     /// The ways to start.
     pub(super) cases: &'a [StartCase],
     pub(super) rounds: usize,
-    /// Number of first rays.
-    pub(super) first: usize,
     /// The file of the rays.
     pub(super) rays: &'a Path,
 }
@@ -83,11 +73,12 @@ impl StartRounds<'_> {
         let mut taken = vec![Vec::new(); self.cases.len()];
         for round in 0..=self.rounds {
             for (case, taken) in self.cases.iter().zip(&mut taken) {
-                progress::show(format!("{}: {}, {threads} thread(s), round {round}", self.name, case.name));
+                progress(format!("{}: {}, {threads} thread(s), round {round}", self.name, case.name));
                 case.cache.prepare(&case.file)?;
                 let probed =
                     self.start(case, threads, &report.head.isa).with_context(|| case.name.clone())?;
-                // The first round brings programs and libraries into the page cache and does not count.
+                // The first round brings programs and libraries into the page cache and does not
+                // count.
                 if round > 0 {
                     taken.push(probed);
                 }
@@ -107,8 +98,8 @@ impl StartRounds<'_> {
     /// Adds the medians of a case.
     fn add(&self, case: &StartCase, threads: usize, taken: &[StartTimes], report: &mut Report) {
         let of = Subject { engine: &case.name, ours: case.ours, model: self.name, threads };
-        for (i, set) in ["ready", "first hit", "total", "CPU", "picture"].into_iter().enumerate() {
-            let figure = |t: &StartTimes| [t.ready_s, t.first_hit_s, t.total_s, t.cpu_s, t.picture_s][i];
+        for (i, set) in ["ready", "first hit", "total", "CPU"].into_iter().enumerate() {
+            let figure = |t: &StartTimes| [t.ready_s, t.first_hit_s, t.total_s, t.cpu_s][i];
             if let Some(seconds) = median(taken.iter().map(figure).collect()) {
                 report.add(&of, set, 1e3 * seconds, "ms");
             }
@@ -122,8 +113,8 @@ impl StartRounds<'_> {
     /// Starts once, in a separate process.
     fn start(&self, case: &StartCase, threads: usize, isa: &str) -> Result<StartTimes> {
         let mut command = Command::new(std::env::current_exe()?);
-        command.args(["probe", "--start", case.start.name(), "--isa", isa]);
-        command.args(["--threads", &threads.to_string(), "--first", &self.first.to_string()]);
+        command.args(["probe", "--start", &case.start.name(), "--isa", isa]);
+        command.args(["--threads", &threads.to_string()]);
         let output = command.arg(&case.file).arg(self.rays).output()?;
         ensure!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr).trim());
         Ok(serde_json::from_slice(&output.stdout)?)

@@ -1,10 +1,9 @@
 //! The paper's tables on our models: its structures with its scalar traversal, and ours.
 //!
-//! `tree` is a binary BVH as in pbrt, some leaves of which may be tetrahedralizations (`tet_records`, `tet_walk`);
-//! `calibrate` measures the costs of its steps, by which the paper's rule selects; `views` makes and renders the
-//! cameras, `steps` compares predicted with counted steps, and `published` holds the paper's figures.
+//! `tree` is a binary BVH as in pbrt that may have tetrahedralizations as leaves
+//! (`tet_records`, `tet_walk`); `views` makes and renders the cameras, `steps` compares predicted
+//! with counted steps, and `published` has the paper's figures.
 
-mod calibrate;
 mod published;
 mod steps;
 mod tet_records;
@@ -15,19 +14,19 @@ mod views;
 use crate::args::{RunOptions, at_least_one};
 use crate::isa;
 use crate::model::Model;
-use crate::progress;
+use crate::output::progress;
 use crate::report::{Head, Report, Subject};
 use crate::structures::{self, Use};
 use crate::tracer::Tracer;
 use anyhow::Result;
-use bth_compile::costs::{self, Profile, Select};
+use bth_compile::costs::{self, Profile, Select, TetCosts, Walk};
 use bth_compile::pipeline::{self, Structure};
 use bth_compile::{Silent, bvh, marks, tets};
 use bth_format::layout::RecordKind;
 use clap::Args;
 use serde_json::json;
 use std::time::Instant;
-use tet_records::{Tet20, Tet32, TetRecord};
+use tet_records::{TET20, TET32};
 use tree::PaperTree;
 use views::Views;
 
@@ -37,7 +36,7 @@ pub(crate) struct Paper {
     /// Model files, or models of `bth-scenes list` by NAME or NAME:FACES.
     #[arg(required = true, value_name = "MODEL")]
     pub(crate) models: Vec<String>,
-    /// Rounds of which the fastest counts; one more comes before.
+    /// Rounds, after one that warms up; the fastest counts.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = at_least_one)]
     pub(crate) rounds: usize,
     #[command(flatten)]
@@ -45,21 +44,35 @@ pub(crate) struct Paper {
 }
 
 const ABOUT: &str = "\
-Camera rays from `far` and `close`, 16×16 tiles, all threads, fastest of the rounds; CPU time of all threads over their \
-number, which is the time on the wall clock of an idle machine. `construction`: on one thread, wall clock. The paper's \
-structures have one scalar traversal: a binary BVH as in pbrt with up to four triangles a leaf (`BVH`), the same with \
-tetrahedralizations where the paper's rule takes them (`BTH`), and the whole model tetrahedralized (`Tet`). \
-`(ours)`: our files in our SIMD traversal. `(paper)`: its Tables 1 and 2, on another machine with six cores and from \
-other cameras, some on other versions of a model; only ratios compare. `steps …`: of a ray through the whole \
-tetrahedralization, counted and as the cost model predicts them.";
+Camera rays in 16×16 tiles on all threads, fastest round: CPU time of all threads over their number. `construction`: one \
+thread, wall clock. `BVH`: binary as in pbrt; `BTH`: with tetrahedralizations where the paper's rule takes them; `Tet`: the \
+whole model tetrahedralized; all with one scalar traversal. `(ours)`: our files. `(paper)`: its Tables 1 and 2, from another \
+machine and other cameras; only ratios compare. `steps …`: of a ray through the whole tetrahedralization.";
 
 /// Pixels of the pictures; a quick run has fewer.
 const SIZE: (u32, u32) = (1920, 1080);
 const QUICK_SIZE: (u32, u32) = (192, 108);
-/// Nodes of fewer triangles are not tetrahedralized: their tetrahedra would have more hull faces than triangles.
+/// Nodes of fewer triangles are not tetrahedralized: their tetrahedra would have more hull faces
+/// than triangles.
 const FEWEST_TRIANGLES: u32 = 64;
-/// Rows of a profile that hold the costs of Tet32 and of Tet20: our records of about these sizes.
-const PROFILE_RECORDS: [RecordKind; 2] = [RecordKind::Link32, RecordKind::Tet16];
+
+/// Costs of the scalar traversals in nanoseconds, which the paper's rule compares: measured on
+/// camera rays to blobs of 6,000 and 150,000 faces (Intel Xeon, family 6, model 207, 2026-11-28).
+fn scalar_profile() -> Profile {
+    let mut profile = Profile { isa: "scalar".to_owned(), bytes: [648e3, 15.6e6], ..Profile::default() };
+    (profile.bvh.ray, profile.bvh.outside) = (0.0, 12.1);
+    for (stored, step) in [(TET32, [23.6, 30.5]), (TET20, [24.0, 29.1])] {
+        let walk = Walk { entry: 77.0, hit: 0.0, step };
+        let record = profile_record(stored).name().to_owned();
+        profile.tets.insert(record, TetCosts { outside: walk, surface: walk, alone: walk });
+    }
+    profile
+}
+
+/// The row of a profile that holds the costs of Tet32 or Tet20: our record of about this size.
+fn profile_record(stored: usize) -> RecordKind {
+    if stored == TET32 { RecordKind::Link32 } else { RecordKind::Tet16 }
+}
 
 /// A structure that is ready to render.
 struct BuiltStructure {
@@ -78,19 +91,11 @@ struct BuiltStructure {
 /// Measures all models.
 pub(crate) fn measure(arguments: &Paper) -> Result<Report> {
     let isa = isa::select(arguments.run.isa.as_deref())?;
-    progress::show("calibrating the scalar traversals");
-    let profile = calibrate::profile()?;
+    let profile = scalar_profile();
     let rounds = arguments.run.rounds(arguments.rounds);
     let size = if arguments.run.quick { QUICK_SIZE } else { SIZE };
     let options = json!({"pixels": size, "rounds": rounds, "quick": arguments.run.quick});
     let mut report = Report::new(Head::now("paper", isa, options), rounds, ABOUT);
-    for (record, costs) in &profile.tets {
-        let (visit, walk) = (profile.bvh.outside, costs.outside);
-        report.notes.push(format!(
-            "Costs of the scalar traversals, ns: {visit:.2} a node of the binary BVH; {record} {:.0} to enter, {:.2?} a step",
-            walk.entry, walk.step
-        ));
-    }
     for name in &arguments.models {
         measure_model(&Model::load(name)?, &profile, size, &mut report)?;
     }
@@ -102,14 +107,14 @@ fn measure_model(model: &Model, profile: &Profile, size: (u32, u32), report: &mu
     let views = Views::of(model, size)?;
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let mut built: Vec<BuiltStructure> = Vec::new();
-    progress::show(format!("{name}: BTH32, Tet32"));
-    one.install(|| scalar::<Tet32>(model, profile, &views, PROFILE_RECORDS[0], &mut built, report))?;
-    progress::show(format!("{name}: BTH20, Tet20"));
-    one.install(|| scalar::<Tet20>(model, profile, &views, PROFILE_RECORDS[1], &mut built, report))?;
-    progress::show(format!("{name}: our files"));
+    progress(format!("{name}: BTH32, Tet32"));
+    one.install(|| scalar::<TET32>(model, profile, &views, &mut built, report))?;
+    progress(format!("{name}: BTH20, Tet20"));
+    one.install(|| scalar::<TET20>(model, profile, &views, &mut built, report))?;
+    progress(format!("{name}: our files"));
     one.install(|| own(model, &mut built))?;
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
-    progress::show(format!("{name}: rendering"));
+    progress(format!("{name}: rendering"));
     let tracers: Vec<&dyn Tracer> = built.iter().map(|b| &*b.tracer).collect();
     let rendered = [0, 1].map(|view| views.render(&tracers, view, report.rounds, threads));
     for (row, structure) in built.iter().enumerate() {
@@ -135,22 +140,21 @@ fn measure_model(model: &Model, profile: &Profile, size: (u32, u32), report: &mu
 }
 
 /// Builds the paper's structures with tetrahedra of one record; with Tet32 also its BVH.
-fn scalar<R: TetRecord + 'static>(
+fn scalar<const STORED: usize>(
     model: &Model,
     profile: &Profile,
     views: &Views,
-    kind: RecordKind,
     built: &mut Vec<BuiltStructure>,
     report: &mut Report,
 ) -> Result<()> {
-    let names = if kind == PROFILE_RECORDS[0] { ["BTH32", "Tet32"] } else { ["BTH20", "Tet20"] };
+    let names = if STORED == TET32 { ["BTH32", "Tet32"] } else { ["BTH20", "Tet20"] };
     let mesh = &model.mesh;
     let clock = Instant::now();
     let (tree, _) = bvh::build(mesh, &tree::bvh_options(), &Silent)?;
     let bvh_seconds = clock.elapsed().as_secs_f64();
-    if kind == PROFILE_RECORDS[0] {
+    if STORED == TET32 {
         let clock = Instant::now();
-        let plain = PaperTree::<R>::new(mesh, &tree, &[]);
+        let plain = PaperTree::<STORED>::new(mesh, &tree, &[]);
         let (seconds, bytes) = (bvh_seconds + clock.elapsed().as_secs_f64(), plain.bytes() as u64);
         built.push(BuiltStructure {
             name: "BVH",
@@ -171,10 +175,10 @@ fn scalar<R: TetRecord + 'static>(
         minimum_gain: 0.0,
         ..costs::CostOptions::default()
     };
-    let storage = costs::Storage { record: kind, keep_subtrees: false, plain_bytes: None };
+    let storage = costs::Storage { record: profile_record(STORED), keep_subtrees: false, plain_bytes: None };
     let (choice, _) = costs::choose(mesh, &tree, &marks, &costs, storage, &Silent)?;
     let (leaves, _) = tets::build(mesh, &tree, &choice.chosen, &tet_options, &Silent)?;
-    let mut bth = PaperTree::<R>::new(mesh, &tree, &leaves);
+    let mut bth = PaperTree::<STORED>::new(mesh, &tree, &leaves);
     let seconds = bvh_seconds + clock.elapsed().as_secs_f64();
     views.eyes().for_each(|eye| bth.look_from(eye));
     let in_tets = leaves.iter().map(|(_, t)| t.faces.len() as u64).sum();
@@ -191,12 +195,12 @@ fn scalar<R: TetRecord + 'static>(
         report.leave_out(&model.name, names[1], &anyhow::anyhow!("could not be tetrahedralized whole"));
         return Ok(());
     };
-    let mut tets = PaperTree::<R>::new(mesh, &tree, &whole);
+    let mut tets = PaperTree::<STORED>::new(mesh, &tree, &whole);
     let seconds = bvh_seconds + clock.elapsed().as_secs_f64();
     views.eyes().for_each(|eye| tets.look_from(eye));
     let (bytes, in_tets) = (tets.bytes() as u64, model.triangles() as u64);
     built.push(BuiltStructure { name: names[1], tracer: Box::new(tets), seconds, bytes, in_tets, leaves: 1 });
-    if kind == PROFILE_RECORDS[0] {
+    if STORED == TET32 {
         steps::add(model, &tree, mesh_of_tets, report);
     }
     Ok(())

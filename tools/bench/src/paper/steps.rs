@@ -1,4 +1,5 @@
-//! Steps of a ray through the tetrahedralization of a whole model: counted, and as the cost model predicts them.
+//! Steps of a ray through the tetrahedralization of a whole model: counted, and as the cost model
+//! predicts them.
 
 use crate::model::Model;
 use crate::report::{Report, Subject};

@@ -7,61 +7,24 @@ pub(super) const FACE: u32 = 1 << 31;
 /// A link to nothing: the hull.
 pub(super) const HULL: u32 = u32::MAX;
 
-/// A record: the fourth vertex from three, and what lies behind the face opposite to a vertex.
-pub(super) trait TetRecord: Copy + Send + Sync {
-    /// From vertices in ascending order and the links opposite to them.
-    fn new(vertex: [u32; 4], next: [u32; 4]) -> Self;
+/// A record: the fourth vertex from three, and what is behind the face opposite to each vertex. The
+/// vertices are in ascending order. Tet32 stores three of them, too.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub(super) struct TetRecord<const STORED: usize> {
+    stored: [u32; STORED],
     /// Exclusive or of all four vertices.
-    fn xor(&self) -> u32;
-    /// The link opposite to a vertex that is the greatest but so many.
-    fn next(&self, rank: usize) -> u32;
+    pub(super) xor: u32,
+    /// Links, by the rank of the opposite vertex.
+    pub(super) next: [u32; 4],
 }
 
-/// 32 bytes.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub(super) struct Tet32 {
-    vertex: [u32; 3],
-    xor: u32,
-    next: [u32; 4],
-}
+/// Stored vertices of Tet32.
+pub(super) const TET32: usize = 3;
+/// Stored vertices of Tet20.
+pub(super) const TET20: usize = 0;
 
-/// 20 bytes.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub(super) struct Tet20 {
-    xor: u32,
-    next: [u32; 4],
-}
-
-impl TetRecord for Tet32 {
-    fn new(vertex: [u32; 4], next: [u32; 4]) -> Self {
-        let [a, b, c, d] = vertex;
-        Tet32 { vertex: [a, b, c], xor: a ^ b ^ c ^ d, next }
-    }
-    #[inline(always)]
-    fn xor(&self) -> u32 {
-        self.xor
-    }
-    #[inline(always)]
-    fn next(&self, rank: usize) -> u32 {
-        self.next[rank & 3]
-    }
-}
-
-impl TetRecord for Tet20 {
-    fn new(vertex: [u32; 4], next: [u32; 4]) -> Self {
-        Tet20 { xor: vertex.iter().fold(0, |x, v| x ^ v), next }
-    }
-    #[inline(always)]
-    fn xor(&self) -> u32 {
-        self.xor
-    }
-    #[inline(always)]
-    fn next(&self, rank: usize) -> u32 {
-        self.next[rank & 3]
-    }
-}
+const _: () = assert!(size_of::<TetRecord<TET32>>() == 32 && size_of::<TetRecord<TET20>>() == 20);
 
 /// A face of the hull: its corners, and the tetrahedron inside.
 #[derive(Clone, Copy, Debug)]
@@ -72,8 +35,8 @@ pub(super) struct HullFace {
 
 /// A tetrahedralization in a record; rows count within it.
 #[derive(Clone, Debug)]
-pub(super) struct Tets<R> {
-    pub(super) records: Vec<R>,
+pub(super) struct Tets<const STORED: usize> {
+    pub(super) records: Vec<TetRecord<STORED>>,
     pub(super) vertices: Vec<[f32; 3]>,
     /// Triangle and vertices of each constrained face, and its tetrahedra.
     pub(super) faces: Vec<(u32, [u32; 3], [u32; 2])>,
@@ -82,8 +45,8 @@ pub(super) struct Tets<R> {
     pub(super) corners: Vec<[u32; 4]>,
 }
 
-impl<R: TetRecord> Tets<R> {
-    pub(super) fn new(mesh: &TetMesh) -> Tets<R> {
+impl<const STORED: usize> Tets<STORED> {
+    pub(super) fn new(mesh: &TetMesh) -> Tets<STORED> {
         let mut hull = Vec::new();
         let mut records = Vec::with_capacity(mesh.tets.len());
         for (t, (tet, behind)) in mesh.tets.iter().zip(&mesh.behind).enumerate() {
@@ -96,7 +59,8 @@ impl<R: TetRecord> Tets<R> {
                 Behind::Face(face) => FACE | face,
                 Behind::Hull => HULL,
             });
-            records.push(R::new(*tet, next));
+            let stored = std::array::from_fn(|k| tet[k]);
+            records.push(TetRecord { stored, xor: tet.iter().fold(0, |x, v| x ^ v), next });
         }
         let faces = mesh.faces.iter().map(|f| (f.triangle, f.vertex, f.tet)).collect();
         Tets { records, vertices: mesh.vertices.clone(), faces, hull, corners: mesh.tets.clone() }
@@ -110,5 +74,3 @@ impl<R: TetRecord> Tets<R> {
             + size_of_val(&self.hull[..])
     }
 }
-
-const _: () = assert!(size_of::<Tet32>() == 32 && size_of::<Tet20>() == 20);

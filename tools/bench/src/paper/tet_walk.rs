@@ -1,7 +1,8 @@
-//! The paper's walk through tetrahedra, one ray at a time. The three vertices of the entry face are kept in projection on a plane
-//! perpendicular to the ray; the fourth vertex is projected, and signs of cross products give the exit face.
+//! The paper's walk through tetrahedra, one ray at a time. The three vertices of the entry face are
+//! kept in projection on a plane perpendicular to the ray; the fourth vertex is projected, and
+//! signs of cross products give the exit face.
 
-use super::tet_records::{FACE, HULL, TetRecord, Tets};
+use super::tet_records::{FACE, HULL, Tets};
 use crate::moller_trumbore::{cross, dot, moller_trumbore, sub};
 use bth::rays::Ray;
 
@@ -49,7 +50,7 @@ pub(super) enum End {
     Lost,
 }
 
-impl<R: TetRecord> Tets<R> {
+impl<const STORED: usize> Tets<STORED> {
     fn corners_of(&self, vertex: [u32; 3]) -> [[f32; 3]; 3] {
         vertex.map(|v| self.vertices[v as usize])
     }
@@ -96,14 +97,15 @@ impl<R: TetRecord> Tets<R> {
     #[inline(always)]
     fn walk(&self, ray: &Ray, plane: &Plane, mut tet: u32, mut id: [u32; 3], best: f32) -> End {
         let mut p = id.map(|v| plane.project(self.vertices[v as usize]));
-        // Counterclockwise around the ray, so that a vertex to the left of one edge and right of the next names the exit.
+        // Counterclockwise around the ray, so that a vertex to the left of one edge and right of
+        // the next names the exit.
         if side(p[0], p[1]) < 0.0 || side(p[1], p[2]) < 0.0 || side(p[2], p[0]) < 0.0 {
             id.swap(1, 2);
             p.swap(1, 2);
         }
         for _ in 0..=self.records.len() {
             let record = &self.records[tet as usize];
-            let apex = record.xor() ^ id[0] ^ id[1] ^ id[2];
+            let apex = record.xor ^ id[0] ^ id[1] ^ id[2];
             let q = plane.project(self.vertices[apex as usize]);
             let s = [side(q, p[0]), side(q, p[1]), side(q, p[2])];
             // Closed sectors: one of them always holds the ray.
@@ -119,7 +121,7 @@ impl<R: TetRecord> Tets<R> {
                 + usize::from(id[1] < leaving)
                 + usize::from(id[2] < leaving)
                 + usize::from(apex < leaving);
-            let next = record.next(rank);
+            let next = record.next[rank & 3];
             (id[out], p[out]) = (apex, q);
             if next & FACE != 0 {
                 return match next {
@@ -132,7 +134,7 @@ impl<R: TetRecord> Tets<R> {
         End::Lost
     }
 
-    /// The end of a walk at a constrained face; t is that of its plane.
+    /// The end of a walk at a constrained face, with the t of its plane.
     #[inline(always)]
     fn at_face(&self, ray: &Ray, row: u32, best: f32) -> End {
         let [a, b, c] = self.corners_of(self.faces[row as usize].1);

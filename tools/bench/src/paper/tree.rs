@@ -1,10 +1,11 @@
-//! A binary BVH as pbrt has it, some leaves of which may be tetrahedralizations: the paper's BTH (§3), and without
-//! any its BVH.
+//! A binary BVH as in pbrt that may have tetrahedralizations as leaves: the paper's BTH
+//! (§3), and without any its BVH.
 //!
-//! Nodes take 32 bytes, the first child follows its parent, traversal visits the nearer child by the sign of the
-//! direction along the axis of the split (Pharr, Jakob and Humphreys 2016, §4.3.4), leaves hold up to four triangles.
+//! Nodes take 32 bytes, the first child follows its parent, traversal visits the nearer child by
+//! the sign of the direction along the axis of the split (Pharr, Jakob and Humphreys 2016, §4.3.4),
+//! leaves hold up to four triangles.
 
-use super::tet_records::{TetRecord, Tets};
+use super::tet_records::Tets;
 use super::tet_walk::{End, Plane};
 use crate::moller_trumbore::moller_trumbore;
 use crate::tracer::{Batch, Tracer};
@@ -20,7 +21,7 @@ pub(super) fn bvh_options() -> bvh::BvhOptions {
 
 /// Most triangles of a leaf (pbrt's default).
 const LEAF: u32 = 4;
-/// Cost of a step down in units of that of a triangle (pbrt, §4.3.2).
+/// Cost of a step down, if a triangle costs 1 (pbrt, §4.3.2).
 const STEP_COST: f64 = 0.125;
 /// Set in `count` where a leaf is a tetrahedralization.
 const TETS: u16 = u16::MAX;
@@ -41,18 +42,19 @@ struct PbrtNode {
 const _: () = assert!(size_of::<PbrtNode>() == 32);
 
 /// The structure.
-pub(super) struct PaperTree<R> {
+pub(super) struct PaperTree<const STORED: usize> {
     nodes: Vec<PbrtNode>,
     /// Corners in the order of the leaves, as pbrt's leaves hold them, with the triangle's id.
     triangles: Vec<([[f32; 3]; 3], u32)>,
-    leaves: Vec<Tets<R>>,
+    leaves: Vec<Tets<STORED>>,
     /// For each camera: the tetrahedron of each leaf that holds its eye.
     cameras: Vec<([f32; 3], Vec<Option<u32>>)>,
 }
 
-impl<R: TetRecord> PaperTree<R> {
-    /// Flattens a binary BVH of single triangles; `built` are nodes in ascending order that become tet leaves.
-    pub(super) fn new(mesh: &Mesh, bvh: &BinaryBvh, built: &[(u32, TetMesh)]) -> PaperTree<R> {
+impl<const STORED: usize> PaperTree<STORED> {
+    /// Flattens a binary BVH of single triangles; `built` are nodes in ascending order that become
+    /// tet leaves.
+    pub(super) fn new(mesh: &Mesh, bvh: &BinaryBvh, built: &[(u32, TetMesh)]) -> PaperTree<STORED> {
         let mut tree = PaperTree {
             nodes: Vec::new(),
             triangles: Vec::new(),
@@ -199,8 +201,8 @@ fn meets(node: &PbrtNode, ray: &Ray, inverse: &[f32; 3], negative: &[bool; 3], b
     near <= far
 }
 
-/// Cost of each node by the surface area heuristic, in units of a triangle's test; leaves of tetrahedra cost nothing, so
-/// that they are kept.
+/// Cost of each node by the surface area heuristic, in units of a triangle's test; leaves of
+/// tetrahedra cost nothing, so that they are kept.
 fn costs(bvh: &BinaryBvh, built: &[(u32, TetMesh)]) -> Vec<f64> {
     let area = |i: usize| {
         let node = &bvh.nodes[i];
@@ -221,7 +223,7 @@ fn costs(bvh: &BinaryBvh, built: &[(u32, TetMesh)]) -> Vec<f64> {
     cost
 }
 
-impl<R: TetRecord> Tracer for PaperTree<R> {
+impl<const STORED: usize> Tracer for PaperTree<STORED> {
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
         for (ray, hit) in batch.rays.iter().zip(hits) {
             *hit = self.trace(ray);
@@ -237,12 +239,13 @@ impl<R: TetRecord> Tracer for PaperTree<R> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tet_records::{Tet20, Tet32};
+    use super::super::tet_records::{TET20, TET32};
     use super::*;
     use bth_compile::{Silent, bvh, sampling, tets};
 
-    /// Hits of a structure against those of trying all triangles; `eye`: rays from one point within.
-    fn agrees<R: TetRecord>(mesh: &Mesh, tree: &PaperTree<R>, rays: &[Ray]) {
+    /// Compares hits with the nearest of all triangles; `eye`: rays from one point
+    /// within.
+    fn agrees<const STORED: usize>(mesh: &Mesh, tree: &PaperTree<STORED>, rays: &[Ray]) {
         let mut hits = 0;
         for ray in rays {
             let all = (0..mesh.triangles.len() as u32)
@@ -271,7 +274,7 @@ mod tests {
             .collect();
         let eye: [f32; 3] = std::array::from_fn(|k| 0.43 * root.lower[k] + 0.57 * root.upper[k]);
         let inside: Vec<Ray> = outside.iter().map(|r| Ray { origin: eye, ..*r }).collect();
-        agrees(&mesh, &PaperTree::<Tet20>::new(&mesh, &bvh, &[]), &outside);
+        agrees(&mesh, &PaperTree::<TET20>::new(&mesh, &bvh, &[]), &outside);
 
         let parts = [1, bvh.nodes[0].right];
         for chosen in [&[0][..], &parts[..]] {
@@ -282,8 +285,8 @@ mod tests {
                 return;
             }
             assert_eq!(built.len(), chosen.len());
-            let mut wide = PaperTree::<Tet32>::new(&mesh, &bvh, &built);
-            let mut small = PaperTree::<Tet20>::new(&mesh, &bvh, &built);
+            let mut wide = PaperTree::<TET32>::new(&mesh, &bvh, &built);
+            let mut small = PaperTree::<TET20>::new(&mesh, &bvh, &built);
             wide.look_from(eye);
             small.look_from(eye);
             for rays in [&outside, &inside] {

@@ -1,5 +1,5 @@
-//! The cameras of the paper's measurement, one sees the whole model, one stands close to it; and rendering with all
-//! structures in turn, on all threads.
+//! The cameras of the paper's measurement, one sees the whole model, one is close to it; and
+//! rendering with all structures in turn, on all threads.
 
 use crate::clock::process_cpu;
 use crate::model::Model;
@@ -42,8 +42,8 @@ impl Views {
         self.rays.iter().filter_map(|rays| rays.first()).map(|ray| ray.origin)
     }
 
-    /// The fastest seconds of each structure for a view, and the number of pixels that hit where they should miss or the
-    /// other way round.
+    /// The fastest seconds of each structure for a view, and the number of pixels that hit where
+    /// they should miss or the other way round.
     pub(super) fn render(
         &self,
         tracers: &[&dyn Tracer],

@@ -68,7 +68,8 @@ impl Camera {
             .collect()
     }
 
-    /// The camera in the direction `from` of the middle that is as near as possible while all points are in the picture.
+    /// The camera in the direction `from` of the middle that is as near as possible while all
+    /// points are in the picture.
     pub fn framing(points: &[DVec3], middle: DVec3, diagonal: f64, from: DVec3, size: (u32, u32)) -> Camera {
         let from = from.normalize();
         let at = |distance: f64| Camera {
@@ -77,7 +78,8 @@ impl Camera {
             tangent: 20f64.to_radians().tan(),
             size,
         };
-        // Beyond some distance the camera sees all points, and nearer it does not: bisection finds that distance.
+        // Beyond some distance the camera sees all points, and nearer it does not: bisection finds
+        // that distance.
         let (mut near, mut far) = (0.0, 20.0 * diagonal);
         for _ in 0..30 {
             let half = 0.5 * (near + far);

@@ -12,8 +12,8 @@ pub fn on_sphere(rng: &mut Rng) -> DVec3 {
     DVec3::new(radius * cos, radius * sin, z)
 }
 
-/// A unit vector in the hemisphere around a unit vector, with a density proportional to the cosine of their angle
-/// (Malley's method: a uniform point of the disk, lifted to the hemisphere).
+/// A unit vector in the hemisphere around a unit vector, with a density proportional to the cosine
+/// of their angle (Malley's method: a uniform point of the disk, lifted to the hemisphere).
 pub fn cosine_weighted(rng: &mut Rng, normal: DVec3) -> DVec3 {
     let square = rng.unit_f64();
     let (sin, cos) = (TAU * rng.unit_f64()).sin_cos();

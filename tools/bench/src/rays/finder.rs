@@ -1,5 +1,5 @@
-//! Finds the hits that the secondary rays start from, with our own plain BVH: its answers are exact and
-//! the same everywhere, so the rays are too.
+//! Finds the hits that the secondary rays start from, with our own plain BVH: its answers are exact
+//! and the same everywhere, so the rays are too.
 
 use crate::model::{Model, position};
 use crate::tracer::{BLOCK, Batch, spread};
@@ -7,8 +7,8 @@ use bth::Scene;
 use bth::rays::{Hit, Ray};
 use glam::DVec3;
 
-/// How far the rays of the sets `-beside` start off the surface, relative to the diagonal of the model. On models far from the
-/// origin it is less than the resolution of f32.
+/// Distance from the surface at which rays of the sets `-beside` start, relative to the model's
+/// diagonal. On models far from the origin it is less than the resolution of f32.
 pub const LIFT: f64 = 2e-5;
 
 /// A model and the compiled scene of it.
@@ -34,8 +34,9 @@ impl<'a> Finder<'a> {
         hits
     }
 
-    /// Where a ray goes on from a hit: the point, and the same lifted off the surface to the ray's side; and the unit normal to
-    /// that side. The point is computed in f64, and rounded once when a ray is made.
+    /// Where a ray goes on from a hit: the point, and the same lifted off the surface to the ray's
+    /// side; and the unit normal to that side. The point is computed in f64, and rounded once when
+    /// a ray is made.
     pub(super) fn points(&self, ray: &Ray, hit: &Hit) -> ([DVec3; 2], DVec3) {
         let normal = self.model.normal(hit.primitive.triangle);
         let direction = position(ray.direction);

@@ -1,22 +1,11 @@
-//! The ray sets. All are seeded, and the same for every tracer.
-//!
-//! | set | query | rays |
-//! |---|---|---|
-//! | `primary` | nearest | a camera that sees the whole model, or stands in it; tiles of 4×4 pixels |
-//! | `closeup` | nearest | a camera just above the surface in the middle of that picture |
-//! | `diffuse` | nearest | from each primary hit, cosine-weighted |
-//! | `ao` | any | four from each primary hit, cosine-weighted, 5 % of the diagonal long |
-//! | `shadow` | any | from each primary hit that faces it to a point light |
-//! | `diffuse-beside`, `ao-beside`, `shadow-beside` | the same | the same, but the start is a little off the surface |
-//! | `random` | nearest | chords between random points of a sphere around the model |
-//!
-//! Rays of `diffuse`, `ao` and `shadow` start at the hit, rounded to f32, with a tmin of 0: they may hit the triangle that
-//! they leave. The sets have the exact starts, too.
+//! The ray sets that `README.md` lists. All are seeded, and the same for every tracer. Rays of
+//! `diffuse`, `ao` and `shadow` start at the hit, rounded to f32, with a tmin of 0: they may hit
+//! the triangle that they leave. The sets have the exact starts, too.
 
 mod camera;
 mod directions;
 mod finder;
-pub mod recorded;
+pub(crate) mod recorded;
 mod viewpoint;
 
 pub use camera::Camera;
@@ -78,10 +67,12 @@ impl RaySet {
         Batch { rays: &self.rays, starts: self.starts.as_deref(), coherent: self.coherent }
     }
 
-    /// Keeps at most about `most` of the rays: whole runs of neighbours, evenly spread over the set.
+    /// Keeps at most about `most` of the rays: whole runs of neighbours, evenly spread over the
+    /// set.
     fn thinned(mut self, most: usize) -> RaySet {
         const RUN: usize = 64;
-        // An odd step: rows of tiles often have a power of two of runs, of which an even step would take the same columns.
+        // An even step would take the same columns of a picture whose rows have a power of two of
+        // runs.
         let step = self.rays.len().div_ceil(most.max(1)) | 1;
         let kept = |i: usize| (i / RUN).is_multiple_of(step);
         let keep = |index: &mut usize| {
@@ -105,11 +96,11 @@ pub struct Options {
     pub size: (u32, u32),
     /// Rays in a set, at most, about.
     pub most: usize,
-    /// Where the cameras stand; the model decides when absent.
+    /// The place of the cameras; by default the model decides.
     pub view: Option<View>,
 }
 
-/// Makes all sets of a model, and returns where their camera stands.
+/// Makes all sets of a model, and returns the place of their camera.
 pub fn sets(finder: &Finder<'_>, options: &Options) -> (View, Vec<RaySet>) {
     let bounds = finder.model.bounds();
     let diagonal = bounds.diagonal();
@@ -141,8 +132,8 @@ pub fn sets(finder: &Finder<'_>, options: &Options) -> (View, Vec<RaySet>) {
     (view, sets.into_iter().map(|s| s.thinned(options.most)).collect())
 }
 
-/// Where the cameras stand, and the rays of two of them in tiles of 4×4 pixels: the first sees the whole model or stands in it,
-/// the second is close to the surface.
+/// The place of the cameras, and the rays of two of them in tiles of 4×4 pixels: the first sees the
+/// whole model or is in it, the second is close to the surface.
 pub fn cameras(finder: &Finder<'_>, options: &Options) -> (View, [Vec<Ray>; 2]) {
     let (view, seen) = trace_camera(finder, options);
     let close = viewpoint::close_up(finder, finder.model.bounds().diagonal(), &seen).rays();

@@ -1,61 +1,30 @@
 //! Rays of a renderer: folders that `record_rays` writes, with a model and the rays of each query.
-//!
-//! | set | rays |
-//! |---|---|
-//! | `nearest`, `any` | those that start on a triangle, as the renderer traced them |
-//! | `nearest-past`, `any-past` | the same, but tmin is just past the triangle on which the ray starts |
-//! | `nearest-beside`, `any-beside` | the same, but the start is a little off that triangle |
+//! The sets are `nearest` and `any`: the rays that start on a triangle, as the renderer traced
+//! them.
 
-use super::{LIFT, RaySet};
+use super::RaySet;
 use crate::model::{Model, position};
 use anyhow::{Context, Result, ensure};
-use bth::rays::{Hit, PrimitiveRef, Ray, Start};
-use bth::{Accept, Scene};
+use bth::rays::{PrimitiveRef, Ray, Start};
 use bth_format::layout::NONE;
-use glam::DVec3;
 use std::path::Path;
 
-/// Names of the sets, in order.
-pub const NAMES: [&str; 6] = ["nearest", "nearest-past", "nearest-beside", "any", "any-past", "any-beside"];
+/// Names of the sets.
+pub(crate) const NAMES: [&str; 2] = ["nearest", "any"];
 /// The file of the model in a folder of recorded rays.
-pub const MODEL: &str = "model.ply";
+pub(crate) const MODEL: &str = "model.ply";
 
-/// Reads the sets of a folder, whose model and its compiled scene are given, of about `most` rays at most.
-///
-/// # Errors
-/// If a file cannot be read or its elements do not belong to the others or to the scene.
-pub fn sets(folder: &Path, model: &Model, scene: &Scene, most: usize) -> Result<Vec<RaySet>> {
-    let lift = LIFT * model.bounds().diagonal();
-    let mut sets = Vec::new();
-    for (any, names) in [(false, &NAMES[..3]), (true, &NAMES[3..])] {
-        let (rays, from) = read(folder, names[0])?;
+/// Reads the sets of a folder, of about `most` rays at most.
+pub(crate) fn sets(folder: &Path, model: &Model, most: usize) -> Result<Vec<RaySet>> {
+    let set = |name| {
+        let (rays, from) = read(folder, name)?;
         let fits = |p: &PrimitiveRef| (p.triangle as usize) < model.triangles();
-        ensure!(from.iter().all(fits), "{}.from: a triangle that {MODEL} lacks", names[0]);
+        ensure!(from.iter().all(fits), "{name}.from: a triangle that {MODEL} lacks");
         let starts = rays.iter().zip(from).map(|(ray, own)| start(ray, own, model)).collect();
-        let set = RaySet { name: names[0], any, coherent: false, rays, starts: Some(starts) }.thinned(most);
-        let other = |name, change: &dyn Fn(&Ray, PrimitiveRef) -> Ray| {
-            let changed = |(ray, start): (&Ray, &Start)| change(ray, start.primitive);
-            let rays = set.rays.iter().zip(set.starts.iter().flatten()).map(changed).collect();
-            RaySet { name, rays, starts: None, ..set.clone() }
-        };
-        let past = other(names[1], &|ray, own| past_own(scene, ray, own));
-        let beside = other(names[2], &|ray, own| lifted(ray, model.normal(own.triangle) * lift));
-        sets.extend([set, past, beside]);
-    }
-    Ok(sets)
-}
-
-/// The ray, beginning just past its own triangle if it hits that.
-fn past_own(scene: &Scene, ray: &Ray, own: PrimitiveRef) -> Ray {
-    let is_own = |_: &Ray, hit: &Hit| hit.primitive == own;
-    let accept = Accept { filter: Some(&is_own), ..Accept::default() };
-    scene.nearest_accepted(ray, &accept).map_or(*ray, |hit| Ray { tmin: hit.t.next_up(), ..*ray })
-}
-
-/// The ray, moved along its own triangle's normal to the side that it travels to.
-fn lifted(ray: &Ray, lift: DVec3) -> Ray {
-    let side = lift.dot(position(ray.direction)).signum();
-    Ray { origin: (position(ray.origin) + lift * side).as_vec3().to_array(), ..*ray }
+        let set = RaySet { name, any: name == "any", coherent: false, rays, starts: Some(starts) };
+        Ok(set.thinned(most))
+    };
+    NAMES.into_iter().map(set).collect()
 }
 
 /// The point of a triangle that is nearest to the origin of a ray which starts there.

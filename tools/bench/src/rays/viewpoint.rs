@@ -1,4 +1,4 @@
-//! Chooses where the camera stands: around the model, within it, or close to its surface.
+//! Chooses the place of the camera: around the model, within it, or close to its surface.
 
 use super::camera::{Camera, ray};
 use super::directions::{cosine_weighted, on_sphere, perpendicular};
@@ -8,19 +8,14 @@ use bth::rays::{Hit, Ray};
 use bth_random::Rng;
 use glam::DVec3;
 
-/// Where the cameras of a model stand.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The place of a model's cameras.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum View {
     /// Around the model.
     Outside,
-    /// Within the model, as is right for rooms and caves: from outside only their walls are visible.
+    /// Within the model, as is right for rooms and caves: from outside only their walls are
+    /// visible.
     Inside,
-}
-
-impl std::fmt::Display for View {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(if *self == View::Inside { "inside" } else { "outside" })
-    }
 }
 
 /// A camera, its rays and what they hit.
@@ -44,8 +39,9 @@ const SIDES: [DVec3; 4] = [
     DVec3::new(-1.0, 0.5, 0.8),
 ];
 
-/// A camera that frames the whole model. Where most of the visible surface lies in the faces of the bounding box, secondary
-/// rays leave the box at once and measure nothing; then the next side is tried.
+/// A camera that frames the whole model. Where most of the visible surface lies in the faces of the
+/// bounding box, secondary rays leave the box at once and measure nothing; then the next side is
+/// tried.
 pub(super) fn outside(finder: &Finder<'_>, bounds: &Bounds, size: (u32, u32)) -> CameraHits {
     let points: Vec<DVec3> = finder.model.mesh.positions.iter().map(|p| crate::model::position(*p)).collect();
     let (middle, diagonal) = (bounds.center(), bounds.diagonal());
@@ -63,8 +59,8 @@ pub(super) fn outside(finder: &Finder<'_>, bounds: &Bounds, size: (u32, u32)) ->
     first.expect("there are sides")
 }
 
-/// A camera within the model. Of 64 random points in the box it takes the one from which most directions hit something, far
-/// away on average; it looks in the direction of the farthest hit.
+/// A camera within the model. Of 64 random points in the box it takes the one from which most
+/// directions hit something, far away on average; it looks in the direction of the farthest hit.
 pub(super) fn inside(finder: &Finder<'_>, bounds: &Bounds, size: (u32, u32)) -> CameraHits {
     const POINTS: usize = 64;
     const DIRECTIONS: usize = 256;
@@ -111,17 +107,14 @@ pub(super) fn close_up(finder: &Finder<'_>, diagonal: f64, seen: &CameraHits) ->
 
 /// Samples of [`automatic`].
 const SKY_SAMPLES: usize = 4096;
-/// The camera stands within the model when less than this share of the rays from the fronts of its triangles leave it.
+/// The camera is in the model if less than this share of the rays from its triangles' fronts leave
+/// it.
 const OPEN: f64 = 0.08;
 
-/// Decides by the share of rays from the fronts of the triangles that hit nothing: next to none in rooms and caves,
-/// most on objects. Triangles count equally, so that furniture outweighs the walls around it.
+/// Decides by the share of cosine-weighted rays from the fronts of random triangles that hit
+/// nothing: few in rooms and caves, most on objects. Triangles count equally, so that furniture
+/// outweighs the walls around it.
 pub(super) fn automatic(finder: &Finder<'_>, diagonal: f64) -> View {
-    if sky(finder, diagonal) < OPEN { View::Inside } else { View::Outside }
-}
-
-/// Share of cosine-weighted rays from the fronts of random triangles that hit nothing.
-fn sky(finder: &Finder<'_>, diagonal: f64) -> f64 {
     let mut rng = Rng::new(7);
     let count = finder.model.triangles();
     let mut rays = Vec::with_capacity(SKY_SAMPLES);
@@ -135,5 +128,6 @@ fn sky(finder: &Finder<'_>, diagonal: f64) -> f64 {
         }
     }
     let open = finder.nearest(&rays).iter().filter(|h| !h.is_hit()).count();
-    open as f64 / rays.len().max(1) as f64
+    let is_room = (open as f64) < OPEN * rays.len().max(1) as f64;
+    if is_room { View::Inside } else { View::Outside }
 }

@@ -1,4 +1,5 @@
-//! A definition: a file of `benchmarks/definitions/`. It says how a benchmark is measured and which figures matter.
+//! A definition: a file of `benchmarks/definitions/`. It says how a benchmark is measured and which
+//! figures matter.
 
 use super::row::Row;
 use crate::args::Arguments;
@@ -16,10 +17,12 @@ pub(crate) struct Definition {
     pub(crate) benchmark: String,
     /// What the benchmark measures.
     pub(crate) about: String,
-    /// The command of this program that measures, and its options. Without it, rows come from the tool that `about` names.
+    /// The command of this program that measures, and its options. Without it, rows come from the
+    /// tool that `about` names.
     #[serde(default)]
     pub(crate) command: Vec<String>,
-    /// Models or scenes of the command: files within the folder of models, or names of `bth-scenes list`.
+    /// Models or scenes of the command: files within the folder of models, or names of `bth-scenes
+    /// list`.
     #[serde(default)]
     pub(crate) models: Vec<String>,
     /// The figures that the summary shows, some with a bar.
@@ -27,7 +30,7 @@ pub(crate) struct Definition {
     pub(crate) figures: Vec<Figures>,
 }
 
-/// Selects figures; a name that is not given stands for any.
+/// Selects figures; a key that is not given matches any.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Figures {
@@ -59,7 +62,7 @@ impl Figures {
             && is(&self.unit, &row.unit)
     }
 
-    /// The bar, and true if a value meets it; `None` if there is no bar.
+    /// The bar, and true if a value reaches it; `None` if there is no bar.
     pub(crate) fn judge(&self, value: f64) -> Option<(String, bool)> {
         match (self.at_least, self.at_most) {
             (Some(bar), _) => Some((format!("≥ {bar}"), value >= bar)),
@@ -87,21 +90,17 @@ impl Definition {
         files.iter().map(|file| Self::read(file)).collect()
     }
 
-    /// Measures the rows of the definition now; none if its models are folders of recorded rays that do not exist.
+    /// Measures the rows of the definition now; none if its models are folders of recorded rays
+    /// that do not exist.
     pub(crate) fn measure(&self, models: &Path, quick: bool) -> Result<Vec<Row>> {
         ensure!(!self.command.is_empty(), "{}: not measured by this program: {}", self.benchmark, self.about);
-        let found = self.models.iter().filter_map(|name| {
-            let file = models.join(name);
-            if file.exists() {
-                return Some(file.to_string_lossy().into_owned());
+        let found = self.models.iter().filter_map(|name| match models.join(name) {
+            file if file.exists() => Some(file.to_string_lossy().into_owned()),
+            _ if name.ends_with('/') => {
+                note(&format!("{name}: skipped: no such recording (tools/bench/record_rays/run makes it)"));
+                None
             }
-            let is_recording = name.ends_with('/');
-            if is_recording {
-                note(&format!(
-                    "{name}: skipped: no such folder of recorded rays (tools/bench/record_rays/run makes it)"
-                ));
-            }
-            (!is_recording).then(|| name.clone())
+            _ => Some(name.clone()),
         });
         let found: Vec<String> = found.collect();
         if found.is_empty() && !self.models.is_empty() {

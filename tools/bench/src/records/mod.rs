@@ -1,7 +1,8 @@
-//! The records of `benchmarks/`: definitions name what is measured, rows hold the figures, and the summary has the newest
-//! ones.
+//! The records of `benchmarks/`: definitions name what is measured, rows hold the figures, and the
+//! summary has the newest ones.
 //!
-//! A row is one figure; a file holds the rows of one kind of processor and one day, and is only ever appended to.
+//! A row is one figure; a file holds the rows of one kind of processor and one day, and is only
+//! ever appended to.
 
 mod definition;
 mod row;
@@ -11,7 +12,7 @@ use definition::Definition;
 pub(crate) use row::{HEAD, Row, cpu_folder};
 pub(crate) use summary::summarize;
 
-use crate::machine::{self, Machine};
+use crate::machine;
 use crate::output::{self, note};
 use anyhow::{Context, Result, ensure};
 use clap::Args;
@@ -50,7 +51,7 @@ pub(crate) struct Summary {
 pub(crate) fn record(arguments: &RecordRows) -> Result<()> {
     let path = arguments.folder.join("definitions").join(format!("{}.toml", arguments.definition));
     let definition = Definition::read(&path)?;
-    let folder = arguments.folder.join("record").join(cpu_folder(&Machine::this().cpu));
+    let folder = arguments.folder.join("record").join(cpu_folder(&machine::cpu()));
     if !arguments.quick {
         // Before hours are spent on rows that cannot be kept.
         std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
@@ -81,8 +82,8 @@ fn print(rows: &str) -> std::io::Result<()> {
     std::io::stdout().lock().write_all(format!("{HEAD}\n{rows}").as_bytes())
 }
 
-/// Appends rows to a file. An empty one gets the names of the columns. A last line without an end, as a full disk leaves
-/// it, gets one, so that the first row does not continue it.
+/// Appends rows to a file. An empty one gets the names of the columns. A last line without an end,
+/// as a full disk leaves it, gets one, so that the first row does not continue it.
 fn append(file: &Path, rows: &str) -> std::io::Result<()> {
     let mut open = std::fs::OpenOptions::new().create(true).read(true).append(true).open(file)?;
     let mut found = Vec::new();

@@ -1,13 +1,14 @@
 //! A row of a record: one figure.
 
-use anyhow::{Context, Result, bail};
-use serde::Serialize;
+use anyhow::{Context, Result, ensure};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 /// The columns.
 pub(crate) const HEAD: &str = "commit,benchmark,engine,model,set,threads,isa,value,unit,low,high,rounds";
 
 /// One figure.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Row {
     /// The commit that was measured, 12 digits; `?` if it is not known.
     pub(crate) commit: String,
@@ -31,7 +32,7 @@ pub(crate) struct Row {
     pub(crate) low: Option<f64>,
     /// Largest value or upper quartile, if known.
     pub(crate) high: Option<f64>,
-    /// Rounds of which the figure is the median; 0 if that is not known.
+    /// Rounds that gave the median; 0 if that is not known.
     pub(crate) rounds: usize,
 }
 
@@ -48,51 +49,30 @@ fn number(x: f64) -> String {
 impl Row {
     /// A line of the file. Commas within names become spaces.
     pub(crate) fn line(&self) -> String {
-        let name = |text: &str| text.replace([',', '\n', '"'], " ");
-        let optional = |x: Option<f64>| x.map(number).unwrap_or_default();
-        [
-            name(&self.commit),
-            name(&self.benchmark),
-            name(&self.engine),
-            name(&self.model),
-            name(&self.set),
-            self.threads.to_string(),
-            name(&self.isa),
-            number(self.value),
-            name(&self.unit),
-            optional(self.low),
-            optional(self.high),
-            self.rounds.to_string(),
-        ]
-        .join(",")
+        let values = serde_json::to_value(self).unwrap_or_default();
+        let cell = |column| match &values[column] {
+            Value::String(text) => text.replace([',', '\n', '"'], " "),
+            Value::Number(n) => number(n.as_f64().unwrap_or(f64::NAN)),
+            _ => String::new(),
+        };
+        HEAD.split(',').map(cell).collect::<Vec<_>>().join(",")
     }
 
     /// Reads a line.
     pub(crate) fn parse(line: &str) -> Result<Row> {
         let cells: Vec<&str> = line.split(',').collect();
-        let [commit, benchmark, engine, model, set, threads, isa, value, unit, low, high, rounds] = cells[..]
-        else {
-            bail!("expected 12 columns, found {}: {line}", cells.len());
+        ensure!(cells.len() == HEAD.split(',').count(), "expected the columns {HEAD}, found {line}");
+        let value = |(column, text): (&str, &str)| {
+            let value = match (["threads", "value", "low", "high", "rounds"].contains(&column), text) {
+                (false, _) => Value::from(text),
+                (true, "") => Value::Null,
+                (true, _) if text.bytes().all(|b| b.is_ascii_digit()) => Value::from(text.parse::<u64>()?),
+                (true, _) => Value::from(text.parse::<f64>().context(text.to_owned())?),
+            };
+            Ok((column.to_owned(), value))
         };
-        let figure = |text: &str| {
-            let found = text.parse::<f64>().ok().filter(|x| x.is_finite());
-            found.with_context(|| format!("expected a finite number, found {text:?}"))
-        };
-        let optional = |text: &str| if text.is_empty() { Ok(None) } else { figure(text).map(Some) };
-        Ok(Row {
-            commit: commit.to_owned(),
-            benchmark: benchmark.to_owned(),
-            engine: engine.to_owned(),
-            model: model.to_owned(),
-            set: set.to_owned(),
-            threads: threads.parse()?,
-            isa: isa.to_owned(),
-            value: figure(value)?,
-            unit: unit.to_owned(),
-            low: optional(low)?,
-            high: optional(high)?,
-            rounds: rounds.parse()?,
-        })
+        let row = HEAD.split(',').zip(cells).map(value).collect::<Result<_>>()?;
+        serde_json::from_value(Value::Object(row)).with_context(|| line.to_owned())
     }
 }
 
@@ -126,12 +106,8 @@ mod tests {
     }
 
     #[test]
-    fn numbers_keep_five_digits() {
-        assert_eq!([123456.7, 0.00012345678, 1.0, 0.0].map(number), ["123457", "0.00012346", "1", "0"]);
-    }
-
-    #[test]
-    fn folders_name_the_processor() {
+    fn numbers_keep_five_digits_and_folders_name_the_processor() {
+        assert_eq!([123456.7, 0.00012345678, 1.0].map(number), ["123457", "0.00012346", "1"]);
         let name = cpu_folder("Intel(R) Xeon(R) Processor (family 6, model 167)");
         assert_eq!(name, "intel-xeon-family-6-model-167");
     }

@@ -1,4 +1,5 @@
-//! The summary of all records: the newest of the figures that definitions show, by processor, and the bars they meet.
+//! The summary of all records: the newest of the figures that definitions show, by processor, and
+//! the bars they reach.
 
 use super::definition::{Definition, Figures};
 use super::row::{HEAD, Row};
@@ -21,7 +22,8 @@ const INTRODUCTION: &str = "# Benchmarks: summary\n\n\
 /// A row and the day on which it was measured.
 type Dated = (String, Row);
 
-/// Reads all records of a folder and makes the page. Rows of benchmarks without a definition are history, and skipped.
+/// Reads all records of a folder and makes the page. Rows of benchmarks without a definition are
+/// history, and skipped.
 pub(crate) fn summarize(folder: &Path) -> Result<String> {
     let definitions = Definition::read_all(&folder.join("definitions"))?;
     let records = folder.join("record");
@@ -81,7 +83,8 @@ fn newest(folder: &Path) -> Result<BTreeMap<[String; 7], Dated>> {
     Ok(out)
 }
 
-/// A table with a line for each model, tracer, instruction set and number of threads, and a column for each set and unit.
+/// A table with a line for each model, tracer, instruction set and number of threads, and a column
+/// for each set and unit.
 fn pivot(rows: &[&Dated], figures: &[Figures]) -> String {
     let line_of = |row: &Row| (row.model.clone(), row.engine.clone(), row.isa.clone(), row.threads);
     let columns = distinct(rows.iter().map(|(_, row)| (row.set.as_str(), row.unit.as_str())));
@@ -129,11 +132,10 @@ mod tests {
     fn the_newest_row_counts_and_bars_are_judged() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path();
-        let write = |file: &str, text: &str| {
-            let file = path.join(file);
-            std::fs::create_dir_all(file.parent().unwrap()).unwrap();
-            std::fs::write(file, text).unwrap();
-        };
+        for folder in ["definitions", "record/cpu"] {
+            std::fs::create_dir_all(path.join(folder)).unwrap();
+        }
+        let write = |file: &str, text: &str| std::fs::write(path.join(file), text).unwrap();
         write(
             "definitions/speed.toml",
             "benchmark = \"speed\"\nabout = \"Rays.\"\n\

@@ -1,6 +1,6 @@
 //! The rivals. One that is missing on a machine is skipped, with the reason.
 
-pub mod embree;
+pub(crate) mod embree;
 mod library;
 mod obvhs;
 mod tinybvh;

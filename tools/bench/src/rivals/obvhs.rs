@@ -1,5 +1,5 @@
-//! The CWBVH of the crate `obvhs`, with its best preset. Triangles are stored in the order of the leaves in the crate's
-//! own precomputed form, as its examples do.
+//! The CWBVH of the crate `obvhs`, with its best preset. Triangles are stored in the order of the
+//! leaves in the crate's own precomputed form, as its examples do.
 
 use crate::model::Model;
 use crate::tracer::{Batch, Contender, Tracer};

@@ -1,14 +1,14 @@
-//! tinybvh's CPU layout of nodes with 8 children, through `shim/tinybvh_shim.cpp`. Built with spatial splits on one thread.
+//! tinybvh's CPU layout of nodes with 8 children, through `shim/tinybvh_shim.cpp`. Built with
+//! spatial splits on one thread.
 #![allow(unsafe_code)]
 
 use super::library;
 use crate::model::Model;
 use crate::tracer::{Batch, Contender, Tracer};
-use anyhow::{Result, anyhow, ensure};
+use anyhow::{Result, ensure};
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_format::layout::NONE;
 use std::ffi::c_void;
-use std::sync::OnceLock;
 use std::time::Instant;
 
 /// Children of a node: the layout `BVH8_CPU`.
@@ -34,9 +34,8 @@ struct TinybvhApi {
 
 impl TinybvhApi {
     fn get() -> Result<&'static TinybvhApi> {
-        static TINYBVH_API: OnceLock<std::result::Result<TinybvhApi, String>> = OnceLock::new();
-        let api = TINYBVH_API.get_or_init(|| TinybvhApi::load().map_err(|e| format!("{e:#}")));
-        api.as_ref().map_err(|e| anyhow!("{e}"))
+        static API: library::Api<TinybvhApi> = library::Api::new();
+        library::once(&API, TinybvhApi::load)
     }
 
     fn load() -> Result<TinybvhApi> {
@@ -97,7 +96,8 @@ impl Tracer for TinyBvh {
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
         let mut answers = [Answer { t: f32::INFINITY, u: 0.0, v: 0.0, triangle: NONE }; MOST_ANSWERS];
         for (batch, hits) in batch.chunks(MOST_ANSWERS).zip(hits.chunks_mut(MOST_ANSWERS)) {
-            // SAFETY: at most as many rays as there is room for answers; `Ray` is what the shim expects.
+            // SAFETY: at most as many rays as there is room for answers; `Ray` is what the shim
+            // expects.
             unsafe {
                 (self.api.nearest)(self.bvh, batch.rays.as_ptr(), batch.rays.len(), answers.as_mut_ptr())
             };

@@ -1,4 +1,5 @@
-//! The contenders of `scenes`: our compiled scenes, scenes whose instances the program places, and Embree's.
+//! The contenders of `scenes`: our compiled scenes, scenes whose instances the program places, and
+//! Embree's.
 
 use super::source::Source;
 use crate::rivals::embree::{self, EmbreeMesh, EmbreeScene, InstancePlace, Variant};
@@ -21,18 +22,12 @@ pub(super) fn names(shown: &Scene) -> &'static [&'static str] {
 
 /// A frame and the transforms of all instances.
 pub(super) struct Frame {
-    number: i32,
-    places: Vec<InstancePlace>,
+    pub(super) number: i32,
+    pub(super) places: Vec<InstancePlace>,
 }
 
-impl Frame {
-    /// The frame of a scene at its current time.
-    pub(super) fn of(scene: &Scene, number: i32) -> Frame {
-        Frame { number, places: places(scene) }
-    }
-}
-
-fn places(scene: &Scene) -> Vec<InstancePlace> {
+/// The transforms of all instances of a scene at its current time.
+pub(super) fn places(scene: &Scene) -> Vec<InstancePlace> {
     let instances = (0..scene.instance_count()).map(|i| scene.instance(i));
     instances.map(|i| i.visible.then(|| i.to_world.map(|row| row.map(|x| x as f32)))).collect()
 }
@@ -85,7 +80,8 @@ pub(super) struct MovingContender {
     pub(super) build_s: f64,
 }
 
-/// The plain BVH of a scene. Its hits are what later rays start from, and others are compared with it.
+/// The plain BVH of a scene. Its hits are what later rays start from, and others are compared with
+/// it.
 pub(super) fn plain(source: &Source) -> Result<Scene> {
     opened(source, &structures::BVH)
 }

@@ -1,4 +1,4 @@
-//! The rays of a frame: the camera's, and those of the diffuse bounces after it.
+//! The rays of a frame: the camera's, and the diffuse bounces after them.
 
 use crate::model::position;
 use crate::rays::{Camera, LIFT, cosine_weighted, ray};
@@ -23,11 +23,6 @@ pub(super) struct FrameRaySet {
     expected: Vec<Hit>,
 }
 
-/// The rays of a frame, by [`super::SETS`].
-pub(super) struct FrameRays {
-    pub(super) sets: Vec<FrameRaySet>,
-}
-
 impl FrameRaySet {
     fn of(scene: &Scene, rays: Vec<Ray>, coherent: bool) -> FrameRaySet {
         let mut expected = vec![Hit::MISS; rays.len()];
@@ -39,7 +34,8 @@ impl FrameRaySet {
         Batch { rays: &self.rays, starts: None, coherent: self.coherent }
     }
 
-    /// Number of answers that differ: in any bit if they must be exact, else in hit or miss or in t.
+    /// Number of answers that differ: in any bit if they must be exact, else in hit or miss or in
+    /// t.
     pub(super) fn differences(&self, hits: &[Hit], exact: bool) -> u64 {
         let near = |a: &Hit, b: &Hit| a.is_hit() && b.is_hit() && (a.t - b.t).abs() <= SAME * a.t.abs();
         let same = |a: &Hit, b: &Hit| a == b || !exact && (near(a, b) || !a.is_hit() && !b.is_hit());
@@ -47,29 +43,24 @@ impl FrameRaySet {
     }
 }
 
-impl FrameRays {
-    /// The rays of a scene's camera at the scene's time.
-    pub(super) fn of(scene: &Scene, size: (u32, u32)) -> Result<FrameRays> {
-        let (camera, diagonal) = camera(scene, size)?;
-        let first = FrameRaySet::of(scene, camera.rays(), true);
-        let mut rng = Rng::new(1);
-        let lift = LIFT * diagonal;
-        let rays = onward(scene, &first.rays, &first.expected, lift, &mut rng);
-        let second = FrameRaySet::of(scene, rays, false);
-        let mut later = Vec::new();
-        let (mut rays, mut hits) = (second.rays.clone(), second.expected.clone());
-        for _ in 1..BOUNCES {
-            let next = onward(scene, &rays, &hits, lift, &mut rng);
-            let set = FrameRaySet::of(scene, next, false);
-            later.extend(&set.rays);
-            (rays, hits) = (set.rays, set.expected);
-        }
-        let third = FrameRaySet::of(scene, later, false);
-        Ok(FrameRays { sets: vec![first, second, third] })
+/// The rays of a scene's camera at the scene's time, by [`super::SETS`].
+pub(super) fn frame_rays(scene: &Scene, size: (u32, u32)) -> Result<Vec<FrameRaySet>> {
+    let (camera, diagonal) = camera(scene, size)?;
+    let (mut rng, lift) = (Rng::new(1), LIFT * diagonal);
+    let first = FrameRaySet::of(scene, camera.rays(), true);
+    let second = FrameRaySet::of(scene, onward(scene, &first.rays, &first.expected, lift, &mut rng), false);
+    let mut later = Vec::new();
+    let (mut rays, mut hits) = (second.rays.clone(), second.expected.clone());
+    for _ in 1..BOUNCES {
+        let set = FrameRaySet::of(scene, onward(scene, &rays, &hits, lift, &mut rng), false);
+        later.extend(&set.rays);
+        (rays, hits) = (set.rays, set.expected);
     }
+    Ok(vec![first, second, FrameRaySet::of(scene, later, false)])
 }
 
-/// The first camera of the scene, or one that frames all of it; and the diagonal of the visible instances' box.
+/// The first camera of the scene, or one that frames all of it; and the diagonal of the visible
+/// instances' box.
 fn camera(scene: &Scene, size: (u32, u32)) -> Result<(Camera, f64)> {
     let view = scene.description().context("a scene")?;
     let (framing, diagonal) = Camera::framing_instances(scene, size).context("nothing is to be seen")?;

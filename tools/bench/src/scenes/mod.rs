@@ -1,5 +1,5 @@
-//! Scenes that move and objects that deform, frame by frame: the paper's Table 3 on our animations, and Embree with the
-//! same instances.
+//! Scenes that move and objects that deform, frame by frame: the paper's Table 3 on our animations,
+//! and Embree with the same instances.
 //!
 //! `source` loads scenes, `frame_rays` makes the rays of a frame, and `contenders` traces them.
 
@@ -14,27 +14,28 @@ use crate::args::{RunOptions, at_least_one};
 use crate::clock::Clock;
 use crate::isa;
 use crate::names::Names;
-use crate::progress;
+use crate::output::progress;
 use crate::report::{Head, Report, Subject};
 use crate::rivals::embree;
 use crate::rounds::median;
-use anyhow::{Result, bail};
+use anyhow::Result;
 use bth::rays::Hit;
 use clap::Args;
 use contenders::{Frame, MovingContender, NAMES};
-use frame_rays::{FrameRaySet, FrameRays};
+use frame_rays::{FrameRaySet, frame_rays};
 use serde_json::json;
 
 /// `scenes`.
 #[derive(Debug, Args)]
 pub(crate) struct Scenes {
-    /// Scenes of `bth-scenes list`, manifests, glTF files, or `instances:N` for N instances that move.
+    /// Scenes of `bth-scenes list`, manifests, glTF files, or `instances:N` for N instances that
+    /// move.
     #[arg(required = true, value_name = "SCENE")]
     pub(crate) scenes: Vec<String>,
     /// Frames to measure, evenly over the range.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = at_least_one)]
     pub(crate) frames: usize,
-    /// Rounds of which the median counts; one more comes before.
+    /// Rounds, after one that warms up; the median counts.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = at_least_one)]
     pub(crate) rounds: usize,
     /// Numbers of threads for updates; rays are traced on one.
@@ -43,7 +44,7 @@ pub(crate) struct Scenes {
     /// Width of the pictures, which are 16:9.
     #[arg(long, value_name = "PIXELS", default_value_t = 640, value_parser = clap::value_parser!(u32).range(64..=8192))]
     pub(crate) width: u32,
-    /// Only these tracers; a star at the end stands for any ending.
+    /// Only these tracers; a star at the end matches any ending.
     #[arg(long = "tracer", value_name = "NAME,…", default_value = "", hide_default_value = true)]
     pub(crate) tracers: Names,
     #[command(flatten)]
@@ -52,12 +53,9 @@ pub(crate) struct Scenes {
 
 const ABOUT: &str = "\
 Medians of interleaved rounds, means over the frames; one thread by its CPU clock, several by the wall clock. `update`: \
-from another time to the frame: tracks, positions, refit and top level; for Embree and `bth placed`, whose instances the \
-program places, the given transforms and the commit. `positions and refit`: the part of it for objects that deform, by \
-the wall clock. Rays are the same for all: the camera's, one cosine-weighted bounce (`diffuse`), and those after it \
-(`later`). `bth` is compiled with the defaults, `bvh` with `--structure bvh`, so `bth` over `bvh` is the paper's BVH-BTH \
-over BVH-BVH. `differ`: answers that are not the BVH's, for compiled scenes in any bit, for others by hit or miss or by \
-more than 1e-4 of t. `times embree`: below 1 is faster.";
+tracks, positions, refit and top level; for Embree and `bth placed` the given transforms and the commit. Rays: the camera's, \
+one cosine-weighted bounce (`diffuse`), and those after it (`later`). `bth` over `bvh` is the paper's BVH-BTH over BVH-BVH. \
+`differ`: answers that are not the BVH's. `times embree`: below 1 is faster.";
 
 /// Sets of rays of a frame.
 const SETS: [&str; 3] = ["camera", "diffuse", "later"];
@@ -66,9 +64,7 @@ const TIME: &str = "ms/frame";
 
 /// Measures all scenes.
 pub(crate) fn measure(arguments: &Scenes) -> Result<Report> {
-    if let Some(name) = arguments.tracers.unknown(&NAMES).first() {
-        bail!("--tracer {name}: there are {}", NAMES.join(", "));
-    }
+    arguments.tracers.check("--tracer", &NAMES)?;
     let isa = isa::select(arguments.run.isa.as_deref())?;
     let width = if arguments.run.quick { 64 } else { arguments.width.next_multiple_of(4) };
     let size = (width, (width * 9 / 16).next_multiple_of(4));
@@ -105,14 +101,14 @@ fn measure_scene(
     threads: usize,
     report: &mut Report,
 ) -> Result<()> {
-    progress::show(format!("{}: compiling", source.name));
+    progress(format!("{}: compiling", source.name));
     let mut shown = contenders::plain(source)?;
     let frames = source.frames(arguments.frames);
     shown.set_frame(frames[0])?;
     let names = contenders::names(&shown).iter().filter(|name| arguments.tracers.select(name));
     let mut built = Vec::new();
     for name in names {
-        progress::show(format!("{}: {name}", source.name));
+        progress(format!("{}: {name}", source.name));
         match contenders::build(source, name, &shown, threads) {
             Ok(contender) => built.push(contender),
             Err(why) => report.leave_out(&source.name, name, &why),
@@ -127,10 +123,10 @@ fn measure_scene(
     ));
     let mut sums = vec![Sums::default(); built.len()];
     for (i, &number) in frames.iter().enumerate() {
-        progress::show(format!("{}: frame {} of {}", source.name, i + 1, frames.len()));
+        progress(format!("{}: frame {} of {}", source.name, i + 1, frames.len()));
         shown.set_frame(number)?;
-        let frame = Frame::of(&shown, number);
-        let sets = if threads == 1 { FrameRays::of(&shown, size)?.sets } else { Vec::new() };
+        let frame = Frame { number, places: contenders::places(&shown) };
+        let sets = if threads == 1 { frame_rays(&shown, size)? } else { Vec::new() };
         measure_frame(&mut built, &frame, &sets, threads, report.rounds, &mut sums)?;
     }
     for (contender, sums) in built.iter().zip(sums) {
@@ -155,7 +151,8 @@ fn measure_scene(
     Ok(())
 }
 
-/// Adds the median seconds of each contender for a frame. Rounds are interleaved: each contender comes once in each.
+/// Adds the median seconds of each contender for a frame. Rounds are interleaved: each contender
+/// comes once in each.
 fn measure_frame(
     contenders: &mut [MovingContender],
     frame: &Frame,

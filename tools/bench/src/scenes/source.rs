@@ -23,7 +23,8 @@ pub(crate) struct Source {
 }
 
 impl Source {
-    /// Makes a scene of `bth-scenes list`, `objects:N` or `instances:N`, or reads a manifest or glTF file.
+    /// Makes a scene of `bth-scenes list`, `objects:N` or `instances:N`, or reads a manifest or
+    /// glTF file.
     pub(crate) fn load(name: &str) -> Result<Source> {
         let count = |text: &str| text.parse().with_context(|| format!("{name}: expected a number"));
         if let Some(text) = name.strip_prefix("objects:") {
@@ -70,7 +71,8 @@ impl Source {
         Source::parsed(format!("{count} objects"), &text, folder)
     }
 
-    /// A scene of instances of one small object that drift through a cube with room for eight times as many.
+    /// A scene of instances of one small object that drift through a cube with room for eight times
+    /// as many.
     fn instances(count: u32) -> Result<Source> {
         let folder = tempfile::tempdir()?;
         bth_scenes::write::file(&bth_scenes::blob::blob(80), &folder.path().join("blob.ply"))?;
@@ -103,7 +105,7 @@ impl Source {
         Ok(Compiled { bytes: compiled.bytes, seconds: start.elapsed().as_secs_f64() })
     }
 
-    /// At most so many frames, evenly spread over the range of the manifest.
+    /// At most `count` frames, evenly spread over the range of the manifest.
     pub(crate) fn frames(&self, count: usize) -> Vec<i32> {
         let range = &self.manifest.frames;
         let (first, last) = (i64::from(range.first), i64::from(range.last));

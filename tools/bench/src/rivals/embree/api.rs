@@ -7,7 +7,6 @@ use anyhow::Result;
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_format::layout::NONE;
 use std::ffi::{c_char, c_int, c_void};
-use std::sync::OnceLock;
 
 pub(super) type Handle = *mut c_void;
 type Function = *const c_void;
@@ -43,22 +42,11 @@ pub(super) struct RayHit<const N: usize> {
 }
 
 impl<const N: usize> RayHit<N> {
-    const EMPTY: Self = RayHit {
-        origin: [[0.0; N]; 3],
-        near: [0.0; N],
-        direction: [[0.0; N]; 3],
-        time: [0.0; N],
-        far: [0.0; N],
-        mask: [u32::MAX; N],
-        id: [0; N],
-        flags: [0; N],
-        normal: [[0.0; N]; 3],
-        u: [0.0; N],
-        v: [0.0; N],
-        primitive: [NONE; N],
-        geometry: [NONE; N],
-        instance: [[NONE; N]; 2],
-    };
+    fn empty() -> Self {
+        // SAFETY: all fields are numbers.
+        let zero: Self = unsafe { std::mem::zeroed() };
+        RayHit { mask: [u32::MAX; N], geometry: [NONE; N], instance: [[NONE; N]; 2], ..zero }
+    }
 
     #[inline(always)]
     fn set(&mut self, lane: usize, ray: &Ray) {
@@ -70,7 +58,7 @@ impl<const N: usize> RayHit<N> {
         self.geometry[lane] = NONE;
     }
 
-    /// The hit of a lane, in the instance that the library names if there are `instances`, else in that of number 0.
+    /// The hit of a lane, in the library's instance if there are `instances`, else in number 0.
     #[inline(always)]
     pub(super) fn hit(&self, lane: usize, instances: bool) -> Hit {
         if self.geometry[lane] == NONE {
@@ -163,9 +151,10 @@ macro_rules! functions {
 
         impl EmbreeApi {
             fn load() -> Result<EmbreeApi> {
-                // SAFETY: EMBREE_LIB names Embree 4, whose initializers may run at any time, and whose functions have
-                // the types below (rtcore_device.h, rtcore_scene.h, rtcore_geometry.h). Occluded rays are passed as
-                // the `RTCRay` that a `RTCRayHit` begins with.
+                // SAFETY: EMBREE_LIB names Embree 4, whose initializers may run at any time, and
+                // whose functions have the types below (rtcore_device.h, rtcore_scene.h,
+                // rtcore_geometry.h). Occluded rays are passed as the `RTCRay` that a `RTCRayHit`
+                // begins with.
                 unsafe {
                     let library = library::load("EMBREE_LIB", "libembree4.so")?;
                     Ok(EmbreeApi { $($field: *library.get(concat!($name, "\0").as_bytes())?,)* })
@@ -204,13 +193,13 @@ functions! {
 
 impl EmbreeApi {
     pub(super) fn get() -> Result<&'static EmbreeApi> {
-        static EMBREE_API: OnceLock<std::result::Result<EmbreeApi, String>> = OnceLock::new();
-        let api = EMBREE_API.get_or_init(|| EmbreeApi::load().map_err(|e| format!("{e:#}")));
-        api.as_ref().map_err(|e| anyhow::anyhow!("{e}"))
+        static API: library::Api<EmbreeApi> = library::Api::new();
+        library::once(&API, EmbreeApi::load)
     }
 }
 
-/// Traces rays through a committed scene one by one; with `own` they do not hit the triangles that they start on.
+/// Traces rays through a committed scene one by one; with `own` they do not hit the triangles that
+/// they start on.
 pub(super) fn singly(
     scene: Handle,
     batch: Batch<'_>,
@@ -227,7 +216,7 @@ pub(super) fn singly(
         arguments.context = context.cast();
         arguments.filter = reject_own as Function;
     }
-    let mut lane = RayHit::<1>::EMPTY;
+    let mut lane = RayHit::<1>::empty();
     for (i, ray) in batch.rays.iter().enumerate() {
         lane.set(0, ray);
         if let Some(starts) = starts {
@@ -248,7 +237,7 @@ pub(super) fn packets(
     mut done: impl FnMut(usize, &RayHit<16>, usize),
 ) {
     let mut arguments = QueryArguments::new(batch.coherent);
-    let mut lanes = RayHit::<16>::EMPTY;
+    let mut lanes = RayHit::<16>::empty();
     for (packet, rays) in batch.rays.chunks(16).enumerate() {
         let mut used = Lanes([0; 16]);
         for (lane, ray) in rays.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Scenes of Embree: of one mesh, or of instances that can be placed anew for each frame.
+//! Scenes of Embree: of one mesh, or of instances that can be placed for each frame.
 #![allow(unsafe_code)]
 
 use super::Variant;
@@ -10,7 +10,7 @@ use std::ffi::c_void;
 use std::sync::atomic::{AtomicI64, AtomicPtr, AtomicUsize, Ordering};
 
 /// A built scene.
-pub struct EmbreeScene {
+pub(crate) struct EmbreeScene {
     api: &'static EmbreeApi,
     device: Handle,
     scene: Handle,
@@ -25,15 +25,16 @@ pub struct EmbreeScene {
     allocated: Box<AtomicI64>,
 }
 
-/// Positions and triangles. The positions must end with one more than the triangles use: the library may read 16 bytes at
-/// the last.
-pub type EmbreeMesh = (Vec<[f32; 3]>, Vec<[u32; 3]>);
+/// Positions and triangles. The positions must end with one more than the triangles use: the
+/// library may read 16 bytes at the last.
+pub(crate) type EmbreeMesh = (Vec<[f32; 3]>, Vec<[u32; 3]>);
 
-/// The transform from object to world of an instance, in rows of four; `None` for one that is not visible.
-pub type InstancePlace = Option<[[f32; 4]; 3]>;
+/// The transform from object to world of an instance, in rows of four; `None` for one that is not
+/// visible.
+pub(crate) type InstancePlace = Option<[[f32; 4]; 3]>;
 
-// SAFETY: the library's queries may run on any number of threads at once, and everything else is done by those who have
-// the scene for themselves.
+// SAFETY: the library's queries may run on any number of threads at once, and everything else is
+// done by those who have the scene for themselves.
 unsafe impl Send for EmbreeScene {}
 // SAFETY: as above.
 unsafe impl Sync for EmbreeScene {}
@@ -48,11 +49,8 @@ unsafe extern "C" fn count_bytes(total: Handle, bytes: isize, _after: bool) -> b
     true
 }
 
-/// Builds a scene on so many threads; see [`EmbreeMesh`].
-///
-/// # Errors
-/// If the library is missing or reports an error.
-pub fn build(
+/// Builds a scene on `threads` threads; see [`EmbreeMesh`].
+pub(crate) fn build(
     positions: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
     variant: &Variant,
@@ -63,12 +61,9 @@ pub fn build(
     scene.finished()
 }
 
-/// Builds the objects of a scene, several at once; instance i is an instance of `object_of[i]`, once it has a transform
-/// ([`EmbreeScene::place`]).
-///
-/// # Errors
-/// As [`build`]; if an index of `object_of` is too large.
-pub fn build_instances(
+/// Builds the objects of a scene, several at once; instance i is an instance of `object_of[i]`,
+/// once it has a transform ([`EmbreeScene::place`]).
+pub(crate) fn build_instances(
     objects: Vec<EmbreeMesh>,
     object_of: &[u32],
     variant: &Variant,
@@ -91,7 +86,8 @@ pub fn build_instances(
     });
     scene.objects = handles.into_iter().map(AtomicPtr::into_inner).collect();
     let api = scene.api;
-    // SAFETY: as for `object`; the objects are committed, and live as long as the scene of their instances.
+    // SAFETY: as for `object`; the objects are committed, and live as long as the scene of their
+    // instances.
     unsafe {
         scene.scene = scene.empty(variant);
         for (row, object) in object_of.iter().enumerate() {
@@ -121,8 +117,8 @@ impl EmbreeScene {
         let total: *const AtomicI64 = &raw const *allocated;
         let isa = variant.isa.map_or_else(String::new, |isa| format!(",max_isa={isa}"));
         let config = std::ffi::CString::new(format!("threads={threads}{isa}"))?;
-        // SAFETY: the counter lives in the `EmbreeScene` until after the device is released: moving a `Box` does not move what
-        // it points to.
+        // SAFETY: the counter lives in the `EmbreeScene` until after the device is released: moving
+        // a `Box` does not move what it points to.
         let device = unsafe {
             let device = (api.new_device)(config.as_ptr());
             ensure!(!device.is_null(), "the library makes no device");
@@ -151,10 +147,12 @@ impl EmbreeScene {
     /// A committed scene of a mesh of this one.
     fn object(&self, (positions, triangles): &EmbreeMesh, variant: &Variant) -> Handle {
         let (api, count_of_positions) = (self.api, positions.len().saturating_sub(1));
-        // SAFETY: the calls are in the order and with the constants that the library's documentation requires, which allows
-        // them from several threads for different scenes. The buffers hold as many items as the calls pass, plus the padding
-        // that it requires, every index is below the number of positions (checked by `new`), and all of it lives in the `EmbreeScene`
-        // until after the device is released: moving a `Vec` does not move what it points to.
+        // SAFETY: the calls are in the order and with the constants that the library's
+        // documentation requires, which allows them from several threads for different scenes. The
+        // buffers hold as many items as the calls pass, plus the padding that it requires, every
+        // index is below the number of positions (checked by `new`), and all of it lives in the
+        // `EmbreeScene` until after the device is released: moving a `Vec` does not move what it
+        // points to.
         unsafe {
             let scene = self.empty(variant);
             let geometry = (api.new_geometry)(self.device, TYPE_TRIANGLE);
@@ -172,9 +170,10 @@ impl EmbreeScene {
     }
 
     /// Places all instances and builds the scene over them.
-    pub fn place(&mut self, places: &[InstancePlace]) {
+    pub(crate) fn place(&mut self, places: &[InstancePlace]) {
         for (instance, place) in self.instances.iter().zip(places) {
-            // SAFETY: the instance is a geometry of the scene; the library copies twelve numbers in rows.
+            // SAFETY: the instance is a geometry of the scene; the library copies twelve numbers in
+            // rows.
             unsafe {
                 match place {
                     Some(rows) => {

@@ -1,4 +1,5 @@
-//! Tetrahedralizations of the nodes of a BVH, behind one door: a mesh and its binary BVH go in, tet leaves and reports come out.
+//! Tetrahedralizations of the nodes of a BVH, behind one door: a mesh and its binary BVH go in, tet
+//! leaves and reports come out.
 //!
 //! | modules | |
 //! |---|---|

@@ -1,10 +1,10 @@
-//! The selection of greatest gain over all suitable nodes, none below another, by dynamic programming from
-//! the leaves up.
+//! The selection of max gain over all suitable nodes, none below another, by dynamic programming
+//! from the leaves up.
 //!
-//! Under limits two selections are made and the better one is taken. The first solves the knapsack problem with the limits
-//! divided into steps: exact except for rounding up to steps, and therefore good for few large nodes. The second uses
-//! prices for bytes and seconds (Lagrange multipliers), which take nodes in the order of gain per unit, and therefore is
-//! good for many small nodes.
+//! Under limits two selections are made and the better one is taken. The first solves the knapsack
+//! problem with the limits divided into steps: exact except for rounding up to steps, and therefore
+//! good for few large nodes. The second uses prices for bytes and seconds (Lagrange multipliers),
+//! which take nodes in the order of gain per unit, and therefore is good for many small nodes.
 
 use super::gains::Gain;
 use bth_bvh::BinaryBvh;
@@ -48,7 +48,7 @@ impl Candidates<'_> {
             if !over(&best, kind) {
                 continue;
             }
-            // At a price above the greatest gain per unit no node is selected.
+            // At a price above the max gain per unit no node is selected.
             let worth = (0..self.nodes.len()).map(|k| self.gains[k].saved / self.takes[k][kind]);
             let (mut low, mut high) = (0.0, worth.fold(0.0, f64::max));
             best = Vec::new();
@@ -66,7 +66,8 @@ impl Candidates<'_> {
         best
     }
 
-    /// The selection by dynamic programming over the limits in steps; the steps of each node are rounded up.
+    /// The selection by dynamic programming over the limits in steps; the steps of each node are
+    /// rounded up.
     fn packed(&self, limits: [Option<f64>; 2]) -> Vec<usize> {
         let count = self.nodes.len();
         let steps = match limits {
@@ -84,7 +85,7 @@ impl Candidates<'_> {
                 Some(limit) => (self.takes[k][kind] / limit * steps[kind] as f64).ceil() as usize,
             })
         };
-        // Greatest gain of the candidates from a row on, by the steps that are left.
+        // Max gain of the candidates from a row on, by the steps that are left.
         let mut best = vec![0.0f64; (count + 1) * width];
         let with = |best: &[f64], k: usize, room: [usize; 2]| {
             let [a, b] = taken(k);
@@ -118,13 +119,13 @@ impl Candidates<'_> {
         k + self.nodes[k..].partition_point(|n| *n < after)
     }
 
-    /// The selection of greatest gain after subtracting the prices of its bytes and seconds.
+    /// The selection of max gain after subtracting the prices of its bytes and seconds.
     fn selection(&self, prices: [f64; 2]) -> Vec<usize> {
         let count = self.nodes.len();
         let net =
             |k: usize| self.gains[k].saved - prices[0] * self.takes[k][0] - prices[1] * self.takes[k][1];
-        // Greatest gain of the candidates from a row on: either the row is taken and the candidates below it are left out,
-        // or the row is left out.
+        // Max gain of the candidates from a row on: either the row is taken and the candidates
+        // below it are skipped, or the row is skipped.
         let mut best = vec![0.0; count + 1];
         let mut taken = vec![false; count];
         for k in (0..count).rev() {
@@ -149,7 +150,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Oracle: greatest gain within the limits over all selections, by trying every one.
+    /// Oracle: max gain within the limits over all selections, by trying every one.
     fn by_trying(c: &Candidates<'_>, limits: [Option<f64>; 2]) -> f64 {
         let mut best = 0.0f64;
         'sets: for set in 0u32..1 << c.nodes.len() {

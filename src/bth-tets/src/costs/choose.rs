@@ -1,4 +1,4 @@
-//! The selection: the paper's rule, or the choice of least expected time.
+//! The selection: the paper's rule, or the choice of min expected time.
 
 use super::bottom_up::Candidates;
 use super::gains::{Gain, Sampled, sample};
@@ -20,14 +20,16 @@ use bth_import::monitor::Monitor;
 pub struct Storage {
     /// Record that stores a tetrahedron.
     pub record: RecordKind,
-    /// Whether a BVH over the same triangles is kept beside the tetrahedra.
+    /// True if a BVH over the same triangles is kept next to the tetrahedra.
     pub keep_subtrees: bool,
-    /// Bytes of the object without tetrahedra, for the limit on bytes; estimated from the number of triangles where absent.
+    /// Bytes of the object without tetrahedra, for the limit on bytes; estimated from the number of
+    /// triangles where absent.
     pub plain_bytes: Option<u64>,
 }
 
 impl Storage {
-    /// Bytes of an object of this many triangles without tetrahedra, estimated where they are not known.
+    /// Bytes of an object of this many triangles without tetrahedra, estimated where they are not
+    /// known.
     fn plain_bytes(&self, triangles: usize) -> f64 {
         self.plain_bytes.map_or(BVH_BYTES * triangles as f64, |bytes| bytes as f64)
     }
@@ -84,8 +86,8 @@ pub fn choose(
     Ok((choice, report))
 }
 
-/// As [`choose`], were all nodes suitable. If no node is chosen then, none is whatever the marks, where
-/// [`CostOptions::more_suitable_gain_more`].
+/// Chooses as if all nodes were suitable. If no node is chosen then, none is whatever the marks,
+/// where [`CostOptions::more_suitable_gain_more`].
 ///
 /// # Errors
 /// [`Error::Cancelled`].
@@ -127,18 +129,19 @@ impl<'a> Limits<'a> {
         [net.max(LEAST_SHARE * bytes), self.prices.seconds(triangles)]
     }
 
-    /// Whether the tetrahedra of a single node are within the limits.
+    /// Returns true if the tetrahedra of a single node are within the limits.
     fn allow(&self, triangles: u32) -> bool {
         let takes = self.takes(triangles);
         self.most.iter().zip(takes).all(|(most, takes)| most.is_none_or(|most| takes <= most))
     }
 }
 
-/// Least share of the bytes of a node's tetrahedra that is counted against the limit where the node's BVH is left out in
-/// exchange. Keeps the bytes positive, so that gain per byte stays defined.
+/// Min share of the bytes of a node's tetrahedra that is counted against the limit where the node's
+/// BVH is dropped in exchange. Keeps the bytes positive, so that gain per byte stays defined.
 const LEAST_SHARE: f64 = 0.1;
 
-/// Refuses the chosen nodes of least gain per byte or second until the others are within the limits; returns the lost gain.
+/// Refuses the chosen nodes of min gain per byte or second until the others are within the limits;
+/// returns the lost gain.
 fn refuse_beyond(choice: &mut Choice, limits: &Limits<'_>) -> f64 {
     let mut lost = 0.0;
     for kind in 0..2 {
@@ -158,7 +161,7 @@ fn refuse_beyond(choice: &mut Choice, limits: &Limits<'_>) -> f64 {
     lost
 }
 
-/// The choice of greatest gain, with the cost of a ray before and after.
+/// The choice of max gain, with the cost of a ray before and after.
 fn best(
     mesh: &Mesh,
     bvh: &BinaryBvh,

@@ -1,10 +1,10 @@
 //! Steps of a ray through a tetrahedralization that does not exist yet: N_avg of the paper's §3.3.
 //!
-//! The paper's appendices with its formulas are not public; the derivations here are independent of them. Both
-//! hold for a constrained tetrahedralization with free-space points at the centres of the empty
-//! cells of an octree (what the `tets` stage builds), and for rays that end at the first surface.
-//! Once the tetrahedra exist, [`super::mean_steps`] samples them and [`super::area_steps`] adds up
-//! their faces.
+//! The paper's appendices with its formulas are not public; the derivations here are independent of
+//! them. Both hold for a constrained tetrahedralization with free-space points at the centres of
+//! the empty cells of an octree (what the `tets` stage builds), and for rays that end at the first
+//! surface. Once the tetrahedra exist, [`super::mean_steps`] samples them and [`super::area_steps`]
+//! adds up their faces.
 
 use serde::Serialize;
 
@@ -29,13 +29,13 @@ pub enum Estimator {
     AverageDepth,
 }
 
-/// Steps at level 0 and steps for each level, of rays from outside and from surfaces, for [`Estimator::FaceCount`]. Fitted
-/// to sampled steps by
-/// `bth-bench costs` on nodes of 1,024 to 80,000 triangles of five models.
+/// Steps at level 0 and steps for each level, of rays from outside and from surfaces, for
+/// [`Estimator::FaceCount`]. Fitted to sampled steps on nodes of 1,024 to 80,000 triangles of five
+/// models.
 const BY_FACE_COUNT: [[f64; 2]; 2] = [[0.68, 4.17], [-10.84, 5.30]];
 /// The same for [`Estimator::AverageDepth`].
 const BY_DEPTH: [[f64; 2]; 2] = [[1.32, 3.96], [-8.93, 4.83]];
-/// Least number of steps of a walk.
+/// Min number of steps of a walk.
 const LEAST: f64 = 1.0;
 
 impl Estimator {
@@ -56,8 +56,8 @@ impl Estimator {
     /// Without free-space points the tetrahedra in front of a fine mesh are long slivers and the
     /// steps more than twice as many (69 on the bunny); that case is not estimated.
     ///
-    /// Both assume the even spread of a scan; large flat faces beside fine detail are outside of what
-    /// they were fitted to.
+    /// Both assume the even spread of a scan; large flat faces next to fine detail are outside of
+    /// what they were fitted to.
     pub fn steps(self, start: Start, triangles: u32, average_depth: f64) -> f64 {
         let constants = match self {
             Estimator::FaceCount => BY_FACE_COUNT,

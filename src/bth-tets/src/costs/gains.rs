@@ -1,8 +1,9 @@
 //! The gain of tetrahedralizing a node, by sample rays through the binary BVH.
 //!
-//! A ray that starts on a triangle of a tet leaf walks its tetrahedra first, and traverses the BVH only if it leaves the
-//! leaf's box without a hit. Rays from outside take the BVH that is kept beside the tetrahedra; where none is kept they
-//! walk through the tetrahedra too. So the saving of a node is a sum over rays, and the savings of disjoint nodes add up.
+//! A ray that starts on a triangle of a tet leaf walks its tetrahedra first, and traverses the BVH
+//! only if it leaves the leaf's box without a hit. Rays from outside take the BVH that is kept next
+//! to the tetrahedra; else they walk through the tetrahedra too. So the saving of a node is a sum
+//! over rays, and the savings of disjoint nodes add up.
 
 use super::Start;
 use super::options::CostOptions;
@@ -14,9 +15,10 @@ use bth_import::Mesh;
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// Steps of a ray as short as those for ambient occlusion, as a share of those of a bounce: 19 of 32 on the bunny.
+/// Steps of a ray as short as those for ambient occlusion, as a share of those of a bounce: 19 of
+/// 32 on the bunny.
 const SHORT_STEPS: f64 = 0.6;
-/// Triangles for each ray of a kind, and the least and greatest number of rays of a kind.
+/// Triangles for each ray of a kind, and the min and max number of rays of a kind.
 const TRIANGLES_PER_RAY: usize = 16;
 const RAYS_OF_KIND: [usize; 2] = [512, 4096];
 
@@ -25,7 +27,8 @@ const RAYS_OF_KIND: [usize; 2] = [512, 4096];
 pub(super) struct Gain {
     /// Nanoseconds saved for each ray of the model; below 0 where tetrahedra are the slower.
     pub(super) saved: f64,
-    /// Nanoseconds of a ray that may use the tetrahedra: through the tetrahedra, and through the BVH.
+    /// Nanoseconds of a ray that may use the tetrahedra: through the tetrahedra, and through the
+    /// BVH.
     pub(super) tets: f64,
     pub(super) bvh: f64,
     /// Estimated steps.
@@ -36,14 +39,16 @@ pub(super) struct Gain {
 pub(super) struct Sampled {
     /// Rays from surfaces, with the row that each starts on and its result.
     surface: Vec<(SampleRay, u32, Traced)>,
-    /// How many rays from outside there were, and the nodes that they entered, ascending, once for each ray.
+    /// How many rays from outside there were, and the nodes that they entered, ascending, once for
+    /// each ray.
     outside: usize,
     entered: Vec<u32>,
     /// Nanoseconds of a ray through the BVH alone, all kinds.
     pub(super) cost_bvh: f64,
 }
 
-/// Draws and traces the rays: those that are known, else uniform lines and rays from the fronts of all triangles.
+/// Draws and traces the rays: those that are known, else uniform lines and rays from the fronts of
+/// all triangles.
 pub(super) fn sample(mesh: &Mesh, bvh: &BinaryBvh, options: &CostOptions) -> Sampled {
     let known = options.rays.as_deref();
     let [camera, surface_share] = known.map_or(options.optimize_for.weights(), KnownRays::shares);
@@ -80,7 +85,7 @@ pub(super) fn sample(mesh: &Mesh, bvh: &BinaryBvh, options: &CostOptions) -> Sam
     Sampled { surface, outside: from_outside.len(), entered, cost_bvh }
 }
 
-/// Rows of the BVH's order of some of so many triangles; those that are in no leaf are left out.
+/// Rows of the BVH's order of some of this many triangles; those that are in no leaf are skipped.
 fn rows(bvh: &BinaryBvh, triangles: usize, of: impl Iterator<Item = u32>) -> HashMap<u32, u32> {
     let mut wanted = vec![false; triangles];
     of.for_each(|triangle| wanted[triangle as usize] = true);
@@ -98,8 +103,8 @@ impl Sampled {
         before(nodes.end) - before(nodes.start)
     }
 
-    /// The gains of these nodes, which are ascending; `depths` are the sums of the depths of their leaves. `weights` are those
-    /// of rays from outside and from surfaces.
+    /// The gains of these nodes, which are ascending; `depths` are the sums of the depths of their
+    /// leaves. `weights` are those of rays from outside and from surfaces.
     pub(super) fn gains(
         &self,
         bvh: &BinaryBvh,
@@ -161,7 +166,7 @@ fn hits(traced: &Traced, node: &bth_bvh::Node) -> f64 {
     if traced.hit.is_some_and(here) { 1.0 } else { 0.0 }
 }
 
-/// Whether a ray leaves a node's box without having hit one of its triangles.
+/// Returns true if a ray leaves a node's box without having hit one of its triangles.
 pub(super) fn leaves(ray: &SampleRay, traced: &Traced, node: &bth_bvh::Node) -> bool {
     match traced.hit {
         Some((row, _)) if (node.first..node.first + node.count).contains(&row) => false,

@@ -9,8 +9,9 @@ pub struct Weighed {
     pub takes: f64,
 }
 
-/// The rows to leave out so that at least `over` bytes or seconds are freed: those of least gain per unit, without any row
-/// that the others make unnecessary. Ascending; all rows if together they take less than `over`.
+/// The rows to drop so that at least `over` bytes or seconds are freed: those of min gain per unit,
+/// without any row that the others make unnecessary. Ascending; all rows if together they take less
+/// than `over`.
 pub fn least_useful(items: &[Weighed], over: f64) -> Vec<usize> {
     let mut order: Vec<usize> = (0..items.len()).collect();
     let worth = |k: &usize| items[*k].gain / items[*k].takes;
@@ -23,7 +24,7 @@ pub fn least_useful(items: &[Weighed], over: f64) -> Vec<usize> {
         freed += items[k].takes;
         out.push(k);
     }
-    // The rows of greatest gain stay if the others free enough.
+    // The rows of max gain stay if the others free enough.
     for place in (0..out.len()).rev() {
         let takes = items[out[place]].takes;
         if freed - takes >= over {

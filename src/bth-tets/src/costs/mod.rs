@@ -1,9 +1,9 @@
 //! Selection of the suitable nodes to tetrahedralize, by the expected cost of rays.
 //!
 //! `profile` holds the measured costs of tracing on a machine. `tet_walk` counts steps of
-//! [sample rays](bth_bvh::sampling); `estimate` and `area` predict the steps without tracing. `choose` selects nodes, by the paper's rule
-//! (`top_down`) or by greatest saving (`gains`, `bottom_up`). `probe` decides again with sampled rays when the tetrahedra
-//! are built.
+//! [sample rays](bth_bvh::sampling); `estimate` and `area` predict the steps without tracing.
+//! `choose` selects nodes, by the paper's rule (`top_down`) or by max saving (`gains`,
+//! `bottom_up`). `probe` decides again with sampled rays when the tetrahedra are built.
 
 mod area;
 mod bottom_up;

@@ -9,11 +9,12 @@ use std::sync::Arc;
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Select {
-    /// The selection of least expected time, over all suitable nodes, for the rays of [`OptimizeFor`].
+    /// The selection of min expected time, over all suitable nodes, for the rays of
+    /// [`OptimizeFor`].
     #[default]
     Best,
-    /// The paper's rule (§3.2): from the root down, the first nodes whose tetrahedra are the cheaper for
-    /// rays from outside.
+    /// The paper's rule (§3.2): from the root down, the first nodes whose tetrahedra are the
+    /// cheaper for rays from outside.
     Paper,
     /// These nodes of the binary BVH, of which none lies below another. For measurements.
     Nodes(Vec<u32>),
@@ -47,14 +48,16 @@ impl OptimizeFor {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Probe {
-    /// Steps of sampled rays, counted and priced by the profile, with the same result on every machine.
+    /// Steps of sampled rays, counted and priced by the profile, with the same result on every
+    /// machine.
     #[default]
     Steps,
     /// None: all tetrahedra that were built stay.
     Off,
 }
 
-/// Costs of the structures, and limits on the nodes that are considered. Times are those of one ray on one thread.
+/// Costs of the structures, and limits on the nodes that are considered. Times are those of one ray
+/// on one thread.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CostOptions {
     /// How nodes are selected.
@@ -66,28 +69,28 @@ pub struct CostOptions {
     /// Costs of tracing. Files and cache keys contain its hash.
     #[serde(serialize_with = "by_hash")]
     pub profile: Profile,
-    /// Cost of a step from one tetrahedron to the next, nanoseconds, in place of the profile's; the other costs of
-    /// tetrahedra are scaled by the same factor.
+    /// Cost of a step from one tetrahedron to the next, nanoseconds, instead of the profile's; the
+    /// other costs of tetrahedra are scaled by the same factor.
     pub c_tet: Option<f64>,
     /// Nodes of fewer triangles are not tetrahedralized.
     pub minimum_triangles: u32,
     /// Nodes of more triangles are not tetrahedralized as a whole; nodes below them may be.
     pub maximum_triangles: u32,
-    /// Least saving of all chosen nodes together, as a share of the cost of the model's BVH; below it no node is chosen,
-    /// because tet leaves take several times the memory of a BVH.
+    /// Min saving of all chosen nodes together, as a share of the cost of the model's BVH; below it
+    /// no node is chosen, because tet leaves take several times the memory of a BVH.
     pub minimum_gain: f64,
-    /// Bytes that traversal may read for each triangle of the model, the BVH included. Sizes are estimated before
-    /// tetrahedra are built; afterwards those beyond the limit are left out.
+    /// Bytes that traversal may read for each triangle of the model, the BVH included. Sizes are
+    /// estimated before tetrahedra are built; afterwards those beyond the limit are skipped.
     pub max_bytes_per_triangle: Option<f64>,
-    /// Seconds of one thread that tetrahedralization may take, by the profile's estimate and not by the clock, so
-    /// that the same nodes are chosen on every machine.
+    /// Seconds of one thread that tetrahedralization may take, by the profile's estimate and not by
+    /// the clock, so that the same nodes are chosen on every machine.
     pub budget: Option<f64>,
     /// The criterion by which tetrahedra stay after they are built.
     pub probe: Probe,
     /// For objects of a scene: whether the rays of its cameras, lights and frames weight the nodes.
     pub for_scene: bool,
-    /// Rays that weight the nodes of the object, those of the BVH beside and those of tetrahedra in place of sampled ones. Cache keys
-    /// contain their hash.
+    /// Rays that weight the nodes of the object, those of the BVH beside and those of tetrahedra
+    /// instead of sampled ones. Cache keys contain their hash.
     #[serde(serialize_with = "rays_by_hash")]
     pub rays: Option<Arc<KnownRays>>,
 }
@@ -104,8 +107,9 @@ fn by_hash<S: Serializer>(profile: &Profile, to: S) -> Result<S::Ok, S::Error> {
 }
 
 impl CostOptions {
-    /// Whether the gain of the selection cannot become less where more nodes are suitable. Without limits the selection of
-    /// greatest gain is found exactly; limits and the paper's rule promise nothing of the kind.
+    /// Returns true if the gain of the selection cannot become less where more nodes are suitable.
+    /// Without limits the selection of max gain is found exactly; limits and the paper's rule
+    /// promise nothing of the kind.
     pub fn more_suitable_gain_more(&self) -> bool {
         let limited = self.max_bytes_per_triangle.is_some() || self.budget.is_some();
         !limited && matches!(self.select, Select::Best)
@@ -146,7 +150,7 @@ pub enum SelectionOutcome {
     RefusedSmall,
     /// It has more triangles than the maximum.
     RefusedLarge,
-    /// It would be chosen, but all such nodes together save less than the least gain.
+    /// It would be chosen, but all such nodes together save less than the min gain.
     RefusedGain,
     /// It would be chosen without the limits on bytes and time.
     RefusedLimit,
@@ -176,10 +180,11 @@ pub struct Verdict {
     pub node: u32,
     /// Triangles below it.
     pub count: u32,
-    /// Whether these triangles are free of bad contacts.
+    /// True if these triangles are free of bad contacts.
     pub suitable: bool,
-    /// Estimated cost with the node's tetrahedralization, nanoseconds for each ray that may use it: by the paper's rule a
-    /// ray that meets the node's box, else a ray that starts on one of its triangles.
+    /// Estimated cost with the node's tetrahedralization, nanoseconds for each ray that may use it:
+    /// by the paper's rule a ray that meets the node's box, else a ray that starts on one of its
+    /// triangles.
     pub cost_tet: f64,
     /// Estimated cost of the same ray with the node's BVH.
     pub cost_bvh: f64,
@@ -196,7 +201,8 @@ pub struct Verdict {
 pub struct Choice {
     /// Nodes that become tet leaves, ascending; none lies below another.
     pub chosen: Vec<u32>,
-    /// The nodes that were examined, ascending; nodes below a chosen or a small node are not examined.
+    /// The nodes that were examined, ascending; nodes below a chosen or a small node are not
+    /// examined.
     pub verdicts: Vec<Verdict>,
 }
 

@@ -4,10 +4,12 @@ use super::profile::{BvhCosts, TetCosts};
 use super::{CostOptions, Start, Walk};
 use bth_format::layout::{HullFace, RecordKind, TetFace, TetLeaf, TetVertex};
 
-/// Tetrahedra and tetrahedron vertices for each triangle, with free-space points, as measured on scans.
+/// Tetrahedra and tetrahedron vertices for each triangle, with free-space points, as measured on
+/// scans.
 const TETS_PER_TRIANGLE: f64 = 3.35;
 const VERTICES_PER_TRIANGLE: f64 = 0.85;
-/// Assumed share of the lines through a node's box that meet a triangle: that of a ball in its bounding cube.
+/// Assumed share of the lines through a node's box that meet a triangle: the share of a ball in its
+/// bounding cube.
 pub(super) const LINES_THAT_HIT: f64 = 0.52;
 
 /// Prices under the options.
@@ -17,7 +19,7 @@ pub(super) struct Prices<'a> {
     record: RecordKind,
     /// Factor on the costs of tetrahedra.
     scale: f64,
-    /// Whether a BVH stays beside the tetrahedra for rays from outside.
+    /// True if a BVH stays next to the tetrahedra for rays from outside.
     pub(super) keep_subtrees: bool,
 }
 
@@ -33,7 +35,7 @@ impl<'a> Prices<'a> {
         self.options.profile.bvh
     }
 
-    /// Bytes of the tetrahedra, vertices and faces of so many triangles.
+    /// Bytes of the tetrahedra, vertices and faces of this many triangles.
     pub(super) fn bytes(&self, triangles: u32) -> f64 {
         let record = self.record.stride() as f64;
         let a_triangle = TETS_PER_TRIANGLE * record
@@ -58,7 +60,8 @@ impl<'a> Prices<'a> {
         self.scale * walk.cost(steps, hits, self.walked(triangles), self.options.profile.bytes)
     }
 
-    /// Nanoseconds of a ray that starts on a triangle of the node; `hits` is the share of such rays that end at one.
+    /// Nanoseconds of a ray that starts on a triangle of the node; `hits` is the share of such rays
+    /// that end at one.
     pub(super) fn surface(&self, triangles: u32, steps: f64, hits: f64) -> f64 {
         self.cost(&self.costs.surface, triangles, steps, hits)
     }
@@ -68,7 +71,8 @@ impl<'a> Prices<'a> {
         self.cost(&self.costs.outside, triangles, steps, hits)
     }
 
-    /// Nanoseconds of a ray that enters the box of a leaf below a BVH node, where rays enter one by one.
+    /// Nanoseconds of a ray that enters the box of a leaf below a BVH node, where rays enter one by
+    /// one.
     pub(super) fn alone(&self, triangles: u32, steps: f64, hits: f64) -> f64 {
         self.cost(&self.costs.alone, triangles, steps, hits)
     }

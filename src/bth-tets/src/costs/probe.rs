@@ -1,8 +1,8 @@
-//! The probe: rays are traced through the tetrahedra that were built and through the BVH, and tetrahedralizations that are
-//! not faster are dropped.
+//! The probe: rays are traced through the tetrahedra that were built and through the BVH, and
+//! tetrahedralizations that are not faster are dropped.
 //!
-//! Steps are counted in double precision and priced by the profile, so that the outcome, and with it the file, is
-//! the same on every machine.
+//! Steps are counted in double precision and priced by the profile, so that the outcome, and with
+//! it the file, is the same on every machine.
 
 use super::choose::Storage;
 use super::gains::leaves;
@@ -19,7 +19,7 @@ use bth_import::error::Result;
 use bth_import::monitor::Monitor;
 use serde::Serialize;
 
-/// Rays of all leaves together, and the least and greatest number of rays of one leaf.
+/// Rays of all leaves together, and the min and max number of rays of one leaf.
 const RAYS_OF_ALL_LEAVES: usize = 1 << 16;
 const RAYS_OF_LEAF: [usize; 2] = [64, 1024];
 
@@ -49,12 +49,12 @@ pub struct ProbedLeaf {
     pub cost_bvh: f64,
     /// Nanoseconds saved for each ray of the model.
     pub gain: f64,
-    /// Whether it is kept.
+    /// True if it is kept.
     pub kept: bool,
 }
 
-/// Drops the tetrahedralizations that are not faster than the BVH, and all of them if together they save less than the
-/// least gain of the options.
+/// Drops the tetrahedralizations that are not faster than the BVH, and all of them if together they
+/// save less than the min gain of the options.
 ///
 /// # Errors
 /// [`bth_import::Error::Cancelled`].
@@ -141,7 +141,8 @@ struct Prober<'a> {
 }
 
 impl Prober<'_> {
-    /// Traces rays that start on the leaf's triangles: known rays if there are any, else sampled rays.
+    /// Traces rays that start on the leaf's triangles: known rays if there are any, else sampled
+    /// rays.
     fn surface(&self, node: u32, tets: &TetMesh) -> ProbedLeaf {
         let Self { mesh, bvh, options, prices, count } = *self;
         let (costs, at) = (options.profile.bvh, &bvh.nodes[node as usize]);
@@ -181,7 +182,8 @@ impl Prober<'_> {
         }
     }
 
-    /// Nanoseconds saved for each ray from outside that enters the root, where no BVH stays beside the tetrahedra.
+    /// Nanoseconds saved for each ray from outside that enters the root, where no BVH stays next to
+    /// the tetrahedra.
     fn entering(&self, node: u32, tets: &TetMesh) -> f64 {
         let Self { mesh, bvh, options, prices, count } = *self;
         let (costs, at) = (options.profile.bvh, &bvh.nodes[node as usize]);

@@ -34,8 +34,8 @@ pub struct Profile {
 pub struct BvhCosts {
     /// Fixed cost of a ray, apart from nodes and leaves.
     pub ray: f64,
-    /// An entered node of the *binary* BVH, for rays from outside: C_t and C_i of the paper. A visit of a wide node or
-    /// leaf stands for several of these.
+    /// An entered node of the *binary* BVH, for rays from outside: C_t and C_i of the paper. A
+    /// visit of a wide node or leaf stands for several of these.
     pub outside: f64,
     /// An entered node of the binary BVH, for rays from surfaces.
     pub surface: f64,
@@ -70,8 +70,9 @@ pub struct Walk {
 }
 
 impl Walk {
-    /// Cost of a walk of `steps` steps in tetrahedra of `bytes` bytes, if the share `hits` of walks ends at a triangle. The
-    /// cost of a step is interpolated by the logarithm of the size between the two measured sizes.
+    /// Cost of a walk of `steps` steps in tetrahedra of `bytes` bytes, if the share `hits` of walks
+    /// ends at a triangle. The cost of a step is interpolated by the logarithm of the size between
+    /// the two measured sizes.
     pub fn cost(&self, steps: f64, hits: f64, bytes: f64, sizes: [f64; 2]) -> f64 {
         let share = (bytes / sizes[0]).max(1.0).log2() / (sizes[1] / sizes[0]).log2();
         let [small, large] = self.step;

@@ -1,4 +1,5 @@
-//! Areas and depths of every subtree, the inputs of the cost model, summed in one pass from the leaves to the root.
+//! Areas and depths of every subtree, the inputs of the cost model, summed in one pass from the
+//! leaves to the root.
 
 use bth_bvh::{BinaryBvh, Node};
 use rayon::prelude::*;
@@ -14,10 +15,12 @@ pub(super) struct Sums {
     pub(super) depth: u64,
 }
 
-/// [`Sums::depth`] of each of `nodes`. These and `top` are ascending; `top` holds the root, and with a node all nodes above it.
+/// [`Sums::depth`] of each of `nodes`. These and `top` are ascending; `top` holds the root, and
+/// with a node all nodes above it.
 pub(super) fn depths(bvh: &BinaryBvh, top: &[u32], nodes: &[u32]) -> Vec<u64> {
-    // A leaf is as deep below a node as there are inner nodes above it, so each inner node adds its leaves. In preorder
-    // the nodes of a subtree are a range, which those of `top` divide into parts.
+    // A leaf is as deep below a node as there are inner nodes above it, so each inner node adds its
+    // leaves. In preorder the nodes of a subtree are a range, which those of `top` divide into
+    // parts.
     let end = |k: usize| top.get(k + 1).map_or(bvh.nodes.len(), |next| *next as usize);
     let inner = |part: &[Node]| part.iter().filter(|n| !n.is_leaf()).map(|n| u64::from(n.count)).sum();
     let parts: Vec<u64> =

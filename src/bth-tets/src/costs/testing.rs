@@ -21,8 +21,8 @@ pub(super) fn tree(seed: u64, leaves: u32) -> BinaryBvh {
     bvh
 }
 
-/// Marks that call a node suitable if its first row is at least the given one, or if it is a leaf. As with real marks,
-/// every node below a suitable one is suitable.
+/// Marks that call a node suitable if its first row is at least the given one, or if it is a leaf.
+/// As with real marks, every node below a suitable one is suitable.
 pub(super) fn marks_beyond(bvh: &BinaryBvh, row: u32) -> Marks {
     Marks { suitable: bvh.nodes.iter().map(|n| n.first >= row || n.count == 1).collect() }
 }

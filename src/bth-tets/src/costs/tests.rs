@@ -1,4 +1,5 @@
-//! Tests of the selection and its parts against plain recursion and against meshes with known numbers of steps.
+//! Tests of the selection and its parts against plain recursion and against meshes with known
+//! numbers of steps.
 
 use super::testing::{marks_beyond, tree};
 use super::*;
@@ -163,7 +164,8 @@ fn cheap_tetrahedra_are_taken_whole_and_dear_ones_not_at_all() {
     assert!(report.cost_with_tets < 0.5 * report.cost_bvh, "{report:?}");
     assert!(choice(1e3, CostOptions::default(), KEPT).0.chosen.is_empty());
 
-    // With a BVH beside the tetrahedra, rays from outside use the BVH only; without one they walk through the tetrahedra.
+    // With a BVH next to the tetrahedra, rays from outside use the BVH only; without one they walk
+    // through the tetrahedra.
     let camera = CostOptions { optimize_for: OptimizeFor::Camera, ..CostOptions::default() };
     assert!(choice(1e-3, camera.clone(), KEPT).0.chosen.is_empty());
     assert_eq!(choice(1e-3, camera, PRUNED).0.chosen, [0]);
@@ -235,8 +237,8 @@ fn what_all_nodes_cannot_gain_no_marks_can() {
     assert!(!limited.more_suitable_gain_more() && !paper().more_suitable_gain_more());
 }
 
-/// Two tetrahedra over the triangle (0, 1, 2), which is a constrained face; the hull is not a box, which walks do not
-/// require.
+/// Two tetrahedra over the triangle (0, 1, 2), which is a constrained face; the hull is not a box,
+/// which walks do not require.
 fn two_tets() -> TetMesh {
     let face = crate::Face { triangle: 9, vertex: [0, 1, 2], tet: [0, 1] };
     TetMesh {

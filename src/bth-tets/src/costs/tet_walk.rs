@@ -1,7 +1,7 @@
 //! Rays through a tetrahedralization in double precision, to count their steps.
 //!
-//! Sampling is the first of the paper's three ways to find N_avg (§3.3), the only one that needs the
-//! tetrahedra. A ray through an edge may take one step more or less than in the runtime.
+//! Sampling is the first of the paper's three ways to find N_avg (§3.3), the only one that needs
+//! the tetrahedra. A ray through an edge may take one step more or less than in the runtime.
 
 use crate::{Behind, TetMesh};
 use bth_bvh::sampling::SampleRay;
@@ -14,9 +14,9 @@ use glam::DVec3;
 pub struct Walked {
     /// Tetrahedra that the ray passes through.
     pub steps: u32,
-    /// Whether the ray ended at a triangle.
+    /// True if the ray ended at a triangle.
     pub hit: bool,
-    /// Whether the ray left the box; the traversal of the BVH then continues.
+    /// True if the ray left the box; the traversal of the BVH then continues.
     pub left: bool,
 }
 
@@ -53,8 +53,8 @@ impl<'a> TetWalker<'a> {
         [1, 2, 3].map(|i| self.corner(tet, (k + i) % 4))
     }
 
-    /// The walk of a ray: from its triangle if that is one of the node's, else from where it enters the
-    /// box; `None` if it misses the box.
+    /// The walk of a ray: from its triangle if that is one of the node's, else from where it enters
+    /// the box; `None` if it misses the box.
     pub fn walk(&self, ray: &SampleRay) -> Option<Walked> {
         let start = ray.from.and_then(|triangle| {
             let row = self.face_of.binary_search_by_key(&triangle, |(id, _)| *id).ok()?;

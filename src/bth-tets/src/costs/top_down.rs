@@ -1,5 +1,5 @@
-//! The paper's selection (§3.2, §3.3): top-down, the first suitable nodes for which tetrahedra are the cheaper
-//! structure for rays from outside.
+//! The paper's selection (§3.2, §3.3): top-down, the first suitable nodes for which tetrahedra are
+//! the cheaper structure for rays from outside.
 
 use super::options::{Choice, CostOptions, SelectionOutcome, Verdict};
 use super::prices::{LINES_THAT_HIT, Prices};
@@ -21,9 +21,10 @@ pub(super) struct PaperCosts {
     pub(super) visit: f64,
 }
 
-/// Chooses nodes from the root down: a suitable node of fitting size becomes a tet leaf if `C_tet N_avg` (the paper's
-/// equation 2) plus the cost of entering the tetrahedra is below the cost of its BVH. Otherwise, and where its triangles
-/// alone exceed the limits, its children are examined.
+/// Chooses nodes from the root down: a suitable node of fitting size becomes a tet leaf if
+/// `C_tet N_avg` (the paper's equation 2) plus the cost of entering the tetrahedra is below the
+/// cost of its BVH. Otherwise, and where its triangles alone exceed the limits, its children are
+/// examined.
 pub(super) fn choose(
     bvh: &BinaryBvh,
     marks: &Marks,

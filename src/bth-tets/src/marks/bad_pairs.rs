@@ -19,7 +19,7 @@ pub struct BadPairs {
     pub tested: u64,
 }
 
-/// Finds every bad contact between triangles of the BVH (those of zero area are not in it).
+/// Finds every bad contact between triangles of the BVH (triangles of zero area are not in it).
 /// The time grows with the number of overlapping boxes: quadratically for a heap of triangles.
 ///
 /// # Errors

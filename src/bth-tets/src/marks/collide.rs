@@ -13,10 +13,10 @@ use rayon::prelude::*;
 const STEPS_BETWEEN_CHECKS: u64 = 1 << 16;
 /// Triangles of two siblings beyond which their collision is worth several threads.
 const PARALLEL_COLLISION: u32 = 1 << 15;
-/// Parts of a collision that several threads process. A constant, because the counts of the report must not depend on the
-/// number of threads.
+/// Parts of a collision that several threads process. A constant, because the counts of the report
+/// must not depend on the number of threads.
 const PARTS: usize = 256;
-/// Greatest number of rounds of splitting, even if there are fewer parts then.
+/// Max number of rounds of splitting, even if there are fewer parts then.
 const SPLITTING_ROUNDS: usize = 24;
 
 /// A BVH with its triangles gathered in the order of its leaves, which keeps traversals local.
@@ -34,7 +34,7 @@ pub(super) struct Contacts {
     pub(super) bad: u64,
 }
 
-/// Whether a traversal continues after a bad contact.
+/// True if a traversal continues after a bad contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum After {
     /// One bad contact suffices.
@@ -44,7 +44,7 @@ pub(super) enum After {
 }
 
 impl<'a> Gathered<'a> {
-    /// Whether a triangle has zero area, given its row of the BVH's order.
+    /// Returns true if a triangle has zero area, given its row of the BVH's order.
     pub(super) fn is_flat(&self, row: u32) -> bool {
         is_zero_area(self.triangles[row as usize].corners)
     }
@@ -59,7 +59,7 @@ impl<'a> Gathered<'a> {
     }
 
     /// Tests the triangles of one node against those of another, on this thread. `found` is called
-    /// with the rows in `order` of each bad pair and returns whether to go on.
+    /// with the rows in `order` of each bad pair and returns true to go on.
     pub(super) fn collide(
         &self,
         left: u32,
@@ -94,8 +94,8 @@ impl<'a> Gathered<'a> {
         Ok(contacts)
     }
 
-    /// As [`Gathered::collide`], on several threads when the nodes are large. The counts do not depend on the number of
-    /// threads, even when a bad contact stops the traversal.
+    /// As [`Gathered::collide`], on several threads when the nodes are large. The counts do not
+    /// depend on the number of threads, even when a bad contact stops the traversal.
     pub(super) fn collide_in_parallel(
         &self,
         left: u32,
@@ -106,8 +106,8 @@ impl<'a> Gathered<'a> {
         if self.node(left).count.saturating_add(self.node(right).count) < PARALLEL_COLLISION {
             return self.collide(left, right, monitor, found);
         }
-        // Pairs of nodes are split breadth first until there are enough parts; pairs whose boxes do not overlap are
-        // dropped.
+        // Pairs of nodes are split breadth first until there are enough parts; pairs whose boxes do
+        // not overlap are dropped.
         let mut parts = vec![(left, right)];
         for _ in 0..SPLITTING_ROUNDS {
             parts = parts
@@ -166,7 +166,8 @@ impl<'a> Gathered<'a> {
     }
 }
 
-/// Whether two closed boxes have a point in common. Exact: the boxes are bounds of f32 corners.
+/// Returns true if two closed boxes have a point in common. Exact: the boxes are bounds of f32
+/// corners.
 #[inline]
 fn overlap(a: &Node, b: &Node) -> bool {
     let axis = |k: usize| (a.lower[k] <= b.upper[k]) & (b.lower[k] <= a.upper[k]);

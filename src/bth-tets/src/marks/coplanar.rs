@@ -28,12 +28,12 @@ impl Projection {
         orient2d(coord(a), coord(b), coord(c))
     }
 
-    /// Whether `p`, collinear with `a` and `b`, lies on the closed segment between them.
+    /// Returns true if `p`, collinear with `a` and `b`, lies on the closed segment between them.
     fn between(&self, a: Point, b: Point, p: Point) -> bool {
         self.axes.iter().all(|&k| a[k].min(b[k]) <= p[k] && p[k] <= a[k].max(b[k]))
     }
 
-    /// Whether two closed segments have a point in common.
+    /// Returns true if two closed segments have a point in common.
     fn segments_meet(&self, a: Point, b: Point, c: Point, d: Point) -> bool {
         let (oc, od) = (self.orient(a, b, c), self.orient(a, b, d));
         let (oa, ob) = (self.orient(c, d, a), self.orient(c, d, b));
@@ -46,7 +46,8 @@ impl Projection {
     }
 }
 
-/// Whether a closed segment meets a closed triangle of non-zero area that lies in the same plane.
+/// Returns true if a closed segment meets a closed triangle of non-zero area that lies in the same
+/// plane.
 pub(super) fn segment_meets_coplanar_triangle(p: Point, q: Point, triangle: [Point; 3]) -> bool {
     let Some((projection, area)) = Projection::of(triangle) else { return false };
     let edges = [(0, 1), (1, 2), (2, 0)];
@@ -55,8 +56,8 @@ pub(super) fn segment_meets_coplanar_triangle(p: Point, q: Point, triangle: [Poi
         || edges.iter().any(|&(i, j)| projection.segments_meet(p, q, triangle[i], triangle[j]))
 }
 
-/// Whether two coplanar triangles of non-zero area that share the edge `s`, `t` lie on the same
-/// side of it; `a` and `b` are their other corners.
+/// Returns true if two coplanar triangles of non-zero area that share the edge `s`, `t` lie on the
+/// same side of it; `a` and `b` are their other corners.
 pub(super) fn on_same_side(s: Point, t: Point, a: Point, b: Point) -> bool {
     let Some((projection, area)) = Projection::of([s, t, a]) else { return false };
     let other = projection.orient(s, t, b);

@@ -9,13 +9,13 @@ use bth_import::monitor::Monitor;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Greatest number of triangles of a subtree that one thread marks.
+/// Max number of triangles of a subtree that one thread marks.
 const GRAIN: u32 = 4096;
 
 /// Report of the marking stage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MarkReport {
-    /// Triangles in the BVH; those of zero area are not.
+    /// Triangles in the BVH; triangles of zero area are not.
     pub triangles: u64,
     /// Nodes of the BVH.
     pub nodes: u64,
@@ -34,7 +34,7 @@ pub struct MarkReport {
 /// How much of a model its large suitable nodes cover.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Coverage {
-    /// Least size of a node that counts, triangles.
+    /// Min size of a node that counts, triangles.
     pub at_least: u32,
     /// Maximal suitable nodes (suitable nodes whose parent is not) of at least that size.
     pub nodes: u64,
@@ -42,8 +42,9 @@ pub struct Coverage {
     pub share: f64,
 }
 
-/// Marks the nodes whose triangles are free of bad contacts, children before parents. A node is suitable when both children
-/// are and no triangle of one is in bad contact with one of the other; a triangle of zero area, as deformable objects may have, is not.
+/// Marks the nodes whose triangles are free of bad contacts, children before parents. A node is
+/// suitable when both children are and no triangle of one is in bad contact with one of the other;
+/// a triangle of zero area, as deformable objects may have, is not.
 ///
 /// # Errors
 /// Only [`bth_import::Error::Cancelled`].
@@ -123,7 +124,7 @@ fn levels_from_below(bvh: &BinaryBvh, upper: &[u32]) -> Vec<Vec<u32>> {
     levels
 }
 
-/// Marks all nodes of a small subtree; `marks[k]` is that of node `root + k`.
+/// Marks all nodes of a small subtree; `marks[k]` is the mark of node `root + k`.
 fn mark_subtree(
     gathered: &Gathered<'_>,
     root: u32,

@@ -1,10 +1,11 @@
 //! Which nodes may be tetrahedralized: the paper's MARKSUITABLENODES (§3.1) with exact predicates.
 //!
-//! Two triangles are in **bad contact** when they touch anywhere beyond the vertices that they share
-//! by index after exact welding: proper crossings, coplanar overlap, T-junctions, a vertex in a face,
-//! edges that overlap in part, duplicates. Triangles that share an edge or a vertex and nothing else,
-//! however flat or thin, are fine, and so is any gap that f32 can express. A set of triangles without
-//! bad contacts is a piecewise linear complex, the input that a constrained tetrahedralization needs.
+//! Two triangles are in **bad contact** when they touch anywhere beyond the vertices that they
+//! share by index after exact welding: proper crossings, coplanar overlap, T-junctions, a vertex in
+//! a face, edges that overlap in part, duplicates. Triangles that share an edge or a vertex and
+//! nothing else, however flat or thin, are fine, and so is any gap that f32 can express. A set of
+//! triangles without bad contacts is a piecewise linear complex, the input that a constrained
+//! tetrahedralization needs.
 
 mod bad_pairs;
 mod collide;

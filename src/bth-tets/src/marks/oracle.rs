@@ -1,5 +1,5 @@
-//! The slow, obvious oracle of the pair test: the intersection of two triangles, by clipping one against the other in
-//! rational arithmetic on small integer coordinates.
+//! The slow, obvious oracle of the pair test: the intersection of two triangles, by clipping one
+//! against the other in rational arithmetic on small integer coordinates.
 
 use super::triangle_contact::Triangle;
 
@@ -49,7 +49,8 @@ fn clip(polygon: &[RationalPoint], normal: IntegerVector, origin: IntegerVector)
             keep(*p);
         }
         if (hp > 0 && hq < 0) || (hp < 0 && hq > 0) {
-            // The heights are scaled by w: the crossing is p/w_p + hp/w_p / (hp/w_p - hq/w_q) (q - p).
+            // The heights are scaled by w: the crossing is p/w_p + hp/w_p / (hp/w_p - hq/w_q) (q -
+            // p).
             let n = [0, 1, 2].map(|k| hp * q.n[k] - hq * p.n[k]);
             keep(RationalPoint::new(n, hp * q.w - hq * p.w));
         }
@@ -69,7 +70,8 @@ fn common_part(a: [IntegerVector; 3], b: [IntegerVector; 3]) -> Vec<RationalPoin
     polygon
 }
 
-/// Whether two triangles with small integer coordinates touch beyond the vertices they share.
+/// Returns true if two triangles with small integer coordinates touch beyond the vertices they
+/// share.
 pub(crate) fn oracle(a: &Triangle, b: &Triangle) -> bool {
     let integer = |t: &Triangle| t.corners.map(|p| p.map(|x| x as i128));
     let shared: Vec<IntegerVector> = (0..3)

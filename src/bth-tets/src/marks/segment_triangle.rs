@@ -13,13 +13,14 @@ pub(super) fn orient3d(a: Point, b: Point, c: Point, d: Point) -> f64 {
     robust::orient3d(coord(a), coord(b), coord(c), coord(d))
 }
 
-/// Whether both values are on the same side of zero, and neither is zero.
+/// Returns true if both values are on the same side of zero, and neither is zero.
 #[inline]
 pub(super) fn same_strict_sign(x: f64, y: f64) -> bool {
     (x > 0.0 && y > 0.0) || (x < 0.0 && y < 0.0)
 }
 
-/// Whether the closed segment `p`, `q` meets the closed triangle, which has a non-zero area.
+/// Returns true if the closed segment `p`, `q` meets the closed triangle, which has a non-zero
+/// area.
 /// `side_p` and `side_q` are the signs of `orient3d(triangle, p)` and `orient3d(triangle, q)`.
 pub(super) fn segment_meets_triangle(
     p: Point,

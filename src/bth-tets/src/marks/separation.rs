@@ -1,5 +1,6 @@
-//! A cheap proof that two triangles that share a vertex touch only there: a separating plane, with a bound on the rounding
-//! of the dot products. Makes the exact tests unnecessary for most neighbours.
+//! A cheap proof that two triangles that share a vertex touch only there: a separating plane, with
+//! a bound on the rounding of the dot products. Makes the exact tests unnecessary for most
+//! neighbours.
 
 type Point = [f32; 3];
 type Vector = [f64; 3];
@@ -18,7 +19,7 @@ fn dot(a: Vector, b: Vector) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Whether `dot(v, d)` is certainly positive, for `v` a rounded difference of f32 points.
+/// Returns true if `dot(v, d)` is certainly positive, for `v` a rounded difference of f32 points.
 #[inline]
 fn certainly_positive(v: Vector, d: Vector) -> bool {
     let magnitude = (v[0] * d[0]).abs() + (v[1] * d[1]).abs() + (v[2] * d[2]).abs();
@@ -31,12 +32,14 @@ fn unit(v: Vector) -> Vector {
     [v[0] * scale, v[1] * scale, v[2] * scale]
 }
 
-/// Whether a plane through `s` certainly has `a` strictly on one side and `b` strictly on the
-/// other, so that the triangles (s, a0, a1) and (s, b0, b1) have only `s` in common. False proves
-/// nothing. Any direction is a valid witness; the one tried runs between the corners' bisectors.
+/// Returns true if a plane through `s` certainly has `a` strictly on one side and `b` strictly on
+/// the other, so that the triangles (s, a0, a1) and (s, b0, b1) have only `s` in common. False
+/// proves nothing. Any direction is a valid witness; the one tried runs between the corners'
+/// bisectors.
 #[inline]
 pub(super) fn fans_are_apart(s: Point, a: [Point; 2], b: [Point; 2]) -> bool {
-    // Written out because `map` on arrays of arrays is not always inlined and this code runs for most pairs.
+    // Written out because `map` on arrays of arrays is not always inlined and this code runs for
+    // most pairs.
     let (a0, a1, b0, b1) = (minus(a[0], s), minus(a[1], s), minus(b[0], s), minus(b[1], s));
     let (ua0, ua1, ub0, ub1) = (unit(a0), unit(a1), unit(b0), unit(b1));
     let between = |k: usize| (ua0[k] + ua1[k]) - (ub0[k] + ub1[k]);

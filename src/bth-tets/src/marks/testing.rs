@@ -50,7 +50,8 @@ pub(super) struct Planted {
     pub(super) pairs: u64,
 }
 
-/// The planted contacts of `tools/crosscheck/planted.json`, which the cross-check with other programs uses too.
+/// The planted contacts of `tools/crosscheck/planted.json`, which the cross-check with other
+/// programs uses too.
 pub(super) fn planted() -> Vec<Planted> {
     #[derive(serde::Deserialize)]
     struct Case {

@@ -1,4 +1,4 @@
-//! Whether two triangles are in bad contact, decided exactly.
+//! Decides exactly if two triangles are in bad contact.
 
 use super::coplanar::on_same_side;
 use super::segment_triangle::{orient3d, same_strict_sign, segment_meets_triangle};
@@ -15,8 +15,8 @@ pub struct Triangle {
     pub vertices: [u32; 3],
 }
 
-/// Whether two triangles of non-zero area touch beyond the vertices that they share (see the
-/// module's definition). Exact for all finite coordinates: products of three differences of f32
+/// Returns true if two triangles of non-zero area touch beyond the vertices that they share (see
+/// the module's definition). Exact for all finite coordinates: products of three differences of f32
 /// neither overflow nor underflow f64.
 pub fn in_bad_contact(a: &Triangle, b: &Triangle) -> bool {
     let (mut shared_a, mut shared_b) = (0u32, 0u32);
@@ -173,8 +173,8 @@ mod tests {
 
     #[test]
     fn one_ulp_decides_between_contact_and_gap() {
-        // Vertices of the second triangle lie on the plane of the first or one ulp above it; no coordinate plane is
-        // parallel to that plane.
+        // Vertices of the second triangle lie on the plane of the first or one ulp above it; no
+        // coordinate plane is parallel to that plane.
         let mut random = Rng::new(13);
         for _ in 0..2000 {
             let [x, y] = [0; 2].map(|_: i32| 1.0 + random.below(1000) as f32 / 1024.0);

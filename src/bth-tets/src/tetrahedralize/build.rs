@@ -18,7 +18,8 @@ use super::{Leaf, TetMesh, TetOptions};
 /// built: chosen nodes, or cells below them where they failed; the rest stays in the BVH. It is
 /// the same for any number of workers, as long as no deadline passes.
 ///
-/// A missing worker is not an error: nothing is built then, and the report contains a hint on how to install one.
+/// A missing worker is not an error: nothing is built then, and the report contains a hint on how
+/// to install one.
 ///
 /// # Errors
 /// [`Error::Cancelled`]; [`Error::Limit`] when the object exceeds a limit of the format;
@@ -33,7 +34,7 @@ pub fn build(
     build_through(mesh, bvh, chosen, options, &TimedNodes, monitor)
 }
 
-/// As [`build`], with every node run by `runner`.
+/// Builds like [`build`], with every node run by `runner`.
 ///
 /// # Errors
 /// As [`build`].
@@ -235,7 +236,8 @@ impl Queue {
         let state = State { waiting: nodes.collect(), running: 0, stopped: false };
         Self { state: Mutex::new(state), changed: Condvar::new() }
     }
-    /// The next node. Waits while nodes in work may still add some; `None` when all nodes are done or the queue is stopped.
+    /// The next node. Waits while nodes in work may still add some; `None` when all nodes are done
+    /// or the queue is stopped.
     fn next(&self) -> Option<u32> {
         let mut state = lock(&self.state);
         loop {

@@ -1,4 +1,4 @@
-//! Whether what TetGen returned is a constrained tetrahedralization after rounding to `f32`.
+//! Decides if what TetGen returned is a constrained tetrahedralization after rounding to `f32`.
 //!
 //! Decided by topology and exact predicates. If all tetrahedra have the same strict orientation,
 //! every face is shared by exactly two that lie on opposite sides of it, except for twelve that
@@ -27,8 +27,8 @@ pub(super) struct Checked {
     pub(super) nudged: u32,
 }
 
-/// Rounds, repairs what rounding broke, and checks. `sent` are the points that were sent to the worker, relative to
-/// `origin`; it must return them bit for bit.
+/// Rounds, repairs what rounding broke, and checks. `sent` are the points that were sent to the
+/// worker, relative to `origin`; it must return them bit for bit.
 ///
 /// # Errors
 /// The first defect found.
@@ -100,7 +100,8 @@ fn fills_box(
         halves[plane].push(here);
     }
     for (quad, halves) in SIDES.iter().zip(&halves) {
-        // A side of the box is two triangles along a diagonal: each omits one corner, and these two are opposite corners.
+        // A side of the box is two triangles along a diagonal: each omits one corner, and these two
+        // are opposite corners.
         let &[a, b] = halves.as_slice() else { return Err(Defect::Hull) };
         let without = |half: [u32; 3]| quad.iter().position(|&c| !half.contains(&(c + first)));
         match (without(a), without(b)) {

@@ -26,7 +26,8 @@ pub struct Encoded {
     pub face_of_triangle: Vec<u32>,
 }
 
-/// Encodes meshes as [`super::build()`] returned them, which holds their sum within the format's limits.
+/// Encodes meshes as [`super::build()`] returned them, which holds their sum within the format's
+/// limits.
 /// `subtrees` are the child codes of the BVHs over the same triangles, one per mesh, `NONE` where
 /// pruned; `triangles` is the number in the source.
 ///
@@ -76,8 +77,8 @@ pub fn encode(meshes: &[TetMesh], subtrees: &[u32], kind: RecordKind, triangles:
     to
 }
 
-/// Bytes that a tetrahedralization adds to the sections, without the map from triangles to faces, which has a row for each
-/// triangle of the source.
+/// Bytes that a tetrahedralization adds to the sections, without the map from triangles to faces,
+/// which has a row for each triangle of the source.
 pub fn encoded_bytes(mesh: &TetMesh, kind: RecordKind) -> u64 {
     let hulls = mesh.behind.iter().flatten().filter(|behind| **behind == Behind::Hull).count();
     let bytes = mesh.tets.len() * kind.stride()

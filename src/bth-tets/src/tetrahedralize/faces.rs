@@ -1,4 +1,5 @@
-//! Matches the faces of tetrahedra: finds for every face the sides of the tetrahedra that meet in it.
+//! Matches the faces of tetrahedra: finds for every face the sides of the tetrahedra that meet in
+//! it.
 
 /// Marks the absence of a side.
 pub(super) const NONE: u32 = u32::MAX;
@@ -13,7 +14,8 @@ pub(super) struct Faces {
 }
 
 impl Faces {
-    /// Collects and sorts the faces. There are less than 2^30 tetrahedra, whose vertices are below `vertices`.
+    /// Collects and sorts the faces. There are less than 2^30 tetrahedra, whose vertices are below
+    /// `vertices`.
     pub(super) fn new(vertices: usize, tets: &[[u32; 4]]) -> Self {
         let mut starts = vec![0u32; vertices + 1];
         let sides = || (0..4 * tets.len() as u32).map(|side| (key(face(tets, side)), side));
@@ -64,7 +66,8 @@ impl Faces {
     }
 }
 
-/// The vertices of a side, such that all sides of a tetrahedron are seen from outside in the same sense.
+/// The vertices of a side, such that all sides of a tetrahedron are seen from outside in the same
+/// sense.
 pub(super) fn face(tets: &[[u32; 4]], side: u32) -> [u32; 3] {
     let [a, b, c, d] = tets[side as usize / 4];
     match side % 4 {
@@ -81,7 +84,7 @@ fn key(mut vertices: [u32; 3]) -> [u32; 3] {
     vertices
 }
 
-/// Whether the order of the vertices is an even permutation of the ascending one.
+/// Returns true if the order of the vertices is an even permutation of the ascending one.
 pub(super) fn even(v: [u32; 3]) -> bool {
     (v[0] < v[1]) ^ (v[1] < v[2]) ^ (v[0] < v[2])
 }

@@ -39,13 +39,14 @@ impl AttemptError {
         }
     }
 
-    /// Whether the same attempt would fail in the same way on any machine at any time.
+    /// Returns true if the same attempt would fail in the same way on any machine at any time.
     pub(super) fn is_reproducible(&self) -> bool {
         matches!(self, AttemptError::Failed(..) | AttemptError::Unfit(_) | AttemptError::Defect(_))
     }
 
-    /// Whether another attempt with other free-space points may succeed. TetGen exceeds its time on some points and not on
-    /// others, but after that a large node is better replaced by its parts.
+    /// Returns true if another attempt with other free-space points may succeed. TetGen exceeds its
+    /// time on some points and not on others, but after that a large node is better replaced by its
+    /// parts.
     pub(super) fn retry(&self, triangles: u32) -> bool {
         match self {
             AttemptError::Died(_) | AttemptError::Answer(_) => true,

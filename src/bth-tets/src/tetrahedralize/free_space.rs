@@ -1,8 +1,8 @@
 //! Points in free space, so that rays cross few tetrahedra where there is nothing to hit.
 //!
 //! The box is split as an octree until a cell holds few vertices; every empty leaf cell gets one
-//! point near its centre. On the bunny the points halve the steps of a ray, and there are fewer tetrahedra, because the
-//! points break up the slivers between distant surfaces.
+//! point near its centre. On the bunny the points halve the steps of a ray, and there are fewer
+//! tetrahedra, because the points break up the slivers between distant surfaces.
 
 use std::collections::HashSet;
 
@@ -14,11 +14,12 @@ const DEPTH: u32 = 11;
 /// How far a point may lie off its cell's centre, relative to the cell's size; the jitter keeps
 /// points of neighbouring cells from being cospherical.
 const JITTER: f64 = 0.15;
-/// Points nearer to the box's sides than this, relative to its extent, are left out because they make slivers.
+/// Points nearer to the box's sides than this, relative to its extent, are skipped because they
+/// make slivers.
 const MARGIN: f64 = 0.02;
 
-/// The free-space points, inside the box and different from every vertex and from each other. They depend on the input and
-/// the seed only. At most `most` vertices share a cell; 0 gives no points.
+/// The free-space points, inside the box and different from every vertex and from each other. They
+/// depend on the input and the seed only. At most `most` vertices share a cell; 0 gives no points.
 pub(super) fn points(input: &NodeInput, most: u32, seed: u64) -> Vec<[f32; 3]> {
     if most == 0 {
         return Vec::new();

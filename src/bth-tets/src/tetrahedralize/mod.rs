@@ -1,6 +1,6 @@
 //! Constrained tetrahedralizations of chosen nodes by the TetGen worker, checked exactly.
 //!
-//! gather (triangles, box) → free_space (extra points) → worker (TetGen, a process of its own) →
+//! gather (triangles, box) → free_space (extra points) → worker (TetGen, a separate process) →
 //! check (with nudge) → order (Hilbert) → encode (the file's sections). `build` schedules the
 //! nodes over a pool of workers and replaces a node that fails by smaller ones.
 
@@ -31,17 +31,20 @@ pub use report::{NodeReport, Outcome, TetReport, WorkerStatus};
 /// A tet leaf: the node of the binary BVH, and its tetrahedralization.
 pub type Leaf = (u32, TetMesh);
 
-/// A checked tetrahedralization of one node's triangles inside a box slightly larger than the node's.
+/// A checked tetrahedralization of one node's triangles inside a box slightly larger than the
+/// node's.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TetMesh {
     /// Box that the tetrahedra fill.
     pub lower: [f32; 3],
     /// Upper end of the box.
     pub upper: [f32; 3],
-    /// Positions, in Hilbert order: corners of the triangles and of the box, free-space and Steiner points.
+    /// Positions, in Hilbert order: corners of the triangles and of the box, free-space and Steiner
+    /// points.
     pub vertices: Vec<[f32; 3]>,
-    /// Vertices of each tetrahedron, in Hilbert order of the centroids, in ascending order of vertex
-    /// index; every tetrahedron has non-zero volume (its orientation sign depends on the order).
+    /// Vertices of each tetrahedron, in Hilbert order of the centroids, in ascending order of
+    /// vertex index; every tetrahedron has non-zero volume (its orientation sign depends on the
+    /// order).
     pub tets: Vec<[u32; 4]>,
     /// What lies behind the face opposite to each vertex of a tetrahedron.
     pub behind: Vec<[Behind; 4]>,

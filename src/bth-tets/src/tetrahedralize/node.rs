@@ -1,4 +1,5 @@
-//! The tetrahedralization of one node: attempts with different free-space points until one passes the checks.
+//! The tetrahedralization of one node: attempts with different free-space points until one passes
+//! the checks.
 
 use std::time::{Duration, Instant};
 
@@ -31,18 +32,20 @@ pub struct NodeJob<'a> {
 }
 
 impl NodeJob<'_> {
-    /// The triangles of the node in the smallest box; `None` when even that leaves the range of `f32`.
+    /// The triangles of the node in the smallest box; `None` when even that leaves the range of
+    /// `f32`.
     pub fn input(&self) -> Option<NodeInput> {
         gather(self.mesh, self.bvh, self.node, 0.0).ok()
     }
 }
 
-/// Wraps the work on single nodes from outside: returns an earlier result, or calls `build` and keeps what it returns.
+/// Wraps the work on single nodes from outside: returns an earlier result, or calls `build` and
+/// keeps what it returns.
 pub trait NodeRunner: Sync {
     /// The result for a node.
     ///
     /// # Errors
-    /// Those of `build`.
+    /// The errors of `build`.
     fn run(&self, job: &NodeJob<'_>, build: &mut dyn FnMut() -> Result<NodeResult>) -> Result<NodeResult>;
 }
 
@@ -64,9 +67,10 @@ pub struct NodeResult {
     pub built: Option<TetMesh>,
     /// The attempts.
     pub report: NodeReport,
-    /// Whether no worker could be started: smaller nodes would fail as well.
+    /// True if no worker could be started: smaller nodes would fail as well.
     pub no_worker: bool,
-    /// Whether the result would be the same on any machine at any time: no deadline passed and no worker died.
+    /// True if the result would be the same on any machine at any time: no deadline passed and no
+    /// worker died.
     pub reproducible: bool,
 }
 
@@ -76,14 +80,16 @@ struct Attempt {
     free_space: u32,
     /// Seed of the free-space points.
     seed: u64,
-    /// Whether TetGen is given coordinates relative to the box.
+    /// True if TetGen is given coordinates relative to the box.
     local: bool,
-    /// As [`TetOptions::inflation`]: TetGen takes points that nearly touch the box for coplanar with it.
+    /// As [`TetOptions::inflation`]: TetGen takes points that nearly touch the box for coplanar
+    /// with it.
     inflation: f32,
 }
 
-/// Attempts in order. Near the origin TetGen is first given the coordinates as they are. A node that can be replaced by
-/// smaller cells gets two attempts, because on models on which TetGen fails cells succeed more often than further attempts.
+/// Attempts in order. Near the origin TetGen is first given the coordinates as they are. A node
+/// that can be replaced by smaller cells gets two attempts, because on models on which TetGen fails
+/// cells succeed more often than further attempts.
 fn attempts(options: &TetOptions, far: bool, triangles: u32) -> Vec<Attempt> {
     let m = options.free_space;
     let more = if m == 0 { 64 } else { m.saturating_mul(4) };
@@ -160,15 +166,16 @@ pub(super) fn tetrahedralize(
     Ok(NodeResult { built, report, no_worker, reproducible })
 }
 
-/// Whether the node lies many times its size away from the origin, where coordinates have few
-/// digits left for the shape.
+/// Returns true if the node lies many times its size away from the origin, where coordinates have
+/// few digits left for the shape.
 fn far(node: &Node) -> bool {
     let size = (0..3).map(|k| f64::from(node.upper[k]) - f64::from(node.lower[k])).fold(0.0, f64::max);
     let away = node.lower.iter().chain(&node.upper).map(|x| f64::from(x.abs())).fold(0.0, f64::max);
     away > 16.0 * size
 }
 
-/// A tetrahedralization, its number of free-space points, and the number of points moved by `nudge`.
+/// A tetrahedralization, its number of free-space points, and the number of points moved by
+/// `nudge`.
 type AttemptResult = (TetMesh, u32, u32);
 
 /// Makes one attempt. The inner error is the reason for which the attempt failed.
@@ -211,8 +218,8 @@ fn run(
     })
 }
 
-/// The points relative to an origin. On an axis where a difference would be rounded the origin becomes zero, because TetGen
-/// must be given the exact points.
+/// The points relative to an origin. On an axis where a difference would be rounded the origin
+/// becomes zero, because TetGen must be given the exact points.
 fn relative(points: &[[f32; 3]], origin: [f32; 3]) -> ([f64; 3], Vec<[f64; 3]>) {
     let origin: [f64; 3] = std::array::from_fn(|k| {
         let o = f64::from(origin[k]);
@@ -222,7 +229,8 @@ fn relative(points: &[[f32; 3]], origin: [f32; 3]) -> ([f64; 3], Vec<[f64; 3]>) 
     (origin, points.iter().map(|p| std::array::from_fn(|k| f64::from(p[k]) - origin[k])).collect())
 }
 
-/// Whether `a - b` was computed without rounding (the error term of Knuth's TwoSum is zero).
+/// Returns true if `a - b` was computed without rounding (the error term of Knuth's TwoSum is
+/// zero).
 fn difference_is_exact(a: f64, b: f64, difference: f64) -> bool {
     let b_virtual = a - difference;
     let a_virtual = difference + b_virtual;

@@ -3,7 +3,8 @@
 
 use super::orientation::orientation;
 
-/// If more than 16 and one in this many tetrahedra are bad, rounding is not the cause and nothing is repaired.
+/// If more than 16 and one in this many tetrahedra are bad, rounding is not the cause and nothing
+/// is repaired.
 const SHARE: usize = 100;
 /// Most passes over the tetrahedra that are still bad.
 const PASSES: usize = 4;
@@ -52,7 +53,8 @@ pub(super) fn repair(vertices: &mut [[f32; 3]], fixed: usize, tets: &[[u32; 4]])
     if left.is_empty() { Ok(moved.len() as u32) } else { Err(left.len()) }
 }
 
-/// Moves one vertex to the nearby position with the fewest bad tetrahedra around it. Returns whether it moved.
+/// Moves one vertex to the nearby position with the fewest bad tetrahedra around it. Returns true
+/// if it moved.
 fn improve(
     vertices: &mut [[f32; 3]],
     v: u32,

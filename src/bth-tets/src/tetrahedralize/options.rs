@@ -8,15 +8,17 @@ use bth_tetgen_protocol::Fault;
 /// Options of the tetrahedralization.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TetOptions {
-    /// The worker program. If absent it is searched for: `BTH_TETGEN`, then beside this program, then on the `PATH`.
+    /// The worker program. If absent it is searched for: `BTH_TETGEN`, then next to this program,
+    /// then on the `PATH`.
     pub worker: Option<PathBuf>,
-    /// Worker processes; 0 for one per thread of the pool that calls. The result is the same for any number.
+    /// Worker processes; 0 for one per thread of the pool that calls. The result is the same for
+    /// any number.
     pub workers: usize,
     /// Vertices of the mesh that an octree cell may hold before it is split; a point goes into the
     /// centre of every empty cell. 16 suits scans, 64 rooms; 0 adds no points.
     pub free_space: u32,
-    /// Distance of the box from the bounds of the triangles on every side, relative to the diagonal of the bounds; at least
-    /// one unit in the last place.
+    /// Distance of the box from the bounds of the triangles on every side, relative to the diagonal
+    /// of the bounds; at least one unit in the last place.
     pub inflation: f32,
     /// Time for one attempt at a node, whatever its size.
     pub deadline: Duration,
@@ -24,8 +26,8 @@ pub struct TetOptions {
     pub deadline_per_triangle: Duration,
     /// Address space of a worker, bytes.
     pub memory: u64,
-    /// Sizes of the cells that replace a node that fails, in triangles: the largest size below the node's, for cells that
-    /// fail the next one.
+    /// Sizes of the cells that replace a node that fails, in triangles: the largest size below the
+    /// node's, for cells that fail the next one.
     pub cells: Vec<u32>,
     /// Cells with fewer triangles than this stay in the BVH.
     pub minimum: u32,

@@ -7,7 +7,7 @@ use super::gather::NodeInput;
 use super::orientation::in_front;
 use super::{Behind, Face, TetMesh};
 
-/// Puts a tetrahedralization in its final form. Vertices that no tetrahedron uses are left out.
+/// Puts a tetrahedralization in its final form. Vertices that no tetrahedron uses are skipped.
 pub(super) fn order(input: &NodeInput, checked: Checked) -> TetMesh {
     let curve = Curve::new(input.lower, input.upper);
     let Checked { vertices, tets, behind, sides, .. } = checked;
@@ -73,7 +73,7 @@ fn sorted(rows: impl Iterator<Item = u32>, key: impl Fn(u32) -> u64) -> Vec<u32>
     keyed.into_iter().map(|(_, row)| row).collect()
 }
 
-/// The new row of each old row; `NONE` for rows that are left out.
+/// The new row of each old row; `NONE` for rows that are skipped.
 fn inverse(order: &[u32], rows: usize) -> Vec<u32> {
     let mut new = vec![NONE; rows];
     for (row, &old) in order.iter().enumerate() {

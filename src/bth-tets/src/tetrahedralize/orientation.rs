@@ -8,7 +8,8 @@ pub(super) fn orientation(vertices: &[[f32; 3]], tet: [u32; 4]) -> f64 {
     orient3d(a, b, c, d)
 }
 
-/// Whether the point lies on the side that (v1-v0)x(v2-v0) points to; exact, false on the plane.
+/// Returns true if the point lies on the side that (v1-v0)x(v2-v0) points to; exact, false on the
+/// plane.
 pub(super) fn in_front(triangle: [[f32; 3]; 3], point: [f32; 3]) -> bool {
     let [a, b, c] = triangle.map(coordinates);
     // Shewchuk's sign is positive for points below a plane seen counterclockwise from above.

@@ -15,7 +15,8 @@ use super::worker::{Setup, Worker};
 /// File name of the worker program.
 const PROGRAM: &str = if cfg!(windows) { "bth-tetgen.exe" } else { "bth-tetgen" };
 
-/// The worker program: named by the options or by `BTH_TETGEN`, else beside this program, else on the `PATH`.
+/// The worker program: named by the options or by `BTH_TETGEN`, else next to this program, else on
+/// the `PATH`.
 ///
 /// # Errors
 /// A hint for the user when there is no worker.
@@ -42,7 +43,8 @@ pub(super) fn find(options: &TetOptions) -> std::result::Result<PathBuf, String>
     })
 }
 
-/// The worker program that compilations will use, and the version of TetGen in it; or a sentence that says why there is none.
+/// The worker program that compilations will use, and the version of TetGen in it; or a sentence
+/// that says why there is none.
 ///
 /// # Errors
 /// Cancelled.
@@ -59,8 +61,8 @@ pub fn worker(
     Ok(started.map(|version| (program, version)).map_err(|error| error.to_string()))
 }
 
-/// The tetrahedralizer that a compilation will use: the version of TetGen, or `none` without a worker; `None` when the worker
-/// fails.
+/// The tetrahedralizer that a compilation will use: the version of TetGen, or `none` without a
+/// worker; `None` when the worker fails.
 ///
 /// # Errors
 /// Cancelled.

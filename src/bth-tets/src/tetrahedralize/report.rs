@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// TetReport on the chosen nodes.
+/// Report on the chosen nodes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TetReport {
     /// The worker that was used, or why there was none.
@@ -67,7 +67,7 @@ pub enum WorkerStatus {
     },
 }
 
-/// TetReport on one node.
+/// Report on one node.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NodeReport {
     /// Index in the binary BVH.

@@ -1,4 +1,5 @@
-//! One worker process: its start, requests to it, and its end after a failure, a deadline or the last request.
+//! One worker process: its start, requests to it, and its end after a failure, a deadline or the
+//! last request.
 
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
@@ -43,7 +44,8 @@ impl Worker {
     /// Starts a worker and waits for its greeting. The worker ends with the calling thread.
     ///
     /// # Errors
-    /// The outer error is cancellation, the inner one the reason for which the worker did not start.
+    /// The outer error is cancellation, the inner one the reason for which the worker did not
+    /// start.
     pub(super) fn start(
         setup: &Setup,
         monitor: &dyn Monitor,
@@ -53,14 +55,16 @@ impl Worker {
         };
         let mut command = Command::new(&setup.program);
         command.args(["--memory", &setup.memory.to_string(), "--parent", &std::process::id().to_string()]);
-        // TetGen opens no files here; a version that did would leave them in the folder for temporary files, not in the
-        // user's. Where there is none, it must not keep the worker from starting.
+        // TetGen opens no files here; a version that did would leave them in the folder for
+        // temporary files, not in the user's. Where there is none, it must not keep the worker from
+        // starting.
         let folder = std::env::temp_dir();
         if folder.is_dir() {
             command.current_dir(folder);
         }
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
-        // The worker does not receive interrupts from the terminal; the compiler receives them and ends its workers.
+        // The worker does not receive interrupts from the terminal; the compiler receives them and
+        // ends its workers.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let mut child = match command.spawn() {
@@ -71,7 +75,8 @@ impl Worker {
         let (inbox, replies) = channel();
         let mut to = child.stdin.take().expect("stdin was piped");
         let mut from = child.stdout.take().expect("stdout was piped");
-        // The pipes are served by a separate thread, which may block; killing the process unblocks it.
+        // The pipes are served by a separate thread, which may block; killing the process unblocks
+        // it.
         let serve = move || {
             let mut receive = || Reply::from_bytes(&read_frame(&mut from)?);
             if inbox.send(receive()).is_err() {
@@ -159,7 +164,8 @@ impl Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        // The process may be busy or hang. It is killed at once because it has no state that would be lost.
+        // The process may be busy or hang. It is killed at once because it has no state that would
+        // be lost.
         let _ = self.child.kill();
         let _ = self.child.wait();
         self.requests = None;

@@ -51,7 +51,8 @@ fn a_memory_hog_costs_one_node() {
     assert_eq!(report.failures["out_of_memory"], 1);
 }
 
-/// Whatever a worker answers costs its node, is counted under its own name, and is tried again where that may help.
+/// Whatever a worker answers costs its node, is counted under its own name, and is tried again
+/// where that may help.
 #[test]
 fn every_answer_that_is_none_costs_one_node_and_is_named() {
     let Some(options) = with_worker("every failure") else { return };

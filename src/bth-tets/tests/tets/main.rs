@@ -1,5 +1,5 @@
-//! The tets stage with a real worker, which `cargo build -p bth-tetgen` builds. Without it these tests are skipped and print
-//! that.
+//! The tets stage with a real worker, which `cargo build -p bth-tetgen` builds. Without it these
+//! tests are skipped and print that.
 #![allow(clippy::print_stdout, reason = "tests print what they skip and what they measured")]
 
 mod faults;

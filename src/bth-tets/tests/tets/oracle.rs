@@ -37,7 +37,8 @@ pub(crate) fn assert_holds(mesh: &Mesh, bvh: &BinaryBvh, node: u32, tets: &TetMe
     assert_triangles_are_faces(mesh, &bvh.order[node.first as usize..][..node.count as usize], tets);
 }
 
-/// A side of a face: the tetrahedron on that side, and which of its vertices lies opposite to the face.
+/// A side of a face: the tetrahedron on that side, and which of its vertices lies opposite to the
+/// face.
 type Side = (u32, usize);
 
 fn position(tets: &TetMesh, vertex: u32) -> [f32; 3] {
@@ -86,8 +87,8 @@ fn assert_is_hull(tets: &TetMesh, face: &[u32; 3], side: Side) {
     assert!((0..3).any(|k| on(k, tets.lower[k]) || on(k, tets.upper[k])));
 }
 
-/// The two tetrahedra of a face lie on opposite sides of it and refer to each other or to the same constrained face.
-/// Returns whether the face is constrained.
+/// The two tetrahedra of a face lie on opposite sides of it and refer to each other or to the same
+/// constrained face. Returns whether the face is constrained.
 fn assert_separates(tets: &TetMesh, face: &[u32; 3], a: Side, b: Side) -> bool {
     let [p, q, r] = face.map(|v| position(tets, v));
     let is_positive = |side| orientation(p, q, r, apex(tets, side)) > 0.0;
@@ -107,7 +108,8 @@ fn assert_separates(tets: &TetMesh, face: &[u32; 3], a: Side, b: Side) -> bool {
     }
 }
 
-/// A constrained face has these vertices and lists the tetrahedron in front of it and the one behind it, in this order.
+/// A constrained face has these vertices and lists the tetrahedron in front of it and the one
+/// behind it, in this order.
 fn assert_is_constrained_face(tets: &TetMesh, constrained: &Face, vertices: &[u32; 3], [a, b]: [Side; 2]) {
     let mut sorted = constrained.vertex;
     sorted.sort_unstable();
@@ -119,8 +121,8 @@ fn assert_is_constrained_face(tets: &TetMesh, constrained: &Face, vertices: &[u3
     assert!(height(front) >= 0.0 && height(back) <= 0.0);
 }
 
-/// The product of a triangle's normal with the vector to a point by the plain formula; 0 where rounding may decide its sign.
-/// Independent of the exact predicate that the stage uses.
+/// The product of a triangle's normal with the vector to a point by the plain formula; 0 where
+/// rounding may decide its sign. Independent of the exact predicate that the stage uses.
 fn height_unless_uncertain([v0, v1, v2]: [[f64; 3]; 3], point: [f64; 3]) -> f64 {
     let [e, g, h] = [v1, v2, point].map(|x| [0, 1, 2].map(|k| x[k] - v0[k]));
     let n = [e[1] * g[2] - e[2] * g[1], e[2] * g[0] - e[0] * g[2], e[0] * g[1] - e[1] * g[0]];

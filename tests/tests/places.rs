@@ -3,7 +3,7 @@
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_format::File;
-use bth_format::file::DeformedObject;
+use bth_format::file::DeformableObject;
 use bth_format::layout::{Child, GridBits, NONE, RecordKind, TrianglePlace};
 use bth_format::object::ObjectView;
 use bth_scenes::{Model, blob, knot, soup};
@@ -100,7 +100,7 @@ fn places_lead_to_the_triangles() {
             assert_eq!(found.iter().sum::<usize>(), model.triangles.len(), "{name}");
             counts = [0, 1, 2].map(|k| counts[k] + found[k]);
             if options.deformable {
-                let deformed = DeformedObject::new(&file, 0).unwrap();
+                let deformed = DeformableObject::new(&file, 0).unwrap();
                 assert_eq!(check(deformed.view(), &name), found);
                 assert_eq!(found[2], 0, "{name}: a deformable object drops no triangle");
             }

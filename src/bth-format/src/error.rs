@@ -1,4 +1,5 @@
-//! Why a file was refused: a stable code for each numbered invariant of the specification, with place, expected and found.
+//! Why a file was refused: a stable code for each numbered invariant of the specification, with
+//! place, expected and found.
 
 pub use crate::code::Code;
 use crate::layout::{NONE, kind};
@@ -43,8 +44,9 @@ impl Error {
     ) -> Self {
         Self::new(code, None, Some(offset), (expected.into(), found.into()))
     }
-    /// An error within a section of object 0; `offset` counts from the section's start. [`crate::File::locate`] turns it into
-    /// an error of the right object with an offset from the start of the file.
+    /// An error within a section of object 0; `offset` counts from the section's start.
+    /// [`crate::File::locate`] turns it into an error of the right object with an offset from the
+    /// start of the file.
     pub(crate) fn within(
         code: Code,
         kind: u32,

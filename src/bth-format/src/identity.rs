@@ -2,8 +2,8 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// A number that no other object or scene of the process has or had. What is measured of one is kept under it: its address would
-/// soon be that of another, which is opened after it was closed.
+/// A number that no other object or scene of the process has or had. What is measured of one is
+/// kept under it: its address would soon be that of another, which is opened after it was closed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Identity(usize);
 

@@ -1,12 +1,14 @@
 //! The BTH file format: layout, reading and validation. Nothing here traces a ray.
 //!
-//! The specification is `format-spec/README.md`; its invariants have the numbers of the error codes ([`Code`]). A file is
-//! checked in three steps:
+//! The specification is `format-spec/README.md`; its invariants have the numbers of the error codes
+//! ([`Code`]). A file is checked in three steps:
 //!
-//! 1. [`File::read`], [`File::map`] and [`File::from_bytes`] check the header and the section table: O(sections).
-//! 2. [`File::check`] and [`File::check_scene`] check every index of an object or of the scene, after which traversing it is
-//!    safe: O(bytes of their sections).
-//! 3. [`verify::verify`] checks hashes, gaps and geometry too, with exact predicates ([`exact`]): O(bytes of the file).
+//! 1. [`File::read`], [`File::map`] and [`File::from_bytes`] check the header and the section
+//!    table: O(sections).
+//! 2. [`File::check`] and [`File::check_scene`] check every index of an object or of the scene,
+//!    after which traversing it is safe: O(bytes of their sections).
+//! 3. [`verify::verify`] checks hashes, gaps and geometry too, with exact predicates ([`exact`]):
+//!    O(bytes of the file).
 //!
 //! ```no_run
 //! let file = bth_format::File::read("bunny.bth")?;
@@ -17,32 +19,29 @@
 //! # Ok::<(), bth_format::Error>(())
 //! ```
 #![warn(missing_docs)]
-// What zerocopy tells about bytes that do not fit says less than the message, and its texts would be part of every program.
+// What zerocopy tells about bytes that do not fit says less than the message, and its texts would
+// be part of every program.
 #![allow(clippy::ok_expect)]
 
 mod check;
 mod code;
-mod deformation_view;
 pub mod error;
 pub mod exact;
 pub mod file;
 mod identity;
 pub mod layout;
 pub mod limits;
-mod materials_view;
 mod names;
 pub mod object;
-mod scene_view;
-mod sequence_view;
 mod unpack;
 pub mod verify;
+mod view;
 
 pub use code::Code;
-pub use deformation_view::{DeformationView, MorphDeltas};
 pub use error::Error;
 pub use file::{File, FileMemory};
 pub use identity::Identity;
-pub use materials_view::{ImagesView, MaterialsView};
 pub use object::ObjectView;
-pub use scene_view::SceneView;
-pub use sequence_view::{FramePosition, SequenceView};
+pub use view::{
+    DeformationView, FramePosition, ImagesView, MaterialsView, MorphDeltas, SceneView, SequenceView,
+};

@@ -1,7 +1,7 @@
 //! Every cap in one place. The reader refuses files beyond them, and the compiler writes none.
 
-/// Nodes on a path from the root (BTH-F110). Bounds the traversal stack, on which at every level all children but the one
-/// entered stay.
+/// Nodes on a path from the root (BTH-F110). Bounds the traversal stack, on which at every level
+/// all children but the one entered stay.
 pub const MAX_DEPTH: usize = 96;
 /// Entries of the section table (BTH-F008).
 pub const MAX_SECTIONS: u32 = 1 << 20;
@@ -13,5 +13,6 @@ pub const MAX_TETS: u32 = 1 << 30;
 pub const MAX_OPACITY_WORDS: u32 = 1 << 28;
 /// Rows of LEAF_VERTICES of an object (BTH-F022): more than the leaves of all lines have.
 pub const MAX_LEAF_VERTICES: u32 = 1 << 28;
-/// Bytes of the name of a group or material (BTH-F144), of an object (BTH-F148), or of a node, camera or light (BTH-F153).
+/// Bytes of the name of a group or material (BTH-F144), of an object (BTH-F148), or of a node,
+/// camera or light (BTH-F153).
 pub const MAX_NAME: u32 = 4096;

@@ -2,22 +2,24 @@
 
 use crate::limits::MAX_NAME;
 
-/// The name of `length` bytes from `first` on; `None` when it does not lie within the text or is not UTF-8, which the checks rule
-/// out (BTH-F144, BTH-F148, BTH-F153).
+/// The name of `length` bytes from `first` on; `None` when it does not lie within the text or is
+/// not UTF-8, which the checks rule out (BTH-F144, BTH-F148, BTH-F153).
 pub(crate) fn name(text: &[u8], first: u32, length: u32) -> Option<&str> {
     let end = (first as usize).checked_add(length as usize)?;
     std::str::from_utf8(text.get(first as usize..end)?).ok()
 }
 
-/// The part of a section of text in which names can lie: all before the first byte that is not UTF-8. Found once, so that checking all names
-/// costs no more than the bytes of the section and the rows, however names overlap.
+/// The part of a section of text in which names can lie: all before the first byte that is not
+/// UTF-8. Found once, so that checking all names costs no more than the bytes of the section and
+/// the rows, however names overlap.
 #[inline(never)]
 pub(crate) fn checked(text: &[u8]) -> &str {
     let valid = std::str::from_utf8(text).map_or_else(|error| error.valid_up_to(), str::len);
     text.get(..valid).and_then(|text| std::str::from_utf8(text).ok()).unwrap_or_default()
 }
 
-/// Whether the bytes from `first` on are a name of an allowed length, given the [`checked`] text of the section.
+/// Returns true if the bytes from `first` on are a name of an allowed length, given the [`checked`]
+/// text of the section.
 #[inline(never)]
 pub(crate) fn is_name(text: &str, first: u32, length: u32) -> bool {
     let end = (first as usize).checked_add(length as usize);

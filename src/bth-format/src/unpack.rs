@@ -1,12 +1,13 @@
-//! Leaves on a grid as their counterparts of `f32`, without rounding. Tracing, checking and verifying read
-//! leaves in this form only.
-// Counted loops over arrays: closures would be compiled without the vector instructions of the kernels that inline them.
+//! Leaves on a grid as their counterparts of `f32`, without rounding. Tracing, checking and
+//! verifying read leaves in this form only.
+// Counted loops over arrays: closures would be compiled without the vector instructions of the
+// kernels that inline them.
 #![allow(clippy::needless_range_loop)]
 
 use crate::layout::*;
 
-/// Vertex numbers of the corners of 16 triangles, of which each byte holds two: triangle i the low half of byte i,
-/// triangle i + 8 the high half.
+/// Vertex numbers of the corners of 16 triangles, of which each byte holds two: triangle i the low
+/// half of byte i, triangle i + 8 the high half.
 #[inline(always)]
 fn corners(packed: &[[u8; WIDTH / 2]; 3]) -> [[u8; WIDTH]; 3] {
     let mut out = [[0; WIDTH]; 3];
@@ -79,7 +80,8 @@ impl RawLeaf21 {
     }
 }
 
-/// The reserved fields in the width of a leaf of `f32`: what is not zero stays, so that the check finds it.
+/// The reserved fields in the width of a leaf of `f32`: what is not zero stays, so that the check
+/// finds it.
 #[inline(always)]
 fn widened(reserved: [u32; 6]) -> [u32; 14] {
     let mut out = [0; 14];

@@ -1,4 +1,5 @@
-//! The committed conformance files: the valid ones pass all checks, the invalid ones fail with the code in their name.
+//! The committed conformance files: the valid ones pass all checks, the invalid ones fail with the
+//! code in their name.
 
 use bth_format::File;
 use bth_format::verify::verify;

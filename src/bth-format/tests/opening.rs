@@ -1,6 +1,6 @@
 //! Opening a file: what damage is found, and where errors say that it is.
 
-use bth_format::file::DeformedObject;
+use bth_format::file::DeformableObject;
 use bth_format::layout::{Header, NONE, SectionEntry, kind};
 use bth_format::verify::verify;
 use bth_format::{Code, Error, File};
@@ -49,7 +49,8 @@ fn a_file_that_was_cut_or_appended_to_is_refused() {
 #[test]
 fn an_error_of_the_section_table_names_section_object_and_byte() {
     let (_, mut bytes) = triangle();
-    // The last entry is PROVENANCE: it gets an offset that is no multiple of 64, and hashes to match.
+    // The last entry is PROVENANCE: it gets an offset that is no multiple of 64, and hashes to
+    // match.
     let entry = size_of::<Header>() + 5 * size_of::<SectionEntry>();
     bytes[entry + 16] += 1;
     let table = bth_format::file::hash128(&bytes[128..128 + 6 * 64]);
@@ -110,7 +111,8 @@ fn an_object_is_told_apart_from_all_that_were_opened_before() {
     let (_, bytes) = triangle();
     let mut seen = Vec::new();
     for _ in 0..4 {
-        // The memory of the file before is free again, so its objects may lie at the same addresses.
+        // The memory of the file before is free again, so its objects may lie at the same
+        // addresses.
         let file = File::from_bytes(&bytes).unwrap();
         let identity = file.view(0).unwrap().identity;
         assert_eq!(file.clone().view(0).unwrap().identity, identity);
@@ -123,7 +125,7 @@ fn an_object_is_told_apart_from_all_that_were_opened_before() {
 fn an_object_that_deforms_keeps_its_identity() {
     let (_, bytes) = valid("deformable.bth");
     let file = File::from_bytes(&bytes).unwrap();
-    let mut object = DeformedObject::new(&file, 0).unwrap();
+    let mut object = DeformableObject::new(&file, 0).unwrap();
     let identity = object.view().identity;
     assert_ne!(identity, file.view(0).unwrap().identity);
     let mut positions = object.view().positions.to_vec();

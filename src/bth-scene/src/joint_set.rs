@@ -11,12 +11,12 @@ impl JointSet {
     /// No joint of this number or a greater one is in a set.
     pub const LIMIT: u32 = 256;
 
-    /// Whether no joint is in the set.
+    /// Returns true if no joint is in the set.
     pub fn is_empty(&self) -> bool {
         self.words == [0; 4]
     }
 
-    /// Whether a joint is in the set.
+    /// Returns true if a joint is in the set.
     pub fn contains(&self, joint: u32) -> bool {
         joint < Self::LIMIT && self.words[joint as usize / 64] >> (joint % 64) & 1 == 1
     }

@@ -1,8 +1,9 @@
-//! Scene manifests: the objects, hierarchy, cameras, lights and animation of a scene, as TOML that a person can write.
+//! Scene manifests: the objects, hierarchy, cameras, lights and animation of a scene, as TOML that
+//! a person can write.
 //!
-//! `format-spec/scene-manifest.md` specifies every key. [`read()`] is strict: unknown keys, wrong types,
-//! cycles, missing names and paths that leave the manifest's folder are errors with line and column.
-//! [`Manifest::to_toml`] writes what [`read()`] reads back to an equal value.
+//! `format-spec/scene-manifest.md` specifies every key. [`read()`] is strict: unknown keys, wrong
+//! types, cycles, missing names and paths that leave the manifest's folder are errors with line and
+//! column. [`Manifest::to_toml`] writes what [`read()`] reads back to an equal value.
 #![warn(missing_docs)]
 
 pub mod error;

@@ -1,4 +1,5 @@
-//! A scene as a manifest describes it. References to nodes and objects are indices into the vectors of [`Manifest`].
+//! A scene as a manifest describes it. References to nodes and objects are indices into the vectors
+//! of [`Manifest`].
 
 use crate::joint_set::JointSet;
 
@@ -54,8 +55,8 @@ pub struct Object {
     pub source: Source,
 }
 
-/// Where a geometry comes from. Paths are relative to the manifest's folder and stay within it; their
-/// separator is `/`.
+/// Where a geometry comes from. Paths are relative to the manifest's folder and stay within it;
+/// their separator is `/`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Source {
     /// A model that is to be compiled.
@@ -94,11 +95,12 @@ pub enum Source {
         path: String,
         /// Number of the mesh.
         mesh: u32,
-        /// Joints whose rigid parts ([`Source::RigidPart`]) are left out.
+        /// Joints whose rigid parts ([`Source::RigidPart`]) are skipped.
         without: JointSet,
     },
-    /// The part of a mesh that one joint moves rigidly: all its connected components whose vertices follow this joint alone and no
-    /// morph target. Triangles are connected where they have a corner of equal position.
+    /// The part of a mesh that one joint moves rigidly: all its connected components whose vertices
+    /// follow this joint alone and no morph target. Triangles are connected where they have a
+    /// corner of equal position.
     RigidPart {
         /// glTF or GLB file.
         path: String,
@@ -107,11 +109,13 @@ pub enum Source {
         /// Number of the joint, below [`JointSet::LIMIT`].
         joint: u32,
     },
-    /// The mesh of a node at rest: with its default morph weights and with its joints where the nodes place them.
+    /// The mesh of a node at rest: with its default morph weights and with its joints where the
+    /// nodes place them.
     AtRest {
         /// glTF or GLB file.
         path: String,
-        /// Number of the node. A mesh with a skin is in world space, another one in that of the node.
+        /// Number of the node. A mesh with a skin is in world space, another one in that of the
+        /// node.
         node: u32,
     },
 }
@@ -128,15 +132,16 @@ pub enum SequenceFrames {
 /// When the frames of a sequence or of a vertex cache are shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SequenceTiming {
-    /// Frames a second, above 0; `None` for the rate of the scene's frames, or where the file states the times.
+    /// Frames a second, above 0; `None` for the rate of the scene's frames, or where the file
+    /// states the times.
     pub rate: Option<f64>,
     /// Seconds at which the first frame of a sequence, or frame 0 of a vertex cache, is shown.
     pub start: f64,
 }
 
 impl Source {
-    /// The file, relative to the manifest's folder. Of a sequence its pattern or its first file, of a model with a vertex cache
-    /// the model.
+    /// The file, relative to the manifest's folder. Of a sequence its pattern or its first file, of
+    /// a model with a vertex cache the model.
     pub fn path(&self) -> &str {
         match self {
             Source::Model { path, .. }
@@ -164,7 +169,7 @@ pub struct Node {
     pub transform: Transform,
     /// Object of which the node is an instance.
     pub object: Option<usize>,
-    /// Whether the node and its descendants are visible, before tracks.
+    /// True if the node and its descendants are visible, before tracks.
     pub visible: bool,
 }
 
@@ -257,8 +262,8 @@ pub struct Skin {
     pub name: String,
     /// The nodes that are its joints, at least one.
     pub joints: Vec<usize>,
-    /// For each joint rows of the matrix from the space of the object to that of the joint, applied to columns (x, y, z, 1);
-    /// `None` where all are the identity.
+    /// For each joint rows of the matrix from the space of the object to that of the joint, applied
+    /// to columns (x, y, z, 1); `None` where all are the identity.
     pub inverse_binds: Option<Vec<[[f64; 4]; 3]>>,
 }
 
@@ -269,14 +274,15 @@ pub struct Deformer {
     pub node: usize,
     /// The object that deforms, one of [`Source::Deforming`] or of a compiled file.
     pub object: usize,
-    /// Its skin. Instances of the object are then in world space: the transforms of their nodes have no effect.
+    /// Its skin. Instances of the object are then in world space: the transforms of their nodes
+    /// have no effect.
     pub skin: Option<usize>,
     /// A weight for each morph target of the object, before tracks.
     pub weights: Vec<f64>,
 }
 
-/// Keyframes of one property of one node, with the meanings of glTF. Before the first key and after the
-/// last the track has the value of that key.
+/// Keyframes of one property of one node, with the meanings of glTF. Before the first key and after
+/// the last the track has the value of that key.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
     /// The animated node. It has no matrix, unless the property is its visibility or its weights.
@@ -287,8 +293,8 @@ pub struct Track {
     pub interpolation: Interpolation,
     /// Seconds, strictly ascending, at least one.
     pub times: Vec<f64>,
-    /// For each key [`Property::width`] numbers, of weights as many as the deformer of the node has; with [`Interpolation::Cubic`] those of the in-tangent, the
-    /// value and the out-tangent.
+    /// For each key [`Property::width`] numbers, of weights as many as the deformer of the node
+    /// has; with [`Interpolation::Cubic`] those of the in-tangent, the value and the out-tangent.
     pub values: Vec<f64>,
 }
 

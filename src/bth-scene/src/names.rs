@@ -13,7 +13,8 @@ pub(crate) struct Names<'a> {
 }
 
 impl<'a> Names<'a> {
-    /// Collects the names of tables; fails on one that is empty or too long, holds control characters or is used twice.
+    /// Collects the names of tables; fails on one that is empty or too long, holds control
+    /// characters or is used twice.
     pub(crate) fn collect(what: &'static str, tables: &[Table<'a>]) -> Result<Self> {
         let mut rows = HashMap::with_capacity(tables.len());
         for (row, table) in tables.iter().enumerate() {

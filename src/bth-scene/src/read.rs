@@ -24,7 +24,7 @@ pub(crate) const CAMERA_KEYS: &[&str] = &["name", "node", "fov", "height", "aspe
 pub(crate) const LIGHT_KEYS: &[&str] =
     &["name", "node", "kind", "color", "intensity", "range", "inner", "outer"];
 
-/// Greatest magnitude of a frame number: their times are exact enough at any rate.
+/// Max magnitude of a frame number: their times are exact enough at any rate.
 const FRAME_LIMIT: i64 = 1 << 24;
 
 /// Reads a manifest file.
@@ -40,7 +40,8 @@ pub fn read(path: &Path) -> Result<Manifest> {
         |e: std::io::Error| failed(format!("cannot read: {e}"), "check the path and its permissions");
     let file = bth_files::regular_file(path).and_then(|_| std::fs::File::open(path)).map_err(cannot)?;
     let mut bytes = Vec::new();
-    // Reading one byte more than allowed detects longer files without trusting the size that the system reports.
+    // Reading one byte more than allowed detects longer files without trusting the size that the
+    // system reports.
     file.take(MAX_MANIFEST + 1).read_to_end(&mut bytes).map_err(cannot)?;
     if bytes.len() as u64 > MAX_MANIFEST {
         let message = format!("expected a manifest of at most {MAX_MANIFEST} bytes, found more");
@@ -189,7 +190,7 @@ fn joint(value: &Value<'_>) -> Result<u32> {
     Ok(value.integer(0..=i64::from(JointSet::LIMIT) - 1)? as u32)
 }
 
-/// The joints whose rigid parts are left out of an object that deforms.
+/// The joints whose rigid parts are skipped of an object that deforms.
 fn without_joints(table: &Table<'_>) -> Result<JointSet> {
     let Some(value) = table.get("without_joints") else { return Ok(JointSet::default()) };
     value.array()?.iter().map(joint).collect()

@@ -1,4 +1,5 @@
-//! Transforms: translation, rotation and scale, matrices, and rotations given as axis and angle or as a point to look at.
+//! Transforms: translation, rotation and scale, matrices, and rotations given as axis and angle or
+//! as a point to look at.
 
 use crate::error::{Result, code};
 use crate::model::Transform;
@@ -57,8 +58,8 @@ pub(crate) fn rotation(value: &Value<'_>) -> Result<[f64; 4]> {
     Ok([x, y, z, half.cos()])
 }
 
-/// `{ from = [..], to = [..], up = [..] }`: the translation and rotation of a node at `from` whose negative z axis points to
-/// `to`.
+/// `{ from = [..], to = [..], up = [..] }`: the translation and rotation of a node at `from` whose
+/// negative z axis points to `to`.
 fn look(value: &Value<'_>) -> Result<([f64; 3], [f64; 4])> {
     let table = value.table(LOOK_KEYS)?;
     let from: [f64; 3] = table.need("from")?.numbers()?;
@@ -91,7 +92,8 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// The rotation that takes x, y and z to these unit axes (Shepperd, "Quaternion from rotation matrix", 1978).
+/// The rotation that takes x, y and z to these unit axes (Shepperd, "Quaternion from rotation
+/// matrix", 1978).
 fn quaternion([x, y, z]: [[f64; 3]; 3]) -> [f64; 4] {
     let squares = [
         1.0 + x[0] - y[1] - z[2],

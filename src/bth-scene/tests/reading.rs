@@ -143,8 +143,8 @@ fn the_least_manifest_has_a_version_only() {
     assert_eq!(read("version = 1").unwrap(), Manifest::default());
 }
 
-/// Changes the first occurrence of a text in [`SCENE`] and expects a code at the place of `place` in the
-/// changed text (`place` after the change), with words in the message.
+/// Changes the first occurrence of a text in [`SCENE`] and expects a code at the place of `place`
+/// in the changed text (`place` after the change), with words in the message.
 #[track_caller]
 fn refused(from: &str, to: &str, code: &str, place: &str, words: &str) {
     assert!(SCENE.contains(from), "{from}");

@@ -16,19 +16,17 @@
 // What zerocopy tells about bytes that do not fit says less than the message, and its texts would be part of every program.
 #![allow(clippy::ok_expect)]
 
+mod animation;
 mod batch;
 mod builder;
 mod bvh;
 mod clock;
-mod deform;
-mod deformers;
 mod enumerate;
 mod hits;
 mod instances;
 mod intersect;
 mod masks;
 mod materials;
-mod motion;
 mod nodes;
 mod object;
 mod objects;
@@ -36,6 +34,7 @@ mod opacity;
 mod points;
 mod query;
 pub mod rays;
+mod refit;
 mod scene;
 #[doc(hidden)]
 pub mod simd;
@@ -46,16 +45,16 @@ mod tets;
 mod trace;
 mod update;
 
+pub use animation::DeformerPoses;
 pub use batch::RayBatch;
 pub use bth_format::layout::Opacity;
 pub use bth_format::{Code, Error};
 pub use builder::SceneBuilder;
-pub use deformers::DeformerPoses;
 pub use hits::{Accept, Crossings, Cull, Filter};
 pub use materials::{Alpha, Material, Texture, Wrap};
-pub use motion::{InstanceView, check_first_frame};
 pub use points::{Closest, Feature};
 pub use query::Steps;
+pub use scene::motion::{InstanceView, check_first_frame};
 pub use scene::{Scene, from_bytes, from_file, map, open};
 pub use simd::{Isa, IsaError};
 pub use starts::SegmentEnd;

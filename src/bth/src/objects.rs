@@ -1,17 +1,20 @@
-//! The objects of a scene: all of one file, or those of several. Some may have been given new positions.
+//! The objects of a scene: all of one file, or those of several. Some may have been given new
+//! positions.
 
-use crate::deform::Deforming;
+use crate::clock;
+use crate::refit::{OwnPositions, Refitted};
 use bth_format::layout::Object;
 use bth_format::object::ObjectView;
 use bth_format::{Code, Error, File};
+use std::time::{Duration, Instant};
 
 /// The objects of a scene, by their index.
 #[derive(Debug)]
 pub(crate) struct Objects {
     files: Files,
-    /// For each object its own positions, boxes and leaves, if it was given new positions; shorter than the number of objects, or
-    /// empty, where the others have none.
-    deforming: Vec<Option<Box<Deforming>>>,
+    /// For each object its own positions, boxes and leaves, if it was given new positions; shorter
+    /// than the number of objects, or empty, where the others have none.
+    own_positions: Vec<Option<Box<OwnPositions>>>,
 }
 
 /// Where objects come from.
@@ -64,12 +67,12 @@ impl ObjectTable {
 impl Objects {
     /// All objects of a file.
     pub(crate) fn of_file(file: File) -> Objects {
-        Objects { files: Files::One(file), deforming: Vec::new() }
+        Objects { files: Files::One(file), own_positions: Vec::new() }
     }
 
     /// No objects yet; those of several files can be added.
     pub(crate) fn of_several_files() -> Objects {
-        Objects { files: Files::Several(ObjectTable::default()), deforming: Vec::new() }
+        Objects { files: Files::Several(ObjectTable::default()), own_positions: Vec::new() }
     }
 
     /// Adds the objects of another scene, as their files have them, to those of several files.
@@ -100,8 +103,8 @@ impl Objects {
     #[inline]
     pub(crate) fn view(&self, object: u32) -> &ObjectView<'_> {
         const CHECKED: &str = "an object below object_count, checked when opened";
-        if let Some(Some(deforming)) = self.deforming.get(object as usize) {
-            return deforming.view();
+        if let Some(Some(own)) = self.own_positions.get(object as usize) {
+            return own.view();
         }
         match &self.files {
             Files::One(file) => file.view(object).ok().expect(CHECKED),
@@ -112,41 +115,44 @@ impl Objects {
         }
     }
 
-    /// The sections of the only object of a file that was given no new positions; `None` elsewhere, and before the first [`Self::view`].
+    /// The sections of the only object of a file that was given no new positions; `None` elsewhere,
+    /// and before the first [`Self::view`].
     #[inline(always)]
     pub(crate) fn sole_view(&self) -> Option<&ObjectView<'_>> {
         match &self.files {
-            Files::One(file) if self.deforming.is_empty() => file.sole_view(),
+            Files::One(file) if self.own_positions.is_empty() => file.sole_view(),
             _ => None,
         }
     }
 
-    /// As [`Self::view`], of an object that may not have been checked; `None` if its sections do not fit each other.
+    /// As [`Self::view`], of an object that may not have been checked; `None` if its sections do
+    /// not fit each other.
     pub(crate) fn unchecked_view(&self, object: u32) -> Option<&ObjectView<'_>> {
-        if self.is_deforming(object) {
+        if self.has_own_positions(object) {
             return Some(self.view(object));
         }
         let (file, object) = self.locate(object)?;
         file.view(object).ok()
     }
 
-    /// Whether the object has positions of its own.
-    fn is_deforming(&self, object: u32) -> bool {
-        self.deforming.get(object as usize).is_some_and(Option::is_some)
+    /// Returns true if the object has positions of its own.
+    fn has_own_positions(&self, object: u32) -> bool {
+        self.own_positions.get(object as usize).is_some_and(Option::is_some)
     }
 
     /// The `OBJECT` row of an object. Other sections of the object are not read.
     pub(crate) fn header(&self, object: u32) -> &Object {
-        if let Some(Some(deforming)) = self.deforming.get(object as usize) {
-            return deforming.view().header;
+        if let Some(Some(own)) = self.own_positions.get(object as usize) {
+            return own.view().header;
         }
         let (file, object) = self.locate(object).expect("an object below object_count");
         file.object_header(object)
     }
 
-    /// Whether reading the nodes of an object may wait for the disk: they are in a mapped file.
+    /// Returns true if reading the nodes of an object may wait for the disk: they are in a mapped
+    /// file.
     pub(crate) fn is_mapped(&self, object: u32) -> bool {
-        !self.is_deforming(object) && self.locate(object).is_some_and(|(file, _)| file.is_mapped())
+        !self.has_own_positions(object) && self.locate(object).is_some_and(|(file, _)| file.is_mapped())
     }
 
     /// The file, if the scene is one.
@@ -170,21 +176,47 @@ impl Objects {
     /// The own positions, boxes and leaves of an object, which are made if it has none yet.
     ///
     /// # Errors
-    /// `BTH-O003` if there is no such object, `BTH-S006` if it is not deformable, `BTH-O001` if there is not enough memory.
-    pub(crate) fn deforming(&mut self, object: u32) -> Result<&mut Deforming, Error> {
+    /// `BTH-O003` if there is no such object, `BTH-S006` if it is not deformable, `BTH-O001` if
+    /// there is not enough memory.
+    pub(crate) fn own_positions(&mut self, object: u32) -> Result<&mut OwnPositions, Error> {
         let count = self.count();
         let Some((file, row)) = self.locate(object) else {
             let expected = format!("an object below {count}");
             return Err(Error::of_call(Code::NoSuchObject, expected, format!("{object}")));
         };
         let index = object as usize;
-        if !self.is_deforming(object) {
-            let new = Box::new(Deforming::new(file, row)?);
-            if self.deforming.len() <= index {
-                self.deforming.resize_with(index + 1, || None);
+        if !self.has_own_positions(object) {
+            let new = Box::new(OwnPositions::new(file, row)?);
+            if self.own_positions.len() <= index {
+                self.own_positions.resize_with(index + 1, || None);
             }
-            self.deforming[index] = Some(new);
+            self.own_positions[index] = Some(new);
         }
-        Ok(self.deforming[index].as_mut().expect("just made"))
+        Ok(self.own_positions[index].as_mut().expect("just made"))
+    }
+
+    /// Refits objects to their staged positions. The time counts from `start`.
+    pub(crate) fn refit(&mut self, objects: &[u32], start: Option<Instant>) -> Refitted {
+        if objects.is_empty() {
+            return Refitted { objects: 0, cost_ratio: 1.0, time: Duration::ZERO };
+        }
+        let mut cost_ratio: f64 = 0.0;
+        for object in objects {
+            if let Some(Some(own)) = self.own_positions.get_mut(*object as usize) {
+                own.refit_staged();
+                cost_ratio = cost_ratio.max(own.cost_ratio());
+            }
+        }
+        Refitted { objects: objects.len(), cost_ratio, time: clock::elapsed(start) }
+    }
+
+    /// Gives objects the positions before their last refit. The positions of that refit are staged
+    /// again.
+    pub(crate) fn undo_refit(&mut self, objects: &[u32]) {
+        for object in objects {
+            if let Some(Some(own)) = self.own_positions.get_mut(*object as usize) {
+                own.undo();
+            }
+        }
     }
 }

@@ -15,7 +15,7 @@ impl BitSet {
         *word |= bit;
         held
     }
-    /// Whether the set holds an integer.
+    /// Returns true if the set holds an integer.
     pub(super) fn contains(&self, i: usize) -> bool {
         self.0[i / 64] & (1 << (i % 64)) != 0
     }

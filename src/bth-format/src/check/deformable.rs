@@ -1,11 +1,12 @@
-//! Deformable objects: BTH-F163 to BTH-F167. What they demand lets a refit go through nodes, leaves and LEAF_VERTICES once, in the
-//! order in which they lie.
+//! Deformable objects: BTH-F163 to BTH-F167. What they demand lets a refit go through nodes, leaves
+//! and LEAF_VERTICES once, in the order in which they lie.
 
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::object::ObjectView;
 
-/// Checks the object if it is deformable. Its tree, leaves and rows of the source have been checked before.
+/// Checks the object if it is deformable. Its tree, leaves and rows of the source have been checked
+/// before.
 pub(super) fn check(view: &ObjectView) -> Result<()> {
     if !view.is_deformable() {
         return Ok(());
@@ -143,7 +144,8 @@ fn check_slots(view: &ObjectView, slots: &[u32; WIDTH], row: usize, used: usize)
     Err(Error::within(Code::LeafVertexRows, kind::LEAF_VERTICES, at, expected, format!("{}", slots[i])))
 }
 
-/// BTH-F167 of a triangle of the leaf at a line, given its row of TRIANGLE_IDS and the rows of its corners.
+/// BTH-F167 of a triangle of the leaf at a line, given its row of TRIANGLE_IDS and the rows of its
+/// corners.
 fn check_triangle(view: &ObjectView, line: u32, row: usize, corners: [u32; 3]) -> Result<()> {
     let id = view.triangle_ids[row];
     let expected = view.triangles[id as usize];

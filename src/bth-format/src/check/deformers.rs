@@ -1,16 +1,17 @@
 //! The deformers of a scene and their skins: BTH-F180 to BTH-F184 and BTH-F186.
 
-use super::rows::{RowResult, check_rows, violation};
+use super::rows::{RowResult, check_fields, check_rows, violation};
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
-use crate::scene_view::SceneView;
+use crate::view::SceneView;
 use std::mem::offset_of;
 
-/// What a scene's check asks of an object: its row of `DEFORMATION`, if it has one, and whether a deformer can move it: it can be given new
-/// positions or has nothing that can be hit, and no frames move it.
+/// Returns for an object its row of `DEFORMATION`, if it has one, and whether a deformer can move
+/// it: the object is deformable or cannot be hit, and it has no frames.
 pub(crate) type DeformationOf<'a> = &'a dyn Fn(u32) -> (Option<Deformation>, bool);
 
-/// Checks the deformers and skins of a scene whose nodes have been checked; `objects` is the number of objects.
+/// Checks the deformers and skins of a scene whose nodes have been checked; `objects` is the number
+/// of objects.
 pub(super) fn check(view: &SceneView<'_>, objects: u32, deformation: DeformationOf<'_>) -> Result<()> {
     skins(view)?;
     check_rows(kind::SKIN_JOINTS, view.skin_joints, |_, joint| self::joint(view, joint))?;
@@ -19,8 +20,7 @@ pub(super) fn check(view: &SceneView<'_>, objects: u32, deformation: Deformation
     match view.morph_weights.iter().position(|weight| !weight.is_finite()) {
         None => Ok(()),
         Some(row) => {
-            let found = format!("{}", view.morph_weights[row]);
-            let at = 8 * row as u64;
+            let (at, found) = (8 * row as u64, format!("{}", view.morph_weights[row]));
             Err(Error::within_file(Code::MorphWeights, kind::MORPH_WEIGHTS, at, "a finite weight", found))
         }
     }
@@ -43,19 +43,17 @@ fn skins(view: &SceneView<'_>) -> Result<()> {
 
 /// BTH-F184.
 fn joint(view: &SceneView<'_>, joint: &SkinJoint) -> RowResult<()> {
-    if joint.node as usize >= view.nodes.len() {
-        return violation(Code::SkinJoint, offset_of!(SkinJoint, node), "a row of NODES", joint.node);
-    }
-    if !joint.inverse_bind.iter().all(|x| x.is_finite()) {
-        return violation(Code::SkinJoint, 0, "a finite matrix", joint.inverse_bind);
-    }
-    if joint.reserved != [0; 3] {
-        return violation(Code::SkinJoint, offset_of!(SkinJoint, reserved), "zeros", joint.reserved);
-    }
+    check_fields!(SkinJoint {
+        SkinJoint node: (joint.node as usize) < view.nodes.len(), "a row of NODES", joint.node;
+        SkinJoint inverse_bind: joint.inverse_bind.iter().all(|x| x.is_finite()),
+            "a finite matrix", joint.inverse_bind;
+        SkinJoint reserved: joint.reserved == [0; 3], "zeros", joint.reserved;
+    });
     Ok(())
 }
 
-/// BTH-F180 without distinct objects, BTH-F181, BTH-F182 without the weights themselves, and BTH-F186.
+/// BTH-F180 without distinct objects, BTH-F181, BTH-F182 without the weights themselves, and
+/// BTH-F186.
 fn deformers(view: &SceneView<'_>, objects: u32, deformation: DeformationOf<'_>) -> Result<()> {
     let mut end = 0u64;
     check_rows(kind::DEFORMERS, view.deformers, |row, deformer| {
@@ -66,25 +64,21 @@ fn deformers(view: &SceneView<'_>, objects: u32, deformation: DeformationOf<'_>)
             let expected = "ascending nodes, an object with DEFORMATION, and zeros";
             return violation(Code::Deformer, 0, expected, deformer);
         };
-        if !can_move {
-            let at = offset_of!(Deformer, object);
-            let expected = "an object with LEAF_VERTICES and without SEQUENCE_TIMES";
-            return violation(Code::DeformerObject, at, expected, deformer.object);
-        }
         let joints = view.skins.get(deformer.skin as usize).map(|skin| skin.joints);
         let fits = |joints: u32| counts.joints > 0 && counts.joints <= joints;
-        if deformer.skin != NONE && !joints.is_some_and(fits) {
-            let expected = "NONE, or a skin with the joints of an object that has some";
-            return violation(Code::DeformerSkin, offset_of!(Deformer, skin), expected, deformer.skin);
-        }
+        check_fields!(Deformer {
+            DeformerObject object: can_move,
+                "an object with LEAF_VERTICES and without SEQUENCE_TIMES", deformer.object;
+            DeformerSkin skin: deformer.skin == NONE || joints.is_some_and(fits),
+                "NONE, or a skin with the joints of an object that has some", deformer.skin;
+        });
         Ok(())
     })?;
     check_rows(kind::DEFORMERS, view.deformers, |_, deformer| {
         let targets = deformation(deformer.object).0.map_or(0, |counts| counts.targets);
-        if deformer.weights != targets {
-            let at = offset_of!(Deformer, weights);
-            return violation(Code::MorphWeights, at, "a weight for each target", deformer.weights);
-        }
+        check_fields!(Deformer {
+            MorphWeights weights: deformer.weights == targets, "a weight for each target", deformer.weights;
+        });
         Ok(())
     })?;
     for (row, deformer) in view.deformers.iter().enumerate() {

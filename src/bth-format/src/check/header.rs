@@ -1,6 +1,6 @@
 //! The OBJECT row: BTH-F101 to BTH-F103, and the limits of counts and depth (BTH-F022, BTH-F110).
 
-use super::boxes::is_box;
+use super::nodes::is_box;
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::limits::{MAX_DEPTH, MAX_TRIANGLES};

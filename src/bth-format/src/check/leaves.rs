@@ -1,5 +1,6 @@
 //! Triangle leaves and the ids that they refer to: BTH-F113 to BTH-F118.
 
+use super::rows::check_all;
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::object::ObjectView;
@@ -16,7 +17,8 @@ pub(super) fn check(view: &ObjectView, child: Child, start: u64) -> Result<()> {
     if view.grid.is_none() {
         return checked;
     }
-    // Offsets within the unpacked leaf do not exist in the file: the error names the leaf's first byte instead.
+    // Offsets within the unpacked leaf do not exist in the file: the error names the leaf's first
+    // byte instead.
     checked.map_err(|error| error.moved_to(start))?;
     match view.unused_bits(child) {
         0 => Ok(()),
@@ -24,7 +26,8 @@ pub(super) fn check(view: &ObjectView, child: Child, start: u64) -> Result<()> {
     }
 }
 
-/// Checks an indexed leaf; `start` is its first byte in LINES, `rows` the number of rows of TRIANGLE_IDS.
+/// Checks an indexed leaf; `start` is its first byte in LINES, `rows` the number of rows of
+/// TRIANGLE_IDS.
 fn indexed(leaf: &IndexedLeaf, start: u64, rows: usize) -> Result<()> {
     let fail = |code, offset: usize, expected: &'static str, found: String| {
         Err(Error::within(code, kind::LINES, start + offset as u64, expected, found))
@@ -90,16 +93,12 @@ fn range(first: u32, count: u32, rows: usize, at: u64) -> Result<()> {
     Err(Error::within(Code::LeafIds, kind::LINES, at, expected, found))
 }
 
-/// BTH-F117 and BTH-F118: a coordinate in use is finite; an unused one repeats that of slot 0, bit for bit.
+/// BTH-F117 and BTH-F118: a coordinate in use is finite; an unused one repeats that of slot 0, bit
+/// for bit.
 fn vertex(x: f32, of_slot_0: f32, used: bool, at: u64) -> Result<()> {
     if used && !x.is_finite() {
-        return Err(Error::within(
-            Code::LeafVertices,
-            kind::LINES,
-            at,
-            "a finite coordinate",
-            format!("{x}"),
-        ));
+        let (expected, found) = ("a finite coordinate", format!("{x}"));
+        return Err(Error::within(Code::LeafVertices, kind::LINES, at, expected, found));
     }
     if !used && x.to_bits() != of_slot_0.to_bits() {
         let expected = format!("{of_slot_0}, as in slot 0");
@@ -111,12 +110,6 @@ fn vertex(x: f32, of_slot_0: f32, used: bool, at: u64) -> Result<()> {
 /// BTH-F116: rows of TRIANGLE_IDS are below the number of triangles.
 pub(super) fn check_ids(view: &ObjectView) -> Result<()> {
     let triangles = view.header.triangles;
-    match view.triangle_ids.iter().position(|id| *id >= triangles) {
-        None => Ok(()),
-        Some(row) => {
-            let expected = format!("an id below {triangles}");
-            let found = format!("{}", view.triangle_ids[row]);
-            Err(Error::within(Code::TriangleId, kind::TRIANGLE_IDS, 4 * row as u64, expected, found))
-        }
-    }
+    let expected = format!("an id below {triangles}");
+    check_all(Code::TriangleId, kind::TRIANGLE_IDS, view.triangle_ids, |id| *id < triangles, expected)
 }

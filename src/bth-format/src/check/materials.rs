@@ -1,9 +1,10 @@
-//! Materials, textures, vertex colours, second sets of texture coordinates and images: BTH-F149, BTH-F160 to BTH-F162, BTH-F220
-//! and BTH-F221.
+//! Materials, textures, vertex colours, second sets of texture coordinates and images: BTH-F149,
+//! BTH-F160 to BTH-F162, BTH-F220 and BTH-F221.
 
+use super::rows::{RowResult, check_all, check_fields, check_object_rows, is_finite};
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
-use crate::materials_view::{ImagesView, MaterialsView};
+use crate::view::{ImagesView, MaterialsView};
 use std::borrow::Cow;
 use std::fmt::Debug;
 use std::mem::offset_of;
@@ -15,110 +16,62 @@ pub(crate) fn materials(view: &MaterialsView<'_>, materials: usize, triangles: u
         let expected = format!("{materials} rows or none");
         return error(Code::MaterialParameters, kind::MATERIAL_PARAMETERS, 0, expected, &rows);
     }
-    for (row, parameters) in view.parameters.iter().enumerate() {
-        self::parameters(parameters, view.textures.len(), row * size_of::<MaterialParameters>())?;
-    }
-    for (row, texture) in view.textures.iter().enumerate() {
-        self::texture(texture, row * size_of::<Texture>())?;
-    }
-    colors(view, triangles as usize)?;
-    second_uvs(view, triangles as usize)
+    check_object_rows(kind::MATERIAL_PARAMETERS, view.parameters, |_, row| {
+        parameters(row, view.textures.len())
+    })?;
+    check_object_rows(kind::TEXTURES, view.textures, |_, row| texture(row))?;
+    let triangles = triangles as usize;
+    // BTH-F161.
+    corners(Code::Colors, kind::COLOR_CORNERS, view.color_corners, triangles, view.colors.len())?;
+    // BTH-F220 and BTH-F221.
+    let rows = view.second_uvs.len();
+    corners(Code::SecondCorners, kind::SECOND_CORNERS, view.second_corners, triangles, rows)?;
+    let numbers = view.second_uvs.as_flattened();
+    check_all(Code::SecondUvs, kind::SECOND_UVS, numbers, |x| x.is_finite(), "finite coordinates")
 }
 
 /// BTH-F149 of a row.
-fn parameters(p: &MaterialParameters, textures: usize, at: usize) -> Result<()> {
-    let wrong = |field: usize, expected: &'static str, found: &dyn Debug| {
-        error(Code::MaterialParameters, kind::MATERIAL_PARAMETERS, at + field, expected, found)
-    };
+fn parameters(p: &MaterialParameters, textures: usize) -> RowResult<()> {
     let amount = |x: &f32| x.is_finite() && *x >= 0.0;
-    if !p.base_color.iter().all(amount) || p.base_color[3] > 1.0 {
-        let expected = "a finite color from 0 and an alpha from 0 to 1";
-        return wrong(offset_of!(MaterialParameters, base_color), expected, &p.base_color);
-    }
-    if !p.emissive.iter().all(amount) {
-        return wrong(offset_of!(MaterialParameters, emissive), "a finite color from 0", &p.emissive);
-    }
-    if !amount(&p.alpha_cutoff) {
-        let at = offset_of!(MaterialParameters, alpha_cutoff);
-        return wrong(at, "a finite cutoff from 0", &p.alpha_cutoff);
-    }
-    if p.alpha_mode > ALPHA_BLEND {
-        return wrong(offset_of!(MaterialParameters, alpha_mode), "a mode from 0 to 2", &p.alpha_mode);
-    }
-    if p.flags & !(MATERIAL_DOUBLE_SIDED | MATERIAL_UNLIT) != 0 {
-        return wrong(offset_of!(MaterialParameters, flags), "known flags", &p.flags);
-    }
-    for (field, row) in [
-        (offset_of!(MaterialParameters, base_color_texture), p.base_color_texture),
-        (offset_of!(MaterialParameters, emissive_texture), p.emissive_texture),
-    ] {
-        if row != NONE && row as usize >= textures {
-            let expected = format!("a row below {textures} or NONE");
-            return error(Code::MaterialParameters, kind::MATERIAL_PARAMETERS, at + field, expected, &row);
-        }
-    }
-    if p.reserved != [0; 4] {
-        return wrong(offset_of!(MaterialParameters, reserved), "zeros", &p.reserved);
-    }
+    let is_texture = |row: u32| row == NONE || (row as usize) < textures;
+    let row_of_texture = || format!("a row below {textures} or NONE");
+    check_fields!(MaterialParameters {
+        MaterialParameters base_color: p.base_color.iter().all(amount) && p.base_color[3] <= 1.0,
+            "a finite color from 0 and an alpha from 0 to 1", p.base_color;
+        MaterialParameters emissive: p.emissive.iter().all(amount), "a finite color from 0", p.emissive;
+        MaterialParameters alpha_cutoff: amount(&p.alpha_cutoff), "a finite cutoff from 0", p.alpha_cutoff;
+        MaterialParameters alpha_mode: p.alpha_mode <= ALPHA_BLEND, "a mode from 0 to 2", p.alpha_mode;
+        MaterialParameters flags: p.flags & !(MATERIAL_DOUBLE_SIDED | MATERIAL_UNLIT) == 0, "known flags", p.flags;
+        MaterialParameters base_color_texture: is_texture(p.base_color_texture),
+            row_of_texture(), p.base_color_texture;
+        MaterialParameters emissive_texture: is_texture(p.emissive_texture),
+            row_of_texture(), p.emissive_texture;
+        MaterialParameters reserved: p.reserved == [0; 4], "zeros", p.reserved;
+    });
     Ok(())
 }
 
 /// BTH-F160 of a row.
-fn texture(t: &Texture, at: usize) -> Result<()> {
-    let wrong = |field: usize, expected: &'static str, found: &dyn Debug| {
-        error(Code::Texture, kind::TEXTURES, at + field, expected, found)
-    };
-    if t.wrap.iter().any(|wrap| *wrap > WRAP_CLAMP) {
-        return wrong(offset_of!(Texture, wrap), "wrap modes from 0 to 2", &t.wrap);
-    }
-    if t.filter > FILTER_NEAREST {
-        return wrong(offset_of!(Texture, filter), "0 or 1", &t.filter);
-    }
-    if !t.transform.as_flattened().iter().all(|x| x.is_finite()) {
-        return wrong(offset_of!(Texture, transform), "a finite transform", &t.transform);
-    }
-    if t.uv_set > UV_SET_SECOND {
-        return wrong(offset_of!(Texture, uv_set), "a set of texture coordinates, 0 or 1", &t.uv_set);
-    }
-    if t.reserved != [0; 2] {
-        return wrong(offset_of!(Texture, reserved), "zeros", &t.reserved);
-    }
+fn texture(t: &Texture) -> RowResult<()> {
+    check_fields!(Texture {
+        Texture wrap: t.wrap.iter().all(|wrap| *wrap <= WRAP_CLAMP), "wrap modes from 0 to 2", t.wrap;
+        Texture filter: t.filter <= FILTER_NEAREST, "0 or 1", t.filter;
+        Texture transform: is_finite(t.transform.as_flattened()), "a finite transform", t.transform;
+        Texture uv_set: t.uv_set <= UV_SET_SECOND, "a set of texture coordinates, 0 or 1", t.uv_set;
+        Texture reserved: t.reserved == [0; 2], "zeros", t.reserved;
+    });
     Ok(())
 }
 
-/// BTH-F161.
-fn colors(view: &MaterialsView<'_>, triangles: usize) -> Result<()> {
-    corners((Code::Colors, kind::COLOR_CORNERS), view.color_corners, (view.colors.len(), triangles))
-}
-
-/// BTH-F220 and F221.
-fn second_uvs(view: &MaterialsView<'_>, triangles: usize) -> Result<()> {
-    let (code, section) = (Code::SecondCorners, kind::SECOND_CORNERS);
-    corners((code, section), view.second_corners, (view.second_uvs.len(), triangles))?;
-    let numbers = view.second_uvs.as_flattened();
-    match numbers.iter().position(|x| !x.is_finite()) {
-        None => Ok(()),
-        Some(i) => error(Code::SecondUvs, kind::SECOND_UVS, 4 * i, "finite coordinates", &numbers[i]),
-    }
-}
-
-/// Whether corners have as many rows as the object has triangles, or none, which lie within so many rows of another section.
-fn corners(
-    (code, section): (Code, u32),
-    corners: &[[u32; 3]],
-    (rows, triangles): (usize, usize),
-) -> Result<()> {
+/// Checks that corners have one row per triangle of the object, or none, and refer to `rows` rows
+/// of another section.
+fn corners(code: Code, section: u32, corners: &[[u32; 3]], triangles: usize, rows: usize) -> Result<()> {
     if !corners.is_empty() && corners.len() != triangles {
         let expected = format!("{triangles} rows or none");
         return error(code, section, 0, expected, &corners.len());
     }
-    match corners.as_flattened().iter().position(|row| *row as usize >= rows) {
-        None => Ok(()),
-        Some(i) => {
-            let expected = format!("a row below {rows}");
-            error(code, section, 4 * i, expected, &corners.as_flattened()[i])
-        }
-    }
+    let expected = format!("a row below {rows}");
+    check_all(code, section, corners.as_flattened(), |row| (*row as usize) < rows, expected)
 }
 
 /// BTH-F162 without textures: order and ranges.

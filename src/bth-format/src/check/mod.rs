@@ -1,14 +1,14 @@
-//! The index check of an object and of the scene: what makes tracing safe. Specification: "Index check".
+//! The index check of an object and of the scene: what makes tracing safe. Specification: "Index
+//! check".
 //!
-//! An object that passes cannot make a traversal read out of bounds, loop, or visit a node twice. The check costs O(bytes of
-//! the object) and does not recurse. It covers what indices and counts have to be; what the numbers have to be (boxes that
-//! contain their triangles, tetrahedra that have volume) is checked by [`crate::verify`].
+//! An object that passes cannot make a traversal read out of bounds, loop, or visit a node twice.
+//! The check costs O(bytes of the object) and does not recurse. It covers what indices and counts
+//! have to be; what the numbers have to be (boxes that contain their triangles, tetrahedra that
+//! have volume) is checked by [`crate::verify`].
 
 mod adjacency;
 mod bit_set;
-mod boxes;
 mod deformable;
-mod deformation;
 mod deformers;
 mod free;
 mod groups;
@@ -26,12 +26,13 @@ mod tet_faces;
 mod tet_leaves;
 mod tracks;
 mod tree;
+mod vertex_motion;
 
 pub(crate) use adjacency::TetAdjacency;
-pub(crate) use deformation::check as deformation;
 pub(crate) use materials::{image_names, images, materials};
 pub(crate) use scene::check as scene;
 pub(crate) use sequence::sequence;
+pub(crate) use vertex_motion::check as deformation;
 
 use crate::error::Result;
 use crate::object::ObjectView;
@@ -39,8 +40,9 @@ use crate::object::ObjectView;
 /// Checks every index of an object.
 ///
 /// # Errors
-/// The first violation of `BTH-F101` to `BTH-F147` and `BTH-F163` to `BTH-F172` and `BTH-F187`, with an offset from the start of its section;
-/// [`crate::file::File::check`] gives offsets from the start of the file.
+/// The first violation of `BTH-F101` to `BTH-F147` and `BTH-F163` to `BTH-F172` and `BTH-F187`,
+/// with an offset from the start of its section; [`crate::file::File::check`] gives offsets from
+/// the start of the file.
 pub(crate) fn object(view: &ObjectView) -> Result<()> {
     header::check(view)?;
     sources::check(view)?;

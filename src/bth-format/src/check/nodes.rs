@@ -1,12 +1,16 @@
-//! One node: its slots and boxes.
+//! Boxes, and the slots of a node.
 
-use super::boxes::is_box;
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use std::mem::offset_of;
 
-/// BTH-F111 and BTH-F112: used slots come first and have boxes, empty ones hold the empty box. `start` is the node's first
-/// byte in LINES.
+/// Returns true if a box is finite and `lower <= upper` on every axis.
+pub(super) fn is_box(lower: [f32; 3], upper: [f32; 3]) -> bool {
+    (0..3).all(|a| lower[a].is_finite() && upper[a].is_finite() && lower[a] <= upper[a])
+}
+
+/// BTH-F111 and BTH-F112: used slots come first and have boxes, empty ones hold the empty box.
+/// `start` is the node's first byte in LINES.
 pub(super) fn check_slots(node: &WideNode, start: u64) -> Result<()> {
     let used = node.child.iter().take_while(|c| **c != NONE).count();
     let fail = |code, offset: usize, expected: &'static str, found: String| {

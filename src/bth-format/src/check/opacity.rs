@@ -13,13 +13,8 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
     }
     if !rows.is_empty() && rows.len() != triangles {
         let found = format!("{}", rows.len());
-        return Err(Error::within(
-            Code::OpacityRows,
-            kind::OPACITY,
-            0,
-            format!("{triangles} rows or none"),
-            found,
-        ));
+        let expected = format!("{triangles} rows or none");
+        return Err(Error::within(Code::OpacityRows, kind::OPACITY, 0, expected, found));
     }
     for (triangle, row) in rows.iter().enumerate() {
         let wrong = |expected: String| {

@@ -14,8 +14,8 @@ impl Placed {
         Self(BitSet::new(view.places.len()))
     }
 
-    /// BTH-F187: the triangles of a leaf have places. Adds those whose place is in this leaf. The leaf has
-    /// been checked, but not the ids of its triangles.
+    /// BTH-F187: the triangles of a leaf have places. Adds those whose place is in this leaf. The
+    /// leaf has been checked, but not the ids of its triangles.
     pub(super) fn add_leaf(&mut self, view: &ObjectView, leaf: Child) -> Result<()> {
         if view.places.is_empty() {
             return Ok(());

@@ -1,22 +1,22 @@
-//! The scene sections but for tracks. Costs O(their bytes).
+//! The scene sections except tracks. Costs O(their bytes).
 
 use super::deformers::{self, DeformationOf};
-use super::rows::{RowResult, check_rows, violation};
+use super::rows::{RowResult, check_fields, check_rows};
 use super::tracks;
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::names::{self, is_name};
-use crate::scene_view::SceneView;
-use std::mem::offset_of;
+use crate::view::SceneView;
 
-/// Frame numbers are at most this in absolute value.
+/// Max absolute value of a frame number.
 const FRAME_LIMIT: i32 = 1 << 24;
 const NAME_EXPECTED: &str = "a name of at most 4096 bytes within NAMES";
 
 /// Checks the scene sections of a file; `objects` is the number of its objects.
 ///
 /// # Errors
-/// The first violation of `BTH-F150` to `BTH-F159` and `BTH-F180` to `BTH-F186`, with an offset from the start of its section.
+/// The first violation of `BTH-F150` to `BTH-F159` and `BTH-F180` to `BTH-F186`, with an offset
+/// from the start of its section.
 pub(crate) fn check(view: &SceneView<'_>, objects: u32, deformation: DeformationOf<'_>) -> Result<()> {
     scene_row(view)?;
     let names = names::checked(view.names);
@@ -35,110 +35,79 @@ fn scene_row(view: &SceneView<'_>) -> Result<()> {
         return Err(Error::within_file(Code::Scene, kind::SCENE, 0, "one row of SCENE", found));
     };
     check_rows(kind::SCENE, std::slice::from_ref(scene), |_, s| {
-        if !(s.rate.is_finite() && s.rate > 0.0) {
-            return violation(Code::Scene, offset_of!(Scene, rate), "a finite rate above 0", s.rate);
-        }
         let range = -FRAME_LIMIT..=FRAME_LIMIT;
-        if s.first_frame > s.last_frame || !range.contains(&s.first_frame) || !range.contains(&s.last_frame) {
-            let frames = (s.first_frame, s.last_frame);
-            return violation(Code::Scene, offset_of!(Scene, first_frame), "ordered frames in range", frames);
-        }
-        if s.camera != NONE && s.camera as usize >= view.cameras.len() {
-            return violation(Code::Scene, offset_of!(Scene, camera), "a row of CAMERAS or NONE", s.camera);
-        }
-        if s.reserved != [0; 11] {
-            return violation(Code::Scene, offset_of!(Scene, reserved), "zeros", s.reserved);
-        }
+        let frames = (s.first_frame, s.last_frame);
+        check_fields!(Scene {
+            Scene rate: s.rate.is_finite() && s.rate > 0.0, "a finite rate above 0", s.rate;
+            Scene first_frame: frames.0 <= frames.1 && range.contains(&frames.0) && range.contains(&frames.1),
+                "ordered frames in range", frames;
+            Scene camera: s.camera == NONE || (s.camera as usize) < view.cameras.len(),
+                "a row of CAMERAS or NONE", s.camera;
+            Scene reserved: s.reserved == [0; 11], "zeros", s.reserved;
+        });
         Ok(())
     })
 }
 
 /// BTH-F151 to BTH-F153 of a node.
 fn node(names: &str, row: usize, node: &Node) -> RowResult<()> {
-    if node.parent != NONE && node.parent as usize >= row {
-        return violation(Code::Node, offset_of!(Node, parent), "a lesser row or NONE", node.parent);
-    }
-    if node.flags & !(NODE_HIDDEN | NODE_MATRIX) != 0 {
-        return violation(Code::Node, offset_of!(Node, flags), "known flags", node.flags);
-    }
-    if node.reserved != [0; 4] {
-        return violation(Code::Node, offset_of!(Node, reserved), "zeros", node.reserved);
-    }
     let t = &node.transform;
-    let parts = node.flags & NODE_MATRIX == 0;
-    if !t.iter().all(|x| x.is_finite()) || parts && (tracks::is_zero(&t[3..7]) || !tracks::is_zero(&t[10..]))
-    {
-        return violation(Code::NodeTransform, 0, "a finite transform with a quaternion that is not zero", t);
-    }
-    if !is_name(names, node.name, node.name_length) {
-        let found = (node.name, node.name_length);
-        return violation(Code::Name, offset_of!(Node, name), NAME_EXPECTED, found);
-    }
+    let is_matrix = node.flags & NODE_MATRIX != 0;
+    let transforms = is_matrix || !tracks::is_zero(&t[3..7]) && tracks::is_zero(&t[10..]);
+    check_fields!(Node {
+        Node parent: node.parent == NONE || (node.parent as usize) < row, "a lesser row or NONE", node.parent;
+        Node flags: node.flags & !(NODE_HIDDEN | NODE_MATRIX) == 0, "known flags", node.flags;
+        Node reserved: node.reserved == [0; 4], "zeros", node.reserved;
+        NodeTransform transform: t.iter().all(|x| x.is_finite()) && transforms,
+            "a finite transform with a quaternion that is not zero", t;
+        Name name: is_name(names, node.name, node.name_length), NAME_EXPECTED, (node.name, node.name_length);
+    });
     Ok(())
 }
 
 /// BTH-F154.
 fn instance(view: &SceneView<'_>, instance: &Instance, objects: u32) -> RowResult<()> {
-    if instance.node as usize >= view.nodes.len() {
-        return violation(Code::Instance, offset_of!(Instance, node), "a row of NODES", instance.node);
-    }
-    if instance.object >= objects {
-        return violation(Code::Instance, offset_of!(Instance, object), "an object", instance.object);
-    }
-    if (instance.flags, instance.reserved) != (0, 0) {
-        let found = (instance.flags, instance.reserved);
-        return violation(Code::Instance, offset_of!(Instance, flags), "zeros", found);
-    }
+    let (flags, reserved) = (instance.flags, instance.reserved);
+    check_fields!(Instance {
+        Instance node: (instance.node as usize) < view.nodes.len(), "a row of NODES", instance.node;
+        Instance object: instance.object < objects, "an object", instance.object;
+        Instance flags: (flags, reserved) == (0, 0), "zeros", (flags, reserved);
+    });
     Ok(())
 }
 
 /// BTH-F158 and BTH-F153 of a camera.
-fn camera(view: &SceneView<'_>, names: &str, camera: &Camera) -> RowResult<()> {
-    if camera.node as usize >= view.nodes.len() || camera.projection > 1 {
-        let found = (camera.node, camera.projection);
-        return violation(Code::Camera, 0, "a row of NODES and a known projection", found);
-    }
-    let most = if camera.projection == 0 { 180.0 } else { f64::INFINITY };
-    let size = camera.size > 0.0 && camera.size < most;
-    let aspect = camera.aspect.is_finite() && camera.aspect >= 0.0;
-    let near = camera.near.is_finite() && camera.near >= 0.0;
-    let far = camera.far == 0.0 || camera.far > camera.near && camera.far.is_finite();
-    if !(size && aspect && near && far) {
-        let found = (camera.size, camera.aspect, camera.near, camera.far);
-        return violation(Code::Camera, offset_of!(Camera, size), "numbers that are allowed", found);
-    }
-    if camera.reserved != [0; 4] {
-        return violation(Code::Camera, offset_of!(Camera, reserved), "zeros", camera.reserved);
-    }
-    named(names, camera.name, camera.name_length)
+fn camera(view: &SceneView<'_>, names: &str, c: &Camera) -> RowResult<()> {
+    let most = if c.projection == 0 { 180.0 } else { f64::INFINITY };
+    let from_zero = |x: f64| x.is_finite() && x >= 0.0;
+    let size = c.size > 0.0 && c.size < most;
+    let far = c.far == 0.0 || c.far > c.near && c.far.is_finite();
+    check_fields!(Camera {
+        Camera node: (c.node as usize) < view.nodes.len() && c.projection <= 1,
+            "a row of NODES and a known projection", (c.node, c.projection);
+        Camera size: size && from_zero(c.aspect) && from_zero(c.near) && far,
+            "numbers that are allowed", (c.size, c.aspect, c.near, c.far);
+        Camera reserved: c.reserved == [0; 4], "zeros", c.reserved;
+        Name name: is_name(names, c.name, c.name_length), NAME_EXPECTED, (c.name, c.name_length);
+    });
+    Ok(())
 }
 
 /// BTH-F159 and BTH-F153 of a light.
-fn light(view: &SceneView<'_>, names: &str, light: &Light) -> RowResult<()> {
-    if light.node as usize >= view.nodes.len() || light.kind > 2 {
-        return violation(Code::Light, 0, "a row of NODES and a known kind", (light.node, light.kind));
-    }
+fn light(view: &SceneView<'_>, names: &str, l: &Light) -> RowResult<()> {
     let from_zero = |x: f64| x.is_finite() && x >= 0.0;
-    let angles = match light.kind {
-        2 => from_zero(light.inner) && light.inner < light.outer && light.outer <= 90.0,
-        _ => (light.inner, light.outer) == (0.0, 0.0),
+    let angles = match l.kind {
+        2 => from_zero(l.inner) && l.inner < l.outer && l.outer <= 90.0,
+        _ => (l.inner, l.outer) == (0.0, 0.0),
     };
-    let numbers = light.color.iter().chain([&light.intensity, &light.range]).all(|x| from_zero(*x));
-    if !numbers || !angles {
-        let found = (light.color, light.intensity, light.range, light.inner, light.outer);
-        return violation(Code::Light, offset_of!(Light, color), "numbers that are allowed", found);
-    }
-    if light.reserved != [0; 2] {
-        return violation(Code::Light, offset_of!(Light, reserved), "zeros", light.reserved);
-    }
-    named(names, light.name, light.name_length)
-}
-
-/// BTH-F153 of a camera or light, whose name fields have the same offset.
-fn named(names: &str, first: u32, length: u32) -> RowResult<()> {
-    const _: () = assert!(offset_of!(Camera, name) == offset_of!(Light, name));
-    if is_name(names, first, length) {
-        return Ok(());
-    }
-    violation(Code::Name, offset_of!(Camera, name), NAME_EXPECTED, (first, length))
+    let numbers = l.color.iter().chain([&l.intensity, &l.range]).all(|x| from_zero(*x));
+    check_fields!(Light {
+        Light node: (l.node as usize) < view.nodes.len() && l.kind <= 2,
+            "a row of NODES and a known kind", (l.node, l.kind);
+        Light color: numbers && angles,
+            "numbers that are allowed", (l.color, l.intensity, l.range, l.inner, l.outer);
+        Light reserved: l.reserved == [0; 2], "zeros", l.reserved;
+        Name name: is_name(names, l.name, l.name_length), NAME_EXPECTED, (l.name, l.name_length);
+    });
+    Ok(())
 }

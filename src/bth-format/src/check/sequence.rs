@@ -1,9 +1,10 @@
 //! Objects whose vertices move by themselves: BTH-F190 to BTH-F192.
 
+use super::rows::{check_all, is_finite};
 use crate::error::{Code, Error, Result};
 use crate::layout::kind;
 use crate::object::ObjectView;
-use crate::sequence_view::SequenceView;
+use crate::view::SequenceView;
 use zerocopy::IntoBytes;
 
 /// BTH-F190 to BTH-F192 of an object.
@@ -23,16 +24,15 @@ pub(crate) fn sequence(view: &ObjectView, sequence: &SequenceView) -> Result<()>
         let expected = "finite times that ascend strictly";
         return Err(Error::within(Code::SequenceTimes, kind::SEQUENCE_TIMES, at, expected, found));
     }
-    let wrong = |row: usize, expected: &'static str| {
-        let (at, found) = (12 * row as u64, format!("{:?}", positions[row]));
-        Err(Error::within(Code::SequencePositions, kind::SEQUENCE_POSITIONS, at, expected, found))
-    };
-    if let Some(row) = positions.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
-        return wrong(row, "a finite position");
-    }
+    let (code, section) = (Code::SequencePositions, kind::SEQUENCE_POSITIONS);
+    check_all(code, section, positions, |p| is_finite(p), "a finite position")?;
     let first = positions.iter().zip(view.positions);
     match first.map(|(a, b)| a.as_bytes() == b.as_bytes()).position(|same| !same) {
         None => Ok(()),
-        Some(row) => wrong(row, "the position of the first frame as in POSITIONS"),
+        Some(row) => {
+            let (expected, found) =
+                ("the position of the first frame as in POSITIONS", format!("{:?}", positions[row]));
+            Err(Error::within(code, section, 12 * row as u64, expected, found))
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Tet leaves, their vertices, and the map from triangles to constrained faces.
 
-use super::boxes::is_box;
+use super::nodes::is_box;
+use super::rows::{check_all, is_finite};
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::object::ObjectView;
@@ -51,13 +52,8 @@ fn ranges(view: &ObjectView) -> Result<()> {
         if end[k] != rows[k] as u64 {
             let expected = format!("tet leaves with {} rows of {}", rows[k], names[k]);
             let at = size_of_val(view.tet_leaves) as u64;
-            return Err(Error::within(
-                Code::TetRanges,
-                kind::TET_LEAVES,
-                at,
-                expected,
-                format!("{}", end[k]),
-            ));
+            let found = format!("{}", end[k]);
+            return Err(Error::within(Code::TetRanges, kind::TET_LEAVES, at, expected, found));
         }
     }
     Ok(())
@@ -65,15 +61,8 @@ fn ranges(view: &ObjectView) -> Result<()> {
 
 /// BTH-F124: vertices are finite.
 fn vertices(view: &ObjectView) -> Result<()> {
-    let bad = |v: &TetVertex| v.reserved != 0 || !v.position.iter().all(|x| x.is_finite());
-    match view.tet_vertices.iter().position(bad) {
-        None => Ok(()),
-        Some(row) => {
-            let at = (row * size_of::<TetVertex>()) as u64;
-            let found = format!("{:?}", view.tet_vertices[row]);
-            Err(Error::within(Code::TetVertices, kind::TET_VERTICES, at, "a finite position and 0", found))
-        }
-    }
+    let is_good = |v: &TetVertex| v.reserved == 0 && is_finite(&v.position);
+    check_all(Code::TetVertices, kind::TET_VERTICES, view.tet_vertices, is_good, "a finite position and 0")
 }
 
 /// BTH-F131: TRIANGLE_FACES and the triangles of TET_FACES are inverse to each other.

@@ -3,7 +3,7 @@
 use super::rows::{RowResult, Violation, violation};
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
-use crate::scene_view::SceneView;
+use crate::view::SceneView;
 use std::mem::offset_of;
 
 /// Checks the tracks of a scene whose nodes have been checked.
@@ -64,9 +64,13 @@ fn follows(track: &Track, previous: Option<(u32, u32)>) -> RowResult<()> {
     let key = (track.node, track.property);
     match previous {
         Some(previous) if previous >= key => {
-            let (expected, found) =
-                ("ascending nodes and properties", format!("{key:?} behind {previous:?}"));
-            Err(Violation { code: Code::Track, offset: 0, expected, found })
+            let found = format!("{key:?} behind {previous:?}");
+            Err(Violation {
+                code: Code::Track,
+                offset: 0,
+                expected: "ascending nodes and properties".into(),
+                found,
+            })
         }
         _ => Ok(()),
     }
@@ -80,11 +84,13 @@ struct Ends {
 }
 
 impl Ends {
-    /// BTH-F156: the keys of a track follow those of the tracks before and lie within the sections. `width` is the number
-    /// of values of a key.
+    /// BTH-F156: the keys of a track follow those of the tracks before and lie within the sections.
+    /// `width` is the number of values of a key.
     fn append(&mut self, view: &SceneView<'_>, track: &Track, width: usize) -> RowResult<()> {
         let (at, keys) = (offset_of!(Track, keys), u64::from(track.keys));
-        let error = |expected, found| Err(Violation { code: Code::TrackRanges, offset: at, expected, found });
+        let error = |expected: &'static str, found| {
+            Err(Violation { code: Code::TrackRanges, offset: at, expected: expected.into(), found })
+        };
         let first = (u64::from(track.first_time), u64::from(track.first_value));
         if keys == 0 || first != (self.times, self.values) {
             let found = format!("{keys} keys at {} and {}", track.first_time, track.first_value);
@@ -110,7 +116,7 @@ impl Ends {
                     kind,
                     8 * used,
                     expected,
-                    format!("{}", rows),
+                    format!("{rows}"),
                 ));
             }
         }
@@ -118,7 +124,8 @@ impl Ends {
     }
 }
 
-/// BTH-F157: the keys of a track whose ranges have been checked. `width` is the number of values of a key.
+/// BTH-F157: the keys of a track whose ranges have been checked. `width` is the number of values of
+/// a key.
 fn keys(view: &SceneView<'_>, track: &Track, width: usize) -> Result<()> {
     let (times, values) = view.keys(track, width);
     let ascending = |i: usize| times[i].is_finite() && (i == 0 || times[i - 1] < times[i]);
@@ -128,7 +135,8 @@ fn keys(view: &SceneView<'_>, track: &Track, width: usize) -> Result<()> {
         return Err(Error::within_file(Code::TrackKeys, kind::TIMES, at, "finite ascending times", found));
     }
     let fits = |key: &[f64]| {
-        // Of a cubic rotation only the value, which stands between its tangents, has to be a quaternion.
+        // Of a cubic rotation only the value, which stands between its tangents, has to be a
+        // quaternion.
         let rotation = if width == 12 { &key[4..8] } else { key };
         match Property::from_code(track.property) {
             Some(Property::Rotation) => !is_zero(rotation),
@@ -146,7 +154,7 @@ fn keys(view: &SceneView<'_>, track: &Track, width: usize) -> Result<()> {
     Ok(())
 }
 
-/// Whether all numbers are 0.
+/// Returns true if all numbers are 0.
 pub(super) fn is_zero(numbers: &[f64]) -> bool {
     numbers.iter().all(|x| *x == 0.0)
 }

@@ -1,7 +1,8 @@
 //! The tree of nodes and leaves, subtrees of tet leaves included.
 //!
-//! Child codes are followed from the root with an explicit stack. A block of LINES is claimed when a code leads to it, and a
-//! half line that is claimed twice is an error. So every block is visited once, the work is O(lines), and there is no cycle.
+//! Child codes are followed from the root with an explicit stack. A block of LINES is claimed when
+//! a code leads to it, and a half line that is claimed twice is an error. So every block is visited
+//! once, the work is O(lines), and there is no cycle.
 
 use super::bit_set::BitSet;
 use super::places::Placed;
@@ -20,7 +21,7 @@ struct Reference {
     depth: u32,
     /// First half line of the node that holds it; `None` where no node does.
     parent: Option<u64>,
-    /// Whether it lies in the subtree of a tet leaf.
+    /// True if it lies in the subtree of a tet leaf.
     in_subtree: bool,
     /// Section that holds it.
     section: u32,
@@ -39,8 +40,8 @@ impl Reference {
     }
 }
 
-/// Checks that the blocks of LINES and the tet leaves form one tree that covers both: BTH-F105 to BTH-F115, BTH-F117,
-/// BTH-F118, BTH-F123, BTH-F169 and BTH-F187.
+/// Checks that the blocks of LINES and the tet leaves form one tree that covers both: BTH-F105 to
+/// BTH-F115, BTH-F117, BTH-F118, BTH-F123, BTH-F169 and BTH-F187.
 pub(super) fn check(view: &ObjectView) -> Result<()> {
     let mut tree = Tree {
         view,
@@ -64,7 +65,8 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
 
 struct Tree<'a> {
     view: &'a ObjectView<'a>,
-    /// Half lines that belong to a block. Leaves on a grid start at any half line, all other blocks at a line.
+    /// Half lines that belong to a block. Leaves on a grid start at any half line, all other blocks
+    /// at a line.
     claimed: BitSet,
     /// Tet leaves that a code leads to.
     referenced: BitSet,
@@ -118,8 +120,8 @@ impl Tree<'_> {
         Ok(())
     }
 
-    /// BTH-F106 to BTH-F108: the block lies within LINES, behind the node that refers to it, and no other block overlaps it.
-    /// Returns its first half line.
+    /// BTH-F106 to BTH-F108: the block lies within LINES, behind the node that refers to it, and no
+    /// other block overlaps it. Returns its first half line.
     fn claim(&mut self, reference: &Reference, child: Child) -> Result<u64> {
         let (first, count) = self.view.half_lines(child).expect("all children but tet leaves have blocks");
         let (line, lines) = (first / 2, self.view.lines.len());
@@ -139,7 +141,8 @@ impl Tree<'_> {
         Ok(first)
     }
 
-    /// BTH-F110 to BTH-F112: the node is not too deep, and its slots and boxes are as they should. Pushes its children.
+    /// BTH-F110 to BTH-F112: the node is not too deep, and its slots and boxes are as they should.
+    /// Pushes its children.
     fn follow_node(&mut self, reference: &Reference, line: u32, first_half: u64) -> Result<()> {
         let (depth, most) = (reference.depth + 1, self.view.header.depth);
         if depth > most.min(MAX_DEPTH as u32) {
@@ -170,13 +173,8 @@ impl Tree<'_> {
             None => Ok(()),
             Some((half, _)) => {
                 let at = (half * HALF_LINE) as u64;
-                Err(Error::within(
-                    Code::Unclaimed,
-                    kind::LINES,
-                    at,
-                    "a line of a block",
-                    "no reference to it",
-                ))
+                let (expected, found) = ("a line of a block", "no reference to it");
+                Err(Error::within(Code::Unclaimed, kind::LINES, at, expected, found))
             }
         }
     }

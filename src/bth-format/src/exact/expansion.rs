@@ -1,8 +1,10 @@
-//! Exact sums of products of `f32` values, for the few decisions that rounding in `f64` leaves open.
+//! Exact sums of products of `f32` values, for the few decisions that rounding in `f64` leaves
+//! open.
 //!
-//! Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
-//! Predicates" (1997): a sum is kept as non-overlapping parts of growing size. Products of
-//! three f32 values lie between 2^-447 and 2^384, those of four between 2^-596 and 2^512, so nothing here over- or underflows.
+//! Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates"
+//! (1997): a sum is kept as non-overlapping parts of growing size. Products of three f32 values lie
+//! between 2^-447 and 2^384, those of four between 2^-596 and 2^512, so nothing here over- or
+//! underflows.
 
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
@@ -23,19 +25,21 @@ fn two_product(a: f64, b: f64) -> (f64, f64) {
     (product, al * bl - (((product - ah * bh) - al * bh) - ah * bl))
 }
 
-/// Parts that [`Expansion::add_edge`] needs at most: it adds 18 products of two numbers each, and each addition makes at most
-/// one part more.
+/// Parts that [`Expansion::add_edge`] needs at most: it adds 18 products of two numbers each, and
+/// each addition makes at most one part more.
 pub const EDGE_PARTS: usize = 36;
 /// Parts that [`Expansion::add_volume`] needs at most: it adds 24 products of two numbers each.
 pub const VOLUME_PARTS: usize = 48;
 
-/// An exact sum, as up to `PARTS` numbers that do not overlap, in ascending order of size. Additions beyond that panic.
+/// An exact sum, as up to `PARTS` numbers that do not overlap, in ascending order of size.
+/// Additions beyond that panic.
 pub struct Expansion<const PARTS: usize> {
     part: [f64; PARTS],
     len: usize,
 }
 
-/// `p - o` where `f64` holds it exactly, which it does unless coordinates differ by a factor of about 2^29.
+/// `p - o` where `f64` holds it exactly, which it does unless coordinates differ by a factor of
+/// about 2^29.
 fn exact_difference(o: [f64; 3], p: [f64; 3]) -> Option<[f64; 3]> {
     let differences = [0, 1, 2].map(|k| two_sum(p[k], -o[k]));
     differences.iter().all(|(_, error)| *error == 0.0).then(|| differences.map(|(difference, _)| difference))
@@ -123,8 +127,8 @@ impl<const PARTS: usize> Expansion<PARTS> {
         }
     }
 
-    /// Adds det[d, a-o, b-o]. Where `f64` does not hold the differences, the determinant is expanded into products of three
-    /// inputs.
+    /// Adds det[d, a-o, b-o]. Where `f64` does not hold the differences, the determinant is
+    /// expanded into products of three inputs.
     pub fn add_edge(&mut self, o: [f64; 3], d: [f64; 3], a: [f64; 3], b: [f64; 3]) {
         if let (Some(a), Some(b)) = (exact_difference(o, a), exact_difference(o, b)) {
             return self.add_long_determinant(d, a, b);
@@ -147,8 +151,8 @@ impl<const PARTS: usize> Expansion<PARTS> {
         self.add_determinant(-1.0, a, b, o);
     }
 
-    /// Adds the product of two other sums. The parts of each, multiplied with one another, must neither over- nor underflow, as
-    /// is true of sums of products of two `f32` values.
+    /// Adds the product of two other sums. The parts of each, multiplied with one another, must
+    /// neither over- nor underflow, as is true of sums of products of two `f32` values.
     pub fn add_product_of<const A: usize, const B: usize>(&mut self, a: &Expansion<A>, b: &Expansion<B>) {
         for &x in &a.part[..a.len] {
             for &y in &b.part[..b.len] {
@@ -254,8 +258,8 @@ mod tests {
         }
     }
 
-    /// Coordinates of every size, so that differences are exact for some and not for others: the two ways of adding up
-    /// agree on the sum.
+    /// Coordinates of every size, so that differences are exact for some and not for others: the
+    /// two ways of adding up agree on the sum.
     #[test]
     fn differences_and_products_of_inputs_add_up_alike() {
         let mut rng = Rng::new(17);

@@ -1,4 +1,5 @@
-//! Exact arithmetic on `f32` coordinates: sums of products without rounding, and geometric predicates made of them.
+//! Exact arithmetic on `f32` coordinates: sums of products without rounding, and geometric
+//! predicates made of them.
 
 mod expansion;
 mod predicates;

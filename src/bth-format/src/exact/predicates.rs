@@ -1,16 +1,18 @@
-//! Geometric predicates with exact signs: a floating-point filter in `f64`, and exact sums where it does not decide.
+//! Geometric predicates with exact signs: a floating-point filter in `f64`, and exact sums where it
+//! does not decide.
 
 use super::expansion::{Expansion, VOLUME_PARTS};
 use std::cmp::Ordering;
 
-/// On which side of the plane through a, b and c the point d lies: `Greater` where (b-a)x(c-a) points to, `Equal` on the plane.
-/// Exact for finite points.
+/// On which side of the plane through a, b and c the point d lies: `Greater` where (b-a)x(c-a)
+/// points to, `Equal` on the plane. Exact for finite points.
 pub fn side(a: [f32; 3], b: [f32; 3], c: [f32; 3], d: [f32; 3]) -> Ordering {
     let [u, v, w] = [b, c, d].map(|p| [0, 1, 2].map(|k| p[k] as f64 - a[k] as f64));
     let minors = [[1, 2], [2, 0], [0, 1]].map(|[i, j]| (u[i] * v[j], u[j] * v[i]));
     let det: f64 = (0..3).map(|k| (minors[k].0 - minors[k].1) * w[k]).sum();
     let size: f64 = (0..3).map(|k| (minors[k].0.abs() + minors[k].1.abs()) * w[k].abs()).sum();
-    // Each of the six products has at most 7 roundings (3 differences, 2 products, 2 sums); 16 is ample.
+    // Each of the six products has at most 7 roundings (3 differences, 2 products, 2 sums); 16 is
+    // ample.
     if det.abs() > 16.0 * f64::EPSILON * size {
         return det.total_cmp(&0.0);
     }
@@ -21,7 +23,8 @@ pub fn side(a: [f32; 3], b: [f32; 3], c: [f32; 3], d: [f32; 3]) -> Ordering {
     0.0f64.total_cmp(&(volume.value() + 0.0))
 }
 
-/// Whether a triangle has exactly zero area: whether its projections along the three axes all have. Exact for finite corners.
+/// Whether a triangle has exactly zero area: whether its projections along the three axes all have.
+/// Exact for finite corners.
 pub fn is_zero_area(corners: [[f32; 3]; 3]) -> bool {
     let [a, b, c] = corners.map(|p| p.map(f64::from));
     [[0, 1], [1, 2], [2, 0]].into_iter().all(|[i, j]| {

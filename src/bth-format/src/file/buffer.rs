@@ -27,7 +27,8 @@ pub(super) struct Owned {
 #[derive(Debug)]
 enum Memory {
     Lines(Vec<CacheLine>),
-    /// Anonymous pages, which are large ones where the system has them, and the index of the first byte in use.
+    /// Anonymous pages, which are large ones where the system has them, and the index of the first
+    /// byte in use.
     #[cfg_attr(
         not(target_os = "linux"),
         expect(dead_code, reason = "large pages are requested on Linux only")
@@ -39,7 +40,8 @@ enum Memory {
 const LARGE_PAGE: usize = 2 << 20;
 
 impl Owned {
-    /// Zero bytes. `None` when there is not enough memory: the length comes from a file, so allocation must not abort.
+    /// Zero bytes. `None` when there is not enough memory: the length comes from a file, so
+    /// allocation must not abort.
     pub(super) fn zeroed(length: usize) -> Option<Self> {
         if length >= 2 * LARGE_PAGE
             && let Some(memory) = large_pages(length)
@@ -68,8 +70,8 @@ impl Owned {
     }
 }
 
-/// Zero bytes from the start of a large page on; `None` where there are none. Rays visit a model in no order of addresses: with
-/// small pages most of their cache misses are TLB misses too.
+/// Zero bytes from the start of a large page on; `None` where there are none. Rays visit a model in
+/// no order of addresses: with small pages most of their cache misses are TLB misses too.
 fn large_pages(length: usize) -> Option<Memory> {
     #[cfg(target_os = "linux")]
     {
@@ -102,7 +104,8 @@ impl Buffer {
         Ok(Buffer::Owned(owned))
     }
 
-    /// Reads a whole file. The header is checked first, so that a file of another format is not read to its end.
+    /// Reads a whole file. The header is checked first, so that a file of another format is not
+    /// read to its end.
     pub(super) fn read(path: &Path) -> Result<Self> {
         let io = |e| Error::io(path, e);
         let (mut file, length) = open(path)?;
@@ -121,24 +124,25 @@ impl Buffer {
     /// Maps a whole file.
     ///
     /// # Safety
-    /// Until the buffer is dropped nobody, in this process or another, may write to the file, truncate it or punch holes
-    /// into it.
+    /// Until the buffer is dropped nobody, in this process or another, may write to the file,
+    /// truncate it or punch holes into it.
     #[allow(unsafe_code)]
     pub(super) unsafe fn map(path: &Path) -> Result<Self> {
         let (file, length) = open(path)?;
         if length == 0 {
             return Self::copy(&[]);
         }
-        // SAFETY: the bytes of a `Mmap` must neither change nor become inaccessible while references to them live. The map
-        // is read-only and owned by this buffer, which lends references for its own lifetime only, and the caller promises
-        // that nobody changes or shrinks the file before the buffer is dropped.
+        // SAFETY: the bytes of a `Mmap` must neither change nor become inaccessible while
+        // references to them live. The map is read-only and owned by this buffer, which lends
+        // references for its own lifetime only, and the caller promises that nobody changes or
+        // shrinks the file before the buffer is dropped.
         let map = unsafe { Mmap::map(&file) }.map_err(|e| Error::io(path, e))?;
         Ok(Buffer::Mapped(map))
     }
 }
 
-/// Opens a regular file and returns its length in bytes. Pipes and devices, which may block or have no end, are refused before
-/// they are opened.
+/// Opens a regular file and returns its length in bytes. Pipes and devices, which may block or have
+/// no end, are refused before they are opened.
 fn open(path: &Path) -> Result<(std::fs::File, u64)> {
     let io = |e| Error::io(path, e);
     let found = std::fs::metadata(path).map_err(io)?;

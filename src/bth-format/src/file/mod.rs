@@ -1,14 +1,16 @@
-//! A BTH file in memory: read or mapped, its header and section table checked. Specification: "Container" and "Opening".
+//! A BTH file in memory: read or mapped, its header and section table checked. Specification:
+//! "Container" and "Opening".
 //!
-//! Opening costs O(sections) beyond reading the bytes, and does not read what is in the sections. [`File::check`] checks the
-//! indices of an object, [`File::check_scene`] those of the scene, [`crate::verify`] everything.
+//! Opening costs O(sections) beyond reading the bytes, and does not read what is in the sections.
+//! [`File::check`] checks the indices of an object, [`File::check_scene`] those of the scene,
+//! [`crate::verify`] everything.
 
 mod buffer;
-mod deformed;
+mod deformable;
 mod sections;
 mod table;
 
-pub use deformed::{DeformedObject, Normals, RefitParts};
+pub use deformable::{DeformableObject, Normals, RefitParts};
 pub use table::{content_id, hash128, kind_stride};
 
 use crate::Identity;
@@ -21,15 +23,16 @@ use std::path::Path;
 use std::sync::{Arc, OnceLock};
 use zerocopy::{FromBytes, Immutable, KnownLayout};
 
-/// An open file whose header and section table have been checked: `BTH-F001` to `BTH-F019` and `BTH-F022` hold. Clones share
-/// the memory or the mapping, which lasts as long as the last of them.
+/// An open file whose header and section table have been checked: `BTH-F001` to `BTH-F019` and
+/// `BTH-F022` hold. Clones share the memory or the mapping, which lasts as long as the last of
+/// them.
 #[derive(Clone, Debug)]
 pub struct File {
     buffer: Arc<Buffer>,
     /// Per object and kind the row of the section table, or `NONE`.
     rows: Arc<[[u32; OBJECT_KINDS]]>,
-    /// Per object its view, once it has been made. Views borrow from `buffer`; `'static` stands in for a lifetime that
-    /// cannot be named: see [`File::first_view`].
+    /// Per object its view, once it has been made. Views borrow from `buffer`; `'static` stands in
+    /// for a lifetime that cannot be named: see [`File::first_view`].
     views: Arc<[OnceLock<ObjectView<'static>>]>,
 }
 
@@ -45,7 +48,8 @@ pub struct SectionView<'a> {
     pub bytes: &'a [u8],
 }
 
-/// Memory for the bytes of a file that a caller writes there, so that they need not be copied once more ([`File::from_memory`]).
+/// Memory for the bytes of a file that a caller writes there, so that they need not be copied once
+/// more ([`File::from_memory`]).
 #[derive(Debug)]
 pub struct FileMemory(buffer::Owned);
 
@@ -68,14 +72,15 @@ impl File {
     /// Reads a file into memory and checks the header and the section table.
     ///
     /// # Errors
-    /// `BTH-O001` when the file cannot be read, `BTH-O002` on big-endian machines, `BTH-F001` to `BTH-F019` or `BTH-F022` for
-    /// the first invariant that the file violates.
+    /// `BTH-O001` when the file cannot be read, `BTH-O002` on big-endian machines, `BTH-F001` to
+    /// `BTH-F019` or `BTH-F022` for the first invariant that the file violates.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         Buffer::read(path).and_then(Self::new).map_err(|e| e.in_file(path))
     }
 
-    /// Copies the bytes of a file, which need no alignment, and checks the header and the section table.
+    /// Copies the bytes of a file, which need no alignment, and checks the header and the section
+    /// table.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -94,8 +99,9 @@ impl File {
     /// Maps a file and checks the header and the section table. Pages are read when they are used.
     ///
     /// # Safety
-    /// Until the `File` and its clones are dropped nobody, in this process or another, may write to the file, truncate it or punch holes
-    /// into it. Renaming another file over it or removing its name is allowed: the mapping keeps the old content.
+    /// Until the `File` and its clones are dropped nobody, in this process or another, may write to
+    /// the file, truncate it or punch holes into it. Renaming another file over it or removing its
+    /// name is allowed: the mapping keeps the old content.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -145,7 +151,8 @@ impl File {
         self.table().iter().map(|entry| self.section_of(entry))
     }
 
-    /// The section of a kind; `object` is [`NONE`] for sections of the whole file. `None` when the file lacks it.
+    /// The section of a kind; `object` is [`NONE`] for sections of the whole file. `None` when the
+    /// file lacks it.
     pub fn section(&self, object: u32, kind: u32) -> Option<SectionView<'_>> {
         let table = self.table();
         let entry = match self.rows.get(object as usize).and_then(|kinds| kinds.get(kind as usize)) {
@@ -167,33 +174,36 @@ impl File {
         self.rows.len() as u32
     }
 
-    /// BLAKE3 of what the sections hold, provenance left out: equal for files that answer all rays equally. Specification:
-    /// "Content id".
+    /// BLAKE3 of what the sections hold, without provenance: equal for files that answer all rays
+    /// equally. Specification: "Content id".
     pub fn content_id(&self) -> [u8; 32] {
         self.header().content_id
     }
 
-    /// The PROVENANCE section, JSON by the specification; `None` when the file lacks it or it is not UTF-8.
+    /// The PROVENANCE section, JSON by the specification; `None` when the file lacks it or it is
+    /// not UTF-8.
     pub fn provenance(&self) -> Option<&str> {
         std::str::from_utf8(self.section(NONE, kind::PROVENANCE)?.bytes).ok()
     }
 
-    /// Bytes of the sections that tracing reads; attributes, positions and provenance are not among them.
+    /// Bytes of the sections that tracing reads; attributes, positions and provenance are not among
+    /// them.
     pub fn resident_bytes(&self) -> u64 {
         let traced = |e: &&SectionEntry| e.object != NONE && kind::is_traced(e.kind);
         self.table().iter().filter(traced).map(|e| e.length).sum()
     }
 
-    /// The sections of an object, whose **indices are not checked**: use [`Self::check`] before tracing.
+    /// The sections of an object, whose **indices are not checked**: use [`Self::check`] before
+    /// tracing.
     ///
     /// # Errors
-    /// `BTH-O003` when there is no such object, `BTH-F101` when the kind of its tetrahedron records is not that of TETS,
-    /// `BTH-F104` when its grid is none or is not announced in the header.
+    /// `BTH-O003` when there is no such object, `BTH-F101` when the kind of its tetrahedron records
+    /// is not that of TETS, `BTH-F104` when its grid is none or is not announced in the header.
     pub fn object(&self, object: u32) -> Result<ObjectView<'_>> {
         self.view(object).copied()
     }
 
-    /// Whether the file is mapped, so that reading bytes may wait for the disk.
+    /// Returns true if the file is mapped, so that reading bytes may wait for the disk.
     pub fn is_mapped(&self) -> bool {
         matches!(*self.buffer, Buffer::Mapped(_))
     }
@@ -211,7 +221,8 @@ impl File {
         }
     }
 
-    /// The view of the only object, if the file has only one and [`Self::view`] has made its view before.
+    /// The view of the only object, if the file has only one and [`Self::view`] has made its view
+    /// before.
     #[inline(always)]
     pub fn sole_view(&self) -> Option<&ObjectView<'_>> {
         match &*self.views {
@@ -225,11 +236,12 @@ impl File {
     #[allow(unsafe_code)]
     fn first_view(&self, object: u32) -> Result<&ObjectView<'_>> {
         let view = self.make_view(object)?;
-        // SAFETY: only the lifetime changes. The view borrows from the bytes of `buffer`, which are on the heap or mapped:
-        // they do not move when `self` does, are never written to or replaced, and live until `self` and all its clones are
-        // dropped. `views` is private and shared only with clones, which share `buffer`, too; what leaves this type is shortened
-        // to a borrow of `self`, so no view is used after `buffer` is gone. A view has no destructor, so the order in which
-        // the fields of `self` are dropped does not matter.
+        // SAFETY: only the lifetime changes. The view borrows from the bytes of `buffer`, which are
+        // on the heap or mapped: they do not move when `self` does, are never written to or
+        // replaced, and live until `self` and all its clones are dropped. `views` is private and
+        // shared only with clones, which share `buffer`, too; what leaves this type is shortened to
+        // a borrow of `self`, so no view is used after `buffer` is gone. A view has no destructor,
+        // so the order in which the fields of `self` are dropped does not matter.
         let view = unsafe { std::mem::transmute::<ObjectView<'_>, ObjectView<'static>>(view) };
         Ok(self.views[object as usize].get_or_init(|| view))
     }
@@ -315,12 +327,12 @@ impl File {
         Ok(grid)
     }
 
-    /// The sections of an object, after checking every index in them: traversing it neither reads out of bounds nor loops.
-    /// Costs O(bytes of the object).
+    /// The sections of an object, after checking every index in them: traversing it neither reads
+    /// out of bounds nor loops. Costs O(bytes of the object).
     ///
     /// # Errors
-    /// As [`Self::object`], `BTH-F101` to `BTH-F147`, `BTH-F149`, `BTH-F160`, `BTH-F161`, `BTH-F163` to `BTH-F171` and `BTH-F173` to
-    /// `BTH-F179`.
+    /// As [`Self::object`], `BTH-F101` to `BTH-F147`, `BTH-F149`, `BTH-F160`, `BTH-F161`,
+    /// `BTH-F163` to `BTH-F171` and `BTH-F173` to `BTH-F179`.
     pub fn check(&self, object: u32) -> Result<ObjectView<'_>> {
         let view = self.object(object)?;
         check::object(&view).map_err(|e| self.locate(e, object))?;
@@ -343,15 +355,15 @@ impl File {
         self.slice(NONE, kind::INSTANCES)
     }
 
-    /// The same error with its offset counted from the start of the file instead of that of its section, which belongs to
-    /// `object`.
+    /// The same error with its offset counted from the start of the file instead of that of its
+    /// section, which belongs to `object`.
     pub fn locate(&self, error: Error, object: u32) -> Error {
         let start = error.section().and_then(|s| self.section(object, s.kind)).map_or(0, |s| s.entry.offset);
         error.in_object(object).move_by(start)
     }
 
     /// A section as a slice of its elements; empty when the file lacks it.
-    fn slice<T: FromBytes + KnownLayout + Immutable>(&self, object: u32, kind: u32) -> &[T] {
+    pub(crate) fn slice<T: FromBytes + KnownLayout + Immutable>(&self, object: u32, kind: u32) -> &[T] {
         let Some(section) = self.section(object, kind) else { return &[] };
         <[T]>::ref_from_bytes(section.bytes)
             .ok()

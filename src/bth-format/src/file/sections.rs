@@ -1,55 +1,35 @@
-//! What belongs to objects and to the whole file beside what is traced: materials, movements, names and the scene, and the
-//! checks of their indices.
+//! Sections that no traversal reads: materials, movements, names and the scene, and the checks of
+//! their indices.
 
 use super::File;
 use crate::check;
-use crate::deformation_view::DeformationView;
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
-use crate::materials_view::{ImagesView, MaterialsView};
 use crate::names;
-use crate::scene_view::SceneView;
-use crate::sequence_view::SequenceView;
+use crate::view::{DeformationView, ImagesView, MaterialsView, SceneView, SequenceView};
 
 impl File {
-    /// What moves the vertices of an object, whose **indices are not checked**; empty where nothing does or there is no such
-    /// object.
+    /// What moves the vertices of an object, whose **indices are not checked**; empty where nothing
+    /// does or there is no such object.
     pub fn deformation(&self, object: u32) -> DeformationView<'_> {
-        DeformationView {
-            rows: self.slice(object, kind::DEFORMATION),
-            joints: self.slice(object, kind::JOINTS),
-            weights: self.slice(object, kind::JOINT_WEIGHTS),
-            morphs: self.slice(object, kind::MORPHS),
-            morph_rows: self.slice(object, kind::MORPH_ROWS),
-            deltas: self.slice(object, kind::MORPH_DELTAS),
-        }
+        DeformationView::of(self, object)
     }
 
-    /// The materials and vertex colours of an object, whose **indices are not checked**; empty where the file keeps none or
-    /// there is no such object.
+    /// The materials and vertex colours of an object, whose **indices are not checked**; empty
+    /// where the file keeps none or there is no such object.
     pub fn materials(&self, object: u32) -> MaterialsView<'_> {
-        MaterialsView {
-            parameters: self.slice(object, kind::MATERIAL_PARAMETERS),
-            textures: self.slice(object, kind::TEXTURES),
-            color_corners: self.slice(object, kind::COLOR_CORNERS),
-            colors: self.slice(object, kind::COLORS),
-            second_corners: self.slice(object, kind::SECOND_CORNERS),
-            second_uvs: self.slice(object, kind::SECOND_UVS),
-        }
+        MaterialsView::of(self, object)
     }
 
-    /// How the vertices of an object move by themselves, whose **indices are not checked**; empty where they do not or there is no
-    /// such object.
+    /// How the vertices of an object move by themselves, whose **indices are not checked**; empty
+    /// where they do not or there is no such object.
     pub fn sequence(&self, object: u32) -> SequenceView<'_> {
-        SequenceView {
-            times: self.slice(object, kind::SEQUENCE_TIMES),
-            positions: self.slice(object, kind::SEQUENCE_POSITIONS),
-        }
+        SequenceView::of(self, object)
     }
 
     /// The images of all textures, whose **indices are not checked**.
     pub fn images(&self) -> ImagesView<'_> {
-        ImagesView { images: self.slice(NONE, kind::IMAGES), bytes: self.slice(NONE, kind::IMAGE_BYTES) }
+        ImagesView::of(self, NONE)
     }
 
     /// Checks the images and that textures have one. Costs O(textures and images).
@@ -97,28 +77,15 @@ impl File {
         }
     }
 
-    /// The scene sections, whose **indices are not checked**; `None` when the file has none of them.
+    /// The scene sections, whose **indices are not checked**; `None` when the file has none of
+    /// them.
     pub fn scene(&self) -> Option<SceneView<'_>> {
         (kind::SCENE..=kind::MORPH_WEIGHTS).find(|kind| self.section(NONE, *kind).is_some())?;
-        Some(SceneView {
-            scene: self.slice(NONE, kind::SCENE),
-            nodes: self.slice(NONE, kind::NODES),
-            instances: self.slice(NONE, kind::INSTANCES),
-            tracks: self.slice(NONE, kind::TRACKS),
-            times: self.slice(NONE, kind::TIMES),
-            values: self.slice(NONE, kind::VALUES),
-            cameras: self.slice(NONE, kind::CAMERAS),
-            lights: self.slice(NONE, kind::LIGHTS),
-            names: self.slice(NONE, kind::NAMES),
-            deformers: self.slice(NONE, kind::DEFORMERS),
-            skins: self.slice(NONE, kind::SKINS),
-            skin_joints: self.slice(NONE, kind::SKIN_JOINTS),
-            morph_weights: self.slice(NONE, kind::MORPH_WEIGHTS),
-        })
+        Some(SceneView::of(self, NONE))
     }
 
-    /// The scene sections, after checking every index in them; `None` when the file has none of them. Costs O(bytes of these
-    /// sections).
+    /// The scene sections, after checking every index in them; `None` when the file has none of
+    /// them. Costs O(bytes of these sections).
     ///
     /// # Errors
     /// The first violation of `BTH-F150` to `BTH-F159` and `BTH-F180` to `BTH-F186`.

@@ -1,4 +1,5 @@
-//! The wide BVH: nodes and triangle leaves, in lines of 64 bytes. Specification: "Child codes" to "RawLeaf".
+//! The wide BVH: nodes and triangle leaves, in lines of 64 bytes. Specification: "Child codes" to
+//! "RawLeaf".
 
 use super::assert_layout::assert_layout;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
@@ -8,15 +9,17 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 #[repr(C, align(64))]
 pub struct CacheLine(pub [u32; 16]);
 
-/// What a child code leads to. Codes are `u32`: bits 31 to 29 are the kind of child, with bit 31 set for leaves; bits 28 to
-/// 0 are an index. [`super::NONE`] is an empty slot.
+/// What a child code leads to. Codes are `u32`: bits 31 to 29 are the kind of child, with bit 31
+/// set for leaves; bits 28 to 0 are an index. [`super::NONE`] is an empty slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Child {
     /// Line of a [`WideNode`].
     Node(u32),
-    /// Line of an [`IndexedLeaf`]; on a grid the half line of an [`super::IndexedLeaf16`] or [`super::IndexedLeaf21`].
+    /// Line of an [`IndexedLeaf`]; on a grid the half line of an [`super::IndexedLeaf16`] or
+    /// [`super::IndexedLeaf21`].
     Indexed(u32),
-    /// Line of a [`RawLeaf`]; on a grid the half line of a [`super::RawLeaf16`] or [`super::RawLeaf21`].
+    /// Line of a [`RawLeaf`]; on a grid the half line of a [`super::RawLeaf16`] or
+    /// [`super::RawLeaf21`].
     Raw(u32),
     /// Row of `TET_LEAVES`.
     Tets(u32),
@@ -54,8 +57,8 @@ impl Child {
 /// Slots of a node for children, and of a leaf for triangles and for vertices.
 pub const WIDTH: usize = 16;
 
-/// Inner node of the wide BVH: 7 lines. Used slots come first; an empty slot has lower ends of `f32::MAX`, upper ends of
-/// `-f32::MAX` and child [`super::NONE`].
+/// Inner node of the wide BVH: 7 lines. Used slots come first; an empty slot has lower ends of
+/// `f32::MAX`, upper ends of `-f32::MAX` and child [`super::NONE`].
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct WideNode {
@@ -71,7 +74,8 @@ pub struct WideNode {
 pub struct IndexedLeaf {
     /// `[axis][vertex]`, object space; unused slots repeat vertex 0.
     pub vertex: [[f32; WIDTH]; 3],
-    /// `[corner][triangle]`: vertices of each triangle, in the order of the source; unused slots are 0.
+    /// `[corner][triangle]`: vertices of each triangle, in the order of the source; unused slots
+    /// are 0.
     pub corner: [[u8; WIDTH]; 3],
     /// Row of `TRIANGLE_IDS` of the first triangle; the others follow.
     pub first: u32,
@@ -98,7 +102,8 @@ pub struct RawLeaf {
 }
 
 impl IndexedLeaf {
-    /// Corners of the triangle in a slot. Panics where a corner is no vertex; after [`crate::File::check`] all are.
+    /// Corners of the triangle in a slot. Panics where a corner is no vertex; after
+    /// [`crate::File::check`] all are.
     pub(crate) fn triangle(&self, slot: usize) -> [[f32; 3]; 3] {
         self.corner.map(|vertices| self.vertex.map(|row| row[vertices[slot] as usize]))
     }

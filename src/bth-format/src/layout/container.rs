@@ -3,8 +3,8 @@
 use super::assert_layout::assert_layout;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// First bytes of every file. The non-ASCII byte, CR LF, 0x1A and LF reveal a transfer that treated the file as text;
-/// the digit is the major version.
+/// First bytes of every file. The non-ASCII byte, CR LF, 0x1A and LF reveal a transfer that treated
+/// the file as text; the digit is the major version.
 pub const IDENTIFIER: [u8; 16] = *b"\x89BTH1\r\n\x1a\n\0\0\0\0\0\0\0";
 /// Format version written by this library: major in the high half, minor in the low.
 pub const WRITER_VERSION: u32 = 0x0001_0000;
@@ -31,11 +31,13 @@ pub struct Header {
     pub section_count: u32,
     /// Zero.
     pub reserved: u32,
-    /// Bits that a reader must know to read the file: [`FEATURE_GRID`] and [`FEATURE_WIDENED_BOXES`].
+    /// Bits that a reader must know to read the file: [`FEATURE_GRID`] and
+    /// [`FEATURE_WIDENED_BOXES`].
     pub required_features: u64,
     /// Bits that a reader may ignore; none is assigned.
     pub optional_features: u64,
-    /// BLAKE3 (256 bits) of what the sections hold, provenance left out. Specification: "Content id".
+    /// BLAKE3 (256 bits) of what the sections hold, without provenance. Specification: "Content
+    /// id".
     pub content_id: [u8; 32],
     /// BLAKE3 (first 128 bits) of the section table.
     pub table_hash: [u8; 16],
@@ -43,7 +45,8 @@ pub struct Header {
     pub header_hash: [u8; 16],
 }
 
-/// One entry of the section table. Entries ascend strictly by (object, kind). Specification: "SectionEntry".
+/// One entry of the section table. Entries ascend strictly by (object, kind). Specification:
+/// "SectionEntry".
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct SectionEntry {
@@ -69,20 +72,24 @@ pub struct SectionEntry {
     pub hash: [u8; 16],
 }
 
-/// Bit of [`Header::required_features`]: an object stores the coordinates of its triangle leaves on a [`super::Grid`].
+/// Bit of [`Header::required_features`]: an object stores the coordinates of its triangle leaves on
+/// a [`super::Grid`].
 pub const FEATURE_GRID: u64 = 1;
 
-/// Bit of [`Header::required_features`] of older files: child boxes are quantized to bytes. Such files are refused.
+/// Bit of [`Header::required_features`] of older files: child boxes are quantized to bytes. Such
+/// files are refused.
 pub(crate) const FEATURE_BYTE_BOXES: u64 = 2;
 
-/// Bit of [`Header::required_features`] of older files: an object that can be given new positions has tet leaves. Such files are
-/// refused. Bit 2 is not assigned.
+/// Bit of [`Header::required_features`] of older files: an object that can be given new positions
+/// has tet leaves. Such files are refused. Bit 2 is not assigned.
 pub(crate) const FEATURE_DEFORMABLE_TETS: u64 = 8;
 
-/// Bit of [`Header::required_features`]: the boxes of an object are widened, see [`super::WIDENED_BOXES`].
+/// Bit of [`Header::required_features`]: the boxes of an object are widened, see
+/// [`super::WIDENED_BOXES`].
 pub const FEATURE_WIDENED_BOXES: u64 = 16;
 
-/// Bit of [`SectionEntry::flags`]: a reader that does not know the section's kind must refuse the file.
+/// Bit of [`SectionEntry::flags`]: a reader that does not know the section's kind must refuse the
+/// file.
 pub const SECTION_REQUIRED: u32 = 1;
 
 assert_layout! {

@@ -7,26 +7,26 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 pub const FREE_SIDE: usize = 11;
 /// Direction bins of a triangle.
 pub const FREE_BINS: usize = FREE_SIDE * FREE_SIDE;
-/// Squares of the slopes at which columns meet: tan²(k π / 22) for k = 1, 3, 5, 7, 9, rounded. Columns are equally wide in terms of
-/// the angle that a direction is tilted by along an axis.
+/// Squares of the slopes at which columns meet: tan²(k π / 22) for k = 1, 3, 5, 7, 9, rounded.
+/// Columns are equally wide in terms of the angle that a direction is tilted by along an axis.
 pub const FREE_BORDERS: [f64; 5] =
     [0.020672197824104982, 0.20856091329926152, 0.750830798121458, 2.4212305216220913, 11.598705569133076];
-/// Greatest slope of the directions of bins.
+/// Max slope of the directions of bins.
 pub const FREE_STEEPEST: f64 = 16.0;
-/// How far the promise of a bin reaches beyond its borders: slopes s reach to s ± margin (1 + s²), which is that angle. A reader may
-/// therefore compute slopes with rounding errors.
+/// How far the promise of a bin reaches beyond its borders: slopes s reach to s ± margin (1 + s²),
+/// which is that angle. A reader may therefore compute slopes with rounding errors.
 pub const FREE_MARGIN: f64 = 1.0 / 512.0;
 /// Lengths of the edges at the first corner of a triangle whose directions are known.
 pub const FREE_EDGES: [f64; 2] = [1.0 / (1u64 << 20) as f64, (1u64 << 20) as f64];
-/// Least sine of the angle between these edges: rounding errors in f32 stay below the margin.
+/// Min sine of the angle between these edges: rounding errors in f32 stay below the margin.
 pub const FREE_LEAST_SINE: f64 = 1.0 / 128.0;
 /// Sectors of directions, into which columns and rows of bins are joined: four by four.
 pub const FREE_SECTORS: usize = 16;
-/// For each column of bins that of its sector, and the same for rows. The outermost ones, in which directions are nearly always blocked
-/// at once, have none.
+/// For each column of bins that of its sector, and the same for rows. The outermost ones, in which
+/// directions are nearly always blocked at once, have none.
 pub const FREE_SECTOR_OF: [Option<usize>; FREE_SIDE] =
     [None, Some(0), Some(0), Some(1), Some(1), Some(1), Some(2), Some(2), Some(3), Some(3), None];
-/// The least and greatest distance of a level: squares of them neither vanish nor overflow.
+/// The min and max distance of a level: squares of them neither vanish nor overflow.
 pub const FREE_DISTANCE_RANGE: [f32; 2] = [1.0 / (1u64 << 50) as f32, (1u64 << 50) as f32];
 
 /// A row of `FREE_DIRECTIONS`, by triangle id.
@@ -70,29 +70,30 @@ pub struct FreeBins(pub u128);
 impl FreeBins {
     /// The bits of all bins.
     pub const ALL: u128 = (1 << FREE_BINS) - 1;
-    /// Set where directions are those on the back of the triangle, from which its corners are seen clockwise.
+    /// Set where directions are those on the back of the triangle, from which its corners are seen
+    /// clockwise.
     pub const BACK: u128 = 1 << 126;
 
-    /// Whether directions are those on the back.
+    /// Returns true if directions are those on the back.
     #[inline(always)]
     pub const fn is_back(self) -> bool {
         self.0 & Self::BACK != 0
     }
 
-    /// Whether a bin is free.
+    /// Returns true if a bin is free.
     #[inline(always)]
     pub const fn is_free(self, bin: usize) -> bool {
         bin < FREE_BINS && self.0 >> bin & 1 == 1
     }
 }
 
-/// A level for each sector, from 0 to 3: nothing is met within the distance of the level; of level 0 nothing is known. Bits 0 to 15 are
-/// the low bits of the levels, bits 16 to 31 the high ones.
+/// A level for each sector, from 0 to 3: nothing is met within the distance of the level; of level
+/// 0 nothing is known. Bits 0 to 15 are the low bits of the levels, bits 16 to 31 the high ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FreeSectors(pub u32);
 
 impl FreeSectors {
-    /// The greatest level.
+    /// The max level.
     pub const LEVELS: usize = 3;
 
     /// The sector of a bin, if it has one.
@@ -166,7 +167,7 @@ pub struct KnownFree {
 }
 
 impl KnownFree {
-    /// Whether nothing is known.
+    /// Returns true if nothing is known.
     pub fn is_nothing(&self) -> bool {
         self.sectors == [FreeSectors(0); 2] && self.bins == FreeBins(0)
     }
@@ -188,8 +189,9 @@ impl From<&FreeDistances> for KnownFree {
     }
 }
 
-/// Axes of the directions of a triangle with corners a, b, c, not normalized: b - a, normal × (b - a), and the normal
-/// (b - a) × (c - a). `None` for a triangle whose rounding errors may exceed the margin.
+/// Axes of the directions of a triangle with corners a, b, c, not normalized: b - a, normal × (b -
+/// a), and the normal (b - a) × (c - a). `None` for a triangle whose rounding errors may exceed the
+/// margin.
 pub fn free_axes(corners: [[f32; 3]; 3]) -> Option<[[f64; 3]; 3]> {
     let [a, b, c] = corners.map(|p| p.map(f64::from));
     let minus = |p: [f64; 3], q: [f64; 3]| [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
@@ -206,8 +208,8 @@ pub fn free_axes(corners: [[f32; 3]; 3]) -> Option<[[f64; 3]; 3]> {
     (is_wide && edges.into_iter().all(is_usable)).then(|| [first, cross(normal, first), normal])
 }
 
-/// The bin of a direction that leaves a triangle with these axes on its front, and whether it leaves it on its back; `None` for
-/// directions that are too steep.
+/// The bin of a direction that leaves a triangle with these axes on its front, and whether it
+/// leaves it on its back; `None` for directions that are too steep.
 pub fn free_bin(axes: &[[f64; 3]; 3], direction: [f64; 3]) -> Option<(usize, bool)> {
     let dot = |p: [f64; 3], q: [f64; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
     let [x, y, z] = axes.map(|axis| dot(direction, axis) / dot(axis, axis).sqrt());
@@ -222,7 +224,7 @@ pub fn free_bin(axes: &[[f64; 3]; 3], direction: [f64; 3]) -> Option<(usize, boo
     Some((FREE_SIDE * column(y)? + column(x)?, z < 0.0))
 }
 
-/// Least and greatest slope of the promise of a column, with the margin.
+/// Min and max slope of the promise of a column, with the margin.
 pub fn free_column(column: usize) -> [f64; 2] {
     // The border between columns i and i + 1 is at the tilt (2 i - 9) π / 22.
     let border = |k: isize| {

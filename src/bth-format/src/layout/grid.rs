@@ -1,5 +1,5 @@
-//! The grid of an object: the points that 16 or 21 bits a coordinate can stand for, each an `f32` without rounding.
-//! Specification: "Grids".
+//! The grid of an object: the points that 16 or 21 bits a coordinate can stand for, each an `f32`
+//! without rounding. Specification: "Grids".
 
 use super::bvh::WIDTH;
 use super::grid_leaves::{HALF_LINE, IndexedLeaf16, IndexedLeaf21, RawLeaf16, RawLeaf21};
@@ -27,20 +27,21 @@ impl GridBits {
         }
     }
 
-    /// The greatest number of steps from the origin.
+    /// The max number of steps from the origin.
     pub const fn max_steps(self) -> u32 {
         (1 << self as u32) - 1
     }
 }
 
-/// The points that a vertex can be: per axis `origin + k * step`, with k from 0 to [`GridBits::max_steps`]. Steps are powers
-/// of two, the origin is a multiple of the step, and no point is more than 2^24 steps from 0: so every coordinate is an
-/// `f32`, and computing it takes no rounding.
+/// The points that a vertex can be: per axis `origin + k * step`, with k from 0 to
+/// [`GridBits::max_steps`]. Steps are powers of two, the origin is a multiple of the step, and no
+/// point is more than 2^24 steps from 0: so every coordinate is an `f32`, and computing it takes no
+/// rounding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
     /// Bits of a coordinate of a triangle leaf on a grid.
     pub bits: GridBits,
-    /// The least point, object space.
+    /// The min point, object space.
     pub origin: [f32; 3],
     /// Distance of neighbouring points, per axis, object space.
     pub step: [f32; 3],
@@ -78,7 +79,7 @@ impl Grid {
         Ok(Some(grid))
     }
 
-    /// Whether every coordinate of an axis is an `f32`.
+    /// Returns true if every coordinate of an axis is an `f32`.
     pub fn is_exact(&self, axis: usize) -> bool {
         is_exact(self.origin[axis], self.step[axis], self.bits.max_steps())
     }
@@ -89,8 +90,9 @@ impl Grid {
         (u32::from_le_bytes([self.bits as u32 as u8, exponent(0), exponent(1), exponent(2)]), self.origin)
     }
 
-    /// Steps from the origin to the multiple of the step nearest to a coordinate, ties to the even multiple. Below 0 or above
-    /// [`GridBits::max_steps`] where the coordinate lies outside the grid.
+    /// Steps from the origin to the multiple of the step nearest to a coordinate, ties to the even
+    /// multiple. Below 0 or above [`GridBits::max_steps`] where the coordinate lies outside the
+    /// grid.
     pub fn steps(&self, axis: usize, x: f32) -> i64 {
         let step = f64::from(self.step[axis]);
         // Quotients of f32 by powers of two that are f32 are exact in f64.
@@ -134,7 +136,8 @@ impl Grid {
     }
 }
 
-/// Whether `origin + k * step` is an `f32` for all k from 0 to `max_steps`. The step has to be a power of two.
+/// Returns true if `origin + k * step` is an `f32` for all k from 0 to `max_steps`. The step has to
+/// be a power of two.
 pub fn is_exact(origin: f32, step: f32, max_steps: u32) -> bool {
     let step = f64::from(step);
     let first = f64::from(origin) / step;
@@ -143,7 +146,8 @@ pub fn is_exact(origin: f32, step: f32, max_steps: u32) -> bool {
     multiples && last * step <= f64::from(f32::MAX)
 }
 
-/// Steps from the low bits of an axis and the high bits of all axes, as [`IndexedLeaf21::high`] has them.
+/// Steps from the low bits of an axis and the high bits of all axes, as [`IndexedLeaf21::high`] has
+/// them.
 #[inline(always)]
 fn steps_21(axis: usize, low: u16, high: u16) -> u32 {
     u32::from(low) | (u32::from(high) >> (5 * axis) & 31) << 16

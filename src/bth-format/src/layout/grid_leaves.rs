@@ -13,7 +13,8 @@ pub const HALF_LINE: usize = 32;
 pub struct IndexedLeaf16 {
     /// `[axis][vertex]`: steps from the grid's origin; unused slots repeat vertex 0.
     pub vertex: [[u16; WIDTH]; 3],
-    /// `[corner][i]`: vertices of triangles i (low four bits) and i + 8 (high four bits); unused slots are 0.
+    /// `[corner][i]`: vertices of triangles i (low four bits) and i + 8 (high four bits); unused
+    /// slots are 0.
     pub corner: [[u8; WIDTH / 2]; 3],
     /// Row of `TRIANGLE_IDS` of the first triangle; the others follow.
     pub first: u32,
@@ -31,7 +32,8 @@ pub struct IndexedLeaf16 {
 pub struct IndexedLeaf21 {
     /// `[axis][vertex]`: the low 16 bits, as in [`IndexedLeaf16`].
     pub vertex: [[u16; WIDTH]; 3],
-    /// The high five bits of x in bits 0 to 4, of y in bits 5 to 9, of z in bits 10 to 14; bit 15 is zero.
+    /// The high five bits of x in bits 0 to 4, of y in bits 5 to 9, of z in bits 10 to 14; bit 15
+    /// is zero.
     pub high: [u16; WIDTH],
     /// Vertices of the triangles, as in [`IndexedLeaf16`].
     pub corner: [[u8; WIDTH / 2]; 3],

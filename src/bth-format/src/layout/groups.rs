@@ -1,4 +1,5 @@
-//! Groups of triangles, their materials, and the names of objects. Specification: "Groups and names".
+//! Groups of triangles, their materials, and the names of objects. Specification: "Groups and
+//! names".
 
 use super::assert_layout::assert_layout;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
@@ -17,7 +18,8 @@ pub struct Group {
     pub reserved: u32,
 }
 
-/// Successive triangles of one group: those from `first` to the one before the next run's, or to the last.
+/// Successive triangles of one group: those from `first` to the one before the next run's, or to
+/// the last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct GroupRun {

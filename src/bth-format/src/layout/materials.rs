@@ -1,4 +1,5 @@
-//! How surfaces look: parameters of materials, textures and their images. Specification: "Materials".
+//! How surfaces look: parameters of materials, textures and their images. Specification:
+//! "Materials".
 
 use super::assert_layout::assert_layout;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
@@ -11,7 +12,7 @@ pub struct MaterialParameters {
     pub base_color: [f32; 4],
     /// Emitted radiance: linear red, green and blue.
     pub emissive: [f32; 3],
-    /// Least alpha at which there is a surface, in [`ALPHA_MASK`].
+    /// Min alpha at which there is a surface, in [`ALPHA_MASK`].
     pub alpha_cutoff: f32,
     /// [`ALPHA_OPAQUE`], [`ALPHA_MASK`] or [`ALPHA_BLEND`].
     pub alpha_mode: u32,

@@ -1,12 +1,13 @@
 //! The bytes of a `.bth` file, version 1: every structure on disk.
 //!
-//! `format-spec/README.md` is normative; a test compares its tables with these structures. All numbers are little-endian.
-//! Structures have no padding and no pointers: a reference is an index, and [`NONE`] is no index.
+//! `format-spec/README.md` is normative; a test compares its tables with these structures. All
+//! numbers are little-endian. Structures have no padding and no pointers: a reference is an index,
+//! and [`NONE`] is no index.
 
 mod assert_layout;
 mod bvh;
 mod container;
-mod deformation;
+mod deformer;
 mod free;
 mod grid;
 mod grid_leaves;
@@ -21,7 +22,7 @@ mod tets;
 
 pub use bvh::*;
 pub use container::*;
-pub use deformation::*;
+pub use deformer::*;
 pub use free::*;
 pub use grid::*;
 pub use grid_leaves::*;

@@ -7,7 +7,8 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct Object {
-    /// Lower end of the bounds of the triangles that can be hit, object space; zeros when there are none.
+    /// Lower end of the bounds of the triangles that can be hit, object space; zeros when there are
+    /// none.
     pub lower: [f32; 3],
     /// Upper end of the bounds; zeros when there are none.
     pub upper: [f32; 3],
@@ -21,21 +22,24 @@ pub struct Object {
     pub dropped: u32,
     /// Upper bound on the nodes of a path from the root, through subtrees of tet leaves too.
     pub depth: u32,
-    /// Lowest byte: bits of a coordinate of a triangle leaf (16, 21, or 0 for `f32`), and [`WIDENED_BOXES`]. Above it a byte
-    /// per axis: the biased `f32` exponent of the grid's step, or 0 for `f32`. See [`super::Grid`].
+    /// Lowest byte: bits of a coordinate of a triangle leaf (16, 21, or 0 for `f32`), and
+    /// [`WIDENED_BOXES`]. Above it a byte per axis: the biased `f32` exponent of the grid's step,
+    /// or 0 for `f32`. See [`super::Grid`].
     pub coordinates: u32,
-    /// The grid's least point, object space; zeros for `f32`.
+    /// The grid's min point, object space; zeros for `f32`.
     pub grid_origin: [f32; 3],
-    /// Upper bound on the distance of a stored vertex from that of the source, object space; 0 for `f32`.
+    /// Upper bound on the distance of a stored vertex from that of the source, object space; 0 for
+    /// `f32`.
     pub displacement: f32,
 }
 
-/// Bit of [`Object::coordinates`]: each child box contains the triangles below with room to spare, for each corner [`BOX_MARGIN`] of its
-/// greatest |coordinate| on all sides. A reader need not allow for roundings of the boxes' planes then, only for those of the ray, so that
-/// small things in a large object are told apart.
+/// Bit of [`Object::coordinates`]: each child box contains the triangles below with room to spare,
+/// for each corner [`BOX_MARGIN`] of its max |coordinate| on all sides. A reader need not
+/// allow for roundings of the boxes' planes then, only for those of the ray, so that small things
+/// in a large object are told apart.
 pub const WIDENED_BOXES: u32 = 1 << 6;
 
-/// The room around a corner in a widened box, relative to the corner's greatest |coordinate|.
+/// The room around a corner in a widened box, relative to the corner's max |coordinate|.
 pub const BOX_MARGIN: f64 = 1.0 / (1 << 20) as f64;
 
 assert_layout! {

@@ -1,6 +1,6 @@
 //! Where triangles let rays pass. Specification: "Opacity".
 
-/// Whether a hit on a part of a triangle counts.
+/// True if a hit on a part of a triangle counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Opacity {
     /// There is a surface.
@@ -77,15 +77,18 @@ pub const fn opacity_words(level: u32) -> usize {
     (1usize << (2 * level)).div_ceil(MICRO_PER_WORD)
 }
 
-/// The number of the micro-triangle at barycentric coordinates, which are the weights of the second and third corner. Every
-/// pair of numbers gives a micro-triangle of the level, also such as are beyond the triangle or no numbers at all.
+/// The number of the micro-triangle at barycentric coordinates, which are the weights of the second
+/// and third corner. Every pair of numbers gives a micro-triangle of the level, also such as are
+/// beyond the triangle or no numbers at all.
 ///
-/// Row j holds the micro-triangles between v = j / n and v = (j + 1) / n, n being 2 to the power of the level: by
-/// ascending u in turn one that has the orientation of the triangle and one upside down.
+/// Row j holds the micro-triangles between v = j / n and v = (j + 1) / n, n being 2 to the power of
+/// the level: by ascending u in turn one that has the orientation of the triangle and one upside
+/// down.
 #[inline]
 pub fn micro_triangle(level: u32, u: f32, v: f32) -> u32 {
     let n = 1u32 << level;
-    // In f64 the products and their fractions are exact where they matter; what is no number becomes 0.
+    // In f64 the products and their fractions are exact where they matter; what is no number
+    // becomes 0.
     let (a, b) = (f64::from(u) * f64::from(n), f64::from(v) * f64::from(n));
     let j = (b as u32).min(n - 1);
     let i = (a as u32).min(n - 1 - j);
@@ -106,8 +109,8 @@ pub fn micro_corners(level: u32, micro: u32) -> [[u32; 2]; 3] {
     }
 }
 
-/// The opacity at barycentric coordinates of a triangle, given the rows of `OPACITY` and `OPACITY_MICRO`. Opaque for what these say
-/// nothing about.
+/// The opacity at barycentric coordinates of a triangle, given the rows of `OPACITY` and
+/// `OPACITY_MICRO`. Opaque for what these say nothing about.
 #[inline]
 pub fn opacity_at(rows: &[u32], words: &[u32], triangle: u32, u: f32, v: f32) -> Opacity {
     let Some(row) = rows.get(triangle as usize) else { return Opacity::Opaque };

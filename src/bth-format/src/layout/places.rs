@@ -4,8 +4,8 @@ use super::{Child, NONE};
 
 /// The place of a triangle: a triangle leaf and a slot in it.
 ///
-/// Its code, a row of `TRIANGLE_PLACES`, has bit 31 set for raw leaves. Bits 4 to 30 are the index in
-/// the child code of the leaf, bits 0 to 3 are the slot.
+/// Its code, a row of `TRIANGLE_PLACES`, has bit 31 set for raw leaves. Bits 4 to 30 are the index
+/// in the child code of the leaf, bits 0 to 3 are the slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TrianglePlace {
     /// The leaf, [`Child::Indexed`] or [`Child::Raw`].
@@ -20,7 +20,8 @@ impl TrianglePlace {
     /// Bit of a code that is set for raw leaves.
     pub const RAW: u32 = 1 << 31;
 
-    /// The code; [`NONE`] if the index of the leaf is too large, or if `leaf` is not a triangle leaf.
+    /// The code; [`NONE`] if the index of the leaf is too large, or if `leaf` is not a triangle
+    /// leaf.
     pub fn code(self) -> u32 {
         match self.leaf {
             Child::Indexed(index) if index < Self::INDEX_LIMIT => index << 4 | self.slot,

@@ -1,4 +1,5 @@
-//! The scene: instances of objects and how they move. Its sections belong to the whole file. Specification: "Scenes".
+//! The scene: instances of objects and how they move. Its sections belong to the whole file.
+//! Specification: "Scenes".
 
 use super::assert_layout::assert_layout;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
@@ -23,8 +24,9 @@ pub struct Scene {
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct Node {
-    /// From the node's space to its parent's, before tracks: translation (3), quaternion x, y, z, w (4), scale (3)
-    /// and two zeros; with [`NODE_MATRIX`] three rows of four, applied to columns (x, y, z, 1).
+    /// From the node's space to its parent's, before tracks: translation (3), quaternion x, y, z, w
+    /// (4), scale (3) and two zeros; with [`NODE_MATRIX`] three rows of four, applied to columns
+    /// (x, y, z, 1).
     pub transform: [f64; 12],
     /// Row of the parent, less than its own; [`super::NONE`] where the parent is the world.
     pub parent: u32,
@@ -38,7 +40,8 @@ pub struct Node {
     pub reserved: [u32; 4],
 }
 
-/// Flag of [`Node`]: it and all nodes below it are hidden, unless a visibility track of the node shows it.
+/// Flag of [`Node`]: it and all nodes below it are hidden, unless a visibility track of the node
+/// shows it.
 pub const NODE_HIDDEN: u32 = 1;
 /// Flag of [`Node`]: the transform is a matrix.
 pub const NODE_MATRIX: u32 = 2;
@@ -69,10 +72,11 @@ pub struct Track {
     pub interpolation: u32,
     /// Number of keys.
     pub keys: u32,
-    /// Row of `TIMES` of the first key. In this section and in `VALUES`, the ranges of successive tracks follow each other.
+    /// Row of `TIMES` of the first key. In this section and in `VALUES`, the ranges of successive
+    /// tracks follow each other.
     pub first_time: u32,
-    /// Row of `VALUES` of the first key, which has [`Property::width`] times [`Interpolation::values_per_key`] rows; of weights, those
-    /// of the node's deformer times that.
+    /// Row of `VALUES` of the first key, which has [`Property::width`] times
+    /// [`Interpolation::values_per_key`] rows; of weights, those of the node's deformer times that.
     pub first_value: u32,
     /// Zero.
     pub reserved: [u32; 2],

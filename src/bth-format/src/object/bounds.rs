@@ -6,21 +6,23 @@ use crate::layout::{Object, WIDENED_BOXES};
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(16))]
 pub struct ObjectBounds {
-    /// Least x, y and z; the fourth number is 0.
+    /// Min x, y and z; the fourth number is 0.
     pub lower: [f32; 4],
-    /// Greatest x, y and z; the fourth number is 0.
+    /// Max x, y and z; the fourth number is 0.
     pub upper: [f32; 4],
-    /// Greatest absolute value of a coordinate of either corner.
+    /// Max absolute value of a coordinate of either corner.
     pub greatest: f32,
     /// How [`far_away`] the object is from the origin of its space; 0 where it is near.
     pub away: f32,
-    /// What pads of boxes allow for besides the origin of a ray: the greatest |coordinate| of the object, or its size and a quarter of
-    /// `away` where it is far away, or next to nothing where the file's boxes are widened.
+    /// What pads of boxes allow for besides the origin of a ray: the max |coordinate| of the
+    /// object, or its size and a quarter of `away` where it is far away, or next to nothing where
+    /// the file's boxes are widened.
     pub padded_in_f64: f32,
-    /// The same when f32 prepares the ray: not less than `greatest` where that is not below [`GREATEST_IN_F32`].
+    /// The same when f32 prepares the ray: not less than `max` where that is not below
+    /// [`GREATEST_IN_F32`].
     pub padded: f32,
-    /// Upper bound of the distance (maximum norm) from a ray's f32 origin to the exact point at which it starts: 0 for rays whose
-    /// origin is exact.
+    /// Upper bound of the distance (maximum norm) from a ray's f32 origin to the exact point at
+    /// which it starts: 0 for rays whose origin is exact.
     pub origin_error: f32,
     /// What the reach of a ray grows by, so that bounds of rounding errors hold `origin_error` too.
     pub origin_reach: f32,
@@ -29,15 +31,17 @@ pub struct ObjectBounds {
 /// Half a unit in the last place of f32, relative.
 const U: f32 = f32::EPSILON / 2.0;
 
-/// Objects with widened boxes have greatest |coordinates| in this range, in which neither pads underflow nor products of planes overflow.
+/// Objects with widened boxes have max |coordinates| in this range, in which neither pads
+/// underflow nor products of planes overflow.
 pub const WIDENED_RANGE: std::ops::Range<f32> =
     1.0 / (1u64 << 60) as f32..(1u64 << 49) as f32 * (1u64 << 49) as f32;
-/// From this greatest |coordinate| on, products of three coordinates could overflow f32, which then prepares no rays.
+/// From this max |coordinate| on, products of three coordinates could overflow f32, which then
+/// prepares no rays.
 pub const GREATEST_IN_F32: f32 = (1u64 << 40) as f32;
 /// A box that is more than this many times its size away from the origin is far away.
 const FAR: f32 = 8.0;
-/// What pads of widened boxes allow for besides the origin of a ray. No rounding needs it; it keeps pads far from denormal numbers, for rays
-/// from the origin of the object's space, too.
+/// What pads of widened boxes allow for besides the origin of a ray. No rounding needs it; it keeps
+/// pads far from denormal numbers, for rays from the origin of the object's space, too.
 const LEAST_PADDED: f32 = 1.0 / ((1u64 << 50) as f32 * (1u64 << 50) as f32);
 
 impl ObjectBounds {
@@ -66,19 +70,23 @@ impl ObjectBounds {
 
     /// The bounds for rays that start on the object's triangles, at points that are rounded to f32.
     ///
-    /// A point lies within `greatest`, so rounding moves each coordinate by at most u·`greatest` (u = 2^-24), and by 2^-150 where it
-    /// is denormal; its computation in f64 adds less than 2^-48 of that. Pads of boxes are 16u of what they allow for: an eighth of
-    /// `greatest` covers it. Projected coordinates are off by 8u of the reach for their roundings; a moved origin moves them by twice
-    /// `origin_error`, since slopes are at most 1: three tenths of `greatest` cover that.
+    /// A point lies within `max`, so rounding moves each coordinate by at most u·`max` (u
+    /// = 2^-24), and by 2^-150 where it is denormal; its computation in f64 adds less than 2^-48 of
+    /// that. Pads of boxes are 16u of what they allow for: an eighth of `max` covers it.
+    /// Projected coordinates are off by 8u of the reach for their roundings; a moved origin moves
+    /// them by twice `origin_error`, since slopes are at most 1: three tenths of `max` cover
+    /// that.
     #[inline(always)]
     pub fn for_starts(&self) -> ObjectBounds {
         self.moved(self.greatest)
     }
 
-    /// The bounds for segments, as rays from their first end, whose greatest |coordinate| is `farthest`, with a rounded direction.
+    /// The bounds for segments, as rays from their first end, whose max |coordinate| is
+    /// `farthest`, with a rounded direction.
     ///
-    /// Within the object a point of the segment is off by the roundings of both ends and by those of the direction, which are relative to
-    /// its distance from the first end: together by at most four times u and the greater of `farthest` and `greatest`.
+    /// Within the object a point of the segment is off by the roundings of both ends and by those
+    /// of the direction, which are relative to its distance from the first end: together by at most
+    /// four times u and the greater of `farthest` and `max`.
     pub fn for_segments(&self, farthest: f32) -> ObjectBounds {
         self.moved(4.0 * self.greatest.max(farthest))
     }
@@ -95,7 +103,8 @@ impl ObjectBounds {
         }
     }
 
-    /// The cube around the origin that holds all points with coordinates of at most `greatest` in absolute value.
+    /// The cube around the origin that holds all points with coordinates of at most `max` in
+    /// absolute value.
     pub fn around(greatest: f32) -> ObjectBounds {
         let [lower, upper] = [-greatest, greatest].map(|x| [x, x, x, 0.0]);
         ObjectBounds {
@@ -115,8 +124,9 @@ impl ObjectBounds {
     }
 }
 
-/// How far away a box is from the origin, if that is much for its size: the greatest |coordinate| of its point that is nearest to the origin.
-/// Distances from that point are then small beside coordinates.
+/// How far away a box is from the origin, if that is much for its size: the max |coordinate|
+/// of its point that is nearest to the origin. Distances from that point are then small next to
+/// coordinates.
 pub fn far_away(lower: &[f32; 3], upper: &[f32; 3]) -> Option<f32> {
     let nearest = |lower: f32, upper: f32| if lower > 0.0 { lower } else { upper.min(0.0) };
     let distance = greatest_of(&[0, 1, 2].map(|k| nearest(lower[k], upper[k])));
@@ -129,7 +139,7 @@ fn size(lower: &[f32], upper: &[f32]) -> f32 {
     (0..3).fold(0.0, |size: f32, k| size.max(upper[k] - lower[k]))
 }
 
-/// Greatest absolute value of a coordinate.
+/// Max absolute value of a coordinate.
 fn greatest_of(point: &[f32; 3]) -> f32 {
     point.iter().fold(0.0, |greatest: f32, x| if x.abs() > greatest { x.abs() } else { greatest })
 }

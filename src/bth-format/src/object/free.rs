@@ -4,7 +4,7 @@ use super::ObjectView;
 use crate::layout::{FreeDirections, FreeDistances, KnownFree, kind};
 
 impl ObjectView<'_> {
-    /// Whether anything is known of rays that start on triangles.
+    /// Returns true if anything is known of rays that start on triangles.
     #[inline(always)]
     pub fn has_free_directions(&self) -> bool {
         !self.free.is_empty() || !self.free_distances.is_empty()

@@ -5,13 +5,14 @@ use crate::layout::NONE;
 use crate::names::name;
 
 impl<'a> ObjectView<'a> {
-    /// Number of groups of the object's triangles: 1 where the file keeps none, when all triangles are of group 0.
+    /// Number of groups of the object's triangles: 1 where the file keeps none, when all triangles
+    /// are of group 0.
     pub fn group_count(&self) -> u32 {
         (self.groups.len() as u32).max(1)
     }
 
-    /// The group of a triangle, by binary search in the runs; 0 where the file keeps no groups. For an id that is not below the
-    /// number of triangles it is the group of the last triangle.
+    /// The group of a triangle, by binary search in the runs; 0 where the file keeps no groups. For
+    /// an id that is not below the number of triangles it is the group of the last triangle.
     #[inline]
     pub fn group_of(&self, triangle: u32) -> u32 {
         let behind = self.group_runs.partition_point(|run| run.first <= triangle);

@@ -1,4 +1,5 @@
-//! Triangle leaves by child code, as leaves of `f32` whatever their coordinates are stored in, and the blocks of codes.
+//! Triangle leaves by child code, as leaves of `f32` whatever their coordinates are stored in, and
+//! the blocks of codes.
 
 use super::view::ObjectView;
 use crate::layout::*;
@@ -10,8 +11,9 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 pub struct Unpacked<T>(T);
 
 impl<'a> ObjectView<'a> {
-    /// The indexed leaf at an index of a child code: the stored one where coordinates are `f32`, else the leaf unpacked
-    /// into `scratch`. Panics when the lines end before the leaf does; after [`crate::File::check`] they never do.
+    /// The indexed leaf at an index of a child code: the stored one where coordinates are `f32`,
+    /// else the leaf unpacked into `scratch`. Panics when the lines end before the leaf does; after
+    /// [`crate::File::check`] they never do.
     #[inline(always)]
     pub fn indexed<'s>(&self, index: u32, scratch: &'s mut Option<Unpacked<IndexedLeaf>>) -> &'s IndexedLeaf
     where
@@ -54,8 +56,8 @@ impl<'a> ObjectView<'a> {
         T::ref_from_bytes(bytes).ok().expect("half lines are aligned for every leaf")
     }
 
-    /// The half lines of the block that a child code leads to: the first one, and how many. `None` for tet leaves, which
-    /// are rows of TET_LEAVES. The block need not lie within the lines.
+    /// The half lines of the block that a child code leads to: the first one, and how many. `None`
+    /// for tet leaves, which are rows of TET_LEAVES. The block need not lie within the lines.
     pub(crate) fn half_lines(&self, child: Child) -> Option<(u64, usize)> {
         let [indexed, raw] = match &self.grid {
             Some(grid) => grid.bits.half_lines(),
@@ -80,7 +82,8 @@ impl<'a> ObjectView<'a> {
         <[[u8; HALF_LINE]]>::ref_from_bytes(self.lines.as_bytes()).ok().expect("a line is two half lines")
     }
 
-    /// Bit 15 of the fields `high` of a leaf of 21 bits, which the specification wants zero and the unpacked leaf lacks.
+    /// Bit 15 of the fields `high` of a leaf of 21 bits, which the specification wants zero and the
+    /// unpacked leaf lacks.
     pub(crate) fn unused_bits(&self, child: Child) -> u16 {
         let unused = |rows: &[[u16; WIDTH]]| rows.iter().flatten().fold(0, |all, high| all | high & 1 << 15);
         match (child, self.grid.map(|grid| grid.bits)) {

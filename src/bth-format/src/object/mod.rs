@@ -1,7 +1,7 @@
 //! A view of one object: its sections as typed slices, and its nodes and leaves by child code.
 //!
-//! [`crate::File::object`] and [`crate::File::check`] make views. Reading nodes and leaves of a view that was not checked
-//! may panic; it never reads out of bounds.
+//! [`crate::File::object`] and [`crate::File::check`] make views. Reading nodes and leaves of a
+//! view that was not checked may panic; it never reads out of bounds.
 
 mod bounds;
 mod free;

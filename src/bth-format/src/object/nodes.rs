@@ -4,17 +4,20 @@ use super::view::ObjectView;
 use crate::layout::*;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// An object has at most as many lines as child codes can address, so that [`NodeBase::wide_node`] need not test the kind of a child.
-/// Opening a file skips further lines, which nothing can lead to.
+/// An object has at most as many lines as child codes can address, so that [`NodeBase::wide_node`]
+/// need not test the kind of a child. Opening a file skips further lines, which nothing can lead
+/// to.
 pub(crate) const MAX_LINES: usize = Child::INDEX_LIMIT as usize + NODE_LINES - 1;
 
 /// The lines of an object and how child codes index them: what a traversal loop keeps at hand.
 ///
-/// Methods that return a node or leaf panic when the lines end before it does; after [`crate::File::check`] they never do.
+/// Methods that return a node or leaf panic when the lines end before it does; after
+/// [`crate::File::check`] they never do.
 #[derive(Clone, Copy, Debug)]
 pub struct NodeBase<'a> {
     lines: &'a [CacheLine],
-    /// [`Child::LEAF_BIT`] where leaves are on a grid, so that their indices count half lines; else 0.
+    /// [`Child::LEAF_BIT`] where leaves are on a grid, so that their indices count half lines; else
+    /// 0.
     halved: u32,
 }
 
@@ -30,8 +33,9 @@ impl<'a> NodeBase<'a> {
     pub fn node(self, line: u32) -> &'a WideNode {
         self.block(line, NODE_LINES)
     }
-    /// The node that a child code leads to, if it is a node within the lines: the codes of all others are greater than the number of
-    /// lines. So a traversal that asks for it need not test the kind of the child.
+    /// The node that a child code leads to, if it is a node within the lines: the codes of all
+    /// others are greater than the number of lines. So a traversal that asks for it need not test
+    /// the kind of the child.
     #[inline(always)]
     pub fn wide_node(self, code: u32) -> Option<&'a WideNode> {
         let at = code as usize;
@@ -45,7 +49,8 @@ impl<'a> NodeBase<'a> {
         // Only codes of indexed leaves, and those only without a grid, stay below the limit.
         (line | self.halved < Child::INDEX_LIMIT).then(|| self.block(line, INDEXED_LINES))
     }
-    /// Address of the block of a child code, to prefetch. It is not valid for every code: do not dereference it.
+    /// Address of the block of a child code, to prefetch. It is not valid for every code: do not
+    /// dereference it.
     #[inline(always)]
     pub fn block_address(self, code: u32) -> *const CacheLine {
         let index = code & (Child::INDEX_LIMIT - 1);
@@ -60,7 +65,8 @@ impl<'a> ObjectView<'a> {
         debug_assert!(self.lines.len() <= MAX_LINES, "see `MAX_LINES`");
         NodeBase { lines: self.lines, halved: if self.grid.is_some() { Child::LEAF_BIT } else { 0 } }
     }
-    /// The node at a line. Panics when the lines end before the node does; after [`crate::File::check`] they never do.
+    /// The node at a line. Panics when the lines end before the node does; after
+    /// [`crate::File::check`] they never do.
     #[inline(always)]
     pub fn node(&self, line: u32) -> &'a WideNode {
         self.node_base().node(line)
@@ -82,8 +88,8 @@ impl<'a> ObjectView<'a> {
             Child::Indexed(_) | Child::Raw(_) | Child::Tets(_) => None,
         }
     }
-    /// The root, or that of the root's subtree where the root is a tet leaf; `None` where this is no node or does not lie
-    /// within the lines, as may be in an object that was not checked.
+    /// The root, or that of the root's subtree where the root is a tet leaf; `None` where this is
+    /// no node or does not lie within the lines, as may be in an object that was not checked.
     pub fn root(&self) -> Option<&'a WideNode> {
         let mut root = self.header.root;
         if let Child::Tets(row) = Child::from_code(root)? {

@@ -5,10 +5,12 @@ use super::records::Records;
 use crate::Identity;
 use crate::layout::*;
 
-/// The sections of one object. Sections that the file lacks are empty. Specification: "Kinds" and "Objects".
+/// The sections of one object. Sections that the file lacks are empty. Specification: "Kinds" and
+/// "Objects".
 #[derive(Clone, Copy, Debug)]
 pub struct ObjectView<'a> {
-    /// What measurements of tracing are kept under: no two objects have the same, copies of a view do.
+    /// What measurements of tracing are kept under: no two objects have the same, copies of a view
+    /// do.
     pub identity: Identity,
     /// The OBJECT row: bounds, root and counts.
     pub header: &'a Object,
@@ -34,14 +36,15 @@ pub struct ObjectView<'a> {
     pub hull_faces: &'a [HullFace],
     /// Per source triangle its row of `tet_faces`, or [`NONE`]; empty when there are no tet leaves.
     pub triangle_faces: &'a [u32],
-    /// Per leaf its rows of `positions`, in the order of the leaves: one row for an indexed leaf, one for each corner of a raw
-    /// one. Empty but in deformable objects.
+    /// Per leaf its rows of `positions`, in the order of the leaves: one row for an indexed leaf,
+    /// one for each corner of a raw one. Empty but in deformable objects.
     pub leaf_vertices: &'a [[u32; WIDTH]],
     /// Per source triangle its [`TrianglePlace`], or [`NONE`]. Empty if the file has none.
     pub places: &'a [u32],
-    /// Per source triangle in which directions rays that start on it meet nothing; empty where nothing is known.
+    /// Per source triangle in which directions rays that start on it meet nothing; empty where
+    /// nothing is known.
     pub free: &'a [FreeDirections],
-    /// Per source triangle within which distances such rays meet nothing, in place of `free`.
+    /// Per source triangle within which distances such rays meet nothing, instead of `free`.
     pub free_distances: &'a [FreeDistances],
     /// The row of FREE_LEVELS, if there is one.
     pub free_levels: &'a [FreeLevels],
@@ -70,12 +73,12 @@ pub struct ObjectView<'a> {
 }
 
 impl ObjectView<'_> {
-    /// Whether the object can be given new positions.
+    /// Returns true if the object can be given new positions.
     #[inline(always)]
     pub fn is_deformable(&self) -> bool {
         !self.leaf_vertices.is_empty()
     }
-    /// Whether child boxes are widened ([`WIDENED_BOXES`]).
+    /// Returns true if child boxes are widened ([`WIDENED_BOXES`]).
     pub fn has_widened_boxes(&self) -> bool {
         self.header.coordinates & WIDENED_BOXES != 0
     }

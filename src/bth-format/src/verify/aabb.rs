@@ -2,9 +2,9 @@
 
 use crate::layout::BOX_MARGIN;
 
-/// The greatest `f32` that is not above the exact value of `x - margin`.
+/// The max `f32` that is not above the exact value of `x - margin`.
 fn below(x: f64, margin: f64) -> f32 {
-    // The difference and what its rounding left out (Knuth's sum of two numbers).
+    // The difference and what its rounding lost (Knuth's sum of two numbers).
     let difference = x - margin;
     let taken = difference - x;
     let rest = (x - (difference - taken)) - (margin + taken);
@@ -54,7 +54,7 @@ impl Aabb {
         self
     }
 
-    /// Whether the other box lies within this one, boundaries included.
+    /// Returns true if the other box lies within this one, boundaries included.
     pub(super) fn contains(&self, other: &Aabb) -> bool {
         (0..3).all(|a| self.lower[a] <= other.lower[a] && other.upper[a] <= self.upper[a])
     }

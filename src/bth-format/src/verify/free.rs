@@ -1,7 +1,9 @@
-//! BTH-F210: triangles with free bins have axes. BTH-F209: rays from some triangles meet nothing where their directions are called free.
+//! BTH-F210: triangles with free bins have axes. BTH-F209: rays from some triangles meet nothing
+//! where their directions are called free.
 //!
-//! All pairs of triangles would take quadratic time. Of evenly spaced triangles rays from the corners to the middles of all other
-//! triangles are decided: a wrong bin is found as soon as one of the middles lies in the bin.
+//! All pairs of triangles would take quadratic time. Of evenly spaced triangles rays from the
+//! corners to the middles of all other triangles are decided: a wrong bin is found as soon as one
+//! of the middles lies in the bin.
 
 use crate::error::{Code, Error, Result};
 use crate::exact::side;
@@ -9,7 +11,7 @@ use crate::layout::{Child, FreeLevels, KnownFree, TrianglePlace, free_axes, free
 use crate::object::ObjectView;
 use std::cmp::Ordering;
 
-/// Greatest number of triangles from which rays are sent.
+/// Max number of triangles from which rays are sent.
 const STARTS: usize = 64;
 
 type Corners = [[f32; 3]; 3];
@@ -97,10 +99,12 @@ struct Start {
 }
 
 impl Start {
-    /// Whether the ray from a corner through the middle of another triangle meets it though its direction is called free, or free as far
-    /// as that. It meets the middle itself, unless it lies in the plane of the triangle.
+    /// Whether the ray from a corner through the middle of another triangle meets it though its
+    /// direction is called free, or free as far as that. It meets the middle itself, unless it lies
+    /// in the plane of the triangle.
     fn meets(&self, from: [f32; 3], target: Corners) -> bool {
-        /// Bounds the rounding errors of the direction, a sum of six numbers, relative to the greatest coordinate; and that of its length.
+        /// Bounds the rounding errors of the direction, a sum of six numbers, relative to the
+        /// max coordinate; and that of its length.
         const ERROR: f64 = 1.0 / (1u64 << 48) as f64;
         // Three times the direction to the middle.
         let direction: [f64; 3] = std::array::from_fn(|k| {

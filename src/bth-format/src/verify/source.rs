@@ -7,7 +7,8 @@ use crate::layout::*;
 use crate::object::ObjectView;
 use std::mem::offset_of;
 
-/// Where a stored triangle stands in the file, and the code of the invariant that ties it to the source there.
+/// Where a stored triangle stands in the file, and the code of the invariant that ties it to the
+/// source there.
 #[derive(Clone, Copy)]
 pub(super) struct Stored {
     /// [`Code::LeafSource`] or [`Code::FaceSource`].
@@ -17,8 +18,8 @@ pub(super) struct Stored {
     pub(super) at: u64,
 }
 
-/// BTH-F201 or BTH-F202, and BTH-F207: a stored triangle has the corners of its source triangle, bit for bit, and an area
-/// unless the object is deformable.
+/// BTH-F201 or BTH-F202, and BTH-F207: a stored triangle has the corners of its source triangle,
+/// bit for bit, and an area unless the object is deformable.
 pub(super) fn check_corners(
     view: &ObjectView,
     id: u32,
@@ -38,13 +39,15 @@ pub(super) fn check_corners(
     Ok(())
 }
 
-/// Corners of a source triangle, on the grid if there is one; `None` where the file does not keep them.
+/// Corners of a source triangle, on the grid if there is one; `None` where the file does not keep
+/// them.
 fn source_corners(view: &ObjectView, id: u32) -> Option<[[f32; 3]; 3]> {
     let corners = view.triangles.get(id as usize)?.map(|v| view.positions[v as usize]);
     Some(view.grid.map_or(corners, |grid| corners.map(|p| grid.nearest(p))))
 }
 
-/// BTH-F203 and BTH-F207: as many triangles are left out as the header says, and all of these have zero area.
+/// BTH-F203 and BTH-F207: as many triangles are skipped as the header says, and all of these have
+/// zero area.
 pub(super) fn check_dropped(view: &ObjectView, marks: &TriangleMarks) -> Result<()> {
     let left_out = view.header.triangles as usize - marks.count(TriangleMarks::PLACED);
     if left_out != view.header.dropped as usize {
@@ -52,7 +55,8 @@ pub(super) fn check_dropped(view: &ObjectView, marks: &TriangleMarks) -> Result<
         let expected = format!("{} triangles in no leaf", view.header.dropped);
         return Err(Error::within(Code::Coverage, kind::OBJECT, at, expected, format!("{left_out}")));
     }
-    // Without kept triangles there is nothing to compare, and the header's count must not bound a loop.
+    // Without kept triangles there is nothing to compare, and the header's count must not bound a
+    // loop.
     for id in (0..view.triangles.len()).filter(|id| !marks.has(*id as u32, TriangleMarks::PLACED)) {
         if source_corners(view, id as u32).is_some_and(|corners| !is_zero_area(corners)) {
             let found = format!("triangle {id}, which has an area, in no leaf");

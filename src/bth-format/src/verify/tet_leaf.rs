@@ -8,7 +8,8 @@ use crate::layout::*;
 use crate::object::ObjectView;
 use std::cmp::Ordering;
 
-/// Checks BTH-F205 and BTH-F206 of the tet leaf of a row, whose indices have been checked. Returns the vertices of its tetrahedra.
+/// Checks BTH-F205 and BTH-F206 of the tet leaf of a row, whose indices have been checked. Returns
+/// the vertices of its tetrahedra.
 pub(super) fn check<'a>(view: &'a ObjectView<'a>, row: usize, leaf: &TetLeaf) -> Result<TetAdjacency<'a>> {
     check_box(view, row, leaf)?;
     let adjacency = TetAdjacency::derive(view, leaf)?;
@@ -46,8 +47,8 @@ fn check_box(view: &ObjectView, row: usize, leaf: &TetLeaf) -> Result<()> {
 fn check_tetrahedra(view: &ObjectView, leaf: &TetLeaf, adjacency: &TetAdjacency<'_>) -> Result<()> {
     let rows = leaf.first_tet..leaf.first_tet + leaf.tets;
     let stride = RecordKind::from_code(view.header.record).map_or(0, RecordKind::stride) as u64;
-    // One exact sign per tetrahedron, of its vertices in ascending order. On which side of a face the opposite vertex lies
-    // follows from the parity of moving that vertex to the end.
+    // One exact sign per tetrahedron, of its vertices in ascending order. On which side of a face
+    // the opposite vertex lies follows from the parity of moving that vertex to the end.
     let signs: Vec<Ordering> = rows
         .clone()
         .map(|tet| {
@@ -79,7 +80,8 @@ fn check_tetrahedra(view: &ObjectView, leaf: &TetLeaf, adjacency: &TetAdjacency<
     Ok(())
 }
 
-/// BTH-F206: the first tetrahedron of a constrained face lies where its normal points to, the second behind.
+/// BTH-F206: the first tetrahedron of a constrained face lies where its normal points to, the
+/// second behind.
 fn check_constrained_faces(view: &ObjectView, leaf: &TetLeaf) -> Result<()> {
     for row in leaf.first_face..leaf.first_face + leaf.faces {
         let face = &view.tet_faces[row as usize];

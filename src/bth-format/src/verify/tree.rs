@@ -11,22 +11,26 @@ use std::mem::offset_of;
 /// A node or leaf of the tree.
 struct Visit {
     child: Child,
-    /// The visit of the node that refers to it, and the slot there; `None` for the root and for roots of subtrees.
+    /// The visit of the node that refers to it, and the slot there; `None` for the root and for
+    /// roots of subtrees.
     parent: Option<(usize, usize)>,
     /// The tet leaf whose subtree it lies in.
     tet_leaf: Option<u32>,
     /// Bounds of the triangles below, as far as they have been visited.
     content: Aabb,
-    /// The same with the room around corners that widened boxes have; the box of no point where the object has none.
+    /// The same with the room around corners that widened boxes have; the box of no point where the
+    /// object has none.
     widened: Aabb,
 }
 
-/// Checks BTH-F201 to BTH-F204 and BTH-F207 of the stored triangles; returns which triangles the tree holds.
+/// Checks BTH-F201 to BTH-F204 and BTH-F207 of the stored triangles; returns which triangles the
+/// tree holds.
 pub(super) fn check(view: &ObjectView) -> Result<TriangleMarks> {
     let mut visits = visits(view);
     let in_subtree = vec![0; view.tet_leaves.len()];
     let mut triangles = Triangles { view, marks: TriangleMarks::default(), in_subtree };
-    // Parents stand before their children: from the back, the content of a visit is complete when it is taken.
+    // Parents stand before their children: from the back, the content of a visit is complete when
+    // it is taken.
     while let Some(mut visit) = visits.pop() {
         triangles.check_leaf(&mut visit)?;
         check_containment(view, &visit, &visits)?;
@@ -65,8 +69,8 @@ fn visits(view: &ObjectView) -> Vec<Visit> {
     visits
 }
 
-/// BTH-F204: the box of the slot that leads to a node or leaf, or the bounds of the object, contain the triangles below.
-/// `visits` are those before. The root of a subtree has no box of its own.
+/// BTH-F204: the box of the slot that leads to a node or leaf, or the bounds of the object, contain
+/// the triangles below. `visits` are those before. The root of a subtree has no box of its own.
 fn check_containment(view: &ObjectView, visit: &Visit, visits: &[Visit]) -> Result<()> {
     let (bounds, section, at) = if let Some((parent, slot)) = visit.parent {
         let child = visits[parent].child;
@@ -165,7 +169,8 @@ impl Triangles<'_> {
         Err(Error::within(Code::Coverage, section, at, "each triangle once", found))
     }
 
-    /// BTH-F203: a triangle in the subtree of a tet leaf is one of its constrained faces, and lies there once.
+    /// BTH-F203: a triangle in the subtree of a tet leaf is one of its constrained faces, and lies
+    /// there once.
     fn mark_in_subtree(&mut self, id: u32, tet_leaf: u32, at: u64) -> Result<()> {
         let leaf = &self.view.tet_leaves[tet_leaf as usize];
         let faces = leaf.first_face..leaf.first_face + leaf.faces;

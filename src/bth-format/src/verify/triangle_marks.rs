@@ -5,8 +5,8 @@ use std::collections::HashMap;
 /// Ids in a page.
 const PAGE: u32 = 64;
 
-/// Bits per triangle. Memory is proportional to the triangles that are marked: the number of triangles in the header of an
-/// untrusted file is no reason to allocate.
+/// Bits per triangle. Memory is proportional to the triangles that are marked: the number of
+/// triangles in the header of an untrusted file is no reason to allocate.
 #[derive(Debug, Default)]
 pub(super) struct TriangleMarks {
     pages: HashMap<u32, [u8; PAGE as usize]>,
@@ -18,7 +18,7 @@ impl TriangleMarks {
     /// The triangle lies in the subtree of a tet leaf.
     pub(super) const IN_SUBTREE: u8 = 2;
 
-    /// Whether a triangle has a mark.
+    /// Returns true if a triangle has a mark.
     pub(super) fn has(&self, id: u32, mark: u8) -> bool {
         self.pages.get(&(id / PAGE)).is_some_and(|page| page[(id % PAGE) as usize] & mark != 0)
     }

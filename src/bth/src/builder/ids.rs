@@ -3,8 +3,9 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// Ids that are free again. An id is reused only after the commit in which what it named disappeared, the least first, so that
-/// hits of the scene as it was rendered never name something else.
+/// Ids that are free again. An id is reused only after the commit in which what it named
+/// disappeared, the lowest first, so that hits of the scene as it was rendered never name something
+/// else.
 #[derive(Debug, Default)]
 pub(super) struct FreeIds {
     free: BinaryHeap<Reverse<u32>>,

@@ -1,6 +1,6 @@
 //! Instances of single objects in a scene builder.
 
-use super::subscene::Subscene;
+use super::subscenes::Subscene;
 use super::{MAX_INSTANCES, SceneBuilder};
 use crate::instances::{InstanceRow, NewInstance};
 use crate::nodes::Affine;
@@ -21,7 +21,7 @@ pub(super) struct StagedInstance {
     /// Its node in the file of the subscene, or `NONE`.
     pub(super) node: u32,
     pub(super) visible: bool,
-    /// Whether it is in the list of the changed ones.
+    /// True if it is in the list of the changed ones.
     pub(super) changed: bool,
 }
 
@@ -62,12 +62,13 @@ impl StagedInstance {
 }
 
 impl SceneBuilder {
-    /// Adds an instance of an object; returns its id. `transform` maps object space to world space: the rows of a 3×4 matrix,
-    /// one after the other, that is applied to columns (x, y, z, 1). It may scale, shear and mirror.
+    /// Adds an instance of an object; returns its id. `transform` maps object space to world space:
+    /// the rows of a 3×4 matrix, one after the other, that is applied to columns (x, y, z, 1). It
+    /// may scale, shear and mirror.
     ///
     /// # Errors
-    /// `BTH-O003` if there is no such object, `BTH-S005` if there are too many instances. Whether the transform can be used is
-    /// decided by [`Self::commit`].
+    /// `BTH-O003` if there is no such object, `BTH-S005` if there are too many instances. Whether
+    /// the transform can be used is decided by [`Self::commit`].
     pub fn instance(&mut self, object: u32, transform: &[f32; 12]) -> Result<u32, Error> {
         self.check_object(object)?;
         self.check_capacity(1)?;
@@ -84,7 +85,8 @@ impl SceneBuilder {
         self.set_transforms(&[instance], std::slice::from_ref(transform))
     }
 
-    /// Sets the transforms of many instances. If an instance is given several times, its last transform counts.
+    /// Sets the transforms of many instances. If an instance is given several times, its last
+    /// transform counts.
     ///
     /// # Errors
     /// As [`Self::set_transform`], for the first such instance. No transform is set then.
@@ -102,8 +104,9 @@ impl SceneBuilder {
         Ok(())
     }
 
-    /// Hides an instance from all queries, or shows it again. It keeps its id and its transform, which may be any while it is hidden.
-    /// An instance of a subscene is visible if the subscene and its nodes are, too.
+    /// Hides an instance from all queries, or shows it again. It keeps its id and its transform,
+    /// which may be any while it is hidden. An instance of a subscene is visible if the subscene
+    /// and its nodes are, too.
     ///
     /// # Errors
     /// `BTH-S003` if there is no such instance.
@@ -115,7 +118,8 @@ impl SceneBuilder {
         Ok(())
     }
 
-    /// Removes an instance. Its id is not used for another one before the next commit has succeeded.
+    /// Removes an instance. Its id is not used for another one before the next commit has
+    /// succeeded.
     ///
     /// # Errors
     /// As [`Self::set_transform`].

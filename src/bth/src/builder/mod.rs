@@ -1,33 +1,34 @@
 //! Scenes whose instances the caller places: the objects of several files, moved at run time.
 //!
-//! Changes are staged and become visible by a commit, all or none of them. The staged state is here ([`instances`] of single objects,
-//! [`subscenes`] of whole files); the committed one is that of the [`Scene`], so that rays meet instances of callers and of files in
-//! the same way.
+//! Changes are staged and become visible by a commit, all or none of them. The staged state is here
+//! ([`instances`] of single objects, [`subscenes`] of whole files); the committed one is that of
+//! the [`Scene`], so that rays meet instances of callers and of files in the same way.
 
-mod deform;
 mod ids;
 mod instances;
-mod subscene;
+mod positions;
 mod subscenes;
 
 use self::ids::FreeIds;
 use self::instances::StagedInstance;
-use self::subscene::Subscene;
+use self::subscenes::Subscene;
 use crate::scene::Scene;
 use crate::update::Update;
 use bth_format::{Code, Error};
 
-/// Greatest number of instances: their indices are stored beside kinds of nodes in 32 bits.
+/// Max number of instances: their indices are stored next to kinds of nodes in 32 bits.
 const MAX_INSTANCES: usize = 1 << 30;
 
 /// Makes a [`Scene`] of the objects of several files, and moves its instances at run time.
 ///
-/// The builder holds the scene: [`Self::scene`] returns it, and it answers all queries. Instances are added, moved, hidden and removed
-/// by calls that only note what is to be; [`Self::commit`] then places what has changed and updates the top level. Nothing is
-/// compiled or built for the objects, whose files are shared with the scenes that they were added from.
+/// The builder holds the scene: [`Self::scene`] returns it, and it answers all queries. Instances
+/// are added, moved, hidden and removed by calls that only note what is to be; [`Self::commit`]
+/// then places what has changed and updates the top level. Nothing is compiled or built for the
+/// objects, whose files are shared with the scenes that they were added from.
 ///
-/// Instances are named by an id, which stays the same until the instance is removed, and which is the instance of hits
-/// ([`PrimitiveRef`](crate::rays::PrimitiveRef)). A commit frees the ids of removed instances; the least free id is used first.
+/// Instances are named by an id, which stays the same until the instance is removed, and which is
+/// the instance of hits ([`PrimitiveRef`](crate::rays::PrimitiveRef)). A commit frees the ids of
+/// removed instances; the lowest free id is used first.
 ///
 /// ```no_run
 /// let mut builder = bth::SceneBuilder::new();
@@ -59,7 +60,7 @@ pub struct SceneBuilder {
     subscenes: Vec<Option<Subscene>>,
     subscene_ids: FreeIds,
     /// The objects that get new positions.
-    deformed: Vec<u32>,
+    repositioned: Vec<u32>,
 }
 
 impl Default for SceneBuilder {
@@ -78,13 +79,14 @@ impl SceneBuilder {
             instance_ids: FreeIds::default(),
             subscenes: Vec::new(),
             subscene_ids: FreeIds::default(),
-            deformed: Vec::new(),
+            repositioned: Vec::new(),
         }
     }
 
-    /// Adds the objects of another scene, without instances of them. Returns the index of the first: the object with index `i` there
-    /// has index `first + i` here ([`Scene::file_of`] leads back). The files are shared and stay open as long as one of the
-    /// scenes does; masks and the time of the other scene have no effect here.
+    /// Adds the objects of another scene, without instances of them. Returns the index of the
+    /// first: the object with index `i` there has index `first + i` here ([`Scene::file_of`] leads
+    /// back). The files are shared and stay open as long as one of the scenes does; masks and the
+    /// time of the other scene have no effect here.
     pub fn add(&mut self, scene: &Scene) -> u32 {
         self.scene.add_objects(scene)
     }
@@ -99,8 +101,8 @@ impl SceneBuilder {
         self.scene
     }
 
-    /// As [`Scene::set_instance_mask`]: it has an effect at once, without a commit. The mask of an instance that is removed is
-    /// dropped.
+    /// As [`Scene::set_instance_mask`]: it has an effect at once, without a commit. The mask of an
+    /// instance that is removed is dropped.
     ///
     /// # Errors
     /// `BTH-S003` if there is no such instance.
@@ -125,15 +127,19 @@ impl SceneBuilder {
         Ok(())
     }
 
-    /// Makes all changes since the last commit visible: gives objects their new positions, places the instances that changed, and updates the top level. If instances
-    /// only moved, the boxes of the top level are computed again; if instances came, went, were hidden or became visible, or
-    /// [`Update::cost_ratio`] would exceed its bound, it is built anew. With the feature `rayon`, the threads of the current pool
-    /// share the work of some thousand instances or more. The answers of queries depend on none of this.
+    /// Makes all changes since the last commit visible: gives objects their new positions, places
+    /// the instances that changed, and updates the top level. If instances only moved, the boxes of
+    /// the top level are computed again; if instances came, went, were hidden or became visible, or
+    /// [`Update::cost_ratio`] would exceed its bound, it is built again. With the feature `rayon`,
+    /// the threads of the current pool share the work of some thousand instances or more. The
+    /// answers of queries depend on none of this.
     ///
     /// # Errors
-    /// `BTH-S001` if the transform of a visible instance cannot be inverted, `BTH-S002` if the transform, the world box or the position
-    /// of a vertex that a file's skins and morph targets move is not finite in `f32`. The error gives the instance or the node. The scene is then unchanged, and so are the changes that wait for a commit:
-    /// correct the transform, or hide or remove the instance, and commit again.
+    /// `BTH-S001` if the transform of a visible instance cannot be inverted, `BTH-S002` if the
+    /// transform, the world box or the position of a vertex that a file's skins and morph targets
+    /// move is not finite in `f32`. The error gives the instance or the node. The scene is then
+    /// unchanged, and so are the changes that wait for a commit: correct the transform, or hide or
+    /// remove the instance, and commit again.
     pub fn commit(&mut self) -> Result<Update, Error> {
         let mut nodes = 0;
         for subscene in self.subscenes.iter_mut().flatten() {
@@ -141,27 +147,19 @@ impl SceneBuilder {
             let moved = |id: u32| instances[id as usize].mark(id, changed);
             nodes += subscene.evaluate(self.scene.objects(), moved);
         }
-        let posed = self.stage_poses()?;
+        let staged = self.stage_poses()?;
         let refitted = self.refit_objects();
-        let skinned = self.scene.world().map(|world| world.deformers.skinned_objects()).unwrap_or_default();
+        let skinned = self.scene.world().map(|world| world.animation.skinned_objects()).unwrap_or_default();
         let (scene, instances, subscenes) = (&mut self.scene, &self.instances, &self.subscenes);
         let (objects, world) = scene.objects_and_world_mut();
         let Some(world) = world else { return Ok(Update::default()) };
         let new = |id: u32| instances[id as usize].placed_in(objects, subscenes, &skinned);
         let update = match world.change(objects, instances.len(), &self.changed, &new) {
-            Ok(update) => Update {
-                nodes,
-                deformed: refitted.deformed,
-                deformed_cost_ratio: refitted.deformed_cost_ratio,
-                refit: refitted.refit,
-                ..update
-            },
+            Ok(update) => Update { nodes, ..update }.with_refit(refitted),
             Err(failed) => {
                 self.undo_refit();
-                self.unstage_poses(&posed);
-                let (code, expected, found) = failed.error.words();
-                let found = format!("{found}: {}", self.describe(failed.instance));
-                return Err(Error::of_call(code, expected, found));
+                self.unstage_poses(&staged);
+                return Err(failed.error(&self.describe(failed.instance)));
             }
         };
         for id in self.changed.drain(..) {
@@ -171,9 +169,9 @@ impl SceneBuilder {
             self.scene.masks_mut().set_instance(id, u32::MAX);
         }
         self.subscene_ids.commit();
-        self.deformed.clear();
+        self.repositioned.clear();
         if let (_, Some(world)) = self.scene.parts_mut() {
-            world.deformers.keep(posed);
+            world.animation.keep(staged);
         }
         Ok(update)
     }

@@ -1,21 +1,120 @@
-//! Subscenes of a scene builder: files that are placed as a whole, with their hierarchy and animation.
+//! Subscenes of a scene builder: files that are placed as a whole, with their hierarchy and
+//! animation.
 
 use super::SceneBuilder;
 use super::instances::StagedInstance;
-use super::subscene::{Pose, Subscene};
-use crate::motion::check_time;
-use bth_format::{Code, Error};
+use crate::nodes::{Affine, NodeHierarchy};
+use crate::objects::Objects;
+use crate::scene::motion::check_time;
+use bth_format::layout::NONE;
+use bth_format::{Code, Error, SceneView};
+
+/// Where a subscene is, at which time, and whether it is visible.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct SubscenePose {
+    pub(super) transform: [f32; 12],
+    pub(super) seconds: f64,
+    pub(super) visible: bool,
+}
+
+/// A file whose instances are placed as a whole.
+#[derive(Debug)]
+pub(super) struct Subscene {
+    /// Index in the scene of the first object of the file.
+    pub(super) first_object: u32,
+    /// For each instance of the file its id in the scene.
+    pub(super) ids: Vec<u32>,
+    /// The nodes of the file as at `evaluated`; `None` for a file without scene sections.
+    hierarchy: Option<NodeHierarchy>,
+    /// What the caller wants.
+    pub(super) pose: SubscenePose,
+    /// What the nodes were evaluated for; `None` before the first time.
+    evaluated: Option<SubscenePose>,
+}
+
+impl Subscene {
+    /// A subscene of the file that begins with an object. It has no ids yet.
+    pub(super) fn new(objects: &Objects, first_object: u32, transform: [f32; 12]) -> Subscene {
+        let view = scene(objects, first_object);
+        let seconds = view.map_or(0.0, |view| f64::from(view.scene[0].first_frame) / view.scene[0].rate);
+        Subscene {
+            first_object,
+            ids: Vec::new(),
+            hierarchy: view.map(|view| NodeHierarchy::new(&view)),
+            pose: SubscenePose { transform, seconds, visible: true },
+            evaluated: None,
+        }
+    }
+
+    /// For each instance of the file the index in the scene of its object, and its node or `NONE`.
+    pub(super) fn instances(objects: &Objects, first_object: u32) -> Vec<(u32, u32)> {
+        match scene(objects, first_object) {
+            Some(view) => view.instances.iter().map(|row| (first_object + row.object, row.node)).collect(),
+            None => {
+                let (file, _) = objects.locate(first_object).expect("an object of the scene");
+                (first_object..first_object + file.object_count()).map(|object| (object, NONE)).collect()
+            }
+        }
+    }
+
+    /// Evaluates the nodes for the pose, and calls `moved` with the id of each instance that has to
+    /// be placed again. Returns the number of nodes that moved.
+    pub(super) fn evaluate(&mut self, objects: &Objects, mut moved: impl FnMut(u32)) -> usize {
+        let former = self.evaluated.replace(self.pose);
+        if former == Some(self.pose) {
+            return 0;
+        }
+        let all =
+            former.is_none_or(|former| SubscenePose { seconds: self.pose.seconds, ..former } != self.pose);
+        let (Some(view), Some(hierarchy)) = (scene(objects, self.first_object), &mut self.hierarchy) else {
+            self.ids.iter().filter(|_| all).for_each(|id| moved(*id));
+            return 0;
+        };
+        let nodes = hierarchy.update(&view, self.pose.seconds, all);
+        let ids = self.ids.iter().zip(view.instances);
+        ids.filter(|(_, row)| hierarchy.moved(row.node)).for_each(|(id, _)| moved(*id));
+        nodes
+    }
+
+    /// The nodes of the file as evaluated; `None` for a file without scene sections.
+    pub(super) fn hierarchy(&self) -> Option<&NodeHierarchy> {
+        self.hierarchy.as_ref()
+    }
+
+    /// The transform of a node of the file to world space as evaluated, and whether it is visible.
+    /// An object that is `skinned` is not moved by its node.
+    pub(super) fn node(&self, objects: &Objects, node: u32, skinned: bool) -> (Affine, bool) {
+        let outer = Affine::from_f32(&self.pose.transform);
+        match (scene(objects, self.first_object), &self.hierarchy) {
+            (_, Some(hierarchy)) if skinned => (outer, self.pose.visible && !hierarchy.invisible(node)),
+            (Some(view), Some(hierarchy)) => {
+                let inner = hierarchy.to_world(&view, node);
+                // The product with the identity may change the sign of a zero.
+                let to_world = if outer == Affine::IDENTITY { inner } else { outer.times(&inner) };
+                (to_world, self.pose.visible && !hierarchy.hidden(node))
+            }
+            _ => (outer, self.pose.visible),
+        }
+    }
+}
+
+/// The scene sections of the file of an object.
+fn scene(objects: &Objects, object: u32) -> Option<SceneView<'_>> {
+    objects.locate(object).and_then(|(file, _)| file.scene())
+}
 
 /// Subscenes: files that are placed as a whole.
 impl SceneBuilder {
-    /// Adds an instance of each instance of a file, placed by the nodes and tracks of the file and then by `transform`, as at the
-    /// first frame of the file. A file without scene sections has one instance of each object. `first_object` is what [`Self::add`]
-    /// returned. Returns the id of the subscene; a file may have any number of them, each at a time of its own.
-    /// Objects that the file's skins and morph targets deform are the same in all of them and deform by the time of the one of least id: add
-    /// the file again for others.
+    /// Adds an instance of each instance of a file, placed by the nodes and tracks of the file and
+    /// then by `transform`, as at the first frame of the file. A file without scene sections has
+    /// one instance of each object. `first_object` is what [`Self::add`] returned. Returns the id
+    /// of the subscene; a file may have any number of them, each at a time of its own. Objects that
+    /// the file's skins and morph targets deform are the same in all of them and deform by the time
+    /// of the one of the lowest id: add the file again for others.
     ///
     /// # Errors
-    /// `BTH-O003` if there is no such object, or it is not the first of its file; `BTH-S005` if there are too many instances.
+    /// `BTH-O003` if there is no such object, or it is not the first of its file; `BTH-S005` if
+    /// there are too many instances.
     pub fn subscene(&mut self, first_object: u32, transform: &[f32; 12]) -> Result<u32, Error> {
         self.check_object(first_object)?;
         let (_, row) = self.scene.file_of(first_object);
@@ -52,7 +151,8 @@ impl SceneBuilder {
         found.map(|subscene| subscene.ids.as_slice()).ok_or_else(|| no_subscene(subscene))
     }
 
-    /// Sets the transform from the world space of a subscene's file to that of the scene; see [`Self::instance`].
+    /// Sets the transform from the world space of a subscene's file to that of the scene; see
+    /// [`Self::instance`].
     ///
     /// # Errors
     /// `BTH-S003` if there is no such subscene.
@@ -61,8 +161,8 @@ impl SceneBuilder {
         Ok(())
     }
 
-    /// Sets the time of a subscene in seconds, as [`Scene::set_seconds`](crate::Scene::set_seconds) does for a file. Others keep
-    /// theirs.
+    /// Sets the time of a subscene in seconds, as [`Scene::set_seconds`](crate::Scene::set_seconds)
+    /// does for a file. Others keep theirs.
     ///
     /// # Errors
     /// `BTH-S003` if there is no such subscene, `BTH-S002` if the time is not finite.
@@ -93,7 +193,7 @@ impl SceneBuilder {
         Ok(())
     }
 
-    fn pose(&mut self, subscene: u32) -> Result<&mut Pose, Error> {
+    fn pose(&mut self, subscene: u32) -> Result<&mut SubscenePose, Error> {
         let found = self.subscenes.get_mut(subscene as usize).and_then(Option::as_mut);
         found.map(|subscene| &mut subscene.pose).ok_or_else(|| no_subscene(subscene))
     }

@@ -85,16 +85,6 @@ impl Stacks {
         self.position(stack * self.size)
     }
 
-    /// Empties a stack and pushes the root; returns the top.
-    #[inline(always)]
-    pub(crate) fn start(&mut self, stack: usize, root: u32) -> StackPosition {
-        let bottom = stack * self.size;
-        self.codes[bottom] = BOTTOM;
-        self.codes[bottom + 1] = root;
-        self.keys[bottom + 1] = f32::NEG_INFINITY;
-        self.position(bottom + 1)
-    }
-
     /// Empties the stack with this bottom; returns the position above the bottom, where the children of the root are written. The root
     /// itself is not stored, because it is entered at once.
     #[inline(always)]

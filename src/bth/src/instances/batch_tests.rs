@@ -6,6 +6,7 @@ use super::super::test_worlds::{FILES, START_FILES, rays, unit, world};
 use super::*;
 use crate::hits::Accept;
 use crate::nodes::affine::Affine;
+use crate::query::better;
 use crate::rays::{PrimitiveRef, Start, StartRay};
 use crate::scene::Scene;
 use crate::starts::world_ray::WorldRay;
@@ -194,13 +195,8 @@ fn packets_through_the_top_level_do_not_change_results() {
             hit_count += usize::from(expected.is_hit());
         }
         let mut active_rays = ActiveRays::default();
-        let batch = SceneBatch { world: &world, objects: &objects, rays: &rays, starts: &[] };
-        Isa::chosen().run(StartKernel {
-            batch: &batch,
-            first: 0,
-            count: rays.len(),
-            active_rays: &mut active_rays,
-        });
+        let chunk = Chunk { top: &world.top, rays: &rays, first: 0 };
+        Isa::chosen().run(StartKernel { chunk, starts: &[], active_rays: &mut active_rays });
         in_packets += usize::from(!active_rays.packets.is_empty());
         refused += usize::from(active_rays.packets.is_empty() && count == 150);
         ray_count += rays.len();
@@ -246,7 +242,8 @@ fn a_single_instance_in_world_space_has_the_same_hits_with_and_without_the_top_l
     assert!(hit_count > ray_count / 4, "{hit_count} of {ray_count} hit");
 }
 
-/// Oracle: the hits of a ray in all instances and triangles, each decided exactly, in the documented order.
+/// Oracle: the hits of a ray in all instances and triangles, each decided exactly, in the
+/// documented order.
 fn hits_by_loop(world: &World, file: &File, ray: &Ray) -> Vec<Hit> {
     let mut found = vec![];
     for (instance, placement) in world.placements.iter().enumerate() {

@@ -1,7 +1,6 @@
 //! Transformation of rays into the space of an object.
 
-use super::progress::Progress;
-use super::scene_batch::{ObjectVisits, SceneBatch};
+use super::scene_query::{BatchProgress, ObjectVisits, SceneBatch};
 use crate::intersect::start_point::StartPoint;
 use crate::nodes::affine::RayLanes;
 use crate::query::sink::Visit;
@@ -21,14 +20,14 @@ pub(super) struct ObjectRays {
     pub(super) starts: Vec<StartPoint>,
     /// For each visit the index of its ray in the batch.
     index: Vec<u32>,
-    /// For each ray the greatest t, in world space, of hits that can still change the result.
+    /// For each ray the max t, in world space, of hits that can still change the result.
     so_far: Vec<f32>,
 }
 
 impl ObjectRays {
-    /// Transforms the rays of visits into the space of the object. `progress` are the answers so far, beyond
-    /// which they end.
-    pub(super) fn fill(&mut self, of_object: &ObjectVisits<'_>, progress: Progress<'_>) {
+    /// Transforms the rays of visits into the space of the object. `progress` are the answers so
+    /// far, beyond which they end.
+    pub(super) fn fill(&mut self, of_object: &ObjectVisits<'_>, progress: BatchProgress<'_>) {
         let &ObjectVisits { batch, object, visits } = of_object;
         self.t_scale.clear();
         self.starts.clear();
@@ -52,13 +51,13 @@ impl ObjectRays {
     }
 }
 
-/// The kernel of [`ObjectRays::fill`]. It transforms up to sixteen rays of the same instance at a time; visits are sorted by
-/// instance.
+/// The kernel of [`ObjectRays::fill`]. It transforms up to sixteen rays of the same instance at a
+/// time; visits are sorted by instance.
 struct EnterKernel<'a> {
     object_rays: &'a mut ObjectRays,
     batch: &'a SceneBatch<'a>,
     visits: &'a [Visit],
-    progress: Progress<'a>,
+    progress: BatchProgress<'a>,
 }
 
 impl Kernel for EnterKernel<'_> {

@@ -133,7 +133,8 @@ struct RayInstances<'a> {
 }
 
 impl<'a> BoxQuery for RayInstances<'a> {
-    /// Numbers, not vectors: instructions broadcast them from memory, and no leaf stores and loads them.
+    /// Numbers, not vectors: instructions broadcast them from memory, and no leaf stores and loads
+    /// them.
     type Constants<S: Simd> = &'a RaySlabs;
     #[inline(always)]
     fn lanes<S: Simd>(&self, _: S) -> &'a RaySlabs {

@@ -1,14 +1,14 @@
 //! Enumerated instances, compared with plain tests of all boxes.
 
 use super::super::test_worlds::{FILES, rays, world};
-use super::super::top_nodes::Bounds;
+use super::super::top_nodes::InstanceBounds;
 use super::*;
 use crate::bvh::box_oracle;
 use bth_format::File;
 use bth_random::Rng;
 use std::collections::BTreeSet;
 
-fn ends(bounds: &Bounds) -> [[f32; 3]; 2] {
+fn ends(bounds: &InstanceBounds) -> [[f32; 3]; 2] {
     let ([x, y, z, _], [to_x, to_y, to_z, _]) = (bounds.lower.to_array(), bounds.upper.to_array());
     [[-x, -y, -z], [to_x, to_y, to_z]]
 }

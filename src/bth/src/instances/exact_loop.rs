@@ -31,7 +31,8 @@ fn triangles(object: &ObjectView<'_>) -> Vec<(u32, [[f32; 3]; 3])> {
     found
 }
 
-/// Adds the hits of a ray in an instance, each with its t before rounding. Every triangle is decided exactly.
+/// Adds the hits of a ray in an instance, each with its t before rounding. Every triangle is
+/// decided exactly.
 pub(crate) fn add_hits(
     object: &ObjectView<'_>,
     inverse: &Inverse,

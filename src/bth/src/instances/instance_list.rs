@@ -1,7 +1,8 @@
 //! The instances whose boxes a ray may enter, in the order of their depths.
 //!
-//! A ray is tested against all nodes that it reaches, in any order, and what it meets is sorted. The stack of a traversal would first visit
-//! all instances in the nearest node, also those that are farther than some in the next node.
+//! A ray is tested against all nodes that it reaches, in any order, and what it meets is sorted.
+//! The stack of a traversal would first visit all instances in the nearest node, also those that
+//! are farther than some in the next node.
 
 use super::box_tests::{entered, limit};
 use super::top_level::TopLevel;
@@ -10,14 +11,16 @@ use crate::bvh::ray_state::key_limit;
 use crate::intersect::boxes::{RaySlabLanes, RaySlabs};
 use crate::simd::{LANES, Simd};
 
-/// The least key of a list. Negative depths, which rounding makes of zero, would not be sorted, and keys near zero would be denormal, since
-/// their lowest bits are overwritten. It is still a lower bound for the comparison with a limit, to which [`key_limit`] adds as much.
-pub(super) const LEAST_KEY: f32 = f32::MIN_POSITIVE;
+/// The least key of a list. Negative depths, which rounding makes of zero, would not be sorted, and
+/// keys near zero would be denormal, since their lowest bits are overwritten. It is still a lower
+/// bound for the comparison with a limit, to which [`key_limit`] adds as much.
+const LEAST_KEY: f32 = f32::MIN_POSITIVE;
 
 /// Greatest number of nodes that a ray is tested against.
 const MAX_NODES: usize = 2 * LANES;
 
-/// Receiver of instances: it returns the greatest t, rounded to f32, of hits that can still change the result, or `None` to end.
+/// Receiver of instances: it returns the greatest t, rounded to f32, of hits that can still change
+/// the result, or `None` to end.
 pub(super) type Visit<'a> = &'a mut dyn FnMut(u32) -> Option<f32>;
 
 /// Up to sixteen instances.
@@ -30,7 +33,8 @@ pub(super) struct InstanceList {
 }
 
 impl InstanceList {
-    /// The instances that a ray may enter before the depth `last`; its tmin is not negative. `None` if these or their nodes are too many.
+    /// The instances that a ray may enter before the depth `last`; its tmin is not negative. `None`
+    /// if these or their nodes are too many.
     #[inline(always)]
     pub(super) fn of<S: Simd>(s: S, top: &TopLevel, slabs: &RaySlabs, last: f32) -> Option<InstanceList> {
         let planes = RaySlabLanes::new(s, slabs);
@@ -68,7 +72,8 @@ impl InstanceList {
         self.count = s.compress_far_to_near(instances, depths, codes, &mut self.codes, &mut self.keys);
     }
 
-    /// Visits the instances, as [`World::enumerate`](super::World::enumerate); `scale` is the depth of t = 1.
+    /// Visits the instances, as [`World::enumerate`](super::World::enumerate); `scale` is the depth
+    /// of t = 1.
     #[inline(always)]
     pub(super) fn visit(&self, scale: f32, mut tmax: f32, visit: Visit<'_>) -> bool {
         let mut greatest = f32::INFINITY;

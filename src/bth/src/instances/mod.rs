@@ -1,45 +1,43 @@
 //! Instances of a scene at a time, and rays through them.
 //!
-//! An update of the time ([`file_scene`]) evaluates the nodes of the scene ([`crate::nodes`]), computes the inverse transform and
-//! the world box of each instance that moved ([`placement`]), and rebuilds the BVH over the boxes ([`top_level`]). In a scene that
-//! the caller builds, a commit ([`caller`]) does the same for the instances that the caller has changed, and may refit the BVH
-//! instead. Rays meet the result ([`world`]) in the same way. A batch of rays ([`batch`]) traverses that BVH, coherent rays as
-//! packets ([`packets`]), of the others those that meet few boxes by lists ([`listed_rays`], through few boxes sixteen rays together:
-//! [`met_by_lanes`]) and the rest with stacks ([`traverse`]); the answers so far end them ([`progress`]). Each visit of an instance by a
-//! ray is queued ([`visit_queue`]); the rays of an object's visits are transformed into its space ([`enter_object`]) and traced there
-//! together, with t unchanged. A single ray ([`one_ray`]), and one whose query reports several hits, goes through the top level alone
-//! ([`enumerate`], [`instance_list`]).
+//! Placing: a file's scene at a time ([`by_file`]) or a commit of a scene builder ([`by_caller`])
+//! gives each instance that moved its inverse transform and its world box ([`placement`]), and
+//! builds or refits the BVH over the boxes ([`top_level`], [`refit`]), whose leaves are instances.
+//! Queries see the result ([`world`]).
+//!
+//! There are three ways through the top level:
+//! - one ray ([`enumerate`], [`one_ray`]), which enters one instance after the other;
+//! - in a batch ([`batch`]), packets of coherent rays ([`packets`]);
+//! - in a batch, lists of the instances that each of the other rays may enter ([`lists`]). Rays
+//!   that reach too many boxes for a list go one by one.
+//!
+//! A batch queues the visits of instances by rays ([`visit_queue`]), transforms the rays of an
+//! object's visits into its space ([`enter_object`]), and traces them there together, with t
+//! unchanged.
 
 mod batch;
 mod box_tests;
-mod caller;
-mod caller_instances;
-mod deformed;
+mod by_caller;
+mod by_file;
 mod enter_object;
 mod enumerate;
 #[cfg(test)]
 pub(crate) mod exact_loop;
-mod file_scene;
 mod instance_list;
-mod listed_rays;
-mod met_by_lanes;
+mod lists;
 mod one_ray;
 mod packets;
 mod placement;
-mod progress;
 mod refit;
-mod scene_batch;
 mod scene_query;
 #[cfg(test)]
 mod test_worlds;
 mod top_level;
 mod top_nodes;
-mod traverse;
 mod visit_queue;
 mod world;
 
-pub(crate) use caller::NewInstance;
-pub(crate) use caller_instances::InstanceRow;
+pub(crate) use by_caller::NewInstance;
 #[cfg(test)]
 pub(crate) use placement::PartBoxes;
 pub(crate) use placement::Placement;
@@ -47,4 +45,4 @@ pub(crate) use placement::Placement;
 pub(crate) use top_level::TopLevel;
 #[cfg(test)]
 pub(crate) use top_nodes::INSTANCE;
-pub(crate) use world::{Placed, World};
+pub(crate) use world::{InstanceRow, Placed, World};

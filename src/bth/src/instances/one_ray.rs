@@ -1,4 +1,5 @@
-//! One ray through the instances: it enters one after the other, the nearest box first, and nothing is queued.
+//! One ray through the instances: it enters one after the other, the nearest box first, and nothing
+//! is queued.
 
 use super::World;
 use crate::bvh::coherence::is_same_octant;
@@ -29,14 +30,15 @@ fn min_incoherent_rays() -> usize {
 }
 
 /// An instance that a ray enters.
-struct Entered<'a> {
+struct EnteredObject<'a> {
     object: &'a ObjectView<'a>,
     /// The ray in the space of the object.
     ray: ObjectRay,
 }
 
 impl World {
-    /// Whether the rays of a batch are so few that they are faster one by one; measured, see docs/notes/scenes.md.
+    /// Returns true if the rays of a batch are so few that they are faster one by one; measured,
+    /// see docs/notes/scenes.md.
     pub(crate) fn go_one_by_one(&self, rays: &[Ray]) -> bool {
         if self.has_single_visible() {
             return rays.len() < MIN_RAYS_OF_ONE_INSTANCE;
@@ -50,7 +52,7 @@ impl World {
     /// Stores the nearest hit of a ray, or [`Hit::MISS`], as [`Self::nearest`] does for many.
     #[inline(never)]
     pub(crate) fn store_nearest_of_ray(&self, objects: &Objects, ray: WorldRay<'_>, best: &mut Hit) {
-        self.nearest_by((objects, ray), best, |&Entered { object, ray: of_object }, instance, hit| {
+        self.nearest_by((objects, ray), best, |&EnteredObject { object, ray: of_object }, instance, hit| {
             *hit = ray.in_object(
                 instance,
                 &of_object.ray,
@@ -63,16 +65,20 @@ impl World {
     /// As [`Self::store_nearest_of_ray`], with the statistics of the traversal of objects.
     pub(crate) fn nearest_counted(&self, objects: &Objects, ray: WorldRay<'_>) -> (Hit, Steps) {
         let (mut best, mut steps) = (Hit::MISS, Steps::default());
-        self.nearest_by((objects, ray), &mut best, |&Entered { object, ray: of_object }, instance, hit| {
-            let counted = ray.in_object(
-                instance,
-                &of_object.ray,
-                |start| object::nearest_counted(object, start, instance),
-                |ray| object::nearest_counted(object, ray, instance),
-            );
-            *hit = counted.0;
-            steps += counted.1;
-        });
+        self.nearest_by(
+            (objects, ray),
+            &mut best,
+            |&EnteredObject { object, ray: of_object }, instance, hit| {
+                let counted = ray.in_object(
+                    instance,
+                    &of_object.ray,
+                    |start| object::nearest_counted(object, start, instance),
+                    |ray| object::nearest_counted(object, ray, instance),
+                );
+                *hit = counted.0;
+                steps += counted.1;
+            },
+        );
         (best, steps)
     }
 
@@ -82,7 +88,7 @@ impl World {
         &self,
         (objects, world_ray): (&Objects, WorldRay<'_>),
         best: &mut Hit,
-        mut trace: impl FnMut(&Entered<'_>, u32, &mut Hit),
+        mut trace: impl FnMut(&EnteredObject<'_>, u32, &mut Hit),
     ) {
         *best = Hit::MISS;
         let ray = world_ray.ray;
@@ -99,7 +105,7 @@ impl World {
         });
     }
 
-    /// Whether a ray hits anything, as [`Self::any`] computes it for many.
+    /// Returns true if a ray hits anything, as [`Self::any`] computes it for many.
     #[inline(never)]
     pub(crate) fn any_of_ray(&self, objects: &Objects, ray: WorldRay<'_>) -> bool {
         self.enumerate(ray.ray, &mut |instance| {
@@ -116,11 +122,11 @@ impl World {
     }
 
     #[inline(always)]
-    fn enter<'a>(&self, objects: &'a Objects, instance: u32, world_ray: WorldRay<'a>) -> Entered<'a> {
+    fn enter<'a>(&self, objects: &'a Objects, instance: u32, world_ray: WorldRay<'a>) -> EnteredObject<'a> {
         let placement = self.placement(instance);
         self.mark_traced(placement.object());
         let start = world_ray.start_in(instance);
-        Entered {
+        EnteredObject {
             object: objects.view(placement.object()),
             ray: placement.inverse.ray_from(world_ray.ray, start),
         }

@@ -1,11 +1,12 @@
 //! Packets of up to 64 coherent rays in the top level.
 //!
-//! A packet is traversed once: all instances whose boxes any of its rays may intersect are listed, nearest first, and then
-//! visited one after the other. If the list exceeds its limit, the rays are traversed one by one, because most of the listed
-//! instances would be occluded by others.
+//! A packet is traversed once: all instances whose boxes any of its rays may intersect are listed,
+//! nearest first, and then visited one after the other. If the list exceeds its limit, the rays are
+//! traversed one by one, because most of the listed instances would be occluded by others.
 
+use super::batch::Chunk;
 use super::box_tests::limit_lanes;
-use super::progress::Progress;
+use super::scene_query::BatchProgress;
 use super::top_level::TopLevel;
 use super::top_nodes::INSTANCE;
 use super::visit_queue::VisitQueue;
@@ -23,7 +24,7 @@ use crate::simd::{CacheLevel, LANES, Part, Simd};
 use bth_format::layout::WIDTH;
 use bth_format::object::ObjectBounds;
 
-/// Greatest number of instances that a packet lists.
+/// Max number of instances that a packet lists.
 const MAX_INSTANCES: usize = 64;
 /// Entries of the stack of nodes; rays that need more are not traced as a packet.
 const MAX_STACKED_NODES: usize = 64;
@@ -31,15 +32,16 @@ const MAX_STACKED_NODES: usize = 64;
 /// An instance whose box is intersected by rays of a packet.
 #[derive(Clone, Copy, Debug)]
 struct ListedInstance {
-    /// Lower bound of the depth at which any of the rays enters the box; a depth is t times the greatest |component| of the
-    /// direction.
+    /// Lower bound of the depth at which any of the rays enters the box; a depth is t times the
+    /// max |component| of the direction.
     depth: f32,
     instance: u32,
     /// Bit i is set if ray i of the packet intersects the box.
     rays: u64,
 }
 
-/// Sorts instances by depth. A function of its own, so that it is compiled once for all instruction sets.
+/// Sorts instances by depth. A function of its own, so that it is compiled once for all instruction
+/// sets.
 #[inline(never)]
 fn sort_by_depth(items: &mut [ListedInstance]) {
     items.sort_unstable_by(|a, b| a.depth.total_cmp(&b.depth));
@@ -61,10 +63,12 @@ struct TopLevelPacket {
 }
 
 impl TopLevelPacket {
-    /// For each ray the greatest depth of hits that can still change its result, given the answers so far from its first ray on.
+    /// For each ray the max depth of hits that can still change its result, given the answers
+    /// so far from its first ray on.
     #[inline(always)]
-    fn limits<S: Simd>(&self, s: S, progress: Progress<'_>) -> [S::F; GROUPS] {
-        // All are stored before any is loaded, because a vector waits for what was just stored in parts.
+    fn limits<S: Simd>(&self, s: S, progress: BatchProgress<'_>) -> [S::F; GROUPS] {
+        // All are stored before any is loaded, because a vector waits for what was just stored in
+        // parts.
         let mut tmax = [[f32::NEG_INFINITY; LANES]; GROUPS];
         for (ray, tmax) in tmax.as_flattened_mut()[..self.count as usize].iter_mut().enumerate() {
             *tmax = progress.tmax(ray);
@@ -104,14 +108,16 @@ enum Listed {
 }
 
 impl TopLevelPackets {
-    /// Whether there are no packets.
+    /// Returns true if there are no packets.
     pub(super) fn is_empty(&self) -> bool {
         self.packets.is_empty()
     }
 
-    /// Makes packets of the coherent rays of a chunk, and stores the indices of the other rays in `rest`.
+    /// Makes packets of the coherent rays of a chunk, and stores the indices of the other rays in
+    /// `rest`.
     #[inline(always)]
-    pub(super) fn start<S: Simd>(&mut self, s: S, top: &TopLevel, rays: &[Ray], rest: &mut Vec<u32>) {
+    pub(super) fn start<S: Simd>(&mut self, s: S, chunk: &Chunk<'_>, rest: &mut Vec<u32>) {
+        let (top, rays) = (chunk.top, chunk.rays);
         self.items.clear();
         self.packets.clear();
         rest.clear();
@@ -214,14 +220,16 @@ impl TopLevelPackets {
         Listed::All
     }
 
-    /// Advances each packet to the next instance whose box any of its rays may still intersect, and queues the visits. Packets without a
-    /// further instance are removed. `first_ray` is added to the index of the ray of a visit.
+    /// Advances each packet to the next instance whose box any of its rays may still intersect, and
+    /// queues the visits. Packets without a further instance are removed. `first_ray` is added to
+    /// the index of the ray of a visit.
     #[inline(always)]
     pub(super) fn advance<S: Simd>(
         &mut self,
         s: S,
-        progress: Progress<'_>,
-        (first_ray, visits): (u32, &mut VisitQueue),
+        progress: BatchProgress<'_>,
+        first_ray: u32,
+        visits: &mut VisitQueue,
     ) {
         let TopLevelPackets { items, packets, .. } = self;
         let mut kept = 0;

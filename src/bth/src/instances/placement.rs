@@ -1,13 +1,15 @@
 //! An instance in the world: its inverse transform and a conservative world box.
 
 use crate::nodes::affine::{Affine, Inverse};
+use bth_format::error::Code;
 use bth_format::layout::{NONE, Object, WIDTH};
 use bth_format::object::ObjectView;
 use std::num::NonZeroU32;
 
-/// Bound of the distance by which rounding may move a ray relative to the instance, in units of the magnitudes given at
-/// [`Placement::new`]: 2^-24 for each component of origin and direction, and the error of the inverse, below 2^-53 times ten
-/// times the greatest condition number of 2^24. The constant is more than four times their sum.
+/// Bound of the distance by which rounding may move a ray relative to the instance, in units of the
+/// magnitudes given at [`Placement::new`]: 2^-24 for each component of origin and direction, and
+/// the error of the inverse, below 2^-53 times ten times the max condition number of 2^24. The
+/// constant is more than four times their sum.
 const ROUNDING: f64 = 1.0 / (1 << 21) as f64;
 
 /// The placement of a visible instance in world space.
@@ -15,13 +17,15 @@ const ROUNDING: f64 = 1.0 / (1 << 21) as f64;
 pub(crate) struct Placement {
     /// The transform from world space to object space.
     pub(crate) inverse: Inverse,
-    /// Lower end of the world box, which includes the part of the rounding that does not depend on the ray.
+    /// Lower end of the world box, which includes the part of the rounding that does not depend on
+    /// the ray.
     pub(crate) lower: [f32; 3],
     /// Upper end of the box.
     pub(crate) upper: [f32; 3],
     /// One more than the index of the object, so that `Option<Placement>` needs no further memory.
     object: NonZeroU32,
-    /// The part of the rounding that depends on the ray: the box must be enlarged on all sides by this factor times the greatest
+    /// The part of the rounding that depends on the ray: the box must be enlarged on all sides by
+    /// this factor times the max
     /// |coordinate| of the ray's origin.
     pub(crate) origin_slack: f32,
 }
@@ -34,7 +38,8 @@ const BLOCK: usize = 4;
 pub(crate) struct PartBoxes {
     /// Number of blocks in use.
     blocks: usize,
-    /// For each axis the lower and the upper ends of the boxes, in blocks. Blocks are filled up with copies of the first box.
+    /// For each axis the lower and the upper ends of the boxes, in blocks. Blocks are filled up
+    /// with copies of the first box.
     bounds: [[[[f64; BLOCK]; WIDTH / BLOCK]; 2]; 3],
 }
 
@@ -64,10 +69,11 @@ impl PartBoxes {
         }
     }
 
-    /// The least and the greatest scalar product of `row` with any point of the boxes.
+    /// The min and the max scalar product of `row` with any point of the boxes.
     #[inline(always)]
     fn extent_along(&self, row: [f64; 3]) -> [f64; 2] {
-        // The signs of the row's elements determine at which corners of a box the product is least and greatest.
+        // The signs of the row's elements determine at which corners of a box the product is
+        // smallest and largest.
         let mut ends = [[&self.bounds[0][0]; 2]; 3];
         for k in 0..3 {
             let [low, high] = &self.bounds[k];
@@ -101,16 +107,33 @@ pub(crate) enum PlacementError {
     NotFinite,
 }
 
+impl PlacementError {
+    /// The code of an error about an instance, what is expected, and what was found.
+    pub(crate) fn words(self) -> (Code, &'static str, &'static str) {
+        match self {
+            PlacementError::Singular => {
+                (Code::Singular, "a transform that can be inverted", "one that cannot")
+            }
+            PlacementError::NotFinite => {
+                (Code::NotFinite, "a finite transform and world box", "one that is not")
+            }
+        }
+    }
+}
+
 impl Placement {
-    /// Places an object that has a root. `world` is the transform from object space to world space, `index` the index of the
-    /// object.
+    /// Places an object that has a root. `world` is the transform from object space to world space,
+    /// `index` the index of the object.
     ///
-    /// A hit at t of the ray in object space lies in the object's box. In world space, let o be the origin of the ray and T that
-    /// of the object. Let M be the linear part of the transform, A its inverse, and b the greatest |coordinate| of the object's
-    /// box. The rounding of origin and direction moves the point at t in object space by at most 2^-24 (2 |A (o - T)| + b), hence
-    /// in world space by at most |M| times that: 2^-24 (2 κ (|o| + |T|) + |M| b) where κ = |M| |A|, in the maximum norm.
+    /// A hit at t of the ray in object space lies in the object's box. In world space, let o be the
+    /// origin of the ray and T that of the object. Let M be the linear part of the transform, A its
+    /// inverse, and b the max |coordinate| of the object's box. The rounding of origin and
+    /// direction moves the point at t in object space by at most 2^-24 (2 |A (o - T)| + b), hence
+    /// in world space by at most |M| times that: 2^-24 (2 κ (|o| + |T|) + |M| b) where κ = |M| |A|,
+    /// in the maximum norm.
     ///
-    /// `parts` are boxes that contain all triangles of the object. Tighter boxes give a tighter world box.
+    /// `parts` are boxes that contain all triangles of the object. Tighter boxes give a tighter
+    /// world box.
     #[inline(never)]
     pub(crate) fn new(
         world: &Affine,

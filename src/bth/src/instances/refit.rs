@@ -1,10 +1,10 @@
-//! Refitting of the top level: instances have moved, and the boxes of the same nodes are computed again, from the leaves up. A refit
-//! costs a fraction of a build, but nodes grow where instances that share one move apart.
-//! [`CostRatio`](super::top_nodes::CostRatio) tells how much.
+//! Refitting of the top level: instances have moved, and the boxes of the same nodes are computed
+//! again, from the leaves up. A refit costs a fraction of a build, but nodes grow where instances
+//! that share one move apart. [`CostRatio`](super::top_nodes::CostRatio) tells how much.
 
 use super::placement::Placement;
 use super::top_level::TopLevel;
-use super::top_nodes::{Bounds, INSTANCE, node_mut, put_bounds, used};
+use super::top_nodes::{INSTANCE, InstanceBounds, node_mut, put_bounds, used};
 use bth_format::layout::{CacheLine, NODE_LINES, WIDTH, WideNode};
 use glam::Vec4;
 
@@ -16,12 +16,14 @@ const MIN_PARALLEL: usize = 512;
 const TASK: usize = 64;
 
 impl TopLevel {
-    /// Computes all boxes again after instances have moved. The visible instances are those for which the BVH was built.
+    /// Computes all boxes again after instances have moved. The visible instances are those for
+    /// which the BVH was built.
     pub(crate) fn refit(&mut self, placements: &[Option<Placement>]) {
         self.measure(placements);
         let mut lines = std::mem::take(&mut self.lines);
         self.refit_instances(&mut lines, placements);
-        // Children come behind their parents, so that their boxes are final when the parent is reached.
+        // Children come behind their parents, so that their boxes are final when the parent is
+        // reached.
         for code in (0..lines.len()).step_by(NODE_LINES).rev() {
             let (node, behind) = lines[code..].split_at_mut(NODE_LINES);
             let node = node_mut(node);
@@ -65,14 +67,15 @@ impl TopLevel {
         }
     }
 
-    /// The expected cost relative to that when the BVH was built. It is 1 where there is only one node, or none.
+    /// The expected cost relative to that when the BVH was built. It is 1 where there is only one
+    /// node, or none.
     pub(super) fn cost_ratio(&self) -> f64 {
         self.cost.ratio()
     }
 }
 
 /// The box of all children of a node. Empty slots hold boxes that change no union.
-fn union(node: &WideNode) -> Bounds {
+fn union(node: &WideNode) -> InstanceBounds {
     let (mut lower, mut upper) = ([0.0; 4], [0.0; 4]);
     for k in 0..3 {
         let (mut least, mut greatest) = (f32::INFINITY, f32::NEG_INFINITY);
@@ -83,5 +86,5 @@ fn union(node: &WideNode) -> Bounds {
         }
         (lower[k], upper[k]) = (-least, greatest);
     }
-    Bounds { lower: Vec4::from_array(lower), upper: Vec4::from_array(upper) }
+    InstanceBounds { lower: Vec4::from_array(lower), upper: Vec4::from_array(upper) }
 }

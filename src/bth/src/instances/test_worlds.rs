@@ -22,8 +22,9 @@ pub(super) fn unit(rng: &mut Rng) -> f64 {
     rng.below(1 << 30) as f64 / (1u64 << 29) as f64 - 1.0
 }
 
-/// A random transform: a rotation with scales of either sign, a translation of magnitude `spread`, and in one of four cases a
-/// shear. In one of three cases rotation and translation lie on a coarse grid, so that rays often hit edges exactly.
+/// A random transform: a rotation with scales of either sign, a translation of magnitude `spread`,
+/// and in one of four cases a shear. In one of three cases rotation and translation lie on a coarse
+/// grid, so that rays often hit edges exactly.
 fn transform(rng: &mut Rng, spread: f64) -> Affine {
     let coarse = rng.below(3) == 0;
     let number = |rng: &mut Rng| if coarse { (unit(rng) * 2.0).round() } else { unit(rng) };

@@ -1,32 +1,35 @@
-//! The top-level BVH over the instances of a scene: 16 children per node, built by midpoint splits. Where instances only move, its
-//! boxes can be computed again in the same nodes ([`super::refit`]).
+//! The top-level BVH over the instances of a scene: 16 children per node, built by midpoint splits.
+//! Where instances only move, its boxes can be computed again in the same nodes ([`super::refit`]).
 //!
-//! Sixteen instances or fewer become the children of one node. Splitting them further would give nodes with two or three
-//! children, whose empty slots cost memory and time.
+//! Sixteen instances or fewer become the children of one node. Splitting them further would give
+//! nodes with two or three children, whose empty slots cost memory and time.
 
 use super::placement::Placement;
-use super::top_nodes::{Bounds, CostRatio, INSTANCE, node, node_mut, put_bounds};
+use super::top_nodes::{CostRatio, INSTANCE, InstanceBounds, node, node_mut, put_bounds};
 use bth_format::layout::{CacheLine, NODE_LINES, NONE, WIDTH, WideNode};
 use bth_format::limits::MAX_DEPTH;
 use bth_format::object::ObjectBounds;
 use glam::Vec4;
 
-/// The boxes are built for rays whose origin has at most this factor times the greatest |coordinate| of the instances' boxes. For
-/// rays from farther away they are widened during traversal, see [`TopLevel::origin_slack`].
+/// The boxes are built for rays whose origin has at most this factor times the max
+/// |coordinate| of the instances' boxes. For rays from farther away they are widened during
+/// traversal, see [`TopLevel::origin_slack`].
 const REACH: f32 = 4.0;
 
 /// The top-level BVH.
 #[derive(Debug, Default)]
 pub(crate) struct TopLevel {
-    /// The nodes, the root first and parents before their children, aligned to cache lines like those of objects. The child code of
-    /// a node is the index of its first line, that of an instance is [`INSTANCE`] and its index.
+    /// The nodes, the root first and parents before their children, aligned to cache lines like
+    /// those of objects. The child code of a node is the index of its first line, that of an
+    /// instance is [`INSTANCE`] and its index.
     pub(super) lines: Vec<CacheLine>,
-    /// Greatest |coordinate| of the instances' boxes.
+    /// Max |coordinate| of the instances' boxes.
     pub(crate) extent: f32,
-    /// For rays whose origin has a |coordinate| greater than this, the boxes are widened by `origin_slack` times that
+    /// For rays whose origin has a |coordinate| greater than this, the boxes are widened by
+    /// `origin_slack` times that
     /// |coordinate|.
     pub(crate) reach: f32,
-    /// Greatest [`Placement::origin_slack`] of the instances.
+    /// Max [`Placement::origin_slack`] of the instances.
     pub(crate) origin_slack: f32,
     /// The cube that holds all boxes in the nodes, for the preparation of rays.
     pub(super) cube: ObjectBounds,
@@ -36,8 +39,8 @@ pub(crate) struct TopLevel {
 }
 
 /// From this level on, ranges are halved by their number of instances: instances whose distances
-/// differ by hundreds of powers of two would otherwise make a tree that is deeper than stacks allow.
-/// Each of the levels below at least halves the up to 2^30 instances.
+/// differ by hundreds of powers of two would otherwise make a tree that is deeper than stacks
+/// allow. Each of the levels below at least halves the up to 2^30 instances.
 const HALVED_LEVEL: u32 = MAX_DEPTH as u32 - 28;
 
 /// From this number of visible instances on, the subtrees of the root are built by several threads.
@@ -47,16 +50,19 @@ const MIN_PARALLEL: usize = 4096;
 /// A visible instance, while the BVH is built.
 #[derive(Clone, Copy, Debug)]
 struct BuildItem {
-    /// Its world box, widened for rays from within the reach. In the unused number of the lower end are the bits of its index.
-    bounds: Bounds,
+    /// Its world box, widened for rays from within the reach. In the unused number of the lower end
+    /// are the bits of its index.
+    bounds: InstanceBounds,
 }
 
-/// Bits of the least normal number. Indices of instances are below 2^30, so their sum is far below the bits of infinity.
+/// Bits of the smallest normal number. Indices of instances are below 2^30, so their sum is far
+/// below the bits of infinity.
 const LEAST_NORMAL: u32 = f32::MIN_POSITIVE.to_bits();
 
 impl BuildItem {
-    fn new(mut bounds: Bounds, instance: u32) -> BuildItem {
-        // Neither a denormal number, with which arithmetic may be slow, nor a NaN, whose bits might not survive a copy.
+    fn new(mut bounds: InstanceBounds, instance: u32) -> BuildItem {
+        // Neither a denormal number, with which arithmetic may be slow, nor a NaN, whose bits might
+        // not survive a copy.
         bounds.lower.w = f32::from_bits(instance + LEAST_NORMAL);
         BuildItem { bounds }
     }
@@ -70,10 +76,10 @@ impl BuildItem {
 struct ItemRange {
     first: u32,
     end: u32,
-    bounds: Bounds,
-    /// For each axis twice the least coordinate of the items' centres, negated.
+    bounds: InstanceBounds,
+    /// For each axis twice the min coordinate of the items' centres, negated.
     least: Vec4,
-    /// For each axis twice the greatest coordinate of the items' centres.
+    /// For each axis twice the max coordinate of the items' centres.
     greatest: Vec4,
 }
 
@@ -81,7 +87,7 @@ impl ItemRange {
     /// A range without items that begins at `first`.
     fn empty(first: u32) -> ItemRange {
         let none = Vec4::NEG_INFINITY;
-        ItemRange { first, end: first, bounds: Bounds::EMPTY, least: none, greatest: none }
+        ItemRange { first, end: first, bounds: InstanceBounds::EMPTY, least: none, greatest: none }
     }
 
     fn of(first: u32, items: &[BuildItem]) -> ItemRange {
@@ -91,9 +97,10 @@ impl ItemRange {
         range
     }
 
-    /// Enlarges the boxes for an item if `limit` is infinite, and leaves them as they are if it is negative infinity.
+    /// Enlarges the boxes for an item if `limit` is infinite, and leaves them as they are if it is
+    /// negative infinity.
     #[inline(always)]
-    fn enclose(&mut self, bounds: &Bounds, limit: Vec4) {
+    fn enclose(&mut self, bounds: &InstanceBounds, limit: Vec4) {
         let center = bounds.upper - bounds.lower;
         self.bounds.lower = self.bounds.lower.max(bounds.lower.min(limit));
         self.bounds.upper = self.bounds.upper.max(bounds.upper.min(limit));
@@ -108,7 +115,7 @@ impl ItemRange {
 
 /// A node whose children are not yet determined.
 #[derive(Clone, Copy, Debug)]
-struct Task {
+struct BuildTask {
     node: u32,
     /// Level in the BVH; 1 for the root.
     level: u32,
@@ -148,14 +155,14 @@ impl TopLevel {
     }
 
     /// The world box of an instance, widened for rays from within the reach.
-    pub(super) fn bounds_of(&self, placement: &Placement) -> Bounds {
+    pub(super) fn bounds_of(&self, placement: &Placement) -> InstanceBounds {
         let pad = (placement.origin_slack * self.reach).next_up();
         let (mut lower, mut upper) = ([0.0; 4], [0.0; 4]);
         for k in 0..3 {
             lower[k] = -((placement.lower[k] - pad).next_down().max(f32::MIN));
             upper[k] = (placement.upper[k] + pad).next_up().min(f32::MAX);
         }
-        Bounds { lower: Vec4::from_array(lower), upper: Vec4::from_array(upper) }
+        InstanceBounds { lower: Vec4::from_array(lower), upper: Vec4::from_array(upper) }
     }
 
     fn build_from(&mut self, items: &mut [BuildItem]) {
@@ -214,12 +221,12 @@ impl TopLevel {
         node(&self.lines[code as usize..][..NODE_LINES])
     }
 
-    /// Whether no instance is visible.
+    /// Returns true if no instance is visible.
     pub(crate) fn is_empty(&self) -> bool {
         self.lines.is_empty()
     }
 
-    /// Greatest |coordinate| of the boxes in the nodes.
+    /// Max |coordinate| of the boxes in the nodes.
     pub(crate) fn greatest_coordinate(&self) -> f32 {
         (self.extent + self.origin_slack * self.reach).next_up().next_up()
     }
@@ -230,11 +237,12 @@ impl TopLevel {
     }
 }
 
-/// Adds the nodes over a range of the items to `lines`, the root first, which is on a given level; returns the greatest level.
+/// Adds the nodes over a range of the items to `lines`, the root first, which is on a given level;
+/// returns the max level.
 fn build_subtree(lines: &mut Vec<CacheLine>, items: &mut [BuildItem], range: ItemRange, level: u32) -> u32 {
     let mut depth = level;
-    let mut tasks = vec![Task { node: add_node(lines), level, range }];
-    while let Some(Task { node, level, range }) = tasks.pop() {
+    let mut tasks = vec![BuildTask { node: add_node(lines), level, range }];
+    while let Some(BuildTask { node, level, range }) = tasks.pop() {
         depth = depth.max(level);
         if range.len() <= WIDTH as u32 {
             for (slot, item) in items[range.first as usize..range.end as usize].iter().enumerate() {
@@ -247,7 +255,7 @@ fn build_subtree(lines: &mut Vec<CacheLine>, items: &mut [BuildItem], range: Ite
         for (slot, range) in ranges[..count].iter().enumerate() {
             let child = add_node(lines);
             put(lines, node, slot, child, &range.bounds);
-            tasks.push(Task { node: child, level: level + 1, range: *range });
+            tasks.push(BuildTask { node: child, level: level + 1, range: *range });
         }
     }
     depth
@@ -262,14 +270,15 @@ fn add_node(lines: &mut Vec<CacheLine>) -> u32 {
 }
 
 /// Stores a child in a slot of a node.
-fn put(lines: &mut [CacheLine], node: u32, slot: usize, code: u32, bounds: &Bounds) {
+fn put(lines: &mut [CacheLine], node: u32, slot: usize, code: u32, bounds: &InstanceBounds) {
     let node = node_mut(&mut lines[node as usize..][..NODE_LINES]);
     node.child[slot] = code;
     put_bounds(node, slot, bounds);
 }
 
-/// Splits the first range into up to 16, always the one of greatest area among those with more items than a node has children.
-/// Returns the number of ranges. With `halved` they are split by number, not by place.
+/// Splits the first range into up to 16, always the one of greatest area among those with more
+/// items than a node has children. Returns the number of ranges. With `halved` they are split by
+/// number, not by place.
 fn split_into(items: &mut [BuildItem], ranges: &mut [ItemRange; WIDTH], halved: bool) -> usize {
     let priority =
         |range: &ItemRange| if range.len() > WIDTH as u32 { range.bounds.area() } else { f64::NEG_INFINITY };
@@ -289,11 +298,12 @@ fn split_into(items: &mut [BuildItem], ranges: &mut [ItemRange; WIDTH], halved: 
     count
 }
 
-/// Splits a range of at least two items at the middle of their centres, along the axis on which the centres have the greatest
-/// extent. If all centres lie on one side, or if `halved` is set, the range is halved.
+/// Splits a range of at least two items at the middle of their centres, along the axis on which the
+/// centres have the greatest extent. If all centres lie on one side, or if `halved` is set, the
+/// range is halved.
 fn split(items: &mut [BuildItem], range: ItemRange, halved: bool) -> (ItemRange, ItemRange) {
     let items = &mut items[range.first as usize..range.end as usize];
-    // Differences may overflow to infinity, which is then the greatest extent.
+    // Differences may overflow to infinity, which is then the max extent.
     let spread = (range.greatest + range.least).to_array();
     let axis = (0..3).fold(0, |best, k| if spread[k] > spread[best] { k } else { best });
     let middle = (range.greatest / 2.0 - range.least / 2.0).to_array()[axis];
@@ -338,8 +348,9 @@ mod tests {
     fn subtrees_on_deep_levels_are_halved_and_stay_within_the_depth_of_stacks() {
         // Each instance is twice as far away as the one before, a hundred times over.
         let place = |i: u32| Vec4::splat((0.5f32).powi(i as i32 / 100) * (i % 100 + 1) as f32);
-        let items: Vec<BuildItem> =
-            (0..10_000).map(|i| BuildItem::new(Bounds { lower: -place(i), upper: place(i) }, i)).collect();
+        let items: Vec<BuildItem> = (0..10_000)
+            .map(|i| BuildItem::new(InstanceBounds { lower: -place(i), upper: place(i) }, i))
+            .collect();
         for (level, most) in [(1, HALVED_LEVEL), (HALVED_LEVEL, MAX_DEPTH as u32 - 10)] {
             let (mut items, mut lines) = (items.clone(), Vec::new());
             let range = ItemRange::of(0, &items);

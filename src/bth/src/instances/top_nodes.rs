@@ -1,4 +1,5 @@
-//! The nodes of the top-level BVH: boxes, child codes, and what rays through them are expected to cost.
+//! The nodes of the top-level BVH: boxes, child codes, and what rays through them are expected to
+//! cost.
 
 use bth_format::layout::{CacheLine, Child, NODE_LINES, NONE, WIDTH, WideNode};
 use glam::Vec4;
@@ -7,16 +8,17 @@ use zerocopy::{FromBytes, IntoBytes};
 /// Bit of the child codes of instances; the other bits are the index of the instance.
 pub(crate) const INSTANCE: u32 = Child::LEAF_BIT;
 
-/// A box: the three lower ends, negated so that a union is a maximum of all values, and the three upper ends. The fourth numbers have
-/// no meaning; they fill vector registers.
+/// A box: the three lower ends, negated so that a union is a maximum of all values, and the three
+/// upper ends. The fourth numbers have no meaning; they fill vector registers.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Bounds {
+pub(super) struct InstanceBounds {
     pub(super) lower: Vec4,
     pub(super) upper: Vec4,
 }
 
-impl Bounds {
-    pub(super) const EMPTY: Bounds = Bounds { lower: Vec4::NEG_INFINITY, upper: Vec4::NEG_INFINITY };
+impl InstanceBounds {
+    pub(super) const EMPTY: InstanceBounds =
+        InstanceBounds { lower: Vec4::NEG_INFINITY, upper: Vec4::NEG_INFINITY };
 
     /// Half the surface area, in f64 because f32 could overflow.
     pub(super) fn area(&self) -> f64 {
@@ -38,7 +40,7 @@ pub(super) fn node_mut(lines: &mut [CacheLine]) -> &mut WideNode {
 }
 
 /// Stores the box of a child in a slot of a node.
-pub(super) fn put_bounds(node: &mut WideNode, slot: usize, bounds: &Bounds) {
+pub(super) fn put_bounds(node: &mut WideNode, slot: usize, bounds: &InstanceBounds) {
     let (lower, upper) = (bounds.lower.to_array(), bounds.upper.to_array());
     for k in 0..3 {
         node.bounds[k][0][slot] = -lower[k];
@@ -51,17 +53,18 @@ pub(super) fn used(node: &WideNode) -> usize {
     node.child.iter().position(|code| *code == NONE).unwrap_or(WIDTH)
 }
 
-fn slot_bounds(node: &WideNode, slot: usize) -> Bounds {
+fn slot_bounds(node: &WideNode, slot: usize) -> InstanceBounds {
     let end = |end: usize| [0, 1, 2].map(|k| node.bounds[k][end][slot]);
     let ([a, b, c], [d, e, f]) = (end(0), end(1));
-    Bounds { lower: Vec4::new(-a, -b, -c, 0.0), upper: Vec4::new(d, e, f, 0.0) }
+    InstanceBounds { lower: Vec4::new(-a, -b, -c, 0.0), upper: Vec4::new(d, e, f, 0.0) }
 }
 
 /// The expected cost of rays through the top level, now and when it was built.
 ///
-/// A line that meets a box meets a box within with the probability of the ratio of their surface areas. So the area of all nodes
-/// relative to that of all instances is the expected number of nodes that a random line visits for each instance that it visits.
-/// Unlike a cost relative to the area of the root, it does not become less when an instance moves far away.
+/// A line that meets a box meets a box within with the probability of the ratio of their surface
+/// areas. So the area of all nodes relative to that of all instances is the expected number of
+/// nodes that a random line visits for each instance that it visits. Unlike a cost relative to the
+/// area of the root, it does not become less when an instance moves far away.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct CostRatio {
     built: f64,
@@ -80,7 +83,8 @@ impl CostRatio {
         self.now = cost(lines);
     }
 
-    /// The cost now relative to that when the BVH was built. It is 1 where there is only one node, or none.
+    /// The cost now relative to that when the BVH was built. It is 1 where there is only one node,
+    /// or none.
     pub(super) fn ratio(&self) -> f64 {
         let ratio = self.now / self.built;
         if ratio.is_nan() { 1.0 } else { ratio }

@@ -5,7 +5,7 @@ use crate::simd::{LANES, Simd};
 
 /// Several visits of one instance that follow each other.
 #[derive(Clone, Copy)]
-struct Run {
+struct VisitRun {
     instance: u32,
     count: u32,
 }
@@ -16,10 +16,11 @@ pub(super) struct VisitQueue {
     /// Visits in the order in which they were queued.
     pub(super) all: Vec<Visit>,
     /// The runs that `all` begins with.
-    runs: Vec<Run>,
+    runs: Vec<VisitRun>,
     /// The same visits in the order of the instances.
     pub(super) sorted: Vec<Visit>,
-    /// Runs of `sorted` through instances that few rays visit: the object in the upper half, the first visit in the lower.
+    /// Runs of `sorted` through instances that few rays visit: the object in the upper half, the
+    /// first visit in the lower.
     pub(super) short_runs: Vec<u64>,
     /// The visits of several such runs with the same object.
     pub(super) gathered: Vec<Visit>,
@@ -35,7 +36,8 @@ impl VisitQueue {
         self.runs.clear();
     }
 
-    /// Queues visits of an instance by up to 64 rays, a bit each from the index `first` on; before any single visits.
+    /// Queues visits of an instance by up to 64 rays, a bit each from the index `first` on; before
+    /// any single visits.
     #[inline(always)]
     pub(super) fn push_run<S: Simd>(&mut self, s: S, first: u32, rays: u64, instance: u32) {
         const ROW: [u32; LANES] = {
@@ -64,10 +66,11 @@ impl VisitQueue {
             index = s.add_u(index, s.splat_u(LANES as u32));
         }
         self.all.truncate(count);
-        self.runs.push(Run { instance, count: rays.count_ones() });
+        self.runs.push(VisitRun { instance, count: rays.count_ones() });
     }
 
-    /// Fills `sorted` with all visits, by instance and then by ray: a counting sort, or for few visits a comparison sort.
+    /// Fills `sorted` with all visits, by instance and then by ray: a counting sort, or for few
+    /// visits a comparison sort.
     pub(super) fn sort(&mut self, instances: usize) {
         let VisitQueue { all, runs, sorted, next, keys, .. } = self;
         sorted.clear();

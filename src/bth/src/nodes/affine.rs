@@ -5,8 +5,8 @@ use crate::rays::Ray;
 use crate::simd::LANES;
 use bth_format::layout::Node;
 
-/// Greatest condition number, in the maximum norm, of transforms that are not treated as singular. Beyond it the rounding of rays
-/// to f32 in object space, 2^-24, would be as large as the object.
+/// Max condition number, in the maximum norm, of transforms that are not treated as singular.
+/// Beyond it the rounding of rays to f32 in object space, 2^-24, would be as large as the object.
 const GREATEST_CONDITION: f64 = (1u64 << 24) as f64;
 
 /// An affine transform: a point p is mapped to `linear * p + translation`.
@@ -27,7 +27,7 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Maximum norm of a matrix: the greatest sum of the absolute values of a row.
+/// Maximum norm of a matrix: the max sum of the absolute values of a row.
 #[inline(always)]
 fn norm(rows: &[[f64; 3]; 3]) -> f64 {
     let mut greatest = 0.0;
@@ -38,7 +38,7 @@ fn norm(rows: &[[f64; 3]; 3]) -> f64 {
     greatest
 }
 
-/// Whether all elements are finite, without branches.
+/// Returns true if all elements are finite, without branches.
 #[inline(always)]
 fn all_finite(rows: &[[f64; 3]; 3]) -> bool {
     let mut finite = true;
@@ -64,11 +64,12 @@ impl Affine {
     pub(crate) const IDENTITY: Affine =
         Affine { linear: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
 
-    /// The transform that scales, then rotates by a quaternion, which is normalized here, then translates. It is not finite if
-    /// the quaternion is zero. `parts` are translation, quaternion (x, y, z, w) and scale.
+    /// The transform that scales, then rotates by a quaternion, which is normalized here, then
+    /// translates. It is not finite if the quaternion is zero. `parts` are translation, quaternion
+    /// (x, y, z, w) and scale.
     pub(crate) fn from_parts(parts: &[f64; 10]) -> Affine {
         let [t0, t1, t2, x, y, z, w, sx, sy, sz] = *parts;
-        // The division by the greatest component keeps squares from overflow and underflow.
+        // The division by the max component keeps squares from overflow and underflow.
         let greatest = [x, y, z, w].iter().fold(0.0f64, |m, c| m.max(c.abs()));
         let [x, y, z, w] = [x, y, z, w].map(|c| c / greatest);
         let length = (x * x + y * y + z * z + w * w).sqrt();
@@ -120,7 +121,7 @@ impl Affine {
         all_finite(&self.linear) & x.is_finite() & y.is_finite() & z.is_finite()
     }
 
-    /// Whether the linear part is zero.
+    /// Returns true if the linear part is zero.
     pub(crate) fn is_zero(&self) -> bool {
         self.linear.iter().flatten().all(|x| *x == 0.0)
     }
@@ -133,13 +134,15 @@ impl Affine {
         })
     }
 
-    /// The inverse, and the condition number of the linear part. `None` if the transform is not finite or treated as singular.
+    /// The inverse, and the condition number of the linear part. `None` if the transform is not
+    /// finite or treated as singular.
     #[inline(always)]
     pub(crate) fn inverse(&self) -> Option<(Inverse, f64)> {
         if !self.is_finite() {
             return None;
         }
-        // Scaling by a power of two brings the greatest element near 1, so that no product overflows or underflows.
+        // Scaling by a power of two brings the max element near 1, so that no product
+        // overflows or underflows.
         let mut greatest = 0.0f64;
         for row in &self.linear {
             for x in row {
@@ -176,7 +179,8 @@ impl Affine {
     }
 }
 
-/// The inverse transform of an instance: a point p in world space is mapped to `linear * (p - origin)` in object space.
+/// The inverse transform of an instance: a point p in world space is mapped to `linear * (p -
+/// origin)` in object space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Inverse {
     /// Rows of the linear part.
@@ -185,12 +189,13 @@ pub(crate) struct Inverse {
     pub(crate) origin: [f64; 3],
 }
 
-/// Greatest |binary exponent| of a direction's greatest component in object space with which it is used without scaling.
+/// Max |binary exponent| of a direction's max component in object space with which it is
+/// used without scaling.
 const MAX_EXPONENT: i32 = 64;
 
-/// The least number with such an exponent.
+/// The min number with such an exponent.
 const LEAST_UNSCALED: f64 = 1.0 / (1u128 << MAX_EXPONENT) as f64;
-/// The least number with a greater exponent.
+/// The min number with a greater exponent.
 const LEAST_SCALED: f64 = (1u128 << (MAX_EXPONENT + 1)) as f64;
 
 /// Sixteen rays, one in each lane.
@@ -211,23 +216,27 @@ impl RayLanes {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ObjectRay {
     pub(crate) ray: Ray,
-    /// Factor from t in object space to t in world space, a power of two: 1 unless the direction would leave the range of f32.
+    /// Factor from t in object space to t in world space, a power of two: 1 unless the direction
+    /// would leave the range of f32.
     pub(crate) t_scale: f32,
 }
 
 impl ObjectRay {
-    /// The ray with the ends of the range of `world`, the same ray in world space, as they are: for t that are compared with them exactly.
-    /// The range of [`Self::ray`] reaches to all t that are rounded to its ends in world space.
+    /// The ray with the ends of the range of `world`, the same ray in world space, as they are: for
+    /// t that are compared with them exactly. The range of [`Self::ray`] reaches to all t that are
+    /// rounded to its ends in world space.
     pub(crate) fn with_exact_range(&self, world: &Ray) -> Ray {
         let end = |t: f32| (f64::from(t) / f64::from(self.t_scale)) as f32;
         Ray { tmin: end(world.tmin), tmax: end(world.tmax), ..self.ray }
     }
 }
 
-/// The greatest t in object space that is at most `t` in world space, where it is the product with `t_scale` = 1 / `scale`, a power of two, rounded to f32.
-/// An end at infinity stands for the farthest t that is finite in world space. NaN stays what it is.
+/// The max t in object space that is at most `t` in world space, where it is the product with
+/// `t_scale` = 1 / `scale`, a power of two, rounded to f32. An end at infinity stands for the
+/// farthest t that is finite in world space. NaN stays what it is.
 pub(super) fn greatest_below(t: f32, scale: f64, t_scale: f32) -> f32 {
-    // Products that are denormal are rounded to multiples of twice this; it is lost in the sum with numbers so great that products are exact.
+    // Products that are denormal are rounded to multiples of twice this; it is lost in the sum with
+    // numbers so great that products are exact.
     const HALF_STEP: f64 = 0.5 * f32::from_bits(1) as f64;
     let t = t.clamp(f32::MIN, f32::MAX);
     let exact = (f64::from(t) + HALF_STEP) * scale;
@@ -237,14 +246,15 @@ pub(super) fn greatest_below(t: f32, scale: f64, t_scale: f32) -> f32 {
 }
 
 impl Inverse {
-    /// Whether object space is world space.
+    /// Returns true if object space is world space.
     pub(crate) fn is_identity(&self) -> bool {
         self.linear == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] && self.origin == [0.0; 3]
     }
 
-    /// Transforms a ray to object space, with the same points at the same t except for one rounding to f32 of each component of
-    /// origin and direction (relative 2^-24). All triangles of an object are tested with the same rounded ray, so there are no
-    /// leaks within an object. Where two objects touch, answers may differ by that rounding from those for one joined object.
+    /// Transforms a ray to object space, with the same points at the same t except for one rounding
+    /// to f32 of each component of origin and direction (relative 2^-24). All triangles of an
+    /// object are tested with the same rounded ray, so there are no leaks within an object. Where
+    /// two objects touch, answers may differ by that rounding from those for one joined object.
     pub(crate) fn ray(&self, ray: &Ray) -> ObjectRay {
         let relative = [0, 1, 2].map(|k| f64::from(ray.origin[k]) - self.origin[k]);
         let direction = ray.direction.map(f64::from);
@@ -266,7 +276,8 @@ impl Inverse {
         ObjectRay { ray: Ray { origin, direction, tmin, tmax }, t_scale }
     }
 
-    /// A point of object space in world space, with rounding errors of f64: the solution of the three equations by Cramer's rule.
+    /// A point of object space in world space, with rounding errors of f64: the solution of the
+    /// three equations by Cramer's rule.
     pub(crate) fn point_in_world(&self, point: [f64; 3]) -> [f64; 3] {
         let [a, b, c] = self.linear;
         let cofactors = [cross(b, c), cross(c, a), cross(a, b)];
@@ -277,7 +288,8 @@ impl Inverse {
         })
     }
 
-    /// As [`Self::ray`], for a ray that may start on a triangle of the object: then its origin is that start, rounded.
+    /// As [`Self::ray`], for a ray that may start on a triangle of the object: then its origin is
+    /// that start, rounded.
     #[inline(always)]
     pub(crate) fn ray_from(&self, ray: &Ray, start: Option<&StartPoint>) -> ObjectRay {
         let mut of_object = self.ray(ray);
@@ -287,7 +299,8 @@ impl Inverse {
         of_object
     }
 
-    /// As [`Self::ray`] for sixteen rays, with the same bits. The results of lanes that are not `unscaled` are not valid.
+    /// As [`Self::ray`] for sixteen rays, with the same bits. The results of lanes that are not
+    /// `unscaled` are not valid.
     #[inline(always)]
     pub(crate) fn transform(&self, lanes: &mut RayLanes) {
         let RayLanes { origin, direction, unscaled } = lanes;
@@ -310,7 +323,8 @@ impl Inverse {
         }
     }
 
-    /// Transforms a normal of the object to world space, by the transpose of this transform. Its length has no meaning.
+    /// Transforms a normal of the object to world space, by the transpose of this transform. Its
+    /// length has no meaning.
     pub(crate) fn normal(&self, n: [f64; 3]) -> [f64; 3] {
         [0, 1, 2].map(|k| self.linear[0][k] * n[0] + self.linear[1][k] * n[1] + self.linear[2][k] * n[2])
     }

@@ -84,7 +84,8 @@ fn rays_keep_their_t_whatever_the_scale() {
     }
 }
 
-/// A hit counts in an object if and only if its t is in the range when it is rounded in world space.
+/// A hit counts in an object if and only if its t is in the range when it is rounded in world
+/// space.
 #[test]
 fn ranges_of_scaled_rays_hold_the_t_that_are_in_range_in_world_space() {
     let mut rng = Rng::new(12);
@@ -92,7 +93,7 @@ fn ranges_of_scaled_rays_hold_the_t_that_are_in_range_in_world_space() {
     for case in 0..20_000 {
         let scale = [2f64.powi(70), 2f64.powi(100), 2f64.powi(-70), 2f64.powi(-100)][case % 4];
         let t_scale = (1.0 / scale) as f32;
-        // An end of the range: denormal, close to the least normal number, or any.
+        // An end of the range: denormal, close to the smallest normal number, or any.
         let bits = match case / 4 % 3 {
             0 => rng.below(64) as u32,
             1 => f32::MIN_POSITIVE.to_bits() - 8 + rng.below(16) as u32,

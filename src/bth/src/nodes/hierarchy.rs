@@ -1,7 +1,8 @@
-//! The node hierarchy and the transforms of its nodes at a time. An update evaluates the animation tracks and multiplies the
-//! transforms from the roots down, for the nodes that moved only.
+//! The node hierarchy and the transforms of its nodes at a time. An update evaluates the animation
+//! tracks and multiplies the transforms from the roots down, for the nodes that moved only.
 //!
-//! Values of tracks are not stored: whether a node moved follows from the keys around the old and the new time.
+//! Values of tracks are not stored: whether a node moved follows from the keys around the old and
+//! the new time.
 
 use super::affine::Affine;
 use super::tracks;
@@ -26,7 +27,8 @@ pub(crate) struct NodeHierarchy {
     parents: Vec<u32>,
     /// For each node of `parents` its transform to world space.
     to_world: Vec<Affine>,
-    /// For each node the index of its first track, with a further element at the end; empty without tracks.
+    /// For each node the index of its first track, with a further element at the end; empty without
+    /// tracks.
     first_track: Vec<u32>,
 }
 
@@ -54,8 +56,8 @@ impl NodeHierarchy {
         }
     }
 
-    /// Sets the time in seconds, and returns the number of nodes that moved, were hidden or became visible. With `all`, all nodes
-    /// are evaluated and counted.
+    /// Sets the time in seconds, and returns the number of nodes that moved, were hidden or became
+    /// visible. With `all`, all nodes are evaluated and counted.
     pub(crate) fn update(&mut self, view: &SceneView<'_>, seconds: f64, all: bool) -> usize {
         let previous = std::mem::replace(&mut self.seconds, seconds);
         let (mut moved, mut next_parent_row) = (0, 0);
@@ -116,7 +118,8 @@ impl NodeHierarchy {
             + size_of_val(self.first_track.as_slice())
     }
 
-    /// The transform to world space of a child of `parent`, given its transform to the parent's space.
+    /// The transform to world space of a child of `parent`, given its transform to the parent's
+    /// space.
     fn child_to_world(&self, view: &SceneView<'_>, parent: u32, local: &Affine) -> Affine {
         if parent == NONE { *local } else { self.to_world(view, parent).times(local) }
     }
@@ -129,7 +132,8 @@ impl NodeHierarchy {
         }
     }
 
-    /// Whether a track of a node, but for that of weights, may have another value than at the time `previous`.
+    /// Returns true if a track of a node, but for that of weights, may have another value than at
+    /// the time `previous`.
     fn differs(&self, view: &SceneView<'_>, node: usize, previous: f64) -> bool {
         let weights = Property::Weights as u32;
         let mut tracks = self.tracks_of(node).map(|i| &view.tracks[i]).filter(|t| t.property != weights);
@@ -170,7 +174,7 @@ impl NodeHierarchy {
         }
     }
 
-    /// Whether the scale of a node is not zero.
+    /// Returns true if the scale of a node is not zero.
     fn has_size(&self, view: &SceneView<'_>, row: u32) -> bool {
         let node = &view.nodes[row as usize];
         if node.flags & NODE_MATRIX != 0 {

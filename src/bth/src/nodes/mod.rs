@@ -1,5 +1,5 @@
-//! The nodes of a file's scene at a time: tracks ([`tracks`]), the hierarchy with its transforms to world space ([`hierarchy`]), and
-//! affine transforms ([`affine`]).
+//! The nodes of a file's scene at a time: tracks ([`tracks`]), the hierarchy with its transforms to
+//! world space ([`hierarchy`]), and affine transforms ([`affine`]).
 
 pub(crate) mod affine;
 #[cfg(test)]

@@ -1,18 +1,19 @@
-//! Interpolation of animation tracks, as of glTF animation samplers (glTF 2.0 specification, appendix C). A track holds the keys
-//! of one property of one node.
+//! Interpolation of animation tracks, as of glTF animation samplers (glTF 2.0 specification,
+//! appendix C). A track holds the keys of one property of one node.
 
 use bth_format::SceneView;
 use bth_format::layout::*;
 
-/// The value of a checked track at a time in seconds. As many of the four numbers are valid as the property has
-/// components. A quaternion is not normalized.
+/// The value of a checked track at a time in seconds. As many of the four numbers are valid as the
+/// property has components. A quaternion is not normalized.
 pub(crate) fn value(view: &SceneView<'_>, track: &Track, seconds: f64) -> [f64; 4] {
     let property = Property::from_code(track.property).unwrap_or(Property::Visible);
     let interpolation = Interpolation::from_code(track.interpolation).unwrap_or(Interpolation::Step);
     let width = property.width().unwrap_or(0);
     let per_key = width * interpolation.values_per_key();
     let (times, values) = view.keys(track, per_key);
-    // Row 0, 1 or 2 of a key. Keys with tangents have three rows: in-tangent, value and out-tangent.
+    // Row 0, 1 or 2 of a key. Keys with tangents have three rows: in-tangent, value and
+    // out-tangent.
     let row = |key: usize, row: usize| -> [f64; 4] {
         std::array::from_fn(|i| if i < width { values[key * per_key + row * width + i] } else { 0.0 })
     };
@@ -30,7 +31,8 @@ pub(crate) fn value(view: &SceneView<'_>, track: &Track, seconds: f64) -> [f64; 
     if property == Property::Rotation { slerp(a, b, part) } else { lerp(a, b, part) }
 }
 
-/// The value of a checked track of `width` numbers at a time in seconds, each number by itself: of weights.
+/// The value of a checked track of `width` numbers at a time in seconds, each number by itself: of
+/// weights.
 pub(crate) fn values(view: &SceneView<'_>, track: &Track, width: usize, seconds: f64) -> Vec<f64> {
     let interpolation = Interpolation::from_code(track.interpolation).unwrap_or(Interpolation::Step);
     let per_key = width * interpolation.values_per_key();
@@ -53,15 +55,15 @@ pub(crate) fn values(view: &SceneView<'_>, track: &Track, width: usize, seconds:
     (0..width).map(one).collect()
 }
 
-/// The part of the time between two keys that has passed, and that time in seconds, at most the greatest number. Halves do not overflow, and
-/// have the same quotient.
+/// The part of the time between two keys that has passed, and that time in seconds, at most the
+/// max number. Halves do not overflow, and have the same quotient.
 fn between(from: f64, to: f64, seconds: f64) -> (f64, f64) {
     let part = (0.5 * seconds - 0.5 * from) / (0.5 * to - 0.5 * from);
     (part, (to - from).min(f64::MAX))
 }
 
-/// Whether the value of a checked track differs between two times. The track is evaluated only if the keys around the times do
-/// not decide.
+/// Returns true if the value of a checked track differs between two times. The track is evaluated
+/// only if the keys around the times do not decide.
 pub(crate) fn differs(view: &SceneView<'_>, track: &Track, a: f64, b: f64) -> bool {
     let (times, _) = view.keys(track, 0);
     let next_key = |seconds: f64| times.partition_point(|t| *t <= seconds);
@@ -94,7 +96,8 @@ fn hermite(a: [f64; 4], a_out: [f64; 4], b: [f64; 4], b_in: [f64; 4], part: f64,
     })
 }
 
-/// The quaternion with unit length. It is first divided by its greatest component, so that squares do not overflow.
+/// The quaternion with unit length. It is first divided by its max component, so that squares
+/// do not overflow.
 fn unit(q: [f64; 4]) -> [f64; 4] {
     let greatest = q.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     let q = q.map(|x| x / greatest);
@@ -102,7 +105,8 @@ fn unit(q: [f64; 4]) -> [f64; 4] {
     q.map(|x| x / length)
 }
 
-/// Spherical linear interpolation along the shorter arc (Shoemake, "Animating rotation with quaternion curves", SIGGRAPH 1985).
+/// Spherical linear interpolation along the shorter arc (Shoemake, "Animating rotation with
+/// quaternion curves", SIGGRAPH 1985).
 fn slerp(a: [f64; 4], b: [f64; 4], part: f64) -> [f64; 4] {
     let (a, mut b) = (unit(a), unit(b));
     let mut cosine: f64 = a.iter().zip(&b).map(|(x, y)| x * y).sum();
@@ -128,21 +132,7 @@ mod tests {
     }
 
     fn view_of<'a>(times: &'a [f64], values: &'a [f64]) -> SceneView<'a> {
-        SceneView {
-            scene: &[],
-            nodes: &[],
-            instances: &[],
-            tracks: &[],
-            times,
-            values,
-            cameras: &[],
-            lights: &[],
-            names: &[],
-            deformers: &[],
-            skins: &[],
-            skin_joints: &[],
-            morph_weights: &[],
-        }
+        SceneView { times, values, ..SceneView::default() }
     }
 
     /// The value at time `t` of a track with the given keys.

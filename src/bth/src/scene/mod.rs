@@ -1,7 +1,6 @@
 //! Scenes: opening of compiled files, what they hold, and new positions of their objects.
 
-mod deform;
-mod deformers;
+pub(crate) mod motion;
 
 use crate::instances::World;
 use crate::masks::Masks;
@@ -12,43 +11,47 @@ use bth_format::layout::kind;
 use bth_format::object::ObjectView;
 use std::path::Path;
 
-/// An open file that can be traced. The instances of a file with scene sections are placed as at a given time (see
-/// [`Scene::set_frame`]). In a file without scene sections, each object has one instance with the same index, and object space is
-/// world space. A scene of several files, whose instances the caller places, comes from a
-/// [`SceneBuilder`](crate::SceneBuilder).
+/// An open file that can be traced. The instances of a file with scene sections are placed as at a
+/// given time (see [`Scene::set_frame`]). In a file without scene sections, each object has one
+/// instance with the same index, and object space is world space. A scene of several files, whose
+/// instances the caller places, comes from a [`SceneBuilder`](crate::SceneBuilder).
 ///
-/// Queries take `&self` and may run on any number of threads at once. A ray hits nothing if its origin or direction is not
-/// finite, its direction is zero, `tmin` or `tmax` is NaN, or `tmin` exceeds `tmax`.
+/// Queries take `&self` and may run on any number of threads at once. A ray hits nothing if its
+/// origin or direction is not finite, its direction is zero, `tmin` or `tmax` is NaN, or `tmin`
+/// exceeds `tmax`.
 ///
-/// Results are exact: a ray hits a closed triangle if and only if its line intersects the triangle in real arithmetic at a t
-/// that, rounded to f32 as reported, lies in the closed interval from `tmin` to `tmax`. Lines in the plane of a triangle do not
-/// hit it. Hits in an object are ordered by t in f64, which is within 2^-28 of the exact one; among equal ones the triangle of
-/// least id is reported. Results depend neither on hints nor on the acceleration structures in the file. In a file with scene
-/// sections, a ray is first transformed into the object's space, where
-/// each component of its origin and direction is rounded to f32 (relative error 2^-24). Among hits of equal t in several
-/// instances that of least index is reported.
+/// Results are exact: a ray hits a closed triangle if and only if its line intersects the triangle
+/// in real arithmetic at a t that, rounded to f32 as reported, lies in the closed interval from
+/// `tmin` to `tmax`. Lines in the plane of a triangle do not hit it. Hits in an object are ordered
+/// by t in f64, which is within 2^-28 of the exact one; among equal ones the triangle of the lowest
+/// id is reported. Results depend neither on hints nor on the acceleration structures in the file.
+/// In a file with scene sections, a ray is first transformed into the object's space, where each
+/// component of its origin and direction is rounded to f32 (relative error 2^-24). Among hits of
+/// equal t in several instances that of the lowest index is reported.
 ///
-/// In files with opacity (`bthc compile --alpha`) rays pass through the transparent parts of triangles: nearest and any hits,
-/// counts, and all other hits are those on parts that are not transparent. Crossings, winding numbers, [`Self::contains`] and
-/// closest points are about the surface itself and look at no opacity.
+/// In files with opacity (`bthc compile --alpha`) rays pass through the transparent parts of
+/// triangles: nearest and any hits, counts, and all other hits are those on parts that are not
+/// transparent. Crossings, winding numbers, [`Self::contains`] and closest points are about the
+/// surface itself and look at no opacity.
 #[derive(Debug)]
 pub struct Scene {
     objects: Objects,
     /// The instances at the scene's time; `None` if the scene is a file without scene sections.
     world: Option<World>,
-    /// Whether some triangle of some object may let rays pass.
+    /// True if some triangle of some object may let rays pass.
     has_opacity: bool,
     /// The masks of instances and of groups of triangles.
     masks: Masks,
 }
 
-/// Reads a compiled file into memory and checks every index, so that tracing is safe for any contents of the file. The time is
-/// linear in the size of the file. Hashes and geometry are not checked; see [`mod@bth_format::verify`].
+/// Reads a compiled file into memory and checks every index, so that tracing is safe for any
+/// contents of the file. The time is linear in the size of the file. Hashes and geometry are not
+/// checked; see [`mod@bth_format::verify`].
 ///
 /// # Errors
 /// - `BTH-O…` if the file cannot be read.
-/// - `BTH-F0…` if the header or the section table violates the specification, `BTH-F1…` if the contents of a section do. The error
-///   gives the section and the byte offset.
+/// - `BTH-F0…` if the header or the section table violates the specification, `BTH-F1…` if the
+///   contents of a section do. The error gives the section and the byte offset.
 /// - `BTH-S…` if an instance cannot be placed at the first frame of the scene.
 pub fn open(path: impl AsRef<Path>) -> Result<Scene, Error> {
     let path = path.as_ref();
@@ -71,13 +74,14 @@ pub fn from_file(file: File) -> Result<Scene, Error> {
     Scene::checked(file)
 }
 
-/// Maps a compiled file into memory and checks only its header, section table and scene sections, so the time does not depend on
-/// the size of its objects.
+/// Maps a compiled file into memory and checks only its header, section table and scene sections,
+/// so the time does not depend on the size of its objects.
 ///
 /// # Safety
-/// Until the scene, and every scene that [`SceneBuilder`](crate::SceneBuilder) makes of it, is dropped, the file must not be written to or truncated (see [`File::map`]). Its contents must be such that
-/// [`open`] accepts them, as those of unchanged files that `bthc` has written. With other contents tracing may panic or not
-/// terminate, but it does not read out of bounds.
+/// Until the scene, and every scene that [`SceneBuilder`](crate::SceneBuilder) makes of it, is
+/// dropped, the file must not be written to or truncated (see [`File::map`]). Its contents must be
+/// such that [`open`] accepts them, as those of unchanged files that `bthc` has written. With other
+/// contents tracing may panic or not terminate, but it does not read out of bounds.
 ///
 /// # Errors
 /// As [`open`], except for those about the contents of objects.
@@ -117,7 +121,8 @@ impl Scene {
         Scene { objects, world, has_opacity: false, masks: Masks::default() }
     }
 
-    /// Adds the objects of another scene to a scene of several files; returns the index of the first.
+    /// Adds the objects of another scene to a scene of several files; returns the index of the
+    /// first.
     pub(crate) fn add_objects(&mut self, other: &Scene) -> u32 {
         let first = self.object_count();
         self.objects.add(&other.objects);
@@ -126,7 +131,7 @@ impl Scene {
             for object in first..self.objects.count() {
                 let file = self.objects.locate(object).filter(|(_, row)| *row == 0);
                 if let Some((file, _)) = file {
-                    world.deformers.add(file, object);
+                    world.animation.add(file, object);
                 }
             }
         }
@@ -139,7 +144,7 @@ impl Scene {
         self.world.as_ref()
     }
 
-    /// Whether some triangle of some object may let rays pass.
+    /// Returns true if some triangle of some object may let rays pass.
     pub(crate) fn has_opacity(&self) -> bool {
         self.has_opacity
     }
@@ -177,13 +182,14 @@ impl Scene {
     /// The file of the scene.
     ///
     /// # Panics
-    /// If the scene was made by a [`SceneBuilder`](crate::SceneBuilder): its objects come from any number of files, see
-    /// [`Self::file_of`].
+    /// If the scene was made by a [`SceneBuilder`](crate::SceneBuilder): its objects come from any
+    /// number of files, see [`Self::file_of`].
     pub fn file(&self) -> &File {
         self.objects.sole_file().expect("a scene that is a file; `file_of` is for scenes of several files")
     }
 
-    /// The file of an object, and the object's index there, which in a scene that is a file is the same.
+    /// The file of an object, and the object's index there, which in a scene that is a file is the
+    /// same.
     ///
     /// # Panics
     /// If `object` is not less than [`Self::object_count`].
@@ -221,15 +227,16 @@ impl Scene {
         }
     }
 
-    /// The object of a model whose only object was given no new positions and is opaque; `None` elsewhere, and before something was
-    /// traced.
+    /// The object of a model whose only object was given no new positions and is opaque; `None`
+    /// elsewhere, and before something was traced.
     #[inline(always)]
     pub(crate) fn sole_opaque(&self) -> Option<&ObjectView<'_>> {
         if self.world.is_none() && !self.has_opacity { self.objects.sole_view() } else { None }
     }
 
-    /// The object and the index of the only visible instance, if there is exactly one and its object space is world space. Rays
-    /// are then traced directly in the object, without the top level.
+    /// The object and the index of the only visible instance, if there is exactly one and its
+    /// object space is world space. Rays are then traced directly in the object, without the top
+    /// level.
     #[inline(never)]
     pub(crate) fn sole(&self) -> Option<(&ObjectView<'_>, u32)> {
         let Some(world) = &self.world else {

@@ -1,4 +1,5 @@
-//! What the caller of a scene builder wants, as a plain list, and the answers to rays by loops over it.
+//! What the caller of a scene builder wants, as a plain list, and the answers to rays by loops over
+//! it.
 
 use super::*;
 use crate::instances::exact_loop::{add_hits, in_order};
@@ -52,7 +53,8 @@ impl Expected {
         instances.filter(|(_, i)| i.as_ref().is_some_and(&condition)).map(|(id, _)| id as u32).collect()
     }
 
-    /// The transform of an instance and whether it is visible. The nodes of subscenes are those of the file opened alone.
+    /// The transform of an instance and whether it is visible. The nodes of subscenes are those of
+    /// the file opened alone.
     pub(super) fn transform(&self, instance: &ExpectedInstance) -> (Affine, bool) {
         let own = Affine::from_f32(&instance.transform);
         let Some((id, row)) = instance.subscene else { return (own, instance.visible) };

@@ -1,4 +1,5 @@
-//! Tests of scene builders. The oracle is a plain list of what the caller wants, each instance traced by a loop over its triangles.
+//! Tests of scene builders. The oracle is a plain list of what the caller wants, each instance
+//! traced by a loop over its triangles.
 
 mod expected;
 mod sequences;
@@ -14,7 +15,8 @@ macro_rules! files {
     };
 }
 
-/// Files of one and of several objects, with and without scene sections, tracks, opacity and quantized coordinates.
+/// Files of one and of several objects, with and without scene sections, tracks, opacity and
+/// quantized coordinates.
 const FILES: [&[u8]; 8] = files![
     "two-objects",
     "two-levels",
@@ -157,7 +159,8 @@ fn scenes_without_instances_answer_all_queries() {
     assert!(scene.description().is_none());
 }
 
-/// Rays that start on the surface, whose directions are so short or so long in the space of the object that they are scaled there.
+/// Rays that start on the surface, whose directions are so short or so long in the space of the
+/// object that they are scaled there.
 #[test]
 fn crossings_of_rays_from_the_surface_do_not_depend_on_the_lengths_of_directions() {
     let mut builder = SceneBuilder::new();

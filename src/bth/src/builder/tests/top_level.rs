@@ -4,7 +4,8 @@ use super::*;
 use crate::instances::{INSTANCE, TopLevel};
 use bth_format::layout::NONE;
 
-/// Checks that each visible instance is in the top level once, within the boxes of all nodes above it.
+/// Checks that each visible instance is in the top level once, within the boxes of all nodes above
+/// it.
 pub(super) fn check(scene: &Scene) {
     let world = scene.world().expect("instances");
     let mut seen = vec![0; world.placements.len()];

@@ -1,0 +1,159 @@
+//! Instances that the caller of a scene builder places: all changes of a commit at once, or none of
+//! them.
+
+use super::placement::{Placement, PlacementError};
+use super::world::{InstanceRow, TransformSource, Unplaceable, World};
+use crate::nodes::affine::Affine;
+use crate::objects::Objects;
+use crate::simd::{Isa, Kernel, Simd};
+use crate::update::Update;
+use bth_format::layout::NONE;
+
+/// From this number of changed instances on, they are placed by several threads.
+#[cfg(feature = "rayon")]
+const MIN_PARALLEL: usize = 2048;
+/// Number of instances that one task places.
+#[cfg(feature = "rayon")]
+const TASK: usize = 256;
+
+/// The placement of an instance; `None` if it is not visible.
+type PlaceResult = Result<Option<Placement>, PlacementError>;
+
+/// The instances as the caller has placed them in the last commit.
+#[derive(Debug, Default)]
+pub(super) struct CallerInstances {
+    pub(super) rows: Vec<InstanceRow>,
+    /// Memory for the placements of a commit.
+    placed: Vec<PlaceResult>,
+}
+
+impl CallerInstances {
+    /// Bytes on the heap.
+    pub(super) fn bytes(&self) -> usize {
+        self.rows.capacity() * size_of::<InstanceRow>() + self.placed.capacity() * size_of::<PlaceResult>()
+    }
+}
+
+/// An instance as it is to be.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct NewInstance {
+    pub(crate) row: InstanceRow,
+    pub(crate) visible: bool,
+}
+
+impl World {
+    /// Changes the instances in `changed`, whose indices are below `count`, to what `new` returns
+    /// for them, and builds or refits the top level. `count` is the new number of instances, at
+    /// min the former one. Each new instance is in `changed`.
+    ///
+    /// # Errors
+    /// The first of `changed` that cannot be placed. No instance is changed then.
+    pub(crate) fn change(
+        &mut self,
+        objects: &Objects,
+        count: usize,
+        changed: &[u32],
+        new: &(impl Fn(u32) -> NewInstance + Sync),
+    ) -> Result<Update, Unplaceable> {
+        let mut placed = match &mut self.source {
+            TransformSource::Caller(caller) => std::mem::take(&mut caller.placed),
+            TransformSource::File(_) => Vec::new(),
+        };
+        placed.resize(changed.len(), Ok(None));
+        self.place_all(objects, changed, new, &mut placed);
+        let failed = placed.iter().zip(changed).find_map(|(placed, &instance)| {
+            placed.as_ref().err().map(|&error| Unplaceable { instance, error })
+        });
+        let result = match failed {
+            Some(failed) => Err(failed),
+            None => Ok(self.store(count, changed, new, &placed)),
+        };
+        if let TransformSource::Caller(caller) = &mut self.source {
+            caller.placed = placed;
+        }
+        result
+    }
+
+    /// Stores the placements of changed instances, none of which is an error.
+    fn store(
+        &mut self,
+        count: usize,
+        changed: &[u32],
+        new: &impl Fn(u32) -> NewInstance,
+        placed: &[PlaceResult],
+    ) -> Update {
+        let TransformSource::Caller(caller) = &mut self.source else { return Update::default() };
+        let vacant = InstanceRow { object: NONE, node: NONE, to_world: Affine::IDENTITY };
+        caller.rows.resize(count, vacant);
+        self.placements.resize(count, None);
+        let mut same_visible = true;
+        for (placed, &instance) in placed.iter().zip(changed) {
+            let placement = placed.unwrap_or(None);
+            let former = std::mem::replace(&mut self.placements[instance as usize], placement);
+            caller.rows[instance as usize] = new(instance).row;
+            same_visible &= former.is_some() == placement.is_some();
+        }
+        let mut update = Update { placed: changed.len(), visible: self.visible(), ..Update::default() };
+        if changed.is_empty() {
+            update.cost_ratio = self.top.cost_ratio();
+            return update;
+        }
+        self.update_top(same_visible, &mut update);
+        update
+    }
+
+    /// Computes the placements of changed instances.
+    fn place_all(
+        &self,
+        objects: &Objects,
+        changed: &[u32],
+        new: &(impl Fn(u32) -> NewInstance + Sync),
+        placed: &mut [PlaceResult],
+    ) {
+        #[cfg(feature = "rayon")]
+        if changed.len() >= MIN_PARALLEL {
+            use rayon::iter::{IndexedParallelIterator, ParallelIterator};
+            use rayon::slice::{ParallelSlice, ParallelSliceMut};
+            let tasks = changed.par_chunks(TASK).zip(placed.par_chunks_mut(TASK));
+            return tasks.for_each(|(changed, placed)| self.place_some(objects, changed, new, placed));
+        }
+        self.place_some(objects, changed, new, placed);
+    }
+
+    fn place_some(
+        &self,
+        objects: &Objects,
+        changed: &[u32],
+        new: &impl Fn(u32) -> NewInstance,
+        placed: &mut [PlaceResult],
+    ) {
+        // Its loops are of four f64, so AVX-512 would not make it faster, and registers of 128 bits
+        // hardly.
+        Isa::chosen().min(Isa::Avx2).run(PlaceKernel { world: self, objects, changed, new, placed });
+    }
+}
+
+/// Kernel that computes the placements of changed instances.
+struct PlaceKernel<'a, N> {
+    world: &'a World,
+    objects: &'a Objects,
+    changed: &'a [u32],
+    new: &'a N,
+    placed: &'a mut [PlaceResult],
+}
+
+impl<N: Fn(u32) -> NewInstance> Kernel for PlaceKernel<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        // The loops of a placement are vectorized with the registers of the instruction set.
+        for (&instance, placed) in self.changed.iter().zip(self.placed) {
+            let NewInstance { row, visible } = (self.new)(instance);
+            *placed = match visible && row.object != NONE {
+                true => self.world.place(self.objects, row.object, &row.to_world, S::INLINES_PARTS),
+                false => Ok(None),
+            };
+        }
+    }
+}

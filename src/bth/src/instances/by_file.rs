@@ -1,0 +1,165 @@
+//! The instances of a file with scene sections at a time.
+
+use super::world::{TransformSource, World, scene_of};
+use crate::animation::{AnimatedFile, StagedPoses};
+use crate::clock;
+use crate::nodes::affine::Affine;
+use crate::nodes::hierarchy::NodeHierarchy;
+use crate::objects::Objects;
+use crate::update::Update;
+use bth_format::error::{Error, Result};
+use bth_format::layout::*;
+
+impl World {
+    /// The instances of a file at the first frame of its scene; `None` if the objects are not those
+    /// of a file with scene sections.
+    ///
+    /// # Errors
+    /// Those of [`File::check_scene`](bth_format::file::File::check_scene) and of [`Self::update`].
+    pub(crate) fn new(objects: &Objects) -> Result<Option<World>> {
+        let Some(file) = objects.sole_file() else { return Ok(None) };
+        let Some(view) = file.check_scene()? else { return Ok(None) };
+        let scene = &view.scene[0];
+        let seconds = f64::from(scene.first_frame) / scene.rate;
+        let source = TransformSource::File(NodeHierarchy::new(&view));
+        let mut world = World::unplaced(source, seconds, view.instances.len(), file.object_count());
+        world.animation.add(file, 0);
+        world.evaluate_nodes(objects, seconds, true);
+        world.place_moved(objects, seconds, &[], true)?;
+        Ok(Some(world))
+    }
+
+    /// Deforms the objects as at the first frame and places their instances again. Does nothing for
+    /// a scene whose objects keep their shape.
+    ///
+    /// # Errors
+    /// As [`Self::update`], and `BTH-S006` if an object cannot be given new positions.
+    pub(crate) fn deform_first(&mut self, objects: &mut Objects) -> Result<()> {
+        if !self.animation.is_empty() {
+            self.update(objects, self.seconds)?;
+        }
+        Ok(())
+    }
+
+    /// Sets the time of a file's scene. After an error the scene is unchanged. It has no effect if
+    /// the caller places the instances.
+    ///
+    /// # Errors
+    /// `BTH-S001` if the transform of a visible instance is singular, `BTH-S002` if it, the world
+    /// box or the position of a vertex is not finite. The error gives the node.
+    pub(crate) fn update(&mut self, objects: &mut Objects, seconds: f64) -> Result<Update> {
+        if !matches!(self.source, TransformSource::File(_)) {
+            return Ok(Update::default());
+        }
+        let result = self.try_update(objects, seconds);
+        match &result {
+            Ok(_) => self.seconds = seconds,
+            // The instances of the former time have been placed before, so placing them again
+            // succeeds.
+            Err(_) => {
+                self.evaluate_nodes(objects, self.seconds, true);
+                drop(self.place_moved(objects, self.seconds, &[], true));
+            }
+        }
+        result
+    }
+
+    /// As [`Self::update`]. After an error the objects are unchanged, but not the nodes and
+    /// placements.
+    fn try_update(&mut self, objects: &mut Objects, seconds: f64) -> Result<Update> {
+        let nodes = self.evaluate_nodes(objects, seconds, false);
+        let TransformSource::File(hierarchy) = &self.source else { return Ok(Update::default()) };
+        let start = clock::now();
+        let staged = match objects.sole_file().filter(|_| !self.animation.is_empty()).cloned() {
+            Some(file) => {
+                let at = AnimatedFile { file: &file, first_object: 0, hierarchy, seconds };
+                self.animation.stage(objects, at, &|_| false)?
+            }
+            None => StagedPoses::default(),
+        };
+        let refitted = objects.refit(&staged.objects, start);
+        let update = match self.place_moved(objects, seconds, &staged.objects, false) {
+            Ok(update) => update,
+            Err(error) => {
+                self.forget_parts(&staged.objects);
+                objects.undo_refit(&staged.objects);
+                return Err(error);
+            }
+        };
+        self.animation.keep(staged);
+        Ok(Update { nodes, ..update }.with_refit(refitted))
+    }
+
+    /// Brings the nodes to a time, all of them with `all`; returns the number of those that moved.
+    fn evaluate_nodes(&mut self, objects: &Objects, seconds: f64, all: bool) -> usize {
+        match &mut self.source {
+            TransformSource::File(hierarchy) => hierarchy.update(&scene_of(objects), seconds, all),
+            TransformSource::Caller(_) => 0,
+        }
+    }
+
+    /// Places the instances that moved and those of objects that deformed, or with `all` every
+    /// instance, and rebuilds the top level.
+    fn place_moved(
+        &mut self,
+        objects: &Objects,
+        seconds: f64,
+        deformed: &[u32],
+        all: bool,
+    ) -> Result<Update> {
+        self.forget_parts(deformed);
+        let view = scene_of(objects);
+        let mut deforms = vec![false; if deformed.is_empty() { 0 } else { objects.count() as usize }];
+        deformed.iter().for_each(|object| deforms[*object as usize] = true);
+        let mut update = Update::default();
+        for (row, instance) in view.instances.iter().enumerate() {
+            let TransformSource::File(hierarchy) = &self.source else { break };
+            let is_skinned = self.animation.is_skinned(instance.object);
+            let hidden = match is_skinned {
+                // The transform of its node has no effect, so a scale of zero does not hide it.
+                true => hierarchy.invisible(instance.node),
+                false => hierarchy.hidden(instance.node),
+            };
+            let moved = match is_skinned {
+                true => all || hidden != self.placements[row].is_none(),
+                false => hierarchy.moved(instance.node),
+            };
+            if !moved && !deforms.get(instance.object as usize).is_some_and(|deforms| *deforms) {
+                continue;
+            }
+            self.placements[row] = None;
+            update.placed += 1;
+            if hidden {
+                continue;
+            }
+            let world = match is_skinned {
+                true => Affine::IDENTITY,
+                false => hierarchy.to_world(&view, instance.node),
+            };
+            let placement = self.place(objects, instance.object, &world, false).map_err(|error| {
+                let (code, expected, found) = error.words();
+                let name = view.node_name(instance.node);
+                let found = format!("{found}: node \"{}\" at {seconds} s", name.escape_debug());
+                let offset = u64::from(instance.node) * size_of::<Node>() as u64;
+                let error = Error::within_file(code, kind::NODES, offset, expected, found);
+                objects.sole_file().expect("a file with nodes").locate(error, NONE)
+            })?;
+            self.placements[row] = placement;
+        }
+        if update.placed > 0 {
+            self.update_top(false, &mut update);
+        }
+        update.visible = self.visible();
+        Ok(update)
+    }
+
+    /// The transform from a node's space to world space, as rows of four, and whether the node is
+    /// visible.
+    ///
+    /// # Panics
+    /// If there is no such node, as where the caller places the instances.
+    pub(crate) fn node(&self, objects: &Objects, node: u32) -> ([[f64; 4]; 3], bool) {
+        let TransformSource::File(hierarchy) = &self.source else { panic!("expected a file with nodes") };
+        (hierarchy.to_world(&scene_of(objects), node).rows(), !hierarchy.hidden(node))
+    }
+}

@@ -1,8 +1,7 @@
 //! Candidates: triangles that the f32 filter does not exclude, and their decision in f64 or in exact arithmetic.
 
-use super::nodes::{self, LeafVisitor};
+use super::nodes;
 use crate::intersect::exact::{Estimate, Intersection, estimate, in_pairs};
-use crate::intersect::filter::TriangleBlock;
 use crate::intersect::line::Line;
 use crate::intersect::start::start_on;
 use crate::intersect::start::{StartDecision, decide_start, decide_start_exactly};
@@ -11,7 +10,7 @@ use crate::intersect::start_point::StartPoint;
 use crate::intersect::vector::wide;
 use crate::query::{Goal, RayQuery, TriangleRef};
 use crate::rays::Ray;
-use crate::simd::{Part, Scalar, Simd};
+use crate::simd::{Part, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 
@@ -28,66 +27,10 @@ impl Candidate {
     /// No candidate.
     pub(crate) const NONE: Candidate = Candidate { leaf: NONE, triangle: 0 };
 
-    /// The triangle's index in the object's leaf order, and what `reader` reads of it. None without a candidate.
+    /// The triangle's index in the object's leaf order, and its corners. `None` without a candidate.
     #[inline(always)]
-    pub(crate) fn read<C>(
-        &self,
-        object: &ObjectView<'_>,
-        reader: impl Reader<Output = C>,
-    ) -> Option<(u32, C)> {
-        self.read_in(Scalar, object, reader)
-    }
-
-    /// As [`Self::read`], in a kernel.
-    #[inline(always)]
-    pub(crate) fn read_in<S: Simd, C>(
-        &self,
-        s: S,
-        object: &ObjectView<'_>,
-        reader: impl Reader<Output = C>,
-    ) -> Option<(u32, C)> {
-        let visitor = ReadTriangle { reader, triangle: self.triangle as usize };
-        nodes::visit_leaf(s, object, object.node_base(), self.leaf, visitor)
-    }
-}
-
-/// Reads a triangle of a leaf, and its index in the object's leaf order.
-struct ReadTriangle<R> {
-    reader: R,
-    triangle: usize,
-}
-
-impl<S: Simd, R: Reader> LeafVisitor<S> for ReadTriangle<R> {
-    type Output = Option<(u32, R::Output)>;
-    #[inline(always)]
-    fn triangles<B: TriangleBlock>(self, _: S, block: &B) -> Self::Output {
-        let index = block.first().wrapping_add(self.triangle as u32);
-        Some((index, self.reader.read(block, self.triangle)))
-    }
-    #[inline(always)]
-    fn tets(self, _: S, _row: u32) -> Self::Output {
-        None
-    }
-    #[inline(always)]
-    fn nothing(self) -> Self::Output {
-        None
-    }
-}
-
-/// Reader of a triangle from a leaf of either record format.
-pub(crate) trait Reader {
-    type Output;
-    fn read<B: TriangleBlock>(self, block: &B, triangle: usize) -> Self::Output;
-}
-
-/// Reads the corners of the triangle.
-pub(crate) struct ReadCorners;
-
-impl Reader for ReadCorners {
-    type Output = [[f32; 3]; 3];
-    #[inline(always)]
-    fn read<B: TriangleBlock>(self, block: &B, triangle: usize) -> [[f32; 3]; 3] {
-        block.corners(triangle)
+    pub(crate) fn read(&self, object: &ObjectView<'_>) -> Option<(u32, [[f32; 3]; 3])> {
+        nodes::triangle(object, self.leaf, self.triangle)
     }
 }
 
@@ -137,7 +80,7 @@ fn settle_one<S: Simd, G: Goal>(
     candidate: Candidate,
     query: &mut RayQuery<G>,
 ) -> bool {
-    let Some((index, corners)) = candidate.read(object, ReadCorners) else { return false };
+    let Some((index, corners)) = candidate.read(object) else { return false };
     let mut wide_corners = [[0.0; 3]; 3];
     for c in 0..3 {
         for k in 0..3 {
@@ -165,7 +108,7 @@ fn settle_from_start<G: Goal>(
     candidate: Candidate,
     query: &mut RayQuery<G>,
 ) -> bool {
-    let Some((index, corners)) = candidate.read(object, ReadCorners) else { return false };
+    let Some((index, corners)) = candidate.read(object) else { return false };
     let intersection = match decide_start(start.origin, wide(ray.direction), corners.map(wide)) {
         StartDecision::Certain(found) => found,
         StartDecision::Open(_, t) if !query.may_matter(t) => None,
@@ -184,7 +127,7 @@ fn intersect_candidate_exactly(
     ray: &Ray,
     candidate: Candidate,
 ) -> Option<Intersection> {
-    intersect_exactly(ray, candidate.read(object, ReadCorners)?.1)
+    intersect_exactly(ray, candidate.read(object)?.1)
 }
 
 /// Decides exactly whether and where the ray's line meets a triangle.

@@ -2,7 +2,8 @@
 
 use super::leaf::Progress;
 use super::ray_state::RayState;
-use crate::bvh::candidate::{Candidate, Reader, Settle};
+use crate::bvh::candidate::{Candidate, Settle};
+use crate::bvh::nodes::{Leaf, LeafMemory, leaf};
 use crate::intersect::exact_lanes::{Intersections, Pairs};
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::origin::RoundedOrigin;
@@ -24,24 +25,6 @@ pub(crate) struct DeferredHits {
     index: [u32; LANES],
     pairs: Pairs,
     intersections: Intersections,
-}
-
-/// Stores the corners of a triangle in a lane of the pairs.
-struct StoreCorners<'a> {
-    pairs: &'a mut Pairs,
-    lane: usize,
-}
-
-impl Reader for StoreCorners<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn read<B: TriangleBlock>(self, block: &B, triangle: usize) {
-        for c in 0..3 {
-            for k in 0..3 {
-                self.pairs.corner[c][k][self.lane] = block.coordinate(triangle % WIDTH, c, k);
-            }
-        }
-    }
 }
 
 /// Computes the pending hits of all rays that were added and stores their answers, as a part of kernels.
@@ -129,14 +112,29 @@ impl DeferredHits {
             return state.report(sink);
         }
         let lane = self.count % LANES;
-        let reader = StoreCorners { pairs: &mut self.pairs, lane };
-        let Some((index, ())) = candidate.read_in(s, object, reader) else { return };
-        self.index[lane] = index;
+        let mut memory = LeafMemory::default();
+        match leaf(s, object, object.node_base(), candidate.leaf, &mut memory) {
+            Leaf::Indexed(leaf) => self.store_triangle(lane, leaf, candidate.triangle),
+            Leaf::Raw(leaf) => self.store_triangle(lane, leaf, candidate.triangle),
+            Leaf::Tets(_) | Leaf::Subtree(_) | Leaf::None => return,
+        }
         self.ray[lane] = ray as u32;
         self.candidate[lane] = candidate;
         self.count = lane + 1;
         if self.count == LANES {
             self.flush(s, object, rays, sink);
+        }
+    }
+
+    /// Stores the index and the corners of a triangle in a lane.
+    #[inline(always)]
+    fn store_triangle<B: TriangleBlock>(&mut self, lane: usize, block: &B, triangle: u32) {
+        self.index[lane] = block.first() + triangle;
+        for c in 0..3 {
+            for k in 0..3 {
+                let x = block.coordinate(triangle as usize % WIDTH, c, k);
+                self.pairs.corner[c][k][lane] = x;
+            }
         }
     }
 

@@ -5,9 +5,10 @@ use super::coherence::is_same_octant;
 use super::deferred::DeferredHits;
 use super::entry_node::{ENTRY_RAYS, FindEntryNode};
 use super::leaf::{LeafOutcome, Progress, decide};
+use super::nodes::root;
 use super::ray_pool::{POOL_SIZE, RareSteps, RayPool, Slot, has_rare_steps};
 use super::ray_state::RayState;
-use super::stack::{StackPosition, Stacks};
+use super::stack::Stacks;
 use crate::intersect::prepare::Prepared;
 use crate::intersect::start_point::ExactRay;
 use crate::query::sink::Sink;
@@ -119,12 +120,12 @@ impl<G: Goal> Kernel for Interleaved<'_, '_, G> {
                     source.start(s, goal, slot, &mut pool);
                 }
             }
-            pool.leaf_steps(s, (object, rays, starts), |row, state, top, stacks| {
+            pool.leaf_steps(s, (object, rays, starts), |row, state| {
                 let ray = state.ray();
                 if walked.is_some_and(|walked| walked[ray] == row) {
                     return LeafOutcome::Nothing;
                 }
-                enter_tet_leaf(object, row, (&rays[ray], starts.of(ray)), (state, top), stacks)
+                enter_tet_leaf(object, row, (&rays[ray], starts.of(ray)), state)
             });
         }
         // An any-hit query has no pending hits.
@@ -249,31 +250,15 @@ fn is_run(order: Option<&[u32]>, taken: usize, first: usize) -> bool {
     })
 }
 
-/// The child code at which rays start: the root, or its subtree if the root is a tet leaf that has one.
-fn root(object: &ObjectView<'_>) -> u32 {
-    match Child::from_code(object.header.root) {
-        Some(Child::Tets(row)) if object.tet_leaves[row as usize].subtree != NONE => {
-            object.tet_leaves[row as usize].subtree
-        }
-        _ => object.header.root,
-    }
-}
-
-/// Enters a tet leaf: its stack entry is replaced by its subtree if it has one, otherwise the ray walks through it.
+/// Walks a ray through a tet leaf without a subtree.
 #[cold]
 #[inline(never)]
 fn enter_tet_leaf<G: Goal>(
     object: &ObjectView<'_>,
     row: u32,
     ray: ExactRay<'_>,
-    (state, top): (&mut RayState<G>, StackPosition),
-    stacks: &mut Stacks,
+    state: &mut RayState<G>,
 ) -> LeafOutcome {
-    let subtree = object.tet_leaves[row as usize].subtree;
-    if subtree != NONE {
-        stacks.set_code(top, subtree);
-        return LeafOutcome::Replaced;
-    }
     decide(Scalar, object, ray, &object.bounds, state, (NONE, 0));
     if enter_tets(object, row, ray, state.query(ray.0), &mut ()) == TetOutcome::Done {
         LeafOutcome::Done

@@ -2,11 +2,9 @@
 //! unpack the others.
 
 use crate::intersect::filter::TriangleBlock;
-use crate::intersect::point_lanes::CornerLanes;
-use crate::simd::{CacheLevel, Part, Simd};
-use bth_format::layout::{Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, RawLeaf};
-use bth_format::object::Unpacked;
-use bth_format::object::{NodeBase, ObjectView};
+use crate::simd::{CacheLevel, Part, Scalar, Simd};
+use bth_format::layout::{Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, NONE, RawLeaf};
+use bth_format::object::{NodeBase, ObjectView, Unpacked};
 
 /// Unpacking of the leaf on a grid at an index of a child code, as a part of kernels: it is long,
 /// and rarely needed.
@@ -69,34 +67,75 @@ pub(crate) fn indexed_leaf<'r, S: Simd>(
     }
 }
 
-/// A visitor of what a child code leads to if that is not a node.
-pub(crate) trait LeafVisitor<S: Simd>: Sized {
-    type Output;
-    /// Visits a leaf of triangles, in either record format.
-    fn triangles<B: TriangleBlock + CornerLanes>(self, s: S, block: &B) -> Self::Output;
-    /// Visits the tet leaf with this row.
-    fn tets(self, s: S, row: u32) -> Self::Output;
-    /// Visits nothing: the code belongs to an empty slot, a node or an unchecked file.
-    fn nothing(self) -> Self::Output;
+/// What the child code of a leaf leads to.
+#[derive(Clone, Copy)]
+pub(crate) enum Leaf<'r> {
+    /// A leaf whose triangles refer to vertices by index.
+    Indexed(&'r IndexedLeaf),
+    /// A leaf with the coordinates of each corner.
+    Raw(&'r RawLeaf),
+    /// The row of a tet leaf without a subtree.
+    Tets(u32),
+    /// The child code of a tet leaf's subtree.
+    Subtree(u32),
+    /// No leaf: an empty slot, a node, or a code of a file that was not checked.
+    None,
 }
 
-/// Passes the leaf with a child code to a visitor. Leaves on a grid are unpacked.
+/// Memory of an unpacked leaf.
+#[derive(Default)]
+pub(crate) struct LeafMemory {
+    indexed: Option<Unpacked<IndexedLeaf>>,
+    raw: Option<Unpacked<RawLeaf>>,
+}
+
+/// The leaf with this child code: in place or, for objects with coordinates on a grid, unpacked into `memory`.
 #[inline(always)]
-pub(crate) fn visit_leaf<S: Simd, V: LeafVisitor<S>>(
+pub(crate) fn leaf<'r, S: Simd>(
     s: S,
-    object: &ObjectView<'_>,
-    node_base: NodeBase<'_>,
+    object: &'r ObjectView<'_>,
+    node_base: NodeBase<'r>,
     code: u32,
-    visitor: V,
-) -> V::Output {
-    let (mut unpacked, mut unpacked_raw) = (None, None);
-    if let Some(leaf) = indexed_leaf(s, object, node_base, code, &mut unpacked) {
-        return visitor.triangles(s, leaf);
+    memory: &'r mut LeafMemory,
+) -> Leaf<'r> {
+    if let Some(leaf) = indexed_leaf(s, object, node_base, code, &mut memory.indexed) {
+        return Leaf::Indexed(leaf);
     }
     match Child::from_code(code) {
-        Some(Child::Raw(at)) => visitor.triangles(s, raw(s, object, at, &mut unpacked_raw)),
-        Some(Child::Tets(row)) => visitor.tets(s, row),
-        _ => visitor.nothing(),
+        Some(Child::Raw(index)) => Leaf::Raw(raw(s, object, index, &mut memory.raw)),
+        Some(Child::Tets(row)) => match object.tet_leaves[row as usize].subtree {
+            NONE => Leaf::Tets(row),
+            subtree => Leaf::Subtree(subtree),
+        },
+        _ => Leaf::None,
+    }
+}
+
+/// The index in the object's leaf order of a triangle of the leaf with this child code, and its corners. `None` for tet leaves,
+/// and if there is no such leaf.
+#[inline(always)]
+pub(crate) fn triangle(object: &ObjectView<'_>, code: u32, triangle: u32) -> Option<(u32, [[f32; 3]; 3])> {
+    let at = triangle as usize;
+    match leaf(Scalar, object, object.node_base(), code, &mut LeafMemory::default()) {
+        Leaf::Indexed(leaf) => Some((leaf.first + triangle, leaf.corners(at))),
+        Leaf::Raw(leaf) => Some((leaf.first + triangle, leaf.corners(at))),
+        Leaf::Tets(_) | Leaf::Subtree(_) | Leaf::None => None,
+    }
+}
+
+/// The child code at which rays start: the root, or its subtree if the root is a tet leaf that has one.
+pub(crate) fn root(object: &ObjectView<'_>) -> u32 {
+    match leaf(Scalar, object, object.node_base(), object.header.root, &mut LeafMemory::default()) {
+        Leaf::Subtree(subtree) => subtree,
+        _ => object.header.root,
+    }
+}
+
+/// Row of the tet leaf that is the whole object, if its triangles are not also in a BVH; else `NONE`.
+pub(crate) fn sole_tet_leaf(object: &ObjectView<'_>) -> u32 {
+    match leaf(Scalar, object, object.node_base(), object.header.root, &mut LeafMemory::default()) {
+        Leaf::Tets(row) => row,
+        _ => NONE,
     }
 }
 

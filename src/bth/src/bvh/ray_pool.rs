@@ -2,7 +2,7 @@
 //! with the work of the others. [`super::interleaved`] starts the rays and stores their answers.
 
 use super::leaf::{LeafOutcome, enter_leaf};
-use super::nodes::{indexed_leaf, is_large, prefetch, prefetch_into, raw as raw_leaf};
+use super::nodes::{Leaf, LeafMemory, is_large, leaf, prefetch, prefetch_into};
 use super::ray_state::{RayState, write_children};
 use super::stack::{BOTTOM, StackPosition, Stacks};
 use crate::intersect::start_point::Starts;
@@ -237,14 +237,14 @@ impl<'a, G: Goal> RayPool<'a, G> {
         self.counts = counts;
     }
 
-    /// Makes the step of each ray whose next step enters a leaf. `tets` intersects a tet leaf, given its row, the ray and the position
-    /// of the leaf on the ray's stack.
+    /// Makes the step of each ray whose next step enters a leaf. `tets` intersects a tet leaf without a subtree, given its row
+    /// and the ray.
     #[inline(always)]
     pub(super) fn leaf_steps<S: Simd>(
         &mut self,
         s: S,
         (object, rays, starts): (&ObjectView<'_>, &[Ray], Starts<'_>),
-        mut tets: impl FnMut(u32, &mut RayState<G>, StackPosition, &mut Stacks) -> LeafOutcome,
+        mut tets: impl FnMut(u32, &mut RayState<G>) -> LeafOutcome,
     ) {
         let RayPool { slots, tops, lists, stacks, bottoms, goal, .. } = self;
         let (mut counts, node_base, goal) = (self.counts, object.node_base(), *goal);
@@ -252,20 +252,22 @@ impl<'a, G: Goal> RayPool<'a, G> {
             let slot = usize::from(lists.leaf[i]) % POOL_SIZE;
             let state = &mut slots[slot].0;
             let (code, top) = (tops.code[slot], tops.position[slot]);
-            let (ray, mut unpacked) = (state.ray(), None);
+            let ray = state.ray();
             let exact_ray = (&rays[ray], starts.of(ray));
-            let found = if let Some(leaf) = indexed_leaf(s, object, node_base, code, &mut unpacked) {
-                enter_leaf(s, (object, goal), &object.bounds, exact_ray, state, (leaf, code))
-            } else {
-                let mut unpacked = None;
-                match Child::from_code(code) {
-                    Some(Child::Raw(index)) => {
-                        let leaf = raw_leaf(s, object, index, &mut unpacked);
-                        enter_leaf(s, (object, goal), &object.bounds, exact_ray, state, (leaf, code))
-                    }
-                    Some(Child::Tets(row)) => tets(row, state, top, stacks),
-                    _ => LeafOutcome::Nothing,
+            let mut memory = LeafMemory::default();
+            let found = match leaf(s, object, node_base, code, &mut memory) {
+                Leaf::Indexed(leaf) => {
+                    enter_leaf(s, (object, goal), &object.bounds, exact_ray, state, (leaf, code))
                 }
+                Leaf::Raw(leaf) => {
+                    enter_leaf(s, (object, goal), &object.bounds, exact_ray, state, (leaf, code))
+                }
+                Leaf::Tets(row) => tets(row, state),
+                Leaf::Subtree(subtree) => {
+                    stacks.set_code(top, subtree);
+                    LeafOutcome::Replaced
+                }
+                Leaf::None => LeafOutcome::Nothing,
             };
             let below = top.below();
             let top = match found {

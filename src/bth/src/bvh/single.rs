@@ -5,7 +5,7 @@
 //! the end ([`super::certain_hit`]).
 
 use super::leaf::{LeafOutcome, Progress, decide, enter_leaf};
-use super::nodes::{indexed_leaf, prefetch, raw as raw_leaf};
+use super::nodes::{Leaf, LeafMemory, leaf, prefetch};
 use super::ray_state::key_limit;
 use super::single_stack::{OpenSingleStack, SingleStack};
 use crate::bvh::candidate::Candidate;
@@ -121,40 +121,32 @@ pub(crate) fn trace_single<S: Simd, G: Goal, C: Count>(
     loop {
         let limits = [state.last, limit];
         code = descend(s, prepared, node_base, limits, (code, goal), &mut stack, count);
-        let mut unpacked = None;
-        let leaf = match node_base.indexed_leaf(code) {
-            Some(leaf) => Some(leaf),
-            None if stack.is_empty() => break,
-            None => indexed_leaf(s, object, node_base, code, &mut unpacked),
-        };
-        let done = if let Some(leaf) = leaf {
-            count.leaf();
-            count.triangles(leaf.triangles);
-            enter_leaf(s, (object, goal), bounds, ray, &mut state, (leaf, code)) == LeafOutcome::Done
-        } else {
-            let mut unpacked = None;
-            match Child::from_code(code) {
-                Some(Child::Raw(at)) => {
-                    let leaf = raw_leaf(s, object, at, &mut unpacked);
-                    count.leaf();
-                    count.triangles(leaf.triangles);
-                    enter_leaf(s, (object, goal), bounds, ray, &mut state, (leaf, code)) == LeafOutcome::Done
-                }
-                Some(Child::Tets(row)) => {
-                    let subtree = object.tet_leaves[row as usize].subtree;
-                    if subtree != NONE {
-                        code = subtree;
-                        continue;
-                    }
-                    count.leaf();
-                    decide(s, object, ray, bounds, &mut state, (NONE, 0));
-                    let done = enter_tets(object, row, ray, state.query(ray.0), count) == TetOutcome::Done;
-                    state.update_from_query(ray.0, bounds.origin_error);
-                    done
-                }
-                // A code of a file that was not checked.
-                _ => false,
+        let mut memory = LeafMemory::default();
+        let done = match leaf(s, object, node_base, code, &mut memory) {
+            Leaf::Indexed(leaf) => {
+                count.leaf();
+                count.triangles(leaf.triangles);
+                enter_leaf(s, (object, goal), bounds, ray, &mut state, (leaf, code)) == LeafOutcome::Done
             }
+            _ if stack.is_empty() => break,
+            Leaf::Raw(leaf) => {
+                count.leaf();
+                count.triangles(leaf.triangles);
+                enter_leaf(s, (object, goal), bounds, ray, &mut state, (leaf, code)) == LeafOutcome::Done
+            }
+            Leaf::Subtree(subtree) => {
+                code = subtree;
+                continue;
+            }
+            Leaf::Tets(row) => {
+                count.leaf();
+                decide(s, object, ray, bounds, &mut state, (NONE, 0));
+                let done = enter_tets(object, row, ray, state.query(ray.0), count) == TetOutcome::Done;
+                state.update_from_query(ray.0, bounds.origin_error);
+                done
+            }
+            // A code of a file that was not checked.
+            Leaf::None => false,
         };
         if done || stack.is_last() {
             break;

@@ -4,7 +4,7 @@
 //! BVH of an object, whose leaves hold triangles ([`TriangleQuery`]), or the top level of a scene,
 //! whose leaves are instances (`instances/enumerate.rs`).
 
-use super::nodes::{LeafVisitor, prefetch, visit_leaf};
+use super::nodes::{Leaf, LeafMemory, leaf, prefetch};
 use super::single_stack::SingleStack;
 use super::stack::BOTTOM;
 use crate::intersect::filter::TriangleBlock;
@@ -196,40 +196,15 @@ impl<Q: TriangleQuery> Tree<Q> for ObjectTree<'_> {
         query: &mut Q,
         limit: f32,
     ) -> AfterLeaf {
-        let visit = LeafVisit { query, lanes, object: self.object, limit };
-        visit_leaf(s, self.object, self.node_base, code, visit)
-    }
-}
-
-/// Visits a leaf of an object for a query.
-struct LeafVisit<'a, S: Simd, Q: BoxQuery> {
-    query: &'a mut Q,
-    lanes: &'a Q::Constants<S>,
-    object: &'a ObjectView<'a>,
-    limit: f32,
-}
-
-impl<S: Simd, Q: TriangleQuery> LeafVisitor<S> for LeafVisit<'_, S, Q> {
-    type Output = AfterLeaf;
-    #[inline(always)]
-    fn triangles<B: TriangleBlock + CornerLanes>(self, s: S, block: &B) -> AfterLeaf {
-        let ids = self.object.triangle_ids;
-        match self.query.triangles(s, self.lanes, block, ids, self.limit) {
-            true => AfterLeaf::Done,
-            false => AfterLeaf::Pop,
-        }
-    }
-    #[inline(always)]
-    fn tets(self, s: S, row: u32) -> AfterLeaf {
-        match self.object.tet_leaves[row as usize].subtree {
-            NONE if self.query.tets(s, self.lanes, self.object, row) => AfterLeaf::Done,
-            NONE => AfterLeaf::Pop,
-            subtree => AfterLeaf::Enter(subtree),
-        }
-    }
-    #[inline(always)]
-    fn nothing(self) -> AfterLeaf {
-        AfterLeaf::Pop
+        let (object, mut memory) = (self.object, LeafMemory::default());
+        let is_complete = match leaf(s, object, self.node_base, code, &mut memory) {
+            Leaf::Indexed(block) => query.triangles(s, lanes, block, object.triangle_ids, limit),
+            Leaf::Raw(block) => query.triangles(s, lanes, block, object.triangle_ids, limit),
+            Leaf::Tets(row) => query.tets(s, lanes, object, row),
+            Leaf::Subtree(subtree) => return AfterLeaf::Enter(subtree),
+            Leaf::None => false,
+        };
+        if is_complete { AfterLeaf::Done } else { AfterLeaf::Pop }
     }
 }
 

@@ -1,6 +1,6 @@
 //! The oracle of tests of instances: a loop over all triangles, without any box.
 
-use crate::bvh::candidate::{Candidate, ReadCorners};
+use crate::bvh::candidate::Candidate;
 use crate::intersect::exact::reported;
 use crate::intersect::line::Line;
 use crate::nodes::affine::Inverse;
@@ -24,7 +24,7 @@ fn triangles(object: &ObjectView<'_>) -> Vec<(u32, [[f32; 3]; 3])> {
         };
         for triangle in 0..count {
             let candidate = Candidate { leaf: code, triangle };
-            let (index, corners) = candidate.read(object, ReadCorners).expect("a leaf");
+            let (index, corners) = candidate.read(object).expect("a leaf");
             found.push((object.triangle_ids[index as usize], corners));
         }
     }

@@ -2,10 +2,10 @@
 //! through tetrahedra if these are the whole object.
 
 use super::scratch::Scratch;
-use super::walked_batch::{RAYS_PER_PART, sole_tet_leaf, walk};
+use super::walked_batch::{RAYS_PER_PART, walk};
 use super::{any, nearest};
 use crate::bvh::interleaved::{Interleaved, RemainingRays};
-use crate::bvh::nodes::is_large;
+use crate::bvh::nodes::{is_large, sole_tet_leaf};
 use crate::bvh::packet::{MinimumUse, Packets};
 use crate::intersect::exact_lanes::Intersections;
 use crate::intersect::start_point::Starts;

@@ -1,12 +1,13 @@
 //! Walks of the rays of a batch through tetrahedra, before those that remain go through the BVH. They are compiled once for all queries.
 
+use crate::bvh::nodes::sole_tet_leaf;
 use crate::query::{EitherGoal, EitherQuery};
 use crate::rays::Ray;
 use crate::simd::Isa;
 use crate::tets::batch::WalkBatch;
 use crate::tets::records::LaneRecords;
 use crate::tets::walks::{WalkLists, WalkState};
-use bth_format::layout::{Child, NONE};
+use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 
 /// Greatest number of rays that walk through tetrahedra together. It is large, because lanes are idle at the end of each part.
@@ -57,13 +58,5 @@ pub(super) fn walk(object: &ObjectView<'_>, rays: &[Ray], goal: EitherGoal, scra
     rest.clear();
     for (index, state) in (0..).zip(&*states) {
         if *state == WalkState::NotWalked { rest.push(index) } else { done.push(index) }
-    }
-}
-
-/// Index of the tet leaf that is the whole object, if its triangles are not also in a BVH; else `NONE`.
-pub(super) fn sole_tet_leaf(object: &ObjectView<'_>) -> u32 {
-    match Child::from_code(object.header.root) {
-        Some(Child::Tets(leaf)) if object.tet_leaves[leaf as usize].subtree == NONE => leaf,
-        _ => NONE,
     }
 }

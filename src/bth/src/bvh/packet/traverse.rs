@@ -14,14 +14,14 @@ use super::hit_cache::CachedHits;
 use super::packet_rays::PacketRays;
 use super::ray_group::{IntersectGroup, RayGroup};
 use super::single_rays::FEW_OF_PACKET;
-use crate::bvh::nodes::{self, prefetch_into};
+use crate::bvh::nodes::{Leaf, LeafMemory, leaf, prefetch_into};
 use crate::bvh::ray_state::key_limit;
 use crate::intersect::exact_lanes::{Intersections, OriginTermsLanes, Pairs};
 use crate::query::sink::Sink;
 use crate::query::{Goal, RayQuery};
 use crate::rays::Ray;
 use crate::simd::{CacheLevel, LANES, Part, Simd};
-use bth_format::layout::{Child, NONE, WIDTH};
+use bth_format::layout::{Child, WIDTH};
 use bth_format::object::ObjectView;
 use std::marker::PhantomData;
 
@@ -105,36 +105,29 @@ impl<S: Simd, G: Goal, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, S
         'steps: loop {
             steps += 1;
             used += mask.count_ones();
-            let (mut indexed, mut raw) = (None, None);
-            let reached = match Child::from_code(code) {
-                Some(Child::Node(line)) => {
-                    let node = object.node(line);
-                    let entries =
-                        stack[top..].first_chunk_mut().expect("the BVH is no deeper than its header says");
-                    top += if H::MIXED_OCTANTS && mask.count_ones() <= FEW_OF_PACKET {
-                        rays.single_rays.children(s, groups, mask, (line, node), entries)
-                    } else {
-                        let (rays, node) = (mask, (line, node));
-                        PacketChildren { bounds, groups, rays, node, limit, entries, goal }.inline_or_call(s)
-                    };
-                    None
-                }
-                Some(Child::Indexed(line)) => {
-                    let block = nodes::indexed(s, object, line, &mut indexed);
-                    rays.reached(s, bounds, groups, (block, code), mask)
-                }
-                Some(Child::Raw(line)) => {
-                    let block = nodes::raw(s, object, line, &mut raw);
-                    rays.reached(s, bounds, groups, (block, code), mask)
-                }
-                Some(Child::Tets(row)) => {
-                    code = object.tet_leaves[row as usize].subtree;
-                    if code == NONE {
-                        return PacketOutcome::Refused;
+            let mut memory = LeafMemory::default();
+            let reached = if code & Child::LEAF_BIT == 0 {
+                let node = object.node(code);
+                let entries =
+                    stack[top..].first_chunk_mut().expect("the BVH is no deeper than its header says");
+                top += if H::MIXED_OCTANTS && mask.count_ones() <= FEW_OF_PACKET {
+                    rays.single_rays.children(s, groups, mask, (code, node), entries)
+                } else {
+                    let (rays, node) = (mask, (code, node));
+                    PacketChildren { bounds, groups, rays, node, limit, entries, goal }.inline_or_call(s)
+                };
+                None
+            } else {
+                match leaf(s, object, object.node_base(), code, &mut memory) {
+                    Leaf::Indexed(block) => rays.reached(s, bounds, groups, (block, code), mask),
+                    Leaf::Raw(block) => rays.reached(s, bounds, groups, (block, code), mask),
+                    Leaf::Subtree(subtree) => {
+                        code = subtree;
+                        continue;
                     }
-                    continue;
+                    Leaf::Tets(_) => return PacketOutcome::Refused,
+                    Leaf::None => None,
                 }
-                None => None,
             };
             if let Some(reached) = reached
                 && rays.enter_triangles(s, bounds, groups, (points, relative), reached)

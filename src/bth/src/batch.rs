@@ -6,10 +6,12 @@ use crate::rays::{Hit, Ray};
 use crate::scene::Scene;
 use crate::trace::TraceRay;
 
-/// Rays in world space that are traced together, with options: [`Ray`]s, or [`StartRay`](crate::rays::StartRay)s. Made by [`Scene::batch`].
+/// Rays in world space that are traced together, with options: [`Ray`]s, or
+/// [`StartRay`](crate::rays::StartRay)s. Made by [`Scene::batch`].
 ///
-/// Rays that are traced together answer as each would alone, to the last bit. About a thousand coherent rays that are adjacent in
-/// the slice (a tile of a picture, the shadow rays of a tile) are traced fastest.
+/// Rays that are traced together answer as each would alone, to the last bit. About a thousand
+/// coherent rays that are adjacent in the slice (a tile of a picture, the shadow rays of a tile)
+/// are traced fastest.
 ///
 /// ```no_run
 /// use bth::rays::{Hit, Ray, StartRay};
@@ -35,7 +37,8 @@ pub struct RayBatch<'a, R: TraceRay = Ray> {
     parallel: bool,
 }
 
-/// Number of rays that one task of a parallel batch traces: many enough for packets, few enough to balance.
+/// Number of rays that one task of a parallel batch traces: many enough for packets, few enough to
+/// balance.
 #[cfg(feature = "rayon")]
 const TASK: usize = 4096;
 
@@ -51,14 +54,16 @@ impl<'a, R: TraceRay> RayBatch<'a, R> {
         }
     }
 
-    /// Sets what the rays are allowed to hit; by default everything, whatever the masks of the scene. Where something is excluded, rays
-    /// are traced one at a time, as by [`Scene::nearest_accepted`].
+    /// Sets what the rays are allowed to hit; by default everything, whatever the masks of the
+    /// scene. Where something is excluded, rays are traced one at a time, as by
+    /// [`Scene::nearest_accepted`].
     #[inline]
     pub fn accept(self, accept: &'a Accept<'a>) -> Self {
         RayBatch { accept: Some(accept), ..self }
     }
 
-    /// Traces on all threads of the current pool of `rayon`. Answers do not depend on the number of threads.
+    /// Traces on all threads of the current pool of `rayon`. Answers do not depend on the number of
+    /// threads.
     #[cfg(feature = "rayon")]
     #[inline]
     pub fn parallel(self) -> Self {
@@ -69,7 +74,8 @@ impl<'a, R: TraceRay> RayBatch<'a, R> {
     ///
     /// # Panics
     /// If there are not as many hits as rays.
-    // What a single ray needs is inlined into the caller: what is not asked for, such as conditions, then takes no time.
+    // What a single ray needs is inlined into the caller: what is not asked for, such as
+    // conditions, then takes no time.
     #[inline(always)]
     pub fn nearest(self, hits: &mut [Hit]) {
         assert_eq!(self.rays.len(), hits.len(), "as many results as rays");

@@ -1,21 +1,22 @@
-//! Rays, hits and the triangles of instances, as they are passed to and returned from queries. The types have the layout of those
-//! of the C interface (`bth.h`).
+//! Rays, hits and the triangles of instances, as they are passed to and returned from queries. The
+//! types have the layout of those of the C interface (`bth.h`).
 
 use bth_format::layout::NONE;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// A ray in world space: the points `origin + t * direction` with `tmin <= t <= tmax`. The direction need not be normalized; t is
-/// in units of its length.
+/// A ray in world space: the points `origin + t * direction` with `tmin <= t <= tmax`. The
+/// direction need not be normalized; t is in units of its length.
 #[derive(Clone, Copy, Debug, PartialEq, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct Ray {
     /// Point at t = 0, finite.
     pub origin: [f32; 3],
-    /// Least t of a hit; may be negative or infinite. No hit's t is infinite: what lies beyond the range of `f32` is not hit.
+    /// Smallest t of a hit; may be negative or infinite. No hit's t is infinite: what lies beyond
+    /// the range of `f32` is not hit.
     pub tmin: f32,
     /// Direction of any length except zero, finite.
     pub direction: [f32; 3],
-    /// Greatest t of a hit; may be infinite.
+    /// Largest t of a hit; may be infinite.
     pub tmax: f32,
 }
 
@@ -50,7 +51,8 @@ impl Ray {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct PrimitiveRef {
-    /// Index of the instance in the scene. In a file without scene sections it is the index of the object.
+    /// Index of the instance in the scene. In a file without scene sections it is the index of the
+    /// object.
     pub instance: u32,
     /// Index of the triangle among those of the source file, after fan triangulation of its faces.
     pub triangle: u32,
@@ -67,11 +69,13 @@ impl PrimitiveRef {
     }
 }
 
-/// A point of a surface, at which a ray may start: the point with these weights of a triangle of an instance.
+/// A point of a surface, at which a ray may start: the point with these weights of a triangle of an
+/// instance.
 ///
-/// It is the exact point a + u(b - a) + v(c - a) of the triangle's stored vertices a, b and c in the space of the object, not rounded.
-/// Weights of hits are rounded; where u + v exceeds 1, the start is the point (ub + vc) / (u + v) of the edge from b to c. So a start
-/// always lies on its triangle.
+/// It is the exact point a + u(b - a) + v(c - a) of the triangle's stored vertices a, b and c in
+/// the space of the object, not rounded. Weights of hits are rounded; where u + v exceeds 1, the
+/// start is the point (ub + vc) / (u + v) of the edge from b to c. So a start always lies on its
+/// triangle.
 #[derive(Clone, Copy, Debug, PartialEq, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct Start {
@@ -79,7 +83,8 @@ pub struct Start {
     pub primitive: PrimitiveRef,
     /// Barycentric weight of the triangle's second vertex, from 0 to 1.
     pub u: f32,
-    /// Barycentric weight of the triangle's third vertex, from 0 to 1. u + v is at most 1, but for rounding (2^-22).
+    /// Barycentric weight of the triangle's third vertex, from 0 to 1. u + v is at most 1, but for
+    /// rounding (2^-22).
     pub v: f32,
 }
 
@@ -93,12 +98,15 @@ impl Start {
     }
 }
 
-/// A ray that starts on a surface: the points `S + t * direction` with t > 0 and `t <= tmax`, where S is the exact point of its start.
+/// A ray that starts on a surface: the points `S + t * direction` with t > 0 and `t <= tmax`, where
+/// S is the exact point of its start.
 ///
-/// It never hits the surface that it leaves, nor another one through S, and never skips a wall, however near: t > 0 is decided exactly.
-/// It needs no offset and no `tmin`. t is in units of the length of the direction.
+/// It never hits the surface that it leaves, nor another one through S, and never skips a wall,
+/// however near: t > 0 is decided exactly. It needs no offset and no `tmin`. t is in units of the
+/// length of the direction.
 ///
-/// A ray whose start is not a point of a visible instance hits nothing; [`Scene::check_start`](crate::Scene::check_start) says why.
+/// A ray whose start is not a point of a visible instance hits nothing;
+/// [`Scene::check_start`](crate::Scene::check_start) says why.
 #[derive(Clone, Copy, Debug, PartialEq, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct StartRay {
@@ -106,7 +114,7 @@ pub struct StartRay {
     pub start: Start,
     /// Direction in world space, of any length except zero, finite.
     pub direction: [f32; 3],
-    /// Greatest t of a hit; may be infinite.
+    /// Largest t of a hit; may be infinite.
     pub tmax: f32,
 }
 
@@ -148,12 +156,13 @@ impl Hit {
     /// The result for a ray that hits something, where only that is asked.
     pub(crate) const SOME: Hit = Hit { t: 0.0, ..Hit::MISS };
 
-    /// The point of the surface that was hit, at which another ray may start; [`Start::NONE`] for a miss.
+    /// The point of the surface that was hit, at which another ray may start; [`Start::NONE`] for a
+    /// miss.
     pub const fn start(&self) -> Start {
         Start { primitive: self.primitive, u: self.u, v: self.v }
     }
 
-    /// Whether the ray hits a triangle.
+    /// Returns true if the ray hits a triangle.
     pub fn is_hit(&self) -> bool {
         self.t < f32::INFINITY
     }

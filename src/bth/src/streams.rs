@@ -1,4 +1,5 @@
-//! Rays and hits whose components are separate arrays, as other tracers and array languages keep them.
+//! Rays and hits whose components are separate arrays, as other tracers and array languages keep
+//! them.
 
 use crate::rays::{Hit, Ray};
 
@@ -9,13 +10,14 @@ pub struct RayStreams<'a> {
     pub origin: [&'a [f32]; 3],
     /// x, y and z of the directions.
     pub direction: [&'a [f32]; 3],
-    /// Least t of each ray's hits; 0 for all rays if it is empty.
+    /// Smallest t of each ray's hits; 0 for all rays if it is empty.
     pub tmin: &'a [f32],
-    /// Greatest t of each ray's hits; infinite for all rays if it is empty.
+    /// Largest t of each ray's hits; infinite for all rays if it is empty.
     pub tmax: &'a [f32],
 }
 
-/// Hits, each component an array with one element for each ray. A ray that hits nothing has the values of [`Hit::MISS`].
+/// Hits, each component an array with one element for each ray. A ray that hits nothing has the
+/// values of [`Hit::MISS`].
 #[derive(Debug)]
 pub struct HitStreams<'a> {
     /// t of each hit, infinite for a miss.

@@ -1,4 +1,5 @@
-//! Queries for the nearest hit and for any hit: of one ray, of a batch, and of arrays of components.
+//! Queries for the nearest hit and for any hit: of one ray, of a batch, and of arrays of
+//! components.
 
 // `sealed::Traced` is out of reach for other crates, so its types may be private.
 #![allow(private_interfaces, private_bounds)]
@@ -32,13 +33,15 @@ pub(crate) mod sealed {
 
     /// How rays of a kind are traced.
     pub trait Traced: SingleRay + Copy + Sync {
-        /// Returns true if the ray may hit something in a scene that is this instance, whose object's space is world space.
+        /// Returns true if the ray may hit something in a scene that is this instance, whose
+        /// object's space is world space.
         fn may_start_in(&self, instance: u32) -> bool;
         /// The ray in the world; `None` if it has no place there.
         fn placed(&self, scene: &Scene) -> Option<PlacedRay>;
         /// Returns true if rays are traced together, through instances if there is a world.
         fn go_together(rays: &[Self], world: Option<&World>) -> bool;
-        /// Stores the answers of rays that hit anything in an instance whose object's space is world space.
+        /// Stores the answers of rays that hit anything in an instance whose object's space is
+        /// world space.
         fn trace_in_object(
             object: &ObjectView<'_>,
             rays: &[Self],
@@ -46,7 +49,8 @@ pub(crate) mod sealed {
             scratch: &mut Scratch,
             answers: Answers<'_>,
         );
-        /// Calls `trace` with the rays of a batch in world space, and with their starts if there are any.
+        /// Calls `trace` with the rays of a batch in world space, and with their starts if there
+        /// are any.
         fn with_placed(scene: &Scene, rays: &[Self], trace: impl FnOnce(&[Ray], &[InstanceStart]));
     }
 }
@@ -205,8 +209,8 @@ impl Scene {
 
     /// Stores the nearest hit of a ray, or [`Hit::MISS`].
     ///
-    /// Inlined up to the kernel, which is not: every crate that traces single rays would hold kernels of its own. For a single
-    /// ray in a model every instruction on the way there counts.
+    /// Inlined up to the kernel, which is not: every crate that traces single rays would hold
+    /// kernels of its own. For a single ray in a model every instruction on the way there counts.
     #[inline(always)]
     pub(crate) fn store_nearest<R: Traced>(&self, ray: &R, hit: &mut Hit) {
         match self.sole_opaque() {
@@ -235,8 +239,8 @@ impl Scene {
         self.go_on(ray, hit);
     }
 
-    /// Stores the nearest hit of a ray in all objects of a file without scene sections, each in world space, or in the only
-    /// visible instance. `trace` returns the nearest hit in one.
+    /// Stores the nearest hit of a ray in all objects of a file without scene sections, each in
+    /// world space, or in the only visible instance. `trace` returns the nearest hit in one.
     fn nearest_of_objects(
         &self,
         world_ray: WorldRay<'_>,

@@ -1,4 +1,5 @@
-//! Candidates: triangles that the f32 filter does not exclude, and their decision in f64 or in exact arithmetic.
+//! Candidates: triangles that the f32 filter does not exclude, and their decision in f64 or in
+//! exact arithmetic.
 
 use super::nodes;
 use crate::intersect::exact::{Estimate, Intersection, estimate, in_pairs};
@@ -27,16 +28,18 @@ impl Candidate {
     /// No candidate.
     pub(crate) const NONE: Candidate = Candidate { leaf: NONE, triangle: 0 };
 
-    /// The triangle's index in the object's leaf order, and its corners. `None` without a candidate.
+    /// The triangle's index in the object's leaf order, and its corners. `None` without a
+    /// candidate.
     #[inline(always)]
     pub(crate) fn read(&self, object: &ObjectView<'_>) -> Option<(u32, [[f32; 3]; 3])> {
         nodes::triangle(object, self.leaf, self.triangle)
     }
 }
 
-/// Offers candidates of a ray to its query: the pending hit, then the triangles of the leaf with child code `leaf` whose bit is set
-/// in `triangles`. Its output is whether the query is complete. All traversals decide here, in f64 and where that is uncertain exactly,
-/// what the f32 filter leaves open.
+/// Offers candidates of a ray to its query: the pending hit, then the triangles of the leaf with
+/// child code `leaf` whose bit is set in `triangles`. Its output is whether the query is complete.
+/// All traversals decide here, in f64 and where that is uncertain exactly, what the f32 filter
+/// leaves open.
 pub(crate) struct Settle<'a, G> {
     pub(crate) object: &'a ObjectView<'a>,
     pub(crate) ray: ExactRay<'a>,
@@ -119,7 +122,8 @@ fn settle_from_start<G: Goal>(
         .is_some_and(|intersection| query.offer(TriangleRef::index(index, object.triangle_ids), intersection))
 }
 
-/// Decides exactly a candidate that f64 leaves open. Its corners are read again, so that the common path keeps them in registers.
+/// Decides exactly a candidate that f64 leaves open. Its corners are read again, so that the common
+/// path keeps them in registers.
 #[cold]
 #[inline(never)]
 fn intersect_candidate_exactly(
@@ -130,7 +134,7 @@ fn intersect_candidate_exactly(
     intersect_exactly(ray, candidate.read(object)?.1)
 }
 
-/// Decides exactly whether and where the ray's line meets a triangle.
+/// Decides exactly whether and where the ray's line hits a triangle.
 #[cold]
 #[inline(never)]
 pub(crate) fn intersect_exactly(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Intersection> {

@@ -1,4 +1,5 @@
-//! The answer of a single ray whose nearest hit is certain: t, u and v in f64, as [`super::deferred`] computes them for sixteen rays.
+//! The answer of a single ray whose nearest hit is certain: t, u and v in f64, as
+//! [`super::deferred`] computes them for sixteen rays.
 
 use super::candidate::{Candidate, Settle};
 use crate::intersect::exact::{reported, reported_barycentric};
@@ -11,8 +12,9 @@ use crate::simd::Simd;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 
-/// Stores the answer of a ray of which the filter is sure that its nearest hit is this candidate, within the ray's range. `norm` is
-/// the greatest |component| of its direction, and `instance` is reported with the hit.
+/// Stores the answer of a ray of which the filter is sure that its nearest hit is this candidate,
+/// within the ray's range. `norm` is the largest |component| of its direction, and `instance` is
+/// reported with the hit.
 #[inline(always)]
 pub(crate) fn store_certain_hit<S: Simd, G: Goal>(
     s: S,

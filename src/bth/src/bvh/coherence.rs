@@ -11,21 +11,22 @@ use zerocopy::{FromBytes, IntoBytes};
 const FLOATS: usize = size_of::<Ray>() / size_of::<f32>();
 const _: () = assert!(2 * FLOATS == LANES);
 
-/// Greatest difference of the directions of coherent rays, relative to the least of their components along the main axis.
+/// Largest difference of the directions of coherent rays, relative to the smallest of their
+/// components along the main axis.
 const SPREAD: f32 = 0.25;
-/// Greatest extent of the box of short rays, relative to the longest of them.
+/// Largest extent of the box of short rays, relative to the longest of them.
 const LOOSENESS: f32 = 3.0;
-/// Greatest extent of that box, relative to the size of the object.
+/// Largest extent of that box, relative to the size of the object.
 const SHORT: f32 = 0.3;
 
-/// Least and greatest values of the components of rays. Rays with a NaN may be missing from them.
+/// Smallest and largest values of the components of rays. Rays with a NaN may be missing from them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Span {
-    /// For each axis the least and the greatest coordinate of the origins.
+    /// For each axis the smallest and the largest coordinate of the origins.
     pub(crate) origin: [[f32; 2]; 3],
-    /// For each axis the least and the greatest component of the directions.
+    /// For each axis the smallest and the largest component of the directions.
     pub(crate) direction: [[f32; 2]; 3],
-    /// Least tmin and greatest tmax.
+    /// Smallest tmin and largest tmax.
     pub(crate) range: [f32; 2],
 }
 
@@ -44,8 +45,8 @@ fn floats(rays: &[Ray; 2]) -> &[f32; LANES] {
     <[f32; LANES]>::ref_from_bytes(rays.as_bytes()).ok().expect("rays are made of f32")
 }
 
-/// Whether the directions of two rays lie in the same octant. It is tested for the first and the last ray before [`Span::of`], which
-/// takes longer.
+/// Returns true if the directions of two rays lie in the same octant. It is tested for the first
+/// and the last ray before [`Span::of`], which takes longer.
 #[inline(always)]
 pub(crate) fn is_same_octant(a: &Ray, b: &Ray) -> bool {
     let mut differ = 0;
@@ -55,7 +56,7 @@ pub(crate) fn is_same_octant(a: &Ray, b: &Ray) -> bool {
     differ >> 31 == 0
 }
 
-/// The least and the greatest value of a component, given those of two rays in one vector.
+/// The smallest and the largest value of a component, given those of two rays in one vector.
 #[inline(always)]
 fn both(least: &[f32; LANES], greatest: &[f32; LANES], at: usize) -> [f32; 2] {
     [least[at].min(least[at + FLOATS]), greatest[at].max(greatest[at + FLOATS])]
@@ -95,7 +96,8 @@ impl Span {
         span
     }
 
-    /// The axis along which the least |component| of the directions is the greatest, and that |component|.
+    /// The axis along which the smallest |component| of the directions is the largest, and that
+    /// |component|.
     #[inline(always)]
     pub(crate) fn main_axis(&self) -> (usize, f32) {
         let mut main = (0, 0.0);
@@ -109,7 +111,7 @@ impl Span {
         main
     }
 
-    /// Whether the directions lie in the same octant and differ little.
+    /// Returns true if the directions lie in the same octant and differ little.
     #[inline(always)]
     pub(crate) fn is_coherent(&self) -> bool {
         let mut spread = 0f32;
@@ -121,7 +123,8 @@ impl Span {
         same && spread <= SPREAD * self.main_axis().1
     }
 
-    /// Whether the rays have the same origin, and the main axis is that of each direction's greatest |component|.
+    /// Returns true if the rays have the same origin, and the main axis is that of each direction's
+    /// largest |component|.
     #[inline(always)]
     pub(crate) fn is_from_point(&self) -> bool {
         let [[x, to_x], [y, to_y], [z, to_z]] = self.origin;
@@ -134,7 +137,7 @@ impl Span {
         same
     }
 
-    /// Greatest |coordinate| of an origin.
+    /// Largest |coordinate| of an origin.
     #[inline(always)]
     pub(crate) fn farthest_origin(&self) -> f32 {
         let mut farthest = 0f32;
@@ -159,10 +162,12 @@ impl Span {
         prepare::padded_extent(bounds, farthest, reach)
     }
 
-    /// A box of all points at which the rays can hit something, as lower and upper corner, if they are short and close together.
+    /// A box of all points at which the rays can hit something, as lower and upper corner, if they
+    /// are short and close together.
     ///
-    /// An end of a segment, o + t·d, is off by at most 3u(|o| + |t·d|) for its roundings (u = 2^-24), and by
-    /// u|t·d| for those of the reported t; the pad is 16u(|o| + the extent of the box).
+    /// An end of a segment, o + t·d, is off by at most 3u(|o| + |t·d|) for its roundings (u =
+    /// 2^-24), and by u|t·d| for those of the reported t; the pad is 16u(|o| + the extent of the
+    /// box).
     #[inline(always)]
     pub(crate) fn segments<S: Simd>(
         &self,

@@ -1,4 +1,5 @@
-//! Deferred evaluation of hits: t, u and v of finished rays whose nearest triangle is certain, for sixteen rays at a time.
+//! Deferred evaluation of hits: t, u and v of finished rays whose nearest triangle is certain, for
+//! sixteen rays at a time.
 
 use super::leaf::Progress;
 use super::ray_state::RayState;
@@ -27,7 +28,8 @@ pub(crate) struct DeferredHits {
     intersections: Intersections,
 }
 
-/// Computes the pending hits of all rays that were added and stores their answers, as a part of kernels.
+/// Computes the pending hits of all rays that were added and stores their answers, as a part of
+/// kernels.
 struct Flush<'a, 's> {
     deferred: &'a mut DeferredHits,
     object: &'a ObjectView<'a>,
@@ -42,7 +44,8 @@ impl<S: Simd> Part<S> for Flush<'_, '_> {
         let Flush { deferred, object, rays, sink } = self;
         let all = ((1u64 << deferred.count) - 1) as u32;
         deferred.count = 0;
-        // Gathering all rays here was measured to take half the time of storing each when it is added.
+        // Gathering all rays here was measured to take half the time of storing each when it is
+        // added.
         let [ox, oy, oz, _, dx, dy, dz, _] = gather_rays(s, s.mask(all), rays, s.load_u(&deferred.ray));
         let (origin, direction) = ([ox, oy, oz], [dx, dy, dz]);
         for k in 0..3 {

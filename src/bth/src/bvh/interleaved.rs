@@ -1,5 +1,5 @@
-//! Traversal of an object's BVH by the rays of a batch, interleaved: rays are prepared sixteen at a time, enter the pool as slots
-//! become free, and their answers are stored as they finish.
+//! Traversal of an object's BVH by the rays of a batch, interleaved: rays are prepared sixteen at a
+//! time, enter the pool as slots become free, and their answers are stored as they finish.
 
 use super::coherence::is_same_octant;
 use super::deferred::DeferredHits;
@@ -27,7 +27,8 @@ pub(crate) struct RemainingRays<'a> {
     pub(crate) order: Option<&'a [u32]>,
     /// Queries of all rays of the batch, if another structure has been traversed before.
     pub(crate) queries: Option<&'a [EitherQuery]>,
-    /// For each ray of the batch the row of the tet leaf whose hits its query already holds, or `NONE`.
+    /// For each ray of the batch the row of the tet leaf whose hits its query already holds, or
+    /// `NONE`.
     pub(crate) walked: Option<&'a [u32]>,
 }
 
@@ -39,24 +40,26 @@ pub(crate) struct Interleaved<'a, 's, G: Goal> {
     pub(crate) stacks: &'a mut Stacks,
     pub(crate) sink: &'a mut Sink<'s>,
     pub(crate) goal: G,
-    /// Whether runs of coherent rays begin at entry nodes. It pays in [large](super::nodes::is_large) objects only.
+    /// True if runs of coherent rays begin at entry nodes. It pays in
+    /// [large](super::nodes::is_large) objects only.
     pub(crate) entry_nodes: bool,
 }
 
-/// Supplies rays to the pool. Sixteen at a time are prepared and tested against the boxes of the root's children or, if they are
-/// coherent, of their entry node's.
+/// Supplies rays to the pool. Sixteen at a time are prepared and tested against the boxes of the
+/// root's children or, if they are coherent, of their entry node's.
 #[repr(C, align(64))]
 struct RaySource<'a> {
     prepared: Prepared,
     /// For each lane the depths at which its ray enters the children.
     enter: [[f32; LANES]; LANES],
-    /// For each lane a bit for each child that its ray may meet.
+    /// For each lane a bit for each child that its ray may hit.
     children: [u32; LANES],
     /// Codes of the children, unless the root is a leaf.
     codes: [u32; LANES],
-    /// The entry node of the next rays, as long as fewer than this many of the batch have been prepared.
+    /// The entry node of the next rays, as long as fewer than this many of the batch have been
+    /// prepared.
     entered: usize,
-    /// Whether entry nodes are searched.
+    /// True if entry nodes are searched.
     searches: bool,
     entry_node: WideNode,
     /// For each lane the index of its ray in the batch.
@@ -67,7 +70,7 @@ struct RaySource<'a> {
     /// Child code at which rays start.
     root: u32,
     bounds: ObjectBounds,
-    /// Lanes whose rays may meet a child of the root; the first `filled` are valid.
+    /// Lanes whose rays may hit a child of the root; the first `filled` are valid.
     lane: [u8; LANES],
     filled: usize,
     /// How many of those lanes have been started.
@@ -213,7 +216,8 @@ impl RaySource<'_> {
         true
     }
 
-    /// Searches the entry node of the next rays, where those before had another. They must follow one another in the batch.
+    /// Searches the entry node of the next rays, where those before had another. They must follow
+    /// one another in the batch.
     #[inline(always)]
     fn find_entry_node<S: Simd>(&mut self, s: S) {
         // Not with 128 bits, whose code is long, nor in scalar code.
@@ -241,7 +245,8 @@ fn walked<G: Goal>(goal: G, query: &EitherQuery) -> RayQuery<G> {
     query.with_goal(goal)
 }
 
-/// Whether the rays from `taken` on in an order are as many as have an entry node in common, and those of the batch from `first` on.
+/// Returns true if the rays from `taken` on in an order are as many as have an entry node in
+/// common, and those of the batch from `first` on.
 #[inline(never)]
 fn is_run(order: Option<&[u32]>, taken: usize, first: usize) -> bool {
     order.is_none_or(|order| {

@@ -1,10 +1,11 @@
 //! Intersection of one ray with the triangles of a leaf, for single and for interleaved rays.
 //!
-//! The conservative f32 filter ([`TriangleFilter`](crate::intersect::filter::TriangleFilter)) excludes the triangles that are
-//! certainly missed. A triangle that is certainly hit, and certainly nearer than all hits before, becomes the pending hit: its
-//! t, u and v are computed when the traversal has ended, since most rays find several hits, each nearer than the one before.
-//! The other triangles are decided at once, in f64 or exactly ([`Settle`]). Packets take the same decisions with one ray in each
-//! lane (`bvh/packet/leaf.rs`), and share [`Settle`].
+//! The conservative f32 filter ([`TriangleFilter`](crate::intersect::filter::TriangleFilter))
+//! excludes the triangles that are certainly missed. A triangle that is certainly hit, and
+//! certainly nearer than all hits before, becomes the pending hit: its t, u and v are computed when
+//! the traversal has ended, since most rays find several hits, each nearer than the one before. The
+//! other triangles are decided at once, in f64 or exactly ([`Settle`]). Packets take the same
+//! decisions with one ray in each lane (`bvh/packet/leaf.rs`), and share [`Settle`].
 
 use crate::bvh::candidate::{Candidate, Settle};
 use crate::intersect::filter::{Certain, TriangleBlock};
@@ -46,8 +47,9 @@ pub(crate) trait Progress<G: Goal> {
     /// Records that some triangle is certainly hit, which completes an any-hit query.
     fn accept(&mut self);
 
-    /// Updates the limits of depth from the hits that the query holds: [`LeafOutcome::Nearer`] if they shrank. `origin_error` is that
-    /// of the [bounds](bth_format::object::ObjectBounds::origin_error) for which the ray was prepared.
+    /// Updates the limits of depth from the hits that the query holds: [`LeafOutcome::Nearer`] if
+    /// they shrank. `origin_error` is that of the
+    /// [bounds](bth_format::object::ObjectBounds::origin_error) for which the ray was prepared.
     #[inline(always)]
     fn update_from_query(&mut self, ray: &Ray, origin_error: f32) -> LeafOutcome {
         // The limits of an any-hit query do not change before its first hit, which ends it.
@@ -62,8 +64,8 @@ pub(crate) trait Progress<G: Goal> {
     }
 }
 
-/// Intersects a ray with the triangles of a leaf, given as its record and its child code. `bounds` are those for which the ray was
-/// prepared.
+/// Intersects a ray with the triangles of a leaf, given as its record and its child code. `bounds`
+/// are those for which the ray was prepared.
 #[inline(always)]
 pub(crate) fn enter_leaf<S: Simd, G: Goal, B: TriangleBlock>(
     s: S,
@@ -102,7 +104,8 @@ pub(crate) fn enter_leaf<S: Simd, G: Goal, B: TriangleBlock>(
     decide(s, object, ray, bounds, progress, (code, maybe))
 }
 
-/// Decides the triangles of a leaf, given as its child code and their bits, and before them the pending hit.
+/// Decides the triangles of a leaf, given as its child code and their bits, and before them the
+/// pending hit.
 #[inline(always)]
 pub(crate) fn decide<S: Simd, G: Goal>(
     s: S,

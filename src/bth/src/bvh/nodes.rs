@@ -89,7 +89,8 @@ pub(crate) struct LeafMemory {
     raw: Option<Unpacked<RawLeaf>>,
 }
 
-/// The leaf with this child code: in place or, for objects with coordinates on a grid, unpacked into `memory`.
+/// The leaf with this child code: in place or, for objects with coordinates on a grid, unpacked
+/// into `memory`.
 #[inline(always)]
 pub(crate) fn leaf<'r, S: Simd>(
     s: S,
@@ -111,8 +112,8 @@ pub(crate) fn leaf<'r, S: Simd>(
     }
 }
 
-/// The index in the object's leaf order of a triangle of the leaf with this child code, and its corners. `None` for tet leaves,
-/// and if there is no such leaf.
+/// The index in the object's leaf order of a triangle of the leaf with this child code, and its
+/// corners. `None` for tet leaves, and if there is no such leaf.
 #[inline(always)]
 pub(crate) fn triangle(object: &ObjectView<'_>, code: u32, triangle: u32) -> Option<(u32, [[f32; 3]; 3])> {
     let at = triangle as usize;
@@ -123,7 +124,8 @@ pub(crate) fn triangle(object: &ObjectView<'_>, code: u32, triangle: u32) -> Opt
     }
 }
 
-/// The child code at which rays start: the root, or its subtree if the root is a tet leaf that has one.
+/// The child code at which rays start: the root, or its subtree if the root is a tet leaf that has
+/// one.
 pub(crate) fn root(object: &ObjectView<'_>) -> u32 {
     match leaf(Scalar, object, object.node_base(), object.header.root, &mut LeafMemory::default()) {
         Leaf::Subtree(subtree) => subtree,
@@ -131,7 +133,8 @@ pub(crate) fn root(object: &ObjectView<'_>) -> u32 {
     }
 }
 
-/// Row of the tet leaf that is the whole object, if its triangles are not also in a BVH; else `NONE`.
+/// Row of the tet leaf that is the whole object, if its triangles are not also in a BVH; else
+/// `NONE`.
 pub(crate) fn sole_tet_leaf(object: &ObjectView<'_>) -> u32 {
     match leaf(Scalar, object, object.node_base(), object.header.root, &mut LeafMemory::default()) {
         Leaf::Tets(row) => row,

@@ -1,5 +1,6 @@
-//! A pool of rays in the wide BVH that make one step each in turn, so that cache misses and branch mispredictions of one ray overlap
-//! with the work of the others. [`super::interleaved`] starts the rays and stores their answers.
+//! A pool of rays in the wide BVH that make one step each in turn, so that cache misses and branch
+//! mispredictions of one ray overlap with the work of the others. [`super::interleaved`] starts the
+//! rays and stores their answers.
 
 use super::leaf::{LeafOutcome, enter_leaf};
 use super::nodes::{Leaf, LeafMemory, is_large, leaf, prefetch, prefetch_into};
@@ -17,15 +18,16 @@ pub(super) const POOL_SIZE: usize = 32;
 /// Steps through inner nodes continue while at least this many rays have one as their next step.
 const MIN_INNER: u8 = (POOL_SIZE / 4) as u8;
 
-/// Whether the steps through the inner nodes of an object are [`RareSteps`]. Nodes of smaller objects, most of which the second level holds
-/// already, wait in the first: with them in the second, diffuse rays are slower.
+/// Returns true if the steps through the inner nodes of an object are [`RareSteps`]. Nodes of
+/// smaller objects, most of which the second level holds already, wait in the first: with them in
+/// the second, diffuse rays are slower.
 #[inline(always)]
 pub(super) fn has_rare_steps(object: &ObjectView<'_>) -> bool {
     is_large(object) && CacheLevel::waiting() == CacheLevel::Second
 }
 
-/// Slots of rays with the same kind of next step. Indices are `u8`, so the length 256 makes bounds checks unnecessary; at most
-/// POOL_SIZE + 1 entries are used.
+/// Slots of rays with the same kind of next step. Indices are `u8`, so the length 256 makes bounds
+/// checks unnecessary; at most POOL_SIZE + 1 entries are used.
 type StepList = [u8; 256];
 
 /// The slots of the pool by the kind of their ray's next step.
@@ -38,7 +40,8 @@ struct StepLists {
     bottom: StepList,
 }
 
-/// Lengths of the three [`StepLists`], a byte each. Loops work on a copy, which stays in a register.
+/// Lengths of the three [`StepLists`], a byte each. Loops work on a copy, which stays in a
+/// register.
 #[derive(Clone, Copy, Debug)]
 struct StepCounts(u32);
 
@@ -47,7 +50,8 @@ impl StepCounts {
     const INNER: u32 = 0;
     const LEAF: u32 = 8;
     const BOTTOM: u32 = 16;
-    /// The increment for a code with the given upper three bits: codes of nodes are below 4, codes of leaves below 7.
+    /// The increment for a code with the given upper three bits: codes of nodes are below 4, codes
+    /// of leaves below 7.
     const INCREMENT: [u32; 8] = {
         let (inner, leaf, bottom) = (1 << Self::INNER, 1 << Self::LEAF, 1 << Self::BOTTOM);
         [inner, inner, inner, inner, leaf, leaf, leaf, bottom]
@@ -65,8 +69,8 @@ impl StepCounts {
     fn bottom(self) -> u8 {
         (self.0 >> Self::BOTTOM) as u8
     }
-    /// Empties the list whose count begins at bit `at`, and returns its length. Its entries remain readable as long as not more
-    /// entries are added than have been read.
+    /// Empties the list whose count begins at bit `at`, and returns its length. Its entries remain
+    /// readable as long as not more entries are added than have been read.
     #[inline(always)]
     fn take(&mut self, at: u32) -> usize {
         let count = self.0 >> at & 0xff;
@@ -78,8 +82,8 @@ impl StepCounts {
 const _: () = assert!(Child::LEAF_BIT == 4 << 29 && BOTTOM == 7 << 29);
 
 impl StepLists {
-    /// Adds a slot to the list of its next step, given the code on top of its stack. There is no branch: the slot is written to all
-    /// lists, and one count grows.
+    /// Adds a slot to the list of its next step, given the code on top of its stack. There is no
+    /// branch: the slot is written to all lists, and one count grows.
     #[inline(always)]
     fn push(&mut self, counts: &mut StepCounts, slot: usize, code: u32) {
         self.inner[usize::from(counts.inner())] = slot as u8;
@@ -103,14 +107,15 @@ impl<G: Goal> Slot<G> {
     }
 }
 
-/// Position and code of the top of each slot's stack. They are separate from the slots, because every step begins with them and they
-/// fill few cache lines.
+/// Position and code of the top of each slot's stack. They are separate from the slots, because
+/// every step begins with them and they fill few cache lines.
 struct StackTops {
     position: [StackPosition; POOL_SIZE],
     code: [u32; POOL_SIZE],
 }
 
-/// The pool: a slot for each ray. The caller makes the slots in their final place; as a part of this value they would be copied to it.
+/// The pool: a slot for each ray. The caller makes the slots in their final place; as a part of
+/// this value they would be copied to it.
 pub(super) struct RayPool<'a, G: Goal> {
     slots: &'a mut [Slot<G>; POOL_SIZE],
     tops: StackTops,
@@ -136,7 +141,8 @@ impl<'a, G: Goal> RayPool<'a, G> {
         for (stack, bottom) in bottoms.iter_mut().enumerate() {
             *bottom = stacks.bottom(stack);
         }
-        // All slots are at the bottom of their stacks, like those of finished rays, so the first rays start as all others do.
+        // All slots are at the bottom of their stacks, like those of finished rays, so the first
+        // rays start as all others do.
         let mut bottom = [0; 256];
         for slot in 0..POOL_SIZE {
             bottom[slot] = slot as u8;
@@ -152,7 +158,7 @@ impl<'a, G: Goal> RayPool<'a, G> {
         }
     }
 
-    /// Whether no slot has a ray.
+    /// Returns true if no slot has a ray.
     #[inline(always)]
     pub(super) fn is_empty(&self) -> bool {
         self.counts.0 == 0
@@ -173,8 +179,9 @@ impl<'a, G: Goal> RayPool<'a, G> {
         self.lists.push(&mut self.counts, slot, root);
     }
 
-    /// As [`Self::start`] for a root whose children were already tested, given their codes: `children` holds a bit for each child that the
-    /// ray may meet, and the depths at which it enters them.
+    /// As [`Self::start`] for a root whose children were already tested, given their codes:
+    /// `children` holds a bit for each child that the ray may hit, and the depths at which it
+    /// enters them.
     #[inline(always)]
     pub(super) fn start_among<S: Simd>(
         &mut self,
@@ -192,14 +199,16 @@ impl<'a, G: Goal> RayPool<'a, G> {
         self.lists.push(&mut self.counts, slot, code);
     }
 
-    /// Empties the list of slots whose top is [`BOTTOM`] or an empty child, and returns its length. The caller passes each index below
-    /// it to [`Self::finished`] in order, and starts at most one ray after each.
+    /// Empties the list of slots whose top is [`BOTTOM`] or an empty child, and returns its length.
+    /// The caller passes each index below it to [`Self::finished`] in order, and starts at most one
+    /// ray after each.
     #[inline(always)]
     pub(super) fn take_bottom(&mut self) -> usize {
         self.counts.take(StepCounts::BOTTOM)
     }
 
-    /// The slot with index i in that list, if its ray is finished. Otherwise the empty child is popped, and the ray continues.
+    /// The slot with index i in that list, if its ray is finished. Otherwise the empty child is
+    /// popped, and the ray continues.
     #[inline(always)]
     pub(super) fn finished(&mut self, i: usize) -> Option<usize> {
         let slot = usize::from(self.lists.bottom[i]) % POOL_SIZE;
@@ -237,8 +246,8 @@ impl<'a, G: Goal> RayPool<'a, G> {
         self.counts = counts;
     }
 
-    /// Makes the step of each ray whose next step enters a leaf. `tets` intersects a tet leaf without a subtree, given its row
-    /// and the ray.
+    /// Makes the step of each ray whose next step enters a leaf. `tets` intersects a tet leaf
+    /// without a subtree, given its row and the ray.
     #[inline(always)]
     pub(super) fn leaf_steps<S: Simd>(
         &mut self,
@@ -287,8 +296,9 @@ impl<'a, G: Goal> RayPool<'a, G> {
     }
 }
 
-/// [`RayPool::inner_steps`] through an object whose nodes wait in the second level of caches, as a part of kernels: apart from the loop
-/// for all other objects, whose constants then stay in registers.
+/// [`RayPool::inner_steps`] through an object whose nodes wait in the second level of caches, as a
+/// part of kernels: apart from the loop for all other objects, whose constants then stay in
+/// registers.
 pub(super) struct RareSteps<'p, 'a, 'o, G: Goal>(
     pub(super) &'p mut RayPool<'a, G>,
     pub(super) &'p ObjectView<'o>,

@@ -1,5 +1,6 @@
-//! State of one of several interleaved rays in the wide BVH, with the step through a node. The step through a leaf is
-//! [`enter_leaf`](super::leaf::enter_leaf); the order in which rays step is decided by [`ray_pool`](super::ray_pool).
+//! State of one of several interleaved rays in the wide BVH, with the step through a node. The step
+//! through a leaf is [`enter_leaf`](super::leaf::enter_leaf); the order in which rays step is
+//! decided by [`ray_pool`](super::ray_pool).
 
 use super::leaf::Progress;
 use crate::bvh::candidate::Candidate;
@@ -12,15 +13,16 @@ use bth_format::layout::{WIDTH, WideNode};
 use bth_format::object::ObjectView;
 use zerocopy::FromZeros;
 
-/// Relative amount by which a key of the stack may exceed the depth at which the ray enters the child: sorting replaces the four
-/// lowest bits of the f32 by the index of the child. A denormal key exceeds the depth by less than the least normal number.
+/// Relative amount by which a key of the stack may exceed the depth at which the ray enters the
+/// child: sorting replaces the four lowest bits of the f32 by the index of the child. A denormal
+/// key exceeds the depth by less than the smallest normal number.
 const KEY_SLACK: f32 = 1.0 / (1 << 19) as f32;
 
-/// The greatest key of stack entries that can hold hits up to the depth `last`.
+/// The largest key of stack entries that can hold hits up to the depth `last`.
 #[inline(always)]
 pub(crate) fn key_limit(last: f32) -> f32 {
-    // The sum comes first, so that the product is no denormal number, which takes processors a hundred cycles: `last` is next to 0 where
-    // a ray hits the triangle that its origin lies on.
+    // The sum comes first, so that the product is no denormal number, which takes processors a
+    // hundred cycles: `last` is next to 0 where a ray hits the triangle that its origin lies on.
     last + (last.abs() + f32::MIN_POSITIVE / KEY_SLACK) * KEY_SLACK
 }
 
@@ -28,15 +30,17 @@ pub(crate) fn key_limit(last: f32) -> f32 {
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub(crate) struct RayState<G> {
-    /// The prepared ray, with the hits found so far in `progress` and the limit of depth in `slabs.last`.
+    /// The prepared ray, with the hits found so far in `progress` and the limit of depth in
+    /// `slabs.last`.
     prepared: PreparedRay,
-    /// Valid if [`HitProgress::BY_QUERY`] is set; its goal always is. Most rays never need a decision in f64, and their query is never written.
+    /// Valid if [`HitProgress::BY_QUERY`] is set; its goal always is. Most rays never need a
+    /// decision in f64, and their query is never written.
     query: RayQuery<G>,
 }
 
 impl<G: Goal> RayState<G> {
-    /// As [`Self::start`], for a ray with index `index` that f32 lanes could not prepare. Returns false if the ray cannot hit anything
-    /// ([`PreparedRay::in_f64`]).
+    /// As [`Self::start`], for a ray with index `index` that f32 lanes could not prepare. Returns
+    /// false if the ray cannot hit anything ([`PreparedRay::in_f64`]).
     #[cold]
     #[inline(never)]
     pub(crate) fn start_unprepared(
@@ -87,13 +91,14 @@ impl<G: Goal> RayState<G> {
         }
     }
 
-    /// The greatest key of stack entries that can still change the result.
+    /// The largest key of stack entries that can still change the result.
     #[inline(always)]
     pub(crate) fn key_limit(&self) -> f32 {
         key_limit(self.prepared.slabs.last)
     }
 
-    /// Writes codes and keys of the children whose box the ray may meet, the nearest last; returns their number.
+    /// Writes codes and keys of the children whose box the ray may hit, the nearest last; returns
+    /// their number.
     #[inline(always)]
     pub(crate) fn enter_node<S: Simd>(
         &self,
@@ -155,8 +160,9 @@ impl<G: Goal> Progress<G> for RayState<G> {
     }
 }
 
-/// Writes codes and keys of the children whose bit is set, the nearest last, given the codes of all children and the depths at which the ray enters all children;
-/// returns their number. Any-hit queries write no keys.
+/// Writes codes and keys of the children whose bit is set, the nearest last, given the codes of all
+/// children and the depths at which the ray enters all children; returns their number. Any-hit
+/// queries write no keys.
 #[inline(always)]
 pub(crate) fn write_children<S: Simd>(
     s: S,

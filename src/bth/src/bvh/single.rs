@@ -1,8 +1,8 @@
 //! Traversal of the wide BVH by a single ray.
 //!
-//! There are no other rays whose work could hide latencies, so the length of the dependency chain from step to step decides the
-//! speed. The nearest certain hit is therefore kept with f32 bounds of its depth, and its t, u and v are computed in f64 once, at
-//! the end ([`super::certain_hit`]).
+//! There are no other rays whose work could hide latencies, so the length of the dependency chain
+//! from step to step decides the speed. The nearest certain hit is therefore kept with f32 bounds
+//! of its depth, and its t, u and v are computed in f64 once, at the end ([`super::certain_hit`]).
 
 use super::leaf::{LeafOutcome, Progress, decide, enter_leaf};
 use super::nodes::{Leaf, LeafMemory, leaf, prefetch};
@@ -25,7 +25,8 @@ use std::hint::black_box;
 pub(crate) enum SingleResult {
     /// What its query holds; nothing if it was not constructed.
     OfQuery,
-    /// A triangle that is certainly the nearest hit, whose t, u and v are not yet computed, and the direction's greatest |component|.
+    /// A triangle that is certainly the nearest hit, whose t, u and v are not yet computed, and the
+    /// direction's largest |component|.
     Certain(Candidate, f32),
     /// A triangle that is certainly hit, which completes an any-hit query.
     Accepted,
@@ -91,8 +92,9 @@ impl<G: Goal> Progress<G> for SingleState<'_, G> {
 
 /// Traverses the BVH of an object from its root. `bounds` are those for which the ray was prepared.
 ///
-/// This is one kernel, longer than other functions and with more parameters: its variables must stay in registers across all steps,
-/// and a function boundary or a struct of parameters between the steps was measured to be slower.
+/// This is one kernel, longer than other functions and with more parameters: its variables must
+/// stay in registers across all steps, and a function boundary or a struct of parameters between
+/// the steps was measured to be slower.
 #[inline(always)]
 pub(crate) fn trace_single<S: Simd, G: Goal, C: Count>(
     s: S,
@@ -102,7 +104,8 @@ pub(crate) fn trace_single<S: Simd, G: Goal, C: Count>(
     stack: &mut SingleStack,
     count: &mut C,
 ) -> SingleResult {
-    // Kept in memory: the compiler would otherwise broadcast each number to sixteen lanes before the loop and spill the vectors.
+    // Kept in memory: the compiler would otherwise broadcast each number to sixteen lanes before
+    // the loop and spill the vectors.
     let prepared = black_box(prepared);
     let mut state = SingleState {
         prepared,
@@ -165,8 +168,8 @@ pub(crate) fn trace_single<S: Simd, G: Goal, C: Count>(
 
 /// Descends to the next leaf or to the bottom of the stack. Returns that code.
 ///
-/// Hits deeper than the first of `limits` and stack entries with a greater key than the second cannot change the result. The parameters
-/// are separate, because they stay in registers.
+/// Hits deeper than the first of `limits` and stack entries with a greater key than the second
+/// cannot change the result. The parameters are separate, because they stay in registers.
 #[inline(always)]
 fn descend<S: Simd, G: Goal, C: Count>(
     s: S,
@@ -195,7 +198,8 @@ fn descend<S: Simd, G: Goal, C: Count>(
         let free = stack.free_entries();
         let children = s.load_u(&node.child);
         if goal.is_any() {
-            // The last slot is entered first, as from the stack: compiled files hold the child there in which a hit is most likely.
+            // The last slot is entered first, as from the stack: compiled files hold the child
+            // there in which a hit is most likely.
             let last = u32::BITS - 1 - bits.leading_zeros();
             code = node.child[last as usize % WIDTH];
             let others = s.compress(bits ^ 1 << last, children, free.codes);

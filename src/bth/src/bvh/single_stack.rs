@@ -8,7 +8,8 @@ use bth_format::layout::WIDTH;
 use bth_format::limits::MAX_DEPTH;
 use std::mem::MaybeUninit;
 
-/// Greatest number of entries: at every level all children but the entered one are stacked, and whole vectors are stored at the top.
+/// Largest number of entries: at every level all children but the entered one are stacked, and
+/// whole vectors are stored at the top.
 const SIZE: usize = 2 + MAX_DEPTH * (WIDTH - 1) + LANES;
 
 /// Memory for the stack of one ray, for the deepest BVH that a file may hold.
@@ -37,7 +38,8 @@ impl SingleStack {
     }
 }
 
-/// Stack of child codes with keys, as in [`Stacks`](super::stack::Stacks). All entries up to `top` are initialized.
+/// Stack of child codes with keys, as in [`Stacks`](super::stack::Stacks). All entries up to `top`
+/// are initialized.
 pub(crate) struct OpenSingleStack<'a> {
     codes: &'a mut [MaybeUninit<u32>; SIZE],
     keys: &'a mut [MaybeUninit<f32>; SIZE],
@@ -45,13 +47,14 @@ pub(crate) struct OpenSingleStack<'a> {
 }
 
 impl OpenSingleStack<'_> {
-    /// Whether [`BOTTOM`] is the top.
+    /// Returns true if [`BOTTOM`] is the top.
     #[inline(always)]
     pub(crate) fn is_empty(&self) -> bool {
         self.top == 0
     }
 
-    /// Whether only [`BOTTOM`] lies below the top, so that nothing is left once the top is done.
+    /// Returns true if only [`BOTTOM`] lies below the top, so that nothing is left once the top is
+    /// done.
     #[inline(always)]
     pub(crate) fn is_last(&self) -> bool {
         self.top <= 1
@@ -60,9 +63,10 @@ impl OpenSingleStack<'_> {
     #[inline(always)]
     fn code(&self, at: usize) -> u32 {
         debug_assert!(at <= self.top);
-        // SAFETY: `at` is at most `top`, as all callers pass `top` or less. `SingleStack::start` initializes the entries 0 and 1 and
-        // sets `top` to 1. `top` grows only in `FreeEntries::push`, by less than LANES, into entries that `free_entries` has
-        // initialized before. So `at` lies within the arrays, and its entry is initialized.
+        // SAFETY: `at` is at most `top`, as all callers pass `top` or less. `SingleStack::start`
+        // initializes the entries 0 and 1 and sets `top` to 1. `top` grows only in
+        // `FreeEntries::push`, by less than LANES, into entries that `free_entries` has initialized
+        // before. So `at` lies within the arrays, and its entry is initialized.
         unsafe { self.codes.get_unchecked(at).assume_init() }
     }
 
@@ -77,8 +81,9 @@ impl OpenSingleStack<'_> {
     #[inline(always)]
     pub(crate) fn free_entries(&mut self) -> FreeEntries<'_> {
         assert!(self.top <= SIZE - LANES, "the BVH is deeper than its header says");
-        // SAFETY: by the assertion, LANES entries begin at `top` in both arrays, which are borrowed mutably for as long as the result
-        // lives. They are initialized before references to them are made.
+        // SAFETY: by the assertion, LANES entries begin at `top` in both arrays, which are borrowed
+        // mutably for as long as the result lives. They are initialized before references to them
+        // are made.
         unsafe {
             let codes = self.codes.as_mut_ptr().add(self.top).cast::<[u32; LANES]>();
             let keys = self.keys.as_mut_ptr().add(self.top).cast::<[f32; LANES]>();
@@ -94,7 +99,8 @@ impl OpenSingleStack<'_> {
         self.code(self.top.saturating_sub(1))
     }
 
-    /// Pops the top, and the entries below it whose key exceeds `limit` up to the first that does not; returns the new top's code.
+    /// Pops the top, and the entries below it whose key exceeds `limit` up to the first that does
+    /// not; returns the new top's code.
     #[inline(always)]
     pub(crate) fn pop(&mut self, limit: f32, goal: impl Goal) -> u32 {
         self.top = self.top.saturating_sub(1);
@@ -114,7 +120,8 @@ pub(crate) struct FreeEntries<'a> {
 }
 
 impl FreeEntries<'_> {
-    /// Completes the push of the first `count` entries, 1 to [`LANES`]: the last of them is the new top.
+    /// Completes the push of the first `count` entries, 1 to [`LANES`]: the last of them is the new
+    /// top.
     #[inline(always)]
     pub(crate) fn push(self, count: usize) {
         *self.top += count.wrapping_sub(1) % LANES;

@@ -1,9 +1,10 @@
 //! Conservative ray-box tests in f32 for the sixteen children of a node.
 //!
-//! Slab test (Kay and Kajiya, "Ray Tracing Complex Scenes", SIGGRAPH 1986) with one multiplication and one addition per
-//! plane, depth = plane · r + (-o · r ∓ pad · |r|). The pad covers all roundings and the clamping of small direction
-//! components, so a box that the ray hits is never excluded. **Depth** is t times the greatest |component| of the direction, so
-//! that depths are of the magnitude of coordinates.
+//! Slab test (Kay and Kajiya, "Ray Tracing Complex Scenes", SIGGRAPH 1986) with one multiplication
+//! and one addition per plane, depth = plane · r + (-o · r ∓ pad · |r|). The pad covers all
+//! roundings and the clamping of small direction components, so a box that the ray hits is never
+//! excluded. **Depth** is t times the largest |component| of the direction, so that depths are of
+//! the magnitude of coordinates.
 
 use crate::intersect::line::{Line, widened};
 use crate::intersect::vector::splat3;
@@ -13,18 +14,25 @@ use bth_format::layout::{WIDTH, WideNode};
 use bth_format::object::ObjectBounds;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// Pad of a plane relative to what the object asks for ([`ObjectBounds::padded`]) and the least of two bounds of how far away the ray's origin o is: the distance
-/// of the farthest corner of the object's box, and the greatest |coordinate| of o and how far away the object is ([`ObjectBounds::away`]).
+/// Pad of a plane relative to what the object asks for ([`ObjectBounds::padded`]) and the smallest
+/// of two bounds of how far away the ray's origin o is: the distance of the farthest corner of the
+/// object's box, and the largest |coordinate| of o and how far away the object is
+/// ([`ObjectBounds::away`]).
 ///
-/// With P a plane, p a point of the box within it, r the reciprocal, u = 2^-24, and c the point of the object's box that is nearest to the origin of its space:
-/// products with P and o and the addend are off by at most u(|P| + 2|o|)|r|, reciprocal and sum by 2u|P - o||r|, and clamping moves the ray by at most 4u|p - o|
-/// ([`LEAST_COMPONENT`]), all in the maximum norm. Measured from c that is 7u|P - c| + 8u|o - c| + 3u|c|. Both bounds are bounds of |o - c|, if |c| is added to the
-/// second: the pad has 16u of it. Of what the object asks for it has 16u, too: of the greatest |coordinate|, which is |c| + |P - c| for some P,
-/// as these have the same signs, so that it covers an |o - c| of |o| + |c|, too; or, where the object is far away, of its size and |c| / 4. Widened boxes
-/// bring 16u|p| in place of it; where P is farther away, its own roundings are less than what it is farther.
+/// With P a plane, p a point of the box within it, r the reciprocal, u = 2^-24, and c the point of
+/// the object's box that is nearest to the origin of its space: products with P and o and the
+/// addend are off by at most u(|P| + 2|o|)|r|, reciprocal and sum by 2u|P - o||r|, and clamping
+/// moves the ray by at most 4u|p - o| ([`LEAST_COMPONENT`]), all in the maximum norm. Measured from
+/// c that is 7u|P - c| + 8u|o - c| + 3u|c|. Both bounds are bounds of |o - c|, if |c| is added to
+/// the second: the pad has 16u of it. Of what the object asks for it has 16u, too: of the largest
+/// |coordinate|, which is |c| + |P - c| for some P, as these have the same signs, so that it covers
+/// an |o - c| of |o| + |c|, too; or, where the object is far away, of its size and |c| / 4. Widened
+/// boxes bring 16u|p| instead of it; where P is farther away, its own roundings are less than what
+/// it is farther.
 pub(crate) const PAD: f64 = 1.0 / (1 << 20) as f64;
-/// Least |component| of a direction whose greatest |component| is 1; smaller ones are raised to it, which keeps products
-/// finite. Up to the farthest coordinate this moves the ray by less than half the pad.
+/// Smallest |component| of a direction whose largest |component| is 1; smaller ones are raised to
+/// it, which keeps products finite. Up to the farthest coordinate this moves the ray by less than
+/// half the pad.
 pub(crate) const LEAST_COMPONENT: f64 = 1.0 / (1 << 22) as f64;
 /// From this extent on, products could overflow f32: every box then counts as hit.
 const LARGEST_COORDINATE: f64 = 1e30;
@@ -38,9 +46,9 @@ pub(crate) const FAR: u32 = WIDTH as u32;
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub(crate) struct RaySlabs {
-    /// Reciprocal of each component of the direction, scaled so that the greatest |component| is 1.
+    /// Reciprocal of each component of the direction, scaled so that the largest |component| is 1.
     pub(crate) reciprocal: [f32; 3],
-    /// Depth of t = 1, which is the direction's greatest |component|.
+    /// Depth of t = 1, which is the direction's largest |component|.
     pub(crate) scale: f32,
     /// Addends of the planes through which the ray enters.
     pub(crate) near_addend: [f32; 3],
@@ -50,12 +58,13 @@ pub(crate) struct RaySlabs {
     pub(crate) far_addend: [f32; 3],
     /// Upper bound of the depth of `tmax`.
     pub(crate) last: f32,
-    /// For each axis the row of the planes through which the ray enters: 0 for the lower bounds, [`FAR`] for the upper ones.
+    /// For each axis the row of the planes through which the ray enters: 0 for the lower bounds,
+    /// [`FAR`] for the upper ones.
     pub(crate) near: [u32; 3],
 }
 
-/// An upper bound of a depth in f32. It is not denormal, which would take operations hundreds of cycles: where rays hit the triangle that
-/// their origin lies on, depths are 0 or next to it.
+/// An upper bound of a depth in f32. It is not denormal, which would take operations hundreds of
+/// cycles: where rays hit the triangle that their origin lies on, depths are 0 or next to it.
 #[inline(always)]
 pub(crate) fn upper_depth(depth: f64) -> f32 {
     const LEAST: f64 = 2.0 * f32::MIN_POSITIVE as f64;
@@ -71,7 +80,8 @@ pub(crate) fn lower_depth(depth: f64) -> f32 {
 }
 
 impl RaySlabs {
-    /// Constants with which every box is hit; used for values that are not yet set or cannot be computed in f32.
+    /// Constants with which every box is hit; used for values that are not yet set or cannot be
+    /// computed in f32.
     pub(crate) const NONE: RaySlabs = RaySlabs {
         reciprocal: [0.0; 3],
         scale: 0.0,
@@ -87,8 +97,9 @@ impl RaySlabs {
         RaySlabs::with_pad(ray, line, bounds, |_| 0.0)
     }
 
-    /// For boxes whose |coordinates| do not exceed `farthest`. `extra_pad` maps the greatest |coordinate| of the ray's origin
-    /// to a length by which the boxes are widened further. None for a ray without a line.
+    /// For boxes whose |coordinates| do not exceed `farthest`. `extra_pad` maps the largest
+    /// |coordinate| of the ray's origin to a length by which the boxes are widened further. None
+    /// for a ray without a line.
     pub(crate) fn widened(ray: &Ray, farthest: f32, extra_pad: impl Fn(f64) -> f64) -> Option<RaySlabs> {
         Some(RaySlabs::with_pad(ray, &Line::new(ray)?, &ObjectBounds::around(farthest), extra_pad))
     }
@@ -104,10 +115,10 @@ impl RaySlabs {
         let extent = greatest + farthest_origin;
         let pad = PAD * (padded + reach.min(farthest_origin + away)) + extra_pad(farthest_origin);
         let mut slabs = RaySlabs { scale: scale as f32, ..RaySlabs::NONE };
-        // Finite even where it is the depth of all boxes: the traversal writes lane numbers into the low bits of depths, which
-        // would turn an infinity into NaN.
-        // A hit is in the range if its t is after it was rounded, as a t of 2^-150 is to 0: with a great direction the depth of such a hit
-        // is far beyond that of the end of the range.
+        // Finite even where it is the depth of all boxes: the traversal writes lane numbers into
+        // the low bits of depths, which would turn an infinity into NaN. A hit is in the range if
+        // its t is after it was rounded, as a t of 2^-150 is to 0: with a great direction the depth
+        // of such a hit is far beyond that of the end of the range.
         let after = |t: f64| widened(t.max(f64::MIN));
         let off = f64::from(bounds.origin_error);
         slabs.first = ((-after(-f64::from(ray.tmin)) * scale - off) as f32).next_down().max(-f32::MAX);
@@ -125,7 +136,8 @@ impl RaySlabs {
         slabs
     }
 
-    /// Upper bound of the depth of t, for [`Self::children`]. `origin_error` is that of the bounds for which the ray was prepared.
+    /// Upper bound of the depth of t, for [`Self::children`]. `origin_error` is that of the bounds
+    /// for which the ray was prepared.
     #[inline(always)]
     pub(crate) fn limit(&self, t: f64, origin_error: f32) -> f32 {
         upper_depth(t * f64::from(self.scale) + f64::from(origin_error))
@@ -138,8 +150,8 @@ impl RaySlabs {
         t.map_or(f32::INFINITY, |[t, _]| lower_depth(depth(t)))
     }
 
-    /// The range of depths in which a hit certainly lies in the ray's range of t, whose ends are no NaN, and is finite. The exact
-    /// origin may be off by `origin_error`.
+    /// The range of depths in which a hit certainly lies in the ray's range of t, whose ends are no
+    /// NaN, and is finite. The exact origin may be off by `origin_error`.
     pub(crate) fn certain_range(&self, ray: &Ray, origin_error: f32) -> [f32; 2] {
         let depth = |t: f32, off: f32| (f64::from(t) * f64::from(self.scale) + f64::from(off)) as f32;
         let (tmin, tmax) = (ray.tmin.max(f32::MIN), ray.tmax.min(f32::MAX));
@@ -175,8 +187,9 @@ impl<S: Simd> RaySlabLanes<S> {
         }
     }
 
-    /// The children of a node whose boxes the ray may enter before the depth `limit`, as bits, and lower bounds of the depths
-    /// at which it enters them. Empty slots may be among them where coordinates are too great for f32.
+    /// The children of a node whose boxes the ray may enter before the depth `limit`, as bits, and
+    /// lower bounds of the depths at which it enters them. Empty slots may be among them where
+    /// coordinates are too great for f32.
     #[inline(always)]
     pub(crate) fn children(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
         if S::HAS_VECTORS {
@@ -186,7 +199,8 @@ impl<S: Simd> RaySlabLanes<S> {
         }
     }
 
-    /// [`Self::children`] for one ray at a time, which waits for the result: comparisons follow each other twice, not three times.
+    /// [`Self::children`] for one ray at a time, which waits for the result: comparisons follow
+    /// each other twice, not three times.
     #[inline(always)]
     pub(crate) fn children_soon(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
         if !S::HAS_VECTORS {
@@ -202,7 +216,8 @@ impl<S: Simd> RaySlabLanes<S> {
         (s.mask_bits(s.le(enter, leave)), enter)
     }
 
-    /// [`Self::children`] as a function of its own, because unrolled in every scalar kernel it would take much code.
+    /// [`Self::children`] as a function of its own, because unrolled in every scalar kernel it
+    /// would take much code.
     #[inline(never)]
     fn children_called(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
         self.children_inlined(s, node, limit)
@@ -227,7 +242,8 @@ pub(crate) fn row<T>(rows: &[[T; WIDTH]; 2], side: u32) -> &[T; WIDTH] {
     rows.as_flattened()[first..first + WIDTH].try_into().expect("a row")
 }
 
-/// The bounds of a node's child boxes along an axis: the lower ones for `side` 0, the upper ones for [`FAR`].
+/// The bounds of a node's child boxes along an axis: the lower ones for `side` 0, the upper ones
+/// for [`FAR`].
 #[inline(always)]
 pub(crate) fn planes<S: Simd>(s: S, node: &WideNode, axis: usize, side: u32) -> S::F {
     s.load(row(&node.bounds[axis], side))

@@ -1,21 +1,23 @@
-//! Edge functions of projected triangles in f32 lanes, with bounds of their errors: which triangles lines certainly miss, and which they
-//! certainly hit at which depth.
+//! Edge functions of projected triangles in f32 lanes, with bounds of their errors: which triangles
+//! lines certainly miss, and which they certainly hit at which depth.
 //!
-//! The weight of a corner is the edge function of the opposite edge, twice the area of the triangle of that edge and the origin of the
-//! plane of projection, through which the line passes.
+//! The weight of a corner is the edge function of the opposite edge, twice the area of the triangle
+//! of that edge and the origin of the plane of projection, through which the line passes.
 //!
 //! **Error of a weight.** Let u = 2^-24. For the corners of one triangle, let M >= |x| + |y| as projected, and let r be their
-//! greatest |coordinate| relative to the ray's origin. Differences are off by ur, the shear by a factor 1±2u, its product with
-//! the depth by the same factor and by the error of the depth (|shear| <= 1), and the last sum by 2ur: sheared coordinates are
-//! off by less than δ = 8ur. A cross product of two points is off by 2δM + 2δ² because of its points and by 3uM² <= δM because
-//! of its own roundings, together by less than 4δ(M + δ). Products that underflow add at most the least normal number. The
-//! filter of single rays takes for r the distance (maximum norm) to the farthest corner of the object's box, so that 8δ and 4δ² are constants
-//! of the ray, and for M twice the greatest |x| or |y|; where that leaves a pair undecided, it takes the bound of packets. Packets take r = M + |depth|, which is tighter and was measured to be
-//! faster.
+//! largest |coordinate| relative to the ray's origin. Differences are off by ur, the shear by a
+//! factor 1±2u, its product with the depth by the same factor and by the error of the depth
+//! (|shear| <= 1), and the last sum by 2ur: sheared coordinates are off by less than δ = 8ur. A
+//! cross product of two points is off by 2δM + 2δ² because of its points and by 3uM² <= δM because
+//! of its own roundings, together by less than 4δ(M + δ). Products that underflow add at most the
+//! smallest normal number. The filter of single rays takes for r the distance (maximum norm) to the
+//! farthest corner of the object's box, so that 8δ and 4δ² are constants of the ray, and for M
+//! twice the largest |x| or |y|; where that leaves a pair undecided, it takes the bound of packets.
+//! Packets take r = M + |depth|, which is tighter and was measured to be faster.
 //!
 //! **Error of a depth.** A change of the three weights by e each changes the depth by at most 3e·range/(|sum| - 3e), where
-//! `range` is the range of the corners' depths, and never moves it out of that range. The roundings of the depth itself stay
-//! below 8u of the greatest |depth|.
+//! `range` is the range of the corners' depths, and never moves it out of that range. The roundings
+//! of the depth itself stay below 8u of the largest |depth|.
 
 use crate::simd::Lanewise;
 
@@ -23,7 +25,7 @@ use crate::simd::Lanewise;
 pub(crate) const F32_PROJECTION_ERROR: f64 = 8.0 / (1 << 24) as f64;
 /// 8δ/r, a little enlarged to cover the roundings of the bounds that are computed from it.
 pub(crate) const ERROR_SLOPE: f32 = 8.01 * F32_PROJECTION_ERROR as f32;
-/// Slack of depths relative to the greatest |depth|: twice the bound of their roundings.
+/// Slack of depths relative to the largest |depth|: twice the bound of their roundings.
 const DEPTH_SLACK: f32 = 16.0 / (1 << 24) as f32;
 
 /// Projected corners of sixteen triangles: `[corner][x, y, depth]`.
@@ -54,17 +56,20 @@ pub(crate) struct FilteredTriangles<S: Lanewise> {
     pub(crate) farthest: S::F,
 }
 
-/// `error_slope` and `error_floor` of a [`TriangleFilter`](crate::intersect::filter::TriangleFilter), for points whose coordinates relative to the origin do not
-/// exceed `reach`.
+/// `error_slope` and `error_floor` of a
+/// [`TriangleFilter`](crate::intersect::filter::TriangleFilter), for points whose coordinates
+/// relative to the origin do not exceed `reach`.
 #[inline(always)]
 pub(crate) fn error_coefficients(reach: f32) -> [f32; 2] {
     let slope = reach * ERROR_SLOPE;
     [slope, slope * slope + f32::MIN_POSITIVE]
 }
 
-/// Bound of the error of weights, 4δ(M + δ), from the greatest |x| + |y| (`l1_norm`) and |depth| of the projected corners. Where
-/// the ray's exact origin is another than that in f32, `greatest_depth` is larger by the
-/// [`origin_reach`](bth_format::object::ObjectBounds::origin_reach) of the bounds for which the ray was prepared.
+/// Bound of the error of weights, 4δ(M + δ), from the largest |x| + |y| (`l1_norm`) and |depth| of
+/// the projected corners. Where the ray's exact origin is another than that in f32,
+/// `greatest_depth` is larger by the
+/// [`origin_reach`](bth_format::object::ObjectBounds::origin_reach) of the bounds for which the ray
+/// was prepared.
 #[inline(always)]
 pub(crate) fn error<S: Lanewise>(s: S, l1_norm: S::F, greatest_depth: S::F, floor: S::F) -> S::F {
     let reach = s.add(l1_norm, greatest_depth);
@@ -94,8 +99,8 @@ pub(super) struct Sides<S: Lanewise> {
     pub(super) certain: S::M,
 }
 
-/// Tests sixteen triangles for hits at depths from `first` to `limit`. `error` bounds the error of the weights, see the
-/// head of this file.
+/// Tests sixteen triangles for hits at depths from `first` to `limit`. `error` bounds the error of
+/// the weights, see the head of this file.
 #[inline(always)]
 pub(crate) fn test_triangles<S: Lanewise>(
     s: S,
@@ -120,7 +125,8 @@ impl<S: Lanewise> Sides<S> {
         let minus_error = s.sub(s.splat(0.0), error);
         let least = s.min(s.min(weight[0], weight[1]), weight[2]);
         let greatest = s.max(s.max(weight[0], weight[1]), weight[2]);
-        // Comparisons with NaN are false, so a pair with NaN is neither missed nor certain and remains a candidate.
+        // Comparisons with NaN are false, so a pair with NaN is neither missed nor certain and
+        // remains a candidate.
         let missed = s.and(s.lt(least, minus_error), s.lt(error, greatest));
         let certain = s.or(s.lt(error, least), s.lt(greatest, minus_error));
         Sides { weight, error, missed, certain }
@@ -145,13 +151,14 @@ impl<S: Lanewise> Sides<S> {
         let least_depth = s.min(s.min(a[2], b[2]), c[2]);
         let greatest_depth = s.max(s.max(a[2], b[2]), c[2]);
         let sum = s.add(s.add(weight[0], weight[1]), weight[2]);
-        // The weights are normalized before they are multiplied with depths: products of a small triangle's own weights would
-        // underflow.
+        // The weights are normalized before they are multiplied with depths: products of a small
+        // triangle's own weights would underflow.
         let inverse_sum = s.div(s.splat(1.0), sum);
         let barycentric =
             [s.mul(weight[0], inverse_sum), s.mul(weight[1], inverse_sum), s.mul(weight[2], inverse_sum)];
         let range = s.sub(greatest_depth, least_depth);
-        // 3e·range/(|sum| - 3e) <= 6e·range/|sum| where |sum| >= 6e. Elsewhere this is at least the range and is clamped to it.
+        // 3e·range/(|sum| - 3e) <= 6e·range/|sum| where |sum| >= 6e. Elsewhere this is at least the
+        // range and is clamped to it.
         let shift = s.mul(s.mul(error, s.splat(6.0)), s.mul(range, s.abs(inverse_sum)));
         let shift = s.min(shift, range);
         let depth = s.fma(barycentric[2], c[2], s.fma(barycentric[1], b[2], s.mul(barycentric[0], a[2])));

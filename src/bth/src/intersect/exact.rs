@@ -1,18 +1,22 @@
-//! Intersection of a line with a closed triangle: whether they cross, and t, u and v. All acceleration structures, records and
-//! instruction sets use this module, so they all give the same bits.
+//! Intersection of a line with a closed triangle: whether they cross, and t, u and v. All
+//! acceleration structures, records and instruction sets use this module, so they all give the same
+//! bits.
 //!
-//! With o + t·d = a + u·(b-a) + v·(c-a), Cramer's rule gives t, u and v as quotients of determinants (Möller and Trumbore,
-//! "Fast, Minimum Storage Ray/Triangle Intersection", JGT 1997). The products are ordered so that everything but three scalar
-//! products with d is the same for all rays from one point ([`OriginTerms`]). Signs and quotients are computed in f64; where the
-//! error bound leaves a sign or a digit uncertain, they are computed from exact sums ([`bth_format::exact`]).
+//! With o + t·d = a + u·(b-a) + v·(c-a), Cramer's rule gives t, u and v as quotients of
+//! determinants (Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", JGT 1997).
+//! The products are ordered so that everything but three scalar products with d is the same for all
+//! rays from one point ([`OriginTerms`]). Signs and quotients are computed in f64; where the error
+//! bound leaves a sign or a digit uncertain, they are computed from exact sums
+//! ([`bth_format::exact`]).
 //!
 //! **Errors.** Let u = 2^-53, and let r, m and D be the greatest |coordinates| of a-o, of the edges b-a and c-a, and of d.
-//! Differences have a relative error of u. A component of a vector product of two differences has two products, each with three
-//! roundings, and a subtraction: its error is 8u times the sizes of both factors. The determinant and the weights of b and c
-//! are scalar products of such vectors with d: they are off by 3·8u because of the vectors and by 16u because of their own
-//! roundings, which gives 40uDm² and 40uDmr. The weight of a is the determinant minus the other two weights: 98uDm(m+r). The
-//! volume is off by (3·8 + 3·2 + 16)urm². Products of three differences of f32 values, and of three such with the bounds, lie
-//! far from the limits of f64.
+//! Differences have a relative error of u. A component of a vector product of two differences has
+//! two products, each with three roundings, and a subtraction: its error is 8u times the sizes of
+//! both factors. The determinant and the weights of b and c are scalar products of such vectors
+//! with d: they are off by 3·8u because of the vectors and by 16u because of their own roundings,
+//! which gives 40uDm² and 40uDmr. The weight of a is the determinant minus the other two weights:
+//! 98uDm(m+r). The volume is off by (3·8 + 3·2 + 16)urm². Products of three differences of f32
+//! values, and of three such with the bounds, lie far from the limits of f64.
 
 use crate::intersect::line::Line;
 pub(crate) use crate::intersect::line::RATIO_ERROR;
@@ -22,15 +26,17 @@ use crate::intersect::vector::{cross, dot, greater, lesser, max_norm, minus, wid
 use crate::simd::{Doubles, PlainDoubles};
 use bth_format::exact::{EDGE_PARTS, Expansion, VOLUME_PARTS};
 
-/// 128u, more than the 98u above: bounds the error of weights relative to Dm(m+r) and that of the volume relative to rm².
+/// 128u, more than the 98u above: bounds the error of weights relative to Dm(m+r) and that of the
+/// volume relative to rm².
 pub(super) const WEIGHT_ERROR: f64 = 128.0 / (1u64 << 53) as f64;
-/// Factor from the bound of an error to the least value of which it is at most [`RATIO_ERROR`].
+/// Factor from the bound of an error to the smallest value of which it is at most [`RATIO_ERROR`].
 pub(super) const INVERSE_RATIO_ERROR: f64 = 1.0 / RATIO_ERROR;
 
 /// Intersection of a line and a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Intersection {
-    /// Parameter of the ray, in units of its direction. Hits are ordered by this value and reported rounded to f32.
+    /// Parameter of the ray, in units of its direction. Hits are ordered by this value and reported
+    /// rounded to f32.
     pub(crate) t: f64,
     /// u, v and 1, all multiplied by the determinant.
     pub(crate) weight: [f64; 3],
@@ -42,7 +48,8 @@ pub(crate) fn reported(x: f64) -> f32 {
     x as f32 + 0.0
 }
 
-/// Rounds u or v for the answer, and replaces -0.0 and values below 0, which rounding errors can give, by 0.0.
+/// Rounds u or v for the answer, and replaces -0.0 and values below 0, which rounding errors can
+/// give, by 0.0.
 #[inline(always)]
 pub(crate) fn reported_barycentric(x: f64) -> f32 {
     // This comparison, unlike `f64::max`, compiles to a single vector instruction.
@@ -65,7 +72,8 @@ pub(crate) enum Estimate {
     Missed,
     /// The line certainly crosses the triangle, and t, u and v are within [`RATIO_ERROR`].
     Intersects(Intersection),
-    /// The error bounds leave the intersection, or its t, u and v, uncertain. The array bounds t if the line crosses.
+    /// The error bounds leave the intersection, or its t, u and v, uncertain. The array bounds t if
+    /// the line crosses.
     Open(UncertainWeights, [f64; 2]),
 }
 
@@ -79,20 +87,23 @@ pub(crate) struct UncertainWeights {
     bound: f64,
 }
 
-/// Scalar product that does not depend on the order of the axes: the greatest of the sums in three orders. t is computed from
-/// such products, so it has the same bits after model and rays are rotated by a multiple of 90° about a coordinate axis, and
-/// the choice between equal hits does not change. u and v need not have this property, because no decision depends on them.
+/// Scalar product that does not depend on the order of the axes: the largest of the sums in three
+/// orders. t is computed from such products, so it has the same bits after model and rays are
+/// rotated by a multiple of 90° about a coordinate axis, and the choice between equal hits does not
+/// change. u and v need not have this property, because no decision depends on them.
 #[inline(always)]
 fn unordered_scalar_product(a: [f64; 3], b: [f64; 3]) -> f64 {
     let [x, y, z] = [a[0] * b[0], a[1] * b[1], a[2] * b[2]];
     greater(greater(x + y + z, y + z + x), z + x + y)
 }
 
-/// Terms of the determinants of a triangle that depend on the ray's origin but not on its direction. No operation here and in
-/// [`RoundedIntersection`] is fused or conditional, so the bits are the same on every machine, for one triangle or in lanes.
+/// Terms of the determinants of a triangle that depend on the ray's origin but not on its
+/// direction. No operation here and in [`RoundedIntersection`] is fused or conditional, so the bits
+/// are the same on every machine, for one triangle or in lanes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OriginTerms {
-    /// (b-a) × (c-a). Its scalar product with the direction is the determinant, which is the sum of the three weights.
+    /// (b-a) × (c-a). Its scalar product with the direction is the determinant, which is the sum of
+    /// the three weights.
     pub(crate) normal: [f64; 3],
     /// (c-a) × (a-o). Its scalar product with the direction is the weight of the second corner.
     pub(crate) second: [f64; 3],
@@ -100,7 +111,8 @@ pub(crate) struct OriginTerms {
     pub(crate) third: [f64; 3],
     /// (a-o) · normal, which is t multiplied by the determinant.
     pub(crate) volume: f64,
-    /// t, u and v are within [`RATIO_ERROR`] where |determinant| exceeds this value times the direction's greatest |component|.
+    /// t, u and v are within [`RATIO_ERROR`] where |determinant| exceeds this value times the
+    /// direction's largest |component|.
     pub(crate) min_determinant: f64,
 }
 
@@ -110,7 +122,8 @@ impl OriginTerms {
         OriginTerms::with_errors(origin, corners).0
     }
 
-    /// Also returns bounds of the errors of the weights, for a direction whose greatest |component| is 1, and of the volume.
+    /// Also returns bounds of the errors of the weights, for a direction whose largest |component|
+    /// is 1, and of the volume.
     #[inline(always)]
     fn with_errors(origin: impl Origin, [a, b, c]: [[f64; 3]; 3]) -> (OriginTerms, [f64; 2]) {
         let (offset, second, third) = (minus(a, origin.point()), minus(b, a), minus(c, a));
@@ -131,21 +144,22 @@ impl OriginTerms {
     }
 }
 
-/// Intersection of a line with the plane of a triangle in f64, with rounding errors; whether it lies in the triangle is not
-/// decided.
+/// Intersection of a line with the plane of a triangle in f64, with rounding errors; whether it
+/// lies in the triangle is not decided.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RoundedIntersection {
-    /// Weights of the second and the third corner, and the determinant, which is the sum of all three weights.
+    /// Weights of the second and the third corner, and the determinant, which is the sum of all
+    /// three weights.
     pub(crate) weight: [f64; 3],
     /// 1 / determinant.
     pub(crate) inverse: f64,
     pub(crate) t: f64,
-    /// Whether t, u and v are within [`RATIO_ERROR`].
+    /// True if t, u and v are within [`RATIO_ERROR`].
     pub(crate) is_accurate: bool,
 }
 
 impl RoundedIntersection {
-    /// `norm` is the direction's greatest |component|.
+    /// `norm` is the direction's largest |component|.
     #[inline(always)]
     pub(crate) fn new(terms: &OriginTerms, direction: [f64; 3], norm: f64) -> RoundedIntersection {
         let determinant = unordered_scalar_product(direction, terms.normal);
@@ -164,7 +178,8 @@ impl RoundedIntersection {
     }
 }
 
-/// A line and a triangle in f64: its intersection with the triangle's plane, and on which sides of the edges it passes.
+/// A line and a triangle in f64: its intersection with the triangle's plane, and on which sides of
+/// the edges it passes.
 struct Sides {
     rounded: RoundedIntersection,
     /// Weights of the three corners.
@@ -198,8 +213,8 @@ impl Sides {
     }
 }
 
-/// Decides in f64 whether a line crosses a triangle and computes t, u and v, or returns [`Estimate::Open`] where the error bounds
-/// do not allow it.
+/// Decides in f64 whether a line crosses a triangle and computes t, u and v, or returns
+/// [`Estimate::Open`] where the error bounds do not allow it.
 #[inline(always)]
 pub(crate) fn estimate(origin: impl Origin, direction: [f64; 3], corners: [[f64; 3]; 3]) -> Estimate {
     let Sides { rounded, weight, error, is_inside, is_outside } = Sides::new(origin, direction, corners);
@@ -217,8 +232,8 @@ pub(crate) fn estimate(origin: impl Origin, direction: [f64; 3], corners: [[f64;
     Estimate::Open(UncertainWeights { rounded, weight, bound: error[0] }, t)
 }
 
-/// The intersection of a line and a triangle. It is valid only if the flag is true: where [`estimate`] returns
-/// [`Estimate::Intersects`].
+/// The intersection of a line and a triangle. It is valid only if the flag is true: where
+/// [`estimate`] returns [`Estimate::Intersects`].
 #[inline(always)]
 pub(crate) fn certain_intersection(
     origin: [f64; 3],
@@ -229,8 +244,9 @@ pub(crate) fn certain_intersection(
     (rounded.intersection(), is_inside & rounded.is_accurate)
 }
 
-/// Bounds of the t at which a line crosses a triangle, given t in f64, the determinant W, whose sign is certain, and bounds of
-/// the errors of W and of the volume V: (V+p)/(W+q) - V/W = (p - q·V/W)/(W+q).
+/// Bounds of the t at which a line crosses a triangle, given t in f64, the determinant W, whose
+/// sign is certain, and bounds of the errors of W and of the volume V: (V+p)/(W+q) - V/W = (p -
+/// q·V/W)/(W+q).
 #[inline(never)]
 fn t_range(t: f64, determinant: f64, error: [f64; 2]) -> [f64; 2] {
     /// Bounds the relative roundings of this function and of t itself.
@@ -244,8 +260,8 @@ fn t_range(t: f64, determinant: f64, error: [f64; 2]) -> [f64; 2] {
     [t - shift, t + shift]
 }
 
-/// The intersection of a line that certainly crosses a triangle, where f64 leaves only the volume inaccurate: with the volume in pairs.
-/// `None` if more than that is uncertain.
+/// The intersection of a line that certainly crosses a triangle, where f64 leaves only the volume
+/// inaccurate: with the volume in pairs. `None` if more than that is uncertain.
 #[inline(always)]
 pub(crate) fn in_pairs<D: Doubles>(
     s: D,
@@ -264,9 +280,10 @@ pub(crate) fn in_pairs<D: Doubles>(
     Some(Intersection { t: volume * rounded.inverse, weight: rounded.weight })
 }
 
-/// Decides a triangle that f64 leaves uncertain: uncertain weights are replaced by exact ones, and t, u and v are computed from exact
-/// sums unless the f64 values are accurate. `edge` returns the exact weight of the corner opposite an edge, or its product with a
-/// positive number; `exact` the intersection from exact sums.
+/// Decides a triangle that f64 leaves uncertain: uncertain weights are replaced by exact ones, and
+/// t, u and v are computed from exact sums unless the f64 values are accurate. `edge` returns the
+/// exact weight of the corner opposite an edge, or its product with a positive number; `exact` the
+/// intersection from exact sums.
 pub(super) fn decide_exactly(
     uncertain: &UncertainWeights,
     corners: [[f64; 3]; 3],
@@ -288,7 +305,8 @@ pub(super) fn decide_exactly(
 }
 
 impl Line {
-    /// The intersection of the line with the closed triangle of these corners (object space), decided exactly.
+    /// The intersection of the line with the closed triangle of these corners (object space),
+    /// decided exactly.
     pub(crate) fn intersection(&self, corners: [[f32; 3]; 3]) -> Option<Intersection> {
         match estimate(self.origin, self.direction, corners.map(wide)) {
             Estimate::Missed => None,
@@ -348,8 +366,8 @@ mod tests {
         difference.value().abs()
     }
 
-    /// A random line and triangle: triangles of all sizes and shapes, slivers among them, and origins near and far, some in the
-    /// triangle's plane. None if the ray has no line.
+    /// A random line and triangle: triangles of all sizes and shapes, slivers among them, and
+    /// origins near and far, some in the triangle's plane. None if the ray has no line.
     fn random_pair(rng: &mut Rng, round: usize) -> Option<(Line, [[f64; 3]; 3])> {
         let scale = [1.0, 1e-30, 3e37, 1e-42, 1e12][round % 5];
         let size = [1.0, 1e-3, 1e-6][round / 5 % 3];

@@ -1,4 +1,5 @@
-//! The arithmetic of [`super::exact`] in f64 for sixteen pairs of a ray and a triangle that the f32 filter is sure the ray hits.
+//! The arithmetic of [`super::exact`] in f64 for sixteen pairs of a ray and a triangle that the f32
+//! filter is sure the ray hits.
 
 use crate::intersect::exact::{
     Intersection, OriginTerms, RoundedIntersection, certain_intersection, reported, reported_barycentric,
@@ -40,7 +41,8 @@ pub(crate) struct OriginTermsLanes {
 impl OriginTermsLanes {
     pub(crate) const NONE: OriginTermsLanes = OriginTermsLanes { rows: [[0.0; LANES]; TERMS] };
 
-    /// Computes the terms of the first `count` triangles, whose corners are `[corner][axis]`, and of those that complete a half.
+    /// Computes the terms of the first `count` triangles, whose corners are `[corner][axis]`, and
+    /// of those that complete a half.
     #[inline(always)]
     pub(crate) fn compute(&mut self, origin: [f32; 3], corner: &[[F32Lanes; 3]; 3], count: usize) {
         const HALF: usize = LANES / 2;
@@ -88,11 +90,11 @@ pub(crate) struct Intersections {
     pub(crate) t: F32Lanes,
     pub(crate) u: F32Lanes,
     pub(crate) v: F32Lanes,
-    /// Lanes whose t, u and v are accurate. Their hits lie in the rays' ranges, because the filter is sure only of such
-    /// triangles.
+    /// Lanes whose t, u and v are accurate. Their hits lie in the rays' ranges, because the filter
+    /// is sure only of such triangles.
     pub(crate) certain: u32,
-    /// Lanes whose t, u or v may be inaccurate, to be computed one by one. They are hits as well, since the filter was sure of
-    /// them.
+    /// Lanes whose t, u or v may be inaccurate, to be computed one by one. They are hits as well,
+    /// since the filter was sure of them.
     pub(crate) open: u32,
 }
 
@@ -122,7 +124,8 @@ impl Intersections {
         self.set_masks(s, lanes, &accurate);
     }
 
-    /// As [`Self::compute`], for rays whose origins f64 does not hold exactly; `pairs.origin` is not read.
+    /// As [`Self::compute`], for rays whose origins f64 does not hold exactly; `pairs.origin` is
+    /// not read.
     #[inline(always)]
     pub(crate) fn compute_from<S: Simd>(
         &mut self,
@@ -150,9 +153,10 @@ impl Intersections {
         self.set_masks(s, lanes, &accurate);
     }
 
-    /// As [`Self::compute`], for rays that all start at the origin of `terms`. `norm` holds the greatest |component| of each
-    /// direction, and `hit` for each ray the index of its triangle in `terms`; with `FIRST_HALF`, all indices are below eight.
-    /// It is a kernel that is inlined into its caller, whose variables the parameters are.
+    /// As [`Self::compute`], for rays that all start at the origin of `terms`. `norm` holds the
+    /// largest |component| of each direction, and `hit` for each ray the index of its triangle in
+    /// `terms`; with `FIRST_HALF`, all indices are below eight. It is a kernel that is inlined into
+    /// its caller, whose variables the parameters are.
     #[inline(always)]
     pub(crate) fn compute_from_point<S: Simd, const FIRST_HALF: bool>(
         &mut self,

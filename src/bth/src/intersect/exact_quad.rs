@@ -1,5 +1,5 @@
-//! The arithmetic of [`super::exact`] in vectors of four f64, for one pair of a ray and a triangle: its three vector products are one
-//! operation, and so are its four scalar products.
+//! The arithmetic of [`super::exact`] in vectors of four f64, for one pair of a ray and a triangle:
+//! its three vector products are one operation, and so are its four scalar products.
 
 use crate::intersect::exact::{INVERSE_RATIO_ERROR, RoundedIntersection, WEIGHT_ERROR};
 use crate::intersect::origin::{Origin, RoundedOrigin};
@@ -44,7 +44,8 @@ pub(crate) fn rounded_intersection<D: Doubles>(
     [a, b, c]: [[f32; 3]; 3],
     norm: f32,
 ) -> RoundedIntersection {
-    // By axis, four factors of vector products: the edges to b and c, the offset of a from the origin, and the first edge again.
+    // By axis, four factors of vector products: the edges to b and c, the offset of a from the
+    // origin, and the first edge again.
     let factor = |k: usize| s.sub(s.widen([b[k], c[k], a[k], b[k]]), origin.with_corner(s, a[k], k));
     let left = [factor(0), factor(1), factor(2)];
     // The other factors, so that the products are `normal`, `second`, `third` and `normal` again.

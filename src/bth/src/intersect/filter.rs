@@ -1,8 +1,10 @@
-//! Conservative f32 filter of the triangles of a leaf: it excludes those that the ray certainly misses.
+//! Conservative f32 filter of the triangles of a leaf: it excludes those that the ray certainly
+//! misses.
 //!
-//! It is the projection of [`crate::intersect::line`] in f32, for sixteen triangles at a time. Every triangle that
-//! `Line::intersection` could accept remains a candidate, and every triangle that is called sure is accepted by `Line::intersection`.
-//! The other candidates are decided in f64, so the result of a query does not depend on the instruction set.
+//! It is the projection of [`crate::intersect::line`] in f32, for sixteen triangles at a time.
+//! Every triangle that `Line::intersection` could accept remains a candidate, and every triangle
+//! that is called sure is accepted by `Line::intersection`. The other candidates are decided in
+//! f64, so the result of a query does not depend on the instruction set.
 //! [`edge_functions`](crate::intersect::edge_functions) derives the bounds of the errors.
 
 use crate::intersect::boxes::RaySlabs;
@@ -17,14 +19,16 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 const _: () = assert!(WIDTH == LANES);
 
-/// From this reach on, products of weights and depths could overflow: all triangles are candidates then.
+/// From this reach on, products of weights and depths could overflow: all triangles are candidates
+/// then.
 const MAX_REACH: f64 = (1u64 << 40) as f64;
-/// Per-ray constants of the filter, in object space. Depths are t times the greatest |component| of the direction, as in
-/// [`RaySlabs`].
+/// Per-ray constants of the filter, in object space. Depths are t times the largest |component| of
+/// the direction, as in [`RaySlabs`].
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub(crate) struct TriangleFilter {
-    /// The two axes of the plane of projection, and the axis of the direction's greatest |component|.
+    /// The two axes of the plane of projection, and the axis of the direction's largest
+    /// |component|.
     pub(crate) axis: [u32; 3],
     /// Constant part of the bound of a weight's error; infinite where products may overflow.
     pub(crate) error_floor: f32,
@@ -32,19 +36,22 @@ pub(crate) struct TriangleFilter {
     pub(crate) origin: [f32; 2],
     /// Change of the plane's coordinates along the ray per unit of depth.
     pub(crate) shear: [f32; 2],
-    /// 1 or -1, the sign of the direction along the third axis. The depth of a coordinate z is `forward * z + start`.
+    /// 1 or -1, the sign of the direction along the third axis. The depth of a coordinate z is
+    /// `forward * z + start`.
     pub(crate) forward: f32,
     /// Depth of the coordinate 0 along the third axis. It is exact, as is `forward`.
     pub(crate) start: f32,
-    /// Least depth from which a hit certainly lies in the ray's range.
+    /// Smallest depth from which a hit certainly lies in the ray's range.
     pub(crate) first: f32,
-    /// Greatest depth up to which a hit certainly lies in the ray's range.
+    /// Largest depth up to which a hit certainly lies in the ray's range.
     pub(crate) last: f32,
-    /// Growth of the bound of a weight's error with the greatest |x| or |y| of the projected corners.
+    /// Growth of the bound of a weight's error with the largest |x| or |y| of the projected
+    /// corners.
     pub(crate) error_slope: f32,
 }
 
-/// Triangles of a leaf that the ray may hit: in the bit sets, bit i stands for triangle i of the leaf.
+/// Triangles of a leaf that the ray may hit: in the bit sets, bit i stands for triangle i of the
+/// leaf.
 #[derive(Clone, Copy)]
 pub(crate) struct Candidates<S: Simd> {
     /// Triangles that the line may cross, at whatever depth.
@@ -71,7 +78,8 @@ pub(crate) struct Certain {
 }
 
 impl<S: Simd> Candidates<S> {
-    /// The triangles that may be the nearest hit, as bits, and the nearest hit if it is certain. `maybe` must not be empty.
+    /// The triangles that may be the nearest hit, as bits, and the nearest hit if it is certain.
+    /// `maybe` must not be empty.
     #[inline(always)]
     pub(crate) fn nearest_candidates(&self, s: S) -> (u32, Option<Certain>) {
         let &Candidates { crossed, mut maybe, sure, nearest, farthest } = self;
@@ -85,8 +93,9 @@ impl<S: Simd> Candidates<S> {
         let (mut near, mut far) = ([0.0; WIDTH], [0.0; WIDTH]);
         s.store(nearest, &mut near);
         s.store(farthest, &mut far);
-        // `maybe` waits for a division that `crossed` does not need. A single ray is answered in f64 next, which begins that much earlier
-        // if the processor predicts this branch; the black box keeps it from becoming a selection, which would wait for both.
+        // `maybe` waits for a division that `crossed` does not need. A single ray is answered in
+        // f64 next, which begins that much earlier if the processor predicts this branch; the black
+        // box keeps it from becoming a selection, which would wait for both.
         let only = if crossed & (crossed - 1) == 0 { crossed } else { black_box(maybe) };
         let triangle = only.trailing_zeros() as usize % WIDTH;
         (maybe, Some(Certain { triangle, near: near[triangle], far: far[triangle] }))
@@ -101,7 +110,8 @@ fn corner([x, y, z, _]: [f32; 4]) -> [f32; 3] {
 /// Projected points of a leaf: x, y and depth of each.
 pub(crate) type PointRows = [[f32; 4]; WIDTH];
 
-/// The triangles of a leaf, in either of the leaf's record formats. Indices of triangles are taken modulo [`WIDTH`].
+/// The triangles of a leaf, in either of the leaf's record formats. Indices of triangles are taken
+/// modulo [`WIDTH`].
 pub(crate) trait TriangleBlock {
     /// Index of the leaf's first triangle in the object's leaf order.
     fn first(&self) -> u32;
@@ -141,7 +151,7 @@ fn lookup_points<S: Simd>(s: S, [x, y, depth]: [S::F; 3], row: &[u8; WIDTH]) -> 
     [s.lookup(x, at), s.lookup(y, at), s.lookup(depth, at)]
 }
 
-/// The greatest |x| or |y| of the three corners.
+/// The largest |x| or |y| of the three corners.
 #[inline(always)]
 fn greatest_coordinate<S: Lanewise>(s: S, [a, b, c]: &Corners<S>) -> S::F {
     s.max(s.max(s.max_abs(a[0], a[1]), s.max_abs(b[0], b[1])), s.max_abs(c[0], c[1]))
@@ -178,7 +188,7 @@ impl TriangleBlock for IndexedLeaf {
     fn project_points<S: Simd>(&self, s: S, filter: &TriangleFilter) -> Option<PointRows> {
         let mut rows = [[0.0; 4]; WIDTH];
         for i in 0..S::PIECES {
-            // A piece without a vertex is left out.
+            // A piece without a vertex is skipped.
             if lanes_of_piece::<S>(i).trailing_zeros() >= self.vertices {
                 break;
             }
@@ -264,8 +274,9 @@ impl TriangleFilter {
         [s.fnma(s.splat(self.shear[0]), depth, x), s.fnma(s.splat(self.shear[1]), depth, y), depth]
     }
 
-    /// The triangles of a leaf that may be hit at a depth between `first` and `limit`, without those whose bits are set in `left_out`.
-    /// `origin_reach` is that of the [bounds](ObjectBounds::origin_reach) for which the ray was prepared.
+    /// The triangles of a leaf that may be hit at a depth between `first` and `limit`, without
+    /// those whose bits are set in `left_out`. `origin_reach` is that of the
+    /// [bounds](ObjectBounds::origin_reach) for which the ray was prepared.
     #[inline(always)]
     pub(crate) fn candidates<S: Simd, B: TriangleBlock>(
         &self,
@@ -287,8 +298,9 @@ impl TriangleFilter {
         sides(s, corners, error)
     }
 
-    /// The sides with the errors that the triangles' own distances from the ray's origin bound. Where the object is much larger than
-    /// what lies around the ray, such as a statue on a plain, the bound by the object's box decides nothing.
+    /// The sides with the errors that the triangles' own distances from the ray's origin bound.
+    /// Where the object is much larger than what lies around the ray, such as a statue on a plain,
+    /// the bound by the object's box decides nothing.
     #[inline(always)]
     fn closer<S: Lanewise>(
         &self,
@@ -343,7 +355,8 @@ impl<S: Simd, B: TriangleBlock> Part<S> for CandidatesOf<'_, B> {
                 sides = filter.closer(s, sides, &corners, origin_reach);
                 crossed &= !s.mask_bits(sides.missed);
             }
-            // In most leaves that a ray enters, all triangles are missed: then depths need not be computed.
+            // In most leaves that a ray enters, all triangles are missed: then depths need not be
+            // computed.
             if crossed == 0 {
                 return Candidates {
                     crossed,
@@ -387,7 +400,8 @@ impl<S: Simd, B: TriangleBlock> Part<S> for CandidatesOf<'_, B> {
     }
 }
 
-/// The triangles of a leaf, a bit each: at most as many as lanes, even if an unchecked file has a greater count.
+/// The triangles of a leaf, a bit each: at most as many as lanes, even if an unchecked file has a
+/// greater count.
 #[inline(always)]
 fn valid_triangles(block: &impl TriangleBlock) -> u32 {
     1u32.wrapping_shl(block.triangles()).wrapping_sub(1) & (u32::MAX >> WIDTH)

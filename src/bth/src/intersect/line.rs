@@ -1,29 +1,33 @@
-//! The line of a ray, and the side of it on which points and edges lie: the predicates of walks through tetrahedra.
+//! The line of a ray, and the side of it on which points and edges lie: the predicates of walks
+//! through tetrahedra.
 //!
-//! Points are projected along the ray by the axis shear of Woop, Benthin and Wald ("Watertight Ray/Triangle Intersection",
-//! JCGT 2013), in f64: the line becomes the origin of a plane. A sign that rounding errors might change is reported as
-//! [`Sign::Uncertain`]. The intersection of lines with triangles is decided exactly in [`super::exact`]; a line in the plane of a
-//! triangle misses it.
+//! Points are projected along the ray by the axis shear of Woop, Benthin and Wald ("Watertight
+//! Ray/Triangle Intersection", JCGT 2013), in f64: the line becomes the origin of a plane. A sign
+//! that rounding errors might change is reported as [`Sign::Uncertain`]. The intersection of lines
+//! with triangles is decided exactly in [`super::exact`]; a line in the plane of a triangle misses
+//! it.
 
 use super::origin::RoundedOrigin;
 use super::start_point::StartPoint;
 use super::vector::wide;
 use crate::rays::Ray;
 
-/// Error up to which f64 values are taken: 2^-28, an eighth of the rounding of f32, relative to 1 for u and v and to itself for
-/// t. Where the error may be greater, t, u and v are computed from exact sums.
+/// Error up to which f64 values are taken: 2^-28, an eighth of the rounding of f32, relative to 1
+/// for u and v and to itself for t. Where the error may be greater, t, u and v are computed from
+/// exact sums.
 pub(crate) const RATIO_ERROR: f64 = 1.0 / (1u64 << 28) as f64;
 
-/// Upper bound of all t that cannot be distinguished from `t`: t is rounded to f32 before it is compared with the ray's range,
-/// and it has a relative error of 2^-28 ([`RATIO_ERROR`]), so one of two equal hits may appear nearer.
+/// Upper bound of all t that cannot be distinguished from `t`: t is rounded to f32 before it is
+/// compared with the ray's range, and it has a relative error of 2^-28 ([`RATIO_ERROR`]), so one of
+/// two equal hits may appear nearer.
 pub(crate) fn widened(t: f64) -> f64 {
     const SLACK: f64 = 1.0 / (1 << 23) as f64;
     const LEAST: f64 = f32::from_bits(1) as f64;
     t + (t.abs() * SLACK + LEAST)
 }
 
-/// 8u with u = 2^-53: bounds the error of a projected coordinate relative to the greatest |coordinate| of the point relative to
-/// the ray's origin; see [`Line::project`].
+/// 8u with u = 2^-53: bounds the error of a projected coordinate relative to the largest
+/// |coordinate| of the point relative to the ray's origin; see [`Line::project`].
 pub(crate) const F64_PROJECTION_ERROR: f64 = 1.0 / (1u64 << 50) as f64;
 
 /// The line of a ray in the ray's space, with the constants of its projection.
@@ -31,7 +35,8 @@ pub(crate) const F64_PROJECTION_ERROR: f64 = 1.0 / (1u64 << 50) as f64;
 pub(crate) struct Line {
     pub(crate) origin: [f64; 3],
     pub(crate) direction: [f64; 3],
-    /// The two axes of the plane of projection, and the axis of the direction's greatest |component|.
+    /// The two axes of the plane of projection, and the axis of the direction's largest
+    /// |component|.
     pub(crate) axis: [usize; 3],
     /// Change of the plane's coordinates along the line per unit of depth.
     pub(crate) shear: [f64; 2],
@@ -116,23 +121,24 @@ impl Line {
         self.origin_error * self.inverse_depth.abs()
     }
 
-    /// Projects a point. Let u = 2^-53 and R the greatest |coordinate| of point - origin. The differences are off by uR, the
-    /// shear by a factor of 1±2u, its product with the depth by one more rounding and by the depth's own uR, and |shear| <= 1:
-    /// x and y are off by less than uR + 4uR + 2uR < 8uR.
+    /// Projects a point. Let u = 2^-53 and R the largest |coordinate| of point - origin. The
+    /// differences are off by uR, the shear by a factor of 1±2u, its product with the depth by one
+    /// more rounding and by the depth's own uR, and |shear| <= 1: x and y are off by less than uR +
+    /// 4uR + 2uR < 8uR.
     #[inline(always)]
     pub(crate) fn project(&self, point: [f32; 3]) -> Projected {
         let [x, y, z] = self.axis.map(|k| f64::from(point[k]) - self.origin[k]);
         Projected { x: x - self.shear[0] * z, y: y - self.shear[1] * z, depth: z }
     }
 
-    /// Bound on the error of x and y of [`Self::project`], for points whose distance from the origin in the maximum norm does not
-    /// exceed `reach`.
+    /// Bound on the error of x and y of [`Self::project`], for points whose distance from the
+    /// origin in the maximum norm does not exceed `reach`.
     #[inline(always)]
     pub(crate) fn projection_error(reach: f64) -> f64 {
         F64_PROJECTION_ERROR * reach
     }
 
-    /// Greatest |coordinate| of any point of a box relative to the origin.
+    /// Largest |coordinate| of any point of a box relative to the origin.
     pub(crate) fn reach_of_box(&self, lower: [f32; 3], upper: [f32; 3]) -> f64 {
         (0..3).fold(0.0, |reach: f64, k| {
             let (lo, hi) = (f64::from(lower[k]) - self.origin[k], f64::from(upper[k]) - self.origin[k]);
@@ -140,8 +146,9 @@ impl Line {
         })
     }
 
-    /// Side of the line on which the edge p→q passes, given the error of the coordinates. The products are off by
-    /// error·(sizes + error) because of the coordinates, and by less than the same again because of their own roundings.
+    /// Side of the line on which the edge p→q passes, given the error of the coordinates. The
+    /// products are off by error·(sizes + error) because of the coordinates, and by less than the
+    /// same again because of their own roundings.
     #[inline(always)]
     pub(crate) fn side(p: &Projected, q: &Projected, error: f64) -> Sign {
         let value = cross(p, q);
@@ -155,7 +162,7 @@ impl Line {
         }
     }
 
-    /// Least and greatest t at which the line can cross a triangle with these corners.
+    /// Smallest and largest t at which the line can cross a triangle with these corners.
     #[inline(always)]
     pub(crate) fn t_range(&self, corners: [&Projected; 3]) -> (f64, f64) {
         let t = corners.map(|p| p.depth * self.inverse_depth);
@@ -163,27 +170,29 @@ impl Line {
         (t[0].min(t[1]).min(t[2]) - off, t[0].max(t[1]).max(t[2]) + off)
     }
 
-    /// Whether the corners of a triangle that the line certainly crosses are clockwise about it.
+    /// Returns true if the corners of a triangle that the line certainly crosses are clockwise
+    /// about it.
     pub(crate) fn turns_clockwise([a, b, c]: [&Projected; 3]) -> bool {
         cross(b, c) + cross(c, a) + cross(a, b) < 0.0
     }
 
-    /// Lower bound of the t at which the line crosses a triangle that it certainly crosses, given the error of the projected
-    /// coordinates.
+    /// Lower bound of the t at which the line crosses a triangle that it certainly crosses, given
+    /// the error of the projected coordinates.
     pub(crate) fn t_before(&self, corners: [&Projected; 3], error: f64) -> f64 {
         let (depth, shift) = Self::depth_of_crossing(corners, error);
         depth * self.inverse_depth - shift * self.inverse_depth.abs() - self.t_error()
     }
 
-    /// The depth at which the line crosses a triangle that it certainly crosses, and a bound of its error.
+    /// The depth at which the line crosses a triangle that it certainly crosses, and a bound of its
+    /// error.
     fn depth_of_crossing([a, b, c]: [&Projected; 3], error: f64) -> (f64, f64) {
         let weight = [cross(b, c), cross(c, a), cross(a, b)];
         let bound = 4.0 * error * (a.size() + b.size() + c.size() + error);
         let sum = weight[0] + weight[1] + weight[2];
         let depth = (weight[0] * a.depth + weight[1] * b.depth + weight[2] * c.depth) / sum;
         let farthest = a.depth.abs().max(b.depth.abs()).max(c.depth.abs());
-        // The errors of the weights shift the depth within the range of depths. The roundings of the sum above shift it by less
-        // than 2^-48 of the greatest |depth|.
+        // The errors of the weights shift the depth within the range of depths. The roundings of
+        // the sum above shift it by less than 2^-48 of the largest |depth|.
         let shift =
             2.0 * farthest * (4.0 * bound / (sum.abs() - 4.0 * bound).max(0.0)) + farthest * RATIO_ERROR;
         (depth, shift)

@@ -1,14 +1,17 @@
-//! The volume of a start and a triangle in pairs of f64, for rays that begin so close to a triangle that f64 leaves t inaccurate: a ray
-//! whose origin is a hit, rounded.
+//! The volume of a start and a triangle in pairs of f64, for rays that begin so close to a triangle
+//! that f64 leaves t inaccurate: a ray whose origin is a hit, rounded.
 //!
-//! A pair holds a number as the sum of two f64, by operations whose errors are f64 (Dekker, "A Floating-Point Technique for Extending the
-//! Available Precision", Numerische Mathematik 1971). The errors are the same with and without fused operations, so all instruction sets
-//! give the same bits.
+//! A pair holds a number as the sum of two f64, by operations whose errors are f64 (Dekker, "A
+//! Floating-Point Technique for Extending the Available Precision", Numerische Mathematik 1971).
+//! The errors are the same with and without fused operations, so all instruction sets give the same
+//! bits.
 //!
 //! **Error.** Let u = 2^-53, and let r and m be the greatest |coordinates| of a-o and of the edges. These differences must be exact. A
-//! component n of the normal is known up to 6u²m²: its products and the difference are exact as pairs, and the low parts, at most 4um²
-//! together, are rounded twice. Its product with a component of a-o adds 10u²rm². The three low parts are at most 18urm² together and
-//! rounded six times, and the high parts add two roundings of their errors, at most 30urm²: together less than 2^8 u²rm² = 2^-98 rm².
+//! component n of the normal is known up to 6u²m²: its products and the difference are exact as
+//! pairs, and the low parts, at most 4um² together, are rounded twice. Its product with a component
+//! of a-o adds 10u²rm². The three low parts are at most 18urm² together and rounded six times, and
+//! the high parts add two roundings of their errors, at most 30urm²: together less than 2^8 u²rm² =
+//! 2^-98 rm².
 
 use crate::intersect::vector::{greater, max_norm};
 use crate::simd::Doubles;
@@ -31,7 +34,8 @@ fn exact_difference<D: Doubles>(s: D, p: D::V, q: D::V) -> Option<D::V> {
     (x == 0.0 && y == 0.0 && z == 0.0).then_some(difference)
 }
 
-/// A sum of three numbers that does not depend on their order: the greatest of the sums in three orders.
+/// A sum of three numbers that does not depend on their order: the largest of the sums in three
+/// orders.
 #[inline(always)]
 fn unordered_sum([x, y, z]: [f64; 3]) -> f64 {
     greater(greater(x + y + z, y + z + x), z + x + y)
@@ -58,7 +62,8 @@ pub(super) fn volume<D: Doubles>(s: D, origin: [f32; 3], corners: [[f32; 3]; 3])
     let rest = s.add(s.product_error(offset, normal, high), s.mul(offset, low));
     let ([x, y, z, _], [rest_x, rest_y, rest_z, _]) = (s.array(high), s.array(rest));
     let rest = [rest_x, rest_y, rest_z];
-    // The exact error of a sum of two does not depend on their order; of three, the two of greater size come first.
+    // The exact error of a sum of two does not depend on their order; of three, the two of greater
+    // size come first.
     let (sum, low) = sum_of_three([x, y, z]);
     let value = sum + (low + unordered_sum(rest));
     let [x_o, y_o, z_o, _] = s.array(s.abs(offset));
@@ -71,7 +76,7 @@ pub(super) fn volume<D: Doubles>(s: D, origin: [f32; 3], corners: [[f32; 3]; 3])
 /// The sum of three numbers and its error, rounded, in an order by their sizes.
 #[inline(always)]
 fn sum_of_three([x, y, z]: [f64; 3]) -> (f64, f64) {
-    // The number of least size last.
+    // The number of smallest size last.
     let (x, z) = if x.abs() < z.abs() { (z, x) } else { (x, z) };
     let (y, z) = if y.abs() < z.abs() { (z, y) } else { (y, z) };
     let (first, first_error) = sum_of_two(x, y);

@@ -1,5 +1,5 @@
-//! Terms of the distance of a point to a triangle as exact sums of products of f32 coordinates, for the few points and triangles
-//! for which f64 loses too many digits ([`super::point_triangle`]).
+//! Terms of the distance of a point to a triangle as exact sums of products of f32 coordinates, for
+//! the few points and triangles for which f64 loses too many digits ([`super::point_triangle`]).
 
 use super::vector::{dot, wide};
 use bth_format::exact::{Expansion, VOLUME_PARTS};
@@ -69,8 +69,8 @@ impl ExactTriangle {
         [x.value(), y.value(), z.value()]
     }
 
-    /// Whether the projection of a point to the plane lies in the interior of the triangle: whether all three barycentric weights
-    /// are positive.
+    /// Returns true if the projection of a point to the plane lies in the interior of the triangle:
+    /// whether all three barycentric weights are positive.
     #[cold]
     #[inline(never)]
     pub(super) fn projects_inside(&self, point: [f32; 3]) -> bool {

@@ -1,20 +1,24 @@
-//! Distance of a point to a closed triangle, and the feature of the triangle on which the closest point lies.
+//! Distance of a point to a closed triangle, and the feature of the triangle on which the closest
+//! point lies.
 //!
-//! The closest point lies in the interior of the triangle if and only if the projection of the point to the triangle's plane
-//! does; else it lies on an edge, in its interior or at its ends (the Voronoi regions of Ericson, "Real-Time Collision
-//! Detection", 5.1.5). The squared distance is computed in f64. Where cancellation could cost more than [`ACCURACY`] of it, as
-//! for points that nearly touch the triangle and for needles, and where the side of an edge is uncertain, the terms that cancel
-//! are computed as exact sums ([`super::point_exact`]).
+//! The closest point lies in the interior of the triangle if and only if the projection of the
+//! point to the triangle's plane does; else it lies on an edge, in its interior or at its ends (the
+//! Voronoi regions of Ericson, "Real-Time Collision Detection", 5.1.5). The squared distance is
+//! computed in f64. Where cancellation could cost more than [`ACCURACY`] of it, as for points that
+//! nearly touch the triangle and for needles, and where the side of an edge is uncertain, the terms
+//! that cancel are computed as exact sums ([`super::point_exact`]).
 //!
-//! The distance to an edge is a function of the point and the edge alone, so triangles that share an edge or a vertex have
-//! distances of the same bits where the closest point lies on it.
+//! The distance to an edge is a function of the point and the edge alone, so triangles that share
+//! an edge or a vertex have distances of the same bits where the closest point lies on it.
 //!
 //! **Errors.** Let u = 2^-53. Differences of two coordinates have a relative error of u. For vectors q and e of such differences
-//! with greatest |components| |q| and |e|, each component of q × e has an error below 8.1 u |q||e| (two products, each with
-//! three relative errors of u, and one subtraction of at most 2|q||e|). With one more product by a vector r the error of
-//! (q × e)·r is below 50 u |q||e||r|, and that of (q × e)·(r × s) below 150 u |q||e||r||s|.
+//! with largest |components| |q| and |e|, each component of q × e has an error below 8.1 u |q||e|
+//! (two products, each with three relative errors of u, and one subtraction of at most 2|q||e|).
+//! With one more product by a vector r the error of (q × e)·r is below 50 u |q||e||r|, and that of
+//! (q × e)·(r × s) below 150 u |q||e||r||s|.
 //!
-//! The range of f64 holds all these products of f32 coordinates, whose exponents lie between -149 and 128.
+//! The range of f64 holds all these products of f32 coordinates, whose exponents lie between -149
+//! and 128.
 
 use super::point_exact::{ExactTriangle, exact_edge_cross};
 use super::vector::{cross, dot, max_norm};
@@ -22,8 +26,9 @@ use std::cmp::Ordering;
 
 /// Bound of the relative error of computed squared distances.
 pub(crate) const ACCURACY: f64 = 1.0 / (1 << 27) as f64;
-/// Factor by which a rounded term must exceed the bound of its error, so that the relative error of a squared distance that is
-/// computed from two of them stays below [`ACCURACY`]: 2 · (√3 + 1) / 2^30.
+/// Factor by which a rounded term must exceed the bound of its error, so that the relative error of
+/// a squared distance that is computed from two of them stays below [`ACCURACY`]: 2 · (√3 + 1) /
+/// 2^30.
 const CERTAIN: f64 = (1 << 30) as f64;
 /// 16 u: bounds the error of a component of q × e relative to |q||e|.
 const CROSS_ERROR: f64 = 1.0 / (1u64 << 49) as f64;
@@ -79,8 +84,9 @@ fn difference(a: [f32; 3], b: [f32; 3]) -> [f64; 3] {
     out
 }
 
-/// The squared distance of a point to a closed triangle, with a relative error of at most [`ACCURACY`], and the feature on which
-/// the closest point lies. All coordinates are finite. A triangle without area is the edge or the point that its corners span.
+/// The squared distance of a point to a closed triangle, with a relative error of at most
+/// [`ACCURACY`], and the feature on which the closest point lies. All coordinates are finite. A
+/// triangle without area is the edge or the point that its corners span.
 #[inline(never)]
 pub(crate) fn squared_distance(point: [f32; 3], corners: [[f32; 3]; 3]) -> (f64, Feature) {
     let [a, b, c] = corners;
@@ -98,8 +104,8 @@ pub(crate) fn squared_distance(point: [f32; 3], corners: [[f32; 3]; 3]) -> (f64,
     if outside || boundary.0 == 0.0 {
         return boundary;
     }
-    // The projection lies close to the boundary or the triangle is a needle. If the plane is not nearer than the boundary, the
-    // boundary is close enough in any case.
+    // The projection lies close to the boundary or the triangle is a needle. If the plane is not
+    // nearer than the boundary, the boundary is close enough in any case.
     let plane = relative.plane(normal, size, point, corners);
     if boundary.0 <= plane * (1.0 + ACCURACY / 8.0) || !ExactTriangle::new(corners).projects_inside(point) {
         return boundary;
@@ -108,8 +114,9 @@ pub(crate) fn squared_distance(point: [f32; 3], corners: [[f32; 3]; 3]) -> (f64,
 }
 
 impl Relative {
-    /// Whether the projection of the point to the triangle's plane certainly lies outside of the triangle or on its boundary, and
-    /// whether it certainly lies inside. `size` is the product of the greatest |components| of the edges that span the normal.
+    /// Returns true if the projection of the point to the triangle's plane certainly lies outside
+    /// of the triangle or on its boundary, and whether it certainly lies inside. `size` is the
+    /// product of the largest |components| of the edges that span the normal.
     #[inline(always)]
     fn sides(&self, normal: [f64; 3], size: f64) -> [bool; 2] {
         let [a, b, c] = self.corner;
@@ -164,8 +171,9 @@ impl Relative {
         for i in 0..3 {
             let j = (i + 1) % 3;
             let (p, q, edge) = (self.corner[i], self.corner[j], self.edge[i]);
-            // Both are positive where the foot of the perpendicular from the point lies within the edge. Their errors matter
-            // only where the foot is so close to a corner that the distance to that corner is as good.
+            // Both are positive where the foot of the perpendicular from the point lies within the
+            // edge. Their errors matter only where the foot is so close to a corner that the
+            // distance to that corner is as good.
             let (from_p, from_q) = (-dot(edge, p), dot(edge, q));
             if from_p > 0.0 && from_q > 0.0 {
                 let distance = line(p, q, edge, from_p.partial_cmp(&from_q))
@@ -179,8 +187,9 @@ impl Relative {
     }
 }
 
-/// Squared distance of the origin to the line through p and q. `nearer` compares their distances. `None` where cancellation costs
-/// more than [`ACCURACY`]. The same bits for both directions of the edge.
+/// Squared distance of the origin to the line through p and q. `nearer` compares their distances.
+/// `None` where cancellation costs more than [`ACCURACY`]. The same bits for both directions of the
+/// edge.
 #[inline(always)]
 fn line(p: [f64; 3], q: [f64; 3], edge: [f64; 3], nearer: Option<Ordering>) -> Option<f64> {
     let area = match nearer {
@@ -228,7 +237,8 @@ pub(crate) fn locate(point: [f32; 3], corners: [[f32; 3]; 3], feature: Feature) 
     ClosestPoint { point: closest, weight: [weights[1] as f32, weights[2] as f32], feature }
 }
 
-/// Barycentric weights of the projection of a point to the plane of a triangle, limited to the triangle.
+/// Barycentric weights of the projection of a point to the plane of a triangle, limited to the
+/// triangle.
 fn face_weights(point: [f32; 3], corners: [[f32; 3]; 3]) -> [f64; 3] {
     let [ab, ac] = [difference(corners[1], corners[0]), difference(corners[2], corners[0])];
     let mut normal = cross(ab, ac);
@@ -238,7 +248,8 @@ fn face_weights(point: [f32; 3], corners: [[f32; 3]; 3]) -> [f64; 3] {
     let squared = dot(normal, normal);
     let relative = corners.map(|p| difference(p, point));
     let height = dot(normal, relative[0]) / squared;
-    // The corners relative to the projection: their components along the normal would only add rounding errors.
+    // The corners relative to the projection: their components along the normal would only add
+    // rounding errors.
     let flat = relative.map(|p| [0, 1, 2].map(|k| p[k] - normal[k] * height));
     let weight = |i: usize| (dot(normal, cross(flat[(i + 1) % 3], flat[(i + 2) % 3])) / squared).max(0.0);
     let weights = [weight(0), weight(1), weight(2)];

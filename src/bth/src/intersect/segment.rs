@@ -1,4 +1,5 @@
-//! Whether triangles cross the open segment between two points, exactly. The points may be starts on triangles.
+//! Whether triangles cross the open segment between two points, exactly. The points may be starts
+//! on triangles.
 
 use super::origin::RoundedOrigin;
 use super::start::{ExactStart, START_VOLUME_PARTS};
@@ -8,8 +9,8 @@ use bth_format::exact::{Expansion, VOLUME_PARTS};
 
 /// Parts of a volume of two starts and two points.
 const TWO_STARTS_PARTS: usize = 9 * START_VOLUME_PARTS;
-/// 2^-46: bounds the error of volumes in f64 relative to the product of the sizes of their edges, with room: 3 roundings of 2^-53 for each of six
-/// products of three differences, and their sums.
+/// 2^-46: bounds the error of volumes in f64 relative to the product of the sizes of their edges,
+/// with room: 3 roundings of 2^-53 for each of six products of three differences, and their sums.
 const ROUNDING: f64 = 1.0 / (1u64 << 46) as f64;
 
 /// An end of a segment.
@@ -44,7 +45,8 @@ pub(crate) struct Segment {
     pub(crate) rounded: [RoundedOrigin; 2],
 }
 
-/// det[p-o, q-o, r-o] in f64, and a bound of its error where each point is off by at most `off` along an axis.
+/// det[p-o, q-o, r-o] in f64, and a bound of its error where each point is off by at most `off`
+/// along an axis.
 fn volume(o: [f64; 3], [p, q, r]: [[f64; 3]; 3], off: f64) -> (f64, f64) {
     let [p, q, r] = [p, q, r].map(|point| minus(point, o));
     let size = |v: [f64; 3]| v.iter().fold(0.0f64, |most, x| most.max(x.abs()));
@@ -52,7 +54,8 @@ fn volume(o: [f64; 3], [p, q, r]: [[f64; 3]; 3], off: f64) -> (f64, f64) {
         + p[1] * (q[2] * r[0] - q[0] * r[2])
         + p[2] * (q[0] * r[1] - q[1] * r[0]);
     let [p, q, r] = [p, q, r].map(size);
-    // Six products of three differences, each of which the errors of two points change by at most 2·off.
+    // Six products of three differences, each of which the errors of two points change by at most
+    // 2·off.
     let moved = 2.0 * off;
     let change = 6.0 * ((p + moved) * (q + moved) * (r + moved) - p * q * r);
     (value, ROUNDING * p * q * r + change * (1.0 + ROUNDING))

@@ -1,16 +1,19 @@
 //! Points of triangles at which rays start, and the exact intersection of such rays with triangles.
 //!
-//! The start at weights u and v of the triangle a, b, c is the point S = a + u(b-a) + v(c-a) of the stored numbers: a real point, not
-//! rounded. Where u + v exceeds 1, by the rounding of a hit's weights, S is the point (ub + vc)/(u + v) of the edge b→c. So S always
-//! lies on the closed triangle.
+//! The start at weights u and v of the triangle a, b, c is the point S = a + u(b-a) + v(c-a) of the
+//! stored numbers: a real point, not rounded. Where u + v exceeds 1, by the rounding of a hit's
+//! weights, S is the point (ub + vc)/(u + v) of the edge b→c. So S always lies on the closed
+//! triangle.
 //!
-//! A ray from S hits a closed triangle if its line crosses the triangle at t > 0. Triangles through S are crossed at t = 0, or lie in
-//! one plane with the line; neither is a hit. So a ray never hits the surface that it leaves, and never skips a wall, however near.
+//! A ray from S hits a closed triangle if its line crosses the triangle at t > 0. Triangles through
+//! S are crossed at t = 0, or lie in one plane with the line; neither is a hit. So a ray never hits
+//! the surface that it leaves, and never skips a wall, however near.
 //!
 //! **Exactness.** The weight det[d, p-S, q-S] of a corner and the volume (a-S)·n are affine functions of S: where S is a combination of
-//! a, b and c, they are the same combination of their values at a, b and c, which are exact sums ([`bth_format::exact`]). The
-//! combination multiplies these by u and v, numbers of f32. f64 decides most rays before: S rounded to f64 is off by a bound that
-//! [`RoundedOrigin`] adds to the bounds of the errors.
+//! a, b and c, they are the same combination of their values at a, b and c, which are exact sums
+//! ([`bth_format::exact`]). The combination multiplies these by u and v, numbers of f32. f64
+//! decides most rays before: S rounded to f64 is off by a bound that [`RoundedOrigin`] adds to the
+//! bounds of the errors.
 
 use super::exact::{Estimate, Intersection, UncertainWeights, decide_exactly, estimate};
 use super::filter::TriangleBlock;
@@ -24,34 +27,36 @@ use bth_format::object::ObjectView;
 
 /// Weights of hits are rounded to f32: their sum, rounded too, exceeds 1 by at most this.
 pub(crate) const ABOVE_ONE: f32 = 1.0 / (1 << 22) as f32;
-/// 2^-49: bounds the error of a start in f64 relative to the greatest |coordinate| of its triangle. It has five roundings of 2^-53,
-/// each of at most twice that coordinate.
+/// 2^-49: bounds the error of a start in f64 relative to the largest |coordinate| of its triangle.
+/// It has five roundings of 2^-53, each of at most twice that coordinate.
 const ROUNDING: f64 = 1.0 / (1u64 << 49) as f64;
 
-/// Parts of an affine combination of edges: that of `a`, and differences of two others with `a`, times a number of f32 each.
+/// Parts of an affine combination of edges: that of `a`, and differences of two others with `a`,
+/// times a number of f32 each.
 const START_EDGE_PARTS: usize = 9 * EDGE_PARTS;
 /// The same for volumes.
 pub(super) const START_VOLUME_PARTS: usize = 9 * VOLUME_PARTS;
 
-/// Whether weights are those of a point of a triangle: finite, not negative, and their sum not above 1 by more than the rounding of
-/// hits.
+/// Returns true if weights are those of a point of a triangle: finite, not negative, and their sum
+/// not above 1 by more than the rounding of hits.
 #[inline(always)]
 pub(crate) fn are_weights([u, v]: [f32; 2]) -> bool {
     // Comparisons with NaN are false.
     u >= 0.0 && v >= 0.0 && u + v <= 1.0 + ABOVE_ONE
 }
 
-/// Whether u + v exceeds 1 exactly.
+/// Returns true if u + v exceeds 1 exactly.
 #[inline(always)]
 fn is_above_one(u: f64, v: f64) -> bool {
-    // The error of the sum decides where the rounded sum is 1. The greater number comes first: then this is the exact error.
+    // The error of the sum decides where the rounded sum is 1. The greater number comes first: then
+    // this is the exact error.
     let (greater, less) = if u < v { (v, u) } else { (u, v) };
     let sum = u + v;
     (sum > 1.0) | ((sum == 1.0) & (less - (sum - greater) > 0.0))
 }
 
-/// The point with weights u and v of a triangle, rounded to f64, and a bound of the error of its coordinates. There are no branches,
-/// so that a loop of it can be vectorized.
+/// The point with weights u and v of a triangle, rounded to f64, and a bound of the error of its
+/// coordinates. There are no branches, so that a loop of it can be vectorized.
 #[inline(always)]
 pub(crate) fn rounded_start([a, b, c]: [[f64; 3]; 3], [u, v]: [f64; 2]) -> RoundedOrigin {
     let above = is_above_one(u, v);
@@ -87,7 +92,8 @@ impl ExactStart {
         if self.is_on_edge { self.u + self.v } else { 1.0 }
     }
 
-    /// An affine function of a point, given its values at the corners, at this start: exactly, times [`Self::scale`].
+    /// An affine function of a point, given its values at the corners, at this start: exactly,
+    /// times [`Self::scale`].
     pub(super) fn combined<const PARTS: usize, const SUM: usize>(
         &self,
         at: impl Fn([f64; 3]) -> Expansion<PARTS>,
@@ -122,7 +128,8 @@ impl ExactStart {
         })
     }
 
-    /// The exact `volume` of this start minus s times a determinant, times [`Self::scale`]; its sign is exact.
+    /// The exact `volume` of this start minus s times a determinant, times [`Self::scale`]; its
+    /// sign is exact.
     pub(super) fn minus_product(
         &self,
         volume: &Expansion<START_VOLUME_PARTS>,
@@ -142,21 +149,23 @@ impl ExactStart {
         sum.value()
     }
 
-    /// Whether the closed triangle certainly holds the start: it has all corners that have a weight, at the same coordinates.
+    /// Returns true if the closed triangle certainly holds the start: it has all corners that have
+    /// a weight, at the same coordinates.
     pub(crate) fn is_corner_of(&self, corners: [[f32; 3]; 3]) -> bool {
         let others = corners.map(wide);
         let is_weightless = [!self.has_first_corner(), self.u == 0.0, self.v == 0.0];
         (0..3).all(|i| is_weightless[i] || others.contains(&self.corners[i]))
     }
 
-    /// Whether 1 - u - v is above 0 exactly.
+    /// Returns true if 1 - u - v is above 0 exactly.
     fn has_first_corner(&self) -> bool {
         let mut sum = Expansion::<3>::new();
         [1.0, -self.u, -self.v].into_iter().for_each(|x| sum.add(x));
         sum.value() > 0.0
     }
 
-    /// The intersection of the ray along `line` from this start with a triangle of these corners, if it is at t > 0.
+    /// The intersection of the ray along `line` from this start with a triangle of these corners,
+    /// if it is at t > 0.
     pub(crate) fn intersection(&self, line: &Line, corners: [[f32; 3]; 3]) -> Option<Intersection> {
         let origin = RoundedOrigin(line.origin, line.origin_error);
         match decide_start(origin, line.direction, corners.map(wide)) {
@@ -167,7 +176,8 @@ impl ExactStart {
         }
     }
 
-    /// The intersection of the ray with a triangle that [`estimate`] leaves open, if it is at t > 0.
+    /// The intersection of the ray with a triangle that [`estimate`] leaves open, if it is at t >
+    /// 0.
     #[cold]
     #[inline(never)]
     fn decide(
@@ -185,7 +195,8 @@ impl ExactStart {
     fn exact_intersection(&self, direction: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> Intersection {
         let scale = self.scale();
         let (second, third) = (self.edge(direction, c, a).value(), self.edge(direction, a, b).value());
-        // The determinant is the same at every origin, and at a corner the weights of the other two corners are 0.
+        // The determinant is the same at every origin, and at a corner the weights of the other two
+        // corners are 0.
         let mut determinant = Expansion::<EDGE_PARTS>::new();
         determinant.add_edge(a, direction, b, c);
         let determinant = determinant.value();
@@ -232,13 +243,14 @@ pub(crate) fn decide_start_exactly(
     start.decide(direction, corners.map(wide), uncertain)
 }
 
-/// The corners of the triangle in a slot of a leaf, given as its child code; in a tet leaf `slot` is the index of a constrained face of the
-/// object. `None` if there is no such leaf.
+/// The corners of the triangle in a slot of a leaf, given as its child code; in a tet leaf `slot`
+/// is the index of a constrained face of the object. `None` if there is no such leaf.
 #[inline(always)]
 pub(crate) fn start_corners(object: &ObjectView<'_>, leaf: u32, slot: u32) -> Option<[[f32; 3]; 3]> {
     let mut own = None;
-    // Most triangles lie in indexed leaves of f32. The others become one, so that in either case the corners are loaded, not copied: what
-    // was just stored number by number is slow to load as vectors.
+    // Most triangles lie in indexed leaves of f32. The others become one, so that in either case
+    // the corners are loaded, not copied: what was just stored number by number is slow to load as
+    // vectors.
     let (leaf, triangle) = match object.node_base().indexed_leaf(leaf) {
         Some(leaf) => (leaf, slot as usize),
         None => (&*own.insert(leaf_of(other_corners(object, leaf, slot)?)), 0),

@@ -5,7 +5,8 @@ use super::vector::wide;
 use crate::rays::Ray;
 use bth_format::layout::{NONE, WIDTH};
 
-/// A ray as decisions in f64 need it: with the exact point at which it starts, if it starts on a triangle of the object.
+/// A ray as decisions in f64 need it: with the exact point at which it starts, if it starts on a
+/// triangle of the object.
 pub(crate) type ExactRay<'r> = (&'r Ray, Option<&'r StartPoint>);
 
 /// Where a ray of a batch starts, in the space of the object.
@@ -13,8 +14,8 @@ pub(crate) type ExactRay<'r> = (&'r Ray, Option<&'r StartPoint>);
 pub(crate) struct StartPoint {
     /// The point, rounded, and a bound of its error.
     pub(crate) origin: RoundedOrigin,
-    /// Child code of the leaf that holds the triangle; [`NONE`] if the ray starts on no triangle of the
-    /// object, and `origin` is exact.
+    /// Child code of the leaf that holds the triangle; [`NONE`] if the ray starts on no triangle of
+    /// the object, and `origin` is exact.
     pub(crate) leaf: u32,
     /// Slot of the triangle in the leaf.
     pub(crate) slot: u32,
@@ -30,14 +31,15 @@ impl StartPoint {
         StartPoint { origin, leaf: NONE, slot: 0, u: 0.0, v: 0.0 }
     }
 
-    /// Whether the ray starts on a triangle of the object.
+    /// Returns true if the ray starts on a triangle of the object.
     #[inline(always)]
     pub(crate) fn is_on_triangle(&self) -> bool {
         self.leaf != NONE
     }
 }
 
-/// The bit of the triangle on which a ray starts if it is in the leaf with this child code: a ray does not hit it.
+/// The bit of the triangle on which a ray starts if it is in the leaf with this child code: a ray
+/// does not hit it.
 #[inline(always)]
 pub(crate) fn own_triangle(start: Option<&StartPoint>, leaf: u32) -> u32 {
     start.filter(|start| start.leaf == leaf).map_or(0, |start| 1 << (start.slot % WIDTH as u32))

@@ -1,14 +1,16 @@
 //! Whether a closed triangle and a closed axis-aligned box have a point in common, decided exactly.
 //!
-//! Two convex polyhedra are disjoint if and only if a plane separates them that is parallel to a face of one of them or to an edge
-//! of each (Akenine-Möller, "Fast 3D Triangle-Box Overlap Testing", JGT 2001): here to a face of the box, to the triangle, or to
-//! an edge of the triangle and an axis. In the last case the projections along the axis are a triangle and a rectangle, which a
-//! line parallel to an edge of the triangle separates.
+//! Two convex polyhedra are disjoint if and only if a plane separates them that is parallel to a
+//! face of one of them or to an edge of each (Akenine-Möller, "Fast 3D Triangle-Box Overlap
+//! Testing", JGT 2001): here to a face of the box, to the triangle, or to an edge of the triangle
+//! and an axis. In the last case the projections along the axis are a triangle and a rectangle,
+//! which a line parallel to an edge of the triangle separates.
 
 use bth_format::exact::{Expansion, side};
 use std::cmp::Ordering;
 
-/// Whether a closed triangle and a closed box of finite coordinates, with `lower <= upper`, have a point in common.
+/// Returns true if a closed triangle and a closed box of finite coordinates, with `lower <= upper`,
+/// have a point in common.
 pub(crate) fn overlaps(lower: [f32; 3], upper: [f32; 3], corners: [[f32; 3]; 3]) -> bool {
     for k in 0..3 {
         if corners.iter().all(|p| p[k] < lower[k]) || corners.iter().all(|p| p[k] > upper[k]) {
@@ -22,14 +24,15 @@ pub(crate) fn overlaps(lower: [f32; 3], upper: [f32; 3], corners: [[f32; 3]; 3])
     !(0..3).any(|k| is_separated_along(k, bounds, corners)) && !plane_separates(bounds, corners)
 }
 
-/// Whether all corners of a box lie on the same side of the triangle's plane.
+/// Returns true if all corners of a box lie on the same side of the triangle's plane.
 fn plane_separates(bounds: [[f32; 3]; 2], [a, b, c]: [[f32; 3]; 3]) -> bool {
     let corner = |i: usize| [bounds[i & 1][0], bounds[i >> 1 & 1][1], bounds[i >> 2][2]];
     let first = side(a, b, c, corner(0));
     first != Ordering::Equal && (1..8).all(|i| side(a, b, c, corner(i)) == first)
 }
 
-/// Whether a line parallel to an edge of the triangle separates the projections along an axis.
+/// Returns true if a line parallel to an edge of the triangle separates the projections along an
+/// axis.
 fn is_separated_along(axis: usize, bounds: [[f32; 3]; 2], corners: [[f32; 3]; 3]) -> bool {
     let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
     let project = |p: [f32; 3]| [p[i], p[j]];

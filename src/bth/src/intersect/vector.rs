@@ -8,7 +8,8 @@ pub(crate) fn wide(v: [f32; 3]) -> [f64; 3] {
     v.map(f64::from)
 }
 
-/// The lesser of two numbers, neither of which is NaN; this comparison compiles to a single vector instruction.
+/// The lesser of two numbers, neither of which is NaN; this comparison compiles to a single vector
+/// instruction.
 #[inline(always)]
 pub(crate) fn lesser(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
@@ -20,7 +21,7 @@ pub(crate) fn greater(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-/// The greatest |component| of a vector.
+/// The largest |component| of a vector.
 #[inline(always)]
 pub(crate) fn max_norm([x, y, z]: [f64; 3]) -> f64 {
     greater(greater(x.abs(), y.abs()), z.abs())

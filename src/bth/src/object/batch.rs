@@ -1,5 +1,5 @@
-//! Tracing of one object by batches of rays. Coherent rays are traced in packets, the others interleaved through the BVH, or
-//! through tetrahedra if these are the whole object.
+//! Tracing of one object by batches of rays. Coherent rays are traced in packets, the others
+//! interleaved through the BVH, or through tetrahedra if these are the whole object.
 
 use super::scratch::Scratch;
 use super::walked_batch::{RAYS_PER_PART, walk};
@@ -17,7 +17,7 @@ use crate::starts::prepare::PreparedStarts;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 
-/// Least number of rays of a batch; fewer rays are traced one after the other.
+/// Smallest number of rays of a batch; fewer rays are traced one after the other.
 pub(crate) const MIN_BATCH: usize = 4;
 /// Where at most one in this many rays has ended, all are traced: packets without gaps save more.
 const FEW_ENDED: usize = 8;
@@ -51,8 +51,8 @@ impl Kernel for MissKernel<'_> {
     }
 }
 
-/// Stores in `sink` the answers of those rays in object space that hit anything: all of them, or those whose indices are in
-/// `order`.
+/// Stores in `sink` the answers of those rays in object space that hit anything: all of them, or
+/// those whose indices are in `order`.
 pub(crate) fn trace_batch(
     object: &ObjectView<'_>,
     rays: &[Ray],
@@ -63,7 +63,8 @@ pub(crate) fn trace_batch(
     if object.header.root == NONE {
         return;
     }
-    // Packets and interleaved rays are not compiled for scalar code, where they would be the largest part of the library.
+    // Packets and interleaved rays are not compiled for scalar code, where they would be the
+    // largest part of the library.
     if Isa::chosen() == Isa::Scalar {
         return one_by_one(object, rays, order, sink);
     }
@@ -106,8 +107,8 @@ fn trace_in_tets(object: &ObjectView<'_>, rays: &[Ray], scratch: &mut Scratch, s
     scratch.walks = walks;
 }
 
-/// Traces coherent rays in packets and returns their number. If it is not 0, the indices of the other rays are stored in
-/// `scratch.packets.rest`.
+/// Traces coherent rays in packets and returns their number. If it is not 0, the indices of the
+/// other rays are stored in `scratch.packets.rest`.
 fn in_packets(object: &ObjectView<'_>, rays: &[Ray], scratch: &mut Scratch, sink: &mut Sink<'_>) -> usize {
     let (isa, least, scratch) = (Isa::chosen(), MinimumUse::of(object), &mut scratch.packets);
     with_batch_goal!(isa, sink.goal(), goal => {
@@ -129,7 +130,8 @@ fn through_bvh(
     });
 }
 
-/// Implements [`trace_batch`] in scalar code, one ray after the other. Without vectors no batch has starts.
+/// Implements [`trace_batch`] in scalar code, one ray after the other. Without vectors no batch has
+/// starts.
 fn one_by_one(object: &ObjectView<'_>, rays: &[Ray], order: Option<&[u32]>, sink: &mut Sink<'_>) {
     let is_any = sink.goal().is_any;
     let trace = |index: usize, sink: &mut Sink<'_>| {
@@ -145,8 +147,8 @@ fn one_by_one(object: &ObjectView<'_>, rays: &[Ray], order: Option<&[u32]>, sink
     }
 }
 
-/// Stores the answers of rays that start on triangles of an object, in the instance with the given index: they become rays of
-/// the object, with the exact points at which they start.
+/// Stores the answers of rays that start on triangles of an object, in the instance with the given
+/// index: they become rays of the object, with the exact points at which they start.
 pub(crate) fn trace_starts(
     object: &ObjectView<'_>,
     rays: &[StartRay],
@@ -161,7 +163,8 @@ pub(crate) fn trace_starts(
     let sink =
         |answers, points| Sink::new(object.triangle_ids, answers, instance).with_starts(Starts(points));
     if answers.goal().is_any && ended * FEW_ENDED > rays.len() {
-        // Most short rays go in packets, also those that are left. No ray is before its place among those that are left.
+        // Most short rays go in packets, also those that are left. No ray is before its place among
+        // those that are left.
         for (i, &ray) in order.iter().enumerate() {
             (object_rays[i], points[i]) = (object_rays[ray as usize], points[ray as usize]);
         }

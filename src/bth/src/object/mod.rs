@@ -1,4 +1,5 @@
-//! Tracing of one object by rays in object space, through its BVH and its tetrahedra: by one ray or by a batch.
+//! Tracing of one object by rays in object space, through its BVH and its tetrahedra: by one ray or
+//! by a batch.
 
 mod batch;
 mod scratch;

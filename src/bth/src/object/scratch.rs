@@ -28,7 +28,8 @@ pub(crate) fn with_scratch<R>(work: impl FnOnce(&mut Scratch) -> R) -> R {
     thread_local! {
         static SCRATCH: Cell<Option<Box<Scratch>>> = const { Cell::new(None) };
     }
-    // The memory is taken out of the cell while it is in use, so that after a panic the next batch begins with new memory.
+    // The memory is taken out of the cell while it is in use, so that after a panic the next batch
+    // begins with new memory.
     SCRATCH.with(|cell| {
         let mut scratch = cell.take().unwrap_or_else(new_scratch);
         let result = work(&mut scratch);

@@ -15,8 +15,8 @@ use bth_format::layout::NONE;
 use bth_format::object::{ObjectBounds, ObjectView};
 use glam::Vec4;
 
-/// A ray in the space of an object, as a kernel takes it. There are no closures, which might be compiled without the instruction set of the
-/// kernel.
+/// A ray in the space of an object, as a kernel takes it. There are no closures, which might be
+/// compiled without the instruction set of the kernel.
 pub(crate) trait SingleRay {
     /// What is computed of the ray at first.
     type Line;
@@ -100,7 +100,8 @@ pub(crate) fn trace<G: Goal, C: Count, R: SingleRay>(
     count: &mut C,
     hit: &mut Hit,
 ) {
-    // The kernel is passed by reference, because a copy of fields that were just written would stall.
+    // The kernel is passed by reference, because a copy of fields that were just written would
+    // stall.
     let kernel = &mut SingleKernel { object, goal, ray, instance, count, hit };
     // Where nothing but the kernel is called, the registers need not be saved a second time.
     match Isa::already_chosen() {

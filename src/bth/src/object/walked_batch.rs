@@ -1,4 +1,5 @@
-//! Walks of the rays of a batch through tetrahedra, before those that remain go through the BVH. They are compiled once for all queries.
+//! Walks of the rays of a batch through tetrahedra, before those that remain go through the BVH.
+//! They are compiled once for all queries.
 
 use crate::bvh::nodes::sole_tet_leaf;
 use crate::query::{EitherGoal, EitherQuery};
@@ -10,11 +11,12 @@ use crate::tets::walks::{WalkLists, WalkState};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 
-/// Greatest number of rays that walk through tetrahedra together. It is large, because lanes are idle at the end of each part.
+/// Largest number of rays that walk through tetrahedra together. It is large, because lanes are
+/// idle at the end of each part.
 pub(super) const RAYS_PER_PART: usize = 2048;
 
-/// The rays of a batch after their walks, and memory of the walks, which is reused from one batch to the next. Lists with one element
-/// per ray say so.
+/// The rays of a batch after their walks, and memory of the walks, which is reused from one batch
+/// to the next. Lists with one element per ray say so.
 #[derive(Debug, Default)]
 pub(super) struct WalkScratch {
     /// Indices of the rays that were not walked.
@@ -48,7 +50,8 @@ pub(super) fn walk(object: &ObjectView<'_>, rays: &[Ray], goal: EitherGoal, scra
     if let Some(records) = records {
         let of = (rays, sole_tet_leaf(object));
         let mut batch = WalkBatch::new(object, records, of, queries, states, lists);
-        // Elsewhere no ray is walked here, and `states` stay `NotWalked`: rays are faster through the BVH.
+        // Elsewhere no ray is walked here, and `states` stay `NotWalked`: rays are faster through
+        // the BVH.
         if Isa::chosen().has_long_vectors() {
             Isa::chosen().run(&mut batch);
         }

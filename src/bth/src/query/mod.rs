@@ -1,5 +1,5 @@
-//! Queries of rays: what they look for ([`Goal`]), what one ray has found so far ([`RayQuery`]), where the answers of a batch
-//! go ([`sink`]), and the statistics of traversals ([`Count`]).
+//! Queries of rays: what they look for ([`Goal`]), what one ray has found so far ([`RayQuery`]),
+//! where the answers of a batch go ([`sink`]), and the statistics of traversals ([`Count`]).
 
 pub(crate) mod sink;
 #[cfg(test)]
@@ -10,17 +10,20 @@ use crate::intersect::line::widened;
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use bth_format::layout::NONE;
 
-/// What a query looks for: the nearest hit, or any. Kernels ask a goal for it at run time. Goals of no size have kernels of
-/// their own; walks through tetrahedra and batches with vectors of 128 bits serve both goals by [`EitherGoal`].
+/// What a query looks for: the nearest hit, or any. Kernels ask a goal for it at run time. Goals of
+/// no size have kernels of their own; walks through tetrahedra and batches with vectors of 128 bits
+/// serve both goals by [`EitherGoal`].
 pub(crate) trait Goal: Copy {
-    /// Whether kernels of batches with this goal are compiled for vectors of 128 bits, and for longer ones.
+    /// True if kernels of batches with this goal are compiled for vectors of 128 bits, and for
+    /// longer ones.
     const QUADS: bool = false;
     const LONG_VECTORS: bool = true;
     /// Returns true if a query ends at the first hit found.
     fn is_any(self) -> bool;
 }
 
-/// The nearest hit: the least t, and among equal t the least triangle id. This order does not depend on the traversal.
+/// The nearest hit: the smallest t, and among equal t the smallest triangle id. This order does not
+/// depend on the traversal.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NearestHit;
 
@@ -57,8 +60,8 @@ impl Goal for EitherGoal {
     }
 }
 
-/// Evaluates an expression with the goal of a batch as the type for which kernels of batches are compiled. With vectors of 128
-/// bits, with which kernels are long, one kernel serves both goals.
+/// Evaluates an expression with the goal of a batch as the type for which kernels of batches are
+/// compiled. With vectors of 128 bits, with which kernels are long, one kernel serves both goals.
 macro_rules! with_batch_goal {
     ($isa:expr, $either:expr, $goal:ident => $do:expr) => {
         match ($isa.has_long_vectors(), $either) {
@@ -76,8 +79,9 @@ macro_rules! with_batch_goal {
 }
 pub(crate) use with_batch_goal;
 
-/// A triangle, by its id or by its index in the leaf order of an object. Reading an id is most often a cache miss, and the id
-/// is not needed until the query ends: traversals prefetch it when they find the triangle, and the query reads it at its end.
+/// A triangle, by its id or by its index in the leaf order of an object. Reading an id is most
+/// often a cache miss, and the id is not needed until the query ends: traversals prefetch it when
+/// they find the triangle, and the query reads it at its end.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TriangleRef<'a> {
     /// The id, or the index in `ids`.
@@ -104,12 +108,14 @@ impl<'a> TriangleRef<'a> {
     }
 }
 
-/// State of a query over one ray: its range of t and the best hit so far. Values of t are in units of the ray's direction.
+/// State of a query over one ray: its range of t and the best hit so far. Values of t are in units
+/// of the ray's direction.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RayQuery<G> {
     tmin: f32,
     tmax: f32,
-    /// The best triangle so far, by its id or by its index in leaf order ([`TriangleRef`]); `NONE` if nothing is hit.
+    /// The best triangle so far, by its id or by its index in leaf order ([`TriangleRef`]); `NONE`
+    /// if nothing is hit.
     triangle: u32,
     is_index: bool,
     goal: G,
@@ -121,8 +127,8 @@ pub(crate) struct RayQuery<G> {
 pub(crate) type EitherQuery = RayQuery<EitherGoal>;
 
 impl EitherQuery {
-    /// For any hits: offers a certain intersection of which only bounds of t are known, which include all roundings. Returns
-    /// true if the query is complete.
+    /// For any hits: offers a certain intersection of which only bounds of t are known, which
+    /// include all roundings. Returns true if the query is complete.
     pub(crate) fn offer_bounds(&mut self, t: (f64, f64)) -> bool {
         let finite = f64::from(f32::MIN) <= t.0 && t.1 <= f64::from(f32::MAX);
         if finite && f64::from(self.tmin) <= t.0 && t.1 <= f64::from(self.tmax) {
@@ -163,8 +169,8 @@ impl<G: Goal> RayQuery<G> {
         self.goal.is_any() && self.triangle != NONE
     }
 
-    /// The result of a traversal that has ended; for any hit [`Hit::SOME`]. `ids` are the ids of the object's triangles in leaf
-    /// order, and `instance` is reported with a hit.
+    /// The result of a traversal that has ended; for any hit [`Hit::SOME`]. `ids` are the ids of
+    /// the object's triangles in leaf order, and `instance` is reported with a hit.
     pub(crate) fn answer(&self, ids: &[u32], instance: u32) -> Hit {
         if self.triangle == NONE {
             return Hit::MISS;
@@ -190,7 +196,8 @@ impl<G: Goal> RayQuery<G> {
         self.is_complete()
     }
 
-    /// Notes that a triangle is certainly hit within the ray's range, which completes an any-hit query.
+    /// Notes that a triangle is certainly hit within the ray's range, which completes an any-hit
+    /// query.
     pub(crate) fn accept(&mut self) {
         if self.goal.is_any() {
             (self.triangle, self.is_index) = (0, false);
@@ -203,8 +210,8 @@ impl<G: Goal> RayQuery<G> {
         widened(self.best.t)
     }
 
-    /// Returns true if an intersection with a t between two values can change the result. It seldom can for the triangle on
-    /// which a ray starts; exact arithmetic is then avoided.
+    /// Returns true if an intersection with a t between two values can change the result. It seldom
+    /// can for the triangle on which a ray starts; exact arithmetic is then avoided.
     pub(crate) fn may_matter(&self, t: [f64; 2]) -> bool {
         may_be_in_range(t, self.tmin, self.limit())
     }
@@ -228,8 +235,9 @@ impl<G: Goal> RayQuery<G> {
     }
 }
 
-/// The new hit of a ray in a scene, with its t in world space, if it is better than `best`: a lesser t, or an equal t and a
-/// lesser instance. `None` if it is not better, or if its t in world space lies outside the ray's range.
+/// The new hit of a ray in a scene, with its t in world space, if it is better than `best`: a
+/// lesser t, or an equal t and a lesser instance. `None` if it is not better, or if its t in world
+/// space lies outside the ray's range.
 pub(crate) fn better(ray: &Ray, best: &Hit, hit: &Hit, t_scale: f32) -> Option<Hit> {
     if !hit.is_hit() {
         return None;
@@ -246,7 +254,8 @@ pub(crate) fn may_be_in_range(t: [f64; 2], tmin: f32, limit: f64) -> bool {
     t[0] <= limit && (t[1] as f32).next_up() >= tmin
 }
 
-/// Returns true if a t that is already rounded for the answer lies in the ray's range and is finite.
+/// Returns true if a t that is already rounded for the answer lies in the ray's range and is
+/// finite.
 #[inline(always)]
 pub(crate) fn in_range(t: f32, tmin: f32, tmax: f32) -> bool {
     tmin <= t && t <= tmax && t.is_finite()
@@ -279,7 +288,8 @@ pub struct Steps {
     pub triangles: u32,
     /// Tetrahedra walked through.
     pub tets: u32,
-    /// Walks through tetrahedra that were repeated exactly, because the ray passes through a vertex, an edge or a face plane.
+    /// Walks through tetrahedra that were repeated exactly, because the ray passes through a
+    /// vertex, an edge or a face plane.
     pub floods: u32,
 }
 

@@ -1,5 +1,5 @@
-//! Destination of the answers of a batch: one type for models and for scenes, and for both goals, so that every kernel is
-//! compiled once for all.
+//! Destination of the answers of a batch: one type for models and for scenes, and for both goals,
+//! so that every kernel is compiled once for all.
 
 use super::{EitherGoal, Goal, RayQuery, better};
 use crate::intersect::exact_lanes::Intersections;
@@ -15,7 +15,8 @@ pub(crate) struct Visit {
     pub(crate) instance: u32,
 }
 
-/// Maps the rays of a batch in object space to the rays of the scene's batch from which they were transformed.
+/// Maps the rays of a batch in object space to the rays of the scene's batch from which they were
+/// transformed.
 #[derive(Clone, Copy)]
 pub(crate) struct SceneRays<'a> {
     /// All rays of the scene's batch, in world space.
@@ -58,8 +59,8 @@ impl Answers<'_> {
         }
     }
 
-    /// Merges a hit in an object into the answer of the ray with this index in the scene. `t_scale` is the factor from t in
-    /// object space to t in world space.
+    /// Merges a hit in an object into the answer of the ray with this index in the scene. `t_scale`
+    /// is the factor from t in object space to t in world space.
     pub(crate) fn merge(&mut self, index: usize, hit: &Hit, ray: &Ray, t_scale: f32) {
         match self {
             Answers::Nearest(hits) => {
@@ -79,7 +80,8 @@ impl Answers<'_> {
     }
 }
 
-/// Stores the answers of the rays of a batch. Rays for which nothing is reported keep their initial answer, a miss.
+/// Stores the answers of the rays of a batch. Rays for which nothing is reported keep their initial
+/// answer, a miss.
 pub(crate) struct Sink<'a> {
     /// Ids of the object's triangles, in leaf order.
     ids: &'a [u32],
@@ -100,7 +102,8 @@ impl<'a> Sink<'a> {
         Sink { ids, answers, instance, scene: None, first: 0, starts: Starts::NONE }
     }
 
-    /// Merges the answer of each visit into the answer of its ray; `answers` are those of the scene's batch.
+    /// Merges the answer of each visit into the answer of its ray; `answers` are those of the
+    /// scene's batch.
     pub(crate) fn of_scene(ids: &'a [u32], answers: Answers<'a>, scene: SceneRays<'a>) -> Self {
         Sink { scene: Some(scene), ..Sink::new(ids, answers, 0) }
     }
@@ -163,16 +166,17 @@ impl<'a> Sink<'a> {
         }
     }
 
-    /// Stores the nearest hit of a ray; t, u and v are already rounded. They are separate parameters, because an aggregate
-    /// would be passed through memory and stall the load that follows.
+    /// Stores the nearest hit of a ray; t, u and v are already rounded. They are separate
+    /// parameters, because an aggregate would be passed through memory and stall the load that
+    /// follows.
     #[inline(always)]
     pub(crate) fn hit(&mut self, ray: usize, triangle: u32, t: f32, u: f32, v: f32) {
         let primitive = PrimitiveRef { instance: self.instance_of(ray), triangle };
         self.answer(ray, Hit { t, u, v, primitive });
     }
 
-    /// Stores the hits of up to sixteen consecutive rays from `ray` on. Bit i of `lanes` is set if ray i hits; nothing may have
-    /// been reported for these rays before.
+    /// Stores the hits of up to sixteen consecutive rays from `ray` on. Bit i of `lanes` is set if
+    /// ray i hits; nothing may have been reported for these rays before.
     #[inline(always)]
     pub(crate) fn hits<S: Simd>(&mut self, s: S, ray: usize, mut lanes: u32, found: &Intersections) {
         if self.scene.is_none()

@@ -3,7 +3,8 @@
 use super::*;
 use bth_random::Rng;
 
-/// One of a few values, so that equal ones are frequent, some of which lie at the ends of ranges or are no numbers.
+/// One of a few values, so that equal ones are frequent, some of which lie at the ends of ranges or
+/// are no numbers.
 fn value(rng: &mut Rng) -> f32 {
     const VALUES: [f32; 10] =
         [f32::NEG_INFINITY, -1.0, -0.0, 0.5, 1.0, 1.000_000_1, 2.0, f32::MAX, f32::INFINITY, f32::NAN];
@@ -16,8 +17,8 @@ fn state<G: Goal>(query: &RayQuery<G>, ids: &[u32]) -> (String, u64, Option<u64>
     (format!("{:?}", query.answer(ids, 7)), query.limit().to_bits(), found)
 }
 
-/// Offers the same intersections to a query, to one that is converted there and back after each of them, and to one of either
-/// goal.
+/// Offers the same intersections to a query, to one that is converted there and back after each of
+/// them, and to one of either goal.
 fn converted_queries_are_the_same<G: Goal>(goal: G, rng: &mut Rng) -> bool {
     let ids = [5, 3, 9, 1, 0, 2];
     let ray = Ray { origin: [0.0; 3], tmin: value(rng), direction: [1.0; 3], tmax: value(rng) };

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// Whether this machine has the features of an instruction set, which is found out once.
+/// True if this machine has the features of an instruction set, which is found out once.
 pub(in crate::simd) struct Detected {
     find: fn() -> bool,
     /// [`Self::UNKNOWN`], [`Self::MISSING`] or [`Self::PRESENT`].

@@ -1,6 +1,7 @@
 //! Vectors of four f64, for arithmetic on one pair of a ray and a triangle.
 
-/// Operations on vectors of four f64. As for [`Simd`](super::Simd), an implementation is a token that proves the instructions.
+/// Operations on vectors of four f64. As for [`Simd`](super::Simd), an implementation is a token
+/// that proves the instructions.
 pub trait Doubles: Copy + 'static {
     /// Four f64.
     type V: Copy;

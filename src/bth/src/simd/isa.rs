@@ -1,11 +1,13 @@
-//! Choice of the instruction set of the kernels: detected once, or set by environment variable or call.
+//! Choice of the instruction set of the kernels: detected once, or set by environment variable or
+//! call.
 
 use super::{Kernel, Simd};
 use std::fmt;
 use std::str::FromStr;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// Environment variable with the name of the instruction set to use in place of the best: a name of [`Isa::ALL`].
+/// Environment variable with the name of the instruction set to use instead of the best: a name of
+/// [`Isa::ALL`].
 const ISA_VARIABLE: &str = "BTH_ISA";
 
 /// An instruction set for which kernels are compiled. Answers have the same bits on all of them.
@@ -83,9 +85,10 @@ const NEON: u8 = Isa::Neon as u8 + 1;
 const SIMD128: u8 = Isa::Simd128 as u8 + 1;
 const AVX2: u8 = Isa::Avx2 as u8 + 1;
 
-/// Evaluates the expression with the token of an instruction set if the kernel type is compiled for its vectors, it is compiled
-/// for this target, and this machine has it. `$detect` is the function that returns the token: `detect` or, where it is known
-/// which instruction sets there are, `found`.
+/// Evaluates the expression with the token of an instruction set if the kernel type is compiled for
+/// its vectors, it is compiled for this target, and this machine has it. `$detect` is the function
+/// that returns the token: `detect` or, where it is known which instruction sets there are,
+/// `found`.
 macro_rules! with_vectors {
     ($isa:expr, $kernel:ident, $detect:ident, $simd:ident => $do:expr) => {
         match $isa {
@@ -129,7 +132,8 @@ fn run_scalar<K: Kernel>(kernel: K) -> K::Output {
     if K::SCALAR { kernel.run(super::Scalar) } else { panic!("the kernel is not compiled for scalar code") }
 }
 
-/// A module of WebAssembly for browsers that is compiled for SIMD128 has no scalar kernels, which would be half of its size.
+/// A module of WebAssembly for browsers that is compiled for SIMD128 has no scalar kernels, which
+/// would be half of its size.
 #[cfg(all(target_arch = "wasm32", target_os = "unknown", target_feature = "simd128"))]
 fn run_scalar<K: Kernel>(kernel: K) -> K::Output {
     if K::QUADS {
@@ -140,7 +144,7 @@ fn run_scalar<K: Kernel>(kernel: K) -> K::Output {
 }
 
 impl Isa {
-    /// All instruction sets, from the least to the most capable.
+    /// All instruction sets, from the smallest to the most capable.
     pub const ALL: [Isa; 6] = [Isa::Scalar, Isa::Sse4, Isa::Neon, Isa::Simd128, Isa::Avx2, Isa::Avx512];
 
     /// Returns true if this machine has the instruction set.
@@ -184,8 +188,8 @@ impl Isa {
         Ok(())
     }
 
-    /// The instruction set that tracing uses: the last one set by [`Self::choose`], else the one named by the environment
-    /// variable `BTH_ISA` if this machine has it, else the best.
+    /// The instruction set that tracing uses: the last one set by [`Self::choose`], else the one
+    /// named by the environment variable `BTH_ISA` if this machine has it, else the best.
     #[inline]
     pub fn chosen() -> Isa {
         Isa::already_chosen().unwrap_or_else(Isa::choose_first)
@@ -219,8 +223,8 @@ impl Isa {
         CHOSEN_ISA.store(self as u8 + 1, Ordering::Relaxed);
     }
 
-    /// The instruction set named by the environment variable `BTH_ISA`; None if it is not set or empty. Programs report the
-    /// error at their start; the library ignores an invalid value.
+    /// The instruction set named by the environment variable `BTH_ISA`; None if it is not set or
+    /// empty. Programs report the error at their start; the library ignores an invalid value.
     ///
     /// # Errors
     /// [`IsaError`] if the value names no instruction set, or one that this machine does not have.
@@ -243,8 +247,8 @@ impl Isa {
         run_scalar(kernel)
     }
 
-    /// As [`Self::run`], for the chosen instruction set, which is known to be available. There is then no call but that of the
-    /// kernel, so that callers save no registers.
+    /// As [`Self::run`], for the chosen instruction set, which is known to be available. There is
+    /// then no call but that of the kernel, so that callers save no registers.
     #[inline(always)]
     pub(crate) fn run_found<K: Kernel>(self, kernel: K) -> K::Output {
         with_vectors!(self, K, found, simd => return simd.run(kernel));

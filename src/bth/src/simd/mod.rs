@@ -1,15 +1,18 @@
 //! Vectors of sixteen f32 or u32 lanes on any machine: the trait over which kernels are generic.
 //!
-//! An implementation is a token that exists only on machines that have its instructions, so its methods are safe to call, and
-//! all `unsafe` code of the kernels is in this folder. All methods, and all functions that are generic over [`Simd`], must be
-//! `#[inline(always)]`, so that they are compiled inside the one function per instruction set that enables its features
-//! ([`Isa::run`]). A closure, or a library function that takes one (`array::map`), is compiled as a function of its own,
-//! without these features, and must not use lanes.
+//! An implementation is a token that exists only on machines that have its instructions, so its
+//! methods are safe to call, and all `unsafe` code of the kernels is in this folder. All methods,
+//! and all functions that are generic over [`Simd`], must be `#[inline(always)]`, so that they are
+//! compiled inside the one function per instruction set that enables its features ([`Isa::run`]). A
+//! closure, or a library function that takes one (`array::map`), is compiled as a function of its
+//! own, without these features, and must not use lanes.
 //!
-//! The module is public for the compiler alone, and hidden: nothing of it but [`Isa`] is part of the library's interface.
+//! The module is public for the compiler alone, and hidden: nothing of it but [`Isa`] is part of
+//! the library's interface.
 //!
-//! The f32 arithmetic of kernels only *excludes* nodes and triangles; hits are decided in f64 (`crate::intersect::exact`).
-//! Answers therefore do not depend on whether `fma` rounds once or twice.
+//! The f32 arithmetic of kernels only *excludes* nodes and triangles; hits are decided in f64
+//! (`crate::intersect::exact`). Answers therefore do not depend on whether `fma` rounds once or
+//! twice.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -41,8 +44,8 @@ pub const LANES: usize = 16;
 /// A function that is generic over the instruction set, with its arguments.
 pub trait Kernel: Sized {
     type Output;
-    /// Whether the kernel is compiled for scalar code, for vectors of 128 bits, and for longer ones. Large kernels that are no
-    /// faster than other code are not.
+    /// True if the kernel is compiled for scalar code, for vectors of 128 bits, and for longer
+    /// ones. Large kernels that are no faster than other code are not.
     const SCALAR: bool = true;
     const QUADS: bool = true;
     const LONG_VECTORS: bool = true;
@@ -50,7 +53,8 @@ pub trait Kernel: Sized {
     fn run<S: Simd>(self, simd: S) -> Self::Output;
 }
 
-/// A part of kernels that is compiled once per instruction set, with its arguments ([`Simd::call`]).
+/// A part of kernels that is compiled once per instruction set, with its arguments
+/// ([`Simd::call`]).
 pub trait Part<S> {
     type Output;
     /// Must be `#[inline(always)]`.
@@ -64,7 +68,8 @@ pub trait Part<S> {
     {
         if S::INLINES_PARTS { self.run(simd) } else { simd.call(self) }
     }
-    /// As [`Self::inline_or_call`], for parts that several kernels have in common: see [`Simd::INLINES_SHARED_PARTS`].
+    /// As [`Self::inline_or_call`], for parts that several kernels have in common: see
+    /// [`Simd::INLINES_SHARED_PARTS`].
     #[inline(always)]
     fn inline_or_share(self, simd: S) -> Self::Output
     where
@@ -75,9 +80,9 @@ pub trait Part<S> {
     }
 }
 
-/// Operations on vectors that treat each lane alone. A vector has sixteen lanes or, in a [piece](Simd::Piece), some of the sixteen;
-/// arrays always have sixteen elements, of which a piece reads and writes its own. Where masks are given as bits, bit i stands for lane
-/// i of sixteen.
+/// Operations on vectors that treat each lane alone. A vector has sixteen lanes or, in a
+/// [piece](Simd::Piece), some of the sixteen; arrays always have sixteen elements, of which a piece
+/// reads and writes its own. Where masks are given as bits, bit i stands for lane i of sixteen.
 pub trait Lanewise: Copy + 'static {
     /// f32 lanes.
     type F: Copy;
@@ -163,21 +168,25 @@ pub trait Lanewise: Copy + 'static {
 
 /// Operations on vectors of sixteen lanes across lanes and with memory.
 pub trait Simd: Lanewise {
-    /// Whether the lanes are vector registers. Kernels that are faster only with vectors are not compiled without them.
+    /// True if the lanes are vector registers. Kernels that are faster only with vectors are not
+    /// compiled without them.
     const HAS_VECTORS: bool = true;
-    /// Whether kernels contain their larger parts. Otherwise they call them ([`Self::call`]), because unrolled in every kernel, with
-    /// several registers for each vector, these would be the largest part of the library.
+    /// True if kernels contain their larger parts. Otherwise they call them ([`Self::call`]),
+    /// because unrolled in every kernel, with several registers for each vector, these would be the
+    /// largest part of the library.
     const INLINES_PARTS: bool = true;
-    /// Whether kernels contain parts that other kernels contain, too.
+    /// True if kernels contain parts that other kernels contain, too.
     const INLINES_SHARED_PARTS: bool = Self::INLINES_PARTS;
-    /// The lanes of one register, where a vector fills several. Parts that are called treat one piece after the other where they can:
-    /// all their variables are then in registers, and pieces without work are left out.
+    /// The lanes of one register, where a vector fills several. Parts that are called treat one
+    /// piece after the other where they can: all their variables are then in registers, and pieces
+    /// without work are skipped.
     type Piece: Lanewise;
     /// Vectors of four f64.
     type Doubles: Doubles;
     fn doubles(self) -> Self::Doubles;
-    /// The greatest of the first three elements, none of which is negative, in all four. It is compared by its bits, which takes less time
-    /// and finds NaN, which is greater than all numbers.
+    /// The largest of the first three elements, none of which is negative, in all four. It is
+    /// compared by its bits, which takes less time and finds NaN, which is greater than all
+    /// numbers.
     #[inline(always)]
     fn greatest_of_three(self, a: [f32; 4]) -> [f32; 4] {
         scalar::greatest_of_three(a)
@@ -189,7 +198,8 @@ pub trait Simd: Lanewise {
     fn pick(piece: Self::Piece, a: &Self::F) -> <Self::Piece as Lanewise>::F;
     /// Replaces the lanes of a piece.
     fn put(piece: Self::Piece, to: &mut Self::F, a: <Self::Piece as Lanewise>::F);
-    /// Transposes sixteen vectors of a piece to rows, and stores the row of each lane as row `line` of its record.
+    /// Transposes sixteen vectors of a piece to rows, and stores the row of each lane as row `line`
+    /// of its record.
     fn store_transposed<const N: usize>(
         piece: Self::Piece,
         columns: [<Self::Piece as Lanewise>::F; LANES],
@@ -201,12 +211,12 @@ pub trait Simd: Lanewise {
     /// As [`Self::pick`].
     fn pick_mask(piece: Self::Piece, m: &Self::M) -> <Self::Piece as Lanewise>::M;
 
-    /// Runs a part of a kernel as a function of its own, which all kernels of the instruction set share: for parts that many
-    /// kernels need and that run long beside a call.
+    /// Runs a part of a kernel as a function of its own, which all kernels of the instruction set
+    /// share: for parts that many kernels need and that run long beside a call.
     fn call<P: Part<Self>>(self, part: P) -> P::Output;
     /// Lane `at[i] % 16` of the table.
     fn lookup(self, table: Self::F, at: Self::U) -> Self::F;
-    /// The least of all lanes, none of which may be NaN.
+    /// The smallest of all lanes, none of which may be NaN.
     fn least(self, a: Self::F) -> f32;
     /// Loads rows of three: lane i of vector k is element k of row `row[i]`.
     ///
@@ -223,8 +233,8 @@ pub trait Simd: Lanewise {
         }
         [self.load(&columns[0]), self.load(&columns[1]), self.load(&columns[2])]
     }
-    /// Loads rows of four and transposes them: lane i of vector k is element k of row `row[i]`, and is undefined where the mask
-    /// is clear. Much faster than four gathers on all instruction sets.
+    /// Loads rows of four and transposes them: lane i of vector k is element k of row `row[i]`, and
+    /// is undefined where the mask is clear. Much faster than four gathers on all instruction sets.
     ///
     /// # Panics
     /// If the index of a row lies outside of `from` where the mask is set.
@@ -244,14 +254,15 @@ pub trait Simd: Lanewise {
             to[i] = [words[0][i], words[1][i], words[2][i], words[3][i], words[4][i]];
         }
     }
-    /// Assigns the elements of `from` in order to the lanes whose mask is set, from `from[0]` on; the other lanes are those of
-    /// `a`.
+    /// Assigns the elements of `from` in order to the lanes whose mask is set, from `from[0]` on;
+    /// the other lanes are those of `a`.
     fn expand(self, a: Self::F, m: Self::M, from: &[f32; LANES]) -> Self::F;
     /// As [`Self::lookup`].
     fn lookup_u(self, table: Self::U, at: Self::U) -> Self::U;
-    /// Whether [`Self::lookup_f64`] compiles to a few instructions.
+    /// True if [`Self::lookup_f64`] compiles to a few instructions.
     const HAS_FAST_F64_LOOKUP: bool = false;
-    /// Elements `at[i] % 16` of the table. With `FIRST_HALF`, elements whose index is not below eight are undefined.
+    /// Elements `at[i] % 16` of the table. With `FIRST_HALF`, elements whose index is not below
+    /// eight are undefined.
     #[inline(always)]
     fn lookup_f64<const FIRST_HALF: bool>(self, table: &[f64; LANES], at: Self::U) -> [f64; LANES] {
         let (mut index, mut out) = ([0; LANES], [0.0; LANES]);
@@ -266,21 +277,24 @@ pub trait Simd: Lanewise {
     /// # Panics
     /// If an index lies outside of `from` where the mask is set.
     fn gather_u(self, m: Self::M, from: &[u32], at: Self::U) -> Self::U;
-    /// First and second words of elements of a slice, undefined where the mask is clear. AVX-512 loads each pair at once.
+    /// First and second words of elements of a slice, undefined where the mask is clear. AVX-512
+    /// loads each pair at once.
     ///
     /// # Panics
     /// As [`Self::gather_u`].
     fn gather_pair(self, m: Self::M, from: &[[u32; 2]], at: Self::U) -> (Self::U, Self::U);
     /// As [`Self::expand`].
     fn expand_u(self, a: Self::U, m: Self::M, from: &[u32; LANES]) -> Self::U;
-    /// Whether [`Self::compress`] compiles to a few instructions.
+    /// True if [`Self::compress`] compiles to a few instructions.
     const HAS_FAST_COMPRESS: bool = false;
-    /// Stores the lanes whose bit is set, in order, from `to[0]` on, and returns their number. The rest of `to` is undefined.
+    /// Stores the lanes whose bit is set, in order, from `to[0]` on, and returns their number. The
+    /// rest of `to` is undefined.
     fn compress(self, bits: u32, a: Self::U, to: &mut [u32; LANES]) -> usize;
     /// As [`Self::compress`].
     fn compress_f(self, bits: u32, a: Self::F, to: &mut [f32; LANES]) -> usize;
-    /// As [`Self::compress`], sorted by descending keys. The four lowest bits of keys are not compared; in the stored keys they
-    /// hold the lane. Negative keys are stored in unspecified order.
+    /// As [`Self::compress`], sorted by descending keys. The four lowest bits of keys are not
+    /// compared; in the stored keys they hold the lane. Negative keys are stored in unspecified
+    /// order.
     fn compress_far_to_near(
         self,
         bits: u32,
@@ -289,8 +303,8 @@ pub trait Simd: Lanewise {
         to: &mut [u32; LANES],
         keys: &mut [f32; LANES],
     ) -> usize;
-    /// As [`Self::compress_far_to_near`]; also returns the lane of the last entry, the nearest, which is undefined if no bit is
-    /// set.
+    /// As [`Self::compress_far_to_near`]; also returns the lane of the last entry, the nearest,
+    /// which is undefined if no bit is set.
     #[inline(always)]
     fn sort_far_to_near(
         self,
@@ -303,11 +317,12 @@ pub trait Simd: Lanewise {
         let count = self.compress_far_to_near(bits, key, a, to, keys);
         (count, keys[count.wrapping_sub(1) % LANES].to_bits() as usize % LANES)
     }
-    /// Removes the entries whose key exceeds the limit from `codes` and `keys`, keeping the order, and returns how many remain.
+    /// Removes the entries whose key exceeds the limit from `codes` and `keys`, keeping the order,
+    /// and returns how many remain.
     fn keep_up_to(self, codes: &mut [u32], keys: &mut [f32], limit: f32) -> usize;
     /// Transposes: lane k of row i becomes lane i of row k.
     fn transpose(self, rows: [Self::F; LANES]) -> [Self::F; LANES];
-    /// Lane i of the result is the least lane of row i; no lane may be NaN.
+    /// Lane i of the result is the smallest lane of row i; no lane may be NaN.
     #[inline(always)]
     fn least_of_each(self, rows: [Self::F; LANES]) -> Self::F {
         let mut columns = self.transpose(rows);
@@ -441,8 +456,9 @@ macro_rules! avx_doubles {
 #[cfg(target_arch = "x86_64")]
 use avx_doubles;
 
-/// Defines the token of an x86-64 instruction set, its detection, and the entries of kernels and of their parts, which enable the
-/// features. `$simd` is the implementation of [`Simd`] that `$make` makes of the token.
+/// Defines the token of an x86-64 instruction set, its detection, and the entries of kernels and of
+/// their parts, which enable the features. `$simd` is the implementation of [`Simd`] that `$make`
+/// makes of the token.
 #[cfg(target_arch = "x86_64")]
 macro_rules! x86_token {
     ($(#[$doc:meta])* $token:ident, $simd:ty = $make:expr, $($feature:tt)*) => {
@@ -450,7 +466,7 @@ macro_rules! x86_token {
         #[derive(Clone, Copy, Debug)]
         pub(in crate::simd) struct $token(());
 
-        /// Whether this machine has the features.
+        /// True if this machine has the features.
         static IS_FOUND: $crate::simd::detected::Detected =
             $crate::simd::detected::Detected::new(|| $(is_x86_feature_detected!($feature))&&*);
 
@@ -493,7 +509,8 @@ use x86_token;
 /// The lanes in order.
 pub(crate) const IN_ORDER: [u32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
-/// Panics unless the indices of all lanes of the mask are below `len` and below 2^31, because gathers have signed 32-bit indices.
+/// Panics unless the indices of all lanes of the mask are below `len` and below 2^31, because
+/// gathers have signed 32-bit indices.
 #[inline(always)]
 #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
 fn assert_indices<S: Simd>(s: S, m: S::M, at: S::U, len: usize) {
@@ -502,8 +519,8 @@ fn assert_indices<S: Simd>(s: S, m: S::M, at: S::U, len: usize) {
     assert!(s.mask_bits(outside) == 0, "an index of a gather lies outside");
 }
 
-/// The indices of the lanes of the mask, and 0 for the other lanes, so that every lane has a valid index of a slice of length
-/// `len`. Panics if the slice is empty, and as [`assert_indices`].
+/// The indices of the lanes of the mask, and 0 for the other lanes, so that every lane has a valid
+/// index of a slice of length `len`. Panics if the slice is empty, and as [`assert_indices`].
 #[inline(always)]
 #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
 fn valid_indices<S: Simd>(s: S, m: S::M, at: S::U, len: usize) -> [u32; LANES] {

@@ -1,8 +1,9 @@
-//! Sixteen lanes in arrays: the implementation for machines without vector code, and the oracle of the tests of the others.
+//! Sixteen lanes in arrays: the implementation for machines without vector code, and the oracle of
+//! the tests of the others.
 //!
-//! Each operation is a loop over the lanes, which the compiler vectorizes with the baseline instructions of the target. Kernels
-//! that are faster only with vectors are not compiled for it ([`Simd::HAS_VECTORS`]): unrolled, they would be the largest part
-//! of the library.
+//! Each operation is a loop over the lanes, which the compiler vectorizes with the baseline
+//! instructions of the target. Kernels that are faster only with vectors are not compiled for it
+//! ([`Simd::HAS_VECTORS`]): unrolled, they would be the largest part of the library.
 
 use super::{LANES, Lanewise, Part, Simd, one_piece, plain_doubles};
 use std::array::from_fn;
@@ -59,13 +60,14 @@ fn compress(bits: u32, a: &U, to: &mut U) -> usize {
     count
 }
 
-/// [`Simd::compress_far_to_near`] in scalar code: an insertion sort of at most sixteen entries, usually two or three.
+/// [`Simd::compress_far_to_near`] in scalar code: an insertion sort of at most sixteen entries,
+/// usually two or three.
 #[inline(always)]
 pub(super) fn compress_far_to_near(bits: u32, key: &F, a: &U, to: &mut U, keys: &mut F) -> usize {
     let mut count = 0;
     for lane in lanes(bits) {
-        // The lane is written into the lowest bits of its key. Keys are compared as integers, because an infinity becomes NaN
-        // by this.
+        // The lane is written into the lowest bits of its key. Keys are compared as integers,
+        // because an infinity becomes NaN by this.
         let key = key[lane].to_bits() & !15 | lane as u32;
         let mut at = count % LANES;
         while at > 0 && (keys[at - 1].to_bits() as i32) < key as i32 {

@@ -17,8 +17,8 @@ fn floats(rng: &mut Rng) -> [f32; LANES] {
     })
 }
 
-/// Kernel that runs all operations of the trait and returns their results as bits. Its function is long because it is a table
-/// of the operations.
+/// Kernel that runs all operations of the trait and returns their results as bits. Its function is
+/// long because it is a table of the operations.
 struct AllOperations<'a> {
     a: &'a [f32; LANES],
     b: &'a [f32; LANES],
@@ -69,7 +69,8 @@ impl Kernel for AllOperations<'_> {
         for key in [ordered, self.a.map(|x| if x.is_nan() { -0.5 } else { x })] {
             let (count, nearest) = s.sort_far_to_near(self.bits, s.load(&key), x, &mut codes, &mut keys);
             assert_eq!(count, sorted);
-            // The lane of the last entry is returned, although the order of negative keys is unspecified.
+            // The lane of the last entry is returned, although the order of negative keys is
+            // unspecified.
             if let Some(last) = count.checked_sub(1) {
                 assert_eq!(nearest, keys[last].to_bits() as usize % LANES, "of {key:?}");
                 assert_eq!(codes[last], self.u[nearest]);

@@ -1,8 +1,9 @@
-//! What rays that start on triangles certainly do not meet.
+//! What rays that start on triangles certainly do not hit.
 //!
-//! For directions in bins, a file may say that rays that leave a triangle meet nothing else, at all or within a distance (specification,
-//! "Free directions"). A ray whose bin is free hits nothing; another one begins behind that distance, where boxes and triangles before it
-//! are skipped. Neither changes an answer. Where a direction is in doubt, the ray is traced from its start.
+//! For directions in bins, a file may say that rays that leave a triangle hit nothing else, at all
+//! or within a distance (specification, "Free directions"). A ray whose bin is free hits nothing;
+//! another one begins behind that distance, where boxes and triangles before it are skipped.
+//! Neither changes an answer. Where a direction is in doubt, the ray is traced from its start.
 
 use super::leaving::{Leaving, SLACK};
 use super::triangles::{Row, StartTriangles};
@@ -35,7 +36,8 @@ static FIRST_BIN: [u32; LANES] = {
     }
     first
 };
-/// For each column and each row the bits of the levels in the sectors that hold it. Lanes without a column have none.
+/// For each column and each row the bits of the levels in the sectors that hold it. Lanes without a
+/// column have none.
 static OF_SECTORS: [[u32; LANES]; 2] = {
     let mut bits = [[0; LANES]; 2];
     let mut column = 0;
@@ -49,8 +51,8 @@ static OF_SECTORS: [[u32; LANES]; 2] = {
     bits
 };
 
-/// Where the range of a ray in the space of an object can begin, given the triangle and the point at which it starts: infinite in a free
-/// direction, 0 where nothing is known.
+/// Where the range of a ray in the space of an object can begin, given the triangle and the point
+/// at which it starts: infinite in a free direction, 0 where nothing is known.
 #[inline(always)]
 pub(crate) fn begin<S: Simd>(
     s: S,
@@ -110,7 +112,8 @@ pub(crate) fn prefetch<S: Simd>(s: S, object: &ObjectView<'_>, triangle: u32) {
     }
 }
 
-/// Bits of the rays in free directions, and where the ranges of the others can begin, given their directions.
+/// Bits of the rays in free directions, and where the ranges of the others can begin, given their
+/// directions.
 #[inline(always)]
 pub(super) fn decide<S: Simd, R: Row>(
     s: S,
@@ -137,7 +140,8 @@ pub(super) fn decide<S: Simd, R: Row>(
     (free, begins(s, direction, within(s, of_side, [column, row], levels)))
 }
 
-/// Bits of the rays in free directions, given their columns and rows, and the bits of those to the front and to the back.
+/// Bits of the rays in free directions, given their columns and rows, and the bits of those to the
+/// front and to the back.
 #[inline(always)]
 fn free_lanes<S: Simd>(
     s: S,
@@ -162,7 +166,8 @@ fn free_lanes<S: Simd>(
     open & s.mask_bits(s.lt_u(row, s.splat_u(FREE_SIDE as u32))) & (to_front & !back | to_back & back)
 }
 
-/// The distances within which nothing is met, given the sectors of the sides to which rays go, and their columns and rows.
+/// The distances within which nothing is hit, given the sectors of the sides to which rays go, and
+/// their columns and rows.
 #[inline(always)]
 fn within<S: Simd>(s: S, sectors: S::U, [column, row]: [S::U; 2], levels: &FreeLevels) -> S::F {
     let of_column = s.lookup_u(s.load_u(&OF_SECTORS[0]), column);
@@ -174,10 +179,11 @@ fn within<S: Simd>(s: S, sectors: S::U, [column, row]: [S::U; 2], levels: &FreeL
     s.select(is_high, s.select(is_low, three, two), s.select(is_low, one, s.splat(0.0)))
 }
 
-/// Where the ranges of rays can begin, given the distances within which they meet nothing.
+/// Where the ranges of rays can begin, given the distances within which they hit nothing.
 ///
-/// With a guess g of the length of a direction d, (g² + d²) / 2g is an upper bound of it, by the inequality of the means, and for a good guess
-/// a close one. The slack is more than the rounding errors of all terms.
+/// With a guess g of the length of a direction d, (g² + d²) / 2g is an upper bound of it, by the
+/// inequality of the means, and for a good guess a close one. The slack is more than the rounding
+/// errors of all terms.
 #[inline(always)]
 fn begins<S: Simd>(s: S, [dx, dy, dz]: [S::F; 3], within: S::F) -> S::F {
     let greatest = s.max_abs(s.max_abs(dx, dy), dz);

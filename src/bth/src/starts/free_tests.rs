@@ -1,5 +1,6 @@
-//! Which rays end or begin later, for two parallel triangles: the conformance files `free-directions` and `free-distances`. From the
-//! upper one, at the height 10, nothing is met upwards, from the lower one nothing straight up within 4; by the latter file nothing within 1
+//! Which rays end or begin later, for two parallel triangles: the conformance files
+//! `free-directions` and `free-distances`. From the upper one, at the height 10, nothing is hit
+//! upwards, from the lower one nothing straight up within 4; by the latter file nothing within 1
 //! straight down from the upper one, either.
 
 use super::prepare::PreparedStarts;
@@ -84,7 +85,7 @@ fn begin(file: &[u8], ray: StartRay) -> Prepared {
     alone
 }
 
-/// Whether a ray ends, by the file with directions.
+/// Returns true if a ray ends, by the file with directions.
 fn ends(ray: StartRay) -> bool {
     begin(DIRECTIONS, ray) == Prepared::Ended
 }

@@ -1,16 +1,19 @@
-//! On which side rays leave the triangles on which they start, and the bins of their directions, in f32.
+//! On which side rays leave the triangles on which they start, and the bins of their directions, in
+//! f32.
 
 use crate::intersect::vector::dot_lanes;
 use crate::simd::{LANES, Lanewise};
 use bth_format::layout::{FREE_BORDERS, FREE_SIDE, FREE_STEEPEST};
 
-/// Directions are looked up whose greatest component in absolute value is between these, so that no product underflows or overflows.
+/// Directions are looked up whose largest component in absolute value is between these, so that no
+/// product underflows or overflows.
 pub(super) const DIRECTIONS: [f32; 2] = [1.0 / (1 << 20) as f32, (1 << 20) as f32];
 /// Relative slack of distances, for the rounding of t and of what is computed here.
 pub(super) const SLACK: f32 = 1.0 / (1 << 20) as f32;
 /// Column of directions that are too steep.
 pub(super) const NO_COLUMN: u32 = LANES as u32 - 1;
-/// What is lost where the products of a term underflow, also if the caller has denormal numbers flushed to zero: that of eight.
+/// What is lost where the products of a term underflow, also if the caller has denormal numbers
+/// flushed to zero: that of eight.
 const UNDERFLOW: f32 = 8.0 * f32::MIN_POSITIVE;
 /// Unit of rounding.
 const U: f32 = f32::EPSILON / 2.0;
@@ -25,10 +28,13 @@ pub(super) struct Leaving<S: Lanewise> {
 }
 
 impl<S: Lanewise> Leaving<S> {
-    /// For rays with these directions, and triangles whose corners `corner` loads, given corner and axis.
+    /// For rays with these directions, and triangles whose corners `corner` loads, given corner and
+    /// axis.
     ///
-    /// Errors, in units of rounding u, where no component of the edges e and f is greater than `far` and `size` is the sum of the direction's:
-    /// a component of e×f is off by 4.1u of its terms, 8.2u·far², and the product with d has three more roundings of at most 2·far²·size: 17u.
+    /// Errors, in units of rounding u, where no component of the edges e and f is greater than
+    /// `far` and `size` is the sum of the direction's: a component of e×f is off by 4.1u of its
+    /// terms, 8.2u·far², and the product with d has three more roundings of at most 2·far²·size:
+    /// 17u.
     #[inline(always)]
     pub(super) fn new(s: S, corner: impl Fn(usize, usize) -> S::F, d: [S::F; 3]) -> Self {
         let zero = s.splat(0.0);
@@ -65,19 +71,21 @@ fn cross<S: Lanewise>(s: S, a: [S::F; 3], b: [S::F; 3]) -> [S::F; 3] {
     ]
 }
 
-/// The columns and rows of the bins of directions d ([`bth_format::layout::free_bin`]), or [`NO_COLUMN`] for both, given the first edge, the
-/// normal and their product with d.
+/// The columns and rows of the bins of directions d ([`bth_format::layout::free_bin`]), or
+/// [`NO_COLUMN`] for both, given the first edge, the normal and their product with d.
 ///
-/// The errors of the axes are 5 units of the lengths of the edges, those of their products with a direction a few more: relative to
-/// the normal, which is at least 1/128 of the product of the edges, less than 2^-13, a sixteenth of the margin. For edges and
-/// directions in their ranges nothing overflows, and what underflows is less than that.
+/// The errors of the axes are 5 units of the lengths of the edges, those of their products with a
+/// direction a few more: relative to the normal, which is at least 1/128 of the product of the
+/// edges, less than 2^-13, a sixteenth of the margin. For edges and directions in their ranges
+/// nothing overflows, and what underflows is less than that.
 #[inline(always)]
 fn columns<S: Lanewise>(s: S, [e, normal]: [[S::F; 3]; 2], d: [S::F; 3], height: S::F) -> [S::U; 2] {
     let per_height = s.div(s.splat(1.0), height);
     let per_square = s.div(s.splat(1.0), dot_lanes(s, e, e));
     let x = s.mul(dot_lanes(s, d, e), per_height);
     let y = s.mul(dot_lanes(s, d, cross(s, normal, e)), per_height);
-    // Squares of the slopes. Signs are those of the components, not of the slopes, which are negated on the back.
+    // Squares of the slopes. Signs are those of the components, not of the slopes, which are
+    // negated on the back.
     let x_square = s.mul(s.mul(s.mul(x, x), per_square), dot_lanes(s, normal, normal));
     let y_square = s.mul(s.mul(y, y), per_square);
     let upwards = s.lt(s.splat(0.0), height);
@@ -101,7 +109,7 @@ fn column<S: Lanewise>(s: S, (slope, square): (S::F, S::F), upwards: S::M) -> S:
     add_signed(s, s.splat_u((FREE_SIDE / 2) as u32), negative, beyond)
 }
 
-/// Square of the greatest slope.
+/// Square of the largest slope.
 const STEEPEST: f32 = (FREE_STEEPEST * FREE_STEEPEST) as f32;
 
 /// a ± b, the latter where the mask is set.

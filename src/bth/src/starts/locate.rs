@@ -13,7 +13,8 @@ use bth_format::object::ObjectView;
 /// Why a start is not a point of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum StartError {
-    /// No leaf of the object holds the triangle: it does not exist, or it has no area and was dropped.
+    /// No leaf of the object holds the triangle: it does not exist, or it has no area and was
+    /// dropped.
     NoTriangle,
     /// The triangle has no area.
     NoArea,
@@ -38,8 +39,9 @@ pub(crate) fn locate(object: &ObjectView<'_>, start: Start) -> Result<StartPoint
     Ok(StartPoint { origin, leaf, slot, u, v })
 }
 
-/// The child code of the leaf that holds a triangle, and its slot there. For a triangle of a tet leaf without a subtree, these are the
-/// code of the tet leaf and the index of the constrained face.
+/// The child code of the leaf that holds a triangle, and its slot there. For a triangle of a tet
+/// leaf without a subtree, these are the code of the tet leaf and the index of the constrained
+/// face.
 #[inline(always)]
 pub(super) fn place(object: &ObjectView<'_>, triangle: u32) -> Option<(u32, u32)> {
     let code = *object.places.get(triangle as usize)?;

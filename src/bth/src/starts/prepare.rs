@@ -1,4 +1,5 @@
-//! The rays of a batch that start on triangles of an object, as rays of the object with the exact points at which they start.
+//! The rays of a batch that start on triangles of an object, as rays of the object with the exact
+//! points at which they start.
 
 use super::free::{self, decide};
 use super::locate::locate;
@@ -26,7 +27,8 @@ pub(crate) struct PreparedStarts {
 pub(crate) const ENDED: Ray = Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: -1.0 };
 
 impl PreparedStarts {
-    /// Prepares rays that start on triangles of the instance with the given index; the others hit nothing.
+    /// Prepares rays that start on triangles of the instance with the given index; the others hit
+    /// nothing.
     pub(crate) fn fill(&mut self, object: &ObjectView<'_>, rays: &[StartRay], instance: u32) {
         // All elements are replaced.
         self.rays.resize(rays.len(), ENDED);
@@ -103,8 +105,8 @@ impl<R: Row> Kernel for PrepareKernel<'_, '_, R> {
         let PreparedStarts { rays: object_rays, points, order } = prepared;
         let levels = object.free_levels.first().copied().unwrap_or_default();
         let (blocks, _) = rays.as_chunks::<LANES>();
-        // What is stored lane by lane and loaded at once waits until the stores are done, so sixteen rays are fetched before the sixteen
-        // before them are decided.
+        // What is stored lane by lane and loaded at once waits until the stores are done, so
+        // sixteen rays are fetched before the sixteen before them are decided.
         let mut triangles = [StartTriangles::NONE; 2];
         // Sixteen indices are stored at once; those of rays that have ended are overwritten.
         let mut end = order.len();
@@ -173,7 +175,8 @@ impl Group<'_> {
         let mut of_lane = [[0.0; LANES]; 2];
         s.store(u, &mut of_lane[0]);
         s.store(v, &mut of_lane[1]);
-        // There are no branches in this loop, and it reads whole vectors, so that the compiler vectorizes all of it.
+        // There are no branches in this loop, and it reads whole vectors, so that the compiler
+        // vectorizes all of it.
         for i in 0..LANES {
             let weights = [of_lane[0][i].into(), of_lane[1][i].into()];
             let mut corner = [[0.0f64; 3]; 3];

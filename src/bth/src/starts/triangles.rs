@@ -12,9 +12,9 @@ const BACK: u32 = (FreeBins::BACK >> 96) as u32;
 
 /// A row of what is known of a triangle.
 pub(crate) trait Row {
-    /// Whether it tells anything.
+    /// True if it tells anything.
     const TELLS: bool;
-    /// Whether it tells free bins.
+    /// True if it tells free bins.
     const HAS_BINS: bool;
     /// Copies what the row tells to a column.
     fn copy(&self, triangles: &mut StartTriangles, column: usize);
@@ -74,7 +74,8 @@ const fn before(distance: usize) -> [u32; LANES] {
 #[derive(Clone, Copy)]
 pub(super) struct TriangleIds {
     ids: [u32; LANES],
-    /// Bits of the rays that start on another triangle than the one before. Neighbouring rays often start on the same one.
+    /// Bits of the rays that start on another triangle than the one before. Neighbouring rays often
+    /// start on the same one.
     new: u32,
 }
 
@@ -103,8 +104,8 @@ impl TriangleIds {
         }
     }
 
-    /// Prefetches the leaves in which the triangles lie, whose places are there. Those on a grid, and what is beyond the lines of an
-    /// indexed leaf, are not.
+    /// Prefetches the leaves in which the triangles lie, whose places are there. Those on a grid,
+    /// and what is beyond the lines of an indexed leaf, are not.
     #[inline(always)]
     pub(super) fn prefetch_leaves<S: Simd>(&self, s: S, object: &ObjectView<'_>) {
         let mut new = self.new;
@@ -116,7 +117,8 @@ impl TriangleIds {
     }
 }
 
-/// The triangles on which sixteen rays start, and what the file knows of them. Each vector is a cache line, so what is shorter comes last.
+/// The triangles on which sixteen rays start, and what the file knows of them. Each vector is a
+/// cache line, so what is shorter comes last.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub(crate) struct StartTriangles {
@@ -132,7 +134,7 @@ pub(crate) struct StartTriangles {
     pub(super) bins: [[u32; LANES]; 4],
     /// The sectors of their fronts and backs.
     pub(super) sectors: [[u32; LANES]; 2],
-    /// Whether all rays have columns of their own.
+    /// True if all rays have columns of their own.
     is_expanded: bool,
 }
 

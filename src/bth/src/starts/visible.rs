@@ -1,9 +1,11 @@
 //! Whether two points see each other: whether no triangle crosses the open segment between them.
 //!
-//! A triangle blocks the segment from A to B if A and B lie strictly on different sides of its plane, and the segment's line crosses the
-//! closed triangle: if the volumes det[a-A, b-A, c-A] and det[a-B, b-B, c-B] have opposite signs, and the signs of det[B-A, p-A, q-A] over
-//! its edges p→q do not differ. These are affine in A and in B, so starts on triangles are decided exactly, as for rays
-//! ([`mod@crate::intersect::start`]). Triangles through A or B, or in a plane with both, do not block.
+//! A triangle blocks the segment from A to B if A and B lie strictly on different sides of its
+//! plane, and the segment's line crosses the closed triangle: if the volumes det[a-A, b-A, c-A] and
+//! det[a-B, b-B, c-B] have opposite signs, and the signs of det[B-A, p-A, q-A] over its edges p→q
+//! do not differ. These are affine in A and in B, so starts on triangles are decided exactly, as
+//! for rays ([`mod@crate::intersect::start`]). Triangles through A or B, or in a plane with both,
+//! do not block.
 
 use crate::bvh::enumerate::{Receiver, enumerate_within};
 use crate::enumerate::{EnteredInstance, enumerate_instances};
@@ -40,7 +42,8 @@ impl From<[f32; 3]> for SegmentEnd {
 }
 
 impl SegmentEnd {
-    /// The order in which the ends of a segment are taken, so that both directions have the same answer whatever is rounded.
+    /// The order in which the ends of a segment are taken, so that both directions have the same
+    /// answer whatever is rounded.
     fn order(&self) -> [u32; 5] {
         match self {
             SegmentEnd::Start(Start { primitive, u, v }) => {
@@ -61,83 +64,64 @@ struct PlacedEnd {
     start: Option<InstanceStart>,
 }
 
-impl Scene {
-    /// Whether two points see each other: whether no triangle crosses the open segment between them. Each is a
-    /// [`Start`], or a point in world space.
-    ///
-    /// It is decided exactly, so it is symmetrical: `visible(a, b)` is `visible(b, a)`. Triangles through an end, or in a plane with
-    /// the whole segment, do not block. Rays pass through the transparent parts of triangles. An end that is not a point of a
-    /// visible instance, or not finite, sees nothing.
-    ///
-    /// ```no_run
-    /// use bth::rays::Ray;
-    ///
-    /// let scene = bth::open("bunny.bth")?;
-    /// let light = [0.0, 3.0, 1.0];
-    /// if let Some(hit) = scene.nearest(&Ray::new([0.0, 0.1, 1.0], [0.0, 0.0, -1.0])) {
-    ///     println!("lit: {}", scene.visible(hit.start(), light));
-    /// }
-    /// # Ok::<(), bth::Error>(())
-    /// ```
-    pub fn visible(&self, a: impl Into<SegmentEnd>, b: impl Into<SegmentEnd>) -> bool {
-        let (a, b) = (a.into(), b.into());
-        let (a, b) = if b.order() < a.order() { (b, a) } else { (a, b) };
-        let (Some(a), Some(b)) = (self.place_end(&a), self.place_end(&b)) else { return false };
-        let direction = [0, 1, 2].map(|k| (f64::from(b.origin[k]) - f64::from(a.origin[k])) as f32);
-        // Only which instances lie near the segment: those that hold an end are met in any case.
-        let ray = Ray { origin: a.origin, tmin: 0.0, direction, tmax: 1.0 };
-        let ends = [&a, &b].map(|end| end.start.as_ref().map(|start| start.instance));
-        for (i, end) in ends.into_iter().enumerate() {
-            let is_new = i == 0 || end != ends[0];
-            if let (Some(instance), true) = (end, is_new)
-                && self.blocks_in(&EnteredInstance::new(self, instance), &a, &b)
-            {
-                return false;
-            }
-        }
-        let is_blocked = enumerate_instances(self, &ray, &mut |entered| {
-            let was_met = ends.contains(&Some(entered.instance));
-            let blocks = !was_met && self.blocks_in(&entered, &a, &b);
-            (!blocks).then_some(1.0)
-        });
-        !is_blocked
-    }
-
-    fn place_end(&self, end: &SegmentEnd) -> Option<PlacedEnd> {
-        match end {
-            SegmentEnd::Point(point) => {
-                let origin = *point;
-                origin.iter().all(|x| x.is_finite()).then_some(PlacedEnd { origin, start: None })
-            }
-            SegmentEnd::Start(start) => {
-                let (start, origin) = self.place_start(start).ok()?;
-                Some(PlacedEnd { origin, start: Some(start) })
-            }
+/// Returns true if no triangle crosses the open segment between two points.
+pub(super) fn see_each_other(scene: &Scene, a: SegmentEnd, b: SegmentEnd) -> bool {
+    let (a, b) = if b.order() < a.order() { (b, a) } else { (a, b) };
+    let (Some(a), Some(b)) = (place_end(scene, &a), place_end(scene, &b)) else { return false };
+    let direction = [0, 1, 2].map(|k| (f64::from(b.origin[k]) - f64::from(a.origin[k])) as f32);
+    // Only which instances lie near the segment: those that hold an end are hit in any case.
+    let ray = Ray { origin: a.origin, tmin: 0.0, direction, tmax: 1.0 };
+    let ends = [&a, &b].map(|end| end.start.as_ref().map(|start| start.instance));
+    for (i, end) in ends.into_iter().enumerate() {
+        let is_new = i == 0 || end != ends[0];
+        if let (Some(instance), true) = (end, is_new)
+            && blocks_in(&EnteredInstance::new(scene, instance), &a, &b)
+        {
+            return false;
         }
     }
+    let is_blocked = enumerate_instances(scene, &ray, &mut |entered| {
+        let was_met = ends.contains(&Some(entered.instance));
+        let blocks = !was_met && blocks_in(&entered, &a, &b);
+        (!blocks).then_some(1.0)
+    });
+    !is_blocked
+}
 
-    /// Whether a triangle of an instance blocks a segment.
-    fn blocks_in(&self, entered: &EnteredInstance<'_>, a: &PlacedEnd, b: &PlacedEnd) -> bool {
-        let object = entered.object;
-        let in_object = |end: &PlacedEnd| {
-            let ray = Ray::new(end.origin, [1.0, 0.0, 0.0]);
-            let world_ray = WorldRay { ray: &ray, start: end.start.as_ref() };
-            match world_ray.start_in(entered.instance) {
-                Some(start) => *start,
-                None => StartPoint::beside(entered.object_ray(world_ray).ray.origin),
-            }
-        };
-        let (a, b) = (in_object(a), in_object(b));
-        let exact = |point: &StartPoint| match start_on(object, point) {
-            Some(start) => ExactEnd::Start(start),
-            None => ExactEnd::Point(point.origin.0),
-        };
-        let segment = Segment { from: exact(&a), to: exact(&b), rounded: [a.origin, b.origin] };
-        let farthest = a.origin.0.iter().fold(0.0f32, |most, x| most.max((x.abs() as f32).next_up()));
-        let bounds = object.bounds.for_segments(farthest);
-        let ray = segment.ray(bounds.origin_error);
-        enumerate_within(object, &bounds, (&ray, None), &mut Blocking { object, segment: &segment })
+fn place_end(scene: &Scene, end: &SegmentEnd) -> Option<PlacedEnd> {
+    match end {
+        SegmentEnd::Point(point) => {
+            let origin = *point;
+            origin.iter().all(|x| x.is_finite()).then_some(PlacedEnd { origin, start: None })
+        }
+        SegmentEnd::Start(start) => {
+            let (start, origin) = scene.place_start(start).ok()?;
+            Some(PlacedEnd { origin, start: Some(start) })
+        }
     }
+}
+
+/// Returns true if a triangle of an instance blocks a segment.
+fn blocks_in(entered: &EnteredInstance<'_>, a: &PlacedEnd, b: &PlacedEnd) -> bool {
+    let object = entered.object;
+    let in_object = |end: &PlacedEnd| {
+        let ray = Ray::new(end.origin, [1.0, 0.0, 0.0]);
+        let world_ray = WorldRay { ray: &ray, start: end.start.as_ref() };
+        match world_ray.start_in(entered.instance) {
+            Some(start) => *start,
+            None => StartPoint::beside(entered.object_ray(world_ray).ray.origin),
+        }
+    };
+    let (a, b) = (in_object(a), in_object(b));
+    let exact = |point: &StartPoint| match start_on(object, point) {
+        Some(start) => ExactEnd::Start(start),
+        None => ExactEnd::Point(point.origin.0),
+    };
+    let segment = Segment { from: exact(&a), to: exact(&b), rounded: [a.origin, b.origin] };
+    let farthest = a.origin.0.iter().fold(0.0f32, |most, x| most.max((x.abs() as f32).next_up()));
+    let bounds = object.bounds.for_segments(farthest);
+    let ray = segment.ray(bounds.origin_error);
+    enumerate_within(object, &bounds, (&ray, None), &mut Blocking { object, segment: &segment })
 }
 
 /// Ends the enumeration at a triangle that blocks a segment.

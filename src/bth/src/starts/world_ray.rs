@@ -23,8 +23,8 @@ impl InstanceStart {
     }
 }
 
-/// A ray in world space, and its start if that is on a triangle. Its origin is then the start rounded to f32, where other instances see
-/// it.
+/// A ray in world space, and its start if that is on a triangle. Its origin is then the start
+/// rounded to f32, where other instances see it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WorldRay<'a> {
     pub(crate) ray: &'a Ray,
@@ -61,12 +61,14 @@ impl<'a> WorldRay<'a> {
         self.in_object(instance, ray, start, |ray| object::nearest_counted(object, ray, instance))
     }
 
-    /// Returns true if the ray hits anything in an instance; parameters as for [`Self::nearest_in`].
+    /// Returns true if the ray hits anything in an instance; parameters as for
+    /// [`Self::nearest_in`].
     pub(crate) fn any_in(&self, object: &ObjectView<'_>, instance: u32, ray: &Ray) -> bool {
         self.in_object(instance, ray, |start| object::any(object, start), |ray| object::any(object, ray))
     }
 
-    /// As a ray in an instance, given the ray in the space of its object: one that starts there, or else one with an origin.
+    /// As a ray in an instance, given the ray in the space of its object: one that starts there, or
+    /// else one with an origin.
     #[inline(always)]
     pub(crate) fn in_object<T>(
         &self,

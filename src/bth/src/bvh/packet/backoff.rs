@@ -2,8 +2,8 @@
 
 use bth_format::Identity;
 
-/// Exponential back-off of a kind of packets: after a packet that was not worthwhile some groups of rays are not tried as packets, and
-/// twice as many after the next.
+/// Exponential back-off of a kind of packets: after a packet that was not worthwhile some groups of
+/// rays are not tried as packets, and twice as many after the next.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PacketBackoff {
     /// Number of groups of rays still to be skipped.
@@ -19,14 +19,14 @@ impl Default for PacketBackoff {
 }
 
 impl PacketBackoff {
-    /// Greatest number of skipped groups.
+    /// Largest number of skipped groups.
     const MAX_SKIP: u32 = 64;
 
     pub(crate) fn new() -> PacketBackoff {
         PacketBackoff { skip: 0, back: 4 }
     }
 
-    /// Whether the next group of rays may be tried as a packet.
+    /// Returns true if the next group of rays may be tried as a packet.
     #[inline(always)]
     pub(crate) fn may_try(&mut self) -> bool {
         let open = self.skip == 0;
@@ -53,8 +53,8 @@ pub(crate) struct KindBackoffs {
     pub(crate) short: PacketBackoff,
 }
 
-/// The back-offs of a thread, kept from one batch to the next: batches of a few hundred rays would otherwise try packets anew each time.
-/// They are those of one object, for each goal of queries.
+/// The back-offs of a thread, kept from one batch to the next: batches of a few hundred rays would
+/// otherwise try packets again each time. They are those of one object, for each goal of queries.
 #[derive(Debug, Default)]
 pub(crate) struct Backoffs {
     object: Option<Identity>,
@@ -63,7 +63,8 @@ pub(crate) struct Backoffs {
 }
 
 impl Backoffs {
-    /// The back-offs for rays through an object; new ones if the last batch went through another object.
+    /// The back-offs for rays through an object; new ones if the last batch went through another
+    /// object.
     #[inline(always)]
     pub(crate) fn of(&mut self, object: Identity, is_any: bool) -> &mut KindBackoffs {
         if self.object != Some(object) {

@@ -22,7 +22,8 @@ pub(crate) struct PacketBuffers {
     pub(crate) hit_cache: HitCache,
     /// Terms of the cached triangles for the packet's origin.
     pub(super) origin_terms: OriginTermsLanes,
-    /// Rays and triangles of the hits that are computed. They are kept, because clearing them takes longer than the computation.
+    /// Rays and triangles of the hits that are computed. They are kept, because clearing them takes
+    /// longer than the computation.
     pub(super) pairs: Pairs,
     pub(super) intersections: [Intersections; GROUPS],
     /// For each ray that starts on a triangle the child code of its leaf, and its slot there.
@@ -56,8 +57,8 @@ impl Default for PacketBuffers {
     }
 }
 
-/// Groups for the instruction set that was used last. They are kept, because initializing them for every batch would take as long as
-/// tracing a few rays.
+/// Groups for the instruction set that was used last. They are kept, because initializing them for
+/// every batch would take as long as tracing a few rays.
 #[derive(Debug, Default)]
 pub(crate) struct GroupStorage(Option<Box<dyn Any>>);
 

@@ -8,9 +8,9 @@ use crate::simd::{IN_ORDER, LANES, Part, Simd, lanes_of_piece};
 use bth_format::layout::{WIDTH, WideNode};
 use std::marker::PhantomData;
 
-/// Writes the stack entries of the children of a node that the bounds of the packet overlap before the depth `limit`, the nearest
-/// last, as a part of kernels. Its output is their number. Where directions lie in different octants, each entry gets only the
-/// rays that may hit its box.
+/// Writes the stack entries of the children of a node that the bounds of the packet overlap before
+/// the depth `limit`, the nearest last, as a part of kernels. Its output is their number. Where
+/// directions lie in different octants, each entry gets only the rays that may hit its box.
 pub(super) struct PacketChildren<'a, S: Simd, H, G> {
     pub(super) bounds: &'a H,
     pub(super) groups: &'a [RayGroup<S>],
@@ -46,7 +46,8 @@ impl<S: Simd, H: PacketBounds<S>, G: Goal> Part<S> for PacketChildren<'_, S, H, 
     }
 }
 
-/// [`meeting`] as a part of kernels: the corners of the child's box, the groups, and the rays that are tested.
+/// [`meeting`] as a part of kernels: the corners of the child's box, the groups, and the rays that
+/// are tested.
 struct Meeting<'a, S: Simd, H>([[f32; 3]; 2], &'a [RayGroup<S>], u64, PhantomData<H>);
 
 impl<S: Simd, H: PacketBounds<S>> Part<S> for Meeting<'_, S, H> {
@@ -67,7 +68,8 @@ impl<S: Simd, H: PacketBounds<S>> Part<S> for Meeting<'_, S, H> {
     }
 }
 
-/// The rays that may meet the box of a child, a bit each. Only groups with a bit in `rays` are tested.
+/// The rays that may hit the box of a child, a bit each. Only groups with a bit in `rays` are
+/// tested.
 #[inline(always)]
 pub(super) fn meeting<S: Simd, H: PacketBounds<S>>(
     s: S,

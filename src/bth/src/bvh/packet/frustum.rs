@@ -12,12 +12,14 @@ use bth_format::object::ObjectBounds;
 /// Bounds of coherent rays: a [`Shaft`] for boxes, and for triangles what follows.
 ///
 /// With s = d_x/d_z along one axis z for all, a point's sheared x is
-/// (x - c_x) - s₀(z - c_z) + (s₀ - s)(z - c_z) + a with a = (c_x - o_x) - s(c_z - o_z): the middle of the interval of s,
-/// its half width, and an interval of a. Coherent rays have |s| <= 1.25, rounded at most twice. With u = 2^-24, the first two terms
-/// and their difference x' are wrong by at most 4u|z - c_z| + 2u|x'|, s in the third by 3u, the products and sums on the other side by
-/// 2u of each of their terms, and a by 16u of the greatest distance D of two origins along an axis. [`SLACK`] = 32u of |z - c_z|, of D
-/// and of each term on the other side covers them: where |x'| is greater than that side, its error is less than what it exceeds it by.
-/// Where all rays have the same origin (`POINT`), the intervals of origins, widened by their pads, are also used for the single rays
+/// (x - c_x) - s₀(z - c_z) + (s₀ - s)(z - c_z) + a with a = (c_x - o_x) - s(c_z - o_z): the middle
+/// of the interval of s, its half width, and an interval of a. Coherent rays have |s| <= 1.25, rounded at most twice. With u =
+/// 2^-24, the first two terms and their difference x' are wrong by at most 4u|z - c_z| + 2u|x'|, s
+/// in the third by 3u, the products and sums on the other side by 2u of each of their terms, and a
+/// by 16u of the largest distance D of two origins along an axis. [`SLACK`] = 32u of |z - c_z|, of
+/// D and of each term on the other side covers them: where |x'| is greater than that side, its
+/// error is less than what it exceeds it by. Where all rays have the same origin (`POINT`), the
+/// intervals of origins, widened by their pads, are also used for the single rays
 /// ([`RayGroup::may_enter`]), and the interval of a is zero.
 pub(crate) struct Frustum<S: Simd, const POINT: bool> {
     view: FrustumView,
@@ -28,7 +30,8 @@ pub(crate) struct Frustum<S: Simd, const POINT: bool> {
     lower: [f32; 2],
 }
 
-/// Computes the frustum of coherent rays ([`Span::is_coherent`]) that are prepared in `groups`, as a part of kernels.
+/// Computes the frustum of coherent rays ([`Span::is_coherent`]) that are prepared in `groups`, as
+/// a part of kernels.
 pub(crate) struct FrustumOf<'a, S: Simd, const POINT: bool> {
     pub(crate) bounds: &'a ObjectBounds,
     pub(crate) span: &'a Span,
@@ -49,7 +52,8 @@ impl<S: Simd, const POINT: bool> Part<S> for FrustumOf<'_, S, POINT> {
             let [least, greatest] = span.origin[k];
             center[k] = if POINT { least } else { 0.5 * least + 0.5 * greatest };
         }
-        // The ranges of three reciprocals, two slopes and two terms a of sheared coordinates, and the least depth.
+        // The ranges of three reciprocals, two slopes and two terms a of sheared coordinates, and
+        // the smallest depth.
         let (mut least, mut greatest) = ([s.splat(f32::INFINITY); 8], [s.splat(f32::NEG_INFINITY); 7]);
         for group in groups {
             for k in 0..3 {
@@ -166,7 +170,8 @@ mod tests {
     use crate::simd::{Isa, Kernel};
     use bth_random::Rng;
 
-    /// For each of sixteen points, given as rows, the sides of the frustum of the rays beyond which it lies.
+    /// For each of sixteen points, given as rows, the sides of the frustum of the rays beyond which
+    /// it lies.
     struct Sides<'a, const POINT: bool>(&'a [Ray], &'a ObjectBounds, &'a [[f32; LANES]; 3]);
 
     impl<const POINT: bool> Kernel for Sides<'_, POINT> {
@@ -190,8 +195,8 @@ mod tests {
         }
     }
 
-    /// Points on rays, which are exact because all coordinates are integers below 2^24 times a power of two, and such points moved
-    /// away from all rays by about 2^-15 of their distance.
+    /// Points on rays, which are exact because all coordinates are integers below 2^24 times a
+    /// power of two, and such points moved away from all rays by about 2^-15 of their distance.
     fn check<const POINT: bool>(seed: u64) {
         let mut rng = Rng::new(seed);
         let mut below = |limit: u64| rng.below(limit) as f32;

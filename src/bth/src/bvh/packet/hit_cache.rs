@@ -1,16 +1,17 @@
 //! Cache of the triangles of a packet's pending hits, for rays that have the same origin.
 //!
-//! The terms of an intersection that do not depend on the direction ([`crate::intersect::exact::OriginTerms`]) are then computed in f64
-//! once for each triangle, and only the others for each ray.
+//! The terms of an intersection that do not depend on the direction
+//! ([`crate::intersect::exact::OriginTerms`]) are then computed in f64 once for each triangle, and
+//! only the others for each ray.
 
 use super::leaf_mesh::LeafPoints;
 use crate::bvh::candidate::Candidate;
 use crate::intersect::exact_lanes::{F32Lanes, OriginTermsLanes, Pairs};
 use crate::simd::{LANES, Simd};
 
-/// Greatest number of cached triangles.
+/// Largest number of cached triangles.
 pub(crate) const CACHED_TRIANGLES: usize = LANES;
-/// In place of the index of a triangle that is not in the cache; each ray that hits it stores it.
+/// Instead of the index of a triangle that is not in the cache; each ray that hits it stores it.
 pub(crate) const UNCACHED: u32 = CACHED_TRIANGLES as u32;
 
 /// The cached triangles of a packet.
@@ -29,9 +30,10 @@ pub(crate) struct HitCache {
     triangle: [u32; CACHED_TRIANGLES],
     /// Number of triangles of pending hits, cached or not.
     count: usize,
-    /// Number of triangles that may be cached: 0 if the rays have different origins, or if the previous packet had too many.
+    /// Number of triangles that may be cached: 0 if the rays have different origins, or if the
+    /// previous packet had too many.
     capacity: usize,
-    /// Whether ids and terms of the triangles have been computed ([`CachedHits::compute`]).
+    /// True if ids and terms of the triangles have been computed ([`CachedHits::compute`]).
     is_computed: bool,
 }
 
@@ -65,7 +67,7 @@ impl HitCache {
         self.count.min(self.capacity)
     }
 
-    /// Whether the triangles fill at most half of the cache.
+    /// Returns true if the triangles fill at most half of the cache.
     #[inline(always)]
     pub(crate) fn is_at_most_half_full(&self) -> bool {
         self.count <= CACHED_TRIANGLES / 2

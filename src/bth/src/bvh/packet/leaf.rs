@@ -1,9 +1,10 @@
-//! Intersection of the rays of a packet with the triangles of a leaf: one triangle at a time with a ray in each lane or, where few rays
-//! are left, one ray at a time ([`super::single_rays`]).
+//! Intersection of the rays of a packet with the triangles of a leaf: one triangle at a time with a
+//! ray in each lane or, where few rays are left, one ray at a time ([`super::single_rays`]).
 //!
-//! Points are projected once for a group of sixteen rays or, if all rays of the packet have the same origin, for each tested triangle.
-//! Most triangles are excluded by the error bound of [`crate::intersect::edge_functions`] for the greatest corner of the whole leaf; only for
-//! the others the bound of the triangle itself is computed.
+//! Points are projected once for a group of sixteen rays or, if all rays of the packet have the
+//! same origin, for each tested triangle. Most triangles are excluded by the error bound of
+//! [`crate::intersect::edge_functions`] for the largest corner of the whole leaf; only for the
+//! others the bound of the triangle itself is computed.
 
 use super::bounds::PacketBounds;
 use super::hit_cache::UNCACHED;
@@ -20,7 +21,7 @@ use crate::query::Goal;
 use crate::simd::{LANES, Lanewise, Part, Simd, lanes_of_piece};
 use bth_format::layout::WIDTH;
 
-/// In place of a triangle's index in the hit cache: no ray has hit it certainly so far.
+/// Instead of a triangle's index in the hit cache: no ray has hit it certainly so far.
 const NOT_CACHED_YET: u8 = u8::MAX;
 
 /// The rays of a group that may hit a triangle, a bit each.
@@ -98,6 +99,20 @@ impl<S: Simd, C: CornerSource<S>> Part<S> for TestRays<'_, S, C> {
     }
 }
 
+/// The active rays of a group and the triangles of a leaf that they are tested against.
+struct GroupTest<'a, 'l, S: Simd> {
+    group: &'a mut RayGroup<S>,
+    /// Index of the group.
+    at: usize,
+    leaf: &'a LeafPoints<'l>,
+    /// For each triangle its index in the hit cache, or [`NOT_CACHED_YET`].
+    cache_indices: &'a mut [u8; WIDTH],
+    /// One bit per triangle.
+    triangles: u32,
+    /// One bit per ray.
+    active: u32,
+}
+
 /// Triangles of a leaf that rays of a packet may hit.
 pub(super) struct ReachedTriangles<'a> {
     leaf: LeafPoints<'a>,
@@ -108,8 +123,9 @@ pub(super) struct ReachedTriangles<'a> {
 }
 
 impl<G: Goal> PacketRays<'_, G> {
-    /// Finds the triangles of a leaf that the rays whose bit is set may hit, if there are any. Where few rays of an any-hit group are left,
-    /// it intersects them with the leaf. This is a part of the kernel of packets and inlined into it, once for each format of leaves.
+    /// Finds the triangles of a leaf that the rays whose bit is set may hit, if there are any.
+    /// Where few rays of an any-hit group are left, it intersects them with the leaf. This is a
+    /// part of the kernel of packets and inlined into it, once for each format of leaves.
     #[inline(always)]
     pub(super) fn reached<'b, S: Simd, H: PacketBounds<S>, B: LeafMesh>(
         &mut self,
@@ -138,8 +154,8 @@ impl<G: Goal> PacketRays<'_, G> {
         (triangles != 0).then(|| ReachedTriangles { leaf: block.points(code), triangles, rays })
     }
 
-    /// Intersects rays with triangles of a leaf. Returns whether any has a nearer hit than before. As [`Self::reached`], it is a part of
-    /// the kernel, but serves both formats of leaves.
+    /// Intersects rays with triangles of a leaf. Returns whether any has a nearer hit than before.
+    /// As [`Self::reached`], it is a part of the kernel, but serves both formats of leaves.
     #[inline(always)]
     pub(super) fn enter_triangles<S: Simd, H: PacketBounds<S>>(
         &mut self,
@@ -164,23 +180,16 @@ impl<G: Goal> PacketRays<'_, G> {
         for (i, group) in groups.iter_mut().enumerate() {
             let active = (rays >> (i * LANES)) as u32 & 0xffff;
             if active != 0 {
-                nearer |= self.enter_group(
-                    s,
-                    bounds,
-                    group,
-                    i,
-                    (points, relative, spread),
-                    &leaf,
-                    &mut cache_indices,
-                    (triangles, used),
-                    active,
-                );
+                let cache_indices = &mut cache_indices;
+                let test = GroupTest { group, at: i, leaf: &leaf, cache_indices, triangles, active };
+                nearer |= self.enter_group(s, bounds, (points, relative, spread), used, test);
             }
         }
         nearer
     }
 
-    /// Intersects the active rays of an any-hit group with the triangles of a leaf, one ray at a time. `at` is the index of the group.
+    /// Intersects the active rays of an any-hit group with the triangles of a leaf, one ray at a
+    /// time. `at` is the index of the group.
     #[inline(always)]
     fn enter_leaf_singly<S: Simd, H: PacketBounds<S>, B: LeafMesh>(
         &mut self,
@@ -203,22 +212,19 @@ impl<G: Goal> PacketRays<'_, G> {
         }
     }
 
-    /// Intersects the active rays of a group with triangles of a leaf, a bit each, whose points are set in `used`. Returns whether any ray
-    /// has a nearer hit than before. This is a part of a kernel and inlined into it: the parameters are variables of its caller.
+    /// Intersects the active rays of a group with triangles of a leaf whose points are set in
+    /// `used`. Returns true if any ray has a nearer hit than before. This is a part of a kernel and
+    /// inlined into it.
     #[inline(always)]
-    #[expect(clippy::too_many_arguments)]
     fn enter_group<S: Simd, H: PacketBounds<S>>(
         &mut self,
         s: S,
         bounds: &H,
-        group: &mut RayGroup<S>,
-        at: usize,
         (points, relative, spread): (&mut ProjectedPoints, &RelativePoints, [f32; 2]),
-        leaf: &LeafPoints<'_>,
-        cache_indices: &mut [u8; WIDTH],
-        (triangles, used): (u32, u64),
-        active: u32,
+        used: u64,
+        test: GroupTest<'_, '_, S>,
     ) -> bool {
+        let (group, leaf) = (&*test.group, test.leaf);
         let floor = s.splat(f32::MIN_POSITIVE);
         if let Some(view) = bounds.view() {
             let along = CommonAxis(view.axis());
@@ -227,17 +233,7 @@ impl<G: Goal> PacketRays<'_, G> {
             let [size, depth] = spread;
             let error = edge_functions::error(s, s.splat(size + size), s.splat(depth), floor);
             let corners = ProjectedOnDemand { rows, projection: group.projection.relative(s) };
-            return self.test_triangles::<S, H>(
-                s,
-                group,
-                at,
-                &corners,
-                error,
-                leaf,
-                cache_indices,
-                triangles,
-                active,
-            );
+            return self.test_triangles::<S, H>(s, &corners, error, test);
         }
         let order = group.common.map_or([0, 1, 2], CommonAxis::order);
         // Copies stay in registers; fields of `group` would be loaded for each point.
@@ -258,26 +254,21 @@ impl<G: Goal> PacketRays<'_, G> {
         let size = s.add(greatest.coordinate, greatest.coordinate);
         let depth = s.add(greatest.depth, s.splat(self.object.bounds.origin_reach));
         let error = edge_functions::error(s, size, depth, floor);
-        self.test_triangles::<S, H>(s, group, at, &*points, error, leaf, cache_indices, triangles, active)
+        self.test_triangles::<S, H>(s, &*points, error, test)
     }
 
-    /// Intersects the active rays of a group with triangles, a bit each, given the projections of their corners. `error` bounds the errors
-    /// of the weights of all of them. Returns whether any ray has a nearer hit. As for [`Self::enter_group`], the parameters are
-    /// separate.
+    /// Intersects the active rays of a group with triangles, given the projections of their
+    /// corners. `error` bounds the errors of the weights of all of them. Returns true if any ray
+    /// has a nearer hit.
     #[inline(always)]
-    #[expect(clippy::too_many_arguments)]
     fn test_triangles<S: Simd, H: PacketBounds<S>>(
         &mut self,
         s: S,
-        group: &mut RayGroup<S>,
-        at: usize,
         corners: &impl CornerSource<S>,
         error: S::F,
-        leaf: &LeafPoints<'_>,
-        cache_indices: &mut [u8; WIDTH],
-        mut triangles: u32,
-        mut active: u32,
+        test: GroupTest<'_, '_, S>,
     ) -> bool {
+        let GroupTest { group, at, leaf, cache_indices, mut triangles, mut active } = test;
         let (mut nearer, origin_reach) = (false, self.object.bounds.origin_reach);
         let starting = self.starting_in(s, at, leaf.code);
         while triangles != 0 {

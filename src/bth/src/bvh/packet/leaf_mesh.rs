@@ -19,7 +19,8 @@ static OWN_POINTS: [[u8; WIDTH]; 3] = {
     corner
 };
 
-/// A leaf as points and triangles between them, so that what tests triangles is compiled once for both formats.
+/// A leaf as points and triangles between them, so that what tests triangles is compiled once for
+/// both formats.
 #[derive(Clone, Copy)]
 pub(crate) struct LeafPoints<'a> {
     /// For sixteen points a row of x, y and z each, then for the next sixteen.
@@ -60,7 +61,8 @@ impl LeafPoints<'_> {
 pub(crate) trait LeafMesh: TriangleBlock {
     /// The leaf as points and triangles; `code` is its child code.
     fn points(&self, code: u32) -> LeafPoints<'_>;
-    /// The triangles whose corners all lie beyond the same side of the bounds, a bit each: all rays miss them.
+    /// The triangles whose corners all lie beyond the same side of the bounds, a bit each: all rays
+    /// miss them.
     fn outside<S: Simd, H: PacketBounds<S>>(&self, s: S, bounds: &H) -> u32;
 }
 

@@ -1,4 +1,5 @@
-//! The rays of a packet with their queries, and the decisions in f64 about what the f32 tests of a packet leave open.
+//! The rays of a packet with their queries, and the decisions in f64 about what the f32 tests of a
+//! packet leave open.
 
 use super::entry::GROUPS;
 use super::hit_cache::{HitCache, UNCACHED};
@@ -29,7 +30,8 @@ pub(crate) struct PacketRays<'a, G: Goal> {
     pub(crate) alive: u64,
     /// Where the rays start.
     pub(crate) starts: Starts<'a>,
-    /// For each ray the child code of the leaf that holds the triangle on which it starts, and the slot there; not set without starts.
+    /// For each ray the child code of the leaf that holds the triangle on which it starts, and the
+    /// slot there; not set without starts.
     pub(crate) own: &'a mut [[[u32; LANES]; 2]; GROUPS],
 }
 
@@ -59,8 +61,8 @@ impl UncachedHits {
     }
 }
 
-/// Decides a candidate for the rays of lanes, and before it their pending hits, as a part of kernels. It is rare, so they call it
-/// on every instruction set.
+/// Decides a candidate for the rays of lanes, and before it their pending hits, as a part of
+/// kernels. It is rare, so they call it on every instruction set.
 pub(super) struct SettleLanes<'p, 'a, S: Simd, G: Goal> {
     pub(super) rays: &'p mut PacketRays<'a, G>,
     pub(super) group: &'p mut RayGroup<S>,

@@ -6,7 +6,8 @@ use crate::intersect::exact_lanes::F32Lanes;
 use crate::simd::{LANES, Lanewise, Simd};
 use bth_format::layout::WIDTH;
 
-/// Upper bound on the number of points of a leaf, three for each triangle: a power of two, to which indices are easily limited.
+/// Upper bound on the number of points of a leaf, three for each triangle: a power of two, to which
+/// indices are easily limited.
 pub(crate) const POINTS: usize = 4 * WIDTH;
 
 /// Projected points of a leaf: for each point x, y and depth in the projections along sixteen rays.
@@ -32,7 +33,8 @@ impl ProjectedPoints {
     }
 }
 
-/// Points of a leaf relative to the common origin of the rays: for each axis rows of sixteen coordinates.
+/// Points of a leaf relative to the common origin of the rays: for each axis rows of sixteen
+/// coordinates.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct RelativePoints([[F32Lanes; POINTS / LANES]; 3]);
@@ -54,8 +56,8 @@ impl RelativePoints {
         self.0[axis].as_flattened().first_chunk().expect("a row holds all points")
     }
 
-    /// Upper bounds of |x| or |y| and of |depth| in the projection along any ray, over the points whose bit is set in `used`, which
-    /// lie in the first `parts` rows.
+    /// Upper bounds of |x| or |y| and of |depth| in the projection along any ray, over the points
+    /// whose bit is set in `used`, which lie in the first `parts` rows.
     #[inline(always)]
     pub(crate) fn spread<S: Simd>(&self, s: S, view: &FrustumView, parts: usize, used: u64) -> [f32; 2] {
         let (mut size, mut depth) = (s.splat(0.0), s.splat(0.0));
@@ -90,7 +92,8 @@ impl<S: Simd> CornerSource<S> for ProjectedPoints {
     }
 }
 
-/// Projects corners at each use. For points relative to the rays' origin this takes less time than storing and loading them.
+/// Projects corners at each use. For points relative to the rays' origin this takes less time than
+/// storing and loading them.
 pub(crate) struct ProjectedOnDemand<'a, S: Simd> {
     pub(crate) rows: [&'a [f32; POINTS]; 3],
     pub(crate) projection: Projection<S>,
@@ -109,7 +112,7 @@ impl<S: Simd> CornerSource<S> for ProjectedOnDemand<'_, S> {
     }
 }
 
-/// Greatest |x| or |y| and greatest |depth| of projected points.
+/// Largest |x| or |y| and largest |depth| of projected points.
 pub(crate) struct ProjectedMaxima<S: Simd> {
     pub(crate) coordinate: S::F,
     pub(crate) depth: S::F,

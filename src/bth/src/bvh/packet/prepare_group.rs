@@ -45,13 +45,13 @@ impl<S: Simd> RayGroup<S> {
     }
 }
 
-/// Prepares the first sixteen of the rays, as a part of kernels; unused lanes repeat the last ray. Its output is false if a ray
-/// cannot be prepared in f32.
+/// Prepares the first sixteen of the rays, as a part of kernels; unused lanes repeat the last ray.
+/// Its output is false if a ray cannot be prepared in f32.
 pub(crate) struct PrepareGroup<'a, S: Simd, H> {
     group: &'a mut RayGroup<S>,
     bounds: &'a ObjectBounds,
     rays: &'a [Ray],
-    /// Whether origins and directions are needed later on.
+    /// True if origins and directions are needed later on.
     keeps_lines: bool,
     packet: PhantomData<H>,
 }
@@ -99,7 +99,8 @@ impl<S: Simd, H: PacketBounds<S>> Part<S> for PrepareGroup<'_, S, H> {
         // Groups are kept from one batch to the next, so hits of an earlier batch are removed here.
         group.nearest = s.splat(f32::INFINITY);
         group.pending = s.splat_u(NONE);
-        // `set_prepared` is called in both branches: joining the results first would pass them through memory.
+        // `set_prepared` is called in both branches: joining the results first would pass them
+        // through memory.
         let mut ready = true;
         for i in 0..S::PIECES {
             let p = s.piece(i);

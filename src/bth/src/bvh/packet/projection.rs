@@ -2,7 +2,8 @@
 
 use crate::simd::{Lanewise, Simd};
 
-/// The projection along sixteen rays, one in each lane, onto the plane that is perpendicular to the axis of the direction's greatest
+/// The projection along sixteen rays, one in each lane, onto the plane that is perpendicular to the
+/// axis of the direction's largest
 /// |component|.
 #[derive(Clone, Copy)]
 pub(crate) struct Projection<S: Lanewise> {
@@ -17,8 +18,8 @@ pub(crate) struct Projection<S: Lanewise> {
 }
 
 impl<S: Lanewise> Projection<S> {
-    /// Projects a point whose coordinates are in the order of the axes. The two coordinates in the plane are negated, which does not
-    /// change any weight.
+    /// Projects a point whose coordinates are in the order of the axes. The two coordinates in the
+    /// plane are negated, which does not change any weight.
     #[inline(always)]
     pub(crate) fn of(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
         let depth = s.fma(z, self.forward, self.start);
@@ -26,15 +27,17 @@ impl<S: Lanewise> Projection<S> {
         [s.fma(self.shear[0], depth, x), s.fma(self.shear[1], depth, y), depth]
     }
 
-    /// The projection for points relative to the common origin of the rays: its slopes are per unit of z, not of depth.
+    /// The projection for points relative to the common origin of the rays: its slopes are per unit
+    /// of z, not of depth.
     #[inline(always)]
     pub(crate) fn relative(mut self, s: S) -> Self {
         self.shear = [s.mul(self.shear[0], self.forward), s.mul(self.shear[1], self.forward)];
         self
     }
 
-    /// As [`Self::of`] for a point relative to the common origin. The depth is not used by the other coordinates, because for most
-    /// triangles it is not needed and its computation is removed.
+    /// As [`Self::of`] for a point relative to the common origin. The depth is not used by the
+    /// other coordinates, because for most triangles it is not needed and its computation is
+    /// removed.
     #[inline(always)]
     pub(crate) fn of_relative(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
         [s.fnma(self.shear[0], z, x), s.fnma(self.shear[1], z, y), s.mul(z, self.forward)]

@@ -1,8 +1,8 @@
 //! Sixteen rays of a packet, one in each lane.
 //!
-//! [`crate::intersect::boxes`] and [`crate::intersect::filter`] test one ray against sixteen boxes or triangles; here sixteen rays are
-//! tested against one box or triangle, by the same operations on the same prepared values ([`crate::intersect::prepare`]), so the same
-//! error bounds hold.
+//! [`crate::intersect::boxes`] and [`crate::intersect::filter`] test one ray against sixteen boxes
+//! or triangles; here sixteen rays are tested against one box or triangle, by the same operations
+//! on the same prepared values ([`crate::intersect::prepare`]), so the same error bounds hold.
 
 use super::bounds::PacketBounds;
 use super::hit_cache::{CachedHits, UNCACHED};
@@ -15,7 +15,8 @@ use crate::simd::{LANES, Lanewise, Part, Simd};
 use bth_format::layout::NONE;
 use std::marker::PhantomData;
 
-/// Sixteen rays and their hits so far. Fields whose names occur in [`prepare::PreparedLanes`] have the meaning documented there.
+/// Sixteen rays and their hits so far. Fields whose names occur in [`prepare::PreparedLanes`] have
+/// the meaning documented there.
 #[derive(Clone, Copy)]
 pub(crate) struct RayGroup<S: Simd> {
     pub(crate) origin: [S::F; 3],
@@ -27,22 +28,23 @@ pub(crate) struct RayGroup<S: Simd> {
     pub(super) negative: [S::M; 3],
     /// Depth of t = 1.
     pub(crate) scale: S::F,
-    /// Least depth of hits in the ray's range.
+    /// Smallest depth of hits in the ray's range.
     pub(crate) first: S::F,
     /// Upper limit of the depths of hits that can still change the result.
     pub(crate) limit: S::F,
     /// Distance (maximum norm) from the origin to the farthest corner of the object's box.
     pub(crate) reach: S::F,
-    /// The axis of each direction's greatest |component|.
+    /// The axis of each direction's largest |component|.
     pub(crate) mixed: MixedAxes<S>,
     /// That axis, if it is the same for all rays.
     pub(crate) common: Option<CommonAxis>,
     pub(crate) projection: Projection<S>,
-    /// Least and greatest depth between which a hit is certainly in the ray's range.
+    /// Smallest and largest depth between which a hit is certainly in the ray's range.
     pub(crate) certain: [S::F; 2],
     /// Lower bound of the depth of the nearest hit so far.
     pub(crate) nearest: S::F,
-    /// The triangle of the pending hit: its index in the [`HitCache`](super::hit_cache::HitCache), [`UNCACHED`], or `NONE` without one.
+    /// The triangle of the pending hit: its index in the [`HitCache`](super::hit_cache::HitCache),
+    /// [`UNCACHED`], or `NONE` without one.
     pub(crate) pending: S::U,
     /// For an uncached pending hit the child code of its leaf.
     pub(crate) leaf: S::U,
@@ -56,11 +58,11 @@ pub(crate) struct RayGroup<S: Simd> {
 
 /// Limits of the depths of hits of rays, one in each lane.
 pub(crate) struct RayLimits<S: Lanewise> {
-    /// Least depth of hits in the ray's range.
+    /// Smallest depth of hits in the ray's range.
     pub(crate) first: S::F,
     /// Upper limit of the depths of hits that can still change the result.
     pub(crate) limit: S::F,
-    /// Least and greatest depth between which a hit is certainly in the ray's range.
+    /// Smallest and largest depth between which a hit is certainly in the ray's range.
     pub(crate) certain: [S::F; 2],
 }
 
@@ -70,7 +72,7 @@ pub(crate) struct GroupSlabs<S: Lanewise> {
     near_addend: [S::F; 3],
     far_addend: [S::F; 3],
     negative: [S::M; 3],
-    /// Least and greatest depth.
+    /// Smallest and largest depth.
     depths: [S::F; 2],
 }
 
@@ -93,8 +95,8 @@ impl<S: Lanewise> GroupSlabs<S> {
         s.mask_bits(self.enter(s, corners, kind).1)
     }
 
-    /// The depths at which the rays enter a box, and the rays that may meet it within their range. The parameters are those of
-    /// [`Self::may_enter`].
+    /// The depths at which the rays enter a box, and the rays that may hit it within their range.
+    /// The parameters are those of [`Self::may_enter`].
     #[inline(always)]
     pub(crate) fn enter(
         &self,
@@ -152,7 +154,8 @@ impl<S: Simd> RayGroup<S> {
         }
     }
 
-    /// Sets the pending hit of masked lanes to `triangle`, given as for `pending`. `depth` holds the bounds of its depth.
+    /// Sets the pending hit of masked lanes to `triangle`, given as for `pending`. `depth` holds
+    /// the bounds of its depth.
     #[inline(always)]
     pub(crate) fn accept(&mut self, s: S, m: S::M, depth: [S::F; 2], triangle: u32) {
         self.nearest = s.select(m, depth[0], self.nearest);
@@ -167,7 +170,8 @@ impl<S: Simd> RayGroup<S> {
         self.triangle = s.select_u(m, s.splat_u(triangle), self.triangle);
         self.index = s.select_u(m, s.splat_u(leaf.first + triangle), self.index);
         for (corner, point) in self.corner.iter_mut().zip(leaf.points_of(triangle as usize)) {
-            // Each is loaded directly from the leaf: loading vectors from an array that was just written by words would stall.
+            // Each is loaded directly from the leaf: loading vectors from an array that was just
+            // written by words would stall.
             let point = leaf.point(point);
             for k in 0..3 {
                 corner[k] = s.select(m, s.splat(point[k]), corner[k]);
@@ -214,8 +218,9 @@ impl<S: Simd> RayGroup<S> {
         }
     }
 
-    /// The rays that may meet a box within their range, a bit each. If all directions lie in one octant ([`PacketBounds::MIXED_OCTANTS`] is
-    /// false), the corners are that at which rays enter the box and that at which they leave, else the lower and the upper one.
+    /// The rays that may hit a box within their range, a bit each. If all directions lie in one
+    /// octant ([`PacketBounds::MIXED_OCTANTS`] is false), the corners are that at which rays enter
+    /// the box and that at which they leave, else the lower and the upper one.
     #[inline(always)]
     pub(crate) fn may_enter<H: PacketBounds<S>>(&self, s: S, corners: [[f32; 3]; 2]) -> u32 {
         let slabs = GroupSlabs {
@@ -247,7 +252,8 @@ impl<S: Simd> RayGroup<S> {
     }
 }
 
-/// Computes the pending hits of a group, as a part of kernels. Without any, only the bit masks of `intersections` are cleared.
+/// Computes the pending hits of a group, as a part of kernels. Without any, only the bit masks of
+/// `intersections` are cleared.
 pub(crate) struct IntersectGroup<'a, 'c, S: Simd, H> {
     pub(crate) group: &'a RayGroup<S>,
     pub(crate) cached: &'a mut CachedHits<'c>,

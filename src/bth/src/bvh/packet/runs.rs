@@ -1,5 +1,5 @@
-//! Selection of the rays of a batch that are traced in packets: runs of consecutive coherent rays, as long as enough of their rays take
-//! part in each step.
+//! Selection of the rays of a batch that are traced in packets: runs of consecutive coherent rays,
+//! as long as enough of their rays take part in each step.
 
 use super::backoff::{Backoffs, KindBackoffs};
 use super::bounds::PacketBounds;
@@ -19,7 +19,8 @@ use bth_format::layout::NONE;
 use bth_format::object::ObjectBounds;
 use bth_format::object::ObjectView;
 
-/// The least average share of a packet's rays, in per cent, that must take part in a step. Below it single rays are faster.
+/// The smallest average share of a packet's rays, in per cent, that must take part in a step. Below
+/// it single rays are faster.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MinimumUse {
     /// The share for coherent rays.
@@ -30,7 +31,8 @@ pub(crate) struct MinimumUse {
 
 /// The shares that were measured to be the fastest (docs/notes/packets.md).
 pub(crate) const MINIMUM_USE: MinimumUse = MinimumUse { coherent: 10, short: 8 };
-/// The same for [large](is_large) objects: single rays wait less for memory, because many are interleaved.
+/// The same for [large](is_large) objects: single rays wait less for memory, because many are
+/// interleaved.
 const MINIMUM_USE_OF_LARGE: MinimumUse = MinimumUse { coherent: 20, ..MINIMUM_USE };
 
 impl MinimumUse {
@@ -63,13 +65,14 @@ pub(crate) struct PacketCount {
     pub(crate) poor: usize,
 }
 
-/// Kernel that traces the coherent rays of a batch in packets and stores the answers of those that hit something. The indices of
-/// the other rays are left in `scratch.rest`, unless no packets were tried; then the returned count is 0.
+/// Kernel that traces the coherent rays of a batch in packets and stores the answers of those that
+/// hit something. The indices of the other rays are left in `scratch.rest`, unless no packets were
+/// tried; then the returned count is 0.
 pub(crate) struct Packets<'a, 's, G: Goal> {
     pub object: &'a ObjectView<'a>,
     pub rays: &'a [Ray],
     pub scratch: &'a mut PacketScratch,
-    /// The least use of packets for which they are made.
+    /// The smallest use of packets for which they are made.
     pub least: MinimumUse,
     pub sink: &'a mut Sink<'s>,
     pub goal: G,
@@ -113,7 +116,8 @@ impl<G: Goal> Kernel for Packets<'_, '_, G> {
             let sink = &mut sink.part(first);
             let (outcome, backoff, least_use, kind) = match run.kind {
                 Kind::Coherent(span) => {
-                    // Any-hit rays with the same origin are rare, so that kernel is compiled for nearest hits only.
+                    // Any-hit rays with the same origin are rare, so that kernel is compiled for
+                    // nearest hits only.
                     let outcome = if !goal.is_any() && sink.starts().is_empty() && span.is_from_point() {
                         frustum::<S, G, true>(s, object, &bounds, &span, &mut packets, rays, sink)
                     } else {
@@ -121,7 +125,8 @@ impl<G: Goal> Kernel for Packets<'_, '_, G> {
                     };
                     (outcome, &mut runs.backoffs.coherent, least.coherent, &mut count.coherent)
                 }
-                // Runs of short rays are found for any-hit queries only, so no kernel is compiled for others.
+                // Runs of short rays are found for any-hit queries only, so no kernel is compiled
+                // for others.
                 Kind::Short(_) if !goal.is_any() => {
                     (PacketOutcome::Refused, &mut runs.backoffs.short, least.short, &mut count.short)
                 }
@@ -158,7 +163,7 @@ impl<G: Goal> Kernel for Packets<'_, '_, G> {
     }
 }
 
-/// Whether packets support an object: no tet leaf lacks a subtree.
+/// Returns true if packets support an object: no tet leaf lacks a subtree.
 #[inline(always)]
 fn is_supported(object: &ObjectView<'_>) -> bool {
     object.tet_leaves.first().is_none_or(|leaf| leaf.subtree != NONE)
@@ -223,7 +228,7 @@ impl<'a> Runs<'a, '_> {
 struct Choose<'a> {
     bounds: &'a ObjectBounds,
     rays: &'a [Ray],
-    /// Whether the rays may make a packet of coherent rays, or one of short rays.
+    /// True if the rays may make a packet of coherent rays, or one of short rays.
     try_coherent: bool,
     try_short: bool,
 }
@@ -263,7 +268,8 @@ fn choose(
     Choose { bounds, rays, try_coherent, try_short }.inline_or_call(s)
 }
 
-/// Traces a run of coherent rays. The parameters are separate, because this is a part of the kernel [`Packets`].
+/// Traces a run of coherent rays. The parameters are separate, because this is a part of the kernel
+/// [`Packets`].
 #[inline(always)]
 fn frustum<S: Simd, G: Goal, const POINT: bool>(
     s: S,
@@ -285,7 +291,8 @@ fn frustum<S: Simd, G: Goal, const POINT: bool>(
     TracePacket { packets, object, bounds: &frustum, rays, sink }.inline_or_call(s)
 }
 
-/// Prepares the groups of a packet, with the lines of their rays where these are needed later on; false if a ray cannot be prepared in f32.
+/// Prepares the groups of a packet, with the lines of their rays where these are needed later on;
+/// false if a ray cannot be prepared in f32.
 #[inline(always)]
 fn prepare<S: Simd, G: Goal, H: PacketBounds<S>>(
     s: S,

@@ -1,7 +1,9 @@
-//! Tests of the rays of a packet one at a time, against all children of a node or all triangles of a leaf, where few rays are left.
+//! Tests of the rays of a packet one at a time, against all children of a node or all triangles of
+//! a leaf, where few rays are left.
 //!
-//! Half of the leaves that sixteen rays of ambient occlusion enter are met by one of them only (docs/notes/packets.md). Testing one ray
-//! against sixteen triangles at once is then far faster than testing sixteen rays against each triangle in turn.
+//! Half of the leaves that sixteen rays of ambient occlusion enter are hit by one of them only
+//! (docs/notes/packets.md). Testing one ray against sixteen triangles at once is then far faster
+//! than testing sixteen rays against each triangle in turn.
 
 use super::bounds::PacketBounds;
 use super::entry::{GROUPS, StackEntry};
@@ -12,16 +14,17 @@ use crate::intersect::prepare::{Prepared, PreparedRay};
 use crate::simd::{LANES, Lanewise, Part, Simd};
 use bth_format::layout::{WIDTH, WideNode};
 
-/// Greatest number of rays of a group that are tested one at a time in a leaf, by measurement.
+/// Largest number of rays of a group that are tested one at a time in a leaf, by measurement.
 pub(crate) const FEW_OF_GROUP: u32 = 6;
-/// Greatest number of rays of a packet that are tested one at a time in a node, by measurement.
+/// Largest number of rays of a packet that are tested one at a time in a node, by measurement.
 pub(crate) const FEW_OF_PACKET: u32 = 24;
 
 /// The rays of a packet as prepared single rays. Groups are converted at their first use.
 #[derive(Debug)]
 pub(crate) struct SingleRays {
     group: [Prepared; GROUPS],
-    /// For each group the least and the greatest depth of hits that can change the rays' results, at the time of conversion.
+    /// For each group the smallest and the largest depth of hits that can change the rays' results,
+    /// at the time of conversion.
     depths: [[F32Lanes; 2]; GROUPS],
     /// A bit for each converted group.
     ready: u32,
@@ -64,8 +67,8 @@ impl SingleRays {
         self.ready = 0;
     }
 
-    /// Converts the rays of a group unless this has been done. Values for box tests are written only if `for_boxes`, because no other
-    /// use of them follows.
+    /// Converts the rays of a group unless this has been done. Values for box tests are written
+    /// only if `for_boxes`, because no other use of them follows.
     #[inline(always)]
     fn convert<S: Simd>(&mut self, s: S, group: &RayGroup<S>, at: usize, for_boxes: bool) {
         if self.ready >> at & 1 == 0 {
@@ -86,7 +89,8 @@ impl SingleRays {
         self.group[at % GROUPS].prepared(lane).expect("packets are made of rays that are prepared")
     }
 
-    /// The triangles of a leaf that a ray of a group may hit; parameters as for its [filter](crate::intersect::filter::TriangleFilter).
+    /// The triangles of a leaf that a ray of a group may hit; parameters as for its
+    /// [filter](crate::intersect::filter::TriangleFilter).
     #[inline(always)]
     pub(crate) fn candidates<S: Simd, H: PacketBounds<S>>(
         &mut self,
@@ -102,7 +106,8 @@ impl SingleRays {
         self.prepared(at, lane).filter.candidates(s, block, first, last, origin_reach)
     }
 
-    /// Writes the stack entries of the children of a node that any of the given rays may meet; returns their number.
+    /// Writes the stack entries of the children of a node that any of the given rays may hit;
+    /// returns their number.
     #[inline(always)]
     pub(crate) fn children<S: Simd>(
         &mut self,
@@ -112,7 +117,8 @@ impl SingleRays {
         (parent, node): (u32, &WideNode),
         entries: &mut [StackEntry; WIDTH],
     ) -> usize {
-        // A lane for each child, with a bit for each ray that may meet it: the first word for rays 0 to 31, the second for the others.
+        // A lane for each child, with a bit for each ray that may hit it: the first word for rays 0
+        // to 31, the second for the others.
         let (mut meeting, mut children) = ([s.splat_u(0); 2], 0);
         while rays != 0 {
             let ray = rays.trailing_zeros() as usize;
@@ -153,7 +159,7 @@ mod tests {
     use bth_format::object::ObjectBounds;
     use bth_random::Rng;
 
-    /// For each child the rays that may meet it, a bit each. The last field holds the rays to test.
+    /// For each child the rays that may hit it, a bit each. The last field holds the rays to test.
     struct Children<'a>(&'a [Ray], &'a WideNode, u64);
 
     impl Kernel for Children<'_> {

@@ -1,4 +1,5 @@
-//! Tests that packets give the same bits as single rays with every instruction set, over a surface of triangles with shared edges.
+//! Tests that packets give the same bits as single rays with every instruction set, over a surface
+//! of triangles with shared edges.
 
 use crate::bvh::height_field::HeightField;
 use crate::bvh::packet::runs::{MINIMUM_USE, MinimumUse, PacketCount, PacketScratch, Packets};
@@ -67,7 +68,8 @@ fn batch(object: &ObjectView<'_>, rays: &[Ray]) -> Vec<(Hit, bool)> {
     hits.into_iter().zip(found).collect()
 }
 
-/// Compares packets with single rays; returns the statistics and the number of hits, for nearest and for any-hit queries.
+/// Compares packets with single rays; returns the statistics and the number of hits, for nearest
+/// and for any-hit queries.
 fn check(surface: &HeightField, rays: &[Ray], least: MinimumUse) -> [(PacketCount, usize); 2] {
     let object = surface.view();
     let (mut nearest, mut any) = Default::default();
@@ -99,8 +101,8 @@ fn unit(rng: &mut Rng) -> f32 {
     rng.below(1 << 24) as f32 / (1 << 23) as f32 - 1.0
 }
 
-/// Runs of 64 rays from near a camera to near a point of the surface; with `exact` they start exactly at the camera and are aimed at
-/// points of the surface.
+/// Runs of 64 rays from near a camera to near a point of the surface; with `exact` they start
+/// exactly at the camera and are aimed at points of the surface.
 fn bundles(surface: &HeightField, scale: f32, exact: bool, seed: u64) -> Vec<Ray> {
     let mut rng = Rng::new(seed);
     let mut rays = vec![];
@@ -176,7 +178,8 @@ fn views_from_one_point_are_traced_to_the_same_bits() {
     }
     let [(count, hits), _] = check(&surface, &rays, ALWAYS);
     assert!(count.coherent > 60 && hits > 1000, "{count:?}, {hits}");
-    // The numbers of triangles that a packet hits include at most half of the hit cache, more than half, and more than it holds.
+    // The numbers of triangles that a packet hits include at most half of the hit cache, more than
+    // half, and more than it holds.
     let all: Vec<Hit> = rays.iter().map(|ray| alone(&surface.view(), ray).0).collect();
     let mut runs = [0; 3];
     for run in all.chunks(64) {
@@ -245,7 +248,8 @@ fn packets_with_few_active_rays_are_followed_by_single_rays() {
     }
 }
 
-/// Runs of coherent rays that pass the surface far from one another, so that few take part in a step.
+/// Runs of coherent rays that pass the surface far from one another, so that few take part in a
+/// step.
 fn poor_bundles(surface: &HeightField) -> Vec<Ray> {
     let mut rays = bundles(surface, 1.0, false, 8);
     let mut rng = Rng::new(9);

@@ -1,9 +1,10 @@
 //! Traversal of the wide BVH by a packet of up to 64 rays.
 //!
-//! The sixteen children of a node are tested against the bounds of all rays ([`super::bounds`]), and those that remain against the rays,
-//! sixteen at a time. Triangles are decided as for single rays: the f32 filter excludes those that are certainly missed; one that is
-//! certainly hit, and certainly nearer than all before, becomes the ray's pending hit, which is computed at the end; the others are
-//! decided at once ([`crate::bvh::candidate`]).
+//! The sixteen children of a node are tested against the bounds of all rays ([`super::bounds`]),
+//! and those that remain against the rays, sixteen at a time. Triangles are decided as for single
+//! rays: the f32 filter excludes those that are certainly missed; one that is certainly hit, and
+//! certainly nearer than all before, becomes the ray's pending hit, which is computed at the end;
+//! the others are decided at once ([`crate::bvh::candidate`]).
 
 use super::bounds::PacketBounds;
 use super::buffers::PacketBuffers;
@@ -25,7 +26,8 @@ use bth_format::layout::{Child, WIDTH};
 use bth_format::object::ObjectView;
 use std::marker::PhantomData;
 
-/// The state of a packet: its prepared rays, their queries and its memory. One value serves all packets of a batch.
+/// The state of a packet: its prepared rays, their queries and its memory. One value serves all
+/// packets of a batch.
 pub(crate) struct PacketTracer<'a, S: Simd, G> {
     pub(super) goal: G,
     pub(crate) groups: &'a mut [RayGroup<S>; GROUPS],
@@ -36,14 +38,16 @@ pub(crate) struct PacketTracer<'a, S: Simd, G> {
 /// Result of the traversal of a packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PacketOutcome {
-    /// The packet was traced; the value is the average share of its rays that took part in a step, in per cent.
+    /// The packet was traced; the value is the average share of its rays that took part in a step,
+    /// in per cent.
     Lanes(u32),
     /// The packet met something that only single rays support. No answer has been stored.
     Refused,
 }
 
-/// Traces the rays for which the groups have been prepared, and stores the answers of those that hit something. It is a part of kernels,
-/// so that the variables of packets with one kind of bounds are not in the way of others.
+/// Traces the rays for which the groups have been prepared, and stores the answers of those that
+/// hit something. It is a part of kernels, so that the variables of packets with one kind of bounds
+/// are not in the way of others.
 pub(super) struct TracePacket<'p, 'a, 's, S: Simd, G: Goal, H> {
     pub(super) packets: &'p mut PacketTracer<'a, S, G>,
     pub(super) object: &'p ObjectView<'p>,
@@ -54,7 +58,8 @@ pub(super) struct TracePacket<'p, 'a, 's, S: Simd, G: Goal, H> {
 
 impl<S: Simd, G: Goal, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, S, G, H> {
     type Output = PacketOutcome;
-    /// This is longer than other functions: all steps share code, mask, limit and the top of the stack.
+    /// This is longer than other functions: all steps share code, mask, limit and the top of the
+    /// stack.
     #[inline(always)]
     fn run(self, s: S) -> PacketOutcome {
         let TracePacket { packets, object, bounds, rays, sink } = self;
@@ -95,7 +100,8 @@ impl<S: Simd, G: Goal, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, S
             }
         }
         if let Some(group) = groups.last_mut() {
-            // Lanes without a ray get the least limit, so that they never keep a child or a triangle.
+            // Lanes without a ray get the smallest limit, so that they never keep a child or a
+            // triangle.
             let valid = s.mask((all >> ((rays.rays.len() - 1) / LANES * LANES)) as u32);
             group.limit = s.select(valid, group.limit, s.splat(f32::MIN));
         }
@@ -151,7 +157,8 @@ impl<S: Simd, G: Goal, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, S
                 let node = object.node(entry.parent);
                 code = node.child[entry.slot as usize % WIDTH];
                 prefetch_into(s, CacheLevel::waiting(), object.node_base(), code);
-                // The rays are tested against the box only here, because hits since the parent was entered may have shortened them.
+                // The rays are tested against the box only here, because hits since the parent was
+                // entered may have shortened them.
                 if !H::MIXED_OCTANTS {
                     mask &= meeting(s, bounds, groups, mask, node, entry.slot);
                 }
@@ -184,7 +191,8 @@ fn finish<S: Simd, H: PacketBounds<S>, G: Goal>(
         }
         return;
     }
-    // All groups are computed before any answer is stored, so that the divisions of one group overlap with the next.
+    // All groups are computed before any answer is stored, so that the divisions of one group
+    // overlap with the next.
     let mut cached = CachedHits {
         origin: rays.rays[0].origin,
         ids: rays.object.triangle_ids,
@@ -229,7 +237,7 @@ fn finish<S: Simd, H: PacketBounds<S>, G: Goal>(
     }
 }
 
-/// The greatest limit of all rays.
+/// The largest limit of all rays.
 #[inline(always)]
 fn farthest_limit<S: Simd>(s: S, groups: &[RayGroup<S>]) -> f32 {
     let mut farthest = groups[0].limit;

@@ -2,17 +2,20 @@
 
 use crate::simd::{Lanewise, Simd};
 
-/// The axes of projection of sixteen rays: of each ray the axis z of its direction's greatest |component|, and for the plane of
-/// projection the next axis and the one after it in cyclic order. [`Line`](crate::intersect::line::Line) swaps the plane's axes
-/// of rays with a negative z, to keep the orientation; the conservative tests do not depend on the orientation.
+/// The axes of projection of sixteen rays: of each ray the axis z of its direction's largest
+/// |component|, and for the plane of projection the next axis and the one after it in cyclic order.
+/// [`Line`](crate::intersect::line::Line) swaps the plane's axes of rays with a negative z, to keep
+/// the orientation; the conservative tests do not depend on the orientation.
 pub(crate) trait Axes<S: Lanewise> {
-    /// Permutes x, y and z of points to the coordinates along the plane's two axes and along the third axis.
+    /// Permutes x, y and z of points to the coordinates along the plane's two axes and along the
+    /// third axis.
     fn permute(&self, s: S, point: [S::F; 3]) -> [S::F; 3];
     /// Indices of the axes, in the same order.
     fn axes(&self, s: S) -> [S::U; 3];
 }
 
-/// Axes of rays whose greatest |components| may lie along different axes. Where neither bit is set, the axis is z.
+/// Axes of rays whose largest |components| may lie along different axes. Where neither bit is set,
+/// the axis is z.
 #[derive(Clone, Copy)]
 pub(crate) struct MixedAxes<S: Lanewise> {
     pub(crate) is_x: S::M,
@@ -68,7 +71,7 @@ impl<S: Simd> MixedAxes<S> {
     }
 }
 
-/// Axes of rays whose greatest |components| all lie along the axis of this index.
+/// Axes of rays whose largest |components| all lie along the axis of this index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct CommonAxis(pub(crate) usize);
 

@@ -1,4 +1,5 @@
-//! Preparation of sixteen rays in lanes: the fields of [`PreparedRay`], before they are transposed to one record for each ray.
+//! Preparation of sixteen rays in lanes: the fields of [`PreparedRay`], before they are transposed
+//! to one record for each ray.
 
 use super::axes::Axes;
 use super::{HitProgress, LARGEST, PreparedRay, ROUND_UP, SMALLEST};
@@ -40,30 +41,32 @@ pub(crate) fn pick_rays<S: Simd>(p: S::Piece, field: &[S::F; 8]) -> [<S::Piece a
     out
 }
 
-/// The fields of [`PreparedRay`] for sixteen rays or a piece of them, from which [`PreparedLanes::rows`] computes the records.
+/// The fields of [`PreparedRay`] for sixteen rays or a piece of them, from which
+/// [`PreparedLanes::rows`] computes the records.
 pub(crate) struct PreparedLanes<S: Lanewise> {
     pub(crate) reciprocal: [S::F; 3],
     pub(crate) near_addend: [S::F; 3],
     pub(crate) far_addend: [S::F; 3],
-    /// Whether the components of the direction are negative.
+    /// True if the components of the direction are negative.
     pub(crate) negative: [S::M; 3],
     pub(crate) scale: S::F,
-    /// Least and greatest depth at which a hit may lie in the ray's range.
+    /// Smallest and largest depth at which a hit may lie in the ray's range.
     pub(crate) depths: [S::F; 2],
-    /// Least and greatest depth at which a hit certainly lies in the ray's range.
+    /// Smallest and largest depth at which a hit certainly lies in the ray's range.
     pub(crate) certain: [S::F; 2],
     pub(crate) axis: [S::U; 3],
     pub(crate) origin: [S::F; 2],
     pub(crate) shear: [S::F; 2],
     pub(crate) forward: S::F,
     pub(crate) start: S::F,
-    /// Greatest |coordinate| of the object's box relative to the ray's origin.
+    /// Largest |coordinate| of the object's box relative to the ray's origin.
     pub(crate) reach: S::F,
     /// Rays that f32 can prepare and whose range of t is not empty.
     pub(crate) usable: S::M,
 }
 
-/// Prepares sixteen rays for an object of these bounds, given the floats of the rays ([`gather_rays`]).
+/// Prepares sixteen rays for an object of these bounds, given the floats of the rays
+/// ([`gather_rays`]).
 #[inline(always)]
 pub(crate) fn prepare_lanes<S: Lanewise>(
     s: S,
@@ -79,7 +82,8 @@ pub(crate) fn prepare_lanes<S: Lanewise>(
 
     let mut reach = zero;
     let mut farthest = zero;
-    // Sums of |coordinates| detect NaN; a maximum would not, because the greater of NaN and a number may be the number.
+    // Sums of |coordinates| detect NaN; a maximum would not, because the greater of NaN and a
+    // number may be the number.
     let (mut origin_sum, mut direction_sum) = (zero, zero);
     for k in 0..3 {
         let far =
@@ -122,7 +126,8 @@ pub(crate) fn prepare_lanes<S: Lanewise>(
         s.fma(s.add(greatest, s.splat(1.0)), s.splat(f32::MIN_POSITIVE), s.splat(bounds.origin_error));
     let ulps = s.splat(4.0 / (1 << 24) as f32);
     let slack = |depth: S::F| s.fma(s.abs(depth), ulps, least);
-    // For the least normal number and denormal ones, whose products would be denormal, 0 stands: that moves them by less than the slack.
+    // For the smallest normal number and denormal ones, whose products would be denormal, 0 stands:
+    // that moves them by less than the slack.
     let start = s.select(s.le(s.abs(tmin), s.splat(f32::MIN_POSITIVE)), zero, tmin);
     let first = s.max(s.mul(start, greatest), s.splat(-f32::MAX));
     let limit = s.mul(tmax, greatest);
@@ -151,7 +156,8 @@ macro_rules! row {
 }
 
 impl<S: Lanewise> PreparedLanes<S> {
-    /// The words of sixteen [`PreparedRay`]s, a vector for each word; `at` holds the indices of the rays in the batch.
+    /// The words of sixteen [`PreparedRay`]s, a vector for each word; `at` holds the indices of the
+    /// rays in the batch.
     #[inline(always)]
     pub(super) fn rows(&self, s: S, at: S::U) -> [S::F; 2 * LANES] {
         let mut rows = [s.splat(0.0); 2 * LANES];

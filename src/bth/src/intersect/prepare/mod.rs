@@ -1,8 +1,9 @@
-//! Preparation of rays for the BVH: the per-ray constants of box tests and filter, in f32 for one ray or for sixteen at once.
+//! Preparation of rays for the BVH: the per-ray constants of box tests and filter, in f32 for one
+//! ray or for sixteen at once.
 //!
-//! The results satisfy the bounds that [`RaySlabs`] and [`TriangleFilter`] need, but differ in their bits from those of their
-//! constructors, which compute in f64. Rays whose coordinates are too great or too small for f32 are prepared by those
-//! constructors.
+//! The results satisfy the bounds that [`RaySlabs`] and [`TriangleFilter`] need, but differ in
+//! their bits from those of their constructors, which compute in f64. Rays whose coordinates are
+//! too great or too small for f32 are prepared by those constructors.
 
 mod axes;
 mod lanes;
@@ -24,32 +25,34 @@ use std::mem::offset_of;
 use std::ops::Range;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// f32 prepares rays whose |coordinates| are below this and whose greatest |component| of the direction lies between 1 /
-/// `LARGEST` and `LARGEST`.
+/// f32 prepares rays whose |coordinates| are below this and whose largest |component| of the
+/// direction lies between 1 / `LARGEST` and `LARGEST`.
 pub(crate) const LARGEST: f32 = GREATEST_IN_F32;
-/// Where the sum of the greatest |coordinates| of box and origin is not above this, pads could underflow.
+/// Where the sum of the largest |coordinates| of box and origin is not above this, pads could
+/// underflow.
 pub(crate) const SMALLEST: f32 = boxes::SMALLEST_EXTENT as f32;
 /// Factor that turns a result of a few f32 roundings into an upper bound.
 const ROUND_UP: f32 = 1.0 + 1.0 / (1 << 20) as f32;
 
-/// Whether `x` is greater than `lower` and less than `upper`, which are positive numbers. One comparison of bits decides, and tells NaN,
-/// infinity and negative numbers from numbers between both.
+/// Returns true if `x` is greater than `lower` and less than `upper`, which are positive numbers.
+/// One comparison of bits decides, and tells NaN, infinity and negative numbers from numbers
+/// between both.
 #[inline(always)]
 fn lies_between(x: f32, lower: f32, upper: f32) -> bool {
     let first = lower.to_bits() + 1;
     x.to_bits().wrapping_sub(first) < upper.to_bits() - first
 }
 
-/// Whether `tmin` is `f32::MIN_POSITIVE` or a denormal number, of either sign: products would be denormal. The slack of depths makes 0 stand
-/// for it.
+/// Returns true if `tmin` is `f32::MIN_POSITIVE` or a denormal number, of either sign: products
+/// would be denormal. The slack of depths makes 0 stand for it.
 #[inline(always)]
 fn is_tiny(tmin: f32) -> bool {
     tmin.abs().to_bits().wrapping_sub(1) < f32::MIN_POSITIVE.to_bits()
 }
 
-/// Upper bound of what the pads of boxes are relative to ([`boxes::PAD`]), for origins whose |coordinates| do not exceed `farthest`
-/// and that are no farther from any corner of the object's box than `reach`; and whether f32 can prepare such rays. It cannot where
-/// `farthest` is NaN.
+/// Upper bound of what the pads of boxes are relative to ([`boxes::PAD`]), for origins whose
+/// |coordinates| do not exceed `farthest` and that are no farther from any corner of the object's
+/// box than `reach`; and whether f32 can prepare such rays. It cannot where `farthest` is NaN.
 #[inline(always)]
 pub(crate) fn padded_extent(bounds: &ObjectBounds, farthest: f32, reach: f32) -> (f32, bool) {
     let away = farthest + bounds.away;
@@ -57,8 +60,9 @@ pub(crate) fn padded_extent(bounds: &ObjectBounds, farthest: f32, reach: f32) ->
     (extent, lies_between(extent, SMALLEST, LARGEST) & (farthest < LARGEST))
 }
 
-/// A ray prepared for box tests and for the filter, with the progress of its traversal. The first cache line holds what node
-/// steps read, the second what leaves read and write, so that interleaved rays take little of the L1 cache.
+/// A ray prepared for box tests and for the filter, with the progress of its traversal. The first
+/// cache line holds what node steps read, the second what leaves read and write, so that
+/// interleaved rays take little of the L1 cache.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub(crate) struct PreparedRay {
@@ -77,8 +81,9 @@ const _: () = assert!(offset_of!(PreparedRay, filter) == 64 && size_of::<Prepare
 pub(crate) struct HitProgress {
     /// Lower bound of the depth of the nearest hit so far.
     pub(crate) nearest: f32,
-    /// Leaf of the pending hit, which is certainly the nearest so far but whose t, u and v are not yet computed; else `NONE`.
-    /// Most rays find several hits, each nearer than the one before, and only the last is computed in f64.
+    /// Leaf of the pending hit, which is certainly the nearest so far but whose t, u and v are not
+    /// yet computed; else `NONE`. Most rays find several hits, each nearer than the one before, and
+    /// only the last is computed in f64.
     pub(crate) leaf: u32,
     /// Index of the pending hit's triangle in its leaf.
     pub(crate) triangle: u16,
@@ -103,8 +108,8 @@ impl PreparedRay {
         PreparedRay { slabs, ray: 0, filter, progress: HitProgress::NOTHING }
     }
 
-    /// Prepares a single ray, with the same error bounds as [`Prepared::fill`]. None if f32 cannot prepare it or if its range
-    /// of t is empty.
+    /// Prepares a single ray, with the same error bounds as [`Prepared::fill`]. None if f32 cannot
+    /// prepare it or if its range of t is empty.
     #[inline(always)]
     pub(crate) fn of<S: Simd>(s: S, bounds: &ObjectBounds, ray: &Ray) -> Option<PreparedRay> {
         let rows: [[f32; 4]; 2] = zerocopy::transmute!(*ray);
@@ -121,14 +126,15 @@ impl PreparedRay {
     ) -> Option<PreparedRay> {
         let (tmin, tmax) = (start.w, end.w);
         let (o, d) = (Vec3A::from_vec4(start), Vec3A::from_vec4(end));
-        // The fourth lane is not tmax, which as f32::MAX would make the reciprocal denormal, and so take hundreds of cycles.
+        // The fourth lane is not tmax, which as f32::MAX would make the reciprocal denormal, and so
+        // take hundreds of cycles.
         let size = Vec3A::from_vec4(end.abs().xyzz());
         let [lower, upper] = [bounds.lower, bounds.upper].map(|p| Vec3A::from_vec4(Vec4::from_array(p)));
         let reach = (lower - o).abs().max((upper - o).abs()).max_element() + bounds.origin_reach;
         let greatest = s.greatest_of_three(end.abs().to_array());
         let [greatest_origin, ..] = s.greatest_of_three(start.abs().to_array());
         let (greatest, greatest_lanes) = (greatest[0], Vec3A::from_vec4(Vec4::from_array(greatest)));
-        // NaN and infinity among the components make these the greatest.
+        // NaN and infinity among the components make these the largest.
         let (extent, is_prepared) = padded_extent(bounds, greatest_origin, reach);
         if !(lies_between(greatest, 1.0 / LARGEST, LARGEST) & is_prepared & (tmin <= tmax) & !is_tiny(tmin)) {
             return None;
@@ -141,8 +147,9 @@ impl PreparedRay {
         let z = (size.cmpeq(greatest_lanes).bitmask().trailing_zeros() as usize).min(2);
         let [x, y, _] = CommonAxis(z).order();
         let (inverse, forward) = (1.0 / greatest, 1f32.copysign(ray.direction[z]));
-        // Depths of tmin and tmax: first those that are widened to bound all hits in range, then those that are narrowed so that
-        // hits between them are certainly in range. Of rays that f32 prepares, no hit is so far away that its t is not finite.
+        // Depths of tmin and tmax: first those that are widened to bound all hits in range, then
+        // those that are narrowed so that hits between them are certainly in range. Of rays that
+        // f32 prepares, no hit is so far away that its t is not finite.
         const LEAST: Vec4 = Vec4::splat(-f32::MAX);
         const GREATEST: Vec4 = Vec4::new(f32::MAX, f32::INFINITY, f32::MAX, f32::MAX);
         let depths = Vec4::new(tmin, tmax, tmin, tmax) * greatest;
@@ -174,8 +181,8 @@ impl PreparedRay {
         Some(zerocopy::transmute!(rows))
     }
 
-    /// Prepares any ray, in f64 where [`Self::of`] cannot. None if the ray cannot hit anything, because it has no line ([`Line::new`]) or an empty range
-    /// of t.
+    /// Prepares any ray, in f64 where [`Self::of`] cannot. None if the ray cannot hit anything,
+    /// because it has no line ([`Line::new`]) or an empty range of t.
     #[cold]
     #[inline(never)]
     pub(crate) fn in_f64(bounds: &ObjectBounds, ray: &Ray) -> Option<PreparedRay> {
@@ -260,8 +267,8 @@ impl Prepared {
         self.ready = 0;
     }
 
-    /// Stores rays that are prepared in the vacant lanes of a piece; `at` holds their indices in the batch. Only the cache lines in
-    /// `lines`, a part of 0..2, are stored.
+    /// Stores rays that are prepared in the vacant lanes of a piece; `at` holds their indices in
+    /// the batch. Only the cache lines in `lines`, a part of 0..2, are stored.
     #[inline(always)]
     pub(crate) fn write<S: Simd>(
         &mut self,

@@ -1,5 +1,5 @@
-//! For every way to prepare a ray and every instruction set, box test and filter exclude nothing that exact arithmetic accepts,
-//! and the filter is sure of nothing that exact arithmetic rejects.
+//! For every way to prepare a ray and every instruction set, box test and filter exclude nothing
+//! that exact arithmetic accepts, and the filter is sure of nothing that exact arithmetic rejects.
 
 use super::{LARGEST, Prepared, PreparedRay, SMALLEST, lies_between};
 use crate::intersect::boxes::RaySlabs;
@@ -41,7 +41,7 @@ impl OneTriangle {
         OneTriangle { node, leaf, object }
     }
 
-    /// Gives the box of the triangle the least room that widened boxes have.
+    /// Gives the box of the triangle the smallest room that widened boxes have.
     fn widen(&mut self, corners: [[f32; 3]; 3]) {
         self.object.coordinates |= WIDENED_BOXES;
         for corner in corners {
@@ -103,7 +103,8 @@ struct FilterResult {
     depth: [f32; 2],
 }
 
-/// Kernel of box test and filter, with the `origin_reach` of the bounds. Its output is the set of children that are hit, as bits, and the result of the filter.
+/// Kernel of box test and filter, with the `origin_reach` of the bounds. Its output is the set of
+/// children that are hit, as bits, and the result of the filter.
 struct BoxAndFilter<'a>(&'a PreparedRay, &'a OneTriangle, f32);
 
 impl Kernel for BoxAndFilter<'_> {
@@ -149,7 +150,8 @@ impl Kernel for PrepareOneKernel<'_> {
     }
 }
 
-/// The ray prepared in all ways: in f64, and on every instruction set alone and in a lane among others.
+/// The ray prepared in all ways: in f64, and on every instruction set alone and in a lane among
+/// others.
 fn all_preparations(ray: &Ray, line: &Line, bounds: &ObjectBounds, lane: usize) -> Vec<PreparedRay> {
     let slabs = RaySlabs::new(ray, line, bounds);
     let mut all = vec![PreparedRay::new(slabs, TriangleFilter::new(ray, line, &slabs, bounds))];
@@ -180,7 +182,8 @@ fn boxes_and_triangles_that_the_line_crosses_are_kept_and_sure_hits_are_hits() {
         let unit = |rng: &mut Rng| (rng.below(1 << 24) as f32 / (1 << 23) as f32) - 1.0;
         let scale = [1.0, 1e-30, 1e30, 3e37, 1e-42, 1e-14, 1e-20, 1e12, 1e-36, 1e20][round % 10];
         let away = [0.0, 1.0, 1e3, 1e6][round / 10 % 4] * scale;
-        // Every third round lies on a coarse grid, so that many boxes have no volume and rays run along their sides.
+        // Every third round lies on a coarse grid, so that many boxes have no volume and rays run
+        // along their sides.
         let coarse = round % 3 == 0;
         let mut point = |spread: f32| {
             [(); 3].map(|()| {
@@ -306,7 +309,7 @@ fn small_boxes_of_large_objects_are_told_apart_where_they_are_widened() {
         let unit = |rng: &mut Rng| rng.below(1 << 24) as f32 / (1 << 24) as f32;
         let corners = [[0.5, 0.5, 0.5], [0.501, 0.5, 0.501], [0.5, 0.501, 0.5]];
         let mut object = OneTriangle::new(corners);
-        // The two greatest objects are beyond what f32 prepares rays for.
+        // The two largest objects are beyond what f32 prepares rays for.
         object.enlarge([1e5, 1e11, 1e13, 1e29][round / 4 % 4]);
         let is_widened = round % 2 == 0;
         if is_widened {
@@ -338,7 +341,8 @@ fn boxes_of_objects_far_from_the_origin_are_told_apart() {
     let mut rng = Rng::new(7);
     let mut met = 0;
     for round in 0..500 {
-        // Coordinates of f32 are 2^-10 apart here, and the pads that are relative to the origin would be 2^-6.
+        // Coordinates of f32 are 2^-10 apart here, and the pads that are relative to the origin
+        // would be 2^-6.
         let away = [1, 2, 3].map(|k| if (round % 7) & k == 0 { 8192.0 } else { -8193.0 });
         let place = |p: [f32; 3]| [0, 1, 2].map(|k| p[k] + away[k]);
         let size = 1.0 / 32.0;

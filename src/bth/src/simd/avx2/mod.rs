@@ -1,7 +1,8 @@
 //! Sixteen lanes in two AVX2 registers.
 //!
-//! The intrinsics of all `unsafe` blocks below may be executed, because an [`Avx2`] exists only where [`Avx2::detect`] found the
-//! features that they need. The comments at the blocks prove the accesses through pointers.
+//! The intrinsics of all `unsafe` blocks below may be executed, because an [`Avx2`] exists only
+//! where [`Avx2::detect`] found the features that they need. The comments at the blocks prove the
+//! accesses through pointers.
 #![allow(unsafe_code)]
 
 pub(super) mod doubles;
@@ -32,7 +33,8 @@ impl Avx2 {
     fn lookup_half(self, table: F, at: __m256i) -> __m256 {
         // SAFETY: registers only.
         unsafe {
-            // Bit 3 of the index selects the half of the table. Shifted to the sign bit, it controls the blend.
+            // Bit 3 of the index selects the half of the table. Shifted to the sign bit, it
+            // controls the blend.
             let low = _mm256_permutevar8x32_ps(table[0], at);
             let high = _mm256_permutevar8x32_ps(table[1], at);
             _mm256_blendv_ps(low, high, _mm256_castsi256_ps(_mm256_slli_epi32::<28>(at)))
@@ -172,7 +174,8 @@ impl Lanewise for Avx2 {
     fn shl_u<const K: u32>(self, a: U) -> U {
         // SAFETY: registers only.
         unsafe {
-            // The count is passed in a register, because an immediate would have to be an i32 constant.
+            // The count is passed in a register, because an immediate would have to be an i32
+            // constant.
             let count = _mm_cvtsi32_si128(K as i32);
             [_mm256_sll_epi32(a[0], count), _mm256_sll_epi32(a[1], count)]
         }
@@ -259,7 +262,8 @@ impl Simd for Avx2 {
     #[inline(always)]
     fn gather_u(self, m: M, from: &[u32], at: U) -> U {
         assert_indices(self, m, at, from.len());
-        // SAFETY: the indices of set lanes lie in the slice and are not negative as i32; clear lanes are not accessed.
+        // SAFETY: the indices of set lanes lie in the slice and are not negative as i32; clear
+        // lanes are not accessed.
         unsafe {
             let (zero, from) = (_mm256_setzero_si256(), from.as_ptr().cast());
             [
@@ -273,7 +277,8 @@ impl Simd for Avx2 {
         let flat = from.as_flattened();
         let even = self.shl_u::<1>(at);
         let odd = self.or_u(even, self.splat_u(1));
-        // The indices themselves are checked, because an index that is too great might wrap into the range when it is doubled.
+        // The indices themselves are checked, because an index that is too great might wrap into
+        // the range when it is doubled.
         assert_indices(self, m, at, from.len());
         (self.gather_u(m, flat, even), self.gather_u(m, flat, odd))
     }
@@ -281,7 +286,8 @@ impl Simd for Avx2 {
     fn expand(self, a: F, m: M, from: &[f32; LANES]) -> F {
         let bits = self.mask_bits(m);
         let low = from.as_ptr();
-        // The elements of the high half follow those of the low half, of which there are at most eight.
+        // The elements of the high half follow those of the low half, of which there are at most
+        // eight.
         let high = from[(bits as u8).count_ones() as usize..][..8].as_ptr();
         // SAFETY: eight readable floats each; unaligned loads.
         unsafe {
@@ -305,8 +311,9 @@ impl Simd for Avx2 {
     #[inline(always)]
     fn compress_f(self, bits: u32, a: F, to: &mut [f32; LANES]) -> usize {
         let low = (bits as u8).count_ones() as usize;
-        // SAFETY: the first store writes to[..8]. The second writes eight elements after the compressed lanes of the low half,
-        // of which there are at most eight; the slices check both.
+        // SAFETY: the first store writes to[..8]. The second writes eight elements after the
+        // compressed lanes of the low half, of which there are at most eight; the slices check
+        // both.
         unsafe {
             let packed = [
                 _mm256_permutevar8x32_ps(a[0], compression(bits as u8)),

@@ -2,8 +2,8 @@
 
 use std::arch::x86_64::*;
 
-/// Permutation that expands a packed row: for each of eight lanes whose bit is set, the number of set bits below it, which is
-/// the index of its element in the packed row.
+/// Permutation that expands a packed row: for each of eight lanes whose bit is set, the number of
+/// set bits below it, which is the index of its element in the packed row.
 ///
 /// # Safety
 /// The machine must have the features of [`super::Avx2`].
@@ -18,7 +18,8 @@ pub(super) unsafe fn expansion(bits: u8) -> __m256i {
     }
 }
 
-/// Permutation that packs a row: the indices of those of eight lanes whose bit is set, in order; the inverse of [`expansion`].
+/// Permutation that packs a row: the indices of those of eight lanes whose bit is set, in order;
+/// the inverse of [`expansion`].
 ///
 /// # Safety
 /// As [`expansion`].

@@ -32,7 +32,8 @@ pub(super) unsafe fn transpose8(rows: [__m256; 8]) -> [__m256; 8] {
     let mut out = rows;
     // SAFETY: see `transpose4`.
     unsafe {
-        // Columns 0 to 3 of these four rows in the low half, columns 4 to 7 in the high half; `low` are the first four rows.
+        // Columns 0 to 3 of these four rows in the low half, columns 4 to 7 in the high half; `low`
+        // are the first four rows.
         let low = transpose4([rows[0], rows[1], rows[2], rows[3]]);
         let high = transpose4([rows[4], rows[5], rows[6], rows[7]]);
         for k in 0..4 {

@@ -1,7 +1,8 @@
 //! Sixteen lanes in one AVX-512 register.
 //!
-//! The intrinsics of all `unsafe` blocks below may be executed, because an [`Avx512`] exists only where [`Avx512::detect`]
-//! found the features that they need. The comments at the blocks prove the accesses through pointers.
+//! The intrinsics of all `unsafe` blocks below may be executed, because an [`Avx512`] exists only
+//! where [`Avx512::detect`] found the features that they need. The comments at the blocks prove the
+//! accesses through pointers.
 #![allow(unsafe_code)]
 
 mod rows;
@@ -17,7 +18,8 @@ use super::{
 use std::arch::x86_64::*;
 
 x86_token!(
-    /// Proof that this machine has AVX-512 F, BW, CD, DQ and VL, AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT.
+    /// Proof that this machine has AVX-512 F, BW, CD, DQ and VL, AVX2, FMA, BMI1, BMI2, LZCNT and
+    /// POPCNT.
     Avx512, Avx512 = std::convert::identity, "avx512f" "avx512bw" "avx512cd" "avx512dq" "avx512vl"
     "avx2" "fma" "bmi1" "bmi2" "lzcnt" "popcnt"
 );
@@ -177,7 +179,8 @@ impl Simd for Avx512 {
     #[inline(always)]
     fn lookup_f64<const FIRST_HALF: bool>(self, table: &[f64; LANES], at: U) -> [f64; LANES] {
         let mut out = [0.0; LANES];
-        // SAFETY: self proves the features; the first and the last eight elements of arrays of sixteen are read and written.
+        // SAFETY: self proves the features; the first and the last eight elements of arrays of
+        // sixteen are read and written.
         unsafe {
             let (low, high) = (_mm512_loadu_pd(table.as_ptr()), _mm512_loadu_pd(table.as_ptr().add(8)));
             let first = _mm512_cvtepu32_epi64(_mm512_castsi512_si256(at));
@@ -196,20 +199,23 @@ impl Simd for Avx512 {
     #[inline(always)]
     fn gather_u(self, m: u16, from: &[u32], at: U) -> U {
         assert_indices(self, m, at, from.len());
-        // SAFETY: the indices of set lanes lie in the slice and are not negative as i32; clear lanes are not accessed.
+        // SAFETY: the indices of set lanes lie in the slice and are not negative as i32; clear
+        // lanes are not accessed.
         unsafe { _mm512_mask_i32gather_epi32::<4>(_mm512_setzero_si512(), m, at, from.as_ptr().cast()) }
     }
     #[inline(always)]
     fn gather_pair(self, m: u16, from: &[[u32; 2]], at: U) -> (U, U) {
         let at = valid_indices(self, m, at, from.len());
-        // SAFETY: `valid_indices` returns indices of elements of the slice; unaligned loads of eight bytes.
+        // SAFETY: `valid_indices` returns indices of elements of the slice; unaligned loads of
+        // eight bytes.
         unsafe {
             macro_rules! load {
                 ($i:literal) => {
                     from.as_ptr().add(at[$i] as usize).cast()
                 };
             }
-            // `two` loads two elements to a register of four lanes, and `quarters` two elements to each quarter of the lanes.
+            // `two` loads two elements to a register of four lanes, and `quarters` two elements to
+            // each quarter of the lanes.
             macro_rules! two {
                 ($a:literal $b:literal) => {
                     _mm_castpd_ps(_mm_loadh_pd(_mm_load_sd(load!($a)), load!($b)))
@@ -240,7 +246,8 @@ impl Simd for Avx512 {
     fn compress(self, bits: u32, a: U, to: &mut [u32; LANES]) -> usize {
         // SAFETY: all sixteen lanes are stored to an array of sixteen.
         unsafe {
-            // Compression to a register and a store of all lanes are much faster than a compressing store.
+            // Compression to a register and a store of all lanes are much faster than a compressing
+            // store.
             _mm512_storeu_si512(to.as_mut_ptr().cast(), _mm512_maskz_compress_epi32(bits as u16, a));
         }
         (bits & 0xffff).count_ones() as usize
@@ -276,7 +283,8 @@ impl Simd for Avx512 {
         unsafe {
             let key = keys_with_lanes(key);
             let count = store_far_to_near::<true>(bits as u16, key, a, to, keys);
-            // The traversal of a single ray depends on the latency of the nearest: a minimum is faster than the sorted keys.
+            // The traversal of a single ray depends on the latency of the nearest: a minimum is
+            // faster than the sorted keys.
             let nearest =
                 if count <= 4 { nearest_of_four(bits as u16, key) } else { keys[count - 1].to_bits() };
             (count, nearest as usize % LANES)
@@ -289,8 +297,9 @@ impl Simd for Avx512 {
         let limit = self.splat(limit);
         while from < len {
             let valid = if len - from >= LANES { u16::MAX } else { (1 << (len - from)) - 1 };
-            // SAFETY: the masked loads read only elements below len. The masked stores write `count` elements from `kept` on, and
-            // kept + count is at most the number of elements read so far.
+            // SAFETY: the masked loads read only elements below len. The masked stores write
+            // `count` elements from `kept` on, and kept + count is at most the number of elements
+            // read so far.
             unsafe {
                 let key = _mm512_maskz_loadu_ps(valid, keys.as_ptr().add(from));
                 let code = _mm512_maskz_loadu_epi32(valid, codes.as_ptr().add(from).cast());

@@ -33,7 +33,8 @@ pub(super) unsafe fn columns8(simd: Avx512, from: *const [u32; 8], row: [u32; LA
                 _mm512_insertf32x8::<1>(_mm512_castps256_ps512(load!($a)), load!($b))
             };
         }
-        // After these transpositions, quarters 0 and 2 belong to columns 0 to 3, quarters 1 and 3 to columns 4 to 7.
+        // After these transpositions, quarters 0 and 2 belong to columns 0 to 3, quarters 1 and 3
+        // to columns 4 to 7.
         let low = transpose4([halves!(0 4), halves!(1 5), halves!(2 6), halves!(3 7)]);
         let high = transpose4([halves!(8 12), halves!(9 13), halves!(10 14), halves!(11 15)]);
         let mut out = [simd.bits(low[0]); 8];
@@ -45,7 +46,8 @@ pub(super) unsafe fn columns8(simd: Avx512, from: *const [u32; 8], row: [u32; LA
     }
 }
 
-/// For the 80 consecutive words of sixteen rows of five words, as five vectors: the index of each word's row.
+/// For the 80 consecutive words of sixteen rows of five words, as five vectors: the index of each
+/// word's row.
 pub(super) const ROWS5: [[u32; LANES]; 5] = {
     let mut rows = [[0; LANES]; 5];
     let mut i = 0;
@@ -56,7 +58,8 @@ pub(super) const ROWS5: [[u32; LANES]; 5] = {
     rows
 };
 
-/// For each of the vectors of [`ROWS5`] and each column, the bits of the words that belong to the column.
+/// For each of the vectors of [`ROWS5`] and each column, the bits of the words that belong to the
+/// column.
 pub(super) const COLUMNS5: [[u16; 5]; 5] = {
     let mut columns = [[0; 5]; 5];
     let mut i = 0;

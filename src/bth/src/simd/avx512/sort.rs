@@ -3,8 +3,8 @@
 use crate::simd::LANES;
 use std::arch::x86_64::*;
 
-/// Step of a bitonic sorting network in descending order: lanes whose bit is set in `keep_greater` take the greater of their
-/// own and their partner's value, the other lanes the lesser.
+/// Step of a bitonic sorting network in descending order: lanes whose bit is set in `keep_greater`
+/// take the greater of their own and their partner's value, the other lanes the lesser.
 macro_rules! exchange {
     ($min:ident, $mask_max:ident, $v:expr, $partner:expr, $keep_greater:expr) => {{
         let (v, partner) = ($v, $partner);
@@ -76,7 +76,8 @@ pub(super) unsafe fn sort16(v: __m512i) -> __m512i {
     }
 }
 
-/// Replaces the four lowest bits of each key by the index of its lane, which thus moves with the key when keys are sorted.
+/// Replaces the four lowest bits of each key by the index of its lane, which thus moves with the
+/// key when keys are sorted.
 ///
 /// # Safety
 /// As [`sort4`].
@@ -89,8 +90,9 @@ pub(super) unsafe fn keys_with_lanes(key: __m512) -> __m512i {
     }
 }
 
-/// Stores the keys of `lanes` and their values `a` in descending order of the keys, which come from [`keys_with_lanes`];
-/// returns their number. `WHOLE` stores all sixteen entries of both arrays, so that no store before needs to initialize them.
+/// Stores the keys of `lanes` and their values `a` in descending order of the keys, which come from
+/// [`keys_with_lanes`]; returns their number. `WHOLE` stores all sixteen entries of both arrays, so
+/// that no store before needs to initialize them.
 ///
 /// # Safety
 /// The machine must have the features of [`super::Avx512`].
@@ -136,7 +138,7 @@ pub(super) unsafe fn store_far_to_near<const WHOLE: bool>(
     count
 }
 
-/// The least key of at most four lanes.
+/// The smallest key of at most four lanes.
 ///
 /// # Safety
 /// As [`sort4`].

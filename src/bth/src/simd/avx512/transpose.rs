@@ -36,7 +36,8 @@ pub(super) unsafe fn transpose16(rows: [__m512; LANES]) -> [__m512; LANES] {
             let four = transpose4([r[i], r[i + 1], r[i + 2], r[i + 3]]);
             r[i..i + 4].copy_from_slice(&four);
         }
-        // Then the quarters: row 4p + i now holds lane 4q + i of rows 4p to 4p + 3 in its quarter q.
+        // Then the quarters: row 4p + i now holds lane 4q + i of rows 4p to 4p + 3 in its quarter
+        // q.
         let mut out = r;
         for i in 0..4 {
             let (a, b) = (r[i], r[i + 4]);
@@ -54,7 +55,7 @@ pub(super) unsafe fn transpose16(rows: [__m512; LANES]) -> [__m512; LANES] {
     }
 }
 
-/// Lane i of the result is the least lane of row i.
+/// Lane i of the result is the smallest lane of row i.
 ///
 /// # Safety
 /// As [`transpose4`].
@@ -63,8 +64,8 @@ pub(super) unsafe fn least_of_each(rows: [__m512; LANES]) -> __m512 {
     let mut r = rows;
     // SAFETY: the caller proves the features.
     unsafe {
-        // Each step takes minima of the halves of two vectors and packs them into one vector: two steps within each quarter
-        // of the lanes, then two over the quarters.
+        // Each step takes minima of the halves of two vectors and packs them into one vector: two
+        // steps within each quarter of the lanes, then two over the quarters.
         for i in 0..8 {
             let (a, b) = (r[2 * i], r[2 * i + 1]);
             r[i] = _mm512_min_ps(_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));

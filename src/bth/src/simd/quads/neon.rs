@@ -1,7 +1,7 @@
 //! Four lanes in a register of NEON.
 //!
-//! NEON is part of every AArch64 target that this crate supports, so the intrinsics of all `unsafe` blocks below may be executed. The
-//! comments at the blocks prove the accesses through pointers.
+//! NEON is part of every AArch64 target that this crate supports, so the intrinsics of all `unsafe`
+//! blocks below may be executed. The comments at the blocks prove the accesses through pointers.
 #![allow(unsafe_code)]
 
 use super::{LANES, QUAD, QUADS, Quad, Quads};
@@ -64,7 +64,8 @@ impl Quad for Neon {
         div(a: F, b: F) -> F = vdivq_f32(a, b);
         fma(a: F, b: F, c: F) -> F = vfmaq_f32(c, a, b);
         fnma(a: F, b: F, c: F) -> F = vfmsq_f32(c, a, b);
-        // The minimum and maximum of NEON are NaN where either operand is, or the other operand: here it is `b`.
+        // The minimum and maximum of NEON are NaN where either operand is, or the other operand:
+        // here it is `b`.
         min(a: F, b: F) -> F = vbslq_f32(vcltq_f32(a, b), a, b);
         max(a: F, b: F) -> F = vbslq_f32(vcgtq_f32(a, b), a, b);
         abs(a: F) -> F = vabsq_f32(a);
@@ -89,7 +90,8 @@ impl Quad for Neon {
         bits(a: F) -> U = vreinterpretq_u32_f32(a);
         floats(a: U) -> F = vreinterpretq_f32_u32(a);
         mask_bits(m: U) -> u32 = vaddvq_u32(vandq_u32(m, vcombine_u32(vcreate_u32(2 << 32 | 1), vcreate_u32(8 << 32 | 4))));
-        // The masks are narrowed to bytes, of which each keeps one bit; neighbouring bytes are then added until two remain.
+        // The masks are narrowed to bytes, of which each keeps one bit; neighbouring bytes are then
+        // added until two remain.
         mask_bits_of_all(m: [U; QUADS]) -> u32 = {
             let low = vuzp1q_u16(vreinterpretq_u16_u32(m[0]), vreinterpretq_u16_u32(m[1]));
             let high = vuzp1q_u16(vreinterpretq_u16_u32(m[2]), vreinterpretq_u16_u32(m[3]));
@@ -129,7 +131,8 @@ impl Quad for Neon {
     }
     #[inline(always)]
     fn shl_u<const K: u32>(self, a: U) -> U {
-        // SAFETY: registers only. The count is passed in a register, because an immediate would have to be an i32 constant.
+        // SAFETY: registers only. The count is passed in a register, because an immediate would
+        // have to be an i32 constant.
         unsafe { vshlq_u32(a, vdupq_n_s32(K as i32)) }
     }
     #[inline(always)]
@@ -139,7 +142,8 @@ impl Quad for Neon {
     }
     #[inline(always)]
     fn prefetch<T>(self, address: *const T) {
-        // SAFETY: a hint that never faults, whatever the address, and changes neither memory nor registers.
+        // SAFETY: a hint that never faults, whatever the address, and changes neither memory nor
+        // registers.
         unsafe {
             asm!("prfm pldl1keep, [{0}]", in(reg) address, options(nostack, preserves_flags, readonly));
         }

@@ -5,8 +5,8 @@ use crate::simd::Lanewise;
 
 /// For each set of four lanes the indices of its lanes in order, as bytes of a register.
 const COMPRESSION: [[u8; LANES]; 1 << QUAD] = tables(true);
-/// For each set of four lanes the number of its lanes below each lane, which is the index of the lane's element in a packed row, as
-/// bytes of a register: the inverse of [`COMPRESSION`].
+/// For each set of four lanes the number of its lanes below each lane, which is the index of the
+/// lane's element in a packed row, as bytes of a register: the inverse of [`COMPRESSION`].
 const EXPANSION: [[u8; LANES]; 1 << QUAD] = tables(false);
 
 const fn tables(compress: bool) -> [[u8; LANES]; 1 << QUAD] {

@@ -101,7 +101,8 @@ pub(super) fn transpose<Q: Quad>(s: Quads<Q>, rows: [F<Q>; LANES]) -> [F<Q>; LAN
     out
 }
 
-/// Implements [`crate::simd::Simd::least_of_each`]: each row is reduced to one register before four of them are transposed.
+/// Implements [`crate::simd::Simd::least_of_each`]: each row is reduced to one register before four
+/// of them are transposed.
 #[inline(always)]
 pub(super) fn least_of_each<Q: Quad>(s: Quads<Q>, rows: [F<Q>; LANES]) -> F<Q> {
     let mut out = rows[0];

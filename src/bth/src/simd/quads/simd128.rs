@@ -1,7 +1,7 @@
 //! Four lanes in a vector of WebAssembly's SIMD128.
 //!
-//! A module is compiled for these instructions as a whole, so they may be executed wherever it was loaded. The comments at the blocks
-//! prove the accesses through pointers.
+//! A module is compiled for these instructions as a whole, so they may be executed wherever it was
+//! loaded. The comments at the blocks prove the accesses through pointers.
 #![allow(unsafe_code)]
 
 use super::{LANES, QUAD, QUADS, Quad, Quads};
@@ -57,7 +57,8 @@ impl Quad for Simd128 {
         div(a: v128, b: v128) -> v128 = f32x4_div(a, b);
         fma(a: v128, b: v128, c: v128) -> v128 = f32x4_add(f32x4_mul(a, b), c);
         fnma(a: v128, b: v128, c: v128) -> v128 = f32x4_sub(c, f32x4_mul(a, b));
-        // The pseudo-minimum is its first operand unless the second is less: the operands are exchanged.
+        // The pseudo-minimum is its first operand unless the second is less: the operands are
+        // exchanged.
         min(a: v128, b: v128) -> v128 = f32x4_pmin(b, a);
         max(a: v128, b: v128) -> v128 = f32x4_pmax(b, a);
         abs(a: v128) -> v128 = f32x4_abs(a);

@@ -1,7 +1,8 @@
 //! Four lanes in a register of SSE4.1.
 //!
-//! The intrinsics of all `unsafe` blocks below may be executed, because an [`Sse4`] exists only where [`Sse4::detect`] found the
-//! features that they need. The comments at the blocks prove the accesses through pointers.
+//! The intrinsics of all `unsafe` blocks below may be executed, because an [`Sse4`] exists only
+//! where [`Sse4::detect`] found the features that they need. The comments at the blocks prove the
+//! accesses through pointers.
 #![allow(unsafe_code)]
 
 use super::{LANES, QUAD, QUADS, Quad, Quads};
@@ -22,7 +23,8 @@ type U = __m128i;
 /// The machine must have SSE4.1.
 #[inline(always)]
 pub(in crate::simd) unsafe fn greatest_of_three(a: [f32; QUAD]) -> [f32; QUAD] {
-    // SAFETY: the caller proves the feature; four floats are loaded from an array of four, and stored to one.
+    // SAFETY: the caller proves the feature; four floats are loaded from an array of four, and
+    // stored to one.
     unsafe {
         let a = _mm_castps_si128(_mm_loadu_ps(a.as_ptr()));
         // Lanes 0, 1, 2 and 2; 1, 2, 0 and 0; 2, 0, 1 and 1.
@@ -131,7 +133,8 @@ impl Quad for Sse4 {
     }
     #[inline(always)]
     fn shl_u<const K: u32>(self, a: U) -> U {
-        // SAFETY: registers only. The count is passed in a register, because an immediate would have to be an i32 constant.
+        // SAFETY: registers only. The count is passed in a register, because an immediate would
+        // have to be an i32 constant.
         unsafe { _mm_sll_epi32(a, _mm_cvtsi32_si128(K as i32)) }
     }
     #[inline(always)]

@@ -1,10 +1,12 @@
-//! Places rays that start on surfaces in the world.
+//! Queries of scenes about starts on surfaces: where they lie in the world, whether rays can start
+//! there, and what they see.
 
+use super::locate::{StartError, locate};
+use super::visible::{self, SegmentEnd};
+use super::world_ray::{InstanceStart, PlacedRay};
 use crate::intersect::origin::RoundedOrigin;
 use crate::rays::{Ray, Start, StartRay};
 use crate::scene::Scene;
-use crate::starts::locate::{StartError, locate};
-use crate::starts::world_ray::{InstanceStart, PlacedRay};
 use bth_format::{Code, Error};
 use std::borrow::Cow;
 
@@ -40,13 +42,15 @@ impl Scene {
         Some(PlacedRay { ray: Ray { origin, tmin: 0.0, direction, tmax }, start: Some(start) })
     }
 
-    /// Checks that rays can start at a point: that it is a point of a triangle with area of a visible instance.
+    /// Checks that rays can start at a point: that it is a point of a triangle with area of a
+    /// visible instance.
     ///
     /// Queries do not check starts: a ray whose start is not such a point hits nothing.
     ///
     /// # Errors
-    /// `BTH-S003` if there is no such instance, `BTH-S008` if it is hidden, if it has no such triangle or the triangle has no area, or if
-    /// u or v is not finite, negative, or their sum above 1 by more than 2^-22. The error says what was found.
+    /// `BTH-S003` if there is no such instance, `BTH-S008` if it is hidden, if it has no such
+    /// triangle or the triangle has no area, or if u or v is not finite, negative, or their sum
+    /// above 1 by more than 2^-22. The error says what was found.
     pub fn check_start(&self, start: &Start) -> Result<(), Error> {
         let Start { primitive, u, v } = *start;
         let (instance, triangle) = (primitive.instance, primitive.triangle);
@@ -69,5 +73,27 @@ impl Scene {
                 bad("u >= 0, v >= 0 and u + v <= 1", format!("u = {u}, v = {v}").into())
             }
         }
+    }
+
+    /// Returns true if two points see each other: whether no triangle crosses the open segment
+    /// between them. Each is a [`Start`], or a point in world space.
+    ///
+    /// It is decided exactly, so it is symmetrical: `visible(a, b)` is `visible(b, a)`. Triangles
+    /// through an end, or in a plane with the whole segment, do not block. Rays pass through the
+    /// transparent parts of triangles. An end that is not a point of a visible instance, or not
+    /// finite, sees nothing.
+    ///
+    /// ```no_run
+    /// use bth::rays::Ray;
+    ///
+    /// let scene = bth::open("bunny.bth")?;
+    /// let light = [0.0, 3.0, 1.0];
+    /// if let Some(hit) = scene.nearest(&Ray::new([0.0, 0.1, 1.0], [0.0, 0.0, -1.0])) {
+    ///     println!("lit: {}", scene.visible(hit.start(), light));
+    /// }
+    /// # Ok::<(), bth::Error>(())
+    /// ```
+    pub fn visible(&self, a: impl Into<SegmentEnd>, b: impl Into<SegmentEnd>) -> bool {
+        visible::see_each_other(self, a.into(), b.into())
     }
 }

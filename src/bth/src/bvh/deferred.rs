@@ -1,7 +1,7 @@
 //! Deferred evaluation of hits: t, u and v of finished rays whose nearest triangle is certain, for
 //! sixteen rays at a time.
 
-use super::leaf::Progress;
+use super::leaf::RayProgress;
 use super::ray_state::RayState;
 use crate::bvh::candidate::{Candidate, Settle};
 use crate::bvh::nodes::{Leaf, LeafMemory, leaf};

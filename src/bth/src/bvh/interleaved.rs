@@ -4,9 +4,9 @@
 use super::coherence::is_same_octant;
 use super::deferred::DeferredHits;
 use super::entry_node::{ENTRY_RAYS, FindEntryNode};
-use super::leaf::{LeafOutcome, Progress, decide};
+use super::leaf::{LeafOutcome, RayProgress, decide};
 use super::nodes::root;
-use super::ray_pool::{POOL_SIZE, RareSteps, RayPool, Slot, has_rare_steps};
+use super::ray_pool::{POOL_SIZE, PoolSlot, RareSteps, RayPool, has_rare_steps};
 use super::ray_state::RayState;
 use super::stack::Stacks;
 use crate::intersect::prepare::Prepared;
@@ -108,7 +108,7 @@ impl<G: Goal> Kernel for Interleaved<'_, '_, G> {
             taken: 0,
         };
         let mut deferred = DeferredHits::new();
-        let mut slots = [Slot::vacant(goal); POOL_SIZE];
+        let mut slots = [PoolSlot::vacant(goal); POOL_SIZE];
         let mut pool = RayPool::new(object, &mut slots, stacks, goal);
         let has_rare_steps = has_rare_steps(object);
         while !pool.is_empty() {

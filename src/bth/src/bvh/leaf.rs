@@ -30,7 +30,7 @@ pub(crate) enum LeafOutcome {
 }
 
 /// State of a ray that leaves read and update.
-pub(crate) trait Progress<G: Goal> {
+pub(crate) trait RayProgress<G: Goal> {
     fn goal(&self) -> G;
     fn prepared(&self) -> &PreparedRay;
     /// Upper limit of the depths of hits that can still change the result.
@@ -72,7 +72,7 @@ pub(crate) fn enter_leaf<S: Simd, G: Goal, B: TriangleBlock>(
     (object, goal): (&ObjectView<'_>, G),
     bounds: &ObjectBounds,
     ray: ExactRay<'_>,
-    progress: &mut impl Progress<G>,
+    progress: &mut impl RayProgress<G>,
     (block, code): (&B, u32),
 ) -> LeafOutcome {
     let prepared = progress.prepared();
@@ -112,7 +112,7 @@ pub(crate) fn decide<S: Simd, G: Goal>(
     object: &ObjectView<'_>,
     ray: ExactRay<'_>,
     bounds: &ObjectBounds,
-    progress: &mut impl Progress<G>,
+    progress: &mut impl RayProgress<G>,
     triangles: (u32, u32),
 ) -> LeafOutcome {
     let pending = progress.pending();

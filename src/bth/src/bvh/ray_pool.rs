@@ -96,14 +96,14 @@ impl StepLists {
 /// State of a ray, aligned to cache lines.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
-pub(super) struct Slot<G>(RayState<G>);
+pub(super) struct PoolSlot<G>(RayState<G>);
 
-impl<G: Goal> Slot<G> {
+impl<G: Goal> PoolSlot<G> {
     /// A slot without a ray.
     #[inline(always)]
     pub(super) fn vacant(goal: G) -> Self {
         let ray = Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 };
-        Slot(RayState::vacant(RayQuery::new(goal, &ray)))
+        PoolSlot(RayState::vacant(RayQuery::new(goal, &ray)))
     }
 }
 
@@ -117,7 +117,7 @@ struct StackTops {
 /// The pool: a slot for each ray. The caller makes the slots in their final place; as a part of
 /// this value they would be copied to it.
 pub(super) struct RayPool<'a, G: Goal> {
-    slots: &'a mut [Slot<G>; POOL_SIZE],
+    slots: &'a mut [PoolSlot<G>; POOL_SIZE],
     tops: StackTops,
     lists: StepLists,
     counts: StepCounts,
@@ -132,7 +132,7 @@ impl<'a, G: Goal> RayPool<'a, G> {
     #[inline(always)]
     pub(super) fn new(
         object: &ObjectView<'_>,
-        slots: &'a mut [Slot<G>; POOL_SIZE],
+        slots: &'a mut [PoolSlot<G>; POOL_SIZE],
         stacks: &'a mut Stacks,
         goal: G,
     ) -> Self {

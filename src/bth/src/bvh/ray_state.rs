@@ -2,7 +2,7 @@
 //! through a leaf is [`enter_leaf`](super::leaf::enter_leaf); the order in which rays step is
 //! decided by [`ray_pool`](super::ray_pool).
 
-use super::leaf::Progress;
+use super::leaf::RayProgress;
 use crate::bvh::candidate::Candidate;
 use crate::intersect::prepare::{HitProgress, PreparedRay};
 use crate::query::sink::Sink;
@@ -112,7 +112,7 @@ impl<G: Goal> RayState<G> {
     }
 }
 
-impl<G: Goal> Progress<G> for RayState<G> {
+impl<G: Goal> RayProgress<G> for RayState<G> {
     #[inline(always)]
     fn goal(&self) -> G {
         self.query.goal()

@@ -4,7 +4,7 @@
 //! from step to step decides the speed. The nearest certain hit is therefore kept with f32 bounds
 //! of its depth, and its t, u and v are computed in f64 once, at the end ([`super::certain_hit`]).
 
-use super::leaf::{LeafOutcome, Progress, decide, enter_leaf};
+use super::leaf::{LeafOutcome, RayProgress, decide, enter_leaf};
 use super::nodes::{Leaf, LeafMemory, leaf, prefetch};
 use super::ray_state::key_limit;
 use super::single_stack::{OpenSingleStack, SingleStack};
@@ -47,7 +47,7 @@ struct SingleState<'a, G: Goal> {
     pending: Candidate,
 }
 
-impl<G: Goal> Progress<G> for SingleState<'_, G> {
+impl<G: Goal> RayProgress<G> for SingleState<'_, G> {
     #[inline(always)]
     fn goal(&self) -> G {
         self.goal

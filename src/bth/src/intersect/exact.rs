@@ -180,7 +180,7 @@ impl RoundedIntersection {
 
 /// A line and a triangle in f64: its intersection with the triangle's plane, and on which sides of
 /// the edges it passes.
-struct Sides {
+struct LineSides {
     rounded: RoundedIntersection,
     /// Weights of the three corners.
     weight: [f64; 3],
@@ -191,10 +191,10 @@ struct Sides {
     is_outside: bool,
 }
 
-impl Sides {
+impl LineSides {
     /// There are no branches, so that the compiler can vectorize a loop of it.
     #[inline(always)]
-    fn new(origin: impl Origin, direction: [f64; 3], corners: [[f64; 3]; 3]) -> Sides {
+    fn new(origin: impl Origin, direction: [f64; 3], corners: [[f64; 3]; 3]) -> LineSides {
         let (terms, error) = OriginTerms::with_errors(origin, corners);
         let norm = max_norm(direction);
         let rounded = RoundedIntersection::new(&terms, direction, norm);
@@ -203,7 +203,7 @@ impl Sides {
         let least = lesser(lesser(first, second), third);
         let greatest = greater(greater(first, second), third);
         let bound = error[0] * norm;
-        Sides {
+        LineSides {
             rounded,
             weight: [first, second, third],
             error: [bound, error[1]],
@@ -217,7 +217,8 @@ impl Sides {
 /// [`Estimate::Open`] where the error bounds do not allow it.
 #[inline(always)]
 pub(crate) fn estimate(origin: impl Origin, direction: [f64; 3], corners: [[f64; 3]; 3]) -> Estimate {
-    let Sides { rounded, weight, error, is_inside, is_outside } = Sides::new(origin, direction, corners);
+    let LineSides { rounded, weight, error, is_inside, is_outside } =
+        LineSides::new(origin, direction, corners);
     if is_outside {
         return Estimate::Missed;
     }
@@ -240,7 +241,7 @@ pub(crate) fn certain_intersection(
     direction: [f64; 3],
     corners: [[f64; 3]; 3],
 ) -> (Intersection, bool) {
-    let Sides { rounded, is_inside, .. } = Sides::new(origin, direction, corners);
+    let LineSides { rounded, is_inside, .. } = LineSides::new(origin, direction, corners);
     (rounded.intersection(), is_inside & rounded.is_accurate)
 }
 

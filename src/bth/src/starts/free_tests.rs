@@ -23,7 +23,7 @@ fn ray(triangle: u32, direction: [f32; 3]) -> StartRay {
 
 /// How a ray is prepared.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Prepared {
+enum PreparedByKernel {
     /// It starts on no triangle.
     Unusable,
     /// It ends without being traced.
@@ -33,7 +33,7 @@ enum Prepared {
 }
 
 /// The rays, prepared with this instruction set.
-fn prepared(isa: Isa, file: &[u8], rays: &[StartRay]) -> Vec<Prepared> {
+fn prepared(isa: Isa, file: &[u8], rays: &[StartRay]) -> Vec<PreparedByKernel> {
     // Which instruction set is used is a setting of the process.
     static TURN: Mutex<()> = Mutex::new(());
     let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -51,14 +51,14 @@ fn prepared(isa: Isa, file: &[u8], rays: &[StartRay]) -> Vec<Prepared> {
         let goes_on = prepared.order.contains(&(i as u32));
         if !point.is_on_triangle() {
             assert!(!goes_on, "{isa}: {:?}", rays[i]);
-            return Prepared::Unusable;
+            return PreparedByKernel::Unusable;
         }
         let StartRay { start, direction, tmax } = rays[i];
         let height = start.primitive.triangle as f32 * 10.0;
         assert_eq!(of_object.origin, [start.u, start.v, height], "{isa}: {:?}", rays[i]);
         let same = direction.map(f32::to_bits) == of_object.direction.map(f32::to_bits);
         assert!(same && of_object.tmax.to_bits() == tmax.to_bits(), "{isa}: {of_object:?} {:?}", rays[i]);
-        if goes_on { Prepared::Begins(of_object.tmin) } else { Prepared::Ended }
+        if goes_on { PreparedByKernel::Begins(of_object.tmin) } else { PreparedByKernel::Ended }
     };
     (0..rays.len()).map(of).collect()
 }
@@ -68,7 +68,7 @@ fn available() -> impl Iterator<Item = Isa> {
 }
 
 /// How a ray is prepared alone. In lanes it is about the same.
-fn begin(file: &[u8], ray: StartRay) -> Prepared {
+fn begin(file: &[u8], ray: StartRay) -> PreparedByKernel {
     let [alone] = prepared(Isa::Scalar, file, &[ray])[..] else { unreachable!("one ray") };
     for isa in available() {
         // The last ray is less than a group.
@@ -76,7 +76,9 @@ fn begin(file: &[u8], ray: StartRay) -> Prepared {
         assert_eq!(all[16], alone, "{isa}: {ray:?}");
         for of in all {
             let is_close = match (of, alone) {
-                (Prepared::Begins(of), Prepared::Begins(alone)) => of <= alone && of >= 0.99 * alone,
+                (PreparedByKernel::Begins(of), PreparedByKernel::Begins(alone)) => {
+                    of <= alone && of >= 0.99 * alone
+                }
                 _ => of == alone,
             };
             assert!(is_close, "{isa}: {of:?} {alone:?} {ray:?}");
@@ -87,7 +89,7 @@ fn begin(file: &[u8], ray: StartRay) -> Prepared {
 
 /// Returns true if a ray ends, by the file with directions.
 fn ends(ray: StartRay) -> bool {
-    begin(DIRECTIONS, ray) == Prepared::Ended
+    begin(DIRECTIONS, ray) == PreparedByKernel::Ended
 }
 
 #[test]
@@ -105,28 +107,28 @@ fn rays_that_leave_in_a_free_direction_end() {
     assert!(!ends(ray(1, [1.0, 0.0, 0.05])));
     assert!(!ends(ray(1, [1.0, 0.0, 0.0])));
     for triangle in [2, 77, NONE] {
-        assert_eq!(begin(DIRECTIONS, ray(triangle, UP)), Prepared::Unusable);
+        assert_eq!(begin(DIRECTIONS, ray(triangle, UP)), PreparedByKernel::Unusable);
     }
     let mut elsewhere = ray(1, UP);
     elsewhere.start.primitive.instance = 1;
-    assert_eq!(begin(DIRECTIONS, elsewhere), Prepared::Unusable);
+    assert_eq!(begin(DIRECTIONS, elsewhere), PreparedByKernel::Unusable);
 }
 
 #[test]
 fn rays_that_end_within_a_distance_end() {
     for file in [DIRECTIONS, DISTANCES] {
         let up = ray(0, [0.0, 0.0, 2.0]);
-        let within = |tmax: f32| begin(file, up.with_tmax(tmax)) == Prepared::Ended;
+        let within = |tmax: f32| begin(file, up.with_tmax(tmax)) == PreparedByKernel::Ended;
         assert!(within(0.25) && within(1.98) && !within(2.0) && !within(f32::INFINITY));
         // Another sector than the one in the middle.
-        assert_eq!(begin(file, ray(0, [3.0, 0.0, 1.0]).with_tmax(0.25)), Prepared::Begins(0.0));
+        assert_eq!(begin(file, ray(0, [3.0, 0.0, 1.0]).with_tmax(0.25)), PreparedByKernel::Begins(0.0));
     }
 }
 
 #[test]
 fn other_rays_begin_behind_that_distance() {
-    let is_about = |begin: Prepared, expected: f32| {
-        let Prepared::Begins(begin) = begin else { panic!("a ray that does not end") };
+    let is_about = |begin: PreparedByKernel, expected: f32| {
+        let PreparedByKernel::Begins(begin) = begin else { panic!("a ray that does not end") };
         assert!(begin <= expected && begin > 0.99 * expected, "{begin} {expected}");
     };
     for file in [DIRECTIONS, DISTANCES] {
@@ -135,10 +137,10 @@ fn other_rays_begin_behind_that_distance() {
         is_about(begin(file, ray(0, [0.1, 0.1, 1.0])), 4.0 / 1.02f32.sqrt());
     }
     // Of the lower one's back only the file with distances of both sides tells the last level.
-    assert_eq!(begin(DIRECTIONS, ray(0, DOWN)), Prepared::Begins(0.0));
+    assert_eq!(begin(DIRECTIONS, ray(0, DOWN)), PreparedByKernel::Begins(0.0));
     is_about(begin(DISTANCES, ray(0, DOWN)), 4.0);
     // Downwards from the upper one, which only the file with distances of both sides tells.
-    assert_eq!(begin(DIRECTIONS, ray(1, DOWN)), Prepared::Begins(0.0));
+    assert_eq!(begin(DIRECTIONS, ray(1, DOWN)), PreparedByKernel::Begins(0.0));
     is_about(begin(DISTANCES, ray(1, DOWN)), 1.0);
     is_about(begin(DISTANCES, ray(1, UP)), 4.0);
 }
@@ -152,9 +154,9 @@ fn numbers_that_are_none_end_nothing() {
     for bad in [f32::NAN, f32::INFINITY, -0.1, 1.1, f32::NEG_INFINITY] {
         let mut at = ray(1, UP);
         at.start.u = bad;
-        assert_eq!(begin(DIRECTIONS, at), Prepared::Unusable, "{bad}");
+        assert_eq!(begin(DIRECTIONS, at), PreparedByKernel::Unusable, "{bad}");
         (at.start.u, at.start.v) = (0.0, bad);
-        assert_eq!(begin(DIRECTIONS, at), Prepared::Unusable, "{bad}");
+        assert_eq!(begin(DIRECTIONS, at), PreparedByKernel::Unusable, "{bad}");
     }
 }
 
@@ -181,20 +183,21 @@ fn lanes_decide_as_single_rays() {
             let mut different = 0;
             for (i, (found, expected)) in found.into_iter().zip(&expected).enumerate() {
                 let same = match (found, *expected) {
-                    (Prepared::Begins(found), Prepared::Begins(expected)) => {
+                    (PreparedByKernel::Begins(found), PreparedByKernel::Begins(expected)) => {
                         found <= expected && found >= 0.9 * expected
                     }
                     _ => found == *expected,
                 };
                 // Near the border of a bin they may differ.
                 different += usize::from(!same);
-                let unusable = [found, *expected].map(|of| of == Prepared::Unusable);
+                let unusable = [found, *expected].map(|of| of == PreparedByKernel::Unusable);
                 assert!(unusable[0] == unusable[1], "{isa}, ray {i}: {found:?} {expected:?}");
             }
             assert!(different * 100 < rays.len(), "{isa}: {different} of {}", rays.len());
         }
-        let ended = expected.iter().filter(|of| **of == Prepared::Ended).count();
-        let later = expected.iter().filter(|of| matches!(of, Prepared::Begins(t) if *t > 0.0)).count();
+        let ended = expected.iter().filter(|of| **of == PreparedByKernel::Ended).count();
+        let later =
+            expected.iter().filter(|of| matches!(of, PreparedByKernel::Begins(t) if *t > 0.0)).count();
         assert!(ended > 50 && later > 50, "{ended} ended, {later} begin later");
     }
 }

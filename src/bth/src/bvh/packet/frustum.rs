@@ -172,14 +172,14 @@ mod tests {
 
     /// For each of sixteen points, given as rows, the sides of the frustum of the rays beyond which
     /// it lies.
-    struct Sides<'a, const POINT: bool>(&'a [Ray], &'a ObjectBounds, &'a [[f32; LANES]; 3]);
+    struct SidesOfPoints<'a, const POINT: bool>(&'a [Ray], &'a ObjectBounds, &'a [[f32; LANES]; 3]);
 
-    impl<const POINT: bool> Kernel for Sides<'_, POINT> {
+    impl<const POINT: bool> Kernel for SidesOfPoints<'_, POINT> {
         type Output = [u32; LANES];
         const SCALAR: bool = false;
         #[inline(always)]
         fn run<S: Simd>(self, s: S) -> [u32; LANES] {
-            let Sides(rays, bounds, points) = self;
+            let SidesOfPoints(rays, bounds, points) = self;
             let span = Span::of(s, rays);
             assert!(span.is_coherent() && span.is_from_point() == POINT, "{rays:?}");
             let mut groups = [RayGroup::vacant(s); GROUPS];
@@ -243,7 +243,7 @@ mod tests {
                 if isa == Isa::Scalar || !isa.is_available() {
                     continue;
                 }
-                let sides = isa.run(Sides::<POINT>(&rays, &bounds, &points));
+                let sides = isa.run(SidesOfPoints::<POINT>(&rays, &bounds, &points));
                 for i in 0..LANES {
                     let point = points.map(|row| row[i]);
                     if is_on[i] {

@@ -8,7 +8,7 @@
 
 use super::bounds::PacketBounds;
 use super::hit_cache::UNCACHED;
-use super::leaf_mesh::{LeafMesh, LeafPoints, Outside};
+use super::leaf_mesh::{FindOutside, LeafMesh, LeafPoints};
 use super::packet_rays::{PacketRays, SettleLanes};
 use super::points::{CornerSource, ProjectedMaxima, ProjectedOnDemand, ProjectedPoints, RelativePoints};
 use super::ray_group::{RayGroup, RayLimits};
@@ -149,7 +149,7 @@ impl<G: Goal> PacketRays<'_, G> {
             }
         }
         let count = block.triangles().min(WIDTH as u32);
-        let outside = Outside { bounds, block }.inline_or_call(s);
+        let outside = FindOutside { bounds, block }.inline_or_call(s);
         let triangles = !outside & ((1 << count) - 1);
         (triangles != 0).then(|| ReachedTriangles { leaf: block.points(code), triangles, rays })
     }

@@ -67,12 +67,12 @@ pub(crate) trait LeafMesh: TriangleBlock {
 }
 
 /// [`LeafMesh::outside`] as a part of kernels.
-pub(crate) struct Outside<'a, H, B> {
+pub(crate) struct FindOutside<'a, H, B> {
     pub(crate) bounds: &'a H,
     pub(crate) block: &'a B,
 }
 
-impl<S: Simd, H: PacketBounds<S>, B: LeafMesh> Part<S> for Outside<'_, H, B> {
+impl<S: Simd, H: PacketBounds<S>, B: LeafMesh> Part<S> for FindOutside<'_, H, B> {
     type Output = u32;
     #[inline(always)]
     fn run(self, s: S) -> u32 {

@@ -170,7 +170,7 @@ fn is_supported(object: &ObjectView<'_>) -> bool {
 }
 
 /// Consecutive rays that make a packet.
-struct Run<'a> {
+struct PacketRun<'a> {
     /// Index of the first ray in the batch.
     first: usize,
     rays: &'a [Ray],
@@ -199,7 +199,7 @@ struct Runs<'a, 'b> {
 impl<'a> Runs<'a, '_> {
     /// The next run. The rays before it are added to `rest`.
     #[inline(always)]
-    fn next(&mut self, s: impl Simd, goal: impl Goal) -> Option<Run<'a>> {
+    fn next(&mut self, s: impl Simd, goal: impl Goal) -> Option<PacketRun<'a>> {
         while self.next < self.rays.len() {
             let first = self.next;
             let count = match self.rays.len() - first {
@@ -210,7 +210,7 @@ impl<'a> Runs<'a, '_> {
             let rays = &self.rays[first..first + count];
             self.next = first + count;
             if let Some(kind) = choose(s, goal, self.bounds, rays, &mut self.backoffs) {
-                return Some(Run { first, rays, kind });
+                return Some(PacketRun { first, rays, kind });
             }
             self.skip(first, rays.len());
         }

@@ -200,7 +200,7 @@ impl PreparedRay {
 }
 
 /// [`Prepared::fill`] with its arguments.
-struct Fill<'a> {
+struct PrepareSixteen<'a> {
     prepared: &'a mut Prepared,
     bounds: &'a ObjectBounds,
     rays: &'a [Ray],
@@ -208,11 +208,11 @@ struct Fill<'a> {
     count: usize,
 }
 
-impl<S: Simd> Part<S> for Fill<'_> {
+impl<S: Simd> Part<S> for PrepareSixteen<'_> {
     type Output = ();
     #[inline(always)]
     fn run(self, s: S) {
-        let Fill { prepared, bounds, rays, at, count } = self;
+        let PrepareSixteen { prepared, bounds, rays, at, count } = self;
         let used = s.mask(((1u64 << count) - 1) as u32);
         let field = gather_rays(s, used, rays, s.load_u(at));
         prepared.clear();
@@ -258,7 +258,7 @@ impl Prepared {
         at: &[u32; LANES],
         count: usize,
     ) {
-        s.call(Fill { prepared: self, bounds, rays, at, count });
+        s.call(PrepareSixteen { prepared: self, bounds, rays, at, count });
     }
 
     /// Makes all lanes vacant.

@@ -126,9 +126,9 @@ impl Kernel for BoxAndFilter<'_> {
 }
 
 /// Kernel that prepares sixteen rays together.
-struct PrepareKernel<'a>(&'a [Ray; LANES], &'a ObjectBounds);
+struct PrepareTest<'a>(&'a [Ray; LANES], &'a ObjectBounds);
 
-impl Kernel for PrepareKernel<'_> {
+impl Kernel for PrepareTest<'_> {
     type Output = Prepared;
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Prepared {
@@ -160,7 +160,7 @@ fn all_preparations(ray: &Ray, line: &Line, bounds: &ObjectBounds, lane: usize) 
     others[lane] = *ray;
     for isa in Isa::ALL {
         all.extend(isa.run(PrepareOneKernel(ray, bounds)));
-        let prepared = isa.run(PrepareKernel(&others, bounds));
+        let prepared = isa.run(PrepareTest(&others, bounds));
         all.extend(prepared.prepared(lane));
         assert!(prepared.prepared((lane + 1) % LANES).is_none(), "a ray without a line is not prepared");
     }

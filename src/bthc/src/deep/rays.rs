@@ -29,16 +29,16 @@ impl Start {
 pub(super) fn sample(triangles: &[Triangle], count: usize, seed: u64) -> Vec<Start> {
     let mut random = Rng::new(seed);
     let kind = |i: usize| match 4 * i / count {
-        0 | 1 => Kind::Corner,
-        2 => Kind::Edge,
-        _ => Kind::Within,
+        0 | 1 => StartKind::Corner,
+        2 => StartKind::Edge,
+        _ => StartKind::Within,
     };
     (0..count).filter_map(|i| start(triangles, kind(i), i, &mut random)).collect()
 }
 
 /// Where a ray starts.
 #[derive(Clone, Copy, PartialEq)]
-enum Kind {
+enum StartKind {
     Corner,
     Edge,
     /// Within the triangle, or off it by a share of the way.
@@ -46,15 +46,15 @@ enum Kind {
 }
 
 /// A ray; `None` where f32 has no number for it.
-fn start(triangles: &[Triangle], kind: Kind, i: usize, random: &mut Rng) -> Option<Start> {
+fn start(triangles: &[Triangle], kind: StartKind, i: usize, random: &mut Rng) -> Option<Start> {
     let any = |random: &mut Rng| triangles[random.below(triangles.len() as u64) as usize];
     let (triangle, target) = (any(random), any(random));
     let first = random.below(3) as usize;
     let [a, b, c] = [0, 1, 2].map(|k| triangle.corners[(first + k) % 3]);
     let (u, v) = match kind {
-        Kind::Corner => (0.0, 0.0),
-        Kind::Edge => (random.unit_f32(), 0.0),
-        Kind::Within => (0.5 * random.unit_f32(), 0.5 * random.unit_f32()),
+        StartKind::Corner => (0.0, 0.0),
+        StartKind::Edge => (random.unit_f32(), 0.0),
+        StartKind::Within => (0.5 * random.unit_f32(), 0.5 * random.unit_f32()),
     };
     let on_surface: [f32; 3] = std::array::from_fn(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]));
     let to = |p: [f32; 3]| -> [f32; 3] { std::array::from_fn(|k| p[k] - on_surface[k]) };
@@ -63,10 +63,10 @@ fn start(triangles: &[Triangle], kind: Kind, i: usize, random: &mut Rng) -> Opti
         1 => to([0, 1, 2].map(|k| 0.5 * target.corners[0][k] + 0.5 * target.corners[1][k])),
         _ => random.unit_vector().map(|x| x as f32),
     };
-    let off = if kind == Kind::Within { [1e-3, 1e-5, 1e-7, -1e-6][i / 8 % 4] } else { 0.0 };
+    let off = if kind == StartKind::Within { [1e-3, 1e-5, 1e-7, -1e-6][i / 8 % 4] } else { 0.0 };
     let origin = [0, 1, 2].map(|k| on_surface[k] + off * direction[k]);
     // Above zero, so that what is touched at the start does not count.
-    let is_at_corner = kind == Kind::Corner;
+    let is_at_corner = kind == StartKind::Corner;
     let tmin = if is_at_corner { f32::MIN_POSITIVE } else { [0.0, 1e-4][i / 32 % 2] };
     let tmax = if i / 64 % 4 == 3 { 0.1 } else { f32::INFINITY };
     let ray = Ray { origin, tmin, direction, tmax };

@@ -4,7 +4,7 @@ use crate::hits::Accept;
 use crate::query::sink::Answers;
 use crate::rays::{Hit, Ray};
 use crate::scene::Scene;
-use crate::trace::TraceRay;
+use crate::trace_ray::TraceRay;
 
 /// Rays in world space that are traced together, with options: [`Ray`]s, or
 /// [`StartRay`](crate::rays::StartRay)s. Made by [`Scene::batch`].

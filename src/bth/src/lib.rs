@@ -38,12 +38,15 @@ mod refit;
 mod scene;
 #[doc(hidden)]
 pub mod simd;
+mod start_points;
 mod starts;
 mod streams;
 mod surface;
 mod tets;
 mod trace;
+mod trace_ray;
 mod update;
+mod visible;
 
 pub use animation::DeformerPoses;
 pub use batch::RayBatch;
@@ -57,8 +60,8 @@ pub use query::Steps;
 pub use scene::motion::{InstanceView, check_first_frame};
 pub use scene::{Scene, from_bytes, from_file, map, open};
 pub use simd::{Isa, IsaError};
-pub use starts::SegmentEnd;
 pub use streams::{HitStreams, RayStreams};
 pub use surface::{Bounds, SurfacePoint};
-pub use trace::TraceRay;
+pub use trace_ray::TraceRay;
 pub use update::Update;
+pub use visible::SegmentEnd;

@@ -1,133 +1,19 @@
 //! Queries for the nearest hit and for any hit: of one ray, of a batch, and of arrays of
 //! components.
 
-// `sealed::Traced` is out of reach for other crates, so its types may be private.
-#![allow(private_interfaces, private_bounds)]
-
-use self::sealed::Traced;
 use crate::batch::RayBatch;
 use crate::hits::Accept;
-use crate::instances::World;
-use crate::object::{self, Scratch};
+use crate::object;
 use crate::query::Steps;
-use crate::query::sink::{Answers, Sink};
-use crate::rays::{Hit, Ray, StartRay};
+use crate::query::sink::Answers;
+use crate::rays::{Hit, Ray};
 use crate::scene::Scene;
-use crate::simd::Isa;
-use crate::starts::prepare::ENDED;
-use crate::starts::world_ray::{InstanceStart, PlacedRay, WorldRay};
+use crate::starts::world_ray::{PlacedRay, WorldRay};
 use crate::streams::{HitStreams, RayStreams};
+use crate::trace_ray::TraceRay;
+use crate::trace_ray::sealed::Traced;
 use bth_format::layout::Opacity;
 use bth_format::object::ObjectView;
-use std::cell::Cell;
-
-/// A ray that can be traced: a [`Ray`], or a [`StartRay`].
-pub trait TraceRay: sealed::Traced {}
-
-impl TraceRay for Ray {}
-impl TraceRay for StartRay {}
-
-pub(crate) mod sealed {
-    use super::{Answers, InstanceStart, ObjectView, PlacedRay, Ray, Scene, Scratch, World};
-    use crate::object::single::SingleRay;
-
-    /// How rays of a kind are traced.
-    pub trait Traced: SingleRay + Copy + Sync {
-        /// Returns true if the ray may hit something in a scene that is this instance, whose
-        /// object's space is world space.
-        fn may_start_in(&self, instance: u32) -> bool;
-        /// The ray in the world; `None` if it has no place there.
-        fn placed(&self, scene: &Scene) -> Option<PlacedRay>;
-        /// Returns true if rays are traced together, through instances if there is a world.
-        fn go_together(rays: &[Self], world: Option<&World>) -> bool;
-        /// Stores the answers of rays that hit anything in an instance whose object's space is
-        /// world space.
-        fn trace_in_object(
-            object: &ObjectView<'_>,
-            rays: &[Self],
-            instance: u32,
-            scratch: &mut Scratch,
-            answers: Answers<'_>,
-        );
-        /// Calls `trace` with the rays of a batch in world space, and with their starts if there
-        /// are any.
-        fn with_placed(scene: &Scene, rays: &[Self], trace: impl FnOnce(&[Ray], &[InstanceStart]));
-    }
-}
-
-impl Traced for Ray {
-    #[inline(always)]
-    fn may_start_in(&self, _instance: u32) -> bool {
-        true
-    }
-    #[inline(always)]
-    fn placed(&self, _scene: &Scene) -> Option<PlacedRay> {
-        Some(PlacedRay { ray: *self, start: None })
-    }
-    fn go_together(rays: &[Ray], world: Option<&World>) -> bool {
-        world.is_none_or(|world| !world.go_one_by_one(rays))
-    }
-    fn trace_in_object(
-        object: &ObjectView<'_>,
-        rays: &[Ray],
-        instance: u32,
-        scratch: &mut Scratch,
-        answers: Answers<'_>,
-    ) {
-        object::trace_batch(
-            object,
-            rays,
-            None,
-            scratch,
-            &mut Sink::new(object.triangle_ids, answers, instance),
-        );
-    }
-    fn with_placed(_scene: &Scene, rays: &[Ray], trace: impl FnOnce(&[Ray], &[InstanceStart])) {
-        trace(rays, &[]);
-    }
-}
-
-thread_local! {
-    /// The rays of a batch in world space. A thread keeps their memory from one batch to the next.
-    static PLACED: Cell<(Vec<Ray>, Vec<InstanceStart>)> = const { Cell::new((Vec::new(), Vec::new())) };
-}
-
-impl Traced for StartRay {
-    #[inline(always)]
-    fn may_start_in(&self, instance: u32) -> bool {
-        self.start.primitive.instance == instance
-    }
-    fn placed(&self, scene: &Scene) -> Option<PlacedRay> {
-        scene.place(self)
-    }
-    fn go_together(_rays: &[StartRay], _world: Option<&World>) -> bool {
-        Isa::chosen() != Isa::Scalar
-    }
-    fn trace_in_object(
-        object: &ObjectView<'_>,
-        rays: &[StartRay],
-        instance: u32,
-        scratch: &mut Scratch,
-        answers: Answers<'_>,
-    ) {
-        object::trace_starts(object, rays, instance, scratch, answers);
-    }
-    fn with_placed(scene: &Scene, rays: &[StartRay], trace: impl FnOnce(&[Ray], &[InstanceStart])) {
-        let (mut world_rays, mut starts) = PLACED.take();
-        world_rays.clear();
-        starts.clear();
-        for ray in rays {
-            let (ray, start) = match scene.place(ray) {
-                Some(PlacedRay { ray, start: Some(start) }) => (ray, start),
-                _ => (ENDED, InstanceStart::none(ENDED.origin)),
-            };
-            world_rays.push(ray);
-            starts.push(start);
-        }
-        trace(&world_rays, &starts);
-        PLACED.set((world_rays, starts));
-    }
-}
 
 impl Scene {
     /// Nearest hit of a ray in world space: a [`Ray`], or a [`StartRay`].

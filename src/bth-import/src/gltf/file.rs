@@ -95,7 +95,8 @@ impl<'a> GltfFile<'a> {
             }
             let Some(columns) = node.matrix else { continue };
             let row = [3, 7, 11, 15].map(|k| columns[k]);
-            if row.iter().zip([0.0, 0.0, 0.0, 1.0]).any(|(x, affine)| !((x - affine).abs() <= 1e-6)) {
+            let is_affine = row.iter().zip([0.0, 0.0, 0.0, 1.0]).all(|(x, of)| (x - of).abs() <= 1e-6);
+            if !is_affine {
                 let message = format!("expected a matrix whose last row is 0, 0, 0, 1, found {row:?}");
                 let hint =
                     "export the model with affine transforms; a matrix has its columns one after the other";

@@ -14,9 +14,9 @@ use bth_format::object::ObjectBounds;
 /// A ray reaches a plane at the depth (plane - o)·r. An interval of o, widened by a pad on both
 /// sides, and an interval of r bound it. All operations round monotonically, so only roundings need
 /// the pad. With u = 2^-24 and P a plane, they come to at most 2u|o||r| for the padded end, and to
-/// u|P - o||r| each for the reciprocal, the difference and the product. Clamped components add 4u|P
-/// - o||r|. With the distances from c of [`boxes::PAD`] these are 7u|P - c| + 9u|o - c| + 2u|c|: 2
-/// · PAD of the lengths there.
+/// u|P - o||r| each for the reciprocal, the difference and the product. Clamped components add
+/// 4u|P - o||r|. With the distances from c of [`boxes::PAD`] these are
+/// 7u|P - c| + 9u|o - c| + 2u|c|, which is 2 · PAD of the lengths there.
 #[derive(Clone, Copy)]
 pub(crate) struct Shaft<S: Simd> {
     /// For each axis the end of the origins' interval that is nearest to the planes at which rays

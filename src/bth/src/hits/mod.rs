@@ -24,7 +24,7 @@ use crate::masks::Masks;
 use crate::rays::Hit;
 use crate::scene::Scene;
 use crate::starts::world_ray::WorldRay;
-use crate::trace::TraceRay;
+use crate::trace_ray::TraceRay;
 use std::collections::BinaryHeap;
 
 /// Queries for several hits, and with conditions. Hits are ordered by ascending t, then instance,

@@ -7,12 +7,11 @@ use super::{any, nearest};
 use crate::bvh::interleaved::{Interleaved, RemainingRays};
 use crate::bvh::nodes::{is_large, sole_tet_leaf};
 use crate::bvh::packet::{MinimumUse, Packets};
-use crate::intersect::exact_lanes::Intersections;
 use crate::intersect::start_point::Starts;
-use crate::query::sink::{Answers, Sink, store_hits};
+use crate::query::sink::{Answers, Sink};
 use crate::query::with_batch_goal;
-use crate::rays::{Hit, Ray, StartRay};
-use crate::simd::{Isa, Kernel, Simd};
+use crate::rays::{Ray, StartRay};
+use crate::simd::Isa;
 use crate::starts::prepare::PreparedStarts;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
@@ -21,35 +20,6 @@ use bth_format::object::ObjectView;
 pub(crate) const MIN_BATCH: usize = 4;
 /// Where at most one in this many rays has ended, all are traced: packets without gaps save more.
 const FEW_ENDED: usize = 8;
-
-/// Fills `hits` with [`Hit::MISS`].
-#[inline]
-pub(crate) fn fill_misses(hits: &mut [Hit]) {
-    // For a few hits the call of a kernel takes longer than a loop.
-    if hits.len() < MIN_BATCH {
-        hits.fill(Hit::MISS);
-    } else {
-        Isa::chosen().run(MissKernel(hits));
-    }
-}
-
-/// The kernel of [`fill_misses`], which stores whole vectors.
-struct MissKernel<'a>(&'a mut [Hit]);
-
-impl Kernel for MissKernel<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run<S: Simd>(self, s: S) {
-        if !S::HAS_VECTORS {
-            return self.0.fill(Hit::MISS);
-        }
-        let (blocks, rest) = self.0.as_chunks_mut();
-        for block in blocks {
-            store_hits(s, 0, &Intersections::NONE, NONE, block);
-        }
-        rest.fill(Hit::MISS);
-    }
-}
 
 /// Stores in `sink` the answers of those rays in object space that hit anything: all of them, or
 /// those whose indices are in `order`.

@@ -2,11 +2,12 @@
 //! by a batch.
 
 mod batch;
+mod in_instance;
 mod scratch;
 pub(crate) mod single;
 mod walked_batch;
 
-pub(crate) use batch::{MIN_BATCH, fill_misses, trace_batch, trace_starts};
+pub(crate) use batch::{MIN_BATCH, trace_batch, trace_starts};
 pub(crate) use scratch::{Scratch, with_scratch};
 
 use self::single::{SingleRay, trace};

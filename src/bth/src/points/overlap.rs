@@ -27,7 +27,7 @@ fn visit_in_box(at: PointInstance<'_>, region: [[f32; 3]; 2], visit: &mut Visito
     let greatest = object.bounds.greatest;
     let boxes = match at.placed {
         None => RegionBox::in_world(region, greatest),
-        Some(placed) => RegionBox::new(region, placed.to_world(), greatest, placed.extent()),
+        Some(placed) => RegionBox::new(region, placed.world_rows(), greatest, placed.extent()),
     };
     object.header.root != NONE
         && run_walk(&ObjectTree::new(object), &mut BoxTriangles { at, region, boxes, visit })

@@ -74,7 +74,7 @@ impl PlacedObject {
     }
 
     /// The transform from object space to world space: rows of four.
-    pub(super) fn to_world(&self) -> &[[f64; 4]; 3] {
+    pub(super) fn world_rows(&self) -> &[[f64; 4]; 3] {
         &self.placed.to_world
     }
 

@@ -5,7 +5,8 @@ use super::{EitherGoal, Goal, RayQuery, better};
 use crate::intersect::exact_lanes::Intersections;
 use crate::intersect::start_point::Starts;
 use crate::rays::{Hit, PrimitiveRef, Ray};
-use crate::simd::{LANES, Simd};
+use crate::simd::{Isa, Kernel, LANES, Simd};
+use bth_format::layout::NONE;
 
 /// The traversal of one instance by one ray of a scene.
 #[derive(Clone, Copy, Debug)]
@@ -54,7 +55,7 @@ impl Answers<'_> {
     /// Makes all answers misses.
     pub(crate) fn clear(&mut self) {
         match self {
-            Answers::Nearest(hits) => crate::object::fill_misses(hits),
+            Answers::Nearest(hits) => fill_misses(hits),
             Answers::Any(found) => found.fill(false),
         }
     }
@@ -218,4 +219,35 @@ pub(crate) fn store_hits<S: Simd>(
     let instance = s.select_u(m, s.splat_u(instance), s.splat_u(primitive.instance));
     let triangle = s.select_u(m, s.load_u(&found.triangle), s.splat_u(primitive.triangle));
     s.store_rows5([s.bits(t), s.bits(u), s.bits(v), instance, triangle], zerocopy::transmute_mut!(hits));
+}
+
+/// Fewest hits for which the call of a kernel takes less time than a loop.
+const MIN_HITS: usize = 4;
+
+/// Fills `hits` with [`Hit::MISS`].
+#[inline]
+fn fill_misses(hits: &mut [Hit]) {
+    if hits.len() < MIN_HITS {
+        hits.fill(Hit::MISS);
+    } else {
+        Isa::chosen().run(MissKernel(hits));
+    }
+}
+
+/// The kernel of [`fill_misses`], which stores whole vectors.
+struct MissKernel<'a>(&'a mut [Hit]);
+
+impl Kernel for MissKernel<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) {
+        if !S::HAS_VECTORS {
+            return self.0.fill(Hit::MISS);
+        }
+        let (blocks, rest) = self.0.as_chunks_mut();
+        for block in blocks {
+            store_hits(s, 0, &Intersections::NONE, NONE, block);
+        }
+        rest.fill(Hit::MISS);
+    }
 }

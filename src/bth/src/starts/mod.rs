@@ -5,8 +5,7 @@
 //! the triangle in the leaves of its object, [`triangles`] the triangles of sixteen rays. [`free`]
 //! looks up what they certainly do not hit, by the side on which they leave the triangle and the
 //! bin of their direction ([`leaving`]). [`prepare`] makes rays of the object of a batch.
-//! [`world_ray`] holds a ray in world space that may start on a triangle of an instance;
-//! [`queries`] places it there. [`visible`] decides whether two points see each other.
+//! [`world_ray`] holds a ray in world space that may start on a triangle of an instance.
 
 pub(crate) mod free;
 #[cfg(test)]
@@ -14,9 +13,5 @@ mod free_tests;
 mod leaving;
 pub(crate) mod locate;
 pub(crate) mod prepare;
-mod queries;
 mod triangles;
-mod visible;
 pub(crate) mod world_ray;
-
-pub use visible::SegmentEnd;

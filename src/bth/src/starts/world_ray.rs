@@ -1,11 +1,8 @@
 //! Rays in world space that may start on a triangle of an instance.
 
 use crate::intersect::start_point::StartPoint;
-use crate::object;
-use crate::query::Steps;
-use crate::rays::{Hit, Ray, Start, StartRay};
+use crate::rays::{Ray, Start, StartRay};
 use bth_format::layout::NONE;
-use bth_format::object::ObjectView;
 
 /// A start in the space of the object of an instance.
 #[derive(Clone, Copy, Debug)]
@@ -42,29 +39,6 @@ impl<'a> WorldRay<'a> {
     #[inline(always)]
     pub(crate) fn start_in(&self, instance: u32) -> Option<&'a StartPoint> {
         self.start.filter(|start| start.instance == instance).map(|start| &start.point)
-    }
-
-    /// Nearest hit in an instance, given the ray in the space of its object, with its end.
-    pub(crate) fn nearest_in(&self, object: &ObjectView<'_>, instance: u32, ray: &Ray) -> Hit {
-        let start = |start: &StartRay| object::nearest(object, start, instance);
-        self.in_object(instance, ray, start, |ray| object::nearest(object, ray, instance))
-    }
-
-    /// As [`Self::nearest_in`], with the statistics of the traversal.
-    pub(crate) fn nearest_counted_in(
-        &self,
-        object: &ObjectView<'_>,
-        instance: u32,
-        ray: &Ray,
-    ) -> (Hit, Steps) {
-        let start = |start: &StartRay| object::nearest_counted(object, start, instance);
-        self.in_object(instance, ray, start, |ray| object::nearest_counted(object, ray, instance))
-    }
-
-    /// Returns true if the ray hits anything in an instance; parameters as for
-    /// [`Self::nearest_in`].
-    pub(crate) fn any_in(&self, object: &ObjectView<'_>, instance: u32, ray: &Ray) -> bool {
-        self.in_object(instance, ray, |start| object::any(object, start), |ray| object::any(object, ray))
     }
 
     /// As a ray in an instance, given the ray in the space of its object: one that starts there, or

@@ -1,17 +1,17 @@
 //! Queries of scenes about starts on surfaces: where they lie in the world, whether rays can start
 //! there, and what they see.
 
-use super::locate::{StartError, locate};
-use super::visible::{self, SegmentEnd};
-use super::world_ray::{InstanceStart, PlacedRay};
 use crate::intersect::origin::RoundedOrigin;
 use crate::rays::{Ray, Start, StartRay};
 use crate::scene::Scene;
+use crate::starts::locate::{StartError, locate};
+use crate::starts::world_ray::{InstanceStart, PlacedRay};
+use crate::visible::{self, SegmentEnd};
 use bth_format::{Code, Error};
 use std::borrow::Cow;
 
 /// Why a ray cannot be placed.
-pub(super) enum Misplaced {
+pub(crate) enum Misplaced {
     NoInstance,
     Hidden,
     Start(StartError),
@@ -19,7 +19,7 @@ pub(super) enum Misplaced {
 
 impl Scene {
     /// Places a start in the world: with its point in world space, rounded to f32.
-    pub(super) fn place_start(&self, start: &Start) -> Result<(InstanceStart, [f32; 3]), Misplaced> {
+    pub(crate) fn place_start(&self, start: &Start) -> Result<(InstanceStart, [f32; 3]), Misplaced> {
         let instance = start.primitive.instance;
         let Some(world) = self.world() else {
             let object = Some(instance).filter(|instance| *instance < self.object_count());

@@ -206,7 +206,7 @@ mod tests {
             let frames: Vec<Vec<_>> =
                 (0..count).map(|frame| (0..rows).map(|row| at(frame, row)).collect()).collect();
             let all: Vec<&[_]> = frames.iter().map(Vec::as_slice).collect();
-            let (frames, moved) = if moves { (&all[..1], Some(moved(&all[count - 1]))) } else { (&all[..], None) };
+            let (frames, moved) = if moves { (&all[..1], Some(moved(all[count - 1]))) } else { (&all[..], None) };
             let same = |a: u32, b: u32| {
                 let [a, b] = [a as usize, b as usize];
                 let joint = |row: usize| all[count - 1][row][0] > 0.0;

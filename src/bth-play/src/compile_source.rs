@@ -25,7 +25,7 @@ pub(crate) fn is_source(path: &Path) -> bool {
         .and_then(|_| std::fs::File::open(path))
         .and_then(|mut file| file.read_exact(&mut start));
     let is_named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("bth"));
-    !is_named && !(read.is_ok() && start == IDENTIFIER)
+    !is_named && (read.is_err() || start != IDENTIFIER)
 }
 
 /// A compiled source.
@@ -174,7 +174,7 @@ fn compile(source: &Path, cache: &Path, materials: bool) -> Result<Done, Failure
     let is_new = |line: &&str| reported.is_none() || !line.starts_with("error: ");
     stderr.lines().filter(is_new).for_each(messages::note);
     if let Some(error) = reported {
-        return Err(Failure::Compiler(error));
+        return Err(Failure::Compiler(Box::new(error)));
     }
     if !output.status.success() {
         return Err(failed(format!("{} ended with {}", bthc.display(), output.status)));

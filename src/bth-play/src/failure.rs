@@ -16,7 +16,7 @@ pub(crate) enum Failure {
     /// A compiled file that lacks what the mode needs (exit code 3).
     Lacks { file: PathBuf, what: &'static str, hint: &'static str },
     /// What `bthc` reported of a scene or model that it could not compile.
-    Compiler(Diagnosis),
+    Compiler(Box<Diagnosis>),
     /// A scene or model for which `bthc` could not be run (exit code 3).
     Source { path: PathBuf, message: String },
     /// A picture of the surroundings that cannot be used (exit code 3) or read (exit code 4).
@@ -66,7 +66,7 @@ impl Failure {
         let found = match self {
             Self::Usage(message) => Diagnosis::usage(message).with_hint("see bth-play --help"),
             Self::Runtime(error) => error.into(),
-            Self::Compiler(diagnosis) => diagnosis.clone(),
+            Self::Compiler(diagnosis) => (**diagnosis).clone(),
             Self::Source { path, message } => {
                 let name = path.to_string_lossy();
                 let quote = if name.contains(char::is_whitespace) { "\"" } else { "" };

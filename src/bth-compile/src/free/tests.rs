@@ -217,7 +217,7 @@ fn a_plane_is_free_though_its_triangles_touch() {
 fn duplicates_and_triangles_without_area_block_nothing() {
     let [a, b, c] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.25], [0.0, 1.0, 0.5]];
     let mesh =
-        weld(&[[a, b, c], [c, b, a], [a, b, c], [a, a, [0.2, 0.2, 9.0]], [[0.25; 3], [0.5; 3], [0.75; 3]]]);
+        weld([[a, b, c], [c, b, a], [a, b, c], [a, a, [0.2, 0.2, 9.0]], [[0.25; 3], [0.5; 3], [0.75; 3]]]);
     let free = free_of(&mesh);
     assert!((0..3).all(|triangle| free.bins(triangle).0 == FreeBins::ALL));
     assert!((3..5).all(|triangle| free.known(triangle).is_nothing()));
@@ -230,7 +230,7 @@ fn distant_triangles_block_beyond_their_distance_only() {
     let up = free_bin(&free_axes(corners).unwrap(), [0.1, 0.1, 1.0]).unwrap();
     assert!(!up.1);
     for height in [0.01, 0.5, 1.0, 3.0, 10.0, 25.0, 50.0] {
-        let mesh = weld(&[corners, above(height)]);
+        let mesh = weld([corners, above(height)]);
         let free = found(&mesh, KeepFree::Distances).0;
         // The largest level below the height, since nothing else is there.
         let levels = free.levels.map(f64::from);
@@ -338,8 +338,8 @@ fn solids_are_seen_from_outside_and_rooms_from_within() {
     // tetrahedron, each face turned outwards.
     let [a, b, c, d] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let outwards = [[a, c, b], [a, b, d], [a, d, c], [b, c, d]];
-    assert_eq!(found(&weld(&outwards), KeepFree::Auto).1.kept, Kept::Directions);
-    let (_, report) = found(&weld(&outwards.map(|[a, b, c]| [a, c, b])), KeepFree::Auto);
+    assert_eq!(found(&weld(outwards), KeepFree::Auto).1.kept, Kept::Directions);
+    let (_, report) = found(&weld(outwards.map(|[a, b, c]| [a, c, b])), KeepFree::Auto);
     let worth = report.worth.unwrap();
     assert_eq!(report.kept, Kept::None, "{report:?}");
     assert!(worth.from_outside.open > 0.9 && worth.from_within.open < 0.1, "{worth:?}");
@@ -357,7 +357,7 @@ fn what_no_ray_meets_is_not_worthwhile() {
     assert!(worth.from_outside.rays > 100, "{report:?}");
     // Nothing can be met at all.
     let a = [0.5; 3];
-    let (_, report) = found(&weld(&[[a, a, a]]), KeepFree::Auto);
+    let (_, report) = found(&weld([[a, a, a]]), KeepFree::Auto);
     assert_eq!((report.kept, report.worth.unwrap_or_default()), (Kept::None, Worth::default()), "{report:?}");
 }
 

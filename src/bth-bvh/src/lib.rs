@@ -9,8 +9,8 @@
 //!
 //! [`sampling`] draws sample rays and walks them through the binary BVH.
 //!
-//! Spatial splits are not made: with nodes of 16 children the few large triangles of much overlap end
-//! up in one leaf near the root, and splitting them gained nothing.
+//! Spatial splits are not made: with nodes of 16 children the few large triangles of much overlap
+//! end up in one leaf near the root, and splitting them gained nothing.
 #![warn(missing_docs)]
 
 mod binned_split;

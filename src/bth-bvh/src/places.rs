@@ -26,7 +26,7 @@ pub fn triangle_places(wide: &Wide, grid: Option<&Grid>, triangles: usize) -> Ve
 }
 
 /// A triangle leaf.
-struct Leaf {
+struct LeafRows {
     child: Child,
     /// Half line where it starts.
     half: u64,
@@ -36,7 +36,7 @@ struct Leaf {
 }
 
 /// All triangle leaves in the order of their lines, also those in subtrees of tet leaves.
-fn leaves(wide: &Wide, grid: Option<&Grid>) -> Vec<Leaf> {
+fn leaves(wide: &Wide, grid: Option<&Grid>) -> Vec<LeafRows> {
     let mut stack: Vec<u32> = wide.subtrees.iter().copied().chain([wide.root]).collect();
     let mut leaves = Vec::new();
     while let Some(code) = stack.pop() {
@@ -55,7 +55,7 @@ fn leaves(wide: &Wide, grid: Option<&Grid>) -> Vec<Leaf> {
 }
 
 /// Reads which triangles a leaf holds.
-fn leaf(wide: &Wide, child: Child, bits: Option<GridBits>) -> Leaf {
+fn leaf(wide: &Wide, child: Child, bits: Option<GridBits>) -> LeafRows {
     let (Child::Indexed(index) | Child::Raw(index)) = child else { unreachable!("a triangle leaf") };
     let is_indexed = matches!(child, Child::Indexed(_));
     // Leaves on a grid are counted in half lines.
@@ -86,7 +86,7 @@ fn leaf(wide: &Wide, child: Child, bits: Option<GridBits>) -> Leaf {
             (leaf.first, leaf.triangles)
         }
     };
-    Leaf { child, half, first, triangles }
+    LeafRows { child, half, first, triangles }
 }
 
 /// The block that starts at a half line.

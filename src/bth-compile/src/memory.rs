@@ -23,7 +23,7 @@ use crate::cached::Cache;
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
 use crate::pipeline::{
-    CachedCompilation, CompileOptions, CompileReport, Compiled, Source, compile_source, joined,
+    CachedCompilation, CompileInput, CompileOptions, CompileReport, Compiled, compile_source, joined,
 };
 use crate::scene::{self, SceneReport};
 use crate::write::Content;
@@ -65,7 +65,7 @@ pub fn compile_cached(
     needed: &dyn Fn(&Record) -> bool,
     monitor: &dyn Monitor,
 ) -> Result<CachedCompilation<CompileReport>> {
-    compile_source(Source::Triangles(mesh), options, cache, needed, monitor)
+    compile_source(CompileInput::Triangles(mesh), options, cache, needed, monitor)
 }
 
 /// Compiles a scene of meshes, each of which may have any number of instances; with [`Cache::none`]

@@ -23,7 +23,7 @@ pub(crate) trait Stage: Sized {
 }
 
 /// A stage whose results the cache keeps: a value, and a report as JSON.
-pub(crate) trait Kept<T, R>: Stage<Output = (T, R)>
+pub(crate) trait CachedStage<T, R>: Stage<Output = (T, R)>
 where
     R: Serialize + DeserializeOwned,
 {

@@ -165,7 +165,8 @@ impl Request {
     /// The message of the bytes.
     ///
     /// # Errors
-    /// [`Error::Malformed`] for anything but one whole message; indices are checked against `points`.
+    /// [`Error::Malformed`] for anything but one whole message; indices are checked against
+    /// `points`.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
         let mut from = Reader(bytes);
         let request = match from.byte()? {
@@ -222,7 +223,8 @@ impl Reply {
     /// The message of the bytes.
     ///
     /// # Errors
-    /// [`Error::Malformed`] for anything but one whole message; indices are checked against `points`.
+    /// [`Error::Malformed`] for anything but one whole message; indices are checked against
+    /// `points`.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
         let mut from = Reader(bytes);
         let reply = match from.byte()? {

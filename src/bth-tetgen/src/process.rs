@@ -11,7 +11,8 @@ use std::os::fd::FromRawFd;
 /// The system's.
 pub(crate) fn frames_apart_from_prints() -> io::Result<File> {
     let null = std::fs::OpenOptions::new().write(true).open("/dev/null")?;
-    // SAFETY: `dup` only reads the descriptor table; on success nothing else owns the new descriptor.
+    // SAFETY: `dup` only reads the descriptor table; on success nothing else owns the new
+    // descriptor.
     let frames = unsafe { libc::dup(1) };
     if frames < 0 {
         return Err(io::Error::last_os_error());

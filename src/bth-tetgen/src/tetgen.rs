@@ -91,7 +91,8 @@ pub(crate) fn tetrahedralize(job: &Job) -> Result<Tetrahedra, (Failure, String)>
         };
         return Err((failure, format!("{text} (code {code})")));
     }
-    // SAFETY: on success both lists are TetGen's own arrays of these lengths, alive until `owned` drops.
+    // SAFETY: on success both lists are TetGen's own arrays of these lengths, alive until `owned`
+    // drops.
     let (points, tets) = unsafe {
         (
             std::slice::from_raw_parts(output.points, output.point_count),

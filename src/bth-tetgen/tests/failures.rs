@@ -1,6 +1,6 @@
-//! Every kind of failure, brought about in TetGen itself. (But for its internal errors and
-//! what it calls wrong input, for which no input is known that brings them about and not its end; those are planted:
-//! `bth-compile`, tests/tets/faults.rs.)
+//! Every kind of failure, brought about in TetGen itself. (But for its internal errors and what it
+//! calls wrong input, for which no input is known that brings them about and not its end; those are
+//! planted: `bth-compile`, tests/tets/faults.rs.)
 
 use bth_random::Rng;
 use bth_tetgen_protocol::{Failure, Job, Reply, Request, read_frame, write_frame};
@@ -117,7 +117,8 @@ fn there_is_no_result() {
     fails(&request, GIBIBYTE, Failure::Other);
 }
 
-/// Eight thin triangles through one another, on which TetGen 1.5 dies; another version may say why it fails.
+/// Eight thin triangles through one another, on which TetGen 1.5 dies; another version may say why
+/// it fails.
 #[test]
 fn a_death_is_no_answer_and_no_reply_is_made_up() {
     let points = vec![

@@ -4,7 +4,7 @@ use super::log::{Log, Miss};
 use super::warnings::{replay, with_warnings};
 use crate::error::Result;
 use crate::monitor::{Monitor, Recording};
-use crate::stage::Kept;
+use crate::stage::CachedStage;
 use crate::tets;
 use bth_cache::{Key, Record, Store, WorkLock};
 use bth_files::Digest;
@@ -176,7 +176,7 @@ impl<'a> Cache<'a> {
 
     /// The result of a stage: from the cache if it has the result, else made and kept. `part` as in
     /// [`Cache::fetch`].
-    pub(crate) fn run<T, R: Serialize + DeserializeOwned, S: Kept<T, R>>(
+    pub(crate) fn run<T, R: Serialize + DeserializeOwned, S: CachedStage<T, R>>(
         &self,
         stage: S,
         part: &str,

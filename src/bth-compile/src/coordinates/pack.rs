@@ -6,7 +6,7 @@ use bth_format::layout::*;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// A node or leaf in the lines.
-struct Block {
+struct MovedBlock {
     /// Child code in the wide BVH of `f32`.
     old: Child,
     /// Offset of its new place, in half lines.
@@ -65,17 +65,17 @@ pub fn pack(wide: &mut Wide, grid: &Grid) -> Result<()> {
 }
 
 /// All nodes and leaves, in the order of their lines.
-fn blocks(wide: &Wide) -> Vec<Block> {
+fn blocks(wide: &Wide) -> Vec<MovedBlock> {
     let mut found = Vec::new();
     let mut stack: Vec<u32> = wide.subtrees.iter().copied().chain([wide.root]).collect();
     while let Some(code) = stack.pop() {
         match Child::from_code(code) {
             Some(old @ Child::Node(line)) => {
-                found.push((line, Block { old, half: 0 }));
+                found.push((line, MovedBlock { old, half: 0 }));
                 stack.extend(read::<WideNode>(&wide.lines, line).child);
             }
             Some(old @ (Child::Indexed(line) | Child::Raw(line))) => {
-                found.push((line, Block { old, half: 0 }))
+                found.push((line, MovedBlock { old, half: 0 }))
             }
             Some(Child::Tets(_)) | None => {}
         }
@@ -106,7 +106,7 @@ impl Packed<'_> {
         }
     }
 
-    fn write(&mut self, block: &Block) {
+    fn write(&mut self, block: &MovedBlock) {
         let (half, grid, bits) = (block.half, self.grid, self.grid.bits);
         match block.old {
             Child::Node(line) => {

@@ -188,8 +188,8 @@ struct Factors<S: Simd> {
 
 impl<S: Simd> Factors<S> {
     /// A corner at the height a above the line and z above the plane lies below a plane with w if
-    /// a + w z <= 0. With z known to lie between two bounds, w <= -a / z or w >= -a / z for that one
-    /// of them which makes it harder.
+    /// `a + w z <= 0`. z lies between two bounds, so w <= -a / z or w >= -a / z with the bound that
+    /// makes this harder.
     #[inline(always)]
     fn new<const TOUCHES: bool>(s: S, corners: &Corners<S, TOUCHES>) -> Self {
         let zero = s.splat(0.0);

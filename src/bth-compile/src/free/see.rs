@@ -15,7 +15,7 @@ pub(super) const SMALL: f32 = 1.0 / 10.0;
 pub(super) const SMALL_FOR_SECTORS: f32 = 1.0 / 6.0;
 
 /// What may be seen of children.
-pub(super) struct Seen {
+pub(super) struct SeenChildren {
     /// Lower bounds of the squared distances.
     pub(super) squared_gap: [f32; LANES],
     /// Bits of the children in any bins.
@@ -26,7 +26,7 @@ pub(super) struct Seen {
     range: [u32; LANES],
 }
 
-impl Seen {
+impl SeenChildren {
     /// The bins in which a child may be seen, which is one of `lanes`.
     #[inline(always)]
     pub(super) fn bins(&self, lane: usize) -> BinSet {
@@ -34,7 +34,7 @@ impl Seen {
     }
 }
 
-/// The bins of a range of columns and one of rows, as [`Seen`] stores them.
+/// The bins of a range of columns and one of rows, as [`SeenChildren`] stores them.
 #[inline(always)]
 pub(super) fn bins_of(range: u32) -> BinSet {
     let [first, end, first_row, end_row] = range.to_le_bytes();
@@ -68,7 +68,7 @@ pub(super) fn squared_gap<S: Simd>(s: S, ranges: &[[S::F; 2]; 3]) -> S::F {
 /// What a start triangle may see of the boxes of a node. There are no fused operations, so that all
 /// instruction sets agree.
 #[inline(always)]
-pub(super) fn see<S: Simd>(s: S, start: &Start, node: &Node) -> Seen {
+pub(super) fn see<S: Simd>(s: S, start: &Start, node: &Node) -> SeenChildren {
     let zero = s.splat(0.0);
     let half = s.splat(0.5);
     // Middles, relative to the first corner, and halves of the sides.
@@ -95,7 +95,7 @@ pub(super) fn see<S: Simd>(s: S, start: &Start, node: &Node) -> Seen {
     let diagonal = s.add(s.add(s.mul(side[0], side[0]), s.mul(side[1], side[1])), s.mul(side[2], side[2]));
     let small = s.le(diagonal, s.mul(gap, s.splat(start.small * start.small)));
     let (range, seen) = columns_and_rows(s, &ranges);
-    let mut out = Seen {
+    let mut out = SeenChildren {
         squared_gap: [0.0; LANES],
         lanes: s.mask_bits(s.and(seen, s.lt(zero, ranges[2][1]))) & node.children,
         small: s.mask_bits(small),
@@ -106,8 +106,8 @@ pub(super) fn see<S: Simd>(s: S, start: &Start, node: &Node) -> Seen {
     out
 }
 
-/// Columns and rows in which points with coordinates in ranges may be seen, as [`Seen`] stores
-/// them, and where there are any.
+/// Columns and rows in which points with coordinates in ranges may be seen, as [`SeenChildren`]
+/// stores them, and where there are any.
 #[inline(always)]
 pub(super) fn columns_and_rows<S: Simd>(s: S, ranges: &[[S::F; 2]; 3]) -> (S::U, S::M) {
     let zero_u = s.splat_u(0);

@@ -88,7 +88,7 @@ impl fmt::Display for Worth {
 
 /// A triangle that a ray meets.
 #[derive(Clone, Copy)]
-struct Met {
+struct RayHit {
     /// Row of the BVH's order.
     row: usize,
     is_back: bool,
@@ -114,12 +114,13 @@ pub(super) fn worth(
     let drawn = all.len();
     let lines = affordable(around.mesh, tree, all);
     let count = if drawn == 0 { count } else { (count * lines.len()).div_ceil(drawn) };
-    let from_outside: Vec<Met> = lines.par_iter().filter_map(|line| meet(around.mesh, tree, line)).collect();
+    let from_outside: Vec<RayHit> =
+        lines.par_iter().filter_map(|line| meet(around.mesh, tree, line)).collect();
     let from_within = met_from_within(around.mesh, tree, count);
     around.kept = Kept::Distances;
     let of_row = decide_met(around, from_outside.iter().chain(&from_within), monitor)?;
-    let open = |met: &Met| beyond(of_row[&met.row].sectors[usize::from(met.is_back)], 1);
-    let seen = |met: &[Met]| Seen { rays: met.len() as u64, open: mean(met, open) };
+    let open = |met: &RayHit| beyond(of_row[&met.row].sectors[usize::from(met.is_back)], 1);
+    let seen = |met: &[RayHit]| Seen { rays: met.len() as u64, open: mean(met, open) };
     (worth.from_outside, worth.from_within) = (seen(&from_outside), seen(&from_within));
     if !worth.is_open() {
         return Ok((Kept::None, worth));
@@ -138,27 +139,27 @@ pub(super) fn worth(
 
 /// The triangles that rays in uniform directions meet from uniform points of the box, but not from
 /// points in solids, from which only backs are seen: what is in a room shows its front.
-fn met_from_within(mesh: &Mesh, tree: &BinaryBvh, count: usize) -> Vec<Met> {
+fn met_from_within(mesh: &Mesh, tree: &BinaryBvh, count: usize) -> Vec<RayHit> {
     let root = &tree.nodes[0];
     let rays = within(root.lower, root.upper, [count.div_ceil(RAYS_A_POINT), RAYS_A_POINT], 2);
     let of_point = |rays: &[SampleRay]| {
-        let met: Vec<Met> = rays.iter().filter_map(|ray| meet(mesh, tree, ray)).collect();
+        let met: Vec<RayHit> = rays.iter().filter_map(|ray| meet(mesh, tree, ray)).collect();
         if met.iter().all(|met| met.is_back) { Vec::new() } else { met }
     };
     rays.par_chunks(RAYS_A_POINT).flat_map_iter(of_point).collect()
 }
 
 /// The first triangle that a ray meets.
-fn meet(mesh: &Mesh, tree: &BinaryBvh, ray: &SampleRay) -> Option<Met> {
+fn meet(mesh: &Mesh, tree: &BinaryBvh, ray: &SampleRay) -> Option<RayHit> {
     let (row, _) = walk(mesh, tree, ray, |_| ()).hit?;
     let normal = double_area(corners(mesh, tree.order[row as usize]));
-    Some(Met { row: row as usize, is_back: normal.dot(DVec3::from(ray.direction)) > 0.0 })
+    Some(RayHit { row: row as usize, is_back: normal.dot(DVec3::from(ray.direction)) > 0.0 })
 }
 
 /// What is known of the triangles that are met, by rows.
 fn decide_met<'a>(
     around: &Surroundings<'_>,
-    met: impl IntoIterator<Item = &'a Met>,
+    met: impl IntoIterator<Item = &'a RayHit>,
     monitor: &dyn Monitor,
 ) -> Result<HashMap<usize, Found>> {
     let rows: BTreeSet<usize> = met.into_iter().map(|met| met.row).collect();
@@ -167,7 +168,7 @@ fn decide_met<'a>(
 }
 
 /// The mean of a share over what is met; 0 where nothing is.
-fn mean(met: &[Met], share: impl Fn(&Met) -> f64) -> f64 {
+fn mean(met: &[RayHit], share: impl Fn(&RayHit) -> f64) -> f64 {
     let sum = met.iter().fold(0.0, |sum, met| sum + share(met));
     (sum / (met.len() as f64).max(1.0)).min(1.0)
 }

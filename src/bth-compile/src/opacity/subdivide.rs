@@ -38,14 +38,14 @@ impl Pattern {
 /// A part of a subdivided triangle: the corner at (column, row) of those of its level, upright or
 /// upside down.
 #[derive(Clone, Copy)]
-struct Part {
+struct SubTriangle {
     level: u32,
     column: u32,
     row: u32,
     upside_down: bool,
 }
 
-impl Part {
+impl SubTriangle {
     /// The number of its micro-triangle among those of its level; see
     /// [`bth_format::layout::micro_triangle`].
     fn number(self) -> usize {
@@ -64,9 +64,9 @@ impl Part {
         corners.map(|p| p.map(|x| f64::from(x) / n))
     }
 
-    fn quarters(self) -> [Part; 4] {
+    fn quarters(self) -> [SubTriangle; 4] {
         let (i, j) = (2 * self.column, 2 * self.row);
-        let part = |column, row, upside_down| Part { level: self.level + 1, column, row, upside_down };
+        let part = |column, row, upside_down| SubTriangle { level: self.level + 1, column, row, upside_down };
         match self.upside_down {
             false => [part(i, j, false), part(i + 1, j, false), part(i, j + 1, false), part(i, j, true)],
             true => [
@@ -79,7 +79,7 @@ impl Part {
     }
 }
 
-const ROOT: Part = Part { level: 0, column: 0, row: 0, upside_down: false };
+const ROOT: SubTriangle = SubTriangle { level: 0, column: 0, row: 0, upside_down: false };
 
 /// What a triangle needs, by the number of its texels.
 pub(super) fn plan(footprint: &Footprint<'_>) -> Plan {
@@ -107,7 +107,7 @@ pub(super) fn pattern(footprint: &Footprint<'_>, level: u32) -> Pattern {
 }
 
 /// Sets the states of all micro-triangles in a part.
-fn decide(footprint: &Footprint<'_>, level: u32, part: Part, states: &mut [u8]) {
+fn decide(footprint: &Footprint<'_>, level: u32, part: SubTriangle, states: &mut [u8]) {
     let last = part.level == level;
     match footprint.state(part.corners(), last) {
         state if last => states[part.number()] = state as u8,
@@ -116,7 +116,7 @@ fn decide(footprint: &Footprint<'_>, level: u32, part: Part, states: &mut [u8]) 
     }
 }
 
-fn fill(level: u32, part: Part, state: u8, states: &mut [u8]) {
+fn fill(level: u32, part: SubTriangle, state: u8, states: &mut [u8]) {
     if part.level == level {
         states[part.number()] = state;
     } else {
@@ -130,7 +130,7 @@ fn coarser(level: u32, states: &[u8]) -> Option<Vec<u8>> {
     let mut above = Vec::with_capacity(states.len() / 4);
     for row in 0..n {
         for k in 0..2 * (n - row) - 1 {
-            let part = Part { level: level - 1, column: k / 2, row, upside_down: k % 2 == 1 };
+            let part = SubTriangle { level: level - 1, column: k / 2, row, upside_down: k % 2 == 1 };
             let quarters = part.quarters().map(|quarter| states[quarter.number()]);
             if quarters != [quarters[0]; 4] {
                 return None;

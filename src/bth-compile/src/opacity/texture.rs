@@ -64,14 +64,14 @@ impl Pyramid {
         found: Range,
         enough: &dyn Fn(Range) -> bool,
     ) -> Range {
-        let mut search = Search { pyramid: self, columns, rows, found, enough };
+        let mut search = RangeSearch { pyramid: self, columns, rows, found, enough };
         search.square(self.levels.len() - 1, [0, 0]);
         search.found
     }
 }
 
 /// A search for the range of a rectangle.
-struct Search<'a> {
+struct RangeSearch<'a> {
     pyramid: &'a Pyramid,
     columns: Interval,
     rows: Interval,
@@ -79,7 +79,7 @@ struct Search<'a> {
     enough: &'a dyn Fn(Range) -> bool,
 }
 
-impl Search<'_> {
+impl RangeSearch<'_> {
     /// Joins the part of a square that lies in the rectangle. Returns whether that is enough.
     fn square(&mut self, level: usize, [x, y]: [usize; 2]) -> bool {
         let (width, height, squares) = &self.pyramid.levels[level];

@@ -72,27 +72,27 @@ impl DryRun {
 
 /// What a file with one object is made from.
 #[derive(Clone, Copy)]
-pub(crate) enum Source<'a> {
+pub(crate) enum CompileInput<'a> {
     /// A model file.
     Model(&'a Path),
     /// Triangles in memory. Their imported mesh is not kept in the cache.
     Triangles(TriangleMesh<'a>),
 }
 
-impl<'a> Source<'a> {
+impl<'a> CompileInput<'a> {
     /// Its path, or its name in messages.
     fn path(self) -> &'a Path {
         match self {
-            Source::Model(path) => path,
-            Source::Triangles(_) => Path::new(MESH_NAME),
+            CompileInput::Model(path) => path,
+            CompileInput::Triangles(_) => Path::new(MESH_NAME),
         }
     }
 
     /// Reads and hashes it.
     fn digest(self, options: &CompileOptions) -> Result<SourceDigest> {
         match self {
-            Source::Model(path) => SourceDigest::of(path, options.looks()),
-            Source::Triangles(mesh) => Ok(SourceDigest::of_triangles(mesh)),
+            CompileInput::Model(path) => SourceDigest::of(path, options.looks()),
+            CompileInput::Triangles(mesh) => Ok(SourceDigest::of_triangles(mesh)),
         }
     }
 }
@@ -122,7 +122,7 @@ pub fn compile_cached(
     needed: &dyn Fn(&Record) -> bool,
     monitor: &dyn Monitor,
 ) -> Result<CachedCompilation<CompileReport>> {
-    compile_source(Source::Model(source), options, cache, needed, monitor)
+    compile_source(CompileInput::Model(source), options, cache, needed, monitor)
 }
 
 /// What [`compile_cached`] would do. Only reads and hashes the model.
@@ -135,13 +135,13 @@ pub fn dry_run(
     cache: &Cache<'_>,
     monitor: &dyn Monitor,
 ) -> Result<DryRun> {
-    let (_, key) = identify(Source::Model(source), options, cache, monitor, &mut Clock::default())?;
+    let (_, key) = identify(CompileInput::Model(source), options, cache, monitor, &mut Clock::default())?;
     Ok(DryRun::of(key.as_ref(), cache, monitor))
 }
 
 /// As [`compile_cached`], also for triangles in memory.
 pub(crate) fn compile_source(
-    source: Source<'_>,
+    source: CompileInput<'_>,
     options: &CompileOptions,
     cache: &Cache<'_>,
     needed: &dyn Fn(&Record) -> bool,
@@ -154,8 +154,8 @@ pub(crate) fn compile_source(
         let mut compiler =
             Compiler { source: model.path, part: "", options, cache, clock: &mut clock, monitor };
         let imported = match source {
-            Source::Model(_) => compiler.import(&model)?,
-            Source::Triangles(TriangleMesh { positions, triangles }) => {
+            CompileInput::Model(_) => compiler.import(&model)?,
+            CompileInput::Triangles(TriangleMesh { positions, triangles }) => {
                 let import = || import_triangles(model.path, positions, triangles, options.wanted(), monitor);
                 let (mesh, report) = compiler.clock.time("mesh", import)?;
                 (mesh, report, OnceCell::new())
@@ -172,7 +172,7 @@ pub(crate) fn compile_source(
 
 /// Hashes a source. Returns its key too, if the compiled file may be kept.
 fn identify(
-    source: Source<'_>,
+    source: CompileInput<'_>,
     options: &CompileOptions,
     cache: &Cache<'_>,
     monitor: &dyn Monitor,

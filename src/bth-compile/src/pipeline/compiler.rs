@@ -21,7 +21,7 @@ use crate::free::{self, Free, FreeReport};
 use crate::monitor::Monitor;
 use crate::options::{CompileOptions, Structure};
 use crate::source::{Model, changed};
-use crate::stage::{Clock, Kept, Stage};
+use crate::stage::{CachedStage, Clock, Stage};
 use crate::tets;
 use bth_files::Digest;
 use bth_import::{self as mesh, Mesh};
@@ -45,7 +45,10 @@ pub(crate) struct Compiler<'a> {
 
 impl<'a> Compiler<'a> {
     /// Runs a stage whose results the cache keeps.
-    fn fetch<T, R: Serialize + DeserializeOwned, S: Kept<T, R>>(&mut self, stage: S) -> Result<(T, R)> {
+    fn fetch<T, R: Serialize + DeserializeOwned, S: CachedStage<T, R>>(
+        &mut self,
+        stage: S,
+    ) -> Result<(T, R)> {
         let Self { part, cache, monitor, .. } = *self;
         self.clock.time(S::NAME, || cache.run(stage, part, monitor))
     }

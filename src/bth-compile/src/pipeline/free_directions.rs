@@ -6,7 +6,7 @@ use crate::cached::{decode, encode, fields};
 use crate::error::Result;
 use crate::free::{self, Free, FreeOptions, FreeReport};
 use crate::monitor::Monitor;
-use crate::stage::{Kept, Stage};
+use crate::stage::{CachedStage, Stage};
 use bth_cache::Key;
 
 /// Decides in which directions rays from a triangle meet nothing. What is too close to decide may
@@ -27,7 +27,7 @@ impl Stage for FindFree<'_> {
     }
 }
 
-impl Kept<Free, FreeReport> for FindFree<'_> {
+impl CachedStage<Free, FreeReport> for FindFree<'_> {
     fn key(&self) -> Key {
         let tree = self.built.key();
         Key::new("free-directions")

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::opacity;
 use crate::source::{Model, SourceDigest, extension};
-use crate::stage::{Kept, Stage};
+use crate::stage::{CachedStage, Stage};
 use bth_cache::Key;
 use bth_import::{self as mesh, Looks, Mesh, Wanted};
 use std::path::Path;
@@ -62,7 +62,7 @@ impl Stage for Import<'_> {
     }
 }
 
-impl Kept<Mesh, MeshSummary> for Import<'_> {
+impl CachedStage<Mesh, MeshSummary> for Import<'_> {
     fn key(&self) -> Key {
         Self::key_of(self.model.digest, self.model.path, "flat", self.wanted)
     }

@@ -6,7 +6,7 @@ use crate::cached::{decode, encode};
 use crate::error::Result;
 use crate::marks::{self, MarkReport, Marks};
 use crate::monitor::Monitor;
-use crate::stage::{Kept, Stage};
+use crate::stage::{CachedStage, Stage};
 use bth_cache::Key;
 
 /// Marks the nodes without bad contacts.
@@ -25,7 +25,7 @@ impl Stage for Mark<'_> {
     }
 }
 
-impl Kept<Marks, MarkReport> for Mark<'_> {
+impl CachedStage<Marks, MarkReport> for Mark<'_> {
     fn key(&self) -> Key {
         let tree = self.built.key();
         let components = tree.components().iter().cloned();

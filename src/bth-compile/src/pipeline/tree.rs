@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::options::CompileOptions;
 use crate::sampling::{self, KnownRays};
-use crate::stage::{Kept, Stage};
+use crate::stage::{CachedStage, Stage};
 use bth_cache::Key;
 use bth_import::Mesh;
 
@@ -52,7 +52,7 @@ impl Stage for BuildTree<'_> {
     }
 }
 
-impl Kept<BinaryBvh, BvhReport> for BuildTree<'_> {
+impl CachedStage<BinaryBvh, BvhReport> for BuildTree<'_> {
     fn key(&self) -> Key {
         let TreeOptions { bvh: BvhOptions { quality, keep_zero_area }, rays } = self.options;
         Key::new(Self::NAME)

@@ -23,11 +23,11 @@ pub(super) struct ObjectSections {
     pub(super) row: Object,
     /// Absent for objects copied from compiled files, which are not trusted.
     pub(super) made: Option<Made>,
-    sections: Vec<Section>,
+    sections: Vec<ObjectSection>,
 }
 
 #[derive(Clone)]
-struct Section {
+struct ObjectSection {
     kind: u32,
     stride: u32,
     hash: [u8; 16],
@@ -43,7 +43,7 @@ impl ObjectSections {
         let sections = sections.filter(|s| kind_stride(s.entry.kind).is_some()).map(|section| {
             let e = section.entry;
             let range = e.offset as usize..(e.offset + e.length) as usize;
-            Section {
+            ObjectSection {
                 kind: e.kind,
                 stride: e.stride,
                 hash: if made.is_some() { e.hash } else { hash128(section.bytes) },
@@ -58,7 +58,7 @@ impl ObjectSections {
     pub(super) fn in_previous(previous: &Previous, object: u32) -> Self {
         let index = &previous.index;
         let row = &index.objects[object as usize];
-        let section = |row: &SectionRow| Section {
+        let section = |row: &SectionRow| ObjectSection {
             kind: row.kind,
             stride: row.stride,
             hash: row.hash,
@@ -73,7 +73,7 @@ impl ObjectSections {
 
     /// Adds its sections.
     pub(super) fn write(&self, number: u32, builder: &mut FileBuilder<'_>) -> Result<()> {
-        for Section { kind, stride, hash, bytes } in &self.sections {
+        for ObjectSection { kind, stride, hash, bytes } in &self.sections {
             let head = SectionHead { kind: *kind, object: number, stride: *stride, hash: *hash };
             let coordinates = (*kind == kind::OBJECT).then_some(self.row.coordinates);
             builder.hashed_section(head, coordinates, bytes.clone())?;

@@ -54,7 +54,7 @@ struct ShadingPoint {
     sample: usize,
     normal: DVec3,
     to_key: DVec3,
-    what: Surface,
+    what: LitSurface,
 }
 
 /// Points of one kind, and the occlusion rays of all of them.
@@ -71,7 +71,7 @@ impl<R: TraceRay> Lit<R> {
 
 /// What is lit.
 #[derive(Clone, Copy, Debug)]
-enum Surface {
+enum LitSurface {
     /// The ground, and how strongly a shadow shows there.
     Ground(f64),
     /// The clay of what has no material.
@@ -114,13 +114,13 @@ impl Studio {
                 let ray = |direction, tmax| StartRay::from_hit(hit, direction).with_tmax(tmax);
                 let to_key = self.push(&mut lit.rays, (point, geometric), ray, sample, frame);
                 let normal = frame.geometry.shading_normal(hit, geometric);
-                let what = look.map_or(Surface::Clay, Surface::Material);
+                let what = look.map_or(LitSurface::Clay, LitSurface::Material);
                 lit.points.push(ShadingPoint { sample: index, normal, to_key, what });
             } else if let Some((point, share)) = self.on_ground(frame, sample) {
                 let (normal, origin) = (self.vertical, point.as_vec3().to_array());
                 let ray = |direction, tmax| Ray { origin, tmin: 0.0, direction, tmax };
                 let to_key = self.push(&mut on_ground.rays, (point, normal), ray, sample, frame);
-                let what = Surface::Ground(share);
+                let what = LitSurface::Ground(share);
                 on_ground.points.push(ShadingPoint { sample: index, normal, to_key, what });
             }
         }
@@ -145,13 +145,13 @@ impl Studio {
             let color = &mut colors[point.sample];
             let direction = samples[point.sample].ray.direction;
             *color = match point.what {
-                Surface::Ground(share) => {
+                LitSurface::Ground(share) => {
                     *color * (1.0 - share as f32 * (0.62 * (1.0 - open) + 0.30 * (1.0 - key)))
                 }
-                Surface::Clay => {
+                LitSurface::Clay => {
                     shoulder(STUDIO_ALBEDO * self.light(point, key, open) + self.gloss(point, direction, key))
                 }
-                Surface::Material(look) => {
+                LitSurface::Material(look) => {
                     shoulder(look.base_color * self.light(point, key, open) + look.emissive)
                 }
             };

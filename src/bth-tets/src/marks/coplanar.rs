@@ -1,8 +1,7 @@
 //! Contact of coplanar triangles, decided exactly in a projection onto a coordinate plane.
 
+use super::Point;
 use robust::{Coord, orient2d};
-
-type Point = [f32; 3];
 
 /// A coordinate plane onto which the plane of a triangle projects one to one.
 #[derive(Clone, Copy, Debug)]

@@ -24,6 +24,9 @@ pub use bad_pairs::{BadPairs, bad_pairs};
 pub use mark::{MarkReport, mark};
 pub use triangle_contact::{Triangle, in_bad_contact};
 
+/// Coordinates of a vertex, object space.
+type Point = [f32; 3];
+
 /// Result of the marking stage.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Marks {

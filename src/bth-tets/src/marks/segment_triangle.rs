@@ -1,9 +1,8 @@
 //! Exact test of a closed segment against a closed triangle.
 
+use super::Point;
 use super::coplanar::segment_meets_coplanar_triangle;
 use robust::Coord3D;
-
-type Point = [f32; 3];
 
 /// Sign of the volume of `a`, `b`, `c`, `d`, exactly: positive when `d` lies below the plane of
 /// `a`, `b`, `c` seen counter-clockwise (Shewchuk 1997). The value beyond the sign is approximate.

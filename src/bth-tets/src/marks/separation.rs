@@ -2,7 +2,8 @@
 //! a bound on the rounding of the dot products. Makes the exact tests unnecessary for most
 //! neighbours.
 
-type Point = [f32; 3];
+use super::Point;
+
 type Vector = [f64; 3];
 
 /// Bound on the relative rounding of `dot(p - s, d)` in f64, of the sum of the magnitudes of its

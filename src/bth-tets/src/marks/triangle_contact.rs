@@ -1,10 +1,9 @@
 //! Decides exactly if two triangles are in bad contact.
 
+use super::Point;
 use super::coplanar::on_same_side;
 use super::segment_triangle::{orient3d, same_strict_sign, segment_meets_triangle};
 use super::separation::fans_are_apart;
-
-type Point = [f32; 3];
 
 /// A triangle of non-zero area, by corners and by welded vertex.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -16,7 +16,7 @@ struct Bin<E> {
     count: u32,
 }
 
-/// The bins of each axis, or of each order of several poses. On the heap: those of 16 poses take
+/// The bins of each axis, or of each order of several poses. They are on the heap: 16 poses take
 /// 150 KiB, and a thread that waits for others splits further nodes on top of its stack.
 type Bins<E> = Vec<[Bin<E>; MAX_BINS]>;
 
@@ -63,8 +63,7 @@ impl<E: Extent> Centers<E> {
     }
 }
 
-/// Maps centres to bins. The partition uses the same arithmetic, so its counts agree with those of
-/// the bins.
+/// Maps centres to bins. The partition uses the same arithmetic, so both count alike.
 struct Grid<E: Extent> {
     origin: E::Orders<f32>,
     scale: E::Orders<f32>,
@@ -131,7 +130,7 @@ pub(super) fn measure<E: Extent>(references: &[Reference<E>]) -> (E, Centers<E>)
 /// Partitions the references at the best of the boundaries between `bins` equal slabs per axis and
 /// returns the size of the left side; `None`, with nothing changed, when no boundary separates
 /// them.
-// Its frame must not become part of that of the recursion.
+// Keeps its frame out of the frame of the recursion.
 #[inline(never)]
 pub(super) fn split<E: Extent>(
     references: &mut [Reference<E>],

@@ -11,8 +11,8 @@ use bth_import::{Mesh, is_zero_area};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Subtrees of more triangles are built as separate tasks, each of which first checks for
-/// cancellation.
+/// Subtrees of more triangles are built as separate tasks. Each of these checks for cancellation
+/// first.
 const BUILD_TASK: usize = 1 << 12;
 
 /// How much time to spend on the tree.
@@ -79,9 +79,10 @@ pub struct BvhReport {
     pub nodes: u64,
     /// Edges on the longest path from the root.
     pub levels: u32,
-    /// Nodes that a random line through the root's box meets, on average, after the top-down build,
-    /// then after each pass of reinsertion, and at last after treelets were rebuilt, which lowers
-    /// the cost of the wide tree and may raise this: the sum of the nodes' areas over the root's.
+    /// Nodes that a random line through the root's box enters, on average: the sum of the nodes'
+    /// areas over the root's. One value after the top-down build, one after each pass of
+    /// reinsertion, and the last after treelets were rebuilt, which lowers the cost of the wide
+    /// tree and may raise this.
     pub visits: Vec<f64>,
     /// Subtrees that each pass of reinsertion moved.
     pub moved: Vec<u64>,
@@ -89,17 +90,18 @@ pub struct BvhReport {
     pub treelets: Vec<u64>,
 }
 
-/// Builds the binary BVH of all triangles, those of zero area only if the options say so, down to
-/// single triangles. The result depends on mesh and options alone, not on the number of threads.
+/// Builds the binary BVH of all triangles, down to single triangles. Skips triangles of zero area
+/// unless the options keep them. The result depends on mesh and options alone, not on the number of
+/// threads.
 ///
 /// # Errors
-/// [`Error::Internal`] when the mesh breaks its own contract (indices in range, positions finite),
+/// [`Error::Internal`] when the mesh breaks its contract (indices in range, positions finite),
 /// [`Error::Limit`] beyond `bth_format::limits::MAX_TRIANGLES`, [`Error::Cancelled`].
 pub fn build(mesh: &Mesh, options: &BvhOptions, monitor: &dyn Monitor) -> Result<(BinaryBvh, BvhReport)> {
     build_with(mesh, &options.quality.effort(), options.keep_zero_area, monitor)
 }
 
-/// As [`build`], with any effort.
+/// Builds the tree of [`build`] with any effort.
 pub(super) fn build_with(
     mesh: &Mesh,
     effort: &Effort,
@@ -117,7 +119,7 @@ pub(super) fn build_with(
     })
 }
 
-/// The tree that `build` makes over the triangles that it holds, of which there is at least one.
+/// Builds the tree by `build`, which gets the ids of the triangles to hold, at least one.
 pub(super) fn over_used(
     mesh: &Mesh,
     keep_zero_area: bool,
@@ -140,7 +142,7 @@ pub(super) fn over_used(
     Ok((bvh, report))
 }
 
-/// Splits the references, of which there is at least one, from the top down.
+/// Splits the references, at least one, from the top down.
 pub(super) fn split_all<E: Extent>(
     mut references: Vec<Reference<E>>,
     effort: &Effort,
@@ -150,7 +152,7 @@ pub(super) fn split_all<E: Extent>(
     split_with(&mut references, effort, &mut sweep_split::Scratch::default(), monitor)
 }
 
-/// As [`split_all`], within another stage.
+/// Does the work of [`split_all`] within another stage.
 pub(super) fn split_with<E: Extent>(
     references: &mut [Reference<E>],
     effort: &Effort,
@@ -262,7 +264,7 @@ impl Builder<'_> {
         a.and(b)
     }
 
-    /// As [`Self::subtree`], with buffers of its own.
+    /// Does the same as [`Self::subtree`], with separate buffers.
     fn task<E: Extent>(
         &self,
         references: &mut [Reference<E>],
@@ -324,7 +326,7 @@ fn split_by_id<E: Extent>(references: &mut [Reference<E>]) -> usize {
     middle
 }
 
-/// Nodes that a random line through the root's box meets on average; see [`BvhReport::visits`].
+/// Nodes that a random line through the root's box enters on average; see [`BvhReport::visits`].
 pub(super) fn visits(bvh: &BinaryBvh) -> f64 {
     let area = |node: &Node| Bounds::of_node(node).half_area();
     let root = area(&bvh.nodes[0]);

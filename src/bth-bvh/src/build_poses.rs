@@ -23,18 +23,17 @@ use rayon::prelude::*;
 pub struct PoseOptions {
     /// Parameters of the builder.
     pub effort: Effort,
-    /// True if the tree has the triangles of zero area, too, as that of a mesh does whose vertices
-    /// move at run time.
+    /// True if the tree keeps triangles of zero area, for a mesh whose vertices move at run time.
     pub keep_zero_area: bool,
 }
 
-/// Builds the binary BVH of smallest cost over all poses; the boxes of its nodes are those of the
-/// mesh's own positions. The report's visits are means over the poses. With one pose that equals
-/// the mesh's positions, and without `keep_zero_area`, the tree is that of
+/// Builds the binary BVH of smallest cost over all poses; the boxes of its nodes are computed from
+/// the mesh's own positions. The report's visits are means over the poses. With one pose that
+/// equals the mesh's positions, and without `keep_zero_area`, the tree is the same as from
 /// [`build()`](super::build()).
 ///
 /// # Errors
-/// As [`build()`](super::build()).
+/// The errors of [`build()`](super::build()).
 pub fn build_poses(
     mesh: &Mesh,
     poses: &Poses<'_>,

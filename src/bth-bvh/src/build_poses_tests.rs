@@ -212,7 +212,7 @@ fn the_wide_tree_is_chosen_by_the_mean_cost_over_the_poses() {
     let (bvh, _) = build_poses(&mesh, &poses, &options(Quality::Balanced, false), &Silent).unwrap();
     let probabilities = poses.probabilities(&mesh, &bvh);
     let weighed = Weighed { bvh: &bvh, probabilities: Some(&probabilities) };
-    // Without a price of lines the cost is that of visits alone.
+    // Without a price of lines the cost is the cost of visits alone.
     let costs = Costs { line: 0.0, ..Costs::default() };
     let options = CollapseOptions { costs, ..CollapseOptions::default() };
     let (wide, report) = collapse(&mesh, weighed, &[], &options, &Silent).unwrap();

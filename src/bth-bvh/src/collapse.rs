@@ -48,10 +48,10 @@ pub fn collapse<'a>(
 /// without its tet leaves.
 pub(super) type Decide<'a> = dyn Fn(&Planner<'_>, &[u32]) -> Result<(Vec<Decision>, f32)> + 'a;
 
-/// As [`collapse`], with the tree chosen by `decide`.
+/// Collapses like [`collapse`], with the tree chosen by `decide`.
 ///
 /// # Errors
-/// As [`collapse`], and those of `decide`.
+/// The errors of [`collapse`] and of `decide`.
 pub(super) fn collapse_by<'a>(
     mesh: &Mesh,
     bvh: impl Into<Weighed<'a>>,
@@ -69,9 +69,9 @@ pub(super) fn collapse_by<'a>(
     }
     monitor.stage("collapse", None);
     let greatest = bvh.nodes.first().map_or(0.0, greatest_coordinate);
-    // The boxes of an object that deforms are computed anew by readers, which do not widen them.
-    // Those of an object that is far from the origin would be widened by much for its size, and
-    // readers need not allow for it.
+    // Readers compute the boxes of a deforming object again and do not widen them. For an object
+    // that is far from the origin, widening would be large for its size, and readers need not allow
+    // for it.
     let is_far = bvh.nodes.first().is_some_and(|root| far_away(&root.lower, &root.upper).is_some());
     let widened_boxes = !options.leaf_vertices && !is_far && WIDENED_RANGE.contains(&greatest);
     let mut wide = Wide { root: NONE, subtrees: vec![NONE; cut.len()], widened_boxes, ..Wide::default() };

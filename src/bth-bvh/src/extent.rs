@@ -3,8 +3,7 @@
 use super::bounds::Bounds;
 
 /// Bounds whose area the builder sums up. Every stage of the builder is written once over this
-/// trait; [`Bounds`] are those of one pose, [`PoseBounds`](super::pose_bounds::PoseBounds) those of
-/// several.
+/// trait: [`Bounds`] for one pose, [`PoseBounds`](super::pose_bounds::PoseBounds) for several.
 pub(super) trait Extent: Copy + PartialEq + Send + Sync {
     /// A value for each order in which triangles are sorted and binned: the axes of one pose or of
     /// several.

@@ -99,8 +99,8 @@ impl Node {
 pub struct BinaryBvh {
     /// Nodes in preorder; empty when the mesh has no triangle that can be hit.
     pub nodes: Vec<Node>,
-    /// Triangle ids; each node covers `order[first..first + count]`. Triangles of exactly zero
-    /// area are left out. A leaf of the tree holds one triangle.
+    /// Triangle ids, without triangles of exactly zero area. Each node covers
+    /// `order[first..first + count]`. A leaf of the tree holds one triangle.
     pub order: Vec<u32>,
 }
 
@@ -108,7 +108,7 @@ pub struct BinaryBvh {
 /// threads.
 const SUMMED_AT_ONCE: usize = 1 << 16;
 
-/// The sum of a value over so many nodes.
+/// Sums a value over the first `nodes` nodes.
 fn sum(nodes: usize, value: impl Fn(u32) -> f64 + Sync) -> f64 {
     let parts = (0..nodes.div_ceil(SUMMED_AT_ONCE)).into_par_iter();
     let part = |k: usize| {

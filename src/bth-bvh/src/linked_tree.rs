@@ -52,8 +52,9 @@ impl<E: Extent> LinkedTree<E> {
         Self::linked(bvh, bounds, |_, left, right| left.union(right))
     }
 
-    /// The tree of a BVH. `bounds` gives those of a node, which for a leaf is told its triangle;
-    /// `inner` those of an inner node from these and the ones of its children.
+    /// Links the nodes of a BVH. `bounds` gives the bounds of a node, and is told the triangle of a
+    /// leaf. `inner` then gives the bounds of an inner node from these and the bounds of its
+    /// children.
     fn linked(
         bvh: &BinaryBvh,
         bounds: impl Fn(&Node, u32) -> E + Sync,
@@ -240,8 +241,8 @@ struct Place {
     first: u32,
 }
 
-/// Sets the parents, heights and bounds of a subtree, given its nodes in preorder of which the
-/// first has index `at`. The parent of that one is left as it is. Returns its height.
+/// Sets the parents, heights and bounds of a subtree, given its nodes in preorder; `at` is the
+/// index of the first one, whose parent is not changed. Returns its height.
 fn link<E: Extent>(
     nodes: &mut [LinkedNode<E>],
     heights: &mut [u8],

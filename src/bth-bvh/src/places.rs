@@ -4,7 +4,7 @@ use super::Wide;
 use bth_format::layout::*;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// The rows of `TRIANGLE_PLACES` for a mesh with so many triangles; no rows without a root.
+/// The rows of `TRIANGLE_PLACES` for a mesh with this number of triangles; no rows without a root.
 ///
 /// A triangle that lies in several leaves gets the place in the first of them, in the order of
 /// their lines. A triangle without a place gets [`NONE`]: it lies in no triangle leaf, or beyond

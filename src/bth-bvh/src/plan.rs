@@ -13,7 +13,7 @@ use bth_import::error::Result;
 use bth_import::monitor::Monitor;
 use zerocopy::FromZeros;
 
-/// Costs of a ray's visits, relative to that of a wide node. A visit's probability is the node's
+/// Costs of a ray's visits, relative to a visit of a wide node. A visit's probability is the node's
 /// area over the root's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Costs {
@@ -84,8 +84,7 @@ impl Decision {
         }
     }
 
-    /// Returns true if the node is a tet leaf; its role is then that of the subtree kept next to
-    /// it.
+    /// Returns true if the node is a tet leaf; its role is then the role of its subtree.
     pub(super) fn is_cut(self) -> bool {
         self.0 & Self::CUT != 0
     }
@@ -185,7 +184,7 @@ impl<'a> Planner<'a> {
         Ok((decisions, summary.cost[1]))
     }
 
-    /// Probability that a ray through the root meets the node.
+    /// Probability that a ray through the root enters the node.
     pub(super) fn area(&self, at: u32) -> f32 {
         (self.weighed.area(at) * self.inverse_area) as f32
     }
@@ -205,8 +204,8 @@ impl<'a> Planner<'a> {
             self.plain(at, &[], decisions)?;
         }
         decisions[0].set_cut();
-        // The cut nodes are given, and the cost of the slot of a tet leaf is the same in every
-        // tree, so it is left out.
+        // The cut nodes are given, and the slot of a tet leaf costs the same in every tree, so its
+        // cost does not count.
         Ok(Summary { cost: [0.0; WIDTH], vertices: None })
     }
 
@@ -278,7 +277,7 @@ pub(super) struct Pair<'a> {
 }
 
 impl Pair<'_> {
-    /// The smallest cost of both in so many slots, and how many of these the left one takes.
+    /// The smallest cost of both in `slots` slots, and how many of these the left one takes.
     #[inline(always)]
     pub(super) fn distribute(&self, slots: usize) -> (f32, usize) {
         let [left, right] = self.leaves;

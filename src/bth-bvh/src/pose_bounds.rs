@@ -11,8 +11,8 @@ const ORDER_POSES: usize = 4;
 /// Largest scaled coordinate.
 const GREATEST: f64 = (1u64 << 40) as f64;
 
-/// Bounds in up to `P` poses. Each pose is scaled so that the root's half area is 1 in it, so that
-/// the sum of areas is the sum of probabilities that a ray meets the node, as T-SAH has it. Places
+/// Bounds in up to `P` poses. Each pose is scaled so that the root's half area is 1 in it. The sum
+/// of areas is then the sum of probabilities that a ray enters the node, as in T-SAH. Places
 /// without a pose hold points, whose area is 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PoseBounds<const P: usize> {
@@ -62,7 +62,8 @@ impl<const P: usize> Extent for PoseBounds<P> {
         })
     }
 
-    /// The boxes of nodes are those of the mesh, which are written when the tree is complete.
+    /// A box of zeros: the boxes of nodes come from the mesh and are written when the tree is
+    /// complete.
     fn node_box(&self) -> Bounds {
         Bounds { lower: [0.0; 3], upper: [0.0; 3] }
     }
@@ -85,7 +86,7 @@ struct Scaled<'a> {
 }
 
 impl<'a, const P: usize> ScaledPoses<'a, P> {
-    /// Scales the poses, of which there are 1 to `P`. `used` are the triangles of the tree.
+    /// Scales the poses, 1 to `P` of them. `used` are the triangles of the tree.
     pub(super) fn new(triangles: &'a [[u32; 3]], poses: &Poses<'a>, used: &[u32]) -> Self {
         const { assert!(P >= ORDER_POSES) };
         let count = poses.len().min(P);

@@ -61,7 +61,7 @@ impl<'a> Poses<'a> {
         boxes
     }
 
-    /// For each node of a BVH the probability that a random line through the root meets it, as the
+    /// For each node of a BVH the probability that a random line through the root enters it, as the
     /// mean over the poses (Bittner and Meister 2015, equation 4, with equal weights). Poses in
     /// which the root has no area do not count.
     pub fn probabilities(&self, mesh: &Mesh, bvh: &BinaryBvh) -> Vec<f64> {
@@ -82,14 +82,14 @@ impl<'a> Poses<'a> {
     }
 }
 
-/// A BVH with the probabilities that a ray meets its nodes.
+/// A BVH with the probabilities that a ray enters its nodes.
 #[derive(Clone, Copy)]
 pub struct Weighed<'a> {
     /// The BVH.
     pub bvh: &'a BinaryBvh,
     /// For each node the probability that a sample ray enters it ([`crate::sampling::visits`]), or
-    /// the mean of that of lines over poses ([`Poses::probabilities`]); `None` for those of the
-    /// boxes.
+    /// the mean probability of lines over poses ([`Poses::probabilities`]); `None` to use the areas
+    /// of the boxes.
     pub probabilities: Option<&'a [f64]>,
 }
 
@@ -114,7 +114,7 @@ impl Weighed<'_> {
     }
 }
 
-/// Replaces the boxes of a BVH by those of the mesh's own positions.
+/// Computes the boxes of a BVH from the mesh's own positions.
 pub(super) fn refit(mesh: &Mesh, bvh: &mut BinaryBvh) {
     for at in (0..bvh.nodes.len()).rev() {
         let node = bvh.nodes[at];

@@ -55,8 +55,8 @@ const COUNTED_AT_ONCE: usize = 1 << 14;
 /// Bits of an area that do not count where areas are counted.
 const LESS_BITS: u32 = 20;
 
-/// The power of two by which areas are multiplied, exactly, so that f32 holds those of meshes of
-/// any size.
+/// The power of two by which areas are multiplied, exactly, so that f32 holds the areas of meshes
+/// of any size.
 fn scale<E: Extent>(tree: &LinkedTree<E>) -> f64 {
     let greatest = (0..tree.len() as u32)
         .find(|&at| tree.node(at).parent == NONE)

@@ -1,16 +1,17 @@
 //! The order of a wide node's children in its slots.
 //!
-//! Queries for the nearest hit sort children by depth. Those for any hit enter them as they lie,
-//! the last slot first, so the child lies last in which a ray most probably meets a triangle, as in
-//! "SATO: Surface Area Traversal Order for Shadow Ray Tracing" (Nah and Manocha 2014). A line that
-//! meets a box of surface S meets triangles of area A in it 2 A / S times in the mean (Crofton).
+//! Queries for the nearest hit sort children by depth. Queries for any hit enter them in the order
+//! of the slots, the last slot first, so the last child is the one in which a ray most probably
+//! hits a triangle, as in "SATO: Surface Area Traversal Order for Shadow Ray Tracing" (Nah and
+//! Manocha 2014). A line that hits a box of surface S hits triangles of area A in it 2 A / S times
+//! in the mean (Crofton).
 
 use super::BinaryBvh;
 use crate::vectors::{corners, double_area};
 use bth_import::Mesh;
 use rayon::prelude::*;
 
-/// Sorts children by the area of their triangles over that of their boxes.
+/// Sorts children by the area of their triangles over the area of their boxes.
 pub(super) struct SlotOrder<'a> {
     bvh: &'a BinaryBvh,
     /// For each row of the BVH's order the sum of the areas of the triangles before it, doubled;
@@ -32,13 +33,13 @@ impl<'a> SlotOrder<'a> {
         Self { bvh, before }
     }
 
-    /// Sorts children, nodes of the BVH, so that the one in which something is met most probably is
-    /// the last one.
+    /// Sorts children, nodes of the BVH. The last one is the one in which a ray most probably hits
+    /// a triangle.
     pub(super) fn sort(&self, children: &mut [u32]) {
         children.sort_by(|a, b| self.density(*a).total_cmp(&self.density(*b)));
     }
 
-    /// The area of the triangles below a node over that of its box.
+    /// The area of the triangles below a node over the area of its box.
     fn density(&self, at: u32) -> f64 {
         let node = &self.bvh.nodes[at as usize];
         let rows = [node.first, node.first + node.count].map(|row| self.before[row as usize]);

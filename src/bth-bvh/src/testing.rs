@@ -22,8 +22,7 @@ pub fn weld(corners: impl IntoIterator<Item: Borrow<[[f32; 3]; 3]>>) -> Mesh {
     mesh
 }
 
-/// A random mesh on a small grid of points: connected fans and loose triangles, many of which
-/// touch.
+/// A random mesh on a small grid of points: connected fans and loose triangles. Many of them touch.
 pub fn patch(seed: u64, triangles: usize) -> Mesh {
     let mut random = Rng::new(seed);
     let side = 3 + random.below(12);

@@ -7,8 +7,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError, TryLockError};
 use std::time::{Duration, Instant};
 
-/// Least time between two calls of the progress function within a stage. Stages ask some thousand
-/// times a second whether they are cancelled.
+/// Min time between two calls of the progress function within a stage. Stages check some thousand
+/// times a second if they are cancelled.
 const INTERVAL: Duration = Duration::from_millis(100);
 
 /// Calls the functions of C one at a time.

@@ -6,11 +6,11 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 
-/// Runs the jobs, at most `parallel` at a time, and only as many as together need at most `memory`
+/// Runs the jobs, at most `parallel` at a time. The jobs that run together need at most `memory`
 /// bytes by the `estimate`; a job that needs more runs alone. Results are in the order of the jobs.
 /// Where the system starts fewer threads, fewer jobs run at a time.
 ///
-/// `within` runs the work of each thread, for example in a pool of its own.
+/// `within` runs the work of each thread, for example in a separate pool.
 pub fn run<J: Send, T: Send>(
     jobs: Vec<J>,
     parallel: usize,

@@ -5,8 +5,8 @@
 //!
 //! | modules | |
 //! |---|---|
-//! | [`bvh`], [`sampling`] | crate `bth-bvh`: the binary BVH, its collapse to the wide BVH, sample rays |
-//! | [`marks`], [`costs`], [`tets`] | crate `bth-tets`: which nodes become tetrahedralizations, and how |
+//! | [`bvh`], [`sampling`] | crate `bth-bvh`: binary BVH, collapse to the wide BVH, sample rays |
+//! | [`marks`], [`costs`], [`tets`] | crate `bth-tets`: the tetrahedralizations of nodes |
 //! | [`opacity`], [`coordinates`], [`free`], [`mod@write`] | the work of the other stages |
 //! | `stage` | what all stages have: name, version, key, run |
 //! | [`cached`] | the cache, which runs stages and keeps their results |

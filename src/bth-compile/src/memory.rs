@@ -1,16 +1,17 @@
 //! Compilation of triangles that are in memory, without files.
 //!
-//! The result is that of a model file with the same vertices and faces, for example a PLY file: all
-//! sections but PROVENANCE are the same bytes, and so is the content id. PROVENANCE names the
-//! format `memory` and the hash of the arrays in place of those of the file. A scene is that of a
+//! The result is the same as from a model file with the same vertices and faces, for example a PLY
+//! file: all sections but PROVENANCE are the same bytes, and so is the content id. PROVENANCE names
+//! the format `memory` and the hash of the arrays instead of the file's. A scene is compiled like a
 //! manifest whose nodes are called `instance 0`, `instance 1` and so on.
 //!
 //! ```
 //! use bth_compile::memory::{TriangleMesh, open};
+//! use bth_compile::{Silent, pipeline::CompileOptions};
 //!
 //! let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 //! let mesh = TriangleMesh { positions: &positions, triangles: &[[0, 1, 2]] };
-//! let scene = open(mesh, &bth_compile::pipeline::CompileOptions::default(), &bth_compile::Silent)?;
+//! let scene = open(mesh, &CompileOptions::default(), &Silent)?;
 //! let ray = bth::rays::Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
 //! assert_eq!(scene.nearest(&ray).map(|hit| hit.t), Some(1.0));
 //! # Ok::<(), bth_compile::Error>(())
@@ -33,7 +34,7 @@ use bth_cache::Record;
 ///
 /// # Errors
 /// `BTH-I005` for an index that is not a row of the positions, `BTH-I004` for a corner that is not
-/// finite, both with the row of the triangle; else those of the stages: a limit of the format,
+/// finite, both with the row of the triangle; else the errors of the stages: a limit of the format,
 /// cancellation.
 pub fn compile(
     mesh: TriangleMesh<'_>,
@@ -47,17 +48,17 @@ pub fn compile(
 /// Compiles a mesh and opens the result. The bytes are not copied.
 ///
 /// # Errors
-/// As [`compile`].
+/// The errors of [`compile`].
 pub fn open(mesh: TriangleMesh<'_>, options: &CompileOptions, monitor: &dyn Monitor) -> Result<bth::Scene> {
     let (content, _) = compile_cached(mesh, options, &Cache::none(), &|_| true, monitor)?.into_built();
     opened(content)
 }
 
-/// Compiles a mesh through a cache. `needed` decides whether the bytes of a file in the cache are
-/// read; with `&|_| true` the result always has the content.
+/// Compiles a mesh through a cache. `needed` returns true to read the bytes of a file in the
+/// cache; with `&|_| true` the result always has the content.
 ///
 /// # Errors
-/// As [`compile`].
+/// The errors of [`compile`].
 pub fn compile_cached(
     mesh: TriangleMesh<'_>,
     options: &CompileOptions,
@@ -68,14 +69,14 @@ pub fn compile_cached(
     compile_source(CompileInput::Triangles(mesh), options, cache, needed, monitor)
 }
 
-/// Compiles a scene of meshes, each of which may have any number of instances; with [`Cache::none`]
-/// without a cache. Row i of `instances` is instance i of the scene. Meshes without an instance are
-/// left out and equal ones are stored once, so the file may have fewer objects than there are
-/// meshes. The result always has the content.
+/// Compiles a scene of meshes, each with any number of instances; with [`Cache::none`] without a
+/// cache. Row i of `instances` is instance i of the scene. Skips meshes without an instance and
+/// stores equal ones once, so the file may have fewer objects than there are meshes. The result
+/// always has the content.
 ///
 /// # Errors
-/// As [`compile`], for each mesh; `BTH-I005` for an instance of no mesh, `BTH-I004` and `BTH-I050`
-/// for one whose transform is not finite or flattens the mesh.
+/// The errors of [`compile`], for each mesh; `BTH-I005` for an instance of no mesh, `BTH-I004` and
+/// `BTH-I050` for one whose transform is not finite or flattens the mesh.
 pub fn compile_scene(
     meshes: &[TriangleMesh<'_>],
     instances: &[Instance],
@@ -86,10 +87,10 @@ pub fn compile_scene(
     scene::compile_meshes(meshes, instances, options, cache, monitor)
 }
 
-/// As [`compile_scene`] without a cache, opened.
+/// Compiles a scene without a cache and opens it; see [`compile_scene`].
 ///
 /// # Errors
-/// As [`compile_scene`].
+/// The errors of [`compile_scene`].
 pub fn open_scene(
     meshes: &[TriangleMesh<'_>],
     instances: &[Instance],

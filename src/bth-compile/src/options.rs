@@ -1,4 +1,4 @@
-//! The options of a compilation: those of all stages.
+//! The options of a compilation: the options of all stages.
 
 use crate::{bvh, coordinates, costs, free, tets};
 use bth_format::layout::RecordKind;
@@ -9,8 +9,7 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Structure {
-    /// A BVH, some nodes of which are tetrahedralized where that saves time according to the cost
-    /// model.
+    /// A BVH. Nodes are tetrahedralized where that saves time according to the cost model.
     #[default]
     Bth,
     /// A BVH only.
@@ -35,14 +34,14 @@ pub struct CompileOptions {
     /// True to keep how materials look, with textures and vertex colours. Includes all
     /// attributes and the groups of triangles.
     pub materials: bool,
-    /// True if images and material libraries that are missing, broken or too large are left out,
-    /// each with a warning.
+    /// True to skip images and material libraries that are missing, broken or too large, each with
+    /// a warning.
     pub lenient_materials: bool,
     /// Coordinates that triangle leaves store.
     pub coordinates: coordinates::CoordinateOptions,
     /// Builder of the binary BVH.
     pub bvh: bvh::BvhOptions,
-    /// Directions in which rays from a triangle meet nothing.
+    /// Directions in which rays from a triangle hit nothing.
     pub free: free::FreeOptions,
     /// Selection of the nodes to tetrahedralize.
     pub costs: costs::CostOptions,
@@ -54,10 +53,10 @@ pub struct CompileOptions {
     pub keep_subtrees: bool,
     /// True to store the positions and triangles of the source.
     pub geometry: bool,
-    /// True to keep what new positions at run time need (`bth::Scene::set_positions`). All
-    /// vertices of the source are kept in its order, and triangles of zero area are not dropped.
-    /// Excludes `coordinates` other than f32, leaving out the geometry, and `Structure::Tets`.
-    /// `Structure::Bth` stands for a BVH.
+    /// True to keep what new positions at run time need (`bth::Scene::set_positions`). All vertices
+    /// of the source are kept in its order, and triangles of zero area are not dropped. Excludes
+    /// `coordinates` other than f32, files without the geometry, and `Structure::Tets`.
+    /// `Structure::Bth` then gives a BVH.
     pub deformable: bool,
     /// How objects whose vertices move by themselves are compiled.
     pub motion: MotionOptions,

@@ -86,7 +86,7 @@ pub(crate) struct Args {
     #[arg(long, default_value_t = 16, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     pub(crate) spp: u32,
     /// Motion blur: frames for which the shutter is open, around the time of each picture, such as
-    /// 0.5. Each sample sees the scene at a time of its own. By default pictures show an instant.
+    /// 0.5. Each sample sees the scene at a different time. By default pictures show an instant.
     #[arg(long, value_name = "FRAMES", value_parser = parse_positive)]
     pub(crate) shutter: Option<f64>,
     /// No ground under the model. Scenes never have one but their own.
@@ -139,7 +139,7 @@ pub(crate) enum Mode {
     Steps,
     /// Diffuse path tracing of the file's materials with the scene's lights and an environment.
     Path,
-    /// Each instance in a colour of its own.
+    /// Each instance in a different colour.
     Instances,
     /// As shaded, everything of matte clay.
     Clay,

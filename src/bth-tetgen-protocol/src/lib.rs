@@ -1,12 +1,12 @@
 //! The messages between the compiler and its tetrahedralization worker.
 //!
-//! The worker is a program of its own (TetGen is under the AGPL, keeps static state and can
-//! crash or hang), reached through its standard input and output. Both sides send frames: a
-//! `u32` length, little-endian, then that many bytes, of which the first is the message's tag.
-//! The worker sends [`Reply::Hello`] first; then every request gets one reply.
+//! The worker is a separate program (TetGen is under the AGPL, keeps static state and can crash or
+//! hang), reached through its standard input and output. Both sides send frames: a `u32` length,
+//! little-endian, then that many bytes; the first byte is the message's tag. The worker sends
+//! [`Reply::Hello`] first; then every request gets one reply.
 //!
-//! Neither side trusts the other: no length leads to an allocation beyond what has arrived,
-//! and bytes that are no message are an [`Error`], never a panic.
+//! Neither side trusts the other: no length leads to an allocation beyond what has arrived, and
+//! bytes that are no message are an [`Error`], never a panic.
 #![warn(missing_docs)]
 
 mod frame;

@@ -46,7 +46,7 @@ pub enum Fault {
     Fail(Failure),
 }
 
-/// Bit of the code of a fault that stands for a [`Failure`].
+/// Bit that marks the code of a fault as a [`Failure`].
 const FAIL: u8 = 0x80;
 
 /// A reply of the worker.

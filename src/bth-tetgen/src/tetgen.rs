@@ -62,9 +62,9 @@ pub(crate) fn tetrahedralize(job: &Job) -> Result<Tetrahedra, (Failure, String)>
         tet_count: 0,
         text: [0; 160],
     });
-    // SAFETY: every pointer is valid for the count passed beside it for the whole call, the
-    // switches end with NUL, the result is writable and has the shim's layout; the shim catches
-    // every exception.
+    // SAFETY: every pointer is valid for the count passed with it for the whole call, the switches
+    // end with NUL, the result is writable and has the shim's layout; the shim catches every
+    // exception.
     let code = unsafe {
         bth_tetgen_run(
             switches.as_ptr(),

@@ -1,6 +1,6 @@
-//! Every kind of failure, brought about in TetGen itself. (But for its internal errors and what it
-//! calls wrong input, for which no input is known that brings them about and not its end; those are
-//! planted: `bth-compile`, tests/tets/faults.rs.)
+//! Provokes every kind of failure in TetGen itself, except internal errors and what it calls wrong
+//! input. No known input provokes these without ending the process, so `bth-tets` injects them
+//! (tests/tets/faults.rs).
 
 use bth_random::Rng;
 use bth_tetgen_protocol::{Failure, Job, Reply, Request, read_frame, write_frame};

@@ -3,9 +3,9 @@
 //!
 //! | modules | |
 //! |---|---|
-//! | [`marks`] | which nodes may be tetrahedralized: their triangles touch only where they share vertices |
-//! | [`costs`] | which of these are worth it: the expected time of rays, and sample rays once the tetrahedra exist |
-//! | [`tetrahedralize`] | the constrained tetrahedralization by TetGen, a process, checked exactly and encoded |
+//! | [`marks`] | which nodes may be tetrahedralized: triangles touch only at shared vertices |
+//! | [`costs`] | which of these save time: by estimate, then by sample rays through the tets |
+//! | [`tetrahedralize`] | runs TetGen in a process, checks its result exactly, encodes it |
 #![warn(missing_docs)]
 
 pub mod costs;

@@ -12,7 +12,7 @@ const MOST: usize = 1 << 16;
 /// Rays that are known when an object is compiled, in its space. Nodes are weighted by them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct KnownRays {
-    /// Rays that enter the object's box from outside, or of which it is not known where they start.
+    /// Rays that enter the object's box from outside, or whose start is not known.
     pub outside: Vec<SampleRay>,
     /// Rays that start on the object's triangles.
     pub surface: Vec<SampleRay>,

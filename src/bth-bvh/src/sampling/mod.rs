@@ -1,4 +1,4 @@
-//! Sample rays that stand in for those of a renderer, and what they meet in a binary BVH.
+//! Sample rays, which represent the rays of a renderer, and what they hit in a binary BVH.
 //!
 //! [`visits()`] says how probable it is that such a ray enters each node, by which the wide tree is
 //! chosen; the costs of tetrahedra and the worth of free directions are judged by the same rays.

@@ -1,4 +1,4 @@
-//! Sample rays that stand in for those of a renderer: uniform lines from outside, rays from
+//! Sample rays, which represent the rays of a renderer: uniform lines from outside, rays from
 //! surfaces, and rays from points within.
 
 use crate::vectors::{corners, double_area, uniform_direction, unit};
@@ -37,15 +37,15 @@ fn diagonal(node: &Node) -> f64 {
     (DVec3::from(node.upper.map(f64::from)) - DVec3::from(node.lower.map(f64::from))).length()
 }
 
-/// Lines that are uniform in space (chords of the ball around the box), which start outside of it
-/// and meet it: the rays of the surface area heuristic and of Cauchy and Crofton.
+/// Lines that are uniform in space (chords of the ball around the box), which start outside the box
+/// and hit it: the rays of the surface area heuristic and of Cauchy and Crofton.
 pub fn outside(lower: [f32; 3], upper: [f32; 3], count: usize, seed: u64) -> Vec<SampleRay> {
     let mut random = Rng::new(seed);
     let ends = [lower, upper].map(|end| DVec3::from(end.map(f64::from)));
     let middle = 0.5 * (ends[0] + ends[1]);
     let radius = (0.5 * (ends[1] - ends[0])).length();
     let mut rays = Vec::with_capacity(count);
-    // No chord meets a box of zero size, and few meet a flat box; hence the limit on attempts.
+    // No chord hits a box of zero size, and few hit a flat box; hence the limit on attempts.
     for _ in 0..64 * count {
         if rays.len() == count || radius == 0.0 {
             break;
@@ -60,8 +60,7 @@ pub fn outside(lower: [f32; 3], upper: [f32; 3], count: usize, seed: u64) -> Vec
     rays
 }
 
-/// Rays in uniform directions from uniform points of a box, so many from each point one after the
-/// other.
+/// Rays in uniform directions from uniform points of a box. All rays of a point follow each other.
 pub fn within(
     lower: [f32; 3],
     upper: [f32; 3],

@@ -21,8 +21,9 @@ const RAYS: [usize; 2] = [1 << 10, 1 << 14];
 /// Known rays for each that is drawn in addition. Without any, other rays take up to 1.17 of the
 /// steps, with them up to 1.06, for the same gain.
 const DRAWN_OF_KNOWN: usize = 3;
-/// A node's share of the rays that enter its parent is that of its area before any ray is counted,
-/// with the weight of so many rays. Between 16 and 256 visits differ by less than 0.2 %.
+/// Before any ray is counted, a node's share of the rays that enter its parent is its share of the
+/// area. That counts as much as this number of rays. Between 16 and 256 visits differ by less than
+/// 0.2 %.
 const PRIOR: f64 = 64.0;
 
 /// For each node of a BVH the probability that a sample ray enters it, where the root's is 1. If

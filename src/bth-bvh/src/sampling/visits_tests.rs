@@ -3,8 +3,8 @@ use crate::{BvhOptions, build};
 use bth_import::monitor::Silent;
 use bth_random::Rng;
 
-/// Two clusters of the same small triangles, one in the open, and one in the middle of a closed
-/// box, which stands next to it.
+/// Two clusters of the same small triangles, one in the open, and one in the middle of a closed box
+/// next to it.
 fn open_and_enclosed() -> Mesh {
     let mut mesh = Mesh::default();
     let mut add = |corners: [[f32; 3]; 3]| {
@@ -19,7 +19,7 @@ fn open_and_enclosed() -> Mesh {
         add(corners);
         add(corners.map(|[x, y, z]| [x + 5.0, y, z]));
     }
-    // The walls stand at a fifth of a unit from the cluster, and show their fronts to the outside.
+    // The walls are a fifth of a unit from the cluster, and show their fronts to the outside.
     let corner = |k: usize| [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { 1.3 } else { -0.2 });
     for axis in 0..3 {
         for side in 0..2 {

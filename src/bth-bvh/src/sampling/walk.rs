@@ -55,14 +55,14 @@ pub fn walk(mesh: &Mesh, bvh: &BinaryBvh, ray: &SampleRay, mut entered: impl FnM
     traced
 }
 
-/// Nodes that all sample rays of a stage together may enter; those of ordinary models enter a fifth
-/// of them.
+/// Nodes that all sample rays of a stage together may enter. With ordinary models they enter a
+/// fifth of this number.
 const MOST_ENTERED: u64 = 1 << 24;
 /// Rays by which it is estimated how many nodes all enter.
 const ESTIMATED_BY: usize = 64;
 
-/// The rays, or so many of them, evenly spaced, as enter no more nodes than a stage has time for.
-/// Where many triangles lie in one place, each ray enters the nodes of all.
+/// Returns the rays, or an evenly spaced part of them if all would enter more nodes than a stage
+/// has time for. Where many triangles lie in one place, each ray enters the nodes of all.
 pub fn affordable(mesh: &Mesh, bvh: &BinaryBvh, rays: Vec<SampleRay>) -> Vec<SampleRay> {
     let spaced = rays.iter().step_by(rays.len().div_ceil(ESTIMATED_BY).max(1));
     let (count, entered) = spaced.fold((0u64, 0u64), |(count, entered), ray| {

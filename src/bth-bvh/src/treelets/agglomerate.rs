@@ -6,13 +6,13 @@ use bth_format::layout::WIDTH;
 
 /// A binary tree over boxes.
 pub(super) struct Joined {
-    /// The given boxes, then those of inner nodes; the last one is the root.
+    /// The given boxes, then the boxes of inner nodes; the last one is the root.
     pub(super) bounds: Vec<Bounds>,
     /// For each inner node its children, as indices of `bounds`.
     pub(super) children: Vec<[usize; 2]>,
 }
 
-/// Joins up to [`WIDTH`] boxes, of which there is at least one.
+/// Joins up to [`WIDTH`] boxes, at least one.
 pub(super) fn agglomerate(boxes: &[Bounds]) -> Joined {
     assert!((1..=WIDTH).contains(&boxes.len()), "children of a wide node");
     let mut joined = Joined { bounds: boxes.to_vec(), children: Vec::with_capacity(boxes.len() - 1) };

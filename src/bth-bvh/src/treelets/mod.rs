@@ -3,12 +3,12 @@
 //!
 //! Reinsertion lowers the cost of the binary tree, most of whose nodes vanish in the collapse. Here
 //! the plan of the wide tree is made first. One round then rebuilds subtrees of few triangles
-//! (`small`), whose leaves may share more vertices; the others rebuild what lies below each wide
-//! node (`wide`), and join the children of each anew (`agglomerate`). The present plan remains
+//! (`small`), whose leaves may share more vertices. The other rounds rebuild what lies below each
+//! wide node (`wide`), and join its children again (`agglomerate`). The present plan remains
 //! possible in every new tree, so by areas the cost of the wide tree never rises.
 //!
 //! After the treelets of "Fast Parallel Construction of High-Quality Bounding Volume Hierarchies"
-//! (Karras and Aila 2013), with the cost of the wide tree in place of that of the binary one.
+//! (Karras and Aila 2013), with the cost of the wide tree instead of the binary one.
 
 mod agglomerate;
 mod small;
@@ -25,8 +25,8 @@ use bth_import::monitor::Monitor;
 /// Trees of fewer nodes are one or two wide nodes, whatever is done.
 const LEAST_NODES: usize = 64;
 
-/// Rebuilds treelets in so many rounds. `visits` gives for each node of a tree the probability that
-/// a ray enters it, by which its wide tree is planned.
+/// Rebuilds treelets in `rounds` rounds. `visits` gives for each node of a tree the probability
+/// that a ray enters it, by which its wide tree is planned.
 ///
 /// # Errors
 /// [`bth_import::Error::Cancelled`].

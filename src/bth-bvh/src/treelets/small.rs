@@ -1,4 +1,4 @@
-//! Subtrees of few triangles, split anew by a full sweep.
+//! Splits subtrees of few triangles again, by a full sweep.
 
 use super::super::bounds::Bounds;
 use super::super::build::{Effort, levels, split_with};
@@ -11,14 +11,14 @@ use bth_format::layout::WIDTH;
 use bth_import::error::Result;
 use rayon::prelude::*;
 
-/// Largest number of triangles of a subtree that is split anew. With half of it sponza_dabrovic
+/// Largest number of triangles of a subtree that is split again. With half of it sponza_dabrovic
 /// keeps a quarter of the gain.
 const MOST_TRIANGLES: u32 = 200;
 
 /// A subtree, by its root, and what replaces it.
 type Replaced = (u32, BinaryBvh);
 
-/// The subtrees of few triangles in the planned BVH that cost less when they are split anew.
+/// Finds the subtrees of few triangles in the planned BVH that cost less when they are split again.
 pub(super) fn find(planner: &Planner<'_>, decisions: &[Decision]) -> Result<Vec<Replaced>> {
     let bvh = planner.bvh;
     let effort = Effort { sweep_count: usize::MAX, ..Quality::Balanced.effort() };
@@ -54,8 +54,7 @@ struct Root {
     level: u32,
 }
 
-/// The topmost wide nodes of at most [`MOST_TRIANGLES`] triangles, of which there are more than one
-/// leaf holds.
+/// The topmost wide nodes of at most [`MOST_TRIANGLES`] triangles. Skips nodes that fit one leaf.
 fn small_subtrees(bvh: &BinaryBvh, decisions: &[Decision]) -> Vec<Root> {
     let mut found = Vec::new();
     let mut stack = vec![Root { at: 0, level: 0 }];

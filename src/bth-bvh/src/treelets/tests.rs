@@ -84,7 +84,7 @@ fn entered_by_others(mesh: &Mesh, bvh: &BinaryBvh, probabilities: Option<&[f64]>
     let judged = Weighed { bvh, probabilities: Some(&judge) };
     let options = CollapseOptions::default();
     let (_, report) = collapse_by(mesh, judged, &[], &options, &decide, &Silent).unwrap();
-    // Visits are told relative to those of the root.
+    // Visits are relative to the visits of the root.
     (report.node_visits + report.leaf_visits) * judge[0]
 }
 
@@ -132,7 +132,7 @@ fn rounds_can_be_cancelled() {
     assert!(matches!(result, Err(bth_import::Error::Cancelled)));
 }
 
-/// The smallest area of wide nodes of a subtree in at most so many slots, by trying everything.
+/// The smallest area of wide nodes of a subtree in at most `slots` slots, by trying everything.
 fn least_area(treelet: &BinaryBvh, at: usize, slots: usize) -> f64 {
     let node = &treelet.nodes[at];
     if node.is_leaf() {
@@ -164,8 +164,8 @@ fn treelet_plans_have_the_least_area() {
     }
 }
 
-/// As [`agglomerate`], with all areas computed anew before each step; returns the boxes of the
-/// inner nodes.
+/// Does the same as [`agglomerate`], but computes all areas again before each step. Returns the
+/// boxes of the inner nodes.
 fn joined_slowly(boxes: &[Bounds]) -> Vec<Bounds> {
     let (mut open, mut inner) = (boxes.to_vec(), Vec::new());
     while open.len() > 1 {

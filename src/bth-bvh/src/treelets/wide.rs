@@ -1,4 +1,4 @@
-//! What lies below each wide node, opened, split anew by a full sweep, and planned anew.
+//! Opens what lies below each wide node, splits it again by a full sweep, and plans it again.
 
 use super::super::bounds::Bounds;
 use super::super::build::{Effort, split_with};
@@ -173,7 +173,7 @@ impl WideTree<'_> {
     }
 }
 
-/// The plan of smallest area of wide nodes over a treelet, of which each leaf takes one slot.
+/// The plan of smallest area of wide nodes over a treelet. Each leaf takes one slot.
 pub(super) struct TreeletPlan<'a> {
     treelet: &'a BinaryBvh,
     decisions: Vec<Decision>,

@@ -75,8 +75,7 @@ impl<'a> Cache<'a> {
         bytes
     }
 
-    /// The content of a record as a file, of which nothing but its hash, header and table has been
-    /// checked.
+    /// The content of a record as a file. Only its hash, header and table have been checked.
     pub(crate) fn open(&self, record: &Record, monitor: &dyn Monitor) -> Option<bth_format::File> {
         let store = self.store?;
         let copy = |bytes: &[u8]| bth_format::File::from_bytes(bytes).ok();
@@ -167,7 +166,7 @@ impl<'a> Cache<'a> {
         }
     }
 
-    /// The lock for building what a key stands for, where the file system has locks.
+    /// The lock for building the result of a key, where the file system has locks.
     fn work(&self, key: &Key, monitor: &dyn Monitor) -> Result<Option<WorkLock>> {
         let lock = self.store.and_then(|store| store.work_lock(key, &|| monitor.cancelled()));
         monitor.check()?;

@@ -95,7 +95,7 @@ impl OnGrid {
 ///
 /// # Errors
 /// `BTH-I070` when `bits` move a vertex farther than `max_error` allows, `BTH-I071` when the object
-/// has no grid of so many bits, as its coordinates are too great or too close together.
+/// has no grid of this number of bits, as its coordinates are too large or too close together.
 pub(crate) fn place(source: &Path, mesh: &mut Mesh, options: &CoordinateOptions) -> Result<Option<OnGrid>> {
     let Some(bounds) = bounds(&mesh.positions) else { return Ok(None) };
     let found = |bits: GridBits| {
@@ -196,8 +196,8 @@ fn grid(bits: GridBits, bounds: AxisRanges) -> Option<Grid> {
     Some(grid)
 }
 
-/// Returns true if the smallest step of a file is too great for a box: its longest side then has
-/// less than half of the steps that its bits stand for, and none at the smallest extents, where the
+/// Returns true if the smallest step of a file is too large for a box: its longest side then has
+/// less than half of the steps that its bits allow, and no step at the smallest extents, where the
 /// surface would be a point.
 fn is_too_coarse(grid: &Grid, bounds: AxisRanges) -> bool {
     let extent = |axis: usize| f64::from(bounds[axis][1]) - f64::from(bounds[axis][0]);

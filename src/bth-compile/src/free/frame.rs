@@ -4,7 +4,7 @@ use bth::simd::LANES;
 use bth_format::layout::{FREE_BINS, FREE_SECTORS, FREE_SIDE, FreeSectors, free_axes, free_column};
 use std::sync::LazyLock;
 
-/// A set of bins: bit i stands for bin i.
+/// A set of bins: bit i is bin i.
 pub(super) type BinSet = u128;
 
 /// All columns, or rows, as bits.
@@ -33,7 +33,7 @@ pub(super) const SECTORS: [BinSet; FREE_SECTORS] = {
     sectors
 };
 
-/// Smallest and largest slopes of columns, in f32: those of the promise, and a 2^-19 (1 + s²)
+/// Smallest and largest slopes of columns, in f32: the slopes of the promise, and a 2^-19 (1 + s²)
 /// beyond, which is more than the rounding errors of sums of two products with them. Lanes from the
 /// eleventh on are empty.
 #[repr(align(64))]

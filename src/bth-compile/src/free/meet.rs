@@ -1,4 +1,4 @@
-//! In which bins rays from a start triangle may meet the triangles of a block.
+//! Finds the bins in which rays from a start triangle may hit the triangles of a block.
 
 use super::frame::{ALL_COLUMNS, BinSet, COLUMNS, bins};
 use super::see::{ERROR, bins_of, columns_and_rows, dot, squared_gap, sum_abs};
@@ -11,7 +11,7 @@ use bth_format::layout::FREE_SIDE;
 #[repr(align(64))]
 pub(super) struct Met {
     /// Largest w, for each line of the start triangle, with which its plane holds the triangle on
-    /// the lower side; less than all others where there is none.
+    /// the lower side; -∞ if there is no such w.
     most: [[f32; LANES]; LINES],
     /// Normals of the triangles' planes, towards the side on which the whole start triangle lies,
     /// in its frame.
@@ -87,9 +87,9 @@ impl<S: Simd, const TOUCHES: bool> Corners<S, TOUCHES> {
     }
 }
 
-/// What a start triangle sees of those triangles of a block that may be seen in some `bins`, given
-/// whether the block's box `TOUCHES` that triangle, so that corners may be shared. There are no
-/// fused operations, so that all instruction sets agree.
+/// What a start triangle sees of the triangles of a block that may be seen in some `bins`.
+/// `TOUCHES` if the block's box touches the start triangle, so that corners may be shared. There
+/// are no fused operations, so that all instruction sets agree.
 #[inline(always)]
 pub(super) fn meet<S: Simd, const TOUCHES: bool>(s: S, start: &Start, block: &Block, bins: BinSet) -> Met {
     let corners = Corners::<S, TOUCHES>::new(s, start, block);
@@ -214,12 +214,12 @@ impl<S: Simd> Factors<S> {
         out
     }
 
-    /// Largest w with which the plane along a line holds triangles on the lower side; -∞ where
-    /// there is none.
+    /// Largest w with which the plane along a line holds triangles on the lower side; -∞ if there
+    /// is no such w.
     ///
-    /// The error of heights above the line is at most 18 units of the size of the corner and 2 of
-    /// that of the start triangle, those of the quotients 3 units of both: the bounds are 32 and
-    /// 16.
+    /// The error of heights above the line is at most 18 units of the size of the corner and 2
+    /// units of the size of the start triangle. The error of the quotients is 3 units of both. The
+    /// bounds are 32 and 16.
     #[inline(always)]
     fn most<const TOUCHES: bool>(
         &self,
@@ -255,7 +255,7 @@ impl<S: Simd> Factors<S> {
 }
 
 /// Planes of the triangles that hold the start triangle on one side: rays that leave it away from
-/// them meet nothing there.
+/// them hit nothing there.
 #[inline(always)]
 fn away<S: Simd, const TOUCHES: bool>(s: S, start: &Start, corners: &Corners<S, TOUCHES>, met: &mut Met) {
     let zero = s.splat(0.0);
@@ -308,7 +308,7 @@ fn away<S: Simd, const TOUCHES: bool>(s: S, start: &Start, corners: &Corners<S, 
 }
 
 impl Met {
-    /// Those of some bins in which rays may meet the triangle in a lane.
+    /// Returns the bins of `of` in which rays may hit the triangle in a lane.
     #[inline(always)]
     pub(super) fn blocked<S: Simd>(&self, s: S, start: &Start, lane: usize, of: BinSet) -> BinSet {
         let columns = self.open(s, start, lane, BY_COLUMN, |line| &line.of_column);

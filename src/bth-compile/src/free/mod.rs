@@ -1,15 +1,15 @@
-//! Free directions: what a ray that starts on a triangle certainly cannot meet, by bins of
+//! Free directions: what a ray that starts on a triangle certainly cannot hit, by bins of
 //! directions.
 //!
 //! For each triangle and bin the *shaft* holds all points that rays reach from any point of the
-//! triangle in any direction of the bin. If no other triangle meets the shaft, the bin is free.
-//! Bins are joined to *sectors*, and a sector has a distance within which no other triangle meets
-//! the shafts of its bins. A row tells either the free bins and the sectors of one side of the
+//! triangle in any direction of the bin. If no other triangle touches the shaft, the bin is free.
+//! Bins are joined to *sectors*, and a sector has a distance within which no other triangle touches
+//! the shafts of its bins. A row holds either the free bins and the sectors of one side of the
 //! triangle, nearly always its front, or the sectors of both sides.
 //!
-//! A proof for each pair of bin and triangle would take too long: nodes of the BVH are left out by
-//! conservative tests of boxes, what is small for its distance blocks without a proof, and bins
-//! that are blocked are not asked again.
+//! A proof for each pair of bin and triangle would take too long. So conservative tests of boxes
+//! skip nodes of the BVH, what is small for its distance blocks without a proof, and bins that are
+//! blocked are not tested again.
 
 // Kernels loop over lanes by index: closures could be compiled as functions without the kernel's
 // instruction set.
@@ -106,7 +106,7 @@ pub struct Free {
 }
 
 impl Free {
-    /// Returns true if the rows are those of a mesh with so many triangles.
+    /// Returns true if the rows belong to a mesh with this number of triangles.
     pub(crate) fn is_of(&self, triangles: usize) -> bool {
         let [directions, distances] = [self.directions.len(), self.distances.len()];
         [directions, distances].iter().all(|rows| [0, triangles].contains(rows))

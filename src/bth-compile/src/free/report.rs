@@ -21,16 +21,16 @@ pub enum Kept {
     Directions,
 }
 
-/// Report of [`super::find`]. Shares are those of cosine-weighted rays from triangles, by area, of
-/// what is kept.
+/// Report of [`super::find`]. Shares are shares of cosine-weighted rays from triangles, by area,
+/// for what is kept.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FreeReport {
     /// Triangles that rays may start on.
     pub triangles: u64,
-    /// Share of the rays that certainly meet nothing; 0 where distances alone were decided.
+    /// Share of the rays that certainly hit nothing; 0 where distances alone were decided.
     pub free: f64,
-    /// For each level the share of the rays that certainly meet nothing within its distance, from
-    /// the sides that are told.
+    /// For each level the share of the rays that certainly hit nothing within its distance, from
+    /// the sides that the rows hold.
     pub beyond: [f64; FreeSectors::LEVELS],
     /// The distances of the levels, object space.
     pub levels: [f32; FreeSectors::LEVELS],

@@ -87,7 +87,7 @@ struct Entry {
     bins: BinSet,
 }
 
-/// Searches for triangles one after the other, with memory of its own.
+/// Searches for triangles one after the other, with a separate stack.
 struct Search<'a> {
     around: &'a Surroundings<'a>,
     stack: Vec<Entry>,
@@ -98,9 +98,9 @@ struct State {
     /// Row of the triangle in the order of the BVH.
     row: usize,
     start: Start,
-    /// Bins in which nothing is met at all.
+    /// Bins in which rays hit nothing at all.
     free: BinSet,
-    /// For each level the bins of the sectors in which nothing is met within its distance.
+    /// For each level the bins of the sectors in which rays hit nothing within its distance.
     open: [BinSet; FreeSectors::LEVELS],
     /// Squared distances below which something may lie within a level.
     near: [f32; FreeSectors::LEVELS],
@@ -187,8 +187,8 @@ impl Search<'_> {
         found
     }
 
-    /// What is known of one side of a triangle, given the bins of which it is asked whether they
-    /// are free; `None` without axes.
+    /// Decides what is known of one side of a triangle; `None` without axes. `free` are the bins
+    /// that may turn out to be free.
     #[inline(always)]
     fn search<S: Simd>(&mut self, s: S, row: usize, (is_back, free): (bool, BinSet)) -> Option<State> {
         let corners = self.around.mesh.corners(self.around.order[row]);
@@ -205,9 +205,10 @@ impl Search<'_> {
         Some(state)
     }
 
-    /// Blocks the bins in which a triangle of the mesh may be met. What is found does not depend on
-    /// the order of the visits: children are sorted by distance where distances alone are open,
-    /// since near ones block these, but not where all in a free bin must be visited.
+    /// Blocks the bins in which rays may hit a triangle of the mesh. The result does not depend on
+    /// the order of the visits. Children are sorted by distance where distances alone are open,
+    /// since near ones block these. Where a bin is still free, all in it must be visited, in any
+    /// order.
     #[inline(always)]
     fn block_all<S: Simd>(&mut self, s: S, state: &mut State) {
         let tree = &self.around.tree;
@@ -266,7 +267,7 @@ fn nearest_last(entries: &mut [Entry]) {
     }
 }
 
-/// Blocks those of the bins of a block's box in which its triangles may be met.
+/// Blocks the bins of a block's box in which rays may hit its triangles.
 #[inline(always)]
 fn search_block<S: Simd, const TOUCHES: bool>(s: S, block: &Block, bins: BinSet, state: &mut State) {
     let met = meet::<S, TOUCHES>(s, &state.start, block, bins);

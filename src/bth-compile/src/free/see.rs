@@ -9,9 +9,9 @@ use bth_format::layout::FREE_SIDE;
 /// Relative bound of rounding errors: 16 units, for eight roundings of coordinates.
 pub(super) const ERROR: f32 = 1.0 / (1 << 20) as f32;
 /// Boxes and triangles whose size, relative to their distance, is at most this block the bins in
-/// which they may be seen, without proof that they are met: six degrees.
+/// which they may be seen, without proof that rays hit them: six degrees.
 pub(super) const SMALL: f32 = 1.0 / 10.0;
-/// As [`SMALL`], where only sectors are decided, which are wider than bins.
+/// The same as [`SMALL`] where only sectors are decided, which are wider than bins.
 pub(super) const SMALL_FOR_SECTORS: f32 = 1.0 / 6.0;
 
 /// What may be seen of children.

@@ -1,17 +1,17 @@
 //! The triangle from which rays start, and planes that bound what they reach from it.
 //!
 //! All points that rays in the directions of a bin reach from any point of the triangle are its
-//! *shaft*. A plane proves that another triangle is not met if the start triangle lies on its upper
-//! side, the other one on its lower side, and every direction of the bin points strictly upwards:
-//! then no point p + s d of the shaft with s > 0 is a point of the other triangle, also where both
-//! share corners on the plane.
+//! *shaft*. A plane proves that no ray hits another triangle if the start triangle lies on its
+//! upper side, the other one on its lower side, and every direction of the bin points strictly
+//! upwards: then no point p + s d of the shaft with s > 0 is a point of the other triangle, also
+//! where both share corners on the plane.
 //!
 //! In the frame of the start triangle, whose z is 0, directions are (X, Y, 1) with the slopes X and
 //! Y of the bin. The planes tried have normals (m, w): a line in the plane of the triangle that
 //! holds it on the side of the unit vector m, tilted around that line. Directions point upwards
 //! from it if w > -m · (X, Y) for all slopes of the bin, which is the sum of a bound for the column
-//! and one for the row; a greater w keeps all that was said. Six lines are used: those along the
-//! axes through the outermost corners, and the edges.
+//! and one for the row; with a larger w they still do. Six lines are used: the lines along the axes
+//! through the outermost corners, and the edges.
 
 use super::frame::{ALL_COLUMNS, COLUMNS, Frame};
 use bth::simd::LANES;

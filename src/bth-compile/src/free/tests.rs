@@ -29,7 +29,7 @@ impl Free {
         self.directions[triangle].bins()
     }
 
-    /// The distance within which nothing is met in a bin of a side, infinite where it is free.
+    /// The distance within which rays hit nothing in a bin of a side, infinite where it is free.
     fn distance(&self, triangle: usize, (bin, is_back): (usize, bool)) -> f64 {
         let known = self.known(triangle);
         if known.bins.is_free(bin) && known.bins.is_back() == is_back {
@@ -139,7 +139,7 @@ fn check_found(mesh: &Mesh, free: &Free, rays: usize, seed: u64) -> usize {
         if length == 0.0 {
             continue;
         }
-        // The bin may be that of another direction within the margin.
+        // The bin may be the bin of another direction within the margin.
         let jitter = random.unit_vector();
         let within = 0.9 * FREE_MARGIN * random.unit_f64();
         let other = std::array::from_fn(|k| direction[k] / length + within * jitter[k]);
@@ -194,8 +194,8 @@ fn a_convex_solid_is_free_outside() {
 fn a_solid_that_is_inside_out_is_free_on_the_back() {
     let mut mesh = sphere(8, [0.0; 3]);
     mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
-    // On the back nothing is met at all; where before the front nothing is met up to some distance,
-    // that may be told instead.
+    // Rays from the back hit nothing at all. Where rays from the front hit nothing up to some
+    // distance, the row may hold that instead.
     let free = free_of(&mesh);
     let is_open = |t: usize| free.bins(t).0 & FreeBins::ALL == FreeBins::ALL;
     let is_told =
@@ -348,14 +348,14 @@ fn solids_are_seen_from_outside_and_rooms_from_within() {
 
 #[test]
 fn what_no_ray_meets_is_not_worthwhile() {
-    // A ray that lies in a plane meets no triangle of it, so no ray from within counts.
+    // A ray that lies in a plane hits no triangle of it, so no ray from within counts.
     let mut mesh = terraces(5, 1);
     mesh.positions.iter_mut().for_each(|p| p[2] = 0.1);
     let (_, report) = found(&mesh, KeepFree::Auto);
     let worth = report.worth.unwrap();
     assert_eq!((report.kept, worth.from_within.rays), (Kept::Directions, 0), "{report:?}");
     assert!(worth.from_outside.rays > 100, "{report:?}");
-    // Nothing can be met at all.
+    // No ray can hit anything.
     let a = [0.5; 3];
     let (_, report) = found(&weld([[a, a, a]]), KeepFree::Auto);
     assert_eq!((report.kept, report.worth.unwrap_or_default()), (Kept::None, Worth::default()), "{report:?}");

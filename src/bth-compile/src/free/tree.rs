@@ -34,7 +34,7 @@ pub(super) struct Block {
     pub(super) count: u32,
 }
 
-/// The nodes, of which the first is the root, and the blocks.
+/// The nodes, the root first, and the blocks.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tree {
     pub(super) nodes: Vec<Node>,

@@ -1,7 +1,7 @@
-//! Whether free directions are worth their bytes: by what rays that meet the mesh from everywhere
+//! Decides if free directions are worth their bytes: by what rays that hit the mesh from everywhere
 //! would know where they start again.
 //!
-//! Many triangles of a mesh may be where no ray comes, as the inner ones of parts that stand in
+//! Many triangles of a mesh may be where no ray comes, such as the inner ones of parts that lie in
 //! each other, and a room's walls are seen from one side. So triangles are not sampled by
 //! themselves, but by rays: from outside, as an object is seen, and from points within its box, as
 //! a room is.
@@ -26,22 +26,22 @@ use std::fmt;
 /// [`super::KeepFree::Auto`] keeps anything.
 const LEAST_OPEN: f64 = 0.5;
 /// Smallest share of free directions from outside for which it keeps them, and not distances alone.
-/// Terrain is met on its back by half of the lines, of which rows then tell nothing.
+/// Half of the lines hit terrain on its back, for which rows then hold nothing.
 const LEAST_FREE: f64 = 1.0 / 3.0;
-/// Rays of each kind: one for so many triangles, but at least and at most so many.
+/// Triangles for each ray of a kind, and the min and max number of rays of a kind.
 const TRIANGLES_A_RAY: usize = 16;
 const RAYS: [usize; 2] = [256, 2048];
 /// Rays from each point within the box.
 const RAYS_A_POINT: usize = 8;
 
-/// What is known, in the mean, of the directions from where rays meet the mesh, on the side that
-/// they meet.
+/// What is known, in the mean, of the directions from the points where rays hit the mesh, on the
+/// side that they hit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Seen {
-    /// Rays that meet the mesh.
+    /// Rays that hit the mesh.
     pub rays: u64,
-    /// Share of cosine-weighted directions in which certainly nothing is met within the distance of
-    /// the first level.
+    /// Share of cosine-weighted directions in which rays certainly hit nothing within the distance
+    /// of the first level.
     pub open: f64,
 }
 
@@ -52,8 +52,8 @@ pub struct Worth {
     pub from_outside: Seen,
     /// By rays in uniform directions from uniform points of the box that are not in solids.
     pub from_within: Seen,
-    /// Share of cosine-weighted directions in which certainly nothing is met, where lines from
-    /// outside meet the mesh; 0 where too few are open, or where there is no room for free
+    /// Share of cosine-weighted directions in which rays certainly hit nothing, where lines from
+    /// outside hit the mesh; 0 where too few are open, or where there is no room for free
     /// directions.
     pub free: f64,
 }
@@ -86,7 +86,7 @@ impl fmt::Display for Worth {
     }
 }
 
-/// A triangle that a ray meets.
+/// A triangle that a ray hits.
 #[derive(Clone, Copy)]
 struct RayHit {
     /// Row of the BVH's order.
@@ -137,7 +137,7 @@ pub(super) fn worth(
     Ok((if worth.free >= LEAST_FREE { Kept::Directions } else { Kept::Distances }, worth))
 }
 
-/// The triangles that rays in uniform directions meet from uniform points of the box, but not from
+/// Returns the triangles that rays in uniform directions from uniform points of the box hit. Skips
 /// points in solids, from which only backs are seen: what is in a room shows its front.
 fn met_from_within(mesh: &Mesh, tree: &BinaryBvh, count: usize) -> Vec<RayHit> {
     let root = &tree.nodes[0];
@@ -149,14 +149,14 @@ fn met_from_within(mesh: &Mesh, tree: &BinaryBvh, count: usize) -> Vec<RayHit> {
     rays.par_chunks(RAYS_A_POINT).flat_map_iter(of_point).collect()
 }
 
-/// The first triangle that a ray meets.
+/// The first triangle that a ray hits.
 fn meet(mesh: &Mesh, tree: &BinaryBvh, ray: &SampleRay) -> Option<RayHit> {
     let (row, _) = walk(mesh, tree, ray, |_| ()).hit?;
     let normal = double_area(corners(mesh, tree.order[row as usize]));
     Some(RayHit { row: row as usize, is_back: normal.dot(DVec3::from(ray.direction)) > 0.0 })
 }
 
-/// What is known of the triangles that are met, by rows.
+/// What is known of the triangles that rays hit, by rows.
 fn decide_met<'a>(
     around: &Surroundings<'_>,
     met: impl IntoIterator<Item = &'a RayHit>,
@@ -167,7 +167,7 @@ fn decide_met<'a>(
     Ok(decide(around, &tasks, monitor, |_| ())?.into_iter().collect())
 }
 
-/// The mean of a share over what is met; 0 where nothing is.
+/// The mean of a share over the hits; 0 without hits.
 fn mean(met: &[RayHit], share: impl Fn(&RayHit) -> f64) -> f64 {
     let sum = met.iter().fold(0.0, |sum, met| sum + share(met));
     (sum / (met.len() as f64).max(1.0)).min(1.0)

@@ -4,7 +4,7 @@
 //! A part is opaque (transparent) only if alpha is at least (below) the cutoff at all of its
 //! points; the part includes its boundary. What is both, or not decided by the texels around it, is
 //! unknown. So the states are right for every sampling that interpolates the same texels; they
-//! cannot be right for mipmaps, which whether a ray hits must not depend on. The states follow
+//! cannot be right for mipmaps, and hits of rays must not depend on mipmaps. The states follow
 //! opacity micromaps (VK_EXT_opacity_micromap; Gruen, Benthin and Woop, "Sub-triangle opacity masks
 //! for faster ray tracing of transparent objects", 2020).
 
@@ -29,13 +29,13 @@ use texture::Pyramid;
 /// levels are lowered.
 const MAX_WORDS: usize = 1 << 26;
 
-/// Triangles whose patterns are made between two looks at whether the user cancelled.
+/// Triangles whose patterns are made between two checks for cancellation.
 const BATCH: usize = 512;
 
 /// Adds the opacity of its triangles to a mesh and its report.
 ///
 /// # Errors
-/// As [`compile`].
+/// The errors of [`compile`].
 pub(crate) fn add(
     mesh: &mut Mesh,
     report: &mut bth_import::Report,

@@ -35,8 +35,8 @@ impl Pattern {
     }
 }
 
-/// A part of a subdivided triangle: the corner at (column, row) of those of its level, upright or
-/// upside down.
+/// A part of a subdivided triangle: upright or upside down, at the corner (column, row) of its
+/// level.
 #[derive(Clone, Copy)]
 struct SubTriangle {
     level: u32,
@@ -46,8 +46,7 @@ struct SubTriangle {
 }
 
 impl SubTriangle {
-    /// The number of its micro-triangle among those of its level; see
-    /// [`bth_format::layout::micro_triangle`].
+    /// The number of its micro-triangle in its level; see [`bth_format::layout::micro_triangle`].
     fn number(self) -> usize {
         let n = 1usize << self.level;
         let (i, j) = (self.column as usize, self.row as usize);

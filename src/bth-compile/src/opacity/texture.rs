@@ -80,7 +80,7 @@ struct RangeSearch<'a> {
 }
 
 impl RangeSearch<'_> {
-    /// Joins the part of a square that lies in the rectangle. Returns whether that is enough.
+    /// Joins the part of a square that lies in the rectangle. Returns true if that is enough.
     fn square(&mut self, level: usize, [x, y]: [usize; 2]) -> bool {
         let (width, height, squares) = &self.pyramid.levels[level];
         let ([left, right], [top, bottom]) = (self.columns, self.rows);

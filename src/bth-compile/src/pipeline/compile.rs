@@ -111,10 +111,10 @@ pub fn compile(
 }
 
 /// Compiles a model, or takes results from the cache that were made from the same content. `needed`
-/// decides whether the bytes of a file in the cache are read.
+/// returns true to read the bytes of a file in the cache.
 ///
 /// # Errors
-/// As [`compile`]; `BTH-O002` when the model changes meanwhile.
+/// The errors of [`compile`]; `BTH-O002` when the model changes meanwhile.
 pub fn compile_cached(
     source: &Path,
     options: &CompileOptions,
@@ -139,7 +139,7 @@ pub fn dry_run(
     Ok(DryRun::of(key.as_ref(), cache, monitor))
 }
 
-/// As [`compile_cached`], also for triangles in memory.
+/// Does the work of [`compile_cached`], also for triangles in memory.
 pub(crate) fn compile_source(
     source: CompileInput<'_>,
     options: &CompileOptions,
@@ -212,7 +212,7 @@ pub(crate) fn tetgen_in_keys(
 }
 
 /// The file of a key: from the cache if it is there, else built, by one process if several want the
-/// same. `build` also returns whether the bytes are to be kept.
+/// same. `build` also returns true if the bytes are to be kept.
 pub(crate) fn compile_or_fetch<R: Serialize>(
     cache: &Cache<'_>,
     key: Option<&Key>,

@@ -132,7 +132,7 @@ impl<'a> Compiler<'a> {
         Ok((object, StageReports { coordinates, bvh, free: free_report, tets, collapse }))
     }
 
-    /// Compiles a mesh whose vertices move. The options are those of deformable objects
+    /// Compiles a mesh whose vertices move, with the options of deformable objects
     /// ([`CompileOptions::of_deforming`]).
     pub(crate) fn moving(mut self, mesh: Mesh, source: &dyn PoseSource) -> Result<(Object, StageReports)> {
         let options = self.options;
@@ -175,7 +175,7 @@ impl<'a> Compiler<'a> {
         Ok((leaves, reports))
     }
 
-    /// Decides in which directions rays from a triangle meet nothing. A tetrahedralization of the
+    /// Decides in which directions rays from a triangle hit nothing. A tetrahedralization of the
     /// whole model has no leaves in which its triangles could be found, and deformable objects get
     /// no free directions. With [`free::KeepFree::Auto`] they stay within the limit on bytes.
     fn free_directions(

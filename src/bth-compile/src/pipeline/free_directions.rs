@@ -9,7 +9,7 @@ use crate::monitor::Monitor;
 use crate::stage::{CachedStage, Stage};
 use bth_cache::Key;
 
-/// Decides in which directions rays from a triangle meet nothing. What is too close to decide may
+/// Decides in which directions rays from a triangle hit nothing. What is too close to decide may
 /// depend on the tree.
 pub(super) struct FindFree<'a> {
     pub(super) built: BuildTree<'a>,

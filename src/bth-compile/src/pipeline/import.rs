@@ -32,8 +32,8 @@ impl Import<'_> {
         digest.unchanged(path, (mesh, report))
     }
 
-    /// The key of a mesh, of which a model may have several parts. A supported extension determines
-    /// the format in which the file is read.
+    /// The key of a mesh, the part `part` of a model. A supported extension determines the format
+    /// in which the file is read.
     pub(crate) fn key_of(source: &SourceDigest, path: &Path, part: &str, wanted: Wanted) -> Key {
         let Wanted { attributes, groups, materials, unreadable, polygons, vertices } = wanted;
         let Looks { alpha, materials: _, unreadable: _ } = source.looks;

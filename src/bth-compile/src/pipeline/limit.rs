@@ -1,6 +1,5 @@
-//! The limit on the bytes that tracing reads: the size of the BVH, which is determined before nodes
-//! are chosen, and the selection of the tetrahedralizations to leave out when they are larger than
-//! estimated.
+//! The limit on the bytes that tracing reads: determines the size of the BVH before nodes are
+//! chosen, and drops tetrahedralizations when they are larger than estimated.
 
 use super::report::FileReport;
 use super::traced::{TracedMesh, TracedRef, collapse};
@@ -27,7 +26,7 @@ pub fn storage(
     storage_of(TracedRef { mesh, on_grid: None, tree, probabilities: None }, options, monitor)
 }
 
-/// As [`storage`], for a mesh that may be on a grid.
+/// Returns the same as [`storage`] for a mesh that may be on a grid.
 pub(super) fn storage_of(
     traced: TracedRef<'_>,
     options: &CompileOptions,
@@ -45,9 +44,9 @@ pub(super) fn bytes_per_triangle(options: &CompileOptions) -> Option<f64> {
     options.costs.max_bytes_per_triangle.filter(|_| options.structure == Structure::Bth)
 }
 
-/// Leaves out tetrahedralizations, the least useful for their bytes first, until tracing reads
-/// at most `most` bytes a triangle; all of them if the rest saves less than the smallest gain. The
-/// probe's report is updated.
+/// Drops tetrahedralizations, the lowest gain per byte first, until tracing reads at most `most`
+/// bytes a triangle. Drops all of them if the rest saves less than the smallest gain. Updates the
+/// probe's report.
 pub(super) struct FitLimit<'a> {
     pub(super) traced: &'a TracedMesh,
     pub(super) most: f64,
@@ -90,8 +89,8 @@ impl Stage for FitLimit<'_> {
     }
 }
 
-/// Brings the probe's report up to date after leaves were left out, and leaves out the rest if it
-/// saves too little.
+/// Brings the probe's report up to date after leaves were dropped, and drops the rest if it saves
+/// too little.
 fn follow(probe: &mut ProbeReport, leaves: &mut Vec<tets::Leaf>, costs: &costs::CostOptions) {
     let is_left = |node: u32| leaves.iter().any(|(n, _)| *n == node);
     probe.leaves.iter_mut().for_each(|leaf| leaf.kept = leaf.kept && is_left(leaf.node));

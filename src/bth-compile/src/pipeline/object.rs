@@ -42,7 +42,7 @@ pub(crate) struct Object {
     pub(crate) motion: Option<MotionReport>,
 }
 
-/// Assembles an object: collapses the BVH with tet leaves in place of their nodes, and encodes the
+/// Assembles an object: collapses the BVH with tet leaves instead of their nodes, and encodes the
 /// tet leaves.
 pub(super) struct Collapse<'a> {
     pub(super) traced: TracedMesh,

@@ -1,4 +1,4 @@
-//! Tetrahedralizations of the chosen nodes, and those of them that are kept.
+//! Builds tetrahedralizations of the chosen nodes, and keeps the ones that save time.
 
 use super::choose_nodes::unusable;
 use crate::bvh::BinaryBvh;

@@ -20,7 +20,7 @@ pub(crate) struct TracedMesh {
     pub(crate) probabilities: Option<Vec<f64>>,
 }
 
-/// As [`TracedMesh`], borrowed.
+/// A borrowed [`TracedMesh`].
 #[derive(Clone, Copy)]
 pub(super) struct TracedRef<'a> {
     pub(super) mesh: &'a Mesh,

@@ -82,7 +82,7 @@ fn build(mesh: &Mesh, options: &TreeOptions<'_>, monitor: &dyn Monitor) -> Resul
 /// The tree by which a mesh is compiled with these options.
 ///
 /// # Errors
-/// As [`bvh::build`].
+/// The errors of [`bvh::build`].
 pub fn build_tree(
     mesh: &Mesh,
     options: &CompileOptions,
@@ -92,7 +92,7 @@ pub fn build_tree(
 }
 
 /// Finds for each node of a tree the probability that a ray enters it; `None` where the node's area
-/// stands for that.
+/// is used instead.
 pub(super) struct CountVisits<'a> {
     pub(super) built: BuildTree<'a>,
     pub(super) tree: &'a BinaryBvh,

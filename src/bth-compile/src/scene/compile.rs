@@ -69,7 +69,7 @@ pub struct CachePolicy<'a> {
 /// Compiles a scene through the cache.
 ///
 /// # Errors
-/// As [`compile`]; `BTH-O002` when a source changes meanwhile.
+/// The errors of [`compile`]; `BTH-O002` when a source changes meanwhile.
 pub fn compile_cached(
     manifest: &Manifest,
     source: SceneSource<'_>,
@@ -143,7 +143,7 @@ fn warn_over_limit(objects: &[ObjectReport], options: &CompileOptions, monitor: 
 /// the number of objects in this part.
 ///
 /// # Errors
-/// As [`compile_cached`].
+/// The errors of [`compile_cached`].
 pub fn compile_objects(
     manifest: &Manifest,
     source: SceneSource<'_>,
@@ -316,7 +316,7 @@ fn check(objects: &Objects, parts: &SceneParts, content: &Content, name: &Path) 
     objects.write_rows(&mut rows_only)?;
     write::scene(&mut rows_only, parts)?;
     let first_frame = |bytes: &[u8]| bth::check_first_frame(&bth_format::File::from_bytes(bytes)?);
-    // The error is replaced by that of the whole file, so that offsets in messages are those of the
+    // Reports the error of the whole file instead, so that offsets in messages are offsets in the
     // whole file.
     let whole = |error| content.bytes().ok().and_then(|bytes| first_frame(&bytes).err()).unwrap_or(error);
     first_frame(&rows_only.finish()).map_err(|e| refused(name, &whole(e)))

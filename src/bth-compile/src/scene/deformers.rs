@@ -1,5 +1,5 @@
-//! The rows of deformers and skins, from a manifest, and whether they fit the objects that they
-//! deform.
+//! Makes the rows of deformers and skins from a manifest, and checks that they fit the objects that
+//! they deform.
 
 use crate::error::{Error, Place, Result};
 use crate::write::DeformerParts;
@@ -45,7 +45,7 @@ pub(super) fn encode(manifest: &Manifest, row_of: &[u32], objects: &[Option<u32>
 }
 
 /// Refuses deformers that do not fit their objects. `deformation` gives for an object of the file
-/// what can move its vertices; `name` is that of the scene in messages.
+/// what can move its vertices; `name` is the scene's name in messages.
 ///
 /// # Errors
 /// `BTH-I052`, with the node of the deformer.

@@ -7,7 +7,7 @@ use bth_format::layout as on_disk;
 use bth_format::layout::NONE;
 use bth_scene::{Lens, LightKind, Manifest, Track, Transform};
 
-/// The order of the nodes with parents before children: that of the manifest where it has this
+/// The order of the nodes with parents before children: the manifest's order where it has this
 /// property, else by depth.
 pub(super) fn order(manifest: &Manifest) -> Vec<usize> {
     let nodes = &manifest.nodes;
@@ -33,9 +33,9 @@ pub(super) fn order(manifest: &Manifest) -> Vec<usize> {
     order
 }
 
-/// Encodes the scene sections. `objects` gives the object of the file for each of the manifest,
-/// `None` for those that no instance uses; `visible` tells for each node whether it may be seen;
-/// instances at other nodes are left out.
+/// Encodes the scene sections. `objects` gives for each object of the manifest the object of the
+/// file, `None` for those that no instance uses. `visible` is true for each node that may be seen;
+/// instances at other nodes are skipped.
 ///
 /// # Errors
 /// `BTH-L050` beyond the limits of the format.
@@ -180,7 +180,7 @@ fn transform(transform: &Transform) -> ([f64; 12], u32) {
     }
 }
 
-/// Adds the tracks, but for those of weights of deformers that are left out.
+/// Adds the tracks. Skips weights of deformers that are not in the file.
 fn add_tracks(parts: &mut SceneParts, manifest: &Manifest, row_of: &[u32]) {
     let deformers = &parts.deformers.deformers;
     let deforms = |node: usize| deformers.binary_search_by_key(&row_of[node], |d| d.node).is_ok();

@@ -64,7 +64,7 @@ fn check(meshes: usize, instances: &[Instance]) -> Result<()> {
     Ok(())
 }
 
-/// The manifest of a scene in which each instance has a node of its own.
+/// The manifest of a scene in which each instance has a separate node.
 fn manifest(meshes: usize, instances: &[Instance]) -> Manifest {
     let object = |row| {
         let name = format!("mesh {row}");
@@ -85,7 +85,7 @@ fn manifest(meshes: usize, instances: &[Instance]) -> Manifest {
 }
 
 /// The plan of a manifest made by [`manifest`]. All instances count as visible: if one without size
-/// were left out, those behind it would be renumbered.
+/// were skipped, the ones behind it would be renumbered.
 fn plan<'a>(manifest: &'a Manifest, meshes: &[TriangleMesh<'a>], clock: &mut Clock) -> ScenePlan<'a> {
     let count = manifest.nodes.len();
     let mut used = vec![false; meshes.len()];

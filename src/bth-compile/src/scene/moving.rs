@@ -22,7 +22,7 @@ pub(super) struct Moving {
 /// not move by themselves.
 ///
 /// # Errors
-/// As [`mesh::sequence_files`].
+/// The errors of [`mesh::sequence_files`].
 pub(super) fn moving_files(source: &Source, folder: &Path) -> Result<Vec<PathBuf>> {
     match source {
         Source::Sequence { frames: SequenceFrames::Numbered(pattern), .. } => {
@@ -40,7 +40,7 @@ impl Moving {
     /// What moves the vertices of an object; `None` where nothing does.
     ///
     /// # Errors
-    /// As [`moving_files`].
+    /// The errors of [`moving_files`].
     pub(super) fn of(manifest: &Manifest, source: &Source, folder: &Path) -> Result<Option<Moving>> {
         let (is_cache, SequenceTiming { rate, start }) = match source {
             Source::Sequence { timing, .. } => (false, *timing),

@@ -23,7 +23,7 @@ const MEMORY_PER_TRIANGLE: u64 = 320;
 /// Bytes of memory that building an object takes in addition.
 const MEMORY_AT_LEAST: u64 = 4 << 20;
 
-/// An object with its sections, of which every index has been checked.
+/// An object with its sections. Every index in them has been checked.
 pub(super) struct BuiltObject {
     pub(super) file: bth_format::File,
     pub(super) record: ObjectRecord,

@@ -201,7 +201,7 @@ fn copy(objects: &mut Objects, places: &mut Places<'_>, manifest: &Manifest, fil
         hasher.update(b"compiled");
         for section in read.sections().filter(|s| s.entry.object == object) {
             hasher.update(&section.entry.kind.to_le_bytes()).update(&section.entry.stride.to_le_bytes());
-            // The hash is computed here; that of the section table is untrusted.
+            // Computes the hash: the one in the section table is untrusted.
             hasher.update(blake3::hash(section.bytes).as_bytes());
         }
         let number = *places.of_content.entry(hasher.finalize()).or_insert_with(|| {

@@ -68,8 +68,8 @@ pub(super) struct Places<'a> {
 }
 
 impl<'a> Places<'a> {
-    /// The place of a part: that of equal geometry, or a new one, which is filled from the previous
-    /// file or by a task.
+    /// The place of a part: the place of equal geometry, or a new one, which is filled from the
+    /// previous file or by a task.
     pub(super) fn of_part(&mut self, file: &'a File<'a>, part: Part, context: &Context<'_>) -> u32 {
         let (old, content) = find(&part, context);
         let free = match self.of_content.entry(content) {
@@ -93,8 +93,8 @@ impl<'a> Places<'a> {
         *free.insert(number as u32)
     }
 
-    /// The place for an object of the manifest whose part has a place: each deformer moves an
-    /// object of its own.
+    /// The place for an object of the manifest whose part has a place: each deformer moves a
+    /// separate object.
     pub(super) fn for_row(&mut self, part: SourcePart, number: u32) -> u32 {
         if !part.deforms() || self.deforming.insert(number) {
             return number;

@@ -13,9 +13,9 @@ use std::sync::Arc;
 pub(super) struct ScenePlan<'a> {
     /// Nodes with parents before children.
     pub(super) order: Vec<usize>,
-    /// For each node whether it may be visible.
+    /// For each node: true if it may be visible.
     pub(super) visible: Vec<bool>,
-    /// For each object of the manifest whether a visible node has an instance of it.
+    /// For each object of the manifest: true if a visible node has an instance of it.
     pub(super) used: Vec<bool>,
     /// The files of the used objects.
     pub(super) sources: Vec<sources::File<'a>>,

@@ -16,7 +16,7 @@ use zerocopy::FromBytes;
 /// Hash by which equal objects are found, and status of the worker.
 pub(super) type Made = (Hash, Option<WorkerStatus>);
 
-/// The sections of an object, of which every index has been checked.
+/// The sections of an object. Every index in them has been checked.
 #[derive(Clone)]
 pub(super) struct ObjectSections {
     /// Its OBJECT row.

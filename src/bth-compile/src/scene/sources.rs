@@ -81,7 +81,7 @@ impl SourcePart {
         }
     }
 
-    /// Returns true if its vertices can be moved, so that each deformer needs an object of its own.
+    /// Returns true if its vertices can be moved, so that each deformer needs a separate object.
     pub(super) fn deforms(self) -> bool {
         matches!(self, SourcePart::Gltf(GltfPart::Deforming { .. }) | SourcePart::Posed(..))
     }

@@ -2,7 +2,7 @@
 
 use bth_scene::{Manifest, Property, Track, Transform};
 
-/// For each node whether it, or what stands at it, may be visible. True for every node that some
+/// Decides for each node if it, or an instance at it, may be visible. True for every node that some
 /// frame shows; also true for some that no frame shows, when a node and its parent are visible at
 /// different times. Scales of zero do not hide an object with a skin, which the transform of its
 /// node does not move.

@@ -13,10 +13,10 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     write_atomically_with(path, |out| out.write_all(bytes))
 }
 
-/// As [`write_atomically`], for bytes that are not in memory at once.
+/// Does the same as [`write_atomically`] for bytes that are not in memory at once.
 ///
 /// # Errors
-/// As [`write_atomically`]; also when `write` fails.
+/// The errors of [`write_atomically`]; also when `write` fails.
 pub fn write_atomically_with(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
@@ -24,11 +24,11 @@ pub fn write_atomically_with(
     bth_files::replace(path, write).map_err(|e| cannot(path, &e))
 }
 
-/// As [`write_atomically`], for a content with pieces in other files, which the operating system
-/// copies.
+/// Does the same as [`write_atomically`] for a content with pieces in other files, which the
+/// operating system copies.
 ///
 /// # Errors
-/// As [`write_atomically`]; also when such a file cannot be read or has changed.
+/// The errors of [`write_atomically`]; also when such a file cannot be read or has changed.
 pub fn write_content(path: &Path, content: &Content) -> Result<()> {
     bth_files::replace_file(path, |file| content.write_to(file)).map_err(|e| cannot(path, &e))
 }

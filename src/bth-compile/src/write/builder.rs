@@ -59,11 +59,11 @@ impl<'a> FileBuilder<'a> {
         self.hashed_section(SectionHead { kind, object, stride, hash }, coordinates, Bytes::Owned(bytes))
     }
 
-    /// As [`Self::section`], for a section whose hash is known already. `coordinates` is that field
-    /// of the row, if it is an OBJECT section.
+    /// Adds a section whose hash is known already, like [`Self::section`]. `coordinates` is this
+    /// field of the row if it is an OBJECT section.
     ///
     /// # Errors
-    /// As [`Self::section`].
+    /// The errors of [`Self::section`].
     pub(crate) fn hashed_section(
         &mut self,
         SectionHead { kind, object, stride, hash }: SectionHead,
@@ -79,10 +79,10 @@ impl<'a> FileBuilder<'a> {
         }
     }
 
-    /// Adds a section of structures; one without elements is left out.
+    /// Adds a section of structures; skips one without elements.
     ///
     /// # Errors
-    /// As [`Self::section`].
+    /// The errors of [`Self::section`].
     pub fn rows<T: IntoBytes + zerocopy::Immutable>(
         &mut self,
         kind: u32,
@@ -98,7 +98,7 @@ impl<'a> FileBuilder<'a> {
     /// Adds the provenance, UTF-8 JSON that is no part of the content id. No times, no paths.
     ///
     /// # Errors
-    /// As [`Self::section`].
+    /// The errors of [`Self::section`].
     pub fn provenance(&mut self, json: String) -> Result<&mut Self> {
         self.section(kind::PROVENANCE, NONE, 1, json.into_bytes())
     }

@@ -148,8 +148,8 @@ impl Content {
         self.length
     }
 
-    /// The name of the content: the hash of the header, which contains that of the section table,
-    /// which contains those of the sections.
+    /// The name of the content: the hash of the header. The header contains the hash of the section
+    /// table, which contains the hashes of the sections.
     pub fn name(&self) -> Digest {
         let head = self.pieces.first().and_then(Bytes::in_memory).unwrap_or_default();
         name(head)
@@ -185,7 +185,7 @@ impl Content {
     /// All bytes in memory.
     ///
     /// # Errors
-    /// As [`Self::write_to`].
+    /// The errors of [`Self::write_to`].
     pub fn bytes(&self) -> Result<Cow<'_, [u8]>> {
         if let ([piece], 0) = (&self.pieces[..], self.pad)
             && let Some(bytes) = piece.in_memory()

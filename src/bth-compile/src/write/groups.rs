@@ -36,7 +36,7 @@ impl GroupParts {
         Self { groups: rows, runs, materials, labels: names.bytes }
     }
 
-    /// Adds the sections of an object; those without rows are left out.
+    /// Adds the sections of an object that have rows.
     pub(super) fn write<'a>(&'a self, builder: &mut FileBuilder<'a>, object: u32) -> Result<()> {
         builder.rows(kind::GROUPS, object, &self.groups)?;
         builder.rows(kind::GROUP_RUNS, object, &self.runs)?;

@@ -39,10 +39,10 @@ pub fn checked(file: bth_format::File) -> Result<bth_format::File> {
     Ok(file)
 }
 
-/// As [`checked`]; `deep` also makes the checks of `bthc verify`.
+/// Checks a file like [`checked`]; with `deep` also makes the checks of `bthc verify`.
 ///
 /// # Errors
-/// As [`checked`].
+/// The errors of [`checked`].
 pub fn self_check(bytes: &[u8], deep: bool) -> Result<()> {
     let file = checked(bth_format::File::from_bytes(bytes).map_err(defect)?)?;
     if deep {

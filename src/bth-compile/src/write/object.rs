@@ -42,14 +42,14 @@ pub struct ObjectParts<'a> {
     pub tet_faces: &'a [TetFace],
     /// Hull faces.
     pub hull_faces: &'a [HullFace],
-    /// Row of `tet_faces` per source triangle; left out without tet leaves.
+    /// Row of `tet_faces` per source triangle; not written without tet leaves.
     pub triangle_faces: &'a [u32],
     /// The place of each triangle in the leaves; empty if it is not kept.
     pub places: &'a [u32],
-    /// In which directions rays that start on each triangle meet nothing; empty where nothing is
+    /// In which directions rays that start on each triangle hit nothing; empty where nothing is
     /// known.
     pub free: &'a [FreeDirections],
-    /// Within which distances they meet nothing, in place of `free`.
+    /// Within which distances they hit nothing, instead of `free`.
     pub free_distances: &'a [FreeDistances],
     /// The levels of these distances, one row if there are any.
     pub free_levels: &'a [FreeLevels],
@@ -71,10 +71,10 @@ pub struct ObjectParts<'a> {
     pub source: Option<Source<'a>>,
 }
 
-/// Positions and attributes of the source; empty slices are left out.
+/// Positions and attributes of the source; empty slices are not written.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Source<'a> {
-    /// Welded positions; those of all vertices in deformable objects.
+    /// Welded positions; in deformable objects the positions of all vertices.
     pub positions: &'a [[f32; 3]],
     /// Rows of `positions` per triangle.
     pub triangles: &'a [[u32; 3]],
@@ -100,7 +100,7 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
         );
         return Err(Error::Limit { code: "BTH-L031", message });
     }
-    // Without tet leaves the sections of tetrahedra and faces are left out.
+    // Without tet leaves there are no sections of tetrahedra and faces.
     let record = parts.record.filter(|_| !parts.tet_leaves.is_empty());
     let (lower, upper) = parts.bounds.unwrap_or_default();
     let (coordinates, grid_origin) = parts.grid.map_or_else(Default::default, |(grid, _)| grid.fields());

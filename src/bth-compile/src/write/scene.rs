@@ -42,7 +42,7 @@ pub struct DeformerParts {
     pub weights: Vec<f64>,
 }
 
-/// Adds the sections of a scene; those without rows are left out.
+/// Adds the sections of a scene that have rows.
 ///
 /// # Errors
 /// `BTH-X031` when one exists already.

@@ -8,8 +8,8 @@ use std::path::Path;
 /// Bytes of the header; their hash is the name of the content.
 pub(crate) const HEADER: usize = size_of::<bth_format::layout::Header>();
 
-/// The name of a file's content: the hash of the header, which contains that of the section table,
-/// which contains those of the sections. The bytes between sections are zeros.
+/// The name of a file's content: the hash of the header. The header contains the hash of the
+/// section table, which contains the hashes of the sections. The bytes between sections are zeros.
 pub(crate) fn name(head: &[u8]) -> Digest {
     Digest::of(head.get(..HEADER).unwrap_or(head))
 }

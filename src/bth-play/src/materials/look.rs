@@ -138,7 +138,7 @@ impl SceneMaterials {
 }
 
 impl SceneMaterials {
-    /// The materials of all objects of a scene. An image that cannot be decoded is left out with a
+    /// Loads the materials of all objects of a scene. Skips an image that cannot be decoded, with a
     /// warning.
     pub(crate) fn load(scene: &Scene, file: &Path) -> Self {
         let images = decoded_images(scene, file);

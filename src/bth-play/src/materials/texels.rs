@@ -109,7 +109,7 @@ mod tests {
     }
 
     /// IEC 61966-2-1: 188 is about half the light; 0 and 255 are the ends; the two pieces of the
-    /// curve meet.
+    /// curve join.
     #[test]
     fn srgb_is_made_linear_by_its_definition() {
         assert_eq!((LINEAR[0], LINEAR[255]), (0.0, 1.0));

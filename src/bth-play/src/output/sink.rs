@@ -15,9 +15,9 @@ pub(crate) struct Pattern {
 }
 
 impl Pattern {
-    /// The pattern of a path: its last run of `#` stands for the number, padded with zeros to as
-    /// many digits. `None` for a path without `#`, and for one in a folder that is there and has
-    /// them in its name.
+    /// The pattern of a path: its last run of `#` is replaced by the number, padded with zeros to
+    /// the same number of digits. `None` for a path without `#`, and for one in a folder that is
+    /// there and has them in its name.
     pub(crate) fn new(path: &Path) -> Option<Self> {
         let text = path.to_str()?;
         let end = text.rfind('#')? + 1;
@@ -123,8 +123,8 @@ impl Sink {
         matches!(self, Sink::Stream(_))
     }
 
-    /// Returns true if each frame is a file of its own, so that frames can be skipped or rendered
-    /// on several machines.
+    /// Returns true if each frame is a separate file, so that frames can be skipped or rendered on
+    /// several machines.
     pub(crate) fn is_numbered(&self) -> bool {
         matches!(self, Sink::Numbered(_))
     }

@@ -1,11 +1,11 @@
 //! Motion blur: the times within an open shutter at which a frame is sampled, and which pixels are
-//! sampled at which of them.
+//! sampled at each of them.
 //!
-//! A frame is the mean of its samples, and each sample sees the scene at a time of its own. The
-//! scene is set to one of these times after the other; at each of them the tracks are evaluated,
-//! and the boxes of the top level bound what is there at that time. So every sample is exact for
-//! its time. The times of a pixel are stratified; pixels next to each other take different ones, so
-//! that motion becomes fine noise rather than a row of copies.
+//! A frame is the mean of its samples, and each sample sees the scene at one time. The scene is set
+//! to one of these times after the other; at each of them the tracks are evaluated, and the boxes
+//! of the top level bound what is there at that time. So every sample is exact for its time. The
+//! times of a pixel are stratified; pixels next to each other take different ones, so that motion
+//! becomes fine noise rather than a row of copies.
 
 use bth_random::mix;
 use std::ops::Range;
@@ -26,8 +26,8 @@ pub(crate) struct Shutter {
     samples: u32,
     /// Number of times in each stratum. Each pixel takes one of them.
     slots: u32,
-    /// For each sample its stratum. Every so many samples from the first on are spread over the
-    /// whole of the open time, which serves pictures that are refined over time.
+    /// For each sample its stratum. The first samples of a pixel, however few, are spread over the
+    /// whole of the open time, for pictures that are refined over time.
     strata: Vec<u32>,
 }
 
@@ -95,8 +95,8 @@ impl Exposure {
     pub(crate) fn takes(&self, (x, y): (u32, u32)) -> bool {
         let (slot, slots) = self.slot;
         let pixel = (u64::from(y) << 32) | u64::from(x);
-        // Another constant than those of sample points, whose rotations would otherwise go with the
-        // times.
+        // The constant differs from the one of sample points, whose rotations would otherwise go
+        // with the times.
         slots == 1
             || mix(mix(pixel ^ 0x7368_7574_7465_7200) ^ u64::from(self.samples.start)) % u64::from(slots)
                 == u64::from(slot)

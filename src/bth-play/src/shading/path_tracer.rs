@@ -70,7 +70,7 @@ pub(super) fn shade(
     colors
 }
 
-/// What the paths of a batch meet after the bounce of a number.
+/// Traces the paths of a batch after bounce `number`. Returns their hits.
 fn trace(frame: &FrameContext<'_>, paths: &[PathState], samples: &[Sample], number: u32) -> Vec<Hit> {
     let ray = |path: &PathState| path.start.ray(path.direction.as_vec3().to_array());
     let rays: Vec<StartRay> = paths.iter().map(ray).collect();
@@ -80,7 +80,7 @@ fn trace(frame: &FrameContext<'_>, paths: &[PathState], samples: &[Sample], numb
     hits
 }
 
-/// What the paths of a batch meet at once.
+/// The work of one bounce of a batch.
 struct Bounce<'a> {
     frame: &'a FrameContext<'a>,
     lights: &'a Lights<'a>,
@@ -99,7 +99,7 @@ impl<'a> Bounce<'a> {
         Self { frame, lights, samples, number, shadow_rays, contributions, next: Vec::new() }
     }
 
-    /// Adds the shadow rays and the next ray of a path that meets a surface. Returns the radiance
+    /// Adds the shadow rays and the next ray of a path that hits a surface. Returns the radiance
     /// that it finds there, or in the surroundings.
     fn meet(&mut self, path: &PathState, hit: &Hit) -> Vec3 {
         let Self { frame, lights, number, .. } = *self;
@@ -164,7 +164,7 @@ fn share(chosen: Option<f64>, other: f64) -> f32 {
     }
 }
 
-/// How a path meets a surface.
+/// How a path hits a surface.
 struct Surface {
     /// Radiance, towards wherever the path comes from.
     emitted: Vec3,

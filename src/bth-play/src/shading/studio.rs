@@ -189,7 +189,7 @@ impl Studio {
     }
 
     /// The light that falls on a point of the model; `key` is the visible share of the key light,
-    /// `open` that of the hemisphere.
+    /// `open` the visible share of the hemisphere.
     fn light(&self, point: &ShadingPoint, key: f32, open: f32) -> Vec3 {
         let facing = |towards: DVec3| point.normal.dot(towards).max(0.0) as f32;
         let height = (point.normal.dot(self.vertical) * 0.5 + 0.5) as f32;
@@ -198,14 +198,14 @@ impl Studio {
     }
 
     /// A weak specular term (Blinn), which shows curvature in the lit parts of clay; `direction` is
-    /// that of the camera ray.
+    /// the direction of the camera ray.
     fn gloss(&self, point: &ShadingPoint, direction: DVec3, key: f32) -> Vec3 {
         let half = (point.to_key - direction).normalize_or(point.normal);
         let facing = point.normal.dot(half).max(0.0) as f32;
         KEY * (0.06 * facing.powi(24) * key)
     }
 
-    /// Where the camera ray meets the ground, and how much of the shadow there shows.
+    /// Where the camera ray hits the ground, and how much of the shadow there shows.
     fn on_ground(&self, frame: &FrameContext<'_>, sample: &Sample) -> Option<(DVec3, f64)> {
         let height = self.ground?;
         let eye = sample.ray.origin;

@@ -20,7 +20,7 @@ pub(super) fn normals(frame: &FrameContext<'_>, samples: &[Sample], hits: &[Hit]
     samples.iter().zip(hits).map(color).collect()
 }
 
-/// Each instance in a colour of its own, darker where the surface turns away from the camera.
+/// Each instance in a different colour, darker where the surface turns away from the camera.
 pub(super) fn instances(frame: &FrameContext<'_>, samples: &[Sample], hits: &[Hit]) -> Vec<Vec3> {
     let color = |(sample, hit): (&Sample, &Hit)| {
         if !hit.is_hit() {
@@ -44,7 +44,7 @@ pub(super) fn instance_color(number: u32) -> Vec3 {
 
 /// Ambient-occlusion rays per sample.
 const RAYS: u32 = 4;
-/// Dark enough that open surfaces, which are white, stand out.
+/// Dark enough to contrast with open surfaces, which are white.
 const BACKGROUND: Vec3 = Vec3::splat(0.14);
 
 /// Returns the share of the hemisphere above each hit that is open, as grey.

@@ -49,21 +49,21 @@ impl Playback {
     }
 
     /// While playing, goes to the frame of a time, in a loop; frames are skipped where they come
-    /// faster than they are shown. Returns whether the frame changed.
+    /// faster than they are shown. Returns true if the frame changed.
     pub(crate) fn advance(&mut self, now: Duration) -> bool {
         let Some((since, from)) = self.playing else { return false };
         let elapsed_frames = (now.saturating_sub(since).as_secs_f64() * self.rate) as i64;
         self.set(i64::from(from) + elapsed_frames)
     }
 
-    /// Pauses, and goes forward or back by a number of frames, in a loop. Returns whether the frame
+    /// Pauses, and goes forward or back by a number of frames, in a loop. Returns true if the frame
     /// changed.
     pub(crate) fn step(&mut self, by: i32) -> bool {
         self.playing = None;
         self.set(i64::from(self.frame) + i64::from(by))
     }
 
-    /// Pauses at a fraction of the whole, from 0 to 1. Returns whether the frame changed.
+    /// Pauses at a fraction of the whole, from 0 to 1. Returns true if the frame changed.
     pub(crate) fn scrub(&mut self, part: f64) -> bool {
         self.playing = None;
         let frames = f64::from(self.last) - f64::from(self.first) + 1.0;

@@ -113,7 +113,7 @@ impl ProgressiveRenderer {
         (self.passes, self.slots, self.tiles, self.spent) = (0, 0, 0, Duration::ZERO);
     }
 
-    /// Returns true if every pixel of the fine picture has so many samples.
+    /// Returns true if every pixel of the fine picture has at least `samples` samples.
     pub(super) fn is_done(&self, samples: u32) -> bool {
         self.block == 1 && self.passes >= samples
     }

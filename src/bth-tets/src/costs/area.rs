@@ -1,15 +1,15 @@
 //! Steps through a tetrahedralization from the area of its faces alone, after Cauchy and Crofton.
 //!
-//! A uniform line that meets a convex body of surface S meets a surface of area A within it 2A/S
+//! A uniform line that hits a convex body of surface S hits a surface of area A within it 2A/S
 //! times on average. For a node's box and the input's triangles in it, of area A_c, that is λ =
 //! 2A_c/S hits; for the other faces between tetrahedra, of area A_f, it is F = 2A_f/S crossings. A
-//! line with n hits consists of n + 1 gaps, in each of which it visits one tetrahedron more than it
+//! line with n hits consists of n + 1 gaps. In each gap it visits one tetrahedron more than it
 //! crosses faces: all gaps of a line together have F + 1 + λ tetrahedra on average.
 //!
-//! A ray is a gap with a direction. Each gap is two rays, of which those that begin at the box are
-//! rays from outside (two a line, N_out steps each on average) and those that begin at a hit are
-//! rays from a surface: 2λ a line, N_surf steps each. Directions at a surface have the density of
-//! uniform lines, which is cosine-weighted. So
+//! A ray is a gap with a direction. Each gap is two rays. Rays that begin at the box are rays from
+//! outside (two a line, N_out steps each on average). Rays that begin at a hit are rays from a
+//! surface: 2λ a line, N_surf steps each. Directions at a surface have the density of uniform
+//! lines, which is cosine-weighted. So
 //!
 //! ```text
 //! N_out + λ N_surf = 1 + λ + F
@@ -22,7 +22,7 @@ use super::Start;
 use crate::{Behind, TetMesh};
 use bth_bvh::vectors::double_area;
 
-/// r: steps of a ray from outside over those of a ray from a surface, fitted to sampled steps.
+/// r: steps of a ray from outside over steps of a ray from a surface, fitted to sampled steps.
 const OUTSIDE_OVER_SURFACE: f64 = 1.3;
 
 /// The estimate of N_avg.

@@ -40,7 +40,7 @@ impl Candidates<'_> {
         if gain(&packed) > gain(&priced) { packed } else { priced }
     }
 
-    /// The selection at the least prices for which it is within all limits, by bisection.
+    /// Finds by bisection the smallest prices whose selection is within all limits.
     fn priced(&self, over: impl Fn(&[usize], usize) -> bool) -> Vec<usize> {
         let mut prices = [0.0; 2];
         let mut best = self.selection(prices);
@@ -193,7 +193,7 @@ mod tests {
             // Rounding up adds at most one step for each node.
             let less = limit * (1.0 - nodes.len() as f64 / ONE_STEPS as f64);
             prop_assert!(gain(&limited) >= by_trying(&c, [Some(less), None]) - 1e-9);
-            // Limits that all candidates together meet do not change the selection.
+            // Limits that all candidates together keep do not change the selection.
             let all: f64 = takes.iter().map(|t| t[0]).sum();
             prop_assert_eq!(c.best([Some(all), None]), free);
         }

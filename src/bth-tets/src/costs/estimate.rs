@@ -45,7 +45,7 @@ impl Estimator {
     /// A tetrahedron at distance r from the surface has the size of the octree's cell there, which
     /// is about r but at least the mesh width h. A ray crosses ∫ ds / max(h, r(s)) of them, which
     /// is proportional to the logarithm of L/h for a box of size L: a constant number for each
-    /// level of the octree, of which there are log2(L/h).
+    /// level of the octree, log2(L/h) levels in all.
     ///
     /// - *Face count*: n triangles on a surface of about L² have h = L n^(-1/2), which makes
     ///   log2(L/h) = log2(n) / 2 levels.
@@ -54,7 +54,7 @@ impl Estimator {
     ///   an uneven one, and under a poor tree, the depth is larger.
     ///
     /// Without free-space points the tetrahedra in front of a fine mesh are long slivers and the
-    /// steps more than twice as many (69 on the bunny); that case is not estimated.
+    /// number of steps more than doubles (69 on the bunny); that case is not estimated.
     ///
     /// Both assume the even spread of a scan; large flat faces next to fine detail are outside of
     /// what they were fitted to.

@@ -15,7 +15,7 @@ use bth_import::Mesh;
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// Steps of a ray as short as those for ambient occlusion, as a share of those of a bounce: 19 of
+/// Steps of a short ray, such as for ambient occlusion, as a share of the steps of a bounce: 19 of
 /// 32 on the bunny.
 const SHORT_STEPS: f64 = 0.6;
 /// Triangles for each ray of a kind, and the min and max number of rays of a kind.
@@ -104,7 +104,7 @@ impl Sampled {
     }
 
     /// The gains of these nodes, which are ascending; `depths` are the sums of the depths of their
-    /// leaves. `weights` are those of rays from outside and from surfaces.
+    /// leaves. `weights` are the weights of rays from outside and from surfaces.
     pub(super) fn gains(
         &self,
         bvh: &BinaryBvh,

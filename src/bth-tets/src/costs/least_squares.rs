@@ -1,7 +1,8 @@
-//! Fits constants to measurements by linear least squares.
+//! Fits constants to measurements by linear regression.
 
-/// The coefficients of least squared *relative* error. Each of `rows` has the terms and the value
-/// that their weighted sum should have. `None` if the terms do not determine the coefficients.
+/// The coefficients with the smallest sum of squared *relative* errors. Each of `rows` has the
+/// terms and the value that their weighted sum should have. `None` if the terms do not determine
+/// the coefficients.
 pub fn fit<const N: usize>(rows: &[([f64; N], f64)]) -> Option<[f64; N]> {
     let mut system = [[0.0; N]; N];
     let mut right = [0.0; N];

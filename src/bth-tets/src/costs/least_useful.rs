@@ -1,4 +1,4 @@
-//! Selection of the nodes to leave out when a limit is exceeded.
+//! Selects the nodes to drop when a limit is exceeded.
 
 /// The gain of a chosen node and its share of a limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -9,9 +9,9 @@ pub struct Weighed {
     pub takes: f64,
 }
 
-/// The rows to drop so that at least `over` bytes or seconds are freed: those of min gain per unit,
-/// without any row that the others make unnecessary. Ascending; all rows if together they take less
-/// than `over`.
+/// The rows to drop so that at least `over` bytes or seconds are freed: the rows of min gain per
+/// unit, without any row that the others make unnecessary. Ascending; all rows if together they
+/// take less than `over`.
 pub fn least_useful(items: &[Weighed], over: f64) -> Vec<usize> {
     let mut order: Vec<usize> = (0..items.len()).collect();
     let worth = |k: &usize| items[*k].gain / items[*k].takes;

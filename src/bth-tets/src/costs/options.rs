@@ -16,7 +16,7 @@ pub enum Select {
     /// The paper's rule (§3.2): from the root down, the first nodes whose tetrahedra are the
     /// cheaper for rays from outside.
     Paper,
-    /// These nodes of the binary BVH, of which none lies below another. For measurements.
+    /// These nodes of the binary BVH, none below another. For measurements.
     Nodes(Vec<u32>),
 }
 
@@ -56,8 +56,8 @@ pub enum Probe {
     Off,
 }
 
-/// Costs of the structures, and limits on the nodes that are considered. Times are those of one ray
-/// on one thread.
+/// Costs of the structures, and limits on the nodes that are considered. Times are per ray on one
+/// thread.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CostOptions {
     /// How nodes are selected.
@@ -87,10 +87,10 @@ pub struct CostOptions {
     pub budget: Option<f64>,
     /// The criterion by which tetrahedra stay after they are built.
     pub probe: Probe,
-    /// For objects of a scene: whether the rays of its cameras, lights and frames weight the nodes.
+    /// For objects of a scene: true if the rays of its cameras, lights and frames weight the nodes.
     pub for_scene: bool,
-    /// Rays that weight the nodes of the object, those of the BVH beside and those of tetrahedra
-    /// instead of sampled ones. Cache keys contain their hash.
+    /// Rays that weight the nodes of the object: in addition to sampled ones for the BVH, instead
+    /// of sampled ones for tetrahedra. Cache keys contain their hash.
     #[serde(serialize_with = "rays_by_hash")]
     pub rays: Option<Arc<KnownRays>>,
 }
@@ -183,7 +183,7 @@ pub struct Verdict {
     /// True if these triangles are free of bad contacts.
     pub suitable: bool,
     /// Estimated cost with the node's tetrahedralization, nanoseconds for each ray that may use it:
-    /// by the paper's rule a ray that meets the node's box, else a ray that starts on one of its
+    /// by the paper's rule a ray that hits the node's box, else a ray that starts on one of its
     /// triangles.
     pub cost_tet: f64,
     /// Estimated cost of the same ray with the node's BVH.

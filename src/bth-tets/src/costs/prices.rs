@@ -8,7 +8,7 @@ use bth_format::layout::{HullFace, RecordKind, TetFace, TetLeaf, TetVertex};
 /// scans.
 const TETS_PER_TRIANGLE: f64 = 3.35;
 const VERTICES_PER_TRIANGLE: f64 = 0.85;
-/// Assumed share of the lines through a node's box that meet a triangle: the share of a ball in its
+/// Assumed share of the lines through a node's box that hit a triangle: the share of a ball in its
 /// bounding cube.
 pub(super) const LINES_THAT_HIT: f64 = 0.52;
 

@@ -35,7 +35,7 @@ pub struct BvhCosts {
     /// Fixed cost of a ray, apart from nodes and leaves.
     pub ray: f64,
     /// An entered node of the *binary* BVH, for rays from outside: C_t and C_i of the paper. A
-    /// visit of a wide node or leaf stands for several of these.
+    /// visit of a wide node or leaf counts as several of these.
     pub outside: f64,
     /// An entered node of the binary BVH, for rays from surfaces.
     pub surface: f64,

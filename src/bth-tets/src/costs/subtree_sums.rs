@@ -19,7 +19,7 @@ pub(super) struct Sums {
 /// with a node all nodes above it.
 pub(super) fn depths(bvh: &BinaryBvh, top: &[u32], nodes: &[u32]) -> Vec<u64> {
     // A leaf is as deep below a node as there are inner nodes above it, so each inner node adds its
-    // leaves. In preorder the nodes of a subtree are a range, which those of `top` divide into
+    // leaves. In preorder the nodes of a subtree are a range, which the nodes of `top` divide into
     // parts.
     let end = |k: usize| top.get(k + 1).map_or(bvh.nodes.len(), |next| *next as usize);
     let inner = |part: &[Node]| part.iter().filter(|n| !n.is_leaf()).map(|n| u64::from(n.count)).sum();

@@ -73,7 +73,7 @@ impl<'a> TetWalker<'a> {
         Some(self.go(ray, tet, k))
     }
 
-    /// The tetrahedron and hull face at which a ray from outside enters: the nearest that it meets.
+    /// The tetrahedron and hull face at which a ray from outside enters: the nearest that it hits.
     fn entry(&self, ray: &SampleRay) -> Option<(u32, usize)> {
         let mut best: Option<(f64, (u32, usize))> = None;
         for &(tet, k) in &self.hull {
@@ -116,7 +116,7 @@ impl<'a> TetWalker<'a> {
     }
 }
 
-/// Mean steps of the rays that meet the box; `None` if none does.
+/// Mean steps of the rays that hit the box; `None` if no ray does.
 pub fn mean_steps(mesh: &TetMesh, rays: &[SampleRay]) -> Option<f64> {
     let walker = TetWalker::new(mesh);
     let steps: Vec<u32> = rays.iter().filter_map(|ray| walker.walk(ray)).map(|w| w.steps).collect();

@@ -58,8 +58,8 @@ impl<'a> Gathered<'a> {
         Self { bvh, triangles }
     }
 
-    /// Tests the triangles of one node against those of another, on this thread. `found` is called
-    /// with the rows in `order` of each bad pair and returns true to go on.
+    /// Tests the triangles of one node against the triangles of another, on this thread. `found` is
+    /// called with the rows in `order` of each bad pair and returns true to go on.
     pub(super) fn collide(
         &self,
         left: u32,
@@ -94,7 +94,7 @@ impl<'a> Gathered<'a> {
         Ok(contacts)
     }
 
-    /// As [`Gathered::collide`], on several threads when the nodes are large. The counts do not
+    /// Runs [`Gathered::collide`] on several threads when the nodes are large. The counts do not
     /// depend on the number of threads, even when a bad contact stops the traversal.
     pub(super) fn collide_in_parallel(
         &self,

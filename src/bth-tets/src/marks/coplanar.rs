@@ -45,8 +45,8 @@ impl Projection {
     }
 }
 
-/// Returns true if a closed segment meets a closed triangle of non-zero area that lies in the same
-/// plane.
+/// Returns true if a closed segment touches a closed triangle of non-zero area that lies in the
+/// same plane.
 pub(super) fn segment_meets_coplanar_triangle(p: Point, q: Point, triangle: [Point; 3]) -> bool {
     let Some((projection, area)) = Projection::of(triangle) else { return false };
     let edges = [(0, 1), (1, 2), (2, 0)];

@@ -214,7 +214,7 @@ mod tests {
 
     #[test]
     fn marks_equal_all_pairs_in_every_node() {
-        // A few large patches and thousands of small ones, of which many nodes are suitable.
+        // A few large patches and thousands of small ones. Many of their nodes are suitable.
         let large = (0..60).map(|seed| patch(seed, 30 + seed as usize * 2));
         let small = (60..3000).map(|seed| patch(seed, 4 + seed as usize % 14));
         for (seed, mesh) in large.chain(small).enumerate() {

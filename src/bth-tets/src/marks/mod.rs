@@ -30,6 +30,6 @@ type Point = [f32; 3];
 /// Result of the marking stage.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Marks {
-    /// Per node of the binary BVH: whether no two of its triangles are in bad contact.
+    /// Per node of the binary BVH: true if no two of its triangles are in bad contact.
     pub suitable: Vec<bool>,
 }

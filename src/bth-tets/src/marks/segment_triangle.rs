@@ -18,9 +18,9 @@ pub(super) fn same_strict_sign(x: f64, y: f64) -> bool {
     (x > 0.0 && y > 0.0) || (x < 0.0 && y < 0.0)
 }
 
-/// Returns true if the closed segment `p`, `q` meets the closed triangle, which has a non-zero
-/// area.
-/// `side_p` and `side_q` are the signs of `orient3d(triangle, p)` and `orient3d(triangle, q)`.
+/// Returns true if the closed segment `p`, `q` touches the closed triangle, which has a non-zero
+/// area. `side_p` and `side_q` are the signs of `orient3d(triangle, p)` and
+/// `orient3d(triangle, q)`.
 pub(super) fn segment_meets_triangle(
     p: Point,
     q: Point,
@@ -34,7 +34,7 @@ pub(super) fn segment_meets_triangle(
     if side_p == 0.0 && side_q == 0.0 {
         return segment_meets_coplanar_triangle(p, q, triangle);
     }
-    // The line through p and q meets the plane in one point, which lies on the segment; that point
+    // The line through p and q hits the plane in one point, which lies on the segment; that point
     // is in the triangle unless the line passes on different sides of two edges.
     let [a, b, c] = triangle;
     let u = orient3d(p, q, a, b);

@@ -50,7 +50,7 @@ fn from_corner(c: [Point; 3], first: u32) -> [Point; 3] {
     [c[i], c[(i + 1) % 3], c[(i + 2) % 3]]
 }
 
-/// Triangles without a common vertex: if they meet, an edge of one meets the other.
+/// Triangles without a common vertex: if they touch, an edge of one touches the other.
 fn disjoint_meet(a: [Point; 3], b: [Point; 3]) -> bool {
     let side_of = |t: [Point; 3], p: Point| orient3d(t[0], t[1], t[2], p);
     let b_sides = [side_of(a, b[0]), side_of(a, b[1]), side_of(a, b[2])];

@@ -37,7 +37,7 @@ pub fn build(
 /// Builds like [`build`], with every node run by `runner`.
 ///
 /// # Errors
-/// As [`build`].
+/// The errors of [`build`].
 pub fn build_through(
     mesh: &Mesh,
     bvh: &BinaryBvh,
@@ -226,7 +226,7 @@ struct Queue {
 struct State {
     /// Size and node.
     waiting: BinaryHeap<(u32, u32)>,
-    /// Nodes in work, each of which may add smaller ones when it fails.
+    /// Nodes in work. Each may add smaller ones when it fails.
     running: usize,
     stopped: bool,
 }

@@ -1,5 +1,4 @@
-//! Matches the faces of tetrahedra: finds for every face the sides of the tetrahedra that meet in
-//! it.
+//! Matches the faces of tetrahedra: finds for every face the sides of the tetrahedra that share it.
 
 /// Marks the absence of a side.
 pub(super) const NONE: u32 = u32::MAX;

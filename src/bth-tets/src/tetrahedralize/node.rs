@@ -82,8 +82,8 @@ struct Attempt {
     seed: u64,
     /// True if TetGen is given coordinates relative to the box.
     local: bool,
-    /// As [`TetOptions::inflation`]: TetGen takes points that nearly touch the box for coplanar
-    /// with it.
+    /// [`TetOptions::inflation`] for this attempt: TetGen takes points that nearly touch the box
+    /// for coplanar with it.
     inflation: f32,
 }
 

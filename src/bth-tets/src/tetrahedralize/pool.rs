@@ -44,7 +44,7 @@ pub(super) fn find(options: &TetOptions) -> std::result::Result<PathBuf, String>
 }
 
 /// The worker program that compilations will use, and the version of TetGen in it; or a sentence
-/// that says why there is none.
+/// that says why there is no worker.
 ///
 /// # Errors
 /// Cancelled.
@@ -87,10 +87,10 @@ impl<'a> WorkerSlot<'a> {
         Self { setup, worker: None, started: 0 }
     }
 
-    /// The version of TetGen; starts a worker if there is none.
+    /// The version of TetGen. Starts a worker if none runs.
     ///
     /// # Errors
-    /// As [`Worker::start`].
+    /// The errors of [`Worker::start`].
     pub(super) fn tetgen(
         &mut self,
         monitor: &dyn Monitor,
@@ -110,7 +110,7 @@ impl<'a> WorkerSlot<'a> {
     /// Sends a request to the worker, which is dropped after any failure.
     ///
     /// # Errors
-    /// As [`Worker::ask`].
+    /// The errors of [`Worker::ask`].
     pub(super) fn ask(
         &mut self,
         request: &Request,

@@ -55,8 +55,8 @@ impl Worker {
         };
         let mut command = Command::new(&setup.program);
         command.args(["--memory", &setup.memory.to_string(), "--parent", &std::process::id().to_string()]);
-        // TetGen opens no files here; a version that did would leave them in the folder for
-        // temporary files, not in the user's. Where there is none, it must not keep the worker from
+        // TetGen opens no files here; a version that did would write them in the folder for
+        // temporary files, not in the user's. A missing folder must not keep the worker from
         // starting.
         let folder = std::env::temp_dir();
         if folder.is_dir() {

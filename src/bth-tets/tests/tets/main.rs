@@ -13,7 +13,7 @@ use std::path::PathBuf;
 
 use bth_tets::TetOptions;
 
-/// TetOptions with the worker that was built beside these tests.
+/// TetOptions with the worker that was built with these tests.
 fn with_worker(test: &str) -> Option<TetOptions> {
     let named = std::env::var_os("BTH_TETGEN").map(PathBuf::from);
     let beside = || {

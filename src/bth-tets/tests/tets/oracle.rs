@@ -88,7 +88,7 @@ fn assert_is_hull(tets: &TetMesh, face: &[u32; 3], side: Side) {
 }
 
 /// The two tetrahedra of a face lie on opposite sides of it and refer to each other or to the same
-/// constrained face. Returns whether the face is constrained.
+/// constrained face. Returns true if the face is constrained.
 fn assert_separates(tets: &TetMesh, face: &[u32; 3], a: Side, b: Side) -> bool {
     let [p, q, r] = face.map(|v| position(tets, v));
     let is_positive = |side| orientation(p, q, r, apex(tets, side)) > 0.0;

@@ -33,8 +33,8 @@ pub(crate) fn decode<T: Codec>(bytes: &[u8]) -> Option<T> {
     rows.is_empty().then_some(value)
 }
 
-/// Encodes structures by their fields, all of which have to be named. What does not pass the check
-/// is not decoded.
+/// Encodes structures by their fields; all must be named. Decoding returns `None` if the check
+/// fails.
 macro_rules! by_fields {
     ($($type:ident { $($field:ident),* } $check:expr;)*) => {
         $(impl $crate::cached::Codec for $type {

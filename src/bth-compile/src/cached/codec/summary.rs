@@ -1,4 +1,4 @@
-//! Report and hashes of a mesh, which tell the stages that follow whether their inputs are the
+//! Encodes report and hashes of a mesh. By these the stages that follow see if their inputs are the
 //! same.
 
 use super::super::rows::{HashedRows, Sink};

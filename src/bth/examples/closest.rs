@@ -1,5 +1,5 @@
-//! Closest points of many points, with the time they take: `closest SCENE.bth POINTS.f32 [RESULTS.f32]`. Points are x, y and z as
-//! little-endian f32; results are the distances.
+//! Closest points of many points, with the time they take: `closest SCENE.bth POINTS.f32
+//! [RESULTS.f32]`. Points are x, y and z as little-endian f32; results are the distances.
 
 #![allow(clippy::print_stdout)]
 

@@ -1,4 +1,5 @@
-//! Times of the queries for several hits and with conditions, beside the nearest hit and any hit, one ray a call.
+//! Times of the queries for several hits and with conditions, compared with the nearest hit and any
+//! hit, one ray a call.
 //!
 //!     cargo run --release -p bth --example hits -- MODEL.bth…
 #![allow(clippy::print_stdout)]
@@ -27,7 +28,7 @@ fn rays(scene: &Scene, count: usize) -> Vec<Ray> {
     (0..count).map(|_| ray()).collect()
 }
 
-/// Nanoseconds a ray, the least of several rounds, and a sum of results.
+/// Nanoseconds a ray in the fastest of several rounds, and a sum of results.
 fn time(rays: &[Ray], mut query: impl FnMut(&Ray) -> usize) -> (f64, usize) {
     let round = |query: &mut dyn FnMut(&Ray) -> usize| {
         let start = Instant::now();

@@ -1,6 +1,8 @@
-//! Traces the same rays again and again, and nothing else, for tools that count what tracing does, such as cache simulators:
-//! `repeat SCENE.bth camera|diffuse|ao RAYS TIMES`. Camera rays come from a side of the scene's bounds in tiles of 32 by 32; the others
-//! start where camera rays hit, in random directions, and those of `ao` end at a twentieth of the diagonal. Prints the number of rays.
+//! Traces the same rays again and again, and nothing else, for tools that count what tracing does,
+//! such as cache simulators: `repeat SCENE.bth camera|diffuse|ao RAYS TIMES`. Camera rays come from
+//! a side of the scene's bounds in tiles of 32 by 32; the others start where camera rays hit, in
+//! random directions, and `ao` rays end at a twentieth of the diagonal. Prints the number of
+//! rays.
 
 #![allow(clippy::print_stdout)]
 
@@ -26,7 +28,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Traces rays so many times. Returns their number.
+/// Traces the rays `times` times. Returns the number of traced rays.
 fn repeat<R: bth::TraceRay>(scene: &bth::Scene, rays: &[R], any: bool, times: usize) -> usize {
     let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
     for _ in 0..times {
@@ -69,7 +71,8 @@ fn camera_rays(scene: &bth::Scene, count: usize) -> Option<Vec<Ray>> {
     Some(rays)
 }
 
-/// For each of the rays that hits, one of length `reach` from there, on the side from which it came.
+/// For each of the rays that hits, one of length `reach` from there, on the side from which it
+/// came.
 fn bounces(scene: &bth::Scene, rays: &[Ray], reach: f32) -> Vec<StartRay> {
     let mut hits = vec![Hit::MISS; rays.len()];
     scene.batch(rays).nearest(&mut hits);

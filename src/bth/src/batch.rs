@@ -22,7 +22,8 @@ use crate::trace_ray::TraceRay;
 /// scene.batch(&rays).nearest(&mut hits);
 ///
 /// // The next rays start where these hit: they need no offset and do not hit what they leave.
-/// let onward: Vec<StartRay> = hits.iter().map(|hit| StartRay::from_hit(hit, [0.0, 1.0, 0.0])).collect();
+/// let up = [0.0, 1.0, 0.0];
+/// let onward: Vec<StartRay> = hits.iter().map(|hit| StartRay::from_hit(hit, up)).collect();
 /// let mut blocked = vec![false; rays.len()];
 /// scene.batch(&onward).any(&mut blocked);
 /// # Ok::<(), bth::Error>(())

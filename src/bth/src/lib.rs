@@ -1,4 +1,5 @@
-//! Runtime of BTH files: opens compiled files and traces rays through them, without copying or converting their sections.
+//! Runtime of BTH files: opens compiled files and traces rays through them, without copying or
+//! converting their sections.
 //!
 //! ```no_run
 //! use bth::rays::Ray;
@@ -11,9 +12,11 @@
 //! # Ok::<(), bth::Error>(())
 //! ```
 #![warn(missing_docs)]
-// Kernels loop over lanes by index: iterators and closures could be compiled as functions without the kernel's instruction set.
+// Kernels loop over lanes by index: iterators and closures could be compiled as functions without
+// the kernel's instruction set.
 #![allow(clippy::needless_range_loop)]
-// What zerocopy tells about bytes that do not fit says less than the message, and its texts would be part of every program.
+// What zerocopy tells about bytes that do not fit says less than the message, and its texts would
+// be part of every program.
 #![allow(clippy::ok_expect)]
 
 mod animation;

@@ -1,4 +1,4 @@
-//! The objects of a scene: all of one file, or those of several. Some may have been given new
+//! The objects of a scene: all objects of one file, or of several files. Some may have new
 //! positions.
 
 use crate::clock;
@@ -70,12 +70,13 @@ impl Objects {
         Objects { files: Files::One(file), own_positions: Vec::new() }
     }
 
-    /// No objects yet; those of several files can be added.
+    /// An empty table, to which the objects of several files can be added.
     pub(crate) fn of_several_files() -> Objects {
         Objects { files: Files::Several(ObjectTable::default()), own_positions: Vec::new() }
     }
 
-    /// Adds the objects of another scene, as their files have them, to those of several files.
+    /// Adds the objects of another scene, with the positions in their files, to a table of several
+    /// files.
     pub(crate) fn add(&mut self, other: &Objects) {
         if let Files::Several(table) = &mut self.files {
             table.add(&other.files);
@@ -135,7 +136,7 @@ impl Objects {
         file.view(object).ok()
     }
 
-    /// Returns true if the object has positions of its own.
+    /// Returns true if the object has been given positions that differ from its file.
     fn has_own_positions(&self, object: u32) -> bool {
         self.own_positions.get(object as usize).is_some_and(Option::is_some)
     }

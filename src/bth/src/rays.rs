@@ -1,5 +1,5 @@
 //! Rays, hits and the triangles of instances, as they are passed to and returned from queries. The
-//! types have the layout of those of the C interface (`bth.h`).
+//! types have the same layout as in the C interface (`bth.h`).
 
 use bth_format::layout::NONE;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
@@ -54,12 +54,12 @@ pub struct PrimitiveRef {
     /// Index of the instance in the scene. In a file without scene sections it is the index of the
     /// object.
     pub instance: u32,
-    /// Index of the triangle among those of the source file, after fan triangulation of its faces.
+    /// Index of the triangle in the source file, after fan triangulation of its faces.
     pub triangle: u32,
 }
 
 impl PrimitiveRef {
-    /// No triangle: that of a miss.
+    /// No triangle: the value in a miss, and the hint of a ray with unknown start.
     pub const NONE: PrimitiveRef = PrimitiveRef { instance: NONE, triangle: NONE };
 
     /// The triangle, if it is one of the given instance; else `NONE`.

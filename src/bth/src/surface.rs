@@ -194,7 +194,8 @@ impl Scene {
     ///     let name = scene.material_name(0, material);
     ///     if let Some(look) = scene.material(0, material) {
     ///         let image = look.base_color_texture.and_then(|texture| scene.texture(0, texture));
-    ///         println!("{name}: {:?}, image of {} bytes", look.base_color, image.map_or(0, |i| i.bytes.len()));
+    ///         let bytes = image.map_or(0, |image| image.bytes.len());
+    ///         println!("{name}: {:?}, image of {bytes} bytes", look.base_color);
     ///     }
     /// }
     /// # Ok::<(), bth::Error>(())

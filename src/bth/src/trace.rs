@@ -95,8 +95,9 @@ impl Scene {
 
     /// Stores the nearest hit of a ray, or [`Hit::MISS`].
     ///
-    /// Inlined up to the kernel, which is not: every crate that traces single rays would hold
-    /// kernels of its own. For a single ray in a model every instruction on the way there counts.
+    /// Inlined up to the kernel. The kernel is not inlined, because every crate that traces single
+    /// rays would then hold copies of the kernels. For a single ray in a model every instruction on
+    /// the way there counts.
     #[inline(always)]
     pub(crate) fn store_nearest<R: Traced>(&self, ray: &R, hit: &mut Hit) {
         match self.sole_opaque() {

@@ -15,10 +15,10 @@ pub struct Update {
     /// True if the top level was built again. If instances only moved, a commit refits it, that is,
     /// keeps its nodes and computes their boxes again, as long as [`Self::cost_ratio`] permits.
     pub rebuilt: bool,
-    /// Expected cost of rays through the top level relative to when it was last built: 1 after it
-    /// was, greater where instances that share a node have moved apart since. It is the surface
-    /// area of the boxes of all nodes, relative to that of the boxes of all instances. A commit
-    /// builds the top level again where this would exceed 1.5.
+    /// Expected cost of rays through the top level relative to when it was last built: 1 right
+    /// after a build, more if instances that share a node have moved apart since. It is the surface
+    /// area of the boxes of all nodes, relative to the surface area of the boxes of all instances.
+    /// A commit builds the top level again where this would exceed 1.5.
     pub cost_ratio: f64,
     /// Time to rebuild or refit the top level.
     pub top_level: Duration,

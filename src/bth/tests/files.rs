@@ -1,5 +1,6 @@
-//! The conformance files, embedded: opened, checked, damaged and traced without a file system, as it runs under Miri
-//! (`tools/check/miri`), in WebAssembly and on 32-bit machines (`tools/check/targets`).
+//! The conformance files, embedded: opened, checked, damaged and traced without a file system, as
+//! it runs under Miri (`tools/check/miri`), in WebAssembly and on 32-bit machines
+//! (`tools/check/targets`).
 
 use bth::TraceRay;
 use bth::rays::{Hit, PrimitiveRef, Ray, Start, StartRay};

@@ -2,7 +2,8 @@
 
 use crate::rays::Ray;
 
-/// Whether a ray meets a box that is enlarged by `more` on all sides. No ray meets an empty box.
+/// Returns true if a ray hits a box that is enlarged by `more` on all sides. No ray hits an empty
+/// box.
 pub(crate) fn meets(ray: &Ray, lower: [f32; 3], upper: [f32; 3], more: f64) -> bool {
     if lower[0] > upper[0] {
         return false;

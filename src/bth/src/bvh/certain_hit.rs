@@ -12,9 +12,9 @@ use crate::simd::Simd;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 
-/// Stores the answer of a ray of which the filter is sure that its nearest hit is this candidate,
-/// within the ray's range. `norm` is the largest |component| of its direction, and `instance` is
-/// reported with the hit.
+/// Stores the answer of a ray whose nearest hit is this candidate: the filter is sure that it lies
+/// in the range and before all others. `norm` is the largest |component| of its direction, and
+/// `instance` is reported with the hit.
 #[inline(always)]
 pub(crate) fn store_certain_hit<S: Simd, G: Goal>(
     s: S,

@@ -56,14 +56,14 @@ pub(crate) fn is_same_octant(a: &Ray, b: &Ray) -> bool {
     differ >> 31 == 0
 }
 
-/// The smallest and the largest value of a component, given those of two rays in one vector.
+/// The smallest and the largest value of a component, given its values in two rays in one vector.
 #[inline(always)]
 fn both(least: &[f32; LANES], greatest: &[f32; LANES], at: usize) -> [f32; 2] {
     [least[at].min(least[at + FLOATS]), greatest[at].max(greatest[at + FLOATS])]
 }
 
 impl Span {
-    /// The ranges of rays, of which there must be at least one.
+    /// The ranges of the components of rays. There must be at least one ray.
     #[inline(always)]
     pub(crate) fn of<S: Simd>(s: S, rays: &[Ray]) -> Span {
         let first = pair(s, rays, 0);
@@ -123,8 +123,8 @@ impl Span {
         same && spread <= SPREAD * self.main_axis().1
     }
 
-    /// Returns true if the rays have the same origin, and the main axis is that of each direction's
-    /// largest |component|.
+    /// Returns true if the rays have the same origin, and the largest |component| of each direction
+    /// lies along the main axis.
     #[inline(always)]
     pub(crate) fn is_from_point(&self) -> bool {
         let [[x, to_x], [y, to_y], [z, to_z]] = self.origin;
@@ -166,8 +166,8 @@ impl Span {
     /// are short and close together.
     ///
     /// An end of a segment, o + t·d, is off by at most 3u(|o| + |t·d|) for its roundings (u =
-    /// 2^-24), and by u|t·d| for those of the reported t; the pad is 16u(|o| + the extent of the
-    /// box).
+    /// 2^-24), and by u|t·d| because the reported t is rounded; the pad is 16u(|o| + the extent of
+    /// the box).
     #[inline(always)]
     pub(crate) fn segments<S: Simd>(
         &self,

@@ -70,7 +70,8 @@ struct RayTriangles<'a> {
 }
 
 impl<'a> BoxQuery for RayTriangles<'a> {
-    /// Numbers, not vectors: instructions broadcast them from memory, and no leaf stores and loads them.
+    /// Numbers, not vectors: instructions broadcast them from memory, and no leaf stores and loads
+    /// them.
     type Constants<S: Simd> = &'a RaySlabs;
     #[inline(always)]
     fn lanes<S: Simd>(&self, _: S) -> &'a RaySlabs {

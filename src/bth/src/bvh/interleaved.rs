@@ -174,7 +174,7 @@ impl RaySource<'_> {
         }
     }
 
-    /// Prepares the next rays, up to sixteen; false if there are none.
+    /// Prepares up to sixteen of the next rays. Returns false if no ray is left.
     #[inline(always)]
     fn refill<S: Simd>(&mut self, s: S) -> bool {
         let order = self.remaining.order;
@@ -245,8 +245,8 @@ fn walked<G: Goal>(goal: G, query: &EitherQuery) -> RayQuery<G> {
     query.with_goal(goal)
 }
 
-/// Returns true if the rays from `taken` on in an order are as many as have an entry node in
-/// common, and those of the batch from `first` on.
+/// Returns true if the next [`ENTRY_RAYS`] rays of an order, from `taken` on, exist and are the
+/// rays of the batch from `first` on.
 #[inline(never)]
 fn is_run(order: Option<&[u32]>, taken: usize, first: usize) -> bool {
     order.is_none_or(|order| {

@@ -48,7 +48,7 @@ pub(crate) trait RayProgress<G: Goal> {
     fn accept(&mut self);
 
     /// Updates the limits of depth from the hits that the query holds: [`LeafOutcome::Nearer`] if
-    /// they shrank. `origin_error` is that of the
+    /// they shrank. `origin_error` is taken from the
     /// [bounds](bth_format::object::ObjectBounds::origin_error) for which the ray was prepared.
     #[inline(always)]
     fn update_from_query(&mut self, ray: &Ray, origin_error: f32) -> LeafOutcome {

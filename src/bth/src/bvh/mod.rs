@@ -1,16 +1,19 @@
 //! Rays through the wide BVH.
 //!
-//! Three traversals share the node formats ([`nodes`]) and the decisions about triangles ([`leaf`], [`candidate`]):
+//! Three traversals share the node formats ([`nodes`]) and the decisions about triangles ([`leaf`],
+//! [`candidate`]):
 //!
-//! - [`single`]: one ray, with a stack of its own ([`single_stack`]), and its certain hit ([`certain_hit`]);
-//! - [`interleaved`]: a pool of rays ([`ray_pool`], [`ray_state`]) that step in turn, with their stacks ([`stack`]) and with hits
-//!   that are computed for sixteen rays at a time ([`deferred`]);
+//! - [`single`]: one ray, with a stack of its own ([`single_stack`]), and its certain hit
+//!   ([`certain_hit`]);
+//! - [`interleaved`]: a pool of rays ([`ray_pool`], [`ray_state`]) that step in turn, with their
+//!   stacks ([`stack`]) and with hits that are computed for sixteen rays at a time ([`deferred`]);
 //! - [`packet`]: coherent rays that enter nodes together.
 //!
-//! Which rays are coherent is told by [`coherence`]; a [`shaft`] bounds them. In large objects those that are interleaved begin below the
-//! root ([`entry_node`]).
+//! [`coherence`] decides which rays are coherent; a [`shaft`] bounds them. In large objects,
+//! interleaved rays begin below the root ([`entry_node`]).
 //!
-//! All other queries take one walk ([`walk`]); [`enumerate`] passes every triangle that a ray may hit to a receiver.
+//! All other queries take one walk ([`walk`]); [`enumerate`] passes every triangle that a ray may
+//! hit to a receiver.
 
 #[cfg(test)]
 pub(crate) mod box_oracle;

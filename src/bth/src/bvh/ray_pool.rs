@@ -18,9 +18,9 @@ pub(super) const POOL_SIZE: usize = 32;
 /// Steps through inner nodes continue while at least this many rays have one as their next step.
 const MIN_INNER: u8 = (POOL_SIZE / 4) as u8;
 
-/// Returns true if the steps through the inner nodes of an object are [`RareSteps`]. Nodes of
-/// smaller objects, most of which the second level holds already, wait in the first: with them in
-/// the second, diffuse rays are slower.
+/// Returns true if the steps through the inner nodes of an object are [`RareSteps`]. Most nodes of
+/// smaller objects are in the second level already, so they are fetched to the first: with a fetch
+/// to the second, diffuse rays are slower.
 #[inline(always)]
 pub(super) fn has_rare_steps(object: &ObjectView<'_>) -> bool {
     is_large(object) && CacheLevel::waiting() == CacheLevel::Second
@@ -142,7 +142,7 @@ impl<'a, G: Goal> RayPool<'a, G> {
             *bottom = stacks.bottom(stack);
         }
         // All slots are at the bottom of their stacks, like those of finished rays, so the first
-        // rays start as all others do.
+        // rays start in the same way.
         let mut bottom = [0; 256];
         for slot in 0..POOL_SIZE {
             bottom[slot] = slot as u8;

@@ -6,15 +6,17 @@ use bth_format::layout::WIDTH;
 use bth_format::limits::MAX_DEPTH;
 use bth_format::object::ObjectView;
 
-/// The code at the bottom of a stack. It is the code of no child. Unlike `NONE` its address lies near the file, so that a prefetch
-/// does not cause a walk through the page tables.
+/// The code at the bottom of a stack. It is the code of no child. Unlike `NONE` its address lies
+/// near the file, so that a prefetch does not cause a walk through the page tables.
 pub(crate) const BOTTOM: u32 = 7 << 29;
 
-/// Memory of the stacks, kept from one batch to the next. An entry is a child code, and as its key a lower bound of the depth at
-/// which the ray enters the child. At the bottom of each stack lies [`BOTTOM`], which is never dropped.
+/// Memory of the stacks, kept from one batch to the next. An entry is a child code, and as its key
+/// a lower bound of the depth at which the ray enters the child. At the bottom of each stack lies
+/// [`BOTTOM`], which is never dropped.
 ///
-/// Positions are indices into the memory of all stacks. In an unchecked file a BVH may be deeper than its header states, and a stack
-/// may then grow into the next one: answers are wrong or tracing panics, but nothing outside of the memory is read or written.
+/// Positions are indices into the memory of all stacks. In an unchecked file a BVH may be deeper
+/// than its header states, and a stack may then grow into the next one: answers are wrong or
+/// tracing panics, but nothing outside of the memory is read or written.
 #[derive(Debug, Default)]
 pub(crate) struct Stacks {
     codes: Vec<u32>,
@@ -27,8 +29,9 @@ pub(crate) struct Stacks {
     count: usize,
 }
 
-/// Index of an entry, at least [`LANES`] entries before the end of both vectors of the [`Stacks`] that made it. The vectors never
-/// become shorter, and a position is used only with the stacks that made it, within one batch.
+/// Index of an entry, at least [`LANES`] entries before the end of both vectors of the [`Stacks`]
+/// that made it. The vectors never become shorter, and a position is used only with the stacks that
+/// made it, within one batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct StackPosition(usize);
 
@@ -62,8 +65,9 @@ impl Stacks {
     #[inline(never)]
     fn grow(&mut self, depth: usize, count: usize) {
         (self.depth, self.count) = (depth, count);
-        // At every level all children but the entered one are stacked, and whole vectors are stored at the top. An odd number of
-        // cache lines places the tops of the stacks in different sets of the cache.
+        // At every level all children but the entered one are stacked, and whole vectors are stored
+        // at the top. An odd number of cache lines places the tops of the stacks in different sets
+        // of the cache.
         let entries = 2 + depth * (WIDTH - 1) + LANES;
         self.size = (entries.div_ceil(LANES) | 1) * LANES;
         let total = self.size * count;
@@ -85,8 +89,9 @@ impl Stacks {
         self.position(stack * self.size)
     }
 
-    /// Empties the stack with this bottom; returns the position above the bottom, where the children of the root are written. The root
-    /// itself is not stored, because it is entered at once.
+    /// Empties the stack with this bottom; returns the position above the bottom, where the
+    /// children of the root are written. The root itself is not stored, because it is entered at
+    /// once.
     #[inline(always)]
     pub(crate) fn start_at(&mut self, bottom: StackPosition) -> StackPosition {
         self.codes[bottom.0] = BOTTOM;
@@ -124,7 +129,8 @@ impl Stacks {
         OpenStacks { codes: &mut self.codes, keys: &mut self.keys }
     }
 
-    /// Removes the entries between `bottom` and `top` whose key exceeds `limit`, keeping the order of the others; returns the new top.
+    /// Removes the entries between `bottom` and `top` whose key exceeds `limit`, keeping the order
+    /// of the others; returns the new top.
     #[inline(always)]
     pub(crate) fn keep_up_to<S: Simd>(
         &mut self,
@@ -190,7 +196,8 @@ fn free_entries<'a>(
     top: StackPosition,
 ) -> (&'a mut [u32; LANES], &'a mut [f32; LANES]) {
     debug_assert!(top.0 + LANES <= codes.len() && top.0 + LANES <= keys.len());
-    // SAFETY: at least LANES entries follow from the position on in both vectors, which are borrowed mutably together.
+    // SAFETY: at least LANES entries follow from the position on in both vectors, which are
+    // borrowed mutably together.
     unsafe {
         (
             &mut *codes.as_mut_ptr().add(top.0).cast::<[u32; LANES]>(),

@@ -118,7 +118,7 @@ impl RaySlabs {
         // Finite even where it is the depth of all boxes: the traversal writes lane numbers into
         // the low bits of depths, which would turn an infinity into NaN. A hit is in the range if
         // its t is after it was rounded, as a t of 2^-150 is to 0: with a great direction the depth
-        // of such a hit is far beyond that of the end of the range.
+        // of such a hit is far beyond the depth of the end of the range.
         let after = |t: f64| widened(t.max(f64::MIN));
         let off = f64::from(bounds.origin_error);
         slabs.first = ((-after(-f64::from(ray.tmin)) * scale - off) as f32).next_down().max(-f32::MAX);
@@ -136,8 +136,8 @@ impl RaySlabs {
         slabs
     }
 
-    /// Upper bound of the depth of t, for [`Self::children`]. `origin_error` is that of the bounds
-    /// for which the ray was prepared.
+    /// Upper bound of the depth of t, for [`Self::children`]. `origin_error` is taken from the
+    /// bounds for which the ray was prepared.
     #[inline(always)]
     pub(crate) fn limit(&self, t: f64, origin_error: f32) -> f32 {
         upper_depth(t * f64::from(self.scale) + f64::from(origin_error))
@@ -216,8 +216,8 @@ impl<S: Simd> RaySlabLanes<S> {
         (s.mask_bits(s.le(enter, leave)), enter)
     }
 
-    /// [`Self::children`] as a function of its own, because unrolled in every scalar kernel it
-    /// would take much code.
+    /// Calls [`Self::children`] without inlining it: unrolled in every scalar kernel it would take
+    /// much code.
     #[inline(never)]
     fn children_called(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
         self.children_inlined(s, node, limit)

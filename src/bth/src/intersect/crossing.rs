@@ -1,35 +1,43 @@
-//! The crossing rule: whether, and in which direction, a ray crosses a triangle, decided so that each passage of a closed surface
-//! counts once.
+//! The crossing rule: whether, and in which direction, a ray crosses a triangle, decided so that
+//! each passage of a closed surface counts once.
 //!
-//! Triangles of a hit ([`super::exact`]) are closed: a ray through an edge hits both triangles at it, and a ray in the plane of a
-//! triangle hits none, so numbers of hits say nothing about inside and outside. Here the origin o of the ray is moved by
-//! δ = (ε, ε², ε³) for an infinitely small ε > 0, which moves the whole line, and all answers are those for the moved ray. This
-//! is simulation of simplicity (Edelsbrunner and Mücke, "Simulation of Simplicity", ACM Transactions on Graphics 1990) with one
-//! moved point: a sign that is 0 for o is that of the first coefficient, in the order ε, ε², ε³, that is not 0. All the functions
-//! of o below are linear, so these are their partial derivatives along x, y and z.
+//! Triangles of a hit ([`super::exact`]) are closed: a ray through an edge hits both triangles at
+//! it, and a ray in the plane of a triangle hits none, so numbers of hits say nothing about inside
+//! and outside. Here the origin o of the ray is moved by δ = (ε, ε², ε³) for an infinitely small
+//! positive ε, which moves the whole line. All answers are given for the moved ray. This is
+//! simulation of simplicity (Edelsbrunner and Mücke, "Simulation of Simplicity", ACM Transactions
+//! on Graphics 1990) with one moved point: where a function is 0 for o, its sign is the sign of the
+//! first coefficient, in the order ε, ε², ε³, that is not 0. All the functions of o below are
+//! linear, so these are their partial derivatives along x, y and z.
 //!
-//! **Sides.** The line passes an edge p→q on the side that the sign of E(p, q) = det[d, p-o, q-o] gives. Its gradient along o is
-//! d × (q-p). All of it is exactly antisymmetric in p and q, so two triangles that have an edge in common, in opposite directions,
-//! get opposite signs whatever the rounding. E remains 0 only for an edge that is parallel to d, or whose ends are equal. The line
+//! **Sides.** The line passes an edge p→q on the side that the sign of E(p, q) = det[d, p-o, q-o]
+//! gives. Its gradient along o is d × (q-p). All of it is exactly antisymmetric in p and q, so two
+//! triangles that have an edge in common, in opposite directions, get opposite signs whatever the
+//! rounding. E remains 0 only for an edge that is parallel to d, or whose ends are equal. The line
 //! crosses the triangle abc if E(b, c), E(c, a) and E(a, b) have the same sign.
 //!
-//! **Why each passage counts once.** Project along d: a triangle becomes a plane triangle, possibly of no area, an edge a segment
-//! or a point, and the moved line a point P that lies on none of the finitely many segments, since for a small enough ε > 0 it
-//! avoids the lines through them. A triangle of no projected area has two edges of opposite sides, or an edge with E = 0: its
-//! weights sum to its area, 0, so they cannot all have one sign. Hence it is not crossed, which is right, because P does not
-//! lie on it. Every other triangle is crossed exactly if P lies in its interior. So the moved line meets no edge and no vertex, and
-//! it lies in no plane: the crossings are those of a line in general position. On a surface in which every edge has as
-//! many triangles in one direction as in the other, the signed number of crossings beyond the moved origin is therefore the
-//! surface's winding number around it (degree theory), whatever the direction of the ray; its parity is that of the number of
-//! crossings. Triangles of no area, which files do not hold, would add nothing.
+//! **Why each passage counts once.** Project along d: a triangle becomes a plane triangle, possibly
+//! of no area, an edge a segment or a point, and the moved line a point P that lies on none of the
+//! finitely many segments, since for a small enough ε > 0 it avoids the lines through them. A
+//! triangle of no projected area has two edges of opposite sides, or an edge with E = 0: its
+//! weights sum to its area, 0, so they cannot all have one sign. Hence it is not crossed, which is
+//! right, because P does not lie on it. Every other triangle is crossed exactly if P lies in its
+//! interior. So the moved line touches no edge and no vertex, and it lies in no plane: it is a line
+//! in general position. On a surface in which every edge has as many triangles in one direction as
+//! in the other, the signed number of crossings beyond the moved origin is therefore the surface's
+//! winding number around it (degree theory), whatever the direction of the ray; its parity is the
+//! parity of the number of crossings. Triangles of no area, which files do not hold, would add
+//! nothing.
 //!
-//! **Along the ray.** With n = (b-a)×(c-a), the line crosses the plane at t = V/W for the volume V = (a-o)·n and W = d·n, whose
-//! sign is that of the three sides. t is before or after a number s as the sign of V - sW says; its gradient along o is -n, which
-//! is not 0 because W is not. So t never equals an end of the ray's range: of two ranges with a common end, each crossing lies in
-//! exactly one. For s = 0 this decides on which side of the plane the origin lies.
+//! **Along the ray.** With n = (b-a)×(c-a), the line crosses the plane at t = V/W for the volume V
+//! = (a-o)·n and W = d·n, whose sign equals the sign of the three sides. t is before or after a
+//! number s as the sign of V - sW says; its gradient along o is -n, which is not 0 because W is
+//! not. So t never equals an end of the ray's range: of two ranges with a common end, each crossing
+//! lies in exactly one. For s = 0 this decides on which side of the plane the origin lies.
 //!
-//! **Exactness.** Signs come from f64 where its error bound allows, else from exact sums ([`bth_format::exact`]). Products have at
-//! most four factors of f32, so they lie between 2^-596 and 2^520.
+//! **Exactness.** Signs come from f64 where its error bound allows, else from exact sums
+//! ([`bth_format::exact`]). Products have at most four factors of f32, so they lie between 2^-596
+//! and 2^520.
 
 use crate::intersect::exact::{Estimate, RATIO_ERROR, estimate};
 use crate::intersect::start::ExactStart;
@@ -38,16 +46,17 @@ use crate::intersect::vector::wide;
 use crate::rays::Ray;
 use bth_format::exact::{EDGE_PARTS, Expansion, VOLUME_PARTS};
 
-/// Bounds the error of a sum of products relative to the sum of their sizes: each product below has at most 10 roundings of half
-/// an epsilon.
+/// Bounds the error of a sum of products relative to the sum of their sizes: each product below has
+/// at most 10 roundings of half an epsilon.
 const ERROR: f64 = 16.0 * f64::EPSILON;
 
 /// Pairs of the axes that follow x, y and z.
 const NEXT: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
 
-/// The direction in which a ray crosses a triangle: 1 if it enters through the back and leaves through the front, from which the
-/// corners are seen counterclockwise, -1 for the reverse, and 0 if it does not cross it in the ray's range. Coordinates and
-/// direction must be finite; numbers in the range of NaN or in wrong order contain no crossing.
+/// The direction in which a ray crosses a triangle: 1 if it enters through the back and leaves
+/// through the front, from which the corners are seen counterclockwise, -1 for the reverse, and 0
+/// if it does not cross it in the ray's range. Coordinates and direction must be finite; numbers in
+/// the range of NaN or in wrong order contain no crossing.
 pub(crate) fn crossing(ray: &Ray, corners: [[f32; 3]; 3]) -> i32 {
     let (origin, direction, wide_corners) = (wide(ray.origin), wide(ray.direction), corners.map(wide));
     match estimate(origin, direction, wide_corners) {
@@ -79,7 +88,8 @@ fn crossing_by_signs(ray: &Ray, [a, b, c]: [[f64; 3]; 3]) -> i32 {
     if position(ray.tmin) > 0 && position(ray.tmax) < 0 { passed } else { 0 }
 }
 
-/// As [`crossing`], for a ray that starts on a triangle: crossings at t > 0 of the line through the start itself, up to `tmax`.
+/// As [`crossing`], for a ray that starts on a triangle: crossings at t > 0 of the line through the
+/// start itself, up to `tmax`.
 pub(crate) fn crossing_from_start(
     ray: &Ray,
     point: &StartPoint,
@@ -104,8 +114,8 @@ pub(crate) fn crossing_from_start(
     }
 }
 
-/// [`crossing_from_start`] by the signs of its definition. The gradients along the origin are those of [`side`] and [`order`], since
-/// all functions are affine.
+/// [`crossing_from_start`] by the signs of its definition. The gradients along the origin are those
+/// of [`side`] and [`order`], since all functions are affine.
 #[cold]
 #[inline(never)]
 fn start_crossing_by_signs(ray: &Ray, start: &ExactStart, corners: [[f64; 3]; 3]) -> i32 {
@@ -134,7 +144,8 @@ fn sign(x: f64) -> i32 {
     i32::from(x > 0.0) - i32::from(x < 0.0)
 }
 
-/// The side on which the moved line passes the edge p→q: the sign of E(p, q); 0 only where it is 0 for all origins.
+/// The side on which the moved line passes the edge p→q: the sign of E(p, q); 0 only where it is 0
+/// for all origins.
 fn side(o: [f64; 3], d: [f64; 3], p: [f64; 3], q: [f64; 3]) -> i32 {
     let (mut value, mut size) = (0.0, 0.0);
     for (k, [i, j]) in NEXT.into_iter().enumerate() {
@@ -163,8 +174,8 @@ fn side_gradient(d: [f64; 3], p: [f64; 3], q: [f64; 3]) -> [impl Fn() -> f64; 3]
     })
 }
 
-/// Whether the moved line crosses the plane of a triangle after `s` (1) or before it (-1), given the sign of W, which is not 0. 0
-/// for an `s` of NaN.
+/// Returns true if the moved line crosses the plane of a triangle after `s` (1) or before it (-1),
+/// given the sign of W, which is not 0. 0 for an `s` of NaN.
 fn order(ray: &Ray, corners: [[f64; 3]; 3], s: f32, passed: i32) -> i32 {
     if !s.is_finite() {
         return -sign(s.into());
@@ -193,7 +204,7 @@ fn order(ray: &Ray, corners: [[f64; 3]; 3], s: f32, passed: i32) -> i32 {
 fn order_gradient([a, b, c]: [[f64; 3]; 3]) -> [impl Fn() -> f64; 3] {
     NEXT.map(|[i, j]| {
         move || {
-            // The component of the normal is the sum of those of the vector products a×b, b×c and c×a.
+            // The component of the normal is the sum of the same components of a×b, b×c and c×a.
             let mut sum = Expansion::<6>::new();
             for (p, q) in [(a, b), (b, c), (c, a)] {
                 sum.add(p[j] * q[i]);
@@ -204,7 +215,7 @@ fn order_gradient([a, b, c]: [[f64; 3]; 3]) -> [impl Fn() -> f64; 3] {
     })
 }
 
-/// The sign of `value`, or if it is 0 that of the first of `gradient` that is not 0.
+/// The sign of `value`, or if it is 0 the sign of the first of `gradient` that is not 0.
 fn first_sign(value: f64, gradient: [impl Fn() -> f64; 3]) -> i32 {
     let signs = std::iter::once(sign(value)).chain(gradient.iter().map(|slope| sign(slope())));
     signs.into_iter().find(|sign| *sign != 0).unwrap_or(0)
@@ -236,7 +247,8 @@ mod tests {
         NEXT.into_iter().enumerate().map(|(k, [i, j])| a[k] * (b[i] * c[j] - b[j] * c[i])).sum()
     }
 
-    /// The value of a function that is linear in a point, at `point`, and its changes along the axes.
+    /// The value of a function that is linear in a point, at `point`, and its changes along the
+    /// axes.
     fn series(point: Point, value: impl Fn(Point) -> i128) -> Series {
         let at = value(point);
         let slope = |k: usize| {
@@ -247,7 +259,8 @@ mod tests {
         [at, slope(0), slope(1), slope(2)]
     }
 
-    /// The rule in integers, by differences of values in place of the formulas of gradients. The range is in units of 1/4.
+    /// The rule in integers, by differences of values instead of the formulas of gradients. The
+    /// range is in units of 1/4.
     fn expected(o: Point, d: Point, [a, b, c]: [Point; 3], range: [i64; 2]) -> i32 {
         let side = |p, q| lexicographic(series(o, |o| determinant([d, minus(p, o), minus(q, o)])));
         let sides = [side(b, c), side(c, a), side(a, b)];

@@ -1,23 +1,24 @@
 //! Edge functions of projected triangles in f32 lanes, with bounds of their errors: which triangles
-//! lines certainly miss, and which they certainly hit at which depth.
+//! a line certainly misses, and which it certainly hits at which depth.
 //!
-//! The weight of a corner is the edge function of the opposite edge, twice the area of the triangle
-//! of that edge and the origin of the plane of projection, through which the line passes.
+//! The weight of a corner is the edge function of the opposite edge: twice the area of the triangle
+//! that this edge forms with the origin of the plane of projection, through which the line passes.
 //!
-//! **Error of a weight.** Let u = 2^-24. For the corners of one triangle, let M >= |x| + |y| as projected, and let r be their
-//! largest |coordinate| relative to the ray's origin. Differences are off by ur, the shear by a
-//! factor 1±2u, its product with the depth by the same factor and by the error of the depth
-//! (|shear| <= 1), and the last sum by 2ur: sheared coordinates are off by less than δ = 8ur. A
-//! cross product of two points is off by 2δM + 2δ² because of its points and by 3uM² <= δM because
-//! of its own roundings, together by less than 4δ(M + δ). Products that underflow add at most the
-//! smallest normal number. The filter of single rays takes for r the distance (maximum norm) to the
-//! farthest corner of the object's box, so that 8δ and 4δ² are constants of the ray, and for M
-//! twice the largest |x| or |y|; where that leaves a pair undecided, it takes the bound of packets.
-//! Packets take r = M + |depth|, which is tighter and was measured to be faster.
+//! **Error of a weight.** Let u = 2^-24. For the corners of one triangle, let M >= |x| + |y| as
+//! projected, and let r be their largest |coordinate| relative to the ray's origin. Differences are
+//! off by ur, the shear by a factor 1±2u, its product with the depth by the same factor and by the
+//! error of the depth (|shear| <= 1), and the last sum by 2ur: sheared coordinates are off by less
+//! than δ = 8ur. A cross product of two points is off by 2δM + 2δ² because of its points and by
+//! 3uM² <= δM because of its own roundings, together by less than 4δ(M + δ). Products that
+//! underflow add at most the smallest normal number. The filter of single rays takes for r the
+//! distance (maximum norm) to the farthest corner of the object's box, so that 8δ and 4δ² are
+//! constants of the ray, and for M twice the largest |x| or |y|; where that leaves a pair
+//! undecided, it takes the bound of packets. Packets take r = M + |depth|, which is tighter and was
+//! measured to be faster.
 //!
-//! **Error of a depth.** A change of the three weights by e each changes the depth by at most 3e·range/(|sum| - 3e), where
-//! `range` is the range of the corners' depths, and never moves it out of that range. The roundings
-//! of the depth itself stay below 8u of the largest |depth|.
+//! **Error of a depth.** A change of the three weights by e each changes the depth by at most
+//! 3e·range/(|sum| - 3e), where `range` is the range of the corners' depths, and never moves it out
+//! of that range. The roundings of the depth itself stay below 8u of the largest |depth|.
 
 use crate::simd::Lanewise;
 

@@ -9,14 +9,14 @@
 //! bound leaves a sign or a digit uncertain, they are computed from exact sums
 //! ([`bth_format::exact`]).
 //!
-//! **Errors.** Let u = 2^-53, and let r, m and D be the greatest |coordinates| of a-o, of the edges b-a and c-a, and of d.
-//! Differences have a relative error of u. A component of a vector product of two differences has
-//! two products, each with three roundings, and a subtraction: its error is 8u times the sizes of
-//! both factors. The determinant and the weights of b and c are scalar products of such vectors
-//! with d: they are off by 3·8u because of the vectors and by 16u because of their own roundings,
-//! which gives 40uDm² and 40uDmr. The weight of a is the determinant minus the other two weights:
-//! 98uDm(m+r). The volume is off by (3·8 + 3·2 + 16)urm². Products of three differences of f32
-//! values, and of three such with the bounds, lie far from the limits of f64.
+//! **Errors.** Let u = 2^-53, and let r, m and D be the largest |coordinates| of a-o, of the edges
+//! b-a and c-a, and of d. Differences have a relative error of u. A component of a vector product
+//! of two differences has two products, each with three roundings, and a subtraction: its error is
+//! 8u times the sizes of both factors. The determinant and the weights of b and c are scalar
+//! products of such vectors with d: they are off by 3·8u because of the vectors and by 16u because
+//! of their own roundings, which gives 40uDm² and 40uDmr. The weight of a is the determinant minus
+//! the other two weights: 98uDm(m+r). The volume is off by (3·8 + 3·2 + 16)urm². Products of three
+//! differences of f32 values, and of three such with the bounds, lie far from the limits of f64.
 
 use crate::intersect::line::Line;
 pub(crate) use crate::intersect::line::RATIO_ERROR;
@@ -26,10 +26,11 @@ use crate::intersect::vector::{cross, dot, greater, lesser, max_norm, minus, wid
 use crate::simd::{Doubles, PlainDoubles};
 use bth_format::exact::{EDGE_PARTS, Expansion, VOLUME_PARTS};
 
-/// 128u, more than the 98u above: bounds the error of weights relative to Dm(m+r) and that of the
-/// volume relative to rm².
+/// 128u, more than the 98u above: bounds the error of weights relative to Dm(m+r), and the error of
+/// the volume relative to rm².
 pub(super) const WEIGHT_ERROR: f64 = 128.0 / (1u64 << 53) as f64;
-/// Factor from the bound of an error to the smallest value of which it is at most [`RATIO_ERROR`].
+/// Factor from the bound of an error to the smallest value whose relative error is at most
+/// [`RATIO_ERROR`].
 pub(super) const INVERSE_RATIO_ERROR: f64 = 1.0 / RATIO_ERROR;
 
 /// Intersection of a line and a triangle.

@@ -81,7 +81,7 @@ fn lane(rows: &[F32Lanes; 3], i: usize) -> [f64; 3] {
     [rows[0][i].into(), rows[1][i].into(), rows[2][i].into()]
 }
 
-/// Intersections of sixteen rays, rounded for the answer. In the bit sets, bit i stands for lane i.
+/// Intersections of sixteen rays, rounded for the answer. In the bit sets, bit i is lane i.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Intersections {

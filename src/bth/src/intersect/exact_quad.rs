@@ -7,7 +7,8 @@ use crate::simd::Doubles;
 
 /// The origin of a ray.
 pub(crate) trait QuadOrigin: Copy {
-    /// A coordinate of a corner, but in the third place that of the origin along the same axis.
+    /// Repeats a coordinate of a corner in four lanes, except that the third lane gets the
+    /// coordinate of the origin along the same axis.
     fn with_corner<D: Doubles>(self, s: D, corner: f32, axis: usize) -> D::V;
     /// As [`Origin::enlarge`].
     fn enlarge(self, error: [f64; 2], edge: f64) -> [f64; 2];

@@ -50,8 +50,7 @@ pub(crate) struct TriangleFilter {
     pub(crate) error_slope: f32,
 }
 
-/// Triangles of a leaf that the ray may hit: in the bit sets, bit i stands for triangle i of the
-/// leaf.
+/// Triangles of a leaf that the ray may hit: in the bit sets, bit i is triangle i of the leaf.
 #[derive(Clone, Copy)]
 pub(crate) struct Candidates<S: Simd> {
     /// Triangles that the line may cross, at whatever depth.
@@ -144,7 +143,7 @@ pub(crate) trait TriangleBlock {
     ) -> Corners<L>;
 }
 
-/// For each lane the point whose index stands in `row`, out of sixteen points.
+/// For each lane the point whose index is in `row`, out of sixteen points.
 #[inline(always)]
 fn lookup_points<S: Simd>(s: S, [x, y, depth]: [S::F; 3], row: &[u8; WIDTH]) -> [S::F; 3] {
     let at = s.load_bytes(row);
@@ -275,7 +274,7 @@ impl TriangleFilter {
     }
 
     /// The triangles of a leaf that may be hit at a depth between `first` and `limit`, without
-    /// those whose bits are set in `left_out`. `origin_reach` is that of the
+    /// those whose bits are set in `left_out`. `origin_reach` is taken from the
     /// [bounds](ObjectBounds::origin_reach) for which the ray was prepared.
     #[inline(always)]
     pub(crate) fn candidates<S: Simd, B: TriangleBlock>(
@@ -400,8 +399,8 @@ impl<S: Simd, B: TriangleBlock> Part<S> for CandidatesOf<'_, B> {
     }
 }
 
-/// The triangles of a leaf, a bit each: at most as many as lanes, even if an unchecked file has a
-/// greater count.
+/// The triangles of a leaf, one bit per triangle: at most one per lane, even if the count in an
+/// unchecked file is larger.
 #[inline(always)]
 fn valid_triangles(block: &impl TriangleBlock) -> u32 {
     1u32.wrapping_shl(block.triangles()).wrapping_sub(1) & (u32::MAX >> WIDTH)

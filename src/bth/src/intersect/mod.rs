@@ -1,13 +1,16 @@
 //! Intersection of rays with boxes and triangles, in object space.
 //!
-//! The f32 tests [`boxes`] and [`filter`], by the [`edge_functions`] of triangles, are conservative: they exclude only boxes and
-//! triangles that are certainly missed. The remaining triangles are decided in f64, and in exact arithmetic where the error bounds of f64 leave a sign or a digit
-//! uncertain: [`exact`] computes one ray and triangle, [`exact_lanes`] sixteen pairs at a time with the same bits, and
-//! [`crossing`] decides by a rule of its own whether a ray passes through a surface. [`mod@line`] projects points along a ray in f64,
-//! and [`prepare`] computes the per-ray constants of the box test and of the filter.
+//! The f32 tests [`boxes`] and [`filter`], by the [`edge_functions`] of triangles, are
+//! conservative: they exclude only boxes and triangles that are certainly missed. The remaining
+//! triangles are decided in f64, and in exact arithmetic where the error bounds of f64 leave a sign
+//! or a digit uncertain: [`exact`] computes one ray and triangle, [`exact_lanes`] sixteen pairs at
+//! a time with the same bits, and [`crossing`] decides whether a ray passes through a surface, so
+//! that shared edges count once. [`mod@line`] projects points along a ray in f64, and [`prepare`]
+//! computes the per-ray constants of the box test and of the filter.
 //!
-//! The distance of a point to boxes and triangles is bounded in f32 in the same way ([`point_lanes`]) and decided in f64
-//! ([`point_triangle`]) or exactly ([`point_exact`]). [`triangle_box`] decides whether triangles and boxes overlap.
+//! The distance of a point to boxes and triangles is bounded in f32 in the same way
+//! ([`point_lanes`]) and decided in f64 ([`point_triangle`]) or exactly ([`point_exact`]).
+//! [`triangle_box`] decides whether triangles and boxes overlap.
 
 pub(crate) mod boxes;
 pub(crate) mod crossing;

@@ -6,12 +6,12 @@
 //! The errors are the same with and without fused operations, so all instruction sets give the same
 //! bits.
 //!
-//! **Error.** Let u = 2^-53, and let r and m be the greatest |coordinates| of a-o and of the edges. These differences must be exact. A
-//! component n of the normal is known up to 6u²m²: its products and the difference are exact as
-//! pairs, and the low parts, at most 4um² together, are rounded twice. Its product with a component
-//! of a-o adds 10u²rm². The three low parts are at most 18urm² together and rounded six times, and
-//! the high parts add two roundings of their errors, at most 30urm²: together less than 2^8 u²rm² =
-//! 2^-98 rm².
+//! **Error.** Let u = 2^-53, and let r and m be the largest |coordinates| of a-o and of the edges.
+//! These differences must be exact. A component n of the normal is known up to 6u²m²: its products
+//! and the difference are exact as pairs, and the low parts, at most 4um² together, are rounded
+//! twice. Its product with a component of a-o adds 10u²rm². The three low parts are at most 18urm²
+//! together and rounded six times, and the high parts add two roundings of their errors, at most
+//! 30urm²: together less than 2^8 u²rm² = 2^-98 rm².
 
 use crate::intersect::vector::{greater, max_norm};
 use crate::simd::Doubles;

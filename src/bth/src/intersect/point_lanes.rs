@@ -1,14 +1,17 @@
-//! Conservative f32 bounds of the distance of a point to sixteen boxes or sixteen triangles at a time. They only *exclude* boxes
-//! and triangles; distances are decided by [`super::point_triangle`].
+//! Conservative f32 bounds of the distance of a point to sixteen boxes or sixteen triangles at a
+//! time. They only *exclude* boxes and triangles; distances are decided by
+//! [`super::point_triangle`].
 //!
-//! Coordinates are scaled by a power of two so that the greatest is about 2 to the power [`TARGET_EXPONENT`], and are relative to the point
-//! after the same fused step: squares then neither overflow nor, for lengths that matter, underflow.
+//! Coordinates are scaled by a power of two so that the largest is about 2 to the power
+//! [`TARGET_EXPONENT`], and are relative to the point after the same fused step: squares then
+//! neither overflow nor, for lengths that matter, underflow.
 //!
-//! **Triangles.** Let A, B and C be the corners relative to the point. For any vector q, no point of the triangle is nearer than
-//! min(q·A, q·B, q·C) / |q|, because the triangle lies beyond the plane that is perpendicular to q at that distance. The bound is
-//! tight where q leads to the closest point, so q is computed by the usual case analysis (Ericson, "Real-Time Collision
-//! Detection", 5.1.5) in f32: an inaccurate q, as that of a needle, makes the bound loose, not wrong. Since q leads to a point of
-//! the triangle, |q| is an upper bound.
+//! **Triangles.** Let A, B and C be the corners relative to the point. For any vector q, no point
+//! of the triangle is nearer than min(q·A, q·B, q·C) / |q|, because the triangle lies beyond the
+//! plane that is perpendicular to q at that distance. The bound is tight where q leads to the
+//! closest point, so q is computed by the usual case analysis (Ericson, "Real-Time Collision
+//! Detection", 5.1.5) in f32: an inaccurate q, for example of a needle, makes the bound loose, not
+//! wrong. Since q leads to a point of the triangle, |q| is an upper bound.
 
 use super::boxes::{FAR, planes};
 use super::vector::dot_lanes;
@@ -17,18 +20,21 @@ use bth_format::layout::{IndexedLeaf, RawLeaf, WIDTH, WideNode};
 
 const _: () = assert!(WIDTH == LANES);
 
-/// The greatest |coordinate| is scaled to 2^27 to 2^28. Differences are then below 2^29, their scalar products below 2^60, and
-/// sums of products of two of these below 2^123.
+/// The largest |coordinate| is scaled to between 2^27 and 2^28. Differences are then below 2^29,
+/// their scalar products below 2^60, and sums of products of two of these below 2^123.
 const TARGET_EXPONENT: i32 = 28;
-/// Slack of a limit of squared distances, relative to the limit. It covers the roundings of the bounds of boxes, 8 · 2^-24, and
-/// the four lowest bits of the keys of the stack, which hold lane numbers, 2^-19.
+/// Slack of a limit of squared distances, relative to the limit. It covers the roundings of the
+/// bounds of boxes, 8 · 2^-24, and the four lowest bits of the keys of the stack, which hold lane
+/// numbers, 2^-19.
 const LIMIT_SLACK: f64 = 1.0 / (1 << 17) as f64;
-/// Absolute slack of a limit, for squares that underflow: far more than 2^-149, and nothing beside the square of 2^28.
+/// Absolute slack of a limit, for squares that underflow: far more than 2^-149, and negligible
+/// compared with the square of 2^28.
 const LIMIT_FLOOR: f64 = 1.0 / (1u128 << 120) as f64;
-/// 2^-19: bounds the error of q·A relative to |q| and the reach (see [`TriangleLanes::reach`]): differences are off by 2^-24,
-/// products and sums by less than 2^-21.
+/// 2^-19: bounds the error of q·A relative to |q| and the reach (see [`TriangleLanes::reach`]):
+/// differences are off by 2^-24, products and sums by less than 2^-21.
 const PROJECTION_SLACK: f32 = 1.0 / (1 << 19) as f32;
-/// Where |q|² or (q·A)² is below this, a term of the bound might have underflowed: the triangle is then not excluded.
+/// Where |q|² or (q·A)² is below this, a term of the bound might have underflowed: the triangle is
+/// then not excluded.
 const LEAST_SQUARE: f32 = 1.0 / (1u128 << 100) as f32;
 
 /// A point for bounds of distances, and the scale of its space.
@@ -102,8 +108,9 @@ impl<S: Simd> Part<S> for NearChildren<'_, S> {
 }
 
 impl<S: Simd> PointLanes<S> {
-    /// The children of a node that may contain a point whose squared distance, scaled, is at most `limit`, as bits, and lower
-    /// bounds of the scaled squared distances. Empty slots may be among them.
+    /// The children of a node that may contain a point whose squared distance, scaled, is at most
+    /// `limit`, as bits, and lower bounds of the scaled squared distances. Empty slots may be among
+    /// them.
     #[inline(always)]
     pub(crate) fn children(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
         NearChildren { point: self, node, limit }.inline_or_call(s)
@@ -124,8 +131,9 @@ impl<S: Simd> PointLanes<S> {
 pub(crate) trait CornerLanes {
     /// The corners relative to a point, scaled: `[corner][axis]`.
     fn relative<S: Simd>(&self, s: S, point: &PointLanes<S>) -> [[S::F; 3]; 3];
-    /// Whether all triangles certainly have a squared distance above `limit`, by the bound for one q for all of them. Most leaves
-    /// whose boxes are near enough are excluded so, in a tenth of the time that [`TriangleLanes`] takes.
+    /// Returns true if all triangles certainly have a squared distance above `limit`, by the bound
+    /// for one q for all of them. Most leaves whose boxes are near enough are excluded so, in a
+    /// tenth of the time that [`TriangleLanes`] takes.
     fn is_beyond<S: Simd>(&self, s: S, point: &PointLanes<S>, limit: f32) -> bool;
 }
 
@@ -241,8 +249,9 @@ impl<S: Simd> TriangleLanes<S> {
         all
     }
 
-    /// Upper bound of the least squared distance of the triangles of `lanes`, at most `f32::MAX`. The point to which q leads is
-    /// off by less than 2^-20 of the reach, ε; for any η, (|q| + ε)² <= (1 + η) |q|² + (1 + 1/η) ε². Here η is 2^-10.
+    /// Upper bound of the smallest squared distance of the triangles of `lanes`, at most
+    /// `f32::MAX`. The point to which q leads is off by less than 2^-20 of the reach, ε; for any η,
+    /// (|q| + ε)² <= (1 + η) |q|² + (1 + 1/η) ε². Here η is 2^-10.
     #[inline(always)]
     pub(crate) fn least_upper_bound(&self, s: S, lanes: u32) -> f32 {
         const SQUARE: f32 = 1.0 + 1.0 / (1 << 9) as f32;
@@ -268,12 +277,14 @@ impl<S: Simd> TriangleLanes<S> {
     }
 }
 
-/// For each triangle a vector from the point to a point of the triangle, which is near the closest one unless rounding prevails.
+/// For each triangle a vector from the point to a point of the triangle, which is near the closest
+/// one unless rounding prevails.
 #[inline(always)]
 fn closest<S: Lanewise>(s: S, corners: &[[S::F; 3]; 3], ab: [S::F; 3], ac: [S::F; 3]) -> [S::F; 3] {
     let [a, b, c] = *corners;
     let (zero, one) = (s.splat(0.0), s.splat(1.0));
-    // Scalar products of the edges with the vectors from the corners to the point, with the sign changed.
+    // Scalar products of the edges with the vectors from the corners to the point, with the sign
+    // changed.
     let (d1, d2) = (dot_lanes(s, ab, a), dot_lanes(s, ac, a));
     let (d3, d4) = (dot_lanes(s, ab, b), dot_lanes(s, ac, b));
     let (d5, d6) = (dot_lanes(s, ab, c), dot_lanes(s, ac, c));

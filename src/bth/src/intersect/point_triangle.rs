@@ -11,11 +11,11 @@
 //! The distance to an edge is a function of the point and the edge alone, so triangles that share
 //! an edge or a vertex have distances of the same bits where the closest point lies on it.
 //!
-//! **Errors.** Let u = 2^-53. Differences of two coordinates have a relative error of u. For vectors q and e of such differences
-//! with largest |components| |q| and |e|, each component of q × e has an error below 8.1 u |q||e|
-//! (two products, each with three relative errors of u, and one subtraction of at most 2|q||e|).
-//! With one more product by a vector r the error of (q × e)·r is below 50 u |q||e||r|, and that of
-//! (q × e)·(r × s) below 150 u |q||e||r||s|.
+//! **Errors.** Let u = 2^-53. Differences of two coordinates have a relative error of u. For
+//! vectors q and e of such differences with largest |components| |q| and |e|, each component of q ×
+//! e has an error below 8.1 u |q||e| (two products, each with three relative errors of u, and one
+//! subtraction of at most 2|q||e|). With one more product by a vector r the error of (q × e)·r is
+//! below 50 u |q||e||r|, and the error of (q × e)·(r × s) is below 150 u |q||e||r||s|.
 //!
 //! The range of f64 holds all these products of f32 coordinates, whose exponents lie between -149
 //! and 128.

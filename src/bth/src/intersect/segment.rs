@@ -54,7 +54,7 @@ fn volume(o: [f64; 3], [p, q, r]: [[f64; 3]; 3], off: f64) -> (f64, f64) {
         + p[1] * (q[2] * r[0] - q[0] * r[2])
         + p[2] * (q[0] * r[1] - q[1] * r[0]);
     let [p, q, r] = [p, q, r].map(size);
-    // Six products of three differences, each of which the errors of two points change by at most
+    // Six products of three differences. The errors of two points change each difference by at most
     // 2·off.
     let moved = 2.0 * off;
     let change = 6.0 * ((p + moved) * (q + moved) * (r + moved) - p * q * r);

@@ -9,11 +9,11 @@
 //! S are crossed at t = 0, or lie in one plane with the line; neither is a hit. So a ray never hits
 //! the surface that it leaves, and never skips a wall, however near.
 //!
-//! **Exactness.** The weight det[d, p-S, q-S] of a corner and the volume (a-S)·n are affine functions of S: where S is a combination of
-//! a, b and c, they are the same combination of their values at a, b and c, which are exact sums
-//! ([`bth_format::exact`]). The combination multiplies these by u and v, numbers of f32. f64
-//! decides most rays before: S rounded to f64 is off by a bound that [`RoundedOrigin`] adds to the
-//! bounds of the errors.
+//! **Exactness.** The weight det[d, p-S, q-S] of a corner and the volume (a-S)·n are affine
+//! functions of S: where S is a combination of a, b and c, they are the same combination of their
+//! values at a, b and c, which are exact sums ([`bth_format::exact`]). The combination multiplies
+//! these by u and v, numbers of f32. f64 decides most rays before: S rounded to f64 is off by a
+//! bound that [`RoundedOrigin`] adds to the bounds of the errors.
 
 use super::exact::{Estimate, Intersection, UncertainWeights, decide_exactly, estimate};
 use super::filter::TriangleBlock;
@@ -31,14 +31,14 @@ pub(crate) const ABOVE_ONE: f32 = 1.0 / (1 << 22) as f32;
 /// It has five roundings of 2^-53, each of at most twice that coordinate.
 const ROUNDING: f64 = 1.0 / (1u64 << 49) as f64;
 
-/// Parts of an affine combination of edges: that of `a`, and differences of two others with `a`,
-/// times a number of f32 each.
+/// Parts of an affine combination of edges: `a`, and the differences of two other edges with `a`,
+/// each times an f32.
 const START_EDGE_PARTS: usize = 9 * EDGE_PARTS;
 /// The same for volumes.
 pub(super) const START_VOLUME_PARTS: usize = 9 * VOLUME_PARTS;
 
-/// Returns true if weights are those of a point of a triangle: finite, not negative, and their sum
-/// not above 1 by more than the rounding of hits.
+/// Returns true if weights describe a point of a triangle: finite, not negative, with a sum that
+/// exceeds 1 by at most the rounding of hits.
 #[inline(always)]
 pub(crate) fn are_weights([u, v]: [f32; 2]) -> bool {
     // Comparisons with NaN are false.

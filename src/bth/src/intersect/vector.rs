@@ -8,7 +8,7 @@ pub(crate) fn wide(v: [f32; 3]) -> [f64; 3] {
     v.map(f64::from)
 }
 
-/// The lesser of two numbers, neither of which is NaN; this comparison compiles to a single vector
+/// The smaller of two numbers that are not NaN. This comparison compiles to a single vector
 /// instruction.
 #[inline(always)]
 pub(crate) fn lesser(a: f64, b: f64) -> f64 {

@@ -232,8 +232,8 @@ impl ObjectRay {
 }
 
 /// The max t in object space that is at most `t` in world space, where it is the product with
-/// `t_scale` = 1 / `scale`, a power of two, rounded to f32. An end at infinity stands for the
-/// farthest t that is finite in world space. NaN stays what it is.
+/// `t_scale` = 1 / `scale`, a power of two, rounded to f32. Infinity gives the farthest t that is
+/// finite in world space. NaN stays NaN.
 pub(super) fn greatest_below(t: f32, scale: f64, t_scale: f32) -> f32 {
     // Products that are denormal are rounded to multiples of twice this; it is lost in the sum with
     // numbers so great that products are exact.

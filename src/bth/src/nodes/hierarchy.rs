@@ -87,17 +87,18 @@ impl NodeHierarchy {
         moved
     }
 
-    /// Whether a node moved, was hidden or became visible in the last update.
+    /// Returns true if a node moved, was hidden or became visible in the last update.
     pub(crate) fn moved(&self, node: u32) -> bool {
         self.state[node as usize] & MOVED != 0
     }
 
-    /// Whether the visibility of a node or of an ancestor hides it, whatever their scales are.
+    /// Returns true if the visibility of a node or of an ancestor hides it, whatever their scales
+    /// are.
     pub(crate) fn invisible(&self, node: u32) -> bool {
         self.state[node as usize] & INVISIBLE != 0
     }
 
-    /// Whether a node or an ancestor is hidden.
+    /// Returns true if a node or an ancestor is hidden.
     pub(crate) fn hidden(&self, node: u32) -> bool {
         self.state[node as usize] & HIDDEN != 0
     }
@@ -132,8 +133,8 @@ impl NodeHierarchy {
         }
     }
 
-    /// Returns true if a track of a node, but for that of weights, may have another value than at
-    /// the time `previous`.
+    /// Returns true if a track of a node, other than its track of weights, may have another value
+    /// than at the time `previous`.
     fn differs(&self, view: &SceneView<'_>, node: usize, previous: f64) -> bool {
         let weights = Property::Weights as u32;
         let mut tracks = self.tracks_of(node).map(|i| &view.tracks[i]).filter(|t| t.property != weights);
@@ -166,7 +167,7 @@ impl NodeHierarchy {
         parts
     }
 
-    /// Whether a node is visible by its flag or its track of visibility.
+    /// Returns true if a node is visible by its flag or its track of visibility.
     fn is_visible(&self, view: &SceneView<'_>, row: u32) -> bool {
         match self.value_of(view, row, Property::Visible) {
             Some(value) => value[0] != 0.0,

@@ -32,7 +32,7 @@ pub(super) struct WalkScratch {
     lists: WalkLists,
 }
 
-/// The elements of a list, as many as there are rays, all with one value.
+/// Resizes a list to one element per ray, all with one value.
 fn filled<T: Clone>(list: &mut Vec<T>, rays: usize, value: T) -> &mut [T] {
     list.clear();
     list.resize(rays, value);

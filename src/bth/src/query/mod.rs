@@ -10,9 +10,9 @@ use crate::intersect::line::widened;
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use bth_format::layout::NONE;
 
-/// What a query looks for: the nearest hit, or any. Kernels ask a goal for it at run time. Goals of
-/// no size have kernels of their own; walks through tetrahedra and batches with vectors of 128 bits
-/// serve both goals by [`EitherGoal`].
+/// What a query looks for: the nearest hit, or any. Kernels ask a goal for it at run time. A goal
+/// of size zero gets a separate kernel. Walks through tetrahedra and batches with vectors of 128
+/// bits serve both goals by [`EitherGoal`].
 pub(crate) trait Goal: Copy {
     /// True if kernels of batches with this goal are compiled for vectors of 128 bits, and for
     /// longer ones.
@@ -127,7 +127,7 @@ pub(crate) struct RayQuery<G> {
 pub(crate) type EitherQuery = RayQuery<EitherGoal>;
 
 impl EitherQuery {
-    /// For any hits: offers a certain intersection of which only bounds of t are known, which
+    /// For any hits: offers a certain intersection for which only bounds of t are known. The bounds
     /// include all roundings. Returns true if the query is complete.
     pub(crate) fn offer_bounds(&mut self, t: (f64, f64)) -> bool {
         let finite = f64::from(f32::MIN) <= t.0 && t.1 <= f64::from(f32::MAX);

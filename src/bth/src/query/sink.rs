@@ -89,7 +89,7 @@ pub(crate) struct Sink<'a> {
     answers: Answers<'a>,
     /// Instance that is reported with a hit if there is no `scene`.
     instance: u32,
-    /// If set, answers are merged into those of the scene's rays.
+    /// If set, answers are merged into the answers of the scene's rays.
     scene: Option<SceneRays<'a>>,
     /// Index in the batch of the ray with index 0 in calls.
     first: usize,
@@ -103,8 +103,8 @@ impl<'a> Sink<'a> {
         Sink { ids, answers, instance, scene: None, first: 0, starts: Starts::NONE }
     }
 
-    /// Merges the answer of each visit into the answer of its ray; `answers` are those of the
-    /// scene's batch.
+    /// Merges the answer of each visit into the answer of its ray; `answers` belong to the scene's
+    /// batch.
     pub(crate) fn of_scene(ids: &'a [u32], answers: Answers<'a>, scene: SceneRays<'a>) -> Self {
         Sink { scene: Some(scene), ..Sink::new(ids, answers, 0) }
     }

@@ -3,8 +3,8 @@
 use super::*;
 use bth_random::Rng;
 
-/// One of a few values, so that equal ones are frequent, some of which lie at the ends of ranges or
-/// are no numbers.
+/// One of a few values, so that equal ones are frequent. Some lie at the ends of ranges, some are
+/// infinite or NaN.
 fn value(rng: &mut Rng) -> f32 {
     const VALUES: [f32; 10] =
         [f32::NEG_INFINITY, -1.0, -0.0, 0.5, 1.0, 1.000_000_1, 2.0, f32::MAX, f32::INFINITY, f32::NAN];

@@ -217,7 +217,7 @@ fn ends<S: Simd>(s: S, lower: [S::F; 3], upper: [S::F; 3]) -> Ends {
     let mut ends = [[0.0; 3]; 2];
     for k in 0..3 {
         ends[0][k] = s.least(lower[k]);
-        // A difference from 0 and a sum with 0 keep zeros positive, as those of positions are.
+        // A difference from 0 and a sum with 0 keep zeros positive, like the zeros of positions.
         ends[1][k] = 0.0 - s.least(s.sub(s.splat(0.0), upper[k]));
     }
     ends

@@ -1,6 +1,6 @@
-//! The expected cost of rays through an object's tree, by the surface area heuristic: the nodes and
-//! leaves that a random line visits if it meets the object's box, which is the sum of the areas of
-//! all boxes relative to that of the box of the object.
+//! The expected cost of rays through an object's tree, by the surface area heuristic: the expected
+//! number of nodes and leaves that a random line through the object's box visits. It is the sum of
+//! the areas of all boxes relative to the area of the object's box.
 
 use bth_format::layout::{CacheLine, NODE_LINES, WIDTH, WideNode};
 use zerocopy::{FromBytes, IntoBytes};
@@ -9,7 +9,7 @@ use zerocopy::{FromBytes, IntoBytes};
 /// of threads.
 const CHUNK: usize = 512 * NODE_LINES;
 
-/// The cost of a tree with given nodes, of which the first is the root; 1 if there are none.
+/// The cost of a tree with given nodes, the root first; 1 if there are no nodes.
 pub(super) fn cost(nodes: &[CacheLine]) -> f64 {
     let Some(root) = nodes.first_chunk::<NODE_LINES>() else { return 1.0 };
     1.0 + sum(nodes) / half_area(bounds(node(root)))

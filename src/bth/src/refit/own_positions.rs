@@ -1,4 +1,4 @@
-//! An object with positions of its own: its memory, and the state of its refits.
+//! An object whose positions differ from its file: its memory, and the state of its refits.
 
 use super::boxes::refit;
 use super::cost::cost;
@@ -7,7 +7,7 @@ use bth_format::file::{DeformableObject, Normals};
 use bth_format::object::ObjectView;
 use bth_format::{Code, Error, File};
 
-/// An object with positions, boxes and leaves of its own.
+/// Positions, boxes and leaves of an object that differ from its file.
 #[derive(Debug)]
 pub(crate) struct OwnPositions {
     object: DeformableObject,
@@ -110,7 +110,7 @@ impl OwnPositions {
         check_finite(&self.staged)
     }
 
-    /// Makes positions that [`Self::stage`] has staged those of the object.
+    /// Gives the object the positions that [`Self::stage`] has staged.
     pub(crate) fn refit_staged(&mut self) {
         let plan = &self.plan;
         let refitted = self.object.refit(&mut self.staged, &mut self.staged_normals, |mut parts| {

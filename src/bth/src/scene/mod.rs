@@ -27,12 +27,12 @@ use std::path::Path;
 /// id is reported. Results depend neither on hints nor on the acceleration structures in the file.
 /// In a file with scene sections, a ray is first transformed into the object's space, where each
 /// component of its origin and direction is rounded to f32 (relative error 2^-24). Among hits of
-/// equal t in several instances that of the lowest index is reported.
+/// equal t in several instances, the instance of the lowest index is reported.
 ///
 /// In files with opacity (`bthc compile --alpha`) rays pass through the transparent parts of
-/// triangles: nearest and any hits, counts, and all other hits are those on parts that are not
-/// transparent. Crossings, winding numbers, [`Self::contains`] and closest points are about the
-/// surface itself and look at no opacity.
+/// triangles: nearest hits, any hits, counts and lists of hits consider only hits on opaque parts.
+/// Crossings, winding numbers, [`Self::contains`] and closest points are about the surface itself
+/// and ignore opacity.
 #[derive(Debug)]
 pub struct Scene {
     objects: Objects,
@@ -79,16 +79,16 @@ pub fn from_file(file: File) -> Result<Scene, Error> {
 ///
 /// # Safety
 /// Until the scene, and every scene that [`SceneBuilder`](crate::SceneBuilder) makes of it, is
-/// dropped, the file must not be written to or truncated (see [`File::map`]). Its contents must be
-/// such that [`open`] accepts them, as those of unchanged files that `bthc` has written. With other
-/// contents tracing may panic or not terminate, but it does not read out of bounds.
+/// dropped, the file must not be written to or truncated (see [`File::map`]). [`open`] must accept
+/// its contents. It accepts unchanged files that `bthc` has written. With other contents tracing
+/// may panic or not terminate, but it does not read out of bounds.
 ///
 /// # Errors
-/// As [`open`], except for those about the contents of objects.
+/// The errors of [`open`], except errors about the contents of objects.
 #[allow(unsafe_code)]
 pub unsafe fn map(path: impl AsRef<Path>) -> Result<Scene, Error> {
     let path = path.as_ref();
-    // SAFETY: the caller's contract includes that of `File::map`.
+    // SAFETY: the caller's contract includes the contract of `File::map`.
     let file = unsafe { File::map(path)? };
     Scene::with_world(file).map_err(|e| e.in_file(path))
 }

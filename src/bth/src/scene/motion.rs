@@ -49,8 +49,8 @@ impl Scene {
         self.world().and_then(|_| self.objects().sole_file()?.scene())
     }
 
-    /// Time of the scene in seconds: after opening, that of its first frame; 0 without scene
-    /// sections.
+    /// Time of the scene in seconds. After opening, it is the time of the first frame; 0 without
+    /// scene sections.
     pub fn seconds(&self) -> f64 {
         self.world().map_or(0.0, |world| world.seconds)
     }
@@ -73,7 +73,7 @@ impl Scene {
     /// Sets the time of the scene to that of a frame, which may lie outside of the range of frames.
     ///
     /// # Errors
-    /// As [`Self::set_seconds`].
+    /// The errors of [`Self::set_seconds`].
     pub fn set_frame(&mut self, frame: i32) -> Result<Update, Error> {
         let rate = self.description().map_or(1.0, |view| view.scene[0].rate);
         self.set_seconds(f64::from(frame) / rate)
@@ -175,18 +175,18 @@ impl Scene {
     }
 
     /// Gives an object new positions: one for each vertex of its source, in the source's order, in
-    /// the space of the object. That order is the one of the vertices of a PLY or OFF file and of
-    /// the `v` lines of an OBJ file, that of the corners of an STL file's triangles, that of the
-    /// arrays for triangles from memory, and for glTF that of the vertices of one primitive after
-    /// the other.
+    /// the space of the object. For a PLY or OFF file this is the order of its vertices, for OBJ
+    /// the order of its `v` lines, for STL the order of the corners of its triangles, for triangles
+    /// from memory the order of the arrays, and for glTF the vertices of one primitive after the
+    /// other.
     ///
     /// The boxes of the object's nodes are computed again, by the threads of the current pool with
-    /// the feature `rayon`, in memory of the scene's own; the file is not touched, and other scenes
-    /// with the same file are not either. All queries of this scene then answer for the new
-    /// positions, as exactly as before. Triangles of zero area are not hit and are no part of the
-    /// surface, as in a file that is compiled with these positions. The tree remains that of the
-    /// pose that was compiled: [`Update::deformed_cost_ratio`] tells how much worse it is for the
-    /// new one.
+    /// the feature `rayon`, in memory that belongs to this scene. The file and other scenes with
+    /// the same file do not change. All queries of this scene then answer for the new positions, as
+    /// exactly as before. Triangles of zero area are not hit and are not part of the surface, as in
+    /// a file that is compiled with these positions. The tree still has the structure that was
+    /// compiled for the first pose: [`Update::deformed_cost_ratio`] tells how much worse it is for
+    /// the new one.
     ///
     /// # Errors
     /// `BTH-O003` if there is no such object, `BTH-S006` if it was not compiled with
@@ -245,9 +245,9 @@ impl Scene {
         }
     }
 
-    /// The positions of an object's vertices at the scene's time: those of the file, or those that
-    /// skins and morph targets or [`Self::set_positions`] have given the object. They are in the
-    /// space of the object, of an object with a skin in world space.
+    /// The positions of an object's vertices at the scene's time: from the file, from skins and
+    /// morph targets, or from [`Self::set_positions`]. They are in the space of the object, or in
+    /// world space if the object has a skin.
     /// [`ObjectView::triangles`](bth_format::ObjectView::triangles) refers to them. Empty if the
     /// file does not keep them (it was compiled with `--no-geometry`).
     ///
@@ -257,8 +257,8 @@ impl Scene {
         self.view(object).positions
     }
 
-    /// The normals at the corners of a triangle, given those of the file, as the deformer of its
-    /// object turns them; of any length. `None` if none deforms the object.
+    /// The normals at the corners of a triangle, turned from the normals in the file by the
+    /// deformer of its object; of any length. `None` if nothing deforms the object.
     pub(crate) fn deformed_normals(
         &self,
         object: u32,

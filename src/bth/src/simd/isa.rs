@@ -247,8 +247,8 @@ impl Isa {
         run_scalar(kernel)
     }
 
-    /// As [`Self::run`], for the chosen instruction set, which is known to be available. There is
-    /// then no call but that of the kernel, so that callers save no registers.
+    /// Like [`Self::run`], for the chosen instruction set, which is known to be available. The only
+    /// call is then the call of the kernel, so callers save no registers.
     #[inline(always)]
     pub(crate) fn run_found<K: Kernel>(self, kernel: K) -> K::Output {
         with_vectors!(self, K, found, simd => return simd.run(kernel));

@@ -81,8 +81,8 @@ pub trait Part<S> {
 }
 
 /// Operations on vectors that treat each lane alone. A vector has sixteen lanes or, in a
-/// [piece](Simd::Piece), some of the sixteen; arrays always have sixteen elements, of which a piece
-/// reads and writes its own. Where masks are given as bits, bit i stands for lane i of sixteen.
+/// [piece](Simd::Piece), some of the sixteen; arrays always have sixteen elements, and a piece
+/// reads and writes its part of them. Where masks are given as bits, bit i is lane i of sixteen.
 pub trait Lanewise: Copy + 'static {
     /// f32 lanes.
     type F: Copy;
@@ -129,7 +129,7 @@ pub trait Lanewise: Copy + 'static {
             }
         }
     }
-    /// The first three elements of the rows whose indices, modulo 16, stand in `at`.
+    /// The first three elements of the rows whose indices, modulo 16, are in `at`.
     #[inline(always)]
     fn lookup_rows(self, rows: &[[f32; 4]; LANES], at: &[u8; LANES]) -> [Self::F; 3] {
         let mut out = [[0.0; LANES]; 3];
@@ -184,7 +184,7 @@ pub trait Simd: Lanewise {
     /// Vectors of four f64.
     type Doubles: Doubles;
     fn doubles(self) -> Self::Doubles;
-    /// The largest of the first three elements, none of which is negative, in all four. It is
+    /// The largest of the first three elements, in all four. No element may be negative. It is
     /// compared by its bits, which takes less time and finds NaN, which is greater than all
     /// numbers.
     #[inline(always)]
@@ -211,12 +211,12 @@ pub trait Simd: Lanewise {
     /// As [`Self::pick`].
     fn pick_mask(piece: Self::Piece, m: &Self::M) -> <Self::Piece as Lanewise>::M;
 
-    /// Runs a part of a kernel as a function of its own, which all kernels of the instruction set
-    /// share: for parts that many kernels need and that run long beside a call.
+    /// Calls a part of a kernel as a function that all kernels of the instruction set share: for
+    /// parts that many kernels need and that run long compared with a call.
     fn call<P: Part<Self>>(self, part: P) -> P::Output;
     /// Lane `at[i] % 16` of the table.
     fn lookup(self, table: Self::F, at: Self::U) -> Self::F;
-    /// The smallest of all lanes, none of which may be NaN.
+    /// The smallest of all lanes. No lane may be NaN.
     fn least(self, a: Self::F) -> f32;
     /// Loads rows of three: lane i of vector k is element k of row `row[i]`.
     ///
@@ -255,7 +255,7 @@ pub trait Simd: Lanewise {
         }
     }
     /// Assigns the elements of `from` in order to the lanes whose mask is set, from `from[0]` on;
-    /// the other lanes are those of `a`.
+    /// the other lanes keep the values of `a`.
     fn expand(self, a: Self::F, m: Self::M, from: &[f32; LANES]) -> Self::F;
     /// As [`Self::lookup`].
     fn lookup_u(self, table: Self::U, at: Self::U) -> Self::U;
@@ -361,7 +361,7 @@ pub trait Simd: Lanewise {
     }
 }
 
-/// The lanes of a [piece](Simd::Piece), a bit each.
+/// The lanes of a [piece](Simd::Piece), one bit per lane.
 #[inline(always)]
 pub(crate) fn lanes_of_piece<S: Simd>(i: usize) -> u32 {
     let lanes = LANES / S::PIECES;

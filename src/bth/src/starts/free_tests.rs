@@ -202,7 +202,7 @@ fn lanes_decide_as_single_rays() {
     }
 }
 
-/// Batches of which nothing, little and most ends.
+/// Batches in which no rays, few rays and most rays end.
 #[test]
 fn rays_that_end_change_no_answer() {
     for file in [DIRECTIONS, DISTANCES] {

@@ -12,8 +12,8 @@ pub(super) const DIRECTIONS: [f32; 2] = [1.0 / (1 << 20) as f32, (1 << 20) as f3
 pub(super) const SLACK: f32 = 1.0 / (1 << 20) as f32;
 /// Column of directions that are too steep.
 pub(super) const NO_COLUMN: u32 = LANES as u32 - 1;
-/// What is lost where the products of a term underflow, also if the caller has denormal numbers
-/// flushed to zero: that of eight.
+/// Bound of the loss where up to eight products underflow, also if the caller has denormal numbers
+/// flushed to zero.
 const UNDERFLOW: f32 = 8.0 * f32::MIN_POSITIVE;
 /// Unit of rounding.
 const U: f32 = f32::EPSILON / 2.0;
@@ -74,17 +74,17 @@ fn cross<S: Lanewise>(s: S, a: [S::F; 3], b: [S::F; 3]) -> [S::F; 3] {
 /// The columns and rows of the bins of directions d ([`bth_format::layout::free_bin`]), or
 /// [`NO_COLUMN`] for both, given the first edge, the normal and their product with d.
 ///
-/// The errors of the axes are 5 units of the lengths of the edges, those of their products with a
-/// direction a few more: relative to the normal, which is at least 1/128 of the product of the
-/// edges, less than 2^-13, a sixteenth of the margin. For edges and directions in their ranges
-/// nothing overflows, and what underflows is less than that.
+/// The errors of the axes are 5 units of the lengths of the edges; the errors of their products
+/// with a direction are a few units more: relative to the normal, which is at least 1/128 of the
+/// product of the edges, less than 2^-13, a sixteenth of the margin. For edges and directions in
+/// their ranges nothing overflows, and what underflows is less than that.
 #[inline(always)]
 fn columns<S: Lanewise>(s: S, [e, normal]: [[S::F; 3]; 2], d: [S::F; 3], height: S::F) -> [S::U; 2] {
     let per_height = s.div(s.splat(1.0), height);
     let per_square = s.div(s.splat(1.0), dot_lanes(s, e, e));
     let x = s.mul(dot_lanes(s, d, e), per_height);
     let y = s.mul(dot_lanes(s, d, cross(s, normal, e)), per_height);
-    // Squares of the slopes. Signs are those of the components, not of the slopes, which are
+    // Squares of the slopes. Signs are taken from the components, not from the slopes, which are
     // negated on the back.
     let x_square = s.mul(s.mul(s.mul(x, x), per_square), dot_lanes(s, normal, normal));
     let y_square = s.mul(s.mul(y, y), per_square);

@@ -18,7 +18,7 @@ pub(crate) enum StartError {
     NoTriangle,
     /// The triangle has no area.
     NoArea,
-    /// The weights are not those of a point of the triangle.
+    /// The weights do not describe a point of the triangle.
     Weights,
 }
 

@@ -108,7 +108,8 @@ impl<R: Row> Kernel for PrepareKernel<'_, '_, R> {
         // What is stored lane by lane and loaded at once waits until the stores are done, so
         // sixteen rays are fetched before the sixteen before them are decided.
         let mut triangles = [StartTriangles::NONE; 2];
-        // Sixteen indices are stored at once; those of rays that have ended are overwritten.
+        // Sixteen indices are stored at once; the next store overwrites the indices of rays that
+        // have ended.
         let mut end = order.len();
         order.resize(end + rays.len() + LANES, 0);
         let mut ahead = [ids(s, blocks, 0, instance), ids(s, blocks, 1, instance)];

@@ -134,7 +134,7 @@ pub(crate) struct StartTriangles {
     pub(super) bins: [[u32; LANES]; 4],
     /// The sectors of their fronts and backs.
     pub(super) sectors: [[u32; LANES]; 2],
-    /// True if all rays have columns of their own.
+    /// True if each ray has a separate column, even where rays start on the same triangle.
     is_expanded: bool,
 }
 

@@ -1,7 +1,8 @@
-//! Tet walks of a batch of rays in one tet leaf: the state of the batch, and the choice between rays that are prepared
-//! and faces that are tested.
+//! Tet walks of a batch of rays in one tet leaf: the state of the batch, and the choice between
+//! rays that are prepared and faces that are tested.
 //!
-//! The kernel is in [`super::rounds`]; the decisions that its f32 lanes leave open are made in [`super::decide`].
+//! The kernel is in [`super::rounds`]; the decisions that its f32 lanes leave open are made in
+//! [`super::decide`].
 
 use super::queue::PreparedQueue;
 use super::records::LaneRecords;
@@ -23,7 +24,7 @@ pub(crate) struct WalkBatch<'a> {
 }
 
 impl<'a> WalkBatch<'a> {
-    /// A batch of which no ray has been walked. All slices have one element per ray.
+    /// A batch in which no ray has been walked. All slices have one element per ray.
     pub(crate) fn new(
         object: &'a ObjectView<'a>,
         records: LaneRecords<'a>,
@@ -37,7 +38,8 @@ impl<'a> WalkBatch<'a> {
         WalkBatch { walks, queries }
     }
 
-    /// Returns true if lanes can address the tetrahedra of an object: gathers need indices of words below 2^31.
+    /// Returns true if lanes can address the tetrahedra of an object: gathers need indices of words
+    /// below 2^31.
     pub(crate) fn fits(object: &ObjectView<'_>) -> bool {
         const MAX_WORDS: usize = 1 << 31;
         object.records.len() < MAX_WORDS / 8

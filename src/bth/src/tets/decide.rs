@@ -1,8 +1,10 @@
-//! The decisions that the f32 lanes of a batch of tet walks leave open, made in f64 for one ray at a time.
+//! The decisions that the f32 lanes of a batch of tet walks leave open, made in f64 for one ray at
+//! a time.
 //!
-//! There are three: the exact test of a constrained face that a line crosses, where [`super::reached`] does not decide it; the step
-//! of a line that passes close to an edge, after which the ray returns to the lanes; and the flood, where a sign is uncertain in f64,
-//! too. Therefore the answers have the same bits as those of walks of single rays.
+//! There are three: the exact test of a constrained face that a line crosses, where
+//! [`super::reached`] does not decide it; the step of a line that passes close to an edge, after
+//! which the ray returns to the lanes; and the flood, where a sign is uncertain in f64, too.
+//! Therefore the answers have the same bits as the answers of single rays.
 
 use super::batch::WalkBatch;
 use super::lanes::UNCERTAIN;
@@ -12,7 +14,8 @@ use super::walks::{Reached, WalkStart, WalkState, Walks};
 use crate::intersect::line::Line;
 use bth_format::layout::{FACE_BIT, NONE, TetFace};
 
-/// Greatest number of times that a ray returns to the lanes; after it, the ray is walked to its end in f64.
+/// Greatest number of times that a ray returns to the lanes; after it, the ray is walked to its end
+/// in f64.
 const MAX_RETURNS: u8 = 16;
 /// Slack of bounds of t, relative to the bound. It exceeds the sum of all rounding errors.
 const T_BOUND_SLACK: f64 = 1.0 / (1 << 20) as f64;
@@ -107,8 +110,8 @@ impl WalkBatch<'_> {
         }
     }
 
-    /// Tests exactly a constrained face that the line of a ray certainly crosses, and ends the walk or returns the ray to the
-    /// lanes in the tetrahedron behind the face.
+    /// Tests exactly a constrained face that the line of a ray certainly crosses, and ends the walk
+    /// or returns the ray to the lanes in the tetrahedron behind the face.
     #[inline(never)]
     pub(super) fn test_face(&mut self, Reached { ray, face }: Reached) {
         let line = self.walks.line(ray);
@@ -116,7 +119,8 @@ impl WalkBatch<'_> {
         let constrained: &TetFace = &self.walks.object.tet_faces[face as usize];
         let mut query = self.queries[ray as usize];
         let done = walker.offer(constrained, &mut query);
-        // If the line certainly leaves the next tetrahedron beyond the limit, no face further along it can change the result.
+        // If the line certainly leaves the next tetrahedron beyond the limit, no face further along
+        // it can change the result.
         let mut vertex = constrained.vertex;
         let mut corner = vertex.map(|v| walker.project(v));
         let side = usize::from(Line::turns_clockwise(corner.each_ref()));
@@ -139,8 +143,8 @@ impl WalkBatch<'_> {
         }
     }
 
-    /// Evaluates a lane that has stopped. `start` holds its words, with `tet` as described at `word::TET`; `depth` holds the
-    /// depths of the corners of its face, if these are kept.
+    /// Evaluates a lane that has stopped. `start` holds its words, with `tet` as described at
+    /// `word::TET`; `depth` holds the depths of the corners of its face, if these are kept.
     #[inline(always)]
     pub(super) fn evaluate(&mut self, start: WalkStart, depth: [f32; 3]) {
         let WalkStart { ray, tet, .. } = start;
@@ -156,7 +160,8 @@ impl WalkBatch<'_> {
         self.walks.reached.push(Reached { ray, face: tet & !FACE_BIT });
     }
 
-    /// Whether the depths of the corners of a face that the line of a ray certainly crosses complete the ray's query.
+    /// Returns true if the depths of the corners of a face that the line of a ray certainly crosses
+    /// complete the ray's query.
     fn is_certainly_hit(&mut self, ray: u32, [a, b, c]: [f32; 3]) -> bool {
         let (least, greatest) = (f64::from(a.min(b).min(c)), f64::from(a.max(b).max(c)));
         let per_t = self.walks.rays[ray as usize].direction.iter().fold(0.0_f32, |m, d| m.max(d.abs()));

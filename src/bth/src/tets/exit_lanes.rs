@@ -1,8 +1,10 @@
-//! Where the lines of sixteen rays leave the tetrahedra behind faces that they certainly cross, in f64: what [`super::walk`] computes for
-//! one ray with `exit` and [`Line::t_before`], without branches, so that the compiler vectorizes it.
+//! Where the lines of sixteen rays leave the tetrahedra behind faces that they certainly cross, in
+//! f64: what [`super::walk`] computes for one ray with `exit` and [`Line::t_before`], without
+//! branches, so that the compiler vectorizes it.
 //!
-//! Projections, their errors and the signs of cross products are those of [`Line`]. Coordinates come permuted to the axes of each ray's
-//! projection, so that no lane selects an axis. The reach in the error bound is that of the four vertices of the tetrahedron.
+//! Projections, their errors and the signs of cross products are computed as in [`Line`].
+//! Coordinates come permuted to the axes of each ray's projection, so that no lane selects an axis.
+//! The reach in the error bound is the reach of the four vertices of the tetrahedron.
 
 use crate::intersect::exact::RATIO_ERROR;
 use crate::intersect::exact_lanes::F32Lanes;
@@ -10,13 +12,15 @@ use crate::intersect::line::Line;
 use crate::intersect::vector::{greater, max_norm};
 use crate::simd::LANES;
 
-/// Sixteen rays and tetrahedra, by lane. Coordinates are along the axes of a ray's projection, of which the third is that of the depth.
+/// Sixteen rays and tetrahedra, by lane. Coordinates are along the axes of a ray's projection. The
+/// third axis is the depth.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Exits {
     pub(super) origin: [F32Lanes; 3],
     pub(super) direction: [F32Lanes; 3],
-    /// The corners of the entered face, counterclockwise along the ray, and the fourth vertex, `[vertex][axis]`.
+    /// The corners of the entered face, counterclockwise along the ray, and the fourth vertex,
+    /// `[vertex][axis]`.
     pub(super) vertex: [[F32Lanes; 3]; 4],
 }
 
@@ -24,7 +28,8 @@ impl Exits {
     pub(super) const NONE: Exits =
         Exits { origin: [[0.0; LANES]; 3], direction: [[0.0; LANES]; 3], vertex: [[[0.0; LANES]; 3]; 4] };
 
-    /// Lower bounds of the t at which the lines leave their tetrahedra; -∞ or NaN where a sign is uncertain.
+    /// Lower bounds of the t at which the lines leave their tetrahedra; -∞ or NaN where a sign is
+    /// uncertain.
     #[inline(always)]
     pub(super) fn t_before(&self) -> [f64; LANES] {
         let mut out = [0.0; LANES];
@@ -65,7 +70,7 @@ impl Exits {
             positive[k] = side[k] > bound;
             negative[k] = side[k] < -bound;
         }
-        // The face of exit has the fourth vertex in place of one corner.
+        // The face of exit has the fourth vertex instead of one corner.
         let replaced = [positive[1] & negative[2], negative[0] & positive[2], positive[0] & negative[1]];
         let weight = [
             select(replaced[2], -side[1], select(replaced[1], side[2], 0.0)),

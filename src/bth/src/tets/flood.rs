@@ -1,10 +1,11 @@
-//! Fallback of a tet walk for lines that pass through an edge or a vertex: a flood fill over all tetrahedra that the line may
-//! touch.
+//! Fallback of a tet walk for lines that pass through an edge or a vertex: a flood fill over all
+//! tetrahedra that the line may touch.
 //!
-//! The flood starts at the hull faces that the line may touch within the bounds of rounding errors, and crosses every such face.
-//! All tetrahedra at a vertex or an edge are connected through faces that contain the vertex or edge. Therefore the flood reaches
-//! every tetrahedron that the line touches, and every constrained face that the exact test can accept. Each tetrahedron is
-//! visited once, so the flood ends.
+//! The flood starts at the hull faces that the line may touch within the bounds of rounding errors,
+//! and crosses every such face. All tetrahedra at a vertex or an edge are connected through faces
+//! that contain the vertex or edge. Therefore the flood reaches every tetrahedron that the line
+//! touches, and every constrained face that the exact test can accept. Each tetrahedron is visited
+//! once, so the flood ends.
 
 use super::records::{Entered, ReadRecords};
 use super::walk::{TetWalker, WalkOutcome};
@@ -13,8 +14,8 @@ use crate::query::{Count, EitherQuery};
 use bth_format::layout::{FACE_BIT, NONE, TetFace};
 use std::collections::BTreeSet;
 
-/// The tetrahedra that a flood has visited, or the faces. Around most vertices these are about ten, around the center of a fan as
-/// many as the leaf holds.
+/// The tetrahedra that a flood has visited, or the faces. Around most vertices these are about ten,
+/// around the center of a fan up to all of the leaf.
 pub(crate) struct VisitedSet {
     /// The elements that were inserted first. An array needs no allocation.
     first: [u32; VisitedSet::FIRST],
@@ -46,13 +47,14 @@ impl VisitedSet {
     }
 }
 
-/// Tetrahedra that a flood has yet to pass, with the faces through which it enters them. Most are few enough to need no
-/// allocation.
+/// Tetrahedra that a flood has yet to pass, with the faces through which it enters them. Most are
+/// few enough to need no allocation.
 type Pending = smallvec::SmallVec<[(u32, Entered); 64]>;
 
 /// Receiver of the constrained faces that a flood reaches.
 pub(crate) trait FaceReceiver {
-    /// Receives a face that the line may touch, once or from both sides. Returns whether the query is complete.
+    /// Receives a face that the line may touch, once or from both sides. Returns whether the query
+    /// is complete.
     fn receive(&mut self, face: &TetFace) -> bool;
     /// Upper bound of the exact t of intersections that can still change the result.
     fn limit(&self) -> f64;
@@ -74,8 +76,8 @@ impl FaceReceiver for Offering<'_, '_> {
 }
 
 impl TetWalker<'_> {
-    /// Offers to the query all constrained faces of the leaf that the line can touch up to the query's limit. Returns `Done` if
-    /// the query is complete, else `Left`.
+    /// Offers to the query all constrained faces of the leaf that the line can touch up to the
+    /// query's limit. Returns `Done` if the query is complete, else `Left`.
     pub(crate) fn flood<C: Count>(&self, query: &mut EitherQuery, count: &mut C) -> WalkOutcome {
         if self.flood_faces(&mut Offering { walker: self, query }, count) {
             WalkOutcome::Done
@@ -84,8 +86,8 @@ impl TetWalker<'_> {
         }
     }
 
-    /// Passes all constrained faces of the leaf that the line can touch up to the receiver's limit. Returns whether the query is
-    /// complete.
+    /// Passes all constrained faces of the leaf that the line can touch up to the receiver's limit.
+    /// Returns whether the query is complete.
     #[inline(never)]
     pub(crate) fn flood_faces<C: Count>(&self, receiver: &mut dyn FaceReceiver, count: &mut C) -> bool {
         count.flood();
@@ -125,7 +127,7 @@ impl TetWalker<'_> {
         false
     }
 
-    /// Whether the line may touch the closed face; false only if it certainly does not.
+    /// Returns true if the line may touch the closed face; false only if it certainly does not.
     fn touches(&self, corner: &[Projected; 3]) -> bool {
         let sides = self.sides(corner);
         !(sides.contains(&Sign::Positive) && sides.contains(&Sign::Negative))

@@ -2,33 +2,37 @@
 //!
 //! The method is that of [`super::walk`]; a sign is used only if it is certain in f32.
 //!
-//! **Error of a cross product.** Let u = 2^-24, let (x, y, z) be the computed projection of a point, where z is its depth, and
-//! let W = |x| + |y| + |z|. The differences from the origin are off by a factor of 1 + u, and so is the shear, at most 1. With
-//! the roundings of the product and of the last difference, x and y are off by u (2|x| + 4|z|), less than δ = 4.1 u W.
-//! For two points a and b let S = |x| + |y|. Their cross product is then off by δa Sb + δb Sa + 2 δa δb because of the points,
-//! and by 2 u Sa Sb because of its own roundings. Where B is at least the W of both points, the sum is less than
-//! 5.1 u B (Sa + Sb) + 34 u² B². What is computed is a bound of E = 6 u B (Sa + T + 8 u B).
+//! **Error of a cross product.** Let u = 2^-24, let (x, y, z) be the computed projection of a
+//! point, where z is its depth, and let W = |x| + |y| + |z|. The differences from the origin are
+//! off by a factor of 1 + u, and so is the shear, at most 1. With the roundings of the product and
+//! of the last difference, x and y are off by u (2|x| + 4|z|), less than δ = 4.1 u W. For two
+//! points a and b let S = |x| + |y|. Their cross product is then off by δa Sb + δb Sa + 2 δa δb
+//! because of the points, and by 2 u Sa Sb because of its own roundings. Where B is at least the W
+//! of both points, the sum is less than 5.1 u B (Sa + Sb) + 34 u² B². What is computed is a bound
+//! of E = 6 u B (Sa + T + 8 u B).
 //!
-//! B and T are the greatest W and S of the points that the lane has projected so far, and B is at least 2^-38. Therefore E
-//! exceeds 2^-119, which is more than the effect of underflow. From B = 2^61 on, where products might overflow, E is infinite and
-//! no sign is certain. One E serves all three products of a step. Of the diffuse rays in a scanned model, fewer than one in 500
-//! have an uncertain sign.
+//! B and T are the largest W and S of the points that the lane has projected so far, and B is at
+//! least 2^-38. Therefore E exceeds 2^-119, which is more than the effect of underflow. From B =
+//! 2^61 on, where products might overflow, E is infinite and no sign is certain. One E serves all
+//! three products of a step. Of the diffuse rays in a scanned model, fewer than one in 500 have an
+//! uncertain sign.
 //!
-//! The two signs that select the face of exit are all that a step needs: the entered face was crossed with certain signs, so the
-//! signs of the face of exit are certain, too.
+//! The two signs that select the face of exit are all that a step needs: the entered face was
+//! crossed with certain signs, so the signs of the face of exit are certain, too.
 
 use super::records::{EnteredLanes, LaneRecords};
 use crate::simd::Simd;
 use bth_format::layout::{FACE_BIT, NONE};
 
-/// u = 2^-24, the greatest relative error of a rounding.
+/// u = 2^-24, the largest relative error of a rounding.
 const U: f32 = 1.0 / (1 << 24) as f32;
-/// The least value of B in the error bound at the head of this file.
+/// The smallest value of B in the error bound at the head of this file.
 const LEAST_REACH: f32 = 1.0 / (1u64 << 38) as f32;
 /// Factor by which a B of 2^61 or more becomes infinite.
 const TO_INFINITY: f32 = (1u128 << 67) as f32;
 
-/// An array of three elements. `array::map` would call a closure that is not compiled for the kernel's instruction set.
+/// An array of three elements. `array::map` would call a closure that is not compiled for the
+/// kernel's instruction set.
 macro_rules! three {
     (|$i:ident| $element:expr) => {
         [
@@ -49,15 +53,17 @@ macro_rules! three {
 }
 pub(super) use three;
 
-/// Set in the `TET` word of a lane that stops because a sign is uncertain; the lower bits hold the tetrahedron.
+/// Set in the `TET` word of a lane that stops because a sign is uncertain; the lower bits hold the
+/// tetrahedron.
 pub(super) const UNCERTAIN: u32 = FACE_BIT | 1 << 30;
 
 /// Indices of the u32 values of a lane.
 pub(super) mod word {
-    /// Index of the tetrahedron. In a lane that has stopped: the link behind the face at which it stopped, or the tetrahedron's
-    /// index with [`super::UNCERTAIN`].
+    /// Index of the tetrahedron. In a lane that has stopped: the link behind the face at which it
+    /// stopped, or the tetrahedron's index with [`super::UNCERTAIN`].
     pub(crate) const TET: usize = 0;
-    /// The opposite vertex that is stored in the link that was followed. It is used in the format `Link32` only.
+    /// The opposite vertex that is stored in the link that was followed. It is used in the format
+    /// `Link32` only.
     pub(crate) const APEX: usize = 1;
     /// The link behind the entered face, as the record of the tetrahedron stores it.
     pub(crate) const BEHIND: usize = 2;
@@ -76,7 +82,8 @@ pub(super) mod word {
 pub(super) mod float {
     /// Three elements: the ray's origin along the axes of the lane.
     pub(crate) const ORIGIN: usize = 0;
-    /// Two elements: the direction in the plane of projection, divided by its |component| along the axis of the depth.
+    /// Two elements: the direction in the plane of projection, divided by its |component| along the
+    /// axis of the depth.
     pub(crate) const SHEAR: usize = 3;
     /// Three elements: x of the projected corners of the entered face.
     pub(crate) const X: usize = 5;
@@ -138,7 +145,8 @@ impl<S: Simd> Extent<S> {
     }
 }
 
-/// Twice the signed area of the triangle (line, a, b) in the plane of projection, with an error below E.
+/// Twice the signed area of the triangle (line, a, b) in the plane of projection, with an error
+/// below E.
 #[inline(always)]
 pub(super) fn cross<S: Simd>(s: S, a: &ProjectedLanes<S>, b: &ProjectedLanes<S>) -> S::F {
     s.fnma(a.y, b.x, s.mul(a.x, b.y))
@@ -166,8 +174,8 @@ impl<S: Simd> Lanes<S> {
         ProjectedLanes { x: f[float::X + i], y: f[float::Y + i], depth: f[float::DEPTH + i] }
     }
 
-    /// Positions of vertices relative to the rays' origins, along the axes of the lanes. `vertices` are rows of x, y, z and an
-    /// unused word.
+    /// Positions of vertices relative to the rays' origins, along the axes of the lanes. `vertices`
+    /// are rows of x, y, z and an unused word.
     #[inline(always)]
     pub(super) fn gather_positions(&self, s: S, m: S::M, vertices: &[[f32; 4]], vertex: S::U) -> [S::F; 3] {
         let [x, y, z, _] = s.rows4(m, vertices, vertex);
@@ -175,8 +183,9 @@ impl<S: Simd> Lanes<S> {
         three!(|k| s.sub(along[k], self.floats[float::ORIGIN + k]))
     }
 
-    /// Permutes coordinates to the axes of the lanes: first the two axes of the plane of projection, then the axis of the depth.
-    /// The two follow the axis of the depth cyclically, and are swapped for rays whose direction along that axis is negative.
+    /// Permutes coordinates to the axes of the lanes: first the two axes of the plane of
+    /// projection, then the axis of the depth. The two follow the axis of the depth cyclically, and
+    /// are swapped for rays whose direction along that axis is negative.
     #[inline(always)]
     pub(super) fn permute(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
         let axis = self.words[word::AXIS];
@@ -198,8 +207,8 @@ impl<S: Simd> Lanes<S> {
     }
 }
 
-/// Results that one part of a step passes to the next. A step has three parts, so that the gathers of several groups of lanes
-/// overlap.
+/// Results that one part of a step passes to the next. A step has three parts, so that the gathers
+/// of several groups of lanes overlap.
 #[derive(Clone, Copy)]
 pub(super) struct Step<S: Simd> {
     /// The fourth vertex of the tetrahedron.
@@ -254,8 +263,9 @@ impl<S: Simd> Lanes<S> {
         step.position = self.gather_positions(s, active, vertices, step.apex);
     }
 
-    /// Second part of a step: finds the face through which the line leaves the tetrahedron, and stores it as the entered face of
-    /// the next. The depths of its corners are stored only if `keeps_depths` is set.
+    /// Second part of a step: finds the face through which the line leaves the tetrahedron, and
+    /// stores it as the entered face of the next. The depths of its corners are stored only if
+    /// `keeps_depths` is set.
     #[inline(always)]
     pub(super) fn choose_exit(&mut self, s: S, keeps_depths: bool, step: &mut Step<S>) {
         let apex = self.project(s, step.position);
@@ -295,9 +305,10 @@ impl<S: Simd> Lanes<S> {
         }
     }
 
-    /// Third part of a step: moves to the tetrahedron behind the face of exit. A walk stops where it reaches a constrained face,
-    /// leaves the hull or, where depths are kept, passes its limit; `TET` is then a link with [`FACE_BIT`]. A walk with an uncertain sign
-    /// stops with [`UNCERTAIN`] in `TET` and is otherwise unchanged.
+    /// Third part of a step: moves to the tetrahedron behind the face of exit. A walk stops where
+    /// it reaches a constrained face, leaves the hull or, where depths are kept, passes its limit;
+    /// `TET` is then a link with [`FACE_BIT`]. A walk with an uncertain sign stops with
+    /// [`UNCERTAIN`] in `TET` and is otherwise unchanged.
     #[inline(always)]
     pub(super) fn follow_link(&mut self, s: S, one: S::U, step: &Step<S>, records: &LaneRecords<'_>) {
         let (tet, behind) = (self.words[word::TET], self.words[word::BEHIND]);
@@ -322,8 +333,8 @@ mod tests {
     use crate::tets::queue::PreparedWalks;
     use bth_random::Rng;
 
-    /// For sixteen rays with three points each: the cross products of the points in cyclic order, their bound, and the bits of
-    /// the rays that f32 can represent.
+    /// For sixteen rays with three points each: the cross products of the points in cyclic order,
+    /// their bound, and the bits of the rays that f32 can represent.
     struct CrossProducts<'a>(&'a [Ray], &'a [[f32; 4]]);
 
     impl Kernel for CrossProducts<'_> {

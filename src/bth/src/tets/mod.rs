@@ -1,7 +1,8 @@
 //! Walks of rays through the tetrahedra of tet leaves, in either record ([`records`]).
 //!
-//! A single ray is walked in f64 ([`walk`], [`flood`]). The rays of a batch are walked in f32, sixteen to a vector
-//! ([`batch`], [`queue`], [`lanes`], [`rounds`]), and in f64 where f32 does not decide ([`decide`]).
+//! A single ray is walked in f64 ([`walk`], [`flood`]). The rays of a batch are walked in f32,
+//! sixteen to a vector ([`batch`], [`queue`], [`lanes`], [`rounds`]), and in f64 where f32 does not
+//! decide ([`decide`]).
 
 pub(crate) mod batch;
 pub(crate) mod decide;
@@ -33,7 +34,8 @@ pub(crate) enum TetOutcome {
     Continue,
 }
 
-/// Walks through a tet leaf that has no subtree, from the face of its hull through which the line enters.
+/// Walks through a tet leaf that has no subtree, from the face of its hull through which the line
+/// enters.
 #[inline(never)]
 pub(crate) fn enter_tets<G: Goal, C: Count>(
     object: &ObjectView<'_>,

@@ -1,4 +1,5 @@
-//! Preparation of rays for tet walks in lanes, and the queue of prepared rays from which lanes are filled.
+//! Preparation of rays for tet walks in lanes, and the queue of prepared rays from which lanes are
+//! filled.
 
 use super::lanes::{Extent, Lanes, cross, float, three, word};
 use crate::intersect::prepare;
@@ -6,16 +7,18 @@ use crate::rays::Ray;
 use crate::simd::{LANES, Part, Simd};
 use bth_format::layout::{HullFace, NONE};
 
-/// Greatest |coordinate| of an origin, 2^59. Rays beyond this limit or those below are walked in f64, because products could
-/// overflow or underflow in f32.
+/// Greatest |coordinate| of an origin, 2^59. Rays beyond this limit or those below are walked in
+/// f64, because products could overflow or underflow in f32.
 const GREATEST_ORIGIN: f32 = (1u64 << 59) as f32;
 /// Greatest |component| of a direction, 2^40. A depth is t times a factor between 2^-40 and 2^40.
 const GREATEST_DIRECTION: f32 = (1u64 << 40) as f32;
-/// Least value of a direction's greatest |component|, 2^-40.
+/// Smallest allowed value of a direction's largest |component|, 2^-40.
 const LEAST_DIRECTION: f32 = 1.0 / (1u64 << 40) as f32;
-/// Slack of comparisons of depths with bounds of t, relative to the depth. It exceeds the sum of all rounding errors.
+/// Slack of comparisons of depths with bounds of t, relative to the depth. It exceeds the sum of
+/// all rounding errors.
 const LANE_DEPTH_SLACK: f32 = 1.0 / (1 << 20) as f32;
-/// Absolute part of the slack, for depths near 0. It exceeds the least positive f32 times the greatest direction.
+/// Absolute part of the slack, for depths near 0. It exceeds the smallest positive f32 times the
+/// largest direction.
 const LEAST_DEPTH_SLACK: f32 = 1.0 / (1u128 << 100) as f32;
 
 /// Greatest number of queued rays.
@@ -63,7 +66,7 @@ impl PreparedQueue {
         (self.first, self.end) = (0, 0);
     }
 
-    /// Whether sixteen more rays can be pushed.
+    /// Returns true if sixteen more rays can be pushed.
     pub(super) fn has_space(&self) -> bool {
         self.end + LANES <= QUEUE_CAPACITY
     }
@@ -74,8 +77,8 @@ impl PreparedQueue {
         s.call(Push { queue: self, bits, lanes });
     }
 
-    /// Moves rays from the queue to lanes whose bit is set in `idle`, until no such lane or no ray is left. Returns the bits of
-    /// the lanes that were filled.
+    /// Moves rays from the queue to lanes whose bit is set in `idle`, until no such lane or no ray
+    /// is left. Returns the bits of the lanes that were filled.
     #[inline(always)]
     pub(super) fn pop<S: Simd>(&mut self, s: S, idle: u32, lanes: &mut Lanes<S>) -> u32 {
         let mut taken = idle;
@@ -96,7 +99,7 @@ impl PreparedQueue {
     }
 }
 
-/// [`PreparedQueue::push`] as a part of kernels, of which there are three calls.
+/// [`PreparedQueue::push`] as a function that kernels share. There are three calls.
 struct Push<'a, S: Simd> {
     queue: &'a mut PreparedQueue,
     bits: u32,
@@ -130,7 +133,7 @@ impl<S: Simd> Part<S> for OfRays<'_, S> {
     }
 }
 
-/// [`PreparedWalks::set_face`] as a part of kernels, of which there are four calls.
+/// [`PreparedWalks::set_face`] as a function that kernels share. There are four calls.
 struct SetFace<'a, S: Simd> {
     lanes: &'a mut Lanes<S>,
     m: S::M,
@@ -163,7 +166,8 @@ fn slack<S: Simd>(s: S, depth: S::F) -> S::F {
     s.fma(s.abs(depth), s.splat(LANE_DEPTH_SLACK), s.splat(LEAST_DEPTH_SLACK))
 }
 
-/// Sixteen rays with the constants of their projections, and the projected faces through which their walks begin.
+/// Sixteen rays with the constants of their projections, and the projected faces through which
+/// their walks begin.
 pub(super) struct PreparedWalks<S: Simd> {
     pub(super) lanes: Lanes<S>,
     /// The lanes whose rays are within the limits of f32 and have tmin <= tmax.
@@ -191,7 +195,7 @@ impl<S: Simd> PreparedWalks<S> {
             representable = s.and(representable, s.le(s.abs(o[k]), s.splat(GREATEST_ORIGIN)));
             representable = s.and(representable, s.le(size[k], s.splat(GREATEST_DIRECTION)));
         }
-        // The axis of the depth is that of the direction's greatest |component|.
+        // The axis of the depth is the axis of the direction's largest |component|.
         let is_x = s.and(s.lt(size[1], size[0]), s.lt(size[2], size[0]));
         let is_y = s.and_not(s.lt(size[2], size[1]), is_x);
         let axis = s.select_u(is_x, s.splat_u(0), s.select_u(is_y, s.splat_u(1), s.splat_u(2)));
@@ -217,7 +221,8 @@ impl<S: Simd> PreparedWalks<S> {
         s.call(SetFace { lanes: &mut self.lanes, m, vertices, face });
     }
 
-    /// Prepares the rays with indices `ray` in `rays`, whose walks begin at the faces with the vertices `face`.
+    /// Prepares the rays with indices `ray` in `rays`, whose walks begin at the faces with the
+    /// vertices `face`.
     #[inline(always)]
     pub(super) fn new(
         s: S,
@@ -232,8 +237,9 @@ impl<S: Simd> PreparedWalks<S> {
         prepared
     }
 
-    /// Prepares the rays with indices `ray` at the faces of `hull` through which their lines enter a leaf. Also returns the lanes
-    /// whose line certainly enters, and those whose line certainly misses the hull.
+    /// Prepares the rays with indices `ray` at the faces of `hull` through which their lines enter
+    /// a leaf. Also returns the lanes whose line certainly enters, and those whose line certainly
+    /// misses the hull.
     #[inline(always)]
     pub(super) fn from_hull(
         s: S,

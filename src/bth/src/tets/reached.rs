@@ -1,6 +1,8 @@
-//! The exact test of constrained faces that lanes have reached, sixteen at a time in f64, and whether the walks of their rays go on.
+//! The exact test of constrained faces that lanes have reached, sixteen at a time in f64, and
+//! whether the walks of their rays go on.
 //!
-//! Whatever f64 does not decide is decided for one ray at a time ([`super::decide`]), so answers have the same bits.
+//! Whatever f64 does not decide is decided for one ray at a time ([`super::decide`]), so answers
+//! have the same bits.
 
 use super::batch::WalkBatch;
 use super::exit_lanes::Exits;
@@ -93,7 +95,8 @@ impl<S: Simd> Faces<S> {
         Estimates::new(s, &pairs)
     }
 
-    /// What lies behind the faces of the lanes `open`, given the lanes whose rays pass `against` the normals of the faces.
+    /// What lies behind the faces of the lanes `open`, given the lanes whose rays pass `against`
+    /// the normals of the faces.
     #[inline(always)]
     fn behind(&self, s: S, walks: &Walks<'_>, open: u32, against: u32) -> Behind {
         let against = s.mask(against);
@@ -124,7 +127,8 @@ impl<S: Simd> Faces<S> {
     }
 }
 
-/// Sixteen faces behind which walks may go on: the tetrahedra there, and the words that the walks begin with.
+/// Sixteen faces behind which walks may go on: the tetrahedra there, and the words that the walks
+/// begin with.
 struct Behind {
     exits: Exits,
     tet: [u32; LANES],
@@ -141,8 +145,8 @@ fn store<S: Simd>(s: S, from: [S::F; 3], to: &mut [F32Lanes; 3]) {
 }
 
 impl WalkBatch<'_> {
-    /// Tests constrained faces that the lines of their rays certainly cross, and ends walks or returns rays to the lanes in the
-    /// tetrahedra behind the faces.
+    /// Tests constrained faces that the lines of their rays certainly cross, and ends walks or
+    /// returns rays to the lanes in the tetrahedra behind the faces.
     #[inline(always)]
     pub(super) fn test_reached_faces<S: Simd>(&mut self, s: S) {
         let mut reached = std::mem::take(self.walks.reached);
@@ -178,7 +182,8 @@ impl WalkBatch<'_> {
             let lane = open.trailing_zeros() as usize % LANES;
             open &= open - 1;
             let ray = faces.ray[lane];
-            // No face further along the line can change the result if the line certainly leaves the tetrahedron beyond the limit.
+            // No face further along the line can change the result if the line certainly leaves the
+            // tetrahedron beyond the limit.
             if t_before[lane] > limit[lane] {
                 self.walks.finish(ray, WalkOutcome::Left);
                 continue;
@@ -192,8 +197,9 @@ impl WalkBatch<'_> {
         }
     }
 
-    /// Offers those intersections of the lanes `all` that are certain, with triangles given by their ids, to the queries of the rays.
-    /// Returns the bits of the rays whose walks may go on, with the limits of their queries.
+    /// Offers those intersections of the lanes `all` that are certain, with triangles given by
+    /// their ids, to the queries of the rays. Returns the bits of the rays whose walks may go on,
+    /// with the limits of their queries.
     fn offer(
         &mut self,
         rays: &[u32; LANES],

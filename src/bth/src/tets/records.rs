@@ -1,11 +1,13 @@
 //! One interface to the two records of tetrahedra, for one tetrahedron and for sixteen.
 //!
-//! A record is read only after a walk has entered its tetrahedron through a face, so the three vertices of the face and the link
-//! behind it are known. The record yields the fourth vertex and the links behind the other faces.
+//! A record is read only after a walk has entered its tetrahedron through a face, so the three
+//! vertices of the face and the link behind it are known. The record yields the fourth vertex and
+//! the links behind the other faces.
 //!
-//! `Tet16` has 16 bytes: the exclusive or of the four vertices, and three words that combine the four links. It is from A. Aman,
-//! S. Demirci and U. Güdükbay, "Compact tetrahedralization-based acceleration structures for ray tracing", 2021 (arXiv
-//! 2103.02309). `Link32` has 32 bytes. Each of its links stores the fourth vertex of the tetrahedron that it leads to.
+//! `Tet16` has 16 bytes: the exclusive or of the four vertices, and three words that combine the
+//! four links. It is from A. Aman, S. Demirci and U. Güdükbay, "Compact tetrahedralization-based
+//! acceleration structures for ray tracing", 2021 (arXiv 2103.02309). `Link32` has 32 bytes. Each
+//! of its links stores the fourth vertex of the tetrahedron that it leads to.
 
 use crate::simd::Simd;
 use bth_format::layout::{Link, NONE, Tet16};
@@ -19,13 +21,14 @@ pub(crate) struct Entered {
     pub(crate) face: [u32; 3],
     /// The fourth vertex.
     pub(crate) apex: u32,
-    /// The link behind the entered face, as the record of the tetrahedron stores it: it leads to the previous tetrahedron, or to
-    /// the constrained face between the two.
+    /// The link behind the entered face, as the record of the tetrahedron stores it: it leads to
+    /// the previous tetrahedron, or to the constrained face between the two.
     pub(crate) behind: u32,
 }
 
 impl Entered {
-    /// Number of the tetrahedron's vertices with an index below `vertex`: 0 to 3 for its own vertices.
+    /// Number of the tetrahedron's vertices with an index below `vertex`: 0 to 3 for its own
+    /// vertices.
     #[inline(always)]
     fn rank(&self, vertex: u32) -> usize {
         let below = |v: u32| (v < vertex) as usize;
@@ -33,14 +36,16 @@ impl Entered {
     }
 }
 
-/// The fourth vertex of a tetrahedron, from the exclusive or of all four vertices and the vertices of a face.
+/// The fourth vertex of a tetrahedron, from the exclusive or of all four vertices and the vertices
+/// of a face.
 #[inline(always)]
 fn fourth_vertex(xor: u32, face: [u32; 3]) -> u32 {
     xor ^ face[0] ^ face[1] ^ face[2]
 }
 
-/// The link of a [`Tet16`] behind the face opposite to `vertex`. Each of the three words is the exclusive or of a link and the
-/// fourth link, so `entered.behind` yields the fourth link, and that yields any other.
+/// The link of a [`Tet16`] behind the face opposite to `vertex`. Each of the three words is the
+/// exclusive or of a link and the fourth link, so `entered.behind` yields the fourth link, and that
+/// yields any other.
 #[inline(always)]
 fn decode_link(record: &Tet16, entered: &Entered, vertex: u32) -> u32 {
     let stored = |rank: usize| record.next.get(rank).copied().unwrap_or(0);
@@ -48,11 +53,14 @@ fn decode_link(record: &Tet16, entered: &Entered, vertex: u32) -> u32 {
     fourth_link ^ stored(entered.rank(vertex))
 }
 
-/// Reads records of an object's tetrahedra. Links are stored in ascending order of the opposite vertex.
+/// Reads records of an object's tetrahedra. Links are stored in ascending order of the opposite
+/// vertex.
 pub(crate) trait ReadRecords {
-    /// The vertex of a tetrahedron that is not on `face`. `opposite` is from the link that was followed to the tetrahedron.
+    /// The vertex of a tetrahedron that is not on `face`. `opposite` is from the link that was
+    /// followed to the tetrahedron.
     fn apex(&self, tet: u32, face: [u32; 3], opposite: u32) -> u32;
-    /// The link behind the face opposite to `vertex`. Its `opposite` is `NONE` in records whose [`Self::apex`] does not need it.
+    /// The link behind the face opposite to `vertex`. Its `opposite` is `NONE` in records whose
+    /// [`Self::apex`] does not need it.
     fn link(&self, tet: u32, entered: &Entered, vertex: u32) -> Link;
 }
 
@@ -78,8 +86,8 @@ impl ReadRecords for Records<'_> {
     }
 }
 
-/// The tetrahedra of sixteen walks, one in each lane, and the faces through which they were entered. The fields are those of
-/// [`Entered`].
+/// The tetrahedra of sixteen walks, one in each lane, and the faces through which they were
+/// entered. The fields are the same as in [`Entered`].
 #[derive(Clone, Copy)]
 pub(crate) struct EnteredLanes<S: Simd> {
     pub(crate) tet: S::U,
@@ -87,7 +95,8 @@ pub(crate) struct EnteredLanes<S: Simd> {
     /// The `opposite` of the link that was followed, where the fourth vertex is not yet known.
     pub(crate) apex: S::U,
     pub(crate) behind: S::U,
-    /// 1 in every lane. It is a variable, because the compiler replaces the masked addition of a constant by slower code.
+    /// 1 in every lane. It is a variable, because the compiler replaces the masked addition of a
+    /// constant by slower code.
     pub(crate) one: S::U,
 }
 
@@ -103,15 +112,16 @@ impl<S: Simd> EnteredLanes<S> {
     }
 }
 
-/// The fourth vertex in each lane. `xor` holds the index of the word that stores the exclusive or of all four vertices.
+/// The fourth vertex in each lane. `xor` holds the index of the word that stores the exclusive or
+/// of all four vertices.
 #[inline(always)]
 fn fourth_vertices<S: Simd>(s: S, words: &[u32], m: S::M, entered: &EnteredLanes<S>, xor: S::U) -> S::U {
     let [a, b, c] = entered.face;
     s.xor_u(s.xor_u(s.gather_u(m, words, xor), a), s.xor_u(b, c))
 }
 
-/// The words of [`Records`], for gathers in sixteen lanes. The record is tested at every step, so that one kernel serves both;
-/// the branch is well predicted.
+/// The words of [`Records`], for gathers in sixteen lanes. The record is tested at every step, so
+/// that one kernel serves both; the branch is well predicted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum LaneRecords<'a> {
     Link32(&'a [[u32; 2]]),
@@ -141,7 +151,7 @@ impl<'a> LaneRecords<'a> {
         matches!(self, LaneRecords::Tet16(_))
     }
 
-    /// As [`ReadRecords::apex`], in the lanes of the mask; those of other lanes are undefined.
+    /// Like [`ReadRecords::apex`], in the lanes of the mask. Other lanes are undefined.
     #[inline(always)]
     pub(crate) fn apex<S: Simd>(&self, s: S, m: S::M, entered: &EnteredLanes<S>) -> S::U {
         match self {
@@ -150,7 +160,8 @@ impl<'a> LaneRecords<'a> {
         }
     }
 
-    /// `next` and `opposite` of [`ReadRecords::link`], in the lanes of the mask; those of other lanes are undefined.
+    /// `next` and `opposite` of [`ReadRecords::link`], in the lanes of the mask. Other lanes are
+    /// undefined.
     #[inline(always)]
     pub(crate) fn link<S: Simd>(
         &self,
@@ -172,8 +183,8 @@ impl<'a> LaneRecords<'a> {
 #[inline(always)]
 fn decode_links<S: Simd>(s: S, words: &[u32], m: S::M, entered: &EnteredLanes<S>, vertex: S::U) -> S::U {
     let first = s.add_u(s.shl_u::<2>(entered.tet), s.splat_u(1));
-    // The first round turns the link behind the entered face into the fourth link, the second round the fourth into the requested
-    // one.
+    // The first round turns the link behind the entered face into the fourth link, the second round
+    // the fourth into the requested one.
     let mut link = entered.behind;
     for v in [entered.apex, vertex] {
         let rank = entered.rank(s, v);

@@ -1,6 +1,8 @@
-//! The kernel of a batch of tet walks: three groups of sixteen lanes, whose steps are interleaved so that their gathers overlap.
+//! The kernel of a batch of tet walks: three groups of sixteen lanes, whose steps are interleaved
+//! so that their gathers overlap.
 //!
-//! When several lanes of a group have stopped, their results are evaluated and the lanes are refilled from the queue.
+//! When several lanes of a group have stopped, their results are evaluated and the lanes are
+//! refilled from the queue.
 
 use super::batch::WalkBatch;
 use super::lanes::{Lanes, Step, float, word};
@@ -18,7 +20,8 @@ const MIN_IDLE_LANES: u32 = 6;
 struct LaneGroup<S: Simd> {
     lanes: Lanes<S>,
     step: Step<S>,
-    /// Bits of the lanes that hold a ray, including those that have stopped and are not yet evaluated.
+    /// Bits of the lanes that hold a ray, including those that have stopped and are not yet
+    /// evaluated.
     held: u32,
     /// For each lane the round in which it received its ray.
     start_round: S::U,
@@ -26,9 +29,10 @@ struct LaneGroup<S: Simd> {
 
 /// State of the kernel that the groups share.
 struct RefillState {
-    /// Number of completed rounds. In a round each lane makes as many steps as the object has tetrahedra.
+    /// Number of completed rounds. In a round each lane makes as many steps as the object has
+    /// tetrahedra.
     round: u32,
-    /// Whether the batch may have rays that no lane holds yet.
+    /// True if the batch may have rays that no lane holds yet.
     rays_left: bool,
 }
 
@@ -68,8 +72,9 @@ impl WalkBatch<'_> {
         }
     }
 
-    /// Stops walks that began two rounds ago, and repeats them by a flood. A line passes each tetrahedron at most once, so such a
-    /// walk has made more steps than any line needs, which happens only if the data are inconsistent.
+    /// Stops walks that began two rounds ago, and repeats them by a flood. A line passes each
+    /// tetrahedron at most once, so such a walk has made more steps than any line needs, which
+    /// happens only if the data are inconsistent.
     #[inline(always)]
     fn stop_overlong<S: Simd>(&mut self, s: S, group: &mut LaneGroup<S>, round: u32) {
         let overlong =
@@ -129,13 +134,15 @@ impl Kernel for &mut WalkBatch<'_> {
         let idle =
             LaneGroup { lanes: Lanes::idle(s), step: Step::empty(s), held: 0, start_round: s.splat_u(0) };
         let mut groups = [idle; 3];
-        // A line passes each tetrahedron at most once, so a valid walk ends within this number of steps.
+        // A line passes each tetrahedron at most once, so a valid walk ends within this number of
+        // steps.
         let steps_per_round = self.walks.object.records.len();
         let mut state = RefillState { round: 0, rays_left: true };
         let mut steps = 0;
         let one = s.splat_u(std::hint::black_box(1));
         loop {
-            // `refill` is called in a loop, so that it is compiled once. The lanes are in memory at this point in any case.
+            // `refill` is called in a loop, so that it is compiled once. The lanes are in memory at
+            // this point in any case.
             let mut held = 0;
             for group in &mut groups {
                 self.refill(s, &mut queue, group, &mut state);

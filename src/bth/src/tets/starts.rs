@@ -1,4 +1,5 @@
-//! Chooses the rays of a batch that are prepared next for the lanes: walks that return to them, or the next rays of the batch.
+//! Chooses the rays of a batch that are prepared next for the lanes: walks that return to them, or
+//! the next rays of the batch.
 
 use super::lanes::{three, word};
 use super::queue::{PreparedQueue, PreparedWalks};
@@ -8,8 +9,9 @@ use super::walks::{WalkStart, Walks, vertices};
 use crate::intersect::line::Line;
 use crate::simd::{LANES, Part, Simd};
 
-/// Fills the empty queue with prepared rays, until it is full or no rays are left but those that reach a face which is not yet
-/// tested. It depends on no query, so it is compiled once per instruction set.
+/// Fills the empty queue with prepared rays, until it is full or no rays are left but those that
+/// reach a face which is not yet tested. It depends on no query, so it is compiled once per
+/// instruction set.
 pub(super) struct Fill<'a, 'b> {
     pub(super) walks: &'a mut Walks<'b>,
     pub(super) queue: &'a mut PreparedQueue,
@@ -34,7 +36,8 @@ impl<S: Simd> Part<S> for Fill<'_, '_> {
 }
 
 impl Walks<'_> {
-    /// Prepares the last sixteen of `starts`, or all if there are fewer. Rays that f32 cannot represent are walked in f64.
+    /// Prepares the last sixteen of `starts`, or all if there are fewer. Rays that f32 cannot
+    /// represent are walked in f64.
     #[inline(always)]
     fn fill_from_starts<S: Simd>(&mut self, s: S, queue: &mut PreparedQueue) {
         let first = self.starts.len().saturating_sub(LANES);
@@ -69,7 +72,8 @@ impl Walks<'_> {
         self.starts.truncate(first);
     }
 
-    /// Prepares the next sixteen rays of the batch, or the last ones. Entries that f32 does not decide are found in f64.
+    /// Prepares the next sixteen rays of the batch, or the last ones. Entries that f32 does not
+    /// decide are found in f64.
     #[inline(always)]
     fn fill_from_batch<S: Simd>(&mut self, s: S, queue: &mut PreparedQueue) {
         let first = self.next;
@@ -83,7 +87,8 @@ impl Walks<'_> {
         }
     }
 
-    /// Prepares rays that enter the tet leaf from outside. Returns the bits of the rays that f32 does not decide.
+    /// Prepares rays that enter the tet leaf from outside. Returns the bits of the rays that f32
+    /// does not decide.
     #[inline(always)]
     fn fill_from_outside<S: Simd>(&mut self, s: S, queue: &mut PreparedQueue, m: S::M, ray: S::U) -> u32 {
         let leaf = &self.object.tet_leaves[self.leaf as usize];

@@ -1,10 +1,11 @@
 //! The walk of one ray from tetrahedron to tetrahedron along its line, in f64.
 //!
-//! As in the traversal of Aman et al. (arXiv 2103.02309, 2021), the projections of the entered face's three vertices are kept,
-//! the fourth vertex is projected, and the signs of three cross products select the face of exit. While all signs are certain,
-//! the walk follows the exact line through the interiors of faces. A sign is uncertain if the line passes an edge or a vertex
-//! within the bound of the rounding errors. The walk then ends, and [`TetWalker::flood`] visits every tetrahedron that the line
-//! may touch.
+//! As in the traversal of Aman et al. (arXiv 2103.02309, 2021), the projections of the entered
+//! face's three vertices are kept, the fourth vertex is projected, and the signs of three cross
+//! products select the face of exit. While all signs are certain, the walk follows the exact line
+//! through the interiors of faces. A sign is uncertain if the line passes an edge or a vertex
+//! within the bound of the rounding errors. The walk then ends, and [`TetWalker::flood`] visits
+//! every tetrahedron that the line may touch.
 
 use super::records::{Entered, ReadRecords};
 use crate::intersect::line::{Line, Projected, Sign};
@@ -40,12 +41,14 @@ pub(crate) enum WalkOutcome {
     Done,
     /// The line has left the leaf, or no face further along it can change the result.
     Left,
-    /// A sign was uncertain, or the data are inconsistent. The hits that were offered are correct, but others may be missing.
+    /// A sign was uncertain, or the data are inconsistent. The hits that were offered are correct,
+    /// but others may be missing.
     Uncertain,
 }
 
-/// Position of a walk: the tetrahedron `tet`, and the face through which the line enters it. The line crosses that face with
-/// certain signs, and the corners of the face are counterclockwise as seen along the ray.
+/// Position of a walk: the tetrahedron `tet`, and the face through which the line enters it. The
+/// line crosses that face with certain signs, and the corners of the face are counterclockwise as
+/// seen along the ray.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TetPosition {
     pub(crate) tet: u32,
@@ -88,8 +91,8 @@ impl<'a> TetWalker<'a> {
         [(0, 1), (1, 2), (2, 0)].map(|(i, j)| Line::side(&corner[i], &corner[j], self.error))
     }
 
-    /// Tests a constrained face exactly, as the triangles of BVH leaves are, and offers a hit to the query. Returns whether the
-    /// query is complete.
+    /// Tests a constrained face exactly, as the triangles of BVH leaves are, and offers a hit to
+    /// the query. Returns whether the query is complete.
     pub(crate) fn offer(&self, face: &TetFace, query: &mut EitherQuery) -> bool {
         let corners = face.vertex.map(|v| self.position(v));
         let found = match &self.start {
@@ -102,8 +105,9 @@ impl<'a> TetWalker<'a> {
         }
     }
 
-    /// Follows a link from the tetrahedron `from` through `face`. Returns the tetrahedron behind the face, its fourth vertex, and
-    /// the link in its record that leads back through the face; `None` if the face belongs to the hull.
+    /// Follows a link from the tetrahedron `from` through `face`. Returns the tetrahedron behind
+    /// the face, its fourth vertex, and the link in its record that leads back through the face;
+    /// `None` if the face belongs to the hull.
     #[inline(always)]
     pub(crate) fn beyond(&self, from: u32, link: Link, face: [u32; 3]) -> Option<(u32, u32, u32)> {
         if link.next == NONE {
@@ -118,8 +122,8 @@ impl<'a> TetWalker<'a> {
         Some((link.next, apex, from))
     }
 
-    /// Replaces the position's face by the one through which the line leaves the tetrahedron, and returns the link behind it.
-    /// `None` if a sign is uncertain; the position is then unchanged.
+    /// Replaces the position's face by the one through which the line leaves the tetrahedron, and
+    /// returns the link behind it. `None` if a sign is uncertain; the position is then unchanged.
     #[inline(always)]
     pub(crate) fn exit(&self, position: &mut TetPosition) -> Option<Link> {
         use Sign::{Negative, Positive};
@@ -137,15 +141,16 @@ impl<'a> TetWalker<'a> {
         Some(link)
     }
 
-    /// Walks from a position until the query is complete, the line leaves the hull or passes the query's limit, or a sign is
-    /// uncertain.
+    /// Walks from a position until the query is complete, the line leaves the hull or passes the
+    /// query's limit, or a sign is uncertain.
     pub(crate) fn walk<C: Count>(
         &self,
         mut position: TetPosition,
         query: &mut EitherQuery,
         count: &mut C,
     ) -> WalkOutcome {
-        // A line passes each tetrahedron at most once, so a walk has more steps only if the data are inconsistent.
+        // A line passes each tetrahedron at most once, so a walk has more steps only if the data
+        // are inconsistent.
         for _ in 0..self.leaf.tets {
             count.tet();
             let Some(link) = self.exit(&mut position) else { return WalkOutcome::Uncertain };
@@ -169,7 +174,8 @@ impl<'a> TetWalker<'a> {
         WalkOutcome::Uncertain
     }
 
-    /// The position behind the constrained face on which the ray starts. `None` if it is uncertain that the line crosses the face.
+    /// The position behind the constrained face on which the ray starts. `None` if it is uncertain
+    /// that the line crosses the face.
     pub(crate) fn leave(&self, face: u32) -> Option<TetPosition> {
         let constrained = &self.faces[face as usize];
         let mut vertex = constrained.vertex;
@@ -191,8 +197,8 @@ impl<'a> TetWalker<'a> {
     /// The position at which the line enters the hull.
     ///
     /// # Errors
-    /// [`WalkOutcome::Left`] if the line misses the hull, [`WalkOutcome::Uncertain`] if it passes an edge of the hull within the
-    /// bound of the rounding errors.
+    /// [`WalkOutcome::Left`] if the line misses the hull, [`WalkOutcome::Uncertain`] if it passes
+    /// an edge of the hull within the bound of the rounding errors.
     pub(crate) fn enter_hull(&self) -> Result<TetPosition, WalkOutcome> {
         let mut position = Err(WalkOutcome::Left);
         for face in self.hull {
@@ -200,7 +206,8 @@ impl<'a> TetWalker<'a> {
             let sides = self.sides(&corner);
             if sides.contains(&Sign::Negative) {
                 if !sides.contains(&Sign::Positive) && sides.contains(&Sign::Uncertain) {
-                    // The line leaves the hull here or passes its silhouette, and it may also enter close to the same edge.
+                    // The line leaves the hull here or passes its silhouette, and it may also enter
+                    // close to the same edge.
                     return Err(WalkOutcome::Uncertain);
                 }
                 continue;

@@ -23,7 +23,8 @@ pub(super) struct WalkStart {
     /// Index of the ray in the batch.
     pub(super) ray: u32,
     pub(super) tet: u32,
-    /// The line certainly crosses the entered face, whose corners are counterclockwise as seen along the ray.
+    /// The line certainly crosses the entered face, whose corners are counterclockwise as seen
+    /// along the ray.
     pub(super) entered: Entered,
 }
 
@@ -45,7 +46,8 @@ pub(crate) struct WalkLists {
     without_lanes: Vec<(u32, Option<TetPosition>)>,
 }
 
-/// The walks of a batch of rays through one tet leaf, without the queries. All slices have one element per ray.
+/// The walks of a batch of rays through one tet leaf, without the queries. All slices have one
+/// element per ray.
 pub(super) struct Walks<'a> {
     pub(super) object: &'a ObjectView<'a>,
     pub(super) records: LaneRecords<'a>,
@@ -53,7 +55,8 @@ pub(super) struct Walks<'a> {
     pub(super) rays: &'a [Ray],
     /// Index of the tet leaf that the rays enter from outside.
     pub(super) leaf: u32,
-    /// True if the walks keep track of depths: they can end any-hit queries, whose rays are often short.
+    /// True if the walks keep track of depths: they can end any-hit queries, whose rays are often
+    /// short.
     pub(super) keeps_depths: bool,
     /// For each ray the state of its walk.
     pub(super) states: &'a mut [WalkState],
@@ -65,7 +68,8 @@ pub(super) struct Walks<'a> {
     pub(super) reached: &'a mut Vec<Reached>,
     /// For each ray the number of times that it has returned to the lanes.
     pub(super) returns: &'a mut [u8],
-    /// Rays whose walks are to be made without lanes: from a position, or where that is uncertain as a flood.
+    /// Rays whose walks are to be made without lanes: from a position, or where that is uncertain
+    /// as a flood.
     pub(super) without_lanes: &'a mut Vec<(u32, Option<TetPosition>)>,
 }
 

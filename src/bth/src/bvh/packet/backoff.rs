@@ -54,7 +54,7 @@ pub(crate) struct KindBackoffs {
 }
 
 /// The back-offs of a thread, kept from one batch to the next: batches of a few hundred rays would
-/// otherwise try packets again each time. They are those of one object, for each goal of queries.
+/// otherwise try packets again each time. They belong to one object; each goal of queries has one.
 #[derive(Debug, Default)]
 pub(crate) struct Backoffs {
     object: Option<Identity>,

@@ -20,8 +20,8 @@ pub(crate) trait PacketBounds<S: Simd> {
     }
     /// The view from that origin, if `COMMON_ORIGIN`.
     fn view(&self) -> Option<&FrustumView>;
-    /// The children of a node that any ray may hit before the depth `limit`, a bit each, and lower
-    /// bounds of the depths at which any of the rays enters them.
+    /// The children of a node that any ray may hit before the depth `limit`, one bit per child, and
+    /// lower bounds of the depths at which any of the rays enters them.
     fn children(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F);
     /// For sixteen points, given as rows of x, y and z, a bit for each side of the bounds beyond
     /// which they lie. A triangle whose three corners have a bit in common is missed by all rays.

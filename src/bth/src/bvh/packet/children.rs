@@ -68,7 +68,7 @@ impl<S: Simd, H: PacketBounds<S>> Part<S> for Meeting<'_, S, H> {
     }
 }
 
-/// The rays that may hit the box of a child, a bit each. Only groups with a bit in `rays` are
+/// The rays that may hit the box of a child, one bit per ray. Only groups with a bit in `rays` are
 /// tested.
 #[inline(always)]
 pub(super) fn meeting<S: Simd, H: PacketBounds<S>>(

@@ -13,14 +13,16 @@ use bth_format::object::ObjectBounds;
 ///
 /// With s = d_x/d_z along one axis z for all, a point's sheared x is
 /// (x - c_x) - s₀(z - c_z) + (s₀ - s)(z - c_z) + a with a = (c_x - o_x) - s(c_z - o_z): the middle
-/// of the interval of s, its half width, and an interval of a. Coherent rays have |s| <= 1.25, rounded at most twice. With u =
-/// 2^-24, the first two terms and their difference x' are wrong by at most 4u|z - c_z| + 2u|x'|, s
-/// in the third by 3u, the products and sums on the other side by 2u of each of their terms, and a
-/// by 16u of the largest distance D of two origins along an axis. [`SLACK`] = 32u of |z - c_z|, of
-/// D and of each term on the other side covers them: where |x'| is greater than that side, its
-/// error is less than what it exceeds it by. Where all rays have the same origin (`POINT`), the
-/// intervals of origins, widened by their pads, are also used for the single rays
-/// ([`RayGroup::may_enter`]), and the interval of a is zero.
+/// of the interval of s, its half width, and an interval of a.
+///
+/// Coherent rays have |s| <= 1.25, rounded at most twice. With u = 2^-24, the first two terms and
+/// their difference x' are wrong by at most 4u|z - c_z| + 2u|x'|, s in the third by 3u, the
+/// products and sums on the other side by 2u of each of their terms, and a by 16u of the largest
+/// distance D of two origins along an axis. [`SLACK`] = 32u of |z - c_z|, of D and of each term on
+/// the other side covers them: where |x'| is greater than that side, its error is less than what it
+/// exceeds it by. Where all rays have the same origin (`POINT`), the intervals of origins, widened
+/// by their pads, are also used for the single rays ([`RayGroup::may_enter`]), and the interval of
+/// a is zero.
 pub(crate) struct Frustum<S: Simd, const POINT: bool> {
     view: FrustumView,
     shaft: Shaft<S>,

@@ -24,7 +24,7 @@ use bth_format::layout::WIDTH;
 /// Instead of a triangle's index in the hit cache: no ray has hit it certainly so far.
 const NOT_CACHED_YET: u8 = u8::MAX;
 
-/// The rays of a group that may hit a triangle, a bit each.
+/// The rays of a group that may hit a triangle, one bit per ray.
 struct RayTest<S: Simd> {
     /// Rays that do not certainly miss it.
     maybe: u32,
@@ -118,7 +118,7 @@ pub(super) struct ReachedTriangles<'a> {
     leaf: LeafPoints<'a>,
     /// A bit each.
     triangles: u32,
-    /// The rays that are to be tested, a bit each.
+    /// The rays to test, one bit per ray.
     rays: u64,
 }
 

@@ -8,7 +8,7 @@ use crate::simd::{Part, Simd};
 use bth_format::layout::{IndexedLeaf, RawLeaf, WIDTH};
 use std::slice;
 
-/// The corners of the triangles of a [`RawLeaf`], which have points of their own.
+/// The corners of the triangles of a [`RawLeaf`], where triangles share no points.
 static OWN_POINTS: [[u8; WIDTH]; 3] = {
     let mut corner = [[0; WIDTH]; 3];
     let mut point = 0;
@@ -61,8 +61,8 @@ impl LeafPoints<'_> {
 pub(crate) trait LeafMesh: TriangleBlock {
     /// The leaf as points and triangles; `code` is its child code.
     fn points(&self, code: u32) -> LeafPoints<'_>;
-    /// The triangles whose corners all lie beyond the same side of the bounds, a bit each: all rays
-    /// miss them.
+    /// The triangles whose corners all lie beyond the same side of the bounds, one bit per
+    /// triangle: all rays miss them.
     fn outside<S: Simd, H: PacketBounds<S>>(&self, s: S, bounds: &H) -> u32;
 }
 

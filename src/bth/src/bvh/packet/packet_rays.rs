@@ -139,7 +139,7 @@ impl<G: Goal> PacketRays<'_, G> {
         s.call(Settle { object, ray: exact_ray, pending, of_leaf, query })
     }
 
-    /// The rays of a group that start in a leaf, a bit each.
+    /// The rays of a group that start in a leaf, one bit per ray.
     #[inline(always)]
     pub(super) fn starting_in<S: Simd>(&self, s: S, at: usize, leaf: u32) -> u32 {
         if self.starts.is_empty() {
@@ -148,7 +148,7 @@ impl<G: Goal> PacketRays<'_, G> {
         s.mask_bits(s.eq_u(s.load_u(&self.own[at % GROUPS][0]), s.splat_u(leaf)))
     }
 
-    /// The rays of a group whose triangle has this slot in its leaf, a bit each.
+    /// The rays of a group whose triangle has this slot in its leaf, one bit per ray.
     #[inline(always)]
     pub(super) fn starting_at<S: Simd>(&self, s: S, at: usize, slot: u32) -> u32 {
         s.mask_bits(s.eq_u(s.load_u(&self.own[at % GROUPS][1]), s.splat_u(slot)))

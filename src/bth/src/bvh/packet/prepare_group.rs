@@ -11,7 +11,7 @@ use bth_format::object::ObjectBounds;
 use std::marker::PhantomData;
 
 impl<S: Simd> RayGroup<S> {
-    /// Stores prepared rays of a piece; returns those that are usable, a bit each.
+    /// Stores prepared rays of a piece. Returns one bit per ray, set if the ray is usable.
     #[inline(always)]
     fn set_prepared<H: PacketBounds<S>>(
         &mut self,

@@ -96,7 +96,7 @@ impl<S: Lanewise> GroupSlabs<S> {
     }
 
     /// The depths at which the rays enter a box, and the rays that may hit it within their range.
-    /// The parameters are those of [`Self::may_enter`].
+    /// Takes the same parameters as [`Self::may_enter`].
     #[inline(always)]
     pub(crate) fn enter(
         &self,
@@ -218,9 +218,9 @@ impl<S: Simd> RayGroup<S> {
         }
     }
 
-    /// The rays that may hit a box within their range, a bit each. If all directions lie in one
-    /// octant ([`PacketBounds::MIXED_OCTANTS`] is false), the corners are that at which rays enter
-    /// the box and that at which they leave, else the lower and the upper one.
+    /// The rays that may hit a box within their range, one bit per ray. If all directions lie in
+    /// one octant ([`PacketBounds::MIXED_OCTANTS`] is false), rays enter the box at the first
+    /// corner and leave it at the second. Else these are the lower and the upper corner.
     #[inline(always)]
     pub(crate) fn may_enter<H: PacketBounds<S>>(&self, s: S, corners: [[f32; 3]; 2]) -> u32 {
         let slabs = GroupSlabs {

@@ -159,7 +159,8 @@ mod tests {
     use bth_format::object::ObjectBounds;
     use bth_random::Rng;
 
-    /// For each child the rays that may hit it, a bit each. The last field holds the rays to test.
+    /// For each child the rays that may hit it, one bit per ray. The last field holds the rays to
+    /// test.
     struct Children<'a>(&'a [Ray], &'a WideNode, u64);
 
     impl Kernel for Children<'_> {

@@ -41,7 +41,7 @@ pub(crate) enum PacketOutcome {
     /// The packet was traced; the value is the average share of its rays that took part in a step,
     /// in per cent.
     Lanes(u32),
-    /// The packet met something that only single rays support. No answer has been stored.
+    /// The packet reached something that only single rays support. No answer has been stored.
     Refused,
 }
 

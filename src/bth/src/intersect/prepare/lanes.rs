@@ -126,8 +126,8 @@ pub(crate) fn prepare_lanes<S: Lanewise>(
         s.fma(s.add(greatest, s.splat(1.0)), s.splat(f32::MIN_POSITIVE), s.splat(bounds.origin_error));
     let ulps = s.splat(4.0 / (1 << 24) as f32);
     let slack = |depth: S::F| s.fma(s.abs(depth), ulps, least);
-    // For the smallest normal number and denormal ones, whose products would be denormal, 0 stands:
-    // that moves them by less than the slack.
+    // The smallest normal number and denormal ones become 0, because their products would be
+    // denormal: that moves them by less than the slack.
     let start = s.select(s.le(s.abs(tmin), s.splat(f32::MIN_POSITIVE)), zero, tmin);
     let first = s.max(s.mul(start, greatest), s.splat(-f32::MAX));
     let limit = s.mul(tmax, greatest);

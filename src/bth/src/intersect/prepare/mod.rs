@@ -2,8 +2,8 @@
 //! ray or for sixteen at once.
 //!
 //! The results satisfy the bounds that [`RaySlabs`] and [`TriangleFilter`] need, but differ in
-//! their bits from those of their constructors, which compute in f64. Rays whose coordinates are
-//! too great or too small for f32 are prepared by those constructors.
+//! their bits from those of their constructors, which compute in f64. Where coordinates are too
+//! large or too small for f32, these constructors prepare the ray.
 
 mod axes;
 mod lanes;
@@ -44,7 +44,7 @@ fn lies_between(x: f32, lower: f32, upper: f32) -> bool {
 }
 
 /// Returns true if `tmin` is `f32::MIN_POSITIVE` or a denormal number, of either sign: products
-/// would be denormal. The slack of depths makes 0 stand for it.
+/// would be denormal, so 0 is used instead. The slack of depths covers the difference.
 #[inline(always)]
 fn is_tiny(tmin: f32) -> bool {
     tmin.abs().to_bits().wrapping_sub(1) < f32::MIN_POSITIVE.to_bits()

@@ -225,7 +225,7 @@ fn boxes_and_triangles_that_the_line_crosses_are_kept_and_sure_hits_are_hits() {
             }
         };
         let t = intersection.map_or(1.0, |c| c.t as f32);
-        // The whole line, and ranges that end or begin at the intersection or directly beside it.
+        // The whole line, and ranges that end or begin at the intersection or directly next to it.
         let ranges = [
             (endless.tmin, f32::INFINITY),
             (t, t),
@@ -280,7 +280,7 @@ fn small_triangles_of_large_objects_are_decided_in_f32() {
         let corners = [[0.0, 0.0, 0.0], [1e-3, 0.0, 2e-4], [0.0, 1e-3, -1e-4]];
         let mut object = OneTriangle::new(corners);
         object.enlarge(1e3);
-        // A point within the triangle, or beside it, at least a fifth of it away from its edges.
+        // A point within the triangle or outside of it, at least a fifth of it away from its edges.
         let [u, v] = [0.2 + 0.2 * unit(&mut rng), 0.2 + 0.2 * unit(&mut rng)];
         let is_hit = round % 2 == 0;
         let [u, v] = if is_hit { [u, v] } else { [-u, v] };
@@ -315,7 +315,7 @@ fn small_boxes_of_large_objects_are_told_apart_where_they_are_widened() {
         if is_widened {
             object.widen(corners);
         }
-        // A point within the box, or beside it by its own size.
+        // A point within the box, or outside of it by the size of the box.
         let is_met = round % 4 < 2;
         let away = if is_met { 0.0 } else { 1e-3 };
         let target = [0.5005 + away, 0.5005, 0.5005];
@@ -349,7 +349,7 @@ fn boxes_of_objects_far_from_the_origin_are_told_apart() {
         let corners = [[0.5, 0.5, 0.5], [0.5 + size, 0.5, 0.5], [0.5, 0.5 + size, 0.5 + size]].map(place);
         let mut object = OneTriangle::new(corners);
         (object.object.lower, object.object.upper) = (place([0.0; 3]), place([1.0; 3]));
-        // A point within the box, or beside it by three eighths of its size.
+        // A point within the box, or outside of it by three eighths of its size.
         let is_met = round % 2 == 0;
         let beside = if is_met { 0.5 } else { 1.375 };
         let target = place([0.5 + beside * size, 0.5 + size / 2.0, 0.5 + size / 2.0]);
@@ -385,7 +385,7 @@ fn rays_that_f32_cannot_prepare_are_left_to_f64() {
         let empty = Ray { tmin: 1e-40, tmax, ..usual };
         assert!(PreparedRay::in_f64(&bounds, &empty).is_none(), "an empty range up to {tmax}");
     }
-    // Products of these are denormal; 0 stands for them.
+    // Products of these are denormal; 0 is used instead.
     for tmin in [f32::MIN_POSITIVE, -f32::MIN_POSITIVE, 1e-40, f32::from_bits(1)] {
         let (ray, zero) = (Ray { tmin, ..usual }, Ray { tmin: 0.0, ..usual });
         assert!(

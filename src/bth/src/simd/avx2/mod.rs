@@ -286,8 +286,7 @@ impl Simd for Avx2 {
     fn expand(self, a: F, m: M, from: &[f32; LANES]) -> F {
         let bits = self.mask_bits(m);
         let low = from.as_ptr();
-        // The elements of the high half follow those of the low half, of which there are at most
-        // eight.
+        // The elements of the high half follow the elements of the low half, at most eight.
         let high = from[(bits as u8).count_ones() as usize..][..8].as_ptr();
         // SAFETY: eight readable floats each; unaligned loads.
         unsafe {
@@ -312,8 +311,7 @@ impl Simd for Avx2 {
     fn compress_f(self, bits: u32, a: F, to: &mut [f32; LANES]) -> usize {
         let low = (bits as u8).count_ones() as usize;
         // SAFETY: the first store writes to[..8]. The second writes eight elements after the
-        // compressed lanes of the low half, of which there are at most eight; the slices check
-        // both.
+        // compressed lanes of the low half, at most eight. The slices check both.
         unsafe {
             let packed = [
                 _mm256_permutevar8x32_ps(a[0], compression(bits as u8)),

@@ -18,8 +18,8 @@ pub(super) unsafe fn expansion(bits: u8) -> __m256i {
     }
 }
 
-/// Permutation that packs a row: the indices of those of eight lanes whose bit is set, in order;
-/// the inverse of [`expansion`].
+/// Permutation that packs a row: the indices of the lanes, out of eight, whose bit is set, in
+/// order. The inverse of [`expansion`].
 ///
 /// # Safety
 /// As [`expansion`].

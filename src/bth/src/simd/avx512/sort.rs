@@ -4,7 +4,7 @@ use crate::simd::LANES;
 use std::arch::x86_64::*;
 
 /// Step of a bitonic sorting network in descending order: lanes whose bit is set in `keep_greater`
-/// take the greater of their own and their partner's value, the other lanes the lesser.
+/// take the larger of their own and their partner's value, the other lanes the smaller.
 macro_rules! exchange {
     ($min:ident, $mask_max:ident, $v:expr, $partner:expr, $keep_greater:expr) => {{
         let (v, partner) = ($v, $partner);

@@ -1,9 +1,9 @@
 //! Sixteen lanes in four registers of 128 bits: one implementation for SSE4.1, NEON and SIMD128.
 //!
 //! The files of the instruction sets supply the operations on one register ([`Quad`]); everything
-//! that is made of them stands here and in [`rows`], [`packing`] and [`register`]. Without
-//! registers for whole vectors, code that works on sixteen lanes is long: kernels call their larger
-//! parts instead of containing them ([`Simd::INLINES_PARTS`]).
+//! that is made of them is here and in [`rows`], [`packing`] and [`register`]. Without registers
+//! for whole vectors, code that works on sixteen lanes is long: kernels call their larger parts
+//! instead of containing them ([`Simd::INLINES_PARTS`]).
 
 #[cfg(target_arch = "aarch64")]
 pub(super) mod neon;
@@ -61,8 +61,8 @@ macro_rules! declared {
     };
 }
 
-/// A token of an instruction set with registers of four lanes, and its operations on them. Where
-/// nothing else is said, they are those of the same name in [`Simd`].
+/// A token of an instruction set with registers of four lanes, and its operations on them. Unless
+/// their docs say otherwise, they do the same as the operations of the same name in [`Simd`].
 pub(super) trait Quad: Copy + 'static {
     /// Four f32 lanes.
     type F: Copy;
@@ -76,7 +76,7 @@ pub(super) trait Quad: Copy + 'static {
     fn load(self, from: &[f32; QUAD]) -> Self::F;
     fn store(self, a: Self::F, to: &mut [f32; QUAD]);
     lane_operations!(declared);
-    /// The smallest of the four lanes, none of which may be NaN.
+    /// The smallest of the four lanes. No lane may be NaN.
     fn least(self, a: Self::F) -> f32;
     /// Transposes: lane k of row i becomes lane i of row k.
     fn transpose(self, rows: [Self::F; QUAD]) -> [Self::F; QUAD];

@@ -90,7 +90,7 @@ impl Quad for Neon {
         bits(a: F) -> U = vreinterpretq_u32_f32(a);
         floats(a: U) -> F = vreinterpretq_f32_u32(a);
         mask_bits(m: U) -> u32 = vaddvq_u32(vandq_u32(m, vcombine_u32(vcreate_u32(2 << 32 | 1), vcreate_u32(8 << 32 | 4))));
-        // The masks are narrowed to bytes, of which each keeps one bit; neighbouring bytes are then
+        // The masks are narrowed to bytes, and each byte keeps one bit. Neighbouring bytes are then
         // added until two remain.
         mask_bits_of_all(m: [U; QUADS]) -> u32 = {
             let low = vuzp1q_u16(vreinterpretq_u16_u32(m[0]), vreinterpretq_u16_u32(m[1]));

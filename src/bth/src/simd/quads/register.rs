@@ -1,4 +1,4 @@
-//! One of the four registers of a vector, as a piece of its own.
+//! One of the four registers of a vector, used as a [piece](super::super::Simd::Piece).
 
 use super::{LANES, QUAD, QUADS, Quad, lane_operations, split, split_mut};
 use crate::simd::Lanewise;

@@ -89,7 +89,7 @@ impl<'a, R: TraceRay> RayBatch<'a, R> {
     /// Stores for each ray whether it hits anything.
     ///
     /// # Panics
-    /// As [`Self::nearest`].
+    /// The panics of [`Self::nearest`].
     #[inline(always)]
     pub fn any(self, found: &mut [bool]) {
         assert_eq!(self.rays.len(), found.len(), "as many results as rays");

@@ -126,7 +126,7 @@ impl Objects {
         }
     }
 
-    /// As [`Self::view`], of an object that may not have been checked; `None` if its sections do
+    /// Like [`Self::view`], of an object that may not have been checked; `None` if its sections do
     /// not fit each other.
     pub(crate) fn unchecked_view(&self, object: u32) -> Option<&ObjectView<'_>> {
         if self.has_own_positions(object) {

@@ -28,13 +28,13 @@ pub struct SurfacePoint {
     /// The normal of the triangle's plane, on the side from which the object's vertices are seen
     /// counterclockwise. A mirrored instance shows the same sides of its object as others do.
     pub geometric_normal: [f64; 3],
-    /// As [`Self::geometric_normal`], in the space of the object.
+    /// Like [`Self::geometric_normal`], in the space of the object.
     pub object_geometric_normal: [f64; 3],
     /// The normals of the source at the vertices, interpolated, on whatever side the source has
     /// them. The geometric normal where the file keeps none, where the object has new positions,
     /// where the normals of the vertices cancel out, and instead of a vertex's normal of zeros.
     pub normal: [f64; 3],
-    /// As [`Self::normal`], in the space of the object.
+    /// Like [`Self::normal`], in the space of the object.
     pub object_normal: [f64; 3],
     /// Texture coordinates, interpolated; `None` if the file keeps none.
     pub uv: Option<[f32; 2]>,

@@ -28,7 +28,7 @@ impl Scene {
         self.hits_any(ray)
     }
 
-    /// As [`Self::nearest`], with statistics of the traversal. A miss is [`Hit::MISS`].
+    /// Like [`Self::nearest`], with statistics of the traversal. A miss is [`Hit::MISS`].
     pub fn nearest_counted<R: TraceRay>(&self, ray: &R) -> (Hit, Steps) {
         let (mut hit, mut steps) = (Hit::MISS, Steps::default());
         let Some(placed) = ray.placed(self) else { return (hit, steps) };
@@ -54,7 +54,7 @@ impl Scene {
         RayBatch::new(self, rays)
     }
 
-    /// As [`RayBatch::nearest`], from arrays into arrays.
+    /// Like [`RayBatch::nearest`], from arrays into arrays.
     ///
     /// ```no_run
     /// use bth::{HitStreams, RayStreams};
@@ -84,7 +84,7 @@ impl Scene {
         });
     }
 
-    /// As [`RayBatch::any`], from arrays.
+    /// Like [`RayBatch::any`], from arrays.
     ///
     /// # Panics
     /// If the arrays differ in length.
@@ -106,7 +106,7 @@ impl Scene {
         }
     }
 
-    /// As [`Self::store_nearest`], in any scene.
+    /// Like [`Self::store_nearest`], in any scene.
     #[inline(never)]
     fn store_nearest_elsewhere<R: Traced>(&self, ray: &R, hit: &mut Hit) {
         *hit = Hit::MISS;
@@ -157,7 +157,7 @@ impl Scene {
         }
     }
 
-    /// As [`Self::hits_any`], in any scene.
+    /// Like [`Self::hits_any`], in any scene.
     #[inline(never)]
     fn hits_any_elsewhere<R: Traced>(&self, ray: &R) -> bool {
         let is_hit = if let Some((object, instance)) = self.sole() {

@@ -1,4 +1,4 @@
-//! Whether two points see each other: whether no triangle crosses the open segment between them.
+//! Mutual visibility of two points: no triangle may cross the open segment between them.
 //!
 //! A triangle blocks the segment from A to B if A and B lie strictly on different sides of its
 //! plane, and the segment's line crosses the closed triangle: if the volumes det[a-A, b-A, c-A] and

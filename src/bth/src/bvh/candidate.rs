@@ -103,7 +103,7 @@ fn settle_one<S: Simd, G: Goal>(
         .is_some_and(|intersection| query.offer(TriangleRef::index(index, object.triangle_ids), intersection))
 }
 
-/// As [`settle_one`], for a ray that starts on a triangle.
+/// Like [`settle_one`], for a ray that starts on a triangle.
 #[inline(never)]
 fn settle_from_start<G: Goal>(
     object: &ObjectView<'_>,

@@ -3,7 +3,7 @@
 //! Three traversals share the node formats ([`nodes`]) and the decisions about triangles ([`leaf`],
 //! [`candidate`]):
 //!
-//! - [`single`]: one ray, with a stack of its own ([`single_stack`]), and its certain hit
+//! - [`single`]: one ray, with its stack ([`single_stack`]), and its certain hit
 //!   ([`certain_hit`]);
 //! - [`interleaved`]: a pool of rays ([`ray_pool`], [`ray_state`]) that step in turn, with their
 //!   stacks ([`stack`]) and with hits that are computed for sixteen rays at a time ([`deferred`]);

@@ -141,8 +141,8 @@ impl<'a, G: Goal> RayPool<'a, G> {
         for (stack, bottom) in bottoms.iter_mut().enumerate() {
             *bottom = stacks.bottom(stack);
         }
-        // All slots are at the bottom of their stacks, like those of finished rays, so the first
-        // rays start in the same way.
+        // All slots are at the bottom of their stacks, as after a ray has finished, so the first
+        // rays start like all others.
         let mut bottom = [0; 256];
         for slot in 0..POOL_SIZE {
             bottom[slot] = slot as u8;
@@ -179,7 +179,7 @@ impl<'a, G: Goal> RayPool<'a, G> {
         self.lists.push(&mut self.counts, slot, root);
     }
 
-    /// As [`Self::start`] for a root whose children were already tested, given their codes:
+    /// Like [`Self::start`] for a root whose children were already tested, given their codes:
     /// `children` holds a bit for each child that the ray may hit, and the depths at which it
     /// enters them.
     #[inline(always)]

@@ -39,7 +39,7 @@ pub(crate) struct RayState<G> {
 }
 
 impl<G: Goal> RayState<G> {
-    /// As [`Self::start`], for a ray with index `index` that f32 lanes could not prepare. Returns
+    /// Like [`Self::start`], for a ray with index `index` that f32 lanes could not prepare. Returns
     /// false if the ray cannot hit anything ([`PreparedRay::in_f64`]).
     #[cold]
     #[inline(never)]

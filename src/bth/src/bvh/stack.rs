@@ -53,7 +53,7 @@ impl Stacks {
         self.reserve_for((object.header.depth as usize).min(MAX_DEPTH), count);
     }
 
-    /// As [`Self::reserve`], for a BVH with `depth` levels of nodes.
+    /// Like [`Self::reserve`], for a BVH with `depth` levels of nodes.
     #[inline]
     pub(crate) fn reserve_for(&mut self, depth: usize, count: usize) {
         let count = count.max(1);
@@ -110,7 +110,7 @@ impl Stacks {
         self.codes[at.0] = code;
     }
 
-    /// As [`OpenStacks::free_entries`].
+    /// Like [`OpenStacks::free_entries`].
     #[inline(always)]
     pub(crate) fn free_entries(&mut self, top: StackPosition) -> (&mut [u32; LANES], &mut [f32; LANES]) {
         let OpenStacks { codes, keys } = self.open();

@@ -158,7 +158,7 @@ impl RaySlabs {
         [depth(tmin, origin_error).next_up(), depth(tmax, -origin_error).next_down()]
     }
 
-    /// As [`RaySlabLanes::children`], for one node.
+    /// Like [`RaySlabLanes::children`], for one node.
     #[inline(always)]
     pub(crate) fn children<S: Simd>(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
         RaySlabLanes::new(s, self).children(s, node, limit)

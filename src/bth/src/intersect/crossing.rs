@@ -88,8 +88,8 @@ fn crossing_by_signs(ray: &Ray, [a, b, c]: [[f64; 3]; 3]) -> i32 {
     if position(ray.tmin) > 0 && position(ray.tmax) < 0 { passed } else { 0 }
 }
 
-/// As [`crossing`], for a ray that starts on a triangle: crossings at t > 0 of the line through the
-/// start itself, up to `tmax`.
+/// Like [`crossing`], for a ray that starts on a triangle: crossings at t > 0 of the line through
+/// the start itself, up to `tmax`.
 pub(crate) fn crossing_from_start(
     ray: &Ray,
     point: &StartPoint,

@@ -9,8 +9,8 @@
 //! off by ur, the shear by a factor 1±2u, its product with the depth by the same factor and by the
 //! error of the depth (|shear| <= 1), and the last sum by 2ur: sheared coordinates are off by less
 //! than δ = 8ur. A cross product of two points is off by 2δM + 2δ² because of its points and by
-//! 3uM² <= δM because of its own roundings, together by less than 4δ(M + δ). Products that
-//! underflow add at most the smallest normal number. The filter of single rays takes for r the
+//! 3uM² <= δM because of the roundings of the product, together by less than 4δ(M + δ). Products
+//! that underflow add at most the smallest normal number. The filter of single rays takes for r the
 //! distance (maximum norm) to the farthest corner of the object's box, so that 8δ and 4δ² are
 //! constants of the ray, and for M twice the largest |x| or |y|; where that leaves a pair
 //! undecided, it takes the bound of packets. Packets take r = M + |depth|, which is tighter and was
@@ -79,7 +79,7 @@ pub(crate) fn error<S: Lanewise>(s: S, l1_norm: S::F, greatest_depth: S::F, floo
     s.fma(s.mul(reach, s.splat(4.001 * DELTA)), s.fma(reach, s.splat(DELTA), l1_norm), floor)
 }
 
-/// As [`error`], from the projected corners.
+/// Like [`error`], from the projected corners.
 #[inline(always)]
 pub(crate) fn error_of<S: Lanewise>(s: S, [a, b, c]: &Corners<S>, origin_reach: S::F, floor: S::F) -> S::F {
     let norm = s.max(s.max(l1_norm(s, *a), l1_norm(s, *b)), l1_norm(s, *c));

@@ -14,9 +14,10 @@
 //! of two differences has two products, each with three roundings, and a subtraction: its error is
 //! 8u times the sizes of both factors. The determinant and the weights of b and c are scalar
 //! products of such vectors with d: they are off by 3·8u because of the vectors and by 16u because
-//! of their own roundings, which gives 40uDm² and 40uDmr. The weight of a is the determinant minus
-//! the other two weights: 98uDm(m+r). The volume is off by (3·8 + 3·2 + 16)urm². Products of three
-//! differences of f32 values, and of three such with the bounds, lie far from the limits of f64.
+//! of the roundings of the scalar products, which gives 40uDm² and 40uDmr. The weight of a is the
+//! determinant minus the other two weights: 98uDm(m+r). The volume is off by (3·8 + 3·2 + 16)urm².
+//! Products of three differences of f32 values, and of three such with the bounds, lie far from the
+//! limits of f64.
 
 use crate::intersect::line::Line;
 pub(crate) use crate::intersect::line::RATIO_ERROR;

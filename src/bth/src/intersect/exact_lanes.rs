@@ -124,7 +124,7 @@ impl Intersections {
         self.set_masks(s, lanes, &accurate);
     }
 
-    /// As [`Self::compute`], for rays whose origins f64 does not hold exactly; `pairs.origin` is
+    /// Like [`Self::compute`], for rays whose origins f64 does not hold exactly; `pairs.origin` is
     /// not read.
     #[inline(always)]
     pub(crate) fn compute_from<S: Simd>(
@@ -153,7 +153,7 @@ impl Intersections {
         self.set_masks(s, lanes, &accurate);
     }
 
-    /// As [`Self::compute`], for rays that all start at the origin of `terms`. `norm` holds the
+    /// Like [`Self::compute`], for rays that all start at the origin of `terms`. `norm` holds the
     /// largest |component| of each direction, and `hit` for each ray the index of its triangle in
     /// `terms`; with `FIRST_HALF`, all indices are below eight. It is a kernel that is inlined into
     /// its caller, whose variables the parameters are.

@@ -10,7 +10,7 @@ pub(crate) trait QuadOrigin: Copy {
     /// Repeats a coordinate of a corner in four lanes, except that the third lane gets the
     /// coordinate of the origin along the same axis.
     fn with_corner<D: Doubles>(self, s: D, corner: f32, axis: usize) -> D::V;
-    /// As [`Origin::enlarge`].
+    /// Like [`Origin::enlarge`].
     fn enlarge(self, error: [f64; 2], edge: f64) -> [f64; 2];
 }
 
@@ -37,7 +37,8 @@ impl QuadOrigin for RoundedOrigin {
     }
 }
 
-/// As [`RoundedIntersection::new`] with the terms of an origin and a triangle, with the same bits.
+/// Like [`RoundedIntersection::new`] with the terms of an origin and a triangle, with the same
+/// bits.
 #[inline(always)]
 pub(crate) fn rounded_intersection<D: Doubles>(
     s: D,

@@ -134,7 +134,7 @@ pub(crate) trait TriangleBlock {
     fn project<S: Simd>(&self, s: S, filter: &TriangleFilter) -> Corners<S>;
     /// Projects the points of the leaf, if its triangles refer to them by index.
     fn project_points<S: Simd>(&self, s: S, filter: &TriangleFilter) -> Option<PointRows>;
-    /// As [`Self::project`], for a piece of the triangles, given the projected points.
+    /// Like [`Self::project`], for a piece of the triangles, given the projected points.
     fn project_piece<L: Lanewise>(
         &self,
         l: L,
@@ -314,7 +314,7 @@ impl TriangleFilter {
         sides.with_error(s, s.min(own, sides.error))
     }
 
-    /// As [`Sides::bound_depths`]; certain are only hits within the ray's range.
+    /// Like [`Sides::bound_depths`]; certain are only hits within the ray's range.
     #[inline(always)]
     fn bound_depths<S: Lanewise>(
         &self,

@@ -148,7 +148,7 @@ impl Line {
 
     /// Side of the line on which the edge p→q passes, given the error of the coordinates. The
     /// products are off by error·(sizes + error) because of the coordinates, and by less than the
-    /// same amount because of their own roundings.
+    /// same amount because of the roundings of the products.
     #[inline(always)]
     pub(crate) fn side(p: &Projected, q: &Projected, error: f64) -> Sign {
         let value = cross(p, q);

@@ -1,4 +1,4 @@
-//! Whether triangles cross the open segment between two points, exactly. The points may be starts
+//! Exact test of triangles that cross the open segment between two points. The points may be starts
 //! on triangles.
 
 use super::origin::RoundedOrigin;

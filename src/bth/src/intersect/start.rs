@@ -265,7 +265,7 @@ fn leaf_of(corners: [[f32; 3]; 3]) -> IndexedLeaf {
     IndexedLeaf { vertex, corner, first: 0, triangles: 1, vertices: 3, reserved: 0 }
 }
 
-/// As [`start_corners`], for any leaf.
+/// Like [`start_corners`], for any leaf.
 #[inline(never)]
 fn other_corners(object: &ObjectView<'_>, leaf: u32, slot: u32) -> Option<[[f32; 3]; 3]> {
     let at = slot as usize;

@@ -1,4 +1,4 @@
-//! Whether a closed triangle and a closed axis-aligned box have a point in common, decided exactly.
+//! Exact overlap test of a closed triangle and a closed axis-aligned box.
 //!
 //! Two convex polyhedra are disjoint if and only if a plane separates them that is parallel to a
 //! face of one of them or to an edge of each (Akenine-Möller, "Fast 3D Triangle-Box Overlap

@@ -288,7 +288,7 @@ impl Inverse {
         })
     }
 
-    /// As [`Self::ray`], for a ray that may start on a triangle of the object: then its origin is
+    /// Like [`Self::ray`], for a ray that may start on a triangle of the object: then its origin is
     /// that start, rounded.
     #[inline(always)]
     pub(crate) fn ray_from(&self, ray: &Ray, start: Option<&StartPoint>) -> ObjectRay {
@@ -299,7 +299,7 @@ impl Inverse {
         of_object
     }
 
-    /// As [`Self::ray`] for sixteen rays, with the same bits. The results of lanes that are not
+    /// Like [`Self::ray`] for sixteen rays, with the same bits. The results of lanes that are not
     /// `unscaled` are not valid.
     #[inline(always)]
     pub(crate) fn transform(&self, lanes: &mut RayLanes) {

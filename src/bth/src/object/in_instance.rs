@@ -13,7 +13,7 @@ impl WorldRay<'_> {
         self.in_object(instance, ray, start, |ray| object::nearest(object, ray, instance))
     }
 
-    /// As [`Self::nearest_in`], with the statistics of the traversal.
+    /// Like [`Self::nearest_in`], with the statistics of the traversal.
     pub(crate) fn nearest_counted_in(
         &self,
         object: &ObjectView<'_>,

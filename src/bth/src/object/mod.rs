@@ -23,13 +23,13 @@ pub(crate) fn nearest<R: SingleRay>(object: &ObjectView<'_>, ray: &R, instance: 
     hit
 }
 
-/// As [`nearest`], but stores the hit in `hit`, which avoids a copy.
+/// Like [`nearest`], but stores the hit in `hit`, which avoids a copy.
 #[inline(never)]
 pub(crate) fn store_nearest<R: SingleRay>(object: &ObjectView<'_>, ray: &R, instance: u32, hit: &mut Hit) {
     trace(object, NearestHit, ray, instance, &mut (), hit);
 }
 
-/// As [`nearest`], with the statistics of the traversal.
+/// Like [`nearest`], with the statistics of the traversal.
 pub(crate) fn nearest_counted<R: SingleRay>(object: &ObjectView<'_>, ray: &R, instance: u32) -> (Hit, Steps) {
     let (mut hit, mut steps) = (Hit::MISS, Steps::default());
     trace(object, NearestHit, ray, instance, &mut steps, &mut hit);

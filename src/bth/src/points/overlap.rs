@@ -111,7 +111,7 @@ pub(super) fn visit_box(scene: &Scene, lower: [f32; 3], upper: [f32; 3], visit: 
     }
 }
 
-/// As [`visit_box`], for a ball.
+/// Like [`visit_box`], for a ball.
 pub(super) fn visit_ball(scene: &Scene, center: [f32; 3], radius: f32, visit: &mut Visitor<'_>) -> bool {
     let Some(search) = &Search::new(center, radius) else { return false };
     let mut in_instance =

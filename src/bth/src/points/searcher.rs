@@ -45,7 +45,7 @@ impl<'a> Searcher<'a> {
         Searcher { scene, sole: sole_instance(scene), placed: HashMap::new(), previous: None }
     }
 
-    /// As [`Scene::closest`].
+    /// Like [`Scene::closest`].
     pub(super) fn closest(&mut self, point: [f32; 3], radius: f32) -> Option<Closest> {
         let mut search = Search::new(point, radius)?;
         // The triangle of the point before gives a bound, which never changes the result. It is of

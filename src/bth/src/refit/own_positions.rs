@@ -66,7 +66,7 @@ impl OwnPositions {
     /// first to the second.
     ///
     /// # Errors
-    /// As [`Self::stage`], and `BTH-S007` for a share that is not from 0 to 1.
+    /// The errors of [`Self::stage`], and `BTH-S007` for a share that is not from 0 to 1.
     #[cold]
     pub(crate) fn stage_between(&mut self, ends: [&[[f32; 3]]; 2], share: f64) -> Result<(), Error> {
         if !(0.0..=1.0).contains(&share) {

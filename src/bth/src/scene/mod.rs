@@ -58,18 +58,18 @@ pub fn open(path: impl AsRef<Path>) -> Result<Scene, Error> {
     Scene::checked(File::read(path)?).map_err(|e| e.in_file(path))
 }
 
-/// As [`open`], for the contents of a file in memory, which are copied.
+/// Opens a compiled file whose contents are in memory. Copies them, then does the same as [`open`].
 ///
 /// # Errors
-/// As [`open`].
+/// The errors of [`open`].
 pub fn from_bytes(bytes: &[u8]) -> Result<Scene, Error> {
     Scene::checked(File::from_bytes(bytes)?)
 }
 
-/// As [`open`], for an open file, which is neither copied nor read again.
+/// Makes a scene of an open file, which is neither copied nor read again. Checks it like [`open`].
 ///
 /// # Errors
-/// As [`open`], except for those about reading, the header and the section table.
+/// The errors of [`open`], except errors about reading, the header and the section table.
 pub fn from_file(file: File) -> Result<Scene, Error> {
     Scene::checked(file)
 }

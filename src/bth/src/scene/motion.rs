@@ -70,7 +70,8 @@ impl Scene {
         world.as_mut().map_or(Ok(Update::default()), |world| world.update(objects, seconds))
     }
 
-    /// Sets the time of the scene to that of a frame, which may lie outside of the range of frames.
+    /// Sets the time of the scene to the time of a frame. The frame may lie outside of the range of
+    /// frames.
     ///
     /// # Errors
     /// The errors of [`Self::set_seconds`].
@@ -197,7 +198,7 @@ impl Scene {
         self.refit_object(object, |own| own.stage(positions))
     }
 
-    /// As [`Self::set_positions`], with positions on the straight lines between those at two times:
+    /// Like [`Self::set_positions`], but interpolates each position linearly between two times:
     /// at `share` of the way from the first to the second, from 0 to 1. For motion blur, where
     /// positions are known when the shutter opens and when it closes: set the object to as many
     /// shares as there are times at which the picture is sampled.
@@ -207,8 +208,8 @@ impl Scene {
     /// that is between. Rays are traced as exactly as against any other positions.
     ///
     /// # Errors
-    /// As [`Self::set_positions`], for both ends, and `BTH-S007` if `share` is not from 0 to 1. The
-    /// scene is then unchanged.
+    /// The errors of [`Self::set_positions`] for both ends, and `BTH-S007` if `share` is not from 0
+    /// to 1. The scene is then unchanged.
     pub fn set_positions_between(
         &mut self,
         object: u32,

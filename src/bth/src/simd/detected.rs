@@ -26,7 +26,7 @@ impl Detected {
         }
     }
 
-    /// As [`Self::get`]; false before it was found out.
+    /// Like [`Self::get`]; false before it was found out.
     #[inline(always)]
     pub(in crate::simd) fn is_found(&self) -> bool {
         self.state.load(Ordering::Relaxed) == Detected::PRESENT

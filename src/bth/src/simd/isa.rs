@@ -195,7 +195,7 @@ impl Isa {
         Isa::already_chosen().unwrap_or_else(Isa::choose_first)
     }
 
-    /// As [`Self::chosen`]; `None` where none is chosen, as before the first trace.
+    /// Like [`Self::chosen`]; `None` where none is chosen, as before the first trace.
     #[inline(always)]
     pub(crate) fn already_chosen() -> Option<Isa> {
         Some(match CHOSEN_ISA.load(Ordering::Relaxed) {

@@ -68,7 +68,7 @@ pub trait Part<S> {
     {
         if S::INLINES_PARTS { self.run(simd) } else { simd.call(self) }
     }
-    /// As [`Self::inline_or_call`], for parts that several kernels have in common: see
+    /// Like [`Self::inline_or_call`], for parts that several kernels have in common: see
     /// [`Simd::INLINES_SHARED_PARTS`].
     #[inline(always)]
     fn inline_or_share(self, simd: S) -> Self::Output
@@ -206,9 +206,9 @@ pub trait Simd: Lanewise {
         to: &mut [[[f32; LANES]; N]; LANES],
         line: usize,
     );
-    /// As [`Self::put`].
+    /// Like [`Self::put`].
     fn put_mask(piece: Self::Piece, to: &mut Self::M, m: <Self::Piece as Lanewise>::M);
-    /// As [`Self::pick`].
+    /// Like [`Self::pick`].
     fn pick_mask(piece: Self::Piece, m: &Self::M) -> <Self::Piece as Lanewise>::M;
 
     /// Calls a part of a kernel as a function that all kernels of the instruction set share: for
@@ -239,7 +239,7 @@ pub trait Simd: Lanewise {
     /// # Panics
     /// If the index of a row lies outside of `from` where the mask is set.
     fn rows4(self, m: Self::M, from: &[[f32; 4]], row: Self::U) -> [Self::F; 4];
-    /// As [`Self::rows4`], for rows of eight words.
+    /// Like [`Self::rows4`], for rows of eight words.
     fn rows8(self, m: Self::M, from: &[[u32; 8]], row: Self::U) -> [Self::U; 8];
     /// Transposes sixteen rows of eight words: lane i of vector k is element k of row i.
     fn columns8(self, rows: &[[u32; 8]; LANES]) -> [Self::U; 8];
@@ -257,7 +257,7 @@ pub trait Simd: Lanewise {
     /// Assigns the elements of `from` in order to the lanes whose mask is set, from `from[0]` on;
     /// the other lanes keep the values of `a`.
     fn expand(self, a: Self::F, m: Self::M, from: &[f32; LANES]) -> Self::F;
-    /// As [`Self::lookup`].
+    /// Like [`Self::lookup`].
     fn lookup_u(self, table: Self::U, at: Self::U) -> Self::U;
     /// True if [`Self::lookup_f64`] compiles to a few instructions.
     const HAS_FAST_F64_LOOKUP: bool = false;
@@ -281,18 +281,18 @@ pub trait Simd: Lanewise {
     /// loads each pair at once.
     ///
     /// # Panics
-    /// As [`Self::gather_u`].
+    /// Like [`Self::gather_u`].
     fn gather_pair(self, m: Self::M, from: &[[u32; 2]], at: Self::U) -> (Self::U, Self::U);
-    /// As [`Self::expand`].
+    /// Like [`Self::expand`].
     fn expand_u(self, a: Self::U, m: Self::M, from: &[u32; LANES]) -> Self::U;
     /// True if [`Self::compress`] compiles to a few instructions.
     const HAS_FAST_COMPRESS: bool = false;
     /// Stores the lanes whose bit is set, in order, from `to[0]` on, and returns their number. The
     /// rest of `to` is undefined.
     fn compress(self, bits: u32, a: Self::U, to: &mut [u32; LANES]) -> usize;
-    /// As [`Self::compress`].
+    /// Like [`Self::compress`].
     fn compress_f(self, bits: u32, a: Self::F, to: &mut [f32; LANES]) -> usize;
-    /// As [`Self::compress`], sorted by descending keys. The four lowest bits of keys are not
+    /// Like [`Self::compress`], sorted by descending keys. The four lowest bits of keys are not
     /// compared; in the stored keys they hold the lane. Negative keys are stored in unspecified
     /// order.
     fn compress_far_to_near(
@@ -303,7 +303,7 @@ pub trait Simd: Lanewise {
         to: &mut [u32; LANES],
         keys: &mut [f32; LANES],
     ) -> usize;
-    /// As [`Self::compress_far_to_near`]; also returns the lane of the last entry, the nearest,
+    /// Like [`Self::compress_far_to_near`]; also returns the lane of the last entry, the nearest,
     /// which is undefined if no bit is set.
     #[inline(always)]
     fn sort_far_to_near(
@@ -337,7 +337,7 @@ pub trait Simd: Lanewise {
     }
     /// Prefetches a cache line; any address is allowed.
     fn prefetch<T>(self, address: *const T);
-    /// As [`Self::prefetch`], into the second-level cache only, where the machine can.
+    /// Like [`Self::prefetch`], into the second-level cache only, where the machine can.
     #[inline(always)]
     fn prefetch_second<T>(self, address: *const T) {
         self.prefetch(address);
@@ -476,7 +476,7 @@ macro_rules! x86_token {
                 IS_FOUND.get().then_some($token(()))
             }
 
-            /// As [`Self::detect`]; `None` before that was called.
+            /// Like [`Self::detect`]; `None` before that was called.
             #[inline(always)]
             pub(in crate::simd) fn found() -> Option<Self> {
                 IS_FOUND.is_found().then_some($token(()))
@@ -495,7 +495,7 @@ macro_rules! x86_token {
             kernel.run(simd)
         }
 
-        /// As [`entry`], for a part of kernels.
+        /// Like [`entry`], for a part of kernels.
         #[target_feature($(enable = $feature),*)]
         #[inline(never)]
         fn part_entry<P: $crate::simd::Part<$simd>>(simd: $simd, part: P) -> P::Output {

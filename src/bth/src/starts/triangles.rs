@@ -204,7 +204,7 @@ impl StartTriangles {
         }
     }
 
-    /// As [`Self::set`], for any triangle.
+    /// Like [`Self::set`], for any triangle.
     #[inline(never)]
     fn set_other(&mut self, object: &ObjectView<'_>, id: u32, column: usize) {
         self.leaf[column] = NONE;

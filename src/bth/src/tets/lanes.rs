@@ -1,18 +1,18 @@
 //! The step of sixteen tet walks, one in each lane, from a tetrahedron to the next, in f32.
 //!
-//! The method is that of [`super::walk`]; a sign is used only if it is certain in f32.
+//! The method is the same as in [`super::walk`], but a sign is used only if it is certain in f32.
 //!
 //! **Error of a cross product.** Let u = 2^-24, let (x, y, z) be the computed projection of a
 //! point, where z is its depth, and let W = |x| + |y| + |z|. The differences from the origin are
 //! off by a factor of 1 + u, and so is the shear, at most 1. With the roundings of the product and
 //! of the last difference, x and y are off by u (2|x| + 4|z|), less than δ = 4.1 u W. For two
 //! points a and b let S = |x| + |y|. Their cross product is then off by δa Sb + δb Sa + 2 δa δb
-//! because of the points, and by 2 u Sa Sb because of its own roundings. Where B is at least the W
-//! of both points, the sum is less than 5.1 u B (Sa + Sb) + 34 u² B². What is computed is a bound
-//! of E = 6 u B (Sa + T + 8 u B).
+//! because of the points, and by 2 u Sa Sb because of the roundings of the product. Where B is not
+//! below the W of either point, the sum is less than 5.1 u B (Sa + Sb) + 34 u² B². What is computed
+//! is a bound of E = 6 u B (Sa + T + 8 u B).
 //!
-//! B and T are the largest W and S of the points that the lane has projected so far, and B is at
-//! least 2^-38. Therefore E exceeds 2^-119, which is more than the effect of underflow. From B =
+//! B and T are the largest W and S of the points that the lane has projected so far, and B is never
+//! below 2^-38. Therefore E exceeds 2^-119, which is more than the effect of underflow. From B =
 //! 2^61 on, where products might overflow, E is infinite and no sign is certain. One E serves all
 //! three products of a step. Of the diffuse rays in a scanned model, fewer than one in 500 have an
 //! uncertain sign.

@@ -101,7 +101,7 @@ pub(crate) struct EnteredLanes<S: Simd> {
 }
 
 impl<S: Simd> EnteredLanes<S> {
-    /// As [`Entered::rank`], for a vertex in each lane.
+    /// Like [`Entered::rank`], for a vertex in each lane.
     #[inline(always)]
     fn rank(&self, s: S, vertex: S::U) -> S::U {
         let mut rank = s.splat_u(0);
@@ -179,7 +179,7 @@ impl<'a> LaneRecords<'a> {
     }
 }
 
-/// As [`decode_link`], in each lane.
+/// Like [`decode_link`], in each lane.
 #[inline(always)]
 fn decode_links<S: Simd>(s: S, words: &[u32], m: S::M, entered: &EnteredLanes<S>, vertex: S::U) -> S::U {
     let first = s.add_u(s.shl_u::<2>(entered.tet), s.splat_u(1));

@@ -1,4 +1,4 @@
-//! Whether packets have been worthwhile so far.
+//! Decides by the results so far if packets are worthwhile.
 
 use bth_format::Identity;
 

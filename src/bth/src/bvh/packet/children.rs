@@ -82,7 +82,7 @@ pub(super) fn meeting<S: Simd, H: PacketBounds<S>>(
     rays_meeting::<S, H>(s, groups, rays, bounds.corners(node, slot as usize % WIDTH))
 }
 
-/// As [`meeting`], given the corners of the box ([`PacketBounds::corners`]).
+/// Like [`meeting`], given the corners of the box ([`PacketBounds::corners`]).
 #[inline(always)]
 pub(crate) fn rays_meeting<S: Simd, H: PacketBounds<S>>(
     s: S,

@@ -155,7 +155,7 @@ impl<G: Goal> PacketRays<'_, G> {
     }
 
     /// Intersects rays with triangles of a leaf. Returns whether any has a nearer hit than before.
-    /// As [`Self::reached`], it is a part of the kernel, but serves both formats of leaves.
+    /// Like [`Self::reached`], it is inlined into the kernel, but it serves both formats of leaves.
     #[inline(always)]
     pub(super) fn enter_triangles<S: Simd, H: PacketBounds<S>>(
         &mut self,

@@ -77,7 +77,7 @@ impl RelativePoints {
 pub(crate) trait CornerSource<S: Simd> {
     /// x, y and depth of a point in the projections along sixteen rays.
     fn corner(&self, s: S, point: usize) -> [S::F; 3];
-    /// As [`Self::corner`], along the rays of a piece.
+    /// Like [`Self::corner`], along the rays of a piece.
     fn corner_of_piece(&self, piece: S::Piece, point: usize) -> [<S::Piece as Lanewise>::F; 3];
 }
 

@@ -35,7 +35,7 @@ impl<S: Lanewise> Projection<S> {
         self
     }
 
-    /// As [`Self::of`] for a point relative to the common origin. The depth is not used by the
+    /// Like [`Self::of`] for a point relative to the common origin. The depth is not used by the
     /// other coordinates, because for most triangles it is not needed and its computation is
     /// removed.
     #[inline(always)]

@@ -208,7 +208,7 @@ impl<S: Simd> RayGroup<S> {
         RayLimits { first: self.first, limit: self.limit, certain: self.certain }
     }
 
-    /// As [`Self::limits`], of the rays of a piece.
+    /// Like [`Self::limits`], of the rays of a piece.
     #[inline(always)]
     pub(crate) fn limits_of_piece(&self, p: S::Piece) -> RayLimits<S::Piece> {
         RayLimits {
@@ -233,7 +233,7 @@ impl<S: Simd> RayGroup<S> {
         slabs.may_enter(s, corners, (H::MIXED_OCTANTS, H::COMMON_ORIGIN))
     }
 
-    /// As [`Self::may_enter`], for the rays of a piece.
+    /// Like [`Self::may_enter`], for the rays of a piece.
     #[inline(always)]
     pub(crate) fn piece_may_enter<H: PacketBounds<S>>(&self, p: S::Piece, corners: [[f32; 3]; 2]) -> u32 {
         self.slabs_of_piece(p).may_enter(p, corners, (H::MIXED_OCTANTS, H::COMMON_ORIGIN))

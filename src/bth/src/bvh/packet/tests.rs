@@ -31,7 +31,7 @@ fn packed(
     (count, scratch.rest)
 }
 
-/// As [`packed`], with memory that other batches may have used.
+/// Like [`packed`], with memory that other batches may have used.
 fn packed_in(
     isa: Isa,
     scratch: &mut PacketScratch,

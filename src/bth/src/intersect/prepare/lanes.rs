@@ -16,7 +16,7 @@ pub(crate) fn gather_rays<S: Simd>(s: S, m: S::M, rays: &[Ray], at: S::U) -> [S:
     floats(s, s.rows8(m, Ray::rows(rays), at))
 }
 
-/// As [`gather_rays`], for sixteen consecutive rays.
+/// Like [`gather_rays`], for sixteen consecutive rays.
 #[inline(always)]
 pub(crate) fn load_rays<S: Simd>(s: S, rays: &[Ray; LANES]) -> [S::F; 8] {
     floats(s, s.columns8(Ray::rows(rays).first_chunk().expect("sixteen rows")))

@@ -1,8 +1,8 @@
 //! Preparation of rays for the BVH: the per-ray constants of box tests and filter, in f32 for one
 //! ray or for sixteen at once.
 //!
-//! The results satisfy the bounds that [`RaySlabs`] and [`TriangleFilter`] need, but differ in
-//! their bits from those of their constructors, which compute in f64. Where coordinates are too
+//! The results satisfy the bounds that [`RaySlabs`] and [`TriangleFilter`] need, but not with the
+//! same bits as the constructors of these types, which compute in f64. Where coordinates are too
 //! large or too small for f32, these constructors prepare the ray.
 
 mod axes;
@@ -116,7 +116,7 @@ impl PreparedRay {
         PreparedRay::of_rows(s, bounds, rows.map(Vec4::from_array), ray)
     }
 
-    /// As [`Self::of`], given the floats of the ray as two rows of four.
+    /// Like [`Self::of`], given the floats of the ray as two rows of four.
     #[inline(always)]
     pub(crate) fn of_rows<S: Simd>(
         s: S,

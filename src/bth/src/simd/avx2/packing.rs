@@ -22,7 +22,7 @@ pub(super) unsafe fn expansion(bits: u8) -> __m256i {
 /// order. The inverse of [`expansion`].
 ///
 /// # Safety
-/// As [`expansion`].
+/// The same as for [`expansion`].
 #[inline(always)]
 pub(super) unsafe fn compression(bits: u8) -> __m256i {
     // SAFETY: the caller proves the features; registers only.

@@ -26,7 +26,7 @@ pub(super) unsafe fn transpose4([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {
 /// Transposes eight by eight lanes.
 ///
 /// # Safety
-/// As [`transpose4`].
+/// The same as for [`transpose4`].
 #[inline(always)]
 pub(super) unsafe fn transpose8(rows: [__m256; 8]) -> [__m256; 8] {
     let mut out = rows;

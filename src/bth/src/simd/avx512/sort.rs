@@ -4,7 +4,8 @@ use crate::simd::LANES;
 use std::arch::x86_64::*;
 
 /// Step of a bitonic sorting network in descending order: lanes whose bit is set in `keep_greater`
-/// take the larger of their own and their partner's value, the other lanes the smaller.
+/// take the larger of two values, their value and their partner's; the other lanes take the
+/// smaller.
 macro_rules! exchange {
     ($min:ident, $mask_max:ident, $v:expr, $partner:expr, $keep_greater:expr) => {{
         let (v, partner) = ($v, $partner);
@@ -31,7 +32,7 @@ pub(super) unsafe fn sort4(v: __m128i) -> __m128i {
 /// Sorts eight lanes; see [`sort4`].
 ///
 /// # Safety
-/// As [`sort4`].
+/// The same as for [`sort4`].
 #[inline(always)]
 pub(super) unsafe fn sort8(v: __m256i) -> __m256i {
     macro_rules! step {
@@ -53,7 +54,7 @@ pub(super) unsafe fn sort8(v: __m256i) -> __m256i {
 /// Sorts sixteen lanes; see [`sort4`].
 ///
 /// # Safety
-/// As [`sort4`].
+/// The same as for [`sort4`].
 #[inline(always)]
 pub(super) unsafe fn sort16(v: __m512i) -> __m512i {
     macro_rules! step {
@@ -80,7 +81,7 @@ pub(super) unsafe fn sort16(v: __m512i) -> __m512i {
 /// key when keys are sorted.
 ///
 /// # Safety
-/// As [`sort4`].
+/// The same as for [`sort4`].
 #[inline(always)]
 pub(super) unsafe fn keys_with_lanes(key: __m512) -> __m512i {
     // SAFETY: see `sort4`.
@@ -141,7 +142,7 @@ pub(super) unsafe fn store_far_to_near<const WHOLE: bool>(
 /// The smallest key of at most four lanes.
 ///
 /// # Safety
-/// As [`sort4`].
+/// The same as for [`sort4`].
 #[inline(always)]
 pub(super) unsafe fn nearest_of_four(lanes: u16, key: __m512i) -> u32 {
     // SAFETY: see `sort4`.

@@ -6,7 +6,7 @@ use std::arch::x86_64::*;
 /// Transposes four by four lanes within each quarter.
 ///
 /// # Safety
-/// As [`super::sort::sort4`].
+/// The same as for [`super::sort::sort4`].
 #[inline(always)]
 pub(super) unsafe fn transpose4([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
     // SAFETY: see `super::sort::sort4`.
@@ -25,7 +25,7 @@ pub(super) unsafe fn transpose4([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
 /// Transposes sixteen vectors: lane k of row i becomes lane i of row k.
 ///
 /// # Safety
-/// As [`transpose4`].
+/// The same as for [`transpose4`].
 #[inline(always)]
 pub(super) unsafe fn transpose16(rows: [__m512; LANES]) -> [__m512; LANES] {
     let mut r = rows;
@@ -58,7 +58,7 @@ pub(super) unsafe fn transpose16(rows: [__m512; LANES]) -> [__m512; LANES] {
 /// Lane i of the result is the smallest lane of row i.
 ///
 /// # Safety
-/// As [`transpose4`].
+/// The same as for [`transpose4`].
 #[inline(always)]
 pub(super) unsafe fn least_of_each(rows: [__m512; LANES]) -> __m512 {
     let mut r = rows;

@@ -114,7 +114,7 @@ fn split<T>(from: &[T; LANES]) -> &[[T; QUAD]; QUADS] {
     from.as_chunks().0.try_into().expect("sixteen are four times four")
 }
 
-/// As [`split`], mutably.
+/// Like [`split`], mutably.
 #[inline(always)]
 fn split_mut<T>(to: &mut [T; LANES]) -> &mut [[T; QUAD]; QUADS] {
     to.as_chunks_mut().0.try_into().expect("sixteen are four times four")

@@ -30,7 +30,7 @@ pub(crate) mod sealed {
         /// Returns true if the ray may hit something in a scene that is this instance, whose
         /// object's space is world space.
         fn may_start_in(&self, instance: u32) -> bool;
-        /// The ray in the world; `None` if it has no place there.
+        /// The ray in world space; `None` if its start is not in the scene.
         fn placed(&self, scene: &Scene) -> Option<PlacedRay>;
         /// Returns true if rays are traced together, through instances if there is a world.
         fn go_together(rays: &[Self], world: Option<&World>) -> bool;

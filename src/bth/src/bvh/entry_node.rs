@@ -23,7 +23,8 @@ struct Boxes {
     /// For each axis the lower bounds, then the upper ones, like [`WideNode::bounds`].
     bounds: [[f32; 2 * WIDTH]; 6],
     child: [u32; 2 * WIDTH],
-    /// True for the box of a leaf, and of a node whose children there is no room for.
+    /// True for the box of a leaf, and for the box of a node if the slots left cannot hold its
+    /// children.
     is_final: [bool; 2 * WIDTH],
     count: usize,
 }

@@ -21,7 +21,7 @@ const KEY_SLACK: f32 = 1.0 / (1 << 19) as f32;
 /// The largest key of stack entries that can hold hits up to the depth `last`.
 #[inline(always)]
 pub(crate) fn key_limit(last: f32) -> f32 {
-    // The sum comes first, so that the product is no denormal number, which takes processors a
+    // The sum comes first, so that the product is not a denormal number, which takes processors a
     // hundred cycles: `last` is next to 0 where a ray hits the triangle that its origin lies on.
     last + (last.abs() + f32::MIN_POSITIVE / KEY_SLACK) * KEY_SLACK
 }

@@ -24,7 +24,7 @@ pub(super) struct PointInstance<'a> {
 
 impl PointInstance<'_> {
     /// The corners of a triangle in world space, given those in object space; `None` for triangles
-    /// of zero area, which are no part of the surface. Only deformable objects hold some.
+    /// of zero area, which are not part of the surface. Only deformable objects hold some.
     #[inline(always)]
     pub(super) fn corners_in_world(&self, corners: [[f32; 3]; 3]) -> Option<[[f32; 3]; 3]> {
         if self.object.is_deformable() && is_zero_area(corners) {

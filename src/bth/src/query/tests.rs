@@ -60,7 +60,8 @@ fn queries_that_are_converted_there_and_back_give_the_same_answers() {
     assert!(hits.iter().all(|hits| (2_000..18_000).contains(hits)), "{hits:?}");
 }
 
-/// A t beyond the finite numbers of f32, in either direction, is no hit: it tells no point.
+/// A t beyond the finite numbers of f32, in either direction, is not a hit: it does not give a
+/// point.
 #[test]
 fn hits_at_infinity_are_none() {
     let ray = Ray::new([0.0; 3], [1.0; 3]).with_range(f32::NEG_INFINITY, f32::INFINITY);

@@ -41,7 +41,7 @@ pub(super) struct RefitTask {
     pub(super) leaves: LeafRange,
 }
 
-/// A leaf that is no part of a task.
+/// A leaf that does not belong to a task.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TopLeaf {
     /// Where its box is stored; `None` if it is the whole tree.

@@ -198,10 +198,10 @@ impl Scene {
         self.refit_object(object, |own| own.stage(positions))
     }
 
-    /// Like [`Self::set_positions`], but interpolates each position linearly between two times:
-    /// at `share` of the way from the first to the second, from 0 to 1. For motion blur, where
-    /// positions are known when the shutter opens and when it closes: set the object to as many
-    /// shares as there are times at which the picture is sampled.
+    /// Like [`Self::set_positions`], but interpolates each position linearly between two times: at
+    /// `share` of the way from the first to the second, from 0 to 1. For motion blur, where
+    /// positions are known when the shutter opens and when it closes: set one share for each time
+    /// at which the picture is sampled.
     ///
     /// A coordinate is (1 − `share`) · a + `share` · b in `f64`, rounded once to `f32`: exactly a
     /// or b at the ends, and never beyond them, so that the boxes of both ends together contain all

@@ -22,7 +22,7 @@ pub(crate) enum StartError {
     Weights,
 }
 
-/// Finds a start on a triangle of an object, of whatever instance.
+/// Finds a start on a triangle of an object. The instance is not looked at.
 #[inline(always)]
 pub(crate) fn locate(object: &ObjectView<'_>, start: Start) -> Result<StartPoint, StartError> {
     let Start { primitive: PrimitiveRef { triangle, .. }, u, v } = start;

@@ -87,7 +87,7 @@ impl TetWalker<'_> {
     }
 
     /// Passes all constrained faces of the leaf that the line can touch up to the receiver's limit.
-    /// Returns whether the query is complete.
+    /// Returns true if the query is complete.
     #[inline(never)]
     pub(crate) fn flood_faces<C: Count>(&self, receiver: &mut dyn FaceReceiver, count: &mut C) -> bool {
         count.flood();

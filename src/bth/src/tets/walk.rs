@@ -92,7 +92,7 @@ impl<'a> TetWalker<'a> {
     }
 
     /// Tests a constrained face exactly, as the triangles of BVH leaves are, and offers a hit to
-    /// the query. Returns whether the query is complete.
+    /// the query. Returns true if the query is complete.
     pub(crate) fn offer(&self, face: &TetFace, query: &mut EitherQuery) -> bool {
         let corners = face.vertex.map(|v| self.position(v));
         let found = match &self.start {

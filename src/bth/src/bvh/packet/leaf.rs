@@ -154,8 +154,9 @@ impl<G: Goal> PacketRays<'_, G> {
         (triangles != 0).then(|| ReachedTriangles { leaf: block.points(code), triangles, rays })
     }
 
-    /// Intersects rays with triangles of a leaf. Returns whether any has a nearer hit than before.
-    /// Like [`Self::reached`], it is inlined into the kernel, but it serves both formats of leaves.
+    /// Intersects rays with triangles of a leaf. Returns true if any ray has a nearer hit than
+    /// before. Like [`Self::reached`], it is inlined into the kernel, but it serves both formats of
+    /// leaves.
     #[inline(always)]
     pub(super) fn enter_triangles<S: Simd, H: PacketBounds<S>>(
         &mut self,

@@ -54,8 +54,7 @@ pub(super) struct MorphRuns<'a> {
 }
 
 impl<'a> MorphRuns<'a> {
-    /// The runs of the targets of an object of so many vertices by their weights. Targets of weight
-    /// 0 have none.
+    /// The runs of an object's targets whose weight is not 0.
     #[inline(never)]
     pub(super) fn new(deformation: &DeformationView<'a>, weights: &[f64], vertices: usize) -> Self {
         // How many runs chunks have, then where they begin, then, as they are filled, where they
@@ -83,8 +82,8 @@ impl<'a> MorphRuns<'a> {
     }
 }
 
-/// Gives each run with its chunk, those of a chunk in the order of the targets, in which sums are
-/// rounded.
+/// Passes on each run with its chunk. The runs of a chunk come in the order of the targets, which
+/// fixes how sums are rounded.
 fn each_run<'a>(
     deformation: &DeformationView<'a>,
     weights: &[f64],

@@ -5,8 +5,8 @@ use super::pose::Pose;
 use super::positions::blend;
 use bth_format::DeformationView;
 
-/// The normal of a corner in a pose, given that of the file, the row of the normal and the row of
-/// its corner's position. Of any length; zero where the pose leaves it no direction.
+/// The normal of a corner in a pose, given the normal in the file, its row, and the row of the
+/// corner's position. Of any length; zero if the pose leaves it without a direction.
 ///
 /// The normal is transformed by the inverse transpose of the position's blended matrix, up to a
 /// positive factor: by the cofactors of the matrix with the sign of its determinant.

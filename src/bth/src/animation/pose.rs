@@ -30,7 +30,7 @@ impl<'a> SkinMatrices<'a> {
         SkinMatrices { view, hierarchy, skins: vec![None; view.skins.len()] }
     }
 
-    /// The matrices of a skin; `None` if there is none of that row.
+    /// The matrices of the skin in a row; `None` if there is no such row.
     fn of(&mut self, row: u32) -> Option<Arc<[JointMatrix]>> {
         let SkinMatrices { view, hierarchy, skins } = self;
         let (skin, matrices) = (view.skins.get(row as usize)?, &mut skins[row as usize]);
@@ -54,7 +54,8 @@ impl Pose {
     }
 }
 
-/// The weights of a deformer at a time: those of its node's track, else its own.
+/// The weights of a deformer at a time: from the track of its node if there is one, else the
+/// constant weights of the deformer.
 fn weights(view: &SceneView<'_>, deformer: &Deformer, seconds: f64) -> Vec<f64> {
     let count = deformer.weights as usize;
     let key = (deformer.node, Property::Weights as u32);

@@ -53,7 +53,7 @@ impl Sample {
             weights[0] += 0.25;
         }
         let (mut morphs, mut rows, mut deltas) = (Vec::new(), Vec::new(), Vec::new());
-        // For positions, then for normals, of which there are as many.
+        // For positions, then for the same number of normals.
         for target in 0..2 * targets {
             let changed: Vec<u32> = (0..vertices as u32).filter(|_| rng.below(3) == 0).collect();
             let dense = target % 2 == 0;

@@ -67,8 +67,8 @@ impl SceneBuilder {
     /// may scale, shear and mirror.
     ///
     /// # Errors
-    /// `BTH-O003` if there is no such object, `BTH-S005` if there are too many instances. Whether
-    /// the transform can be used is decided by [`Self::commit`].
+    /// `BTH-O003` if there is no such object, `BTH-S005` if there are too many instances.
+    /// [`Self::commit`] decides whether the transform can be used.
     pub fn instance(&mut self, object: u32, transform: &[f32; 12]) -> Result<u32, Error> {
         self.check_object(object)?;
         self.check_capacity(1)?;
@@ -89,7 +89,8 @@ impl SceneBuilder {
     /// transform counts.
     ///
     /// # Errors
-    /// As [`Self::set_transform`], for the first such instance. No transform is set then.
+    /// The error of [`Self::set_transform`] for the first instance that has one. No transform is
+    /// set then.
     ///
     /// # Panics
     /// If there are not as many transforms as instances.
@@ -122,7 +123,7 @@ impl SceneBuilder {
     /// succeeded.
     ///
     /// # Errors
-    /// As [`Self::set_transform`].
+    /// The errors of [`Self::set_transform`].
     pub fn remove(&mut self, instance: u32) -> Result<(), Error> {
         self.check_own(instance)?;
         self.unstage(instance);

@@ -1,8 +1,8 @@
 //! Scenes whose instances the caller places: the objects of several files, moved at run time.
 //!
-//! Changes are staged and become visible by a commit, all or none of them. The staged state is here
-//! ([`instances`] of single objects, [`subscenes`] of whole files); the committed one is that of
-//! the [`Scene`], so that rays meet instances of callers and of files in the same way.
+//! Changes are staged. A commit makes all of them visible, or none if it fails. The staged state is
+//! here ([`instances`] of single objects, [`subscenes`] of whole files). The committed state is in
+//! the [`Scene`], so rays reach instances of callers and of files in the same way.
 
 mod ids;
 mod instances;
@@ -35,7 +35,10 @@ const MAX_INSTANCES: usize = 1 << 30;
 /// let tree = builder.add(&bth::open("tree.bth")?);
 /// let stone = builder.add(&bth::open("stone.bth")?);
 /// let at = |x: f32| [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
-/// let trees: Vec<u32> = (0..100).map(|i| builder.instance(tree, &at(i as f32))).collect::<Result<_, _>>()?;
+/// let mut trees = Vec::new();
+/// for i in 0..100 {
+///     trees.push(builder.instance(tree, &at(i as f32))?);
+/// }
 /// builder.instance(stone, &at(-3.0))?;
 /// builder.commit()?;
 ///
@@ -53,7 +56,7 @@ pub struct SceneBuilder {
     scene: Scene,
     /// For each id the instance as it is to be.
     instances: Vec<StagedInstance>,
-    /// The ids of instances that differ from those of the scene.
+    /// The ids of instances that differ from the scene.
     changed: Vec<u32>,
     instance_ids: FreeIds,
     /// For each id the subscene; `None` if it was removed.
@@ -101,7 +104,7 @@ impl SceneBuilder {
         self.scene
     }
 
-    /// As [`Scene::set_instance_mask`]: it has an effect at once, without a commit. The mask of an
+    /// Like [`Scene::set_instance_mask`]: takes effect at once, without a commit. The mask of an
     /// instance that is removed is dropped.
     ///
     /// # Errors
@@ -112,7 +115,7 @@ impl SceneBuilder {
         Ok(())
     }
 
-    /// As [`Scene::set_group_mask`]: it has an effect at once, without a commit.
+    /// Like [`Scene::set_group_mask`]: takes effect at once, without a commit.
     ///
     /// # Errors
     /// `BTH-O003` if there is no such object, or if it has no such group.

@@ -21,12 +21,12 @@ impl SceneBuilder {
         self.stage_positions(object, |own| own.stage(positions))
     }
 
-    /// As [`Self::set_positions`], with positions at a share of the way between those at two times,
-    /// as [`Scene::set_positions_between`](crate::Scene::set_positions_between) has them.
+    /// Like [`Self::set_positions`], but interpolates between the positions at two times, in the
+    /// same way as [`Scene::set_positions_between`](crate::Scene::set_positions_between).
     ///
     /// # Errors
-    /// As [`Self::set_positions`], for both ends, and `BTH-S007` if `share` is not from 0 to 1.
-    /// Nothing is changed then.
+    /// The errors of [`Self::set_positions`] for both ends, and `BTH-S007` if `share` is not from 0
+    /// to 1. Nothing is changed then.
     pub fn set_positions_between(
         &mut self,
         object: u32,
@@ -54,7 +54,7 @@ impl SceneBuilder {
     /// Several subscenes of one file have the same objects; the lowest id wins.
     ///
     /// # Errors
-    /// As [`Self::commit`]. Nothing is staged then.
+    /// The errors of [`Self::commit`]. Nothing is staged then.
     pub(super) fn stage_poses(&mut self) -> Result<StagedPoses, Error> {
         let mut staged = StagedPoses::default();
         if self.scene.world().is_none_or(|world| world.animation.is_empty()) {

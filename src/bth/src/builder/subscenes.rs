@@ -108,9 +108,9 @@ impl SceneBuilder {
     /// Adds an instance of each instance of a file, placed by the nodes and tracks of the file and
     /// then by `transform`, as at the first frame of the file. A file without scene sections has
     /// one instance of each object. `first_object` is what [`Self::add`] returned. Returns the id
-    /// of the subscene; a file may have any number of them, each at a time of its own. Objects that
-    /// the file's skins and morph targets deform are the same in all of them and deform by the time
-    /// of the one of the lowest id: add the file again for others.
+    /// of the subscene; a file may have any number of subscenes, each with its own time. All of
+    /// them share the objects that the file's skins and morph targets deform; the time of the
+    /// subscene with the lowest id decides their pose. For other poses, add the file again.
     ///
     /// # Errors
     /// `BTH-O003` if there is no such object, or it is not the first of its file; `BTH-S005` if
@@ -151,8 +151,8 @@ impl SceneBuilder {
         found.map(|subscene| subscene.ids.as_slice()).ok_or_else(|| no_subscene(subscene))
     }
 
-    /// Sets the transform from the world space of a subscene's file to that of the scene; see
-    /// [`Self::instance`].
+    /// Sets the transform from the world space of a subscene's file to the world space of the
+    /// scene; see [`Self::instance`].
     ///
     /// # Errors
     /// `BTH-S003` if there is no such subscene.

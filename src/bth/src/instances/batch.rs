@@ -20,9 +20,9 @@ use std::cell::Cell;
 
 /// Number of rays that advance together.
 const CHUNK: usize = 2048;
-/// From this number of rays on, the rays through one instance are a batch of their own: they are as
-/// many as four packets hold, so the cost of a further batch is small. Fewer rays are joined with
-/// those through other instances of the same object.
+/// From this number of rays on, the rays through one instance are a separate batch: four packets
+/// hold them, so the cost of a further batch is small. Fewer rays are joined with the rays through
+/// other instances of the same object.
 const MIN_RAYS_PER_INSTANCE: usize = 256;
 
 /// Rays of a batch that advance together.
@@ -40,7 +40,7 @@ struct ActiveRays {
     packets: TopLevelPackets,
     /// The other rays that reach few boxes.
     lists: InstanceLists,
-    /// Indices within the chunk of the rest, each of which is traced alone.
+    /// Indices within the chunk of the other rays. Each of them is traced alone.
     alone: Vec<u32>,
     /// The visits to be traced before the rays advance.
     visits: VisitQueue,

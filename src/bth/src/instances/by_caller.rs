@@ -74,7 +74,7 @@ impl World {
         result
     }
 
-    /// Stores the placements of changed instances, none of which is an error.
+    /// Stores the placements of changed instances. No placement may be an error.
     fn store(
         &mut self,
         count: usize,

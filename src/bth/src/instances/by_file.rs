@@ -33,7 +33,7 @@ impl World {
     /// a scene whose objects keep their shape.
     ///
     /// # Errors
-    /// As [`Self::update`], and `BTH-S006` if an object cannot be given new positions.
+    /// The errors of [`Self::update`], and `BTH-S006` if an object cannot be given new positions.
     pub(crate) fn deform_first(&mut self, objects: &mut Objects) -> Result<()> {
         if !self.animation.is_empty() {
             self.update(objects, self.seconds)?;
@@ -64,8 +64,8 @@ impl World {
         result
     }
 
-    /// As [`Self::update`]. After an error the objects are unchanged, but not the nodes and
-    /// placements.
+    /// The errors of [`Self::update`]. After an error the objects are unchanged, but not the nodes
+    /// and placements.
     fn try_update(&mut self, objects: &mut Objects, seconds: f64) -> Result<Update> {
         let nodes = self.evaluate_nodes(objects, seconds, false);
         let TransformSource::File(hierarchy) = &self.source else { return Ok(Update::default()) };
@@ -98,8 +98,8 @@ impl World {
         }
     }
 
-    /// Places the instances that moved and those of objects that deformed, or with `all` every
-    /// instance, and rebuilds the top level.
+    /// Places the instances that moved and the instances of objects that deformed, or with `all`
+    /// every instance, and rebuilds the top level.
     fn place_moved(
         &mut self,
         objects: &Objects,

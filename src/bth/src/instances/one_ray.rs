@@ -62,7 +62,7 @@ impl World {
         });
     }
 
-    /// As [`Self::store_nearest_of_ray`], with the statistics of the traversal of objects.
+    /// Like [`Self::store_nearest_of_ray`], with the statistics of the traversal of objects.
     pub(crate) fn nearest_counted(&self, objects: &Objects, ray: WorldRay<'_>) -> (Hit, Steps) {
         let (mut best, mut steps) = (Hit::MISS, Steps::default());
         self.nearest_by(

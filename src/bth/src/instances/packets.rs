@@ -40,7 +40,7 @@ struct ListedInstance {
     rays: u64,
 }
 
-/// Sorts instances by depth. A function of its own, so that it is compiled once for all instruction
+/// Sorts instances by depth. A separate function, so that it is compiled once for all instruction
 /// sets.
 #[inline(never)]
 fn sort_by_depth(items: &mut [ListedInstance]) {

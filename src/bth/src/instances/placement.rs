@@ -44,7 +44,7 @@ pub(crate) struct PartBoxes {
 }
 
 impl PartBoxes {
-    /// The first `count` of some boxes, given as those of a node, at least one.
+    /// The first `count` boxes, at least one, of boxes in the layout of a node.
     fn new(count: usize, boxes: &[[[f32; WIDTH]; 2]; 3]) -> PartBoxes {
         let mut bounds = [[[[0.0; BLOCK]; WIDTH / BLOCK]; 2]; 3];
         for (bounds, boxes) in bounds.as_flattened_mut().iter_mut().zip(boxes.as_flattened()) {
@@ -126,8 +126,8 @@ impl Placement {
     /// `index` the index of the object.
     ///
     /// A hit at t of the ray in object space lies in the object's box. In world space, let o be the
-    /// origin of the ray and T that of the object. Let M be the linear part of the transform, A its
-    /// inverse, and b the max |coordinate| of the object's box. The rounding of origin and
+    /// origin of the ray and T the origin of the object. Let M be the linear part of the transform,
+    /// A its inverse, and b the max |coordinate| of the object's box. The rounding of origin and
     /// direction moves the point at t in object space by at most 2^-24 (2 |A (o - T)| + b), hence
     /// in world space by at most |M| times that: 2^-24 (2 κ (|o| + |T|) + |M| b) where κ = |M| |A|,
     /// in the maximum norm.
@@ -144,7 +144,7 @@ impl Placement {
         Placement::inlined(world, index, object, parts)
     }
 
-    /// As [`Self::new`], compiled inside of a kernel.
+    /// Like [`Self::new`], compiled inside of a kernel.
     #[inline(always)]
     pub(crate) fn inlined(
         world: &Affine,

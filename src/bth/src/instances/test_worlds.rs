@@ -41,7 +41,7 @@ fn transform(rng: &mut Rng, spread: f64) -> Affine {
     affine
 }
 
-/// A world of `count` instances, of which about one in eight is not visible, and their transforms.
+/// A world of `count` instances and their transforms. About one instance in eight is not visible.
 pub(super) fn world(file: &File, rng: &mut Rng, count: usize) -> (World, Vec<Affine>) {
     let spread = [0.0, 1.0, 4.0, 1e4][rng.below(4) as usize];
     let transforms: Vec<Affine> = (0..count).map(|_| transform(rng, spread)).collect();

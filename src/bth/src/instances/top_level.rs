@@ -19,9 +19,9 @@ const REACH: f32 = 4.0;
 /// The top-level BVH.
 #[derive(Debug, Default)]
 pub(crate) struct TopLevel {
-    /// The nodes, the root first and parents before their children, aligned to cache lines like
-    /// those of objects. The child code of a node is the index of its first line, that of an
-    /// instance is [`INSTANCE`] and its index.
+    /// The nodes, the root first and parents before their children, aligned to cache lines like the
+    /// nodes of objects. The child code of a node is the index of its first line. The child code of
+    /// an instance is [`INSTANCE`] and its index.
     pub(super) lines: Vec<CacheLine>,
     /// Max |coordinate| of the instances' boxes.
     pub(crate) extent: f32,
@@ -276,9 +276,9 @@ fn put(lines: &mut [CacheLine], node: u32, slot: usize, code: u32, bounds: &Inst
     put_bounds(node, slot, bounds);
 }
 
-/// Splits the first range into up to 16, always the one of greatest area among those with more
-/// items than a node has children. Returns the number of ranges. With `halved` they are split by
-/// number, not by place.
+/// Splits the first range into up to 16, always the range of largest area among the ranges with
+/// more items than a node has children. Returns the number of ranges. With `halved` they are split
+/// by number, not by place.
 fn split_into(items: &mut [BuildItem], ranges: &mut [ItemRange; WIDTH], halved: bool) -> usize {
     let priority =
         |range: &ItemRange| if range.len() > WIDTH as u32 { range.bounds.area() } else { f64::NEG_INFINITY };
@@ -299,7 +299,7 @@ fn split_into(items: &mut [BuildItem], ranges: &mut [ItemRange; WIDTH], halved: 
 }
 
 /// Splits a range of at least two items at the middle of their centres, along the axis on which the
-/// centres have the greatest extent. If all centres lie on one side, or if `halved` is set, the
+/// centres have the largest extent. If all centres lie on one side, or if `halved` is set, the
 /// range is halved.
 fn split(items: &mut [BuildItem], range: ItemRange, halved: bool) -> (ItemRange, ItemRange) {
     let items = &mut items[range.first as usize..range.end as usize];

@@ -34,7 +34,7 @@ pub(super) fn node(lines: &[CacheLine]) -> &WideNode {
     WideNode::ref_from_bytes(lines.as_bytes()).ok().expect("a node is as long as its lines")
 }
 
-/// As [`node`].
+/// Like [`node`].
 pub(super) fn node_mut(lines: &mut [CacheLine]) -> &mut WideNode {
     WideNode::mut_from_bytes(lines.as_mut_bytes()).ok().expect("a node is as long as its lines")
 }
@@ -61,10 +61,10 @@ fn slot_bounds(node: &WideNode, slot: usize) -> InstanceBounds {
 
 /// The expected cost of rays through the top level, now and when it was built.
 ///
-/// A line that meets a box meets a box within with the probability of the ratio of their surface
-/// areas. So the area of all nodes relative to that of all instances is the expected number of
-/// nodes that a random line visits for each instance that it visits. Unlike a cost relative to the
-/// area of the root, it does not become less when an instance moves far away.
+/// If a random line hits a box, the probability that it also hits a second box inside is the ratio
+/// of their surface areas. So the area of all nodes relative to the area of all instances is the
+/// expected number of nodes that a random line visits for each instance that it visits. Unlike a
+/// cost relative to the area of the root, it does not decrease when an instance moves far away.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct CostRatio {
     built: f64,
@@ -91,7 +91,7 @@ impl CostRatio {
     }
 }
 
-/// The area of all nodes but the root relative to that of all instances.
+/// The area of all nodes except the root, relative to the area of all instances.
 fn cost(lines: &[CacheLine]) -> f64 {
     let (mut nodes, mut instances) = (0.0, 0.0);
     for lines in lines.chunks_exact(NODE_LINES) {

@@ -36,8 +36,8 @@ impl VisitQueue {
         self.runs.clear();
     }
 
-    /// Queues visits of an instance by up to 64 rays, a bit each from the index `first` on; before
-    /// any single visits.
+    /// Queues visits of an instance by up to 64 rays, one bit per ray from the index `first` on.
+    /// Must come before any single visits.
     #[inline(always)]
     pub(super) fn push_run<S: Simd>(&mut self, s: S, first: u32, rays: u64, instance: u32) {
         const ROW: [u32; LANES] = {

@@ -185,9 +185,8 @@ impl Scene {
     /// the feature `rayon`, in memory that belongs to this scene. The file and other scenes with
     /// the same file do not change. All queries of this scene then answer for the new positions, as
     /// exactly as before. Triangles of zero area are not hit and are not part of the surface, as in
-    /// a file that is compiled with these positions. The tree still has the structure that was
-    /// compiled for the first pose: [`Update::deformed_cost_ratio`] tells how much worse it is for
-    /// the new one.
+    /// a file that is compiled with these positions. The tree keeps the structure that was
+    /// compiled: [`Update::deformed_cost_ratio`] tells how much worse it is for the new one.
     ///
     /// # Errors
     /// `BTH-O003` if there is no such object, `BTH-S006` if it was not compiled with

@@ -53,8 +53,8 @@ impl Expected {
         instances.filter(|(_, i)| i.as_ref().is_some_and(&condition)).map(|(id, _)| id as u32).collect()
     }
 
-    /// The transform of an instance and whether it is visible. The nodes of subscenes are those of
-    /// the file opened alone.
+    /// The transform of an instance and whether it is visible. The nodes of a subscene are taken
+    /// from its file, opened alone.
     pub(super) fn transform(&self, instance: &ExpectedInstance) -> (Affine, bool) {
         let own = Affine::from_f32(&instance.transform);
         let Some((id, row)) = instance.subscene else { return (own, instance.visible) };
@@ -111,7 +111,8 @@ impl Expected {
         let mut builder = SceneBuilder::new();
         FILES.iter().for_each(|bytes| _ = builder.add(&crate::from_bytes(bytes).unwrap()));
         for (id, instance) in self.instances.iter().enumerate() {
-            // Instances of subscenes are placed as single ones, if their transform is that of f32.
+            // Instances of subscenes are placed like single ones, if f32 holds their transform
+            // exactly.
             let (object, transform, visible) = match instance {
                 Some(i) => (i.object, i.transform, i.visible),
                 None => (0, IDENTITY, false),

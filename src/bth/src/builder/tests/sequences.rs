@@ -180,7 +180,7 @@ impl Case {
         hits.iter().filter(|hit| hit.is_hit()).count()
     }
 
-    /// Compares other queries with those of a scene that was built at once. Only without subscenes.
+    /// Compares other queries with a scene that was built at once. Only without subscenes.
     fn check_afresh(&self, rng: &mut Rng) {
         let (scene, afresh) = (self.builder.scene(), self.expected.afresh());
         let afresh = afresh.scene();

@@ -153,7 +153,7 @@ impl InstanceLists {
         rest.truncate(kept);
     }
 
-    /// Removes all lists, and makes room for those of `count` rays.
+    /// Removes all lists, and makes room for the lists of `count` rays.
     fn reserve(&mut self, count: usize) {
         self.len = 0;
         let total = count * (1 + MAX_LISTED) + LANES;
@@ -280,9 +280,9 @@ impl InstanceLists {
     }
 }
 
-/// Lists those of up to sixteen rays that f32 prepares, by tests of all against one box at a time.
-/// Returns one bit per listed ray, and none if there are too many boxes. A separate function, which
-/// leaves the kernel's registers to tests against nodes.
+/// Makes lists for the rays, out of up to sixteen, that f32 prepares. Tests all rays against one
+/// box at a time. Returns one bit per listed ray, or 0 if there are too many boxes. A separate
+/// function, which leaves the kernel's registers to tests against nodes.
 struct ListByBoxes<'a> {
     lists: &'a mut InstanceLists,
     rays: RaysToList<'a>,

@@ -18,6 +18,7 @@ use crate::check;
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::object::{MAX_LINES, ObjectBounds, ObjectView, Records};
+use crate::view;
 use buffer::{Buffer, no_memory};
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
@@ -364,9 +365,11 @@ impl File {
 
     /// A section as a slice of its elements; empty when the file lacks it.
     pub(crate) fn slice<T: FromBytes + KnownLayout + Immutable>(&self, object: u32, kind: u32) -> &[T] {
-        let Some(section) = self.section(object, kind) else { return &[] };
-        <[T]>::ref_from_bytes(section.bytes)
-            .ok()
-            .expect("checking the table made length, stride and alignment fit")
+        view::rows(self.section_bytes(object, kind))
+    }
+
+    /// The bytes of a section; `None` if the file lacks it.
+    fn section_bytes(&self, object: u32, kind: u32) -> Option<&[u8]> {
+        self.section(object, kind).map(|section| section.bytes)
     }
 }

@@ -12,24 +12,24 @@ impl File {
     /// What moves the vertices of an object, whose **indices are not checked**; empty where nothing
     /// does or there is no such object.
     pub fn deformation(&self, object: u32) -> DeformationView<'_> {
-        DeformationView::of(self, object)
+        DeformationView::of(|kind| self.section_bytes(object, kind))
     }
 
     /// The materials and vertex colours of an object, whose **indices are not checked**; empty
     /// where the file keeps none or there is no such object.
     pub fn materials(&self, object: u32) -> MaterialsView<'_> {
-        MaterialsView::of(self, object)
+        MaterialsView::of(|kind| self.section_bytes(object, kind))
     }
 
     /// How the vertices of an object move by themselves, whose **indices are not checked**; empty
     /// where they do not or there is no such object.
     pub fn sequence(&self, object: u32) -> SequenceView<'_> {
-        SequenceView::of(self, object)
+        SequenceView::of(|kind| self.section_bytes(object, kind))
     }
 
     /// The images of all textures, whose **indices are not checked**.
     pub fn images(&self) -> ImagesView<'_> {
-        ImagesView::of(self, NONE)
+        ImagesView::of(|kind| self.section_bytes(NONE, kind))
     }
 
     /// Checks the images and that textures have one. Costs O(textures and images).
@@ -81,7 +81,7 @@ impl File {
     /// them.
     pub fn scene(&self) -> Option<SceneView<'_>> {
         (kind::SCENE..=kind::MORPH_WEIGHTS).find(|kind| self.section(NONE, *kind).is_some())?;
-        Some(SceneView::of(self, NONE))
+        Some(SceneView::of(|kind| self.section_bytes(NONE, kind)))
     }
 
     /// The scene sections, after checking every index in them; `None` when the file has none of

@@ -7,6 +7,7 @@
 //! it. All is computed in f64, in a fixed order: results have the same bits with any instruction
 //! set and number of threads.
 
+mod animated_file;
 mod morph_runs;
 pub(crate) mod normals;
 mod pose;
@@ -17,8 +18,9 @@ mod sequences;
 mod tests;
 mod update;
 
+pub(crate) use animated_file::AnimatedFile;
 pub use poses::DeformerPoses;
-pub(crate) use update::{AnimatedFile, Animation, StagedPoses};
+pub(crate) use update::{Animation, StagedPoses};
 
 /// The matrix of a joint from the space of the object to world space: columns, each with a fourth
 /// number of zero, so that four lanes hold one.

@@ -3,7 +3,7 @@
 //! Format: "Sequences". A coordinate between two frames is computed in f64 and rounded once, so it
 //! has the same bits on every machine.
 
-use super::update::AnimatedFile;
+use super::animated_file::AnimatedFile;
 use crate::objects::Objects;
 use bth_format::error::Result;
 use bth_format::{File, FramePosition};

@@ -1,10 +1,10 @@
 //! The objects whose positions change with time, brought to a time: of a file's scene, or of the
 //! subscenes of a scene builder.
 
+use super::animated_file::AnimatedFile;
 use super::pose::{Pose, SkinMatrices};
 use super::positions::{self, Vertices};
 use super::sequences::Sequences;
-use crate::nodes::NodeHierarchy;
 use crate::objects::Objects;
 use bth_format::error::{Code, Error, Result};
 use bth_format::layout::*;
@@ -20,17 +20,6 @@ pub(crate) struct Animation {
     /// The poses of the last update.
     poses: BTreeMap<u32, Pose>,
     sequences: Sequences,
-}
-
-/// A file of a scene, with its nodes at a time.
-#[derive(Clone, Copy)]
-pub(crate) struct AnimatedFile<'a> {
-    pub(crate) file: &'a File,
-    /// Index in the scene of its first object.
-    pub(crate) first_object: u32,
-    /// The nodes as at the time.
-    pub(crate) hierarchy: &'a NodeHierarchy,
-    pub(crate) seconds: f64,
 }
 
 /// Objects that are to be refitted: their positions are staged.

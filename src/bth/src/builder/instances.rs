@@ -1,13 +1,8 @@
 //! Instances of single objects in a scene builder.
 
-use super::subscenes::Subscene;
 use super::{MAX_INSTANCES, SceneBuilder};
-use crate::instances::{InstanceRow, NewInstance};
-use crate::nodes::Affine;
-use crate::objects::Objects;
 use bth_format::layout::NONE;
 use bth_format::{Code, Error};
-use std::collections::HashSet;
 
 /// An instance as it is to be after the next commit.
 #[derive(Clone, Copy, Debug)]
@@ -42,22 +37,6 @@ impl StagedInstance {
             self.changed = true;
             changed.push(id);
         }
-    }
-
-    /// The instance as it is to be in the scene.
-    pub(super) fn placed_in(
-        &self,
-        objects: &Objects,
-        subscenes: &[Option<Subscene>],
-        skinned: &HashSet<u32>,
-    ) -> NewInstance {
-        let StagedInstance { object, subscene, node, visible, .. } = *self;
-        let owner = subscenes.get(subscene as usize).and_then(Option::as_ref);
-        let (to_world, shown) = match owner {
-            Some(owner) => owner.node(objects, node, skinned.contains(&object)),
-            None => (Affine::from_f32(&self.transform), true),
-        };
-        NewInstance { row: InstanceRow { object, node, to_world }, visible: visible && shown }
     }
 }
 

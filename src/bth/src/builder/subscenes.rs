@@ -3,11 +3,13 @@
 
 use super::SceneBuilder;
 use super::instances::StagedInstance;
+use crate::instances::{InstanceRow, NewInstance};
 use crate::nodes::{Affine, NodeHierarchy};
 use crate::objects::Objects;
 use crate::scene::motion::check_time;
 use bth_format::layout::NONE;
 use bth_format::{Code, Error, SceneView};
+use std::collections::HashSet;
 
 /// Where a subscene is, at which time, and whether it is visible.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,6 +97,24 @@ impl Subscene {
             }
             _ => (outer, self.pose.visible),
         }
+    }
+}
+
+impl StagedInstance {
+    /// The instance as it is to be in the scene.
+    pub(super) fn placed_in(
+        &self,
+        objects: &Objects,
+        subscenes: &[Option<Subscene>],
+        skinned: &HashSet<u32>,
+    ) -> NewInstance {
+        let StagedInstance { object, subscene, node, visible, .. } = *self;
+        let owner = subscenes.get(subscene as usize).and_then(Option::as_ref);
+        let (to_world, shown) = match owner {
+            Some(owner) => owner.node(objects, node, skinned.contains(&object)),
+            None => (Affine::from_f32(&self.transform), true),
+        };
+        NewInstance { row: InstanceRow { object, node, to_world }, visible: visible && shown }
     }
 }
 

@@ -6,8 +6,8 @@ use super::enter_object::ObjectRays;
 use super::lists::InstanceLists;
 use super::packets::TopLevelPackets;
 use super::placement::Placement;
-use super::scene_query::{BatchProgress, ObjectVisits, SceneAny, SceneBatch, SceneNearest, SceneQuery};
-use super::top_level::TopLevel;
+use super::scene_batch::{BatchProgress, Chunk, ObjectVisits, SceneBatch};
+use super::scene_query::{SceneAny, SceneNearest, SceneQuery};
 use super::visit_queue::VisitQueue;
 use crate::object;
 use crate::objects::Objects;
@@ -24,14 +24,6 @@ const CHUNK: usize = 2048;
 /// hold them, so the cost of a further batch is small. Fewer rays are joined with the rays through
 /// other instances of the same object.
 const MIN_RAYS_PER_INSTANCE: usize = 256;
-
-/// Rays of a batch that advance together.
-pub(super) struct Chunk<'a> {
-    pub(super) top: &'a TopLevel,
-    pub(super) rays: &'a [Ray],
-    /// Index in the batch of the first of them.
-    pub(super) first: u32,
-}
 
 /// The state of a chunk's rays. A thread keeps the memory from one batch to the next.
 #[derive(Default)]

@@ -1,8 +1,7 @@
 //! Instances that the caller of a scene builder places: all changes of a commit at once, or none of
 //! them.
 
-use super::placement::{Placement, PlacementError};
-use super::world::{InstanceRow, TransformSource, Unplaceable, World};
+use super::world::{InstanceRow, PlaceResult, TransformSource, Unplaceable, World};
 use crate::nodes::affine::Affine;
 use crate::objects::Objects;
 use crate::simd::{Isa, Kernel, Simd};
@@ -15,24 +14,6 @@ const MIN_PARALLEL: usize = 2048;
 /// Number of instances that one task places.
 #[cfg(feature = "rayon")]
 const TASK: usize = 256;
-
-/// The placement of an instance; `None` if it is not visible.
-type PlaceResult = Result<Option<Placement>, PlacementError>;
-
-/// The instances as the caller has placed them in the last commit.
-#[derive(Debug, Default)]
-pub(super) struct CallerInstances {
-    pub(super) rows: Vec<InstanceRow>,
-    /// Memory for the placements of a commit.
-    placed: Vec<PlaceResult>,
-}
-
-impl CallerInstances {
-    /// Bytes on the heap.
-    pub(super) fn bytes(&self) -> usize {
-        self.rows.capacity() * size_of::<InstanceRow>() + self.placed.capacity() * size_of::<PlaceResult>()
-    }
-}
 
 /// An instance as it is to be.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,6 @@
 //! Transformation of rays into the space of an object.
 
-use super::scene_query::{BatchProgress, ObjectVisits, SceneBatch};
+use super::scene_batch::{BatchProgress, ObjectVisits, SceneBatch};
 use crate::intersect::start_point::StartPoint;
 use crate::nodes::affine::RayLanes;
 use crate::query::sink::Visit;

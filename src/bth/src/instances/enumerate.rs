@@ -3,7 +3,7 @@
 
 use super::World;
 use super::box_tests::{entered, limit, widened_slabs};
-use super::instance_list::{InstanceList, Visit};
+use super::instance_list::{InstanceList, InstanceReceiver};
 use super::top_level::TopLevel;
 use super::top_nodes::INSTANCE;
 use crate::bvh::ray_state::key_limit;
@@ -23,7 +23,7 @@ impl World {
     /// Calls `visit` with each visible instance whose box a ray in world space may enter within its
     /// range of t, nearer boxes first. Instances beyond what `visit` returns may be skipped.
     /// Returns true if `visit` has ended the enumeration.
-    pub(crate) fn enumerate(&self, ray: &Ray, visit: Visit<'_>) -> bool {
+    pub(crate) fn enumerate(&self, ray: &Ray, visit: InstanceReceiver<'_>) -> bool {
         let top = &self.top;
         // False for NaN, too.
         let has_range = ray.tmin <= ray.tmax;
@@ -97,7 +97,7 @@ fn slabs<S: Simd>(s: S, ray: &Ray, top: &TopLevel) -> Option<RaySlabs> {
 struct RayKernel<'a> {
     top: &'a TopLevel,
     ray: &'a Ray,
-    visit: Visit<'a>,
+    visit: InstanceReceiver<'a>,
 }
 
 impl Kernel for RayKernel<'_> {
@@ -129,7 +129,7 @@ struct RayInstances<'a> {
     /// Max t of hits that can still change the result, and their max depth.
     tmax: f32,
     last: f32,
-    visit: Visit<'a>,
+    visit: InstanceReceiver<'a>,
 }
 
 impl<'a> BoxQuery for RayInstances<'a> {

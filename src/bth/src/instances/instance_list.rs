@@ -11,17 +11,17 @@ use crate::bvh::ray_state::key_limit;
 use crate::intersect::boxes::{RaySlabLanes, RaySlabs};
 use crate::simd::{LANES, Simd};
 
-/// The least key of a list. Negative depths, which rounding makes of zero, would not be sorted, and
+/// The min key of a list. Negative depths, which rounding makes of zero, would not be sorted, and
 /// keys near zero would be denormal, since their lowest bits are overwritten. It is still a lower
 /// bound for the comparison with a limit, to which [`key_limit`] adds as much.
-const LEAST_KEY: f32 = f32::MIN_POSITIVE;
+const MIN_KEY: f32 = f32::MIN_POSITIVE;
 
-/// Greatest number of nodes that a ray is tested against.
+/// Max number of nodes that a ray is tested against.
 const MAX_NODES: usize = 2 * LANES;
 
-/// Receiver of instances: it returns the greatest t, rounded to f32, of hits that can still change
-/// the result, or `None` to end.
-pub(super) type Visit<'a> = &'a mut dyn FnMut(u32) -> Option<f32>;
+/// Receiver of instances: it returns the max t, rounded to f32, of hits that can still change the
+/// result, or `None` to end.
+pub(super) type InstanceReceiver<'a> = &'a mut dyn FnMut(u32) -> Option<f32>;
 
 /// Up to sixteen instances.
 pub(super) struct InstanceList {
@@ -68,22 +68,22 @@ impl InstanceList {
 
     #[inline(always)]
     fn sort<S: Simd>(&mut self, s: S, instances: u32, depths: S::F, codes: S::U) {
-        let depths = s.max(depths, s.splat(LEAST_KEY));
+        let depths = s.max(depths, s.splat(MIN_KEY));
         self.count = s.compress_far_to_near(instances, depths, codes, &mut self.codes, &mut self.keys);
     }
 
-    /// Visits the instances, as [`World::enumerate`](super::World::enumerate); `scale` is the depth
-    /// of t = 1.
+    /// Calls `visit` with the instances like [`World::enumerate`](super::World::enumerate). `scale`
+    /// is the depth of t = 1.
     #[inline(always)]
-    pub(super) fn visit(&self, scale: f32, mut tmax: f32, visit: Visit<'_>) -> bool {
-        let mut greatest = f32::INFINITY;
+    pub(super) fn visit(&self, scale: f32, mut tmax: f32, visit: InstanceReceiver<'_>) -> bool {
+        let mut max_key = f32::INFINITY;
         for i in (0..self.count.min(LANES)).rev() {
-            if self.keys[i] > greatest {
+            if self.keys[i] > max_key {
                 return false;
             }
             match visit(self.codes[i] & !INSTANCE) {
                 None => return true,
-                Some(t) if t < tmax => (tmax, greatest) = (t, key_limit(limit(scale, t))),
+                Some(t) if t < tmax => (tmax, max_key) = (t, key_limit(limit(scale, t))),
                 Some(_) => {}
             }
         }

@@ -11,9 +11,9 @@
 //! - in a batch, lists of the instances that each of the other rays may enter ([`lists`]). Rays
 //!   that reach too many boxes for a list go one by one.
 //!
-//! A batch queues the visits of instances by rays ([`visit_queue`]), transforms the rays of an
-//! object's visits into its space ([`enter_object`]), and traces them there together, with t
-//! unchanged.
+//! A batch ([`scene_batch`]) queues the visits of instances by rays ([`visit_queue`]), transforms
+//! the rays of an object's visits into its space ([`enter_object`]), and traces them there
+//! together, with t unchanged.
 
 mod batch;
 mod box_tests;
@@ -29,6 +29,7 @@ mod one_ray;
 mod packets;
 mod placement;
 mod refit;
+mod scene_batch;
 mod scene_query;
 #[cfg(test)]
 mod test_worlds;

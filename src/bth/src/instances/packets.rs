@@ -4,9 +4,8 @@
 //! nearest first, and then visited one after the other. If the list exceeds its limit, the rays are
 //! traversed one by one, because most of the listed instances would be occluded by others.
 
-use super::batch::Chunk;
 use super::box_tests::limit_lanes;
-use super::scene_query::BatchProgress;
+use super::scene_batch::{BatchProgress, Chunk};
 use super::top_level::TopLevel;
 use super::top_nodes::INSTANCE;
 use super::visit_queue::VisitQueue;

@@ -1,96 +1,12 @@
-//! What a batch of rays through the instances of a scene asks for, and its answers so far.
+//! What a batch of rays through the instances of a scene asks for.
 
-use super::World;
 use super::enter_object::ObjectRays;
+use super::scene_batch::{BatchProgress, ObjectVisits, SceneBatch};
 use crate::intersect::start_point::Starts;
-use crate::nodes::affine::ObjectRay;
 use crate::object::{self, Scratch};
-use crate::objects::Objects;
 use crate::query::better;
-use crate::query::sink::{Answers, SceneRays, Sink, Visit};
-use crate::rays::{Hit, Ray, StartRay};
-use crate::starts::world_ray::{InstanceStart, WorldRay};
-use bth_format::object::ObjectView;
-
-/// A batch of rays in world space, and the scene that they go through.
-pub(super) struct SceneBatch<'a> {
-    pub(super) world: &'a World,
-    pub(super) objects: &'a Objects,
-    pub(super) rays: &'a [Ray],
-    /// For each ray its start, if rays start on triangles; else empty.
-    pub(super) starts: &'a [InstanceStart],
-}
-
-impl<'a> SceneBatch<'a> {
-    /// A ray of the batch.
-    fn world_ray(&self, index: usize) -> WorldRay<'a> {
-        WorldRay { ray: &self.rays[index], start: self.starts.get(index) }
-    }
-
-    /// The ray of a visit in the space of the object, ended at `tmax`.
-    pub(super) fn object_ray(&self, visit: Visit, tmax: f32) -> ObjectRay {
-        let ray = Ray { tmax, ..self.rays[visit.ray as usize] };
-        self.world
-            .placement(visit.instance)
-            .inverse
-            .ray_from(&ray, self.start(visit).map(|start| &start.point))
-    }
-
-    /// As [`WorldRay::in_object`], for the ray of a visit.
-    pub(super) fn in_object<T>(
-        &self,
-        visit: Visit,
-        ray: &Ray,
-        start: impl FnOnce(&StartRay) -> T,
-        plain: impl FnOnce(&Ray) -> T,
-    ) -> T {
-        self.world_ray(visit.ray as usize).in_object(visit.instance, ray, start, plain)
-    }
-
-    /// Where the ray of a visit starts, if that is on a triangle of the instance.
-    #[inline(always)]
-    pub(super) fn start(&self, visit: Visit) -> Option<&InstanceStart> {
-        self.starts.get(visit.ray as usize).filter(|start| start.instance == visit.instance)
-    }
-}
-
-/// Visits of the instances of an object by rays of a batch.
-#[derive(Clone, Copy)]
-pub(super) struct ObjectVisits<'a> {
-    pub(super) batch: &'a SceneBatch<'a>,
-    pub(super) object: &'a ObjectView<'a>,
-    pub(super) visits: &'a [Visit],
-}
-
-/// The answers so far, by ray.
-#[derive(Clone, Copy)]
-pub(super) enum BatchProgress<'a> {
-    /// The nearest hits.
-    Nearest(&'a [Hit]),
-    /// True if anything is hit.
-    Any(&'a [bool]),
-}
-
-impl<'a> BatchProgress<'a> {
-    /// The rays from an index on.
-    pub(super) fn of_rays_from(self, first: usize) -> BatchProgress<'a> {
-        match self {
-            BatchProgress::Nearest(hits) => BatchProgress::Nearest(&hits[first..]),
-            BatchProgress::Any(found) => BatchProgress::Any(&found[first..]),
-        }
-    }
-
-    /// The max t of hits that can still change the result of a ray if they lie in its range;
-    /// negative infinity if its query is complete.
-    #[inline(always)]
-    pub(super) fn tmax(&self, ray: usize) -> f32 {
-        match self {
-            BatchProgress::Nearest(hits) => hits[ray].t,
-            BatchProgress::Any(found) if found[ray] => f32::NEG_INFINITY,
-            BatchProgress::Any(_) => f32::INFINITY,
-        }
-    }
-}
+use crate::query::sink::{Answers, SceneRays, Sink};
+use crate::rays::Hit;
 
 /// A query over the rays of a batch. The kernels are compiled once for all.
 pub(super) trait SceneQuery {

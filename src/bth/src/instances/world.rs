@@ -1,7 +1,6 @@
 //! The instances of a scene, as queries see them. A file with scene sections ([`super::by_file`])
 //! or the caller of a scene builder ([`super::by_caller`]) places them.
 
-use super::by_caller::CallerInstances;
 use super::placement::{PartBoxes, Placement, PlacementError};
 use super::top_level::TopLevel;
 use crate::animation::Animation;
@@ -63,6 +62,24 @@ pub(crate) struct Placed {
 /// The scene sections of a scene that is a file with such sections.
 pub(super) fn scene_of(objects: &Objects) -> SceneView<'_> {
     objects.sole_file().and_then(File::scene).expect("a file with scene sections, checked when it was opened")
+}
+
+/// The placement of an instance; `None` if it is not visible.
+pub(super) type PlaceResult = Result<Option<Placement>, PlacementError>;
+
+/// The instances as the caller has placed them in the last commit.
+#[derive(Debug, Default)]
+pub(super) struct CallerInstances {
+    pub(super) rows: Vec<InstanceRow>,
+    /// Memory for the placements of a commit.
+    pub(super) placed: Vec<PlaceResult>,
+}
+
+impl CallerInstances {
+    /// Bytes on the heap.
+    pub(super) fn bytes(&self) -> usize {
+        self.rows.capacity() * size_of::<InstanceRow>() + self.placed.capacity() * size_of::<PlaceResult>()
+    }
 }
 
 /// Where the transforms of instances come from.

@@ -11,9 +11,8 @@ mod by_nodes;
 
 use self::by_boxes::BoxTests;
 use self::by_nodes::{NodeTests, RayToList};
-use super::batch::Chunk;
 use super::box_tests::limit;
-use super::scene_query::BatchProgress;
+use super::scene_batch::{BatchProgress, Chunk};
 use super::top_nodes::INSTANCE;
 use crate::bvh::packet::backoff::PacketBackoff;
 use crate::bvh::ray_state::key_limit;

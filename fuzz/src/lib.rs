@@ -22,8 +22,9 @@ fn seeded_by(bytes: &[u8]) -> Rng {
     Rng::new(bytes.iter().fold(0xcbf2_9ce4_8422_2325, fold))
 }
 
-/// Opens a file; what passes the checks is traced with 64 rays, at some times, with the instruction set that the
-/// input's bytes choose. Whatever the answers: no panic, no end beyond the time limit, nothing read out of bounds.
+/// Opens a file; what passes the checks is traced with 64 rays, at some times, with the instruction
+/// set that the input's bytes choose. Whatever the answers: no panic, no end beyond the time limit,
+/// nothing read out of bounds.
 pub fn open_and_trace(bytes: &[u8]) {
     let Ok(mut scene) = bth::from_bytes(bytes) else { return };
     let mut rng = seeded_by(bytes);
@@ -114,7 +115,8 @@ fn trace(scene: &Scene, rng: &mut Rng) {
     }
 }
 
-/// A ray about an instance: often between points of its box, along axes, from corners; also without sense.
+/// A ray about an instance: often between points of its box, along axes, from corners; also without
+/// sense.
 fn ray(scene: &Scene, rng: &mut Rng) -> Ray {
     let instance = rng.below(u64::from(scene.instance_count().max(1))) as u32;
     let bounds = (instance < scene.instance_count()).then(|| scene.instance_bounds(instance)).flatten();
@@ -155,8 +157,8 @@ pub fn import(format: &str, bytes: &[u8]) {
     }
 }
 
-/// Imports a glTF file as a scene with all its animations; its manifest reads back equal, and its meshes keep the promises of their type,
-/// also those that deform.
+/// Imports a glTF file as a scene with all its animations; its manifest reads back equal, and its
+/// meshes keep the promises of their type, also those that deform.
 pub fn import_scene(bytes: &[u8]) {
     let path = Path::new("/nonexistent/fuzz/model.gltf");
     let rigid_parts = bytes.len() % 2 == 1;
@@ -234,7 +236,8 @@ fn check(mesh: &Mesh) {
 /// Between two frames of a sequence in an input.
 const FRAME_END: &[u8] = b"\0FRAME\0";
 
-/// Imports the frames of a sequence, which the input has one after the other behind a byte that chooses their format.
+/// Imports the frames of a sequence, which the input has one after the other behind a byte that
+/// chooses their format.
 pub fn import_frames(bytes: &[u8]) {
     let Some((choice, mut rest)) = bytes.split_first() else { return };
     let name = PathBuf::from("frame").with_extension(["obj", "ply", "stl", "off"][usize::from(*choice % 4)]);

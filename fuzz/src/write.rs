@@ -1,4 +1,5 @@
-//! The builder of files, from the sources of `bth-compile`. The rest of that crate is not fuzzed, and would take a quarter of the build.
+//! The builder of files, from the sources of `bth-compile`. The rest of that crate is not fuzzed,
+//! and would take a quarter of the build.
 #![allow(dead_code)]
 
 #[path = "../../src/bth-compile/src/write/builder.rs"]

@@ -1,5 +1,5 @@
-//! A file that opens is written again section by section: reading that and writing once more gives equal bytes,
-//! and each section is what it was.
+//! A file that opens is written again section by section: reading that and writing once more gives
+//! equal bytes, and each section is what it was.
 #![no_main]
 use bth_fuzz::write::FileBuilder;
 

@@ -1,5 +1,6 @@
-//! Section tables that are nearly right: entries laid out as the format wants, then some fields changed, and
-//! sections of arbitrary content that fit their strides, so that the checks of contents are reached often.
+//! Section tables that are nearly right: entries laid out as the format wants, then some fields
+//! changed, and sections of arbitrary content that fit their strides, so that the checks of
+//! contents are reached often.
 #![no_main]
 use arbitrary::Arbitrary;
 use bth_format::layout::*;

@@ -1,5 +1,5 @@
-//! Animated scenes: manifests, and the models that they refer to. The first three are modelled on the animations of the
-//! BTH paper.
+//! Animated scenes: manifests, and the models that they refer to. The first three are modelled on
+//! the animations of the BTH paper.
 
 use crate::math::sin_cos;
 use crate::{Model, blob, gyroid, hairball, knot, sheet};
@@ -95,7 +95,8 @@ impl Builder {
 
     /// Adds a track that rotates a node about an axis, `turns` times within `seconds`.
     fn turn(&mut self, node: usize, axis: [f64; 3], turns: f64, seconds: f64) {
-        // Interpolation between two keys takes the shorter rotation, so keys are at most a third of a turn apart.
+        // Interpolation between two keys takes the shorter rotation, so keys are at most a third of
+        // a turn apart.
         let count = (turns.abs() * 3.0).ceil().max(1.0) as u32;
         let key = |i: u32| {
             let part = f64::from(i) / f64::from(count);
@@ -132,8 +133,8 @@ fn quaternion(axis: [f64; 3], turns: f64) -> [f64; 4] {
     [axis[0] * s, axis[1] * s, axis[2] * s, c].map(short)
 }
 
-/// The rotation of a camera or light as a quaternion: first downwards by `pitch` turns about its own x axis, then by
-/// `yaw` turns about the vertical.
+/// The rotation of a camera or light as a quaternion: first downwards by `pitch` turns about its
+/// own x axis, then by `yaw` turns about the vertical.
 fn view(yaw: f64, pitch: f64) -> [f64; 4] {
     let ((sy, cy), (sp, cp)) = (sin_cos(yaw / 2.0), sin_cos(-pitch / 2.0));
     [cy * sp, sy * cp, -sy * sp, cy * cp].map(short)

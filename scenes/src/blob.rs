@@ -11,7 +11,8 @@ pub fn blob(faces: u32) -> Model {
     let n = resolution_for(faces, 8, 1) as i32;
     let mut model = Model::default();
     let mut rows = HashMap::new();
-    // The vertices are the points with whole coordinates of the octahedron |x| + |y| + |z| = n, moved outwards.
+    // The vertices are the points with whole coordinates of the octahedron |x| + |y| + |z| = n,
+    // moved outwards.
     let mut row = |model: &mut Model, p: [i32; 3]| {
         *rows.entry(p).or_insert_with(|| {
             let direction = DVec3::from_array(p.map(f64::from)).normalize();

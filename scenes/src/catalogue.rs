@@ -11,11 +11,11 @@ pub struct Entry {
     pub faces: u32,
     /// What it is.
     pub about: &'static str,
-    /// Makes it with about so many faces.
+    /// Makes it with about this number of faces.
     pub make: fn(u32) -> Model,
 }
 
-/// The greatest number of faces of `--faces`: some hundred times what tests and benchmarks use.
+/// The max number of faces of `--faces`: some hundred times what tests and benchmarks use.
 pub const MAX_FACES: u32 = 50_000_000;
 
 /// All models.

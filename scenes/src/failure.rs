@@ -24,7 +24,7 @@ pub(crate) enum Failure {
 }
 
 impl From<std::io::Error> for Failure {
-    /// Errors of standard output; those of files are made with [`Failure::file`].
+    /// Converts errors of standard output; [`Failure::file`] makes errors of files.
     fn from(error: std::io::Error) -> Self {
         match error.kind() {
             ErrorKind::BrokenPipe => Self::ClosedOutput,

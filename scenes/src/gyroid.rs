@@ -28,7 +28,7 @@ pub fn gyroid(faces: u32) -> Model {
 fn field(p: DVec3) -> f64 {
     let [(sx, cx), (sy, cy), (sz, cz)] = p.to_array().map(|x| sin_cos(x * PERIODS / 2.0));
     let labyrinth = (sx * cy + sy * cz + sz * cx) / 4.0;
-    // The greater of both, rounded where they meet.
+    // The max of both, rounded near where they are equal.
     let ball = p.length() - 1.0;
     let apart = labyrinth - ball;
     0.5 * (labyrinth + ball + (apart * apart + 0.01).sqrt())

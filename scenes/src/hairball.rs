@@ -35,7 +35,7 @@ pub fn hairball(faces: u32) -> Model {
             }
             let curl = DVec3::from_array(rng.point_in_ball());
             direction = (direction + (bend * 0.25 + curl * 0.35)).normalize();
-            // Carry the side along with the least rotation, so that the tube does not twist.
+            // Carry the side along with minimal rotation, so that the tube does not twist.
             let carried = side - direction * side.dot(direction);
             side =
                 if carried.length_squared() > 1e-6 { carried.normalize() } else { perpendicular(direction) };

@@ -1,7 +1,7 @@
 //! A hall: floor, steps, columns, arches, a barrel vault and window bars.
 //!
-//! Every part is closed. Parts stand on and lean against each other without being welded, so
-//! that many faces touch, overlap in a plane or meet in T-junctions, as in real architecture.
+//! Every part is closed. Parts rest on and lean against each other without being welded, so
+//! that many faces touch, overlap in a plane or form T-junctions, as in real architecture.
 //! Bars and steps are long and thin.
 
 use crate::Model;
@@ -24,7 +24,7 @@ pub fn hall(faces: u32) -> Model {
     let (outer, end) = (HALF_WIDTH + 2.0, length + 2.0);
     cuboid(&mut model, [-outer, -2.0, -0.5], [outer, end, 0.0]);
     for side in [-1.0, 1.0] {
-        // The walls stand on the floor and carry bars from end to end.
+        // The walls rest on the floor and carry bars from end to end.
         let wall = side * (outer - 0.25);
         cuboid(&mut model, [wall - 0.25, -2.0, 0.0], [wall + 0.25, end, COLUMN_HEIGHT + 3.0]);
         for i in 0..40 {

@@ -57,8 +57,8 @@ pub fn torus_knots_in_a_box(faces: u32) -> Model {
     model
 }
 
-/// The point of the knot at `s` in [0, 1), and two unit vectors perpendicular to the curve there. They are functions of
-/// the point and the tangent alone, so the tube closes without a twist.
+/// The point of the knot at `s` in [0, 1), and two unit vectors perpendicular to the curve there.
+/// They are functions of the point and the tangent alone, so the tube closes without a twist.
 fn frame(s: f64) -> [DVec3; 3] {
     let ((sin2, cos2), (sin3, cos3)) = (sin_cos(2.0 * s), sin_cos(3.0 * s));
     let ring = 2.0 + cos3;

@@ -1,8 +1,9 @@
 //! Generators of the models that tests, demos and benchmarks use.
 //!
 //! Every generator uses only `+`, `-`, `*`, `/`, `sqrt` and `floor` on `f64`, which IEEE 754
-//! defines to the last bit, so a model has the same bytes on every machine. Vectors are those of `glam`, whose `f64`
-//! operations are these same ones; its functions that call the system's mathematics library are not used.
+//! defines to the last bit, so a model has the same bytes on every machine. Vectors come from
+//! `glam`, whose `f64` operations are these same ones; its functions that call the system's
+//! mathematics library are not used.
 #![warn(missing_docs)]
 
 pub mod animations;

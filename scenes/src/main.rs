@@ -59,7 +59,8 @@ fn main() -> ExitCode {
     }
 }
 
-/// A name that is not in the catalogue of `kind`s; `names` are those that are. One of the other catalogue needs the command `other`.
+/// A name that is not in the catalogue of `kind`s; `names` are those that are. One of the other
+/// catalogue needs the command `other`.
 fn unknown<'a>(
     kind: &str,
     found: &str,
@@ -147,7 +148,7 @@ fn manual() -> Result<(), Failure> {
         man.render_description_section(&mut page)?;
         man.render_options_section(&mut page)?;
     }
-    // Subcommands have no pages of their own: what the page says of them stands further down.
+    // Subcommands have no separate pages: this page describes them further down.
     let mut page = String::from_utf8_lossy(&page).into_owned();
     for name in command.get_subcommands().map(clap::Command::get_name) {
         page = page.replace(&format!("bth\\-scenes\\-{name}(1)"), &format!("\\fBbth\\-scenes {name}\\fR"));

@@ -27,8 +27,8 @@ pub(crate) fn sin_cos(turns: f64) -> (f64, f64) {
     }
 }
 
-/// The resolution n, at least `least`, of a generator that makes `per * n * n` faces: the n whose square is nearest to
-/// `faces / per`.
+/// The resolution n, at least `least`, of a generator that makes `per * n * n` faces: the n whose
+/// square is nearest to `faces / per`.
 pub(crate) fn resolution_for(faces: u32, per: u32, least: u32) -> u32 {
     ((f64::from(faces) / f64::from(per)).sqrt() + 0.5).floor().max(f64::from(least)) as u32
 }

@@ -11,11 +11,12 @@ pub struct Case {
     pub name: &'static str,
     /// The triangles.
     pub model: Model,
-    /// Whether two triangles are in bad contact.
+    /// True if two triangles are in bad contact.
     pub bad: bool,
 }
 
-/// All cases. Coordinates are small whole numbers, halves, or one ulp from such a number, and so all are exact.
+/// All cases. Coordinates are small whole numbers, halves, or one ulp from such a number, and so
+/// all are exact.
 pub fn cases() -> Vec<Case> {
     [without_shared_vertices(), with_shared_vertices()].concat()
 }

@@ -16,12 +16,14 @@ const PITCH: f64 = 0.012;
 /// Height of the waves.
 const WAVE: f64 = 0.008;
 
-/// A sheet of 65,536 faces of which a share is rolled up, from its end at x = 1 on, into a spiral of turns that lie on each other. Waves
-/// across it have moved on by `phase` turns. All sheets have the same faces over as many positions.
+/// A sheet of 65,536 faces with a share rolled up, from its end at x = 1 on, into a spiral of turns
+/// that lie on each other. Waves across it have moved on by `phase` turns. All sheets have the same
+/// faces and the same number of positions.
 pub fn sheet(rolled: f64, phase: f64) -> Model {
     let mut model = Model::default();
     let flat = 1.0 - rolled;
-    // A turn of radius r takes 2πr of the length, so the square of the radius falls linearly along the sheet.
+    // A turn of radius r takes 2πr of the length, so the square of the radius falls linearly along
+    // the sheet.
     let radius = |s: f64| (INNER * INNER + PITCH * (1.0 - s) / std::f64::consts::PI).sqrt();
     let outer = radius(flat);
     for i in 0..=ALONG {

@@ -9,7 +9,8 @@ use glam::DVec3;
 pub fn soup(faces: u32) -> Model {
     let mut rng = Rng::new(3);
     let mut model = Model::default();
-    // The library's cube root differs between systems in the last place, so the root is found by counting.
+    // The library's cube root differs between systems in the last place, so the root is found by
+    // counting.
     let cells = (1..).find(|k: &u32| k.pow(3) >= faces).expect("faces are below 1625^3");
     let size = 1.5 / f64::from(cells);
     for _ in 0..faces {

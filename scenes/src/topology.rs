@@ -22,7 +22,7 @@ pub struct Topology {
 }
 
 impl Topology {
-    /// Whether the surface is closed, consistently oriented and manifold along its edges.
+    /// Returns true if the surface is closed, consistently oriented and manifold along its edges.
     pub fn is_closed(&self) -> bool {
         self.boundary_edges + self.non_manifold_edges + self.flipped_edges + self.degenerate == 0
     }

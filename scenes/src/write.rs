@@ -66,7 +66,8 @@ pub fn stl(model: &Model) -> Vec<u8> {
     bytes
 }
 
-/// Writes a model in the format that the extension names: `.obj`, `.ply` or `.stl`. The file is whole or as it was.
+/// Writes a model in the format that the extension names: `.obj`, `.ply` or `.stl`. The file is
+/// whole or as it was.
 ///
 /// # Errors
 /// Fails on another extension, or when the file cannot be written.

@@ -1,4 +1,5 @@
-//! Animated scenes: the committed manifests are those that the generators make, and they can be read.
+//! Animated scenes: the committed manifests are those that the generators make, and they can be
+//! read.
 
 use bth_scenes::animations::ANIMATIONS;
 use std::collections::BTreeSet;
@@ -27,7 +28,7 @@ fn manifests_are_read_and_refer_to_the_models_that_are_made() {
         let read = bth_scene::parse(&scene.manifest.to_toml(), Path::new(animation.name)).unwrap();
         assert_eq!(read, scene.manifest, "{}", animation.name);
         let named: BTreeSet<_> = read.objects.iter().map(|o| o.source.path().to_owned()).collect();
-        // The numbers of frames stand for themselves as `#`.
+        // Manifests write the numbers of frames as `#`.
         let numbered = |path: &str| match path.strip_suffix(".ply").and_then(|path| path.rsplit_once('_')) {
             Some((name, digits)) => format!("{name}_{}.ply", "#".repeat(digits.len())),
             None => path.to_owned(),

@@ -1,4 +1,5 @@
-//! The properties that the generators guarantee: bytes, face counts, topology and self-intersections.
+//! The properties that the generators guarantee: bytes, face counts, topology and
+//! self-intersections.
 
 use bth_scenes::catalogue::{ENTRIES, find};
 use bth_scenes::topology::topology;
@@ -222,7 +223,7 @@ impl Sign for f64 {
     }
 }
 
-/// Whether a closed segment and a closed triangle have a point in common.
+/// Returns true if a closed segment and a closed triangle have a point in common.
 fn segment_meets(p: [f32; 3], q: [f32; 3], t: [[f32; 3]; 3]) -> bool {
     let (sp, sq) = (side(t, p), side(t, q));
     if sp == 0.0 && sq == 0.0 {
@@ -235,8 +236,8 @@ fn segment_meets(p: [f32; 3], q: [f32; 3], t: [[f32; 3]; 3]) -> bool {
     s.iter().all(|&x| x >= 0.0) || s.iter().all(|&x| x <= 0.0)
 }
 
-/// As [`segment_meets`] for a segment in the plane of the triangle: an end inside it, or a crossing with an edge. Both
-/// are projected along a coordinate axis that is not parallel to the plane.
+/// As [`segment_meets`] for a segment in the plane of the triangle: an end inside it, or a crossing
+/// with an edge. Both are projected along a coordinate axis that is not parallel to the plane.
 fn coplanar_meets(p: [f32; 3], q: [f32; 3], t: [[f32; 3]; 3]) -> bool {
     let area = |a: [f32; 3], b: [f32; 3], c: [f32; 3], drop: usize| {
         let f = |p: [f32; 3]| robust::Coord { x: p[(drop + 1) % 3], y: p[(drop + 2) % 3] };
@@ -252,7 +253,8 @@ fn coplanar_meets(p: [f32; 3], q: [f32; 3], t: [[f32; 3]; 3]) -> bool {
         || inside(q)
         || (0..3).any(|k| {
             let (a, b) = (t[k], t[(k + 1) % 3]);
-            // Collinear overlap has an end of one in the other; ends in the triangle are done above.
+            // Collinear overlap has an end of one in the other; ends in the triangle are done
+            // above.
             s(p, q, a) * s(p, q, b) < 0.0 && s(a, b, p) * s(a, b, q) < 0.0
         })
 }

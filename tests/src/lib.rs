@@ -51,7 +51,7 @@ pub fn by_day<T>(day: T, night: T) -> T {
 }
 
 /// The tetrahedralization worker: `BTH_TETGEN`, or the one built with the tests. Prints a line
-/// where there is none, since tests with tetrahedra are skipped then.
+/// if there is no worker, since tests with tetrahedra are skipped then.
 #[allow(clippy::print_stderr)]
 pub fn worker() -> Option<&'static Path> {
     static FOUND: OnceLock<Option<PathBuf>> = OnceLock::new();

@@ -1,4 +1,4 @@
-//! Eviction: the least recently used contents first, and none that a process has mapped.
+//! Eviction: the oldest contents by time of use first, never contents that a process has mapped.
 
 use crate::files::{Files, named, remove};
 use crate::record::Record;

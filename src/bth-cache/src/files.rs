@@ -63,7 +63,7 @@ impl Files {
         self.sharded("blobs", digest)
     }
 
-    /// The lock for building what a key stands for.
+    /// The lock for building the content of a key.
     pub(crate) fn lock(&self, id: &Digest) -> PathBuf {
         self.root.join("locks").join(id.hex())
     }

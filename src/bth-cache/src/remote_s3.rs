@@ -31,12 +31,12 @@ pub struct S3 {
 }
 
 impl S3 {
-    /// A place such as `s3://bucket/prefix`; how to reach it stands in the variables
-    /// `AWS_ACCESS_KEY_ID`, `AWS_SECRET_ACCESS_KEY`, `AWS_REGION`, `AWS_ENDPOINT_URL` and
-    /// `AWS_ALLOW_HTTP`. Nothing is sent yet. When `cancelled` says so, nothing more is waited for.
+    /// Opens a place such as `s3://bucket/prefix`. The variables `AWS_ACCESS_KEY_ID`,
+    /// `AWS_SECRET_ACCESS_KEY`, `AWS_REGION`, `AWS_ENDPOINT_URL` and `AWS_ALLOW_HTTP` say how to
+    /// reach it. Sends nothing yet. Waits end as soon as `cancelled` returns true.
     ///
     /// # Errors
-    /// When it is no such place, or a variable is none.
+    /// When `url` is not such a place, or a variable is malformed.
     pub fn open(url: &str, cancelled: fn() -> bool) -> Result<Self> {
         let prefix = url.strip_prefix("s3://").and_then(|rest| rest.split_once('/')).map_or("", |(_, p)| p);
         // The client's own limit is one for a whole transfer of any size.
@@ -86,8 +86,8 @@ impl Remote for S3 {
                 found => found.map_err(Error::other)?,
             };
             let size = found.meta.size;
-            // The client takes memory for as many bytes as the server says, and ends the program
-            // where there is none.
+            // The client allocates the size that the server claims, and aborts the program if
+            // memory runs out.
             let has_memory =
                 usize::try_from(size).is_ok_and(|n| Vec::<u8>::new().try_reserve_exact(n).is_ok());
             if !has_memory {

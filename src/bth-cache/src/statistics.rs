@@ -71,7 +71,7 @@ impl Statistics {
         }
         let path = files.statistics();
         let mut file = File::options().read(true).append(true).create(true).open(path)?;
-        // Without locks lines may mix, and mixed lines are left out when they are read.
+        // Without locks lines may mix; the reader skips mixed lines.
         let _ = file.lock();
         if file.metadata()?.len() > LONG {
             let mut sum = Self::sum(&mut file)?;

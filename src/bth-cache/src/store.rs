@@ -308,8 +308,8 @@ impl Store {
         WorkLock::take(&self.files.lock(&key.id()), cancelled)
     }
 
-    /// Renews the time of use of a record whose content is not kept; others have that of their
-    /// contents.
+    /// Renews the time of use of a record whose content is not kept. For other records the time of
+    /// their contents counts.
     pub fn touch(&self, record: &Record) {
         if !record.whole {
             touch(&self.files.key(&record.key.id()));
@@ -344,7 +344,7 @@ impl Store {
         std::mem::take(&mut lock(&self.notes))
     }
 
-    /// Removes the least recently used contents until `cap` bytes are left, and files left by
+    /// Removes contents, the longest unused first, until `cap` bytes are left, and files left by
     /// killed processes.
     pub fn evict(&self, cap: u64) -> Evicted {
         self.written.store(0, Ordering::Relaxed);

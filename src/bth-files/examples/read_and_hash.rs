@@ -1,4 +1,5 @@
-//! Reads files and prints their BLAKE3 hashes: the minimum work of a compilation whose result is in the cache.
+//! Reads files and prints their BLAKE3 hashes: the minimum work of a compilation whose result is in
+//! the cache.
 #![allow(clippy::print_stdout)]
 
 fn main() -> std::io::Result<()> {

@@ -1,9 +1,10 @@
 //! Files that are whole or absent.
 //!
-//! On Linux the bytes go to a file without a name (`O_TMPFILE`), so a killed program leaves nothing.
-//! The finished file gets a hidden name and is renamed over the target at once. Where nameless files
-//! are not supported, the bytes go to a hidden file in the target's folder; it is removed on failure. A
-//! file left by a killed program is removed by the next write to the same target, which finds it unlocked.
+//! On Linux the bytes go to a file without a name (`O_TMPFILE`), so a killed program leaves
+//! nothing. The finished file gets a hidden name and is renamed over the target at once. Where
+//! nameless files are not supported, the bytes go to a hidden file in the target's folder; it is
+//! removed on failure. A file left by a killed program is removed by the next write to the same
+//! target, which finds it unlocked.
 
 use crate::Digest;
 use std::ffi::{OsStr, OsString};
@@ -13,8 +14,8 @@ use std::path::{Path, PathBuf};
 
 /// End of the names of unfinished files.
 pub const SUFFIX: &str = ".bth-part";
-/// Longest name of a target that its hidden names contain, in bytes. Most file systems take 255 bytes, and a hidden name is longer than
-/// the target's.
+/// Longest name of a target that its hidden names contain, in bytes. Most file systems take 255
+/// bytes, and a hidden name is longer than the target's.
 const LONGEST: usize = 200;
 
 /// Writes a file that is whole or absent, replacing one of that name; it is on the disk on return.
@@ -77,9 +78,9 @@ pub fn replace_file(
     Ok(())
 }
 
-/// Writes a read-only file that is whole or absent, unless there is one of that name already; whether it
-/// was written. It is not flushed to disk and may be lost when the machine stops, so readers must check it. Whoever may write to the
-/// folder may read it.
+/// Writes a read-only file that is whole or absent, unless there is one of that name already;
+/// whether it was written. It is not flushed to disk and may be lost when the machine stops, so
+/// readers must check it. Whoever may write to the folder may read it.
 ///
 /// # Errors
 /// Those of the system.
@@ -104,7 +105,8 @@ pub fn write_once(path: &Path, bytes: &[u8]) -> std::io::Result<bool> {
     }
 }
 
-/// Makes the folders of a path that are missing below `root`. Whoever may write to a folder may write to those that are made in it.
+/// Makes the folders of a path that are missing below `root`. Whoever may write to a folder may
+/// write to those that are made in it.
 ///
 /// # Errors
 /// Those of the system.
@@ -127,8 +129,9 @@ pub fn create_folders(root: &Path, path: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Gives these permissions to the group and to others where they may write to the folder, whatever the umask: the folder says with whom
-/// its content is shared. Folders inherit that they let nobody remove what is another user's.
+/// Gives these permissions to the group and to others where they may write to the folder, whatever
+/// the umask: the folder says with whom its content is shared. Folders inherit that they let nobody
+/// remove what is another user's.
 #[cfg(unix)]
 fn share(file: &File, folder: &Path, permissions: u32) {
     use std::os::unix::fs::{MetadataExt, PermissionsExt};
@@ -183,8 +186,8 @@ fn create(folder: &Path, prefix: &OsString, mode: u32) -> std::io::Result<(File,
             // Without /proc it could not get a name.
             && std::fs::metadata(name_in_proc(&file)).is_ok()
         {
-            // A file system without locks takes it all the same: nobody can tell there that the hidden name, which it has for an
-            // instant, is unlocked.
+            // A file system without locks takes it all the same: nobody can tell there that the
+            // hidden name, which it has for an instant, is unlocked.
             let _ = file.try_lock();
             return Ok((file, None));
         }
@@ -238,7 +241,8 @@ fn unused_name<T>(
     Err(IoError::new(ErrorKind::AlreadyExists, "no unused name for the unfinished file"))
 }
 
-/// Removes unfinished files of this target that are not locked: the programs that wrote them have ended.
+/// Removes unfinished files of this target that are not locked: the programs that wrote them have
+/// ended.
 fn remove_stale(folder: &Path, prefix: &OsString) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     for entry in entries.flatten() {

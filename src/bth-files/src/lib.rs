@@ -1,7 +1,8 @@
-//! Files as the compiler and its cache use them: content hashes ([`Digest`]), writes that leave a whole file or none
-//! ([`replace`], [`write_once`]), copies of ranges from a file that others may change ([`OpenFile`]), whether there is a file at all
-//! ([`regular_file`]), text that terminals may show ([`printable`]), errors as programs report them ([`Diagnosis`]), and signals that end
-//! a program ([`signals`]).
+//! Files as the compiler and its cache use them: content hashes ([`Digest`]), writes that leave a
+//! whole file or none ([`replace`], [`write_once`]), copies of ranges from a file that others may
+//! change ([`OpenFile`]), whether there is a file at all ([`regular_file`]), text that terminals
+//! may show ([`printable`]), errors as programs report them ([`Diagnosis`]), and signals that end a
+//! program ([`signals`]).
 
 mod atomic;
 mod diagnosis;

@@ -10,8 +10,8 @@ use std::sync::{Mutex, PoisonError};
 /// The unit in which file systems share blocks between files, in bytes.
 const BLOCK: u64 = 4096;
 
-/// Identity of a file and the time of its last change. The system sets that time on every change of content, name or
-/// attributes, and no program can set it.
+/// Identity of a file and the time of its last change. The system sets that time on every change of
+/// content, name or attributes, and no program can set it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FileState {
     /// Device that holds the file; 0 where the system does not tell.
@@ -32,7 +32,8 @@ impl FileState {
         Self { device: m.dev(), inode: m.ino(), bytes: m.len(), changed: (m.ctime(), m.ctime_nsec()) }
     }
 
-    /// The state of a file. Systems other than Unix have no time of change, so the time of modification stands in for it.
+    /// The state of a file. Systems other than Unix have no time of change, so the time of
+    /// modification replaces it.
     #[cfg(not(unix))]
     pub fn of(m: &Metadata) -> Self {
         let since =
@@ -71,7 +72,7 @@ impl OpenFile {
         self.state.bytes
     }
 
-    /// Whether the file has not changed since it was opened.
+    /// Returns true if the file has not changed since it was opened.
     pub fn is_unchanged(&self) -> bool {
         let file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         file.metadata().is_ok_and(|m| FileState::of(&m) == self.state)
@@ -87,8 +88,9 @@ impl OpenFile {
         file.read_exact(bytes)
     }
 
-    /// Writes a range of the file to `out`, in which `out_at` bytes precede it. Between two files the system copies, and file
-    /// systems that support it share the blocks whose offsets are aligned alike.
+    /// Writes a range of the file to `out`, in which `out_at` bytes precede it. Between two files
+    /// the system copies, and file systems that support it share the blocks whose offsets are
+    /// aligned alike.
     ///
     /// # Errors
     /// Those of the system; `UnexpectedEof` when the file ends before.

@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 use std::fmt::Write;
 
-/// Text with its control characters, but for line feeds, as escapes such as `\u{1b}`: names come from files of others and must not
-/// move the cursor or change colours.
+/// Text with its control characters, but for line feeds, as escapes such as `\u{1b}`: names come
+/// from files of others and must not move the cursor or change colours.
 pub fn printable(text: &str) -> Cow<'_, str> {
     let is_control = |c: char| c.is_control() && c != '\n';
     if !text.contains(is_control) {

@@ -4,8 +4,8 @@ use std::fs::Metadata;
 use std::io::{Error, ErrorKind, Result};
 use std::path::Path;
 
-/// The metadata of a regular file. What is read whole, or more than once, must be one: a named pipe that is opened waits for a writer, and
-/// a device may have no end.
+/// The metadata of a regular file. What is read whole, or more than once, must be one: a named pipe
+/// that is opened waits for a writer, and a device may have no end.
 ///
 /// # Errors
 /// Those of the system; `IsADirectory` for folders, `NotSeekable` for pipes, sockets and devices.

@@ -9,9 +9,9 @@ use crate::mesh::Polygons;
 use crate::monitor::Monitor;
 use crate::polygon::fan_areas;
 
-/// A fan covers something twice or reaches beyond its polygon where more than one part in so many
-/// of the polygon's area is turned over. Less is what coordinates with few digits do to corners on
-/// a straight line.
+/// A fan covers something twice or reaches beyond its polygon if it turns over more than the
+/// polygon's area divided by this number. Coordinates with few digits turn over less than that at
+/// corners on a straight line.
 const PARTS: f64 = 1000.0;
 
 /// The concave polygons of a mesh.

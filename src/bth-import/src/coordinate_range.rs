@@ -11,7 +11,7 @@ const LEAST: f32 = 1.0 / (1u64 << 50) as f32;
 const FAR: f64 = (1u64 << 30) as f64;
 /// Number of vertices by which the bulk is found.
 const SAMPLES: usize = 4096;
-/// Of the sampled coordinates along each axis, one in so many may lie beyond either end of the
+/// Along each axis, one in this number of sampled coordinates may lie beyond either end of the
 /// bulk.
 const OUTSIDE: usize = 16;
 
@@ -23,7 +23,7 @@ struct Bulk {
 }
 
 impl Bulk {
-    /// Returns the bulk of positions, of which there is at least one.
+    /// Returns the bulk of positions, at least one.
     fn of(positions: &[[f32; 3]]) -> Bulk {
         let step = positions.len().div_ceil(SAMPLES);
         let mut bulk = Bulk { middle: [0.0; 3], size: 0.0 };
@@ -44,8 +44,8 @@ impl Bulk {
     }
 }
 
-/// Warns of vertices far out and, if there are none, of coordinates that are too great or too small
-/// for f32.
+/// Warns of vertices far out and otherwise of coordinates that are too large or too
+/// small for f32.
 pub(crate) fn warn(mesh: &Mesh, monitor: &dyn Monitor) {
     if mesh.positions.is_empty() {
         return;

@@ -11,7 +11,7 @@ pub(super) struct CornerGrid {
 }
 
 impl CornerGrid {
-    /// An empty grid of square cells, about as many as there are points.
+    /// Makes an empty grid of square cells, with about one cell per point.
     pub(super) fn new(points: &[[f64; 2]]) -> Self {
         let [lower, upper] = bounds(points);
         let extent = [upper[0] - lower[0], upper[1] - lower[1]];

@@ -1,8 +1,8 @@
 //! What decides where triangles of cut-out materials have holes: alpha of textures, factors and
 //! vertices.
 //!
-//! alpha(u, v) = factor · texture(u, v) · vertex alpha; the surface is there where alpha is at
-//! least the cutoff (glTF 2.0 specification, §3.9.4).
+//! alpha(u, v) = factor · texture(u, v) · vertex alpha; the surface is there where alpha is at or
+//! above the cutoff (glTF 2.0 specification, §3.9.4).
 
 use serde::{Deserialize, Serialize};
 

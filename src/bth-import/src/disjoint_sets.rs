@@ -7,12 +7,12 @@ pub(crate) struct DisjointSets {
 }
 
 impl DisjointSets {
-    /// Each of `count` rows in a set of its own.
+    /// Makes one set for each of `count` rows.
     pub(crate) fn new(count: usize) -> DisjointSets {
         DisjointSets { parents: (0..count as u32).collect() }
     }
 
-    /// The row that stands for the set of a row.
+    /// Returns the row that represents the set of a row.
     pub(crate) fn root(&mut self, mut row: u32) -> u32 {
         let parents = &mut self.parents;
         while parents[row as usize] != row {

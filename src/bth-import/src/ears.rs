@@ -10,18 +10,19 @@ use std::collections::VecDeque;
 /// Corners that are tried between two looks at whether the user cancelled.
 const CHECKED: u64 = 1024;
 
-/// Triangles of numbers of a polygon's corners, turned as it is, none of which is turned over: they
-/// cover each point as often as the outline runs around it, so a polygon that does not cross itself
-/// is covered once. `None` where there are none, since the outline runs around something the other
-/// way, or since the polygon is so far from flat that its projection does.
+/// Returns triangles of numbers of a polygon's corners. They are turned as the polygon is, and none
+/// is turned over: they cover each point as often as the outline runs around it, so a polygon that
+/// does not cross itself is covered once. Returns `None` if there are no such triangles: the
+/// outline runs around something the other way, or the polygon is so far from flat that its
+/// projection does.
 ///
 /// The polygon is projected along the axis that is nearest to its normal, which rounds nothing.
 /// There an ear, a convex corner whose triangle holds no other corner, is clipped until three
 /// corners are left (Meisters, "Polygons have ears", 1975). Predicates are exact. All corners stay,
-/// those on straight lines too, so no gaps open between neighbours, and there are two triangles
-/// fewer than corners, as in a fan: where corners come twice in a row, some have no area. An
-/// outline may run along an edge and back, as it does to reach a hole. A polygon of n corners takes
-/// about n steps where ears are small, and n² where they are as long as the polygon.
+/// also on straight lines, so no gaps open between neighbours. There are two triangles fewer than
+/// corners, as in a fan: where corners come twice in a row, some have no area. An outline may run
+/// along an edge and back, as it does to reach a hole. A polygon of n corners takes about n steps
+/// where ears are small, and n² where they are as long as the polygon.
 ///
 /// # Errors
 /// Cancellation.
@@ -183,8 +184,9 @@ mod tests {
     }
 
     /// Checks triangles by the definition: none is turned over, their areas add up to the
-    /// polygon's, and each side of the polygon is the side of one triangle while all others are
-    /// those of two that are turned opposite ways. Then they cover the polygon, and nothing twice.
+    /// polygon's, and each side of the polygon is the side of one triangle. Each other side is
+    /// shared by two triangles that run along it in opposite directions. Then they cover the
+    /// polygon, and nothing twice.
     #[track_caller]
     fn assert_covers(corners: &[[f32; 2]], triangles: &[[u32; 3]]) {
         assert_eq!(open_sides(corners.len(), triangles, |corner| corner), [[0; 2]; 0]);
@@ -207,8 +209,8 @@ mod tests {
         assert_eq!(open_sides(corners.len(), triangles, point), [[0; 2]; 0]);
     }
 
-    /// Sides of triangles without a counterpart in another triangle or in the outline, and those of
-    /// the outline without one. Corners are equal if `name` gives them one name.
+    /// Returns sides of triangles without a counterpart in another triangle or in the outline, and
+    /// sides of the outline without one. Corners are equal if `name` gives them one name.
     fn open_sides(count: usize, triangles: &[[u32; 3]], name: impl Fn(u32) -> u32) -> Vec<[u32; 2]> {
         let mut sides = BTreeMap::new();
         let mut add = |from: u32, to: u32, times: i32| {
@@ -273,7 +275,7 @@ mod tests {
     #[test]
     fn an_outline_may_reach_holes_and_run_back() {
         assert_split(&outline("00 40 44 04 00 11 13 33 31 11"), assert_covers);
-        // Two squares that meet in a corner.
+        // Two squares that share a corner.
         assert_split(&outline("00 10 11 21 22 12 11 01"), assert_covers_points);
     }
 
@@ -307,7 +309,7 @@ mod tests {
         assert!(matches!(clip_ears(&corners, &Cancelled), Err(crate::error::Error::Cancelled)));
     }
 
-    /// Returns true if sides meet in common corners only.
+    /// Returns true if sides touch in common corners only.
     fn is_simple(corners: &[[i32; 2]]) -> bool {
         let turn = |a: [i32; 2], b: [i32; 2], c: [i32; 2]| {
             ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).signum()
@@ -345,8 +347,8 @@ mod tests {
             assert_covers(&corners, &split(&placed).unwrap());
         }
 
-        /// Any corners: triangles cover the polygon, or there are none, which only outlines that
-        /// meet themselves may have.
+        /// Any corners: triangles cover the polygon, or `None` is returned, only for outlines that
+        /// touch or cross themselves.
         #[test]
         fn polygons_are_covered_or_refused(corners in prop::collection::vec([0u8..6, 0u8..6], 4..9)) {
             let simple = is_simple(&corners.iter().map(|p| p.map(i32::from)).collect::<Vec<_>>());

@@ -60,10 +60,10 @@ impl GroupRecorder {
         }
     }
 
-    /// The groups of a mesh of so many triangles. Those before the first start are of a group
-    /// without a name; groups and materials without triangles are left out. None at all, if there
-    /// is but one without a name and a material. The second value has the numbers of the materials
-    /// that stay.
+    /// Returns the groups of a mesh of `triangles` triangles, and the numbers of the materials that
+    /// stay. Triangles before the first start get a group without a name. Groups and materials
+    /// without triangles are skipped. If the only group has neither name nor material, there are no
+    /// groups.
     pub(super) fn finish(mut self, triangles: usize) -> (Groups, Vec<u32>) {
         self.runs.retain(|run| (run[0] as usize) < triangles);
         if triangles > 0 && self.runs.first().is_none_or(|run| run[0] > 0) {

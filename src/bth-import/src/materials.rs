@@ -19,7 +19,7 @@ pub struct Materials {
     pub textures: Vec<Texture>,
     /// Per triangle rows of `colors`; empty without vertex colours.
     pub color_corners: Vec<[u32; 3]>,
-    /// Distinct vertex colours, linear red, green, blue and alpha; 65,535 stands for 1.
+    /// Distinct vertex colours, linear red, green, blue and alpha; 65,535 means 1.
     pub colors: Vec<[u16; 4]>,
     /// Per triangle rows of `second_uvs`; empty where no texture has coordinates of a second set.
     pub second_corners: Vec<[u32; 3]>,
@@ -34,17 +34,17 @@ pub enum Unreadable {
     /// They are errors.
     #[default]
     Refused,
-    /// They are left out, each with a warning. A base colour counts as white then, and what would
-    /// emit does not.
+    /// Skips them, each with a warning. A base colour counts as white then, and what would emit
+    /// does not.
     LeftOut,
 }
 
 impl Unreadable {
-    /// What was read. `None`, with a warning, for an image or a material library that cannot be
-    /// read and is left out.
+    /// Returns what was read; `None`, with a warning, for an image or a material library that
+    /// cannot be read and is skipped.
     ///
     /// # Errors
-    /// Other errors, and all where nothing is left out.
+    /// Other errors, and all errors if nothing is to be skipped.
     pub(crate) fn check<T>(self, read: Result<T>, monitor: &dyn Monitor) -> Result<Option<T>> {
         let what = match (self, &read) {
             (Unreadable::LeftOut, Err(Error::Input { code: IMAGE, place, message, .. })) => {
@@ -143,8 +143,8 @@ impl MaterialRecorder {
         row
     }
 
-    /// The materials of a mesh of so many triangles. `kept` are the numbers of the materials that
-    /// its groups have, in order.
+    /// Returns the materials of a mesh of `triangles` triangles. `kept` are the numbers of the
+    /// materials that its groups have, in order.
     pub(crate) fn finish(self, kept: &[u32], triangles: usize) -> Materials {
         let Self { parameters, textures, colors, second_uvs, .. } = self;
         let parameters: Vec<_> = match parameters.is_empty() {
@@ -180,7 +180,7 @@ fn used(mut materials: Materials) -> Materials {
     materials
 }
 
-/// Collects what the corners of triangles have; each different one stands once.
+/// Collects the values at the corners of triangles; each different value is kept once.
 #[derive(Debug)]
 pub(crate) struct CornerRecorder<T> {
     corners: Vec<[u32; 3]>,

@@ -34,7 +34,7 @@ pub struct Mesh {
 }
 
 /// Positions of a mesh at several times. Between two frames vertices move on straight lines at
-/// constant speed; before the first and after the last they stand still.
+/// constant speed; before the first and after the last they do not move.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sequence {
     /// Seconds of the frames, strictly ascending; at least one.
@@ -152,7 +152,7 @@ pub struct Report {
     /// polygon.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub concave: u64,
-    /// Elements that were left out: faces of fewer than three corners, triangles of glTF that the
+    /// Elements that were skipped: faces of fewer than three corners, triangles of glTF that the
     /// number of indices leaves incomplete, points and lines.
     pub skipped: u64,
     /// Triangles of exactly zero area, decided by exact arithmetic. They keep their ids, and no ray

@@ -136,9 +136,9 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
-/// The words of a name, with single spaces between them, as [`text`] reads them. Names go on to the
-/// end of the line, and a word such as `#12` belongs to them, as other readers have it (Blender,
-/// tinyobjloader). Only `#` as a word of its own begins a comment.
+/// Returns the words of a name, with single spaces between them, as [`text`] reads them. A name
+/// ends at the end of the line, and a word such as `#12` belongs to it, as in other readers
+/// (Blender, tinyobjloader). Only a single `#` as a word begins a comment.
 pub(super) fn name<'w>(words: impl Iterator<Item = &'w [u8]>) -> String {
     let words: Vec<_> = words.take_while(|word| *word != b"#").collect();
     text(words.join(&b' '))

@@ -14,13 +14,15 @@ fn cross(a: &Point, b: &Point) -> Point {
     [minor(1, 2), minor(2, 0), minor(0, 1)]
 }
 
-/// The squared distance of a point to a closed triangle. A triangle without area is the segment or the point that it covers.
+/// The squared distance of a point to a closed triangle. A triangle without area is the segment or
+/// the point that it covers.
 ///
-/// It is the least of the distances to the corners, to the edges for which the foot of the perpendicular lies within the edge,
-/// and to the plane if the foot of the perpendicular lies within the triangle. All coordinates must be finite.
+/// It is the smallest of the distances to the corners, to the edges for which the foot of the
+/// perpendicular lies within the edge, and to the plane if the foot of the perpendicular lies
+/// within the triangle. All coordinates must be finite.
 pub fn squared_distance(point: [f32; 3], corners: [[f32; 3]; 3]) -> BigRational {
     let point = point.map(integer);
-    // The corners relative to the point, in units of the least positive f32.
+    // The corners relative to the point, in units of the smallest positive f32.
     let corners = corners.map(|p| sub(&p.map(integer), &point));
     let normal = cross(&sub(&corners[1], &corners[0]), &sub(&corners[2], &corners[0]));
     let mut candidates: Vec<BigRational> = corners.iter().map(|p| dot(p, p).into()).collect();
@@ -41,7 +43,8 @@ pub fn squared_distance(point: [f32; 3], corners: [[f32; 3]; 3]) -> BigRational 
     candidates.into_iter().min().expect("three corners") / BigRational::from(unit)
 }
 
-/// Whether a distance differs from the square root of `squared` by at most `units` units in the last place of the distance.
+/// Returns true if a distance differs from the square root of `squared` by at most `units` units in
+/// the last place of the distance.
 pub fn is_root_within(squared: &BigRational, distance: f32, units: (u32, u32)) -> bool {
     let exact = |x: f32| BigRational::new(integer(x), BigInt::from(1) << 149);
     let unit =

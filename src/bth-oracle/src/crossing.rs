@@ -1,11 +1,12 @@
-//! Crossings of surfaces by rays, for the crossing rule of the runtime, by another way: the origin of the ray is moved by a small
-//! rational vector instead of an infinitely small one.
+//! Crossings of surfaces by rays, for the crossing rule of the runtime, by another way: the origin
+//! of the ray is moved by a small rational vector instead of an infinitely small one.
 //!
-//! Coordinates are integers in units of 2^-149. Every sign that the rule asks for is that of a number c + x·δ₁ + y·δ₂ + z·δ₃ whose
-//! integers c, x, y and z lie below 2^720: products of at most four coordinates or differences, each below 2^279, and a factor of
-//! at most 2^149 · 6. With δ = (2^-BITS, 2^-2BITS, 2^-3BITS) and BITS = 724, such a number has the sign of c, or if that is 0 of x,
-//! or else of y, or else of z: the sign that it has for all smaller δ of this kind. So the moved ray is one in general position,
-//! and plain integer determinants decide.
+//! Coordinates are integers in units of 2^-149. Every sign that the rule asks for is the sign of a
+//! number c + x·δ₁ + y·δ₂ + z·δ₃ whose integers c, x, y and z lie below 2^720: products of at most
+//! four coordinates or differences, each below 2^279, and a factor of at most 2^149 · 6. With δ =
+//! (2^-BITS, 2^-2BITS, 2^-3BITS) and BITS = 724, such a number has the sign of c, or if that is 0
+//! of x, or else of y, or else of z: the sign that it has for all smaller δ of this kind. So the
+//! moved ray is one in general position, and plain integer determinants decide.
 
 use crate::intersection::{Point, certainly_missed, determinant, has_line, integer, sub};
 use bth::Crossings;
@@ -16,8 +17,8 @@ use num_traits::Signed;
 /// Binary digits by which the three components of the movement differ.
 const BITS: u32 = 724;
 
-/// Whether the moved ray of an origin (moved, in units of 2^-(149 + 3 BITS)) crosses a triangle within the ray's range: the sign of
-/// its direction times the normal, or 0.
+/// Returns true if the moved ray of an origin (moved, in units of 2^-(149 + 3 BITS)) crosses a
+/// triangle within the ray's range: the sign of its direction times the normal, or 0.
 fn crossing(ray: &Ray, moved: &Point, direction: &Point, corners: [[f32; 3]; 3]) -> i32 {
     let [a, b, c] = corners.map(|p| {
         let fine: Point = p.map(|x| integer(x) << (3 * BITS));
@@ -33,7 +34,8 @@ fn crossing(ray: &Ray, moved: &Point, direction: &Point, corners: [[f32; 3]; 3])
     } else {
         return 0;
     };
-    // t is volume / whole, in units of 2^-3BITS because the direction is not multiplied as the corners are.
+    // t is volume / whole, in units of 2^-3BITS because the direction is not multiplied as the
+    // corners are.
     let (volume, whole): (BigInt, BigInt) = (determinant(&a, &b, &c), sides.iter().sum());
     let after = |end: f32| {
         if end.is_infinite() {
@@ -69,7 +71,8 @@ pub fn crossings(corners: &[[[f32; 3]; 3]], ray: &Ray) -> Crossings {
     found
 }
 
-/// The winding number of a surface around a point, along a ray in a direction, on which it does not depend if the surface is closed.
+/// The winding number of a surface around a point, along a ray in a direction, on which it does not
+/// depend if the surface is closed.
 pub fn winding(corners: &[[[f32; 3]; 3]], point: [f32; 3], direction: [f32; 3]) -> i32 {
     crossings(corners, &Ray::new(point, direction)).winding
 }

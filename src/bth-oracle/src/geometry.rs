@@ -12,8 +12,8 @@ pub struct Triangle {
     pub corners: [[f32; 3]; 3],
 }
 
-/// All triangles that can be hit, by ascending id: those of the triangle leaves, and the constrained faces of the tet
-/// leaves. The object must have passed its check.
+/// All triangles that can be hit, by ascending id: the triangles of triangle leaves, and the
+/// constrained faces of tet leaves. The object must have passed its check.
 pub fn triangles(object: &ObjectView<'_>) -> Vec<Triangle> {
     let mut found = Vec::with_capacity(object.header.triangles as usize);
     let mut stack = vec![object.header.root];
@@ -39,7 +39,8 @@ pub fn triangles(object: &ObjectView<'_>) -> Vec<Triangle> {
                     found.push(Triangle { id: object.triangle_ids[leaf.first as usize + row], corners });
                 }
             }
-            // A subtree that is kept beside the tet leaf holds the same triangles, so it is not visited.
+            // A subtree that is kept with the tet leaf holds the same triangles, so it is not
+            // visited.
             Some(Child::Tets(row)) => {
                 let leaf = &object.tet_leaves[row as usize];
                 let faces = &object.tet_faces[leaf.first_face as usize..][..leaf.faces as usize];

@@ -8,7 +8,7 @@ use num_traits::{Signed, ToPrimitive, Zero};
 /// A point in integer coordinates, in a unit that the caller chooses.
 pub(crate) type Point = [BigInt; 3];
 
-/// The point at which a line meets a triangle.
+/// The point at which a line hits a triangle.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Intersection {
     /// Parameter of the point along the ray: origin + t * direction.
@@ -24,7 +24,7 @@ pub fn to_f64(t: &BigRational) -> f64 {
     t.to_f64().expect("quotients of f32 input are within the range of f64")
 }
 
-/// A finite f32 as an integer, in units of the least positive f32, 2^-149.
+/// A finite f32 as an integer, in units of the smallest positive f32, 2^-149.
 pub(crate) fn integer(x: f32) -> BigInt {
     assert!(x.is_finite());
     let (exponent, fraction) = ((x.to_bits() >> 23) & 0xff, x.to_bits() & 0x7f_ffff);
@@ -44,13 +44,13 @@ pub(crate) fn determinant(a: &Point, b: &Point, c: &Point) -> BigInt {
     &a[0] * minor(1, 2) + &a[1] * minor(2, 0) + &a[2] * minor(0, 1)
 }
 
-/// Whether a ray defines a line: its coordinates are finite and its direction is not zero.
+/// Returns true if a ray defines a line: its coordinates are finite and its direction is not zero.
 pub(crate) fn has_line(ray: &Ray) -> bool {
     ray.origin.iter().chain(&ray.direction).all(|x| x.is_finite()) && ray.direction != [0.0; 3]
 }
 
-/// Whether a line certainly misses a triangle. The corners are relative to the origin of the line; each coordinate has an
-/// error of at most 2^-52 times the sum of `magnitude` and itself.
+/// Returns true if a line certainly misses a triangle. The corners are relative to the origin of
+/// the line; each coordinate has an error of at most 2^-52 times the sum of `magnitude` and itself.
 pub(crate) fn certainly_missed(direction: [f64; 3], corners: [[f64; 3]; 3], magnitude: f64) -> bool {
     let (mut positive, mut negative) = (false, false);
     for (p, q) in [(0, 1), (1, 2), (2, 0)] {
@@ -70,7 +70,8 @@ pub(crate) fn certainly_missed(direction: [f64; 3], corners: [[f64; 3]; 3], magn
     positive && negative
 }
 
-/// The intersection of the line through `origin` along `direction` with a closed triangle; all in the same unit.
+/// The intersection of the line through `origin` along `direction` with a closed triangle; all in
+/// the same unit.
 pub(crate) fn intersect_exactly(
     origin: &Point,
     direction: &Point,
@@ -80,8 +81,8 @@ pub(crate) fn intersect_exactly(
     let sides =
         [determinant(direction, &b, &c), determinant(direction, &c, &a), determinant(direction, &a, &b)];
     let (positive, negative) = (sides.iter().any(Signed::is_positive), sides.iter().any(Signed::is_negative));
-    // With both signs the line misses. With neither the line lies in the plane, or the triangle has no area in the
-    // projection along it.
+    // With both signs the line misses. With neither the line lies in the plane, or the triangle has
+    // no area in the projection along it.
     if positive == negative {
         return None;
     }
@@ -95,7 +96,8 @@ pub(crate) fn intersect_exactly(
     })
 }
 
-/// The intersection of the whole line of a ray, in both directions and whatever its range, with a closed triangle.
+/// The intersection of the whole line of a ray, in both directions and whatever its range, with a
+/// closed triangle.
 pub fn intersection(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Intersection> {
     if !has_line(ray) {
         return None;
@@ -107,8 +109,9 @@ pub fn intersection(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Intersection> {
     intersect_exactly(&ray.origin.map(integer), &ray.direction.map(integer), &corners.map(|p| p.map(integer)))
 }
 
-/// Whether the direction of a ray and the normal (b-a)×(c-a) of a triangle point to opposite sides, so that the ray comes from
-/// the side from which the corners appear counter-clockwise. False if they are perpendicular.
+/// Returns true if the direction of a ray and the normal (b-a)×(c-a) of a triangle point to
+/// opposite sides, so that the ray comes from the side from which the corners appear
+/// counter-clockwise. False if they are perpendicular.
 pub fn is_front(ray: &Ray, corners: [[f32; 3]; 3]) -> bool {
     let [a, b, c] = corners.map(|p| p.map(integer));
     let whole = determinant(&ray.direction.map(integer), &sub(&b, &a), &sub(&c, &a));
@@ -153,7 +156,7 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(3000))]
-        /// The filter never skips a triangle that the line meets.
+        /// The filter never skips a triangle that the line hits.
         #[test]
         fn the_filter_changes_no_intersection(ray in ray(), corners in prop::array::uniform3(prop::array::uniform3(number()))) {
             prop_assume!(has_line(&ray));
@@ -161,7 +164,8 @@ mod tests {
             prop_assert_eq!(intersection(&ray, corners), exact);
         }
 
-        /// A ray aimed at a point of a triangle from outside its plane meets it with the t, u and v of that point.
+        /// A ray aimed at a point of a triangle from outside its plane hits it with the t, u and v
+        /// of that point.
         #[test]
         fn a_point_of_a_triangle_is_met_there(
             corners in prop::array::uniform3(prop::array::uniform3(-50i32..50)),
@@ -179,7 +183,8 @@ mod tests {
                 let eighth = |n: i32| BigRational::new(n.into(), 8.into());
                 prop_assert_eq!(found, Intersection { t: eighth(32), u: eighth(b), v: eighth(c) });
             } else {
-                // There is no intersection only when the line lies in the plane or the triangle has no area.
+                // There is no intersection only when the line lies in the plane or the triangle has
+                // no area.
                 let p = |q: [f32; 3]| sub(&q.map(integer), &origin.map(integer));
                 let [x, y, z] = scaled.map(p);
                 prop_assert!(determinant(&x, &y, &z).is_zero());

@@ -24,7 +24,7 @@ impl<Id> ExactHit<Id> {
     }
 }
 
-/// Whether a hit counts: t, rounded to f32 as it is reported, lies within the ray's range.
+/// Returns true if a hit counts: t, rounded to f32 as it is reported, lies within the ray's range.
 fn in_range(ray: &Ray, t: &BigRational) -> bool {
     let reported = to_f64(t) as f32;
     ray.tmin <= reported && reported <= ray.tmax && reported.is_finite()
@@ -49,14 +49,14 @@ pub(crate) fn nearest_of<Id: Clone>(
     best
 }
 
-/// The nearest exact hit whose t, rounded to f32 as it is reported, lies within the ray's range. Ids are rows of
-/// `corners`.
+/// The nearest exact hit whose t, rounded to f32 as it is reported, lies within the ray's range.
+/// Ids are rows of `corners`.
 pub fn nearest(corners: &[[[f32; 3]; 3]], ray: &Ray) -> Option<ExactHit> {
     let rows = corners.iter().enumerate();
     nearest_of(ray, rows.filter_map(|(id, &triangle)| Some((id as u32, intersection(ray, triangle)?))))
 }
 
-/// Whether any triangle is hit within the ray's range.
+/// Returns true if any triangle is hit within the ray's range.
 pub fn any(corners: &[[[f32; 3]; 3]], ray: &Ray) -> bool {
     corners.iter().any(|&triangle| intersection(ray, triangle).is_some_and(|at| in_range(ray, &at.t)))
 }

@@ -4,7 +4,8 @@ use crate::intersection::{determinant, integer, sub};
 use num_bigint::{BigInt, Sign};
 use std::cmp::Ordering;
 
-/// On which side of the plane through the first three points the fourth lies: `Greater` where (b − a) × (c − a) points to.
+/// On which side of the plane through the first three points the fourth lies: `Greater` where (b −
+/// a) × (c − a) points to.
 ///
 /// # Panics
 /// If a coordinate is not finite.

@@ -9,8 +9,8 @@ fn exact(x: f32) -> BigRational {
     BigRational::from_float(x).expect("a finite number")
 }
 
-/// The part of a convex polygon in the half space where `sign * (p[axis] - plane)` is not negative (Sutherland and Hodgman,
-/// "Reentrant Polygon Clipping", CACM 1974).
+/// The part of a convex polygon in the half space where `sign * (p[axis] - plane)` is not negative
+/// (Sutherland and Hodgman, "Reentrant Polygon Clipping", CACM 1974).
 fn cut(polygon: &Polygon, axis: usize, plane: &BigRational, sign: i32) -> Polygon {
     let height = |p: &[BigRational; 3]| (&p[axis] - plane) * BigRational::from_integer(sign.into());
     let mut kept = Polygon::new();
@@ -28,7 +28,7 @@ fn cut(polygon: &Polygon, axis: usize, plane: &BigRational, sign: i32) -> Polygo
     kept
 }
 
-/// Whether a closed triangle and a closed box of finite coordinates have a point in common.
+/// Returns true if a closed triangle and a closed box of finite coordinates have a point in common.
 pub fn overlaps_box(lower: [f32; 3], upper: [f32; 3], corners: [[f32; 3]; 3]) -> bool {
     let mut polygon: Polygon = corners.iter().map(|p| p.map(exact)).collect();
     for k in 0..3 {

@@ -1,7 +1,8 @@
 //! Rays that start on triangles: their exact starts, hits and crossings, by testing every triangle.
 //!
-//! The start with weights u and v of the corners a, b and c is a + u(b - a) + v(c - a), or (ub + vc) / (u + v) where u + v is above 1. It
-//! is held as integers over one positive integer, the scale. Multiplying all coordinates by the scale changes neither t nor weights.
+//! The start with weights u and v of the corners a, b and c is a + u(b - a) + v(c - a), or (ub +
+//! vc) / (u + v) where u + v is above 1. It is held as integers over one positive integer, the
+//! scale. Multiplying all coordinates by the scale changes neither t nor weights.
 
 use crate::intersection::{
     Intersection, Point, certainly_missed, determinant, integer, intersect_exactly, sub, to_f64,
@@ -17,7 +18,8 @@ use num_traits::{Signed, Zero};
 /// The weights of a hit, rounded to f32, have a sum of at most this.
 const GREATEST_SUM: f32 = 1.0 + 1.0 / (1 << 22) as f32;
 
-/// A start: a point whose coordinates are these integers divided by `scale`, in the unit of the corners.
+/// A start: a point whose coordinates are these integers divided by `scale`, in the unit of the
+/// corners.
 #[derive(Clone, Debug)]
 pub(crate) struct ExactStart {
     point: Point,
@@ -25,7 +27,7 @@ pub(crate) struct ExactStart {
 }
 
 impl ExactStart {
-    /// `None` if the weights are not those of a point of a triangle, or the triangle has no area.
+    /// Returns `None` if the weights are outside the triangle, or the triangle has no area.
     pub(crate) fn new([a, b, c]: &[Point; 3], u: f32, v: f32) -> Option<ExactStart> {
         // Comparisons with NaN are false.
         if !(u >= 0.0 && v >= 0.0 && u + v <= GREATEST_SUM) {
@@ -58,7 +60,7 @@ impl ExactStart {
     }
 }
 
-/// Whether a ray has a direction.
+/// Returns true if a ray has a direction.
 pub(crate) fn has_direction(ray: &StartRay) -> bool {
     ray.direction.iter().all(|x| x.is_finite()) && ray.direction != [0.0; 3]
 }
@@ -73,7 +75,7 @@ struct FromStart<'a> {
     corners: &'a [[[f32; 3]; 3]],
     direction: [f32; 3],
     start: ExactStart,
-    /// The start in f64, and the greatest coordinate of its triangle in absolute value.
+    /// The start in f64, and the max absolute coordinate of its triangle.
     rounded: [f64; 3],
     greatest: f64,
 }
@@ -109,13 +111,14 @@ impl<'a> FromStart<'a> {
     }
 }
 
-/// The intersection of a ray from a start with a triangle, a row of `corners`, at t > 0 and whatever its end.
+/// The intersection of a ray from a start with a triangle, a row of `corners`, at t > 0 and
+/// whatever its end.
 pub fn intersection(corners: &[[[f32; 3]; 3]], ray: &StartRay, triangle: u32) -> Option<Intersection> {
     FromStart::new(corners, ray)?.intersection(triangle as usize)
 }
 
-/// The nearest exact hit at t > 0 whose t, rounded to f32 as it is reported, is not above the ray's end. Triangles are rows of `corners`,
-/// also that of the start.
+/// The nearest exact hit at t > 0 whose t, rounded to f32 as it is reported, is not above the ray's
+/// end. Triangles are rows of `corners`, also the triangle of the start.
 pub fn nearest(corners: &[[[f32; 3]; 3]], ray: &StartRay) -> Option<ExactHit> {
     nearest_of(&range(ray), FromStart::new(corners, ray)?.intersections())
 }
@@ -131,7 +134,7 @@ fn end(corners: &[[[f32; 3]; 3]], end: SegmentEnd) -> Option<ExactStart> {
     }
 }
 
-/// Whether no triangle crosses the open segment between two points, of which both exist.
+/// Returns true if no triangle crosses the open segment between two points. Both must exist.
 pub fn visible(corners: &[[[f32; 3]; 3]], a: SegmentEnd, b: SegmentEnd) -> bool {
     let (Some(a), Some(b)) = (end(corners, a), end(corners, b)) else { return false };
     let scaled = |p: &Point, by: &BigInt| -> Point { [0, 1, 2].map(|k| &p[k] * by) };
@@ -145,7 +148,7 @@ pub fn visible(corners: &[[[f32; 3]; 3]], a: SegmentEnd, b: SegmentEnd) -> bool 
     })
 }
 
-/// Whether any triangle is hit.
+/// Returns true if any triangle is hit.
 pub fn any(corners: &[[[f32; 3]; 3]], ray: &StartRay) -> bool {
     let Some(from) = FromStart::new(corners, ray) else { return false };
     from.intersections().any(|found| nearest_of(&range(ray), std::iter::once(found)).is_some())
@@ -161,12 +164,12 @@ pub fn all_hits(corners: &[[[f32; 3]; 3]], ray: &StartRay) -> Vec<(u32, Intersec
     hits
 }
 
-/// Binary digits by which the three components of the movement of an origin differ, for coordinates that are multiplied by a scale below
-/// 2^151; see [`mod@crate::crossing`].
+/// Binary digits by which the three components of the movement of an origin differ, for coordinates
+/// that are multiplied by a scale below 2^151; see [`mod@crate::crossing`].
 const BITS: u32 = 1400;
 
-/// The crossings of triangles by a ray from a start, by the rule of the runtime: the moved line crosses the triangle, and the line through
-/// the start itself crosses its plane at t > 0.
+/// The crossings of triangles by a ray from a start, by the rule of the runtime: the moved line
+/// crosses the triangle, and the line through the start itself crosses its plane at t > 0.
 pub fn crossings(corners: &[[[f32; 3]; 3]], ray: &StartRay) -> Crossings {
     let mut found = Crossings::default();
     let Some(from) = FromStart::new(corners, ray) else { return found };

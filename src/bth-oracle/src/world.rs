@@ -14,10 +14,11 @@ use num_bigint::BigInt;
 /// The units of f64, 2^-1074, and of f32, 2^-149.
 const UNITS: [u32; 2] = [1074, 149];
 
-/// The visible instances of a scene at the time to which it is set. Vertices are transformed to world space by the f64
-/// matrix of the instance without any rounding, whereas the runtime transforms the ray into the space of the object and
-/// rounds it there. Answers for transformed instances therefore differ from the runtime's by that rounding; answers for
-/// instances without a transform are those of the runtime. Transparent parts of triangles are not hit.
+/// The visible instances of a scene at the time to which it is set. Vertices are transformed to
+/// world space by the f64 matrix of the instance without any rounding, whereas the runtime
+/// transforms the ray into the space of the object and rounds it there. Answers for transformed
+/// instances therefore differ from the runtime's by that rounding. For instances without a
+/// transform both give the same answers. Transparent parts of triangles are not hit.
 #[derive(Debug)]
 pub struct World {
     instances: Vec<Instance>,
@@ -72,19 +73,20 @@ impl World {
         nearest_of(ray, self.intersections(ray))
     }
 
-    /// The nearest exact hit as the runtime reports hits: t, u and v rounded to f32; of equal ones that of the least
-    /// instance and triangle.
+    /// The nearest exact hit as the runtime reports hits: t, u and v rounded to f32. Among equal
+    /// hits, the smallest instance and triangle win.
     pub fn hit(&self, ray: &Ray) -> Hit {
         as_reported(self.nearest(ray))
     }
 
-    /// Whether any triangle is hit within the ray's range.
+    /// Returns true if any triangle is hit within the ray's range.
     pub fn any(&self, ray: &Ray) -> bool {
         self.intersections(ray).any(|found| nearest_of(ray, std::iter::once(found)).is_some())
     }
 
-    /// The nearest exact hit of a ray from a start. The instance on which it starts sees the exact point, others see it rounded to f32, at
-    /// t >= 0, as in the runtime. Of instances whose hits have an equal t as it is reported, rounded to f32, that of the least instance.
+    /// The nearest exact hit of a ray from a start. The instance on which it starts sees the exact
+    /// point, others see it rounded to f32, at t >= 0, as in the runtime. Among hits of instances
+    /// with equal reported t, rounded to f32, the smallest instance wins.
     pub fn nearest_from_start(&self, ray: &StartRay) -> Option<ExactHit<PrimitiveRef>> {
         let PrimitiveRef { instance, triangle } = ray.start.primitive;
         let own = self.instances.iter().find(|other| other.number == instance)?;
@@ -127,7 +129,8 @@ impl World {
         as_reported(self.nearest_from_start(ray))
     }
 
-    /// How many triangles the whole line of a ray meets, in both directions. Each costs the search for a hit as much as many that it misses.
+    /// Counts the triangles that the whole line of a ray hits, in both directions. Each costs the
+    /// search for a hit as much as many that it misses.
     pub fn crossed(&self, ray: &Ray) -> usize {
         self.intersections(ray).count()
     }
@@ -152,7 +155,7 @@ impl Instance {
         }
     }
 
-    /// Whether a point of a triangle is not transparent.
+    /// Returns true if a point of a triangle is not transparent.
     fn blocks(&self, triangle: u32, at: &Intersection) -> bool {
         let [rows, words] = &self.opacity;
         let [u, v] = [&at.u, &at.v].map(|x| to_f64(x) as f32);
@@ -168,7 +171,7 @@ impl Instance {
     }
 }
 
-/// A hit as the runtime reports it; of equal ones that of the least instance and triangle.
+/// A hit as the runtime reports it; among equal hits, the smallest instance and triangle win.
 fn as_reported(hit: Option<ExactHit<PrimitiveRef>>) -> Hit {
     let rounded = |x: &_| to_f64(x) as f32;
     hit.map_or(Hit::MISS, |truth| Hit {
@@ -197,7 +200,8 @@ fn intersection_in_world(ray: &Ray, rows: &[[f64; 4]; 3], corners: [[f32; 3]; 3]
         std::array::from_fn(|k| {
             let [a, b, c, moved] = rows[k];
             let terms = [a * p[0], b * p[1], c * p[2], moved, -origin[k]];
-            // Five terms with one rounding each and four sums: below 8 roundings of the sum of their magnitudes.
+            // Five terms with one rounding each and four sums: below 8 roundings of the sum of
+            // their magnitudes.
             magnitude = magnitude.max(8.0 * terms.iter().map(|x| x.abs()).sum::<f64>());
             terms.iter().sum()
         })

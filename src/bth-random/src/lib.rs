@@ -1,9 +1,10 @@
-//! The one seeded generator of pseudo-random numbers of the workspace: tests, benchmarks, generated models and sampled
-//! rays all draw from it, so that the same seed gives the same numbers on every machine and in every release.
+//! The one seeded generator of pseudo-random numbers of the workspace: tests, benchmarks, generated
+//! models and sampled rays all draw from it, so that the same seed gives the same numbers on every
+//! machine and in every release.
 #![warn(missing_docs)]
 
-/// SplitMix64 (Steele, Lea and Flood, "Fast Splittable Pseudorandom Number Generators", OOPSLA 2014): 64 bits of state,
-/// period 2^64. Not for cryptography.
+/// SplitMix64 (Steele, Lea and Flood, "Fast Splittable Pseudorandom Number Generators", OOPSLA
+/// 2014): 64 bits of state, period 2^64. Not for cryptography.
 #[derive(Clone, Debug)]
 pub struct Rng(u64);
 
@@ -22,7 +23,8 @@ impl Rng {
         bits
     }
 
-    /// A whole number from 0 to `n - 1`, by the remainder: the bias, at most n / 2^64, matters to no use here.
+    /// A whole number from 0 to `n - 1`, by the remainder: the bias, at most n / 2^64, matters to
+    /// no use here.
     ///
     /// # Panics
     /// If `n` is 0.
@@ -43,14 +45,15 @@ impl Rng {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Uniform between two finite numbers: at least `lower`, and at most `upper`, which only rounding can return.
+    /// Uniform between two finite numbers: at least `lower`, and at most `upper`, which only
+    /// rounding can return.
     #[inline]
     pub fn between(&mut self, lower: f64, upper: f64) -> f64 {
         lower + (upper - lower) * self.unit_f64()
     }
 
-    /// A point uniform in the unit ball, by rejection from the cube around it. Its distance from the centre is from 0.001
-    /// to 1, so that it can be normalized.
+    /// A point uniform in the unit ball, by rejection from the cube around it. Its distance from
+    /// the centre is from 0.001 to 1, so that it can be normalized.
     pub fn point_in_ball(&mut self) -> [f64; 3] {
         loop {
             let p = [(); 3].map(|()| self.between(-1.0, 1.0));
@@ -71,8 +74,9 @@ impl Rng {
 /// The increment of the state: 2^64 divided by the golden ratio, made odd.
 const GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// A hash of 64 bits in which every input bit changes every output bit with probability about one half: the output of a
-/// generator in this state. For numbers that must depend on a place, such as a pixel, rather than on a sequence.
+/// A hash of 64 bits in which every input bit changes every output bit with probability about one
+/// half: the output of a generator in this state. For numbers that must depend on a place, such as
+/// a pixel, rather than on a sequence.
 #[inline]
 pub fn mix(bits: u64) -> u64 {
     let z = bits.wrapping_add(GAMMA);

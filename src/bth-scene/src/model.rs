@@ -114,8 +114,8 @@ pub enum Source {
     AtRest {
         /// glTF or GLB file.
         path: String,
-        /// Number of the node. A mesh with a skin is in world space, another one in that of the
-        /// node.
+        /// Number of the node. A mesh with a skin is in world space, another one in the space of
+        /// its node.
         node: u32,
     },
 }
@@ -167,7 +167,7 @@ pub struct Node {
     pub parent: Option<usize>,
     /// From its own space to its parent's, before tracks.
     pub transform: Transform,
-    /// Object of which the node is an instance.
+    /// The object if the node is an instance.
     pub object: Option<usize>,
     /// True if the node and its descendants are visible, before tracks.
     pub visible: bool,
@@ -221,7 +221,7 @@ pub enum Lens {
     Orthographic(f64),
 }
 
-/// A light. Directed ones shine along the negative z axis of their node. Units are those of glTF's
+/// A light. Directed ones shine along the negative z axis of their node. Units are as in glTF's
 /// KHR_lights_punctual.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Light {
@@ -262,8 +262,8 @@ pub struct Skin {
     pub name: String,
     /// The nodes that are its joints, at least one.
     pub joints: Vec<usize>,
-    /// For each joint rows of the matrix from the space of the object to that of the joint, applied
-    /// to columns (x, y, z, 1); `None` where all are the identity.
+    /// For each joint rows of the matrix from the space of the object to the space of the joint,
+    /// applied to columns (x, y, z, 1); `None` where all are the identity.
     pub inverse_binds: Option<Vec<[[f64; 4]; 3]>>,
 }
 
@@ -293,8 +293,9 @@ pub struct Track {
     pub interpolation: Interpolation,
     /// Seconds, strictly ascending, at least one.
     pub times: Vec<f64>,
-    /// For each key [`Property::width`] numbers, of weights as many as the deformer of the node
-    /// has; with [`Interpolation::Cubic`] those of the in-tangent, the value and the out-tangent.
+    /// For each key [`Property::width`] numbers; for weights one number per morph target of the
+    /// node's deformer. With [`Interpolation::Cubic`] each key has the in-tangent, the value and
+    /// the out-tangent.
     pub values: Vec<f64>,
 }
 
@@ -318,7 +319,7 @@ impl Property {
     pub const ALL: [Property; 5] =
         [Self::Translation, Self::Rotation, Self::Scale, Self::Visible, Self::Weights];
 
-    /// Numbers of a value; `None` for weights, of which the deformer of the node has some number.
+    /// Numbers of a value; `None` for weights, where the deformer of the node decides.
     pub const fn width(self) -> Option<usize> {
         match self {
             Self::Translation | Self::Scale => Some(3),

@@ -30,7 +30,7 @@ const FRAME_LIMIT: i64 = 1 << 24;
 /// Reads a manifest file.
 ///
 /// # Errors
-/// [`code::READ`] when it cannot be read, else those of [`parse`].
+/// [`code::READ`] when it cannot be read, else the errors of [`parse`].
 pub fn read(path: &Path) -> Result<Manifest> {
     let failed = |message: String, hint: &str| {
         let path = path.to_owned();

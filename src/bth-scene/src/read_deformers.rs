@@ -32,7 +32,7 @@ pub(crate) fn skin(table: &Table<'_>, nodes: &Names<'_>) -> Result<Skin> {
     Ok(Skin { name: table.need("name")?.string()?.to_owned(), joints, inverse_binds })
 }
 
-/// Reads the deformers of a manifest, of which no two have the same node or the same object.
+/// Reads the deformers of a manifest. No two have the same node or the same object.
 pub(crate) fn deformers(
     tables: &[Table<'_>],
     nodes: &Names<'_>,

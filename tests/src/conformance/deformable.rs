@@ -73,8 +73,8 @@ fn with_parts<T>(make: impl FnOnce(&ObjectParts<'_>) -> T) -> T {
     let root = node(&[(Child::Node(7), bounds(inner.as_flattened())), (Child::Indexed(LINES[2]), of(2))]);
     let second = node(&[(Child::Indexed(LINES[0]), of(0)), (Child::Raw(LINES[1]), of(1))]);
     let mut last = indexed(&corners(LEAVES[2]), 5);
-    // The doubled vertex has a separate slot: triangles 4 and 5 use vertices 4 to 7, triangle 7 has 6,
-    // 8 and 7.
+    // The doubled vertex has a separate slot: triangles 4 and 5 use vertices 4 to 7, triangle 7 has
+    // 6, 8 and 7.
     last.corner = [[0; WIDTH]; 3];
     for (t, vertices) in [[0, 1, 2], [2, 1, 3], [1, 4, 3]].into_iter().enumerate() {
         (0..3).for_each(|k| last.corner[k][t] = vertices[k]);

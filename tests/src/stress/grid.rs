@@ -28,7 +28,8 @@ pub struct GridRay {
     pub origin: Point,
     /// Direction, in units of 2^`exponent`.
     pub direction: Point,
-    /// Unit of the direction. It differs from the grid where rays are stretched, which shrinks their t.
+    /// Unit of the direction. It differs from the grid where rays are stretched, which shrinks
+    /// their t.
     pub exponent: i32,
     /// Range of t.
     pub range: [f32; 2],
@@ -86,8 +87,8 @@ impl Grid {
         Ray { origin: ray.origin.map(|x| float(x, self.exponent)), tmin, direction, tmax }
     }
 
-    /// The t at which the line of a ray hits a triangle; `None` if it misses or lies in the plane of
-    /// the triangle.
+    /// The t at which the line of a ray hits a triangle; `None` if it misses or lies in the plane
+    /// of the triangle.
     pub fn intersection(&self, ray: &GridRay, triangle: u32) -> Option<Quotient> {
         let [a, b, c] =
             self.triangles[triangle as usize].map(|v| sub(self.positions[v as usize], ray.origin));

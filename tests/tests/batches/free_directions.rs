@@ -211,7 +211,7 @@ fn placed(ray: &StartRay, instance: u32, rows: &[f32; 12]) -> StartRay {
     placed
 }
 
-/// Rays that start on instances, some of which do not exist.
+/// Rays that start on instances; some of the instances do not exist.
 #[test]
 fn free_directions_of_instances_change_no_answer() {
     let _turn = turn();

@@ -249,7 +249,8 @@ fn rays_do_not_leave_closed_parts_at_vertices_and_edges() {
                     let share = rng.unit_f64();
                     let along = |p: &[f64; 3], q: &[f64; 3]| [0, 1, 2].map(|k| p[k] + share * (q[k] - p[k]));
                     for to in [*a, *b, *c, along(a, b), along(b, c), along(c, a)] {
-                        // Ends behind the surface but before another ball, which then cannot be hit.
+                        // Ends behind the surface but before another ball, which then cannot be
+                        // hit.
                         let direction = [0, 1, 2].map(|k| to[k] as f32 - origin[k]);
                         rays.push(Ray { tmax: 1.001, ..Ray::new(origin, direction) });
                     }

@@ -1,4 +1,4 @@
-//! Whether two points see each other: exactly, and the same in both directions.
+//! Visibility between two points: exact, and the same in both directions.
 
 use crate::check::corners_of;
 use bth::SegmentEnd;

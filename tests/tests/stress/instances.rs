@@ -126,8 +126,8 @@ fn closed_surfaces_stay_closed_under_transforms_and_t_keeps_its_bound() {
             let origin = greatest(ray.origin.map(f64::from));
             let bound = (condition * (origin + translation) + norm * size) / f64::from(1 << 21);
             worst = worst.max(distance / bound);
-            // Of a sample, the exact truth for the instance as it is: hit as well, and at about the same
-            // t.
+            // Of a sample, the exact truth for the instance as it is: hit as well, and at about the
+            // same t.
             if i % 10 == 0 {
                 let exact = world.hit(ray);
                 assert_eq!((exact.is_hit(), exact.primitive.instance), (true, instance), "{ray:?}");

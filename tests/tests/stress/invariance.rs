@@ -140,8 +140,8 @@ fn cutting_into_instances_changes_no_answer() {
             let triangle = hit.primitive.instance * size as u32 + hit.primitive.triangle;
             hit.primitive = PrimitiveRef { instance: 0, triangle };
         }
-        // Among hits at the same t, rounded, the smallest instance is reported; within an object the
-        // nearest is.
+        // Among hits at the same t, rounded, the smallest instance is reported; within an object
+        // the nearest is.
         let whole =
             structures::compiled(&model, &structures::options(Structure::Bvh, RecordKind::Link32, false));
         compare(&hits(&whole, &rays), &ours, |id| id, false);

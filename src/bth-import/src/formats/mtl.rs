@@ -52,8 +52,8 @@ struct Libraries {
     left_out: BTreeSet<String>,
 }
 
-/// Reads the libraries of an OBJ file: the parameters of the materials of these names, in order.
-/// Without libraries there are none.
+/// Reads the libraries of an OBJ file: the parameters of the materials with these names, in order.
+/// Without libraries there is nothing to read.
 ///
 /// # Errors
 /// `BTH-I016` for a library or image that cannot be read, `BTH-I002` for a malformed library,
@@ -109,7 +109,7 @@ pub(super) fn files(path: &Path, data: &[u8]) -> Vec<PathBuf> {
 /// The images of an OBJ file's materials that can be read.
 pub(super) fn images(source: &Source<'_>, unreadable: Unreadable) -> Result<Vec<ImageFile>> {
     let libraries: Vec<Library> = libraries_of(source.data).collect();
-    // What is left out was warned of when the materials were read.
+    // The warnings about skipped files came when the materials were read.
     let quiet = Source::new(source.path, source.data, &Silent);
     let found = read_libraries(&quiet, &libraries, unreadable)?;
     let maps: BTreeSet<&PathBuf> = found.materials.values().flat_map(kept_files).collect();
@@ -365,12 +365,12 @@ fn texture(map: &Map, image: [u8; 16]) -> Texture {
 struct Images<'m> {
     unreadable: Unreadable,
     monitor: &'m dyn Monitor,
-    /// Names by files; `None` for those that are left out.
+    /// Names by files; `None` for skipped files.
     read: HashMap<PathBuf, Option<[u8; 16]>>,
 }
 
 impl Images<'_> {
-    /// The name of a map's image, whose format and size are checked; `None` if it is left out.
+    /// Returns the name of a map's image after checking format and size; `None` if it is skipped.
     fn name(&mut self, map: &Map) -> Result<Option<[u8; 16]>> {
         if let Some(name) = map.file.as_ref().ok().and_then(|file| self.read.get(file)) {
             return Ok(*name);

@@ -68,7 +68,7 @@ impl<'a> Statements<'a, '_> {
 }
 
 /// Reads an OFF file. Colours, normals and texture coordinates at the ends of lines are ignored,
-/// which is why each vertex and each face must have a line of its own.
+/// so each vertex and each face must have a separate line.
 fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
     let mut statements = Statements { source, lines: Lines::new(source.data), long_line: None };
     let malformed =

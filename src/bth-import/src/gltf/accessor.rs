@@ -18,7 +18,7 @@ enum ComponentType {
 }
 
 impl ComponentType {
-    /// Returns the type of a code, its bytes and the integer that stands for 1 if it is normalized.
+    /// Returns the type of a code, its bytes and the integer that means 1 if it is normalized.
     fn properties(self) -> (u64, usize, f64) {
         match self {
             ComponentType::I8 => (5120, 1, 127.0),
@@ -55,7 +55,7 @@ impl ComponentType {
         if normalized { self.normalized(value) } else { value as f32 }
     }
 
-    /// Returns the fraction that a normalized integer stands for (§3.6.2.2).
+    /// Returns the fraction that a normalized integer means (§3.6.2.2).
     #[inline]
     fn normalized(self, value: f64) -> f32 {
         (value / self.properties().2).max(-1.0) as f32

@@ -12,13 +12,14 @@ const DEFLATE_RATIO: u64 = 1040;
 /// Bytes of a texel that decoders write.
 const RGBA: usize = 4;
 
-type Result<T> = std::result::Result<T, Refused>;
+/// Result of decoding an image.
+type Decoded<T> = std::result::Result<T, Refused>;
 
 /// Returns the alpha channel of an image file; `None` where it has none: alpha is 1 everywhere.
 ///
 /// # Errors
 /// When the image is malformed, too large or of another format.
-pub(super) fn decode(bytes: &[u8]) -> Result<Option<AlphaImage>> {
+pub(super) fn decode(bytes: &[u8]) -> Decoded<Option<AlphaImage>> {
     if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
         return png(bytes);
     }
@@ -33,7 +34,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Option<AlphaImage>> {
 }
 
 /// Reads 16-bit channels at 8 bits, palettes and transparent colours as the alpha that they mean.
-fn png(bytes: &[u8]) -> Result<Option<AlphaImage>> {
+fn png(bytes: &[u8]) -> Decoded<Option<AlphaImage>> {
     let malformed = |e: png::DecodingError| Refused::Malformed(format!("malformed PNG: {e}"));
     let limits = png::Limits { bytes: MAX_TEXELS as usize * RGBA };
     let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), limits);
@@ -59,7 +60,7 @@ fn png(bytes: &[u8]) -> Result<Option<AlphaImage>> {
 }
 
 /// Reads the first frame of an animation.
-fn webp(bytes: &[u8]) -> Result<Option<AlphaImage>> {
+fn webp(bytes: &[u8]) -> Decoded<Option<AlphaImage>> {
     let malformed = |e: image_webp::DecodingError| Refused::Malformed(format!("malformed WebP: {e}"));
     let mut decoder = image_webp::WebPDecoder::new(Cursor::new(bytes)).map_err(malformed)?;
     decoder.set_memory_limit(MAX_TEXELS as usize * RGBA);

@@ -7,8 +7,8 @@ use crate::text::without_mark;
 const JSON_CHUNK: u32 = 0x4E4F_534A;
 const BIN_CHUNK: u32 = 0x004E_4942;
 
-/// Splits a GLB into its JSON and its binary chunk; a `.gltf` is all JSON, before which a byte
-/// order mark may stand.
+/// Splits a GLB into its JSON and its binary chunk. A `.gltf` is all JSON, perhaps after a byte
+/// order mark.
 pub(crate) fn split<'a>(source: &Source<'a>) -> Result<(&'a [u8], Option<&'a [u8]>)> {
     let data = source.data;
     if !data.starts_with(b"glTF") {

@@ -9,8 +9,8 @@ use crate::gltf::file::{GRAPH, WEIGHTS};
 use crate::gltf::primitive::{PrimitiveReader, Triangles};
 use crate::source::{INDEX, UNSUPPORTED};
 
-/// Rows of morph targets that any model may have; one with more may have as many as bytes were
-/// read.
+/// Rows of morph targets that any model may store. A model with more rows may store at most one per
+/// byte read.
 const FREE_ROWS: u64 = 1 << 24;
 
 impl PrimitiveReader<'_, '_> {

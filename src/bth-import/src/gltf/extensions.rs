@@ -17,7 +17,7 @@ pub(super) const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 const POINTER: &str = "KHR_animation_pointer";
 
 /// Required extensions that are read or that do not change where triangles are. A name that ends
-/// with `_` stands for all names that begin with it.
+/// with `_` includes all names that begin with it.
 const SUPPORTED: [&str; 21] = [
     "KHR_mesh_quantization",
     VISIBILITY,

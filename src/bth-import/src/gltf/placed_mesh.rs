@@ -17,7 +17,7 @@ pub(super) struct PlacedMesh {
     pub(super) kept: KeptTriangles,
 }
 
-/// A part of a glTF document that is read as a model of its own.
+/// A part of a glTF document that is read as a separate model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum GltfPart {
     /// A mesh by its number, in its own space.
@@ -26,7 +26,7 @@ pub enum GltfPart {
     Deforming {
         /// Number of the mesh.
         mesh: u32,
-        /// Joints whose rigid parts ([`GltfPart::Rigid`]) are left out.
+        /// Joints whose rigid parts ([`GltfPart::Rigid`]) are skipped.
         without: JointSet,
     },
     /// The connected components of a mesh that one joint alone moves, in the space of the mesh.

@@ -150,7 +150,7 @@ impl RigidParts {
         for triangle in triangles.iter().flatten() {
             sets.join(place(triangle));
         }
-        // For the root of each component its joint; `None` where no triangle has been met.
+        // For the root of each component its joint; `None` before its first triangle.
         let mut of_component: Vec<Option<u32>> = vec![None; numbers.len()];
         for triangle in triangles.iter().flatten() {
             let component = &mut of_component[sets.root(place(triangle)[0]) as usize];

@@ -180,7 +180,7 @@ pub(super) struct Buffer {
     pub(super) extensions: Extensions,
 }
 
-/// EXT_meshopt_compression of a buffer: true if it only stands in for compressed buffer views.
+/// EXT_meshopt_compression of a buffer: true if the buffer only replaces compressed buffer views.
 #[derive(Deserialize, Default)]
 #[serde(default)]
 pub(super) struct MeshoptFallback {

@@ -40,7 +40,7 @@ struct WebpTexture {
 
 #[derive(Deserialize, Default)]
 #[serde(default, rename_all = "camelCase")]
-struct Sampler {
+struct TextureSampler {
     mag_filter: Option<u64>,
     wrap_s: Option<u64>,
     wrap_t: Option<u64>,
@@ -115,9 +115,9 @@ impl TextureReader<'_, '_> {
         let name = format!("texture {index}");
         let document = &self.file.document;
         let texture: Texture = self.part(document.textures.get(index), &name)?;
-        let sampler: Sampler = match texture.sampler {
+        let sampler: TextureSampler = match texture.sampler {
             Some(sampler) => self.part(document.samplers.get(sampler), &format!("sampler {sampler}"))?,
-            None => Sampler::default(),
+            None => TextureSampler::default(),
         };
         let wrap = |code: Option<u64>| match code {
             None | Some(10497) => Some(Wrap::Repeat),

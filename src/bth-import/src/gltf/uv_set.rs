@@ -88,7 +88,7 @@ impl UvSet {
     }
 
     /// Returns the rows of the transform from these coordinates, transformed, to another set's;
-    /// `None` where there is none.
+    /// `None` if there is no such transform.
     pub(super) fn relative(&self, other: &UvSet) -> Option<[[f32; 3]; 2]> {
         if other.number != self.number {
             return None;

@@ -7,7 +7,7 @@ use bth_import::{AlphaMode, Cutouts, Wrap, import_cutouts, source_files};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// An image of 2 by 1 texels, of which the left is transparent.
+/// An image of 2 by 1 texels; the left one is transparent.
 fn image() -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, 2, 1);
@@ -88,8 +88,8 @@ fn materials_of_the_mode_are_read_with_their_corners() {
     assert_eq!(cutouts(&document(masked()), AlphaMode::None).unwrap(), Cutouts::default());
 }
 
-/// The alpha of an older model of materials is that of its diffuse colour, at the coordinates of
-/// its texture, whichever set is kept.
+/// An older model of materials takes alpha from its diffuse colour, at the coordinates of its
+/// texture, whichever set is kept.
 #[test]
 fn older_models_have_holes_by_the_alpha_of_their_diffuse_colors() {
     let expected = cutouts(&document(masked()), AlphaMode::Mask).unwrap();

@@ -10,7 +10,7 @@ use bth_import::{GltfPart, Keep, Mesh, Silent, import_gltf_parts_bytes};
 use bth_random::Rng;
 use bth_scene::Source;
 
-/// Numbers that stand where others stood.
+/// Numbers that replace others.
 const NUMBERS: [&str; 12] =
     ["0", "1", "2", "3", "4", "5", "-1", "1e39", "0.5", "65536", "4294967295", "18446744073709551615"];
 
@@ -19,7 +19,7 @@ fn seed(name: &str) -> Vec<u8> {
     std::fs::read(path).unwrap()
 }
 
-/// A document with a number replaced, a part left out or doubled, or a character of the binary data
+/// A document with a number replaced, a part removed or doubled, or a character of the binary data
 /// changed.
 fn damaged(bytes: &[u8], rng: &mut Rng) -> Vec<u8> {
     let mut out = bytes.to_vec();

@@ -70,7 +70,7 @@ impl Model {
         self
     }
 
-    /// Adds an accessor of these rows with a view of its own.
+    /// Adds an accessor of these rows with a separate view.
     pub(super) fn rows<T: Component, const N: usize>(mut self, rows: &[[T; N]]) -> Self {
         let shape = match N {
             1 => "SCALAR".to_owned(),

@@ -6,8 +6,8 @@ use bth_import::gltf::scene::{self, ImportOptions};
 use serde_json::json;
 use std::path::Path;
 
-/// A triangle whose skin has so many joints, each the child of the one before; the first turns, and
-/// no node of the scene is one of them.
+/// A triangle whose skin has `joints` joints, each the child of the one before; the first turns,
+/// and no node of the scene is one of them.
 fn chain(joints: usize) -> Vec<u8> {
     let joint = |k: usize| if k < joints { json!({"children": [k + 1]}) } else { json!({}) };
     let nodes: Vec<_> =

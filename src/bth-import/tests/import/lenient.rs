@@ -1,4 +1,4 @@
-//! Images and material libraries that are missing, broken or too large, where they are left out.
+//! Images and material libraries that are missing, broken or too large, where they are skipped.
 
 use super::gltf::Model;
 use super::*;
@@ -19,8 +19,8 @@ fn image(width: u32) -> Vec<u8> {
     [b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR".as_slice(), &width, &width, b"\x08\x06\0\0\0\0\0\0\0"].concat()
 }
 
-/// Checks that a model is refused unless images are left out; its mesh and the warnings without the
-/// folder's name.
+/// Checks that a model is refused unless images are skipped. Returns its mesh, and the warnings
+/// without the folder's name.
 fn lenient(folder: &Path, name: &str) -> (Mesh, Vec<String>) {
     let path = folder.join(name);
     let refused = import(&path, everything(), &Silent).unwrap_err();

@@ -193,7 +193,7 @@ fn a_byte_order_mark_before_text_is_passed_over() {
             assert_eq!(mesh.triangles.len(), triangles, "{text}");
         }
     }
-    // Places are those of the file: lines from its first one, bytes with those of the mark.
+    // Places count from the start of the file: lines from the first one, bytes including the mark.
     assert_refused("a.obj", &marked("v 0 0 0\nf 1 2 3\n"), "BTH-I005", "line 2", "from 1 to 1");
     let mut binary = marked(&format!("ply\nformat binary_little_endian 1.0\n{header}"));
     let body = binary.len();

@@ -1,5 +1,4 @@
-//! Documents of many meshes, each of which is imported as a model of its own: what they share is
-//! read once.
+//! Documents of many meshes, each imported as a separate model: what they share is read once.
 
 use super::gltf::{binary, edited};
 use super::*;

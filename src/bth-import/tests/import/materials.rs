@@ -1,4 +1,4 @@
-//! Materials of glTF documents and colours of PLY files: what is read, what is left out with a
+//! Materials of glTF documents and colours of PLY files: what is read, what is skipped with a
 //! warning, and the sets of texture coordinates.
 
 use super::gltf::Model;

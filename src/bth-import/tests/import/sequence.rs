@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 const TIMING: Timing = Timing { rate: Some(10.0), usual_rate: 24.0, start: 0.5 };
 
-/// Two triangles whose shared edge comes as vertices of its own for each, and which part in the
-/// second frame if `lift` is not 0.
+/// Two triangles with a common edge whose vertices each has separately. They part in the second
+/// frame if `lift` is not 0.
 fn frame(lift: f32) -> String {
     format!(
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 {lift}\nv 0 1 {lift}\nv 1 1 {lift}\nvt 0 0\nvn 0 0 1\n\

@@ -39,8 +39,8 @@ impl TinybvhApi {
     }
 
     fn load() -> Result<TinybvhApi> {
-        // SAFETY: TINYBVH_LIB names the shim, which has no initializers but those of C++, and whose
-        // functions have the types above.
+        // SAFETY: TINYBVH_LIB names the shim, which has no initializers but the C++ runtime's, and
+        // whose functions have the types above.
         unsafe {
             let library = library::load("TINYBVH_LIB", "libtinybvh_shim.so")?;
             Ok(TinybvhApi {

@@ -50,8 +50,8 @@ impl Importer<'_, '_> {
         Ok(object)
     }
 
-    /// A node in world space for an object with a skin at rest, since the transform of its own node
-    /// has no effect (§3.7.3.2).
+    /// Adds a node in world space for an object with a skin at rest, since the transform of the
+    /// object's node has no effect (§3.7.3.2).
     pub(super) fn place_in_world(&mut self, row: usize, object: usize) {
         let mut visible = true;
         let mut next = Some(row);

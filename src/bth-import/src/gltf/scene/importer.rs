@@ -12,7 +12,7 @@ use std::collections::{HashMap, HashSet};
 pub(super) struct Importer<'a, 's> {
     pub(super) file: &'a GltfFile<'s>,
     pub(super) options: &'a ImportOptions,
-    /// The path of the document as it stands in the manifest.
+    /// The path of the document as written in the manifest.
     pub(super) path: &'a str,
     pub(super) manifest: Manifest,
     pub(super) report: ImportReport,
@@ -87,9 +87,9 @@ impl<'a, 's> Importer<'a, 's> {
 #[derive(Default)]
 pub(super) struct Names {
     taken: HashSet<String>,
-    /// For names that came again the number that is tried next behind them; with those below they
-    /// are taken. Documents may have thousands of nodes of one name, for each of which trying all
-    /// numbers would take long.
+    /// Per name that came again, the number to try next; it and all numbers below are taken.
+    /// Documents may have thousands of nodes of one name: trying all numbers for each would take
+    /// long.
     next: HashMap<String, u64>,
 }
 

@@ -77,7 +77,7 @@ pub struct ImportReport {
     pub objects: u64,
     /// Names or numbers of the animations that are read.
     pub animations: Vec<String>,
-    /// Names or numbers of the animations that are left out.
+    /// Names or numbers of the skipped animations.
     pub animations_left_out: Vec<String>,
     /// Objects that deform.
     pub deformers: u64,
@@ -108,8 +108,7 @@ pub fn file_name(path: &Path) -> Result<&str> {
     })
 }
 
-/// Reads the scene of a glTF or GLB file. `name` is the file's path as it is to stand in the
-/// manifest.
+/// Reads the scene of a glTF or GLB file. `name` is the file's path as the manifest is to name it.
 ///
 /// # Errors
 /// `BTH-O001` when it cannot be read, `BTH-I…` with the place when it cannot be used; with `strict`

@@ -22,7 +22,7 @@ const MOST_CONDITION: f64 = (1u64 << 20) as f64;
 const MOST_NORM: f64 = (1u64 << 60) as f64;
 
 /// Rows of a matrix that is applied to columns (x, y, z, 1).
-type Rows = [[f64; 4]; 3];
+type AffineMatrix = [[f64; 4]; 3];
 
 impl Importer<'_, '_> {
     /// Takes the parts that joints move rigidly out of the objects that deform. The nodes, tracks
@@ -124,7 +124,7 @@ impl Importer<'_, '_> {
         bounds.is_some_and(|bounds| bounds.are_usable())
     }
 
-    /// Bounds of the linear part of a node's transform at all times; `None` where there are none.
+    /// Bounds of the linear part of a node's transform at all times; `None` if it is unbounded.
     fn bounds(&self, row: usize) -> Option<Bounds> {
         let tracks = &self.manifest.tracks;
         match self.manifest.nodes[row].transform {
@@ -170,7 +170,7 @@ impl Bounds {
     const IDENTITY: Bounds = Bounds { norm: 1.0, inverse: 1.0, mirrors: false };
 
     /// Of a matrix; `None` if it is singular.
-    fn of(rows: &Rows) -> Option<Bounds> {
+    fn of(rows: &AffineMatrix) -> Option<Bounds> {
         let [a, b, c] = rows.map(|[x, y, z, _]| DVec3::new(x, y, z));
         let linear = DMat3::from_cols(a, b, c);
         let determinant = linear.determinant();

@@ -1,9 +1,11 @@
-//! The stable codes of errors, one for each numbered invariant of the specification, with the words of the invariant and a hint.
+//! The stable codes of errors, one for each numbered invariant of the specification, with the words
+//! of the invariant and a hint.
 
 macro_rules! codes {
     ($($name:ident $text:literal $rule:literal)*) => {
-        /// What was violated: `BTH-F` and a number for the invariants of the specification, `BTH-O` for opening, `BTH-S` for
-        /// scenes that cannot be traced. Codes never change their meaning; new ones may be added.
+        /// What was violated: `BTH-F` and a number for the invariants of the specification, `BTH-O`
+        /// for opening, `BTH-S` for scenes that cannot be traced. Codes never change their meaning;
+        /// new ones may be added.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
         #[non_exhaustive]
         pub enum Code {

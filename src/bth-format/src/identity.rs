@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A number that no other object or scene of the process has or had. What is measured of one is
-/// kept under it: its address would soon be that of another, which is opened after it was closed.
+/// kept under it: an address could later belong to another object, opened after this one closed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Identity(usize);
 

@@ -6,8 +6,8 @@
 
 use crate::layout::*;
 
-/// Vertex numbers of the corners of 16 triangles, of which each byte holds two: triangle i the low
-/// half of byte i, triangle i + 8 the high half.
+/// Vertex numbers of the corners of 16 triangles. Each byte holds two: triangle i the low half of
+/// byte i, triangle i + 8 the high half.
 #[inline(always)]
 fn corners(packed: &[[u8; WIDTH / 2]; 3]) -> [[u8; WIDTH]; 3] {
     let mut out = [[0; WIDTH]; 3];

@@ -1,9 +1,10 @@
 //! The vertices and links of the tetrahedra of a tet leaf, derived as a traversal derives them.
 //!
-//! The compact records hold neither all vertices nor, in Tet16, all links of a tetrahedron: a traversal derives them from the
-//! tetrahedron that it came from. So does this file, from a leaf's first hull face through every tetrahedron.
-//! [`super::tet_faces`] then compares every record, hull face and constrained face with the result, so that no traversal,
-//! wherever it starts, can derive anything else. Specification: "Records" and the text below the table of "Index check".
+//! The compact records hold neither all vertices nor, in Tet16, all links of a tetrahedron: a
+//! traversal derives them from the tetrahedron that it came from. So does this file, from a leaf's
+//! first hull face through every tetrahedron. [`super::tet_faces`] then compares every record, hull
+//! face and constrained face with the result, so that no traversal, wherever it starts, can derive
+//! anything else. Specification: "Records" and the text below the table of "Index check".
 
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
@@ -11,7 +12,8 @@ use crate::object::{ObjectView, Records};
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// The vertices and links of one leaf's tetrahedra. Tetrahedra, vertices and faces are named by their rows in the file.
+/// The vertices and links of one leaf's tetrahedra. Tetrahedra, vertices and faces are named by
+/// their rows in the file.
 pub(crate) struct TetAdjacency<'a> {
     pub(super) view: &'a ObjectView<'a>,
     pub(super) tets: Range<u32>,
@@ -39,8 +41,8 @@ impl<'a> TetAdjacency<'a> {
     /// Derives the vertices of all tetrahedra of a leaf whose ranges have been checked.
     ///
     /// # Errors
-    /// BTH-F125 where the first hull face is none, BTH-F126 to BTH-F128 where a link leads to nothing that fits, BTH-F130
-    /// where a tetrahedron is not reached.
+    /// BTH-F125 where the first hull face is invalid, BTH-F126 to BTH-F128 where a link leads to
+    /// nothing that fits, BTH-F130 where a tetrahedron is not reached.
     pub(crate) fn derive(view: &'a ObjectView<'a>, leaf: &TetLeaf) -> Result<Self> {
         let count = leaf.tets as usize;
         let mut this = Self {
@@ -89,7 +91,8 @@ impl<'a> TetAdjacency<'a> {
         }
     }
 
-    /// Records that a tetrahedron with these vertices was reached through the face opposite to one of them.
+    /// Records that a tetrahedron with these vertices was reached through the face opposite to one
+    /// of them.
     fn reach(&mut self, neighbour: Neighbour, vertices: [u32; 4]) {
         let Neighbour { tet, opposite, back } = neighbour;
         let i = (tet - self.tets.start) as usize;
@@ -101,8 +104,9 @@ impl<'a> TetAdjacency<'a> {
         }
     }
 
-    /// BTH-F128: crosses a face of a reached tetrahedron. Returns the neighbour where it is reached for the first time;
-    /// a neighbour that was reached before has to have the same vertices on this way.
+    /// BTH-F128: crosses a face of a reached tetrahedron. Returns the neighbour where it is reached
+    /// for the first time; a neighbour that was reached before has to have the same vertices on
+    /// this way.
     fn cross(&mut self, tet: u32, slot: usize) -> Result<Option<u32>> {
         let face = others(self.vertices(tet), slot);
         let Some(next) = self.neighbour(tet, slot)? else { return Ok(None) };
@@ -146,8 +150,8 @@ impl<'a> TetAdjacency<'a> {
         Ok(Some(Neighbour { tet: link, opposite, back: tet }))
     }
 
-    /// BTH-F127 and BTH-F126: the link leads to a constrained face of the leaf that names this tetrahedron on one side and
-    /// another one of the leaf on the other.
+    /// BTH-F127 and BTH-F126: the link leads to a constrained face of the leaf that names this
+    /// tetrahedron on one side and another one of the leaf on the other.
     fn across_constrained_face(&self, tet: u32, slot: usize, link: u32) -> Result<Neighbour> {
         let row = link & !FACE_BIT;
         if !self.face_rows.contains(&row) {
@@ -172,8 +176,8 @@ impl<'a> TetAdjacency<'a> {
         Ok(Neighbour { tet: next, opposite: named.opposite[1 - side], back: link })
     }
 
-    /// BTH-F125: the four vertices of a hull face's tetrahedron, ascending, which are distinct and of the leaf, as the
-    /// tetrahedron is.
+    /// BTH-F125: the four vertices of a hull face's tetrahedron, ascending, which are distinct and
+    /// of the leaf, as the tetrahedron is.
     pub(super) fn hull_vertices(&self, row: u32) -> Result<[u32; 4]> {
         let hull = &self.view.hull_faces[row as usize];
         let vertices = sorted(hull.vertex, hull.opposite);
@@ -207,7 +211,7 @@ fn sorted([a, b, c]: [u32; 3], d: u32) -> [u32; 4] {
     all
 }
 
-/// The vertices other than that of a slot, in order.
+/// Returns the vertices except the one of a slot, in order.
 pub(super) fn others([a, b, c, d]: [u32; 4], slot: usize) -> [u32; 3] {
     match slot {
         0 => [b, c, d],
@@ -217,7 +221,7 @@ pub(super) fn others([a, b, c, d]: [u32; 4], slot: usize) -> [u32; 3] {
     }
 }
 
-/// Whether two faces have the same vertices; those of `b` are distinct.
+/// Returns true if two faces have the same vertices. The vertices of `b` are distinct.
 pub(super) fn is_same_face(a: [u32; 3], b: [u32; 3]) -> bool {
     b.iter().all(|v| a.contains(v))
 }

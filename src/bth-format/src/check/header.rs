@@ -17,7 +17,7 @@ fn fail(code: Code, offset: usize, expected: String, found: String) -> Result<()
     Err(Error::within(code, kind::OBJECT, offset as u64, expected, found))
 }
 
-/// BTH-F101: the record kind is that of the TETS section.
+/// BTH-F101: the record kind matches the TETS section.
 fn record(view: &ObjectView) -> Result<()> {
     let record = view.header.record;
     let fits = match view.records {

@@ -9,7 +9,7 @@ use std::borrow::Cow;
 use std::fmt::Debug;
 use std::mem::offset_of;
 
-/// Checks the materials of an object that has so many rows of MATERIALS and triangles.
+/// Checks the materials of an object with `materials` rows of MATERIALS and `triangles` triangles.
 pub(crate) fn materials(view: &MaterialsView<'_>, materials: usize, triangles: u32) -> Result<()> {
     let rows = view.parameters.len();
     if rows != 0 && rows != materials {

@@ -1,4 +1,5 @@
-//! Hull faces, constrained faces, links and records of tet leaves, compared with the derived tetrahedra.
+//! Hull faces, constrained faces, links and records of tet leaves, compared with the derived
+//! tetrahedra.
 
 use super::adjacency::{Neighbour, TetAdjacency, is_same_face, others};
 use super::bit_set::BitSet;
@@ -46,8 +47,8 @@ fn check_hull_faces(tets: &TetAdjacency, leaf: &TetLeaf) -> Result<()> {
     Ok(())
 }
 
-/// BTH-F126: both tetrahedra of a constrained face refer to it. That no other one does follows from the derivation, which
-/// follows a link to a face only from a tetrahedron that the face names.
+/// BTH-F126: both tetrahedra of a constrained face refer to it. That no other one does follows from
+/// the derivation, which follows a link to a face only from a tetrahedron that the face names.
 fn check_constrained_faces(tets: &TetAdjacency, leaf: &TetLeaf) -> Result<()> {
     for row in leaf.first_face..leaf.first_face + leaf.faces {
         let face = &tets.view.tet_faces[row as usize];
@@ -95,7 +96,7 @@ fn check_links(tets: &TetAdjacency, tet: u32) -> Result<()> {
     Ok(())
 }
 
-/// BTH-F129: the vertices that a record holds are those of its tetrahedron.
+/// BTH-F129: a record holds the vertices of its tetrahedron.
 fn check_record(tets: &TetAdjacency, tet: u32) -> Result<()> {
     let (row, vertices) = (tet as usize, tets.vertices(tet));
     let xor = vertices.iter().fold(0, |x, v| x ^ v);

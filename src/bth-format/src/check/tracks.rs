@@ -50,7 +50,7 @@ fn property_and_interpolation(view: &SceneView<'_>, track: &Track) -> RowResult<
     Ok((property, interpolation))
 }
 
-/// BTH-F185: the numbers of a value; weights are those of the node's deformer, which has some.
+/// BTH-F185: the numbers of a value; for weights the node has a deformer, with at least 1 weight.
 fn width(view: &SceneView<'_>, track: &Track, property: Property) -> RowResult<usize> {
     debug_assert_eq!(Property::from_code(track.property), Some(property));
     match view.width_of(track) {
@@ -84,8 +84,8 @@ struct Ends {
 }
 
 impl Ends {
-    /// BTH-F156: the keys of a track follow those of the tracks before and lie within the sections.
-    /// `width` is the number of values of a key.
+    /// BTH-F156: the keys of a track follow the keys of the tracks before and lie within the
+    /// sections. `width` is the number of values of a key.
     fn append(&mut self, view: &SceneView<'_>, track: &Track, width: usize) -> RowResult<()> {
         let (at, keys) = (offset_of!(Track, keys), u64::from(track.keys));
         let error = |expected: &'static str, found| {
@@ -135,8 +135,7 @@ fn keys(view: &SceneView<'_>, track: &Track, width: usize) -> Result<()> {
         return Err(Error::within_file(Code::TrackKeys, kind::TIMES, at, "finite ascending times", found));
     }
     let fits = |key: &[f64]| {
-        // Of a cubic rotation only the value, which stands between its tangents, has to be a
-        // quaternion.
+        // Of a cubic rotation only the value, between its tangents, has to be a quaternion.
         let rotation = if width == 12 { &key[4..8] } else { key };
         match Property::from_code(track.property) {
             Some(Property::Rotation) => !is_zero(rotation),

@@ -14,7 +14,7 @@ use crate::object::ObjectView;
 use std::borrow::Cow;
 use std::mem::offset_of;
 
-/// A child code that is still to be followed, and where it stands.
+/// A child code that is still to be followed, and its place.
 struct Reference {
     code: u32,
     /// Nodes on the path from the root to it.
@@ -75,7 +75,7 @@ struct Tree<'a> {
 }
 
 impl Tree<'_> {
-    /// Checks what a code leads to, and pushes the codes that stand there.
+    /// Checks what a code leads to, and pushes the codes found there.
     fn follow(&mut self, reference: &Reference) -> Result<()> {
         let child = self.child(reference)?;
         if let Child::Tets(row) = child {
@@ -91,7 +91,7 @@ impl Tree<'_> {
         }
     }
 
-    /// BTH-F105: the code is of a kind that may stand here.
+    /// BTH-F105: the code is of a kind that is allowed here.
     fn child(&self, reference: &Reference) -> Result<Child> {
         let child = Child::from_code(reference.code);
         let child = child.filter(|child| !(reference.in_subtree && matches!(child, Child::Tets(_))));

@@ -3,7 +3,7 @@
 //!
 //! Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates"
 //! (1997): a sum is kept as non-overlapping parts of growing size. Products of three f32 values lie
-//! between 2^-447 and 2^384, those of four between 2^-596 and 2^512, so nothing here over- or
+//! between 2^-447 and 2^384, products of four between 2^-596 and 2^512, so nothing here over- or
 //! underflows.
 
 fn two_sum(a: f64, b: f64) -> (f64, f64) {

@@ -23,8 +23,8 @@ pub fn side(a: [f32; 3], b: [f32; 3], c: [f32; 3], d: [f32; 3]) -> Ordering {
     0.0f64.total_cmp(&(volume.value() + 0.0))
 }
 
-/// Whether a triangle has exactly zero area: whether its projections along the three axes all have.
-/// Exact for finite corners.
+/// Returns true if a triangle has exactly zero area: whether its projections along the three axes
+/// all have. Exact for finite corners.
 pub fn is_zero_area(corners: [[f32; 3]; 3]) -> bool {
     let [a, b, c] = corners.map(|p| p.map(f64::from));
     [[0, 1], [1, 2], [2, 0]].into_iter().all(|[i, j]| {

@@ -70,8 +70,8 @@ impl Owned {
     }
 }
 
-/// Zero bytes from the start of a large page on; `None` where there are none. Rays visit a model in
-/// no order of addresses: with small pages most of their cache misses are TLB misses too.
+/// Zero bytes from the start of a large page on; `None` if there are no large pages. Rays visit a
+/// model in no order of addresses: with small pages most of their cache misses are TLB misses too.
 fn large_pages(length: usize) -> Option<Memory> {
     #[cfg(target_os = "linux")]
     {

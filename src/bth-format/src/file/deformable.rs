@@ -1,4 +1,4 @@
-//! An object of a file with positions of its own.
+//! An object of a file with separate positions.
 
 use super::buffer::Owned;
 use super::{File, no_memory};
@@ -29,7 +29,7 @@ pub type Normals = Option<Vec<[f32; 3]>>;
 /// What a refit reads and writes.
 #[derive(Debug)]
 pub struct RefitParts<'a> {
-    /// Nodes and leaves of the object: those of the file, or those of the refit before.
+    /// Nodes and leaves of the object, from the file or from the refit before.
     pub lines: &'a mut [CacheLine],
     /// As [`ObjectView::leaf_vertices`].
     pub leaf_vertices: &'a [[u32; WIDTH]],
@@ -76,11 +76,10 @@ impl DeformableObject {
         self.lines.bytes().len() + size_of_val(self.positions.as_slice()) + size_of::<Object>()
     }
 
-    /// Replaces the positions by others, of which there are as many, and the normals: by others, by
-    /// none at all (an empty vector), or by those of the file (`None`). Returns the former ones in
-    /// their place. `refit` computes the boxes of nodes and the vertices of leaves from them,
-    /// changes nothing else of the lines, and returns the bounds of all triangles: lower and upper
-    /// end.
+    /// Replaces the positions by the same number of others, and the normals: by others, by none at
+    /// all (an empty vector), or by the file's (`None`). Returns the former ones. `refit` computes
+    /// the boxes of nodes and the vertices of leaves from them, changes nothing else of the lines,
+    /// and returns the bounds of all triangles: lower and upper end.
     ///
     /// # Errors
     /// None for an object that [`Self::new`] has made.
@@ -90,8 +89,8 @@ impl DeformableObject {
         normals: &mut Normals,
         refit: impl FnOnce(RefitParts<'_>) -> ([[f32; 3]; 2], T),
     ) -> Result<T> {
-        // While memory is written to, nothing borrows from it; should `refit` panic, the view
-        // remains that of the file.
+        // While memory is written to, nothing borrows from it; should `refit` panic, the file's
+        // view remains.
         self.set_view(false)?;
         let view = self.view;
         std::mem::swap(&mut self.positions, positions);

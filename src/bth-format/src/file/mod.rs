@@ -32,8 +32,8 @@ pub struct File {
     buffer: Arc<Buffer>,
     /// Per object and kind the row of the section table, or `NONE`.
     rows: Arc<[[u32; OBJECT_KINDS]]>,
-    /// Per object its view, once it has been made. Views borrow from `buffer`; `'static` stands in
-    /// for a lifetime that cannot be named: see [`File::first_view`].
+    /// Per object its view, once it has been made. Views borrow from `buffer`; `'static` replaces a
+    /// lifetime that cannot be named: see [`File::first_view`].
     views: Arc<[OnceLock<ObjectView<'static>>]>,
 }
 
@@ -147,7 +147,7 @@ impl File {
         table::entries(self.bytes(), self.header())
     }
 
-    /// The sections, in the order of the table, which is that of their offsets.
+    /// The sections, in the order of the table, by ascending offset.
     pub fn sections(&self) -> impl ExactSizeIterator<Item = SectionView<'_>> {
         self.table().iter().map(|entry| self.section_of(entry))
     }
@@ -199,7 +199,8 @@ impl File {
     ///
     /// # Errors
     /// `BTH-O003` when there is no such object, `BTH-F101` when the kind of its tetrahedron records
-    /// is not that of TETS, `BTH-F104` when its grid is none or is not announced in the header.
+    /// differs from the kind of TETS, `BTH-F104` when its grid is invalid or is not announced in
+    /// the header.
     pub fn object(&self, object: u32) -> Result<ObjectView<'_>> {
         self.view(object).copied()
     }
@@ -356,8 +357,8 @@ impl File {
         self.slice(NONE, kind::INSTANCES)
     }
 
-    /// The same error with its offset counted from the start of the file instead of that of its
-    /// section, which belongs to `object`.
+    /// The same error with its offset counted from the start of the file instead of the start of
+    /// its section, which belongs to `object`.
     pub fn locate(&self, error: Error, object: u32) -> Error {
         let start = error.section().and_then(|s| self.section(object, s.kind)).map_or(0, |s| s.entry.offset);
         error.in_object(object).move_by(start)

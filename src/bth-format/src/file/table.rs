@@ -1,5 +1,5 @@
-//! Checks of the header and the section table: BTH-F001 to BTH-F019 and BTH-F022. Costs O(sections).
-//! Specification: "Opening".
+//! Checks of the header and the section table: BTH-F001 to BTH-F019 and BTH-F022. Costs
+//! O(sections). Specification: "Opening".
 
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
@@ -14,7 +14,8 @@ const ENTRY_SIZE: u64 = size_of::<SectionEntry>() as u64;
 /// Required feature bits that this library knows.
 const KNOWN_FEATURES: u64 = FEATURE_GRID | FEATURE_WIDENED_BOXES;
 
-/// Whether hashes are compared. Not under fuzzing: mutated files would have wrong hashes, and no check behind would be reached.
+/// True if hashes are compared. Not under fuzzing: mutated files would have wrong hashes, and no
+/// check behind would be reached.
 const CHECKSUMS: bool = !cfg!(fuzzing);
 
 /// The first 128 bits of the BLAKE3 hash.
@@ -22,8 +23,9 @@ pub fn hash128(bytes: &[u8]) -> [u8; 16] {
     blake3::hash(bytes).as_bytes()[..16].try_into().expect("32 bytes hold 16")
 }
 
-/// The content id of a section table: BLAKE3 of the identifier and, in the table's order and without PROVENANCE, each entry's
-/// kind, flags, object, stride, count and hash. Specification: "Content id".
+/// The content id of a section table: BLAKE3 of the identifier and, in the table's order and
+/// without PROVENANCE, each entry's kind, flags, object, stride, count and hash. Specification:
+/// "Content id".
 pub fn content_id(entries: &[SectionEntry]) -> [u8; 32] {
     let mut hasher = blake3::Hasher::new();
     hasher.update(&IDENTIFIER);
@@ -36,8 +38,8 @@ pub fn content_id(entries: &[SectionEntry]) -> [u8; 32] {
     *hasher.finalize().as_bytes()
 }
 
-/// Bytes of an element of a section; `None` for unknown kinds, 0 for TETS, whose stride is that of a [`RecordKind`].
-/// Specification: "Kinds".
+/// Bytes of an element of a section; `None` for unknown kinds, 0 for TETS, whose stride depends on
+/// the [`RecordKind`]. Specification: "Kinds".
 pub fn kind_stride(kind: u32) -> Option<usize> {
     Some(match kind {
         kind::OBJECT => size_of::<Object>(),
@@ -90,7 +92,7 @@ pub fn kind_stride(kind: u32) -> Option<usize> {
     })
 }
 
-/// BTH-F022: the greatest number of elements of a section.
+/// BTH-F022: the max number of elements of a section.
 fn max_count(kind: u32) -> u64 {
     match kind {
         kind::OBJECT => 1,
@@ -118,8 +120,8 @@ fn max_count(kind: u32) -> u64 {
     }
 }
 
-/// BTH-F001 to BTH-F008 of the header. `bytes` are the file's first 128, or all where there are fewer or more; `length` is
-/// the number of bytes of the file.
+/// BTH-F001 to BTH-F008 of the header. `bytes` are the file's first 128, or all where there are
+/// fewer or more; `length` is the number of bytes of the file.
 pub(super) fn check_header(bytes: &[u8], length: u64) -> Result<&Header> {
     let fail = |code, offset: usize, expected: String, found: String| {
         Err(Error::at(code, offset as u64, expected, found))
@@ -214,7 +216,8 @@ pub(super) fn check(bytes: &[u8]) -> Result<u32> {
         let at = offset_of!(Header, content_id) as u64;
         return Err(Error::at(Code::ContentId, at, hex(&id), hex(&header.content_id)));
     }
-    // BTH-F019, which makes the file's length a multiple of 64. Sections end within the file, but rounding up may overflow.
+    // BTH-F019, which makes the file's length a multiple of 64. Sections end within the file, but
+    // rounding up may overflow.
     if end.checked_next_multiple_of(ALIGNMENT as u64) != Some(header.file_length) {
         let at = offset_of!(Header, file_length) as u64;
         let expected = format!("the end of the last section, {end}, rounded up to {ALIGNMENT}");
@@ -223,11 +226,12 @@ pub(super) fn check(bytes: &[u8]) -> Result<u32> {
     Ok(objects)
 }
 
-/// A violation in an entry: the code, the field's offset in the entry, what is expected and what was found.
+/// A violation in an entry: the code, the field's offset in the entry, what is expected and what
+/// was found.
 type Mismatch = (Code, usize, String, String);
 
-/// BTH-F006, BTH-F007, BTH-F010 to BTH-F016 and BTH-F022 of an entry. `end` is where the section before ends, `length` that of the
-/// file; returns where this section ends.
+/// BTH-F006, BTH-F007, BTH-F010 to BTH-F016 and BTH-F022 of an entry. `end` is where the section
+/// before ends, `length` the length of the file; returns where this section ends.
 fn check_entry(
     e: &SectionEntry,
     previous: Option<&SectionEntry>,
@@ -306,7 +310,8 @@ fn check_entry(
     Ok(last)
 }
 
-/// BTH-F017: objects are numbered without gaps. The entries ascend by object and kind. Returns the number of objects.
+/// BTH-F017: objects are numbered without gaps. The entries ascend by object and kind. Returns the
+/// number of objects.
 fn check_objects(entries: &[SectionEntry]) -> Result<u32> {
     let mut objects = 0;
     for (i, e) in entries.iter().enumerate() {
@@ -317,7 +322,8 @@ fn check_objects(entries: &[SectionEntry]) -> Result<u32> {
         } else if e.kind == kind::OBJECT {
             !first || e.count != 1
         } else {
-            // Kind 1 sorts first (kind 0 is not assigned), so an object's other sections follow its OBJECT.
+            // Kind 1 sorts first (kind 0 is not assigned), so an object's other sections follow its
+            // OBJECT.
             e.object + 1 != objects || kind::is_of_file(e.kind) || e.kind == 0
         };
         if wrong {

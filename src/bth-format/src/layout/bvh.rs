@@ -87,7 +87,7 @@ pub struct IndexedLeaf {
     pub reserved: u32,
 }
 
-/// Triangle leaf with three corners of its own for each triangle: 10 lines.
+/// Triangle leaf with three separate corners for each triangle: 10 lines.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct RawLeaf {

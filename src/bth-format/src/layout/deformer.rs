@@ -71,8 +71,8 @@ pub struct Skin {
 #[derive(Clone, Copy, Debug, PartialEq, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct SkinJoint {
-    /// From the space of the object to that of the joint: three rows of four, applied to columns
-    /// (x, y, z, 1).
+    /// From the space of the object to the space of the joint: three rows of four, applied to
+    /// columns (x, y, z, 1).
     pub inverse_bind: [f64; 12],
     /// Row of `NODES`.
     pub node: u32,

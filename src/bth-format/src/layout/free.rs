@@ -1,4 +1,4 @@
-//! What rays that start on a triangle cannot meet. Specification: "Free directions".
+//! What rays that start on a triangle cannot hit. Specification: "Free directions".
 
 use super::assert_layout::assert_layout;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
@@ -7,7 +7,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 pub const FREE_SIDE: usize = 11;
 /// Direction bins of a triangle.
 pub const FREE_BINS: usize = FREE_SIDE * FREE_SIDE;
-/// Squares of the slopes at which columns meet: tan²(k π / 22) for k = 1, 3, 5, 7, 9, rounded.
+/// Squares of the slopes at which columns touch: tan²(k π / 22) for k = 1, 3, 5, 7, 9, rounded.
 /// Columns are equally wide in terms of the angle that a direction is tilted by along an axis.
 pub const FREE_BORDERS: [f64; 5] =
     [0.020672197824104982, 0.20856091329926152, 0.750830798121458, 2.4212305216220913, 11.598705569133076];
@@ -22,8 +22,8 @@ pub const FREE_EDGES: [f64; 2] = [1.0 / (1u64 << 20) as f64, (1u64 << 20) as f64
 pub const FREE_LEAST_SINE: f64 = 1.0 / 128.0;
 /// Sectors of directions, into which columns and rows of bins are joined: four by four.
 pub const FREE_SECTORS: usize = 16;
-/// For each column of bins that of its sector, and the same for rows. The outermost ones, in which
-/// directions are nearly always blocked at once, have none.
+/// For each column of bins its column of sectors, and the same for rows. The outermost ones, in
+/// which directions are nearly always blocked at once, have none.
 pub const FREE_SECTOR_OF: [Option<usize>; FREE_SIDE] =
     [None, Some(0), Some(0), Some(1), Some(1), Some(1), Some(2), Some(2), Some(3), Some(3), None];
 /// The min and max distance of a level: squares of them neither vanish nor overflow.
@@ -87,7 +87,7 @@ impl FreeBins {
     }
 }
 
-/// A level for each sector, from 0 to 3: nothing is met within the distance of the level; of level
+/// A level for each sector, from 0 to 3: nothing is hit within the distance of the level; for level
 /// 0 nothing is known. Bits 0 to 15 are the low bits of the levels, bits 16 to 31 the high ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FreeSectors(pub u32);
@@ -105,7 +105,7 @@ impl FreeSectors {
         }
     }
 
-    /// The level of a bin: that of its sector, 0 without one.
+    /// Returns the level of a bin's sector, 0 without a sector.
     #[inline(always)]
     pub const fn level_of_bin(self, bin: usize) -> usize {
         match Self::of_bin(bin) {
@@ -128,7 +128,7 @@ impl FreeSectors {
 }
 
 impl FreeLevels {
-    /// The distance within which nothing is met in a sector of a level.
+    /// The distance within which nothing is hit in a sector of a level.
     #[inline(always)]
     pub fn within(&self, level: usize) -> f32 {
         level.checked_sub(1).map_or(0.0, |above| self.distance[above])

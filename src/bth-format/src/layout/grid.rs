@@ -1,4 +1,4 @@
-//! The grid of an object: the points that 16 or 21 bits a coordinate can stand for, each an `f32`
+//! The grid of an object: the points that 16 or 21 bits per coordinate can express, each an `f32`
 //! without rounding. Specification: "Grids".
 
 use super::bvh::WIDTH;

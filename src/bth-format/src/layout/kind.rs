@@ -1,5 +1,5 @@
-//! Section kinds. Specification: "Kinds". Kinds 1 to 31, 35 to 38, 41 to 47 and 64 to 71 belong to an object, the others to
-//! the whole file.
+//! Section kinds. Specification: "Kinds". Kinds 1 to 31, 35 to 38, 41 to 47 and 64 to 71 belong to
+//! an object, the others to the whole file.
 
 macro_rules! kinds {
     ($($(#[$doc:meta])* $name:ident = $number:literal;)*) => {
@@ -34,16 +34,16 @@ kinds! {
     HULL_FACES = 8;
     /// `u32` per source triangle: its row in `TET_FACES`, or `NONE`.
     TRIANGLE_FACES = 9;
-    /// `[u32; 16]` per indexed leaf and three of them per raw leaf, in the order of the leaves: rows of `POSITIONS`. Objects that
-    /// have it can be given new positions ("Deformable objects").
+    /// `[u32; 16]` per indexed leaf and three of them per raw leaf, in the order of the leaves:
+    /// rows of `POSITIONS`. Objects that have it can be given new positions ("Deformable objects").
     LEAF_VERTICES = 10;
     /// `u32` per source triangle: its [`super::TrianglePlace`], or `NONE`.
     TRIANGLE_PLACES = 11;
-    /// [`super::FreeDirections`] per source triangle: what rays that start on it cannot meet.
+    /// [`super::FreeDirections`] per source triangle: what rays that start on it cannot hit.
     FREE_DIRECTIONS = 12;
     /// One [`super::FreeLevels`], if there are free directions or distances.
     FREE_LEVELS = 13;
-    /// [`super::FreeDistances`] per source triangle, in place of free directions.
+    /// [`super::FreeDistances`] per source triangle, instead of free directions.
     FREE_DISTANCES = 14;
     /// `[f32; 3]`: positions of the source, object space; distinct ones but in deformable objects.
     POSITIONS = 16;
@@ -77,15 +77,17 @@ kinds! {
     OBJECT_NAMES = 33;
     /// UTF-8 bytes of the names of objects.
     OBJECT_LABELS = 34;
-    /// [`super::MaterialParameters`], one per row of `MATERIALS`. This section and the three that follow belong to an object.
+    /// [`super::MaterialParameters`], one per row of `MATERIALS`. This section and the three that
+    /// follow belong to an object.
     MATERIAL_PARAMETERS = 35;
     /// [`super::Texture`]s that material parameters refer to.
     TEXTURES = 36;
     /// `[u32; 3]` per source triangle: rows of `COLORS`.
     COLOR_CORNERS = 37;
-    /// `[u16; 4]`: vertex colours, linear red, green, blue and alpha; 65,535 stands for 1.
+    /// `[u16; 4]`: vertex colours, linear red, green, blue and alpha; 65,535 means 1.
     COLORS = 38;
-    /// [`super::Image`]s of textures, ascending by name. This section and the next one belong to the whole file.
+    /// [`super::Image`]s of textures, ascending by name. This section and the next one belong to
+    /// the whole file.
     IMAGES = 39;
     /// Bytes of the image files.
     IMAGE_BYTES = 40;
@@ -136,19 +138,19 @@ kinds! {
 /// Kind of trees for ranges of time in older files, which are refused (BTH-F007).
 pub(crate) const FORMER_SEGMENTS: u32 = 27;
 
-/// Whether sections of this kind are part of the scene.
+/// Returns true if sections of this kind are part of the scene.
 pub const fn is_scene(kind: u32) -> bool {
     SCENE <= kind && kind <= MORPH_WEIGHTS
 }
-/// Whether sections of this kind belong to the whole file.
+/// Returns true if sections of this kind belong to the whole file.
 pub const fn is_of_file(kind: u32) -> bool {
     (PROVENANCE <= kind && kind <= OBJECT_LABELS) || kind == IMAGES || kind == IMAGE_BYTES || is_scene(kind)
 }
-/// Whether sections of this kind say how an object's vertices move by themselves.
+/// Returns true if sections of this kind say how an object's vertices move by themselves.
 pub const fn is_sequence(kind: u32) -> bool {
     kind == SEQUENCE_TIMES || kind == SEQUENCE_POSITIONS
 }
-/// Whether tracing reads sections of this kind of an object.
+/// Returns true if tracing reads sections of this kind of an object.
 pub const fn is_traced(kind: u32) -> bool {
     is_required(kind) && kind != LEAF_VERTICES && !is_sequence(kind) && !is_of_file(kind)
         || kind == TRIANGLE_PLACES
@@ -156,7 +158,8 @@ pub const fn is_traced(kind: u32) -> bool {
         || kind == FREE_LEVELS
         || kind == FREE_DISTANCES
 }
-/// Whether sections of this kind carry [`super::SECTION_REQUIRED`]: a reader that does not know the kind must refuse the file.
+/// Returns true if sections of this kind carry [`super::SECTION_REQUIRED`]: a reader that does not
+/// know the kind must refuse the file.
 pub const fn is_required(kind: u32) -> bool {
     (OBJECT <= kind && kind <= LEAF_VERTICES)
         || kind == OPACITY

@@ -47,7 +47,7 @@ pub struct Texture {
     pub wrap: [u32; 2],
     /// [`FILTER_LINEAR`] or [`FILTER_NEAREST`].
     pub filter: u32,
-    /// Rows of the transform from (u, v, 1) of the coordinates to those of the image.
+    /// Rows of the transform from the coordinates (u, v, 1) to coordinates of the image.
     pub transform: [[f32; 3]; 2],
     /// [`UV_SET_FIRST`] or [`UV_SET_SECOND`].
     pub uv_set: u32,
@@ -55,9 +55,9 @@ pub struct Texture {
     pub reserved: [u32; 2],
 }
 
-/// Coordinates of a texture are those of `UVS`.
+/// The texture takes its coordinates from `UVS`.
 pub const UV_SET_FIRST: u32 = 0;
-/// Coordinates of a texture are those of `SECOND_UVS`.
+/// The texture takes its coordinates from `SECOND_UVS`.
 pub const UV_SET_SECOND: u32 = 1;
 
 /// The image repeats.

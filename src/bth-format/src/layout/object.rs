@@ -10,7 +10,7 @@ pub struct Object {
     /// Lower end of the bounds of the triangles that can be hit, object space; zeros when there are
     /// none.
     pub lower: [f32; 3],
-    /// Upper end of the bounds; zeros when there are none.
+    /// Upper end of the bounds; zeros without bounds.
     pub upper: [f32; 3],
     /// Code of the root, a [`super::Child`]; `NONE` when nothing can be hit.
     pub root: u32,
@@ -28,15 +28,15 @@ pub struct Object {
     pub coordinates: u32,
     /// The grid's min point, object space; zeros for `f32`.
     pub grid_origin: [f32; 3],
-    /// Upper bound on the distance of a stored vertex from that of the source, object space; 0 for
+    /// Upper bound on the distance from a stored vertex to its source vertex, object space; 0 for
     /// `f32`.
     pub displacement: f32,
 }
 
 /// Bit of [`Object::coordinates`]: each child box contains the triangles below with room to spare,
 /// for each corner [`BOX_MARGIN`] of its max |coordinate| on all sides. A reader need not
-/// allow for roundings of the boxes' planes then, only for those of the ray, so that small things
-/// in a large object are told apart.
+/// allow for roundings of the boxes' planes then, only for roundings of the ray, so that small
+/// things in a large object are told apart.
 pub const WIDENED_BOXES: u32 = 1 << 6;
 
 /// The room around a corner in a widened box, relative to the corner's max |coordinate|.

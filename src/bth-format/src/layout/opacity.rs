@@ -5,7 +5,7 @@
 pub enum Opacity {
     /// There is a surface.
     Opaque = 0,
-    /// There is none: rays pass.
+    /// There is no surface: rays pass.
     Transparent = 1,
     /// There is a surface on some of the part, and none on the rest.
     Unknown = 2,

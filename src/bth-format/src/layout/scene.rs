@@ -76,7 +76,7 @@ pub struct Track {
     /// tracks follow each other.
     pub first_time: u32,
     /// Row of `VALUES` of the first key, which has [`Property::width`] times
-    /// [`Interpolation::values_per_key`] rows; of weights, those of the node's deformer times that.
+    /// [`Interpolation::values_per_key`] rows. For weights the node's deformer gives the width.
     pub first_value: u32,
     /// Zero.
     pub reserved: [u32; 2],
@@ -107,7 +107,7 @@ impl Property {
     pub fn from_code(code: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|p| *p as u32 == code)
     }
-    /// Numbers of a value; `None` for weights, of which the deformer of the node has some number.
+    /// Numbers of a value; `None` for weights, where the deformer of the node decides.
     pub const fn width(self) -> Option<usize> {
         match self {
             Self::Translation | Self::Scale => Some(3),

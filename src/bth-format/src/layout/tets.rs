@@ -3,7 +3,8 @@
 use super::assert_layout::assert_layout;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// The record that the `TETS` section holds, as in [`super::Object::record`]. Specification: "Records".
+/// The record that the `TETS` section holds, as in [`super::Object::record`]. Specification:
+/// "Records".
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u32)]
 pub enum RecordKind {
@@ -40,7 +41,8 @@ impl RecordKind {
     }
 }
 
-/// A leaf of the BVH that is a constrained tetrahedralization: tetrahedra that fill a box and have its triangles as faces.
+/// A leaf of the BVH that is a constrained tetrahedralization: tetrahedra that fill a box and have
+/// its triangles as faces.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct TetLeaf {
@@ -48,7 +50,8 @@ pub struct TetLeaf {
     pub lower: [f32; 3],
     /// Upper end of the box.
     pub upper: [f32; 3],
-    /// First row of `TETS`. In this section and in those below, the ranges of successive leaves follow each other.
+    /// First row of `TETS`. In this section and in those below, the ranges of successive leaves
+    /// follow each other.
     pub first_tet: u32,
     /// Number of tetrahedra.
     pub tets: u32,
@@ -64,8 +67,8 @@ pub struct TetLeaf {
     pub first_hull: u32,
     /// Number of hull faces.
     pub hulls: u32,
-    /// Child code of a BVH over the same triangles, for rays that do not start in a known tetrahedron and where it is faster;
-    /// [`super::NONE`] where it was left out.
+    /// Child code of a BVH over the same triangles, for rays that do not start in a known
+    /// tetrahedron and where it is faster; [`super::NONE`] without such a BVH.
     pub subtree: u32,
     /// Zero.
     pub flags: u32,
@@ -107,11 +110,13 @@ pub struct HullFace {
     pub opposite: u32,
 }
 
-/// Set in links to constrained faces. A link is a `u32` for what lies behind a face of a tetrahedron: below 2^31 the row of the
-/// neighbour in `TETS`, with this bit a row of `TET_FACES`, and [`super::NONE`] outside the hull.
+/// Set in links to constrained faces. A link is a `u32` for what lies behind a face of a
+/// tetrahedron: below 2^31 the row of the neighbour in `TETS`, with this bit a row of `TET_FACES`,
+/// and [`super::NONE`] outside the hull.
 pub const FACE_BIT: u32 = 1 << 31;
 
-/// Record of 32 bytes: four links with the vertex beyond each, in ascending order of the vertex opposite to the link's face.
+/// Record of 32 bytes: four links with the vertex beyond each, in ascending order of the vertex
+/// opposite to the link's face.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct Link32 {
@@ -125,8 +130,8 @@ pub struct Link32 {
 pub struct Link {
     /// The link: see [`FACE_BIT`].
     pub next: u32,
-    /// The vertex of the tetrahedron beyond, behind a constrained face too, that is not of the face; [`super::NONE`] outside
-    /// the hull.
+    /// The vertex of the tetrahedron beyond, behind a constrained face too, that is not of the
+    /// face; [`super::NONE`] outside the hull.
     pub opposite: u32,
 }
 

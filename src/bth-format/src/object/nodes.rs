@@ -88,8 +88,8 @@ impl<'a> ObjectView<'a> {
             Child::Indexed(_) | Child::Raw(_) | Child::Tets(_) => None,
         }
     }
-    /// The root, or that of the root's subtree where the root is a tet leaf; `None` where this is
-    /// no node or does not lie within the lines, as may be in an object that was not checked.
+    /// The root, or the root of the subtree if the root is a tet leaf. `None` if this is not a node
+    /// or does not lie within the lines, as may be in an object that was not checked.
     pub fn root(&self) -> Option<&'a WideNode> {
         let mut root = self.header.root;
         if let Child::Tets(row) = Child::from_code(root)? {

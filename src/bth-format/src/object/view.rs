@@ -41,10 +41,10 @@ pub struct ObjectView<'a> {
     pub leaf_vertices: &'a [[u32; WIDTH]],
     /// Per source triangle its [`TrianglePlace`], or [`NONE`]. Empty if the file has none.
     pub places: &'a [u32],
-    /// Per source triangle in which directions rays that start on it meet nothing; empty where
+    /// Per source triangle the directions in which rays that start on it hit nothing; empty if
     /// nothing is known.
     pub free: &'a [FreeDirections],
-    /// Per source triangle within which distances such rays meet nothing, instead of `free`.
+    /// Per source triangle the distances within which such rays hit nothing, instead of `free`.
     pub free_distances: &'a [FreeDistances],
     /// The row of FREE_LEVELS, if there is one.
     pub free_levels: &'a [FreeLevels],

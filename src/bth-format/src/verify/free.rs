@@ -1,4 +1,4 @@
-//! BTH-F210: triangles with free bins have axes. BTH-F209: rays from some triangles meet nothing
+//! BTH-F210: triangles with free bins have axes. BTH-F209: rays from some triangles hit nothing
 //! where their directions are called free.
 //!
 //! All pairs of triangles would take quadratic time. Of evenly spaced triangles rays from the
@@ -99,12 +99,12 @@ struct Start {
 }
 
 impl Start {
-    /// Whether the ray from a corner through the middle of another triangle meets it though its
-    /// direction is called free, or free as far as that. It meets the middle itself, unless it lies
-    /// in the plane of the triangle.
+    /// Returns true if the ray from a corner through the middle of another triangle hits it though
+    /// its direction is called free, or free as far as that. It hits the middle itself, unless it
+    /// lies in the plane of the triangle.
     fn meets(&self, from: [f32; 3], target: Corners) -> bool {
-        /// Bounds the rounding errors of the direction, a sum of six numbers, relative to the
-        /// max coordinate; and that of its length.
+        /// Bounds the rounding errors of the direction, a sum of six numbers, and of its length,
+        /// relative to the max coordinate.
         const ERROR: f64 = 1.0 / (1u64 << 48) as f64;
         // Three times the direction to the middle.
         let direction: [f64; 3] = std::array::from_fn(|k| {

@@ -83,7 +83,7 @@ fn check_object(view: &ObjectView, report: &mut Report) -> Result<()> {
     Ok(())
 }
 
-/// BTH-F021: the hash of a section is that of its bytes.
+/// BTH-F021: the hash of a section matches its bytes.
 fn check_hash(section: &SectionView) -> Result<()> {
     let (e, hash) = (section.entry, hash128(section.bytes));
     if hash == e.hash {

@@ -1,4 +1,4 @@
-//! The stored triangles compared with those of the source, where the file keeps positions.
+//! The stored triangles compared with the source's, where the file keeps positions.
 
 use super::triangle_marks::TriangleMarks;
 use crate::error::{Code, Error, Result};
@@ -7,7 +7,7 @@ use crate::layout::*;
 use crate::object::ObjectView;
 use std::mem::offset_of;
 
-/// Where a stored triangle stands in the file, and the code of the invariant that ties it to the
+/// The place of a stored triangle in the file, and the code of the invariant that ties it to the
 /// source there.
 #[derive(Clone, Copy)]
 pub(super) struct Stored {

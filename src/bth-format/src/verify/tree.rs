@@ -29,7 +29,7 @@ pub(super) fn check(view: &ObjectView) -> Result<TriangleMarks> {
     let mut visits = visits(view);
     let in_subtree = vec![0; view.tet_leaves.len()];
     let mut triangles = Triangles { view, marks: TriangleMarks::default(), in_subtree };
-    // Parents stand before their children: from the back, the content of a visit is complete when
+    // Parents come before their children: from the back, the content of a visit is complete when
     // it is taken.
     while let Some(mut visit) = visits.pop() {
         triangles.check_leaf(&mut visit)?;
@@ -70,7 +70,7 @@ fn visits(view: &ObjectView) -> Vec<Visit> {
 }
 
 /// BTH-F204: the box of the slot that leads to a node or leaf, or the bounds of the object, contain
-/// the triangles below. `visits` are those before. The root of a subtree has no box of its own.
+/// the triangles below. `visits` are the visits before. The root of a subtree has no separate box.
 fn check_containment(view: &ObjectView, visit: &Visit, visits: &[Visit]) -> Result<()> {
     let (bounds, section, at) = if let Some((parent, slot)) = visit.parent {
         let child = visits[parent].child;

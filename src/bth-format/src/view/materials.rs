@@ -12,7 +12,7 @@ section_view! {
         textures: Texture = TEXTURES,
         /// Per source triangle its rows of `colors`, or empty.
         color_corners: [u32; 3] = COLOR_CORNERS,
-        /// Vertex colours: linear red, green, blue and alpha; 65,535 stands for 1.
+        /// Vertex colours: linear red, green, blue and alpha; 65,535 means 1.
         colors: [u16; 4] = COLORS,
         /// Per source triangle its rows of `second_uvs`, or empty.
         second_corners: [u32; 3] = SECOND_CORNERS,
@@ -63,7 +63,7 @@ impl<'a> ImagesView<'a> {
 }
 
 /// The interpolation of rows at barycentric coordinates (weights of the second and third corner) of
-/// a triangle, whose corners have rows of their own; `None` where it has none.
+/// a triangle, whose corners have separate rows; `None` for a triangle without rows.
 fn interpolated<T: Copy + Into<f64>, const N: usize>(
     corners: &[[u32; 3]],
     rows: &[[T; N]],

@@ -15,13 +15,12 @@ section_view! {
 pub struct FramePosition {
     /// The frame before, or the first.
     pub frame: usize,
-    /// Share of the way to the next frame, from 0 to below 1; 0 if there is none.
+    /// Share of the way to the next frame, from 0 to below 1; 0 without a next frame.
     pub share: f64,
 }
 
 impl<'a> SequenceView<'a> {
-    /// Where a time lies among the frames, of which there is at least one; a time that is no number
-    /// is before the first.
+    /// Returns where a time lies among the frames, at least one. NaN is before the first.
     pub fn locate(&self, seconds: f64) -> FramePosition {
         let frame = self.times.partition_point(|time| *time <= seconds).saturating_sub(1);
         let (Some(&from), Some(&to)) = (self.times.get(frame), self.times.get(frame + 1)) else {
@@ -42,7 +41,7 @@ impl<'a> SequenceView<'a> {
     }
 
     /// Stores the positions at a place among the frames, from row `first` on. A coordinate is a +
-    /// (b − a) · share in `f64`, rounded once to `f32`, where a and b are those of the two frames.
+    /// (b − a) · share in `f64`, rounded once to `f32`, where a and b come from the two frames.
     pub fn positions_at(&self, at: FramePosition, (rows, first): (usize, usize), into: &mut [[f32; 3]]) {
         let from = self.frame(at.frame, rows).get(first..).unwrap_or_default();
         if at.share == 0.0 {

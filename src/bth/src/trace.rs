@@ -16,14 +16,15 @@ use bth_format::layout::Opacity;
 use bth_format::object::ObjectView;
 
 impl Scene {
-    /// Nearest hit of a ray in world space: a [`Ray`], or a [`StartRay`].
+    /// Nearest hit of a ray in world space: a [`Ray`], or a [`StartRay`](crate::rays::StartRay).
     pub fn nearest<R: TraceRay>(&self, ray: &R) -> Option<Hit> {
         let mut hit = Hit::MISS;
         self.store_nearest(ray, &mut hit);
         hit.is_hit().then_some(hit)
     }
 
-    /// Returns true if a ray in world space hits anything: a [`Ray`], or a [`StartRay`].
+    /// Returns true if a ray in world space hits anything: a [`Ray`], or a
+    /// [`StartRay`](crate::rays::StartRay).
     pub fn any<R: TraceRay>(&self, ray: &R) -> bool {
         self.hits_any(ray)
     }

@@ -1,8 +1,8 @@
 //! The instances whose boxes a ray may enter, in the order of their depths.
 //!
-//! A ray is tested against all nodes that it reaches, in any order, and what it meets is sorted.
-//! The stack of a traversal would first visit all instances in the nearest node, also those that
-//! are farther than some in the next node.
+//! A ray is tested against all nodes that it reaches, in any order, and the instances that it
+//! reaches are sorted. The stack of a traversal would first visit all instances in the nearest
+//! node, also those that are farther than some in the next node.
 
 use super::box_tests::{entered, limit};
 use super::top_level::TopLevel;
@@ -93,7 +93,7 @@ impl InstanceList {
 
 /// The children of a node that a ray may enter.
 struct Met<S: Simd> {
-    /// Those that are nodes, a bit each.
+    /// The children that are nodes, one bit per child.
     nodes: u32,
     /// Those that are instances.
     instances: u32,

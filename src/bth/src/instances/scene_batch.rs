@@ -33,7 +33,7 @@ impl<'a> SceneBatch<'a> {
             .ray_from(&ray, self.start(visit).map(|start| &start.point))
     }
 
-    /// As [`WorldRay::in_object`], for the ray of a visit.
+    /// Like [`WorldRay::in_object`], for the ray of a visit.
     pub(super) fn in_object<T>(
         &self,
         visit: Visit,

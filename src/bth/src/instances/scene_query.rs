@@ -28,8 +28,8 @@ pub(super) trait SceneQuery {
     }
 }
 
-/// Traces visits of one object, given with their rays in its space, and merges the answers into
-/// those of the rays of the scene.
+/// Traces visits of one object, given with their rays in its space, and merges the answers into the
+/// answers of the scene's rays.
 fn trace_visits(
     ObjectVisits { batch, object, visits }: ObjectVisits<'_>,
     object_rays: &ObjectRays,

@@ -14,7 +14,9 @@
 //! let file = bth_format::File::read("bunny.bth")?;
 //! for object in 0..file.object_count() {
 //!     let view = file.check(object)?;
-//!     println!("{} triangles from {:?} to {:?}", view.header.triangles, view.header.lower, view.header.upper);
+//!     let header = view.header;
+//!     println!("{} triangles", header.triangles);
+//!     println!("from {:?} to {:?}", header.lower, header.upper);
 //! }
 //! # Ok::<(), bth_format::Error>(())
 //! ```

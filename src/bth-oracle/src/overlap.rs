@@ -1,4 +1,4 @@
-//! Whether a triangle overlaps a box, by cutting the triangle to the box exactly.
+//! Decides if a triangle overlaps a box, by cutting the triangle to the box exactly.
 
 use num_rational::BigRational;
 use num_traits::Zero;

@@ -1,8 +1,8 @@
 //! The compilation of a model: import → coordinates → BVH → visits → costs → marks → tets → probe →
 //! limit → free directions → collapse → file.
 //!
-//! `compiler` calls the stages in order; each is a [`Stage`](crate::stage::Stage) in a file of its
-//! own. `compile` is the way in, for a model in a file or in memory, with or without a cache.
+//! `compiler` calls the stages in order; each is a `Stage` (`stage.rs`) in a separate file.
+//! `compile` is the way in, for a model in a file or in memory, with or without a cache.
 
 mod choose_nodes;
 mod compile;

@@ -93,8 +93,7 @@ fn range(first: u32, count: u32, rows: usize, at: u64) -> Result<()> {
     Err(Error::within(Code::LeafIds, kind::LINES, at, expected, found))
 }
 
-/// BTH-F117 and BTH-F118: a coordinate in use is finite; an unused one repeats that of slot 0, bit
-/// for bit.
+/// BTH-F117 and BTH-F118: a coordinate in use is finite; an unused one repeats slot 0, bit for bit.
 fn vertex(x: f32, of_slot_0: f32, used: bool, at: u64) -> Result<()> {
     if used && !x.is_finite() {
         let (expected, found) = ("a finite coordinate", format!("{x}"));

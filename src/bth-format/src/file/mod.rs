@@ -2,7 +2,7 @@
 //! "Container" and "Opening".
 //!
 //! Opening costs O(sections) beyond reading the bytes, and does not read what is in the sections.
-//! [`File::check`] checks the indices of an object, [`File::check_scene`] those of the scene,
+//! [`File::check`] checks the indices of an object, [`File::check_scene`] the indices of the scene,
 //! [`crate::verify`] everything.
 
 mod buffer;

@@ -13,19 +13,21 @@ use crate::trace_ray::TraceRay;
 /// coherent rays that are adjacent in the slice (a tile of a picture, the shadow rays of a tile)
 /// are traced fastest.
 ///
-/// ```no_run
+/// ```
 /// use bth::rays::{Hit, Ray, StartRay};
 ///
-/// let scene = bth::open("bunny.bth")?;
-/// let rays = vec![Ray::new([0.0, 0.1, 1.0], [0.0, 0.0, -1.0]); 1024];
+/// # const CUBE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/cube.bth"));
+/// let scene = bth::from_bytes(CUBE)?;
+/// let rays = vec![Ray::new([0.25, 0.5, 2.0], [0.0, 0.0, -1.0]); 1024];
 /// let mut hits = vec![Hit::MISS; rays.len()];
 /// scene.batch(&rays).nearest(&mut hits);
 ///
 /// // The next rays start where these hit: they need no offset and do not hit what they leave.
-/// let up = [0.0, 1.0, 0.0];
+/// let up = [0.0, 0.0, 1.0];
 /// let onward: Vec<StartRay> = hits.iter().map(|hit| StartRay::from_hit(hit, up)).collect();
-/// let mut blocked = vec![false; rays.len()];
+/// let mut blocked = vec![true; rays.len()];
 /// scene.batch(&onward).any(&mut blocked);
+/// assert!(blocked.iter().all(|blocked| !blocked));
 /// # Ok::<(), bth::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug)]

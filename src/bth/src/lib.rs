@@ -1,14 +1,15 @@
 //! Runtime of BTH files: opens compiled files and traces rays through them, without copying or
 //! converting their sections.
 //!
-//! ```no_run
+//! ```
 //! use bth::rays::Ray;
 //!
-//! let scene = bth::open("bunny.bth")?;
-//! let ray = Ray::new([0.0, 0.1, 1.0], [0.0, 0.0, -1.0]);
-//! if let Some(hit) = scene.nearest(&ray) {
-//!     println!("triangle {} at {:?}", hit.primitive.triangle, ray.at(hit.t));
-//! }
+//! # const CUBE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/cube.bth"));
+//! // The unit cube as `bthc` compiles it. `bth::open("cube.bth")` maps a file.
+//! let scene = bth::from_bytes(CUBE)?;
+//! let ray = Ray::new([0.25, 0.5, 2.0], [0.0, 0.0, -1.0]);
+//! let hit = scene.nearest(&ray).expect("it is above the cube");
+//! assert_eq!((hit.t, ray.at(hit.t)), (1.0, [0.25, 0.5, 1.0]));
 //! # Ok::<(), bth::Error>(())
 //! ```
 #![warn(missing_docs)]

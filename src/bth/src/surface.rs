@@ -71,15 +71,14 @@ impl Scene {
     /// not keep the vertices of triangles (it was compiled with `--no-geometry`), if there is no
     /// such instance or triangle, or if the instance is hidden by now.
     ///
-    /// ```no_run
+    /// ```
     /// use bth::rays::Ray;
     ///
-    /// let scene = bth::open("house.bth")?;
-    /// let hit = scene.nearest(&Ray::new([0.0, 1.0, 9.0], [0.0, 0.0, -1.0]));
-    /// if let Some(surface) = hit.and_then(|hit| scene.surface(&hit)) {
-    ///     let group = scene.group_name(surface.object, surface.group);
-    ///     println!("{group} at {:?} with normal {:?}", surface.position, surface.normal);
-    /// }
+    /// # const CUBE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/cube.bth"));
+    /// let scene = bth::from_bytes(CUBE)?;
+    /// let hit = scene.nearest(&Ray::new([0.25, 0.5, 2.0], [0.0, 0.0, -1.0]));
+    /// let surface = hit.and_then(|hit| scene.surface(&hit)).expect("it is above the cube");
+    /// assert_eq!((surface.position, surface.normal), ([0.25, 0.5, 1.0], [0.0, 0.0, 1.0]));
     /// # Ok::<(), bth::Error>(())
     /// ```
     pub fn surface(&self, hit: &Hit) -> Option<SurfacePoint> {

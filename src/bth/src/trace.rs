@@ -57,19 +57,20 @@ impl Scene {
 
     /// Like [`RayBatch::nearest`], from arrays into arrays.
     ///
-    /// ```no_run
+    /// ```
     /// use bth::{HitStreams, RayStreams};
     ///
-    /// let scene = bth::open("bunny.bth")?;
-    /// let (zero, one) = ([0.0; 4], [1.0; 4]);
-    /// let origin = [&[0.1, 0.2, 0.3, 0.4][..], &zero, &zero];
+    /// # const CUBE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/cube.bth"));
+    /// let scene = bth::from_bytes(CUBE)?;
+    /// let (half, below, zero, one) = ([0.5; 4], [-1.0; 4], [0.0; 4], [1.0; 4]);
+    /// let origin = [&[0.1, 0.2, 0.3, 1.4][..], &half, &below];
     /// let rays = RayStreams { origin, direction: [&zero, &zero, &one], tmin: &[], tmax: &[] };
     /// let (mut t, mut u, mut v) = ([0.0; 4], [0.0; 4], [0.0; 4]);
     /// let (mut instance, mut triangle) = ([0; 4], [0; 4]);
     /// let (instance, triangle) = (&mut instance, &mut triangle);
     /// let hits = HitStreams { t: &mut t, u: &mut u, v: &mut v, instance, triangle };
     /// scene.nearest_streams(&rays, hits);
-    /// println!("{t:?}");
+    /// assert_eq!(t, [1.0, 1.0, 1.0, f32::INFINITY]);
     /// # Ok::<(), bth::Error>(())
     /// ```
     ///

@@ -197,3 +197,12 @@ fn concave_polygons_are_covered_exactly_where_that_is_asked_for() {
     assert_eq!(covered("ears", 1, 0), !hole);
     assert_ne!(covered("fans", 1, 1) & hole, 0);
 }
+
+#[test]
+fn the_cube_of_the_examples_is_as_it_is_compiled() {
+    let sources = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../src/bth/doc");
+    let folder = folder(&[("cube.obj", &std::fs::read_to_string(sources.join("cube.obj")).unwrap())]);
+    bthc(folder.path(), &["compile", "cube.obj", "--no-cache"]).expect(0);
+    let [compiled, kept] = [folder.path(), &sources].map(|at| std::fs::read(at.join("cube.bth")).unwrap());
+    assert!(compiled == kept, "compile src/bth/doc/cube.obj again");
+}

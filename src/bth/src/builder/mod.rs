@@ -30,10 +30,11 @@ const MAX_INSTANCES: usize = 1 << 30;
 /// the instance of hits ([`PrimitiveRef`](crate::rays::PrimitiveRef)). A commit frees the ids of
 /// removed instances; the lowest free id is used first.
 ///
-/// ```no_run
+/// ```
+/// # const CUBE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/cube.bth"));
 /// let mut builder = bth::SceneBuilder::new();
-/// let tree = builder.add(&bth::open("tree.bth")?);
-/// let stone = builder.add(&bth::open("stone.bth")?);
+/// let tree = builder.add(&bth::from_bytes(CUBE)?);
+/// let stone = builder.add(&bth::from_bytes(CUBE)?);
 /// let at = |x: f32| [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 /// let mut trees = Vec::new();
 /// for i in 0..100 {
@@ -43,12 +44,11 @@ const MAX_INSTANCES: usize = 1 << 30;
 /// builder.commit()?;
 ///
 /// let ray = bth::rays::Ray::new([7.0, 0.5, 9.0], [0.0, 0.0, -1.0]);
-/// if let Some(hit) = builder.scene().nearest(&ray) {
-///     builder.set_transform(hit.primitive.instance, &at(7.5))?;
-///     builder.remove(trees[0])?;
-///     let update = builder.commit()?;
-///     println!("{} instances placed, {} visible", update.placed, update.visible);
-/// }
+/// let hit = builder.scene().nearest(&ray).expect("a tree is there");
+/// builder.set_transform(hit.primitive.instance, &at(7.5))?;
+/// builder.remove(trees[0])?;
+/// let update = builder.commit()?;
+/// assert_eq!(update.visible, 100);
 /// # Ok::<(), bth::Error>(())
 /// ```
 #[derive(Debug)]

@@ -39,18 +39,19 @@ pub type Filter<'a> = dyn Fn(&Ray, &Hit) -> bool + Sync + 'a;
 /// What a ray is allowed to hit: conditions on the instance and the triangle. By default
 /// everything.
 ///
-/// ```no_run
-/// use bth::{Accept, Cull};
+/// ```
 /// use bth::rays::{Hit, Ray};
+/// use bth::{Accept, Cull};
 ///
-/// # fn is_opaque(_: u32, _: f32, _: f32) -> bool { true }
-/// let scene = bth::open("forest.bth")?;
-/// let ray = Ray::new([0.0, 0.1, 1.0], [0.0, 0.0, -1.0]);
-/// let filter = |_: &Ray, hit: &Hit| is_opaque(hit.primitive.triangle, hit.u, hit.v);
-/// let accept = Accept { cull: Cull::Back, filter: Some(&filter), ..Accept::default() };
-/// if let Some(hit) = scene.nearest_accepted(&ray, &accept) {
-///     println!("triangle {} at t = {}", hit.primitive.triangle, hit.t);
-/// }
+/// # const CUBE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/cube.bth"));
+/// let scene = bth::from_bytes(CUBE)?;
+/// let ray = Ray::new([0.25, 0.5, 2.0], [0.0, 0.0, -1.0]);
+/// // Both sides count by default. From above, the bottom of the cube shows its back.
+/// let filter = |_: &Ray, hit: &Hit| hit.t > 1.0;
+/// let accept = Accept { filter: Some(&filter), ..Accept::default() };
+/// assert_eq!(scene.nearest_accepted(&ray, &accept).map(|hit| hit.t), Some(2.0));
+/// let accept = Accept { cull: Cull::Back, ..accept };
+/// assert_eq!(scene.nearest_accepted(&ray, &accept), None);
 /// # Ok::<(), bth::Error>(())
 /// ```
 #[derive(Clone, Copy)]

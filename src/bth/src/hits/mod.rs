@@ -52,17 +52,16 @@ impl Scene {
     /// Replaces `hits` by all hits of a ray in world space that are accepted, in order. The time
     /// grows with the number of triangles that the ray passes closely.
     ///
-    /// ```no_run
+    /// ```
     /// use bth::Accept;
     /// use bth::rays::Ray;
     ///
-    /// let scene = bth::open("bunny.bth")?;
-    /// let ray = Ray::new([0.0, 0.1, 1.0], [0.0, 0.0, -1.0]);
+    /// # const CUBE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/cube.bth"));
+    /// let scene = bth::from_bytes(CUBE)?;
+    /// let ray = Ray::new([0.25, 0.5, 2.0], [0.0, 0.0, -1.0]);
     /// let mut hits = Vec::new();
     /// scene.all_hits(&ray, &Accept::default(), &mut hits);
-    /// for hit in &hits {
-    ///     println!("triangle {} at t = {}", hit.primitive.triangle, hit.t);
-    /// }
+    /// assert_eq!(hits.iter().map(|hit| hit.t).collect::<Vec<_>>(), [1.0, 2.0]);
     /// # Ok::<(), bth::Error>(())
     /// ```
     pub fn all_hits<R: TraceRay>(&self, ray: &R, accept: &Accept<'_>, hits: &mut Vec<Hit>) {
@@ -161,13 +160,14 @@ impl Scene {
     /// Each instance is counted in the space of its object, into which the ray is rounded as for
     /// other queries. A mirrored instance keeps its front and back.
     ///
-    /// ```no_run
+    /// ```
     /// use bth::rays::Ray;
     ///
-    /// let scene = bth::open("bunny.bth")?;
-    /// let ray = Ray::new([0.0, 0.1, 1.0], [0.0, 0.0, -1.0]);
+    /// # const CUBE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/cube.bth"));
+    /// let scene = bth::from_bytes(CUBE)?;
+    /// let ray = Ray::new([0.25, 0.5, 2.0], [0.0, 0.0, -1.0]);
     /// // An even number for a closed model and a ray from outside.
-    /// println!("{} crossings", scene.crossings(&ray).count);
+    /// assert_eq!(scene.crossings(&ray).count, 2);
     /// # Ok::<(), bth::Error>(())
     /// ```
     pub fn crossings<R: TraceRay>(&self, ray: &R) -> Crossings {

@@ -57,11 +57,11 @@ impl Scene {
     /// area do not count, as for rays. The corners of instances are transformed in f64 and rounded
     /// to f32 in world space.
     ///
-    /// ```no_run
-    /// let scene = bth::open("bunny.bth")?;
-    /// if let Some(closest) = scene.closest([0.0, 0.1, 1.0], f32::INFINITY) {
-    ///     println!("{} to triangle {}", closest.distance, closest.primitive.triangle);
-    /// }
+    /// ```
+    /// # const CUBE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/cube.bth"));
+    /// let scene = bth::from_bytes(CUBE)?;
+    /// let closest = scene.closest([0.25, 0.5, 3.0], f32::INFINITY).expect("a triangle");
+    /// assert_eq!((closest.distance, closest.point), (2.0, [0.25, 0.5, 1.0]));
     /// # Ok::<(), bth::Error>(())
     /// ```
     pub fn closest(&self, point: [f32; 3], radius: f32) -> Option<Closest> {
@@ -184,11 +184,10 @@ impl Scene {
     /// shells overlap, points in both are inside. A cavity is outside if its triangles are
     /// counterclockwise as seen from within it, as they are in models of solids.
     ///
-    /// ```no_run
-    /// let scene = bth::open("bunny.bth")?;
-    /// if scene.contains([0.0, 0.1, 0.0]) {
-    ///     println!("inside");
-    /// }
+    /// ```
+    /// # const CUBE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/cube.bth"));
+    /// let scene = bth::from_bytes(CUBE)?;
+    /// assert!(scene.contains([0.5, 0.5, 0.5]) && !scene.contains([0.5, 0.5, 1.5]));
     /// # Ok::<(), bth::Error>(())
     /// ```
     pub fn contains(&self, point: [f32; 3]) -> bool {

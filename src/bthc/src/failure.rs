@@ -1,5 +1,6 @@
 //! Why a command did not succeed.
 
+use crate::output;
 use bth_files::Diagnosis;
 use std::io::Write;
 use std::path::Path;
@@ -116,10 +117,14 @@ impl Failure {
 
     /// Prints the error, with `--json` as an object too, and returns the exit code.
     pub(crate) fn report(&self, wants_json: bool) -> ExitCode {
-        match self.diagnosis() {
-            Some(diagnosis) => diagnosis.report(wants_json),
-            None => ExitCode::from(self.exit_code()),
+        if let Some(diagnosis) = self.diagnosis() {
+            // The handler of signals prints nothing where output has begun.
+            if wants_json {
+                output::begin();
+            }
+            return diagnosis.report(wants_json);
         }
+        ExitCode::from(self.exit_code())
     }
 
     /// Prints the error on standard error.

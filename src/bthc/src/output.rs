@@ -13,9 +13,14 @@ pub(crate) fn has_begun() -> bool {
     BEGUN.load(Ordering::Relaxed)
 }
 
+/// Notes that something is going to be printed on standard output.
+pub(crate) fn begin() {
+    BEGUN.store(true, Ordering::Relaxed);
+}
+
 /// Standard output, locked.
 pub(crate) fn stdout() -> StdoutLock<'static> {
-    BEGUN.store(true, Ordering::Relaxed);
+    begin();
     std::io::stdout().lock()
 }
 

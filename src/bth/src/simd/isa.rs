@@ -154,7 +154,7 @@ impl Isa {
             type Output = bool;
             #[inline(always)]
             fn run<S: Simd>(self, _: S) -> bool {
-                S::HAS_VECTORS
+                true
             }
         }
         match self {
@@ -162,7 +162,11 @@ impl Isa {
             Isa::Scalar => {
                 !cfg!(all(target_arch = "wasm32", target_os = "unknown", target_feature = "simd128"))
             }
-            _ => self.run(IsCompiled),
+            // Not by `run`, which runs what a target does not have in scalar code, or in that target's.
+            _ => {
+                with_vectors!(self, IsCompiled, detect, simd => return simd.run(IsCompiled));
+                false
+            }
         }
     }
 

@@ -162,7 +162,7 @@ impl Isa {
             Isa::Scalar => {
                 !cfg!(all(target_arch = "wasm32", target_os = "unknown", target_feature = "simd128"))
             }
-            // Not by `run`, which runs what a target does not have in scalar code, or in that target's.
+            // `run` would take other code where the target does not have the instructions.
             _ => {
                 with_vectors!(self, IsCompiled, detect, simd => return simd.run(IsCompiled));
                 false

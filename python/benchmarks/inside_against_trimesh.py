@@ -1,9 +1,9 @@
-"""Points inside of closed meshes: how many answers of trimesh with embreex are wrong, beside those of bth.
+"""Points inside of closed meshes: how many answers of trimesh with embreex are wrong, and how many of bth.
 
     python python/benchmarks/inside_against_trimesh.py MODEL.ply …        closed models that bth and trimesh read
 
 Three sets of 1e6 points: anywhere in the bounds; such that the ray along which trimesh looks passes a vertex; and likewise the middle of an
-edge. The reference is `Scene.contains`, which `bth-bench inside` checks along two rays and, on samples, against all triangles in exact
+edge. The reference is `Scene.contains`, which `bth-bench stress` checks along two rays and, on samples, against all triangles in exact
 arithmetic. trimesh asks embreex along two opposite rays, and where they disagree along others.
 """
 

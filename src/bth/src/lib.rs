@@ -35,6 +35,7 @@ mod nodes;
 mod object;
 mod objects;
 mod opacity;
+mod parallel;
 mod points;
 mod query;
 pub mod rays;

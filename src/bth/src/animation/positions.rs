@@ -3,12 +3,12 @@
 use super::JointMatrix;
 use super::morph_runs::{CHUNK, MorphRuns};
 use super::pose::Pose;
+use crate::parallel::Tasks;
 use crate::simd::{Isa, Kernel, Simd};
 use bth_format::DeformationView;
 
-/// Vertices that one task computes.
-#[cfg(feature = "rayon")]
-const TASK: usize = 16 * CHUNK;
+/// How vertices are computed.
+const TASKS: Tasks = Tasks { rows: 16 * CHUNK, min_rows: 16 * CHUNK + 1 };
 
 /// What the positions of an object are computed from.
 #[derive(Clone, Copy)]
@@ -23,15 +23,7 @@ pub(crate) struct Vertices<'a> {
 pub(crate) fn compute(vertices: Vertices<'_>, pose: &Pose, out: &mut [[f32; 3]]) {
     let isa = Isa::chosen();
     let runs = &MorphRuns::new(&vertices.deformation, &pose.weights, out.len());
-    #[cfg(feature = "rayon")]
-    if out.len() > TASK {
-        use rayon::iter::{IndexedParallelIterator, ParallelIterator};
-        use rayon::slice::ParallelSliceMut;
-        let tasks = out.par_chunks_mut(TASK).enumerate();
-        return tasks
-            .for_each(|(task, out)| isa.run(VertexRange { vertices, pose, runs, first: task * TASK, out }));
-    }
-    isa.run(VertexRange { vertices, pose, runs, first: 0, out });
+    TASKS.for_each(out, |first, out| isa.run(VertexRange { vertices, pose, runs, first, out }));
 }
 
 /// The positions of successive vertices, from `first` on, which is a multiple of [`CHUNK`].

@@ -5,16 +5,13 @@
 
 use super::animated_file::AnimatedFile;
 use crate::objects::Objects;
+use crate::parallel::Tasks;
 use bth_format::error::Result;
 use bth_format::{File, FramePosition};
 use std::collections::BTreeMap;
 
-/// From this number of positions on, several threads compute them.
-#[cfg(feature = "rayon")]
-const MIN_PARALLEL: usize = 1 << 14;
-/// Number of positions of one task.
-#[cfg(feature = "rayon")]
-const TASK: usize = 1 << 13;
+/// How positions are computed.
+const TASKS: Tasks = Tasks { rows: 1 << 13, min_rows: 1 << 14 };
 
 /// The time for which objects are compiled: their first frame.
 const COMPILED: FramePosition = FramePosition { frame: 0, share: 0.0 };
@@ -80,12 +77,5 @@ impl Sequences {
 /// Stores the positions of an object between two frames.
 fn positions(file: &File, object: u32, at: FramePosition, into: &mut [[f32; 3]]) {
     let (sequence, rows) = (file.sequence(object), into.len());
-    #[cfg(feature = "rayon")]
-    if rows >= MIN_PARALLEL {
-        use rayon::iter::{IndexedParallelIterator, ParallelIterator};
-        use rayon::slice::ParallelSliceMut;
-        let tasks = into.par_chunks_mut(TASK).enumerate();
-        return tasks.for_each(|(task, part)| sequence.positions_at(at, (rows, TASK * task), part));
-    }
-    sequence.positions_at(at, (rows, 0), into);
+    TASKS.for_each(into, |first, into| sequence.positions_at(at, (rows, first), into));
 }

@@ -4,16 +4,13 @@
 use super::world::{InstanceRow, PlaceResult, TransformSource, Unplaceable, World};
 use crate::nodes::affine::Affine;
 use crate::objects::Objects;
+use crate::parallel::Tasks;
 use crate::simd::{Isa, Kernel, Simd};
 use crate::update::Update;
 use bth_format::layout::NONE;
 
-/// From this number of changed instances on, they are placed by several threads.
-#[cfg(feature = "rayon")]
-const MIN_PARALLEL: usize = 2048;
-/// Number of instances that one task places.
-#[cfg(feature = "rayon")]
-const TASK: usize = 256;
+/// How changed instances are placed.
+const TASKS: Tasks = Tasks { rows: 256, min_rows: 2048 };
 
 /// An instance as it is to be.
 #[derive(Clone, Copy, Debug)]
@@ -25,7 +22,7 @@ pub(crate) struct NewInstance {
 impl World {
     /// Changes the instances in `changed`, whose indices are below `count`, to what `new` returns
     /// for them, and builds or refits the top level. `count` is the new number of instances, at
-    /// min the former one. Each new instance is in `changed`.
+    /// least the former one. Each new instance is in `changed`.
     ///
     /// # Errors
     /// The first of `changed` that cannot be placed. No instance is changed then.
@@ -41,7 +38,12 @@ impl World {
             TransformSource::File(_) => Vec::new(),
         };
         placed.resize(changed.len(), Ok(None));
-        self.place_all(objects, changed, new, &mut placed);
+        // Its loops are of four f64, so AVX-512 would not make it faster, and registers of 128 bits
+        // hardly.
+        let (isa, world) = (Isa::chosen().min(Isa::Avx2), &*self);
+        TASKS.for_each(&mut placed, |first, placed| {
+            isa.run(PlaceKernel { world, objects, changed: &changed[first..], new, placed });
+        });
         let failed = placed.iter().zip(changed).find_map(|(placed, &instance)| {
             placed.as_ref().err().map(|&error| Unplaceable { instance, error })
         });
@@ -81,36 +83,6 @@ impl World {
         }
         self.update_top(same_visible, &mut update);
         update
-    }
-
-    /// Computes the placements of changed instances.
-    fn place_all(
-        &self,
-        objects: &Objects,
-        changed: &[u32],
-        new: &(impl Fn(u32) -> NewInstance + Sync),
-        placed: &mut [PlaceResult],
-    ) {
-        #[cfg(feature = "rayon")]
-        if changed.len() >= MIN_PARALLEL {
-            use rayon::iter::{IndexedParallelIterator, ParallelIterator};
-            use rayon::slice::{ParallelSlice, ParallelSliceMut};
-            let tasks = changed.par_chunks(TASK).zip(placed.par_chunks_mut(TASK));
-            return tasks.for_each(|(changed, placed)| self.place_some(objects, changed, new, placed));
-        }
-        self.place_some(objects, changed, new, placed);
-    }
-
-    fn place_some(
-        &self,
-        objects: &Objects,
-        changed: &[u32],
-        new: &impl Fn(u32) -> NewInstance,
-        placed: &mut [PlaceResult],
-    ) {
-        // Its loops are of four f64, so AVX-512 would not make it faster, and registers of 128 bits
-        // hardly.
-        Isa::chosen().min(Isa::Avx2).run(PlaceKernel { world: self, objects, changed, new, placed });
     }
 }
 

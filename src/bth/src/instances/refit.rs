@@ -5,15 +5,12 @@
 use super::placement::Placement;
 use super::top_level::TopLevel;
 use super::top_nodes::{INSTANCE, InstanceBounds, node_mut, put_bounds, used};
+use crate::parallel::Tasks;
 use bth_format::layout::{CacheLine, NODE_LINES, WIDTH, WideNode};
 use glam::Vec4;
 
-/// From this number of nodes on, the boxes of instances are stored by several threads.
-#[cfg(feature = "rayon")]
-const MIN_PARALLEL: usize = 512;
-/// Number of nodes of one task.
-#[cfg(feature = "rayon")]
-const TASK: usize = 64;
+/// How the boxes of instances are stored.
+const TASKS: Tasks = Tasks { rows: 64 * NODE_LINES, min_rows: 512 * NODE_LINES };
 
 impl TopLevel {
     /// Computes all boxes again after instances have moved. The visible instances are those for
@@ -21,7 +18,7 @@ impl TopLevel {
     pub(crate) fn refit(&mut self, placements: &[Option<Placement>]) {
         self.measure(placements);
         let mut lines = std::mem::take(&mut self.lines);
-        self.refit_instances(&mut lines, placements);
+        TASKS.for_each(&mut lines, |_, lines| self.refit_instances(lines, placements));
         // Children come behind their parents, so that their boxes are final when the parent is
         // reached.
         for code in (0..lines.len()).step_by(NODE_LINES).rev() {
@@ -40,20 +37,8 @@ impl TopLevel {
         self.cost.update(&self.lines);
     }
 
-    /// Stores the boxes of all instances.
-    fn refit_instances(&self, lines: &mut [CacheLine], placements: &[Option<Placement>]) {
-        #[cfg(feature = "rayon")]
-        if lines.len() >= MIN_PARALLEL * NODE_LINES {
-            use rayon::iter::ParallelIterator;
-            use rayon::slice::ParallelSliceMut;
-            let tasks = lines.par_chunks_mut(TASK * NODE_LINES);
-            return tasks.for_each(|lines| self.refit_some(lines, placements));
-        }
-        self.refit_some(lines, placements);
-    }
-
     /// Stores the boxes of the instances in some nodes.
-    fn refit_some(&self, lines: &mut [CacheLine], placements: &[Option<Placement>]) {
+    fn refit_instances(&self, lines: &mut [CacheLine], placements: &[Option<Placement>]) {
         for lines in lines.chunks_exact_mut(NODE_LINES) {
             let node = node_mut(lines);
             for slot in 0..used(node) {

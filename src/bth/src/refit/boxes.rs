@@ -6,6 +6,7 @@
 //! computes them.
 
 use super::plan::{ChildSlot, LeafRange, RefitPlan, RefitTask, leaf_size};
+use crate::parallel;
 use crate::simd::{Isa, Kernel, LANES, Simd};
 use bth_format::file::RefitParts;
 use bth_format::layout::{
@@ -70,12 +71,7 @@ fn refit_tasks(
         TaskKernel { first: task.node, nodes: own_nodes, leaves: own_leaves, rows, positions }
     };
     let kernels: Vec<_> = plan.tasks.iter().map(&mut kernel).collect();
-    #[cfg(feature = "rayon")]
-    if kernels.len() > 1 {
-        use rayon::iter::{IntoParallelIterator, ParallelIterator};
-        return kernels.into_par_iter().map(|kernel| Isa::chosen().run(kernel)).collect();
-    }
-    kernels.into_iter().map(|kernel| Isa::chosen().run(kernel)).collect()
+    parallel::map(kernels, |kernel| Isa::chosen().run(kernel))
 }
 
 /// Takes a range of lines from the front of `rest`, whose first line is `at`, and drops those

@@ -2,6 +2,7 @@
 //! number of nodes and leaves that a random line through the object's box visits. It is the sum of
 //! the areas of all boxes relative to the area of the object's box.
 
+use crate::parallel;
 use bth_format::layout::{CacheLine, NODE_LINES, WIDTH, WideNode};
 use zerocopy::{FromBytes, IntoBytes};
 
@@ -12,18 +13,8 @@ const CHUNK: usize = 512 * NODE_LINES;
 /// The cost of a tree with given nodes, the root first; 1 if there are no nodes.
 pub(super) fn cost(nodes: &[CacheLine]) -> f64 {
     let Some(root) = nodes.first_chunk::<NODE_LINES>() else { return 1.0 };
-    1.0 + sum(nodes) / half_area(bounds(node(root)))
-}
-
-fn sum(nodes: &[CacheLine]) -> f64 {
-    #[cfg(feature = "rayon")]
-    if nodes.len() > CHUNK {
-        use rayon::iter::ParallelIterator;
-        use rayon::slice::ParallelSlice;
-        let sums: Vec<f64> = nodes.par_chunks(CHUNK).map(areas).collect();
-        return sums.iter().sum();
-    }
-    nodes.chunks(CHUNK).map(areas).sum()
+    let sums = parallel::map(nodes.chunks(CHUNK).collect(), areas);
+    1.0 + sums.iter().sum::<f64>() / half_area(bounds(node(root)))
 }
 
 /// Half the areas of the boxes of all children of some nodes.

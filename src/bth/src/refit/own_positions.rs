@@ -3,6 +3,7 @@
 use super::boxes::refit;
 use super::cost::cost;
 use super::plan::RefitPlan;
+use crate::parallel::Tasks;
 use bth_format::file::{DeformableObject, Normals};
 use bth_format::object::ObjectView;
 use bth_format::{Code, Error, File};
@@ -22,12 +23,8 @@ pub(crate) struct OwnPositions {
     cost: f64,
 }
 
-/// From this number of positions on, several threads check and copy them.
-#[cfg(feature = "rayon")]
-const MIN_PARALLEL: usize = 1 << 16;
-/// Number of positions of one task.
-#[cfg(feature = "rayon")]
-const TASK: usize = 1 << 14;
+/// How positions are checked and copied.
+const TASKS: Tasks = Tasks { rows: 1 << 14, min_rows: 1 << 16 };
 
 impl OwnPositions {
     /// An object with the positions of its file.
@@ -135,22 +132,12 @@ impl OwnPositions {
 
 /// Checks that all positions are finite.
 fn check_finite(positions: &[[f32; 3]]) -> Result<(), Error> {
-    if are_finite(positions) {
+    if TASKS.all(positions, all_finite) {
         return Ok(());
     }
     let row = positions.iter().position(|p| !p.iter().all(|x| x.is_finite())).unwrap_or_default();
     let found = format!("{:?} of vertex {row}", positions[row]);
     Err(Error::of_call(Code::NewPositions, "finite positions", found))
-}
-
-fn are_finite(positions: &[[f32; 3]]) -> bool {
-    #[cfg(feature = "rayon")]
-    if positions.len() >= MIN_PARALLEL {
-        use rayon::iter::ParallelIterator;
-        use rayon::slice::ParallelSlice;
-        return positions.par_chunks(TASK).all(all_finite);
-    }
-    all_finite(positions)
 }
 
 fn all_finite(positions: &[[f32; 3]]) -> bool {
@@ -166,40 +153,23 @@ fn all_finite(positions: &[[f32; 3]]) -> bool {
     sums.iter().all(|sum| *sum == 0.0) && rest.iter().all(|x| x.is_finite())
 }
 
-/// Copies positions; as in compiled files, no zero is negative.
+/// Copies positions. As in compiled files, no zero is negative.
 fn copy_positions(from: &[[f32; 3]], to: &mut [[f32; 3]]) {
-    #[cfg(feature = "rayon")]
-    if from.len() >= MIN_PARALLEL {
-        use rayon::iter::{IndexedParallelIterator, ParallelIterator};
-        use rayon::slice::{ParallelSlice, ParallelSliceMut};
-        let tasks = from.par_chunks(TASK).zip(to.par_chunks_mut(TASK));
-        return tasks.for_each(|(from, to)| copy_some(from, to));
-    }
-    copy_some(from, to);
-}
-
-fn copy_some(from: &[[f32; 3]], to: &mut [[f32; 3]]) {
-    for (to, from) in to.as_flattened_mut().iter_mut().zip(from.as_flattened()) {
-        *to = from + 0.0;
-    }
+    TASKS.for_each(to, |first, to| {
+        for (to, from) in to.as_flattened_mut().iter_mut().zip(from[first..].as_flattened()) {
+            *to = from + 0.0;
+        }
+    });
 }
 
 /// Moves positions by a share of the way to others.
-fn move_towards(positions: &mut [[f32; 3]], to: &[[f32; 3]], share: f64) {
-    #[cfg(feature = "rayon")]
-    if positions.len() >= MIN_PARALLEL {
-        use rayon::iter::{IndexedParallelIterator, ParallelIterator};
-        use rayon::slice::{ParallelSlice, ParallelSliceMut};
-        let tasks = positions.par_chunks_mut(TASK).zip(to.par_chunks(TASK));
-        return tasks.for_each(|(positions, to)| move_some(positions, to, share));
-    }
-    move_some(positions, to, share);
-}
-
+///
 /// A coordinate is (1 − share) · a + share · b in `f64`, rounded once to `f32`. Since a and b are
 /// `f32`, it is exactly a and b at the ends and never beyond them.
-fn move_some(positions: &mut [[f32; 3]], to: &[[f32; 3]], share: f64) {
-    for (from, to) in positions.as_flattened_mut().iter_mut().zip(to.as_flattened()) {
-        *from = ((1.0 - share) * f64::from(*from) + share * f64::from(*to)) as f32 + 0.0;
-    }
+fn move_towards(positions: &mut [[f32; 3]], to: &[[f32; 3]], share: f64) {
+    TASKS.for_each(positions, |first, positions| {
+        for (from, to) in positions.as_flattened_mut().iter_mut().zip(to[first..].as_flattened()) {
+            *from = ((1.0 - share) * f64::from(*from) + share * f64::from(*to)) as f32 + 0.0;
+        }
+    });
 }

@@ -73,7 +73,7 @@ fn track(table: &Table<'_>, names: &Names<'_>, weights: &HashMap<usize, usize>) 
     let mut values = Vec::with_capacity(keys.len() * interpolation.values_per_key() * width);
     for key in &keys {
         if interpolation != Interpolation::Cubic {
-            value(key, (property, width), &mut values)?;
+            value(key, property, width, &mut values)?;
             continue;
         }
         let parts = key.array()?;
@@ -82,9 +82,9 @@ fn track(table: &Table<'_>, names: &Names<'_>, weights: &HashMap<usize, usize>) 
                 format!("expected an in-tangent, a value and an out-tangent, found {} rows", parts.len());
             return Err(key.error(code::TRACK, message, "give three rows for each key"));
         };
-        tangent(before, (property, width), &mut values)?;
-        value(at, (property, width), &mut values)?;
-        tangent(after, (property, width), &mut values)?;
+        tangent(before, property, width, &mut values)?;
+        value(at, property, width, &mut values)?;
+        tangent(after, property, width, &mut values)?;
     }
     Ok(Track { node, property, interpolation, times, values })
 }
@@ -106,7 +106,7 @@ fn times(value: &Value<'_>) -> Result<Vec<f64>> {
     Ok(times)
 }
 
-fn value(value: &Value<'_>, (property, width): (Property, usize), into: &mut Vec<f64>) -> Result<()> {
+fn value(value: &Value<'_>, property: Property, width: usize, into: &mut Vec<f64>) -> Result<()> {
     match property {
         Property::Translation | Property::Scale => into.extend(value.numbers::<3>()?),
         Property::Rotation => into.extend(rotation(value)?),
@@ -116,7 +116,7 @@ fn value(value: &Value<'_>, (property, width): (Property, usize), into: &mut Vec
     Ok(())
 }
 
-fn tangent(value: &Value<'_>, (property, width): (Property, usize), into: &mut Vec<f64>) -> Result<()> {
+fn tangent(value: &Value<'_>, property: Property, width: usize, into: &mut Vec<f64>) -> Result<()> {
     match property {
         Property::Rotation => into.extend(value.numbers::<4>()?),
         Property::Weights => into.extend(value.numbers_of(width)?),

@@ -35,14 +35,14 @@ impl MaterialsView<'_> {
     /// The interpolated vertex colour at barycentric coordinates (weights of the second and third
     /// corner) of a triangle; `None` where it has none.
     pub fn color_at(&self, triangle: u32, u: f32, v: f32) -> Option<[f32; 4]> {
-        let color = interpolated(self.color_corners, self.colors, triangle, (u, v))?;
+        let color = interpolated(self.color_corners, self.colors, triangle, [u, v])?;
         Some(color.map(|x| (x / f64::from(u16::MAX)) as f32))
     }
 
     /// The interpolated texture coordinates of the second set at barycentric coordinates of a
     /// triangle; `None` where it has none.
     pub fn second_uv_at(&self, triangle: u32, u: f32, v: f32) -> Option<[f32; 2]> {
-        let uv = interpolated(self.second_corners, self.second_uvs, triangle, (u, v))?;
+        let uv = interpolated(self.second_corners, self.second_uvs, triangle, [u, v])?;
         Some(uv.map(|x| x as f32))
     }
 }
@@ -68,7 +68,7 @@ fn interpolated<T: Copy + Into<f64>, const N: usize>(
     corners: &[[u32; 3]],
     rows: &[[T; N]],
     triangle: u32,
-    (u, v): (f32, f32),
+    [u, v]: [f32; 2],
 ) -> Option<[f64; N]> {
     let [a, b, c] = corners.get(triangle as usize)?.map(|row| rows.get(row as usize).copied());
     let (corners, weights) = ([a?, b?, c?], [1.0 - f64::from(u) - f64::from(v), u.into(), v.into()]);

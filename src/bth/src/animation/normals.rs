@@ -13,7 +13,8 @@ use bth_format::DeformationView;
 pub(crate) fn corner_normal(
     deformation: &DeformationView<'_>,
     pose: &Pose,
-    (row, normal): (u32, [f32; 3]),
+    row: u32,
+    normal: [f32; 3],
     position: u32,
 ) -> [f64; 3] {
     let mut moved = normal.map(f64::from);

@@ -175,7 +175,7 @@ fn normals_stay_perpendicular_to_what_the_joints_do() {
         let sample = Sample::new(&mut rng, 60, sets, targets);
         for row in 0..60 {
             let normal = vector(&mut rng);
-            let found = corner_normal(&sample.view(), &sample.pose, (row as u32, normal), row as u32);
+            let found = corner_normal(&sample.view(), &sample.pose, row as u32, normal, row as u32);
             let moved = sample.morphed(targets, row, normal);
             // Two vectors of the plane of the normal before the skin remain in its plane.
             let [x, y, z] = moved;

@@ -52,7 +52,7 @@ impl World {
     /// Stores the nearest hit of a ray, or [`Hit::MISS`], as [`Self::nearest`] does for many.
     #[inline(never)]
     pub(crate) fn store_nearest_of_ray(&self, objects: &Objects, ray: WorldRay<'_>, best: &mut Hit) {
-        self.nearest_by((objects, ray), best, |&EnteredObject { object, ray: of_object }, instance, hit| {
+        self.nearest_by(objects, ray, best, |&EnteredObject { object, ray: of_object }, instance, hit| {
             *hit = ray.in_object(
                 instance,
                 &of_object.ray,
@@ -66,7 +66,8 @@ impl World {
     pub(crate) fn nearest_counted(&self, objects: &Objects, ray: WorldRay<'_>) -> (Hit, Steps) {
         let (mut best, mut steps) = (Hit::MISS, Steps::default());
         self.nearest_by(
-            (objects, ray),
+            objects,
+            ray,
             &mut best,
             |&EnteredObject { object, ray: of_object }, instance, hit| {
                 let counted = ray.in_object(
@@ -86,7 +87,8 @@ impl World {
     #[inline(always)]
     fn nearest_by(
         &self,
-        (objects, world_ray): (&Objects, WorldRay<'_>),
+        objects: &Objects,
+        world_ray: WorldRay<'_>,
         best: &mut Hit,
         mut trace: impl FnMut(&EnteredObject<'_>, u32, &mut Hit),
     ) {

@@ -271,6 +271,6 @@ impl Scene {
         let (corners, vertices) =
             (view.corners.get(triangle as usize)?, view.triangles.get(triangle as usize)?);
         let deformation = file.deformation(row);
-        Some([0, 1, 2].map(|k| corner_normal(&deformation, pose, (corners[k], normals[k]), vertices[k])))
+        Some([0, 1, 2].map(|k| corner_normal(&deformation, pose, corners[k], normals[k], vertices[k])))
     }
 }

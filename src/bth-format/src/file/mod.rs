@@ -10,8 +10,9 @@ mod deformable;
 mod sections;
 mod table;
 
+pub use crate::layout::kind::stride as kind_stride;
 pub use deformable::{DeformableObject, Normals, RefitParts};
-pub use table::{content_id, hash128, kind_stride};
+pub use table::{content_id, hash128};
 
 use crate::Identity;
 use crate::check;

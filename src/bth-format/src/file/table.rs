@@ -38,60 +38,6 @@ pub fn content_id(entries: &[SectionEntry]) -> [u8; 32] {
     *hasher.finalize().as_bytes()
 }
 
-/// Bytes of an element of a section; `None` for unknown kinds, 0 for TETS, whose stride depends on
-/// the [`RecordKind`]. Specification: "Kinds".
-pub fn kind_stride(kind: u32) -> Option<usize> {
-    Some(match kind {
-        kind::OBJECT => size_of::<Object>(),
-        kind::LINES => size_of::<CacheLine>(),
-        kind::TRIANGLE_IDS | kind::TRIANGLE_FACES | kind::OPACITY | kind::OPACITY_MICRO => 4,
-        kind::TRIANGLE_PLACES => 4,
-        kind::TET_LEAVES => size_of::<TetLeaf>(),
-        kind::LEAF_VERTICES => size_of::<[u32; WIDTH]>(),
-        kind::TETS => 0,
-        kind::TET_VERTICES => size_of::<TetVertex>(),
-        kind::TET_FACES => size_of::<TetFace>(),
-        kind::HULL_FACES => size_of::<HullFace>(),
-        kind::FREE_DIRECTIONS => size_of::<FreeDirections>(),
-        kind::FREE_LEVELS => size_of::<FreeLevels>(),
-        kind::FREE_DISTANCES => size_of::<FreeDistances>(),
-        kind::POSITIONS | kind::TRIANGLES | kind::CORNERS | kind::NORMALS => 12,
-        kind::UVS => 8,
-        kind::GROUPS => size_of::<Group>(),
-        kind::GROUP_RUNS => size_of::<GroupRun>(),
-        kind::MATERIALS => size_of::<Material>(),
-        kind::SEQUENCE_TIMES => 8,
-        kind::SEQUENCE_POSITIONS => 12,
-        kind::OBJECT_NAMES => size_of::<ObjectName>(),
-        kind::PROVENANCE | kind::NAMES | kind::LABELS | kind::OBJECT_LABELS | kind::IMAGE_BYTES => 1,
-        kind::MATERIAL_PARAMETERS => size_of::<MaterialParameters>(),
-        kind::TEXTURES => size_of::<Texture>(),
-        kind::COLOR_CORNERS => 12,
-        kind::COLORS => 8,
-        kind::SECOND_CORNERS => 12,
-        kind::SECOND_UVS => 8,
-        kind::IMAGES => size_of::<Image>(),
-        kind::DEFORMATION => size_of::<Deformation>(),
-        kind::JOINTS => 8,
-        kind::JOINT_WEIGHTS => 16,
-        kind::MORPHS => size_of::<Morph>(),
-        kind::MORPH_ROWS => 4,
-        kind::MORPH_DELTAS => 12,
-        kind::DEFORMERS => size_of::<Deformer>(),
-        kind::SKINS => size_of::<Skin>(),
-        kind::SKIN_JOINTS => size_of::<SkinJoint>(),
-        kind::MORPH_WEIGHTS => 8,
-        kind::SCENE => size_of::<Scene>(),
-        kind::NODES => size_of::<Node>(),
-        kind::INSTANCES => size_of::<Instance>(),
-        kind::TRACKS => size_of::<Track>(),
-        kind::TIMES | kind::VALUES => 8,
-        kind::CAMERAS => size_of::<Camera>(),
-        kind::LIGHTS => size_of::<Light>(),
-        _ => return None,
-    })
-}
-
 /// BTH-F022: the max number of elements of a section.
 fn max_count(kind: u32) -> u64 {
     match kind {
@@ -287,7 +233,7 @@ fn check_entry(
         let found = "27: trees for ranges of time, which are no longer read; compile the scene again";
         return Err((Code::Features, 0, "a known kind".into(), found.into()));
     }
-    match kind_stride(e.kind) {
+    match kind::stride(e.kind) {
         None if e.flags & SECTION_REQUIRED != 0 => {
             return Err((Code::UnknownKind, 0, "a known kind".into(), format!("{}", e.kind)));
         }
@@ -318,7 +264,7 @@ fn check_objects(entries: &[SectionEntry]) -> Result<u32> {
         let whole_file = e.object == NONE;
         let first = !whole_file && e.object == objects;
         let wrong = if whole_file {
-            kind_stride(e.kind).is_some() && !kind::is_of_file(e.kind)
+            kind::stride(e.kind).is_some() && !kind::is_of_file(e.kind)
         } else if e.kind == kind::OBJECT {
             !first || e.count != 1
         } else {

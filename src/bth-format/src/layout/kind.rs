@@ -1,8 +1,11 @@
 //! Section kinds. Specification: "Kinds". Kinds 1 to 31, 35 to 38, 41 to 47 and 64 to 71 belong to
 //! an object, the others to the whole file.
 
+use super::*;
+
+/// The table of kinds: name, number, and the type of an element.
 macro_rules! kinds {
-    ($($(#[$doc:meta])* $name:ident = $number:literal;)*) => {
+    ($($(#[$doc:meta])* $name:ident = $number:literal: $row:ty;)*) => {
         $($(#[$doc])* pub const $name: u32 = $number;)*
 
         /// Name of a kind, as in the specification; `unknown` for others.
@@ -12,127 +15,136 @@ macro_rules! kinds {
                 _ => "unknown",
             }
         }
+
+        /// Bytes of an element of a section; `None` for unknown kinds, 0 for [`TETS`], whose stride
+        /// is the stride of a [`RecordKind`].
+        pub fn stride(kind: u32) -> Option<usize> {
+            match kind {
+                $($name => Some(size_of::<$row>()),)*
+                _ => None,
+            }
+        }
     };
 }
 
 kinds! {
     /// One [`super::Object`].
-    OBJECT = 1;
+    OBJECT = 1: Object;
     /// [`super::CacheLine`]s that hold the nodes and triangle leaves.
-    LINES = 2;
+    LINES = 2: CacheLine;
     /// `u32` per triangle, in the order of the leaves: its id in the source.
-    TRIANGLE_IDS = 3;
+    TRIANGLE_IDS = 3: u32;
     /// [`super::TetLeaf`]s.
-    TET_LEAVES = 4;
+    TET_LEAVES = 4: TetLeaf;
     /// [`super::Link32`] or [`super::Tet16`] records.
-    TETS = 5;
+    TETS = 5: [u8; 0];
     /// [`super::TetVertex`] positions.
-    TET_VERTICES = 6;
+    TET_VERTICES = 6: TetVertex;
     /// [`super::TetFace`]s, one per constrained face.
-    TET_FACES = 7;
+    TET_FACES = 7: TetFace;
     /// [`super::HullFace`]s.
-    HULL_FACES = 8;
+    HULL_FACES = 8: HullFace;
     /// `u32` per source triangle: its row in `TET_FACES`, or `NONE`.
-    TRIANGLE_FACES = 9;
+    TRIANGLE_FACES = 9: u32;
     /// `[u32; 16]` per indexed leaf and three of them per raw leaf, in the order of the leaves:
     /// rows of `POSITIONS`. Objects that have it can be given new positions ("Deformable objects").
-    LEAF_VERTICES = 10;
+    LEAF_VERTICES = 10: [u32; WIDTH];
     /// `u32` per source triangle: its [`super::TrianglePlace`], or `NONE`.
-    TRIANGLE_PLACES = 11;
+    TRIANGLE_PLACES = 11: u32;
     /// [`super::FreeDirections`] per source triangle: what rays that start on it cannot hit.
-    FREE_DIRECTIONS = 12;
+    FREE_DIRECTIONS = 12: FreeDirections;
     /// One [`super::FreeLevels`], if there are free directions or distances.
-    FREE_LEVELS = 13;
+    FREE_LEVELS = 13: FreeLevels;
     /// [`super::FreeDistances`] per source triangle, instead of free directions.
-    FREE_DISTANCES = 14;
+    FREE_DISTANCES = 14: FreeDistances;
     /// `[f32; 3]`: positions of the source, object space; distinct ones but in deformable objects.
-    POSITIONS = 16;
+    POSITIONS = 16: [f32; 3];
     /// `[u32; 3]` per source triangle: rows of `POSITIONS`.
-    TRIANGLES = 17;
+    TRIANGLES = 17: [u32; 3];
     /// `[u32; 3]` per source triangle: rows of `NORMALS` and `UVS`.
-    CORNERS = 18;
+    CORNERS = 18: [u32; 3];
     /// `[f32; 3]`: shading normals as in the source, of any length.
-    NORMALS = 19;
+    NORMALS = 19: [f32; 3];
     /// `[f32; 2]`: texture coordinates as in the source.
-    UVS = 20;
+    UVS = 20: [f32; 2];
     /// [`super::Group`]s: the groups of the object's triangles.
-    GROUPS = 21;
+    GROUPS = 21: Group;
     /// [`super::GroupRun`]s: which triangles belong to which group.
-    GROUP_RUNS = 22;
+    GROUP_RUNS = 22: GroupRun;
     /// [`super::Material`]s that groups refer to.
-    MATERIALS = 23;
+    MATERIALS = 23: Material;
     /// UTF-8 bytes of the names of groups and materials.
-    LABELS = 24;
+    LABELS = 24: u8;
     /// `f64` seconds of the frames of a sequence.
-    SEQUENCE_TIMES = 25;
+    SEQUENCE_TIMES = 25: f64;
     /// `[f32; 3]`: the positions of a sequence, by frame, then by row of `POSITIONS`.
-    SEQUENCE_POSITIONS = 26;
+    SEQUENCE_POSITIONS = 26: [f32; 3];
     /// `u32` per source triangle: a [`super::TriangleOpacity`].
-    OPACITY = 28;
+    OPACITY = 28: u32;
     /// `u32`: states of micro-triangles, two bits each.
-    OPACITY_MICRO = 29;
+    OPACITY_MICRO = 29: u32;
     /// UTF-8 JSON: how the file came about. Not part of the content id.
-    PROVENANCE = 32;
+    PROVENANCE = 32: u8;
     /// [`super::ObjectName`]s, one per object of the file.
-    OBJECT_NAMES = 33;
+    OBJECT_NAMES = 33: ObjectName;
     /// UTF-8 bytes of the names of objects.
-    OBJECT_LABELS = 34;
+    OBJECT_LABELS = 34: u8;
     /// [`super::MaterialParameters`], one per row of `MATERIALS`. This section and the three that
     /// follow belong to an object.
-    MATERIAL_PARAMETERS = 35;
+    MATERIAL_PARAMETERS = 35: MaterialParameters;
     /// [`super::Texture`]s that material parameters refer to.
-    TEXTURES = 36;
+    TEXTURES = 36: Texture;
     /// `[u32; 3]` per source triangle: rows of `COLORS`.
-    COLOR_CORNERS = 37;
+    COLOR_CORNERS = 37: [u32; 3];
     /// `[u16; 4]`: vertex colours, linear red, green, blue and alpha; 65,535 means 1.
-    COLORS = 38;
+    COLORS = 38: [u16; 4];
     /// [`super::Image`]s of textures, ascending by name. This section and the next one belong to
     /// the whole file.
-    IMAGES = 39;
+    IMAGES = 39: Image;
     /// Bytes of the image files.
-    IMAGE_BYTES = 40;
+    IMAGE_BYTES = 40: u8;
     /// One [`super::Deformation`]. This section and the five that follow belong to an object.
-    DEFORMATION = 41;
+    DEFORMATION = 41: Deformation;
     /// `[u16; 4]`: joints that move a position, of the skin of the object's deformer.
-    JOINTS = 42;
+    JOINTS = 42: [u16; 4];
     /// `[f32; 4]`: weights of the joints.
-    JOINT_WEIGHTS = 43;
+    JOINT_WEIGHTS = 43: [f32; 4];
     /// [`super::Morph`]s: of each target what it adds to positions, then what it adds to normals.
-    MORPHS = 44;
+    MORPHS = 44: Morph;
     /// `u32`: rows of `POSITIONS` or `NORMALS` that sparse morphs change.
-    MORPH_ROWS = 45;
+    MORPH_ROWS = 45: u32;
     /// `[f32; 3]`: what morphs add at a weight of 1.
-    MORPH_DELTAS = 46;
+    MORPH_DELTAS = 46: [f32; 3];
     /// One [`super::Scene`]. This section and the following ones belong to the whole file.
-    SCENE = 48;
+    SCENE = 48: Scene;
     /// [`super::Node`]s, parents before children.
-    NODES = 49;
+    NODES = 49: Node;
     /// [`super::Instance`]s.
-    INSTANCES = 50;
+    INSTANCES = 50: Instance;
     /// [`super::Track`]s, ascending by node and property.
-    TRACKS = 51;
+    TRACKS = 51: Track;
     /// `f64` seconds: times of the keys of all tracks.
-    TIMES = 52;
+    TIMES = 52: f64;
     /// `f64`: values of the keys of all tracks.
-    VALUES = 53;
+    VALUES = 53: f64;
     /// [`super::Camera`]s.
-    CAMERAS = 54;
+    CAMERAS = 54: Camera;
     /// [`super::Light`]s.
-    LIGHTS = 55;
+    LIGHTS = 55: Light;
     /// UTF-8 bytes of the names of nodes, cameras and lights.
-    NAMES = 56;
+    NAMES = 56: u8;
     /// [`super::Deformer`]s, ascending by node.
-    DEFORMERS = 57;
+    DEFORMERS = 57: Deformer;
     /// [`super::Skin`]s.
-    SKINS = 58;
+    SKINS = 58: Skin;
     /// [`super::SkinJoint`]s of all skins.
-    SKIN_JOINTS = 59;
+    SKIN_JOINTS = 59: SkinJoint;
     /// `f64`: weights of the morph targets of all deformers, where no track gives others.
-    MORPH_WEIGHTS = 60;
+    MORPH_WEIGHTS = 60: f64;
     /// `[u32; 3]` per source triangle: rows of `SECOND_UVS`.
-    SECOND_CORNERS = 68;
+    SECOND_CORNERS = 68: [u32; 3];
     /// `[f32; 2]`: a second set of texture coordinates.
-    SECOND_UVS = 69;
+    SECOND_UVS = 69: [f32; 2];
 }
 
 /// Kind of trees for ranges of time in older files, which are refused (BTH-F007).

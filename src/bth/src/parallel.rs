@@ -25,7 +25,7 @@ impl Tasks {
     }
 
     /// Returns true if `test` does for all chunks of rows.
-    pub(crate) fn all<T: Sync>(self, rows: &[T], test: impl Fn(&[T]) -> bool + Sync) -> bool {
+    pub(crate) fn all<T: Sync>(self, rows: &[T], test: impl Fn(&[T]) -> bool + Sync + Send) -> bool {
         #[cfg(feature = "rayon")]
         if rows.len() >= self.min_rows {
             use rayon::iter::ParallelIterator;
@@ -37,7 +37,7 @@ impl Tasks {
 }
 
 /// The results of `work` for each item.
-pub(crate) fn map<T: Send, R: Send>(items: Vec<T>, work: impl Fn(T) -> R + Sync) -> Vec<R> {
+pub(crate) fn map<T: Send, R: Send>(items: Vec<T>, work: impl Fn(T) -> R + Sync + Send) -> Vec<R> {
     #[cfg(feature = "rayon")]
     if items.len() > 1 {
         use rayon::iter::{IntoParallelIterator, ParallelIterator};

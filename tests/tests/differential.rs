@@ -287,8 +287,8 @@ fn tets_are_really_walked_also_from_starts() {
         from_starts += tets.nearest_counted(&onward).1;
         rays += 1;
     }
-    assert!(plain.tets > 0 && from_starts.tets > 0, "{plain:?} {from_starts:?}");
+    assert!(plain.cells > 0 && from_starts.cells > 0, "{plain:?} {from_starts:?}");
     assert_eq!((plain.nodes, from_starts.nodes), (0, 0), "{plain:?} {from_starts:?}");
-    assert!(from_starts.tets < plain.tets, "{from_starts:?} {plain:?}");
+    assert!(from_starts.cells < plain.cells, "{from_starts:?} {plain:?}");
     assert!(from_starts.floods * 3 < rays, "most rays need no exact fall-back: {from_starts:?} of {rays}");
 }

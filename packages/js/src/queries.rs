@@ -128,7 +128,7 @@ pub unsafe extern "C" fn bth_steps(scene: *const Scene, rays: *const Ray, count:
     };
     for (i, ray) in rays.iter().enumerate() {
         let (_, steps) = scene.nearest_counted(ray);
-        let words = [steps.nodes, steps.leaves, steps.triangles, steps.tets];
+        let words = [steps.nodes, steps.leaves, steps.triangles, steps.cells];
         for (k, word) in words.into_iter().enumerate() {
             columns[k * count + i] = word;
         }

@@ -7,13 +7,13 @@
 //! for rays ([`mod@crate::intersect::start`]). Triangles through A or B, or in a plane with both,
 //! do not block.
 
-use crate::bvh::enumerate::{Receiver, enumerate_within};
+use crate::bvh::enumerate::enumerate_within;
 use crate::enumerate::{EnteredInstance, enumerate_instances};
 use crate::intersect::segment::{ExactEnd, Segment};
 use crate::intersect::start::start_on;
 use crate::intersect::start_point::StartPoint;
 use crate::intersect::vector::wide;
-use crate::query::TriangleRef;
+use crate::query::{Receiver, TriangleRef};
 use crate::rays::{Ray, Start};
 use crate::scene::Scene;
 use crate::starts::world_ray::{InstanceStart, WorldRay};

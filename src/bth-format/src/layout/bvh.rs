@@ -102,17 +102,18 @@ pub struct RawLeaf {
 }
 
 impl IndexedLeaf {
-    /// Corners of the triangle in a slot. Panics where a corner is no vertex; after
-    /// [`crate::File::check`] all are.
+    /// Corners of the triangle in a slot. Slots and vertices are taken modulo [`WIDTH`]: those of
+    /// unchecked files may be larger.
     pub(crate) fn triangle(&self, slot: usize) -> [[f32; 3]; 3] {
-        self.corner.map(|vertices| self.vertex.map(|row| row[vertices[slot] as usize]))
+        let vertex = self.corner.map(|vertices| vertices[slot % WIDTH] as usize % WIDTH);
+        vertex.map(|vertex| self.vertex.map(|row| row[vertex]))
     }
 }
 
 impl RawLeaf {
-    /// Corners of the triangle in a slot.
+    /// Corners of the triangle in a slot, which is taken modulo [`WIDTH`].
     pub(crate) fn triangle(&self, slot: usize) -> [[f32; 3]; 3] {
-        self.corner.map(|rows| rows.map(|row| row[slot]))
+        self.corner.map(|rows| rows.map(|row| row[slot % WIDTH]))
     }
 }
 

@@ -33,6 +33,34 @@ impl<'a> ObjectView<'a> {
         &scratch.insert(Unpacked(self.unpacked_raw(grid, index))).0
     }
 
+    /// The corners of the triangle in a slot of a leaf, given as its child code; in a tet leaf `slot` is
+    /// a row of TET_FACES. `None` if there is no such leaf.
+    #[inline(never)]
+    pub fn corners_in(&self, leaf: u32, slot: u32) -> Option<[[f32; 3]; 3]> {
+        let (at, mut indexed, mut raw) = (slot as usize, None, None);
+        match Child::from_code(leaf)? {
+            Child::Indexed(index) => Some(self.indexed(index, &mut indexed).triangle(at)),
+            Child::Raw(index) => Some(self.raw(index, &mut raw).triangle(at)),
+            Child::Tets(_) => Some(self.face_corners(self.tet_faces.get(at)?)),
+            Child::Node(_) => None,
+        }
+    }
+
+    /// The corners of a constrained face.
+    pub fn face_corners(&self, face: &TetFace) -> [[f32; 3]; 3] {
+        face.vertex.map(|v| self.tet_vertices[v as usize].position)
+    }
+
+    /// The child code of the tet leaf without a subtree that holds a triangle, and its row of
+    /// TET_FACES.
+    #[cold]
+    #[inline(never)]
+    pub fn special_place(&self, triangle: u32) -> Option<(u32, u32)> {
+        let face = *self.triangle_faces.get(triangle as usize)?;
+        let leaf = self.tet_leaves.partition_point(|leaf| leaf.first_face <= face).checked_sub(1)?;
+        (face != NONE).then(|| (Child::Tets(leaf as u32).code(), face))
+    }
+
     #[inline(always)]
     fn unpacked_indexed(&self, grid: &Grid, half_line: u32) -> IndexedLeaf {
         match grid.bits {

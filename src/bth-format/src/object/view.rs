@@ -72,7 +72,47 @@ pub struct ObjectView<'a> {
     pub opacity_micro: &'a [u32],
 }
 
-impl ObjectView<'_> {
+impl<'a> ObjectView<'a> {
+    /// An object that is a tree of triangle leaves of `f32`, without any other section.
+    pub fn of_tree(
+        identity: Identity,
+        header: &'a Object,
+        lines: &'a [CacheLine],
+        triangle_ids: &'a [u32],
+    ) -> ObjectView<'a> {
+        let bounds = ObjectBounds::new(header);
+        ObjectView {
+            identity,
+            header,
+            bounds,
+            start_bounds: bounds.for_starts(),
+            grid: None,
+            lines,
+            leaf_vertices: &[],
+            triangle_ids,
+            tet_leaves: &[],
+            records: Records::None,
+            tet_vertices: &[],
+            tet_faces: &[],
+            hull_faces: &[],
+            triangle_faces: &[],
+            places: &[],
+            free: &[],
+            free_distances: &[],
+            free_levels: &[],
+            positions: &[],
+            triangles: &[],
+            corners: &[],
+            normals: &[],
+            uvs: &[],
+            groups: &[],
+            group_runs: &[],
+            materials: &[],
+            labels: &[],
+            opacity: &[],
+            opacity_micro: &[],
+        }
+    }
     /// Returns true if the object can be given new positions.
     #[inline(always)]
     pub fn is_deformable(&self) -> bool {

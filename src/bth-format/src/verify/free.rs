@@ -25,7 +25,10 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
         (0..view.header.triangles as usize).map_while(|triangle| view.known_free(triangle)).collect();
     let triangles: Vec<Option<Corners>> = (0..)
         .zip(&known)
-        .map(|(triangle, known)| if known.is_nothing() { None } else { corners(view, view.place(triangle)?) })
+        .map(|(triangle, known)| {
+            let TrianglePlace { leaf, slot } = view.place(triangle).filter(|_| !known.is_nothing())?;
+            view.corners_in(leaf.code(), slot)
+        })
         .collect();
     let levels = view.free_levels.first().copied().unwrap_or_default();
     let (kind, stride) = view.free_kind();
@@ -79,16 +82,6 @@ fn all_corners(view: &ObjectView) -> Vec<(u32, Corners)> {
         }
     }
     found
-}
-
-/// The corners of the triangle at a place, if it is one.
-fn corners(view: &ObjectView, TrianglePlace { leaf, slot }: TrianglePlace) -> Option<Corners> {
-    let (mut indexed, mut raw) = (None, None);
-    match leaf {
-        Child::Indexed(index) => Some(view.indexed(index, &mut indexed).triangle(slot as usize)),
-        Child::Raw(index) => Some(view.raw(index, &mut raw).triangle(slot as usize)),
-        Child::Node(_) | Child::Tets(_) => None,
-    }
 }
 
 /// A triangle from which rays are sent.

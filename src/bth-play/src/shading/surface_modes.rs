@@ -83,8 +83,8 @@ pub(super) fn ambient_occlusion(
 pub(super) fn steps(scene: &Scene, rays: &[Ray], total: &mut DVec4) -> Vec<Vec3> {
     let count = |ray: &Ray| {
         let (_, steps) = scene.nearest_counted(ray);
-        *total += DVec4::from_array([steps.nodes, steps.leaves, steps.triangles, steps.tets].map(f64::from));
-        Vec3::X * (steps.nodes + steps.leaves + steps.tets) as f32
+        *total += DVec4::from_array([steps.nodes, steps.leaves, steps.triangles, steps.cells].map(f64::from));
+        Vec3::X * (steps.nodes + steps.leaves + steps.cells) as f32
     };
     rays.iter().map(count).collect()
 }

@@ -12,25 +12,13 @@ use super::ray_state::key_limit;
 use super::walk::{BoxQuery, ObjectTree, TriangleQuery, any_in_set, run_walk};
 use crate::intersect::boxes::{RaySlabLanes, RaySlabs};
 use crate::intersect::filter::TriangleBlock;
-use crate::intersect::line::Line;
 use crate::intersect::prepare::PreparedRay;
 use crate::intersect::start_point::ExactRay;
-use crate::query::TriangleRef;
+use crate::query::{Receiver, TriangleRef};
+use crate::shortcuts::SpecialLeaf;
 use crate::simd::{Scalar, Simd};
-use crate::tets::flood::{FaceReceiver, VisitedSet};
-use crate::tets::walk::TetWalker;
-use bth_format::layout::{NONE, TetFace, WideNode};
+use bth_format::layout::{NONE, WideNode};
 use bth_format::object::{ObjectBounds, ObjectView};
-
-/// Receiver of the triangles that a ray may hit.
-pub(crate) trait Receiver {
-    /// Receives a triangle and its corners in object space, in the order of the source. Returns
-    /// true if the query is complete, which ends the enumeration.
-    fn receive(&mut self, triangle: TriangleRef<'_>, corners: [[f32; 3]; 3]) -> bool;
-    /// Upper bound of the exact t, in the units of the ray, of further intersections that can
-    /// change the result. It may shrink with every triangle. Triangles beyond it may be skipped.
-    fn limit(&self) -> f64;
-}
 
 /// Passes to a receiver each triangle of an object that the line of a ray touches at a t from
 /// `tmin` to `tmax` and the receiver's limit, and some others. Nearer boxes come first, but
@@ -109,8 +97,14 @@ impl<'a> TriangleQuery for RayTriangles<'a> {
         found.maybe != 0 && pass_triangles(block, found.maybe, ids, self.receiver)
     }
     #[inline(always)]
-    fn tets<S: Simd>(&mut self, _: S, _: &&'a RaySlabs, object: &ObjectView<'_>, row: u32) -> bool {
-        pass_faces(object, row, self.ray, self.receiver)
+    fn special<S: Simd>(
+        &mut self,
+        _: S,
+        _: &&'a RaySlabs,
+        object: &ObjectView<'_>,
+        leaf: SpecialLeaf,
+    ) -> bool {
+        leaf.pass_triangles(object, self.ray, self.receiver)
     }
 }
 
@@ -126,44 +120,4 @@ fn pass_triangles(
     any_in_set(triangles, |i| {
         receiver.receive(TriangleRef::index(block.first() + i as u32, ids), block.corners(i))
     })
-}
-
-/// Passes the constrained faces of a tet leaf without a subtree that the line may touch. Returns
-/// true if the query is complete. A flood fill finds every face that the line touches, even where
-/// it passes through edges and vertices or lies in the plane of a face.
-#[cold]
-#[inline(never)]
-fn pass_faces(
-    object: &ObjectView<'_>,
-    row: u32,
-    (ray, start): ExactRay<'_>,
-    receiver: &mut dyn Receiver,
-) -> bool {
-    let Some(mut line) = Line::new(ray) else { return false };
-    if let Some(start) = start {
-        line.start_at(start);
-    }
-    let walker = TetWalker::new(object, row, &line);
-    walker.flood_faces(&mut PassedFaces { object, receiver, passed: VisitedSet::new() }, &mut ())
-}
-
-/// Passes the faces that a flood reaches to a receiver.
-struct PassedFaces<'a> {
-    object: &'a ObjectView<'a>,
-    receiver: &'a mut dyn Receiver,
-    /// Ids of the passed triangles: the flood may reach a face from both sides.
-    passed: VisitedSet,
-}
-
-impl FaceReceiver for PassedFaces<'_> {
-    fn receive(&mut self, face: &TetFace) -> bool {
-        if !self.passed.insert(face.triangle) {
-            return false;
-        }
-        let corners = face.vertex.map(|v| self.object.tet_vertices[v as usize].position);
-        self.receiver.receive(TriangleRef::id(face.triangle, self.object.triangle_ids), corners)
-    }
-    fn limit(&self) -> f64 {
-        self.receiver.limit()
-    }
 }

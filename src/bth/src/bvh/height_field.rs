@@ -5,7 +5,7 @@ use bth_format::layout::{
     CacheLine, Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, NONE, Object, RAW_LINES, RawLeaf, WIDTH,
     WideNode,
 };
-use bth_format::object::{ObjectBounds, ObjectView, Records};
+use bth_format::object::ObjectView;
 use bth_random::Rng;
 use zerocopy::{FromZeros, IntoBytes};
 
@@ -136,37 +136,6 @@ impl HeightField {
     }
 
     pub(crate) fn view(&self) -> ObjectView<'_> {
-        let bounds = ObjectBounds::new(&self.header);
-        ObjectView {
-            identity: self.identity,
-            header: &self.header,
-            bounds,
-            start_bounds: bounds.for_starts(),
-            grid: None,
-            lines: &self.lines,
-            leaf_vertices: &[],
-            triangle_ids: &self.ids,
-            tet_leaves: &[],
-            records: Records::None,
-            tet_vertices: &[],
-            tet_faces: &[],
-            hull_faces: &[],
-            triangle_faces: &[],
-            places: &[],
-            free: &[],
-            free_distances: &[],
-            free_levels: &[],
-            positions: &[],
-            triangles: &[],
-            corners: &[],
-            normals: &[],
-            uvs: &[],
-            groups: &[],
-            group_runs: &[],
-            materials: &[],
-            labels: &[],
-            opacity: &[],
-            opacity_micro: &[],
-        }
+        ObjectView::of_tree(self.identity, &self.header, &self.lines, &self.ids)
     }
 }

@@ -1,42 +1,29 @@
 //! Traversal of an object's BVH by the rays of a batch, interleaved: rays are prepared sixteen at a
 //! time, enter the pool as slots become free, and their answers are stored as they finish.
 
-use super::coherence::is_same_octant;
 use super::deferred::DeferredHits;
-use super::entry_node::{ENTRY_RAYS, FindEntryNode};
 use super::leaf::{LeafOutcome, RayProgress, decide};
-use super::nodes::root;
 use super::ray_pool::{POOL_SIZE, PoolSlot, RareSteps, RayPool, has_rare_steps};
 use super::ray_state::RayState;
 use super::stack::Stacks;
+use crate::coherence::is_same_octant;
 use crate::intersect::prepare::Prepared;
 use crate::intersect::start_point::ExactRay;
+use crate::query::Goal;
 use crate::query::sink::Sink;
-use crate::query::{EitherQuery, Goal, RayQuery};
-
 use crate::rays::Ray;
+use crate::shortcuts::{self, ENTRY_RAYS, FindEntryNode, SpecialLeaf};
 use crate::simd::{CacheLevel, Kernel, LANES, Scalar, Simd};
-use crate::tets::{TetOutcome, enter_tets};
 use bth_format::layout::{Child, NONE, WIDTH, WideNode};
 use bth_format::object::ObjectBounds;
 use bth_format::object::ObjectView;
-
-/// The rays of a batch that are to be traced, with what is known of them.
-pub(crate) struct RemainingRays<'a> {
-    /// Indices in the batch of the rays to trace, in this order; all rays if absent.
-    pub(crate) order: Option<&'a [u32]>,
-    /// Queries of all rays of the batch, if another structure has been traversed before.
-    pub(crate) queries: Option<&'a [EitherQuery]>,
-    /// For each ray of the batch the row of the tet leaf whose hits its query already holds, or
-    /// `NONE`.
-    pub(crate) walked: Option<&'a [u32]>,
-}
 
 /// The kernel that traverses a batch and stores its answers.
 pub(crate) struct Interleaved<'a, 's, G: Goal> {
     pub(crate) object: &'a ObjectView<'a>,
     pub(crate) rays: &'a [Ray],
-    pub(crate) remaining: RemainingRays<'a>,
+    /// Indices in the batch of the rays to trace, in this order; all rays if absent.
+    pub(crate) order: Option<&'a [u32]>,
     pub(crate) stacks: &'a mut Stacks,
     pub(crate) sink: &'a mut Sink<'s>,
     pub(crate) goal: G,
@@ -66,7 +53,7 @@ struct RaySource<'a> {
     ray: [u32; LANES],
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
-    remaining: RemainingRays<'a>,
+    order: Option<&'a [u32]>,
     /// Child code at which rays start.
     root: u32,
     bounds: ObjectBounds,
@@ -86,13 +73,13 @@ impl<G: Goal> Kernel for Interleaved<'_, '_, G> {
     const LONG_VECTORS: bool = G::LONG_VECTORS;
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Interleaved { object, rays, remaining, stacks, sink, goal, entry_nodes } = self;
-        let (walked, starts) = (remaining.walked, sink.starts());
+        let Interleaved { object, rays, order, stacks, sink, goal, entry_nodes } = self;
+        let starts = sink.starts();
         let mut source = RaySource {
             object,
             rays,
-            remaining,
-            root: root(object),
+            order,
+            root: shortcuts::root(object),
             bounds: object.bounds,
             prepared: Prepared::new(),
             ray: [0; LANES],
@@ -120,15 +107,12 @@ impl<G: Goal> Kernel for Interleaved<'_, '_, G> {
             for i in 0..pool.take_bottom() {
                 if let Some(slot) = pool.finished(i) {
                     deferred.add(s, object, rays, pool.state(slot), sink);
-                    source.start(s, goal, slot, &mut pool);
+                    source.start(s, slot, &mut pool);
                 }
             }
-            pool.leaf_steps(s, (object, rays, starts), |row, state| {
+            pool.leaf_steps(s, (object, rays, starts), |leaf, state| {
                 let ray = state.ray();
-                if walked.is_some_and(|walked| walked[ray] == row) {
-                    return LeafOutcome::Nothing;
-                }
-                enter_tet_leaf(object, row, (&rays[ray], starts.of(ray)), state)
+                enter_special_leaf(object, leaf, (&rays[ray], starts.of(ray)), state)
             });
         }
         // An any-hit query has no pending hits.
@@ -141,7 +125,7 @@ impl<G: Goal> Kernel for Interleaved<'_, '_, G> {
 impl RaySource<'_> {
     /// Starts the next ray that can hit anything in a slot, if there is one.
     #[inline(always)]
-    fn start<S: Simd, G: Goal>(&mut self, s: S, goal: G, slot: usize, pool: &mut RayPool<'_, G>) {
+    fn start<S: Simd, G: Goal>(&mut self, s: S, slot: usize, pool: &mut RayPool<'_, G>) {
         loop {
             while self.used == self.filled {
                 if !self.refill(s) {
@@ -151,19 +135,15 @@ impl RaySource<'_> {
             let lane = usize::from(self.lane[self.used]) % LANES;
             self.used += 1;
             let index = self.ray[lane];
-            let query = self.remaining.queries.map(|queries| walked(goal, &queries[index as usize]));
             let prepared = self.prepared.prepared(lane);
             let state = pool.state(slot);
             if let Some(prepared) = prepared {
-                state.start(prepared, query);
+                state.start(prepared);
             } else {
                 let ray = (index, &self.rays[index as usize]);
-                if !state.start_unprepared(self.object, ray, query) {
+                if !state.start_unprepared(self.object, ray) {
                     continue;
                 }
-            }
-            if query.is_some() {
-                state.update_from_query(&self.rays[index as usize], self.bounds.origin_error);
             }
             if prepared.is_some() && self.root & Child::LEAF_BIT == 0 {
                 pool.start_among(s, slot, &self.codes, (self.children[lane], s.load(&self.enter[lane])));
@@ -177,7 +157,7 @@ impl RaySource<'_> {
     /// Prepares up to sixteen of the next rays. Returns false if no ray is left.
     #[inline(always)]
     fn refill<S: Simd>(&mut self, s: S) -> bool {
-        let order = self.remaining.order;
+        let order = self.order;
         let total = order.map_or(self.rays.len(), <[u32]>::len);
         let count = (total - self.taken).min(LANES);
         for i in 0..count {
@@ -226,9 +206,7 @@ impl RaySource<'_> {
         }
         let first = self.ray[0] as usize;
         let Some(rays) = self.rays.get(first..first + ENTRY_RAYS) else { return };
-        if !is_same_octant(&rays[0], &rays[ENTRY_RAYS - 1])
-            || !is_run(self.remaining.order, self.taken, first)
-        {
+        if !is_same_octant(&rays[0], &rays[ENTRY_RAYS - 1]) || !is_run(self.order, self.taken, first) {
             return;
         }
         let (node_base, root, bounds) = (self.object.node_base(), self.root, &self.bounds);
@@ -236,13 +214,6 @@ impl RaySource<'_> {
             self.entered = self.taken + ENTRY_RAYS;
         }
     }
-}
-
-/// The query of a ray that has been walked before.
-#[cold]
-#[inline(never)]
-fn walked<G: Goal>(goal: G, query: &EitherQuery) -> RayQuery<G> {
-    query.with_goal(goal)
 }
 
 /// Returns true if the next [`ENTRY_RAYS`] rays of an order, from `taken` on, exist and are the
@@ -255,17 +226,17 @@ fn is_run(order: Option<&[u32]>, taken: usize, first: usize) -> bool {
     })
 }
 
-/// Walks a ray through a tet leaf without a subtree.
+/// Enters a special leaf.
 #[cold]
 #[inline(never)]
-fn enter_tet_leaf<G: Goal>(
+fn enter_special_leaf<G: Goal>(
     object: &ObjectView<'_>,
-    row: u32,
+    leaf: SpecialLeaf,
     ray: ExactRay<'_>,
     state: &mut RayState<G>,
 ) -> LeafOutcome {
     decide(Scalar, object, ray, &object.bounds, state, (NONE, 0));
-    if enter_tets(object, row, ray, state.query(ray.0), &mut ()) == TetOutcome::Done {
+    if leaf.enter(object, ray, state.query(ray.0), &mut ()) {
         LeafOutcome::Done
     } else {
         state.update_from_query(ray.0, object.bounds.origin_error)

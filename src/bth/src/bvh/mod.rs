@@ -9,8 +9,8 @@
 //!   stacks ([`stack`]) and with hits that are computed for sixteen rays at a time ([`deferred`]);
 //! - [`packet`]: coherent rays that enter nodes together.
 //!
-//! [`coherence`] decides which rays are coherent; a [`shaft`] bounds them. In large objects,
-//! interleaved rays begin below the root ([`entry_node`]).
+//! Where rays begin instead of the root, and leaves that hold no block of triangles, are the matter of
+//! [`crate::shortcuts`].
 //!
 //! All other queries take one walk ([`walk`]); [`enumerate`] passes every triangle that a ray may
 //! hit to a receiver.
@@ -19,9 +19,7 @@
 pub(crate) mod box_oracle;
 pub(crate) mod candidate;
 pub(crate) mod certain_hit;
-pub(crate) mod coherence;
 pub(crate) mod deferred;
-mod entry_node;
 pub(crate) mod enumerate;
 #[cfg(test)]
 pub(crate) mod height_field;
@@ -31,7 +29,6 @@ pub(crate) mod nodes;
 pub(crate) mod packet;
 mod ray_pool;
 pub(crate) mod ray_state;
-pub(crate) mod shaft;
 pub(crate) mod single;
 pub(crate) mod single_stack;
 pub(crate) mod stack;

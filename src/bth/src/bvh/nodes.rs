@@ -2,8 +2,9 @@
 //! unpack the others.
 
 use crate::intersect::filter::TriangleBlock;
+use crate::shortcuts::{self, Special, SpecialLeaf};
 use crate::simd::{CacheLevel, Part, Scalar, Simd};
-use bth_format::layout::{Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, NONE, RawLeaf};
+use bth_format::layout::{Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, RAW_LINES, RawLeaf};
 use bth_format::object::{NodeBase, ObjectView, Unpacked};
 
 /// Unpacking of the leaf on a grid at an index of a child code, as a part of kernels: it is long,
@@ -74,9 +75,9 @@ pub(crate) enum Leaf<'r> {
     Indexed(&'r IndexedLeaf),
     /// A leaf with the coordinates of each corner.
     Raw(&'r RawLeaf),
-    /// The row of a tet leaf without a subtree.
-    Tets(u32),
-    /// The child code of a tet leaf's subtree.
+    /// A leaf that holds no block of triangles.
+    Special(SpecialLeaf),
+    /// The child code of the subtree that is entered instead of a special leaf.
     Subtree(u32),
     /// No leaf: an empty slot, a node, or a code of a file that was not checked.
     None,
@@ -104,41 +105,35 @@ pub(crate) fn leaf<'r, S: Simd>(
     }
     match Child::from_code(code) {
         Some(Child::Raw(index)) => Leaf::Raw(raw(s, object, index, &mut memory.raw)),
-        Some(Child::Tets(row)) => match object.tet_leaves[row as usize].subtree {
-            NONE => Leaf::Tets(row),
-            subtree => Leaf::Subtree(subtree),
+        Some(child) => match shortcuts::special(object, child) {
+            Some(Special::Leaf(leaf)) => Leaf::Special(leaf),
+            Some(Special::Subtree(code)) => Leaf::Subtree(code),
+            None => Leaf::None,
         },
-        _ => Leaf::None,
+        None => Leaf::None,
     }
 }
 
 /// The index in the object's leaf order of a triangle of the leaf with this child code, and its
-/// corners. `None` for tet leaves, and if there is no such leaf.
+/// corners. `None` for special leaves, and if there is no such leaf.
 #[inline(always)]
 pub(crate) fn triangle(object: &ObjectView<'_>, code: u32, triangle: u32) -> Option<(u32, [[f32; 3]; 3])> {
     let at = triangle as usize;
     match leaf(Scalar, object, object.node_base(), code, &mut LeafMemory::default()) {
         Leaf::Indexed(leaf) => Some((leaf.first + triangle, leaf.corners(at))),
         Leaf::Raw(leaf) => Some((leaf.first + triangle, leaf.corners(at))),
-        Leaf::Tets(_) | Leaf::Subtree(_) | Leaf::None => None,
+        Leaf::Special(_) | Leaf::Subtree(_) | Leaf::None => None,
     }
 }
 
-/// The child code at which rays start: the root, or its subtree if the root is a tet leaf that has
-/// one.
-pub(crate) fn root(object: &ObjectView<'_>) -> u32 {
-    match leaf(Scalar, object, object.node_base(), object.header.root, &mut LeafMemory::default()) {
-        Leaf::Subtree(subtree) => subtree,
-        _ => object.header.root,
-    }
-}
-
-/// Row of the tet leaf that is the whole object, if its triangles are not also in a BVH; else
-/// `NONE`.
-pub(crate) fn sole_tet_leaf(object: &ObjectView<'_>) -> u32 {
-    match leaf(Scalar, object, object.node_base(), object.header.root, &mut LeafMemory::default()) {
-        Leaf::Tets(row) => row,
-        _ => NONE,
+/// The lines and the rows of LEAF_VERTICES of the leaf with this child code, in a deformable object:
+/// one row for an indexed leaf, three for a raw one. `None` for codes of nodes.
+#[inline(always)]
+pub(crate) fn leaf_size(code: u32) -> Option<(u32, u32)> {
+    match Child::from_code(code) {
+        Some(Child::Indexed(_)) => Some((INDEXED_LINES as u32, 1)),
+        Some(Child::Raw(_)) => Some((RAW_LINES as u32, 3)),
+        _ => None,
     }
 }
 

@@ -9,6 +9,7 @@ use super::stack::{BOTTOM, StackPosition, Stacks};
 use crate::intersect::start_point::Starts;
 use crate::query::{Goal, RayQuery};
 use crate::rays::Ray;
+use crate::shortcuts::SpecialLeaf;
 use crate::simd::{CacheLevel, Part, Simd};
 use bth_format::layout::{Child, WIDTH};
 use bth_format::object::ObjectView;
@@ -246,14 +247,14 @@ impl<'a, G: Goal> RayPool<'a, G> {
         self.counts = counts;
     }
 
-    /// Makes the step of each ray whose next step enters a leaf. `tets` intersects a tet leaf
-    /// without a subtree, given its row and the ray.
+    /// Makes the step of each ray whose next step enters a leaf. `special` enters a
+    /// [`SpecialLeaf`].
     #[inline(always)]
     pub(super) fn leaf_steps<S: Simd>(
         &mut self,
         s: S,
         (object, rays, starts): (&ObjectView<'_>, &[Ray], Starts<'_>),
-        mut tets: impl FnMut(u32, &mut RayState<G>) -> LeafOutcome,
+        mut special: impl FnMut(SpecialLeaf, &mut RayState<G>) -> LeafOutcome,
     ) {
         let RayPool { slots, tops, lists, stacks, bottoms, goal, .. } = self;
         let (mut counts, node_base, goal) = (self.counts, object.node_base(), *goal);
@@ -271,7 +272,7 @@ impl<'a, G: Goal> RayPool<'a, G> {
                 Leaf::Raw(leaf) => {
                     enter_leaf(s, (object, goal), &object.bounds, exact_ray, state, (leaf, code))
                 }
-                Leaf::Tets(row) => tets(row, state),
+                Leaf::Special(leaf) => special(leaf, state),
                 Leaf::Subtree(subtree) => {
                     stacks.set_code(top, subtree);
                     LeafOutcome::Replaced

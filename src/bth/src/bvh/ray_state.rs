@@ -43,15 +43,10 @@ impl<G: Goal> RayState<G> {
     /// false if the ray cannot hit anything ([`PreparedRay::in_f64`]).
     #[cold]
     #[inline(never)]
-    pub(crate) fn start_unprepared(
-        &mut self,
-        object: &ObjectView<'_>,
-        (index, ray): (u32, &Ray),
-        query: Option<RayQuery<G>>,
-    ) -> bool {
+    pub(crate) fn start_unprepared(&mut self, object: &ObjectView<'_>, (index, ray): (u32, &Ray)) -> bool {
         let prepared =
             PreparedRay::of(Scalar, &object.bounds, ray).or_else(|| PreparedRay::in_f64(&object.bounds, ray));
-        prepared.map(|prepared| self.start(&PreparedRay { ray: index, ..prepared }, query)).is_some()
+        prepared.map(|prepared| self.start(&PreparedRay { ray: index, ..prepared })).is_some()
     }
 
     /// State without a ray.
@@ -62,13 +57,10 @@ impl<G: Goal> RayState<G> {
         }
     }
 
-    /// Begins a prepared ray, with its query if that was constructed before.
+    /// Begins a prepared ray.
     #[inline(always)]
-    pub(crate) fn start(&mut self, prepared: &PreparedRay, query: Option<RayQuery<G>>) {
+    pub(crate) fn start(&mut self, prepared: &PreparedRay) {
         self.prepared = *prepared;
-        if let Some(query) = query {
-            self.set_query(query);
-        }
     }
 
     fn set_query(&mut self, query: RayQuery<G>) {

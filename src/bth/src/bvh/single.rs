@@ -15,7 +15,6 @@ use crate::intersect::start_point::ExactRay;
 use crate::query::{Count, Goal, RayQuery};
 use crate::rays::Ray;
 use crate::simd::Simd;
-use crate::tets::{TetOutcome, enter_tets};
 use bth_format::layout::{Child, NONE, WIDTH};
 use bth_format::object::{NodeBase, ObjectBounds, ObjectView};
 use std::hint::black_box;
@@ -141,10 +140,10 @@ pub(crate) fn trace_single<S: Simd, G: Goal, C: Count>(
                 code = subtree;
                 continue;
             }
-            Leaf::Tets(row) => {
+            Leaf::Special(leaf) => {
                 count.leaf();
                 decide(s, object, ray, bounds, &mut state, (NONE, 0));
-                let done = enter_tets(object, row, ray, state.query(ray.0), count) == TetOutcome::Done;
+                let done = leaf.enter(object, ray, state.query(ray.0), count);
                 state.update_from_query(ray.0, bounds.origin_error);
                 done
             }

@@ -10,8 +10,9 @@ use super::stack::BOTTOM;
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::point_lanes::CornerLanes;
 use crate::query::{AnyHit, NearestHit};
-use crate::simd::{Isa, Kernel, LANES, Part, Simd};
-use bth_format::layout::{Child, NONE, RawLeaf, TetLeaf, WIDTH, WideNode};
+use crate::shortcuts::SpecialLeaf;
+use crate::simd::{Isa, Kernel, Part, Simd};
+use bth_format::layout::{Child, WIDTH, WideNode};
 use bth_format::object::{NodeBase, ObjectView};
 
 /// Which boxes of a tree may matter to a query.
@@ -50,14 +51,19 @@ pub(crate) trait TriangleQuery: BoxQuery {
         limit: f32,
     ) -> bool;
 
-    /// Visits the constrained faces of a tet leaf without a subtree. Returns true if the query is
-    /// complete.
+    /// Visits the triangles of a special leaf. Returns true if the query is complete.
     #[inline(always)]
-    fn tets<S: Simd>(&mut self, s: S, lanes: &Self::Constants<S>, object: &ObjectView<'_>, row: u32) -> bool
+    fn special<S: Simd>(
+        &mut self,
+        s: S,
+        lanes: &Self::Constants<S>,
+        object: &ObjectView<'_>,
+        leaf: SpecialLeaf,
+    ) -> bool
     where
         Self: Sized,
     {
-        s.call(FacesAsLeaves { query: self, lanes, object, leaf: &object.tet_leaves[row as usize] })
+        s.call(SpecialBlocks { query: self, lanes, object, leaf })
     }
 }
 
@@ -79,7 +85,7 @@ pub(crate) trait Tree<Q: BoxQuery> {
     /// Prefetches what is entered soon.
     #[inline(always)]
     fn prefetch<S: Simd>(&self, _: S, _code: u32) {}
-    /// Visits the leaf of a child code; the code may be [`NONE`].
+    /// Visits the leaf of a child code; the code may be `NONE`.
     fn leaf<S: Simd>(&self, s: S, lanes: &Q::Constants<S>, code: u32, query: &mut Q, limit: f32)
     -> AfterLeaf;
 }
@@ -200,7 +206,7 @@ impl<Q: TriangleQuery> Tree<Q> for ObjectTree<'_> {
         let is_complete = match leaf(s, object, self.node_base, code, &mut memory) {
             Leaf::Indexed(block) => query.triangles(s, lanes, block, object.triangle_ids, limit),
             Leaf::Raw(block) => query.triangles(s, lanes, block, object.triangle_ids, limit),
-            Leaf::Tets(row) => query.tets(s, lanes, object, row),
+            Leaf::Special(leaf) => query.special(s, lanes, object, leaf),
             Leaf::Subtree(subtree) => return AfterLeaf::Enter(subtree),
             Leaf::None => false,
         };
@@ -208,36 +214,24 @@ impl<Q: TriangleQuery> Tree<Q> for ObjectTree<'_> {
     }
 }
 
-/// The constrained faces of a tet leaf, as leaves of sixteen triangles. Kernels call this part,
-/// because such leaves are rare.
-struct FacesAsLeaves<'a, S: Simd, Q: BoxQuery> {
+/// The triangles of a special leaf, as blocks of sixteen. Kernels call this part, because such
+/// leaves are rare.
+struct SpecialBlocks<'a, S: Simd, Q: BoxQuery> {
     query: &'a mut Q,
     lanes: &'a Q::Constants<S>,
     object: &'a ObjectView<'a>,
-    leaf: &'a TetLeaf,
+    leaf: SpecialLeaf,
 }
 
-impl<S: Simd, Q: TriangleQuery> Part<S> for FacesAsLeaves<'_, S, Q> {
+impl<S: Simd, Q: TriangleQuery> Part<S> for SpecialBlocks<'_, S, Q> {
     type Output = bool;
     #[inline(always)]
     fn run(self, s: S) -> bool {
-        let FacesAsLeaves { query, lanes, object, leaf } = self;
-        let faces = &object.tet_faces[leaf.first_face as usize..][..leaf.faces as usize];
-        let mut block = RawLeaf { corner: [[[0.0; WIDTH]; 3]; 3], first: 0, triangles: 0, reserved: [0; 14] };
-        let mut ids = [NONE; LANES];
-        for faces in faces.chunks(LANES) {
-            block.triangles = faces.len() as u32;
-            for i in 0..faces.len() {
-                ids[i] = faces[i].triangle;
-                for c in 0..3 {
-                    let position = &object.tet_vertices[faces[i].vertex[c] as usize].position;
-                    for k in 0..3 {
-                        block.corner[c][k][i] = position[k];
-                    }
-                }
-            }
+        let SpecialBlocks { query, lanes, object, leaf } = self;
+        let mut blocks = leaf.blocks(object);
+        while let Some((block, ids)) = blocks.next_block() {
             let limit = query.limit();
-            if query.triangles(s, lanes, &block, &ids, limit) {
+            if query.triangles(s, lanes, block, ids, limit) {
                 return true;
             }
         }

@@ -3,12 +3,12 @@
 //! [`mod@crate::intersect::crossing`] is the rule that decides. `points/winding.rs` counts the
 //! crossings of rays along an axis faster.
 
-use crate::bvh::enumerate::{Receiver, enumerate};
+use crate::bvh::enumerate::enumerate;
 use crate::enumerate::enumerate_instances;
 use crate::intersect::crossing::{crossing, crossing_from_start};
 use crate::intersect::start::{ExactStart, start_on};
 use crate::intersect::start_point::StartPoint;
-use crate::query::TriangleRef;
+use crate::query::{Receiver, TriangleRef};
 use crate::rays::Ray;
 use crate::scene::Scene;
 use crate::starts::world_ray::WorldRay;

@@ -4,7 +4,7 @@
 use super::accept::Accept;
 use super::collect::{Collector, FoundHit};
 use crate::bvh::candidate::intersect_exactly;
-use crate::bvh::enumerate::{Receiver, enumerate};
+use crate::bvh::enumerate::enumerate;
 use crate::enumerate::{EnteredInstance, enumerate_instances};
 use crate::intersect::exact::{Estimate, Intersection, estimate, reported};
 use crate::intersect::line::widened;
@@ -14,7 +14,7 @@ use crate::intersect::start_point::StartPoint;
 use crate::intersect::vector::wide;
 use crate::masks::Masks;
 use crate::nodes::ObjectRay;
-use crate::query::{TriangleRef, in_range, may_be_in_range};
+use crate::query::{Receiver, TriangleRef, in_range, may_be_in_range};
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::scene::Scene;
 use crate::starts::world_ray::WorldRay;

@@ -5,8 +5,8 @@ use crate::intersect::start_point::StartPoint;
 use crate::nodes::affine::RayLanes;
 use crate::query::sink::Visit;
 use crate::rays::Ray;
+use crate::shortcuts::free;
 use crate::simd::{Isa, Kernel, LANES, Scalar, Simd};
-use crate::starts::free;
 use crate::starts::prepare::ENDED;
 use crate::starts::world_ray::InstanceStart;
 

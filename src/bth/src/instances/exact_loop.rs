@@ -1,26 +1,28 @@
 //! The oracle of tests of instances: a loop over all triangles, without any box.
 
 use crate::bvh::candidate::Candidate;
+use crate::bvh::nodes::{Leaf, LeafMemory, leaf};
 use crate::intersect::exact::reported;
 use crate::intersect::line::Line;
 use crate::nodes::affine::Inverse;
 use crate::rays::{Hit, PrimitiveRef, Ray};
-use bth_format::layout::{Child, Opacity};
+use crate::simd::Scalar;
+use bth_format::layout::Opacity;
 use bth_format::object::ObjectView;
 
 /// The triangles of an object with their ids.
 fn triangles(object: &ObjectView<'_>) -> Vec<(u32, [[f32; 3]; 3])> {
     let (mut found, mut stack) = (vec![], vec![object.header.root]);
     while let Some(code) = stack.pop() {
-        let Some(child) = Child::from_code(code) else { continue };
-        let count = match child {
-            Child::Indexed(at) => object.indexed(at, &mut None).triangles,
-            Child::Raw(at) => object.raw(at, &mut None).triangles,
-            Child::Node(line) => {
-                stack.extend(object.node(line).child);
-                continue;
-            }
-            Child::Tets(_) => panic!("a file without tetrahedra"),
+        if let Some(node) = object.node_base().wide_node(code) {
+            stack.extend(node.child);
+            continue;
+        }
+        let count = match leaf(Scalar, object, object.node_base(), code, &mut LeafMemory::default()) {
+            Leaf::Indexed(block) => block.triangles,
+            Leaf::Raw(block) => block.triangles,
+            Leaf::None => 0,
+            Leaf::Special(_) | Leaf::Subtree(_) => panic!("a file with triangle leaves only"),
         };
         for triangle in 0..count {
             let candidate = Candidate { leaf: code, triangle };

@@ -2,8 +2,8 @@
 //! is queued.
 
 use super::World;
-use crate::bvh::coherence::is_same_octant;
 use crate::bvh::packet;
+use crate::coherence::is_same_octant;
 use crate::nodes::affine::ObjectRay;
 use crate::object;
 use crate::objects::Objects;

@@ -22,7 +22,7 @@ use super::origin::RoundedOrigin;
 use super::start_point::StartPoint;
 use super::vector::wide;
 use bth_format::exact::{EDGE_PARTS, Expansion, VOLUME_PARTS};
-use bth_format::layout::{Child, IndexedLeaf, WIDTH};
+use bth_format::layout::{IndexedLeaf, WIDTH};
 use bth_format::object::ObjectView;
 
 /// Weights of hits are rounded to f32: their sum, rounded too, exceeds 1 by at most this.
@@ -243,8 +243,8 @@ pub(crate) fn decide_start_exactly(
     start.decide(direction, corners.map(wide), uncertain)
 }
 
-/// The corners of the triangle in a slot of a leaf, given as its child code; in a tet leaf `slot`
-/// is the index of a constrained face of the object. `None` if there is no such leaf.
+/// The corners of the triangle in a slot of a leaf, given as its child code. `None` if there is no
+/// such leaf.
 #[inline(always)]
 pub(crate) fn start_corners(object: &ObjectView<'_>, leaf: u32, slot: u32) -> Option<[[f32; 3]; 3]> {
     let mut own = None;
@@ -253,7 +253,7 @@ pub(crate) fn start_corners(object: &ObjectView<'_>, leaf: u32, slot: u32) -> Op
     // vectors.
     let (leaf, triangle) = match object.node_base().indexed_leaf(leaf) {
         Some(leaf) => (leaf, slot as usize),
-        None => (&*own.insert(leaf_of(other_corners(object, leaf, slot)?)), 0),
+        None => (&*own.insert(leaf_of(object.corners_in(leaf, slot)?)), 0),
     };
     Some(leaf.corners(triangle))
 }
@@ -263,22 +263,6 @@ fn leaf_of(corners: [[f32; 3]; 3]) -> IndexedLeaf {
     let vertex = [0, 1, 2].map(|axis| std::array::from_fn(|i| corners[i.min(2)][axis]));
     let corner = [0, 1, 2].map(|i| [i; WIDTH]);
     IndexedLeaf { vertex, corner, first: 0, triangles: 1, vertices: 3, reserved: 0 }
-}
-
-/// Like [`start_corners`], for any leaf.
-#[inline(never)]
-fn other_corners(object: &ObjectView<'_>, leaf: u32, slot: u32) -> Option<[[f32; 3]; 3]> {
-    let at = slot as usize;
-    let (mut indexed, mut raw) = (None, None);
-    match Child::from_code(leaf)? {
-        Child::Indexed(index) => Some(object.indexed(index, &mut indexed).corners(at)),
-        Child::Raw(index) => Some(object.raw(index, &mut raw).corners(at)),
-        Child::Tets(_) => {
-            let face = object.tet_faces.get(at)?;
-            Some(face.vertex.map(|v| object.tet_vertices[v as usize].position))
-        }
-        Child::Node(_) => None,
-    }
 }
 
 /// A start with the corners of its triangle.

@@ -1,16 +1,16 @@
 //! Tracing of one object by batches of rays. Coherent rays are traced in packets, the others
-//! interleaved through the BVH, or through tetrahedra if these are the whole object.
+//! interleaved through the BVH. An object that is one special leaf is entered without it.
 
 use super::scratch::Scratch;
-use super::walked_batch::{RAYS_PER_PART, walk};
 use super::{any, nearest};
-use crate::bvh::interleaved::{Interleaved, RemainingRays};
-use crate::bvh::nodes::{is_large, sole_tet_leaf};
+use crate::bvh::interleaved::Interleaved;
+use crate::bvh::nodes::is_large;
 use crate::bvh::packet::{MinimumUse, Packets};
 use crate::intersect::start_point::Starts;
 use crate::query::sink::{Answers, Sink};
 use crate::query::with_batch_goal;
 use crate::rays::{Ray, StartRay};
+use crate::shortcuts::{self, RAYS_PER_PART, SpecialLeaf};
 use crate::simd::Isa;
 use crate::starts::prepare::PreparedStarts;
 use bth_format::layout::NONE;
@@ -43,38 +43,41 @@ pub(crate) fn trace_batch(
         true => object,
         false => with_starts.insert(ObjectView { bounds: object.start_bounds, ..*object }),
     };
-    let remaining = RemainingRays { order, queries: None, walked: None };
     if order.is_some() {
         // Too few rays are left of most packets.
-        through_bvh(object, rays, remaining, scratch, sink);
-    } else if sole_tet_leaf(object) != NONE && starts.is_empty() {
-        for (part, rays) in rays.chunks(RAYS_PER_PART).enumerate() {
-            trace_in_tets(object, rays, scratch, &mut sink.part(part * RAYS_PER_PART));
-        }
+        through_bvh(object, rays, order, scratch, sink);
+    } else if let (Some(leaf), true) = (shortcuts::whole(object), starts.is_empty()) {
+        through_leaf(object, leaf, rays, scratch, sink);
     } else {
         let packet_rays = in_packets(object, rays, scratch, sink);
         if packet_rays < rays.len() {
             let rest = std::mem::take(&mut scratch.packets.rest);
             let order = (packet_rays > 0).then_some(&rest[..]);
-            through_bvh(object, rays, RemainingRays { order, ..remaining }, scratch, sink);
+            through_bvh(object, rays, order, scratch, sink);
             scratch.packets.rest = rest;
         }
     }
 }
 
-/// Traces at most [`RAYS_PER_PART`] rays, which enter the same tet leaf.
-fn trace_in_tets(object: &ObjectView<'_>, rays: &[Ray], scratch: &mut Scratch, sink: &mut Sink<'_>) {
-    let mut walks = std::mem::take(&mut scratch.walks);
-    walk(object, rays, sink.goal(), &mut walks);
-    for &ray in &walks.done {
-        sink.query(ray as usize, &walks.queries[ray as usize]);
+/// Traces rays through the special leaf that is the whole object.
+#[cold]
+#[inline(never)]
+fn through_leaf(
+    object: &ObjectView<'_>,
+    leaf: SpecialLeaf,
+    rays: &[Ray],
+    scratch: &mut Scratch,
+    sink: &mut Sink<'_>,
+) {
+    let mut special = std::mem::take(&mut scratch.special);
+    for (part, rays) in rays.chunks(RAYS_PER_PART).enumerate() {
+        let sink = &mut sink.part(part * RAYS_PER_PART);
+        leaf.trace(object, rays, &mut special, sink);
+        if !special.rest.is_empty() {
+            through_bvh(object, rays, Some(&special.rest), scratch, sink);
+        }
     }
-    if !walks.rest.is_empty() {
-        let (order, walked) = (Some(&walks.rest[..]), Some(&walks.walked[..]));
-        let remaining = RemainingRays { order, queries: Some(&walks.queries), walked };
-        through_bvh(object, rays, remaining, scratch, sink);
-    }
-    scratch.walks = walks;
+    scratch.special = special;
 }
 
 /// Traces coherent rays in packets and returns their number. If it is not 0, the indices of the
@@ -90,13 +93,13 @@ fn in_packets(object: &ObjectView<'_>, rays: &[Ray], scratch: &mut Scratch, sink
 fn through_bvh(
     object: &ObjectView<'_>,
     rays: &[Ray],
-    remaining: RemainingRays<'_>,
+    order: Option<&[u32]>,
     scratch: &mut Scratch,
     sink: &mut Sink<'_>,
 ) {
     let (isa, stacks, entry_nodes) = (Isa::chosen(), &mut scratch.stacks, is_large(object));
     with_batch_goal!(isa, sink.goal(), goal => {
-        isa.run(Interleaved { object, rays, remaining, stacks, sink, goal, entry_nodes });
+        isa.run(Interleaved { object, rays, order, stacks, sink, goal, entry_nodes });
     });
 }
 

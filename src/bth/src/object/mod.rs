@@ -1,11 +1,9 @@
-//! Tracing of one object by rays in object space, through its BVH and its tetrahedra: by one ray or
-//! by a batch.
+//! Tracing of one object by rays in object space: by one ray or by a batch.
 
 mod batch;
 mod in_instance;
 mod scratch;
 pub(crate) mod single;
-mod walked_batch;
 
 pub(crate) use batch::{MIN_BATCH, trace_batch, trace_starts};
 pub(crate) use scratch::{Scratch, with_scratch};

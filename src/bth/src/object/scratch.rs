@@ -1,8 +1,8 @@
 //! Scratch memory of a thread, which is reused from one batch to the next.
 
-use super::walked_batch::WalkScratch;
 use crate::bvh::packet::PacketScratch;
 use crate::bvh::stack::Stacks;
+use crate::shortcuts::SpecialScratch;
 use crate::starts::prepare::PreparedStarts;
 use std::cell::Cell;
 
@@ -11,7 +11,7 @@ use std::cell::Cell;
 pub(crate) struct Scratch {
     pub(super) stacks: Stacks,
     pub(super) packets: PacketScratch,
-    pub(super) walks: WalkScratch,
+    pub(super) special: SpecialScratch,
     pub(super) starts: PreparedStarts,
 }
 

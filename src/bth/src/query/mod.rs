@@ -11,7 +11,7 @@ use crate::rays::{Hit, PrimitiveRef, Ray};
 use bth_format::layout::NONE;
 
 /// What a query looks for: the nearest hit, or any. Kernels ask a goal for it at run time. A goal
-/// of size zero gets a separate kernel. Walks through tetrahedra and batches with vectors of 128
+/// of size zero gets a separate kernel. Special leaves and batches with vectors of 128
 /// bits serve both goals by [`EitherGoal`].
 pub(crate) trait Goal: Copy {
     /// True if kernels of batches with this goal are compiled for vectors of 128 bits, and for
@@ -123,7 +123,7 @@ pub(crate) struct RayQuery<G> {
     best: Intersection,
 }
 
-/// The query of walks through tetrahedra, which are compiled once for both goals.
+/// The query of special leaves, which are compiled once for both goals.
 pub(crate) type EitherQuery = RayQuery<EitherGoal>;
 
 impl EitherQuery {
@@ -261,6 +261,16 @@ pub(crate) fn in_range(t: f32, tmin: f32, tmax: f32) -> bool {
     tmin <= t && t <= tmax && t.is_finite()
 }
 
+/// Receiver of the triangles that a ray may hit.
+pub(crate) trait Receiver {
+    /// Receives a triangle and its corners in object space, in the order of the source. Returns
+    /// true if the query is complete, which ends the enumeration.
+    fn receive(&mut self, triangle: TriangleRef<'_>, corners: [[f32; 3]; 3]) -> bool;
+    /// Upper bound of the exact t, in the units of the ray, of further intersections that can
+    /// change the result. It may shrink with every triangle. Triangles beyond it may be skipped.
+    fn limit(&self) -> f64;
+}
+
 /// Receiver of the statistics of a traversal; `()` counts nothing.
 pub(crate) trait Count {
     /// A wide node was entered.
@@ -269,8 +279,8 @@ pub(crate) trait Count {
     fn leaf(&mut self) {}
     /// This many triangles were tested.
     fn triangles(&mut self, _n: u32) {}
-    /// A tetrahedron was walked through.
-    fn tet(&mut self) {}
+    /// A tetrahedron was passed.
+    fn cell(&mut self) {}
     /// A walk was repeated exactly.
     fn flood(&mut self) {}
 }
@@ -282,12 +292,12 @@ impl Count for () {}
 pub struct Steps {
     /// Wide nodes entered.
     pub nodes: u32,
-    /// Triangle and tet leaves entered.
+    /// Leaves entered.
     pub leaves: u32,
     /// Triangles tested in leaves.
     pub triangles: u32,
-    /// Tetrahedra walked through.
-    pub tets: u32,
+    /// Tetrahedra passed.
+    pub cells: u32,
     /// Walks through tetrahedra that were repeated exactly, because the ray passes through a
     /// vertex, an edge or a face plane.
     pub floods: u32,
@@ -298,7 +308,7 @@ impl std::ops::AddAssign for Steps {
         self.nodes += other.nodes;
         self.leaves += other.leaves;
         self.triangles += other.triangles;
-        self.tets += other.tets;
+        self.cells += other.cells;
         self.floods += other.floods;
     }
 }
@@ -313,8 +323,8 @@ impl Count for Steps {
     fn triangles(&mut self, n: u32) {
         self.triangles += n;
     }
-    fn tet(&mut self) {
-        self.tets += 1;
+    fn cell(&mut self) {
+        self.cells += 1;
     }
     fn flood(&mut self) {
         self.floods += 1;

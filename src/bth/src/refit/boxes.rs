@@ -5,7 +5,8 @@
 //! are read in the order of the source. Boxes are exact bounds, so they have the same bits whoever
 //! computes them.
 
-use super::plan::{ChildSlot, LeafRange, RefitPlan, RefitTask, leaf_size};
+use super::plan::{ChildSlot, LeafRange, RefitPlan, RefitTask};
+use crate::bvh::nodes::leaf_size;
 use crate::parallel;
 use crate::simd::{Isa, Kernel, LANES, Simd};
 use bth_format::file::RefitParts;
@@ -32,7 +33,7 @@ pub(super) fn refit(plan: &RefitPlan, parts: &mut RefitParts<'_>) -> Ends {
         let range = LeafRange { line: at, lines: leaf_lines, row: leaf.row, rows };
         let leaves = &mut lines[range.line as usize..][..leaf_lines as usize];
         let rows = &leaf_vertices[range.row as usize..][..rows as usize];
-        let ends = Isa::chosen().run(LeafKernel { code: leaf.code, leaf: leaves, rows, positions });
+        let ends = Isa::chosen().run(LeafKernel { leaf: leaves, rows, positions });
         put_at(lines, leaf.parent, &ends);
         root = root.or(Some(ends));
     }
@@ -142,7 +143,7 @@ impl Kernel for TaskKernel<'_> {
                 let (leaf, behind) = std::mem::take(&mut leaves).split_at_mut(leaf_lines as usize);
                 let (leaf_vertices, rows_behind) = rows.split_at(leaf_rows as usize);
                 (leaves, rows) = (behind, rows_behind);
-                put(node, slot, &refit_leaf(s, code, leaf, leaf_vertices, positions));
+                put(node, slot, &refit_leaf(s, leaf, leaf_vertices, positions));
                 slot += 1;
             } else {
                 path.push((at, slot));
@@ -154,7 +155,6 @@ impl Kernel for TaskKernel<'_> {
 
 /// Kernel that refits one leaf.
 struct LeafKernel<'a> {
-    code: u32,
     leaf: &'a mut [CacheLine],
     rows: &'a [[u32; WIDTH]],
     positions: &'a [[f32; 3]],
@@ -165,23 +165,18 @@ impl Kernel for LeafKernel<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Ends {
-        refit_leaf(s, self.code, self.leaf, self.rows, self.positions)
+        refit_leaf(s, self.leaf, self.rows, self.positions)
     }
 }
 
-/// Stores the positions in a leaf, and returns its box.
+/// Stores the positions in a leaf, and returns its box. An indexed leaf has one row of vertices, a
+/// raw one has three.
 #[inline(always)]
-fn refit_leaf<S: Simd>(
-    s: S,
-    code: u32,
-    leaf: &mut [CacheLine],
-    rows: &[[u32; WIDTH]],
-    positions: &[[f32; 3]],
-) -> Ends {
+fn refit_leaf<S: Simd>(s: S, leaf: &mut [CacheLine], rows: &[[u32; WIDTH]], positions: &[[f32; 3]]) -> Ends {
     const { assert!(WIDTH == LANES) };
-    if let Some(Child::Indexed(_)) = Child::from_code(code) {
+    if let [row] = rows {
         let leaf: &mut IndexedLeaf = block_mut(&mut leaf[..INDEXED_LINES]);
-        let points = s.points(positions, &rows[0]);
+        let points = s.points(positions, row);
         for k in 0..3 {
             s.store(points[k], &mut leaf.vertex[k]);
         }

@@ -2,7 +2,8 @@
 //! each, because both lie in depth-first order in deformable objects. The tasks do not depend on
 //! the number of threads.
 
-use bth_format::layout::{Child, INDEXED_LINES, NODE_LINES, NONE, RAW_LINES, WIDTH};
+use crate::bvh::nodes::leaf_size;
+use bth_format::layout::{NODE_LINES, NONE, WIDTH};
 use bth_format::object::ObjectView;
 
 /// Subtrees of at most this many leaves are tasks.
@@ -86,16 +87,6 @@ impl Size {
         self.leaves += other.leaves;
         self.leaf_lines += other.leaf_lines;
         self.rows += other.rows;
-    }
-}
-
-/// The lines and the rows of LEAF_VERTICES of a leaf; `None` for codes of nodes.
-#[inline(always)]
-pub(super) fn leaf_size(code: u32) -> Option<(u32, u32)> {
-    match Child::from_code(code) {
-        Some(Child::Indexed(_)) => Some((INDEXED_LINES as u32, 1)),
-        Some(Child::Raw(_)) => Some((RAW_LINES as u32, 3)),
-        _ => None,
     }
 }
 

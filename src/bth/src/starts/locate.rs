@@ -7,7 +7,7 @@ use crate::intersect::vector::wide;
 use crate::rays::{PrimitiveRef, Start};
 use crate::simd::Simd;
 use bth_format::exact::is_zero_area;
-use bth_format::layout::{Child, NONE, TrianglePlace};
+use bth_format::layout::TrianglePlace;
 use bth_format::object::ObjectView;
 
 /// Why a start is not a point of a surface.
@@ -39,15 +39,14 @@ pub(crate) fn locate(object: &ObjectView<'_>, start: Start) -> Result<StartPoint
     Ok(StartPoint { origin, leaf, slot, u, v })
 }
 
-/// The child code of the leaf that holds a triangle, and its slot there. For a triangle of a tet
-/// leaf without a subtree, these are the code of the tet leaf and the index of the constrained
-/// face.
+/// The child code of the leaf that holds a triangle, and its slot there. Special
+/// leaves have slots, too.
 #[inline(always)]
 pub(super) fn place(object: &ObjectView<'_>, triangle: u32) -> Option<(u32, u32)> {
     let code = *object.places.get(triangle as usize)?;
     match TrianglePlace::from_code(code) {
         Some(TrianglePlace { leaf, slot }) => Some((leaf.code(), slot)),
-        None => place_in_tets(object, triangle),
+        None => object.special_place(triangle),
     }
 }
 
@@ -59,12 +58,4 @@ pub(crate) fn prefetch_leaf<S: Simd>(s: S, object: &ObjectView<'_>, triangle: u3
     for line in 0..4 {
         s.prefetch(leaf.wrapping_add(line));
     }
-}
-
-#[cold]
-#[inline(never)]
-fn place_in_tets(object: &ObjectView<'_>, triangle: u32) -> Option<(u32, u32)> {
-    let face = *object.triangle_faces.get(triangle as usize)?;
-    let leaf = object.tet_leaves.partition_point(|leaf| leaf.first_face <= face).checked_sub(1)?;
-    (face != NONE).then(|| (Child::Tets(leaf as u32).code(), face))
 }

@@ -1,13 +1,13 @@
 //! The rays of a batch that start on triangles of an object, as rays of the object with the exact
 //! points at which they start.
 
-use super::free::{self, decide};
 use super::locate::locate;
-use super::triangles::{NoRow, Row, StartTriangles, TriangleIds};
+use super::triangles::{StartTriangles, TriangleIds};
 use crate::intersect::origin::RoundedOrigin;
 use crate::intersect::start::{ABOVE_ONE, rounded_start};
 use crate::intersect::start_point::StartPoint;
 use crate::rays::{PrimitiveRef, Ray, Start, StartRay};
+use crate::shortcuts::free::{self, FreeRow, NoRow, free_rays};
 use crate::simd::{Isa, Kernel, LANES, Scalar, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
@@ -43,7 +43,7 @@ impl PreparedStarts {
         }
     }
 
-    fn fill_by<R: Row>(&mut self, object: &ObjectView<'_>, rows: &[R], of: (&[StartRay], u32)) {
+    fn fill_by<R: FreeRow>(&mut self, object: &ObjectView<'_>, rows: &[R], of: (&[StartRay], u32)) {
         let (rays, instance) = of;
         let isa = Isa::chosen();
         let whole = if isa == Isa::Scalar { 0 } else { rays.len() / LANES * LANES };
@@ -96,7 +96,7 @@ fn ids<S: Simd>(s: S, groups: &[[StartRay; LANES]], group: usize, instance: u32)
     TriangleIds::new(s, s.select_u(s.eq_u(of, s.splat_u(instance)), triangle, s.splat_u(NONE)))
 }
 
-impl<R: Row> Kernel for PrepareKernel<'_, '_, R> {
+impl<R: FreeRow> Kernel for PrepareKernel<'_, '_, R> {
     type Output = ();
     const SCALAR: bool = false;
     #[inline(always)]
@@ -148,7 +148,7 @@ struct Group<'a> {
 impl Group<'_> {
     /// Stores the rays and their starts. Returns the bits of those that may hit something.
     #[inline(always)]
-    fn prepare<S: Simd, R: Row>(
+    fn prepare<S: Simd, R: FreeRow>(
         self,
         s: S,
         levels: &bth_format::layout::FreeLevels,
@@ -166,7 +166,8 @@ impl Group<'_> {
         let is_start = s.mask_bits(s.and_not(weights, s.eq_u(s.load_u(&triangles.leaf), s.splat_u(NONE))));
         let (mut left, mut begins) = (is_start, [0.0; LANES]);
         if R::TELLS {
-            let (free, begin) = decide::<S, R>(s, triangles, [dx, dy, dz], levels);
+            let (free, begin) =
+                free_rays::<S, R>(s, &triangles.corners, &triangles.known, [dx, dy, dz], levels);
             // A ray whose range ends before it begins has ended, too.
             left &= !(free | s.mask_bits(s.lt(tmax, begin)));
             s.store(begin, &mut begins);

@@ -2,58 +2,11 @@
 
 use super::locate::{place, prefetch_leaf};
 use crate::intersect::start::start_corners;
+use crate::shortcuts::free::{FreeColumns, FreeRow};
 use crate::simd::{LANES, Simd};
 use bth_format::exact::is_zero_area;
-use bth_format::layout::{Child, FreeBins, FreeDirections, FreeDistances, NONE, TrianglePlace};
+use bth_format::layout::{Child, NONE, TrianglePlace};
 use bth_format::object::{NodeBase, ObjectView};
-
-/// Bit of the last word of bins.
-const BACK: u32 = (FreeBins::BACK >> 96) as u32;
-
-/// A row of what is known of a triangle.
-pub(crate) trait Row {
-    /// True if it tells anything.
-    const TELLS: bool;
-    /// True if it tells free bins.
-    const HAS_BINS: bool;
-    /// Copies what the row tells to a column.
-    fn copy(&self, triangles: &mut StartTriangles, column: usize);
-}
-
-/// Nothing is known.
-pub(crate) struct NoRow;
-
-impl Row for NoRow {
-    const TELLS: bool = false;
-    const HAS_BINS: bool = false;
-    fn copy(&self, _: &mut StartTriangles, _: usize) {}
-}
-
-impl Row for FreeDirections {
-    const TELLS: bool = true;
-    const HAS_BINS: bool = true;
-
-    #[inline(always)]
-    fn copy(&self, triangles: &mut StartTriangles, column: usize) {
-        for word in 0..4 {
-            triangles.bins[word][column] = self.bins[word];
-        }
-        let back = if self.bins[3] & BACK != 0 { u32::MAX } else { 0 };
-        triangles.sectors[0][column] = self.sectors & !back;
-        triangles.sectors[1][column] = self.sectors & back;
-    }
-}
-
-impl Row for FreeDistances {
-    const TELLS: bool = true;
-    const HAS_BINS: bool = false;
-
-    #[inline(always)]
-    fn copy(&self, triangles: &mut StartTriangles, column: usize) {
-        triangles.sectors[0][column] = self.sectors[0];
-        triangles.sectors[1][column] = self.sectors[1];
-    }
-}
 
 /// The lanes.
 static LANE: [u32; LANES] = before(0);
@@ -92,7 +45,7 @@ impl TriangleIds {
 
     /// Prefetches the rows and the places of the triangles.
     #[inline(always)]
-    pub(super) fn prefetch_rows<S: Simd, R: Row>(&self, s: S, object: &ObjectView<'_>, rows: &[R]) {
+    pub(super) fn prefetch_rows<S: Simd, R: FreeRow>(&self, s: S, object: &ObjectView<'_>, rows: &[R]) {
         let mut new = self.new;
         while new != 0 {
             let id = self.ids[new.trailing_zeros() as usize % LANES] as usize;
@@ -121,7 +74,7 @@ impl TriangleIds {
 /// cache line, so what is shorter comes last.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
-pub(crate) struct StartTriangles {
+pub(super) struct StartTriangles {
     /// For each ray the column of its triangle: the first ray that starts there.
     column: [u32; LANES],
     /// Corners of the triangles, by corner and axis.
@@ -130,10 +83,8 @@ pub(crate) struct StartTriangles {
     pub(super) leaf: [u32; LANES],
     /// Their slots in the leaves.
     pub(super) slot: [u32; LANES],
-    /// The words of their bins.
-    pub(super) bins: [[u32; LANES]; 4],
-    /// The sectors of their fronts and backs.
-    pub(super) sectors: [[u32; LANES]; 2],
+    /// What the file knows of them.
+    pub(super) known: FreeColumns,
     /// True if each ray has a separate column, even where rays start on the same triangle.
     is_expanded: bool,
 }
@@ -144,14 +95,13 @@ impl StartTriangles {
         corners: [[[0.0; LANES]; 3]; 3],
         leaf: [NONE; LANES],
         slot: [0; LANES],
-        bins: [[0; LANES]; 4],
-        sectors: [[0; LANES]; 2],
+        known: FreeColumns::NONE,
         is_expanded: false,
     };
 
     /// Reads the triangles.
     #[inline(always)]
-    pub(super) fn fetch<S: Simd, R: Row>(
+    pub(super) fn fetch<S: Simd, R: FreeRow>(
         &mut self,
         s: S,
         object: &ObjectView<'_>,
@@ -168,7 +118,7 @@ impl StartTriangles {
             if R::TELLS
                 && let Some(row) = rows.get(id as usize)
             {
-                row.copy(self, lane);
+                row.copy(&mut self.known, lane);
             }
             self.set((object, base), id, lane);
         }
@@ -223,7 +173,7 @@ impl StartTriangles {
 
     /// Copies each triangle to the lanes of its rays.
     #[inline(always)]
-    pub(super) fn expand<S: Simd, R: Row>(&mut self, s: S) {
+    pub(super) fn expand<S: Simd, R: FreeRow>(&mut self, s: S) {
         if self.is_expanded {
             return;
         }
@@ -236,11 +186,6 @@ impl StartTriangles {
         for row in [&mut self.leaf, &mut self.slot] {
             s.store_u(s.lookup_u(s.load_u(row), column), row);
         }
-        for row in if R::HAS_BINS { &mut self.bins[..] } else { &mut [] } {
-            s.store_u(s.lookup_u(s.load_u(row), column), row);
-        }
-        for row in if R::TELLS { &mut self.sectors[..] } else { &mut [] } {
-            s.store_u(s.lookup_u(s.load_u(row), column), row);
-        }
+        self.known.expand::<S, R>(s, column);
     }
 }

@@ -2,8 +2,8 @@
 
 use super::bounds::{FrustumView, PacketBounds, SLACK};
 use super::ray_group::RayGroup;
-use crate::bvh::coherence::Span;
-use crate::bvh::shaft::Shaft;
+use crate::coherence::Span;
+use crate::coherence::shaft::Shaft;
 use crate::intersect::boxes;
 use crate::simd::{LANES, Part, Simd};
 use bth_format::layout::{WIDTH, WideNode};

@@ -9,13 +9,13 @@ use super::frustum::{Frustum, FrustumOf};
 use super::prepare_group::PrepareGroup;
 use super::segment_box::SegmentBox;
 use super::traverse::{PacketOutcome, PacketTracer, TracePacket};
-use crate::bvh::coherence::{Span, is_same_octant};
 use crate::bvh::nodes::is_large;
+use crate::coherence::{Span, is_same_octant};
 use crate::query::sink::Sink;
 use crate::query::{Goal, RayQuery};
 use crate::rays::{RAYS_PER_CACHE_LINE, Ray};
+use crate::shortcuts;
 use crate::simd::{CacheLevel, Kernel, LANES, Part, Simd};
-use bth_format::layout::NONE;
 use bth_format::object::ObjectBounds;
 use bth_format::object::ObjectView;
 
@@ -87,7 +87,7 @@ impl<G: Goal> Kernel for Packets<'_, '_, G> {
     fn run<S: Simd>(self, s: S) -> PacketCount {
         let Packets { object, rays, scratch, least, sink, goal } = self;
         let mut count = PacketCount::default();
-        if rays.len() < MIN_RAYS || !is_supported(object) {
+        if rays.len() < MIN_RAYS || shortcuts::has_special_leaves(object) {
             return count;
         }
         let bounds = object.bounds;
@@ -161,12 +161,6 @@ impl<G: Goal> Kernel for Packets<'_, '_, G> {
         *backoffs = runs.backoffs;
         count
     }
-}
-
-/// Returns true if packets support an object: no tet leaf lacks a subtree.
-#[inline(always)]
-fn is_supported(object: &ObjectView<'_>) -> bool {
-    object.tet_leaves.first().is_none_or(|leaf| leaf.subtree != NONE)
 }
 
 /// Consecutive rays that make a packet.

@@ -131,7 +131,7 @@ impl<S: Simd, G: Goal, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, S
                         code = subtree;
                         continue;
                     }
-                    Leaf::Tets(_) => return PacketOutcome::Refused,
+                    Leaf::Special(_) => return PacketOutcome::Refused,
                     Leaf::None => None,
                 }
             };

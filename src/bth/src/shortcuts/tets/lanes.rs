@@ -326,11 +326,11 @@ impl<S: Simd> Lanes<S> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::queue::PreparedWalks;
     use super::*;
     use crate::intersect::line::Line;
     use crate::rays::Ray;
     use crate::simd::{Isa, Kernel, LANES};
-    use crate::tets::queue::PreparedWalks;
     use bth_random::Rng;
 
     /// For sixteen rays with three points each: the cross products of the points in cyclic order,

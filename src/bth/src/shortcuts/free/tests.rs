@@ -3,16 +3,16 @@
 //! upwards, from the lower one nothing straight up within 4; by the latter file nothing within 1
 //! straight down from the upper one, either.
 
-use super::prepare::PreparedStarts;
 use crate::rays::{Hit, PrimitiveRef, Start, StartRay};
 use crate::simd::Isa;
+use crate::starts::prepare::PreparedStarts;
 use bth_format::File;
 use bth_format::layout::NONE;
 use bth_random::Rng;
 use std::sync::{Mutex, PoisonError};
 
-const DIRECTIONS: &[u8] = include_bytes!("../../../../format-spec/conformance/valid/free-directions.bth");
-const DISTANCES: &[u8] = include_bytes!("../../../../format-spec/conformance/valid/free-distances.bth");
+const DIRECTIONS: &[u8] = include_bytes!("../../../../../format-spec/conformance/valid/free-directions.bth");
+const DISTANCES: &[u8] = include_bytes!("../../../../../format-spec/conformance/valid/free-distances.bth");
 const UP: [f32; 3] = [0.0, 0.0, 1.0];
 const DOWN: [f32; 3] = [0.0, 0.0, -1.0];
 

@@ -91,16 +91,31 @@ impl<'a> TetWalker<'a> {
         [(0, 1), (1, 2), (2, 0)].map(|(i, j)| Line::side(&corner[i], &corner[j], self.error))
     }
 
+    /// The triangle of a constrained face, and its corners.
+    pub(crate) fn triangle(&self, face: &TetFace) -> (TriangleRef<'a>, [[f32; 3]; 3]) {
+        (TriangleRef::id(face.triangle, self.ids), face.vertex.map(|v| self.position(v)))
+    }
+
     /// Tests a constrained face exactly, as the triangles of BVH leaves are, and offers a hit to
     /// the query. Returns true if the query is complete.
-    pub(crate) fn offer(&self, face: &TetFace, query: &mut EitherQuery) -> bool {
-        let corners = face.vertex.map(|v| self.position(v));
+    pub(crate) fn offer_face(&self, face: &TetFace, query: &mut EitherQuery) -> bool {
+        let (triangle, corners) = self.triangle(face);
+        self.offer(triangle, corners, query)
+    }
+
+    /// Like [`Self::offer_face`], given its triangle.
+    pub(crate) fn offer(
+        &self,
+        triangle: TriangleRef<'_>,
+        corners: [[f32; 3]; 3],
+        query: &mut EitherQuery,
+    ) -> bool {
         let found = match &self.start {
             None => self.line.intersection(corners),
             Some(start) => start.intersection(self.line, corners),
         };
         match found {
-            Some(intersection) => query.offer(TriangleRef::id(face.triangle, self.ids), intersection),
+            Some(intersection) => query.offer(triangle, intersection),
             None => false,
         }
     }
@@ -152,11 +167,11 @@ impl<'a> TetWalker<'a> {
         // A line passes each tetrahedron at most once, so a walk has more steps only if the data
         // are inconsistent.
         for _ in 0..self.leaf.tets {
-            count.tet();
+            count.cell();
             let Some(link) = self.exit(&mut position) else { return WalkOutcome::Uncertain };
             if link.next & FACE_BIT != 0
                 && link.next != NONE
-                && self.offer(&self.faces[(link.next & !FACE_BIT) as usize], query)
+                && self.offer_face(&self.faces[(link.next & !FACE_BIT) as usize], query)
             {
                 return WalkOutcome::Done;
             }

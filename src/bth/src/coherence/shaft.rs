@@ -1,6 +1,6 @@
 //! Shafts: bounds of coherent rays for the box test.
 
-use super::coherence::Span;
+use super::Span;
 use crate::intersect::boxes::{self, LEAST_COMPONENT, PAD};
 use crate::intersect::prepare;
 use crate::simd::Simd;

@@ -5,16 +5,21 @@
 //! another one begins behind that distance, where boxes and triangles before it are skipped.
 //! Neither changes an answer. Where a direction is in doubt, the ray is traced from its start.
 
-use super::leaving::{Leaving, SLACK};
-use super::triangles::{Row, StartTriangles};
+mod columns;
+mod leaving;
+#[cfg(test)]
+mod tests;
+
+pub(crate) use columns::{FreeColumns, FreeRow, NoRow};
+
 use crate::intersect::start::start_corners;
 use crate::intersect::start_point::StartPoint;
 use crate::simd::{LANES, Lanewise, Simd};
-use bth_format::layout::{FREE_BINS, FREE_SECTOR_OF, FREE_SIDE, FreeBins, FreeLevels, KnownFree};
+use bth_format::layout::{FREE_BINS, FREE_SECTOR_OF, FREE_SIDE, FreeLevels, KnownFree};
 use bth_format::object::ObjectView;
+use columns::BACK;
+use leaving::{Leaving, SLACK};
 
-/// Bit of the last word of bins.
-const BACK: u32 = (FreeBins::BACK >> 96) as u32;
 /// 2^i for lane i.
 static POWERS: [u32; LANES] = {
     let mut powers = [1; LANES];
@@ -112,12 +117,13 @@ pub(crate) fn prefetch<S: Simd>(s: S, object: &ObjectView<'_>, triangle: u32) {
     }
 }
 
-/// Bits of the rays in free directions, and where the ranges of the others can begin, given their
-/// directions.
+/// Bits of the rays in free directions, and where the ranges of the others can begin, given the
+/// corners of the triangles on which they start, what the file knows of these, and the directions.
 #[inline(always)]
-pub(super) fn decide<S: Simd, R: Row>(
+pub(crate) fn free_rays<S: Simd, R: FreeRow>(
     s: S,
-    triangles: &StartTriangles,
+    corners: &[[[f32; LANES]; 3]; 3],
+    known: &FreeColumns,
     direction: [S::F; 3],
     levels: &FreeLevels,
 ) -> (u32, S::F) {
@@ -126,15 +132,15 @@ pub(super) fn decide<S: Simd, R: Row>(
     for i in 0..S::PIECES {
         let p = s.piece(i);
         let d = [S::pick(p, &direction[0]), S::pick(p, &direction[1]), S::pick(p, &direction[2])];
-        let leaving = Leaving::new(p, |corner, k| p.load(&triangles.corners[corner][k]), d);
+        let leaving = Leaving::new(p, |corner, k| p.load(&corners[corner][k]), d);
         to_front |= leaving.front;
         to_back |= leaving.back;
         p.store_u(leaving.columns[0], &mut columns[0]);
         p.store_u(leaving.columns[1], &mut columns[1]);
     }
     let [column, row] = [s.load_u(&columns[0]), s.load_u(&columns[1])];
-    let free = if R::HAS_BINS { free_lanes(s, triangles, [column, row], [to_front, to_back]) } else { 0 };
-    let sectors = [s.load_u(&triangles.sectors[0]), s.load_u(&triangles.sectors[1])];
+    let free = if R::HAS_BINS { free_lanes(s, known, [column, row], [to_front, to_back]) } else { 0 };
+    let sectors = [s.load_u(&known.sectors[0]), s.load_u(&known.sectors[1])];
     let none = s.splat_u(0);
     let of_side = s.select_u(s.mask(to_front), sectors[0], s.select_u(s.mask(to_back), sectors[1], none));
     (free, begins(s, direction, within(s, of_side, [column, row], levels)))
@@ -145,14 +151,14 @@ pub(super) fn decide<S: Simd, R: Row>(
 #[inline(always)]
 fn free_lanes<S: Simd>(
     s: S,
-    triangles: &StartTriangles,
+    known: &FreeColumns,
     [column, row]: [S::U; 2],
     [to_front, to_back]: [u32; 2],
 ) -> u32 {
     let bin = s.add_u(s.lookup_u(s.load_u(&FIRST_BIN), row), column);
     let mut words = [s.splat_u(0); 4];
     for word in 0..4 {
-        words[word] = s.load_u(&triangles.bins[word]);
+        words[word] = s.load_u(&known.bins[word]);
     }
     let mut word = words[3];
     for k in [2, 1, 0] {

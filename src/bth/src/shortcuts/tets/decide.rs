@@ -118,7 +118,7 @@ impl WalkBatch<'_> {
         let walker = self.walks.walker(&line);
         let constrained: &TetFace = &self.walks.object.tet_faces[face as usize];
         let mut query = self.queries[ray as usize];
-        let done = walker.offer(constrained, &mut query);
+        let done = walker.offer_face(constrained, &mut query);
         // If the line certainly leaves the next tetrahedron beyond the limit, no face further along
         // it can change the result.
         let mut vertex = constrained.vertex;

@@ -10,8 +10,8 @@
 use super::records::{Entered, ReadRecords};
 use super::walk::{TetWalker, WalkOutcome};
 use crate::intersect::line::{Projected, Sign};
-use crate::query::{Count, EitherQuery};
-use bth_format::layout::{FACE_BIT, NONE, TetFace};
+use crate::query::{Count, EitherQuery, Receiver, TriangleRef};
+use bth_format::layout::{FACE_BIT, NONE};
 use std::collections::BTreeSet;
 
 /// The tetrahedra that a flood has visited, or the faces. Around most vertices these are about ten,
@@ -51,24 +51,15 @@ impl VisitedSet {
 /// few enough to need no allocation.
 type Pending = smallvec::SmallVec<[(u32, Entered); 64]>;
 
-/// Receiver of the constrained faces that a flood reaches.
-pub(crate) trait FaceReceiver {
-    /// Receives a face that the line may touch, once or from both sides. Returns whether the query
-    /// is complete.
-    fn receive(&mut self, face: &TetFace) -> bool;
-    /// Upper bound of the exact t of intersections that can still change the result.
-    fn limit(&self) -> f64;
-}
-
 /// Offers the faces to a query.
 struct Offering<'a, 'w> {
     walker: &'a TetWalker<'w>,
     query: &'a mut EitherQuery,
 }
 
-impl FaceReceiver for Offering<'_, '_> {
-    fn receive(&mut self, face: &TetFace) -> bool {
-        self.walker.offer(face, self.query)
+impl Receiver for Offering<'_, '_> {
+    fn receive(&mut self, triangle: TriangleRef<'_>, corners: [[f32; 3]; 3]) -> bool {
+        self.walker.offer(triangle, corners, self.query)
     }
     fn limit(&self) -> f64 {
         self.query.limit()
@@ -86,10 +77,11 @@ impl TetWalker<'_> {
         }
     }
 
-    /// Passes all constrained faces of the leaf that the line can touch up to the receiver's limit.
+    /// Passes all constrained faces of the leaf that the line can touch up to the receiver's limit,
+    /// each once or from both sides.
     /// Returns true if the query is complete.
     #[inline(never)]
-    pub(crate) fn flood_faces<C: Count>(&self, receiver: &mut dyn FaceReceiver, count: &mut C) -> bool {
+    pub(crate) fn flood_faces<C: Count>(&self, receiver: &mut dyn Receiver, count: &mut C) -> bool {
         count.flood();
         let mut visited = VisitedSet::new();
         let mut stack = Pending::new();
@@ -99,7 +91,7 @@ impl TetWalker<'_> {
             }
         }
         while let Some((tet, entered)) = stack.pop() {
-            count.tet();
+            count.cell();
             let apex = self.project(entered.apex);
             let corner = entered.face.map(|v| self.project(v));
             for replaced in 0..3 {
@@ -111,8 +103,11 @@ impl TetWalker<'_> {
                 }
                 let link = self.records.link(tet, &entered, entered.face[replaced]);
                 let constrained = link.next & FACE_BIT != 0 && link.next != NONE;
-                if constrained && receiver.receive(&self.faces[(link.next & !FACE_BIT) as usize]) {
-                    return true;
+                if constrained {
+                    let (triangle, corners) = self.triangle(&self.faces[(link.next & !FACE_BIT) as usize]);
+                    if receiver.receive(triangle, corners) {
+                        return true;
+                    }
                 }
                 if self.line.t_range(projected.each_ref()).0 > receiver.limit() {
                     continue;

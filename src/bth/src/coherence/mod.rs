@@ -1,4 +1,6 @@
-//! Coherence of rays: the ranges of their origins and directions.
+//! Coherence of rays: the ranges of their origins and directions. A [`shaft`] bounds coherent rays.
+
+pub(crate) mod shaft;
 
 use crate::intersect::boxes::PAD;
 use crate::intersect::prepare;

@@ -6,8 +6,8 @@
 //! against it instead of the root. It holds several of the entry points of Reshetov, Soupikov and
 //! Hurley, "Multi-Level Ray Tracing Algorithm", SIGGRAPH 2005.
 
-use super::coherence::Span;
-use super::shaft::Shaft;
+use crate::coherence::Span;
+use crate::coherence::shaft::Shaft;
 use crate::rays::Ray;
 use crate::simd::{Part, Simd};
 use bth_format::layout::{NONE, WIDTH, WideNode};
@@ -15,7 +15,7 @@ use bth_format::limits::MAX_DEPTH;
 use bth_format::object::{NodeBase, ObjectBounds};
 
 /// Number of consecutive rays that have an entry node in common.
-pub(super) const ENTRY_RAYS: usize = 64;
+pub(crate) const ENTRY_RAYS: usize = 64;
 
 /// Boxes with their child codes, at most [`WIDTH`] between two operations, and room for the
 /// children of one more node.
@@ -82,15 +82,15 @@ impl Boxes {
 
 /// The search for the entry node of rays, as a part of kernels. Its output is true if they have
 /// one: if they are coherent, and the root is a wide node.
-pub(super) struct FindEntryNode<'a> {
-    pub(super) node_base: NodeBase<'a>,
+pub(crate) struct FindEntryNode<'a> {
+    pub(crate) node_base: NodeBase<'a>,
     /// Child code of the root.
-    pub(super) root: u32,
+    pub(crate) root: u32,
     /// Bounds of the object.
-    pub(super) bounds: &'a ObjectBounds,
-    pub(super) rays: &'a [Ray],
+    pub(crate) bounds: &'a ObjectBounds,
+    pub(crate) rays: &'a [Ray],
     /// Receives the entry node.
-    pub(super) node: &'a mut WideNode,
+    pub(crate) node: &'a mut WideNode,
 }
 
 impl<S: Simd> Part<S> for FindEntryNode<'_> {
@@ -140,7 +140,7 @@ mod tests {
     use super::*;
     use crate::bvh::box_oracle;
     use crate::bvh::height_field::HeightField;
-    use crate::bvh::interleaved::{Interleaved, RemainingRays};
+    use crate::bvh::interleaved::Interleaved;
     use crate::bvh::stack::Stacks;
     use crate::query::sink::{Answers, Sink};
     use crate::query::with_batch_goal;
@@ -169,11 +169,10 @@ mod tests {
         if isa == Isa::Scalar || !isa.is_available() {
             return false;
         }
-        let remaining = RemainingRays { order, queries: None, walked: None };
         let either = answers.goal();
         let sink = &mut Sink::new(object.triangle_ids, answers, 0);
         with_batch_goal!(isa, either, goal => {
-            isa.run(Interleaved { object, rays, remaining, stacks, sink, goal, entry_nodes: true });
+            isa.run(Interleaved { object, rays, order, stacks, sink, goal, entry_nodes: true });
         });
         true
     }

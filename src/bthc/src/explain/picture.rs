@@ -181,8 +181,11 @@ fn bounce(of: &Explained<'_>, ray: &Ray, hit: &Hit) -> Option<f64> {
     let (_, steps) = of.compiled.nearest_counted(&StartRay::from_hit(hit, direction));
     let costs = &of.costs.profile;
     let walk = costs.record(bth_format::layout::RecordKind::Link32).surface;
-    let tets =
-        if steps.tets > 0 { walk.cost(f64::from(steps.tets), 0.5, costs.bytes[0], costs.bytes) } else { 0.0 };
+    let tets = if steps.cells > 0 {
+        walk.cost(f64::from(steps.cells), 0.5, costs.bytes[0], costs.bytes)
+    } else {
+        0.0
+    };
     Some(
         costs.bvh.ray
             + costs.bvh.node * f64::from(steps.nodes)

@@ -10,6 +10,9 @@ from trimesh import caching, util
 from . import _arrays
 from ._compile import compile
 
+#: Bound of the rounding of t in float32, a hundredfold, relative to t or to the size of the mesh.
+ROUGH = 1e-5
+
 
 class RayMeshIntersector:
     """Ray queries of a mesh, with the methods of trimesh's own. Answers are exact for the vertices and rays rounded to float32."""
@@ -72,7 +75,8 @@ class RayMeshIntersector:
             exact = np.einsum("ij,ij->i", normals, corner - origins) / np.einsum("ij,ij->i", normals, directions)
         rough = t.astype(np.float64) / self._scene[2]
         # A plane that is nearly along the ray gives a t that is worse than the one that the query has found.
-        near = np.abs(exact - rough) <= 1e-5 * np.maximum(np.abs(rough), self.mesh.scale / np.maximum(util.row_norm(directions), 1e-300))
+        lengths = np.maximum(util.row_norm(directions), np.finfo(np.float64).tiny)
+        near = np.abs(exact - rough) <= ROUGH * np.maximum(np.abs(rough), self.mesh.scale / lengths)
         return origins + np.where(near, exact, rough)[:, None] * directions
 
     def intersects_location(self, ray_origins, ray_directions, multiple_hits=True):

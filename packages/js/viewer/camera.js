@@ -39,9 +39,12 @@ export function shifted(view, right, up) {
     return { ...view, target: add(add(view.target, camera.right, right * height), camera.up, up * height) };
 }
 
+/** The smallest and the largest distance of the camera from its target, relative to the radius of the scene. */
+const NEAREST = 1e-4, FARTHEST = 1e3;
+
 /** Moves closer or farther. */
 export function zoomed(view, factor) {
-    const distance = Math.min(Math.max(view.distance * factor, view.radius * 1e-4), view.radius * 1e3);
+    const distance = Math.min(Math.max(view.distance * factor, view.radius * NEAREST), view.radius * FARTHEST);
     return { ...view, distance };
 }
 
@@ -81,8 +84,11 @@ export function directionThrough(camera, x, y) {
     return unit(to);
 }
 
+/** Rays that descend less, relative to their length, end at the horizon and meet no ground. */
+const HORIZON = 1e-6;
+
 /** Where a ray meets the plane through a height along the vertical from above, or null. */
 export function onGround(camera, direction, height) {
     const above = dot(camera.eye, camera.vertical) - height, descent = -dot(direction, camera.vertical);
-    return above > 0 && descent > 1e-6 ? add(camera.eye, direction, above / descent) : null;
+    return above > 0 && descent > HORIZON ? add(camera.eye, direction, above / descent) : null;
 }

@@ -7,6 +7,8 @@ import numpy as np
 
 from ._arithmetic import Floats, dot, unit
 
+#: Sine of the angle between two unit vectors below which their rounding decides its direction.
+STRAIGHT = 1e-9
 #: Share of the width or height of the picture that a model fills.
 _FILLED = 0.9
 UP = {"x": np.array([1.0, 0.0, 0.0]), "y": np.array([0.0, 1.0, 0.0]), "z": np.array([0.0, 0.0, 1.0])}
@@ -33,8 +35,8 @@ class Camera:
         """A camera that looks along `forward` with `up` upright in the picture. field: the vertical field of view in degrees."""
         forward = unit(forward)
         side = np.cross(forward, up)
-        # Straight up or down every perpendicular direction can be `right`. Both vectors are unit, so the bound is relative.
-        if np.sqrt(dot(side, side)) < 1e-9:
+        # Straight up or down every perpendicular direction can be `right`.
+        if np.sqrt(dot(side, side)) < STRAIGHT:
             side = np.cross(forward, np.eye(3)[int(np.argmin(np.abs(forward)))])
         right = unit(side)
         half = math.tan(math.radians(field) / 2)

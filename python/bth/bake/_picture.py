@@ -99,12 +99,16 @@ def save(path: str, picture: NDArray[np.uint8]) -> None:
     write_whole(path, lambda file: image.save(file, "PNG", optimize=True))
 
 
+#: Bound of the rounding of a multiple of a step, relative to the step.
+ROUNDING = 1e-9
+
+
 def ticks(low: float, high: float) -> list[float]:
     """About five round numbers from low to high."""
     step = 10.0 ** math.floor(math.log10((high - low) / 4))
     step *= next(m for m in (1, 2, 2.5, 5, 10) if (high - low) / (m * step) <= 5)
-    first = math.ceil(low / step - 1e-9)
-    return [(first + i) * step for i in range(int((high - low) / step) + 2) if (first + i) * step <= high + 1e-9 * step]
+    first = math.ceil(low / step - ROUNDING)
+    return [(first + i) * step for i in range(int((high - low) / step) + 2) if (first + i) * step <= high + ROUNDING * step]
 
 
 def with_color_bar(picture: NDArray[np.uint8], title: str, low: float, high: float, stops: Floats) -> NDArray[np.uint8]:

@@ -8,6 +8,11 @@ use num_traits::{Signed, ToPrimitive, Zero};
 /// A point in integer coordinates, in a unit that the caller chooses.
 pub(crate) type Point = [BigInt; 3];
 
+/// Bounds the error of a determinant in f64 relative to the size of its products.
+const ROUNDING: f64 = 1e-13;
+/// The bound holds for sizes from here on: no product has underflowed.
+const LEAST_SIZE: f64 = 1e-280;
+
 /// The point at which a line hits a triangle.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Intersection {
@@ -61,10 +66,9 @@ pub(crate) fn certainly_missed(direction: [f64; 3], corners: [[f64; 3]; 3], magn
             value += direction[i] * (x - y);
             size += direction[i].abs() * (reach(p, j) * reach(q, k) + reach(p, k) * reach(q, j));
         }
-        // The bound on the rounding error does not hold where products have underflowed.
-        if size > 1e-280 {
-            positive |= value > 1e-13 * size;
-            negative |= value < -1e-13 * size;
+        if size > LEAST_SIZE {
+            positive |= value > ROUNDING * size;
+            negative |= value < -ROUNDING * size;
         }
     }
     positive && negative

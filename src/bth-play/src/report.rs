@@ -10,6 +10,7 @@ use bth::Scene;
 use serde::Serialize;
 use serde_json::json;
 use std::path::Path;
+use std::time::Duration;
 
 /// Prints a summary of what a window showed, for people or as JSON.
 #[cfg(feature = "window")]
@@ -95,7 +96,7 @@ fn totals(report: &Report) -> (f64, f64) {
 }
 
 fn rate(rays: f64, seconds: f64) -> f64 {
-    rays / seconds.max(1e-9)
+    rays / seconds.max(Duration::from_nanos(1).as_secs_f64())
 }
 
 fn json(

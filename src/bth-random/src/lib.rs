@@ -8,6 +8,10 @@
 #[derive(Clone, Debug)]
 pub struct Rng(u64);
 
+/// Square of the smallest distance of points in the unit ball from its centre, relative to its
+/// radius.
+const LEAST_SQUARE: f64 = 1e-6;
+
 impl Rng {
     /// A generator whose numbers depend on the seed only; any seed will do.
     pub fn new(seed: u64) -> Rng {
@@ -57,7 +61,7 @@ impl Rng {
     pub fn point_in_ball(&mut self) -> [f64; 3] {
         loop {
             let p = [(); 3].map(|()| self.between(-1.0, 1.0));
-            if (1e-6..=1.0).contains(&square_length(p)) {
+            if (LEAST_SQUARE..=1.0).contains(&square_length(p)) {
                 return p;
             }
         }

@@ -309,6 +309,10 @@ fn triangle(view: &ObjectView<'_>, id: u32) -> Option<[[f32; 3]; 3]> {
     Some(view.grid.map_or(corners, |grid| corners.map(|corner| grid.nearest(corner))))
 }
 
+/// Bounds the error of a component of a vector product relative to its products' sizes: it has at
+/// most 7 roundings of half an epsilon.
+const CROSS_ERROR: f64 = 8.0 * f64::EPSILON;
+
 /// Normals are computed exactly if the error bound of f64 exceeds this share of their largest
 /// component.
 const NORMAL_ERROR: f64 = 1.0 / (1u64 << 40) as f64;
@@ -320,10 +324,8 @@ fn plane_normal(corners: [[f32; 3]; 3]) -> Option<[f64; 3]> {
     let (e, f) = (edge(b), edge(c));
     let products = [[1, 2], [2, 0], [0, 1]].map(|[i, j]| (e[i] * f[j], e[j] * f[i]));
     let normal = products.map(|(p, q)| p - q);
-    // The products of differences of f32 neither overflow nor underflow in f64. Each component has
-    // at most 7 roundings.
-    let error =
-        products.iter().fold(0.0, |most: f64, (p, q)| most.max(p.abs() + q.abs())) * 8.0 * f64::EPSILON;
+    // The products of differences of f32 neither overflow nor underflow in f64.
+    let error = products.iter().fold(0.0, |most: f64, (p, q)| most.max(p.abs() + q.abs())) * CROSS_ERROR;
     let greatest = normal.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     unit(if error <= NORMAL_ERROR * greatest { normal } else { exact_normal(corners) })
 }

@@ -3,6 +3,7 @@
 use bth::Scene;
 use bth::rays::{Hit, Ray};
 use bth_compile::sampling::SampleRay;
+use std::time::Duration;
 
 /// Rays in one call of a batch.
 const BATCH: usize = 1024;
@@ -90,7 +91,7 @@ fn once(scene: &Scene, rays: &Rays, query: QueryKind) -> f64 {
 #[cfg(unix)]
 fn thread_seconds() -> f64 {
     let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
+    Duration::new(now.tv_sec as u64, now.tv_nsec as u32).as_secs_f64()
 }
 
 /// Seconds on the wall clock.

@@ -79,6 +79,10 @@ impl Kernel for Decide<'_> {
 /// [`SECTORS`] in memory.
 static BINS_OF: [BinSet; FREE_SECTORS] = SECTORS;
 
+/// Bound of the rounding of squared distances in f32, as a factor: more than the square of a
+/// distance by a thousand roundings.
+const MORE: f32 = 1.0 + 1e-4;
+
 /// A child that is still to be visited.
 #[derive(Clone, Copy)]
 struct Entry {
@@ -199,7 +203,7 @@ impl Search<'_> {
             start: Start::new(corners, &frame, is_back, if free == 0 { SMALL_FOR_SECTORS } else { SMALL }),
             free,
             open: levels.map(|distance| if distance > 0.0 { IN_SECTORS } else { 0 }),
-            near: levels.map(|distance| distance * distance * (1.0 + 1e-4)),
+            near: levels.map(|distance| distance * distance * MORE),
         };
         self.block_all(s, &mut state);
         Some(state)

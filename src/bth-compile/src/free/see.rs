@@ -106,12 +106,16 @@ pub(super) fn see<S: Simd>(s: S, start: &Start, node: &Node) -> SeenChildren {
     out
 }
 
+/// What divisors are raised to, so that quotients are numbers. It has no unit: a lower bound of
+/// heights, relative to a frame's size, at which all columns are seen.
+const FLOOR: f32 = 1e-30;
+
 /// Columns and rows in which points with coordinates in ranges may be seen, as [`SeenChildren`]
 /// stores them, and where there are any.
 #[inline(always)]
 pub(super) fn columns_and_rows<S: Simd>(s: S, ranges: &[[S::F; 2]; 3]) -> (S::U, S::M) {
     let zero_u = s.splat_u(0);
-    let floor = s.splat(1e-30);
+    let floor = s.splat(FLOOR);
     let near = s.div(s.splat(1.0), s.max(ranges[2][0], floor));
     let far = s.div(s.splat(1.0), s.max(ranges[2][1], floor));
     let columns = &*COLUMNS;

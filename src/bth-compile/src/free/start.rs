@@ -99,6 +99,12 @@ impl Start {
     }
 }
 
+/// Bound of the rounding of heights, relative to the triangle's size: corners whose heights differ
+/// by less may be equally high.
+const EQUAL: f64 = 1e-12;
+/// Bound of the rounding of one height, relative to the triangle's size.
+const LOWER: f64 = 1e-14;
+
 impl Line {
     fn new(inward: [f64; 2], offset: f64, on: u8) -> Self {
         let columns = &*COLUMNS;
@@ -129,8 +135,8 @@ impl Line {
     fn through_outermost(local: &[[f64; 2]; 3], inward: [f64; 2], size: f64) -> Self {
         let heights = local.map(|p| inward[0] * p[0] + inward[1] * p[1]);
         let least = heights.into_iter().fold(f64::INFINITY, f64::min);
-        let near = |height: &f64| *height <= least + 1e-12 * size;
+        let near = |height: &f64| *height <= least + EQUAL * size;
         let on = (0..3).filter(|k| near(&heights[*k])).fold(0, |on, k| on | 1u8 << k);
-        Line::new(inward, least - 1e-14 * size, if on.is_power_of_two() { on } else { 0 })
+        Line::new(inward, least - LOWER * size, if on.is_power_of_two() { on } else { 0 })
     }
 }

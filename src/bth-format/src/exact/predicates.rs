@@ -4,6 +4,12 @@
 use super::expansion::{Expansion, VOLUME_PARTS};
 use std::cmp::Ordering;
 
+/// Bounds the error of a volume relative to the sum of its products' sizes: each of the six has at
+/// most 7 roundings (3 differences, 2 products, 2 sums) of half an epsilon.
+const VOLUME_ERROR: f64 = 16.0 * f64::EPSILON;
+/// The same for an area: each of the two products has three roundings, the difference one more.
+const AREA_ERROR: f64 = 8.0 * f64::EPSILON;
+
 /// On which side of the plane through a, b and c the point d lies: `Greater` where (b-a)x(c-a)
 /// points to, `Equal` on the plane. Exact for finite points.
 pub fn side(a: [f32; 3], b: [f32; 3], c: [f32; 3], d: [f32; 3]) -> Ordering {
@@ -11,9 +17,7 @@ pub fn side(a: [f32; 3], b: [f32; 3], c: [f32; 3], d: [f32; 3]) -> Ordering {
     let minors = [[1, 2], [2, 0], [0, 1]].map(|[i, j]| (u[i] * v[j], u[j] * v[i]));
     let det: f64 = (0..3).map(|k| (minors[k].0 - minors[k].1) * w[k]).sum();
     let size: f64 = (0..3).map(|k| (minors[k].0.abs() + minors[k].1.abs()) * w[k].abs()).sum();
-    // Each of the six products has at most 7 roundings (3 differences, 2 products, 2 sums); 16 is
-    // ample.
-    if det.abs() > 16.0 * f64::EPSILON * size {
+    if det.abs() > VOLUME_ERROR * size {
         return det.total_cmp(&0.0);
     }
     let mut volume = Expansion::<VOLUME_PARTS>::new();
@@ -29,8 +33,7 @@ pub fn is_zero_area(corners: [[f32; 3]; 3]) -> bool {
     let [a, b, c] = corners.map(|p| p.map(f64::from));
     [[0, 1], [1, 2], [2, 0]].into_iter().all(|[i, j]| {
         let (p, q) = ((b[i] - a[i]) * (c[j] - a[j]), (b[j] - a[j]) * (c[i] - a[i]));
-        // Each product has three roundings, the difference one more.
-        if (p - q).abs() > 8.0 * f64::EPSILON * (p.abs() + q.abs()) {
+        if (p - q).abs() > AREA_ERROR * (p.abs() + q.abs()) {
             return false;
         }
         let mut sum = Expansion::<12>::new();

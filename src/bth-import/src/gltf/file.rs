@@ -30,6 +30,10 @@ pub(crate) struct GltfFile<'a> {
     pub(super) decompressed: Vec<OnceCell<Vec<u8>>>,
 }
 
+/// Bound of the rounding of a matrix's last row, relative to its 1: exporters compute matrices in
+/// f32.
+const LAST_ROW: f32 = 1e-6;
+
 impl<'a> GltfFile<'a> {
     /// Reads the document and refuses required extensions that this use of it does not read.
     pub(crate) fn open(source: &'a Source<'a>, used: Use) -> Result<Self> {
@@ -95,7 +99,7 @@ impl<'a> GltfFile<'a> {
             }
             let Some(columns) = node.matrix else { continue };
             let row = [3, 7, 11, 15].map(|k| columns[k]);
-            let is_affine = row.iter().zip([0.0, 0.0, 0.0, 1.0]).all(|(x, of)| (x - of).abs() <= 1e-6);
+            let is_affine = row.iter().zip([0.0, 0.0, 0.0, 1.0]).all(|(x, of)| (x - of).abs() <= LAST_ROW);
             if !is_affine {
                 let message = format!("expected a matrix whose last row is 0, 0, 0, 1, found {row:?}");
                 let hint =

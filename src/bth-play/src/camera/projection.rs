@@ -53,14 +53,18 @@ impl CameraRay {
     }
 }
 
+/// Sine of the angle between two unit vectors below which the rounding of these decides its
+/// direction. It is relative to their length.
+const STRAIGHT: f64 = 1e-9;
+
 impl Camera {
     /// A pinhole camera at `eye` that looks along `forward` with `vertical` upright in the picture.
     pub(crate) fn look_along(eye: DVec3, forward: DVec3, vertical: DVec3, half_extent: DVec2) -> Self {
         let forward = forward.normalize();
         let side = forward.cross(vertical);
-        // Straight up or down every perpendicular direction can be `right`. Both vectors are unit,
-        // so the bound is relative.
-        let right = if side.length() > 1e-9 { side.normalize() } else { forward.any_orthonormal_vector() };
+        // Straight up or down every perpendicular direction can be `right`.
+        let right =
+            if side.length() > STRAIGHT { side.normalize() } else { forward.any_orthonormal_vector() };
         let up = right.cross(forward);
         let (projection, near, far) = (Projection::Perspective, 0.0, f64::INFINITY);
         Self { eye, right, up, forward, half_extent, projection, near, far }

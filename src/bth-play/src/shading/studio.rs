@@ -39,6 +39,9 @@ pub(crate) struct Studio {
     diagonal: f64,
 }
 
+/// Rays that descend less, relative to their length, end at the horizon and meet no ground.
+const HORIZON: f64 = 1e-6;
+
 /// The key light.
 #[derive(Clone, Copy, Debug)]
 enum Key {
@@ -210,7 +213,7 @@ impl Studio {
         let height = self.ground?;
         let eye = sample.ray.origin;
         let (above, descent) = (eye.dot(self.vertical) - height, -sample.ray.direction.dot(self.vertical));
-        if above <= 0.0 || descent <= 1e-6 {
+        if above <= 0.0 || descent <= HORIZON {
             return None;
         }
         let point = eye + sample.ray.direction * (above / descent);

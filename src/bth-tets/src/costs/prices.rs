@@ -23,6 +23,9 @@ pub(super) struct Prices<'a> {
     pub(super) keep_subtrees: bool,
 }
 
+/// Seconds of the unit in which profiles give times.
+const MICROSECOND: f64 = 1e-6;
+
 impl<'a> Prices<'a> {
     pub(super) fn new(options: &'a CostOptions, record: RecordKind, keep_subtrees: bool) -> Self {
         let costs = options.profile.record(record);
@@ -46,7 +49,7 @@ impl<'a> Prices<'a> {
 
     /// Seconds to tetrahedralize this many triangles.
     pub(super) fn seconds(&self, triangles: u32) -> f64 {
-        f64::from(triangles) * self.options.profile.tetrahedralize * 1e-6
+        f64::from(triangles) * self.options.profile.tetrahedralize * MICROSECOND
     }
 
     /// Bytes that walks read: the records and the vertices.

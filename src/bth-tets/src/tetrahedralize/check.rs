@@ -76,6 +76,9 @@ pub(super) fn check(
     Ok(Checked { vertices, tets, behind, sides, nudged })
 }
 
+/// Bounds the relative error of a sum of a few million volumes, a thousandfold.
+const SUM_ERROR: f64 = 1e-6;
+
 /// Checks that positively oriented tetrahedra fill the box once.
 fn fills_box(
     input: &NodeInput,
@@ -112,8 +115,8 @@ fn fills_box(
     let total: f64 = tets.iter().map(|t| orientation(vertices, *t)).sum();
     let extent = |k: usize| f64::from(input.upper[k]) - f64::from(input.lower[k]);
     let expected = 6.0 * extent(0) * extent(1) * extent(2);
-    // Unless the product underflows, sums of a few million terms have relative errors below 1e-9.
-    if expected > 0.0 && (total - expected).abs() > 1e-6 * expected {
+    // The product may underflow to 0.
+    if expected > 0.0 && (total - expected).abs() > SUM_ERROR * expected {
         return Err(Defect::Volume);
     }
     Ok(())

@@ -48,6 +48,10 @@ fn is_separated_along(axis: usize, bounds: [[f32; 3]; 2], corners: [[f32; 3]; 3]
     })
 }
 
+/// Bounds the error of a difference of two products relative to their sizes: each product has three
+/// relative errors of 2^-53, the difference one more.
+const ERROR: f64 = 4.0 * f64::EPSILON;
+
 /// The sign of the vector product of two differences, `(u[1] - u[0]) × (v[1] - v[0])`; exact.
 fn cross_sign(u: [[f32; 2]; 2], v: [[f32; 2]; 2]) -> Ordering {
     let wide = |p: [[f32; 2]; 2]| p.map(|x| x.map(f64::from));
@@ -55,8 +59,7 @@ fn cross_sign(u: [[f32; 2]; 2], v: [[f32; 2]; 2]) -> Ordering {
     let left = (q[0] - p[0]) * (s[1] - r[1]);
     let right = (q[1] - p[1]) * (s[0] - r[0]);
     let difference = left - right;
-    // Each product has three relative errors of 2^-53, the difference one more.
-    if difference.abs() > 4.0 * f64::EPSILON * (left.abs() + right.abs()) {
+    if difference.abs() > ERROR * (left.abs() + right.abs()) {
         return difference.total_cmp(&0.0);
     }
     let mut sum = Expansion::<8>::new();

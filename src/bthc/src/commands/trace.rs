@@ -12,7 +12,7 @@ use bth_compile::{Error, Monitor};
 use bth_oracle::World;
 use rayon::prelude::*;
 use serde_json::json;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Rays per task: enough to make the cost of starting a task negligible.
 const CHUNK: usize = 4096;
@@ -46,7 +46,7 @@ pub(crate) fn run(args: &Trace) -> Result<(), Failure> {
         let report = json!({"rays": rays.len(), "hits": found, "seconds": seconds, "any": args.any, "exact": args.exact});
         output::json(&report)?;
     } else {
-        let rate = rays.len() as f64 / seconds.max(1e-9) / 1e6;
+        let rate = rays.len() as f64 / seconds.max(Duration::from_nanos(1).as_secs_f64()) / 1e6;
         output::text(&format!(
             "{} rays, {} hits, {seconds:.3} s, {rate:.2} million rays/s\n",
             count(rays.len() as u64),

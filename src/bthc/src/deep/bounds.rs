@@ -13,11 +13,14 @@ pub(super) struct Bound {
     length: f64,
 }
 
+/// Bounds the relative roundings of a file's distance and of a length, a hundredfold.
+const ROUNDING: f64 = 1e-9;
+
 impl Bound {
     /// Returns true if a hit contradicts it. The distance of a file and the length are rounded, by
     /// far less than this.
     pub(super) fn is_broken(&self, t: f64) -> bool {
-        t * self.length < self.distance * (1.0 - 1e-9)
+        t * self.length < self.distance * (1.0 - ROUNDING)
     }
 }
 

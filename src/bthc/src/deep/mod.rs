@@ -240,10 +240,13 @@ fn is_rounded(t: f32, exact: f64) -> bool {
     t == exact || t.to_bits().abs_diff(exact.to_bits()) <= 1
 }
 
+/// Bounds the relative rounding of two exact values of t to f64, a thousandfold.
+const ORDER_ROUNDING: f64 = 1e-12;
+
 /// Returns true if another triangle is hit at a distance that differs by less than its rounding to
 /// f64.
 fn is_as_near(at: Option<Intersection>, exact: f64) -> bool {
-    at.is_some_and(|at| (to_f64(&at.t) - exact).abs() <= 1e-12 * exact.abs())
+    at.is_some_and(|at| (to_f64(&at.t) - exact).abs() <= ORDER_ROUNDING * exact.abs())
 }
 
 #[cfg(test)]

@@ -4,6 +4,11 @@ use bth::rays::{self, PrimitiveRef, Ray, StartRay};
 use bth_oracle::Triangle;
 use bth_random::Rng;
 
+/// How far origins lie off their triangle, relative to the ray's direction.
+const OFF: [f32; 4] = [1e-3, 1e-5, 1e-7, -1e-6];
+/// Ends of ranges, relative to the ray's direction.
+const TMIN: [f32; 2] = [0.0, 1e-4];
+
 /// A ray with the triangle on which it starts.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Start {
@@ -63,11 +68,11 @@ fn start(triangles: &[Triangle], kind: StartKind, i: usize, random: &mut Rng) ->
         1 => to([0, 1, 2].map(|k| 0.5 * target.corners[0][k] + 0.5 * target.corners[1][k])),
         _ => random.unit_vector().map(|x| x as f32),
     };
-    let off = if kind == StartKind::Within { [1e-3, 1e-5, 1e-7, -1e-6][i / 8 % 4] } else { 0.0 };
+    let off = if kind == StartKind::Within { OFF[i / 8 % 4] } else { 0.0 };
     let origin = [0, 1, 2].map(|k| on_surface[k] + off * direction[k]);
     // Above zero, so that what is touched at the start does not count.
     let is_at_corner = kind == StartKind::Corner;
-    let tmin = if is_at_corner { f32::MIN_POSITIVE } else { [0.0, 1e-4][i / 32 % 2] };
+    let tmin = if is_at_corner { f32::MIN_POSITIVE } else { TMIN[i / 32 % 2] };
     let tmax = if i / 64 % 4 == 3 { 0.1 } else { f32::INFINITY };
     let ray = Ray { origin, tmin, direction, tmax };
     let numbers = origin.iter().chain(&direction);

@@ -66,6 +66,9 @@ pub(crate) struct App<'a> {
     pub(super) failure: Option<Failure>,
 }
 
+/// Smallest distance from the camera to what it turns around, relative to the scene's diagonal.
+const NEAREST: f64 = 1e-6;
+
 impl<'a> App<'a> {
     /// A window that plays the frames of `range` at `rate` frames per second.
     pub(crate) fn new(content: Content<'a>, args: &Args, pool: &'a ThreadPool, range: (i32, i32)) -> Self {
@@ -154,7 +157,7 @@ impl<'a> App<'a> {
         let bounds = &self.content.setup.bounds;
         let diagonal = bounds.diagonal();
         if hit[0].is_hit() {
-            f64::from(hit[0].t).max(1e-6 * diagonal)
+            f64::from(hit[0].t).max(NEAREST * diagonal)
         } else {
             (bounds.center() - camera.eye).length().max(0.1 * diagonal)
         }

@@ -32,7 +32,7 @@ pub(crate) struct GltfFile<'a> {
 
 /// Bound of the rounding of a matrix's last row, relative to its 1: exporters compute matrices in
 /// f32.
-const LAST_ROW: f32 = 1e-6;
+const LAST_ROW: f64 = 1e-6;
 
 impl<'a> GltfFile<'a> {
     /// Reads the document and refuses required extensions that this use of it does not read.

@@ -140,14 +140,11 @@ impl<'a> Sink<'a> {
         self.scene.as_ref().map_or(self.instance, |scene| scene.visits[self.first + ray].instance)
     }
 
-    /// Stores the answer of a ray, which reports the instance of [`Self::instance_of`].
+    /// Stores the answer of a ray.
     #[inline(always)]
     pub(crate) fn answer(&mut self, ray: usize, hit: Hit) {
-        let index = self.first + ray;
-        match (&self.scene, &mut self.answers) {
-            (None, Answers::Nearest(hits)) => hits[index] = hit,
-            (None, Answers::Any(found)) => found[index] = hit.is_hit(),
-            (Some(_), _) => self.merge(index, &hit),
+        if hit.is_hit() {
+            self.hit(ray, hit.primitive.triangle, hit.t, hit.u, hit.v);
         }
     }
 
@@ -160,20 +157,23 @@ impl<'a> Sink<'a> {
     /// Records that `ray` hits something, which answers an any-hit query.
     #[inline(always)]
     pub(crate) fn accepted(&mut self, ray: usize) {
-        let index = self.first + ray;
-        match (&self.scene, &mut self.answers) {
-            (None, Answers::Any(found)) => found[index] = true,
-            _ => self.merge(index, &Hit::SOME),
-        }
+        self.hit(ray, NONE, 0.0, 0.0, 0.0);
     }
 
-    /// Stores the nearest hit of a ray; t, u and v are already rounded. They are separate
-    /// parameters, because an aggregate would be passed through memory and stall the load that
-    /// follows.
+    /// Stores a hit of a ray; t, u and v are already rounded. They are separate parameters, here
+    /// and in [`Self::merge`], because an aggregate would be passed through memory and stall the
+    /// load that follows.
     #[inline(always)]
     pub(crate) fn hit(&mut self, ray: usize, triangle: u32, t: f32, u: f32, v: f32) {
-        let primitive = PrimitiveRef { instance: self.instance_of(ray), triangle };
-        self.answer(ray, Hit { t, u, v, primitive });
+        let index = self.first + ray;
+        match (&self.scene, &mut self.answers) {
+            (None, Answers::Nearest(hits)) => {
+                let primitive = PrimitiveRef { instance: self.instance, triangle };
+                hits[index] = Hit { t, u, v, primitive };
+            }
+            (None, Answers::Any(found)) => found[index] = true,
+            (Some(_), _) => self.merge(index, triangle, t, u, v),
+        }
     }
 
     /// Stores the hits of up to sixteen consecutive rays from `ray` on. Bit i of `lanes` is set if
@@ -193,12 +193,13 @@ impl<'a> Sink<'a> {
         }
     }
 
-    /// Merges the answer of a visit into the answer of its ray.
+    /// Merges the hit of a visit into the answer of its ray.
     #[inline(never)]
-    fn merge(&mut self, visit: usize, hit: &Hit) {
+    fn merge(&mut self, visit: usize, triangle: u32, t: f32, u: f32, v: f32) {
         let Some(SceneRays { rays, visits, t_scale }) = &self.scene else { return };
-        let ray = visits[visit].ray as usize;
-        self.answers.merge(ray, hit, &rays[ray], t_scale[visit]);
+        let Visit { ray, instance } = visits[visit];
+        let hit = Hit { t, u, v, primitive: PrimitiveRef { instance, triangle } };
+        self.answers.merge(ray as usize, &hit, &rays[ray as usize], t_scale[visit]);
     }
 }
 

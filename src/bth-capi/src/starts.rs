@@ -20,18 +20,18 @@ struct StartArguments {
 
 impl StartArguments {
     /// Stores the answers of a query; returns its code. After a panic the answers of a chunk are
-    /// `none`.
+    /// `none`. The query gets at most [`CHUNK`] rays, and stores their answers in place.
     ///
     /// # Safety
     /// The arguments are as in [`StartArguments`]. `answers` is null or points to `count` elements,
     /// which are valid for writes and do not overlap the others. All bit patterns are valid for
     /// them.
-    unsafe fn store<T: Copy, A>(
+    #[inline(always)]
+    unsafe fn store<A: Copy>(
         self,
         answers: *mut A,
-        none: T,
-        mut query: impl FnMut(&Scene, &[StartRay], &mut [T]),
-        in_c: impl Fn(T) -> A,
+        none: A,
+        query: impl Fn(&Scene, &[StartRay], &mut [A]),
     ) -> i32 {
         let StartArguments { scene, starts, directions, tmax, count } = self;
         if count == 0 {
@@ -58,26 +58,37 @@ impl StartArguments {
             let start = Start { primitive: PrimitiveRef { instance, triangle }, u, v };
             StartRay { start, direction: [x, y, z], tmax }
         };
-        if let [answer] = answers {
-            let mut found = [none];
-            let code = guarded(|| query(scene, &[ray(0)], &mut found));
-            *answer = in_c(if code.is_ok() { found[0] } else { none });
-            return code.unwrap_or_else(|code| code);
+        // With nothing but the kernel behind it, no registers are saved for what only batches need.
+        if count == 1 {
+            let rays = [ray(0)];
+            return guarded(|| query(scene, &rays, answers)).unwrap_or_else(|code| {
+                answers.fill(none);
+                code
+            });
         }
-        let (mut rays, mut buffer) = (Vec::with_capacity(CHUNK.min(count)), vec![none; CHUNK.min(count)]);
-        let mut code = OK;
-        for (first, answers) in (0..count).step_by(CHUNK).zip(answers.chunks_mut(CHUNK)) {
-            rays.clear();
-            rays.extend((first..first + answers.len()).map(ray));
-            let found = &mut buffer[..rays.len()];
-            if let Err(failed) = guarded(|| query(scene, &rays, found)) {
-                code = failed;
-                found.fill(none);
-            }
-            answers.iter_mut().zip(found).for_each(|(answer, found)| *answer = in_c(*found));
-        }
-        code
+        in_chunks(answers, none, ray, |rays, answers| query(scene, rays, answers))
     }
+}
+
+/// Stores the answers of a query for the rays of each chunk; returns its code.
+#[inline(never)]
+fn in_chunks<A: Copy>(
+    answers: &mut [A],
+    none: A,
+    ray: impl Fn(usize) -> StartRay,
+    query: impl Fn(&[StartRay], &mut [A]),
+) -> i32 {
+    let (mut rays, mut code) = (Vec::with_capacity(CHUNK.min(answers.len())), OK);
+    for (first, answers) in answers.chunks_mut(CHUNK).enumerate() {
+        let first = first * CHUNK;
+        rays.clear();
+        rays.extend((first..first + answers.len()).map(&ray));
+        if let Err(failed) = guarded(|| query(&rays, answers)) {
+            code = failed;
+            answers.fill(none);
+        }
+    }
+    code
 }
 
 /// Nearest hits of rays that start on surfaces; see `bth.h`.
@@ -95,9 +106,8 @@ pub unsafe extern "C" fn bth_nearest_starts(
     count: usize,
 ) -> i32 {
     let arguments = StartArguments { scene, starts, directions, tmax, count };
-    let query = |scene: &Scene, rays: &[StartRay], hits: &mut [Hit]| scene.batch(rays).nearest(hits);
     // SAFETY: the contract of this function includes the contract of `store`.
-    unsafe { arguments.store(hits, Hit::MISS, query, |hit| hit) }
+    unsafe { arguments.store(hits, Hit::MISS, |scene, rays, hits| scene.batch(rays).nearest(hits)) }
 }
 
 /// Stores which rays that start on surfaces hit anything; see `bth.h`.
@@ -115,9 +125,17 @@ pub unsafe extern "C" fn bth_any_starts(
     count: usize,
 ) -> i32 {
     let arguments = StartArguments { scene, starts, directions, tmax, count };
-    let query = |scene: &Scene, rays: &[StartRay], found: &mut [bool]| scene.batch(rays).any(found);
+    let query = |scene: &Scene, rays: &[StartRay], hit: &mut [u8]| {
+        if let ([ray], [hit]) = (rays, &mut *hit) {
+            *hit = scene.any(ray).into();
+            return;
+        }
+        let mut found = [false; CHUNK];
+        scene.batch(rays).any(&mut found[..rays.len()]);
+        hit.iter_mut().zip(found).for_each(|(hit, found)| *hit = found.into());
+    };
     // SAFETY: the contract of this function includes the contract of `store`.
-    unsafe { arguments.store(hit, false, query, u8::from) }
+    unsafe { arguments.store(hit, 0, query) }
 }
 
 /// Checks that rays can start at a point; see `bth.h`.

@@ -1,10 +1,12 @@
 //! The surface at a hit: positions, normals, texture coordinates, group, material and names, from
-//! the sections of the source that a file keeps. And bounds.
+//! the sections of the source that a file keeps. The queries are methods of [`Scene`]
+//! (`hits/mod.rs`).
 //!
 //! Compiling decides what a file keeps: positions of triangles by default (not with
 //! `--no-geometry`), normals and texture coordinates with `--attributes`, groups, materials and
 //! names with `--names`, how materials look with `--materials`.
 
+use crate::animation::normals::corner_normal;
 use crate::intersect::point_exact::exact_normal;
 use crate::materials::{Alpha, Material, Texture, Wrap};
 use crate::rays::{Hit, PrimitiveRef};
@@ -48,261 +50,143 @@ pub struct SurfacePoint {
     pub material: Option<u32>,
 }
 
-/// Lower and upper end of a box.
-pub type Bounds = ([f32; 3], [f32; 3]);
-
-impl Scene {
-    /// The vertices of a triangle in the space of its object, as rays are tested against them: on
-    /// the grid, if the file has one. `None` if the file does not keep them (it was compiled with
-    /// `--no-geometry`), or if there is no such instance or triangle.
-    pub fn triangle(&self, primitive: PrimitiveRef) -> Option<[[f32; 3]; 3]> {
-        triangle(&self.object(self.object_at(primitive)?), primitive.triangle)
+/// Implements [`Scene::surface`].
+pub(crate) fn surface_at(scene: &Scene, hit: &Hit) -> Option<SurfacePoint> {
+    let PrimitiveRef { instance, triangle: id } = hit.primitive;
+    let object = object_at(scene, hit.primitive)?;
+    if scene.world().is_some_and(|world| world.placements[instance as usize].is_none()) {
+        return None;
     }
+    let view = scene.object(object);
+    let corners = triangle(&view, id)?;
+    let (u, v) = (f64::from(hit.u), f64::from(hit.v));
+    let weights = [1.0 - u - v, u, v];
+    let object_position = weighted(weights, corners.map(|corner| corner.map(f64::from)));
+    let object_geometric_normal = plane_normal(corners)?;
+    let object_normal = interpolated_normal(scene, (object, id), weights, object_geometric_normal);
+    let to_world = |normal: [f64; 3]| match scene.world() {
+        None => normal,
+        Some(_) => unit(scene.normal_to_world(instance, normal)).unwrap_or(normal),
+    };
+    let group = view.group_of(id);
+    Some(SurfacePoint {
+        position: transformed(&scene.instance(instance).to_world, object_position),
+        object_position,
+        geometric_normal: to_world(object_geometric_normal),
+        object_geometric_normal,
+        normal: to_world(object_normal),
+        object_normal,
+        uv: interpolated_uv(&view, id, weights),
+        object,
+        group,
+        material: view.material_of(group),
+    })
+}
 
-    /// The vertices of a triangle in world space, at the scene's time. In a mirrored instance they
-    /// are seen clockwise from the front. `None` as for [`Self::triangle`].
-    pub fn triangle_in_world(&self, primitive: PrimitiveRef) -> Option<[[f64; 3]; 3]> {
-        let corners = self.triangle(primitive)?;
-        let to_world = self.instance(primitive.instance).to_world;
-        Some(corners.map(|corner| transformed(&to_world, corner.map(f64::from))))
-    }
+/// Implements [`Scene::material`].
+pub(crate) fn material(scene: &Scene, object: u32, material: u32) -> Option<Material> {
+    let (file, row) = scene.objects().locate(object)?;
+    let row = *file.materials(row).parameters.get(material as usize)?;
+    let texture = |row: u32| (row != NONE).then_some(row);
+    Some(Material {
+        base_color: row.base_color,
+        base_color_texture: texture(row.base_color_texture),
+        emissive: row.emissive,
+        emissive_texture: texture(row.emissive_texture),
+        alpha: match row.alpha_mode {
+            ALPHA_MASK => Alpha::Mask(row.alpha_cutoff),
+            ALPHA_BLEND => Alpha::Blend,
+            _ => Alpha::Opaque,
+        },
+        double_sided: row.flags & MATERIAL_DOUBLE_SIDED != 0,
+        unlit: row.flags & MATERIAL_UNLIT != 0,
+    })
+}
 
-    /// The surface at a hit of this scene, at the scene's time. `None` for a miss, if the file does
-    /// not keep the vertices of triangles (it was compiled with `--no-geometry`), if there is no
-    /// such instance or triangle, or if the instance is hidden by now.
-    ///
-    /// ```
-    /// use bth::rays::Ray;
-    ///
-    /// # const CUBE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/cube.bth"));
-    /// let scene = bth::from_bytes(CUBE)?;
-    /// let hit = scene.nearest(&Ray::new([0.25, 0.5, 2.0], [0.0, 0.0, -1.0]));
-    /// let surface = hit.and_then(|hit| scene.surface(&hit)).expect("it is above the cube");
-    /// assert_eq!((surface.position, surface.normal), ([0.25, 0.5, 1.0], [0.0, 0.0, 1.0]));
-    /// # Ok::<(), bth::Error>(())
-    /// ```
-    pub fn surface(&self, hit: &Hit) -> Option<SurfacePoint> {
-        let PrimitiveRef { instance, triangle: id } = hit.primitive;
-        let object = self.object_at(hit.primitive)?;
-        if self.world().is_some_and(|world| world.placements[instance as usize].is_none()) {
-            return None;
+/// Implements [`Scene::texture`].
+pub(crate) fn texture(scene: &Scene, object: u32, texture: u32) -> Option<Texture<'_>> {
+    let (file, row) = scene.objects().locate(object)?;
+    let row = file.materials(row).textures.get(texture as usize)?;
+    let images = file.images();
+    let image = images.row_of(row.image)?;
+    Some(Texture {
+        image,
+        bytes: images.file(image)?,
+        wrap: row.wrap.map(|wrap| match wrap {
+            WRAP_MIRROR => Wrap::Mirror,
+            WRAP_CLAMP => Wrap::Clamp,
+            _ => Wrap::Repeat,
+        }),
+        nearest: row.filter == FILTER_NEAREST,
+        uv_set: row.uv_set,
+        transform: row.transform,
+    })
+}
+
+/// Implements [`Scene::texture_coordinates`].
+pub(crate) fn texture_coordinates(scene: &Scene, hit: &Hit, uv_set: u32) -> Option<[f32; 2]> {
+    let object = object_at(scene, hit.primitive)?;
+    let triangle = hit.primitive.triangle;
+    match uv_set {
+        UV_SET_FIRST => {
+            let (u, v) = (f64::from(hit.u), f64::from(hit.v));
+            interpolated_uv(scene.view(object), triangle, [1.0 - u - v, u, v])
         }
-        let view = self.object(object);
-        let corners = triangle(&view, id)?;
-        let (u, v) = (f64::from(hit.u), f64::from(hit.v));
-        let weights = [1.0 - u - v, u, v];
-        let object_position = weighted(weights, corners.map(|corner| corner.map(f64::from)));
-        let object_geometric_normal = plane_normal(corners)?;
-        let object_normal = self.interpolated_normal((object, id), weights, object_geometric_normal);
-        let to_world = |normal: [f64; 3]| match self.world() {
-            None => normal,
-            Some(_) => unit(self.normal_to_world(instance, normal)).unwrap_or(normal),
-        };
-        let group = view.group_of(id);
-        Some(SurfacePoint {
-            position: transformed(&self.instance(instance).to_world, object_position),
-            object_position,
-            geometric_normal: to_world(object_geometric_normal),
-            object_geometric_normal,
-            normal: to_world(object_normal),
-            object_normal,
-            uv: interpolated_uv(&view, id, weights),
-            object,
-            group,
-            material: view.material_of(group),
-        })
-    }
-
-    /// The group of a triangle of an object: 0 if the file keeps no groups. Costs O(log runs),
-    /// where a run is a sequence of triangles of one group in the source.
-    ///
-    /// # Panics
-    /// If there is no such object.
-    pub fn group_of(&self, object: u32, triangle: u32) -> u32 {
-        self.object(object).group_of(triangle)
-    }
-
-    /// The name of a group of an object's triangles; empty if it has none or the file keeps none.
-    ///
-    /// # Panics
-    /// If there is no such object.
-    pub fn group_name(&self, object: u32, group: u32) -> &str {
-        self.object(object).group_name(group)
-    }
-
-    /// The material of a group; `None` if it has none or the file keeps none.
-    ///
-    /// # Panics
-    /// If there is no such object.
-    pub fn group_material(&self, object: u32, group: u32) -> Option<u32> {
-        self.object(object).material_of(group)
-    }
-
-    /// Number of materials of an object; 0 if the file keeps none.
-    ///
-    /// # Panics
-    /// If there is no such object.
-    pub fn material_count(&self, object: u32) -> u32 {
-        self.object(object).materials.len() as u32
-    }
-
-    /// The name of an object's material; empty if it has none or the file keeps none.
-    ///
-    /// # Panics
-    /// If there is no such object.
-    pub fn material_name(&self, object: u32, material: u32) -> &str {
-        self.object(object).material_name(material)
-    }
-
-    /// The name of an object in the scene manifest, or of the glTF mesh; empty if the file keeps
-    /// none.
-    pub fn object_name(&self, object: u32) -> &str {
-        self.objects().locate(object).map_or("", |(file, row)| file.object_name(row))
-    }
-
-    /// Box of the triangles of an object that can be hit, in the space of the object; `None` if it
-    /// has no such triangle.
-    ///
-    /// # Panics
-    /// If there is no such object.
-    pub fn object_bounds(&self, object: u32) -> Option<Bounds> {
-        let header = self.object(object).header;
-        (header.root != NONE).then_some((header.lower, header.upper))
-    }
-
-    /// Box in world space that contains all visible instances at the scene's time, slightly
-    /// enlarged to cover roundings of transforms; `None` if nothing is visible. It is the union of
-    /// all [`Self::instance_bounds`].
-    pub fn bounds(&self) -> Option<Bounds> {
-        let boxes = (0..self.instance_count()).filter_map(|instance| self.instance_bounds(instance));
-        boxes.reduce(|(lower, upper), (l, u)| {
-            (
-                std::array::from_fn(|k| f32::min(lower[k], l[k])),
-                std::array::from_fn(|k| f32::max(upper[k], u[k])),
-            )
-        })
-    }
-
-    /// How a material of an object looks. `None` if the file keeps only its name, or if there is no
-    /// such object or material. The material of a hit is
-    /// [`SurfacePoint::material`](crate::SurfacePoint::material).
-    ///
-    /// ```no_run
-    /// let scene = bth::open("house.bth")?;
-    /// for material in 0..scene.material_count(0) {
-    ///     let name = scene.material_name(0, material);
-    ///     if let Some(look) = scene.material(0, material) {
-    ///         let image = look.base_color_texture.and_then(|texture| scene.texture(0, texture));
-    ///         let bytes = image.map_or(0, |image| image.bytes.len());
-    ///         println!("{name}: {:?}, image of {bytes} bytes", look.base_color);
-    ///     }
-    /// }
-    /// # Ok::<(), bth::Error>(())
-    /// ```
-    pub fn material(&self, object: u32, material: u32) -> Option<Material> {
-        let (file, row) = self.objects().locate(object)?;
-        let row = *file.materials(row).parameters.get(material as usize)?;
-        let texture = |row: u32| (row != NONE).then_some(row);
-        Some(Material {
-            base_color: row.base_color,
-            base_color_texture: texture(row.base_color_texture),
-            emissive: row.emissive,
-            emissive_texture: texture(row.emissive_texture),
-            alpha: match row.alpha_mode {
-                ALPHA_MASK => Alpha::Mask(row.alpha_cutoff),
-                ALPHA_BLEND => Alpha::Blend,
-                _ => Alpha::Opaque,
-            },
-            double_sided: row.flags & MATERIAL_DOUBLE_SIDED != 0,
-            unlit: row.flags & MATERIAL_UNLIT != 0,
-        })
-    }
-
-    /// Number of textures of an object; 0 if the file keeps none or there is no such object.
-    pub fn texture_count(&self, object: u32) -> u32 {
-        self.objects().locate(object).map_or(0, |(file, row)| file.materials(row).textures.len() as u32)
-    }
-
-    /// A texture of an object; `None` if there is no such object or texture.
-    pub fn texture(&self, object: u32, texture: u32) -> Option<Texture<'_>> {
-        let (file, row) = self.objects().locate(object)?;
-        let row = file.materials(row).textures.get(texture as usize)?;
-        let images = file.images();
-        let image = images.row_of(row.image)?;
-        Some(Texture {
-            image,
-            bytes: images.file(image)?,
-            wrap: row.wrap.map(|wrap| match wrap {
-                WRAP_MIRROR => Wrap::Mirror,
-                WRAP_CLAMP => Wrap::Clamp,
-                _ => Wrap::Repeat,
-            }),
-            nearest: row.filter == FILTER_NEAREST,
-            uv_set: row.uv_set,
-            transform: row.transform,
-        })
-    }
-
-    /// The texture coordinates of a set at a hit, interpolated. Set 0 is the set of
-    /// [`SurfacePoint::uv`](crate::SurfacePoint::uv). `None` if the file keeps none of the set, or
-    /// if there is no such instance, triangle or set.
-    pub fn texture_coordinates(&self, hit: &Hit, uv_set: u32) -> Option<[f32; 2]> {
-        let object = self.object_at(hit.primitive)?;
-        let triangle = hit.primitive.triangle;
-        match uv_set {
-            UV_SET_FIRST => {
-                let (u, v) = (f64::from(hit.u), f64::from(hit.v));
-                interpolated_uv(self.view(object), triangle, [1.0 - u - v, u, v])
-            }
-            UV_SET_SECOND => {
-                let (file, row) = self.objects().locate(object)?;
-                file.materials(row).second_uv_at(triangle, hit.u, hit.v)
-            }
-            _ => None,
+        UV_SET_SECOND => {
+            let (file, row) = scene.objects().locate(object)?;
+            file.materials(row).second_uv_at(triangle, hit.u, hit.v)
         }
+        _ => None,
     }
+}
 
-    /// The vertex colour at a hit, interpolated linearly: linear red, green, blue and alpha. `None`
-    /// if the file keeps none, or if there is no such instance or triangle.
-    pub fn vertex_color(&self, hit: &Hit) -> Option<[f32; 4]> {
-        let object = self.object_at(hit.primitive)?;
-        let (file, row) = self.objects().locate(object)?;
-        file.materials(row).color_at(hit.primitive.triangle, hit.u, hit.v)
-    }
+/// The object of a triangle; `None` if there is no such instance.
+pub(crate) fn object_at(scene: &Scene, primitive: PrimitiveRef) -> Option<u32> {
+    let object = (primitive.instance < scene.instance_count()).then(|| scene.object_of(primitive.instance));
+    object.filter(|object| *object != NONE)
+}
 
-    /// The interpolated normal at barycentric weights of a triangle, in the space of the object.
-    /// What deforms the object turns normals, too.
-    fn interpolated_normal(
-        &self,
-        (object, id): (u32, u32),
-        weights: [f64; 3],
-        geometric: [f64; 3],
-    ) -> [f64; 3] {
-        let view = self.view(object);
-        let Some(corners) = attribute(view, view.normals, id) else { return geometric };
-        let zero = |normal: &[f32; 3]| normal.iter().all(|x| *x == 0.0);
-        if corners.iter().all(zero) {
-            return geometric;
-        }
-        let deformed = self.deformed_normals(object, id, corners);
-        let normals = [0, 1, 2].map(|k| match &deformed {
-            _ if zero(&corners[k]) => geometric,
-            Some(deformed) => unit(deformed[k]).unwrap_or(geometric),
-            None => corners[k].map(f64::from),
-        });
-        unit(weighted(weights, normals)).unwrap_or(geometric)
+/// The interpolated normal at barycentric weights of a triangle, in the space of the object. What
+/// deforms the object turns normals, too.
+fn interpolated_normal(
+    scene: &Scene,
+    (object, id): (u32, u32),
+    weights: [f64; 3],
+    geometric: [f64; 3],
+) -> [f64; 3] {
+    let view = scene.view(object);
+    let Some(corners) = attribute(view, view.normals, id) else { return geometric };
+    let zero = |normal: &[f32; 3]| normal.iter().all(|x| *x == 0.0);
+    if corners.iter().all(zero) {
+        return geometric;
     }
+    let deformed = deformed_normals(scene, (object, id), corners);
+    let normals = [0, 1, 2].map(|k| match &deformed {
+        _ if zero(&corners[k]) => geometric,
+        Some(deformed) => unit(deformed[k]).unwrap_or(geometric),
+        None => corners[k].map(f64::from),
+    });
+    unit(weighted(weights, normals)).unwrap_or(geometric)
+}
 
-    /// The object of a triangle; `None` if there is no such instance.
-    pub(crate) fn object_at(&self, primitive: PrimitiveRef) -> Option<u32> {
-        let object = (primitive.instance < self.instance_count()).then(|| self.object_of(primitive.instance));
-        object.filter(|object| *object != NONE)
-    }
+/// The normals at the corners of a triangle, turned from the normals in the file by the deformer of
+/// its object; of any length. `None` if nothing deforms the object.
+fn deformed_normals(
+    scene: &Scene,
+    (object, triangle): (u32, u32),
+    normals: [[f32; 3]; 3],
+) -> Option<[[f64; 3]; 3]> {
+    let pose = scene.world()?.animation.pose_of(object)?;
+    let (file, row) = scene.file_of(object);
+    let view = scene.view(object);
+    let (corners, vertices) = (view.corners.get(triangle as usize)?, view.triangles.get(triangle as usize)?);
+    let deformation = file.deformation(row);
+    Some([0, 1, 2].map(|k| corner_normal(&deformation, pose, corners[k], normals[k], vertices[k])))
 }
 
 /// The vertices of a triangle as they are traced; `None` if the file does not keep them or there is
 /// no such triangle.
-fn triangle(view: &ObjectView<'_>, id: u32) -> Option<[[f32; 3]; 3]> {
+pub(crate) fn triangle(view: &ObjectView<'_>, id: u32) -> Option<[[f32; 3]; 3]> {
     let rows = view.triangles.get(id as usize)?;
     let [a, b, c] = rows.map(|row| view.positions.get(row as usize).copied());
     let corners = [a?, b?, c?];
@@ -348,7 +232,7 @@ fn weighted<const N: usize>(weights: [f64; 3], [a, b, c]: [[f64; N]; 3]) -> [f64
 }
 
 /// A point after a transform with rows of four.
-fn transformed(rows: &[[f64; 4]; 3], p: [f64; 3]) -> [f64; 3] {
+pub(crate) fn transformed(rows: &[[f64; 4]; 3], p: [f64; 3]) -> [f64; 3] {
     rows.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3])
 }
 

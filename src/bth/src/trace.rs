@@ -1,17 +1,25 @@
-//! Queries for the nearest hit and for any hit: of one ray, of a batch, and of arrays of
-//! components.
+//! Queries of rays: the nearest hit and any hit of one ray, of a batch, and of arrays of components;
+//! where rays can start, and which points see each other.
+//!
+//! Where some triangles let rays pass, the nearest hit is found as if every triangle were opaque. If
+//! it lies on a transparent part, the ray is searched again by the walk of [`mod@crate::hits`], which
+//! passes over such hits. So scenes without opacity pay for one test in each call, and rays that
+//! reach no holes pay for looking up the opacity of their hit.
 
 use crate::batch::RayBatch;
-use crate::hits::Accept;
+use crate::hits::{Accept, results};
 use crate::object;
 use crate::query::Steps;
 use crate::query::sink::Answers;
-use crate::rays::{Hit, Ray};
+use crate::rays::{Hit, Ray, Start};
 use crate::scene::Scene;
+use crate::start_points;
 use crate::starts::world_ray::{PlacedRay, WorldRay};
 use crate::streams::{HitStreams, RayStreams};
 use crate::trace_ray::TraceRay;
 use crate::trace_ray::sealed::Traced;
+use crate::visible::{self, SegmentEnd};
+use bth_format::Error;
 use bth_format::layout::Opacity;
 use bth_format::object::ObjectView;
 
@@ -93,6 +101,51 @@ impl Scene {
     pub fn any_streams(&self, rays: &RayStreams<'_>, found: &mut [bool]) {
         assert_eq!(found.len(), rays.len(), "as many results as rays");
         rays.in_blocks(|first, rays| self.batch(rays).any(&mut found[first..first + rays.len()]));
+    }
+
+    /// The opacity of the triangle where a hit lies: [`Opacity::Opaque`] for triangles about which
+    /// the file says nothing. A hit of a query is never transparent; where it is unknown, a filter
+    /// ([`Accept::filter`](crate::Accept::filter)) may decide, and without one it counts.
+    ///
+    /// # Panics
+    /// If `hit` is not from this scene.
+    pub fn opacity(&self, hit: &Hit) -> Opacity {
+        self.view(self.object_of(hit.primitive.instance)).opacity_at(hit.primitive.triangle, hit.u, hit.v)
+    }
+
+    /// Checks that rays can start at a point: that it is a point of a triangle with area of a
+    /// visible instance.
+    ///
+    /// Queries do not check starts: a ray whose start is not such a point hits nothing.
+    ///
+    /// # Errors
+    /// `BTH-S003` if there is no such instance, `BTH-S008` if it is hidden, if it has no such
+    /// triangle or the triangle has no area, or if u or v is not finite, negative, or their sum
+    /// above 1 by more than 2^-22. The error says what was found.
+    pub fn check_start(&self, start: &Start) -> Result<(), Error> {
+        start_points::check_start(self, start)
+    }
+
+    /// Returns true if two points see each other: if no triangle crosses the open segment
+    /// between them. Each is a [`Start`], or a point in world space.
+    ///
+    /// It is decided exactly, so it is symmetrical: `visible(a, b)` is `visible(b, a)`. Triangles
+    /// through an end, or in a plane with the whole segment, do not block. Rays pass through the
+    /// transparent parts of triangles. An end that is not a point of a visible instance, or not
+    /// finite, sees nothing.
+    ///
+    /// ```no_run
+    /// use bth::rays::Ray;
+    ///
+    /// let scene = bth::open("bunny.bth")?;
+    /// let light = [0.0, 3.0, 1.0];
+    /// if let Some(hit) = scene.nearest(&Ray::new([0.0, 0.1, 1.0], [0.0, 0.0, -1.0])) {
+    ///     println!("lit: {}", scene.visible(hit.start(), light));
+    /// }
+    /// # Ok::<(), bth::Error>(())
+    /// ```
+    pub fn visible(&self, a: impl Into<SegmentEnd>, b: impl Into<SegmentEnd>) -> bool {
+        visible::see_each_other(self, a.into(), b.into())
     }
 
     /// Stores the nearest hit of a ray, or [`Hit::MISS`].
@@ -216,14 +269,14 @@ impl Scene {
 
     /// Returns true if a ray that hits something hits anything that is not transparent.
     fn hits_what_is_not_transparent<R: Traced>(&self, ray: &R) -> bool {
-        let search = |placed: PlacedRay| self.search_any(placed.world_ray(), &Accept::default());
+        let search = |placed: PlacedRay| results::any(self, placed.world_ray(), &Accept::default());
         !self.has_opacity() || ray.placed(self).is_some_and(search)
     }
 
     /// Replaces a ray's nearest hit by its nearest one that is not transparent.
     fn go_on<R: Traced>(&self, ray: &R, hit: &mut Hit) {
         if self.has_opacity() && hit.is_hit() && self.opacity(hit) == Opacity::Transparent {
-            let search = |placed: PlacedRay| self.search_nearest(placed.world_ray(), &Accept::default());
+            let search = |placed: PlacedRay| results::nearest(self, placed.world_ray(), &Accept::default());
             *hit = ray.placed(self).and_then(search).unwrap_or(Hit::MISS);
         }
     }

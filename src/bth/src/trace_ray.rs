@@ -10,6 +10,7 @@ use crate::query::sink::{Answers, Sink};
 use crate::rays::{Ray, StartRay};
 use crate::scene::Scene;
 use crate::simd::Isa;
+use crate::start_points;
 use crate::starts::prepare::ENDED;
 use crate::starts::world_ray::{InstanceStart, PlacedRay};
 use bth_format::object::ObjectView;
@@ -92,7 +93,7 @@ impl Traced for StartRay {
         self.start.primitive.instance == instance
     }
     fn placed(&self, scene: &Scene) -> Option<PlacedRay> {
-        scene.place(self)
+        start_points::place(scene, self)
     }
     fn go_together(_rays: &[StartRay], _world: Option<&World>) -> bool {
         Isa::chosen() != Isa::Scalar
@@ -111,7 +112,7 @@ impl Traced for StartRay {
         world_rays.clear();
         starts.clear();
         for ray in rays {
-            let (ray, start) = match scene.place(ray) {
+            let (ray, start) = match start_points::place(scene, ray) {
                 Some(PlacedRay { ray, start: Some(start) }) => (ray, start),
                 _ => (ENDED, InstanceStart::none(ENDED.origin)),
             };

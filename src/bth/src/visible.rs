@@ -16,6 +16,7 @@ use crate::intersect::vector::wide;
 use crate::query::{Receiver, TriangleRef};
 use crate::rays::{Ray, Start};
 use crate::scene::Scene;
+use crate::start_points::place_start;
 use crate::starts::world_ray::{InstanceStart, WorldRay};
 use bth_format::layout::Opacity;
 use bth_format::object::ObjectView;
@@ -95,7 +96,7 @@ fn place_end(scene: &Scene, end: &SegmentEnd) -> Option<PlacedEnd> {
             origin.iter().all(|x| x.is_finite()).then_some(PlacedEnd { origin, start: None })
         }
         SegmentEnd::Start(start) => {
-            let (start, origin) = scene.place_start(start).ok()?;
+            let (start, origin) = place_start(scene, start).ok()?;
             Some(PlacedEnd { origin, start: Some(start) })
         }
     }

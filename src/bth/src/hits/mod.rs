@@ -12,20 +12,20 @@
 mod accept;
 mod collect;
 mod crossings;
+pub(crate) mod results;
 mod search;
 
 pub use accept::{Accept, Cull, Filter};
 pub use crossings::Crossings;
 
-use self::collect::{AnyFound, FirstHit, FirstHits, FoundHit, HitCount};
 use self::crossings::count_crossings;
-use self::search::search;
+use self::results::{append_all, append_each, append_nearest, store_each};
 use crate::masks::Masks;
-use crate::rays::Hit;
+use crate::materials::{Material, Texture};
+use crate::rays::{Hit, PrimitiveRef};
 use crate::scene::Scene;
-use crate::starts::world_ray::WorldRay;
+use crate::surface::{self, SurfacePoint};
 use crate::trace_ray::TraceRay;
-use std::collections::BinaryHeap;
 
 /// Queries for several hits, and with conditions. Hits are ordered by ascending t, then instance,
 /// then triangle. Reported t are rounded to f32: among equal ones in one instance, the hit that is
@@ -38,7 +38,7 @@ impl Scene {
         if self.accepts_everything(accept) {
             return self.nearest(ray);
         }
-        self.search_nearest(ray.placed(self)?.world_ray(), accept)
+        results::nearest(self, ray.placed(self)?.world_ray(), accept)
     }
 
     /// Returns true if a ray in world space has a hit that is accepted.
@@ -46,7 +46,7 @@ impl Scene {
         if self.accepts_everything(accept) {
             return self.any(ray);
         }
-        ray.placed(self).is_some_and(|placed| self.search_any(placed.world_ray(), accept))
+        ray.placed(self).is_some_and(|placed| results::any(self, placed.world_ray(), accept))
     }
 
     /// Replaces `hits` by all hits of a ray in world space that are accepted, in order. The time
@@ -66,23 +66,19 @@ impl Scene {
     /// ```
     pub fn all_hits<R: TraceRay>(&self, ray: &R, accept: &Accept<'_>, hits: &mut Vec<Hit>) {
         hits.clear();
-        self.append_all(ray, accept, &mut Vec::new(), hits);
+        append_all(self, ray, accept, &mut Vec::new(), hits);
     }
 
     /// Replaces `hits` by the first `k` of the hits that [`Self::all_hits`] returns, or by all if
     /// there are fewer. Nothing beyond is searched.
     pub fn nearest_hits<R: TraceRay>(&self, ray: &R, k: usize, accept: &Accept<'_>, hits: &mut Vec<Hit>) {
         hits.clear();
-        self.append_nearest(ray, k, accept, hits);
+        append_nearest(self, ray, k, accept, hits);
     }
 
     /// Counts the hits that [`Self::all_hits`] returns, and stores none.
     pub fn count_hits<R: TraceRay>(&self, ray: &R, accept: &Accept<'_>) -> usize {
-        let mut count = HitCount::default();
-        if let Some(placed) = ray.placed(self) {
-            search(self, placed.world_ray(), accept, &mut count);
-        }
-        count.0
+        results::count(self, ray, accept)
     }
 
     /// Stores for each ray the result of [`Self::nearest_accepted`], or [`Hit::MISS`].
@@ -126,7 +122,7 @@ impl Scene {
         hits: &mut Vec<Hit>,
     ) {
         let mut found = Vec::new();
-        append_each(rays, offsets, hits, |ray, hits| self.append_all(ray, accept, &mut found, hits));
+        append_each(rays, offsets, hits, |ray, hits| append_all(self, ray, accept, &mut found, hits));
     }
 
     /// Does the same as [`Self::all_hits_batch`] with the `k` nearest hits of each ray
@@ -139,7 +135,7 @@ impl Scene {
         offsets: &mut Vec<usize>,
         hits: &mut Vec<Hit>,
     ) {
-        append_each(rays, offsets, hits, |ray, hits| self.append_nearest(ray, k, accept, hits));
+        append_each(rays, offsets, hits, |ray, hits| append_nearest(self, ray, k, accept, hits));
     }
 
     /// Counts the crossings of triangles by a ray in world space. Each passage through a closed
@@ -239,71 +235,126 @@ impl Scene {
         let Accept { mask, cull, filter } = accept;
         self.masks().is_empty() && *mask != 0 && *cull == Cull::None && filter.is_none()
     }
-
-    /// Finds the result of [`Self::nearest_accepted`], always by [`mod@search`].
-    pub(crate) fn search_nearest(&self, ray: WorldRay<'_>, accept: &Accept<'_>) -> Option<Hit> {
-        let mut first = FirstHit::default();
-        search(self, ray, accept, &mut first);
-        first.0.map(|found| found.hit)
-    }
-
-    /// Finds the result of [`Self::any_accepted`], always by [`mod@search`].
-    pub(crate) fn search_any(&self, ray: WorldRay<'_>, accept: &Accept<'_>) -> bool {
-        let mut any = AnyFound::default();
-        search(self, ray, accept, &mut any);
-        any.0
-    }
-
-    /// Appends all accepted hits of a ray to `hits`, in order. `found` is scratch memory.
-    fn append_all<R: TraceRay>(
-        &self,
-        ray: &R,
-        accept: &Accept<'_>,
-        found: &mut Vec<FoundHit>,
-        hits: &mut Vec<Hit>,
-    ) {
-        found.clear();
-        if let Some(placed) = ray.placed(self) {
-            search(self, placed.world_ray(), accept, found);
-        }
-        // The heap of `append_nearest` sorts these few hits, too, which saves the code of another
-        // sort.
-        *found = BinaryHeap::from(std::mem::take(found)).into_sorted_vec();
-        hits.extend(found.iter().map(|found| found.hit));
-    }
-
-    /// Appends the `k` nearest accepted hits of a ray to `hits`, in order.
-    fn append_nearest<R: TraceRay>(&self, ray: &R, k: usize, accept: &Accept<'_>, hits: &mut Vec<Hit>) {
-        if let (1.., Some(placed)) = (k, ray.placed(self)) {
-            let mut first = FirstHits { count: k, hits: BinaryHeap::new() };
-            search(self, placed.world_ray(), accept, &mut first);
-            hits.extend(first.hits.into_sorted_vec().iter().map(|found| found.hit));
-        }
-    }
 }
 
-/// Stores the result of a query for each ray.
-fn store_each<R, T>(rays: &[R], results: &mut [T], query: impl Fn(&R) -> T) {
-    assert_eq!(rays.len(), results.len(), "as many results as rays");
-    for (ray, result) in rays.iter().zip(results) {
-        *result = query(ray);
+/// What a file keeps of the surface at a hit.
+impl Scene {
+    /// The vertices of a triangle in the space of its object, as rays are tested against them: on
+    /// the grid, if the file has one. `None` if the file does not keep them (it was compiled with
+    /// `--no-geometry`), or if there is no such instance or triangle.
+    pub fn triangle(&self, primitive: PrimitiveRef) -> Option<[[f32; 3]; 3]> {
+        surface::triangle(&self.object(surface::object_at(self, primitive)?), primitive.triangle)
     }
-}
 
-/// Replaces `hits` by those that a query appends for each ray, and `offsets` by their first indices
-/// and the number of all.
-fn append_each<R>(
-    rays: &[R],
-    offsets: &mut Vec<usize>,
-    hits: &mut Vec<Hit>,
-    mut query: impl FnMut(&R, &mut Vec<Hit>),
-) {
-    hits.clear();
-    offsets.clear();
-    offsets.reserve(rays.len() + 1);
-    offsets.push(0);
-    for ray in rays {
-        query(ray, hits);
-        offsets.push(hits.len());
+    /// The vertices of a triangle in world space, at the scene's time. In a mirrored instance they
+    /// are seen clockwise from the front. `None` as for [`Self::triangle`].
+    pub fn triangle_in_world(&self, primitive: PrimitiveRef) -> Option<[[f64; 3]; 3]> {
+        let corners = self.triangle(primitive)?;
+        let to_world = self.instance(primitive.instance).to_world;
+        Some(corners.map(|corner| surface::transformed(&to_world, corner.map(f64::from))))
+    }
+
+    /// The surface at a hit of this scene, at the scene's time. `None` for a miss, if the file does
+    /// not keep the vertices of triangles (it was compiled with `--no-geometry`), if there is no
+    /// such instance or triangle, or if the instance is hidden by now.
+    ///
+    /// ```
+    /// use bth::rays::Ray;
+    ///
+    /// # const CUBE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/cube.bth"));
+    /// let scene = bth::from_bytes(CUBE)?;
+    /// let hit = scene.nearest(&Ray::new([0.25, 0.5, 2.0], [0.0, 0.0, -1.0]));
+    /// let surface = hit.and_then(|hit| scene.surface(&hit)).expect("it is above the cube");
+    /// assert_eq!((surface.position, surface.normal), ([0.25, 0.5, 1.0], [0.0, 0.0, 1.0]));
+    /// # Ok::<(), bth::Error>(())
+    /// ```
+    pub fn surface(&self, hit: &Hit) -> Option<SurfacePoint> {
+        surface::surface_at(self, hit)
+    }
+
+    /// The group of a triangle of an object: 0 if the file keeps no groups. Costs O(log runs),
+    /// where a run is a sequence of triangles of one group in the source.
+    ///
+    /// # Panics
+    /// If there is no such object.
+    pub fn group_of(&self, object: u32, triangle: u32) -> u32 {
+        self.object(object).group_of(triangle)
+    }
+
+    /// The name of a group of an object's triangles; empty if it has none or the file keeps none.
+    ///
+    /// # Panics
+    /// If there is no such object.
+    pub fn group_name(&self, object: u32, group: u32) -> &str {
+        self.object(object).group_name(group)
+    }
+
+    /// The material of a group; `None` if it has none or the file keeps none.
+    ///
+    /// # Panics
+    /// If there is no such object.
+    pub fn group_material(&self, object: u32, group: u32) -> Option<u32> {
+        self.object(object).material_of(group)
+    }
+
+    /// Number of materials of an object; 0 if the file keeps none.
+    ///
+    /// # Panics
+    /// If there is no such object.
+    pub fn material_count(&self, object: u32) -> u32 {
+        self.object(object).materials.len() as u32
+    }
+
+    /// The name of an object's material; empty if it has none or the file keeps none.
+    ///
+    /// # Panics
+    /// If there is no such object.
+    pub fn material_name(&self, object: u32, material: u32) -> &str {
+        self.object(object).material_name(material)
+    }
+
+    /// How a material of an object looks. `None` if the file keeps only its name, or if there is no
+    /// such object or material. The material of a hit is
+    /// [`SurfacePoint::material`](crate::SurfacePoint::material).
+    ///
+    /// ```no_run
+    /// let scene = bth::open("house.bth")?;
+    /// for material in 0..scene.material_count(0) {
+    ///     let name = scene.material_name(0, material);
+    ///     if let Some(look) = scene.material(0, material) {
+    ///         let image = look.base_color_texture.and_then(|texture| scene.texture(0, texture));
+    ///         let bytes = image.map_or(0, |image| image.bytes.len());
+    ///         println!("{name}: {:?}, image of {bytes} bytes", look.base_color);
+    ///     }
+    /// }
+    /// # Ok::<(), bth::Error>(())
+    /// ```
+    pub fn material(&self, object: u32, material: u32) -> Option<Material> {
+        surface::material(self, object, material)
+    }
+
+    /// Number of textures of an object; 0 if the file keeps none or there is no such object.
+    pub fn texture_count(&self, object: u32) -> u32 {
+        self.objects().locate(object).map_or(0, |(file, row)| file.materials(row).textures.len() as u32)
+    }
+
+    /// A texture of an object; `None` if there is no such object or texture.
+    pub fn texture(&self, object: u32, texture: u32) -> Option<Texture<'_>> {
+        surface::texture(self, object, texture)
+    }
+
+    /// The texture coordinates of a set at a hit, interpolated. Set 0 is the set of
+    /// [`SurfacePoint::uv`](crate::SurfacePoint::uv). `None` if the file keeps none of the set, or
+    /// if there is no such instance, triangle or set.
+    pub fn texture_coordinates(&self, hit: &Hit, uv_set: u32) -> Option<[f32; 2]> {
+        surface::texture_coordinates(self, hit, uv_set)
+    }
+
+    /// The vertex colour at a hit, interpolated linearly: linear red, green, blue and alpha. `None`
+    /// if the file keeps none, or if there is no such instance or triangle.
+    pub fn vertex_color(&self, hit: &Hit) -> Option<[f32; 4]> {
+        let object = surface::object_at(self, hit.primitive)?;
+        let (file, row) = self.objects().locate(object)?;
+        file.materials(row).color_at(hit.primitive.triangle, hit.u, hit.v)
     }
 }

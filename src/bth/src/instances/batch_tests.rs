@@ -9,6 +9,7 @@ use crate::nodes::affine::Affine;
 use crate::query::better;
 use crate::rays::{PrimitiveRef, Start, StartRay};
 use crate::scene::Scene;
+use crate::start_points::place;
 use crate::starts::world_ray::WorldRay;
 use bth_format::File;
 use bth_random::Rng;
@@ -73,7 +74,7 @@ fn the_top_level_does_not_change_results() {
 /// Oracle: the nearest hit of a ray that starts on an instance, of a loop over all instances.
 fn nearest_start_by_loop(scene: &Scene, ray: &StartRay) -> Hit {
     let mut best = Hit::MISS;
-    let Some(placed) = scene.place(ray) else { return best };
+    let Some(placed) = place(scene, ray) else { return best };
     let world = scene.world().expect("instances");
     for (instance, placement) in world.placements.iter().enumerate() {
         let Some(placement) = placement else { continue };

@@ -1,15 +1,23 @@
-//! Scenes: opening of compiled files, what they hold, and new positions of their objects.
+//! Scenes: what they hold, their time and instances, and new positions of their objects.
 
 pub(crate) mod motion;
+mod open;
+
+pub(crate) use motion::InstanceView;
+pub use open::{from_bytes, from_file, map, open};
 
 use crate::instances::World;
 use crate::masks::Masks;
 use crate::objects::Objects;
+use crate::update::Update;
+use bth_format::SceneView;
 use bth_format::error::Error;
 use bth_format::file::File;
-use bth_format::layout::kind;
+use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
-use std::path::Path;
+
+/// Lower and upper end of a box.
+pub type Bounds = ([f32; 3], [f32; 3]);
 
 /// An open file that can be traced. The instances of a file with scene sections are placed as at a
 /// given time (see [`Scene::set_frame`]). In a file without scene sections, each object has one
@@ -44,77 +52,7 @@ pub struct Scene {
     masks: Masks,
 }
 
-/// Reads a compiled file into memory and checks every index, so that tracing is safe for any
-/// contents of the file. The time is linear in the size of the file. Hashes and geometry are not
-/// checked; see [`mod@bth_format::verify`].
-///
-/// # Errors
-/// - `BTH-O…` if the file cannot be read.
-/// - `BTH-F0…` if the header or the section table violates the specification, `BTH-F1…` if the
-///   contents of a section do. The error gives the section and the byte offset.
-/// - `BTH-S…` if an instance cannot be placed at the first frame of the scene.
-pub fn open(path: impl AsRef<Path>) -> Result<Scene, Error> {
-    let path = path.as_ref();
-    Scene::checked(File::read(path)?).map_err(|e| e.in_file(path))
-}
-
-/// Opens a compiled file whose contents are in memory. Copies them, then does the same as [`open`].
-///
-/// # Errors
-/// The errors of [`open`].
-pub fn from_bytes(bytes: &[u8]) -> Result<Scene, Error> {
-    Scene::checked(File::from_bytes(bytes)?)
-}
-
-/// Makes a scene of an open file, which is neither copied nor read again. Checks it like [`open`].
-///
-/// # Errors
-/// The errors of [`open`], except errors about reading, the header and the section table.
-pub fn from_file(file: File) -> Result<Scene, Error> {
-    Scene::checked(file)
-}
-
-/// Maps a compiled file into memory and checks only its header, section table and scene sections,
-/// so the time does not depend on the size of its objects.
-///
-/// # Safety
-/// Until the scene, and every scene that [`SceneBuilder`](crate::SceneBuilder) makes of it, is
-/// dropped, the file must not be written to or truncated (see [`File::map`]). [`open`] must accept
-/// its contents. It accepts unchanged files that `bthc` has written. With other contents tracing
-/// may panic or not terminate, but it does not read out of bounds.
-///
-/// # Errors
-/// The errors of [`open`], except errors about the contents of objects.
-#[allow(unsafe_code)]
-pub unsafe fn map(path: impl AsRef<Path>) -> Result<Scene, Error> {
-    let path = path.as_ref();
-    // SAFETY: the caller's contract includes the contract of `File::map`.
-    let file = unsafe { File::map(path)? };
-    Scene::with_world(file).map_err(|e| e.in_file(path))
-}
-
 impl Scene {
-    /// Checks all sections of a file and opens its scene.
-    fn checked(file: File) -> Result<Scene, Error> {
-        for object in 0..file.object_count() {
-            file.check(object)?;
-        }
-        file.check_object_names()?;
-        file.check_images()?;
-        Scene::with_world(file)
-    }
-
-    /// Checks only the scene sections of a file and opens its scene.
-    fn with_world(file: File) -> Result<Scene, Error> {
-        let has_opacity = file.table().iter().any(|e| e.kind == kind::OPACITY && e.count != 0);
-        let mut objects = Objects::of_file(file);
-        let mut world = World::new(&objects)?;
-        if let Some(world) = &mut world {
-            world.deform_first(&mut objects)?;
-        }
-        Ok(Scene { objects, world, has_opacity, masks: Masks::default() })
-    }
-
     /// A scene of the objects of several files, without objects and instances yet.
     pub(crate) fn of_several_files() -> Scene {
         let (objects, world) = (Objects::of_several_files(), Some(World::empty()));
@@ -250,5 +188,210 @@ impl Scene {
     /// Size in bytes of the sections that traversal reads.
     pub fn resident_bytes(&self) -> u64 {
         self.objects.resident_bytes()
+    }
+}
+
+/// Motion: time, instances and nodes at that time, and positions of objects.
+impl Scene {
+    /// The scene sections; `None` if the file has none or a scene builder made the scene.
+    pub fn description(&self) -> Option<SceneView<'_>> {
+        self.world().and_then(|_| self.objects().sole_file()?.scene())
+    }
+
+    /// Time of the scene in seconds. After opening, it is the time of the first frame; 0 without
+    /// scene sections.
+    pub fn seconds(&self) -> f64 {
+        self.world().map_or(0.0, |world| world.seconds)
+    }
+
+    /// Sets the time of the scene in seconds: evaluates the animation, refits the objects that
+    /// skins and morph targets deform, places the instances that moved and rebuilds the top-level
+    /// BVH. The time may lie outside of the range of frames; tracks are constant beyond their keys.
+    /// Without scene sections, and in scenes of a scene builder, this has no effect.
+    ///
+    /// # Errors
+    /// `BTH-S001` if the transform of a visible instance cannot be inverted, `BTH-S002` if the
+    /// transform, the world box or the position of a vertex that deforms is not finite in `f32`, or
+    /// the time is not finite. The error gives the node. The scene is then unchanged.
+    pub fn set_seconds(&mut self, seconds: f64) -> Result<Update, Error> {
+        motion::check_time(seconds)?;
+        let (objects, world) = self.parts_mut();
+        world.as_mut().map_or(Ok(Update::default()), |world| world.update(objects, seconds))
+    }
+
+    /// Sets the time of the scene to the time of a frame. The frame may lie outside of the range of
+    /// frames.
+    ///
+    /// # Errors
+    /// The errors of [`Self::set_seconds`].
+    pub fn set_frame(&mut self, frame: i32) -> Result<Update, Error> {
+        let rate = self.description().map_or(1.0, |view| view.scene[0].rate);
+        self.set_seconds(f64::from(frame) / rate)
+    }
+
+    /// Number of instances in the scene, visible or not; in a scene of a scene builder, one more
+    /// than the max id that was ever committed.
+    pub fn instance_count(&self) -> u32 {
+        self.world().map_or(self.object_count(), |world| world.placements.len() as u32)
+    }
+
+    /// Index of an instance's object; `u32::MAX` if a scene builder has removed the instance.
+    ///
+    /// # Panics
+    /// If there is no such instance.
+    pub fn object_of(&self, instance: u32) -> u32 {
+        let Some(world) = self.world() else {
+            assert!(instance < self.object_count(), "an instance below instance_count");
+            return instance;
+        };
+        world.object_of(self.objects(), instance)
+    }
+
+    /// An instance at the scene's time.
+    ///
+    /// # Panics
+    /// If there is no such instance.
+    pub fn instance(&self, instance: u32) -> InstanceView {
+        motion::instance(self, instance)
+    }
+
+    /// The transform from a node's space to world space at the scene's time, as in
+    /// [`InstanceView::to_world`], and whether the node is visible.
+    ///
+    /// # Panics
+    /// If there is no such node, as in a file without scene sections or a scene of a scene builder.
+    pub fn node(&self, node: u32) -> ([[f64; 4]; 3], bool) {
+        self.world().expect("a file with nodes").node(self.objects(), node)
+    }
+
+    /// Transforms a normal from an instance's object space to world space, by the transpose of the
+    /// inverse. The result is not normalized.
+    ///
+    /// # Panics
+    /// In a file with scene sections, if there is no such instance or it is not visible.
+    pub fn normal_to_world(&self, instance: u32, normal: [f64; 3]) -> [f64; 3] {
+        let Some(world) = self.world() else { return normal };
+        let placement = world.placements[instance as usize].as_ref().expect("an instance that can be seen");
+        placement.inverse.normal(normal)
+    }
+
+    /// Lower and upper end of a box in world space that contains an instance and is slightly
+    /// enlarged to cover roundings; `None` if the instance is not visible.
+    ///
+    /// # Panics
+    /// If there is no such instance.
+    pub fn instance_bounds(&self, instance: u32) -> Option<Bounds> {
+        let Some(world) = self.world() else {
+            let object = self.object(instance).header;
+            return (object.root != NONE).then_some((object.lower, object.upper));
+        };
+        world.bounds(self.objects(), instance)
+    }
+
+    /// Number of objects in which rays have been traced since the scene was opened; without scene
+    /// sections, of all objects.
+    pub fn touched_objects(&self) -> usize {
+        self.world().map_or(self.object_count() as usize, |world| world.traced_objects())
+    }
+
+    /// Bytes on the heap: of the placed instances with the top-level BVH, and of the node hierarchy
+    /// or the transforms that a scene builder was given. Both are 0 for a file without scene
+    /// sections.
+    pub fn heap_bytes(&self) -> (usize, usize) {
+        self.world().map_or((0, 0), |world| world.bytes())
+    }
+
+    /// Number of vertices that [`Self::set_positions`] expects; `None` if the object was not
+    /// compiled with `--deformable`.
+    ///
+    /// # Panics
+    /// If there is no such object.
+    pub fn vertex_count(&self, object: u32) -> Option<usize> {
+        let view = self.view(object);
+        view.is_deformable().then_some(view.positions.len())
+    }
+
+    /// Gives an object new positions: one for each vertex of its source, in the source's order, in
+    /// the space of the object. For a PLY or OFF file this is the order of its vertices, for OBJ
+    /// the order of its `v` lines, for STL the order of the corners of its triangles, for triangles
+    /// from memory the order of the arrays, and for glTF the vertices of one primitive after the
+    /// other.
+    ///
+    /// The boxes of the object's nodes are computed again, by the threads of the current pool with
+    /// the feature `rayon`, in memory that belongs to this scene. The file and other scenes with
+    /// the same file do not change. All queries of this scene then answer for the new positions, as
+    /// exactly as before. Triangles of zero area are not hit and are not part of the surface, as in
+    /// a file that is compiled with these positions. The tree keeps the structure that was
+    /// compiled: [`Update::deformed_cost_ratio`] tells how much worse it is for the new one.
+    ///
+    /// # Errors
+    /// `BTH-O003` if there is no such object, `BTH-S006` if it was not compiled with
+    /// `--deformable`, `BTH-S007` if the number of positions is wrong or one is not finite,
+    /// `BTH-S002` if the world box of an instance would not be finite, `BTH-O001` if there is not
+    /// enough memory. The scene is then unchanged.
+    pub fn set_positions(&mut self, object: u32, positions: &[[f32; 3]]) -> Result<Update, Error> {
+        motion::refit_object(self, object, |own| own.stage(positions))
+    }
+
+    /// Like [`Self::set_positions`], but interpolates each position linearly between two times: at
+    /// `share` of the way from the first to the second, from 0 to 1. For motion blur, where
+    /// positions are known when the shutter opens and when it closes: set one share for each time
+    /// at which the picture is sampled.
+    ///
+    /// A coordinate is (1 − `share`) · a + `share` · b in `f64`, rounded once to `f32`: exactly a
+    /// or b at the ends, and never beyond them, so that the boxes of both ends together contain all
+    /// that is between. Rays are traced as exactly as against any other positions.
+    ///
+    /// # Errors
+    /// The errors of [`Self::set_positions`] for both ends, and `BTH-S007` if `share` is not from 0
+    /// to 1. The scene is then unchanged.
+    pub fn set_positions_between(
+        &mut self,
+        object: u32,
+        ends: [&[[f32; 3]]; 2],
+        share: f64,
+    ) -> Result<Update, Error> {
+        motion::refit_object(self, object, |own| own.stage_between(ends, share))
+    }
+
+    /// The positions of an object's vertices at the scene's time: from the file, from skins and
+    /// morph targets, or from [`Self::set_positions`]. They are in the space of the object, or in
+    /// world space if the object has a skin.
+    /// [`ObjectView::triangles`](bth_format::ObjectView::triangles) refers to them. Empty if the
+    /// file does not keep them (it was compiled with `--no-geometry`).
+    ///
+    /// # Panics
+    /// If there is no such object.
+    pub fn positions(&self, object: u32) -> &[[f32; 3]] {
+        self.view(object).positions
+    }
+
+    /// The name of an object in the scene manifest, or of the glTF mesh; empty if the file keeps
+    /// none.
+    pub fn object_name(&self, object: u32) -> &str {
+        self.objects().locate(object).map_or("", |(file, row)| file.object_name(row))
+    }
+
+    /// Box of the triangles of an object that can be hit, in the space of the object; `None` if it
+    /// has no such triangle.
+    ///
+    /// # Panics
+    /// If there is no such object.
+    pub fn object_bounds(&self, object: u32) -> Option<Bounds> {
+        let header = self.object(object).header;
+        (header.root != NONE).then_some((header.lower, header.upper))
+    }
+
+    /// Box in world space that contains all visible instances at the scene's time, slightly
+    /// enlarged to cover roundings of transforms; `None` if nothing is visible. It is the union of
+    /// all [`Self::instance_bounds`].
+    pub fn bounds(&self) -> Option<Bounds> {
+        let boxes = (0..self.instance_count()).filter_map(|instance| self.instance_bounds(instance));
+        boxes.reduce(|(lower, upper), (l, u)| {
+            (
+                std::array::from_fn(|k| f32::min(lower[k], l[k])),
+                std::array::from_fn(|k| f32::max(upper[k], u[k])),
+            )
+        })
     }
 }

@@ -1,0 +1,91 @@
+//! Results of searches: for one ray, and for each of many.
+
+use super::accept::Accept;
+use super::collect::{AnyFound, FirstHit, FirstHits, FoundHit, HitCount};
+use super::search::search;
+use crate::rays::Hit;
+use crate::scene::Scene;
+use crate::starts::world_ray::WorldRay;
+use crate::trace_ray::TraceRay;
+use std::collections::BinaryHeap;
+
+/// The nearest accepted hit.
+pub(crate) fn nearest(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>) -> Option<Hit> {
+    let mut first = FirstHit::default();
+    search(scene, ray, accept, &mut first);
+    first.0.map(|found| found.hit)
+}
+
+/// Returns true if there is an accepted hit.
+pub(crate) fn any(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>) -> bool {
+    let mut any = AnyFound::default();
+    search(scene, ray, accept, &mut any);
+    any.0
+}
+
+/// The number of accepted hits.
+pub(super) fn count(scene: &Scene, ray: &impl TraceRay, accept: &Accept<'_>) -> usize {
+    let mut count = HitCount::default();
+    if let Some(placed) = ray.placed(scene) {
+        search(scene, placed.world_ray(), accept, &mut count);
+    }
+    count.0
+}
+
+/// Appends all accepted hits of a ray to `hits`, in order. `found` is scratch memory.
+pub(super) fn append_all(
+    scene: &Scene,
+    ray: &impl TraceRay,
+    accept: &Accept<'_>,
+    found: &mut Vec<FoundHit>,
+    hits: &mut Vec<Hit>,
+) {
+    found.clear();
+    if let Some(placed) = ray.placed(scene) {
+        search(scene, placed.world_ray(), accept, found);
+    }
+    // The heap of `append_nearest` sorts these few hits, too, which saves the code of another sort.
+    *found = BinaryHeap::from(std::mem::take(found)).into_sorted_vec();
+    hits.extend(found.iter().map(|found| found.hit));
+}
+
+/// Appends the `k` nearest accepted hits of a ray to `hits`, in order.
+pub(super) fn append_nearest(
+    scene: &Scene,
+    ray: &impl TraceRay,
+    k: usize,
+    accept: &Accept<'_>,
+    hits: &mut Vec<Hit>,
+) {
+    if let (1.., Some(placed)) = (k, ray.placed(scene)) {
+        let mut first = FirstHits { count: k, hits: BinaryHeap::new() };
+        search(scene, placed.world_ray(), accept, &mut first);
+        hits.extend(first.hits.into_sorted_vec().iter().map(|found| found.hit));
+    }
+}
+
+/// Stores the result of a query for each ray.
+pub(super) fn store_each<R, T>(rays: &[R], results: &mut [T], query: impl Fn(&R) -> T) {
+    assert_eq!(rays.len(), results.len(), "as many results as rays");
+    for (ray, result) in rays.iter().zip(results) {
+        *result = query(ray);
+    }
+}
+
+/// Replaces `hits` by those that a query appends for each ray, and `offsets` by their first indices
+/// and the number of all.
+pub(super) fn append_each<R>(
+    rays: &[R],
+    offsets: &mut Vec<usize>,
+    hits: &mut Vec<Hit>,
+    mut query: impl FnMut(&R, &mut Vec<Hit>),
+) {
+    hits.clear();
+    offsets.clear();
+    offsets.reserve(rays.len() + 1);
+    offsets.push(0);
+    for ray in rays {
+        query(ray, hits);
+        offsets.push(hits.len());
+    }
+}

@@ -12,17 +12,25 @@ use crate::simd::Simd;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 
-/// Stores the answer of a ray whose nearest hit is this candidate: the filter is sure that it lies
-/// in the range and before all others. `norm` is the largest |component| of its direction, and
-/// `instance` is reported with the hit.
+/// The nearest hit of a ray, whose t, u and v are not yet computed: the filter is sure that it lies
+/// in the range and before all others.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CertainHit {
+    pub(crate) candidate: Candidate,
+    /// The largest |component| of the ray's direction.
+    pub(crate) norm: f32,
+}
+
+/// Stores the answer of a ray with a certain hit. `instance` is reported with it.
 #[inline(always)]
 pub(crate) fn store_certain_hit<S: Simd, G: Goal>(
     s: S,
     object: &ObjectView<'_>,
     exact_ray: ExactRay<'_>,
-    (candidate, norm): (Candidate, f32),
+    CertainHit { candidate, norm }: CertainHit,
     goal: G,
-    (hit, instance): (&mut Hit, u32),
+    instance: u32,
+    hit: &mut Hit,
 ) {
     if let Some(leaf) = object.node_base().indexed_leaf(candidate.leaf) {
         let (corners, (ray, start)) = (leaf.corners(candidate.triangle as usize), exact_ray);

@@ -4,6 +4,7 @@
 //! from step to step decides the speed. The nearest certain hit is therefore kept with f32 bounds
 //! of its depth, and its t, u and v are computed in f64 once, at the end ([`super::certain_hit`]).
 
+use super::certain_hit::CertainHit;
 use super::leaf::{LeafOutcome, RayProgress, decide, enter_leaf};
 use super::nodes::{Leaf, LeafMemory, leaf, prefetch};
 use super::ray_state::key_limit;
@@ -24,9 +25,8 @@ use std::hint::black_box;
 pub(crate) enum SingleResult {
     /// What its query holds; nothing if it was not constructed.
     OfQuery,
-    /// A triangle that is certainly the nearest hit, whose t, u and v are not yet computed, and the
-    /// direction's largest |component|.
-    Certain(Candidate, f32),
+    /// The nearest hit, which is certain.
+    Certain(CertainHit),
     /// A triangle that is certainly hit, which completes an any-hit query.
     Accepted,
 }
@@ -89,17 +89,30 @@ impl<G: Goal> RayProgress<G> for SingleState<'_, G> {
     }
 }
 
+/// A ray and the object that it goes through.
+pub(crate) struct RayInObject<'a> {
+    pub(crate) object: &'a ObjectView<'a>,
+    pub(crate) ray: ExactRay<'a>,
+}
+
+/// What a single ray looks for, and its query once that is needed.
+pub(crate) struct SingleQuery<'a, G: Goal> {
+    pub(crate) goal: G,
+    pub(crate) query: &'a mut Option<RayQuery<G>>,
+}
+
 /// Traverses the BVH of an object from its root. `bounds` are those for which the ray was prepared.
 ///
-/// This is one kernel, longer than other functions and with more parameters: its variables must
-/// stay in registers across all steps, and a function boundary or a struct of parameters between
-/// the steps was measured to be slower.
+/// This is one kernel, longer than other functions: its variables must stay in registers across all
+/// steps, and a function boundary or one struct of all parameters between the steps was measured to
+/// be slower. A reference that is a parameter aliases nothing, but one in a larger struct may.
 #[inline(always)]
 pub(crate) fn trace_single<S: Simd, G: Goal, C: Count>(
     s: S,
-    (object, ray): (&ObjectView<'_>, ExactRay<'_>),
-    (prepared, bounds): (&PreparedRay, &ObjectBounds),
-    (goal, query): (G, &mut Option<RayQuery<G>>),
+    RayInObject { object, ray }: RayInObject<'_>,
+    prepared: &PreparedRay,
+    bounds: &ObjectBounds,
+    SingleQuery { goal, query }: SingleQuery<'_, G>,
     stack: &mut SingleStack,
     count: &mut C,
 ) -> SingleResult {
@@ -121,8 +134,8 @@ pub(crate) fn trace_single<S: Simd, G: Goal, C: Count>(
     // Stack entries with a greater key are dropped.
     let mut limit = key_limit(state.last);
     loop {
-        let limits = [state.last, limit];
-        code = descend(s, prepared, node_base, limits, (code, goal), &mut stack, count);
+        let nodes = SingleNodes { node_base, last: state.last, limit };
+        code = descend(s, prepared, nodes, code, goal, &mut stack, count);
         let mut memory = LeafMemory::default();
         let done = match leaf(s, object, node_base, code, &mut memory) {
             Leaf::Indexed(leaf) => {
@@ -159,23 +172,29 @@ pub(crate) fn trace_single<S: Simd, G: Goal, C: Count>(
     if state.accepted {
         SingleResult::Accepted
     } else if state.pending.leaf != NONE {
-        SingleResult::Certain(state.pending, prepared.slabs.scale)
+        SingleResult::Certain(CertainHit { candidate: state.pending, norm: prepared.slabs.scale })
     } else {
         SingleResult::OfQuery
     }
 }
 
+/// The nodes of an object, and which of them a single ray need not enter.
+struct SingleNodes<'a> {
+    node_base: NodeBase<'a>,
+    /// Deeper hits cannot change the result.
+    last: f32,
+    /// Stack entries with a greater key cannot, either.
+    limit: f32,
+}
+
 /// Descends to the next leaf or to the bottom of the stack. Returns that code.
-///
-/// Hits deeper than the first of `limits` and stack entries with a greater key than the second
-/// cannot change the result. The parameters are separate, because they stay in registers.
 #[inline(always)]
 fn descend<S: Simd, G: Goal, C: Count>(
     s: S,
     prepared: &PreparedRay,
-    node_base: NodeBase<'_>,
-    [last, limit]: [f32; 2],
-    (mut code, goal): (u32, G),
+    SingleNodes { node_base, last, limit }: SingleNodes<'_>,
+    mut code: u32,
+    goal: G,
     stack: &mut OpenSingleStack<'_>,
     count: &mut C,
 ) -> u32 {

@@ -1,7 +1,7 @@
 //! Tracing of one object by a single ray.
 
 use crate::bvh::certain_hit::store_certain_hit;
-use crate::bvh::single::{SingleResult, trace_single};
+use crate::bvh::single::{RayInObject, SingleQuery, SingleResult, trace_single};
 use crate::bvh::single_stack::SingleStack;
 use crate::intersect::prepare::PreparedRay;
 use crate::intersect::start_point::ExactRay;
@@ -150,13 +150,13 @@ impl<G: Goal, C: Count, R: SingleRay> Kernel for &mut SingleKernel<'_, G, C, R> 
             },
         };
         let (mut query, mut stack) = (None, SingleStack::new());
-        let (of, prepared) = ((object, ray_of_line), (&prepared, bounds));
+        let of = RayInObject { object, ray: ray_of_line };
+        let query_of_ray = SingleQuery { goal, query: &mut query };
         // The answer is written in place: a copy of what was just written word by word would stall.
-        match trace_single(s, of, prepared, (goal, &mut query), &mut stack, *count) {
+        match trace_single(s, of, &prepared, bounds, query_of_ray, &mut stack, *count) {
             SingleResult::Accepted => **hit = Hit::SOME,
-            SingleResult::Certain(candidate, norm) => {
-                let place = (&mut **hit, instance);
-                store_certain_hit(s, object, ray_of_line, (candidate, norm), goal, place);
+            SingleResult::Certain(found) => {
+                store_certain_hit(s, object, ray_of_line, found, goal, instance, hit);
             }
             SingleResult::OfQuery => {
                 **hit = match &query {

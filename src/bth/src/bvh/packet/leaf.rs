@@ -105,6 +105,10 @@ struct GroupTest<'a, 'l, S: Simd> {
     /// Index of the group.
     at: usize,
     leaf: &'a LeafPoints<'l>,
+    /// Points of the leaf that the triangles use, one bit per point.
+    used: u64,
+    /// Where all rays have the same origin: the largest |coordinate| and |depth| of these points.
+    spread: [f32; 2],
     /// For each triangle its index in the hit cache, or [`NOT_CACHED_YET`].
     cache_indices: &'a mut [u8; WIDTH],
     /// One bit per triangle.
@@ -182,8 +186,9 @@ impl<G: Goal> PacketRays<'_, G> {
             let active = (rays >> (i * LANES)) as u32 & 0xffff;
             if active != 0 {
                 let cache_indices = &mut cache_indices;
-                let test = GroupTest { group, at: i, leaf: &leaf, cache_indices, triangles, active };
-                nearer |= self.enter_group(s, bounds, (points, relative, spread), used, test);
+                let test =
+                    GroupTest { group, at: i, leaf: &leaf, used, spread, cache_indices, triangles, active };
+                nearer |= self.enter_group(s, bounds, points, relative, test);
             }
         }
         nearer
@@ -213,16 +218,15 @@ impl<G: Goal> PacketRays<'_, G> {
         }
     }
 
-    /// Intersects the active rays of a group with triangles of a leaf whose points are set in
-    /// `used`. Returns true if any ray has a nearer hit than before. This is a part of a kernel and
-    /// inlined into it.
+    /// Intersects the active rays of a group with triangles of a leaf. Returns true if any ray has
+    /// a nearer hit than before. This is a part of a kernel and inlined into it.
     #[inline(always)]
     fn enter_group<S: Simd, H: PacketBounds<S>>(
         &mut self,
         s: S,
         bounds: &H,
-        (points, relative, spread): (&mut ProjectedPoints, &RelativePoints, [f32; 2]),
-        used: u64,
+        points: &mut ProjectedPoints,
+        relative: &RelativePoints,
         test: GroupTest<'_, '_, S>,
     ) -> bool {
         let (group, leaf) = (&*test.group, test.leaf);
@@ -231,7 +235,7 @@ impl<G: Goal> PacketRays<'_, G> {
             let along = CommonAxis(view.axis());
             debug_assert_eq!(group.common, Some(along), "see `Span::is_from_point`");
             let rows = along.order().map(|axis| relative.row(axis));
-            let [size, depth] = spread;
+            let [size, depth] = test.spread;
             let error = edge_functions::error(s, s.splat(size + size), s.splat(depth), floor);
             let corners = ProjectedOnDemand { rows, projection: group.projection.relative(s) };
             return self.test_triangles::<S, H>(s, &corners, error, test);
@@ -242,7 +246,7 @@ impl<G: Goal> PacketRays<'_, G> {
         let mut greatest = ProjectedMaxima { coordinate: s.splat(0.0), depth: s.splat(0.0) };
         for (part, rows) in leaf.parts.iter().enumerate() {
             let rows = order.map(|axis| &rows[axis]);
-            let mut used = (used >> (part * LANES)) as u32 & 0xffff;
+            let mut used = (test.used >> (part * LANES)) as u32 & 0xffff;
             while used != 0 {
                 let i = used.trailing_zeros() as usize % WIDTH;
                 used &= used - 1;
@@ -269,7 +273,7 @@ impl<G: Goal> PacketRays<'_, G> {
         error: S::F,
         test: GroupTest<'_, '_, S>,
     ) -> bool {
-        let GroupTest { group, at, leaf, cache_indices, mut triangles, mut active } = test;
+        let GroupTest { group, at, leaf, cache_indices, mut triangles, mut active, .. } = test;
         let (mut nearer, origin_reach) = (false, self.object.bounds.origin_reach);
         let starting = self.starting_in(s, at, leaf.code);
         while triangles != 0 {

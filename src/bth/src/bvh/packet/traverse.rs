@@ -167,10 +167,18 @@ impl<S: Simd, G: Goal, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, S
                 }
             }
         }
-        finish::<S, H, G>(s, groups, (origin_terms, pairs, intersections), &mut rays, all, sink);
+        let found = HitBuffers { origin_terms, pairs, intersections };
+        finish::<S, H, G>(s, groups, found, &mut rays, all, sink);
         let steps = u64::from(steps);
         PacketOutcome::Lanes((u64::from(used) * 100 / (steps * rays.rays.len() as u64)) as u32)
     }
+}
+
+/// Memory for the computation of the pending hits.
+struct HitBuffers<'b> {
+    origin_terms: &'b mut OriginTermsLanes,
+    pairs: &'b mut Pairs,
+    intersections: &'b mut [Intersections; GROUPS],
 }
 
 /// Computes the pending hits, and stores the answers of all rays that hit something.
@@ -178,7 +186,7 @@ impl<S: Simd, G: Goal, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, S
 fn finish<S: Simd, H: PacketBounds<S>, G: Goal>(
     s: S,
     groups: &[RayGroup<S>],
-    (origin_terms, pairs, intersections): (&mut OriginTermsLanes, &mut Pairs, &mut [Intersections; GROUPS]),
+    HitBuffers { origin_terms, pairs, intersections }: HitBuffers<'_>,
     rays: &mut PacketRays<'_, G>,
     all: u64,
     sink: &mut Sink<'_>,

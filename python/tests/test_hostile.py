@@ -1,6 +1,7 @@
 """What callers get wrong: exceptions of Python, never a crash."""
 
 import pickle
+import warnings
 
 import numpy as np
 import pytest
@@ -260,3 +261,17 @@ def test_arrays_that_are_not_aligned(scene, rays):
     assert onward.hit.any() and (onward.t == expected.t).all()
     columns = _ray_queries._start_columns(start)
     assert all(column.flags.aligned for column in _ray_queries._flat(columns, (len(packed),)))
+
+
+def test_what_rounding_to_float32_loses_is_told():
+    steps = 5e6 + np.arange(9) * 0.125
+    x, y = np.meshgrid(steps, steps)
+    vertices = np.stack([x.ravel(), y.ravel(), np.zeros(81)], axis=1)
+    first = np.array([9 * (i // 8) + i % 8 for i in range(64)])
+    faces = np.concatenate([first[:, None] + [0, 1, 10], first[:, None] + [0, 10, 9]])
+    with pytest.warns(UserWarning, match="moves 72 of 81 vertices, by up to 2.50e-01 .*triangles lose their area"):
+        bth.compile((vertices, faces))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        bth.compile((vertices - 5e6, faces))
+        bth.compile((vertices.astype(np.float32), faces))

@@ -84,7 +84,7 @@ export function directionThrough(camera, x, y) {
     return unit(to);
 }
 
-/** Rays that descend less, relative to their length, end at the horizon and meet no ground. */
+/** Rays that descend less, relative to their length, end at the horizon and reach no ground. */
 const HORIZON = 1e-6;
 
 /** Where a ray meets the plane through a height along the vertical from above, or null. */

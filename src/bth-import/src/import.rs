@@ -15,7 +15,7 @@ use crate::monitor::Monitor;
 use crate::raw::{Raw, RowKind, check_rows, check_triangles};
 use crate::source::{NON_FINITE, Source, input_error, read_file};
 use crate::weld::{equal_in_all_frames, equal_positions, number};
-use crate::{attributes, coordinate_range, gltf, topology};
+use crate::{attributes, coordinate_range, gltf, rounding, topology};
 use rayon::prelude::*;
 
 /// Reads an OBJ, glTF, GLB, PLY, STL or OFF file. The extension decides about the format, or else
@@ -168,6 +168,7 @@ pub(crate) fn finish(
     check_triangles(raw.triangles.len() as u64)?;
     check_rows((raw.positions.len() as u64).saturating_mul(count))?;
     raw.concave.warn(wanted.polygons, monitor);
+    let rounding = if frames.is_none() { rounding::check(&raw, monitor) } else { None };
     let collected = attributes::collect(&raw, wanted.attributes)?;
     let (mut attributes, normal_sources) = collected.map_or((None, Vec::new()), |(a, rows)| (Some(a), rows));
     if frames.is_some() {
@@ -202,6 +203,7 @@ pub(crate) fn finish(
         polygons: raw.polygons,
         concave: raw.concave.count(),
         skipped: raw.skipped,
+        rounding,
         ..report
     };
     if let Some(Frames { times, format, .. }) = frames {

@@ -29,6 +29,7 @@ mod mesh;
 pub mod monitor;
 mod polygon;
 mod raw;
+mod rounding;
 mod sequence;
 mod source;
 mod text;
@@ -49,7 +50,7 @@ pub use import::{
 pub use materials::{ImageFile, Looks, Materials, Unreadable};
 pub use memory::{MEMORY_FORMAT, import_triangles};
 pub use mesh::{
-    Attributes, Keep, Mesh, OpacityReport, Polygons, Report, Sequence, TriangleOpacities, Wanted,
+    Attributes, Keep, Mesh, OpacityReport, Polygons, Report, Rounding, Sequence, TriangleOpacities, Wanted,
 };
 pub use monitor::{Monitor, Silent};
 pub use sequence::{

@@ -168,12 +168,28 @@ pub struct Report {
     pub components: u64,
     /// Positions that are not finite and that no face uses. Used ones are an error.
     pub non_finite_unused: u64,
+    /// What rounding positions to f32 moves and drops, where that is more than next to nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rounding: Option<Rounding>,
     /// Frames of a sequence; 0 for other models.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub frames: u64,
     /// Opacity of triangles, where some are not opaque.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub opacity: Option<OpacityReport>,
+}
+
+/// What rounding the positions of a source to f32 does to a mesh that lies farther from the origin
+/// than it is large.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Rounding {
+    /// Positions in the source, before welding, that move by more than the size of the model times
+    /// 2^-24.
+    pub positions: u64,
+    /// The farthest that a position moves along an axis, in the model's unit.
+    pub farthest: f64,
+    /// Triangles that have an area in the source and none after rounding.
+    pub triangles: u64,
 }
 
 fn is_zero(count: &u64) -> bool {

@@ -26,6 +26,9 @@ pub(super) enum RowKind {
 /// messages only.
 pub(super) type Locate<'a> = Box<dyn Fn(RowKind, usize) -> Place + 'a>;
 
+/// Reads the positions of a source again, in f64.
+pub(super) type Exact<'a> = Box<dyn Fn() -> Vec<[f64; 3]> + 'a>;
+
 /// A mesh with the rows of its source. Its reader has checked that all indices are in range.
 pub(super) struct Raw<'a> {
     /// Name of the format.
@@ -54,6 +57,8 @@ pub(super) struct Raw<'a> {
     pub(super) materials: MaterialRecorder,
     /// What moves the vertices, if the caller wants it.
     pub(super) deformation: Option<RawDeformation>,
+    /// The positions with all digits of the source; `None` if its numbers are f32.
+    pub(super) exact: Option<Exact<'a>>,
     /// Finds places for error messages.
     pub(super) locate: Locate<'a>,
 }
@@ -75,6 +80,7 @@ impl<'a> Raw<'a> {
             groups: GroupRecorder::default(),
             materials: MaterialRecorder::default(),
             deformation: None,
+            exact: None,
             locate,
         }
     }

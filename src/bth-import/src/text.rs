@@ -1,12 +1,13 @@
 //! Numbers, words, names, lines and statements of text sources.
 
 use std::borrow::Cow;
+use std::str::FromStr;
 
 /// Parses a number; `None` for other words. What some C libraries write for numbers that are not
 /// finite, such as `-nan(ind)` and `1.#INF`, becomes NaN, so that it is an error only where a face
 /// uses it.
 #[inline]
-pub(super) fn float<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
+pub(super) fn float<T: FromStr>(word: &[u8]) -> Option<T> {
     let text = std::str::from_utf8(word).ok()?;
     text.parse().ok().or_else(|| foreign_nan(text)?.parse().ok())
 }
@@ -19,8 +20,10 @@ fn foreign_nan(text: &str) -> Option<&'static str> {
 
 /// Parses three numbers; the error is the first word that is not a number.
 #[inline]
-pub(super) fn point<'w>(words: &mut impl Iterator<Item = &'w [u8]>) -> Result<[f32; 3], &'w [u8]> {
-    let mut point = [0.0; 3];
+pub(super) fn point<'w, T: FromStr + Default + Copy>(
+    words: &mut impl Iterator<Item = &'w [u8]>,
+) -> Result<[T; 3], &'w [u8]> {
+    let mut point = [T::default(); 3];
     for x in &mut point {
         let word = words.next().unwrap_or_default();
         *x = float(word).ok_or(word)?;

@@ -11,9 +11,10 @@ use crate::mesh::{Keep, Wanted};
 use crate::polygon::fan;
 use crate::raw::{Raw, RowKind, check_rows};
 use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, UNSUPPORTED, read_file};
-use crate::text::{Lines, float, integer, shown, words};
+use crate::text::{Lines, float, integer, point, shown, words};
 use crate::text::{file_name, name, next_statement, statements};
 use bth_format::layout::NONE;
+use std::borrow::Cow;
 
 const ATTRIBUTE_HINT: &str = "correct the file, or compile without attributes (--attributes none)";
 
@@ -142,7 +143,19 @@ fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
     }
     let mut raw = reader.finish(wanted)?;
     raw.drop_unused_rows();
+    raw.exact = Some(Box::new(|| exact_positions(source.data)));
     Ok(raw)
+}
+
+/// The positions in f64, of a text that was read before.
+fn exact_positions(data: &[u8]) -> Vec<[f64; 3]> {
+    let mut lines = Lines::new(data);
+    let statements = std::iter::from_fn(|| next_statement(&mut lines));
+    let position = |(_, line): (u64, Cow<'_, [u8]>)| {
+        let mut words = words(&line);
+        (words.next() == Some(b"v")).then(|| point(&mut words).unwrap_or_default())
+    };
+    statements.filter_map(position).collect()
 }
 
 impl<'a> Reader<'a, '_> {

@@ -137,15 +137,24 @@ fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
         source.monitor.warn(&format!("line {number}: what follows the last face is ignored"));
     }
     raw.finish_polygons(wanted.polygons, source.monitor)?;
+    raw.exact = Some(Box::new(move || {
+        let lines = vertex_lines(source).take(vertices as usize);
+        lines.map(|(_, line)| point(&mut words(line)).unwrap_or_default()).collect()
+    }));
     Ok(raw)
 }
 
-fn line_of_vertex(source: &Source<'_>, row: usize) -> u64 {
+/// The lines from the first vertex on, of a text that was read before.
+fn vertex_lines<'a>(source: &Source<'a>) -> impl Iterator<Item = (u64, &'a [u8])> {
     let mut statements = Statements { source, lines: Lines::new(source.data), long_line: None };
-    let Some((_, first)) = statements.next() else { return 0 };
+    let first = statements.next().map_or(&b""[..], |(_, line)| line);
     let word = words(first).next().unwrap_or_default();
     if variant(word).is_some() && word.len() == first.len() {
         statements.next();
     }
-    (0..=row).map_while(|_| statements.next()).last().map_or(0, |(number, _)| number)
+    std::iter::from_fn(move || statements.next())
+}
+
+fn line_of_vertex(source: &Source<'_>, row: usize) -> u64 {
+    vertex_lines(source).nth(row).map_or(0, |(number, _)| number)
 }

@@ -127,10 +127,19 @@ fn read_text<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
         return Err(source.error_at_line(TRUNCATED, lines.number(), message, TRUNCATED_HINT));
     }
     raw.finish_polygons(wanted.polygons, source.monitor)?;
+    raw.exact = Some(Box::new(|| {
+        let numbers = |(_, line)| point(&mut words(line).skip(1)).unwrap_or_default();
+        vertex_lines(source.data).map(numbers).collect()
+    }));
     Ok(raw)
 }
 
-fn line_of_vertex(data: &[u8], row: usize) -> u64 {
+/// The lines of vertices.
+fn vertex_lines(data: &[u8]) -> impl Iterator<Item = (u64, &[u8])> {
     let is_vertex = |line: &[u8]| words(line).next().is_some_and(|w| w.eq_ignore_ascii_case(b"vertex"));
-    Lines::new(data).filter(|(_, line)| is_vertex(line)).nth(row).map_or(0, |(number, _)| number)
+    Lines::new(data).filter(move |(_, line)| is_vertex(line))
+}
+
+fn line_of_vertex(data: &[u8], row: usize) -> u64 {
+    vertex_lines(data).nth(row).map_or(0, |(number, _)| number)
 }

@@ -3,6 +3,7 @@
 
 use glam::DAffine3;
 use std::collections::HashMap;
+use std::path::PathBuf;
 
 use crate::deformation::RawDeformation;
 use crate::error::{Place, Result};
@@ -49,6 +50,8 @@ struct Flattener<'r, 'd, 'a> {
     spans: Vec<Span>,
     wanted: Wanted,
     groups: GroupNumbers,
+    /// Collects positions in f64, when the meshes are read a second time, without a warning.
+    exact: Option<Vec<[f64; 3]>>,
 }
 
 /// Reads a glTF or GLB file: its default scene, else its first, else all root nodes, at rest and
@@ -71,7 +74,19 @@ pub(crate) fn read<'a>(source: &'a Source<'a>, wanted: Wanted) -> Result<Raw<'a>
     let shared = SharedMaterials::default();
     let raw = read_placed(source, &file, wanted, &shared, &placed, None)?;
     shared.report(source);
-    Ok(raw)
+    Ok(Raw { exact: Some(Box::new(move || exact_positions(&file, &placed).unwrap_or_default())), ..raw })
+}
+
+/// The positions in f64, of meshes that were read before.
+fn exact_positions(file: &GltfFile<'_>, placed: &[PlacedMesh]) -> Result<Vec<[f64; 3]>> {
+    let mut flattener = Flattener::new(
+        file,
+        Raw::new("gltf", Box::new(|_, _| Place::File(PathBuf::new()))),
+        Wanted::default(),
+    );
+    flattener.exact = Some(Vec::new());
+    placed.iter().try_for_each(|mesh| flattener.mesh(mesh))?;
+    Ok(flattener.exact.unwrap_or_default())
 }
 
 /// Reads one part of a file. Parts share what was read of it, so each buffer is read once.
@@ -97,7 +112,7 @@ fn read_placed<'a>(
 ) -> Result<Raw<'a>> {
     let no_place = Box::new(|_: RowKind, _: usize| Place::File(source.path.to_owned()));
     let raw = Raw { deformation, ..Raw::new("gltf", no_place) };
-    let mut flattener = Flattener { file, raw, spans: Vec::new(), wanted, groups: GroupNumbers::default() };
+    let mut flattener = Flattener::new(file, raw, wanted);
     for (done, mesh) in placed.iter().enumerate() {
         source.progress(source.data.len() / placed.len() * done)?;
         flattener.mesh(mesh)?;
@@ -117,6 +132,12 @@ fn locate(source: &Source<'_>, spans: &[Span], kind: RowKind, row: usize) -> Pla
         .map_or(String::new(), |a| format!(" accessor {a} row {}", row - span.first[kind]));
     let node = span.node.map_or(String::new(), |node| format!("node {node} "));
     Place::Part(source.path.to_owned(), format!("{node}{}{accessor}", span.part))
+}
+
+impl<'r, 'd, 'a> Flattener<'r, 'd, 'a> {
+    fn new(file: &'r GltfFile<'d>, raw: Raw<'a>, wanted: Wanted) -> Self {
+        Flattener { file, raw, spans: Vec::new(), wanted, groups: GroupNumbers::default(), exact: None }
+    }
 }
 
 impl Flattener<'_, '_, '_> {
@@ -152,7 +173,9 @@ impl Flattener<'_, '_, '_> {
     ) -> Result<()> {
         let (monitor, primitive) = (self.file.source.monitor, reader.primitive);
         let Some(kept) = reader.kept(self.wanted.attributes)? else {
-            monitor.warn(&format!("{} has no positions and is left out", reader.part));
+            if self.exact.is_none() {
+                monitor.warn(&format!("{} has no positions and is left out", reader.part));
+            }
             self.raw.skipped += 1;
             return Ok(());
         };
@@ -167,7 +190,7 @@ impl Flattener<'_, '_, '_> {
             part: reader.part.clone(),
         });
         let mut triangles = reader.read(&kept, self.raw.positions.len())?;
-        if triangles.skipped > 0 {
+        if triangles.skipped > 0 && self.exact.is_none() {
             let indices = self.file.count(primitive.indices.unwrap_or(kept.positions))?;
             monitor.warn(&format!(
                 "{}: the last of its {indices} indices form no whole triangle and are left out",
@@ -251,6 +274,9 @@ impl Flattener<'_, '_, '_> {
         };
         let absent = std::iter::repeat_n([NONE; 3], corners.len());
         let first = [raw.positions.len(), raw.normals.len(), raw.uvs.len()];
+        if let Some(exact) = &mut self.exact {
+            exact.extend(triangles.positions.iter().map(|p| transform::exact_point(world, *p)));
+        }
         raw.positions.extend(triangles.positions.iter().map(|p| transform::point(world, *p)));
         raw.triangles.extend(rows_from(first[0]));
         match &triangles.normals {

@@ -31,7 +31,13 @@ pub(super) fn rows(transform: &DAffine3) -> [[f64; 4]; 3] {
 /// A transformed position, computed in f64 and rounded to f32 once.
 #[inline]
 pub(super) fn point(transform: &DAffine3, p: [f32; 3]) -> [f32; 3] {
-    transform.transform_point3(DVec3::from_array(p.map(f64::from))).to_array().map(|x| x as f32)
+    exact_point(transform, p).map(|x| x as f32)
+}
+
+/// A transformed position, computed in f64.
+#[inline]
+pub(super) fn exact_point(transform: &DAffine3, p: [f32; 3]) -> [f64; 3] {
+    transform.transform_point3(DVec3::from_array(p.map(f64::from))).to_array()
 }
 
 /// Returns the corners of a triangle, with the last two exchanged where it is mirrored.

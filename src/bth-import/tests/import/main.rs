@@ -20,6 +20,7 @@ mod off;
 mod ply;
 mod quantized;
 mod rest_pose;
+mod rounding;
 mod sequence;
 mod stl;
 mod textures;

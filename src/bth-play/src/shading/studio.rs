@@ -39,7 +39,7 @@ pub(crate) struct Studio {
     diagonal: f64,
 }
 
-/// Rays that descend less, relative to their length, end at the horizon and meet no ground.
+/// Rays that descend less, relative to their length, end at the horizon and reach no ground.
 const HORIZON: f64 = 1e-6;
 
 /// The key light.

@@ -18,6 +18,10 @@ pub(super) fn summary(report: &CompileReport, known_rays: u64) -> String {
     facts.row(["triangles", &count(mesh.triangles)]);
     row_unless_zero(&mut facts, "degenerate (never hit)", mesh.degenerate);
     row_unless_zero(&mut facts, "duplicate", mesh.duplicate);
+    if let Some(rounding) = &mesh.rounding {
+        row_unless_zero(&mut facts, "positions moved by rounding", rounding.positions);
+        row_unless_zero(&mut facts, "triangles without area by rounding", rounding.triangles);
+    }
     row_unless_zero(&mut facts, "concave polygons", mesh.concave);
     row_unless_zero(&mut facts, "elements skipped", mesh.skipped);
     row_unless_zero(&mut facts, "boundary edges", mesh.boundary_edges);

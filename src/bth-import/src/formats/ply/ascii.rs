@@ -67,8 +67,8 @@ fn read_row(
             let word = words.next().unwrap_or_default();
             if let Some(place) = place {
                 let value = match property.scalar {
-                    Scalar::F64 => float::<f64>(word).map(|x| x as f32),
-                    _ => float::<f32>(word),
+                    Scalar::F32 => float::<f32>(word).map(f64::from),
+                    _ => float::<f64>(word),
                 };
                 vertex[place] = value.ok_or_else(|| malformed("a number", word))?;
             } else if property.meaning == Meaning::Indices {

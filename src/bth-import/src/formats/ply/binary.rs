@@ -195,10 +195,10 @@ fn integer<const BIG: bool>(scalar: Scalar, bytes: &[u8]) -> i64 {
 }
 
 #[inline]
-fn coordinate<const BIG: bool>(scalar: Scalar, bytes: &[u8]) -> f32 {
+fn coordinate<const BIG: bool>(scalar: Scalar, bytes: &[u8]) -> f64 {
     match scalar {
-        Scalar::F32 => f32::from_bits(bits::<BIG>(bytes) as u32),
-        Scalar::F64 => f64::from_bits(bits::<BIG>(bytes)) as f32,
-        _ => integer::<BIG>(scalar, bytes) as f32,
+        Scalar::F32 => f32::from_bits(bits::<BIG>(bytes) as u32).into(),
+        Scalar::F64 => f64::from_bits(bits::<BIG>(bytes)),
+        _ => integer::<BIG>(scalar, bytes) as f64,
     }
 }

@@ -123,6 +123,13 @@ impl Header {
         self.elements.iter().find(|element| element.kind == ElementKind::Vertices)
     }
 
+    /// Returns true if coordinates of positions may have more digits than f32 keeps.
+    pub(super) fn has_long_positions(&self) -> bool {
+        let is_long = |scalar| matches!(scalar, Scalar::F64 | Scalar::I32 | Scalar::U32);
+        let is_position = |p: &&Property| matches!(p.meaning, Meaning::Position(_));
+        self.vertices().is_some_and(|v| v.properties.iter().filter(is_position).any(|p| is_long(p.scalar)))
+    }
+
     /// The largest value of a component of vertex colours, 1 for numbers with a fraction; `None`
     /// without all three of one type.
     pub(super) fn color_scale(&self) -> Option<f32> {

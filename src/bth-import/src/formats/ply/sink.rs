@@ -7,7 +7,7 @@ use crate::raw::{Raw, check_triangles, strip};
 use crate::source::{INDEX, INDEX_HINT, Source, input_error};
 
 /// Values of a vertex that are kept: position, normal, texture coordinate, colour.
-pub(super) type Vertex = [f32; 11];
+pub(super) type Vertex = [f64; 11];
 
 /// The index of a property in a [`Vertex`].
 pub(super) fn slot(meaning: Meaning) -> Option<usize> {
@@ -23,6 +23,8 @@ pub(super) fn slot(meaning: Meaning) -> Option<usize> {
 /// A raw mesh that grows by vertices and faces.
 pub(super) struct Sink<'a> {
     pub(super) raw: Raw<'a>,
+    /// The positions in f64 if the file has more digits than f32.
+    exact: Option<Vec<[f64; 3]>>,
     normals: bool,
     uvs: bool,
     /// Largest value of a component of the colours, if they are kept.
@@ -43,6 +45,7 @@ impl<'a> Sink<'a> {
         Sink {
             color_scale: header.color_scale().filter(|_| materials),
             colors: Vec::new(),
+            exact: header.has_long_positions().then(Vec::new),
             raw,
             normals: keep != Keep::None && header.has::<3>(Meaning::Normal),
             uvs: keep == Keep::All && header.has::<2>(Meaning::Uv),
@@ -53,7 +56,10 @@ impl<'a> Sink<'a> {
 
     /// What was collected. Normals and texture coordinates are in the vertices' rows.
     pub(super) fn finish(self) -> Raw<'a> {
-        let Sink { mut raw, normals, uvs, colors, .. } = self;
+        let Sink { mut raw, exact, normals, uvs, colors, .. } = self;
+        if let Some(exact) = exact {
+            raw.exact = Some(Box::new(move || exact.clone()));
+        }
         if !colors.is_empty() {
             let corners = raw.triangles.iter().map(|corners| corners.map(|row| colors[row as usize]));
             raw.materials.colors.add(0, corners);
@@ -69,7 +75,11 @@ impl<'a> Sink<'a> {
 
     /// Adds a vertex.
     #[inline]
-    pub(super) fn vertex(&mut self, [x, y, z, nx, ny, nz, u, v, red, green, blue]: Vertex) {
+    pub(super) fn vertex(&mut self, vertex: Vertex) {
+        if let (Some(exact), [x, y, z, ..]) = (&mut self.exact, vertex) {
+            exact.push([x, y, z]);
+        }
+        let [x, y, z, nx, ny, nz, u, v, red, green, blue] = vertex.map(|x| x as f32);
         self.raw.positions.push([x, y, z]);
         if self.normals {
             self.raw.normals.push([nx, ny, nz]);

@@ -1,0 +1,108 @@
+//! What rounding to f32 moves and drops is counted, and told where a picture would show it.
+
+use super::*;
+use bth_import::Rounding;
+
+/// Corners of a grid of 8 by 8 squares of 0.125, `away` from the origin along x and y.
+fn grid(away: f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let at = |i: u32| away + f64::from(i) * 0.125;
+    let corners = (0..81).map(|i| [at(i % 9), at(i / 9), 0.0]).collect();
+    let square = |i: u32| {
+        let a = i / 8 * 9 + i % 8;
+        [[a, a + 1, a + 10], [a, a + 10, a + 9]]
+    };
+    (corners, (0..64).flat_map(square).collect())
+}
+
+/// A name with bytes of each format that keeps more than f32.
+fn in_formats(corners: &[[f64; 3]], triangles: &[[u32; 3]]) -> Vec<(&'static str, Vec<u8>)> {
+    let line = |prefix: &str, [x, y, z]: [f64; 3]| format!("{prefix}{x} {y} {z}\n");
+    let lines = |prefix: &str| corners.iter().map(|p| line(prefix, *p)).collect::<String>();
+    let faces = |prefix: &str, first: u32| {
+        triangles
+            .iter()
+            .map(|t| format!("{prefix}{} {} {}\n", t[0] + first, t[1] + first, t[2] + first))
+            .collect::<String>()
+    };
+    let header = |encoding: &str| {
+        let axes = ["x", "y", "z"].map(|k| format!("property double {k}\n")).concat();
+        let lists = format!("element face {}\nproperty list uchar int vertex_indices\n", triangles.len());
+        format!("ply\nformat {encoding} 1.0\nelement vertex {}\n{axes}{lists}end_header\n", corners.len())
+    };
+    let mut binary = header("binary_little_endian").into_bytes();
+    binary.extend(corners.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
+    for triangle in triangles {
+        binary.push(3);
+        binary.extend(triangle.iter().flat_map(|row| row.to_le_bytes()));
+    }
+    let facet = |t: &[u32; 3]| {
+        let corners = t.map(|row| line("vertex ", corners[row as usize])).concat();
+        format!("facet normal 0 0 1\nouter loop\n{corners}endloop\nendfacet\n")
+    };
+    vec![
+        ("a.obj", format!("# far away\n{}{}", lines("v "), faces("f ", 1)).into_bytes()),
+        (
+            "a.off",
+            format!("OFF\n{} {} 0\n{}{}", corners.len(), triangles.len(), lines(""), faces("3 ", 0))
+                .into_bytes(),
+        ),
+        ("text.ply", format!("{}{}{}", header("ascii"), lines(""), faces("3 ", 0)).into_bytes()),
+        ("binary.ply", binary),
+        (
+            "a.stl",
+            format!("solid a\n{}endsolid a\n", triangles.iter().map(facet).collect::<String>()).into_bytes(),
+        ),
+    ]
+}
+
+/// What was counted, and whether a warning says so.
+fn rounding(name: &str, bytes: &[u8]) -> (Option<Rounding>, bool) {
+    let said = Listener::default();
+    let (_, report) = import_with(name, bytes, Keep::None, &said).unwrap();
+    (report.rounding, said.heard("rounding to 32-bit numbers moves"))
+}
+
+#[test]
+fn far_models_lose_what_f32_cannot_hold_and_say_so() {
+    // Steps of f32 are 0.5 there: of nine coordinates 0, 0.5 and 1 stay, and the others move.
+    let (corners, triangles) = grid(5_000_000.0);
+    for (name, bytes) in in_formats(&corners, &triangles) {
+        let (found, warned) = rounding(name, &bytes);
+        let Rounding { positions, farthest, triangles } = found.expect(name);
+        // Each triangle of a text STL has its own corners.
+        let (moved, all) = if name == "a.stl" { (360, 384) } else { (72, 81) };
+        assert_eq!((positions, farthest, warned), (moved, 0.25, true), "{name}: of {all}");
+        assert!((96..128).contains(&triangles), "{name}: {triangles}");
+    }
+}
+
+#[test]
+fn what_a_picture_cannot_show_is_counted_only() {
+    let (mut corners, triangles) = grid(20.0);
+    corners[40][0] += 1e-6;
+    for (name, bytes) in in_formats(&corners, &triangles) {
+        let (found, warned) = rounding(name, &bytes);
+        assert!(
+            found.is_some_and(|found| found.triangles == 0 && found.farthest < 1e-6),
+            "{name}: {found:?}"
+        );
+        assert!(!warned, "{name}");
+    }
+}
+
+#[test]
+fn models_in_f32_and_models_near_the_origin_lose_nothing() {
+    for away in [0.0, -0.5, 4096.0] {
+        let (corners, triangles) = grid(away);
+        for (name, bytes) in in_formats(&corners, &triangles) {
+            assert_eq!(rounding(name, &bytes), (None, false), "{name}, {away}");
+        }
+    }
+}
+
+#[test]
+fn what_the_transforms_of_nodes_move_is_counted() {
+    let document = gltf::edited(|d| d["nodes"][0]["translation"] = serde_json::json!([5e6 + 0.2, 0, 0]));
+    let (found, warned) = rounding("a.glb", &gltf::glb(&document, &gltf::binary()));
+    assert!(warned && found.is_some_and(|found| (found.farthest - 0.2).abs() < 1e-6), "{found:?}");
+}

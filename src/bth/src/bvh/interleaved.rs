@@ -3,16 +3,15 @@
 
 use super::deferred::DeferredHits;
 use super::leaf::{LeafOutcome, RayProgress, decide};
-use super::ray_pool::{POOL_SIZE, PoolSlot, RareSteps, RayPool, has_rare_steps};
+use super::ray_pool::{POOL_SIZE, PoolRays, PoolSlot, RareSteps, RayPool, has_rare_steps};
 use super::ray_state::RayState;
 use super::stack::Stacks;
-use crate::coherence::is_same_octant;
 use crate::intersect::prepare::Prepared;
 use crate::intersect::start_point::ExactRay;
 use crate::query::Goal;
 use crate::query::sink::Sink;
 use crate::rays::Ray;
-use crate::shortcuts::{self, ENTRY_RAYS, FindEntryNode, SpecialLeaf};
+use crate::shortcuts::{self, ENTRY_RAYS, FindEntryNode, SpecialLeaf, entry_run};
 use crate::simd::{CacheLevel, Kernel, LANES, Scalar, Simd};
 use bth_format::layout::{Child, NONE, WIDTH, WideNode};
 use bth_format::object::ObjectBounds;
@@ -110,7 +109,7 @@ impl<G: Goal> Kernel for Interleaved<'_, '_, G> {
                     source.start(s, slot, &mut pool);
                 }
             }
-            pool.leaf_steps(s, (object, rays, starts), |leaf, state| {
+            pool.leaf_steps(s, PoolRays { object, rays, starts }, |leaf, state| {
                 let ray = state.ray();
                 enter_special_leaf(object, leaf, (&rays[ray], starts.of(ray)), state)
             });
@@ -205,25 +204,12 @@ impl RaySource<'_> {
             return;
         }
         let first = self.ray[0] as usize;
-        let Some(rays) = self.rays.get(first..first + ENTRY_RAYS) else { return };
-        if !is_same_octant(&rays[0], &rays[ENTRY_RAYS - 1]) || !is_run(self.order, self.taken, first) {
-            return;
-        }
+        let Some(rays) = entry_run(self.rays, self.order, self.taken, first) else { return };
         let (node_base, root, bounds) = (self.object.node_base(), self.root, &self.bounds);
         if s.call(FindEntryNode { node_base, root, bounds, rays, node: &mut self.entry_node }) {
             self.entered = self.taken + ENTRY_RAYS;
         }
     }
-}
-
-/// Returns true if the next [`ENTRY_RAYS`] rays of an order, from `taken` on, exist and are the
-/// rays of the batch from `first` on.
-#[inline(never)]
-fn is_run(order: Option<&[u32]>, taken: usize, first: usize) -> bool {
-    order.is_none_or(|order| {
-        let run = order.get(taken..taken + ENTRY_RAYS);
-        run.is_some_and(|run| run.iter().zip(first..).all(|(&ray, next)| ray as usize == next))
-    })
 }
 
 /// Enters a special leaf.

@@ -64,16 +64,23 @@ pub(crate) trait RayProgress<G: Goal> {
     }
 }
 
-/// Intersects a ray with the triangles of a leaf, given as its record and its child code. `bounds`
-/// are those for which the ray was prepared.
+/// A leaf of triangles and its child code.
+pub(crate) struct CodedLeaf<'a, B> {
+    pub(crate) block: &'a B,
+    pub(crate) code: u32,
+}
+
+/// Intersects a ray with the triangles of a leaf. `bounds` are those for which the ray was
+/// prepared.
 #[inline(always)]
 pub(crate) fn enter_leaf<S: Simd, G: Goal, B: TriangleBlock>(
     s: S,
-    (object, goal): (&ObjectView<'_>, G),
+    object: &ObjectView<'_>,
+    goal: G,
     bounds: &ObjectBounds,
     ray: ExactRay<'_>,
     progress: &mut impl RayProgress<G>,
-    (block, code): (&B, u32),
+    CodedLeaf { block, code }: CodedLeaf<'_, B>,
 ) -> LeafOutcome {
     let prepared = progress.prepared();
     let (first, last) = (prepared.slabs.first, progress.last());

@@ -2,7 +2,7 @@
 //! mispredictions of one ray overlap with the work of the others. [`super::interleaved`] starts the
 //! rays and stores their answers.
 
-use super::leaf::{LeafOutcome, enter_leaf};
+use super::leaf::{CodedLeaf, LeafOutcome, enter_leaf};
 use super::nodes::{Leaf, LeafMemory, is_large, leaf, prefetch, prefetch_into};
 use super::ray_state::{RayState, write_children};
 use super::stack::{BOTTOM, StackPosition, Stacks};
@@ -92,6 +92,13 @@ impl StepLists {
         self.bottom[usize::from(counts.bottom())] = slot as u8;
         counts.0 += StepCounts::INCREMENT[(code >> 29) as usize];
     }
+}
+
+/// The rays of a batch through an object, and where they start.
+pub(super) struct PoolRays<'a> {
+    pub(super) object: &'a ObjectView<'a>,
+    pub(super) rays: &'a [Ray],
+    pub(super) starts: Starts<'a>,
 }
 
 /// State of a ray, aligned to cache lines.
@@ -253,7 +260,7 @@ impl<'a, G: Goal> RayPool<'a, G> {
     pub(super) fn leaf_steps<S: Simd>(
         &mut self,
         s: S,
-        (object, rays, starts): (&ObjectView<'_>, &[Ray], Starts<'_>),
+        PoolRays { object, rays, starts }: PoolRays<'_>,
         mut special: impl FnMut(SpecialLeaf, &mut RayState<G>) -> LeafOutcome,
     ) {
         let RayPool { slots, tops, lists, stacks, bottoms, goal, .. } = self;
@@ -266,11 +273,13 @@ impl<'a, G: Goal> RayPool<'a, G> {
             let exact_ray = (&rays[ray], starts.of(ray));
             let mut memory = LeafMemory::default();
             let found = match leaf(s, object, node_base, code, &mut memory) {
-                Leaf::Indexed(leaf) => {
-                    enter_leaf(s, (object, goal), &object.bounds, exact_ray, state, (leaf, code))
+                Leaf::Indexed(block) => {
+                    let leaf = CodedLeaf { block, code };
+                    enter_leaf(s, object, goal, &object.bounds, exact_ray, state, leaf)
                 }
-                Leaf::Raw(leaf) => {
-                    enter_leaf(s, (object, goal), &object.bounds, exact_ray, state, (leaf, code))
+                Leaf::Raw(block) => {
+                    let leaf = CodedLeaf { block, code };
+                    enter_leaf(s, object, goal, &object.bounds, exact_ray, state, leaf)
                 }
                 Leaf::Special(leaf) => special(leaf, state),
                 Leaf::Subtree(subtree) => {

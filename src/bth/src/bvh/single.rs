@@ -5,7 +5,7 @@
 //! of its depth, and its t, u and v are computed in f64 once, at the end ([`super::certain_hit`]).
 
 use super::certain_hit::CertainHit;
-use super::leaf::{LeafOutcome, RayProgress, decide, enter_leaf};
+use super::leaf::{CodedLeaf, LeafOutcome, RayProgress, decide, enter_leaf};
 use super::nodes::{Leaf, LeafMemory, leaf, prefetch};
 use super::ray_state::key_limit;
 use super::single_stack::{OpenSingleStack, SingleStack};
@@ -138,16 +138,18 @@ pub(crate) fn trace_single<S: Simd, G: Goal, C: Count>(
         code = descend(s, prepared, nodes, code, goal, &mut stack, count);
         let mut memory = LeafMemory::default();
         let done = match leaf(s, object, node_base, code, &mut memory) {
-            Leaf::Indexed(leaf) => {
+            Leaf::Indexed(block) => {
                 count.leaf();
-                count.triangles(leaf.triangles);
-                enter_leaf(s, (object, goal), bounds, ray, &mut state, (leaf, code)) == LeafOutcome::Done
+                count.triangles(block.triangles);
+                let leaf = CodedLeaf { block, code };
+                enter_leaf(s, object, goal, bounds, ray, &mut state, leaf) == LeafOutcome::Done
             }
             _ if stack.is_empty() => break,
-            Leaf::Raw(leaf) => {
+            Leaf::Raw(block) => {
                 count.leaf();
-                count.triangles(leaf.triangles);
-                enter_leaf(s, (object, goal), bounds, ray, &mut state, (leaf, code)) == LeafOutcome::Done
+                count.triangles(block.triangles);
+                let leaf = CodedLeaf { block, code };
+                enter_leaf(s, object, goal, bounds, ray, &mut state, leaf) == LeafOutcome::Done
             }
             Leaf::Subtree(subtree) => {
                 code = subtree;

@@ -6,8 +6,8 @@
 //! against it instead of the root. It holds several of the entry points of Reshetov, Soupikov and
 //! Hurley, "Multi-Level Ray Tracing Algorithm", SIGGRAPH 2005.
 
-use crate::coherence::Span;
 use crate::coherence::shaft::Shaft;
+use crate::coherence::{Span, is_same_octant};
 use crate::rays::Ray;
 use crate::simd::{Part, Simd};
 use bth_format::layout::{NONE, WIDTH, WideNode};
@@ -16,6 +16,29 @@ use bth_format::object::{NodeBase, ObjectBounds};
 
 /// Number of consecutive rays that have an entry node in common.
 pub(crate) const ENTRY_RAYS: usize = 64;
+
+/// The next [`ENTRY_RAYS`] rays of an order, from `taken` on, if they are the rays of the batch from
+/// `first` on, and may be coherent.
+#[inline(always)]
+pub(crate) fn entry_run<'r>(
+    rays: &'r [Ray],
+    order: Option<&[u32]>,
+    taken: usize,
+    first: usize,
+) -> Option<&'r [Ray]> {
+    let run = rays.get(first..first + ENTRY_RAYS)?;
+    (is_same_octant(&run[0], &run[ENTRY_RAYS - 1]) && is_run(order, taken, first)).then_some(run)
+}
+
+/// Returns true if the next [`ENTRY_RAYS`] rays of an order, from `taken` on, exist and are the
+/// rays of the batch from `first` on.
+#[inline(never)]
+fn is_run(order: Option<&[u32]>, taken: usize, first: usize) -> bool {
+    order.is_none_or(|order| {
+        let run = order.get(taken..taken + ENTRY_RAYS);
+        run.is_some_and(|run| run.iter().zip(first..).all(|(&ray, next)| ray as usize == next))
+    })
+}
 
 /// Boxes with their child codes, at most [`WIDTH`] between two operations, and room for the
 /// children of one more node.

@@ -16,6 +16,6 @@ mod entry_node;
 pub(crate) mod free;
 mod tets;
 
-pub(crate) use entry_node::{ENTRY_RAYS, FindEntryNode};
+pub(crate) use entry_node::{ENTRY_RAYS, FindEntryNode, entry_run};
 pub(crate) use tets::leaf::{Special, SpecialLeaf, has_special_leaves, root, special, whole};
 pub(crate) use tets::whole::{RAYS_PER_PART, SpecialScratch};

@@ -1,6 +1,6 @@
 //! Traversal of the BVH by packets: up to 64 coherent rays, in four groups of sixteen lanes.
 //!
-//! [`runs`] finds coherent rays in a batch, by the measures of [`coherence`](super::coherence) and
+//! [`runs`] finds coherent rays in a batch, by the measures of [`coherence`](crate::coherence) and
 //! as long as packets pay ([`backoff`]), and [`prepare_group`] prepares them. A packet
 //! ([`traverse`]) tests the boxes of [`children`] first against bounds of all its rays ([`bounds`]:
 //! a [`frustum`], or a [`segment_box`] of short rays), then against each group ([`ray_group`]), and

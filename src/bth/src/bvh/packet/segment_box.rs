@@ -6,7 +6,7 @@ use crate::simd::Simd;
 use bth_format::layout::{WIDTH, WideNode};
 
 /// A box of all points at which the rays can hit something
-/// ([`Span::segments`](crate::bvh::coherence::Span::segments)).
+/// ([`Span::segments`](crate::coherence::Span::segments)).
 pub(crate) struct SegmentBox<S: Simd> {
     lower: [S::F; 3],
     upper: [S::F; 3],

@@ -102,8 +102,8 @@ pub struct RawLeaf {
 }
 
 impl IndexedLeaf {
-    /// Corners of the triangle in a slot. Slots and vertices are taken modulo [`WIDTH`]: those of
-    /// unchecked files may be larger.
+    /// Corners of the triangle in a slot. Slots and vertices are taken modulo [`WIDTH`]: an
+    /// unchecked file may hold larger ones.
     pub(crate) fn triangle(&self, slot: usize) -> [[f32; 3]; 3] {
         let vertex = self.corner.map(|vertices| vertices[slot % WIDTH] as usize % WIDTH);
         vertex.map(|vertex| self.vertex.map(|row| row[vertex]))

@@ -33,8 +33,8 @@ impl<'a> ObjectView<'a> {
         &scratch.insert(Unpacked(self.unpacked_raw(grid, index))).0
     }
 
-    /// The corners of the triangle in a slot of a leaf, given as its child code; in a tet leaf `slot` is
-    /// a row of TET_FACES. `None` if there is no such leaf.
+    /// The corners of the triangle in a slot of a leaf, given as its child code; in a tet leaf
+    /// `slot` is a row of TET_FACES. `None` if there is no such leaf.
     #[inline(never)]
     pub fn corners_in(&self, leaf: u32, slot: u32) -> Option<[[f32; 3]; 3]> {
         let (at, mut indexed, mut raw) = (slot as usize, None, None);

@@ -9,8 +9,8 @@
 //!   stacks ([`stack`]) and with hits that are computed for sixteen rays at a time ([`deferred`]);
 //! - [`packet`]: coherent rays that enter nodes together.
 //!
-//! Where rays begin instead of the root, and leaves that hold no block of triangles, are the matter of
-//! [`crate::shortcuts`].
+//! Where rays begin instead of the root, and leaves that hold no block of triangles, are the matter
+//! of [`crate::shortcuts`].
 //!
 //! All other queries take one walk ([`walk`]); [`enumerate`] passes every triangle that a ray may
 //! hit to a receiver.

@@ -126,8 +126,8 @@ pub(crate) fn triangle(object: &ObjectView<'_>, code: u32, triangle: u32) -> Opt
     }
 }
 
-/// The lines and the rows of LEAF_VERTICES of the leaf with this child code, in a deformable object:
-/// one row for an indexed leaf, three for a raw one. `None` for codes of nodes.
+/// The lines and the rows of LEAF_VERTICES of the leaf with this child code, in a deformable
+/// object: one row for an indexed leaf, three for a raw one. `None` for codes of nodes.
 #[inline(always)]
 pub(crate) fn leaf_size(code: u32) -> Option<(u32, u32)> {
     match Child::from_code(code) {

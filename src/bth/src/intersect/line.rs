@@ -1,5 +1,5 @@
-//! The line of a ray, and the side of it on which points and edges lie: the predicates of walks from
-//! cell to cell.
+//! The line of a ray, and the side of it on which points and edges lie: the predicates of walks
+//! from cell to cell.
 //!
 //! Points are projected along the ray by the axis shear of Woop, Benthin and Wald ("Watertight
 //! Ray/Triangle Intersection", JCGT 2013), in f64: the line becomes the origin of a plane. A sign

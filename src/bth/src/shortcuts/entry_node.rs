@@ -17,7 +17,8 @@ use bth_format::object::{NodeBase, ObjectBounds};
 /// Number of consecutive rays that have an entry node in common.
 pub(crate) const ENTRY_RAYS: usize = 64;
 
-/// The next [`ENTRY_RAYS`] rays of an order, from `taken` on, if they are the rays of the batch from
+/// The next [`ENTRY_RAYS`] rays of an order, from `taken` on, if they are the rays of the batch
+/// from
 /// `first` on, and may be coherent.
 #[inline(always)]
 pub(crate) fn entry_run<'r>(

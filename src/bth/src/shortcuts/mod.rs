@@ -1,7 +1,8 @@
 //! Where a ray can begin, and what it can skip.
 //!
-//! A plain ray begins at the root of an object's tree, at the start of its range, and its leaves are
-//! blocks of triangles. Everything else that a file or a batch knows passes through this module:
+//! A plain ray begins at the root of an object's tree, at the start of its range, and its leaves
+//! are blocks of triangles. Everything else that a file or a batch knows passes through this
+//! module:
 //!
 //! | shortcut | begins | skips |
 //! |---|---|---|

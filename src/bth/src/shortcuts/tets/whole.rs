@@ -10,7 +10,8 @@ use crate::rays::Ray;
 use crate::simd::Isa;
 use bth_format::object::ObjectView;
 
-/// Max number of rays that go together. It is large, because lanes are idle at the end of each part.
+/// Max number of rays that go together. It is large, because lanes are idle at the end of each
+/// part.
 pub(crate) const RAYS_PER_PART: usize = 2048;
 
 /// Memory of such batches, which is reused from one to the next.

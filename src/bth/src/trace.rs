@@ -14,7 +14,7 @@ use crate::query::sink::Answers;
 use crate::rays::{Hit, Ray, Start};
 use crate::scene::Scene;
 use crate::start_points;
-use crate::starts::world_ray::{PlacedRay, WorldRay};
+use crate::starts::world_ray::WorldRay;
 use crate::streams::{HitStreams, RayStreams};
 use crate::trace_ray::TraceRay;
 use crate::trace_ray::sealed::Traced;
@@ -40,9 +40,7 @@ impl Scene {
     /// Like [`Self::nearest`], with statistics of the traversal. A miss is [`Hit::MISS`].
     pub fn nearest_counted<R: TraceRay>(&self, ray: &R) -> (Hit, Steps) {
         let (mut hit, mut steps) = (Hit::MISS, Steps::default());
-        let Some(placed) = ray.placed(self) else { return (hit, steps) };
-        let world_ray = placed.world_ray();
-        match self.world() {
+        ray.in_world(self, |world_ray| match self.world() {
             Some(world) if self.sole().is_none() => {
                 (hit, steps) = world.nearest_counted(self.objects(), world_ray);
             }
@@ -51,7 +49,7 @@ impl Scene {
                 steps += more;
                 hit
             }),
-        }
+        });
         // The steps of the search behind holes are not counted.
         self.go_on(ray, &mut hit);
         (hit, steps)
@@ -169,14 +167,13 @@ impl Scene {
             if ray.may_start_in(instance) {
                 object::store_nearest(object, ray, instance, hit);
             }
-        } else if let Some(placed) = ray.placed(self) {
-            let world_ray = placed.world_ray();
-            match self.world() {
+        } else {
+            ray.in_world(self, |world_ray| match self.world() {
                 Some(world) => world.store_nearest_of_ray(self.objects(), world_ray, hit),
                 None => self.nearest_of_objects(world_ray, hit, |object, instance, ray| {
                     world_ray.nearest_in(object, instance, ray)
                 }),
-            }
+            });
         }
         self.go_on(ray, hit);
     }
@@ -217,15 +214,13 @@ impl Scene {
     fn hits_any_elsewhere<R: Traced>(&self, ray: &R) -> bool {
         let is_hit = if let Some((object, instance)) = self.sole() {
             ray.may_start_in(instance) && object::any(object, ray)
-        } else if let Some(placed) = ray.placed(self) {
-            let world_ray = placed.world_ray();
-            match self.world() {
+        } else {
+            let any = |world_ray: WorldRay<'_>| match self.world() {
                 Some(world) => world.any_of_ray(self.objects(), world_ray),
                 None => (0..self.object_count())
                     .any(|instance| world_ray.any_in(self.view(instance), instance, world_ray.ray)),
-            }
-        } else {
-            false
+            };
+            ray.in_world(self, any).unwrap_or(false)
         };
         is_hit && self.hits_what_is_not_transparent(ray)
     }
@@ -269,15 +264,15 @@ impl Scene {
 
     /// Returns true if a ray that hits something hits anything that is not transparent.
     fn hits_what_is_not_transparent<R: Traced>(&self, ray: &R) -> bool {
-        let search = |placed: PlacedRay| results::any(self, placed.world_ray(), &Accept::default());
-        !self.has_opacity() || ray.placed(self).is_some_and(search)
+        let search = |ray: WorldRay<'_>| results::any(self, ray, &Accept::default());
+        !self.has_opacity() || ray.in_world(self, search).unwrap_or(false)
     }
 
     /// Replaces a ray's nearest hit by its nearest one that is not transparent.
     fn go_on<R: Traced>(&self, ray: &R, hit: &mut Hit) {
         if self.has_opacity() && hit.is_hit() && self.opacity(hit) == Opacity::Transparent {
-            let search = |placed: PlacedRay| results::nearest(self, placed.world_ray(), &Accept::default());
-            *hit = ray.placed(self).and_then(search).unwrap_or(Hit::MISS);
+            let search = |ray: WorldRay<'_>| results::nearest(self, ray, &Accept::default());
+            *hit = ray.in_world(self, search).flatten().unwrap_or(Hit::MISS);
         }
     }
 }

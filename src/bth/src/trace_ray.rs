@@ -12,7 +12,7 @@ use crate::scene::Scene;
 use crate::simd::Isa;
 use crate::start_points;
 use crate::starts::prepare::ENDED;
-use crate::starts::world_ray::{InstanceStart, PlacedRay};
+use crate::starts::world_ray::{InstanceStart, PlacedRay, WorldRay};
 use bth_format::object::ObjectView;
 use std::cell::Cell;
 
@@ -23,7 +23,7 @@ impl TraceRay for Ray {}
 impl TraceRay for StartRay {}
 
 pub(crate) mod sealed {
-    use super::{Answers, InstanceStart, ObjectView, PlacedRay, Ray, Scene, Scratch, World};
+    use super::{Answers, InstanceStart, ObjectView, Ray, Scene, Scratch, World, WorldRay};
     use crate::object::single::SingleRay;
 
     /// How rays of a kind are traced.
@@ -31,8 +31,8 @@ pub(crate) mod sealed {
         /// Returns true if the ray may hit something in a scene that is this instance, whose
         /// object's space is world space.
         fn may_start_in(&self, instance: u32) -> bool;
-        /// The ray in world space; `None` if its start is not in the scene.
-        fn placed(&self, scene: &Scene) -> Option<PlacedRay>;
+        /// Calls `trace` with the ray in world space; `None` if its start is not in the scene.
+        fn in_world<T>(&self, scene: &Scene, trace: impl FnOnce(WorldRay<'_>) -> T) -> Option<T>;
         /// Returns true if rays are traced together, through instances if there is a world.
         fn go_together(rays: &[Self], world: Option<&World>) -> bool;
         /// Stores the answers of rays that hit anything in an instance whose object's space is
@@ -56,8 +56,9 @@ impl Traced for Ray {
         true
     }
     #[inline(always)]
-    fn placed(&self, _scene: &Scene) -> Option<PlacedRay> {
-        Some(PlacedRay { ray: *self, start: None })
+    fn in_world<T>(&self, _scene: &Scene, trace: impl FnOnce(WorldRay<'_>) -> T) -> Option<T> {
+        // Not copied: loading what was just written would stall.
+        Some(trace(WorldRay::plain(self)))
     }
     fn go_together(rays: &[Ray], world: Option<&World>) -> bool {
         world.is_none_or(|world| !world.go_one_by_one(rays))
@@ -92,8 +93,8 @@ impl Traced for StartRay {
     fn may_start_in(&self, instance: u32) -> bool {
         self.start.primitive.instance == instance
     }
-    fn placed(&self, scene: &Scene) -> Option<PlacedRay> {
-        start_points::place(scene, self)
+    fn in_world<T>(&self, scene: &Scene, trace: impl FnOnce(WorldRay<'_>) -> T) -> Option<T> {
+        start_points::place(scene, self).map(|placed| trace(placed.world_ray()))
     }
     fn go_together(_rays: &[StartRay], _world: Option<&World>) -> bool {
         Isa::chosen() != Isa::Scalar

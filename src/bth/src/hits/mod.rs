@@ -38,7 +38,7 @@ impl Scene {
         if self.accepts_everything(accept) {
             return self.nearest(ray);
         }
-        results::nearest(self, ray.placed(self)?.world_ray(), accept)
+        ray.in_world(self, |ray| results::nearest(self, ray, accept))?
     }
 
     /// Returns true if a ray in world space has a hit that is accepted.
@@ -46,7 +46,7 @@ impl Scene {
         if self.accepts_everything(accept) {
             return self.any(ray);
         }
-        ray.placed(self).is_some_and(|placed| results::any(self, placed.world_ray(), accept))
+        ray.in_world(self, |ray| results::any(self, ray, accept)).unwrap_or(false)
     }
 
     /// Replaces `hits` by all hits of a ray in world space that are accepted, in order. The time
@@ -167,7 +167,7 @@ impl Scene {
     /// # Ok::<(), bth::Error>(())
     /// ```
     pub fn crossings<R: TraceRay>(&self, ray: &R) -> Crossings {
-        ray.placed(self).map_or_else(Crossings::default, |placed| count_crossings(self, placed.world_ray()))
+        ray.in_world(self, |ray| count_crossings(self, ray)).unwrap_or_default()
     }
 
     /// Stores for each ray the result of [`Self::crossings`].

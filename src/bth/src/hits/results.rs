@@ -26,9 +26,7 @@ pub(crate) fn any(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>) -> bool
 /// The number of accepted hits.
 pub(super) fn count(scene: &Scene, ray: &impl TraceRay, accept: &Accept<'_>) -> usize {
     let mut count = HitCount::default();
-    if let Some(placed) = ray.placed(scene) {
-        search(scene, placed.world_ray(), accept, &mut count);
-    }
+    ray.in_world(scene, |ray| search(scene, ray, accept, &mut count));
     count.0
 }
 
@@ -41,9 +39,7 @@ pub(super) fn append_all(
     hits: &mut Vec<Hit>,
 ) {
     found.clear();
-    if let Some(placed) = ray.placed(scene) {
-        search(scene, placed.world_ray(), accept, found);
-    }
+    ray.in_world(scene, |ray| search(scene, ray, accept, found));
     // The heap of `append_nearest` sorts these few hits, too, which saves the code of another sort.
     *found = BinaryHeap::from(std::mem::take(found)).into_sorted_vec();
     hits.extend(found.iter().map(|found| found.hit));
@@ -57,9 +53,9 @@ pub(super) fn append_nearest(
     accept: &Accept<'_>,
     hits: &mut Vec<Hit>,
 ) {
-    if let (1.., Some(placed)) = (k, ray.placed(scene)) {
+    if k > 0 {
         let mut first = FirstHits { count: k, hits: BinaryHeap::new() };
-        search(scene, placed.world_ray(), accept, &mut first);
+        ray.in_world(scene, |ray| search(scene, ray, accept, &mut first));
         hits.extend(first.hits.into_sorted_vec().iter().map(|found| found.hit));
     }
 }

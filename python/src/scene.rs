@@ -83,7 +83,7 @@ impl NativeScene {
     /// Writes the compiled file, whole or not at all.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let write =
-            |scene: &bth::Scene| bth_files::replace_file(&path, |file| file.write_all(scene.file().bytes()));
+            |scene: &bth::Scene| bth_files::replace(&path, |file| file.write_all(scene.file().bytes()));
         self.with(py, write)?.map_err(|error| write_error(&path, &error))
     }
 

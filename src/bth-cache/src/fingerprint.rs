@@ -4,7 +4,6 @@
 use crate::files::Files;
 use crate::record::{seal, unseal};
 use crate::{Digest, Store};
-use bth_files::{FileState, OpenFile};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -30,14 +29,6 @@ impl Store {
     pub fn content_of(&self, path: &Path) -> Option<Digest> {
         let fingerprint = read(&self.files, path)?;
         (Fingerprint::of(path, fingerprint.blob) == Some(fingerprint)).then_some(fingerprint.blob)
-    }
-
-    /// As [`Store::content_of`] for a file already opened by that path, which may have been
-    /// replaced since.
-    pub fn content_of_open(&self, path: &Path, opened: &OpenFile) -> Option<Digest> {
-        let fingerprint = read(&self.files, path)?;
-        (Fingerprint::from_state(opened.state(), fingerprint.blob) == Some(fingerprint))
-            .then_some(fingerprint.blob)
     }
 
     /// Stores the fingerprint of a large file that has just been written.
@@ -67,14 +58,20 @@ fn read(files: &Files, path: &Path) -> Option<Fingerprint> {
 }
 
 impl Fingerprint {
+    /// The fingerprint of a file. No program can set its time of change, which the system sets on
+    /// every change of content, name or attributes. `None` where times are in whole seconds, which
+    /// are too coarse, and on systems other than Unix, which have no time of change.
+    #[cfg(unix)]
     fn of(path: &Path, blob: Digest) -> Option<Self> {
-        Self::from_state(FileState::of(&std::fs::metadata(path).ok()?), blob)
+        use std::os::unix::fs::MetadataExt;
+        let m = std::fs::metadata(path).ok()?;
+        let changed = (m.ctime(), m.ctime_nsec());
+        (changed.1 != 0).then_some(Self { device: m.dev(), inode: m.ino(), bytes: m.len(), changed, blob })
     }
 
-    fn from_state(FileState { device, inode, bytes, changed }: FileState, blob: Digest) -> Option<Self> {
-        // Times in whole seconds are too coarse, and on systems other than Unix programs can set
-        // them.
-        (cfg!(unix) && changed.1 != 0).then_some(Self { device, inode, bytes, changed, blob })
+    #[cfg(not(unix))]
+    fn of(_: &Path, _: Digest) -> Option<Self> {
+        None
     }
 
     /// Time since the change; zero when the clock of a remote file system is ahead of this
@@ -102,13 +99,10 @@ mod tests {
         assert_eq!(store.content_of(&path), None);
         store.store_fingerprint(&path, digest);
         assert_eq!(store.content_of(&path), Some(digest));
-        let opened = OpenFile::open(&path).unwrap();
-        assert_eq!(store.content_of_open(&path, &opened), Some(digest));
         let modified = std::fs::metadata(&path).unwrap().modified().unwrap();
         std::fs::write(&path, vec![8u8; LARGE as usize]).unwrap();
         std::fs::File::options().write(true).open(&path).unwrap().set_modified(modified).unwrap();
         assert_eq!(store.content_of(&path), None);
-        assert_eq!(store.content_of_open(&path, &OpenFile::open(&path).unwrap()), None);
         std::fs::write(&path, b"small").unwrap();
         store.store_fingerprint(&path, Digest::of(b"small"));
         assert_eq!(store.content_of(&path), None, "small files are read");

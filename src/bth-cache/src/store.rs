@@ -217,15 +217,6 @@ impl Store {
         Ok(record)
     }
 
-    /// Does the same as [`Store::put`], but not in the shared store: for what is of use on this
-    /// machine only.
-    ///
-    /// # Errors
-    /// The same as [`Store::put`].
-    pub fn put_here(&self, key: &Key, bytes: &[u8], report: Value) -> Result<Record> {
-        self.put_both(key, bytes, report).map(|(record, _)| record)
-    }
-
     /// Keeps only the name and length of a key's content, for contents that are quickly put
     /// together from others. `blob` is a hash that determines the content.
     ///

@@ -24,7 +24,7 @@ use crate::cached::Cache;
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
 use crate::pipeline::{
-    CachedCompilation, CompileInput, CompileOptions, CompileReport, Compiled, compile_source, joined,
+    CachedCompilation, CompileInput, CompileOptions, CompileReport, Compiled, compile_source,
 };
 use crate::scene::{self, SceneReport};
 use crate::write::Content;
@@ -42,7 +42,7 @@ pub fn compile(
     monitor: &dyn Monitor,
 ) -> Result<(Compiled, CompileReport)> {
     let (content, report) = compile_cached(mesh, options, &Cache::none(), &|_| true, monitor)?.into_built();
-    Ok((Compiled { bytes: joined(&content)?.into_owned() }, report))
+    Ok((Compiled { bytes: content.bytes().into_owned() }, report))
 }
 
 /// Compiles a mesh and opens the result. The bytes are not copied.
@@ -104,7 +104,7 @@ pub fn open_scene(
 fn opened(content: Content) -> Result<bth::Scene> {
     let scene = match content.file() {
         Some(file) => bth::from_file(file.clone()),
-        None => bth::from_bytes(&joined(&content)?),
+        None => bth::from_bytes(&content.bytes()),
     };
     scene.map_err(|e| Error::Internal { code: "BTH-X030", message: format!("the written file fails: {e}") })
 }

@@ -26,21 +26,6 @@ pub fn replace(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
 ) -> std::io::Result<()> {
-    replace_file(path, |file| {
-        let mut out = BufWriter::with_capacity(1 << 20, file);
-        write(&mut out)?;
-        out.flush()
-    })
-}
-
-/// As [`replace`] without a buffer, for callers that write large pieces or copy from file to file.
-///
-/// # Errors
-/// As [`replace`].
-pub fn replace_file(
-    path: &Path,
-    write: impl FnOnce(&mut File) -> std::io::Result<()>,
-) -> std::io::Result<()> {
     let name =
         path.file_name().ok_or_else(|| IoError::new(ErrorKind::InvalidInput, "not the name of a file"))?;
     // Renaming over a device or a folder would not do what is meant.
@@ -62,7 +47,10 @@ pub fn replace_file(
     remove_stale(folder, &prefix);
 
     let (mut file, named) = create(folder, &prefix, 0o666)?;
-    write(&mut file)?;
+    let mut out = BufWriter::with_capacity(1 << 20, &mut file);
+    write(&mut out)?;
+    out.flush()?;
+    drop(out);
     file.sync_all()?;
     let named = match named {
         Some(named) => named,

@@ -16,7 +16,6 @@ mod mistakes;
 mod pipelines;
 mod play;
 mod play_files;
-mod previous;
 #[cfg(unix)]
 mod recipes;
 mod scenes;

@@ -130,12 +130,6 @@ impl<'a> Cache<'a> {
         self.note_put(key, "", self.store?.put_name(key, blob, bytes, report.clone()), monitor)
     }
 
-    /// Keeps a content that is useful on this machine only and whose misses are not explained.
-    pub(crate) fn put_here(&self, key: &Key, bytes: &[u8], monitor: &dyn Monitor) {
-        let Some(store) = self.store else { return };
-        self.warn_once(store.put_here(key, bytes, serde_json::Value::Null), monitor);
-    }
-
     /// Notes the key as the last one of its subject.
     fn note_put(
         &self,

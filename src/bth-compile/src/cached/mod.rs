@@ -22,4 +22,4 @@ pub(crate) use nodes::CachedNodes;
 pub(crate) use rows::{HashedRows, RowReader, Sink};
 pub(crate) use text::{fields, text};
 pub(crate) use topology::Topology;
-pub(crate) use warnings::{replay, warnings, with_warnings};
+pub(crate) use warnings::{replay, with_warnings};

@@ -20,12 +20,8 @@ pub(crate) fn with_warnings(report: &impl Serialize, recording: &Recording<'_>) 
     Ok(report)
 }
 
-/// The warnings that are kept with a report.
-pub(crate) fn warnings(report: &Value) -> impl Iterator<Item = &str> {
-    report[KEY].as_array().into_iter().flatten().filter_map(Value::as_str)
-}
-
 /// Gives again the warnings that are kept with a report.
 pub(crate) fn replay(report: &Value, monitor: &dyn Monitor) {
-    warnings(report).for_each(|message| monitor.warn(message));
+    let warnings = report[KEY].as_array().into_iter().flatten().filter_map(Value::as_str);
+    warnings.for_each(|message| monitor.warn(message));
 }

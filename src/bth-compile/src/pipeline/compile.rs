@@ -16,7 +16,6 @@ use bth_cache::{Key, Record};
 use bth_import::import_triangles;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::borrow::Cow;
 use std::cell::OnceCell;
 use std::path::Path;
 
@@ -53,7 +52,7 @@ pub struct DryRun {
     pub because: Vec<String>,
     /// Objects of a scene that would be built.
     pub parts: Vec<Miss>,
-    /// Number of a scene's objects that would come from the cache or the previous file.
+    /// Number of a scene's objects that would come from the cache.
     pub reused: u64,
 }
 
@@ -107,7 +106,7 @@ pub fn compile(
     monitor: &dyn Monitor,
 ) -> Result<(Compiled, CompileReport)> {
     let (content, report) = compile_cached(source, options, &Cache::none(), &|_| true, monitor)?.into_built();
-    Ok((Compiled { bytes: joined(&content)?.into_owned() }, report))
+    Ok((Compiled { bytes: content.bytes().into_owned() }, report))
 }
 
 /// Compiles a model, or takes results from the cache that were made from the same content. `needed`
@@ -232,20 +231,11 @@ pub(crate) fn compile_or_fetch<R: Serialize>(
         message: format!("the report cannot be written: {e}"),
     })?;
     let record = match (key, keep) {
-        (Some(key), true) => cache.put(key, "", &joined(&content)?, &report, &recording),
+        (Some(key), true) => cache.put(key, "", &content.bytes(), &report, &recording),
         (Some(key), false) => cache.put_name(key, (content.name(), content.length()), &report, monitor),
         (None, _) => None,
     };
     Ok(CachedCompilation { content: Some(content), built: Some(built), record, report })
-}
-
-/// All bytes of a content.
-pub(crate) fn joined(content: &Content) -> Result<Cow<'_, [u8]>> {
-    content.bytes().map_err(|e| Error::File {
-        code: "BTH-O001",
-        path: "the file that was there".into(),
-        message: format!("cannot read: {e}"),
-    })
 }
 
 /// The file of a key, if the cache has it.

@@ -24,8 +24,6 @@ use std::path::Path;
 
 /// Version of compiled files.
 const FILE: &str = "4";
-/// Version of inventories of scene files.
-const OUTLINE: &str = "3";
 /// Version of how objects are compiled whose vertices move by themselves.
 pub(crate) const MOTION: &str = BuildPoses::VERSION;
 
@@ -63,14 +61,6 @@ pub(crate) fn scene(parts: &SceneParts, sources: &[String], options: &CompileOpt
         .with("scene", hasher.finish().hex())
         .with("objects", objects.finish().hex())
         .with_all(components(options, tetgen))
-}
-
-/// The inventory of a scene file, by the name of the file's content.
-pub(crate) fn file_index(named: &Digest, options: &CompileOptions, tetgen: &str) -> Key {
-    Key::new("outline")
-        .with("file", named.hex())
-        .with_all(components(options, tetgen))
-        .with("outline version", OUTLINE)
 }
 
 /// The keys of a scene's objects; the components that all of them share are made once.

@@ -30,9 +30,9 @@ pub use object::{Compiled, assemble};
 pub use report::{CompileReport, FileReport, MotionReport};
 pub use tree::build_tree;
 
-pub(crate) use compile::{CompileInput, compile_or_fetch, compile_source, joined, tetgen_in_keys};
+pub(crate) use compile::{CompileInput, compile_or_fetch, compile_source, tetgen_in_keys};
 pub(crate) use compiler::Compiler;
 pub(crate) use import::Import;
-pub(crate) use keys::{MOTION, ObjectKeys, file_index, scene};
+pub(crate) use keys::{MOTION, ObjectKeys, scene};
 pub(crate) use moving::{PoseSource, warn_of_options};
 pub(crate) use provenance::of_scene as provenance_of_scene;

@@ -2,25 +2,22 @@
 //! scene.
 
 use super::context::Context;
-use super::file_index::FileIndex;
 use super::objects::{self, Objects};
 use super::plan::ScenePlan;
-use super::previous::Previous;
 use super::report::{ObjectReport, SceneReport};
 use super::{deformers, encode, known_rays, meshes, sources, visible};
 use crate::bvh::{BvhOptions, Quality};
-use crate::cached::{self, Cache};
+use crate::cached::Cache;
 use crate::costs;
 use crate::error::{self, Error, Result};
 use crate::free::FreeOptions;
 use crate::monitor::Monitor;
 use crate::options::{CompileOptions, Structure};
-use crate::pipeline::{self, CachedCompilation, Compiled, DryRun, compile_or_fetch, joined};
+use crate::pipeline::{self, CachedCompilation, Compiled, DryRun, compile_or_fetch};
 use crate::sampling::KnownRays;
 use crate::stage::Clock;
 use crate::write::{self, Content, FileBuilder, SceneParts};
 use bth_cache::{Key, Record};
-use bth_files::Digest;
 use bth_scene::Manifest;
 use serde::Deserialize;
 use std::path::Path;
@@ -38,9 +35,9 @@ pub fn compile(
     monitor: &dyn Monitor,
 ) -> Result<(Compiled, SceneReport)> {
     let (source, cache) = (SceneSource { folder, name }, Cache::none());
-    let policy = CachePolicy { whole: true, needed: &|_| true, target: None };
+    let policy = CachePolicy { whole: true, needed: &|_| true };
     let (content, report) = compile_cached(manifest, source, options, &cache, policy, monitor)?.into_built();
-    Ok((Compiled { bytes: joined(&content)?.into_owned() }, report))
+    Ok((Compiled { bytes: content.bytes().into_owned() }, report))
 }
 
 /// The folder and the name of a scene.
@@ -61,9 +58,6 @@ pub struct CachePolicy<'a> {
     pub whole: bool,
     /// True if the bytes of a file that the cache has are needed.
     pub needed: &'a dyn Fn(&Record) -> bool,
-    /// The path to which the file will be written. Objects that have not changed are copied from an
-    /// existing file of that path.
-    pub target: Option<&'a Path>,
 }
 
 /// Compiles a scene through the cache.
@@ -97,12 +91,7 @@ pub(super) fn through_cache(
     let Context { options, cache, monitor, .. } = *context;
     let key = key(manifest, plan, context)?;
     let outcome = compile_or_fetch(cache, key.as_ref(), policy.needed, monitor, |monitor| {
-        let mut context = context.with_monitor(monitor);
-        context.previous = previous(policy.target, &context);
-        let (content, report, index) = build(manifest, plan, name, &context, clock)?;
-        if policy.target.is_some() && !options.costs.for_scene {
-            keep_index(&content.name(), &index, &context);
-        }
+        let (content, report) = build(manifest, plan, name, &context.with_monitor(monitor), clock)?;
         Ok((content, report, policy.whole))
     })?;
     let objects = Vec::<ObjectReport>::deserialize(&outcome.report["objects"]).unwrap_or_default();
@@ -167,8 +156,7 @@ pub fn compile_objects(
     Ok(objects.reports.len() as u64)
 }
 
-/// What [`compile_cached`] would do; `target` as in [`CachePolicy`]. Only reads and hashes the
-/// sources.
+/// What [`compile_cached`] would do. Only reads and hashes the sources.
 ///
 /// # Errors
 /// When a source cannot be read.
@@ -177,41 +165,19 @@ pub fn dry_run(
     source: SceneSource<'_>,
     options: &CompileOptions,
     cache: &Cache<'_>,
-    target: Option<&Path>,
     monitor: &dyn Monitor,
 ) -> Result<DryRun> {
-    let mut context = Context::new(options, cache, monitor)?;
-    context.previous = previous(target, &context);
+    let context = Context::new(options, cache, monitor)?;
     let plan = ScenePlan::of(manifest, source.folder, options, &mut Clock::default())?;
     let mut found = DryRun::of(key(manifest, &plan, &context)?.as_ref(), cache, monitor);
     if found.record.is_none() {
         for file in plan.sources.iter().filter(|file| !file.compiled) {
-            if objects::parts_without_reading(file, &context).is_some() {
-                found.reused += file.parts.len() as u64;
-                continue;
-            }
             let missing = meshes::missing(file, &context);
             found.reused += (file.parts.len() - missing.len()) as u64;
             found.parts.extend(missing);
         }
     }
     Ok(found)
-}
-
-/// The file of an earlier compilation at the target. Not used where the scene's rays weight the
-/// costs, because an object then depends on all others.
-fn previous(target: Option<&Path>, context: &Context<'_>) -> Option<Arc<Previous>> {
-    let target = target.filter(|_| !context.options.costs.for_scene)?;
-    let tetgen = context.tetgen.as_ref()?;
-    Previous::open(target, context.options, tetgen, context.cache, context.monitor).map(Arc::new)
-}
-
-/// Keeps the index of a file under the name of its content.
-fn keep_index(named: &Digest, index: &FileIndex, context: &Context<'_>) {
-    if let Some(tetgen) = &context.tetgen {
-        let key = pipeline::file_index(named, context.options, tetgen);
-        context.cache.put_here(&key, &cached::encode(index), context.monitor);
-    }
 }
 
 /// The key of a scene, if it may be kept.
@@ -233,7 +199,7 @@ fn build(
     name: &Path,
     context: &Context<'_>,
     mut clock: Clock,
-) -> Result<(Content, SceneReport, FileIndex)> {
+) -> Result<(Content, SceneReport)> {
     let options = context.options;
     if options.costs.rays.is_some() {
         let message =
@@ -254,7 +220,7 @@ fn build(
     let parts = encode::encode(manifest, &plan.order, &plan.visible, &objects.number)?;
 
     let provenance = pipeline::provenance_of_scene(&objects.sources, objects.worker.as_ref(), options)?;
-    let (content, index) = clock.time("file", || {
+    let content = clock.time("file", || {
         let mut builder = FileBuilder::new();
         objects.write(&mut builder)?;
         write::scene(&mut builder, &parts)?;
@@ -265,13 +231,13 @@ fn build(
         super::images::write(&mut builder, &plan.sources, &objects, context)?;
         builder.provenance(provenance)?;
         builder.check_limits()?;
-        let (content, table) = builder.content();
+        let content = builder.content();
         check(&objects, &parts, &content, name)?;
-        Ok::<_, Error>((content, objects.file_index(&table)))
+        Ok::<_, Error>(content)
     })?;
 
     let report = report(manifest, plan, (objects, clock), &parts, content.length());
-    Ok((content, report, index))
+    Ok((content, report))
 }
 
 /// The report on a compiled scene.
@@ -310,7 +276,7 @@ fn report(
 /// deform.
 fn check(objects: &Objects, parts: &SceneParts, content: &Content, name: &Path) -> Result<()> {
     if !parts.deformers.deformers.is_empty() {
-        return bth::from_bytes(&joined(content)?).map(drop).map_err(|e| refused(name, &e));
+        return bth::from_bytes(&content.bytes()).map(drop).map_err(|e| refused(name, &e));
     }
     let mut rows_only = FileBuilder::new();
     objects.write_rows(&mut rows_only)?;
@@ -318,7 +284,7 @@ fn check(objects: &Objects, parts: &SceneParts, content: &Content, name: &Path) 
     let first_frame = |bytes: &[u8]| bth::check_first_frame(&bth_format::File::from_bytes(bytes)?);
     // Reports the error of the whole file instead, so that offsets in messages are offsets in the
     // whole file.
-    let whole = |error| content.bytes().ok().and_then(|bytes| first_frame(&bytes).err()).unwrap_or(error);
+    let whole = |error| first_frame(&content.bytes()).err().unwrap_or(error);
     first_frame(&rows_only.finish()).map_err(|e| refused(name, &whole(e)))
 }
 
@@ -344,8 +310,8 @@ fn rays(
     };
     let tetgen = context.tetgen.as_ref().map(|_| String::new());
     let plain = Context::of(&options, cache, tetgen, monitor);
-    let (content, ..) = build(manifest, plan, name, &plain, Clock::default())?;
-    let mut scene = bth::from_bytes(&joined(&content)?).map_err(|e| refused(name, &e))?;
+    let (content, _) = build(manifest, plan, name, &plain, Clock::default())?;
+    let mut scene = bth::from_bytes(&content.bytes()).map_err(|e| refused(name, &e))?;
     Ok(known_rays::known_rays(&mut scene, name)?.into_iter().map(Arc::new).collect())
 }
 

@@ -1,6 +1,5 @@
 //! What all parts of a scene's compilation share.
 
-use super::previous::Previous;
 use crate::cached::Cache;
 use crate::error::Result;
 use crate::monitor::Monitor;
@@ -20,8 +19,6 @@ pub(super) struct Context<'a> {
     pub(super) monitor: &'a dyn Monitor,
     /// The scene's rays for each object of the file, if they weight the costs.
     pub(super) known_rays: Option<Vec<Arc<KnownRays>>>,
-    /// The file of an earlier compilation at the path of this one's output.
-    pub(super) previous: Option<Arc<Previous>>,
 }
 
 impl<'a> Context<'a> {
@@ -45,12 +42,12 @@ impl<'a> Context<'a> {
         monitor: &'a dyn Monitor,
     ) -> Self {
         let keys = tetgen.as_ref().map(|tetgen| Arc::new(ObjectKeys::new(options, tetgen)));
-        Self { options, cache, tetgen, keys, monitor, known_rays: None, previous: None }
+        Self { options, cache, tetgen, keys, monitor, known_rays: None }
     }
 
     /// The same context with another monitor.
     pub(super) fn with_monitor<'b>(&'b self, monitor: &'b dyn Monitor) -> Context<'b> {
-        let Self { options, cache, ref tetgen, ref keys, ref known_rays, ref previous, .. } = *self;
+        let Self { options, cache, ref tetgen, ref keys, ref known_rays, .. } = *self;
         Context {
             options,
             cache,
@@ -58,7 +55,6 @@ impl<'a> Context<'a> {
             keys: keys.clone(),
             monitor,
             known_rays: known_rays.clone(),
-            previous: previous.clone(),
         }
     }
 }

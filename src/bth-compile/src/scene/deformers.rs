@@ -53,7 +53,7 @@ pub(super) fn check(
     manifest: &Manifest,
     objects: &[Option<u32>],
     name: &Path,
-    deformation: &dyn Fn(u32) -> Result<Option<Deformation>>,
+    deformation: &dyn Fn(u32) -> Option<Deformation>,
 ) -> Result<()> {
     for deformer in &manifest.deformers {
         let Some(number) = objects[deformer.object] else { continue };
@@ -63,7 +63,7 @@ pub(super) fn check(
             let place = Place::Part(name.to_owned(), part);
             Err(Error::Input { code: "BTH-I052", place, message, hint: hint.to_owned() })
         };
-        let Some(counts) = deformation(number)? else {
+        let Some(counts) = deformation(number) else {
             let message = format!("expected an object whose vertices can be moved, found \"{object}\"");
             return refused(message, "give the object the key `deforms`");
         };

@@ -6,7 +6,7 @@ use super::sources::File;
 use crate::error::Result;
 use crate::source::changed;
 use crate::write::{self, FileBuilder};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Adds the images that textures of the objects refer to, from the files of their sources.
 ///
@@ -19,7 +19,7 @@ pub(super) fn write(
     objects: &Objects,
     context: &Context<'_>,
 ) -> Result<()> {
-    let mut missing: BTreeSet<[u8; 16]> = objects.image_names()?;
+    let mut missing = objects.image_names();
     let mut found: BTreeMap<[u8; 16], Vec<u8>> = BTreeMap::new();
     for file in sources {
         if missing.is_empty() {

@@ -42,7 +42,7 @@ pub(crate) fn compile_meshes(
     let context = Context::new(options, cache, monitor)?;
     let mut clock = Clock::default();
     let plan = plan(&manifest, meshes, &mut clock);
-    let policy = CachePolicy { whole: false, needed: &|_| true, target: None };
+    let policy = CachePolicy { whole: false, needed: &|_| true };
     through_cache(&manifest, &plan, Path::new(SCENE_NAME), &context, clock, policy)
 }
 

@@ -19,8 +19,6 @@ pub(super) struct SourceMesh {
     pub(super) summary: MeshSummary,
     /// The part of the file.
     pub(super) part: SourcePart,
-    /// What was warned of while it was read, without the name of the file.
-    pub(super) warnings: Vec<String>,
     mesh: Option<Mesh>,
 }
 
@@ -28,7 +26,6 @@ pub(super) struct SourceMesh {
 struct Imported {
     mesh: Mesh,
     summary: MeshSummary,
-    warnings: Vec<String>,
 }
 
 /// The meshes of a file that are used, in order. Those that the cache lacks are imported together.
@@ -47,16 +44,13 @@ pub(super) fn read(file: &File<'_>, context: &Context<'_>) -> Result<Vec<SourceM
     let mut imported = import(file, &lacking, context)?.into_iter();
     let found = file.parts.iter().zip(known).map(|((part, _), known)| {
         known.or_else(|| {
-            let Imported { mesh, summary, warnings } = imported.next()?;
-            Some(SourceMesh { summary, part: *part, warnings, mesh: Some(mesh) })
+            let Imported { mesh, summary } = imported.next()?;
+            Some(SourceMesh { summary, part: *part, mesh: Some(mesh) })
         })
     });
-    let mut meshes: Vec<SourceMesh> = found.flatten().collect();
-    for mesh in &mut meshes {
-        if let Some(warning) = mesh.left_out() {
-            OfFile::new(file, context.monitor).warn(&warning);
-            mesh.warnings.push(warning);
-        }
+    let meshes: Vec<SourceMesh> = found.flatten().collect();
+    for warning in meshes.iter().filter_map(SourceMesh::left_out) {
+        OfFile::new(file, context.monitor).warn(&warning);
     }
     Ok(meshes)
 }
@@ -109,28 +103,20 @@ fn known(file: &File<'_>, part: SourcePart, context: &Context<'_>) -> Option<Sou
     let record = context.cache.find(&key(file, part, context), context.monitor)?;
     let summary = MeshSummary::deserialize(&record.report).ok()?;
     cached::replay(&record.report, &OfFile::new(file, context.monitor));
-    let warnings = cached::warnings(&record.report).map(str::to_owned).collect();
-    Some(SourceMesh { summary, part, warnings, mesh: None })
+    Some(SourceMesh { summary, part, mesh: None })
 }
 
-/// The objects of a file that neither the previous file nor the cache has, with the reasons.
+/// The objects of a file that the cache lacks, with the reasons.
 pub(super) fn missing(file: &File<'_>, context: &Context<'_>) -> Vec<Miss> {
     let one = |source_part: SourcePart| {
         let part = file.name_of(source_part);
         let mesh = key(file, source_part, context);
         let summary = known(file, source_part, context).map(|mesh| mesh.summary);
         let object = summary.as_ref().and_then(|summary| object_key(summary, source_part, context));
-        let (Some(summary), Some(object)) = (summary, object) else {
+        let Some(object) = object else {
             let because = context.cache.reasons(&mesh, &part);
             return Some(Miss { stage: mesh.stage().to_owned(), part, because });
         };
-        let old = context
-            .previous
-            .as_ref()
-            .and_then(|p| Some((p, p.index.object_of(summary.content(source_part.clip()).as_bytes())?)));
-        if old.is_some_and(|(previous, object)| previous.has(object)) {
-            return None;
-        }
         let found = context.cache.find(&object, context.monitor);
         if found.is_some_and(|record| context.cache.holds(&record)) {
             return None;
@@ -176,7 +162,7 @@ fn import(file: &File<'_>, parts: &[SourcePart], context: &Context<'_>) -> Resul
     if let Some(TriangleMesh { positions, triangles }) = file.in_memory {
         let read = mesh::import_triangles(&file.full, positions, triangles, options.wanted(), *monitor)?;
         let (mesh, summary) = MeshSummary::of(read);
-        return Ok(vec![Imported { mesh, summary, warnings: recording.warnings() }]);
+        return Ok(vec![Imported { mesh, summary }]);
     }
     if let Some(moving) = &file.moving {
         let read = moving.import(&file.digest, context)?;
@@ -213,5 +199,5 @@ fn keep_mesh(
         cache.miss(&key(file, part, context), &name);
         cache.put(&key(file, part, context), &name, &cached::encode(&mesh), &summary, recording);
     }
-    Imported { mesh, summary, warnings: recording.warnings() }
+    Imported { mesh, summary }
 }

@@ -3,16 +3,14 @@
 //!
 //! `compile` is the entry, `in_memory` that for meshes in memory; `objects` compiles all objects
 //! and `object` one; `sources` and `meshes` read the source files, `of_file` names them in
-//! warnings; `clips` gives the poses of objects that skins and morph targets deform; `previous`,
-//! `file_index` and `sections` reuse the file of an earlier compilation; `encode` lays out the
-//! scene itself.
+//! warnings; `clips` gives the poses of objects that skins and morph targets deform; `sections`
+//! holds the sections of objects until they are written; `encode` lays out the scene itself.
 
 mod clips;
 mod compile;
 mod context;
 mod deformers;
 mod encode;
-mod file_index;
 mod files;
 mod images;
 mod in_memory;
@@ -25,7 +23,6 @@ mod of_file;
 mod parallel;
 mod places;
 mod plan;
-mod previous;
 mod report;
 mod sections;
 mod sources;

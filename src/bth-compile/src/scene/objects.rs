@@ -2,21 +2,18 @@
 //! compiled in parallel.
 
 use super::context::Context;
-use super::file_index::{FileIndex, Hash, ObjectRow, PartRow, SectionRow};
-use super::meshes;
+use super::meshes::{self, SourceMesh};
 use super::object::{self, BuiltObject};
-use super::of_file::OfFile;
 use super::parallel::run_parallel;
-use super::places::{Part, Places, Task};
+use super::places::{Places, Task};
 use super::report::ObjectReport;
 use super::sections::ObjectSections;
 use super::sources::{File, SourcePart};
 use crate::error::{Error, Place, Result};
-use crate::monitor::Monitor;
 use crate::stage::Clock;
 use crate::tets;
 use crate::write::FileBuilder;
-use bth_format::layout::{self, SectionEntry, kind};
+use bth_format::layout::{self, kind};
 use bth_scene::Manifest;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -36,23 +33,9 @@ pub(super) struct Objects {
     pub(super) sources: Vec<(String, String)>,
     /// Status of the worker, where one was needed.
     pub(super) worker: Option<tets::WorkerStatus>,
-    /// The parts of the source files that objects are made from, but of compiled files.
-    parts: Vec<MadePart>,
 }
 
-/// A part of a source file that an object is made from.
-struct MadePart {
-    /// The hash that identifies it.
-    part: Hash,
-    /// Format of the file.
-    format: String,
-    /// What was warned of while it was read.
-    warnings: Vec<String>,
-    /// Number of the object.
-    object: u32,
-}
-
-/// Compiles the objects that are used, or takes them from the previous file or the cache.
+/// Compiles the objects that are used, or takes them from the cache.
 pub(super) fn build(
     manifest: &Manifest,
     sources: &[File<'_>],
@@ -67,25 +50,19 @@ pub(super) fn build(
             copy(&mut objects, &mut places, manifest, file)?;
             continue;
         }
-        let format = parts.first().map_or_else(String::new, |part| part.format().to_owned());
-        objects.sources.push((format.clone(), file.digest.file.hex()));
-        for ((part, rows), what) in file.parts.iter().zip(parts) {
-            let warnings = what.warnings().to_vec();
-            let object = places.of_part(file, what, context);
-            let format = format.clone();
-            objects.parts.push(MadePart { part: part_hash(file, *part), format, warnings, object });
+        let format = parts.first().map_or_else(String::new, |mesh| mesh.summary.report.format.clone());
+        objects.sources.push((format, file.digest.file.hex()));
+        for ((part, rows), mesh) in file.parts.iter().zip(parts) {
+            let object = places.of_part(file, mesh);
             for row in rows {
                 objects.number[*row] = Some(places.for_row(*part, object));
             }
         }
     }
-    let Places { mut stored, tasks, copies, taken, worker, .. } = places;
-    objects.worker = worker;
-    context.cache.hits("object", taken);
-    for (number, content, built) in build_all(tasks, context, clock)? {
-        objects.note_worker(built.record.worker.clone());
-        let made = Some((*content.as_bytes(), built.record.worker));
-        let sections = ObjectSections::in_file(&Arc::new(built.file), 0, made);
+    let Places { mut stored, tasks, copies, .. } = places;
+    for (number, built) in build_all(tasks, context, clock)? {
+        objects.note_worker(built.record.worker);
+        let sections = ObjectSections::in_file(&Arc::new(built.file), 0, true);
         stored[number] = Some((sections, built.record.object));
     }
     for (copy, of) in copies {
@@ -103,52 +80,21 @@ pub(super) fn build(
     Ok(objects)
 }
 
-/// The parts of all files, in order; a compiled file has no parts.
-fn read(sources: &[File<'_>], context: &Context<'_>, clock: &mut Clock) -> Result<Vec<Vec<Part>>> {
-    let mut all: Vec<Option<Vec<Part>>> =
-        sources.iter().map(|file| parts_without_reading(file, context)).collect();
-    for (file, parts) in sources.iter().zip(&all) {
-        let monitor = OfFile::new(file, context.monitor);
-        parts.iter().flatten().flat_map(Part::warnings).for_each(|warning| monitor.warn(warning));
-    }
+/// The meshes of all files, in order; a compiled file has none.
+fn read(sources: &[File<'_>], context: &Context<'_>, clock: &mut Clock) -> Result<Vec<Vec<SourceMesh>>> {
     let bytes = |file: &&File<'_>| match &file.moving {
         Some(moving) => moving.bytes(),
         None => std::fs::metadata(&file.full).map_or(0, |m| m.len()),
     };
     // Memory for the file and for the mesh that is made from it.
     let estimate = |file: &&File<'_>| bytes(file).saturating_mul(3);
-    let unknown =
-        sources.iter().zip(&all).filter(|(_, known)| known.is_none()).map(|(file, _)| file).collect();
-    let found = run_parallel(unknown, context, clock, estimate, |context, clock, file| {
+    let models = sources.iter().filter(|file| !file.compiled).collect();
+    let mut meshes = run_parallel(models, context, clock, estimate, |context, clock, file| {
         clock.time("mesh", || meshes::read(file, context))
-    })?;
-    let meshes =
-        found.into_iter().map(|meshes| meshes.into_iter().map(|mesh| Part::Mesh(Box::new(mesh))).collect());
-    all.iter_mut()
-        .filter(|known| known.is_none())
-        .zip(meshes)
-        .for_each(|(place, meshes)| *place = Some(meshes));
-    Ok(all.into_iter().flatten().collect())
-}
-
-/// The parts of a file that need not be read, because it is a compiled one or the previous file has
-/// all of them.
-pub(super) fn parts_without_reading(file: &File<'_>, context: &Context<'_>) -> Option<Vec<Part>> {
-    if file.compiled {
-        return Some(Vec::new());
-    }
-    let previous = context.previous.as_ref()?;
-    let part = |part: SourcePart| {
-        let (row, warnings) = previous.index.part(&part_hash(file, part))?;
-        let format = previous.index.formats[row.format as usize].clone();
-        previous.has(row.object).then(|| Part::InPrevious(format, row.object, warnings.to_vec()))
-    };
-    file.parts.iter().map(|(source, _)| part(*source)).collect()
-}
-
-/// The hash that identifies a part of a source.
-fn part_hash(file: &File<'_>, part: SourcePart) -> Hash {
-    *blake3::hash(file.content(part).as_bytes()).as_bytes()
+    })?
+    .into_iter();
+    let of = |file: &File<'_>| if file.compiled { None } else { meshes.next() };
+    Ok(sources.iter().map(of).map(Option::unwrap_or_default).collect())
 }
 
 /// Builds objects: large ones one after another, the others in parallel. Returns the number of
@@ -157,11 +103,11 @@ fn build_all(
     tasks: Vec<Task<'_>>,
     context: &Context<'_>,
     clock: &mut Clock,
-) -> Result<Vec<(usize, blake3::Hash, BuiltObject)>> {
+) -> Result<Vec<(usize, BuiltObject)>> {
     let triangles = |task: &Task<'_>| task.mesh.summary.report.triangles;
     let one = |context: &Context<'_>, clock: &mut Clock, mut task: Task<'_>| {
         let built = object::build(task.file, &mut task.mesh, context, task.number, clock)?;
-        Ok((task.number, task.content, built))
+        Ok((task.number, built))
     };
     let (large, small): (Vec<_>, Vec<_>) = tasks.into_iter().partition(|task| triangles(task) > LARGE);
     let mut built = large.into_iter().map(|task| one(context, clock, task)).collect::<Result<Vec<_>>>()?;
@@ -213,7 +159,7 @@ fn copy(objects: &mut Objects, places: &mut Places<'_>, manifest: &Manifest, fil
                 copied: true,
                 ..ObjectReport::default()
             };
-            let sections = ObjectSections::in_file(&read, object, None);
+            let sections = ObjectSections::in_file(&read, object, false);
             places.stored.push(Some((sections, report)));
             places.stored.len() as u32 - 1
         });
@@ -239,22 +185,12 @@ impl Objects {
     }
 
     /// Names of the images that textures of the objects refer to.
-    ///
-    /// # Errors
-    /// When the previous file cannot be read.
-    pub(super) fn image_names(&self) -> Result<BTreeSet<[u8; 16]>> {
-        let mut names = BTreeSet::new();
-        for stored in &self.stored {
-            names.extend(stored.image_names()?);
-        }
-        Ok(names)
+    pub(super) fn image_names(&self) -> BTreeSet<[u8; 16]> {
+        self.stored.iter().flat_map(ObjectSections::image_names).collect()
     }
 
     /// The DEFORMATION row of an object, if its vertices can be moved.
-    ///
-    /// # Errors
-    /// When the previous file cannot be read.
-    pub(super) fn deformation(&self, object: u32) -> Result<Option<layout::Deformation>> {
+    pub(super) fn deformation(&self, object: u32) -> Option<layout::Deformation> {
         self.stored[object as usize].deformation()
     }
 
@@ -265,48 +201,5 @@ impl Objects {
             builder.section(kind::OBJECT, number as u32, stride, row)?;
         }
         Ok(())
-    }
-
-    /// The index of the file with this section table, for the next compilation. Without objects
-    /// that were copied from compiled files.
-    pub(super) fn file_index(&self, table: &[SectionEntry]) -> FileIndex {
-        let mut index = FileIndex::default();
-        let mut rows = vec![None; self.stored.len()];
-        for (number, (stored, report)) in self.stored.iter().zip(&self.reports).enumerate() {
-            let Some((content, worker)) = &stored.made else { continue };
-            let first = index.sections.len() as u32;
-            let start = table.partition_point(|e| e.object < number as u32);
-            let sections = table[start..].iter().take_while(|e| e.object == number as u32);
-            index.sections.extend(sections.map(|e| SectionRow {
-                kind: e.kind,
-                stride: e.stride,
-                offset: e.offset,
-                length: e.length,
-                hash: e.hash,
-            }));
-            rows[number] = Some(index.objects.len() as u32);
-            index.objects.push(ObjectRow {
-                content: *content,
-                triangles: report.triangles,
-                degenerate: report.degenerate,
-                tet_leaves: report.tet_leaves,
-                tet_triangles: report.tet_triangles,
-                object: stored.row,
-                first,
-                sections: index.sections.len() as u32 - first,
-                worker: FileIndex::row_of(&mut index.workers, worker),
-                reserved: 0,
-            });
-        }
-        for MadePart { part, format, warnings, object } in &self.parts {
-            if let Some(object) = rows[*object as usize] {
-                let format = FileIndex::row_of(&mut index.formats, format);
-                if !warnings.is_empty() {
-                    index.warnings.insert(index.parts.len() as u32, warnings.clone());
-                }
-                index.parts.push(PartRow { part: *part, object, format });
-            }
-        }
-        index
     }
 }

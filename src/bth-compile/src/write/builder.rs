@@ -128,9 +128,6 @@ impl<'a> FileBuilder<'a> {
     }
 
     /// The whole file in memory.
-    ///
-    /// # Panics
-    /// When a section is still in another file.
     pub fn finish(&self) -> Vec<u8> {
         let mut bytes = vec![0; self.file_length() as usize];
         self.copies(&mut bytes).into_iter().for_each(|(to, from)| to.copy_from_slice(from));
@@ -139,9 +136,6 @@ impl<'a> FileBuilder<'a> {
 
     /// Writes header and table into as many zero bytes as the file has. Returns where which bytes
     /// of the sections are to be copied.
-    ///
-    /// # Panics
-    /// When a section is still in another file.
     pub(super) fn copies<'b>(&'b self, bytes: &'b mut [u8]) -> Vec<(&'b mut [u8], &'b [u8])> {
         let entries = self.entries();
         let head = self.head(&entries);
@@ -150,7 +144,7 @@ impl<'a> FileBuilder<'a> {
         let mut end = head.len();
         let mut copies = Vec::with_capacity(entries.len());
         for (entry, section) in entries.iter().zip(self.sections.values()) {
-            let from = section.bytes.in_memory().expect("the bytes of all sections are in memory");
+            let from = &*section.bytes;
             let (_, section_and_rest) = rest.split_at_mut(entry.offset as usize - end);
             let (to, behind) = section_and_rest.split_at_mut(from.len());
             copies.extend(to.chunks_mut(COPIED_AT_ONCE).zip(from.chunks(COPIED_AT_ONCE)));
@@ -160,8 +154,8 @@ impl<'a> FileBuilder<'a> {
         copies
     }
 
-    /// The file, ready to be written, and its section table.
-    pub(crate) fn content(self) -> (Content, Vec<SectionEntry>) {
+    /// The file, ready to be written.
+    pub(crate) fn content(self) -> Content {
         let entries = self.entries();
         let mut content = Content::new(self.head(&entries));
         let length = self.file_length();
@@ -170,7 +164,7 @@ impl<'a> FileBuilder<'a> {
             content.push(section.bytes);
         }
         content.pad_to(length);
-        (content, entries)
+        content
     }
 
     /// Header and section table.
@@ -201,7 +195,7 @@ impl<'a> FileBuilder<'a> {
         let mut end = self.table_end();
         let entry = |(&(object, kind), section): (&(u32, u32), &Section)| {
             let offset = end.next_multiple_of(ALIGNMENT as u64);
-            let length = section.bytes.length();
+            let length = section.bytes.len() as u64;
             end = offset + length;
             SectionEntry {
                 kind,

@@ -1,10 +1,10 @@
-//! A file that is ready to be written, in pieces in memory and in other files.
+//! A file that is ready to be written, in pieces.
 
 use super::whole::{are_zeros, name};
-use bth_files::{Digest, OpenFile};
+use bth_files::Digest;
 use std::borrow::Cow;
-use std::io::{Error, Result, Write};
-use std::ops::Range;
+use std::io::{Result, Write};
+use std::ops::{Deref, Range};
 use std::sync::Arc;
 
 /// Where the bytes of a section are.
@@ -14,38 +14,15 @@ pub(crate) enum Bytes<'a> {
     Owned(Cow<'a, [u8]>),
     /// In a file in memory.
     InFile(Arc<bth_format::File>, Range<usize>),
-    /// In an open file on disk.
-    OnDisk(Arc<OpenFile>, Range<u64>),
 }
 
-impl Bytes<'_> {
-    /// Number of bytes.
-    pub(crate) fn length(&self) -> u64 {
-        match self {
-            Self::Owned(bytes) => bytes.len() as u64,
-            Self::InFile(_, range) => range.len() as u64,
-            Self::OnDisk(_, range) => range.end - range.start,
-        }
-    }
+impl Deref for Bytes<'_> {
+    type Target = [u8];
 
-    /// The bytes, read from disk if they are there.
-    pub(crate) fn read(&self) -> Result<Cow<'_, [u8]>> {
+    fn deref(&self) -> &[u8] {
         match self {
-            Self::OnDisk(file, range) => {
-                let mut bytes = vec![0; self.length() as usize];
-                file.read_at(range.start, &mut bytes)?;
-                Ok(bytes.into())
-            }
-            _ => Ok(self.in_memory().unwrap_or_default().into()),
-        }
-    }
-
-    /// The bytes, unless they are on disk.
-    pub(super) fn in_memory(&self) -> Option<&[u8]> {
-        match self {
-            Self::Owned(bytes) => Some(bytes),
-            Self::InFile(file, range) => file.bytes().get(range.clone()),
-            Self::OnDisk(..) => None,
+            Self::Owned(bytes) => bytes,
+            Self::InFile(file, range) => &file.bytes()[range.clone()],
         }
     }
 }
@@ -93,28 +70,18 @@ impl Content {
 
     /// Appends the bytes of a section. Adjacent ranges of the same file become one piece.
     pub(super) fn push(&mut self, bytes: Bytes<'_>) {
-        self.length += bytes.length();
-        let pad = self.pad;
+        self.length += bytes.len() as u64;
         match (self.pieces.last_mut(), bytes) {
             (Some(Bytes::InFile(file, old)), Bytes::InFile(other, new))
-                if Arc::ptr_eq(file, &other) && pad == 0 && old.end == new.start =>
+                if Arc::ptr_eq(file, &other) && self.pad == 0 && old.end == new.start =>
             {
                 old.end = new.end;
-            }
-            // Sections of a compiled file are separated by zeros, so the zeros between adjacent
-            // ranges are copied with them.
-            (Some(Bytes::OnDisk(file, old)), Bytes::OnDisk(other, new))
-                if Arc::ptr_eq(file, &other) && old.end + pad as u64 == new.start =>
-            {
-                old.end = new.end;
-                self.pad = 0;
             }
             (_, bytes) => {
                 self.fill();
                 match bytes {
                     Bytes::Owned(bytes) => self.append(&bytes),
                     Bytes::InFile(file, range) => self.pieces.push(Bytes::InFile(file, range)),
-                    Bytes::OnDisk(file, range) => self.pieces.push(Bytes::OnDisk(file, range)),
                 }
             }
         }
@@ -151,49 +118,26 @@ impl Content {
     /// The name of the content: the hash of the header. The header contains the hash of the section
     /// table, which contains the hashes of the sections.
     pub fn name(&self) -> Digest {
-        let head = self.pieces.first().and_then(Bytes::in_memory).unwrap_or_default();
-        name(head)
+        name(self.pieces.first().map_or(&[], |head| head))
     }
 
     /// Writes the content.
     ///
     /// # Errors
-    /// Those of the writer, and when an old file that it takes sections from cannot be read or has
-    /// changed.
+    /// Those of the writer.
     pub fn write_to(&self, out: &mut (impl Write + ?Sized)) -> Result<()> {
-        let mut at = 0;
-        let mut used: Option<&Arc<OpenFile>> = None;
-        for piece in &self.pieces {
-            match piece {
-                Bytes::OnDisk(file, range) => {
-                    file.copy_to(range.clone(), out, at)?;
-                    used = Some(file);
-                }
-                piece => out.write_all(piece.in_memory().unwrap_or_default())?,
-            }
-            at += piece.length();
-        }
-        out.write_all(&[0; bth_format::layout::ALIGNMENT][..self.pad])?;
-        match used {
-            Some(file) if !file.is_unchanged() => {
-                Err(Error::other("the file that was there was changed meanwhile; compile again"))
-            }
-            _ => Ok(()),
-        }
+        self.pieces.iter().try_for_each(|piece| out.write_all(piece))?;
+        out.write_all(&[0; bth_format::layout::ALIGNMENT][..self.pad])
     }
 
-    /// All bytes in memory.
-    ///
-    /// # Errors
-    /// The errors of [`Self::write_to`].
-    pub fn bytes(&self) -> Result<Cow<'_, [u8]>> {
-        if let ([piece], 0) = (&self.pieces[..], self.pad)
-            && let Some(bytes) = piece.in_memory()
-        {
-            return Ok(Cow::Borrowed(bytes));
+    /// All bytes in one piece.
+    pub fn bytes(&self) -> Cow<'_, [u8]> {
+        if let ([piece], 0) = (&self.pieces[..], self.pad) {
+            return Cow::Borrowed(piece);
         }
         let mut bytes = Vec::with_capacity(self.length as usize);
-        self.write_to(&mut bytes)?;
-        Ok(bytes.into())
+        self.pieces.iter().for_each(|piece| bytes.extend_from_slice(piece));
+        bytes.resize(self.length as usize, 0);
+        bytes.into()
     }
 }

@@ -11,7 +11,7 @@ mod open;
 mod scene;
 mod whole;
 
-pub use atomic::{write_atomically, write_atomically_with, write_content};
+pub use atomic::{write_atomically, write_content};
 pub use builder::FileBuilder;
 pub(crate) use builder::SectionHead;
 pub(crate) use content::Bytes;
@@ -24,7 +24,6 @@ pub use object::{ObjectParts, Source, object};
 pub(crate) use open::open;
 pub use scene::{DeformerParts, SceneParts, scene};
 pub use whole::name_if_whole;
-pub(crate) use whole::{HEADER, are_zeros, name};
 
 use crate::error::{Error, Result};
 

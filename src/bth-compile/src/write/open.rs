@@ -11,9 +11,6 @@ use rayon::prelude::*;
 /// # Errors
 /// `BTH-L034` when there is not enough memory; `BTH-X030` when the bytes violate the format, which
 /// is a defect of the compiler.
-///
-/// # Panics
-/// When a section is still in another file.
 pub(crate) fn open(builder: &FileBuilder<'_>) -> Result<File> {
     let length = builder.file_length();
     let mut memory = FileMemory::zeroed(length as usize).map_err(|_| Error::Limit {

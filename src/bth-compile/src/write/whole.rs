@@ -6,11 +6,11 @@ use bth_format::file::hash128;
 use std::path::Path;
 
 /// Bytes of the header; their hash is the name of the content.
-pub(crate) const HEADER: usize = size_of::<bth_format::layout::Header>();
+const HEADER: usize = size_of::<bth_format::layout::Header>();
 
 /// The name of a file's content: the hash of the header. The header contains the hash of the
 /// section table, which contains the hashes of the sections. The bytes between sections are zeros.
-pub(crate) fn name(head: &[u8]) -> Digest {
+pub(super) fn name(head: &[u8]) -> Digest {
     Digest::of(head.get(..HEADER).unwrap_or(head))
 }
 
@@ -30,7 +30,7 @@ pub fn name_if_whole(path: &Path) -> Option<Digest> {
     are_zeros(&bytes[end..]).then(|| name(bytes))
 }
 
-pub(crate) fn are_zeros(bytes: &[u8]) -> bool {
+pub(super) fn are_zeros(bytes: &[u8]) -> bool {
     bytes.iter().all(|b| *b == 0)
 }
 
@@ -50,7 +50,7 @@ mod tests {
         let bytes = builder.finish();
         std::fs::write(&path, &bytes).unwrap();
         let named = name_if_whole(&path);
-        assert_eq!(named, Some(builder.content().0.name()));
+        assert_eq!(named, Some(builder.content().name()));
         for at in 0..bytes.len() {
             let mut other = bytes.clone();
             other[at] ^= 1;

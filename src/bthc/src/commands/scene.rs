@@ -79,7 +79,6 @@ pub(super) fn compile(
     let policy = CachePolicy {
         whole: job.target == Target::Cache,
         needed: &|record| job.target.needs(record, context.store.as_ref()),
-        target: job.target.path(),
     };
     let outcome = scene::compile_cached(&manifest, source, &context.options, &cache, policy, monitor)?;
     let mut report = deliver(context, job, &outcome, &cache, &|| {
@@ -119,7 +118,7 @@ pub(super) fn dry_run(
 ) -> Result<DryRun, Failure> {
     let (manifest, _) = read(&job.model, &context.args.gltf, monitor)?;
     let source = SceneSource { folder: folder(&job.model), name: &job.model };
-    Ok(scene::dry_run(&manifest, source, &context.options, cache, job.target.path(), monitor)?)
+    Ok(scene::dry_run(&manifest, source, &context.options, cache, monitor)?)
 }
 
 /// All files that a scene is made from.

@@ -19,7 +19,7 @@ def compile(
     model, *, output=None, quality=None, structure=None, coordinates=None, max_error=None, polygons=None,
     attributes=None, alpha=None, compact=None, geometry=None, names=None, materials=None,
     lenient_materials=None, profile=None, max_bytes_per_triangle=None,
-    for_scene=None, rays=None, settings=None, flatten=None, scene=None, animation=None, rate=None, at_rest=None, rigid_parts=None,
+    rays=None, settings=None, flatten=None, scene=None, animation=None, rate=None, at_rest=None, rigid_parts=None,
     strict=None, deformable=None, free_directions=None, cache=None,
     cache_size=None, shared_cache=None, memory=None, threads=None, progress=None,
 ):

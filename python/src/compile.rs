@@ -134,8 +134,7 @@ pub(crate) fn compile_path(
     let flatten = keywords.value("flatten")?.unwrap_or(false);
     let output: Option<PathBuf> = keywords.value("output")?;
     if options.costs.rays.is_some() && is_scene(&path, flatten) {
-        let message =
-            format!("rays: an option for one model, and {} is a scene: see for_scene", path.display());
+        let message = format!("rays: an option for one model, and {} is a scene", path.display());
         return Err(PyValueError::new_err(message));
     }
     if let Some(output) = output.as_deref().filter(|output| output.is_file()) {

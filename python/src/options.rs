@@ -177,7 +177,6 @@ fn selection(keywords: &Keywords<'_, '_>, options: &mut CompileOptions) -> PyRes
         options.bvh.quality = quality;
     }
     let costs = &mut options.costs;
-    costs.for_scene = keywords.value("for_scene")?.unwrap_or(false);
     costs.max_bytes_per_triangle = keywords.positive("max_bytes_per_triangle")?;
     if let Some(arrays) = keywords.value::<RayArrays<'_>>("rays")? {
         costs.rays = Some(Arc::new(known_rays(&arrays)?));

@@ -86,7 +86,7 @@ def test_wrong_known_rays(path, tmp_path):
         with pytest.raises(TypeError, match="rays"):
             bth.compile(path, rays=wrong)
     (tmp_path / "a.manifest").write_text("version = 1\n")
-    with pytest.raises(ValueError, match="for_scene"):
+    with pytest.raises(ValueError, match="is a scene"):
         bth.compile(tmp_path / "a.manifest", rays=([[0, 0, 0]], [[0, 0, 1]]))
 
 

@@ -461,7 +461,6 @@ fn options_without_effect_are_told() {
             assert!(warned(model, option), "{model} {option:?}");
         }
     }
-    assert!(warned("a.obj", &["--for-scene"]));
     let poses = ["--set", "poses=3"];
     assert!(warned("a.obj", &poses) && !warned("s.manifest", &poses));
     assert!(warned("a.obj", &["--format", "ply"]));

@@ -160,37 +160,3 @@ fn calibration_needs_the_worker_and_says_so() {
     assert!(run.stderr.contains("BTH-I061") && run.stderr.contains("worker"), "{run:?}");
     assert!(!folder.path().join("bth-profile.json").exists());
 }
-
-#[test]
-fn the_rays_of_a_scene_decide_which_objects_are_tetrahedralized() {
-    // Two balls: one in view of the camera, one behind the camera.
-    let scene = r#"version = 1
-camera = "eye"
-objects = [{ name = "seen", model = "seen.obj" }, { name = "behind", model = "behind.obj" }]
-nodes = [
-    { name = "seen", object = "seen" }, { name = "behind", object = "behind", translation = [0, 0, 6000] },
-    { name = "eye", look = { from = [0, 0, 5], to = [0, 0, 0] } },
-]
-cameras = [{ name = "eye", node = "eye", fov = 30 }]
-"#;
-    let folder = folder(&[("a.manifest", scene), ("seen.obj", &sphere(24)), ("behind.obj", &sphere(25))]);
-    let compile = |more: &[&str]| {
-        let args = ["compile", "a.manifest", "-o", "out.bth", "--json"];
-        let json = bthc(folder.path(), &[&args[..], &CHEAP[..], more].concat()).expect(0).json();
-        ["seen", "behind"].map(|name| {
-            let objects = json["scene"]["objects"].as_array().unwrap();
-            let object = objects.iter().find(|o| o["names"][0] == name).unwrap();
-            object["tet_triangles"].as_u64().unwrap()
-        })
-    };
-    let all = compile(&[]);
-    if all == [0, 0] {
-        println!("skipped: tetrahedra need the worker bth-tetgen");
-        return;
-    }
-    assert!(all[0] > 1000 && all[1] > 1000, "{all:?}");
-    // Rays that bounce off a convex ball hit nothing else, but they start on it.
-    let weighed = compile(&["--for-scene"]);
-    assert!(weighed[0] > 0 && weighed[1] == 0, "{weighed:?}");
-    assert_eq!(compile(&["--for-scene"]), weighed);
-}

@@ -1,4 +1,4 @@
-//! Trees for rays that are known when a model is compiled: `--rays` and `--for-scene`.
+//! Trees for rays that are known when a model is compiled: `--rays`.
 
 use crate::support::{bthc, command, data, folder, run_with, sphere, wait};
 use bth::rays::Ray;
@@ -164,51 +164,8 @@ fn rays_that_cannot_be_traced_are_reported_and_none_are_refused() {
     assert!(none.stderr.contains("BTH-I090") && none.stderr.contains("found none of 1"), "{none:?}");
     bthc(path, &["compile", "ball.obj", "--rays", "ball.obj"]).expect(3);
     let scene = bthc(path, &["compile", "a.manifest", "--rays", "some.rays"]).expect(2);
-    assert!(scene.stderr.contains("--for-scene"), "{scene:?}");
+    assert!(scene.stderr.contains("compile its models one by one"), "{scene:?}");
     bthc(path, &["compile", "ball.obj", "ball.obj", "--rays", "some.rays", "-o", "."]).expect(2);
     let deformable = bthc(path, &["compile", "ball.obj", "--rays", "some.rays", "--deformable"]);
     assert!(deformable.stderr.contains("BTH-L033"), "{deformable:?}");
-}
-
-#[test]
-fn the_rays_of_a_scene_decide_on_its_trees() {
-    let scene = r#"version = 1
-objects = [{ name = "knot", model = "knot.ply" }]
-nodes = [
-    { name = "knot", object = "knot", scale = [2, 2, 2], translation = [0, 1, 0] },
-    { name = "eye", look = { from = [20, 1, 2], to = [0, 1, 0] } },
-]
-cameras = [{ name = "eye", node = "eye", fov = 25 }]
-"#;
-    let folder = folder(&[("a.manifest", scene)]);
-    let at = |name: &str| folder.path().join(name);
-    bth_scenes::write::file(&torus_knot(30_000), &at("knot.ply")).unwrap();
-    // The same view in the space of the scene.
-    let placed = |ray: Ray| Ray {
-        origin: std::array::from_fn(|k| 2.0 * ray.origin[k] + [0.0, 1.0, 0.0][k]),
-        direction: ray.direction.map(|x| 2.0 * x),
-        ..ray
-    };
-    let rays: Vec<Ray> = view(20_000, 3).into_iter().map(placed).collect();
-    for structure in ["bth", "bvh"] {
-        let compile = |output: &str, more: &[&str]| {
-            let args = [
-                "compile",
-                "a.manifest",
-                "--structure",
-                structure,
-                "--free-directions",
-                "none",
-                "-o",
-                output,
-            ];
-            bthc(folder.path(), &[&args, more].concat()).expect(0);
-        };
-        compile("any.bth", &[]);
-        compile("known.bth", &["--for-scene"]);
-        let ((steps, hits), (known_steps, known_hits)) =
-            (traced(&at("any.bth"), &rays), traced(&at("known.bth"), &rays));
-        assert_eq!(known_hits, hits);
-        assert!((known_steps as f64) < 0.99 * steps as f64, "{structure}: {known_steps} of {steps}");
-    }
 }

@@ -70,7 +70,6 @@ fn options_json(options: &CompileOptions) -> Value {
         ("names", options.names),
         ("materials", options.materials),
         ("lenient_materials", options.lenient_materials),
-        ("for_scene", options.costs.for_scene && !is_bth),
     ];
     for (name, _) in flags.into_iter().filter(|(_, is_set)| *is_set) {
         json[name] = json!(true);

@@ -5,23 +5,18 @@ use super::context::Context;
 use super::objects::{self, Objects};
 use super::plan::ScenePlan;
 use super::report::{ObjectReport, SceneReport};
-use super::{deformers, encode, known_rays, meshes, sources, visible};
-use crate::bvh::{BvhOptions, Quality};
+use super::{deformers, encode, meshes, sources, visible};
 use crate::cached::Cache;
-use crate::costs;
 use crate::error::{self, Error, Result};
-use crate::free::FreeOptions;
 use crate::monitor::Monitor;
-use crate::options::{CompileOptions, Structure};
+use crate::options::CompileOptions;
 use crate::pipeline::{self, CachedCompilation, Compiled, DryRun, compile_or_fetch};
-use crate::sampling::KnownRays;
 use crate::stage::Clock;
 use crate::write::{self, Content, FileBuilder, SceneParts};
 use bth_cache::{Key, Record};
 use bth_scene::Manifest;
 use serde::Deserialize;
 use std::path::Path;
-use std::sync::Arc;
 
 /// Compiles a scene; paths of the manifest count from `folder`, `name` names the scene in messages.
 ///
@@ -202,19 +197,9 @@ fn build(
 ) -> Result<(Content, SceneReport)> {
     let options = context.options;
     if options.costs.rays.is_some() {
-        let message =
-            "rays are known of one model; those of a scene are those of its cameras and lights".to_owned();
+        let message = "known rays are rays through one model, and this is a scene".to_owned();
         return Err(Error::Limit { code: "BTH-L033", message });
     }
-    let weighed;
-    let context = match options.costs.for_scene && options.structure != Structure::Tets {
-        true => {
-            let known_rays = Some(clock.time("rays", || rays(manifest, plan, name, context))?);
-            weighed = Context { known_rays, ..context.with_monitor(context.monitor) };
-            &weighed
-        }
-        false => context,
-    };
     let objects = objects::build(manifest, &plan.sources, context, &mut clock)?;
     deformers::check(manifest, &objects.number, name, &|object| objects.deformation(object))?;
     let parts = encode::encode(manifest, &plan.order, &plan.visible, &objects.number)?;
@@ -286,33 +271,6 @@ fn check(objects: &Objects, parts: &SceneParts, content: &Content, name: &Path) 
     // whole file.
     let whole = |error| first_frame(&content.bytes()).err().unwrap_or(error);
     first_frame(&rows_only.finish()).map_err(|e| refused(name, &whole(e)))
-}
-
-/// The rays of the scene that reach each object of the file, traced through a file that is compiled
-/// for that: with BVHs that are quickly built.
-fn rays(
-    manifest: &Manifest,
-    plan: &ScenePlan<'_>,
-    name: &Path,
-    context: &Context<'_>,
-) -> Result<Vec<Arc<KnownRays>>> {
-    let Context { cache, monitor, .. } = *context;
-    let costs = costs::CostOptions { for_scene: false, ..context.options.costs.clone() };
-    let coordinates = Default::default();
-    let options = CompileOptions {
-        structure: Structure::Bvh,
-        bvh: BvhOptions { quality: Quality::Fast, ..context.options.bvh },
-        free: FreeOptions::default(),
-        geometry: true,
-        costs,
-        coordinates,
-        ..context.options.clone()
-    };
-    let tetgen = context.tetgen.as_ref().map(|_| String::new());
-    let plain = Context::of(&options, cache, tetgen, monitor);
-    let (content, _) = build(manifest, plan, name, &plain, Clock::default())?;
-    let mut scene = bth::from_bytes(&content.bytes()).map_err(|e| refused(name, &e))?;
-    Ok(known_rays::known_rays(&mut scene, name)?.into_iter().map(Arc::new).collect())
 }
 
 /// The error for a file that fails the reader's check: an input error when the first frame cannot

@@ -5,7 +5,6 @@ use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::options::CompileOptions;
 use crate::pipeline::{ObjectKeys, tetgen_in_keys};
-use crate::sampling::KnownRays;
 use std::sync::Arc;
 
 /// What all parts of a scene's compilation share.
@@ -17,8 +16,6 @@ pub(super) struct Context<'a> {
     /// The keys of objects, if they may be kept.
     pub(super) keys: Option<Arc<ObjectKeys>>,
     pub(super) monitor: &'a dyn Monitor,
-    /// The scene's rays for each object of the file, if they weight the costs.
-    pub(super) known_rays: Option<Vec<Arc<KnownRays>>>,
 }
 
 impl<'a> Context<'a> {
@@ -31,30 +28,14 @@ impl<'a> Context<'a> {
         cache: &'a Cache<'a>,
         monitor: &'a dyn Monitor,
     ) -> Result<Self> {
-        Ok(Self::of(options, cache, tetgen_in_keys(options, cache, monitor)?, monitor))
-    }
-
-    /// The context of a compilation whose tetrahedralizer is known.
-    pub(super) fn of(
-        options: &'a CompileOptions,
-        cache: &'a Cache<'a>,
-        tetgen: Option<String>,
-        monitor: &'a dyn Monitor,
-    ) -> Self {
+        let tetgen = tetgen_in_keys(options, cache, monitor)?;
         let keys = tetgen.as_ref().map(|tetgen| Arc::new(ObjectKeys::new(options, tetgen)));
-        Self { options, cache, tetgen, keys, monitor, known_rays: None }
+        Ok(Self { options, cache, tetgen, keys, monitor })
     }
 
     /// The same context with another monitor.
     pub(super) fn with_monitor<'b>(&'b self, monitor: &'b dyn Monitor) -> Context<'b> {
-        let Self { options, cache, ref tetgen, ref keys, ref known_rays, .. } = *self;
-        Context {
-            options,
-            cache,
-            tetgen: tetgen.clone(),
-            keys: keys.clone(),
-            monitor,
-            known_rays: known_rays.clone(),
-        }
+        let Self { options, cache, ref tetgen, ref keys, .. } = *self;
+        Context { options, cache, tetgen: tetgen.clone(), keys: keys.clone(), monitor }
     }
 }

@@ -88,7 +88,7 @@ fn key(file: &File<'_>, part: SourcePart, context: &Context<'_>) -> Key {
     Import::key_of(&file.digest, &file.full, &file.part(part), context.options.wanted())
 }
 
-/// The key of an object, if it may be kept, whose costs the scene's rays do not weight.
+/// The key of an object, if it may be kept.
 pub(super) fn object_key(mesh: &MeshSummary, part: SourcePart, context: &Context<'_>) -> Option<Key> {
     if !mesh.deforms() {
         return context.keys.as_ref().map(|keys| keys.of(mesh, None));

@@ -14,7 +14,6 @@ mod encode;
 mod files;
 mod images;
 mod in_memory;
-mod known_rays;
 mod meshes;
 mod moving;
 mod object;

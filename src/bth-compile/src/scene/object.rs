@@ -6,11 +6,10 @@ use super::meshes::{SourceMesh, object_key};
 use super::report::ObjectReport;
 use super::sources::File;
 use crate::cached::replay;
-use crate::costs::CostOptions;
 use crate::error::Result;
 use crate::monitor::{Monitor, Recording};
 use crate::options::CompileOptions;
-use crate::pipeline::{Compiler, ObjectKeys, warn_of_options};
+use crate::pipeline::{Compiler, warn_of_options};
 use crate::stage::Clock;
 use crate::tets;
 use crate::write::{self, FileBuilder, object as object_sections};
@@ -41,29 +40,18 @@ pub(super) fn memory(triangles: u64) -> u64 {
     triangles.saturating_mul(MEMORY_PER_TRIANGLE).saturating_add(MEMORY_AT_LEAST)
 }
 
-/// An object, from the cache or built. `number` is its number in the file, which selects the
-/// scene's rays.
+/// An object, from the cache or built.
 pub(super) fn build(
     file: &File<'_>,
     mesh: &mut SourceMesh,
     context: &Context<'_>,
-    number: usize,
     clock: &mut Clock,
 ) -> Result<BuiltObject> {
     let part = file.name_of(mesh.part);
-    let rays = context.known_rays.as_ref().and_then(|rays| rays.get(number));
-    let (options, key) = match rays {
-        _ if mesh.summary.deforms() => {
-            (context.options.of_deforming(), object_key(&mesh.summary, mesh.part, context))
-        }
-        Some(rays) => {
-            let costs = CostOptions { rays: Some(rays.clone()), ..context.options.costs.clone() };
-            let options = CompileOptions { costs, ..context.options.clone() };
-            let tetgen = context.tetgen.as_ref();
-            let key = tetgen.map(|tetgen| ObjectKeys::new(&options, tetgen).of(&mesh.summary, None));
-            (options, key)
-        }
-        None => (context.options.clone(), object_key(&mesh.summary, mesh.part, context)),
+    let key = object_key(&mesh.summary, mesh.part, context);
+    let options = match mesh.summary.deforms() {
+        true => context.options.of_deforming(),
+        false => context.options.clone(),
     };
     let Context { cache, monitor, .. } = context;
     let fetched = || key.as_ref().and_then(|key| fetch(key, &part, context));

@@ -106,7 +106,7 @@ fn build_all(
 ) -> Result<Vec<(usize, BuiltObject)>> {
     let triangles = |task: &Task<'_>| task.mesh.summary.report.triangles;
     let one = |context: &Context<'_>, clock: &mut Clock, mut task: Task<'_>| {
-        let built = object::build(task.file, &mut task.mesh, context, task.number, clock)?;
+        let built = object::build(task.file, &mut task.mesh, context, clock)?;
         Ok((task.number, built))
     };
     let (large, small): (Vec<_>, Vec<_>) = tasks.into_iter().partition(|task| triangles(task) > LARGE);

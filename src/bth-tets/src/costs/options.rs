@@ -87,8 +87,6 @@ pub struct CostOptions {
     pub budget: Option<f64>,
     /// The criterion by which tetrahedra stay after they are built.
     pub probe: Probe,
-    /// For objects of a scene: true if the rays of its cameras, lights and frames weight the nodes.
-    pub for_scene: bool,
     /// Rays that weight the nodes of the object: in addition to sampled ones for the BVH, instead
     /// of sampled ones for tetrahedra. Cache keys contain their hash.
     #[serde(serialize_with = "rays_by_hash")]
@@ -130,7 +128,6 @@ impl Default for CostOptions {
             max_bytes_per_triangle: None,
             budget: None,
             probe: Probe::default(),
-            for_scene: false,
             rays: None,
         }
     }

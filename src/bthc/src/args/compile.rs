@@ -82,10 +82,6 @@ pub(crate) struct Compile {
     pub(crate) deformable: bool,
     #[command(flatten)]
     pub(crate) selection: Selection,
-    /// Build the trees of a scene for the rays of its cameras, lights and frames, more than for
-    /// rays from everywhere. Nodes that none of them hits are not tetrahedralized.
-    #[arg(long)]
-    pub(crate) for_scene: bool,
     /// Threads; 0 for one per processor. The result does not depend on it.
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = threads)]
     pub(crate) threads: usize,
@@ -141,7 +137,6 @@ impl Compile {
             ..Default::default()
         };
         self.selection.apply(&mut options, monitor)?;
-        options.costs.for_scene = self.for_scene;
         Ok(options)
     }
 

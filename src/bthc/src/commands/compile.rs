@@ -150,7 +150,7 @@ fn check_rays(args: &Compile, jobs: &[Job]) -> Result<(), Failure> {
     match jobs {
         [job] if scene::is_scene(&job.model, args) => usage(
             format!("--rays are rays through one model, and {} is a scene", job.model.display()),
-            "let the rays of its cameras and lights decide with --for-scene, or make one model of a glTF file with --flatten",
+            "compile its models one by one and refer to the compiled files, or make one model of a glTF file with --flatten",
         ),
         [_] => Ok(()),
         _ => usage(
@@ -176,9 +176,8 @@ fn warn_of_options(args: &Compile, jobs: &[Job], monitor: &dyn Monitor) {
     }
     if !jobs.iter().any(|job| scene::is_scene(&job.model, args)) {
         let poses = args.selection.settings.iter().any(|setting| setting.name() == "poses");
-        let of_scenes = [("--for-scene", args.for_scene), ("--set poses", poses)];
-        for (option, _) in of_scenes.iter().filter(|(_, is_given)| *is_given) {
-            monitor.warn(&format!("{option} has no effect: no model is a scene"));
+        if poses {
+            monitor.warn("--set poses has no effect: no model is a scene");
         }
     }
     if args.jobs.format.is_some() && !jobs.iter().any(|job| job.is_input) {

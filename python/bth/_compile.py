@@ -18,7 +18,7 @@ _GLTF = ("flatten", "scene", "animation", "rate", "at_rest", "rigid_parts", "str
 def compile(
     model, *, output=None, quality=None, structure=None, coordinates=None, max_error=None, polygons=None,
     attributes=None, alpha=None, compact=None, geometry=None, names=None, materials=None,
-    lenient_materials=None, profile=None, max_bytes_per_triangle=None,
+    lenient_materials=None, max_bytes_per_triangle=None,
     rays=None, settings=None, flatten=None, scene=None, animation=None, rate=None, at_rest=None, rigid_parts=None,
     strict=None, deformable=None, free_directions=None, cache=None,
     cache_size=None, shared_cache=None, memory=None, threads=None, progress=None,
@@ -94,7 +94,7 @@ def _checked(options):
     progress = options.get("progress")
     if progress is not None and not callable(progress):
         raise TypeError(f"progress: expected a function, got {type(progress).__name__}")
-    for name in ("output", "profile", "shared_cache", "cache"):
+    for name in ("output", "shared_cache", "cache"):
         if name in options and not (name == "cache" and isinstance(options[name], (bool, np.bool_))):
             options[name] = _path(options[name], name)
     if "cache_size" in options and not isinstance(options["cache_size"], str):

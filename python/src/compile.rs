@@ -138,8 +138,7 @@ pub(crate) fn compile_path(
         return Err(PyValueError::new_err(message));
     }
     if let Some(output) = output.as_deref().filter(|output| output.is_file()) {
-        let mut inputs = py.detach(|| inputs(&path, options.looks()));
-        inputs.extend(keywords.value::<PathBuf>("profile")?);
+        let inputs = py.detach(|| inputs(&path, options.looks()));
         refuse_input(output, &inputs)?;
     }
     let bytes = monitored(py, &keywords, |monitor| {

@@ -181,10 +181,6 @@ fn selection(keywords: &Keywords<'_, '_>, options: &mut CompileOptions) -> PyRes
     if let Some(arrays) = keywords.value::<RayArrays<'_>>("rays")? {
         costs.rays = Some(Arc::new(known_rays(&arrays)?));
     }
-    if let Some(profile) = keywords.value::<PathBuf>("profile")?.filter(|path| path.as_os_str() != "default")
-    {
-        costs.profile = costs::Profile::read(&profile).map_err(crate::errors::compile_error)?;
-    }
     for (key, value) in keywords.value::<BTreeMap<String, Bound<'_, PyAny>>>("settings")?.unwrap_or_default()
     {
         let setting = Setting::parse(&format!("{}={}", key.replace('_', "-"), value.str()?));

@@ -90,17 +90,13 @@ def test_wrong_known_rays(path, tmp_path):
         bth.compile(tmp_path / "a.manifest", rays=([[0, 0, 0]], [[0, 0, 1]]))
 
 
-def test_the_default_profile_has_a_name(path):
-    assert bth.compile(path, profile="default").to_bytes() == bth.compile(path).to_bytes()
-
-
 @pytest.mark.parametrize("options, error", [
     ({"alpha": "holes"}, ValueError), ({"polygons": "delaunay"}, ValueError), ({"attributes": "colours"}, ValueError), ({"names": "yes"}, TypeError), ({"threads": -1}, ValueError),
     ({"threads": 5000}, ValueError), ({"threads": 1.5}, TypeError), ({"settings": {"tet-deadline": 0}}, ValueError), ({"settings": {"tet_memory": 1}}, ValueError),
     ({"memory": 0}, ValueError), ({"settings": {"budget": -1}}, ValueError), ({"settings": {"c-tet": float("nan")}}, ValueError), ({"settings": 3}, TypeError), ({"settings": {"speed": 3}}, ValueError),
     ({"max_error": "much"}, ValueError), ({"cache_size": "large", "cache": True}, ValueError), ({"cache": 3.5}, TypeError),
     ({"progress": 3}, TypeError), ({"rate": 0}, ValueError),
-    ({"cache": False, "shared_cache": "x"}, ValueError), ({"profile": "no such profile"}, OSError), ({"output": 7}, TypeError),
+    ({"cache": False, "shared_cache": "x"}, ValueError), ({"output": 7}, TypeError),
     ({"shared_cache": "s3://bucket/prefix"}, ValueError),
 ])
 def test_wrong_options(path, tmp_path, options, error):
@@ -181,10 +177,8 @@ def test_outputs_replace_no_input(path, tmp_path):
     library = tmp_path / "parts.mtl"
     library.write_text("newmtl a\nKd 1 0 0\n")
     path.write_text("mtllib parts.mtl\n" + path.read_text())
-    profile = tmp_path / "profile.json"
-    profile.write_bytes((PAGE.parents[1] / "src/bth-tets/src/costs/default-profile.json").read_bytes())
-    before = [file.read_bytes() for file in (path, library, profile)]
-    for output, options in ((path, {}), (library, {"materials": True}), (profile, {"profile": profile})):
+    before = [file.read_bytes() for file in (path, library)]
+    for output, options in ((path, {}), (library, {"materials": True})):
         with pytest.raises(ValueError, match="output: .* would replace .*hint"):
             bth.compile(path, output=output, cache=False, **options)
-    assert [file.read_bytes() for file in (path, library, profile)] == before
+    assert [file.read_bytes() for file in (path, library)] == before

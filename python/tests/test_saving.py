@@ -79,7 +79,7 @@ def test_paths_as_bytes(scene, mesh, tmp_path):
     (tmp_path / "a.off").write_text("OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
     for path in (Path(tmp_path / "a.off"), os.fsencode(tmp_path / "a.off")):
         assert bth.compile(path, cache=False).triangle_counts == [1]
-    for name in ("output", "profile", "shared_cache", "cache"):
+    for name in ("output", "shared_cache", "cache"):
         with pytest.raises(TypeError, match=f"^{name}: expected"):
             bth.compile(mesh, **{name: 5})
     for size, error in ((-1, ValueError), (2**64, ValueError), (1.5, TypeError)):

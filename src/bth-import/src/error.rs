@@ -124,7 +124,6 @@ fn file_hint(code: &str) -> &'static str {
     match code {
         "BTH-O002" => "compile again when the file is complete",
         "BTH-O020" => "name a folder that is there and may be written, on a disk that has room",
-        "BTH-O060" => "name a profile that may be read; bthc calibrate writes one",
         "BTH-O061" => "let the cache have room (--cache-size, --cache-dir), or name an output",
         "BTH-O062" => "pipe a model into the program, and let the folder for temporary files have room",
         "BTH-O063" => "name a folder that may be written, with --cache-dir or BTH_CACHE_DIR",
@@ -163,9 +162,7 @@ mod tests {
     #[test]
     fn errors_of_files_and_limits_end_with_a_hint() {
         let message = || "what is wrong".to_owned();
-        for code in
-            ["BTH-O001", "BTH-O020", "BTH-O060", "BTH-O061", "BTH-O062", "BTH-O063", "BTH-O090", "BTH-O091"]
-        {
+        for code in ["BTH-O001", "BTH-O020", "BTH-O061", "BTH-O062", "BTH-O063", "BTH-O090", "BTH-O091"] {
             let error = Error::File { code, path: "a.obj".into(), message: message() };
             assert_eq!(error.to_string(), format!("a.obj: {code}: what is wrong (hint: {})", error.hint()));
             assert!(!error.hint().is_empty());

@@ -1,7 +1,6 @@
 //! `bthc`, the BTH compiler: compiles models, inspects and verifies compiled files, traces rays.
 
 mod args;
-mod calibrate;
 mod commands;
 mod deep;
 mod explain;

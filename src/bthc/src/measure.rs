@@ -23,31 +23,24 @@ impl Rays {
         Rays(samples.iter().map(ray).collect())
     }
 
-    pub(crate) fn each(&self) -> impl Iterator<Item = &Ray> {
-        self.0.iter()
-    }
-
     pub(crate) fn len(&self) -> usize {
         self.0.len()
     }
 }
 
-/// How rays are traced.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// How batches are traced.
+#[derive(Clone, Copy, Debug)]
 pub(crate) enum QueryKind {
-    /// In batches, nearest hits.
+    /// Nearest hits.
     Nearest,
-    /// In batches, any hits.
+    /// Any hits.
     Any,
-    /// One a call, nearest hits.
-    Single,
 }
 
 /// A scene, the rays that are traced through it, and the kind of query.
 pub(crate) type TimedRun<'a> = (&'a Scene, &'a Rays, QueryKind);
 
-/// Rays of one turn of batches; sets with fewer rays are repeated. Single rays are not repeated,
-/// since the branch predictor learns a short sequence.
+/// Rays of one turn; sets with fewer rays are repeated.
 const TURN: usize = 16384;
 
 /// Nanoseconds of a ray in each run: the minimum over the rounds, in which the runs take turns,
@@ -59,8 +52,7 @@ pub(crate) fn nanoseconds(runs: &[TimedRun<'_>], rounds: usize, stop: impl Fn() 
             if stop() {
                 return None;
             }
-            let again = if *query == QueryKind::Single { 1 } else { TURN / rays.len().max(1) };
-            for _ in 0..again.max(1) {
+            for _ in 0..(TURN / rays.len().max(1)).max(1) {
                 let seconds = once(scene, rays, *query);
                 *least = least.min(1e9 * seconds / rays.len().max(1) as f64);
             }
@@ -76,11 +68,6 @@ fn once(scene: &Scene, rays: &Rays, query: QueryKind) -> f64 {
         match query {
             QueryKind::Nearest => scene.batch(batch).nearest(&mut hits[..batch.len()]),
             QueryKind::Any => scene.batch(batch).any(&mut found[..batch.len()]),
-            QueryKind::Single => {
-                for (ray, hit) in batch.iter().zip(&mut hits) {
-                    *hit = scene.nearest(ray).unwrap_or(Hit::MISS);
-                }
-            }
         }
     }
     std::hint::black_box((&hits, &found));

@@ -165,7 +165,6 @@ fn the_help_lists_options_under_their_headings() {
         ("--materials", "What the file keeps"),
         ("--max-error", "Smaller files"),
         ("--deformable", "Objects that deform"),
-        ("--profile", "Tetrahedra"),
         ("--flatten", "Scenes from glTF"),
         ("--strict", "Scenes from glTF"),
         ("--depfile", "Many models and build systems"),

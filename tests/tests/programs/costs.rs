@@ -1,4 +1,4 @@
-//! `bthc explain` and `bthc calibrate`: selection of nodes, budgets and profiles.
+//! `bthc explain`: selection of nodes and budgets.
 
 use crate::support::{bthc, command, folder, run_with, sphere};
 
@@ -123,24 +123,6 @@ fn free_directions_are_kept_by_default_where_they_pay_and_fit() {
 }
 
 #[test]
-fn a_profile_decides_by_its_content_alone() {
-    let folder = folder(&[("ball.obj", &sphere(12)), ("bad.json", "{}")]);
-    let args = ["compile", "ball.obj", "--profile"];
-    bthc(folder.path(), &[&args[..], &["nowhere.json"]].concat()).expect(4);
-    let bad = bthc(folder.path(), &[&args[..], &["bad.json"]].concat()).expect(3);
-    assert!(bad.stderr.contains("BTH-I060") && bad.stderr.contains("bthc calibrate"), "{bad:?}");
-
-    let profile = include_str!("../../../src/bth-tets/src/costs/default-profile.json");
-    std::fs::write(folder.path().join("same.json"), profile.replace("  ", " ")).unwrap();
-    let bytes = |profile: &str| {
-        let args = [&args[..], &[profile, "-o", "out.bth"]].concat();
-        bthc(folder.path(), &args).expect(0);
-        std::fs::read(folder.path().join("out.bth")).unwrap()
-    };
-    assert!(bytes("default") == bytes("same.json"));
-}
-
-#[test]
 fn explain_measures_and_draws() {
     let folder = folder(&[("ball.obj", &sphere(12))]);
     let args = ["explain", "ball.obj", "--measure", "--picture", "out.png"];
@@ -149,14 +131,4 @@ fn explain_measures_and_draws() {
     assert!(run.stdout.contains("measured") || run.stdout.contains("nothing to measure"), "{run:?}");
     let png = std::fs::read(folder.path().join("out.png")).unwrap();
     assert!(png.starts_with(b"\x89PNG") && png.len() > 5000, "{} bytes", png.len());
-}
-
-#[test]
-fn calibration_needs_the_worker_and_says_so() {
-    let folder = folder(&[]);
-    let mut calibrate = command("bthc", folder.path(), &["calibrate", "--rounds", "1"]);
-    calibrate.env("BTH_TETGEN", "/nonexistent/bth-tetgen");
-    let run = run_with(calibrate).expect(3);
-    assert!(run.stderr.contains("BTH-I061") && run.stderr.contains("worker"), "{run:?}");
-    assert!(!folder.path().join("bth-profile.json").exists());
 }

@@ -219,10 +219,7 @@ fn pipes_and_devices_are_refused_where_files_are_read_whole() {
         &["bthc", "import", "p.glb", "-o", "a.manifest"],
         &["bthc", "explain", "p.obj"],
         &["bthc", "marks", "p.obj"],
-        &["bthc", "calibrate", "p.obj", "-o", "a.json"],
         &["bthc", "compile", "ball.obj", "--rays", "p"],
-        &["bthc", "compile", "ball.obj", "--profile", "p"],
-        &["bthc", "compile", "ball.obj", "--profile", "/dev/zero"],
         &["bth-play", "ball.bth", "-o", "a.png", "--mode", "path", "--env", "/dev/zero"],
     ] {
         let mut child = command(args[0], path, &args[1..]);

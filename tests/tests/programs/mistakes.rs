@@ -15,7 +15,7 @@ fn mistaken(program: &str, folder: &Path, args: &[&str]) -> Run {
 /// A program, its arguments, its exit code, and what the error must contain.
 type Mistake = (&'static str, &'static [&'static str], i32, &'static [&'static str]);
 
-const BTHC: [Mistake; 25] = [
+const BTHC: [Mistake; 23] = [
     ("bthc", &["nosuch"], 2, &["nosuch"]),
     ("bthc", &["compile", "ball.obj", "--nosuch"], 2, &["--nosuch"]),
     ("bthc", &["compile", "missing.obj"], 4, &["missing.obj", "BTH-O"]),
@@ -25,7 +25,6 @@ const BTHC: [Mistake; 25] = [
     ("bthc", &["compile", "words.manifest"], 3, &["words.manifest:1", "BTH-M", "hint"]),
     ("bthc", &["compile", "ball.obj", "-o", "missing/ball.bth"], 4, &["missing", "BTH-O020"]),
     ("bthc", &["compile", "ball.obj", "-o", "ball.obj/ball.bth"], 4, &["ball.obj", "BTH-O020"]),
-    ("bthc", &["compile", "ball.obj", "--profile", "missing.json"], 4, &["missing.json", "BTH-O"]),
     ("bthc", &["compile", "ball.obj", "--cache-dir", "ball.obj"], 4, &["ball.obj", "BTH-O063"]),
     ("bthc", &["info", "empty"], 4, &["empty", "BTH-O001", "a folder, not a file"]),
     ("bthc", &["info", "ball.obj"], 3, &["ball.obj", "BTH-F", "`bthc compile` makes one of a model"]),
@@ -40,7 +39,6 @@ const BTHC: [Mistake; 25] = [
     ("bthc", &["marks", "ball.obj", "--tris", "-"], 2, &["--tris", "not standard output"]),
     ("bthc", &["explain", "ball.obj", "--picture", "-"], 2, &["--picture", "not standard output"]),
     ("bthc", &["trace", "a.bth", "a.rays", "-o", "-"], 2, &["--output", "not standard output"]),
-    ("bthc", &["calibrate", "-o", "-"], 2, &["--output", "not standard output"]),
 ];
 
 const BTH_PLAY: [Mistake; 12] = [
@@ -140,7 +138,6 @@ fn outputs_never_replace_what_is_read() {
         &["explain", "a.obj", "--picture", "./a.obj"],
         &["explain", "a.obj", "--free-picture", "./a.obj"],
         &["marks", "a.obj", "--tris", "./a.obj"],
-        &["calibrate", "a.obj", "-o", "./a.obj"],
     ] {
         let run = bthc(path, args).expect(2);
         assert!(run.stderr.contains("BTH-U001"), "{args:?}: {run:?}");

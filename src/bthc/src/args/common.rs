@@ -23,7 +23,6 @@ pub(super) const GLTF: &str = "Scenes from glTF";
 pub(super) const JOBS: &str = "Many models and build systems";
 pub(super) const KEPT: &str = "What the file keeps";
 pub(super) const SMALLER: &str = "Smaller files";
-pub(super) const TETRAHEDRA: &str = "Tetrahedra";
 
 /// Parses a number of threads: at most 4096, 0 for one per processor.
 pub(super) fn threads(text: &str) -> Result<usize, String> {

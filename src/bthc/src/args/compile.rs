@@ -110,7 +110,7 @@ impl Compile {
     /// The options of the compiler.
     ///
     /// # Errors
-    /// If the profile or the known rays cannot be used.
+    /// If the known rays cannot be used.
     pub(crate) fn options(&self, monitor: &dyn Monitor) -> Result<CompileOptions, Failure> {
         let structure = self.structure.unwrap_or(match self.deformable {
             true => Structure::Bvh,

@@ -47,7 +47,6 @@ pub(crate) enum Command {
     Info(Info),
     Verify(Verify),
     Explain(Explain),
-    Calibrate(Calibrate),
     Marks(Marks),
     Positions(Positions),
     Trace(Trace),
@@ -151,24 +150,6 @@ pub(crate) struct Explain {
     pub(crate) json: bool,
 }
 
-/// Measure what tracing costs on this machine, for `--profile`. Takes below a minute without
-/// models.
-#[derive(Debug, Group)]
-#[command(after_help = EXIT_CODES)]
-pub(crate) struct Calibrate {
-    /// Models to measure on besides our own; they must be free of bad contacts.
-    pub(crate) models: Vec<PathBuf>,
-    /// The profile.
-    #[arg(short, long, value_name = "FILE", default_value = "bth-profile.json", value_parser = output_file())]
-    pub(crate) output: PathBuf,
-    /// Rounds; the fastest counts.
-    #[arg(long, default_value_t = 30, value_name = "N", value_parser = rounds)]
-    pub(crate) rounds: usize,
-    /// Print the profile as one JSON object on standard output, too.
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
 /// List the triangles of a model that are in bad contact with another one, and so cannot be
 /// tetrahedralized together: crossings, overlaps, T-junctions, duplicates.
 #[derive(Debug, Group)]
@@ -235,13 +216,5 @@ fn finite(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number.is_finite() => Ok(number),
         _ => Err("expected a finite number".to_owned()),
-    }
-}
-
-/// Parses a number of rounds.
-fn rounds(text: &str) -> Result<usize, String> {
-    match text.parse() {
-        Ok(n) if (1..=10_000).contains(&n) => Ok(n),
-        _ => Err("expected a number from 1 to 10000".to_owned()),
     }
 }

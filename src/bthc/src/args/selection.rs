@@ -1,7 +1,7 @@
 //! Options that decide how trees are built and which nodes are tetrahedralized.
 
 use super::choices::*;
-use super::common::{SMALLER, TETRAHEDRA, positive};
+use super::common::{SMALLER, positive};
 use crate::failure::Failure;
 use crate::ray_files;
 use bth_compile::Monitor;
@@ -17,10 +17,6 @@ pub(crate) struct Selection {
     /// Effort of the BVH builder.
     #[arg(long, value_enum, default_value_t = Quality::Balanced)]
     pub(crate) quality: Quality,
-    /// What tracing costs: `default`, or a file that `bthc calibrate` wrote. Files of one profile
-    /// are the same on every machine.
-    #[arg(long, help_heading = TETRAHEDRA, value_name = "PROFILE", default_value = "default")]
-    pub(crate) profile: PathBuf,
     /// Max bytes that tracing may read per triangle of an object, including the BVH. Nodes that
     /// save little for their bytes stay BVH. Warns if the BVH alone is larger.
     #[arg(long, help_heading = SMALLER, value_name = "BYTES", value_parser = positive)]
@@ -35,20 +31,10 @@ pub(crate) struct Selection {
 }
 
 impl Selection {
-    /// The file that holds the profile.
-    pub(crate) fn profile_file(&self) -> Option<&PathBuf> {
-        Some(&self.profile).filter(|profile| profile.as_os_str() != "default")
-    }
-
-    /// The files that options name.
-    pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
-        self.rays.iter().chain(self.profile_file())
-    }
-
     /// Sets the options that concern the selection.
     ///
     /// # Errors
-    /// If the profile or the known rays cannot be used.
+    /// If the known rays cannot be used.
     pub(crate) fn apply(
         &self,
         options: &mut bth_compile::pipeline::CompileOptions,
@@ -57,9 +43,6 @@ impl Selection {
         options.bvh.quality = self.quality.into();
         let costs = &mut options.costs;
         costs.max_bytes_per_triangle = self.max_bytes_per_triangle;
-        if let Some(profile) = self.profile_file() {
-            costs.profile = bth_compile::costs::Profile::read(profile)?;
-        }
         if let Some(path) = &self.rays {
             costs.rays = Some(Arc::new(known_rays(path, monitor)?));
         }

@@ -33,7 +33,7 @@ fn compile_job(context: &JobContext<'_>, job: &Job, monitor: &dyn Monitor) -> Re
         bth_compile::pipeline::compile_cached(&job.model, &context.options, &cache, &needed, monitor)?;
     let files = || {
         let mut files = bth_compile::source::files(&job.model, context.options.looks())?;
-        files.extend(context.args.selection.files().cloned());
+        files.extend(context.args.selection.rays.clone());
         Ok(files)
     };
     let mut report = deliver::deliver(context, job, &outcome, &cache, &files)?;

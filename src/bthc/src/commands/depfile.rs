@@ -31,7 +31,7 @@ pub(super) fn inputs(context: &JobContext<'_>, job: &Job) -> Result<Vec<PathBuf>
         true => scene::inputs(&job.model, context.options.looks())?,
         false => source::files(&job.model, context.options.looks())?,
     };
-    files.extend(context.args.selection.files().cloned());
+    files.extend(context.args.selection.rays.clone());
     Ok(files)
 }
 

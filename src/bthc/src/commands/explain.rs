@@ -21,7 +21,7 @@ use std::path::Path;
 pub(crate) fn run(args: &Explain) -> Result<(), Failure> {
     let mut options = pipeline::CompileOptions { geometry: false, ..pipeline::CompileOptions::default() };
     for picture in args.picture.iter().chain(&args.free_picture) {
-        overwrite::check(picture, [&args.model].into_iter().chain(args.selection.files()))?;
+        overwrite::check(picture, [&args.model].into_iter().chain(&args.selection.rays))?;
     }
     if let (Some(picture), Some(other)) = (&args.picture, &args.free_picture)
         && overwrite::place(picture) == overwrite::place(other)

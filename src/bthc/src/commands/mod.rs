@@ -1,7 +1,6 @@
 //! The subcommands.
 
 mod cache;
-mod calibrate;
 mod compile;
 mod compile_one;
 mod deliver;
@@ -39,7 +38,6 @@ pub(crate) fn run(command: Command, wants_json: bool) -> Result<(), Failure> {
         Command::Info(args) => info::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Explain(args) => explain::run(&args),
-        Command::Calibrate(args) => calibrate::run(&args),
         Command::Marks(args) => marks::run(&args),
         Command::Positions(args) => positions::run(&args),
         Command::Trace(args) => trace::run(&args),

@@ -83,7 +83,7 @@ pub(super) fn compile(
     let outcome = scene::compile_cached(&manifest, source, &context.options, &cache, policy, monitor)?;
     let mut report = deliver(context, job, &outcome, &cache, &|| {
         let mut files = files(&manifest, &job.model, context.options.looks())?;
-        files.extend(context.args.selection.files().cloned());
+        files.extend(context.args.selection.rays.clone());
         Ok(files)
     })?;
     report.json["scene"] = outcome.report;

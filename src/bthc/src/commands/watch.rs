@@ -36,7 +36,7 @@ pub(super) fn run(context: &mut JobContext<'_>, jobs: &[Job], progress: &Progres
                 std::thread::sleep(PAUSE / 4);
             }
             *seen = Some(fingerprint(context, job));
-            // The profile and known rays are files, too.
+            // Known rays are a file, too.
             match context.args.options(progress) {
                 Ok(options) => {
                     let objects_memory = context.options.objects_memory;

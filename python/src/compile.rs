@@ -194,16 +194,10 @@ fn no_content() -> bth_compile::Error {
 
 /// The bytes of a compiled file, which are also written to `output`.
 fn deliver(content: &write::Content, output: Option<&Path>) -> bth_compile::Result<Vec<u8>> {
-    let mut bytes = Vec::with_capacity(content.length() as usize);
-    content.write_to(&mut bytes).map_err(|e| bth_compile::Error::File {
-        code: "BTH-O001",
-        path: "the compiled file".into(),
-        message: e.to_string(),
-    })?;
     if let Some(output) = output {
         write::write_content(output, content)?;
     }
-    Ok(bytes)
+    Ok(content.bytes().into_owned())
 }
 
 /// Compiles a scene: pairs of positions and triangles, and for each instance its mesh and the 3×4
@@ -300,7 +294,7 @@ fn compile_file(
         };
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let source = SceneSource { folder, name: path };
-        let policy = CachePolicy { whole: false, needed: &|_| true, target: None };
+        let policy = CachePolicy { whole: false, needed: &|_| true };
         bth_compile::scene::compile_cached(&manifest, source, options, &cache, policy, monitor)?.content
     } else {
         bth_compile::pipeline::compile_cached(path, options, &cache, &|_| true, monitor)?.content

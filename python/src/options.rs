@@ -4,7 +4,7 @@ use crate::rays::{Given, RayArrays, Rays};
 use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_compile::sampling::KnownRays;
 use bth_compile::settings::Setting;
-use bth_compile::{bvh, coordinates, costs, free};
+use bth_compile::{bvh, coordinates, free};
 use bth_format::layout::{GridBits, RecordKind};
 use bth_import::{AlphaMode, Keep, Polygons};
 use pyo3::exceptions::PyValueError;
@@ -12,7 +12,6 @@ use pyo3::prelude::*;
 use pyo3::types::{PyAny, PyDict};
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 /// The keywords of a call; those that are missing or `None` have their defaults.

@@ -6,7 +6,6 @@ use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use std::io::Write;
 use std::path::PathBuf;
 use std::sync::Arc;
 

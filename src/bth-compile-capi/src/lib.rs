@@ -229,8 +229,7 @@ unsafe fn with_bytes<T: Sync>(
         }
         let content = in_threads(options.threads, || Ok(compile(&input, &chosen, &cache, &monitor)?))?;
         let content = content.ok_or_else(|| Failure(ERROR_INTERNAL, "no content".into()))?;
-        let made = content.bytes().map_err(|e| Failure(ERROR_FILE, e.to_string()))?;
-        Ok(made.into_owned())
+        Ok(content.bytes().into_owned())
     };
     let outcome = catch_unwind(AssertUnwindSafe(run))
         .unwrap_or_else(|_| Err(Failure(ERROR_INTERNAL, "internal error".to_owned())));

@@ -88,7 +88,6 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
         attributes: if materials { Keep::All } else { attributes },
         record: if compact { RecordKind::Tet16 } else { RecordKind::Link32 },
         coordinates: coordinates(keywords)?,
-        keep_subtrees: !compact && structure == Structure::Bth,
         alpha: keywords
             .choice(
                 "alpha",

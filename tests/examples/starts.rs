@@ -184,7 +184,7 @@ impl Task {
         if all.iter().all(|corners| bth_format::exact::is_zero_area(*corners)) {
             return None;
         }
-        let mut of = options(Structure::Bvh, RecordKind::Link32, false);
+        let mut of = options(Structure::Bvh, RecordKind::Link32);
         let form = rng.below(8);
         match form {
             1 => of.coordinates.bits = Some(GridBits::B16),

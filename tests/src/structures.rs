@@ -20,8 +20,8 @@ pub struct Traced {
 }
 
 /// CompileOptions with which even small models get tet leaves wherever these are possible.
-pub fn options(structure: Structure, record: RecordKind, keep_subtrees: bool) -> CompileOptions {
-    let mut options = CompileOptions { structure, record, keep_subtrees, ..CompileOptions::default() };
+pub fn options(structure: Structure, record: RecordKind) -> CompileOptions {
+    let mut options = CompileOptions { structure, record, ..CompileOptions::default() };
     options.costs.minimum_triangles = 32;
     options.costs.c_tet = Some(1e-3);
     options.tets.worker = crate::worker().map(Into::into);
@@ -49,7 +49,7 @@ pub fn every_structure(model: &Model, whole: bool) -> Vec<Traced> {
 
 /// Those of [`every_structure`] whose names are wanted; no others are compiled.
 pub fn structures_named(model: &Model, whole: bool, is_wanted: impl Fn(&str) -> bool) -> Vec<Traced> {
-    let bvh = options(Structure::Bvh, RecordKind::Link32, false);
+    let bvh = options(Structure::Bvh, RecordKind::Link32);
     let mut free = bvh.clone();
     free.free.keep = KeepFree::All;
     let mut distances = bvh.clone();
@@ -61,12 +61,11 @@ pub fn structures_named(model: &Model, whole: bool, is_wanted: impl Fn(&str) -> 
     ];
     if crate::worker().is_some() {
         for record in RecordKind::ALL {
-            wanted.push((format!("bth {}", record.name()), options(Structure::Bth, record, false)));
+            wanted.push((format!("bth {}", record.name()), options(Structure::Bth, record)));
             if whole {
-                wanted.push((format!("tets {}", record.name()), options(Structure::Tets, record, false)));
+                wanted.push((format!("tets {}", record.name()), options(Structure::Tets, record)));
             }
         }
-        wanted.push(("bth with subtrees".into(), options(Structure::Bth, RecordKind::Link32, true)));
     }
     let wanted = wanted.into_iter().filter(|(name, _)| is_wanted(name));
     wanted.map(|(name, options)| Traced { scene: compiled(model, &options), name }).collect()
@@ -93,7 +92,7 @@ pub fn deformed(model: &Model, seed: u64) -> Traced {
     };
     let shape =
         Model { positions: model.positions.iter().map(other).collect(), triangles: model.triangles.clone() };
-    let options = CompileOptions { deformable: true, ..options(Structure::Bvh, RecordKind::Link32, false) };
+    let options = CompileOptions { deformable: true, ..options(Structure::Bvh, RecordKind::Link32) };
     let mut scene = compiled(&shape, &options);
     scene.set_positions(0, &model.positions).unwrap_or_else(|e| panic!("{e}"));
     Traced { name: DEFORMED.into(), scene }

@@ -29,15 +29,11 @@ fn kinds() -> impl Iterator<Item = CompileOptions> {
         // Without tetrahedra their record makes no difference.
         let records = if structure == Structure::Bvh { &RecordKind::ALL[..1] } else { &RecordKind::ALL[..] };
         records.iter().flat_map(move |&record| {
-            [false, true].map(|keep_subtrees| CompileOptions {
+            [KeepFree::None, KeepFree::All].map(|keep| CompileOptions {
                 structure,
                 record,
-                keep_subtrees,
                 // At this cost of a step the tetrahedra of the knot are chosen.
-                free: FreeOptions {
-                    keep: if keep_subtrees { KeepFree::All } else { KeepFree::None },
-                    ..FreeOptions::default()
-                },
+                free: FreeOptions { keep, ..FreeOptions::default() },
                 costs: bth_compile::costs::CostOptions { c_tet: Some(1e-3), ..Default::default() },
                 ..CompileOptions::default()
             })

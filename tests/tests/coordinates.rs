@@ -27,7 +27,7 @@ fn compiled(path: &Path, grid: Option<GridBits>, mut options: pipeline::CompileO
 }
 
 fn plain() -> pipeline::CompileOptions {
-    bth_tests::structures::options(Structure::Bvh, RecordKind::Link32, false)
+    bth_tests::structures::options(Structure::Bvh, RecordKind::Link32)
 }
 
 fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
@@ -93,7 +93,7 @@ fn answers_on_a_grid_are_exact_for_the_stored_triangles_in_every_structure() {
         for grid in GridBits::ALL {
             let mut structures = vec![plain()];
             if bth_tests::worker().is_some() {
-                let with = |s| bth_tests::structures::options(s, RecordKind::Link32, s == Structure::Bth);
+                let with = |s| bth_tests::structures::options(s, RecordKind::Link32);
                 structures.push(with(Structure::Bth));
                 structures.extend(whole.then(|| with(Structure::Tets)));
             }

@@ -149,7 +149,7 @@ fn packets_to_the_corners_of_small_things_on_a_wide_plain_are_traced_exactly() {
     for width in [1e3, 1e5, 1e7] {
         let model = knot_on_a_plain(width);
         let corners: Corners = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
-        let scene = compiled(&model, &options(Structure::Bvh, RecordKind::Link32, false));
+        let scene = compiled(&model, &options(Structure::Bvh, RecordKind::Link32));
         for along_one_direction in [false, true] {
             // Rays to the corners of each triangle and next to them, triangle by triangle.
             let targets = corners.iter().take(200).flatten().flat_map(|p| {

@@ -19,7 +19,7 @@ fn compiled(model: &Model, options: &CompileOptions) -> File {
 
 /// Options for one kind of leaves each, with a name.
 fn kinds() -> Vec<(&'static str, CompileOptions)> {
-    let plain = options(Structure::Bvh, RecordKind::Link32, false);
+    let plain = options(Structure::Bvh, RecordKind::Link32);
     let with = |change: fn(&mut CompileOptions)| {
         let mut options = plain.clone();
         change(&mut options);
@@ -33,8 +33,7 @@ fn kinds() -> Vec<(&'static str, CompileOptions)> {
         ("free directions", with(|o| o.free.keep = bth_compile::free::KeepFree::All)),
     ];
     if bth_tests::worker().is_some() {
-        kinds.push(("tet leaves", options(Structure::Bth, RecordKind::Link32, false)));
-        kinds.push(("tet leaves with subtrees", options(Structure::Bth, RecordKind::Link32, true)));
+        kinds.push(("tet leaves", options(Structure::Bth, RecordKind::Link32)));
     }
     kinds
 }

@@ -216,7 +216,7 @@ fn the_wide_tree_is_chosen_by_the_mean_cost_over_the_poses() {
     let costs = Costs { line: 0.0, ..Costs::default() };
     let options = CollapseOptions { costs, ..CollapseOptions::default() };
     let (wide, report) = collapse(&mesh, weighed, &[], &options, &Silent).unwrap();
-    validate_wide(&mesh, &bvh, &[], false, &wide);
+    validate_wide(&mesh, &bvh, &[], &wide);
     let mean_cost = |wide: &Wide| {
         let costs = positions.iter().map(|positions| slow_cost(&mesh, wide, &costs, positions));
         costs.sum::<f64>() / positions.len() as f64

@@ -17,10 +17,7 @@ use bth_import::monitor::Monitor;
 /// Options of [`collapse`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CollapseOptions {
-    /// True if the BVH below each tet leaf is kept next to it.
-    pub keep_subtrees: bool,
-    /// True if the vertices of leaves are recorded, and subtrees of tet leaves lie where these are
-    /// in depth-first order. Demands kept subtrees where nodes are cut.
+    /// True if the vertices of leaves are recorded. No node may be cut then.
     pub leaf_vertices: bool,
     /// Costs by which the tree is chosen.
     pub costs: Costs,
@@ -32,8 +29,7 @@ pub struct CollapseOptions {
 ///
 /// # Errors
 /// [`Error::Limit`] when the lines exceed what a child code can address or the tree is too deep,
-/// [`Error::Internal`] when `cut` is not as described or its subtrees are to be recorded and not
-/// kept, [`Error::Cancelled`].
+/// [`Error::Internal`] when `cut` is not as described, [`Error::Cancelled`].
 pub fn collapse<'a>(
     mesh: &Mesh,
     bvh: impl Into<Weighed<'a>>,
@@ -74,12 +70,12 @@ pub(super) fn collapse_by<'a>(
     // for it.
     let is_far = bvh.nodes.first().is_some_and(|root| far_away(&root.lower, &root.upper).is_some());
     let widened_boxes = !options.leaf_vertices && !is_far && WIDENED_RANGE.contains(&greatest);
-    let mut wide = Wide { root: NONE, subtrees: vec![NONE; cut.len()], widened_boxes, ..Wide::default() };
+    let mut wide = Wide { root: NONE, widened_boxes, ..Wide::default() };
     let mut report = CollapseReport::default();
     if bvh.nodes.is_empty() {
         return Ok((wide, report));
     }
-    let planner = Planner::new(mesh, weighed, options.costs, options.keep_subtrees, monitor);
+    let planner = Planner::new(mesh, weighed, options.costs, monitor);
     let (decisions, cost) = decide(&planner, cut)?;
     report.cost = f64::from(cost);
     let root_area = weighed.area(0);
@@ -95,14 +91,7 @@ pub(super) fn collapse_by<'a>(
         wide: &mut wide,
         report: &mut report,
     };
-    let (root, tets) = writer.tree(0, 0, true)?;
-    if options.keep_subtrees {
-        for (at, level) in tets {
-            let (code, _) = writer.tree(at, level, false)?;
-            let row = cut.binary_search(&at).expect("tet leaves are cut nodes");
-            writer.wide.subtrees[row] = code;
-        }
-    }
+    let root = writer.tree()?;
     wide.root = root;
     check_depth(wide.depth)?;
 

@@ -15,10 +15,9 @@ fn built(mesh: &Mesh, quality: Quality) -> BinaryBvh {
     build(mesh, &BvhOptions { quality, ..BvhOptions::default() }, &Silent).expect("builds").0
 }
 
-fn collapsed(mesh: &Mesh, bvh: &BinaryBvh, cut: &[u32], keep_subtrees: bool) -> (Wide, CollapseReport) {
-    let options = CollapseOptions { keep_subtrees, ..CollapseOptions::default() };
-    let (wide, report) = collapse(mesh, bvh, cut, &options, &Silent).expect("collapses");
-    validate_wide(mesh, bvh, cut, keep_subtrees, &wide);
+fn collapsed(mesh: &Mesh, bvh: &BinaryBvh, cut: &[u32]) -> (Wide, CollapseReport) {
+    let (wide, report) = collapse(mesh, bvh, cut, &CollapseOptions::default(), &Silent).expect("collapses");
+    validate_wide(mesh, bvh, cut, &wide);
     assert_eq!(report.tet_leaves as usize, cut.len());
     (wide, report)
 }
@@ -39,14 +38,14 @@ fn random_cut(bvh: &BinaryBvh, odds: usize, random: &mut Rng) -> Vec<u32> {
 
 #[test]
 fn an_empty_tree_has_no_root() {
-    let (wide, report) = collapsed(&Mesh::default(), &BinaryBvh::default(), &[], false);
+    let (wide, report) = collapsed(&Mesh::default(), &BinaryBvh::default(), &[]);
     assert_eq!((wide.root, wide.depth, report.bytes), (NONE, 0, 0));
 }
 
 #[test]
 fn a_single_triangle_is_a_leaf_as_root() {
     let mesh = soup(1, 1);
-    let (wide, _) = collapsed(&mesh, &built(&mesh, Quality::Fast), &[], false);
+    let (wide, _) = collapsed(&mesh, &built(&mesh, Quality::Fast), &[]);
     assert_eq!((wide.root, wide.depth), (Child::Indexed(0).code(), 0));
     assert_eq!(wide.lines.len(), INDEXED_LINES);
 }
@@ -55,13 +54,8 @@ fn a_single_triangle_is_a_leaf_as_root() {
 fn a_cut_root_is_the_whole_tree() {
     let mesh = grid(10, 1.0, 2);
     let bvh = built(&mesh, Quality::Fast);
-    let (wide, _) = collapsed(&mesh, &bvh, &[0], false);
+    let (wide, _) = collapsed(&mesh, &bvh, &[0]);
     assert_eq!((wide.root, wide.depth, wide.lines.len()), (Child::Tets(0).code(), 0, 0));
-    let (kept, _) = collapsed(&mesh, &bvh, &[0], true);
-    let (plain, _) = collapsed(&mesh, &bvh, &[], false);
-    assert_eq!(kept.root, Child::Tets(0).code());
-    assert_eq!(kept.lines, plain.lines, "the kept subtree is the tree without the cut");
-    assert_eq!((kept.subtrees, kept.depth), (vec![plain.root], plain.depth));
 }
 
 #[test]
@@ -69,11 +63,8 @@ fn a_cut_leaf_is_atomic_too() {
     let mesh = soup(40, 3);
     let bvh = built(&mesh, Quality::Fast);
     let cut: Vec<u32> = (0..bvh.nodes.len() as u32).filter(|&i| bvh.nodes[i as usize].is_leaf()).collect();
-    for keep in [false, true] {
-        let (wide, report) = collapsed(&mesh, &bvh, &cut, keep);
-        assert_eq!(report.tet_leaves, 40);
-        assert_eq!(wide.triangle_ids.len(), if keep { 40 } else { 0 });
-    }
+    let (wide, report) = collapsed(&mesh, &bvh, &cut);
+    assert_eq!((report.tet_leaves, wide.triangle_ids.len()), (40, 0));
 }
 
 #[test]
@@ -94,7 +85,7 @@ fn nodes_and_leaves_lie_depth_first_where_vertices_are_recorded() {
     let bvh = built(&mesh, Quality::Fast);
     let options = CollapseOptions { leaf_vertices: true, ..CollapseOptions::default() };
     let (wide, _) = collapse(&mesh, &bvh, &[], &options, &Silent).expect("collapses");
-    validate_wide(&mesh, &bvh, &[], true, &wide);
+    validate_wide(&mesh, &bvh, &[], &wide);
     let (mut nodes, mut leaves, mut stack) = (Vec::new(), Vec::new(), vec![wide.root]);
     while let Some(code) = stack.pop() {
         match Child::from_code(code) {
@@ -130,7 +121,7 @@ fn too_many_lines_or_levels_are_refused() {
 #[test]
 fn chains_collapse_within_the_depth_limit() {
     let mesh = exponential(3000);
-    let (wide, _) = collapsed(&mesh, &built(&mesh, Quality::Best), &[], false);
+    let (wide, _) = collapsed(&mesh, &built(&mesh, Quality::Best), &[]);
     assert!(wide.depth as usize <= bth_format::limits::MAX_DEPTH);
 }
 
@@ -141,7 +132,7 @@ fn the_lines_are_the_same_at_any_number_of_threads() {
     let cut = random_cut(&bvh, 200, &mut Rng::new(9));
     let at = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
-        pool.install(|| collapsed(&mesh, &bvh, &cut, true).0)
+        pool.install(|| collapsed(&mesh, &bvh, &cut).0)
     };
     let one = at(1);
     assert!(one == at(2) && one == at(5));
@@ -154,9 +145,7 @@ fn random_cuts_leave_valid_trees() {
     {
         let bvh = built(&mesh, Quality::Fast);
         let cut = random_cut(&bvh, 150, &mut Rng::new(seed));
-        for keep in [false, true] {
-            collapsed(&mesh, &bvh, &cut, keep);
-        }
+        collapsed(&mesh, &bvh, &cut);
     }
 }
 
@@ -203,7 +192,7 @@ fn the_plan_has_the_least_cost_by_definition() {
             let bvh = built(&mesh, Quality::Best);
             let options = CollapseOptions { costs, ..CollapseOptions::default() };
             let (_, report) = collapse(&mesh, &bvh, &[], &options, &Silent).expect("collapses");
-            let planner = Planner::new(&mesh, (&bvh).into(), costs, false, &Silent);
+            let planner = Planner::new(&mesh, (&bvh).into(), costs, &Silent);
             let least = cost_by_definition(&mesh, &bvh, &planner, 0, 1);
             assert!((report.cost - least).abs() <= 1e-5 * least, "{} {least}", report.cost);
         }
@@ -218,7 +207,7 @@ fn the_written_tree_costs_what_the_plan_says() {
         let bvh = built(&mesh, Quality::Balanced);
         let options = CollapseOptions { costs, ..CollapseOptions::default() };
         let (wide, report) = collapse(&mesh, &bvh, &[], &options, &Silent).expect("collapses");
-        let line = f64::from(Planner::new(&mesh, (&bvh).into(), costs, false, &Silent).line);
+        let line = f64::from(Planner::new(&mesh, (&bvh).into(), costs, &Silent).line);
         let cost = 1.3 * report.node_visits + 0.9 * report.leaf_visits + line * wide.lines.len() as f64;
         assert!((report.cost - cost).abs() <= 1e-3 * cost, "{} {cost}", report.cost);
     }
@@ -246,7 +235,7 @@ fn leaves_are_small_on_disk() {
             continue;
         };
         let bvh = built(&mesh, Quality::Balanced);
-        let (_, report) = collapsed(&mesh, &bvh, &[], false);
+        let (_, report) = collapsed(&mesh, &bvh, &[]);
         println!(
             "{name}: {:.1} bytes a triangle, {} nodes of {:.1} children, {} indexed leaves of {:.1}, {} raw of {:.1}, visits {:.2} + {:.2}",
             report.bytes_per_triangle,
@@ -267,7 +256,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
     fn random_meshes_and_cuts_collapse_to_valid_trees(
-        count in 1usize..400, seed: u64, kind in 0..3, odds in 1usize..60, keep: bool,
+        count in 1usize..400, seed: u64, kind in 0..3, odds in 1usize..60,
     ) {
         let mut random = Rng::new(seed);
         let mesh = match kind {
@@ -277,7 +266,7 @@ proptest! {
         };
         let bvh = built(&mesh, Quality::Balanced);
         let cut = random_cut(&bvh, odds, &mut random);
-        collapsed(&mesh, &bvh, &cut, keep);
-        collapsed(&mesh, &bvh, &[], false);
+        collapsed(&mesh, &bvh, &cut);
+        collapsed(&mesh, &bvh, &[]);
     }
 }

@@ -35,9 +35,9 @@ struct LeafRows {
     triangles: u32,
 }
 
-/// All triangle leaves in the order of their lines, also those in subtrees of tet leaves.
+/// All triangle leaves in the order of their lines.
 fn leaves(wide: &Wide, grid: Option<&Grid>) -> Vec<LeafRows> {
-    let mut stack: Vec<u32> = wide.subtrees.iter().copied().chain([wide.root]).collect();
+    let mut stack = vec![wide.root];
     let mut leaves = Vec::new();
     while let Some(code) = stack.pop() {
         match Child::from_code(code) {

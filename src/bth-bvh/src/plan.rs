@@ -146,8 +146,6 @@ pub(super) struct Planner<'a> {
     /// Binary BVH of at least one node.
     pub(super) bvh: &'a BinaryBvh,
     pub(super) costs: Costs,
-    /// True if the subtrees below cut nodes are planned, too.
-    below_cut: bool,
     pub(super) monitor: &'a dyn Monitor,
     weighed: Weighed<'a>,
     inverse_area: f64,
@@ -160,20 +158,14 @@ const PLAN_TASK: u32 = 1 << 13;
 
 impl<'a> Planner<'a> {
     /// Prepares the planning for a BVH of at least one node.
-    pub(super) fn new(
-        mesh: &'a Mesh,
-        weighed: Weighed<'a>,
-        costs: Costs,
-        below_cut: bool,
-        monitor: &'a dyn Monitor,
-    ) -> Self {
+    pub(super) fn new(mesh: &'a Mesh, weighed: Weighed<'a>, costs: Costs, monitor: &'a dyn Monitor) -> Self {
         let bvh = weighed.bvh;
         let area = weighed.area(0);
         // A deformable mesh may lie on one line: then all trees cost the same.
         let inverse_area = if area > 0.0 { 1.0 / area } else { 0.0 };
         let visits = weighed.total() * inverse_area;
         let line = (f64::from(costs.line) * visits / bvh.order.len() as f64) as f32;
-        Planner { mesh, bvh, costs, below_cut, monitor, weighed, inverse_area, line }
+        Planner { mesh, bvh, costs, monitor, weighed, inverse_area, line }
     }
 
     /// Decisions for all nodes, and the cost of the tree without its tet leaves; `cut` holds these,
@@ -199,9 +191,6 @@ impl<'a> Planner<'a> {
     fn subtree(&self, at: u32, cut: &[u32], decisions: &mut [Decision]) -> Result<Summary> {
         if cut.first() != Some(&at) {
             return self.plain(at, cut, decisions);
-        }
-        if self.below_cut {
-            self.plain(at, &[], decisions)?;
         }
         decisions[0].set_cut();
         // The cut nodes are given, and the slot of a tet leaf costs the same in every tree, so its

@@ -69,17 +69,16 @@ struct Reader<'a> {
 
 /// Asserts the contract of `Wide`: every triangle in exactly one leaf or cut node, boxes exact,
 /// corners bit for bit and in order, every line used once.
-pub(super) fn validate_wide(mesh: &Mesh, bvh: &BinaryBvh, cut: &[u32], keep_subtrees: bool, wide: &Wide) {
+pub(super) fn validate_wide(mesh: &Mesh, bvh: &BinaryBvh, cut: &[u32], wide: &Wide) {
     let lines = BTreeSet::new();
     let mut reader =
         Reader { mesh, bvh, cut, wide, lines_seen: lines, rows_seen: BTreeSet::new(), deepest: 0 };
-    assert_eq!(wide.subtrees.len(), cut.len());
     if bvh.nodes.is_empty() {
         assert_eq!(wide.root, NONE);
         assert!(wide.lines.is_empty() && wide.triangle_ids.is_empty());
         return;
     }
-    let mut found = reader.child(wide.root, 0, keep_subtrees);
+    let mut found = reader.child(wide.root, 0);
     found.sort_unstable();
     assert_eq!(found, hittable(mesh), "every triangle with area is in the tree exactly once");
     assert_eq!(reader.deepest, wide.depth);
@@ -97,10 +96,10 @@ impl Reader<'_> {
     }
 
     /// The triangle ids below a child; `level` wide nodes lie above it.
-    fn child(&mut self, code: u32, level: u32, subtrees: bool) -> Vec<u32> {
+    fn child(&mut self, code: u32, level: u32) -> Vec<u32> {
         self.deepest = self.deepest.max(level);
         match Child::from_code(code).expect("a code") {
-            Child::Node(line) => self.node(line, level, subtrees),
+            Child::Node(line) => self.node(line, level),
             Child::Indexed(line) => {
                 let leaf: IndexedLeaf = self.read(line, INDEXED_LINES);
                 let used = leaf.vertices as usize;
@@ -126,22 +125,12 @@ impl Reader<'_> {
             }
             Child::Tets(row) => {
                 let node = &self.bvh.nodes[self.cut[row as usize] as usize];
-                let ids = self.bvh.order[node.first as usize..][..node.count as usize].to_vec();
-                let code = self.wide.subtrees[row as usize];
-                assert_eq!(code != NONE, subtrees);
-                if subtrees {
-                    let mut kept = self.child(code, level, false);
-                    let mut all = ids.clone();
-                    kept.sort_unstable();
-                    all.sort_unstable();
-                    assert_eq!(kept, all, "a kept subtree holds what the tet leaf holds");
-                }
-                ids
+                self.bvh.order[node.first as usize..][..node.count as usize].to_vec()
             }
         }
     }
 
-    fn node(&mut self, line: u32, level: u32, subtrees: bool) -> Vec<u32> {
+    fn node(&mut self, line: u32, level: u32) -> Vec<u32> {
         self.deepest = self.deepest.max(level + 1);
         let node: WideNode = self.read(line, NODE_LINES);
         let used = node.child.iter().take_while(|&&c| c != NONE).count();
@@ -158,7 +147,7 @@ impl Reader<'_> {
             if let Some(Child::Node(l) | Child::Indexed(l) | Child::Raw(l)) = Child::from_code(code) {
                 assert!(l > line, "children lie behind their parent");
             }
-            let ids = self.child(code, level + 1, subtrees);
+            let ids = self.child(code, level + 1);
             let exact = bounds_of(self.mesh, &ids);
             if self.wide.widened_boxes {
                 assert_widened((lower, upper), exact);

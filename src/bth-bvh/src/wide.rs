@@ -9,8 +9,7 @@ use serde::Serialize;
 /// The wide BVH, ready for the `LINES` and `TRIANGLE_IDS` sections.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Wide {
-    /// Nodes in depth-first order, then leaves; after them the nodes and leaves of each kept
-    /// subtree, which lie among the others where the vertices of leaves are recorded.
+    /// Nodes in depth-first order, then leaves.
     pub lines: Vec<CacheLine>,
     /// Ids of the leaves' triangles, in order of the leaves' lines.
     pub triangle_ids: Vec<u32>,
@@ -22,10 +21,8 @@ pub struct Wide {
     pub widened_boxes: bool,
     /// [`Child`] code of the root, `NONE` when no triangle can be hit.
     pub root: u32,
-    /// Wide nodes on the longest path from the root; subtrees count as below their tet leaf.
+    /// Wide nodes on the longest path from the root.
     pub depth: u32,
-    /// Per cut node: [`Child`] code of the subtree's root, or `NONE` if subtrees are not kept.
-    pub subtrees: Vec<u32>,
 }
 
 /// Report of [`collapse`](super::collapse()).
@@ -51,7 +48,7 @@ pub struct CollapseReport {
     /// [`Costs`](super::Costs).
     pub cost: f64,
     /// Wide nodes that a sample ray enters on average, or a random line through the root's box
-    /// where the tree was chosen by areas; kept subtrees not counted.
+    /// where the tree was chosen by areas.
     pub node_visits: f64,
     /// The same for triangle leaves.
     pub leaf_visits: f64,

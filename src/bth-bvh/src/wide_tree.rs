@@ -80,46 +80,39 @@ pub(super) struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    /// Appends the tree below a node, nodes before leaves. `level` wide nodes lie above; `outer` is
-    /// false for the subtree of a tet leaf. Returns the root's code and the tet leaves with the
-    /// wide nodes above each.
-    pub(super) fn tree(&mut self, root: u32, level: u32, outer: bool) -> Result<(u32, Vec<(u32, u32)>)> {
-        let base = self.wide.lines.len();
+    /// Writes the tree, nodes before leaves. Returns the root's code.
+    pub(super) fn tree(&mut self) -> Result<u32> {
         // First the shape is determined: slot 0 holds the root, every other slot belongs to a node.
-        let mut slots = vec![Slot { node: root, code: NONE }];
+        let mut slots = vec![Slot { node: 0, code: NONE }];
         let mut inner: Vec<Inner> = Vec::new();
         let mut leaves: Vec<usize> = Vec::new();
-        let mut tets = Vec::new();
-        let mut pending = vec![Pending { slot: 0, level }];
+        let mut pending = vec![Pending { slot: 0, level: 0 }];
         while let Some(Pending { slot, level }) = pending.pop() {
             let at = slots[slot].node;
             let decision = self.decisions[at as usize];
-            if outer && decision.is_cut() {
+            if decision.is_cut() {
                 let row = self.cut.binary_search(&at).expect("only cut nodes are marked so");
                 slots[slot].code = Child::Tets(row as u32).code();
                 self.report.tet_leaves += 1;
-                tets.push((at, level));
                 continue;
             }
             if decision.role() != Role::Node {
                 leaves.push(slot);
                 continue;
             }
-            slots[slot].code = Child::Node((base + inner.len() * NODE_LINES) as u32).code();
+            slots[slot].code = Child::Node((inner.len() * NODE_LINES) as u32).code();
             let first = slots.len();
             let mut children = children(self.bvh, self.decisions, at);
             self.slot_order.sort(&mut children);
             slots.extend(children.into_iter().map(|node| Slot { node, code: NONE }));
             inner.push(Inner { first, count: slots.len() - first });
             self.wide.depth = self.wide.depth.max(level + 1);
-            if outer {
-                self.report.node_visits += self.area(at);
-            }
+            self.report.node_visits += self.area(at);
             pending.extend((first..slots.len()).rev().map(|slot| Pending { slot, level: level + 1 }));
         }
 
         // Leaves follow the nodes.
-        let leaves_from = base + inner.len() * NODE_LINES;
+        let leaves_from = inner.len() * NODE_LINES;
         let mut next = leaves_from;
         let mut placed = Vec::with_capacity(leaves.len());
         for &slot in &leaves {
@@ -128,20 +121,14 @@ impl Writer<'_> {
             slots[slot].code = leaf.child(next).code();
             next += leaf.lines();
             check_lines(next)?;
-            if outer {
-                self.report.leaf_visits += self.area(node);
-            }
+            self.report.leaf_visits += self.area(node);
             placed.push(leaf);
         }
         check_lines(next)?;
 
-        if base == 0 {
-            self.wide.lines = zeroed(next);
-        } else {
-            self.wide.lines.resize(next, CacheLine([0; 16]));
-        }
+        self.wide.lines = zeroed(next);
         let widened = self.wide.widened_boxes;
-        let node_lines = self.wide.lines[base..leaves_from].par_chunks_mut(NODE_LINES);
+        let node_lines = self.wide.lines[..leaves_from].par_chunks_mut(NODE_LINES);
         node_lines.zip(inner.par_iter()).for_each(|(lines, &Inner { first, count })| {
             let slots =
                 slots[first..first + count].iter().map(|s| (&self.bvh.nodes[s.node as usize], s.code));
@@ -150,7 +137,7 @@ impl Writer<'_> {
         self.leaves(&placed, leaves_from)?;
         self.report.nodes += inner.len() as u64;
         self.report.children += slots.len() as u64 - 1;
-        Ok((slots[0].code, tets))
+        Ok(slots[0].code)
     }
 
     /// Writes triangle leaves, one behind the other from a line on, and their triangles' ids.

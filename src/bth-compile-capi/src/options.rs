@@ -74,8 +74,6 @@ impl Options {
         let deformable = self.flags & DEFORMABLE != 0;
         let mut options = CompileOptions {
             structure,
-            // As the program does by default.
-            keep_subtrees: structure == Structure::Bth,
             geometry: self.flags & NO_GEOMETRY == 0,
             deformable,
             ..CompileOptions::default()

@@ -49,8 +49,6 @@ pub struct CompileOptions {
     pub tets: tets::TetOptions,
     /// Record that stores a tetrahedron.
     pub record: RecordKind,
-    /// True to keep a BVH under each tet leaf.
-    pub keep_subtrees: bool,
     /// True to store the positions and triangles of the source.
     pub geometry: bool,
     /// True to keep what new positions at run time need (`bth::Scene::set_positions`). All vertices
@@ -81,7 +79,6 @@ impl Default for CompileOptions {
             costs: costs::CostOptions::default(),
             tets: tets::TetOptions::default(),
             record: RecordKind::Link32,
-            keep_subtrees: true,
             geometry: true,
             deformable: false,
             motion: MotionOptions::default(),
@@ -158,7 +155,7 @@ impl CompileOptions {
 
     /// How tetrahedra will be stored; the size of the object without them is not set.
     pub fn storage(&self) -> costs::Storage {
-        costs::Storage { record: self.record, keep_subtrees: self.keep_subtrees, plain_bytes: None }
+        costs::Storage { record: self.record, plain_bytes: None }
     }
 }
 

@@ -18,7 +18,7 @@ struct Key {
     apply: fn(&str, &mut CompileOptions) -> Result<(), String>,
 }
 
-const KEYS: [Key; 13] = [
+const KEYS: [Key; 12] = [
     Key {
         name: "budget",
         values: "SECONDS",
@@ -95,14 +95,6 @@ const KEYS: [Key; 13] = [
         apply: |text, options| {
             let values = [("best", Select::Best), ("paper", Select::Paper)];
             set(&mut options.costs.select, one_of(text, &values))
-        },
-    },
-    Key {
-        name: "subtrees",
-        values: "keep|prune",
-        about: "keep the BVH under each tet leaf, for rays with unknown start; or save its bytes",
-        apply: |text, options| {
-            set(&mut options.keep_subtrees, one_of(text, &[("keep", true), ("prune", false)]))
         },
     },
     Key {

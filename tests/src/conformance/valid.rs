@@ -303,7 +303,6 @@ fn two_levels_of(bits: Option<GridBits>, [widened_boxes, has_places]: [bool; 2])
         triangle_ids: (0..40).collect(),
         root: Child::Node(0).code(),
         depth: 2,
-        subtrees: Vec::new(),
         leaf_vertices: Vec::new(),
         widened_boxes,
     };

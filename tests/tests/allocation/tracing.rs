@@ -28,7 +28,7 @@ fn rays_that_are_traced_again_allocate_nothing() {
     let mut rays = assorted(&corners, 1024, 1);
     rays.extend(camera(32));
     // The other records are walked by the same code.
-    let kinds = ["bvh", "bth link32", "bth with subtrees", "tets link32"];
+    let kinds = ["bvh", "bth link32", "tets link32"];
     let traced = every_structure(&model, true).into_iter().map(|traced| (traced.name, traced.scene));
     let mut structures: Vec<_> =
         traced.filter(|(name, _)| kinds.iter().any(|kind| name.starts_with(kind))).collect();

@@ -21,16 +21,11 @@ pub(crate) fn turn() -> MutexGuard<'static, ()> {
     TURN.lock().unwrap_or_else(|e| e.into_inner())
 }
 
-pub(crate) fn compiled(
-    model: &Model,
-    structure: Structure,
-    record: RecordKind,
-    keep_subtrees: bool,
-) -> Scene {
+pub(crate) fn compiled(model: &Model, structure: Structure, record: RecordKind) -> Scene {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("model.ply");
     bth_scenes::write::file(model, &path).expect("a model file");
-    let mut options = CompileOptions { structure, record, keep_subtrees, ..CompileOptions::default() };
+    let mut options = CompileOptions { structure, record, ..CompileOptions::default() };
     options.costs.minimum_triangles = 32;
     options.costs.c_tet = Some(1e-3);
     options.tets.worker = bth_tests::worker().map(Into::into);
@@ -73,7 +68,7 @@ fn check(model: &Model, structure: Structure, rays: usize, seed: u64) {
     }
     let _turn = turn();
     let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
-    let plain = compiled(model, Structure::Bvh, RecordKind::Link32, false);
+    let plain = compiled(model, Structure::Bvh, RecordKind::Link32);
     let starts = starts_about_hits(&plain, &corners, rays / 2, seed + 1);
     let rays = rays_about_hits(&plain, &corners, rays, seed);
     let (expected, after) = (alone(&plain, &rays), alone(&plain, &starts));
@@ -81,8 +76,8 @@ fn check(model: &Model, structure: Structure, rays: usize, seed: u64) {
         let some_hits = hits.iter().filter(|hit| hit.is_hit()).count();
         assert!(some_hits > hits.len() / 4 && some_hits < hits.len(), "{some_hits} of {} hit", hits.len());
     }
-    for (record, keep) in RecordKind::ALL.into_iter().zip([true, false, true, false]) {
-        let scene = compiled(model, structure, record, keep);
+    for record in RecordKind::ALL {
+        let scene = compiled(model, structure, record);
         assert!(!scene.object(0).tet_leaves.is_empty());
         for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
             isa.choose().expect("an instruction set that is available");
@@ -129,7 +124,7 @@ fn rays_through_two_points_of_a_surface_get_the_same_bits_on_every_instruction_s
     let _turn = turn();
     let model = torus_knot(4_000);
     let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
-    let scene = compiled(&model, Structure::Bvh, RecordKind::Link32, true);
+    let scene = compiled(&model, Structure::Bvh, RecordKind::Link32);
     let mut rng = Rng::new(5);
     let mut within = || {
         let [a, b, c] = corners[rng.below(corners.len() as u64) as usize];
@@ -163,7 +158,7 @@ fn rays_through_two_points_of_a_surface_get_the_same_bits_on_every_instruction_s
 fn a_batch_on_many_threads_has_the_answers_of_one() {
     let _turn = turn();
     let model = gyroid(2000);
-    let scene = compiled(&model, Structure::Bvh, RecordKind::Link32, false);
+    let scene = compiled(&model, Structure::Bvh, RecordKind::Link32);
     let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
     // More rays than one task takes, and not a multiple of that.
     are_alike_in_parallel(&scene, &rays_about_hits(&scene, &corners, 10_001, 5));
@@ -188,7 +183,7 @@ fn are_alike_in_parallel<R: TraceRay + std::fmt::Debug>(scene: &Scene, rays: &[R
 fn streams_have_the_answers_of_batches() {
     let _turn = turn();
     let model = gyroid(2000);
-    let scene = compiled(&model, Structure::Bvh, RecordKind::Link32, false);
+    let scene = compiled(&model, Structure::Bvh, RecordKind::Link32);
     let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
     // More rays than a block holds, and not a multiple of that.
     let rays = assorted(&corners, 2_501, 6);
@@ -226,7 +221,7 @@ fn streams_have_the_answers_of_batches() {
 fn conditions_of_a_batch_are_those_of_its_rays() {
     let _turn = turn();
     let model = gyroid(2000);
-    let scene = compiled(&model, Structure::Bvh, RecordKind::Link32, false);
+    let scene = compiled(&model, Structure::Bvh, RecordKind::Link32);
     let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
     let rays = assorted(&corners, 6_000, 7);
     let even = |_: &Ray, hit: &Hit| hit.primitive.triangle.is_multiple_of(2);

@@ -230,8 +230,7 @@ fn a_c_program_compiles_in_memory_and_gets_the_bytes_of_rust() {
 
     let (positions, triangles) = hills();
     let hills = TriangleMesh { positions: &positions, triangles: &triangles };
-    let mut options =
-        CompileOptions { structure: Structure::Bvh, keep_subtrees: false, ..CompileOptions::default() };
+    let mut options = CompileOptions { structure: Structure::Bvh, ..CompileOptions::default() };
     options.bvh.quality = bth_compile::bvh::Quality::Fast;
     let (compiled, _) = memory::compile(hills, &options, &Silent).expect("it compiles");
     assert!(std::fs::read(mesh).expect("a file") == compiled.bytes);

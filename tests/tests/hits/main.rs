@@ -238,7 +238,7 @@ fn duplicates_and_shared_edges_and_vertices() {
 
 #[test]
 fn a_ray_through_a_vertex_of_layers_hits_every_triangle_around_it_on_each_layer_in_order() {
-    let scene = compiled(&layers(3), &options(Structure::Bvh, RecordKind::Link32, false));
+    let scene = compiled(&layers(3), &options(Structure::Bvh, RecordKind::Link32));
     let ray = Ray::new([1.0, 1.0, -5.0], [0.0, 0.0, 2.0]);
     let hits = all_hits(&scene, &ray, &Accept::default());
     // Around an inner vertex lie four squares: of two of them both triangles, of the others one,
@@ -260,13 +260,13 @@ fn a_ray_through_a_vertex_of_layers_hits_every_triangle_around_it_on_each_layer_
 
 #[test]
 fn grids_and_tetrahedra_on_grids() {
-    let mut structures = vec![(Structure::Bvh, false)];
+    let mut structures = vec![Structure::Bvh];
     if bth_tests::worker().is_some() {
-        structures.extend([(Structure::Tets, false), (Structure::Bth, true)]);
+        structures.extend([Structure::Tets, Structure::Bth]);
     }
-    for (structure, subtrees) in structures {
+    for structure in structures {
         for grid in GridBits::ALL {
-            let mut options = options(structure, RecordKind::Tet16, subtrees);
+            let mut options = options(structure, RecordKind::Tet16);
             options.coordinates.bits = Some(grid);
             let scene = compiled(&blob(400), &options);
             let triangles = oracle::triangles(&scene.object(0));

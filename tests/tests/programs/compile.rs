@@ -92,11 +92,7 @@ fn compact_tetrahedra_take_at_most_110_bytes_a_triangle() {
     };
     let compact = compile("compact.bth", &["--compact"]);
     assert!(
-        compact
-            == compile(
-                "long.bth",
-                &["--set", "record=tet16", "--set", "subtrees=prune", "--free-directions", "none"]
-            ),
+        compact == compile("long.bth", &["--set", "record=tet16", "--free-directions", "none"]),
         "what it is short for"
     );
     if compact.0 == Some(0) {

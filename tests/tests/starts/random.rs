@@ -18,7 +18,7 @@ use bth_tests::structures::{deformed, options};
 
 /// The scene of a model in one of the forms, if it has one.
 fn scene_of(model: &Model, form: usize, rng: &mut Rng) -> Option<(&'static str, Scene)> {
-    let mut of_bvh = options(Structure::Bvh, RecordKind::Link32, false);
+    let mut of_bvh = options(Structure::Bvh, RecordKind::Link32);
     let name = match form {
         0 => "plain",
         1 => {
@@ -153,7 +153,7 @@ fn triangles_in_several_leaves() {
 fn models_of_many_nodes() {
     let _turn = turn();
     let model = bth_scenes::knot::torus_knot(3000);
-    let plain = options(Structure::Bvh, RecordKind::Link32, false);
+    let plain = options(Structure::Bvh, RecordKind::Link32);
     for (scale, by) in [(1.0, 0.0), (0.01, 700.0), (1e-20, 0.0)] {
         let scene = compiled(&placed(model.clone(), scale, by), &plain).unwrap();
         let corners = corners_of(&scene, 0);
@@ -173,7 +173,7 @@ fn whole_tetrahedralizations() {
         [cube(3, None), bth_scenes::knot::torus_knot(600), cube(3, Some(rng))].iter().enumerate()
     {
         for record in RecordKind::ALL {
-            let of = options(Structure::Tets, record, false);
+            let of = options(Structure::Tets, record);
             let scene = compiled(model, &of).unwrap();
             assert!(!scene.object(0).tet_leaves.is_empty());
             let corners = corners_of(&scene, 0);

@@ -12,7 +12,7 @@ use bth_tests::structures::{compiled, every_structure, options};
 use bth_tests::{by_day, oracle};
 
 fn bvh(model: &Model) -> Scene {
-    compiled(model, &options(Structure::Bvh, RecordKind::Link32, false))
+    compiled(model, &options(Structure::Bvh, RecordKind::Link32))
 }
 
 fn corners_of(scene: &Scene) -> Vec<Corners> {
@@ -185,7 +185,7 @@ fn winding_numbers_in_closed_scans_are_exact() {
             println!("SKIPPED: no {} (set BTH_DATA to the folder of the test models)", path.display());
             continue;
         }
-        let options = options(Structure::Bvh, RecordKind::Link32, false);
+        let options = options(Structure::Bvh, RecordKind::Link32);
         let (file, _) = bth_compile::pipeline::compile(&path, &options, &bth_compile::Silent).unwrap();
         let scene = bth::from_bytes(&file.bytes).unwrap();
         let corners = corners_of(&scene);

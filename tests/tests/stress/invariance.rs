@@ -142,8 +142,7 @@ fn cutting_into_instances_changes_no_answer() {
         }
         // Among hits at the same t, rounded, the smallest instance is reported; within an object
         // the nearest is.
-        let whole =
-            structures::compiled(&model, &structures::options(Structure::Bvh, RecordKind::Link32, false));
+        let whole = structures::compiled(&model, &structures::options(Structure::Bvh, RecordKind::Link32));
         compare(&hits(&whole, &rays), &ours, |id| id, false);
     }
 }

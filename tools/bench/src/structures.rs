@@ -70,13 +70,11 @@ impl Kind {
         USES[..count].iter().map(|(of, usage)| (format!("{}{of}", self.name), *usage))
     }
 
-    /// Compiler options. Tetrahedra of the whole model come without a BVH below them, which would
-    /// be traced instead of them; all else is the default.
+    /// Compiler options.
     pub(crate) fn options(&self) -> CompileOptions {
         CompileOptions {
             structure: self.structure,
             record: self.record,
-            keep_subtrees: !self.is_tets(),
             free: FreeOptions { keep: self.free, ..FreeOptions::default() },
             ..CompileOptions::default()
         }

@@ -46,7 +46,7 @@ pub fn rebuild_treelets(
         monitor.check()?;
         let probabilities = visits(&bvh);
         let weighed = Weighed { bvh: &bvh, probabilities: Some(&probabilities) };
-        let planner = Planner::new(mesh, weighed, Costs::default(), false, monitor);
+        let planner = Planner::new(mesh, weighed, Costs::default(), monitor);
         let (decisions, _) = planner.run(&[])?;
         let count = if round == 0 {
             let found = small::find(&planner, &decisions)?;

@@ -21,7 +21,7 @@ fn by_areas(bvh: &BinaryBvh) -> Vec<f64> {
 /// The smallest cost of a wide tree over a BVH, by areas, with lines at the price that they have
 /// over another BVH.
 fn cost(mesh: &Mesh, bvh: &BinaryBvh, priced: &BinaryBvh) -> f32 {
-    let planner = |bvh| Planner::new(mesh, Weighed::from(bvh), Costs::default(), false, &Silent);
+    let planner = |bvh| Planner::new(mesh, Weighed::from(bvh), Costs::default(), &Silent);
     let mut planned = planner(bvh);
     planned.line = planner(priced).line;
     planned.run(&[]).unwrap().1
@@ -79,7 +79,7 @@ fn entered_by_others(mesh: &Mesh, bvh: &BinaryBvh, probabilities: Option<&[f64]>
     let planned_by = Weighed { bvh, probabilities };
     let decide = |planner: &Planner<'_>, cut: &[u32]| {
         let (mesh, costs) = (planner.mesh, Costs::default());
-        Planner::new(mesh, planned_by, costs, false, &Silent).run(cut)
+        Planner::new(mesh, planned_by, costs, &Silent).run(cut)
     };
     let judged = Weighed { bvh, probabilities: Some(&judge) };
     let options = CollapseOptions::default();

@@ -59,7 +59,6 @@ pub fn pack(wide: &mut Wide, grid: &Grid) -> Result<()> {
         packed.write(block);
     }
     wide.root = packed.code(wide.root);
-    wide.subtrees = wide.subtrees.iter().map(|code| packed.code(*code)).collect();
     wide.lines = packed.lines;
     Ok(())
 }
@@ -67,7 +66,7 @@ pub fn pack(wide: &mut Wide, grid: &Grid) -> Result<()> {
 /// All nodes and leaves, in the order of their lines.
 fn blocks(wide: &Wide) -> Vec<MovedBlock> {
     let mut found = Vec::new();
-    let mut stack: Vec<u32> = wide.subtrees.iter().copied().chain([wide.root]).collect();
+    let mut stack = vec![wide.root];
     while let Some(code) = stack.pop() {
         match Child::from_code(code) {
             Some(old @ Child::Node(line)) => {

@@ -100,7 +100,6 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
         costs,
         tets,
         record,
-        keep_subtrees,
         geometry,
         deformable,
         motion,
@@ -132,7 +131,6 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
         let TetOptions { cells, minimum, .. } = tets;
         all.extend([
             ("tets", record.name().to_owned()),
-            ("subtrees", keep_subtrees.to_string()),
             ("tetrahedralization", CachedNodes::attempts(tets)),
             ("cells", format!("{cells:?} from {minimum}")),
             ("tetgen", tetgen.to_owned()),

@@ -62,8 +62,7 @@ impl Stage for Collapse<'_> {
         let (cut, meshes): (Vec<u32>, Vec<tets::TetMesh>) = leaves.into_iter().unzip();
         let (wide, report) = collapse(traced.by_ref(), &cut, options, monitor)?;
         let triangles = traced.mesh.triangles.len();
-        let encoded =
-            (!meshes.is_empty()).then(|| tets::encode(&meshes, &wide.subtrees, options.record, triangles));
+        let encoded = (!meshes.is_empty()).then(|| tets::encode(&meshes, options.record, triangles));
         let grid = traced.on_grid.as_ref().map(|on_grid| &on_grid.grid);
         let places = bvh::triangle_places(&wide, grid, triangles);
         let object = Object {

@@ -61,7 +61,6 @@ fn options_json(options: &CompileOptions) -> Value {
         "attributes": options.attributes,
         "tets": options.record.name(),
         "selection": (options.structure == Structure::Bth).then_some(&options.costs),
-        "keep_subtrees": options.keep_subtrees,
         "geometry": options.geometry,
     });
     let is_bth = options.structure == Structure::Bth;

@@ -43,11 +43,8 @@ pub(super) fn collapse(
     options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<(bvh::Wide, bvh::CollapseReport)> {
-    let collapse_options = bvh::CollapseOptions {
-        keep_subtrees: options.keep_subtrees,
-        leaf_vertices: options.deformable,
-        ..bvh::CollapseOptions::default()
-    };
+    let collapse_options =
+        bvh::CollapseOptions { leaf_vertices: options.deformable, ..bvh::CollapseOptions::default() };
     let weighed = bvh::Weighed { bvh: traced.tree, probabilities: traced.probabilities };
     let (mut wide, mut report) = bvh::collapse(traced.mesh, weighed, cut, &collapse_options, monitor)?;
     if let Some(on_grid) = traced.on_grid {

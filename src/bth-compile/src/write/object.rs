@@ -170,7 +170,7 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
     Ok(())
 }
 
-/// Wide nodes on the longest path, through the subtrees next to tet leaves too.
+/// Wide nodes on the longest path.
 fn depth(parts: &ObjectParts) -> Result<u32> {
     let mut deepest = 0;
     let mut stack = vec![(parts.root, 0)];
@@ -189,12 +189,7 @@ fn depth(parts: &ObjectParts) -> Result<u32> {
                 }
                 stack.extend(node.child.map(|code| (code, above + 1)));
             }
-            Some(Child::Tets(row)) => {
-                let leaf =
-                    parts.tet_leaves.get(row as usize).ok_or_else(|| defect(format!("no tet leaf {row}")))?;
-                stack.push((leaf.subtree, above));
-            }
-            Some(Child::Indexed(_) | Child::Raw(_)) | None => {}
+            Some(Child::Indexed(_) | Child::Raw(_) | Child::Tets(_)) | None => {}
         }
     }
     Ok(deepest)

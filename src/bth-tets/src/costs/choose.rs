@@ -20,8 +20,6 @@ use bth_import::monitor::Monitor;
 pub struct Storage {
     /// Record that stores a tetrahedron.
     pub record: RecordKind,
-    /// True if a BVH over the same triangles is kept next to the tetrahedra.
-    pub keep_subtrees: bool,
     /// Bytes of the object without tetrahedra, for the limit on bytes; estimated from the number of
     /// triangles where absent.
     pub plain_bytes: Option<u64>,
@@ -52,7 +50,7 @@ pub fn choose(
         let message = format!("{} marks for {} nodes", marks.suitable.len(), bvh.nodes.len());
         return Err(Error::Internal { code: "BTH-X030", message });
     }
-    let prices = Prices::new(options, storage.record, storage.keep_subtrees);
+    let prices = Prices::new(options, storage.record);
     let limits = Limits::new(mesh.triangles.len(), options, &prices, storage);
     let (mut choice, cost_bvh, mut cost_with_tets) = match &options.select {
         Select::Paper => {
@@ -107,7 +105,7 @@ struct Limits<'a> {
     prices: &'a Prices<'a>,
     /// Most bytes and seconds; `None` where they are not limited.
     most: [Option<f64>; 2],
-    /// Bytes of the BVH saved for each triangle of a tet leaf, where subtrees are not kept.
+    /// Bytes of the BVH saved for each triangle of a tet leaf.
     pruned: f64,
 }
 
@@ -118,8 +116,7 @@ impl<'a> Limits<'a> {
         // A file with any tet leaf also holds the map from triangles to faces.
         let map = size_of::<u32>() as f64 * count;
         let bytes = options.max_bytes_per_triangle.map(|most| (most * count - plain - map).max(0.0));
-        let pruned = if storage.keep_subtrees { 0.0 } else { plain / count.max(1.0) };
-        Limits { prices, most: [bytes, options.budget], pruned }
+        Limits { prices, most: [bytes, options.budget], pruned: plain / count.max(1.0) }
     }
 
     /// Expected bytes and seconds of a node's tetrahedra, both above zero.
@@ -136,7 +133,7 @@ impl<'a> Limits<'a> {
     }
 }
 
-/// Min share of the bytes of a node's tetrahedra that is counted against the limit where the node's
+/// Min share of the bytes of a node's tetrahedra that is counted against the limit: the node's
 /// BVH is dropped in exchange. Keeps the bytes positive, so that gain per byte stays defined.
 const LEAST_SHARE: f64 = 0.1;
 

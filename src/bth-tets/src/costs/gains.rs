@@ -1,9 +1,9 @@
 //! The gain of tetrahedralizing a node, by sample rays through the binary BVH.
 //!
 //! A ray that starts on a triangle of a tet leaf walks its tetrahedra first, and traverses the BVH
-//! only if it leaves the leaf's box without a hit. Rays from outside take the BVH that is kept next
-//! to the tetrahedra; else they walk through the tetrahedra too. So the saving of a node is a sum
-//! over rays, and the savings of disjoint nodes add up.
+//! only if it leaves the leaf's box without a hit. Rays from outside that enter the box walk through
+//! the tetrahedra, too. So the saving of a node is a sum over rays, and the savings of disjoint
+//! nodes add up.
 
 use super::Start;
 use super::options::CostOptions;
@@ -141,18 +141,16 @@ impl Sampled {
             let node = &bvh.nodes[at as usize];
             gain.steps = steps(Start::Surface, k);
             gain.saved += weights[1] * (gain.bvh - gain.tets) / self.surface.len().max(1) as f64;
-            if !prices.keep_subtrees {
-                let n = steps(Start::Outside, k);
-                let walked = match at {
-                    0 => prices.outside(node.count, n, LINES_THAT_HIT),
-                    _ => prices.alone(node.count, n, LINES_THAT_HIT),
-                };
-                // A ray that enters the root's tetrahedra is not prepared for the BVH.
-                let prepared = if at == 0 { costs.ray } else { 0.0 };
-                let through = costs.outside * self.entered(at..at + 2 * node.count - 1) as f64
-                    + (prepared - walked) * self.entered(at..at + 1) as f64;
-                gain.saved += weights[0] * through / self.outside.max(1) as f64;
-            }
+            let n = steps(Start::Outside, k);
+            let walked = match at {
+                0 => prices.outside(node.count, n, LINES_THAT_HIT),
+                _ => prices.alone(node.count, n, LINES_THAT_HIT),
+            };
+            // A ray that enters the root's tetrahedra is not prepared for the BVH.
+            let prepared = if at == 0 { costs.ray } else { 0.0 };
+            let through = costs.outside * self.entered(at..at + 2 * node.count - 1) as f64
+                + (prepared - walked) * self.entered(at..at + 1) as f64;
+            gain.saved += weights[0] * through / self.outside.max(1) as f64;
             let started = f64::from(started.max(1));
             (gain.tets, gain.bvh) = (gain.tets / started, gain.bvh / started);
         }

@@ -19,18 +19,16 @@ pub(super) struct Prices<'a> {
     record: RecordKind,
     /// Factor on the costs of tetrahedra.
     scale: f64,
-    /// True if a BVH stays next to the tetrahedra for rays from outside.
-    pub(super) keep_subtrees: bool,
 }
 
 /// Seconds of the unit in which profiles give times.
 const MICROSECOND: f64 = 1e-6;
 
 impl<'a> Prices<'a> {
-    pub(super) fn new(options: &'a CostOptions, record: RecordKind, keep_subtrees: bool) -> Self {
+    pub(super) fn new(options: &'a CostOptions, record: RecordKind) -> Self {
         let costs = options.profile.record(record);
         let scale = options.c_tet.map_or(1.0, |c| c / costs.surface.step[0].max(f64::MIN_POSITIVE));
-        Prices { options, costs, record, scale, keep_subtrees }
+        Prices { options, costs, record, scale }
     }
 
     /// Costs of the BVH.

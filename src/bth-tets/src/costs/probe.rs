@@ -70,7 +70,7 @@ pub fn probe(
         return Ok((built, None));
     }
     monitor.stage("probe", Some(built.len() as u64));
-    let prices = Prices::new(options, storage.record, storage.keep_subtrees);
+    let prices = Prices::new(options, storage.record);
     let known = options.rays.as_deref();
     let weights = known.map_or(options.optimize_for.weights(), KnownRays::shares);
     let all = super::gains::sample(mesh, bvh, options);
@@ -89,9 +89,7 @@ pub fn probe(
             None => (areas[rows.end] - areas[rows.start]) / areas[bvh.order.len()],
         };
         leaf.gain = weights[1] * share * (leaf.cost_bvh - leaf.cost_tet);
-        if !storage.keep_subtrees {
-            leaf.gain += weights[0] * prober.entering(*node, tets);
-        }
+        leaf.gain += weights[0] * prober.entering(*node, tets);
         leaf.kept = leaf.gain > 0.0;
         report.leaves.push(leaf);
         monitor.advance(1);

@@ -11,15 +11,14 @@ use bth_format::layout::RecordKind;
 use bth_import::Mesh;
 use bth_import::monitor::Silent;
 
-const KEPT: Storage = Storage { record: RecordKind::Link32, keep_subtrees: true, plain_bytes: None };
-const PRUNED: Storage = Storage { record: RecordKind::Link32, keep_subtrees: false, plain_bytes: None };
+const STORED: Storage = Storage { record: RecordKind::Link32, plain_bytes: None };
 
 fn paper() -> CostOptions {
     CostOptions { select: Select::Paper, minimum_gain: 0.0, ..CostOptions::default() }
 }
 
 fn chosen(bvh: &BinaryBvh, marks: &Marks, options: &CostOptions) -> (Choice, CostReport) {
-    choose(&Mesh::default(), bvh, marks, options, PRUNED, &Silent).unwrap()
+    choose(&Mesh::default(), bvh, marks, options, STORED, &Silent).unwrap()
 }
 
 /// The cost after the surface area heuristic, and the sum of depths, by plain recursion.
@@ -111,7 +110,7 @@ fn an_empty_bvh_chooses_nothing_and_foreign_marks_are_an_error() {
         let (choice, _) = chosen(&BinaryBvh::default(), &Marks::default(), &options);
         assert!(choice.chosen.is_empty() && choice.verdicts.is_empty());
         let bvh = tree(1, 9);
-        let error = choose(&Mesh::default(), &bvh, &Marks::default(), &options, KEPT, &Silent).unwrap_err();
+        let error = choose(&Mesh::default(), &bvh, &Marks::default(), &options, STORED, &Silent).unwrap_err();
         assert!(error.to_string().contains("BTH-X030"));
     }
 }
@@ -155,20 +154,18 @@ fn a_ray_meets_what_trying_all_triangles_meets_and_enters_the_nodes_above() {
 #[test]
 fn cheap_tetrahedra_are_taken_whole_and_dear_ones_not_at_all() {
     let (mesh, bvh, marks) = blob();
-    let choice = |c_tet: f64, options: CostOptions, storage: Storage| {
+    let choice = |c_tet: f64, options: CostOptions| {
         let options = CostOptions { c_tet: Some(c_tet), minimum_triangles: 64, ..options };
-        choose(&mesh, &bvh, &marks, &options, storage, &Silent).unwrap()
+        choose(&mesh, &bvh, &marks, &options, STORED, &Silent).unwrap()
     };
-    let (cheap, report) = choice(1e-3, CostOptions::default(), KEPT);
+    let (cheap, report) = choice(1e-3, CostOptions::default());
     assert_eq!(cheap.chosen, [0]);
     assert!(report.cost_with_tets < 0.5 * report.cost_bvh, "{report:?}");
-    assert!(choice(1e3, CostOptions::default(), KEPT).0.chosen.is_empty());
+    assert!(choice(1e3, CostOptions::default()).0.chosen.is_empty());
 
-    // With a BVH next to the tetrahedra, rays from outside use the BVH only; without one they walk
-    // through the tetrahedra.
+    // Rays from outside walk through the tetrahedra, too.
     let camera = CostOptions { optimize_for: OptimizeFor::Camera, ..CostOptions::default() };
-    assert!(choice(1e-3, camera.clone(), KEPT).0.chosen.is_empty());
-    assert_eq!(choice(1e-3, camera, PRUNED).0.chosen, [0]);
+    assert_eq!(choice(1e-3, camera).0.chosen, [0]);
 }
 
 #[test]
@@ -176,7 +173,7 @@ fn limits_on_bytes_and_time_leave_fewer_triangles_to_tetrahedra() {
     let (mesh, bvh, marks) = blob();
     let triangles = |options: CostOptions| {
         let options = CostOptions { c_tet: Some(1e-3), minimum_triangles: 64, minimum_gain: 0.0, ..options };
-        choose(&mesh, &bvh, &marks, &options, KEPT, &Silent).unwrap().1.triangles
+        choose(&mesh, &bvh, &marks, &options, STORED, &Silent).unwrap().1.triangles
     };
     let all = triangles(CostOptions::default());
     let by_bytes = [40.0, 80.0, 1e3]
@@ -196,7 +193,7 @@ fn rays_of_a_scene_decide_which_nodes_count() {
         let rays = Some(std::sync::Arc::new(rays));
         let options =
             CostOptions { c_tet: Some(1e-3), minimum_triangles: 64, rays, ..CostOptions::default() };
-        choose(&mesh, &bvh, &marks, &options, KEPT, &Silent).unwrap().0.chosen
+        choose(&mesh, &bvh, &marks, &options, STORED, &Silent).unwrap().0.chosen
     };
     assert!(nodes(KnownRays::default()).is_empty());
     // Rays that all start below one child of the root and end there.
@@ -219,11 +216,11 @@ fn what_all_nodes_cannot_gain_no_marks_can() {
         let options =
             CostOptions { c_tet: Some(c_tet), minimum_triangles: 64, minimum_gain, ..CostOptions::default() };
         assert!(options.more_suitable_gain_more());
-        let (of_all, report) = choose_of_all(&mesh, &bvh, &options, KEPT, &Silent).unwrap();
+        let (of_all, report) = choose_of_all(&mesh, &bvh, &options, STORED, &Silent).unwrap();
         let gain = report.cost_bvh - report.cost_with_tets;
         for row in [0, 1, 100, bvh.order.len() as u32 / 2, bvh.order.len() as u32 - 300] {
             let marks = marks_beyond(&bvh, row);
-            let (choice, report) = choose(&mesh, &bvh, &marks, &options, KEPT, &Silent).unwrap();
+            let (choice, report) = choose(&mesh, &bvh, &marks, &options, STORED, &Silent).unwrap();
             assert!(
                 report.cost_bvh - report.cost_with_tets <= gain + 1e-9 * report.cost_bvh,
                 "{c_tet}, {row}"

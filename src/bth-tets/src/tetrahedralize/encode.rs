@@ -27,17 +27,15 @@ pub struct Encoded {
 }
 
 /// Encodes meshes as [`super::build()`] returned them, which holds their sum within the format's
-/// limits.
-/// `subtrees` are the child codes of the BVHs over the same triangles, one per mesh, `NONE` where
-/// pruned; `triangles` is the number in the source.
+/// limits. `triangles` is the number in the source.
 ///
 /// # Panics
-/// When `subtrees` is shorter than `meshes`, or a face names a triangle beyond `triangles`.
-pub fn encode(meshes: &[TetMesh], subtrees: &[u32], kind: RecordKind, triangles: usize) -> Encoded {
+/// When a face names a triangle beyond `triangles`.
+pub fn encode(meshes: &[TetMesh], kind: RecordKind, triangles: usize) -> Encoded {
     let mut to = Encoded { face_of_triangle: vec![NONE; triangles], ..Encoded::default() };
     let count: usize = meshes.iter().map(|m| m.tets.len()).sum();
     to.tets.reserve_exact(count * kind.stride());
-    for (mesh, &subtree) in meshes.iter().zip(&subtrees[..meshes.len()]) {
+    for mesh in meshes {
         let base = Base { tet: to.tet_count, vertex: to.vertices.len() as u32, face: to.faces.len() as u32 };
         let first_hull = to.hulls.len() as u32;
         to.vertices.extend(mesh.vertices.iter().map(|&position| TetVertex { position, reserved: 0 }));
@@ -70,7 +68,7 @@ pub fn encode(meshes: &[TetMesh], subtrees: &[u32], kind: RecordKind, triangles:
             faces: mesh.faces.len() as u32,
             first_hull,
             hulls: to.hulls.len() as u32 - first_hull,
-            subtree,
+            subtree: NONE,
             flags: 0,
         });
     }

@@ -71,9 +71,8 @@ pub(crate) struct Compile {
     /// fails if a vertex would move more.
     #[arg(long, help_heading = SMALLER, value_name = "DISTANCE", value_parser = str::parse::<MaxError>)]
     pub(crate) max_error: Option<MaxError>,
-    /// Make the smallest tetrahedralizations: short for `--set record=tet16 --set subtrees=prune
-    /// --free-directions none`. Takes 100 bytes a triangle instead of 180 to 200 where all
-    /// triangles are in tetrahedra.
+    /// Make the smallest tetrahedralizations: short for `--set record=tet16
+    /// --free-directions none`. Takes 100 bytes a triangle where all triangles are in tetrahedra.
     #[arg(long, help_heading = SMALLER)]
     pub(crate) compact: bool,
     /// Keep what new positions at run time need: see docs/deforming.md. All vertices keep the order
@@ -131,7 +130,6 @@ impl Compile {
                 most_triangles: self.free_directions.map_or(DEFAULT_MOST_TRIANGLES, |_| usize::MAX),
                 ..Default::default()
             },
-            keep_subtrees: !self.compact && structure == Structure::Bth,
             geometry: !self.no_geometry,
             deformable: self.deformable,
             ..Default::default()

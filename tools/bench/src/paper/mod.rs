@@ -175,7 +175,7 @@ fn scalar<const STORED: usize>(
         minimum_gain: 0.0,
         ..costs::CostOptions::default()
     };
-    let storage = costs::Storage { record: profile_record(STORED), keep_subtrees: false, plain_bytes: None };
+    let storage = costs::Storage { record: profile_record(STORED), plain_bytes: None };
     let (choice, _) = costs::choose(mesh, &tree, &marks, &costs, storage, &Silent)?;
     let (leaves, _) = tets::build(mesh, &tree, &choice.chosen, &tet_options, &Silent)?;
     let mut bth = PaperTree::<STORED>::new(mesh, &tree, &leaves);

@@ -76,7 +76,7 @@ def _room(point):
 
 def _tree(view):
     """F201 to F204 and F207; returns the corners of the triangles that are in a triangle leaf of the tree or are a constrained face."""
-    placed, in_subtree = {}, [set() for _ in view.tet_leaves]
+    placed = {}
 
     def triangle(t, corners, number, section, at):
         if view.source:
@@ -91,20 +91,20 @@ def _tree(view):
             raise view.invalid("F203", f"triangle {t} again", section, at)
         placed[t] = corners
 
-    # A reference, the boxes around it, and the tet leaf whose subtree it lies in.
+    # A reference, and the boxes around it.
     object_box = (view.lower, view.upper)
-    stack = [(view.root, [object_box], None)]
+    stack = [(view.root, [object_box])]
     # Boxes around the triangles of each leaf, and those triangles' points.
     found = []
     while stack:
-        code, boxes, leaf_row = stack.pop()
+        code, boxes = stack.pop()
         if code == NONE:
             continue
         kind, index = child(code)
         points = []
         if kind == NODE:
             lower, upper, codes = view.node(index)
-            stack.extend((codes[i], [*boxes, (lower[i], upper[i])], leaf_row) for i in range(16))
+            stack.extend((codes[i], [*boxes, (lower[i], upper[i])]) for i in range(16))
         elif kind == TETS:
             leaf = view.tet_leaves[index]
             for row in range(leaf.first_face, leaf.first_face + leaf.faces):
@@ -113,18 +113,10 @@ def _tree(view):
                 place(face.triangle, corners, c.TET_FACES, 32 * row)
                 triangle(face.triangle, corners, "F202", c.TET_FACES, 32 * row)
                 points += corners
-            stack.append((leaf.subtree, [], index))
         else:
             for row, corners in bth_leaves.triangles(view, kind, index):
                 t = view.triangle_ids[row]
-                if leaf_row is None:
-                    place(t, corners, c.TRIANGLE_IDS, 4 * row)
-                else:
-                    leaf = view.tet_leaves[leaf_row]
-                    here = leaf.first_face <= view.triangle_faces[t] < leaf.first_face + leaf.faces
-                    if not here or t in in_subtree[leaf_row]:
-                        raise view.invalid("F203", f"triangle {t} in a subtree", c.TRIANGLE_IDS, 4 * row)
-                    in_subtree[leaf_row].add(t)
+                place(t, corners, c.TRIANGLE_IDS, 4 * row)
                 triangle(t, corners, "F201", c.LINES, 32 * bth_leaves.halves(view, kind, index).start)
                 points += corners
         found.append((boxes, points))
@@ -132,9 +124,6 @@ def _tree(view):
         room = [end for point in points for end in _room(point)] if view.widened_boxes else points
         if not all(contains(box, points if box is object_box else room) for box in boxes):
             raise view.invalid("F204", "triangles outside a box above", c.LINES)
-    for row, leaf in enumerate(view.tet_leaves):
-        if leaf.subtree != NONE and len(in_subtree[row]) != leaf.faces:
-            raise view.invalid("F203", f"{len(in_subtree[row])} triangles in the subtree", c.TET_LEAVES, 64 * row)
     return placed
 
 

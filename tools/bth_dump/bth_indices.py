@@ -144,14 +144,14 @@ def _tree(view):
     """F105 to F118 and F123."""
     halves = len(view.lines) // 32
     claimed, referenced, placed = set(), set(), set()
-    # Code, nodes above, first half line of the parent, whether in a subtree, section and byte of the reference.
-    stack = [(view.root, 0, -1, False, c.OBJECT, 24)]
+    # Code, nodes above, first half line of the parent, section and byte of the reference.
+    stack = [(view.root, 0, -1, c.OBJECT, 24)]
     while stack:
-        code, depth, parent, in_subtree, section, at = stack.pop()
+        code, depth, parent, section, at = stack.pop()
         if code == NONE:
             continue
         found = child(code)
-        if found is None or (found[0] == TETS and in_subtree):
+        if found is None:
             raise view.invalid("F105", f"child code {code:#x}", section, at)
         kind, index = found
         if kind == TETS:
@@ -160,7 +160,8 @@ def _tree(view):
             if index in referenced:
                 raise view.invalid("F123", f"tet leaf {index} again", section, at)
             referenced.add(index)
-            stack.append((view.tet_leaves[index].subtree, depth, -1, True, c.TET_LEAVES, 64 * index + 56))
+            if view.tet_leaves[index].subtree != NONE:
+                raise view.invalid("F105", f"tet leaf {index} with a BVH", c.TET_LEAVES, 64 * index + 56)
             continue
         block = bth_leaves.halves(view, kind, index)
         if block.stop > halves:
@@ -176,7 +177,7 @@ def _tree(view):
             codes = _slots(view, index)
             for slot in reversed(range(16)):
                 at = 64 * index + 384 + 4 * slot
-                stack.append((codes[slot], depth + 1, block.start, in_subtree, c.LINES, at))
+                stack.append((codes[slot], depth + 1, block.start, c.LINES, at))
         else:
             bth_leaves.check(view, kind, index)
             placed.update(bth_places.check_leaf(view, kind, index))

@@ -59,7 +59,7 @@ codes! {
     Counts "F102" "TRIANGLE_FACES, TRIANGLE_PLACES, TRIANGLES and CORNERS are empty or have as many rows as the object has triangles; no more triangles are dropped than there are."
     ObjectBounds "F103" "Object bounds are finite with lower <= upper; without a root they are zero."
     Coordinates "F104" "Coordinates of triangle leaves are f32, with zeros in the fields of the grid, or have 16 or 21 bits on a grid whose points are all f32, with a displacement that is finite and not negative; the header's features announce the grids and widened boxes of objects."
-    ChildCode "F105" "Child codes are NONE or of an assigned kind; the subtree of a tet leaf holds no tet leaves."
+    ChildCode "F105" "Child codes are NONE or of an assigned kind; a tet leaf has no subtree."
     ChildRange "F106" "The block or row that a child code leads to lies within its section."
     ChildOrder "F107" "Nodes and triangle leaves lie behind the node that refers to them."
     Overlap "F108" "Blocks do not overlap, and one child code leads to each."
@@ -143,7 +143,7 @@ codes! {
 
     LeafSource "F201" "A triangle of a leaf has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
     FaceSource "F202" "A constrained face has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
-    Coverage "F203" "Every triangle that is not dropped lies in exactly one triangle leaf or constrained face; a kept subtree holds the triangles of its tet leaf; as many are dropped as the object says."
+    Coverage "F203" "Every triangle that is not dropped lies in exactly one triangle leaf or constrained face; as many are dropped as the object says."
     Containment "F204" "The object's bounds and each child box contain the triangles below; widened child boxes contain each corner with the room around it."
     TetContainment "F205" "The box of a tet leaf contains its vertices."
     Orientation "F206" "Tetrahedra have volume, neighbours lie on either side of their common face, hull faces point inwards and constrained faces to their first tetrahedron."

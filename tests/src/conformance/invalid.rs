@@ -342,7 +342,6 @@ fn places() -> Vec<Case> {
         row("F187-none", base, 1, NONE),
         row("F187-none-in-a-raw-leaf", base, 15, NONE),
         row("F187-none-on-a-grid", "places-grid-16", 39, NONE),
-        row("F187-none-in-a-subtree", tets, 1, NONE),
         row("F187-none-in-a-deformable-object", "places-deformable", 0, NONE),
     ]
 }
@@ -418,8 +417,7 @@ fn tets() -> Vec<Case> {
     // (3), and constrained faces behind the others.
     let middle = 2;
     vec![
-        leaf("F105-tets-below-tets", 0, offset_of!(TetLeaf, subtree), Child::Tets(1).code()),
-        leaf("F108-subtree-twice", 1, offset_of!(TetLeaf, subtree), Child::Indexed(11).code()),
+        leaf("F105-subtree", 0, offset_of!(TetLeaf, subtree), Child::Indexed(11).code()),
         leaf("F120-flags", 0, offset_of!(TetLeaf, flags), 1),
         leaf("F120-flat-box", 0, offset_of!(TetLeaf, upper), 0),
         leaf("F121-hole", 1, offset_of!(TetLeaf, first_tet), 6),
@@ -472,7 +470,6 @@ fn geometry() -> Vec<Case> {
             // Triangle 0 takes the slot of triangle 1, which then has no place.
             e.put_u32(kind::TRIANGLE_IDS, 4, 0).put_u32(kind::TRIANGLE_PLACES, 4, NONE);
         }),
-        field("F203-subtree-of-others", tets, kind::TRIANGLE_IDS, 4, 4),
         field("F203-more-dropped", base, kind::OBJECT, offset_of!(Object, dropped), 2),
         field("F204-small-box", base, kind::LINES, 64, half),
         // A box that holds the triangles, without room.

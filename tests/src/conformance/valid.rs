@@ -394,8 +394,7 @@ pub(super) const CUBE: [[u32; 4]; 5] = [[0, 1, 2, 4], [1, 2, 3, 7], [1, 2, 4, 7]
 /// Two faces of the middle tetrahedron.
 pub(super) const FACES: [[u32; 3]; 2] = [[1, 2, 7], [1, 4, 2]];
 
-/// Two cubes as tet leaves, each around two triangles, the first with a subtree; a triangle leaf;
-/// and a triangle without area.
+/// Two cubes as tet leaves, each around two triangles; a triangle leaf; and a triangle without area.
 fn tets(record: RecordKind) -> Vec<u8> {
     tets_of(record, false, &[])
 }
@@ -418,11 +417,8 @@ pub(super) fn tets_of(record: RecordKind, has_places: bool, leaf_vertices: &[[u3
     positions.extend([[2.0, 0.0, 0.0], [3.0, 0.0, 0.0], [2.0, 1.0, 0.5]]);
     triangles.extend([[base, base + 1, base + 2], [base, base, base + 1]]);
     let corners = |t: usize| triangles[t].map(|v| positions[v as usize]);
-    let beside: Vec<_> = (0..2).map(corners).collect();
 
     let leaf = NODE_LINES as u32;
-    let subtree = leaf + INDEXED_LINES as u32;
-    parts.leaves[0].subtree = Child::Indexed(subtree).code();
     let root = node(&[
         (Child::Tets(0), ([0.0; 3], [1.0; 3])),
         (Child::Indexed(leaf), bounds(&corners(4))),
@@ -430,11 +426,9 @@ pub(super) fn tets_of(record: RecordKind, has_places: bool, leaf_vertices: &[[u3
     ]);
     let mut all = lines(root.as_bytes());
     all.extend(lines(indexed(&[corners(4)], 0).as_bytes()));
-    all.extend(lines(indexed(&beside, 1).as_bytes()));
-    let mut homes: Vec<u32> = (0..4).collect();
-    homes.extend([NONE, NONE]);
+    let homes = [0, 1, 2, 3, NONE, NONE];
     let place = |leaf, slot| TrianglePlace { leaf: Child::Indexed(leaf), slot }.code();
-    let places = [place(subtree, 0), place(subtree, 1), NONE, NONE, place(leaf, 0), NONE];
+    let places = [NONE, NONE, NONE, NONE, place(leaf, 0), NONE];
     let source = Source { positions: &positions, triangles: &triangles, ..Source::default() };
     file(&ObjectParts {
         bounds: Some(bounds(&positions)),
@@ -443,7 +437,7 @@ pub(super) fn tets_of(record: RecordKind, has_places: bool, leaf_vertices: &[[u3
         dropped: 1,
         grid: None,
         lines: &all,
-        triangle_ids: &[4, 0, 1],
+        triangle_ids: &[4],
         leaf_vertices,
         places: if has_places { &places } else { &[] },
         record: Some(record),

@@ -1,4 +1,4 @@
-//! The tree of nodes and leaves, subtrees of tet leaves included.
+//! The tree of nodes and leaves.
 //!
 //! Child codes are followed from the root with an explicit stack. A block of LINES is claimed when
 //! a code leads to it, and a half line that is claimed twice is an error. So every block is visited
@@ -21,8 +21,6 @@ struct Reference {
     depth: u32,
     /// First half line of the node that holds it; `None` where no node does.
     parent: Option<u64>,
-    /// True if it lies in the subtree of a tet leaf.
-    in_subtree: bool,
     /// Section that holds it.
     section: u32,
     /// Its byte in that section.
@@ -52,7 +50,7 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
     };
     let at = offset_of!(Object, root) as u64;
     let code = view.header.root;
-    tree.stack.push(Reference { code, depth: 0, parent: None, in_subtree: false, section: kind::OBJECT, at });
+    tree.stack.push(Reference { code, depth: 0, parent: None, section: kind::OBJECT, at });
     while let Some(reference) = tree.stack.pop() {
         if reference.code != NONE {
             tree.follow(&reference)?;
@@ -91,15 +89,15 @@ impl Tree<'_> {
         }
     }
 
-    /// BTH-F105: the code is of a kind that is allowed here.
+    /// BTH-F105: the code is of a known kind.
     fn child(&self, reference: &Reference) -> Result<Child> {
-        let child = Child::from_code(reference.code);
-        let child = child.filter(|child| !(reference.in_subtree && matches!(child, Child::Tets(_))));
         let found = || format!("{:#010x}", reference.code);
-        child.ok_or_else(|| reference.error(Code::ChildCode, "a child code that may stand here", found()))
+        let unknown = || reference.error(Code::ChildCode, "a child code", found());
+        Child::from_code(reference.code).ok_or_else(unknown)
     }
 
-    /// BTH-F106 and BTH-F123: the tet leaf exists, and nothing else leads to it.
+    /// BTH-F105, BTH-F106 and BTH-F123: the tet leaf exists, nothing else leads to it, and it leads
+    /// to no BVH.
     fn follow_tet_leaf(&mut self, reference: &Reference, row: u32) -> Result<()> {
         let Some(leaf) = self.view.tet_leaves.get(row as usize) else {
             let expected = format!("a row below {}", self.view.tet_leaves.len());
@@ -109,14 +107,12 @@ impl Tree<'_> {
             let expected = "one reference to each tet leaf";
             return Err(reference.error(Code::TetReferences, expected, format!("row {row} again")));
         }
-        self.stack.push(Reference {
-            code: leaf.subtree,
-            depth: reference.depth,
-            parent: None,
-            in_subtree: true,
-            section: kind::TET_LEAVES,
-            at: u64::from(row) * size_of::<TetLeaf>() as u64 + offset_of!(TetLeaf, subtree) as u64,
-        });
+        if leaf.subtree != NONE {
+            let at = row as usize * size_of::<TetLeaf>() + offset_of!(TetLeaf, subtree);
+            let (expected, found) = ("no BVH below a tet leaf, as older files have", leaf.subtree);
+            let found = format!("{found:#010x}");
+            return Err(Error::within(Code::ChildCode, kind::TET_LEAVES, at as u64, expected, found));
+        }
         Ok(())
     }
 
@@ -156,7 +152,6 @@ impl Tree<'_> {
             code,
             depth,
             parent: Some(first_half),
-            in_subtree: reference.in_subtree,
             section: kind::LINES,
             at: start + (offset_of!(WideNode, child) + 4 * slot) as u64,
         }));

@@ -20,7 +20,7 @@ pub struct Object {
     pub triangles: u32,
     /// Number of triangles of zero area, which no ray can hit and no leaf holds.
     pub dropped: u32,
-    /// Upper bound on the nodes of a path from the root, through subtrees of tet leaves too.
+    /// Upper bound on the nodes of a path from the root.
     pub depth: u32,
     /// Lowest byte: bits of a coordinate of a triangle leaf (16, 21, or 0 for `f32`), and
     /// [`WIDENED_BOXES`]. Above it a byte per axis: the biased `f32` exponent of the grid's step,

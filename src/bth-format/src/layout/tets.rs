@@ -67,8 +67,8 @@ pub struct TetLeaf {
     pub first_hull: u32,
     /// Number of hull faces.
     pub hulls: u32,
-    /// Child code of a BVH over the same triangles, for rays that do not start in a known
-    /// tetrahedron and where it is faster; [`super::NONE`] without such a BVH.
+    /// [`super::NONE`]. Older files, which are refused, have the child code of a BVH over the same
+    /// triangles here.
     pub subtree: u32,
     /// Zero.
     pub flags: u32,

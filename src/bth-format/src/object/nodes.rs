@@ -88,13 +88,9 @@ impl<'a> ObjectView<'a> {
             Child::Indexed(_) | Child::Raw(_) | Child::Tets(_) => None,
         }
     }
-    /// The root, or the root of the subtree if the root is a tet leaf. `None` if this is not a node
-    /// or does not lie within the lines, as may be in an object that was not checked.
+    /// The root. `None` if it is not a node or does not lie within the lines, as may be in an object
+    /// that was not checked.
     pub fn root(&self) -> Option<&'a WideNode> {
-        let mut root = self.header.root;
-        if let Child::Tets(row) = Child::from_code(root)? {
-            root = self.tet_leaves.get(row as usize)?.subtree;
-        }
-        self.node_base().wide_node(root)
+        self.node_base().wide_node(self.header.root)
     }
 }

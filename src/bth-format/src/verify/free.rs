@@ -61,7 +61,6 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
 /// The triangles of all triangle leaves, with their ids.
 fn all_corners(view: &ObjectView) -> Vec<(u32, Corners)> {
     let mut stack = vec![view.header.root];
-    stack.extend(view.tet_leaves.iter().map(|leaf| leaf.subtree));
     let mut found = Vec::new();
     while let Some(code) = stack.pop() {
         let (mut indexed, mut raw) = (None, None);

@@ -6,7 +6,7 @@ mod free;
 mod source;
 mod tet_leaf;
 mod tree;
-mod triangle_marks;
+mod triangle_set;
 
 use crate::error::{Code, Error, Result};
 use crate::file::{File, SectionView, hash128};
@@ -68,12 +68,12 @@ pub fn verify(file: &File) -> std::result::Result<Report, Vec<Error>> {
 /// Checks the geometry of an object whose indices have been checked, BTH-F201 to BTH-F209, and adds
 /// the object to a report. Offsets of errors count from the start of the section.
 fn check_object(view: &ObjectView, report: &mut Report) -> Result<()> {
-    let marks = tree::check(view)?;
+    let placed = tree::check(view)?;
     for (row, leaf) in view.tet_leaves.iter().enumerate() {
         tet_leaf::check(view, row, leaf)?;
         report.tets += u64::from(leaf.tets);
     }
-    source::check_dropped(view, &marks)?;
+    source::check_dropped(view, &placed)?;
     source::check_displacement(view)?;
     free::check(view)?;
     report.tet_leaves += view.tet_leaves.len() as u64;

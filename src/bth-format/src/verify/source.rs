@@ -1,6 +1,6 @@
 //! The stored triangles compared with the source's, where the file keeps positions.
 
-use super::triangle_marks::TriangleMarks;
+use super::triangle_set::TriangleSet;
 use crate::error::{Code, Error, Result};
 use crate::exact::is_zero_area;
 use crate::layout::*;
@@ -48,8 +48,8 @@ fn source_corners(view: &ObjectView, id: u32) -> Option<[[f32; 3]; 3]> {
 
 /// BTH-F203 and BTH-F207: as many triangles are skipped as the header says, and all of these have
 /// zero area.
-pub(super) fn check_dropped(view: &ObjectView, marks: &TriangleMarks) -> Result<()> {
-    let left_out = view.header.triangles as usize - marks.count(TriangleMarks::PLACED);
+pub(super) fn check_dropped(view: &ObjectView, placed: &TriangleSet) -> Result<()> {
+    let left_out = view.header.triangles as usize - placed.len();
     if left_out != view.header.dropped as usize {
         let at = offset_of!(Object, dropped) as u64;
         let expected = format!("{} triangles in no leaf", view.header.dropped);
@@ -57,7 +57,7 @@ pub(super) fn check_dropped(view: &ObjectView, marks: &TriangleMarks) -> Result<
     }
     // Without kept triangles there is nothing to compare, and the header's count must not bound a
     // loop.
-    for id in (0..view.triangles.len()).filter(|id| !marks.has(*id as u32, TriangleMarks::PLACED)) {
+    for id in (0..view.triangles.len()).filter(|id| !placed.has(*id as u32)) {
         if source_corners(view, id as u32).is_some_and(|corners| !is_zero_area(corners)) {
             let found = format!("triangle {id}, which has an area, in no leaf");
             let expected = "triangles of zero area to be left out";

@@ -2,7 +2,7 @@
 
 use super::aabb::Aabb;
 use super::source::{Stored, check_corners};
-use super::triangle_marks::TriangleMarks;
+use super::triangle_set::TriangleSet;
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::object::ObjectView;
@@ -11,11 +11,8 @@ use std::mem::offset_of;
 /// A node or leaf of the tree.
 struct Visit {
     child: Child,
-    /// The visit of the node that refers to it, and the slot there; `None` for the root and for
-    /// roots of subtrees.
+    /// The visit of the node that refers to it, and the slot there; `None` for the root.
     parent: Option<(usize, usize)>,
-    /// The tet leaf whose subtree it lies in.
-    tet_leaf: Option<u32>,
     /// Bounds of the triangles below, as far as they have been visited.
     content: Aabb,
     /// The same with the room around corners that widened boxes have; the box of no point where the
@@ -25,10 +22,9 @@ struct Visit {
 
 /// Checks BTH-F201 to BTH-F204 and BTH-F207 of the stored triangles; returns which triangles the
 /// tree holds.
-pub(super) fn check(view: &ObjectView) -> Result<TriangleMarks> {
+pub(super) fn check(view: &ObjectView) -> Result<TriangleSet> {
     let mut visits = visits(view);
-    let in_subtree = vec![0; view.tet_leaves.len()];
-    let mut triangles = Triangles { view, marks: TriangleMarks::default(), in_subtree };
+    let mut triangles = Triangles { view, placed: TriangleSet::default() };
     // Parents come before their children: from the back, the content of a visit is complete when
     // it is taken.
     while let Some(mut visit) = visits.pop() {
@@ -39,30 +35,21 @@ pub(super) fn check(view: &ObjectView) -> Result<TriangleMarks> {
             visits[parent].widened.merge(&visit.widened);
         }
     }
-    triangles.check_subtrees()?;
-    Ok(triangles.marks)
+    Ok(triangles.placed)
 }
 
 /// All nodes and leaves, parents before their children.
 fn visits(view: &ObjectView) -> Vec<Visit> {
-    let visit = |code, parent, tet_leaf| {
-        Child::from_code(code).map(|child| Visit {
-            child,
-            parent,
-            tet_leaf,
-            content: Aabb::EMPTY,
-            widened: Aabb::EMPTY,
-        })
+    let visit = |code, parent| {
+        let child = Child::from_code(code)?;
+        Some(Visit { child, parent, content: Aabb::EMPTY, widened: Aabb::EMPTY })
     };
-    let mut visits: Vec<Visit> = visit(view.header.root, None, None).into_iter().collect();
+    let mut visits: Vec<Visit> = visit(view.header.root, None).into_iter().collect();
     let mut i = 0;
     while i < visits.len() {
-        let (child, tet_leaf) = (visits[i].child, visits[i].tet_leaf);
-        if let Child::Tets(row) = child {
-            visits.extend(visit(view.tet_leaves[row as usize].subtree, None, Some(row)));
-        } else if let Some(node) = view.node_at(child) {
+        if let Some(node) = view.node_at(visits[i].child) {
             let codes = node.child.iter().enumerate();
-            visits.extend(codes.filter_map(|(slot, &code)| visit(code, Some((i, slot)), tet_leaf)));
+            visits.extend(codes.filter_map(|(slot, &code)| visit(code, Some((i, slot)))));
         }
         i += 1;
     }
@@ -70,17 +57,15 @@ fn visits(view: &ObjectView) -> Vec<Visit> {
 }
 
 /// BTH-F204: the box of the slot that leads to a node or leaf, or the bounds of the object, contain
-/// the triangles below. `visits` are the visits before. The root of a subtree has no separate box.
+/// the triangles below. `visits` are the visits before.
 fn check_containment(view: &ObjectView, visit: &Visit, visits: &[Visit]) -> Result<()> {
     let (bounds, section, at) = if let Some((parent, slot)) = visit.parent {
         let child = visits[parent].child;
         let node = view.node_at(child).expect("only nodes have slots");
         let end = |upper: usize| [0, 1, 2].map(|axis| node.bounds[axis][upper][slot]);
         (Aabb { lower: end(0), upper: end(1) }, kind::LINES, view.block_start(child))
-    } else if visit.tet_leaf.is_none() {
-        (Aabb { lower: view.header.lower, upper: view.header.upper }, kind::OBJECT, 0)
     } else {
-        return Ok(());
+        (Aabb { lower: view.header.lower, upper: view.header.upper }, kind::OBJECT, 0)
     };
     // The object's bounds are not widened.
     let content = if section == kind::LINES { &visit.content.with(&visit.widened) } else { &visit.content };
@@ -94,9 +79,7 @@ fn check_containment(view: &ObjectView, visit: &Visit, visits: &[Visit]) -> Resu
 
 struct Triangles<'a> {
     view: &'a ObjectView<'a>,
-    marks: TriangleMarks,
-    /// Per tet leaf the triangles in its subtree.
-    in_subtree: Vec<u32>,
+    placed: TriangleSet,
 }
 
 impl Triangles<'_> {
@@ -131,10 +114,7 @@ impl Triangles<'_> {
     fn check_leaf_triangle(&mut self, visit: &mut Visit, row: usize, corners: [[f32; 3]; 3]) -> Result<()> {
         self.add(visit, corners);
         let (id, at) = (self.view.triangle_ids[row], 4 * row as u64);
-        match visit.tet_leaf {
-            Some(tet_leaf) => self.mark_in_subtree(id, tet_leaf, at)?,
-            None => self.mark_placed(id, kind::TRIANGLE_IDS, at)?,
-        }
+        self.mark_placed(id, kind::TRIANGLE_IDS, at)?;
         let at = self.view.block_start(visit.child);
         check_corners(self.view, id, corners, Stored { code: Code::LeafSource, section: kind::LINES, at })
     }
@@ -162,43 +142,10 @@ impl Triangles<'_> {
 
     /// BTH-F203: a triangle lies in one triangle leaf or constrained face.
     fn mark_placed(&mut self, id: u32, section: u32, at: u64) -> Result<()> {
-        if self.marks.mark(id, TriangleMarks::PLACED) {
+        if self.placed.insert(id) {
             return Ok(());
         }
         let found = format!("triangle {id} again");
         Err(Error::within(Code::Coverage, section, at, "each triangle once", found))
-    }
-
-    /// BTH-F203: a triangle in the subtree of a tet leaf is one of its constrained faces, and lies
-    /// there once.
-    fn mark_in_subtree(&mut self, id: u32, tet_leaf: u32, at: u64) -> Result<()> {
-        let leaf = &self.view.tet_leaves[tet_leaf as usize];
-        let faces = leaf.first_face..leaf.first_face + leaf.faces;
-        let is_face = faces.contains(&self.view.triangle_faces[id as usize]);
-        if is_face && self.marks.mark(id, TriangleMarks::IN_SUBTREE) {
-            self.in_subtree[tet_leaf as usize] += 1;
-            return Ok(());
-        }
-        let (expected, found) =
-            (format!("a triangle of tet leaf {tet_leaf}, once"), format!("triangle {id}"));
-        Err(Error::within(Code::Coverage, kind::TRIANGLE_IDS, at, expected, found))
-    }
-
-    /// BTH-F203: a subtree that is kept holds all triangles of its tet leaf.
-    fn check_subtrees(&self) -> Result<()> {
-        for (row, (leaf, &found)) in self.view.tet_leaves.iter().zip(&self.in_subtree).enumerate() {
-            if leaf.subtree != NONE && found != leaf.faces {
-                let at = (row * size_of::<TetLeaf>() + offset_of!(TetLeaf, subtree)) as u64;
-                let expected = format!("a subtree with all {} triangles", leaf.faces);
-                return Err(Error::within(
-                    Code::Coverage,
-                    kind::TET_LEAVES,
-                    at,
-                    expected,
-                    format!("{found}"),
-                ));
-            }
-        }
-        Ok(())
     }
 }

@@ -106,7 +106,7 @@ fn code(behind: Behind, first_tet: u32, first_face: u32) -> u32 {
 fn every_record_decodes_to_what_was_encoded() {
     let meshes = [five(0.0, 2), five(4.0, 0)];
     for kind in RecordKind::ALL {
-        let encoded = encode(&meshes, &[5, NONE], kind, 4);
+        let encoded = encode(&meshes, kind, 4);
         assert_eq!(encoded.face_of_triangle, [1, NONE, 0, NONE]);
         assert_eq!(encoded.leaves.iter().map(|l| l.subtree).collect::<Vec<_>>(), [5, NONE]);
         assert_eq!((encoded.leaves[1].first_tet, encoded.leaves[1].first_vertex), (5, 8));
@@ -117,7 +117,7 @@ fn every_record_decodes_to_what_was_encoded() {
 
 #[test]
 fn nothing_encodes_to_nothing() {
-    let encoded = encode(&[], &[], RecordKind::Link32, 3);
+    let encoded = encode(&[], RecordKind::Link32, 3);
     assert_eq!(encoded.face_of_triangle, [NONE; 3]);
     assert!(encoded.leaves.is_empty() && encoded.tets.is_empty() && encoded.hulls.is_empty());
 }
@@ -131,7 +131,7 @@ fn records_of_a_real_tetrahedralization_decode() {
     let meshes: Vec<TetMesh> = built.into_iter().map(|(_, m)| m).collect();
     assert!(meshes.len() > 1);
     for kind in RecordKind::ALL {
-        let encoded = encode(&meshes, &vec![NONE; meshes.len()], kind, mesh.triangles.len());
+        let encoded = encode(&meshes, kind, mesh.triangles.len());
         assert_decodes(&meshes, kind, &encoded);
         assert!(encoded.face_of_triangle.iter().all(|&row| row != NONE));
         for hull in &encoded.hulls {

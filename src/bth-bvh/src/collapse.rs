@@ -1,7 +1,7 @@
 //! The collapse of a binary BVH to the wide BVH: plans the nodes and leaves, and has their lines
 //! written.
 
-use super::plan::{Costs, Decision, Planner};
+use super::plan::{Costs, Planner};
 use super::poses::Weighed;
 use super::slot_order::SlotOrder;
 use super::wide::{CollapseReport, Wide};
@@ -37,25 +37,6 @@ pub fn collapse<'a>(
     options: &CollapseOptions,
     monitor: &dyn Monitor,
 ) -> Result<(Wide, CollapseReport)> {
-    collapse_by(mesh, bvh, cut, options, &|planner, cut| planner.run(cut), monitor)
-}
-
-/// Decides for each node of the binary BVH, given the cut nodes; also returns the cost of the tree
-/// without its tet leaves.
-pub(super) type Decide<'a> = dyn Fn(&Planner<'_>, &[u32]) -> Result<(Vec<Decision>, f32)> + 'a;
-
-/// Collapses like [`collapse`], with the tree chosen by `decide`.
-///
-/// # Errors
-/// The errors of [`collapse`] and of `decide`.
-pub(super) fn collapse_by<'a>(
-    mesh: &Mesh,
-    bvh: impl Into<Weighed<'a>>,
-    cut: &[u32],
-    options: &CollapseOptions,
-    decide: &Decide<'_>,
-    monitor: &dyn Monitor,
-) -> Result<(Wide, CollapseReport)> {
     let weighed = bvh.into();
     let bvh = weighed.bvh;
     check_cut(bvh, cut)?;
@@ -76,7 +57,7 @@ pub(super) fn collapse_by<'a>(
         return Ok((wide, report));
     }
     let planner = Planner::new(mesh, weighed, options.costs, monitor);
-    let (decisions, cost) = decide(&planner, cut)?;
+    let (decisions, cost) = planner.run(cut)?;
     report.cost = f64::from(cost);
     let root_area = weighed.area(0);
     let mut writer = Writer {

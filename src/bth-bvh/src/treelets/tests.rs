@@ -1,8 +1,8 @@
 use super::super::bounds::Bounds;
-use super::super::collapse::collapse_by;
+use super::super::plan::{Role, children};
 use super::super::samples::{clutter, exponential, grid, model, soup};
 use super::super::validate::validate_binary;
-use super::super::{CollapseOptions, Quality, build};
+use super::super::{Quality, build};
 use super::agglomerate::agglomerate;
 use super::wide::TreeletPlan;
 use super::*;
@@ -76,16 +76,16 @@ fn entered_by_others(mesh: &Mesh, bvh: &BinaryBvh, probabilities: Option<&[f64]>
     rays.retain(|ray| ray.tmax == f64::INFINITY);
     let counts = entered(mesh, bvh, &rays);
     let judge: Vec<f64> = counts.into_iter().map(|count| f64::from(count) / rays.len() as f64).collect();
-    let planned_by = Weighed { bvh, probabilities };
-    let decide = |planner: &Planner<'_>, cut: &[u32]| {
-        let (mesh, costs) = (planner.mesh, Costs::default());
-        Planner::new(mesh, planned_by, costs, &Silent).run(cut)
-    };
-    let judged = Weighed { bvh, probabilities: Some(&judge) };
-    let options = CollapseOptions::default();
-    let (_, report) = collapse_by(mesh, judged, &[], &options, &decide, &Silent).unwrap();
-    // Visits are relative to the visits of the root.
-    (report.node_visits + report.leaf_visits) * judge[0]
+    let planner = Planner::new(mesh, Weighed { bvh, probabilities }, Costs::default(), &Silent);
+    let (decisions, _) = planner.run(&[]).unwrap();
+    let (mut visits, mut stack) = (0.0, vec![0]);
+    while let Some(at) = stack.pop() {
+        visits += judge[at as usize];
+        if decisions[at as usize].role() == Role::Node {
+            stack.extend(children(bvh, &decisions, at));
+        }
+    }
+    visits
 }
 
 #[test]

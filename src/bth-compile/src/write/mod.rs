@@ -38,18 +38,6 @@ pub fn checked(file: bth_format::File) -> Result<bth_format::File> {
     Ok(file)
 }
 
-/// Checks a file like [`checked`]; with `deep` also makes the checks of `bthc verify`.
-///
-/// # Errors
-/// The errors of [`checked`].
-pub fn self_check(bytes: &[u8], deep: bool) -> Result<()> {
-    let file = checked(bth_format::File::from_bytes(bytes).map_err(defect)?)?;
-    if deep {
-        return bth_format::verify::verify(&file).map(drop).map_err(|mut all| defect(all.swap_remove(0)));
-    }
-    Ok(())
-}
-
 pub(crate) fn defect(error: bth::Error) -> Error {
     Error::Internal { code: "BTH-X030", message: format!("the written file fails: {error}") }
 }

@@ -96,7 +96,7 @@ impl SourceDigest {
 /// The extension of a model, lower-case, if it is supported; else empty.
 pub(crate) fn extension(path: &Path) -> String {
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    let is_supported = |e: &String| ["obj", "gltf", "glb", "ply", "stl", "off"].contains(&e.as_str());
+    let is_supported = |e: &String| bth_import::extensions().any(|known| known == e);
     extension.filter(is_supported).unwrap_or_default()
 }
 

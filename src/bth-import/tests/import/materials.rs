@@ -285,7 +285,7 @@ fn colors_of_ply_that_are_not_kept_are_told() {
         heard.0.into_inner().unwrap()
     };
     let of_faces =
-        "1 rows of element face: the colours red, green, blue are not kept, only those of vertices are";
+        "1 rows of element face: the colours red, green, blue are not kept; only vertices keep colours";
     assert_eq!(told("", &colors("uchar"), everything()), [of_faces]);
     assert_eq!(told(&colors("uchar"), &colors("uchar"), everything()), [of_faces]);
     assert_eq!(told(&colors("uchar"), "", everything()), [""; 0]);
@@ -293,8 +293,8 @@ fn colors_of_ply_that_are_not_kept_are_told() {
         told(&colors("uchar"), &colors("uchar"), Wanted { materials: false, ..everything() }),
         [""; 0]
     );
-    let of_vertices = "3 rows of element vertex: the colours red, green, blue are not kept, of vertices the first red, green and \
-        blue of one type are, uchar, ushort or float";
+    let of_vertices = "3 rows of element vertex: the colours red, green, blue are not kept; a vertex keeps its first red, green and \
+        blue of one type: uchar, ushort or float";
     assert_eq!(told(&colors("int"), "", everything()), [of_vertices]);
 }
 

@@ -149,27 +149,25 @@ pub(super) fn warn_left_out(source: &Source<'_>, header: &Header, wanted: Wanted
         };
         let tell = |what: String| source.monitor.warn(&format!("{count} rows of element {name}: {what}"));
         if let Some(names) = named(has_indices).filter(|_| *kind == ElementKind::Other) {
-            tell(format!(
-                "{names} is not read; polygons are those of element face, strips those of tristrips"
-            ));
+            tell(format!("{names} is not read; polygons come from element face, strips from tristrips"));
         }
         if let Some(names) = named(has_colors).filter(|_| wanted.materials) {
             let kept = match kind {
                 ElementKind::Vertices => {
-                    "of vertices the first red, green and blue of one type are, uchar, ushort or float"
+                    "a vertex keeps its first red, green and blue of one type: uchar, ushort or float"
                 }
-                _ => "only those of vertices are",
+                _ => "only vertices keep colours",
             };
-            tell(format!("the colours {names} are not kept, {kept}"));
+            tell(format!("the colours {names} are not kept; {kept}"));
         }
         if wanted.attributes != Keep::All {
             continue;
         }
         if let Some(names) = named(has_face_coordinates) {
-            tell(format!("the texture coordinates {names} are not kept, only those of vertices are"));
+            tell(format!("the texture coordinates {names} are not kept; only vertices keep texture coordinates"));
         }
         if let Some(names) = named(has_second_coordinates) {
-            tell(format!("the texture coordinates {names} are not kept, only the first ones are"));
+            tell(format!("the texture coordinates {names} are not kept; only the first ones are"));
         }
     }
 }

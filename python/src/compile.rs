@@ -181,7 +181,7 @@ pub(crate) fn compile_mesh(
             return memory::open(mesh, &options, monitor).map(Ok);
         }
         let cache = store.as_ref().map_or_else(Cache::none, |store| Cache::new(store, "mesh"));
-        let compiled = memory::compile_cached(mesh, &options, &cache, &|_| true, monitor)?;
+        let compiled = bth_compile::pipeline::compile_cached(mesh, &options, &cache, &|_| true, monitor)?;
         let content = compiled.content.ok_or_else(no_content)?;
         deliver(&content, output.as_deref()).map(|bytes| bth::from_bytes(&bytes))
     })?;

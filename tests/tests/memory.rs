@@ -63,13 +63,13 @@ fn the_bytes_are_those_of_a_file_with_the_same_triangles() {
         for (chosen, options) in all_options() {
             let what = format!("{name}, {chosen}");
             let (of_file, _) = pipeline::compile(&path, &options, &Silent).expect(&what);
-            let (compiled, report) = memory::compile(mesh(&model), &options, &Silent).expect(&what);
+            let (compiled, report) = pipeline::compile(mesh(&model), &options, &Silent).expect(&what);
             assert_same(&compiled.bytes, &of_file.bytes, &what);
             assert_eq!(report.mesh.triangles, model.triangles.len() as u64);
             assert_eq!(chosen == "tets", report.file.tet_leaves > 0, "{what}");
             let scene = memory::open(mesh(&model), &options, &Silent).expect(&what);
             assert_eq!(scene.file().bytes(), compiled.bytes, "{what}");
-            let again = memory::compile(mesh(&model), &options, &Silent).expect(&what).0;
+            let again = pipeline::compile(mesh(&model), &options, &Silent).expect(&what).0;
             assert_eq!(again, compiled, "{what}");
         }
     }
@@ -81,10 +81,10 @@ fn the_cache_answers_the_second_time() {
     let store = bth_cache::Store::open(folder.path(), 1 << 30).expect("a cache");
     let (_, model) = models().swap_remove(0);
     let options = CompileOptions { structure: Structure::Bvh, ..CompileOptions::default() };
-    let (expected, _) = memory::compile(mesh(&model), &options, &Silent).expect("it compiles");
+    let (expected, _) = pipeline::compile(mesh(&model), &options, &Silent).expect("it compiles");
     let cached = |model: &Model| {
         let cache = Cache::new(&store, "a test");
-        memory::compile_cached(mesh(model), &options, &cache, &|_| true, &Silent).expect("it compiles")
+        pipeline::compile_cached(mesh(model), &options, &cache, &|_| true, &Silent).expect("it compiles")
     };
     let (first, second) = (cached(&model), cached(&model));
     assert!(first.built.is_some() && second.built.is_none());
@@ -112,7 +112,7 @@ fn a_monitor_cancels_at_any_time() {
     let options = CompileOptions { structure: Structure::Bvh, ..CompileOptions::default() };
     let mut cancelled = 0;
     for patience in 0.. {
-        match memory::compile(mesh(&model), &options, &Impatient(patience.into())) {
+        match pipeline::compile(mesh(&model), &options, &Impatient(patience.into())) {
             Ok(_) => break,
             Err(e) => assert!(matches!(e, bth_compile::Error::Cancelled), "{e}"),
         }

@@ -9,7 +9,7 @@ pub mod options;
 use bth_cache::{DEFAULT_CAP, Store};
 use compiler::cached::Cache;
 use compiler::memory::{self, Instance, TriangleMesh};
-use compiler::pipeline::{CompileOptions, Structure};
+use compiler::pipeline::{self, CompileOptions, Structure};
 use compiler::write::Content;
 use compiler::{Error, Monitor};
 use monitor::Callbacks;
@@ -103,7 +103,7 @@ pub unsafe extern "C" fn bth_compile_mesh(
     // SAFETY: the contract of this function includes the contract of `with_bytes`.
     unsafe {
         with_bytes(options, bytes, input, |mesh, options, cache, monitor| {
-            Ok(memory::compile_cached(*mesh, options, cache, &|_| true, monitor)?.content)
+            Ok(pipeline::compile_cached(*mesh, options, cache, &|_| true, monitor)?.content)
         })
     }
 }

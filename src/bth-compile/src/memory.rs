@@ -1,4 +1,5 @@
-//! Compilation of triangles that are in memory, without files.
+//! Compilation of triangles that are in memory, without files. [`pipeline::compile`] takes one mesh,
+//! too.
 //!
 //! The result is the same as from a model file with the same vertices and faces, for example a PLY
 //! file: all sections but PROVENANCE are the same bytes, and so is the content id. PROVENANCE names
@@ -23,50 +24,18 @@ pub use crate::source::TriangleMesh;
 use crate::cached::Cache;
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
-use crate::pipeline::{
-    CachedCompilation, CompileInput, CompileOptions, CompileReport, Compiled, compile_source,
-};
+use crate::pipeline::{self, CachedCompilation, CompileOptions};
 use crate::scene::{self, SceneReport};
 use crate::write::Content;
-use bth_cache::Record;
-
-/// Compiles a mesh.
-///
-/// # Errors
-/// `BTH-I005` for an index that is not a row of the positions, `BTH-I004` for a corner that is not
-/// finite, both with the row of the triangle; else the errors of the stages: a limit of the format,
-/// cancellation.
-pub fn compile(
-    mesh: TriangleMesh<'_>,
-    options: &CompileOptions,
-    monitor: &dyn Monitor,
-) -> Result<(Compiled, CompileReport)> {
-    let (content, report) = compile_cached(mesh, options, &Cache::none(), &|_| true, monitor)?.into_built();
-    Ok((Compiled { bytes: content.bytes().into_owned() }, report))
-}
 
 /// Compiles a mesh and opens the result. The bytes are not copied.
 ///
 /// # Errors
-/// The errors of [`compile`].
+/// The errors of [`pipeline::compile`].
 pub fn open(mesh: TriangleMesh<'_>, options: &CompileOptions, monitor: &dyn Monitor) -> Result<bth::Scene> {
-    let (content, _) = compile_cached(mesh, options, &Cache::none(), &|_| true, monitor)?.into_built();
+    let (content, _) =
+        pipeline::compile_cached(mesh, options, &Cache::none(), &|_| true, monitor)?.into_built();
     opened(content)
-}
-
-/// Compiles a mesh through a cache. `needed` returns true to read the bytes of a file in the
-/// cache; with `&|_| true` the result always has the content.
-///
-/// # Errors
-/// The errors of [`compile`].
-pub fn compile_cached(
-    mesh: TriangleMesh<'_>,
-    options: &CompileOptions,
-    cache: &Cache<'_>,
-    needed: &dyn Fn(&Record) -> bool,
-    monitor: &dyn Monitor,
-) -> Result<CachedCompilation<CompileReport>> {
-    compile_source(CompileInput::Triangles(mesh), options, cache, needed, monitor)
 }
 
 /// Compiles a scene of meshes, each with any number of instances; with [`Cache::none`] without a
@@ -75,7 +44,7 @@ pub fn compile_cached(
 /// always has the content.
 ///
 /// # Errors
-/// The errors of [`compile`], for each mesh; `BTH-I005` for an instance of no mesh, `BTH-I004` and
+/// The errors of [`pipeline::compile`], for each mesh; `BTH-I005` for an instance of no mesh, `BTH-I004` and
 /// `BTH-I050` for one whose transform is not finite or flattens the mesh.
 pub fn compile_scene(
     meshes: &[TriangleMesh<'_>],

@@ -232,7 +232,7 @@ fn a_c_program_compiles_in_memory_and_gets_the_bytes_of_rust() {
     let hills = TriangleMesh { positions: &positions, triangles: &triangles };
     let mut options = CompileOptions { structure: Structure::Bvh, ..CompileOptions::default() };
     options.bvh.quality = bth_compile::bvh::Quality::Fast;
-    let (compiled, _) = memory::compile(hills, &options, &Silent).expect("it compiles");
+    let (compiled, _) = compile(hills, &options, &Silent).expect("it compiles");
     assert!(std::fs::read(mesh).expect("a file") == compiled.bytes);
     let instance = |z| Instance { mesh: 0, to_world: [[1., 0., 0., 0.], [0., 1., 0., 0.], [0., 0., 1., z]] };
     let instances = [instance(0.0), instance(-50.0)];

@@ -6,8 +6,8 @@ use crate::support::options;
 use bth::rays::Ray;
 use bth::{Code, Isa, Scene, SceneBuilder};
 use bth_compile::Silent;
-use bth_compile::memory::{TriangleMesh, compile};
-use bth_compile::pipeline::{CompileOptions, Structure};
+use bth_compile::memory::TriangleMesh;
+use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_random::Rng;
 use bth_tests::oracle::World;
 

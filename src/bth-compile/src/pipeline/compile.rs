@@ -69,13 +69,25 @@ impl DryRun {
     }
 }
 
-/// What a file with one object is made from.
-#[derive(Clone, Copy)]
-pub(crate) enum CompileInput<'a> {
+/// What a file with one object is made from: the path of a model, or triangles in memory.
+#[derive(Clone, Copy, Debug)]
+pub enum CompileInput<'a> {
     /// A model file.
     Model(&'a Path),
     /// Triangles in memory. Their imported mesh is not kept in the cache.
     Triangles(TriangleMesh<'a>),
+}
+
+impl<'a, P: AsRef<Path> + ?Sized> From<&'a P> for CompileInput<'a> {
+    fn from(path: &'a P) -> Self {
+        CompileInput::Model(path.as_ref())
+    }
+}
+
+impl<'a> From<TriangleMesh<'a>> for CompileInput<'a> {
+    fn from(mesh: TriangleMesh<'a>) -> Self {
+        CompileInput::Triangles(mesh)
+    }
 }
 
 impl<'a> CompileInput<'a> {
@@ -96,12 +108,14 @@ impl<'a> CompileInput<'a> {
     }
 }
 
-/// Compiles a model.
+/// Compiles a model from its path, or from a [`TriangleMesh`].
 ///
 /// # Errors
 /// Those of the stages: a source that cannot be used or read, a limit of the format, cancellation.
-pub fn compile(
-    source: &Path,
+/// For triangles in memory `BTH-I005` for an index that is not a row of the positions, and
+/// `BTH-I004` for a corner that is not finite, both with the row of the triangle.
+pub fn compile<'a>(
+    source: impl Into<CompileInput<'a>>,
     options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<(Compiled, CompileReport)> {
@@ -110,18 +124,19 @@ pub fn compile(
 }
 
 /// Compiles a model, or takes results from the cache that were made from the same content. `needed`
-/// returns true to read the bytes of a file in the cache.
+/// returns true to read the bytes of a file in the cache; with `&|_| true` the result always has the
+/// content.
 ///
 /// # Errors
 /// The errors of [`compile`]; `BTH-O002` when the model changes meanwhile.
-pub fn compile_cached(
-    source: &Path,
+pub fn compile_cached<'a>(
+    source: impl Into<CompileInput<'a>>,
     options: &CompileOptions,
     cache: &Cache<'_>,
     needed: &dyn Fn(&Record) -> bool,
     monitor: &dyn Monitor,
 ) -> Result<CachedCompilation<CompileReport>> {
-    compile_source(CompileInput::Model(source), options, cache, needed, monitor)
+    compile_source(source.into(), options, cache, needed, monitor)
 }
 
 /// What [`compile_cached`] would do. Only reads and hashes the model.
@@ -138,8 +153,7 @@ pub fn dry_run(
     Ok(DryRun::of(key.as_ref(), cache, monitor))
 }
 
-/// Does the work of [`compile_cached`], also for triangles in memory.
-pub(crate) fn compile_source(
+fn compile_source(
     source: CompileInput<'_>,
     options: &CompileOptions,
     cache: &Cache<'_>,

@@ -24,13 +24,13 @@ mod tree;
 
 pub use crate::options::{CompileOptions, MotionOptions, Structure};
 pub use crate::stage::StageTime;
-pub use compile::{CachedCompilation, DryRun, compile, compile_cached, dry_run};
+pub use compile::{CachedCompilation, CompileInput, DryRun, compile, compile_cached, dry_run};
 pub use limit::storage;
 pub use object::{Compiled, assemble};
 pub use report::{CompileReport, FileReport, MotionReport};
 pub use tree::build_tree;
 
-pub(crate) use compile::{CompileInput, compile_or_fetch, compile_source, tetgen_in_keys};
+pub(crate) use compile::{compile_or_fetch, tetgen_in_keys};
 pub(crate) use compiler::Compiler;
 pub(crate) use import::Import;
 pub(crate) use keys::{MOTION, ObjectKeys, scene};

@@ -164,7 +164,9 @@ pub(super) fn warn_left_out(source: &Source<'_>, header: &Header, wanted: Wanted
             continue;
         }
         if let Some(names) = named(has_face_coordinates) {
-            tell(format!("the texture coordinates {names} are not kept; only vertices keep texture coordinates"));
+            tell(format!(
+                "the texture coordinates {names} are not kept; only vertices keep texture coordinates"
+            ));
         }
         if let Some(names) = named(has_second_coordinates) {
             tell(format!("the texture coordinates {names} are not kept; only the first ones are"));

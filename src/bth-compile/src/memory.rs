@@ -1,5 +1,5 @@
-//! Compilation of triangles that are in memory, without files. [`pipeline::compile`] takes one mesh,
-//! too.
+//! Compilation of triangles that are in memory, without files. [`pipeline::compile`] takes one
+//! mesh, too.
 //!
 //! The result is the same as from a model file with the same vertices and faces, for example a PLY
 //! file: all sections but PROVENANCE are the same bytes, and so is the content id. PROVENANCE names
@@ -44,8 +44,8 @@ pub fn open(mesh: TriangleMesh<'_>, options: &CompileOptions, monitor: &dyn Moni
 /// always has the content.
 ///
 /// # Errors
-/// The errors of [`pipeline::compile`], for each mesh; `BTH-I005` for an instance of no mesh, `BTH-I004` and
-/// `BTH-I050` for one whose transform is not finite or flattens the mesh.
+/// The errors of [`pipeline::compile`], for each mesh; `BTH-I005` for an instance of no mesh,
+/// `BTH-I004` and `BTH-I050` for one whose transform is not finite or flattens the mesh.
 pub fn compile_scene(
     meshes: &[TriangleMesh<'_>],
     instances: &[Instance],

@@ -394,7 +394,8 @@ pub(super) const CUBE: [[u32; 4]; 5] = [[0, 1, 2, 4], [1, 2, 3, 7], [1, 2, 4, 7]
 /// Two faces of the middle tetrahedron.
 pub(super) const FACES: [[u32; 3]; 2] = [[1, 2, 7], [1, 4, 2]];
 
-/// Two cubes as tet leaves, each around two triangles; a triangle leaf; and a triangle without area.
+/// Two cubes as tet leaves, each around two triangles; a triangle leaf; and a triangle without
+/// area.
 fn tets(record: RecordKind) -> Vec<u8> {
     tets_of(record, false, &[])
 }

@@ -124,8 +124,8 @@ pub fn compile<'a>(
 }
 
 /// Compiles a model, or takes results from the cache that were made from the same content. `needed`
-/// returns true to read the bytes of a file in the cache; with `&|_| true` the result always has the
-/// content.
+/// returns true to read the bytes of a file in the cache; with `&|_| true` the result always has
+/// the content.
 ///
 /// # Errors
 /// The errors of [`compile`]; `BTH-O002` when the model changes meanwhile.

@@ -26,8 +26,8 @@ struct ObjectSection {
 
 impl ObjectSections {
     /// An object of a file in memory. Skips sections of unknown kinds, because their meaning could
-    /// depend on other parts of the file. `trusted` takes the hashes of the section table; otherwise
-    /// they are computed.
+    /// depend on other parts of the file. `trusted` takes the hashes of the section table;
+    /// otherwise they are computed.
     pub(super) fn in_file(file: &Arc<bth_format::File>, object: u32, trusted: bool) -> Self {
         let sections = file.sections().filter(|s| s.entry.object == object);
         let sections = sections.filter(|s| kind_stride(s.entry.kind).is_some()).map(|section| {

@@ -88,8 +88,8 @@ impl<'a> ObjectView<'a> {
             Child::Indexed(_) | Child::Raw(_) | Child::Tets(_) => None,
         }
     }
-    /// The root. `None` if it is not a node or does not lie within the lines, as may be in an object
-    /// that was not checked.
+    /// The root. `None` if it is not a node or does not lie within the lines, as may be in an
+    /// object that was not checked.
     pub fn root(&self) -> Option<&'a WideNode> {
         self.node_base().wide_node(self.header.root)
     }

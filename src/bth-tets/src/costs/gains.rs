@@ -1,9 +1,9 @@
 //! The gain of tetrahedralizing a node, by sample rays through the binary BVH.
 //!
 //! A ray that starts on a triangle of a tet leaf walks its tetrahedra first, and traverses the BVH
-//! only if it leaves the leaf's box without a hit. Rays from outside that enter the box walk through
-//! the tetrahedra, too. So the saving of a node is a sum over rays, and the savings of disjoint
-//! nodes add up.
+//! only if it leaves the leaf's box without a hit. Rays from outside that enter the box walk
+//! through the tetrahedra, too. So the saving of a node is a sum over rays, and the savings of
+//! disjoint nodes add up.
 
 use super::Start;
 use super::options::CostOptions;

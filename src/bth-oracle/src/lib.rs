@@ -19,6 +19,7 @@
 
 mod closest;
 mod crossing;
+mod double;
 mod geometry;
 mod intersection;
 mod nearest;
@@ -29,6 +30,7 @@ mod world;
 
 pub use closest::{is_root_within, squared_distance};
 pub use crossing::{crossings, winding};
+pub use double::{LineHit, line_hit};
 pub use geometry::{Triangle, triangles};
 pub use intersection::{Intersection, intersection, is_front, to_f64};
 pub use nearest::{ExactHit, any, nearest};

@@ -2,7 +2,7 @@
 //! are here.
 
 use crate::rays::View;
-use crate::{accuracy, compare, load, paper, records, scenes, speed, stress};
+use crate::{accuracy, compare, load, paper, records, scenes, speed, stress, truth};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -28,6 +28,8 @@ pub(crate) enum Command {
     Summary(records::Summary),
     /// Run time and bytes against every kind of error, ours and rivals'.
     Accuracy(accuracy::Accuracy),
+    /// Wrong answers against time, for engines from package registries.
+    Truth(truth::Truth),
     /// Hard rays and points on hard surfaces, every answer checked exactly.
     Stress(stress::Stress),
     /// Opening a compiled model or scene and tracing the first rays, against building at the start.

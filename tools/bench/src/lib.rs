@@ -29,6 +29,7 @@ mod speed;
 mod stress;
 pub mod structures;
 pub mod tracer;
+mod truth;
 
 use anyhow::{Result, bail};
 use args::{Arguments, Command, RunOptions};
@@ -65,7 +66,10 @@ fn measure(command: &Command) -> Result<(Report, &RunOptions)> {
         Command::Stress(arguments) => (stress::measure(arguments)?, &arguments.run),
         Command::Load(arguments) => (load::measure(arguments)?, &arguments.run),
         Command::Scenes(arguments) => (scenes::measure(arguments)?, &arguments.run),
+        Command::Truth(arguments) => (truth::measure(arguments)?, &arguments.run),
         Command::Paper(arguments) => (paper::measure(arguments)?, &arguments.run),
-        _ => bail!("expected a command that makes a report: speed, accuracy, stress, load, scenes or paper"),
+        _ => bail!(
+            "expected a command that makes a report: speed, accuracy, truth, stress, load, scenes or paper"
+        ),
     })
 }

@@ -58,6 +58,11 @@ impl Model {
         Ok(Model { name, path, mesh, _folder: folder })
     }
 
+    /// A model that is in no file.
+    pub(crate) fn in_memory(name: &str, mesh: Mesh) -> Model {
+        Model { name: name.to_owned(), path: PathBuf::new(), mesh, _folder: None }
+    }
+
     /// The model of a compiled file, with the triangles of its source.
     ///
     /// # Errors

@@ -37,13 +37,15 @@ impl Head {
         Head { measurement, date, commit, machine, isa, options }
     }
 
-    fn markdown(&self) -> String {
+    /// When, where and how, without a full stop.
+    pub(crate) fn place(&self) -> String {
         let Head { date, machine, isa, options, .. } = self;
         let commit = self.commit.as_deref().unwrap_or("unknown");
-        format!(
-            "{date}; commit {commit}. {machine}. Our kernels: {isa}. Options: `{options}`. Only ratios within this report \
-             mean something.\n"
-        )
+        format!("{date}; commit {commit}. {machine}. Our kernels: {isa}. Options: `{options}`")
+    }
+
+    fn markdown(&self) -> String {
+        format!("{}. Only ratios within this report mean something.\n", self.place())
     }
 }
 

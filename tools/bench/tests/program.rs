@@ -10,6 +10,7 @@ const NO_FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/no-such-library");
 fn bench(arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bth-bench"));
     command.env("RUST_BACKTRACE", "1").env("EMBREE_LIB", NO_FILE).env("TINYBVH_LIB", NO_FILE);
+    command.env("TRUTH_ENGINES", NO_FILE);
     command.args(arguments).output().unwrap()
 }
 
@@ -80,6 +81,43 @@ fn accuracy_finds_errors_of_rivals_only() {
 }
 
 #[test]
+fn truth_finds_no_wrong_answer_of_ours_where_input_is_in_f32() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (page, json) = (path(""), path("truth.json"));
+    let engines = "bth,Embree,obvhs,CGAL";
+    let done = bench(&[
+        "truth",
+        "--queries=300",
+        "--rounds=1",
+        "--engine",
+        engines,
+        "--page",
+        &page,
+        "--json",
+        &json,
+    ]);
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let Value::Array(rows) =
+        serde_json::from_str::<Value>(&std::fs::read_to_string(json).unwrap()).unwrap()["rows"].take()
+    else {
+        panic!("no rows")
+    };
+    let single = ["camera", "bounces", "vertices and edges", "slivers", "tiles", "inside", "visibility"];
+    assert!(single.iter().all(|set| figure(&rows, "bth", set) == 0.0));
+    // Were there none here, nothing would be measured.
+    assert!(figure(&rows, "obvhs", "tiles") > 0.0 && figure(&rows, "bth", "national coordinates") > 0.0);
+    let page = std::fs::read_to_string(path("TRUTH.md")).unwrap();
+    assert!(page.contains("| **bth** | f32 | **0**<br>") && page.contains("not to be had here"), "{page}");
+    assert!(
+        page.contains("- obvhs, inside: has no such query\n") && page.matches('{').count() == 1,
+        "{page}"
+    );
+    let chart = std::fs::read_to_string(path("truth.svg")).unwrap();
+    assert!(chart.contains(">bth</text>") && chart.matches("<circle").count() > 14, "{chart}");
+}
+
+#[test]
 fn a_report_that_cannot_be_saved_is_printed() {
     let inside_a_file = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml/speed.json");
     let done = bench(&[
@@ -123,6 +161,7 @@ fn mistakes_are_named_with_an_exit_code() {
         (1, "speed torus-knot --set primarily", "primarily"),
         (1, "speed torus-knot --isa avx1024", "avx1024"),
         (1, "accuracy torus-knot --tracer embre", "embre"),
+        (1, "truth --engine Embre", "Embre"),
         (1, "load missing.manifest", "missing.manifest"),
         (1, "load objects:missing", "objects:missing"),
         (1, "scenes missing", "missing"),

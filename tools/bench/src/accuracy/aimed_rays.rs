@@ -11,7 +11,7 @@ const EDGE_TRIES: usize = 1000;
 
 /// What is aimed at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Target {
+pub(crate) enum Target {
     /// Vertices.
     Vertices,
     /// Middles of edges.
@@ -20,7 +20,7 @@ pub(super) enum Target {
 
 impl Target {
     /// Name of the ray set.
-    pub(super) fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Target::Vertices => "vertices",
             Target::Edges => "edges",
@@ -29,7 +29,7 @@ impl Target {
 }
 
 /// A set of such rays. Each passes through its target at t = 1 without any rounding.
-pub(super) fn set(model: &Model, target: Target, count: usize) -> RaySet {
+pub(crate) fn set(model: &Model, target: Target, count: usize) -> RaySet {
     let mut rng = Rng::new(11 + target as u64);
     let diagonal = model.bounds().diagonal();
     let mut rays = Vec::with_capacity(count);

@@ -3,7 +3,7 @@
 //! `aimed_rays` makes rays through vertices and edges, `exact_answers` has the right answers, and
 //! `defects` classifies the others.
 
-mod aimed_rays;
+pub(crate) mod aimed_rays;
 mod defects;
 mod exact_answers;
 

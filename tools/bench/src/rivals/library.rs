@@ -34,7 +34,7 @@ pub(super) fn once<T>(api: &'static Api<T>, load: fn() -> Result<T>) -> Result<&
 }
 
 /// Looks into the folder `rivals` next to the folder of this program or of the tests.
-fn installed(file: &str) -> Option<PathBuf> {
+pub(crate) fn installed(file: &str) -> Option<PathBuf> {
     let program = std::env::current_exe().ok()?;
     let folders = program.ancestors().skip(2).take(2);
     folders.map(|target: &Path| target.join("rivals").join(file)).find(|p| p.exists())

@@ -5,6 +5,8 @@ mod library;
 mod obvhs;
 mod tinybvh;
 
+pub(crate) use self::library::installed;
+
 use crate::model::Model;
 use crate::tracer::Contender;
 use anyhow::Result;

@@ -30,9 +30,9 @@ const MIN_RAYS_PER_INSTANCE: usize = 256;
 struct ActiveRays {
     /// The coherent rays.
     packets: TopLevelPackets,
-    /// The other rays that reach few boxes.
+    /// The other rays that f32 prepares.
     lists: InstanceLists,
-    /// Indices within the chunk of the other rays. Each of them is traced alone.
+    /// Indices within the chunk of the rest. Each of them is traced alone.
     alone: Vec<u32>,
     /// The visits to be traced before the rays advance.
     visits: VisitQueue,
@@ -140,6 +140,9 @@ impl World {
             while active_rays.is_any_active() {
                 let progress = query.progress().of_rays_from(first);
                 isa.run(AdvanceKernel { progress, first: first as u32, active_rays });
+                for index in active_rays.lists.unfinished.drain(..) {
+                    query.trace_alone(batch, first + index as usize);
+                }
                 self.trace(batch, query, active_rays);
             }
         }

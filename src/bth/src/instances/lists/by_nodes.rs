@@ -2,12 +2,16 @@
 //! reaches.
 
 use super::{InstanceLanes, MAX_LISTED, MIN_KEY};
+use crate::bvh::ray_state::key_limit;
+use crate::bvh::single_stack::SingleStack;
 use crate::bvh::stack::BOTTOM;
+use crate::instances::box_tests::entered;
 use crate::instances::top_level::TopLevel;
 use crate::instances::top_nodes::INSTANCE;
-use crate::intersect::boxes::RaySlabs;
+use crate::intersect::boxes::{RaySlabLanes, RaySlabs};
+use crate::query::NearestHit;
 use crate::simd::{LANES, Simd};
-use bth_format::layout::NONE;
+use bth_format::layout::{NONE, WIDTH};
 
 /// Max number of tests of sixteen rays against nodes.
 const MAX_TESTS: usize = 16 * LANES;
@@ -32,6 +36,44 @@ impl RayToList<'_> {
 struct UnsortedList {
     codes: [u32; 2 * LANES],
     keys: [f32; 2 * LANES],
+}
+
+impl UnsortedList {
+    /// Adds instances of a node behind the first `count`. Returns the number of all.
+    #[inline(always)]
+    fn add<S: Simd>(&mut self, s: S, count: usize, instances: u32, depth: S::F, child: S::U) -> usize {
+        let to = self.codes[count..].first_chunk_mut().expect("there is room for a node");
+        s.compress(instances, child, to);
+        let to = self.keys[count..].first_chunk_mut().expect("there is room for a node");
+        count + s.compress_f(instances, s.max(depth, s.splat(MIN_KEY)), to)
+    }
+
+    /// Keeps the nearest of `count` instances, as many as a list holds. Returns the largest key
+    /// that is kept.
+    ///
+    /// Of two halves, one sorted from far to near and the other from near to far, the nearer of
+    /// each pair are the nearest of all (Batcher, "Sorting Networks and their Applications", 1968).
+    #[inline(always)]
+    fn keep_nearest<S: Simd>(&mut self, s: S, count: usize) -> f32 {
+        let mut halves = [([0; LANES], [0.0; LANES]); 2];
+        for (half, (codes, keys)) in halves.iter_mut().enumerate() {
+            let used = (count - half * LANES).min(LANES);
+            let key = self.keys[half * LANES..].first_chunk().expect("of this length");
+            let code = self.codes[half * LANES..].first_chunk().expect("of this length");
+            s.compress_far_to_near(((1u64 << used) - 1) as u32, s.load(key), s.load_u(code), codes, keys);
+        }
+        let [(codes, keys), (more_codes, more_keys)] = &mut halves;
+        let more = count - LANES;
+        for i in 0..more {
+            let from = (more - 1 - i) % LANES;
+            if more_keys[from] < keys[i % LANES] {
+                (codes[i % LANES], keys[i % LANES]) = (more_codes[from], more_keys[from]);
+            }
+        }
+        self.codes[..LANES].copy_from_slice(codes);
+        self.keys[..LANES].copy_from_slice(keys);
+        keys.iter().fold(0.0, |most: f32, key| if *key > most { *key } else { most })
+    }
 }
 
 /// The tests of sixteen rays against nodes, and the instances found.
@@ -89,12 +131,7 @@ impl NodeTests {
             let to: &mut [u8; LANES] = lanes[end..].first_chunk_mut().expect("there is room for a node");
             *to = [lane as u8; LANES];
             end += added;
-            let instances = met & !inner;
-            let (list, count) = (&mut lists[lane], usize::from(counts[lane]));
-            let to = list.codes[count..].first_chunk_mut().expect("there is room for a node");
-            s.compress(instances, child, to);
-            let to = list.keys[count..].first_chunk_mut().expect("there is room for a node");
-            let count = count + s.compress_f(instances, s.max(depth, s.splat(MIN_KEY)), to);
+            let count = lists[lane].add(s, usize::from(counts[lane]), met & !inner, depth, child);
             failed |= u32::from(count > MAX_LISTED) << lane;
             counts[lane] = count.min(MAX_LISTED) as u8;
             if end > MAX_TESTS {
@@ -103,6 +140,40 @@ impl NodeTests {
             }
         }
         failed
+    }
+
+    /// Finds the nearest instances whose boxes one ray may enter, nearer nodes first, as the list of
+    /// a lane. Returns the key from which on instances may be missing; infinity if none is. It takes
+    /// longer than [`Self::run`] does for a ray that reaches few boxes.
+    #[inline(always)]
+    pub(super) fn run_one<S: Simd>(&mut self, s: S, top: &TopLevel, ray: &RayToList<'_>, lane: usize) -> f32 {
+        let planes = RaySlabLanes::new(s, ray.slabs);
+        let (mut stack, mut code) = (SingleStack::new(), 0);
+        let mut stack = stack.start(code);
+        let (mut count, mut last, mut missing) = (0, ray.last, f32::INFINITY);
+        // The bottom of the stack is no node.
+        while code & INSTANCE == 0 {
+            let node = top.node(code);
+            let (met, depth) = entered(s, &planes, node, last);
+            let child = s.load_u(&node.child);
+            let inner = met & s.mask_bits(s.lt_u(child, s.splat_u(INSTANCE)));
+            count = self.lists[lane].add(s, count, met & !inner, depth, child);
+            if count > MAX_LISTED {
+                missing = self.lists[lane].keep_nearest(s, count);
+                last = if missing < last { missing } else { last };
+                count = MAX_LISTED;
+            }
+            if inner == 0 {
+                code = stack.pop(key_limit(last), NearestHit);
+                continue;
+            }
+            let free = stack.free_entries();
+            let (count, nearest) = s.sort_far_to_near(inner, depth, child, free.codes, free.keys);
+            code = node.child[nearest % WIDTH];
+            free.push(count);
+        }
+        self.counts[lane] = count as u8;
+        missing
     }
 
     /// The instances of a lane: their bits, and depths and codes.

@@ -3,8 +3,8 @@
 //! Sixteen rays are tested together: all against one box at a time if there are few boxes
 //! ([`by_boxes`]), else each against the nodes that it reaches ([`by_nodes`]). A ray visits its
 //! nearest instance at once, and the next ones in later rounds unless it has ended. With a list, a
-//! ray needs neither its constants nor a stack any more. In exchange it is also tested against
-//! boxes behind its hit, so rays that reach many boxes get no list.
+//! ray needs neither its constants nor a stack any more. A list holds the nearest instances. A ray
+//! that goes on behind all of them is traced alone.
 
 mod by_boxes;
 mod by_nodes;
@@ -23,7 +23,7 @@ use crate::simd::{LANES, Part, Simd};
 
 /// Max number of instances in a list.
 const MAX_LISTED: usize = LANES;
-/// Lists pay unless more than this number of sixteen rays reach too many boxes.
+/// Tests of sixteen rays together pay unless more than this number of them reach too many nodes.
 const MAX_FAILED: usize = 4;
 /// The min key of an instance. Rounding may turn a depth of zero into a negative number, which
 /// would not be sorted. Keys near zero would be denormal, since their lowest bits are overwritten.
@@ -33,11 +33,11 @@ const MIN_KEY: f32 = f32::MIN_POSITIVE;
 /// The lists of the rays of a chunk.
 #[derive(Debug, Default)]
 pub(super) struct InstanceLists {
-    /// The lists, one after the other: a code that is not read, then the codes of a ray's
-    /// instances, the nearest last.
+    /// The lists, one after the other: [`BOTTOM`], then the codes of a ray's instances, the nearest
+    /// last.
     codes: Vec<u32>,
     /// For each code a lower bound of the depth at which the ray enters the box. The first of each
-    /// list is NaN, which no limit exceeds.
+    /// list is the key from which on instances are missing; NaN, which no limit exceeds, if none is.
     keys: Vec<f32>,
     /// Length of all lists.
     len: usize,
@@ -45,8 +45,10 @@ pub(super) struct InstanceLists {
     rays: Vec<ListedRay>,
     /// The indices within the chunk of the rays that still have instances in their list.
     pub(super) active: Vec<u32>,
+    /// The indices of rays that have passed all instances of their list, but not all instances.
+    pub(super) unfinished: Vec<u32>,
     tests: NodeTests,
-    /// Skips tests against nodes after rays that reached too many boxes.
+    /// Skips tests of sixteen rays against nodes after rays that reached too many.
     backoff_nodes: PacketBackoff,
     /// Skips tests against single boxes after rays for which they did not pay.
     backoff_boxes: PacketBackoff,
@@ -112,10 +114,7 @@ impl InstanceLists {
                     continue;
                 }
             }
-            let tests_nodes = self.backoff_nodes.may_try();
-            if tests_nodes {
-                prepared.fill(s, &chunk.top.cube, chunk.rays, &at, count);
-            }
+            prepared.fill(s, &chunk.top.cube, chunk.rays, &at, count);
             let mut listed = [RayToList::NONE; LANES];
             let mut listed_count = 0;
             for (lane, &index) in at[..count].iter().enumerate() {
@@ -125,7 +124,7 @@ impl InstanceLists {
                 let ray = &chunk.rays[index as usize];
                 let [x, y, z] = ray.origin.map(f32::abs);
                 let reach = chunk.top.reach;
-                let may_list = tests_nodes && x <= reach && y <= reach && z <= reach && ray.tmin >= 0.0;
+                let may_list = x <= reach && y <= reach && z <= reach && ray.tmin >= 0.0;
                 match prepared.prepared(lane).filter(|_| may_list) {
                     Some(PreparedRay { slabs, .. }) => {
                         let last = limit(slabs.scale, ray.tmax);
@@ -164,7 +163,7 @@ impl InstanceLists {
     }
 
     /// Lists rays by tests of each against the nodes that it reaches. Returns one bit per ray that
-    /// reaches too many boxes.
+    /// reaches too many boxes: where [`Simd::compress`] is slow, a list of its nearest takes too long.
     #[inline(always)]
     fn list_by_nodes<S: Simd>(
         &mut self,
@@ -173,21 +172,28 @@ impl InstanceLists {
         rays: &[RayToList<'_>],
         visits: &mut Vec<Visit>,
     ) -> u32 {
-        let failed = self.tests.run(s, chunk.top, rays);
+        let mut failed = ((1u64 << rays.len()) - 1) as u32;
+        if self.backoff_nodes.may_try() {
+            failed = self.tests.run(s, chunk.top, rays);
+            self.backoff_nodes.record(failed.count_ones() as usize <= MAX_FAILED);
+        }
         for (lane, ray) in rays.iter().enumerate() {
+            let mut missing = f32::INFINITY;
             if failed >> lane & 1 != 0 {
-                continue;
+                if !S::HAS_FAST_COMPRESS {
+                    continue;
+                }
+                missing = self.tests.run_one(s, chunk.top, ray, lane);
             }
             let found = self.tests.found(s, lane);
             let is_any = found.bits != 0;
-            let nearest = self.push(s, ray.index, ray.slabs.scale, found);
+            let nearest = self.push(s, ray.index, ray.slabs.scale, found, missing);
             if is_any {
                 let instance = self.codes[nearest] & !INSTANCE;
                 visits.push(Visit { ray: chunk.first + ray.index, instance });
             }
         }
-        self.backoff_nodes.record(failed.count_ones() as usize <= MAX_FAILED);
-        failed
+        if S::HAS_FAST_COMPRESS { 0 } else { failed }
     }
 
     /// Stores the lists of rays that were tested against all boxes.
@@ -217,7 +223,7 @@ impl InstanceLists {
                 // Unused lanes are not stored, but may be sorted.
                 let depths = s.min(s.max(depths, s.splat(MIN_KEY)), s.splat(f32::MAX));
                 let found = InstanceLanes { bits, depths, codes };
-                let nearest = self.push(s, rays.at[lane], scale[lane], found);
+                let nearest = self.push(s, rays.at[lane], scale[lane], found, f32::INFINITY);
                 code[lane] = self.codes[nearest];
             }
         }
@@ -233,12 +239,13 @@ impl InstanceLists {
         visits.truncate(count);
     }
 
-    /// Stores the list of a ray. `ray` is its index in the chunk, `scale` the depth of t = 1.
-    /// Returns the index of the nearest entry. The ray visits that instance at once; the list holds
-    /// the others.
+    /// Stores the list of a ray. `ray` is its index in the chunk, `scale` the depth of t = 1. From
+    /// the key `missing` on instances are missing. Returns the index of the nearest entry. The ray
+    /// visits that instance at once; the list holds the others.
     #[inline(always)]
-    fn push<S: Simd>(&mut self, s: S, ray: u32, scale: f32, found: InstanceLanes<S>) -> usize {
-        self.keys[self.len] = f32::NAN;
+    fn push<S: Simd>(&mut self, s: S, ray: u32, scale: f32, found: InstanceLanes<S>, missing: f32) -> usize {
+        self.keys[self.len] = if missing < f32::INFINITY { missing } else { f32::NAN };
+        self.codes[self.len] = BOTTOM;
         let first = self.len + 1;
         let codes = self.codes[first..].first_chunk_mut().expect("there is room for all lists");
         let keys = self.keys[first..].first_chunk_mut().expect("there is room for all lists");
@@ -254,10 +261,11 @@ impl InstanceLists {
 
     /// Advances each active ray to the next instance whose box it may enter, and appends the visits
     /// to `visits`, in the order of the rays. Removes rays without a further instance from the
-    /// active ones. `first_ray` is added to the index of the ray of a visit.
+    /// active ones, and fills `unfinished`. `first_ray` is added to the index of the ray of a visit.
     #[inline(always)]
     pub(super) fn advance(&mut self, progress: BatchProgress<'_>, first_ray: u32, visits: &mut Vec<Visit>) {
-        let InstanceLists { codes, keys, rays, active, .. } = self;
+        let InstanceLists { codes, keys, rays, active, unfinished, .. } = self;
+        unfinished.clear();
         let (mut count, mut kept) = (visits.len(), 0);
         visits.resize(count + active.len(), Visit { ray: 0, instance: 0 });
         for i in 0..active.len() {
@@ -266,8 +274,13 @@ impl InstanceLists {
             let next = ray.next as usize;
             // The list holds nothing beyond the ray's own range.
             let farthest = key_limit(limit(ray.scale, progress.tmax(index as usize)));
-            // There are no branches, because which rays continue is not predictable.
-            let goes_on = usize::from(keys[next] <= farthest);
+            // Which rays continue is not predictable, so no branch depends on it; few pass all
+            // instances of their list.
+            let mut goes_on = usize::from(keys[next] <= farthest);
+            if goes_on != 0 && codes[next] == BOTTOM {
+                unfinished.push(index);
+                goes_on = 0;
+            }
             visits[count] = Visit { ray: first_ray + index, instance: codes[next] & !INSTANCE };
             active[kept] = index;
             ray.next = (next - goes_on) as u32;

@@ -119,7 +119,7 @@ impl DeferredHits {
         match leaf(s, object, object.node_base(), candidate.leaf, &mut memory) {
             Leaf::Indexed(leaf) => self.store_triangle(lane, leaf, candidate.triangle),
             Leaf::Raw(leaf) => self.store_triangle(lane, leaf, candidate.triangle),
-            Leaf::Special(_) | Leaf::Subtree(_) | Leaf::None => return,
+            Leaf::Special(_) | Leaf::None => return,
         }
         self.ray[lane] = ray as u32;
         self.candidate[lane] = candidate;

@@ -11,7 +11,7 @@ use crate::intersect::start_point::ExactRay;
 use crate::query::Goal;
 use crate::query::sink::Sink;
 use crate::rays::Ray;
-use crate::shortcuts::{self, ENTRY_RAYS, FindEntryNode, SpecialLeaf, entry_run};
+use crate::shortcuts::{ENTRY_RAYS, FindEntryNode, SpecialLeaf, entry_run};
 use crate::simd::{CacheLevel, Kernel, LANES, Scalar, Simd};
 use bth_format::layout::{Child, NONE, WIDTH, WideNode};
 use bth_format::object::ObjectBounds;
@@ -78,7 +78,7 @@ impl<G: Goal> Kernel for Interleaved<'_, '_, G> {
             object,
             rays,
             order,
-            root: shortcuts::root(object),
+            root: object.header.root,
             bounds: object.bounds,
             prepared: Prepared::new(),
             ray: [0; LANES],

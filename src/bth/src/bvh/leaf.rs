@@ -21,8 +21,6 @@ use bth_format::object::{ObjectBounds, ObjectView};
 pub(crate) enum LeafOutcome {
     /// Nothing nearer than before was found.
     Nothing,
-    /// The stack entry of the leaf was replaced by another node or leaf, which is entered next.
-    Replaced,
     /// A nearer hit than before was found: stack entries beyond it can be dropped.
     Nearer,
     /// The query is complete.

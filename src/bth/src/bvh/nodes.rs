@@ -2,7 +2,7 @@
 //! unpack the others.
 
 use crate::intersect::filter::TriangleBlock;
-use crate::shortcuts::{self, Special, SpecialLeaf};
+use crate::shortcuts::{self, SpecialLeaf};
 use crate::simd::{CacheLevel, Part, Scalar, Simd};
 use bth_format::layout::{Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, RAW_LINES, RawLeaf};
 use bth_format::object::{NodeBase, ObjectView, Unpacked};
@@ -77,8 +77,6 @@ pub(crate) enum Leaf<'r> {
     Raw(&'r RawLeaf),
     /// A leaf that holds no block of triangles.
     Special(SpecialLeaf),
-    /// The child code of the subtree that is entered instead of a special leaf.
-    Subtree(u32),
     /// No leaf: an empty slot, a node, or a code of a file that was not checked.
     None,
 }
@@ -105,12 +103,7 @@ pub(crate) fn leaf<'r, S: Simd>(
     }
     match Child::from_code(code) {
         Some(Child::Raw(index)) => Leaf::Raw(raw(s, object, index, &mut memory.raw)),
-        Some(child) => match shortcuts::special(object, child) {
-            Some(Special::Leaf(leaf)) => Leaf::Special(leaf),
-            Some(Special::Subtree(code)) => Leaf::Subtree(code),
-            None => Leaf::None,
-        },
-        None => Leaf::None,
+        child => child.and_then(shortcuts::special).map_or(Leaf::None, Leaf::Special),
     }
 }
 
@@ -122,7 +115,7 @@ pub(crate) fn triangle(object: &ObjectView<'_>, code: u32, triangle: u32) -> Opt
     match leaf(Scalar, object, object.node_base(), code, &mut LeafMemory::default()) {
         Leaf::Indexed(leaf) => Some((leaf.first + triangle, leaf.corners(at))),
         Leaf::Raw(leaf) => Some((leaf.first + triangle, leaf.corners(at))),
-        Leaf::Special(_) | Leaf::Subtree(_) | Leaf::None => None,
+        Leaf::Special(_) | Leaf::None => None,
     }
 }
 

@@ -282,10 +282,6 @@ impl<'a, G: Goal> RayPool<'a, G> {
                     enter_leaf(s, object, goal, &object.bounds, exact_ray, state, leaf)
                 }
                 Leaf::Special(leaf) => special(leaf, state),
-                Leaf::Subtree(subtree) => {
-                    stacks.set_code(top, subtree);
-                    LeafOutcome::Replaced
-                }
                 Leaf::None => LeafOutcome::Nothing,
             };
             let below = top.below();
@@ -293,7 +289,6 @@ impl<'a, G: Goal> RayPool<'a, G> {
                 // Any-hit queries store no keys by which entries could be dropped.
                 LeafOutcome::Nearer if goal.is_any() => below,
                 LeafOutcome::Nothing => below,
-                LeafOutcome::Replaced => top,
                 LeafOutcome::Nearer => stacks.keep_up_to(s, bottoms[slot], below, state.key_limit()),
                 LeafOutcome::Done => bottoms[slot],
             };

@@ -151,10 +151,6 @@ pub(crate) fn trace_single<S: Simd, G: Goal, C: Count>(
                 let leaf = CodedLeaf { block, code };
                 enter_leaf(s, object, goal, bounds, ray, &mut state, leaf) == LeafOutcome::Done
             }
-            Leaf::Subtree(subtree) => {
-                code = subtree;
-                continue;
-            }
             Leaf::Special(leaf) => {
                 count.leaf();
                 decide(s, object, ray, bounds, &mut state, (NONE, 0));

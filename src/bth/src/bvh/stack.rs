@@ -104,12 +104,6 @@ impl Stacks {
         code(&self.codes, at)
     }
 
-    /// Replaces the code at a position.
-    #[inline(always)]
-    pub(crate) fn set_code(&mut self, at: StackPosition, code: u32) {
-        self.codes[at.0] = code;
-    }
-
     /// Like [`OpenStacks::free_entries`].
     #[inline(always)]
     pub(crate) fn free_entries(&mut self, top: StackPosition) -> (&mut [u32; LANES], &mut [f32; LANES]) {

@@ -63,18 +63,8 @@ pub(crate) trait TriangleQuery: BoxQuery {
     where
         Self: Sized,
     {
-        s.call(SpecialBlocks { query: self, lanes, object, leaf })
+        s.call(VisitSpecial { query: self, lanes, object, leaf })
     }
-}
-
-/// What a walk does after a leaf.
-pub(crate) enum AfterLeaf {
-    /// Goes on with the stack.
-    Pop,
-    /// Enters the node with this code.
-    Enter(u32),
-    /// Ends.
-    Done,
 }
 
 /// A tree that a query walks through.
@@ -85,9 +75,9 @@ pub(crate) trait Tree<Q: BoxQuery> {
     /// Prefetches what is entered soon.
     #[inline(always)]
     fn prefetch<S: Simd>(&self, _: S, _code: u32) {}
-    /// Visits the leaf of a child code; the code may be `NONE`.
-    fn leaf<S: Simd>(&self, s: S, lanes: &Q::Constants<S>, code: u32, query: &mut Q, limit: f32)
-    -> AfterLeaf;
+    /// Visits the leaf of a child code; the code may be `NONE`. Returns true if the query is
+    /// complete.
+    fn leaf<S: Simd>(&self, s: S, lanes: &Q::Constants<S>, code: u32, query: &mut Q, limit: f32) -> bool;
 }
 
 /// Walks through a tree. Returns true if the query is complete before the end.
@@ -132,13 +122,8 @@ pub(crate) fn walk<S: Simd, Q: BoxQuery>(
         if code == BOTTOM {
             return false;
         }
-        match tree.leaf(s, &lanes, code, query, limit) {
-            AfterLeaf::Pop => {}
-            AfterLeaf::Enter(root) => {
-                code = root;
-                continue;
-            }
-            AfterLeaf::Done => return true,
+        if tree.leaf(s, &lanes, code, query, limit) {
+            return true;
         }
         limit = query.limit();
         max_key = Q::max_key(limit);
@@ -194,40 +179,31 @@ impl<Q: TriangleQuery> Tree<Q> for ObjectTree<'_> {
         prefetch(s, self.node_base, code);
     }
     #[inline(always)]
-    fn leaf<S: Simd>(
-        &self,
-        s: S,
-        lanes: &Q::Constants<S>,
-        code: u32,
-        query: &mut Q,
-        limit: f32,
-    ) -> AfterLeaf {
+    fn leaf<S: Simd>(&self, s: S, lanes: &Q::Constants<S>, code: u32, query: &mut Q, limit: f32) -> bool {
         let (object, mut memory) = (self.object, LeafMemory::default());
-        let is_complete = match leaf(s, object, self.node_base, code, &mut memory) {
+        match leaf(s, object, self.node_base, code, &mut memory) {
             Leaf::Indexed(block) => query.triangles(s, lanes, block, object.triangle_ids, limit),
             Leaf::Raw(block) => query.triangles(s, lanes, block, object.triangle_ids, limit),
             Leaf::Special(leaf) => query.special(s, lanes, object, leaf),
-            Leaf::Subtree(subtree) => return AfterLeaf::Enter(subtree),
             Leaf::None => false,
-        };
-        if is_complete { AfterLeaf::Done } else { AfterLeaf::Pop }
+        }
     }
 }
 
 /// The triangles of a special leaf, as blocks of sixteen. Kernels call this part, because such
 /// leaves are rare.
-struct SpecialBlocks<'a, S: Simd, Q: BoxQuery> {
+struct VisitSpecial<'a, S: Simd, Q: BoxQuery> {
     query: &'a mut Q,
     lanes: &'a Q::Constants<S>,
     object: &'a ObjectView<'a>,
     leaf: SpecialLeaf,
 }
 
-impl<S: Simd, Q: TriangleQuery> Part<S> for SpecialBlocks<'_, S, Q> {
+impl<S: Simd, Q: TriangleQuery> Part<S> for VisitSpecial<'_, S, Q> {
     type Output = bool;
     #[inline(always)]
     fn run(self, s: S) -> bool {
-        let SpecialBlocks { query, lanes, object, leaf } = self;
+        let VisitSpecial { query, lanes, object, leaf } = self;
         let mut blocks = leaf.blocks(object);
         while let Some((block, ids)) = blocks.next_block() {
             let limit = query.limit();

@@ -21,8 +21,8 @@ pub(crate) struct NewInstance {
 
 impl World {
     /// Changes the instances in `changed`, whose indices are below `count`, to what `new` returns
-    /// for them, and builds or refits the top level. `count` is the new number of instances, at
-    /// least the former one. Each new instance is in `changed`.
+    /// for them, and builds or refits the top level. `count` is the new number of instances, not
+    /// below the former one. Each new instance is in `changed`.
     ///
     /// # Errors
     /// The first of `changed` that cannot be placed. No instance is changed then.

@@ -9,7 +9,7 @@ use super::top_nodes::INSTANCE;
 use crate::bvh::ray_state::key_limit;
 use crate::bvh::single_stack::SingleStack;
 use crate::bvh::stack::BOTTOM;
-use crate::bvh::walk::{AfterLeaf, BoxQuery, Tree, run_walk, walk};
+use crate::bvh::walk::{BoxQuery, Tree, run_walk, walk};
 use crate::intersect::boxes::{RaySlabLanes, RaySlabs};
 use crate::intersect::point_lanes::{LanePoint, PointLanes};
 use crate::intersect::prepare::PreparedRay;
@@ -71,12 +71,9 @@ impl<Q: InstanceQuery> Tree<Q> for TopLevel {
         TopLevel::node(self, code)
     }
     #[inline(always)]
-    fn leaf<S: Simd>(&self, _: S, _: &Q::Constants<S>, code: u32, query: &mut Q, _limit: f32) -> AfterLeaf {
+    fn leaf<S: Simd>(&self, _: S, _: &Q::Constants<S>, code: u32, query: &mut Q, _limit: f32) -> bool {
         // Boxes of empty slots may pass the test.
-        match code < BOTTOM && query.instance(code & !INSTANCE) {
-            true => AfterLeaf::Done,
-            false => AfterLeaf::Pop,
-        }
+        code < BOTTOM && query.instance(code & !INSTANCE)
     }
 }
 

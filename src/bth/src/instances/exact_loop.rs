@@ -22,7 +22,7 @@ fn triangles(object: &ObjectView<'_>) -> Vec<(u32, [[f32; 3]; 3])> {
             Leaf::Indexed(block) => block.triangles,
             Leaf::Raw(block) => block.triangles,
             Leaf::None => 0,
-            Leaf::Special(_) | Leaf::Subtree(_) => panic!("a file with triangle leaves only"),
+            Leaf::Special(_) => panic!("a file with triangle leaves only"),
         };
         for triangle in 0..count {
             let candidate = Candidate { leaf: code, triangle };

@@ -127,10 +127,6 @@ impl<S: Simd, G: Goal, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, S
                 match leaf(s, object, object.node_base(), code, &mut memory) {
                     Leaf::Indexed(block) => rays.reached(s, bounds, groups, (block, code), mask),
                     Leaf::Raw(block) => rays.reached(s, bounds, groups, (block, code), mask),
-                    Leaf::Subtree(subtree) => {
-                        code = subtree;
-                        continue;
-                    }
                     Leaf::Special(_) => return PacketOutcome::Refused,
                     Leaf::None => None,
                 }

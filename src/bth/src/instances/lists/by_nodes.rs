@@ -48,8 +48,7 @@ impl UnsortedList {
         count + s.compress_f(instances, s.max(depth, s.splat(MIN_KEY)), to)
     }
 
-    /// Keeps the nearest of `count` instances, as many as a list holds. Returns the largest key
-    /// that is kept.
+    /// Keeps the nearest [`MAX_LISTED`] of `count` instances. Returns the largest key that is kept.
     ///
     /// Of two halves, one sorted from far to near and the other from near to far, the nearer of
     /// each pair are the nearest of all (Batcher, "Sorting Networks and their Applications", 1968).
@@ -142,9 +141,9 @@ impl NodeTests {
         failed
     }
 
-    /// Finds the nearest instances whose boxes one ray may enter, nearer nodes first, as the list of
-    /// a lane. Returns the key from which on instances may be missing; infinity if none is. It takes
-    /// longer than [`Self::run`] does for a ray that reaches few boxes.
+    /// Finds the nearest instances whose boxes one ray may enter, nearer nodes first, as the list
+    /// of a lane. Returns the key from which on instances may be missing; infinity if none is. It
+    /// takes longer than [`Self::run`] does for a ray that reaches few boxes.
     #[inline(always)]
     pub(super) fn run_one<S: Simd>(&mut self, s: S, top: &TopLevel, ray: &RayToList<'_>, lane: usize) -> f32 {
         let planes = RaySlabLanes::new(s, ray.slabs);

@@ -37,7 +37,8 @@ pub(super) struct InstanceLists {
     /// last.
     codes: Vec<u32>,
     /// For each code a lower bound of the depth at which the ray enters the box. The first of each
-    /// list is the key from which on instances are missing; NaN, which no limit exceeds, if none is.
+    /// list is the key from which on instances are missing. If none is, it is NaN, which no limit
+    /// exceeds.
     keys: Vec<f32>,
     /// Length of all lists.
     len: usize,
@@ -163,7 +164,8 @@ impl InstanceLists {
     }
 
     /// Lists rays by tests of each against the nodes that it reaches. Returns one bit per ray that
-    /// reaches too many boxes: where [`Simd::compress`] is slow, a list of its nearest takes too long.
+    /// reaches too many boxes: where [`Simd::compress`] is slow, a list of its nearest takes too
+    /// long.
     #[inline(always)]
     fn list_by_nodes<S: Simd>(
         &mut self,
@@ -261,7 +263,8 @@ impl InstanceLists {
 
     /// Advances each active ray to the next instance whose box it may enter, and appends the visits
     /// to `visits`, in the order of the rays. Removes rays without a further instance from the
-    /// active ones, and fills `unfinished`. `first_ray` is added to the index of the ray of a visit.
+    /// active ones, and fills `unfinished`. `first_ray` is added to the index of the ray of a
+    /// visit.
     #[inline(always)]
     pub(super) fn advance(&mut self, progress: BatchProgress<'_>, first_ray: u32, visits: &mut Vec<Visit>) {
         let InstanceLists { codes, keys, rays, active, unfinished, .. } = self;

@@ -17,46 +17,24 @@ pub(crate) struct SpecialLeaf {
     row: u32,
 }
 
-/// Where the child code of a special leaf leads.
-pub(crate) enum Special {
-    /// To the leaf.
-    Leaf(SpecialLeaf),
-    /// To this child code: the tree over the triangles of the leaf, if the file keeps one.
-    Subtree(u32),
-}
-
-/// Where a child leads that is neither a node nor a block of triangles. `None` for other children.
+/// The leaf of a child that is neither a node nor a block of triangles. `None` for other children.
 #[inline(always)]
-pub(crate) fn special(object: &ObjectView<'_>, child: Child) -> Option<Special> {
-    let Child::Tets(row) = child else { return None };
-    Some(match object.tet_leaves[row as usize].subtree {
-        NONE => Special::Leaf(SpecialLeaf { row }),
-        subtree => Special::Subtree(subtree),
-    })
-}
-
-/// The child code at which rays begin: the root, or the subtree that is entered instead.
-pub(crate) fn root(object: &ObjectView<'_>) -> u32 {
-    let root = object.header.root;
-    match Child::from_code(root).and_then(|child| special(object, child)) {
-        Some(Special::Subtree(subtree)) => subtree,
-        _ => root,
+pub(crate) fn special(child: Child) -> Option<SpecialLeaf> {
+    match child {
+        Child::Tets(row) => Some(SpecialLeaf { row }),
+        _ => None,
     }
 }
 
 /// The special leaf that is the whole object, if it is.
 pub(crate) fn whole(object: &ObjectView<'_>) -> Option<SpecialLeaf> {
-    match special(object, Child::from_code(object.header.root)?) {
-        Some(Special::Leaf(leaf)) => Some(leaf),
-        _ => None,
-    }
+    special(Child::from_code(object.header.root)?)
 }
 
-/// Returns true if an object has leaves that are not entered by subtrees. The compiler keeps the
-/// subtrees of all special leaves or of none.
+/// Returns true if an object has special leaves.
 #[inline(always)]
 pub(crate) fn has_special_leaves(object: &ObjectView<'_>) -> bool {
-    object.tet_leaves.first().is_some_and(|leaf| leaf.subtree == NONE)
+    !object.tet_leaves.is_empty()
 }
 
 impl SpecialLeaf {

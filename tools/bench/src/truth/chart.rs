@@ -67,8 +67,8 @@ pub(super) fn draw(sets: &[Set], lines: &[Line<'_>]) -> String {
             cell += 1;
         }
         let points = lines.iter().filter_map(|line| {
-            let Outcome { verdict, ns } = line.outcomes[i].as_ref().ok()?;
-            Some(Point(line, verdict.per_million(), *ns))
+            let Outcome { judgement, ns } = line.outcomes[i].as_ref().ok()?;
+            Some(Point(line, judgement.per_million(), *ns))
         });
         Panel { area, is_large: false, ..large }.draw(&mut svg, &title, points.collect());
     }

@@ -57,27 +57,27 @@ impl Judgement {
 
 /// Judges the answers to these rows of the questions of a set.
 pub(super) fn judge(set: &Set, rows: impl Iterator<Item = usize>, answers: &[EngineAnswer]) -> Judgement {
-    let mut verdict = Judgement { answers: answers.len(), ..Judgement::default() };
+    let mut judgement = Judgement { answers: answers.len(), ..Judgement::default() };
     for (row, answer) in rows.zip(answers) {
         let question = &set.questions[row];
         match &set.truths[row] {
-            ExactAnswer::Miss => verdict.invented += usize::from(answer.id != NONE),
-            ExactAnswer::Hit { .. } if answer.id == NONE => verdict.missed += 1,
-            ExactAnswer::Hit { triangles, .. } if !triangles.contains(&answer.id) => verdict.other += 1,
+            ExactAnswer::Miss => judgement.invented += usize::from(answer.id != NONE),
+            ExactAnswer::Hit { .. } if answer.id == NONE => judgement.missed += 1,
+            ExactAnswer::Hit { triangles, .. } if !triangles.contains(&answer.id) => judgement.other += 1,
             ExactAnswer::Hit { .. } if question.from.is_some() => {}
             ExactAnswer::Hit { t, .. } => {
-                verdict.error_of_t = verdict.error_of_t.max((answer.t - t).abs() / t);
+                judgement.error_of_t = judgement.error_of_t.max((answer.t - t).abs() / t);
             }
             ExactAnswer::Flag(truth) if (answer.id == 1) == *truth => {}
-            ExactAnswer::Flag(false) if set.query == Query::Visible => verdict.missed += 1,
-            ExactAnswer::Flag(_) => verdict.invented += 1,
+            ExactAnswer::Flag(false) if set.query == Query::Visible => judgement.missed += 1,
+            ExactAnswer::Flag(_) => judgement.invented += 1,
         }
     }
     if set.query == Query::Visible {
         let differ = |pair: &&[EngineAnswer]| pair.iter().any(|answer| answer.id != pair[0].id);
-        verdict.one_sided = answers.chunks(2).filter(differ).count();
+        judgement.one_sided = answers.chunks(2).filter(differ).count();
     }
-    verdict
+    judgement
 }
 
 #[cfg(test)]

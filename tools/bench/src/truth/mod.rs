@@ -59,7 +59,7 @@ const QUICK_QUERIES: usize = 300;
 
 /// What an engine did with a set.
 struct Outcome {
-    verdict: Judgement,
+    judgement: Judgement,
     /// Nanoseconds of processor time for a query.
     ns: f64,
 }
@@ -142,7 +142,7 @@ fn ask(set: &Set, lines: &mut [Line<'_>], running: &mut [Result<Box<dyn Running>
     for ((line, of), seconds) in lines.iter_mut().zip(loaded).zip(seconds) {
         let outcome = of.into_inner().map(|(_, asked, answers): (_, Vec<Asked>, Vec<EngineAnswer>)| {
             let ns = seconds.unwrap_or(f64::NAN) * 1e9 / answers.len().max(1) as f64;
-            Outcome { verdict: judge(set, asked.iter().map(|asked| asked.row), &answers), ns }
+            Outcome { judgement: judge(set, asked.iter().map(|asked| asked.row), &answers), ns }
         });
         line.outcomes.push(outcome);
     }
@@ -150,22 +150,22 @@ fn ask(set: &Set, lines: &mut [Line<'_>], running: &mut [Result<Box<dyn Running>
 
 /// Adds the figures of an engine and a set.
 fn add(report: &mut Report, engine: &Engine, set: &Set, outcome: &Result<Outcome, String>) {
-    let Outcome { verdict, ns } = match outcome {
+    let Outcome { judgement, ns } = match outcome {
         Ok(outcome) => outcome,
         Err(why) => return report.leave_out(set.name, &engine.name, &anyhow::anyhow!("{why}")),
     };
     let ours = engine.is_ours();
     let of = Subject { engine: &engine.name, ours, model: "all", threads: 1 };
-    report.add(&of, set.name, verdict.per_million(), "wrong per million");
+    report.add(&of, set.name, judgement.per_million(), "wrong per million");
     report.add(&of, set.name, *ns, "ns/query");
     if set.query == Query::Visible {
-        report.add(&of, set.name, verdict.one_sided_per_million(), "one-sided per million");
-    } else if verdict.error_of_t > 0.0 {
-        report.add(&of, set.name, verdict.error_of_t, "error of t");
+        report.add(&of, set.name, judgement.one_sided_per_million(), "one-sided per million");
+    } else if judgement.error_of_t > 0.0 {
+        report.add(&of, set.name, judgement.error_of_t, "error of t");
     }
     // In national coordinates f32 input is not the caller's.
-    if ours && set.single && verdict.wrong() > 0 {
-        report.wrong.push(format!("{} of {} on {}", verdict.wrong(), verdict.answers, set.name));
+    if ours && set.single && judgement.wrong() > 0 {
+        report.wrong.push(format!("{} of {} on {}", judgement.wrong(), judgement.answers, set.name));
     }
 }
 
@@ -179,7 +179,7 @@ impl Line<'_> {
     fn mean(&self, sets: &[Set]) -> Option<(f64, f64)> {
         let of = || sets.iter().zip(&self.outcomes).filter(|(set, _)| set.single);
         let answered = || of().filter_map(|(_, outcome)| outcome.as_ref().ok());
-        let wrong: f64 = answered().map(|o| o.verdict.per_million()).sum();
+        let wrong: f64 = answered().map(|o| o.judgement.per_million()).sum();
         let ns = geometric_mean(answered().map(|o| o.ns))?;
         Some((wrong / answered().count() as f64, ns))
     }

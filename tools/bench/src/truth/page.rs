@@ -27,6 +27,7 @@ pub(super) fn write(head: &Head, queries: usize, sets: &[Set], lines: &[Line<'_>
         .replace("{table}", &table(&words(&columns), &rows))
         .replace("{said}", &text(&["set", "not more wrong", "faster"], said))
         .replace("{one-sided}", &list(lines.iter().filter_map(|line| one_sided(line, sets)).collect()))
+        .replace("{missed}", &list(lines.iter().filter_map(|line| missed(line, sets)).collect()))
         .replace("{errors}", &list(lines.iter().filter_map(|line| error_of_t(line, sets)).collect()))
         .replace("{sets}", &text(&["set", "queries", "triangles"], sets.iter().map(about).collect()))
         .replace(
@@ -40,10 +41,10 @@ pub(super) fn write(head: &Head, queries: usize, sets: &[Set], lines: &[Line<'_>
 fn row(line: &Line<'_>) -> Vec<String> {
     let is_missing = line.answered().next().is_none();
     let cell = |outcome: &Result<Outcome, String>| match outcome {
-        Ok(Outcome { verdict, ns }) => {
-            let wrong = match verdict.wrong() {
+        Ok(Outcome { judgement, ns }) => {
+            let wrong = match judgement.wrong() {
                 0 => "**0**".to_owned(),
-                _ => count(verdict.per_million().round() as u64),
+                _ => count(judgement.per_million().round() as u64),
             };
             format!("{wrong}<br>{} ns", short(*ns))
         }
@@ -61,8 +62,8 @@ fn row(line: &Line<'_>) -> Vec<String> {
 /// Who is as right as ours on a set, or faster; each with its time relative to ours.
 fn comparison(name: &str, set: usize, lines: &[Line<'_>]) -> Option<Vec<String>> {
     let of = |line: &Line<'_>| -> Option<(f64, f64)> {
-        let Outcome { verdict, ns } = line.outcomes[set].as_ref().ok()?;
-        Some((verdict.per_million(), *ns))
+        let Outcome { judgement, ns } = line.outcomes[set].as_ref().ok()?;
+        Some((judgement.per_million(), *ns))
     };
     let (wrong, ns) = of(lines.iter().find(|line| line.engine.is_ours())?)?;
     let others = |is_wanted: &dyn Fn((f64, f64)) -> bool| {
@@ -76,18 +77,27 @@ fn comparison(name: &str, set: usize, lines: &[Line<'_>]) -> Option<Vec<String>>
     Some(vec![name.to_owned(), others(&|other| other.0 <= wrong), others(&|other| other.1 < ns)])
 }
 
+/// Rays of the sets in f32 that hit and found nothing, per million.
+fn missed(line: &Line<'_>, sets: &[Set]) -> Option<String> {
+    let is_asked = |set: &Set| set.single && set.query == Query::Nearest;
+    let asked = sets.iter().zip(&line.outcomes).filter(|(set, _)| is_asked(set));
+    let counts = asked.filter_map(|(_, outcome)| Some(outcome.as_ref().ok()?.judgement));
+    let (missed, all) = counts.fold((0, 0), |(missed, all), of| (missed + of.missed, all + of.answers));
+    (missed > 0).then(|| format!("{} {}", line.engine.name, count((missed as f64 * 1e6 / all as f64) as u64)))
+}
+
 /// Pairs per million with different answers in both directions.
 fn one_sided(line: &Line<'_>, sets: &[Set]) -> Option<String> {
     let visible = sets.iter().position(|set| set.query == Query::Visible)?;
-    let verdict = line.outcomes[visible].as_ref().ok()?.verdict;
-    (verdict.one_sided > 0)
-        .then(|| format!("{} {}", line.engine.name, count(verdict.one_sided_per_million() as u64)))
+    let judgement = line.outcomes[visible].as_ref().ok()?.judgement;
+    (judgement.one_sided > 0)
+        .then(|| format!("{} {}", line.engine.name, count(judgement.one_sided_per_million() as u64)))
 }
 
 /// The largest error of t in the sets in f32.
 fn error_of_t(line: &Line<'_>, sets: &[Set]) -> Option<String> {
     let single = sets.iter().zip(&line.outcomes).filter(|(set, _)| set.single);
-    let errors = single.filter_map(|(_, outcome)| Some(outcome.as_ref().ok()?.verdict.error_of_t));
+    let errors = single.filter_map(|(_, outcome)| Some(outcome.as_ref().ok()?.judgement.error_of_t));
     errors.reduce(f64::max).map(|error| format!("{} {error:.0e}", line.engine.name))
 }
 

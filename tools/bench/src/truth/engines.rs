@@ -116,7 +116,7 @@ impl Engine {
     pub(super) fn start(&self) -> Result<Box<dyn Running>> {
         Ok(match &self.how {
             How::Ours => Box::new(Ours::default()),
-            How::Rival(name) => Box::new(LinkedRival { name: name.clone(), loaded: None }),
+            How::Rival(name) => Box::new(LinkedRival { name: name.clone(), loaded: None, coherent: false }),
             How::Program(program) => Box::new(Process::start(program, &self.name)?),
         })
     }
@@ -235,6 +235,7 @@ impl Running for Ours {
 struct LinkedRival {
     name: String,
     loaded: Option<(Box<dyn Tracer>, Query, Vec<Ray>)>,
+    coherent: bool,
 }
 
 impl Running for LinkedRival {
@@ -249,12 +250,13 @@ impl Running for LinkedRival {
         // Crates may panic.
         let built = std::panic::catch_unwind(|| rival.build(&model, 1)).map_err(|_| anyhow!("panics"))??;
         self.loaded = Some((built.tracer, set.query, rays));
+        self.coherent = set.coherent;
         Ok(())
     }
 
     fn run(&mut self) -> Result<(f64, Vec<EngineAnswer>)> {
         let (tracer, query, rays) = self.loaded.as_ref().context("nothing is loaded")?;
-        let batch = Batch { rays, starts: None, coherent: false };
+        let batch = Batch { rays, starts: None, coherent: self.coherent };
         if *query == Query::Visible {
             let mut blocked = vec![false; rays.len()];
             let seconds = Clock::ThreadCpu.time(|| tracer.any(batch, &mut blocked));

@@ -61,6 +61,8 @@ pub(super) struct Set {
     pub(super) query: Query,
     /// True if positions, origins and directions are f32.
     pub(super) single: bool,
+    /// True if neighbouring rays are similar; Embree takes this as a flag.
+    pub(super) coherent: bool,
     pub(super) positions: Vec<[f64; 3]>,
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) questions: Vec<Question>,
@@ -90,7 +92,8 @@ impl Set {
         let both = questions.into_iter().zip(truths).filter_map(|(question, truth)| Some((question, truth?)));
         let (questions, truths) = both.take(count).unzip();
         let (positions, triangles) = (surface.positions.clone(), surface.triangles.clone());
-        Set { name, about, query, single: true, positions, triangles, questions, truths }
+        let (single, coherent) = (true, false);
+        Set { name, about, query, single, coherent, positions, triangles, questions, truths }
     }
 
     /// Positions rounded to f32, as a model.
@@ -137,6 +140,7 @@ pub(super) fn all(count: usize) -> Vec<Set> {
 
     let names = ("camera", "rays of a camera that sees a whole gyroid");
     let camera = of(names, Query::Nearest, camera_rays(&gyroid, count), NEAREST);
+    let camera = Set { coherent: true, ..camera };
     let seen: Vec<Place> = camera.places(&surface).into_iter().flatten().collect();
 
     let mut rng = Rng::new(1);

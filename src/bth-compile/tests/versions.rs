@@ -13,7 +13,7 @@ use std::path::Path;
 /// stage was changed on purpose, raise the stage's version and note what the test prints.
 const NOTED: &str = "\
 bvh 3 85ced845a2e06b3c60ec6905522a8ae3914e4cb9826bc17089f4ec97abdefd04
-file 4.65536 ac1ef9fac53d0117947e01d17618a19a4761aa4ee1e8984b10d658c3e46d9347
+file 5.65536 815e4e230c0a1ceb4558a26b481d9c0e987859feb8646a11265170b8e1c1fd92
 marks 1 f1700307c15a7f23fface5b89ee0ce399fac1b93c7dd43e36616475cc7f08b70
 mesh 8 08ac41aea839d3293886f59a13ccf58fcd23985d2d78e04e183f8aa68bed18fd
 ";

@@ -32,7 +32,7 @@ fn rays_that_are_traced_again_allocate_nothing() {
     let traced = every_structure(&model, true).into_iter().map(|traced| (traced.name, traced.scene));
     let mut structures: Vec<_> =
         traced.filter(|(name, _)| kinds.iter().any(|kind| name.starts_with(kind))).collect();
-    assert_eq!(structures.len(), if bth_tests::worker().is_some() { 6 } else { 3 });
+    assert_eq!(structures.len(), if bth_tests::worker().is_some() { 5 } else { 3 });
     let crowd = bth::from_bytes(&bth_tests::crowd::crowd(300, true)).expect("a valid scene");
     structures.push(("instances".into(), crowd));
     for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {

@@ -23,7 +23,7 @@ use bth_files::Digest;
 use std::path::Path;
 
 /// Version of compiled files.
-const FILE: &str = "4";
+const FILE: &str = "5";
 /// Version of how objects are compiled whose vertices move by themselves.
 pub(crate) const MOTION: &str = BuildPoses::VERSION;
 

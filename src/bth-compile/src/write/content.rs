@@ -124,7 +124,7 @@ impl Content {
     /// Writes the content.
     ///
     /// # Errors
-    /// Those of the writer.
+    /// Returns the error of the writer.
     pub fn write_to(&self, out: &mut (impl Write + ?Sized)) -> Result<()> {
         self.pieces.iter().try_for_each(|piece| out.write_all(piece))?;
         out.write_all(&[0; bth_format::layout::ALIGNMENT][..self.pad])

@@ -52,7 +52,7 @@ pub(crate) struct Truth {
 const ABOUT: &str = "\
 Wrong answers per million, by exact rational arithmetic on the numbers that all engines are given, and processor time for a \
 query, the fastest of interleaved rounds. `error of t`: the largest, relative, where the triangle is right. `one-sided`: pairs \
-of points of which only one sees the other.";
+of points that see each other in one direction only.";
 
 /// Queries of a set in a quick run.
 const QUICK_QUERIES: usize = 300;

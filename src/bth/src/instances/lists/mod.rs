@@ -115,7 +115,11 @@ impl InstanceLists {
                     continue;
                 }
             }
-            prepared.fill(s, &chunk.top.cube, chunk.rays, &at, count);
+            let together = self.backoff_nodes.may_try();
+            let lists_nodes = together || S::HAS_FAST_COMPRESS;
+            if lists_nodes {
+                prepared.fill(s, &chunk.top.cube, chunk.rays, &at, count);
+            }
             let mut listed = [RayToList::NONE; LANES];
             let mut listed_count = 0;
             for (lane, &index) in at[..count].iter().enumerate() {
@@ -125,7 +129,7 @@ impl InstanceLists {
                 let ray = &chunk.rays[index as usize];
                 let [x, y, z] = ray.origin.map(f32::abs);
                 let reach = chunk.top.reach;
-                let may_list = x <= reach && y <= reach && z <= reach && ray.tmin >= 0.0;
+                let may_list = lists_nodes && x <= reach && y <= reach && z <= reach && ray.tmin >= 0.0;
                 match prepared.prepared(lane).filter(|_| may_list) {
                     Some(PreparedRay { slabs, .. }) => {
                         let last = limit(slabs.scale, ray.tmax);
@@ -142,7 +146,7 @@ impl InstanceLists {
                 continue;
             }
             let listed = &listed[..listed_count];
-            let mut failed = self.list_by_nodes(s, chunk, listed, visits);
+            let mut failed = self.list_by_nodes(s, chunk, listed, together, visits);
             while failed != 0 {
                 rest[kept] = listed[failed.trailing_zeros() as usize % LANES].index;
                 failed &= failed - 1;
@@ -163,19 +167,20 @@ impl InstanceLists {
         }
     }
 
-    /// Lists rays by tests of each against the nodes that it reaches. Returns one bit per ray that
-    /// reaches too many boxes: where [`Simd::compress`] is slow, a list of its nearest takes too
-    /// long.
+    /// Lists rays by tests of each against the nodes that it reaches, first of all rays `together`
+    /// if that may pay. Returns one bit per ray that reaches too many boxes: where
+    /// [`Simd::compress`] is slow, a list of its nearest takes too long.
     #[inline(always)]
     fn list_by_nodes<S: Simd>(
         &mut self,
         s: S,
         chunk: &Chunk<'_>,
         rays: &[RayToList<'_>],
+        together: bool,
         visits: &mut Vec<Visit>,
     ) -> u32 {
         let mut failed = ((1u64 << rays.len()) - 1) as u32;
-        if self.backoff_nodes.may_try() {
+        if together {
             failed = self.tests.run(s, chunk.top, rays);
             self.backoff_nodes.record(failed.count_ones() as usize <= MAX_FAILED);
         }

@@ -1,8 +1,10 @@
-//! Exact arithmetic on `f32` coordinates: sums of products without rounding, and geometric
-//! predicates made of them.
+//! Exact arithmetic on coordinates: sums of products without rounding, of `f32` values and of any
+//! `f64`, and geometric predicates made of them.
 
+mod dyadic;
 mod expansion;
 mod predicates;
 
+pub use dyadic::{Dyadic, DyadicVector, dyadic_cross, dyadic_difference, dyadic_dot, dyadic_vector};
 pub use expansion::{EDGE_PARTS, Expansion, VOLUME_PARTS};
 pub use predicates::{is_zero_area, side};

@@ -1,5 +1,6 @@
-"""Geometry (format-spec/README.md, "Verifying"): F201 to F210, with exact arithmetic."""
+"""Geometry (format-spec/README.md, "Verifying"): F201 to F211, with exact arithmetic."""
 
+import math
 import struct
 from fractions import Fraction
 
@@ -32,6 +33,12 @@ def is_zero_area(points):
     return all(u[i] * v[j] == u[j] * v[i] for i, j in ((0, 1), (1, 2), (2, 0)))
 
 
+def nearest_f32(x):
+    """The f32 nearest to a fraction, of two equally near ones the even one."""
+    unit = Fraction(2) ** max(math.frexp(float(x))[1] - 24, -149)
+    return float(round(x / unit) * unit)
+
+
 def contains(box, points):
     """Whether a box, as (lower, upper), contains all points."""
     lower, upper = box
@@ -44,13 +51,14 @@ def check_geometry(view, tets):
     for leaf, found in zip(view.tet_leaves, tets):
         _tet_leaf(view, leaf, found)
     _displacement(view)
+    _rounding(view)
     # By their number, since the file may claim any number of triangles that it does not hold.
     if view.triangles - len(placed) != view.dropped:
         raise view.invalid(
             "F203", f"{view.triangles - len(placed)} triangles in no leaf, {view.dropped} dropped", c.OBJECT, 36
         )
     for t in (t for t in range(view.triangles) if t not in placed):
-        if view.source and not is_zero_area(_source(view, t)):
+        if view.source and not is_zero_area(_exact(view, t)):
             raise view.invalid("F207", f"triangle {t} has an area but no leaf", c.TRIANGLES, 12 * t)
     bth_free.check_met(view, placed, side)
 
@@ -58,6 +66,19 @@ def check_geometry(view, tets):
 def _source(view, t):
     """Corners of a triangle of the source, on the grid if there is one."""
     return [bth_leaves.nearest(view.grid, view.positions[v]) for v in view.source[t]]
+
+
+def _exact(view, t):
+    """Corners of a triangle of the source before they were rounded."""
+    return [view.exact[v] for v in view.source[t]] if view.exact else _source(view, t)
+
+
+def _rounding(view):
+    """F211."""
+    for row, (p, exact) in enumerate(zip(view.positions, view.exact)):
+        expected = [nearest_f32(Fraction(x) - Fraction(a)) for x, a in zip(exact, view.anchor[0])]
+        if bits([expected]) != bits([p]):
+            raise view.invalid("F211", f"{p}, not {expected}", c.POSITIONS, 12 * row)
 
 
 def _displacement(view):
@@ -83,7 +104,7 @@ def _tree(view):
             source = _source(view, t)
             if bits(source) != bits(corners):
                 raise view.invalid(number, f"triangle {t} is {source} in the source, {corners} here", section, at)
-            if not view.leaf_vertices and is_zero_area(source):
+            if not view.leaf_vertices and is_zero_area(_exact(view, t)):
                 raise view.invalid("F207", f"triangle {t} has no area", section, at)
 
     def place(t, corners, section, at):

@@ -32,6 +32,7 @@ def check_indices(view):
     _header(view)
     _sources(view)
     _opacity(view)
+    _exact(view)
     bth_free.check(view)
     _tet_ranges(view)
     _triangle_faces(view)
@@ -76,6 +77,20 @@ def _sources(view):
     for i, position in enumerate(view.positions):
         if not all(map(math.isfinite, position)):
             raise view.invalid("F141", f"position {position}", c.POSITIONS, 12 * i)
+
+
+def _exact(view):
+    """F193 and F194."""
+    if len(view.anchor) != bool(view.exact):
+        raise view.invalid("F193", f"{len(view.anchor)} anchors", c.EXACT_POSITIONS)
+    other = view.grid or view.leaf_vertices or view.tet_leaves or view.free or view.free_distances
+    rows = len(view.exact) == len(view.positions) and len(view.source) == view.triangles
+    if view.exact and (other or not rows):
+        raise view.invalid("F193", f"{len(view.exact)} rows, or sections that do not go with them", c.EXACT_POSITIONS)
+    for kind, points in ((c.ANCHOR, view.anchor), (c.EXACT_POSITIONS, view.exact)):
+        for i, point in enumerate(points):
+            if not all(x == 0 or 2**-149 <= abs(x) <= (2 - 2**-23) * 2.0**127 for x in point):
+                raise view.invalid("F194", f"{point}", kind, 24 * i)
 
 
 def _opacity(view):

@@ -46,6 +46,8 @@ class ObjectView:
         self.hull_faces = [HullFace(r[:3], r[3], r[4]) for r in self.rows(c.HULL_FACES, "<5I")]
         self.leaf_vertices = self.rows(c.LEAF_VERTICES, "<16I")
         self.positions = self.rows(c.POSITIONS, "<3f")
+        self.anchor = self.rows(c.ANCHOR, "<3d")
+        self.exact = self.rows(c.EXACT_POSITIONS, "<3d")
         self.source = self.rows(c.TRIANGLES, "<3I")
         self.corners = self.rows(c.CORNERS, "<3I")
         self.normals = self.rows(c.NORMALS, "<3f")

@@ -138,6 +138,8 @@ codes! {
     SequenceRows "F190" "SEQUENCE_POSITIONS has a row for each time of SEQUENCE_TIMES and each row of POSITIONS; an object with times is deformable."
     SequenceTimes "F191" "Times of SEQUENCE_TIMES are finite and ascend strictly."
     SequencePositions "F192" "Positions of SEQUENCE_POSITIONS are finite; those of the first time are POSITIONS, bit for bit."
+    ExactRows "F193" "EXACT_POSITIONS has as many rows as POSITIONS, or none; ANCHOR has one row beside them, else none. An object that has them has TRIANGLES and coordinates of f32, and neither LEAF_VERTICES nor tet leaves nor free directions or distances."
+    ExactNumbers "F194" "Numbers of EXACT_POSITIONS and ANCHOR are 0 or numbers that f32 neither rounds to 0 nor to an infinity: from 2^-149 to the largest finite f32 in absolute value."
     SecondCorners "F220" "SECOND_CORNERS has as many rows as the object has triangles, or none, and its rows lie within SECOND_UVS."
     SecondUvs "F221" "Coordinates of SECOND_UVS are finite."
 
@@ -147,10 +149,11 @@ codes! {
     Containment "F204" "The object's bounds and each child box contain the triangles below; widened child boxes contain each corner with the room around it."
     TetContainment "F205" "The box of a tet leaf contains its vertices."
     Orientation "F206" "Tetrahedra have volume, neighbours lie on either side of their common face, hull faces point inwards and constrained faces to their first tetrahedron."
-    ZeroArea "F207" "Exactly the triangles of zero area are dropped; of a deformable object none is."
+    ZeroArea "F207" "Exactly the triangles of zero area are dropped, decided by EXACT_POSITIONS where there are some; of a deformable object none is."
     Displacement "F208" "No vertex of a triangle is farther from that of the source than the displacement of the object."
     FreeMet "F209" "Rays that start on a triangle, in a direction of a free bin or its margin, meet no point of a triangle beyond; none within the distance of a level, in a direction of its sector."
     FreeAxes "F210" "A triangle with a row of FREE_DIRECTIONS or FREE_DISTANCES that is not zero has axes: edges from 2^-20 to 2^20 long at its first corner, and a sine of at least 1/128 between them."
+    ExactRounding "F211" "A row of POSITIONS next to EXACT_POSITIONS is the f32 nearest to their difference from ANCHOR, with 0 for -0."
 
     Singular "S001" "The transform of an instance that is seen can be inverted."
     NotFinite "S002" "The transform and the world box of an instance that is seen are finite."

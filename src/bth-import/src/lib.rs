@@ -50,7 +50,8 @@ pub use import::{
 pub use materials::{ImageFile, Looks, Materials, Unreadable};
 pub use memory::{MEMORY_FORMAT, import_triangles};
 pub use mesh::{
-    Attributes, Keep, Mesh, OpacityReport, Polygons, Report, Rounding, Sequence, TriangleOpacities, Wanted,
+    Attributes, Exact, Keep, Mesh, OpacityReport, Polygons, Report, Rounding, Sequence, TriangleOpacities,
+    Wanted,
 };
 pub use monitor::{Monitor, Silent};
 pub use sequence::{

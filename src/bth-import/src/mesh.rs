@@ -33,6 +33,17 @@ pub struct Mesh {
     pub deformation: Option<Deformation>,
 }
 
+/// Positions with all digits of the source, and the origin of the space in which
+/// [`Mesh::positions`] holds them in f32.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Exact {
+    /// What is subtracted before positions are rounded.
+    pub anchor: [f64; 3],
+    /// Row by row the positions of the mesh, in the source's space. Coordinates are 0 or in
+    /// [`EXACT_RANGE`](bth_format::object::EXACT_RANGE).
+    pub positions: Vec<[f64; 3]>,
+}
+
 /// Positions of a mesh at several times. Between two frames vertices move on straight lines at
 /// constant speed; before the first and after the last they do not move.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -27,7 +27,7 @@ pub(super) enum RowKind {
 pub(super) type Locate<'a> = Box<dyn Fn(RowKind, usize) -> Place + 'a>;
 
 /// Reads the positions of a source again, in f64.
-pub(super) type Exact<'a> = Box<dyn Fn() -> Vec<[f64; 3]> + 'a>;
+pub(super) type ReadAgain<'a> = Box<dyn Fn() -> Vec<[f64; 3]> + 'a>;
 
 /// A mesh with the rows of its source. Its reader has checked that all indices are in range.
 pub(super) struct Raw<'a> {
@@ -58,7 +58,7 @@ pub(super) struct Raw<'a> {
     /// What moves the vertices, if the caller wants it.
     pub(super) deformation: Option<RawDeformation>,
     /// The positions with all digits of the source; `None` if its numbers are f32.
-    pub(super) exact: Option<Exact<'a>>,
+    pub(super) exact: Option<ReadAgain<'a>>,
     /// Finds places for error messages.
     pub(super) locate: Locate<'a>,
 }

@@ -16,6 +16,7 @@ pub fn invalid() -> Vec<Case> {
     cases.extend(super::deformable::invalid());
     cases.extend(super::deformers::invalid());
     cases.extend(super::deformable::invalid_sequences());
+    cases.extend(super::exact::invalid());
     cases.extend(groups());
     cases.extend(super::materials::invalid());
     cases.extend(super::scenes::invalid());
@@ -310,7 +311,7 @@ fn tree() -> Vec<Case> {
 
 /// A case in which `rows` of `before` rows of a section of object 0 are left. The others become a
 /// gap, which is zero.
-fn shortened((name, base): (&str, &str), kind: u32, [stride, before, rows]: [usize; 3]) -> Case {
+pub(super) fn shortened((name, base): (&str, &str), kind: u32, [stride, before, rows]: [usize; 3]) -> Case {
     broken(name, base, Seal::Sections, |e| {
         let end = e.section_at(kind) + stride * rows;
         e.put(end, &vec![0; stride * (before - rows)]);

@@ -111,8 +111,8 @@ pub(super) fn second_uvs() -> Vec<u8> {
         positions: &CORNERS,
         triangles: &[[0, 1, 2]],
         corners: &[[0, 1, 2]],
-        normals: &[],
         uvs: &uvs,
+        ..Source::default()
     };
     let parts = ObjectParts {
         source: Some(source),

@@ -6,6 +6,7 @@
 mod deformable;
 mod deformers;
 mod edit;
+mod exact;
 mod invalid;
 mod materials;
 mod scenes;

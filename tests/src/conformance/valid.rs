@@ -25,6 +25,7 @@ pub fn valid() -> Vec<Case> {
         Case::new("opacity", opacity()),
         Case::new("free-directions", free_directions()),
         Case::new("free-distances", free_distances()),
+        Case::new("exact-positions", super::exact::exact_positions()),
         Case::new("two-objects", two_objects()),
         Case::new("groups", groups()),
         Case::new("deformable", super::deformable::deformable()),
@@ -330,6 +331,7 @@ fn two_levels_of(bits: Option<GridBits>, [widened_boxes, has_places]: [bool; 2])
         corners: &triangles,
         normals: &normals,
         uvs: &uvs,
+        ..Source::default()
     };
     file(&ObjectParts {
         bounds: Some(bounds),

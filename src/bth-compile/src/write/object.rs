@@ -4,7 +4,7 @@ use super::builder::defect;
 use super::{FileBuilder, GroupParts};
 use crate::error::{Error, Result};
 use bth_format::layout::*;
-use bth_import::{Deformation, Materials};
+use bth_import::{Deformation, Exact, Materials};
 use std::borrow::Cow;
 use zerocopy::{FromBytes, IntoBytes};
 
@@ -76,6 +76,8 @@ pub struct ObjectParts<'a> {
 pub struct Source<'a> {
     /// Welded positions; in deformable objects the positions of all vertices.
     pub positions: &'a [[f32; 3]],
+    /// The same positions before they were rounded, where they are kept.
+    pub exact: Option<&'a Exact>,
     /// Rows of `positions` per triangle.
     pub triangles: &'a [[u32; 3]],
     /// Rows of `normals` and `uvs` per triangle.
@@ -139,6 +141,10 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
     builder.rows(kind::FREE_DISTANCES, index, parts.free_distances)?;
     if let Some(source) = &parts.source {
         builder.rows(kind::POSITIONS, index, source.positions)?;
+        if let Some(exact) = source.exact.filter(|exact| !exact.positions.is_empty()) {
+            builder.rows(kind::ANCHOR, index, std::slice::from_ref(&exact.anchor))?;
+            builder.rows(kind::EXACT_POSITIONS, index, &exact.positions)?;
+        }
         builder.rows(kind::TRIANGLES, index, source.triangles)?;
         builder.rows(kind::CORNERS, index, source.corners)?;
         builder.rows(kind::NORMALS, index, source.normals)?;

@@ -10,6 +10,7 @@ mod adjacency;
 mod bit_set;
 mod deformable;
 mod deformers;
+mod exact;
 mod free;
 mod groups;
 mod header;
@@ -29,6 +30,7 @@ mod tree;
 mod vertex_motion;
 
 pub(crate) use adjacency::TetAdjacency;
+pub(crate) use exact::check as exact;
 pub(crate) use materials::{image_names, images, materials};
 pub(crate) use scene::check as scene;
 pub(crate) use sequence::sequence;

@@ -6,7 +6,7 @@
 //! between 2^-447 and 2^384, products of four between 2^-596 and 2^512, so nothing here over- or
 //! underflows.
 
-fn two_sum(a: f64, b: f64) -> (f64, f64) {
+pub(crate) fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let b_part = sum - a;
     (sum, (a - (sum - b_part)) + (b - b_part))
@@ -14,7 +14,7 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
 
 /// Exact product as a rounded value and its error (Dekker's splitting: no fused
 /// multiply-add, which not every target has in hardware).
-fn two_product(a: f64, b: f64) -> (f64, f64) {
+pub(super) fn two_product(a: f64, b: f64) -> (f64, f64) {
     fn split(x: f64) -> (f64, f64) {
         let c = 134_217_729.0 * x;
         let high = c - (c - x);

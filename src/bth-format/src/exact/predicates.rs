@@ -1,7 +1,7 @@
 //! Geometric predicates with exact signs: a floating-point filter in `f64`, and exact sums where it
 //! does not decide.
 
-use super::expansion::{Expansion, VOLUME_PARTS};
+use super::expansion::{Expansion, VOLUME_PARTS, two_product};
 use std::cmp::Ordering;
 
 /// Bounds the error of a volume relative to the sum of its products' sizes: each of the six has at
@@ -28,9 +28,10 @@ pub fn side(a: [f32; 3], b: [f32; 3], c: [f32; 3], d: [f32; 3]) -> Ordering {
 }
 
 /// Returns true if a triangle has exactly zero area: whether its projections along the three axes
-/// all have. Exact for finite corners.
-pub fn is_zero_area(corners: [[f32; 3]; 3]) -> bool {
-    let [a, b, c] = corners.map(|p| p.map(f64::from));
+/// all have. Exact for finite corners in f32, and for corners in f64 whose coordinates are in
+/// [`EXACT_RANGE`](crate::object::EXACT_RANGE) or 0.
+pub fn is_zero_area<T: Into<f64> + Copy>(corners: [[T; 3]; 3]) -> bool {
+    let [a, b, c] = corners.map(|p| p.map(T::into));
     [[0, 1], [1, 2], [2, 0]].into_iter().all(|[i, j]| {
         let (p, q) = ((b[i] - a[i]) * (c[j] - a[j]), (b[j] - a[j]) * (c[i] - a[i]));
         if (p - q).abs() > AREA_ERROR * (p.abs() + q.abs()) {
@@ -38,8 +39,10 @@ pub fn is_zero_area(corners: [[f32; 3]; 3]) -> bool {
         }
         let mut sum = Expansion::<12>::new();
         for [p, q] in [[a, b], [b, c], [c, a]] {
-            sum.add_product(p[i], q[j], 1.0);
-            sum.add_product(-p[j], q[i], 1.0);
+            for (product, error) in [two_product(p[i], q[j]), two_product(-p[j], q[i])] {
+                sum.add(error);
+                sum.add(product);
+            }
         }
         sum.value() == 0.0
     })

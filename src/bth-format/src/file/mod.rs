@@ -18,7 +18,7 @@ use crate::Identity;
 use crate::check;
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
-use crate::object::{MAX_LINES, ObjectBounds, ObjectView, Records};
+use crate::object::{ExactPositions, MAX_LINES, ObjectBounds, ObjectView, Records};
 use crate::view;
 use buffer::{Buffer, no_memory};
 use std::path::Path;
@@ -188,10 +188,13 @@ impl File {
         std::str::from_utf8(self.section(NONE, kind::PROVENANCE)?.bytes).ok()
     }
 
-    /// Bytes of the sections that tracing reads; attributes, positions and provenance are not among
-    /// them.
+    /// Bytes of the sections that tracing reads: no attributes, positions in f32 or provenance.
     pub fn resident_bytes(&self) -> u64 {
-        let traced = |e: &&SectionEntry| e.object != NONE && kind::is_traced(e.kind);
+        let traced = |e: &&SectionEntry| {
+            let of_exact =
+                e.kind == kind::TRIANGLES && self.section(e.object, kind::EXACT_POSITIONS).is_some();
+            e.object != NONE && (kind::is_traced(e.kind) || of_exact)
+        };
         self.table().iter().filter(traced).map(|e| e.length).sum()
     }
 
@@ -278,6 +281,8 @@ impl File {
         let grid = self.grid(header).map_err(|e| self.locate(e, object))?;
         let lines: &[CacheLine] = self.slice(object, kind::LINES);
         let bounds = ObjectBounds::new(header);
+        let anchors: &[[f64; 3]] = self.slice(object, kind::ANCHOR);
+        let triangles = self.slice(object, kind::TRIANGLES);
         Ok(ObjectView {
             identity: Identity::new(),
             header,
@@ -298,7 +303,9 @@ impl File {
             free_distances: self.slice(object, kind::FREE_DISTANCES),
             free_levels: self.slice(object, kind::FREE_LEVELS),
             positions: self.slice(object, kind::POSITIONS),
-            triangles: self.slice(object, kind::TRIANGLES),
+            triangles,
+            anchor: anchors.first().copied().unwrap_or_default(),
+            exact: ExactPositions::new(self.slice(object, kind::EXACT_POSITIONS), triangles),
             corners: self.slice(object, kind::CORNERS),
             normals: self.slice(object, kind::NORMALS),
             uvs: self.slice(object, kind::UVS),
@@ -335,10 +342,11 @@ impl File {
     ///
     /// # Errors
     /// As [`Self::object`], `BTH-F101` to `BTH-F147`, `BTH-F149`, `BTH-F160`, `BTH-F161`,
-    /// `BTH-F163` to `BTH-F171` and `BTH-F173` to `BTH-F179`.
+    /// `BTH-F163` to `BTH-F171`, `BTH-F173` to `BTH-F179` and `BTH-F190` to `BTH-F194`.
     pub fn check(&self, object: u32) -> Result<ObjectView<'_>> {
         let view = self.object(object)?;
         check::object(&view).map_err(|e| self.locate(e, object))?;
+        check::exact(&view, self.slice(object, kind::ANCHOR)).map_err(|e| self.locate(e, object))?;
         let materials = self.materials(object);
         check::materials(&materials, view.materials.len(), view.header.triangles)
             .map_err(|e| self.locate(e, object))?;

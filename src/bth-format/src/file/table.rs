@@ -48,13 +48,15 @@ fn max_count(kind: u32) -> u64 {
             limits::MAX_TRIANGLES as u64
         }
         kind::TRIANGLE_PLACES | kind::FREE_DIRECTIONS | kind::FREE_DISTANCES => limits::MAX_TRIANGLES as u64,
-        kind::FREE_LEVELS => 1,
+        kind::FREE_LEVELS | kind::ANCHOR => 1,
         kind::OPACITY_MICRO => limits::MAX_OPACITY_WORDS as u64,
         kind::LEAF_VERTICES => limits::MAX_LEAF_VERTICES as u64,
         kind::TET_LEAVES => Child::INDEX_LIMIT as u64,
         // Links hold rows in 31 bits, other references in 32; NONE is no row.
         kind::TET_FACES | kind::HULL_FACES | kind::TET_VERTICES | kind::INSTANCES => (FACE_BIT - 1) as u64,
-        kind::POSITIONS | kind::NORMALS | kind::UVS | kind::SECOND_UVS => (NONE - 1) as u64,
+        kind::POSITIONS | kind::EXACT_POSITIONS | kind::NORMALS | kind::UVS | kind::SECOND_UVS => {
+            (NONE - 1) as u64
+        }
         kind::GROUP_RUNS | kind::COLOR_CORNERS | kind::SECOND_CORNERS => limits::MAX_TRIANGLES as u64,
         kind::GROUPS | kind::MATERIALS | kind::LABELS => (NONE - 1) as u64,
         kind::SEQUENCE_TIMES | kind::SEQUENCE_POSITIONS => (NONE - 1) as u64,

@@ -57,7 +57,10 @@ kinds! {
     FREE_LEVELS = 13: FreeLevels;
     /// [`super::FreeDistances`] per source triangle, instead of free directions.
     FREE_DISTANCES = 14: FreeDistances;
-    /// `[f32; 3]`: positions of the source, object space; distinct ones but in deformable objects.
+    /// One `[f64; 3]`, if there are `EXACT_POSITIONS`: the origin of object space in the source's.
+    ANCHOR = 15: [f64; 3];
+    /// `[f32; 3]`: positions of the source, object space; distinct ones but in deformable objects
+    /// and next to `EXACT_POSITIONS`.
     POSITIONS = 16: [f32; 3];
     /// `[u32; 3]` per source triangle: rows of `POSITIONS`.
     TRIANGLES = 17: [u32; 3];
@@ -83,6 +86,8 @@ kinds! {
     OPACITY = 28: u32;
     /// `u32`: states of micro-triangles, two bits each.
     OPACITY_MICRO = 29: u32;
+    /// `[f64; 3]`, row by row for `POSITIONS`: the same positions in the source's space, exactly.
+    EXACT_POSITIONS = 30: [f64; 3];
     /// UTF-8 JSON: how the file came about. Not part of the content id.
     PROVENANCE = 32: u8;
     /// [`super::ObjectName`]s, one per object of the file.
@@ -176,6 +181,8 @@ pub const fn is_required(kind: u32) -> bool {
     (OBJECT <= kind && kind <= LEAF_VERTICES)
         || kind == OPACITY
         || kind == OPACITY_MICRO
+        || kind == ANCHOR
+        || kind == EXACT_POSITIONS
         || is_sequence(kind)
         || is_scene(kind)
 }

@@ -4,6 +4,7 @@
 //! view that was not checked may panic; it never reads out of bounds.
 
 mod bounds;
+mod exact;
 mod free;
 mod groups;
 mod leaves;
@@ -14,6 +15,7 @@ mod records;
 mod view;
 
 pub use bounds::{GREATEST_IN_F32, ObjectBounds, WIDENED_RANGE, far_away};
+pub use exact::{EXACT_RANGE, ExactPositions, relative_to_anchor};
 pub use leaves::Unpacked;
 pub(crate) use nodes::MAX_LINES;
 pub use nodes::NodeBase;

@@ -1,6 +1,7 @@
 //! The sections of one object as typed slices, zero-copy.
 
 use super::bounds::ObjectBounds;
+use super::exact::ExactPositions;
 use super::records::Records;
 use crate::Identity;
 use crate::layout::*;
@@ -48,7 +49,12 @@ pub struct ObjectView<'a> {
     pub free_distances: &'a [FreeDistances],
     /// The row of FREE_LEVELS, if there is one.
     pub free_levels: &'a [FreeLevels],
-    /// Positions of the source, object space, if kept; distinct ones but in deformable objects.
+    /// The origin of object space in the source's space; zero without `exact`.
+    pub anchor: [f64; 3],
+    /// The corners of triangles in the source's space, where f32 would not keep them.
+    pub exact: ExactPositions<'a>,
+    /// Positions of the source, object space, if kept; distinct ones but in deformable objects and
+    /// next to `exact`.
     pub positions: &'a [[f32; 3]],
     /// Per source triangle its rows of `positions`, if kept.
     pub triangles: &'a [[u32; 3]],
@@ -100,6 +106,8 @@ impl<'a> ObjectView<'a> {
             free: &[],
             free_distances: &[],
             free_levels: &[],
+            anchor: [0.0; 3],
+            exact: ExactPositions::default(),
             positions: &[],
             triangles: &[],
             corners: &[],

@@ -38,7 +38,7 @@ pub struct Report {
 ///
 /// # Errors
 /// All damaged sections and gaps, and for each object the first violation; at least one error.
-/// Codes are `BTH-F020`, `BTH-F021` and `BTH-F101` to `BTH-F209`. The scene sections count as one
+/// Codes are `BTH-F020`, `BTH-F021` and `BTH-F101` to `BTH-F211`. The scene sections count as one
 /// object.
 pub fn verify(file: &File) -> std::result::Result<Report, Vec<Error>> {
     let mut errors = Vec::new();
@@ -65,7 +65,7 @@ pub fn verify(file: &File) -> std::result::Result<Report, Vec<Error>> {
     if errors.is_empty() { Ok(report) } else { Err(errors) }
 }
 
-/// Checks the geometry of an object whose indices have been checked, BTH-F201 to BTH-F209, and adds
+/// Checks the geometry of an object whose indices have been checked, BTH-F201 to BTH-F211, and adds
 /// the object to a report. Offsets of errors count from the start of the section.
 fn check_object(view: &ObjectView, report: &mut Report) -> Result<()> {
     let placed = tree::check(view)?;
@@ -75,6 +75,7 @@ fn check_object(view: &ObjectView, report: &mut Report) -> Result<()> {
     }
     source::check_dropped(view, &placed)?;
     source::check_displacement(view)?;
+    source::check_rounding(view)?;
     free::check(view)?;
     report.tet_leaves += view.tet_leaves.len() as u64;
     report.triangles += u64::from(view.header.triangles - view.header.dropped);

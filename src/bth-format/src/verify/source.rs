@@ -4,7 +4,7 @@ use super::triangle_set::TriangleSet;
 use crate::error::{Code, Error, Result};
 use crate::exact::is_zero_area;
 use crate::layout::*;
-use crate::object::ObjectView;
+use crate::object::{ObjectView, relative_to_anchor};
 use std::mem::offset_of;
 
 /// The place of a stored triangle in the file, and the code of the invariant that ties it to the
@@ -32,7 +32,7 @@ pub(super) fn check_corners(
         let expected = format!("triangle {id}: {source:?}");
         return Err(Error::within(code, section, at, expected, format!("{corners:?}")));
     }
-    if !view.is_deformable() && is_zero_area(source) {
+    if !view.is_deformable() && has_zero_area(view, id, source) {
         let found = format!("triangle {id} of zero area");
         return Err(Error::within(Code::ZeroArea, section, at, "triangles that can be hit", found));
     }
@@ -44,6 +44,11 @@ pub(super) fn check_corners(
 fn source_corners(view: &ObjectView, id: u32) -> Option<[[f32; 3]; 3]> {
     let corners = view.triangles.get(id as usize)?.map(|v| view.positions[v as usize]);
     Some(view.grid.map_or(corners, |grid| corners.map(|p| grid.nearest(p))))
+}
+
+/// Returns true if a source triangle has zero area, given its corners in f32.
+fn has_zero_area(view: &ObjectView, id: u32, corners: [[f32; 3]; 3]) -> bool {
+    view.exact.corners(id).map_or_else(|| is_zero_area(corners), is_zero_area)
 }
 
 /// BTH-F203 and BTH-F207: as many triangles are skipped as the header says, and all of these have
@@ -58,10 +63,25 @@ pub(super) fn check_dropped(view: &ObjectView, placed: &TriangleSet) -> Result<(
     // Without kept triangles there is nothing to compare, and the header's count must not bound a
     // loop.
     for id in (0..view.triangles.len()).filter(|id| !placed.has(*id as u32)) {
-        if source_corners(view, id as u32).is_some_and(|corners| !is_zero_area(corners)) {
+        let id = id as u32;
+        if source_corners(view, id).is_some_and(|corners| !has_zero_area(view, id, corners)) {
             let found = format!("triangle {id}, which has an area, in no leaf");
             let expected = "triangles of zero area to be left out";
-            return Err(Error::within(Code::ZeroArea, kind::TRIANGLES, 12 * id as u64, expected, found));
+            return Err(Error::within(Code::ZeroArea, kind::TRIANGLES, 12 * u64::from(id), expected, found));
+        }
+    }
+    Ok(())
+}
+
+/// BTH-F211: positions in f32 are the exact ones, rounded once.
+pub(super) fn check_rounding(view: &ObjectView) -> Result<()> {
+    let rows = view.positions.iter().zip(view.exact.positions());
+    for (row, (found, exact)) in rows.enumerate() {
+        let expected = [0, 1, 2].map(|k| relative_to_anchor(exact[k], view.anchor[k]));
+        if expected.map(f32::to_bits) != found.map(f32::to_bits) {
+            let (at, expected) = (12 * row as u64, format!("{expected:?}"));
+            let found = format!("{found:?}");
+            return Err(Error::within(Code::ExactRounding, kind::POSITIONS, at, expected, found));
         }
     }
     Ok(())

@@ -341,7 +341,7 @@ impl Task {
 /// Returns true if a hit is the exact one, or one at the same t but for the accuracy of f64, with t
 /// rounded to f32.
 fn is_right(corners: &[[[f32; 3]; 3]], ray: &StartRay, hit: &Hit) -> bool {
-    let Some(truth) = oracle::starts::nearest(corners, ray) else { return !hit.is_hit() };
+    let Some(truth) = oracle::nearest(corners, ray) else { return !hit.is_hit() };
     let (t, exact) = (f64::from(hit.t), truth.t_f64());
     let half = 0.5 * f64::from(hit.t - hit.t.next_down());
     let at = oracle::starts::intersection(corners, ray, hit.primitive.triangle);

@@ -18,7 +18,7 @@ fn check_against_oracle(corners: &Corners, ray: &Ray, hit: &Hit) {
 
 fn check_start_against_oracle(corners: &Corners, ray: &StartRay, hit: &Hit) {
     let at = |triangle: u32| oracle::starts::intersection(corners, ray, triangle);
-    check_hit(oracle::starts::nearest(corners, ray), at, hit, &format!("{ray:?}"));
+    check_hit(oracle::nearest(corners, ray), at, hit, &format!("{ray:?}"));
 }
 
 fn check_hit(

@@ -1,17 +1,22 @@
 //! The exact intersection of a line and a triangle.
 
-use bth::rays::Ray;
-use num_bigint::BigInt;
+use crate::number::{Coordinate, Number, Point, determinant, dot, exact, sub};
 use num_rational::BigRational;
-use num_traits::{Signed, ToPrimitive, Zero};
+use num_traits::ToPrimitive;
 
-/// A point in integer coordinates, in a unit that the caller chooses.
-pub(crate) type Point = [BigInt; 3];
+/// Rows of a matrix from object to world space.
+pub type Rows = [[f64; 4]; 3];
+
+/// The matrix of objects that nothing moves.
+pub(crate) const IDENTITY: Rows = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
 /// Bounds the error of a determinant in f64 relative to the size of its products.
 const ROUNDING: f64 = 1e-13;
-/// The bound holds for sizes from here on: no product has underflowed.
-const LEAST_SIZE: f64 = 1e-280;
+/// Bounds what underflow adds to the error of a determinant, relative to the direction: three units
+/// of 2^-1074 in each product.
+const UNDERFLOW: f64 = 1e-320;
+/// A magnitude for the underflow of coordinates: 2^52 times three units of 2^-1074, or more.
+const SMALL: f64 = 1e-300;
 
 /// The point at which a line hits a triangle.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,40 +29,136 @@ pub struct Intersection {
     pub v: BigRational,
 }
 
+/// Where a line hits a closed triangle.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum LineHit {
+    /// Nowhere.
+    Missed,
+    /// The line lies in the plane of the triangle, or the triangle has no area.
+    InPlane,
+    /// At one point.
+    At(Intersection),
+}
+
+impl LineHit {
+    /// The point, if there is one.
+    pub fn at(self) -> Option<Intersection> {
+        match self {
+            LineHit::At(at) => Some(at),
+            LineHit::Missed | LineHit::InPlane => None,
+        }
+    }
+}
+
 /// A quotient rounded to the nearest f64.
 pub fn to_f64(t: &BigRational) -> f64 {
-    t.to_f64().expect("quotients of f32 input are within the range of f64")
+    t.to_f64().expect("every quotient is rounded to a number or an infinity")
 }
 
-/// A finite f32 as an integer, in units of the smallest positive f32, 2^-149.
-pub(crate) fn integer(x: f32) -> BigInt {
-    assert!(x.is_finite());
-    let (exponent, fraction) = ((x.to_bits() >> 23) & 0xff, x.to_bits() & 0x7f_ffff);
-    let magnitude = match exponent {
-        0 => BigInt::from(fraction),
-        e => BigInt::from(fraction | 0x80_0000) << (e - 1),
-    };
-    if x.is_sign_negative() { -magnitude } else { magnitude }
+/// A triangle in world space: the images of its corners under a matrix, as real numbers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Placed<'a> {
+    corners: [[f64; 3]; 3],
+    to_world: &'a Rows,
 }
 
-pub(crate) fn sub(a: &Point, b: &Point) -> Point {
-    [0, 1, 2].map(|k| &a[k] - &b[k])
+impl<'a> Placed<'a> {
+    pub(crate) fn new<T: Coordinate>(corners: [[T; 3]; 3], to_world: &'a Rows) -> Placed<'a> {
+        Placed { corners: corners.map(|p| p.map(Into::into)), to_world }
+    }
+
+    /// The corners.
+    pub(crate) fn exact(&self) -> [Point; 3] {
+        let rows = self.to_world.map(|row| row.map(Number::from));
+        self.corners.map(exact).map(|p| {
+            [0, 1, 2].map(|k| {
+                let [a, b, c, moved] = &rows[k];
+                &dot(&[a.clone(), b.clone(), c.clone()], &p) + moved
+            })
+        })
+    }
+
+    /// The corners relative to a point, rounded, and a `magnitude` for [`certainly_missed`].
+    fn rounded(&self, point: [f64; 3]) -> ([[f64; 3]; 3], f64) {
+        let mut magnitude: f64 = 0.0;
+        let corners = self.corners.map(|p| {
+            [0, 1, 2].map(|k| {
+                let [a, b, c, moved] = self.to_world[k];
+                let terms = [a * p[0], b * p[1], c * p[2], moved, -point[k]];
+                // Five terms with one rounding each and four sums: below 8 roundings of the sum of
+                // their magnitudes.
+                magnitude = magnitude.max(8.0 * terms.iter().map(|x| x.abs()).sum::<f64>() + SMALL);
+                terms.iter().sum()
+            })
+        });
+        (corners, magnitude)
+    }
 }
 
-pub(crate) fn determinant(a: &Point, b: &Point, c: &Point) -> BigInt {
-    let minor = |i: usize, j: usize| &b[i] * &c[j] - &b[j] * &c[i];
-    &a[0] * minor(1, 2) + &a[1] * minor(2, 0) + &a[2] * minor(0, 1)
+/// The line through `point / scale` along `direction`.
+#[derive(Clone, Debug)]
+pub(crate) struct Line {
+    pub(crate) point: Point,
+    pub(crate) scale: Number,
+    pub(crate) direction: Point,
+    /// The point, rounded, and the direction.
+    rounded: [[f64; 3]; 2],
 }
 
-/// Returns true if a ray defines a line: its coordinates are finite and its direction is not zero.
-pub(crate) fn has_line(ray: &Ray) -> bool {
-    ray.origin.iter().chain(&ray.direction).all(|x| x.is_finite()) && ray.direction != [0.0; 3]
+impl Line {
+    /// The line through a point of floating-point numbers.
+    pub(crate) fn through(point: [f64; 3], direction: [f64; 3]) -> Line {
+        let rounded = [point, direction];
+        Line { point: exact(point), scale: Number::from(1.0), direction: exact(direction), rounded }
+    }
+
+    pub(crate) fn new((point, scale): (Point, Number), direction: [f64; 3]) -> Line {
+        let near = [0, 1, 2].map(|k| to_f64(&point[k].over(&scale)));
+        Line { point, scale, direction: exact(direction), rounded: [near, direction] }
+    }
+
+    /// Corners relative to the point, all times `scale`.
+    pub(crate) fn relative(&self, corners: &[Point; 3]) -> [Point; 3] {
+        [0, 1, 2].map(|i| sub(&corners[i].each_ref().map(|x| x * &self.scale), &self.point))
+    }
+
+    pub(crate) fn certainly_misses(&self, triangle: &Placed<'_>) -> bool {
+        let [point, direction] = self.rounded;
+        let (corners, magnitude) = triangle.rounded(point);
+        certainly_missed(direction, corners, magnitude)
+    }
+
+    /// Where the line hits a triangle.
+    pub(crate) fn hit(&self, triangle: &Placed<'_>) -> LineHit {
+        match self.certainly_misses(triangle) {
+            true => LineHit::Missed,
+            false => hit(&self.relative(&triangle.exact()), &self.direction, &self.scale),
+        }
+    }
+}
+
+/// Where the line through 0 along `d` hits the triangle of `corners / scale`.
+pub(crate) fn hit([a, b, c]: &[Point; 3], d: &Point, scale: &Number) -> LineHit {
+    let sides = [determinant(d, b, c), determinant(d, c, a), determinant(d, a, b)];
+    match (sides.iter().any(Number::is_positive), sides.iter().any(Number::is_negative)) {
+        (true, true) => return LineHit::Missed,
+        (false, false) => return LineHit::InPlane,
+        _ => {}
+    }
+    let [w, u, v] = sides;
+    let whole = &(&w + &u) + &v;
+    LineHit::At(Intersection {
+        t: determinant(a, b, c).over(&(&whole * scale)),
+        u: u.over(&whole),
+        v: v.over(&whole),
+    })
 }
 
 /// Returns true if a line certainly misses a triangle. The corners are relative to the origin of
 /// the line; each coordinate has an error of at most 2^-52 times the sum of `magnitude` and itself.
-pub(crate) fn certainly_missed(direction: [f64; 3], corners: [[f64; 3]; 3], magnitude: f64) -> bool {
+fn certainly_missed(direction: [f64; 3], corners: [[f64; 3]; 3], magnitude: f64) -> bool {
     let (mut positive, mut negative) = (false, false);
+    let underflow = UNDERFLOW * (1.0 + direction.iter().map(|x| x.abs()).sum::<f64>());
     for (p, q) in [(0, 1), (1, 2), (2, 0)] {
         let (mut value, mut size) = (0.0, 0.0);
         for (i, j, k) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
@@ -66,112 +167,77 @@ pub(crate) fn certainly_missed(direction: [f64; 3], corners: [[f64; 3]; 3], magn
             value += direction[i] * (x - y);
             size += direction[i].abs() * (reach(p, j) * reach(q, k) + reach(p, k) * reach(q, j));
         }
-        if size > LEAST_SIZE {
-            positive |= value > ROUNDING * size;
-            negative |= value < -ROUNDING * size;
-        }
+        let bound = ROUNDING * size + underflow;
+        positive |= value > bound;
+        negative |= value < -bound;
     }
     positive && negative
 }
 
-/// The intersection of the line through `origin` along `direction` with a closed triangle; all in
-/// the same unit.
-pub(crate) fn intersect_exactly(
-    origin: &Point,
-    direction: &Point,
-    corners: &[Point; 3],
-) -> Option<Intersection> {
-    let [a, b, c] = [0, 1, 2].map(|i| sub(&corners[i], origin));
-    let sides =
-        [determinant(direction, &b, &c), determinant(direction, &c, &a), determinant(direction, &a, &b)];
-    let (positive, negative) = (sides.iter().any(Signed::is_positive), sides.iter().any(Signed::is_negative));
-    // With both signs the line misses. With neither the line lies in the plane, or the triangle has
-    // no area in the projection along it.
-    if positive == negative {
-        return None;
-    }
-    let whole: BigInt = sides.iter().sum();
-    debug_assert!(!whole.is_zero());
-    let [_, u, v] = sides;
-    Some(Intersection {
-        t: BigRational::new(determinant(&a, &b, &c), whole.clone()),
-        u: BigRational::new(u, whole.clone()),
-        v: BigRational::new(v, whole),
-    })
-}
-
-/// The intersection of the whole line of a ray, in both directions and whatever its range, with a
-/// closed triangle.
-pub fn intersection(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Intersection> {
-    if !has_line(ray) {
-        return None;
-    }
-    let from = corners.map(|p| [0, 1, 2].map(|k| f64::from(p[k]) - f64::from(ray.origin[k])));
-    if certainly_missed(ray.direction.map(f64::from), from, 0.0) {
-        return None;
-    }
-    intersect_exactly(&ray.origin.map(integer), &ray.direction.map(integer), &corners.map(|p| p.map(integer)))
-}
-
-/// Returns true if the direction of a ray and the normal (b-a)×(c-a) of a triangle point to
-/// opposite sides, so that the ray comes from the side from which the corners appear
-/// counter-clockwise. False if they are perpendicular.
-pub fn is_front(ray: &Ray, corners: [[f32; 3]; 3]) -> bool {
-    let [a, b, c] = corners.map(|p| p.map(integer));
-    let whole = determinant(&ray.direction.map(integer), &sub(&b, &a), &sub(&c, &a));
-    whole.is_negative()
+/// Returns where the whole line through `origin` along `direction`, which is not zero, hits a
+/// triangle. All coordinates must be finite.
+pub fn line_hit<T: Coordinate>(origin: [T; 3], direction: [T; 3], corners: [[T; 3]; 3]) -> LineHit {
+    Line::through(origin.map(Into::into), direction.map(Into::into)).hit(&Placed::new(corners, &IDENTITY))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use num_bigint::BigInt;
     use proptest::prelude::*;
 
-    fn number() -> impl Strategy<Value = f32> {
-        let bits = any::<u32>().prop_map(f32::from_bits).prop_filter("finite", |x| x.is_finite());
+    /// Numbers of every size that an f64 times 2^`down` has.
+    fn number() -> impl Strategy<Value = f64> {
+        let finite = |x: &f64| x.is_finite();
         prop_oneof![
-            (-3i32..4).prop_map(|x| x as f32),
-            -1.0f32..1.0,
-            bits,
-            Just(f32::MAX),
-            Just(1e-45),
-            Just(-0.0)
+            (-3i32..4).prop_map(f64::from),
+            -1.0f64..1.0,
+            any::<u32>().prop_map(|x| f64::from(f32::from_bits(x))).prop_filter("finite", finite),
+            any::<u64>().prop_map(f64::from_bits).prop_filter("finite", finite),
+            Just(f64::MAX),
+            Just(f64::from_bits(1)),
+            Just(-0.0),
         ]
     }
 
-    fn ray() -> impl Strategy<Value = Ray> {
-        let point = || prop::array::uniform3(number());
-        (point(), point()).prop_map(|(origin, direction)| Ray {
-            origin,
-            tmin: 0.0,
-            direction,
-            tmax: f32::INFINITY,
-        })
+    fn points() -> impl Strategy<Value = [[f64; 3]; 3]> {
+        prop::array::uniform3(prop::array::uniform3(number()))
     }
 
     #[test]
-    fn integers_are_the_numbers() {
-        let power = |bits: u32| BigInt::from(1) << bits;
-        assert_eq!(integer(f32::from_bits(1)), power(0));
-        assert_eq!(integer(-f32::MIN_POSITIVE), -power(23));
-        assert_eq!(integer(1.5), power(149) + power(148));
-        assert_eq!(integer(f32::MAX), power(277) - power(253));
+    fn a_step_of_f64_decides_at_large_coordinates() {
+        let far = [5.5e6, 4.2e5, 300.0];
+        let at = |x: f64, y: f64, z: f64| [far[0] + x, far[1] + y, far[2] + z];
+        let corners = [at(0.0, 0.0, 0.0), at(4.0, 0.0, 0.0), at(0.0, 4.0, 0.0)];
+        let (step, down) = (2f64.powi(-30), [0.0, 0.0, -1.0]);
+        let found =
+            line_hit(at(0.0, 1.0, 8.0), down, corners).at().expect("the edge belongs to the triangle");
+        assert_eq!((to_f64(&found.t), to_f64(&found.v)), (8.0, 0.25));
+        assert_eq!(line_hit(at(-step, 1.0, 8.0), down, corners), LineHit::Missed);
+        assert_eq!(line_hit(at(0.0, 1.0, 0.0), [1.0, 0.0, 0.0], corners), LineHit::InPlane);
     }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(3000))]
         /// The filter never skips a triangle that the line hits.
         #[test]
-        fn the_filter_changes_no_intersection(ray in ray(), corners in prop::array::uniform3(prop::array::uniform3(number()))) {
-            prop_assume!(has_line(&ray));
-            let exact = intersect_exactly(&ray.origin.map(integer), &ray.direction.map(integer), &corners.map(|p| p.map(integer)));
-            prop_assert_eq!(intersection(&ray, corners), exact);
+        fn the_filter_changes_no_intersection(
+            [origin, direction, moved] in points(),
+            corners in points(),
+            linear in points(),
+            is_placed in any::<bool>(),
+        ) {
+            let rows = [0, 1, 2].map(|k| [linear[k][0], linear[k][1], linear[k][2], moved[k]]);
+            let placed = Placed::new(corners, if is_placed { &rows } else { &IDENTITY });
+            prop_assume!(direction != [0.0; 3]);
+            let line = Line::through(origin, direction);
+            prop_assert_eq!(line.hit(&placed).at(), hit(&line.relative(&placed.exact()), &line.direction, &line.scale).at());
         }
 
         /// A ray aimed at a point of a triangle from outside its plane hits it with the t, u and v
         /// of that point.
         #[test]
-        fn a_point_of_a_triangle_is_met_there(
+        fn a_point_of_a_triangle_is_hit_there(
             corners in prop::array::uniform3(prop::array::uniform3(-50i32..50)),
             weights in (0i32..9).prop_flat_map(|a| (Just(a), 0..9 - a)),
             origin in prop::array::uniform3(-50i32..50),
@@ -182,15 +248,14 @@ mod tests {
             let target = [0, 1, 2].map(|k| (a * corners[0][k] + b * corners[1][k] + c * corners[2][k]) as f32);
             let (origin, scaled) = (f(origin), corners.map(f));
             let direction = [0, 1, 2].map(|k| (target[k] - origin[k]) / 4.0);
-            let ray = Ray::new(origin, direction);
-            if let Some(found) = intersection(&ray, scaled) {
-                let eighth = |n: i32| BigRational::new(n.into(), 8.into());
+            prop_assume!(direction != [0.0; 3]);
+            if let Some(found) = line_hit(origin, direction, scaled).at() {
+                let eighth = |n: i32| BigRational::new(n.into(), BigInt::from(8));
                 prop_assert_eq!(found, Intersection { t: eighth(32), u: eighth(b), v: eighth(c) });
             } else {
                 // There is no intersection only when the line lies in the plane or the triangle has
                 // no area.
-                let p = |q: [f32; 3]| sub(&q.map(integer), &origin.map(integer));
-                let [x, y, z] = scaled.map(p);
+                let [x, y, z] = scaled.map(|q| sub(&exact(q), &exact(origin)));
                 prop_assert!(determinant(&x, &y, &z).is_zero());
             }
         }

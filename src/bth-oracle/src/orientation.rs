@@ -1,7 +1,6 @@
 //! The exact orientation of tetrahedra.
 
-use crate::intersection::{determinant, integer, sub};
-use num_bigint::{BigInt, Sign};
+use crate::number::{Coordinate, cross, dot, exact, sub};
 use std::cmp::Ordering;
 
 /// On which side of the plane through the first three points the fourth lies: `Greater` where (b −
@@ -9,14 +8,10 @@ use std::cmp::Ordering;
 ///
 /// # Panics
 /// If a coordinate is not finite.
-pub fn orientation(points: [[f32; 3]; 4]) -> Ordering {
-    let [a, b, c, d] = points.map(|p| p.map(integer));
-    let volume: BigInt = determinant(&sub(&b, &a), &sub(&c, &a), &sub(&d, &a));
-    match volume.sign() {
-        Sign::Plus => Ordering::Greater,
-        Sign::NoSign => Ordering::Equal,
-        Sign::Minus => Ordering::Less,
-    }
+pub fn orientation<T: Coordinate>(points: [[T; 3]; 4]) -> Ordering {
+    let [a, b, c, d] = points.map(exact);
+    let volume = dot(&cross(&sub(&b, &a), &sub(&c, &a)), &sub(&d, &a));
+    volume.is_positive().cmp(&volume.is_negative())
 }
 
 #[cfg(test)]
@@ -26,7 +21,7 @@ mod tests {
     #[test]
     fn a_point_above_on_and_below_a_plane() {
         let face = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-        let with = |z: f32| orientation([face[0], face[1], face[2], [0.3, 0.3, z]]);
-        assert_eq!([1e-45, 0.0, -1e-45].map(with), [Ordering::Greater, Ordering::Equal, Ordering::Less]);
+        let with = |z| orientation([face[0], face[1], face[2], [0.3, 0.3, z]]);
+        assert_eq!([1e-45f32, 0.0, -1e-45].map(with), [Ordering::Greater, Ordering::Equal, Ordering::Less]);
     }
 }

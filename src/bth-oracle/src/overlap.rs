@@ -1,12 +1,13 @@
 //! Decides if a triangle overlaps a box, by cutting the triangle to the box exactly.
 
+use crate::number::Coordinate;
 use num_rational::BigRational;
 use num_traits::Zero;
 
 type Polygon = Vec<[BigRational; 3]>;
 
-fn exact(x: f32) -> BigRational {
-    BigRational::from_float(x).expect("a finite number")
+fn exact<T: Coordinate>(x: T) -> BigRational {
+    BigRational::from_float(x.into()).expect("a finite number")
 }
 
 /// The part of a convex polygon in the half space where `sign * (p[axis] - plane)` is not negative
@@ -29,7 +30,7 @@ fn cut(polygon: &Polygon, axis: usize, plane: &BigRational, sign: i32) -> Polygo
 }
 
 /// Returns true if a closed triangle and a closed box of finite coordinates have a point in common.
-pub fn overlaps_box(lower: [f32; 3], upper: [f32; 3], corners: [[f32; 3]; 3]) -> bool {
+pub fn overlaps_box<T: Coordinate>(lower: [T; 3], upper: [T; 3], corners: [[T; 3]; 3]) -> bool {
     let mut polygon: Polygon = corners.iter().map(|p| p.map(exact)).collect();
     for k in 0..3 {
         polygon = cut(&polygon, k, &exact(lower[k]), 1);

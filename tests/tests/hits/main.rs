@@ -53,7 +53,7 @@ fn check_against_oracle(scene: &Scene, triangles: &[Triangle], ray: &Ray) -> usi
     hits.sort_by_key(|hit| hit.primitive.triangle);
     let mut remaining = hits.iter();
     for triangle in triangles {
-        let Some(at) = oracle::intersection(&ray, triangle.corners) else { continue };
+        let Some(at) = oracle::intersection(ray, triangle.corners) else { continue };
         let t = oracle::to_f64(&at.t) as f32;
         if t.is_infinite() {
             continue;
@@ -67,7 +67,7 @@ fn check_against_oracle(scene: &Scene, triangles: &[Triangle], ray: &Ray) -> usi
             assert!(error <= 2f64.powi(-24), "weight {found}: {}", context());
         }
         // The hit with the other side culled.
-        let (seen, other) = match oracle::is_front(&ray, triangle.corners) {
+        let (seen, other) = match oracle::is_front(ray, triangle.corners) {
             true => (Cull::Back, Cull::Front),
             false => (Cull::Front, Cull::Back),
         };

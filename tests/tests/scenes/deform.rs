@@ -80,7 +80,7 @@ fn new_positions_have_the_answers_of_a_new_compilation() {
         hits += compare(&fresh, &scene, 0, rng);
         let exact = World::new(&scene);
         for ray in crate::built::rays(&scene, rng, 10) {
-            let (found, truth) = (scene.nearest(&ray), exact.hit(&ray));
+            let (found, truth) = (scene.nearest(&ray), exact.hit(ray));
             assert_eq!(found.map_or(f32::INFINITY, |hit| hit.t), truth.t, "kind {kind}: {ray:?}");
         }
         assert!(kind % 7 != 6 || update.deformed_cost_ratio > 3.0, "{}", update.deformed_cost_ratio);

@@ -82,7 +82,7 @@ fn check_all(scene: &Scene, corners: &Corners, ray: &StartRay, nearest: Option<H
     let context = || format!("{context}: {ray:?}");
     let (mut all, mut some) = (Vec::new(), Vec::new());
     scene.all_hits(ray, &everything, &mut all);
-    let truth = starts::all_hits(corners, ray);
+    let truth = oracle::all_hits(corners, ray);
     let sorted = |ids: Vec<u32>| {
         let mut ids = ids;
         ids.sort_unstable();
@@ -102,7 +102,7 @@ fn check_all(scene: &Scene, corners: &Corners, ray: &StartRay, nearest: Option<H
     }
     let even = |_: &Ray, hit: &Hit| hit.primitive.triangle.is_multiple_of(2);
     let at_origin = Ray::new([0.0; 3], ray.direction);
-    let is_front = |hit: &Hit| oracle::is_front(&at_origin, corners[hit.primitive.triangle as usize]);
+    let is_front = |hit: &Hit| oracle::is_front(at_origin, corners[hit.primitive.triangle as usize]);
     let conditions: [Condition<'_>; 5] = [
         (Accept { filter: Some(&even), ..everything }, &|hit| hit.primitive.triangle.is_multiple_of(2)),
         (Accept { cull: Cull::Back, ..everything }, &is_front),
@@ -119,7 +119,7 @@ fn check_all(scene: &Scene, corners: &Corners, ray: &StartRay, nearest: Option<H
         assert!(some.iter().map(bits).eq(left.iter().copied()), "{accept:?}: {}", context());
         assert_eq!(scene.count_hits(ray, &accept), left.len(), "{accept:?}: {}", context());
     }
-    assert_eq!(scene.crossings(ray), starts::crossings(corners, ray), "crossings of {}", context());
+    assert_eq!(scene.crossings(ray), oracle::crossings(corners, ray), "crossings of {}", context());
 }
 
 /// Checks rays from the triangles of a scene of one object against the oracle, and on every
@@ -141,10 +141,10 @@ pub(crate) fn check_with(
     Isa::Scalar.choose().expect("it is everywhere");
     let expected = alone(scene, rays);
     for (ray, hit) in rays.iter().zip(&expected) {
-        let truth = starts::nearest(corners, ray);
+        let truth = oracle::nearest(corners, ray);
         check_nearest(corners, ray, hit, truth.as_ref(), context);
         assert_eq!(scene.any(ray), truth.is_some(), "{context}: any hit of {ray:?}");
-        assert_eq!(starts::any(corners, ray), truth.is_some(), "{ray:?}");
+        assert_eq!(oracle::any(corners, ray), truth.is_some(), "{ray:?}");
     }
     check_isas(scene, rays, &expected, context, check_one);
     expected.iter().filter(|hit| hit.is_hit()).count()

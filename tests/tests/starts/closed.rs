@@ -33,9 +33,9 @@ fn starts_into_a_closed_surface_hit_it_again() {
                 Start { primitive: PrimitiveRef { instance: 0, triangle }, u, v }.ray(direction);
             let line = bth::rays::Ray::new([0.0; 3], direction);
             let to_front = bth::rays::Ray::new([0.0; 3], direction.map(|x| -x));
-            if is_front(&line, corners[triangle as usize]) {
+            if is_front(line, corners[triangle as usize]) {
                 inward.push(ray);
-            } else if is_front(&to_front, corners[triangle as usize]) {
+            } else if is_front(to_front, corners[triangle as usize]) {
                 outward.push(ray);
             }
         }

@@ -108,7 +108,7 @@ fn ranges_that_share_an_end_hold_each_crossing_once() {
         let found = |from: f32, to: f32| {
             let ray = ray.with_range(from, to);
             let found = scene.crossings(&ray);
-            assert_eq!(found, oracle::crossings(&corners, &ray), "{ray:?}");
+            assert_eq!(found, oracle::crossings(&corners, ray), "{ray:?}");
             found
         };
         let ends = [f32::NEG_INFINITY, -1.0, 0.0, 0.5, 1.0, f32::INFINITY];

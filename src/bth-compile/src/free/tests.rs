@@ -146,10 +146,10 @@ fn check_found(mesh: &Mesh, free: &Free, rays: usize, seed: u64) -> usize {
         let within = free_bin(&axes, other).map_or(0.0, |found| free.distance(triangle, found));
         let direction = direction.map(|x| (x / length) as f32);
         let ray = Ray::new(start(&mut random, corners, direction), direction);
-        let Some(from) = intersection(&ray, corners).filter(|_| within > 0.0) else { continue };
+        let Some(from) = intersection(ray, corners).filter(|_| within > 0.0) else { continue };
         used += 1;
         for other in 0..mesh.triangles.len() as u32 {
-            let Some(hit) = intersection(&ray, mesh.corners(other)).filter(|hit| hit.t > from.t) else {
+            let Some(hit) = intersection(ray, mesh.corners(other)).filter(|hit| hit.t > from.t) else {
                 continue;
             };
             let distance = to_f64(&(hit.t - &from.t));

@@ -116,7 +116,7 @@ fn affordable(alone: &Scene, all: &[Triangle]) -> usize {
         return RAYS[0];
     }
     let (world, starts) = (World::new(alone), rays::sample(all, ESTIMATE, 0));
-    let crossed: usize = starts.par_iter().map(|start| world.crossed(&start.ray)).sum();
+    let crossed: usize = starts.par_iter().map(|start| world.crossed(start.ray)).sum();
     let tests = all.len() + INTERSECTION * crossed / starts.len().max(1);
     (TESTS / tests).clamp(RAYS[0], RAYS[1])
 }
@@ -142,12 +142,12 @@ fn check_pose(
             return Err(Failure::Compile(Error::Cancelled));
         }
         let (ray, start_ray) = (&start.ray, start.start_ray(instance));
-        let (truth, from_start) = (world.nearest(ray), world.nearest_from_start(&start_ray));
+        let (truth, from_start) = (world.nearest(ray), world.nearest(start_ray));
         let at = |id| intersection(ray, corners_of(id)?);
         // The first of two triangles is the start.
         let mut of_two = start_ray;
         of_two.start.primitive.triangle = 0;
-        let at_from_start = |id| starts::intersection(&[start.triangle.corners, corners_of(id)?], &of_two, 1);
+        let at_from_start = |id| starts::intersection(&[start.triangle.corners, corners_of(id)?], of_two, 1);
         let t = truth.as_ref().map(ExactHit::t_f64);
         let known = bounds::known(&view, start);
         let found = plain

@@ -3,7 +3,7 @@
 
 use bth::SegmentEnd;
 use bth::rays::{PrimitiveRef, Start, StartRay};
-use bth_oracle::{LineHit, line_hit, starts, to_f64};
+use bth_oracle::{LineHit, line_hit, nearest, starts, to_f64};
 use bth_random::Rng;
 use glam::DVec3;
 
@@ -179,7 +179,7 @@ impl Surface {
         let ids = self.with_near([own], self.point(start), direction);
         let primitive = PrimitiveRef { instance: 0, triangle: 0 };
         let ray = StartRay { start: Start { primitive, ..*start }, ..start.ray(direction.map(|x| x as f32)) };
-        starts::nearest(&self.narrow(&ids), &ray).map_or(ExactAnswer::Miss, |hit| {
+        nearest(&self.narrow(&ids), ray).map_or(ExactAnswer::Miss, |hit| {
             let mut triangles: Vec<u32> = hit.triangles.iter().map(|row| ids[*row as usize]).collect();
             triangles.sort_unstable();
             triangles.dedup();
@@ -244,7 +244,7 @@ mod tests {
         for _ in 0..200 {
             let mut point = || [(); 3].map(|()| rng.between(-1.2, 1.2) as f32);
             let (origin, direction) = (point(), point());
-            let expected = bth_oracle::nearest(&all, &bth::rays::Ray::new(origin, direction));
+            let expected = bth_oracle::nearest(&all, bth::rays::Ray::new(origin, direction));
             let found = surface.nearest(origin.map(f64::from), direction.map(f64::from));
             match (found, expected) {
                 (Some(ExactAnswer::Hit { t, triangles, .. }), Some(hit)) => {

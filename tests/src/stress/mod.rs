@@ -10,12 +10,16 @@ mod inside;
 mod rays;
 mod shapes;
 mod statistics;
+mod tile_rays;
+mod tiles;
 
 pub use grid::{Grid, GridRay, LIMIT, Point, Quotient};
 pub use inside::{Corners, InsideStatistics, is_closed, run_inside};
 pub use rays::{Aimed, Kind, Target, rays};
 pub use shapes::{Shape, shapes};
 pub use statistics::Statistics;
+pub use tile_rays::run_tiles;
+pub use tiles::{Tiles, tiles};
 
 use crate::structures::{Traced, bits};
 use bth::Isa;

@@ -91,8 +91,12 @@ impl Statistics {
     }
 
     fn example(&mut self, what: &str, shape: &Shape, aimed: &Aimed, hit: &Hit) {
+        self.add_example(format_args!("{what}: {}: {aimed:?} {hit:?}", shape.name));
+    }
+
+    pub(super) fn add_example(&mut self, example: std::fmt::Arguments<'_>) {
         if self.examples.len() < 8 {
-            self.examples.push(format!("{what}: {}: {aimed:?} {hit:?}", shape.name));
+            self.examples.push(example.to_string());
         }
     }
 
@@ -107,7 +111,7 @@ impl Statistics {
                 self.ghosts += 1;
                 self.example("ghost", shape, aimed, hit);
             } else if let Some(exact) = exact {
-                self.error(exact, hit.t);
+                self.error(exact.value(), hit.t);
             }
         } else if aimed.kind == Kind::Inside && !shape.inside.is_empty() {
             self.leaks += 1;
@@ -120,9 +124,9 @@ impl Statistics {
         }
     }
 
-    fn error(&mut self, exact: Quotient, t: f32) {
+    pub(super) fn error(&mut self, exact: f64, t: f32) {
         let ulp = f64::from(t.abs().next_up()) - f64::from(t.abs());
-        let error = (f64::from(t) - exact.value()).abs() / ulp;
+        let error = (f64::from(t) - exact).abs() / ulp;
         self.worst = self.worst.max(error);
         self.histogram[((error * 8.0) as usize).min(BINS - 1)] += 1;
     }

@@ -6,3 +6,4 @@ mod instances;
 mod invariance;
 mod random_meshes;
 mod surfaces;
+mod tiles;

@@ -7,7 +7,7 @@ use crate::scene::NativeScene;
 use crate::work;
 use bth_cache::Store;
 use bth_compile::cached::Cache;
-use bth_compile::memory::{self, Instance, TriangleMesh};
+use bth_compile::memory::{self, Instance, PositionRows, TriangleMesh};
 use bth_compile::pipeline::CompileOptions;
 use bth_compile::scene::{CachePolicy, SceneSource};
 use bth_compile::{Monitor, write};
@@ -241,7 +241,7 @@ fn triangle_mesh<'a>(
     let contiguous = |_| PyValueError::new_err("expected contiguous arrays of positions and triangles");
     let (positions, _) = positions.as_slice().map_err(contiguous)?.as_chunks::<3>();
     let (triangles, _) = triangles.as_slice().map_err(contiguous)?.as_chunks::<3>();
-    Ok(TriangleMesh { positions, triangles })
+    Ok(TriangleMesh { positions: PositionRows::F32(positions), triangles })
 }
 
 /// The files that a compilation of a file reads, itself among them.

@@ -2,7 +2,7 @@
 
 use bth_compile::cached::Cache;
 use bth_compile::coordinates::CoordinateOptions;
-use bth_compile::memory::{self, Instance, TriangleMesh};
+use bth_compile::memory::{self, Instance, PositionRows, TriangleMesh};
 use bth_compile::pipeline::{self, CompileOptions, Structure};
 use bth_compile::{Monitor, Silent};
 use bth_format::layout::{GridBits, kind};
@@ -23,7 +23,7 @@ fn models() -> Vec<(&'static str, Model)> {
 }
 
 fn mesh(model: &Model) -> TriangleMesh<'_> {
-    TriangleMesh { positions: &model.positions, triangles: &model.triangles }
+    TriangleMesh { positions: PositionRows::F32(&model.positions), triangles: &model.triangles }
 }
 
 /// Options that lead through different stages, those with tetrahedra where the worker exists.

@@ -5,9 +5,9 @@ use super::bounds::Bounds;
 use super::extent::Extent;
 use super::split::Reference;
 use super::{BinaryBvh, MAX_LEVELS, Node, binned_split, linked_tree::LinkedTree, reinsertion, sweep_split};
+use bth_import::Mesh;
 use bth_import::error::{Error, Result};
 use bth_import::monitor::Monitor;
-use bth_import::{Mesh, is_zero_area};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -127,7 +127,7 @@ pub(super) fn over_used(
 ) -> Result<(BinaryBvh, BvhReport)> {
     check_mesh(mesh)?;
     let ids = (0..mesh.triangles.len() as u32).into_par_iter();
-    let used: Vec<u32> = ids.filter(|id| keep_zero_area || !is_zero_area(mesh.corners(*id))).collect();
+    let used: Vec<u32> = ids.filter(|id| keep_zero_area || !mesh.has_zero_area(*id)).collect();
     let mut report = BvhReport {
         triangles: used.len() as u64,
         dropped: (mesh.triangles.len() - used.len()) as u64,

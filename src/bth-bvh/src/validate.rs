@@ -4,7 +4,7 @@ use super::{BinaryBvh, Wide};
 use bth_format::layout::{
     BOX_MARGIN, Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, NONE, RAW_LINES, RawLeaf, WideNode,
 };
-use bth_import::{Mesh, is_zero_area};
+use bth_import::Mesh;
 use std::collections::BTreeSet;
 use zerocopy::{FromBytes, IntoBytes};
 
@@ -20,7 +20,7 @@ fn bounds_of(mesh: &Mesh, ids: &[u32]) -> Box3 {
 }
 
 fn hittable(mesh: &Mesh) -> Vec<u32> {
-    (0..mesh.triangles.len() as u32).filter(|&id| !is_zero_area(mesh.corners(id))).collect()
+    (0..mesh.triangles.len() as u32).filter(|&id| !mesh.has_zero_area(id)).collect()
 }
 
 /// Asserts the contract of `BinaryBvh`. Quadratic in the depth of the tree. Returns the edges on

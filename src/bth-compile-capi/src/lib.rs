@@ -8,7 +8,7 @@ pub mod options;
 
 use bth_cache::{DEFAULT_CAP, Store};
 use compiler::cached::Cache;
-use compiler::memory::{self, Instance, TriangleMesh};
+use compiler::memory::{self, Instance, PositionRows, TriangleMesh};
 use compiler::pipeline::{self, CompileOptions, Structure};
 use compiler::write::Content;
 use compiler::{Error, Monitor};
@@ -165,7 +165,7 @@ impl Mesh {
         // SAFETY: the contract of this function is the contract of `slice`.
         unsafe {
             Ok(TriangleMesh {
-                positions: slice(self.positions, self.position_count, "positions")?,
+                positions: PositionRows::F32(slice(self.positions, self.position_count, "positions")?),
                 triangles: slice(self.triangles, self.triangle_count, "triangles")?,
             })
         }

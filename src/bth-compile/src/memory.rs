@@ -7,11 +7,11 @@
 //! manifest whose nodes are called `instance 0`, `instance 1` and so on.
 //!
 //! ```
-//! use bth_compile::memory::{TriangleMesh, open};
+//! use bth_compile::memory::{PositionRows, TriangleMesh, open};
 //! use bth_compile::{Silent, pipeline::CompileOptions};
 //!
 //! let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-//! let mesh = TriangleMesh { positions: &positions, triangles: &[[0, 1, 2]] };
+//! let mesh = TriangleMesh { positions: PositionRows::F32(&positions), triangles: &[[0, 1, 2]] };
 //! let scene = open(mesh, &CompileOptions::default(), &Silent)?;
 //! let ray = bth::rays::Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
 //! assert_eq!(scene.nearest(&ray).map(|hit| hit.t), Some(1.0));
@@ -20,6 +20,7 @@
 
 pub use crate::scene::Instance;
 pub use crate::source::TriangleMesh;
+pub use bth_import::PositionRows;
 
 use crate::cached::Cache;
 use crate::error::{Error, Result};

@@ -27,6 +27,11 @@ pub struct CompileOptions {
     pub attributes: mesh::Keep,
     /// How polygons of more than three corners become triangles.
     pub polygons: mesh::Polygons,
+    /// In which numbers positions are kept. Positions in f64 exclude `coordinates` other than f32,
+    /// `deformable`, `Structure::Tets`, free directions that are always kept, and known rays: with
+    /// these `auto` means f32. Objects that keep f64 are a BVH with the geometry of the source and
+    /// without free directions.
+    pub positions: mesh::Positions,
     /// Materials whose alpha makes holes.
     pub alpha: mesh::AlphaMode,
     /// True to keep groups of triangles, materials, and the names of these and of objects.
@@ -69,6 +74,7 @@ impl Default for CompileOptions {
             structure: Structure::default(),
             attributes: mesh::Keep::default(),
             polygons: mesh::Polygons::default(),
+            positions: mesh::Positions::default(),
             names: false,
             materials: false,
             lenient_materials: false,
@@ -97,6 +103,10 @@ impl CompileOptions {
             materials: self.materials,
             unreadable: self.looks().unreadable,
             polygons: self.polygons,
+            positions: match self.excludes_f64() {
+                Some(_) => mesh::Positions::F32,
+                None => self.positions,
+            },
             vertices: self.deformable,
         }
     }
@@ -107,11 +117,34 @@ impl CompileOptions {
         Self {
             structure: Structure::Bvh,
             deformable: true,
+            positions: mesh::Positions::F32,
             coordinates: coordinates::CoordinateOptions::default(),
             geometry: true,
             free: free::FreeOptions::default(),
             costs: costs::CostOptions { rays: None, ..self.costs.clone() },
             ..self.clone()
+        }
+    }
+
+    /// The options of an object whose positions are kept in f64.
+    pub(crate) fn of_exact(&self) -> Self {
+        Self { structure: Structure::Bvh, geometry: true, free: free::FreeOptions::default(), ..self.clone() }
+    }
+
+    /// What positions in f64 cannot be combined with.
+    fn excludes_f64(&self) -> Option<&'static str> {
+        if self.deformable {
+            Some("new positions at run time")
+        } else if self.coordinates != coordinates::CoordinateOptions::default() {
+            Some("coordinates of fewer bits")
+        } else if self.structure == Structure::Tets {
+            Some("a tetrahedralization")
+        } else if self.free.keep.always() {
+            Some("free directions")
+        } else if self.costs.rays.is_some() {
+            Some("known rays")
+        } else {
+            None
         }
     }
 
@@ -134,6 +167,10 @@ impl CompileOptions {
     /// # Errors
     /// `BTH-L033`.
     pub(crate) fn check(&self) -> bth_import::Result<()> {
+        if let (mesh::Positions::F64, Some(other)) = (self.positions, self.excludes_f64()) {
+            let message = format!("an object can keep positions in f64 or be compiled for {other}, not both");
+            return Err(bth_import::Error::Limit { code: "BTH-L033", message });
+        }
         let excluded = if !self.deformable {
             return Ok(());
         } else if self.coordinates != coordinates::CoordinateOptions::default() {

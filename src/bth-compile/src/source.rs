@@ -3,7 +3,7 @@
 
 use crate::error::{Error, Result};
 use bth_files::Digest;
-use bth_import::Looks;
+use bth_import::{Looks, PositionRows};
 use std::fs::File;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use zerocopy::IntoBytes;
 #[derive(Clone, Copy, Debug)]
 pub struct TriangleMesh<'a> {
     /// The positions of vertices; equal ones are merged. Those of triangles must be finite.
-    pub positions: &'a [[f32; 3]],
+    pub positions: PositionRows<'a>,
     /// For each triangle the rows of its corners in `positions`, counter-clockwise seen from the
     /// front. The row of a triangle here is its id in hits.
     pub triangles: &'a [[u32; 3]],
@@ -60,15 +60,18 @@ impl SourceDigest {
         Ok(Self { file: digest(path)?, others, looks })
     }
 
-    /// Hashes a mesh in memory: the numbers of positions and triangles, then their little-endian
-    /// bytes.
+    /// Hashes a mesh in memory: the numbers of positions and triangles, each with their
+    /// little-endian bytes.
     pub(crate) fn of_triangles(mesh: TriangleMesh<'_>) -> Self {
         let mut hasher = blake3::Hasher::new();
-        hasher.update(b"triangles in memory");
-        for (count, bytes) in [
-            (mesh.positions.len(), mesh.positions.as_bytes()),
-            (mesh.triangles.len(), mesh.triangles.as_bytes()),
-        ] {
+        let (name, positions) = match mesh.positions {
+            PositionRows::F32(rows) => (&b"triangles in memory"[..], rows.as_bytes()),
+            PositionRows::F64(rows) => (&b"triangles in memory, f64"[..], rows.as_bytes()),
+        };
+        hasher.update(name);
+        for (count, bytes) in
+            [(mesh.positions.len(), positions), (mesh.triangles.len(), mesh.triangles.as_bytes())]
+        {
             hasher.update(&(count as u64).to_le_bytes()).update(bytes);
         }
         Self { file: hasher.finalize().into(), others: Vec::new(), looks: Looks::default() }

@@ -55,11 +55,15 @@ pub(crate) fn warn(mesh: &Mesh, monitor: &dyn Monitor) {
         let count = mesh.positions.iter().filter(|position| bulk.is_far(position)).count();
         let is_far = |corners: &[u32; 3]| corners.iter().any(|v| bulk.is_far(&mesh.positions[*v as usize]));
         if let (true, Some(triangle)) = (count > 0, mesh.triangles.iter().position(is_far)) {
-            let corners = mesh.triangles[triangle].map(|v| mesh.positions[v as usize]);
-            let first = corners.into_iter().find(|corner| bulk.is_far(corner)).unwrap_or_default();
+            let mut corners = mesh.triangles[triangle].into_iter().map(|v| v as usize);
+            let row = corners.find(|row| bulk.is_far(&mesh.positions[*row])).unwrap_or_default();
+            let first = match &mesh.exact {
+                None => format!("{:?}", mesh.positions[row]),
+                Some(exact) => format!("{:?}", exact.positions[row]),
+            };
             let vertices = if count == 1 { "1 vertex lies".into() } else { format!("{count} vertices lie") };
             return monitor.warn(&format!(
-                "{vertices} more than 2^30 times as far out as most of the mesh is large, the first at {first:?} \
+                "{vertices} more than 2^30 times as far out as most of the mesh is large, the first at {first} \
                  in triangle {triangle}: rays take two to four times as long, from coordinates of 1.1e12 (2^40) on ten to thirty times, from 3e29 \
                  (2^98) on thousands of times. Remove what is there by mistake",
             ));

@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use crate::cutout::{AlphaMode, Cutouts};
 use crate::deformation::RawDeformation;
 use crate::error::{Error, Place, Result};
+use crate::exact::Exact;
 use crate::formats::format;
 use crate::gltf::GltfPart;
 use crate::gltf::extensions::Use;
 use crate::gltf::file::GltfFile;
 use crate::materials::{ImageFile, Looks};
-use crate::mesh::{Attributes, Mesh, Report, Sequence, Wanted};
+use crate::mesh::{Attributes, Mesh, Positions, Report, Sequence, Wanted};
 use crate::monitor::Monitor;
 use crate::raw::{Raw, RowKind, check_rows, check_triangles};
 use crate::source::{NON_FINITE, Source, input_error, read_file};
@@ -168,7 +169,14 @@ pub(crate) fn finish(
     check_triangles(raw.triangles.len() as u64)?;
     check_rows((raw.positions.len() as u64).saturating_mul(count))?;
     raw.concave.warn(wanted.polygons, monitor);
-    let rounding = if frames.is_none() { rounding::check(&raw, monitor) } else { None };
+    let moves = frames.is_some() || raw.deformation.is_some();
+    let rounded = match &frames {
+        None => {
+            let positions = if moves { Positions::F32 } else { wanted.kept_positions() };
+            rounding::check((&raw.positions, &raw.triangles), raw.exact.as_deref(), positions, monitor)
+        }
+        Some(_) => rounding::Rounded::default(),
+    };
     let collected = attributes::collect(&raw, wanted.attributes)?;
     let (mut attributes, normal_sources) = collected.map_or((None, Vec::new()), |(a, rows)| (Some(a), rows));
     if frames.is_some() {
@@ -195,7 +203,8 @@ pub(crate) fn finish(
         input_error(NON_FINITE, place, format!("expected finite coordinates, found {found:?}{unit}"), hint)
     };
     let moved = raw.deformation.as_ref();
-    let welded = weld_and_count(&positions, triangles, moved, wanted.vertices, monitor, not_finite)?;
+    let (exact, all) = (rounded.exact, wanted.vertices);
+    let welded = weld_and_count(&positions, exact, triangles, moved, all, monitor, not_finite)?;
     let Welded { mut mesh, kept, report } = welded;
     mesh.deformation = moved.map(|moved| moved.finish(&kept, &normal_sources));
     let mut report = Report {
@@ -203,7 +212,8 @@ pub(crate) fn finish(
         polygons: raw.polygons,
         concave: raw.concave.count(),
         skipped: raw.skipped,
-        rounding,
+        rounding: rounded.rounding,
+        avoided_rounding: rounded.avoided,
         ..report
     };
     if let Some(Frames { times, format, .. }) = frames {
@@ -232,12 +242,13 @@ pub(crate) struct Welded {
 
 /// Welds vertices that are equal in all frames and in what moves them, and counts. Indices of
 /// triangles have been checked. With `all` every vertex of the source stays, and the counts are of
-/// the welded mesh.
+/// the welded mesh. With exact positions, of the only frame, these decide what is equal.
 ///
 /// # Errors
 /// `not_finite` of the first used row that is not finite, and its first such frame; cancellation.
 pub(crate) fn weld_and_count(
     frames: &[&[[f32; 3]]],
+    exact: Option<Vec<[f64; 3]>>,
     mut triangles: Vec<[u32; 3]>,
     moved: Option<&RawDeformation>,
     all: bool,
@@ -257,10 +268,11 @@ pub(crate) fn weld_and_count(
         monitor.warn(&format!("{bad} positions are not finite; no face uses them, they {fate}"));
     }
     let unwelded = all.then(|| triangles.clone());
-    let same_as = match moved {
-        Some(moved) => moved.equal_vertices(frames[0]),
-        None if frames.len() == 1 => equal_positions(frames[0]),
-        None => equal_in_all_frames(frames),
+    let same_as = match (moved, &exact) {
+        (Some(moved), _) => moved.equal_vertices(frames[0]),
+        (None, Some(exact)) => equal_positions(exact),
+        (None, None) if frames.len() == 1 => equal_positions(frames[0]),
+        (None, None) => equal_in_all_frames(frames),
     };
     let mut kept = number(&same_as, &mut triangles);
     // -0 becomes 0. What is not finite is used by no triangle.
@@ -269,7 +281,9 @@ pub(crate) fn weld_and_count(
         kept.par_iter().map(|row| vertex(&frame[*row as usize])).collect()
     };
     monitor.check()?;
-    let mut mesh = Mesh { positions: positions(frames[0], &kept), triangles, ..Mesh::default() };
+    let exact = exact.map(|exact| Exact::new(kept.par_iter().map(|row| exact[*row as usize]).collect()));
+    let rounded = exact.as_ref().map_or_else(|| positions(frames[0], &kept), Exact::rounded);
+    let mut mesh = Mesh { positions: rounded, triangles, exact, ..Mesh::default() };
     let counts = topology::topology(&mesh);
     monitor.check()?;
     coordinate_range::warn(&mesh, monitor);

@@ -17,6 +17,7 @@ mod deformation;
 mod disjoint_sets;
 mod ears;
 pub mod error;
+mod exact;
 mod foreign;
 mod formats;
 pub mod gltf;
@@ -40,6 +41,7 @@ mod zero_area;
 pub use cutout::{AlphaImage, AlphaMode, CutoutCorner, CutoutMaterial, CutoutTriangle, Cutouts, Wrap};
 pub use deformation::Deformation;
 pub use error::{Error, Place, Result};
+pub use exact::Exact;
 pub use formats::{extensions, source_files};
 pub use gltf::GltfPart;
 pub use groups::{Group, Groups};
@@ -48,10 +50,10 @@ pub use import::{
     import_gltf_parts_bytes, import_images,
 };
 pub use materials::{ImageFile, Looks, Materials, Unreadable};
-pub use memory::{MEMORY_FORMAT, import_triangles};
+pub use memory::{MEMORY_FORMAT, PositionRows, import_triangles};
 pub use mesh::{
-    Attributes, Exact, Keep, Mesh, OpacityReport, Polygons, Report, Rounding, Sequence, TriangleOpacities,
-    Wanted,
+    Attributes, Keep, Mesh, OpacityReport, Polygons, Positions, Report, Rounding, Sequence,
+    TriangleOpacities, Wanted,
 };
 pub use monitor::{Monitor, Silent};
 pub use sequence::{

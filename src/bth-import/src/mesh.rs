@@ -1,8 +1,10 @@
 //! The triangle mesh that importers make, and their report about it.
 
 use crate::deformation::Deformation;
+use crate::exact::Exact;
 use crate::groups::Groups;
 use crate::materials::{Materials, Unreadable};
+use crate::zero_area::is_zero_area;
 use serde::{Deserialize, Serialize};
 
 /// A triangle mesh in object space, with bit-equal positions welded (-0 counts as +0) unless all
@@ -10,8 +12,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// Distinct finite positions, in order of first use by the faces; with [`Wanted::vertices`] all
-    /// positions of the source in its order.
+    /// positions of the source in its order. With `exact` they are relative to its anchor, and some
+    /// may be equal.
     pub positions: Vec<[f32; 3]>,
+    /// The positions before they were rounded, where f64 is kept ([`Wanted::positions`]).
+    pub exact: Option<Exact>,
     /// Rows of `positions`, in the source's face order after polygons have been triangulated. The
     /// index of a triangle here is its id in the compiled file and in hits. Degenerate triangles
     /// are kept.
@@ -31,17 +36,6 @@ pub struct Mesh {
     /// What moves its vertices, of a [`GltfPart::Deforming`](crate::GltfPart::Deforming). Positions
     /// are then distinct together with what moves them.
     pub deformation: Option<Deformation>,
-}
-
-/// Positions with all digits of the source, and the origin of the space in which
-/// [`Mesh::positions`] holds them in f32.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Exact {
-    /// What is subtracted before positions are rounded.
-    pub anchor: [f64; 3],
-    /// Row by row the positions of the mesh, in the source's space. Coordinates are 0 or in
-    /// [`EXACT_RANGE`](bth_format::object::EXACT_RANGE).
-    pub positions: Vec<[f64; 3]>,
 }
 
 /// Positions of a mesh at several times. Between two frames vertices move on straight lines at
@@ -122,6 +116,19 @@ pub enum Polygons {
     Ears,
 }
 
+/// In which numbers to keep positions (`--positions`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Positions {
+    /// In f64 where f32 would move a position by more than the size of the model times 2^-24.
+    Auto,
+    /// In f32. What that moves and drops is counted.
+    #[default]
+    F32,
+    /// As the source has them, unless all its numbers are f32.
+    F64,
+}
+
 /// What to read of a model besides positions and triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wanted {
@@ -135,9 +142,19 @@ pub struct Wanted {
     pub unreadable: Unreadable,
     /// How polygons of OBJ, PLY, OFF and STL become triangles (`--polygons`).
     pub polygons: Polygons,
+    /// In which numbers to keep positions. Sequences, what skins or morph targets move, and meshes
+    /// with all vertices keep f32.
+    pub positions: Positions,
     /// All vertices of the source, in its order, those at equal positions and unused ones too
     /// (`--deformable`).
     pub vertices: bool,
+}
+
+impl Wanted {
+    /// In which numbers positions are kept, unless the vertices move.
+    pub(crate) fn kept_positions(&self) -> Positions {
+        if self.vertices { Positions::F32 } else { self.positions }
+    }
 }
 
 impl From<Keep> for Wanted {
@@ -182,6 +199,9 @@ pub struct Report {
     /// What rounding positions to f32 moves and drops, where that is more than next to nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rounding: Option<Rounding>,
+    /// What it would move and drop, if positions are kept in f64 instead.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub avoided_rounding: Option<Rounding>,
     /// Frames of a sequence; 0 for other models.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub frames: u64,
@@ -212,5 +232,16 @@ impl Mesh {
     #[inline]
     pub fn corners(&self, triangle: u32) -> [[f32; 3]; 3] {
         self.triangles[triangle as usize].map(|v| self.positions[v as usize])
+    }
+
+    /// Returns true if a triangle has exactly zero area, decided by the exact positions if there
+    /// are some.
+    pub fn has_zero_area(&self, triangle: u32) -> bool {
+        match &self.exact {
+            None => is_zero_area(self.corners(triangle)),
+            Some(exact) => {
+                is_zero_area(self.triangles[triangle as usize].map(|v| exact.positions[v as usize]))
+            }
+        }
     }
 }

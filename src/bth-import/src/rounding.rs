@@ -1,9 +1,9 @@
 //! What rounding positions to f32 moves and drops, for models that lie farther from the origin than
 //! they are large. Nearer ones lose less than their size times 2^-24.
 
-use crate::mesh::Rounding;
+use crate::exact::in_range;
+use crate::mesh::{Positions, Rounding};
 use crate::monitor::Monitor;
-use crate::raw::Raw;
 use crate::zero_area::is_zero_area;
 use rayon::prelude::*;
 
@@ -15,11 +15,27 @@ const COUNTED: f64 = 1.0 / (1u64 << 24) as f64;
 /// they are worth a warning.
 const SHOWN: f64 = 1.0 / (1u64 << 13) as f64;
 
-/// Counts what rounding does to a mesh whose source has more digits than f32 keeps, and warns where
-/// it can be seen. `None` if no position moves by more than the size of the model times 2^-24. The
-/// size is the longest side of the box of all finite positions.
-pub(crate) fn check(raw: &Raw<'_>, monitor: &dyn Monitor) -> Option<Rounding> {
-    let (rows, triangles) = (&raw.positions, &raw.triangles);
+/// What becomes of positions that have more digits than f32 keeps.
+#[derive(Default)]
+pub(crate) struct Rounded {
+    /// What rounding moves and drops, if positions are rounded.
+    pub(crate) rounding: Option<Rounding>,
+    /// What it would move and drop, if they are not.
+    pub(crate) avoided: Option<Rounding>,
+    /// The positions, row by row, if they are kept in f64.
+    pub(crate) exact: Option<Vec<[f64; 3]>>,
+}
+
+/// Decides in which numbers positions are kept, counts what rounding does to a mesh, and warns
+/// where it can be seen. `again` reads the positions in f64; it is absent if the numbers of the
+/// source are f32. Nothing is counted if no position moves by more than the size of the mesh times
+/// 2^-24. The size is the longest side of the box of all finite positions.
+pub(crate) fn check(
+    (rows, triangles): (&[[f32; 3]], &[[u32; 3]]),
+    again: Option<&dyn Fn() -> Vec<[f64; 3]>>,
+    positions: Positions,
+    monitor: &dyn Monitor,
+) -> Rounded {
     let finite = |p: &&[f32; 3]| p.iter().all(|x| x.is_finite());
     let (mut lower, mut upper) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for position in rows.iter().filter(finite) {
@@ -30,21 +46,25 @@ pub(crate) fn check(raw: &Raw<'_>, monitor: &dyn Monitor) -> Option<Rounding> {
     }
     let size = (0..3).fold(0.0, |size: f64, k| size.max(upper[k] - lower[k]));
     let farthest = (0..3).fold(0.0, |most: f64, k| most.max(-lower[k]).max(upper[k]));
-    if farthest <= size || rows.is_empty() {
-        return None;
-    }
-    let exact = (raw.exact.as_ref()?)();
+    let is_near = farthest <= size && positions != Positions::F64;
+    let Some(again) = again.filter(|_| !is_near && !rows.is_empty()) else { return Rounded::default() };
+    let exact = again();
     if exact.len() != rows.len() {
-        return None;
+        return Rounded::default();
     }
     let moves = rows.par_iter().zip(&exact).filter(|(p, _)| finite(p));
     let moves =
         moves.map(|(p, exact)| (0..3).fold(0.0, |most: f64, k| most.max((f64::from(p[k]) - exact[k]).abs())));
-    let (positions, farthest) = moves
+    let (moved, farthest) = moves
         .fold(|| (0, 0.0), |sum, by| more(sum, (u64::from(by > COUNTED * size), by)))
         .reduce(|| (0, 0.0), more);
-    if positions == 0 {
-        return None;
+    let is_kept = match positions {
+        Positions::F32 => false,
+        Positions::Auto => moved > 0,
+        Positions::F64 => farthest > 0.0,
+    };
+    if moved == 0 && !is_kept {
+        return Rounded::default();
     }
     let corners = |triangle: &[u32; 3]| triangle.map(|row| exact[row as usize]);
     let rounded = |triangle: &[u32; 3]| triangle.map(|row| rows[row as usize]);
@@ -53,18 +73,30 @@ pub(crate) fn check(raw: &Raw<'_>, monitor: &dyn Monitor) -> Option<Rounding> {
         is_finite(triangle) && is_zero_area(rounded(triangle)) && !is_zero_area(corners(triangle))
     };
     let lost = triangles.par_iter().filter(collapsed).count() as u64;
-    let found = Rounding { positions, farthest, triangles: lost };
+    let found = Rounding { positions: moved, farthest, triangles: lost };
+    if is_kept && let Some(exact) = kept(rows, &exact) {
+        return Rounded { rounding: None, avoided: Some(found), exact: Some(exact) };
+    }
     if lost > 0 || farthest > SHOWN * size {
         monitor.warn(&format!(
-            "rounding to 32-bit numbers moves {positions} of {} positions, by up to {farthest:.2e} ({:.1e} of the \
-             model's size), and {lost} of {} triangles lose their area. Move the model near the origin before you \
-             export it",
+            "rounding to 32-bit numbers moves {moved} of {} positions, by up to {farthest:.2e} ({:.1e} of the \
+             model's size), and {lost} of {} triangles lose their area. Keep positions in 64-bit numbers \
+             (`--positions f64`), or move the model near the origin before you export it",
             rows.len(),
             farthest / size,
             triangles.len(),
         ));
     }
-    Some(found)
+    Rounded { rounding: Some(found), ..Rounded::default() }
+}
+
+/// The positions as files keep them; zeros for those that are not finite, which no face may use.
+/// `None` if a coordinate is beyond f32, though it rounds to the largest number.
+fn kept(rows: &[[f32; 3]], exact: &[[f64; 3]]) -> Option<Vec<[f64; 3]>> {
+    let is_finite = |p: &[f32; 3]| p.iter().all(|x| x.is_finite());
+    let one =
+        |(p, exact): (&[f32; 3], &[f64; 3])| if is_finite(p) { in_range(*exact) } else { Some([0.0; 3]) };
+    rows.par_iter().zip(exact).map(one).collect()
 }
 
 /// The sum of two counts, and the larger of two distances.

@@ -4,7 +4,6 @@ use rayon::prelude::*;
 
 use crate::disjoint_sets::DisjointSets;
 use crate::mesh::Mesh;
-use crate::zero_area::is_zero_area;
 
 /// Counts of a welded mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -32,11 +31,8 @@ pub(super) fn topology(mesh: &Mesh) -> Topology {
 }
 
 fn degenerate(mesh: &Mesh) -> u64 {
-    let count = |triangles: &[[u32; 3]]| {
-        let corners = |t: &[u32; 3]| t.map(|v| mesh.positions[v as usize]);
-        triangles.iter().filter(|t| is_zero_area(corners(t))).count() as u64
-    };
-    mesh.triangles.par_chunks(1 << 14).map(count).sum()
+    let ids = (0..mesh.triangles.len() as u32).into_par_iter().with_min_len(1 << 14);
+    ids.filter(|id| mesh.has_zero_area(*id)).count() as u64
 }
 
 /// Triangles of three distinct positions.
@@ -141,8 +137,7 @@ mod tests {
                 t.iter().for_each(|&v| labels[v as usize] = low);
             }
         }
-        let degenerate =
-            (0..mesh.triangles.len() as u32).filter(|&t| is_zero_area(mesh.corners(t))).count() as u64;
+        let degenerate = (0..mesh.triangles.len() as u32).filter(|&t| mesh.has_zero_area(t)).count() as u64;
         let components = labels.into_iter().collect::<BTreeSet<_>>().len() as u64;
         Topology { degenerate, duplicate, boundary_edges, non_manifold_edges, components }
     }

@@ -36,14 +36,27 @@ pub(super) fn number(same_as: &[AtomicU32], triangles: &mut [[u32; 3]]) -> Vec<u
 /// Corners that one task numbers.
 const CORNERS_AT_ONCE: usize = 1 << 16;
 
-/// Returns the position with +0 instead of -0.
-fn positive_zeros(position: [f32; 3]) -> [f32; 3] {
-    position.map(|x| x + 0.0)
+/// A number in f32 or f64.
+pub(super) trait Number: Copy + Sync {
+    /// Its bits; -0 has the bits of 0.
+    fn bits(self) -> u64;
+}
+
+impl Number for f32 {
+    fn bits(self) -> u64 {
+        u64::from((self + 0.0).to_bits())
+    }
+}
+
+impl Number for f64 {
+    fn bits(self) -> u64 {
+        (self + 0.0).to_bits()
+    }
 }
 
 /// Returns for each position the first row of one that is equal to it. -0 equals +0.
-pub(super) fn equal_positions(positions: &[[f32; 3]]) -> Vec<AtomicU32> {
-    let key = |row: u32| positive_zeros(positions[row as usize]).map(f32::to_bits);
+pub(super) fn equal_positions<T: Number>(positions: &[[T; 3]]) -> Vec<AtomicU32> {
+    let key = |row: u32| positions[row as usize].map(T::bits);
     // Equal positions are in the same share, and a share's table stays in a cache.
     let shares = (positions.len() / ROWS_OF_A_SHARE).next_power_of_two().min(MOST_SHARES);
     let share_of = |row: u32| (hash(key(row)) as usize) & (shares - 1);
@@ -84,7 +97,7 @@ impl Table {
 
     /// The row of that key that was inserted first.
     #[inline]
-    fn find_or_insert(&mut self, row: u32, key: impl Fn(u32) -> [u32; 3]) -> u32 {
+    fn find_or_insert(&mut self, row: u32, key: impl Fn(u32) -> [u64; 3]) -> u32 {
         let mask = self.slots.len() - 1;
         let mut slot = (hash(key(row)) >> self.shift) as usize;
         loop {
@@ -103,9 +116,9 @@ impl Table {
 /// Mixes all bits into the upper and lower ones: multiply and fold (as in Wang Yi's wyhash), then
 /// Fibonacci hashing.
 #[inline]
-fn hash([x, y, z]: [u32; 3]) -> u64 {
-    let a = (u64::from(x) | u64::from(y) << 32) ^ 0xa076_1d64_78bd_642f;
-    let b = u64::from(z) ^ 0xe703_7ed1_a0b4_28db;
+fn hash([x, y, z]: [u64; 3]) -> u64 {
+    let a = x ^ y.rotate_left(32) ^ 0xa076_1d64_78bd_642f;
+    let b = z ^ 0xe703_7ed1_a0b4_28db;
     let product = u128::from(a) * u128::from(b);
     ((product as u64) ^ (product >> 64) as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)
 }
@@ -170,7 +183,7 @@ mod tests {
         moved: Option<&RawDeformation>,
     ) -> Result<(Vec<u32>, u64), [usize; 2]> {
         let mut bad = [0; 2];
-        let found = weld_and_count(frames, triangles.to_vec(), moved, false, &Silent, |frame, row| {
+        let found = weld_and_count(frames, None, triangles.to_vec(), moved, false, &Silent, |frame, row| {
             bad = [frame, row];
             crate::error::Error::Cancelled
         });

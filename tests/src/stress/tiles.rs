@@ -4,7 +4,7 @@ use crate::oracle::World;
 use bth::rays::{Hit, PrimitiveRef};
 use bth::{Scene, SceneBuilder};
 use bth_compile::Silent;
-use bth_compile::memory::{TriangleMesh, open};
+use bth_compile::memory::{PositionRows, TriangleMesh, open};
 use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_random::Rng;
 use bth_scenes::Model;
@@ -200,7 +200,8 @@ impl Tiles {
         let options = CompileOptions { structure: Structure::Bvh, ..CompileOptions::default() };
         let mut builder = SceneBuilder::new();
         for Model { positions, triangles } in objects {
-            let compiled = open(TriangleMesh { positions, triangles }, &options, &Silent);
+            let compiled =
+                open(TriangleMesh { positions: PositionRows::F32(positions), triangles }, &options, &Silent);
             builder.add(&compiled.expect("an object"));
         }
         let (mut outward, mut borders) = (Vec::new(), Vec::new());

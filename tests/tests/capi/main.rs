@@ -9,7 +9,7 @@ use crate::queries::hills;
 use bth::rays::{Hit, Ray};
 use bth_compile::Silent;
 use bth_compile::cached::Cache;
-use bth_compile::memory::{self, Instance, TriangleMesh};
+use bth_compile::memory::{self, Instance, PositionRows, TriangleMesh};
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -229,7 +229,7 @@ fn a_c_program_compiles_in_memory_and_gets_the_bytes_of_rust() {
     assert!(output.status.success(), "{output:?}");
 
     let (positions, triangles) = hills();
-    let hills = TriangleMesh { positions: &positions, triangles: &triangles };
+    let hills = TriangleMesh { positions: PositionRows::F32(&positions), triangles: &triangles };
     let mut options = CompileOptions { structure: Structure::Bvh, ..CompileOptions::default() };
     options.bvh.quality = bth_compile::bvh::Quality::Fast;
     let (compiled, _) = compile(hills, &options, &Silent).expect("it compiles");

@@ -6,7 +6,7 @@ use crate::support::options;
 use bth::rays::Ray;
 use bth::{Code, Isa, Scene, SceneBuilder};
 use bth_compile::Silent;
-use bth_compile::memory::TriangleMesh;
+use bth_compile::memory::{PositionRows, TriangleMesh};
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_random::Rng;
 use bth_tests::oracle::World;
@@ -18,7 +18,9 @@ fn deformable() -> CompileOptions {
 }
 
 fn bytes(positions: &[[f32; 3]], triangles: &[[u32; 3]], options: &CompileOptions) -> Vec<u8> {
-    let (compiled, _) = compile(TriangleMesh { positions, triangles }, options, &Silent).unwrap();
+    let (compiled, _) =
+        compile(TriangleMesh { positions: PositionRows::F32(positions), triangles }, options, &Silent)
+            .unwrap();
     let file = bth_format::File::from_bytes(&compiled.bytes).unwrap();
     bth_format::verify::verify(&file).unwrap_or_else(|e| panic!("{}", e[0]));
     compiled.bytes
@@ -321,7 +323,7 @@ fn options_that_exclude_each_other_are_an_error() {
     let mut free = deformable();
     free.free.keep = bth_compile::free::KeepFree::All;
     for options in [tets, no_geometry, free] {
-        let mesh = TriangleMesh { positions: &positions, triangles: &triangles };
+        let mesh = TriangleMesh { positions: PositionRows::F32(&positions), triangles: &triangles };
         let error = compile(mesh, &options, &Silent).unwrap_err().to_string();
         assert!(error.contains("BTH-L033"), "{error}");
     }

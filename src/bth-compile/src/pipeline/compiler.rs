@@ -96,6 +96,10 @@ impl<'a> Compiler<'a> {
             let options = &self.options.of_deforming();
             return Compiler { options, ..self }.moving(mesh, &sequence);
         }
+        if mesh.exact.is_some() {
+            let options = &self.options.of_exact();
+            return Compiler { options, ..self }.still(mesh, None, &hash);
+        }
         let (mesh, on_grid, hash) = match self.options.coordinates == Default::default() {
             true => (mesh, None, hash),
             false => {

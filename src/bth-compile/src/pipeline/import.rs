@@ -35,7 +35,7 @@ impl Import<'_> {
     /// The key of a mesh, the part `part` of a model. A supported extension determines the format
     /// in which the file is read.
     pub(crate) fn key_of(source: &SourceDigest, path: &Path, part: &str, wanted: Wanted) -> Key {
-        let Wanted { attributes, groups, materials, unreadable, polygons, vertices } = wanted;
+        let Wanted { attributes, groups, materials, unreadable, polygons, positions, vertices } = wanted;
         let Looks { alpha, materials: _, unreadable: _ } = source.looks;
         Key::new(Self::NAME)
             .with("source", source.text())
@@ -46,6 +46,7 @@ impl Import<'_> {
             .with("materials", materials.to_string())
             .with("unreadable images", format!("{unreadable:?}"))
             .with("polygons", text(&polygons))
+            .with("positions", text(&positions))
             .with("all vertices", vertices.to_string())
             .with("alpha", text(&alpha))
             .with("mesh version", Self::VERSION)
@@ -55,7 +56,7 @@ impl Import<'_> {
 impl Stage for Import<'_> {
     type Output = (Mesh, MeshSummary);
     const NAME: &'static str = "mesh";
-    const VERSION: &'static str = "8";
+    const VERSION: &'static str = "9";
 
     fn run(self, monitor: &dyn Monitor) -> Result<Self::Output> {
         Ok(MeshSummary::of(self.read(monitor)?))

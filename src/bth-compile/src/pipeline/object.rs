@@ -179,7 +179,8 @@ impl Object {
 /// The geometry and the attributes of the source that the file keeps.
 fn source<'a>(mesh: &'a Mesh, on_grid: Option<&'a OnGrid>, options: &CompileOptions) -> write::Source<'a> {
     let mut source = write::Source::default();
-    if options.geometry {
+    if options.geometry || mesh.exact.is_some() {
+        source.exact = mesh.exact.as_ref();
         source.positions = on_grid.map_or(&mesh.positions, |on| &on.source);
         source.triangles = &mesh.triangles;
     }

@@ -89,6 +89,8 @@ fn compile(
     let object = ObjectReport {
         triangles: mesh.summary.report.triangles,
         degenerate: mesh.summary.report.degenerate,
+        rounding: mesh.summary.report.rounding,
+        avoided_rounding: mesh.summary.report.avoided_rounding,
         tet_leaves: built.tet_leaves,
         tet_triangles: built.tet_triangles,
         opacity: mesh.summary.report.opacity,

@@ -3,7 +3,7 @@
 use crate::pipeline::MotionReport;
 use crate::stage::StageTime;
 use crate::tets::WorkerStatus;
-use bth_import::OpacityReport;
+use bth_import::{OpacityReport, Rounding};
 use serde::{Deserialize, Serialize};
 
 /// CompileReport on an object of the file.
@@ -15,6 +15,13 @@ pub struct ObjectReport {
     pub triangles: u64,
     /// Triangles of zero area.
     pub degenerate: u64,
+    /// What rounding positions to f32 moves and drops, where that is more than next to nothing; not
+    /// known, as the next, of objects that were taken from an earlier file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rounding: Option<Rounding>,
+    /// What it would move and drop, if positions are kept in f64 instead.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub avoided_rounding: Option<Rounding>,
     /// Tet leaves.
     pub tet_leaves: u64,
     /// Triangles in tet leaves.

@@ -253,7 +253,8 @@ fn a_vertex_far_out_of_a_scan_is_warned_of_and_the_scan_is_not() {
     assert!(!listener.heard("lie"), "{:?}", listener.0);
     let mut positions = mesh.positions;
     positions[mesh.triangles[1000][1] as usize][2] = -1e13;
-    let far = bth_import::import_triangles(&path, &positions, &mesh.triangles, Keep::None, &listener);
+    let rows = bth_import::PositionRows::F32(&positions);
+    let far = bth_import::import_triangles(&path, rows, &mesh.triangles, Keep::None, &listener);
     assert_eq!(far.unwrap().1.triangles, mesh.triangles.len() as u64);
     assert!(listener.heard("1 vertex lies more than 2^30 times as far out"), "{:?}", listener.0);
 }

@@ -36,11 +36,16 @@ fn import_bytes(name: &str, bytes: &[u8], keep: Keep) -> Result<(Mesh, Report)> 
     import_with(name, bytes, keep, &Silent)
 }
 
-fn import_with(name: &str, bytes: &[u8], keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
+fn import_with(
+    name: &str,
+    bytes: &[u8],
+    wanted: impl Into<Wanted>,
+    monitor: &dyn Monitor,
+) -> Result<(Mesh, Report)> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     std::fs::write(&path, bytes).unwrap();
-    import(&path, keep, monitor)
+    import(&path, wanted, monitor)
 }
 
 /// Code, place (without the file's name) and message of the error that these bytes give.

@@ -1,10 +1,11 @@
 //! Triangles that are in memory already.
 
 use bth_import::error::Result;
-use bth_import::{Keep, Mesh, Report, Silent, Wanted, import_triangles};
+use bth_import::{Keep, Mesh, PositionRows, Report, Silent, Wanted, import_triangles};
 use std::path::Path;
 
 fn import(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Result<(Mesh, Report)> {
+    let positions = PositionRows::F32(positions);
     import_triangles(Path::new("mesh"), positions, triangles, Wanted::default(), &Silent)
 }
 

@@ -1,7 +1,8 @@
-//! What rounding to f32 moves and drops is counted, and told where a picture would show it.
+//! What rounding to f32 moves and drops is counted, and told where a picture would show it. In f64
+//! nothing moves.
 
 use super::*;
-use bth_import::Rounding;
+use bth_import::{Mesh, Positions, Rounding, Wanted};
 
 /// Corners of a grid of 8 by 8 squares of 0.125, `away` from the origin along x and y.
 fn grid(away: f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
@@ -105,4 +106,71 @@ fn what_the_transforms_of_nodes_move_is_counted() {
     let document = gltf::edited(|d| d["nodes"][0]["translation"] = serde_json::json!([5e6 + 0.2, 0, 0]));
     let (found, warned) = rounding("a.glb", &gltf::glb(&document, &gltf::binary()));
     assert!(warned && found.is_some_and(|found| (found.farthest - 0.2).abs() < 1e-6), "{found:?}");
+}
+
+/// The mesh with positions in these numbers, what rounding did, and what it would have done. No
+/// warning is given.
+fn kept(name: &str, bytes: &[u8], positions: Positions) -> (Mesh, [Option<Rounding>; 2]) {
+    let said = Listener::default();
+    let wanted = Wanted { positions, ..Wanted::default() };
+    let (mesh, report) = import_with(name, bytes, wanted, &said).unwrap();
+    assert!(said.0.into_inner().unwrap().is_empty(), "{name}");
+    (mesh, [report.rounding, report.avoided_rounding])
+}
+
+/// The corners of all triangles as the source has them.
+fn exact_corners(mesh: &Mesh) -> Vec<[[f64; 3]; 3]> {
+    let exact = mesh.exact.as_ref().unwrap();
+    mesh.triangles.iter().map(|t| t.map(|v| exact.positions[v as usize])).collect()
+}
+
+#[test]
+fn positions_in_f64_keep_what_the_source_has() {
+    let (mut corners, triangles) = grid(5_000_000.0);
+    for (i, corner) in corners.iter_mut().enumerate() {
+        corner[2] = 300.0 + 1e-9 * i as f64;
+    }
+    let expected: Vec<_> = triangles.iter().map(|t| t.map(|v| corners[v as usize])).collect();
+    for (name, bytes) in in_formats(&corners, &triangles) {
+        let as_f32 = import_with(name, &bytes, Keep::None, &Listener::default()).unwrap().1;
+        for positions in [Positions::Auto, Positions::F64] {
+            let (mesh, [rounding, avoided]) = kept(name, &bytes, positions);
+            assert_eq!((rounding, avoided), (None, as_f32.rounding), "{name}");
+            assert_eq!(exact_corners(&mesh), expected, "{name}");
+            let anchor = mesh.exact.as_ref().unwrap().anchor;
+            assert_eq!(anchor, [5_000_000.5, 5_000_000.5, 300.0], "{name}");
+            // Differences in x and y are f32, and z is rounded.
+            assert!(mesh.positions.iter().all(|p| p[0].abs() <= 0.5 && (0.0..1e-7).contains(&p[2])));
+            assert_eq!(mesh.positions.len(), 81, "{name}: equal positions are merged, others are not");
+        }
+    }
+}
+
+#[test]
+fn positions_stay_f32_where_f64_keeps_no_more() {
+    // All numbers are f32; and a model that is near, which only an explicit choice keeps.
+    let (corners, triangles) = grid(4096.0);
+    for (name, bytes) in in_formats(&corners, &triangles) {
+        assert_eq!(kept(name, &bytes, Positions::F64).0.exact, None, "{name}");
+    }
+    let (mut corners, triangles) = grid(-0.5);
+    corners[40][0] += 1e-9;
+    for (name, bytes) in in_formats(&corners, &triangles) {
+        let (near, found) = kept(name, &bytes, Positions::Auto);
+        assert_eq!((near.exact, found), (None, [None; 2]), "{name}");
+        let (exact, [_, avoided]) = kept(name, &bytes, Positions::F64);
+        assert_eq!(exact.exact.as_ref().unwrap().anchor, [0.0; 3], "{name}");
+        assert_eq!(exact.positions, near.positions, "{name}");
+        assert!(avoided.is_some_and(|avoided| avoided.positions == 0 && avoided.farthest > 0.0), "{name}");
+    }
+}
+
+#[test]
+fn vertices_that_move_stay_f32() {
+    let (corners, triangles) = grid(5_000_000.0);
+    let wanted = Wanted { positions: Positions::F64, vertices: true, ..Wanted::default() };
+    for (name, bytes) in in_formats(&corners, &triangles) {
+        let (mesh, report) = import_with(name, &bytes, wanted, &Listener::default()).unwrap();
+        assert!(mesh.exact.is_none() && report.rounding.is_some(), "{name}");
+    }
 }

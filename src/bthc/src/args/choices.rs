@@ -43,7 +43,7 @@ impl From<Alpha> for bth_import::AlphaMode {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Attributes {
-    /// Positions only.
+    /// PositionNumbers only.
     None,
     /// Shading normals.
     Normals,
@@ -65,6 +65,27 @@ impl From<Polygons> for bth_import::Polygons {
         match polygons {
             Polygons::Fans => Self::Fans,
             Polygons::Ears => Self::Ears,
+        }
+    }
+}
+
+/// Numbers in which positions are kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PositionNumbers {
+    /// f64 where f32 would move a vertex by more than 2^-24 of the object's size, else f32.
+    Auto,
+    /// f32. What that moves and drops is reported.
+    F32,
+    /// f64, unless all numbers of the source are f32.
+    F64,
+}
+
+impl From<PositionNumbers> for bth_import::Positions {
+    fn from(positions: PositionNumbers) -> Self {
+        match positions {
+            PositionNumbers::Auto => Self::Auto,
+            PositionNumbers::F32 => Self::F32,
+            PositionNumbers::F64 => Self::F64,
         }
     }
 }

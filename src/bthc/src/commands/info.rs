@@ -82,7 +82,8 @@ fn describe(file: &File) -> Result<Value, Failure> {
         let h = view.header;
         Ok(json!({"lower": h.lower, "upper": h.upper, "triangles": h.triangles, "dropped": h.dropped,
             "depth": h.depth, "coordinates": view.grid.map_or(32, |grid| grid.bits as u32),
-            "displacement": h.displacement, "record": record(&view), "tet_leaves": view.tet_leaves.len(),
+            "displacement": h.displacement, "positions": if view.exact.is_empty() { "f32" } else { "f64" },
+            "anchor": view.anchor, "record": record(&view), "tet_leaves": view.tet_leaves.len(),
             "tets": view.records.len(), "tet_triangles": view.tet_faces.len(),
             "holes": holes(&view).map(|h| json!({"triangles": h.triangles, "opaque": h.shares[0],
                 "transparent": h.shares[1], "unknown": h.shares[2]})),
@@ -249,6 +250,10 @@ fn add_object(facts: &mut Table, file: &File, object: u32) -> Result<(), Failure
     if let Some(grid) = &view.grid {
         facts.row(["coordinates", &format!("{} bits", grid.bits as u32)]);
         facts.row(["vertices moved by at most", &view.header.displacement.to_string()]);
+    }
+    if !view.exact.is_empty() {
+        let [x, y, z] = view.anchor;
+        facts.row(["positions", &format!("f64; leaves are f32, relative to {x}, {y}, {z}")]);
     }
     if let Some(Holes { triangles, shares: [opaque, transparent, unknown] }) = holes(&view) {
         facts.row(["triangles with holes", &count(triangles)]);

@@ -175,6 +175,11 @@ fn summary(report: &SceneReport) -> String {
     facts.row(["triangles", &count(report.triangles)]);
     facts.row(["triangles of all instances", &count(report.instanced_triangles)]);
     row_unless_zero(&mut facts, "degenerate (never hit)", report.objects.iter().map(|o| o.degenerate).sum());
+    let rounded = report.objects.iter().filter_map(|o| o.rounding.as_ref());
+    row_unless_zero(&mut facts, "positions moved by rounding", rounded.clone().map(|r| r.positions).sum());
+    row_unless_zero(&mut facts, "triangles without area by rounding", rounded.map(|r| r.triangles).sum());
+    let in_f64 = report.objects.iter().filter(|o| o.avoided_rounding.is_some()).count();
+    row_unless_zero(&mut facts, "objects with positions in f64", in_f64 as u64);
     row_unless_zero(&mut facts, "tet leaves", report.objects.iter().map(|o| o.tet_leaves).sum());
     row_unless_zero(
         &mut facts,

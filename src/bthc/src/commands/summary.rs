@@ -4,6 +4,7 @@ use crate::table::{Table, bytes, count, seconds};
 use bth_compile::free::Kept;
 use bth_compile::pipeline::CompileReport;
 use bth_compile::tets::WorkerStatus;
+use bth_import::Rounding;
 
 /// The stages with their seconds, then counts. `known_rays` are those for which the tree was built.
 pub(super) fn summary(report: &CompileReport, known_rays: u64) -> String {
@@ -21,6 +22,15 @@ pub(super) fn summary(report: &CompileReport, known_rays: u64) -> String {
     if let Some(rounding) = &mesh.rounding {
         row_unless_zero(&mut facts, "positions moved by rounding", rounding.positions);
         row_unless_zero(&mut facts, "triangles without area by rounding", rounding.triangles);
+    }
+    if let Some(avoided) = &mesh.avoided_rounding {
+        let Rounding { positions, farthest, triangles } = avoided;
+        let f32_would = format!(
+            "f64; f32 would move {} by up to {farthest:.2e}, and {} triangles would lose their area",
+            count(*positions),
+            count(*triangles)
+        );
+        facts.row(["positions", &f32_would]);
     }
     row_unless_zero(&mut facts, "concave polygons", mesh.concave);
     row_unless_zero(&mut facts, "elements skipped", mesh.skipped);

@@ -253,7 +253,7 @@ fn is_as_near(at: Option<Intersection>, exact: f64) -> bool {
 mod tests {
     use super::*;
     use bth_compile::Silent;
-    use bth_compile::memory::{TriangleMesh, open};
+    use bth_compile::memory::{PositionRows, TriangleMesh, open};
     use bth_compile::pipeline::{CompileOptions, Structure};
     use bth_random::Rng;
 
@@ -271,7 +271,7 @@ mod tests {
             );
         }
         let triangles: Vec<[u32; 3]> = (0..3000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-        let mesh = TriangleMesh { positions: &positions, triangles: &triangles };
+        let mesh = TriangleMesh { positions: PositionRows::F32(&positions), triangles: &triangles };
         let options = CompileOptions { structure: Structure::Bvh, ..CompileOptions::default() };
         let scene = open(mesh, &options, &Silent).unwrap();
         affordable(&scene, &triangles_of(&scene))

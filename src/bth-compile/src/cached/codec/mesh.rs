@@ -3,10 +3,12 @@
 use super::super::rows::{RowReader, Sink};
 use super::{Codec, by_fields};
 use bth_format::layout::{self, NONE};
-use bth_import::{Attributes, Deformation, Group, Groups, Materials, Mesh, Sequence, TriangleOpacities};
+use bth_import::{
+    Attributes, Deformation, Exact, Group, Groups, Materials, Mesh, Sequence, TriangleOpacities,
+};
 
 by_fields! {
-    Mesh { positions, triangles, attributes, opacity, groups, materials, sequence, deformation } fits;
+    Mesh { positions, exact, triangles, attributes, opacity, groups, materials, sequence, deformation } fits;
     Attributes { corners, normals, uvs } |_| true;
     TriangleOpacities { rows, micro } |_| true;
     Materials { parameters, textures, color_corners, colors, second_corners, second_uvs } textures_exist;
@@ -25,15 +27,36 @@ impl Codec for layout::Deformation {
     }
 }
 
+impl Codec for Exact {
+    fn write(&self, to: &mut impl Sink) {
+        to.add(&[self.anchor]);
+        to.add(&self.positions);
+    }
+
+    fn read(from: &mut RowReader<'_>) -> Option<Self> {
+        Some(Exact { anchor: from.one()?, positions: from.take()? })
+    }
+}
+
 /// Returns true if all rows of a mesh are in range and fit each other.
 fn fits(mesh: &Mesh) -> bool {
-    let Mesh { positions, triangles, attributes, opacity, groups, materials, sequence, deformation: _ } =
-        mesh;
+    let Mesh {
+        positions,
+        exact,
+        triangles,
+        attributes,
+        opacity,
+        groups,
+        materials,
+        sequence,
+        deformation: _,
+    } = mesh;
     let within = |rows: &[[u32; 3]], count: usize| rows.as_flattened().iter().all(|r| (*r as usize) < count);
     let one_each = |rows: usize| rows == triangles.len();
     let none_or_one_each = |rows: usize| rows == 0 || one_each(rows);
     let known = groups.as_ref().map_or(0, |g| g.materials.len());
     within(triangles, positions.len())
+        && exact.as_ref().is_none_or(|exact| exact.positions.len() == positions.len())
         && attributes.as_ref().is_none_or(|a| {
             one_each(a.corners.len())
                 && [a.normals.len(), a.uvs.len()].iter().all(|&n| n == 0 || within(&a.corners, n))
@@ -123,6 +146,10 @@ mod tests {
         let opacity = Some(TriangleOpacities { rows: vec![1], micro: vec![9] });
         let mesh = Mesh {
             positions: vec![[0.0; 3], [1.0; 3], [2.0; 3]],
+            exact: Some(Exact {
+                anchor: [1e6, 0.0, -7.0],
+                positions: vec![[1e6; 3], [0.1; 3], [f64::EPSILON; 3]],
+            }),
             triangles: vec![[0, 1, 2]],
             attributes: Some(attributes),
             opacity,
@@ -159,6 +186,7 @@ mod tests {
         let short = Mesh { sequence: Some(short), ..mesh.clone() };
         assert_eq!(decode::<Mesh>(&encode(&short)), None);
         let plain = Mesh {
+            exact: None,
             attributes: None,
             opacity: None,
             groups: None,
@@ -169,6 +197,9 @@ mod tests {
         };
         assert_eq!(decode::<Mesh>(&encode(&plain)), Some(plain.clone()));
         let short = Mesh { positions: vec![[0.0; 3]; 2], ..plain };
+        assert_eq!(decode::<Mesh>(&encode(&short)), None);
+        let mut short = mesh.clone();
+        short.exact.as_mut().unwrap().positions.pop();
         assert_eq!(decode::<Mesh>(&encode(&short)), None);
         let changes: [fn(&mut Groups); 3] =
             [|g| g.runs[0][1] = 1, |g| g.runs[0][0] = 1, |g| g.groups[0].material = Some(1)];

@@ -8,11 +8,15 @@ use bth_import::{self as mesh, Mesh};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Hash of a mesh's positions and triangles, the input of all stages between import and file.
+/// Hash of a mesh's positions, exact ones included, and triangles: the input of all stages between
+/// import and file.
 pub(crate) fn geometry(mesh: &Mesh) -> Digest {
     let mut hasher = HashedRows::new("geometry");
     hasher.add(&mesh.positions);
     hasher.add(&mesh.triangles);
+    if let Some(exact) = &mesh.exact {
+        exact.write(&mut hasher);
+    }
     hasher.finish()
 }
 
@@ -32,6 +36,7 @@ impl MeshSummary {
     pub(crate) fn of((mesh, report): (Mesh, mesh::Report)) -> (Mesh, Self) {
         let Mesh {
             positions: _,
+            exact: _,
             triangles: _,
             attributes,
             opacity,

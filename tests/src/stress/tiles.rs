@@ -22,6 +22,8 @@ const UNITS: i32 = 1 << 10;
 #[derive(Debug)]
 pub struct Tiles {
     /// What it is.
+    pub kind: &'static str,
+    /// The same, with the numbers that are random.
     pub name: String,
     /// Its instances.
     pub scene: Scene,
@@ -65,7 +67,8 @@ fn cross(a: Vector, b: Vector) -> Vector {
 /// If an object does not compile.
 pub fn tiles(seed: u64) -> Vec<Tiles> {
     let rng = &mut Rng::new(seed);
-    let mut all: Vec<Tiles> = (0..4).map(|kind| box_of_tiles(1 + kind, rng)).collect();
+    let boxes = ["box of 6 tiles", "box of 24 tiles", "box of 54 tiles", "box of 96 tiles"];
+    let mut all: Vec<Tiles> = (1..).zip(boxes).map(|(side, kind)| box_of_tiles(kind, side, rng)).collect();
     let (blob, inside) = (bth_scenes::blob::blob(1500), |rng: &mut Rng| rng.point_in_ball().map(|x| 0.2 * x));
     all.push(patches("bumpy sphere", &blob, 8 + rng.below(57) as usize, inside, rng));
     all.push(patches("torus", &torus(36, 24), 8 + rng.below(57) as usize, inside_torus, rng));
@@ -74,7 +77,7 @@ pub fn tiles(seed: u64) -> Vec<Tiles> {
 
 /// A box of `side`² copies of a square tile on each face. The entries of all matrices have so few
 /// bits that images share borders as real numbers, and that rays can be aimed at them exactly.
-fn box_of_tiles(side: usize, rng: &mut Rng) -> Tiles {
+fn box_of_tiles(kind: &'static str, side: usize, rng: &mut Rng) -> Tiles {
     let tile = relief(rng);
     let exponent = rng.below(40) as i32 - 29;
     let unit = 2f64.powi(exponent);
@@ -112,8 +115,8 @@ fn box_of_tiles(side: usize, rng: &mut Rng) -> Tiles {
         add(times(&linear, half), moved)
     });
     let inside = inside.collect();
-    let name = format!("box of {} tiles, scale 2^{}", matrices.len(), exponent + 9);
-    Tiles::new(name, &[tile], &matrices, inside, (linear, true))
+    let name = format!("{kind}, scale 2^{}", exponent + 9);
+    Tiles::new((kind, name), &[tile], &matrices, inside, (linear, true))
 }
 
 /// A square tile with a relief, flat at its border.
@@ -159,7 +162,7 @@ fn inside_torus(rng: &mut Rng) -> Vector {
 
 /// A closed mesh cut into patches, which all have the same random transform.
 fn patches(
-    name: &str,
+    kind: &'static str,
     mesh: &Model,
     count: usize,
     inside: impl Fn(&mut Rng) -> Vector,
@@ -184,14 +187,14 @@ fn patches(
     let rows = rows.map(|row| row.map(|x| f64::from(x as f32)));
     let linear = rows.map(|[a, b, c, _]| [a, b, c]);
     let inside = (0..64).map(|_| add(times(&linear, inside(rng)), rows.map(|row| row[3]))).collect();
-    let name = format!("{name} of {} patches, scale {scale:.0e}", patches.len());
-    Tiles::new(name, &patches, &vec![rows; patches.len()], inside, (linear, false))
+    let name = format!("{kind} of {} patches, scale {scale:.0e}", patches.len());
+    Tiles::new((kind, name), &patches, &vec![rows; patches.len()], inside, (linear, false))
 }
 
 impl Tiles {
     /// Instances of the objects in turn.
     fn new(
-        name: String,
+        (kind, name): (&'static str, String),
         objects: &[Model],
         matrices: &[[[f64; 4]; 3]],
         inside: Vec<Vector>,
@@ -229,7 +232,7 @@ impl Tiles {
         builder.commit().expect("transforms that can be used");
         let scene = builder.into_scene();
         let inside = inside.into_iter().map(|p| p.map(|x| x as f32)).collect();
-        Tiles { name, world: World::new(&scene), scene, outward, borders, inside, linear, is_exact }
+        Tiles { kind, name, world: World::new(&scene), scene, outward, borders, inside, linear, is_exact }
     }
 
     /// Returns true if a direction surely leads inside from within the triangle of a hit.

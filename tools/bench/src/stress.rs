@@ -6,13 +6,17 @@ use crate::isa;
 use crate::markdown::count;
 use crate::output::progress;
 use crate::report::{Head, Report, Subject};
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail, ensure};
 use bth::Isa;
 use bth_tests::oracle;
-use bth_tests::stress::{Corners, InsideStatistics, Shape, Statistics, run, run_inside, shapes};
+use bth_tests::stress::{
+    Corners, InsideStatistics, Shape, Statistics, Tiles, run, run_inside, run_tiles, shapes, tiles,
+};
 use bth_tests::structures::{DEFORMED, Traced, deformed, structures_named};
 use clap::Args;
+use rayon::prelude::*;
 use serde_json::json;
+use std::collections::BTreeMap;
 
 /// `stress`.
 #[derive(Debug, Args)]
@@ -34,6 +38,10 @@ pub(crate) struct Stress {
     /// Only structures with this in their names, such as `deformed bvh` or `bth`.
     #[arg(long, value_name = "NAME", default_value = "")]
     pub(crate) structure: String,
+    /// Tiles instead: instances that share borders exactly, at random transforms. At least one round
+    /// is traced, of some million rays.
+    #[arg(long, conflicts_with_all = ["size", "structure"])]
+    pub(crate) tiles: bool,
     #[command(flatten)]
     pub(crate) run: RunOptions,
 }
@@ -46,6 +54,9 @@ triangles, of `compared` rays.";
 
 /// Rays of a shape in a round: a number of batches that the instruction sets divide.
 const ROUND: usize = 12 * 1024;
+
+/// Rays from inside of each surface of tiles in a round, and as many starts.
+const TILES_ROUND: usize = 1 << 18;
 
 /// A shape, its compiled structures and what was found so far.
 struct ShapeRun {
@@ -60,6 +71,9 @@ struct ShapeRun {
 /// that it is there if the run is stopped.
 pub(crate) fn measure(arguments: &Stress) -> Result<Report> {
     isa::select(arguments.run.isa.as_deref())?;
+    if arguments.tiles {
+        return measure_tiles(arguments);
+    }
     let mut runs = Vec::new();
     for shape in shapes(arguments.size) {
         progress(format!("{}: compiling", shape.name));
@@ -86,7 +100,11 @@ pub(crate) fn measure(arguments: &Stress) -> Result<Report> {
             run_inside(&of.structures[0].scene, &of.corners, ROUND, one_in, seed, &mut of.points);
             is_done = false;
         }
-        let report = report(arguments, &runs);
+        let lines = runs.iter().map(|of| {
+            let counts = [of.corners.len() as u64, of.structures.len() as u64];
+            (of.shape.name, counts, &of.rays, &of.points)
+        });
+        let report = report(arguments, lines);
         if is_done || !report.wrong.is_empty() {
             return Ok(report);
         }
@@ -97,18 +115,67 @@ pub(crate) fn measure(arguments: &Stress) -> Result<Report> {
     }
 }
 
-/// One table: each shape is a line.
-fn report(arguments: &Stress, runs: &[ShapeRun]) -> Report {
+/// As [`measure`], for tiles, of which each round has others. Threads trace a surface each, with the
+/// instruction sets in turn. Then each instruction set traces one of the surfaces again, in batches
+/// that threads share.
+fn measure_tiles(arguments: &Stress) -> Result<Report> {
+    let isas: Vec<Isa> = Isa::ALL.into_iter().filter(|isa| isa.is_available()).collect();
+    let mut kinds = BTreeMap::<&str, (u64, Statistics)>::new();
+    for round in 0.. {
+        let seed = arguments.seed.wrapping_mul(1 << 40).wrapping_add(round as u64);
+        let all = tiles(seed);
+        let trace = |of: &Tiles, one_in, in_parallel| {
+            let mut rays = Statistics::default();
+            let hash = run_tiles(of, TILES_ROUND, one_in, seed, in_parallel, &mut rays);
+            (hash, rays)
+        };
+        isas[round % isas.len()].choose()?;
+        let traced: Vec<_> = all.par_iter().map(|of| trace(of, arguments.one_in, false)).collect();
+        let again = round % all.len();
+        for isa in &isas {
+            isa.choose()?;
+            let (hash, rays) = trace(&all[again], 0, true);
+            let (_, sum) = kinds.entry(all[again].kind).or_default();
+            sum.traced += rays.traced;
+            sum.different += u64::from(hash != traced[again].0);
+        }
+        for (of, (_, rays)) in all.iter().zip(&traced) {
+            let (triangles, sum) = kinds.entry(of.kind).or_default();
+            *triangles = of.world.triangle_count() as u64;
+            sum.add(rays);
+        }
+        let points = InsideStatistics::default();
+        let report = report(
+            arguments,
+            kinds.iter().map(|(kind, (triangles, rays))| (*kind, [*triangles, 1], rays, &points)),
+        );
+        let traced = kinds.values().map(|(_, rays)| rays.traced).sum();
+        if traced >= arguments.millions.saturating_mul(1_000_000) || !report.wrong.is_empty() {
+            return Ok(report);
+        }
+        report.save(&arguments.run)?;
+        progress(format!("{} of {} million rays", count(traced), arguments.millions));
+    }
+    bail!("no round is the last")
+}
+
+/// One table: each shape is a line. It has a name, numbers of triangles and structures, and what was
+/// found.
+fn report<'a>(
+    arguments: &Stress,
+    shapes: impl Iterator<Item = (&'a str, [u64; 2], &'a Statistics, &'a InsideStatistics)>,
+) -> Report {
     let isas = Isa::ALL.iter().filter(|isa| isa.is_available()).map(|isa| isa.to_string());
-    let Stress { size, one_in, seed, structure, .. } = arguments;
-    let options = json!({ "size": size, "one_in": one_in, "seed": seed, "structure": structure });
+    let Stress { size, one_in, seed, structure, tiles, .. } = arguments;
+    let options =
+        json!({ "size": size, "one_in": one_in, "seed": seed, "structure": structure, "tiles": tiles });
     let head = Head::now("stress", isas.collect::<Vec<_>>().join(" "), options);
     let mut report = Report::new(head, 1, ABOUT);
-    for ShapeRun { shape, structures, corners, rays, points } in runs {
-        let of = Subject { engine: shape.name, ours: true, model: "all", threads: 1 };
+    for (name, [triangles, structures], rays, points) in shapes {
+        let of = Subject { engine: name, ours: true, model: "all", threads: 1 };
         let counts = [
-            ("triangles", corners.len() as u64),
-            ("structures", structures.len() as u64),
+            ("triangles", triangles),
+            ("structures", structures),
             ("rays", rays.rays),
             ("traced", rays.traced),
             ("hits", rays.hits),
@@ -128,7 +195,7 @@ fn report(arguments: &Stress, runs: &[ShapeRun]) -> Report {
         let defects = rays.defects() + points.defects();
         if defects > 0 {
             let examples = (&rays.examples, &points.examples);
-            report.wrong.push(format!("{}: {defects}, such as {examples:?}", shape.name));
+            report.wrong.push(format!("{name}: {defects}, such as {examples:?}"));
         }
     }
     report

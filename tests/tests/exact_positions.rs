@@ -6,6 +6,7 @@ use bth_compile::{Error, Silent};
 use bth_format::File;
 use bth_format::verify::verify;
 use bth_import::Positions;
+use bth_tests::oracle;
 use std::path::Path;
 
 /// National coordinates.
@@ -47,6 +48,9 @@ fn assert_exact(bytes: &[u8], positions: &[[f64; 3]], triangles: &[[u32; 3]]) {
         assert_eq!(view.exact.corners(id).map(|c| c.map(|p| p.map(f64::to_bits))), Some(expected));
     }
     assert_eq!(view.exact.corners(triangles.len() as u32), None);
+    let all = oracle::exact_triangles(&view);
+    assert_eq!(all.len() as u32, view.header.triangles - view.header.dropped);
+    assert!(all.iter().all(|(id, corners)| view.exact.corners(*id) == Some(*corners)));
     assert_eq!(view.header.dropped, 1);
     assert!(view.bounds.greatest < 8.0, "{:?}", view.bounds);
 }

@@ -55,3 +55,13 @@ pub fn triangles(object: &ObjectView<'_>) -> Vec<Triangle> {
     found.sort_by_key(|triangle| triangle.id);
     found
 }
+
+/// Id and corners of all triangles, by ascending id, in the source's space: the exact positions of
+/// an object that has them.
+pub fn exact_triangles(object: &ObjectView<'_>) -> Vec<(u32, [[f64; 3]; 3])> {
+    let exact = |of: Triangle| {
+        let wide = || of.corners.map(|p| p.map(f64::from));
+        (of.id, object.exact.corners(of.id).unwrap_or_else(wide))
+    };
+    triangles(object).into_iter().map(exact).collect()
+}

@@ -30,7 +30,7 @@ mod world;
 
 pub use closest::{is_root_within, squared_distance};
 pub use crossing::{crossings, winding};
-pub use geometry::{Triangle, triangles};
+pub use geometry::{Triangle, exact_triangles, triangles};
 pub use intersection::{Intersection, LineHit, Rows, line_hit, to_f64};
 pub use nearest::{ExactHit, all_hits, any, nearest};
 pub use number::Coordinate;

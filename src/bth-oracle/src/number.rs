@@ -55,8 +55,7 @@ impl Number {
         self.digits.sign() == Sign::Minus
     }
 
-    /// A number of which this is a multiple, and one that its absolute value is below: exponents of
-    /// powers of two.
+    /// Two exponents: the number is a multiple of 2^first, and its absolute value below 2^second.
     pub(crate) fn range(&self) -> [i32; 2] {
         [self.exponent, self.exponent + self.digits.bits() as i32]
     }

@@ -1,6 +1,6 @@
 //! Exact queries to a whole scene: every triangle of every instance, transformed exactly.
 
-use crate::geometry::triangles;
+use crate::geometry::exact_triangles;
 use crate::intersection::{Intersection, Placed, Rows, to_f64};
 use crate::nearest::{ExactHit, nearest_of};
 use crate::number::Coordinate;
@@ -34,8 +34,7 @@ impl World {
             let view = scene.instance(number);
             if view.visible {
                 let object = scene.object(view.object);
-                let corners = triangles(&object).into_iter().map(|of| (of.id, of.corners));
-                world.place(number, view.to_world, corners);
+                world.place(number, view.to_world, exact_triangles(&object));
                 world.instances.last_mut().expect("it was placed").opacity =
                     [object.opacity.to_vec(), object.opacity_micro.to_vec()];
             }

@@ -144,8 +144,8 @@ fn check<R: TraceRay + Copy + Debug + Into<ExactRay>>(
     hits
 }
 
-/// Returns true if a hit is not one of the nearest of all triangles in exact arithmetic, or its t is
-/// not the exact one, rounded.
+/// Returns true if a hit is not a nearest one of all triangles in exact arithmetic, or its t is not
+/// the exact one, rounded.
 fn is_wrong<R: Copy + Into<ExactRay>>(
     tiles: &Tiles,
     ray: &R,

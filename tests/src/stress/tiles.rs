@@ -81,7 +81,7 @@ fn box_of_tiles(kind: &'static str, side: usize, rng: &mut Rng) -> Tiles {
     let tile = relief(rng);
     let exponent = rng.below(40) as i32 - 29;
     let unit = 2f64.powi(exponent);
-    // Ten bits for each entry, and few enough beside the diagonal for a box that is not flat.
+    // Ten bits for each entry, and small ones off the diagonal for a box that is not flat.
     let mut digits = |limit: u64| rng.below(2 * limit + 1) as f64 - limit as f64;
     let mut linear: Matrix = [(); 3].map(|()| [(); 3].map(|()| unit * digits(100)));
     (0..3).for_each(|k| linear[k][k] = unit * (if digits(1) < 0.0 { -400.0 } else { 400.0 } + digits(111)));

@@ -38,8 +38,8 @@ pub(crate) struct Stress {
     /// Only structures with this in their names, such as `deformed bvh` or `bth`.
     #[arg(long, value_name = "NAME", default_value = "")]
     pub(crate) structure: String,
-    /// Tiles instead: instances that share borders exactly, at random transforms. At least one round
-    /// is traced, of some million rays.
+    /// Tiles instead: instances that share borders exactly, at random transforms. At least one
+    /// round is traced, of some million rays.
     #[arg(long, conflicts_with_all = ["size", "structure"])]
     pub(crate) tiles: bool,
     #[command(flatten)]
@@ -115,7 +115,7 @@ pub(crate) fn measure(arguments: &Stress) -> Result<Report> {
     }
 }
 
-/// As [`measure`], for tiles, of which each round has others. Threads trace a surface each, with the
+/// As [`measure`], for tiles; each round has other ones. Threads trace a surface each, with the
 /// instruction sets in turn. Then each instruction set traces one of the surfaces again, in batches
 /// that threads share.
 fn measure_tiles(arguments: &Stress) -> Result<Report> {
@@ -159,8 +159,8 @@ fn measure_tiles(arguments: &Stress) -> Result<Report> {
     bail!("no round is the last")
 }
 
-/// One table: each shape is a line. It has a name, numbers of triangles and structures, and what was
-/// found.
+/// One table: each shape is a line. It has a name, numbers of triangles and structures, and what
+/// was found.
 fn report<'a>(
     arguments: &Stress,
     shapes: impl Iterator<Item = (&'a str, [u64; 2], &'a Statistics, &'a InsideStatistics)>,

@@ -2,6 +2,7 @@
 
 use bth_compile::memory::{self, PositionRows, TriangleMesh};
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
+use bth_compile::scene::{self, SceneSource};
 use bth_compile::{Error, Silent};
 use bth_format::File;
 use bth_format::verify::verify;
@@ -164,4 +165,32 @@ fn positions_that_are_kept_by_the_cache_come_back() {
     assert_exact(&again, &positions, &triangles);
     let (rounded, _) = run(&path, &options(Positions::F32));
     assert!(File::from_bytes(&rounded).unwrap().object(0).unwrap().exact.is_empty());
+}
+
+#[test]
+fn each_object_of_a_scene_decides_for_itself_and_transforms_are_f64() {
+    let (positions, triangles) = far_model();
+    let near: Vec<_> = positions.iter().map(|p| [0, 1, 2].map(|k| p[k] - AWAY[k])).collect();
+    let folder = tempfile::tempdir().unwrap();
+    for (name, positions) in [("far.obj", &positions), ("near.obj", &near)] {
+        std::fs::write(folder.path().join(name), obj(positions, &triangles)).unwrap();
+    }
+    let away = [5_500_000.1, 420_000.3, -7e-9];
+    let text = format!(
+        "version = 1\n[[objects]]\nname = \"far\"\nmodel = \"far.obj\"\n[[objects]]\nname = \"near\"\nmodel = \"near.obj\"\n\
+         [[nodes]]\nname = \"a\"\nobject = \"far\"\n[[nodes]]\nname = \"b\"\nobject = \"near\"\ntranslation = {away:?}\n"
+    );
+    let manifest = bth_scene::parse(&text, Path::new("s.manifest")).unwrap();
+    let source = SceneSource { folder: folder.path(), name: Path::new("s.manifest") };
+    let (compiled, report) = scene::compile(&manifest, source, &options(Positions::Auto), &Silent).unwrap();
+    let file = File::from_bytes(&compiled.bytes).unwrap();
+    verify(&file).unwrap_or_else(|errors| panic!("{}", errors[0]));
+    let is_exact = [0, 1].map(|object| !file.object(object).unwrap().exact.is_empty());
+    assert_eq!(is_exact, [true, false]);
+    let of_report = |k: usize| (report.objects[k].avoided_rounding.is_some(), report.objects[k].rounding);
+    assert_eq!([0, 1].map(of_report), [(true, None), (false, None)]);
+    assert_eq!(file.scene().unwrap().nodes[1].transform[..3], away);
+    // Until queries read exact positions, such files are refused.
+    let error = bth::from_bytes(&compiled.bytes).unwrap_err().to_string();
+    assert!(error.contains("positions in f64 of object 0"), "{error}");
 }

@@ -7,18 +7,24 @@ use crate::ears::clip_ears;
 use crate::error::Result;
 use crate::mesh::Polygons;
 use crate::monitor::Monitor;
-use crate::polygon::fan_areas;
+use crate::polygon::{fan as fan_of, fan_areas};
 
 /// A fan covers something twice or reaches beyond its polygon if it turns over more than the
 /// polygon's area divided by this number. Coordinates with few digits turn over less than that at
 /// corners on a straight line.
 const PARTS: f64 = 1000.0;
 
+/// Half a unit in the last place of f32, relative.
+const U: f64 = 1.0 / (1u64 << 24) as f64;
+
+/// 2√3, rounded up: two corners that move by 1 along each axis part by at most this length.
+const TWICE_ROOT_3: f64 = 3.47;
+
 /// The concave polygons of a mesh.
 #[derive(Default)]
 pub(super) struct ConcavePolygons {
-    /// Fans some of whose triangles are turned over, or that have corners whose positions were not
-    /// known yet.
+    /// Fans some of whose triangles are turned over, or may be before positions are rounded to f32,
+    /// or that have corners whose positions were not known yet.
     suspects: Vec<Fan>,
     /// Number of concave polygons.
     count: u64,
@@ -51,24 +57,25 @@ impl ConcavePolygons {
     /// Notes a polygon whose fan begins with the triangle `first`.
     #[inline]
     pub(super) fn note(&mut self, positions: &[[f32; 3]], face: &[u32], first: usize) {
-        if face.len() > 3 && turned_part(positions, face).is_none_or(|part| part > 0.0) {
+        if face.len() > 3 && may_turn(positions, face) {
             self.suspects.push(Fan { first: first as u32, triangles: face.len() as u32 - 2 });
         }
     }
 
     /// Finds which polygons are concave, and triangles for them if they are wanted, once all
-    /// positions are known.
+    /// positions are known. `triangles` are fans.
     ///
     /// # Errors
     /// Cancellation.
-    pub(super) fn find(
+    pub(super) fn find<T: Into<f64> + Copy>(
         &mut self,
-        positions: &[[f32; 3]],
+        positions: &[[T; 3]],
         triangles: &[[u32; 3]],
         polygons: Polygons,
         monitor: &dyn Monitor,
     ) -> Result<()> {
-        for fan in std::mem::take(&mut self.suspects) {
+        (self.count, self.left, self.first, self.replaced) = (0, 0, 0, Vec::new());
+        for &fan in &self.suspects {
             let face = fan.corners(triangles);
             let part = turned_part(positions, &face).unwrap_or(0.0);
             if part == 0.0 {
@@ -106,6 +113,22 @@ impl ConcavePolygons {
         }
     }
 
+    /// Puts fans back where they have been replaced.
+    pub(super) fn restore(&self, triangles: &mut [[u32; 3]]) {
+        if triangles.is_empty() {
+            return;
+        }
+        for (fan, found) in &self.replaced {
+            let of_fan = &mut triangles[fan.first as usize..][..found.len()];
+            let mut corners = vec![0; found.len() + 2];
+            let pairs = found.as_flattened().iter().zip(of_fan.as_flattened());
+            pairs.for_each(|(corner, row)| corners[*corner as usize] = *row);
+            let mut again = Vec::with_capacity(found.len());
+            fan_of(&mut again, &corners);
+            of_fan.copy_from_slice(&again);
+        }
+    }
+
     /// Number of concave polygons, whatever has become of them.
     pub(super) fn count(&self) -> u64 {
         self.count
@@ -113,7 +136,6 @@ impl ConcavePolygons {
 
     /// Warns of those that remain fans.
     pub(super) fn warn(&self, polygons: Polygons, monitor: &dyn Monitor) {
-        debug_assert!(self.suspects.is_empty(), "polygons are told before all are known");
         if self.left == 0 {
             return;
         }
@@ -135,8 +157,8 @@ impl ConcavePolygons {
 /// The part of a polygon's area that triangles of its fan cover which are turned over relative to
 /// the polygon; `None` if not all positions of its corners are known. What has no area has no such
 /// part.
-fn turned_part(positions: &[[f32; 3]], face: &[u32]) -> Option<f64> {
-    let known = |row: &u32| positions.get(*row as usize).map(|p| DVec3::from_array(p.map(f64::from)));
+fn turned_part<T: Into<f64> + Copy>(positions: &[[T; 3]], face: &[u32]) -> Option<f64> {
+    let known = |row: &u32| positions.get(*row as usize).map(|p| DVec3::from_array(p.map(T::into)));
     if face.iter().any(|row| known(row).is_none()) {
         return None;
     }
@@ -145,6 +167,30 @@ fn turned_part(positions: &[[f32; 3]], face: &[u32]) -> Option<f64> {
     let whole: DVec3 = areas().sum();
     let turned: f64 = areas().map(|area| -area.dot(whole)).filter(|turned| *turned > 0.0).sum();
     Some(if turned > 0.0 { turned / whole.length_squared() } else { 0.0 })
+}
+
+/// Returns true if triangles of a polygon's fan may be turned over relative to the polygon, where
+/// its corners lie before they are rounded to f32. Also if not all positions are known.
+///
+/// Rounding moves a corner along each axis by at most m, 2^-24 times the largest coordinate (or
+/// 2^-150), and so sides of triangles, of length s at most, by d = 2√3 m. Area vectors of triangles
+/// change by at most e = 2sd + d². So the scalar product of one of them, A, and the sum W of all n
+/// changes by at most e |W| + n e (|A| + e).
+fn may_turn(positions: &[[f32; 3]], face: &[u32]) -> bool {
+    let known = |row: &u32| positions.get(*row as usize).map(|p| DVec3::from_array(p.map(f64::from)));
+    if face.iter().any(|row| known(row).is_none()) {
+        return true;
+    }
+    let corners = || face.iter().map(|row| known(row).unwrap_or_default());
+    let first = corners().next().unwrap_or_default();
+    let largest = corners().fold(0.0, |most: f64, p| most.max(p.abs().max_element()));
+    let moved = TWICE_ROOT_3 * (largest * U + f64::from(f32::from_bits(1)));
+    let side = corners().fold(0.0, |most: f64, p| most.max(p.distance(first)));
+    let change = moved * (2.0 * side + moved);
+    let areas = || fan_areas(corners());
+    let whole: DVec3 = areas().sum();
+    let (length, count) = (whole.length(), face.len() as f64);
+    areas().any(|area| area.dot(whole) <= change * (length + count * (area.length() + change)))
 }
 
 #[cfg(test)]

@@ -26,7 +26,10 @@ const CHECKED: u64 = 1024;
 ///
 /// # Errors
 /// Cancellation.
-pub(super) fn clip_ears(corners: &[[f32; 3]], monitor: &dyn Monitor) -> Result<Option<Vec<[u32; 3]>>> {
+pub(super) fn clip_ears<T: Into<f64> + Copy>(
+    corners: &[[T; 3]],
+    monitor: &dyn Monitor,
+) -> Result<Option<Vec<[u32; 3]>>> {
     let mut outline = Outline::new(corners);
     let mut triangles = Vec::with_capacity(corners.len() - 2);
     let mut next: VecDeque<u32> = outline.remaining().collect();
@@ -82,11 +85,11 @@ struct Outline {
 
 impl Outline {
     /// The projection of a polygon of three corners or more.
-    fn new(corners: &[[f32; 3]]) -> Self {
+    fn new<T: Into<f64> + Copy>(corners: &[[T; 3]]) -> Self {
         let normal = area_vector(corners);
         let axis = normal.abs().max_position();
         let [x, y] = if normal[axis] > 0.0 { [1, 2] } else { [2, 1] }.map(|k| (axis + k) % 3);
-        let points: Vec<_> = corners.iter().map(|p| [x, y].map(|k| f64::from(p[k]))).collect();
+        let points: Vec<_> = corners.iter().map(|p| [x, y].map(|k| p[k].into())).collect();
         let count = points.len() as u32;
         let around = |corner: u32| [(corner + count - 1) % count, (corner + 1) % count];
         let neighbours = (0..count).map(around).collect();

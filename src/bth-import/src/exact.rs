@@ -6,8 +6,8 @@ use rayon::prelude::*;
 /// Positions with all digits of the source.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Exact {
-    /// What is subtracted before positions are rounded. Its coordinates are 0 along axes along which
-    /// the mesh is not farther from the origin than it is large.
+    /// What is subtracted before positions are rounded: 0 along axes along which the mesh is not
+    /// farther from the origin than it is large.
     pub anchor: [f64; 3],
     /// Row by row for [`Mesh::positions`](crate::Mesh::positions), in the source's space.
     /// Coordinates are 0 or in [`EXACT_RANGE`].

@@ -168,7 +168,6 @@ pub(crate) fn finish(
     let count = frames.as_ref().map_or(1, |frames| frames.positions.len() as u64);
     check_triangles(raw.triangles.len() as u64)?;
     check_rows((raw.positions.len() as u64).saturating_mul(count))?;
-    raw.concave.warn(wanted.polygons, monitor);
     let moves = frames.is_some() || raw.deformation.is_some();
     let rounded = match &frames {
         None => {
@@ -177,6 +176,10 @@ pub(crate) fn finish(
         }
         Some(_) => rounding::Rounded::default(),
     };
+    if let Some(exact) = &rounded.exact {
+        raw.finish_polygons_again(exact, wanted.polygons, monitor)?;
+    }
+    raw.concave.warn(wanted.polygons, monitor);
     let collected = attributes::collect(&raw, wanted.attributes)?;
     let (mut attributes, normal_sources) = collected.map_or((None, Vec::new()), |(a, rows)| (Some(a), rows));
     if frames.is_some() {

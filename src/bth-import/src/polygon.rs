@@ -3,8 +3,8 @@
 use glam::DVec3;
 
 /// The vector of a polygon's area, times two.
-pub(super) fn area_vector(corners: &[[f32; 3]]) -> DVec3 {
-    fan_areas(corners.iter().map(|p| DVec3::from_array(p.map(f64::from)))).sum()
+pub(super) fn area_vector<T: Into<f64> + Copy>(corners: &[[T; 3]]) -> DVec3 {
+    fan_areas(corners.iter().map(|p| DVec3::from_array(p.map(T::into)))).sum()
 }
 
 /// The vectors of the areas of the triangles of a fan from the first corner, times two.

@@ -107,6 +107,26 @@ impl<'a> Raw<'a> {
         Ok(())
     }
 
+    /// Does again what [`Self::finish_polygons`] did, by the positions in f64.
+    ///
+    /// # Errors
+    /// Cancellation.
+    pub(super) fn finish_polygons_again(
+        &mut self,
+        exact: &[[f64; 3]],
+        polygons: Polygons,
+        monitor: &dyn Monitor,
+    ) -> Result<()> {
+        for triangles in [&mut self.triangles, &mut self.normal_rows, &mut self.uv_rows] {
+            self.concave.restore(triangles);
+        }
+        self.concave.find(exact, &self.triangles, polygons, monitor)?;
+        for triangles in [&mut self.triangles, &mut self.normal_rows, &mut self.uv_rows] {
+            self.concave.replace(triangles);
+        }
+        Ok(())
+    }
+
     /// Forgets the rows of attributes that the source does not have.
     pub(super) fn drop_unused_rows(&mut self) {
         if self.normals.is_empty() {

@@ -2,7 +2,7 @@
 //! nothing moves.
 
 use super::*;
-use bth_import::{Mesh, Positions, Rounding, Wanted};
+use bth_import::{Mesh, Polygons, Positions, Rounding, Wanted};
 
 /// Corners of a grid of 8 by 8 squares of 0.125, `away` from the origin along x and y.
 fn grid(away: f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
@@ -173,4 +173,27 @@ fn vertices_that_move_stay_f32() {
         let (mesh, report) = import_with(name, &bytes, wanted, &Listener::default()).unwrap();
         assert!(mesh.exact.is_none() && report.rounding.is_some(), "{name}");
     }
+}
+
+#[test]
+fn polygons_far_away_are_split_by_their_exact_corners() {
+    // The letter C of 4 cm, seen from no corner; and a convex polygon. In f32 each is one point.
+    let c = [[0, 0], [3, 0], [3, 1], [1, 1], [1, 2], [3, 2], [3, 3], [0, 3]];
+    let obj = |away: f64| {
+        let corner =
+            |[x, y]: [i32; 2]| format!("v {} {} 0\n", away + 0.01 * f64::from(x), 0.01 * f64::from(y));
+        let corners: String = c.into_iter().chain([[5, 0], [6, 0], [6, 1], [5, 1]]).map(corner).collect();
+        format!("{corners}v {} 0 0\nf 1 2 3 4 5 6 7 8\nf 9 10 11 12\nf 1 2 13\n", away + 100.0)
+    };
+    let split = |text: &str, polygons, positions| {
+        let wanted = Wanted { polygons, positions, ..Wanted::default() };
+        import_with("a.obj", text.as_bytes(), wanted, &Listener::default()).unwrap()
+    };
+    let (near, report) = split(&obj(0.0), Polygons::Ears, Positions::F32);
+    assert_eq!(report.concave, 1);
+    let (far, report) = split(&obj(5e6), Polygons::Ears, Positions::Auto);
+    assert!(far.exact.is_some() && report.concave == 1, "{report:?}");
+    assert_eq!(far.triangles, near.triangles);
+    let (_, report) = split(&obj(5e6), Polygons::Fans, Positions::Auto);
+    assert_eq!(report.concave, 1);
 }

@@ -2,7 +2,7 @@
 
 use bth_compile::memory::{self, PositionRows, TriangleMesh};
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
-use bth_compile::scene::{self, SceneSource};
+use bth_compile::scene;
 use bth_compile::{Error, Silent};
 use bth_format::File;
 use bth_format::verify::verify;
@@ -181,8 +181,9 @@ fn each_object_of_a_scene_decides_for_itself_and_transforms_are_f64() {
          [[nodes]]\nname = \"a\"\nobject = \"far\"\n[[nodes]]\nname = \"b\"\nobject = \"near\"\ntranslation = {away:?}\n"
     );
     let manifest = bth_scene::parse(&text, Path::new("s.manifest")).unwrap();
-    let source = SceneSource { folder: folder.path(), name: Path::new("s.manifest") };
-    let (compiled, report) = scene::compile(&manifest, source, &options(Positions::Auto), &Silent).unwrap();
+    let (compiled, report) =
+        scene::compile(&manifest, folder.path(), Path::new("s.manifest"), &options(Positions::Auto), &Silent)
+            .unwrap();
     let file = File::from_bytes(&compiled.bytes).unwrap();
     verify(&file).unwrap_or_else(|errors| panic!("{}", errors[0]));
     let is_exact = [0, 1].map(|object| !file.object(object).unwrap().exact.is_empty());

@@ -103,9 +103,9 @@ impl CompileOptions {
             materials: self.materials,
             unreadable: self.looks().unreadable,
             polygons: self.polygons,
-            positions: match self.excludes_f64() {
-                Some(_) => mesh::Positions::F32,
-                None => self.positions,
+            positions: match (self.positions, self.excludes_f64()) {
+                (mesh::Positions::Auto, Some(_)) => mesh::Positions::F32,
+                (positions, _) => positions,
             },
             vertices: self.deformable,
         }

@@ -190,12 +190,14 @@ impl File {
 
     /// Bytes of the sections that tracing reads: no attributes, positions in f32 or provenance.
     pub fn resident_bytes(&self) -> u64 {
-        let traced = |e: &&SectionEntry| {
-            let of_exact =
-                e.kind == kind::TRIANGLES && self.section(e.object, kind::EXACT_POSITIONS).is_some();
-            e.object != NONE && (kind::is_traced(e.kind) || of_exact)
-        };
-        self.table().iter().filter(traced).map(|e| e.length).sum()
+        self.table().iter().filter(|entry| self.is_traced(entry)).map(|entry| entry.length).sum()
+    }
+
+    /// Returns true if tracing reads the section of an entry of this file's table.
+    pub fn is_traced(&self, entry: &SectionEntry) -> bool {
+        let is_of_exact =
+            || entry.kind == kind::TRIANGLES && self.section(entry.object, kind::EXACT_POSITIONS).is_some();
+        entry.object != NONE && (kind::is_traced(entry.kind) || is_of_exact())
     }
 
     /// The sections of an object, whose **indices are not checked**: use [`Self::check`] before

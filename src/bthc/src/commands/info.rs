@@ -271,7 +271,7 @@ fn add_object(facts: &mut Table, file: &File, object: u32) -> Result<(), Failure
     facts.row(["triangles in tet leaves", &count(view.tet_faces.len() as u64)]);
     facts.row(["tetrahedra", &count(view.records.len() as u64)]);
     facts.row(["record", record(&view)]);
-    let own = |e: &&SectionEntry| e.object == object && kind::is_traced(e.kind);
+    let own = |e: &&SectionEntry| e.object == object && file.is_traced(e);
     let traced: u64 = file.sections().map(|s| s.entry).filter(own).map(|e| e.length).sum();
     let per_triangle = traced as f64 / f64::from(view.header.triangles.max(1));
     facts.row(["bytes a triangle", &format!("{per_triangle:.1}")]);

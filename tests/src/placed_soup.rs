@@ -1,7 +1,9 @@
 //! Files of a few given triangles, degenerate ones included, that are written without the compiler.
 
-use bth_compile::write::{FileBuilder, ObjectParts, SceneParts, object, scene};
+use bth_compile::write::{FileBuilder, ObjectParts, SceneParts, Source, object, scene};
 use bth_format::layout::*;
+use bth_format::object::relative_to_anchor;
+use bth_import::Exact;
 use zerocopy::IntoBytes;
 
 /// The smallest box around points.
@@ -34,6 +36,28 @@ pub fn placed_soup(triangles: &[[[f32; 3]; 3]], matrices: &[[f64; 12]]) -> Vec<u
     if !matrices.is_empty() {
         scene(&mut builder, &scene_parts).expect("a scene");
     }
+    builder.finish()
+}
+
+/// A file of one object like [`placed_soup`], with corners in f64 and an anchor.
+///
+/// # Panics
+/// If there are no triangles or too many.
+pub fn exact_soup(triangles: &[[[f64; 3]; 3]], anchor: [f64; 3]) -> Vec<u8> {
+    let ids: Vec<u32> = (0..triangles.len() as u32).collect();
+    let round = |p: [f64; 3]| [0, 1, 2].map(|k| relative_to_anchor(p[k], anchor[k]));
+    let rounded: Vec<_> = triangles.iter().map(|corners| corners.map(round)).collect();
+    let soup = Soup::new(&rounded, &ids.chunks(WIDTH).map(<[u32]>::to_vec).collect::<Vec<_>>());
+    let exact = Exact { anchor, positions: triangles.as_flattened().to_vec() };
+    let rows: Vec<_> = ids.iter().map(|id| [3 * id, 3 * id + 1, 3 * id + 2]).collect();
+    let source = Source {
+        positions: rounded.as_flattened(),
+        exact: Some(&exact),
+        triangles: &rows,
+        ..Source::default()
+    };
+    let mut builder = FileBuilder::new();
+    object(&mut builder, 0, &ObjectParts { source: Some(source), ..soup.parts() }).expect("an object");
     builder.finish()
 }
 

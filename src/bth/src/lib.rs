@@ -60,7 +60,7 @@ pub use bth_format::{Code, Error};
 pub use builder::SceneBuilder;
 pub use hits::{Accept, Crossings, Cull, Filter};
 pub use materials::{Alpha, Material, Texture, Wrap};
-pub use points::{Closest, Feature};
+pub use points::{Closest, Closest64, Feature};
 pub use query::Steps;
 pub use scene::motion::{InstanceView, check_first_frame};
 pub use scene::{Bounds, Scene, from_bytes, from_file, map, open};

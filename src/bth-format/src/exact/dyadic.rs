@@ -44,6 +44,11 @@ impl Dyadic {
         }
     }
 
+    /// The number in units of 2^exponent, a smaller one than its own.
+    fn digits(&self, exponent: i64) -> BigInt {
+        &self.mantissa << (self.exponent - exponent) as u64
+    }
+
     /// The nearest `f64`; ties go to the even one. Infinite beyond the range of `f64`.
     pub fn to_f64(&self) -> f64 {
         self.ratio(&Dyadic::from(1.0))
@@ -85,7 +90,7 @@ fn scaled(mut x: f64, exponent: i64) -> f64 {
     while rest > 900 && x.is_finite() {
         (x, rest) = (x * power(900), rest - 900);
     }
-    // What is still left is far below the least number.
+    // What is still left is far below the smallest number.
     x * power(rest.clamp(-1022, 1023))
 }
 
@@ -93,8 +98,7 @@ impl Add for &Dyadic {
     type Output = Dyadic;
     fn add(self, other: &Dyadic) -> Dyadic {
         let exponent = self.exponent.min(other.exponent);
-        let at = |x: &Dyadic| &x.mantissa << (x.exponent - exponent) as u64;
-        Dyadic { mantissa: at(self) + at(other), exponent }
+        Dyadic { mantissa: self.digits(exponent) + other.digits(exponent), exponent }
     }
 }
 

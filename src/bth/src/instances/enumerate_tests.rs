@@ -4,6 +4,7 @@ use super::super::test_worlds::{FILES, rays, world};
 use super::super::top_nodes::InstanceBounds;
 use super::*;
 use crate::bvh::box_oracle;
+use crate::intersect::vector::wide;
 use bth_format::File;
 use bth_random::Rng;
 use std::collections::BTreeSet;
@@ -98,7 +99,7 @@ fn points_and_boxes_visit_every_instance_within_reach_and_few_others() {
                 assert!(of_point.insert(i));
                 Some(squared)
             }));
-            let boxes_in_region = RegionBox::in_world(region, world.max_coordinate());
+            let boxes_in_region = RegionBox::in_world(region.map(wide), world.max_coordinate());
             assert!(!world.enumerate_in_box(boxes_in_region, &mut |i| !of_box.insert(i)));
             for (instance, bounds) in &boxes {
                 let away = outside(bounds);

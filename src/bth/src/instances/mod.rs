@@ -46,4 +46,4 @@ pub(crate) use placement::Placement;
 pub(crate) use top_level::TopLevel;
 #[cfg(test)]
 pub(crate) use top_nodes::INSTANCE;
-pub(crate) use world::{InstanceRow, Placed, World};
+pub(crate) use world::{InstanceRow, World};

@@ -5,7 +5,7 @@ use super::placement::{PartBoxes, Placement, PlacementError};
 use super::top_level::TopLevel;
 use crate::animation::Animation;
 use crate::clock;
-use crate::nodes::affine::{Affine, Inverse};
+use crate::nodes::affine::Affine;
 use crate::nodes::hierarchy::NodeHierarchy;
 use crate::objects::Objects;
 use crate::update::Update;
@@ -42,21 +42,6 @@ impl Unplaceable {
         let (code, expected, found) = self.error.words();
         Error::of_call(code, expected, format!("{found}: {instance}"))
     }
-}
-
-/// The transforms of a visible instance.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Placed {
-    /// Index of the object.
-    pub(crate) object: u32,
-    /// From object space to world space: rows of four.
-    pub(crate) to_world: [[f64; 4]; 3],
-    /// Rows of the linear part of the inverse, and the origin of object space in world space.
-    pub(crate) inverse: [[f64; 3]; 3],
-    pub(crate) origin: [f64; 3],
-    /// The world box.
-    pub(crate) lower: [f32; 3],
-    pub(crate) upper: [f32; 3],
 }
 
 /// The scene sections of a scene that is a file with such sections.
@@ -305,20 +290,6 @@ impl World {
         let header = objects.header(object);
         let placement = Placement::new(&to_world, object, header, &PartBoxes::whole(header)).ok()?;
         Some((placement.lower, placement.upper))
-    }
-
-    /// The transforms and the world box of an instance; `None` if it is not visible.
-    pub(crate) fn placed(&self, objects: &Objects, instance: u32) -> Option<Placed> {
-        let placement = self.placements[instance as usize].as_ref()?;
-        let Inverse { linear, origin } = placement.inverse;
-        Some(Placed {
-            object: placement.object(),
-            to_world: self.row(objects, instance).to_world.rows(),
-            inverse: linear,
-            origin,
-            lower: placement.lower,
-            upper: placement.upper,
-        })
     }
 
     /// The only visible instance and its object, if there is exactly one and the object's space is

@@ -10,7 +10,9 @@
 //!
 //! The distance of a point to boxes and triangles is bounded in f32 in the same way
 //! ([`point_lanes`]) and decided in f64 ([`point_triangle`]) or exactly ([`point_exact`]).
-//! [`triangle_box`] decides whether triangles and boxes overlap.
+//! [`triangle_box`] decides if triangles and boxes overlap. Points, boxes and corners that are no
+//! f32 numbers, and the images of triangles under transforms, are decided as real numbers, too
+//! ([`wide_triangle`], [`wide_distance`], [`wide_box`], [`wide_side`]).
 
 pub(crate) mod boxes;
 pub(crate) mod crossing;
@@ -32,3 +34,7 @@ pub(crate) mod start;
 pub(crate) mod start_point;
 pub(crate) mod triangle_box;
 pub(crate) mod vector;
+pub(crate) mod wide_box;
+pub(crate) mod wide_distance;
+pub(crate) mod wide_side;
+pub(crate) mod wide_triangle;

@@ -10,52 +10,59 @@ use crate::simd::{Part, Simd};
 use bth_format::layout::{NONE, WideNode};
 
 /// 2^-21: bounds all roundings relative to the magnitudes of the sums. Rounding elements of the
-/// transform, products and sums to f32 gives less than six times 2^-24.
+/// transform, products and sums to f32 gives less than six times 2^-24, rounded vertices one more.
 const ROUNDING: f64 = 1.0 / (1 << 21) as f64;
 /// Where sums could overflow, no box is excluded.
 const LARGEST: f64 = f32::MAX as f64 / 4.0;
 
-/// A closed box in world space, for tests of boxes in the space of an object.
+/// A closed box in world space relative to the origin of an object, for tests of boxes in the space
+/// of the object.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RegionBox {
     lower: [f32; 3],
     upper: [f32; 3],
     /// The linear part of the transform to world space, by rows.
     rows: [[f32; 3]; 3],
-    /// The translation, less and plus a pad for roundings.
-    translation: [[f32; 2]; 3],
+    /// A pad for roundings, below and above.
+    pad: [[f32; 2]; 3],
 }
 
 impl RegionBox {
-    /// For boxes with |coordinates| of at most `greatest`, whose triangles are rounded to f32 in a
-    /// world box with |coordinates| of at most `extent`.
+    /// For boxes with |coordinates| of at most `greatest`, which a linear map, given by rows, takes
+    /// to the space of the region. That space has the origin of the object as its origin, because
+    /// this is often far from the origin of world space. `off` bounds how far the region is off but
+    /// for one rounding.
     pub(crate) fn new(
-        [lower, upper]: [[f32; 3]; 2],
-        to_world: &[[f64; 4]; 3],
+        [lower, upper]: [[f64; 3]; 2],
+        linear: &[[f64; 3]; 3],
         greatest: f32,
-        extent: f64,
+        off: f64,
     ) -> RegionBox {
-        let mut region =
-            RegionBox { lower, upper, rows: [[0.0; 3]; 3], translation: [[f32::MIN, f32::MAX]; 3] };
+        let mut region = RegionBox {
+            // The steps cover that rounding, too.
+            lower: lower.map(|x| (x as f32).next_down()),
+            upper: upper.map(|x| (x as f32).next_up()),
+            rows: [[0.0; 3]; 3],
+            pad: [[f32::MIN, f32::MAX]; 3],
+        };
         let greatest = f64::from(greatest);
-        for (i, [x, y, z, t]) in to_world.iter().enumerate() {
-            let stretch = x.abs() + y.abs() + z.abs();
-            let sum = stretch * greatest + t.abs();
+        for (i, row) in linear.iter().enumerate() {
+            let stretch = row.iter().map(|x| x.abs()).sum::<f64>();
+            let sum = stretch * greatest;
             // The processor may take denormal numbers for zero: coordinates, elements and products.
             let denormal = f64::from(f32::MIN_POSITIVE) * (stretch + 3.0 * greatest + 4.0);
-            let pad = ROUNDING * (sum + extent) + denormal;
+            let pad = ROUNDING * sum + denormal + off;
             if sum + pad < LARGEST {
-                region.rows[i] = [*x as f32, *y as f32, *z as f32];
-                region.translation[i] = [((t - pad) as f32).next_down(), ((t + pad) as f32).next_up()];
+                region.rows[i] = row.map(|x| x as f32);
+                region.pad[i] = [(-pad as f32).next_down(), (pad as f32).next_up()];
             }
         }
         region
     }
 
     /// For boxes in world space.
-    pub(crate) fn in_world(region: [[f32; 3]; 2], greatest: f32) -> RegionBox {
-        const IDENTITY: [[f64; 4]; 3] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
-        RegionBox::new(region, &IDENTITY, greatest, 0.0)
+    pub(crate) fn in_world(region: [[f64; 3]; 2], greatest: f32) -> RegionBox {
+        RegionBox::new(region, &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], greatest, 0.0)
     }
 
     #[inline(always)]
@@ -91,7 +98,7 @@ impl<S: Simd> Part<S> for InRegion<'_, S> {
         let RegionLanes { region, rows } = self.lanes;
         let mut apart = s.mask(0);
         for i in 0..3 {
-            let [from, to] = region.translation[i];
+            let [from, to] = region.pad[i];
             let (mut from, mut to) = (s.splat(from), s.splat(to));
             for k in 0..3 {
                 let low = s.mul(planes(s, self.node, k, 0), rows[i][k]);

@@ -1,22 +1,27 @@
 //! Queries about points, boxes and balls: closest points, overlapping triangles, winding numbers.
 //!
-//! [`searcher`] goes through the instances of a scene, [`nearest`] through the triangles of one;
-//! [`search`] holds the best triangle so far. [`overlap`] finds the triangles in a box or a ball,
+//! [`searcher`] goes through the instances of a scene, [`nearest`] through the triangles of one.
+//! [`search`] holds the best triangle so far where all is f32 in world space, [`wide_search`] for
+//! instances and points of f64 ([`double`]). [`overlap`] finds the triangles in a box or a ball,
 //! [`winding`] counts the surfaces around a point. [`placed`] bounds distances in the space of an
 //! instance's object.
 
+mod double;
 mod nearest;
 mod order;
 mod overlap;
 mod placed;
 mod search;
 mod searcher;
+mod wide_search;
 mod winding;
 
+pub use self::double::Closest64;
 pub use crate::intersect::point_triangle::Feature;
 
-use self::order::along_curve;
+use self::order::in_order;
 use self::searcher::Searcher;
+use crate::intersect::vector::wide;
 use crate::rays::PrimitiveRef;
 use crate::scene::Scene;
 
@@ -38,10 +43,8 @@ pub struct Closest {
     pub feature: Feature,
 }
 
-/// Number of points that are ordered together.
-const CHUNK: usize = 1 << 20;
-/// Fewer points are searched in the order in which they are given.
-const MIN_ORDERED: usize = 32;
+/// Points that are handled at a time where numbers are held for each.
+const CHUNK: usize = 256;
 
 /// Queries about points in world space.
 impl Scene {
@@ -49,13 +52,13 @@ impl Scene {
     /// distance, rounded to f32 as reported, exceeds `radius`, if the point is not finite, or if
     /// the radius is negative or NaN.
     ///
-    /// Distances are exact to 0.55 units in the last place. Triangles are compared by their squared
-    /// distances, computed in f64 from the point and the triangle alone with a relative error below
-    /// 2^-27. Among equal ones the min instance wins, then the min id. Distances to a shared edge
-    /// or vertex are equal for all triangles that share it. So the result does not depend on the
-    /// acceleration structures in the file, the instruction set or the batch. Triangles without
-    /// area do not count, as for rays. The corners of instances are transformed in f64 and rounded
-    /// to f32 in world space.
+    /// Distances are exact to 0.55 units in the last place. Triangles of instances are their images
+    /// under the f64 transform, as real numbers, and are compared by their exact distances. Where
+    /// all triangles are f32 in world space, squared distances are compared, computed in f64 from
+    /// the point and the triangle alone with a relative error below 2^-27. Distances to a shared
+    /// edge or vertex are equal for all triangles that share it. Among equal ones the min instance
+    /// wins, then the min id. So the result does not depend on the acceleration structures in the
+    /// file, the instruction set or the batch. Triangles without area do not count, as for rays.
     ///
     /// ```
     /// # const CUBE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/cube.bth"));
@@ -78,18 +81,7 @@ impl Scene {
     pub fn closest_batch(&self, points: &[[f32; 3]], radius: f32, closest: &mut [Option<Closest>]) {
         assert_eq!(points.len(), closest.len(), "as many results as points");
         let mut searcher = Searcher::new(self);
-        let mut order = Vec::new();
-        for (points, closest) in points.chunks(CHUNK).zip(closest.chunks_mut(CHUNK)) {
-            if points.len() < MIN_ORDERED {
-                (0..points.len()).for_each(|i| closest[i] = searcher.closest(points[i], radius));
-                continue;
-            }
-            along_curve(points, &mut order);
-            for entry in &order {
-                let i = *entry as u32 as usize;
-                closest[i] = searcher.closest(points[i], radius);
-            }
-        }
+        in_order(points, |i| closest[i] = searcher.closest(points[i], radius));
     }
 
     /// The distance of a point in world space to the closest triangle, as [`Self::closest`] reports
@@ -127,16 +119,17 @@ impl Scene {
 
     /// Returns true if a triangle and an axis-aligned box in world space have a point in common.
     /// Both are closed, so touching counts; the answer is exact. A box may be infinite. A box with
-    /// a `lower` above its `upper` or a NaN is empty. The corners of instances are transformed in
-    /// f64 and rounded to f32 in world space.
+    /// a `lower` above its `upper` or a NaN is empty. Triangles of instances are their images under
+    /// the f64 transform, as real numbers.
     pub fn overlaps_box(&self, lower: [f32; 3], upper: [f32; 3]) -> bool {
-        overlap::visit_box(self, lower, upper, &mut |_| true)
+        overlap::visit_box(self, [lower, upper].map(wide), true, &mut |_| true)
     }
 
     /// Replaces the contents of `triangles` by all triangles that overlap a box as in
     /// [`Self::overlaps_box`], by ascending instance and triangle.
     pub fn triangles_in_box(&self, lower: [f32; 3], upper: [f32; 3], triangles: &mut Vec<PrimitiveRef>) {
-        overlap::collect_sorted(triangles, |visit| overlap::visit_box(self, lower, upper, visit));
+        let region = [lower, upper].map(wide);
+        overlap::collect_sorted(triangles, |visit| overlap::visit_box(self, region, true, visit));
     }
 
     /// Returns true if a triangle overlaps a ball in world space: if its distance from the centre,
@@ -160,15 +153,15 @@ impl Scene {
     /// It is exact for closed meshes, even if they intersect themselves. A point on the surface
     /// counts as if it were moved by (ε, ε², ε³) for an infinitely small ε > 0, so of solids that
     /// fill space without gaps exactly one contains it. For other meshes it is the number of
-    /// crossings of a ray from the point along an axis to the nearest side of the object's bounds.
-    /// Outside of the bounds of an instance, and for a point that is not finite, it is 0.
+    /// crossings of a ray from the point along an axis of its object to the nearest side of the
+    /// object's bounds. Outside of the bounds of an instance, and for a point that is not finite,
+    /// it is 0.
     ///
-    /// The numbers of all instances are added. Each is counted in the space of its object, into
-    /// which the point is rounded.
+    /// The numbers of all instances are added. Their triangles are images under the f64 transform,
+    /// as real numbers, counterclockwise where the object's are. Of instances that fill space
+    /// without gaps exactly one contains each point.
     pub fn winding(&self, point: [f32; 3]) -> i32 {
-        let mut winding = [0];
-        winding::windings(self, &[point], &mut winding);
-        winding[0]
+        self.winding_f64(wide(point))
     }
 
     /// Stores for each point what [`Self::winding`] returns.
@@ -177,7 +170,12 @@ impl Scene {
     /// If there are not as many numbers as points.
     pub fn winding_batch(&self, points: &[[f32; 3]], winding: &mut [i32]) {
         assert_eq!(points.len(), winding.len(), "as many winding numbers as points");
-        winding::windings(self, points, winding);
+        let mut buffer = [[0.0; 3]; CHUNK];
+        for (points, winding) in points.chunks(CHUNK).zip(winding.chunks_mut(CHUNK)) {
+            let buffer = &mut buffer[..points.len()];
+            buffer.iter_mut().zip(points).for_each(|(wide_point, point)| *wide_point = wide(*point));
+            winding::windings(self, buffer, winding);
+        }
     }
 
     /// Returns true if a point in world space lies inside: if [`Self::winding`] is not 0. Where
@@ -199,13 +197,11 @@ impl Scene {
     /// # Panics
     /// If there are not as many answers as points.
     pub fn contains_batch(&self, points: &[[f32; 3]], inside: &mut [bool]) {
-        /// Points whose winding numbers are held at a time.
-        const CHUNK: usize = 256;
         assert_eq!(points.len(), inside.len(), "as many answers as points");
         let mut buffer = [0; CHUNK];
         for (points, inside) in points.chunks(CHUNK).zip(inside.chunks_mut(CHUNK)) {
             let winding = &mut buffer[..points.len()];
-            winding::windings(self, points, winding);
+            self.winding_batch(points, winding);
             for (inside, winding) in inside.iter_mut().zip(winding) {
                 *inside = *winding != 0;
             }

@@ -1,8 +1,9 @@
 //! The walk of a point through the BVH of an object, nearest boxes first: for the closest triangle,
 //! or for all triangles that overlap a ball.
 
-use super::placed::PlacedObject;
+use super::placed::{NarrowPoint, PlacedObject};
 use super::search::Search;
+use super::wide_search::WideSearch;
 use crate::bvh::walk::{BoxQuery, ObjectTree, TriangleQuery, all_triangles, any_in_set, run_walk};
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::point_lanes::{CornerLanes, LanePoint, PointLanes, TriangleLanes};
@@ -18,22 +19,16 @@ pub(super) struct PointInstance<'a> {
     pub(super) object: &'a ObjectView<'a>,
     /// Instance that is reported.
     pub(super) instance: u32,
-    /// The transform of the instance; `None` where object space is world space.
+    /// The transform of the instance. `None` for queries in f32 of what lies in world space as f32.
     pub(super) placed: Option<&'a PlacedObject>,
 }
 
 impl PointInstance<'_> {
-    /// The corners of a triangle in world space, given those in object space; `None` for triangles
-    /// of zero area, which are not part of the surface. Only deformable objects hold some.
+    /// Returns true if a triangle is part of the surface, given its corners in object space: if it
+    /// has an area. Only deformable objects hold others.
     #[inline(always)]
-    pub(super) fn corners_in_world(&self, corners: [[f32; 3]; 3]) -> Option<[[f32; 3]; 3]> {
-        if self.object.is_deformable() && is_zero_area(corners) {
-            return None;
-        }
-        Some(match self.placed {
-            None => corners,
-            Some(placed) => placed.corners_in_world(corners),
-        })
+    pub(super) fn is_surface(&self, corners: [[f32; 3]; 3]) -> bool {
+        !(self.object.is_deformable() && is_zero_area(corners))
     }
 
     /// The triangle with an id.
@@ -52,16 +47,10 @@ pub(super) enum PointGoal<'a, 'v> {
     Closest(&'a mut Search),
     /// All triangles that overlap the ball of a search that has found nothing yet.
     Ball { search: &'a Search, radius: f32, visit: &'a mut Visitor<'v> },
-}
-
-impl PointGoal<'_, '_> {
-    #[inline(always)]
-    fn search(&self) -> &Search {
-        match self {
-            PointGoal::Closest(search) => search,
-            PointGoal::Ball { search, .. } => search,
-        }
-    }
+    /// The closest triangle of a placed instance.
+    WideClosest(&'a mut WideSearch),
+    /// All triangles of a placed instance in the ball of a search that has found nothing yet.
+    WideBall { search: &'a WideSearch, visit: &'a mut Visitor<'v> },
 }
 
 /// Searches an instance. Returns true if the query is complete.
@@ -71,28 +60,51 @@ pub(super) fn search_instance(at: PointInstance<'_>, goal: PointGoal<'_, '_>) ->
     if object.header.root == NONE {
         return false;
     }
-    let world_point = goal.search().point;
-    let (point, slack) = match placed {
-        None => (world_point, 0.0),
-        Some(placed) => (placed.point(world_point), placed.slack(world_point)),
+    let in_object = |point, placed: Option<&PlacedObject>| {
+        let nowhere = NarrowPoint { point: [0.0; 3], off: 0.0 };
+        placed.map_or(nowhere, |placed| placed.narrow(&placed.point(point), object))
+    };
+    let NarrowPoint { point, off } = match &goal {
+        PointGoal::Closest(search) => NarrowPoint { point: search.point, off: 0.0 },
+        PointGoal::Ball { search, .. } => NarrowPoint { point: search.point, off: 0.0 },
+        PointGoal::WideClosest(search) => in_object(search.point, placed),
+        PointGoal::WideBall { search, .. } => in_object(search.point, placed),
     };
     let point = LanePoint::new(point, object.bounds.greatest);
     // In object space, the smallest upper bound says nothing about which triangle is closest in
     // world space; nor does the bound of a triangle of zero area, which is not offered.
-    let only_closest = matches!(goal, PointGoal::Closest(_)) && placed.is_none() && !object.is_deformable();
-    run_walk(&ObjectTree::new(object), &mut PointTriangles { at, slack, point, only_closest, goal })
+    let only_closest = matches!(goal, PointGoal::Closest(_)) && !object.is_deformable();
+    run_walk(&ObjectTree::new(object), &mut PointTriangles { at, off, point, only_closest, goal })
 }
 
 /// The triangles near a point.
 struct PointTriangles<'a, 'g, 'v> {
     at: PointInstance<'a>,
-    /// Slack of the transform for the point.
-    slack: f64,
+    /// How far a coordinate of the point in object space is off.
+    off: f64,
     /// The point in object space.
     point: LanePoint,
     /// True if triangles that are certainly not the closest of a leaf are skipped.
     only_closest: bool,
     goal: PointGoal<'g, 'v>,
+}
+
+impl PointTriangles<'_, '_, '_> {
+    /// Decides a triangle of a placed instance. Returns true if the query is complete.
+    #[inline(never)]
+    fn decide(&mut self, corners: [[f32; 3]; 3], id: u32) -> bool {
+        let at = self.at;
+        let Some(placed) = at.placed else { return false };
+        let triangle = placed.triangle(at.object, corners, id);
+        match &mut self.goal {
+            PointGoal::WideClosest(search) => search.offer(triangle, at.primitive(id)),
+            PointGoal::WideBall { search, visit } => {
+                return search.is_within(&triangle) && visit(at.primitive(id));
+            }
+            PointGoal::Closest(_) | PointGoal::Ball { .. } => {}
+        }
+        false
+    }
 }
 
 impl BoxQuery for PointTriangles<'_, '_, '_> {
@@ -108,10 +120,13 @@ impl BoxQuery for PointTriangles<'_, '_, '_> {
     /// Upper bound in scaled object space of squared distances that can change the result.
     #[inline(always)]
     fn limit(&self) -> f32 {
-        let squared = self.goal.search().squared;
-        self.point.limit(match self.at.placed {
-            None => squared,
-            Some(placed) => placed.squared_in_object(squared, self.slack),
+        let in_object =
+            |limit| self.at.placed.map_or(0.0, |placed| placed.squared_in_object(limit, self.off));
+        self.point.limit(match &self.goal {
+            PointGoal::Closest(search) => search.squared,
+            PointGoal::Ball { search, .. } => search.squared,
+            PointGoal::WideClosest(search) => in_object(search.limit),
+            PointGoal::WideBall { search, .. } => in_object(search.limit),
         })
     }
 }
@@ -138,16 +153,20 @@ impl TriangleQuery for PointTriangles<'_, '_, '_> {
         };
         let at = self.at;
         any_in_set(found, |i| {
-            let Some(corners) = at.corners_in_world(block.corners(i)) else { return false };
-            let primitive = || at.primitive(ids[block.first() as usize + i]);
+            let corners = block.corners(i);
+            if !at.is_surface(corners) {
+                return false;
+            }
+            let id = || ids[block.first() as usize + i];
             match &mut self.goal {
                 PointGoal::Closest(search) => {
-                    search.offer(corners, primitive);
+                    search.offer(corners, || at.primitive(id()));
                     false
                 }
                 PointGoal::Ball { search, radius, visit } => {
-                    search.is_in_ball(corners, *radius) && visit(primitive())
+                    search.is_in_ball(corners, *radius) && visit(at.primitive(id()))
                 }
+                _ => self.decide(corners, id()),
             }
         })
     }

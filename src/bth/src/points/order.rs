@@ -2,6 +2,10 @@
 //! is close to the one before. Its triangle then gives a good bound, and the nodes that it visited
 //! are in the cache. The order never changes a result.
 
+/// Number of points that are ordered together.
+const CHUNK: usize = 1 << 20;
+/// Fewer points are searched in the order in which they are given.
+const MIN_ORDERED: usize = 32;
 /// Bits of each coordinate on the curve.
 const BITS: u32 = 10;
 
@@ -16,26 +20,43 @@ fn spread(x: u64) -> u64 {
 /// The points of a batch by their place on the curve through the box of all finite ones: `order`
 /// receives the place in the high half and the index of the point in the low half of each number.
 /// There are at most 2^32 points.
-pub(super) fn along_curve(points: &[[f32; 3]], order: &mut Vec<u64>) {
-    let (mut lower, mut upper) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-    for point in points.iter().filter(|point| point.iter().all(|x| x.is_finite())) {
+fn along_curve<T: Into<f64> + Copy>(points: &[[T; 3]], order: &mut Vec<u64>) {
+    let (mut lower, mut upper) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    let wide = |point: &[T; 3]| point.map(T::into);
+    for point in points.iter().map(wide).filter(|point| point.iter().all(|x: &f64| x.is_finite())) {
         for k in 0..3 {
             lower[k] = lower[k].min(point[k]);
             upper[k] = upper[k].max(point[k]);
         }
     }
     let cells = f64::from((1 << BITS) - 1);
-    let scale = [0, 1, 2].map(|k| cells / (f64::from(upper[k]) - f64::from(lower[k])));
-    let place = |point: &[f32; 3]| {
+    let scale = [0, 1, 2].map(|k| cells / (upper[k] - lower[k]));
+    let place = |point: &[T; 3]| {
+        let point = wide(point);
         (0..3).fold(0, |place, k| {
             // The conversion limits the number to the range of the type, and maps NaN to 0.
-            let cell = ((f64::from(point[k]) - f64::from(lower[k])) * scale[k]) as u16;
+            let cell = ((point[k] - lower[k]) * scale[k]) as u16;
             place | spread(u64::from(cell.min((1 << BITS) - 1))) << k
         })
     };
     order.clear();
     order.extend(points.iter().enumerate().map(|(i, point)| place(point) << 32 | i as u64));
     order.sort_unstable();
+}
+
+/// Calls `visit` with the index of each point of a batch, in an order in which each is close to the
+/// one before.
+pub(super) fn in_order<T: Into<f64> + Copy>(points: &[[T; 3]], mut visit: impl FnMut(usize)) {
+    let mut order = Vec::new();
+    for (chunk, points) in points.chunks(CHUNK).enumerate() {
+        let first = chunk * CHUNK;
+        if points.len() < MIN_ORDERED {
+            (first..first + points.len()).for_each(&mut visit);
+            continue;
+        }
+        along_curve(points, &mut order);
+        order.iter().for_each(|entry| visit(first + *entry as u32 as usize));
+    }
 }
 
 #[cfg(test)]

@@ -2,32 +2,36 @@
 
 use super::nearest::{PointGoal, PointInstance, Visitor, search_instance};
 use super::search::Search;
-use super::searcher::{objects, placed, sole_instance};
+use super::searcher::Instances;
+use super::wide_search::{Radius, WideSearch};
 use crate::bvh::walk::{BoxQuery, ObjectTree, TriangleQuery, all_triangles, any_in_set, run_walk};
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::region_box::{RegionBox, RegionLanes};
-use crate::intersect::triangle_box;
+use crate::intersect::vector::wide;
+use crate::intersect::{triangle_box, wide_box};
 use crate::rays::PrimitiveRef;
 use crate::scene::Scene;
 use crate::simd::Simd;
 use bth_format::layout::{NONE, WideNode};
 
-/// The finite part of a box: lower and upper ends. `None` if it contains no finite point or a
+/// A box: lower and upper end.
+pub(super) type Region = [[f64; 3]; 2];
+
+/// The part of a box with coordinates of at most `max`. `None` if it contains no such point or a
 /// coordinate is NaN.
-fn finite_box(lower: [f32; 3], upper: [f32; 3]) -> Option<[[f32; 3]; 2]> {
+fn finite_box([lower, upper]: Region, max: f64) -> Option<Region> {
     let is_number = lower.iter().chain(&upper).all(|x| !x.is_nan());
-    let (lower, upper) = (lower.map(|x| x.max(f32::MIN)), upper.map(|x| x.min(f32::MAX)));
+    let (lower, upper) = (lower.map(|x| x.max(-max)), upper.map(|x| x.min(max)));
     (is_number && (0..3).all(|k| lower[k] <= upper[k])).then_some([lower, upper])
 }
 
 /// Visits the triangles of an instance that overlap a box in world space. Returns true if the
 /// visitor has ended the query.
-fn visit_in_box(at: PointInstance<'_>, region: [[f32; 3]; 2], visit: &mut Visitor<'_>) -> bool {
+fn visit_in_box(at: PointInstance<'_>, region: Region, visit: &mut Visitor<'_>) -> bool {
     let object = at.object;
-    let greatest = object.bounds.greatest;
     let boxes = match at.placed {
-        None => RegionBox::in_world(region, greatest),
-        Some(placed) => RegionBox::new(region, placed.world_rows(), greatest, placed.extent()),
+        None => RegionBox::in_world(region, object.bounds.greatest),
+        Some(placed) => placed.region(region, object),
     };
     object.header.root != NONE
         && run_walk(&ObjectTree::new(object), &mut BoxTriangles { at, region, boxes, visit })
@@ -36,7 +40,7 @@ fn visit_in_box(at: PointInstance<'_>, region: [[f32; 3]; 2], visit: &mut Visito
 /// The triangles that overlap a box.
 struct BoxTriangles<'a, 'v> {
     at: PointInstance<'a>,
-    region: [[f32; 3]; 2],
+    region: Region,
     /// The region for tests of boxes.
     boxes: RegionBox,
     visit: &'a mut Visitor<'v>,
@@ -75,10 +79,17 @@ impl BoxTriangles<'_, '_> {
     #[inline(never)]
     fn visit_block(&mut self, block: &impl TriangleBlock, ids: &[u32]) -> bool {
         let [lower, upper] = self.region;
+        let narrow = self.region.map(|end| end.map(|x| x as f32));
         any_in_set(all_triangles(block), |i| {
-            let Some(corners) = self.at.corners_in_world(block.corners(i)) else { return false };
-            triangle_box::overlaps(lower, upper, corners)
-                && (self.visit)(self.at.primitive(ids[block.first() as usize + i]))
+            let corners = block.corners(i);
+            let id = || ids[block.first() as usize + i];
+            let overlaps = || match self.at.placed {
+                None => triangle_box::overlaps(narrow[0], narrow[1], corners),
+                Some(placed) => {
+                    wide_box::overlaps(lower, upper, &placed.triangle(self.at.object, corners, id()))
+                }
+            };
+            self.at.is_surface(corners) && overlaps() && (self.visit)(self.at.primitive(id()))
         })
     }
 }
@@ -94,36 +105,39 @@ pub(super) fn collect_sorted(triangles: &mut Vec<PrimitiveRef>, find: impl FnOnc
 }
 
 /// Visits the triangles of a scene that overlap a box, until the visitor returns true. Returns true
-/// then.
-pub(super) fn visit_box(scene: &Scene, lower: [f32; 3], upper: [f32; 3], visit: &mut Visitor<'_>) -> bool {
-    let Some(region) = finite_box(lower, upper) else { return false };
-    match (sole_instance(scene), scene.world()) {
-        (Some(sole), _) => visit_in_box(sole, region, visit),
-        (None, None) => objects(scene).any(|object| visit_in_box(object, region, visit)),
-        (None, Some(world)) => {
-            let boxes = RegionBox::in_world(region, world.max_coordinate());
-            world.enumerate_in_box(boxes, &mut |instance| {
-                let Some(placed) = placed(scene, world, instance) else { return false };
-                let object = scene.view(placed.object());
-                visit_in_box(PointInstance { object, instance, placed: Some(&placed) }, region, visit)
-            })
-        }
-    }
+/// then. With `narrow` the numbers of the box are f32.
+pub(super) fn visit_box(scene: &Scene, region: Region, narrow: bool, visit: &mut Visitor<'_>) -> bool {
+    let max = if narrow { f64::from(f32::MAX) } else { f64::MAX };
+    let Some(region) = finite_box(region, max) else { return false };
+    let mut instances = Instances::new(scene);
+    let narrow = narrow && instances.is_narrow();
+    instances.any(
+        narrow,
+        |world, visit| world.enumerate_in_box(RegionBox::in_world(region, world.max_coordinate()), visit),
+        &mut |at| visit_in_box(at, region, visit),
+    )
 }
 
-/// Like [`visit_box`], for a ball.
+/// Visits the triangles of a scene that overlap a ball of f32 numbers, until the visitor returns
+/// true. Returns true then.
 pub(super) fn visit_ball(scene: &Scene, center: [f32; 3], radius: f32, visit: &mut Visitor<'_>) -> bool {
-    let Some(search) = &Search::new(center, radius) else { return false };
-    let mut in_instance =
-        |at: PointInstance<'_>| search_instance(at, PointGoal::Ball { search, radius, visit });
-    match (sole_instance(scene), scene.world()) {
-        (Some(sole), _) => in_instance(sole),
-        (None, None) => objects(scene).any(in_instance),
-        (None, Some(world)) => world.enumerate_near(center, search.squared, &mut |instance| {
-            let Some(placed) = placed(scene, world, instance) else { return Some(search.squared) };
-            let object = scene.view(placed.object());
-            let ended = in_instance(PointInstance { object, instance, placed: Some(&placed) });
-            (!ended).then_some(search.squared)
-        }),
+    let mut instances = Instances::new(scene);
+    if !instances.is_narrow() {
+        return visit_wide_ball(scene, wide(center), Radius::Reported(radius), visit);
     }
+    let Some(search) = &Search::new(center, radius) else { return false };
+    let visit = &mut |at: PointInstance<'_>| search_instance(at, PointGoal::Ball { search, radius, visit });
+    instances.any(true, |_, _| false, visit)
+}
+
+/// Like [`visit_ball`], about triangles as real numbers.
+pub(super) fn visit_wide_ball(
+    scene: &Scene,
+    center: [f64; 3],
+    radius: Radius,
+    visit: &mut Visitor<'_>,
+) -> bool {
+    let Some(mut search) = WideSearch::new(center, radius) else { return false };
+    Instances::new(scene)
+        .any_near(&mut search, |at, search| search_instance(at, PointGoal::WideBall { search, visit }))
 }

@@ -1,95 +1,151 @@
-//! An instance for searches of closest points: its corners in world space, and bounds of distances
-//! in the space of its object.
+//! An instance for queries about points: its triangles in world space, and points and bounds of
+//! distances in the space of its object, in which the BVH is walked.
 //!
-//! An affine transform does not preserve distances, so triangles are measured in world space. Each
-//! coordinate of a corner is computed in f64 and rounded to f32, as if the instance had been
-//! written to a file as a mesh. The BVH is walked in object space. Let A be the linear part of the
-//! inverse transform and |A| its spectral norm. A triangle within the distance d in world space
-//! lies within
-//! |A| d in object space, plus a slack for the roundings of the point, the corners and the inverse.
+//! An affine transform does not preserve distances, so triangles are measured in world space, as
+//! real numbers ([`WideTriangle`]). Let L and T be the linear part and the translation of the
+//! transform and |M| the spectral norm of a matrix. What lies within the distance d of a point in
+//! world space lies within |L⁻¹| d of its image in object space, plus a slack for the rounding of
+//! that image.
+//!
+//! Let A be the inverse that f64 has computed. With R = 1 - AL, L⁻¹ is (1 - R)⁻¹ A. For any norm
+//! with |R| < 1 it differs from A by at most |R| / (1 - |R|) |A|, and is at most |A| / (1 - |R|).
+//! The max sum of |elements| of a row of R is computed; the spectral norm is at most √3 times that.
 
-use crate::instances::Placed;
+use crate::intersect::region_box::RegionBox;
+use crate::intersect::vector::{max_norm, minus, wide};
+use crate::intersect::wide_side::PointInObject;
+use crate::intersect::wide_triangle::WideTriangle;
+use crate::nodes::affine::Affine;
 use bth_format::object::ObjectView;
 
-/// Bounds all roundings relative to the magnitudes in [`PlacedObject::new`]: 2^-24 · √3 for world
-/// corners, the same for the point in object space, and 10 · 2^24 · 2^-53 for the error of the
-/// inverse (see `instances/placement.rs`).
-const ROUNDING: f64 = 1.0 / (1 << 21) as f64;
-/// The min magnitude that roundings are relative to: denormal numbers are rounded by as much as the
-/// smallest normal one.
-const LEAST: f64 = f32::MIN_POSITIVE as f64;
+/// 16 u: bounds the roundings of a point in object space and of elements of R, relative to the
+/// product of the norms of the factors.
+const PRODUCT_ERROR: f64 = 1.0 / (1u64 << 49) as f64;
+/// 1 + 2^-40: covers roundings of bounds.
+const SLACK: f64 = 1.0 + 1.0 / (1u64 << 40) as f64;
+/// √3, rounded up.
+const ROOT_OF_3: f64 = 1.7321;
+/// Max norm of R. Beyond it, all triangles of the instance are tried.
+const MAX_RESIDUAL: f64 = 0.25;
 
 /// An instance for a search.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PlacedObject {
-    placed: Placed,
-    /// Upper bound of |A|.
+    /// The transform from object space to world space: rows of four. `None` for the identity.
+    rows: Option<[[f64; 4]; 3]>,
+    /// A.
+    inverse: [[f64; 3]; 3],
+    /// Upper bounds of the spectral norm of L⁻¹, and of the rounding of a point in object space
+    /// relative to its distance from T (maximum norm).
     norm: f64,
-    /// Max |coordinate| of the world box, at least [`LEAST`].
-    extent: f64,
-    /// Magnitude of the roundings in object space for a point at the origin of world space.
-    magnitude: f64,
+    error: f64,
+}
+
+/// A point in object space, for walks through the BVH.
+pub(super) struct NarrowPoint {
+    pub(super) point: [f32; 3],
+    /// Upper bound of how far a coordinate is off.
+    pub(super) off: f64,
+}
+
+impl NarrowPoint {
+    /// Rounds a point whose coordinates are off by at most `error`.
+    pub(super) fn new(point: [f64; 3], error: f64) -> NarrowPoint {
+        let narrow = point.map(|x| (x as f32).clamp(f32::MIN, f32::MAX));
+        let off = (max_norm(minus(point, narrow.map(f64::from))) + error) * SLACK;
+        // Neither are NaN, which an overflow may give.
+        let off = if off < f64::INFINITY { off } else { f64::INFINITY };
+        NarrowPoint { point: narrow.map(|x| if x.is_nan() { 0.0 } else { x }), off }
+    }
+}
+
+fn row_norm(rows: &[[f64; 3]; 3]) -> f64 {
+    rows.iter().map(|row| row.iter().map(|x| x.abs()).sum()).fold(0.0, f64::max)
 }
 
 impl PlacedObject {
-    pub(super) fn new(placed: Placed, object: &ObjectView<'_>) -> PlacedObject {
-        let norm = spectral_norm(&placed.inverse);
-        let world = placed.lower.iter().chain(&placed.upper).fold(LEAST, |m, x| m.max(f64::from(x.abs())));
-        let origin = placed.origin.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-        // The length of a vector is less than twice its max |coordinate|.
-        let magnitude = 2.0 * (norm * (world + origin) + f64::from(object.bounds.greatest).max(LEAST));
-        PlacedObject { placed, norm, extent: world, magnitude }
+    /// An instance in world space.
+    pub(super) fn untransformed() -> PlacedObject {
+        PlacedObject { rows: None, inverse: [[0.0; 3]; 3], norm: 1.0, error: 0.0 }
     }
 
-    /// Index of the object.
-    pub(super) fn object(&self) -> u32 {
-        self.placed.object
-    }
-
-    /// The point in object space. Coordinates beyond the range of f32 are limited to it: that moves
-    /// the point to the closest one of a cube that contains the object, and no part of the object
-    /// gets farther.
-    pub(super) fn point(&self, point: [f32; 3]) -> [f32; 3] {
-        let mut relative = [0.0; 3];
-        for k in 0..3 {
-            relative[k] = f64::from(point[k]) - self.placed.origin[k];
+    /// An instance with a transform and the rows of its inverse's linear part.
+    pub(super) fn new(to_world: &Affine, inverse: [[f64; 3]; 3]) -> PlacedObject {
+        if *to_world == Affine::IDENTITY {
+            return PlacedObject::untransformed();
         }
-        self.placed.inverse.map(|row| {
-            let x = row[0] * relative[0] + row[1] * relative[1] + row[2] * relative[2];
-            (x as f32).clamp(f32::MIN, f32::MAX)
-        })
+        let (linear, identity) = (to_world.linear, Affine::IDENTITY.linear);
+        let residual = [0, 1, 2].map(|i| {
+            [0, 1, 2].map(|k| {
+                let product = (0..3).map(|j| inverse[i][j] * linear[j][k]).sum::<f64>();
+                identity[i][k] - product
+            })
+        });
+        let size = row_norm(&inverse);
+        let residual = row_norm(&residual) + PRODUCT_ERROR * size * row_norm(&linear);
+        let (mut norm, mut error) = (f64::INFINITY, f64::INFINITY);
+        if residual < MAX_RESIDUAL {
+            norm = spectral_norm(&inverse) / (1.0 - ROOT_OF_3 * residual) * (1.0 + PRODUCT_ERROR);
+            error = size * (residual / (1.0 - residual) + PRODUCT_ERROR);
+        }
+        PlacedObject { rows: Some(to_world.rows()), inverse, norm, error }
     }
 
-    /// Length in object space by which roundings may move the point and the corners.
-    pub(super) fn slack(&self, point: [f32; 3]) -> f64 {
-        let greatest = point.iter().fold(0.0f64, |m, x| m.max(f64::from(x.abs())));
-        ROUNDING * (self.magnitude + 2.0 * self.norm * greatest)
+    /// A point of world space in the space of the object's source.
+    pub(super) fn point(&self, world: [f64; 3]) -> PointInObject<'_> {
+        let (mut point, mut error) = (world, 0.0);
+        if let Some(rows) = &self.rows {
+            let relative = minus(world, rows.map(|[.., t]| t));
+            point = self.inverse.map(|[x, y, z]| x * relative[0] + y * relative[1] + z * relative[2]);
+            error = self.error * max_norm(relative) + f64::MIN_POSITIVE;
+        }
+        PointInObject::new(world, self.rows.as_ref(), point, error)
     }
 
-    /// Upper bound of the squared distance in object space of what lies within a squared distance
-    /// in world space.
-    pub(super) fn squared_in_object(&self, squared: f64, slack: f64) -> f64 {
-        let distance = squared.sqrt() * self.norm + slack;
-        distance * distance
+    /// A point in object space, rounded to f32, for walks through the BVH of rounded vertices.
+    /// Coordinates beyond the range of f32 are limited to it.
+    pub(super) fn narrow(&self, point: &PointInObject<'_>, object: &ObjectView<'_>) -> NarrowPoint {
+        NarrowPoint::new(minus(point.point, object.anchor), point.error + rounding(object, point.point))
     }
 
-    /// The transform from object space to world space: rows of four.
-    pub(super) fn world_rows(&self) -> &[[f64; 4]; 3] {
-        &self.placed.to_world
+    /// A box of world space for tests of an object's boxes.
+    pub(super) fn region(&self, [lower, upper]: [[f64; 3]; 2], object: &ObjectView<'_>) -> RegionBox {
+        let identity = Affine::IDENTITY.rows();
+        let rows = self.rows.as_ref().unwrap_or(&identity);
+        let anchor = object.anchor;
+        // The origin of object space in world space.
+        let origin = rows.map(|[x, y, z, t]| x * anchor[0] + y * anchor[1] + z * anchor[2] + t);
+        let size = max_norm(rows.map(|[x, y, z, t]| {
+            (x * anchor[0]).abs() + (y * anchor[1]).abs() + (z * anchor[2]).abs() + t.abs()
+        }));
+        let off = if object.exact.is_empty() { 0.0 } else { PRODUCT_ERROR * size };
+        let linear = rows.map(|[x, y, z, _]| [x, y, z]);
+        RegionBox::new([minus(lower, origin), minus(upper, origin)], &linear, object.bounds.greatest, off)
     }
 
-    /// Max |coordinate| of the world box.
-    pub(super) fn extent(&self) -> f64 {
-        self.extent
+    /// Upper bound of the squared distance in object space, from a point that is off, of what lies
+    /// within a distance in world space.
+    pub(super) fn squared_in_object(&self, distance: f64, off: f64) -> f64 {
+        let distance = distance * self.norm + ROOT_OF_3 * off;
+        // Not NaN, where an infinite norm bounds a distance of 0.
+        if distance < f64::INFINITY { distance * distance } else { f64::INFINITY }
     }
 
-    /// Corners in world space.
-    pub(super) fn corners_in_world(&self, corners: [[f32; 3]; 3]) -> [[f32; 3]; 3] {
-        corners.map(|p| {
-            let [x, y, z] = p.map(f64::from);
-            self.placed.to_world.map(|[a, b, c, d]| (a * x + b * y + c * z + d) as f32)
-        })
+    /// A triangle in world space, given its corners in object space and its id.
+    pub(super) fn triangle(&self, object: &ObjectView<'_>, corners: [[f32; 3]; 3], id: u32) -> WideTriangle {
+        let corners = object.exact.corners(id).unwrap_or_else(|| corners.map(wide));
+        WideTriangle { corners, rows: self.rows }
     }
+}
+
+/// Upper bound of how far the vertices of an object's leaves are off where they are rounded, and
+/// the difference of a point and the anchor: half a unit in the last place of f32, and one in f64.
+fn rounding(object: &ObjectView<'_>, point: [f64; 3]) -> f64 {
+    if object.exact.is_empty() {
+        return 0.0;
+    }
+    let vertices = f64::from(object.bounds.greatest) / (1 << 24) as f64 + f64::from(f32::from_bits(1));
+    vertices * SLACK + PRODUCT_ERROR * (max_norm(point) + max_norm(object.anchor))
 }
 
 /// Upper bound of the max factor by which a matrix A stretches a vector, at most 1.04 times that

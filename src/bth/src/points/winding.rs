@@ -12,58 +12,84 @@
 //! That rule moves the ray by infinitely little. What the moved ray crosses, the ray touches. So
 //! tests that exclude only what the closed ray certainly does not touch miss no crossing. A weight
 //! or depth of certain sign keeps its sign.
+//!
+//! Points that are no f32 numbers in the space of an object are rounded for these tests, which
+//! allow for it; [`PointInObject`] decides the rest about the point itself.
 
+use super::nearest::PointInstance;
+use super::placed::{NarrowPoint, PlacedObject};
+use super::searcher::Instances;
 use crate::bvh::single_stack::SingleStack;
 use crate::bvh::walk::{BoxQuery, ObjectTree, TriangleQuery, all_triangles, walk};
-use crate::enumerate::enumerate_instances;
 use crate::intersect::boxes::{FAR, planes};
 use crate::intersect::crossing::crossing;
 use crate::intersect::edge_functions::cross;
 use crate::intersect::filter::{TriangleBlock, TriangleFilter};
+use crate::intersect::region_box::RegionBox;
+use crate::intersect::vector::wide;
+use crate::intersect::wide_side::PointInObject;
 use crate::rays::Ray;
 use crate::scene::Scene;
 use crate::simd::{Isa, Kernel, Part, Simd};
-use crate::starts::world_ray::WorldRay;
 use bth_format::layout::{NONE, WIDTH, WideNode};
-use bth_format::object::ObjectView;
+use bth_format::object::{ExactPositions, ObjectView};
 use std::cmp::Ordering;
 
 /// 12u: bounds the error of a weight relative to XY, with the roundings of the bound.
 const WEIGHT_ERROR: f32 = 12.0 / (1 << 24) as f32;
 
+/// 1 + 2^-20: covers the roundings of tests in f32 that are shifted by how far a point is off.
+const OFF_SLACK: f64 = 1.0 + 1.0 / (1 << 20) as f64;
+/// 1 / 4u: what X and Y grow by for each unit by which coordinates are off. It makes the bound of a
+/// weight grow by 3 (X + Y) units; the weight is off by 2 (X + Y), and the square.
+const OFF_SIZE: f32 = (1 << 22) as f32;
+
+/// Less than x by at least `off`; x itself if that is 0.
+fn below(x: f32, off: f32) -> f32 {
+    if off > 0.0 { (x - off).next_down() } else { x }
+}
+
 /// Stores the winding number of each point in a scene.
-pub(super) fn windings(scene: &Scene, points: &[[f32; 3]], winding: &mut [i32]) {
+pub(super) fn windings(scene: &Scene, points: &[[f64; 3]], winding: &mut [i32]) {
     winding.fill(0);
-    if scene.world().is_none() {
-        for object in 0..scene.object_count() {
-            add_windings(scene.view(object), points, winding);
-        }
+    let mut instances = Instances::new(scene);
+    if instances.are_all_in_world_space() {
+        let visit = &mut |at: PointInstance<'_>| {
+            add_windings(at, points, winding);
+            false
+        };
+        instances.any(false, |_, _| false, visit);
         return;
     }
     for (point, winding) in points.iter().zip(winding) {
-        // The boxes at t = 0 are those that contain the point.
-        let ray = Ray { origin: *point, tmin: 0.0, direction: [1.0, 0.0, 0.0], tmax: 0.0 };
-        enumerate_instances(scene, &ray, &mut |entered| {
-            let point = entered.object_ray(WorldRay::plain(&ray)).ray.origin;
-            add_windings(entered.object, &[point], std::slice::from_mut(winding));
-            Some(0.0)
-        });
+        let visit = &mut |at: PointInstance<'_>| {
+            add_windings(at, &[*point], std::slice::from_mut(winding));
+            false
+        };
+        let region = |max| RegionBox::in_world([*point; 2], max);
+        instances.any(
+            false,
+            |world, visit| world.enumerate_in_box(region(world.max_coordinate()), visit),
+            visit,
+        );
     }
 }
 
-/// Adds the winding number of each point in object space to `winding`: 0 outside of the object's
+/// Adds the winding number of each point of world space to `winding`: 0 outside of the object's
 /// bounds and for points that are not finite.
-fn add_windings(object: &ObjectView<'_>, points: &[[f32; 3]], winding: &mut [i32]) {
+fn add_windings(at: PointInstance<'_>, points: &[[f64; 3]], winding: &mut [i32]) {
+    let PointInstance { object, placed: Some(placed), .. } = at else { return };
     if object.header.root != NONE {
         let stack = &mut SingleStack::new();
-        Isa::chosen().run(WindingKernel { object, points, winding, stack });
+        Isa::chosen().run(WindingKernel { object, placed, points, winding, stack });
     }
 }
 
 /// The kernel of [`add_windings`].
 struct WindingKernel<'a> {
     object: &'a ObjectView<'a>,
-    points: &'a [[f32; 3]],
+    placed: &'a PlacedObject,
+    points: &'a [[f64; 3]],
     winding: &'a mut [i32],
     stack: &'a mut SingleStack,
 }
@@ -73,10 +99,14 @@ impl Kernel for WindingKernel<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let WindingKernel { object, points, winding, stack } = self;
+        let WindingKernel { object, placed, points, winding, stack } = self;
         let tree = ObjectTree::new(object);
         for (point, winding) in points.iter().zip(winding) {
-            if let Some(ray) = AxisRay::new(object, *point) {
+            if !(point[0].is_finite() && point[1].is_finite() && point[2].is_finite()) {
+                continue;
+            }
+            let point = placed.point(*point);
+            if let Some(ray) = AxisRay::new(object, &placed.narrow(&point, object), &point) {
                 let mut query = AxisCrossings { ray, winding: 0 };
                 walk(s, &tree, &mut query, stack);
                 *winding += query.winding;
@@ -86,18 +116,28 @@ impl Kernel for WindingKernel<'_> {
 }
 
 /// A ray along an axis.
-struct AxisRay {
+struct AxisRay<'a> {
     ray: Ray,
     /// 1 or -1, the direction along the axis.
     forward: f32,
+    /// Upper bound of how far a coordinate of the origin is off; 0 if the ray is exact.
+    off: f32,
+    /// The origin as it is, and the triangles where leaves have rounded ones.
+    point: &'a PointInObject<'a>,
+    exact: ExactPositions<'a>,
+    /// Bounds of the origin: of the two coordinates across the axis, and where the ray begins.
+    low: [f32; 2],
+    high: [f32; 2],
+    begin: f32,
     /// Projects triangles along the axis.
     filter: TriangleFilter,
 }
 
 /// [`AxisRay::crossings`] as a part of kernels.
 struct CrossedTriangles<'a, B> {
-    ray: &'a AxisRay,
+    ray: &'a AxisRay<'a>,
     block: &'a B,
+    ids: &'a [u32],
     valid: u32,
 }
 
@@ -105,23 +145,28 @@ impl<S: Simd, B: TriangleBlock> Part<S> for CrossedTriangles<'_, B> {
     type Output = i32;
     #[inline(always)]
     fn run(self, s: S) -> i32 {
-        self.ray.crossings(s, self.block, self.valid)
+        self.ray.crossings(s, self.block, self.ids, self.valid)
     }
 }
 
-impl AxisRay {
+impl<'a> AxisRay<'a> {
     /// The ray from a point in the bounds of an object to their nearest side. Of equally near ones
     /// it is the first of the lower sides in x, y and z, then of the upper ones. `None` for a point
     /// outside.
     #[inline(always)]
-    fn new(object: &ObjectView<'_>, point: [f32; 3]) -> Option<AxisRay> {
+    fn new(
+        object: &ObjectView<'a>,
+        &NarrowPoint { point, off }: &NarrowPoint,
+        exact_point: &'a PointInObject<'a>,
+    ) -> Option<AxisRay<'a>> {
+        let off = if off > 0.0 { ((off * OFF_SLACK) as f32).next_up() } else { 0.0 };
         let (lower, upper) = (&object.header.lower, &object.header.upper);
         let (mut axis, mut forward, mut least) = (0, -1.0, f32::INFINITY);
         for (sign, from, to) in [(-1.0, lower, &point), (1.0, &point, upper)] {
             for k in 0..3 {
                 let way = to[k] - from[k];
                 // The sign of a difference is exact.
-                if way < 0.0 || way.is_nan() {
+                if way < -off || way.is_nan() {
                     return None;
                 }
                 if way < least {
@@ -145,7 +190,18 @@ impl AxisRay {
             last: 0.0,
             error_slope: 0.0,
         };
-        Some(AxisRay { ray: Ray::new(point, direction), forward, filter })
+        let (low, high) = (|x: f32| below(x, off), |x: f32| -below(-x, off));
+        Some(AxisRay {
+            ray: Ray::new(point, direction),
+            forward,
+            off,
+            point: exact_point,
+            exact: object.exact,
+            low: filter.origin.map(low),
+            high: filter.origin.map(high),
+            begin: below(-filter.start, off),
+            filter,
+        })
     }
 
     /// The children of a node whose boxes the ray touches, as bits.
@@ -153,32 +209,33 @@ impl AxisRay {
     fn children<S: Simd>(&self, s: S, node: &WideNode) -> u32 {
         let [i, j, k] = self.filter.axis.map(|axis| axis as usize);
         let far = planes(s, node, k, if self.forward > 0.0 { FAR } else { 0 });
-        let mut touched = s.le(s.splat(-self.filter.start), s.mul(far, s.splat(self.forward)));
-        for (axis, at) in [(i, self.filter.origin[0]), (j, self.filter.origin[1])] {
-            let at = s.splat(at);
-            touched = s.and(touched, s.le(planes(s, node, axis, 0), at));
-            touched = s.and(touched, s.le(at, planes(s, node, axis, FAR)));
+        let mut touched = s.le(s.splat(self.begin), s.mul(far, s.splat(self.forward)));
+        for (axis, n) in [(i, 0), (j, 1)] {
+            touched = s.and(touched, s.le(planes(s, node, axis, 0), s.splat(self.high[n])));
+            touched = s.and(touched, s.le(s.splat(self.low[n]), planes(s, node, axis, FAR)));
         }
         s.mask_bits(touched)
     }
 
     /// The signed number of crossings with the triangles of a leaf.
     #[inline(always)]
-    fn leaf<S: Simd, B: TriangleBlock>(&self, s: S, block: &B) -> i32 {
+    fn leaf<S: Simd, B: TriangleBlock>(&self, s: S, block: &B, ids: &[u32]) -> i32 {
         let valid = all_triangles(block);
         // Without vectors, the filter in lanes takes as long as decisions, and much code.
         if !S::HAS_VECTORS {
-            return decide(&self.ray, block, valid);
+            return decide(self, block, ids, valid);
         }
-        CrossedTriangles { ray: self, block, valid }.inline_or_call(s)
+        CrossedTriangles { ray: self, block, ids, valid }.inline_or_call(s)
     }
 
     /// The signed number of crossings with the triangles of `valid`.
     #[inline(always)]
-    fn crossings<S: Simd, B: TriangleBlock>(&self, s: S, block: &B, valid: u32) -> i32 {
+    fn crossings<S: Simd, B: TriangleBlock>(&self, s: S, block: &B, ids: &[u32], valid: u32) -> i32 {
         let [a, b, c] = block.project(s, &self.filter);
         let x = s.max(s.max_abs(a[0], b[0]), s.abs(c[0]));
         let y = s.max(s.max_abs(a[1], b[1]), s.abs(c[1]));
+        let away = s.splat(self.off * OFF_SIZE);
+        let (x, y) = (s.add(x, away), s.add(y, away));
         let error = s.fma(s.mul(x, y), s.splat(WEIGHT_ERROR), s.splat(self.filter.error_floor));
         let minus_error = s.sub(s.splat(0.0), error);
         let weight = [cross(s, b, c), cross(s, c, a), cross(s, a, b)];
@@ -190,9 +247,8 @@ impl AxisRay {
         if valid & !s.mask_bits(missed) == 0 {
             return 0;
         }
-        let zero = s.splat(0.0);
-        let behind = s.lt(s.max(s.max(a[2], b[2]), c[2]), zero);
-        let ahead = s.lt(zero, s.min(s.min(a[2], b[2]), c[2]));
+        let behind = s.lt(s.max(s.max(a[2], b[2]), c[2]), s.splat(-self.off));
+        let ahead = s.lt(s.splat(self.off), s.min(s.min(a[2], b[2]), c[2]));
         let (front, back) = (s.lt(error, least), s.lt(greatest, minus_error));
         let open = valid & !s.mask_bits(s.or(missed, behind));
         let (front, back) = (open & s.mask_bits(s.and(front, ahead)), open & s.mask_bits(s.and(back, ahead)));
@@ -202,17 +258,17 @@ impl AxisRay {
         if doubtful == 0 {
             return certain;
         }
-        certain + decide(&self.ray, block, doubtful)
+        certain + decide(self, block, ids, doubtful)
     }
 }
 
 /// The crossings of a ray along an axis.
-struct AxisCrossings {
-    ray: AxisRay,
+struct AxisCrossings<'a> {
+    ray: AxisRay<'a>,
     winding: i32,
 }
 
-impl BoxQuery for AxisCrossings {
+impl BoxQuery for AxisCrossings<'_> {
     type Constants<S: Simd> = ();
     const NEAREST_FIRST: bool = false;
     #[inline(always)]
@@ -223,27 +279,35 @@ impl BoxQuery for AxisCrossings {
     }
 }
 
-impl TriangleQuery for AxisCrossings {
+impl TriangleQuery for AxisCrossings<'_> {
     #[inline(always)]
     fn triangles<S: Simd, B: TriangleBlock>(
         &mut self,
         s: S,
         _: &(),
         block: &B,
-        _ids: &[u32],
+        ids: &[u32],
         _limit: f32,
     ) -> bool {
-        self.winding += self.ray.leaf(s, block);
+        self.winding += self.ray.leaf(s, block, ids);
         false
     }
 }
 
 /// The signed number of crossings with the triangles of a leaf whose bit is set.
 #[inline(never)]
-fn decide<B: TriangleBlock>(ray: &Ray, block: &B, mut triangles: u32) -> i32 {
+fn decide<B: TriangleBlock>(ray: &AxisRay<'_>, block: &B, ids: &[u32], mut triangles: u32) -> i32 {
     let mut signed = 0;
     while triangles != 0 {
-        signed += crossing(ray, block.corners(triangles.trailing_zeros() as usize % WIDTH));
+        let i = triangles.trailing_zeros() as usize % WIDTH;
+        let corners = block.corners(i);
+        signed += if ray.off == 0.0 {
+            crossing(&ray.ray, corners)
+        } else {
+            let exact = ray.exact.corners(ids[block.first() as usize + i]);
+            let corners = exact.unwrap_or_else(|| corners.map(wide));
+            ray.point.crossing(ray.filter.axis[2] as usize, ray.forward as i32, corners)
+        };
         triangles &= triangles - 1;
     }
     signed

@@ -138,7 +138,7 @@ codes! {
     SequenceRows "F190" "SEQUENCE_POSITIONS has a row for each time of SEQUENCE_TIMES and each row of POSITIONS; an object with times is deformable."
     SequenceTimes "F191" "Times of SEQUENCE_TIMES are finite and ascend strictly."
     SequencePositions "F192" "Positions of SEQUENCE_POSITIONS are finite; those of the first time are POSITIONS, bit for bit."
-    ExactRows "F193" "EXACT_POSITIONS has as many rows as POSITIONS, or none; ANCHOR has one row beside them, else none. An object that has them has TRIANGLES and coordinates of f32, and neither LEAF_VERTICES nor tet leaves nor free directions or distances."
+    ExactRows "F193" "EXACT_POSITIONS has as many rows as POSITIONS, or none; ANCHOR has one row if there are any, else none. An object that has them has TRIANGLES and coordinates of f32, and neither LEAF_VERTICES nor tet leaves nor free directions or distances."
     ExactNumbers "F194" "Numbers of EXACT_POSITIONS and ANCHOR are 0 or numbers that f32 neither rounds to 0 nor to an infinity: from 2^-149 to the largest finite f32 in absolute value."
     SecondCorners "F220" "SECOND_CORNERS has as many rows as the object has triangles, or none, and its rows lie within SECOND_UVS."
     SecondUvs "F221" "Coordinates of SECOND_UVS are finite."

@@ -25,7 +25,7 @@ struct Wide<'a> {
     exact: OnceCell<[DyadicVector; 3]>,
 }
 
-/// 1 / 2u: a vector whose components are off by `error`, besides the rounding of a difference, has
+/// 1 / 2u: a vector whose components are off by `error` before the rounding of a difference, has
 /// the max |component| and this factor times `error` as its size ([`super::wide_triangle`]).
 const SIZE_OF_ERROR: f64 = (1u64 << 52) as f64;
 

@@ -1,8 +1,10 @@
 //! Enumerates the instances of a scene that a ray may hit.
 //! [`bvh::enumerate`](crate::bvh::enumerate) does the same for the triangles of an object.
 
-use crate::instances::Placement;
-use crate::nodes::ObjectRay;
+use crate::instances::{RayInInstance, World};
+use crate::intersect::exact_ray::{ExactRay, LineSource};
+use crate::intersect::origin::{RoundedLine, RoundedOrigin};
+use crate::intersect::start_point::StartPoint;
 use crate::rays::Ray;
 use crate::scene::Scene;
 use crate::starts::world_ray::WorldRay;
@@ -15,28 +17,79 @@ pub(crate) struct EnteredInstance<'a> {
     /// Index of its object.
     pub(crate) object_index: u32,
     pub(crate) object: &'a ObjectView<'a>,
+    scene: &'a Scene,
     /// `None` if the object's space is world space.
-    placement: Option<&'a Placement>,
+    world: Option<&'a World>,
 }
 
 impl<'a> EnteredInstance<'a> {
     /// A visible instance.
     pub(crate) fn new(scene: &'a Scene, instance: u32) -> EnteredInstance<'a> {
-        let sole = scene.sole().filter(|(_, sole)| *sole == instance);
-        let placement = scene.world().filter(|_| sole.is_none()).map(|world| world.placement(instance));
+        let is_sole = scene.sole().is_some_and(|(_, sole)| sole == instance);
         let object_index = scene.object_of(instance);
         if let Some(world) = scene.world() {
             world.mark_traced(object_index);
         }
-        EnteredInstance { instance, object_index, object: scene.view(object_index), placement }
+        let world = scene.world().filter(|_| !is_sole);
+        EnteredInstance { instance, object_index, object: scene.view(object_index), scene, world }
     }
 
-    /// A ray in the space of the object. All queries transform rays here, so t has the same bits in
-    /// all of them.
-    pub(crate) fn object_ray(&self, ray: WorldRay<'_>) -> ObjectRay {
-        match self.placement {
-            None => ObjectRay { ray: *ray.ray, t_scale: 1.0 },
-            Some(placement) => placement.inverse.ray_from(ray.ray, ray.start_in(self.instance)),
+    /// A point of world space in the space of the object.
+    pub(crate) fn point(&self, point: RoundedOrigin) -> RoundedOrigin {
+        let Some(world) = self.world else { return point };
+        let line = RoundedLine { origin: point, direction: [1.0, 0.0, 0.0], direction_error: 0.0 };
+        world.placement(self.instance).line(&line).origin
+    }
+
+    /// A ray in the instance, ended at `tmax`. All queries transform rays here, so t has the same
+    /// bits in all of them.
+    pub(crate) fn ray<'r>(&self, ray: WorldRay<'r>, tmax: f32) -> EnteredRay<'r>
+    where
+        'a: 'r,
+    {
+        match self.world {
+            Some(world) => EnteredRay::InInstance(RayInInstance::new(
+                world,
+                self.scene.objects(),
+                self.instance,
+                ray,
+                tmax,
+            )),
+            None => EnteredRay::InWorld { ray: Ray { tmax, ..*ray.ray }, start: ray.start_in(self.instance) },
+        }
+    }
+}
+
+/// A ray in the space of an instance's object.
+pub(crate) enum EnteredRay<'a> {
+    /// Object space is world space.
+    InWorld {
+        /// The ray.
+        ray: Ray,
+        /// Where it starts, if that is on a triangle of the object.
+        start: Option<&'a StartPoint>,
+    },
+    /// The object is placed in the world.
+    InInstance(RayInInstance<'a>),
+}
+
+impl EnteredRay<'_> {
+    /// The ray for decisions.
+    pub(crate) fn exact(&self) -> ExactRay<'_> {
+        match self {
+            EnteredRay::InWorld { ray, start: None } => ExactRay::plain(ray),
+            EnteredRay::InWorld { ray, start: Some(start) } => {
+                ExactRay { ray, line: LineSource::Start(start) }
+            }
+            EnteredRay::InInstance(of_instance) => of_instance.exact_ray(),
+        }
+    }
+
+    /// Factor from t in object space to t in world space, a power of two.
+    pub(crate) fn t_scale(&self) -> f32 {
+        match self {
+            EnteredRay::InWorld { .. } => 1.0,
+            EnteredRay::InInstance(of_instance) => of_instance.of_object.t_scale,
         }
     }
 }
@@ -52,19 +105,19 @@ pub(crate) fn enumerate_instances(
 ) -> bool {
     if let Some((object, instance)) = scene.sole() {
         let object_index = scene.world().map_or(0, |world| world.placement(instance).object());
-        return visit(EnteredInstance { instance, object_index, object, placement: None }).is_none();
+        return visit(EnteredInstance { instance, object_index, object, scene, world: None }).is_none();
     }
     let Some(world) = scene.world() else {
         return (0..scene.object_count()).any(|object_index| {
             let object = scene.view(object_index);
-            visit(EnteredInstance { instance: object_index, object_index, object, placement: None }).is_none()
+            let instance = object_index;
+            visit(EnteredInstance { instance, object_index, object, scene, world: None }).is_none()
         });
     };
     world.enumerate(ray, &mut |instance| {
-        let placement = world.placement(instance);
-        let object_index = placement.object();
+        let object_index = world.placement(instance).object();
         world.mark_traced(object_index);
         let object = scene.view(object_index);
-        visit(EnteredInstance { instance, object_index, object, placement: Some(placement) })
+        visit(EnteredInstance { instance, object_index, object, scene, world: Some(world) })
     })
 }

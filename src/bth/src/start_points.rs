@@ -1,6 +1,5 @@
 //! Starts on surfaces of a scene: where they lie in the world, and whether rays can start there.
 
-use crate::intersect::origin::RoundedOrigin;
 use crate::rays::{Ray, Start, StartRay};
 use crate::scene::Scene;
 use crate::starts::locate::{StartError, locate};
@@ -15,27 +14,27 @@ pub(crate) enum Misplaced {
     Start(StartError),
 }
 
-/// Places a start in the world: with its point in world space, rounded to f32.
-pub(crate) fn place_start(scene: &Scene, start: &Start) -> Result<(InstanceStart, [f32; 3]), Misplaced> {
+/// Places a start in the world: with its point in world space.
+pub(crate) fn place_start(scene: &Scene, start: &Start) -> Result<InstanceStart, Misplaced> {
     let instance = start.primitive.instance;
     let Some(world) = scene.world() else {
         let object = Some(instance).filter(|instance| *instance < scene.object_count());
         let point = locate(scene.view(object.ok_or(Misplaced::NoInstance)?), *start);
         let point = point.map_err(Misplaced::Start)?;
-        return Ok((InstanceStart { instance, start: *start, point }, point.rounded()));
+        return Ok(InstanceStart { instance, start: *start, point, world: point.origin });
     };
     let placement = world.placements.get(instance as usize).ok_or(Misplaced::NoInstance)?;
     let placement = placement.as_ref().ok_or(Misplaced::Hidden)?;
     let point = locate(scene.view(placement.object()), *start).map_err(Misplaced::Start)?;
-    let RoundedOrigin(origin, _) = point.origin;
-    let origin = placement.inverse.point_in_world(origin).map(|x| x as f32);
-    Ok((InstanceStart { instance, start: *start, point }, origin))
+    let world = placement.point_in_world(point.origin);
+    Ok(InstanceStart { instance, start: *start, point, world })
 }
 
 /// Places a ray in the world; `None` if its start is not a point of a visible instance.
 pub(crate) fn place(scene: &Scene, ray: &StartRay) -> Option<PlacedRay> {
     let &StartRay { start, direction, tmax } = ray;
-    let (start, origin) = place_start(scene, &start).ok()?;
+    let start = place_start(scene, &start).ok()?;
+    let origin = start.rounded();
     Some(PlacedRay { ray: Ray { origin, tmin: 0.0, direction, tmax }, start: Some(start) })
 }
 

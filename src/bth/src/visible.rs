@@ -1,23 +1,25 @@
 //! Mutual visibility of two points: no triangle may cross the open segment between them.
 //!
-//! A triangle blocks the segment from A to B if A and B lie strictly on different sides of its
-//! plane, and the segment's line crosses the closed triangle: if the volumes det[a-A, b-A, c-A] and
-//! det[a-B, b-B, c-B] have opposite signs, and the signs of det[B-A, p-A, q-A] over its edges p→q
-//! do not differ. These are affine in A and in B, so starts on triangles are decided exactly, as
-//! for rays ([`mod@crate::intersect::start`]). Triangles through A or B, or in a plane with both,
-//! do not block.
+//! A triangle blocks the segment from A to B if the line of the direction B - A from A crosses the
+//! closed triangle at a t between 0 and 1, exclusive. Triangles through A or B, or in a plane with
+//! both, do not block.
 
 use crate::bvh::enumerate::enumerate_within;
 use crate::enumerate::{EnteredInstance, enumerate_instances};
-use crate::intersect::segment::{ExactEnd, Segment};
-use crate::intersect::start::start_on;
+use crate::intersect::exact::{Estimate, RATIO_ERROR, estimate};
+use crate::intersect::exact_line::{ExactLine, Rows, SegmentLine, image, image_of_start};
+use crate::intersect::exact_ray::{ExactRay, LineSource, WorldLines};
+use crate::intersect::origin::{RoundedLine, RoundedOrigin};
+use crate::intersect::start::start_corners;
 use crate::intersect::start_point::StartPoint;
-use crate::intersect::vector::wide;
+use crate::intersect::vector::{max_norm, minus, wide};
+use crate::nodes::ObjectRay;
 use crate::query::{Receiver, TriangleRef};
 use crate::rays::{Ray, Start};
 use crate::scene::Scene;
 use crate::start_points::place_start;
-use crate::starts::world_ray::{InstanceStart, WorldRay};
+use crate::starts::world_ray::InstanceStart;
+use bth_format::exact::{Dyadic, DyadicVector};
 use bth_format::layout::Opacity;
 use bth_format::object::ObjectView;
 
@@ -60,8 +62,7 @@ impl SegmentEnd {
 
 /// An end of a segment in the world.
 struct PlacedEnd {
-    /// In world space, rounded to f32 unless it is a point.
-    origin: [f32; 3],
+    world: RoundedOrigin,
     start: Option<InstanceStart>,
 }
 
@@ -69,21 +70,22 @@ struct PlacedEnd {
 pub(super) fn see_each_other(scene: &Scene, a: SegmentEnd, b: SegmentEnd) -> bool {
     let (a, b) = if b.order() < a.order() { (b, a) } else { (a, b) };
     let (Some(a), Some(b)) = (place_end(scene, &a), place_end(scene, &b)) else { return false };
-    let direction = [0, 1, 2].map(|k| (f64::from(b.origin[k]) - f64::from(a.origin[k])) as f32);
+    let origin = a.world.0.map(|x| x as f32);
+    let direction = minus(b.world.0, wide(origin)).map(|x| x as f32);
     // Only which instances lie near the segment: those that hold an end are hit in any case.
-    let ray = Ray { origin: a.origin, tmin: 0.0, direction, tmax: 1.0 };
+    let ray = Ray { origin, tmin: 0.0, direction, tmax: 1.0 };
     let ends = [&a, &b].map(|end| end.start.as_ref().map(|start| start.instance));
     for (i, end) in ends.into_iter().enumerate() {
         let is_new = i == 0 || end != ends[0];
         if let (Some(instance), true) = (end, is_new)
-            && blocks_in(&EnteredInstance::new(scene, instance), &a, &b)
+            && blocks_in(scene, &EnteredInstance::new(scene, instance), &a, &b)
         {
             return false;
         }
     }
     let is_blocked = enumerate_instances(scene, &ray, &mut |entered| {
         let was_met = ends.contains(&Some(entered.instance));
-        let blocks = !was_met && blocks_in(&entered, &a, &b);
+        let blocks = !was_met && blocks_in(scene, &entered, &a, &b);
         (!blocks).then_some(1.0)
     });
     !is_blocked
@@ -92,48 +94,123 @@ pub(super) fn see_each_other(scene: &Scene, a: SegmentEnd, b: SegmentEnd) -> boo
 fn place_end(scene: &Scene, end: &SegmentEnd) -> Option<PlacedEnd> {
     match end {
         SegmentEnd::Point(point) => {
-            let origin = *point;
-            origin.iter().all(|x| x.is_finite()).then_some(PlacedEnd { origin, start: None })
+            let world = RoundedOrigin(wide(*point), 0.0);
+            point.iter().all(|x| x.is_finite()).then_some(PlacedEnd { world, start: None })
         }
         SegmentEnd::Start(start) => {
-            let (start, origin) = place_start(scene, start).ok()?;
-            Some(PlacedEnd { origin, start: Some(start) })
+            let start = place_start(scene, start).ok()?;
+            Some(PlacedEnd { world: start.world, start: Some(start) })
         }
     }
 }
 
-/// Returns true if a triangle of an instance blocks a segment.
-fn blocks_in(entered: &EnteredInstance<'_>, a: &PlacedEnd, b: &PlacedEnd) -> bool {
-    let object = entered.object;
-    let in_object = |end: &PlacedEnd| {
-        let ray = Ray::new(end.origin, [1.0, 0.0, 0.0]);
-        let world_ray = WorldRay { ray: &ray, start: end.start.as_ref() };
-        match world_ray.start_in(entered.instance) {
-            Some(start) => *start,
-            None => StartPoint::beside(entered.object_ray(world_ray).ray.origin),
+impl PlacedEnd {
+    /// The end in the space of an instance's object.
+    fn in_object(&self, entered: &EnteredInstance<'_>) -> RoundedOrigin {
+        match &self.start {
+            Some(start) if start.instance == entered.instance => start.point.origin,
+            _ => entered.point(self.world),
         }
-    };
-    let (a, b) = (in_object(a), in_object(b));
-    let exact = |point: &StartPoint| match start_on(object, point) {
-        Some(start) => ExactEnd::Start(start),
-        None => ExactEnd::Point(point.origin.0),
-    };
-    let segment = Segment { from: exact(&a), to: exact(&b), rounded: [a.origin, b.origin] };
-    let farthest = a.origin.0.iter().fold(0.0f32, |most, x| most.max((x.abs() as f32).next_up()));
-    let bounds = object.bounds.for_segments(farthest);
-    let ray = segment.ray(bounds.origin_error);
-    enumerate_within(object, &bounds, (&ray, None), &mut Blocking { object, segment: &segment })
+    }
+
+    /// The end in world space exactly, times a positive number, which is the second result.
+    fn exact(&self, scene: &Scene) -> (DyadicVector, Dyadic) {
+        let start = self.start.as_ref().and_then(|start| {
+            let object = scene.view(scene.object_of(start.instance));
+            let corners = start_corners(object, start.point.leaf, start.point.slot)?.map(wide);
+            let weights = [start.point.u.into(), start.point.v.into()];
+            Some(image_of_start(rows(scene, start.instance).as_ref(), corners, weights))
+        });
+        start.unwrap_or_else(|| (image(None, self.world.0), Dyadic::from(1.0)))
+    }
+}
+
+/// The transform of an instance, if there are any.
+fn rows(scene: &Scene, instance: u32) -> Option<Rows> {
+    scene.world().map(|world| world.row(scene.objects(), instance).to_world.rows())
+}
+
+/// Returns true if a triangle of an instance blocks a segment.
+fn blocks_in(scene: &Scene, entered: &EnteredInstance<'_>, a: &PlacedEnd, b: &PlacedEnd) -> bool {
+    let [RoundedOrigin(from, from_off), RoundedOrigin(to, to_off)] = [a, b].map(|end| end.in_object(entered));
+    let direction = minus(to, from);
+    // One more rounding of the difference.
+    let off = (from_off + to_off) * (1.0 + RATIO_ERROR) / max_norm(direction) + f64::EPSILON;
+    let line =
+        RoundedLine { origin: RoundedOrigin(from, from_off), direction, direction_error: off }.or_unknown();
+    let of_object = ObjectRay::of(line, 0.0, 1.0);
+    let segment = Segment { scene, instance: entered.instance, ends: [a, b], line: of_object.line };
+    let ray = ExactRay { ray: &of_object.ray, line: LineSource::World(&segment, 0) };
+    let t_scale = f64::from(of_object.t_scale);
+    let bounds = of_object.line.bounds(&entered.object.bounds);
+    let mut blocking = Blocking { object: entered.object, segment: &segment, t_scale };
+    enumerate_within(entered.object, &bounds, ray, &mut blocking)
+}
+
+/// The segment between two points through an instance.
+struct Segment<'a> {
+    scene: &'a Scene,
+    instance: u32,
+    ends: [&'a PlacedEnd; 2],
+    /// The line in the space of the object.
+    line: RoundedLine,
+}
+
+impl Segment<'_> {
+    fn exact_segment(&self) -> SegmentLine {
+        let [from, to] = self.ends.map(|end| end.exact(self.scene));
+        SegmentLine::between(from, to, rows(self.scene, self.instance))
+    }
+}
+
+impl WorldLines for Segment<'_> {
+    fn line(&self, _ray: usize) -> RoundedLine {
+        self.line
+    }
+    fn exact(&self, _ray: usize) -> ExactLine {
+        self.exact_segment().line
+    }
+    fn start(&self, _ray: usize) -> Option<&StartPoint> {
+        None
+    }
+    fn are_from_starts(&self) -> bool {
+        true
+    }
 }
 
 /// Ends the enumeration at a triangle that blocks a segment.
 struct Blocking<'a> {
     object: &'a ObjectView<'a>,
-    segment: &'a Segment,
+    segment: &'a Segment<'a>,
+    /// Factor from t of the line to t of the segment.
+    t_scale: f64,
+}
+
+impl Blocking<'_> {
+    /// u and v where a triangle blocks the segment, if it does.
+    fn crossed(&self, corners: [[f64; 3]; 3]) -> Option<[f32; 2]> {
+        let line = self.segment.line;
+        match estimate(line, line.direction, corners) {
+            Estimate::Missed => None,
+            Estimate::Intersects(found) => {
+                let (t, off) = (found.t * self.t_scale, 2.0 * RATIO_ERROR);
+                if t <= 0.0 || t > 1.0 + off {
+                    None
+                } else if t < 1.0 - off {
+                    Some(found.uv())
+                } else {
+                    self.segment.exact_segment().crossed(corners)
+                }
+            }
+            Estimate::Open(_, [_, last]) if last <= 0.0 => None,
+            Estimate::Open(..) => self.segment.exact_segment().crossed(corners),
+        }
+    }
 }
 
 impl Receiver for Blocking<'_> {
     fn receive(&mut self, triangle: TriangleRef<'_>, corners: [[f32; 3]; 3]) -> bool {
-        let Some([u, v]) = self.segment.crossed(corners.map(wide)) else { return false };
+        let Some([u, v]) = self.crossed(corners.map(wide)) else { return false };
         let opacity = self.object.opacity.is_empty();
         opacity || self.object.opacity_at(triangle.read(), u, v) != Opacity::Transparent
     }

@@ -91,6 +91,20 @@ impl ObjectBounds {
         self.moved(4.0 * self.greatest.max(farthest))
     }
 
+    /// The bounds for rays of f32 that approximate lines: origins of max |coordinate| `farthest`
+    /// and directions are rounded from numbers that are off by `origin_error` and, relative to the
+    /// max |component| of the direction, by `direction_error`.
+    ///
+    /// Within the object, no farther than twice the greater of `farthest` and `max` from the
+    /// origin, a ray is off as in [`Self::for_segments`], and by these errors. Infinite where they
+    /// leave the range of `f32`.
+    #[inline(always)]
+    pub fn for_lines(&self, farthest: f64, origin_error: f64, direction_error: f64) -> ObjectBounds {
+        let farthest = if farthest > self.greatest.into() { farthest } else { self.greatest.into() };
+        let off = origin_error + 8.0 * direction_error * farthest;
+        self.moved(((4.0 * farthest + off / f64::from(U)) * (1.0 + f64::from(U))) as f32)
+    }
+
     /// The bounds for rays that are off by at most u times `coordinate`.
     #[inline(always)]
     fn moved(&self, coordinate: f32) -> ObjectBounds {

@@ -3,11 +3,10 @@
 
 use super::nodes;
 use crate::intersect::exact::{Estimate, Intersection, estimate, in_pairs};
+use crate::intersect::exact_ray::{ExactRay, LineSource, WorldLines};
 use crate::intersect::line::Line;
 use crate::intersect::start::start_on;
 use crate::intersect::start::{StartDecision, decide_start, decide_start_exactly};
-use crate::intersect::start_point::ExactRay;
-use crate::intersect::start_point::StartPoint;
 use crate::intersect::vector::wide;
 use crate::query::{Goal, RayQuery, TriangleRef};
 use crate::rays::Ray;
@@ -53,13 +52,14 @@ impl<S: Simd, G: Goal> Part<S> for Settle<'_, G> {
     type Output = bool;
     #[inline(always)]
     fn run(self, s: S) -> bool {
-        let Settle { object, ray: (ray, start), pending, of_leaf: (leaf, mut triangles), query } = self;
+        let Settle { object, ray: ExactRay { ray, line }, pending, of_leaf: (leaf, mut triangles), query } =
+            self;
         let mut candidate = pending;
         loop {
             if candidate.leaf != NONE {
-                let is_complete = match start {
-                    None => settle_one(s, object, ray, candidate, query),
-                    Some(start) => settle_from_start(object, (ray, start), candidate, query),
+                let is_complete = match line {
+                    LineSource::Ray => settle_one(s, object, ray, candidate, query),
+                    _ => settle_other(object, ExactRay { ray, line }, candidate, query),
                 };
                 if is_complete {
                     return true;
@@ -103,23 +103,64 @@ fn settle_one<S: Simd, G: Goal>(
         .is_some_and(|intersection| query.offer(TriangleRef::index(index, object.triangle_ids), intersection))
 }
 
-/// Like [`settle_one`], for a ray that starts on a triangle.
+/// Like [`settle_one`], for a ray whose line is not that of f32.
 #[inline(never)]
-fn settle_from_start<G: Goal>(
+fn settle_other<G: Goal>(
     object: &ObjectView<'_>,
-    (ray, start): (&Ray, &StartPoint),
+    ray: ExactRay<'_>,
     candidate: Candidate,
     query: &mut RayQuery<G>,
 ) -> bool {
     let Some((index, corners)) = candidate.read(object) else { return false };
-    let intersection = match decide_start(start.origin, wide(ray.direction), corners.map(wide)) {
-        StartDecision::Certain(found) => found,
-        StartDecision::Open(_, t) if !query.may_matter(t) => None,
-        StartDecision::Open(uncertain, _) => start_on(object, start)
-            .and_then(|start| decide_start_exactly(&start, wide(ray.direction), corners, &uncertain)),
-    };
-    intersection
+    intersect(object, ray, corners, |t| query.may_matter(t))
         .is_some_and(|intersection| query.offer(TriangleRef::index(index, object.triangle_ids), intersection))
+}
+
+/// The intersection of a ray with a triangle of its object, if it counts. `may_matter` as for
+/// [`intersect_in_world`].
+pub(crate) fn intersect(
+    object: &ObjectView<'_>,
+    ExactRay { ray, line }: ExactRay<'_>,
+    corners: [[f32; 3]; 3],
+    may_matter: impl FnOnce([f64; 2]) -> bool,
+) -> Option<Intersection> {
+    match line {
+        LineSource::Ray => match estimate(wide(ray.origin), wide(ray.direction), corners.map(wide)) {
+            Estimate::Missed => None,
+            Estimate::Intersects(intersection) => Some(intersection),
+            Estimate::Open(_, t) if !may_matter(t) => None,
+            Estimate::Open(..) => intersect_exactly(ray, corners),
+        },
+        LineSource::Start(start) => {
+            match decide_start(start.origin, wide(ray.direction), corners.map(wide)) {
+                StartDecision::Certain(found) => found,
+                StartDecision::Open(_, t) if !may_matter(t) => None,
+                StartDecision::Open(uncertain, _) => start_on(object, start)
+                    .and_then(|start| decide_start_exactly(&start, wide(ray.direction), corners, &uncertain)),
+            }
+        }
+        LineSource::World(lines, ray) => intersect_in_world((lines, ray), corners.map(wide), may_matter),
+    }
+}
+
+/// The intersection of a line in world space with a triangle, given its corners in the space of the
+/// object, if it counts. `may_matter` is called with bounds of t where only exact arithmetic can
+/// tell.
+pub(crate) fn intersect_in_world(
+    (lines, ray): (&dyn WorldLines, usize),
+    corners: [[f64; 3]; 3],
+    may_matter: impl FnOnce([f64; 2]) -> bool,
+) -> Option<Intersection> {
+    let (line, counts) = (lines.line(ray), |found: &Intersection| found.t > 0.0 || !lines.are_from_starts());
+    match estimate(line, line.direction, corners) {
+        Estimate::Missed => None,
+        Estimate::Intersects(found) => Some(found).filter(counts),
+        Estimate::Open(_, t) if t[1] <= 0.0 && lines.are_from_starts() || !may_matter(t) => None,
+        Estimate::Open(uncertain, _) => {
+            let exact = lines.exact(ray).intersection(corners).filter(counts)?;
+            Some(uncertain.if_accurate().unwrap_or(exact))
+        }
+    }
 }
 
 /// Decides exactly a candidate that f64 leaves open. Its corners are read again, so that the common

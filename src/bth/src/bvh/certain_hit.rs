@@ -2,10 +2,11 @@
 //! [`super::deferred`] computes them for sixteen rays.
 
 use super::candidate::{Candidate, Settle};
-use crate::intersect::exact::{reported, reported_barycentric};
+use crate::intersect::exact::{OriginTerms, RoundedIntersection, reported, reported_barycentric};
 use crate::intersect::exact_quad::rounded_intersection;
+use crate::intersect::exact_ray::{ExactRay, LineSource};
 use crate::intersect::filter::TriangleBlock;
-use crate::intersect::start_point::ExactRay;
+use crate::intersect::vector::{max_norm, wide};
 use crate::query::{Goal, RayQuery};
 use crate::rays::{Hit, PrimitiveRef};
 use crate::simd::Simd;
@@ -33,10 +34,17 @@ pub(crate) fn store_certain_hit<S: Simd, G: Goal>(
     hit: &mut Hit,
 ) {
     if let Some(leaf) = object.node_base().indexed_leaf(candidate.leaf) {
-        let (corners, (ray, start)) = (leaf.corners(candidate.triangle as usize), exact_ray);
-        let rounded = match start {
-            None => rounded_intersection(s.doubles(), (ray.origin, ray.direction), corners, norm),
-            Some(start) => rounded_intersection(s.doubles(), (start.origin, ray.direction), corners, norm),
+        let (corners, ExactRay { ray, line }) = (leaf.corners(candidate.triangle as usize), exact_ray);
+        let rounded = match line {
+            LineSource::Ray => rounded_intersection(s.doubles(), (ray.origin, ray.direction), corners, norm),
+            LineSource::Start(start) => {
+                rounded_intersection(s.doubles(), (start.origin, ray.direction), corners, norm)
+            }
+            LineSource::World(lines, ray) => {
+                let line = lines.line(ray);
+                let terms = OriginTerms::new(line, corners.map(wide));
+                RoundedIntersection::new(&terms, line.direction, max_norm(line.direction))
+            }
         };
         if rounded.is_accurate {
             let index = leaf.first.wrapping_add(candidate.triangle);
@@ -48,7 +56,7 @@ pub(crate) fn store_certain_hit<S: Simd, G: Goal>(
         }
     }
     // Leaves of other formats, and where f64 leaves t, u or v inaccurate.
-    let mut query = RayQuery::new(goal, exact_ray.0);
+    let mut query = RayQuery::new(goal, exact_ray.ray);
     let (pending, of_leaf) = (candidate, (NONE, 0));
     s.call(Settle { object, ray: exact_ray, pending, of_leaf, query: &mut query });
     *hit = query.answer(object.triangle_ids, instance);

@@ -6,8 +6,8 @@ use super::ray_state::RayState;
 use crate::bvh::candidate::{Candidate, Settle};
 use crate::bvh::nodes::{Leaf, LeafMemory, leaf};
 use crate::intersect::exact_lanes::{Intersections, Pairs};
+use crate::intersect::exact_ray::{ExactRay, LineLanes};
 use crate::intersect::filter::TriangleBlock;
-use crate::intersect::origin::RoundedOrigin;
 use crate::intersect::prepare::gather_rays;
 use crate::query::sink::Sink;
 use crate::query::{Goal, NearestHit, RayQuery};
@@ -42,8 +42,8 @@ impl<S: Simd> Part<S> for Flush<'_, '_> {
     #[inline(always)]
     fn run(self, s: S) {
         let Flush { deferred, object, rays, sink } = self;
-        let all = ((1u64 << deferred.count) - 1) as u32;
-        deferred.count = 0;
+        let count = std::mem::take(&mut deferred.count).min(LANES);
+        let all = ((1u64 << count) - 1) as u32;
         // Gathering all rays here was measured to take half the time of storing each when it is
         // added.
         let [ox, oy, oz, _, dx, dy, dz, _] = gather_rays(s, s.mask(all), rays, s.load_u(&deferred.ray));
@@ -52,15 +52,15 @@ impl<S: Simd> Part<S> for Flush<'_, '_> {
             s.store(origin[k], &mut deferred.pairs.origin[k]);
             s.store(direction[k], &mut deferred.pairs.direction[k]);
         }
-        let (starts, intersections) = (sink.starts(), &mut deferred.intersections);
-        if starts.is_empty() {
+        let (lines, intersections) = (sink.lines(), &mut deferred.intersections);
+        if lines.are_rays() {
             intersections.compute(s, all, &deferred.pairs);
         } else {
-            let mut origins = [RoundedOrigin([0.0; 3], 0.0); LANES];
-            for (origin, ray) in origins.iter_mut().zip(deferred.ray) {
-                *origin = starts.0[ray as usize].origin;
+            let mut of_lanes = LineLanes::NONE;
+            for (lane, &ray) in deferred.ray[..count].iter().enumerate() {
+                of_lanes.set(lane, &lines.rounded(ray as usize, &rays[ray as usize]));
             }
-            intersections.compute_from(s, all, &origins, &deferred.pairs);
+            intersections.compute_lines(s, all, &of_lanes, &deferred.pairs);
         }
         for lane in 0..LANES {
             if intersections.certain >> lane & 1 != 0 {
@@ -79,9 +79,9 @@ impl<S: Simd> Part<S> for Flush<'_, '_> {
             let lane = rest.trailing_zeros() as usize % LANES;
             rest &= rest - 1;
             let index = deferred.ray[lane] as usize;
-            let (ray, start) = (&rays[index], starts.of(index));
-            let mut query = RayQuery::new(NearestHit, ray);
-            let (ray, pending, of_leaf) = ((ray, start), deferred.candidate[lane], (NONE, 0));
+            let ray = ExactRay { ray: &rays[index], line: lines.of(index) };
+            let mut query = RayQuery::new(NearestHit, ray.ray);
+            let (pending, of_leaf) = (deferred.candidate[lane], (NONE, 0));
             s.call(Settle { object, ray, pending, of_leaf, query: &mut query });
             sink.query(deferred.ray[lane] as usize, &query);
         }

@@ -11,9 +11,9 @@
 use super::ray_state::key_limit;
 use super::walk::{BoxQuery, ObjectTree, TriangleQuery, any_in_set, run_walk};
 use crate::intersect::boxes::{RaySlabLanes, RaySlabs};
+use crate::intersect::exact_ray::{ExactRay, LineSource};
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::prepare::PreparedRay;
-use crate::intersect::start_point::ExactRay;
 use crate::query::{Receiver, TriangleRef};
 use crate::shortcuts::SpecialLeaf;
 use crate::simd::{Scalar, Simd};
@@ -24,13 +24,13 @@ use bth_format::object::{ObjectBounds, ObjectView};
 /// `tmin` to `tmax` and the receiver's limit, and some others. Nearer boxes come first, but
 /// triangles come in no particular order. A ray that starts on a triangle passes all that it
 /// touches at t >= 0. Returns true if the receiver has ended the enumeration.
-pub(crate) fn enumerate(
-    object: &ObjectView<'_>,
-    (ray, start): ExactRay<'_>,
-    receiver: &mut dyn Receiver,
-) -> bool {
-    let bounds = if start.is_some() { &object.start_bounds } else { &object.bounds };
-    enumerate_within(object, bounds, (ray, start), receiver)
+pub(crate) fn enumerate(object: &ObjectView<'_>, ray: ExactRay<'_>, receiver: &mut dyn Receiver) -> bool {
+    let bounds = match ray.line {
+        LineSource::Ray => &object.bounds,
+        LineSource::Start(_) => &object.start_bounds,
+        LineSource::World(lines, at) => &lines.line(at).bounds(&object.bounds),
+    };
+    enumerate_within(object, bounds, ray, receiver)
 }
 
 /// Does the same as [`enumerate`], with tests of boxes and triangles for these bounds.
@@ -43,7 +43,7 @@ pub(crate) fn enumerate_within(
     if object.header.root == NONE {
         return false;
     }
-    let prepared = PreparedRay::of(Scalar, bounds, ray.0).or_else(|| PreparedRay::in_f64(bounds, ray.0));
+    let prepared = PreparedRay::of(Scalar, bounds, ray.ray).or_else(|| PreparedRay::in_f64(bounds, ray.ray));
     let Some(prepared) = &prepared else { return false };
     run_walk(&ObjectTree::new(object), &mut RayTriangles { bounds, ray, prepared, receiver })
 }

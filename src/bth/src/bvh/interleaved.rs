@@ -6,8 +6,8 @@ use super::leaf::{LeafOutcome, RayProgress, decide};
 use super::ray_pool::{POOL_SIZE, PoolRays, PoolSlot, RareSteps, RayPool, has_rare_steps};
 use super::ray_state::RayState;
 use super::stack::Stacks;
+use crate::intersect::exact_ray::ExactRay;
 use crate::intersect::prepare::Prepared;
-use crate::intersect::start_point::ExactRay;
 use crate::query::Goal;
 use crate::query::sink::Sink;
 use crate::rays::Ray;
@@ -73,7 +73,7 @@ impl<G: Goal> Kernel for Interleaved<'_, '_, G> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let Interleaved { object, rays, order, stacks, sink, goal, entry_nodes } = self;
-        let starts = sink.starts();
+        let lines = sink.lines();
         let mut source = RaySource {
             object,
             rays,
@@ -109,9 +109,10 @@ impl<G: Goal> Kernel for Interleaved<'_, '_, G> {
                     source.start(s, slot, &mut pool);
                 }
             }
-            pool.leaf_steps(s, PoolRays { object, rays, starts }, |leaf, state| {
+            pool.leaf_steps(s, PoolRays { object, rays, lines }, |leaf, state| {
                 let ray = state.ray();
-                enter_special_leaf(object, leaf, (&rays[ray], starts.of(ray)), state)
+                let ray = ExactRay { ray: &rays[ray], line: lines.of(ray) };
+                enter_special_leaf(object, leaf, ray, state)
             });
         }
         // An any-hit query has no pending hits.
@@ -222,9 +223,9 @@ fn enter_special_leaf<G: Goal>(
     state: &mut RayState<G>,
 ) -> LeafOutcome {
     decide(Scalar, object, ray, &object.bounds, state, (NONE, 0));
-    if leaf.enter(object, ray, state.query(ray.0), &mut ()) {
+    if leaf.enter(object, ray, state.query(ray.ray), &mut ()) {
         LeafOutcome::Done
     } else {
-        state.update_from_query(ray.0, object.bounds.origin_error)
+        state.update_from_query(ray.ray, object.bounds.origin_error)
     }
 }

@@ -8,9 +8,9 @@
 //! decisions with one ray in each lane (`bvh/packet/leaf.rs`), and share [`Settle`].
 
 use crate::bvh::candidate::{Candidate, Settle};
+use crate::intersect::exact_ray::ExactRay;
 use crate::intersect::filter::{Certain, TriangleBlock};
 use crate::intersect::prepare::PreparedRay;
-use crate::intersect::start_point::{ExactRay, own_triangle};
 use crate::query::{Goal, RayQuery};
 use crate::rays::Ray;
 use crate::simd::Simd;
@@ -82,7 +82,7 @@ pub(crate) fn enter_leaf<S: Simd, G: Goal, B: TriangleBlock>(
 ) -> LeafOutcome {
     let prepared = progress.prepared();
     let (first, last) = (prepared.slabs.first, progress.last());
-    let own = own_triangle(ray.1, code);
+    let own = ray.own_triangle(code);
     let found = prepared.filter.candidates(s, (block, own), first, last, bounds.origin_reach);
     if found.maybe == 0 {
         return LeafOutcome::Nothing;
@@ -122,9 +122,9 @@ pub(crate) fn decide<S: Simd, G: Goal>(
 ) -> LeafOutcome {
     let pending = progress.pending();
     progress.set_pending(Candidate::NONE);
-    let query = progress.query(ray.0);
+    let query = progress.query(ray.ray);
     if s.call(Settle { object, ray, pending, of_leaf: triangles, query }) {
         return LeafOutcome::Done;
     }
-    progress.update_from_query(ray.0, bounds.origin_error)
+    progress.update_from_query(ray.ray, bounds.origin_error)
 }

@@ -6,7 +6,7 @@ use super::leaf::{CodedLeaf, LeafOutcome, enter_leaf};
 use super::nodes::{Leaf, LeafMemory, is_large, leaf, prefetch, prefetch_into};
 use super::ray_state::{RayState, write_children};
 use super::stack::{BOTTOM, StackPosition, Stacks};
-use crate::intersect::start_point::Starts;
+use crate::intersect::exact_ray::{ExactRay, Lines};
 use crate::query::{Goal, RayQuery};
 use crate::rays::Ray;
 use crate::shortcuts::SpecialLeaf;
@@ -98,7 +98,7 @@ impl StepLists {
 pub(super) struct PoolRays<'a> {
     pub(super) object: &'a ObjectView<'a>,
     pub(super) rays: &'a [Ray],
-    pub(super) starts: Starts<'a>,
+    pub(super) lines: Lines<'a>,
 }
 
 /// State of a ray, aligned to cache lines.
@@ -260,7 +260,7 @@ impl<'a, G: Goal> RayPool<'a, G> {
     pub(super) fn leaf_steps<S: Simd>(
         &mut self,
         s: S,
-        PoolRays { object, rays, starts }: PoolRays<'_>,
+        PoolRays { object, rays, lines }: PoolRays<'_>,
         mut special: impl FnMut(SpecialLeaf, &mut RayState<G>) -> LeafOutcome,
     ) {
         let RayPool { slots, tops, lists, stacks, bottoms, goal, .. } = self;
@@ -270,7 +270,7 @@ impl<'a, G: Goal> RayPool<'a, G> {
             let state = &mut slots[slot].0;
             let (code, top) = (tops.code[slot], tops.position[slot]);
             let ray = state.ray();
-            let exact_ray = (&rays[ray], starts.of(ray));
+            let exact_ray = ExactRay { ray: &rays[ray], line: lines.of(ray) };
             let mut memory = LeafMemory::default();
             let found = match leaf(s, object, node_base, code, &mut memory) {
                 Leaf::Indexed(block) => {

@@ -11,8 +11,8 @@ use super::ray_state::key_limit;
 use super::single_stack::{OpenSingleStack, SingleStack};
 use crate::bvh::candidate::Candidate;
 use crate::intersect::boxes::RaySlabLanes;
+use crate::intersect::exact_ray::ExactRay;
 use crate::intersect::prepare::PreparedRay;
-use crate::intersect::start_point::ExactRay;
 use crate::query::{Count, Goal, RayQuery};
 use crate::rays::Ray;
 use crate::simd::Simd;
@@ -154,8 +154,8 @@ pub(crate) fn trace_single<S: Simd, G: Goal, C: Count>(
             Leaf::Special(leaf) => {
                 count.leaf();
                 decide(s, object, ray, bounds, &mut state, (NONE, 0));
-                let done = leaf.enter(object, ray, state.query(ray.0), count);
-                state.update_from_query(ray.0, bounds.origin_error);
+                let done = leaf.enter(object, ray, state.query(ray.ray), count);
+                state.update_from_query(ray.ray, bounds.origin_error);
                 done
             }
             // A code of a file that was not checked.

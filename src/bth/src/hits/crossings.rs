@@ -5,13 +5,15 @@
 
 use crate::bvh::enumerate::enumerate;
 use crate::enumerate::enumerate_instances;
-use crate::intersect::crossing::{crossing, crossing_from_start};
-use crate::intersect::start::{ExactStart, start_on};
-use crate::intersect::start_point::StartPoint;
+use crate::intersect::crossing::{crossing, crossing_from_start, crossing_in_world};
+use crate::intersect::exact_ray::{ExactRay, LineSource};
+use crate::intersect::start::start_on;
+use crate::intersect::vector::wide;
 use crate::query::{Receiver, TriangleRef};
 use crate::rays::Ray;
 use crate::scene::Scene;
 use crate::starts::world_ray::WorldRay;
+use bth_format::object::ObjectView;
 
 /// Passages of a ray through triangles, counted by the rule of [`Scene::crossings`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,17 +29,21 @@ pub struct Crossings {
 
 /// Counts the crossings of a ray in object space.
 struct CrossingCounter<'a> {
-    ray: Ray,
-    /// Where it starts, if that is on a triangle of the object.
-    start: Option<(&'a StartPoint, &'a ExactStart)>,
+    object: &'a ObjectView<'a>,
+    ray: ExactRay<'a>,
+    /// The range of t, in the units of the ray.
+    range: [f64; 2],
     found: Crossings,
 }
 
 impl Receiver for CrossingCounter<'_> {
     fn receive(&mut self, _triangle: TriangleRef<'_>, corners: [[f32; 3]; 3]) -> bool {
-        let sign = match self.start {
-            None => crossing(&self.ray, corners),
-            Some((point, start)) => crossing_from_start(&self.ray, point, start, corners),
+        let ExactRay { ray, line } = self.ray;
+        let sign = match line {
+            LineSource::Ray => crossing(ray, corners),
+            LineSource::Start(point) => start_on(self.object, point)
+                .map_or(0, |start| crossing_from_start(ray, point, &start, corners)),
+            LineSource::World(lines, ray) => crossing_in_world((lines, ray), self.range, corners.map(wide)),
         };
         self.found.count += sign.unsigned_abs();
         self.found.winding += sign;
@@ -50,14 +56,17 @@ impl Receiver for CrossingCounter<'_> {
 
 /// Counts the crossings of a ray in all instances.
 pub(super) fn count_crossings(scene: &Scene, world_ray: WorldRay<'_>) -> Crossings {
-    let mut total = Crossings::default();
+    let (mut total, Ray { tmin, tmax, .. }) = (Crossings::default(), *world_ray.ray);
     enumerate_instances(scene, world_ray.ray, &mut |entered| {
-        let ray = entered.object_ray(world_ray).with_exact_range(world_ray.ray);
-        let start = world_ray.start_in(entered.instance);
-        let exact_start = start.and_then(|start| start_on(entered.object, start));
-        let start_pair = start.zip(exact_start.as_ref());
-        let mut counter = CrossingCounter { ray, start: start_pair, found: Crossings::default() };
-        enumerate(entered.object, (&ray, start), &mut counter);
+        let of_instance = entered.ray(world_ray, tmax);
+        let t_scale = f64::from(of_instance.t_scale());
+        let mut counter = CrossingCounter {
+            object: entered.object,
+            ray: of_instance.exact(),
+            range: [tmin, tmax].map(|t| f64::from(t) / t_scale),
+            found: Crossings::default(),
+        };
+        enumerate(entered.object, counter.ray, &mut counter);
         total.count += counter.found.count;
         total.winding += counter.found.winding;
         Some(f32::INFINITY)

@@ -3,17 +3,13 @@
 
 use super::accept::Accept;
 use super::collect::{Collector, FoundHit};
-use crate::bvh::candidate::intersect_exactly;
+use crate::bvh::candidate::intersect;
 use crate::bvh::enumerate::enumerate;
 use crate::enumerate::{EnteredInstance, enumerate_instances};
-use crate::intersect::exact::{Estimate, Intersection, estimate, reported};
+use crate::intersect::exact::reported;
+use crate::intersect::exact_ray::ExactRay;
 use crate::intersect::line::widened;
-use crate::intersect::start::start_on;
-use crate::intersect::start::{ExactStart, StartDecision, decide_start, decide_start_exactly};
-use crate::intersect::start_point::StartPoint;
-use crate::intersect::vector::wide;
 use crate::masks::Masks;
-use crate::nodes::ObjectRay;
 use crate::query::{Receiver, TriangleRef, in_range, may_be_in_range};
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::scene::Scene;
@@ -48,33 +44,32 @@ fn search_instance(
     (accept, masks): (&Accept<'_>, &Masks),
     collector: &mut dyn Collector,
 ) -> bool {
-    let ray = world_ray.ray;
-    let object_ray = entered.object_ray(WorldRay { ray: &Ray { tmax, ..*ray }, ..world_ray });
-    let start = world_ray.start_in(entered.instance);
-    let exact_start = start.and_then(|start| start_on(entered.object, start));
+    let of_instance = entered.ray(world_ray, tmax);
+    let exact = of_instance.exact();
     let mut hits = InstanceHits {
-        ray,
-        start: start.zip(exact_start.as_ref()),
+        ray: world_ray.ray,
+        exact,
         instance: entered.instance,
         object: entered.object,
-        object_ray,
+        t_scale: of_instance.t_scale(),
         groups: masks.groups(entered.object_index),
         accept,
         collector,
-        limit: widened(object_ray.ray.tmax.into()),
+        limit: widened(exact.ray.tmax.into()),
     };
-    enumerate(entered.object, (&object_ray.ray, start), &mut hits)
+    enumerate(entered.object, exact, &mut hits)
 }
 
 /// The state of a search in an instance.
 struct InstanceHits<'a> {
     /// In world space.
     ray: &'a Ray,
-    /// Where it starts, if that is on a triangle of this instance.
-    start: Option<(&'a StartPoint, &'a ExactStart)>,
+    /// In the space of the object.
+    exact: ExactRay<'a>,
     instance: u32,
     object: &'a ObjectView<'a>,
-    object_ray: ObjectRay,
+    /// Factor from t in object space to t in world space.
+    t_scale: f32,
     /// The masks of the object's groups, if any was set.
     groups: Option<&'a [u32]>,
     accept: &'a Accept<'a>,
@@ -84,35 +79,14 @@ struct InstanceHits<'a> {
 }
 
 impl InstanceHits<'_> {
-    /// The intersection of the ray's line with a triangle, unless its t certainly lies out of the
-    /// range of hits that can change the result.
-    fn intersection(&self, corners: [[f32; 3]; 3]) -> Option<Intersection> {
-        let ray = &self.object_ray.ray;
-        if let Some((point, start)) = self.start {
-            return match decide_start(point.origin, wide(ray.direction), corners.map(wide)) {
-                StartDecision::Certain(found) => found,
-                StartDecision::Open(_, t) if !may_be_in_range(t, ray.tmin, self.limit) => None,
-                StartDecision::Open(uncertain, _) => {
-                    decide_start_exactly(start, wide(ray.direction), corners, &uncertain)
-                }
-            };
-        }
-        match estimate(wide(ray.origin), wide(ray.direction), corners.map(wide)) {
-            Estimate::Missed => None,
-            Estimate::Intersects(intersection) => Some(intersection),
-            Estimate::Open(_, t) if !may_be_in_range(t, ray.tmin, self.limit) => None,
-            Estimate::Open(..) => intersect_exactly(ray, corners),
-        }
-    }
-
     /// t in world space as it is reported; `None` if it lies out of the ray's range.
     fn reported_t(&self, t: f64) -> Option<f32> {
-        let ObjectRay { ray, t_scale } = &self.object_ray;
+        let (ray, t_scale) = (self.exact.ray, self.t_scale);
         if !in_range(t as f32, ray.tmin, ray.tmax) {
             return None;
         }
         let t = reported(t);
-        if *t_scale == 1.0 {
+        if t_scale == 1.0 {
             return Some(t);
         }
         let t = t * t_scale;
@@ -129,7 +103,7 @@ impl InstanceHits<'_> {
 
     /// Updates the limit after the collector has taken a hit.
     fn shrink(&mut self) {
-        let (t, t_scale) = (self.collector.limit(), self.object_ray.t_scale);
+        let (t, t_scale) = (self.collector.limit(), self.t_scale);
         if t < f32::INFINITY {
             // The product of t in the object and the factor may have been rounded where it is
             // denormal.
@@ -141,7 +115,10 @@ impl InstanceHits<'_> {
 
 impl Receiver for InstanceHits<'_> {
     fn receive(&mut self, triangle: TriangleRef<'_>, corners: [[f32; 3]; 3]) -> bool {
-        let Some(intersection) = self.intersection(corners) else { return false };
+        let ExactRay { ray, .. } = self.exact;
+        let may_matter = |t| may_be_in_range(t, ray.tmin, self.limit);
+        let found = intersect(self.object, self.exact, corners, may_matter);
+        let Some(intersection) = found else { return false };
         let Some(t) = self.reported_t(intersection.t) else { return false };
         let [.., determinant] = intersection.weight;
         // A hit beyond the limit is excluded before the id is read, which is often a cache miss.

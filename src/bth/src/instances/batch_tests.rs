@@ -5,6 +5,7 @@ use super::super::placement::PartBoxes;
 use super::super::test_worlds::{FILES, START_FILES, rays, unit, world};
 use super::*;
 use crate::hits::Accept;
+use crate::instances::RayInInstance;
 use crate::nodes::affine::Affine;
 use crate::query::better;
 use crate::rays::{PrimitiveRef, Start, StartRay};
@@ -15,14 +16,14 @@ use bth_format::File;
 use bth_random::Rng;
 
 /// Oracle: the nearest hit of a loop over all instances, without the top level.
-fn nearest_by_loop(world: &World, file: &File, ray: &Ray) -> Hit {
+fn nearest_by_loop(world: &World, objects: &Objects, ray: &Ray) -> Hit {
     let mut best = Hit::MISS;
     for (instance, placement) in world.placements.iter().enumerate() {
         let Some(placement) = placement else { continue };
-        let object = placement.inverse.ray(ray);
-        let view = file.object(placement.object()).unwrap();
-        let hit = object::nearest(&view, &object.ray, instance as u32);
-        best = better(ray, &best, &hit, object.t_scale).unwrap_or(best);
+        let instance = instance as u32;
+        let of_instance = RayInInstance::new(world, objects, instance, WorldRay::plain(ray), ray.tmax);
+        let hit = object::nearest(objects.view(placement.object()), &of_instance, instance);
+        best = better(ray, &best, &hit, of_instance.of_object.t_scale).unwrap_or(best);
     }
     best
 }
@@ -47,7 +48,7 @@ fn the_top_level_does_not_change_results() {
         let rays = rays(&mut rng, &transforms, 40);
         let (hits, found) = traced(&world, &objects, &rays);
         for (i, ray) in rays.iter().enumerate() {
-            let expected = nearest_by_loop(&world, &file, ray);
+            let expected = nearest_by_loop(&world, &objects, ray);
             assert_eq!(hits[i], expected, "case {case}, ray {i}: {ray:?}");
             assert_eq!(found[i], expected.is_hit(), "case {case}, ray {i}: {ray:?}");
             // What a single ray stored before does not matter.
@@ -79,15 +80,10 @@ fn nearest_start_by_loop(scene: &Scene, ray: &StartRay) -> Hit {
     for (instance, placement) in world.placements.iter().enumerate() {
         let Some(placement) = placement else { continue };
         let (instance, world_ray) = (instance as u32, placed.world_ray());
-        let of_object = placement.inverse.ray_from(&placed.ray, world_ray.start_in(instance));
-        let view = scene.file().object(placement.object()).unwrap();
-        let hit = world_ray.in_object(
-            instance,
-            &of_object.ray,
-            |start| object::nearest(&view, start, instance),
-            |ray| object::nearest(&view, ray, instance),
-        );
-        best = better(&placed.ray, &best, &hit, of_object.t_scale).unwrap_or(best);
+        let objects = scene.objects();
+        let of_instance = RayInInstance::new(world, objects, instance, world_ray, ray.tmax);
+        let hit = object::nearest(objects.view(placement.object()), &of_instance, instance);
+        best = better(&placed.ray, &best, &hit, of_instance.of_object.t_scale).unwrap_or(best);
     }
     best
 }
@@ -190,7 +186,7 @@ fn packets_through_the_top_level_do_not_change_results() {
         world.nearest(&objects, &rays, &[], &mut hits);
         world.any(&objects, &rays, &[], &mut found);
         for (i, ray) in rays.iter().enumerate() {
-            let expected = nearest_by_loop(&world, &file, ray);
+            let expected = nearest_by_loop(&world, &objects, ray);
             assert_eq!(hits[i], expected, "case {case}, ray {i}: {ray:?}");
             assert_eq!(found[i], expected.is_hit(), "case {case}, ray {i}: {ray:?}");
             hit_count += usize::from(expected.is_hit());
@@ -245,12 +241,12 @@ fn a_single_instance_in_world_space_has_the_same_hits_with_and_without_the_top_l
 
 /// Oracle: the hits of a ray in all instances and triangles, each decided exactly, in the
 /// documented order.
-fn hits_by_loop(world: &World, file: &File, ray: &Ray) -> Vec<Hit> {
+fn hits_by_loop(world: &World, objects: &Objects, ray: &Ray) -> Vec<Hit> {
     let mut found = vec![];
     for (instance, placement) in world.placements.iter().enumerate() {
         let Some(placement) = placement else { continue };
-        let object = file.object(placement.object()).unwrap();
-        exact_loop::add_hits(&object, &placement.inverse, instance as u32, ray, &mut found);
+        let object = objects.view(placement.object());
+        exact_loop::add_hits(object, (world, objects), instance as u32, ray, &mut found);
     }
     exact_loop::in_order(found)
 }
@@ -264,9 +260,9 @@ fn several_hits_are_those_of_a_loop_over_all_instances_and_triangles() {
         let count = [1, 2, 7, 16, 17, 40, 300][case % 7];
         let (world, transforms) = world(&file, &mut rng, count);
         let (reach, scene) = (world.top.reach, Scene::with_instances(file, world));
-        let (world, file) = (scene.world().expect("instances"), scene.file());
+        let (world, objects) = (scene.world().expect("instances"), scene.objects());
         for ray in rays(&mut rng, &transforms, 20) {
-            let expected = hits_by_loop(world, file, &ray);
+            let expected = hits_by_loop(world, objects, &ray);
             let mut hits = vec![Hit::MISS];
             let all = |_: &Ray, _: &Hit| true;
             for accept in [Accept::default(), Accept { filter: Some(&all), ..Accept::default() }] {

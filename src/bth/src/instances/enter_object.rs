@@ -1,14 +1,16 @@
 //! Transformation of rays into the space of an object.
 
+use super::lines::visit_ray;
+use super::placement::Placement;
 use super::scene_batch::{BatchProgress, ObjectVisits, SceneBatch};
-use crate::intersect::start_point::StartPoint;
-use crate::nodes::affine::RayLanes;
+use crate::nodes::affine::{ObjectRay, RayLanes};
 use crate::query::sink::Visit;
 use crate::rays::Ray;
 use crate::shortcuts::free;
 use crate::simd::{Isa, Kernel, LANES, Scalar, Simd};
 use crate::starts::prepare::ENDED;
 use crate::starts::world_ray::InstanceStart;
+use bth_format::object::ObjectBounds;
 
 /// The rays of visits of one object, in its space and in the order of the visits.
 #[derive(Default)]
@@ -16,8 +18,8 @@ pub(super) struct ObjectRays {
     pub(super) rays: Vec<Ray>,
     /// For each ray the factor from its t to t in world space.
     pub(super) t_scale: Vec<f32>,
-    /// For each ray where it starts; empty if no rays start on triangles.
-    pub(super) starts: Vec<StartPoint>,
+    /// The bounds for which all of the rays are prepared.
+    pub(super) bounds: ObjectBounds,
     /// For each visit the index of its ray in the batch.
     index: Vec<u32>,
     /// For each ray the max t, in world space, of hits that can still change the result.
@@ -30,24 +32,40 @@ impl ObjectRays {
     pub(super) fn fill(&mut self, of_object: &ObjectVisits<'_>, progress: BatchProgress<'_>) {
         let &ObjectVisits { batch, object, visits } = of_object;
         self.t_scale.clear();
-        self.starts.clear();
-        Isa::chosen().run(EnterKernel { object_rays: self, batch, visits, progress });
-        if !batch.starts.is_empty() {
-            let ObjectRays { rays, starts, .. } = self;
-            starts.extend(rays.iter_mut().zip(visits).map(|(ray, visit)| match batch.start(*visit) {
-                Some(InstanceStart { start, point, .. }) => {
-                    ray.origin = point.rounded();
-                    let begin = free::begin(Scalar, object, start.primitive.triangle, point, ray.direction);
-                    if begin == f32::INFINITY {
-                        *ray = ENDED;
-                    } else {
-                        ray.tmin = begin;
-                    }
-                    *point
-                }
-                None => StartPoint::beside(ray.origin),
-            }));
+        let farthest = Isa::chosen().run(EnterKernel { object_rays: self, batch, visits, progress });
+        for (ray, visit) in self.rays.iter_mut().zip(visits) {
+            if batch.starts.is_empty() {
+                break;
+            }
+            let Some(InstanceStart { start, point, .. }) = batch.start(*visit) else { continue };
+            ray.origin = point.rounded();
+            ray.tmin = free::begin(Scalar, object, start.primitive.triangle, point, ray.direction);
+            if ray.tmin == f32::INFINITY {
+                *ray = ENDED;
+            }
         }
+        let Farthest { in_object, error, direction_error } = farthest;
+        self.bounds = object.bounds.for_lines(in_object, error, direction_error);
+    }
+}
+
+/// What the bounds of rays depend on: the max |coordinate| of their origins in the space of the
+/// object, and bounds of the errors of their lines.
+#[derive(Default)]
+struct Farthest {
+    in_object: f64,
+    error: f64,
+    direction_error: f64,
+}
+
+impl Farthest {
+    /// Includes rays through an instance, given the max |coordinate| of their origins in world
+    /// space. `rounded` are origins of starts, which f32 does not hold.
+    fn include(&mut self, placement: &Placement, in_object: f32, in_world: f32, rounded: bool) {
+        let [error, direction_error] = placement.line_errors(in_world.into(), rounded);
+        self.in_object = self.in_object.max(in_object.into());
+        self.error = self.error.max(error);
+        self.direction_error = self.direction_error.max(direction_error);
     }
 }
 
@@ -61,10 +79,10 @@ struct EnterKernel<'a> {
 }
 
 impl Kernel for EnterKernel<'_> {
-    type Output = ();
+    type Output = Farthest;
 
     #[inline(always)]
-    fn run<S: Simd>(self, s: S) {
+    fn run<S: Simd>(self, s: S) -> Farthest {
         let EnterKernel {
             object_rays: ObjectRays { rays, t_scale, index, so_far, .. },
             batch,
@@ -74,19 +92,23 @@ impl Kernel for EnterKernel<'_> {
         // All of them are replaced.
         rays.resize(visits.len(), NO_RAY);
         t_scale.resize(visits.len(), 1.0);
+        let (mut farthest, rounded) = (Farthest::default(), !batch.starts.is_empty());
         let by_itself = |visit: Visit, ray: &mut Ray, t_scale: &mut f32| {
             let index = visit.ray as usize;
             let (own, so_far) = (batch.rays[index].tmax, progress.tmax(index));
             // Not `f32::min`, which would replace a `tmax` of NaN by a number.
             let tmax = if so_far < own { so_far } else { own };
-            let of_object = batch.object_ray(visit, tmax);
-            (*ray, *t_scale) = (of_object.ray, of_object.t_scale);
+            let ObjectRay { ray: of_f32, t_scale: scale, .. } = visit_ray(batch, visit, tmax).of_object;
+            (*ray, *t_scale) = (of_f32, scale);
         };
         if !S::HAS_VECTORS {
             for (i, &visit) in visits.iter().enumerate() {
                 by_itself(visit, &mut rays[i], &mut t_scale[i]);
+                let [in_object, in_world] =
+                    [&rays[i], &batch.rays[visit.ray as usize]].map(|ray| greatest_of(ray.origin));
+                farthest.include(batch.world.placement(visit.instance), in_object, in_world, rounded);
             }
-            return;
+            return farthest;
         }
         index.clear();
         so_far.clear();
@@ -112,11 +134,18 @@ impl Kernel for EnterKernel<'_> {
                 s.store(s.floats(words[k]), &mut lanes.origin[k]);
                 s.store(s.floats(words[4 + k]), &mut lanes.direction[k]);
             }
-            batch.world.placement(instance).inverse.transform(&mut lanes);
+            let placement = batch.world.placement(instance);
+            placement.inverse.transform(&mut lanes);
+            let (mut in_object, mut in_world) = (s.splat(0.0), s.splat(0.0));
             for k in 0..3 {
                 rows[k] = s.load(&lanes.origin[k]);
                 rows[4 + k] = s.load(&lanes.direction[k]);
+                in_object = s.max_abs(rows[k], in_object);
+                in_world = s.max_abs(s.floats(words[k]), in_world);
             }
+            let [in_object, in_world] = [in_object, in_world]
+                .map(|lanes| -s.least(s.sub(s.splat(0.0), s.select(used, lanes, s.splat(0.0)))));
+            farthest.include(placement, in_object, in_world, rounded);
             (rows[3], rows[7]) = (s.floats(words[3]), s.min(s.load(so_far), s.floats(words[7])));
             let rows = s.transpose(rows);
             let mut row = [0.0; LANES];
@@ -134,7 +163,13 @@ impl Kernel for EnterKernel<'_> {
             }
             start += count;
         }
+        farthest
     }
+}
+
+/// Max |coordinate|.
+fn greatest_of(point: [f32; 3]) -> f32 {
+    point.iter().fold(0.0, |most, x| most.max(x.abs()))
 }
 
 const NO_RAY: Ray = Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 };

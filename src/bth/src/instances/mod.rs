@@ -24,6 +24,7 @@ mod enumerate;
 #[cfg(test)]
 pub(crate) mod exact_loop;
 mod instance_list;
+mod lines;
 mod lists;
 mod one_ray;
 mod packets;
@@ -39,8 +40,10 @@ mod visit_queue;
 mod world;
 
 pub(crate) use by_caller::NewInstance;
+pub(crate) use lines::RayInInstance;
 #[cfg(test)]
 pub(crate) use placement::PartBoxes;
+#[cfg(test)]
 pub(crate) use placement::Placement;
 #[cfg(test)]
 pub(crate) use top_level::TopLevel;

@@ -2,9 +2,9 @@
 //! is queued.
 
 use super::World;
+use super::lines::RayInInstance;
 use crate::bvh::packet;
 use crate::coherence::is_same_octant;
-use crate::nodes::affine::ObjectRay;
 use crate::object;
 use crate::objects::Objects;
 use crate::query::{Steps, better};
@@ -29,13 +29,6 @@ fn min_incoherent_rays() -> usize {
     }
 }
 
-/// An instance that a ray enters.
-struct EnteredObject<'a> {
-    object: &'a ObjectView<'a>,
-    /// The ray in the space of the object.
-    ray: ObjectRay,
-}
-
 impl World {
     /// Returns true if the rays of a batch are so few that they are faster one by one; measured,
     /// see docs/notes/scenes.md.
@@ -52,34 +45,19 @@ impl World {
     /// Stores the nearest hit of a ray, or [`Hit::MISS`], as [`Self::nearest`] does for many.
     #[inline(never)]
     pub(crate) fn store_nearest_of_ray(&self, objects: &Objects, ray: WorldRay<'_>, best: &mut Hit) {
-        self.nearest_by(objects, ray, best, |&EnteredObject { object, ray: of_object }, instance, hit| {
-            *hit = ray.in_object(
-                instance,
-                &of_object.ray,
-                |start| object::nearest(object, start, instance),
-                |ray| object::nearest(object, ray, instance),
-            );
+        self.nearest_by(objects, ray, best, |object, ray, hit| {
+            object::store_nearest(object, ray, ray.instance, hit);
         });
     }
 
     /// Like [`Self::store_nearest_of_ray`], with the statistics of the traversal of objects.
     pub(crate) fn nearest_counted(&self, objects: &Objects, ray: WorldRay<'_>) -> (Hit, Steps) {
         let (mut best, mut steps) = (Hit::MISS, Steps::default());
-        self.nearest_by(
-            objects,
-            ray,
-            &mut best,
-            |&EnteredObject { object, ray: of_object }, instance, hit| {
-                let counted = ray.in_object(
-                    instance,
-                    &of_object.ray,
-                    |start| object::nearest_counted(object, start, instance),
-                    |ray| object::nearest_counted(object, ray, instance),
-                );
-                *hit = counted.0;
-                steps += counted.1;
-            },
-        );
+        self.nearest_by(objects, ray, &mut best, |object, ray, hit| {
+            let counted = object::nearest_counted(object, ray, ray.instance);
+            *hit = counted.0;
+            steps += counted.1;
+        });
         (best, steps)
     }
 
@@ -90,18 +68,18 @@ impl World {
         objects: &Objects,
         world_ray: WorldRay<'_>,
         best: &mut Hit,
-        mut trace: impl FnMut(&EnteredObject<'_>, u32, &mut Hit),
+        mut trace: impl FnMut(&ObjectView<'_>, &RayInInstance<'_>, &mut Hit),
     ) {
         *best = Hit::MISS;
         let ray = world_ray.ray;
         self.enumerate(ray, &mut |instance| {
             // Neither is NaN: for a ray whose `tmax` is, nothing is enumerated.
             let tmax = if best.t < ray.tmax { best.t } else { ray.tmax };
-            let ended = Ray { tmax, ..*ray };
-            let entered = self.enter(objects, instance, WorldRay { ray: &ended, ..world_ray });
+            let (object, of_instance) = self.enter(objects, instance, world_ray, tmax);
             let mut hit = Hit::MISS;
-            trace(&entered, instance, &mut hit);
-            let Some(nearer) = better(ray, best, &hit, entered.ray.t_scale) else { return Some(tmax) };
+            trace(object, &of_instance, &mut hit);
+            let t_scale = of_instance.of_object.t_scale;
+            let Some(nearer) = better(ray, best, &hit, t_scale) else { return Some(tmax) };
             *best = nearer;
             Some(nearer.t)
         });
@@ -111,26 +89,22 @@ impl World {
     #[inline(never)]
     pub(crate) fn any_of_ray(&self, objects: &Objects, ray: WorldRay<'_>) -> bool {
         self.enumerate(ray.ray, &mut |instance| {
-            let entered = self.enter(objects, instance, ray);
-            let object = entered.object;
-            let is_hit = ray.in_object(
-                instance,
-                &entered.ray.ray,
-                |start| object::any(object, start),
-                |ray| object::any(object, ray),
-            );
-            (!is_hit).then_some(ray.ray.tmax)
+            let (object, of_instance) = self.enter(objects, instance, ray, ray.ray.tmax);
+            (!object::any(object, &of_instance)).then_some(ray.ray.tmax)
         })
     }
 
+    /// The object of an instance, and a ray in it that ends at `tmax`.
     #[inline(always)]
-    fn enter<'a>(&self, objects: &'a Objects, instance: u32, world_ray: WorldRay<'a>) -> EnteredObject<'a> {
-        let placement = self.placement(instance);
-        self.mark_traced(placement.object());
-        let start = world_ray.start_in(instance);
-        EnteredObject {
-            object: objects.view(placement.object()),
-            ray: placement.inverse.ray_from(world_ray.ray, start),
-        }
+    fn enter<'a>(
+        &'a self,
+        objects: &'a Objects,
+        instance: u32,
+        ray: WorldRay<'a>,
+        tmax: f32,
+    ) -> (&'a ObjectView<'a>, RayInInstance<'a>) {
+        let object = self.placement(instance).object();
+        self.mark_traced(object);
+        (objects.view(object), RayInInstance::new(self, objects, instance, ray, tmax))
     }
 }

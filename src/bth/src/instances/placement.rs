@@ -1,5 +1,6 @@
 //! An instance in the world: its inverse transform and a conservative world box.
 
+use crate::intersect::origin::{RoundedLine, RoundedOrigin};
 use crate::nodes::affine::{Affine, Inverse};
 use bth_format::error::Code;
 use bth_format::layout::{NONE, Object, WIDTH};
@@ -181,6 +182,29 @@ impl Placement {
             finite &= placement.lower[k].is_finite() & placement.upper[k].is_finite();
         }
         if finite { Ok(placement) } else { Err(PlacementError::NotFinite) }
+    }
+
+    /// Upper bound of the condition number of the transform, rounded.
+    #[inline(always)]
+    pub(crate) fn condition(&self) -> f64 {
+        f64::from(self.origin_slack) / ROUNDING
+    }
+
+    /// The line in the space of the object, as [`Inverse::line`].
+    #[inline(always)]
+    pub(crate) fn line(&self, line: &RoundedLine) -> RoundedLine {
+        self.inverse.line(self.condition(), line)
+    }
+
+    /// Bounds of the errors of lines in the space of the object, whose origins have coordinates of
+    /// at most `in_world` in world space. `rounded` are origins that were rounded to f32 there.
+    pub(crate) fn line_errors(&self, in_world: f64, rounded: bool) -> [f64; 2] {
+        self.inverse.line_errors(self.condition(), in_world, rounded)
+    }
+
+    /// A point of the object in world space, as [`Inverse::point_in_world`].
+    pub(crate) fn point_in_world(&self, point: RoundedOrigin) -> RoundedOrigin {
+        self.inverse.point_in_world(self.condition(), point)
     }
 
     /// Index of the object.

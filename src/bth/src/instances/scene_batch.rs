@@ -2,11 +2,11 @@
 
 use super::World;
 use super::top_level::TopLevel;
-use crate::nodes::affine::ObjectRay;
 use crate::objects::Objects;
 use crate::query::sink::Visit;
-use crate::rays::{Hit, Ray, StartRay};
+use crate::rays::{Hit, Ray};
 use crate::starts::world_ray::{InstanceStart, WorldRay};
+use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 
 /// A batch of rays in world space, and the scene that they go through.
@@ -21,27 +21,8 @@ pub(super) struct SceneBatch<'a> {
 impl<'a> SceneBatch<'a> {
     /// A ray of the batch.
     pub(super) fn world_ray(&self, index: usize) -> WorldRay<'a> {
-        WorldRay { ray: &self.rays[index], start: self.starts.get(index) }
-    }
-
-    /// The ray of a visit in the space of the object, ended at `tmax`.
-    pub(super) fn object_ray(&self, visit: Visit, tmax: f32) -> ObjectRay {
-        let ray = Ray { tmax, ..self.rays[visit.ray as usize] };
-        self.world
-            .placement(visit.instance)
-            .inverse
-            .ray_from(&ray, self.start(visit).map(|start| &start.point))
-    }
-
-    /// Like [`WorldRay::in_object`], for the ray of a visit.
-    pub(super) fn in_object<T>(
-        &self,
-        visit: Visit,
-        ray: &Ray,
-        start: impl FnOnce(&StartRay) -> T,
-        plain: impl FnOnce(&Ray) -> T,
-    ) -> T {
-        self.world_ray(visit.ray as usize).in_object(visit.instance, ray, start, plain)
+        let start = self.starts.get(index).filter(|start| start.instance != NONE);
+        WorldRay { ray: &self.rays[index], start }
     }
 
     /// Where the ray of a visit starts, if that is on a triangle of the instance.

@@ -1,12 +1,14 @@
 //! What a batch of rays through the instances of a scene asks for.
 
 use super::enter_object::ObjectRays;
+use super::lines::{VisitLines, visit_ray};
 use super::scene_batch::{BatchProgress, ObjectVisits, SceneBatch};
-use crate::intersect::start_point::Starts;
+use crate::intersect::exact_ray::Lines;
 use crate::object::{self, Scratch};
 use crate::query::better;
 use crate::query::sink::{Answers, SceneRays, Sink};
 use crate::rays::Hit;
+use bth_format::object::ObjectView;
 
 /// A query over the rays of a batch. The kernels are compiled once for all.
 pub(super) trait SceneQuery {
@@ -38,8 +40,10 @@ fn trace_visits(
 ) {
     let scene = SceneRays { rays: batch.rays, visits, t_scale: &object_rays.t_scale };
     let sink = Sink::of_scene(object.triangle_ids, answers, scene);
-    let mut sink = sink.with_starts(Starts(&object_rays.starts));
-    object::trace_batch(object, &object_rays.rays, None, scratch, &mut sink);
+    let lines = VisitLines { batch, visits, t_scale: &object_rays.t_scale };
+    let mut sink = sink.with_lines(Lines::World(&lines, 0));
+    let object = ObjectView { bounds: object_rays.bounds, ..*object };
+    object::trace_batch(&object, &object_rays.rays, None, scratch, &mut sink);
 }
 
 /// The query for the nearest hits.
@@ -58,14 +62,10 @@ impl SceneQuery for SceneNearest<'_> {
     fn trace_one_by_one(&mut self, ObjectVisits { batch, object, visits }: ObjectVisits<'_>) {
         for &visit in visits {
             let i = visit.ray as usize;
-            let ray = batch.object_ray(visit, batch.rays[i].tmax.min(self.hits[i].t));
-            let hit = batch.in_object(
-                visit,
-                &ray.ray,
-                |start| object::nearest(object, start, visit.instance),
-                |ray| object::nearest(object, ray, visit.instance),
-            );
-            self.hits[i] = better(&batch.rays[i], &self.hits[i], &hit, ray.t_scale).unwrap_or(self.hits[i]);
+            let ray = visit_ray(batch, visit, batch.rays[i].tmax.min(self.hits[i].t));
+            let hit = object::nearest(object, &ray, visit.instance);
+            let t_scale = ray.of_object.t_scale;
+            self.hits[i] = better(&batch.rays[i], &self.hits[i], &hit, t_scale).unwrap_or(self.hits[i]);
         }
     }
     fn trace_placed(&mut self, of_object: ObjectVisits<'_>, object_rays: &ObjectRays) {
@@ -89,13 +89,7 @@ impl SceneQuery for SceneAny<'_> {
     fn trace_one_by_one(&mut self, ObjectVisits { batch, object, visits }: ObjectVisits<'_>) {
         for &visit in visits {
             let i = visit.ray as usize;
-            let ray = batch.object_ray(visit, batch.rays[i].tmax);
-            self.found[i] |= batch.in_object(
-                visit,
-                &ray.ray,
-                |start| object::any(object, start),
-                |ray| object::any(object, ray),
-            );
+            self.found[i] |= object::any(object, &visit_ray(batch, visit, batch.rays[i].tmax));
         }
     }
     fn trace_placed(&mut self, of_object: ObjectVisits<'_>, object_rays: &ObjectRays) {

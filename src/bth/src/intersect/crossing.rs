@@ -40,6 +40,7 @@
 //! and 2^520.
 
 use crate::intersect::exact::{Estimate, RATIO_ERROR, estimate};
+use crate::intersect::exact_ray::WorldLines;
 use crate::intersect::start::ExactStart;
 use crate::intersect::start_point::StartPoint;
 use crate::intersect::vector::wide;
@@ -137,6 +138,28 @@ fn start_crossing_by_signs(ray: &Ray, start: &ExactStart, corners: [[f64; 3]; 3]
     determinant.add_edge(a, d, b, c);
     let beyond = first_sign(start.minus_product(&volume, &determinant, tmax), order_gradient(corners));
     if passed * beyond < 0 { passed } else { 0 }
+}
+
+/// Like [`crossing`], for a line in world space and a range of t in the units of its line.
+pub(crate) fn crossing_in_world(
+    (lines, ray): (&dyn WorldLines, usize),
+    [tmin, tmax]: [f64; 2],
+    corners: [[f64; 3]; 3],
+) -> i32 {
+    let (line, from_start) = (lines.line(ray), lines.are_from_starts());
+    match estimate(line, line.direction, corners) {
+        Estimate::Missed => return 0,
+        Estimate::Intersects(found) => {
+            let error = 2.0 * RATIO_ERROR * found.t.abs();
+            let after = if from_start { found.t > 0.0 } else { found.t - tmin > error };
+            if after && tmax - found.t > error {
+                return sign(found.weight[2]);
+            }
+        }
+        Estimate::Open(_, [_, last]) if from_start && last <= 0.0 => return 0,
+        Estimate::Open(..) => {}
+    }
+    lines.exact(ray).crossing(corners, [tmin, tmax], from_start)
 }
 
 /// The sign of a number that is not NaN.

@@ -89,6 +89,13 @@ pub(crate) struct UncertainWeights {
     bound: f64,
 }
 
+impl UncertainWeights {
+    /// The intersection in f64, if only the signs of weights are uncertain.
+    pub(crate) fn if_accurate(&self) -> Option<Intersection> {
+        self.rounded.is_accurate.then(|| self.rounded.intersection())
+    }
+}
+
 /// Scalar product that does not depend on the order of the axes: the largest of the sums in three
 /// orders. t is computed from such products, so it has the same bits after model and rays are
 /// rotated by a multiple of 90° about a coordinate axis, and the choice between equal hits does not
@@ -133,7 +140,7 @@ impl OriginTerms {
         let volume = unordered_scalar_product(offset, normal);
         let (distance, edge) = (max_norm(offset), greater(max_norm(second), max_norm(third)));
         let error = [WEIGHT_ERROR * (edge * (edge + distance)), WEIGHT_ERROR * (distance * (edge * edge))];
-        let error = origin.enlarge(error, edge);
+        let error = origin.enlarge(error, edge, distance);
         let is_accurate = INVERSE_RATIO_ERROR * error[1] < volume.abs();
         let terms = OriginTerms {
             normal,

@@ -4,7 +4,7 @@
 use crate::intersect::exact::{
     Intersection, OriginTerms, RoundedIntersection, certain_intersection, reported, reported_barycentric,
 };
-use crate::intersect::origin::RoundedOrigin;
+use crate::intersect::exact_ray::LineLanes;
 use crate::intersect::vector::{max_norm, wide};
 use crate::simd::{LANES, Simd};
 
@@ -124,30 +124,18 @@ impl Intersections {
         self.set_masks(s, lanes, &accurate);
     }
 
-    /// Like [`Self::compute`], for rays whose origins f64 does not hold exactly; `pairs.origin` is
-    /// not read.
+    /// Like [`Self::compute`], for lines that f64 may not hold exactly; of `pairs` only the corners
+    /// are read.
     #[inline(always)]
-    pub(crate) fn compute_from<S: Simd>(
-        &mut self,
-        s: S,
-        lanes: u32,
-        origins: &[RoundedOrigin; LANES],
-        pairs: &Pairs,
-    ) {
-        let Pairs { direction, corner, .. } = pairs;
-        let (mut point, mut error) = ([[0.0; LANES]; 3], [0.0; LANES]);
-        for i in 0..LANES {
-            let RoundedOrigin([x, y, z], off) = origins[i];
-            (point[0][i], point[1][i], point[2][i], error[i]) = (x, y, z, off);
-        }
+    pub(crate) fn compute_lines<S: Simd>(&mut self, s: S, lanes: u32, lines: &LineLanes, pairs: &Pairs) {
+        let Pairs { corner, .. } = pairs;
         let mut accurate = [0; LANES];
         // There are no branches in this loop, so that the compiler vectorizes it.
         for i in 0..LANES {
             let corners = [lane(&corner[0], i), lane(&corner[1], i), lane(&corner[2], i)];
-            let direction = lane(direction, i);
-            let origin = RoundedOrigin([point[0][i], point[1][i], point[2][i]], error[i]);
-            let terms = OriginTerms::new(origin, corners);
-            let rounded = RoundedIntersection::new(&terms, direction, max_norm(direction));
+            let line = lines.get(i);
+            let terms = OriginTerms::new(line, corners);
+            let rounded = RoundedIntersection::new(&terms, line.direction, max_norm(line.direction));
             self.store_lane(i, &rounded, &mut accurate);
         }
         self.set_masks(s, lanes, &accurate);

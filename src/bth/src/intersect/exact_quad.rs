@@ -11,7 +11,7 @@ pub(crate) trait QuadOrigin: Copy {
     /// coordinate of the origin along the same axis.
     fn with_corner<D: Doubles>(self, s: D, corner: f32, axis: usize) -> D::V;
     /// Like [`Origin::enlarge`].
-    fn enlarge(self, error: [f64; 2], edge: f64) -> [f64; 2];
+    fn enlarge(self, error: [f64; 2], edge: f64, distance: f64) -> [f64; 2];
 }
 
 impl QuadOrigin for [f32; 3] {
@@ -20,7 +20,7 @@ impl QuadOrigin for [f32; 3] {
         s.widen([a, a, self[axis], a])
     }
     #[inline(always)]
-    fn enlarge(self, error: [f64; 2], _edge: f64) -> [f64; 2] {
+    fn enlarge(self, error: [f64; 2], _edge: f64, _distance: f64) -> [f64; 2] {
         error
     }
 }
@@ -32,8 +32,8 @@ impl QuadOrigin for RoundedOrigin {
         s.load([a, a, self.0[axis], a])
     }
     #[inline(always)]
-    fn enlarge(self, error: [f64; 2], edge: f64) -> [f64; 2] {
-        Origin::enlarge(self, error, edge)
+    fn enlarge(self, error: [f64; 2], edge: f64, distance: f64) -> [f64; 2] {
+        Origin::enlarge(self, error, edge, distance)
     }
 }
 
@@ -62,7 +62,7 @@ pub(crate) fn rounded_intersection<D: Doubles>(
     let [edge_b, edge_c, distance, _] = s.array(s.max(s.max(s.abs(left[0]), s.abs(left[1])), s.abs(left[2])));
     let edge = if edge_b > edge_c { edge_b } else { edge_c };
     let error = [WEIGHT_ERROR * (edge * (edge + distance)), WEIGHT_ERROR * (distance * (edge * edge))];
-    let error = origin.enlarge(error, edge);
+    let error = origin.enlarge(error, edge, distance);
     let inverse = 1.0 / determinant;
     RoundedIntersection {
         weight: [second, third, determinant],

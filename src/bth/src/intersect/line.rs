@@ -7,9 +7,7 @@
 //! with triangles is decided exactly in [`super::exact`]; a line in the plane of a triangle misses
 //! it.
 
-use super::origin::RoundedOrigin;
-use super::start_point::StartPoint;
-use super::vector::wide;
+use super::origin::{RoundedLine, RoundedOrigin};
 use crate::rays::Ray;
 
 /// Error up to which f64 values are taken: 2^-28, an eighth of the rounding of f32, relative to 1
@@ -42,8 +40,10 @@ pub(crate) struct Line {
     pub(crate) shear: [f64; 2],
     /// `1 / direction[axis[2]]`, the factor from depth to t.
     pub(crate) inverse_depth: f64,
-    /// Bound of the error of the coordinates of `origin`; 0 unless the ray starts on a triangle.
-    pub(crate) origin_error: f64,
+    /// Bounds of the errors of `origin` and `direction`, as in [`RoundedLine`]; 0 where a ray of f32
+    /// holds the line.
+    origin_error: f64,
+    direction_error: f64,
 }
 
 /// A point projected along the line.
@@ -80,7 +80,12 @@ fn cross(p: &Projected, q: &Projected) -> f64 {
 impl Line {
     /// None if the ray has no line, because a component is not finite or the direction is zero.
     pub(crate) fn new(ray: &Ray) -> Option<Line> {
-        let (origin, direction) = (wide(ray.origin), wide(ray.direction));
+        Line::of(&RoundedLine::of_ray(ray))
+    }
+
+    /// The line of a ray as f64 knows it; `None` as for [`Self::new`].
+    pub(crate) fn of(line: &RoundedLine) -> Option<Line> {
+        let &RoundedLine { origin: RoundedOrigin(origin, origin_error), direction, direction_error } = line;
         let finite = origin.iter().chain(&direction).all(|x| x.is_finite());
         let size = direction.map(f64::abs);
         let z = if size[0] > size[1] && size[0] > size[2] {
@@ -105,20 +110,20 @@ impl Line {
             axis: [x, y, z],
             shear: [direction[x] * inverse_depth, direction[y] * inverse_depth],
             inverse_depth,
-            origin_error: 0.0,
+            origin_error,
+            direction_error,
         })
     }
 
-    /// Moves the origin to a start on a triangle, where f64 may not hold it exactly.
-    pub(crate) fn start_at(&mut self, start: &StartPoint) {
-        let RoundedOrigin(point, error) = start.origin;
-        (self.origin, self.origin_error) = (point, error);
+    /// By how much a t, or a t no farther from 0, may be off because of the errors of the line.
+    #[inline(always)]
+    fn t_error(&self, t: f64) -> f64 {
+        self.origin_error * self.inverse_depth.abs() + 4.0 * self.direction_error * t.abs()
     }
 
-    /// By how much t may be off because of the origin.
-    #[inline(always)]
-    fn t_error(&self) -> f64 {
-        self.origin_error * self.inverse_depth.abs()
+    /// The origin, rounded, and a bound of its error.
+    pub(crate) fn rounded_origin(&self) -> RoundedOrigin {
+        RoundedOrigin(self.origin, self.origin_error)
     }
 
     /// Projects a point. Let u = 2^-53 and R the largest |coordinate| of point - origin. The
@@ -131,11 +136,19 @@ impl Line {
         Projected { x: x - self.shear[0] * z, y: y - self.shear[1] * z, depth: z }
     }
 
-    /// Bound on the error of x and y of [`Self::project`], for points whose distance from the
-    /// origin in the maximum norm does not exceed `reach`.
+    /// Bound on the error of x and y of [`Self::project`] for a line without errors, for points
+    /// whose distance from the origin in the maximum norm does not exceed `reach`.
     #[inline(always)]
     pub(crate) fn projection_error(reach: f64) -> f64 {
         F64_PROJECTION_ERROR * reach
+    }
+
+    /// The same for this line. An error of the origin moves x and y by at most twice that much,
+    /// since slopes are at most 1; one of the direction changes slopes by at most three times as
+    /// much.
+    pub(crate) fn own_projection_error(&self, reach: f64) -> f64 {
+        let reach = reach + self.origin_error;
+        Line::projection_error(reach) + 2.0 * self.origin_error + 4.0 * self.direction_error * reach
     }
 
     /// Largest |coordinate| of any point of a box relative to the origin.
@@ -166,8 +179,9 @@ impl Line {
     #[inline(always)]
     pub(crate) fn t_range(&self, corners: [&Projected; 3]) -> (f64, f64) {
         let t = corners.map(|p| p.depth * self.inverse_depth);
-        let off = self.t_error();
-        (t[0].min(t[1]).min(t[2]) - off, t[0].max(t[1]).max(t[2]) + off)
+        let (least, greatest) = (t[0].min(t[1]).min(t[2]), t[0].max(t[1]).max(t[2]));
+        let off = self.t_error(least.abs().max(greatest.abs()));
+        (least - off, greatest + off)
     }
 
     /// Returns true if the corners of a triangle that the line certainly crosses are clockwise
@@ -180,7 +194,8 @@ impl Line {
     /// the error of the projected coordinates.
     pub(crate) fn t_before(&self, corners: [&Projected; 3], error: f64) -> f64 {
         let (depth, shift) = Self::depth_of_crossing(corners, error);
-        depth * self.inverse_depth - shift * self.inverse_depth.abs() - self.t_error()
+        let t = depth * self.inverse_depth;
+        t - shift * self.inverse_depth.abs() - self.t_error(t)
     }
 
     /// The depth at which the line crosses a triangle that it certainly crosses, and a bound of its

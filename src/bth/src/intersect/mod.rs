@@ -8,6 +8,10 @@
 //! that shared edges count once. [`mod@line`] projects points along a ray in f64, and [`prepare`]
 //! computes the per-ray constants of the box test and of the filter.
 //!
+//! Rays through instances are lines in world space, which f32 and f64 only approximate in the space
+//! of an object: [`exact_ray`] names where a line is known, [`origin`] bounds what f64 knows of it,
+//! and [`exact_line`] decides in world space.
+//!
 //! The distance of a point to boxes and triangles is bounded in f32 in the same way
 //! ([`point_lanes`]) and decided in f64 ([`point_triangle`]) or exactly ([`point_exact`]).
 //! [`triangle_box`] decides if triangles and boxes overlap. Points, boxes and corners that are no
@@ -19,7 +23,9 @@ pub(crate) mod crossing;
 pub(crate) mod edge_functions;
 pub(crate) mod exact;
 pub(crate) mod exact_lanes;
+pub(crate) mod exact_line;
 pub(crate) mod exact_quad;
+pub(crate) mod exact_ray;
 pub(crate) mod filter;
 pub(crate) mod line;
 pub(crate) mod origin;
@@ -29,7 +35,6 @@ pub(crate) mod point_lanes;
 pub(crate) mod point_triangle;
 pub(crate) mod prepare;
 pub(crate) mod region_box;
-pub(crate) mod segment;
 pub(crate) mod start;
 pub(crate) mod start_point;
 pub(crate) mod triangle_box;

@@ -1,26 +1,32 @@
-//! Origins of rays in f64, as far as they are known there.
+//! Origins and lines of rays in f64, as far as they are known there.
+
+use super::vector::{max_norm, wide};
+use crate::rays::Ray;
+use bth_format::object::ObjectBounds;
 
 /// The origin of a ray in f64, as far as it is known there.
 pub(crate) trait Origin: Copy {
     fn point(self) -> [f64; 3];
-    /// Adds to bounds of the errors of weights and of the volume what the error of the origin adds,
-    /// for a triangle whose edges have no component larger than `edge`.
-    fn enlarge(self, error: [f64; 2], edge: f64) -> [f64; 2];
+    /// Adds to bounds of the errors of weights, for a direction whose max |component| is 1, and of
+    /// the volume what the error of the ray adds. No edge of the triangle has a component larger
+    /// than `edge`, and its first corner lies within `distance` of the origin along each axis.
+    fn enlarge(self, error: [f64; 2], edge: f64, distance: f64) -> [f64; 2];
 }
 
-/// An origin that f64 holds exactly.
+/// An origin that f64 holds exactly, of a ray whose direction it holds exactly, too.
 impl Origin for [f64; 3] {
     #[inline(always)]
     fn point(self) -> [f64; 3] {
         self
     }
     #[inline(always)]
-    fn enlarge(self, error: [f64; 2], _edge: f64) -> [f64; 2] {
+    fn enlarge(self, error: [f64; 2], _edge: f64, _distance: f64) -> [f64; 2] {
         error
     }
 }
 
-/// An origin that was rounded to f64, and a bound of the error of its coordinates.
+/// An origin that was rounded to f64, and a bound of the error of its coordinates. The direction is
+/// exact.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RoundedOrigin(pub(crate) [f64; 3], pub(crate) f64);
 
@@ -33,7 +39,70 @@ impl Origin for RoundedOrigin {
     /// determinant of the direction, an edge and the origin, by at most 6Dme; the weight of the
     /// first by the sum of both changes, 12Dme; and the volume by 6m²e.
     #[inline(always)]
-    fn enlarge(self, [weight, volume]: [f64; 2], edge: f64) -> [f64; 2] {
+    fn enlarge(self, [weight, volume]: [f64; 2], edge: f64, _distance: f64) -> [f64; 2] {
         [weight + self.1 * (16.0 * edge), volume + self.1 * (8.0 * (edge * edge))]
+    }
+}
+
+/// A line that was rounded to f64.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RoundedLine {
+    pub(crate) origin: RoundedOrigin,
+    pub(crate) direction: [f64; 3],
+    /// Bound of the error of the direction's components, relative to the largest |component|.
+    pub(crate) direction_error: f64,
+}
+
+impl Origin for RoundedLine {
+    #[inline(always)]
+    fn point(self) -> [f64; 3] {
+        self.origin.0
+    }
+    /// An error of δD of each component of the direction changes the determinant by at most 6δDm²,
+    /// the weights of the second and the third corner by 6δDmr and the weight of the first by
+    /// 12δDm(m+r), where r is the distance from the true origin.
+    #[inline(always)]
+    fn enlarge(self, error: [f64; 2], edge: f64, distance: f64) -> [f64; 2] {
+        let [weight, volume] = self.origin.enlarge(error, edge, distance);
+        let reach = edge + distance + self.origin.1;
+        [weight + self.direction_error * (16.0 * edge * reach), volume]
+    }
+}
+
+/// Components beyond this range could make products overflow or underflow in f64.
+const SAFE: std::ops::Range<f64> = 1.0 / POWER..POWER;
+/// 2^300.
+const POWER: f64 = f64::from_bits((1023 + 300) << 52);
+
+impl RoundedLine {
+    /// The line of a ray of f32.
+    #[inline(always)]
+    pub(crate) fn of_ray(ray: &Ray) -> RoundedLine {
+        RoundedLine {
+            origin: RoundedOrigin(wide(ray.origin), 0.0),
+            direction: wide(ray.direction),
+            direction_error: 0.0,
+        }
+    }
+
+    /// The same line with a direction that is a power of two times as long.
+    pub(crate) fn with_direction_times(mut self, factor: f64) -> RoundedLine {
+        self.direction = self.direction.map(|x| x * factor);
+        self
+    }
+
+    /// The bounds for which the ray of f32 is prepared that approximates this line in the space of
+    /// an object with bounds `of`.
+    #[inline(always)]
+    pub(crate) fn bounds(&self, of: &ObjectBounds) -> ObjectBounds {
+        of.for_lines(max_norm(self.origin.0), self.origin.1, self.direction_error)
+    }
+
+    /// The same line; f64 decides nothing about it where products could leave its range.
+    #[inline(always)]
+    pub(crate) fn or_unknown(mut self) -> RoundedLine {
+        let is_safe = max_norm(self.origin.0) < POWER && SAFE.contains(&max_norm(self.direction));
+        self.origin.1 = if is_safe { self.origin.1 } else { f64::INFINITY };
+        self
     }
 }

@@ -167,8 +167,7 @@ impl ExactStart {
     /// The intersection of the ray along `line` from this start with a triangle of these corners,
     /// if it is at t > 0.
     pub(crate) fn intersection(&self, line: &Line, corners: [[f32; 3]; 3]) -> Option<Intersection> {
-        let origin = RoundedOrigin(line.origin, line.origin_error);
-        match decide_start(origin, line.direction, corners.map(wide)) {
+        match decide_start(line.rounded_origin(), line.direction, corners.map(wide)) {
             StartDecision::Certain(found) => found,
             StartDecision::Open(uncertain, _) => {
                 decide_start_exactly(self, line.direction, corners, &uncertain)

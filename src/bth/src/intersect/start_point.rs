@@ -2,12 +2,7 @@
 
 use super::origin::RoundedOrigin;
 use super::vector::wide;
-use crate::rays::Ray;
-use bth_format::layout::{NONE, WIDTH};
-
-/// A ray as decisions in f64 need it: with the exact point at which it starts, if it starts on a
-/// triangle of the object.
-pub(crate) type ExactRay<'r> = (&'r Ray, Option<&'r StartPoint>);
+use bth_format::layout::NONE;
 
 /// Where a ray of a batch starts, in the space of the object.
 #[derive(Clone, Copy, Debug)]
@@ -36,41 +31,7 @@ impl StartPoint {
     pub(crate) fn is_on_triangle(&self) -> bool {
         self.leaf != NONE
     }
-}
 
-/// The bit of the triangle on which a ray starts if it is in the leaf with this child code: a ray
-/// does not hit it.
-#[inline(always)]
-pub(crate) fn own_triangle(start: Option<&StartPoint>, leaf: u32) -> u32 {
-    start.filter(|start| start.leaf == leaf).map_or(0, |start| 1 << (start.slot % WIDTH as u32))
-}
-
-/// The starts of the rays of a batch; empty where all of them start at their f32 origins.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Starts<'a>(pub(crate) &'a [StartPoint]);
-
-impl<'a> Starts<'a> {
-    pub(crate) const NONE: Starts<'static> = Starts(&[]);
-
-    /// The start of a ray, if it is on a triangle of the object.
-    #[inline(always)]
-    pub(crate) fn of(self, ray: usize) -> Option<&'a StartPoint> {
-        self.0.get(ray).filter(|start| start.is_on_triangle())
-    }
-
-    #[inline(always)]
-    pub(crate) fn is_empty(self) -> bool {
-        self.0.is_empty()
-    }
-
-    /// The starts of the rays from `first` on.
-    #[inline(always)]
-    pub(crate) fn from(self, first: usize) -> Starts<'a> {
-        Starts(self.0.get(first..).unwrap_or(&[]))
-    }
-}
-
-impl StartPoint {
     /// The point, rounded to f32.
     #[inline(always)]
     pub(crate) fn rounded(&self) -> [f32; 3] {

@@ -1,13 +1,21 @@
 //! Affine transforms in f64, and their inverses for rays.
 
-use crate::intersect::start_point::StartPoint;
+use crate::intersect::origin::{RoundedLine, RoundedOrigin};
+use crate::intersect::vector::max_norm;
 use crate::rays::Ray;
 use crate::simd::LANES;
 use bth_format::layout::Node;
 
 /// Max condition number, in the maximum norm, of transforms that are not treated as singular.
-/// Beyond it the rounding of rays to f32 in object space, 2^-24, would be as large as the object.
+/// Beyond it f32 would leave out nothing in object space.
 const GREATEST_CONDITION: f64 = (1u64 << 24) as f64;
+/// 2^-50: bound of the residual I - LA that is computed for the inverse L of A, relative to the
+/// condition number. Its own roundings are at most half of it, so the error of L is below twice
+/// this, relative to the condition number and the norm of L.
+const RESIDUAL: f64 = 1.0 / (1u64 << 50) as f64;
+/// 2^-47: bounds the error of the inverse, twice [`RESIDUAL`], and eight roundings of f64 in the
+/// transform of a vector.
+const LINE_ERROR: f64 = 1.0 / (1u64 << 47) as f64;
 
 /// An affine transform: a point p is mapped to `linear * p + translation`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,6 +66,28 @@ fn scaled(rows: &[[f64; 3]; 3], factor: f64) -> [[f64; 3]; 3] {
         }
     }
     product
+}
+
+/// I - LA.
+#[inline(always)]
+fn residual(l: &[[f64; 3]; 3], a: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
+    let mut rest = [[0.0; 3]; 3];
+    for i in 0..3 {
+        for j in 0..3 {
+            let unit = if i == j { 1.0 } else { 0.0 };
+            rest[i][j] = unit - (l[i][0] * a[0][j] + l[i][1] * a[1][j] + l[i][2] * a[2][j]);
+        }
+    }
+    rest
+}
+
+/// The inverse L of A after a step of Newton's method, L + (I - LA)L, for ill-conditioned A.
+#[cold]
+#[inline(never)]
+fn refined(l: [[f64; 3]; 3], a: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
+    let rest = residual(&l, a);
+    let column = |j: usize| [0, 1, 2].map(|k: usize| l[k][j]);
+    [0, 1, 2].map(|i: usize| [0, 1, 2].map(|j: usize| l[i][j] + dot(rest[i], column(j))))
 }
 
 impl Affine {
@@ -167,6 +197,12 @@ impl Affine {
             return None;
         }
         let condition = norm(&[a, b, c]) * norm(&linear);
+        if norm(&residual(&linear, &[a, b, c])) > RESIDUAL * condition {
+            linear = refined(linear, &[a, b, c]);
+            if !(norm(&residual(&linear, &[a, b, c])) <= RESIDUAL * condition) {
+                return None;
+            }
+        }
         let linear = scaled(&linear, scale);
         let inverse = Inverse { linear, origin: self.translation };
         (condition <= GREATEST_CONDITION && norm(&linear).is_finite()).then_some((inverse, condition))
@@ -215,19 +251,38 @@ impl RayLanes {
 /// A ray in an object's space.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ObjectRay {
+    /// Each number rounded to f32.
     pub(crate) ray: Ray,
+    pub(crate) line: RoundedLine,
     /// Factor from t in object space to t in world space, a power of two: 1 unless the direction
     /// would leave the range of f32.
     pub(crate) t_scale: f32,
 }
 
 impl ObjectRay {
-    /// The ray with the ends of the range of `world`, the same ray in world space, as they are: for
-    /// t that are compared with them exactly. The range of [`Self::ray`] reaches to all t that are
-    /// rounded to its ends in world space.
-    pub(crate) fn with_exact_range(&self, world: &Ray) -> Ray {
-        let end = |t: f32| (f64::from(t) / f64::from(self.t_scale)) as f32;
-        Ray { tmin: end(world.tmin), tmax: end(world.tmax), ..self.ray }
+    /// A ray on a line of the object's space; `tmin` and `tmax` are in world space.
+    #[inline(always)]
+    pub(crate) fn of(line: RoundedLine, tmin: f32, tmax: f32) -> ObjectRay {
+        let origin = line.origin.0.map(|x| x as f32);
+        let exponent = (max_norm(line.direction).to_bits() >> 52) as i32 - 1023;
+        if exponent.abs() <= MAX_EXPONENT {
+            let direction = line.direction.map(|x| x as f32);
+            return ObjectRay { ray: Ray { origin, direction, tmin, tmax }, line, t_scale: 1.0 };
+        }
+        ObjectRay::scaled(line, origin, exponent, [tmin, tmax])
+    }
+
+    /// The ray where its direction must be scaled.
+    #[cold]
+    fn scaled(line: RoundedLine, origin: [f32; 3], exponent: i32, [tmin, tmax]: [f32; 2]) -> ObjectRay {
+        // The clamp keeps the scale itself in the range of f32.
+        let exponent = exponent.clamp(-100, 100);
+        let scale = f64::from_bits(((1023 + exponent) as u64) << 52);
+        let line = line.with_direction_times(1.0 / scale);
+        let direction = line.direction.map(|x| x as f32);
+        let t_scale = (1.0 / scale) as f32;
+        let (tmin, tmax) = (-greatest_below(-tmin, scale, t_scale), greatest_below(tmax, scale, t_scale));
+        ObjectRay { ray: Ray { origin, direction, tmin, tmax }, line, t_scale }
     }
 }
 
@@ -251,56 +306,70 @@ impl Inverse {
         self.linear == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] && self.origin == [0.0; 3]
     }
 
-    /// Transforms a ray to object space, with the same points at the same t except for one rounding
-    /// to f32 of each component of origin and direction (relative 2^-24). All triangles of an
-    /// object are tested with the same rounded ray, so there are no leaks within an object. Where
-    /// two objects touch, answers may differ by that rounding from those for one joined object.
-    pub(crate) fn ray(&self, ray: &Ray) -> ObjectRay {
-        let relative = [0, 1, 2].map(|k| f64::from(ray.origin[k]) - self.origin[k]);
-        let direction = ray.direction.map(f64::from);
-        let origin = self.linear.map(|row| dot(row, relative) as f32);
-        let direction = self.linear.map(|row| dot(row, direction));
-        let greatest = direction.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-        let exponent = (greatest.to_bits() >> 52) as i32 - 1023;
-        if exponent.abs() <= MAX_EXPONENT {
-            let direction = direction.map(|x| x as f32);
-            return ObjectRay { ray: Ray { origin, direction, ..*ray }, t_scale: 1.0 };
+    /// Transforms a line of world space to object space, with the same points at the same t.
+    /// `condition` is a bound of the condition number.
+    ///
+    /// Let L be this inverse, E its error and u = 2^-53. The difference p of origins and its
+    /// product with L are off by at most 8u|L||p| by roundings and by |E||p|, in the maximum norm.
+    #[inline(always)]
+    pub(crate) fn line(&self, condition: f64, line: &RoundedLine) -> RoundedLine {
+        let RoundedLine { origin: RoundedOrigin(point, off), direction, direction_error } = *line;
+        let (mut relative, mut origin, mut of_object) = ([0.0; 3], [0.0; 3], [0.0; 3]);
+        for k in 0..3 {
+            relative[k] = point[k] - self.origin[k];
         }
-        // The clamp keeps the scale itself in the range of f32.
-        let exponent = exponent.clamp(-100, 100);
-        let scale = f64::from_bits(((1023 + exponent) as u64) << 52);
-        let direction = direction.map(|x| (x / scale) as f32);
-        let t_scale = (1.0 / scale) as f32;
-        let (tmin, tmax) =
-            (-greatest_below(-ray.tmin, scale, t_scale), greatest_below(ray.tmax, scale, t_scale));
-        ObjectRay { ray: Ray { origin, direction, tmin, tmax }, t_scale }
+        for k in 0..3 {
+            origin[k] = dot(self.linear[k], relative);
+            of_object[k] = dot(self.linear[k], direction);
+        }
+        // Where object space is world space, nothing is rounded.
+        let relative_error = if self.is_identity() { 0.0 } else { LINE_ERROR * condition };
+        let norm = norm(&self.linear);
+        let origin_error = norm * (max_norm(relative) * relative_error + 1.01 * off);
+        let stretched = norm * max_norm(direction) / max_norm(of_object);
+        RoundedLine {
+            origin: RoundedOrigin(origin, origin_error),
+            direction: of_object,
+            direction_error: stretched * (relative_error + 1.01 * direction_error),
+        }
+        .or_unknown()
     }
 
-    /// A point of object space in world space, with rounding errors of f64: the solution of the
-    /// three equations by Cramer's rule.
-    pub(crate) fn point_in_world(&self, point: [f64; 3]) -> [f64; 3] {
+    /// Bounds of the errors of any lines that [`Self::line`] returns for origins with coordinates
+    /// of at most `in_world` and exact directions. The direction in object space is at least 1/κ of
+    /// |L| times the direction in world space.
+    pub(crate) fn line_errors(&self, condition: f64, in_world: f64, rounded: bool) -> [f64; 2] {
+        /// Half a unit in the last place of f32, relative.
+        const ROUNDED: f64 = 1.0 / (1u64 << 24) as f64;
+        let off = if rounded { 1.01 * ROUNDED * in_world } else { 0.0 };
+        let relative = in_world + max_norm(self.origin);
+        let origin_error = norm(&self.linear) * (relative * LINE_ERROR * condition + off);
+        [origin_error, 2.0 * LINE_ERROR * condition * condition]
+    }
+
+    /// A point of object space in world space: the solution of the three equations by Cramer's
+    /// rule. `condition` as for [`Self::line`].
+    ///
+    /// The residual of the solution x bounds its error: |A| (|p - Lx| + 8u|L||x|), and |E| adds
+    /// [`LINE_ERROR`] · κ |x|, where |A| ≤ κ / |L|.
+    pub(crate) fn point_in_world(&self, condition: f64, point: RoundedOrigin) -> RoundedOrigin {
+        let RoundedOrigin(point, off) = point;
         let [a, b, c] = self.linear;
         let cofactors = [cross(b, c), cross(c, a), cross(a, b)];
         let determinant = dot(a, cofactors[0]);
-        [0, 1, 2].map(|k| {
+        let x = [0, 1, 2].map(|k| {
             let sum = point[0] * cofactors[0][k] + point[1] * cofactors[1][k] + point[2] * cofactors[2][k];
-            self.origin[k] + sum / determinant
-        })
+            sum / determinant
+        });
+        let rest = max_norm([0, 1, 2].map(|k| point[k] - dot(self.linear[k], x)));
+        let error =
+            condition / norm(&self.linear) * (rest + off) + 4.0 * LINE_ERROR * condition * max_norm(x);
+        let world = [0, 1, 2].map(|k| self.origin[k] + x[k]);
+        RoundedOrigin(world, 1.01 * error + max_norm(world) * f64::EPSILON)
     }
 
-    /// Like [`Self::ray`], for a ray that may start on a triangle of the object: then its origin is
-    /// that start, rounded.
-    #[inline(always)]
-    pub(crate) fn ray_from(&self, ray: &Ray, start: Option<&StartPoint>) -> ObjectRay {
-        let mut of_object = self.ray(ray);
-        if let Some(start) = start {
-            of_object.ray.origin = start.rounded();
-        }
-        of_object
-    }
-
-    /// Like [`Self::ray`] for sixteen rays, with the same bits. The results of lanes that are not
-    /// `unscaled` are not valid.
+    /// Like [`Self::line`] and [`ObjectRay::of`] for sixteen rays of f32, rounded to f32. The
+    /// results of lanes that are not `unscaled` are not valid.
     #[inline(always)]
     pub(crate) fn transform(&self, lanes: &mut RayLanes) {
         let RayLanes { origin, direction, unscaled } = lanes;

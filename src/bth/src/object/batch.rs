@@ -6,7 +6,7 @@ use super::{any, nearest};
 use crate::bvh::interleaved::Interleaved;
 use crate::bvh::nodes::is_large;
 use crate::bvh::packet::{MinimumUse, Packets};
-use crate::intersect::start_point::Starts;
+use crate::intersect::exact_ray::Lines;
 use crate::query::sink::{Answers, Sink};
 use crate::query::with_batch_goal;
 use crate::rays::{Ray, StartRay};
@@ -38,15 +38,16 @@ pub(crate) fn trace_batch(
     if Isa::chosen() == Isa::Scalar {
         return one_by_one(object, rays, order, sink);
     }
-    let (starts, mut with_starts) = (sink.starts(), None);
-    let object = match starts.is_empty() {
-        true => object,
-        false => with_starts.insert(ObjectView { bounds: object.start_bounds, ..*object }),
+    let (lines, mut with_starts) = (sink.lines(), None);
+    let object = match lines {
+        // The caller has set the bounds of lines in world space.
+        Lines::Rays | Lines::World(..) => object,
+        Lines::Starts(_) => with_starts.insert(ObjectView { bounds: object.start_bounds, ..*object }),
     };
     if order.is_some() {
         // Too few rays are left of most packets.
         through_bvh(object, rays, order, scratch, sink);
-    } else if let (Some(leaf), true) = (shortcuts::whole(object), starts.is_empty()) {
+    } else if let (Some(leaf), true) = (shortcuts::whole(object), lines.are_rays()) {
         through_leaf(object, leaf, rays, scratch, sink);
     } else {
         let packet_rays = in_packets(object, rays, scratch, sink);
@@ -134,7 +135,7 @@ pub(crate) fn trace_starts(
     let PreparedStarts { rays: object_rays, points, order } = &mut prepared;
     let ended = rays.len() - order.len();
     let sink =
-        |answers, points| Sink::new(object.triangle_ids, answers, instance).with_starts(Starts(points));
+        |answers, points| Sink::new(object.triangle_ids, answers, instance).with_lines(Lines::Starts(points));
     if answers.goal().is_any && ended * FEW_ENDED > rays.len() {
         // Most short rays go in packets, also those that are left. No ray is before its place among
         // those that are left.

@@ -3,8 +3,8 @@
 use crate::bvh::certain_hit::store_certain_hit;
 use crate::bvh::single::{RayInObject, SingleQuery, SingleResult, trace_single};
 use crate::bvh::single_stack::SingleStack;
+use crate::intersect::exact_ray::{ExactRay, LineSource};
 use crate::intersect::prepare::PreparedRay;
-use crate::intersect::start_point::ExactRay;
 use crate::intersect::start_point::StartPoint;
 use crate::query::{Count, Goal};
 use crate::rays::{Hit, Ray, StartRay};
@@ -25,7 +25,7 @@ pub(crate) trait SingleRay {
     /// The ray for decisions in f64.
     fn exact<'a>(&'a self, line: &'a Self::Line) -> ExactRay<'a>;
     /// The bounds for which the ray is prepared.
-    fn bounds<'a>(object: &'a ObjectView<'_>) -> &'a ObjectBounds;
+    fn bounds<'a>(object: &'a ObjectView<'_>, line: &'a Self::Line) -> &'a ObjectBounds;
     /// Prepares the ray for boxes and triangles, if f32 can.
     fn prepared<S: Simd>(&self, s: S, line: &Self::Line, bounds: &ObjectBounds) -> Option<PreparedRay>;
 }
@@ -38,10 +38,10 @@ impl SingleRay for Ray {
     }
     #[inline(always)]
     fn exact<'a>(&'a self, _line: &'a ()) -> ExactRay<'a> {
-        (self, None)
+        ExactRay::plain(self)
     }
     #[inline(always)]
-    fn bounds<'a>(object: &'a ObjectView<'_>) -> &'a ObjectBounds {
+    fn bounds<'a>(object: &'a ObjectView<'_>, _line: &'a ()) -> &'a ObjectBounds {
         &object.bounds
     }
     #[inline(always)]
@@ -78,10 +78,10 @@ impl SingleRay for StartRay {
     }
     #[inline(always)]
     fn exact<'a>(&'a self, line: &'a StartLine) -> ExactRay<'a> {
-        (&line.ray, Some(&line.point))
+        ExactRay { ray: &line.ray, line: LineSource::Start(&line.point) }
     }
     #[inline(always)]
-    fn bounds<'a>(object: &'a ObjectView<'_>) -> &'a ObjectBounds {
+    fn bounds<'a>(object: &'a ObjectView<'_>, _line: &'a StartLine) -> &'a ObjectBounds {
         &object.start_bounds
     }
     #[inline(always)]
@@ -138,10 +138,10 @@ impl<G: Goal, C: Count, R: SingleRay> Kernel for &mut SingleKernel<'_, G, C, R> 
             **hit = Hit::MISS;
             return;
         };
-        let (bounds, ray_of_line) = (R::bounds(object), ray.exact(&line));
+        let (bounds, ray_of_line) = (R::bounds(object, &line), ray.exact(&line));
         let prepared = match ray.prepared(s, &line, bounds) {
             Some(prepared) => prepared,
-            None => match PreparedRay::in_f64(bounds, ray_of_line.0) {
+            None => match PreparedRay::in_f64(bounds, ray_of_line.ray) {
                 Some(prepared) => prepared,
                 None => {
                     **hit = Hit::MISS;

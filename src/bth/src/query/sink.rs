@@ -3,7 +3,7 @@
 
 use super::{EitherGoal, Goal, RayQuery, better};
 use crate::intersect::exact_lanes::Intersections;
-use crate::intersect::start_point::Starts;
+use crate::intersect::exact_ray::Lines;
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::simd::{Isa, Kernel, LANES, Simd};
 use bth_format::layout::NONE;
@@ -93,14 +93,14 @@ pub(crate) struct Sink<'a> {
     scene: Option<SceneRays<'a>>,
     /// Index in the batch of the ray with index 0 in calls.
     first: usize,
-    /// Where the rays of the batch start.
-    starts: Starts<'a>,
+    /// The lines of the rays of the batch.
+    lines: Lines<'a>,
 }
 
 impl<'a> Sink<'a> {
     /// Stores the answer of ray i as answer i.
     pub(crate) fn new(ids: &'a [u32], answers: Answers<'a>, instance: u32) -> Self {
-        Sink { ids, answers, instance, scene: None, first: 0, starts: Starts::NONE }
+        Sink { ids, answers, instance, scene: None, first: 0, lines: Lines::Rays }
     }
 
     /// Merges the answer of each visit into the answer of its ray; `answers` belong to the scene's
@@ -109,15 +109,15 @@ impl<'a> Sink<'a> {
         Sink { scene: Some(scene), ..Sink::new(ids, answers, 0) }
     }
 
-    /// The same sink for rays with these starts.
-    pub(crate) fn with_starts(self, starts: Starts<'a>) -> Self {
-        Sink { starts, ..self }
+    /// The same sink for rays with these lines.
+    pub(crate) fn with_lines(self, lines: Lines<'a>) -> Self {
+        Sink { lines, ..self }
     }
 
-    /// Where the rays start, by their index in calls.
+    /// The lines of the rays, by their index in calls.
     #[inline(always)]
-    pub(crate) fn starts(&self) -> Starts<'a> {
-        self.starts.from(self.first)
+    pub(crate) fn lines(&self) -> Lines<'a> {
+        self.lines.from(self.first)
     }
 
     /// What the answers are about.
@@ -129,9 +129,9 @@ impl<'a> Sink<'a> {
     /// A sink for the rays from `first` on, whose indices in calls begin at 0.
     #[inline(always)]
     pub(crate) fn part(&mut self, first: usize) -> Sink<'_> {
-        let (ids, instance, scene, starts) = (self.ids, self.instance, self.scene, self.starts);
+        let (ids, instance, scene, lines) = (self.ids, self.instance, self.scene, self.lines);
         let answers = self.answers.reborrow();
-        Sink { ids, answers, instance, scene, first: self.first + first, starts }
+        Sink { ids, answers, instance, scene, first: self.first + first, lines }
     }
 
     /// The instance that is reported with a hit of a ray.

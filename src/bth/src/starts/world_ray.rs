@@ -1,6 +1,8 @@
 //! Rays in world space that may start on a triangle of an instance.
 
+use crate::intersect::origin::{RoundedLine, RoundedOrigin};
 use crate::intersect::start_point::StartPoint;
+use crate::intersect::vector::wide;
 use crate::rays::{Ray, Start, StartRay};
 use bth_format::layout::NONE;
 
@@ -10,18 +12,25 @@ pub(crate) struct InstanceStart {
     pub(crate) instance: u32,
     pub(crate) start: Start,
     pub(crate) point: StartPoint,
+    /// The point in world space.
+    pub(crate) world: RoundedOrigin,
 }
 
 impl InstanceStart {
     /// For a ray that starts on no triangle.
     pub(crate) fn none(origin: [f32; 3]) -> InstanceStart {
         let point = StartPoint::beside(origin);
-        InstanceStart { instance: NONE, start: Start::NONE, point }
+        InstanceStart { instance: NONE, start: Start::NONE, point, world: point.origin }
+    }
+
+    /// The point in world space, rounded to f32.
+    pub(crate) fn rounded(&self) -> [f32; 3] {
+        self.world.0.map(|x| x as f32)
     }
 }
 
 /// A ray in world space, and its start if that is on a triangle. Its origin is then the start
-/// rounded to f32, where other instances see it.
+/// rounded to f32.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WorldRay<'a> {
     pub(crate) ray: &'a Ray,
@@ -41,8 +50,19 @@ impl<'a> WorldRay<'a> {
         self.start.filter(|start| start.instance == instance).map(|start| &start.point)
     }
 
-    /// As a ray in an instance, given the ray in the space of its object: one that starts there, or
-    /// else one with an origin.
+    /// The line in world space.
+    #[inline(always)]
+    pub(crate) fn line(&self) -> RoundedLine {
+        match self.start {
+            None => RoundedLine::of_ray(self.ray),
+            Some(start) => {
+                RoundedLine { origin: start.world, direction: wide(self.ray.direction), direction_error: 0.0 }
+            }
+        }
+    }
+
+    /// As a ray in an object whose space is world space: one that starts there, or else one with an
+    /// origin.
     #[inline(always)]
     pub(crate) fn in_object<T>(
         &self,

@@ -99,8 +99,9 @@ impl Expected {
         for id in 0..self.instances.len() as u32 {
             let Some(Ok(placement)) = self.placement(scene, id) else { continue };
             let object = scene.object(placement.object());
+            let world = scene.world().expect("instances");
             for (ray, found) in rays.iter().zip(&mut found) {
-                add_hits(&object, &placement.inverse, id, ray, found);
+                add_hits(&object, (world, scene.objects()), id, ray, found);
             }
         }
         found.into_iter().map(in_order).collect()

@@ -7,6 +7,8 @@
 use super::leaf_mesh::LeafPoints;
 use crate::bvh::candidate::Candidate;
 use crate::intersect::exact_lanes::{F32Lanes, OriginTermsLanes, Pairs};
+use crate::intersect::exact_ray::{LineLanes, Lines};
+use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 
 /// Largest number of cached triangles.
@@ -109,9 +111,24 @@ pub(crate) struct CachedHits<'a> {
     pub(crate) origin_terms: &'a mut OriginTermsLanes,
     /// Overwritten by each group.
     pub(crate) pairs: &'a mut Pairs,
+    /// The rays of the packet, and their lines.
+    pub(crate) rays: &'a [Ray],
+    pub(crate) lines: Lines<'a>,
 }
 
 impl CachedHits<'_> {
+    /// The lines of the rays of a group whose bit is set in `lanes`.
+    #[inline(never)]
+    pub(crate) fn lines_of(&self, at: usize, lanes: u32) -> LineLanes {
+        let mut of_lanes = LineLanes::NONE;
+        for (lane, ray) in self.rays[at * LANES..].iter().take(LANES).enumerate() {
+            if lanes >> lane & 1 != 0 {
+                of_lanes.set(lane, &self.lines.rounded(at * LANES + lane, ray));
+            }
+        }
+        of_lanes
+    }
+
     /// Computes ids and terms of the cached triangles, at the first call for a packet.
     #[inline(always)]
     pub(crate) fn compute(&mut self) {

@@ -15,8 +15,8 @@ use super::ray_group::{RayGroup, RayLimits};
 use super::single_rays::FEW_OF_GROUP;
 use crate::bvh::candidate::Candidate;
 use crate::intersect::edge_functions::{self, Corners, FilteredTriangles};
+use crate::intersect::exact_ray::ExactRay;
 use crate::intersect::prepare::{Axes, CommonAxis};
-use crate::intersect::start_point::own_triangle;
 use crate::query::Goal;
 use crate::simd::{LANES, Lanewise, Part, Simd, lanes_of_piece};
 use bth_format::layout::WIDTH;
@@ -210,7 +210,10 @@ impl<G: Goal> PacketRays<'_, G> {
             active &= active - 1;
             let origin_reach = self.object.bounds.origin_reach;
             let ray = at * LANES + lane;
-            let own = own_triangle(self.starts.of(ray), code);
+            let own = match self.have_starts {
+                true => ExactRay { ray: &self.rays[ray], line: self.lines.of(ray) }.own_triangle(code),
+                false => 0,
+            };
             let found = self.single_rays.candidates::<S, H>(s, group, (at, lane), (block, own), origin_reach);
             let hit = found.sure != 0
                 || found.maybe != 0 && self.settle_one(s, ray, Candidate::NONE, (code, found.maybe));
@@ -236,7 +239,8 @@ impl<G: Goal> PacketRays<'_, G> {
             debug_assert_eq!(group.common, Some(along), "see `Span::is_from_point`");
             let rows = along.order().map(|axis| relative.row(axis));
             let [size, depth] = test.spread;
-            let error = edge_functions::error(s, s.splat(size + size), s.splat(depth), floor);
+            let depth = s.splat(depth + self.object.bounds.origin_reach);
+            let error = edge_functions::error(s, s.splat(size + size), depth, floor);
             let corners = ProjectedOnDemand { rows, projection: group.projection.relative(s) };
             return self.test_triangles::<S, H>(s, &corners, error, test);
         }

@@ -7,7 +7,7 @@ use super::ray_group::RayGroup;
 use super::single_rays::SingleRays;
 use crate::bvh::candidate::{Candidate, Settle};
 use crate::intersect::boxes::{lower_depth, upper_depth};
-use crate::intersect::start_point::Starts;
+use crate::intersect::exact_ray::{ExactRay, Lines};
 use crate::query::{Goal, RayQuery};
 use crate::rays::Ray;
 use crate::simd::{LANES, Part, Simd};
@@ -28,8 +28,9 @@ pub(crate) struct PacketRays<'a, G: Goal> {
     pub(crate) hit_cache: &'a mut HitCache,
     /// A bit for each ray whose query is not complete.
     pub(crate) alive: u64,
-    /// Where the rays start.
-    pub(crate) starts: Starts<'a>,
+    pub(crate) lines: Lines<'a>,
+    /// True if rays may start on triangles.
+    pub(crate) have_starts: bool,
     /// For each ray the child code of the leaf that holds the triangle on which it starts, and the
     /// slot there; not set without starts.
     pub(crate) own: &'a mut [[[u32; LANES]; 2]; GROUPS],
@@ -134,7 +135,7 @@ impl<G: Goal> PacketRays<'_, G> {
             self.queries[ray] = RayQuery::new(self.goal, &self.rays[ray]);
             self.queried |= 1 << ray;
         }
-        let exact_ray = (&self.rays[ray], self.starts.of(ray));
+        let exact_ray = ExactRay { ray: &self.rays[ray], line: self.lines.of(ray) };
         let (object, query) = (self.object, &mut self.queries[ray]);
         s.call(Settle { object, ray: exact_ray, pending, of_leaf, query })
     }
@@ -142,7 +143,7 @@ impl<G: Goal> PacketRays<'_, G> {
     /// The rays of a group that start in a leaf, one bit per ray.
     #[inline(always)]
     pub(super) fn starting_in<S: Simd>(&self, s: S, at: usize, leaf: u32) -> u32 {
-        if self.starts.is_empty() {
+        if !self.have_starts {
             return 0;
         }
         s.mask_bits(s.eq_u(s.load_u(&self.own[at % GROUPS][0]), s.splat_u(leaf)))

@@ -256,6 +256,8 @@ impl<S: Simd> RayGroup<S> {
 /// `intersections` are cleared.
 pub(crate) struct IntersectGroup<'a, 'c, S: Simd, H> {
     pub(crate) group: &'a RayGroup<S>,
+    /// Index of the group.
+    pub(crate) at: usize,
     pub(crate) cached: &'a mut CachedHits<'c>,
     pub(crate) intersections: &'a mut Intersections,
     pub(crate) packet: PhantomData<H>,
@@ -265,7 +267,7 @@ impl<S: Simd, H: PacketBounds<S>> Part<S> for IntersectGroup<'_, '_, S, H> {
     type Output = ();
     #[inline(always)]
     fn run(self, s: S) {
-        let IntersectGroup { group, cached, intersections, .. } = self;
+        let IntersectGroup { group, at, cached, intersections, .. } = self;
         let lanes = s.mask_bits(s.lt_u(group.pending, s.splat_u(NONE)));
         (intersections.certain, intersections.open) = (0, 0);
         if lanes == 0 {
@@ -274,7 +276,7 @@ impl<S: Simd, H: PacketBounds<S>> Part<S> for IntersectGroup<'_, '_, S, H> {
         let uncached = s.eq_u(group.pending, s.splat_u(UNCACHED));
         // For most kernels this is a constant.
         let kept = if H::COMMON_ORIGIN && S::HAS_FAST_F64_LOOKUP { cached.hit_cache.kept() } else { 0 };
-        if kept > 0 && s.mask_bits(uncached) == 0 {
+        if kept > 0 && s.mask_bits(uncached) == 0 && cached.lines.are_rays() {
             cached.compute();
             let (hit_cache, terms) = (&*cached.hit_cache, &*cached.origin_terms);
             let (mut direction, mut size) = ([[0.0; LANES]; 3], [0.0; LANES]);
@@ -306,6 +308,10 @@ impl<S: Simd, H: PacketBounds<S>> Part<S> for IntersectGroup<'_, '_, S, H> {
         }
         let index = s.select_u(uncached, group.index, s.lookup_u(s.load_u(&hit_cache.index), group.pending));
         s.store_u(s.gather_u(s.mask(lanes), ids, index), &mut intersections.triangle);
-        intersections.compute(s, lanes, pairs);
+        if cached.lines.are_rays() {
+            intersections.compute(s, lanes, cached.pairs);
+        } else {
+            intersections.compute_lines(s, lanes, &cached.lines_of(at, lanes), cached.pairs);
+        }
     }
 }

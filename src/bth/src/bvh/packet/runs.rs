@@ -118,7 +118,7 @@ impl<G: Goal> Kernel for Packets<'_, '_, G> {
                 Kind::Coherent(span) => {
                     // Any-hit rays with the same origin are rare, so that kernel is compiled for
                     // nearest hits only.
-                    let outcome = if !goal.is_any() && sink.starts().is_empty() && span.is_from_point() {
+                    let outcome = if !goal.is_any() && span.is_from_point() {
                         frustum::<S, G, true>(s, object, &bounds, &span, &mut packets, rays, sink)
                     } else {
                         frustum::<S, G, false>(s, object, &bounds, &span, &mut packets, rays, sink)

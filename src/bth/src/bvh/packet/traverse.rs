@@ -79,7 +79,7 @@ impl<S: Simd, G: Goal, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, S
         let groups = &mut groups[..rays.len().div_ceil(LANES)];
         let all = u64::MAX >> (PACKET - rays.len());
         single_rays.clear();
-        let starts = sink.starts();
+        let lines = sink.lines();
         let mut rays = PacketRays {
             object,
             rays,
@@ -89,14 +89,14 @@ impl<S: Simd, G: Goal, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, S
             hit_cache,
             queried: 0,
             alive: all,
-            starts,
+            lines,
+            have_starts: lines.have_starts(),
             own,
         };
-        if !starts.is_empty() {
+        if rays.have_starts {
             for ray in 0..rays.rays.len() {
                 let [leaf, slot] = &mut rays.own[ray / LANES % GROUPS];
-                let start = &starts.0[ray];
-                (leaf[ray % LANES], slot[ray % LANES]) = (start.leaf, start.slot);
+                (leaf[ray % LANES], slot[ray % LANES]) = lines.own(ray).into();
             }
         }
         if let Some(group) = groups.last_mut() {
@@ -203,22 +203,18 @@ fn finish<S: Simd, H: PacketBounds<S>, G: Goal>(
         hit_cache: rays.hit_cache,
         origin_terms,
         pairs,
+        rays: rays.rays,
+        lines: rays.lines,
     };
-    for (group, intersections) in groups.iter().zip(&mut *intersections) {
+    for (at, (group, intersections)) in groups.iter().zip(&mut *intersections).enumerate() {
         let cached = &mut cached;
         if !S::INLINES_PARTS {
             // Every ray has its origin, so one part serves all packets.
             let packet = PhantomData::<Frustum<S, false>>;
-            IntersectGroup { group, cached, intersections, packet }.inline_or_call(s);
+            IntersectGroup { group, at, cached, intersections, packet }.inline_or_call(s);
         } else {
             let packet = PhantomData::<H>;
-            IntersectGroup { group, cached, intersections, packet }.inline_or_call(s);
-        }
-    }
-    if !rays.starts.is_empty() {
-        // Exact origins are not in lanes, so hits are computed one by one.
-        for intersections in &mut *intersections {
-            intersections.open |= std::mem::take(&mut intersections.certain);
+            IntersectGroup { group, at, cached, intersections, packet }.inline_or_call(s);
         }
     }
     for (i, (group, intersections)) in groups.iter().zip(intersections.iter()).enumerate() {

@@ -6,6 +6,7 @@ use crate::intersect::boxes::RaySlabs;
 use crate::intersect::exact::Intersection;
 use crate::intersect::filter::TriangleFilter;
 use crate::intersect::line::Line;
+use crate::intersect::origin::RoundedLine;
 use crate::intersect::start::{ExactStart, rounded_start};
 use crate::intersect::start_point::StartPoint;
 use crate::intersect::vector::wide;
@@ -219,7 +220,8 @@ fn boxes_and_triangles_that_the_line_crosses_are_kept_and_sure_hits_are_hits() {
             None => (ObjectBounds::new(&object.object), line.intersection(corners)),
             Some(start) => {
                 object.include(start.corners);
-                line.start_at(&start.point());
+                let StartPoint { origin, .. } = start.point();
+                line = Line::of(&RoundedLine { origin, ..RoundedLine::of_ray(&endless) }).expect("a line");
                 let exact = ExactStart::new(start.corners, start.u, start.v);
                 (ObjectBounds::new(&object.object).for_starts(), exact.intersection(&line, corners))
             }

@@ -1,10 +1,10 @@
 //! Leaves that hold tetrahedra, as the traversals see them: special leaves.
 
 use super::flood::VisitedSet;
-use super::walk::{TetWalker, WalkOutcome};
+use super::walk::{Decision, TetWalker, WalkOutcome};
+use crate::intersect::exact_ray::{ExactRay, LineSource};
 use crate::intersect::line::Line;
 use crate::intersect::start::start_on;
-use crate::intersect::start_point::ExactRay;
 use crate::query::{Count, EitherQuery, Goal, RayQuery, Receiver, TriangleRef};
 use crate::simd::LANES;
 use bth_format::layout::{Child, NONE, RawLeaf, TetFace, WIDTH};
@@ -64,17 +64,18 @@ impl SpecialLeaf {
     fn walk<C: Count>(
         self,
         object: &ObjectView<'_>,
-        (ray, start): ExactRay<'_>,
+        ray: ExactRay<'_>,
         query: &mut EitherQuery,
         count: &mut C,
     ) -> bool {
-        let Some(mut line) = Line::new(ray) else { return true };
-        if let Some(start) = start {
-            line.start_at(start);
-        }
+        let Some(line) = Line::of(&ray.rounded()) else { return true };
         let mut walker = TetWalker::new(object, self.row, &line);
-        walker.start = start.and_then(|start| start_on(object, start));
-        let entered = match start {
+        walker.decision = match ray.line {
+            LineSource::Ray => Decision::Line,
+            LineSource::Start(start) => start_on(object, start).map_or(Decision::Line, Decision::Start),
+            LineSource::World(lines, ray) => Decision::World(lines, ray),
+        };
+        let entered = match ray.start() {
             Some(start) if start.leaf == Child::Tets(self.row).code() => walker.leave(start.slot),
             _ => None,
         };
@@ -97,13 +98,10 @@ impl SpecialLeaf {
     pub(crate) fn pass_triangles(
         self,
         object: &ObjectView<'_>,
-        (ray, start): ExactRay<'_>,
+        ray: ExactRay<'_>,
         receiver: &mut dyn Receiver,
     ) -> bool {
-        let Some(mut line) = Line::new(ray) else { return false };
-        if let Some(start) = start {
-            line.start_at(start);
-        }
+        let Some(line) = Line::of(&ray.rounded()) else { return false };
         let walker = TetWalker::new(object, self.row, &line);
         walker.flood_faces(&mut PassedOnce { receiver, passed: VisitedSet::new() }, &mut ())
     }

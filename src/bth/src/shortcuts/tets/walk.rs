@@ -8,8 +8,11 @@
 //! every tetrahedron that the line may touch.
 
 use super::records::{Entered, ReadRecords};
+use crate::bvh::candidate::intersect_in_world;
+use crate::intersect::exact_ray::WorldLines;
 use crate::intersect::line::{Line, Projected, Sign};
 use crate::intersect::start::ExactStart;
+use crate::intersect::vector::wide;
 use crate::query::{Count, EitherQuery, TriangleRef};
 use bth_format::layout::{FACE_BIT, HullFace, Link, NONE, TetFace, TetLeaf, TetVertex};
 use bth_format::object::{ObjectView, Records};
@@ -28,10 +31,19 @@ pub(crate) struct TetWalker<'a> {
     pub(crate) line: &'a Line,
     /// Bound of the error of projected coordinates of points within the leaf's box.
     pub(crate) error: f64,
-    /// Where the ray starts, if it starts on a triangle of the object.
-    pub(super) start: Option<ExactStart>,
+    pub(super) decision: Decision<'a>,
     /// Ids of the object's triangles, in leaf order.
     ids: &'a [u32],
+}
+
+/// What decides about a face that the line may cross.
+pub(super) enum Decision<'a> {
+    /// The line, which f64 holds exactly.
+    Line,
+    /// The exact start on a triangle of the object.
+    Start(ExactStart),
+    /// The line in world space of the ray with this index.
+    World(&'a dyn WorldLines, usize),
 }
 
 /// How a walk ended.
@@ -69,9 +81,8 @@ impl<'a> TetWalker<'a> {
             hull: &object.hull_faces[leaf.first_hull as usize..][..leaf.hulls as usize],
             ids: object.triangle_ids,
             line,
-            error: Line::projection_error(line.reach_of_box(leaf.lower, leaf.upper))
-                + 2.0 * line.origin_error,
-            start: None,
+            error: line.own_projection_error(line.reach_of_box(leaf.lower, leaf.upper)),
+            decision: Decision::Line,
         }
     }
 
@@ -110,9 +121,12 @@ impl<'a> TetWalker<'a> {
         corners: [[f32; 3]; 3],
         query: &mut EitherQuery,
     ) -> bool {
-        let found = match &self.start {
-            None => self.line.intersection(corners),
-            Some(start) => start.intersection(self.line, corners),
+        let found = match &self.decision {
+            Decision::Line => self.line.intersection(corners),
+            Decision::Start(start) => start.intersection(self.line, corners),
+            &Decision::World(lines, ray) => {
+                intersect_in_world((lines, ray), corners.map(wide), |t| query.may_matter(t))
+            }
         };
         match found {
             Some(intersection) => query.offer(triangle, intersection),

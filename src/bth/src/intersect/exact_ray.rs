@@ -1,0 +1,182 @@
+//! Rays as decisions need them: with the line that f32 only approximates.
+
+use super::exact_line::ExactLine;
+use super::origin::{RoundedLine, RoundedOrigin};
+use super::start_point::StartPoint;
+use super::vector::wide;
+use crate::rays::Ray;
+use crate::simd::LANES;
+use bth_format::layout::{NONE, WIDTH};
+
+/// A ray in the space of an object.
+#[derive(Clone, Copy)]
+pub(crate) struct ExactRay<'a> {
+    /// The ray as f32 knows it, with its range of t.
+    pub(crate) ray: &'a Ray,
+    pub(crate) line: LineSource<'a>,
+}
+
+/// Where the line of a ray is known exactly.
+#[derive(Clone, Copy)]
+pub(crate) enum LineSource<'a> {
+    /// In the ray of f32.
+    Ray,
+    /// It starts on a triangle of the object, along the direction of f32.
+    Start(&'a StartPoint),
+    /// In world space, where the object is placed: the ray with this index.
+    World(&'a dyn WorldLines, usize),
+}
+
+/// The lines of rays in world space, as the object sees that they go through.
+pub(crate) trait WorldLines {
+    /// The line of a ray in the space of the object, in the units of t of the ray of f32.
+    fn line(&self, ray: usize) -> RoundedLine;
+    /// The same line exactly. It is constructed for each decision, which are rare.
+    fn exact(&self, ray: usize) -> ExactLine;
+    /// Where a ray starts, if that is on a triangle of this object.
+    fn start(&self, ray: usize) -> Option<&StartPoint>;
+    /// Returns true if all rays start on triangles: only hits at t > 0 count.
+    fn are_from_starts(&self) -> bool;
+}
+
+impl<'a> ExactRay<'a> {
+    /// A ray of f32.
+    #[inline(always)]
+    pub(crate) fn plain(ray: &'a Ray) -> ExactRay<'a> {
+        ExactRay { ray, line: LineSource::Ray }
+    }
+
+    /// Where the ray starts, if that is on a triangle of the object.
+    #[inline(always)]
+    pub(crate) fn start(&self) -> Option<&'a StartPoint> {
+        match self.line {
+            LineSource::Ray => None,
+            LineSource::Start(start) => Some(start),
+            LineSource::World(lines, ray) => lines.start(ray),
+        }
+    }
+
+    /// The bit of the triangle on which the ray starts if it is in the leaf with this child code: a
+    /// ray does not hit it.
+    #[inline(always)]
+    pub(crate) fn own_triangle(&self, leaf: u32) -> u32 {
+        let start = self.start().filter(|start| start.leaf == leaf);
+        start.map_or(0, |start| 1 << (start.slot % WIDTH as u32))
+    }
+
+    /// The line in f64.
+    #[inline(always)]
+    pub(crate) fn rounded(&self) -> RoundedLine {
+        match self.line {
+            LineSource::Ray => RoundedLine::of_ray(self.ray),
+            LineSource::Start(&StartPoint { origin, .. }) => {
+                RoundedLine { origin, direction: wide(self.ray.direction), direction_error: 0.0 }
+            }
+            LineSource::World(lines, ray) => lines.line(ray),
+        }
+    }
+}
+
+/// The lines of the rays of a batch.
+#[derive(Clone, Copy)]
+pub(crate) enum Lines<'a> {
+    /// The rays of f32 themselves.
+    Rays,
+    /// For each ray its start; rays whose start is on no triangle begin at their f32 origins.
+    Starts(&'a [StartPoint]),
+    /// Lines in world space. The first ray of the batch has this index.
+    World(&'a dyn WorldLines, usize),
+}
+
+impl<'a> Lines<'a> {
+    /// The line of a ray.
+    #[inline(always)]
+    pub(crate) fn of(self, ray: usize) -> LineSource<'a> {
+        match self {
+            Lines::Rays => LineSource::Ray,
+            Lines::Starts(starts) => match starts.get(ray).filter(|start| start.is_on_triangle()) {
+                Some(start) => LineSource::Start(start),
+                None => LineSource::Ray,
+            },
+            Lines::World(lines, first) => LineSource::World(lines, first + ray),
+        }
+    }
+
+    /// Returns true if rays may start on triangles.
+    pub(crate) fn have_starts(self) -> bool {
+        match self {
+            Lines::Rays => false,
+            Lines::Starts(_) => true,
+            Lines::World(lines, _) => lines.are_from_starts(),
+        }
+    }
+
+    /// Returns true if the rays of f32 hold the lines exactly.
+    #[inline(always)]
+    pub(crate) fn are_rays(self) -> bool {
+        matches!(self, Lines::Rays)
+    }
+
+    /// The lines of the rays from `first` on.
+    #[inline(always)]
+    pub(crate) fn from(self, first: usize) -> Lines<'a> {
+        match self {
+            Lines::Rays => Lines::Rays,
+            Lines::Starts(starts) => Lines::Starts(starts.get(first..).unwrap_or(&[])),
+            Lines::World(lines, before) => Lines::World(lines, before + first),
+        }
+    }
+
+    /// The line of a ray in f64.
+    #[inline(always)]
+    pub(crate) fn rounded(self, ray: usize, of_f32: &Ray) -> RoundedLine {
+        ExactRay { ray: of_f32, line: self.of(ray) }.rounded()
+    }
+
+    /// The child code of the leaf of the triangle on which a ray starts, and its slot there; `NONE`
+    /// if it starts on no triangle of the object.
+    #[inline(always)]
+    pub(crate) fn own(self, ray: usize) -> [u32; 2] {
+        let start = match self.of(ray) {
+            LineSource::Ray => None,
+            LineSource::Start(start) => Some(start),
+            LineSource::World(lines, ray) => lines.start(ray),
+        };
+        start.map_or([NONE; 2], |start| [start.leaf, start.slot])
+    }
+}
+
+/// Lines of sixteen rays in f64, by axis.
+pub(crate) struct LineLanes {
+    pub(crate) origin: [[f64; LANES]; 3],
+    pub(crate) direction: [[f64; LANES]; 3],
+    /// Errors of the origin and of the direction, as in [`RoundedLine`].
+    pub(crate) error: [[f64; LANES]; 2],
+}
+
+impl LineLanes {
+    pub(crate) const NONE: Self =
+        LineLanes { origin: [[0.0; LANES]; 3], direction: [[1.0; LANES]; 3], error: [[0.0; LANES]; 2] };
+
+    /// Sets the line of a lane.
+    #[inline(always)]
+    pub(crate) fn set(&mut self, lane: usize, line: &RoundedLine) {
+        let RoundedLine { origin: RoundedOrigin(point, off), direction, direction_error } = line;
+        for k in 0..3 {
+            (self.origin[k][lane], self.direction[k][lane]) = (point[k], direction[k]);
+        }
+        (self.error[0][lane], self.error[1][lane]) = (*off, *direction_error);
+    }
+
+    /// The line of a lane.
+    #[inline(always)]
+    pub(crate) fn get(&self, lane: usize) -> RoundedLine {
+        let [[x, y, z], direction] =
+            [&self.origin, &self.direction].map(|of| [of[0][lane], of[1][lane], of[2][lane]]);
+        RoundedLine {
+            origin: RoundedOrigin([x, y, z], self.error[0][lane]),
+            direction,
+            direction_error: self.error[1][lane],
+        }
+    }
+}

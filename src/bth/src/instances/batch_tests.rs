@@ -40,7 +40,7 @@ fn traced(world: &World, objects: &Objects, rays: &[Ray]) -> (Vec<Hit>, Vec<bool
 fn the_top_level_does_not_change_results() {
     let mut rng = Rng::new(11);
     let (mut hit_count, mut far_hits, mut ray_count) = (0, 0, 0);
-    for case in 0..600 {
+    for case in 0..200 {
         let file = File::from_bytes(FILES[case % 2]).unwrap();
         let objects = Objects::of_file(file.clone());
         let count = [1, 2, 7, 16, 17, 40, 300][case % 7];
@@ -67,7 +67,7 @@ fn the_top_level_does_not_change_results() {
         }
     }
     assert!(
-        hit_count > ray_count / 3 && far_hits > 500,
+        hit_count > ray_count / 3 && far_hits > 150,
         "{hit_count} of {ray_count} hit, {far_hits} from afar"
     );
 }

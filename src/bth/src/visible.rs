@@ -8,7 +8,8 @@ use crate::bvh::enumerate::enumerate_within;
 use crate::enumerate::{EnteredInstance, enumerate_instances};
 use crate::intersect::exact::{Estimate, RATIO_ERROR, estimate};
 use crate::intersect::exact_line::{ExactLine, Rows, SegmentLine, image, image_of_start};
-use crate::intersect::exact_ray::{ExactRay, LineSource, WorldLines};
+use crate::intersect::exact_ray::{ExactRay, LineLanes, LineSource, WorldLines};
+use crate::intersect::long::LongLine;
 use crate::intersect::origin::{RoundedLine, RoundedOrigin};
 use crate::intersect::start::start_corners;
 use crate::intersect::start_point::StartPoint;
@@ -167,6 +168,15 @@ impl WorldLines for Segment<'_> {
     fn line(&self, _ray: usize) -> RoundedLine {
         self.line
     }
+    fn lanes(&self, _first: usize, _rays: &[u32], of_lanes: &mut LineLanes) {
+        of_lanes.set(0, &self.line);
+    }
+    fn common_origin(&self, _first: usize, _count: usize) -> Option<RoundedLine> {
+        None
+    }
+    fn long(&self, _ray: usize) -> Option<LongLine> {
+        None
+    }
     fn exact(&self, _ray: usize) -> ExactLine {
         self.exact_segment().line
     }
@@ -203,6 +213,11 @@ impl Blocking<'_> {
                 }
             }
             Estimate::Open(_, [_, last]) if last <= 0.0 => None,
+            Estimate::Open(uncertain, [first, last])
+                if first > 0.0 && last * self.t_scale < 1.0 - RATIO_ERROR =>
+            {
+                Some(uncertain.uv())
+            }
             Estimate::Open(..) => self.segment.exact_segment().crossed(corners),
         }
     }

@@ -78,41 +78,37 @@ impl ObjectBounds {
     /// that.
     #[inline(always)]
     pub fn for_starts(&self) -> ObjectBounds {
-        self.moved(self.greatest)
-    }
-
-    /// The bounds for segments, as rays from their first end, whose max |coordinate| is
-    /// `farthest`, with a rounded direction.
-    ///
-    /// Within the object a point of the segment is off by the roundings of both ends and by those
-    /// of the direction, which are relative to its distance from the first end: together by at most
-    /// four times u and the greater of `farthest` and `max`.
-    pub fn for_segments(&self, farthest: f32) -> ObjectBounds {
-        self.moved(4.0 * self.greatest.max(farthest))
+        ObjectBounds {
+            padded: self.padded + self.greatest / 8.0,
+            padded_in_f64: self.padded_in_f64 + self.greatest / 8.0,
+            origin_error: self.greatest * (U * 1.01) + 4.0 * f32::MIN_POSITIVE,
+            origin_reach: self.greatest * 0.3,
+            ..*self
+        }
     }
 
     /// The bounds for rays of f32 that approximate lines: origins of max |coordinate| `farthest`
     /// and directions are rounded from numbers that are off by `origin_error` and, relative to the
     /// max |component| of the direction, by `direction_error`.
     ///
-    /// Within the object, no farther than twice the greater of `farthest` and `max` from the
-    /// origin, a ray is off as in [`Self::for_segments`], and by these errors. Infinite where they
-    /// leave the range of `f32`.
+    /// No point of the object is farther than r = `farthest` + `max` from the origin along an axis.
+    /// Let u = 2^-24. The origin is off by u·`farthest`. The reciprocals of the direction's
+    /// components are off by 2u, which moves the planes of boxes by 2ur: with the origin, by 16u of
+    /// three sixteenths of `farthest` and an eighth of `max`. Slopes are off by 2u: projected
+    /// coordinates by 2ur, and by twice the error of the origin, together 8u of a half of
+    /// `farthest` and a quarter of `max`. Depths are off by ur, because t is multiplied by the
+    /// rounded direction, and by the error of the origin.
     #[inline(always)]
-    pub fn for_lines(&self, farthest: f64, origin_error: f64, direction_error: f64) -> ObjectBounds {
-        let farthest = if farthest > self.greatest.into() { farthest } else { self.greatest.into() };
-        let off = origin_error + 8.0 * direction_error * farthest;
-        self.moved(((4.0 * farthest + off / f64::from(U)) * (1.0 + f64::from(U))) as f32)
-    }
-
-    /// The bounds for rays that are off by at most u times `coordinate`.
-    #[inline(always)]
-    fn moved(&self, coordinate: f32) -> ObjectBounds {
+    pub fn for_lines(&self, farthest: f32, origin_error: f32, direction_error: f32) -> ObjectBounds {
+        // An error of the direction moves points by at most r times as much.
+        let off = origin_error + direction_error * (farthest + self.greatest);
+        let (of_u, greatest) = ((off * (1.01 / U)).min(f32::MAX / 16.0), self.greatest);
+        let pad = 0.19 * farthest + 0.13 * greatest + 0.25 * of_u;
         ObjectBounds {
-            padded: self.padded + coordinate / 8.0,
-            padded_in_f64: self.padded_in_f64 + coordinate / 8.0,
-            origin_error: coordinate * (U * 1.01) + 4.0 * f32::MIN_POSITIVE,
-            origin_reach: coordinate * 0.3,
+            padded: self.padded + pad,
+            padded_in_f64: self.padded_in_f64 + pad,
+            origin_error: (2.0 * farthest + greatest + 2.0 * of_u) * (U * 1.01) + 4.0 * f32::MIN_POSITIVE,
+            origin_reach: 0.51 * farthest + 0.26 * greatest + 0.6 * of_u,
             ..*self
         }
     }

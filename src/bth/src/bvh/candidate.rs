@@ -157,8 +157,10 @@ pub(crate) fn intersect_in_world(
         Estimate::Intersects(found) => Some(found).filter(counts),
         Estimate::Open(_, t) if t[1] <= 0.0 && lines.are_from_starts() || !may_matter(t) => None,
         Estimate::Open(uncertain, _) => {
-            let exact = lines.exact(ray).intersection(corners).filter(counts)?;
-            Some(uncertain.if_accurate().unwrap_or(exact))
+            let found = lines.long(ray).and_then(|line| line.decide(corners));
+            let found = found.unwrap_or_else(|| lines.exact(ray).intersection(corners));
+            let found = found.filter(counts)?;
+            Some(uncertain.if_accurate().unwrap_or(found))
         }
     }
 }

@@ -57,9 +57,7 @@ impl<S: Simd> Part<S> for Flush<'_, '_> {
             intersections.compute(s, all, &deferred.pairs);
         } else {
             let mut of_lanes = LineLanes::NONE;
-            for (lane, &ray) in deferred.ray[..count].iter().enumerate() {
-                of_lanes.set(lane, &lines.rounded(ray as usize, &rays[ray as usize]));
-            }
+            lines.lanes(&deferred.ray[..count], rays, &mut of_lanes);
             intersections.compute_lines(s, all, &of_lanes, &deferred.pairs);
         }
         for lane in 0..LANES {

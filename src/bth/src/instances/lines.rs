@@ -4,23 +4,27 @@
 use super::World;
 use super::placement::Placement;
 use super::scene_batch::SceneBatch;
-use crate::intersect::exact_line::{ExactLine, image, image_of_start};
-use crate::intersect::exact_ray::{ExactRay, LineSource, WorldLines};
-use crate::intersect::origin::RoundedLine;
+use crate::intersect::exact_line::{ExactLine, Rows, image, image_of_start};
+use crate::intersect::exact_ray::{ExactRay, LineLanes, LineSource, WorldLines};
+use crate::intersect::long::{
+    LONG_ERROR, Long, LongLine, LongVector, long_difference, long_dot, long_start, long_vector,
+};
+use crate::intersect::origin::{RoundedLine, RoundedOrigin};
 use crate::intersect::prepare::PreparedRay;
 use crate::intersect::start::start_corners;
 use crate::intersect::start_point::StartPoint;
-use crate::intersect::vector::wide;
-use crate::nodes::affine::ObjectRay;
+use crate::intersect::vector::{max_norm, wide};
+use crate::nodes::affine::{Inverse, ObjectRay};
 use crate::object::single::SingleRay;
 use crate::objects::Objects;
 use crate::query::sink::Visit;
 use crate::rays::Ray;
 use crate::shortcuts::free;
-use crate::simd::Simd;
+use crate::simd::{Isa, Kernel, LANES, Simd};
 use crate::starts::world_ray::WorldRay;
 use bth_format::exact::{Dyadic, dyadic_vector};
 use bth_format::object::{ObjectBounds, ObjectView};
+use glam::Vec4;
 
 /// The line of a ray in the space of an instance's object.
 #[inline(always)]
@@ -51,6 +55,46 @@ fn exact_line(
     let scale = Dyadic::from(f64::from(t_scale));
     let direction = dyadic_vector(wide(ray.ray.direction)).map(|x| &x * &scale);
     ExactLine { origin, weight, direction, to_world: Some(rows(instance)) }
+}
+
+/// The line of a ray through an instance with more digits. Its direction is divided by `t_scale`.
+#[cold]
+fn long_line(
+    world: &World,
+    objects: &Objects,
+    instance: u32,
+    (ray, t_scale): (&WorldRay<'_>, f32),
+) -> Option<LongLine> {
+    let rows_of = |instance: u32| world.row(objects, instance).to_world.rows();
+    let (rows, inverse) = (rows_of(instance), &world.placement(instance).inverse);
+    let direction = long_vector(wide(ray.ray.direction).map(|x| x * f64::from(t_scale)));
+    let (direction, off) = inverse.solve(&rows, direction, 0.0);
+    let direction_error = off / max_norm(direction.map(Long::rounded));
+    let (origin, origin_error) = match ray.start {
+        None => (long_vector(wide(ray.ray.origin)), 0.0),
+        Some(start) => {
+            let object = objects.view(world.placement(start.instance).object());
+            let corners = start_corners(object, start.point.leaf, start.point.slot)?.map(wide);
+            let size = corners.iter().fold(0.0f64, |most, corner| most.max(max_norm(*corner)));
+            let point = long_start(corners, [start.point.u.into(), start.point.v.into()]);
+            if start.instance == instance {
+                let origin_error = 8.0 * LONG_ERROR * size;
+                return Some(LongLine { origin: point, origin_error, direction, direction_error });
+            }
+            image_of_long(&rows_of(start.instance), point, size)
+        }
+    };
+    let relative = long_difference(origin, long_vector(inverse.origin));
+    let (origin, origin_error) = inverse.solve(&rows, relative, origin_error);
+    Some(LongLine { origin, origin_error, direction, direction_error })
+}
+
+/// The image of a point with coordinates of at most `size`, and a bound of its error.
+fn image_of_long(rows: &Rows, point: LongVector, size: f64) -> (LongVector, f64) {
+    let image = rows.map(|[x, y, z, offset]| long_dot(long_vector([x, y, z]), point) + Long::from(offset));
+    let norm = rows.iter().fold(0.0f64, |most, [x, y, z, _]| most.max(x.abs() + y.abs() + z.abs()));
+    let greatest = max_norm(image.map(Long::rounded));
+    (image, 16.0 * LONG_ERROR * (norm * size + greatest))
 }
 
 /// A ray through an instance.
@@ -87,6 +131,15 @@ impl WorldLines for RayInInstance<'_> {
     fn line(&self, _ray: usize) -> RoundedLine {
         self.of_object.line
     }
+    fn lanes(&self, _first: usize, _rays: &[u32], of_lanes: &mut LineLanes) {
+        of_lanes.set(0, &self.of_object.line);
+    }
+    fn common_origin(&self, _first: usize, _count: usize) -> Option<RoundedLine> {
+        None
+    }
+    fn long(&self, _ray: usize) -> Option<LongLine> {
+        long_line(self.world, self.objects, self.instance, (&self.ray, self.of_object.t_scale))
+    }
     fn exact(&self, _ray: usize) -> ExactLine {
         exact_line(self.world, self.objects, self.instance, (&self.ray, self.of_object.t_scale))
     }
@@ -98,8 +151,10 @@ impl WorldLines for RayInInstance<'_> {
     }
 }
 
-/// A ray through an instance in the space of its object, and the bounds for which it is prepared.
+/// A ray through an instance in the space of its object, its floats as rows of four, and the bounds
+/// for which it is prepared.
 pub(crate) struct InstanceLine {
+    rows: [Vec4; 2],
     ray: Ray,
     bounds: ObjectBounds,
 }
@@ -108,12 +163,19 @@ impl SingleRay for RayInInstance<'_> {
     type Line = InstanceLine;
     #[inline(always)]
     fn line<S: Simd>(&self, s: S, object: &ObjectView<'_>) -> Option<InstanceLine> {
-        let mut ray = self.of_object.ray;
+        let (ObjectRay { ray, line, .. }, mut tmin) = (&self.of_object, self.of_object.ray.tmin);
+        let [[x, y, z], [dx, dy, dz]] = [line.origin.0, line.direction].map(|v| v.map(|x| x as f32));
         if let Some(start) = self.ray.start.filter(|start| start.instance == self.instance) {
-            ray.tmin = free::begin(s, object, start.start.primitive.triangle, &start.point, ray.direction);
+            tmin = free::begin(s, object, start.start.primitive.triangle, &start.point, [dx, dy, dz]);
+            if tmin == f32::INFINITY {
+                return None;
+            }
         }
-        let bounds = self.of_object.line.bounds(&object.bounds);
-        (ray.tmin < f32::INFINITY).then_some(InstanceLine { ray, bounds })
+        // Vectors are made in registers: loading what was just written word by word would stall.
+        let rows = [Vec4::new(x, y, z, tmin), Vec4::new(dx, dy, dz, ray.tmax)];
+        let floats = [rows[0].to_array(), rows[1].to_array()];
+        let bounds = line.bounds(&object.bounds);
+        Some(InstanceLine { rows, ray: zerocopy::transmute!(floats), bounds })
     }
     #[inline(always)]
     fn exact<'a>(&'a self, line: &'a InstanceLine) -> ExactRay<'a> {
@@ -125,7 +187,7 @@ impl SingleRay for RayInInstance<'_> {
     }
     #[inline(always)]
     fn prepared<S: Simd>(&self, s: S, line: &InstanceLine, bounds: &ObjectBounds) -> Option<PreparedRay> {
-        PreparedRay::of(s, bounds, &line.ray)
+        PreparedRay::of_rows(s, bounds, line.rows, &line.ray)
     }
 }
 
@@ -144,6 +206,42 @@ impl WorldLines for VisitLines<'_> {
             line_in(self.batch.world.placement(instance), instance, &self.batch.world_ray(ray as usize));
         line.with_direction_times(f64::from(self.t_scale[visit]))
     }
+    fn lanes(&self, first: usize, rays: &[u32], of_lanes: &mut LineLanes) {
+        let visit = |lane: usize| first + rays[lane] as usize;
+        let Some(Visit { instance, .. }) = self.visits.get(visit(0)) else { return };
+        let mut is_plain = self.batch.starts.is_empty();
+        let mut of_world = [[[0.0; LANES]; 3]; 2];
+        for lane in 0..rays.len().min(LANES) {
+            let Visit { ray, instance: of } = self.visits[visit(lane)];
+            is_plain &= (of == *instance) & (self.t_scale[visit(lane)] == 1.0);
+            let Ray { origin, direction, .. } = &self.batch.rays[ray as usize];
+            for k in 0..3 {
+                (of_world[0][k][lane], of_world[1][k][lane]) = (origin[k], direction[k]);
+            }
+        }
+        if is_plain {
+            let inverse = &self.batch.world.placement(*instance).inverse;
+            return Isa::chosen().run(LanesKernel { inverse, of_world: &of_world, of_lanes });
+        }
+        for lane in 0..rays.len().min(LANES) {
+            of_lanes.set(lane, &self.line(visit(lane)));
+        }
+    }
+    fn common_origin(&self, first: usize, count: usize) -> Option<RoundedLine> {
+        let (visits, batch) = (&self.visits[first..first + count], self.batch);
+        let Visit { ray, instance } = visits[0];
+        let origin = batch.rays[ray as usize].origin;
+        let is_same =
+            |visit: &Visit| (visit.instance == instance) & (batch.rays[visit.ray as usize].origin == origin);
+        let is_scaled = self.t_scale[first..first + count].iter().any(|scale| *scale != 1.0);
+        let is_common = batch.starts.is_empty() && !is_scaled && visits.iter().all(is_same);
+        is_common.then(|| self.line(first))
+    }
+    fn long(&self, visit: usize) -> Option<LongLine> {
+        let (Visit { ray, instance }, SceneBatch { world, objects, .. }) = (self.visits[visit], self.batch);
+        let ray = self.batch.world_ray(ray as usize);
+        long_line(world, objects, instance, (&ray, self.t_scale[visit]))
+    }
     fn exact(&self, visit: usize) -> ExactLine {
         let (Visit { ray, instance }, SceneBatch { world, objects, .. }) = (self.visits[visit], self.batch);
         let ray = self.batch.world_ray(ray as usize);
@@ -154,6 +252,29 @@ impl WorldLines for VisitLines<'_> {
     }
     fn are_from_starts(&self) -> bool {
         !self.batch.starts.is_empty()
+    }
+}
+
+/// Sets the lines of sixteen rays of f32 in one instance, with the bits of [`Inverse::line`].
+struct LanesKernel<'a> {
+    inverse: &'a Inverse,
+    /// Origins and directions in world space, by axis.
+    of_world: &'a [[[f32; LANES]; 3]; 2],
+    of_lanes: &'a mut LineLanes,
+}
+
+impl Kernel for LanesKernel<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let LanesKernel { inverse, of_world: [origin, direction], of_lanes } = self;
+        // There are no branches in this loop, so that the compiler vectorizes it.
+        for lane in 0..LANES {
+            let [origin, direction] =
+                [origin, direction].map(|of| [of[0][lane].into(), of[1][lane].into(), of[2][lane].into()]);
+            let origin = RoundedOrigin(origin, 0.0);
+            of_lanes.set(lane, &inverse.line(&RoundedLine { origin, direction, direction_error: 0.0 }));
+        }
     }
 }
 

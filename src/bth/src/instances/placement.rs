@@ -184,22 +184,15 @@ impl Placement {
         if finite { Ok(placement) } else { Err(PlacementError::NotFinite) }
     }
 
-    /// Upper bound of the condition number of the transform, rounded.
-    #[inline(always)]
-    pub(crate) fn condition(&self) -> f64 {
+    /// Upper bound of the condition number of the transform.
+    fn condition(&self) -> f64 {
         f64::from(self.origin_slack) / ROUNDING
     }
 
     /// The line in the space of the object, as [`Inverse::line`].
     #[inline(always)]
     pub(crate) fn line(&self, line: &RoundedLine) -> RoundedLine {
-        self.inverse.line(self.condition(), line)
-    }
-
-    /// Bounds of the errors of lines in the space of the object, whose origins have coordinates of
-    /// at most `in_world` in world space. `rounded` are origins that were rounded to f32 there.
-    pub(crate) fn line_errors(&self, in_world: f64, rounded: bool) -> [f64; 2] {
-        self.inverse.line_errors(self.condition(), in_world, rounded)
+        self.inverse.line(line)
     }
 
     /// A point of the object in world space, as [`Inverse::point_in_world`].
@@ -213,7 +206,7 @@ impl Placement {
     }
 }
 
-const _: () = assert!(size_of::<Option<Placement>>() == 128);
+const _: () = assert!(size_of::<Option<Placement>>() == 136);
 
 #[cfg(test)]
 mod tests {

@@ -90,6 +90,11 @@ pub(crate) struct UncertainWeights {
 }
 
 impl UncertainWeights {
+    /// u and v in f64, rounded for the answer.
+    pub(crate) fn uv(&self) -> [f32; 2] {
+        self.rounded.intersection().uv()
+    }
+
     /// The intersection in f64, if only the signs of weights are uncertain.
     pub(crate) fn if_accurate(&self) -> Option<Intersection> {
         self.rounded.is_accurate.then(|| self.rounded.intersection())

@@ -5,7 +5,8 @@ use crate::intersect::exact::{
     Intersection, OriginTerms, RoundedIntersection, certain_intersection, reported, reported_barycentric,
 };
 use crate::intersect::exact_ray::LineLanes;
-use crate::intersect::vector::{max_norm, wide};
+use crate::intersect::origin::Origin;
+use crate::intersect::vector::max_norm;
 use crate::simd::{LANES, Simd};
 
 /// A number of each of sixteen rays or triangles.
@@ -44,9 +45,8 @@ impl OriginTermsLanes {
     /// Computes the terms of the first `count` triangles, whose corners are `[corner][axis]`, and
     /// of those that complete a half.
     #[inline(always)]
-    pub(crate) fn compute(&mut self, origin: [f32; 3], corner: &[[F32Lanes; 3]; 3], count: usize) {
+    pub(crate) fn compute(&mut self, origin: impl Origin, corner: &[[F32Lanes; 3]; 3], count: usize) {
         const HALF: usize = LANES / 2;
-        let origin = wide(origin);
         for first in (0..count.min(LANES)).step_by(HALF) {
             for i in first..first + HALF {
                 let corners = [lane(&corner[0], i), lane(&corner[1], i), lane(&corner[2], i)];
@@ -77,7 +77,7 @@ fn lane_terms(rows: &[[f64; LANES]; TERMS], i: usize) -> OriginTerms {
 
 /// The vector of lane `i`.
 #[inline(always)]
-fn lane(rows: &[F32Lanes; 3], i: usize) -> [f64; 3] {
+pub(crate) fn lane(rows: &[F32Lanes; 3], i: usize) -> [f64; 3] {
     [rows[0][i].into(), rows[1][i].into(), rows[2][i].into()]
 }
 
@@ -141,17 +141,16 @@ impl Intersections {
         self.set_masks(s, lanes, &accurate);
     }
 
-    /// Like [`Self::compute`], for rays that all start at the origin of `terms`. `norm` holds the
-    /// largest |component| of each direction, and `hit` for each ray the index of its triangle in
-    /// `terms`; with `FIRST_HALF`, all indices are below eight. It is a kernel that is inlined into
+    /// Like [`Self::compute`], for rays that all start at the origin of `terms`. `of_lane` returns
+    /// the direction of a ray and its max |component|; `hit` holds for each ray the index of its
+    /// triangle in `terms`; with `FIRST_HALF`, all indices are below eight. It is a kernel that is inlined into
     /// its caller, whose variables the parameters are.
     #[inline(always)]
     pub(crate) fn compute_from_point<S: Simd, const FIRST_HALF: bool>(
         &mut self,
         s: S,
         lanes: u32,
-        direction: &[F32Lanes; 3],
-        norm: &F32Lanes,
+        of_lane: impl Fn(usize) -> ([f64; 3], f64),
         terms: &OriginTermsLanes,
         hit: S::U,
     ) {
@@ -162,7 +161,8 @@ impl Intersections {
         let mut accurate = [0; LANES];
         for i in 0..LANES {
             let terms = lane_terms(&rows, i);
-            let rounded = RoundedIntersection::new(&terms, lane(direction, i), norm[i].into());
+            let (direction, norm) = of_lane(i);
+            let rounded = RoundedIntersection::new(&terms, direction, norm);
             self.store_lane(i, &rounded, &mut accurate);
         }
         self.set_masks(s, lanes, &accurate);

@@ -1,6 +1,7 @@
 //! Rays as decisions need them: with the line that f32 only approximates.
 
 use super::exact_line::ExactLine;
+use super::long::LongLine;
 use super::origin::{RoundedLine, RoundedOrigin};
 use super::start_point::StartPoint;
 use super::vector::wide;
@@ -31,6 +32,12 @@ pub(crate) enum LineSource<'a> {
 pub(crate) trait WorldLines {
     /// The line of a ray in the space of the object, in the units of t of the ray of f32.
     fn line(&self, ray: usize) -> RoundedLine;
+    /// Sets the lines of up to sixteen rays, whose indices are counted from `first` on.
+    fn lanes(&self, first: usize, rays: &[u32], of_lanes: &mut LineLanes);
+    /// The line of the first of consecutive rays, if all of them have its origin and errors.
+    fn common_origin(&self, first: usize, count: usize) -> Option<RoundedLine>;
+    /// The same line with more digits, where there is one.
+    fn long(&self, ray: usize) -> Option<LongLine>;
     /// The same line exactly. It is constructed for each decision, which are rare.
     fn exact(&self, ray: usize) -> ExactLine;
     /// Where a ray starts, if that is on a triangle of this object.
@@ -133,6 +140,19 @@ impl<'a> Lines<'a> {
         ExactRay { ray: of_f32, line: self.of(ray) }.rounded()
     }
 
+    /// Sets the lines of up to sixteen rays, given their indices and the rays of the batch.
+    #[inline(always)]
+    pub(crate) fn lanes(self, at: &[u32], rays: &[Ray], of_lanes: &mut LineLanes) {
+        match self {
+            Lines::World(lines, first) => lines.lanes(first, at, of_lanes),
+            _ => {
+                for (lane, ray) in at.iter().map(|ray| *ray as usize).enumerate().take(LANES) {
+                    of_lanes.set(lane, &self.rounded(ray, &rays[ray]));
+                }
+            }
+        }
+    }
+
     /// The child code of the leaf of the triangle on which a ray starts, and its slot there; `NONE`
     /// if it starts on no triangle of the object.
     #[inline(always)]
@@ -166,6 +186,12 @@ impl LineLanes {
             (self.origin[k][lane], self.direction[k][lane]) = (point[k], direction[k]);
         }
         (self.error[0][lane], self.error[1][lane]) = (*off, *direction_error);
+    }
+
+    /// The direction of a lane.
+    #[inline(always)]
+    pub(crate) fn direction_of(&self, lane: usize) -> [f64; 3] {
+        [self.direction[0][lane], self.direction[1][lane], self.direction[2][lane]]
     }
 
     /// The line of a lane.

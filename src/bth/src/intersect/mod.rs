@@ -10,7 +10,7 @@
 //!
 //! Rays through instances are lines in world space, which f32 and f64 only approximate in the space
 //! of an object: [`exact_ray`] names where a line is known, [`origin`] bounds what f64 knows of it,
-//! and [`exact_line`] decides in world space.
+//! [`mod@long`] has twice the digits, and [`exact_line`] decides in world space.
 //!
 //! The distance of a point to boxes and triangles is bounded in f32 in the same way
 //! ([`point_lanes`]) and decided in f64 ([`point_triangle`]) or exactly ([`point_exact`]).
@@ -28,6 +28,7 @@ pub(crate) mod exact_quad;
 pub(crate) mod exact_ray;
 pub(crate) mod filter;
 pub(crate) mod line;
+pub(crate) mod long;
 pub(crate) mod origin;
 mod pairs;
 pub(crate) mod point_exact;

@@ -95,7 +95,7 @@ impl RoundedLine {
     /// an object with bounds `of`.
     #[inline(always)]
     pub(crate) fn bounds(&self, of: &ObjectBounds) -> ObjectBounds {
-        of.for_lines(max_norm(self.origin.0), self.origin.1, self.direction_error)
+        of.for_lines(max_norm(self.origin.0) as f32, self.origin.1 as f32, self.direction_error as f32)
     }
 
     /// The same line; f64 decides nothing about it where products could leave its range.

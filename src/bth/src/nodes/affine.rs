@@ -1,5 +1,6 @@
 //! Affine transforms in f64, and their inverses for rays.
 
+use crate::intersect::long::{LONG_ERROR, Long, LongVector, long_dot, long_vector};
 use crate::intersect::origin::{RoundedLine, RoundedOrigin};
 use crate::intersect::vector::max_norm;
 use crate::rays::Ray;
@@ -9,13 +10,11 @@ use bth_format::layout::Node;
 /// Max condition number, in the maximum norm, of transforms that are not treated as singular.
 /// Beyond it f32 would leave out nothing in object space.
 const GREATEST_CONDITION: f64 = (1u64 << 24) as f64;
-/// 2^-50: bound of the residual I - LA that is computed for the inverse L of A, relative to the
-/// condition number. Its own roundings are at most half of it, so the error of L is below twice
-/// this, relative to the condition number and the norm of L.
+/// 2^-50: the greatest residual I - LA that is computed for the inverse L of A, relative to the
+/// condition number.
 const RESIDUAL: f64 = 1.0 / (1u64 << 50) as f64;
-/// 2^-47: bounds the error of the inverse, twice [`RESIDUAL`], and eight roundings of f64 in the
-/// transform of a vector.
-const LINE_ERROR: f64 = 1.0 / (1u64 << 47) as f64;
+/// Six roundings of half an epsilon; the transform of a vector has four.
+const ROUNDINGS: f64 = 3.0 * f64::EPSILON;
 
 /// An affine transform: a point p is mapped to `linear * p + translation`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -197,14 +196,23 @@ impl Affine {
             return None;
         }
         let condition = norm(&[a, b, c]) * norm(&linear);
-        if norm(&residual(&linear, &[a, b, c])) > RESIDUAL * condition {
+        let mut rest = norm(&residual(&linear, &[a, b, c]));
+        if rest > RESIDUAL * condition {
             linear = refined(linear, &[a, b, c]);
-            if !(norm(&residual(&linear, &[a, b, c])) <= RESIDUAL * condition) {
+            rest = norm(&residual(&linear, &[a, b, c]));
+            if !(rest <= RESIDUAL * condition) {
                 return None;
             }
         }
+        // Each product in the residual has at most three roundings of half an epsilon.
+        let line_error = 1.01 * (rest + 2.0 * f64::EPSILON * condition) + ROUNDINGS;
         let linear = scaled(&linear, scale);
-        let inverse = Inverse { linear, origin: self.translation };
+        let [error, direction_error] =
+            [norm(&linear), condition].map(|factor| (1.01 * factor * line_error) as f32);
+        let mut inverse = Inverse { linear, origin: self.translation, error, direction_error };
+        if inverse.is_identity() {
+            (inverse.error, inverse.direction_error) = (0.0, 0.0);
+        }
         (condition <= GREATEST_CONDITION && norm(&linear).is_finite()).then_some((inverse, condition))
     }
 
@@ -223,6 +231,11 @@ pub(crate) struct Inverse {
     pub(crate) linear: [[f64; 3]; 3],
     /// The origin of object space, in world space.
     pub(crate) origin: [f64; 3],
+    /// Bound of the error of a product of `linear` with a vector, relative to that of the vector,
+    /// which includes the error of `linear`. 0 where it is the identity.
+    pub(crate) error: f32,
+    /// The same for directions, relative to the max |component| of the product.
+    pub(crate) direction_error: f32,
 }
 
 /// Max |binary exponent| of a direction's max component in object space with which it is
@@ -307,12 +320,12 @@ impl Inverse {
     }
 
     /// Transforms a line of world space to object space, with the same points at the same t.
-    /// `condition` is a bound of the condition number.
     ///
     /// Let L be this inverse, E its error and u = 2^-53. The difference p of origins and its
-    /// product with L are off by at most 8u|L||p| by roundings and by |E||p|, in the maximum norm.
+    /// product with L are off by at most 4u|L||p| by roundings and by |E||p|, in the maximum norm.
     #[inline(always)]
-    pub(crate) fn line(&self, condition: f64, line: &RoundedLine) -> RoundedLine {
+    pub(crate) fn line(&self, line: &RoundedLine) -> RoundedLine {
+        // The direction of a line in world space is exact.
         let RoundedLine { origin: RoundedOrigin(point, off), direction, direction_error } = *line;
         let (mut relative, mut origin, mut of_object) = ([0.0; 3], [0.0; 3], [0.0; 3]);
         for k in 0..3 {
@@ -322,36 +335,52 @@ impl Inverse {
             origin[k] = dot(self.linear[k], relative);
             of_object[k] = dot(self.linear[k], direction);
         }
-        // Where object space is world space, nothing is rounded.
-        let relative_error = if self.is_identity() { 0.0 } else { LINE_ERROR * condition };
-        let norm = norm(&self.linear);
-        let origin_error = norm * (max_norm(relative) * relative_error + 1.01 * off);
-        let stretched = norm * max_norm(direction) / max_norm(of_object);
+        let mut origin_error = max_norm(relative) * f64::from(self.error);
+        if off != 0.0 {
+            origin_error += 1.01 * norm(&self.linear) * off;
+        }
         RoundedLine {
             origin: RoundedOrigin(origin, origin_error),
             direction: of_object,
-            direction_error: stretched * (relative_error + 1.01 * direction_error),
+            direction_error: f64::from(self.direction_error) + direction_error,
         }
         .or_unknown()
     }
 
-    /// Bounds of the errors of any lines that [`Self::line`] returns for origins with coordinates
-    /// of at most `in_world` and exact directions. The direction in object space is at least 1/κ of
-    /// |L| times the direction in world space.
-    pub(crate) fn line_errors(&self, condition: f64, in_world: f64, rounded: bool) -> [f64; 2] {
+    /// Bound of the errors of the origins of all lines that [`Self::line`] returns for origins with
+    /// coordinates of at most `in_world`. `rounded` were rounded to f32 there.
+    pub(crate) fn origin_error(&self, in_world: f64, rounded: bool) -> f64 {
         /// Half a unit in the last place of f32, relative.
         const ROUNDED: f64 = 1.0 / (1u64 << 24) as f64;
-        let off = if rounded { 1.01 * ROUNDED * in_world } else { 0.0 };
-        let relative = in_world + max_norm(self.origin);
-        let origin_error = norm(&self.linear) * (relative * LINE_ERROR * condition + off);
-        [origin_error, 2.0 * LINE_ERROR * condition * condition]
+        let off = if rounded { 1.01 * ROUNDED * in_world * norm(&self.linear) } else { 0.0 };
+        (in_world + max_norm(self.origin)) * f64::from(self.error) + off
+    }
+
+    /// The vector x of object space with Ax = `of`, for the transform A from object space with these
+    /// rows, and a bound of its error; `off` bounds the error of `of`.
+    ///
+    /// A step of refinement: with the residual r of x = L`of`, L r is added, whose error is at most
+    /// that of L times r.
+    pub(crate) fn solve(&self, rows: &[[f64; 4]; 3], of: LongVector, off: f64) -> (LongVector, f64) {
+        let linear = rows.map(|[x, y, z, _]| [x, y, z]);
+        let rounded = of.map(Long::rounded);
+        let x = self.linear.map(|row| dot(row, rounded));
+        let rest = [0, 1, 2].map(|k| of[k] - long_dot(long_vector(linear[k]), long_vector(x)));
+        let rest = rest.map(Long::rounded);
+        let solution = [0, 1, 2].map(|k| Long::from(x[k]) + Long::from(dot(self.linear[k], rest)));
+        let of_rest = LONG_ERROR * (norm(&linear) * max_norm(x) + max_norm(rounded)) + off;
+        // The low part of the residual, which is not used, is a rounding of f64.
+        let norm = norm(&self.linear);
+        let relative_error = f64::from(self.error) + ROUNDINGS * norm;
+        (solution, 1.01 * (relative_error * max_norm(rest) + norm * of_rest))
     }
 
     /// A point of object space in world space: the solution of the three equations by Cramer's
-    /// rule. `condition` as for [`Self::line`].
+    /// rule. `condition` is a bound of the
+    /// condition number.
     ///
     /// The residual of the solution x bounds its error: |A| (|p - Lx| + 8u|L||x|), and |E| adds
-    /// [`LINE_ERROR`] · κ |x|, where |A| ≤ κ / |L|.
+    /// a relative error of [`Self::error`] / |L|, where |A| ≤ κ / |L|.
     pub(crate) fn point_in_world(&self, condition: f64, point: RoundedOrigin) -> RoundedOrigin {
         let RoundedOrigin(point, off) = point;
         let [a, b, c] = self.linear;
@@ -362,8 +391,8 @@ impl Inverse {
             sum / determinant
         });
         let rest = max_norm([0, 1, 2].map(|k| point[k] - dot(self.linear[k], x)));
-        let error =
-            condition / norm(&self.linear) * (rest + off) + 4.0 * LINE_ERROR * condition * max_norm(x);
+        let error = condition / norm(&self.linear) * (rest + off)
+            + 2.0 * (f64::from(self.error) / norm(&self.linear) + ROUNDINGS) * condition * max_norm(x);
         let world = [0, 1, 2].map(|k| self.origin[k] + x[k]);
         RoundedOrigin(world, 1.01 * error + max_norm(world) * f64::EPSILON)
     }
@@ -373,7 +402,7 @@ impl Inverse {
     #[inline(always)]
     pub(crate) fn transform(&self, lanes: &mut RayLanes) {
         let RayLanes { origin, direction, unscaled } = lanes;
-        let Inverse { linear, origin: object_origin } = *self;
+        let Inverse { linear, origin: object_origin, .. } = *self;
         // There are no branches, so that the loop is vectorized.
         for i in 0..LANES {
             let (mut relative, mut world_direction) = ([0.0; 3], [0.0; 3]);

@@ -11,7 +11,7 @@ fn unit(rng: &mut Rng) -> f64 {
 }
 
 fn of_object(inverse: &Inverse, ray: &Ray) -> ObjectRay {
-    ObjectRay::of(inverse.line(1.0, &RoundedLine::of_ray(ray)), ray.tmin, ray.tmax)
+    ObjectRay::of(inverse.line(&RoundedLine::of_ray(ray)), ray.tmin, ray.tmax)
 }
 
 fn random(rng: &mut Rng, scale: f64) -> Affine {

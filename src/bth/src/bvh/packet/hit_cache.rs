@@ -8,6 +8,7 @@ use super::leaf_mesh::LeafPoints;
 use crate::bvh::candidate::Candidate;
 use crate::intersect::exact_lanes::{F32Lanes, OriginTermsLanes, Pairs};
 use crate::intersect::exact_ray::{LineLanes, Lines};
+use crate::intersect::vector::wide;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 
@@ -114,31 +115,39 @@ pub(crate) struct CachedHits<'a> {
     /// The rays of the packet, and their lines.
     pub(crate) rays: &'a [Ray],
     pub(crate) lines: Lines<'a>,
+    /// False once the lines are known to have no common origin.
+    pub(crate) has_common_origin: bool,
 }
 
 impl CachedHits<'_> {
-    /// The lines of the rays of a group whose bit is set in `lanes`.
-    #[inline(never)]
-    pub(crate) fn lines_of(&self, at: usize, lanes: u32) -> LineLanes {
-        let mut of_lanes = LineLanes::NONE;
-        for (lane, ray) in self.rays[at * LANES..].iter().take(LANES).enumerate() {
-            if lanes >> lane & 1 != 0 {
-                of_lanes.set(lane, &self.lines.rounded(at * LANES + lane, ray));
-            }
-        }
-        of_lanes
+    /// The lines of the rays of a group.
+    pub(crate) fn lines_of(&self, at: usize, of_lanes: &mut LineLanes) {
+        let first = at * LANES;
+        let rays: [u32; LANES] = std::array::from_fn(|lane| (first + lane) as u32);
+        let count = (self.rays.len() - first).min(LANES);
+        self.lines.lanes(&rays[..count], self.rays, of_lanes);
     }
 
-    /// Computes ids and terms of the cached triangles, at the first call for a packet.
+    /// Computes ids and terms of the cached triangles, at the first call for a packet. Returns false
+    /// if the lines of the rays have no common origin, though the rays of f32 have one.
     #[inline(always)]
-    pub(crate) fn compute(&mut self) {
+    pub(crate) fn compute(&mut self) -> bool {
         if self.hit_cache.is_computed {
-            return;
+            return self.has_common_origin;
         }
         self.hit_cache.is_computed = true;
-        for i in 0..self.hit_cache.kept().min(CACHED_TRIANGLES) {
+        let (corners, kept) = (&self.hit_cache.corner, self.hit_cache.kept());
+        match self.lines {
+            Lines::Rays => self.origin_terms.compute(wide(self.origin), corners, kept),
+            Lines::Starts(_) => self.has_common_origin = false,
+            Lines::World(lines, first) => match lines.common_origin(first, self.rays.len()) {
+                Some(line) => self.origin_terms.compute(line, corners, kept),
+                None => self.has_common_origin = false,
+            },
+        }
+        for i in 0..kept.min(CACHED_TRIANGLES) {
             self.hit_cache.id[i] = self.ids[self.hit_cache.index[i] as usize];
         }
-        self.origin_terms.compute(self.origin, &self.hit_cache.corner, self.hit_cache.kept());
+        self.has_common_origin
     }
 }

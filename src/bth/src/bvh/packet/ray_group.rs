@@ -8,8 +8,10 @@ use super::bounds::PacketBounds;
 use super::hit_cache::{CachedHits, UNCACHED};
 use super::leaf_mesh::LeafPoints;
 use super::projection::Projection;
-use crate::intersect::exact_lanes::Intersections;
+use crate::intersect::exact_lanes::{Intersections, lane};
+use crate::intersect::exact_ray::LineLanes;
 use crate::intersect::prepare::{self, Axes, CommonAxis, MixedAxes, PreparedLanes};
+use crate::intersect::vector::max_norm;
 use crate::intersect::vector::pick3;
 use crate::simd::{LANES, Lanewise, Part, Simd};
 use bth_format::layout::NONE;
@@ -276,20 +278,29 @@ impl<S: Simd, H: PacketBounds<S>> Part<S> for IntersectGroup<'_, '_, S, H> {
         let uncached = s.eq_u(group.pending, s.splat_u(UNCACHED));
         // For most kernels this is a constant.
         let kept = if H::COMMON_ORIGIN && S::HAS_FAST_F64_LOOKUP { cached.hit_cache.kept() } else { 0 };
-        if kept > 0 && s.mask_bits(uncached) == 0 && cached.lines.are_rays() {
-            cached.compute();
-            let (hit_cache, terms) = (&*cached.hit_cache, &*cached.origin_terms);
+        let is_cached = kept > 0 && s.mask_bits(uncached) == 0;
+        if is_cached && cached.compute() {
+            let (hit_cache, terms, pending) = (&*cached.hit_cache, &*cached.origin_terms, group.pending);
+            s.store_u(s.lookup_u(s.load_u(&hit_cache.id), pending), &mut intersections.triangle);
+            if !cached.lines.are_rays() {
+                let mut of_lanes = LineLanes::NONE;
+                cached.lines_of(at, &mut of_lanes);
+                let of_lane = |i: usize| {
+                    let direction = of_lanes.direction_of(i);
+                    (direction, max_norm(direction))
+                };
+                return intersections.compute_from_point::<S, false>(s, lanes, of_lane, terms, pending);
+            }
             let (mut direction, mut size) = ([[0.0; LANES]; 3], [0.0; LANES]);
             for k in 0..3 {
                 s.store(group.direction[k], &mut direction[k]);
             }
             s.store(group.scale, &mut size);
-            s.store_u(s.lookup_u(s.load_u(&hit_cache.id), group.pending), &mut intersections.triangle);
-            let pending = group.pending;
+            let of_lane = |i: usize| (lane(&direction, i), size[i].into());
             return if hit_cache.is_at_most_half_full() {
-                intersections.compute_from_point::<S, true>(s, lanes, &direction, &size, terms, pending)
+                intersections.compute_from_point::<S, true>(s, lanes, of_lane, terms, pending)
             } else {
-                intersections.compute_from_point::<S, false>(s, lanes, &direction, &size, terms, pending)
+                intersections.compute_from_point::<S, false>(s, lanes, of_lane, terms, pending)
             };
         }
         let (hit_cache, ids, pairs) = (&*cached.hit_cache, cached.ids, &mut *cached.pairs);
@@ -311,7 +322,9 @@ impl<S: Simd, H: PacketBounds<S>> Part<S> for IntersectGroup<'_, '_, S, H> {
         if cached.lines.are_rays() {
             intersections.compute(s, lanes, cached.pairs);
         } else {
-            intersections.compute_lines(s, lanes, &cached.lines_of(at, lanes), cached.pairs);
+            let mut of_lanes = LineLanes::NONE;
+            cached.lines_of(at, &mut of_lanes);
+            intersections.compute_lines(s, lanes, &of_lanes, cached.pairs);
         }
     }
 }

@@ -205,6 +205,7 @@ fn finish<S: Simd, H: PacketBounds<S>, G: Goal>(
         pairs,
         rays: rays.rays,
         lines: rays.lines,
+        has_common_origin: true,
     };
     for (at, (group, intersections)) in groups.iter().zip(&mut *intersections).enumerate() {
         let cached = &mut cached;

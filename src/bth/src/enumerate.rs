@@ -55,6 +55,9 @@ impl<'a> EnteredInstance<'a> {
                 ray,
                 tmax,
             )),
+            None if ray.wide.is_some() => {
+                EnteredRay::InInstance(RayInInstance::in_world(ray, self.instance, tmax))
+            }
             None => EnteredRay::InWorld { ray: Ray { tmax, ..*ray.ray }, start: ray.start_in(self.instance) },
         }
     }

@@ -168,5 +168,82 @@ impl Hit {
     }
 }
 
+/// A ray in f64: the points `origin + t * direction` with t from `tmin` to `tmax`.
+///
+/// All queries take it. They decide about its own numbers, exactly, and choose the nearest hit by
+/// its exact t. Hits that they return have t, u and v rounded to f32;
+/// [`Scene::hit_f64`](crate::Scene::hit_f64) returns the f64 numbers of a hit. A ray whose origin or
+/// range leaves f32 in the space of an object, or whose direction is beyond 2^±164, does not hit it.
+#[derive(Clone, Copy, Debug, PartialEq, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct Ray64 {
+    /// Point at t = 0, finite.
+    pub origin: [f64; 3],
+    /// Smallest t of a hit; may be negative or infinite.
+    pub tmin: f64,
+    /// Direction of any length except zero, finite.
+    pub direction: [f64; 3],
+    /// Largest t of a hit; may be infinite.
+    pub tmax: f64,
+}
+
+impl Ray64 {
+    /// A ray from `origin` without an end: `tmin` is 0 and `tmax` infinite.
+    pub const fn new(origin: [f64; 3], direction: [f64; 3]) -> Ray64 {
+        Ray64 { origin, tmin: 0.0, direction, tmax: f64::INFINITY }
+    }
+
+    /// The same line with the hits of another range of t.
+    pub const fn with_range(self, tmin: f64, tmax: f64) -> Ray64 {
+        Ray64 { tmin, tmax, ..self }
+    }
+
+    /// The point `origin + t * direction`.
+    pub fn at(&self, t: f64) -> [f64; 3] {
+        std::array::from_fn(|k| self.origin[k] + t * self.direction[k])
+    }
+
+    /// The ray with each number rounded to f32.
+    pub(crate) fn narrow(&self) -> Ray {
+        let &Ray64 { origin, tmin, direction, tmax } = self;
+        let [origin, direction] = [origin, direction].map(|v| v.map(|x| x as f32));
+        Ray { origin, tmin: tmin as f32, direction, tmax: tmax as f32 }
+    }
+}
+
+impl From<Ray> for Ray64 {
+    fn from(ray: Ray) -> Ray64 {
+        let [origin, direction] = [ray.origin, ray.direction].map(|v| v.map(f64::from));
+        Ray64 { origin, tmin: ray.tmin.into(), direction, tmax: ray.tmax.into() }
+    }
+}
+
+/// The numbers of a hit in f64.
+#[derive(Clone, Copy, Debug, PartialEq, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct Hit64 {
+    /// Distance in units of the length of the ray's direction, with a relative error of at most
+    /// 2^-40; infinite for a miss.
+    pub t: f64,
+    /// Barycentric weight of the triangle's second vertex, from 0 to 1, with an error of at most
+    /// 2^-28.
+    pub u: f64,
+    /// The same of the triangle's third vertex.
+    pub v: f64,
+    /// The triangle, or [`PrimitiveRef::NONE`] for a miss.
+    pub primitive: PrimitiveRef,
+}
+
+impl Hit64 {
+    /// The result for a ray that hits nothing.
+    pub const MISS: Hit64 = Hit64 { t: f64::INFINITY, u: 0.0, v: 0.0, primitive: PrimitiveRef::NONE };
+
+    /// Returns true if the ray hits a triangle.
+    pub fn is_hit(&self) -> bool {
+        self.t < f64::INFINITY
+    }
+}
+
+const _: () = assert!(size_of::<Ray64>() == 64 && size_of::<Hit64>() == 32);
 const _: () = assert!(size_of::<Ray>() == 32 && size_of::<StartRay>() == 32);
 const _: () = assert!(size_of::<Start>() == 16 && size_of::<PrimitiveRef>() == 8 && size_of::<Hit>() == 20);

@@ -7,13 +7,20 @@
 //! that reach no holes pay for looking up the opacity of their hit.
 
 use crate::batch::RayBatch;
+use crate::enumerate::EnteredInstance;
 use crate::hits::{Accept, results};
+use crate::instances::{RayInInstance, exact_of_start};
+use crate::intersect::exact::precise;
+use crate::intersect::exact_ray::{LineSource, WorldLines};
+use crate::intersect::start::start_corners;
+use crate::intersect::vector::wide;
 use crate::object;
 use crate::query::Steps;
 use crate::query::sink::Answers;
-use crate::rays::{Hit, Ray, Start};
+use crate::rays::{Hit, Hit64, PrimitiveRef, Ray, Start};
 use crate::scene::Scene;
 use crate::start_points;
+use crate::starts::locate::place;
 use crate::starts::world_ray::WorldRay;
 use crate::streams::{HitStreams, RayStreams};
 use crate::trace_ray::TraceRay;
@@ -24,7 +31,8 @@ use bth_format::layout::Opacity;
 use bth_format::object::ObjectView;
 
 impl Scene {
-    /// Nearest hit of a ray in world space: a [`Ray`], or a [`StartRay`](crate::rays::StartRay).
+    /// Nearest hit of a ray in world space: a [`Ray`], a
+    /// [`Ray64`](crate::rays::Ray64), or a [`StartRay`](crate::rays::StartRay).
     pub fn nearest<R: TraceRay>(&self, ray: &R) -> Option<Hit> {
         let mut hit = Hit::MISS;
         self.store_nearest(ray, &mut hit);
@@ -146,6 +154,30 @@ impl Scene {
         visible::see_each_other(self, a.into(), b.into())
     }
 
+    /// The numbers of a hit of a ray in f64; [`Hit64::MISS`] for a miss.
+    ///
+    /// ```
+    /// use bth::rays::Ray64;
+    ///
+    /// # const CUBE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/cube.bth"));
+    /// let scene = bth::from_bytes(CUBE)?;
+    /// let ray = Ray64::new([0.25, 0.5, 1.0 + 1e-12], [0.0, 0.0, -1.0]);
+    /// let hit = scene.nearest(&ray).expect("the top of the cube");
+    /// assert!((scene.hit_f64(&ray, &hit).t - 1e-12).abs() < 1e-15);
+    /// # Ok::<(), bth::Error>(())
+    /// ```
+    ///
+    /// # Panics
+    /// If `hit` is not from this scene.
+    pub fn hit_f64<R: TraceRay>(&self, ray: &R, hit: &Hit) -> Hit64 {
+        let Hit { t, u, v, primitive } = *hit;
+        if !hit.is_hit() {
+            return Hit64::MISS;
+        }
+        let rounded = Hit64 { t: t.into(), u: u.into(), v: v.into(), primitive };
+        ray.in_world(self, |ray| hit_in_f64(self, ray, primitive)).flatten().unwrap_or(rounded)
+    }
+
     /// Stores the nearest hit of a ray, or [`Hit::MISS`].
     ///
     /// Inlined up to the kernel. The kernel is not inlined, because every crate that traces single
@@ -154,7 +186,7 @@ impl Scene {
     #[inline(always)]
     pub(crate) fn store_nearest<R: Traced>(&self, ray: &R, hit: &mut Hit) {
         match self.sole_opaque() {
-            Some(object) if ray.may_start_in(0) => object::store_nearest(object, ray, 0, hit),
+            Some(object) if ray.may_start_in(0) => ray.store_nearest_in(object, 0, hit),
             _ => self.store_nearest_elsewhere(ray, hit),
         }
     }
@@ -165,7 +197,7 @@ impl Scene {
         *hit = Hit::MISS;
         if let Some((object, instance)) = self.sole() {
             if ray.may_start_in(instance) {
-                object::store_nearest(object, ray, instance, hit);
+                ray.store_nearest_in(object, instance, hit);
             }
         } else {
             ray.in_world(self, |world_ray| match self.world() {
@@ -204,7 +236,7 @@ impl Scene {
     #[inline(always)]
     pub(crate) fn hits_any<R: Traced>(&self, ray: &R) -> bool {
         match self.sole_opaque() {
-            Some(object) if ray.may_start_in(0) => object::any(object, ray),
+            Some(object) if ray.may_start_in(0) => ray.hits_any_in(object),
             _ => self.hits_any_elsewhere(ray),
         }
     }
@@ -213,7 +245,7 @@ impl Scene {
     #[inline(never)]
     fn hits_any_elsewhere<R: Traced>(&self, ray: &R) -> bool {
         let is_hit = if let Some((object, instance)) = self.sole() {
-            ray.may_start_in(instance) && object::any(object, ray)
+            ray.may_start_in(instance) && ray.hits_any_in(object)
         } else {
             let any = |world_ray: WorldRay<'_>| match self.world() {
                 Some(world) => world.any_of_ray(self.objects(), world_ray),
@@ -275,4 +307,23 @@ impl Scene {
             *hit = ray.in_world(self, search).flatten().unwrap_or(Hit::MISS);
         }
     }
+}
+
+/// The numbers of a ray's hit on a triangle in f64.
+fn hit_in_f64(scene: &Scene, ray: WorldRay<'_>, primitive: PrimitiveRef) -> Option<Hit64> {
+    let entered = EnteredInstance::new(scene, primitive.instance);
+    let of_instance = entered.ray(ray, ray.ray.tmax);
+    let (exact, object) = (of_instance.exact(), entered.object);
+    let (leaf, slot) = place(object, primitive.triangle)?;
+    let corners = start_corners(object, leaf, slot)?.map(wide);
+    let found = precise(&exact.rounded(), corners).or_else(|| match exact.line {
+        LineSource::Ray => RayInInstance::in_world(ray, 0, ray.ray.tmax).exact(0).intersection(corners),
+        LineSource::Start(start) => {
+            exact_of_start(object, start, wide(ray.ray.direction))?.intersection(corners)
+        }
+        LineSource::World(lines, at) => lines.exact(at).intersection(corners),
+    })?;
+    let [u, v, determinant] = found.weight;
+    let [u, v] = [u, v].map(|weight| (weight / determinant).clamp(0.0, 1.0));
+    Some(Hit64 { t: found.t * f64::from(of_instance.t_scale()) + 0.0, u, v, primitive })
 }

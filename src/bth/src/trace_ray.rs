@@ -4,10 +4,10 @@
 #![allow(private_interfaces, private_bounds)]
 
 use self::sealed::Traced;
-use crate::instances::World;
+use crate::instances::{RayInInstance, World, trace_wide, wide_ray};
 use crate::object::{self, Scratch};
 use crate::query::sink::{Answers, Sink};
-use crate::rays::{Ray, StartRay};
+use crate::rays::{Hit, Ray, Ray64, StartRay};
 use crate::scene::Scene;
 use crate::simd::Isa;
 use crate::start_points;
@@ -16,18 +16,22 @@ use crate::starts::world_ray::{InstanceStart, PlacedRay, WorldRay};
 use bth_format::object::ObjectView;
 use std::cell::Cell;
 
-/// A ray that can be traced: a [`Ray`], or a [`StartRay`].
+/// A ray that can be traced: a [`Ray`], a [`Ray64`], or a [`StartRay`].
 pub trait TraceRay: sealed::Traced {}
 
 impl TraceRay for Ray {}
+impl TraceRay for Ray64 {}
 impl TraceRay for StartRay {}
 
 pub(crate) mod sealed {
-    use super::{Answers, InstanceStart, ObjectView, Ray, Scene, Scratch, World, WorldRay};
-    use crate::object::single::SingleRay;
+    use super::{Answers, Hit, InstanceStart, ObjectView, Ray, Scene, Scratch, World, WorldRay};
 
     /// How rays of a kind are traced.
-    pub trait Traced: SingleRay + Copy + Sync {
+    pub trait Traced: Copy + Sync {
+        /// Stores the nearest hit in an instance whose object's space is world space.
+        fn store_nearest_in(&self, object: &ObjectView<'_>, instance: u32, hit: &mut Hit);
+        /// Returns true if the ray hits anything in an object whose space is world space.
+        fn hits_any_in(&self, object: &ObjectView<'_>) -> bool;
         /// Returns true if the ray may hit something in a scene that is this instance, whose
         /// object's space is world space.
         fn may_start_in(&self, instance: u32) -> bool;
@@ -51,6 +55,14 @@ pub(crate) mod sealed {
 }
 
 impl Traced for Ray {
+    #[inline(always)]
+    fn store_nearest_in(&self, object: &ObjectView<'_>, instance: u32, hit: &mut Hit) {
+        object::store_nearest(object, self, instance, hit);
+    }
+    #[inline(always)]
+    fn hits_any_in(&self, object: &ObjectView<'_>) -> bool {
+        object::any(object, self)
+    }
     #[inline(always)]
     fn may_start_in(&self, _instance: u32) -> bool {
         true
@@ -90,6 +102,14 @@ thread_local! {
 
 impl Traced for StartRay {
     #[inline(always)]
+    fn store_nearest_in(&self, object: &ObjectView<'_>, instance: u32, hit: &mut Hit) {
+        object::store_nearest(object, self, instance, hit);
+    }
+    #[inline(always)]
+    fn hits_any_in(&self, object: &ObjectView<'_>) -> bool {
+        object::any(object, self)
+    }
+    #[inline(always)]
     fn may_start_in(&self, instance: u32) -> bool {
         self.start.primitive.instance == instance
     }
@@ -123,4 +143,35 @@ impl Traced for StartRay {
         trace(&world_rays, &starts);
         PLACED.set((world_rays, starts));
     }
+}
+
+impl Traced for Ray64 {
+    fn store_nearest_in(&self, object: &ObjectView<'_>, instance: u32, hit: &mut Hit) {
+        let ray = self.narrow();
+        let of_object = RayInInstance::in_world(wide_ray(&ray, self), instance, ray.tmax);
+        object::store_nearest(object, &of_object, instance, hit);
+    }
+    fn hits_any_in(&self, object: &ObjectView<'_>) -> bool {
+        let ray = self.narrow();
+        object::any(object, &RayInInstance::in_world(wide_ray(&ray, self), 0, ray.tmax))
+    }
+    fn may_start_in(&self, _instance: u32) -> bool {
+        true
+    }
+    fn in_world<T>(&self, _scene: &Scene, trace: impl FnOnce(WorldRay<'_>) -> T) -> Option<T> {
+        Some(trace(wide_ray(&self.narrow(), self)))
+    }
+    fn go_together(_rays: &[Ray64], world: Option<&World>) -> bool {
+        world.is_none() && Isa::chosen() != Isa::Scalar
+    }
+    fn trace_in_object(
+        object: &ObjectView<'_>,
+        rays: &[Ray64],
+        instance: u32,
+        scratch: &mut Scratch,
+        answers: Answers<'_>,
+    ) {
+        trace_wide(object, rays, instance, scratch, answers);
+    }
+    fn with_placed(_scene: &Scene, _rays: &[Ray64], _trace: impl FnOnce(&[Ray], &[InstanceStart])) {}
 }

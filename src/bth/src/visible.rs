@@ -183,6 +183,9 @@ impl WorldLines for Segment<'_> {
     fn start(&self, _ray: usize) -> Option<&StartPoint> {
         None
     }
+    fn range(&self, _ray: usize) -> Option<[f64; 2]> {
+        None
+    }
     fn are_from_starts(&self) -> bool {
         true
     }

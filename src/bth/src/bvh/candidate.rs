@@ -5,12 +5,13 @@ use super::nodes;
 use crate::intersect::exact::{Estimate, Intersection, estimate, in_pairs};
 use crate::intersect::exact_ray::{ExactRay, LineSource, WorldLines};
 use crate::intersect::line::Line;
-use crate::intersect::start::start_on;
-use crate::intersect::start::{StartDecision, decide_start, decide_start_exactly};
+use crate::intersect::line::RATIO_ERROR;
+use crate::intersect::start::{StartDecision, decide_start, decide_start_exactly, start_corners, start_on};
 use crate::intersect::vector::wide;
 use crate::query::{Goal, RayQuery, TriangleRef};
 use crate::rays::Ray;
 use crate::simd::{Part, Simd};
+use crate::starts::locate::place;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 
@@ -112,8 +113,45 @@ fn settle_other<G: Goal>(
     query: &mut RayQuery<G>,
 ) -> bool {
     let Some((index, corners)) = candidate.read(object) else { return false };
-    intersect(object, ray, corners, |t| query.may_matter(t))
-        .is_some_and(|intersection| query.offer(TriangleRef::index(index, object.triangle_ids), intersection))
+    let Some(found) = intersect(object, ray, corners, |t| query.may_matter(t)) else { return false };
+    let triangle = TriangleRef::index(index, object.triangle_ids);
+    match ray.line {
+        LineSource::World(lines, at) if let Some(range) = lines.range(at) => {
+            offer_wide(object, (lines, at), range, (triangle, corners), found, query)
+        }
+        _ => query.offer(triangle, found),
+    }
+}
+
+/// Offers an intersection of a ray in f64. Its t is exact before it is compared with an end of the
+/// range or with another t that is close to it; among equal t, the smaller id wins.
+fn offer_wide<G: Goal>(
+    object: &ObjectView<'_>,
+    (lines, at): (&dyn WorldLines, usize),
+    [tmin, tmax]: [f64; 2],
+    (triangle, corners): (TriangleRef<'_>, [[f32; 3]; 3]),
+    mut found: Intersection,
+    query: &mut RayQuery<G>,
+) -> bool {
+    let exact_t = |corners: [[f32; 3]; 3]| Some(lines.exact(at).intersection(corners.map(wide))?.t);
+    let close = |a: f64, b: f64| b.is_finite() && (a - b).abs() <= 4.0 * RATIO_ERROR * a.abs().max(b.abs());
+    if close(found.t, tmin) || close(found.t, tmax) {
+        found.t = exact_t(corners).unwrap_or(found.t);
+    }
+    if !(tmin <= found.t && found.t <= tmax) {
+        return false;
+    }
+    if let Some((best, t)) = query.best(object.triangle_ids)
+        && close(t, found.t)
+        && let Some(other) = place(object, best).and_then(|(leaf, slot)| start_corners(object, leaf, slot))
+        && let (Some(t), Some(of_best)) = (exact_t(corners), exact_t(other))
+    {
+        if t < of_best || t == of_best && triangle.read() < best {
+            query.replace(triangle, found);
+        }
+        return false;
+    }
+    query.offer(triangle, found)
 }
 
 /// The intersection of a ray with a triangle of its object, if it counts. `may_matter` as for

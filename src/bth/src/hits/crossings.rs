@@ -56,14 +56,14 @@ impl Receiver for CrossingCounter<'_> {
 
 /// Counts the crossings of a ray in all instances.
 pub(super) fn count_crossings(scene: &Scene, world_ray: WorldRay<'_>) -> Crossings {
-    let (mut total, Ray { tmin, tmax, .. }) = (Crossings::default(), *world_ray.ray);
+    let (mut total, Ray { tmax, .. }) = (Crossings::default(), *world_ray.ray);
     enumerate_instances(scene, world_ray.ray, &mut |entered| {
         let of_instance = entered.ray(world_ray, tmax);
         let t_scale = f64::from(of_instance.t_scale());
         let mut counter = CrossingCounter {
             object: entered.object,
             ray: of_instance.exact(),
-            range: [tmin, tmax].map(|t| f64::from(t) / t_scale),
+            range: world_ray.range().map(|t| t / t_scale),
             found: Crossings::default(),
         };
         enumerate(entered.object, counter.ray, &mut counter);

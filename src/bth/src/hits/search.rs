@@ -6,9 +6,10 @@ use super::collect::{Collector, FoundHit};
 use crate::bvh::candidate::intersect;
 use crate::bvh::enumerate::enumerate;
 use crate::enumerate::{EnteredInstance, enumerate_instances};
-use crate::intersect::exact::reported;
-use crate::intersect::exact_ray::ExactRay;
-use crate::intersect::line::widened;
+use crate::intersect::exact::{Intersection, reported};
+use crate::intersect::exact_ray::{ExactRay, LineSource};
+use crate::intersect::line::{RATIO_ERROR, widened};
+use crate::intersect::vector::wide;
 use crate::masks::Masks;
 use crate::query::{Receiver, TriangleRef, in_range, may_be_in_range};
 use crate::rays::{Hit, PrimitiveRef, Ray};
@@ -93,6 +94,18 @@ impl InstanceHits<'_> {
         in_range(t, self.ray.tmin, self.ray.tmax).then_some(t)
     }
 
+    /// Returns true if t is in the range of a ray in f64; always true for others.
+    fn is_in_wide_range(&self, found: &Intersection, corners: [[f32; 3]; 3]) -> bool {
+        let LineSource::World(lines, ray) = self.exact.line else { return true };
+        let Some([tmin, tmax]) = lines.range(ray) else { return true };
+        let off = 4.0 * RATIO_ERROR * found.t.abs();
+        if found.t - tmin > off && tmax - found.t > off {
+            return true;
+        }
+        let exact = lines.exact(ray).intersection(corners.map(wide));
+        exact.is_some_and(|exact| tmin <= exact.t && exact.t <= tmax)
+    }
+
     /// Returns true if the mask of a triangle's group and the ray's mask have a bit in common.
     fn meets_group(&self, triangle: TriangleRef<'_>) -> bool {
         self.groups.is_none_or(|groups| {
@@ -122,7 +135,11 @@ impl Receiver for InstanceHits<'_> {
         let Some(t) = self.reported_t(intersection.t) else { return false };
         let [.., determinant] = intersection.weight;
         // A hit beyond the limit is excluded before the id is read, which is often a cache miss.
-        if t > self.collector.limit() || !self.accept.cull.keeps(determinant) || !self.meets_group(triangle) {
+        if !self.is_in_wide_range(&intersection, corners)
+            || t > self.collector.limit()
+            || !self.accept.cull.keeps(determinant)
+            || !self.meets_group(triangle)
+        {
             return false;
         }
         let [u, v] = intersection.uv();

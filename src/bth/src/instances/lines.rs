@@ -18,13 +18,32 @@ use crate::nodes::affine::{Inverse, ObjectRay};
 use crate::object::single::SingleRay;
 use crate::objects::Objects;
 use crate::query::sink::Visit;
-use crate::rays::Ray;
+use crate::rays::{Ray, Ray64};
 use crate::shortcuts::free;
 use crate::simd::{Isa, Kernel, LANES, Simd};
-use crate::starts::world_ray::WorldRay;
+use crate::starts::world_ray::{InstanceStart, WorldRay};
 use bth_format::exact::{Dyadic, dyadic_vector};
 use bth_format::object::{ObjectBounds, ObjectView};
 use glam::Vec4;
+
+/// Where a ray goes through an object.
+#[derive(Clone, Copy)]
+pub(super) enum Place<'a> {
+    /// The object's space is world space.
+    World,
+    /// It is the object of this instance.
+    Instance(&'a World, &'a Objects, u32),
+}
+
+impl Place<'_> {
+    /// The transform to world space.
+    fn rows(&self) -> Option<Rows> {
+        match *self {
+            Place::World => None,
+            Place::Instance(world, objects, instance) => Some(world.row(objects, instance).to_world.rows()),
+        }
+    }
+}
 
 /// The line of a ray in the space of an instance's object.
 #[inline(always)]
@@ -36,52 +55,61 @@ pub(super) fn line_in(placement: &Placement, instance: u32, ray: &WorldRay<'_>) 
     line
 }
 
-/// The line of a ray through an instance, exactly. Its direction is divided by `t_scale`.
-#[cold]
-fn exact_line(
-    world: &World,
-    objects: &Objects,
-    instance: u32,
-    (ray, t_scale): (&WorldRay<'_>, f32),
-) -> ExactLine {
-    let rows = |instance: u32| world.row(objects, instance).to_world.rows();
-    let start = ray.start.and_then(|start| {
-        let object = objects.view(world.placement(start.instance).object());
-        let corners = start_corners(object, start.point.leaf, start.point.slot)?.map(wide);
-        let weights = [start.point.u.into(), start.point.v.into()];
-        Some(image_of_start(Some(&rows(start.instance)), corners, weights))
-    });
-    let (origin, weight) = start.unwrap_or_else(|| (image(None, wide(ray.ray.origin)), Dyadic::from(1.0)));
-    let scale = Dyadic::from(f64::from(t_scale));
-    let direction = dyadic_vector(wide(ray.ray.direction)).map(|x| &x * &scale);
-    ExactLine { origin, weight, direction, to_world: Some(rows(instance)) }
+/// The corners of the triangle on which a ray starts, its weights and the transform to world space.
+fn start_of(place: Place<'_>, start: &InstanceStart) -> Option<([[f64; 3]; 3], [f64; 2], Rows)> {
+    let Place::Instance(world, objects, _) = place else { return None };
+    let object = objects.view(world.placement(start.instance).object());
+    let corners = start_corners(object, start.point.leaf, start.point.slot)?.map(wide);
+    let weights = [start.point.u.into(), start.point.v.into()];
+    Some((corners, weights, Place::Instance(world, objects, start.instance).rows()?))
 }
 
-/// The line of a ray through an instance with more digits. Its direction is divided by `t_scale`.
+/// The line of a ray through an object, exactly. Its direction is divided by `t_scale`.
 #[cold]
-fn long_line(
-    world: &World,
-    objects: &Objects,
-    instance: u32,
-    (ray, t_scale): (&WorldRay<'_>, f32),
-) -> Option<LongLine> {
-    let rows_of = |instance: u32| world.row(objects, instance).to_world.rows();
-    let (rows, inverse) = (rows_of(instance), &world.placement(instance).inverse);
-    let direction = long_vector(wide(ray.ray.direction).map(|x| x * f64::from(t_scale)));
+pub(super) fn exact_line(place: Place<'_>, ray: &WorldRay<'_>, t_scale: f32) -> ExactLine {
+    let start = ray.start.and_then(|start| start_of(place, start));
+    let (origin, weight) = match start {
+        Some((corners, weights, rows)) => image_of_start(Some(&rows), corners, weights),
+        None => (image(None, ray.origin()), Dyadic::from(1.0)),
+    };
+    let scale = Dyadic::from(f64::from(t_scale));
+    let direction = dyadic_vector(ray.direction()).map(|x| &x * &scale);
+    ExactLine { origin, weight, direction, to_world: place.rows() }
+}
+
+/// The line of a ray that starts on a triangle of an object whose space is world space.
+pub(crate) fn exact_of_start(
+    object: &ObjectView<'_>,
+    start: &StartPoint,
+    direction: [f64; 3],
+) -> Option<ExactLine> {
+    let corners = start_corners(object, start.leaf, start.slot)?.map(wide);
+    let (origin, weight) = image_of_start(None, corners, [start.u.into(), start.v.into()]);
+    Some(ExactLine { origin, weight, direction: dyadic_vector(direction), to_world: None })
+}
+
+/// The line of a ray through an object with more digits. Its direction is divided by `t_scale`.
+#[cold]
+pub(super) fn long_line(place: Place<'_>, ray: &WorldRay<'_>, t_scale: f32) -> Option<LongLine> {
+    let direction = long_vector(ray.direction().map(|x| x * f64::from(t_scale)));
+    let Place::Instance(world, _, instance) = place else {
+        let origin = long_vector(ray.origin());
+        return Some(LongLine { origin, origin_error: 0.0, direction, direction_error: 0.0 });
+    };
+    let (rows, inverse) = (place.rows()?, &world.placement(instance).inverse);
     let (direction, off) = inverse.solve(&rows, direction, 0.0);
     let direction_error = off / max_norm(direction.map(Long::rounded));
     let (origin, origin_error) = match ray.start {
-        None => (long_vector(wide(ray.ray.origin)), 0.0),
+        None => (long_vector(ray.origin()), 0.0),
         Some(start) => {
-            let object = objects.view(world.placement(start.instance).object());
-            let corners = start_corners(object, start.point.leaf, start.point.slot)?.map(wide);
+            let (corners, weights, rows) = start_of(place, start)?;
             let size = corners.iter().fold(0.0f64, |most, corner| most.max(max_norm(*corner)));
-            let point = long_start(corners, [start.point.u.into(), start.point.v.into()]);
+            let origin = long_start(corners, weights);
             if start.instance == instance {
                 let origin_error = 8.0 * LONG_ERROR * size;
-                return Some(LongLine { origin: point, origin_error, direction, direction_error });
+                return Some(LongLine { origin, origin_error, direction, direction_error });
             }
-            image_of_long(&rows_of(start.instance), point, size)
+            image_of_long(&rows, origin, size)
         }
     };
     let relative = long_difference(origin, long_vector(inverse.origin));
@@ -97,10 +125,9 @@ fn image_of_long(rows: &Rows, point: LongVector, size: f64) -> (LongVector, f64)
     (image, 16.0 * LONG_ERROR * (norm * size + greatest))
 }
 
-/// A ray through an instance.
+/// A ray through an instance, or through an object whose space is world space.
 pub(crate) struct RayInInstance<'a> {
-    world: &'a World,
-    objects: &'a Objects,
+    place: Place<'a>,
     pub(crate) instance: u32,
     ray: WorldRay<'a>,
     /// The ray in the space of the object.
@@ -119,7 +146,13 @@ impl<'a> RayInInstance<'a> {
     ) -> RayInInstance<'a> {
         let line = line_in(world.placement(instance), instance, &ray);
         let of_object = ObjectRay::of(line, ray.ray.tmin, tmax);
-        RayInInstance { world, objects, instance, ray, of_object }
+        RayInInstance { place: Place::Instance(world, objects, instance), instance, ray, of_object }
+    }
+
+    /// A ray without a start that ends at `tmax`, in an object whose space is world space.
+    pub(crate) fn in_world(ray: WorldRay<'a>, instance: u32, tmax: f32) -> RayInInstance<'a> {
+        let of_object = ObjectRay::of(ray.line().or_unknown(), ray.ray.tmin, tmax);
+        RayInInstance { place: Place::World, instance, ray, of_object }
     }
 
     pub(crate) fn exact_ray(&self) -> ExactRay<'_> {
@@ -138,16 +171,20 @@ impl WorldLines for RayInInstance<'_> {
         None
     }
     fn long(&self, _ray: usize) -> Option<LongLine> {
-        long_line(self.world, self.objects, self.instance, (&self.ray, self.of_object.t_scale))
+        long_line(self.place, &self.ray, self.of_object.t_scale)
     }
     fn exact(&self, _ray: usize) -> ExactLine {
-        exact_line(self.world, self.objects, self.instance, (&self.ray, self.of_object.t_scale))
+        exact_line(self.place, &self.ray, self.of_object.t_scale)
     }
     fn start(&self, _ray: usize) -> Option<&StartPoint> {
         self.ray.start_in(self.instance)
     }
     fn are_from_starts(&self) -> bool {
         self.ray.start.is_some()
+    }
+    fn range(&self, _ray: usize) -> Option<[f64; 2]> {
+        let Ray64 { tmin, tmax, .. } = self.ray.wide?;
+        Some([tmin, tmax].map(|t| t / f64::from(self.of_object.t_scale)))
     }
 }
 
@@ -174,7 +211,10 @@ impl SingleRay for RayInInstance<'_> {
         // Vectors are made in registers: loading what was just written word by word would stall.
         let rows = [Vec4::new(x, y, z, tmin), Vec4::new(dx, dy, dz, ray.tmax)];
         let floats = [rows[0].to_array(), rows[1].to_array()];
-        let bounds = line.bounds(&object.bounds);
+        let bounds = match self.ray.wide {
+            None => line.bounds(&object.bounds),
+            Some(_) => line.with_rounded_range().bounds(&object.bounds),
+        };
         Some(InstanceLine { rows, ray: zerocopy::transmute!(floats), bounds })
     }
     #[inline(always)]
@@ -197,6 +237,13 @@ pub(super) struct VisitLines<'a> {
     pub(super) visits: &'a [Visit],
     /// For each visit the factor from t in the object to t in world space.
     pub(super) t_scale: &'a [f32],
+}
+
+impl<'a> VisitLines<'a> {
+    fn place_of(&self, visit: usize) -> (Place<'a>, WorldRay<'a>) {
+        let (Visit { ray, instance }, SceneBatch { world, objects, .. }) = (self.visits[visit], self.batch);
+        (Place::Instance(world, objects, instance), self.batch.world_ray(ray as usize))
+    }
 }
 
 impl WorldLines for VisitLines<'_> {
@@ -238,20 +285,21 @@ impl WorldLines for VisitLines<'_> {
         is_common.then(|| self.line(first))
     }
     fn long(&self, visit: usize) -> Option<LongLine> {
-        let (Visit { ray, instance }, SceneBatch { world, objects, .. }) = (self.visits[visit], self.batch);
-        let ray = self.batch.world_ray(ray as usize);
-        long_line(world, objects, instance, (&ray, self.t_scale[visit]))
+        let (place, ray) = self.place_of(visit);
+        long_line(place, &ray, self.t_scale[visit])
     }
     fn exact(&self, visit: usize) -> ExactLine {
-        let (Visit { ray, instance }, SceneBatch { world, objects, .. }) = (self.visits[visit], self.batch);
-        let ray = self.batch.world_ray(ray as usize);
-        exact_line(world, objects, instance, (&ray, self.t_scale[visit]))
+        let (place, ray) = self.place_of(visit);
+        exact_line(place, &ray, self.t_scale[visit])
     }
     fn start(&self, visit: usize) -> Option<&StartPoint> {
         self.batch.start(self.visits[visit]).map(|start| &start.point)
     }
     fn are_from_starts(&self) -> bool {
         !self.batch.starts.is_empty()
+    }
+    fn range(&self, _visit: usize) -> Option<[f64; 2]> {
+        None
     }
 }
 

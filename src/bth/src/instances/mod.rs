@@ -37,10 +37,11 @@ mod test_worlds;
 mod top_level;
 mod top_nodes;
 mod visit_queue;
+mod wide_rays;
 mod world;
 
 pub(crate) use by_caller::NewInstance;
-pub(crate) use lines::RayInInstance;
+pub(crate) use lines::{RayInInstance, exact_of_start};
 #[cfg(test)]
 pub(crate) use placement::PartBoxes;
 #[cfg(test)]
@@ -50,3 +51,4 @@ pub(crate) use top_level::TopLevel;
 #[cfg(test)]
 pub(crate) use top_nodes::INSTANCE;
 pub(crate) use world::{InstanceRow, World};
+pub(crate) use wide_rays::{trace_wide, wide_ray};

@@ -5,11 +5,15 @@ use super::World;
 use super::lines::RayInInstance;
 use crate::bvh::packet;
 use crate::coherence::is_same_octant;
+use crate::intersect::exact_ray::WorldLines;
+use crate::intersect::start::start_corners;
+use crate::intersect::vector::wide;
 use crate::object;
 use crate::objects::Objects;
 use crate::query::{Steps, better};
-use crate::rays::{Hit, Ray};
+use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::simd::Isa;
+use crate::starts::locate::place;
 use crate::starts::world_ray::WorldRay;
 use bth_format::object::ObjectView;
 
@@ -74,15 +78,55 @@ impl World {
         let ray = world_ray.ray;
         self.enumerate(ray, &mut |instance| {
             // Neither is NaN: for a ray whose `tmax` is, nothing is enumerated.
-            let tmax = if best.t < ray.tmax { best.t } else { ray.tmax };
+            let end = if world_ray.wide.is_some() { best.t.next_up() } else { best.t };
+            let tmax = if end < ray.tmax { end } else { ray.tmax };
             let (object, of_instance) = self.enter(objects, instance, world_ray, tmax);
             let mut hit = Hit::MISS;
             trace(object, &of_instance, &mut hit);
             let t_scale = of_instance.of_object.t_scale;
-            let Some(nearer) = better(ray, best, &hit, t_scale) else { return Some(tmax) };
+            let nearer = match world_ray.wide {
+                None => better(ray, best, &hit, t_scale),
+                Some(_) => self.better_wide(objects, world_ray, best, &hit, t_scale),
+            };
+            let Some(nearer) = nearer else { return Some(tmax) };
             *best = nearer;
-            Some(nearer.t)
+            // Another instance may be nearer by less than f32 can tell.
+            Some(if world_ray.wide.is_some() { nearer.t.next_up() } else { nearer.t })
         });
+    }
+
+    /// Like [`better`], for a ray in f64: hits whose t are equal when they are rounded are compared
+    /// exactly.
+    #[cold]
+    fn better_wide(
+        &self,
+        objects: &Objects,
+        ray: WorldRay<'_>,
+        best: &Hit,
+        hit: &Hit,
+        t_scale: f32,
+    ) -> Option<Hit> {
+        if !hit.is_hit() {
+            return None;
+        }
+        let hit = Hit { t: hit.t * t_scale, ..*hit };
+        let exact_t = |hit: &Hit| {
+            let PrimitiveRef { instance, triangle } = hit.primitive;
+            let of_instance = RayInInstance::new(self, objects, instance, ray, f32::INFINITY);
+            let object = objects.view(self.placement(instance).object());
+            let (leaf, slot) = place(object, triangle)?;
+            let corners = start_corners(object, leaf, slot)?.map(wide);
+            let t = of_instance.exact(0).intersection(corners)?.t;
+            Some(t * f64::from(of_instance.of_object.t_scale))
+        };
+        let is_close = best.is_hit() && (hit.t - best.t).abs() <= 2.0 * f32::EPSILON * hit.t.abs();
+        let nearer = match is_close.then(|| (exact_t(&hit), exact_t(best))) {
+            Some((Some(t), Some(of_best))) => {
+                t < of_best || t == of_best && hit.primitive.instance < best.primitive.instance
+            }
+            _ => hit.t < best.t,
+        };
+        nearer.then_some(hit)
     }
 
     /// Returns true if a ray hits anything, as [`Self::any`] computes it for many.

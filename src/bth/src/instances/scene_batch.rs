@@ -22,7 +22,7 @@ impl<'a> SceneBatch<'a> {
     /// A ray of the batch.
     pub(super) fn world_ray(&self, index: usize) -> WorldRay<'a> {
         let start = self.starts.get(index).filter(|start| start.instance != NONE);
-        WorldRay { ray: &self.rays[index], start }
+        WorldRay { ray: &self.rays[index], start, wide: None }
     }
 
     /// Where the ray of a visit starts, if that is on a triangle of the instance.

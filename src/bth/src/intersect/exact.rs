@@ -21,7 +21,7 @@
 
 use crate::intersect::line::Line;
 pub(crate) use crate::intersect::line::RATIO_ERROR;
-use crate::intersect::origin::Origin;
+use crate::intersect::origin::{Origin, RoundedLine};
 use crate::intersect::pairs;
 use crate::intersect::vector::{cross, dot, greater, lesser, max_norm, minus, wide};
 use crate::simd::{Doubles, PlainDoubles};
@@ -257,6 +257,29 @@ pub(crate) fn certain_intersection(
 ) -> (Intersection, bool) {
     let LineSides { rounded, is_inside, .. } = LineSides::new(origin, direction, corners);
     (rounded.intersection(), is_inside & rounded.is_accurate)
+}
+
+/// The intersection of a line with a triangle that it crosses, if t certainly has a relative error
+/// of at most 2^-40, and u and v are within [`RATIO_ERROR`].
+///
+/// With the notation above, let n' be the rounded normal, N its max |component|, h the point of the
+/// hit, and e and δ the errors of the line. V and W have the error of n' in common: from a-o = td +
+/// (a-h) follows V/W - t = (a-h)·n'/W, which is at most 24um³/W. The roundings of the products with
+/// n' add 12urN to V and 9uDN to W, the errors of the line 3eN and 3δDN.
+pub(crate) fn precise(line: &RoundedLine, corners: [[f64; 3]; 3]) -> Option<Intersection> {
+    const U: f64 = f64::EPSILON / 2.0;
+    const PRECISE: f64 = 1.0 / (1u64 << 40) as f64;
+    let (terms, norm) = (OriginTerms::new(*line, corners), max_norm(line.direction));
+    let rounded = RoundedIntersection::new(&terms, line.direction, norm);
+    let [a, b, c] = corners;
+    let (distance, edge) =
+        (max_norm(minus(a, line.point())), greater(max_norm(minus(b, a)), max_norm(minus(c, a))));
+    let (normal, [.., determinant]) = (max_norm(terms.normal), rounded.weight);
+    let of_volume = 24.0 * U * edge * edge * edge + (12.0 * U * distance + 3.0 * line.origin.1) * normal;
+    let of_determinant = (9.0 * U + 3.0 * line.direction_error) * norm * normal;
+    let error = of_volume + rounded.t.abs() * of_determinant;
+    let is_precise = 1.01 * error <= PRECISE * rounded.t.abs() * determinant.abs();
+    (is_precise && rounded.is_accurate).then(|| rounded.intersection())
 }
 
 /// Bounds of the t at which a line crosses a triangle, given t in f64, the determinant W, whose

@@ -42,6 +42,9 @@ pub(crate) trait WorldLines {
     fn exact(&self, ray: usize) -> ExactLine;
     /// Where a ray starts, if that is on a triangle of this object.
     fn start(&self, ray: usize) -> Option<&StartPoint>;
+    /// The range of t of a ray in f64, in the units of its line, which is compared with t as it is.
+    /// `None` for rays whose range and t are numbers of f32.
+    fn range(&self, ray: usize) -> Option<[f64; 2]>;
     /// Returns true if all rays start on triangles: only hits at t > 0 count.
     fn are_from_starts(&self) -> bool;
 }

@@ -91,6 +91,12 @@ impl RoundedLine {
         self
     }
 
+    /// The same line with the error that a range of t rounded to f32 has.
+    pub(crate) fn with_rounded_range(mut self) -> RoundedLine {
+        self.direction_error += f64::from(f32::EPSILON / 2.0);
+        self
+    }
+
     /// The bounds for which the ray of f32 is prepared that approximates this line in the space of
     /// an object with bounds `of`.
     #[inline(always)]

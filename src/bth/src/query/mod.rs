@@ -221,6 +221,18 @@ impl<G: Goal> RayQuery<G> {
         (self.triangle != NONE && !self.goal.is_any()).then_some(self.best.t)
     }
 
+    /// Id and t of the nearest hit so far; `None` as for [`Self::found`].
+    pub(crate) fn best(&self, ids: &[u32]) -> Option<(u32, f64)> {
+        let t = self.found()?;
+        Some((self.best_triangle(ids).read(), t))
+    }
+
+    /// Replaces the nearest hit so far by one whose t lies in the range.
+    pub(crate) fn replace(&mut self, triangle: TriangleRef<'_>, intersection: Intersection) {
+        (self.triangle, self.is_index) = (triangle.value, triangle.is_index);
+        self.best = intersection;
+    }
+
     /// Lower and upper bound of the t of [`Self::found`].
     #[inline(always)]
     pub(crate) fn found_bounds(&self) -> Option<[f64; 2]> {

@@ -42,7 +42,7 @@ pub(crate) fn locate(object: &ObjectView<'_>, start: Start) -> Result<StartPoint
 /// The child code of the leaf that holds a triangle, and its slot there. Special
 /// leaves have slots, too.
 #[inline(always)]
-pub(super) fn place(object: &ObjectView<'_>, triangle: u32) -> Option<(u32, u32)> {
+pub(crate) fn place(object: &ObjectView<'_>, triangle: u32) -> Option<(u32, u32)> {
     let code = *object.places.get(triangle as usize)?;
     match TrianglePlace::from_code(code) {
         Some(TrianglePlace { leaf, slot }) => Some((leaf.code(), slot)),

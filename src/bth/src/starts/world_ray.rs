@@ -3,7 +3,7 @@
 use crate::intersect::origin::{RoundedLine, RoundedOrigin};
 use crate::intersect::start_point::StartPoint;
 use crate::intersect::vector::wide;
-use crate::rays::{Ray, Start, StartRay};
+use crate::rays::{Ray, Ray64, Start, StartRay};
 use bth_format::layout::NONE;
 
 /// A start in the space of the object of an instance.
@@ -30,18 +30,20 @@ impl InstanceStart {
 }
 
 /// A ray in world space, and its start if that is on a triangle. Its origin is then the start
-/// rounded to f32.
+/// rounded to f32. A ray in f64 is rounded, too.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WorldRay<'a> {
     pub(crate) ray: &'a Ray,
     pub(crate) start: Option<&'a InstanceStart>,
+    /// The ray in f64, if it is one.
+    pub(crate) wide: Option<&'a Ray64>,
 }
 
 impl<'a> WorldRay<'a> {
     /// A ray with an origin.
     #[inline(always)]
     pub(crate) fn plain(ray: &'a Ray) -> WorldRay<'a> {
-        WorldRay { ray, start: None }
+        WorldRay { ray, start: None, wide: None }
     }
 
     /// The start, if it is on this instance.
@@ -53,11 +55,30 @@ impl<'a> WorldRay<'a> {
     /// The line in world space.
     #[inline(always)]
     pub(crate) fn line(&self) -> RoundedLine {
-        match self.start {
-            None => RoundedLine::of_ray(self.ray),
-            Some(start) => {
-                RoundedLine { origin: start.world, direction: wide(self.ray.direction), direction_error: 0.0 }
-            }
+        let origin = match (self.start, self.wide) {
+            (None, None) => return RoundedLine::of_ray(self.ray),
+            (Some(start), _) => start.world,
+            (None, Some(ray)) => RoundedOrigin(ray.origin, 0.0),
+        };
+        RoundedLine { origin, direction: self.direction(), direction_error: 0.0 }
+    }
+
+    /// The direction in world space.
+    #[inline(always)]
+    pub(crate) fn direction(&self) -> [f64; 3] {
+        self.wide.map_or_else(|| wide(self.ray.direction), |ray| ray.direction)
+    }
+
+    /// The origin in world space of a ray that does not start on a triangle.
+    pub(crate) fn origin(&self) -> [f64; 3] {
+        self.wide.map_or_else(|| wide(self.ray.origin), |ray| ray.origin)
+    }
+
+    /// The range of t.
+    pub(crate) fn range(&self) -> [f64; 2] {
+        match self.wide {
+            Some(ray) => [ray.tmin, ray.tmax],
+            None => [self.ray.tmin.into(), self.ray.tmax.into()],
         }
     }
 
@@ -87,6 +108,6 @@ pub(crate) struct PlacedRay {
 
 impl PlacedRay {
     pub(crate) fn world_ray(&self) -> WorldRay<'_> {
-        WorldRay { ray: &self.ray, start: self.start.as_ref() }
+        WorldRay { ray: &self.ray, start: self.start.as_ref(), wide: None }
     }
 }

@@ -172,8 +172,9 @@ impl Hit {
 ///
 /// All queries take it. They decide about its own numbers, exactly, and choose the nearest hit by
 /// its exact t. Hits that they return have t, u and v rounded to f32;
-/// [`Scene::hit_f64`](crate::Scene::hit_f64) returns the f64 numbers of a hit. A ray whose origin or
-/// range leaves f32 in the space of an object, or whose direction is beyond 2^±164, does not hit it.
+/// [`Scene::hit_f64`](crate::Scene::hit_f64) returns the f64 numbers of a hit. A ray whose origin
+/// leaves the range of f32 in the space of an object, or whose direction is beyond 2^±164, does not
+/// hit it.
 #[derive(Clone, Copy, Debug, PartialEq, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct Ray64 {

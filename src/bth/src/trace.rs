@@ -12,7 +12,7 @@ use crate::hits::{Accept, results};
 use crate::instances::{RayInInstance, exact_of_start};
 use crate::intersect::exact::precise;
 use crate::intersect::exact_ray::{LineSource, WorldLines};
-use crate::intersect::start::start_corners;
+use crate::intersect::start::corners_of;
 use crate::intersect::vector::wide;
 use crate::object;
 use crate::query::Steps;
@@ -20,7 +20,6 @@ use crate::query::sink::Answers;
 use crate::rays::{Hit, Hit64, PrimitiveRef, Ray, Start};
 use crate::scene::Scene;
 use crate::start_points;
-use crate::starts::locate::place;
 use crate::starts::world_ray::WorldRay;
 use crate::streams::{HitStreams, RayStreams};
 use crate::trace_ray::TraceRay;
@@ -314,8 +313,7 @@ fn hit_in_f64(scene: &Scene, ray: WorldRay<'_>, primitive: PrimitiveRef) -> Opti
     let entered = EnteredInstance::new(scene, primitive.instance);
     let of_instance = entered.ray(ray, ray.ray.tmax);
     let (exact, object) = (of_instance.exact(), entered.object);
-    let (leaf, slot) = place(object, primitive.triangle)?;
-    let corners = start_corners(object, leaf, slot)?.map(wide);
+    let corners = corners_of(object, primitive.triangle)?.map(wide);
     let found = precise(&exact.rounded(), corners).or_else(|| match exact.line {
         LineSource::Ray => RayInInstance::in_world(ray, 0, ray.ray.tmax).exact(0).intersection(corners),
         LineSource::Start(start) => {

@@ -131,12 +131,14 @@ fn rows(scene: &Scene, instance: u32) -> Option<Rows> {
     scene.world().map(|world| world.row(scene.objects(), instance).to_world.rows())
 }
 
+/// 2^-52: bounds the rounding of a difference, relative to the difference.
+const DIFFERENCE_ERROR: f64 = f64::EPSILON;
+
 /// Returns true if a triangle of an instance blocks a segment.
 fn blocks_in(scene: &Scene, entered: &EnteredInstance<'_>, a: &PlacedEnd, b: &PlacedEnd) -> bool {
     let [RoundedOrigin(from, from_off), RoundedOrigin(to, to_off)] = [a, b].map(|end| end.in_object(entered));
     let direction = minus(to, from);
-    // One more rounding of the difference.
-    let off = (from_off + to_off) * (1.0 + RATIO_ERROR) / max_norm(direction) + f64::EPSILON;
+    let off = (from_off + to_off) * (1.0 + RATIO_ERROR) / max_norm(direction) + DIFFERENCE_ERROR;
     let line =
         RoundedLine { origin: RoundedOrigin(from, from_off), direction, direction_error: off }.or_unknown();
     let of_object = ObjectRay::of(line, 0.0, 1.0);

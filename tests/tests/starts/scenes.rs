@@ -91,7 +91,7 @@ fn agree(scene: &Scene, ray: &StartRay, hit: &Hit, context: &str) {
 }
 
 #[test]
-#[ignore = "until rays are exact in every instance"]
+
 fn instances_under_exact_transforms_agree_with_the_oracle() {
     let _turn = turn();
     let (mut hits, mut count) = (0, 0);

@@ -5,7 +5,7 @@ use bth_tests::by_day;
 use bth_tests::stress::{Statistics, run_tiles, tiles};
 
 #[test]
-#[ignore = "until rays are exact in every instance"]
+
 fn nothing_leaks_between_tiles_and_bits_are_equal_everywhere() {
     for seed in 0..by_day(2, 8) {
         for tiles in tiles(seed) {

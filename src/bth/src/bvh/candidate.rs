@@ -3,15 +3,14 @@
 
 use super::nodes;
 use crate::intersect::exact::{Estimate, Intersection, estimate, in_pairs};
-use crate::intersect::exact_ray::{ExactRay, LineSource, WorldLines};
+use crate::intersect::exact_ray::{ExactRay, LineSource, WorldLines, intersect_in_world};
 use crate::intersect::line::Line;
 use crate::intersect::line::RATIO_ERROR;
-use crate::intersect::start::{StartDecision, decide_start, decide_start_exactly, start_corners, start_on};
+use crate::intersect::start::{StartDecision, corners_of, decide_start, decide_start_exactly, start_on};
 use crate::intersect::vector::wide;
 use crate::query::{Goal, RayQuery, TriangleRef};
 use crate::rays::Ray;
 use crate::simd::{Part, Simd};
-use crate::starts::locate::place;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 
@@ -104,7 +103,7 @@ fn settle_one<S: Simd, G: Goal>(
         .is_some_and(|intersection| query.offer(TriangleRef::index(index, object.triangle_ids), intersection))
 }
 
-/// Like [`settle_one`], for a ray whose line is not that of f32.
+/// Like [`settle_one`], for a ray whose line f32 does not hold.
 #[inline(never)]
 fn settle_other<G: Goal>(
     object: &ObjectView<'_>,
@@ -143,7 +142,7 @@ fn offer_wide<G: Goal>(
     }
     if let Some((best, t)) = query.best(object.triangle_ids)
         && close(t, found.t)
-        && let Some(other) = place(object, best).and_then(|(leaf, slot)| start_corners(object, leaf, slot))
+        && let Some(other) = corners_of(object, best)
         && let (Some(t), Some(of_best)) = (exact_t(corners), exact_t(other))
     {
         if t < of_best || t == of_best && triangle.read() < best {
@@ -178,28 +177,6 @@ pub(crate) fn intersect(
             }
         }
         LineSource::World(lines, ray) => intersect_in_world((lines, ray), corners.map(wide), may_matter),
-    }
-}
-
-/// The intersection of a line in world space with a triangle, given its corners in the space of the
-/// object, if it counts. `may_matter` is called with bounds of t where only exact arithmetic can
-/// tell.
-pub(crate) fn intersect_in_world(
-    (lines, ray): (&dyn WorldLines, usize),
-    corners: [[f64; 3]; 3],
-    may_matter: impl FnOnce([f64; 2]) -> bool,
-) -> Option<Intersection> {
-    let (line, counts) = (lines.line(ray), |found: &Intersection| found.t > 0.0 || !lines.are_from_starts());
-    match estimate(line, line.direction, corners) {
-        Estimate::Missed => None,
-        Estimate::Intersects(found) => Some(found).filter(counts),
-        Estimate::Open(_, t) if t[1] <= 0.0 && lines.are_from_starts() || !may_matter(t) => None,
-        Estimate::Open(uncertain, _) => {
-            let found = lines.long(ray).and_then(|line| line.decide(corners));
-            let found = found.unwrap_or_else(|| lines.exact(ray).intersection(corners));
-            let found = found.filter(counts)?;
-            Some(uncertain.if_accurate().unwrap_or(found))
-        }
     }
 }
 

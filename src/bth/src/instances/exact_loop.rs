@@ -1,10 +1,10 @@
 //! The oracle of tests of instances: a loop over all triangles, without any box.
 
 use super::{RayInInstance, World};
-use crate::bvh::candidate::{Candidate, intersect_in_world};
+use crate::bvh::candidate::Candidate;
 use crate::bvh::nodes::{Leaf, LeafMemory, leaf};
 use crate::intersect::exact::{RATIO_ERROR, reported};
-use crate::intersect::exact_ray::WorldLines;
+use crate::intersect::exact_ray::{WorldLines, intersect_in_world};
 use crate::intersect::line::Line;
 use crate::intersect::vector::wide;
 use crate::objects::Objects;
@@ -48,7 +48,9 @@ pub(crate) fn add_hits(
 ) {
     let of_instance = RayInInstance::new(world, objects, instance, WorldRay::plain(ray), ray.tmax);
     let object_ray = &of_instance.of_object;
-    if Line::of(&object_ray.line).is_none() || !(ray.tmin <= ray.tmax) {
+    if Line::of(&object_ray.line).is_none()
+        || ray.tmin.partial_cmp(&ray.tmax).is_none_or(|order| order.is_gt())
+    {
         return;
     }
     for (triangle, corners) in triangles(object) {

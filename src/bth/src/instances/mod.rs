@@ -50,5 +50,5 @@ pub(crate) use placement::Placement;
 pub(crate) use top_level::TopLevel;
 #[cfg(test)]
 pub(crate) use top_nodes::INSTANCE;
-pub(crate) use world::{InstanceRow, World};
 pub(crate) use wide_rays::{trace_wide, wide_ray};
+pub(crate) use world::{InstanceRow, World};

@@ -6,16 +6,19 @@ use super::lines::RayInInstance;
 use crate::bvh::packet;
 use crate::coherence::is_same_octant;
 use crate::intersect::exact_ray::WorldLines;
-use crate::intersect::start::start_corners;
+use crate::intersect::start::corners_of;
 use crate::intersect::vector::wide;
 use crate::object;
 use crate::objects::Objects;
 use crate::query::{Steps, better};
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::simd::Isa;
-use crate::starts::locate::place;
 use crate::starts::world_ray::WorldRay;
 use bth_format::object::ObjectView;
+
+/// Bounds the difference of two t that are rounded to f32 and may be equal before, relative to
+/// them: two roundings of half an epsilon each, twice.
+const ROUNDED_T: f32 = 2.0 * f32::EPSILON;
 
 /// Fewer rays go one by one if a single instance is visible.
 const MIN_RAYS_OF_ONE_INSTANCE: usize = 16;
@@ -114,12 +117,11 @@ impl World {
             let PrimitiveRef { instance, triangle } = hit.primitive;
             let of_instance = RayInInstance::new(self, objects, instance, ray, f32::INFINITY);
             let object = objects.view(self.placement(instance).object());
-            let (leaf, slot) = place(object, triangle)?;
-            let corners = start_corners(object, leaf, slot)?.map(wide);
+            let corners = corners_of(object, triangle)?.map(wide);
             let t = of_instance.exact(0).intersection(corners)?.t;
             Some(t * f64::from(of_instance.of_object.t_scale))
         };
-        let is_close = best.is_hit() && (hit.t - best.t).abs() <= 2.0 * f32::EPSILON * hit.t.abs();
+        let is_close = best.is_hit() && (hit.t - best.t).abs() <= ROUNDED_T * hit.t.abs();
         let nearer = match is_close.then(|| (exact_t(&hit), exact_t(best))) {
             Some((Some(t), Some(of_best))) => {
                 t < of_best || t == of_best && hit.primitive.instance < best.primitive.instance

@@ -267,7 +267,8 @@ pub(crate) fn certain_intersection(
 /// (a-h) follows V/W - t = (a-h)·n'/W, which is at most 24um³/W. The roundings of the products with
 /// n' add 12urN to V and 9uDN to W, the errors of the line 3eN and 3δDN.
 pub(crate) fn precise(line: &RoundedLine, corners: [[f64; 3]; 3]) -> Option<Intersection> {
-    const U: f64 = f64::EPSILON / 2.0;
+    /// The relative rounding of an operation, u.
+    const U: f64 = 1.0 / (1u64 << 53) as f64;
     const PRECISE: f64 = 1.0 / (1u64 << 40) as f64;
     let (terms, norm) = (OriginTerms::new(*line, corners), max_norm(line.direction));
     let rounded = RoundedIntersection::new(&terms, line.direction, norm);

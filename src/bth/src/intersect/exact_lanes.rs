@@ -143,8 +143,8 @@ impl Intersections {
 
     /// Like [`Self::compute`], for rays that all start at the origin of `terms`. `of_lane` returns
     /// the direction of a ray and its max |component|; `hit` holds for each ray the index of its
-    /// triangle in `terms`; with `FIRST_HALF`, all indices are below eight. It is a kernel that is inlined into
-    /// its caller, whose variables the parameters are.
+    /// triangle in `terms`; with `FIRST_HALF`, all indices are below eight. It is a kernel that is
+    /// inlined into its caller, whose variables the parameters are.
     #[inline(always)]
     pub(crate) fn compute_from_point<S: Simd, const FIRST_HALF: bool>(
         &mut self,

@@ -143,8 +143,8 @@ impl SegmentLine {
         let found = self.line.intersection(corners)?;
         let [a, b, c] = &self.line.relative(corners);
         let normal = dyadic_cross(&dyadic_difference(b, a), &dyadic_difference(c, a));
-        // For weights w and z of the ends, the volume has a factor w³ and this determinant w³z: t is
-        // the volume times z over the determinant.
+        // For weights w and z of the ends, the volume has a factor w³ and this determinant w³z: t
+        // is the volume times z over the determinant.
         let volume = &dyadic_dot(a, &normal) * &self.end_weight;
         let determinant = dyadic_dot(&self.line.direction, &normal);
         let sign = sign_of(&determinant);

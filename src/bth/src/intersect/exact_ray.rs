@@ -1,5 +1,6 @@
 //! Rays as decisions need them: with the line that f32 only approximates.
 
+use super::exact::{Estimate, Intersection, estimate};
 use super::exact_line::ExactLine;
 use super::long::LongLine;
 use super::origin::{RoundedLine, RoundedOrigin};
@@ -83,6 +84,28 @@ impl<'a> ExactRay<'a> {
                 RoundedLine { origin, direction: wide(self.ray.direction), direction_error: 0.0 }
             }
             LineSource::World(lines, ray) => lines.line(ray),
+        }
+    }
+}
+
+/// The intersection of a line in world space with a triangle, given its corners in the space of the
+/// object, if it counts. `may_matter` is called with bounds of t where only exact arithmetic can
+/// tell.
+pub(crate) fn intersect_in_world(
+    (lines, ray): (&dyn WorldLines, usize),
+    corners: [[f64; 3]; 3],
+    may_matter: impl FnOnce([f64; 2]) -> bool,
+) -> Option<Intersection> {
+    let (line, counts) = (lines.line(ray), |found: &Intersection| found.t > 0.0 || !lines.are_from_starts());
+    match estimate(line, line.direction, corners) {
+        Estimate::Missed => None,
+        Estimate::Intersects(found) => Some(found).filter(counts),
+        Estimate::Open(_, t) if t[1] <= 0.0 && lines.are_from_starts() || !may_matter(t) => None,
+        Estimate::Open(uncertain, _) => {
+            let found = lines.long(ray).and_then(|line| line.decide(corners));
+            let found = found.unwrap_or_else(|| lines.exact(ray).intersection(corners));
+            let found = found.filter(counts)?;
+            Some(uncertain.if_accurate().unwrap_or(found))
         }
     }
 }

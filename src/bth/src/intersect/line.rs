@@ -40,8 +40,8 @@ pub(crate) struct Line {
     pub(crate) shear: [f64; 2],
     /// `1 / direction[axis[2]]`, the factor from depth to t.
     pub(crate) inverse_depth: f64,
-    /// Bounds of the errors of `origin` and `direction`, as in [`RoundedLine`]; 0 where a ray of f32
-    /// holds the line.
+    /// Bounds of the errors of `origin` and `direction`, as in [`RoundedLine`]; 0 where a ray of
+    /// f32 holds the line.
     origin_error: f64,
     direction_error: f64,
 }

@@ -107,6 +107,9 @@ fn long_cross(a: LongVector, b: LongVector) -> LongVector {
 /// 2^-98: bounds the errors of sums of products of three components relative to their sizes.
 pub(crate) const LONG_ERROR: f64 = 1.0 / (1u128 << 98) as f64;
 
+/// 2^-52: bounds the rounding of a number to f64, relative to the number.
+const ROUNDED: f64 = f64::EPSILON;
+
 /// The point with weights u and v of a triangle: a + u(b-a) + v(c-a), or (ub + vc)/(u + v) where
 /// u + v exceeds 1.
 pub(crate) fn long_start(corners: [[f64; 3]; 3], [u, v]: [f64; 2]) -> LongVector {
@@ -156,7 +159,7 @@ impl LongLine {
         let error = [rounding * edge * (edge + distance), rounding * distance * edge * edge];
         let [weight_error, volume_error] = line.enlarge(error, edge, distance);
         // The weights were rounded to f64.
-        let of_weights = f64::EPSILON * (first.abs() + weights[0].abs() + weights[1].abs());
+        let of_weights = ROUNDED * (first.abs() + weights[0].abs() + weights[1].abs());
         let bound = weight_error * size(self.direction) + of_weights;
         let (volume, determinant) = (volume.rounded(), determinant.rounded());
         let all = [first, weights[0], weights[1]];

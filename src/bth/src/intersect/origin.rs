@@ -74,6 +74,9 @@ const SAFE: std::ops::Range<f64> = 1.0 / POWER..POWER;
 /// 2^300.
 const POWER: f64 = f64::from_bits((1023 + 300) << 52);
 
+/// 2^-24: the relative rounding of a number to f32.
+const ROUNDED_TO_F32: f64 = 1.0 / (1u64 << 24) as f64;
+
 impl RoundedLine {
     /// The line of a ray of f32.
     #[inline(always)]
@@ -93,7 +96,7 @@ impl RoundedLine {
 
     /// The same line with the error that a range of t rounded to f32 has.
     pub(crate) fn with_rounded_range(mut self) -> RoundedLine {
-        self.direction_error += f64::from(f32::EPSILON / 2.0);
+        self.direction_error += ROUNDED_TO_F32;
         self
     }
 

@@ -22,7 +22,7 @@ use super::origin::RoundedOrigin;
 use super::start_point::StartPoint;
 use super::vector::wide;
 use bth_format::exact::{EDGE_PARTS, Expansion, VOLUME_PARTS};
-use bth_format::layout::{IndexedLeaf, WIDTH};
+use bth_format::layout::{IndexedLeaf, TrianglePlace, WIDTH};
 use bth_format::object::ObjectView;
 
 /// Weights of hits are rounded to f32: their sum, rounded too, exceeds 1 by at most this.
@@ -240,6 +240,23 @@ pub(crate) fn decide_start_exactly(
         return None;
     }
     start.decide(direction, corners.map(wide), uncertain)
+}
+
+/// The child code of the leaf that holds a triangle, and its slot there. Special
+/// leaves have slots, too.
+#[inline(always)]
+pub(crate) fn place(object: &ObjectView<'_>, triangle: u32) -> Option<(u32, u32)> {
+    let code = *object.places.get(triangle as usize)?;
+    match TrianglePlace::from_code(code) {
+        Some(TrianglePlace { leaf, slot }) => Some((leaf.code(), slot)),
+        None => object.special_place(triangle),
+    }
+}
+
+/// The corners of the triangle with an id. `None` if the file does not tell where it lies.
+pub(crate) fn corners_of(object: &ObjectView<'_>, triangle: u32) -> Option<[[f32; 3]; 3]> {
+    let (leaf, slot) = place(object, triangle)?;
+    start_corners(object, leaf, slot)
 }
 
 /// The corners of the triangle in a slot of a leaf, given as its child code. `None` if there is no

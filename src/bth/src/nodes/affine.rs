@@ -8,13 +8,16 @@ use crate::simd::LANES;
 use bth_format::layout::Node;
 
 /// Max condition number, in the maximum norm, of transforms that are not treated as singular.
-/// Beyond it f32 would leave out nothing in object space.
+/// Beyond it f32 would exclude nothing in object space.
 const GREATEST_CONDITION: f64 = (1u64 << 24) as f64;
-/// 2^-50: the greatest residual I - LA that is computed for the inverse L of A, relative to the
+/// 2^-50: the largest residual I - LA that is computed for the inverse L of A, relative to the
 /// condition number.
 const RESIDUAL: f64 = 1.0 / (1u64 << 50) as f64;
 /// Six roundings of half an epsilon; the transform of a vector has four.
 const ROUNDINGS: f64 = 3.0 * f64::EPSILON;
+/// Bounds the rounding of the computed residual relative to the condition number: each of its
+/// products has at most three roundings of half an epsilon.
+const RESIDUAL_ROUNDING: f64 = 2.0 * f64::EPSILON;
 
 /// An affine transform: a point p is mapped to `linear * p + translation`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -200,12 +203,11 @@ impl Affine {
         if rest > RESIDUAL * condition {
             linear = refined(linear, &[a, b, c]);
             rest = norm(&residual(&linear, &[a, b, c]));
-            if !(rest <= RESIDUAL * condition) {
+            if rest.is_nan() || rest > RESIDUAL * condition {
                 return None;
             }
         }
-        // Each product in the residual has at most three roundings of half an epsilon.
-        let line_error = 1.01 * (rest + 2.0 * f64::EPSILON * condition) + ROUNDINGS;
+        let line_error = 1.01 * (rest + RESIDUAL_ROUNDING * condition) + ROUNDINGS;
         let linear = scaled(&linear, scale);
         let [error, direction_error] =
             [norm(&linear), condition].map(|factor| (1.01 * factor * line_error) as f32);
@@ -231,8 +233,8 @@ pub(crate) struct Inverse {
     pub(crate) linear: [[f64; 3]; 3],
     /// The origin of object space, in world space.
     pub(crate) origin: [f64; 3],
-    /// Bound of the error of a product of `linear` with a vector, relative to that of the vector,
-    /// which includes the error of `linear`. 0 where it is the identity.
+    /// Bound of the error of a product of `linear` with a vector, relative to the vector. It
+    /// includes the error of `linear`, and is 0 for the identity.
     pub(crate) error: f32,
     /// The same for directions, relative to the max |component| of the product.
     pub(crate) direction_error: f32,
@@ -356,11 +358,11 @@ impl Inverse {
         (in_world + max_norm(self.origin)) * f64::from(self.error) + off
     }
 
-    /// The vector x of object space with Ax = `of`, for the transform A from object space with these
-    /// rows, and a bound of its error; `off` bounds the error of `of`.
+    /// The vector x of object space with Ax = `of`, for the transform A from object space with
+    /// these rows, and a bound of its error; `off` bounds the error of `of`.
     ///
-    /// A step of refinement: with the residual r of x = L`of`, L r is added, whose error is at most
-    /// that of L times r.
+    /// A step of refinement: with the residual r of x = L`of`, L r is added. Its error is at most
+    /// the error of L times r.
     pub(crate) fn solve(&self, rows: &[[f64; 4]; 3], of: LongVector, off: f64) -> (LongVector, f64) {
         let linear = rows.map(|[x, y, z, _]| [x, y, z]);
         let rounded = of.map(Long::rounded);
@@ -394,7 +396,7 @@ impl Inverse {
         let error = condition / norm(&self.linear) * (rest + off)
             + 2.0 * (f64::from(self.error) / norm(&self.linear) + ROUNDINGS) * condition * max_norm(x);
         let world = [0, 1, 2].map(|k| self.origin[k] + x[k]);
-        RoundedOrigin(world, 1.01 * error + max_norm(world) * f64::EPSILON)
+        RoundedOrigin(world, 1.01 * error + max_norm(world) * ROUNDINGS)
     }
 
     /// Like [`Self::line`] and [`ObjectRay::of`] for sixteen rays of f32, rounded to f32. The

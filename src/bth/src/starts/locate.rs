@@ -1,7 +1,6 @@
 //! Where the triangle of a start lies in its object, and the start in f64.
 
-use crate::intersect::start::start_corners;
-use crate::intersect::start::{are_weights, rounded_start};
+use crate::intersect::start::{are_weights, place, rounded_start, start_corners};
 use crate::intersect::start_point::StartPoint;
 use crate::intersect::vector::wide;
 use crate::rays::{PrimitiveRef, Start};
@@ -37,17 +36,6 @@ pub(crate) fn locate(object: &ObjectView<'_>, start: Start) -> Result<StartPoint
     let corners = corners.map(wide);
     let origin = rounded_start(corners, [u.into(), v.into()]);
     Ok(StartPoint { origin, leaf, slot, u, v })
-}
-
-/// The child code of the leaf that holds a triangle, and its slot there. Special
-/// leaves have slots, too.
-#[inline(always)]
-pub(crate) fn place(object: &ObjectView<'_>, triangle: u32) -> Option<(u32, u32)> {
-    let code = *object.places.get(triangle as usize)?;
-    match TrianglePlace::from_code(code) {
-        Some(TrianglePlace { leaf, slot }) => Some((leaf.code(), slot)),
-        None => object.special_place(triangle),
-    }
 }
 
 /// Prefetches the lines of the leaf of a triangle that [`locate`] reads one after the other.

@@ -1,7 +1,7 @@
 //! The triangles on which sixteen rays start: what must be read of them, without waiting for it.
 
-use super::locate::{place, prefetch_leaf};
-use crate::intersect::start::start_corners;
+use super::locate::prefetch_leaf;
+use crate::intersect::start::{place, start_corners};
 use crate::shortcuts::free::{FreeColumns, FreeRow};
 use crate::simd::{LANES, Simd};
 use bth_format::exact::is_zero_area;

@@ -128,8 +128,8 @@ impl CachedHits<'_> {
         self.lines.lanes(&rays[..count], self.rays, of_lanes);
     }
 
-    /// Computes ids and terms of the cached triangles, at the first call for a packet. Returns false
-    /// if the lines of the rays have no common origin, though the rays of f32 have one.
+    /// Computes ids and terms of the cached triangles, at the first call for a packet. Returns
+    /// false if the lines of the rays have no common origin, though the rays of f32 have one.
     #[inline(always)]
     pub(crate) fn compute(&mut self) -> bool {
         if self.hit_cache.is_computed {

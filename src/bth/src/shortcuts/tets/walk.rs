@@ -8,8 +8,7 @@
 //! every tetrahedron that the line may touch.
 
 use super::records::{Entered, ReadRecords};
-use crate::bvh::candidate::intersect_in_world;
-use crate::intersect::exact_ray::WorldLines;
+use crate::intersect::exact_ray::{WorldLines, intersect_in_world};
 use crate::intersect::line::{Line, Projected, Sign};
 use crate::intersect::start::ExactStart;
 use crate::intersect::vector::wide;

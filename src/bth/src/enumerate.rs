@@ -55,8 +55,9 @@ impl<'a> EnteredInstance<'a> {
                 ray,
                 tmax,
             )),
-            None if ray.wide.is_some() => {
-                EnteredRay::InInstance(RayInInstance::in_world(ray, self.instance, tmax))
+            None if ray.wide.is_some() || ray.start.is_some_and(|of| of.instance != self.instance) => {
+                let objects = Some(self.scene.objects());
+                EnteredRay::InInstance(RayInInstance::in_world(objects, self.instance, ray, tmax))
             }
             None => EnteredRay::InWorld { ray: Ray { tmax, ..*ray.ray }, start: ray.start_in(self.instance) },
         }

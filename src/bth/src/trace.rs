@@ -9,7 +9,7 @@
 use crate::batch::RayBatch;
 use crate::enumerate::EnteredInstance;
 use crate::hits::{Accept, results};
-use crate::instances::{RayInInstance, exact_of_start};
+use crate::instances::{RayInInstance, UnplacedRay, better_wide, exact_of_start};
 use crate::intersect::exact::precise;
 use crate::intersect::exact_ray::{LineSource, WorldLines};
 use crate::intersect::start::corners_of;
@@ -17,7 +17,7 @@ use crate::intersect::vector::wide;
 use crate::object;
 use crate::query::Steps;
 use crate::query::sink::Answers;
-use crate::rays::{Hit, Hit64, PrimitiveRef, Ray, Start};
+use crate::rays::{Hit, Hit64, PrimitiveRef, Start};
 use crate::scene::Scene;
 use crate::start_points;
 use crate::starts::world_ray::WorldRay;
@@ -52,7 +52,7 @@ impl Scene {
                 (hit, steps) = world.nearest_counted(self.objects(), world_ray);
             }
             _ => self.nearest_of_objects(world_ray, &mut hit, |object, instance, ray| {
-                let (hit, more) = world_ray.nearest_counted_in(object, instance, ray);
+                let (hit, more) = ray.nearest_counted(object, instance);
                 steps += more;
                 hit
             }),
@@ -202,7 +202,7 @@ impl Scene {
             ray.in_world(self, |world_ray| match self.world() {
                 Some(world) => world.store_nearest_of_ray(self.objects(), world_ray, hit),
                 None => self.nearest_of_objects(world_ray, hit, |object, instance, ray| {
-                    world_ray.nearest_in(object, instance, ray)
+                    ray.nearest(object, instance)
                 }),
             });
         }
@@ -215,19 +215,31 @@ impl Scene {
         &self,
         world_ray: WorldRay<'_>,
         best: &mut Hit,
-        mut trace: impl FnMut(&ObjectView<'_>, u32, &Ray) -> Hit,
+        mut trace: impl FnMut(&ObjectView<'_>, u32, &UnplacedRay<'_>) -> Hit,
     ) {
+        let (objects, ray) = (self.objects(), world_ray.ray);
         if let Some((object, instance)) = self.sole() {
-            *best = trace(object, instance, world_ray.ray);
+            *best = trace(object, instance, &UnplacedRay::new(objects, instance, world_ray, ray.tmax));
             return;
         }
+        let is_wide = world_ray.wide.is_some();
+        let exact_t = |hit: &Hit| {
+            let PrimitiveRef { instance, triangle } = hit.primitive;
+            let line = RayInInstance::in_world(Some(objects), instance, world_ray, ray.tmax);
+            line.exact_t(self.view(instance), triangle)
+        };
         for instance in 0..self.object_count() {
+            // Another object may be nearer by less than f32 can tell.
+            let end = if is_wide { best.t.next_up() } else { best.t };
             // Not `f32::min`, which would replace a `tmax` of NaN by a number.
-            let tmax = if best.t < world_ray.ray.tmax { best.t } else { world_ray.ray.tmax };
-            let hit = trace(self.view(instance), instance, &Ray { tmax, ..*world_ray.ray });
-            if hit.t < best.t {
-                *best = hit;
-            }
+            let tmax = if end < ray.tmax { end } else { ray.tmax };
+            let of_object = UnplacedRay::new(objects, instance, world_ray, tmax);
+            let hit = trace(self.view(instance), instance, &of_object);
+            let nearer = match is_wide {
+                true => better_wide(best, &hit, 1.0, exact_t),
+                false => (hit.t < best.t).then_some(hit),
+            };
+            *best = nearer.unwrap_or(*best);
         }
     }
 
@@ -248,8 +260,10 @@ impl Scene {
         } else {
             let any = |world_ray: WorldRay<'_>| match self.world() {
                 Some(world) => world.any_of_ray(self.objects(), world_ray),
-                None => (0..self.object_count())
-                    .any(|instance| world_ray.any_in(self.view(instance), instance, world_ray.ray)),
+                None => (0..self.object_count()).any(|instance| {
+                    let tmax = world_ray.ray.tmax;
+                    UnplacedRay::new(self.objects(), instance, world_ray, tmax).any(self.view(instance))
+                }),
             };
             ray.in_world(self, any).unwrap_or(false)
         };
@@ -315,7 +329,7 @@ fn hit_in_f64(scene: &Scene, ray: WorldRay<'_>, primitive: PrimitiveRef) -> Opti
     let (exact, object) = (of_instance.exact(), entered.object);
     let corners = corners_of(object, primitive.triangle)?.map(wide);
     let found = precise(&exact.rounded(), corners).or_else(|| match exact.line {
-        LineSource::Ray => RayInInstance::in_world(ray, 0, ray.ray.tmax).exact(0).intersection(corners),
+        LineSource::Ray => RayInInstance::in_world(None, 0, ray, ray.ray.tmax).exact(0).intersection(corners),
         LineSource::Start(start) => {
             exact_of_start(object, start, wide(ray.ray.direction))?.intersection(corners)
         }

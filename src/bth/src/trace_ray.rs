@@ -148,12 +148,12 @@ impl Traced for StartRay {
 impl Traced for Ray64 {
     fn store_nearest_in(&self, object: &ObjectView<'_>, instance: u32, hit: &mut Hit) {
         let ray = self.narrow();
-        let of_object = RayInInstance::in_world(wide_ray(&ray, self), instance, ray.tmax);
+        let of_object = RayInInstance::in_world(None, instance, wide_ray(&ray, self), ray.tmax);
         object::store_nearest(object, &of_object, instance, hit);
     }
     fn hits_any_in(&self, object: &ObjectView<'_>) -> bool {
         let ray = self.narrow();
-        object::any(object, &RayInInstance::in_world(wide_ray(&ray, self), 0, ray.tmax))
+        object::any(object, &RayInInstance::in_world(None, 0, wide_ray(&ray, self), ray.tmax))
     }
     fn may_start_in(&self, _instance: u32) -> bool {
         true

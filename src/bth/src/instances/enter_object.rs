@@ -3,7 +3,7 @@
 use super::lines::visit_ray;
 use super::placement::Placement;
 use super::scene_batch::{BatchProgress, ObjectVisits, SceneBatch};
-use crate::nodes::affine::{Inverse, ObjectRay, RayLanes};
+use crate::nodes::affine::{ObjectRay, RayLanes};
 use crate::query::sink::Visit;
 use crate::rays::Ray;
 use crate::shortcuts::free;
@@ -62,10 +62,10 @@ impl Farthest {
     /// Includes rays through an instance, given the max |coordinate| of their origins in world
     /// space. `rounded` are origins of starts, which f32 does not hold.
     fn include(&mut self, placement: &Placement, in_object: f32, in_world: f32, rounded: bool) {
-        let Inverse { direction_error, .. } = placement.inverse;
+        let Placement { inverse, accuracy, .. } = placement;
         self.in_object = self.in_object.max(in_object);
-        self.error = self.error.max(placement.inverse.origin_error(in_world.into(), rounded) as f32);
-        self.direction_error = self.direction_error.max(direction_error);
+        self.error = self.error.max(inverse.origin_error(*accuracy, in_world.into(), rounded) as f32);
+        self.direction_error = self.direction_error.max(accuracy.direction_error() as f32);
     }
 }
 

@@ -11,10 +11,10 @@ use crate::intersect::long::{
 };
 use crate::intersect::origin::{RoundedLine, RoundedOrigin};
 use crate::intersect::prepare::PreparedRay;
-use crate::intersect::start::start_corners;
+use crate::intersect::start::{corners_of, start_corners};
 use crate::intersect::start_point::StartPoint;
 use crate::intersect::vector::{max_norm, wide};
-use crate::nodes::affine::{Inverse, ObjectRay};
+use crate::nodes::affine::ObjectRay;
 use crate::object::single::SingleRay;
 use crate::objects::Objects;
 use crate::query::sink::Visit;
@@ -29,8 +29,9 @@ use glam::Vec4;
 /// Where a ray goes through an object.
 #[derive(Clone, Copy)]
 pub(super) enum Place<'a> {
-    /// The object's space is world space.
-    World,
+    /// The object's space is world space. Rays may start on one of these objects, whose indices
+    /// are those of instances.
+    World(Option<&'a Objects>),
     /// It is the object of this instance.
     Instance(&'a World, &'a Objects, u32),
 }
@@ -39,7 +40,7 @@ impl Place<'_> {
     /// The transform to world space.
     fn rows(&self) -> Option<Rows> {
         match *self {
-            Place::World => None,
+            Place::World(_) => None,
             Place::Instance(world, objects, instance) => Some(world.row(objects, instance).to_world.rows()),
         }
     }
@@ -55,21 +56,34 @@ pub(super) fn line_in(placement: &Placement, instance: u32, ray: &WorldRay<'_>) 
     line
 }
 
-/// The corners of the triangle on which a ray starts, its weights and the transform to world space.
-fn start_of(place: Place<'_>, start: &InstanceStart) -> Option<([[f64; 3]; 3], [f64; 2], Rows)> {
-    let Place::Instance(world, objects, _) = place else { return None };
-    let object = objects.view(world.placement(start.instance).object());
-    let corners = start_corners(object, start.point.leaf, start.point.slot)?.map(wide);
-    let weights = [start.point.u.into(), start.point.v.into()];
-    Some((corners, weights, Place::Instance(world, objects, start.instance).rows()?))
+/// The triangle on which a ray starts.
+struct StartTriangle {
+    corners: [[f64; 3]; 3],
+    weights: [f64; 2],
+    to_world: Option<Rows>,
+}
+
+impl StartTriangle {
+    fn of(place: Place<'_>, start: &InstanceStart) -> Option<StartTriangle> {
+        let (object, to_world) = match place {
+            Place::World(objects) => (objects?.view(start.instance), None),
+            Place::Instance(world, objects, _) => {
+                let of_start = Place::Instance(world, objects, start.instance);
+                (objects.view(world.placement(start.instance).object()), of_start.rows())
+            }
+        };
+        let corners = start_corners(object, start.point.leaf, start.point.slot)?.map(wide);
+        let weights = [start.point.u.into(), start.point.v.into()];
+        Some(StartTriangle { corners, weights, to_world })
+    }
 }
 
 /// The line of a ray through an object, exactly. Its direction is divided by `t_scale`.
 #[cold]
 pub(super) fn exact_line(place: Place<'_>, ray: &WorldRay<'_>, t_scale: f32) -> ExactLine {
-    let start = ray.start.and_then(|start| start_of(place, start));
+    let start = ray.start.and_then(|start| StartTriangle::of(place, start));
     let (origin, weight) = match start {
-        Some((corners, weights, rows)) => image_of_start(Some(&rows), corners, weights),
+        Some(of) => image_of_start(of.to_world.as_ref(), of.corners, of.weights),
         None => (image(None, ray.origin()), Dyadic::from(1.0)),
     };
     let scale = Dyadic::from(f64::from(t_scale));
@@ -92,28 +106,29 @@ pub(crate) fn exact_of_start(
 #[cold]
 pub(super) fn long_line(place: Place<'_>, ray: &WorldRay<'_>, t_scale: f32) -> Option<LongLine> {
     let direction = long_vector(ray.direction().map(|x| x * f64::from(t_scale)));
-    let Place::Instance(world, _, instance) = place else {
-        let origin = long_vector(ray.origin());
-        return Some(LongLine { origin, origin_error: 0.0, direction, direction_error: 0.0 });
-    };
-    let (rows, inverse) = (place.rows()?, &world.placement(instance).inverse);
-    let (direction, off) = inverse.solve(&rows, direction, 0.0);
-    let direction_error = off / max_norm(direction.map(Long::rounded));
-    let (origin, origin_error) = match ray.start {
-        None => (long_vector(ray.origin()), 0.0),
+    let (origin, origin_error, to_world) = match ray.start {
+        None => (long_vector(ray.origin()), 0.0, None),
         Some(start) => {
-            let (corners, weights, rows) = start_of(place, start)?;
+            let StartTriangle { corners, weights, to_world } = StartTriangle::of(place, start)?;
             let size = corners.iter().fold(0.0f64, |most, corner| most.max(max_norm(*corner)));
-            let origin = long_start(corners, weights);
-            if start.instance == instance {
-                let origin_error = 8.0 * LONG_ERROR * size;
-                return Some(LongLine { origin, origin_error, direction, direction_error });
-            }
-            image_of_long(&rows, origin, size)
+            (long_start(corners, weights), 8.0 * LONG_ERROR * size, to_world.map(|rows| (rows, size)))
         }
     };
+    let Place::Instance(world, _, instance) = place else {
+        return Some(LongLine { origin, origin_error, direction, direction_error: 0.0 });
+    };
+    let (rows, Placement { inverse, accuracy, .. }) = (place.rows()?, world.placement(instance));
+    let (direction, off) = inverse.solve(*accuracy, &rows, (direction, 0.0));
+    let direction_error = off / max_norm(direction.map(Long::rounded));
+    if ray.start_in(instance).is_some() {
+        return Some(LongLine { origin, origin_error, direction, direction_error });
+    }
+    let (origin, origin_error) = match to_world {
+        Some((rows, size)) => image_of_long(&rows, origin, size),
+        None => (origin, origin_error),
+    };
     let relative = long_difference(origin, long_vector(inverse.origin));
-    let (origin, origin_error) = inverse.solve(&rows, relative, origin_error);
+    let (origin, origin_error) = inverse.solve(*accuracy, &rows, (relative, origin_error));
     Some(LongLine { origin, origin_error, direction, direction_error })
 }
 
@@ -149,10 +164,22 @@ impl<'a> RayInInstance<'a> {
         RayInInstance { place: Place::Instance(world, objects, instance), instance, ray, of_object }
     }
 
-    /// A ray without a start that ends at `tmax`, in an object whose space is world space.
-    pub(crate) fn in_world(ray: WorldRay<'a>, instance: u32, tmax: f32) -> RayInInstance<'a> {
+    /// A ray that ends at `tmax`, in an object whose space is world space. `objects` are those on
+    /// which it may start.
+    pub(crate) fn in_world(
+        objects: Option<&'a Objects>,
+        instance: u32,
+        ray: WorldRay<'a>,
+        tmax: f32,
+    ) -> RayInInstance<'a> {
         let of_object = ObjectRay::of(ray.line().or_unknown(), ray.ray.tmin, tmax);
-        RayInInstance { place: Place::World, instance, ray, of_object }
+        RayInInstance { place: Place::World(objects), instance, ray, of_object }
+    }
+
+    /// The exact t, rounded to f64, at which the ray hits a triangle of the object.
+    pub(crate) fn exact_t(&self, object: &ObjectView<'_>, triangle: u32) -> Option<f64> {
+        let corners = corners_of(object, triangle)?.map(wide);
+        Some(WorldLines::exact(self, 0).intersection(corners)?.t * f64::from(self.of_object.t_scale))
     }
 
     pub(crate) fn exact_ray(&self) -> ExactRay<'_> {
@@ -267,8 +294,8 @@ impl WorldLines for VisitLines<'_> {
             }
         }
         if is_plain {
-            let inverse = &self.batch.world.placement(*instance).inverse;
-            return Isa::chosen().run(LanesKernel { inverse, of_world: &of_world, of_lanes });
+            let placement = self.batch.world.placement(*instance);
+            return Isa::chosen().run(LanesKernel { placement, of_world: &of_world, of_lanes });
         }
         for lane in 0..rays.len().min(LANES) {
             of_lanes.set(lane, &self.line(visit(lane)));
@@ -303,9 +330,9 @@ impl WorldLines for VisitLines<'_> {
     }
 }
 
-/// Sets the lines of sixteen rays of f32 in one instance, with the bits of [`Inverse::line`].
+/// Sets the lines of sixteen rays of f32 in one instance, with the bits of [`Placement::line`].
 struct LanesKernel<'a> {
-    inverse: &'a Inverse,
+    placement: &'a Placement,
     /// Origins and directions in world space, by axis.
     of_world: &'a [[[f32; LANES]; 3]; 2],
     of_lanes: &'a mut LineLanes,
@@ -315,13 +342,13 @@ impl Kernel for LanesKernel<'_> {
     type Output = ();
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let LanesKernel { inverse, of_world: [origin, direction], of_lanes } = self;
+        let LanesKernel { placement, of_world: [origin, direction], of_lanes } = self;
         // There are no branches in this loop, so that the compiler vectorizes it.
         for lane in 0..LANES {
             let [origin, direction] =
                 [origin, direction].map(|of| [of[0][lane].into(), of[1][lane].into(), of[2][lane].into()]);
             let origin = RoundedOrigin(origin, 0.0);
-            of_lanes.set(lane, &inverse.line(&RoundedLine { origin, direction, direction_error: 0.0 }));
+            of_lanes.set(lane, &placement.line(&RoundedLine { origin, direction, direction_error: 0.0 }));
         }
     }
 }

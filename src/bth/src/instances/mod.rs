@@ -36,6 +36,7 @@ mod scene_query;
 mod test_worlds;
 mod top_level;
 mod top_nodes;
+mod unplaced;
 mod visit_queue;
 mod wide_rays;
 mod world;
@@ -50,5 +51,6 @@ pub(crate) use placement::Placement;
 pub(crate) use top_level::TopLevel;
 #[cfg(test)]
 pub(crate) use top_nodes::INSTANCE;
-pub(crate) use wide_rays::{trace_wide, wide_ray};
+pub(crate) use unplaced::UnplacedRay;
+pub(crate) use wide_rays::{better_wide, trace_wide, wide_ray};
 pub(crate) use world::{InstanceRow, World};

@@ -3,11 +3,9 @@
 
 use super::World;
 use super::lines::RayInInstance;
+use super::wide_rays::better_wide;
 use crate::bvh::packet;
 use crate::coherence::is_same_octant;
-use crate::intersect::exact_ray::WorldLines;
-use crate::intersect::start::corners_of;
-use crate::intersect::vector::wide;
 use crate::object;
 use crate::objects::Objects;
 use crate::query::{Steps, better};
@@ -15,10 +13,6 @@ use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::simd::Isa;
 use crate::starts::world_ray::WorldRay;
 use bth_format::object::ObjectView;
-
-/// Bounds the difference of two t that are rounded to f32 and may be equal before, relative to
-/// them: two roundings of half an epsilon each, twice.
-const ROUNDED_T: f32 = 2.0 * f32::EPSILON;
 
 /// Fewer rays go one by one if a single instance is visible.
 const MIN_RAYS_OF_ONE_INSTANCE: usize = 16;
@@ -89,7 +83,7 @@ impl World {
             let t_scale = of_instance.of_object.t_scale;
             let nearer = match world_ray.wide {
                 None => better(ray, best, &hit, t_scale),
-                Some(_) => self.better_wide(objects, world_ray, best, &hit, t_scale),
+                Some(_) => better_wide(best, &hit, t_scale, |hit| self.exact_t(objects, world_ray, hit)),
             };
             let Some(nearer) = nearer else { return Some(tmax) };
             *best = nearer;
@@ -98,37 +92,11 @@ impl World {
         });
     }
 
-    /// Like [`better`], for a ray in f64: hits whose t are equal when they are rounded are compared
-    /// exactly.
-    #[cold]
-    fn better_wide(
-        &self,
-        objects: &Objects,
-        ray: WorldRay<'_>,
-        best: &Hit,
-        hit: &Hit,
-        t_scale: f32,
-    ) -> Option<Hit> {
-        if !hit.is_hit() {
-            return None;
-        }
-        let hit = Hit { t: hit.t * t_scale, ..*hit };
-        let exact_t = |hit: &Hit| {
-            let PrimitiveRef { instance, triangle } = hit.primitive;
-            let of_instance = RayInInstance::new(self, objects, instance, ray, f32::INFINITY);
-            let object = objects.view(self.placement(instance).object());
-            let corners = corners_of(object, triangle)?.map(wide);
-            let t = of_instance.exact(0).intersection(corners)?.t;
-            Some(t * f64::from(of_instance.of_object.t_scale))
-        };
-        let is_close = best.is_hit() && (hit.t - best.t).abs() <= ROUNDED_T * hit.t.abs();
-        let nearer = match is_close.then(|| (exact_t(&hit), exact_t(best))) {
-            Some((Some(t), Some(of_best))) => {
-                t < of_best || t == of_best && hit.primitive.instance < best.primitive.instance
-            }
-            _ => hit.t < best.t,
-        };
-        nearer.then_some(hit)
+    /// The exact t of a hit, rounded to f64.
+    fn exact_t(&self, objects: &Objects, ray: WorldRay<'_>, hit: &Hit) -> Option<f64> {
+        let PrimitiveRef { instance, triangle } = hit.primitive;
+        let (object, of_instance) = self.enter(objects, instance, ray, f32::INFINITY);
+        of_instance.exact_t(object, triangle)
     }
 
     /// Returns true if a ray hits anything, as [`Self::any`] computes it for many.

@@ -1,7 +1,7 @@
 //! An instance in the world: its inverse transform and a conservative world box.
 
 use crate::intersect::origin::{RoundedLine, RoundedOrigin};
-use crate::nodes::affine::{Affine, Inverse};
+use crate::nodes::affine::{Accuracy, Affine, Inverse};
 use bth_format::error::Code;
 use bth_format::layout::{NONE, Object, WIDTH};
 use bth_format::object::ObjectView;
@@ -25,10 +25,7 @@ pub(crate) struct Placement {
     pub(crate) upper: [f32; 3],
     /// One more than the index of the object, so that `Option<Placement>` needs no further memory.
     object: NonZeroU32,
-    /// The part of the rounding that depends on the ray: the box must be enlarged on all sides by
-    /// this factor times the max
-    /// |coordinate| of the ray's origin.
-    pub(crate) origin_slack: f32,
+    pub(crate) accuracy: Accuracy,
 }
 
 /// Number of boxes that are computed together.
@@ -156,7 +153,8 @@ impl Placement {
         if !world.is_finite() {
             return Err(PlacementError::NotFinite);
         }
-        let (inverse, condition) = world.inverse().ok_or(PlacementError::Singular)?;
+        let (inverse, accuracy) = world.inverse().ok_or(PlacementError::Singular)?;
+        let condition = accuracy.condition();
         let (mut greatest, mut far) = (0.0, 0.0);
         for k in 0..3 {
             let ends = f64::from(object.lower[k].abs().max(object.upper[k].abs()));
@@ -170,7 +168,7 @@ impl Placement {
             lower: [0.0; 3],
             upper: [0.0; 3],
             object: NonZeroU32::MIN.saturating_add(index),
-            origin_slack: ((ROUNDING * condition) as f32).next_up(),
+            accuracy,
         };
         for k in 0..3 {
             let [lower, upper] = parts.extent_along(world.linear[k]);
@@ -184,20 +182,21 @@ impl Placement {
         if finite { Ok(placement) } else { Err(PlacementError::NotFinite) }
     }
 
-    /// Upper bound of the condition number of the transform.
-    fn condition(&self) -> f64 {
-        f64::from(self.origin_slack) / ROUNDING
+    /// The part of the rounding that depends on the ray: the box must be enlarged on all sides by
+    /// this factor times the max |coordinate| of the ray's origin.
+    pub(crate) fn origin_slack(&self) -> f32 {
+        ((ROUNDING * self.accuracy.condition()) as f32).next_up()
     }
 
     /// The line in the space of the object, as [`Inverse::line`].
     #[inline(always)]
     pub(crate) fn line(&self, line: &RoundedLine) -> RoundedLine {
-        self.inverse.line(line)
+        self.inverse.line(self.accuracy, line)
     }
 
     /// A point of the object in world space, as [`Inverse::point_in_world`].
     pub(crate) fn point_in_world(&self, point: RoundedOrigin) -> RoundedOrigin {
-        self.inverse.point_in_world(self.condition(), point)
+        self.inverse.point_in_world(self.accuracy, point)
     }
 
     /// Index of the object.
@@ -206,7 +205,7 @@ impl Placement {
     }
 }
 
-const _: () = assert!(size_of::<Option<Placement>>() == 136);
+const _: () = assert!(size_of::<Option<Placement>>() == 128);
 
 #[cfg(test)]
 mod tests {

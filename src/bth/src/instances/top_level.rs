@@ -144,7 +144,7 @@ impl TopLevel {
     pub(super) fn measure(&mut self, placements: &[Option<Placement>]) {
         (self.extent, self.origin_slack) = (0.0, 0.0);
         for placement in placements.iter().flatten() {
-            self.origin_slack = self.origin_slack.max(placement.origin_slack);
+            self.origin_slack = self.origin_slack.max(placement.origin_slack());
             for k in 0..3 {
                 let greater = placement.upper[k].abs().max(placement.lower[k].abs());
                 self.extent = self.extent.max(greater);
@@ -156,7 +156,7 @@ impl TopLevel {
 
     /// The world box of an instance, widened for rays from within the reach.
     pub(super) fn bounds_of(&self, placement: &Placement) -> InstanceBounds {
-        let pad = (placement.origin_slack * self.reach).next_up();
+        let pad = (placement.origin_slack() * self.reach).next_up();
         let (mut lower, mut upper) = ([0.0; 4], [0.0; 4]);
         for k in 0..3 {
             lower[k] = -((placement.lower[k] - pad).next_down().max(f32::MIN));

@@ -10,13 +10,17 @@ use crate::intersect::vector::max_norm;
 use crate::nodes::affine::ObjectRay;
 use crate::object::{self, Scratch};
 use crate::query::sink::{Answers, Sink};
-use crate::rays::{Ray, Ray64};
+use crate::rays::{Hit, Ray, Ray64};
 use crate::starts::prepare::ENDED;
 use crate::starts::world_ray::WorldRay;
 use bth_format::object::ObjectView;
 
 /// Rays that are rounded to f32 and traced together. One bound holds for the errors of all of them.
 const TOGETHER: usize = 1024;
+
+/// Bounds the difference of two t that are rounded to f32 and may be equal before, relative to
+/// them: two roundings of half an epsilon each, twice.
+const ROUNDED_T: f32 = 2.0 * f32::EPSILON;
 
 /// Stores the answers of rays that hit anything in an instance whose object's space is world space.
 pub(crate) fn trace_wide(
@@ -49,7 +53,7 @@ pub(crate) fn trace_wide(
     }
     for i in alone {
         let (ray, narrow) = (&rays[i], rays[i].narrow());
-        let of_object = RayInInstance::in_world(wide_ray(&narrow, ray), instance, narrow.tmax);
+        let of_object = RayInInstance::in_world(None, instance, wide_ray(&narrow, ray), narrow.tmax);
         match &mut answers {
             Answers::Nearest(hits) => object::store_nearest(object, &of_object, instance, &mut hits[i]),
             Answers::Any(found) => found[i] = object::any(object, &of_object),
@@ -60,6 +64,29 @@ pub(crate) fn trace_wide(
 /// A ray in f64, given the same ray rounded to f32.
 pub(crate) fn wide_ray<'a>(ray: &'a Ray, wide: &'a Ray64) -> WorldRay<'a> {
     WorldRay { ray, start: None, wide: Some(wide) }
+}
+
+/// Like [`crate::query::better`], for a ray in f64. `exact_t` returns the t of a hit: hits whose t
+/// may be equal before they are rounded are compared exactly.
+#[cold]
+pub(crate) fn better_wide(
+    best: &Hit,
+    hit: &Hit,
+    t_scale: f32,
+    exact_t: impl Fn(&Hit) -> Option<f64>,
+) -> Option<Hit> {
+    if !hit.is_hit() {
+        return None;
+    }
+    let hit = Hit { t: hit.t * t_scale, ..*hit };
+    let is_close = best.is_hit() && (hit.t - best.t).abs() <= ROUNDED_T * hit.t.abs();
+    let nearer = match is_close.then(|| (exact_t(&hit), exact_t(best))) {
+        Some((Some(t), Some(of_best))) => {
+            t < of_best || t == of_best && hit.primitive.instance < best.primitive.instance
+        }
+        _ => hit.t < best.t,
+    };
+    nearer.then_some(hit)
 }
 
 /// The lines of rays in f64.
@@ -81,10 +108,10 @@ impl WorldLines for WideRays<'_> {
         rays.iter().all(|ray| ray.origin == rays[0].origin).then(|| self.line(first))
     }
     fn long(&self, ray: usize) -> Option<LongLine> {
-        long_line(Place::World, &wide_ray(&ENDED, &self.0[ray]), 1.0)
+        long_line(Place::World(None), &wide_ray(&ENDED, &self.0[ray]), 1.0)
     }
     fn exact(&self, ray: usize) -> ExactLine {
-        exact_line(Place::World, &wide_ray(&ENDED, &self.0[ray]), 1.0)
+        exact_line(Place::World(None), &wide_ray(&ENDED, &self.0[ray]), 1.0)
     }
     fn start(&self, _ray: usize) -> Option<&StartPoint> {
         None

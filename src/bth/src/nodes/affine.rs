@@ -166,10 +166,10 @@ impl Affine {
         })
     }
 
-    /// The inverse, and the condition number of the linear part. `None` if the transform is not
+    /// The inverse, and its accuracy. `None` if the transform is not
     /// finite or treated as singular.
     #[inline(always)]
-    pub(crate) fn inverse(&self) -> Option<(Inverse, f64)> {
+    pub(crate) fn inverse(&self) -> Option<(Inverse, Accuracy)> {
         if !self.is_finite() {
             return None;
         }
@@ -209,19 +209,50 @@ impl Affine {
         }
         let line_error = 1.01 * (rest + RESIDUAL_ROUNDING * condition) + ROUNDINGS;
         let linear = scaled(&linear, scale);
-        let [error, direction_error] =
-            [norm(&linear), condition].map(|factor| (1.01 * factor * line_error) as f32);
-        let mut inverse = Inverse { linear, origin: self.translation, error, direction_error };
-        if inverse.is_identity() {
-            (inverse.error, inverse.direction_error) = (0.0, 0.0);
-        }
-        (condition <= GREATEST_CONDITION && norm(&linear).is_finite()).then_some((inverse, condition))
+        let inverse = Inverse { linear, origin: self.translation };
+        let line_error = if inverse.is_identity() { 0.0 } else { line_error };
+        let accuracy = Accuracy::new(condition, line_error);
+        (condition <= GREATEST_CONDITION && norm(&linear).is_finite()).then_some((inverse, accuracy))
     }
 
     /// Maximum norm of the linear part.
     #[inline(always)]
     pub(crate) fn norm(&self) -> f64 {
         norm(&self.linear)
+    }
+}
+
+/// How accurate an inverse is, in four bytes: upper bounds, each the upper half of an f32.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Accuracy {
+    condition: u16,
+    line_error: u16,
+}
+
+impl Accuracy {
+    fn new(condition: f64, line_error: f64) -> Accuracy {
+        let half = |x: f64| ((x as f32).next_up().to_bits() >> 16) as u16 + 1;
+        let line_error = if line_error == 0.0 { 0 } else { half(line_error) };
+        Accuracy { condition: half(condition), line_error }
+    }
+
+    /// The condition number κ of the transform.
+    #[inline(always)]
+    pub(crate) fn condition(self) -> f64 {
+        f64::from(f32::from_bits(u32::from(self.condition) << 16))
+    }
+
+    /// Bound of the error of a product of the inverse L with a vector, relative to |L| and the
+    /// vector. It includes the error of L, and is 0 for the identity.
+    #[inline(always)]
+    fn line_error(self) -> f64 {
+        f64::from(f32::from_bits(u32::from(self.line_error) << 16))
+    }
+
+    /// Bound of the error of a direction in object space, relative to its max |component|.
+    #[inline(always)]
+    pub(crate) fn direction_error(self) -> f64 {
+        1.01 * self.condition() * self.line_error()
     }
 }
 
@@ -233,11 +264,6 @@ pub(crate) struct Inverse {
     pub(crate) linear: [[f64; 3]; 3],
     /// The origin of object space, in world space.
     pub(crate) origin: [f64; 3],
-    /// Bound of the error of a product of `linear` with a vector, relative to the vector. It
-    /// includes the error of `linear`, and is 0 for the identity.
-    pub(crate) error: f32,
-    /// The same for directions, relative to the max |component| of the product.
-    pub(crate) direction_error: f32,
 }
 
 /// Max |binary exponent| of a direction's max component in object space with which it is
@@ -326,7 +352,7 @@ impl Inverse {
     /// Let L be this inverse, E its error and u = 2^-53. The difference p of origins and its
     /// product with L are off by at most 4u|L||p| by roundings and by |E||p|, in the maximum norm.
     #[inline(always)]
-    pub(crate) fn line(&self, line: &RoundedLine) -> RoundedLine {
+    pub(crate) fn line(&self, accuracy: Accuracy, line: &RoundedLine) -> RoundedLine {
         // The direction of a line in world space is exact.
         let RoundedLine { origin: RoundedOrigin(point, off), direction, direction_error } = *line;
         let (mut relative, mut origin, mut of_object) = ([0.0; 3], [0.0; 3], [0.0; 3]);
@@ -337,25 +363,22 @@ impl Inverse {
             origin[k] = dot(self.linear[k], relative);
             of_object[k] = dot(self.linear[k], direction);
         }
-        let mut origin_error = max_norm(relative) * f64::from(self.error);
-        if off != 0.0 {
-            origin_error += 1.01 * norm(&self.linear) * off;
-        }
+        let origin_error = 1.01 * norm(&self.linear) * (max_norm(relative) * accuracy.line_error() + off);
         RoundedLine {
             origin: RoundedOrigin(origin, origin_error),
             direction: of_object,
-            direction_error: f64::from(self.direction_error) + direction_error,
+            direction_error: accuracy.direction_error() + direction_error,
         }
         .or_unknown()
     }
 
     /// Bound of the errors of the origins of all lines that [`Self::line`] returns for origins with
     /// coordinates of at most `in_world`. `rounded` were rounded to f32 there.
-    pub(crate) fn origin_error(&self, in_world: f64, rounded: bool) -> f64 {
+    pub(crate) fn origin_error(&self, accuracy: Accuracy, in_world: f64, rounded: bool) -> f64 {
         /// Half a unit in the last place of f32, relative.
         const ROUNDED: f64 = 1.0 / (1u64 << 24) as f64;
-        let off = if rounded { 1.01 * ROUNDED * in_world * norm(&self.linear) } else { 0.0 };
-        (in_world + max_norm(self.origin)) * f64::from(self.error) + off
+        let off = if rounded { ROUNDED * in_world } else { 0.0 };
+        1.01 * norm(&self.linear) * ((in_world + max_norm(self.origin)) * accuracy.line_error() + off)
     }
 
     /// The vector x of object space with Ax = `of`, for the transform A from object space with
@@ -363,7 +386,12 @@ impl Inverse {
     ///
     /// A step of refinement: with the residual r of x = L`of`, L r is added. Its error is at most
     /// the error of L times r.
-    pub(crate) fn solve(&self, rows: &[[f64; 4]; 3], of: LongVector, off: f64) -> (LongVector, f64) {
+    pub(crate) fn solve(
+        &self,
+        accuracy: Accuracy,
+        rows: &[[f64; 4]; 3],
+        (of, off): (LongVector, f64),
+    ) -> (LongVector, f64) {
         let linear = rows.map(|[x, y, z, _]| [x, y, z]);
         let rounded = of.map(Long::rounded);
         let x = self.linear.map(|row| dot(row, rounded));
@@ -372,18 +400,17 @@ impl Inverse {
         let solution = [0, 1, 2].map(|k| Long::from(x[k]) + Long::from(dot(self.linear[k], rest)));
         let of_rest = LONG_ERROR * (norm(&linear) * max_norm(x) + max_norm(rounded)) + off;
         // The low part of the residual, which is not used, is a rounding of f64.
-        let norm = norm(&self.linear);
-        let relative_error = f64::from(self.error) + ROUNDINGS * norm;
-        (solution, 1.01 * (relative_error * max_norm(rest) + norm * of_rest))
+        let relative_error = accuracy.line_error() + ROUNDINGS;
+        (solution, 1.01 * norm(&self.linear) * (relative_error * max_norm(rest) + of_rest))
     }
 
     /// A point of object space in world space: the solution of the three equations by Cramer's
-    /// rule. `condition` is a bound of the
-    /// condition number.
+    /// rule.
     ///
     /// The residual of the solution x bounds its error: |A| (|p - Lx| + 8u|L||x|), and |E| adds
-    /// a relative error of [`Self::error`] / |L|, where |A| ≤ κ / |L|.
-    pub(crate) fn point_in_world(&self, condition: f64, point: RoundedOrigin) -> RoundedOrigin {
+    /// a relative error of κ times [`Accuracy::line_error`], where |A| ≤ κ / |L|.
+    pub(crate) fn point_in_world(&self, accuracy: Accuracy, point: RoundedOrigin) -> RoundedOrigin {
+        let condition = accuracy.condition();
         let RoundedOrigin(point, off) = point;
         let [a, b, c] = self.linear;
         let cofactors = [cross(b, c), cross(c, a), cross(a, b)];
@@ -394,7 +421,7 @@ impl Inverse {
         });
         let rest = max_norm([0, 1, 2].map(|k| point[k] - dot(self.linear[k], x)));
         let error = condition / norm(&self.linear) * (rest + off)
-            + 2.0 * (f64::from(self.error) / norm(&self.linear) + ROUNDINGS) * condition * max_norm(x);
+            + 2.0 * (accuracy.line_error() + ROUNDINGS) * condition * max_norm(x);
         let world = [0, 1, 2].map(|k| self.origin[k] + x[k]);
         RoundedOrigin(world, 1.01 * error + max_norm(world) * ROUNDINGS)
     }

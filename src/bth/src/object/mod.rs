@@ -1,7 +1,6 @@
 //! Tracing of one object by rays in object space: by one ray or by a batch.
 
 mod batch;
-mod in_instance;
 mod scratch;
 pub(crate) mod single;
 

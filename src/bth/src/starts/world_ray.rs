@@ -3,7 +3,7 @@
 use crate::intersect::origin::{RoundedLine, RoundedOrigin};
 use crate::intersect::start_point::StartPoint;
 use crate::intersect::vector::wide;
-use crate::rays::{Ray, Ray64, Start, StartRay};
+use crate::rays::{Ray, Ray64, Start};
 use bth_format::layout::NONE;
 
 /// A start in the space of the object of an instance.
@@ -79,22 +79,6 @@ impl<'a> WorldRay<'a> {
         match self.wide {
             Some(ray) => [ray.tmin, ray.tmax],
             None => [self.ray.tmin.into(), self.ray.tmax.into()],
-        }
-    }
-
-    /// As a ray in an object whose space is world space: one that starts there, or else one with an
-    /// origin.
-    #[inline(always)]
-    pub(crate) fn in_object<T>(
-        &self,
-        instance: u32,
-        ray: &Ray,
-        start: impl FnOnce(&StartRay) -> T,
-        plain: impl FnOnce(&Ray) -> T,
-    ) -> T {
-        match self.start.filter(|start| start.instance == instance) {
-            Some(of) => start(&StartRay { start: of.start, direction: ray.direction, tmax: ray.tmax }),
-            None => plain(ray),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::intersection::{IDENTITY, Intersection, Line, Placed, to_f64};
 use crate::number::{Coordinate, Number, Point, cross, dot, exact, sub};
-use bth::rays::{PrimitiveRef, Ray, StartRay};
+use bth::rays::{PrimitiveRef, Ray, Ray64, StartRay};
 use num_rational::BigRational;
 use num_traits::Signed;
 
@@ -46,6 +46,14 @@ impl From<Ray> for ExactRay {
         let range = [ray.tmin, ray.tmax].map(f64::from);
         let origin = RayOrigin::Point(ray.origin.map(f64::from));
         ExactRay { origin, direction: ray.direction.map(f64::from), range, precision: Precision::Single }
+    }
+}
+
+impl From<Ray64> for ExactRay {
+    fn from(ray: Ray64) -> ExactRay {
+        let Ray64 { origin, tmin, direction, tmax } = ray;
+        let origin = RayOrigin::Point(origin);
+        ExactRay { origin, direction, range: [tmin, tmax], precision: Precision::Double }
     }
 }
 

@@ -10,7 +10,6 @@ use bth_tests::placed_soup::soups;
 use bth_tests::rays::{alone, starts};
 
 #[test]
-
 fn starts_on_one_of_several_objects_meet_the_others() {
     let _turn = turn();
     let mut of_others = 0;

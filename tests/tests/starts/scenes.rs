@@ -91,7 +91,6 @@ fn agree(scene: &Scene, ray: &StartRay, hit: &Hit, context: &str) {
 }
 
 #[test]
-
 fn instances_under_exact_transforms_agree_with_the_oracle() {
     let _turn = turn();
     let (mut hits, mut count) = (0, 0);

@@ -5,7 +5,6 @@ use bth_tests::by_day;
 use bth_tests::stress::{Statistics, run_tiles, tiles};
 
 #[test]
-
 fn nothing_leaks_between_tiles_and_bits_are_equal_everywhere() {
     for seed in 0..by_day(2, 8) {
         for tiles in tiles(seed) {

@@ -13,6 +13,7 @@ use crate::rays::Ray;
 use crate::simd::{Part, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
+use std::cmp::Ordering;
 
 /// A triangle that a ray may hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -143,9 +144,11 @@ fn offer_wide<G: Goal>(
     if let Some((best, t)) = query.best(object.triangle_ids)
         && close(t, found.t)
         && let Some(other) = corners_of(object, best)
-        && let (Some(t), Some(of_best)) = (exact_t(corners), exact_t(other))
     {
-        if t < of_best || t == of_best && triangle.read() < best {
+        let line = lines.exact(at);
+        let order = line.exact_t(corners.map(wide)).zip(line.exact_t(other.map(wide)));
+        let order = order.map_or(Ordering::Equal, |(t, of_best)| t.cmp(&of_best));
+        if order.then(triangle.read().cmp(&best)) == Ordering::Less {
             query.replace(triangle, found);
         }
         return false;

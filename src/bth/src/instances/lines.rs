@@ -4,7 +4,7 @@
 use super::World;
 use super::placement::Placement;
 use super::scene_batch::SceneBatch;
-use crate::intersect::exact_line::{ExactLine, Rows, image, image_of_start};
+use crate::intersect::exact_line::{ExactLine, ExactT, Rows, image, image_of_start};
 use crate::intersect::exact_ray::{ExactRay, LineLanes, LineSource, WorldLines};
 use crate::intersect::long::{
     LONG_ERROR, Long, LongLine, LongVector, long_difference, long_dot, long_start, long_vector,
@@ -176,10 +176,10 @@ impl<'a> RayInInstance<'a> {
         RayInInstance { place: Place::World(objects), instance, ray, of_object }
     }
 
-    /// The exact t, rounded to f64, at which the ray hits a triangle of the object.
-    pub(crate) fn exact_t(&self, object: &ObjectView<'_>, triangle: u32) -> Option<f64> {
+    /// The exact t at which the ray hits a triangle of the object.
+    pub(crate) fn exact_t(&self, object: &ObjectView<'_>, triangle: u32) -> Option<ExactT> {
         let corners = corners_of(object, triangle)?.map(wide);
-        Some(WorldLines::exact(self, 0).intersection(corners)?.t * f64::from(self.of_object.t_scale))
+        Some(WorldLines::exact(self, 0).exact_t(corners)?.times(f64::from(self.of_object.t_scale)))
     }
 
     pub(crate) fn exact_ray(&self) -> ExactRay<'_> {

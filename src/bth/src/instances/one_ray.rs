@@ -6,6 +6,7 @@ use super::lines::RayInInstance;
 use super::wide_rays::better_wide;
 use crate::bvh::packet;
 use crate::coherence::is_same_octant;
+use crate::intersect::exact_line::ExactT;
 use crate::object;
 use crate::objects::Objects;
 use crate::query::{Steps, better};
@@ -92,8 +93,8 @@ impl World {
         });
     }
 
-    /// The exact t of a hit, rounded to f64.
-    fn exact_t(&self, objects: &Objects, ray: WorldRay<'_>, hit: &Hit) -> Option<f64> {
+    /// The exact t of a hit.
+    fn exact_t(&self, objects: &Objects, ray: WorldRay<'_>, hit: &Hit) -> Option<ExactT> {
         let PrimitiveRef { instance, triangle } = hit.primitive;
         let (object, of_instance) = self.enter(objects, instance, ray, f32::INFINITY);
         of_instance.exact_t(object, triangle)

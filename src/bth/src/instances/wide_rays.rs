@@ -1,7 +1,7 @@
 //! Batches of rays in f64 through an object whose space is world space.
 
 use super::lines::{Place, RayInInstance, exact_line, long_line};
-use crate::intersect::exact_line::ExactLine;
+use crate::intersect::exact_line::{ExactLine, ExactT};
 use crate::intersect::exact_ray::{LineLanes, Lines, WorldLines};
 use crate::intersect::long::LongLine;
 use crate::intersect::origin::{RoundedLine, RoundedOrigin};
@@ -14,6 +14,7 @@ use crate::rays::{Hit, Ray, Ray64};
 use crate::starts::prepare::ENDED;
 use crate::starts::world_ray::WorldRay;
 use bth_format::object::ObjectView;
+use std::cmp::Ordering;
 
 /// Rays that are rounded to f32 and traced together. One bound holds for the errors of all of them.
 const TOGETHER: usize = 1024;
@@ -73,20 +74,16 @@ pub(crate) fn better_wide(
     best: &Hit,
     hit: &Hit,
     t_scale: f32,
-    exact_t: impl Fn(&Hit) -> Option<f64>,
+    exact_t: impl Fn(&Hit) -> Option<ExactT>,
 ) -> Option<Hit> {
     if !hit.is_hit() {
         return None;
     }
     let hit = Hit { t: hit.t * t_scale, ..*hit };
     let is_close = best.is_hit() && (hit.t - best.t).abs() <= ROUNDED_T * hit.t.abs();
-    let nearer = match is_close.then(|| (exact_t(&hit), exact_t(best))) {
-        Some((Some(t), Some(of_best))) => {
-            t < of_best || t == of_best && hit.primitive.instance < best.primitive.instance
-        }
-        _ => hit.t < best.t,
-    };
-    nearer.then_some(hit)
+    let exact = is_close.then(|| exact_t(&hit).zip(exact_t(best))).flatten();
+    let order = exact.map_or(hit.t.total_cmp(&best.t), |(t, of_best)| t.cmp(&of_best));
+    (order.then(hit.primitive.instance.cmp(&best.primitive.instance)) == Ordering::Less).then_some(hit)
 }
 
 /// The lines of rays in f64.

@@ -86,6 +86,20 @@ impl ExactLine {
         Some(Intersection { t, weight: [u, v, sign] })
     }
 
+    /// The exact t at which the line crosses the plane of a triangle; `None` where it is parallel.
+    #[cold]
+    pub(crate) fn exact_t(&self, corners: [[f64; 3]; 3]) -> Option<ExactT> {
+        let [a, b, c] = &self.relative(corners);
+        let normal = dyadic_cross(&dyadic_difference(b, a), &dyadic_difference(c, a));
+        let determinant = &dyadic_dot(&self.direction, &normal) * &self.weight;
+        let volume = dyadic_dot(a, &normal);
+        match determinant.sign() {
+            Ordering::Equal => None,
+            Ordering::Less => Some(ExactT { volume: -&volume, determinant: -&determinant }),
+            Ordering::Greater => Some(ExactT { volume, determinant }),
+        }
+    }
+
     /// The crossing rule of [`super::crossing`] with the origin moved in world space, for t after
     /// `tmin` and before `tmax`; with `from_start` for t > 0 of the line itself.
     #[cold]
@@ -113,6 +127,23 @@ impl ExactLine {
         };
         let is_after = if from_start { passed * sign_of(&volume) > 0 } else { position(tmin) > 0 };
         if is_after && position(tmax) < 0 { passed * self.orientation() as i32 } else { 0 }
+    }
+}
+
+/// A t as a quotient; the determinant is positive.
+pub(crate) struct ExactT {
+    volume: Dyadic,
+    determinant: Dyadic,
+}
+
+impl ExactT {
+    /// This t times a number.
+    pub(crate) fn times(self, factor: f64) -> ExactT {
+        ExactT { volume: &self.volume * &Dyadic::from(factor), ..self }
+    }
+
+    pub(crate) fn cmp(&self, other: &ExactT) -> Ordering {
+        (&(&self.volume * &other.determinant) - &(&other.volume * &self.determinant)).sign()
     }
 }
 

@@ -82,9 +82,7 @@ impl EnteredRay<'_> {
     pub(crate) fn exact(&self) -> ExactRay<'_> {
         match self {
             EnteredRay::InWorld { ray, start: None } => ExactRay::plain(ray),
-            EnteredRay::InWorld { ray, start: Some(start) } => {
-                ExactRay { ray, line: LineSource::Start(start) }
-            }
+            EnteredRay::InWorld { ray, start: Some(start) } => ExactRay::new(ray, LineSource::Start(start)),
             EnteredRay::InInstance(of_instance) => of_instance.exact_ray(),
         }
     }

@@ -143,7 +143,7 @@ fn blocks_in(scene: &Scene, entered: &EnteredInstance<'_>, a: &PlacedEnd, b: &Pl
         RoundedLine { origin: RoundedOrigin(from, from_off), direction, direction_error: off }.or_unknown();
     let of_object = ObjectRay::of(line, 0.0, 1.0);
     let segment = Segment { scene, instance: entered.instance, ends: [a, b], line: of_object.line };
-    let ray = ExactRay { ray: &of_object.ray, line: LineSource::World(&segment, 0) };
+    let ray = ExactRay::new(&of_object.ray, LineSource::World(&segment, 0));
     let t_scale = f64::from(of_object.t_scale);
     let bounds = of_object.line.bounds(&entered.object.bounds);
     let mut blocking = Blocking { object: entered.object, segment: &segment, t_scale };

@@ -53,14 +53,13 @@ impl<S: Simd, G: Goal> Part<S> for Settle<'_, G> {
     type Output = bool;
     #[inline(always)]
     fn run(self, s: S) -> bool {
-        let Settle { object, ray: ExactRay { ray, line }, pending, of_leaf: (leaf, mut triangles), query } =
-            self;
+        let Settle { object, ray, pending, of_leaf: (leaf, mut triangles), query } = self;
         let mut candidate = pending;
         loop {
             if candidate.leaf != NONE {
-                let is_complete = match line {
-                    LineSource::Ray => settle_one(s, object, ray, candidate, query),
-                    _ => settle_other(object, ExactRay { ray, line }, candidate, query),
+                let is_complete = match ray.line {
+                    LineSource::Ray => settle_one(s, object, ray.ray, candidate, query),
+                    _ => settle_other(object, ray, candidate, query),
                 };
                 if is_complete {
                     return true;
@@ -160,7 +159,7 @@ fn offer_wide<G: Goal>(
 /// [`intersect_in_world`].
 pub(crate) fn intersect(
     object: &ObjectView<'_>,
-    ExactRay { ray, line }: ExactRay<'_>,
+    ExactRay { ray, line, .. }: ExactRay<'_>,
     corners: [[f32; 3]; 3],
     may_matter: impl FnOnce([f64; 2]) -> bool,
 ) -> Option<Intersection> {

@@ -34,7 +34,7 @@ pub(crate) fn store_certain_hit<S: Simd, G: Goal>(
     hit: &mut Hit,
 ) {
     if let Some(leaf) = object.node_base().indexed_leaf(candidate.leaf) {
-        let (corners, ExactRay { ray, line }) = (leaf.corners(candidate.triangle as usize), exact_ray);
+        let (corners, ExactRay { ray, line, .. }) = (leaf.corners(candidate.triangle as usize), exact_ray);
         let rounded = match line {
             LineSource::Ray => rounded_intersection(s.doubles(), (ray.origin, ray.direction), corners, norm),
             LineSource::Start(start) => {

@@ -77,7 +77,7 @@ impl<S: Simd> Part<S> for Flush<'_, '_> {
             let lane = rest.trailing_zeros() as usize % LANES;
             rest &= rest - 1;
             let index = deferred.ray[lane] as usize;
-            let ray = ExactRay { ray: &rays[index], line: lines.of(index) };
+            let ray = ExactRay::new(&rays[index], lines.of(index));
             let mut query = RayQuery::new(NearestHit, ray.ray);
             let (pending, of_leaf) = (deferred.candidate[lane], (NONE, 0));
             s.call(Settle { object, ray, pending, of_leaf, query: &mut query });

@@ -111,7 +111,7 @@ impl<G: Goal> Kernel for Interleaved<'_, '_, G> {
             }
             pool.leaf_steps(s, PoolRays { object, rays, lines }, |leaf, state| {
                 let ray = state.ray();
-                let ray = ExactRay { ray: &rays[ray], line: lines.of(ray) };
+                let ray = ExactRay::new(&rays[ray], lines.of(ray));
                 enter_special_leaf(object, leaf, ray, state)
             });
         }

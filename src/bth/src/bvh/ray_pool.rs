@@ -270,7 +270,7 @@ impl<'a, G: Goal> RayPool<'a, G> {
             let state = &mut slots[slot].0;
             let (code, top) = (tops.code[slot], tops.position[slot]);
             let ray = state.ray();
-            let exact_ray = ExactRay { ray: &rays[ray], line: lines.of(ray) };
+            let exact_ray = ExactRay::new(&rays[ray], lines.of(ray));
             let mut memory = LeafMemory::default();
             let found = match leaf(s, object, node_base, code, &mut memory) {
                 Leaf::Indexed(block) => {

@@ -38,7 +38,7 @@ struct CrossingCounter<'a> {
 
 impl Receiver for CrossingCounter<'_> {
     fn receive(&mut self, _triangle: TriangleRef<'_>, corners: [[f32; 3]; 3]) -> bool {
-        let ExactRay { ray, line } = self.ray;
+        let ExactRay { ray, line, .. } = self.ray;
         let sign = match line {
             LineSource::Ray => crossing(ray, corners),
             LineSource::Start(point) => start_on(self.object, point)

@@ -62,10 +62,11 @@ impl Farthest {
     /// Includes rays through an instance, given the max |coordinate| of their origins in world
     /// space. `rounded` are origins of starts, which f32 does not hold.
     fn include(&mut self, placement: &Placement, in_object: f32, in_world: f32, rounded: bool) {
-        let Placement { inverse, accuracy, .. } = placement;
+        let error = placement.accuracy.error();
+        let of_f32 = if rounded { placement.inverse.rounding_error(in_world.into()) } else { 0.0 };
         self.in_object = self.in_object.max(in_object);
-        self.error = self.error.max(inverse.origin_error(*accuracy, in_world.into(), rounded) as f32);
-        self.direction_error = self.direction_error.max(accuracy.direction_error() as f32);
+        self.error = self.error.max((f64::from(in_object) * error + of_f32) as f32);
+        self.direction_error = self.direction_error.max(error as f32);
     }
 }
 

@@ -183,7 +183,7 @@ impl<'a> RayInInstance<'a> {
     }
 
     pub(crate) fn exact_ray(&self) -> ExactRay<'_> {
-        ExactRay { ray: &self.of_object.ray, line: LineSource::World(self, 0) }
+        ExactRay::new(&self.of_object.ray, LineSource::World(self, 0))
     }
 }
 
@@ -246,7 +246,7 @@ impl SingleRay for RayInInstance<'_> {
     }
     #[inline(always)]
     fn exact<'a>(&'a self, line: &'a InstanceLine) -> ExactRay<'a> {
-        ExactRay { ray: &line.ray, line: LineSource::World(self, 0) }
+        ExactRay::new(&line.ray, LineSource::World(self, 0))
     }
     #[inline(always)]
     fn bounds<'a>(_object: &'a ObjectView<'_>, line: &'a InstanceLine) -> &'a ObjectBounds {

@@ -16,6 +16,8 @@ pub(crate) struct ExactRay<'a> {
     /// The ray as f32 knows it, with its range of t.
     pub(crate) ray: &'a Ray,
     pub(crate) line: LineSource<'a>,
+    /// If the ray starts on a triangle of the object: the child code of its leaf, and its slot.
+    own: Option<[u32; 2]>,
 }
 
 /// Where the line of a ray is known exactly.
@@ -54,7 +56,18 @@ impl<'a> ExactRay<'a> {
     /// A ray of f32.
     #[inline(always)]
     pub(crate) fn plain(ray: &'a Ray) -> ExactRay<'a> {
-        ExactRay { ray, line: LineSource::Ray }
+        ExactRay { ray, line: LineSource::Ray, own: None }
+    }
+
+    /// A ray with its line.
+    #[inline(always)]
+    pub(crate) fn new(ray: &'a Ray, line: LineSource<'a>) -> ExactRay<'a> {
+        let own = match line {
+            LineSource::Ray => None,
+            LineSource::Start(start) => Some([start.leaf, start.slot]),
+            LineSource::World(lines, ray) => lines.start(ray).map(|start| [start.leaf, start.slot]),
+        };
+        ExactRay { ray, line, own }
     }
 
     /// Where the ray starts, if that is on a triangle of the object.
@@ -71,8 +84,7 @@ impl<'a> ExactRay<'a> {
     /// ray does not hit it.
     #[inline(always)]
     pub(crate) fn own_triangle(&self, leaf: u32) -> u32 {
-        let start = self.start().filter(|start| start.leaf == leaf);
-        start.map_or(0, |start| 1 << (start.slot % WIDTH as u32))
+        self.own.map_or(0, |[own, slot]| u32::from(own == leaf) << (slot % WIDTH as u32))
     }
 
     /// The line in f64.
@@ -163,7 +175,7 @@ impl<'a> Lines<'a> {
     /// The line of a ray in f64.
     #[inline(always)]
     pub(crate) fn rounded(self, ray: usize, of_f32: &Ray) -> RoundedLine {
-        ExactRay { ray: of_f32, line: self.of(ray) }.rounded()
+        ExactRay { ray: of_f32, line: self.of(ray), own: None }.rounded()
     }
 
     /// Sets the lines of up to sixteen rays, given their indices and the rays of the batch.

@@ -226,33 +226,35 @@ impl Affine {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Accuracy {
     condition: u16,
-    line_error: u16,
+    error: u16,
 }
 
 impl Accuracy {
+    /// With the bound of the error of a product of the inverse L with a vector, relative to |L| and
+    /// the vector.
     fn new(condition: f64, line_error: f64) -> Accuracy {
+        /// Beyond this error nothing is known: bounds of the first order would not hold.
+        const LARGEST: f64 = 1.0 / 128.0;
         let half = |x: f64| ((x as f32).next_up().to_bits() >> 16) as u16 + 1;
-        let line_error = if line_error == 0.0 { 0 } else { half(line_error) };
-        Accuracy { condition: half(condition), line_error }
+        let error = match condition * line_error {
+            0.0 => 0,
+            error if error < LARGEST => half(1.02 * error),
+            _ => (f32::INFINITY.to_bits() >> 16) as u16,
+        };
+        Accuracy { condition: half(condition), error }
     }
 
-    /// The condition number κ of the transform.
-    #[inline(always)]
+    /// The condition number κ of the transform A.
     pub(crate) fn condition(self) -> f64 {
         f64::from(f32::from_bits(u32::from(self.condition) << 16))
     }
 
-    /// Bound of the error of a product of the inverse L with a vector, relative to |L| and the
-    /// vector. It includes the error of L, and is 0 for the identity.
+    /// Bound of the error of a product x of L with a vector, relative to |x|: κ times the error
+    /// relative to |L| and the vector, which is Ax. It includes the error of L, and is 0 for the
+    /// identity.
     #[inline(always)]
-    fn line_error(self) -> f64 {
-        f64::from(f32::from_bits(u32::from(self.line_error) << 16))
-    }
-
-    /// Bound of the error of a direction in object space, relative to its max |component|.
-    #[inline(always)]
-    pub(crate) fn direction_error(self) -> f64 {
-        1.01 * self.condition() * self.line_error()
+    pub(crate) fn error(self) -> f64 {
+        f64::from(f32::from_bits(u32::from(self.error) << 16))
     }
 }
 
@@ -349,8 +351,7 @@ impl Inverse {
 
     /// Transforms a line of world space to object space, with the same points at the same t.
     ///
-    /// Let L be this inverse, E its error and u = 2^-53. The difference p of origins and its
-    /// product with L are off by at most 4u|L||p| by roundings and by |E||p|, in the maximum norm.
+    /// Errors are bounded in the maximum norm ([`Accuracy::error`]).
     #[inline(always)]
     pub(crate) fn line(&self, accuracy: Accuracy, line: &RoundedLine) -> RoundedLine {
         // The direction of a line in world space is exact.
@@ -363,22 +364,24 @@ impl Inverse {
             origin[k] = dot(self.linear[k], relative);
             of_object[k] = dot(self.linear[k], direction);
         }
-        let origin_error = 1.01 * norm(&self.linear) * (max_norm(relative) * accuracy.line_error() + off);
+        let mut origin_error = max_norm(origin) * accuracy.error();
+        if off != 0.0 {
+            origin_error += 1.01 * norm(&self.linear) * off;
+        }
         RoundedLine {
             origin: RoundedOrigin(origin, origin_error),
             direction: of_object,
-            direction_error: accuracy.direction_error() + direction_error,
+            direction_error: accuracy.error() + direction_error,
         }
         .or_unknown()
     }
 
-    /// Bound of the errors of the origins of all lines that [`Self::line`] returns for origins with
-    /// coordinates of at most `in_world`. `rounded` were rounded to f32 there.
-    pub(crate) fn origin_error(&self, accuracy: Accuracy, in_world: f64, rounded: bool) -> f64 {
+    /// Bound of the error that rounding to f32 has, in object space, for points with coordinates of
+    /// at most `in_world` in world space.
+    pub(crate) fn rounding_error(&self, in_world: f64) -> f64 {
         /// Half a unit in the last place of f32, relative.
         const ROUNDED: f64 = 1.0 / (1u64 << 24) as f64;
-        let off = if rounded { ROUNDED * in_world } else { 0.0 };
-        1.01 * norm(&self.linear) * ((in_world + max_norm(self.origin)) * accuracy.line_error() + off)
+        1.01 * norm(&self.linear) * ROUNDED * in_world
     }
 
     /// The vector x of object space with Ax = `of`, for the transform A from object space with
@@ -400,7 +403,7 @@ impl Inverse {
         let solution = [0, 1, 2].map(|k| Long::from(x[k]) + Long::from(dot(self.linear[k], rest)));
         let of_rest = LONG_ERROR * (norm(&linear) * max_norm(x) + max_norm(rounded)) + off;
         // The low part of the residual, which is not used, is a rounding of f64.
-        let relative_error = accuracy.line_error() + ROUNDINGS;
+        let relative_error = accuracy.error() + ROUNDINGS;
         (solution, 1.01 * norm(&self.linear) * (relative_error * max_norm(rest) + of_rest))
     }
 
@@ -408,7 +411,7 @@ impl Inverse {
     /// rule.
     ///
     /// The residual of the solution x bounds its error: |A| (|p - Lx| + 8u|L||x|), and |E| adds
-    /// a relative error of κ times [`Accuracy::line_error`], where |A| ≤ κ / |L|.
+    /// a relative error of [`Accuracy::error`], where |A| ≤ κ / |L|.
     pub(crate) fn point_in_world(&self, accuracy: Accuracy, point: RoundedOrigin) -> RoundedOrigin {
         let condition = accuracy.condition();
         let RoundedOrigin(point, off) = point;
@@ -421,7 +424,7 @@ impl Inverse {
         });
         let rest = max_norm([0, 1, 2].map(|k| point[k] - dot(self.linear[k], x)));
         let error = condition / norm(&self.linear) * (rest + off)
-            + 2.0 * (accuracy.line_error() + ROUNDINGS) * condition * max_norm(x);
+            + 2.0 * (accuracy.error() + ROUNDINGS * condition) * max_norm(x);
         let world = [0, 1, 2].map(|k| self.origin[k] + x[k]);
         RoundedOrigin(world, 1.01 * error + max_norm(world) * ROUNDINGS)
     }

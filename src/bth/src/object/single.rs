@@ -78,7 +78,7 @@ impl SingleRay for StartRay {
     }
     #[inline(always)]
     fn exact<'a>(&'a self, line: &'a StartLine) -> ExactRay<'a> {
-        ExactRay { ray: &line.ray, line: LineSource::Start(&line.point) }
+        ExactRay::new(&line.ray, LineSource::Start(&line.point))
     }
     #[inline(always)]
     fn bounds<'a>(object: &'a ObjectView<'_>, _line: &'a StartLine) -> &'a ObjectBounds {

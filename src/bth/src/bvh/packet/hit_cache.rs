@@ -8,7 +8,7 @@ use super::leaf_mesh::LeafPoints;
 use crate::bvh::candidate::Candidate;
 use crate::intersect::exact_lanes::{F32Lanes, OriginTermsLanes, Pairs};
 use crate::intersect::exact_ray::{LineLanes, Lines};
-use crate::intersect::vector::wide;
+use crate::intersect::origin::Origin;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 
@@ -128,25 +128,33 @@ impl CachedHits<'_> {
         self.lines.lanes(&rays[..count], self.rays, of_lanes);
     }
 
-    /// Computes ids and terms of the cached triangles, at the first call for a packet. Returns
-    /// false if the lines of the rays have no common origin, though the rays of f32 have one.
+    /// Computes ids and terms of the cached triangles for the common origin of the rays, at the first
+    /// call for a packet.
     #[inline(always)]
-    pub(crate) fn compute(&mut self) -> bool {
+    pub(crate) fn compute(&mut self, origin: impl Origin) {
         if self.hit_cache.is_computed {
-            return self.has_common_origin;
+            return;
         }
         self.hit_cache.is_computed = true;
-        let (corners, kept) = (&self.hit_cache.corner, self.hit_cache.kept());
-        match self.lines {
-            Lines::Rays => self.origin_terms.compute(wide(self.origin), corners, kept),
-            Lines::Starts(_) => self.has_common_origin = false,
-            Lines::World(lines, first) => match lines.common_origin(first, self.rays.len()) {
-                Some(line) => self.origin_terms.compute(line, corners, kept),
-                None => self.has_common_origin = false,
-            },
-        }
-        for i in 0..kept.min(CACHED_TRIANGLES) {
+        for i in 0..self.hit_cache.kept().min(CACHED_TRIANGLES) {
             self.hit_cache.id[i] = self.ids[self.hit_cache.index[i] as usize];
+        }
+        self.origin_terms.compute(origin, &self.hit_cache.corner, self.hit_cache.kept());
+    }
+
+    /// Like [`Self::compute`], for lines. Returns false if they have no common origin, though the
+    /// rays of f32 have one.
+    #[inline(always)]
+    pub(crate) fn compute_for_lines(&mut self) -> bool {
+        if !self.hit_cache.is_computed && self.has_common_origin {
+            let line = match self.lines {
+                Lines::World(lines, first) => lines.common_origin(first, self.rays.len()),
+                Lines::Rays | Lines::Starts(_) => None,
+            };
+            self.has_common_origin = line.is_some();
+            if let Some(line) = line {
+                self.compute(line);
+            }
         }
         self.has_common_origin
     }

@@ -211,7 +211,7 @@ impl<G: Goal> PacketRays<'_, G> {
             let origin_reach = self.object.bounds.origin_reach;
             let ray = at * LANES + lane;
             let own = match self.have_starts {
-                true => ExactRay { ray: &self.rays[ray], line: self.lines.of(ray) }.own_triangle(code),
+                true => ExactRay::new(&self.rays[ray], self.lines.of(ray)).own_triangle(code),
                 false => 0,
             };
             let found = self.single_rays.candidates::<S, H>(s, group, (at, lane), (block, own), origin_reach);

@@ -135,7 +135,7 @@ impl<G: Goal> PacketRays<'_, G> {
             self.queries[ray] = RayQuery::new(self.goal, &self.rays[ray]);
             self.queried |= 1 << ray;
         }
-        let exact_ray = ExactRay { ray: &self.rays[ray], line: self.lines.of(ray) };
+        let exact_ray = ExactRay::new(&self.rays[ray], self.lines.of(ray));
         let (object, query) = (self.object, &mut self.queries[ray]);
         s.call(Settle { object, ray: exact_ray, pending, of_leaf, query })
     }

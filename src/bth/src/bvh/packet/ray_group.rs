@@ -11,8 +11,8 @@ use super::projection::Projection;
 use crate::intersect::exact_lanes::{Intersections, lane};
 use crate::intersect::exact_ray::LineLanes;
 use crate::intersect::prepare::{self, Axes, CommonAxis, MixedAxes, PreparedLanes};
-use crate::intersect::vector::max_norm;
 use crate::intersect::vector::pick3;
+use crate::intersect::vector::{max_norm, wide};
 use crate::simd::{LANES, Lanewise, Part, Simd};
 use bth_format::layout::NONE;
 use std::marker::PhantomData;
@@ -258,8 +258,6 @@ impl<S: Simd> RayGroup<S> {
 /// `intersections` are cleared.
 pub(crate) struct IntersectGroup<'a, 'c, S: Simd, H> {
     pub(crate) group: &'a RayGroup<S>,
-    /// Index of the group.
-    pub(crate) at: usize,
     pub(crate) cached: &'a mut CachedHits<'c>,
     pub(crate) intersections: &'a mut Intersections,
     pub(crate) packet: PhantomData<H>,
@@ -269,62 +267,104 @@ impl<S: Simd, H: PacketBounds<S>> Part<S> for IntersectGroup<'_, '_, S, H> {
     type Output = ();
     #[inline(always)]
     fn run(self, s: S) {
-        let IntersectGroup { group, at, cached, intersections, .. } = self;
-        let lanes = s.mask_bits(s.lt_u(group.pending, s.splat_u(NONE)));
-        (intersections.certain, intersections.open) = (0, 0);
-        if lanes == 0 {
-            return;
-        }
+        let IntersectGroup { group, cached, intersections, .. } = self;
+        let Some(lanes) = group.pending_lanes(s, intersections) else { return };
         let uncached = s.eq_u(group.pending, s.splat_u(UNCACHED));
         // For most kernels this is a constant.
         let kept = if H::COMMON_ORIGIN && S::HAS_FAST_F64_LOOKUP { cached.hit_cache.kept() } else { 0 };
-        let is_cached = kept > 0 && s.mask_bits(uncached) == 0;
-        if is_cached && cached.compute() {
-            let (hit_cache, terms, pending) = (&*cached.hit_cache, &*cached.origin_terms, group.pending);
-            s.store_u(s.lookup_u(s.load_u(&hit_cache.id), pending), &mut intersections.triangle);
-            if !cached.lines.are_rays() {
-                let mut of_lanes = LineLanes::NONE;
-                cached.lines_of(at, &mut of_lanes);
-                let of_lane = |i: usize| {
-                    let direction = of_lanes.direction_of(i);
-                    (direction, max_norm(direction))
-                };
-                return intersections.compute_from_point::<S, false>(s, lanes, of_lane, terms, pending);
-            }
+        if kept > 0 && s.mask_bits(uncached) == 0 {
+            cached.compute(wide(cached.origin));
+            let (hit_cache, terms) = (&*cached.hit_cache, &*cached.origin_terms);
             let (mut direction, mut size) = ([[0.0; LANES]; 3], [0.0; LANES]);
             for k in 0..3 {
                 s.store(group.direction[k], &mut direction[k]);
             }
             s.store(group.scale, &mut size);
-            let of_lane = |i: usize| (lane(&direction, i), size[i].into());
+            s.store_u(s.lookup_u(s.load_u(&hit_cache.id), group.pending), &mut intersections.triangle);
+            let (pending, of_lane) = (group.pending, |i: usize| (lane(&direction, i), size[i].into()));
             return if hit_cache.is_at_most_half_full() {
                 intersections.compute_from_point::<S, true>(s, lanes, of_lane, terms, pending)
             } else {
                 intersections.compute_from_point::<S, false>(s, lanes, of_lane, terms, pending)
             };
         }
-        let (hit_cache, ids, pairs) = (&*cached.hit_cache, cached.ids, &mut *cached.pairs);
         for k in 0..3 {
             let origin = if H::COMMON_ORIGIN { s.splat(cached.origin[k]) } else { group.origin[k] };
-            s.store(origin, &mut pairs.origin[k]);
-            s.store(group.direction[k], &mut pairs.direction[k]);
+            s.store(origin, &mut cached.pairs.origin[k]);
+            s.store(group.direction[k], &mut cached.pairs.direction[k]);
+        }
+        group.store_triangles(s, lanes, (uncached, kept), cached, intersections);
+        intersections.compute(s, lanes, cached.pairs);
+    }
+}
+
+impl<S: Simd> RayGroup<S> {
+    /// Clears the masks of `intersections`. Returns the lanes with a pending hit, if there are any.
+    #[inline(always)]
+    fn pending_lanes(&self, s: S, intersections: &mut Intersections) -> Option<u32> {
+        (intersections.certain, intersections.open) = (0, 0);
+        Some(s.mask_bits(s.lt_u(self.pending, s.splat_u(NONE)))).filter(|lanes| *lanes != 0)
+    }
+
+    /// Stores the triangles of the pending hits; `kept` are in the cache.
+    #[inline(always)]
+    fn store_triangles(
+        &self,
+        s: S,
+        lanes: u32,
+        (uncached, kept): (S::M, usize),
+        cached: &mut CachedHits<'_>,
+        intersections: &mut Intersections,
+    ) {
+        let hit_cache = &*cached.hit_cache;
+        for k in 0..3 {
             for c in 0..3 {
-                let mut corner = group.corner[c][k];
+                let mut corner = self.corner[c][k];
                 if kept > 0 {
                     corner =
-                        s.select(uncached, corner, s.lookup(s.load(&hit_cache.corner[c][k]), group.pending));
+                        s.select(uncached, corner, s.lookup(s.load(&hit_cache.corner[c][k]), self.pending));
                 }
-                s.store(corner, &mut pairs.corner[c][k]);
+                s.store(corner, &mut cached.pairs.corner[c][k]);
             }
         }
-        let index = s.select_u(uncached, group.index, s.lookup_u(s.load_u(&hit_cache.index), group.pending));
-        s.store_u(s.gather_u(s.mask(lanes), ids, index), &mut intersections.triangle);
-        if cached.lines.are_rays() {
-            intersections.compute(s, lanes, cached.pairs);
-        } else {
-            let mut of_lanes = LineLanes::NONE;
-            cached.lines_of(at, &mut of_lanes);
-            intersections.compute_lines(s, lanes, &of_lanes, cached.pairs);
+        let index = s.select_u(uncached, self.index, s.lookup_u(s.load_u(&hit_cache.index), self.pending));
+        s.store_u(s.gather_u(s.mask(lanes), cached.ids, index), &mut intersections.triangle);
+    }
+}
+
+/// Like [`IntersectGroup`], for rays whose lines f32 does not hold.
+pub(crate) struct IntersectLines<'a, 'c, S: Simd> {
+    pub(crate) group: &'a RayGroup<S>,
+    /// Index of the group.
+    pub(crate) at: usize,
+    pub(crate) cached: &'a mut CachedHits<'c>,
+    pub(crate) intersections: &'a mut Intersections,
+}
+
+impl<S: Simd> Part<S> for IntersectLines<'_, '_, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self, s: S) {
+        let IntersectLines { group, at, cached, intersections } = self;
+        let Some(lanes) = group.pending_lanes(s, intersections) else { return };
+        let mut of_lanes = LineLanes::NONE;
+        cached.lines_of(at, &mut of_lanes);
+        let uncached = s.eq_u(group.pending, s.splat_u(UNCACHED));
+        let kept = cached.hit_cache.kept();
+        if kept > 0 && s.mask_bits(uncached) == 0 && cached.compute_for_lines() {
+            let (hit_cache, terms, pending) = (&*cached.hit_cache, &*cached.origin_terms, group.pending);
+            s.store_u(s.lookup_u(s.load_u(&hit_cache.id), pending), &mut intersections.triangle);
+            let of_lane = |i: usize| {
+                let direction = of_lanes.direction_of(i);
+                (direction, max_norm(direction))
+            };
+            return if hit_cache.is_at_most_half_full() {
+                intersections.compute_from_point::<S, true>(s, lanes, of_lane, terms, pending)
+            } else {
+                intersections.compute_from_point::<S, false>(s, lanes, of_lane, terms, pending)
+            };
         }
+        group.store_triangles(s, lanes, (uncached, kept), cached, intersections);
+        intersections.compute_lines(s, lanes, &of_lanes, cached.pairs);
     }
 }

@@ -13,7 +13,7 @@ use super::entry::{GROUPS, PACKET};
 use super::frustum::Frustum;
 use super::hit_cache::CachedHits;
 use super::packet_rays::PacketRays;
-use super::ray_group::{IntersectGroup, RayGroup};
+use super::ray_group::{IntersectGroup, IntersectLines, RayGroup};
 use super::single_rays::FEW_OF_PACKET;
 use crate::bvh::nodes::{Leaf, LeafMemory, leaf, prefetch_into};
 use crate::bvh::ray_state::key_limit;
@@ -209,13 +209,15 @@ fn finish<S: Simd, H: PacketBounds<S>, G: Goal>(
     };
     for (at, (group, intersections)) in groups.iter().zip(&mut *intersections).enumerate() {
         let cached = &mut cached;
-        if !S::INLINES_PARTS {
+        if !cached.lines.are_rays() {
+            s.call(IntersectLines { group, at, cached, intersections });
+        } else if !S::INLINES_PARTS {
             // Every ray has its origin, so one part serves all packets.
             let packet = PhantomData::<Frustum<S, false>>;
-            IntersectGroup { group, at, cached, intersections, packet }.inline_or_call(s);
+            IntersectGroup { group, cached, intersections, packet }.inline_or_call(s);
         } else {
             let packet = PhantomData::<H>;
-            IntersectGroup { group, at, cached, intersections, packet }.inline_or_call(s);
+            IntersectGroup { group, cached, intersections, packet }.inline_or_call(s);
         }
     }
     for (i, (group, intersections)) in groups.iter().zip(intersections.iter()).enumerate() {

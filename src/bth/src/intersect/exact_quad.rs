@@ -48,14 +48,21 @@ pub(crate) fn rounded_intersection<D: Doubles>(
 ) -> RoundedIntersection {
     // By axis, four factors of vector products: the edges to b and c, the offset of a from the
     // origin, and the first edge again.
-    let factor = |k: usize| s.sub(s.widen([b[k], c[k], a[k], b[k]]), origin.with_corner(s, a[k], k));
-    let left = [factor(0), factor(1), factor(2)];
+    // Closures might be compiled without the instruction set of the kernel.
+    let mut left = [s.widen([0.0; 4]); 3];
+    for k in 0..3 {
+        left[k] = s.sub(s.widen([b[k], c[k], a[k], b[k]]), origin.with_corner(s, a[k], k));
+    }
     // The other factors, so that the products are `normal`, `second`, `third` and `normal` again.
     let right = [s.rotate(left[0]), s.rotate(left[1]), s.rotate(left[2])];
-    let product = |i: usize, j: usize| s.sub(s.mul(left[i], right[j]), s.mul(left[j], right[i]));
     // Scalar products with the direction, and the last with the offset.
-    let term = |k: usize, product: D::V| s.mul(product, s.with_last(s.widen([direction[k]; 4]), left[k]));
-    let [x, y, z] = [term(0, product(1, 2)), term(1, product(2, 0)), term(2, product(0, 1))];
+    let mut terms = [left[0]; 3];
+    for k in 0..3 {
+        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+        let product = s.sub(s.mul(left[i], right[j]), s.mul(left[j], right[i]));
+        terms[k] = s.mul(product, s.with_last(s.widen([direction[k]; 4]), left[k]));
+    }
+    let [x, y, z] = terms;
     let sum = s.add(s.add(x, y), z);
     let greatest = s.max(s.max(sum, s.add(s.add(y, z), x)), s.add(s.add(z, x), y));
     let ([_, second, third, _], [determinant, _, _, volume]) = (s.array(sum), s.array(greatest));

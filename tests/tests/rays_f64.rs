@@ -46,7 +46,7 @@ fn rays(world: &[[[f64; 3]; 3]], count: usize, rng: &mut Rng) -> Vec<Ray64> {
         };
         let target = [0, 1, 2].map(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]));
         let direction = [(); 3].map(|()| unit(rng) * size);
-        // The origin is exact for many rays, so that they meet vertices exactly.
+        // The origin is exact for many rays, so that they hit vertices exactly.
         let steps = [1.0, 2.0, 1.0 / 3.0][rng.below(3) as usize];
         let origin = [0, 1, 2].map(|k| target[k] - steps * direction[k]);
         let ray = Ray64::new(origin, direction);

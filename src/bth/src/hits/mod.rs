@@ -143,7 +143,7 @@ impl Scene {
     ///
     /// Hits are not suited for this: a ray through an edge or a vertex hits all triangles at it,
     /// and a ray in the plane of a triangle does not hit it. Crossings are counted for the ray with
-    /// its origin moved by (ε, ε², ε³) in the space of the object, for an infinitely small ε > 0.
+    /// its origin moved by (ε, ε², ε³) in world space, for an infinitely small ε > 0.
     /// This exact rule never hits an edge, a vertex or a plane. So a line crosses a surface
     /// without boundary as often in as out. Of two ranges of t that share an end, `[a, b]` and `[b,
     /// c]`, each crossing is in exactly one: t is compared with the ends exactly, without rounding.
@@ -153,8 +153,8 @@ impl Scene {
     /// A [`StartRay`](crate::rays::StartRay) counts the crossings of the moved line with a t above
     /// 0 on the line through the start itself, and none of a triangle through the start.
     ///
-    /// Each instance is counted in the space of its object, into which the ray is rounded as for
-    /// other queries. A mirrored instance keeps its front and back.
+    /// The triangles of an instance are their exact images in world space. A mirrored instance
+    /// keeps its front and back.
     ///
     /// ```
     /// use bth::rays::Ray;

@@ -29,8 +29,8 @@ use glam::Vec4;
 /// Where a ray goes through an object.
 #[derive(Clone, Copy)]
 pub(super) enum Place<'a> {
-    /// The object's space is world space. Rays may start on one of these objects, whose indices
-    /// are those of instances.
+    /// The object's space is world space. Rays may start on one of these objects; each is the
+    /// instance with its index.
     World(Option<&'a Objects>),
     /// It is the object of this instance.
     Instance(&'a World, &'a Objects, u32),

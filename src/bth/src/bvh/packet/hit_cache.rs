@@ -128,8 +128,8 @@ impl CachedHits<'_> {
         self.lines.lanes(&rays[..count], self.rays, of_lanes);
     }
 
-    /// Computes ids and terms of the cached triangles for the common origin of the rays, at the first
-    /// call for a packet.
+    /// Computes ids and terms of the cached triangles for the common origin of the rays, at the
+    /// first call for a packet.
     #[inline(always)]
     pub(crate) fn compute(&mut self, origin: impl Origin) {
         if self.hit_cache.is_computed {

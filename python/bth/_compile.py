@@ -16,7 +16,7 @@ _GLTF = ("flatten", "scene", "animation", "rate", "at_rest", "rigid_parts", "str
 
 
 def compile(
-    model, *, output=None, quality=None, structure=None, coordinates=None, max_error=None, polygons=None,
+    model, *, output=None, quality=None, structure=None, coordinates=None, max_error=None, polygons=None, positions=None,
     attributes=None, alpha=None, compact=None, geometry=None, names=None, materials=None,
     lenient_materials=None, max_bytes_per_triangle=None,
     rays=None, settings=None, flatten=None, scene=None, animation=None, rate=None, at_rest=None, rigid_parts=None,
@@ -39,6 +39,7 @@ def compile(
     All other options are those of `bthc compile`. `structure` is 'bvh' by default, since the package has no worker for tetrahedra, and
     free_directions is 'none'.
     polygons ('ears') covers concave polygons of models in files exactly, which fans do not.
+    positions ('f64', 'auto') keeps the positions of models in files in double precision: always, or where float32 would move a vertex.
     attributes ('normals', 'all'), alpha ('mask', 'blend'), names and materials (True) keep what models in files have of these;
     lenient_materials leaves out images that cannot be read.
     settings: a dictionary of the keys of `bthc compile --set` and their values, such as {"poses": 1}.

@@ -6,7 +6,7 @@ use bth_compile::sampling::KnownRays;
 use bth_compile::settings::Setting;
 use bth_compile::{bvh, coordinates, free};
 use bth_format::layout::{GridBits, RecordKind};
-use bth_import::{AlphaMode, Keep, Polygons};
+use bth_import::{AlphaMode, Keep, Polygons, Positions};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyAny, PyDict};
@@ -96,6 +96,12 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
             .unwrap_or_default(),
         polygons: keywords
             .choice("polygons", &[("fans", Polygons::Fans), ("ears", Polygons::Ears)])?
+            .unwrap_or_default(),
+        positions: keywords
+            .choice(
+                "positions",
+                &[("auto", Positions::Auto), ("f32", Positions::F32), ("f64", Positions::F64)],
+            )?
             .unwrap_or_default(),
         geometry: keywords.value("geometry")?.unwrap_or(true),
         names: materials || keywords.value("names")?.unwrap_or(false),

@@ -30,7 +30,7 @@ use bth_format::layout::Opacity;
 use bth_format::object::ObjectView;
 
 impl Scene {
-    /// Nearest hit of a ray in world space: a [`Ray`], a
+    /// Nearest hit of a ray in world space: a [`Ray`](crate::rays::Ray), a
     /// [`Ray64`](crate::rays::Ray64), or a [`StartRay`](crate::rays::StartRay).
     pub fn nearest<R: TraceRay>(&self, ray: &R) -> Option<Hit> {
         let mut hit = Hit::MISS;
@@ -38,8 +38,8 @@ impl Scene {
         hit.is_hit().then_some(hit)
     }
 
-    /// Returns true if a ray in world space hits anything: a [`Ray`], or a
-    /// [`StartRay`](crate::rays::StartRay).
+    /// Returns true if a ray in world space hits anything: a [`Ray`](crate::rays::Ray),
+    /// a [`Ray64`](crate::rays::Ray64), or a [`StartRay`](crate::rays::StartRay).
     pub fn any<R: TraceRay>(&self, ray: &R) -> bool {
         self.hits_any(ray)
     }

@@ -60,6 +60,22 @@ int main(int argc, char **argv) {
     CHECK(scene.all_hits(beside).empty() && scene.surface(hit).geometric_normal[2] == 1);
     CHECK(!scene.contains({0.25F, 0.25F, -1}) && scene.closest({0.25F, 0.25F, -3}, 9).distance == 3);
     CHECK(std::abs(scene.signed_distance({0.25F, 0.25F, 3})) == 3 && scene.object_name(0).empty());
+
+    /* In double: float would lose what the rays are above the triangles. */
+    const bth_ray64 close = {{0.25, 0.25, 0x1p-40}, 0, {0, 0, -1}, INFINITY};
+    const bth_ray64 below = {{0.25, 0.25, -0x1p-40}, 0, {0, 0, -1}, INFINITY};
+    CHECK(scene.nearest(close).t == 0x1p-40 && bth::is_miss(scene.nearest(below)));
+    CHECK(scene.any(close) && !scene.any(below));
+    const std::vector<bth_ray64> double_rays = {below, close};
+    const std::vector<bth_hit64> double_hits = scene.nearest_of(double_rays);
+    CHECK(bth::is_miss(double_hits[0]) && double_hits[1].t == 0x1p-40 && double_hits[1].u == 0.25);
+    CHECK((scene.any_of(double_rays) == std::vector<std::uint8_t>{0, 1}));
+    const bth_ray64 along = {{0.5, 0.5, 2}, 0, {0, 0, -1}, INFINITY}, upward = {{0.25, 0.25, -2}, 0, {0, 0, 1}, INFINITY};
+    CHECK(scene.count_hits(along) == 2 && scene.all_hits(along).size() == 2 && scene.all_hits(along, 1)[0].t == 2);
+    CHECK(!scene.any_accepted(upward, no_back) && bth::is_miss(scene.nearest_accepted(upward, no_back)));
+    CHECK(scene.hit_f64({{0.25, 0.25, 2}, 0, {0, 0, -1}, INFINITY}, hit).t == 2);
+    CHECK(scene.closest_f64({0.25, 0.25, 0x1p-40}, 9).distance == 0x1p-40 && !scene.contains_f64({9, 9, 9}));
+    CHECK(std::abs(scene.signed_distance_f64({0.25, 0.25, 0x1p-40})) == 0x1p-40 && scene.winding_f64({9, 9, 9}) == 0);
     scene.set_instance_mask(0, 2);
     CHECK(bth::is_miss(scene.nearest_accepted(down, {1, BTH_CULL_NONE, nullptr, nullptr})));
     CHECK(scene.winding({9, 9, 9}) == 0);
@@ -129,7 +145,7 @@ int main(int argc, char **argv) {
         caught += e.code() == BTH_ERROR_ARGUMENT;
     }
     try {
-        scene.nearest(nullptr, nullptr, 3);
+        scene.nearest(static_cast<const bth_ray *>(nullptr), nullptr, 3);
     } catch (const bth::error &e) {
         caught += e.code() == BTH_ERROR_ARGUMENT;
     }
@@ -148,7 +164,7 @@ int main(int argc, char **argv) {
     } catch (const bth::error &e) {
         caught += e.code() == BTH_ERROR_ARGUMENT;
     }
-    scene.nearest(nullptr, nullptr, 0);
+    scene.nearest(static_cast<const bth_ray64 *>(nullptr), nullptr, 0);
     CHECK(caught == 7 && scene.any(down));
     return 0;
 }

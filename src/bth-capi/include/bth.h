@@ -284,6 +284,86 @@ int32_t bth_winding(const bth_scene *scene, const float *points, int32_t *windin
 /* Stores in `inside` for each of `count` points 1 if its winding number is not 0, else 0. The rest is as for bth_winding. */
 int32_t bth_contains(const bth_scene *scene, const float *points, uint8_t *inside, size_t count);
 
+/* Double precision. The functions below decide about the caller's own numbers, exactly: nothing is rounded to float before. They are
+ * the functions of the same names without _f64, with the differences that are stated. */
+
+/* A bth_ray in double. An origin beyond the range of float in the space of an object does not hit it, nor does a direction whose
+ * length is beyond 2^164 or below 2^-164. 64 bytes. */
+typedef struct {
+    double origin[3];
+    double tmin;
+    double direction[3];
+    double tmax;
+} bth_ray64;
+
+/* A bth_hit in double. t has a relative error of at most 2^-40; u and v are off by at most 2^-28. The range of t is compared with t
+ * rounded to double. A t beyond the range of float is not hit. 32 bytes. */
+typedef struct {
+    double t;
+    double u;
+    double v;
+    bth_surface surface;
+} bth_hit64;
+
+/* Stores the nearest hit of each of `count` rays that is accepted: the one with the smallest exact t. If `accept` is null, everything
+ * is accepted, as in the other queries below. Its filter gets the ray and the hit rounded to float. Returns BTH_OK or a negative code;
+ * after BTH_ERROR_INTERNAL the results are not valid. The results must not overlap the other arrays. */
+int32_t bth_nearest_f64(const bth_scene *scene, const bth_ray64 *rays, const bth_accept *accept, bth_hit64 *hits, size_t count);
+
+/* Stores in `found` for each of `count` rays 1 if it has a hit that is accepted, else 0. */
+int32_t bth_any_f64(const bth_scene *scene, const bth_ray64 *rays, const bth_accept *accept, uint8_t *found, size_t count);
+
+/* Stores in `counts` the number of hits of each of `count` rays that are accepted. */
+int32_t bth_count_hits_f64(const bth_scene *scene, const bth_ray64 *rays, const bth_accept *accept, uint64_t *counts,
+                           size_t count);
+
+/* A bth_hit_list in double. */
+typedef struct {
+    uint64_t *offsets;
+    bth_hit64 *hits;
+    uint64_t capacity;
+    uint64_t needed;
+} bth_hit64_list;
+
+/* As bth_all_hits. The order is the same: by t rounded to float, then instance, then triangle. */
+int32_t bth_all_hits_f64(const bth_scene *scene, const bth_ray64 *rays, const bth_accept *accept, uint64_t most,
+                         bth_hit64_list *list, size_t count);
+
+/* Stores the numbers of one hit in double, for a hit that another function has found for the ray with the same numbers. A miss stays
+ * a miss. Returns BTH_OK, or BTH_ERROR_ARGUMENT if a pointer is null, or the instance or triangle does not exist or is hidden. */
+int32_t bth_hit_f64(const bth_scene *scene, const bth_ray64 *ray, const bth_hit *hit, bth_hit64 *numbers);
+
+/* As bth_crossings. */
+int32_t bth_crossings_f64(const bth_scene *scene, const bth_ray64 *rays, bth_crossing_count *crossings, size_t count);
+
+/* A bth_closest in double. The distance is off by at most 2^-40 of the distance plus the triangle's longest edge, and by at most 2^-28
+ * of the distance. Each coordinate of the point is off by the former and half a unit in its last place. u and v are off by at most
+ * 2^-26. 64 bytes. */
+typedef struct {
+    double distance;
+    double point[3];
+    double u, v;
+    bth_surface surface;
+    uint32_t feature;
+    uint32_t reserved; /* 0 */
+} bth_closest64;
+
+/* As bth_closest_points. Triangles are compared by their exact distances; there is none if the exact distance exceeds `radius`. */
+int32_t bth_closest_points_f64(const bth_scene *scene, const double *points, double radius, bth_closest64 *closest, size_t count);
+
+/* As bth_signed_distances, with the distances of bth_closest_points_f64. */
+int32_t bth_signed_distances_f64(const bth_scene *scene, const double *points, double *distances, size_t count);
+
+/* As bth_winding and bth_contains. */
+int32_t bth_winding_f64(const bth_scene *scene, const double *points, int32_t *winding, size_t count);
+int32_t bth_contains_f64(const bth_scene *scene, const double *points, uint8_t *inside, size_t count);
+
+/* As bth_triangles_in_box, and as bth_triangles_in_sphere with exact distances. */
+int32_t bth_triangles_in_box_f64(const bth_scene *scene, const double lower[3], const double upper[3], bth_surface *triangles,
+                                 size_t capacity, size_t *count);
+int32_t bth_triangles_in_sphere_f64(const bth_scene *scene, const double center[3], double radius, bth_surface *triangles,
+                                    size_t capacity, size_t *count);
+
 /* What hits lead to. A file keeps the positions of triangles by default (not with `bthc compile --no-geometry`), normals and texture
  * coordinates with --attributes, and groups, materials and names with --names. */
 

@@ -18,6 +18,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 namespace bth {
@@ -46,12 +47,17 @@ inline void check_arrays(const void *rays, const void *results, std::size_t coun
 
 /* Whether a hit is none. */
 inline bool is_miss(const bth_hit &hit) noexcept { return hit.surface.triangle == BTH_NONE; }
+inline bool is_miss(const bth_hit64 &hit) noexcept { return hit.surface.triangle == BTH_NONE; }
 
 /* The point that was hit, at which another ray may start. The start of a miss is none: rays from it
  * are misses. */
 inline bth_start start_of(const bth_hit &hit) noexcept {
     return {hit.surface.instance, hit.surface.triangle, hit.u, hit.v};
 }
+
+/* The hit of a kind of rays. */
+template <typename Ray>
+using hit_of = std::conditional_t<std::is_same_v<std::remove_cv_t<Ray>, bth_ray64>, bth_hit64, bth_hit>;
 
 /* Frames of a scene. */
 struct frame_range {
@@ -90,6 +96,27 @@ public:
         return hit != 0;
     }
 
+    /* The same in double. */
+    bth_hit64 nearest(const bth_ray64 &ray) const {
+        bth_hit64 hit{};
+        check(bth_nearest_f64(opened(), &ray, nullptr, &hit, 1));
+        return hit;
+    }
+
+    bool any(const bth_ray64 &ray) const {
+        std::uint8_t hit = 0;
+        check(bth_any_f64(opened(), &ray, nullptr, &hit, 1));
+        return hit != 0;
+    }
+
+    void nearest(const bth_ray64 *rays, bth_hit64 *hits, std::size_t count) const {
+        check(bth_nearest_f64(opened(), rays, nullptr, hits, count));
+    }
+
+    void any(const bth_ray64 *rays, std::uint8_t *hit, std::size_t count) const {
+        check(bth_any_f64(opened(), rays, nullptr, hit, count));
+    }
+
     /* As bth_nearest. */
     void nearest(const bth_ray *rays, bth_hit *hits, std::size_t count) const {
         check_arrays(rays, hits, count);
@@ -104,8 +131,8 @@ public:
 
     /* For any range of rays that are adjacent in memory: std::vector, std::array, std::span. */
     template <typename Rays>
-    std::vector<bth_hit> nearest_of(const Rays &rays) const {
-        std::vector<bth_hit> hits(std::size(rays));
+    auto nearest_of(const Rays &rays) const {
+        std::vector<hit_of<std::remove_pointer_t<decltype(std::data(rays))>>> hits(std::size(rays));
         nearest(std::data(rays), hits.data(), hits.size());
         return hits;
     }
@@ -201,24 +228,47 @@ public:
         return found != 0;
     }
 
+    /* The same in double. */
+    bth_hit64 nearest_accepted(const bth_ray64 &ray, const bth_accept &accept) const {
+        bth_hit64 hit;
+        check(bth_nearest_f64(get(), &ray, &accept, &hit, 1));
+        return hit;
+    }
+
+    bool any_accepted(const bth_ray64 &ray, const bth_accept &accept) const {
+        std::uint8_t found = 0;
+        check(bth_any_f64(get(), &ray, &accept, &found, 1));
+        return found != 0;
+    }
+
     std::uint64_t count_hits(const bth_ray &ray, const bth_accept &accept = BTH_ACCEPT_EVERYTHING) const {
         std::uint64_t count = 0;
         check(bth_count_hits(get(), &ray, &accept, &count, 1));
         return count;
     }
 
+    std::uint64_t count_hits(const bth_ray64 &ray, const bth_accept &accept = BTH_ACCEPT_EVERYTHING) const {
+        std::uint64_t count = 0;
+        check(bth_count_hits_f64(get(), &ray, &accept, &count, 1));
+        return count;
+    }
+
     /* The `most` nearest hits, all by default. */
     std::vector<bth_hit> all_hits(const bth_ray &ray, std::uint64_t most = BTH_ALL_HITS,
                                   const bth_accept &accept = BTH_ACCEPT_EVERYTHING) const {
-        std::vector<bth_hit> hits(8);
-        for (;;) {
-            std::uint64_t offsets[2];
-            bth_hit_list list{offsets, hits.data(), hits.size(), 0};
-            check(bth_all_hits(get(), &ray, &accept, most, &list, 1));
-            const bool complete = list.needed <= hits.size();
-            hits.resize(static_cast<std::size_t>(list.needed));
-            if (complete) return hits;
-        }
+        return all_hits_of<bth_hit_list>(bth_all_hits, ray, most, accept);
+    }
+
+    std::vector<bth_hit64> all_hits(const bth_ray64 &ray, std::uint64_t most = BTH_ALL_HITS,
+                                    const bth_accept &accept = BTH_ACCEPT_EVERYTHING) const {
+        return all_hits_of<bth_hit64_list>(bth_all_hits_f64, ray, most, accept);
+    }
+
+    /* The numbers in double of a hit of the ray with these numbers. */
+    bth_hit64 hit_f64(const bth_ray64 &ray, const bth_hit &hit) const {
+        bth_hit64 numbers;
+        check(bth_hit_f64(get(), &ray, &hit, &numbers));
+        return numbers;
     }
 
     void set_instance_mask(std::uint32_t instance, std::uint32_t mask) {
@@ -252,6 +302,31 @@ public:
     float signed_distance(const float (&point)[3]) const {
         float distance = 0;
         check(bth_signed_distances(get(), point, &distance, 1));
+        return distance;
+    }
+
+    /* The same in double. */
+    bool contains_f64(const double (&point)[3]) const {
+        std::uint8_t inside = 0;
+        check(bth_contains_f64(get(), point, &inside, 1));
+        return inside != 0;
+    }
+
+    std::int32_t winding_f64(const double (&point)[3]) const {
+        std::int32_t found = 0;
+        check(bth_winding_f64(get(), point, &found, 1));
+        return found;
+    }
+
+    bth_closest64 closest_f64(const double (&point)[3], double radius) const {
+        bth_closest64 found;
+        check(bth_closest_points_f64(get(), point, radius, &found, 1));
+        return found;
+    }
+
+    double signed_distance_f64(const double (&point)[3]) const {
+        double distance = 0;
+        check(bth_signed_distances_f64(get(), point, &distance, 1));
         return distance;
     }
 
@@ -293,6 +368,20 @@ public:
 
 private:
     static constexpr float infinite = std::numeric_limits<float>::infinity();
+
+    /* The hits that a query stores in a list. */
+    template <typename List, typename Query, typename Ray>
+    std::vector<hit_of<Ray>> all_hits_of(Query query, const Ray &ray, std::uint64_t most, const bth_accept &accept) const {
+        std::vector<hit_of<Ray>> hits(8);
+        for (;;) {
+            std::uint64_t offsets[2];
+            List list{offsets, hits.data(), hits.size(), 0};
+            check(query(get(), &ray, &accept, most, &list, 1));
+            const bool complete = list.needed <= hits.size();
+            hits.resize(static_cast<std::size_t>(list.needed));
+            if (complete) return hits;
+        }
+    }
 
     /* The floats of a range of vectors, one for each of `count` rays. */
     template <typename Directions>

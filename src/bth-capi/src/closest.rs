@@ -117,6 +117,46 @@ unsafe fn store_found(
     OK
 }
 
+/// Stores the triangles in a box; returns a code.
+///
+/// # Safety
+/// `ends` are null or point to three numbers. The rest is as for [`store_found`].
+pub(crate) unsafe fn in_box<T: Copy>(
+    name: &str,
+    scene: *const Scene,
+    ends: [*const [T; 3]; 2],
+    triangles: (*mut PrimitiveRef, usize),
+    count: *mut usize,
+    find: fn(&Scene, [T; 3], [T; 3], &mut Vec<PrimitiveRef>),
+) -> i32 {
+    // SAFETY: by contract both are null, and then rejected, or valid for reads.
+    let [Some(lower), Some(upper)] = ends.map(|end| unsafe { end.as_ref() }) else {
+        return fail(ERROR_ARGUMENT, format!("{name}: lower and upper must not be null"));
+    };
+    // SAFETY: the contract of this function includes the contract of `store_found`.
+    unsafe { store_found(name, scene, triangles, count, |scene, found| find(scene, *lower, *upper, found)) }
+}
+
+/// Stores the triangles in a ball; returns a code.
+///
+/// # Safety
+/// `center` is null or points to three numbers. The rest is as for [`store_found`].
+pub(crate) unsafe fn in_ball<T: Copy>(
+    name: &str,
+    scene: *const Scene,
+    (center, radius): (*const [T; 3], T),
+    triangles: (*mut PrimitiveRef, usize),
+    count: *mut usize,
+    find: fn(&Scene, [T; 3], T, &mut Vec<PrimitiveRef>),
+) -> i32 {
+    // SAFETY: by contract it is null, and then rejected, or valid for reads.
+    let Some(center) = (unsafe { center.as_ref() }) else {
+        return fail(ERROR_ARGUMENT, format!("{name}: center must not be null"));
+    };
+    // SAFETY: the contract of this function includes the contract of `store_found`.
+    unsafe { store_found(name, scene, triangles, count, |scene, found| find(scene, *center, radius, found)) }
+}
+
 /// Triangles in a box; see `bth.h`.
 ///
 /// # Safety
@@ -131,16 +171,9 @@ pub unsafe extern "C" fn bth_triangles_in_box(
     capacity: usize,
     count: *mut usize,
 ) -> i32 {
-    // SAFETY: by contract both are null, and then rejected, or valid for reads.
-    let (Some(lower), Some(upper)) = (unsafe { lower.as_ref() }, unsafe { upper.as_ref() }) else {
-        return fail(ERROR_ARGUMENT, "bth_triangles_in_box: lower and upper must not be null".into());
-    };
-    // SAFETY: the contract of this function includes the contract of `store_found`.
-    unsafe {
-        store_found("bth_triangles_in_box", scene, (triangles, capacity), count, |scene, found| {
-            scene.triangles_in_box(*lower, *upper, found);
-        })
-    }
+    let (name, find) = ("bth_triangles_in_box", Scene::triangles_in_box);
+    // SAFETY: the contract is the same.
+    unsafe { in_box(name, scene, [lower, upper], (triangles, capacity), count, find) }
 }
 
 /// Triangles in a ball; see `bth.h`.
@@ -156,14 +189,7 @@ pub unsafe extern "C" fn bth_triangles_in_sphere(
     capacity: usize,
     count: *mut usize,
 ) -> i32 {
-    // SAFETY: by contract it is null, and then rejected, or valid for reads.
-    let Some(center) = (unsafe { center.as_ref() }) else {
-        return fail(ERROR_ARGUMENT, "bth_triangles_in_sphere: center must not be null".into());
-    };
-    // SAFETY: the contract of this function includes the contract of `store_found`.
-    unsafe {
-        store_found("bth_triangles_in_sphere", scene, (triangles, capacity), count, |scene, found| {
-            scene.triangles_in_sphere(*center, radius, found);
-        })
-    }
+    let (name, find) = ("bth_triangles_in_sphere", Scene::triangles_in_sphere);
+    // SAFETY: the contract is the same.
+    unsafe { in_ball(name, scene, (center, radius), (triangles, capacity), count, find) }
 }

@@ -1,10 +1,10 @@
 //! The part of the C interface that reports several hits and hits under conditions, and that sets
 //! masks.
 
-use crate::query::Arguments;
+use crate::query::{Arguments, CHUNK};
 use crate::{ERROR_ARGUMENT, OK, fail};
-use runtime::rays::{Hit, Ray};
-use runtime::{Accept, Cull, Filter, Scene};
+use runtime::rays::{Hit, Hit64, Ray, Ray64};
+use runtime::{Accept, Cull, Filter, Scene, TraceRay};
 use std::ffi::c_void;
 
 /// `bth_filter` of `bth.h`.
@@ -20,14 +20,59 @@ pub struct AcceptC {
     user: *mut c_void,
 }
 
-/// `bth_hit_list` of `bth.h`.
+/// `bth_hit_list` and `bth_hit64_list` of `bth.h`.
 #[derive(Debug)]
 #[repr(C)]
-pub struct HitList {
+pub struct HitList<H> {
     offsets: *mut u64,
-    hits: *mut Hit,
+    hits: *mut H,
     capacity: u64,
     needed: u64,
+}
+
+/// A ray of C, and the hits that answer it.
+pub(crate) trait CallerRay: TraceRay {
+    /// A hit in C.
+    type Hit: Copy;
+    /// No hit.
+    const MISS: Self::Hit;
+    /// The answer for a hit or a miss of this ray.
+    fn answer(&self, scene: &Scene, hit: &Hit) -> Self::Hit;
+    /// Stores the nearest hit of each ray that is accepted.
+    fn nearest(scene: &Scene, rays: &[Self], accept: &Accept<'_>, hits: &mut [Self::Hit]);
+}
+
+impl CallerRay for Ray {
+    type Hit = Hit;
+    const MISS: Hit = Hit::MISS;
+
+    fn answer(&self, _scene: &Scene, hit: &Hit) -> Hit {
+        *hit
+    }
+
+    fn nearest(scene: &Scene, rays: &[Ray], accept: &Accept<'_>, hits: &mut [Hit]) {
+        scene.nearest_accepted_batch(rays, accept, hits);
+    }
+}
+
+impl CallerRay for Ray64 {
+    type Hit = Hit64;
+    const MISS: Hit64 = Hit64::MISS;
+
+    fn answer(&self, scene: &Scene, hit: &Hit) -> Hit64 {
+        scene.hit_f64(self, hit)
+    }
+
+    fn nearest(scene: &Scene, rays: &[Ray64], accept: &Accept<'_>, hits: &mut [Hit64]) {
+        let mut buffer = [Hit::MISS; CHUNK];
+        for (rays, hits) in rays.chunks(CHUNK).zip(hits.chunks_mut(CHUNK)) {
+            let found = &mut buffer[..rays.len()];
+            scene.nearest_accepted_batch(rays, accept, found);
+            for ((ray, found), hit) in rays.iter().zip(found).zip(hits) {
+                *hit = ray.answer(scene, found);
+            }
+        }
+    }
 }
 
 /// A function of the caller that decides about hits, with its argument.
@@ -78,6 +123,127 @@ unsafe fn with_accept(
     query(&Accept { mask, cull, filter: accepts.as_ref().map(|accepts| accepts as &Filter<'_>) })
 }
 
+/// Stores the nearest hit of each ray that is accepted; returns a code. `name` is the name of the C
+/// function, for error messages.
+///
+/// # Safety
+/// The arguments are as in [`Arguments`]. `accept` is null or points to a struct whose filter is
+/// null or keeps the contract in `bth.h`.
+pub(crate) unsafe fn nearest<R: CallerRay>(
+    name: &str,
+    arguments: Arguments<R, R::Hit>,
+    accept: *const AcceptC,
+) -> i32 {
+    // SAFETY: the contract of this function includes the contracts of `with_accept` and `store`.
+    unsafe {
+        with_accept(name, accept, arguments.count, |accept| {
+            arguments.store(R::MISS, |scene, rays, hits| R::nearest(scene, rays, accept, hits))
+        })
+    }
+}
+
+/// Stores which rays have a hit that is accepted, like [`nearest`].
+///
+/// # Safety
+/// The contract of [`nearest`].
+pub(crate) unsafe fn any<R: CallerRay>(
+    name: &str,
+    arguments: Arguments<R, u8>,
+    accept: *const AcceptC,
+) -> i32 {
+    // SAFETY: the contract of this function includes the contracts of `with_accept` and `store_as`.
+    unsafe {
+        with_accept(name, accept, arguments.count, |accept| {
+            let query = |scene: &Scene, rays: &[R], found: &mut [bool]| {
+                scene.any_accepted_batch(rays, accept, found);
+            };
+            arguments.store_as(false, query, u8::from)
+        })
+    }
+}
+
+/// Stores the number of hits of each ray that are accepted, like [`nearest`].
+///
+/// # Safety
+/// The contract of [`nearest`].
+pub(crate) unsafe fn count<R: CallerRay>(
+    name: &str,
+    arguments: Arguments<R, u64>,
+    accept: *const AcceptC,
+) -> i32 {
+    // SAFETY: the contract of this function includes the contracts of `with_accept` and `store_as`.
+    unsafe {
+        with_accept(name, accept, arguments.count, |accept| {
+            let query = |scene: &Scene, rays: &[R], counts: &mut [usize]| {
+                scene.count_hits_batch(rays, accept, counts);
+            };
+            arguments.store_as(0, query, |count| count as u64)
+        })
+    }
+}
+
+/// Stores the `most` nearest hits of each ray that are accepted, like [`nearest`].
+///
+/// # Safety
+/// The contract of [`nearest`], with `list` for `answers`, which are ignored: it is null or points
+/// to a struct whose `offsets` is null or points to one more number than there are rays, and whose
+/// `hits` is null or points to `capacity` elements, all valid for writes.
+pub(crate) unsafe fn all<R: CallerRay>(
+    name: &str,
+    arguments: Arguments<R, u64>,
+    accept: *const AcceptC,
+    most: u64,
+    list: *mut HitList<R::Hit>,
+) -> i32 {
+    let count = arguments.count;
+    // SAFETY: by contract it is null or valid for reads and writes.
+    let list = match unsafe { list.as_mut() } {
+        Some(list) => list,
+        None if count == 0 => return OK,
+        None => return fail(ERROR_ARGUMENT, format!("{name}: list must not be null")),
+    };
+    let no_offsets = list.offsets.is_null() && count > 0;
+    if no_offsets || (list.hits.is_null() && list.capacity > 0 && count > 0) {
+        return fail(ERROR_ARGUMENT, format!("{name}: the arrays of the list must not be null"));
+    }
+    list.needed = 0;
+    if !list.offsets.is_null() {
+        // SAFETY: it is not null, so by contract it points to one more number than there are rays.
+        unsafe { list.offsets.write(0) };
+    }
+    // The first offset is 0; the others are the answers.
+    let arguments = Arguments { answers: list.offsets.wrapping_add(1), ..arguments };
+    let most = usize::try_from(most).unwrap_or(usize::MAX);
+    let mut store = |scene: &Scene, rays: &[R], accept: &Accept<'_>, offsets: &mut [u64]| {
+        let mut hits = Vec::new();
+        let mut needed = 0u64;
+        for (ray, offset) in rays.iter().zip(offsets) {
+            if most == usize::MAX {
+                scene.all_hits(ray, accept, &mut hits);
+            } else {
+                scene.nearest_hits(ray, most, accept, &mut hits);
+            }
+            for hit in &hits {
+                if needed < list.capacity {
+                    // SAFETY: `hits` is not null, because `capacity` is greater than 0, so by
+                    // contract it points to `capacity` elements.
+                    unsafe { list.hits.add(needed as usize).write(ray.answer(scene, hit)) };
+                }
+                needed += 1;
+            }
+            *offset = needed;
+        }
+        list.needed = needed;
+    };
+    // SAFETY: the contract of this function includes the contracts of `with_accept` and `store`.
+    // After its first number `offsets` has one for each ray.
+    unsafe {
+        with_accept(name, accept, count, |accept| {
+            arguments.store(0, |scene, rays, offsets| store(scene, rays, accept, offsets))
+        })
+    }
+}
+
 /// The nearest hit of each ray that is accepted; see `bth.h`.
 ///
 /// # Safety
@@ -93,12 +259,8 @@ pub unsafe extern "C" fn bth_nearest_accepted(
     count: usize,
 ) -> i32 {
     let arguments = Arguments { scene, asked: rays, answers: hits, count };
-    // SAFETY: the contract of this function includes the contracts of `with_accept` and `store`.
-    unsafe {
-        with_accept("bth_nearest_accepted", accept, count, |accept| {
-            arguments.store(Hit::MISS, |scene, rays, hits| scene.nearest_accepted_batch(rays, accept, hits))
-        })
-    }
+    // SAFETY: the contract is the same.
+    unsafe { nearest("bth_nearest_accepted", arguments, accept) }
 }
 
 /// Stores which rays have a hit that is accepted; see `bth.h`.
@@ -114,15 +276,8 @@ pub unsafe extern "C" fn bth_any_accepted(
     count: usize,
 ) -> i32 {
     let arguments = Arguments { scene, asked: rays, answers: found, count };
-    // SAFETY: the contract of this function includes the contracts of `with_accept` and `store_as`.
-    unsafe {
-        with_accept("bth_any_accepted", accept, count, |accept| {
-            let query = |scene: &Scene, rays: &[Ray], found: &mut [bool]| {
-                scene.any_accepted_batch(rays, accept, found);
-            };
-            arguments.store_as(false, query, u8::from)
-        })
-    }
+    // SAFETY: the contract is the same.
+    unsafe { any("bth_any_accepted", arguments, accept) }
 }
 
 /// Number of hits of each ray that are accepted; see `bth.h`.
@@ -138,15 +293,8 @@ pub unsafe extern "C" fn bth_count_hits(
     count: usize,
 ) -> i32 {
     let arguments = Arguments { scene, asked: rays, answers: counts, count };
-    // SAFETY: the contract of this function includes the contracts of `with_accept` and `store_as`.
-    unsafe {
-        with_accept("bth_count_hits", accept, count, |accept| {
-            let query = |scene: &Scene, rays: &[Ray], counts: &mut [usize]| {
-                scene.count_hits_batch(rays, accept, counts);
-            };
-            arguments.store_as(0, query, |count| count as u64)
-        })
-    }
+    // SAFETY: the contract is the same.
+    unsafe { self::count("bth_count_hits", arguments, accept) }
 }
 
 /// All hits of each ray that are accepted, or the nearest of them; see `bth.h`.
@@ -161,56 +309,12 @@ pub unsafe extern "C" fn bth_all_hits(
     rays: *const Ray,
     accept: *const AcceptC,
     most: u64,
-    list: *mut HitList,
+    list: *mut HitList<Hit>,
     count: usize,
 ) -> i32 {
-    // SAFETY: by contract it is null or valid for reads and writes.
-    let list = match unsafe { list.as_mut() } {
-        Some(list) => list,
-        None if count == 0 => return OK,
-        None => return fail(ERROR_ARGUMENT, "bth_all_hits: list must not be null".into()),
-    };
-    let no_offsets = list.offsets.is_null() && count > 0;
-    if no_offsets || (list.hits.is_null() && list.capacity > 0 && count > 0) {
-        return fail(ERROR_ARGUMENT, "bth_all_hits: the arrays of the list must not be null".into());
-    }
-    list.needed = 0;
-    if !list.offsets.is_null() {
-        // SAFETY: it is not null, so by contract it points to one more number than there are rays.
-        unsafe { list.offsets.write(0) };
-    }
-    // The first offset is 0; the others are the answers.
-    let answers = list.offsets.wrapping_add(1);
-    let arguments = Arguments { scene, asked: rays, answers, count };
-    let most = usize::try_from(most).unwrap_or(usize::MAX);
-    let mut store = |scene: &Scene, rays: &[Ray], accept: &Accept<'_>, offsets: &mut [u64]| {
-        let mut hits = Vec::new();
-        let mut needed = 0u64;
-        for (ray, offset) in rays.iter().zip(offsets) {
-            if most == usize::MAX {
-                scene.all_hits(ray, accept, &mut hits);
-            } else {
-                scene.nearest_hits(ray, most, accept, &mut hits);
-            }
-            for hit in &hits {
-                if needed < list.capacity {
-                    // SAFETY: `hits` is not null, because `capacity` is greater than 0, so by
-                    // contract it points to `capacity` elements.
-                    unsafe { list.hits.add(needed as usize).write(*hit) };
-                }
-                needed += 1;
-            }
-            *offset = needed;
-        }
-        list.needed = needed;
-    };
-    // SAFETY: the contract of this function includes the contracts of `with_accept` and `store`.
-    // After its first number `offsets` has one for each ray.
-    unsafe {
-        with_accept("bth_all_hits", accept, count, |accept| {
-            arguments.store(0, |scene, rays, offsets| store(scene, rays, accept, offsets))
-        })
-    }
+    let arguments = Arguments { scene, asked: rays, answers: std::ptr::null_mut(), count };
+    // SAFETY: the contract is the same.
+    unsafe { all("bth_all_hits", arguments, accept, most, list) }
 }
 
 /// Sets the mask of an instance; see `bth.h`.

@@ -5,6 +5,8 @@
 pub mod builder;
 pub mod closest;
 pub mod deform;
+pub mod double;
+pub mod double_points;
 pub mod hits;
 pub mod inside;
 pub mod materials;

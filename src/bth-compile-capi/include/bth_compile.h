@@ -41,6 +41,12 @@ extern "C" {
 #define BTH_FREE_DISTANCES 2u /* distances alone, 8 bytes a triangle */
 #define BTH_FREE_ALL 3u       /* 20 bytes a triangle */
 
+/* Values of bth_compile_options.positions: in which numbers to keep double positions. */
+#define BTH_POSITIONS_F32 0u
+#define BTH_POSITIONS_AUTO 1u /* in double where float would move a position by more than 2^-24 of the mesh's size */
+#define BTH_POSITIONS_F64 2u  /* in double, unless all numbers are floats. Excludes a deformable mesh, coordinate_bits, max_error,
+                                 BTH_STRUCTURE_TETS, and free directions other than none and BTH_FREE_AUTO */
+
 /* Bits of bth_compile_options.flags. */
 #define BTH_COMPILE_NO_GEOMETRY 1u /* leaves out the positions and triangles of the source, which tracing does not need */
 #define BTH_COMPILE_DEFORMABLE 4u  /* keeps what bth_set_positions needs; excludes the flag above and
@@ -53,6 +59,14 @@ typedef int32_t (*bth_progress)(void *user, const char *stage, uint64_t done, ui
 
 /* Called with each warning, as bth_progress is. */
 typedef void (*bth_warning)(void *user, const char *message);
+
+/* What rounding positions to float does to a mesh that lies farther from the origin than it is large. Of several meshes the counts are
+ * sums, and the distance is the largest one. All are 0 if no position moves by more than 2^-24 of its mesh's size. 24 bytes. */
+typedef struct {
+    uint64_t positions; /* positions that move by more than that */
+    uint64_t triangles; /* triangles that have an area in double and none in float, and cannot be hit then */
+    double farthest;    /* the largest distance by which a position moves along an axis, in units of the mesh */
+} bth_rounding;
 
 /* Options. All zeros are the defaults of the program bthc, but for free directions, which it keeps where they are worth it. */
 typedef struct {
@@ -70,6 +84,10 @@ typedef struct {
     bth_progress progress;     /* null for none */
     bth_warning warning;       /* null for none */
     void *user;                /* passed to both */
+    uint32_t positions;        /* BTH_POSITIONS_... */
+    uint32_t reserved;         /* 0 */
+    bth_rounding *rounding;    /* null, or stores what rounding has moved and dropped; zeros on failure */
+    bth_rounding *avoided_rounding; /* the same for meshes whose positions are kept in double: what it would move and drop */
 } bth_compile_options;
 
 /* A mesh: three floats for each position, three indices of positions for each triangle. The row of a triangle is its id in hits.
@@ -80,6 +98,14 @@ typedef struct {
     const uint32_t *triangles;
     size_t triangle_count;
 } bth_mesh;
+
+/* A bth_mesh with positions in double; bth_compile_options.positions says if they are rounded. */
+typedef struct {
+    const double *positions;
+    size_t position_count;
+    const uint32_t *triangles;
+    size_t triangle_count;
+} bth_mesh64;
 
 /* A mesh of a scene at a place in the world. */
 typedef struct {
@@ -105,6 +131,12 @@ int32_t bth_compile_mesh(const bth_mesh *mesh, const bth_compile_options *option
  * out and equal ones are stored once. */
 int32_t bth_compile_scene(const bth_mesh *meshes, size_t mesh_count, const bth_mesh_instance *instances, size_t instance_count,
                           const bth_compile_options *options, bth_bytes *bytes);
+
+/* As bth_compile_mesh and bth_compile_scene, for positions in double. Where all numbers are floats, the bytes are the same. A warning
+ * says what rounding would show in a picture, and how many triangles lose their area. */
+int32_t bth_compile_mesh_f64(const bth_mesh64 *mesh, const bth_compile_options *options, bth_bytes *bytes);
+int32_t bth_compile_scene_f64(const bth_mesh64 *meshes, size_t mesh_count, const bth_mesh_instance *instances,
+                              size_t instance_count, const bth_compile_options *options, bth_bytes *bytes);
 
 /* Frees bytes and stores null and 0 in their place; null, and bytes that have been freed, are allowed. */
 void bth_free_bytes(bth_bytes *bytes);

@@ -5,6 +5,7 @@
 
 mod monitor;
 pub mod options;
+mod rounding;
 
 use bth_cache::{DEFAULT_CAP, Store};
 use compiler::cached::Cache;
@@ -14,6 +15,7 @@ use compiler::write::Content;
 use compiler::{Error, Monitor};
 use monitor::Callbacks;
 use options::Options;
+use serde_json::Value;
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -56,11 +58,11 @@ impl From<Error> for Failure {
     }
 }
 
-/// `bth_mesh` of `bth_compile.h`.
+/// `bth_mesh` and `bth_mesh64` of `bth_compile.h`.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
-pub struct Mesh {
-    positions: *const [f32; 3],
+pub struct Mesh<T> {
+    positions: *const [T; 3],
     position_count: usize,
     triangles: *const [u32; 3],
     triangle_count: usize,
@@ -92,18 +94,48 @@ const NO_BYTES: Bytes = Bytes { data: std::ptr::null_mut(), length: 0 };
 /// writes to what they point to during the call; `bytes` is null or valid for writes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_compile_mesh(
-    mesh: *const Mesh,
+    mesh: *const Mesh<f32>,
+    options: *const Options,
+    bytes: *mut Bytes,
+) -> i32 {
+    // SAFETY: the contract is the same.
+    unsafe { compile_mesh(mesh, PositionRows::F32, options, bytes) }
+}
+
+/// Compiles a mesh of double positions; see `bth_compile.h`.
+///
+/// # Safety
+/// The contract of [`bth_compile_mesh`].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_compile_mesh_f64(
+    mesh: *const Mesh<f64>,
+    options: *const Options,
+    bytes: *mut Bytes,
+) -> i32 {
+    // SAFETY: the contract is the same.
+    unsafe { compile_mesh(mesh, PositionRows::F64, options, bytes) }
+}
+
+/// Compiles a mesh.
+///
+/// # Safety
+/// The contract of [`bth_compile_mesh`].
+unsafe fn compile_mesh<'a, T: 'a>(
+    mesh: *const Mesh<T>,
+    rows: fn(&'a [[T; 3]]) -> PositionRows<'a>,
     options: *const Options,
     bytes: *mut Bytes,
 ) -> i32 {
     // SAFETY: by contract `mesh` is null or valid for reads, and so are its arrays.
     let input = unsafe {
-        mesh.as_ref().ok_or_else(|| argument("mesh must not be null".into())).and_then(|mesh| mesh.view())
+        let no_mesh = || argument("mesh must not be null".into());
+        mesh.as_ref().ok_or_else(no_mesh).and_then(|mesh| mesh.view(rows))
     };
     // SAFETY: the contract of this function includes the contract of `with_bytes`.
     unsafe {
         with_bytes(options, bytes, input, |mesh, options, cache, monitor| {
-            Ok(pipeline::compile_cached(*mesh, options, cache, &|_| true, monitor)?.content)
+            let compiled = pipeline::compile_cached(*mesh, options, cache, &|_| true, monitor)?;
+            Ok((compiled.content, compiled.report))
         })
     }
 }
@@ -114,58 +146,98 @@ pub unsafe extern "C" fn bth_compile_mesh(
 /// The contract of [`bth_compile_mesh`].
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_compile_scene(
-    meshes: *const Mesh,
+    meshes: *const Mesh<f32>,
     mesh_count: usize,
     instances: *const MeshInstance,
     instance_count: usize,
     options: *const Options,
     bytes: *mut Bytes,
 ) -> i32 {
-    // SAFETY: by contract the arrays, and the arrays of the meshes, are null or valid for reads.
-    let input = unsafe { scene(meshes, mesh_count, instances, instance_count) };
+    // SAFETY: the contract is the same.
+    unsafe {
+        let meshes = views(meshes, mesh_count, PositionRows::F32);
+        compile_scene(meshes, (instances, instance_count), options, bytes)
+    }
+}
+
+/// Compiles a scene of meshes of double positions; see `bth_compile.h`.
+///
+/// # Safety
+/// The contract of [`bth_compile_mesh`].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_compile_scene_f64(
+    meshes: *const Mesh<f64>,
+    mesh_count: usize,
+    instances: *const MeshInstance,
+    instance_count: usize,
+    options: *const Options,
+    bytes: *mut Bytes,
+) -> i32 {
+    // SAFETY: the contract is the same.
+    unsafe {
+        let meshes = views(meshes, mesh_count, PositionRows::F64);
+        compile_scene(meshes, (instances, instance_count), options, bytes)
+    }
+}
+
+/// Compiles a scene.
+///
+/// # Safety
+/// The contract of [`bth_compile_mesh`].
+unsafe fn compile_scene(
+    meshes: Result<Vec<TriangleMesh<'_>>, Failure>,
+    (instances, instance_count): (*const MeshInstance, usize),
+    options: *const Options,
+    bytes: *mut Bytes,
+) -> i32 {
+    // SAFETY: by contract the array is null or valid for reads.
+    let placed = |meshes| unsafe { Ok((meshes, placed(slice(instances, instance_count, "instances")?)?)) };
     // SAFETY: the contract of this function includes the contract of `with_bytes`.
     unsafe {
-        with_bytes(options, bytes, input, |(meshes, instances), options, cache, monitor| {
-            Ok(memory::compile_scene(meshes, instances, options, cache, monitor)?.content)
+        with_bytes(options, bytes, meshes.and_then(placed), |(meshes, instances), options, cache, monitor| {
+            let compiled = memory::compile_scene(meshes, instances, options, cache, monitor)?;
+            Ok((compiled.content, compiled.report))
         })
     }
 }
 
-/// The meshes and instances of a scene.
+/// The meshes of a scene.
 ///
 /// # Safety
-/// The contract of [`Mesh::view`], for these arrays and the arrays of the meshes.
-unsafe fn scene<'a>(
-    meshes: *const Mesh,
-    mesh_count: usize,
-    instances: *const MeshInstance,
-    instance_count: usize,
-) -> Result<(Vec<TriangleMesh<'a>>, Vec<Instance>), Failure> {
+/// The contract of [`Mesh::view`], for this array and the arrays of the meshes.
+unsafe fn views<'a, T: 'a>(
+    meshes: *const Mesh<T>,
+    count: usize,
+    rows: fn(&'a [[T; 3]]) -> PositionRows<'a>,
+) -> Result<Vec<TriangleMesh<'a>>, Failure> {
     // SAFETY: by contract the arrays are null or valid for reads.
-    let (meshes, instances) = unsafe {
-        let meshes = slice(meshes, mesh_count, "meshes")?.iter().map(|mesh| mesh.view());
-        (meshes.collect::<Result<_, _>>()?, slice(instances, instance_count, "instances")?)
-    };
+    unsafe { slice(meshes, count, "meshes")?.iter().map(|mesh| mesh.view(rows)).collect() }
+}
+
+/// The instances of a scene.
+fn placed(instances: &[MeshInstance]) -> Result<Vec<Instance>, Failure> {
     if let Some(row) = instances.iter().position(|i| i.reserved != 0) {
         return Err(argument(format!(
             "reserved of instance {row} must be 0, found {}",
             instances[row].reserved
         )));
     }
-    let instance = |i: &MeshInstance| Instance { mesh: i.mesh, to_world: i.to_world };
-    Ok((meshes, instances.iter().map(instance).collect()))
+    Ok(instances.iter().map(|i| Instance { mesh: i.mesh, to_world: i.to_world }).collect())
 }
 
-impl Mesh {
+impl<T> Mesh<T> {
     /// The arrays as slices.
     ///
     /// # Safety
     /// Each array is null or valid for reads, and not written to during the life of the result.
-    unsafe fn view<'a>(&self) -> Result<TriangleMesh<'a>, Failure> {
+    unsafe fn view<'a>(&self, rows: fn(&'a [[T; 3]]) -> PositionRows<'a>) -> Result<TriangleMesh<'a>, Failure>
+    where
+        T: 'a,
+    {
         // SAFETY: the contract of this function is the contract of `slice`.
         unsafe {
             Ok(TriangleMesh {
-                positions: PositionRows::F32(slice(self.positions, self.position_count, "positions")?),
+                positions: rows(slice(self.positions, self.position_count, "positions")?),
                 triangles: slice(self.triangles, self.triangle_count, "triangles")?,
             })
         }
@@ -192,22 +264,28 @@ unsafe fn slice<'a, T>(first: *const T, count: usize, name: &str) -> Result<&'a 
 /// Runs a compilation with options of C and stores what it makes, or the error.
 ///
 /// # Safety
-/// `options` is null or valid for reads, its paths are null or C strings, and its functions may be
-/// called by any thread; `bytes` is null or valid for writes.
+/// `options` is null or valid for reads, its paths are null or C strings, its functions may be
+/// called by any thread, and its other pointers are null or valid for writes; `bytes` is null or
+/// valid for writes.
 unsafe fn with_bytes<T: Sync>(
     options: *const Options,
     bytes: *mut Bytes,
     input: Result<T, Failure>,
-    compile: impl FnOnce(&T, &CompileOptions, &Cache<'_>, &dyn Monitor) -> compiler::Result<Option<Content>>
+    compile: impl FnOnce(
+        &T,
+        &CompileOptions,
+        &Cache<'_>,
+        &dyn Monitor,
+    ) -> compiler::Result<(Option<Content>, Value)>
     + Send,
 ) -> i32 {
+    // SAFETY: by contract it is null or valid for reads.
+    let options = unsafe { options.as_ref() }.copied().unwrap_or_default();
     let run = || {
         if bytes.is_null() {
             return Err(argument("bytes must not be null".into()));
         }
         let input = input?;
-        // SAFETY: by contract it is null or valid for reads.
-        let options = unsafe { options.as_ref() }.copied().unwrap_or_default();
         // SAFETY: by contract its paths are null or C strings.
         let (chosen, folder) = unsafe { (options.compiler()?, options.cache()?) };
         let store = folder.map(|folder| {
@@ -227,23 +305,26 @@ unsafe fn with_bytes<T: Sync>(
                 absent.display()
             ));
         }
-        let content = in_threads(options.threads, || Ok(compile(&input, &chosen, &cache, &monitor)?))?;
+        let (content, report) =
+            in_threads(options.threads, || Ok(compile(&input, &chosen, &cache, &monitor)?))?;
         let content = content.ok_or_else(|| Failure(ERROR_INTERNAL, "no content".into()))?;
-        Ok(content.bytes().into_owned())
+        Ok((content.bytes().into_owned(), report))
     };
     let outcome = catch_unwind(AssertUnwindSafe(run))
         .unwrap_or_else(|_| Err(Failure(ERROR_INTERNAL, "internal error".to_owned())));
-    let (stored, code) = match outcome {
-        Ok(made) => {
+    let (stored, report, code) = match outcome {
+        Ok((made, report)) => {
             let made = Box::leak(made.into_boxed_slice());
-            (Bytes { data: made.as_mut_ptr(), length: made.len() }, OK)
+            (Bytes { data: made.as_mut_ptr(), length: made.len() }, report, OK)
         }
         Err(Failure(code, text)) => {
             let text = CString::new(text.replace('\0', "?")).unwrap_or_default();
             LAST_ERROR.with(|last| *last.borrow_mut() = text);
-            (NO_BYTES, code)
+            (NO_BYTES, Value::Null, code)
         }
     };
+    // SAFETY: by contract they are null, and then skipped, or valid for writes.
+    unsafe { rounding::store(&report, [options.rounding, options.avoided_rounding]) };
     // SAFETY: by contract it is null, and then skipped, or valid for writes.
     unsafe { bytes.as_mut() }.into_iter().for_each(|out| *out = stored);
     code

@@ -1,7 +1,9 @@
 //! The options of a compilation in C, and what they mean in Rust.
 
+use crate::rounding::RoundingC;
 use crate::{Failure, argument};
 use bth_format::layout::GridBits;
+use bth_import::Positions;
 use compiler::bvh::Quality;
 use compiler::coordinates::MaxError;
 use compiler::free::KeepFree;
@@ -30,6 +32,10 @@ pub struct Options {
     pub(crate) progress: Option<Progress>,
     pub(crate) warning: Option<Warning>,
     pub(crate) user: *mut c_void,
+    positions: u32,
+    reserved: u32,
+    pub(crate) rounding: *mut RoundingC,
+    pub(crate) avoided_rounding: *mut RoundingC,
 }
 
 impl Default for Options {
@@ -47,6 +53,10 @@ impl Default for Options {
             progress: None,
             warning: None,
             user: std::ptr::null_mut(),
+            positions: 0,
+            reserved: 0,
+            rounding: std::ptr::null_mut(),
+            avoided_rounding: std::ptr::null_mut(),
         }
     }
 }
@@ -84,6 +94,12 @@ impl Options {
             2 => Quality::Best,
             other => return unknown("quality", "0, 1 or 2", other),
         };
+        options.positions = match self.positions {
+            0 => Positions::F32,
+            1 => Positions::Auto,
+            2 => Positions::F64,
+            other => return unknown("positions", "0, 1 or 2", other),
+        };
         options.coordinates.bits = match self.coordinate_bits {
             0 => None,
             16 => Some(GridBits::B16),
@@ -108,6 +124,9 @@ impl Options {
             3 => KeepFree::All,
             other => return unknown("free_directions", "0 to 3", other),
         };
+        if self.reserved != 0 {
+            return unknown("reserved", "0", self.reserved);
+        }
         if self.threads > MOST_THREADS {
             return unknown("threads", &format!("at most {MOST_THREADS}"), self.threads);
         }

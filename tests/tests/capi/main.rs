@@ -1,6 +1,7 @@
 //! The C interface, used by C and C++ programs (`tests/c`) that include its headers and link its
 //! libraries only.
 
+mod compile_double;
 mod double;
 mod queries;
 mod scenes;

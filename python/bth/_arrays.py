@@ -18,17 +18,22 @@ def vectors(array, name):
         raise TypeError(f"{name}: expected numbers, got an array of {array.dtype}")
     if array.ndim == 0 or array.shape[-1] != 3:
         if array.size == 0 and array.ndim <= 1:
-            return np.zeros((0, 3), np.float32)
+            return _native_floats(array.reshape(0, 3))
         raise ValueError(f"{name}: expected the shape (..., 3), got {array.shape}")
     return _native_floats(array)
 
 
 def _native_floats(array):
-    if array.dtype not in (np.float32, np.float64) or not array.dtype.isnative:
-        # Others are rounded once: by way of float64, large integers would be rounded twice.
+    """The array as float32 if that holds all numbers of its type, else as float64."""
+    if array.dtype not in (np.float32, np.float64):
         with np.errstate(over="ignore"):
-            array = array.astype(np.float64 if array.dtype == np.dtype(np.float64).newbyteorder() else np.float32)
+            array = array.astype(np.float32 if np.can_cast(array.dtype, np.float32) else np.float64)
     return array if array.flags.aligned else array.copy()
+
+
+def answers(*arguments):
+    """The type of the answers about these arguments: float64 if one of them is an array of it."""
+    return np.float64 if any(getattr(argument, "dtype", None) == np.float64 for argument in arguments) else np.float32
 
 
 def number(value, name):

@@ -39,7 +39,7 @@ def compile(
     All other options are those of `bthc compile`. `structure` is 'bvh' by default, since the package has no worker for tetrahedra, and
     free_directions is 'none'.
     polygons ('ears') covers concave polygons of models in files exactly, which fans do not.
-    positions ('f64', 'auto') keeps the positions of models in files in double precision: always, or where float32 would move a vertex.
+    positions ('f64', 'auto') keeps positions in double precision: always, or where float32 would move a vertex.
     attributes ('normals', 'all'), alpha ('mask', 'blend'), names and materials (True) keep what models in files have of these;
     lenient_materials leaves out images that cannot be read.
     settings: a dictionary of the keys of `bthc compile --set` and their values, such as {"poses": 1}.

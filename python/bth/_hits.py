@@ -111,8 +111,8 @@ def _named(names, index):
 class Hits(_OnTriangles):
     """Nearest hits of rays, each an array of the rays' leading shape.
 
-    t: distance in units of the direction's length, infinite for a miss.
-    u, v: weights of the triangle's second and third vertex (not texture coordinates: see `texcoord`).
+    t: distance in units of the direction's length, infinite for a miss; float64 for rays in float64, else float32.
+    u, v: weights of the triangle's second and third vertex, float32 (not texture coordinates: see `texcoord`).
     triangle, instance: indices; bth.NONE for a miss.
     """
 
@@ -155,8 +155,8 @@ class Hits(_OnTriangles):
 class AllHits(_OnTriangles):
     """All hits of rays: those of ray i are the rows offsets[i] to offsets[i + 1] of the arrays t, u, v, instance and triangle.
 
-    They ascend by t, and by instance and triangle where t is the same; those of one instance by t before it was rounded to float32. Rays of
-    several axes count in C order.
+    They ascend by t, and by instance and triangle where t is the same; those of one instance by t before it was rounded to float32.
+    `most` compares t of several instances in float32. Rays of several axes count in C order.
     """
 
     __slots__ = ("offsets", "t", "u", "v", "instance", "triangle", "_scene")
@@ -208,7 +208,7 @@ def _owners(offsets):
 class Closest(_OnTriangles):
     """Closest points, each an array of the points' leading shape.
 
-    distance: infinite where nothing is within the radius. point: in world space, NaN there.
+    distance: infinite where nothing is within the radius. point: in world space, NaN there. Both are of the type of the points.
     u, v: weights of the triangle's second and third vertex. triangle, instance: indices; bth.NONE where there is none.
     feature: where on the triangle, uint8: 0 inside, 1 to 3 on the edge from the first, second or third vertex to the next, 4 to 6 at that vertex.
     """
@@ -286,9 +286,9 @@ class SurfacePoints:
         return f"<bth.SurfacePoints of shape {self.object.shape}>"
 
 
-def hit_columns(count):
-    """Arrays for t, u, v, instance and triangle."""
-    return tuple(np.empty(count, kind) for kind in (np.float32, np.float32, np.float32, np.uint32, np.uint32))
+def hit_columns(count, kind):
+    """Arrays for t, of this type, u, v, instance and triangle."""
+    return tuple(np.empty(count, kind) for kind in (kind, np.float32, np.float32, np.uint32, np.uint32))
 
 
 def offsets_of(counts):

@@ -3,7 +3,7 @@ from enum import IntEnum
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from ._scene import Scene
 
@@ -60,7 +60,7 @@ class _OnTriangles:
     def material_name(self) -> NDArray[np.object_]: ...
 
 class Hits(_OnTriangles):
-    t: NDArray[np.float32]
+    t: NDArray[np.floating]
     u: NDArray[np.float32]
     v: NDArray[np.float32]
     instance: NDArray[np.uint32]
@@ -74,7 +74,7 @@ class Hits(_OnTriangles):
 
 class AllHits(_OnTriangles):
     offsets: NDArray[np.int64]
-    t: NDArray[np.float32]
+    t: NDArray[np.floating]
     u: NDArray[np.float32]
     v: NDArray[np.float32]
     instance: NDArray[np.uint32]
@@ -94,19 +94,19 @@ class Overlaps:
     def __len__(self) -> int: ...
 
 class Closest(_OnTriangles):
-    distance: NDArray[np.float32]
-    point: NDArray[np.float32]
+    distance: NDArray[np.floating]
+    point: NDArray[np.floating]
     u: NDArray[np.float32]
     v: NDArray[np.float32]
     instance: NDArray[np.uint32]
     triangle: NDArray[np.uint32]
     feature: NDArray[np.uint8]
     def __init__(
-        self, columns: Iterable[NDArray[Any]], point: NDArray[np.float32], feature: NDArray[np.uint8], scene: Scene,
+        self, columns: Iterable[NDArray[Any]], point: NDArray[np.floating], feature: NDArray[np.uint8], scene: Scene,
     ) -> None: ...
     @property
     def found(self) -> NDArray[np.bool_]: ...
     def __len__(self) -> int: ...
 
-def hit_columns(count: int) -> tuple[NDArray[Any], ...]: ...
+def hit_columns(count: int, kind: DTypeLike) -> tuple[NDArray[Any], ...]: ...
 def offsets_of(counts: NDArray[np.uint64]) -> NDArray[np.int64]: ...

@@ -1,14 +1,12 @@
 """Meshes of other packages, by what they look like."""
 
-import warnings
-
 import numpy as np
 
 from . import _arrays
 
 
 def triangles_of(mesh):
-    """Vertices (n, 3) float32 and faces (m, 3) uint32, contiguous, of a pair of arrays or of a mesh of trimesh, meshio or pyvista.
+    """Vertices (n, 3) float32 or float64 and faces (m, 3) uint32, contiguous, of a pair of arrays or of a mesh of trimesh, meshio or pyvista.
 
     They are copies: the compiler reads them while other threads run, and drop-ins compile them when they are first traced. Whatever
     becomes of the caller's arrays then must not change the result.
@@ -33,43 +31,16 @@ def triangles_of(mesh):
         raise ValueError(f"faces: expected indices from 0 to {len(vertices) - 1}, got {worst}")
     if faces.shape[1] == 4:
         faces = faces[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+    return _positions(vertices), np.array(faces, np.uint32, order="C")
+
+
+def _positions(vertices):
+    """A copy in float32 if that holds all numbers, else in float64."""
     with np.errstate(over="ignore"):
         rounded = np.array(vertices, np.float32, order="C")
-    faces = np.array(faces, np.uint32, order="C")
-    _warn_of_rounding(vertices, rounded, faces)
-    return rounded, faces
-
-
-#: Moves that a picture of a model can show, relative to its size: half a pixel of 4,096.
-_SHOWN = 2.0**-13
-
-
-def _warn_of_rounding(vertices, rounded, faces):
-    """Warns where float32 moves vertices visibly or triangles lose their area: far from the origin."""
-    finite = np.isfinite(vertices).all(axis=1) & np.isfinite(rounded).all(axis=1)
-    if not finite.any() or rounded.dtype == vertices.dtype:
-        return
-    kept = vertices[finite].astype(np.float64)
-    size, farthest = np.ptp(kept, axis=0).max(), np.abs(kept).max()
-    if farthest <= size:
-        return
-    moves = np.abs(rounded[finite].astype(np.float64) - kept).max(axis=1)
-    faces = faces[finite[faces].all(axis=1)]
-    lost = np.count_nonzero(_no_area(rounded[faces]) & ~_no_area(vertices[faces]))
-    if lost or moves.max() > _SHOWN * size:
-        moved = np.count_nonzero(moves > 2.0**-24 * size)
-        text = (
-            f"rounding to float32 moves {moved} of {len(vertices)} vertices, by up to {moves.max():.2e} "
-            f"({moves.max() / size:.1e} of the mesh's size), and {lost} of {len(faces)} triangles lose their area. "
-            "Move the mesh near the origin"
-        )
-        warnings.warn(text, UserWarning, stacklevel=4)
-
-
-def _no_area(corners):
-    """Which triangles have no area, by products in float64 that cancel."""
-    a, b, c = np.moveaxis(corners.astype(np.float64), 1, 0)
-    return ~np.cross(b - a, c - a).any(axis=1)
+    if vertices.dtype == np.float32 or np.array_equal(rounded, vertices):
+        return rounded
+    return np.array(vertices, np.float64, order="C")
 
 
 def _parts(mesh):

@@ -30,13 +30,16 @@ def _balls(center, radius):
 
 
 class PointQueries:
-    """The queries of a Scene by points, of shape (..., 3), and by boxes and balls."""
+    """The queries of a Scene by points, of shape (..., 3), and by boxes and balls.
+
+    Numbers in float64 are taken as they are, and distances and positions of answers are then float64.
+    """
 
     __slots__ = ()
 
     def _by_points(self, query, points, kind, threads):
         rows, shape = _rows(points)
-        out = np.empty(len(rows), kind)
+        out = np.empty(len(rows), kind or rows.dtype)
         query(self._native, rows, _threads.count(threads), out)
         return out.reshape(shape)
 
@@ -49,15 +52,16 @@ class PointQueries:
         return self._by_points(_native.winding, points, np.int32, threads)
 
     def signed_distance(self, points, *, threads=None):
-        """Distances of points to the nearest surface, float32, negative inside of closed surfaces; NaN for a point that is not finite."""
-        return self._by_points(_native.signed_distance, points, np.float32, threads)
+        """Distances of points to the nearest surface, in the type of the points, negative inside of closed surfaces; NaN for a point that is not finite."""
+        return self._by_points(_native.signed_distance, points, None, threads)
 
     def closest(self, points, radius=math.inf, *, threads=None):
         """The closest points of surfaces within a radius, as Closest."""
         rows, shape = _rows(points)
-        columns, position = hit_columns(len(rows)), np.empty(len(rows) * 3, np.float32)
+        columns, position = hit_columns(len(rows), rows.dtype), np.empty(len(rows) * 3, rows.dtype)
         feature = np.empty(len(rows), np.uint8)
-        _native.closest(self._native, rows, _arrays.number(radius, "radius"), _threads.count(threads), columns, position, feature)
+        out = columns, position, feature
+        _native.closest(self._native, rows, _arrays.number(radius, "radius"), _threads.count(threads), out)
         columns = [c.reshape(shape) for c in columns]
         return Closest(columns, position.reshape(*shape, 3), feature.reshape(shape), self)
 
@@ -80,7 +84,7 @@ class PointQueries:
         return self._triangles_in(_boxes(lower, upper)[0], threads)
 
     def overlaps_sphere(self, center, radius, *, threads=None):
-        """Whether any triangle is as near to the centers (..., 3) as the radii (...), by the distance that `closest` reports."""
+        """Whether any triangle is as near to the centers (..., 3) as the radii (...): in float64 exactly, in float32 by the distance that `closest` reports."""
         return self._overlaps(*_balls(center, radius), threads)
 
     def triangles_in_sphere(self, center, radius, *, threads=None):

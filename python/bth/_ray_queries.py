@@ -80,12 +80,15 @@ class RayQueries:
     """The queries of a Scene by rays.
 
     Origins and directions are of shape (..., 3) and are broadcast; tmin and tmax are numbers or arrays that are broadcast to (...).
+    If one of the arrays is float64, as lists become, the rays are float64, and so is t. Nothing is rounded. If all are float32, so is t,
+    and queries are faster. tmin and tmax that are one number take the type of the arrays.
 
     start: the points of surfaces at which rays start; origins are then None, and there is no tmin.
     Hits (or Closest), or (instances, triangles, uv) of the shapes (...), (...) and (..., 2),
     broadcast against directions. A ray starts at the exact point, not at a rounded one, and hits
     what lies at t > 0: never the surface that it leaves, and it never skips a wall. A ray is a miss
-    if its start is not a point of a visible instance; `check_start` says why.
+    if its start is not a point of a visible instance; `check_start` says why. Starts, their directions
+    and tmax are rounded to float32; t is of the type of the directions.
 
     mask: instances and groups of triangles whose own mask (`set_instance_mask`, `set_group_mask`) has no bit in common with this one
     are not hit. cull: 'back' or 'front' ignores hits on these sides of triangles.
@@ -100,7 +103,7 @@ class RayQueries:
     ):
         """The nearest hits of rays, as Hits."""
         rays, shape = rays_and_shape(origins, directions, tmin, tmax, start)
-        columns = hit_columns(len(rays[1]))
+        columns = hit_columns(len(rays[1]), _arrays.answers(*rays))
         _native.nearest(self._native, rays, _conditions(mask, cull, filter), _threads.count(threads), columns)
         return Hits([c.reshape(shape) for c in columns], self, rays[:2])
 

@@ -10,27 +10,29 @@ from trimesh import caching, util
 from . import _arrays
 from ._compile import compile
 
-#: Bound of the rounding of t in float32, a hundredfold, relative to t or to the size of the mesh.
+#: How far rounding vertices to float32 moves a hit, a hundredfold, relative to t or to the size of the mesh.
 ROUGH = 1e-5
+#: t is within 2^-40, so those of hits in one point are within twice that.
+_SAME = 2.0**-39
 
 
 class RayMeshIntersector:
-    """Ray queries of a mesh, with the methods of trimesh's own. Answers are exact for the vertices and rays rounded to float32."""
+    """Ray queries of a mesh, with the methods of trimesh's own. Answers are exact for the rays as they are, and for the vertices rounded to float32."""
 
     def __init__(self, geometry, scale_to_box=True):
-        """scale_to_box: scales the mesh to a box of about 100 before vertices and rays are rounded, and moves its corner to the origin."""
+        """scale_to_box: scales the mesh to a size of about 1, by a power of two, which rounds nothing."""
         self.mesh = geometry
         self._scale_to_box = scale_to_box
         self._cache = caching.Cache(id_function=self.mesh.__hash__)
 
     @property
     def _scale(self):
-        return 100.0 / self.mesh.scale if self._scale_to_box else 1.0
+        return np.ldexp(1.0, -np.frexp(self.mesh.scale)[1]) if self._scale_to_box else 1.0
 
     @caching.cache_decorator
     def _scene(self):
         vertices = np.asarray(self.mesh.vertices, np.float64)
-        corner = vertices.min(axis=0) if len(vertices) else np.zeros(3)
+        corner = _corner(vertices)
         scale = float(self._scale)
         faces = np.asarray(self.mesh.faces)
         return compile(((vertices - corner) * scale, faces), quality="fast"), corner, scale
@@ -54,7 +56,7 @@ class RayMeshIntersector:
             triangles, rays = found.triangle.astype(np.int64), found.ray
             facing = np.einsum("ij,ij->i", self.mesh.face_normals[triangles], directions[rays]) > 0
             # Hits in one point follow one another, those from both sides in any order.
-            elsewhere = (np.diff(rays, prepend=-1) != 0) | (np.diff(found.t, prepend=np.float32(-1)) != 0)
+            elsewhere = (np.diff(rays, prepend=-1) != 0) | (np.diff(found.t, prepend=-1) > _SAME * found.t)
             _, keep = np.unique(2 * np.cumsum(elsewhere) + facing, return_index=True)
             keep.sort()
             triangles, rays, t = triangles[keep], rays[keep], found.t[keep]
@@ -73,7 +75,7 @@ class RayMeshIntersector:
         corner, normals = self.mesh.triangles[triangles, 0], self.mesh.face_normals[triangles]
         with np.errstate(all="ignore"):
             exact = np.einsum("ij,ij->i", normals, corner - origins) / np.einsum("ij,ij->i", normals, directions)
-        rough = t.astype(np.float64) / self._scene[2]
+        rough = t / self._scene[2]
         # A plane that is nearly along the ray gives a t that is worse than the one that the query has found.
         lengths = np.maximum(util.row_norm(directions), np.finfo(np.float64).tiny)
         near = np.abs(exact - rough) <= ROUGH * np.maximum(np.abs(rough), self.mesh.scale / lengths)
@@ -118,6 +120,18 @@ class RayMeshIntersector:
 
     def __deepcopy__(self, *_):
         return self.__copy__()
+
+
+def _corner(vertices):
+    """The corner of the box of vertices that is nearest to the origin, with 0 along axes on which the box is less far away than it is long.
+
+    Subtracting it rounds no vertex: both are of one sign, and neither is more than twice the other (Sterbenz).
+    """
+    if not len(vertices):
+        return np.zeros(3)
+    lower, upper = vertices.min(axis=0), vertices.max(axis=0)
+    nearest = np.where(lower > 0, lower, np.where(upper < 0, upper, 0.0))
+    return np.where(np.maximum(np.abs(lower), np.abs(upper)) <= 2 * np.abs(nearest), nearest, 0.0)
 
 
 def install():

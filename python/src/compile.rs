@@ -2,6 +2,7 @@
 
 use crate::caching::{cache, store};
 use crate::errors::{compile_error, format_error};
+use crate::numbers::Vectors;
 use crate::options::{Keywords, options};
 use crate::scene::NativeScene;
 use crate::work;
@@ -163,11 +164,11 @@ fn manifest_error(error: bth_scene::Error) -> bth_compile::Error {
     }
 }
 
-/// Compiles triangles: float32 positions and uint32 indices, three a row.
+/// Compiles triangles: float32 or float64 positions and uint32 indices, three a row.
 #[pyfunction]
 pub(crate) fn compile_mesh(
     py: Python<'_>,
-    positions: PyReadonlyArray2<'_, f32>,
+    positions: Vectors<'_>,
     triangles: PyReadonlyArray2<'_, u32>,
     keywords: &Bound<'_, PyDict>,
 ) -> PyResult<NativeScene> {
@@ -205,7 +206,7 @@ fn deliver(content: &write::Content, output: Option<&Path>) -> bth_compile::Resu
 #[pyfunction]
 pub(crate) fn compile_scene(
     py: Python<'_>,
-    meshes: Vec<(PyReadonlyArray2<'_, f32>, PyReadonlyArray2<'_, u32>)>,
+    meshes: Vec<(Vectors<'_>, PyReadonlyArray2<'_, u32>)>,
     instances: PyReadonlyArray1<'_, u32>,
     transforms: PyReadonlyArray3<'_, f64>,
     keywords: &Bound<'_, PyDict>,
@@ -235,13 +236,16 @@ pub(crate) fn compile_scene(
 
 /// A mesh in arrays, three numbers a row.
 fn triangle_mesh<'a>(
-    positions: &'a PyReadonlyArray2<'_, f32>,
+    positions: &'a Vectors<'_>,
     triangles: &'a PyReadonlyArray2<'_, u32>,
 ) -> PyResult<TriangleMesh<'a>> {
     let contiguous = |_| PyValueError::new_err("expected contiguous arrays of positions and triangles");
-    let (positions, _) = positions.as_slice().map_err(contiguous)?.as_chunks::<3>();
+    let positions = match positions {
+        Vectors::Single(a) => PositionRows::F32(a.as_slice().map_err(contiguous)?.as_chunks::<3>().0),
+        Vectors::Double(a) => PositionRows::F64(a.as_slice().map_err(contiguous)?.as_chunks::<3>().0),
+    };
     let (triangles, _) = triangles.as_slice().map_err(contiguous)?.as_chunks::<3>();
-    Ok(TriangleMesh { positions: PositionRows::F32(positions), triangles })
+    Ok(TriangleMesh { positions, triangles })
 }
 
 /// The files that a compilation of a file reads, itself among them.

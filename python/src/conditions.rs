@@ -1,5 +1,7 @@
 //! What rays may hit: masks, culling, and filters in Python.
 
+use crate::numbers::Number;
+use crate::rays::Rays;
 use crate::work::{self, Watch};
 use bth::rays::{Hit, Ray};
 use bth::{Accept, Cull};
@@ -13,7 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub(crate) struct Candidate {
     /// Index of the ray, in C order.
     ray: usize,
-    t: f32,
+    t: f64,
     u: f32,
     v: f32,
     instance: u32,
@@ -79,13 +81,13 @@ impl Checked {
     /// Calls `query` for each ray with its index within the rays and what it may hit. `first` is
     /// the index of the first ray in the call. After an exception of the filter, and when the call
     /// ends early, skips the rest.
-    pub(crate) fn each<R>(
+    pub(crate) fn each<S: Rays>(
         &self,
         scene: &bth::Scene,
         first: usize,
-        rays: &[R],
+        rays: &[S::Ray],
         watch: &Watch<'_>,
-        mut query: impl FnMut(usize, &R, &Accept<'_>),
+        mut query: impl FnMut(usize, &S::Ray, &Accept<'_>),
     ) {
         for (i, ray) in rays.iter().enumerate() {
             // Most rays take less time than a look at the clock.
@@ -99,7 +101,8 @@ impl Checked {
             if filter.failed.load(Ordering::Relaxed) {
                 return;
             }
-            let accepts = |_: &Ray, hit: &Hit| filter.accepts(scene, first + i, hit);
+            let t = |hit: &Hit| S::Number::t(scene, ray, hit).into();
+            let accepts = |_: &Ray, hit: &Hit| filter.accepts(scene, first + i, hit, t(hit));
             query(i, ray, &Accept { filter: Some(&accepts), ..self.accept });
         }
     }
@@ -120,12 +123,12 @@ pub(crate) struct Filter {
 }
 
 impl Filter {
-    /// Returns true if a hit counts. After an exception none does.
-    fn accepts(&self, scene: &bth::Scene, ray: usize, hit: &Hit) -> bool {
+    /// Returns true if a hit at t counts. After an exception none does.
+    fn accepts(&self, scene: &bth::Scene, ray: usize, hit: &Hit, t: f64) -> bool {
         if self.failed.load(Ordering::Relaxed) {
             return false;
         }
-        let Hit { t, u, v, primitive } = *hit;
+        let Hit { u, v, primitive, .. } = *hit;
         let opacity = scene.opacity(hit) as u8;
         let candidate =
             Candidate { ray, t, u, v, instance: primitive.instance, triangle: primitive.triangle, opacity };

@@ -4,7 +4,7 @@
 //! | file | |
 //! |---|---|
 //! | `work` | runs chunks on threads without the interpreter's lock, and lets signals through |
-//! | `rays`, `output` | arrays to rays, and hits to arrays, chunk by chunk |
+//! | `numbers`, `rays`, `output` | arrays to rays, and hits to arrays, chunk by chunk |
 //! | `scene`, `shared` | a scene that threads share |
 //! | `queries`, `many`, `points`, `overlaps` | its queries |
 //! | `conditions` | what rays may hit, filters in Python included |
@@ -23,6 +23,7 @@ mod conditions;
 mod errors;
 mod many;
 mod materials;
+mod numbers;
 mod options;
 mod output;
 mod overlaps;

@@ -1,24 +1,33 @@
 //! Queries that return several hits of a ray, or a number of them.
 
 use crate::conditions::Conditions;
-use crate::output::{Part, Parts, chunks, chunks_of, numbers};
+use crate::numbers::Number;
+use crate::output::{Job, Parts, chunks, chunks_of, numbers};
 use crate::rays::{RayArrays, Rays, with_rays};
 use crate::scene::NativeScene;
 use crate::work::Watch;
 use bth::Crossings;
-use bth::rays::Hit;
+use bth::rays::{Hit, PrimitiveRef};
 use numpy::{PyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
-use std::ops::Range;
 
 /// Arrays of t, u, v, instance and triangle.
 type Columns<'py> = (
-    Bound<'py, PyArray1<f32>>,
+    Bound<'py, PyAny>,
     Bound<'py, PyArray1<f32>>,
     Bound<'py, PyArray1<f32>>,
     Bound<'py, PyArray1<u32>>,
     Bound<'py, PyArray1<u32>>,
 );
+
+/// A hit with its t as it is returned.
+#[derive(Clone, Copy)]
+struct Found<N> {
+    t: N,
+    u: f32,
+    v: f32,
+    primitive: PrimitiveRef,
+}
 
 /// All hits of rays, or the nearest `most` of each: their number for each ray, and the hits of all
 /// rays one after the other.
@@ -33,37 +42,54 @@ pub(crate) fn all_hits<'py>(
     mut counts: PyReadwriteArray1<'_, u64>,
 ) -> PyResult<Columns<'py>> {
     with_rays!(rays, rays => {
-        let (scene, conditions) = (scene.get()?, conditions.checked()?);
         let counts = numbers(&mut counts, rays.len())?;
-        let mut parts = Parts::new(rays.len());
-        let jobs = parts.jobs(counts);
-        let each = |scene: &bth::Scene,
-                    (range, (counts, mut hits)): (Range<usize>, (&mut [u64], Part<'_, Hit>)),
-                    watch: &Watch<'_>| {
-            if hits.is_full() {
+        all_hits_of(py, scene, rays, most, conditions, threads, counts)
+    })
+}
+
+fn all_hits_of<'py, S: Rays>(
+    py: Python<'py>,
+    scene: &NativeScene,
+    rays: S,
+    most: Option<usize>,
+    conditions: Conditions,
+    threads: usize,
+    counts: &mut [u64],
+) -> PyResult<Columns<'py>> {
+    let (scene, conditions) = (scene.get()?, conditions.checked()?);
+    let mut parts = Parts::new(rays.len());
+    let jobs = parts.jobs(counts);
+    let each =
+        |scene: &bth::Scene, (range, (counts, mut found)): Job<'_, Found<S::Number>>, watch: &Watch<'_>| {
+            if found.is_full() {
                 return;
             }
-            let (mut read, mut of_ray) = (Vec::new(), Vec::new());
+            let (mut read, mut of_ray, mut listed) = (Vec::new(), Vec::new(), Vec::new());
             rays.read(range.clone(), &mut read);
-            conditions.each(scene, range.start, &read, watch, |i, ray, accept| {
+            conditions.each::<S>(scene, range.start, &read, watch, |i, ray, accept| {
                 match most {
                     None => scene.all_hits(ray, accept, &mut of_ray),
                     Some(most) => scene.nearest_hits(ray, most, accept, &mut of_ray),
                 }
                 counts[i] = of_ray.len() as u64;
-                hits.append(&of_ray);
+                listed.clear();
+                listed.extend(of_ray.iter().map(|hit| {
+                    let Hit { u, v, primitive, .. } = *hit;
+                    Found { t: S::Number::t(scene, ray, hit), u, v, primitive }
+                }));
+                S::Number::sort(&mut listed, |found| found.t);
+                found.append(&listed);
             });
         };
-        scene.run(py, conditions.threads(threads), jobs, each)?;
-        conditions.finish()?;
-        Ok((
-            parts.column(py, |h| h.t)?,
-            parts.column(py, |h| h.u)?,
-            parts.column(py, |h| h.v)?,
-            parts.column(py, |h| h.primitive.instance)?,
-            parts.column(py, |h| h.primitive.triangle)?,
-        ))
-    })
+    scene.run(py, conditions.threads(threads), jobs, each)?;
+    conditions.finish()?;
+    Ok((
+        parts.column(py, |h| h.t)?.into_any(),
+        parts.column(py, |h| h.u)?,
+        parts.column(py, |h| h.v)?,
+        parts.column(py, |h| h.primitive.instance)?,
+        parts.column(py, |h| h.primitive.triangle)?,
+    ))
 }
 
 /// Number of hits of rays.
@@ -77,17 +103,28 @@ pub(crate) fn count(
     mut out: PyReadwriteArray1<'_, u64>,
 ) -> PyResult<()> {
     with_rays!(rays, rays => {
-        let (scene, conditions) = (scene.get()?, conditions.checked()?);
-        let jobs = chunks_of(numbers(&mut out, rays.len())?);
-        scene.run(py, conditions.threads(threads), jobs, |scene, (range, counts), watch| {
-            let mut read = Vec::new();
-            rays.read(range.clone(), &mut read);
-            conditions.each(scene, range.start, &read, watch, |i, ray, accept| {
-                counts[i] = scene.count_hits(ray, accept) as u64;
-            });
-        })?;
-        conditions.finish()
+        let out = numbers(&mut out, rays.len())?;
+        count_of(py, scene, rays, conditions, threads, out)
     })
+}
+
+fn count_of<S: Rays>(
+    py: Python<'_>,
+    scene: &NativeScene,
+    rays: S,
+    conditions: Conditions,
+    threads: usize,
+    out: &mut [u64],
+) -> PyResult<()> {
+    let (scene, conditions) = (scene.get()?, conditions.checked()?);
+    scene.run(py, conditions.threads(threads), chunks_of(out), |scene, (range, counts), watch| {
+        let mut read = Vec::new();
+        rays.read(range.clone(), &mut read);
+        conditions.each::<S>(scene, range.start, &read, watch, |i, ray, accept| {
+            counts[i] = scene.count_hits(ray, accept) as u64;
+        });
+    })?;
+    conditions.finish()
 }
 
 /// Crossings of surfaces by rays: their numbers, and outward ones minus inward ones.

@@ -1,6 +1,6 @@
 //! The options of a compilation, as keywords of Python.
 
-use crate::rays::{Given, RayArrays, Rays};
+use crate::rays::{RayArrays, Rays};
 use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_compile::sampling::KnownRays;
 use bth_compile::settings::Setting;
@@ -159,11 +159,9 @@ enum MaxError {
     Text(String),
 }
 
-/// The rays that will be traced. Some may be such that they cannot, but not all.
+/// The rays that will be traced, in f32. Some may be such that they cannot, but not all.
 fn known_rays(arrays: &RayArrays<'_>) -> PyResult<KnownRays> {
-    let Given::Origins(rays) = arrays.given()? else {
-        return Err(PyValueError::new_err("rays: expected origins, got starts"));
-    };
+    let rays = arrays.origin_rays::<f32>()?;
     let mut read = Vec::new();
     rays.read(0..rays.len(), &mut read);
     let (known, _) = KnownRays::of(&read);

@@ -1,6 +1,6 @@
 //! Hits to arrays of numpy that the caller has allocated, split into the parts of the chunks.
 
-use crate::rays::CHUNK;
+use crate::numbers::CHUNK;
 use bth::rays::Hit;
 use numpy::{Element, IntoPyArray, PyArray1, PyReadwriteArray1};
 use pyo3::exceptions::{PyMemoryError, PyValueError};
@@ -22,32 +22,41 @@ pub(crate) fn numbers<'a, T: Element>(
 }
 
 /// The arrays of a call for its hits: t, u, v, instance, triangle.
-#[derive(FromPyObject)]
-pub(crate) struct HitArrays<'py> {
-    #[pyo3(item(0))]
-    t: PyReadwriteArray1<'py, f32>,
-    #[pyo3(item(1))]
+pub(crate) struct HitArrays<'py, N: Element> {
+    t: PyReadwriteArray1<'py, N>,
     u: PyReadwriteArray1<'py, f32>,
-    #[pyo3(item(2))]
     v: PyReadwriteArray1<'py, f32>,
-    #[pyo3(item(3))]
     instance: PyReadwriteArray1<'py, u32>,
-    #[pyo3(item(4))]
     triangle: PyReadwriteArray1<'py, u32>,
 }
 
+impl<'py, N: Element> HitArrays<'py, N> {
+    /// The arrays of a tuple.
+    pub(crate) fn of(arrays: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let (t, u, v) = (arrays.get_item(0)?, arrays.get_item(1)?, arrays.get_item(2)?);
+        let (instance, triangle) = (arrays.get_item(3)?, arrays.get_item(4)?);
+        Ok(HitArrays {
+            t: t.extract()?,
+            u: u.extract()?,
+            v: v.extract()?,
+            instance: instance.extract()?,
+            triangle: triangle.extract()?,
+        })
+    }
+}
+
 /// Where the hits of some rays go.
-pub(crate) struct HitColumns<'a> {
-    t: &'a mut [f32],
+pub(crate) struct HitColumns<'a, N> {
+    t: &'a mut [N],
     u: &'a mut [f32],
     v: &'a mut [f32],
     instance: &'a mut [u32],
     triangle: &'a mut [u32],
 }
 
-impl HitArrays<'_> {
+impl<N: Element> HitArrays<'_, N> {
     /// The columns for `count` hits.
-    pub(crate) fn columns(&mut self, count: usize) -> PyResult<HitColumns<'_>> {
+    pub(crate) fn columns(&mut self, count: usize) -> PyResult<HitColumns<'_, N>> {
         Ok(HitColumns {
             t: numbers(&mut self.t, count)?,
             u: numbers(&mut self.u, count)?,
@@ -58,9 +67,9 @@ impl HitArrays<'_> {
     }
 }
 
-impl<'a> HitColumns<'a> {
+impl<'a, N> HitColumns<'a, N> {
     /// Splits off the first rows.
-    pub(crate) fn split_off(&mut self, rows: usize) -> HitColumns<'a> {
+    pub(crate) fn split_off(&mut self, rows: usize) -> HitColumns<'a, N> {
         HitColumns {
             t: split_off(&mut self.t, rows),
             u: split_off(&mut self.u, rows),
@@ -70,10 +79,10 @@ impl<'a> HitColumns<'a> {
         }
     }
 
-    /// Stores as many hits as there are rows.
-    pub(crate) fn store(&mut self, hits: &[Hit]) {
+    /// Stores as many hits as there are rows. `t_of` returns the t of a row's hit.
+    pub(crate) fn store(&mut self, hits: &[Hit], t_of: impl Fn(usize, &Hit) -> N) {
         // Column by column, so that each is one loop over adjacent numbers.
-        self.t.iter_mut().zip(hits).for_each(|(t, hit)| *t = hit.t);
+        self.t.iter_mut().zip(hits).enumerate().for_each(|(i, (t, hit))| *t = t_of(i, hit));
         self.u.iter_mut().zip(hits).for_each(|(u, hit)| *u = hit.u);
         self.v.iter_mut().zip(hits).for_each(|(v, hit)| *v = hit.v);
         self.instance.iter_mut().zip(hits).for_each(|(i, hit)| *i = hit.primitive.instance);

@@ -1,9 +1,9 @@
 //! Overlaps of triangles with boxes and balls.
 
-use crate::output::{Part, Parts, chunks_of, numbers};
-use crate::rays::{Bound1, Numbers, Rows, Vectors};
+use crate::numbers::{Bound1, Number, Numbers, Rows, Vectors};
+use crate::output::{Job, Parts, chunks_of, numbers};
 use crate::scene::NativeScene;
-use crate::work::Watch;
+use bth::Scene;
 use bth::rays::PrimitiveRef;
 use numpy::{PyArray1, PyReadwriteArray1};
 use pyo3::exceptions::PyValueError;
@@ -39,15 +39,45 @@ enum Regions<'a> {
     Balls(Rows<'a>, Numbers<'a>),
 }
 
-/// A region.
+/// A region in f32 or f64.
 #[derive(Clone, Copy, Default)]
-struct Region {
+struct Region<N> {
     /// The lower end, or the centre.
-    first: [f32; 3],
-    upper: [f32; 3],
+    first: [N; 3],
+    upper: [N; 3],
     /// `None` for a box.
-    radius: Option<f32>,
+    radius: Option<N>,
 }
+
+/// The queries about regions, in f32 or f64.
+trait Regional: Number {
+    fn overlaps(scene: &Scene, region: &Region<Self>) -> bool;
+
+    fn triangles(scene: &Scene, region: &Region<Self>, found: &mut Vec<PrimitiveRef>);
+}
+
+/// Implements [`Regional`] by the queries of [`Scene`] about boxes and about balls.
+macro_rules! regional {
+    ($number:ty, $overlaps_box:ident, $overlaps_ball:ident, $in_box:ident, $in_ball:ident) => {
+        impl Regional for $number {
+            fn overlaps(scene: &Scene, region: &Region<$number>) -> bool {
+                match region.radius {
+                    None => scene.$overlaps_box(region.first, region.upper),
+                    Some(radius) => scene.$overlaps_ball(region.first, radius),
+                }
+            }
+
+            fn triangles(scene: &Scene, region: &Region<$number>, found: &mut Vec<PrimitiveRef>) {
+                match region.radius {
+                    None => scene.$in_box(region.first, region.upper, found),
+                    Some(radius) => scene.$in_ball(region.first, radius, found),
+                }
+            }
+        }
+    };
+}
+regional!(f32, overlaps_box, overlaps_sphere, triangles_in_box, triangles_in_sphere);
+regional!(f64, overlaps_box_f64, overlaps_sphere_f64, triangles_in_box_f64, triangles_in_sphere_f64);
 
 impl RegionArrays<'_> {
     fn regions(&self) -> PyResult<Regions<'_>> {
@@ -72,8 +102,16 @@ impl Regions<'_> {
         }
     }
 
+    /// True if one of the arrays is f64.
+    fn is_double(&self) -> bool {
+        match self {
+            Self::Boxes(lower, upper) => lower.is_double() || upper.is_double(),
+            Self::Balls(center, radius) => center.is_double() || radius.is_double(),
+        }
+    }
+
     /// The regions of a range.
-    fn read(&self, range: Range<usize>) -> Vec<Region> {
+    fn read<N: Number>(&self, range: Range<usize>) -> Vec<Region<N>> {
         let mut read = vec![Region::default(); range.len()];
         match self {
             Self::Boxes(lower, upper) => {
@@ -98,17 +136,27 @@ pub(crate) fn overlaps(
     threads: usize,
     mut out: PyReadwriteArray1<'_, bool>,
 ) -> PyResult<()> {
-    let (scene, regions) = (scene.get()?, regions.regions()?);
-    let jobs = chunks_of(numbers(&mut out, regions.len())?);
-    scene.run(py, threads, jobs, |scene, (range, found), watch| {
-        for (i, (region, found)) in regions.read(range).iter().zip(found).enumerate() {
+    let regions = regions.regions()?;
+    let out = numbers(&mut out, regions.len())?;
+    match regions.is_double() {
+        false => overlaps_in::<f32>(py, scene, regions, threads, out),
+        true => overlaps_in::<f64>(py, scene, regions, threads, out),
+    }
+}
+
+fn overlaps_in<N: Regional>(
+    py: Python<'_>,
+    scene: &NativeScene,
+    regions: Regions<'_>,
+    threads: usize,
+    out: &mut [bool],
+) -> PyResult<()> {
+    scene.get()?.run(py, threads, chunks_of(out), |scene, (range, found), watch| {
+        for (i, (region, found)) in regions.read::<N>(range).iter().zip(found).enumerate() {
             if i % REGIONS == 0 && watch.is_over() {
                 return;
             }
-            *found = match region.radius {
-                None => scene.overlaps_box(region.first, region.upper),
-                Some(radius) => scene.overlaps_sphere(region.first, radius),
-            };
+            *found = N::overlaps(scene, region);
         }
     })
 }
@@ -123,15 +171,27 @@ pub(crate) fn triangles_in<'py>(
     threads: usize,
     mut counts: PyReadwriteArray1<'_, u64>,
 ) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>)> {
-    let (scene, regions) = (scene.get()?, regions.regions()?);
+    let regions = regions.regions()?;
     let rows = numbers(&mut counts, regions.len())?;
     let mut parts = Parts::new(regions.len());
     let jobs = parts.jobs(rows);
-    let each = |scene: &bth::Scene,
-                (range, (counts, mut all)): (Range<usize>, (&mut [u64], Part<'_, PrimitiveRef>)),
-                watch: &Watch<'_>| {
+    match regions.is_double() {
+        false => triangles_of::<f32>(py, scene, regions, threads, jobs)?,
+        true => triangles_of::<f64>(py, scene, regions, threads, jobs)?,
+    }
+    Ok((parts.column(py, |p| p.instance)?, parts.column(py, |p| p.triangle)?))
+}
+
+fn triangles_of<N: Regional>(
+    py: Python<'_>,
+    scene: &NativeScene,
+    regions: Regions<'_>,
+    threads: usize,
+    jobs: Vec<Job<'_, PrimitiveRef>>,
+) -> PyResult<()> {
+    scene.get()?.run(py, threads, jobs, |scene, (range, (counts, mut all)), watch| {
         let (mut triangles, mut listed) = (Vec::new(), 0);
-        for (i, (region, count)) in regions.read(range).iter().zip(counts).enumerate() {
+        for (i, (region, count)) in regions.read::<N>(range).iter().zip(counts).enumerate() {
             if all.is_full() {
                 return;
             }
@@ -141,15 +201,10 @@ pub(crate) fn triangles_in<'py>(
                     return;
                 }
             }
-            match region.radius {
-                None => scene.triangles_in_box(region.first, region.upper, &mut triangles),
-                Some(radius) => scene.triangles_in_sphere(region.first, radius, &mut triangles),
-            }
+            N::triangles(scene, region, &mut triangles);
             *count = triangles.len() as u64;
             listed += triangles.len();
             all.append(&triangles);
         }
-    };
-    scene.run(py, threads, jobs, each)?;
-    Ok((parts.column(py, |p| p.instance)?, parts.column(py, |p| p.triangle)?))
+    })
 }

@@ -1,132 +1,14 @@
-//! Arrays of numpy to rays and points, a chunk at a time, so that what is converted stays in the
-//! cache until it is traced.
+//! Arrays of numpy to rays.
 
+use crate::numbers::{Bound1, Number, Numbers, Rows, Vectors};
 use bth::TraceRay;
-use bth::rays::{PrimitiveRef, Ray, Start, StartRay};
-use numpy::ndarray::{ArrayView1, ArrayView2};
-use numpy::{PyReadonlyArray1, PyReadonlyArray2};
+use bth::rays::{PrimitiveRef, Ray, Ray64, Start, StartRay};
+use numpy::PyReadonlyArray1;
+use numpy::ndarray::ArrayView1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use std::marker::PhantomData;
 use std::ops::Range;
-
-/// Number of rays or points of a chunk: enough that rays are traced together well, and few enough
-/// that they and their hits fit into a core's cache.
-pub(crate) const CHUNK: usize = 4096;
-
-/// A borrowed array of three numbers a row, in either precision.
-#[derive(FromPyObject)]
-pub(crate) enum Vectors<'py> {
-    Single(PyReadonlyArray2<'py, f32>),
-    Double(PyReadonlyArray2<'py, f64>),
-}
-
-/// A number for all rays, or an array with one for each.
-#[derive(FromPyObject)]
-pub(crate) enum Bound1<'py> {
-    Single(PyReadonlyArray1<'py, f32>),
-    Double(PyReadonlyArray1<'py, f64>),
-    Same(f64),
-}
-
-/// A view of rows that may be shared between threads.
-#[derive(Clone, Copy)]
-pub(crate) enum Rows<'a> {
-    Single(ArrayView2<'a, f32>),
-    Double(ArrayView2<'a, f64>),
-}
-
-/// A view of numbers that may be shared between threads.
-#[derive(Clone, Copy)]
-pub(crate) enum Numbers<'a> {
-    Single(ArrayView1<'a, f32>),
-    Double(ArrayView1<'a, f64>),
-    Same(f32),
-}
-
-impl Vectors<'_> {
-    /// The rows, which must have three numbers.
-    pub(crate) fn rows(&self) -> PyResult<Rows<'_>> {
-        let (rows, columns) = match self {
-            Self::Single(a) => (Rows::Single(a.as_array()), a.as_array().ncols()),
-            Self::Double(a) => (Rows::Double(a.as_array()), a.as_array().ncols()),
-        };
-        if columns != 3 {
-            return Err(PyValueError::new_err(format!("expected three numbers a row, got {columns}")));
-        }
-        Ok(rows)
-    }
-}
-
-impl Rows<'_> {
-    /// Number of rows.
-    pub(crate) fn len(&self) -> usize {
-        match self {
-            Self::Single(a) => a.nrows(),
-            Self::Double(a) => a.nrows(),
-        }
-    }
-
-    /// Calls `put` with the row within the range and the three numbers of each row of it, rounded
-    /// to f32.
-    #[inline(always)]
-    pub(crate) fn each(&self, range: Range<usize>, put: impl FnMut(usize, [f32; 3])) {
-        match self {
-            Self::Single(a) => each_row(a, range, |x| x, put),
-            Self::Double(a) => each_row(a, range, |x| x as f32, put),
-        }
-    }
-}
-
-#[inline(always)]
-fn each_row<T: Copy>(
-    rows: &ArrayView2<'_, T>,
-    range: Range<usize>,
-    to_f32: impl Fn(T) -> f32,
-    mut put: impl FnMut(usize, [f32; 3]),
-) {
-    if let Some(numbers) = rows.as_slice() {
-        let (numbers, _) = numbers[range.start * 3..range.end * 3].as_chunks::<3>();
-        for (i, &row) in numbers.iter().enumerate() {
-            put(i, row.map(&to_f32));
-        }
-        return;
-    }
-    for (i, row) in range.enumerate() {
-        put(i, [to_f32(rows[[row, 0]]), to_f32(rows[[row, 1]]), to_f32(rows[[row, 2]])]);
-    }
-}
-
-impl Bound1<'_> {
-    /// The numbers.
-    pub(crate) fn numbers(&self) -> Numbers<'_> {
-        match self {
-            Self::Single(a) => Numbers::Single(a.as_array()),
-            Self::Double(a) => Numbers::Double(a.as_array()),
-            Self::Same(x) => Numbers::Same(*x as f32),
-        }
-    }
-}
-
-impl Numbers<'_> {
-    /// How many there are; `None` for one number for all.
-    pub(crate) fn len(&self) -> Option<usize> {
-        match self {
-            Self::Single(a) => Some(a.len()),
-            Self::Double(a) => Some(a.len()),
-            Self::Same(_) => None,
-        }
-    }
-
-    /// Calls `put` with the row within the range and the number of each row of it, rounded to f32.
-    #[inline(always)]
-    pub(crate) fn each(&self, range: Range<usize>, mut put: impl FnMut(usize, f32)) {
-        match self {
-            Self::Single(a) => range.enumerate().for_each(|(i, row)| put(i, a[row])),
-            Self::Double(a) => range.enumerate().for_each(|(i, row)| put(i, a[row] as f32)),
-            Self::Same(x) => (0..range.len()).for_each(|i| put(i, *x)),
-        }
-    }
-}
 
 /// The arrays of a call that hold its rays: with origins, or with starts.
 #[derive(FromPyObject)]
@@ -161,21 +43,27 @@ macro_rules! with_rays {
     ($given:expr, $rays:ident => $do:expr) => {
         match $given.given()? {
             crate::rays::Given::Origins($rays) => $do,
+            crate::rays::Given::Origins64($rays) => $do,
             crate::rays::Given::Starts($rays) => $do,
+            crate::rays::Given::Starts64($rays) => $do,
         }
     };
 }
 pub(crate) use with_rays;
 
-/// The rays of a call, of either kind.
+/// The rays of a call, of either kind, and with answers of either type.
 pub(crate) enum Given<'a> {
-    Origins(OriginRays<'a>),
-    Starts(StartRays<'a>),
+    Origins(OriginRays<'a, f32>),
+    Origins64(OriginRays<'a, f64>),
+    Starts(StartRays<'a, f32>),
+    Starts64(StartRays<'a, f64>),
 }
 
 /// Rays of a call, which may be shared between threads.
 pub(crate) trait Rays: Copy + Sync {
     type Ray: TraceRay;
+    /// The type of t in answers.
+    type Number: Number;
 
     /// Number of rays.
     fn len(&self) -> usize;
@@ -191,24 +79,27 @@ pub(crate) trait Rays: Copy + Sync {
 #[derive(Default)]
 pub(crate) struct Buffers {
     rays: Vec<Ray>,
+    rays64: Vec<Ray64>,
     starts: Vec<StartRay>,
 }
 
 /// Rays with origins.
 #[derive(Clone, Copy)]
-pub(crate) struct OriginRays<'a> {
+pub(crate) struct OriginRays<'a, N> {
     origins: Rows<'a>,
     directions: Rows<'a>,
     tmin: Numbers<'a>,
     tmax: Numbers<'a>,
+    number: PhantomData<N>,
 }
 
-/// Rays that start on surfaces.
+/// Rays that start on surfaces. They are rays of f32, also where answers are f64.
 #[derive(Clone, Copy)]
-pub(crate) struct StartRays<'a> {
+pub(crate) struct StartRays<'a, N> {
     starts: Starts<'a>,
     directions: Rows<'a>,
     tmax: Numbers<'a>,
+    number: PhantomData<N>,
 }
 
 /// Points of surfaces, which may be shared between threads.
@@ -221,27 +112,42 @@ pub(crate) struct Starts<'a> {
 }
 
 impl RayArrays<'_> {
-    /// The rays. All arrays must have one length.
+    /// The rays. All arrays must have one length. Where one of them is f64, answers are.
     pub(crate) fn given(&self) -> PyResult<Given<'_>> {
-        let (directions, tmax) = (self.directions.rows()?, self.tmax.numbers());
-        let count = directions.len();
-        let same = |n: Option<usize>| n.is_none_or(|n| n == count);
-        let (given, fits) = match (&self.origins, &self.start) {
-            (Some(origins), None) => {
-                let (origins, tmin) = (origins.rows()?, self.tmin.numbers());
-                let fits = origins.len() == count && same(tmin.len());
-                (Given::Origins(OriginRays { origins, directions, tmin, tmax }), fits)
-            }
-            (None, Some(start)) => {
-                let starts = start.starts()?;
-                (Given::Starts(StartRays { starts, directions, tmax }), starts.len() == count)
-            }
-            _ => return Err(PyValueError::new_err("expected either origins or starts")),
+        let is_double = self.directions.rows()?.is_double() || self.tmax.numbers().is_double();
+        let Some(start) = &self.start else {
+            let rays = self.origin_rays()?;
+            let is_double = is_double || rays.origins.is_double() || rays.tmin.is_double();
+            return Ok(if is_double { Given::Origins64(self.origin_rays()?) } else { Given::Origins(rays) });
         };
-        match fits && same(tmax.len()) {
-            true => Ok(given),
-            false => Err(PyValueError::new_err("the arrays of rays differ in length")),
-        }
+        Ok(match is_double {
+            true => Given::Starts64(self.start_rays(start)?),
+            false => Given::Starts(self.start_rays(start)?),
+        })
+    }
+
+    /// The rays with origins, in numbers of either type.
+    pub(crate) fn origin_rays<N>(&self) -> PyResult<OriginRays<'_, N>> {
+        let Some(origins) = &self.origins else { return Err(PyValueError::new_err("expected origins")) };
+        let (origins, directions) = (origins.rows()?, self.directions.rows()?);
+        let (tmin, tmax) = (self.tmin.numbers(), self.tmax.numbers());
+        let lengths = [Some(directions.len()), tmin.len(), tmax.len()];
+        one_length(origins.len(), &lengths)?;
+        Ok(OriginRays { origins, directions, tmin, tmax, number: PhantomData })
+    }
+
+    fn start_rays<'a, N>(&'a self, start: &'a StartArrays<'_>) -> PyResult<StartRays<'a, N>> {
+        let (starts, directions, tmax) = (start.starts()?, self.directions.rows()?, self.tmax.numbers());
+        one_length(starts.len(), &[Some(directions.len()), tmax.len()])?;
+        Ok(StartRays { starts, directions, tmax, number: PhantomData })
+    }
+}
+
+/// Fails if an array has another length than `count`. `None` is one number for all.
+fn one_length(count: usize, lengths: &[Option<usize>]) -> PyResult<()> {
+    match lengths.iter().flatten().all(|&length| length == count) {
+        true => Ok(()),
+        false => Err(PyValueError::new_err("the arrays of rays differ in length")),
     }
 }
 
@@ -272,29 +178,37 @@ impl Starts<'_> {
     }
 }
 
-impl Rays for OriginRays<'_> {
-    type Ray = Ray;
+/// Implements [`Rays`] for rays with origins in numbers of one type.
+macro_rules! origin_rays {
+    ($number:ty, $ray:ident, $buffer:ident) => {
+        impl Rays for OriginRays<'_, $number> {
+            type Ray = $ray;
+            type Number = $number;
 
-    fn len(&self) -> usize {
-        self.origins.len()
-    }
+            fn len(&self) -> usize {
+                self.origins.len()
+            }
 
-    fn read(&self, range: Range<usize>, rays: &mut Vec<Ray>) {
-        let none = Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 };
-        rays.resize(range.len(), none);
-        self.origins.each(range.clone(), |i, origin| rays[i].origin = origin);
-        self.directions.each(range.clone(), |i, direction| rays[i].direction = direction);
-        self.tmin.each(range.clone(), |i, t| rays[i].tmin = t);
-        self.tmax.each(range, |i, t| rays[i].tmax = t);
-    }
+            fn read(&self, range: Range<usize>, rays: &mut Vec<$ray>) {
+                rays.resize(range.len(), $ray::new([0.0; 3], [0.0; 3]));
+                self.origins.each(range.clone(), |i, origin| rays[i].origin = origin);
+                self.directions.each(range.clone(), |i, direction| rays[i].direction = direction);
+                self.tmin.each(range.clone(), |i, t| rays[i].tmin = t);
+                self.tmax.each(range, |i, t| rays[i].tmax = t);
+            }
 
-    fn buffer<'b>(&self, buffers: &'b mut Buffers) -> &'b mut Vec<Ray> {
-        &mut buffers.rays
-    }
+            fn buffer<'b>(&self, buffers: &'b mut Buffers) -> &'b mut Vec<$ray> {
+                &mut buffers.$buffer
+            }
+        }
+    };
 }
+origin_rays!(f32, Ray, rays);
+origin_rays!(f64, Ray64, rays64);
 
-impl Rays for StartRays<'_> {
+impl<N: Number> Rays for StartRays<'_, N> {
     type Ray = StartRay;
+    type Number = N;
 
     fn len(&self) -> usize {
         self.starts.len()

@@ -2,8 +2,8 @@
 //! and opacity.
 
 use crate::errors::no_geometry;
+use crate::numbers::CHUNK;
 use crate::output::{numbers, split_off};
-use crate::rays::CHUNK;
 use crate::scene::NativeScene;
 use bth::rays::{Hit, PrimitiveRef};
 use numpy::ndarray::ArrayView1;

@@ -131,7 +131,7 @@ def test_shapes(scene, rays):
     for change in (np.asfortranarray, lambda a: a[::-1][::-1], lambda a: np.repeat(a, 2, axis=0)[::2],
                    lambda a: a.astype(np.float64), lambda a: a.astype(">f4"), _unaligned):
         other = scene.nearest(change(rays[0]), change(rays[1]))
-        assert (other.t == flat.t).all() and (other.triangle == flat.triangle).all()
+        assert (other.t.astype(np.float32) == flat.t).all() and (other.triangle == flat.triangle).all()
     backwards = scene.nearest(rays[0][::-1, ::-1][:, ::-1], rays[1][::-1])
     assert (backwards.t == flat.t[::-1]).all()
     assert scene.contains(np.zeros((2, 3, 3))).shape == (2, 3)
@@ -169,7 +169,7 @@ def test_geometry(scene, mesh):
 def test_t_beyond_float32():
     """Beyond the range of float32 there are no hits; passages are counted by the exact t."""
     scene = bth.compile(([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
-    ray = [0.2, 0.2, 1e30], [0, 0, -1e-20]
+    ray = np.float32([0.2, 0.2, 1e30]), np.float32([0, 0, -1e-20])
     assert not scene.nearest(*ray).hit and not scene.any(*ray) and not scene.any(*ray, filter=lambda _: True)
     assert scene.count(*ray) == len(scene.all_hits(*ray)) == len(scene.all_hits(*ray, most=1)) == 0
     assert scene.crossings(*ray)[0] == 1

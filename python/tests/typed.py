@@ -13,7 +13,7 @@ FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 
 def nearest(scene: bth.Scene, rays: NDArray[np.float32]) -> NDArray[np.float64]:
     hits: bth.Hits = scene.nearest(rays[..., :3], rays[..., 3:], tmax=9, mask=3, cull="back", filter=keep)
-    t: NDArray[np.float32] = hits.t
+    t: NDArray[np.floating] = hits.t
     triangle: NDArray[np.uint32] = hits.triangle
     found: NDArray[np.bool_] = scene.any(None, [0, 0, 1], start=hits)
     scene.check_start((0, [0, 1], np.zeros((2, 2))))

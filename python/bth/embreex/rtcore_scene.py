@@ -6,7 +6,7 @@ from .. import _arrays
 from .._assembly import Assembly
 
 # What embreex takes for no limit.
-_FAR = np.float32(1e37)
+_FAR = 1e37
 
 
 class EmbreeScene:
@@ -23,7 +23,7 @@ class EmbreeScene:
         for name, array in (("vec_origins", origins), ("vec_directions", directions)):
             if array.ndim != 2 or array.shape[1] != 3:
                 raise ValueError(f"{name}: expected the shape (n, 3), got {array.shape}")
-        far = np.broadcast_to(np.asarray(_FAR if dists is None else _arrays.plain(dists, "dists"), np.float32), (len(origins),))
+        far = _FAR if dists is None else _arrays.numbers(dists, "dists", (len(origins),))
         scene, first_face = self._assembly.scene()
         if query == "OCCLUDED" and not output:
             return np.where(scene.any(origins, directions, tmax=far), 0, -1).astype(np.int32)
@@ -43,8 +43,6 @@ class EmbreeScene:
         """Cross products of the edges, not normalized, as those of Embree; zeros for a miss."""
         scene, _ = self._assembly.scene()
         normals = np.zeros((len(hits), 3), np.float32)
-        vertices, faces = scene.vertices(), scene.triangles()
-        if hits.hit.any():
-            a, b, c = (vertices[faces[hits.triangle[hits.hit], k]] for k in range(3))
-            normals[hits.hit] = np.cross(b - a, c - a)
+        a, b, c = np.moveaxis(scene.triangle_positions(hits.instance[hits.hit], hits.triangle[hits.hit]), 1, 0)
+        normals[hits.hit] = np.cross(b - a, c - a)
         return normals

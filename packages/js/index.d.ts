@@ -49,7 +49,8 @@ export class BthError extends Error {
 
 /**
  * An open file. Rays are a Float32Array of eight numbers each: origin x, y, z, least t, direction x, y, z, greatest t, in world
- * space. Directions need not be normalized; t is in units of their length. About a thousand coherent rays that are adjacent, such as
+ * space. Directions need not be normalized; t is in units of their length. Rays in a Float64Array are not rounded, and their hits have
+ * t, u and v in a Float64Array, too. About a thousand coherent rays that are adjacent, such as
  * a tile of a picture, are traced fastest. Answers are exact, and the same bits as on every other machine. Queries throw a BthError
  * with BTH-O001 where the memory is too small for them, and can be asked again when other scenes were closed. They throw a TypeError
  * for rays of another kind, or whose buffer was transferred.
@@ -75,13 +76,20 @@ export interface Scene {
     seconds: number;
     /** The nearest hit of each ray. */
     nearest(rays: Float32Array): Hits;
+    /**
+     * The nearest hit of each ray in double: the one with the smallest exact t. t has a relative
+     * error of at most 2^-40; u and v are off by at most 2^-28. A t beyond the range of a float is
+     * not hit.
+     */
+    nearest(rays: Float64Array): Hits<Float64Array>;
     /** For each ray 1 if it hits anything, else 0. */
-    any(rays: Float32Array): Uint8Array;
+    any(rays: Float32Array | Float64Array): Uint8Array;
     /**
      * The nearest hits of rays that start on surfaces: at the exact points of `starts`, such as
      * hits of this scene. Such a ray hits what lies at t > 0: never the surface that it leaves, and
      * it never skips a wall. It needs no offset and no least t. A ray is a miss if its start is not
-     * a point of a visible instance; the start of a miss is not.
+     * a point of a visible instance; the start of a miss is not. u and v in double are rounded to
+     * floats first.
      * @param directions Three numbers a ray, of any length except zero; t is in units of that
      * length.
      * @param tmax The largest t of all rays, or of each; infinite by default.
@@ -97,6 +105,11 @@ export interface Scene {
      * @throws TypeError unless each column has its type and `count` elements.
      */
     surface(hits: Hits): Surface;
+    /**
+     * The same for hits of rays in double, with positions in double. u and v are rounded to floats
+     * first: positions are off by less than 2^-23 of the triangle's longest edge.
+     */
+    surface(hits: Hits<Float64Array>): Surface<Float64Array>;
     /**
      * How the materials of an object look, by their indices; none if the file was compiled without `--materials`.
      * @throws RangeError unless there is such an object.
@@ -118,17 +131,18 @@ export interface Scene {
 
 export type Vector = [x: number, y: number, z: number];
 
-/** Nearest hits, each array with one element for each ray. */
-export class Hits {
-    constructor(count: number);
+/** Nearest hits, each array with one element for each ray; `Numbers` is the class of the rays. */
+export class Hits<Numbers extends Float32Array | Float64Array = Float32Array> {
+    /** @param numbers The class of t, u and v; Float32Array by default. */
+    constructor(count: number, numbers?: new (count: number) => Numbers);
     /** Number of rays. */
     readonly count: number;
     /** t of the hit; infinite for a miss. */
-    readonly t: Float32Array;
+    readonly t: Numbers;
     /** Barycentric weight of the triangle's second vertex. */
-    readonly u: Float32Array;
+    readonly u: Numbers;
     /** Barycentric weight of the triangle's third vertex. */
-    readonly v: Float32Array;
+    readonly v: Numbers;
     /** Index of the instance; 0xffffffff for a miss. */
     readonly instance: Uint32Array;
     /** Index of the triangle in the source file; 0xffffffff for a miss. */
@@ -140,7 +154,7 @@ export class Hits {
  * starts. A start is the exact point a + u(b - a) + v(c - a) of the triangle with the vertices a, b
  * and c.
  */
-export type Starts = Pick<Hits, "count" | "u" | "v" | "instance" | "triangle">;
+export type Starts = Pick<Hits | Hits<Float64Array>, "count" | "u" | "v" | "instance" | "triangle">;
 
 /** Numbers of nodes, leaves, triangles and tetrahedra that each ray visits. */
 export interface Steps {
@@ -155,10 +169,10 @@ export interface Steps {
  * The surface at each hit. A miss has NaN and 0xffffffff, and so has what the file does not keep: positions of a file compiled with
  * `--no-geometry`, texture coordinates without `--attributes`, materials without `--names` or `--materials`.
  */
-export interface Surface {
+export interface Surface<Numbers extends Float32Array | Float64Array = Float32Array> {
     readonly count: number;
     /** Points in world space, 3 numbers a hit. */
-    readonly position: Float32Array;
+    readonly position: Numbers;
     /** Normals of the source, interpolated, in world space; those of the triangles where it has none. Length 1. */
     readonly normal: Float32Array;
     /** Normals of the triangles' planes, in world space. Length 1. */

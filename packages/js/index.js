@@ -2,16 +2,16 @@
 
 /** Rays that are copied to the module at a time: they stay in the caches. */
 const CHUNK = 4096;
-/** Numbers of a ray: origin, tmin, direction, tmax. */
+/** Numbers of a ray: origin, tmin, direction, tmax. In double they take two words each. */
 const RAY = 8;
 /** Columns of hits: the first three are numbers, the others indices. */
 const HIT_NAMES = ["t", "u", "v", "instance", "triangle"];
-/** Columns of the results of the module's functions. */
-const HIT_COLUMNS = 5, STEP_COLUMNS = 4, SURFACE_COLUMNS = 20;
+/** Columns of hits for `bth_surface`, and words of a surface. */
+const HIT_COLUMNS = 5, SURFACE_WORDS = 23;
 /** Bytes of a file at most: the module holds it in one piece, at a multiple of 64. */
 const MOST_FILE = 2 ** 31 - 64;
 /** Words of memory that a chunk needs at most: hits and their surfaces. */
-const WORDS = CHUNK * (HIT_COLUMNS + SURFACE_COLUMNS);
+const WORDS = CHUNK * (HIT_COLUMNS + SURFACE_WORDS);
 
 /** What stands for no texture. */
 const NONE = 0xffffffff;
@@ -90,7 +90,7 @@ export class Bth {
         this.module = module;
         this.simd = wasm.bth_has_vectors() === 1;
         // Rays, results and room for 14 numbers of 8 bytes.
-        this.memory = { rays: wasm.bth_words(CHUNK * RAY), results: wasm.bth_words(WORDS), numbers: wasm.bth_words(28) };
+        this.memory = { rays: wasm.bth_words(2 * CHUNK * RAY), results: wasm.bth_words(WORDS), numbers: wasm.bth_words(28) };
     }
 
     open(file) {
@@ -154,11 +154,13 @@ class Scene {
     }
 
     nearest(rays) {
-        return this.#nearest(this.#wasm.bth_nearest, countOf(rays), copied(rays));
+        const count = countOf(rays, "Float32Array", "Float64Array"), numbers = numbersOf(rays);
+        return this.#nearest(numbers === Float64Array ? this.#wasm.bth_nearest_f64 : this.#wasm.bth_nearest, count, copied(rays), numbers);
     }
 
     any(rays) {
-        return this.#any(this.#wasm.bth_any, countOf(rays), copied(rays));
+        const count = countOf(rays, "Float32Array", "Float64Array"), numbers = numbersOf(rays);
+        return this.#any(numbers === Float64Array ? this.#wasm.bth_any_f64 : this.#wasm.bth_any, count, copied(rays), numbers);
     }
 
     nearestStarts(starts, directions, tmax = Infinity) {
@@ -169,20 +171,20 @@ class Scene {
         return this.#any(this.#wasm.bth_any_starts, countOfStarts(starts, directions, tmax), startsCopied(starts, directions, tmax));
     }
 
-    /** The nearest hits of rays that `copy` copies, by one of the module's functions. */
-    #nearest(trace, count, copy) {
-        const hits = new Hits(count);
+    /** The nearest hits of rays that `copy` copies, by one of the module's functions, with numbers of a class of arrays. */
+    #nearest(trace, count, copy, numbers = Float32Array) {
+        const hits = new Hits(count, numbers);
         const columns = HIT_NAMES.map((name) => hits[name]);
-        this.#inChunks(count, copy, (from, n) => {
+        this.#inChunks(count, numbers, copy, (from, n) => {
             trace(this.#scene, this.#memory.rays, n, this.#memory.results);
             this.#columns(columns, this.#memory.results, from, n);
         });
         return hits;
     }
 
-    #any(trace, count, copy) {
+    #any(trace, count, copy, numbers = Float32Array) {
         const found = new Uint8Array(count);
-        this.#inChunks(count, copy, (from, n) => {
+        this.#inChunks(count, numbers, copy, (from, n) => {
             trace(this.#scene, this.#memory.rays, n, this.#memory.results);
             found.set(new Uint8Array(this.#wasm.memory.buffer, this.#memory.results, n), from);
         });
@@ -190,10 +192,10 @@ class Scene {
     }
 
     steps(rays) {
-        const count = countOf(rays);
+        const count = countOf(rays, "Float32Array");
         const steps = new Steps(count);
         const columns = [steps.nodes, steps.leaves, steps.triangles, steps.tets];
-        this.#inChunks(count, copied(rays), (from, n) => {
+        this.#inChunks(count, Float32Array, copied(rays), (from, n) => {
             this.#wasm.bth_steps(this.#scene, this.#memory.rays, n, this.#memory.results);
             this.#columns(columns, this.#memory.results, from, n);
         });
@@ -203,7 +205,7 @@ class Scene {
     surface(hits) {
         const scene = this.#open();
         checkHits(hits);
-        const surface = new Surface(hits.count);
+        const surface = new Surface(hits.count, numbersOf(hits.t));
         const { results } = this.#memory;
         const surfaces = results + 4 * CHUNK * HIT_COLUMNS;
         const columns = HIT_NAMES.map((name) => hits[name]);
@@ -214,15 +216,16 @@ class Scene {
                 new of(this.#wasm.memory.buffer, results + 4 * n * k, n).set(column.subarray(from, from + n));
             });
             this.#wasm.bth_surface(scene, results, n, surfaces);
-            const words = (k) => new Float32Array(this.#wasm.memory.buffer, surfaces + 4 * n * k, n);
+            const { buffer } = this.#wasm.memory, others = surfaces + 24 * n;
+            const words = (k) => new Float32Array(buffer, others + 4 * n * k, n);
             const { position, normal, geometricNormal, uv, color } = surface;
-            interleave([0, 1, 2].map(words), position, from);
-            interleave([3, 4, 5].map(words), normal, from);
-            interleave([6, 7, 8].map(words), geometricNormal, from);
-            interleave([9, 10].map(words), uv, from);
-            interleave([11, 12, 13, 14].map(words), color, from);
-            interleave([15, 16].map(words), surface.secondUv, from);
-            this.#columns([surface.object, surface.group, surface.material], surfaces + 4 * n * 17, from, n);
+            interleave([0, 1, 2].map((k) => new Float64Array(buffer, surfaces + 8 * n * k, n)), position, from);
+            interleave([0, 1, 2].map(words), normal, from);
+            interleave([3, 4, 5].map(words), geometricNormal, from);
+            interleave([6, 7].map(words), uv, from);
+            interleave([8, 9, 10, 11].map(words), color, from);
+            interleave([12, 13].map(words), surface.secondUv, from);
+            this.#columns([surface.object, surface.group, surface.material], others + 4 * n * 14, from, n);
         }
         return surface;
     }
@@ -292,21 +295,21 @@ class Scene {
     }
 
     /** Copies a chunk of rays after the other to the module, and calls `trace` with the index of its first ray and its length. */
-    #inChunks(count, copy, trace) {
+    #inChunks(count, numbers, copy, trace) {
         this.#open();
         for (let from = 0; from < count; from += CHUNK) {
             const n = Math.min(CHUNK, count - from);
-            copy(new Float32Array(this.#wasm.memory.buffer, this.#memory.rays, n * RAY), from, n);
+            copy(new numbers(this.#wasm.memory.buffer, this.#memory.rays, n * RAY), from, n);
             trace(from, n);
         }
     }
 
-    /** Copies columns of `n` words from the module to arrays, from an index on. */
+    /** Copies columns of `n` elements from the module to arrays of their kinds, from an index on. */
     #columns(arrays, address, from, n) {
-        arrays.forEach((array, k) => {
-            const of = array instanceof Float32Array ? Float32Array : Uint32Array;
-            array.set(new of(this.#wasm.memory.buffer, address + 4 * n * k, n), from);
-        });
+        for (const array of arrays) {
+            array.set(new array.constructor(this.#wasm.memory.buffer, address, n), from);
+            address += n * array.BYTES_PER_ELEMENT;
+        }
     }
 }
 
@@ -345,10 +348,15 @@ function checkIndex(name, index, count) {
     throw new RangeError(`${name}: expected an index below ${count}; found ${typeof index === "number" ? index : kindOf(index)}`);
 }
 
-/** Number of rays in an array. */
-function countOf(rays) {
-    if (classOf(rays) !== "Float32Array" || rays.length % RAY !== 0) {
-        throw new TypeError(`rays: expected a Float32Array of eight numbers a ray (origin, tmin, direction, tmax); found ${sizedKindOf(rays)}`);
+/** The class of the numbers of rays or hits: Float64Array where the caller has that, else Float32Array. */
+function numbersOf(array) {
+    return classOf(array) === "Float64Array" ? Float64Array : Float32Array;
+}
+
+/** Number of rays in an array of one of these classes. */
+function countOf(rays, ...classes) {
+    if (!classes.includes(classOf(rays)) || rays.length % RAY !== 0) {
+        throw new TypeError(`rays: expected a ${classes.join(" or ")} of eight numbers a ray (origin, tmin, direction, tmax); found ${sizedKindOf(rays)}`);
     }
     if (rays.length === 0 && isDetached(rays.buffer)) throw new TypeError("rays: their buffer is detached; it was transferred");
     return rays.length / RAY;
@@ -380,7 +388,7 @@ function countOfStarts(starts, directions, tmax) {
     const count = starts?.count;
     if (count === undefined) throw new TypeError(`starts: expected hits, or their columns instance, triangle, u, v and count; found ${kindOf(starts)}`);
     for (const name of ["u", "v", "instance", "triangle"]) {
-        const of = name.length === 1 ? "Float32Array" : "Uint32Array";
+        const of = name.length === 1 ? numbersOf(starts.u).name : "Uint32Array";
         checkColumn(`starts.${name}`, starts[name], of, count);
     }
     checkColumn("directions", directions, "Float32Array", 3 * count, "three numbers a ray");
@@ -407,7 +415,7 @@ function isDetached(buffer) {
 /** Refuses hits whose columns are not those of their number of rays. */
 function checkHits(hits) {
     if (hits?.count === undefined) throw new TypeError(`hits: expected the answer of nearest; found ${kindOf(hits)}`);
-    HIT_NAMES.forEach((name, k) => checkColumn(`hits.${name}`, hits[name], k < 3 ? "Float32Array" : "Uint32Array", hits.count));
+    HIT_NAMES.forEach((name, k) => checkColumn(`hits.${name}`, hits[name], k < 3 ? numbersOf(hits.t).name : "Uint32Array", hits.count));
 }
 
 /** Element k of the vector of hit i is element i of column k. */
@@ -420,11 +428,11 @@ function interleave(columns, to, from) {
 
 /** Hits, an array for each of their numbers. */
 export class Hits {
-    constructor(count) {
+    constructor(count, numbers = Float32Array) {
         this.count = count;
-        this.t = new Float32Array(count);
-        this.u = new Float32Array(count);
-        this.v = new Float32Array(count);
+        this.t = new numbers(count);
+        this.u = new numbers(count);
+        this.v = new numbers(count);
         this.instance = new Uint32Array(count);
         this.triangle = new Uint32Array(count);
     }
@@ -441,9 +449,9 @@ class Steps {
 }
 
 class Surface {
-    constructor(count) {
+    constructor(count, numbers) {
         this.count = count;
-        this.position = new Float32Array(3 * count);
+        this.position = new numbers(3 * count);
         this.normal = new Float32Array(3 * count);
         this.geometricNormal = new Float32Array(3 * count);
         this.uv = new Float32Array(2 * count);

@@ -55,9 +55,9 @@ pub unsafe extern "C" fn bth_close(scene: *mut Scene) {
     drop(unsafe { Box::from_raw(scene) });
 }
 
-/// Words of memory for rays and results, zeros, at a multiple of 4 bytes. It is kept until the
+/// Words of memory for rays and results, zeros, at a multiple of 8 bytes. It is kept until the
 /// module ends.
 #[unsafe(no_mangle)]
-pub extern "C" fn bth_words(count: usize) -> *mut u32 {
-    Box::leak(vec![0u32; count].into_boxed_slice()).as_mut_ptr()
+pub extern "C" fn bth_words(count: usize) -> *mut u64 {
+    Box::leak(vec![0u64; count.div_ceil(2)].into_boxed_slice()).as_mut_ptr()
 }

@@ -193,12 +193,50 @@ test("what is no start is a miss, and other arguments are refused", () => {
     };
     refused(/^starts: expected hits, .* found undefined$/);
     refused(/^starts: expected hits, .* found Array$/, [good], up);
-    refused(/^starts.u: expected a Float32Array of 1 elements, .* found Float64Array of 1$/, { ...good, u: Float64Array.of(0) }, up);
+    refused(/^starts.u: expected a Float32Array of 1 elements, .* found Array of 1$/, { ...good, u: [0] }, up);
+    refused(/^starts.v: expected a Float64Array of 1 elements, .* found Float32Array of 1$/, { ...good, u: Float64Array.of(0) }, up);
     refused(/^starts.triangle: expected a Uint32Array of 1 elements, .* found Uint32Array of 2$/, { ...good, triangle: new Uint32Array(2) }, up);
     refused(/^directions: expected a Float32Array of 3 elements, three numbers a ray; found Array of 3$/, good, [0, 0, 1]);
     refused(/^directions: .* found Float32Array of 6$/, good, new Float32Array(6));
     refused(/^tmax: expected a Float32Array of 1 elements, or a number for all rays; found Array of 1$/, good, up, [1]);
     refused(/^tmax: .* found Float32Array of 2$/, good, up, new Float32Array(2));
+});
+
+test("rays in double are not rounded, and their hits are in double", () => {
+    const [model, file] = [join(folder, "triangle.obj"), join(folder, "triangle.bth")];
+    writeFileSync(model, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    execFileSync(BTHC, ["compile", model, "-o", file, "--quiet"]);
+    const scene = bth.open(readFileSync(file));
+    const above = 2 ** -40, down = [0, 0, -1, Infinity];
+    const rays = Float64Array.of(0.25, 0.25, above, 0, ...down, 0.25, 0.25, -above, 0, ...down, 0.3, 0.5, 3, 0, ...down);
+    const [{ t, u, v, instance, triangle }, any] = [scene.nearest(rays), scene.any(rays)];
+    for (const numbers of [t, u, v]) assert.ok(numbers instanceof Float64Array);
+    assert.deepEqual([[...t], u[0], u[1], [...v]], [[above, Infinity, 3], 0.25, 0, [0.25, 0, 0.5]]);
+    // A float is farther from 0.3.
+    assert.ok(Math.abs(u[2] - 0.3) <= 2 ** -28);
+    assert.deepEqual([[...instance], [...triangle], [...any]], [[0, 2 ** 32 - 1, 0], [0, 2 ** 32 - 1, 0], [1, 0, 1]]);
+    // Positions at hits in double are in double; others as for hits in float.
+    const surface = scene.surface({ count: 3, t, u, v, instance, triangle });
+    assert.ok(surface.position instanceof Float64Array && surface.normal instanceof Float32Array);
+    assert.deepEqual([...surface.position], [0.25, 0.25, 0, NaN, NaN, NaN, Math.fround(0.3), 0.5, 0]);
+    assert.ok(scene.surface(scene.nearest(Float32Array.from(rays))).position instanceof Float32Array);
+    assert.equal(scene.nearestStarts({ count: 3, u, v, instance, triangle }, new Float32Array(9).fill(1)).count, 3);
+    assert.throws(() => scene.steps(rays), /^TypeError: rays: expected a Float32Array of eight .* found Float64Array of 24$/);
+    scene.close();
+});
+
+test("rays whose numbers are floats have the hits of floats, rounded no more, over several chunks", () => {
+    for (const name of ["gyroid.bth", "carousel.bth"]) {
+        const scene = bth.open(readFileSync(join(folder, name)));
+        const rays = raysInto(scene.bounds, 10_000, 4), hits = scene.nearest(rays);
+        const wide = scene.nearest(Float64Array.from(rays));
+        for (const name of ["instance", "triangle"]) assert.deepEqual(wide[name], hits[name]);
+        // Both are rounded, by half a unit in the last place of a float and by 2^-40 (t) or 2^-28 (u and v).
+        wide.t.forEach((t, i) => assert.ok(t === hits.t[i] || Math.abs(t - hits.t[i]) <= 2 ** -23 * Math.abs(t), `${t}, ${hits.t[i]}`));
+        for (const name of ["u", "v"]) wide[name].forEach((u, i) => assert.ok(Math.abs(u - hits[name][i]) <= 2 ** -24 + 2 ** -27));
+        assert.deepEqual(scene.any(Float64Array.from(rays)), scene.any(rays));
+        scene.close();
+    }
 });
 
 test("damaged files are refused with the code of the specification", () => {
@@ -424,8 +462,9 @@ test("rays and hits of another window are taken", () => {
     const columns = Object.fromEntries(["t", "u", "v", "instance", "triangle"].map((name) => [name, elsewhere(hits[name])]));
     assert.deepEqual(scene.surface({ count: hits.count, ...columns }), scene.surface(hits));
     const refused = (rays, found) => assert.throws(() => scene.nearest(rays), (error) => error instanceof TypeError && found.test(error.message), String(found));
-    refused(new Float64Array(8), /found Float64Array of 8$/);
+    refused(new Float64Array(9), /found Float64Array of 9$/);
     refused(new Float32Array(9), /found Float32Array of 9$/);
+    refused(new Int32Array(8), /^rays: expected a Float32Array or Float64Array of eight numbers a ray .* found Int32Array of 8$/);
     refused([...rays], /found Array of 16$/);
     refused(undefined, /found undefined$/);
     refused(new DataView(new ArrayBuffer(32)), /found DataView of 32 bytes$/);
@@ -454,6 +493,10 @@ test("the types need no library but ES2022", (t) => {
             const scene: Scene = bth.open(new ArrayBuffer(8));
             const hits = scene.nearest(Float32Array.of(1));
             const surface: Surface = scene.surface(scene.nearestStarts(hits, Float32Array.of(1), 2));
+            const wide = scene.nearest(Float64Array.of(1)), t: Float64Array = wide.t, at: Float64Array = scene.surface(wide).position;
+            scene.nearestStarts(wide, Float32Array.of(1));
+            // @ts-expect-error: steps are those of rays in float.
+            scene.steps(t);
             scene.anyStarts({ count: 0, u: hits.u, v: hits.v, instance: hits.instance, triangle: hits.triangle }, hits.t, hits.t);
             // @ts-expect-error: it is not to be set.
             scene.objects = 1;
@@ -461,7 +504,7 @@ test("the types need no library but ES2022", (t) => {
             scene.nearest([1]);
             // @ts-expect-error: the bytes have to be awaited.
             bth.open(Promise.resolve(new ArrayBuffer(8)));
-            ${more} export { surface, BthError };`);
+            ${more} export { surface, at, BthError };`);
         mkdirSync(join(folder, "bth"), { recursive: true });
         copyFileSync(types, join(folder, "bth/index.d.ts"));
         const compilerOptions = { strict: true, noEmit: true, lib: lib.split(","), types: [], target: "es2022", module: "esnext", moduleResolution: "bundler" };

@@ -62,7 +62,7 @@ class Contents:
     # Geometry of objects.
 
     def vertices(self, obj=0):
-        """Distinct positions of an object, (n, 3) float32, in the space of the object."""
+        """Distinct positions of an object, (n, 3) in the space of the object: float32, or float64 where the file keeps that."""
         return self._native.geometry(_index(obj, "obj"))[0]
 
     def triangles(self, obj=0):

@@ -59,7 +59,7 @@ impl NativeScene {
 type Placements<'py> = (Bound<'py, PyArray3<f64>>, Vec<u32>, Vec<bool>);
 
 /// Positions and triangles.
-type Geometry<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u32>>);
+type Geometry<'py> = (Bound<'py, PyAny>, Bound<'py, PyArray2<u32>>);
 
 #[pymethods]
 impl NativeScene {
@@ -230,21 +230,27 @@ impl NativeScene {
         })?
     }
 
-    /// Positions and triangles of an object, if the file has them.
+    /// Positions, in f32 or f64 as the file has them, and triangles of an object, if it has them.
     fn geometry<'py>(&self, py: Python<'py>, object: u32) -> PyResult<Geometry<'py>> {
-        let (positions, triangles) = self.with(py, |scene| {
+        let (single, double, triangles) = self.with(py, |scene| {
             check_index("object", object, scene.object_count())?;
             let view = scene.object(object);
             if view.triangles.is_empty() && view.header.triangles > 0 {
                 return Err(no_geometry());
             }
-            let rows = |rows: usize| (rows, 3);
-            let positions =
-                Array2::from_shape_vec(rows(view.positions.len()), view.positions.as_flattened().to_vec());
-            let triangles =
-                Array2::from_shape_vec(rows(view.triangles.len()), view.triangles.as_flattened().to_vec());
-            Ok((positions.expect("three a row"), triangles.expect("three a row")))
+            let double = (!view.exact.is_empty()).then(|| rows(view.exact.positions()));
+            let single = if double.is_some() { &[] } else { view.positions };
+            Ok((rows(single), double, rows(view.triangles)))
         })??;
-        Ok((positions.into_pyarray(py), triangles.into_pyarray(py)))
+        let positions = match double {
+            Some(double) => double.into_pyarray(py).into_any(),
+            None => single.into_pyarray(py).into_any(),
+        };
+        Ok((positions, triangles.into_pyarray(py)))
     }
+}
+
+/// A copy of rows of three numbers.
+fn rows<T: Copy>(rows: &[[T; 3]]) -> Array2<T> {
+    Array2::from_shape_vec((rows.len(), 3), rows.as_flattened().to_vec()).expect("three a row")
 }

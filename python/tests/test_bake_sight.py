@@ -42,7 +42,7 @@ def test_a_viewshed_of_a_height_field():
         seen = bth.bake.viewshed(scene, observers, at, height=height)
         # Nothing hides a point that is just above its surface and its own.
         up = height * np.array([0, 0, 1.0])
-        targets = (at.position + up).astype(np.float32) if height else at.position + 1e-9 * at.normal
+        targets = at.position + up if height else at.position + 1e-9 * at.normal
         expected = [[not hidden_by_force(scene.vertices(), scene.triangles(), t, o) for t in targets] for o in observers]
         assert (seen == expected).all() and 5 < seen.sum() < seen.size - 5
     assert (bth.bake.viewshed(scene, observers, at, height=0.25, threads=3) == seen).all()

@@ -182,6 +182,7 @@ def test_positions_in_float64(positions, recwarn):
     closest = scene.closest(middles)
     assert (closest.distance < 1e-9).all()
     assert (scene.triangle_positions(0, np.arange(len(faces))) == vertices[faces]).all()
+    assert scene.vertices().dtype == np.float64 and (scene.vertices()[scene.triangles()] == vertices[faces]).all()
 
 
 def test_float32_positions_are_warned_of_for_each_mesh():

@@ -72,9 +72,7 @@ def lidar(
     distance = np.empty(shape, np.float32)
     instance, triangle = np.empty(shape, np.uint32), np.empty(shape, np.uint32)
     for part in chunks(shape[0], columns * len(angles), "scan", progress):
-        hits = scene.nearest(
-            origin[part, :, None].astype(np.float32), direction[part], tmin=nearest, tmax=farthest, threads=threads
-        )
+        hits = scene.nearest(origin[part, :, None], direction[part], tmin=nearest, tmax=farthest, threads=threads)
         distance[part], instance[part], triangle[part] = hits.t, hits.instance, hits.triangle
     if noise > 0:
         distance = np.maximum(distance + noise * _normal(seed, distance.size).reshape(shape), 0.0).astype(np.float32)

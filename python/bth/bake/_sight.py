@@ -18,26 +18,26 @@ _END = 1.0 - 2.0**-22
 def line_of_sight(scene: Scene, observers: ArrayLike, targets: ArrayLike, *, threads: int | None = None) -> NDArray[np.bool_]:
     """Whether nothing of the scene lies between observers and targets.
 
-    observers, targets: (..., 3) in world space, rounded to float32 and broadcast against each other.
+    observers, targets: (..., 3) in world space, broadcast against each other.
 
     Returns bool of the leading shape. The line starts at the target. A surface that contains the target only touches the line there and
     does not hide it, and neither does anything within 2^-22 of the line's length of the observer. Between points that are the same,
-    nothing can be. Points that are not finite see nothing and are not seen.
+    nothing can be. Points beyond the range of float32 see nothing and are not seen.
     """
     starts, ends, shape = _arrays.together(targets, "targets", observers, "observers")
-    starts, ends = starts.astype(np.float32), ends.astype(np.float32)
     directions, tmax, finite = _lines(starts, ends)
     blocked = scene.any(starts, directions, tmin=_BEGIN, tmax=tmax, threads=threads)
     return (finite & ~blocked).reshape(shape)
 
 
 def _lines(starts: NDArray[np.floating], ends: NDArray[np.floating]) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Directions and largest t of lines between points (..., 3), and whether both ends are finite."""
-    finite = np.isfinite(starts).all(axis=-1) & np.isfinite(ends).all(axis=-1)
+    """Directions and largest t of lines between points (..., 3), and whether both ends are within the range of float32."""
+    most = np.finfo(np.float32).max
+    finite = (np.abs(starts) <= most).all(axis=-1) & (np.abs(ends) <= most).all(axis=-1)
     with np.errstate(over="ignore", invalid="ignore"):
         directions = ends.astype(np.float64) - starts
         # Halved where the difference has no float32.
-        far = np.abs(directions).max(axis=-1, initial=0.0) > np.finfo(np.float32).max
+        far = np.abs(directions).max(axis=-1, initial=0.0) > most
         directions[far] *= 0.5
     return directions, np.where(far, 2.0, 1.0) * _END, finite
 
@@ -67,7 +67,7 @@ def viewshed(
             targets = at.position[part] + height * np.asarray(up, np.float64)
             seen[:, part] = line_of_sight(scene, observers[:, None], targets, threads=threads)
             continue
-        directions, tmax, finite = _lines(at.position[part, None], observers.astype(np.float32))
+        directions, tmax, finite = _lines(at.position[part, None], observers)
         start, leaves = at.leaving(np.arange(len(at))[part], directions)
         blocked = scene.any(None, directions, tmax=tmax, start=start, threads=threads)
         seen[:, part] = (finite & leaves & ~blocked).T
@@ -90,6 +90,6 @@ def above_ground(scene: Scene, points: ArrayLike, height: float, up: ArrayLike =
     axis = int(np.argmax(np.abs(up)))
     top = box[1 if up[axis] > 0 else 0, axis]
     points[..., axis] = top + up[axis] * max(float(np.ptp(box, axis=0).max()), float(np.abs(box).max()) * 2.0**-20)
-    hits = scene.nearest(points.astype(np.float32), -up)
-    ground = points.astype(np.float32).astype(np.float64) - np.where(hits.hit, hits.t, np.nan).astype(np.float64)[..., None] * up
+    hits = scene.nearest(points, -up)
+    ground = points - np.where(hits.hit, hits.t, np.nan)[..., None] * up
     return ground + height * up

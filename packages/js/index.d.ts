@@ -98,6 +98,18 @@ export interface Scene {
     nearestStarts(starts: Starts, directions: Float32Array, tmax?: number | Float32Array): Hits;
     /** As `nearestStarts`: for each ray 1 if it hits anything, else 0. */
     anyStarts(starts: Starts, directions: Float32Array, tmax?: number | Float32Array): Uint8Array;
+    /**
+     * The closest point of the triangles to each point, with a distance of at most `radius`. Points
+     * are three numbers each, in world space; floats are taken as they are. The triangle is the one
+     * with the smallest exact distance. A distance is off by at most 2^-40 of itself plus the
+     * triangle's longest edge, and by at most 2^-28 of itself.
+     */
+    closest(points: Float32Array | Float64Array, radius?: number): Closest;
+    /**
+     * How often the closed surfaces of the scene enclose each point, decided exactly: not 0 where it
+     * lies inside. 0 for points that are not finite.
+     */
+    winding(points: Float32Array | Float64Array): Int32Array;
     /** What the search for the nearest hit of each ray visits. */
     steps(rays: Float32Array): Steps;
     /**
@@ -155,6 +167,31 @@ export class Hits<Numbers extends Float32Array | Float64Array = Float32Array> {
  * and c.
  */
 export type Starts = Pick<Hits | Hits<Float64Array>, "count" | "u" | "v" | "instance" | "triangle">;
+
+/**
+ * Closest points, in double. Where there is none, the distance is infinite, other numbers are NaN, and indices 0xffffffff: for a point
+ * that is not finite, and for a radius that is negative or NaN.
+ */
+export interface Closest {
+    readonly count: number;
+    /** Distance in world space. */
+    readonly distance: Float64Array;
+    /** The closest point in world space, 3 numbers each. */
+    readonly point: Float64Array;
+    /** Barycentric weight of the triangle's second vertex. */
+    readonly u: Float64Array;
+    /** Barycentric weight of the triangle's third vertex. */
+    readonly v: Float64Array;
+    /** Index of the instance. */
+    readonly instance: Uint32Array;
+    /** Index of the triangle in the source file. */
+    readonly triangle: Uint32Array;
+    /**
+     * Where on the triangle: 0 inside, 1 to 3 on the edge from the first, second or third vertex to
+     * the next, 4 to 6 at that vertex.
+     */
+    readonly feature: Uint32Array;
+}
 
 /** Numbers of nodes, leaves, triangles and tetrahedra that each ray visits. */
 export interface Steps {

@@ -6,6 +6,8 @@ const CHUNK = 4096;
 const RAY = 8;
 /** Columns of hits: the first three are numbers, the others indices. */
 const HIT_NAMES = ["t", "u", "v", "instance", "triangle"];
+/** Numbers of a point. */
+const POINT = 3;
 /** Columns of hits for `bth_surface`, and words of a surface. */
 const HIT_COLUMNS = 5, SURFACE_WORDS = 23;
 /** Bytes of a file at most: the module holds it in one piece, at a multiple of 64. */
@@ -154,12 +156,12 @@ class Scene {
     }
 
     nearest(rays) {
-        const count = countOf(rays, "Float32Array", "Float64Array"), numbers = numbersOf(rays);
+        const count = countOf({ rays }, RAY, "Float32Array", "Float64Array"), numbers = numbersOf(rays);
         return this.#nearest(numbers === Float64Array ? this.#wasm.bth_nearest_f64 : this.#wasm.bth_nearest, count, copied(rays), numbers);
     }
 
     any(rays) {
-        const count = countOf(rays, "Float32Array", "Float64Array"), numbers = numbersOf(rays);
+        const count = countOf({ rays }, RAY, "Float32Array", "Float64Array"), numbers = numbersOf(rays);
         return this.#any(numbers === Float64Array ? this.#wasm.bth_any_f64 : this.#wasm.bth_any, count, copied(rays), numbers);
     }
 
@@ -191,8 +193,30 @@ class Scene {
         return found;
     }
 
+    closest(points, radius = Infinity) {
+        const count = countOf({ points }, POINT, "Float32Array", "Float64Array");
+        if (typeof radius !== "number") throw new TypeError(`radius: expected a number; found ${kindOf(radius)}`);
+        const closest = new Closest(count), { rays, results } = this.#memory;
+        const { point, distance, u, v, instance, triangle, feature } = closest;
+        this.#inChunks(count, Float64Array, copied(points, POINT), (from, n) => {
+            this.#wasm.bth_closest(this.#scene, rays, n, radius, results);
+            interleave([0, 1, 2].map((k) => new Float64Array(this.#wasm.memory.buffer, results + 8 * n * k, n)), point, from);
+            this.#columns([distance, u, v, instance, triangle, feature], results + 24 * n, from, n);
+        }, POINT);
+        return closest;
+    }
+
+    winding(points) {
+        const winding = new Int32Array(countOf({ points }, POINT, "Float32Array", "Float64Array"));
+        this.#inChunks(winding.length, Float64Array, copied(points, POINT), (from, n) => {
+            this.#wasm.bth_winding(this.#scene, this.#memory.rays, n, this.#memory.results);
+            this.#columns([winding], this.#memory.results, from, n);
+        }, POINT);
+        return winding;
+    }
+
     steps(rays) {
-        const count = countOf(rays, "Float32Array");
+        const count = countOf({ rays }, RAY, "Float32Array");
         const steps = new Steps(count);
         const columns = [steps.nodes, steps.leaves, steps.triangles, steps.tets];
         this.#inChunks(count, Float32Array, copied(rays), (from, n) => {
@@ -294,12 +318,15 @@ class Scene {
         return new Float64Array(this.#wasm.memory.buffer.slice(this.#memory.numbers, this.#memory.numbers + 112));
     }
 
-    /** Copies a chunk of rays after the other to the module, and calls `trace` with the index of its first ray and its length. */
-    #inChunks(count, numbers, copy, trace) {
+    /**
+     * Copies a chunk of rays, or of points, after the other to the module, and calls `trace` with the index of its first one and its
+     * length.
+     */
+    #inChunks(count, numbers, copy, trace, width = RAY) {
         this.#open();
         for (let from = 0; from < count; from += CHUNK) {
             const n = Math.min(CHUNK, count - from);
-            copy(new numbers(this.#wasm.memory.buffer, this.#memory.rays, n * RAY), from, n);
+            copy(new numbers(this.#wasm.memory.buffer, this.#memory.rays, n * width), from, n);
             trace(from, n);
         }
     }
@@ -353,18 +380,20 @@ function numbersOf(array) {
     return classOf(array) === "Float64Array" ? Float64Array : Float32Array;
 }
 
-/** Number of rays in an array of one of these classes. */
-function countOf(rays, ...classes) {
-    if (!classes.includes(classOf(rays)) || rays.length % RAY !== 0) {
-        throw new TypeError(`rays: expected a ${classes.join(" or ")} of eight numbers a ray (origin, tmin, direction, tmax); found ${sizedKindOf(rays)}`);
+/** Number of rays or points of so many numbers in an array, which is of one of these classes. */
+function countOf(given, width, ...classes) {
+    const [[name, array]] = Object.entries(given);
+    if (!classes.includes(classOf(array)) || array.length % width !== 0) {
+        const numbers = width === RAY ? "eight numbers a ray (origin, tmin, direction, tmax)" : "three numbers a point";
+        throw new TypeError(`${name}: expected a ${classes.join(" or ")} of ${numbers}; found ${sizedKindOf(array)}`);
     }
-    if (rays.length === 0 && isDetached(rays.buffer)) throw new TypeError("rays: their buffer is detached; it was transferred");
-    return rays.length / RAY;
+    if (array.length === 0 && isDetached(array.buffer)) throw new TypeError(`${name}: their buffer is detached; it was transferred`);
+    return array.length / width;
 }
 
-/** A function that copies `n` rays from an index on to the module. */
-function copied(rays) {
-    return (to, from, n) => to.set(rays.subarray(from * RAY, (from + n) * RAY));
+/** A function that copies `n` rays, or points, from an index on to the module. */
+function copied(rays, width = RAY) {
+    return (to, from, n) => to.set(rays.subarray(from * width, (from + n) * width));
 }
 
 /** The same for rays that start on surfaces: instance, triangle, u, v, direction, tmax. */
@@ -435,6 +464,19 @@ export class Hits {
         this.v = new numbers(count);
         this.instance = new Uint32Array(count);
         this.triangle = new Uint32Array(count);
+    }
+}
+
+class Closest {
+    constructor(count) {
+        this.count = count;
+        this.distance = new Float64Array(count);
+        this.point = new Float64Array(POINT * count);
+        this.u = new Float64Array(count);
+        this.v = new Float64Array(count);
+        this.instance = new Uint32Array(count);
+        this.triangle = new Uint32Array(count);
+        this.feature = new Uint32Array(count);
     }
 }
 

@@ -9,6 +9,7 @@
 pub mod describe;
 pub mod materials;
 pub mod memory;
+pub mod points;
 pub mod queries;
 pub mod surface;
 

@@ -70,9 +70,10 @@ pub unsafe extern "C" fn bth_nearest_f64(
     unsafe { nearest(scene, rays, (hits, HIT64_WORDS * count), count, store) }
 }
 
-/// Stores the bits of element `i` of the first three columns, which have `count` numbers of f64.
-pub(crate) fn store_f64(columns: &mut [u32], count: usize, i: usize, numbers: [f64; 3]) {
-    for (k, bits) in numbers.map(f64::to_bits).into_iter().enumerate() {
+/// Stores the bits of element `i` of the first columns, which have `count` numbers of f64.
+pub(crate) fn store_f64<const N: usize>(columns: &mut [u32], count: usize, i: usize, numbers: [f64; N]) {
+    for (k, number) in numbers.into_iter().enumerate() {
+        let bits = number.to_bits();
         let at = 2 * (k * count + i);
         (columns[at], columns[at + 1]) = (bits as u32, (bits >> 32) as u32);
     }

@@ -239,6 +239,41 @@ test("rays whose numbers are floats have the hits of floats, rounded no more, ov
     }
 });
 
+test("the closest points to points in double, and how often they are enclosed", () => {
+    const scene = bth.open(readFileSync(join(folder, "triangle.bth"))), above = 2 ** -40, none = 2 ** 32 - 1;
+    const points = Float64Array.of(0.25, 0.25, above, -3, -4, 0, 0.5, -2, 0, 9, 9, 9, NaN, 0, 0);
+    const { count, distance, point, u, v, instance, triangle, feature } = scene.closest(points, 5);
+    assert.deepEqual([count, ...distance], [5, above, 5, 2, Infinity, Infinity]);
+    assert.deepEqual([...point], [0.25, 0.25, 0, 0, 0, 0, 0.5, 0, 0, ...Array(6).fill(NaN)]);
+    assert.deepEqual([[...u], [...v]], [[0.25, 0, 0.5, NaN, NaN], [0.25, 0, 0, NaN, NaN]]);
+    for (const index of [instance, triangle]) assert.deepEqual([...index], [0, 0, 0, none, none]);
+    assert.deepEqual([...feature], [0, 4, 1, none, none]);
+    assert.deepEqual([...scene.closest(points, -1).triangle], Array(5).fill(none));
+    assert.deepEqual([...scene.winding(points)], [0, 0, 0, 0, 0]);
+    const refused = (query, text) => assert.throws(query, (error) => error instanceof TypeError && text.test(error.message), String(text));
+    refused(() => scene.closest([0, 0, 0]), /^points: expected a Float32Array or Float64Array of three numbers a point; found Array of 3$/);
+    refused(() => scene.winding(new Float64Array(4)), /^points: .* found Float64Array of 4$/);
+    refused(() => scene.closest(points, "5"), /^radius: expected a number; found String$/);
+    scene.close();
+    assert.throws(() => scene.closest(points), BthError);
+    // A closed box: all points of a grid in and around it, which are more than a chunk.
+    const [model, file] = [join(folder, "box.obj"), join(folder, "box.bth")];
+    const corners = Array.from({ length: 8 }, (_, i) => `v ${8 * (i & 1)} ${8 * ((i >> 1) & 1)} ${8 * (i >> 2)}`);
+    const faces = ["1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6"];
+    writeFileSync(model, [...corners, ...faces.map((face) => `f ${face}`)].join("\n"));
+    execFileSync(BTHC, ["compile", model, "-o", file, "--quiet"]);
+    const box = bth.open(readFileSync(file)), side = 20, grid = new Float32Array(3 * side ** 3);
+    for (let i = 0; i < side ** 3; i++) grid.set([i % side, Math.floor(i / side) % side, Math.floor(i / side ** 2)].map((x) => x - 5.5), 3 * i);
+    const found = box.closest(grid), winding = box.winding(Float64Array.from(grid));
+    for (let i = 0; i < side ** 3; i++) {
+        const at = grid.subarray(3 * i, 3 * i + 3), out = at.map((x) => Math.max(0, -x, x - 8));
+        const inside = out.every((x) => x === 0), expected = inside ? Math.min(...at, ...at.map((x) => 8 - x)) : Math.hypot(...out);
+        assert.equal(winding[i], Number(inside));
+        assert.ok(Math.abs(found.distance[i] - expected) <= 2 ** -28 * expected, `${at}: ${found.distance[i]}`);
+    }
+    box.close();
+});
+
 test("damaged files are refused with the code of the specification", () => {
     const names = readdirSync(join(conformance, "invalid")).filter((name) => name.endsWith(".bth"));
     let refused = 0;
@@ -495,6 +530,7 @@ test("the types need no library but ES2022", (t) => {
             const surface: Surface = scene.surface(scene.nearestStarts(hits, Float32Array.of(1), 2));
             const wide = scene.nearest(Float64Array.of(1)), t: Float64Array = wide.t, at: Float64Array = scene.surface(wide).position;
             scene.nearestStarts(wide, Float32Array.of(1));
+            const away: Float64Array = scene.closest(t, 2).distance, turns: Int32Array = scene.winding(hits.t);
             // @ts-expect-error: steps are those of rays in float.
             scene.steps(t);
             scene.anyStarts({ count: 0, u: hits.u, v: hits.v, instance: hits.instance, triangle: hits.triangle }, hits.t, hits.t);
@@ -504,7 +540,7 @@ test("the types need no library but ES2022", (t) => {
             scene.nearest([1]);
             // @ts-expect-error: the bytes have to be awaited.
             bth.open(Promise.resolve(new ArrayBuffer(8)));
-            ${more} export { surface, at, BthError };`);
+            ${more} export { surface, at, away, turns, BthError };`);
         mkdirSync(join(folder, "bth"), { recursive: true });
         copyFileSync(types, join(folder, "bth/index.d.ts"));
         const compilerOptions = { strict: true, noEmit: true, lib: lib.split(","), types: [], target: "es2022", module: "esnext", moduleResolution: "bundler" };

@@ -33,7 +33,10 @@ def _native_floats(array):
 
 def answers(*arguments):
     """The type of the answers about these arguments: float64 if one of them is an array of it."""
-    return np.float64 if any(getattr(argument, "dtype", None) == np.float64 for argument in arguments) else np.float32
+    for argument in arguments:
+        if isinstance(argument, np.ndarray) and argument.dtype.char == "d":
+            return np.float64
+    return np.float32
 
 
 def number(value, name):

@@ -259,7 +259,6 @@ fn closest_points_are_exact() {
 }
 
 #[test]
-#[ignore = "files with exact positions are not opened yet"]
 fn closest_points_of_models_in_f64_are_exact() {
     check_closest(true);
 }
@@ -328,7 +327,6 @@ fn boxes_and_balls_overlap_exactly() {
 }
 
 #[test]
-#[ignore = "files with exact positions are not opened yet"]
 fn boxes_and_balls_overlap_models_in_f64_exactly() {
     check_overlaps(true);
 }
@@ -428,7 +426,6 @@ fn points_are_inside_of_exactly_one_of_the_solids_that_touch() {
 }
 
 #[test]
-#[ignore = "files with exact positions are not opened yet"]
 fn points_are_inside_of_models_in_f64() {
     let mut rng = Rng::new(4);
     let mut inside = 0;

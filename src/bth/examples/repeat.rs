@@ -82,7 +82,7 @@ fn bounces(scene: &bth::Scene, rays: &[Ray], reach: f32) -> Vec<StartRay> {
         let Some([a, b, c]) = hit.is_hit().then(|| scene.triangle(hit.primitive)).flatten() else { continue };
         let (u, v) = ([0, 1, 2].map(|k| b[k] - a[k]), [0, 1, 2].map(|k| c[k] - a[k]));
         let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-        let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let dot = |a: [f32; 3], b: [f64; 3]| (0..3).map(|k| f64::from(a[k]) * b[k]).sum::<f64>();
         let mut direction = rng.unit_vector().map(|x| x as f32);
         if dot(direction, normal) * dot(ray.direction, normal) > 0.0 {
             direction = direction.map(|x| -x);

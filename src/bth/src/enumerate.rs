@@ -34,7 +34,7 @@ impl<'a> EnteredInstance<'a> {
         EnteredInstance { instance, object_index, object: scene.view(object_index), scene, world }
     }
 
-    /// A point of world space in the space of the object.
+    /// A point of world space in the space of the object's source.
     pub(crate) fn point(&self, point: RoundedOrigin) -> RoundedOrigin {
         let Some(world) = self.world else { return point };
         let line = RoundedLine { origin: point, direction: [1.0, 0.0, 0.0], direction_error: 0.0 };
@@ -48,13 +48,10 @@ impl<'a> EnteredInstance<'a> {
         'a: 'r,
     {
         match self.world {
-            Some(world) => EnteredRay::InInstance(RayInInstance::new(
-                world,
-                self.scene.objects(),
-                self.instance,
-                ray,
-                tmax,
-            )),
+            Some(world) => {
+                let of_instance = RayInInstance::new(world, self.scene.objects(), self.instance, ray, tmax);
+                EnteredRay::InInstance(of_instance.relative_to(self.object.anchor))
+            }
             None if ray.wide.is_some() || ray.start.is_some_and(|of| of.instance != self.instance) => {
                 let objects = Some(self.scene.objects());
                 EnteredRay::InInstance(RayInInstance::in_world(objects, self.instance, ray, tmax))

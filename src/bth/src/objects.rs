@@ -3,7 +3,7 @@
 
 use crate::clock;
 use crate::refit::{OwnPositions, Refitted};
-use bth_format::layout::Object;
+use bth_format::layout::{Object, kind};
 use bth_format::object::ObjectView;
 use bth_format::{Code, Error, File};
 use std::time::{Duration, Instant};
@@ -15,6 +15,8 @@ pub(crate) struct Objects {
     /// For each object its own positions, boxes and leaves, if it was given new positions; shorter
     /// than the number of objects, or empty, where the others have none.
     own_positions: Vec<Option<Box<OwnPositions>>>,
+    /// True if some object has positions in f64.
+    any_exact: bool,
 }
 
 /// Where objects come from.
@@ -67,12 +69,15 @@ impl ObjectTable {
 impl Objects {
     /// All objects of a file.
     pub(crate) fn of_file(file: File) -> Objects {
-        Objects { files: Files::One(file), own_positions: Vec::new() }
+        let any_exact =
+            file.table().iter().any(|entry| entry.kind == kind::EXACT_POSITIONS && entry.count != 0);
+        Objects { files: Files::One(file), own_positions: Vec::new(), any_exact }
     }
 
     /// An empty table, to which the objects of several files can be added.
     pub(crate) fn of_several_files() -> Objects {
-        Objects { files: Files::Several(ObjectTable::default()), own_positions: Vec::new() }
+        let files = Files::Several(ObjectTable::default());
+        Objects { files, own_positions: Vec::new(), any_exact: false }
     }
 
     /// Adds the objects of another scene, with the positions in their files, to a table of several
@@ -80,6 +85,7 @@ impl Objects {
     pub(crate) fn add(&mut self, other: &Objects) {
         if let Files::Several(table) = &mut self.files {
             table.add(&other.files);
+            self.any_exact |= other.any_exact;
         }
     }
 
@@ -148,6 +154,16 @@ impl Objects {
         }
         let (file, object) = self.locate(object).expect("an object below object_count");
         file.object_header(object)
+    }
+
+    /// The origin of an object's space in the space of its source.
+    pub(crate) fn anchor(&self, object: u32) -> [f64; 3] {
+        self.locate(object).filter(|_| self.any_exact).map_or([0.0; 3], |(file, row)| file.anchor(row))
+    }
+
+    /// Returns true if some object has positions in f64.
+    pub(crate) fn any_exact(&self) -> bool {
+        self.any_exact
     }
 
     /// Returns true if reading the nodes of an object may wait for the disk: they are in a mapped

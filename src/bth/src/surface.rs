@@ -7,10 +7,10 @@
 //! names with `--names`, how materials look with `--materials`.
 
 use crate::animation::normals::corner_normal;
-use crate::intersect::point_exact::exact_normal;
 use crate::materials::{Alpha, Material, Texture, Wrap};
 use crate::rays::{Hit, PrimitiveRef};
 use crate::scene::Scene;
+use bth_format::exact::{Dyadic, dyadic_cross, dyadic_difference, dyadic_vector};
 use bth_format::layout::{
     ALPHA_BLEND, ALPHA_MASK, FILTER_NEAREST, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE, UV_SET_FIRST,
     UV_SET_SECOND, WRAP_CLAMP, WRAP_MIRROR,
@@ -61,7 +61,7 @@ pub(crate) fn surface_at(scene: &Scene, hit: &Hit) -> Option<SurfacePoint> {
     let corners = triangle(&view, id)?;
     let (u, v) = (f64::from(hit.u), f64::from(hit.v));
     let weights = [1.0 - u - v, u, v];
-    let object_position = weighted(weights, corners.map(|corner| corner.map(f64::from)));
+    let object_position = weighted(weights, corners);
     let object_geometric_normal = plane_normal(corners)?;
     let object_normal = interpolated_normal(scene, (object, id), weights, object_geometric_normal);
     let to_world = |normal: [f64; 3]| match scene.world() {
@@ -186,11 +186,14 @@ fn deformed_normals(
 
 /// The vertices of a triangle as they are traced; `None` if the file does not keep them or there is
 /// no such triangle.
-pub(crate) fn triangle(view: &ObjectView<'_>, id: u32) -> Option<[[f32; 3]; 3]> {
+pub(crate) fn triangle(view: &ObjectView<'_>, id: u32) -> Option<[[f64; 3]; 3]> {
+    if !view.exact.is_empty() {
+        return view.exact.corners(id);
+    }
     let rows = view.triangles.get(id as usize)?;
     let [a, b, c] = rows.map(|row| view.positions.get(row as usize).copied());
     let corners = [a?, b?, c?];
-    Some(view.grid.map_or(corners, |grid| corners.map(|corner| grid.nearest(corner))))
+    Some(corners.map(|corner| view.grid.map_or(corner, |grid| grid.nearest(corner)).map(f64::from)))
 }
 
 /// Bounds the error of a component of a vector product relative to its products' sizes: it has at
@@ -202,16 +205,23 @@ const CROSS_ERROR: f64 = 8.0 * f64::EPSILON;
 const NORMAL_ERROR: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// The normal of a triangle's plane; `None` for a triangle of zero area, which is never hit.
-fn plane_normal(corners: [[f32; 3]; 3]) -> Option<[f64; 3]> {
-    let [a, b, c] = corners.map(|corner| corner.map(f64::from));
+fn plane_normal([a, b, c]: [[f64; 3]; 3]) -> Option<[f64; 3]> {
     let edge = |to: [f64; 3]| [0, 1, 2].map(|k| to[k] - a[k]);
     let (e, f) = (edge(b), edge(c));
     let products = [[1, 2], [2, 0], [0, 1]].map(|[i, j]| (e[i] * f[j], e[j] * f[i]));
     let normal = products.map(|(p, q)| p - q);
-    // The products of differences of f32 neither overflow nor underflow in f64.
+    // Products of differences of coordinates neither overflow nor underflow in f64.
     let error = products.iter().fold(0.0, |most: f64, (p, q)| most.max(p.abs() + q.abs())) * CROSS_ERROR;
     let greatest = normal.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-    unit(if error <= NORMAL_ERROR * greatest { normal } else { exact_normal(corners) })
+    unit(if error <= NORMAL_ERROR * greatest { normal } else { exact_normal([a, b, c]) })
+}
+
+/// The normal of a triangle's plane, each component rounded once.
+#[cold]
+fn exact_normal(corners: [[f64; 3]; 3]) -> [f64; 3] {
+    let [a, b, c] = corners.map(dyadic_vector);
+    let normal = dyadic_cross(&dyadic_difference(&b, &a), &dyadic_difference(&c, &a));
+    normal.each_ref().map(Dyadic::to_f64)
 }
 
 /// The interpolated texture coordinates at barycentric weights.

@@ -327,7 +327,7 @@ fn hit_in_f64(scene: &Scene, ray: WorldRay<'_>, primitive: PrimitiveRef) -> Opti
     let entered = EnteredInstance::new(scene, primitive.instance);
     let of_instance = entered.ray(ray, ray.ray.tmax);
     let (exact, object) = (of_instance.exact(), entered.object);
-    let corners = corners_of(object, primitive.triangle)?.map(wide);
+    let corners = object.exact_corners(primitive.triangle, corners_of(object, primitive.triangle)?);
     let found = precise(&exact.rounded(), corners).or_else(|| match exact.line {
         LineSource::Ray => RayInInstance::in_world(None, 0, ray, ray.ray.tmax).exact(0).intersection(corners),
         LineSource::Start(start) => {

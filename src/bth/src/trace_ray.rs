@@ -9,7 +9,6 @@ use crate::object::{self, Scratch};
 use crate::query::sink::{Answers, Sink};
 use crate::rays::{Hit, Ray, Ray64, StartRay};
 use crate::scene::Scene;
-use crate::simd::Isa;
 use crate::start_points;
 use crate::starts::prepare::ENDED;
 use crate::starts::world_ray::{InstanceStart, PlacedRay, WorldRay};
@@ -117,7 +116,7 @@ impl Traced for StartRay {
         start_points::place(scene, self).map(|placed| trace(placed.world_ray()))
     }
     fn go_together(_rays: &[StartRay], _world: Option<&World>) -> bool {
-        Isa::chosen() != Isa::Scalar
+        true
     }
     fn trace_in_object(
         object: &ObjectView<'_>,
@@ -162,7 +161,7 @@ impl Traced for Ray64 {
         Some(trace(wide_ray(&self.narrow(), self)))
     }
     fn go_together(_rays: &[Ray64], world: Option<&World>) -> bool {
-        world.is_none() && Isa::chosen() != Isa::Scalar
+        world.is_none()
     }
     fn trace_in_object(
         object: &ObjectView<'_>,

@@ -118,7 +118,8 @@ impl PlacedEnd {
     fn exact(&self, scene: &Scene) -> (DyadicVector, Dyadic) {
         let start = self.start.as_ref().and_then(|start| {
             let object = scene.view(scene.object_of(start.instance));
-            let corners = start_corners(object, start.point.leaf, start.point.slot)?.map(wide);
+            let corners = start_corners(object, start.point.leaf, start.point.slot)?;
+            let corners = object.exact_corners(start.start.primitive.triangle, corners);
             let weights = [start.point.u.into(), start.point.v.into()];
             Some(image_of_start(rows(scene, start.instance).as_ref(), corners, weights))
         });
@@ -141,11 +142,12 @@ fn blocks_in(scene: &Scene, entered: &EnteredInstance<'_>, a: &PlacedEnd, b: &Pl
     let off = (from_off + to_off) * (1.0 + RATIO_ERROR) / max_norm(direction) + DIFFERENCE_ERROR;
     let line =
         RoundedLine { origin: RoundedOrigin(from, from_off), direction, direction_error: off }.or_unknown();
-    let of_object = ObjectRay::of(line, 0.0, 1.0);
+    let mut of_object = ObjectRay::of(line, 0.0, 1.0);
+    of_object.set_anchor(entered.object.anchor);
     let segment = Segment { scene, instance: entered.instance, ends: [a, b], line: of_object.line };
     let ray = ExactRay::new(&of_object.ray, LineSource::World(&segment, 0));
     let t_scale = f64::from(of_object.t_scale);
-    let bounds = of_object.line.bounds(&entered.object.bounds);
+    let bounds = of_object.line.bounds(entered.object);
     let mut blocking = Blocking { object: entered.object, segment: &segment, t_scale };
     enumerate_within(entered.object, &bounds, ray, &mut blocking)
 }
@@ -230,7 +232,9 @@ impl Blocking<'_> {
 
 impl Receiver for Blocking<'_> {
     fn receive(&mut self, triangle: TriangleRef<'_>, corners: [[f32; 3]; 3]) -> bool {
-        let Some([u, v]) = self.crossed(corners.map(wide)) else { return false };
+        let Some([u, v]) = self.crossed(self.object.exact_corners(triangle.read(), corners)) else {
+            return false;
+        };
         let opacity = self.object.opacity.is_empty();
         opacity || self.object.opacity_at(triangle.read(), u, v) != Opacity::Transparent
     }

@@ -282,9 +282,12 @@ impl File {
         };
         let grid = self.grid(header).map_err(|e| self.locate(e, object))?;
         let lines: &[CacheLine] = self.slice(object, kind::LINES);
-        let bounds = ObjectBounds::new(header);
-        let anchors: &[[f64; 3]] = self.slice(object, kind::ANCHOR);
+        let mut bounds = ObjectBounds::new(header);
         let triangles = self.slice(object, kind::TRIANGLES);
+        let exact = ExactPositions::new(self.slice(object, kind::EXACT_POSITIONS), triangles);
+        if !exact.is_empty() {
+            bounds = bounds.with_rounded_corners();
+        }
         Ok(ObjectView {
             identity: Identity::new(),
             header,
@@ -306,8 +309,8 @@ impl File {
             free_levels: self.slice(object, kind::FREE_LEVELS),
             positions: self.slice(object, kind::POSITIONS),
             triangles,
-            anchor: anchors.first().copied().unwrap_or_default(),
-            exact: ExactPositions::new(self.slice(object, kind::EXACT_POSITIONS), triangles),
+            anchor: self.anchor(object),
+            exact,
             corners: self.slice(object, kind::CORNERS),
             normals: self.slice(object, kind::NORMALS),
             uvs: self.slice(object, kind::UVS),
@@ -361,6 +364,13 @@ impl File {
     pub fn object_header(&self, object: u32) -> &Object {
         let rows: &[Object] = self.slice(object, kind::OBJECT);
         &rows[0]
+    }
+
+    /// The origin of an object's space in the space of its source: zero but next to exact
+    /// positions.
+    pub fn anchor(&self, object: u32) -> [f64; 3] {
+        let anchors: &[[f64; 3]] = self.slice(object, kind::ANCHOR);
+        anchors.first().copied().unwrap_or_default()
     }
 
     /// The instances of the scene, whose indices are not checked; empty when the file has no scene.

@@ -26,6 +26,9 @@ pub struct ObjectBounds {
     pub origin_error: f32,
     /// What the reach of a ray grows by, so that bounds of rounding errors hold `origin_error` too.
     pub origin_reach: f32,
+    /// Upper bound of how far corners in leaves are off along an axis, above 0: next to nothing
+    /// but where they are rounded.
+    pub corner_error: f32,
 }
 
 /// Half a unit in the last place of f32, relative.
@@ -65,7 +68,13 @@ impl ObjectBounds {
             padded: if greatest < GREATEST_IN_F32 { padded_in_f64 } else { greatest },
             origin_error: 0.0,
             origin_reach: 0.0,
+            corner_error: f32::MIN_POSITIVE,
         }
+    }
+
+    /// The bounds of an object whose corners in leaves are rounded to f32.
+    pub(crate) fn with_rounded_corners(self) -> ObjectBounds {
+        ObjectBounds { corner_error: self.greatest * (U * 1.01) + f32::MIN_POSITIVE, ..self }
     }
 
     /// The bounds for rays that start on the object's triangles, at points that are rounded to f32.
@@ -100,8 +109,9 @@ impl ObjectBounds {
     /// rounded direction, and by the error of the origin.
     #[inline(always)]
     pub fn for_lines(&self, farthest: f32, origin_error: f32, direction_error: f32) -> ObjectBounds {
-        // An error of the direction moves points by at most r times as much.
-        let off = origin_error + direction_error * (farthest + self.greatest);
+        // An error of the direction moves points by at most r times as much; one of a corner is an
+        // error of the origin for this corner.
+        let off = origin_error + self.corner_error + direction_error * (farthest + self.greatest);
         let (of_u, greatest) = ((off * (1.01 / U)).min(f32::MAX / 16.0), self.greatest);
         let pad = 0.19 * farthest + 0.13 * greatest + 0.25 * of_u;
         ObjectBounds {
@@ -123,6 +133,7 @@ impl ObjectBounds {
             greatest,
             padded_in_f64: greatest,
             padded: greatest,
+            corner_error: f32::MIN_POSITIVE,
             ..ObjectBounds::default()
         }
     }

@@ -126,6 +126,15 @@ impl<'a> ObjectView<'a> {
     pub fn is_deformable(&self) -> bool {
         !self.leaf_vertices.is_empty()
     }
+    /// The corners of a triangle in the source's space, given its id and its corners in a leaf.
+    #[inline(always)]
+    pub fn exact_corners(&self, id: u32, of_leaf: [[f32; 3]; 3]) -> [[f64; 3]; 3] {
+        match self.exact.corners(id) {
+            Some(corners) => corners,
+            None => of_leaf.map(|corner| corner.map(f64::from)),
+        }
+    }
+
     /// Returns true if child boxes are widened ([`WIDENED_BOXES`]).
     pub fn has_widened_boxes(&self) -> bool {
         self.header.coordinates & WIDENED_BOXES != 0

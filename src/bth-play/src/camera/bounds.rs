@@ -42,11 +42,12 @@ impl SceneBounds {
     /// The bounds of a file with one object and no scene.
     pub(super) fn of_object(scene: &Scene) -> Self {
         let view = scene.object(0);
-        let (lower, upper) = (to_f64(view.header.lower), to_f64(view.header.upper));
+        let anchor = DVec3::from(view.anchor);
+        let (lower, upper) = (anchor + to_f64(view.header.lower), anchor + to_f64(view.header.upper));
         if view.header.triangles == 0 {
             return SceneBounds { lower, upper, points: Vec::new() }.or_origin();
         }
-        let points = view.positions.iter().map(|p| to_f64(*p)).collect();
+        let points = view.positions.iter().map(|p| anchor + to_f64(*p)).collect();
         let mut bounds = SceneBounds { lower, upper, points };
         if bounds.points.is_empty() {
             bounds.add(lower, upper);

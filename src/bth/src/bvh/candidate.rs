@@ -112,8 +112,9 @@ fn settle_other<G: Goal>(
     query: &mut RayQuery<G>,
 ) -> bool {
     let Some((index, corners)) = candidate.read(object) else { return false };
-    let Some(found) = intersect(object, ray, corners, |t| query.may_matter(t)) else { return false };
     let triangle = TriangleRef::index(index, object.triangle_ids);
+    let found = intersect(object, ray, (triangle, corners), |t| query.may_matter(t));
+    let Some(found) = found else { return false };
     match ray.line {
         LineSource::World(lines, at) if let Some(range) = lines.range(at) => {
             offer_wide(object, (lines, at), range, (triangle, corners), found, query)
@@ -132,7 +133,8 @@ fn offer_wide<G: Goal>(
     mut found: Intersection,
     query: &mut RayQuery<G>,
 ) -> bool {
-    let exact_t = |corners: [[f32; 3]; 3]| Some(lines.exact(at).intersection(corners.map(wide))?.t);
+    let wide_corners = |id: u32, corners| object.exact_corners(id, corners);
+    let exact_t = |corners| Some(lines.exact(at).intersection(wide_corners(triangle.read(), corners))?.t);
     let close = |a: f64, b: f64| b.is_finite() && (a - b).abs() <= 4.0 * RATIO_ERROR * a.abs().max(b.abs());
     if close(found.t, tmin) || close(found.t, tmax) {
         found.t = exact_t(corners).unwrap_or(found.t);
@@ -145,7 +147,8 @@ fn offer_wide<G: Goal>(
         && let Some(other) = corners_of(object, best)
     {
         let line = lines.exact(at);
-        let order = line.exact_t(corners.map(wide)).zip(line.exact_t(other.map(wide)));
+        let order = line.exact_t(wide_corners(triangle.read(), corners));
+        let order = order.zip(line.exact_t(wide_corners(best, other)));
         let order = order.map_or(Ordering::Equal, |(t, of_best)| t.cmp(&of_best));
         if order.then(triangle.read().cmp(&best)) == Ordering::Less {
             query.replace(triangle, found);
@@ -160,7 +163,7 @@ fn offer_wide<G: Goal>(
 pub(crate) fn intersect(
     object: &ObjectView<'_>,
     ExactRay { ray, line, .. }: ExactRay<'_>,
-    corners: [[f32; 3]; 3],
+    (triangle, corners): (TriangleRef<'_>, [[f32; 3]; 3]),
     may_matter: impl FnOnce([f64; 2]) -> bool,
 ) -> Option<Intersection> {
     match line {
@@ -178,7 +181,22 @@ pub(crate) fn intersect(
                     .and_then(|start| decide_start_exactly(&start, wide(ray.direction), corners, &uncertain)),
             }
         }
-        LineSource::World(lines, ray) => intersect_in_world((lines, ray), corners.map(wide), may_matter),
+        LineSource::World(lines, ray) => {
+            intersect_in_world((lines, ray), corners_in_source(object, triangle, corners), may_matter)
+        }
+    }
+}
+
+/// The corners of a triangle in the source's space, given its corners in a leaf.
+#[inline(always)]
+pub(crate) fn corners_in_source(
+    object: &ObjectView<'_>,
+    triangle: TriangleRef<'_>,
+    of_leaf: [[f32; 3]; 3],
+) -> [[f64; 3]; 3] {
+    match object.exact.is_empty() {
+        true => of_leaf.map(wide),
+        false => object.exact_corners(triangle.read(), of_leaf),
     }
 }
 

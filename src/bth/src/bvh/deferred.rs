@@ -5,7 +5,7 @@ use super::leaf::RayProgress;
 use super::ray_state::RayState;
 use crate::bvh::candidate::{Candidate, Settle};
 use crate::bvh::nodes::{Leaf, LeafMemory, leaf};
-use crate::intersect::exact_lanes::{Intersections, Pairs};
+use crate::intersect::exact_lanes::{ExactCorners, Intersections, Pairs};
 use crate::intersect::exact_ray::{ExactRay, LineLanes};
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::prepare::gather_rays;
@@ -58,7 +58,13 @@ impl<S: Simd> Part<S> for Flush<'_, '_> {
         } else {
             let mut of_lanes = LineLanes::NONE;
             lines.lanes(&deferred.ray[..count], rays, &mut of_lanes);
-            intersections.compute_lines(s, all, &of_lanes, &deferred.pairs);
+            if object.exact.is_empty() {
+                intersections.compute_lines(s, all, &of_lanes, &deferred.pairs.corner);
+            } else {
+                let ids = deferred.index.map(|index| object.triangle_ids[index as usize]);
+                let triangles = ExactCorners::of(&object.exact, &ids, all);
+                intersections.compute_lines(s, all, &of_lanes, &triangles);
+            }
         }
         for lane in 0..LANES {
             if intersections.certain >> lane & 1 != 0 {

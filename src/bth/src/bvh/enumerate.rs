@@ -28,7 +28,7 @@ pub(crate) fn enumerate(object: &ObjectView<'_>, ray: ExactRay<'_>, receiver: &m
     let bounds = match ray.line {
         LineSource::Ray => &object.bounds,
         LineSource::Start(_) => &object.start_bounds,
-        LineSource::World(lines, at) => &lines.line(at).bounds(&object.bounds),
+        LineSource::World(lines, at) => &lines.line(at).bounds(object),
     };
     enumerate_within(object, bounds, ray, receiver)
 }
@@ -93,7 +93,7 @@ impl<'a> TriangleQuery for RayTriangles<'a> {
         limit: f32,
     ) -> bool {
         let PreparedRay { filter, slabs, .. } = self.prepared;
-        let found = filter.candidates(s, (block, 0), slabs.first, limit, self.bounds.origin_reach);
+        let found = filter.candidates(s, (block, 0), slabs.first, limit, self.bounds);
         found.maybe != 0 && pass_triangles(block, found.maybe, ids, self.receiver)
     }
     #[inline(always)]

@@ -83,7 +83,7 @@ pub(crate) fn enter_leaf<S: Simd, G: Goal, B: TriangleBlock>(
     let prepared = progress.prepared();
     let (first, last) = (prepared.slabs.first, progress.last());
     let own = ray.own_triangle(code);
-    let found = prepared.filter.candidates(s, (block, own), first, last, bounds.origin_reach);
+    let found = prepared.filter.candidates(s, (block, own), first, last, bounds);
     if found.maybe == 0 {
         return LeafOutcome::Nothing;
     }

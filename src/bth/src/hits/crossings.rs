@@ -3,12 +3,12 @@
 //! [`mod@crate::intersect::crossing`] is the rule that decides. `points/winding.rs` counts the
 //! crossings of rays along an axis faster.
 
+use crate::bvh::candidate::corners_in_source;
 use crate::bvh::enumerate::enumerate;
 use crate::enumerate::enumerate_instances;
 use crate::intersect::crossing::{crossing, crossing_from_start, crossing_in_world};
 use crate::intersect::exact_ray::{ExactRay, LineSource};
 use crate::intersect::start::start_on;
-use crate::intersect::vector::wide;
 use crate::query::{Receiver, TriangleRef};
 use crate::rays::Ray;
 use crate::scene::Scene;
@@ -37,13 +37,16 @@ struct CrossingCounter<'a> {
 }
 
 impl Receiver for CrossingCounter<'_> {
-    fn receive(&mut self, _triangle: TriangleRef<'_>, corners: [[f32; 3]; 3]) -> bool {
+    fn receive(&mut self, triangle: TriangleRef<'_>, corners: [[f32; 3]; 3]) -> bool {
         let ExactRay { ray, line, .. } = self.ray;
         let sign = match line {
             LineSource::Ray => crossing(ray, corners),
             LineSource::Start(point) => start_on(self.object, point)
                 .map_or(0, |start| crossing_from_start(ray, point, &start, corners)),
-            LineSource::World(lines, ray) => crossing_in_world((lines, ray), self.range, corners.map(wide)),
+            LineSource::World(lines, ray) => {
+                let corners = corners_in_source(self.object, triangle, corners);
+                crossing_in_world((lines, ray), self.range, corners)
+            }
         };
         self.found.count += sign.unsigned_abs();
         self.found.winding += sign;

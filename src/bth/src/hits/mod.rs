@@ -240,9 +240,9 @@ impl Scene {
 /// What a file keeps of the surface at a hit.
 impl Scene {
     /// The vertices of a triangle in the space of its object, as rays are tested against them: on
-    /// the grid, if the file has one. `None` if the file does not keep them (it was compiled with
+    /// the grid, if the file has one, or the positions in f64. `None` if the file does not keep them (it was compiled with
     /// `--no-geometry`), or if there is no such instance or triangle.
-    pub fn triangle(&self, primitive: PrimitiveRef) -> Option<[[f32; 3]; 3]> {
+    pub fn triangle(&self, primitive: PrimitiveRef) -> Option<[[f64; 3]; 3]> {
         surface::triangle(&self.object(surface::object_at(self, primitive)?), primitive.triangle)
     }
 
@@ -251,7 +251,7 @@ impl Scene {
     pub fn triangle_in_world(&self, primitive: PrimitiveRef) -> Option<[[f64; 3]; 3]> {
         let corners = self.triangle(primitive)?;
         let to_world = self.instance(primitive.instance).to_world;
-        Some(corners.map(|corner| surface::transformed(&to_world, corner.map(f64::from))))
+        Some(corners.map(|corner| surface::transformed(&to_world, corner)))
     }
 
     /// The surface at a hit of this scene, at the scene's time. `None` for a miss, if the file does

@@ -3,13 +3,12 @@
 
 use super::accept::Accept;
 use super::collect::{Collector, FoundHit};
-use crate::bvh::candidate::intersect;
+use crate::bvh::candidate::{corners_in_source, intersect};
 use crate::bvh::enumerate::enumerate;
 use crate::enumerate::{EnteredInstance, enumerate_instances};
 use crate::intersect::exact::{Intersection, reported};
 use crate::intersect::exact_ray::{ExactRay, LineSource};
 use crate::intersect::line::{RATIO_ERROR, widened};
-use crate::intersect::vector::wide;
 use crate::masks::Masks;
 use crate::query::{Receiver, TriangleRef, in_range, may_be_in_range};
 use crate::rays::{Hit, PrimitiveRef, Ray};
@@ -95,14 +94,14 @@ impl InstanceHits<'_> {
     }
 
     /// Returns true if t is in the range of a ray in f64; always true for others.
-    fn is_in_wide_range(&self, found: &Intersection, corners: [[f32; 3]; 3]) -> bool {
+    fn is_in_wide_range(&self, found: &Intersection, corners: impl FnOnce() -> [[f64; 3]; 3]) -> bool {
         let LineSource::World(lines, ray) = self.exact.line else { return true };
         let Some([tmin, tmax]) = lines.range(ray) else { return true };
         let off = 4.0 * RATIO_ERROR * found.t.abs();
         if found.t - tmin > off && tmax - found.t > off {
             return true;
         }
-        let exact = lines.exact(ray).intersection(corners.map(wide));
+        let exact = lines.exact(ray).intersection(corners());
         exact.is_some_and(|exact| tmin <= exact.t && exact.t <= tmax)
     }
 
@@ -130,12 +129,12 @@ impl Receiver for InstanceHits<'_> {
     fn receive(&mut self, triangle: TriangleRef<'_>, corners: [[f32; 3]; 3]) -> bool {
         let ExactRay { ray, .. } = self.exact;
         let may_matter = |t| may_be_in_range(t, ray.tmin, self.limit);
-        let found = intersect(self.object, self.exact, corners, may_matter);
+        let found = intersect(self.object, self.exact, (triangle, corners), may_matter);
         let Some(intersection) = found else { return false };
         let Some(t) = self.reported_t(intersection.t) else { return false };
         let [.., determinant] = intersection.weight;
         // A hit beyond the limit is excluded before the id is read, which is often a cache miss.
-        if !self.is_in_wide_range(&intersection, corners)
+        if !self.is_in_wide_range(&intersection, || corners_in_source(self.object, triangle, corners))
             || t > self.collector.limit()
             || !self.accept.cull.keeps(determinant)
             || !self.meets_group(triangle)

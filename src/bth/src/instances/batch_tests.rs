@@ -213,7 +213,7 @@ fn a_single_instance_in_world_space_has_the_same_hits_with_and_without_the_top_l
         let objects = Objects::of_file(file.clone());
         let identity = Affine::IDENTITY;
         let object = rng.below(u64::from(file.object_count())) as u32;
-        let parts = PartBoxes::whole(file.object_header(object));
+        let parts = PartBoxes::whole(file.object_header(object), [0.0; 3]);
         let placement = Placement::new(&identity, object, file.object_header(object), &parts).unwrap();
         // The other instances are not visible.
         let (row, count) = (case % 5, [1, 3, 40, 64][case % 4]);

@@ -2,7 +2,8 @@
 
 use super::lines::visit_ray;
 use super::placement::Placement;
-use super::scene_batch::{BatchProgress, ObjectVisits, SceneBatch};
+use super::scene_batch::{BatchProgress, ObjectVisits};
+use crate::intersect::vector::{max_norm, minus};
 use crate::nodes::affine::{ObjectRay, RayLanes};
 use crate::query::sink::Visit;
 use crate::rays::Ray;
@@ -32,19 +33,19 @@ impl ObjectRays {
     pub(super) fn fill(&mut self, of_object: &ObjectVisits<'_>, progress: BatchProgress<'_>) {
         let &ObjectVisits { batch, object, visits } = of_object;
         self.t_scale.clear();
-        let farthest = Isa::chosen().run(EnterKernel { object_rays: self, batch, visits, progress });
+        let farthest = Isa::chosen().run(EnterKernel { object_rays: self, of_object, progress });
         for (ray, visit) in self.rays.iter_mut().zip(visits) {
             if batch.starts.is_empty() {
                 break;
             }
             let Some(InstanceStart { start, point, .. }) = batch.start(*visit) else { continue };
-            ray.origin = point.rounded();
+            ray.origin = minus(point.origin.0, object.anchor).map(|x| x as f32);
             ray.tmin = free::begin(Scalar, object, start.primitive.triangle, point, ray.direction);
             if ray.tmin == f32::INFINITY {
                 *ray = ENDED;
             }
         }
-        let Farthest { in_object, error, direction_error } = farthest;
+        let Farthest { in_object, error, direction_error, .. } = farthest;
         self.bounds = object.bounds.for_lines(in_object, error, direction_error);
     }
 }
@@ -56,16 +57,23 @@ struct Farthest {
     in_object: f32,
     error: f32,
     direction_error: f32,
+    /// Max |coordinate| of the object's anchor.
+    anchor: f32,
 }
 
 impl Farthest {
+    fn of(anchor: [f64; 3]) -> Farthest {
+        Farthest { anchor: (max_norm(anchor) as f32).next_up(), ..Farthest::default() }
+    }
+
     /// Includes rays through an instance, given the max |coordinate| of their origins in world
     /// space. `rounded` are origins of starts, which f32 does not hold.
     fn include(&mut self, placement: &Placement, in_object: f32, in_world: f32, rounded: bool) {
         let error = placement.accuracy.error();
         let of_f32 = if rounded { placement.inverse.rounding_error(in_world.into()) } else { 0.0 };
         self.in_object = self.in_object.max(in_object);
-        self.error = self.error.max((f64::from(in_object) * error + of_f32) as f32);
+        self.error =
+            self.error.max(((f64::from(in_object) + f64::from(self.anchor)) * error + of_f32) as f32);
         self.direction_error = self.direction_error.max(error as f32);
     }
 }
@@ -74,8 +82,7 @@ impl Farthest {
 /// time; visits are sorted by instance.
 struct EnterKernel<'a> {
     object_rays: &'a mut ObjectRays,
-    batch: &'a SceneBatch<'a>,
-    visits: &'a [Visit],
+    of_object: &'a ObjectVisits<'a>,
     progress: BatchProgress<'a>,
 }
 
@@ -86,20 +93,21 @@ impl Kernel for EnterKernel<'_> {
     fn run<S: Simd>(self, s: S) -> Farthest {
         let EnterKernel {
             object_rays: ObjectRays { rays, t_scale, index, so_far, .. },
-            batch,
-            visits,
+            of_object: &ObjectVisits { batch, object, visits },
             progress,
         } = self;
+        let anchor = object.anchor;
         // All of them are replaced.
         rays.resize(visits.len(), NO_RAY);
         t_scale.resize(visits.len(), 1.0);
-        let (mut farthest, rounded) = (Farthest::default(), !batch.starts.is_empty());
+        let (mut farthest, rounded) = (Farthest::of(anchor), !batch.starts.is_empty());
         let by_itself = |visit: Visit, ray: &mut Ray, t_scale: &mut f32| {
             let index = visit.ray as usize;
             let (own, so_far) = (batch.rays[index].tmax, progress.tmax(index));
             // Not `f32::min`, which would replace a `tmax` of NaN by a number.
             let tmax = if so_far < own { so_far } else { own };
-            let ObjectRay { ray: of_f32, t_scale: scale, .. } = visit_ray(batch, visit, tmax).of_object;
+            let of_visit = visit_ray(batch, visit, tmax).relative_to(anchor);
+            let ObjectRay { ray: of_f32, t_scale: scale, .. } = of_visit.of_object;
             (*ray, *t_scale) = (of_f32, scale);
         };
         if !S::HAS_VECTORS {
@@ -136,7 +144,7 @@ impl Kernel for EnterKernel<'_> {
                 s.store(s.floats(words[4 + k]), &mut lanes.direction[k]);
             }
             let placement = batch.world.placement(instance);
-            placement.inverse.transform(&mut lanes);
+            placement.inverse.transform(&mut lanes, anchor);
             let (mut in_object, mut in_world) = (s.splat(0.0), s.splat(0.0));
             for k in 0..3 {
                 rows[k] = s.load(&lanes.origin[k]);

@@ -72,7 +72,8 @@ impl StartTriangle {
                 (objects.view(world.placement(start.instance).object()), of_start.rows())
             }
         };
-        let corners = start_corners(object, start.point.leaf, start.point.slot)?.map(wide);
+        let corners = start_corners(object, start.point.leaf, start.point.slot)?;
+        let corners = object.exact_corners(start.start.primitive.triangle, corners);
         let weights = [start.point.u.into(), start.point.v.into()];
         Some(StartTriangle { corners, weights, to_world })
     }
@@ -178,8 +179,14 @@ impl<'a> RayInInstance<'a> {
 
     /// The exact t at which the ray hits a triangle of the object.
     pub(crate) fn exact_t(&self, object: &ObjectView<'_>, triangle: u32) -> Option<ExactT> {
-        let corners = corners_of(object, triangle)?.map(wide);
+        let corners = object.exact_corners(triangle, corners_of(object, triangle)?);
         Some(WorldLines::exact(self, 0).exact_t(corners)?.times(f64::from(self.of_object.t_scale)))
+    }
+
+    /// The same ray with its f32 numbers relative to an object's anchor.
+    pub(crate) fn relative_to(mut self, anchor: [f64; 3]) -> Self {
+        self.of_object.set_anchor(anchor);
+        self
     }
 
     pub(crate) fn exact_ray(&self) -> ExactRay<'_> {
@@ -228,7 +235,8 @@ impl SingleRay for RayInInstance<'_> {
     #[inline(always)]
     fn line<S: Simd>(&self, s: S, object: &ObjectView<'_>) -> Option<InstanceLine> {
         let (ObjectRay { ray, line, .. }, mut tmin) = (&self.of_object, self.of_object.ray.tmin);
-        let [[x, y, z], [dx, dy, dz]] = [line.origin.0, line.direction].map(|v| v.map(|x| x as f32));
+        let origin = line.relative_to(object.anchor);
+        let [[x, y, z], [dx, dy, dz]] = [origin, line.direction].map(|v| v.map(|x| x as f32));
         if let Some(start) = self.ray.start.filter(|start| start.instance == self.instance) {
             tmin = free::begin(s, object, start.start.primitive.triangle, &start.point, [dx, dy, dz]);
             if tmin == f32::INFINITY {
@@ -239,8 +247,8 @@ impl SingleRay for RayInInstance<'_> {
         let rows = [Vec4::new(x, y, z, tmin), Vec4::new(dx, dy, dz, ray.tmax)];
         let floats = [rows[0].to_array(), rows[1].to_array()];
         let bounds = match self.ray.wide {
-            None => line.bounds(&object.bounds),
-            Some(_) => line.with_rounded_range().bounds(&object.bounds),
+            None => line.bounds(object),
+            Some(_) => line.with_rounded_range().bounds(object),
         };
         Some(InstanceLine { rows, ray: zerocopy::transmute!(floats), bounds })
     }

@@ -1,6 +1,7 @@
 //! An instance in the world: its inverse transform and a conservative world box.
 
 use crate::intersect::origin::{RoundedLine, RoundedOrigin};
+use crate::intersect::vector::dot;
 use crate::nodes::affine::{Accuracy, Affine, Inverse};
 use bth_format::error::Code;
 use bth_format::layout::{NONE, Object, WIDTH};
@@ -16,7 +17,7 @@ const ROUNDING: f64 = 1.0 / (1 << 21) as f64;
 /// The placement of a visible instance in world space.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Placement {
-    /// The transform from world space to object space.
+    /// The transform from world space to the space of the object's source.
     pub(crate) inverse: Inverse,
     /// Lower end of the world box, which includes the part of the rounding that does not depend on
     /// the ray.
@@ -34,6 +35,8 @@ const BLOCK: usize = 4;
 /// Boxes that contain all triangles of an object.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PartBoxes {
+    /// The origin of the object's space in the space of its source.
+    anchor: [f64; 3],
     /// Number of blocks in use.
     blocks: usize,
     /// For each axis the lower and the upper ends of the boxes, in blocks. Blocks are filled up
@@ -43,27 +46,29 @@ pub(crate) struct PartBoxes {
 
 impl PartBoxes {
     /// The first `count` boxes, at least one, of boxes in the layout of a node.
-    fn new(count: usize, boxes: &[[[f32; WIDTH]; 2]; 3]) -> PartBoxes {
+    fn new(count: usize, boxes: &[[[f32; WIDTH]; 2]; 3], anchor: [f64; 3]) -> PartBoxes {
         let mut bounds = [[[[0.0; BLOCK]; WIDTH / BLOCK]; 2]; 3];
         for (bounds, boxes) in bounds.as_flattened_mut().iter_mut().zip(boxes.as_flattened()) {
             for (i, value) in bounds.as_flattened_mut().iter_mut().enumerate() {
                 *value = f64::from(boxes[if i < count { i } else { 0 }]);
             }
         }
-        PartBoxes { blocks: count.div_ceil(BLOCK), bounds }
+        PartBoxes { anchor, blocks: count.div_ceil(BLOCK), bounds }
     }
 
     /// The box of the whole object.
-    pub(crate) fn whole(object: &Object) -> PartBoxes {
-        PartBoxes::new(1, &[0, 1, 2].map(|k| [[object.lower[k]; WIDTH], [object.upper[k]; WIDTH]]))
+    pub(crate) fn whole(object: &Object, anchor: [f64; 3]) -> PartBoxes {
+        let boxes = [0, 1, 2].map(|k| [[object.lower[k]; WIDTH], [object.upper[k]; WIDTH]]);
+        PartBoxes::new(1, &boxes, anchor)
     }
 
     /// The boxes of the root's children if the object has a root node, else its box.
     pub(crate) fn of_root_children(object: &ObjectView<'_>) -> PartBoxes {
-        let Some(node) = object.root() else { return PartBoxes::whole(object.header) };
+        let whole = || PartBoxes::whole(object.header, object.anchor);
+        let Some(node) = object.root() else { return whole() };
         match node.child.iter().take_while(|code| **code != NONE).count() {
-            0 => PartBoxes::whole(object.header),
-            used => PartBoxes::new(used, &node.bounds),
+            0 => whole(),
+            used => PartBoxes::new(used, &node.bounds, object.anchor),
         }
     }
 
@@ -94,6 +99,11 @@ impl PartBoxes {
             greatest.into_iter().fold(f64::NEG_INFINITY, f64::max),
         ]
     }
+}
+
+/// The sum of the |products| of components.
+fn size(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (a[0] * b[0]).abs() + (a[1] * b[1]).abs() + (a[2] * b[2]).abs()
 }
 
 /// Reason why an instance cannot be placed.
@@ -131,7 +141,8 @@ impl Placement {
     /// in the maximum norm.
     ///
     /// `parts` are boxes that contain all triangles of the object. Tighter boxes give a tighter
-    /// world box.
+    /// world box. Where they have an anchor, T is its image; |T| is then a bound that includes the
+    /// anchor. What rounding has moved vertices by, at most 2^-24 b, is in the constant, too.
     #[inline(never)]
     pub(crate) fn new(
         world: &Affine,
@@ -159,7 +170,7 @@ impl Placement {
         for k in 0..3 {
             let ends = f64::from(object.lower[k].abs().max(object.upper[k].abs()));
             greatest = if ends > greatest { ends } else { greatest };
-            let translation = world.translation[k].abs();
+            let translation = world.translation[k].abs() + size(world.linear[k], parts.anchor);
             far = if translation > far { translation } else { far };
         }
         let pad = ROUNDING * (condition * far + world.norm() * greatest);
@@ -172,8 +183,9 @@ impl Placement {
         };
         for k in 0..3 {
             let [lower, upper] = parts.extent_along(world.linear[k]);
-            placement.lower[k] = ((world.translation[k] + lower - pad) as f32).next_down();
-            placement.upper[k] = ((world.translation[k] + upper + pad) as f32).next_up();
+            let origin = world.translation[k] + dot(world.linear[k], parts.anchor);
+            placement.lower[k] = ((origin + lower - pad) as f32).next_down();
+            placement.upper[k] = ((origin + upper + pad) as f32).next_up();
         }
         let mut finite = true;
         for k in 0..3 {
@@ -231,7 +243,7 @@ mod tests {
                     object.upper[k] = object.upper[k].max(boxes[k][1][i]);
                 }
             }
-            let parts = PartBoxes::new(count, &boxes);
+            let parts = PartBoxes::new(count, &boxes, [0.0; 3]);
             let mut numbers = [0.0; 10];
             numbers.iter_mut().for_each(|x| *x = unit());
             let world = Affine::from_parts(&numbers);
@@ -244,7 +256,7 @@ mod tests {
                 };
                 assert!((0..3).all(holds), "case {case}, part {i}: {point:?}, {placement:?}");
             }
-            let whole = Placement::new(&world, 0, &object, &PartBoxes::whole(&object)).unwrap();
+            let whole = Placement::new(&world, 0, &object, &PartBoxes::whole(&object, [0.0; 3])).unwrap();
             for k in 0..3 {
                 assert!(whole.lower[k] <= placement.lower[k] && placement.upper[k] <= whole.upper[k]);
                 tighter += u32::from(whole.lower[k] < placement.lower[k]);

@@ -8,7 +8,6 @@ use crate::object::{self, Scratch};
 use crate::query::better;
 use crate::query::sink::{Answers, SceneRays, Sink};
 use crate::rays::Hit;
-use crate::simd::Isa;
 use bth_format::object::ObjectView;
 
 /// A query over the rays of a batch. The kernels are compiled once for all.
@@ -23,8 +22,7 @@ pub(super) trait SceneQuery {
     fn trace_placed(&mut self, of_object: ObjectVisits<'_>, object_rays: &ObjectRays);
     /// Traces visits, given memory for their rays in the space of the object.
     fn trace(&mut self, of_object: ObjectVisits<'_>, object_rays: &mut ObjectRays) {
-        // Scalar code has no batches of lines.
-        if of_object.visits.len() < object::MIN_BATCH || Isa::chosen() == Isa::Scalar {
+        if of_object.visits.len() < object::MIN_BATCH {
             return self.trace_one_by_one(of_object);
         }
         object_rays.fill(&of_object, self.progress());

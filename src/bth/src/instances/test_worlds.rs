@@ -50,7 +50,7 @@ pub(super) fn world(file: &File, rng: &mut Rng, count: usize) -> (World, Vec<Aff
         // Both kinds of boxes are tested.
         let parts = match object % 2 {
             0 => PartBoxes::of_root_children(&file.object(object).unwrap()),
-            _ => PartBoxes::whole(file.object_header(object)),
+            _ => PartBoxes::whole(file.object_header(object), [0.0; 3]),
         };
         Placement::new(transform, object, file.object_header(object), &parts).ok()
     };

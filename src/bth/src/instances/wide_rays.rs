@@ -47,7 +47,7 @@ pub(crate) fn trace_wide(
         }
         let origin = RoundedOrigin([farthest; 3], 0.0);
         let line = RoundedLine { origin, direction: [1.0; 3], direction_error: 0.0 };
-        let object = ObjectView { bounds: line.with_rounded_range().bounds(&object.bounds), ..*object };
+        let object = ObjectView { bounds: line.with_rounded_range().bounds(object), ..*object };
         let sink = Sink::new(object.triangle_ids, answers.reborrow(), instance);
         let mut sink = sink.with_lines(Lines::World(&lines, 0));
         object::trace_batch(&object, &narrow, None, scratch, &mut sink.part(first));

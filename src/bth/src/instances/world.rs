@@ -1,6 +1,7 @@
 //! The instances of a scene, as queries see them. A file with scene sections ([`super::by_file`])
 //! or the caller of a scene builder ([`super::by_caller`]) places them.
 
+use super::by_caller::NewInstance;
 use super::placement::{PartBoxes, Placement, PlacementError};
 use super::top_level::TopLevel;
 use crate::animation::Animation;
@@ -114,6 +115,22 @@ impl World {
         world
     }
 
+    /// An instance of each object, in its place. It has the index of the object.
+    ///
+    /// # Errors
+    /// `BTH-S002` if the box of an object is not finite.
+    pub(crate) fn of_objects_in_place(objects: &Objects) -> Result<World, Error> {
+        let (mut world, all) = (World::empty(), (0..objects.count()).collect::<Vec<_>>());
+        world.add_objects(objects.count());
+        let in_place = |object| {
+            let row = InstanceRow { object, node: NONE, to_world: Affine::IDENTITY };
+            NewInstance { row, visible: true }
+        };
+        let changed = world.change(objects, all.len(), &all, &in_place);
+        changed.map_err(|failed| failed.error(&format!("object {}", failed.instance)))?;
+        Ok(world)
+    }
+
     /// No instances yet; the caller will place them.
     pub(crate) fn empty() -> World {
         World::unplaced(TransformSource::Caller(CallerInstances::default()), 0.0, 0, 0)
@@ -176,7 +193,7 @@ impl World {
             None => match objects.unchecked_view(object).filter(|_| self.is_in_memory(objects, object)) {
                 Some(view) => cached.get_or_init(|| Box::new(PartBoxes::of_root_children(view))),
                 None => {
-                    whole = PartBoxes::whole(header);
+                    whole = PartBoxes::whole(header, objects.anchor(object));
                     &whole
                 }
             },
@@ -288,7 +305,8 @@ impl World {
         self.placements[instance as usize].as_ref()?;
         let InstanceRow { object, to_world, .. } = self.row(objects, instance);
         let header = objects.header(object);
-        let placement = Placement::new(&to_world, object, header, &PartBoxes::whole(header)).ok()?;
+        let whole = PartBoxes::whole(header, objects.anchor(object));
+        let placement = Placement::new(&to_world, object, header, &whole).ok()?;
         Some((placement.lower, placement.upper))
     }
 

@@ -18,7 +18,8 @@
 //!
 //! **Error of a depth.** A change of the three weights by e each changes the depth by at most
 //! 3e·range/(|sum| - 3e), where `range` is the range of the corners' depths, and never moves it out
-//! of that range. The roundings of the depth itself stay below 8u of the largest |depth|.
+//! of that range. The roundings of the depth itself stay below 8u of the largest |depth|. An error
+//! of a corner moves the depth by at most as much, besides what it adds to the errors of weights.
 
 use crate::simd::Lanewise;
 
@@ -100,17 +101,18 @@ pub(super) struct Sides<S: Lanewise> {
     pub(super) certain: S::M,
 }
 
-/// Tests sixteen triangles for hits at depths from `first` to `limit`. `error` bounds the error of
-/// the weights, see the head of this file.
+/// Tests sixteen triangles for hits in a range of depths. `error` bounds the error of the weights,
+/// see the head of this file, and `corner_error` is taken from the
+/// [bounds](bth_format::object::ObjectBounds::corner_error) of the object.
 #[inline(always)]
 pub(crate) fn test_triangles<S: Lanewise>(
     s: S,
     corners: Corners<S>,
     error: S::F,
-    first: S::F,
-    limit: S::F,
+    range: [S::F; 2],
+    corner_error: f32,
 ) -> FilteredTriangles<S> {
-    sides(s, &corners, error).bound_depths(s, &corners, first, limit)
+    sides(s, &corners, error).bound_depths(s, &corners, range, corner_error)
 }
 
 /// The sides on which lines pass the edges of triangles; `error` bounds the error of the weights.
@@ -145,8 +147,8 @@ impl<S: Lanewise> Sides<S> {
         self,
         s: S,
         [a, b, c]: &Corners<S>,
-        first: S::F,
-        limit: S::F,
+        [first, limit]: [S::F; 2],
+        corner_error: f32,
     ) -> FilteredTriangles<S> {
         let Sides { weight, error, missed, certain } = self;
         let least_depth = s.min(s.min(a[2], b[2]), c[2]);
@@ -164,7 +166,7 @@ impl<S: Lanewise> Sides<S> {
         let shift = s.min(shift, range);
         let depth = s.fma(barycentric[2], c[2], s.fma(barycentric[1], b[2], s.mul(barycentric[0], a[2])));
         let slack =
-            s.fma(s.max_abs(least_depth, greatest_depth), s.splat(DEPTH_SLACK), s.splat(f32::MIN_POSITIVE));
+            s.fma(s.max_abs(least_depth, greatest_depth), s.splat(DEPTH_SLACK), s.splat(corner_error));
         let nearest = s.sub(s.select(certain, s.sub(depth, shift), least_depth), slack);
         let farthest = s.add(s.select(certain, s.add(depth, shift), greatest_depth), slack);
         let out = s.or(s.lt(farthest, first), s.lt(limit, nearest));

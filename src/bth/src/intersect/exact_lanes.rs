@@ -8,6 +8,7 @@ use crate::intersect::exact_ray::LineLanes;
 use crate::intersect::origin::Origin;
 use crate::intersect::vector::max_norm;
 use crate::simd::{LANES, Simd};
+use bth_format::object::ExactPositions;
 
 /// A number of each of sixteen rays or triangles.
 pub(crate) type F32Lanes = [f32; LANES];
@@ -29,6 +30,48 @@ impl Pairs {
         Pairs { origin: [[0.0; LANES]; 3], direction: [[0.0; LANES]; 3], corner: [[[0.0; LANES]; 3]; 3] };
 }
 
+/// Corners of sixteen triangles.
+pub(crate) trait CornerLanes {
+    /// The corners of lane `i`.
+    fn corners(&self, i: usize) -> [[f64; 3]; 3];
+}
+
+/// As leaves have them: `[corner][axis]`.
+impl CornerLanes for [[F32Lanes; 3]; 3] {
+    #[inline(always)]
+    fn corners(&self, i: usize) -> [[f64; 3]; 3] {
+        [lane(&self[0], i), lane(&self[1], i), lane(&self[2], i)]
+    }
+}
+
+/// As the source of an object has them.
+pub(crate) struct ExactCorners([[[f64; LANES]; 3]; 3]);
+
+impl ExactCorners {
+    /// The corners of the triangles with these ids, of those lanes whose bit is set.
+    pub(crate) fn of(exact: &ExactPositions<'_>, ids: &[u32; LANES], mut lanes: u32) -> ExactCorners {
+        let mut rows = [[[0.0; LANES]; 3]; 3];
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize % LANES;
+            lanes &= lanes - 1;
+            let corners = exact.corners(ids[lane]).unwrap_or_default();
+            for (rows, corner) in rows.iter_mut().zip(corners) {
+                for k in 0..3 {
+                    rows[k][lane] = corner[k];
+                }
+            }
+        }
+        ExactCorners(rows)
+    }
+}
+
+impl CornerLanes for ExactCorners {
+    #[inline(always)]
+    fn corners(&self, i: usize) -> [[f64; 3]; 3] {
+        self.0.each_ref().map(|[x, y, z]| [x[i], y[i], z[i]])
+    }
+}
+
 /// Numbers in [`OriginTerms`].
 const TERMS: usize = 11;
 
@@ -42,16 +85,14 @@ pub(crate) struct OriginTermsLanes {
 impl OriginTermsLanes {
     pub(crate) const NONE: OriginTermsLanes = OriginTermsLanes { rows: [[0.0; LANES]; TERMS] };
 
-    /// Computes the terms of the first `count` triangles, whose corners are `[corner][axis]`, and
-    /// of those that complete a half.
+    /// Computes the terms of the first `count` triangles, and of those that complete a half.
     #[inline(always)]
-    pub(crate) fn compute(&mut self, origin: impl Origin, corner: &[[F32Lanes; 3]; 3], count: usize) {
+    pub(crate) fn compute(&mut self, origin: impl Origin, triangles: &impl CornerLanes, count: usize) {
         const HALF: usize = LANES / 2;
         for first in (0..count.min(LANES)).step_by(HALF) {
             for i in first..first + HALF {
-                let corners = [lane(&corner[0], i), lane(&corner[1], i), lane(&corner[2], i)];
                 let OriginTerms { normal, second, third, volume, min_determinant } =
-                    OriginTerms::new(origin, corners);
+                    OriginTerms::new(origin, triangles.corners(i));
                 for k in 0..3 {
                     (self.rows[k][i], self.rows[3 + k][i], self.rows[6 + k][i]) =
                         (normal[k], second[k], third[k]);
@@ -115,7 +156,7 @@ impl Intersections {
         let mut accurate = [0; LANES];
         // There are no branches in this loop, so that the compiler vectorizes it.
         for i in 0..LANES {
-            let corners = [lane(&corner[0], i), lane(&corner[1], i), lane(&corner[2], i)];
+            let corners = corner.corners(i);
             let direction = lane(direction, i);
             let terms = OriginTerms::new(lane(origin, i), corners);
             let rounded = RoundedIntersection::new(&terms, direction, max_norm(direction));
@@ -124,17 +165,20 @@ impl Intersections {
         self.set_masks(s, lanes, &accurate);
     }
 
-    /// Like [`Self::compute`], for lines that f64 may not hold exactly; of `pairs` only the corners
-    /// are read.
+    /// Like [`Self::compute`], for lines that f64 may not hold exactly.
     #[inline(always)]
-    pub(crate) fn compute_lines<S: Simd>(&mut self, s: S, lanes: u32, lines: &LineLanes, pairs: &Pairs) {
-        let Pairs { corner, .. } = pairs;
+    pub(crate) fn compute_lines<S: Simd>(
+        &mut self,
+        s: S,
+        lanes: u32,
+        lines: &LineLanes,
+        triangles: &impl CornerLanes,
+    ) {
         let mut accurate = [0; LANES];
         // There are no branches in this loop, so that the compiler vectorizes it.
         for i in 0..LANES {
-            let corners = [lane(&corner[0], i), lane(&corner[1], i), lane(&corner[2], i)];
             let line = lines.get(i);
-            let terms = OriginTerms::new(line, corners);
+            let terms = OriginTerms::new(line, triangles.corners(i));
             let rounded = RoundedIntersection::new(&terms, line.direction, max_norm(line.direction));
             self.store_lane(i, &rounded, &mut accurate);
         }
@@ -202,7 +246,7 @@ impl Estimates {
         let (mut rows, mut certain) = ([[0.0; LANES]; 4], [0; LANES]);
         // There are no branches in this loop, so that the compiler vectorizes it.
         for i in 0..LANES {
-            let corners = [lane(&corner[0], i), lane(&corner[1], i), lane(&corner[2], i)];
+            let corners = corner.corners(i);
             let (Intersection { t, weight }, is_certain) =
                 certain_intersection(lane(origin, i), lane(direction, i), corners);
             certain[i] = u32::from(is_certain);

@@ -274,8 +274,7 @@ impl TriangleFilter {
     }
 
     /// The triangles of a leaf that may be hit at a depth between `first` and `limit`, without
-    /// those whose bits are set in `left_out`. `origin_reach` is taken from the
-    /// [bounds](ObjectBounds::origin_reach) for which the ray was prepared.
+    /// those whose bits are set in `left_out`. `bounds` are those for which the ray was prepared.
     #[inline(always)]
     pub(crate) fn candidates<S: Simd, B: TriangleBlock>(
         &self,
@@ -283,10 +282,10 @@ impl TriangleFilter {
         (block, left_out): (&B, u32),
         first: f32,
         limit: f32,
-        origin_reach: f32,
+        bounds: &ObjectBounds,
     ) -> Candidates<S> {
         let triangles = valid_triangles(block) & !left_out;
-        CandidatesOf { filter: self, block, triangles, first, limit, origin_reach }.inline_or_call(s)
+        CandidatesOf { filter: self, block, triangles, first, limit, bounds }.inline_or_call(s)
     }
 
     /// The sides on which the ray passes the edges of triangles.
@@ -321,9 +320,10 @@ impl TriangleFilter {
         s: S,
         sides: Sides<S>,
         corners: &Corners<S>,
-        (first, limit): (f32, f32),
+        range: [f32; 2],
+        corner_error: f32,
     ) -> FilteredTriangles<S> {
-        let tested = sides.bound_depths(s, corners, s.splat(first), s.splat(limit));
+        let tested = sides.bound_depths(s, corners, [s.splat(range[0]), s.splat(range[1])], corner_error);
         let in_range =
             s.and(s.le(s.splat(self.first), tested.nearest), s.le(tested.farthest, s.splat(self.last)));
         FilteredTriangles { certain: s.and(tested.certain, in_range), ..tested }
@@ -338,20 +338,20 @@ struct CandidatesOf<'a, B> {
     triangles: u32,
     first: f32,
     limit: f32,
-    origin_reach: f32,
+    bounds: &'a ObjectBounds,
 }
 
 impl<S: Simd, B: TriangleBlock> Part<S> for CandidatesOf<'_, B> {
     type Output = Candidates<S>;
     #[inline(always)]
     fn run(self, s: S) -> Candidates<S> {
-        let CandidatesOf { filter, block, triangles: valid, first, limit, origin_reach } = self;
+        let CandidatesOf { filter, block, triangles: valid, first, limit, bounds } = self;
         if S::PIECES == 1 {
             let corners = block.project(s, filter);
             let mut sides = filter.sides(s, &corners);
             let mut crossed = valid & !s.mask_bits(sides.missed);
             if crossed & !s.mask_bits(sides.certain) != 0 {
-                sides = filter.closer(s, sides, &corners, origin_reach);
+                sides = filter.closer(s, sides, &corners, bounds.origin_reach);
                 crossed &= !s.mask_bits(sides.missed);
             }
             // In most leaves that a ray enters, all triangles are missed: then depths need not be
@@ -365,7 +365,7 @@ impl<S: Simd, B: TriangleBlock> Part<S> for CandidatesOf<'_, B> {
                     farthest: sides.error,
                 };
             }
-            let tested = filter.bound_depths(s, sides, &corners, (first, limit));
+            let tested = filter.bound_depths(s, sides, &corners, [first, limit], bounds.corner_error);
             let maybe = valid & !s.mask_bits(tested.excluded);
             let sure = maybe & s.mask_bits(tested.certain);
             let FilteredTriangles { nearest, farthest, .. } = tested;
@@ -382,13 +382,13 @@ impl<S: Simd, B: TriangleBlock> Part<S> for CandidatesOf<'_, B> {
             let corners = block.project_piece(p, filter, points.as_ref());
             let mut sides = filter.sides(p, &corners);
             if valid & !p.mask_bits(p.or(sides.missed, sides.certain)) != 0 {
-                sides = filter.closer(p, sides, &corners, origin_reach);
+                sides = filter.closer(p, sides, &corners, bounds.origin_reach);
             }
             if valid & !p.mask_bits(sides.missed) == 0 {
                 continue;
             }
             crossed |= valid & !p.mask_bits(sides.missed);
-            let tested = filter.bound_depths(p, sides, &corners, (first, limit));
+            let tested = filter.bound_depths(p, sides, &corners, [first, limit], bounds.corner_error);
             maybe |= valid & !p.mask_bits(tested.excluded);
             sure |= valid & p.mask_bits(tested.certain);
             p.store(tested.nearest, &mut nearest);

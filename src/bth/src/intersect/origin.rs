@@ -1,8 +1,8 @@
 //! Origins and lines of rays in f64, as far as they are known there.
 
-use super::vector::{max_norm, wide};
+use super::vector::{max_norm, minus, wide};
 use crate::rays::Ray;
-use bth_format::object::ObjectBounds;
+use bth_format::object::{ObjectBounds, ObjectView};
 
 /// The origin of a ray in f64, as far as it is known there.
 pub(crate) trait Origin: Copy {
@@ -44,7 +44,7 @@ impl Origin for RoundedOrigin {
     }
 }
 
-/// A line that was rounded to f64.
+/// A line that was rounded to f64: in world space, or in the space of an object's source.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RoundedLine {
     pub(crate) origin: RoundedOrigin,
@@ -101,10 +101,17 @@ impl RoundedLine {
     }
 
     /// The bounds for which the ray of f32 is prepared that approximates this line in the space of
-    /// an object with bounds `of`.
+    /// an object.
     #[inline(always)]
-    pub(crate) fn bounds(&self, of: &ObjectBounds) -> ObjectBounds {
-        of.for_lines(max_norm(self.origin.0) as f32, self.origin.1 as f32, self.direction_error as f32)
+    pub(crate) fn bounds(&self, object: &ObjectView<'_>) -> ObjectBounds {
+        let farthest = max_norm(self.relative_to(object.anchor));
+        object.bounds.for_lines(farthest as f32, self.origin.1 as f32, self.direction_error as f32)
+    }
+
+    /// The origin relative to the origin of an object's space in the space of its source.
+    #[inline(always)]
+    pub(crate) fn relative_to(&self, anchor: [f64; 3]) -> [f64; 3] {
+        minus(self.origin.0, anchor)
     }
 
     /// The same line; f64 decides nothing about it where products could leave its range.

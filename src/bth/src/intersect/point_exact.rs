@@ -40,13 +40,6 @@ pub(super) fn volume(point: [f32; 3], corners: [[f32; 3]; 3]) -> f64 {
     sum.value()
 }
 
-/// The normal (b - a) × (c - a) of a triangle, each component exact but for one rounding.
-#[cold]
-#[inline(never)]
-pub(crate) fn exact_normal(corners: [[f32; 3]; 3]) -> [f64; 3] {
-    ExactTriangle::new(corners).normal()
-}
-
 /// A triangle with its exact normal.
 pub(super) struct ExactTriangle {
     corners: [[f64; 3]; 3],

@@ -291,7 +291,7 @@ impl RayLanes {
         RayLanes { origin: [[0.0; LANES]; 3], direction: [[0.0; LANES]; 3], unscaled: [0; LANES] };
 }
 
-/// A ray in an object's space.
+/// A ray in the space of an object's source.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ObjectRay {
     /// Each number rounded to f32.
@@ -313,6 +313,11 @@ impl ObjectRay {
             return ObjectRay { ray: Ray { origin, direction, tmin, tmax }, line, t_scale: 1.0 };
         }
         ObjectRay::scaled(line, origin, exponent, [tmin, tmax])
+    }
+
+    /// Makes the origin in f32 relative to an object's anchor.
+    pub(crate) fn set_anchor(&mut self, anchor: [f64; 3]) {
+        self.ray.origin = self.line.relative_to(anchor).map(|x| x as f32);
     }
 
     /// The ray where its direction must be scaled.
@@ -429,10 +434,11 @@ impl Inverse {
         RoundedOrigin(world, 1.01 * error + max_norm(world) * ROUNDINGS)
     }
 
-    /// Like [`Self::line`] and [`ObjectRay::of`] for sixteen rays of f32, rounded to f32. The
-    /// results of lanes that are not `unscaled` are not valid.
+    /// Like [`Self::line`] and [`ObjectRay::of`] for sixteen rays of f32, rounded to f32, with
+    /// origins relative to an object's anchor. The results of lanes that are not `unscaled` are not
+    /// valid.
     #[inline(always)]
-    pub(crate) fn transform(&self, lanes: &mut RayLanes) {
+    pub(crate) fn transform(&self, lanes: &mut RayLanes, anchor: [f64; 3]) {
         let RayLanes { origin, direction, unscaled } = lanes;
         let Inverse { linear, origin: object_origin, .. } = *self;
         // There are no branches, so that the loop is vectorized.
@@ -445,7 +451,7 @@ impl Inverse {
             let mut greatest = 0.0;
             for k in 0..3 {
                 let component = dot(linear[k], world_direction);
-                origin[k][i] = dot(linear[k], relative) as f32;
+                origin[k][i] = (dot(linear[k], relative) - anchor[k]) as f32;
                 direction[k][i] = component as f32;
                 greatest = if component.abs() > greatest { component.abs() } else { greatest };
             }

@@ -158,7 +158,7 @@ fn sixteen_rays_at_once_are_the_same_to_the_bit() {
             }
             expected.push(of_object(&inverse, accuracy, &ray));
         }
-        inverse.transform(&mut lanes);
+        inverse.transform(&mut lanes, [0.0; 3]);
         for (lane, ObjectRay { ray, t_scale, .. }) in expected.into_iter().enumerate() {
             let finite = ray.direction.iter().all(|x| x.is_finite());
             assert!(lanes.unscaled[lane] == 0 || t_scale == 1.0 && finite, "{ray:?}");

@@ -2,7 +2,7 @@
 //! interleaved through the BVH. An object that is one special leaf is entered without it.
 
 use super::scratch::Scratch;
-use super::{any, nearest};
+use super::single::{RayOfBatch, any_in_scalar, nearest_in_scalar};
 use crate::bvh::interleaved::Interleaved;
 use crate::bvh::nodes::is_large;
 use crate::bvh::packet::{MinimumUse, Packets};
@@ -35,7 +35,8 @@ pub(crate) fn trace_batch(
     }
     // Packets and interleaved rays are not compiled for scalar code, where they would be the
     // largest part of the library.
-    if Isa::chosen() == Isa::Scalar {
+    let isa = Isa::chosen();
+    if isa == Isa::Scalar {
         return one_by_one(object, rays, order, sink);
     }
     let (lines, mut with_starts) = (sink.lines(), None);
@@ -46,15 +47,15 @@ pub(crate) fn trace_batch(
     };
     if order.is_some() {
         // Too few rays are left of most packets.
-        through_bvh(object, rays, order, scratch, sink);
+        through_bvh(isa, object, rays, order, (scratch, sink));
     } else if let (Some(leaf), true) = (shortcuts::whole(object), lines.are_rays()) {
-        through_leaf(object, leaf, rays, scratch, sink);
+        through_leaf(isa, object, leaf, rays, (scratch, sink));
     } else {
-        let packet_rays = in_packets(object, rays, scratch, sink);
+        let packet_rays = in_packets(isa, object, rays, scratch, sink);
         if packet_rays < rays.len() {
             let rest = std::mem::take(&mut scratch.packets.rest);
             let order = (packet_rays > 0).then_some(&rest[..]);
-            through_bvh(object, rays, order, scratch, sink);
+            through_bvh(isa, object, rays, order, (scratch, sink));
             scratch.packets.rest = rest;
         }
     }
@@ -64,18 +65,18 @@ pub(crate) fn trace_batch(
 #[cold]
 #[inline(never)]
 fn through_leaf(
+    isa: Isa,
     object: &ObjectView<'_>,
     leaf: SpecialLeaf,
     rays: &[Ray],
-    scratch: &mut Scratch,
-    sink: &mut Sink<'_>,
+    (scratch, sink): (&mut Scratch, &mut Sink<'_>),
 ) {
     let mut special = std::mem::take(&mut scratch.special);
     for (part, rays) in rays.chunks(RAYS_PER_PART).enumerate() {
         let sink = &mut sink.part(part * RAYS_PER_PART);
         leaf.trace(object, rays, &mut special, sink);
         if !special.rest.is_empty() {
-            through_bvh(object, rays, Some(&special.rest), scratch, sink);
+            through_bvh(isa, object, rays, Some(&special.rest), (scratch, sink));
         }
     }
     scratch.special = special;
@@ -83,8 +84,14 @@ fn through_leaf(
 
 /// Traces coherent rays in packets and returns their number. If it is not 0, the indices of the
 /// other rays are stored in `scratch.packets.rest`.
-fn in_packets(object: &ObjectView<'_>, rays: &[Ray], scratch: &mut Scratch, sink: &mut Sink<'_>) -> usize {
-    let (isa, least, scratch) = (Isa::chosen(), MinimumUse::of(object), &mut scratch.packets);
+fn in_packets(
+    isa: Isa,
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    scratch: &mut Scratch,
+    sink: &mut Sink<'_>,
+) -> usize {
+    let (least, scratch) = (MinimumUse::of(object), &mut scratch.packets);
     with_batch_goal!(isa, sink.goal(), goal => {
         isa.run(Packets { object, rays, scratch, least, goal, sink }).rays
     })
@@ -92,26 +99,26 @@ fn in_packets(object: &ObjectView<'_>, rays: &[Ray], scratch: &mut Scratch, sink
 
 /// Traces rays through the BVH, interleaved.
 fn through_bvh(
+    isa: Isa,
     object: &ObjectView<'_>,
     rays: &[Ray],
     order: Option<&[u32]>,
-    scratch: &mut Scratch,
-    sink: &mut Sink<'_>,
+    (scratch, sink): (&mut Scratch, &mut Sink<'_>),
 ) {
-    let (isa, stacks, entry_nodes) = (Isa::chosen(), &mut scratch.stacks, is_large(object));
+    let (stacks, entry_nodes) = (&mut scratch.stacks, is_large(object));
     with_batch_goal!(isa, sink.goal(), goal => {
         isa.run(Interleaved { object, rays, order, stacks, sink, goal, entry_nodes });
     });
 }
 
-/// Implements [`trace_batch`] in scalar code, one ray after the other. Without vectors no batch has
-/// starts.
+/// Implements [`trace_batch`] in scalar code, one ray after the other.
 fn one_by_one(object: &ObjectView<'_>, rays: &[Ray], order: Option<&[u32]>, sink: &mut Sink<'_>) {
-    let is_any = sink.goal().is_any;
+    let (is_any, lines) = (sink.goal().is_any, sink.lines());
     let trace = |index: usize, sink: &mut Sink<'_>| {
+        let ray = RayOfBatch { ray: &rays[index], line: lines.of(index) };
         if !is_any {
-            sink.answer(index, nearest(object, &rays[index], sink.instance_of(index)));
-        } else if any(object, &rays[index]) {
+            sink.answer(index, nearest_in_scalar(object, &ray, sink.instance_of(index)));
+        } else if any_in_scalar(object, &ray) {
             sink.accepted(index);
         }
     };

@@ -6,10 +6,10 @@ use crate::bvh::single_stack::SingleStack;
 use crate::intersect::exact_ray::{ExactRay, LineSource};
 use crate::intersect::prepare::PreparedRay;
 use crate::intersect::start_point::StartPoint;
-use crate::query::{Count, Goal};
+use crate::query::{AnyHit, Count, Goal, NearestHit};
 use crate::rays::{Hit, Ray, StartRay};
 use crate::shortcuts::free;
-use crate::simd::{Isa, Kernel, Simd};
+use crate::simd::{Isa, Kernel, Scalar, Simd};
 use crate::starts::locate::{locate, prefetch_leaf};
 use bth_format::layout::NONE;
 use bth_format::object::{ObjectBounds, ObjectView};
@@ -88,6 +88,49 @@ impl SingleRay for StartRay {
     fn prepared<S: Simd>(&self, s: S, line: &StartLine, bounds: &ObjectBounds) -> Option<PreparedRay> {
         PreparedRay::of_rows(s, bounds, line.rows, &line.ray)
     }
+}
+
+/// A ray of a batch, with its line. The object has the bounds of the batch.
+pub(crate) struct RayOfBatch<'a> {
+    pub(crate) ray: &'a Ray,
+    pub(crate) line: LineSource<'a>,
+}
+
+impl SingleRay for RayOfBatch<'_> {
+    type Line = ();
+    #[inline(always)]
+    fn line<S: Simd>(&self, _s: S, _object: &ObjectView<'_>) -> Option<()> {
+        Some(())
+    }
+    #[inline(always)]
+    fn exact<'a>(&'a self, _line: &'a ()) -> ExactRay<'a> {
+        ExactRay::new(self.ray, self.line)
+    }
+    #[inline(always)]
+    fn bounds<'a>(object: &'a ObjectView<'_>, _line: &'a ()) -> &'a ObjectBounds {
+        &object.bounds
+    }
+    #[inline(always)]
+    fn prepared<S: Simd>(&self, s: S, _line: &(), bounds: &ObjectBounds) -> Option<PreparedRay> {
+        PreparedRay::of(s, bounds, self.ray)
+    }
+}
+
+/// Nearest hit of a ray in object space, in scalar code; `instance` is reported with a hit.
+#[inline(never)]
+pub(crate) fn nearest_in_scalar(object: &ObjectView<'_>, ray: &RayOfBatch<'_>, instance: u32) -> Hit {
+    let mut hit = Hit::MISS;
+    (&mut SingleKernel { object, goal: NearestHit, ray, instance, count: &mut (), hit: &mut hit })
+        .run(Scalar);
+    hit
+}
+
+/// Returns true if a ray in object space hits anything, in scalar code.
+#[inline(never)]
+pub(crate) fn any_in_scalar(object: &ObjectView<'_>, ray: &RayOfBatch<'_>) -> bool {
+    let mut hit = Hit::MISS;
+    (&mut SingleKernel { object, goal: AnyHit, ray, instance: 0, count: &mut (), hit: &mut hit }).run(Scalar);
+    hit.is_hit()
 }
 
 /// Traces one ray and stores its answer. `instance` is reported with a hit.

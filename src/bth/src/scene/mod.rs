@@ -173,7 +173,7 @@ impl Scene {
     }
 
     /// The object and the index of the only visible instance, if there is exactly one and its
-    /// object space is world space. Rays are then traced directly in the object, without the top
+    /// object space is world space, in f32. Rays are then traced directly in the object, without the top
     /// level.
     #[inline(never)]
     pub(crate) fn sole(&self) -> Option<(&ObjectView<'_>, u32)> {
@@ -182,7 +182,7 @@ impl Scene {
         };
         let (instance, object) = world.sole()?;
         world.mark_traced(object);
-        Some((self.view(object), instance))
+        Some((self.view(object), instance)).filter(|(object, _)| object.exact.is_empty())
     }
 
     /// Size in bytes of the sections that traversal reads.

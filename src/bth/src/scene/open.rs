@@ -4,7 +4,7 @@ use super::Scene;
 use crate::instances::World;
 use crate::masks::Masks;
 use crate::objects::Objects;
-use bth_format::error::{Code, Error};
+use bth_format::error::Error;
 use bth_format::file::File;
 use bth_format::layout::kind;
 use std::path::Path;
@@ -70,23 +70,14 @@ fn checked(file: File) -> Result<Scene, Error> {
 
 /// Checks only the scene sections of a file and opens its scene.
 fn with_world(file: File) -> Result<Scene, Error> {
-    refuse_exact_positions(&file)?;
     let has_opacity = file.table().iter().any(|e| e.kind == kind::OPACITY && e.count != 0);
     let mut objects = Objects::of_file(file);
     let mut world = World::new(&objects)?;
-    if let Some(world) = &mut world {
-        world.deform_first(&mut objects)?;
+    match &mut world {
+        Some(world) => world.deform_first(&mut objects)?,
+        // Rays meet objects with positions in f64 as instances.
+        None if objects.any_exact() => world = Some(World::of_objects_in_place(&objects)?),
+        None => {}
     }
     Ok(Scene { objects, world, has_opacity, masks: Masks::default() })
-}
-
-/// Refuses objects with exact positions, which no query reads yet.
-fn refuse_exact_positions(file: &File) -> Result<(), Error> {
-    match file.table().iter().find(|e| e.kind == kind::EXACT_POSITIONS && e.count != 0) {
-        None => Ok(()),
-        Some(entry) => {
-            let found = format!("positions in f64 of object {}; compile with --positions f32", entry.object);
-            Err(Error::of_call(Code::Features, "positions in f32", found))
-        }
-    }
 }

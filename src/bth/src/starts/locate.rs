@@ -2,7 +2,6 @@
 
 use crate::intersect::start::{are_weights, place, rounded_start, start_corners};
 use crate::intersect::start_point::StartPoint;
-use crate::intersect::vector::wide;
 use crate::rays::{PrimitiveRef, Start};
 use crate::simd::Simd;
 use bth_format::exact::is_zero_area;
@@ -33,7 +32,7 @@ pub(crate) fn locate(object: &ObjectView<'_>, start: Start) -> Result<StartPoint
     if !are_weights([u, v]) {
         return Err(StartError::Weights);
     }
-    let corners = corners.map(wide);
+    let corners = object.exact_corners(triangle, corners);
     let origin = rounded_start(corners, [u.into(), v.into()]);
     Ok(StartPoint { origin, leaf, slot, u, v })
 }

@@ -6,11 +6,12 @@
 
 use super::leaf_mesh::LeafPoints;
 use crate::bvh::candidate::Candidate;
-use crate::intersect::exact_lanes::{F32Lanes, OriginTermsLanes, Pairs};
+use crate::intersect::exact_lanes::{ExactCorners, F32Lanes, OriginTermsLanes, Pairs};
 use crate::intersect::exact_ray::{LineLanes, Lines};
 use crate::intersect::origin::Origin;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
+use bth_format::object::ExactPositions;
 
 /// Largest number of cached triangles.
 pub(crate) const CACHED_TRIANGLES: usize = LANES;
@@ -108,6 +109,8 @@ pub(crate) struct CachedHits<'a> {
     pub(crate) origin: [f32; 3],
     /// Ids of the object's triangles, in leaf order.
     pub(crate) ids: &'a [u32],
+    /// Their corners in the source, where those in leaves are rounded.
+    pub(crate) exact: ExactPositions<'a>,
     pub(crate) hit_cache: &'a mut HitCache,
     pub(crate) origin_terms: &'a mut OriginTermsLanes,
     /// Overwritten by each group.
@@ -139,7 +142,12 @@ impl CachedHits<'_> {
         for i in 0..self.hit_cache.kept().min(CACHED_TRIANGLES) {
             self.hit_cache.id[i] = self.ids[self.hit_cache.index[i] as usize];
         }
-        self.origin_terms.compute(origin, &self.hit_cache.corner, self.hit_cache.kept());
+        let kept = self.hit_cache.kept();
+        if self.exact.is_empty() {
+            return self.origin_terms.compute(origin, &self.hit_cache.corner, kept);
+        }
+        let lanes = ((1u64 << kept.min(LANES)) - 1) as u32;
+        self.origin_terms.compute(origin, &ExactCorners::of(&self.exact, &self.hit_cache.id, lanes), kept);
     }
 
     /// Like [`Self::compute`], for lines. Returns false if they have no common origin, though the

@@ -20,6 +20,7 @@ use crate::intersect::prepare::{Axes, CommonAxis};
 use crate::query::Goal;
 use crate::simd::{LANES, Lanewise, Part, Simd, lanes_of_piece};
 use bth_format::layout::WIDTH;
+use bth_format::object::ObjectBounds;
 
 /// Instead of a triangle's index in the hit cache: no ray has hit it certainly so far.
 const NOT_CACHED_YET: u8 = u8::MAX;
@@ -52,10 +53,16 @@ fn missed<S: Lanewise>(s: S, [a, b, c]: &Corners<S>, error: S::F) -> S::M {
 impl<S: Lanewise> RayLimits<S> {
     /// Tests rays against a triangle, with the error bound of the triangle itself.
     #[inline(always)]
-    fn test(&self, s: S, [a, b, c]: Corners<S>, origin_reach: f32) -> FilteredTriangles<S> {
-        let (origin_reach, floor) = (s.splat(origin_reach), s.splat(f32::MIN_POSITIVE));
+    fn test(&self, s: S, [a, b, c]: Corners<S>, bounds: &ObjectBounds) -> FilteredTriangles<S> {
+        let (origin_reach, floor) = (s.splat(bounds.origin_reach), s.splat(f32::MIN_POSITIVE));
         let error = edge_functions::error_of(s, &[a, b, c], origin_reach, floor);
-        let tested = edge_functions::test_triangles(s, [a, b, c], error, self.first, self.limit);
+        let tested = edge_functions::test_triangles(
+            s,
+            [a, b, c],
+            error,
+            [self.first, self.limit],
+            bounds.corner_error,
+        );
         let in_range = s.and(s.le(self.certain[0], tested.nearest), s.le(tested.farthest, self.certain[1]));
         FilteredTriangles { certain: s.and(tested.certain, in_range), ..tested }
     }
@@ -69,7 +76,7 @@ struct TestRays<'a, S: Simd, C> {
     points: [usize; 3],
     /// Bound of the errors of weights.
     error: &'a S::F,
-    origin_reach: f32,
+    bounds: &'a ObjectBounds,
     active: u32,
 }
 
@@ -77,7 +84,7 @@ impl<S: Simd, C: CornerSource<S>> Part<S> for TestRays<'_, S, C> {
     type Output = RayTest<S>;
     #[inline(always)]
     fn run(self, s: S) -> RayTest<S> {
-        let TestRays { group, corners, points: [a, b, c], error, origin_reach, active } = self;
+        let TestRays { group, corners, points: [a, b, c], error, bounds, active } = self;
         let (mut maybe, mut sure, mut nearest, mut farthest) = (0, 0, [0.0; LANES], [0.0; LANES]);
         for i in 0..S::PIECES {
             let (active, p) = (active & lanes_of_piece::<S>(i), s.piece(i));
@@ -89,7 +96,7 @@ impl<S: Simd, C: CornerSource<S>> Part<S> for TestRays<'_, S, C> {
             if active & !p.mask_bits(missed(p, &corners, S::pick(p, error))) == 0 {
                 continue;
             }
-            let tested = group.limits_of_piece(p).test(p, corners, origin_reach);
+            let tested = group.limits_of_piece(p).test(p, corners, bounds);
             maybe |= active & !p.mask_bits(tested.excluded);
             sure |= active & p.mask_bits(tested.certain);
             p.store(tested.nearest, &mut nearest);
@@ -208,13 +215,13 @@ impl<G: Goal> PacketRays<'_, G> {
         while active != 0 {
             let lane = active.trailing_zeros() as usize;
             active &= active - 1;
-            let origin_reach = self.object.bounds.origin_reach;
             let ray = at * LANES + lane;
             let own = match self.have_starts {
                 true => ExactRay::new(&self.rays[ray], self.lines.of(ray)).own_triangle(code),
                 false => 0,
             };
-            let found = self.single_rays.candidates::<S, H>(s, group, (at, lane), (block, own), origin_reach);
+            let found =
+                self.single_rays.candidates::<S, H>(s, group, (at, lane), (block, own), &self.object.bounds);
             let hit = found.sure != 0
                 || found.maybe != 0 && self.settle_one(s, ray, Candidate::NONE, (code, found.maybe));
             self.alive &= !(u64::from(hit) << ray);
@@ -278,7 +285,8 @@ impl<G: Goal> PacketRays<'_, G> {
         test: GroupTest<'_, '_, S>,
     ) -> bool {
         let GroupTest { group, at, leaf, cache_indices, mut triangles, mut active, .. } = test;
-        let (mut nearer, origin_reach) = (false, self.object.bounds.origin_reach);
+        let (mut nearer, object) = (false, self.object);
+        let bounds = &object.bounds;
         let starting = self.starting_in(s, at, leaf.code);
         while triangles != 0 {
             let triangle = triangles.trailing_zeros();
@@ -289,13 +297,13 @@ impl<G: Goal> PacketRays<'_, G> {
                 if active & !s.mask_bits(missed(s, &corners, error)) == 0 {
                     continue;
                 }
-                let tested = group.limits().test(s, corners, origin_reach);
+                let tested = group.limits().test(s, corners, bounds);
                 let maybe = active & !s.mask_bits(tested.excluded);
                 let sure = maybe & s.mask_bits(tested.certain);
                 RayTest { maybe, sure, nearest: tested.nearest, farthest: tested.farthest }
             } else {
                 let error = &error;
-                s.call(TestRays { group: &*group, corners, points: [a, b, c], error, origin_reach, active })
+                s.call(TestRays { group: &*group, corners, points: [a, b, c], error, bounds, active })
             };
             if !S::INLINES_PARTS && maybe == 0 {
                 continue;

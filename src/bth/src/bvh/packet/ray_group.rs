@@ -8,7 +8,7 @@ use super::bounds::PacketBounds;
 use super::hit_cache::{CachedHits, UNCACHED};
 use super::leaf_mesh::LeafPoints;
 use super::projection::Projection;
-use crate::intersect::exact_lanes::{Intersections, lane};
+use crate::intersect::exact_lanes::{ExactCorners, Intersections, lane};
 use crate::intersect::exact_ray::LineLanes;
 use crate::intersect::prepare::{self, Axes, CommonAxis, MixedAxes, PreparedLanes};
 use crate::intersect::vector::pick3;
@@ -365,6 +365,10 @@ impl<S: Simd> Part<S> for IntersectLines<'_, '_, S> {
             };
         }
         group.store_triangles(s, lanes, (uncached, kept), cached, intersections);
-        intersections.compute_lines(s, lanes, &of_lanes, cached.pairs);
+        if cached.exact.is_empty() {
+            return intersections.compute_lines(s, lanes, &of_lanes, &cached.pairs.corner);
+        }
+        let triangles = ExactCorners::of(&cached.exact, &intersections.triangle, lanes);
+        intersections.compute_lines(s, lanes, &of_lanes, &triangles);
     }
 }

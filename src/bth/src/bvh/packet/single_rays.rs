@@ -13,6 +13,7 @@ use crate::intersect::filter::{Candidates, TriangleBlock};
 use crate::intersect::prepare::{Prepared, PreparedRay};
 use crate::simd::{LANES, Lanewise, Part, Simd};
 use bth_format::layout::{WIDTH, WideNode};
+use bth_format::object::ObjectBounds;
 
 /// Largest number of rays of a group that are tested one at a time in a leaf, by measurement.
 pub(crate) const FEW_OF_GROUP: u32 = 6;
@@ -98,12 +99,12 @@ impl SingleRays {
         group: &RayGroup<S>,
         (at, lane): (usize, usize),
         block: (&impl TriangleBlock, u32),
-        origin_reach: f32,
+        bounds: &ObjectBounds,
     ) -> Candidates<S> {
         self.convert(s, group, at, H::MIXED_OCTANTS);
         let [first, last] = &self.depths[at % GROUPS];
         let (first, last) = (first[lane % LANES], last[lane % LANES]);
-        self.prepared(at, lane).filter.candidates(s, block, first, last, origin_reach)
+        self.prepared(at, lane).filter.candidates(s, block, first, last, bounds)
     }
 
     /// Writes the stack entries of the children of a node that any of the given rays may hit;

@@ -200,6 +200,7 @@ fn finish<S: Simd, H: PacketBounds<S>, G: Goal>(
     let mut cached = CachedHits {
         origin: rays.rays[0].origin,
         ids: rays.object.triangle_ids,
+        exact: rays.object.exact,
         hit_cache: rays.hit_cache,
         origin_terms,
         pairs,

@@ -104,19 +104,18 @@ struct FilterResult {
     depth: [f32; 2],
 }
 
-/// Kernel of box test and filter, with the `origin_reach` of the bounds. Its output is the set of
+/// Kernel of box test and filter, with the bounds of the ray. Its output is the set of
 /// children that are hit, as bits, and the result of the filter.
-struct BoxAndFilter<'a>(&'a PreparedRay, &'a OneTriangle, f32);
+struct BoxAndFilter<'a>(&'a PreparedRay, &'a OneTriangle, &'a ObjectBounds);
 
 impl Kernel for BoxAndFilter<'_> {
     type Output = (u32, FilterResult);
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Self::Output {
-        let BoxAndFilter(PreparedRay { slabs, filter, .. }, OneTriangle { node, leaf, .. }, origin_reach) =
-            self;
+        let BoxAndFilter(PreparedRay { slabs, filter, .. }, OneTriangle { node, leaf, .. }, bounds) = self;
         let (bits, _) = slabs.children(s, node, slabs.last);
         let children = (0..WIDTH).filter(|&i| bits >> i & 1 != 0 && node.child[i] != NONE);
-        let candidates = filter.candidates(s, (leaf, 0), slabs.first, slabs.last, origin_reach);
+        let candidates = filter.candidates(s, (leaf, 0), slabs.first, slabs.last, bounds);
         let (mut nearest, mut farthest) = ([0.0; LANES], [0.0; LANES]);
         s.store(candidates.nearest, &mut nearest);
         s.store(candidates.farthest, &mut farthest);
@@ -244,7 +243,7 @@ fn boxes_and_triangles_that_the_line_crosses_are_kept_and_sure_hits_are_hits() {
             prepared += preparations.len() - 1;
             for preparation in &preparations {
                 for isa in Isa::ALL {
-                    let (children, found) = isa.run(BoxAndFilter(preparation, &object, bounds.origin_reach));
+                    let (children, found) = isa.run(BoxAndFilter(preparation, &object, &bounds));
                     let context = || {
                         format!(
                             "{isa}, round {round}: {ray:?}, {corners:?}, {intersection:?}, {preparation:?}"
@@ -293,7 +292,7 @@ fn small_triangles_of_large_objects_are_decided_in_f32() {
         let bounds = ObjectBounds::new(&object.object);
         for preparation in all_preparations(&ray, &line, &bounds, round % LANES) {
             for isa in Isa::ALL {
-                let (_, found) = isa.run(BoxAndFilter(&preparation, &object, bounds.origin_reach));
+                let (_, found) = isa.run(BoxAndFilter(&preparation, &object, &bounds));
                 let expected = u32::from(is_hit);
                 assert_eq!([found.maybe, found.sure], [expected; 2], "{isa}, round {round}: {preparation:?}");
                 decided[expected as usize] += 1;
@@ -327,7 +326,7 @@ fn small_boxes_of_large_objects_are_told_apart_where_they_are_widened() {
         let bounds = ObjectBounds::new(&object.object);
         for preparation in all_preparations(&ray, &line, &bounds, round % LANES) {
             for isa in Isa::ALL {
-                let (children, _) = isa.run(BoxAndFilter(&preparation, &object, bounds.origin_reach));
+                let (children, _) = isa.run(BoxAndFilter(&preparation, &object, &bounds));
                 assert!(!is_met || children == 1, "{isa}, round {round}: {preparation:?}");
                 entered[usize::from(is_widened)][usize::from(is_met)] += children;
             }
@@ -362,7 +361,7 @@ fn boxes_of_objects_far_from_the_origin_are_told_apart() {
         let bounds = ObjectBounds::new(&object.object);
         for preparation in all_preparations(&ray, &line, &bounds, round % LANES) {
             for isa in Isa::ALL {
-                let (children, _) = isa.run(BoxAndFilter(&preparation, &object, bounds.origin_reach));
+                let (children, _) = isa.run(BoxAndFilter(&preparation, &object, &bounds));
                 assert_eq!(children, u32::from(is_met), "{isa}, round {round}: {preparation:?}");
                 met += children;
             }

@@ -1,6 +1,8 @@
 //! Rays in f64 against exact arithmetic: through models, through files of several objects and
 //! through instances, alone and in batches, on every instruction set.
 
+mod models;
+
 use bth::rays::{Hit, Hit64, Ray64};
 use bth::{Accept, Isa, Scene};
 use bth_format::exact::is_zero_area;

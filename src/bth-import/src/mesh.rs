@@ -121,9 +121,9 @@ pub enum Polygons {
 #[serde(rename_all = "lowercase")]
 pub enum Positions {
     /// In f64 where f32 would move a position by more than the size of the model times 2^-24.
+    #[default]
     Auto,
     /// In f32. What that moves and drops is counted.
-    #[default]
     F32,
     /// As the source has them, unless all its numbers are f32.
     F64,

@@ -36,7 +36,7 @@ pub(crate) struct Compile {
     pub(crate) polygons: Polygons,
     /// Numbers in which positions are kept: see docs/models.md. Objects in f64 are a BVH, keep the
     /// geometry of the source, and take about 12 bytes a triangle more.
-    #[arg(long, value_enum, default_value_t = PositionNumbers::F32, value_name = "NUMBERS")]
+    #[arg(long, value_enum, default_value_t = PositionNumbers::Auto, value_name = "NUMBERS")]
     pub(crate) positions: PositionNumbers,
     /// Shading attributes to keep.
     #[arg(long, help_heading = KEPT, value_enum, default_value_t = Attributes::None)]

@@ -240,8 +240,8 @@ impl Scene {
 /// What a file keeps of the surface at a hit.
 impl Scene {
     /// The vertices of a triangle in the space of its object, as rays are tested against them: on
-    /// the grid, if the file has one, or the positions in f64. `None` if the file does not keep them (it was compiled with
-    /// `--no-geometry`), or if there is no such instance or triangle.
+    /// the grid, if the file has one, or the positions in f64. `None` if the file does not keep
+    /// them (it was compiled with `--no-geometry`), or if there is no such instance or triangle.
     pub fn triangle(&self, primitive: PrimitiveRef) -> Option<[[f64; 3]; 3]> {
         surface::triangle(&self.object(surface::object_at(self, primitive)?), primitive.triangle)
     }

@@ -33,9 +33,9 @@ pub type Bounds = ([f32; 3], [f32; 3]);
 /// `tmin` to `tmax`. Lines in the plane of a triangle do not hit it. Hits in an object are ordered
 /// by t in f64, which is within 2^-28 of the exact one; among equal ones the triangle of the lowest
 /// id is reported. Results depend neither on hints nor on the acceleration structures in the file.
-/// In a file with scene sections, a ray is first transformed into the object's space, where each
-/// component of its origin and direction is rounded to f32 (relative error 2^-24). Among hits of
-/// equal t in several instances, the instance of the lowest index is reported.
+/// The triangles of an instance are their images as real numbers. Triangles of objects with
+/// positions in f64 have these corners. Among hits of equal t in several instances, the instance of
+/// the lowest index is reported.
 ///
 /// In files with opacity (`bthc compile --alpha`) rays pass through the transparent parts of
 /// triangles: nearest hits, any hits, counts and lists of hits consider only hits on opaque parts.
@@ -172,9 +172,9 @@ impl Scene {
         if self.world.is_none() && !self.has_opacity { self.objects.sole_view() } else { None }
     }
 
-    /// The object and the index of the only visible instance, if there is exactly one and its
-    /// object space is world space, in f32. Rays are then traced directly in the object, without the top
-    /// level.
+    /// The object and the index of the only visible instance, if there is exactly one, its object
+    /// space is world space, and f32 holds the object. Rays are then traced directly in the object,
+    /// without the top level.
     #[inline(never)]
     pub(crate) fn sole(&self) -> Option<(&ObjectView<'_>, u32)> {
         let Some(world) = &self.world else {

@@ -75,7 +75,7 @@ fn with_world(file: File) -> Result<Scene, Error> {
     let mut world = World::new(&objects)?;
     match &mut world {
         Some(world) => world.deform_first(&mut objects)?,
-        // Rays meet objects with positions in f64 as instances.
+        // Objects with positions in f64 are traced as instances.
         None if objects.any_exact() => world = Some(World::of_objects_in_place(&objects)?),
         None => {}
     }

@@ -1,6 +1,7 @@
 //! The instances of a file with scene sections at a time.
 
-use super::world::{TransformSource, World, scene_of};
+use super::by_caller::NewInstance;
+use super::world::{InstanceRow, TransformSource, World, scene_of};
 use crate::animation::{AnimatedFile, StagedPoses};
 use crate::clock;
 use crate::nodes::affine::Affine;
@@ -27,6 +28,22 @@ impl World {
         world.evaluate_nodes(objects, seconds, true);
         world.place_moved(objects, seconds, &[], true)?;
         Ok(Some(world))
+    }
+
+    /// An instance of each object, in its place. It has the index of the object.
+    ///
+    /// # Errors
+    /// `BTH-S002` if the box of an object is not finite.
+    pub(crate) fn of_objects_in_place(objects: &Objects) -> Result<World> {
+        let (mut world, all) = (World::empty(), (0..objects.count()).collect::<Vec<_>>());
+        world.add_objects(objects.count());
+        let in_place = |object| {
+            let row = InstanceRow { object, node: NONE, to_world: Affine::IDENTITY };
+            NewInstance { row, visible: true }
+        };
+        let changed = world.change(objects, all.len(), &all, &in_place);
+        changed.map_err(|failed| failed.error(&format!("object {}", failed.instance)))?;
+        Ok(world)
     }
 
     /// Deforms the objects as at the first frame and places their instances again. Does nothing for

@@ -1,7 +1,6 @@
 //! The instances of a scene, as queries see them. A file with scene sections ([`super::by_file`])
 //! or the caller of a scene builder ([`super::by_caller`]) places them.
 
-use super::by_caller::NewInstance;
 use super::placement::{PartBoxes, Placement, PlacementError};
 use super::top_level::TopLevel;
 use crate::animation::Animation;
@@ -113,22 +112,6 @@ impl World {
         };
         world.add_objects(objects);
         world
-    }
-
-    /// An instance of each object, in its place. It has the index of the object.
-    ///
-    /// # Errors
-    /// `BTH-S002` if the box of an object is not finite.
-    pub(crate) fn of_objects_in_place(objects: &Objects) -> Result<World, Error> {
-        let (mut world, all) = (World::empty(), (0..objects.count()).collect::<Vec<_>>());
-        world.add_objects(objects.count());
-        let in_place = |object| {
-            let row = InstanceRow { object, node: NONE, to_world: Affine::IDENTITY };
-            NewInstance { row, visible: true }
-        };
-        let changed = world.change(objects, all.len(), &all, &in_place);
-        changed.map_err(|failed| failed.error(&format!("object {}", failed.instance)))?;
-        Ok(world)
     }
 
     /// No instances yet; the caller will place them.

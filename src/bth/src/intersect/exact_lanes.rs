@@ -31,13 +31,13 @@ impl Pairs {
 }
 
 /// Corners of sixteen triangles.
-pub(crate) trait CornerLanes {
+pub(crate) trait LanesOfCorners {
     /// The corners of lane `i`.
     fn corners(&self, i: usize) -> [[f64; 3]; 3];
 }
 
 /// As leaves have them: `[corner][axis]`.
-impl CornerLanes for [[F32Lanes; 3]; 3] {
+impl LanesOfCorners for [[F32Lanes; 3]; 3] {
     #[inline(always)]
     fn corners(&self, i: usize) -> [[f64; 3]; 3] {
         [lane(&self[0], i), lane(&self[1], i), lane(&self[2], i)]
@@ -65,7 +65,7 @@ impl ExactCorners {
     }
 }
 
-impl CornerLanes for ExactCorners {
+impl LanesOfCorners for ExactCorners {
     #[inline(always)]
     fn corners(&self, i: usize) -> [[f64; 3]; 3] {
         self.0.each_ref().map(|[x, y, z]| [x[i], y[i], z[i]])
@@ -87,7 +87,7 @@ impl OriginTermsLanes {
 
     /// Computes the terms of the first `count` triangles, and of those that complete a half.
     #[inline(always)]
-    pub(crate) fn compute(&mut self, origin: impl Origin, triangles: &impl CornerLanes, count: usize) {
+    pub(crate) fn compute(&mut self, origin: impl Origin, triangles: &impl LanesOfCorners, count: usize) {
         const HALF: usize = LANES / 2;
         for first in (0..count.min(LANES)).step_by(HALF) {
             for i in first..first + HALF {
@@ -172,7 +172,7 @@ impl Intersections {
         s: S,
         lanes: u32,
         lines: &LineLanes,
-        triangles: &impl CornerLanes,
+        triangles: &impl LanesOfCorners,
     ) {
         let mut accurate = [0; LANES];
         // There are no branches in this loop, so that the compiler vectorizes it.

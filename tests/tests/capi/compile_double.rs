@@ -31,7 +31,6 @@ fn a_c_program_keeps_positions_in_double_and_is_told_what_float_moves() {
 }
 
 #[test]
-#[ignore = "until files with exact positions are opened"]
 fn a_c_program_traces_positions_in_double() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let Some(program) = program(folder.path(), "compile_double.c", &["bth", "bth_compile"]) else { return };

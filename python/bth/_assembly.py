@@ -27,5 +27,5 @@ class Assembly:
             vertices = np.concatenate([np.zeros((0, 3), np.float32)] + [v for v, _ in self._parts])
             faces = [f + np.uint32(first) for (_, f), first in zip(self._parts, first_vertex)]
             faces = np.concatenate([np.zeros((0, 3), np.uint32)] + faces)
-            self._compiled = compile((vertices, faces), quality="fast"), first_face
+            self._compiled = compile((vertices, faces), quality="fast", positions="f64"), first_face
         return self._compiled

@@ -39,7 +39,8 @@ def compile(
     All other options are those of `bthc compile`. `structure` is 'bvh' by default, since the package has no worker for tetrahedra, and
     free_directions is 'none'.
     polygons ('ears') covers concave polygons of models in files exactly, which fans do not.
-    positions ('f64', 'auto') keeps positions in double precision: always, or where float32 would move a vertex.
+    positions ('auto', 'f64', 'f32') keeps positions in double precision: by default where float32 would move a vertex by more than 2^-24 of
+    the object's size, always, or never.
     attributes ('normals', 'all'), alpha ('mask', 'blend'), names and materials (True) keep what models in files have of these;
     lenient_materials leaves out images that cannot be read.
     settings: a dictionary of the keys of `bthc compile --set` and their values, such as {"poses": 1}.

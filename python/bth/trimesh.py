@@ -10,14 +10,12 @@ from trimesh import caching, util
 from . import _arrays
 from ._compile import compile
 
-#: How far rounding vertices to float32 moves a hit, a hundredfold, relative to t or to the size of the mesh.
-ROUGH = 1e-5
 #: t is within 2^-40, so those of hits in one point are within twice that.
 _SAME = 2.0**-39
 
 
 class RayMeshIntersector:
-    """Ray queries of a mesh, with the methods of trimesh's own. Answers are exact for the rays as they are, and for the vertices rounded to float32."""
+    """Ray queries of a mesh, with the methods of trimesh's own. Answers are exact for the rays and the vertices as they are."""
 
     def __init__(self, geometry, scale_to_box=True):
         """scale_to_box: scales the mesh to a size of about 1, by a power of two, which rounds nothing."""
@@ -31,11 +29,9 @@ class RayMeshIntersector:
 
     @caching.cache_decorator
     def _scene(self):
-        vertices = np.asarray(self.mesh.vertices, np.float64)
-        corner = _corner(vertices)
         scale = float(self._scale)
-        faces = np.asarray(self.mesh.faces)
-        return compile(((vertices - corner) * scale, faces), quality="fast"), corner, scale
+        vertices = np.asarray(self.mesh.vertices, np.float64) * scale
+        return compile((vertices, np.asarray(self.mesh.faces)), quality="fast", positions="f64"), scale
 
     def _rays(self, ray_origins, ray_directions):
         origins = np.array(_arrays.plain(ray_origins, "ray_origins"), dtype=np.float64)
@@ -45,8 +41,8 @@ class RayMeshIntersector:
         # By a power of two, which changes no other bit: float32 ends at 3e38, while `scale_to_box` takes meshes, and so directions, of any size.
         _, exponents = np.frexp(np.abs(directions).max(axis=-1, initial=0, keepdims=True))
         directions = np.ldexp(directions, -exponents)
-        scene, corner, scale = self._scene
-        return scene, (origins - corner) * scale, directions, origins
+        scene, scale = self._scene
+        return scene, origins * scale, directions, origins
 
     def intersects_id(self, ray_origins, ray_directions, multiple_hits=True, max_hits=100, return_locations=False):
         """Triangles that rays hit, and the rays: those of one ray in order. Of several triangles that a ray meets in one point of an edge or a vertex, and from one side, the first counts."""
@@ -68,18 +64,7 @@ class RayMeshIntersector:
             triangles, t = hits.triangle[rays].astype(np.int64), hits.t[rays]
         if not return_locations:
             return triangles, rays
-        return triangles, rays, self._locations(triangles, origins[rays], directions[rays], t)
-
-    def _locations(self, triangles, origins, directions, t):
-        """Where lines meet the planes of triangles, in float64."""
-        corner, normals = self.mesh.triangles[triangles, 0], self.mesh.face_normals[triangles]
-        with np.errstate(all="ignore"):
-            exact = np.einsum("ij,ij->i", normals, corner - origins) / np.einsum("ij,ij->i", normals, directions)
-        rough = t / self._scene[2]
-        # A plane that is nearly along the ray gives a t that is worse than the one that the query has found.
-        lengths = np.maximum(util.row_norm(directions), np.finfo(np.float64).tiny)
-        near = np.abs(exact - rough) <= ROUGH * np.maximum(np.abs(rough), self.mesh.scale / lengths)
-        return origins + np.where(near, exact, rough)[:, None] * directions
+        return triangles, rays, origins[rays] + (t / self._scene[1])[:, None] * directions[rays]
 
     def intersects_location(self, ray_origins, ray_directions, multiple_hits=True):
         """Points where rays hit, the rays and the triangles."""
@@ -103,8 +88,8 @@ class RayMeshIntersector:
         points = np.asanyarray(points, dtype=np.float64)
         if not util.is_shape(points, (-1, 3)):
             raise ValueError("points must be (n,3)")
-        scene, corner, scale = self._scene
-        return scene.contains((points - corner) * scale)
+        scene, scale = self._scene
+        return scene.contains(points * scale)
 
     def __getstate__(self):
         state = self.__dict__.copy()
@@ -120,18 +105,6 @@ class RayMeshIntersector:
 
     def __deepcopy__(self, *_):
         return self.__copy__()
-
-
-def _corner(vertices):
-    """The corner of the box of vertices that is nearest to the origin, with 0 along axes on which the box is less far away than it is long.
-
-    Subtracting it rounds no vertex: both are of one sign, and neither is more than twice the other (Sterbenz).
-    """
-    if not len(vertices):
-        return np.zeros(3)
-    lower, upper = vertices.min(axis=0), vertices.max(axis=0)
-    nearest = np.where(lower > 0, lower, np.where(upper < 0, upper, 0.0))
-    return np.where(np.maximum(np.abs(lower), np.abs(upper)) <= 2 * np.abs(nearest), nearest, 0.0)
 
 
 def install():

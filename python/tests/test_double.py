@@ -166,8 +166,7 @@ def test_arrays_whose_numbers_are_float32_are_the_same_file():
         bth.compile((vertices, faces), positions="f16")
 
 
-@pytest.mark.skip(reason="files with positions in float64 cannot be opened yet")
-@pytest.mark.parametrize("positions", ["auto", "f64"])
+@pytest.mark.parametrize("positions", [None, "auto", "f64"])
 def test_positions_in_float64(positions, recwarn):
     vertices, faces = grid(np.array([5.5e6, 4.2e5, 300]), 0.5, 4)
     vertices += np.random.default_rng(3).uniform(-1e-3, 1e-3, vertices.shape)
@@ -188,9 +187,8 @@ def test_positions_in_float64(positions, recwarn):
 def test_float32_positions_are_warned_of_for_each_mesh():
     vertices, faces = grid(np.array([5.5e6, 4.2e5, 300]), 0.5, 4)
     vertices[:, 0] += 0.1
-    for options in ({}, {"positions": "f32"}):
-        with pytest.warns(UserWarning, match=r"moves 50 of 50 positions, by up to 1\.00e-1 .* 0 of 64 triangles lose their area"):
-            bth.compile((vertices, faces), **options)
+    with pytest.warns(UserWarning, match=r"moves 50 of 50 positions, by up to 1\.00e-1 .* 0 of 64 triangles lose their area"):
+        assert bth.compile((vertices, faces), positions="f32").vertices().dtype == np.float32
     with pytest.warns(UserWarning, match="mesh 1.*moves 50 of 50 positions"):
         bth.compile_scene([(vertices - vertices[0], faces), (vertices, faces)], positions="f32")
 
@@ -214,3 +212,32 @@ def test_drop_ins_round_no_ray(place):
 
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     assert (RayMeshIntersector(mesh).intersects_first(origins, directions) == first).all()
+
+
+def test_drop_ins_round_no_vertex(recwarn):
+    trimesh = pytest.importorskip("trimesh")
+    from bth.trimesh import RayMeshIntersector
+
+    mesh = trimesh.creation.icosphere(subdivisions=2, radius=10)
+    mesh.apply_translation([5.5e6, 4.2e5, 300])
+    random = np.random.default_rng(9)
+    origins = mesh.center_mass + random.normal(size=(60, 3)) * 30
+    directions = mesh.triangles_center[random.integers(len(mesh.faces), size=60)] + random.normal(size=(60, 3)) - origins
+    expected = [exact_hits(mesh.vertices, mesh.faces, *ray) for ray in zip(origins, directions)]
+    first = [hits[0][1] if hits else -1 for hits in expected]
+    ray = RayMeshIntersector(mesh)
+    triangles, rays, locations = ray.intersects_id(origins, directions, return_locations=True)
+    assert triangles.tolist() == [triangle for hits in expected for _, triangle in hits] and len(triangles) > 60
+    assert rays.tolist() == [i for i, hits in enumerate(expected) for _ in hits]
+    points = (
+        [Fraction(o) + t * Fraction(d) for o, d in zip(origins[i].tolist(), directions[i].tolist())]
+        for i, hits in enumerate(expected) for t, _ in hits
+    )
+    assert max(abs(Fraction(x) - y) for found, point in zip(locations.tolist(), points) for x, y in zip(found, point)) < 1e-9
+    assert ray.intersects_first(origins, directions).tolist() == first
+    embree, open3d = EmbreeScene(), RaycastingScene()
+    TriangleMesh(embree, mesh.vertices, mesh.faces)
+    open3d.add_triangles(mesh.vertices, mesh.faces)
+    assert embree.run(origins, directions).tolist() == first
+    assert open3d.cast_rays(np.concatenate([origins, directions], axis=1))["primitive_ids"].astype(np.int32).tolist() == first
+    assert not recwarn.list

@@ -1,5 +1,5 @@
-/* Compiles positions in double through the C interface alone, and writes the file. Arguments: the file, and "trace" to open it and
- * to trace rays, which needs exact positions at run time. Exits with the line of the first check that fails. */
+/* Compiles positions in double through the C interface alone, writes the file, and traces it. Argument: the file. Exits with the line
+ * of the first check that fails. */
 #include "bth.h"
 #include "bth_compile.h"
 #include <math.h>
@@ -22,7 +22,7 @@ static void warning(void *user, const char *message) {
 }
 
 int main(int argc, char **argv) {
-    CHECK(argc >= 2);
+    CHECK(argc == 2);
     /* Where float has steps of half a metre: two triangles of a square, and one that float flattens to a line. */
     const double x = 5.5e6, y = 4.2e5;
     const double positions[] = {x, y, 0, x + 2, y, 0, x, y + 2, 0, x + 2, y + 2, 0, x + 0.125, y + 1, 1, x + 0.0625, y + 2, 2};
@@ -37,6 +37,7 @@ int main(int argc, char **argv) {
     options.avoided_rounding = &avoided;
     bth_bytes bytes;
 
+    options.positions = BTH_POSITIONS_F32;
     CHECK(bth_compile_mesh_f64(&mesh, &options, &bytes) == BTH_COMPILE_OK && warnings == 1);
     CHECK(moved.positions == 2 && moved.triangles == 1 && moved.farthest == 0.125);
     CHECK(avoided.positions == 0 && avoided.triangles == 0 && avoided.farthest == 0);
@@ -51,20 +52,40 @@ int main(int argc, char **argv) {
     CHECK(moved.positions == 2 && moved.triangles == 1 && moved.farthest == 0.125);
     bth_free_bytes(&bytes);
 
-    options.positions = BTH_POSITIONS_AUTO;
+    /* By default float would move two positions. */
+    options.positions = 0;
     CHECK(bth_compile_mesh_f64(&mesh, &options, &bytes) == BTH_COMPILE_OK && warnings == 2);
     CHECK(avoided.positions == 2 && avoided.triangles == 1 && avoided.farthest == 0.125 && moved.positions == 0);
     FILE *file = fopen(argv[1], "wb");
     CHECK(file && fwrite(bytes.data, 1, bytes.length, file) == bytes.length && fclose(file) == 0);
-    if (argc > 2) {
-        CHECK(bth_open_memory(bytes.data, bytes.length, BTH_READ, &scene) == BTH_OK);
-        /* The triangle that float would drop, 2^-30 above it. */
-        const bth_ray64 ray = {{x + 0.0625, y + 1, 1 + 0x1p-30}, 0, {0, 0, -1}, INFINITY};
-        bth_hit64 hit;
-        CHECK(bth_nearest_f64(scene, &ray, NULL, &hit, 1) == BTH_OK && hit.surface.triangle == 2);
-        CHECK(fabs(hit.t - 0x1p-30) <= 0x1p-40 * 0x1p-30);
-        bth_close(scene);
-    }
+    CHECK(bth_open_memory(bytes.data, bytes.length, BTH_READ, &scene) == BTH_OK);
+    /* The triangle that float would drop, 2^-30 above it. */
+    const bth_ray64 ray = {{x + 0.0625, y + 1, 1 + 0x1p-30}, 0, {0, 0, -1}, INFINITY};
+    bth_hit64 hit;
+    CHECK(bth_nearest_f64(scene, &ray, NULL, &hit, 1) == BTH_OK && hit.surface.triangle == 2);
+    CHECK(fabs(hit.t - 0x1p-30) <= 0x1p-40 * 0x1p-30);
+
+    /* Two squares at a place that is no float, by an instance and by a subscene: edges are where the sums are. */
+    bth_builder *builder = bth_builder_new();
+    const float origin[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    uint32_t object, placed, whole;
+    CHECK(bth_builder_add(builder, scene, &object) == BTH_OK);
+    CHECK(bth_builder_instance(builder, object, origin, &placed) == BTH_OK);
+    CHECK(bth_builder_subscene(builder, object, origin, &whole) == BTH_OK);
+    const double by = 0x1p-20, up[12] = {1, 0, 0, by, 0, 1, 0, 0, 0, 0, 1, 0}, down[12] = {1, 0, 0, -by, 0, 1, 0, 0, 0, 0, 1, -8};
+    CHECK(bth_builder_set_transforms_f64(builder, &placed, up, 1) == BTH_OK);
+    CHECK(bth_builder_set_subscene_transform_f64(builder, whole, down) == BTH_OK);
+    CHECK(bth_builder_commit(builder, NULL) == BTH_OK);
+    bth_ray64 edge = {{x + by, y + 0.5, 9}, 0, {0, 0, -1}, INFINITY};
+    CHECK(bth_nearest_f64(bth_builder_scene(builder), &edge, NULL, &hit, 1) == BTH_OK && hit.surface.instance == placed && hit.t == 9);
+    edge.origin[0] = x - by;
+    CHECK(bth_nearest_f64(bth_builder_scene(builder), &edge, NULL, &hit, 1) == BTH_OK && hit.surface.instance != placed && hit.t == 17);
+    edge.origin[0] = x - 2 * by;
+    CHECK(bth_nearest_f64(bth_builder_scene(builder), &edge, NULL, &hit, 1) == BTH_OK && isinf(hit.t));
+    CHECK(bth_builder_set_transforms_f64(builder, NULL, up, 1) == BTH_ERROR_ARGUMENT);
+    CHECK(bth_builder_set_subscene_transform_f64(builder, whole, NULL) == BTH_ERROR_ARGUMENT);
+    bth_builder_free(builder);
+    bth_close(scene);
     bth_free_bytes(&bytes);
 
     /* Floats keep their bytes. */
@@ -73,7 +94,7 @@ int main(int argc, char **argv) {
     const bth_mesh of_floats = {near, 3, triangles, 1};
     const bth_mesh64 of_doubles = {same, 3, triangles, 1};
     bth_bytes expected;
-    for (options.positions = BTH_POSITIONS_F32; options.positions <= BTH_POSITIONS_F64; options.positions++) {
+    for (options.positions = BTH_POSITIONS_AUTO; options.positions <= BTH_POSITIONS_F64; options.positions++) {
         CHECK(bth_compile_mesh(&of_floats, &options, &expected) == BTH_COMPILE_OK);
         CHECK(bth_compile_mesh_f64(&of_doubles, &options, &bytes) == BTH_COMPILE_OK);
         CHECK(moved.positions == 0 && avoided.positions == 0);

@@ -10,8 +10,8 @@ const CLOSEST_NUMBERS: usize = 6;
 /// Words of a closest point: its numbers, instance, triangle and feature.
 const CLOSEST_WORDS: usize = 2 * CLOSEST_NUMBERS + 3;
 
-/// Closest points: columns of numbers, two words a point, then of indices, a word a point. Where
-/// there is none within the radius, the distance is infinite, the other numbers are NaN and the
+/// Closest points: columns of numbers, two words a point, then of indices, a word a point. If
+/// no surface is within the radius, the distance is infinite, the other numbers are NaN and the
 /// indices 2^32 - 1.
 ///
 /// # Safety

@@ -476,8 +476,9 @@ int32_t bth_vertex_color(const bth_scene *scene, const bth_hit *hit, float color
  * code return BTH_ERROR_ARGUMENT for objects, instances and subscenes that do not exist, and have no effect then.
  *
  * Transforms map object space to world space: the rows of a 3x4 matrix, one after the other, that is applied to columns (x, y, z, 1).
- * They may scale, shear and mirror. Instances have ids, which stay the same until they are removed, and which are the instances of
- * hits. A commit frees the ids of removed instances; the least free id is used first. */
+ * They may scale, shear and mirror. Functions whose names end in _f64 take them in double and do not round them. Instances have ids,
+ * which stay the same until they are removed, and which are the instances of hits. A commit frees the ids of removed instances; the
+ * least free id is used first. */
 typedef struct bth_builder bth_builder;
 
 /* A builder whose scene has no objects and no instances. */
@@ -496,12 +497,14 @@ const bth_scene *bth_builder_scene(const bth_builder *builder);
  * the scene of this builder. */
 int32_t bth_builder_add(bth_builder *builder, const bth_scene *scene, uint32_t *first_object);
 
-/* Adds an instance of an object and stores its id in *instance. bth_builder_commit decides whether the transform can be used. */
+/* Adds an instance of an object and stores its id in *instance. bth_builder_commit decides whether the transform can be used; before
+ * it, bth_builder_set_transforms_f64 may give the instance a transform in double. */
 int32_t bth_builder_instance(bth_builder *builder, uint32_t object, const float transform[12], uint32_t *instance);
 
 /* Sets the transforms of `count` instances: the twelve numbers from transforms[12 * i] on are that of instances[i]. If an instance is
  * given several times, its last transform counts. If one does not exist or belongs to a subscene, none is set. */
 int32_t bth_builder_set_transforms(bth_builder *builder, const uint32_t *instances, const float *transforms, size_t count);
+int32_t bth_builder_set_transforms_f64(bth_builder *builder, const uint32_t *instances, const double *transforms, size_t count);
 
 /* Hides an instance from all queries if `visible` is 0, else shows it. An instance of a subscene is visible if the subscene and its
  * nodes are, too. */
@@ -522,6 +525,7 @@ int32_t bth_builder_subscene_instances(bth_builder *builder, uint32_t subscene, 
 
 /* Set the transform of a subscene, its time in seconds, and whether it is visible, and remove it with its instances. */
 int32_t bth_builder_set_subscene_transform(bth_builder *builder, uint32_t subscene, const float transform[12]);
+int32_t bth_builder_set_subscene_transform_f64(bth_builder *builder, uint32_t subscene, const double transform[12]);
 int32_t bth_builder_set_subscene_seconds(bth_builder *builder, uint32_t subscene, double seconds);
 int32_t bth_builder_set_subscene_visible(bth_builder *builder, uint32_t subscene, uint32_t visible);
 int32_t bth_builder_remove_subscene(bth_builder *builder, uint32_t subscene);

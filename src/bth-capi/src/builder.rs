@@ -184,7 +184,36 @@ pub unsafe extern "C" fn bth_builder_set_transforms(
     transforms: *const [f32; 12],
     count: usize,
 ) -> i32 {
-    let name = "bth_builder_set_transforms";
+    // SAFETY: the contract of this function is the contract of `set_transforms`.
+    unsafe { set_transforms(builder, "bth_builder_set_transforms", instances, transforms, count) }
+}
+
+/// Sets the transforms of instances in double; see `bth.h`.
+///
+/// # Safety
+/// The contract of [`bth_builder_set_transforms`].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_builder_set_transforms_f64(
+    builder: *mut SceneBuilder,
+    instances: *const u32,
+    transforms: *const [f64; 12],
+    count: usize,
+) -> i32 {
+    // SAFETY: the contract of this function is the contract of `set_transforms`.
+    unsafe { set_transforms(builder, "bth_builder_set_transforms_f64", instances, transforms, count) }
+}
+
+/// Sets the transforms of instances.
+///
+/// # Safety
+/// The contract of [`bth_builder_set_transforms`].
+unsafe fn set_transforms<T: Copy + Into<f64>>(
+    builder: *mut SceneBuilder,
+    name: &str,
+    instances: *const u32,
+    transforms: *const [T; 12],
+    count: usize,
+) -> i32 {
     if count == 0 {
         // SAFETY: the contract of this function includes the contract of `with`.
         return unsafe { with(builder, name, |_| Ok(())) };
@@ -276,7 +305,34 @@ pub unsafe extern "C" fn bth_builder_set_subscene_transform(
     subscene: u32,
     transform: *const [f32; 12],
 ) -> i32 {
-    let name = "bth_builder_set_subscene_transform";
+    // SAFETY: the contract of this function is the contract of `place_subscene`.
+    unsafe { place_subscene(builder, "bth_builder_set_subscene_transform", subscene, transform) }
+}
+
+/// Places a subscene in double; see `bth.h`.
+///
+/// # Safety
+/// The contract of [`bth_builder_set_subscene_transform`].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_builder_set_subscene_transform_f64(
+    builder: *mut SceneBuilder,
+    subscene: u32,
+    transform: *const [f64; 12],
+) -> i32 {
+    // SAFETY: the contract of this function is the contract of `place_subscene`.
+    unsafe { place_subscene(builder, "bth_builder_set_subscene_transform_f64", subscene, transform) }
+}
+
+/// Places a subscene.
+///
+/// # Safety
+/// The contract of [`bth_builder_set_subscene_transform`].
+unsafe fn place_subscene<T: Copy + Into<f64>>(
+    builder: *mut SceneBuilder,
+    name: &str,
+    subscene: u32,
+    transform: *const [T; 12],
+) -> i32 {
     // SAFETY: by contract it is null or points to 12 numbers.
     let Some(transform) = (unsafe { transform.as_ref() }) else { return null(name, "transform") };
     // SAFETY: the contract of this function includes the contract of `with`.

@@ -42,8 +42,9 @@ extern "C" {
 #define BTH_FREE_ALL 3u       /* 20 bytes a triangle */
 
 /* Values of bth_compile_options.positions: in which numbers to keep double positions. */
-#define BTH_POSITIONS_F32 0u
-#define BTH_POSITIONS_AUTO 1u /* in double where float would move a position by more than 2^-24 of the mesh's size */
+#define BTH_POSITIONS_AUTO 0u /* in double where float would move a position by more than 2^-24 of the mesh's size, and where
+                                 BTH_POSITIONS_F64 is possible */
+#define BTH_POSITIONS_F32 1u
 #define BTH_POSITIONS_F64 2u  /* in double, unless all numbers are floats. Excludes a deformable mesh, coordinate_bits, max_error,
                                  BTH_STRUCTURE_TETS, and free directions other than none and BTH_FREE_AUTO */
 
@@ -132,8 +133,8 @@ int32_t bth_compile_mesh(const bth_mesh *mesh, const bth_compile_options *option
 int32_t bth_compile_scene(const bth_mesh *meshes, size_t mesh_count, const bth_mesh_instance *instances, size_t instance_count,
                           const bth_compile_options *options, bth_bytes *bytes);
 
-/* As bth_compile_mesh and bth_compile_scene, for positions in double. Where all numbers are floats, the bytes are the same. A warning
- * says what rounding would show in a picture, and how many triangles lose their area. */
+/* As bth_compile_mesh and bth_compile_scene, for positions in double. Where all numbers are floats, the bytes are the same. If
+ * positions are rounded, a warning says what would show in a picture, and how many triangles lose their area. */
 int32_t bth_compile_mesh_f64(const bth_mesh64 *mesh, const bth_compile_options *options, bth_bytes *bytes);
 int32_t bth_compile_scene_f64(const bth_mesh64 *meshes, size_t mesh_count, const bth_mesh_instance *instances,
                               size_t instance_count, const bth_compile_options *options, bth_bytes *bytes);

@@ -95,8 +95,8 @@ impl Options {
             other => return unknown("quality", "0, 1 or 2", other),
         };
         options.positions = match self.positions {
-            0 => Positions::F32,
-            1 => Positions::Auto,
+            0 => Positions::Auto,
+            1 => Positions::F32,
             2 => Positions::F64,
             other => return unknown("positions", "0, 1 or 2", other),
         };

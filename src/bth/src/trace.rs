@@ -22,6 +22,7 @@ use crate::scene::Scene;
 use crate::start_points;
 use crate::starts::world_ray::WorldRay;
 use crate::streams::{HitStreams, RayStreams};
+use crate::surface;
 use crate::trace_ray::TraceRay;
 use crate::trace_ray::sealed::Traced;
 use crate::visible::{self, SegmentEnd};
@@ -154,6 +155,9 @@ impl Scene {
     }
 
     /// The numbers of a hit of a ray in f64; [`Hit64::MISS`] for a miss.
+    ///
+    /// They are the numbers of `hit` if the file keeps neither the place of the triangle in a leaf
+    /// nor the triangles of the source: for triangles in tetrahedra with `--no-geometry`.
     ///
     /// ```
     /// use bth::rays::Ray64;
@@ -327,7 +331,10 @@ fn hit_in_f64(scene: &Scene, ray: WorldRay<'_>, primitive: PrimitiveRef) -> Opti
     let entered = EnteredInstance::new(scene, primitive.instance);
     let of_instance = entered.ray(ray, ray.ray.tmax);
     let (exact, object) = (of_instance.exact(), entered.object);
-    let corners = object.exact_corners(primitive.triangle, corners_of(object, primitive.triangle)?);
+    let corners = match corners_of(object, primitive.triangle) {
+        Some(of_leaf) => object.exact_corners(primitive.triangle, of_leaf),
+        None => surface::triangle(object, primitive.triangle)?,
+    };
     let found = precise(&exact.rounded(), corners).or_else(|| match exact.line {
         LineSource::Ray => RayInInstance::in_world(None, 0, ray, ray.ray.tmax).exact(0).intersection(corners),
         LineSource::Start(start) => {

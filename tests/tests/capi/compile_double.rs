@@ -5,10 +5,9 @@ use bth_compile::Silent;
 use bth_compile::memory::{PositionRows, TriangleMesh};
 use bth_compile::pipeline::{CompileOptions, compile};
 use bth_format::File;
-use bth_import::Positions;
 
 #[test]
-fn a_c_program_keeps_positions_in_double_and_is_told_what_float_moves() {
+fn a_c_program_keeps_and_traces_positions_in_double_and_is_told_what_float_moves() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let Some(program) = program(folder.path(), "compile_double.c", &["bth", "bth_compile"]) else { return };
     let path = folder.path().join("far.bth");
@@ -21,20 +20,10 @@ fn a_c_program_keeps_positions_in_double_and_is_told_what_float_moves() {
         positions: PositionRows::F64(&positions),
         triangles: &[[0, 1, 2], [1, 3, 2], [0, 4, 5]],
     };
-    let options = CompileOptions { positions: Positions::Auto, ..CompileOptions::default() };
-    let (compiled, _) = compile(mesh, &options, &Silent).expect("it compiles");
+    let (compiled, _) = compile(mesh, &CompileOptions::default(), &Silent).expect("it compiles");
     let found = std::fs::read(&path).expect("a file");
     assert!(found == compiled.bytes);
     let file = File::from_bytes(&found).expect("a file");
     let corners = [0, 4, 5].map(|row: usize| positions[row]);
     assert_eq!(file.object(0).expect("an object").exact.corners(2), Some(corners));
-}
-
-#[test]
-fn a_c_program_traces_positions_in_double() {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let Some(program) = program(folder.path(), "compile_double.c", &["bth", "bth_compile"]) else { return };
-    let path = folder.path().join("far.bth");
-    let output = run(&program, &[path.to_str().expect("UTF-8"), "trace"], "");
-    assert!(output.status.success(), "{output:?}");
 }

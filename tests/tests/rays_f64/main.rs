@@ -146,6 +146,22 @@ fn rays_in_f64_have_the_exact_hits_of_several_objects() {
     }
 }
 
+/// Without TRIANGLE_PLACES the corners are read from the triangles of the source.
+#[test]
+fn rays_in_f64_have_the_exact_hits_of_files_without_places() {
+    let _choice = CHOICE.lock();
+    let names = ["triangle", "two-levels", "two-objects", "grid-16", "grid-21", "tets-link32", "tets-tet16"];
+    let files = bth_tests::conformance::valid();
+    for name in names {
+        let file = files.iter().find(|case| case.name == name).unwrap();
+        let scene = bth::from_bytes(&file.bytes).unwrap();
+        let places = (0..scene.object_count()).map(|object| scene.object(object).places.len());
+        assert_eq!(places.sum::<usize>(), 0, "{name}");
+        let hits = check(&scene, &rays(&models::images(&scene), 100, &mut Rng::new(1)), name);
+        assert!(hits > 30, "{name}: {hits}");
+    }
+}
+
 /// A random transform: rows of four.
 fn matrix(rng: &mut Rng) -> [f64; 12] {
     let coarse = rng.below(2) == 0;

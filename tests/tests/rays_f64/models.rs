@@ -55,7 +55,7 @@ fn place(rng: &mut Rng) -> [[f64; 4]; 3] {
 }
 
 /// The images of the triangles that have an area, rounded.
-fn images(scene: &Scene) -> Vec<Corners> {
+pub(crate) fn images(scene: &Scene) -> Vec<Corners> {
     let mut images = Vec::new();
     for instance in 0..scene.instance_count() {
         let rows = scene.instance(instance).to_world;

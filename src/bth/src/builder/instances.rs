@@ -8,7 +8,7 @@ use bth_format::{Code, Error};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StagedInstance {
     /// Rows of four; without meaning for an instance of a subscene.
-    pub(super) transform: [f32; 12],
+    pub(super) transform: [f64; 12],
     /// Index of its object, or `NONE` if the instance was removed.
     pub(super) object: u32,
     /// The subscene to which it belongs, or `NONE`.
@@ -43,16 +43,16 @@ impl StagedInstance {
 impl SceneBuilder {
     /// Adds an instance of an object; returns its id. `transform` maps object space to world space:
     /// the rows of a 3×4 matrix, one after the other, that is applied to columns (x, y, z, 1). It
-    /// may scale, shear and mirror.
+    /// may scale, shear and mirror. Its numbers are `f32` or `f64` and are not rounded.
     ///
     /// # Errors
     /// `BTH-O003` if there is no such object, `BTH-S005` if there are too many instances.
     /// [`Self::commit`] decides whether the transform can be used.
-    pub fn instance(&mut self, object: u32, transform: &[f32; 12]) -> Result<u32, Error> {
+    pub fn instance<T: Copy + Into<f64>>(&mut self, object: u32, transform: &[T; 12]) -> Result<u32, Error> {
         self.check_object(object)?;
         self.check_capacity(1)?;
-        let staged =
-            StagedInstance { transform: *transform, object, visible: true, ..StagedInstance::REMOVED };
+        let transform = transform.map(Into::into);
+        let staged = StagedInstance { transform, object, visible: true, ..StagedInstance::REMOVED };
         Ok(self.stage(staged))
     }
 
@@ -60,7 +60,11 @@ impl SceneBuilder {
     ///
     /// # Errors
     /// `BTH-S003` if there is no such instance, `BTH-S004` if it belongs to a subscene.
-    pub fn set_transform(&mut self, instance: u32, transform: &[f32; 12]) -> Result<(), Error> {
+    pub fn set_transform<T: Copy + Into<f64>>(
+        &mut self,
+        instance: u32,
+        transform: &[T; 12],
+    ) -> Result<(), Error> {
         self.set_transforms(&[instance], std::slice::from_ref(transform))
     }
 
@@ -73,12 +77,16 @@ impl SceneBuilder {
     ///
     /// # Panics
     /// If there are not as many transforms as instances.
-    pub fn set_transforms(&mut self, instances: &[u32], transforms: &[[f32; 12]]) -> Result<(), Error> {
+    pub fn set_transforms<T: Copy + Into<f64>>(
+        &mut self,
+        instances: &[u32],
+        transforms: &[[T; 12]],
+    ) -> Result<(), Error> {
         assert_eq!(instances.len(), transforms.len(), "as many transforms as instances");
         instances.iter().try_for_each(|id| self.check_own(*id))?;
         for (&id, transform) in instances.iter().zip(transforms) {
             let staged = &mut self.instances[id as usize];
-            staged.transform = *transform;
+            staged.transform = transform.map(Into::into);
             staged.mark(id, &mut self.changed);
         }
         Ok(())

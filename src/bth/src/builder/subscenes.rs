@@ -14,7 +14,8 @@ use std::collections::HashSet;
 /// Where a subscene is, at which time, and whether it is visible.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SubscenePose {
-    pub(super) transform: [f32; 12],
+    /// Rows of four.
+    pub(super) transform: [f64; 12],
     pub(super) seconds: f64,
     pub(super) visible: bool,
 }
@@ -36,7 +37,7 @@ pub(super) struct Subscene {
 
 impl Subscene {
     /// A subscene of the file that begins with an object. It has no ids yet.
-    pub(super) fn new(objects: &Objects, first_object: u32, transform: [f32; 12]) -> Subscene {
+    pub(super) fn new(objects: &Objects, first_object: u32, transform: [f64; 12]) -> Subscene {
         let view = scene(objects, first_object);
         let seconds = view.map_or(0.0, |view| f64::from(view.scene[0].first_frame) / view.scene[0].rate);
         Subscene {
@@ -86,7 +87,7 @@ impl Subscene {
     /// The transform of a node of the file to world space as evaluated, and whether it is visible.
     /// An object that is `skinned` is not moved by its node.
     pub(super) fn node(&self, objects: &Objects, node: u32, skinned: bool) -> (Affine, bool) {
-        let outer = Affine::from_f32(&self.pose.transform);
+        let outer = Affine::from_rows(&self.pose.transform);
         match (scene(objects, self.first_object), &self.hierarchy) {
             (_, Some(hierarchy)) if skinned => (outer, self.pose.visible && !hierarchy.invisible(node)),
             (Some(view), Some(hierarchy)) => {
@@ -112,7 +113,7 @@ impl StagedInstance {
         let owner = subscenes.get(subscene as usize).and_then(Option::as_ref);
         let (to_world, shown) = match owner {
             Some(owner) => owner.node(objects, node, skinned.contains(&object)),
-            None => (Affine::from_f32(&self.transform), true),
+            None => (Affine::from_rows(&self.transform), true),
         };
         NewInstance { row: InstanceRow { object, node, to_world }, visible: visible && shown }
     }
@@ -135,7 +136,11 @@ impl SceneBuilder {
     /// # Errors
     /// `BTH-O003` if there is no such object, or it is not the first of its file; `BTH-S005` if
     /// there are too many instances.
-    pub fn subscene(&mut self, first_object: u32, transform: &[f32; 12]) -> Result<u32, Error> {
+    pub fn subscene<T: Copy + Into<f64>>(
+        &mut self,
+        first_object: u32,
+        transform: &[T; 12],
+    ) -> Result<u32, Error> {
         self.check_object(first_object)?;
         let (_, row) = self.scene.file_of(first_object);
         if row != 0 {
@@ -149,7 +154,7 @@ impl SceneBuilder {
             self.subscenes.push(None);
             (self.subscenes.len() - 1) as u32
         });
-        let mut subscene = Subscene::new(self.scene.objects(), first_object, *transform);
+        let mut subscene = Subscene::new(self.scene.objects(), first_object, transform.map(Into::into));
         let staged = |(object, node): (u32, u32)| StagedInstance {
             object,
             node,
@@ -176,8 +181,12 @@ impl SceneBuilder {
     ///
     /// # Errors
     /// `BTH-S003` if there is no such subscene.
-    pub fn set_subscene_transform(&mut self, subscene: u32, transform: &[f32; 12]) -> Result<(), Error> {
-        self.pose(subscene)?.transform = *transform;
+    pub fn set_subscene_transform<T: Copy + Into<f64>>(
+        &mut self,
+        subscene: u32,
+        transform: &[T; 12],
+    ) -> Result<(), Error> {
+        self.pose(subscene)?.transform = transform.map(Into::into);
         Ok(())
     }
 

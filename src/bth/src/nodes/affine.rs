@@ -5,7 +5,6 @@ use crate::intersect::origin::{RoundedLine, RoundedOrigin};
 use crate::intersect::vector::max_norm;
 use crate::rays::Ray;
 use crate::simd::LANES;
-use bth_format::layout::Node;
 
 /// Max condition number, in the maximum norm, of transforms that are not treated as singular.
 /// Beyond it f32 would exclude nothing in object space.
@@ -114,24 +113,11 @@ impl Affine {
         Affine { linear: rotation.map(|r| [r[0] * sx, r[1] * sy, r[2] * sz]), translation: [t0, t1, t2] }
     }
 
-    /// The transform of a node with a matrix.
-    pub(crate) fn of_matrix(node: &Node) -> Affine {
-        let t = &node.transform;
-        let row = |i: usize| [t[4 * i], t[4 * i + 1], t[4 * i + 2]];
-        Affine { linear: [row(0), row(1), row(2)], translation: [t[3], t[7], t[11]] }
-    }
-
     /// The transform with the rows of four of `m`, one after the other.
     #[inline(always)]
-    pub(crate) fn from_f32(m: &[f32; 12]) -> Affine {
-        let mut affine = Affine::IDENTITY;
-        for i in 0..3 {
-            for j in 0..3 {
-                affine.linear[i][j] = f64::from(m[4 * i + j]);
-            }
-            affine.translation[i] = f64::from(m[4 * i + 3]);
-        }
-        affine
+    pub(crate) fn from_rows(m: &[f64; 12]) -> Affine {
+        let row = |i: usize| [m[4 * i], m[4 * i + 1], m[4 * i + 2]];
+        Affine { linear: [row(0), row(1), row(2)], translation: [m[3], m[7], m[11]] }
     }
 
     /// The product: `inner` is applied first, then `self`.

@@ -145,7 +145,7 @@ impl NodeHierarchy {
     fn local(&self, view: &SceneView<'_>, row: u32) -> Affine {
         let node = &view.nodes[row as usize];
         if node.flags & NODE_MATRIX != 0 {
-            Affine::of_matrix(node)
+            Affine::from_rows(&node.transform)
         } else {
             Affine::from_parts(&self.parts(view, row))
         }
@@ -179,7 +179,7 @@ impl NodeHierarchy {
     fn has_size(&self, view: &SceneView<'_>, row: u32) -> bool {
         let node = &view.nodes[row as usize];
         if node.flags & NODE_MATRIX != 0 {
-            return !Affine::of_matrix(node).is_zero();
+            return !Affine::from_rows(&node.transform).is_zero();
         }
         let scale = [node.transform[7], node.transform[8], node.transform[9]];
         let value = self.value_of(view, row, Property::Scale);

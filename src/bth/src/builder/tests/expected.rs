@@ -11,7 +11,7 @@ use bth_format::layout::NONE;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ExpectedInstance {
     pub(super) object: u32,
-    pub(super) transform: [f32; 12],
+    pub(super) transform: [f64; 12],
     pub(super) visible: bool,
     /// The subscene, and the number of the instance in its file.
     pub(super) subscene: Option<(u32, u32)>,
@@ -22,7 +22,7 @@ pub(super) struct ExpectedInstance {
 pub(super) struct ExpectedSubscene {
     /// The index of its file in [`FILES`].
     pub(super) file: usize,
-    pub(super) transform: [f32; 12],
+    pub(super) transform: [f64; 12],
     pub(super) seconds: f64,
     pub(super) visible: bool,
 }
@@ -56,10 +56,10 @@ impl Expected {
     /// The transform of an instance and whether it is visible. The nodes of a subscene are taken
     /// from its file, opened alone.
     pub(super) fn transform(&self, instance: &ExpectedInstance) -> (Affine, bool) {
-        let own = Affine::from_f32(&instance.transform);
+        let own = Affine::from_rows(&instance.transform);
         let Some((id, row)) = instance.subscene else { return (own, instance.visible) };
         let subscene = self.subscenes[id as usize].expect("a subscene of an instance");
-        let outer = Affine::from_f32(&subscene.transform);
+        let outer = Affine::from_rows(&subscene.transform);
         let mut file = crate::from_bytes(FILES[subscene.file]).unwrap();
         file.set_seconds(subscene.seconds).unwrap();
         let visible = instance.visible && subscene.visible;
@@ -112,8 +112,6 @@ impl Expected {
         let mut builder = SceneBuilder::new();
         FILES.iter().for_each(|bytes| _ = builder.add(&crate::from_bytes(bytes).unwrap()));
         for (id, instance) in self.instances.iter().enumerate() {
-            // Instances of subscenes are placed like single ones, if f32 holds their transform
-            // exactly.
             let (object, transform, visible) = match instance {
                 Some(i) => (i.object, i.transform, i.visible),
                 None => (0, IDENTITY, false),

@@ -6,7 +6,7 @@ mod sequences;
 mod top_level;
 
 use super::*;
-use crate::rays::{Hit, Ray};
+use crate::rays::{Hit, Ray, Ray64};
 use bth_random::Rng;
 
 macro_rules! files {
@@ -28,10 +28,10 @@ const FILES: [&[u8]; 8] = files![
     "no-objects",
 ];
 
-const IDENTITY: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+const IDENTITY: [f64; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
-fn at(x: f32, y: f32, z: f32) -> [f32; 12] {
-    [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z]
+fn at(x: impl Into<f64>, y: impl Into<f64>, z: impl Into<f64>) -> [f64; 12] {
+    [1.0, 0.0, 0.0, x.into(), 0.0, 1.0, 0.0, y.into(), 0.0, 0.0, 1.0, z.into()]
 }
 
 fn unit(rng: &mut Rng) -> f32 {
@@ -113,6 +113,29 @@ fn ids_are_stable_and_used_again_only_after_the_commit_that_frees_them() {
     let accept = crate::Accept { mask: 1, ..crate::Accept::default() };
     let hit = builder.scene().nearest_accepted(&ray, &accept).expect("a mask is dropped with its instance");
     assert_eq!(hit.primitive.instance, 3);
+}
+
+#[test]
+fn transforms_in_f64_are_not_rounded() {
+    let cube = crate::from_bytes(include_bytes!("../../../doc/cube.bth")).unwrap();
+    let (mut builder, x) = (SceneBuilder::new(), 5_500_000.3);
+    let object = builder.add(&cube);
+    let own = builder.instance(object, &at(x, 0.0, 0.0)).unwrap();
+    let whole = builder.subscene(object, &IDENTITY).unwrap();
+    builder.set_subscene_transform(whole, &at(-x, 0.0, 0.0)).unwrap();
+    builder.commit().unwrap();
+    let scene = builder.scene();
+    let ray = Ray64::new([x + 10.0, 0.5, 0.25], [-1.0, 0.0, 0.0]);
+    let hit = scene.nearest(&ray).unwrap();
+    // The differences are exact.
+    let t = ray.origin[0] - x - 1.0;
+    let found = scene.hit_f64(&ray, &hit);
+    assert!(hit.primitive.instance == own && (found.t - t).abs() <= 1e-9, "{found:?}, {t}");
+    // The border of the cube is hit, the number next to it is not.
+    for (border, beyond) in [(x, x.next_down()), (1.0 - x, (1.0 - x).next_up())] {
+        let down = |x: f64| Ray64::new([x, 0.5, 9.0], [0.0, 0.0, -1.0]);
+        assert!(scene.any(&down(border)) && !scene.any(&down(beyond)), "{border}");
+    }
 }
 
 #[test]

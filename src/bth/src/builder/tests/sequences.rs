@@ -5,21 +5,21 @@ use super::*;
 use crate::Accept;
 
 /// A random transform; one in six cannot be used, and one in eight is tiny, huge or mirrored.
-fn transform(rng: &mut Rng) -> [f32; 12] {
+fn transform(rng: &mut Rng) -> [f64; 12] {
     let mut m = at(unit(rng) * 6.0, unit(rng) * 6.0, unit(rng) * 6.0);
     if rng.below(4) > 0 {
         for k in 0..9 {
-            m[k + k / 3] += unit(rng) * 0.7;
+            m[k + k / 3] += f64::from(unit(rng)) * 0.7;
         }
     }
-    let scale = |m: &mut [f32; 12], s: f32| (0..9).for_each(|k| m[k + k / 3] *= s);
+    let scale = |m: &mut [f64; 12], s: f64| (0..9).for_each(|k| m[k + k / 3] *= s);
     match rng.below(48) {
         0 => m[4..7].fill(0.0),
         1 => (0..3).for_each(|k| m[8 + k] = 2.0 * m[4 + k]),
         2 => scale(&mut m, 0.0),
-        3 => m[rng.below(12) as usize] = f32::NAN,
-        4 => m[rng.below(12) as usize] = f32::INFINITY,
-        5 => m[3] = f32::MAX,
+        3 => m[rng.below(12) as usize] = f64::NAN,
+        4 => m[rng.below(12) as usize] = f64::INFINITY,
+        5 => m[3] = f32::MAX.into(),
         6 => (0..3).for_each(|k| m[4 + k] *= 1e-9),
         7 => scale(&mut m, 3e38),
         8 | 9 => scale(&mut m, 1e-30),
@@ -66,7 +66,7 @@ impl Case {
         Case { builder, expected: Expected::default(), firsts }
     }
 
-    fn change(&mut self, rng: &mut Rng, transforms: &mut dyn FnMut(&mut Rng) -> [f32; 12]) {
+    fn change(&mut self, rng: &mut Rng, transforms: &mut dyn FnMut(&mut Rng) -> [f64; 12]) {
         let Case { builder, expected, .. } = self;
         let own = expected.ids(|i| i.subscene.is_none());
         let any = expected.ids(|_| true);
@@ -103,7 +103,7 @@ impl Case {
         }
     }
 
-    fn change_subscenes(&mut self, rng: &mut Rng, transforms: &mut dyn FnMut(&mut Rng) -> [f32; 12]) {
+    fn change_subscenes(&mut self, rng: &mut Rng, transforms: &mut dyn FnMut(&mut Rng) -> [f64; 12]) {
         let Case { builder, expected, firsts } = self;
         let there: Vec<u32> = (0..expected.subscenes.len() as u32)
             .filter(|id| expected.subscenes[*id as usize].is_some())

@@ -38,7 +38,7 @@ pub(super) fn check(scene: &Scene) {
 }
 
 /// A builder with many instances in a cube, not committed.
-fn crowd(count: usize, rng: &mut Rng) -> (SceneBuilder, Vec<u32>, Vec<[f32; 12]>) {
+fn crowd(count: usize, rng: &mut Rng) -> (SceneBuilder, Vec<u32>, Vec<[f64; 12]>) {
     let mut builder = SceneBuilder::new();
     let objects = [0, 1].map(|i| builder.add(&crate::from_bytes(FILES[i]).unwrap()));
     let side = (count as f32).cbrt() * 2.0;
@@ -49,11 +49,11 @@ fn crowd(count: usize, rng: &mut Rng) -> (SceneBuilder, Vec<u32>, Vec<[f32; 12]>
 }
 
 #[cfg(feature = "rayon")]
-fn aimed(places: &[[f32; 12]], rng: &mut Rng, count: usize) -> Vec<Ray> {
+fn aimed(places: &[[f64; 12]], rng: &mut Rng, count: usize) -> Vec<Ray> {
     (0..count)
         .map(|_| {
             let m = places[rng.below(places.len() as u64) as usize];
-            let target = [m[3] + 0.25, m[7] + 0.25, m[11]];
+            let target = [m[3] + 0.25, m[7] + 0.25, m[11]].map(|x| x as f32);
             let origin = target.map(|x| x + unit(rng) * 20.0);
             Ray::new(origin, [0, 1, 2].map(|k| target[k] - origin[k]))
         })
@@ -70,7 +70,9 @@ fn small_motions_refit_and_great_ones_rebuild() {
     let mut greatest = 1.0f64;
     let mut rebuilt = 0;
     for step in 0..60 {
-        places.iter_mut().for_each(|m| [3, 7, 11].into_iter().for_each(|k| m[k] += unit(rng) * 0.8));
+        places
+            .iter_mut()
+            .for_each(|m| [3, 7, 11].into_iter().for_each(|k| m[k] += f64::from(unit(rng)) * 0.8));
         builder.set_transforms(&ids, &places).unwrap();
         let update = builder.commit().unwrap();
         assert!(update.cost_ratio <= 1.5 && update.rebuilt == (update.cost_ratio == 1.0), "{update:?}");

@@ -82,8 +82,9 @@ def test_above_ground(axis):
 
 
 def test_lines_longer_than_float32_are_followed_to_their_end():
+    vertices = np.float32([[1e38, -1e37, -1e37], [1e38, 1e37, -1e37], [1e38, 0, 1e37]])
     with pytest.warns(UserWarning):
-        scene = bth.compile((np.array([[1e38, -1e37, -1e37], [1e38, 1e37, -1e37], [1e38, 0, 1e37]]), [[0, 1, 2]]))
+        scene = bth.compile((vertices, [[0, 1, 2]]))
     ends = [[3e38, 0, 0], [9e37, 0, 0]]
     assert bth.bake.line_of_sight(scene, ends, [-3e38, 0, 0]).tolist() == [False, True]
 

@@ -113,13 +113,13 @@ fn updates_and_answers_do_not_depend_on_the_number_of_threads() {
             for step in 0..5 {
                 if step == 2 {
                     let mut wrong = places.clone();
-                    wrong[8_000][0] = f32::NAN;
+                    wrong[8_000][0] = f64::NAN;
                     wrong[5_000][..3].fill(0.0);
                     builder.set_transforms(&ids, &wrong).unwrap();
                     let error = builder.commit().unwrap_err().to_string();
                     assert!(error.contains("instance 5000, "), "{error}");
                 }
-                places.iter_mut().for_each(|m| m[3 + 4 * (step % 3)] += unit(rng) * 0.4);
+                places.iter_mut().for_each(|m| m[3 + 4 * (step % 3)] += f64::from(unit(rng)) * 0.4);
                 builder.set_transforms(&ids, &places).unwrap();
                 if step == 4 {
                     (0..4000).for_each(|id| builder.remove(2 * id).unwrap());

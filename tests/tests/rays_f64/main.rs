@@ -1,6 +1,7 @@
 //! Rays in f64 against exact arithmetic: through models, through files of several objects and
 //! through instances, alone and in batches, on every instruction set.
 
+mod building;
 mod models;
 
 use bth::rays::{Hit, Hit64, Ray64};

@@ -34,7 +34,7 @@ pub struct Tiles {
     /// Edges that two instances share, rounded to f64.
     pub borders: Vec<[Vector; 2]>,
     /// Points inside.
-    pub(super) inside: Vec<[f32; 3]>,
+    pub inside: Vec<[f32; 3]>,
     /// True if corners have so few bits that f64 has them exactly.
     pub(super) is_exact: bool,
     /// The linear part of the surface's transform.

@@ -1,6 +1,6 @@
 //! The chart: wrong answers per million against nanoseconds for a query, both logarithmic. A large
-//! panel shows the means of the sets in f32, a tall one the set in f64, and small ones each of the
-//! others. Engines have numbers; ours is red, and those that take f64 are hollow.
+//! panel shows the means of the sets in f32, those beside it the sets in f64, and small ones each of
+//! the others. Engines have numbers; ours is red, and others that take f64 are hollow.
 
 use super::sets::Set;
 use super::{Line, Outcome};
@@ -19,7 +19,7 @@ const HEAD: &str = "\
 text.title { font: bold 13px sans-serif; fill: black } .e { text-anchor: end } .m { text-anchor: middle } \
 text.in { fill: #2f5d8a } circle { fill: #2f5d8a; stroke: #2f5d8a; stroke-width: 1.5 } .m.single { fill: white } \
 circle.double { fill: white } .ours circle { stroke: #d6204e; fill: #d6204e } text.in.ours { fill: #d6204e; \
-font-weight: bold }</style>
+font-weight: bold } .ours .m { fill: white }</style>
 <text x=\"20\" y=\"32\" style=\"font: bold 20px sans-serif; fill: black\">Wrong answers against time</text>
 <text x=\"20\" y=\"53\" style=\"font-size: 13px\">down: fewer wrong answers · left: faster · filled: takes f32 · \
 hollow: takes f64 · red: bth</text>
@@ -56,11 +56,13 @@ pub(super) fn draw(sets: &[Set], lines: &[Line<'_>]) -> String {
     let mean = |line| Line::mean(line, sets).map(|(wrong, ns)| Point(line, wrong, ns));
     let title = "the sets in f32 that an engine answers, mean";
     large.draw(&mut svg, title, lines.iter().filter_map(mean).collect());
-    let mut cell = 0;
+    let (mut cell, mut beside) = (0, 60.0);
+    let tall = LARGE_HEIGHT / (sets.len() - small).max(1) as f64;
     for (i, set) in sets.iter().enumerate() {
-        let (mut area, mut title) =
-            ([wide, 60.0, WIDTH, 60.0 + LARGE_HEIGHT], format!("{}, in f64", set.name));
-        if set.single {
+        let (mut area, mut title) = ([wide, beside, WIDTH, beside + tall], format!("{}, in f64", set.name));
+        if !set.single {
+            beside += tall;
+        } else {
             let width = WIDTH / COLUMNS as f64;
             let (x, y) = ((cell % COLUMNS) as f64 * width, below + (cell / COLUMNS) as f64 * SMALL_HEIGHT);
             (area, title) = ([x, y, x + width, y + SMALL_HEIGHT], set.name.to_owned());

@@ -5,15 +5,19 @@ use super::process::Process;
 use super::sets::{Place, Query, Question, Set};
 use crate::clock::Clock;
 use crate::model::Model;
-use crate::rivals::RIVALS;
-use crate::structures::{self, BATCH};
+use crate::rivals::{RIVALS, embree};
+use crate::scenes::Placed;
+use crate::structures::{BATCH, BTH};
 use crate::tracer::{Batch, Tracer};
 use anyhow::{Context, Result, anyhow, bail};
-use bth::Scene;
-use bth::rays::{Hit, Ray, Start, StartRay};
-use bth_import::Mesh;
+use bth::rays::{Hit, Ray, Ray64, Start, StartRay};
+use bth::{Scene, TraceRay};
+use bth_compile::memory::{self, PositionRows, TriangleMesh};
+use bth_compile::{Silent, pipeline::CompileOptions};
+use bth_import::{Mesh, Positions};
 use glam::DVec3;
 use serde::Deserialize;
+use std::sync::Arc;
 
 /// An engine, as `truth/engines.toml` lists it.
 #[derive(Debug, Deserialize)]
@@ -107,16 +111,16 @@ impl Engine {
         Ok(toml::from_str::<File>(include_str!("../../truth/engines.toml"))?.engines)
     }
 
-    /// Returns true for bth.
+    /// Returns true for bth with the caller's own numbers.
     pub(super) fn is_ours(&self) -> bool {
-        matches!(self.how, How::Ours)
+        matches!(self.how, How::Ours) && !self.single
     }
 
     /// Starts the engine.
     pub(super) fn start(&self) -> Result<Box<dyn Running>> {
         Ok(match &self.how {
-            How::Ours => Box::new(Ours::default()),
-            How::Rival(name) => Box::new(LinkedRival { name: name.clone(), loaded: None, coherent: false }),
+            How::Ours => Box::new(Ours { single: self.single, ..Ours::default() }),
+            How::Rival(name) => Box::new(LinkedRival { name: name.clone(), ..LinkedRival::default() }),
             How::Program(program) => Box::new(Process::start(program, &self.name)?),
         })
     }
@@ -168,19 +172,31 @@ impl Asked {
     }
 }
 
-fn answer(hit: &Hit) -> EngineAnswer {
+/// The answer that a hit is; each instance has `triangles`.
+fn answer(hit: &Hit, t: f64, triangles: u32) -> EngineAnswer {
     if hit.is_hit() {
-        EngineAnswer { t: f64::from(hit.t), id: hit.primitive.triangle }
+        EngineAnswer { t, id: hit.primitive.instance * triangles + hit.primitive.triangle }
     } else {
         EngineAnswer::MISS
     }
 }
 
-/// Ours, as users are advised: rays from surfaces start at exact points.
+/// Triangles of the object of a set's instances.
+fn of_instance(set: &Set) -> u32 {
+    set.scene.as_ref().map_or(0, |scene| scene.object(0).header.triangles)
+}
+
+/// Ours, as users are advised: rays from surfaces start at exact points, and what is in f64 stays
+/// so.
 #[derive(Default)]
 struct Ours {
-    loaded: Option<(Scene, Query)>,
+    /// True if everything is rounded to f32.
+    single: bool,
+    loaded: Option<(Arc<Scene>, Query)>,
+    of_instance: u32,
     rays: Vec<Ray>,
+    /// The same in f64, if the set is in f64.
+    wide: Vec<Ray64>,
     starts: Vec<StartRay>,
     ends: Vec<Start>,
     points: Vec<[f32; 3]>,
@@ -188,12 +204,22 @@ struct Ours {
 
 impl Running for Ours {
     fn load(&mut self, set: &Set, asked: &[Asked]) -> Result<()> {
-        let folder = tempfile::tempdir()?;
-        let path = folder.path().join("model.ply");
-        bth_scenes::write::file(&set.model(), &path)?;
-        let compiled = structures::compile(&Model::load(&path.to_string_lossy())?, &structures::BTH)?;
-        self.loaded = Some((bth::from_bytes(&compiled.bytes)?, set.query));
+        if self.single && set.single {
+            bail!("as bth");
+        }
+        let positions = if self.single { Positions::F32 } else { Positions::Auto };
+        let options = CompileOptions { positions, ..BTH.options() };
+        let mesh = TriangleMesh { positions: PositionRows::F64(&set.positions), triangles: &set.triangles };
+        let scene = match &set.scene {
+            Some(scene) => scene.clone(),
+            None => Arc::new(memory::open(mesh, &options, &Silent)?),
+        };
+        self.loaded = Some((scene, set.query));
+        self.of_instance = of_instance(set);
         self.rays = asked.iter().map(Asked::ray).collect();
+        let wide = |of: &Asked| Ray64::new(of.origin.to_array(), of.direction.to_array());
+        let is_wide = !self.single && !set.single;
+        self.wide = asked.iter().filter(|_| is_wide).map(wide).collect();
         self.points = self.rays.iter().map(|ray| ray.origin).collect();
         let questions = || asked.iter().map(|asked| &set.questions[asked.row]).zip(&self.rays);
         self.starts = questions().filter_map(|(q, ray)| Some(q.from?.start.ray(ray.direction))).collect();
@@ -205,6 +231,7 @@ impl Running for Ours {
         let (scene, query) = self.loaded.as_ref().context("nothing is loaded")?;
         let mut hits = vec![Hit::MISS; self.rays.len()];
         let mut flags = vec![false; self.rays.len()];
+        let mut exact = vec![0.0; self.wide.len()];
         let seconds = Clock::ThreadCpu.time(|| match query {
             Query::Inside => scene.contains_batch(&self.points, &mut flags),
             Query::Visible => {
@@ -212,30 +239,56 @@ impl Running for Ours {
                     *flag = scene.visible(a.start, *b);
                 }
             }
-            Query::Nearest if !self.starts.is_empty() => {
-                for (rays, hits) in self.starts.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
-                    scene.batch(rays).nearest(hits);
+            Query::Nearest if !self.starts.is_empty() => trace(scene, &self.starts, &mut hits),
+            Query::Nearest if !self.wide.is_empty() => {
+                trace(scene, &self.wide, &mut hits);
+                for ((ray, hit), t) in self.wide.iter().zip(&hits).zip(&mut exact) {
+                    *t = scene.hit_f64(ray, hit).t;
                 }
             }
-            Query::Nearest => {
-                for (rays, hits) in self.rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
-                    scene.batch(rays).nearest(hits);
-                }
-            }
+            Query::Nearest => trace(scene, &self.rays, &mut hits),
         });
+        let t = |(i, hit): (usize, &Hit)| exact.get(i).copied().unwrap_or(hit.t.into());
         let answers = match query {
-            Query::Nearest => hits.iter().map(answer).collect(),
+            Query::Nearest => {
+                hits.iter().enumerate().map(|of| answer(of.1, t(of), self.of_instance)).collect()
+            }
             _ => flags.into_iter().map(EngineAnswer::flag).collect(),
         };
         Ok((seconds, answers))
     }
 }
 
+fn trace<R: TraceRay>(scene: &Scene, rays: &[R], hits: &mut [Hit]) {
+    for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
+        scene.batch(rays).nearest(hits);
+    }
+}
+
 /// A rival of `speed`.
+#[derive(Default)]
 struct LinkedRival {
     name: String,
     loaded: Option<(Box<dyn Tracer>, Query, Vec<Ray>)>,
+    of_instance: u32,
     coherent: bool,
+}
+
+impl LinkedRival {
+    fn build(&self, set: &Set) -> Result<Box<dyn Tracer>> {
+        let variant = match &*self.name {
+            "embree" => Some(embree::DEFAULT),
+            "embree robust" => Some(embree::ROBUST),
+            _ => None,
+        };
+        if let (Some(scene), Some(variant)) = (&set.scene, variant) {
+            return Ok(Box::new(Placed::of(scene).build(&variant, 1)?));
+        }
+        let bth_scenes::Model { positions, triangles } = set.model();
+        let model = Model::in_memory("", Mesh { positions, triangles, ..Mesh::default() });
+        let rival = RIVALS.iter().find(|rival| rival.name == self.name).context("no such rival")?;
+        Ok(rival.build(&model, 1)?.tracer)
+    }
 }
 
 impl Running for LinkedRival {
@@ -243,13 +296,12 @@ impl Running for LinkedRival {
         if set.query == Query::Inside {
             bail!("has no such query");
         }
-        let bth_scenes::Model { positions, triangles } = set.model();
-        let model = Model::in_memory("", Mesh { positions, triangles, ..Mesh::default() });
-        let rival = RIVALS.iter().find(|rival| rival.name == self.name).context("no such rival")?;
         let rays = asked.iter().map(Asked::ray).collect();
         // Crates may panic.
-        let built = std::panic::catch_unwind(|| rival.build(&model, 1)).map_err(|_| anyhow!("panics"))??;
-        self.loaded = Some((built.tracer, set.query, rays));
+        let build = std::panic::AssertUnwindSafe(|| self.build(set));
+        let tracer = std::panic::catch_unwind(build).map_err(|_| anyhow!("panics"))??;
+        self.loaded = Some((tracer, set.query, rays));
+        self.of_instance = of_instance(set);
         self.coherent = set.coherent;
         Ok(())
     }
@@ -264,6 +316,7 @@ impl Running for LinkedRival {
         }
         let mut hits = vec![Hit::MISS; rays.len()];
         let seconds = Clock::ThreadCpu.time(|| tracer.nearest(batch, &mut hits));
-        Ok((seconds, hits.iter().map(answer).collect()))
+        let found = |hit: &Hit| answer(hit, hit.t.into(), self.of_instance);
+        Ok((seconds, hits.iter().map(found).collect()))
     }
 }

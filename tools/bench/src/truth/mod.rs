@@ -1,12 +1,13 @@
 //! Wrong answers against time, for engines from package registries.
 //!
-//! `sets` makes the queries, `exact` answers them by rational arithmetic, `engines` knows the
+//! `sets` and `instances` make the queries, `exact` answers them by rational arithmetic, `engines` knows the
 //! engines and how each leaves a surface, `process` talks to those that are programs,
 //! `judge` compares, and `page` and `chart` show it.
 
 mod chart;
 mod engines;
 mod exact;
+mod instances;
 mod judge;
 mod page;
 mod process;
@@ -163,8 +164,7 @@ fn add(report: &mut Report, engine: &Engine, set: &Set, outcome: &Result<Outcome
     } else if judgement.error_of_t > 0.0 {
         report.add(&of, set.name, judgement.error_of_t, "error of t");
     }
-    // In national coordinates f32 input is not the caller's.
-    if ours && set.single && judgement.wrong() > 0 {
+    if ours && judgement.wrong() > 0 {
         report.wrong.push(format!("{} of {} on {}", judgement.wrong(), judgement.answers, set.name));
     }
 }

@@ -27,7 +27,14 @@ pub(super) fn write(head: &Head, queries: usize, sets: &[Set], lines: &[Line<'_>
         .replace("{table}", &table(&words(&columns), &rows))
         .replace("{said}", &text(&["set", "not more wrong", "faster"], said))
         .replace("{one-sided}", &list(lines.iter().filter_map(|line| one_sided(line, sets)).collect()))
-        .replace("{missed}", &list(lines.iter().filter_map(|line| missed(line, sets)).collect()))
+        .replace(
+            "{missed}",
+            &list(lines.iter().filter_map(|line| missed(line, sets, |set| set.single)).collect()),
+        )
+        .replace(
+            "{leaks}",
+            &list(lines.iter().filter_map(|line| missed(line, sets, |set| set.scene.is_some())).collect()),
+        )
         .replace("{errors}", &list(lines.iter().filter_map(|line| error_of_t(line, sets)).collect()))
         .replace("{sets}", &text(&["set", "queries", "triangles"], sets.iter().map(about).collect()))
         .replace(
@@ -77,9 +84,9 @@ fn comparison(name: &str, set: usize, lines: &[Line<'_>]) -> Option<Vec<String>>
     Some(vec![name.to_owned(), others(&|other| other.0 <= wrong), others(&|other| other.1 < ns)])
 }
 
-/// Rays of the sets in f32 that hit and found nothing, per million.
-fn missed(line: &Line<'_>, sets: &[Set]) -> Option<String> {
-    let is_asked = |set: &Set| set.single && set.query == Query::Nearest;
+/// Rays of some sets that hit and found nothing, per million.
+fn missed(line: &Line<'_>, sets: &[Set], is_one: fn(&Set) -> bool) -> Option<String> {
+    let is_asked = |set: &Set| is_one(set) && set.query == Query::Nearest;
     let asked = sets.iter().zip(&line.outcomes).filter(|(set, _)| is_asked(set));
     let counts = asked.filter_map(|(_, outcome)| Some(outcome.as_ref().ok()?.judgement));
     let (missed, all) = counts.fold((0, 0), |(missed, all), of| (missed + of.missed, all + of.answers));

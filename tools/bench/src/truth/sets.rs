@@ -1,9 +1,11 @@
 //! The sets of queries: seeded, and the same numbers for everybody.
 
 use super::exact::{ExactAnswer, Surface};
+use super::instances;
 use crate::accuracy::aimed_rays::{self, Target};
 use crate::model::{Model, position};
 use crate::rays::{Camera, cosine_weighted, on_sphere, perpendicular};
+use bth::Scene;
 use bth::rays::{PrimitiveRef, Ray, Start};
 use bth_import::Mesh;
 use bth_random::Rng;
@@ -11,6 +13,7 @@ use bth_scenes::{Model as Mesh32, catalogue};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// What is asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,6 +68,8 @@ pub(super) struct Set {
     pub(super) coherent: bool,
     pub(super) positions: Vec<[f64; 3]>,
     pub(super) triangles: Vec<[u32; 3]>,
+    /// The same as instances of one object, one after the other.
+    pub(super) scene: Option<Arc<Scene>>,
     pub(super) questions: Vec<Question>,
     /// The exact answers.
     pub(super) truths: Vec<ExactAnswer>,
@@ -73,14 +78,14 @@ pub(super) struct Set {
 /// The exact answer to a question about a surface; `None` if definitions would decide it.
 type Solve = fn(&Surface, &Question) -> Option<ExactAnswer>;
 
-const NEAREST: Solve = |surface, q| surface.nearest(q.origin, q.direction);
+pub(super) const NEAREST: Solve = |surface, q| surface.nearest(q.origin, q.direction);
 const FROM_START: Solve = |surface, q| Some(surface.nearest_from_start(&q.from?.start, q.direction));
 const INSIDE: Solve = |surface, q| surface.inside(q.origin);
 const VISIBLE: Solve = |surface, q| Some(surface.visible(&q.from?.start, &q.to?.start));
 
 impl Set {
     /// A set of at most `count` of these questions.
-    fn new(
+    pub(super) fn new(
         (name, about): (&'static str, &'static str),
         query: Query,
         surface: &Surface,
@@ -92,8 +97,8 @@ impl Set {
         let both = questions.into_iter().zip(truths).filter_map(|(question, truth)| Some((question, truth?)));
         let (questions, truths) = both.take(count).unzip();
         let (positions, triangles) = (surface.positions.clone(), surface.triangles.clone());
-        let (single, coherent) = (true, false);
-        Set { name, about, query, single, coherent, positions, triangles, questions, truths }
+        let (single, coherent, scene) = (true, false, None);
+        Set { name, about, query, single, coherent, positions, triangles, scene, questions, truths }
     }
 
     /// Positions rounded to f32, as a model.
@@ -177,7 +182,8 @@ pub(super) fn all(count: usize) -> Vec<Set> {
     let slivers = hard(names, &cylinders());
     let names = ("tiles", "a wall of boxes in brick bond that touch each other; rays as for the slivers");
     let tiles = hard(names, &bricks());
-    vec![camera, bounces, aimed, slivers, tiles, national(count), inside, pairs]
+    let (instances, national) = (instances::touching(count), national(count));
+    vec![camera, bounces, aimed, slivers, tiles, instances, national, inside, pairs]
 }
 
 fn named(name: &str, faces: usize) -> Mesh32 {
@@ -193,7 +199,7 @@ fn single(v: DVec3) -> [f64; 3] {
     v.to_array().map(|x| f64::from(x as f32))
 }
 
-fn plain(origin: [f64; 3], direction: [f64; 3]) -> Question {
+pub(super) fn plain(origin: [f64; 3], direction: [f64; 3]) -> Question {
     Question { origin, direction, from: None, to: None }
 }
 

@@ -7,6 +7,7 @@
 //! names with `--names`, how materials look with `--materials`.
 
 use crate::animation::normals::corner_normal;
+use crate::intersect::start::source_corners;
 use crate::materials::{Alpha, Material, Texture, Wrap};
 use crate::rays::{Hit, PrimitiveRef};
 use crate::scene::Scene;
@@ -58,7 +59,7 @@ pub(crate) fn surface_at(scene: &Scene, hit: &Hit) -> Option<SurfacePoint> {
         return None;
     }
     let view = scene.object(object);
-    let corners = triangle(&view, id)?;
+    let corners = source_corners(&view, id)?;
     let (u, v) = (f64::from(hit.u), f64::from(hit.v));
     let weights = [1.0 - u - v, u, v];
     let object_position = weighted(weights, corners);
@@ -182,18 +183,6 @@ fn deformed_normals(
     let (corners, vertices) = (view.corners.get(triangle as usize)?, view.triangles.get(triangle as usize)?);
     let deformation = file.deformation(row);
     Some([0, 1, 2].map(|k| corner_normal(&deformation, pose, corners[k], normals[k], vertices[k])))
-}
-
-/// The vertices of a triangle as they are traced; `None` if the file does not keep them or there is
-/// no such triangle.
-pub(crate) fn triangle(view: &ObjectView<'_>, id: u32) -> Option<[[f64; 3]; 3]> {
-    if !view.exact.is_empty() {
-        return view.exact.corners(id);
-    }
-    let rows = view.triangles.get(id as usize)?;
-    let [a, b, c] = rows.map(|row| view.positions.get(row as usize).copied());
-    let corners = [a?, b?, c?];
-    Some(corners.map(|corner| view.grid.map_or(corner, |grid| grid.nearest(corner)).map(f64::from)))
 }
 
 /// Bounds the error of a component of a vector product relative to its products' sizes: it has at

@@ -12,7 +12,7 @@ use crate::hits::{Accept, results};
 use crate::instances::{RayInInstance, UnplacedRay, better_wide, exact_of_start};
 use crate::intersect::exact::precise;
 use crate::intersect::exact_ray::{LineSource, WorldLines};
-use crate::intersect::start::corners_of;
+use crate::intersect::start::corners_by_id;
 use crate::intersect::vector::wide;
 use crate::object;
 use crate::query::Steps;
@@ -22,7 +22,6 @@ use crate::scene::Scene;
 use crate::start_points;
 use crate::starts::world_ray::WorldRay;
 use crate::streams::{HitStreams, RayStreams};
-use crate::surface;
 use crate::trace_ray::TraceRay;
 use crate::trace_ray::sealed::Traced;
 use crate::visible::{self, SegmentEnd};
@@ -331,10 +330,7 @@ fn hit_in_f64(scene: &Scene, ray: WorldRay<'_>, primitive: PrimitiveRef) -> Opti
     let entered = EnteredInstance::new(scene, primitive.instance);
     let of_instance = entered.ray(ray, ray.ray.tmax);
     let (exact, object) = (of_instance.exact(), entered.object);
-    let corners = match corners_of(object, primitive.triangle) {
-        Some(of_leaf) => object.exact_corners(primitive.triangle, of_leaf),
-        None => surface::triangle(object, primitive.triangle)?,
-    };
+    let corners = corners_by_id(object, primitive.triangle)?;
     let found = precise(&exact.rounded(), corners).or_else(|| match exact.line {
         LineSource::Ray => RayInInstance::in_world(None, 0, ray, ray.ray.tmax).exact(0).intersection(corners),
         LineSource::Start(start) => {

@@ -3,17 +3,16 @@
 
 use super::nodes;
 use crate::intersect::exact::{Estimate, Intersection, estimate, in_pairs};
-use crate::intersect::exact_ray::{ExactRay, LineSource, WorldLines, intersect_in_world};
+use crate::intersect::exact_ray::{ExactRay, LineSource, intersect_in_world};
 use crate::intersect::line::Line;
-use crate::intersect::line::RATIO_ERROR;
-use crate::intersect::start::{StartDecision, corners_of, decide_start, decide_start_exactly, start_on};
+use crate::intersect::start::{StartDecision, decide_start, decide_start_exactly, start_on};
 use crate::intersect::vector::wide;
+use crate::query::double::offer_in_world;
 use crate::query::{Goal, RayQuery, TriangleRef};
 use crate::rays::Ray;
 use crate::simd::{Part, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
-use std::cmp::Ordering;
 
 /// A triangle that a ray may hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -116,46 +115,11 @@ fn settle_other<G: Goal>(
     let found = intersect(object, ray, (triangle, corners), |t| query.may_matter(t));
     let Some(found) = found else { return false };
     match ray.line {
-        LineSource::World(lines, at) if let Some(range) = lines.range(at) => {
-            offer_wide(object, (lines, at), range, (triangle, corners), found, query)
+        LineSource::World(lines, at) => {
+            offer_in_world(object, (lines, at), (triangle, corners), found, query)
         }
         _ => query.offer(triangle, found),
     }
-}
-
-/// Offers an intersection of a ray in f64. Its t is exact before it is compared with an end of the
-/// range or with another t that is close to it; among equal t, the smaller id wins.
-fn offer_wide<G: Goal>(
-    object: &ObjectView<'_>,
-    (lines, at): (&dyn WorldLines, usize),
-    [tmin, tmax]: [f64; 2],
-    (triangle, corners): (TriangleRef<'_>, [[f32; 3]; 3]),
-    mut found: Intersection,
-    query: &mut RayQuery<G>,
-) -> bool {
-    let wide_corners = |id: u32, corners| object.exact_corners(id, corners);
-    let exact_t = |corners| Some(lines.exact(at).intersection(wide_corners(triangle.read(), corners))?.t);
-    let close = |a: f64, b: f64| b.is_finite() && (a - b).abs() <= 4.0 * RATIO_ERROR * a.abs().max(b.abs());
-    if close(found.t, tmin) || close(found.t, tmax) {
-        found.t = exact_t(corners).unwrap_or(found.t);
-    }
-    if !(tmin <= found.t && found.t <= tmax) {
-        return false;
-    }
-    if let Some((best, t)) = query.best(object.triangle_ids)
-        && close(t, found.t)
-        && let Some(other) = corners_of(object, best)
-    {
-        let line = lines.exact(at);
-        let order = line.exact_t(wide_corners(triangle.read(), corners));
-        let order = order.zip(line.exact_t(wide_corners(best, other)));
-        let order = order.map_or(Ordering::Equal, |(t, of_best)| t.cmp(&of_best));
-        if order.then(triangle.read().cmp(&best)) == Ordering::Less {
-            query.replace(triangle, found);
-        }
-        return false;
-    }
-    query.offer(triangle, found)
 }
 
 /// The intersection of a ray with a triangle of its object, if it counts. `may_matter` as for

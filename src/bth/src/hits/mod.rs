@@ -20,6 +20,7 @@ pub use crossings::Crossings;
 
 use self::crossings::count_crossings;
 use self::results::{append_all, append_each, append_nearest, store_each};
+use crate::intersect::start::source_corners;
 use crate::masks::Masks;
 use crate::materials::{Material, Texture};
 use crate::rays::{Hit, PrimitiveRef};
@@ -243,7 +244,7 @@ impl Scene {
     /// the grid, if the file has one, or the positions in f64. `None` if the file does not keep
     /// them (it was compiled with `--no-geometry`), or if there is no such instance or triangle.
     pub fn triangle(&self, primitive: PrimitiveRef) -> Option<[[f64; 3]; 3]> {
-        surface::triangle(&self.object(surface::object_at(self, primitive)?), primitive.triangle)
+        source_corners(&self.object(surface::object_at(self, primitive)?), primitive.triangle)
     }
 
     /// The vertices of a triangle in world space, at the scene's time. In a mirrored instance they

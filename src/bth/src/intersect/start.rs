@@ -259,6 +259,27 @@ pub(crate) fn corners_of(object: &ObjectView<'_>, triangle: u32) -> Option<[[f32
     start_corners(object, leaf, slot)
 }
 
+/// The corners of the triangle with an id in the source's space, from its leaf or from the source.
+/// `None` if the file tells neither.
+pub(crate) fn corners_by_id(object: &ObjectView<'_>, id: u32) -> Option<[[f64; 3]; 3]> {
+    match corners_of(object, id) {
+        Some(of_leaf) => Some(object.exact_corners(id, of_leaf)),
+        None => source_corners(object, id),
+    }
+}
+
+/// The vertices of a triangle as they are traced; `None` if the file does not keep them or there is
+/// no such triangle.
+pub(crate) fn source_corners(view: &ObjectView<'_>, id: u32) -> Option<[[f64; 3]; 3]> {
+    if !view.exact.is_empty() {
+        return view.exact.corners(id);
+    }
+    let rows = view.triangles.get(id as usize)?;
+    let [a, b, c] = rows.map(|row| view.positions.get(row as usize).copied());
+    let corners = [a?, b?, c?];
+    Some(corners.map(|corner| view.grid.map_or(corner, |grid| grid.nearest(corner)).map(f64::from)))
+}
+
 /// The corners of the triangle in a slot of a leaf, given as its child code. `None` if there is no
 /// such leaf.
 #[inline(always)]

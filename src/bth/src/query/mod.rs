@@ -1,6 +1,7 @@
 //! Queries of rays: what they look for ([`Goal`]), what one ray has found so far ([`RayQuery`]),
 //! where the answers of a batch go ([`sink`]), and the statistics of traversals ([`Count`]).
 
+pub(crate) mod double;
 pub(crate) mod sink;
 #[cfg(test)]
 mod tests;

@@ -73,7 +73,7 @@ impl SpecialLeaf {
         walker.decision = match ray.line {
             LineSource::Ray => Decision::Line,
             LineSource::Start(start) => start_on(object, start).map_or(Decision::Line, Decision::Start),
-            LineSource::World(lines, ray) => Decision::World(lines, ray),
+            LineSource::World(lines, ray) => Decision::World(object, lines, ray),
         };
         let entered = match ray.start() {
             Some(start) if start.leaf == Child::Tets(self.row).code() => walker.leave(start.slot),

@@ -12,6 +12,7 @@ use crate::intersect::exact_ray::{WorldLines, intersect_in_world};
 use crate::intersect::line::{Line, Projected, Sign};
 use crate::intersect::start::ExactStart;
 use crate::intersect::vector::wide;
+use crate::query::double::offer_in_world;
 use crate::query::{Count, EitherQuery, TriangleRef};
 use bth_format::layout::{FACE_BIT, HullFace, Link, NONE, TetFace, TetLeaf, TetVertex};
 use bth_format::object::{ObjectView, Records};
@@ -41,8 +42,8 @@ pub(super) enum Decision<'a> {
     Line,
     /// The exact start on a triangle of the object.
     Start(ExactStart),
-    /// The line in world space of the ray with this index.
-    World(&'a dyn WorldLines, usize),
+    /// The line in world space of the ray with this index, through an object.
+    World(&'a ObjectView<'a>, &'a dyn WorldLines, usize),
 }
 
 /// How a walk ended.
@@ -123,14 +124,14 @@ impl<'a> TetWalker<'a> {
         let found = match &self.decision {
             Decision::Line => self.line.intersection(corners),
             Decision::Start(start) => start.intersection(self.line, corners),
-            &Decision::World(lines, ray) => {
-                intersect_in_world((lines, ray), corners.map(wide), |t| query.may_matter(t))
+            &Decision::World(object, lines, ray) => {
+                let line = (lines, ray);
+                let found = intersect_in_world(line, corners.map(wide), |t| query.may_matter(t));
+                return found
+                    .is_some_and(|found| offer_in_world(object, line, (triangle, corners), found, query));
             }
         };
-        match found {
-            Some(intersection) => query.offer(triangle, intersection),
-            None => false,
-        }
+        found.is_some_and(|found| query.offer(triangle, found))
     }
 
     /// Follows a link from the tetrahedron `from` through `face`. Returns the tetrahedron behind

@@ -1,6 +1,6 @@
 //! The chart: wrong answers per million against nanoseconds for a query, both logarithmic. A large
-//! panel shows the means of the sets in f32, those beside it the sets in f64, and small ones each of
-//! the others. Engines have numbers; ours is red, and others that take f64 are hollow.
+//! panel shows the means of the sets in f32, the ones at its right the sets in f64, and small ones
+//! each of the others. Engines have numbers; ours is red, and others that take f64 are hollow.
 
 use super::sets::Set;
 use super::{Line, Outcome};

@@ -63,7 +63,7 @@ mod tests {
     use crate::truth::exact::ExactAnswer;
     use bth_tests::oracle::World;
 
-    /// The images are those of the instances, they are closed, and rays hit their borders.
+    /// The images have the exact answers of the instances, and rays hit their borders.
     #[test]
     fn the_images_of_instances_are_exact_and_closed() {
         let set = touching(200);

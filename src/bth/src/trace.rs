@@ -293,9 +293,9 @@ impl Scene {
                 R::trace_in_object(object, rays, instance, scratch, answers.reborrow());
             });
         } else if let Some(world) = world {
-            R::with_placed(self, rays, |rays, starts| match answers.reborrow() {
-                Answers::Nearest(hits) => world.nearest(self.objects(), rays, starts, hits),
-                Answers::Any(found) => world.any(self.objects(), rays, starts, found),
+            R::with_placed(self, rays, |rays| match answers.reborrow() {
+                Answers::Nearest(hits) => world.nearest(self.objects(), rays, hits),
+                Answers::Any(found) => world.any(self.objects(), rays, found),
             });
         }
         if self.has_opacity() {

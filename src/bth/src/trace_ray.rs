@@ -4,7 +4,7 @@
 #![allow(private_interfaces, private_bounds)]
 
 use self::sealed::Traced;
-use crate::instances::{RayInInstance, World, trace_wide, wide_ray};
+use crate::instances::{RayInInstance, World, WorldRays, trace_wide, wide_ray};
 use crate::object::{self, Scratch};
 use crate::query::sink::{Answers, Sink};
 use crate::rays::{Hit, Ray, Ray64, StartRay};
@@ -23,7 +23,7 @@ impl TraceRay for Ray64 {}
 impl TraceRay for StartRay {}
 
 pub(crate) mod sealed {
-    use super::{Answers, Hit, InstanceStart, ObjectView, Ray, Scene, Scratch, World, WorldRay};
+    use super::{Answers, Hit, ObjectView, Scene, Scratch, World, WorldRay, WorldRays};
 
     /// How rays of a kind are traced.
     pub trait Traced: Copy + Sync {
@@ -47,9 +47,8 @@ pub(crate) mod sealed {
             scratch: &mut Scratch,
             answers: Answers<'_>,
         );
-        /// Calls `trace` with the rays of a batch in world space, and with their starts if there
-        /// are any.
-        fn with_placed(scene: &Scene, rays: &[Self], trace: impl FnOnce(&[Ray], &[InstanceStart]));
+        /// Calls `trace` with the rays of a batch in world space.
+        fn with_placed(scene: &Scene, rays: &[Self], trace: impl FnOnce(WorldRays<'_>));
     }
 }
 
@@ -72,7 +71,7 @@ impl Traced for Ray {
         Some(trace(WorldRay::plain(self)))
     }
     fn go_together(rays: &[Ray], world: Option<&World>) -> bool {
-        world.is_none_or(|world| !world.go_one_by_one(rays))
+        world.is_none_or(|world| !world.go_one_by_one(rays.len(), |i| rays[i]))
     }
     fn trace_in_object(
         object: &ObjectView<'_>,
@@ -89,8 +88,8 @@ impl Traced for Ray {
             &mut Sink::new(object.triangle_ids, answers, instance),
         );
     }
-    fn with_placed(_scene: &Scene, rays: &[Ray], trace: impl FnOnce(&[Ray], &[InstanceStart])) {
-        trace(rays, &[]);
+    fn with_placed(_scene: &Scene, rays: &[Ray], trace: impl FnOnce(WorldRays<'_>)) {
+        trace(WorldRays { rays, starts: &[], wide: &[] });
     }
 }
 
@@ -127,7 +126,7 @@ impl Traced for StartRay {
     ) {
         object::trace_starts(object, rays, instance, scratch, answers);
     }
-    fn with_placed(scene: &Scene, rays: &[StartRay], trace: impl FnOnce(&[Ray], &[InstanceStart])) {
+    fn with_placed(scene: &Scene, rays: &[StartRay], trace: impl FnOnce(WorldRays<'_>)) {
         let (mut world_rays, mut starts) = PLACED.take();
         world_rays.clear();
         starts.clear();
@@ -139,7 +138,7 @@ impl Traced for StartRay {
             world_rays.push(ray);
             starts.push(start);
         }
-        trace(&world_rays, &starts);
+        trace(WorldRays { rays: &world_rays, starts: &starts, wide: &[] });
         PLACED.set((world_rays, starts));
     }
 }
@@ -160,8 +159,8 @@ impl Traced for Ray64 {
     fn in_world<T>(&self, _scene: &Scene, trace: impl FnOnce(WorldRay<'_>) -> T) -> Option<T> {
         Some(trace(wide_ray(&self.narrow(), self)))
     }
-    fn go_together(_rays: &[Ray64], world: Option<&World>) -> bool {
-        world.is_none()
+    fn go_together(rays: &[Ray64], world: Option<&World>) -> bool {
+        world.is_none_or(|world| !world.go_one_by_one(rays.len(), |i| rays[i].narrow()))
     }
     fn trace_in_object(
         object: &ObjectView<'_>,
@@ -172,5 +171,11 @@ impl Traced for Ray64 {
     ) {
         trace_wide(object, rays, instance, scratch, answers);
     }
-    fn with_placed(_scene: &Scene, _rays: &[Ray64], _trace: impl FnOnce(&[Ray], &[InstanceStart])) {}
+    fn with_placed(_scene: &Scene, rays: &[Ray64], trace: impl FnOnce(WorldRays<'_>)) {
+        let (mut narrow, starts) = PLACED.take();
+        narrow.clear();
+        narrow.extend(rays.iter().map(Ray64::narrow));
+        trace(WorldRays { rays: &narrow, starts: &[], wide: rays });
+        PLACED.set((narrow, starts));
+    }
 }

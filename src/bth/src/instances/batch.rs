@@ -6,13 +6,13 @@ use super::enter_object::ObjectRays;
 use super::lists::InstanceLists;
 use super::packets::TopLevelPackets;
 use super::placement::Placement;
-use super::scene_batch::{BatchProgress, Chunk, ObjectVisits, SceneBatch};
+use super::scene_batch::{BatchProgress, Chunk, ObjectVisits, SceneBatch, WorldRays};
 use super::scene_query::{SceneAny, SceneNearest, SceneQuery};
 use super::visit_queue::VisitQueue;
 use crate::object;
 use crate::objects::Objects;
 use crate::query::sink::Visit;
-use crate::rays::{Hit, Ray};
+use crate::rays::Hit;
 use crate::simd::{Isa, Kernel, Simd};
 use crate::starts::world_ray::InstanceStart;
 use bth_format::layout::NONE;
@@ -104,21 +104,19 @@ impl Kernel for AdvanceKernel<'_> {
 
 impl World {
     /// Stores the nearest hits. Of hits at equal t, the lower instance index wins. All are
-    /// [`Hit::MISS`] before. `starts` holds the starts of all rays, or is empty.
-    pub(crate) fn nearest(
-        &self,
-        objects: &Objects,
-        rays: &[Ray],
-        starts: &[InstanceStart],
-        hits: &mut [Hit],
-    ) {
-        let batch = SceneBatch { world: self, objects, rays, starts };
-        object::with_scratch(|scratch| self.run(&batch, &mut SceneNearest { hits, scratch }));
+    /// [`Hit::MISS`] before.
+    pub(crate) fn nearest(&self, objects: &Objects, of: WorldRays<'_>, hits: &mut [Hit]) {
+        let WorldRays { rays, starts, wide } = of;
+        let batch = SceneBatch { world: self, objects, rays, starts, wide };
+        object::with_scratch(|scratch| {
+            self.run(&batch, &mut SceneNearest { hits, scratch, is_wide: !wide.is_empty() })
+        });
     }
 
     /// Stores for each ray whether it hits anything. All are false before.
-    pub(crate) fn any(&self, objects: &Objects, rays: &[Ray], starts: &[InstanceStart], found: &mut [bool]) {
-        let batch = SceneBatch { world: self, objects, rays, starts };
+    pub(crate) fn any(&self, objects: &Objects, of: WorldRays<'_>, found: &mut [bool]) {
+        let WorldRays { rays, starts, wide } = of;
+        let batch = SceneBatch { world: self, objects, rays, starts, wide };
         object::with_scratch(|scratch| self.run(&batch, &mut SceneAny { found, scratch }));
     }
 

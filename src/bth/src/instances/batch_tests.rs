@@ -8,7 +8,7 @@ use crate::hits::Accept;
 use crate::instances::RayInInstance;
 use crate::nodes::affine::Affine;
 use crate::query::better;
-use crate::rays::{PrimitiveRef, Start, StartRay};
+use crate::rays::{PrimitiveRef, Ray, Start, StartRay};
 use crate::scene::Scene;
 use crate::start_points::place;
 use crate::starts::world_ray::WorldRay;
@@ -31,8 +31,8 @@ fn nearest_by_loop(world: &World, objects: &Objects, ray: &Ray) -> Hit {
 /// The answers of a batch.
 fn traced(world: &World, objects: &Objects, rays: &[Ray]) -> (Vec<Hit>, Vec<bool>) {
     let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-    world.nearest(objects, rays, &[], &mut hits);
-    world.any(objects, rays, &[], &mut found);
+    world.nearest(objects, WorldRays { rays: rays, starts: &[], wide: &[] }, &mut hits);
+    world.any(objects, WorldRays { rays: rays, starts: &[], wide: &[] }, &mut found);
     (hits, found)
 }
 
@@ -141,8 +141,8 @@ fn rays_that_are_not_finite_or_have_an_empty_range_hit_nothing() {
         Ray { tmin: f32::NAN, ..good },
     ] {
         let (mut hit, mut found) = ([Hit::MISS], [false]);
-        world.nearest(&objects, &[ray], &[], &mut hit);
-        world.any(&objects, &[ray], &[], &mut found);
+        world.nearest(&objects, WorldRays { rays: &[ray], starts: &[], wide: &[] }, &mut hit);
+        world.any(&objects, WorldRays { rays: &[ray], starts: &[], wide: &[] }, &mut found);
         assert_eq!((hit[0], found[0]), (Hit::MISS, false), "{ray:?}");
         (hit, found) = ([Hit { t: 1.0, ..Hit::MISS }], [true]);
         world.store_nearest_of_ray(&objects, WorldRay::plain(&ray), &mut hit[0]);
@@ -183,8 +183,8 @@ fn packets_through_the_top_level_do_not_change_results() {
         let (world, transforms) = world(&file, &mut rng, count);
         let rays = bundle(&mut rng, &transforms, [33, 64, 100][case % 3]);
         let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-        world.nearest(&objects, &rays, &[], &mut hits);
-        world.any(&objects, &rays, &[], &mut found);
+        world.nearest(&objects, WorldRays { rays: &rays, starts: &[], wide: &[] }, &mut hits);
+        world.any(&objects, WorldRays { rays: &rays, starts: &[], wide: &[] }, &mut found);
         for (i, ray) in rays.iter().enumerate() {
             let expected = nearest_by_loop(&world, &objects, ray);
             assert_eq!(hits[i], expected, "case {case}, ray {i}: {ray:?}");

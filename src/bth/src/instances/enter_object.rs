@@ -3,6 +3,7 @@
 use super::lines::visit_ray;
 use super::placement::Placement;
 use super::scene_batch::{BatchProgress, ObjectVisits};
+use crate::intersect::origin::ROUNDED_TO_F32;
 use crate::intersect::vector::{max_norm, minus};
 use crate::nodes::affine::{ObjectRay, RayLanes};
 use crate::query::sink::Visit;
@@ -110,13 +111,15 @@ impl Kernel for EnterKernel<'_> {
             let ObjectRay { ray: of_f32, t_scale: scale, .. } = of_visit.of_object;
             (*ray, *t_scale) = (of_f32, scale);
         };
-        if !S::HAS_VECTORS {
+        // Rays in f64 are not rounded before.
+        if !S::HAS_VECTORS || !batch.wide.is_empty() {
             for (i, &visit) in visits.iter().enumerate() {
                 by_itself(visit, &mut rays[i], &mut t_scale[i]);
                 let [in_object, in_world] =
                     [&rays[i], &batch.rays[visit.ray as usize]].map(|ray| greatest_of(ray.origin));
                 farthest.include(batch.world.placement(visit.instance), in_object, in_world, rounded);
             }
+            farthest.direction_error += if batch.wide.is_empty() { 0.0 } else { ROUNDED_TO_F32 as f32 };
             return farthest;
         }
         index.clear();

@@ -291,7 +291,7 @@ impl WorldLines for VisitLines<'_> {
     fn lanes(&self, first: usize, rays: &[u32], of_lanes: &mut LineLanes) {
         let visit = |lane: usize| first + rays[lane] as usize;
         let Some(Visit { instance, .. }) = self.visits.get(visit(0)) else { return };
-        let mut is_plain = self.batch.starts.is_empty();
+        let mut is_plain = self.batch.starts.is_empty() && self.batch.wide.is_empty();
         let mut of_world = [[[0.0; LANES]; 3]; 2];
         for lane in 0..rays.len().min(LANES) {
             let Visit { ray, instance: of } = self.visits[visit(lane)];
@@ -312,9 +312,13 @@ impl WorldLines for VisitLines<'_> {
     fn common_origin(&self, first: usize, count: usize) -> Option<RoundedLine> {
         let (visits, batch) = (&self.visits[first..first + count], self.batch);
         let Visit { ray, instance } = visits[0];
-        let origin = batch.rays[ray as usize].origin;
-        let is_same =
-            |visit: &Visit| (visit.instance == instance) & (batch.rays[visit.ray as usize].origin == origin);
+        let (origin, wide) = (batch.rays[ray as usize].origin, batch.wide.get(ray as usize));
+        let is_same = |visit: &Visit| {
+            let is_same_wide = batch.wide.get(visit.ray as usize).map(|ray| ray.origin);
+            (visit.instance == instance)
+                & (batch.rays[visit.ray as usize].origin == origin)
+                & (is_same_wide == wide.map(|ray| ray.origin))
+        };
         let is_scaled = self.t_scale[first..first + count].iter().any(|scale| *scale != 1.0);
         let is_common = batch.starts.is_empty() && !is_scaled && visits.iter().all(is_same);
         is_common.then(|| self.line(first))
@@ -333,8 +337,9 @@ impl WorldLines for VisitLines<'_> {
     fn are_from_starts(&self) -> bool {
         !self.batch.starts.is_empty()
     }
-    fn range(&self, _visit: usize) -> Option<[f64; 2]> {
-        None
+    fn range(&self, visit: usize) -> Option<[f64; 2]> {
+        let Ray64 { tmin, tmax, .. } = self.batch.wide.get(self.visits[visit].ray as usize)?;
+        Some([tmin, tmax].map(|t| t / f64::from(self.t_scale[visit])))
     }
 }
 

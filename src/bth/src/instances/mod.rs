@@ -47,6 +47,7 @@ pub(crate) use lines::{RayInInstance, exact_of_start};
 pub(crate) use placement::PartBoxes;
 #[cfg(test)]
 pub(crate) use placement::Placement;
+pub(crate) use scene_batch::WorldRays;
 #[cfg(test)]
 pub(crate) use top_level::TopLevel;
 #[cfg(test)]

@@ -34,14 +34,14 @@ fn min_incoherent_rays() -> usize {
 impl World {
     /// Returns true if the rays of a batch are so few that they are faster one by one; measured,
     /// see docs/notes/scenes.md.
-    pub(crate) fn go_one_by_one(&self, rays: &[Ray]) -> bool {
+    /// `narrow` returns a ray.
+    pub(crate) fn go_one_by_one(&self, count: usize, narrow: impl Fn(usize) -> Ray) -> bool {
         if self.has_single_visible() {
-            return rays.len() < MIN_RAYS_OF_ONE_INSTANCE;
+            return count < MIN_RAYS_OF_ONE_INSTANCE;
         }
-        let is_same_octant = |i: usize| is_same_octant(&rays[0], &rays[i]);
-        rays.len() < MIN_RAYS
-            || rays.len() < min_incoherent_rays()
-                && !(is_same_octant(rays.len() / 2) && is_same_octant(rays.len() - 1))
+        let is_same_octant = |i: usize| is_same_octant(&narrow(0), &narrow(i));
+        count < MIN_RAYS
+            || count < min_incoherent_rays() && !(is_same_octant(count / 2) && is_same_octant(count - 1))
     }
 
     /// Stores the nearest hit of a ray, or [`Hit::MISS`], as [`Self::nearest`] does for many.
@@ -94,7 +94,7 @@ impl World {
     }
 
     /// The exact t of a hit.
-    fn exact_t(&self, objects: &Objects, ray: WorldRay<'_>, hit: &Hit) -> Option<ExactT> {
+    pub(super) fn exact_t(&self, objects: &Objects, ray: WorldRay<'_>, hit: &Hit) -> Option<ExactT> {
         let PrimitiveRef { instance, triangle } = hit.primitive;
         let (object, of_instance) = self.enter(objects, instance, ray, f32::INFINITY);
         of_instance.exact_t(object, triangle)

@@ -5,8 +5,7 @@ use super::lines::{VisitLines, visit_ray};
 use super::scene_batch::{BatchProgress, ObjectVisits, SceneBatch};
 use crate::intersect::exact_ray::Lines;
 use crate::object::{self, Scratch};
-use crate::query::better;
-use crate::query::sink::{Answers, SceneRays, Sink};
+use crate::query::sink::{Answers, Better, SceneRays, Sink};
 use crate::rays::Hit;
 use bth_format::object::ObjectView;
 
@@ -38,7 +37,9 @@ fn trace_visits(
     scratch: &mut Scratch,
     answers: Answers<'_>,
 ) {
-    let scene = SceneRays { rays: batch.rays, visits, t_scale: &object_rays.t_scale };
+    let better = |ray: usize, best: &Hit, hit: &Hit, t_scale: f32| batch.better(ray, best, hit, t_scale);
+    let better_wide: Option<&Better<'_>> = if batch.wide.is_empty() { None } else { Some(&better) };
+    let scene = SceneRays { rays: batch.rays, better_wide, visits, t_scale: &object_rays.t_scale };
     let sink = Sink::of_scene(object.triangle_ids, answers, scene);
     let lines = VisitLines { batch, visits, t_scale: &object_rays.t_scale };
     let mut sink = sink.with_lines(Lines::World(&lines, 0));
@@ -50,11 +51,16 @@ fn trace_visits(
 pub(super) struct SceneNearest<'a> {
     pub(super) hits: &'a mut [Hit],
     pub(super) scratch: &'a mut Scratch,
+    /// True if the rays are in f64.
+    pub(super) is_wide: bool,
 }
 
 impl SceneQuery for SceneNearest<'_> {
     fn progress(&self) -> BatchProgress<'_> {
-        BatchProgress::Nearest(self.hits)
+        match self.is_wide {
+            true => BatchProgress::NearestWide(self.hits),
+            false => BatchProgress::Nearest(self.hits),
+        }
     }
     fn trace_alone(&mut self, batch: &SceneBatch<'_>, ray: usize) {
         batch.world.store_nearest_of_ray(batch.objects, batch.world_ray(ray), &mut self.hits[ray]);
@@ -62,10 +68,10 @@ impl SceneQuery for SceneNearest<'_> {
     fn trace_one_by_one(&mut self, ObjectVisits { batch, object, visits }: ObjectVisits<'_>) {
         for &visit in visits {
             let i = visit.ray as usize;
-            let ray = visit_ray(batch, visit, batch.rays[i].tmax.min(self.hits[i].t));
+            let ray = visit_ray(batch, visit, batch.rays[i].tmax.min(self.progress().tmax(i)));
             let hit = object::nearest(object, &ray, visit.instance);
             let t_scale = ray.of_object.t_scale;
-            self.hits[i] = better(&batch.rays[i], &self.hits[i], &hit, t_scale).unwrap_or(self.hits[i]);
+            self.hits[i] = batch.better(i, &self.hits[i], &hit, t_scale).unwrap_or(self.hits[i]);
         }
     }
     fn trace_placed(&mut self, of_object: ObjectVisits<'_>, object_rays: &ObjectRays) {

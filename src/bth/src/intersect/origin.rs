@@ -75,7 +75,7 @@ const SAFE: std::ops::Range<f64> = 1.0 / POWER..POWER;
 const POWER: f64 = f64::from_bits((1023 + 300) << 52);
 
 /// 2^-24: the relative rounding of a number to f32.
-const ROUNDED_TO_F32: f64 = 1.0 / (1u64 << 24) as f64;
+pub(crate) const ROUNDED_TO_F32: f64 = 1.0 / (1u64 << 24) as f64;
 
 impl RoundedLine {
     /// The line of a ray of f32.

@@ -16,12 +16,19 @@ pub(crate) struct Visit {
     pub(crate) instance: u32,
 }
 
+/// Returns the new hit of a ray of the scene's batch, given by its index, with its t in world space
+/// if it is better than the best one so far, which comes first. The number is the factor from t in
+/// object space to t in world space.
+pub(crate) type Better<'a> = dyn Fn(usize, &Hit, &Hit, f32) -> Option<Hit> + 'a;
+
 /// Maps the rays of a batch in object space to the rays of the scene's batch from which they were
 /// transformed.
 #[derive(Clone, Copy)]
 pub(crate) struct SceneRays<'a> {
     /// All rays of the scene's batch, in world space.
     pub(crate) rays: &'a [Ray],
+    /// How hits of rays in f64 are compared, if they are.
+    pub(crate) better_wide: Option<&'a Better<'a>>,
     /// For each ray in object space its ray in the scene, and the instance.
     pub(crate) visits: &'a [Visit],
     /// For each ray in object space the factor from its t to t in world space.
@@ -57,18 +64,6 @@ impl Answers<'_> {
         match self {
             Answers::Nearest(hits) => fill_misses(hits),
             Answers::Any(found) => found.fill(false),
-        }
-    }
-
-    /// Merges a hit in an object into the answer of the ray with this index in the scene. `t_scale`
-    /// is the factor from t in object space to t in world space.
-    pub(crate) fn merge(&mut self, index: usize, hit: &Hit, ray: &Ray, t_scale: f32) {
-        match self {
-            Answers::Nearest(hits) => {
-                let best = &mut hits[index];
-                *best = better(ray, best, hit, t_scale).unwrap_or(*best);
-            }
-            Answers::Any(found) => found[index] |= hit.is_hit(),
         }
     }
 
@@ -196,10 +191,21 @@ impl<'a> Sink<'a> {
     /// Merges the hit of a visit into the answer of its ray.
     #[inline(never)]
     fn merge(&mut self, visit: usize, triangle: u32, t: f32, u: f32, v: f32) {
-        let Some(SceneRays { rays, visits, t_scale }) = &self.scene else { return };
+        let Some(SceneRays { rays, better_wide, visits, t_scale }) = &self.scene else { return };
         let Visit { ray, instance } = visits[visit];
         let hit = Hit { t, u, v, primitive: PrimitiveRef { instance, triangle } };
-        self.answers.merge(ray as usize, &hit, &rays[ray as usize], t_scale[visit]);
+        match &mut self.answers {
+            Answers::Nearest(hits) => {
+                let best = &mut hits[ray as usize];
+                let (at, t_scale) = (ray as usize, t_scale[visit]);
+                let nearer = match better_wide {
+                    None => better(&rays[at], best, &hit, t_scale),
+                    Some(better) => better(at, best, &hit, t_scale),
+                };
+                *best = nearer.unwrap_or(*best);
+            }
+            Answers::Any(found) => found[ray as usize] |= hit.is_hit(),
+        }
     }
 }
 

@@ -164,6 +164,30 @@ fn rays_in_f64_have_the_exact_hits_of_files_without_places() {
     }
 }
 
+#[test]
+fn instances_nearer_than_f32_can_tell_are_in_order() {
+    let _choice = CHOICE.lock();
+    let at = |z: f64| [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, z];
+    let triangle = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]];
+    let scene = bth::from_bytes(&placed_soup(&[triangle], &[at(1e-9), at(0.0), at(2e-9)])).unwrap();
+    let instances = |hits: &[Hit]| -> Vec<u32> { hits.iter().map(|hit| hit.primitive.instance).collect() };
+    for (start, order) in [(-5.3, [1, 0, 2]), (5.3, [2, 0, 1])] {
+        let ray = Ray64::new([0.1, 0.1, start], [0.0, 0.0, -start]);
+        let first = |hit: Option<Hit>| instances(hit.as_slice());
+        assert_eq!(first(scene.nearest(&ray)), [order[0]]);
+        let keep = |_: &_, hit: &Hit| hit.primitive.instance != order[0];
+        let accept = Accept { filter: Some(&keep), ..Accept::default() };
+        assert_eq!(first(scene.nearest_accepted(&ray, &accept)), [order[1]]);
+        let (mut all, mut two) = (Vec::new(), Vec::new());
+        scene.all_hits(&ray, &Accept::default(), &mut all);
+        scene.nearest_hits(&ray, 2, &Accept::default(), &mut two);
+        assert_eq!((&instances(&all)[..], &instances(&two)[..]), (&order[..], &order[..2]));
+        let mut batch = vec![Hit::MISS; 100];
+        scene.batch(&[ray; 100]).nearest(&mut batch);
+        assert_eq!(instances(&batch), [order[0]; 100]);
+    }
+}
+
 /// A random transform: rows of four.
 fn matrix(rng: &mut Rng) -> [f64; 12] {
     let coarse = rng.below(2) == 0;

@@ -11,16 +11,26 @@ pub(super) struct FoundHit {
     pub(super) hit: Hit,
     /// t in the space of the object, not rounded to f32. It is compared only in the same instance.
     pub(super) t: f64,
+    /// t in world space of a ray in f64, within 2^-40; 0 for others.
+    pub(super) wide_t: f64,
 }
 
-/// Hits are ordered by the reported t, then by instance, then by t before rounding, then by
+impl FoundHit {
+    /// Max reported t of hits that may be nearer.
+    fn limit(&self) -> f32 {
+        if self.wide_t == 0.0 { self.hit.t } else { self.hit.t.next_up() }
+    }
+}
+
+/// Hits are ordered by the t of rays in f64, then by the reported t, then by instance, then by t before rounding, then by
 /// triangle. The first hit is the result of [`Scene::nearest`](crate::Scene::nearest).
 impl Ord for FoundHit {
     fn cmp(&self, other: &FoundHit) -> Ordering {
         // The additions turn -0.0 to 0.0; no t is NaN.
         let (a, b) = (&self.hit, &other.hit);
-        (a.t + 0.0)
-            .total_cmp(&(b.t + 0.0))
+        self.wide_t
+            .total_cmp(&other.wide_t)
+            .then((a.t + 0.0).total_cmp(&(b.t + 0.0)))
             .then(a.primitive.instance.cmp(&b.primitive.instance))
             .then((self.t + 0.0).total_cmp(&(other.t + 0.0)))
             .then(a.primitive.triangle.cmp(&b.primitive.triangle))
@@ -91,7 +101,7 @@ pub(super) struct FirstHit(pub(super) Option<FoundHit>);
 
 impl Collector for FirstHit {
     fn limit(&self) -> f32 {
-        self.0.map_or(f32::INFINITY, |best| best.hit.t)
+        self.0.map_or(f32::INFINITY, |best| best.limit())
     }
     fn wants(&self, found: &FoundHit) -> bool {
         self.0.is_none_or(|best| *found < best)
@@ -112,7 +122,7 @@ pub(super) struct FirstHits {
 impl Collector for FirstHits {
     fn limit(&self) -> f32 {
         let farthest = self.hits.peek().filter(|_| self.hits.len() >= self.count);
-        farthest.map_or(f32::INFINITY, |found| found.hit.t)
+        farthest.map_or(f32::INFINITY, FoundHit::limit)
     }
     fn wants(&self, found: &FoundHit) -> bool {
         self.hits.len() < self.count || self.hits.peek().is_none_or(|farthest| found < farthest)

@@ -6,7 +6,7 @@ use super::collect::{Collector, FoundHit};
 use crate::bvh::candidate::{corners_in_source, intersect};
 use crate::bvh::enumerate::enumerate;
 use crate::enumerate::{EnteredInstance, enumerate_instances};
-use crate::intersect::exact::{Intersection, reported};
+use crate::intersect::exact::{Intersection, precise, reported};
 use crate::intersect::exact_ray::{ExactRay, LineSource};
 use crate::intersect::line::{RATIO_ERROR, widened};
 use crate::masks::Masks;
@@ -105,6 +105,17 @@ impl InstanceHits<'_> {
         exact.is_some_and(|exact| tmin <= exact.t && exact.t <= tmax)
     }
 
+    /// t in world space of a ray in f64, within 2^-40; 0 for others.
+    fn wide_t(&self, found: &Intersection, corners: impl FnOnce() -> [[f64; 3]; 3]) -> f64 {
+        let LineSource::World(lines, ray) = self.exact.line else { return 0.0 };
+        if lines.range(ray).is_none() {
+            return 0.0;
+        }
+        let corners = corners();
+        let precise = precise(&lines.line(ray), corners).or_else(|| lines.exact(ray).intersection(corners));
+        precise.map_or(found.t, |precise| precise.t) * f64::from(self.t_scale) + 0.0
+    }
+
     /// Returns true if the mask of a triangle's group and the ray's mask have a bit in common.
     fn meets_group(&self, triangle: TriangleRef<'_>) -> bool {
         self.groups.is_none_or(|groups| {
@@ -146,7 +157,8 @@ impl Receiver for InstanceHits<'_> {
         if self.object.opacity_at(primitive.triangle, u, v) == Opacity::Transparent {
             return false;
         }
-        let found = FoundHit { hit: Hit { t, u, v, primitive }, t: intersection.t };
+        let wide_t = self.wide_t(&intersection, || corners_in_source(self.object, triangle, corners));
+        let found = FoundHit { hit: Hit { t, u, v, primitive }, t: intersection.t, wide_t };
         if !self.collector.wants(&found)
             || self.accept.filter.is_some_and(|accepts| !accepts(self.ray, &found.hit))
         {

@@ -9,14 +9,14 @@
 use crate::batch::RayBatch;
 use crate::enumerate::EnteredInstance;
 use crate::hits::{Accept, results};
-use crate::instances::{RayInInstance, UnplacedRay, better_wide, exact_of_start};
+use crate::instances::{RayInInstance, UnplacedRay, exact_of_start};
 use crate::intersect::exact::precise;
 use crate::intersect::exact_ray::{LineSource, WorldLines};
 use crate::intersect::start::corners_by_id;
 use crate::intersect::vector::wide;
 use crate::object;
-use crate::query::Steps;
 use crate::query::sink::Answers;
+use crate::query::{Steps, better_wide};
 use crate::rays::{Hit, Hit64, PrimitiveRef, Start};
 use crate::scene::Scene;
 use crate::start_points;

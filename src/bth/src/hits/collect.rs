@@ -22,8 +22,9 @@ impl FoundHit {
     }
 }
 
-/// Hits are ordered by the t of rays in f64, then by the reported t, then by instance, then by t before rounding, then by
-/// triangle. The first hit is the result of [`Scene::nearest`](crate::Scene::nearest).
+/// Hits are ordered by the t of rays in f64, then by the reported t, then by instance, then by t
+/// before rounding, then by triangle. The first hit is the result of
+/// [`Scene::nearest`](crate::Scene::nearest).
 impl Ord for FoundHit {
     fn cmp(&self, other: &FoundHit) -> Ordering {
         // The additions turn -0.0 to 0.0; no t is NaN.

@@ -31,8 +31,8 @@ fn nearest_by_loop(world: &World, objects: &Objects, ray: &Ray) -> Hit {
 /// The answers of a batch.
 fn traced(world: &World, objects: &Objects, rays: &[Ray]) -> (Vec<Hit>, Vec<bool>) {
     let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-    world.nearest(objects, WorldRays { rays: rays, starts: &[], wide: &[] }, &mut hits);
-    world.any(objects, WorldRays { rays: rays, starts: &[], wide: &[] }, &mut found);
+    world.nearest(objects, WorldRays { rays, starts: &[], wide: &[] }, &mut hits);
+    world.any(objects, WorldRays { rays, starts: &[], wide: &[] }, &mut found);
     (hits, found)
 }
 

@@ -3,13 +3,12 @@
 
 use super::World;
 use super::lines::RayInInstance;
-use super::wide_rays::better_wide;
 use crate::bvh::packet;
 use crate::coherence::is_same_octant;
 use crate::intersect::exact_line::ExactT;
 use crate::object;
 use crate::objects::Objects;
-use crate::query::{Steps, better};
+use crate::query::{Steps, better, better_wide};
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::simd::Isa;
 use crate::starts::world_ray::WorldRay;

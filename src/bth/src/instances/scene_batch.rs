@@ -2,10 +2,9 @@
 
 use super::World;
 use super::top_level::TopLevel;
-use super::wide_rays::better_wide;
 use crate::objects::Objects;
-use crate::query::better;
 use crate::query::sink::Visit;
+use crate::query::{better, better_wide};
 use crate::rays::{Hit, Ray, Ray64};
 use crate::starts::world_ray::{InstanceStart, WorldRay};
 use bth_format::layout::NONE;

@@ -1,7 +1,7 @@
 //! Batches of rays in f64 through an object whose space is world space.
 
 use super::lines::{Place, RayInInstance, exact_line, long_line};
-use crate::intersect::exact_line::{ExactLine, ExactT};
+use crate::intersect::exact_line::ExactLine;
 use crate::intersect::exact_ray::{LineLanes, Lines, WorldLines};
 use crate::intersect::long::LongLine;
 use crate::intersect::origin::{RoundedLine, RoundedOrigin};
@@ -10,18 +10,13 @@ use crate::intersect::vector::max_norm;
 use crate::nodes::affine::ObjectRay;
 use crate::object::{self, Scratch};
 use crate::query::sink::{Answers, Sink};
-use crate::rays::{Hit, Ray, Ray64};
+use crate::rays::{Ray, Ray64};
 use crate::starts::prepare::ENDED;
 use crate::starts::world_ray::WorldRay;
 use bth_format::object::ObjectView;
-use std::cmp::Ordering;
 
 /// Rays that are rounded to f32 and traced together. One bound holds for the errors of all of them.
 const TOGETHER: usize = 1024;
-
-/// Bounds the difference of two t that are rounded to f32 and may be equal before, relative to
-/// them: two roundings of half an epsilon each, twice.
-const ROUNDED_T: f32 = 2.0 * f32::EPSILON;
 
 /// Stores the answers of rays that hit anything in an instance whose object's space is world space.
 pub(crate) fn trace_wide(
@@ -65,25 +60,6 @@ pub(crate) fn trace_wide(
 /// A ray in f64, given the same ray rounded to f32.
 pub(crate) fn wide_ray<'a>(ray: &'a Ray, wide: &'a Ray64) -> WorldRay<'a> {
     WorldRay { ray, start: None, wide: Some(wide) }
-}
-
-/// Like [`crate::query::better`], for a ray in f64. `exact_t` returns the t of a hit: hits whose t
-/// may be equal before they are rounded are compared exactly.
-#[cold]
-pub(crate) fn better_wide(
-    best: &Hit,
-    hit: &Hit,
-    t_scale: f32,
-    exact_t: impl Fn(&Hit) -> Option<ExactT>,
-) -> Option<Hit> {
-    if !hit.is_hit() {
-        return None;
-    }
-    let hit = Hit { t: hit.t * t_scale, ..*hit };
-    let is_close = best.is_hit() && (hit.t - best.t).abs() <= ROUNDED_T * hit.t.abs();
-    let exact = is_close.then(|| exact_t(&hit).zip(exact_t(best))).flatten();
-    let order = exact.map_or(hit.t.total_cmp(&best.t), |(t, of_best)| t.cmp(&of_best));
-    (order.then(hit.primitive.instance.cmp(&best.primitive.instance)) == Ordering::Less).then_some(hit)
 }
 
 /// The lines of rays in f64.

@@ -3,8 +3,9 @@
 use super::World;
 use super::top_level::TopLevel;
 use crate::objects::Objects;
+use crate::query::better;
+use crate::query::double::better_wide;
 use crate::query::sink::Visit;
-use crate::query::{better, better_wide};
 use crate::rays::{Hit, Ray, Ray64};
 use crate::starts::world_ray::{InstanceStart, WorldRay};
 use bth_format::layout::NONE;

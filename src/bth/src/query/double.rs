@@ -2,9 +2,11 @@
 
 use super::{Goal, RayQuery, TriangleRef};
 use crate::intersect::exact::Intersection;
+use crate::intersect::exact_line::ExactT;
 use crate::intersect::exact_ray::WorldLines;
 use crate::intersect::line::RATIO_ERROR;
 use crate::intersect::start::corners_by_id;
+use crate::rays::Hit;
 use bth_format::object::ObjectView;
 use std::cmp::Ordering;
 
@@ -55,4 +57,27 @@ fn offer_wide<G: Goal>(
         return false;
     }
     query.offer(triangle, found)
+}
+
+/// Bounds the difference of two t that are rounded to f32 and may be equal before, relative to
+/// them: two roundings of half an epsilon each, twice.
+const ROUNDED_T: f32 = 2.0 * f32::EPSILON;
+
+/// Like [`super::better`], for a ray in f64. `exact_t` returns the t of a hit: hits whose t
+/// may be equal before they are rounded are compared exactly.
+#[cold]
+pub(crate) fn better_wide(
+    best: &Hit,
+    hit: &Hit,
+    t_scale: f32,
+    exact_t: impl Fn(&Hit) -> Option<ExactT>,
+) -> Option<Hit> {
+    if !hit.is_hit() {
+        return None;
+    }
+    let hit = Hit { t: hit.t * t_scale, ..*hit };
+    let is_close = best.is_hit() && (hit.t - best.t).abs() <= ROUNDED_T * hit.t.abs();
+    let exact = is_close.then(|| exact_t(&hit).zip(exact_t(best))).flatten();
+    let order = exact.map_or(hit.t.total_cmp(&best.t), |(t, of_best)| t.cmp(&of_best));
+    (order.then(hit.primitive.instance.cmp(&best.primitive.instance)) == Ordering::Less).then_some(hit)
 }

@@ -7,11 +7,9 @@ pub(crate) mod sink;
 mod tests;
 
 use crate::intersect::exact::{Intersection, reported};
-use crate::intersect::exact_line::ExactT;
 use crate::intersect::line::widened;
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use bth_format::layout::NONE;
-use std::cmp::Ordering;
 
 /// What a query looks for: the nearest hit, or any. Kernels ask a goal for it at run time. A goal
 /// of size zero gets a separate kernel. Special leaves and batches with vectors of 128
@@ -262,29 +260,6 @@ pub(crate) fn better(ray: &Ray, best: &Hit, hit: &Hit, t_scale: f32) -> Option<H
     let hit = Hit { t, ..*hit };
     let nearer = hit.t < best.t || hit.t == best.t && hit.primitive.instance < best.primitive.instance;
     (nearer && in_range(hit.t, ray.tmin, ray.tmax)).then_some(hit)
-}
-
-/// Bounds the difference of two t that are rounded to f32 and may be equal before, relative to
-/// them: two roundings of half an epsilon each, twice.
-const ROUNDED_T: f32 = 2.0 * f32::EPSILON;
-
-/// Like [`better`], for a ray in f64. `exact_t` returns the t of a hit: hits whose t
-/// may be equal before they are rounded are compared exactly.
-#[cold]
-pub(crate) fn better_wide(
-    best: &Hit,
-    hit: &Hit,
-    t_scale: f32,
-    exact_t: impl Fn(&Hit) -> Option<ExactT>,
-) -> Option<Hit> {
-    if !hit.is_hit() {
-        return None;
-    }
-    let hit = Hit { t: hit.t * t_scale, ..*hit };
-    let is_close = best.is_hit() && (hit.t - best.t).abs() <= ROUNDED_T * hit.t.abs();
-    let exact = is_close.then(|| exact_t(&hit).zip(exact_t(best))).flatten();
-    let order = exact.map_or(hit.t.total_cmp(&best.t), |(t, of_best)| t.cmp(&of_best));
-    (order.then(hit.primitive.instance.cmp(&best.primitive.instance)) == Ordering::Less).then_some(hit)
 }
 
 /// Returns true if a t between two values may lie between `tmin` and `limit` after rounding to f32.

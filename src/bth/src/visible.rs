@@ -162,6 +162,14 @@ struct Segment<'a> {
 }
 
 impl Segment<'_> {
+    /// Returns true if an end lies on a triangle, which then does not block: its plane holds the end
+    /// or the whole segment.
+    fn is_at_end(&self, triangle: TriangleRef<'_>) -> bool {
+        let starts = self.ends.iter().filter_map(|end| end.start.as_ref());
+        let mut starts = starts.filter(|start| start.instance == self.instance);
+        starts.any(|start| start.start.primitive.triangle == triangle.read())
+    }
+
     fn exact_segment(&self) -> SegmentLine {
         let [from, to] = self.ends.map(|end| end.exact(self.scene));
         SegmentLine::between(from, to, rows(self.scene, self.instance))
@@ -232,6 +240,9 @@ impl Blocking<'_> {
 
 impl Receiver for Blocking<'_> {
     fn receive(&mut self, triangle: TriangleRef<'_>, corners: [[f32; 3]; 3]) -> bool {
+        if self.segment.is_at_end(triangle) {
+            return false;
+        }
         let Some([u, v]) = self.crossed(self.object.exact_corners(triangle.read(), corners)) else {
             return false;
         };

@@ -56,10 +56,15 @@ fn in_formats(corners: &[[f64; 3]], triangles: &[[u32; 3]]) -> Vec<(&'static str
     ]
 }
 
+/// Positions in f32.
+fn in_f32() -> Wanted {
+    Wanted { positions: Positions::F32, ..Wanted::default() }
+}
+
 /// What was counted, and whether a warning says so.
 fn rounding(name: &str, bytes: &[u8]) -> (Option<Rounding>, bool) {
     let said = Listener::default();
-    let (_, report) = import_with(name, bytes, Keep::None, &said).unwrap();
+    let (_, report) = import_with(name, bytes, in_f32(), &said).unwrap();
     (report.rounding, said.heard("rounding to 32-bit numbers moves"))
 }
 
@@ -132,7 +137,7 @@ fn positions_in_f64_keep_what_the_source_has() {
     }
     let expected: Vec<_> = triangles.iter().map(|t| t.map(|v| corners[v as usize])).collect();
     for (name, bytes) in in_formats(&corners, &triangles) {
-        let as_f32 = import_with(name, &bytes, Keep::None, &Listener::default()).unwrap().1;
+        let as_f32 = import_with(name, &bytes, in_f32(), &Listener::default()).unwrap().1;
         for positions in [Positions::Auto, Positions::F64] {
             let (mesh, [rounding, avoided]) = kept(name, &bytes, positions);
             assert_eq!((rounding, avoided), (None, as_f32.rounding), "{name}");

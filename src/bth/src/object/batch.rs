@@ -33,18 +33,18 @@ pub(crate) fn trace_batch(
     if object.header.root == NONE {
         return;
     }
-    // Packets and interleaved rays are not compiled for scalar code, where they would be the
-    // largest part of the library.
-    let isa = Isa::chosen();
-    if isa == Isa::Scalar {
-        return one_by_one(object, rays, order, sink);
-    }
     let (lines, mut with_starts) = (sink.lines(), None);
     let object = match lines {
         // The caller has set the bounds of lines in world space.
         Lines::Rays | Lines::World(..) => object,
         Lines::Starts(_) => with_starts.insert(ObjectView { bounds: object.start_bounds, ..*object }),
     };
+    // Packets and interleaved rays are not compiled for scalar code, where they would be the
+    // largest part of the library.
+    let isa = Isa::chosen();
+    if isa == Isa::Scalar {
+        return one_by_one(object, rays, order, sink);
+    }
     if order.is_some() {
         // Too few rays are left of most packets.
         through_bvh(isa, object, rays, order, (scratch, sink));

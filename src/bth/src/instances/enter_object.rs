@@ -59,12 +59,12 @@ struct Farthest {
     error: f32,
     direction_error: f32,
     /// Max |coordinate| of the object's anchor.
-    anchor: f32,
+    anchor: f64,
 }
 
 impl Farthest {
     fn of(anchor: [f64; 3]) -> Farthest {
-        Farthest { anchor: (max_norm(anchor) as f32).next_up(), ..Farthest::default() }
+        Farthest { anchor: max_norm(anchor), ..Farthest::default() }
     }
 
     /// Includes rays through an instance, given the max |coordinate| of their origins in world
@@ -74,7 +74,7 @@ impl Farthest {
         let of_f32 = if rounded { placement.inverse.rounding_error(in_world.into()) } else { 0.0 };
         self.in_object = self.in_object.max(in_object);
         self.error =
-            self.error.max(((f64::from(in_object) + f64::from(self.anchor)) * error + of_f32) as f32);
+            self.error.max(((f64::from(in_object) + self.anchor) * error + of_f32) as f32);
         self.direction_error = self.direction_error.max(error as f32);
     }
 }

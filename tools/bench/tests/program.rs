@@ -85,7 +85,7 @@ fn truth_finds_no_wrong_answer_of_ours() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (page, json) = (path(""), path("truth.json"));
-    let engines = "bth,Embree,obvhs,CGAL";
+    let engines = "bth,bth f32,Embree,obvhs,CGAL";
     let done = bench(&[
         "truth",
         "--queries=300",

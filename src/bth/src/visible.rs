@@ -162,8 +162,8 @@ struct Segment<'a> {
 }
 
 impl Segment<'_> {
-    /// Returns true if an end lies on a triangle, which then does not block: its plane holds the end
-    /// or the whole segment.
+    /// Returns true if an end lies on a triangle, which then does not block: its plane holds only
+    /// the end, or the whole segment.
     fn is_at_end(&self, triangle: TriangleRef<'_>) -> bool {
         let starts = self.ends.iter().filter_map(|end| end.start.as_ref());
         let mut starts = starts.filter(|start| start.instance == self.instance);

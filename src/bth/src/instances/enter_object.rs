@@ -73,8 +73,7 @@ impl Farthest {
         let error = placement.accuracy.error();
         let of_f32 = if rounded { placement.inverse.rounding_error(in_world.into()) } else { 0.0 };
         self.in_object = self.in_object.max(in_object);
-        self.error =
-            self.error.max(((f64::from(in_object) + self.anchor) * error + of_f32) as f32);
+        self.error = self.error.max(((f64::from(in_object) + self.anchor) * error + of_f32) as f32);
         self.direction_error = self.direction_error.max(error as f32);
     }
 }

@@ -7,13 +7,11 @@
 //! that reach no holes pay for looking up the opacity of their hit.
 
 use crate::batch::RayBatch;
-use crate::enumerate::EnteredInstance;
 use crate::hits::{Accept, results};
-use crate::instances::{RayInInstance, UnplacedRay, exact_of_start};
+use crate::instances::{RayInInstance, UnplacedRay};
 use crate::intersect::exact::precise;
-use crate::intersect::exact_ray::{LineSource, WorldLines};
+use crate::intersect::exact_ray::WorldLines;
 use crate::intersect::start::corners_by_id;
-use crate::intersect::vector::wide;
 use crate::object;
 use crate::query::Steps;
 use crate::query::double::better_wide;
@@ -328,18 +326,15 @@ impl Scene {
 
 /// The numbers of a ray's hit on a triangle in f64.
 fn hit_in_f64(scene: &Scene, ray: WorldRay<'_>, primitive: PrimitiveRef) -> Option<Hit64> {
-    let entered = EnteredInstance::new(scene, primitive.instance);
-    let of_instance = entered.ray(ray, ray.ray.tmax);
-    let (exact, object) = (of_instance.exact(), entered.object);
-    let corners = corners_by_id(object, primitive.triangle)?;
-    let found = precise(&exact.rounded(), corners).or_else(|| match exact.line {
-        LineSource::Ray => RayInInstance::in_world(None, 0, ray, ray.ray.tmax).exact(0).intersection(corners),
-        LineSource::Start(start) => {
-            exact_of_start(object, start, wide(ray.ray.direction))?.intersection(corners)
-        }
-        LineSource::World(lines, at) => lines.exact(at).intersection(corners),
-    })?;
+    let (objects, instance, tmax) = (scene.objects(), primitive.instance, ray.ray.tmax);
+    let of_instance = match scene.world() {
+        Some(world) => RayInInstance::new(world, objects, instance, ray, tmax),
+        None => RayInInstance::in_world(Some(objects), instance, ray, tmax),
+    };
+    let corners = corners_by_id(scene.view(scene.object_of(instance)), primitive.triangle)?;
+    let found = precise(&WorldLines::line(&of_instance, 0), corners);
+    let found = found.or_else(|| of_instance.exact(0).intersection(corners))?;
     let [u, v, determinant] = found.weight;
     let [u, v] = [u, v].map(|weight| (weight / determinant).clamp(0.0, 1.0));
-    Some(Hit64 { t: found.t * f64::from(of_instance.t_scale()) + 0.0, u, v, primitive })
+    Some(Hit64 { t: found.t * f64::from(of_instance.of_object.t_scale) + 0.0, u, v, primitive })
 }

@@ -11,7 +11,7 @@ use crate::intersect::exact_line::{ExactLine, Rows, SegmentLine, image, image_of
 use crate::intersect::exact_ray::{ExactRay, LineLanes, LineSource, WorldLines};
 use crate::intersect::long::LongLine;
 use crate::intersect::origin::{RoundedLine, RoundedOrigin};
-use crate::intersect::start::start_corners;
+use crate::intersect::start::corners_by_id;
 use crate::intersect::start_point::StartPoint;
 use crate::intersect::vector::{max_norm, minus, wide};
 use crate::nodes::ObjectRay;
@@ -118,8 +118,7 @@ impl PlacedEnd {
     fn exact(&self, scene: &Scene) -> (DyadicVector, Dyadic) {
         let start = self.start.as_ref().and_then(|start| {
             let object = scene.view(scene.object_of(start.instance));
-            let corners = start_corners(object, start.point.leaf, start.point.slot)?;
-            let corners = object.exact_corners(start.start.primitive.triangle, corners);
+            let corners = corners_by_id(object, start.start.primitive.triangle)?;
             let weights = [start.point.u.into(), start.point.v.into()];
             Some(image_of_start(rows(scene, start.instance).as_ref(), corners, weights))
         });
@@ -243,7 +242,7 @@ impl Receiver for Blocking<'_> {
         if self.segment.is_at_end(triangle) {
             return false;
         }
-        let Some([u, v]) = self.crossed(self.object.exact_corners(triangle.read(), corners)) else {
+        let Some([u, v]) = self.crossed(self.object.exact_corners(|| triangle.read(), corners)) else {
             return false;
         };
         let opacity = self.object.opacity.is_empty();

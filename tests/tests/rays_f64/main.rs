@@ -5,7 +5,7 @@ mod building;
 mod models;
 
 use bth::rays::{Hit, Hit64, Ray64};
-use bth::{Accept, Isa, Scene};
+use bth::{Accept, Isa, Scene, TraceRay};
 use bth_format::exact::is_zero_area;
 use bth_random::Rng;
 use bth_tests::meshes::mesh;
@@ -64,6 +64,30 @@ fn rays(world: &[[[f64; 3]; 3]], count: usize, rng: &mut Rng) -> Vec<Ray64> {
     rays
 }
 
+/// Checks that batches and single rays have these hits on every instruction set, and returns the
+/// number of rays that hit.
+fn check_everywhere<R: TraceRay + std::fmt::Debug>(
+    scene: &Scene,
+    rays: &[R],
+    expected: &[Hit],
+    context: &str,
+) -> usize {
+    let chosen = Isa::chosen();
+    for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+        isa.choose().unwrap();
+        let (mut hits, mut any) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+        scene.batch(rays).nearest(&mut hits);
+        scene.batch(rays).any(&mut any);
+        assert_eq!(hits, expected, "{isa}, {context}");
+        assert!(any.iter().zip(expected).all(|(any, hit)| *any == hit.is_hit()), "{isa}, {context}");
+        for (ray, expected) in rays.iter().zip(expected).step_by(5) {
+            assert_eq!(scene.nearest(ray).unwrap_or(Hit::MISS), *expected, "{isa}, {context}");
+        }
+    }
+    chosen.choose().unwrap();
+    expected.iter().filter(|hit| hit.is_hit()).count()
+}
+
 /// Checks the rays, and returns the number of those that hit.
 fn check(scene: &Scene, rays: &[Ray64], context: &str) -> usize {
     let (world, mut expected) = (World::new(scene), Vec::new());
@@ -91,20 +115,7 @@ fn check(scene: &Scene, rays: &[Ray64], context: &str) -> usize {
         let off = (found.u - u).abs().max((found.v - v).abs());
         assert!(off <= 1.0 / (1u64 << 28) as f64, "{found:?}, {}", context());
     }
-    let chosen = Isa::chosen();
-    for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
-        isa.choose().unwrap();
-        let (mut hits, mut any) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-        scene.batch(rays).nearest(&mut hits);
-        scene.batch(rays).any(&mut any);
-        assert_eq!(hits, expected, "{isa}, {context}");
-        assert!(any.iter().zip(&expected).all(|(any, hit)| *any == hit.is_hit()), "{isa}, {context}");
-        for (ray, expected) in rays.iter().zip(&expected).step_by(5) {
-            assert_eq!(scene.nearest(ray).unwrap_or(Hit::MISS), *expected, "{isa}, {context}");
-        }
-    }
-    chosen.choose().unwrap();
-    expected.iter().filter(|hit| hit.is_hit()).count()
+    check_everywhere(scene, rays, &expected, context)
 }
 
 #[test]

@@ -1,9 +1,9 @@
 //! Models with positions in f64: rays of f32, rays in f64 and rays from starts against exact
 //! arithmetic, through models in place and through instances.
 
-use super::{CHOICE, check, rays, unit};
+use super::{CHOICE, check, check_everywhere, rays, unit};
 use bth::rays::{Hit, Ray, Ray64, StartRay};
-use bth::{Accept, Isa, Scene, SegmentEnd, TraceRay};
+use bth::{Accept, Scene, SegmentEnd, TraceRay};
 use bth_compile::Silent;
 use bth_compile::cached::Cache;
 use bth_compile::memory::{Instance, PositionRows, TriangleMesh, compile_scene};
@@ -101,20 +101,7 @@ where
         let precise = scene.hit_f64(&ray, &hit).t;
         assert!((precise - to_f64(&at.t)).abs() <= t.abs() / (1u64 << 40) as f64, "{}", context());
     }
-    let chosen = Isa::chosen();
-    for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
-        isa.choose().unwrap();
-        let (mut hits, mut any) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-        scene.batch(rays).nearest(&mut hits);
-        scene.batch(rays).any(&mut any);
-        assert_eq!(hits, expected, "{isa}, {context}");
-        assert!(any.iter().zip(&expected).all(|(any, hit)| *any == hit.is_hit()), "{isa}, {context}");
-        for (ray, expected) in rays.iter().zip(&expected).step_by(5) {
-            assert_eq!(scene.nearest(ray).unwrap_or(Hit::MISS), *expected, "{isa}, {context}");
-        }
-    }
-    chosen.choose().unwrap();
-    expected.iter().filter(|hit| hit.is_hit()).count()
+    check_everywhere(scene, rays, &expected, context)
 }
 
 fn narrow(ray: &Ray64) -> Ray {

@@ -146,21 +146,8 @@ pub(crate) fn intersect(
             }
         }
         LineSource::World(lines, ray) => {
-            intersect_in_world((lines, ray), corners_in_source(object, triangle, corners), may_matter)
+            intersect_in_world((lines, ray), object.exact_corners(|| triangle.read(), corners), may_matter)
         }
-    }
-}
-
-/// The corners of a triangle in the source's space, given its corners in a leaf.
-#[inline(always)]
-pub(crate) fn corners_in_source(
-    object: &ObjectView<'_>,
-    triangle: TriangleRef<'_>,
-    of_leaf: [[f32; 3]; 3],
-) -> [[f64; 3]; 3] {
-    match object.exact.is_empty() {
-        true => of_leaf.map(wide),
-        false => object.exact_corners(triangle.read(), of_leaf),
     }
 }
 

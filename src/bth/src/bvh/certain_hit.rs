@@ -1,13 +1,13 @@
 //! The answer of a single ray whose nearest hit is certain: t, u and v in f64, as
 //! [`super::deferred`] computes them for sixteen rays.
 
-use super::candidate::{Candidate, Settle, corners_in_source};
+use super::candidate::{Candidate, Settle};
 use crate::intersect::exact::{OriginTerms, RoundedIntersection, reported, reported_barycentric};
 use crate::intersect::exact_quad::rounded_intersection;
 use crate::intersect::exact_ray::{ExactRay, LineSource};
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::vector::max_norm;
-use crate::query::{Goal, RayQuery, TriangleRef};
+use crate::query::{Goal, RayQuery};
 use crate::rays::{Hit, PrimitiveRef};
 use crate::simd::Simd;
 use bth_format::layout::NONE;
@@ -42,9 +42,8 @@ pub(crate) fn store_certain_hit<S: Simd, G: Goal>(
             }
             LineSource::World(lines, ray) => {
                 let line = lines.line(ray);
-                let index = leaf.first.wrapping_add(candidate.triangle);
-                let triangle = TriangleRef::index(index, object.triangle_ids);
-                let terms = OriginTerms::new(line, corners_in_source(object, triangle, corners));
+                let id = || object.triangle_ids[leaf.first.wrapping_add(candidate.triangle) as usize];
+                let terms = OriginTerms::new(line, object.exact_corners(id, corners));
                 RoundedIntersection::new(&terms, line.direction, max_norm(line.direction))
             }
         };

@@ -3,7 +3,6 @@
 //! [`mod@crate::intersect::crossing`] is the rule that decides. `points/winding.rs` counts the
 //! crossings of rays along an axis faster.
 
-use crate::bvh::candidate::corners_in_source;
 use crate::bvh::enumerate::enumerate;
 use crate::enumerate::enumerate_instances;
 use crate::intersect::crossing::{crossing, crossing_from_start, crossing_in_world};
@@ -44,7 +43,7 @@ impl Receiver for CrossingCounter<'_> {
             LineSource::Start(point) => start_on(self.object, point)
                 .map_or(0, |start| crossing_from_start(ray, point, &start, corners)),
             LineSource::World(lines, ray) => {
-                let corners = corners_in_source(self.object, triangle, corners);
+                let corners = self.object.exact_corners(|| triangle.read(), corners);
                 crossing_in_world((lines, ray), self.range, corners)
             }
         };

@@ -3,7 +3,7 @@
 
 use super::accept::Accept;
 use super::collect::{Collector, FoundHit};
-use crate::bvh::candidate::{corners_in_source, intersect};
+use crate::bvh::candidate::intersect;
 use crate::bvh::enumerate::enumerate;
 use crate::enumerate::{EnteredInstance, enumerate_instances};
 use crate::intersect::exact::{Intersection, precise, reported};
@@ -144,8 +144,9 @@ impl Receiver for InstanceHits<'_> {
         let Some(intersection) = found else { return false };
         let Some(t) = self.reported_t(intersection.t) else { return false };
         let [.., determinant] = intersection.weight;
+        let exact_corners = || self.object.exact_corners(|| triangle.read(), corners);
         // A hit beyond the limit is excluded before the id is read, which is often a cache miss.
-        if !self.is_in_wide_range(&intersection, || corners_in_source(self.object, triangle, corners))
+        if !self.is_in_wide_range(&intersection, exact_corners)
             || t > self.collector.limit()
             || !self.accept.cull.keeps(determinant)
             || !self.meets_group(triangle)
@@ -157,7 +158,7 @@ impl Receiver for InstanceHits<'_> {
         if self.object.opacity_at(primitive.triangle, u, v) == Opacity::Transparent {
             return false;
         }
-        let wide_t = self.wide_t(&intersection, || corners_in_source(self.object, triangle, corners));
+        let wide_t = self.wide_t(&intersection, exact_corners);
         let found = FoundHit { hit: Hit { t, u, v, primitive }, t: intersection.t, wide_t };
         if !self.collector.wants(&found)
             || self.accept.filter.is_some_and(|accepts| !accepts(self.ray, &found.hit))

@@ -11,9 +11,9 @@ use crate::intersect::long::{
 };
 use crate::intersect::origin::{RoundedLine, RoundedOrigin};
 use crate::intersect::prepare::PreparedRay;
-use crate::intersect::start::{corners_of, start_corners};
+use crate::intersect::start::corners_by_id;
 use crate::intersect::start_point::StartPoint;
-use crate::intersect::vector::{max_norm, wide};
+use crate::intersect::vector::max_norm;
 use crate::nodes::affine::ObjectRay;
 use crate::object::single::SingleRay;
 use crate::objects::Objects;
@@ -72,8 +72,7 @@ impl StartTriangle {
                 (objects.view(world.placement(start.instance).object()), of_start.rows())
             }
         };
-        let corners = start_corners(object, start.point.leaf, start.point.slot)?;
-        let corners = object.exact_corners(start.start.primitive.triangle, corners);
+        let corners = corners_by_id(object, start.start.primitive.triangle)?;
         let weights = [start.point.u.into(), start.point.v.into()];
         Some(StartTriangle { corners, weights, to_world })
     }
@@ -90,17 +89,6 @@ pub(super) fn exact_line(place: Place<'_>, ray: &WorldRay<'_>, t_scale: f32) -> 
     let scale = Dyadic::from(f64::from(t_scale));
     let direction = dyadic_vector(ray.direction()).map(|x| &x * &scale);
     ExactLine { origin, weight, direction, to_world: place.rows() }
-}
-
-/// The line of a ray that starts on a triangle of an object whose space is world space.
-pub(crate) fn exact_of_start(
-    object: &ObjectView<'_>,
-    start: &StartPoint,
-    direction: [f64; 3],
-) -> Option<ExactLine> {
-    let corners = start_corners(object, start.leaf, start.slot)?.map(wide);
-    let (origin, weight) = image_of_start(None, corners, [start.u.into(), start.v.into()]);
-    Some(ExactLine { origin, weight, direction: dyadic_vector(direction), to_world: None })
 }
 
 /// The line of a ray through an object with more digits. Its direction is divided by `t_scale`.
@@ -179,8 +167,11 @@ impl<'a> RayInInstance<'a> {
 
     /// The exact t at which the ray hits a triangle of the object.
     pub(crate) fn exact_t(&self, object: &ObjectView<'_>, triangle: u32) -> Option<ExactT> {
-        let corners = object.exact_corners(triangle, corners_of(object, triangle)?);
-        Some(WorldLines::exact(self, 0).exact_t(corners)?.times(f64::from(self.of_object.t_scale)))
+        Some(
+            WorldLines::exact(self, 0)
+                .exact_t(corners_by_id(object, triangle)?)?
+                .times(f64::from(self.of_object.t_scale)),
+        )
     }
 
     /// The same ray with its f32 numbers relative to an object's anchor.

@@ -42,7 +42,7 @@ mod wide_rays;
 mod world;
 
 pub(crate) use by_caller::NewInstance;
-pub(crate) use lines::{RayInInstance, exact_of_start};
+pub(crate) use lines::RayInInstance;
 #[cfg(test)]
 pub(crate) use placement::PartBoxes;
 #[cfg(test)]

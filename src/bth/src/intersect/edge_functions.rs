@@ -19,7 +19,7 @@
 //! **Error of a depth.** A change of the three weights by e each changes the depth by at most
 //! 3e·range/(|sum| - 3e), where `range` is the range of the corners' depths, and never moves it out
 //! of that range. The roundings of the depth itself stay below 8u of the largest |depth|. An error
-//! of a corner moves the depth by at most as much, besides what it adds to the errors of weights.
+//! of a corner moves the depth by at most as much. It adds to the errors of weights, too.
 
 use crate::simd::Lanewise;
 

@@ -253,17 +253,11 @@ pub(crate) fn place(object: &ObjectView<'_>, triangle: u32) -> Option<(u32, u32)
     }
 }
 
-/// The corners of the triangle with an id. `None` if the file does not tell where it lies.
-pub(crate) fn corners_of(object: &ObjectView<'_>, triangle: u32) -> Option<[[f32; 3]; 3]> {
-    let (leaf, slot) = place(object, triangle)?;
-    start_corners(object, leaf, slot)
-}
-
 /// The corners of the triangle with an id in the source's space, from its leaf or from the source.
 /// `None` if the file tells neither.
 pub(crate) fn corners_by_id(object: &ObjectView<'_>, id: u32) -> Option<[[f64; 3]; 3]> {
-    match corners_of(object, id) {
-        Some(of_leaf) => Some(object.exact_corners(id, of_leaf)),
+    match place(object, id).and_then(|(leaf, slot)| start_corners(object, leaf, slot)) {
+        Some(of_leaf) => Some(object.exact_corners(|| id, of_leaf)),
         None => source_corners(object, id),
     }
 }

@@ -12,7 +12,7 @@
 //! The max sum of |elements| of a row of R is computed; the spectral norm is at most √3 times that.
 
 use crate::intersect::region_box::RegionBox;
-use crate::intersect::vector::{max_norm, minus, wide};
+use crate::intersect::vector::{max_norm, minus};
 use crate::intersect::wide_side::PointInObject;
 use crate::intersect::wide_triangle::WideTriangle;
 use crate::nodes::affine::Affine;
@@ -133,7 +133,7 @@ impl PlacedObject {
 
     /// A triangle in world space, given its corners in object space and its id.
     pub(super) fn triangle(&self, object: &ObjectView<'_>, corners: [[f32; 3]; 3], id: u32) -> WideTriangle {
-        let corners = object.exact.corners(id).unwrap_or_else(|| corners.map(wide));
+        let corners = object.exact_corners(|| id, corners);
         WideTriangle { corners, rows: self.rows }
     }
 }

@@ -35,7 +35,7 @@ fn offer_wide<G: Goal>(
     mut found: Intersection,
     query: &mut RayQuery<G>,
 ) -> bool {
-    let corners = || object.exact_corners(triangle.read(), corners);
+    let corners = || object.exact_corners(|| triangle.read(), corners);
     let exact_t = || Some(lines.exact(at).intersection(corners())?.t);
     let close = |a: f64, b: f64| b.is_finite() && (a - b).abs() <= 4.0 * RATIO_ERROR * a.abs().max(b.abs());
     if close(found.t, tmin) || close(found.t, tmax) {

@@ -32,7 +32,7 @@ pub(crate) fn locate(object: &ObjectView<'_>, start: Start) -> Result<StartPoint
     if !are_weights([u, v]) {
         return Err(StartError::Weights);
     }
-    let corners = object.exact_corners(triangle, corners);
+    let corners = object.exact_corners(|| triangle, corners);
     let origin = rounded_start(corners, [u.into(), v.into()]);
     Ok(StartPoint { origin, leaf, slot, u, v })
 }

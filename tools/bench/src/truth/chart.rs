@@ -56,12 +56,13 @@ pub(super) fn draw(sets: &[Set], lines: &[Line<'_>]) -> String {
     let mean = |line| Line::mean(line, sets).map(|(wrong, ns)| Point(line, wrong, ns));
     let title = "the sets in f32 that an engine answers, mean";
     large.draw(&mut svg, title, lines.iter().filter_map(mean).collect());
-    let (mut cell, mut beside) = (0, 60.0);
+    let (mut cell, mut next_top) = (0, 60.0);
     let tall = LARGE_HEIGHT / (sets.len() - small).max(1) as f64;
     for (i, set) in sets.iter().enumerate() {
-        let (mut area, mut title) = ([wide, beside, WIDTH, beside + tall], format!("{}, in f64", set.name));
+        let (mut area, mut title) =
+            ([wide, next_top, WIDTH, next_top + tall], format!("{}, in f64", set.name));
         if !set.single {
-            beside += tall;
+            next_top += tall;
         } else {
             let width = WIDTH / COLUMNS as f64;
             let (x, y) = ((cell % COLUMNS) as f64 * width, below + (cell / COLUMNS) as f64 * SMALL_HEIGHT);

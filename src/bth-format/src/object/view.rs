@@ -126,8 +126,8 @@ impl<'a> ObjectView<'a> {
     pub fn is_deformable(&self) -> bool {
         !self.leaf_vertices.is_empty()
     }
-    /// The corners of a triangle in the source's space, given its corners in a leaf. `id` returns the
-    /// triangle's id where it is needed: reading it is often a cache miss.
+    /// The corners of a triangle in the source's space, given its corners in a leaf. `id` returns
+    /// the triangle's id where it is needed: reading it is often a cache miss.
     #[inline(always)]
     pub fn exact_corners(&self, id: impl FnOnce() -> u32, of_leaf: [[f32; 3]; 3]) -> [[f64; 3]; 3] {
         let exact = if self.exact.is_empty() { None } else { self.exact.corners(id()) };

@@ -20,9 +20,10 @@ use crate::rays::{Ray, Start};
 use crate::scene::Scene;
 use crate::start_points::place_start;
 use crate::starts::world_ray::InstanceStart;
-use bth_format::exact::{Dyadic, DyadicVector};
+use bth_format::exact::{Dyadic, DyadicVector, wide_side};
 use bth_format::layout::Opacity;
 use bth_format::object::ObjectView;
+use std::cmp::Ordering;
 
 /// An end of a segment: a point of a surface, or a point in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -169,6 +170,30 @@ impl Segment<'_> {
         starts.any(|start| start.start.primitive.triangle == triangle.read())
     }
 
+    /// Returns true if the corners of the triangles that the ends lie on tell that a triangle does
+    /// not block: both ends are on one side of its plane, or one is in it. Most triangles that f64
+    /// leaves open are neighbors in a surface that is flat or nearly flat.
+    #[cold]
+    fn is_passed(&self, object: &ObjectView<'_>, triangle: [[f64; 3]; 3]) -> bool {
+        let side_of = |end: &PlacedEnd| {
+            let start = end.start.as_ref().filter(|start| start.instance == self.instance)?;
+            let corners = corners_by_id(object, start.start.primitive.triangle)?;
+            let sides = corners.map(|corner| wide_side(triangle, corner));
+            let has = |side| sides.contains(&side);
+            match (has(Ordering::Less), has(Ordering::Greater)) {
+                (true, true) => None,
+                (true, false) => Some(Ordering::Less),
+                (false, true) => Some(Ordering::Greater),
+                (false, false) => Some(Ordering::Equal),
+            }
+        };
+        let [from, to] = self.ends;
+        match side_of(from) {
+            Some(Ordering::Equal) => true,
+            from => matches!(side_of(to), Some(to) if to == Ordering::Equal || Some(to) == from),
+        }
+    }
+
     fn exact_segment(&self) -> SegmentLine {
         let [from, to] = self.ends.map(|end| end.exact(self.scene));
         SegmentLine::between(from, to, rows(self.scene, self.instance))
@@ -232,6 +257,7 @@ impl Blocking<'_> {
             {
                 Some(uncertain.uv())
             }
+            Estimate::Open(..) if self.segment.is_passed(self.object, corners) => None,
             Estimate::Open(..) => self.segment.exact_segment().crossed(corners),
         }
     }

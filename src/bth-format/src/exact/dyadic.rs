@@ -1,23 +1,21 @@
-//! Exact arithmetic on any finite `f64`: numbers m · 2^e with integers m of any length. It is slow
-//! and has no limits; [`super::Expansion`] is faster, for values of `f32` precision.
+//! Exact arithmetic on any finite `f64`: numbers ±m · 2^e with natural m of any size. It has no
+//! limits; [`super::Expansion`] is faster, for values of `f32` precision.
 
-use num_bigint::{BigInt, BigUint, Sign};
+use super::natural::Natural;
 use std::cmp::Ordering;
 use std::ops::{Add, Mul, Neg, Sub};
 
-/// A number m · 2^e.
+/// A number ±m · 2^e.
 #[derive(Clone, Debug)]
 pub struct Dyadic {
-    mantissa: BigInt,
+    /// False where m is 0.
+    is_negative: bool,
+    mantissa: Natural,
     exponent: i64,
 }
 
 /// A vector of exact numbers.
 pub type DyadicVector = [Dyadic; 3];
-
-/// Digits of a quotient before it is rounded to the 53 of `f64`; a further bit holds whether
-/// there is a remainder.
-const QUOTIENT_BITS: u64 = 66;
 
 impl From<f64> for Dyadic {
     /// The exact value of a number.
@@ -29,24 +27,21 @@ impl From<f64> for Dyadic {
         let bits = x.to_bits();
         let (fraction, biased) = (bits & ((1 << 52) - 1), (bits >> 52 & 0x7ff) as i64);
         let magnitude = if biased == 0 { fraction } else { fraction | 1 << 52 };
-        let mantissa = BigInt::from(magnitude);
-        Dyadic { mantissa: if x < 0.0 { -mantissa } else { mantissa }, exponent: biased.max(1) - 1075 }
+        // Numbers of f32 keep their 24 bits.
+        let zeros = magnitude.trailing_zeros() % 64;
+        let exponent = biased.max(1) - 1075 + i64::from(zeros);
+        Dyadic { is_negative: x < 0.0, mantissa: Natural::from(magnitude >> zeros), exponent }
     }
 }
 
 impl Dyadic {
     /// Compares with 0.
     pub fn sign(&self) -> Ordering {
-        match self.mantissa.sign() {
-            Sign::Minus => Ordering::Less,
-            Sign::NoSign => Ordering::Equal,
-            Sign::Plus => Ordering::Greater,
+        match self.is_negative {
+            true => Ordering::Less,
+            false if self.mantissa.is_zero() => Ordering::Equal,
+            false => Ordering::Greater,
         }
-    }
-
-    /// The number in units of 2^exponent, a smaller one than its own.
-    fn digits(&self, exponent: i64) -> BigInt {
-        &self.mantissa << (self.exponent - exponent) as u64
     }
 
     /// The nearest `f64`; ties go to the even one. Infinite beyond the range of `f64`.
@@ -57,27 +52,36 @@ impl Dyadic {
     /// The quotient, rounded to the nearest `f64` (below the range of normal numbers twice). NaN
     /// where the divisor is 0.
     pub fn ratio(&self, divisor: &Dyadic) -> f64 {
-        let ((sign, n), (other, d)) = (parts(&self.mantissa), parts(&divisor.mantissa));
-        if other == Sign::NoSign {
+        if divisor.mantissa.is_zero() {
             return f64::NAN;
         }
-        if sign == Sign::NoSign {
+        if self.mantissa.is_zero() {
             return 0.0;
         }
-        let shift = QUOTIENT_BITS as i64 + d.bits() as i64 - n.bits() as i64;
-        let (n, d) = if shift >= 0 { (n << shift as u64, d) } else { (n, d << shift.unsigned_abs()) };
-        let quotient = &n / &d;
-        let has_rest = &quotient * &d != n;
-        // At most 67 bits.
-        let digits = quotient.iter_u64_digits().rev().fold(0u128, |sum, digit| sum << 64 | u128::from(digit));
-        let rounded = (digits << 1 | u128::from(has_rest)) as f64;
-        let value = scaled(rounded, self.exponent - divisor.exponent - shift - 1);
-        if sign == other { value } else { -value }
+        let (quotient, exponent) = self.mantissa.quotient(&divisor.mantissa);
+        let value = scaled(quotient as f64, self.exponent - divisor.exponent + exponent);
+        if self.is_negative == divisor.is_negative { value } else { -value }
     }
-}
 
-fn parts(x: &BigInt) -> (Sign, BigUint) {
-    (x.sign(), x.magnitude().clone())
+    /// self + other, or self - other.
+    fn combined(&self, other: &Dyadic, is_difference: bool) -> Dyadic {
+        // The exponent of 0 says nothing about the digits that a sum needs.
+        if other.mantissa.is_zero() {
+            return self.clone();
+        }
+        if self.mantissa.is_zero() {
+            return if is_difference { -other } else { other.clone() };
+        }
+        let exponent = self.exponent.min(other.exponent);
+        let [a, b] = [self, other].map(|x| x.mantissa.shifted((x.exponent - exponent) as u64));
+        let of_other = other.is_negative != is_difference;
+        let (is_negative, mantissa) = match () {
+            () if self.is_negative == of_other => (of_other, a.plus(&b)),
+            () if a >= b => (self.is_negative, a.minus(&b)),
+            () => (of_other, b.minus(&a)),
+        };
+        Dyadic { is_negative: is_negative && !mantissa.is_zero(), mantissa, exponent }
+    }
 }
 
 /// x · 2^exponent, in steps that only the last of may round.
@@ -97,29 +101,30 @@ fn scaled(mut x: f64, exponent: i64) -> f64 {
 impl Add for &Dyadic {
     type Output = Dyadic;
     fn add(self, other: &Dyadic) -> Dyadic {
-        let exponent = self.exponent.min(other.exponent);
-        Dyadic { mantissa: self.digits(exponent) + other.digits(exponent), exponent }
+        self.combined(other, false)
     }
 }
 
 impl Sub for &Dyadic {
     type Output = Dyadic;
     fn sub(self, other: &Dyadic) -> Dyadic {
-        self + &-other
+        self.combined(other, true)
     }
 }
 
 impl Neg for &Dyadic {
     type Output = Dyadic;
     fn neg(self) -> Dyadic {
-        Dyadic { mantissa: -&self.mantissa, exponent: self.exponent }
+        Dyadic { is_negative: !self.is_negative && !self.mantissa.is_zero(), ..self.clone() }
     }
 }
 
 impl Mul for &Dyadic {
     type Output = Dyadic;
     fn mul(self, other: &Dyadic) -> Dyadic {
-        Dyadic { mantissa: &self.mantissa * &other.mantissa, exponent: self.exponent + other.exponent }
+        let mantissa = self.mantissa.times(&other.mantissa);
+        let is_negative = self.is_negative != other.is_negative && !mantissa.is_zero();
+        Dyadic { is_negative, mantissa, exponent: self.exponent + other.exponent }
     }
 }
 

@@ -3,9 +3,10 @@
 
 mod dyadic;
 mod expansion;
+mod natural;
 mod predicates;
 
 pub use dyadic::{Dyadic, DyadicVector, dyadic_cross, dyadic_difference, dyadic_dot, dyadic_vector};
 pub(crate) use expansion::two_sum;
 pub use expansion::{EDGE_PARTS, Expansion, VOLUME_PARTS};
-pub use predicates::{is_zero_area, side};
+pub use predicates::{is_zero_area, side, wide_side};

@@ -117,14 +117,13 @@ impl Failure {
 
     /// Prints the error, with `--json` as an object too, and returns the exit code.
     pub(crate) fn report(&self, wants_json: bool) -> ExitCode {
-        if let Some(diagnosis) = self.diagnosis() {
-            // The handler of signals prints nothing where output has begun.
-            if wants_json {
-                output::begin();
+        match self.diagnosis() {
+            Some(diagnosis) => {
+                output::fail();
+                diagnosis.report(wants_json)
             }
-            return diagnosis.report(wants_json);
+            None => ExitCode::from(self.exit_code()),
         }
-        ExitCode::from(self.exit_code())
     }
 
     /// Prints the error on standard error.

@@ -3,24 +3,57 @@
 use bth_files::printable;
 use serde::Serialize;
 use std::io::{Result, StdoutLock, Write};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicU8, Ordering};
 
-/// True if something was printed on standard output, or is being printed.
-static BEGUN: AtomicBool = AtomicBool::new(false);
+/// What was printed, and by whom: one of the numbers below.
+static STATE: AtomicU8 = AtomicU8::new(SILENT);
+/// Nothing was printed on standard output.
+const SILENT: u8 = 0;
+/// Something was printed on standard output, or is being printed.
+const BEGUN: u8 = 1;
+/// The error that ends the program is being reported.
+const FAILING: u8 = 2;
+/// A signal ends the program: only its thread prints.
+const INTERRUPTED: u8 = 3;
 
-/// Returns true if something was printed on standard output, or is being printed.
-pub(crate) fn has_begun() -> bool {
-    BEGUN.load(Ordering::Relaxed)
+/// Notes what is going to be printed. Where a signal ends the program, waits for the end.
+fn enter(state: u8) {
+    let entered = STATE.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |before| match before {
+        INTERRUPTED => None,
+        _ => Some(before.max(state)),
+    });
+    while entered.is_err() {
+        std::thread::park();
+    }
 }
 
-/// Notes that something is going to be printed on standard output.
-pub(crate) fn begin() {
-    BEGUN.store(true, Ordering::Relaxed);
+/// Notes that the error is going to be reported that ends the program.
+pub(crate) fn fail() {
+    enter(FAILING);
+}
+
+/// What the handler of a signal finds that ends the program.
+pub(crate) enum Interrupted {
+    /// Nothing was printed, and nothing but its error will be.
+    Silent,
+    /// Output has begun. Who prints may wait for a reader.
+    Begun,
+    /// Another thread reports an error and then ends the program.
+    Failing,
+}
+
+/// Notes that a signal ends the program.
+pub(crate) fn interrupt() -> Interrupted {
+    match STATE.compare_exchange(SILENT, INTERRUPTED, Ordering::Relaxed, Ordering::Relaxed) {
+        Ok(_) => Interrupted::Silent,
+        Err(FAILING) => Interrupted::Failing,
+        Err(_) => Interrupted::Begun,
+    }
 }
 
 /// Standard output, locked.
 pub(crate) fn stdout() -> StdoutLock<'static> {
-    begin();
+    enter(BEGUN);
     std::io::stdout().lock()
 }
 

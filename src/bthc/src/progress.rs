@@ -1,9 +1,10 @@
 //! Progress on a terminal, and cancellation by Ctrl-C, SIGTERM or SIGHUP.
 
 use crate::failure::Failure;
-use crate::{output, temporary};
+use crate::output::{self, Interrupted};
+use crate::temporary;
 use bth_compile::Monitor;
-use bth_files::signals;
+use bth_files::{Diagnosis, signals};
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::Path;
@@ -13,6 +14,8 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 static CANCELLED: AtomicBool = AtomicBool::new(false);
 /// Values of [`Progress`] that live: while there is one, stages poll [`CANCELLED`].
 static POLLERS: AtomicUsize = AtomicUsize::new(0);
+/// Set once a signal was left to the error that was being reported.
+static LEFT_ALONE: AtomicBool = AtomicBool::new(false);
 
 /// Makes Ctrl-C stop the compilation cleanly; a second one ends the program at once, as does the
 /// first where nothing polls for it: while standard input is read, and in commands without stages.
@@ -24,14 +27,17 @@ pub(crate) fn listen_for_interrupts(wants_json: bool) -> Result<(), Failure> {
     let end = move || {
         let again = CANCELLED.swap(true, Ordering::Relaxed);
         if again || POLLERS.load(Ordering::Relaxed) == 0 {
-            let cancelled = Failure::from(bth_compile::Error::Cancelled);
-            // Who prints already may wait for a reader, and holds the lock of standard output. Else
-            // the second signal is reported, too: `timeout` sends one to the program and at once
-            // another to its group.
-            if !output::has_begun() {
-                cancelled.report(wants_json);
+            let cancelled = bth_compile::Error::Cancelled;
+            match output::interrupt() {
+                // The second signal is reported, too: `timeout` sends one to the program and at
+                // once another to its group.
+                Interrupted::Silent => drop(Diagnosis::from(&cancelled).report(wants_json)),
+                Interrupted::Begun => {}
+                // The program ends by itself, unless nobody reads the report.
+                Interrupted::Failing if !LEFT_ALONE.swap(true, Ordering::Relaxed) => return,
+                Interrupted::Failing => {}
             }
-            temporary::exit(cancelled.exit_code());
+            temporary::exit(Failure::from(cancelled).exit_code());
         }
     };
     match signals::install(|| ctrlc::set_handler(end)) {

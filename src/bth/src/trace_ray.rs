@@ -4,7 +4,7 @@
 #![allow(private_interfaces, private_bounds)]
 
 use self::sealed::Traced;
-use crate::instances::{RayInInstance, World, WorldRays, trace_wide, wide_ray};
+use crate::instances::{RayInInstance, WideRay, World, WorldRays, trace_wide, wide_ray};
 use crate::object::{self, Scratch};
 use crate::query::sink::{Answers, Sink};
 use crate::rays::{Hit, Ray, Ray64, StartRay};
@@ -144,12 +144,20 @@ impl Traced for StartRay {
 }
 
 impl Traced for Ray64 {
+    #[inline]
     fn store_nearest_in(&self, object: &ObjectView<'_>, instance: u32, hit: &mut Hit) {
+        if let Some(ray) = WideRay::new(self) {
+            return object::store_nearest(object, &ray, instance, hit);
+        }
         let ray = self.narrow();
         let of_object = RayInInstance::in_world(None, instance, wide_ray(&ray, self), ray.tmax);
         object::store_nearest(object, &of_object, instance, hit);
     }
+    #[inline]
     fn hits_any_in(&self, object: &ObjectView<'_>) -> bool {
+        if let Some(ray) = WideRay::new(self) {
+            return object::any(object, &ray);
+        }
         let ray = self.narrow();
         object::any(object, &RayInInstance::in_world(None, 0, wide_ray(&ray, self), ray.tmax))
     }

@@ -2,7 +2,7 @@
 //! [`super::deferred`] computes them for sixteen rays.
 
 use super::candidate::{Candidate, Settle};
-use crate::intersect::exact::{OriginTerms, RoundedIntersection, reported, reported_barycentric};
+use crate::intersect::exact::{reported, reported_barycentric};
 use crate::intersect::exact_quad::rounded_intersection;
 use crate::intersect::exact_ray::{ExactRay, LineSource};
 use crate::intersect::filter::TriangleBlock;
@@ -42,9 +42,19 @@ pub(crate) fn store_certain_hit<S: Simd, G: Goal>(
             }
             LineSource::World(lines, ray) => {
                 let line = lines.line(ray);
-                let id = || object.triangle_ids[leaf.first.wrapping_add(candidate.triangle) as usize];
-                let terms = OriginTerms::new(line, object.exact_corners(id, corners));
-                RoundedIntersection::new(&terms, line.direction, max_norm(line.direction))
+                let of_line = (line, line.direction);
+                let exact = if object.exact.is_empty() {
+                    None
+                } else {
+                    let place = leaf.first.wrapping_add(candidate.triangle);
+                    object.exact.corners(object.triangle_ids[place as usize])
+                };
+                match exact {
+                    None => rounded_intersection(s.doubles(), of_line, corners, max_norm(line.direction)),
+                    Some(corners) => {
+                        rounded_intersection(s.doubles(), of_line, corners, max_norm(line.direction))
+                    }
+                }
             }
         };
         if rounded.is_accurate {

@@ -217,8 +217,21 @@ impl WorldLines for RayInInstance<'_> {
 /// for which it is prepared.
 pub(crate) struct InstanceLine {
     rows: [Vec4; 2],
-    ray: Ray,
-    bounds: ObjectBounds,
+    pub(super) ray: Ray,
+    pub(super) bounds: ObjectBounds,
+}
+
+impl InstanceLine {
+    #[inline(always)]
+    pub(super) fn new(rows: [Vec4; 2], bounds: ObjectBounds) -> InstanceLine {
+        let floats = [rows[0].to_array(), rows[1].to_array()];
+        InstanceLine { rows, ray: zerocopy::transmute!(floats), bounds }
+    }
+
+    #[inline(always)]
+    pub(super) fn prepared<S: Simd>(&self, s: S, bounds: &ObjectBounds) -> Option<PreparedRay> {
+        PreparedRay::of_rows(s, bounds, self.rows, &self.ray)
+    }
 }
 
 impl SingleRay for RayInInstance<'_> {
@@ -236,12 +249,11 @@ impl SingleRay for RayInInstance<'_> {
         }
         // Vectors are made in registers: loading what was just written word by word would stall.
         let rows = [Vec4::new(x, y, z, tmin), Vec4::new(dx, dy, dz, ray.tmax)];
-        let floats = [rows[0].to_array(), rows[1].to_array()];
         let bounds = match self.ray.wide {
             None => line.bounds(object),
             Some(_) => line.with_rounded_range().bounds(object),
         };
-        Some(InstanceLine { rows, ray: zerocopy::transmute!(floats), bounds })
+        Some(InstanceLine::new(rows, bounds))
     }
     #[inline(always)]
     fn exact<'a>(&'a self, line: &'a InstanceLine) -> ExactRay<'a> {
@@ -253,7 +265,7 @@ impl SingleRay for RayInInstance<'_> {
     }
     #[inline(always)]
     fn prepared<S: Simd>(&self, s: S, line: &InstanceLine, bounds: &ObjectBounds) -> Option<PreparedRay> {
-        PreparedRay::of_rows(s, bounds, line.rows, &line.ray)
+        line.prepared(s, bounds)
     }
 }
 

@@ -53,5 +53,5 @@ pub(crate) use top_level::TopLevel;
 #[cfg(test)]
 pub(crate) use top_nodes::INSTANCE;
 pub(crate) use unplaced::UnplacedRay;
-pub(crate) use wide_rays::{trace_wide, wide_ray};
+pub(crate) use wide_rays::{WideRay, trace_wide, wide_ray};
 pub(crate) use world::{InstanceRow, World};

@@ -1,19 +1,23 @@
 //! Batches of rays in f64 through an object whose space is world space.
 
-use super::lines::{Place, RayInInstance, exact_line, long_line};
+use super::lines::{InstanceLine, Place, RayInInstance, exact_line, long_line};
 use crate::intersect::exact_line::ExactLine;
-use crate::intersect::exact_ray::{LineLanes, Lines, WorldLines};
+use crate::intersect::exact_ray::{ExactRay, LineLanes, LineSource, Lines, WorldLines};
 use crate::intersect::long::LongLine;
-use crate::intersect::origin::{RoundedLine, RoundedOrigin};
+use crate::intersect::origin::{ROUNDED_TO_F32, RoundedLine, RoundedOrigin};
+use crate::intersect::prepare::PreparedRay;
 use crate::intersect::start_point::StartPoint;
 use crate::intersect::vector::max_norm;
-use crate::nodes::affine::ObjectRay;
+use crate::nodes::affine::{ObjectRay, UNSCALED};
+use crate::object::single::SingleRay;
 use crate::object::{self, Scratch};
 use crate::query::sink::{Answers, Sink};
 use crate::rays::{Ray, Ray64};
+use crate::simd::Simd;
 use crate::starts::prepare::ENDED;
 use crate::starts::world_ray::WorldRay;
-use bth_format::object::ObjectView;
+use bth_format::object::{ObjectBounds, ObjectView};
+use glam::DVec4;
 
 /// Rays that are rounded to f32 and traced together. One bound holds for the errors of all of them.
 const TOGETHER: usize = 1024;
@@ -57,12 +61,53 @@ pub(crate) fn trace_wide(
     }
 }
 
+/// A ray in f64 that f32 can follow, through an object whose space is world space.
+#[derive(Clone, Copy)]
+pub(crate) struct WideRay<'a>(WideRays<'a>);
+
+impl<'a> WideRay<'a> {
+    /// `None` for rays whose numbers must be scaled before they are rounded to f32.
+    #[inline(always)]
+    pub(crate) fn new(ray: &'a Ray64) -> Option<WideRay<'a>> {
+        let is_unscaled = UNSCALED.contains(&max_norm(ray.direction));
+        is_unscaled.then_some(WideRay(WideRays(std::slice::from_ref(ray))))
+    }
+}
+
+impl SingleRay for WideRay<'_> {
+    type Line = InstanceLine;
+    #[inline(always)]
+    fn line<S: Simd>(&self, _s: S, object: &ObjectView<'_>) -> Option<InstanceLine> {
+        let &WideRays([Ray64 { origin: [x, y, z], tmin, direction: [dx, dy, dz], tmax }]) = &self.0 else {
+            return None;
+        };
+        // Vectors are made in registers: loading what was just written word by word would stall.
+        let rows = [DVec4::new(*x, *y, *z, *tmin).as_vec4(), DVec4::new(*dx, *dy, *dz, *tmax).as_vec4()];
+        let [x, y, z, _] = rows[0].abs().to_array();
+        let bounds = object.bounds.for_lines(x.max(y).max(z), 0.0, ROUNDED_TO_F32 as f32);
+        Some(InstanceLine::new(rows, bounds))
+    }
+    #[inline(always)]
+    fn exact<'a>(&'a self, line: &'a InstanceLine) -> ExactRay<'a> {
+        ExactRay::new(&line.ray, LineSource::World(&self.0, 0))
+    }
+    #[inline(always)]
+    fn bounds<'a>(_object: &'a ObjectView<'_>, line: &'a InstanceLine) -> &'a ObjectBounds {
+        &line.bounds
+    }
+    #[inline(always)]
+    fn prepared<S: Simd>(&self, s: S, line: &InstanceLine, bounds: &ObjectBounds) -> Option<PreparedRay> {
+        line.prepared(s, bounds)
+    }
+}
+
 /// A ray in f64, given the same ray rounded to f32.
 pub(crate) fn wide_ray<'a>(ray: &'a Ray, wide: &'a Ray64) -> WorldRay<'a> {
     WorldRay { ray, start: None, wide: Some(wide) }
 }
 
 /// The lines of rays in f64.
+#[derive(Clone, Copy)]
 struct WideRays<'a>(&'a [Ray64]);
 
 impl WorldLines for WideRays<'_> {

@@ -2,19 +2,48 @@
 //! its three vector products are one operation, and so are its four scalar products.
 
 use crate::intersect::exact::{INVERSE_RATIO_ERROR, RoundedIntersection, WEIGHT_ERROR};
-use crate::intersect::origin::{Origin, RoundedOrigin};
+use crate::intersect::origin::{Origin, RoundedLine, RoundedOrigin};
 use crate::simd::Doubles;
 
+/// A coordinate.
+pub(crate) trait QuadNumber: Copy {
+    /// Four of them.
+    fn load<D: Doubles>(s: D, numbers: [Self; 4]) -> D::V;
+    fn wide(self) -> f64;
+}
+
+impl QuadNumber for f32 {
+    #[inline(always)]
+    fn load<D: Doubles>(s: D, numbers: [f32; 4]) -> D::V {
+        s.widen(numbers)
+    }
+    #[inline(always)]
+    fn wide(self) -> f64 {
+        self.into()
+    }
+}
+
+impl QuadNumber for f64 {
+    #[inline(always)]
+    fn load<D: Doubles>(s: D, numbers: [f64; 4]) -> D::V {
+        s.load(numbers)
+    }
+    #[inline(always)]
+    fn wide(self) -> f64 {
+        self
+    }
+}
+
 /// The origin of a ray.
-pub(crate) trait QuadOrigin: Copy {
+pub(crate) trait QuadOrigin<N>: Copy {
     /// Repeats a coordinate of a corner in four lanes, except that the third lane gets the
     /// coordinate of the origin along the same axis.
-    fn with_corner<D: Doubles>(self, s: D, corner: f32, axis: usize) -> D::V;
+    fn with_corner<D: Doubles>(self, s: D, corner: N, axis: usize) -> D::V;
     /// Like [`Origin::enlarge`].
     fn enlarge(self, error: [f64; 2], edge: f64, distance: f64) -> [f64; 2];
 }
 
-impl QuadOrigin for [f32; 3] {
+impl QuadOrigin<f32> for [f32; 3] {
     #[inline(always)]
     fn with_corner<D: Doubles>(self, s: D, a: f32, axis: usize) -> D::V {
         s.widen([a, a, self[axis], a])
@@ -25,33 +54,39 @@ impl QuadOrigin for [f32; 3] {
     }
 }
 
-impl QuadOrigin for RoundedOrigin {
-    #[inline(always)]
-    fn with_corner<D: Doubles>(self, s: D, a: f32, axis: usize) -> D::V {
-        let a = f64::from(a);
-        s.load([a, a, self.0[axis], a])
-    }
-    #[inline(always)]
-    fn enlarge(self, error: [f64; 2], edge: f64, distance: f64) -> [f64; 2] {
-        Origin::enlarge(self, error, edge, distance)
-    }
+/// Origins in f64.
+macro_rules! wide_origin {
+    ($($origin:ty)*) => { $(
+        impl<N: QuadNumber> QuadOrigin<N> for $origin {
+            #[inline(always)]
+            fn with_corner<D: Doubles>(self, s: D, a: N, axis: usize) -> D::V {
+                s.load([a.wide(), a.wide(), self.point()[axis], a.wide()])
+            }
+            #[inline(always)]
+            fn enlarge(self, error: [f64; 2], edge: f64, distance: f64) -> [f64; 2] {
+                Origin::enlarge(self, error, edge, distance)
+            }
+        }
+    )* };
 }
+
+wide_origin!(RoundedOrigin RoundedLine);
 
 /// Like [`RoundedIntersection::new`] with the terms of an origin and a triangle, with the same
 /// bits.
 #[inline(always)]
-pub(crate) fn rounded_intersection<D: Doubles>(
+pub(crate) fn rounded_intersection<D: Doubles, N: QuadNumber>(
     s: D,
-    (origin, direction): (impl QuadOrigin, [f32; 3]),
-    [a, b, c]: [[f32; 3]; 3],
-    norm: f32,
+    (origin, direction): (impl QuadOrigin<N>, [impl QuadNumber; 3]),
+    [a, b, c]: [[N; 3]; 3],
+    norm: impl QuadNumber,
 ) -> RoundedIntersection {
     // By axis, four factors of vector products: the edges to b and c, the offset of a from the
     // origin, and the first edge again.
     // Closures might be compiled without the instruction set of the kernel.
     let mut left = [s.widen([0.0; 4]); 3];
     for k in 0..3 {
-        left[k] = s.sub(s.widen([b[k], c[k], a[k], b[k]]), origin.with_corner(s, a[k], k));
+        left[k] = s.sub(N::load(s, [b[k], c[k], a[k], b[k]]), origin.with_corner(s, a[k], k));
     }
     // The other factors, so that the products are `normal`, `second`, `third` and `normal` again.
     let right = [s.rotate(left[0]), s.rotate(left[1]), s.rotate(left[2])];
@@ -60,7 +95,7 @@ pub(crate) fn rounded_intersection<D: Doubles>(
     for k in 0..3 {
         let (i, j) = ((k + 1) % 3, (k + 2) % 3);
         let product = s.sub(s.mul(left[i], right[j]), s.mul(left[j], right[i]));
-        terms[k] = s.mul(product, s.with_last(s.widen([direction[k]; 4]), left[k]));
+        terms[k] = s.mul(product, s.with_last(QuadNumber::load(s, [direction[k]; 4]), left[k]));
     }
     let [x, y, z] = terms;
     let sum = s.add(s.add(x, y), z);
@@ -76,7 +111,7 @@ pub(crate) fn rounded_intersection<D: Doubles>(
         inverse,
         t: volume * inverse,
         is_accurate: (INVERSE_RATIO_ERROR * error[1] < volume.abs())
-            & (INVERSE_RATIO_ERROR * error[0] * f64::from(norm) < determinant.abs()),
+            & (INVERSE_RATIO_ERROR * error[0] * norm.wide() < determinant.abs()),
     }
 }
 
@@ -96,7 +131,13 @@ mod tests {
         #[inline(always)]
         fn run<S: Simd>(self, s: S) -> Self::Output {
             let OnIsa(origin, direction, corners, norm) = self;
-            bits(&rounded_intersection(s.doubles(), (origin, direction), corners, norm))
+            let found = bits(&rounded_intersection(s.doubles(), (origin, direction), corners, norm));
+            let line = RoundedLine { origin: RoundedOrigin(wide(origin), 0.0), direction: wide(direction), direction_error: 0.0 };
+            let (direction, norm) = (line.direction, max_norm(line.direction));
+            assert_eq!(bits(&rounded_intersection(s.doubles(), (line, direction), corners, norm)), found);
+            let corners = corners.map(wide);
+            assert_eq!(bits(&rounded_intersection(s.doubles(), (line, direction), corners, norm)), found);
+            found
         }
     }
 

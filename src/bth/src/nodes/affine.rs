@@ -262,6 +262,8 @@ const MAX_EXPONENT: i32 = 64;
 const LEAST_UNSCALED: f64 = 1.0 / (1u128 << MAX_EXPONENT) as f64;
 /// The min number with a greater exponent.
 const LEAST_SCALED: f64 = (1u128 << (MAX_EXPONENT + 1)) as f64;
+/// Max components of directions with which they are used without scaling.
+pub(crate) const UNSCALED: std::ops::Range<f64> = LEAST_UNSCALED..LEAST_SCALED;
 
 /// Sixteen rays, one in each lane.
 #[derive(Clone, Copy, Debug)]

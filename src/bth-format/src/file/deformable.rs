@@ -120,6 +120,7 @@ impl DeformableObject {
                 header,
                 bounds,
                 start_bounds: bounds.for_starts(),
+                near_bounds: bounds.for_near_lines(),
                 lines,
                 positions,
                 normals,

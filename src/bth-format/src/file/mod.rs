@@ -293,6 +293,7 @@ impl File {
             header,
             bounds,
             start_bounds: bounds.for_starts(),
+            near_bounds: bounds.for_near_lines(),
             grid,
             lines: lines.get(..MAX_LINES).unwrap_or(lines),
             triangle_ids: self.slice(object, kind::TRIANGLE_IDS),

@@ -123,6 +123,18 @@ impl ObjectBounds {
         }
     }
 
+    /// The bounds for rays that are rounded from f64, range and all, with origins of at most
+    /// [`Self::near`].
+    pub fn for_near_lines(&self) -> ObjectBounds {
+        self.for_lines(self.near(), 0.0, U)
+    }
+
+    /// Twice the object's max |coordinate|.
+    #[inline(always)]
+    pub fn near(&self) -> f32 {
+        2.0 * self.greatest
+    }
+
     /// The cube around the origin that holds all points with coordinates of at most `max` in
     /// absolute value.
     pub fn around(greatest: f32) -> ObjectBounds {

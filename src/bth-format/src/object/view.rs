@@ -19,6 +19,8 @@ pub struct ObjectView<'a> {
     pub bounds: ObjectBounds,
     /// These bounds [for rays that start on triangles](ObjectBounds::for_starts).
     pub start_bounds: ObjectBounds,
+    /// These bounds [for rays of f64](ObjectBounds::for_near_lines).
+    pub near_bounds: ObjectBounds,
     /// The points that coordinates of triangle leaves can be; `None` where these are `f32`.
     pub grid: Option<Grid>,
     /// Nodes and triangle leaves.
@@ -92,6 +94,7 @@ impl<'a> ObjectView<'a> {
             header,
             bounds,
             start_bounds: bounds.for_starts(),
+            near_bounds: bounds.for_near_lines(),
             grid: None,
             lines,
             leaf_vertices: &[],

@@ -215,15 +215,15 @@ impl WorldLines for RayInInstance<'_> {
 
 /// A ray through an instance in the space of its object, its floats as rows of four, and the bounds
 /// for which it is prepared.
-pub(crate) struct InstanceLine {
+pub(crate) struct InstanceLine<B = ObjectBounds> {
     rows: [Vec4; 2],
     pub(super) ray: Ray,
-    pub(super) bounds: ObjectBounds,
+    pub(super) bounds: B,
 }
 
-impl InstanceLine {
+impl<B> InstanceLine<B> {
     #[inline(always)]
-    pub(super) fn new(rows: [Vec4; 2], bounds: ObjectBounds) -> InstanceLine {
+    pub(super) fn new(rows: [Vec4; 2], bounds: B) -> InstanceLine<B> {
         let floats = [rows[0].to_array(), rows[1].to_array()];
         InstanceLine { rows, ray: zerocopy::transmute!(floats), bounds }
     }

@@ -75,28 +75,30 @@ impl<'a> WideRay<'a> {
 }
 
 impl SingleRay for WideRay<'_> {
-    type Line = InstanceLine;
+    type Line = InstanceLine<Option<ObjectBounds>>;
     #[inline(always)]
-    fn line<S: Simd>(&self, _s: S, object: &ObjectView<'_>) -> Option<InstanceLine> {
+    fn line<S: Simd>(&self, _s: S, object: &ObjectView<'_>) -> Option<Self::Line> {
         let &WideRays([Ray64 { origin: [x, y, z], tmin, direction: [dx, dy, dz], tmax }]) = &self.0 else {
             return None;
         };
         // Vectors are made in registers: loading what was just written word by word would stall.
         let rows = [DVec4::new(*x, *y, *z, *tmin).as_vec4(), DVec4::new(*dx, *dy, *dz, *tmax).as_vec4()];
         let [x, y, z, _] = rows[0].abs().to_array();
-        let bounds = object.bounds.for_lines(x.max(y).max(z), 0.0, ROUNDED_TO_F32 as f32);
+        let (farthest, bounds) = (x.max(y).max(z), &object.bounds);
+        let bounds =
+            (farthest > bounds.near()).then(|| bounds.for_lines(farthest, 0.0, ROUNDED_TO_F32 as f32));
         Some(InstanceLine::new(rows, bounds))
     }
     #[inline(always)]
-    fn exact<'a>(&'a self, line: &'a InstanceLine) -> ExactRay<'a> {
+    fn exact<'a>(&'a self, line: &'a Self::Line) -> ExactRay<'a> {
         ExactRay::new(&line.ray, LineSource::World(&self.0, 0))
     }
     #[inline(always)]
-    fn bounds<'a>(_object: &'a ObjectView<'_>, line: &'a InstanceLine) -> &'a ObjectBounds {
-        &line.bounds
+    fn bounds<'a>(object: &'a ObjectView<'_>, line: &'a Self::Line) -> &'a ObjectBounds {
+        line.bounds.as_ref().unwrap_or(&object.near_bounds)
     }
     #[inline(always)]
-    fn prepared<S: Simd>(&self, s: S, line: &InstanceLine, bounds: &ObjectBounds) -> Option<PreparedRay> {
+    fn prepared<S: Simd>(&self, s: S, line: &Self::Line, bounds: &ObjectBounds) -> Option<PreparedRay> {
         line.prepared(s, bounds)
     }
 }

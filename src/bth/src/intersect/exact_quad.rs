@@ -132,7 +132,11 @@ mod tests {
         fn run<S: Simd>(self, s: S) -> Self::Output {
             let OnIsa(origin, direction, corners, norm) = self;
             let found = bits(&rounded_intersection(s.doubles(), (origin, direction), corners, norm));
-            let line = RoundedLine { origin: RoundedOrigin(wide(origin), 0.0), direction: wide(direction), direction_error: 0.0 };
+            let line = RoundedLine {
+                origin: RoundedOrigin(wide(origin), 0.0),
+                direction: wide(direction),
+                direction_error: 0.0,
+            };
             let (direction, norm) = (line.direction, max_norm(line.direction));
             assert_eq!(bits(&rounded_intersection(s.doubles(), (line, direction), corners, norm)), found);
             let corners = corners.map(wide);

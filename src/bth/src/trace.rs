@@ -8,7 +8,7 @@
 
 use crate::batch::RayBatch;
 use crate::hits::{Accept, results};
-use crate::instances::{RayInInstance, UnplacedRay};
+use crate::instances::{RayInInstance, UnplacedRay, in_place};
 use crate::intersect::exact::precise;
 use crate::intersect::exact_ray::WorldLines;
 use crate::intersect::start::corners_by_id;
@@ -192,6 +192,15 @@ impl Scene {
         }
     }
 
+    /// The object and the index of the only visible instance, if f32 does not hold the object and
+    /// its space is world space, and the lines of rays with origins.
+    fn sole_exact<'a, R: Traced>(&self, rays: &'a [R]) -> Option<((&ObjectView<'_>, u32), &'a [R::Line])> {
+        let (instance, object) = self.world()?.sole()?;
+        let (view, lines) = (self.view(object), R::lines(rays)?);
+        self.world()?.mark_traced(object);
+        (!view.exact.is_empty()).then_some(((view, instance), lines))
+    }
+
     /// Like [`Self::store_nearest`], in any scene.
     #[inline(never)]
     fn store_nearest_elsewhere<R: Traced>(&self, ray: &R, hit: &mut Hit) {
@@ -200,6 +209,8 @@ impl Scene {
             if ray.may_start_in(instance) {
                 ray.store_nearest_in(object, instance, hit);
             }
+        } else if let Some(((object, instance), [line])) = self.sole_exact(std::slice::from_ref(ray)) {
+            in_place::store_nearest(object, line, instance, hit);
         } else {
             ray.in_world(self, |world_ray| match self.world() {
                 Some(world) => world.store_nearest_of_ray(self.objects(), world_ray, hit),
@@ -259,6 +270,8 @@ impl Scene {
     fn hits_any_elsewhere<R: Traced>(&self, ray: &R) -> bool {
         let is_hit = if let Some((object, instance)) = self.sole() {
             ray.may_start_in(instance) && ray.hits_any_in(object)
+        } else if let Some(((object, _), [line])) = self.sole_exact(std::slice::from_ref(ray)) {
+            in_place::any(object, line)
         } else {
             let any = |world_ray: WorldRay<'_>| match self.world() {
                 Some(world) => world.any_of_ray(self.objects(), world_ray),
@@ -287,7 +300,11 @@ impl Scene {
             };
         }
         answers.clear();
-        if let Some((object, instance)) = sole {
+        if let Some(((object, instance), lines)) = self.sole_exact(rays) {
+            object::with_scratch(|scratch| {
+                in_place::trace_batch(object, lines, instance, scratch, answers.reborrow());
+            });
+        } else if let Some((object, instance)) = sole {
             object::with_scratch(|scratch| {
                 R::trace_in_object(object, rays, instance, scratch, answers.reborrow());
             });

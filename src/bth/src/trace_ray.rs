@@ -4,7 +4,8 @@
 #![allow(private_interfaces, private_bounds)]
 
 use self::sealed::Traced;
-use crate::instances::{RayInInstance, WideRay, World, WorldRays, trace_wide, wide_ray};
+use crate::instances::in_place::{self, LineRay, wide_ray};
+use crate::instances::{World, WorldRays};
 use crate::object::{self, Scratch};
 use crate::query::sink::{Answers, Sink};
 use crate::rays::{Hit, Ray, Ray64, StartRay};
@@ -23,10 +24,15 @@ impl TraceRay for Ray64 {}
 impl TraceRay for StartRay {}
 
 pub(crate) mod sealed {
-    use super::{Answers, Hit, ObjectView, Scene, Scratch, World, WorldRay, WorldRays};
+    use super::{Answers, Hit, LineRay, ObjectView, Scene, Scratch, World, WorldRay, WorldRays};
 
     /// How rays of a kind are traced.
     pub trait Traced: Copy + Sync {
+        /// What these rays are if they have an origin.
+        type Line: LineRay;
+        /// The rays if they have an origin: they are traced directly through an object in world
+        /// space that f32 does not hold.
+        fn lines(rays: &[Self]) -> Option<&[Self::Line]>;
         /// Stores the nearest hit in an instance whose object's space is world space.
         fn store_nearest_in(&self, object: &ObjectView<'_>, instance: u32, hit: &mut Hit);
         /// Returns true if the ray hits anything in an object whose space is world space.
@@ -53,6 +59,11 @@ pub(crate) mod sealed {
 }
 
 impl Traced for Ray {
+    type Line = Ray;
+    #[inline(always)]
+    fn lines(rays: &[Ray]) -> Option<&[Ray]> {
+        Some(rays)
+    }
     #[inline(always)]
     fn store_nearest_in(&self, object: &ObjectView<'_>, instance: u32, hit: &mut Hit) {
         object::store_nearest(object, self, instance, hit);
@@ -99,6 +110,11 @@ thread_local! {
 }
 
 impl Traced for StartRay {
+    type Line = Ray;
+    #[inline(always)]
+    fn lines(_rays: &[StartRay]) -> Option<&[Ray]> {
+        None
+    }
     #[inline(always)]
     fn store_nearest_in(&self, object: &ObjectView<'_>, instance: u32, hit: &mut Hit) {
         object::store_nearest(object, self, instance, hit);
@@ -144,22 +160,18 @@ impl Traced for StartRay {
 }
 
 impl Traced for Ray64 {
+    type Line = Ray64;
+    #[inline(always)]
+    fn lines(rays: &[Ray64]) -> Option<&[Ray64]> {
+        Some(rays)
+    }
     #[inline]
     fn store_nearest_in(&self, object: &ObjectView<'_>, instance: u32, hit: &mut Hit) {
-        if let Some(ray) = WideRay::new(self) {
-            return object::store_nearest(object, &ray, instance, hit);
-        }
-        let ray = self.narrow();
-        let of_object = RayInInstance::in_world(None, instance, wide_ray(&ray, self), ray.tmax);
-        object::store_nearest(object, &of_object, instance, hit);
+        in_place::store_nearest(object, self, instance, hit);
     }
     #[inline]
     fn hits_any_in(&self, object: &ObjectView<'_>) -> bool {
-        if let Some(ray) = WideRay::new(self) {
-            return object::any(object, &ray);
-        }
-        let ray = self.narrow();
-        object::any(object, &RayInInstance::in_world(None, 0, wide_ray(&ray, self), ray.tmax))
+        in_place::any(object, self)
     }
     fn may_start_in(&self, _instance: u32) -> bool {
         true
@@ -177,7 +189,7 @@ impl Traced for Ray64 {
         scratch: &mut Scratch,
         answers: Answers<'_>,
     ) {
-        trace_wide(object, rays, instance, scratch, answers);
+        in_place::trace_batch(object, rays, instance, scratch, answers);
     }
     fn with_placed(_scene: &Scene, rays: &[Ray64], trace: impl FnOnce(WorldRays<'_>)) {
         let (mut narrow, starts) = PLACED.take();

@@ -129,7 +129,7 @@ impl World {
             active_rays.visits.clear();
             let chunk = Chunk { top: &self.top, rays, first: first as u32 };
             let starts =
-                if self.has_single_visible() { batch.starts.get(first..).unwrap_or(&[]) } else { &[] };
+                if self.only_visible().is_some() { batch.starts.get(first..).unwrap_or(&[]) } else { &[] };
             isa.run(StartKernel { chunk, starts, active_rays });
             for index in active_rays.alone.drain(..) {
                 query.trace_alone(batch, first + index as usize);

@@ -23,6 +23,7 @@ mod enter_object;
 mod enumerate;
 #[cfg(test)]
 pub(crate) mod exact_loop;
+pub(crate) mod in_place;
 mod instance_list;
 mod lines;
 mod lists;
@@ -38,7 +39,6 @@ mod top_level;
 mod top_nodes;
 mod unplaced;
 mod visit_queue;
-mod wide_rays;
 mod world;
 
 pub(crate) use by_caller::NewInstance;
@@ -53,5 +53,4 @@ pub(crate) use top_level::TopLevel;
 #[cfg(test)]
 pub(crate) use top_nodes::INSTANCE;
 pub(crate) use unplaced::UnplacedRay;
-pub(crate) use wide_rays::{WideRay, trace_wide, wide_ray};
 pub(crate) use world::{InstanceRow, World};

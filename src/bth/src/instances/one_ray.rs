@@ -36,7 +36,7 @@ impl World {
     /// see docs/notes/scenes.md.
     /// `narrow` returns a ray.
     pub(crate) fn go_one_by_one(&self, count: usize, narrow: impl Fn(usize) -> Ray) -> bool {
-        if self.has_single_visible() {
+        if self.only_visible().is_some() {
             return count < MIN_RAYS_OF_ONE_INSTANCE;
         }
         let is_same_octant = |i: usize| is_same_octant(&narrow(0), &narrow(i));

@@ -301,9 +301,10 @@ impl World {
         placement.inverse.is_identity().then(|| (instance, placement.object()))
     }
 
-    /// Returns true if exactly one instance is visible.
-    pub(crate) fn has_single_visible(&self) -> bool {
-        self.only_visible.is_some()
+    /// The visible instance, if there is exactly one.
+    #[inline(always)]
+    pub(crate) fn only_visible(&self) -> Option<u32> {
+        self.only_visible
     }
 
     /// Records that a ray is traced in an object. It is stored only once, so that threads do not

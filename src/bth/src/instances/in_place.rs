@@ -18,7 +18,7 @@ use crate::simd::{Isa, Kernel, Simd};
 use crate::starts::prepare::ENDED;
 use crate::starts::world_ray::WorldRay;
 use bth_format::object::{ObjectBounds, ObjectView};
-use glam::{DVec4, Vec4};
+use glam::{DVec4, Vec4, Vec4Swizzles};
 
 /// A ray with an origin.
 pub(crate) trait LineRay: Copy + Sync {
@@ -39,10 +39,12 @@ pub(crate) trait LineRay: Copy + Sync {
         [DVec4::new(x - ax, y - ay, z - az, tmin), DVec4::new(dx, dy, dz, tmax)]
     }
 
-    /// Returns true unless the direction must be scaled before it is rounded to f32.
+    /// Returns true if f32 can follow the line, and f64 can decide about it: its direction needs no
+    /// scaling.
     #[inline(always)]
-    fn is_unscaled(&self) -> bool {
-        UNSCALED.contains(&max_norm(self.world_ray().direction()))
+    fn is_plain(&self) -> bool {
+        let ray = self.world_ray();
+        UNSCALED.contains(&max_norm(ray.direction())) & (max_norm(ray.origin()) <= f32::MAX.into())
     }
 }
 
@@ -76,24 +78,24 @@ pub(crate) fn wide_ray<'a>(ray: &'a Ray, wide: &'a Ray64) -> WorldRay<'a> {
 /// Stores the nearest hit of a ray in an object in world space.
 #[inline(always)]
 pub(crate) fn store_nearest<R: LineRay>(object: &ObjectView<'_>, ray: &R, instance: u32, hit: &mut Hit) {
-    if ray.is_unscaled() {
+    if ray.is_plain() {
         return object::store_nearest(object, &LineRays(std::slice::from_ref(ray)), instance, hit);
     }
-    scaled(object, ray, instance, |ray| object::store_nearest(object, ray, instance, hit));
+    by_line(object, ray, instance, |ray| object::store_nearest(object, ray, instance, hit));
 }
 
 /// Returns true if a ray hits anything in an object in world space.
 #[inline(always)]
 pub(crate) fn any<R: LineRay>(object: &ObjectView<'_>, ray: &R) -> bool {
-    if ray.is_unscaled() {
+    if ray.is_plain() {
         return object::any(object, &LineRays(std::slice::from_ref(ray)));
     }
-    scaled(object, ray, 0, |ray| object::any(object, ray))
+    by_line(object, ray, 0, |ray| object::any(object, ray))
 }
 
-/// Calls `trace` with a ray whose direction must be scaled.
+/// Calls `trace` with any ray.
 #[cold]
-fn scaled<R: LineRay, T>(
+fn by_line<R: LineRay, T>(
     object: &ObjectView<'_>,
     ray: &R,
     instance: u32,
@@ -119,11 +121,14 @@ pub(crate) fn trace_batch<R: LineRay>(
     let (lines, mut narrow, mut alone) = (LineRays(rays), Vec::new(), Vec::new());
     for first in (0..rays.len()).step_by(TOGETHER) {
         let part = &rays[first..rays.len().min(first + TOGETHER)];
-        narrow.clear();
-        let farthest = Isa::chosen().run(Narrow { rays: part, anchor: object.anchor, narrow: &mut narrow });
-        for i in (0..part.len()).filter(|i| !part[*i].is_unscaled()) {
-            alone.push(first + i);
-            narrow[i] = ENDED;
+        narrow.resize(part.len(), ENDED);
+        let kernel = Narrow { rays: part, anchor: object.anchor, narrow: &mut narrow };
+        let (farthest, are_plain) = Isa::chosen().run(kernel);
+        if !are_plain {
+            for i in (0..part.len()).filter(|i| !part[*i].is_plain()) {
+                alone.push(first + i);
+                narrow[i] = ENDED;
+            }
         }
         let bounds = object.bounds.for_lines(farthest, 0.0, R::RANGE_ERROR);
         let object = ObjectView { bounds, ..*object };
@@ -139,36 +144,43 @@ pub(crate) fn trace_batch<R: LineRay>(
     }
 }
 
-/// Rounds rays to f32, with origins relative to an anchor. Returns their max |coordinate|.
+/// Rounds rays to f32, with origins relative to an anchor. Returns their max |coordinate|, and true
+/// if all rays are plain.
 struct Narrow<'a, R> {
     rays: &'a [R],
     anchor: [f64; 3],
-    narrow: &'a mut Vec<Ray>,
+    narrow: &'a mut [Ray],
 }
 
 impl<R: LineRay> Kernel for Narrow<'_, R> {
-    type Output = f32;
+    type Output = (f32, bool);
     #[inline(always)]
-    fn run<S: Simd>(self, _: S) -> f32 {
+    fn run<S: Simd>(self, _: S) -> (f32, bool) {
         let Narrow { rays, anchor, narrow } = self;
-        let mut farthest = Vec4::ZERO;
-        narrow.resize(rays.len(), ENDED);
+        let (mut farthest, mut least, mut most) = (Vec4::ZERO, Vec4::INFINITY, Vec4::ZERO);
         for (ray, to) in rays.iter().zip(narrow) {
             let [origin, direction] = ray.rows(anchor).map(|row| row.as_vec4());
             farthest = farthest.max(origin.abs());
+            // The largest |component| of the direction, in all lanes but the last.
+            let size = direction.abs();
+            let size = size.max(size.yzxw()).max(size.zxyw());
+            (least, most) = (least.min(size), most.max(size));
             *to = zerocopy::transmute!([origin.to_array(), direction.to_array()]);
         }
-        farthest.x.max(farthest.y).max(farthest.z)
+        let farthest = farthest.x.max(farthest.y).max(farthest.z);
+        // The limits are numbers of f32.
+        let are_plain = UNSCALED.contains(&least.x.into()) & UNSCALED.contains(&most.x.into());
+        (farthest, are_plain & farthest.is_finite())
     }
 }
 
-/// The lines of rays.
+/// The lines of plain rays.
 struct LineRays<'a, R>(&'a [R]);
 
 impl<R: LineRay> LineRays<'_, R> {
     #[inline(always)]
     fn rounded(&self, ray: usize) -> RoundedLine {
-        self.0[ray].world_ray().line().or_unknown()
+        self.0[ray].world_ray().line()
     }
 }
 
@@ -203,7 +215,7 @@ impl<R: LineRay> WorldLines for LineRays<'_, R> {
     }
 }
 
-/// The first ray, whose direction f32 holds without scaling.
+/// The first ray.
 impl<R: LineRay> SingleRay for LineRays<'_, R> {
     type Line = InstanceLine<Option<ObjectBounds>>;
     #[inline(always)]

@@ -25,7 +25,7 @@ pub(crate) struct EnteredInstance<'a> {
 impl<'a> EnteredInstance<'a> {
     /// A visible instance.
     pub(crate) fn new(scene: &'a Scene, instance: u32) -> EnteredInstance<'a> {
-        let is_sole = scene.sole().is_some_and(|(_, sole)| sole == instance);
+        let is_sole = scene.sole_in_f32().is_some_and(|(_, sole)| sole == instance);
         let object_index = scene.object_of(instance);
         if let Some(world) = scene.world() {
             world.mark_traced(object_index);
@@ -102,7 +102,7 @@ pub(crate) fn enumerate_instances(
     ray: &Ray,
     visit: &mut dyn FnMut(EnteredInstance<'_>) -> Option<f32>,
 ) -> bool {
-    if let Some((object, instance)) = scene.sole() {
+    if let Some((object, instance)) = scene.sole_in_f32() {
         let object_index = scene.world().map_or(0, |world| world.placement(instance).object());
         return visit(EnteredInstance { instance, object_index, object, scene, world: None }).is_none();
     }

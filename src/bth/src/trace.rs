@@ -47,7 +47,7 @@ impl Scene {
     pub fn nearest_counted<R: TraceRay>(&self, ray: &R) -> (Hit, Steps) {
         let (mut hit, mut steps) = (Hit::MISS, Steps::default());
         ray.in_world(self, |world_ray| match self.world() {
-            Some(world) if self.sole().is_none() => {
+            Some(world) if self.sole_in_f32().is_none() => {
                 (hit, steps) = world.nearest_counted(self.objects(), world_ray);
             }
             _ => self.nearest_of_objects(world_ray, &mut hit, |object, instance, ray| {
@@ -192,24 +192,18 @@ impl Scene {
         }
     }
 
-    /// The object and the index of the only visible instance, if f32 does not hold the object and
-    /// its space is world space, and the lines of rays with origins.
-    fn sole_exact<'a, R: Traced>(&self, rays: &'a [R]) -> Option<((&ObjectView<'_>, u32), &'a [R::Line])> {
-        let (instance, object) = self.world()?.sole()?;
-        let (view, lines) = (self.view(object), R::lines(rays)?);
-        self.world()?.mark_traced(object);
-        (!view.exact.is_empty()).then_some(((view, instance), lines))
-    }
-
     /// Like [`Self::store_nearest`], in any scene.
     #[inline(never)]
     fn store_nearest_elsewhere<R: Traced>(&self, ray: &R, hit: &mut Hit) {
         *hit = Hit::MISS;
-        if let Some((object, instance)) = self.sole() {
+        let (sole, line) = (self.sole(), R::lines(std::slice::from_ref(ray)));
+        if let Some((object, instance)) = sole
+            && object.exact.is_empty()
+        {
             if ray.may_start_in(instance) {
                 ray.store_nearest_in(object, instance, hit);
             }
-        } else if let Some(((object, instance), [line])) = self.sole_exact(std::slice::from_ref(ray)) {
+        } else if let (Some((object, instance)), Some([line])) = (sole, line) {
             in_place::store_nearest(object, line, instance, hit);
         } else {
             ray.in_world(self, |world_ray| match self.world() {
@@ -231,7 +225,7 @@ impl Scene {
         mut trace: impl FnMut(&ObjectView<'_>, u32, &UnplacedRay<'_>) -> Hit,
     ) {
         let (objects, ray) = (self.objects(), world_ray.ray);
-        if let Some((object, instance)) = self.sole() {
+        if let Some((object, instance)) = self.sole_in_f32() {
             *best = trace(object, instance, &UnplacedRay::new(objects, instance, world_ray, ray.tmax));
             return;
         }
@@ -268,9 +262,12 @@ impl Scene {
     /// Like [`Self::hits_any`], in any scene.
     #[inline(never)]
     fn hits_any_elsewhere<R: Traced>(&self, ray: &R) -> bool {
-        let is_hit = if let Some((object, instance)) = self.sole() {
+        let (sole, line) = (self.sole(), R::lines(std::slice::from_ref(ray)));
+        let is_hit = if let Some((object, instance)) = sole
+            && object.exact.is_empty()
+        {
             ray.may_start_in(instance) && ray.hits_any_in(object)
-        } else if let Some(((object, _), [line])) = self.sole_exact(std::slice::from_ref(ray)) {
+        } else if let (Some((object, _)), Some([line])) = (sole, line) {
             in_place::any(object, line)
         } else {
             let any = |world_ray: WorldRay<'_>| match self.world() {
@@ -287,7 +284,11 @@ impl Scene {
 
     /// Stores the answers of a batch.
     pub(crate) fn trace<R: Traced>(&self, rays: &[R], mut answers: Answers<'_>) {
-        let (sole, world) = (self.sole(), self.world());
+        let (whole, world, lines) = (self.sole(), self.world(), R::lines(rays));
+        let (exact, sole) = match whole {
+            Some((object, _)) if !object.exact.is_empty() => (whole, None),
+            _ => (None, whole),
+        };
         let is_batch = rays.len() >= object::MIN_BATCH && (sole.is_some() || world.is_some());
         if !is_batch || !R::go_together(rays, if sole.is_some() { None } else { world }) {
             return match answers {
@@ -300,7 +301,7 @@ impl Scene {
             };
         }
         answers.clear();
-        if let Some(((object, instance), lines)) = self.sole_exact(rays) {
+        if let (Some((object, instance)), Some(lines)) = (exact, lines) {
             object::with_scratch(|scratch| {
                 in_place::trace_batch(object, lines, instance, scratch, answers.reborrow());
             });

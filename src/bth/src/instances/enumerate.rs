@@ -27,9 +27,6 @@ impl World {
         let top = &self.top;
         // False for NaN, too.
         let has_range = ray.tmin <= ray.tmax;
-        if let Some(instance) = self.only_visible() {
-            return has_range && visit(instance).is_none();
-        }
         has_range && !top.is_empty() && Isa::chosen().run(RayKernel { top, ray, visit })
     }
 

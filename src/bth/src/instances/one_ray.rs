@@ -2,6 +2,7 @@
 //! is queued.
 
 use super::World;
+use super::instance_list::InstanceReceiver;
 use super::lines::RayInInstance;
 use crate::bvh::packet;
 use crate::coherence::is_same_octant;
@@ -74,7 +75,7 @@ impl World {
     ) {
         *best = Hit::MISS;
         let ray = world_ray.ray;
-        self.enumerate(ray, &mut |instance| {
+        self.enter_each(ray, &mut |instance| {
             // Neither is NaN: for a ray whose `tmax` is, nothing is enumerated.
             let end = if world_ray.wide.is_some() { best.t.next_up() } else { best.t };
             let tmax = if end < ray.tmax { end } else { ray.tmax };
@@ -103,10 +104,20 @@ impl World {
     /// Returns true if a ray hits anything, as [`Self::any`] computes it for many.
     #[inline(never)]
     pub(crate) fn any_of_ray(&self, objects: &Objects, ray: WorldRay<'_>) -> bool {
-        self.enumerate(ray.ray, &mut |instance| {
+        self.enter_each(ray.ray, &mut |instance| {
             let (object, of_instance) = self.enter(objects, instance, ray, ray.ray.tmax);
             (!object::any(object, &of_instance)).then_some(ray.ray.tmax)
         })
+    }
+
+    /// Like [`Self::enumerate`], but without a test of the box where only one instance is visible.
+    #[inline(always)]
+    fn enter_each(&self, ray: &Ray, visit: InstanceReceiver<'_>) -> bool {
+        match self.only_visible() {
+            // False for NaN, too.
+            Some(instance) => ray.tmin <= ray.tmax && visit(instance).is_none(),
+            None => self.enumerate(ray, visit),
+        }
     }
 
     /// The object of an instance, and a ray in it that ends at `tmax`.

@@ -172,9 +172,8 @@ impl Scene {
         if self.world.is_none() && !self.has_opacity { self.objects.sole_view() } else { None }
     }
 
-    /// The object and the index of the only visible instance, if there is exactly one, its object
-    /// space is world space, and f32 holds the object. Rays are then traced directly in the object,
-    /// without the top level.
+    /// The object and the index of the only visible instance, if there is exactly one and its object
+    /// space is world space. Rays are then traced directly in the object, without the top level.
     #[inline(never)]
     pub(crate) fn sole(&self) -> Option<(&ObjectView<'_>, u32)> {
         let Some(world) = &self.world else {
@@ -182,7 +181,12 @@ impl Scene {
         };
         let (instance, object) = world.sole()?;
         world.mark_traced(object);
-        Some((self.view(object), instance)).filter(|(object, _)| object.exact.is_empty())
+        Some((self.view(object), instance))
+    }
+
+    /// The same if f32 holds the object.
+    pub(crate) fn sole_in_f32(&self) -> Option<(&ObjectView<'_>, u32)> {
+        self.sole().filter(|(object, _)| object.exact.is_empty())
     }
 
     /// Size in bytes of the sections that traversal reads.

@@ -123,16 +123,29 @@ impl ObjectBounds {
         }
     }
 
-    /// The bounds for rays that are rounded from f64, range and all, with origins of at most
-    /// [`Self::near`].
+    /// The bounds for lines whose origins are near and whose errors are at most the rounding of a
+    /// direction to f32. They hold most lines, and need not be computed for each.
     pub fn for_near_lines(&self) -> ObjectBounds {
         self.for_lines(self.near(), 0.0, U)
     }
 
-    /// Twice the object's max |coordinate|.
+    /// Twice the object's max |coordinate|: nearer origins are near.
     #[inline(always)]
-    pub fn near(&self) -> f32 {
+    fn near(&self) -> f32 {
         2.0 * self.greatest
+    }
+
+    /// [`Self::for_lines`], or `None` where [`Self::for_near_lines`] hold for the lines.
+    #[inline(always)]
+    pub fn for_far_lines(
+        &self,
+        farthest: f32,
+        origin_error: f32,
+        direction_error: f32,
+    ) -> Option<ObjectBounds> {
+        let off = origin_error + direction_error * (farthest + self.greatest);
+        let are_near = (farthest <= self.near()) & (off <= U * (self.near() + self.greatest));
+        (!are_near).then(|| self.for_lines(farthest, origin_error, direction_error))
     }
 
     /// The cube around the origin that holds all points with coordinates of at most `max` in

@@ -217,16 +217,15 @@ impl<R: LineRay> WorldLines for LineRays<'_, R> {
 
 /// The first ray.
 impl<R: LineRay> SingleRay for LineRays<'_, R> {
-    type Line = InstanceLine<Option<ObjectBounds>>;
+    type Line = InstanceLine;
     #[inline(always)]
     fn line<S: Simd>(&self, _: S, object: &ObjectView<'_>) -> Option<Self::Line> {
         // Vectors are made in registers: loading what was just written word by word would stall.
         let [start, end] = self.0.first()?.rows(object.anchor);
         let rows = [start.as_vec4(), end.as_vec4()];
         let [x, y, z, _] = rows[0].abs().to_array();
-        let (farthest, of_object) = (x.max(y).max(z), &object.bounds);
-        let is_near = farthest <= of_object.near();
-        Some(InstanceLine::new(rows, (!is_near).then(|| of_object.for_lines(farthest, 0.0, R::RANGE_ERROR))))
+        let bounds = object.bounds.for_far_lines(x.max(y).max(z), 0.0, R::RANGE_ERROR);
+        Some(InstanceLine::new(rows, bounds))
     }
     #[inline(always)]
     fn exact<'a>(&'a self, line: &'a Self::Line) -> ExactRay<'a> {
@@ -234,7 +233,7 @@ impl<R: LineRay> SingleRay for LineRays<'_, R> {
     }
     #[inline(always)]
     fn bounds<'a>(object: &'a ObjectView<'_>, line: &'a Self::Line) -> &'a ObjectBounds {
-        line.bounds.as_ref().unwrap_or(&object.near_bounds)
+        line.bounds(object)
     }
     #[inline(always)]
     fn prepared<S: Simd>(&self, s: S, line: &Self::Line, bounds: &ObjectBounds) -> Option<PreparedRay> {

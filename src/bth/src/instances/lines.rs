@@ -215,17 +215,23 @@ impl WorldLines for RayInInstance<'_> {
 
 /// A ray through an instance in the space of its object, its floats as rows of four, and the bounds
 /// for which it is prepared.
-pub(crate) struct InstanceLine<B = ObjectBounds> {
+pub(crate) struct InstanceLine {
     rows: [Vec4; 2],
     pub(super) ray: Ray,
-    pub(super) bounds: B,
+    /// `None` for those of the object for [near lines](ObjectBounds::for_near_lines).
+    bounds: Option<ObjectBounds>,
 }
 
-impl<B> InstanceLine<B> {
+impl InstanceLine {
     #[inline(always)]
-    pub(super) fn new(rows: [Vec4; 2], bounds: B) -> InstanceLine<B> {
+    pub(super) fn new(rows: [Vec4; 2], bounds: Option<ObjectBounds>) -> InstanceLine {
         let floats = [rows[0].to_array(), rows[1].to_array()];
         InstanceLine { rows, ray: zerocopy::transmute!(floats), bounds }
+    }
+
+    #[inline(always)]
+    pub(super) fn bounds<'a>(&'a self, object: &'a ObjectView<'_>) -> &'a ObjectBounds {
+        self.bounds.as_ref().unwrap_or(&object.near_bounds)
     }
 
     #[inline(always)]
@@ -249,10 +255,10 @@ impl SingleRay for RayInInstance<'_> {
         }
         // Vectors are made in registers: loading what was just written word by word would stall.
         let rows = [Vec4::new(x, y, z, tmin), Vec4::new(dx, dy, dz, ray.tmax)];
-        let bounds = match self.ray.wide {
-            None => line.bounds(object),
-            Some(_) => line.with_rounded_range().bounds(object),
-        };
+        let line = if self.ray.wide.is_none() { *line } else { line.with_rounded_range() };
+        let [x, y, z, _] = rows[0].abs().to_array();
+        let errors = [line.origin.1, line.direction_error].map(|x| x as f32);
+        let bounds = object.bounds.for_far_lines(x.max(y).max(z), errors[0], errors[1]);
         Some(InstanceLine::new(rows, bounds))
     }
     #[inline(always)]
@@ -260,8 +266,8 @@ impl SingleRay for RayInInstance<'_> {
         ExactRay::new(&line.ray, LineSource::World(self, 0))
     }
     #[inline(always)]
-    fn bounds<'a>(_object: &'a ObjectView<'_>, line: &'a InstanceLine) -> &'a ObjectBounds {
-        &line.bounds
+    fn bounds<'a>(object: &'a ObjectView<'_>, line: &'a InstanceLine) -> &'a ObjectBounds {
+        line.bounds(object)
     }
     #[inline(always)]
     fn prepared<S: Simd>(&self, s: S, line: &InstanceLine, bounds: &ObjectBounds) -> Option<PreparedRay> {

@@ -83,14 +83,17 @@ impl World {
             let mut hit = Hit::MISS;
             trace(object, &of_instance, &mut hit);
             let t_scale = of_instance.of_object.t_scale;
-            let nearer = match world_ray.wide {
-                None => better(ray, best, &hit, t_scale),
-                Some(_) => better_wide(best, &hit, t_scale, |hit| self.exact_t(objects, world_ray, hit)),
-            };
-            let Some(nearer) = nearer else { return Some(tmax) };
+            // The results of two branches would be passed through memory.
+            if world_ray.wide.is_some() {
+                let exact_t = |hit: &Hit| self.exact_t(objects, world_ray, hit);
+                let Some(nearer) = better_wide(best, &hit, t_scale, exact_t) else { return Some(tmax) };
+                *best = nearer;
+                // Another instance may be nearer by less than f32 can tell.
+                return Some(nearer.t.next_up());
+            }
+            let Some(nearer) = better(ray, best, &hit, t_scale) else { return Some(tmax) };
             *best = nearer;
-            // Another instance may be nearer by less than f32 can tell.
-            Some(if world_ray.wide.is_some() { nearer.t.next_up() } else { nearer.t })
+            Some(nearer.t)
         });
     }
 

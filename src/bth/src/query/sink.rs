@@ -198,11 +198,12 @@ impl<'a> Sink<'a> {
             Answers::Nearest(hits) => {
                 let best = &mut hits[ray as usize];
                 let (at, t_scale) = (ray as usize, t_scale[visit]);
-                let nearer = match better_wide {
-                    None => better(&rays[at], best, &hit, t_scale),
-                    Some(better) => better(at, best, &hit, t_scale),
-                };
-                *best = nearer.unwrap_or(*best);
+                // The results of two branches would be passed through memory.
+                if let Some(better) = better_wide {
+                    *best = better(at, best, &hit, t_scale).unwrap_or(*best);
+                } else if let Some(nearer) = better(&rays[at], best, &hit, t_scale) {
+                    *best = nearer;
+                }
             }
             Answers::Any(found) => found[ray as usize] |= hit.is_hit(),
         }

@@ -146,7 +146,8 @@ fn measure_set(
     let mut first: BTreeMap<String, (usize, usize)> = BTreeMap::new();
     let times = medians(contenders, rounds, |round, contender| {
         let starting = contender.tracer.starting();
-        if starting != Starting::AtOrigin && set.starts.is_none() {
+        let needs_starts = matches!(starting, Starting::RejectOwn | Starting::OnSurface);
+        if needs_starts && set.starts.is_none() {
             return None;
         }
         let passes = first.get(&contender.name).map_or(1, |(_, passes)| *passes);
@@ -180,10 +181,11 @@ fn add_beside(report: &mut Report) {
     report.rows.extend(ratios);
 }
 
-/// The exact answers to a set: from the origins of its rays; and if it has starts, without hits on
-/// the triangle there, and from the exact starts.
+/// The exact answers to a set: from the origins of its rays, in f32 and in f64; and if it has
+/// starts, without hits on the triangle there, and from the exact starts.
 struct Expected {
     at_origin: Answers,
+    in_f64: Answers,
     others: Option<[Answers; 2]>,
 }
 
@@ -198,7 +200,7 @@ impl Expected {
             Some(_) => Some([of(Use::Own)?, of(Use::StartSingle)?]),
             None => None,
         };
-        Ok(Expected { at_origin: of(Use::Batch)?, others })
+        Ok(Expected { at_origin: of(Use::Batch)?, in_f64: of(Use::WideSingle)?, others })
     }
 
     /// The answers that a tracer has to give.
@@ -206,6 +208,7 @@ impl Expected {
         match (starting, &self.others) {
             (Starting::RejectOwn, Some([without_own, _])) => without_own,
             (Starting::OnSurface, Some([_, on_surface])) => on_surface,
+            (Starting::InF64, _) => &self.in_f64,
             _ => &self.at_origin,
         }
     }

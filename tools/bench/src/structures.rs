@@ -3,7 +3,7 @@
 use crate::model::Model;
 use crate::tracer::{Batch, Contender, Starting, Tracer};
 use anyhow::{Context, Result};
-use bth::rays::{Hit, Ray, Start, StartRay};
+use bth::rays::{Hit, Ray, Ray64, Start, StartRay};
 use bth::{Accept, Scene};
 use bth_compile::free::{FreeOptions, KeepFree};
 use bth_compile::pipeline::{self, CompileOptions, Structure};
@@ -39,12 +39,14 @@ pub const KINDS: [Kind; 6] = [
 ];
 
 /// The ways to trace a structure, and the suffixes of their names.
-const USES: [(&str, Use); 5] = [
+const USES: [(&str, Use); 7] = [
     ("", Use::Batch),
     (" start", Use::Start),
     (" single", Use::Single),
     (" start single", Use::StartSingle),
     (" single own", Use::Own),
+    (" f64", Use::Wide),
+    (" f64 single", Use::WideSingle),
 ];
 
 /// The default file.
@@ -65,7 +67,7 @@ impl Kind {
 
     /// Names of the ways to trace it.
     pub fn uses(&self) -> impl Iterator<Item = (String, Use)> {
-        // The last two differ from others in the default file alone.
+        // The last four are measured in the default file alone.
         let count = if self.name == KINDS[0].name { USES.len() } else { 3 };
         USES[..count].iter().map(|(of, usage)| (format!("{}{of}", self.name), *usage))
     }
@@ -94,6 +96,10 @@ pub enum Use {
     StartSingle,
     /// One ray a call, with a filter that rejects the triangle on which the ray starts.
     Own,
+    /// In batches of rays in f64.
+    Wide,
+    /// One ray in f64 a call.
+    WideSingle,
 }
 
 /// A compiled file.
@@ -187,6 +193,10 @@ impl Tracer for OurTracer {
                 in_start_batches(batch, hits, |rays, hits| scene.batch(rays).nearest(hits))
             }
             (Use::Single, _) => rays.zip(hits).for_each(|(ray, hit)| *hit = found(scene.nearest(ray))),
+            (Use::WideSingle, _) => {
+                rays.zip(hits).for_each(|(ray, hit)| *hit = found(scene.nearest(&Ray64::from(*ray))));
+            }
+            (Use::Wide, _) => in_wide_batches(batch, hits, |rays, hits| scene.batch(rays).nearest(hits)),
             _ => self.scene.nearest(batch, hits),
         }
     }
@@ -206,6 +216,10 @@ impl Tracer for OurTracer {
                 in_start_batches(batch, found, |rays, found| scene.batch(rays).any(found))
             }
             (Use::Single, _) => rays.zip(found).for_each(|(ray, found)| *found = scene.any(ray)),
+            (Use::WideSingle, _) => {
+                rays.zip(found).for_each(|(ray, found)| *found = scene.any(&Ray64::from(*ray)));
+            }
+            (Use::Wide, _) => in_wide_batches(batch, found, |rays, found| scene.batch(rays).any(found)),
             _ => self.scene.any(batch, found),
         }
     }
@@ -213,6 +227,7 @@ impl Tracer for OurTracer {
     fn starting(&self) -> Starting {
         match self.usage {
             Use::Batch | Use::Single => Starting::AtOrigin,
+            Use::Wide | Use::WideSingle => Starting::InF64,
             Use::Own => Starting::RejectOwn,
             Use::Start | Use::StartSingle => Starting::OnSurface,
         }
@@ -238,6 +253,16 @@ fn in_start_batches<T>(batch: Batch<'_>, answers: &mut [T], trace: impl Fn(&[Sta
         rays.clear();
         let starts = batch.starts.unwrap_or_default();
         rays.extend(batch.rays.iter().zip(starts).map(|(ray, start)| start_ray(ray, start)));
+        trace(&rays, answers);
+    }
+}
+
+/// The same for rays in f64.
+fn in_wide_batches<T>(batch: Batch<'_>, answers: &mut [T], trace: impl Fn(&[Ray64], &mut [T])) {
+    let mut rays = Vec::with_capacity(BATCH);
+    for (batch, answers) in batch.rays.chunks(BATCH).zip(answers.chunks_mut(BATCH)) {
+        rays.clear();
+        rays.extend(batch.iter().map(|ray| Ray64::from(*ray)));
         trace(&rays, answers);
     }
 }

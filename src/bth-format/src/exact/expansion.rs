@@ -45,6 +45,24 @@ fn exact_difference(o: [f64; 3], p: [f64; 3]) -> Option<[f64; 3]> {
     differences.iter().all(|(_, error)| *error == 0.0).then(|| differences.map(|(difference, _)| difference))
 }
 
+/// det[a-o, b-o, c-o] for numbers of `f64`, with a relative error of a few units in the last place:
+/// its sign is exact. `None` where that takes more than a short sum.
+pub fn wide_volume(o: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> Option<f64> {
+    /// Products of three numbers in this range, to the last bit, are far from the limits of `f64`.
+    const RANGE: std::ops::Range<f64> = 1.0 / (1u128 << 127) as f64..(1u128 << 127) as f64;
+    // A plane along two axes holds all four points.
+    if (0..3).any(|k| [a[k], b[k], c[k]] == [o[k]; 3]) {
+        return Some(0.0);
+    }
+    let [a, b, c] = [exact_difference(o, a)?, exact_difference(o, b)?, exact_difference(o, c)?];
+    if [a, b, c].iter().flatten().any(|x| *x != 0.0 && !RANGE.contains(&x.abs())) {
+        return None;
+    }
+    let mut volume = Expansion::<VOLUME_PARTS>::new();
+    volume.add_long_determinant(a, b, c);
+    Some(volume.value())
+}
+
 impl<const PARTS: usize> Default for Expansion<PARTS> {
     fn default() -> Self {
         Self::new()
@@ -172,6 +190,7 @@ impl<const PARTS: usize> Expansion<PARTS> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::exact::{dyadic_cross, dyadic_difference, dyadic_dot, dyadic_vector};
     use bth_random::Rng;
 
     /// Miri takes a thousand times as long.
@@ -192,6 +211,29 @@ mod tests {
             let got: i128 = e.part[..e.len].iter().map(|&x| x as i128).sum();
             assert_eq!(got, want);
         }
+    }
+
+    #[test]
+    fn volumes_of_f64_have_exact_signs() {
+        let (mut rng, mut found) = (Rng::new(19), [0; 4]);
+        for round in 0..ROUNDS {
+            let step = [1.0, 1.1, 1e-9][round as usize % 3];
+            let mut point = || [(); 3].map(|()| (rng.below(9) as f64 - 4.0) * step);
+            let (o, mut corners) = (point(), [point(), point(), point()]);
+            if round % 5 == 0 {
+                corners = corners.map(|[x, y, _]| [x * 1.1, y, o[2]]);
+            }
+            let Some(volume) = wide_volume(o, corners) else {
+                found[3] += 1;
+                continue;
+            };
+            let [a, b, c] = corners.map(|p| dyadic_difference(&dyadic_vector(p), &dyadic_vector(o)));
+            let exact = dyadic_dot(&dyadic_cross(&a, &b), &c);
+            assert_eq!(volume.partial_cmp(&0.0), Some(exact.sign()), "{o:?} {corners:?}");
+            assert!((volume - exact.to_f64()).abs() <= 8.0 * f64::EPSILON * volume.abs());
+            found[(exact.sign() as i8 + 1) as usize] += 1;
+        }
+        assert!(found.iter().all(|n| *n > ROUNDS / 50), "{found:?}");
     }
 
     #[test]

@@ -25,7 +25,7 @@ use crate::intersect::origin::{Origin, RoundedLine};
 use crate::intersect::pairs;
 use crate::intersect::vector::{cross, dot, greater, lesser, max_norm, minus, wide};
 use crate::simd::{Doubles, PlainDoubles};
-use bth_format::exact::{EDGE_PARTS, Expansion, VOLUME_PARTS};
+use bth_format::exact::{EDGE_PARTS, Expansion, VOLUME_PARTS, wide_volume};
 
 /// 128u, more than the 98u above: bounds the error of weights relative to Dm(m+r), and the error of
 /// the volume relative to rm².
@@ -93,6 +93,23 @@ impl UncertainWeights {
     /// u and v in f64, rounded for the answer.
     pub(crate) fn uv(&self) -> [f32; 2] {
         self.rounded.intersection().uv()
+    }
+
+    /// Returns true if f64 leaves only the volume inaccurate.
+    #[inline(always)]
+    fn is_certain_but_for_volume(&self) -> bool {
+        let &UncertainWeights { rounded, weight: [first, second, third], bound } = self;
+        let least = lesser(lesser(first, second), third);
+        let greatest = greater(greater(first, second), third);
+        let is_inside = (least > bound) | (greatest < -bound);
+        let [.., determinant] = rounded.weight;
+        is_inside & (determinant.abs() > INVERSE_RATIO_ERROR * bound)
+    }
+
+    /// The intersection with this volume.
+    #[inline(always)]
+    fn with_volume(&self, volume: f64) -> Intersection {
+        Intersection { t: volume * self.rounded.inverse, weight: self.rounded.weight }
     }
 
     /// The intersection in f64, if only the signs of weights are uncertain.
@@ -306,17 +323,26 @@ pub(crate) fn in_pairs<D: Doubles>(
     s: D,
     origin: [f32; 3],
     corners: [[f32; 3]; 3],
-    &UncertainWeights { rounded, weight: [first, second, third], bound }: &UncertainWeights,
+    uncertain: &UncertainWeights,
 ) -> Option<Intersection> {
-    let least = lesser(lesser(first, second), third);
-    let greatest = greater(greater(first, second), third);
-    let is_inside = (least > bound) | (greatest < -bound);
-    let [.., determinant] = rounded.weight;
-    if !is_inside || determinant.abs() <= INVERSE_RATIO_ERROR * bound {
+    // A closure might be compiled without the instruction set of the kernel.
+    if !uncertain.is_certain_but_for_volume() {
         return None;
     }
-    let volume = pairs::volume(s, origin, corners)?;
-    Some(Intersection { t: volume * rounded.inverse, weight: rounded.weight })
+    Some(uncertain.with_volume(pairs::volume(s, origin, corners)?))
+}
+
+/// The same for a line in f64 without errors.
+pub(crate) fn with_exact_volume(
+    line: &RoundedLine,
+    corners: [[f64; 3]; 3],
+    uncertain: &UncertainWeights,
+) -> Option<Intersection> {
+    let is_exact = line.origin.1 == 0.0 && line.direction_error == 0.0;
+    if !is_exact || !uncertain.is_certain_but_for_volume() {
+        return None;
+    }
+    Some(uncertain.with_volume(wide_volume(line.point(), corners)?))
 }
 
 /// Decides a triangle that f64 leaves uncertain: uncertain weights are replaced by exact ones, and

@@ -1,6 +1,6 @@
 //! Rays as decisions need them: with the line that f32 only approximates.
 
-use super::exact::{Estimate, Intersection, estimate};
+use super::exact::{Estimate, Intersection, estimate, with_exact_volume};
 use super::exact_line::ExactLine;
 use super::long::LongLine;
 use super::origin::{RoundedLine, RoundedOrigin};
@@ -114,7 +114,8 @@ pub(crate) fn intersect_in_world(
         Estimate::Intersects(found) => Some(found).filter(counts),
         Estimate::Open(_, t) if t[1] <= 0.0 && lines.are_from_starts() || !may_matter(t) => None,
         Estimate::Open(uncertain, _) => {
-            let found = lines.long(ray).and_then(|line| line.decide(corners));
+            let found = with_exact_volume(&line, corners, &uncertain).map(Some);
+            let found = found.or_else(|| lines.long(ray).and_then(|line| line.decide(corners)));
             let found = found.unwrap_or_else(|| lines.exact(ray).intersection(corners));
             let found = found.filter(counts)?;
             Some(uncertain.if_accurate().unwrap_or(found))

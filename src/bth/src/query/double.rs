@@ -38,7 +38,8 @@ fn offer_wide<G: Goal>(
     let corners = || object.exact_corners(|| triangle.read(), corners);
     let exact_t = || Some(lines.exact(at).intersection(corners())?.t);
     let close = |a: f64, b: f64| b.is_finite() && (a - b).abs() <= 4.0 * RATIO_ERROR * a.abs().max(b.abs());
-    if close(found.t, tmin) || close(found.t, tmax) {
+    // Where t is 0, it is so exactly.
+    if found.t != 0.0 && (close(found.t, tmin) || close(found.t, tmax)) {
         found.t = exact_t().unwrap_or(found.t);
     }
     if !(tmin <= found.t && found.t <= tmax) {

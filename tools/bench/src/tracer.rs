@@ -44,8 +44,8 @@ pub trait Tracer: Send + Sync {
 pub enum Starting {
     /// Ignores them: rays start at their origins, and may hit the triangle that they start on.
     AtOrigin,
-    /// The same, but rays are in f64: of hits at an exactly equal t the smallest id wins, where rays
-    /// of f32 compare t rounded to f64.
+    /// The same with rays in f64: of hits at an exactly equal t the smallest id wins. Rays of f32
+    /// compare t rounded to f64.
     InF64,
     /// Rays start at their origins, with a filter that rejects the triangle on which a ray starts.
     RejectOwn,

@@ -7,11 +7,11 @@ use std::cmp::Ordering;
 /// Most decisions about lines through instances stay below this number of digits.
 const FEW: usize = 8;
 
-/// A natural number: its digits, the least significant first. Equal numbers may differ in how they
-/// are held.
+/// A natural number: its digits, the last the most significant. Equal numbers may differ in how
+/// they are held.
 #[derive(Clone, Debug)]
 pub(super) enum Natural {
-    /// As many digits as the second number tells, the last of which is not 0.
+    /// The digits and their number. The last one is not 0.
     Few([u64; FEW], usize),
     /// The same in memory from the heap; of any length.
     Many(Vec<u64>),
@@ -78,7 +78,7 @@ impl Natural {
         }))
     }
 
-    /// The 128 bits from a bit on; those above are left out.
+    /// The 128 bits from a bit on.
     fn window(&self, from: u64) -> u128 {
         let digit = |i: u64| self.digits().get(i as usize).copied().map_or(0, u128::from);
         let (first, rest) = (from / 64, from % 64);

@@ -22,8 +22,7 @@ use glam::{DVec4, Vec4, Vec4Swizzles};
 
 /// A ray with an origin.
 pub(crate) trait LineRay: Copy + Sync {
-    /// Bound of the error that rounding to f32 adds to a range of t that f32 does not hold, relative
-    /// to the direction.
+    /// Bound of the error that rounding to f32 adds to the range of t, relative to the direction.
     const RANGE_ERROR: f32;
     /// The ray in world space. A ray in f64 has no numbers of f32 there.
     fn world_ray(&self) -> WorldRay<'_>;
@@ -122,7 +121,7 @@ pub(crate) fn trace_batch<R: LineRay>(
     for first in (0..rays.len()).step_by(TOGETHER) {
         let part = &rays[first..rays.len().min(first + TOGETHER)];
         narrow.resize(part.len(), ENDED);
-        let kernel = Narrow { rays: part, anchor: object.anchor, narrow: &mut narrow };
+        let kernel = NarrowKernel { rays: part, anchor: object.anchor, narrow: &mut narrow };
         let (farthest, are_plain) = Isa::chosen().run(kernel);
         if !are_plain {
             for i in (0..part.len()).filter(|i| !part[*i].is_plain()) {
@@ -146,17 +145,17 @@ pub(crate) fn trace_batch<R: LineRay>(
 
 /// Rounds rays to f32, with origins relative to an anchor. Returns their max |coordinate|, and true
 /// if all rays are plain.
-struct Narrow<'a, R> {
+struct NarrowKernel<'a, R> {
     rays: &'a [R],
     anchor: [f64; 3],
     narrow: &'a mut [Ray],
 }
 
-impl<R: LineRay> Kernel for Narrow<'_, R> {
+impl<R: LineRay> Kernel for NarrowKernel<'_, R> {
     type Output = (f32, bool);
     #[inline(always)]
     fn run<S: Simd>(self, _: S) -> (f32, bool) {
-        let Narrow { rays, anchor, narrow } = self;
+        let NarrowKernel { rays, anchor, narrow } = self;
         let (mut farthest, mut least, mut most) = (Vec4::ZERO, Vec4::INFINITY, Vec4::ZERO);
         for (ray, to) in rays.iter().zip(narrow) {
             let [origin, direction] = ray.rows(anchor).map(|row| row.as_vec4());

@@ -218,7 +218,7 @@ impl WorldLines for RayInInstance<'_> {
 pub(crate) struct InstanceLine {
     rows: [Vec4; 2],
     pub(super) ray: Ray,
-    /// `None` for those of the object for [near lines](ObjectBounds::for_near_lines).
+    /// `None` where the object's bounds for [near lines](ObjectBounds::for_near_lines) hold.
     bounds: Option<ObjectBounds>,
 }
 

@@ -11,6 +11,9 @@
 //! - in a batch, lists of the instances that each of the other rays may enter ([`lists`]). Rays
 //!   that reach too many boxes for a list go one by one.
 //!
+//! An object in world space that is alone needs no top level; where f32 does not hold it or its
+//! rays, they go through it as lines ([`in_place`]).
+//!
 //! A batch ([`scene_batch`]) queues the visits of instances by rays ([`visit_queue`]), transforms
 //! the rays of an object's visits into its space ([`enter_object`]), and traces them there
 //! together, with t unchanged.

@@ -172,8 +172,8 @@ impl Scene {
         if self.world.is_none() && !self.has_opacity { self.objects.sole_view() } else { None }
     }
 
-    /// The object and the index of the only visible instance, if there is exactly one and its object
-    /// space is world space. Rays are then traced directly in the object, without the top level.
+    /// The object and the index of the only visible instance, if there is exactly one and its
+    /// object's space is world space. Rays then need no top level.
     #[inline(never)]
     pub(crate) fn sole(&self) -> Option<(&ObjectView<'_>, u32)> {
         let Some(world) = &self.world else {

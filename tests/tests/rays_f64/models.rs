@@ -173,7 +173,11 @@ fn packets_through_models_in_f64_have_the_answers_of_single_rays() {
             hits.map(|hit| StartRay::from_hit(&hit, [(); 3].map(|()| unit(rng) as f32))).collect();
         assert!(check_narrow(&scene, &plain, "camera") > 100);
         assert!(check_narrow(&scene, &starts, "starts") > 100);
-        let mut batch = vec![Hit::MISS; wide.len()];
+        // Rays that f32 cannot follow do not disturb the others.
+        let (mut wide, mut batch) = (wide, vec![Hit::MISS; 1024]);
+        (wide[77].origin, wide[300].origin) = ([1e39; 3], [1e300, 0.0, 0.0]);
+        (wide[500].direction[0], wide[501].direction[1]) = (1e30, f64::NAN);
+        wide[502].direction = wide[502].direction.map(|x| x * 1e-30);
         scene.batch(&wide).nearest(&mut batch);
         let alone: Vec<_> = wide.iter().map(|ray| scene.nearest(ray).unwrap_or(Hit::MISS)).collect();
         assert_eq!(batch, alone);

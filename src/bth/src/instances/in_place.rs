@@ -80,7 +80,7 @@ pub(crate) fn store_nearest<R: LineRay>(object: &ObjectView<'_>, ray: &R, instan
     if ray.is_plain() {
         return object::store_nearest(object, &LineRays(std::slice::from_ref(ray)), instance, hit);
     }
-    by_line(object, ray, instance, |ray| object::store_nearest(object, ray, instance, hit));
+    *hit = by_line(object, ray, instance, |ray| ray.hit_in_world(object::nearest(object, ray, instance)));
 }
 
 /// Returns true if a ray hits anything in an object in world space.
@@ -122,11 +122,17 @@ pub(crate) fn trace_batch<R: LineRay>(
         let part = &rays[first..rays.len().min(first + TOGETHER)];
         narrow.resize(part.len(), ENDED);
         let kernel = NarrowKernel { rays: part, anchor: object.anchor, narrow: &mut narrow };
-        let (farthest, are_plain) = Isa::chosen().run(kernel);
+        let (mut farthest, are_plain) = Isa::chosen().run(kernel);
         if !are_plain {
-            for i in (0..part.len()).filter(|i| !part[*i].is_plain()) {
-                alone.push(first + i);
-                narrow[i] = ENDED;
+            farthest = 0.0;
+            for (i, narrow) in narrow.iter_mut().enumerate() {
+                let of_ray = narrow.origin.iter().fold(0.0f32, |most, x| most.max(x.abs()));
+                if part[i].is_plain() && of_ray.is_finite() {
+                    farthest = farthest.max(of_ray);
+                } else {
+                    alone.push(first + i);
+                    *narrow = ENDED;
+                }
             }
         }
         let bounds = object.bounds.for_lines(farthest, 0.0, R::RANGE_ERROR);

@@ -18,7 +18,7 @@ use crate::nodes::affine::ObjectRay;
 use crate::object::single::SingleRay;
 use crate::objects::Objects;
 use crate::query::sink::Visit;
-use crate::rays::{Ray, Ray64};
+use crate::rays::{Hit, Ray, Ray64};
 use crate::shortcuts::free;
 use crate::simd::{Isa, Kernel, LANES, Simd};
 use crate::starts::world_ray::{InstanceStart, WorldRay};
@@ -172,6 +172,12 @@ impl<'a> RayInInstance<'a> {
                 .exact_t(corners_by_id(object, triangle)?)?
                 .times(f64::from(self.of_object.t_scale)),
         )
+    }
+
+    /// A hit of this ray with its t in world space; a miss where f32 does not hold that.
+    pub(crate) fn hit_in_world(&self, hit: Hit) -> Hit {
+        let t = hit.t * self.of_object.t_scale;
+        if hit.is_hit() && t.is_finite() { Hit { t, ..hit } } else { Hit::MISS }
     }
 
     /// The same ray with its f32 numbers relative to an object's anchor.

@@ -41,7 +41,7 @@ impl<'a> UnplacedRay<'a> {
         match self {
             UnplacedRay::Plain(ray) => object::nearest(object, ray, instance),
             UnplacedRay::Start(ray) => object::nearest(object, ray, instance),
-            UnplacedRay::Line(ray) => object::nearest(object, ray, instance),
+            UnplacedRay::Line(ray) => ray.hit_in_world(object::nearest(object, ray, instance)),
         }
     }
 
@@ -50,7 +50,10 @@ impl<'a> UnplacedRay<'a> {
         match self {
             UnplacedRay::Plain(ray) => object::nearest_counted(object, ray, instance),
             UnplacedRay::Start(ray) => object::nearest_counted(object, ray, instance),
-            UnplacedRay::Line(ray) => object::nearest_counted(object, ray, instance),
+            UnplacedRay::Line(ray) => {
+                let (hit, steps) = object::nearest_counted(object, ray, instance);
+                (ray.hit_in_world(hit), steps)
+            }
         }
     }
 

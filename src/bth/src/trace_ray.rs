@@ -4,7 +4,7 @@
 #![allow(private_interfaces, private_bounds)]
 
 use self::sealed::Traced;
-use crate::instances::in_place::{self, LineRay, wide_ray};
+use crate::instances::in_place::{self, LineRay};
 use crate::instances::{World, WorldRays};
 use crate::object::{self, Scratch};
 use crate::query::sink::{Answers, Sink};
@@ -177,7 +177,7 @@ impl Traced for Ray64 {
         true
     }
     fn in_world<T>(&self, _scene: &Scene, trace: impl FnOnce(WorldRay<'_>) -> T) -> Option<T> {
-        Some(trace(wide_ray(&self.narrow(), self)))
+        Some(trace(WorldRay { ray: &self.narrow(), ..self.world_ray() }))
     }
     fn go_together(rays: &[Ray64], world: Option<&World>) -> bool {
         world.is_none_or(|world| !world.go_one_by_one(rays.len(), |i| rays[i].narrow()))

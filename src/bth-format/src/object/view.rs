@@ -19,7 +19,7 @@ pub struct ObjectView<'a> {
     pub bounds: ObjectBounds,
     /// These bounds [for rays that start on triangles](ObjectBounds::for_starts).
     pub start_bounds: ObjectBounds,
-    /// These bounds [for rays of f64](ObjectBounds::for_near_lines).
+    /// These bounds [for near lines](ObjectBounds::for_near_lines).
     pub near_bounds: ObjectBounds,
     /// The points that coordinates of triangle leaves can be; `None` where these are `f32`.
     pub grid: Option<Grid>,

@@ -69,11 +69,6 @@ impl LineRay for Ray64 {
     }
 }
 
-/// A ray in f64, given the same ray rounded to f32.
-pub(crate) fn wide_ray<'a>(ray: &'a Ray, wide: &'a Ray64) -> WorldRay<'a> {
-    WorldRay { ray, start: None, wide: Some(wide) }
-}
-
 /// Stores the nearest hit of a ray in an object in world space.
 #[inline(always)]
 pub(crate) fn store_nearest<R: LineRay>(object: &ObjectView<'_>, ray: &R, instance: u32, hit: &mut Hit) {
@@ -92,7 +87,7 @@ pub(crate) fn any<R: LineRay>(object: &ObjectView<'_>, ray: &R) -> bool {
     by_line(object, ray, 0, |ray| object::any(object, ray))
 }
 
-/// Calls `trace` with any ray.
+/// Calls `trace` with a ray as instances take it, which may be any.
 #[cold]
 fn by_line<R: LineRay, T>(
     object: &ObjectView<'_>,

@@ -2,11 +2,12 @@
 //! limit → free directions → collapse → file.
 //!
 //! `compiler` calls the stages in order; each is a `Stage` (`stage.rs`) in a separate file.
-//! `compile` is the way in, for a model in a file or in memory, with or without a cache.
+//! `compile` is the way in, for a model in a file or in memory, with or without a cache; `direct` is the short one.
 
 mod choose_nodes;
 mod compile;
 mod compiler;
+mod direct;
 mod free_directions;
 mod hashed;
 mod import;
@@ -25,6 +26,7 @@ mod tree;
 pub use crate::options::{CompileOptions, MotionOptions, Structure};
 pub use crate::stage::StageTime;
 pub use compile::{CachedCompilation, CompileInput, DryRun, compile, compile_cached, dry_run};
+pub use direct::compile_fast;
 pub use limit::storage;
 pub use object::{Compiled, assemble};
 pub use report::{CompileReport, FileReport, MotionReport};

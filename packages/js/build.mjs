@@ -1,4 +1,4 @@
-// Builds the package: bth.wasm from src/, and viewer.html, one page with everything in it.
+// Builds the package: bth.wasm from src/, compile.wasm from compile/, and viewer.html, one page with everything in it.
 //
 //   node build.mjs [FOLDER]    FOLDER is where they go; by default dist/. Needs Rust with the target wasm32-unknown-unknown.
 import { execFileSync } from "node:child_process";
@@ -15,13 +15,13 @@ if (given.length > 1 || given[0]?.startsWith("-")) {
     process.exit(2);
 }
 const out = resolve(given[0] ?? join(here, "dist"));
-/** Bytes at most: of the module as browsers download it, compressed by gzip, and of the page. */
-const MOST_WASM = 400_000, MOST_PAGE = 600_000;
+/** Bytes at most: of the modules as browsers download them, compressed by gzip, and of the page. */
+const MOST_WASM = 450_000, MOST_COMPILER = 300_000, MOST_PAGE = 680_000;
 
-/** Compiles the module; returns its path. Artifacts with these flags have a folder of their own. */
-function compileModule() {
+/** Compiles the modules; returns the folder that has them. Artifacts with these flags have a folder of their own. */
+function compileModules() {
     const target = join(process.env.CARGO_TARGET_DIR ?? join(root, "target"), "wasm");
-    const arguments_ = ["build", "-p", "bth-js", "--profile", "wasm", "--target", "wasm32-unknown-unknown", "--target-dir", target];
+    const arguments_ = ["build", "-p", "bth-js", "-p", "bth-js-compile", "--profile", "wasm", "--target", "wasm32-unknown-unknown", "--target-dir", target];
     // What kernels need is inlined by force; anything else is smaller as a function of its own.
     const small = "llvm-args=-inline-threshold=5";
     // Calls and addresses as short as they are, in place of five bytes each.
@@ -34,7 +34,7 @@ function compileModule() {
     const CARGO_ENCODED_RUSTFLAGS = flags.filter((flag) => flag !== "").join("\x1f");
     // BLAKE3 in plain Rust, so that no C compiler for the target is needed.
     execFileSync("cargo", [...arguments_, "--features", "bth-format/pure"], { cwd: root, stdio: "inherit", env: { ...process.env, CARGO_ENCODED_RUSTFLAGS } });
-    return join(target, "wasm32-unknown-unknown/wasm/bth_js.wasm");
+    return join(target, "wasm32-unknown-unknown/wasm");
 }
 
 /** A module without its custom sections: the names of functions, which are a fifteenth of it, and what compiled it. */
@@ -95,14 +95,18 @@ function keep(name, bytes, most, size = bytes.length, how = "") {
 }
 
 mkdirSync(out, { recursive: true });
-const wasm = stripped(readFileSync(compileModule()));
-keep("bth.wasm", wasm, MOST_WASM, gzipSync(wasm, { level: 9 }).length, ` compressed; ${wasm.length} as they are`);
+const modules = compileModules();
+const [wasm, compiler] = ["bth_js", "bth_js_compile"].map((name) => stripped(readFileSync(join(modules, `${name}.wasm`))));
+for (const [name, module, most] of [["bth.wasm", wasm, MOST_WASM], ["compile.wasm", compiler, MOST_COMPILER]]) {
+    keep(name, module, most, gzipSync(module, { level: 9 }).length, ` compressed; ${module.length} as they are`);
+}
 keep("viewer.html", page(wasm), MOST_PAGE);
-for (const name of ["index.js", "index.d.ts", "package.json"]) copyFileSync(join(here, name), join(out, name));
+for (const name of JSON.parse(readFileSync(join(here, "package.json"))).files.filter((name) => /\.(js|d\.ts)$/.test(name))) copyFileSync(join(here, name), join(out, name));
+copyFileSync(join(here, "package.json"), join(out, "package.json"));
 for (const name of ["LICENSE-MIT", "LICENSE-APACHE"]) copyFileSync(join(root, name), join(out, name));
 // The licences of the crates that the module holds, most of which ask to be where it is.
 try {
-    const notices = execFileSync("bash", [join(root, "tools/package/notices"), "--target", "wasm32-unknown-unknown", "bth-js"]);
+    const notices = execFileSync("bash", [join(root, "tools/package/notices"), "--target", "wasm32-unknown-unknown", "bth-js", "bth-js-compile"]);
     writeFileSync(join(out, "NOTICES"), notices);
 } catch (error) {
     console.error(`NOTE: without NOTICES, the licences of crates, which whoever passes the package on has to add: ${error.message}`);

@@ -9,6 +9,8 @@
 pub mod describe;
 pub mod materials;
 pub mod memory;
+pub mod motion;
+pub mod one;
 pub mod points;
 pub mod queries;
 pub mod surface;

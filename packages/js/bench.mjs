@@ -1,10 +1,11 @@
-// Rays per second of the package under node, beside its module without vector instructions and beside three-mesh-bvh, on identical
-// rays: camera rays in blocks of 8 by 8, and bounces from what they hit.
+// Rays per second of the package under node, in batches and one ray a call, compared with its module without vector instructions and
+// with three-mesh-bvh, on identical rays: camera rays in blocks of 8 by 8, and bounces from what they hit.
 //
 //   BTHC=PROGRAM node bench.mjs MODEL...    models that bthc reads, seen from outside
 //
 // DIST is the built package (dist/); PLAIN a bth_js.wasm that is built without `-C target-feature=+simd128`; MODULES a folder
 // node_modules with three and three-mesh-bvh. What is absent is left out. Times are CPU times of the process, medians of rounds that take turns.
+// In brackets: how many times as fast as the last.
 import { execFileSync } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -64,6 +65,19 @@ async function threeMeshBvh(model, folder) {
     };
 }
 
+/** The same by calls of one ray, with a ray and a hit that are used again. */
+function oneByOne(scene) {
+    const ray = new Float64Array(8), hit = {};
+    return (rays) => {
+        const t = new Float32Array(rays.length / 8);
+        for (let i = 0; i < t.length; i++) {
+            for (let k = 0; k < 8; k++) ray[k] = rays[8 * i + k];
+            t[i] = scene.nearestOne(ray, hit) ? hit.t : Infinity;
+        }
+        return t;
+    };
+}
+
 /** Millions of rays per CPU second of each tracer. */
 function measure(tracers, rays) {
     const times = Object.fromEntries(Object.keys(tracers).map((name) => [name, []]));
@@ -84,7 +98,7 @@ for (const model of process.argv.slice(2)) {
     const file = join(folder, "model.bth");
     execFileSync(BTHC, ["compile", model, "-o", file, "--quiet"]);
     const scene = (await load()).open(readFileSync(file));
-    const tracers = { bth: (rays) => scene.nearest(rays).t };
+    const tracers = { batch: (rays) => scene.nearest(rays).t, one: oneByOne(scene) };
     if (PLAIN) {
         const plain = (await load(readFileSync(PLAIN))).open(readFileSync(file));
         tracers.plain = (rays) => plain.nearest(rays).t;
@@ -93,9 +107,10 @@ for (const model of process.argv.slice(2)) {
     const camera = cameraRays(scene);
     for (const [set, rays] of [["camera", camera], ["bounces", bounces(scene, camera)]]) {
         const speeds = measure(tracers, rays);
-        const [ours, theirs] = [tracers.bth, tracers["three-mesh-bvh"] ?? tracers.bth].map((trace) => trace(rays));
+        const [ours, theirs] = [tracers.one, tracers["three-mesh-bvh"] ?? tracers.batch].map((trace) => trace(rays));
         const differ = ours.filter((t, i) => t !== theirs[i] && !(Math.abs(t - theirs[i]) <= 1e-4 * t)).length;
-        const columns = speeds.map(([name, speed]) => `${name} ${speed.toFixed(2)} M/s (${(speeds[0][1] / speed).toFixed(2)})`);
+        const other = speeds.at(-1)[1];
+        const columns = speeds.map(([name, speed]) => `${name} ${speed.toFixed(2)} M/s (${(speed / other).toFixed(1)})`);
         console.log(`${model.split("/").pop()} ${set}: ${columns.join(", ")}${differ ? `; ${differ} of ${ours.length} rays differ` : ""}`);
     }
     scene.close();

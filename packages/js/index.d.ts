@@ -12,6 +12,14 @@ export class Bth {
      * the file has 2 GiB or more.
      */
     open(file: ArrayBufferLike | ArrayBufferView): Scene;
+    /**
+     * A scene of instances of other scenes, which share their files. Instance i shows the first
+     * object of `scenes[which[i]]`, or of the only scene.
+     * @param transforms 16 numbers a matrix, column by column, as three.js and WebGL have them. A
+     * matrix whose nine numbers of direction are 0 hides its instance.
+     * @throws BthError with BTH-S001 for another matrix that cannot be inverted.
+     */
+    instances(scenes: Scene | Scene[], transforms: Float32Array | Float64Array, which?: ArrayLike<number>): Scene;
 }
 
 /**
@@ -67,9 +75,9 @@ export interface Scene {
     /** Box in world space that contains what can be seen at the scene's time; null if that is nothing. */
     readonly bounds: { lower: Vector; upper: Vector } | null;
     /**
-     * The scene's time in seconds; at first that of its first frame. It may lie outside of the frames: nothing moves beyond them. A file
-     * whose `frames` are null has none: it stays 0.
+     * The scene's time in seconds; at first that of its first frame. It may lie outside of the frames: nothing moves beyond them.
      * @throws TypeError unless it is a finite number.
+     * @throws BthError if it is set where `frames` are null: a model has no time.
      * @throws BthError if an instance cannot be placed at that time; the scene is then unchanged. With BTH-O001 if the memory is too
      * small; the scene can then only be closed.
      */
@@ -96,6 +104,18 @@ export interface Scene {
      * @throws TypeError unless each array has its type and as many elements as there are rays.
      */
     nearestStarts(starts: Starts, directions: Float32Array, tmax?: number | Float32Array): Hits;
+    /**
+     * The nearest hit of one ray: true if there is one, which is then written to `hit`. The ray is
+     * eight numbers, and they are not rounded; t, u and v are as for a Float64Array of rays. Nothing
+     * is allocated: use the same ray and hit again.
+     * @param side What can be hit; "both" by default. The front is the side from which a triangle's
+     * vertices are seen counter-clockwise. It is decided exactly.
+     */
+    nearestOne(ray: ArrayLike<number>, hit: Partial<Hit>, side?: Side): boolean;
+    /** As `nearestOne`: true if the ray hits anything. */
+    anyOne(ray: ArrayLike<number>, side?: Side): boolean;
+    /** All hits of one ray, in order of t. */
+    allHits(ray: ArrayLike<number>, side?: Side): Hits<Float64Array>;
     /** As `nearestStarts`: for each ray 1 if it hits anything, else 0. */
     anyStarts(starts: Starts, directions: Float32Array, tmax?: number | Float32Array): Uint8Array;
     /**
@@ -110,6 +130,28 @@ export interface Scene {
      * lies inside. 0 for points that are not finite.
      */
     winding(points: Float32Array | Float64Array): Int32Array;
+    /** True if a triangle overlaps a closed box, decided exactly. */
+    overlapsBox(lower: ArrayLike<number>, upper: ArrayLike<number>): boolean;
+    /** True if a triangle overlaps a closed ball, decided exactly. */
+    overlapsSphere(center: ArrayLike<number>, radius: number): boolean;
+    /** The triangles that overlap a closed box, by ascending instance and triangle. */
+    trianglesInBox(lower: ArrayLike<number>, upper: ArrayLike<number>): Triangles;
+    /** The triangles that overlap a closed ball, by ascending instance and triangle. */
+    trianglesInSphere(center: ArrayLike<number>, radius: number): Triangles;
+    /** The number of vertices that `setPositions` expects; null if the object is not deformable. */
+    vertices(object?: number): number | null;
+    /**
+     * Gives an object that was compiled as deformable new positions, three numbers a vertex, in the
+     * order of the source. Boxes are computed again; all queries then answer for them.
+     * @throws BthError with BTH-S006 if it is not deformable, BTH-S007 for a wrong number of
+     * positions or one that is not finite. The scene is then unchanged.
+     */
+    setPositions(positions: Float32Array, object?: number): void;
+    /**
+     * Moves instances of a scene of `bth.instances`, from `first` on.
+     * @throws BthError for another scene, and with BTH-S001 for a matrix that cannot be inverted.
+     */
+    setTransforms(transforms: Float32Array | Float64Array, first?: number): void;
     /** What the search for the nearest hit of each ray visits. */
     steps(rays: Float32Array): Steps;
     /**
@@ -139,6 +181,25 @@ export interface Scene {
     image(object: number, texture: number): Uint8Array;
     /** Frees the scene's memory. All other methods throw from then on. */
     close(): void;
+}
+
+/** Which sides of triangles a ray hits. */
+export type Side = "both" | "front" | "back";
+
+/** The hit of one ray. */
+export interface Hit {
+    t: number;
+    u: number;
+    v: number;
+    instance: number;
+    triangle: number;
+}
+
+/** A list of triangles. */
+export interface Triangles {
+    readonly count: number;
+    readonly instance: Uint32Array;
+    readonly triangle: Uint32Array;
 }
 
 export type Vector = [x: number, y: number, z: number];

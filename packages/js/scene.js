@@ -1,6 +1,6 @@
 // What can be asked of an open file.
 
-import { BthError, HIT_NAMES, POINT, RAY, checkHits, checkIndex, copied, countOf, countOfStarts, kindOf, numbersOf, startsCopied } from "./checks.js";
+import { BthError, HIT_NAMES, POINT, RAY, checkHits, checkIndex, copied, countOf, countOfStarts, kindOf, numbersOf, sizedKindOf, startsCopied } from "./checks.js";
 import { Closest, Hits, Steps, Surface } from "./results.js";
 
 /** Rays that are copied to the module at a time: they stay in the caches. */
@@ -80,27 +80,26 @@ export class Scene {
     }
 
     nearestOne(ray, hit, side) {
-        const { numbers, indices } = this.#views(ray);
-        const { rays, results } = this.#memory;
-        const triangle = this.#wasm.bth_nearest_one(this.#open(), rays, sideOf(side), results) >>> 0;
+        const scene = this.#open(), memory = this.#memory;
+        this.#copyRay(ray);
+        const triangle = this.#wasm.bth_nearest_one(scene, memory.rays, sideOf(side), memory.results) >>> 0;
         if (triangle === NONE) return false;
-        // The module may have grown, which detaches its views.
-        const { numbers: found, indices: words } = numbers.length === 0 ? this.#views(ray) : { numbers, indices };
-        hit.t = found[0];
-        hit.u = found[1];
-        hit.v = found[2];
-        hit.instance = words[6];
+        const { numbers, indices } = this.#views();
+        hit.t = numbers[0];
+        hit.u = numbers[1];
+        hit.v = numbers[2];
+        hit.instance = indices[6];
         hit.triangle = triangle;
         return true;
     }
 
     anyOne(ray, side) {
-        this.#views(ray);
+        this.#copyRay(ray);
         return this.#wasm.bth_any_one(this.#open(), this.#memory.rays, sideOf(side)) === 1;
     }
 
     allHits(ray, side) {
-        this.#views(ray);
+        this.#copyRay(ray);
         const hits = new Hits(this.#wasm.bth_all_hits(this.#open(), this.#memory.rays, sideOf(side)), Float64Array);
         const rows = new Float64Array(this.#wasm.memory.buffer, this.#wasm.bth_hits(), 4 * hits.count);
         const words = new Uint32Array(rows.buffer, rows.byteOffset, 8 * hits.count);
@@ -114,21 +113,25 @@ export class Scene {
         return hits;
     }
 
-    /** Views of the module's memory for one ray and its hit; the ray's eight numbers are copied to it. */
-    #views(ray) {
-        if (ray?.length !== RAY) throw new TypeError(`ray: expected eight numbers (origin, tmin, direction, tmax); found ${kindOf(ray)}`);
+    /** Views of the module's memory for one ray and its hit. They are made again when it has grown, which detaches them. */
+    #views() {
         const memory = this.#memory;
-        if (!memory.views || memory.views.ray.length === 0) {
+        if (memory.views === null || memory.views.ray.length === 0) {
             const { buffer } = this.#wasm.memory;
             memory.views = {
                 ray: new Float64Array(buffer, memory.rays, RAY),
-                numbers: new Float64Array(buffer, memory.results, 4),
+                numbers: new Float64Array(buffer, memory.results, 3),
                 indices: new Uint32Array(buffer, memory.results, 8),
             };
         }
-        const to = memory.views.ray;
-        for (let k = 0; k < RAY; k++) to[k] = ray[k];
         return memory.views;
+    }
+
+    /** Copies the numbers of a ray to the module. */
+    #copyRay(ray) {
+        if (ray?.length !== RAY) throw new TypeError(`ray: expected eight numbers (origin, tmin, direction, tmax); found ${sizedKindOf(ray)}`);
+        const to = this.#views().ray;
+        for (let k = 0; k < RAY; k++) to[k] = ray[k];
     }
 
     nearestStarts(starts, directions, tmax = Infinity) {
@@ -394,7 +397,8 @@ export class Scene {
 export const placed = Scene.placed;
 
 /** The number of a side. */
-function sideOf(side = "both") {
+function sideOf(side) {
+    if (side === undefined) return 0;
     const found = SIDES[side];
     if (found === undefined) throw new TypeError(`side: expected "both", "front" or "back"; found ${String(side)}`);
     return found;

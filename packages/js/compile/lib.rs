@@ -26,7 +26,7 @@ impl Monitor for Warnings {
     }
 }
 
-/// Memory for an array of so many words, zeros, at a multiple of 8 bytes.
+/// Memory for an array of `count` words, zeros, at a multiple of 8 bytes.
 #[unsafe(no_mangle)]
 pub extern "C" fn bth_words(count: usize) -> *mut u64 {
     Box::leak(vec![0u64; count.div_ceil(2)].into_boxed_slice()).as_mut_ptr()

@@ -12,7 +12,7 @@ thread_local! {
     static ROOM: RefCell<Vec<f64>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Address of room for so many bytes, at a multiple of 8, until the next call.
+/// Address of room for this number of bytes, at a multiple of 8, until the next call.
 #[unsafe(no_mangle)]
 pub extern "C" fn bth_room(bytes: usize) -> *mut f64 {
     ROOM.with_borrow_mut(|room| {
@@ -87,7 +87,12 @@ pub unsafe extern "C" fn bth_builder_place(builder: *mut SceneBuilder, first: u3
     let builder = unsafe { &mut *builder };
     ROOM.with_borrow(|room| {
         let rows = room.chunks_exact(TRANSFORM + 1).take(count);
-        done((first..).zip(rows).try_for_each(|(id, row)| place(builder, id, row)).and_then(|()| builder.commit()))
+        done(
+            (first..)
+                .zip(rows)
+                .try_for_each(|(id, row)| place(builder, id, row))
+                .and_then(|()| builder.commit()),
+        )
     })
 }
 

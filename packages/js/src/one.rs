@@ -70,7 +70,7 @@ pub unsafe extern "C" fn bth_all_hits(scene: *const Scene, ray: *const Ray64, si
     })
 }
 
-/// Address of the hits of [`bth_all_hits`]: t, u and v as f64, instance and triangle, 32 bytes each.
+/// Address of the hits of [`bth_all_hits`], 32 bytes each: t, u and v as f64, instance, triangle.
 #[unsafe(no_mangle)]
 pub extern "C" fn bth_hits() -> *const Hit64 {
     HITS.with_borrow(|(_, wide)| wide.as_ptr())
@@ -92,7 +92,11 @@ pub unsafe extern "C" fn bth_overlaps_box(scene: *const Scene, ends: *const [[f6
 /// # Safety
 /// `scene` is open, and `center` points to three numbers.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_overlaps_sphere(scene: *const Scene, center: *const [f64; 3], radius: f64) -> u32 {
+pub unsafe extern "C" fn bth_overlaps_sphere(
+    scene: *const Scene,
+    center: *const [f64; 3],
+    radius: f64,
+) -> u32 {
     // SAFETY: by contract both are valid.
     let (scene, center) = unsafe { (&*scene, *center) };
     scene.overlaps_sphere_f64(center, radius).into()

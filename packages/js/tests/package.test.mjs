@@ -362,7 +362,7 @@ test("a scene moves when its time is set", () => {
     assert.notDeepEqual(scene.bounds, first);
     const model = bth.open(readFileSync(join(conformance, "valid/triangle.bth")));
     assert.equal(model.frames, null);
-    model.seconds = 1;
+    assert.throws(() => (model.seconds = 1), (error) => error instanceof BthError && /^seconds: this file is a model/.test(error.message));
     assert.equal(model.seconds, 0);
 });
 
@@ -520,7 +520,8 @@ test("the types need no library but ES2022", (t) => {
     // A program of each kind: without other types, and with those of browsers.
     for (const [lib, more] of [["es2022", ""], ["es2022,dom", "load(fetch(new URL('a', 'b:'))); new WebAssembly.Instance(bth.module); new Worker('').postMessage(bth.module);"]]) {
         const program = join(folder, "program.ts");
-        writeFileSync(program, `import { load, BthError, type Bth, type Scene, type Surface } from "./bth/index.js";
+        writeFileSync(program, `import { load, BthError, type Bth, type Hit, type Hits, type Scene, type Surface } from "./bth/index.js";
+            import { loadCompiler } from "./bth/compile.js";
             const bth: Bth = await load(new Uint8Array(8));
             await load(Promise.resolve(bth.module));
             const scene: Scene = bth.open(new ArrayBuffer(8));
@@ -531,6 +532,11 @@ test("the types need no library but ES2022", (t) => {
             const away: Float64Array = scene.closest(t, 2).distance, turns: Int32Array = scene.winding(hits.t);
             // @ts-expect-error: steps are those of rays in float.
             scene.steps(t);
+            const hit: Partial<Hit> = {}, found: boolean = scene.nearestOne([1], hit, "front"), all: Hits<Float64Array> = scene.allHits(t);
+            const bytes: Uint8Array = (await loadCompiler()).compile(hits.t, hits.instance, { deformable: true });
+            bth.instances([bth.open(bytes)], hits.t, [0]).setTransforms(t, 1);
+            // @ts-expect-error: a side is front, back or both.
+            scene.anyOne(t, "left");
             scene.anyStarts({ count: 0, u: hits.u, v: hits.v, instance: hits.instance, triangle: hits.triangle }, hits.t, hits.t);
             // @ts-expect-error: it is not to be set.
             scene.objects = 1;
@@ -538,9 +544,9 @@ test("the types need no library but ES2022", (t) => {
             scene.nearest([1]);
             // @ts-expect-error: the bytes have to be awaited.
             bth.open(Promise.resolve(new ArrayBuffer(8)));
-            ${more} export { surface, at, away, turns, BthError };`);
+            ${more} export { surface, at, away, turns, found, all, BthError };`);
         mkdirSync(join(folder, "bth"), { recursive: true });
-        copyFileSync(types, join(folder, "bth/index.d.ts"));
+        for (const name of ["index.d.ts", "compile.d.ts"]) copyFileSync(join(dirname(types), name), join(folder, "bth", name));
         const compilerOptions = { strict: true, noEmit: true, lib: lib.split(","), types: [], target: "es2022", module: "esnext", moduleResolution: "bundler" };
         writeFileSync(join(folder, "tsconfig.json"), JSON.stringify({ compilerOptions, files: [program] }));
         execFileSync(process.env.TSC, ["-p", folder], { encoding: "utf8" });
@@ -575,7 +581,7 @@ test("a compiled module and bytes can be loaded", async () => {
 
 test("what is no module is refused with what is expected", async () => {
     for (const [source, found] of [[null, "null"], [5, "Number"], [[], "Array"], [{}, "Object"], [new SharedArrayBuffer(8), "SharedArrayBuffer"]]) {
-        await assert.rejects(load(source), (error) => error instanceof TypeError && /expected bth.wasm as its URL/.test(error.message) && error.message.endsWith(`found ${found}`), found);
+        await assert.rejects(load(source), (error) => error instanceof TypeError && /expected a module of WebAssembly as its URL/.test(error.message) && error.message.endsWith(`found ${found}`), found);
     }
     // The shortest module: the magic number and the version.
     const another = Uint8Array.of(0, 97, 115, 109, 1, 0, 0, 0);
@@ -584,7 +590,7 @@ test("what is no module is refused with what is expected", async () => {
 
 test("bundlers for browsers leave out what is of node", () => {
     const file = (name) => readFileSync(join(process.env.DIST, name), "utf8"), { browser } = JSON.parse(file("package.json"));
-    const imports = [...file("index.js").matchAll(/\bimport\((.*)"(node:[^"]+)"\)|from "(node:[^"]+)"/g)];
+    const imports = [...file("module.js").matchAll(/\bimport\((.*)"(node:[^"]+)"\)|from "(node:[^"]+)"/g)];
     assert.equal(imports.length, 1);
     for (const [text, comments, name] of imports) {
         assert.ok(/webpackIgnore: true/.test(comments) && /@vite-ignore/.test(comments), text);
@@ -592,5 +598,6 @@ test("bundlers for browsers leave out what is of node", () => {
     }
     // What is not a constant is left as it is; the default is taken along.
     assert.match(file("index.js"), /new URL\("\.\/bth\.wasm", import\.meta\.url\)/);
-    assert.match(file("index.js"), /new URL\(\/\* webpackIgnore: true \*\/ source/);
+    assert.match(file("compile.js"), /new URL\("\.\/compile\.wasm", import\.meta\.url\)/);
+    assert.match(file("module.js"), /new URL\(\/\* webpackIgnore: true \*\/ source/);
 });

@@ -52,11 +52,8 @@ mod tests {
             for triangles in [&triangles[..], &[]] {
                 for deformable in [false, true] {
                     let mesh = TriangleMesh { positions, triangles };
-                    let mut options = CompileOptions {
-                        structure: Structure::Bvh,
-                        deformable,
-                        ..CompileOptions::default()
-                    };
+                    let mut options =
+                        CompileOptions { structure: Structure::Bvh, deformable, ..CompileOptions::default() };
                     options.bvh.quality = Quality::Fast;
                     let (expected, _) = compile(mesh, &options, &Silent).unwrap();
                     assert_eq!(compile_fast(mesh, deformable, &Silent).unwrap(), expected);

@@ -2,7 +2,8 @@
 //! limit → free directions → collapse → file.
 //!
 //! `compiler` calls the stages in order; each is a `Stage` (`stage.rs`) in a separate file.
-//! `compile` is the way in, for a model in a file or in memory, with or without a cache; `direct` is the short one.
+//! `compile` is the way in, for a model in a file or in memory, with or without a cache.
+//! `direct` is the short way in, for a mesh in memory and a fast BVH.
 
 mod choose_nodes;
 mod compile;

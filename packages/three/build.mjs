@@ -28,7 +28,7 @@ take("@bth/three", here, [...files.filter((file) => !licences.includes(file)), "
 take("@bth/three", root, licences);
 const bth = JSON.parse(readFileSync(join(DIST, "package.json"))).files.filter((file) => file !== "viewer.html");
 take("bth", resolve(DIST), [...bth.filter((file) => file !== "NOTICES"), "package.json"]);
-const jsm = ["controls/OrbitControls.js", "environments/RoomEnvironment.js", "geometries", "loaders", "libs/fflate.module.js", "utils", "curves"];
+const jsm = ["controls/OrbitControls.js", "geometries/TeapotGeometry.js", "utils", ...["GLTF", "OBJ", "PLY", "STL"].map((kind) => `loaders/${kind}Loader.js`)];
 take("three", join(resolve(MODULES), "three"), ["build/three.module.js", "build/three.core.js", "LICENSE", "package.json", ...jsm.map((file) => `examples/jsm/${file}`)]);
 take("three-mesh-bvh", join(resolve(MODULES), "three-mesh-bvh"), ["build/index.module.js", "LICENSE", "package.json"]);
 

@@ -106,6 +106,19 @@ test("materials of groups, overlapping groups and draw ranges", () => {
     assert.ok(compare(objects, 300) > 500);
 });
 
+test("of triangles whose distances three.js rounds to the same, the nearest is found", () => {
+    // The middle of a torus without a hole: three.js finds all at 10 and takes the first.
+    const mesh = new THREE.Mesh(new THREE.TorusGeometry(5, 5, 40, 10), new THREE.MeshBasicMaterial()), raycaster = new THREE.Raycaster();
+    raycaster.set(new THREE.Vector3(0, 0, -10), new THREE.Vector3(0, 0, 1));
+    raycaster.firstHitOnly = true;
+    mesh.raycast = originals[0];
+    const [theirs] = raycaster.intersectObject(mesh), tree = mesh.geometry.computeBoundsTree(), exact = tree.scene.allHits([0, 0, -10, 0, 0, 0, 1, 99], "front");
+    mesh.raycast = bth.acceleratedRaycast;
+    const [ours] = raycaster.intersectObject(mesh), distanceOf = (face) => exact.t[exact.triangle.indexOf(face)];
+    assert.deepEqual([ours.distance, theirs.distance], [10, 10]);
+    assert.ok(ours.faceIndex !== theirs.faceIndex && distanceOf(ours.faceIndex) < distanceOf(theirs.faceIndex));
+});
+
 test("instances: each by its tree, and a tree over all", () => {
     const next = numbers(3), mesh = placed(new THREE.InstancedMesh(torus(), new THREE.MeshBasicMaterial(), 30), next), one = new THREE.Object3D();
     for (let i = 0; i < 30; i++) mesh.setMatrixAt(i, placed(one, next).matrix);

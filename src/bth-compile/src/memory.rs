@@ -18,7 +18,7 @@
 //! # Ok::<(), bth_compile::Error>(())
 //! ```
 
-pub use crate::scene::Instance;
+pub use crate::scene::{Instance, SceneNames};
 pub use crate::source::TriangleMesh;
 pub use bth_import::PositionRows;
 
@@ -54,7 +54,22 @@ pub fn compile_scene(
     cache: &Cache<'_>,
     monitor: &dyn Monitor,
 ) -> Result<CachedCompilation<SceneReport>> {
-    scene::compile_meshes(meshes, instances, options, cache, monitor)
+    compile_named_scene(meshes, instances, SceneNames::default(), options, cache, monitor)
+}
+
+/// Like [`compile_scene`], with names of meshes and instances.
+///
+/// # Errors
+/// The errors of [`compile_scene`].
+pub fn compile_named_scene(
+    meshes: &[TriangleMesh<'_>],
+    instances: &[Instance],
+    names: SceneNames<'_>,
+    options: &CompileOptions,
+    cache: &Cache<'_>,
+    monitor: &dyn Monitor,
+) -> Result<CachedCompilation<SceneReport>> {
+    scene::compile_meshes(meshes, instances, names, options, cache, monitor)
 }
 
 /// Compiles a scene without a cache and opens it; see [`compile_scene`].

@@ -26,19 +26,30 @@ pub struct Instance {
     pub to_world: [[f64; 4]; 3],
 }
 
+/// Names of the meshes and instances of a scene, one for each of them, which the file keeps.
+/// Without them they are called `mesh 0`, `instance 0` and so on.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SceneNames<'a> {
+    /// Names of meshes. Of equal meshes, which are stored once, the first one's counts.
+    pub meshes: Option<&'a [String]>,
+    /// Names of instances.
+    pub instances: Option<&'a [String]>,
+}
+
 /// Name of the scene in messages.
 const SCENE_NAME: &str = "scene";
 
-/// See [`crate::memory::compile_scene`].
+/// See [`crate::memory::compile_named_scene`].
 pub(crate) fn compile_meshes(
     meshes: &[TriangleMesh<'_>],
     instances: &[Instance],
+    names: SceneNames<'_>,
     options: &CompileOptions,
     cache: &Cache<'_>,
     monitor: &dyn Monitor,
 ) -> Result<CachedCompilation<SceneReport>> {
     check(meshes.len(), instances)?;
-    let manifest = manifest(meshes.len(), instances);
+    let manifest = manifest(meshes.len(), instances, names);
     let context = Context::new(options, cache, monitor)?;
     let mut clock = Clock::default();
     let plan = plan(&manifest, meshes, &mut clock);
@@ -65,13 +76,17 @@ fn check(meshes: usize, instances: &[Instance]) -> Result<()> {
 }
 
 /// The manifest of a scene in which each instance has a separate node.
-fn manifest(meshes: usize, instances: &[Instance]) -> Manifest {
+fn manifest(meshes: usize, instances: &[Instance], names: SceneNames<'_>) -> Manifest {
+    let named = |names: Option<&[String]>, row: usize, other: &dyn Fn() -> String| {
+        names.and_then(|names| names.get(row).cloned()).unwrap_or_else(other)
+    };
     let object = |row| {
-        let name = format!("mesh {row}");
-        Object { source: Source::Model { path: name.clone(), mesh: None }, name }
+        let path = format!("mesh {row}");
+        let name = named(names.meshes, row, &|| path.clone());
+        Object { source: Source::Model { path, mesh: None }, name }
     };
     let node = |(row, instance): (usize, &Instance)| Node {
-        name: format!("instance {row}"),
+        name: named(names.instances, row, &|| format!("instance {row}")),
         parent: None,
         transform: Transform::Matrix(instance.to_world),
         object: Some(instance.mesh as usize),

@@ -29,6 +29,6 @@ mod visible;
 
 pub use compile::{CachePolicy, SceneSource, compile, compile_cached, compile_objects, dry_run};
 pub use files::files;
-pub use in_memory::Instance;
 pub(crate) use in_memory::compile_meshes;
+pub use in_memory::{Instance, SceneNames};
 pub use report::{ObjectReport, SceneReport};

@@ -36,9 +36,8 @@ pub(super) fn find(options: &TetOptions) -> std::result::Result<PathBuf, String>
     let found = beside.into_iter().chain(std::env::split_paths(&path).map(|folder| folder.join(PROGRAM)));
     found.filter_map(|p| std::path::absolute(p).ok()).find(|p| p.is_file()).ok_or_else(|| {
         format!(
-            "no tetrahedralization worker {PROGRAM} was found beside this program or on the PATH, so everything stays in \
-             the BVH; build it with `cargo build --release -p bth-tetgen` (it needs TetGen, on Debian and Ubuntu \
-             libtet1.5-dev), or let BTH_TETGEN name it"
+            "no tetrahedralization worker {PROGRAM} was found next to this program or on the PATH, so everything \
+             stays in the BVH; install it (docs/models.md, \"Tetrahedra\"), or let BTH_TETGEN name it"
         )
     })
 }

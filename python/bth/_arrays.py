@@ -4,11 +4,32 @@ import numpy as np
 
 
 def plain(array, name):
-    """The array without a mask. One in which something is masked is refused: no answer could say that it is of nothing."""
+    """The array without a mask. One in which something is masked is refused: no answer could say that it is of nothing.
+
+    Tensors of other packages are taken by their `numpy()` or by DLPack, from wherever they are.
+    """
+    if callable(getattr(array, "numpy", None)):
+        array = array.detach() if hasattr(array, "detach") else array
+        array = (array.cpu() if hasattr(array, "cpu") else array).numpy()
+    elif hasattr(array, "__dlpack__") and not hasattr(array, "__array__"):
+        array = np.from_dlpack(array)
     if isinstance(array, np.ma.MaskedArray) and np.ma.is_masked(array):
         found = f"a masked array in which {np.ma.count_masked(array)} numbers are masked"
         raise ValueError(f"{name}: expected an array without a mask, got {found}: leave them out (numpy.ma.compressed) or fill them")
     return np.asarray(array)
+
+
+def read_only(array):
+    """The array, which is a copy of what a scene holds: to change it would have no effect."""
+    array.flags.writeable = False
+    return array
+
+
+def moved_by_rounding(points):
+    """How far rounding points (n, 3) of float64 to float32 moves each, if that is more than 2^-24 of their size for one of them; else None."""
+    with np.errstate(over="ignore"):
+        moved = np.abs(points.astype(np.float32) - points).max(axis=1, initial=0)
+    return moved if len(points) and moved.max() > 2.0**-24 * np.ptp(points, axis=0).max() else None
 
 
 def vectors(array, name):

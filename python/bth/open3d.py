@@ -1,11 +1,48 @@
-"""Open3D's `t.geometry.RaycastingScene` on arrays of numpy. Rays are (..., 6): origin and direction."""
+"""Open3D's `t.geometry.RaycastingScene`, without Open3D. Rays are (..., 6): origin and direction.
+
+Arguments are arrays or tensors of any package that have `numpy()` or DLPack. Results are tensors of Open3D where an argument is one,
+else arrays of numpy that also have the methods of tensors which scripts call.
+"""
 
 import numpy as np
 
 from . import _arrays
-from ._assembly import Assembly
+from ._assembly import Assembly, passages
 
 _INVALID = 0xFFFFFFFF
+
+
+class Tensor(np.ndarray):
+    """An array with methods of Open3D's tensors. Its elements are arrays without axes."""
+
+    def __getitem__(self, key):
+        return np.asarray(super().__getitem__(key)).view(Tensor)
+
+    def numpy(self):
+        return self.view(np.ndarray)
+
+    def cpu(self):
+        return self
+
+    def clone(self):
+        return self.copy()
+
+    def isfinite(self):
+        return np.isfinite(self)
+
+    def isinf(self):
+        return np.isinf(self)
+
+    def isnan(self):
+        return np.isnan(self)
+
+
+def _as(like, result):
+    """An array, or a dictionary of arrays, as tensors of the package of `like`."""
+    if isinstance(result, dict):
+        return {name: _as(like, array) for name, array in result.items()}
+    from_numpy = getattr(type(like), "from_numpy", None)
+    return result.view(Tensor) if from_numpy is None else from_numpy(np.ascontiguousarray(result)).to(like.device)
 
 
 class RaycastingScene:
@@ -13,12 +50,13 @@ class RaycastingScene:
 
     INVALID_ID = _INVALID
 
-    def __init__(self, nthreads=0):
+    def __init__(self, nthreads=0, device=None):
+        """device: has no meaning here; tensors of results are where arguments are."""
         self._threads = nthreads or None
         self._assembly = Assembly()
 
     def add_triangles(self, vertex_positions=None, triangle_indices=None, *, mesh=None):
-        """Adds vertices (n, 3) and triangles (m, 3), or a mesh; returns its geometry's index."""
+        """Adds vertices (n, 3) and triangles (m, 3), or a mesh of any package; returns its geometry's index."""
         if (mesh is None) == (vertex_positions is None):
             raise TypeError("expected vertex_positions and triangle_indices, or a mesh")
         mesh = vertex_positions if mesh is None else mesh
@@ -43,54 +81,69 @@ class RaycastingScene:
         origins, directions, threads = self._rays(rays, nthreads)
         hits = self._assembly.scene()[0].nearest(origins, directions, threads=threads)
         geometry, primitive = self._ids(hits.triangle)
-        return {
+        return _as(rays, {
             "t_hit": hits.t, "geometry_ids": geometry, "primitive_ids": primitive,
             "primitive_uvs": np.stack([hits.u, hits.v], axis=-1), "primitive_normals": hits.normal.astype(np.float32),
-        }
+        })
 
     def test_occlusions(self, rays, tnear=0.0, tfar=float("inf"), nthreads=0):
         """Whether rays hit anything between tnear and tfar."""
         origins, directions, threads = self._rays(rays, nthreads)
-        return self._assembly.scene()[0].any(origins, directions, tmin=tnear, tmax=tfar, threads=threads)
+        return _as(rays, self._assembly.scene()[0].any(origins, directions, tmin=tnear, tmax=tfar, threads=threads))
+
+    def _passages(self, rays, nthreads):
+        """All hits, the rows of them that count, and their geometries and triangles."""
+        origins, directions, threads = self._rays(rays, nthreads)
+        scene = self._assembly.scene()[0]
+        found = scene.all_hits(origins.astype(np.float64), directions, threads=threads)
+        geometry, primitive = self._ids(found.triangle)
+
+        def facing(rows):
+            normals = scene.normals(found.instance[rows], found.triangle[rows])
+            return np.einsum("ij,ij->i", normals, directions.reshape(-1, 3)[found.ray[rows]]) > 0
+
+        return found, passages(found, facing, geometry), geometry, primitive, origins
 
     def count_intersections(self, rays, nthreads=0):
-        """Number of triangles that rays hit."""
-        origins, directions, threads = self._rays(rays, nthreads)
-        return self._assembly.scene()[0].count(origins, directions, threads=threads).astype(np.int32)
+        """How often rays hit surfaces. A point on an edge of several triangles counts once for each side from which it is hit."""
+        found, rows, *_, origins = self._passages(rays, nthreads)
+        count = np.bincount(found.ray[rows], minlength=len(found.offsets) - 1)
+        return _as(rays, count.astype(np.int32).reshape(origins.shape[:-1]))
 
     def list_intersections(self, rays, nthreads=0):
-        """All hits: ray_splits (offsets), ray_ids, t_hit, geometry_ids, primitive_ids, primitive_uvs."""
-        origins, directions, threads = self._rays(rays, nthreads)
-        found = self._assembly.scene()[0].all_hits(origins, directions, threads=threads)
-        geometry, primitive = self._ids(found.triangle)
-        return {
-            "ray_splits": found.offsets, "ray_ids": found.ray, "t_hit": found.t, "geometry_ids": geometry,
-            "primitive_ids": primitive, "primitive_uvs": np.stack([found.u, found.v], axis=-1),
-        }
+        """The hits that `count_intersections` counts: ray_splits (offsets), ray_ids, t_hit, geometry_ids, primitive_ids, primitive_uvs."""
+        found, rows, geometry, primitive, origins = self._passages(rays, nthreads)
+        kind = np.float64 if origins.dtype == np.float64 else np.float32
+        return _as(rays, {
+            "ray_splits": np.searchsorted(rows, found.offsets), "ray_ids": found.ray[rows], "t_hit": found.t[rows].astype(kind),
+            "geometry_ids": geometry[rows], "primitive_ids": primitive[rows],
+            "primitive_uvs": np.stack([found.u[rows], found.v[rows]], axis=-1),
+        })
 
     def compute_closest_points(self, query_points, nthreads=0):
         """Closest points: points, geometry_ids, primitive_ids, primitive_uvs, primitive_normals."""
         scene = self._assembly.scene()[0]
         closest = scene.closest(query_points, threads=nthreads or self._threads)
         geometry, primitive = self._ids(closest.triangle)
-        return {
+        return _as(query_points, {
             "points": closest.point, "geometry_ids": geometry, "primitive_ids": primitive,
             "primitive_uvs": np.stack([closest.u, closest.v], axis=-1),
             "primitive_normals": scene.normals(closest.instance, closest.triangle).astype(np.float32),
-        }
+        })
 
     def compute_distance(self, query_points, nthreads=0):
-        return self._assembly.scene()[0].closest(query_points, threads=nthreads or self._threads).distance
+        return _as(query_points, self._assembly.scene()[0].closest(query_points, threads=nthreads or self._threads).distance)
 
     def compute_signed_distance(self, query_points, nthreads=0, nsamples=1):
         """nsamples: one ray decides exactly; more would not change the answer."""
         _odd(nsamples)
-        return self._assembly.scene()[0].signed_distance(query_points, threads=nthreads or self._threads)
+        return _as(query_points, self._assembly.scene()[0].signed_distance(query_points, threads=nthreads or self._threads))
 
     def compute_occupancy(self, query_points, nthreads=0, nsamples=1):
         """1 for points inside, else 0."""
         _odd(nsamples)
-        return self._assembly.scene()[0].contains(query_points, threads=nthreads or self._threads).astype(np.float32)
+        inside = self._assembly.scene()[0].contains(query_points, threads=nthreads or self._threads)
+        return _as(query_points, inside.astype(np.float32))
 
     @staticmethod
     def create_rays_pinhole(*args, **named):
@@ -99,11 +152,12 @@ class RaycastingScene:
         create_rays_pinhole(intrinsic_matrix, extrinsic_matrix, width_px, height_px): by its matrices.
         create_rays_pinhole(fov_deg, center, eye, up, width_px, height_px): by where it is and looks; rows go along `up`.
         """
-        return (_rays_by_view if len(args) + len(named) > 4 else _rays_by_matrices)(*args, **named)
+        rays = (_rays_by_view if len(args) + len(named) > 4 else _rays_by_matrices)(*args, **named)
+        return _as(next((a for a in (*args, *named.values()) if hasattr(type(a), "from_numpy")), None), rays)
 
 
 def _rays_by_view(fov_deg, center, eye, up, width_px, height_px):
-    eye, center, up = (np.asarray(a, np.float64) for a in (eye, center, up))
+    eye, center, up = (np.asarray(_arrays.plain(a, "view"), np.float64) for a in (eye, center, up))
     forward = center - eye
     # As in Open3D, rows of pixels go along `up`, and columns to the left of who looks.
     left = np.cross(up, forward)
@@ -120,7 +174,8 @@ def _rays_by_view(fov_deg, center, eye, up, width_px, height_px):
 
 
 def _rays_by_matrices(intrinsic_matrix, extrinsic_matrix, width_px, height_px):
-    intrinsic, extrinsic = np.asarray(intrinsic_matrix, np.float64), np.asarray(extrinsic_matrix, np.float64)
+    intrinsic = np.asarray(_arrays.plain(intrinsic_matrix, "intrinsic_matrix"), np.float64)
+    extrinsic = np.asarray(_arrays.plain(extrinsic_matrix, "extrinsic_matrix"), np.float64)
     y, x = np.meshgrid(np.arange(height_px) + 0.5, np.arange(width_px) + 0.5, indexing="ij")
     pixels = np.stack([x, y, np.ones_like(x)], axis=-1)
     directions = pixels @ np.linalg.inv(intrinsic).T @ extrinsic[:3, :3]

@@ -4,15 +4,16 @@ import sys
 import types
 
 import numpy as np
-import trimesh
-from trimesh import caching, util
+
+try:
+    import trimesh
+    from trimesh import caching, util
+except ImportError:
+    raise ImportError("bth.trimesh needs trimesh (hint: pip install trimesh)") from None
 
 from . import _arrays
+from ._assembly import passages
 from ._compile import compile
-
-#: t is within 2^-40, so those of hits in one point are within twice that.
-_SAME = 2.0**-39
-
 
 class RayMeshIntersector:
     """Ray queries of a mesh, with the methods of trimesh's own. Answers are exact for the rays and the vertices as they are."""
@@ -50,11 +51,7 @@ class RayMeshIntersector:
         if multiple_hits:
             found = scene.all_hits(scaled, directions)
             triangles, rays = found.triangle.astype(np.int64), found.ray
-            facing = np.einsum("ij,ij->i", self.mesh.face_normals[triangles], directions[rays]) > 0
-            # Hits in one point follow one another, those from both sides in any order.
-            elsewhere = (np.diff(rays, prepend=-1) != 0) | (np.diff(found.t, prepend=-1) > _SAME * found.t)
-            _, keep = np.unique(2 * np.cumsum(elsewhere) + facing, return_index=True)
-            keep.sort()
+            keep = passages(found, lambda rows: np.einsum("ij,ij->i", self.mesh.face_normals[triangles[rows]], directions[rays[rows]]) > 0)
             triangles, rays, t = triangles[keep], rays[keep], found.t[keep]
             rank = np.arange(len(rays)) - np.searchsorted(rays, rays)
             triangles, rays, t = (a[rank < max_hits] for a in (triangles, rays, t))

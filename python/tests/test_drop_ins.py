@@ -2,10 +2,12 @@
 
 import copy
 import pickle
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from conftest import hits_by_force
+from processes import exits
 
 import bth
 from bth.embreex.mesh_construction import ElementMesh, TriangleMesh
@@ -251,3 +253,149 @@ def test_open3d_camera():
     for center, up in [([0, 0, 0], [0, 0, 1]), ([0.1, 0.2, 4.3], [-1, -2, -3]), ([0, 0, 4], [0, 1, 0]), ([0, 0, 0], [0, 0, 0])]:
         with pytest.raises(ValueError, match="up: expected"):
             RaycastingScene.create_rays_pinhole(fov_deg=60, center=center, eye=[0, 0, 4], up=up, width_px=8, height_px=4)
+
+
+# Open3D's tests of its class (test_raycasting_scene.py) run by `python/upstream/run` where open3d is installed. Their cases, in our words.
+SLANT = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0]], np.float32)
+CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float64)
+SIDES = np.array([
+    [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
+])
+
+
+class Foreign:
+    """A tensor of another package on another device, with no more than what the drop-in may use."""
+
+    device = "elsewhere"
+
+    def __init__(self, array, here=False):
+        self._array, self._here = np.asarray(array), here
+
+    @classmethod
+    def from_numpy(cls, array):
+        assert type(array) is np.ndarray and array.flags.c_contiguous
+        return cls(array, True)
+
+    def to(self, device):
+        return Foreign(self._array, device == "here")
+
+    def cpu(self):
+        return self.to("here")
+
+    def numpy(self):
+        assert self._here, "a tensor that has not been fetched"
+        return self._array
+
+    def __array__(self, *_):
+        raise TypeError("no implicit conversion")
+
+
+class Packed:
+    """A tensor that has nothing but DLPack."""
+
+    def __init__(self, array):
+        self.__dlpack__, self.__dlpack_device__ = array.__dlpack__, array.__dlpack_device__
+
+
+def tensor(rows):
+    return Foreign(np.array(rows, np.float32))
+
+
+def open3d_scene(*meshes):
+    scene = RaycastingScene(device="elsewhere")
+    assert [scene.add_triangles(*mesh) for mesh in meshes] == list(range(len(meshes)))
+    return scene
+
+
+def test_open3d_tensors_of_hits():
+    scene = open3d_scene([Foreign(SLANT), Foreign(np.array([[0, 1, 2]], np.uint32))])
+    rays = tensor([[0.2, 0.1, 1, 0, 0, -1], [10, 10, 10, 1, 0, 0]])
+    hits = scene.cast_rays(rays)
+    assert all(isinstance(part, Foreign) and not part._here for part in hits.values())
+    assert hits["geometry_ids"].cpu().numpy().tolist() == [0, scene.INVALID_ID] and hits["t_hit"].cpu().numpy().tolist() == [1, np.inf]
+    occluded = lambda **ends: scene.test_occlusions(rays, **ends).cpu().numpy().tolist()
+    assert occluded() == [True, False] and occluded(tfar=0.5) == occluded(tnear=1.5) == [False, False]
+    packed = scene.cast_rays(Packed(np.array([[0.2, 0.1, 1, 0, 0, -1]])))["t_hit"]
+    assert packed.numpy().tolist() == packed.cpu().clone().tolist() == [1] and packed[0].item() == 1 and packed.isfinite().all()
+    assert packed[0].cpu().numpy().shape == () and not packed.isinf().any() and not packed.isnan().any()
+
+
+def test_open3d_counts_and_lists():
+    mesh = SimpleNamespace(vertex={"positions": Foreign(CUBE)}, triangle={"indices": Foreign(SIDES)})
+    legacy = SimpleNamespace(vertices=CUBE, triangles=SIDES)
+    # Through the diagonals of sides, where two triangles are hit.
+    rays = tensor([[0.5, 0.5, -1, 0, 0, 1], [0.5, 0.5, 0.5, 0, 0, 1], [10, 10, 10, 1, 0, 0]])
+    for scene in (open3d_scene([mesh]), open3d_scene([legacy]), open3d_scene([Foreign(CUBE), Foreign(SIDES)])):
+        assert scene.count_intersections(rays).cpu().numpy().tolist() == [2, 1, 0]
+        np.testing.assert_allclose(scene.list_intersections(rays)["t_hit"].cpu().numpy(), [1, 2, 0.5], rtol=1e-6)
+
+
+def test_open3d_counts_each_surface_and_side():
+    scene = open3d_scene([CUBE, SIDES], [CUBE, SIDES], [SLANT, [[0, 1, 2], [0, 2, 1]]])
+    found = scene.list_intersections([[0.25, 0.25, -1, 0, 0, 1]])
+    assert found["t_hit"].tolist() == [1] * 4 + [2] * 2 and sorted(found["geometry_ids"][:4].tolist()) == [0, 1, 2, 2]
+    assert found["geometry_ids"][4:].tolist() == [0, 1] and found["ray_splits"].tolist() == [0, 6]
+
+
+def test_open3d_points():
+    scene = open3d_scene([SLANT, [[0, 1, 2]]])
+    closest = scene.compute_closest_points(tensor([[0.2, 0.1, 1], [10, 10, 10]]))
+    for name in ("geometry_ids", "primitive_ids"):
+        assert closest[name].cpu().numpy().tolist() == [0, 0]
+    np.testing.assert_allclose(closest["points"].cpu().numpy(), [[0.2, 0.1, 0], [1, 1, 0]], rtol=1e-6)
+    cube, points = open3d_scene([CUBE, SIDES]), tensor([[0.5, 0.5, 0.5], [-0.5, -0.5, -0.5], [0, 0, 0]])
+    np.testing.assert_allclose(cube.compute_distance(points).cpu().numpy(), [0.5, np.sqrt(0.75), 0])
+    np.testing.assert_allclose(cube.compute_signed_distance(points).cpu().numpy(), [-0.5, np.sqrt(0.75), 0])
+    assert cube.compute_occupancy(points).cpu().numpy().tolist()[:2] == [1, 0]
+
+
+@pytest.mark.parametrize("shape", [(11,), (1, 2, 3), (32, 14)])
+def test_open3d_shapes(shape):
+    scene, random = open3d_scene([CUBE, SIDES]), np.random.default_rng(1)
+    rays, points = (random.uniform(size=(*shape, count)).astype(np.float32) for count in (6, 3))
+    for found in (scene.count_intersections(rays), scene.compute_distance(points), scene.compute_signed_distance(points), scene.compute_occupancy(points)):
+        assert found.shape == shape
+    last = {"primitive_uvs": (2,), "primitive_normals": (3,), "points": (3,)}
+    for name, part in [*scene.cast_rays(rays).items(), *scene.compute_closest_points(points).items()]:
+        assert part.shape == (*shape, *last.get(name, ())), name
+    total = int(scene.count_intersections(rays).numpy().sum())
+    for name, part in scene.list_intersections(rays).items():
+        assert part.shape == ((np.prod(shape) + 1,) if name == "ray_splits" else (total, *last.get(name, ()))), name
+
+
+def test_open3d_occupancy_next_to_vertices(mesh):
+    """Points whose rays along the axes meet vertices and edges of a sphere."""
+    scene = open3d_scene([mesh[0] * np.float32(0.8), mesh[1]])
+    axis = np.linspace(-0.88, 0.88, 6)
+    points = np.stack(np.meshgrid(axis, axis, axis), axis=-1)
+    radius = np.linalg.norm(points, axis=-1)
+    inside = scene.compute_occupancy(points)
+    assert inside[radius < 0.75].all() and not inside[radius > 0.8].any()
+
+
+def test_open3d_many_rays():
+    scene, random = open3d_scene([CUBE, SIDES]), np.random.default_rng(2)
+    rays = tensor(random.uniform(size=(200_000, 6)))
+    hits, count = scene.cast_rays(rays), scene.count_intersections(rays).cpu().numpy()
+    assert ((count > 0) == scene.test_occlusions(rays).cpu().numpy()).all() and count.all()
+    assert np.isfinite(hits["t_hit"].cpu().numpy()).all() and len(scene.list_intersections(rays)["t_hit"].cpu().numpy()) == count.sum()
+
+
+def test_modules_are_attributes():
+    code = """
+        import sys, bth
+        assert not {"bth.open3d", "bth.embreex", "bth.trimesh", "bth.bake"} & set(sys.modules)
+        assert {"bake", "embreex", "open3d"} <= set(dir(bth))
+        assert bth.open3d.RaycastingScene and bth.embreex.rtcore_scene.EmbreeScene and bth.bake.sdf
+        assert "trimesh" not in dir(bth) or bth.trimesh.RayMeshIntersector
+        try: bth.embree
+        except AttributeError as error: assert "embree" in str(error)
+        else: sys.exit("no error")
+        sys.modules["trimesh"] = None
+        for name in [name for name in sys.modules if name.startswith("bth.trimesh")]: del sys.modules[name]
+        vars(bth).pop("trimesh", None)
+        try: bth.trimesh
+        except ImportError as error: assert "pip install trimesh" in str(error)
+        else: sys.exit("no error")
+    """
+    assert exits(code) == 0

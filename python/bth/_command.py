@@ -5,6 +5,7 @@ import json
 import re
 import sys
 import traceback
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
@@ -54,6 +55,18 @@ def exit_code_of(error: BaseException) -> tuple[str, int, str]:
 def run(parser: Parser, arguments: Sequence[str]) -> int:
     """Parses arguments, calls the command's function `run`, and returns the exit code. Errors are printed, with --json as an object, too."""
     wants_json = "--json" in arguments
+    quiet = "--quiet" in arguments or "-q" in arguments
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore" if quiet else "always")
+        warnings.showwarning = _show_warning
+        return _run(parser, arguments, wants_json)
+
+
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    print(f"warning: {message}", file=sys.stderr)
+
+
+def _run(parser: Parser, arguments: Sequence[str], wants_json: bool) -> int:
     try:
         parsed = parser.parse_args(arguments)
         command: Callable[[argparse.Namespace], None] = parsed.run

@@ -217,3 +217,49 @@ def test_the_same_bits_with_other_instructions(folder):
             subprocess.run(arguments, check=True, env={**os.environ, **environment}, stderr=subprocess.DEVNULL)
             results.append((folder / f"{command[0]}.npy").read_bytes())
     assert results[:2] == results[2:] and len(set(np.load("ao.npy"))) > 3
+
+
+def test_what_is_told_of_a_room(folder, capsys):
+    vertices, faces = sphere()
+    x, y, z = vertices.T
+    bth.bake.write_ply("room.ply", {"x": x, "y": y, "z": z}, faces[:, ::-1])
+    code, _, err = call(capsys, "ao", "room.ply", "-o", "room-ao.ply", "--rays", "4")
+    assert code == 0 and err.startswith("warning: nearly everything is black") and err.count("\n") == 1
+    assert "--distance) counts near occluders only, such as 0.4 of a room's 2" in err and "--side both" in err
+    for options in (["--distance", "0.1"], ["--side", "both"], ["--quiet"]):
+        assert call(capsys, "ao", "room.ply", "-o", "room-ao.ply", "--rays", "4", *options)[::2] == (0, "")
+
+
+def test_a_picture_from_inside(folder, capsys):
+    vertices, faces = sphere()
+    x, y, z = vertices.T
+    bth.bake.write_ply("room.ply", {"x": 3 * x, "y": y, "z": z}, faces[:, ::-1])
+    options = ["--rays", "4", "--distance", "0.5", "--size", "64x48", "--quiet", "--picture"]
+    assert call(capsys, "ao", "room.ply", *options, "in.png", "--inside")[::2] == (0, "")
+    assert call(capsys, "ao", "room.ply", *options, "out.png")[::2] == (0, "")
+    background = np.asarray(Image.open("out.png"))[0, 0]
+    inside, outside = (np.asarray(Image.open(name))[:48] for name in ("in.png", "out.png"))
+    assert not (inside == background).all(axis=-1).any() and (outside == background).all(axis=-1).any()
+    code, _, err = call(capsys, "ao", "room.ply", *options, "in.png", "--inside", "--camera", "0,0,0,1,0,0")
+    assert code == 2 and "--inside" in err
+
+
+def test_positions_far_from_the_origin_are_written_in_double_precision(folder, capsys):
+    vertices, faces = sphere()
+    x, y, z = vertices.T.astype(np.float64) + [[5e6], [5e6], [0]]
+    bth.bake.write_ply("far.ply", {"x": x, "y": y, "z": z}, faces)
+    assert call(capsys, "ao", "far.ply", "-o", "far-ao.ply", "--rays", "4", "--quiet") == (0, "", "")
+    assert b"property double x" in open("far-ao.ply", "rb").read(400)
+    written = bth.compile("far-ao.ply", cache=False)
+    assert sorted(written.vertices().tolist()) == sorted(np.stack([x, y, z], axis=-1).tolist())
+    assert call(capsys, "ao", "ball.ply", "-o", "ball-ao.ply", "--rays", "4", "--quiet") == (0, "", "")
+    assert b"property float x" in open("ball-ao.ply", "rb").read(400)
+
+
+def test_what_is_told_of_open_surfaces(folder, capsys):
+    vertices, faces = sphere()
+    x, y, z = vertices.T
+    bth.bake.write_ply("bowl.ply", {"x": x, "y": y, "z": z}, faces[4:])
+    code, out, err = call(capsys, "sdf", "bowl.ply", "-o", "bowl.npz", "--resolution", "4", "--json")
+    assert code == 0 and err.startswith("warning: object 0 is not closed") and err.count("\n") == 1 and not json.loads(out)["closed"]
+    assert call(capsys, "sdf", "bowl.ply", "-o", "bowl.npz", "--resolution", "4", "--quiet") == (0, "", "")

@@ -5,12 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._scene import Scene
 from ._arithmetic import Floats, dot, unit
 
 #: Sine of the angle between two unit vectors below which their rounding decides its direction.
 STRAIGHT = 1e-9
 #: Share of the width or height of the picture that a model fills.
 _FILLED = 0.9
+#: Shares of a low-discrepancy sequence in three dimensions (R3).
+_STEPS = np.array([0.8191725133961645, 0.6710436067037893, 0.5497004779019703])
 UP = {"x": np.array([1.0, 0.0, 0.0]), "y": np.array([0.0, 1.0, 0.0]), "z": np.array([0.0, 0.0, 1.0])}
 
 
@@ -64,6 +67,25 @@ class Camera:
         distance, shift = float(((high + low) / (2 * tangents)).max()), (high - low) / 2
         eye = center + camera.right * shift[0] + camera.up * shift[1] - camera.forward * distance
         return Camera(eye, camera.right, camera.up, camera.forward, camera.half / zoom, size)
+
+    @staticmethod
+    def inside(scene: Scene, up: str, size: tuple[int, int], field: float = 60.0, zoom: float = 1.0) -> "Camera":
+        """A camera inside of a room: where most directions end at a surface, far from the nearest, with a view of the deepest corner."""
+        low, high = (np.zeros(3), np.zeros(3)) if scene.bounds is None else scene.bounds.astype(np.float64)
+        # Evenly spread, in height between a quarter and six tenths, as the eyes of who stands in a room.
+        shares = (np.arange(1, 257)[:, None] * _STEPS) % 1.0 * 0.8 + 0.1
+        shares[:, np.argmax(UP[up])] = 0.25 + 0.35 * (shares[:, np.argmax(UP[up])] - 0.1) / 0.8
+        eyes = low + shares * (high - low)
+        heights, turns = (np.arange(64) + 0.5) / 32 - 1, np.arange(64) * math.pi * (3 - math.sqrt(5))
+        around = np.sqrt(1 - heights**2)
+        directions = np.stack([around * np.cos(turns), around * np.sin(turns), heights], axis=-1)
+        enclosed = scene.any(eyes[:, None], directions).mean(axis=1)
+        best = int(np.lexsort((scene.closest(eyes).distance, np.round(enclosed * 8)))[-1])
+        level = directions - dot(directions, UP[up])[:, None] * UP[up] * 0.8
+        t = scene.nearest(eyes[best], level).t
+        forward = level[int(np.argmax(np.where(np.isfinite(t), t, 0)))]
+        camera = Camera.looking(eyes[best], forward, UP[up], size, field)
+        return Camera(camera.eye, camera.right, camera.up, camera.forward, camera.half / zoom, size)
 
     def directions(self, x: Floats, y: Floats) -> Floats:
         """Directions (..., 3) through places of the picture in pixels, from its upper left corner."""

@@ -1,5 +1,7 @@
 """A spinning laser scanner with several beams."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 
@@ -39,7 +41,7 @@ class LidarScan:
 
 
 def lidar(
-    scene: Scene, poses: ArrayLike, *, elevations: ArrayLike = tuple(np.linspace(-25.0, 15.0, 32)), columns: int = 1024,
+    scene: Scene, poses: ArrayLike, *, elevations: ArrayLike | None = None, columns: int = 1024,
     nearest: float = 0.0, farthest: float = math.inf, noise: float = 0.0, seed: int = 0,
     threads: int | None = None, progress: Progress | None = None,
 ) -> LidarScan:
@@ -49,7 +51,7 @@ def lidar(
       (3,) or (revolutions, 3): positions in world space, with the scanner's z axis that of the world;
       (4, 4) or (revolutions, 4, 4): rigid transforms from the scanner to world space;
       (revolutions, columns, 4, 4): one for each column, for a scanner that moves while it spins; see `poses_along`.
-    elevations: angles of the beams above the scanner's xy plane, in degrees.
+    elevations: angles of the beams above the scanner's xy plane, in degrees; by default 32 from -25 to 15.
     columns: directions of one revolution, counter-clockwise about the scanner's z axis from its x axis.
     nearest, farthest: the range of the scanner in world units. What is nearer than `nearest` is looked through.
     noise: standard deviation of the ranges in world units, normally distributed and independent. The same seed gives the same noise.
@@ -61,6 +63,7 @@ def lidar(
         raise ValueError(f"noise: expected a number from 0, got {noise}")
     if columns < 1:
         raise ValueError(f"columns: expected at least 1, got {columns}")
+    elevations = np.linspace(-25.0, 15.0, 32) if elevations is None else elevations
     angles = np.atleast_1d(np.asarray(_arrays.plain(elevations, "elevations"), np.float64))
     if angles.ndim != 1 or not (np.abs(angles) <= 90).all():
         raise ValueError("elevations: expected degrees from -90 to 90")

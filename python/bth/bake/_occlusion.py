@@ -1,6 +1,9 @@
 """Ambient occlusion."""
 
+from __future__ import annotations
+
 import math
+import warnings
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +13,8 @@ from ._progress import Progress, chunks
 from ._sampling import hemisphere
 from ._surface import SurfacePoints, at_vertices
 
+#: Mean openness below which a bake shows nothing.
+_BLACK = 0.01
 SIDES = {"front": (1,), "back": (-1,), "both": (1, -1)}
 
 
@@ -50,4 +55,15 @@ def ambient_occlusion(
             blocked = scene.any(None, directions, tmax=distance, start=start, threads=threads)
             open_rays.append((leaves & ~blocked).sum(axis=1))
         result[points] = np.maximum.reduce(open_rays) / np.float64(rays)
+    if len(usable) and np.nanmean(result, dtype=np.float64) < _BLACK:
+        _warn_of_black(at, distance, side)
     return result
+
+
+def _warn_of_black(at: SurfacePoints, distance: float, side: str) -> None:
+    """Says why everything is black: in a closed room nothing sees the sky."""
+    size = float(np.ptp(at.position, axis=0).max())
+    hints = [] if math.isfinite(distance) else [f"distance (--distance) counts near occluders only, such as {0.2 * size:.2g} of a room's {size:.2g}"]
+    hints += [] if side == "both" else ["side='both' (--side both) takes the more open side of triangles"]
+    hint = f" (hint: {'; '.join(hints)})" if hints else ""
+    warnings.warn(f"nearly everything is black, as inside of a closed room, where no sky is seen{hint}", UserWarning, stacklevel=3)

@@ -25,7 +25,7 @@ def pillow():
     try:
         from PIL import Image
     except ImportError:
-        raise ImportError("pictures and textures are written by Pillow (hint: pip install pillow, or pip install './python[bake]')") from None
+        raise ImportError("pictures and textures are written by Pillow (hint: pip install pillow)") from None
     return Image
 
 

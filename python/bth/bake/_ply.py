@@ -1,13 +1,21 @@
 """Writes PLY files: meshes and point clouds with any properties."""
 
+from __future__ import annotations
+
 import os
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .. import _arrays
 from ._files import write_whole
 
 _TYPES = {"f4": "float", "f8": "double", "u1": "uchar", "i4": "int", "u4": "uint"}
+
+
+def coordinates(points: NDArray[np.float64]) -> NDArray[np.floating]:
+    """The columns x, y and z (3, n) of points (n, 3): float32, or float64 where float32 would move a point by more than 2^-24 of their size."""
+    return (points if _arrays.moved_by_rounding(points) is not None else points.astype(np.float32)).T
 
 
 def write_ply(

@@ -1,5 +1,7 @@
 """Visibility between points, and what is seen from points of a terrain."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

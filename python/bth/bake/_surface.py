@@ -1,5 +1,7 @@
 """Meshes of scenes in world space, and points on surfaces where rays start."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -133,7 +135,7 @@ class FacesAround:
     normal: Floats
 
     @staticmethod
-    def of(counts: NDArray[np.int64], instance, triangle, u, v, normal) -> "FacesAround":
+    def of(counts: NDArray[np.int64], instance, triangle, u, v, normal) -> FacesAround:
         """Adds the last row, given the number of faces around each point."""
         first = np.append([0], np.cumsum(counts))
         instance, triangle = (np.append(rows, np.uint32(NONE)) for rows in (instance, triangle))

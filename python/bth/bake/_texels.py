@@ -1,5 +1,8 @@
 """Texels of a texture as points on a surface."""
 
+from __future__ import annotations
+
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,6 +105,10 @@ def at_texels(scene: Scene, width: int, height: int, uv: Floats | None = None, *
     nearest = found.offsets[:-1][counts > 0]
     faces, u, v = face_of[found.triangle[nearest]], found.u[nearest].astype(np.float64), found.v[nearest].astype(np.float64)
     shared = _overlaps(found, counts)
+    if shared:
+        message = f"{shared} of {len(rows)} texels lie within several triangles, and the triangle of the lowest index has them"
+        hint = "hint: a bake needs texture coordinates that use each texel once, as a lightmap's"
+        warnings.warn(f"{message} ({hint})", UserWarning, stacklevel=2)
     return Texels(_points(scene, mesh, faces, u, v), rows, columns, (height, width), shared)
 
 

@@ -1,5 +1,7 @@
 """Thickness of solids."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

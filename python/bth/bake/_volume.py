@@ -1,5 +1,7 @@
 """Signed distances on a grid."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 
@@ -45,8 +47,9 @@ def sdf(
     box: (2, 3), lower and upper end in world space, in place of the scene's own box; the margin is added to it as well.
     threads, progress: see `bth.compile`.
 
-    The points are rounded to float32; the distance of the rounded point is exact to 0.55 units in the last place (docs/accuracy.md). The sign
-    is exact for closed surfaces. Surfaces that are not closed have no inside: see docs/inside.md, and `WorldMesh.closed`.
+    The points are rounded to float32 where that moves none by more than 2^-24 of the grid's longest side; elsewhere they are float64. The
+    distance of the point is exact to 0.55 units in the last place (docs/accuracy.md). The sign is exact for closed surfaces. For others
+    there is a bth.OpenMeshWarning: they have no inside (docs/inside.md).
     """
     if resolution < 2:
         raise ValueError(f"resolution: expected at least 2, got {resolution}")
@@ -56,19 +59,21 @@ def sdf(
         raise lacks_surface()
     low, high = _box(scene.bounds if box is None else box)
     longest = float((high - low).max())
-    low, high = low - margin * longest, high + margin * longest
-    spacing = float((high - low).max()) / (resolution - 1)
+    sides = high - low + 2 * margin * longest
+    spacing = float(sides.max()) / (resolution - 1)
     # A side that is a whole number of spacings long is not to lose its last point to rounding: hence the relative 2^-40.
-    counts = [max(2, math.floor(side / spacing * (1 + 2.0**-40)) + 1) for side in high - low]
+    counts = [max(2, math.floor(side / spacing * (1 + 2.0**-40)) + 1) for side in sides]
     if math.prod(counts) > MOST_VALUES:
         size = "x".join(map(str, counts))
         raise ValueError(f"resolution: {size} points are more than the {MOST_VALUES} that a volume may have; take a lower resolution")
     # What a side has too much or too little is shared out to both ends.
     origin = 0.5 * (low + high) - 0.5 * spacing * (np.array(counts) - 1)
     volume = Volume(np.empty(counts, np.float32), origin, spacing)
+    moved = max(np.abs(axis.astype(np.float32) - axis).max() for axis in map(volume.axis, range(3)))
+    kind = np.float64 if moved > 2.0**-24 * sides.max() else np.float32
     x, (y, z) = volume.axis(0), np.meshgrid(volume.axis(1), volume.axis(2), indexing="ij")
     for part in chunks(counts[0], counts[1] * counts[2], "signed distance", progress):
-        slab = np.empty((len(x[part]), *y.shape, 3), np.float32)
+        slab = np.empty((len(x[part]), *y.shape, 3), kind)
         slab[..., 0], slab[..., 1], slab[..., 2] = x[part, None, None], y, z
         volume.distance[part] = scene.signed_distance(slab, threads=threads)
     return volume

@@ -89,6 +89,7 @@ def add_parser(commands: Any, name: str, text: str, run: Callable[[argparse.Name
     picture.add_argument("--pitch", type=number(-90, high=90), default=25.0, metavar="DEGREES", help="above the horizon (25)")
     picture.add_argument("--zoom", type=number(above=0), default=1.0, metavar="FACTOR", help="magnification (1)")
     picture.add_argument("--camera", type=numbers(6), metavar="EX,EY,EZ,TX,TY,TZ", help="eye and target, in place of yaw and pitch")
+    picture.add_argument("--inside", action="store_true", help="from a place inside of the model, for rooms")
     picture.add_argument("--fov", type=number(above=0, high=170), metavar="DEGREES", help="vertical field of view")
     picture.add_argument("--up", choices=["y", "z"], default="y", help="the axis of the model that points up (y)")
     return parser
@@ -137,6 +138,10 @@ class Job:
         """The camera that the options name, by default one that frames points in world space."""
         options = self.arguments
         field = options.fov or field
+        if options.inside and options.camera is not None:
+            raise Usage("--inside: expected either this or --camera, got both")
+        if options.inside:
+            return Camera.inside(self.scene, options.up, options.size, options.fov or 60.0, options.zoom)
         if options.camera is None:
             return Camera.around(points, options.yaw, options.pitch, options.up, options.size, field, options.zoom)
         eye, target = options.camera[:3], options.camera[3:]

@@ -8,7 +8,7 @@ from .._colors import colors, quantized
 from .._errors import lacks_surface
 from .._files import write_whole
 from .._picture import Seen
-from .._ply import write_ply
+from .._ply import coordinates, write_ply
 from .._surface import WorldMesh
 
 
@@ -17,7 +17,7 @@ def write_values(path: str, mesh: WorldMesh, name: str, values: NDArray[np.float
     if path.lower().endswith(".npy"):
         write_whole(path, lambda file: np.save(file, values, allow_pickle=False))
         return
-    x, y, z = (mesh.vertices[:, k].astype(np.float32) for k in range(3))
+    x, y, z = coordinates(mesh.vertices)
     red, green, blue = quantized(color).T
     columns = {"x": x, "y": y, "z": z, "red": red, "green": green, "blue": blue, name: values}
     write_ply(path, columns, mesh.faces, "baked by bth")

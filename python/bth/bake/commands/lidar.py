@@ -10,7 +10,7 @@ from .._arithmetic import Floats
 from .._colors import VIRIDIS, colors, quantized, scale
 from .._lidar import LidarScan, lidar, poses_along
 from .._picture import draw_points, save, with_color_bar
-from .._ply import write_ply
+from .._ply import coordinates, write_ply
 from .._progress import Bar
 from ._options import Job, add_parser, number, numbers, whole
 
@@ -74,7 +74,7 @@ def _poses(job: Job) -> Floats:
 def _write(path: str, scan: LidarScan, color: Any) -> None:
     hit = scan.hit
     revolution, column, beam = np.nonzero(hit)
-    x, y, z = (scan.point[hit][:, k].astype(np.float32) for k in range(3))
+    x, y, z = coordinates(scan.point[hit])
     red, green, blue = color.T
     columns = {
         "x": x, "y": y, "z": z, "red": red, "green": green, "blue": blue, "range": scan.range[hit],

@@ -1,7 +1,6 @@
 """python -m bth sdf: signed distances on a grid."""
 
 import argparse
-import sys
 from typing import Any
 
 import numpy as np
@@ -51,14 +50,11 @@ def _run(arguments: argparse.Namespace) -> None:
             _write(arguments.output, volume)
         if arguments.picture:
             _draw(job, volume)
-    closed = mesh.closed()
-    if not closed and not arguments.quiet:
-        print("warning: the surface is not closed, so inside and outside are those of rays along an axis (docs/inside.md)", file=sys.stderr)
     shape, distance = volume.distance.shape, volume.distance
     job.finish(
         f"{'x'.join(map(str, shape))} points, {volume.spacing:.4g} apart, from {distance.min():.4g} to {distance.max():.4g}", shape=shape,
         origin=volume.origin, spacing=volume.spacing, least=distance.min(), greatest=distance.max(),
-        points_inside=int((distance < 0).sum()), closed=closed,
+        points_inside=int((distance < 0).sum()), closed=mesh.closed(),
     )
 
 

@@ -11,6 +11,9 @@ from . import _meshes, _native, _threads
 from ._ray_queries import rays_and_shape
 from ._scene import Scene
 
+_PATH = (str, bytes, os.PathLike)
+#: Of a name in a compiled file.
+_MOST_BYTES = 4096
 #: Options that only files of glTF have a use for.
 _GLTF = ("flatten", "scene", "animation", "rate", "at_rest", "rigid_parts", "strict")
 
@@ -48,7 +51,7 @@ def compile(
     triangle meet nothing, and up to which distance.
     """
     options = {name: value for name, value in locals().items() if name != "model" and value is not None}
-    if isinstance(model, (str, bytes, os.PathLike)):
+    if isinstance(model, _PATH):
         path = os.fsdecode(model)
         os.stat(path)
         return Scene(_native.compile_path(path, _checked(options)))
@@ -58,17 +61,21 @@ def compile(
     if _meshes.is_scene(model):
         if "rays" in options:
             raise ValueError("rays: an option for one model, got a scene")
-        return compile_scene(*_meshes.parts_of_scene(model), **options)
+        *parts, mesh_names, instance_names = _meshes.parts_of_scene(model)
+        return compile_scene(*parts, mesh_names=mesh_names, instance_names=instance_names, **options)
     vertices, faces = _meshes.triangles_of(model)
     return Scene(_native.compile_mesh(vertices, faces, _checked(options)))
 
 
-def compile_scene(meshes, instances=None, transforms=None, **options):
+def compile_scene(meshes, instances=None, transforms=None, *, mesh_names=None, instance_names=None, **options):
     """Compiles a scene of instances of meshes and returns it.
 
     meshes: a list of pairs (vertices, faces) or of meshes, each as for `compile`.
-    instances: for each instance the row of its mesh, (n,) integers; by default each mesh has one.
+    instances: for each instance the row of its mesh, (n,) integers; by default each mesh has one, and a single mesh as many as there are
+    transforms.
     transforms: for each instance the matrix from its mesh's space to world space, which is applied to columns: (n, 4, 4), (n, 3, 4), or one for all.
+    mesh_names, instance_names: a str for each mesh and for each instance, which the scene keeps: see `Scene.object_names`,
+    `Scene.instance_names` and `Hits.instance_name`.
     options: those of `compile` that are not about glTF files.
 
     Instance i of the scene is row i of instances. Meshes without instance are left out and equal ones are stored once, so objects may be fewer than meshes:
@@ -78,14 +85,31 @@ def compile_scene(meshes, instances=None, transforms=None, **options):
         if name not in _OPTIONS:
             raise TypeError(f"compile_scene() got an unexpected keyword argument '{name}'")
     options = {name: value for name, value in options.items() if value is not None}
+    if mesh_names is not None:
+        options.setdefault("names", True)
     if hasattr(meshes, "vertices") or hasattr(meshes, "points"):
         raise TypeError(f"meshes: expected a list of meshes, got a {type(meshes).__name__}")
-    meshes = list(meshes)
-    if any(isinstance(mesh, (str, bytes, os.PathLike)) for mesh in meshes):
-        raise TypeError("meshes: expected meshes in memory, got a path: scenes of files are manifests (format-spec/scene-manifest.md)")
+    for path in [meshes] if isinstance(meshes, _PATH) else (meshes := list(meshes)):
+        if isinstance(path, _PATH):
+            hint = "hint: bth.compile takes the path of one model; a scene of several files is a manifest, see docs/scenes.md"
+            raise TypeError(f"meshes: expected meshes in memory, got the path {os.fsdecode(path)!r} ({hint})")
     parts = [_meshes.triangles_of(mesh) for mesh in meshes]
     instances, transforms = _meshes.places_of(instances, transforms, len(parts))
-    return Scene(_native.compile_scene(parts, instances, transforms, _checked(options)))
+    names = _names(mesh_names, len(parts), "mesh_names"), _names(instance_names, len(instances), "instance_names")
+    return Scene(_native.compile_scene(parts, instances, transforms, names, _checked(options)))
+
+
+def _names(names, count, name):
+    """Names of `count` things, or None."""
+    if names is None:
+        return None
+    names = list(names)
+    if len(names) != count or not all(isinstance(one, str) for one in names):
+        raise ValueError(f"{name}: expected {count} str, got {len(names)} of {', '.join(sorted({type(one).__name__ for one in names}))}")
+    for one in names:
+        if len(one.encode()) > _MOST_BYTES:
+            raise ValueError(f"{name}: expected at most {_MOST_BYTES} bytes, got {one[:40]!r}…")
+    return names
 
 
 _OPTIONS = frozenset(inspect.signature(compile).parameters) - {"model", "rays", *_GLTF}

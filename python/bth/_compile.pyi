@@ -28,6 +28,7 @@ def compile(
 ) -> Scene: ...
 def compile_scene(
     meshes: Iterable[Any], instances: ArrayLike | None = None, transforms: ArrayLike | None = None, *,
+    mesh_names: Iterable[str] | None = None, instance_names: Iterable[str] | None = None,
     output: str | bytes | PathLike[str] | PathLike[bytes] | None = None, quality: Literal["fast", "balanced", "best"] | None = None,
     structure: Literal["bth", "bvh", "tets"] | None = None, coordinates: Literal["f32", "21", "16", 21, 16] | None = None,
     max_error: float | str | None = None,

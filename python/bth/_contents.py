@@ -63,21 +63,46 @@ class Contents:
 
     def vertices(self, obj=0):
         """Distinct positions of an object, (n, 3) in the space of the object: float32, or float64 where the file keeps that."""
-        return self._native.geometry(_index(obj, "obj"))[0]
+        return _arrays.read_only(self._native.geometry(_index(obj, "obj"))[0])
 
     def triangles(self, obj=0):
         """For each triangle of an object its rows of `vertices`, (m, 3) uint32."""
-        return self._native.geometry(_index(obj, "obj"))[1]
+        return _arrays.read_only(self._native.geometry(_index(obj, "obj"))[1])
 
     def texture_coordinates(self, obj=0):
         """Texture coordinates of the corners of an object's triangles, (m, 3, 2) float32 as the source has them; None where the scene
         keeps none (`attributes='all'` of `bth.compile` keeps them)."""
-        return _native.texture_coordinates(self._native, _index(obj, "obj"))
+        coordinates = _native.texture_coordinates(self._native, _index(obj, "obj"))
+        return None if coordinates is None else _arrays.read_only(coordinates)
 
     @property
     def triangle_counts(self):
         """For each object its number of triangles."""
-        return np.array(self._native.facts()["triangles"], np.int64)
+        return _arrays.read_only(np.array(self._native.facts()["triangles"], np.int64))
+
+    # Closed surfaces.
+
+    @property
+    def is_closed(self):
+        """Whether all visible objects are closed; None where the file keeps no triangles."""
+        closed = [self.is_object_closed(obj) for obj in self._visible_objects()]
+        return False if False in closed else None if None in closed else True
+
+    def is_object_closed(self, obj=0):
+        """Whether an object's surface has no boundary, so that it has an inside: whether each edge has as many triangles in one direction
+        as in the other. Vertices at one place count as one. None where the file keeps no triangles. Answers are kept, except for deformable
+        objects."""
+        obj = _index(obj, "obj")
+        if obj not in self._closed:
+            closed = self._native.is_closed(obj)
+            if self._native.vertex_count(obj) is not None:
+                return closed
+            self._closed[obj] = closed
+        return self._closed[obj]
+
+    def _visible_objects(self):
+        _, objects, visible = self._native.placements()
+        return sorted({obj for obj, seen in zip(objects, visible) if seen})
 
     # Bounds: lower and upper end of a box, (2, 3) float32; None where there is nothing that can be hit.
 
@@ -98,22 +123,23 @@ class Contents:
 
     @property
     def transforms(self):
-        """For each instance the transform from its object's space to world space at the scene's time, (n, 4, 4) float64."""
+        """For each instance the transform from its object's space to world space at the scene's time, (n, 4, 4) float64. `set_transforms`
+        sets them."""
         rows = self._native.placements()[0]
         matrices = np.zeros((len(rows), 4, 4))
         matrices[:, :3] = rows
         matrices[:, 3, 3] = 1
-        return matrices
+        return _arrays.read_only(matrices)
 
     @property
     def objects_of_instances(self):
-        """For each instance the index of its object."""
-        return np.array(self._native.placements()[1], np.uint32)
+        """For each instance the index of its object; bth.NONE for a removed one."""
+        return _arrays.read_only(np.array(self._native.placements()[1], np.uint32))
 
     @property
     def visible(self):
-        """For each instance whether rays can hit it at the scene's time."""
-        return np.array(self._native.placements()[2], bool)
+        """For each instance whether rays can hit it at the scene's time. `set_visible` hides and shows instances."""
+        return _arrays.read_only(np.array(self._native.placements()[2], bool))
 
     # Names.
 
@@ -154,11 +180,11 @@ class Contents:
     @property
     def instance_masks(self):
         """For each instance its mask, uint32: all bits are set unless `set_instance_mask` was called."""
-        return np.array(_native.instance_masks(self._native), np.uint32)
+        return _arrays.read_only(np.array(_native.instance_masks(self._native), np.uint32))
 
     def group_masks(self, obj=0):
         """For each group of an object's triangles its mask, uint32: all bits are set unless `set_group_mask` was called."""
-        return np.array(_native.group_masks(self._native, _index(obj, "obj")), np.uint32)
+        return _arrays.read_only(np.array(_native.group_masks(self._native, _index(obj, "obj")), np.uint32))
 
     def set_instance_mask(self, instance, mask):
         """Sets the mask of an instance, 32 bits: rays whose `mask` has no bit in common with it pass. Waits for the queries of other threads."""
@@ -176,4 +202,4 @@ class Contents:
 
 
 def _box(bounds):
-    return None if bounds is None else np.array(bounds, np.float32)
+    return None if bounds is None else _arrays.read_only(np.array(bounds, np.float32))

@@ -84,6 +84,11 @@ class _OnTriangles:
         return _named(self._scene.object_names, self.object)
 
     @property
+    def instance_name(self):
+        """Names of the instances, an array of str; empty for a miss and where there is none."""
+        return _named(self._scene.instance_names, self.instance)
+
+    @property
     def group_name(self):
         """Names of the groups, an array of str; empty for a miss and where there is none."""
         return self._named_in_objects(self._scene.group_names, self.group)

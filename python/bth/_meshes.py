@@ -86,18 +86,24 @@ def is_scene(model):
 
 
 def parts_of_scene(scene):
-    """Meshes, and for each instance its mesh and its transform, of a scene of trimesh."""
+    """Meshes, for each instance its mesh and its transform, and names of meshes and instances, of a scene of trimesh."""
     meshes = list(scene.geometry.values())
     row = {name: row for row, name in enumerate(scene.geometry)}
-    placed = [scene.graph[node] for node in scene.graph.nodes_geometry]
+    nodes = list(scene.graph.nodes_geometry)
+    placed = [scene.graph[node] for node in nodes]
     instances = np.array([row[name] for _, name in placed], np.int64)
     transforms = np.array([matrix for matrix, _ in placed], np.float64).reshape(-1, 4, 4)
-    return meshes, instances, transforms
+    return meshes, instances, transforms, [str(name) for name in row], [str(node) for node in nodes]
 
 
 def places_of(instances, transforms, meshes):
     """Rows of meshes (n,) uint32 and matrices (n, 3, 4) float64, contiguous, of instances of so many meshes."""
-    instances = np.arange(meshes) if instances is None else _arrays.plain(instances, "instances")
+    if instances is None:
+        count = len(transforms) if np.ndim(transforms) == 3 else meshes
+        if count != meshes and meshes != 1:
+            raise ValueError(f"transforms: got {count} for {meshes} meshes (hint: instances= says of which mesh each one is an instance)")
+        instances = np.zeros(count, np.uint32) if meshes == 1 else np.arange(meshes)
+    instances = _arrays.plain(instances, "instances")
     if instances.size == 0 and instances.ndim <= 1:
         instances = np.zeros(0, np.uint32)
     if instances.dtype.kind not in "iu":
@@ -107,19 +113,24 @@ def places_of(instances, transforms, meshes):
     if instances.size and (instances.min() < 0 or instances.max() >= meshes):
         worst = instances.min() if instances.min() < 0 else instances.max()
         raise ValueError(f"instances: expected rows from 0 to {meshes - 1}, got {worst}")
-    transforms = np.eye(4) if transforms is None else _arrays.plain(transforms, "transforms")
-    if transforms.dtype.kind not in "fiu":
-        raise TypeError(f"transforms: expected numbers, got an array of {transforms.dtype}")
-    if transforms.shape[-2:] not in ((3, 4), (4, 4)):
-        raise ValueError(f"transforms: expected the shape (n, 4, 4) or (n, 3, 4), got {transforms.shape}")
-    if transforms.shape[-2] == 4 and not (transforms[..., 3, :] == [0, 0, 0, 1]).all():
-        raise ValueError("transforms: expected 0, 0, 0, 1 in the last rows: the matrices are applied to columns")
+    transforms = np.eye(4) if transforms is None else transforms
+    return np.require(instances, np.uint32, "CA"), matrices_of(transforms, len(instances), "transforms")
+
+
+def matrices_of(matrices, count, name):
+    """Matrices (count, 3, 4) float64, contiguous, of (n, 4, 4), (n, 3, 4) or one for all."""
+    matrices = _arrays.plain(matrices, name)
+    if matrices.dtype.kind not in "fiu":
+        raise TypeError(f"{name}: expected numbers, got an array of {matrices.dtype}")
+    if matrices.shape[-2:] not in ((3, 4), (4, 4)):
+        raise ValueError(f"{name}: expected the shape (n, 4, 4) or (n, 3, 4), got {matrices.shape}")
+    if matrices.shape[-2] == 4 and not (matrices[..., 3, :] == [0, 0, 0, 1]).all():
+        raise ValueError(f"{name}: expected 0, 0, 0, 1 in the last rows: the matrices are applied to columns")
     try:
-        transforms = np.broadcast_to(transforms[..., :3, :], (len(instances), 3, 4))
+        matrices = np.broadcast_to(matrices[..., :3, :], (count, 3, 4))
     except ValueError:
-        message = f"transforms: expected one or {len(instances)}, one for each instance, got the shape {transforms.shape}"
-        raise ValueError(message) from None
-    return np.require(instances, np.uint32, "CA"), np.require(transforms, np.float64, "CA")
+        raise ValueError(f"{name}: expected one or {count}, one for each instance, got the shape {matrices.shape}") from None
+    return np.require(matrices, np.float64, "CA")
 
 
 def _pyvista_surface(mesh):

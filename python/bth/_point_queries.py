@@ -6,6 +6,7 @@ import numpy as np
 
 from . import _arrays, _native, _threads
 from ._hits import Closest, Overlaps, hit_columns, offsets_of
+from ._open_meshes import warn_if_open
 
 
 def _rows(points):
@@ -16,6 +17,11 @@ def _rows(points):
 
 def _boxes(lower, upper):
     lower, upper, shape = _arrays.together(lower, "lower", upper, "upper")
+    inverted = (lower > upper).any(axis=-1)
+    if inverted.any():
+        box = int(np.argmax(inverted))
+        found = f"{lower[box].tolist()} and {upper[box].tolist()}"
+        raise ValueError(f"lower, upper: expected ends in ascending order along each axis, got {found} (box {box})")
     return (lower, upper), shape
 
 
@@ -26,12 +32,16 @@ def _balls(center, radius):
         shape = np.broadcast_shapes(center.shape[:-1], radius_shape)
     except ValueError:
         raise ValueError(f"radius: the shape {radius_shape} does not fit {center.shape[:-1]}, that of the centers") from None
-    return (_arrays.rows(center, (*shape, 3)), _arrays.numbers(radius, "radius", shape)), shape
+    radius = _arrays.numbers(radius, "radius", shape)
+    if np.any(np.less(radius, 0)):
+        raise ValueError(f"radius: expected numbers from 0, got {np.min(radius)}")
+    return (_arrays.rows(center, (*shape, 3)), radius), shape
 
 
 class PointQueries:
     """The queries of a Scene by points, of shape (..., 3), and by boxes and balls.
 
+    `contains`, `winding` and `signed_distance` warn once (bth.OpenMeshWarning) where a surface is not closed.
     Numbers in float64 are taken as they are, and distances and positions of answers are then float64.
     """
 
@@ -45,23 +55,29 @@ class PointQueries:
 
     def contains(self, points, *, threads=None):
         """Whether points lie inside of closed surfaces; exact, and the same on every call."""
+        warn_if_open(self)
         return self._by_points(_native.contains, points, bool, threads)
 
     def winding(self, points, *, threads=None):
         """How often closed surfaces enclose points, int32."""
+        warn_if_open(self)
         return self._by_points(_native.winding, points, np.int32, threads)
 
     def signed_distance(self, points, *, threads=None):
         """Distances of points to the nearest surface, in the type of the points, negative inside of closed surfaces; NaN for a point that is not finite."""
+        warn_if_open(self)
         return self._by_points(_native.signed_distance, points, None, threads)
 
     def closest(self, points, radius=math.inf, *, threads=None):
         """The closest points of surfaces within a radius, as Closest."""
         rows, shape = _rows(points)
+        radius = _arrays.number(radius, "radius")
+        if not radius >= 0:
+            raise ValueError(f"radius: expected a number from 0, got {radius}")
         columns, position = hit_columns(len(rows), rows.dtype), np.empty(len(rows) * 3, rows.dtype)
         feature = np.empty(len(rows), np.uint8)
         out = columns, position, feature
-        _native.closest(self._native, rows, _arrays.number(radius, "radius"), _threads.count(threads), out)
+        _native.closest(self._native, rows, radius, _threads.count(threads), out)
         columns = [c.reshape(shape) for c in columns]
         return Closest(columns, position.reshape(*shape, 3), feature.reshape(shape), self)
 

@@ -4,13 +4,19 @@ import errno
 import math
 import operator
 import os
+import warnings
 
 import numpy as np
 
 from . import _arrays, _native
 from ._contents import Contents, _index
+from ._placing import Placing
 from ._point_queries import PointQueries
 from ._ray_queries import RayQueries
+
+
+#: Endings of files that `bth.compile` takes.
+_MODELS = (".obj", ".ply", ".stl", ".off", ".gltf", ".glb", ".manifest", ".toml")
 
 
 def open(path, mmap=False):
@@ -21,7 +27,16 @@ def open(path, mmap=False):
     """
     path = os.fsdecode(path)
     os.stat(path)
-    return Scene(_native.open(path, bool(mmap)))
+    try:
+        return Scene(_native.open(path, bool(mmap)))
+    except _native.Error as error:
+        ending = os.path.splitext(path)[1].lower()
+        if error.code in ("BTH-F001", "BTH-F002") and ending in _MODELS:
+            hint = f"hint: bth.compile({path!r}) compiles it and returns its scene"
+            told = _native.Error(f"{path}: {error.code}: expected a compiled file, found a model ({ending}) ({hint})")
+            told.code = error.code
+            raise told from None
+        raise
 
 
 def load(data):
@@ -31,9 +46,11 @@ def load(data):
     return Scene(_native.load(data))
 
 
-def _restore(data, seconds, masks, deformed):
+def _restore(data, seconds, masks, deformed, placement):
     scene = load(data)
-    if scene.seconds != seconds:
+    if placement is not None:
+        scene._place(*placement)
+    elif scene.seconds != seconds:
         scene.seconds = seconds
     for obj, positions in deformed:
         # Those of files that move vertices follow from the time.
@@ -49,24 +66,33 @@ def _positions(values, name):
     if values.ndim != 2:
         raise ValueError(f"{name}: expected the shape (n, 3), got {values.shape}")
     with np.errstate(over="ignore"):
-        return np.require(values, np.float32, "CA")
+        rounded = np.require(values, np.float32, "CA")
+    # What is not finite is refused.
+    moved = _arrays.moved_by_rounding(values) if values.dtype == np.float64 and np.isfinite(rounded).all() else None
+    if moved is not None:
+        hint = "hint: keep positions near the origin, and move the object with set_transforms"
+        message = f"{name}: rounding to float32 moves {np.count_nonzero(moved)} of {len(values)} positions, by up to {moved.max():.2e} ({hint})"
+        warnings.warn(message, UserWarning, stacklevel=3)
+    return rounded
 
 
-class Scene(RayQueries, PointQueries, Contents):
+class Scene(RayQueries, PointQueries, Contents, Placing):
     """An open scene.
 
-    Any number of threads may query it at once. Changes (the time, positions, masks) wait until no query of another thread uses it, so that each
+    Any number of threads may query it at once. Changes (the time, positions, instances, masks) wait until no query of another thread uses it, so that each
     query sees the scene as it was before or as it is after. A filter, or the handler of a signal that interrupts a query, may query the
     scene, but not change it. Copies and pickles have the file, the time,
-    positions and the masks.
+    positions, instances and the masks.
     """
 
-    __slots__ = ("_native", "__weakref__")
+    __slots__ = ("_native", "_closed", "_looked_for_open", "__weakref__")
 
     def __init__(self, native):
         if not isinstance(native, _native.Scene):
             raise TypeError("scenes are made by bth.compile, bth.compile_scene, bth.open and bth.load")
         self._native = native
+        # What `is_object_closed` found, by object, and whether `OpenMeshWarning` has been considered.
+        self._closed, self._looked_for_open = {}, False
 
     # Facts.
 
@@ -112,14 +138,23 @@ class Scene(RayQueries, PointQueries, Contents):
         seconds = _arrays.number(seconds, "seconds")
         if not math.isfinite(seconds):
             raise ValueError(f"seconds: expected a finite number, got {seconds}")
+        # First, since it refuses changes by filters and the like. It has no effect on a model.
         self._native.set_seconds(seconds)
+        self._frames()
 
     def set_frame(self, frame):
-        """Sets the time to that of a frame."""
+        """Sets the time to that of a frame. It may lie outside of `frames`, where nothing moves."""
         frame = operator.index(frame)
         if not -(2**31) <= frame < 2**31:
             raise ValueError(f"frame: expected a number from {-(2**31)} to {2**31 - 1}, got {frame}")
-        self._native.set_frame(frame)
+        self.seconds = frame / self._frames()[2]
+
+    def _frames(self):
+        """`frames` of a scene that has time."""
+        frames = self.frames
+        if frames is None:
+            raise ValueError("the file is a model, which has no frames and no time (hint: scenes are glTF files and manifests)")
+        return frames
 
     # Deformation.
 
@@ -172,7 +207,7 @@ class Scene(RayQueries, PointQueries, Contents):
 
     def __reduce__(self):
         deformed = [(obj, self.vertices(obj)) for obj in self._native.deformed()]
-        return _restore, (self.to_bytes(), self.seconds, _native.masks(self._native), deformed)
+        return _restore, (self.to_bytes(), self.seconds, _native.masks(self._native), deformed, self._placement())
 
     def __repr__(self):
         if self.closed:

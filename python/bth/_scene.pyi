@@ -5,13 +5,14 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from ._contents import Contents
+from ._placing import Placing
 from ._point_queries import PointQueries
 from ._ray_queries import RayQueries
 
 def open(path: str | bytes | PathLike[str] | PathLike[bytes], mmap: bool = False) -> Scene: ...
 def load(data: bytes | bytearray | memoryview) -> Scene: ...
 
-class Scene(RayQueries, PointQueries, Contents):
+class Scene(RayQueries, PointQueries, Contents, Placing):
     seconds: float
     def __init__(self, native: Any) -> None: ...
     @property

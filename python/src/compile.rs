@@ -8,7 +8,7 @@ use crate::scene::NativeScene;
 use crate::work;
 use bth_cache::Store;
 use bth_compile::cached::Cache;
-use bth_compile::memory::{self, Instance, PositionRows, TriangleMesh};
+use bth_compile::memory::{self, Instance, PositionRows, SceneNames, TriangleMesh};
 use bth_compile::pipeline::CompileOptions;
 use bth_compile::scene::{CachePolicy, SceneSource};
 use bth_compile::{Monitor, write};
@@ -201,14 +201,15 @@ fn deliver(content: &write::Content, output: Option<&Path>) -> bth_compile::Resu
     Ok(content.bytes().into_owned())
 }
 
-/// Compiles a scene: pairs of positions and triangles, and for each instance its mesh and the 3×4
-/// matrix that places it.
+/// Compiles a scene: pairs of positions and triangles, for each instance its mesh and the 3×4
+/// matrix that places it, and names of meshes and instances.
 #[pyfunction]
 pub(crate) fn compile_scene(
     py: Python<'_>,
     meshes: Vec<(Vectors<'_>, PyReadonlyArray2<'_, u32>)>,
     instances: PyReadonlyArray1<'_, u32>,
     transforms: PyReadonlyArray3<'_, f64>,
+    names: (Option<Vec<String>>, Option<Vec<String>>),
     keywords: &Bound<'_, PyDict>,
 ) -> PyResult<NativeScene> {
     let keywords = Keywords(keywords);
@@ -227,7 +228,8 @@ pub(crate) fn compile_scene(
     let instances: Vec<Instance> = instances.as_array().iter().enumerate().map(placed).collect();
     let bytes = monitored(py, &keywords, |monitor| {
         let cache = store.as_ref().map_or_else(Cache::none, |store| Cache::new(store, "scene"));
-        let compiled = memory::compile_scene(&meshes, &instances, &options, &cache, monitor)?;
+        let names = SceneNames { meshes: names.0.as_deref(), instances: names.1.as_deref() };
+        let compiled = memory::compile_named_scene(&meshes, &instances, names, &options, &cache, monitor)?;
         deliver(&compiled.content.ok_or_else(no_content)?, output.as_deref())
     })?;
     let scene = py.detach(|| bth::from_bytes(&bytes));

@@ -5,7 +5,8 @@
 //! |---|---|
 //! | `work` | runs chunks on threads without the interpreter's lock, and lets signals through |
 //! | `numbers`, `rays`, `output` | arrays to rays, and hits to arrays, chunk by chunk |
-//! | `scene`, `shared` | a scene that threads share |
+//! | `scene`, `shared`, `state` | a scene that threads share, and that its file or Python places |
+//! | `placing` | moving, adding, hiding and removing of its instances |
 //! | `queries`, `many`, `points`, `overlaps` | its queries |
 //! | `conditions` | what rays may hit, filters in Python included |
 //! | `surface`, `parts` | what hits lead to: normals and the like, names and masks |
@@ -28,11 +29,13 @@ mod options;
 mod output;
 mod overlaps;
 mod parts;
+mod placing;
 mod points;
 mod queries;
 mod rays;
 mod scene;
 mod shared;
+mod state;
 mod surface;
 mod work;
 
@@ -79,6 +82,10 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(parts::set_group_masks, module)?)?;
     module.add_function(wrap_pyfunction!(parts::masks, module)?)?;
     module.add_function(wrap_pyfunction!(parts::set_masks, module)?)?;
+    module.add_function(wrap_pyfunction!(placing::set_transforms, module)?)?;
+    module.add_function(wrap_pyfunction!(placing::add_instances, module)?)?;
+    module.add_function(wrap_pyfunction!(placing::remove_instances, module)?)?;
+    module.add_function(wrap_pyfunction!(placing::set_visible, module)?)?;
     module.add_function(wrap_pyfunction!(attributes::texture_coordinates, module)?)?;
     module.add_function(wrap_pyfunction!(work::processors, module)?)?;
     module.add_function(wrap_pyfunction!(isa, module)?)?;

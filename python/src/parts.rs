@@ -1,6 +1,6 @@
 //! The parts of a scene (instances, and the objects' groups and materials): their names and masks.
 
-use crate::errors::check_index;
+use crate::errors::{check_index, format_error};
 use crate::scene::NativeScene;
 use pyo3::prelude::*;
 
@@ -14,11 +14,7 @@ pub(crate) fn object_names(py: Python<'_>, scene: &NativeScene) -> PyResult<Vec<
 #[pyfunction]
 pub(crate) fn instance_names(py: Python<'_>, scene: &NativeScene) -> PyResult<Vec<String>> {
     scene.with(py, |scene| {
-        let name = |instance| {
-            let name = scene.description().map(|view| view.node_name(scene.instance(instance).node));
-            name.unwrap_or_default().to_owned()
-        };
-        (0..scene.instance_count()).map(name).collect()
+        (0..scene.instance_count()).map(|instance| scene.instance_name(instance).to_owned()).collect()
     })
 }
 
@@ -66,8 +62,7 @@ pub(crate) fn set_instance_mask(
 ) -> PyResult<()> {
     scene.get()?.change(py, |scene| {
         check_index("instance", instance, scene.instance_count())?;
-        scene.set_instance_mask(instance, mask);
-        Ok(())
+        scene.set_instance_mask(instance, mask).map_err(|e| format_error(&e))
     })?
 }
 
@@ -84,8 +79,8 @@ pub(crate) fn set_group_masks(
         check_index("object", object, scene.object_count())?;
         let count = scene.group_count(object);
         groups.iter().try_for_each(|&group| check_index("group", group, count))?;
-        groups.iter().for_each(|&group| scene.set_group_mask(object, group, mask));
-        Ok(())
+        let mut set = |&group: &u32| scene.set_group_mask(object, group, mask);
+        groups.iter().try_for_each(&mut set).map_err(|e| format_error(&e))
     })?
 }
 
@@ -114,12 +109,12 @@ pub(crate) fn set_masks(py: Python<'_>, scene: &NativeScene, masks: Masks) -> Py
     scene.get()?.change(py, |scene| {
         for (instance, mask) in instances {
             check_index("instance", instance, scene.instance_count())?;
-            scene.set_instance_mask(instance, mask);
+            scene.set_instance_mask(instance, mask).map_err(|e| format_error(&e))?;
         }
         for (object, group, mask) in groups {
             check_index("object", object, scene.object_count())?;
             check_index("group", group, scene.group_count(object))?;
-            scene.set_group_mask(object, group, mask);
+            scene.set_group_mask(object, group, mask).map_err(|e| format_error(&e))?;
         }
         Ok(())
     })?

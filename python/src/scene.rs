@@ -2,6 +2,7 @@
 
 use crate::errors::{check_index, format_error, no_geometry, write_error};
 use crate::shared::{Handle, OpenScene};
+use crate::state::State;
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -40,11 +41,7 @@ impl NativeScene {
     }
 
     /// Calls `read` with the scene and without the interpreter's lock.
-    pub(crate) fn with<T: Send>(
-        &self,
-        py: Python<'_>,
-        read: impl FnOnce(&bth::Scene) -> T + Send,
-    ) -> PyResult<T> {
+    pub(crate) fn with<T: Send>(&self, py: Python<'_>, read: impl FnOnce(&State) -> T + Send) -> PyResult<T> {
         let scene = self.0.get()?;
         crate::work::note_thread(py);
         py.detach(|| Ok(read(&*scene.read()?)))
@@ -81,8 +78,7 @@ impl NativeScene {
 
     /// Writes the compiled file, whole or not at all.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        let write =
-            |scene: &bth::Scene| bth_files::replace(&path, |file| file.write_all(scene.file().bytes()));
+        let write = |scene: &State| bth_files::replace(&path, |file| file.write_all(scene.file().bytes()));
         self.with(py, write)?.map_err(|error| write_error(&path, &error))
     }
 
@@ -93,7 +89,8 @@ impl NativeScene {
                 let triangles: Vec<u32> =
                     (0..scene.object_count()).map(|o| scene.object(o).header.triangles).collect();
                 let frames = scene
-                    .description()
+                    .file()
+                    .scene()
                     .map(|d| (d.scene[0].first_frame, d.scene[0].last_frame, d.scene[0].rate));
                 (
                     scene.file().bytes().len(),
@@ -119,18 +116,27 @@ impl NativeScene {
     }
 
     fn seconds(&self, py: Python<'_>) -> PyResult<f64> {
-        self.with(py, bth::Scene::seconds)
+        self.with(py, |scene| scene.seconds())
     }
 
     /// Sets the time.
     fn set_seconds(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let updated = self.get()?.change(py, |scene| scene.set_seconds(seconds))?;
-        updated.map(drop).map_err(|e| format_error(&e))
+        updated.map_err(|e| format_error(&e))
     }
 
-    fn set_frame(&self, py: Python<'_>, frame: i32) -> PyResult<()> {
-        let updated = self.get()?.change(py, |scene| scene.set_frame(frame))?;
-        updated.map(drop).map_err(|e| format_error(&e))
+    /// True if Python has placed instances.
+    #[getter]
+    fn placed(&self, py: Python<'_>) -> PyResult<bool> {
+        self.with(py, |scene| scene.is_placed())
+    }
+
+    /// True if an object's surface has no boundary; `None` where the file has no triangles.
+    fn is_closed(&self, py: Python<'_>, object: u32) -> PyResult<Option<bool>> {
+        self.with(py, |scene| {
+            check_index("object", object, scene.object_count())?;
+            Ok(scene.is_closed(object))
+        })?
     }
 
     /// Number of vertices of an object that can be given new positions.
@@ -153,8 +159,7 @@ impl NativeScene {
         let rows = rows.to_vec();
         self.get()?.change(py, |scene| {
             check_index("object", object, scene.object_count())?;
-            let update = scene.set_positions(object, &rows).map_err(|e| format_error(&e))?;
-            Ok(update.deformed_cost_ratio)
+            scene.set_positions(object, &rows).map_err(|e| format_error(&e))
         })?
     }
 
@@ -171,20 +176,13 @@ impl NativeScene {
             [open.as_slice()?, close.as_slice()?].map(|rows| rows.as_chunks::<3>().0.to_vec());
         self.get()?.change(py, |scene| {
             check_index("object", object, scene.object_count())?;
-            let update = scene.set_positions_between(object, [&open, &close], share);
-            Ok(update.map_err(|e| format_error(&e))?.deformed_cost_ratio)
+            scene.set_positions_between(object, [&open, &close], share).map_err(|e| format_error(&e))
         })?
     }
 
     /// Indices of the objects whose positions differ from the file.
     fn deformed(&self, py: Python<'_>) -> PyResult<Vec<u32>> {
-        self.with(py, |scene| {
-            let is_deformed = |object: &u32| {
-                let of_file = scene.file().object(*object).expect("an object of the file");
-                !std::ptr::eq(scene.object(*object).positions, of_file.positions)
-            };
-            (0..scene.object_count()).filter(is_deformed).collect()
-        })
+        self.with(py, |scene| scene.deformed().collect())
     }
 
     /// For each instance the 3×4 matrix that transforms its object's space to world space, its
@@ -211,7 +209,7 @@ impl NativeScene {
 
     /// Lower and upper end of a box that contains all visible instances.
     fn bounds(&self, py: Python<'_>) -> PyResult<Option<bth::Bounds>> {
-        self.with(py, bth::Scene::bounds)
+        self.with(py, |scene| scene.bounds())
     }
 
     /// Lower and upper end of a box in world space that contains an instance, if it is visible.

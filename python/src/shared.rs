@@ -1,5 +1,6 @@
 //! A scene that several threads use: many trace it, one at a time changes it, and any may close it.
 
+use crate::state::State;
 use crate::work::{self, Pauses, Watch};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -8,20 +9,20 @@ use std::sync::{Arc, Mutex, RwLock, RwLockReadGuard, TryLockError};
 
 /// A scene that is open. It is freed when it has been closed and no call uses it any more.
 pub(crate) struct OpenScene {
-    scene: RwLock<bth::Scene>,
+    scene: RwLock<State>,
     /// Threads that wait to change the scene; others let them go first.
     changing: AtomicU32,
 }
 
 impl OpenScene {
     pub(crate) fn new(scene: bth::Scene) -> Arc<OpenScene> {
-        Arc::new(OpenScene { scene: RwLock::new(scene), changing: AtomicU32::new(0) })
+        Arc::new(OpenScene { scene: RwLock::new(State::File(Box::new(scene))), changing: AtomicU32::new(0) })
     }
 
     /// The scene for queries. Not for threads that hold the interpreter's lock: whoever changes the
     /// scene needs it. Fails with the exception that the handler of a signal raises while others
     /// change the scene.
-    pub(crate) fn read(&self) -> PyResult<RwLockReadGuard<'_, bth::Scene>> {
+    pub(crate) fn read(&self) -> PyResult<RwLockReadGuard<'_, State>> {
         let mut pauses = Pauses::new();
         // A filter or the handler of a signal is inside of a call, perhaps of this scene: it must
         // not wait for whom that call keeps waiting.
@@ -38,7 +39,7 @@ impl OpenScene {
         }
     }
 
-    fn try_read(&self) -> Option<RwLockReadGuard<'_, bth::Scene>> {
+    fn try_read(&self) -> Option<RwLockReadGuard<'_, State>> {
         match self.scene.try_read() {
             Ok(scene) => Some(scene),
             Err(TryLockError::Poisoned(scene)) => Some(scene.into_inner()),
@@ -47,7 +48,7 @@ impl OpenScene {
     }
 
     /// Does the same as [`Self::read`] for a thread that holds the interpreter's lock.
-    pub(crate) fn read_attached(&self, py: Python<'_>) -> PyResult<RwLockReadGuard<'_, bth::Scene>> {
+    pub(crate) fn read_attached(&self, py: Python<'_>) -> PyResult<RwLockReadGuard<'_, State>> {
         work::note_thread(py);
         loop {
             if let Some(scene) = self.try_read() {
@@ -78,7 +79,7 @@ impl OpenScene {
     pub(crate) fn change<T: Send>(
         &self,
         py: Python<'_>,
-        change: impl FnOnce(&mut bth::Scene) -> T + Send,
+        change: impl FnOnce(&mut State) -> T + Send,
     ) -> PyResult<T> {
         if work::is_inside_call() {
             let message = "a scene cannot be changed by a filter or a progress function, nor by the handler of a signal that interrupts a call of this package";
@@ -89,13 +90,15 @@ impl OpenScene {
         let result = py.detach(|| {
             // Not `write`, after whose call readers would wait, the handlers of signals too.
             let mut pauses = Pauses::new();
-            loop {
+            let mut scene = loop {
                 match self.scene.try_write() {
-                    Ok(mut scene) => return Ok(change(&mut scene)),
-                    Err(TryLockError::Poisoned(scene)) => return Ok(change(&mut scene.into_inner())),
+                    Ok(scene) => break scene,
+                    Err(TryLockError::Poisoned(scene)) => break scene.into_inner(),
                     Err(TryLockError::WouldBlock) => pauses.pause()?,
                 }
-            }
+            };
+            let state = &mut *scene;
+            Ok(work::pool().install(|| change(state)))
         });
         self.changing.fetch_sub(1, Ordering::Relaxed);
         result

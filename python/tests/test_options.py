@@ -148,6 +148,7 @@ def test_stubs_have_the_options():
     functions = {f.name: {a.arg for a in f.args.kwonlyargs} for f in ast.parse(stub.read_text()).body if isinstance(f, ast.FunctionDef)}
     parameters = set(inspect.signature(bth.compile).parameters) - {"model"}
     assert functions["compile"] == parameters
+    parameters |= {"mesh_names", "instance_names"}
     assert functions["compile_scene"] == parameters - {"flatten", "scene", "animation", "rate", "at_rest", "rigid_parts", "strict", "rays"}
 
 

@@ -198,8 +198,25 @@ def test_trimesh(mesh):
     assert (compiled.instance_count, compiled.object_count) == (3, 1)
     expected = [matrices[0], matrices[1], matrices[0] @ matrices[2]]
     assert sorted(map(tuple, compiled.transforms.reshape(3, 16).round(9))) == sorted(map(tuple, np.reshape(expected, (3, 16)).round(9)))
+    assert sorted(compiled.instance_names) == ["a", "b", "c"] and compiled.object_names == ["ball"]
+    for name, matrix in zip("abc", expected):
+        row = compiled.instance_names.index(name)
+        np.testing.assert_allclose(compiled.transforms[row], matrix, atol=1e-9)
+        hits = compiled.nearest(matrix[:3, 3] + [[0, 0, 1e-3], [1e9, 0, 0]], [0, 0, 1], mask=0xFFFFFFFF)
+        assert set(hits.instance_name.tolist()) <= {"a", "b", "c", ""} and hits.object_name.tolist() == ["ball", ""]
+    named = bth.load(compiled.to_bytes())
+    assert named.instance_names == compiled.instance_names and named.object_names == ["ball"]
     with pytest.raises(ValueError, match="flatten"):
         bth.compile(scene, flatten=True)
+
+
+@pytest.mark.parametrize("names, error", [
+    ({"instance_names": ["a"]}, "instance_names: expected 2 str, got 1"), ({"mesh_names": [3]}, "mesh_names: expected 1 str, got 1 of int"),
+    ({"mesh_names": ["x" * 4097]}, "at most 4096 bytes"),
+])
+def test_names_that_do_not_fit(mesh, names, error):
+    with pytest.raises(ValueError, match=error):
+        bth.compile_scene([mesh], [0, 0], np.eye(4), **names)
 
 
 def test_meshio(mesh):

@@ -6,7 +6,7 @@ import { computeBoundsTreeAsync, ready } from "@bth/three";
 import { counted, done, random, report, stage } from "./common.js";
 
 await ready();
-const ROUNDS = 128, { scene, run } = stage({ eye: [2.6, 2, 4.6], target: [-0.3, 0.25, 0], background: 0x8fa3b8 });
+const ROUNDS = 128, { scene, run } = stage({ eye: [2.8, 2.3, 5.2], target: [0, -0.1, 0], background: 0x8fa3b8 });
 
 // A pot on a plate, as one mesh, with a normal at each vertex.
 const pot = new TeapotGeometry(1, 22), plate = new THREE.CylinderGeometry(2.3, 2.4, 0.14, 160, 1).translate(0, -1.07, 0);
@@ -60,7 +60,7 @@ run(() => {
         milliseconds += performance.now() - start;
     }
     for (let i = 0; i < count; i++) {
-        const light = (open[i] / rounds) ** 1.6, dark = 1 - light;
+        const light = (open[i] / rounds) ** 2, dark = 1 - light;
         colors.setXYZ(i, 1.1 * light + 0.04 * dark, 0.98 * light + 0.06 * dark, 0.82 * light + 0.16 * dark);
     }
     colors.needsUpdate = true;

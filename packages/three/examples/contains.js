@@ -4,7 +4,7 @@ import { computeBoundsTreeAsync, ready } from "@bth/three";
 import { counted, done, model, random, report, stage } from "./common.js";
 
 await ready();
-const COUNT = 30_000, { scene, run } = stage({ eye: [0.6, 1.2, 6.6], target: [-0.4, 0.3, 0], background: 0x1b2430 });
+const COUNT = 30_000, { scene, run } = stage({ eye: [0.6, 1.2, 6.2], target: [0, 0.1, 0], background: 0x1b2430 });
 const knot = model(new THREE.TorusKnotGeometry(1, 0.36, 500, 60));
 const tree = await computeBoundsTreeAsync(knot.geometry), box = tree.getBoundingBox(), size = box.getSize(new THREE.Vector3());
 
@@ -14,7 +14,7 @@ const start = performance.now(), winding = tree.scene.winding(points), milliseco
 
 // Points inside are balls, coloured by where they are; others are dust.
 const inside = winding.reduce((sum, w) => sum + (w !== 0 ? 1 : 0), 0);
-const balls = new THREE.InstancedMesh(new THREE.IcosahedronGeometry(0.03, 1), new THREE.MeshStandardMaterial({ roughness: 0.5 }), inside);
+const balls = new THREE.InstancedMesh(new THREE.IcosahedronGeometry(0.03, 0), new THREE.MeshStandardMaterial({ roughness: 0.5 }), inside);
 const dust = new THREE.BufferGeometry(), outside = [], matrix = new THREE.Matrix4(), color = new THREE.Color();
 for (let i = 0, k = 0; i < COUNT; i++) {
     const [x, y, z] = points.subarray(3 * i, 3 * i + 3);

@@ -6,7 +6,7 @@ import { counted, done, model, report, stage } from "./common.js";
 await ready();
 THREE.Mesh.prototype.raycast = acceleratedRaycast;
 
-const RAYS = 400, { scene, camera, renderer, run } = stage({ eye: [0, 1.5, 6.6], target: [-0.5, 0.25, 0] });
+const RAYS = 400, { scene, camera, renderer, run } = stage({ eye: [0, 1.5, 6.6], target: [0, 0.1, 0] });
 const knot = model(new THREE.TorusKnotGeometry(1, 0.33, 400, 75), 0x4f8fcf);
 scene.add(knot);
 await computeBoundsTreeAsync(knot.geometry);

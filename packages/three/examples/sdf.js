@@ -4,7 +4,7 @@ import { computeBoundsTreeAsync, ready } from "@bth/three";
 import { counted, done, model, report, stage } from "./common.js";
 
 await ready();
-const SIDE = 224, HALF = 2, { scene, run } = stage({ eye: [2.6, 1.4, 6.4], target: [-0.35, 0.2, 0] });
+const SIDE = 224, HALF = 2, { scene, run } = stage({ eye: [2.8, 1.4, 6.4] });
 const knot = model(new THREE.TorusKnotGeometry(1, 0.33, 400, 48), 0xc9d1da, { transparent: true, opacity: 0.28, depthWrite: false });
 knot.castShadow = false;
 scene.add(knot);

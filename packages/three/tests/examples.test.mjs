@@ -2,7 +2,7 @@
 //
 //   OUT=FOLDER CHROMIUM=PROGRAM node --test examples.test.mjs
 //
-// OUT is what build.mjs assembled. The screenshots become the thumbnails of its index page.
+// OUT is what build.mjs assembled. Its index page shows the pictures; screenshots/ has the whole pages.
 import assert from "node:assert/strict";
 import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { createServer } from "node:http";
@@ -53,7 +53,7 @@ const measured = (png) => browser.value(`(async () => {
     const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob("${png}"), (c) => c.charCodeAt(0))], { type: "image/png" }));
     const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d");
     context.drawImage(bitmap, 0, 0);
-    const { data } = context.getImageData(0, 120, bitmap.width, bitmap.height - 220), colors = new Set();
+    const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height), colors = new Set();
     let sum = 0, squares = 0;
     for (let i = 0; i < data.length; i += 4) {
         const light = (data[i] + data[i + 1] + data[i + 2]) / 3;
@@ -73,7 +73,12 @@ for (const { name, title } of examples) {
         await browser.until(`document.title === ${JSON.stringify(`${title} · bth`)} && window.result !== undefined`, 280).catch((error) => {
             throw new Error(`${error.message}\n${browser.complaints.join("\n")}`);
         });
-        const result = await browser.value("window.result"), png = await browser.screenshot();
+        const result = await browser.value("window.result");
+        mkdirSync(join(OUT, "screenshots"), { recursive: true });
+        writeFileSync(join(OUT, "screenshots", `${name}.png`), Buffer.from(await browser.screenshot(), "base64"));
+        // Without the words, which are small in a small picture.
+        await browser.value(`document.querySelectorAll("header, output, .controls").forEach((element) => (element.hidden = true))`);
+        const png = await browser.screenshot();
         writeFileSync(join(OUT, "thumbnails", `${name}.png`), Buffer.from(png, "base64"));
         assert.deepEqual(browser.complaints, []);
         assert.ok(RIGHT[name](result), JSON.stringify(result));
@@ -88,6 +93,6 @@ test("the index shows all of them", async () => {
     browser.complaints.length = 0;
     await browser.open(`${address}/index.html`);
     await browser.until(`[...document.images].filter((image) => image.complete && image.naturalWidth === ${WIDTH}).length === ${examples.length}`);
-    writeFileSync(join(OUT, "thumbnails/index.png"), Buffer.from(await browser.screenshot(), "base64"));
+    writeFileSync(join(OUT, "screenshots/index.png"), Buffer.from(await browser.screenshot(), "base64"));
     assert.deepEqual(browser.complaints, []);
 });

@@ -78,7 +78,7 @@ export class BoundsTree {
     dispose(): void;
 }
 
-/** A tree over the instances of an InstancedMesh. */
+/** A tree over the instances of an InstancedMesh. It has the positions for which the geometry's tree was compiled. */
 export class InstancedTree {
     /** @param tree The tree of the mesh's geometry. */
     constructor(mesh: InstancedMesh, tree: BoundsTree);

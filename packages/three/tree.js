@@ -56,12 +56,13 @@ export class BoundsTree {
         if (this.scene) this.dispose();
         /** The open file, for queries of many rays and points. */
         this.scene = scene;
-        this.version = this.geometry.attributes.position.version;
+        this.version = versionOf(this.geometry);
         forgotten.register(this, scene, this);
     }
 
     /** True while the tree has the triangles that three.js would test. */
     fits() {
+        if (this.version !== versionOf(this.geometry)) return false;
         if (!this.followsDrawRange) return true;
         const { first, count } = rangeOf(this.geometry);
         return first === this.range.first && count === this.range.count;
@@ -86,12 +87,17 @@ export class BoundsTree {
 
     /** All intersections in the space of the geometry, by ascending face. */
     raycast(ray, materialOrSide = FrontSide, near = 0, far = Infinity) {
-        return this.#find(ray, materialOf(materialOrSide), near, far, { origin: ray.origin, near, far }, false);
+        return this.#findHere(ray, materialOrSide, near, far, false);
     }
 
     /** The nearest intersection in the space of the geometry, or null. */
     raycastFirst(ray, materialOrSide = FrontSide, near = 0, far = Infinity) {
-        return this.#find(ray, materialOf(materialOrSide), near, far, { origin: ray.origin, near, far }, true)[0] ?? null;
+        return this.#findHere(ray, materialOrSide, near, far, true)[0] ?? null;
+    }
+
+    #findHere(ray, materialOrSide, near, far, isFirst) {
+        const length = ray.direction.length(), frame = { origin: ray.origin, near, far };
+        return this.#find(ray, materialOf(materialOrSide), near / length, far / length, frame, isFirst);
     }
 
     /** Intersections of a ray with a material, or with the materials of the geometry's groups. */
@@ -101,7 +107,7 @@ export class BoundsTree {
         if (isFirst) {
             if (!this.scene.nearestOne(row, hit, side)) return [];
             const found = this.#intersections([hit], material, ray, frame);
-            if (!isArray || found.length > 0) return found.slice(0, 1);
+            if (found.length > 0) return found.slice(0, 1);
         }
         const { count, triangle, u, v } = this.scene.allHits(row, side);
         const hits = Array.from({ length: count }, (_, i) => ({ triangle: triangle[i], u: u[i], v: v[i] }));
@@ -109,7 +115,7 @@ export class BoundsTree {
         hits.sort((one, other) => one.triangle - other.triangle);
         const found = this.#intersections(hits, material, ray, frame);
         if (!isFirst || found.length === 0) return found;
-        // The nearest triangle has no material that shows it, but what is behind has.
+        // The nearest triangle has no material that shows it, or is nearer than `near` after rounding; what is behind counts.
         return [found.reduce((nearest, one) => (one.distance < nearest.distance ? one : nearest))];
     }
 
@@ -198,7 +204,7 @@ export class BoundsTree {
     refit() {
         if (this.scene.vertices() === null) return this.#open(compile(this.source(), { deformable: true }), false);
         this.scene.setPositions(Float32Array.from(positionsOf(this.geometry, this.mesh)));
-        this.version = this.geometry.attributes.position.version;
+        this.version = versionOf(this.geometry);
     }
 
     /** The box around all triangles. */
@@ -273,9 +279,15 @@ export class InstancedTree {
 
 const turned = new Box3(), triangle = new Triangle(), edge = new Vector3(), normal = new Vector3();
 
-/** The length of a direction after a matrix. */
-function stretch({ x, y, z }, { elements: e }) {
-    return Math.hypot(e[0] * x + e[4] * y + e[8] * z, e[1] * x + e[5] * y + e[9] * z, e[2] * x + e[6] * y + e[10] * z);
+/** How many times as long a direction is after a matrix. */
+function stretch(direction, { elements: e }) {
+    const { x, y, z } = direction;
+    return Math.hypot(e[0] * x + e[4] * y + e[8] * z, e[1] * x + e[5] * y + e[9] * z, e[2] * x + e[6] * y + e[10] * z) / direction.length();
+}
+
+/** What changes when positions or indices are marked as changed (`needsUpdate`). */
+function versionOf({ attributes: { position }, index }) {
+    return `${(position.data ?? position).version} ${index?.version}`;
 }
 
 /** True if a matrix moves and scales along the axes only. */

@@ -35,15 +35,16 @@ for (let i = 0; i < array.length; i++) {
 }
 
 const next = random(5), directions = new Float32Array(3 * count), open = new Float32Array(count);
+const first = Float32Array.from({ length: 2 * count }, next);
 const colors = new THREE.BufferAttribute(new Float32Array(3 * count).fill(1), 3), n = new THREE.Vector3(), d = new THREE.Vector3();
 geometry.setAttribute("color", colors);
 const material = new THREE.MeshBasicMaterial({ vertexColors: true, side: THREE.DoubleSide });
 scene.add(new THREE.Mesh(geometry, material));
 
-/** One ray from each vertex, more often along the normal than aside (cosine). */
-function round() {
+/** Ray k of each vertex, more often along the normal than aside (cosine). Rays of a vertex spread evenly (the sequence R2). */
+function round(k) {
     for (let i = 0; i < count; i++) {
-        const z = 2 * next() - 1, angle = 2 * Math.PI * next(), r = Math.sqrt(1 - z * z);
+        const z = 2 * ((first[2 * i] + 0.7548776662 * k) % 1) - 1, angle = 2 * Math.PI * (first[2 * i + 1] + 0.569840291 * k), r = Math.sqrt(1 - z * z);
         n.fromBufferAttribute(normal, i);
         d.set(r * Math.cos(angle), r * Math.sin(angle), z).addScaledVector(n, 1.0001).normalize().toArray(directions, 3 * i);
     }
@@ -56,7 +57,7 @@ run(() => {
     if (rounds === ROUNDS) return;
     for (let k = 0; k < 32; k++, rounds++) {
         const start = performance.now();
-        round();
+        round(rounds);
         milliseconds += performance.now() - start;
     }
     for (let i = 0; i < count; i++) {

@@ -32,6 +32,7 @@ export function stage({ eye = [3, 2.2, 4], target = [0, 0, 0], floor = null, bac
     sun.castShadow = true;
     sun.shadow.mapSize.set(1024, 1024);
     sun.shadow.radius = 4;
+    sun.shadow.normalBias = 0.03;
     Object.assign(sun.shadow.camera, { left: -6, right: 6, top: 6, bottom: -6, far: 30 });
     scene.add(sun);
     if (floor !== null) {

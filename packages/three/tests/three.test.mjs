@@ -195,11 +195,25 @@ test("new positions of a geometry are followed, whether the tree was made for it
         geometry.computeBoundsTree({ deformable });
         geometry.scale(1.5, 1.2, 2);
         geometry.computeBoundingSphere();
+        assert.equal(geometry.boundsTree.fits(), false);
+        assert.ok(compare([mesh], 20) > 10, "three.js answers until the refit");
         geometry.boundsTree.refit();
+        assert.equal(geometry.boundsTree.fits(), true);
         assert.ok(compare([mesh], 60) > 60);
         const box = geometry.boundsTree.getBoundingBox();
         geometry.computeBoundingBox();
         assert.ok(box.containsBox(geometry.boundingBox) && geometry.boundingBox.clone().expandByScalar(1e-6).containsBox(box));
+    }
+});
+
+test("rays of any length in the space of a geometry", () => {
+    const tree = torus().computeBoundsTree(), ray = new THREE.Ray(new THREE.Vector3(0, 0.2, 5), new THREE.Vector3(0.2, 0, -1)), all = [1, 0.01, 70].map((length) => {
+        ray.direction.set(0.2, 0, -1).setLength(length);
+        return [tree.raycastFirst(ray).distance, tree.raycast(ray, THREE.DoubleSide).length, tree.raycastFirst(ray, THREE.DoubleSide, 4.7, 5.2)?.faceIndex, tree.raycastFirst(ray, THREE.DoubleSide, 0, 3)];
+    });
+    for (const [distance, count, face, near] of all) {
+        assert.ok(Math.abs(distance - all[0][0]) < 1e-9);
+        assert.deepEqual([count, face, near], [all[0][1], all[0][2], null]);
     }
 });
 

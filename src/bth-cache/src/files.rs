@@ -22,15 +22,17 @@ const TAG: &str = "Signature: 8a477f597d28d172789f06886806bc55\n\
     # This folder is a cache of compiled models (bthc); it may be deleted at any time.\n";
 
 impl Files {
-    /// The files of a store; its folders are made.
+    /// The files of a store; its folders are made. A store with contents is read where none can be
+    /// made, as on a read-only disk.
     ///
     /// # Errors
-    /// When they cannot be.
+    /// When they cannot be made, and there are no contents.
     pub(crate) fn open(folder: &Path) -> std::io::Result<Self> {
         let files = Self { root: folder.join(VERSION) };
         std::fs::create_dir_all(folder)?;
         for name in ["keys", "blobs", "locks", "last"] {
-            create_folders(folder, &files.root.join(name))?;
+            let made = create_folders(folder, &files.root.join(name));
+            made.or_else(|e| if files.root.join("blobs").is_dir() { Ok(()) } else { Err(e) })?;
         }
         let tag = folder.join("CACHEDIR.TAG");
         if !tag.exists() {

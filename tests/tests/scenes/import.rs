@@ -253,6 +253,16 @@ fn required_extensions_that_are_not_read_are_refused_by_name() {
     }
 }
 
+#[test]
+fn an_animation_that_is_not_chosen_may_be_malformed() {
+    let document = edited(|d| d["animations"][0] = json!({"channels": 1}));
+    for animation in [Chosen::None, Chosen::One("1".to_owned())] {
+        let options = ImportOptions { animation, ..ImportOptions::default() };
+        let (_, report) = import(&document, &options).unwrap();
+        assert_eq!(report.animations_left_out[0], "0");
+    }
+}
+
 #[track_caller]
 fn bad(edit: impl FnOnce(&mut Value), place: &str, words: &str) {
     let error = import(&edited(edit), &ImportOptions::default()).unwrap_err().to_string();
@@ -294,6 +304,11 @@ fn documents_that_cannot_be_used_are_refused_with_the_place() {
     bad(|d| d["animations"][0]["samplers"][0]["input"] = 0.into(), "accessor 0", "SCALAR");
     bad(|d| d["animations"][0]["samplers"][0]["output"] = 4.into(), "channel 0", "3 rows of values");
     bad(|d| d["animations"][0] = json!({"channels": 1}), "animation 0", "expected");
+    bad(
+        |d| d["extensionsRequired"] = json!(["KHR_new"]),
+        "KHR_new",
+        "known, found KHR_new, which may change",
+    );
     // Times 1, 2, 3 are fine; turned around they are not.
     bad(|d| d["bufferViews"][1]["byteOffset"] = 40.into(), "channel 0", "ascend");
 }

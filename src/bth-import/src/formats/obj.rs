@@ -11,7 +11,7 @@ use crate::mesh::{Keep, Wanted};
 use crate::polygon::fan;
 use crate::raw::{Raw, RowKind, check_rows};
 use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, UNSUPPORTED, read_file};
-use crate::text::{Lines, float, integer, point, shown, words};
+use crate::text::{Lines, float, integer, shown, words};
 use crate::text::{file_name, name, next_statement, statements};
 use bth_format::layout::NONE;
 use std::borrow::Cow;
@@ -93,6 +93,7 @@ fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
         face_uvs: Vec::new(),
     };
     let mut unknown: Option<(u64, String, u64)> = None;
+    let mut flat = 0u64;
     let mut lines = Lines::new(source.data);
     while let Some((number, line)) = next_statement(&mut lines) {
         source.tick(number, lines.position())?;
@@ -101,18 +102,19 @@ fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
             None => {}
             Some(b"v") => {
                 let mut words = until_comment(words);
-                let position = reader.numbers(number, &mut words, 3)?;
+                let (position, found) = reader.numbers(number, &mut words, 2)?;
+                flat += u64::from(found == 2);
                 if wanted.materials {
                     reader.color(words);
                 }
                 reader.raw.positions.push(position);
             }
             Some(b"vn") if reader.normals => {
-                let normal = reader.numbers(number, &mut until_comment(words), 3)?;
+                let (normal, _) = reader.numbers(number, &mut until_comment(words), 3)?;
                 reader.raw.normals.push(normal);
             }
             Some(b"vt") if reader.uvs => {
-                let [u, v, _] = reader.numbers(number, &mut until_comment(words), 1)?;
+                let ([u, v, _], _) = reader.numbers(number, &mut until_comment(words), 1)?;
                 reader.raw.uvs.push([u, v]);
             }
             Some(b"f" | b"fo") => reader.face(number, until_comment(words))?,
@@ -141,6 +143,9 @@ fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
         );
         source.monitor.warn(&message);
     }
+    if flat > 0 {
+        source.monitor.warn(&format!("{flat} vertices have two coordinates; the third is taken as 0"));
+    }
     let mut raw = reader.finish(wanted)?;
     raw.drop_unused_rows();
     raw.exact = Some(Box::new(|| exact_positions(source.data)));
@@ -153,7 +158,10 @@ fn exact_positions(data: &[u8]) -> Vec<[f64; 3]> {
     let statements = std::iter::from_fn(|| next_statement(&mut lines));
     let position = |(_, line): (u64, Cow<'_, [u8]>)| {
         let mut words = words(&line);
-        (words.next() == Some(b"v")).then(|| point(&mut words).unwrap_or_default())
+        (words.next() == Some(b"v")).then(|| {
+            let mut numbers = until_comment(words).map(|word| float(word).unwrap_or_default());
+            std::array::from_fn(|_| numbers.next().unwrap_or_default())
+        })
     };
     statements.filter_map(position).collect()
 }
@@ -180,16 +188,17 @@ impl<'a> Reader<'a, '_> {
 
 impl Reader<'_, '_> {
     /// Parses up to three numbers. The first `needed` are mandatory; the others default to 0.
+    /// Returns also how many there are.
     fn numbers<'w>(
         &self,
         line: u64,
         words: &mut impl Iterator<Item = &'w [u8]>,
         needed: usize,
-    ) -> Result<[f32; 3]> {
+    ) -> Result<([f32; 3], usize)> {
         let mut numbers = [0.0; 3];
         for (k, number) in numbers.iter_mut().enumerate() {
             let word = match words.next() {
-                None if k >= needed => break,
+                None if k >= needed => return Ok((numbers, k)),
                 word => word.unwrap_or_default(),
             };
             *number = float(word).ok_or_else(|| {
@@ -197,7 +206,7 @@ impl Reader<'_, '_> {
                 self.source.error_at_line(MALFORMED, line, message, MALFORMED_HINT)
             })?;
         }
-        Ok(numbers)
+        Ok((numbers, 3))
     }
 
     /// Keeps the colour behind the coordinates of a position, sRGB, if there are three numbers.

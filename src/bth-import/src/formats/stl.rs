@@ -82,7 +82,7 @@ fn read_binary<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
 fn read_text<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
     let mut raw = Raw::new("stl", Box::new(|_, row| source.line(line_of_vertex(source.data, row))));
     let mut lines = Lines::new(source.data);
-    let mut in_solid = false;
+    let (mut in_solid, mut in_facet) = (false, false);
     // Rows of the loop between `outer loop` and `endloop`.
     let mut open: Option<Vec<u32>> = None;
     while let Some((number, line)) = lines.next() {
@@ -98,7 +98,8 @@ fn read_text<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
                 raw.groups.start(raw.triangles.len(), group);
             }
             (b"endsolid", None) if in_solid => in_solid = false,
-            (b"facet" | b"endfacet", None) if in_solid => {}
+            (b"facet", None) if in_solid => in_facet = true,
+            (b"endfacet", None) if in_solid => in_facet = false,
             (b"outer", None) if in_solid => open = Some(Vec::with_capacity(3)),
             (b"vertex", Some(corners)) => {
                 let position = point(&mut words).map_err(|word| {
@@ -122,9 +123,12 @@ fn read_text<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
             }
         }
     }
-    if in_solid {
-        let message = "expected endsolid, found the end of the file";
+    if in_facet {
+        let message = "expected endfacet and endsolid, found the end of the file";
         return Err(source.error_at_line(TRUNCATED, lines.number(), message, TRUNCATED_HINT));
+    }
+    if in_solid {
+        source.monitor.warn("the file ends without endsolid; facets may be missing");
     }
     raw.finish_polygons(wanted.polygons, source.monitor)?;
     raw.exact = Some(Box::new(|| {

@@ -67,7 +67,13 @@ impl Use {
 
 /// Returns the error for an extension that is needed and not read.
 pub(super) fn unsupported_extension(source: &Source<'_>, name: &str) -> Error {
-    let message = format!("expected no required extension that changes geometry, found {name}");
+    let known = [POINTER, INSTANCING].contains(&name) || MESHOPT.contains(&name);
+    let message = match known || name.contains("compression") {
+        true => format!("expected no required extension that changes geometry, found {name}"),
+        false => {
+            format!("expected required extensions that are known, found {name}, which may change geometry")
+        }
+    };
     let hint = if MESHOPT.contains(&name) {
         "decompress the model, for example with gltf-transform copy, or build with the cargo feature meshopt"
     } else if name.contains("compression") {

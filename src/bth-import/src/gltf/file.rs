@@ -39,11 +39,18 @@ impl<'a> GltfFile<'a> {
     pub(crate) fn open(source: &'a Source<'a>, used: Use) -> Result<Self> {
         source.fetched()?;
         let (json, binary) = split(source)?;
+        let unsupported = |message| source.error_in_part(UNSUPPORTED, "asset", message, CONVERT);
         let document: GltfDocument = serde_json::from_slice(json).map_err(|e| {
+            // In glTF 1 lists are objects, and the asset may be absent.
+            let value: Value = serde_json::from_slice(json).unwrap_or_default();
+            let is_first = ["meshes", "buffers", "accessors"].iter().any(|list| value[list].is_object());
+            if is_first || value["asset"]["version"].as_str().is_some_and(|version| version.starts_with("1."))
+            {
+                return unsupported("expected glTF 2, found glTF 1".to_owned());
+            }
             let message = format!("expected a glTF document, found: {e}");
             source.error_in_part(MALFORMED, "JSON", message, MALFORMED_HINT)
         })?;
-        let unsupported = |message| source.error_in_part(UNSUPPORTED, "asset", message, CONVERT);
         let version = &document.asset.version;
         if !version.starts_with("2.") {
             return Err(unsupported(format!("expected glTF 2, found version \"{version}\"")));

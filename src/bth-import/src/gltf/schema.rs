@@ -189,8 +189,6 @@ pub(super) struct MeshoptFallback {
 
 #[derive(Deserialize)]
 pub(super) struct Animation {
-    #[serde(default)]
-    pub(super) name: String,
     pub(super) channels: Vec<Channel>,
     pub(super) samplers: Vec<Sampler>,
 }

@@ -323,6 +323,7 @@ fn refuses_graphs_that_are_not_trees_and_what_does_not_exist_or_fit() {
         ("/accessors/0", "count", json!(3), "BTH-I005", "mesh 0 primitive 0 accessor 1 row 5", "below 3"),
         ("/accessors/2", "count", json!(3), "BTH-I005", "mesh 0 primitive 0 accessor 2", "expected 4"),
         ("/asset", "version", json!("1.0"), "BTH-I006", "asset", "found version \"1.0\""),
+        ("", "meshes", json!({"m": {}}), "BTH-I006", "asset", "expected glTF 2, found glTF 1"),
     ] {
         let edit = |d: &mut Value| match d.pointer_mut(at).unwrap() {
             Value::Array(rows) => rows[key.parse::<usize>().unwrap()] = value,

@@ -37,6 +37,16 @@ fn colours_weights_materials_and_groups_are_ignored() {
 }
 
 #[test]
+fn vertices_of_two_coordinates_lie_at_z_0() {
+    let listener = Listener::default();
+    let text = "v 9000000 0 # corner\nv 9000000.25 0\nv 9000000 1 0\nf 1 2 3\n";
+    let (mesh, _) = import_with("a.obj", text.as_bytes(), Keep::None, &listener).unwrap();
+    assert!(listener.heard("2 vertices have two coordinates; the third is taken as 0"));
+    let exact = mesh.exact.unwrap().positions;
+    assert_eq!(exact, [[9e6, 0.0, 0.0], [9_000_000.25, 0.0, 0.0], [9e6, 1.0, 0.0]]);
+}
+
+#[test]
 fn unknown_keywords_are_told_once() {
     let listener = Listener::default();
     import_with("a.obj", b"v 0 0 0\nvw 1 2\nt 1\n", Keep::None, &listener).unwrap();
@@ -71,7 +81,7 @@ fn refuses_what_is_wrong_at_its_line() {
         ["vt 0 0\nf 1/1 2/2 3/1\n", "BTH-I005", "line 6", "vt line, from 1 to 1, found 2"],
         ["vn 0 0 1\nf 1//1 2//1 3//3\n", "BTH-I005", "line 6", "vn line, from 1 to 1, found 3"],
         ["v 1 2,5 3\n", "BTH-I002", "line 5", "found \"2,5\""],
-        ["v 1 2\n", "BTH-I002", "line 5", "expected 3 or more numbers, found \"\""],
+        ["v 1\n", "BTH-I002", "line 5", "expected 2 or more numbers, found \"\""],
         ["f 1 x 3\n", "BTH-I002", "line 5", "found \"x\""],
         ["v 0 nan 0\nf 1 2 5\n", "BTH-I004", "line 5", "NaN"],
         ["# c\nv 0 1.#INF 0\nf 1 2 5\n", "BTH-I004", "line 6", "NaN"],

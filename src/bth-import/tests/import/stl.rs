@@ -68,7 +68,17 @@ fn refuses_files_that_are_cut_off() {
     assert_refused("a.stl", &bytes[..83], "BTH-I003", "byte 83", "expected a header of 84 bytes");
     assert_refused("a.stl", b"", "BTH-I003", "byte 0", "header");
     let cut = TEXT.find("endfacet").unwrap();
-    assert_refused("a.stl", &TEXT.as_bytes()[..cut], "BTH-I003", "line 8", "expected endsolid");
+    assert_refused("a.stl", &TEXT.as_bytes()[..cut], "BTH-I003", "line 8", "expected endfacet");
+}
+
+#[test]
+fn a_text_may_lack_its_last_line() {
+    let (text, listener) = (TEXT.trim_end(), Listener::default());
+    let cut = text.rfind('\n').unwrap();
+    let whole = import_bytes("a.stl", text.as_bytes(), Keep::None).unwrap().0;
+    let mesh = import_with("a.stl", &text.as_bytes()[..cut], Keep::None, &listener).unwrap().0;
+    assert_eq!(mesh, whole);
+    assert!(listener.heard("ends without endsolid"));
 }
 
 #[test]

@@ -217,6 +217,9 @@ pub(super) fn read(source: &Source<'_>) -> Result<Header> {
                 let body = body(source.data, lines.position(), reader.encoding);
                 return reader.finish(body);
             }
+            [name, ref rest @ ..] if !reader.is_misspelt(name, rest) => {
+                source.monitor.warn(&format!("line {number}: \"{}\" is ignored", shown(line)));
+            }
             _ => return Err(reader.malformed("format, element, property, comment or end_header")),
         }
     }
@@ -236,6 +239,18 @@ impl HeaderReader<'_, '_> {
     fn malformed(&self, expected: &str) -> Error {
         let message = format!("expected {expected}, found \"{}\"", shown(self.line));
         self.source.error_at_line(MALFORMED, self.number, message, MALFORMED_HINT)
+    }
+
+    /// Returns true if a line may be one that the body depends on: by its keyword, or since a type
+    /// or a count is where these have one.
+    fn is_misspelt(&self, keyword: &[u8], words: &[&[u8]]) -> bool {
+        let is_type = |word: &[u8]| word == b"list" || Scalar::new(word).is_some();
+        let is_count = |word: &&[u8]| words.len() == 2 && text::count(word).is_some();
+        let is_word = keyword.first().is_some_and(u8::is_ascii_alphabetic);
+        !is_word
+            || [&b"ply"[..], b"format", b"element", b"property", b"end_header"].contains(&keyword)
+            || words.first().is_some_and(|word| is_type(word))
+            || words.last().is_some_and(is_count)
     }
 
     fn format(&mut self, name: &[u8], version: &[u8]) -> Result<()> {

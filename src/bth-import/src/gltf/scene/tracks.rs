@@ -1,6 +1,7 @@
 //! Tracks of a manifest from the animations of a glTF document.
 
 use std::collections::HashSet;
+use std::ops::Range;
 
 use bth_scene::{Interpolation, Property, Track, Transform};
 
@@ -36,13 +37,14 @@ impl Importer<'_, '_> {
     /// Returns the chosen animations with their numbers, and notes which nodes they change. The
     /// report lists these and the others.
     pub(super) fn animations(&mut self, chosen: &Chosen) -> Result<Vec<(usize, Animation)>> {
-        let all = self.all_animations()?;
-        let name = |(index, animation): &(usize, Animation)| {
-            if animation.name.is_empty() { index.to_string() } else { animation.name.clone() }
-        };
-        let names: Vec<String> = all.iter().map(name).collect();
-        let chosen = self.choose(all, chosen)?;
+        let all = &self.file.document.animations;
+        let names: Vec<String> =
+            all.iter().map(|value| value["name"].as_str().unwrap_or_default().to_owned()).collect();
+        // One that is not chosen may be malformed.
+        let typed = |index: usize| Ok((index, self.file.typed(&all[index], &format!("animation {index}"))?));
+        let chosen = self.choose(&names, chosen)?.map(typed).collect::<Result<Vec<(usize, Animation)>>>()?;
         for (index, name) in names.into_iter().enumerate() {
+            let name = if name.is_empty() { index.to_string() } else { name };
             let is_chosen = chosen.iter().any(|(number, _)| *number == index);
             let list = match is_chosen {
                 true => &mut self.report.animations,
@@ -57,37 +59,18 @@ impl Importer<'_, '_> {
         Ok(chosen)
     }
 
-    /// All animations of the document with their numbers.
-    fn all_animations(&self) -> Result<Vec<(usize, Animation)>> {
-        let mut animations = Vec::new();
-        for (index, value) in self.file.document.animations.iter().enumerate() {
-            let animation: Animation = self.file.typed(value, &format!("animation {index}"))?;
-            animations.push((index, animation));
-        }
-        Ok(animations)
-    }
-
-    /// The chosen ones of all animations.
-    fn choose(
-        &self,
-        mut animations: Vec<(usize, Animation)>,
-        chosen: &Chosen,
-    ) -> Result<Vec<(usize, Animation)>> {
+    /// The numbers of the chosen ones of all animations.
+    fn choose(&self, names: &[String], chosen: &Chosen) -> Result<Range<usize>> {
         match chosen {
-            Chosen::First => {
-                animations.truncate(1);
-                Ok(animations)
-            }
-            Chosen::All => Ok(animations),
-            Chosen::None => Ok(Vec::new()),
+            Chosen::First => Ok(0..names.len().min(1)),
+            Chosen::All => Ok(0..names.len()),
+            Chosen::None => Ok(0..0),
             Chosen::One(wanted) => {
-                let by_name = animations.iter().position(|(_, a)| a.name == *wanted);
-                let by_number = || wanted.parse().ok().filter(|n: &usize| *n < animations.len());
-                let Some(found) = by_name.or_else(by_number) else {
-                    let names = animations.iter().map(|(_, animation)| animation.name.as_str());
-                    return Err(self.no_such("animations", names, wanted));
-                };
-                Ok(vec![animations.swap_remove(found)])
+                let by_name = names.iter().position(|name| name == wanted);
+                let by_number = || wanted.parse().ok().filter(|n: &usize| *n < names.len());
+                let found = by_name.or_else(by_number);
+                let missing = || self.no_such("animations", names.iter().map(String::as_str), wanted);
+                found.map(|n| n..n + 1).ok_or_else(missing)
             }
         }
     }

@@ -1,6 +1,9 @@
 //! However a file is corrupted, opening and checking it ends in a result, never in a panic.
 
-use bth_tests::conformance::{Editor, Seal, valid};
+use bth::rays::Ray;
+use bth_format::layout::RecordKind;
+use bth_tests::conformance::{Editor, Seal, valid, worst};
+use std::time::{Duration, Instant};
 
 /// Opens a file and checks all objects; true if it passes.
 fn passes(bytes: &[u8]) -> bool {
@@ -82,5 +85,45 @@ fn extreme_words_behind_right_hashes_end_in_a_result() {
                 passes(&editor.seal(Seal::Sections));
             }
         }
+    }
+}
+
+/// The time of the quickest of some rays, all ways of tracing together.
+fn time_of_ray(scene: &bth::Scene, ray: Ray) -> Duration {
+    let once = |_| {
+        let start = Instant::now();
+        let _ = std::hint::black_box((scene.nearest(&ray), scene.any(&ray)));
+        scene.batch(&[ray; 2]).any(&mut [false; 2]);
+        start.elapsed()
+    };
+    (0..8).map(once).min().unwrap_or_default()
+}
+
+/// A file that passes the checks can make rays slow only in proportion to its size: a ray visits
+/// each node and triangle once, and each tetrahedron twice, on a walk and in a flood.
+#[test]
+#[allow(clippy::print_stdout)]
+fn the_worst_files_are_visited_once() {
+    let ray =
+        |origin: [f32; 3], direction: [f32; 3]| Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY };
+    let down = ray([0.0, 0.0, 9.0], [0.0, 0.0, -1.0]);
+    let along = ray([-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]);
+    let size = 4_000;
+    for (name, ray, bytes) in [
+        ("a bundle of triangles", down, worst::bundle(size)),
+        ("a strip of link32", along, worst::strip(RecordKind::Link32, size)),
+        ("a strip of tet16", along, worst::strip(RecordKind::Tet16, size)),
+    ] {
+        let scene = bth::from_bytes(&bytes).expect("it passes the checks");
+        let (_, steps) = scene.nearest_counted(&ray);
+        let (time, bytes) = (time_of_ray(&scene, ray).as_secs_f64() / 4.0, scene.resident_bytes());
+        println!("{name}: {steps:?}, {:.2} ms for each megabyte", time * 1e9 / bytes as f64);
+        let all = size;
+        let of_tets = name.contains("strip");
+        assert!(if of_tets { steps.cells >= all } else { steps.triangles >= all }, "{name}: {steps:?}");
+        assert!(
+            steps.cells <= 2 * all && steps.triangles <= all && steps.nodes <= all / 8,
+            "{name}: {steps:?}"
+        );
     }
 }

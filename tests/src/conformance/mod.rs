@@ -11,6 +11,7 @@ mod invalid;
 mod materials;
 mod scenes;
 mod valid;
+pub mod worst;
 
 pub use edit::{Editor, Seal};
 pub use invalid::invalid;

@@ -476,7 +476,13 @@ fn is_in_front(points: &[[f32; 3]], face: &[u32; 3], vertex: u32) -> bool {
 
 impl TetParts {
     /// Encodes a tetrahedron with its neighbours and the vertices opposite in them.
-    fn push_record(&mut self, record: RecordKind, vertices: [u32; 4], next: [u32; 4], opposite: [u32; 4]) {
+    pub(super) fn push_record(
+        &mut self,
+        record: RecordKind,
+        vertices: [u32; 4],
+        next: [u32; 4],
+        opposite: [u32; 4],
+    ) {
         let xor = vertices.iter().fold(0, |x, v| x ^ v);
         let link = std::array::from_fn(|i| Link { next: next[i], opposite: opposite[i] });
         match record {

@@ -2,6 +2,7 @@
 //! check".
 //!
 //! An object that passes cannot make a traversal read out of bounds, loop, or visit a node twice.
+//! So the time of a ray is at most in proportion to the object's bytes (SECURITY.md).
 //! The check costs O(bytes of the object) and does not recurse. It covers what indices and counts
 //! have to be; what the numbers have to be (boxes that contain their triangles, tetrahedra that
 //! have volume) is checked by [`crate::verify`].

@@ -12,17 +12,17 @@ use super::walk::{TetWalker, WalkOutcome};
 use crate::intersect::line::{Projected, Sign};
 use crate::query::{Count, EitherQuery, Receiver, TriangleRef};
 use bth_format::layout::{FACE_BIT, NONE};
-use std::collections::BTreeSet;
 
 /// The tetrahedra that a flood has visited, or the faces. Around most vertices these are about ten,
 /// around the center of a fan up to all of the leaf.
 pub(crate) struct VisitedSet {
-    /// The elements that were inserted first. An array needs no allocation.
+    /// The elements while there are few. An array needs no allocation.
     first: [u32; VisitedSet::FIRST],
     /// Number of elements of `first` that are set.
     len: usize,
-    /// The elements that were inserted after `first` was full.
-    rest: BTreeSet<u32>,
+    /// A bit for each element once there are many, so that the time of a flood is linear in the
+    /// tetrahedra that it visits; else empty.
+    bits: Vec<u64>,
 }
 
 impl VisitedSet {
@@ -30,20 +30,36 @@ impl VisitedSet {
     const FIRST: usize = 256;
 
     pub(crate) fn new() -> Self {
-        VisitedSet { first: [0; VisitedSet::FIRST], len: 0, rest: BTreeSet::new() }
+        VisitedSet { first: [0; VisitedSet::FIRST], len: 0, bits: Vec::new() }
     }
 
     /// Adds an element; returns false if it was already in the set.
     pub(crate) fn insert(&mut self, tet: u32) -> bool {
+        if !self.bits.is_empty() {
+            return self.insert_bit(tet);
+        }
         if self.first[..self.len].contains(&tet) {
             return false;
         }
         if self.len == self.first.len() {
-            return self.rest.insert(tet);
+            for i in 0..self.len {
+                self.insert_bit(self.first[i]);
+            }
+            return self.insert_bit(tet);
         }
         self.first[self.len] = tet;
         self.len += 1;
         true
+    }
+
+    fn insert_bit(&mut self, tet: u32) -> bool {
+        let (word, bit) = (tet as usize / 64, 1 << (tet % 64));
+        if word >= self.bits.len() {
+            self.bits.resize(word + 1, 0);
+        }
+        let is_new = self.bits[word] & bit == 0;
+        self.bits[word] |= bit;
+        is_new
     }
 }
 

@@ -104,10 +104,8 @@ int main(int argc, char **argv) {
     bth_hit hit;
     bth_nearest(scene, &ray, NULL, &hit, 1);
     CHECK(hit.surface.triangle == 2 * (20 * (SIDE - 1) + 10));
-    bth_nearest(scene, NULL, NULL, &hit, 1);
-    CHECK(strstr(bth_last_error(), "null"));
-    bth_any(scene, &ray, NULL, NULL, 1);
-    bth_any(NULL, NULL, NULL, NULL, 0);
+    CHECK(bth_nearest(scene, NULL, NULL, &hit, 1) == BTH_ERROR_ARGUMENT && strstr(bth_last_error(), "null"));
+    CHECK(bth_any(scene, &ray, NULL, NULL, 1) == BTH_ERROR_ARGUMENT && bth_any(NULL, NULL, NULL, NULL, 0) == BTH_OK);
     CHECK(bth_nearest_accepted(scene, NULL, NULL, &hit, 1) == BTH_ERROR_ARGUMENT);
     bth_close(scene);
 
@@ -128,6 +126,20 @@ int main(int argc, char **argv) {
     CHECK(hit.surface.instance == 1);
     bth_close(scene);
     bth_free_bytes(&bytes);
+
+    /* A model file. */
+    char model[4096];
+    snprintf(model, sizeof model, "%s.off", argv[1]);
+    FILE *text = fopen(model, "w");
+    CHECK(text && fputs("OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", text) >= 0 && fclose(text) == 0);
+    CHECK(bth_compile_file(model, &options, &bytes) == BTH_COMPILE_OK);
+    CHECK(bth_open_memory(bytes.data, bytes.length, BTH_READ, &scene) == BTH_OK);
+    const bth_ray down = {{0.25f, 0.25f, 5}, 0, {0, 0, -1}, INFINITY};
+    CHECK(bth_nearest(scene, &down, NULL, &hit, 1) == BTH_OK && hit.t == 5);
+    bth_close(scene);
+    bth_free_bytes(&bytes);
+    CHECK(bth_compile_file("no such file.ply", NULL, &bytes) == BTH_COMPILE_ERROR_FILE && !bytes.data);
+    CHECK(bth_compile_file(NULL, NULL, &bytes) == BTH_COMPILE_ERROR_ARGUMENT);
 
     /* Within a stage, progress is told a few times a second. */
     struct seen often = {0};

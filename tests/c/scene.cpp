@@ -1,6 +1,5 @@
 // Compiles a mesh and traces it through bth.hpp. Exits with the line of the first check that fails.
 #include "bth.hpp"
-#include "bth_compile.h"
 
 #include <array>
 #include <cmath>
@@ -23,10 +22,7 @@ int main(int argc, char **argv) {
     const std::array<float, 12> positions = {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0};
     const std::array<std::uint32_t, 6> triangles = {0, 1, 2, 1, 3, 2};
     const bth_mesh mesh = {positions.data(), 4, triangles.data(), 2};
-    bth_bytes bytes{};
-    CHECK(bth_compile_mesh(&mesh, nullptr, &bytes) == BTH_COMPILE_OK);
-    bth::scene first = bth::scene::from_bytes(bytes.data, bytes.length);
-    bth_free_bytes(&bytes);
+    bth::scene first = bth::compile(mesh).open();
 
     bth::scene scene = std::move(first);
     CHECK(first.get() == nullptr && scene.get() != nullptr);
@@ -76,15 +72,30 @@ int main(int argc, char **argv) {
     CHECK(scene.hit_f64({{0.25, 0.25, 2}, 0, {0, 0, -1}, INFINITY}, hit).t == 2);
     CHECK(scene.closest_f64({0.25, 0.25, 0x1p-40}, 9).distance == 0x1p-40 && !scene.contains_f64({9, 9, 9}));
     CHECK(std::abs(scene.signed_distance_f64({0.25, 0.25, 0x1p-40})) == 0x1p-40 && scene.winding_f64({9, 9, 9}) == 0);
+    /* Ranges, in float and in double. */
+    const std::vector<std::array<float, 3>> points = {{0.25F, 0.25F, -1}, {9, 9, 9}};
+    const std::vector<std::array<double, 3>> double_points = {{0.25, 0.25, 0x1p-40}};
+    CHECK((scene.contains_of(points) == std::vector<std::uint8_t>{0, 0}) && scene.winding_of(double_points)[0] == 0);
+    CHECK(scene.closest_of(points, 2)[0].distance == 1 && scene.closest_of(points, 2)[1].surface.triangle == BTH_NONE);
+    CHECK(scene.closest_of(double_points)[0].distance == 0x1p-40);
+    CHECK(std::abs(scene.signed_distance_of(points)[0]) == 1 && std::abs(scene.signed_distance_of(double_points)[0]) == 0x1p-40);
+    CHECK((scene.count_hits_of(rays) == std::vector<std::uint64_t>{0, 1}) && scene.count_hits_of(double_rays)[1] == 1);
+    CHECK(scene.crossings_of(rays)[1].count == 1 && scene.crossings_of(double_rays)[0].count == 0);
+    CHECK((scene.any_accepted_of(rays, no_back) == std::vector<std::uint8_t>{0, 1}));
+    CHECK(scene.nearest_accepted_of(rays, no_back)[1].t == 2 && scene.nearest_accepted_of(double_rays, no_back)[1].t == 0x1p-40);
+    CHECK(scene.triangles_in({0.1F, 0.1F, 0}, 0.01F).size() == 1 && scene.triangles_in(bth::box{{0, 0, 0}, {1, 1, 1}}).size() == 2);
+    CHECK(scene.bounds().lower[0] <= 0 && scene.bounds().upper[1] >= 1 && scene.object_count() == 1);
+    CHECK(scene.group_count(0) == 1 && scene.material_count(0) == 0 && scene.triangle_positions({0, 1})[2][1] == 1);
     scene.set_instance_mask(0, 2);
     CHECK(bth::is_miss(scene.nearest_accepted(down, {1, BTH_CULL_NONE, nullptr, nullptr})));
     CHECK(scene.winding({9, 9, 9}) == 0);
 
     bth_compile_options options{};
     options.flags = BTH_COMPILE_DEFORMABLE;
-    CHECK(bth_compile_mesh(&mesh, &options, &bytes) == BTH_COMPILE_OK);
-    bth::scene elastic = bth::scene::from_bytes(bytes.data, bytes.length);
-    bth_free_bytes(&bytes);
+    bth::compiled made = bth::compile(mesh, options);
+    CHECK(made.size() > 1000 && made.data() != nullptr);
+    bth::scene elastic = bth::compiled(std::move(made)).open();
+    CHECK(made.data() == nullptr);
     CHECK(elastic.vertex_count(0) == 4 && elastic.vertex_count(1) == 0 && scene.vertex_count(0) == 0);
     std::array<float, 12> moved = positions;
     for (int i = 0; i < 4; i++) moved[3 * i + 2] = -1;
@@ -105,30 +116,45 @@ int main(int argc, char **argv) {
     CHECK(bth_set_positions(elastic.get(), 0, nullptr, 4, nullptr) == BTH_ERROR_ARGUMENT);
     CHECK(bth_set_positions(scene.get(), 0, positions.data(), 4, nullptr) == BTH_ERROR_MISSING);
     CHECK(elastic.nearest(down).t == 3 && elastic.surface(elastic.nearest(down)).position[2] == -1);
-    bth_builder *builder = bth_builder_new();
-    const float place[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-    std::uint32_t object = 9, id = 9;
-    CHECK(bth_builder_add(builder, elastic.get(), &object) == BTH_OK);
-    CHECK(bth_builder_instance(builder, object, place, &id) == BTH_OK && bth_builder_commit(builder, nullptr) == BTH_OK);
+    bth::builder builder;
+    const std::uint32_t object = builder.add(elastic), id = builder.instance(object);
+    const auto height = [&] { return builder.query([&](const bth::scene &all) { return all.nearest(down).t; }); };
+    builder.commit();
     // The positions of another scene are not taken over.
-    bth_hit placed;
-    bth_nearest(bth_builder_scene(builder), &down, nullptr, &placed, 1);
-    CHECK(placed.t == 2);
+    CHECK(height() == 2);
     moved[5] = -1;
-    bth_update commit;
-    CHECK(bth_builder_set_positions(builder, object, moved.data(), 4) == BTH_OK);
-    CHECK(bth_builder_commit(builder, &commit) == BTH_OK && commit.deformed == 1 && commit.placed == 1);
-    bth_nearest(bth_builder_scene(builder), &down, nullptr, &placed, 1);
-    CHECK(placed.t == 3 && bth_builder_set_positions(builder, 5, moved.data(), 4) == BTH_ERROR_ARGUMENT);
-    CHECK(bth_builder_set_positions(builder, object, nullptr, 4) == BTH_ERROR_ARGUMENT);
-    CHECK(bth_builder_set_positions_between(builder, object, unknown, 4, 0.5) == BTH_ERROR_ARGUMENT);
-    CHECK(bth_builder_set_positions_between(builder, object, ends, 4, 0.25) == BTH_OK);
-    CHECK(bth_builder_commit(builder, &commit) == BTH_OK);
-    bth_nearest(bth_builder_scene(builder), &down, nullptr, &placed, 1);
-    CHECK(placed.t == 2.25);
-    bth_builder_free(builder);
+    builder.set_positions(object, moved.data(), 4);
+    const bth_update commit = builder.commit();
+    CHECK(commit.deformed == 1 && commit.placed == 1 && height() == 3);
+    CHECK(bth_builder_set_positions(builder.get(), 5, moved.data(), 4) == BTH_ERROR_ARGUMENT);
+    CHECK(bth_builder_set_positions(builder.get(), object, nullptr, 4) == BTH_ERROR_ARGUMENT);
+    CHECK(bth_builder_set_positions_between(builder.get(), object, unknown, 4, 0.5) == BTH_ERROR_ARGUMENT);
+    builder.set_positions_between(object, positions.data(), moved.data(), 4, 0.25);
+    builder.commit();
+    CHECK(height() == 2.25);
+    builder.set_transforms({id}, std::vector<bth::transform<double>>{{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, -1}});
+    const std::uint32_t whole = builder.subscene(object);
+    CHECK(builder.subscene_instances(whole).size() == 1);
+    builder.commit();
+    CHECK(height() == 2.25);
+    builder.remove_subscene(whole);
+    builder.commit();
+    CHECK(height() == 3.25);
+    builder.set_visible(id, false);
+    builder.commit();
+    CHECK(std::isinf(height()));
 
     int caught = 0;
+    try {
+        bth::compile_file("no such file.ply");
+    } catch (const bth::compile_error &e) {
+        caught += e.code() == BTH_COMPILE_ERROR_FILE;
+    }
+    try {
+        builder.set_transforms({id}, std::vector<bth::transform<float>>{});
+    } catch (const bth::error &e) {
+        caught += e.code() == BTH_ERROR_ARGUMENT;
+    }
     try {
         scene.instance(1);
     } catch (const bth::error &e) {
@@ -165,6 +191,6 @@ int main(int argc, char **argv) {
         caught += e.code() == BTH_ERROR_ARGUMENT;
     }
     scene.nearest(static_cast<const bth_ray64 *>(nullptr), nullptr, 0);
-    CHECK(caught == 7 && scene.any(down));
+    CHECK(caught == 9 && scene.any(down));
     return 0;
 }

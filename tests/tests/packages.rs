@@ -45,6 +45,20 @@ fn run_both(folder: &Path) {
     );
 }
 
+/// Writes the examples of `docs/c.md` as files. What has no function `main` is called a part.
+fn write_examples(folder: &Path) {
+    std::fs::create_dir(folder).expect("a folder");
+    let page = std::fs::read_to_string(root().join("docs/c.md")).expect("the page");
+    let blocks = page.split("\n```").skip(1).step_by(2).filter_map(|block| block.split_once('\n'));
+    let mut written = 0;
+    for (language, text) in blocks.filter(|(language, _)| ["c", "cpp"].contains(language)) {
+        let kind = if text.contains("int main(") { "example" } else { "part" };
+        std::fs::write(folder.join(format!("{kind}{written}.{language}")), text).expect("a file");
+        written += 1;
+    }
+    assert!(written > 5, "{written} examples");
+}
+
 #[test]
 fn a_cmake_project_finds_the_libraries() {
     if !["cmake", "c++", "cc"].into_iter().all(have) {
@@ -57,12 +71,14 @@ fn a_cmake_project_finds_the_libraries() {
     let prefix = folder.path().join("root");
     std::fs::create_dir(&prefix).expect("a folder");
     std::os::unix::fs::symlink(moved.join("lib"), prefix.join("lib")).expect("a link");
-    let build = folder.path().join("build");
+    let (build, examples) = (folder.path().join("build"), folder.path().join("examples"));
+    write_examples(&examples);
     let configure = |extra: &str| {
         let mut cmake = Command::new("cmake");
         cmake.arg("-S").arg(root().join("tests/packages/cmake")).arg("-B").arg(&build);
         cmake.arg(format!("-DCMAKE_PREFIX_PATH={}", prefix.display()));
-        cmake.arg(format!("-DPROGRAMS={}", root().join("tests/c").display())).arg(extra);
+        cmake.arg(format!("-DPROGRAMS={}", root().join("tests/c").display()));
+        cmake.arg(format!("-DEXAMPLES={}", examples.display())).arg(extra);
         cmake
     };
     output_of(&mut configure("-DCMAKE_BUILD_TYPE=Release"));

@@ -88,15 +88,13 @@ void bth_close(bth_scene *scene);
 const char *bth_last_error(void);
 
 /* Stores the nearest hits of `count` rays in `hits`, which must not overlap `rays`. `reserved` is
- * ignored: pass NULL. After an error, which bth_last_error tells, nothing is stored if an argument
- * is null, and all rays are misses if the error is internal. bth_nearest_accepted with a null
- * `accept` does the same and returns a code. */
-void bth_nearest(const bth_scene *scene, const bth_ray *rays, const bth_surface *reserved, bth_hit *hits, size_t count);
+ * ignored: pass NULL. Returns BTH_OK or a negative code. After BTH_ERROR_ARGUMENT nothing is stored,
+ * and after BTH_ERROR_INTERNAL all rays are misses. */
+int32_t bth_nearest(const bth_scene *scene, const bth_ray *rays, const bth_surface *reserved, bth_hit *hits, size_t count);
 
 /* Stores in `hit` for each of `count` rays 1 if it hits anything, else 0. `hit` must not overlap
- * `rays`. `reserved` is ignored: pass NULL. Errors are those of bth_nearest; bth_any_accepted
- * returns a code. */
-void bth_any(const bth_scene *scene, const bth_ray *rays, const bth_surface *reserved, uint8_t *hit, size_t count);
+ * `rays`. `reserved` is ignored: pass NULL. Returns what bth_nearest does. */
+int32_t bth_any(const bth_scene *scene, const bth_ray *rays, const bth_surface *reserved, uint8_t *hit, size_t count);
 
 /* Rays that start on a surface. Such a ray is all points S + t * direction with t > 0 and t <=
  * tmax, where S is the exact point of its start. It never hits the surface that it leaves, nor

@@ -1,11 +1,14 @@
-//! The part of the C interface that reports several hits and hits under conditions, and that sets
-//! masks.
+//! The part of the C interface that reports several hits, hits under conditions and crossings, in
+//! float and double, and that sets masks.
 
-use crate::query::{Arguments, CHUNK};
+use crate::query::{Arguments, CHUNK, queries};
+use crate::surface::{check_triangle, store};
 use crate::{ERROR_ARGUMENT, OK, fail};
 use runtime::rays::{Hit, Hit64, Ray, Ray64};
-use runtime::{Accept, Cull, Filter, Scene, TraceRay};
+use runtime::{Accept, Crossings, Cull, Filter, Scene, TraceRay};
 use std::ffi::c_void;
+
+const _: () = assert!(size_of::<Crossings>() == 8);
 
 /// `bth_filter` of `bth.h`.
 type FilterFunction = unsafe extern "C" fn(user: *mut c_void, ray: *const Ray, hit: *const Hit) -> i32;
@@ -31,7 +34,7 @@ pub struct HitList<H> {
 }
 
 /// A ray of C, and the hits that answer it.
-pub(crate) trait CallerRay: TraceRay {
+trait CallerRay: TraceRay {
     /// A hit in C.
     type Hit: Copy;
     /// No hit.
@@ -129,11 +132,7 @@ unsafe fn with_accept(
 /// # Safety
 /// The arguments are as in [`Arguments`]. `accept` is null or points to a struct whose filter is
 /// null or keeps the contract in `bth.h`.
-pub(crate) unsafe fn nearest<R: CallerRay>(
-    name: &str,
-    arguments: Arguments<R, R::Hit>,
-    accept: *const AcceptC,
-) -> i32 {
+unsafe fn nearest<R: CallerRay>(name: &str, arguments: Arguments<R, R::Hit>, accept: *const AcceptC) -> i32 {
     // SAFETY: the contract of this function includes the contracts of `with_accept` and `store`.
     unsafe {
         with_accept(name, accept, arguments.count, |accept| {
@@ -146,11 +145,7 @@ pub(crate) unsafe fn nearest<R: CallerRay>(
 ///
 /// # Safety
 /// The contract of [`nearest`].
-pub(crate) unsafe fn any<R: CallerRay>(
-    name: &str,
-    arguments: Arguments<R, u8>,
-    accept: *const AcceptC,
-) -> i32 {
+unsafe fn any<R: CallerRay>(name: &str, arguments: Arguments<R, u8>, accept: *const AcceptC) -> i32 {
     // SAFETY: the contract of this function includes the contracts of `with_accept` and `store_as`.
     unsafe {
         with_accept(name, accept, arguments.count, |accept| {
@@ -166,11 +161,7 @@ pub(crate) unsafe fn any<R: CallerRay>(
 ///
 /// # Safety
 /// The contract of [`nearest`].
-pub(crate) unsafe fn count<R: CallerRay>(
-    name: &str,
-    arguments: Arguments<R, u64>,
-    accept: *const AcceptC,
-) -> i32 {
+unsafe fn count<R: CallerRay>(name: &str, arguments: Arguments<R, u64>, accept: *const AcceptC) -> i32 {
     // SAFETY: the contract of this function includes the contracts of `with_accept` and `store_as`.
     unsafe {
         with_accept(name, accept, arguments.count, |accept| {
@@ -185,19 +176,18 @@ pub(crate) unsafe fn count<R: CallerRay>(
 /// Stores the `most` nearest hits of each ray that are accepted, like [`nearest`].
 ///
 /// # Safety
-/// The contract of [`nearest`], with `list` for `answers`, which are ignored: it is null or points
-/// to a struct whose `offsets` is null or points to one more number than there are rays, and whose
-/// `hits` is null or points to `capacity` elements, all valid for writes.
-pub(crate) unsafe fn all<R: CallerRay>(
+/// The contract of [`nearest`], but for the answers: they are null or point to one struct whose
+/// `offsets` is null or points to one more number than there are rays, and whose `hits` is null or
+/// points to `capacity` elements, all valid for writes.
+unsafe fn all<R: CallerRay>(
     name: &str,
-    arguments: Arguments<R, u64>,
+    arguments: Arguments<R, HitList<R::Hit>>,
     accept: *const AcceptC,
     most: u64,
-    list: *mut HitList<R::Hit>,
 ) -> i32 {
-    let count = arguments.count;
+    let Arguments { scene, asked, answers, count } = arguments;
     // SAFETY: by contract it is null or valid for reads and writes.
-    let list = match unsafe { list.as_mut() } {
+    let list = match unsafe { answers.as_mut() } {
         Some(list) => list,
         None if count == 0 => return OK,
         None => return fail(ERROR_ARGUMENT, format!("{name}: list must not be null")),
@@ -212,7 +202,7 @@ pub(crate) unsafe fn all<R: CallerRay>(
         unsafe { list.offsets.write(0) };
     }
     // The first offset is 0; the others are the answers.
-    let arguments = Arguments { answers: list.offsets.wrapping_add(1), ..arguments };
+    let arguments = Arguments { scene, asked, answers: list.offsets.wrapping_add(1), count };
     let most = usize::try_from(most).unwrap_or(usize::MAX);
     let mut store = |scene: &Scene, rays: &[R], accept: &Accept<'_>, offsets: &mut [u64]| {
         let mut hits = Vec::new();
@@ -244,77 +234,64 @@ pub(crate) unsafe fn all<R: CallerRay>(
     }
 }
 
-/// The nearest hit of each ray that is accepted; see `bth.h`.
-///
-/// # Safety
-/// `scene` is null or open. `rays` and `hits` are null or point to `count` elements. The elements
-/// of `hits` are valid for writes and do not overlap the others. `accept` is null or points to a
-/// struct whose filter is null or keeps the contract in `bth.h`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_nearest_accepted(
-    scene: *const Scene,
-    rays: *const Ray,
-    accept: *const AcceptC,
-    hits: *mut Hit,
-    count: usize,
-) -> i32 {
-    let arguments = Arguments { scene, asked: rays, answers: hits, count };
-    // SAFETY: the contract is the same.
-    unsafe { nearest("bth_nearest_accepted", arguments, accept) }
+queries! {
+    /// The nearest hit of each ray that is accepted; see `bth.h`.
+    fn bth_nearest_accepted(Ray, accept: *const AcceptC) -> Hit =
+        |arguments| nearest("bth_nearest_accepted", arguments, accept);
+    /// The same in double.
+    fn bth_nearest_f64(Ray64, accept: *const AcceptC) -> Hit64 =
+        |arguments| nearest("bth_nearest_f64", arguments, accept);
+    /// Stores which rays have a hit that is accepted; see `bth.h`.
+    fn bth_any_accepted(Ray, accept: *const AcceptC) -> u8 =
+        |arguments| any("bth_any_accepted", arguments, accept);
+    /// The same in double.
+    fn bth_any_f64(Ray64, accept: *const AcceptC) -> u8 = |arguments| any("bth_any_f64", arguments, accept);
+    /// Number of hits of each ray that are accepted; see `bth.h`.
+    fn bth_count_hits(Ray, accept: *const AcceptC) -> u64 =
+        |arguments| self::count("bth_count_hits", arguments, accept);
+    /// The same in double.
+    fn bth_count_hits_f64(Ray64, accept: *const AcceptC) -> u64 =
+        |arguments| self::count("bth_count_hits_f64", arguments, accept);
+    /// All hits of each ray that are accepted, or the nearest of them; see `bth.h`.
+    fn bth_all_hits(Ray, accept: *const AcceptC, most: u64) -> HitList<Hit> =
+        |arguments| all("bth_all_hits", arguments, accept, most);
+    /// The same in double.
+    fn bth_all_hits_f64(Ray64, accept: *const AcceptC, most: u64) -> HitList<Hit64> =
+        |arguments| all("bth_all_hits_f64", arguments, accept, most);
+    /// Crossings of surfaces by rays; see `bth.h`.
+    fn bth_crossings(Ray) -> Crossings = |rays| rays.store(Crossings::default(), Scene::crossings_batch);
+    /// The same in double.
+    fn bth_crossings_f64(Ray64) -> Crossings = |rays| rays.store(Crossings::default(), Scene::crossings_batch);
 }
 
-/// Stores which rays have a hit that is accepted; see `bth.h`.
+/// The numbers of a hit; see `bth.h`.
 ///
 /// # Safety
-/// The contract of [`bth_nearest_accepted`], with `found` for `hits`.
+/// `scene` is null or open. `ray` and `hit` are null or valid for reads. `numbers` is null or valid
+/// for writes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_any_accepted(
+pub unsafe extern "C" fn bth_hit_f64(
     scene: *const Scene,
-    rays: *const Ray,
-    accept: *const AcceptC,
-    found: *mut u8,
-    count: usize,
+    ray: *const Ray64,
+    hit: *const Hit,
+    numbers: *mut Hit64,
 ) -> i32 {
-    let arguments = Arguments { scene, asked: rays, answers: found, count };
-    // SAFETY: the contract is the same.
-    unsafe { any("bth_any_accepted", arguments, accept) }
-}
-
-/// Number of hits of each ray that are accepted; see `bth.h`.
-///
-/// # Safety
-/// The contract of [`bth_nearest_accepted`], with `counts` for `hits`.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_count_hits(
-    scene: *const Scene,
-    rays: *const Ray,
-    accept: *const AcceptC,
-    counts: *mut u64,
-    count: usize,
-) -> i32 {
-    let arguments = Arguments { scene, asked: rays, answers: counts, count };
-    // SAFETY: the contract is the same.
-    unsafe { self::count("bth_count_hits", arguments, accept) }
-}
-
-/// All hits of each ray that are accepted, or the nearest of them; see `bth.h`.
-///
-/// # Safety
-/// The contract of [`bth_nearest_accepted`], with `list` for `hits`: it is null or points to a
-/// struct whose `offsets` is null or points to `count + 1` numbers, and whose `hits` is null or
-/// points to `capacity` elements, all valid for writes.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn bth_all_hits(
-    scene: *const Scene,
-    rays: *const Ray,
-    accept: *const AcceptC,
-    most: u64,
-    list: *mut HitList<Hit>,
-    count: usize,
-) -> i32 {
-    let arguments = Arguments { scene, asked: rays, answers: std::ptr::null_mut(), count };
-    // SAFETY: the contract is the same.
-    unsafe { all("bth_all_hits", arguments, accept, most, list) }
+    // SAFETY: by contract both are null, and then rejected, or valid for reads.
+    let (Some(ray), Some(hit)) = (unsafe { (ray.as_ref(), hit.as_ref()) }) else {
+        return fail(ERROR_ARGUMENT, "bth_hit_f64: ray and hit must not be null".into());
+    };
+    let find = |scene: &Scene| {
+        if hit.is_hit() {
+            check_triangle(scene, hit.primitive)?;
+            let instance = hit.primitive.instance;
+            if !scene.instance(instance).visible {
+                return Err((ERROR_ARGUMENT, format!("instance {instance} is hidden")));
+            }
+        }
+        Ok(scene.hit_f64(ray, hit))
+    };
+    // SAFETY: the contract of this function includes the contract of `store`.
+    unsafe { store("bth_hit_f64", scene, numbers, find) }
 }
 
 /// Sets the mask of an instance; see `bth.h`.

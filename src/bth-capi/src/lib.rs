@@ -3,15 +3,12 @@
 #![allow(unsafe_code)] // Most functions take pointers from C.
 
 pub mod builder;
-pub mod closest;
 pub mod deform;
-pub mod double;
-pub mod double_points;
 pub mod hits;
-pub mod inside;
 pub mod materials;
 pub mod memory;
 pub mod motion;
+pub mod points;
 mod query;
 pub mod starts;
 pub mod surface;
@@ -140,7 +137,7 @@ pub unsafe extern "C" fn bth_nearest(
     _reserved: *const PrimitiveRef,
     hits: *mut Hit,
     count: usize,
-) {
+) -> i32 {
     if count == 1 {
         // SAFETY: by contract each pointer is null or points to one element, and `hits` is valid
         // for writes. `Ray` and `Hit` have the layout of the C structs, and all bit patterns are
@@ -150,10 +147,10 @@ pub unsafe extern "C" fn bth_nearest(
             // With nothing but the kernel behind it, no registers are saved for what only batches
             // need.
             let (ray, hits) = (from_ref(ray), from_mut(hit));
-            if guarded(|| scene.batch(ray).nearest(hits)).is_err() {
+            return guarded(|| scene.batch(ray).nearest(hits)).unwrap_or_else(|code| {
                 hits.fill(Hit::MISS);
-            }
-            return;
+                code
+            });
         }
     }
     // SAFETY: the contract is the same.
@@ -165,9 +162,9 @@ pub unsafe extern "C" fn bth_nearest(
 /// # Safety
 /// The arguments are as in [`Arguments`].
 #[inline(never)]
-unsafe fn nearest_of_batch(arguments: Arguments<Ray, Hit>) {
+unsafe fn nearest_of_batch(arguments: Arguments<Ray, Hit>) -> i32 {
     // SAFETY: the contract is the same. `Ray` and `Hit` have the layout of the C structs.
-    unsafe { arguments.store(Hit::MISS, |scene, rays, hits| scene.batch(rays).nearest(hits)) };
+    unsafe { arguments.store(Hit::MISS, |scene, rays, hits| scene.batch(rays).nearest(hits)) }
 }
 
 /// Stores which rays hit anything; see `bth.h`.
@@ -181,15 +178,15 @@ pub unsafe extern "C" fn bth_any(
     _reserved: *const PrimitiveRef,
     hit: *mut u8,
     count: usize,
-) {
+) -> i32 {
     if count == 1 {
         // SAFETY: as in `bth_nearest`; `hit` is null or points to a byte that is valid for writes.
         let one = unsafe { (scene.as_ref(), rays.as_ref(), hit.as_mut()) };
         if let (Some(scene), Some(ray), Some(hit)) = one {
             let (ray, mut found) = (from_ref(ray), [false]);
-            let traced = guarded(|| scene.batch(ray).any(&mut found));
-            *hit = (traced.is_ok() && found[0]).into();
-            return;
+            let code = guarded(|| scene.batch(ray).any(&mut found)).unwrap_or_else(|code| code);
+            *hit = (code == OK && found[0]).into();
+            return code;
         }
     }
     // SAFETY: the contract is the same.
@@ -201,10 +198,10 @@ pub unsafe extern "C" fn bth_any(
 /// # Safety
 /// The arguments are as in [`Arguments`].
 #[inline(never)]
-unsafe fn any_of_batch(arguments: Arguments<Ray, u8>) {
+unsafe fn any_of_batch(arguments: Arguments<Ray, u8>) -> i32 {
     // SAFETY: the contract is the same. The caller's bytes are not used as a slice of `bool`, which
     // has invalid bit patterns.
-    unsafe { arguments.store_as(false, |scene, rays, found| scene.batch(rays).any(found), u8::from) };
+    unsafe { arguments.store_as(false, |scene, rays, found| scene.batch(rays).any(found), u8::from) }
 }
 
 /// Bytes of the sections that traversal reads; see `bth.h`.

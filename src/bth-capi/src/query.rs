@@ -87,6 +87,31 @@ impl<Q, A: Copy> Arguments<Q, A> {
     }
 }
 
+/// Defines functions of C that answer a query: of a scene, what is asked, further parameters, where
+/// the answers go, and the number of what is asked.
+macro_rules! queries {
+    ($($(#[$doc:meta])* fn $name:ident($asked:ty $(, $more:ident: $type:ty)*) -> $answer:ty = |$arguments:ident| $call:expr;)+) => { $(
+        $(#[$doc])*
+        ///
+        /// # Safety
+        /// The arguments are as in `Arguments`. Other pointers, and those in structs, are null or
+        /// valid as `bth.h` says.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $name(
+            scene: *const runtime::Scene,
+            asked: *const $asked,
+            $($more: $type,)*
+            answers: *mut $answer,
+            count: usize,
+        ) -> i32 {
+            let $arguments = crate::query::Arguments { scene, asked, answers, count };
+            // SAFETY: the contract is the same.
+            unsafe { $call }
+        }
+    )+ };
+}
+pub(crate) use queries;
+
 /// Runs a query. A panic must not unwind into C: it would be a defect of the library, and becomes a
 /// code.
 #[inline(always)]

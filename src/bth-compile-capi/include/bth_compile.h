@@ -1,4 +1,4 @@
-/* C interface of the compiler of BTH files: compiles triangles in memory. Link with libbth_compile; libbth (bth.h) opens what it
+/* C interface of the compiler of BTH files: compiles triangles in memory, and model files. Link with libbth_compile; libbth (bth.h) opens what it
  * makes, from memory or from a file, and does not need this library.
  *
  * All functions may be called from any thread, and several compilations may run at the same time.
@@ -17,8 +17,9 @@ extern "C" {
 #define BTH_COMPILE_OK 0
 #define BTH_COMPILE_ERROR_ARGUMENT (-1)  /* a null pointer, an unknown option, options that exclude each other, a path
                                             that is empty or not UTF-8 */
-#define BTH_COMPILE_ERROR_FILE (-2)      /* the cache or the profile could not be read or written */
-#define BTH_COMPILE_ERROR_INPUT (-3)     /* the triangles cannot be used: an index out of range, a position that is not finite */
+#define BTH_COMPILE_ERROR_FILE (-2)      /* the model, the cache or the profile could not be read or written */
+#define BTH_COMPILE_ERROR_INPUT (-3)     /* the triangles cannot be used: an index out of range, a position that is not finite; or the
+                                            file does not follow its format */
 #define BTH_COMPILE_ERROR_LIMIT (-4)     /* beyond a limit of the file format, or more threads than the system starts */
 #define BTH_COMPILE_ERROR_INTERNAL (-5)  /* a defect of this library */
 #define BTH_COMPILE_ERROR_CANCELLED (-6) /* the progress callback cancelled */
@@ -37,7 +38,7 @@ extern "C" {
 /* Values of bth_compile_options.free_directions: which directions are kept in which rays from a triangle meet nothing, and up to which
  * distance they do not, for rays that start on surfaces. */
 #define BTH_FREE_NONE 0u
-#define BTH_FREE_AUTO 1u      /* where that is worth its bytes, as the program bthc does by default */
+#define BTH_FREE_AUTO 1u      /* where that is worth its bytes: bthc --free-directions auto */
 #define BTH_FREE_DISTANCES 2u /* distances alone, 8 bytes a triangle */
 #define BTH_FREE_ALL 3u       /* 20 bytes a triangle */
 
@@ -69,7 +70,7 @@ typedef struct {
     double farthest;    /* the largest distance by which a position moves along an axis, in units of the mesh */
 } bth_rounding;
 
-/* Options. All zeros are the defaults of the program bthc, but for free directions, which it keeps where they are worth it. */
+/* Options. All zeros are the defaults of the program bthc. */
 typedef struct {
     uint32_t structure;        /* BTH_STRUCTURE_... */
     uint32_t quality;          /* BTH_QUALITY_... */
@@ -138,6 +139,11 @@ int32_t bth_compile_scene(const bth_mesh *meshes, size_t mesh_count, const bth_m
 int32_t bth_compile_mesh_f64(const bth_mesh64 *mesh, const bth_compile_options *options, bth_bytes *bytes);
 int32_t bth_compile_scene_f64(const bth_mesh64 *meshes, size_t mesh_count, const bth_mesh_instance *instances,
                               size_t instance_count, const bth_compile_options *options, bth_bytes *bytes);
+
+/* As bth_compile_mesh, for a model file: OBJ, PLY, STL, OFF, or a glTF or GLB file, whose scene at rest becomes one object. `path` is
+ * in UTF-8. The extension of the file decides about its format, or else its content. The bytes are those of `bthc compile --flatten`
+ * with the same options. */
+int32_t bth_compile_file(const char *path, const bth_compile_options *options, bth_bytes *bytes);
 
 /* Frees bytes and stores null and 0 in their place; null, and bytes that have been freed, are allowed. */
 void bth_free_bytes(bth_bytes *bytes);

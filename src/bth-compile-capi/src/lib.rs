@@ -19,6 +19,7 @@ use serde_json::Value;
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
 use std::sync::OnceLock;
 
 // Results of functions, `BTH_COMPILE_OK` and `BTH_COMPILE_ERROR_*` in C.
@@ -135,6 +136,31 @@ unsafe fn compile_mesh<'a, T: 'a>(
     unsafe {
         with_bytes(options, bytes, input, |mesh, options, cache, monitor| {
             let compiled = pipeline::compile_cached(*mesh, options, cache, &|_| true, monitor)?;
+            Ok((compiled.content, compiled.report))
+        })
+    }
+}
+
+/// Compiles a model file; see `bth_compile.h`.
+///
+/// # Safety
+/// The contract of [`bth_compile_mesh`], with `path` for `mesh`: it is null or points to a C
+/// string.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_compile_file(
+    path: *const c_char,
+    options: *const Options,
+    bytes: *mut Bytes,
+) -> i32 {
+    // SAFETY: by contract it is null, and then rejected, or points to a C string.
+    let path = (!path.is_null()).then(|| unsafe { CStr::from_ptr(path) }).and_then(|path| path.to_str().ok());
+    let path = path
+        .map(Path::new)
+        .ok_or_else(|| argument("expected a path in UTF-8, found null or other bytes".into()));
+    // SAFETY: the contract of this function includes the contract of `with_bytes`.
+    unsafe {
+        with_bytes(options, bytes, path, |path, options, cache, monitor| {
+            let compiled = pipeline::compile_cached(*path, options, cache, &|_| true, monitor)?;
             Ok((compiled.content, compiled.report))
         })
     }

@@ -74,6 +74,36 @@ pub(crate) fn lines_of(rays: &[Ray]) -> String {
     rays.iter().map(line).collect()
 }
 
+/// The declarations of functions in a text of C, with single blanks.
+fn declarations(text: &str) -> std::collections::BTreeSet<String> {
+    let code: String =
+        text.split("/*").map(|part| part.split_once("*/").map_or(part, |(_, code)| code)).collect();
+    let lines = code.lines().filter(|line| !line.starts_with(['#', '`', 'e', 'l']));
+    let code = lines.collect::<Vec<_>>().join(" ");
+    let words = code.split(';').map(|one| one.split_whitespace().collect::<Vec<_>>().join(" "));
+    let found = words.map(|one| one.trim_start_matches(['}', ' ']).to_owned());
+    found
+        .filter(|one| one.contains(" bth_") || one.contains("*bth_"))
+        .filter(|one| one.ends_with(')'))
+        .collect()
+}
+
+#[test]
+fn the_page_has_every_function_of_the_headers() {
+    let read = |path: &str| {
+        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)).expect(path)
+    };
+    let headers = ["src/bth-capi/include/bth.h", "src/bth-compile-capi/include/bth_compile.h"];
+    let mut of_headers: Vec<_> = headers.iter().flat_map(|path| declarations(&read(path))).collect();
+    let page = read("docs/c.md");
+    let blocks = page.split("\n```").skip(1).step_by(2).filter_map(|block| block.strip_prefix("text\n"));
+    let mut of_page: Vec<_> = blocks.flat_map(declarations).collect();
+    of_headers.sort();
+    of_page.sort();
+    of_headers.retain(|one| !one.starts_with("typedef"));
+    assert!(of_page.len() > 80 && of_page == of_headers, "{of_page:#?}\n{of_headers:#?}");
+}
+
 #[test]
 fn a_c_program_opens_traces_and_reads_errors() {
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -72,7 +72,7 @@ def test_known_rays(path):
     rows = np.hstack([origins, np.full((500, 1), 0.5), directions, np.full((500, 1), 9)]).astype("<f4")
     file = path.with_suffix(".rays")
     file.write_bytes(b"RAYS" + struct.pack("<IQ", 1, 500) + rows.tobytes())
-    command = [BTHC, "compile", path, "-o", path.with_suffix(".bth"), "--structure", "bvh", "--free-directions", "none", "--no-cache"]
+    command = [BTHC, "compile", path, "-o", path.with_suffix(".bth"), "--structure", "bvh", "--no-cache"]
     subprocess.run([*command, "--quiet", "--rays", file], check=True)
     scene = bth.compile(path, cache=False, rays=(origins, directions, 0.5, np.full(500, 9)))
     assert scene.to_bytes() == path.with_suffix(".bth").read_bytes()

@@ -17,7 +17,7 @@ fn limits_and_weights_decide_what_is_tetrahedralized() {
     let folder = folder(&[("ball.obj", &sphere(24))]);
     let compile = |more: &[&str]| {
         let args = ["compile", "ball.obj", "-o", "out.bth", "--json"];
-        bthc(folder.path(), &[&args[..], &CHEAP[..], more].concat()).expect(0).json()
+        bthc(folder.path(), &[&args[..], &CHEAP[..], more].concat()).expect(0).job()
     };
     let json = compile(&[]);
     if !worker_is_there(&json) {
@@ -40,12 +40,12 @@ fn limits_and_weights_decide_what_is_tetrahedralized() {
 fn tetrahedra_need_no_folder_for_temporary_files() {
     let folder = folder(&[("ball.obj", &sphere(24))]);
     let args = [&["compile", "ball.obj", "-o", "out.bth", "--json"], &CHEAP[..]].concat();
-    if !worker_is_there(&bthc(folder.path(), &args).expect(0).json()) {
+    if !worker_is_there(&bthc(folder.path(), &args).expect(0).job()) {
         return;
     }
     let mut without = command("bthc", folder.path(), &args);
     without.env("TMPDIR", folder.path().join("missing"));
-    let json = run_with(without).expect(0).json();
+    let json = run_with(without).expect(0).job();
     assert!(
         worker_is_there(&json) && json["report"]["file"]["tet_triangles"].as_u64().unwrap() > 0,
         "{json:#}"
@@ -59,9 +59,9 @@ fn tracing_reads_no_more_bytes_than_the_limit_and_what_cannot_be_held_is_said() 
         let args = ["compile", "ball.obj", "-o", "out.bth", "--no-cache", "--set", "min-tet-triangles=64"];
         bthc(folder.path(), &[&args[..], more].concat()).expect(0)
     };
-    let file = |more: &[&str]| compile(&[&["--json"], more].concat()).json()["report"]["file"].clone();
+    let file = |more: &[&str]| compile(&[&["--json"], more].concat()).job()["report"]["file"].clone();
     let each = |file: &serde_json::Value| file["resident_bytes_per_triangle"].as_f64().unwrap();
-    let plain = each(&file(&["--structure", "bvh", "--free-directions", "none"]));
+    let plain = each(&file(&["--structure", "bvh"]));
     for select in ["select=best", "select=paper"] {
         for more in [&["--set", "c-tet=0.001"][..], &["--set", "c-tet=0.001", "--set", "probe=off"]] {
             let with = |limit: f64| {
@@ -94,26 +94,27 @@ fn tracing_reads_no_more_bytes_than_the_limit_and_what_cannot_be_held_is_said() 
 }
 
 #[test]
-fn free_directions_are_kept_by_default_where_they_pay_and_fit() {
+fn free_directions_are_kept_if_asked_for_where_they_pay_and_fit() {
     let folder = folder(&[("ball.obj", &sphere(24))]);
     let kept = |more: &[&str]| {
         let args = ["compile", "ball.obj", "-o", "out.bth", "--no-cache", "--json", "--structure", "bvh"];
         let run = bthc(folder.path(), &[&args[..], more].concat()).expect(0);
-        let report = run.json()["report"].clone();
+        let report = run.job()["report"].clone();
         let each = report["file"]["resident_bytes_per_triangle"].as_f64().unwrap();
         (report["free"]["kept"].as_str().unwrap_or("none").to_owned(), each)
     };
-    let (none, plain) = kept(&["--free-directions", "none"]);
-    let (all, with) = kept(&[]);
+    let auto = ["--free-directions", "auto"];
+    let (none, plain) = kept(&[]);
+    let (all, with) = kept(&auto);
     assert_eq!([&none[..], &all[..]], ["none", "directions"]);
     assert!(with > plain + 19.9 && with < plain + 20.1, "{plain} {with}");
     for small in [&["--quality", "fast"][..], &["--coordinates", "16"]] {
         assert_eq!(kept(small).0, none, "{small:?}");
-        assert_eq!(kept(&[small, &["--free-directions", "auto"]].concat()).0, all, "{small:?}");
+        assert_eq!(kept(&[small, &auto].concat()).0, all, "{small:?}");
     }
     for (more, expected) in [(20.5, "directions"), (19.5, "distances"), (8.5, "distances"), (7.5, "none")] {
         let limit = plain + more;
-        let (kept, each) = kept(&["--max-bytes-per-triangle", &limit.to_string()]);
+        let (kept, each) = kept(&[&auto[..], &["--max-bytes-per-triangle", &limit.to_string()]].concat());
         assert_eq!(kept, expected, "{more}");
         assert!(each <= limit, "{each} {limit}");
     }

@@ -48,7 +48,7 @@ fn rays_take_fewer_steps_through_a_tree_that_is_made_for_such_rays() {
     bth_scenes::write::file(&torus_knot(30_000), &at("knot.ply")).unwrap();
     write(&at("view.rays"), &view(20_000, 1));
     let compile = |output: &str, more: &[&str]| {
-        let args = ["compile", "knot.ply", "--free-directions", "none", "-o", output];
+        let args = ["compile", "knot.ply", "-o", output];
         bthc(folder.path(), &[&args, more].concat()).expect(0)
     };
     compile("any.bth", &[]);
@@ -78,7 +78,7 @@ fn rays_take_fewer_steps_through_real_models() {
         let at = |name: &str| folder.path().join(name);
         let model = data.join("static").join(name).to_string_lossy().into_owned();
         let compile = |output: &str, more: &[&str]| {
-            let args = ["compile", &model, "--free-directions", "none", "-o", output];
+            let args = ["compile", &model, "-o", output];
             bthc(folder.path(), &[&args, more].concat()).expect(0);
         };
         compile("any.bth", &[]);
@@ -135,7 +135,7 @@ fn watching_heeds_new_rays() {
     let folder = folder(&[("ball.obj", &sphere(48))]);
     let path = folder.path();
     write(&path.join("a.rays"), &view(2000, 1));
-    let args = ["compile", "ball.obj", "--rays", "a.rays", "--free-directions", "none"];
+    let args = ["compile", "ball.obj", "--rays", "a.rays"];
     let mut child = command("bthc", path, &[&args[..], &["--watch"]].concat());
     let mut child = child.stdout(Stdio::piped()).spawn().unwrap();
     let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();

@@ -77,19 +77,11 @@ pub struct FreeOptions {
     /// Largest size of a row in bytes: [`KeepFree::Auto`] keeps nothing that takes more for each
     /// triangle.
     pub row_bytes: usize,
-    /// Largest number of triangles for which [`KeepFree::Auto`] decides anything: more take
-    /// minutes.
-    pub most_triangles: usize,
 }
 
 impl Default for FreeOptions {
     fn default() -> Self {
-        FreeOptions {
-            keep: KeepFree::default(),
-            reach: 1.0 / 16.0,
-            row_bytes: size_of::<FreeDirections>(),
-            most_triangles: usize::MAX,
-        }
+        FreeOptions { keep: KeepFree::default(), reach: 1.0 / 16.0, row_bytes: size_of::<FreeDirections>() }
     }
 }
 
@@ -130,10 +122,6 @@ pub fn find(
 ) -> Result<(Free, FreeReport)> {
     let (levels, rows) = (levels(tree, options.reach), tree.order.len());
     let mut free = Free { levels, ..Free::default() };
-    if options.keep == KeepFree::Auto && rows > options.most_triangles {
-        let report = FreeReport::new((mesh, tree), &[], levels, Kept::None);
-        return Ok((free, FreeReport { undecided: true, ..report }));
-    }
     monitor.stage("free directions", Some(rows as u64));
     let Some(wide) = Tree::new(mesh, tree) else {
         return Ok((free, FreeReport::new((mesh, tree), &[], levels, Kept::None)));

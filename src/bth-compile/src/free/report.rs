@@ -39,9 +39,6 @@ pub struct FreeReport {
     /// What [`super::KeepFree::Auto`] decided by: of what is kept, or of distances where nothing
     /// is.
     pub worth: Option<Worth>,
-    /// True if nothing was decided, since there are too many triangles
-    /// ([`super::FreeOptions::most_triangles`]).
-    pub undecided: bool,
 }
 
 impl FreeReport {

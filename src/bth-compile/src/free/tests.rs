@@ -375,11 +375,11 @@ fn huge_and_tiny_meshes_have_no_free_directions() {
 }
 
 #[test]
-fn what_is_too_large_or_has_no_room_is_left_out() {
+fn what_has_no_room_is_left_out() {
     let mesh = sphere(24, [0.0; 3]);
     let (tree, _) = bvh::build(&mesh, &BvhOptions::default(), &Silent).unwrap();
-    let of = |keep: KeepFree, most_triangles: usize, row_bytes: usize| {
-        let options = FreeOptions { keep, most_triangles, row_bytes, ..FreeOptions::default() };
+    let of = |keep: KeepFree, row_bytes: usize| {
+        let options = FreeOptions { keep, row_bytes, ..FreeOptions::default() };
         let (free, report) = find(&mesh, &tree, &options, &Silent).unwrap();
         let rows = [free.directions.len(), free.distances.len()];
         assert_eq!(
@@ -387,13 +387,11 @@ fn what_is_too_large_or_has_no_room_is_left_out() {
             [Kept::Directions, Kept::Distances]
                 .map(|kept| { usize::from(report.kept == kept) * mesh.triangles.len() })
         );
-        (report.kept, report.undecided)
+        report.kept
     };
-    let count = mesh.triangles.len();
-    assert_eq!(of(KeepFree::Auto, count, 20), (Kept::Directions, false));
-    assert_eq!(of(KeepFree::Auto, count, 19), (Kept::Distances, false));
-    assert_eq!(of(KeepFree::Auto, count, 7), (Kept::None, false));
-    assert_eq!(of(KeepFree::Auto, count - 1, 20), (Kept::None, true));
+    assert_eq!(of(KeepFree::Auto, 20), Kept::Directions);
+    assert_eq!(of(KeepFree::Auto, 19), Kept::Distances);
+    assert_eq!(of(KeepFree::Auto, 7), Kept::None);
     // Who asks for it gets it.
-    assert_eq!(of(KeepFree::All, 0, 0), (Kept::Directions, false));
+    assert_eq!(of(KeepFree::All, 0), Kept::Directions);
 }

@@ -39,8 +39,7 @@ def compile(
     It may query scenes, but not change one.
     threads: by default as many as queries use (see `set_threads`); the result does not depend on it.
 
-    All other options are those of `bthc compile`. `structure` is 'bvh' by default, since the package has no worker for tetrahedra, and
-    free_directions is 'none'.
+    All other options are those of `bthc compile`. `structure` is 'bvh' by default, since the package has no worker for tetrahedra.
     polygons ('ears') covers concave polygons of models in files exactly, which fans do not.
     positions ('auto', 'f64', 'f32') keeps positions in double precision: by default where float32 would move a vertex by more than 2^-24 of
     the object's size, always, or never.

@@ -156,7 +156,7 @@ fn check(bthc: &Path, data: &Path, model: &Path, file: &Path) -> Result<(bool, f
     match ended.code {
         Some(0) => {
             if let Some(listed) = listed_triangles(data, "messy", model) {
-                let found = json["report"]["mesh"]["triangles"].as_u64();
+                let found = json["jobs"][0]["report"]["mesh"]["triangles"].as_u64();
                 if found != Some(listed) && !differently_counted(model) {
                     return Err(format!("{found:?} triangles instead of {listed}"));
                 }

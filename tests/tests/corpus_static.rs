@@ -77,17 +77,13 @@ fn static_models_verify_and_answer_alike_with_and_without_tetrahedra() {
                     "--json".as_ref(),
                 ],
             );
-            let report: serde_json::Value = serde_json::from_str(&ended.stdout).unwrap();
-            assert_eq!(
-                report["report"]["mesh"]["triangles"].as_u64(),
-                Some(triangles),
-                "{}",
-                model.display()
-            );
+            let json: serde_json::Value = serde_json::from_str(&ended.stdout).unwrap();
+            let report = &json["jobs"][0]["report"];
+            assert_eq!(report["mesh"]["triangles"].as_u64(), Some(triangles), "{}", model.display());
             bthc(&compiler, &["verify".as_ref(), file.as_os_str()]);
             said += &format!(", {structure} in {:.1} s", ended.seconds);
             if structure == "bth" {
-                said += &format!(" with {} tet leaves", report["report"]["file"]["tet_leaves"]);
+                said += &format!(" with {} tet leaves", report["file"]["tet_leaves"]);
             }
             scenes.push(bth::open(&file).unwrap());
         }

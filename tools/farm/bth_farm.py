@@ -95,8 +95,9 @@ def compile_scene(client, scene, output, options, environment, count, on_done=la
     done = run_part("bthc", ["compile", scene, "-o", str(output), *options], environment)
     if isinstance(done, Failure):
         raise done
-    # A model is one object, and the part that compiles it reports the model and no number of objects.
-    done["farm"] = {"parts": count, "objects": sum(part.get("objects", int("model" in part)) for part in objects)}
+    done = done["jobs"][0]
+    # A model is one object, and the part that compiles it reports no number of objects.
+    done["farm"] = {"parts": count, "objects": sum(job.get("objects", 1) for part in objects for job in part["jobs"])}
     return done
 
 

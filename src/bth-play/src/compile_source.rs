@@ -179,8 +179,9 @@ fn compile(source: &Path, cache: &Path, materials: bool) -> Result<Done, Failure
     if !output.status.success() {
         return Err(failed(format!("{} ended with {}", bthc.display(), output.status)));
     }
-    let key = json["cache"]["key"].as_str().and_then(Digest::parse);
-    let inputs = json["inputs"].as_array().into_iter().flatten().filter_map(|path| path.as_str());
+    let job = &json["jobs"][0];
+    let key = job["cache"]["key"].as_str().and_then(Digest::parse);
+    let inputs = job["inputs"].as_array().into_iter().flatten().filter_map(|path| path.as_str());
     match key {
         Some(key) => Ok(Done { key, inputs: inputs.map(PathBuf::from).collect() }),
         None => Err(failed(format!("{} did not name the entry of the compiled file", bthc.display()))),

@@ -84,26 +84,17 @@ fn whole_rate(state: &ProgressState, out: &mut dyn std::fmt::Write) {
 #[derive(Debug)]
 pub(crate) struct Progress {
     bar: ProgressBar,
-    /// True if warnings are printed.
-    warns: bool,
 }
 
 impl Progress {
-    /// Without stages and warnings if `quiet`.
+    /// Without stages if `quiet`. Warnings are printed in any case.
     pub(crate) fn new(quiet: bool) -> Self {
-        Self::with_warnings(quiet, !quiet)
-    }
-
-    /// Without stages if `quiet`; whether warnings are printed is said apart.
-    pub(crate) fn with_warnings(quiet: bool, warns: bool) -> Self {
         let visible = !quiet && std::io::stderr().is_terminal();
         let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         POLLERS.fetch_add(1, Ordering::Relaxed);
-        Self { bar: ProgressBar::with_draw_target(None, target), warns }
+        Self { bar: ProgressBar::with_draw_target(None, target) }
     }
-}
 
-impl Progress {
     /// Turns the bar into one that counts jobs.
     pub(crate) fn of_jobs(self, total: u64) -> Self {
         self.stage("models", Some(total));
@@ -175,8 +166,6 @@ impl Monitor for Progress {
         is_cancelled()
     }
     fn warn(&self, message: &str) {
-        if self.warns {
-            self.bar.suspend(|| output::warning(message));
-        }
+        self.bar.suspend(|| output::warning(message));
     }
 }

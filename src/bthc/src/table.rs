@@ -1,7 +1,10 @@
 //! Plain text tables, and numbers, for people.
 
 use bth_files::printable;
-use comfy_table::{CellAlignment, presets};
+use comfy_table::{CellAlignment, ContentArrangement, presets};
+
+/// Max columns of a table. Longer cells are wrapped.
+const WIDTH: u16 = 100;
 
 /// A table without lines, whose first column is aligned left and whose others are aligned right.
 #[derive(Debug)]
@@ -11,6 +14,7 @@ impl Default for Table {
     fn default() -> Self {
         let mut table = comfy_table::Table::new();
         table.load_preset(presets::NOTHING);
+        table.set_content_arrangement(ContentArrangement::Dynamic).set_width(WIDTH);
         Self(table)
     }
 }
@@ -21,7 +25,14 @@ impl Table {
         self.0.add_row(cells.map(printable));
     }
 
-    /// The text, one line a row, without trailing blanks and without terminal codes.
+    /// Adds a row with a count, unless that is 0.
+    pub(crate) fn count(&mut self, name: &str, n: u64) {
+        if n > 0 {
+            self.row([name, &count(n)]);
+        }
+    }
+
+    /// The text, without trailing blanks and without terminal codes.
     pub(crate) fn render(mut self) -> String {
         for (i, column) in self.0.column_iter_mut().enumerate() {
             let (left_padding, alignment) = match i {
@@ -96,11 +107,16 @@ mod tests {
     }
 
     #[test]
-    fn long_cells_are_not_wrapped_and_wide_characters_are_aligned() {
-        let (long, mut table) = ("x".repeat(300), Table::default());
-        table.row([&long, "1"]);
+    fn long_cells_are_wrapped_and_wide_characters_are_aligned() {
+        let mut table = Table::default();
+        table.row(["name", &"words ".repeat(40)]);
         table.row(["日本", "22"]);
-        let blanks = " ".repeat(300 - 4 + 2);
-        assert_eq!(table.render(), format!("{long}   1\n日本{blanks}22\n"));
+        table.count("nothing", 0);
+        let text = table.render();
+        assert!(text.lines().all(|line| line.len() <= 100) && text.lines().count() == 4, "{text}");
+        assert!(
+            text.ends_with(&format!("日本{}22\n", " ".repeat(94))) && !text.contains("nothing"),
+            "{text}"
+        );
     }
 }

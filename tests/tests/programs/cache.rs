@@ -22,7 +22,7 @@ pub(crate) fn found(json: &Value) -> (Vec<String>, Vec<String>) {
 
 pub(crate) fn compile(folder: &Path, args: &[&str]) -> Value {
     let all = [&["compile", "--json", "--set", "min-tet-triangles=64", "--set", "c-tet=0.5"], args].concat();
-    cached(folder, &all).expect(0).json()
+    cached(folder, &all).expect(0).job()
 }
 
 fn stats(folder: &Path) -> Value {
@@ -84,14 +84,15 @@ fn neither_name_nor_folder_nor_time_is_part_of_a_key() {
 #[test]
 fn one_option_redoes_what_depends_on_it_and_says_so() {
     let folder = folder(&[("a.obj", &sphere(24))]);
-    let (hits, misses) = found(&compile(folder.path(), &["a.obj"]));
+    let free = ["--free-directions", "auto"];
+    let (hits, misses) = found(&compile(folder.path(), &[&["a.obj"][..], &free].concat()));
     assert!(hits.is_empty(), "{hits:?}");
     let tets = misses.contains(&"tets".to_owned());
     let all = ["file", "mesh", "bvh", "marks"].into_iter().chain(tets.then_some("tets"));
     let all: Vec<&str> = all.chain(["free-directions"]).collect();
     assert_eq!(misses, all);
 
-    let json = compile(folder.path(), &["a.obj", "--set", "record=tet16"]);
+    let json = compile(folder.path(), &[&["a.obj", "--set", "record=tet16"][..], &free].concat());
     let (hits, misses) = found(&json);
     assert_eq!(misses, ["file"], "another record: nothing but the file");
     assert_eq!(hits.iter().any(|h| h == "tets 1"), tets, "{hits:?}");
@@ -110,7 +111,7 @@ fn one_option_redoes_what_depends_on_it_and_says_so() {
 #[test]
 fn the_limit_on_bytes_tells_files_apart_that_have_no_tetrahedra() {
     let folder = folder(&[("a.obj", &sphere(24))]);
-    let args = ["a.obj", "-o", "a.bth", "--structure", "bvh"];
+    let args = ["a.obj", "-o", "a.bth", "--structure", "bvh", "--free-directions", "auto"];
     let limit = ["--max-bytes-per-triangle", "40"];
     compile(folder.path(), &args);
     let free = std::fs::read(folder.path().join("a.bth")).unwrap();
@@ -119,6 +120,35 @@ fn the_limit_on_bytes_tells_files_apart_that_have_no_tetrahedra() {
     assert!(limited.len() < free.len(), "{} and {}", limited.len(), free.len());
     compile(folder.path(), &args);
     assert!(std::fs::read(folder.path().join("a.bth")).unwrap() == free);
+}
+
+/// As on a disc or an image of a disk, which keep no empty folders.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_cache_on_a_read_only_disk_is_used_and_verified() {
+    let folder = folder(&[("a.obj", &sphere(8))]);
+    compile(folder.path(), &["a.obj"]);
+    std::fs::remove_dir(folder.path().join("cache/v1/locks")).unwrap();
+    let read_only = |args: &[&str]| {
+        let script = "mount --bind cache cache && mount -o remount,ro,bind cache && ! touch cache/x && exec \"$0\" \"$@\"";
+        let bthc = command("bthc", folder.path(), &[]).get_program().to_owned();
+        let mut command = std::process::Command::new("unshare");
+        command.args(["-rm", "sh", "-c", script]).arg(bthc).args(args).current_dir(folder.path());
+        command.env_remove("BTH_NO_CACHE").env("BTH_CACHE_DIR", folder.path().join("cache"));
+        command.output()
+    };
+    if !read_only(&["--version"]).is_ok_and(|done| done.status.success()) {
+        println!("skipped: a read-only disk, which needs namespaces of users");
+        return;
+    }
+    let said = |args: &[&str]| {
+        let done = read_only(args).unwrap();
+        assert!(done.status.success(), "{done:?}");
+        String::from_utf8(done.stdout).unwrap()
+    };
+    assert!(said(&["cache", "verify", "--cache-dir", "cache"]).contains("0 damaged"));
+    let compile = ["compile", "a.obj", "-o", "b.bth", "--set", "min-tet-triangles=64", "--set", "c-tet=0.5"];
+    assert!(said(&compile).contains("from the cache"));
 }
 
 #[test]
@@ -388,10 +418,11 @@ fn warnings_are_those_of_the_first_compilation() {
                 1,
                 "{args:?}: {run:?}"
             );
-            let json = cached(path, &[&args[..], &["--json"]].concat()).expect(0).json();
+            let json = cached(path, &[&args[..], &["--json"]].concat()).expect(0).job();
             let warnings = json["warnings"].as_array().unwrap();
             assert_eq!(warnings.len(), 1, "{args:?}: {json:#}");
-            assert_eq!(cached(path, &[&args[..], &["--quiet"]].concat()).expect(0).stderr, "");
+            let quiet = cached(path, &[&args[..], &["--quiet"]].concat()).expect(0);
+            assert_eq!((quiet.stdout.as_str(), quiet.stderr), ("", run.stderr));
         }
     }
 }
@@ -418,7 +449,7 @@ fn warnings_of_scenes_name_the_files() {
     ]);
     let path = folder.path();
     let warned = |model: &str| {
-        let json = cached(path, &["compile", model, "--json"]).expect(0).json();
+        let json = cached(path, &["compile", model, "--json"]).expect(0).job();
         let texts = json["warnings"].as_array().unwrap().iter().map(|text| text.as_str().unwrap().to_owned());
         let mut texts: Vec<String> = texts.collect();
         texts.sort();

@@ -17,7 +17,7 @@ fn json_holds_the_reports_of_all_stages() {
     let folder = folder(&[("ball.obj", &sphere(12))]);
     let compile = |more: &[&str]| {
         let all = [&["compile", "ball.obj", "-o", "out.bth", "--json"], more].concat();
-        bthc(folder.path(), &all).expect(0).json()
+        bthc(folder.path(), &all).expect(0).job()
     };
     // Where tetrahedra cannot pay no node is marked.
     let dear = compile(&["--set", "min-tet-triangles=64", "--set", "c-tet=1000"]);
@@ -38,6 +38,31 @@ fn quiet_prints_nothing() {
     let folder = folder(&[("ball.obj", &sphere(8))]);
     let run = bthc(folder.path(), &["compile", "ball.obj", "--quiet"]).expect(0);
     assert_eq!((run.stdout.as_str(), run.stderr.as_str()), ("", ""));
+}
+
+#[test]
+fn a_model_without_triangles_compiles_with_a_warning() {
+    let scene = r#"{"asset": {"version": "2.0"}, "nodes": [{}], "scenes": [{"nodes": [0]}]}"#;
+    let folder = folder(&[("points.obj", "v 0 0 0\nv 1 0 0\n"), ("scene.gltf", scene)]);
+    for model in ["points.obj", "scene.gltf"] {
+        for more in [&["--quiet"][..], &["--json"]] {
+            let run = bthc(folder.path(), &[&["compile", model][..], more].concat()).expect(0);
+            let warning = format!("{model} has no triangles, so no ray hits it");
+            assert!(run.stderr.contains(&warning), "{run:?}");
+            assert!(more == ["--quiet"] || run.job()["warnings"][0] == warning.as_str(), "{run:?}");
+        }
+    }
+}
+
+#[test]
+fn reports_have_no_rows_of_zeros_and_at_most_100_columns() {
+    let folder = folder(&[("ball.obj", &sphere(8))]);
+    let args = ["compile", "ball.obj", "--free-directions", "auto"];
+    let text = bthc(folder.path(), &args).expect(0).stdout;
+    assert!(text.contains("free directions") && text.contains("total"), "{text}");
+    for line in text.lines() {
+        assert!(line.len() <= 100 && !line.ends_with(" 0") && !line.ends_with(" 0.000 s"), "{line}");
+    }
 }
 
 #[test]
@@ -63,7 +88,7 @@ fn bytes_depend_on_neither_threads_nor_folder_nor_name() {
 fn structure_bvh_has_no_tet_leaves() {
     let folder = folder(&[("ball.obj", &sphere(24))]);
     let run = bthc(folder.path(), &["compile", "ball.obj", "--structure", "bvh", "--json"]).expect(0);
-    let report = &run.json()["report"];
+    let report = &run.job()["report"];
     assert_eq!(report["file"]["tet_leaves"], 0);
     assert!(report["marks"].is_null() && report["tets"].is_null());
 }
@@ -85,16 +110,10 @@ fn compact_tetrahedra_take_at_most_110_bytes_a_triangle() {
         ];
         let run = bthc(folder.path(), &[&cheap[..], &["--set", "probe=off"], more].concat()).expect(0);
         bthc(folder.path(), &["verify", name]).expect(0);
-        (
-            run.json()["report"]["file"]["tet_leaves"].as_u64(),
-            std::fs::read(folder.path().join(name)).unwrap(),
-        )
+        (run.job()["report"]["file"]["tet_leaves"].as_u64(), std::fs::read(folder.path().join(name)).unwrap())
     };
     let compact = compile("compact.bth", &["--compact"]);
-    assert!(
-        compact == compile("long.bth", &["--set", "record=tet16", "--free-directions", "none"]),
-        "what it is short for"
-    );
+    assert!(compact == compile("long.bth", &["--set", "record=tet16"]), "what it is short for");
     if compact.0 == Some(0) {
         println!("skipped: tetrahedra need the worker bth-tetgen");
         return;
@@ -127,7 +146,7 @@ fn geometry_is_left_out_on_request() {
 fn degenerate_triangles_are_counted_and_keep_their_ids() {
     let model = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 2 0 0\nf 1 2 4\nf 1 2 3\n";
     let folder = folder(&[("flat.obj", model)]);
-    let json = bthc(folder.path(), &["compile", "flat.obj", "--json"]).expect(0).json();
+    let json = bthc(folder.path(), &["compile", "flat.obj", "--json"]).expect(0).job();
     assert_eq!(json["report"]["mesh"]["degenerate"], 1);
     let scene = bth::open(folder.path().join("flat.bth")).unwrap();
     let ray = bth::rays::Ray {
@@ -181,7 +200,7 @@ fn concave_polygons_are_covered_exactly_where_that_is_asked_for() {
         let all =
             ["compile", "frame.obj", "-o", "out.bth", "--structure", "bvh", "--json", "--polygons", polygons];
         let run = bthc(folder.path(), &all).expect(0);
-        let mesh = &run.json()["report"]["mesh"];
+        let mesh = &run.job()["report"]["mesh"];
         assert_eq!((&mesh["concave"], &mesh["triangles"]), (&concave.into(), &8.into()), "{mesh:#}");
         assert_eq!(run.stderr.lines().count(), warnings, "{run:?}");
         let scene = bth::open(folder.path().join("out.bth")).unwrap();

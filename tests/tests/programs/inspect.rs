@@ -18,6 +18,29 @@ fn info_shows_sections_and_provenance_without_paths() {
     assert!(!json.to_string().contains("ball"), "{json:#}");
     let text = bthc(folder.path(), &["info", "ball.bth", "--cpu"]).expect(0).stdout;
     assert!(text.contains("LINES") && text.contains("architecture"), "{text}");
+    assert!(!text.contains('{') && !text.contains("tet leaves") && text.contains("made by"), "{text}");
+    assert!(text.lines().all(|line| line.len() <= 100), "{text}");
+}
+
+#[test]
+fn info_of_a_model_shows_its_box_names_and_materials() {
+    let text =
+        "o roof\nusemtl tiles\nv 1 2 3\nv 4 2 3\nv 1 6 3\nf 1 2 3\no wall\nv 1 2 -8\nf 1 2 4\nf 1 4 3\n";
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+               element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    let gltf = r#"{"asset": {"version": "2.0"}, "nodes": [{"name": "empty"}], "scenes": [{"nodes": [0]}]}"#;
+    let folder = folder(&[("house.obj", text), ("flat.ply", ply), ("scene.gltf", gltf)]);
+    let json = bthc(folder.path(), &["info", "house.obj", "--json"]).expect(0).json();
+    assert_eq!((&json["model"]["triangles"], &json["model"]["boundary_edges"]), (&3.into(), &3.into()));
+    assert_eq!((&json["lower"], &json["upper"]), (&[1.0, 2.0, -8.0].into(), &[4.0, 6.0, 3.0].into()));
+    assert_eq!(json["groups"][1], serde_json::json!({"name": "wall", "triangles": 2, "material": 0}));
+    assert_eq!(json["materials"][0], "tiles");
+    let text = bthc(folder.path(), &["info", "house.obj"]).expect(0).stdout;
+    assert!(text.contains("1 2 -8") && text.contains("roof") && text.contains("tiles"), "{text}");
+    assert!(bthc(folder.path(), &["info", "flat.ply"]).expect(0).stdout.contains("1 1 0"));
+    let json = bthc(folder.path(), &["info", "scene.gltf", "--json"]).expect(0).json();
+    assert_eq!((&json["import"]["nodes"], &json["model"]["triangles"]), (&1.into(), &0.into()));
+    assert!(bthc(folder.path(), &["info", "none.ply"]).expect(4).stderr.contains("BTH-O001"));
 }
 
 fn blake3_of(path: std::path::PathBuf) -> String {
@@ -148,7 +171,8 @@ fn explain_says_what_of_free_directions_compiling_keeps() {
             bthc(folder.path(), &["explain", model, "--json", "--free-picture", "free.png"]).expect(0).json();
         let png = std::fs::read(folder.path().join("free.png")).unwrap();
         assert!(png.starts_with(b"\x89PNG") && png.len() > 1000);
-        let compiled = bthc(folder.path(), &["compile", model, "--json"]).expect(0).json();
+        let args = ["compile", model, "--json", "--free-directions", "auto"];
+        let compiled = bthc(folder.path(), &args).expect(0).job();
         assert_eq!(json["free_directions"]["kept"], compiled["report"]["free"]["kept"], "{json:#}");
         all.push(json["free_directions"]["kept"].clone());
     }
@@ -205,7 +229,7 @@ fn info_lists_groups_and_materials() {
     assert_eq!(json["provenance"]["options"]["names"], true);
     let text = bthc(folder.path(), &["info", "car.bth"]).expect(0).stdout;
     let row = text.lines().find(|line| line.contains("body")).expect("a row of the group");
-    assert_eq!(row.split_whitespace().collect::<Vec<_>>(), ["0", "0", "body", "red", "\\u{7}paint", "2"]);
+    assert_eq!(row.split_whitespace().collect::<Vec<_>>(), ["0", "body", "red", "\\u{7}paint", "2"]);
     assert!(text.contains("6 more, see --json") && !text.contains('\u{7}'), "{text}");
 
     bthc(folder.path(), &["compile", "car.obj"]).expect(0);
@@ -232,7 +256,7 @@ fn verify_tells_of_which_objects_the_file_keeps_the_source() {
         ("dropped.bth", "verified; the file keeps no source to compare with\n"),
         (
             "both.bth",
-            "verified; 1 of 2 objects compared with the source's triangles, which the file keeps of no others\n",
+            "verified; 1 of 2 objects compared with the source's triangles; the file keeps no others\n",
         ),
     ] {
         let text = bthc(path, &["verify", name]).expect(0).stdout;

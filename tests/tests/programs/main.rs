@@ -19,6 +19,7 @@ mod play_files;
 #[cfg(unix)]
 mod recipes;
 mod scenes;
+mod schema;
 mod shutter;
 mod stress;
 mod support;

@@ -112,7 +112,7 @@ fn places_of_errors_name_standard_input_and_not_its_copy() {
         "{many:?}"
     );
     let kept = run(&["compile", "-", "--in-cache", "--cache-dir", "c", "--json"], "a.obj").expect(0);
-    assert_eq!(kept.json()["inputs"], serde_json::json!([]));
+    assert_eq!(kept.job()["inputs"], serde_json::json!([]));
 }
 
 /// A model is hashed and then read, and a pipe is empty after that.
@@ -138,7 +138,7 @@ fn a_model_from_standard_input_is_called_so_wherever_it_is_named() {
             command("bthc", path, &["compile", "-", "-o", output, "--depfile", "a.d", "--json"]);
         command.env_remove("BTH_NO_CACHE").env("BTH_CACHE_DIR", path.join("cache"));
         command.stdin(std::fs::File::open(path.join("a.obj")).unwrap());
-        run_with(command).expect(0).json()
+        run_with(command).expect(0).job()
     };
     let names = || std::fs::read_dir(path.join("cache/v1/last")).unwrap().count();
     assert_eq!(compile("a.bth")["model"], "-");

@@ -216,7 +216,7 @@ fn a_git_lfs_project_gets_its_compiled_files_from_the_shared_cache() {
     assert!(done.status.success(), "{done:?}");
     let json: serde_json::Value =
         serde_json::from_slice(&done.stdout[done.stdout.iter().position(|b| *b == b'{').unwrap()..]).unwrap();
-    assert_eq!(json["cache"]["hit"], true, "{json}");
+    assert_eq!(json["jobs"][0]["cache"]["hit"], true, "{json}");
     let bytes = |folder: &str| std::fs::read(project.at(folder).join("models/dragon.bth")).unwrap();
     assert!(bytes("first") == bytes("second"));
 }

@@ -67,7 +67,7 @@ fn manifests_compile_to_files_that_verify_and_tell_what_they_hold() {
     );
     let first = std::fs::read(folder.path().join("scene.bth")).unwrap();
     let args = ["compile", "scene.manifest", "-o", "b.bth", "--threads", "1", "--json"];
-    let json = run("bthc", folder.path(), &args).expect(0).json();
+    let json = run("bthc", folder.path(), &args).expect(0).job();
     assert_eq!(json["scene"]["instances"], 2);
     assert_eq!(json["scene"]["objects"][0]["names"][0], "ball");
     assert!(first == std::fs::read(folder.path().join("b.bth")).unwrap(), "threads change nothing");
@@ -359,7 +359,7 @@ nodes = [{ name = "a", object = "o" }, { name = "flat", object = "o", scale = [1
     let moved = model.replace("v 1 0 0", "v 2 0 0");
     let folder = folder(&[("o.obj", model), ("p.obj", model), ("q.obj", &moved), ("s.manifest", manifest)]);
     let run = run("bthc", folder.path(), &["compile", "s.manifest", "--json"]).expect(0);
-    let warnings = run.json()["warnings"].to_string();
+    let warnings = run.job()["warnings"].to_string();
     for text in ["o.obj: 2 elements are left out", "p.obj: 2 elements are left out", "node \\\"flat\\\""] {
         assert!(warnings.contains(text), "{warnings}");
     }
@@ -389,7 +389,7 @@ fn warnings_come_in_the_order_of_the_objects() {
     let folder = folder(&files);
     let run =
         run("bthc", folder.path(), &["compile", "order.manifest", "--json", "--threads", "4"]).expect(0);
-    let report = run.json();
+    let report = run.job();
     let warnings: Vec<_> =
         report["warnings"].as_array().unwrap().iter().map(|w| w.as_str().unwrap()).collect();
     assert_eq!(warnings.len(), names.len(), "{warnings:#?}");

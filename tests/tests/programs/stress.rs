@@ -139,7 +139,7 @@ fn two_compilations_of_one_model_do_the_work_once() {
     let runs = std::thread::scope(|scope| {
         let outputs = ["1.bth", "2.bth", "3.bth", "4.bth"];
         let running = outputs.map(|output| scope.spawn(move || run_with(start(output))));
-        running.into_iter().map(|thread| thread.join().unwrap().expect(0).json()).collect::<Vec<_>>()
+        running.into_iter().map(|thread| thread.join().unwrap().expect(0).job()).collect::<Vec<_>>()
     });
     let built = runs.iter().filter(|json| json["cache"]["hit"] == false).count();
     assert_eq!(built, 1, "one worked, the others waited");
@@ -162,7 +162,7 @@ fn two_scenes_with_an_object_in_common_build_it_once() {
     scenes.iter().for_each(|scene| std::fs::write(path.join(scene), manifest(scene)).unwrap());
     let compile = |scene| {
         let args = ["compile", scene, "--json", "--quality", "best"];
-        cached(path, &args).expect(0).json()
+        cached(path, &args).expect(0).job()
     };
     let runs = std::thread::scope(|scope| {
         let running = scenes.map(|scene| scope.spawn(move || compile(scene)));

@@ -13,11 +13,22 @@ pub(crate) struct Run {
     pub(crate) code: Option<i32>,
     pub(crate) stdout: String,
     pub(crate) stderr: String,
+    /// The first argument, if the program is `bthc`.
+    command: String,
 }
 
 impl Run {
+    /// What was printed with `--json`.
+    #[track_caller]
     pub(crate) fn json(&self) -> serde_json::Value {
-        serde_json::from_str(&self.stdout).unwrap_or_else(|e| panic!("{e} in {self:?}"))
+        let found = serde_json::from_str(&self.stdout).unwrap_or_else(|e| panic!("{e} in {self:?}"));
+        crate::schema::check(&self.command, &found);
+        found
+    }
+    /// The report on the first of the models that were compiled.
+    #[track_caller]
+    pub(crate) fn job(&self) -> serde_json::Value {
+        self.json()["jobs"][0].clone()
     }
     #[track_caller]
     pub(crate) fn expect(self, code: i32) -> Self {
@@ -47,7 +58,10 @@ pub(crate) fn run(program: &str, folder: &Path, args: &[&str]) -> Run {
 pub(crate) fn run_with(mut command: Command) -> Run {
     let output = command.output().unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
-    Run { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
+    let is_bthc = Path::new(command.get_program()).file_stem().is_some_and(|name| name == "bthc");
+    let name = command.get_args().next().filter(|_| is_bthc).unwrap_or_default();
+    let command = name.to_string_lossy().into_owned();
+    Run { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr), command }
 }
 
 pub(crate) fn bthc(folder: &Path, args: &[&str]) -> Run {

@@ -61,10 +61,10 @@ pub(crate) struct Compile {
     pub(crate) no_geometry: bool,
     /// Keep directions and distances in which rays from a triangle hit nothing. Such rays end at
     /// once or begin later, if the caller names the triangle. Takes 20 bytes a triangle,
-    /// `distances` 8. By default auto; none with --quality fast, --coordinates, --max-error or
-    /// --compact, and for objects of more than a million triangles.
-    #[arg(long, help_heading = KEPT, value_enum, value_name = "WHERE", conflicts_with = "deformable")]
-    pub(crate) free_directions: Option<Free>,
+    /// `distances` 8, and most of the time of compiling. It pays for rays that start on open
+    /// surfaces.
+    #[arg(long, help_heading = KEPT, value_enum, default_value_t = Free::None, value_name = "WHERE", conflicts_with = "deformable")]
+    pub(crate) free_directions: Free,
     /// Bits of a coordinate of a triangle leaf: f32, or 21 or 16 over the object's box. Fewer make
     /// smaller files; vertices move to the nearest points of a grid. By default f32, or what
     /// --max-error asks for.
@@ -75,8 +75,8 @@ pub(crate) struct Compile {
     /// fails if a vertex would move more.
     #[arg(long, help_heading = SMALLER, value_name = "DISTANCE", value_parser = str::parse::<MaxError>)]
     pub(crate) max_error: Option<MaxError>,
-    /// Make the smallest tetrahedralizations: short for `--set record=tet16
-    /// --free-directions none`. Takes 100 bytes a triangle where all triangles are in tetrahedra.
+    /// Make the smallest tetrahedralizations: short for `--set record=tet16`. Takes 100 bytes a
+    /// triangle where all triangles are in tetrahedra.
     #[arg(long, help_heading = SMALLER)]
     pub(crate) compact: bool,
     /// Keep what new positions at run time need: see docs/deforming.md. All vertices keep the order
@@ -88,10 +88,11 @@ pub(crate) struct Compile {
     /// Threads; 0 for one per processor. The result does not depend on it.
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = threads)]
     pub(crate) threads: usize,
-    /// Print the reports of all stages as one JSON object on standard output.
+    /// Print the reports of all stages as one JSON object on standard output, with one of `jobs`
+    /// for each model: see docs/bthc.schema.json.
     #[arg(long)]
     pub(crate) json: bool,
-    /// Print nothing but errors.
+    /// Print nothing but warnings and errors.
     #[arg(short, long)]
     pub(crate) quiet: bool,
     /// Make one object of a glTF file: its scene at rest, in world space, without hierarchy and
@@ -105,9 +106,6 @@ pub(crate) struct Compile {
     #[command(flatten)]
     pub(crate) keeping: Keeping,
 }
-
-/// Max triangles of an object that gets free directions by default: some ten seconds on two cores.
-pub(crate) const DEFAULT_MOST_TRIANGLES: usize = 1_000_000;
 
 impl Compile {
     /// The options of the compiler.
@@ -130,24 +128,13 @@ impl Compile {
             alpha: self.alpha.into(),
             record: if self.compact { RecordKind::Tet16 } else { RecordKind::Link32 },
             coordinates: self.coordinates(),
-            free: bth_compile::free::FreeOptions {
-                keep: self.free_directions().into(),
-                most_triangles: self.free_directions.map_or(DEFAULT_MOST_TRIANGLES, |_| usize::MAX),
-                ..Default::default()
-            },
+            free: bth_compile::free::FreeOptions { keep: self.free_directions.into(), ..Default::default() },
             geometry: !self.no_geometry,
             deformable: self.deformable,
             ..Default::default()
         };
         self.selection.apply(&mut options, monitor)?;
         Ok(options)
-    }
-
-    /// Fast compiling and small files exclude by default what only rays with a known start use.
-    fn free_directions(&self) -> Free {
-        let is_fast = self.selection.quality == Quality::Fast;
-        let is_small = self.compact || self.coordinates() != Default::default();
-        self.free_directions.unwrap_or(if is_fast || is_small { Free::None } else { Free::Auto })
     }
 
     fn coordinates(&self) -> CoordinateOptions {

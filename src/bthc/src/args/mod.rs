@@ -70,15 +70,16 @@ pub(crate) struct Import {
     /// Print one JSON object.
     #[arg(long)]
     pub(crate) json: bool,
-    /// Print nothing but errors.
+    /// Print nothing but warnings and errors.
     #[arg(short, long)]
     pub(crate) quiet: bool,
 }
 
-/// Show what a BTH file contains; or a glTF file's animations, and what a scene skips.
+/// Show what a BTH file or a model contains: boxes, names, materials; of a glTF file also its
+/// animations, and what a scene skips.
 #[derive(Debug, Group)]
 pub(crate) struct Info {
-    /// The compiled file, or a glTF or GLB file.
+    /// The compiled file, or a model: OBJ, PLY, STL, OFF, glTF, GLB.
     #[arg(required_unless_present = "cpu")]
     pub(crate) file: Option<PathBuf>,
     /// Show the processor's features that tracing may use.

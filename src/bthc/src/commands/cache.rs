@@ -77,10 +77,15 @@ fn stats(inventory: &Inventory) -> String {
             table.row([&format!("misses of {stage}, {reason}"), &count(*misses)]);
         }
     }
-    table.row(["hits of the shared cache", &count(statistics.shared_hits)]);
-    table.row(["written", &format!("{} ({})", count(statistics.stored), bytes(statistics.stored_bytes))]);
-    table.row(["evicted", &format!("{} ({})", count(statistics.evictions), bytes(statistics.evicted_bytes))]);
-    table.row(["damaged", &count(statistics.damaged)]);
+    table.count("hits of the shared cache", statistics.shared_hits);
+    let written = [
+        ("written", statistics.stored, statistics.stored_bytes),
+        ("evicted", statistics.evictions, statistics.evicted_bytes),
+    ];
+    for (name, n, size) in written.into_iter().filter(|(_, n, _)| *n > 0) {
+        table.row([name, &format!("{} ({})", count(n), bytes(size))]);
+    }
+    table.count("damaged", statistics.damaged);
     table.render()
 }
 

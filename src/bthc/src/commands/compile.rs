@@ -36,7 +36,7 @@ pub(crate) fn run(args: &Compile) -> Result<(), Failure> {
     }
     let mut jobs = plan(args, &models, from_input)?;
     check_rays(args, &jobs)?;
-    let progress = Progress::with_warnings(args.quiet || args.json, !args.quiet);
+    let progress = Progress::new(args.quiet || args.json);
     warn_of_options(args, &jobs, &progress);
     let store = args.keeping.store(&|text| progress.warn(text))?;
     let options = CompileOptions {
@@ -63,34 +63,38 @@ pub(crate) fn run(args: &Compile) -> Result<(), Failure> {
 /// Compiles all jobs, writes the dependency file, and prints the reports.
 fn all(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -> Result<(), Failure> {
     let args = context.args;
-    if let [job] = jobs {
-        let done = with_threads(args.threads, || compile_one(context, job, &progress))??;
+    let is_told = !args.json && !args.quiet;
+    let results = if let [job] = jobs {
+        let done = with_threads(args.threads, || compile_one(context, job, &progress)).flatten();
         drop(progress);
-        write_dependencies(context, jobs)?;
-        return match (args.json, args.quiet || job.target == Target::Stdout) {
-            (true, _) => Ok(output::json(&done.json)?),
-            (false, true) => Ok(()),
-            (false, false) => Ok(output::text(&done.text)?),
-        };
+        vec![done]
+    } else {
+        let progress = progress.of_jobs(jobs.len() as u64);
+        jobs::run(args, jobs, |job, threads| {
+            let name = job.name();
+            let monitor = Quiet::new(&progress, Path::new(&*name));
+            let done = with_threads(threads, || compile_one(context, job, &monitor)).flatten();
+            if let Ok(done) = &done
+                && is_told
+            {
+                progress.print(&done.line);
+            }
+            progress.done();
+            done
+        })
+    };
+    let failed = results.iter().find_map(|result| result.as_ref().err());
+    let (code, error) = (failed.map(Failure::exit_code), failed.and_then(Failure::diagnosis));
+    match code {
+        // Before the reports, since with --json an error takes their place.
+        None => write_dependencies(context, jobs)?,
+        Some(_) => output::fail(),
     }
-    let progress = progress.of_jobs(jobs.len() as u64);
-    let results = jobs::run(args, jobs, |job, threads| {
-        let name = job.name();
-        let monitor = Quiet::new(&progress, Path::new(&*name));
-        let done = with_threads(threads, || compile_one(context, job, &monitor))?;
-        if let Ok(done) = &done
-            && !args.json
-            && !args.quiet
-        {
-            progress.print(&done.line);
-        }
-        progress.done();
-        done
-    });
-    drop(progress);
-    let failed = results.iter().filter_map(|r| r.as_ref().err()).map(Failure::exit_code).next();
-    if failed.is_none() {
-        write_dependencies(context, jobs)?;
+    if let [Ok(done)] = results.as_slice()
+        && is_told
+        && jobs[0].target != Target::Stdout
+    {
+        output::text(&done.text)?;
     }
     let report = |(job, result): (&Job, Result<JobReport, Failure>)| match result {
         Ok(done) => done.json,
@@ -99,15 +103,17 @@ fn all(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -> Result<(),
             json!({"model": job.name(), "error": failure.diagnosis()})
         }
     };
-    let reports: Vec<_> = jobs.iter().zip(results).map(report).collect();
+    let mut all = json!({"jobs": jobs.iter().zip(results).map(report).collect::<Vec<_>>()});
     if args.json {
-        output::json(&json!({ "jobs": reports }))?;
+        if let Some(error) = error {
+            all["error"] = json!(error);
+        }
+        output::json(&all)?;
     }
-    failed.map_or(Ok(()), |code| Err(Failure::Reported(code)))
+    code.map_or(Ok(()), |code| Err(Failure::Reported(code)))
 }
 
-/// Writes the dependency file, if there is to be one. Before the reports, since with --json an
-/// error takes their place.
+/// Writes the dependency file, if there is to be one.
 fn write_dependencies(context: &JobContext<'_>, jobs: &[Job]) -> Result<(), Failure> {
     match &context.args.jobs.depfile {
         Some(path) => depfile::write(path, context, jobs),

@@ -6,6 +6,7 @@ use super::{deliver, scene};
 use crate::failure::Failure;
 use bth_compile::Monitor;
 use bth_compile::monitor::Recording;
+use serde_json::Value;
 
 /// Compiles a model or scene, or takes it from the cache, and brings it to its target. The report
 /// has the warnings, also from earlier compilations whose results are taken.
@@ -19,6 +20,16 @@ pub(super) fn compile_one(
 ) -> Result<JobReport, Failure> {
     let recording = Recording::with_notices(monitor);
     let mut report = compile_job(context, job, &recording).map_err(|failure| job.failure(failure))?;
+    if ["/report/mesh/triangles", "/scene/triangles"]
+        .iter()
+        .any(|at| report.json.pointer(at) == Some(&0.into()))
+    {
+        recording.warn(&format!("{} has no triangles, so no ray hits it", job.name()));
+    }
+    // Those that are kept with the result are among them.
+    for part in ["report", "scene"] {
+        report.json.get_mut(part).and_then(Value::as_object_mut).map(|kept| kept.remove("warnings"));
+    }
     report.json["warnings"] = recording.warnings().into();
     Ok(report)
 }

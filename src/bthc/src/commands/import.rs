@@ -1,7 +1,6 @@
 //! `bthc import`: writes a scene manifest for a glTF file.
 
 use super::scene::{folder, is_gltf};
-use super::summary::row_unless_zero;
 use crate::args::Import;
 use crate::failure::Failure;
 use crate::output;
@@ -26,7 +25,7 @@ pub(crate) fn run(args: &Import) -> Result<(), Failure> {
     }
     overwrite::check(&path, [&args.model])?;
     let name = name_from(folder(&path), &args.model)?;
-    let progress = Progress::with_warnings(args.quiet || args.json, !args.quiet);
+    let progress = Progress::new(args.quiet || args.json);
     let (manifest, report) = scene::import(&args.model, &name, &args.gltf.options(), &progress)?;
     let text = format!("# From {name}, scene {}.\n{}", comment(&report.scene), manifest.to_toml());
     if to_stdout {
@@ -91,15 +90,18 @@ pub(super) fn facts(report: &ImportReport) -> Table {
     table.row(["nodes", &count(report.nodes)]);
     table.row(["instances", &count(report.instances)]);
     table.row(["objects", &count(report.objects)]);
-    let all = |names: &[String]| names.iter().map(|name| name_or_number(name)).collect::<Vec<_>>().join(", ");
-    table.row(["animations", &all(&report.animations)]);
-    if !report.animations_left_out.is_empty() {
-        table.row(["animations left out", &all(&report.animations_left_out)]);
+    for (row, names) in
+        [("animations", &report.animations), ("animations left out", &report.animations_left_out)]
+    {
+        if !names.is_empty() {
+            let all: Vec<_> = names.iter().map(|name| name_or_number(name)).collect();
+            table.row([row, &all.join(", ")]);
+        }
     }
-    table.row(["objects that deform", &count(report.deformers)]);
-    row_unless_zero(&mut table, "instances of parts that move rigidly", report.rigid_parts);
-    table.row(["tracks", &count(report.tracks)]);
-    table.row(["cameras", &count(report.cameras)]);
-    table.row(["lights", &count(report.lights)]);
+    table.count("objects that deform", report.deformers);
+    table.count("instances of parts that move rigidly", report.rigid_parts);
+    table.count("tracks", report.tracks);
+    table.count("cameras", report.cameras);
+    table.count("lights", report.lights);
     table
 }

@@ -1,7 +1,8 @@
-//! `bthc info`: shows the contents of a compiled file.
+//! `bthc info`: shows the contents of a compiled file or a model.
+
+mod model;
 
 use super::holes::{Holes, holes};
-use super::scene::is_gltf;
 use crate::args::Info;
 use crate::failure::Failure;
 use crate::output;
@@ -10,51 +11,51 @@ use bth::Isa;
 use bth_format::File;
 use bth_format::layout::kind;
 use bth_format::layout::{
-    FREE_BINS, FREE_SECTORS, FreeBins, FreeSectors, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE, RecordKind,
-    SectionEntry,
+    FREE_BINS, FREE_SECTORS, FreeBins, FreeSectors, IDENTIFIER, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE,
+    RecordKind, SectionEntry,
 };
 use bth_format::object::ObjectView;
-use bth_import::gltf::scene::{self, ImportOptions};
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
+use std::io::Read;
 use std::path::Path;
 
 pub(crate) fn run(args: &Info) -> Result<(), Failure> {
-    if let Some(model) = args.file.as_ref().filter(|file| is_gltf(file)) {
-        return gltf(model, args.json);
-    }
-    let file = args.file.as_ref().map(File::read).transpose()?;
-    let named = |failure| match (failure, &args.file) {
-        (Failure::Runtime(error), Some(path)) => Failure::Runtime(error.in_file(path)),
-        (other, _) => other,
-    };
-    if args.json {
-        let mut value = file.as_ref().map_or_else(|| Ok(json!({})), describe).map_err(named)?;
-        if args.cpu {
-            value["cpu"] = cpu();
+    let (mut json, mut text) = match &args.file {
+        None => (json!({}), String::new()),
+        Some(path) if is_compiled(path) => {
+            let named = |failure| match failure {
+                Failure::Runtime(error) => Failure::Runtime(error.in_file(path)),
+                other => other,
+            };
+            let file = File::read(path)?;
+            let told =
+                if args.json { describe(&file).map(|json| (json, String::new())) } else { summary(&file) };
+            told.map_err(named)?
         }
-        return Ok(output::json(&value)?);
-    }
-    let mut text = file.as_ref().map_or_else(|| Ok(String::new()), summary).map_err(named)?;
+        Some(path) => model::tell(path, args.json)?,
+    };
     if args.cpu {
-        text.push_str(&format!("{:#}\n", cpu()));
+        json["cpu"] = cpu();
+        let mut facts = Table::default();
+        let shown =
+            |value: &Value| value.to_string().replace(['"', '{', '}', '[', ']'], "").replace(',', ", ");
+        json["cpu"]
+            .as_object()
+            .into_iter()
+            .flatten()
+            .for_each(|(name, value)| facts.row([name, &shown(value)]));
+        text.push_str(&facts.render());
     }
-    Ok(output::text(&text)?)
+    Ok(if args.json { output::json(&json) } else { output::text(&text) }?)
 }
 
-/// Shows what of a glTF file becomes a scene by default, and what is skipped.
-fn gltf(model: &Path, json: bool) -> Result<(), Failure> {
-    let options = ImportOptions::default();
-    let (manifest, report) = scene::import(model, "model", &options, &bth_import::Silent)?;
-    if json {
-        return Ok(output::json(&json!({"import": report, "last_frame": manifest.frames.last,
-            "rate": manifest.frames.rate}))?);
-    }
-    let mut facts = super::import::facts(&report);
-    facts.row(["frames", &format!("0 to {} at {}/s", manifest.frames.last, manifest.frames.rate)]);
-    for what in &report.ignored {
-        facts.row(["ignored", &what.escape_debug().to_string()]);
-    }
-    Ok(output::text(&format!("{}\n", facts.render()))?)
+/// Returns true for a file that is compiled, by its first bytes or its name; also for one that
+/// cannot be read.
+fn is_compiled(path: &Path) -> bool {
+    let mut first = [0; IDENTIFIER.len()];
+    let read = std::fs::File::open(path).map(|mut file| file.read_exact(&mut first));
+    path.extension().is_some_and(|extension| extension == "bth") || read.is_err() || first == IDENTIFIER
 }
 
 fn hex(bytes: &[u8]) -> String {
@@ -159,31 +160,22 @@ fn materials(file: &File, object: u32) -> Vec<Value> {
 /// Most groups of an object that the table shows.
 const SHOWN_GROUPS: usize = 40;
 
-/// A table of the groups of all objects; empty where the file keeps none.
-fn groups_table(file: &File) -> Result<String, Failure> {
-    let mut table = Table::default();
-    table.row(["object", "group", "name", "material", "triangles"]);
-    let mut rows = 0;
-    for object in 0..file.object_count() {
-        let view = file.object(object)?;
-        let name = file.object_name(object);
-        let shown = if name.is_empty() { object.to_string() } else { name.escape_debug().to_string() };
-        let counts = view.triangles_of_groups();
-        for group in 0..view.groups.len().min(SHOWN_GROUPS) {
-            let row = group as u32;
-            let material = view.material_of(row).map_or("", |material| view.material_name(material));
-            let (name, material) = (view.group_name(row).escape_debug(), material.escape_debug());
-            let cells = [shown.clone(), row.to_string(), name.to_string(), material.to_string()];
-            let [object, group, name, material] = cells.each_ref().map(String::as_str);
-            table.row([object, group, name, material, &count(counts[row as usize])]);
-            rows += 1;
-        }
-        if view.groups.len() > SHOWN_GROUPS {
-            let rest = format!("{} more, see --json", view.groups.len() - SHOWN_GROUPS);
-            table.row([shown.as_str(), "", &rest, "", ""]);
-        }
+/// A table of groups with their materials and numbers of triangles; empty if there are no groups.
+fn groups_table<'a>(rows: impl ExactSizeIterator<Item = (&'a str, &'a str, u64)>) -> String {
+    let (mut table, all) = (Table::default(), rows.len());
+    table.row(["group", "name", "material", "triangles"]);
+    for (i, (name, material, triangles)) in rows.take(SHOWN_GROUPS).enumerate() {
+        table.row([&i.to_string(), name, material, &count(triangles)]);
     }
-    Ok(if rows == 0 { String::new() } else { format!("{}\n", table.render()) })
+    if all > SHOWN_GROUPS {
+        table.row(["", &format!("{} more, see --json", all - SHOWN_GROUPS), "", ""]);
+    }
+    if all == 0 { String::new() } else { format!("\n{}", table.render()) }
+}
+
+/// A point or a box's corner.
+fn point<T: ToString>(numbers: &[T]) -> String {
+    numbers.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
 }
 
 /// The scene; null without scene sections.
@@ -206,26 +198,27 @@ fn version(code: u32) -> String {
     format!("{}.{}", code >> 16, code & 0xffff)
 }
 
-fn summary(file: &File) -> Result<String, Failure> {
+/// What people read; the JSON is empty.
+fn summary(file: &File) -> Result<(Value, String), Failure> {
     let header = file.header();
     let mut facts = Table::default();
     facts.row(["format", &version(header.writer_version)]);
     facts.row(["content id", &hex(&file.content_id()[..16])]);
     facts.row(["file", &bytes(header.file_length)]);
     facts.row(["traversal reads", &bytes(file.resident_bytes())]);
-    for object in 0..file.object_count() {
-        add_object(&mut facts, file, object)?;
-    }
     if let Some(view) = file.check_scene()? {
         let scene = &view.scene[0];
-        facts.row(["nodes", &count(view.nodes.len() as u64)]);
-        facts.row(["instances", &count(view.instances.len() as u64)]);
-        facts.row(["tracks", &count(view.tracks.len() as u64)]);
-        facts.row(["objects that deform", &count(view.deformers.len() as u64)]);
+        facts.count("nodes", view.nodes.len() as u64);
+        facts.count("instances", view.instances.len() as u64);
+        facts.count("tracks", view.tracks.len() as u64);
+        facts.count("objects that deform", view.deformers.len() as u64);
         facts.row(["frames", &format!("{} to {} at {}/s", scene.first_frame, scene.last_frame, scene.rate)]);
-        for camera in 0..view.cameras.len() as u32 {
-            facts.row(["camera", &view.camera_name(camera).escape_debug().to_string()]);
-        }
+        (0..view.cameras.len() as u32).for_each(|camera| facts.row(["camera", view.camera_name(camera)]));
+    }
+    made_by(&provenance(file), &mut facts);
+    let mut text = facts.render();
+    for object in 0..file.object_count() {
+        text.push_str(&object_text(file, object)?);
     }
     let mut sections = Table::default();
     sections.row(["section", "rows", "size"]);
@@ -233,27 +226,47 @@ fn summary(file: &File) -> Result<String, Failure> {
         let e = section.entry;
         sections.row([kind::name(e.kind), &count(e.count), &bytes(e.length)]);
     }
-    let made = file.provenance().map_or(String::new(), |text| format!("\n{}\n", printable(text)));
-    Ok(format!("{}\n{}{}{made}", facts.render(), groups_table(file)?, sections.render()))
+    Ok((Value::Null, format!("{text}\n{}", sections.render())))
 }
 
-/// Adds the facts of an object, behind a row that tells which it is where the file has several.
-fn add_object(facts: &mut Table, file: &File, object: u32) -> Result<(), Failure> {
-    let view = file.object(object)?;
-    if file.object_count() > 1 {
-        let name = file.object_name(object).escape_debug();
+/// The program, the source's formats and the main options that made a file.
+fn made_by(provenance: &Value, facts: &mut Table) {
+    let text = |value: &Value| value.as_str().map(str::to_owned).unwrap_or_else(|| value.to_string());
+    if let (Some(tool), Some(version)) = (provenance.get("tool"), provenance.get("version")) {
+        facts.row(["made by", &format!("{} {}", text(tool), text(version))]);
+    }
+    let sources = provenance["sources"].as_array().into_iter().flatten().chain(provenance.get("source"));
+    let formats: BTreeSet<String> = sources.map(|source| text(&source["format"])).collect();
+    if !formats.is_empty() {
+        facts.row(["from", &formats.into_iter().collect::<Vec<_>>().join(", ")]);
+    }
+    let options = provenance["options"].as_object().into_iter().flatten();
+    let options = options.filter(|(_, value)| !value.is_object() && !value.is_null());
+    let options: Vec<_> = options.map(|(name, value)| format!("{name} {}", text(value))).collect();
+    if !options.is_empty() {
+        facts.row(["options", &options.join(", ")]);
+    }
+}
+
+/// The facts of an object, behind a row that tells which it is where the file has several.
+fn object_text(file: &File, object: u32) -> Result<String, Failure> {
+    let (view, mut facts) = (file.object(object)?, Table::default());
+    let name = file.object_name(object);
+    if file.object_count() > 1 || !name.is_empty() {
         facts.row(["object", format!("{object} {name}").trim_end()]);
     }
     facts.row(["triangles", &count(view.header.triangles.into())]);
-    facts.row(["dropped", &count(view.header.dropped.into())]);
+    facts.row(["lower", &point(&view.header.lower)]);
+    facts.row(["upper", &point(&view.header.upper)]);
+    facts.count("dropped", view.header.dropped.into());
     facts.row(["depth", &count(view.header.depth.into())]);
     if let Some(grid) = &view.grid {
         facts.row(["coordinates", &format!("{} bits", grid.bits as u32)]);
         facts.row(["vertices moved by at most", &view.header.displacement.to_string()]);
     }
     if !view.exact.is_empty() {
-        let [x, y, z] = view.anchor;
-        facts.row(["positions", &format!("f64; leaves are f32, relative to {x}, {y}, {z}")]);
+        let anchor = point(&view.anchor);
+        facts.row(["positions", &format!("f64; leaves and box are f32, relative to {anchor}")]);
     }
     if let Some(Holes { triangles, shares: [opaque, transparent, unknown] }) = holes(&view) {
         facts.row(["triangles with holes", &count(triangles)]);
@@ -267,24 +280,22 @@ fn add_object(facts: &mut Table, file: &File, object: u32) -> Result<(), Failure
         let frames = format!("{} from {first} to {last} s", sequence.times.len());
         facts.row(["frames of its vertices", &frames]);
     }
-    facts.row(["tet leaves", &count(view.tet_leaves.len() as u64)]);
-    facts.row(["triangles in tet leaves", &count(view.tet_faces.len() as u64)]);
-    facts.row(["tetrahedra", &count(view.records.len() as u64)]);
-    facts.row(["record", record(&view)]);
+    if !view.tet_leaves.is_empty() {
+        facts.row(["tet leaves", &count(view.tet_leaves.len() as u64)]);
+        facts.row(["triangles in tet leaves", &count(view.tet_faces.len() as u64)]);
+        facts.row(["tetrahedra", &count(view.records.len() as u64)]);
+        facts.row(["record", record(&view)]);
+    }
     let own = |e: &&SectionEntry| e.object == object && file.is_traced(e);
     let traced: u64 = file.sections().map(|s| s.entry).filter(own).map(|e| e.length).sum();
     let per_triangle = traced as f64 / f64::from(view.header.triangles.max(1));
     facts.row(["bytes a triangle", &format!("{per_triangle:.1}")]);
-    Ok(())
-}
-
-/// JSON without characters that would change the state of a terminal.
-fn printable(json: &str) -> String {
-    let escaped = |c: char| match c {
-        '"' | '\\' | '\'' => c.to_string(),
-        _ => c.escape_debug().to_string(),
-    };
-    json.chars().map(escaped).collect()
+    let counts = view.triangles_of_groups();
+    let groups = (0..view.groups.len()).map(|group| {
+        let material = view.material_of(group as u32).map_or("", |material| view.material_name(material));
+        (view.group_name(group as u32), material, counts[group])
+    });
+    Ok(format!("\n{}{}", facts.render(), groups_table(groups)))
 }
 
 /// The processor's features that kernels may use.

@@ -2,10 +2,10 @@
 
 use super::deliver::deliver;
 use super::job::{self, Job, JobContext, JobReport, Target};
-use super::summary::{row_unless_zero, worker_note};
+use super::summary::{stages, worker_note};
 use crate::args::{Compile, Gltf};
 use crate::failure::Failure;
-use crate::table::{Table, bytes, count, seconds};
+use crate::table::{Table, bytes, count};
 use bth_compile::Monitor;
 use bth_compile::cached::Cache;
 use bth_compile::pipeline::DryRun;
@@ -154,41 +154,31 @@ fn motion(facts: &mut Table, report: &SceneReport) {
 
 /// The report of a compiled scene for people.
 fn summary(report: &SceneReport) -> String {
-    let mut stages = Table::default();
-    for stage in &report.seconds {
-        stages.row([stage.name, &seconds(stage.seconds)]);
-    }
-    stages.row(["total", &seconds(report.seconds.iter().map(|s| s.seconds).sum())]);
-
     let mut facts = Table::default();
     facts.row(["nodes", &count(report.nodes)]);
     facts.row(["instances", &count(report.instances)]);
     facts.row(["objects", &count(report.objects.len() as u64)]);
     let stored_once = report.objects.iter().map(|object| object.names.len().saturating_sub(1) as u64).sum();
-    row_unless_zero(&mut facts, "objects of equal geometry, stored once", stored_once);
-    row_unless_zero(&mut facts, "objects that nobody sees, left out", report.unused.len() as u64);
-    row_unless_zero(&mut facts, "objects that deform", report.deformers);
-    row_unless_zero(&mut facts, "tracks", report.tracks);
-    row_unless_zero(&mut facts, "cameras", report.cameras);
-    row_unless_zero(&mut facts, "lights", report.lights);
+    facts.count("objects of equal geometry, stored once", stored_once);
+    facts.count("objects that nobody sees, left out", report.unused.len() as u64);
+    facts.count("objects that deform", report.deformers);
+    facts.count("tracks", report.tracks);
+    facts.count("cameras", report.cameras);
+    facts.count("lights", report.lights);
     facts.row(["frames", &format!("{} to {} at {}/s", report.first_frame, report.last_frame, report.rate)]);
     facts.row(["triangles", &count(report.triangles)]);
     facts.row(["triangles of all instances", &count(report.instanced_triangles)]);
-    row_unless_zero(&mut facts, "degenerate (never hit)", report.objects.iter().map(|o| o.degenerate).sum());
+    facts.count("degenerate (never hit)", report.objects.iter().map(|o| o.degenerate).sum());
     let rounded = report.objects.iter().filter_map(|o| o.rounding.as_ref());
-    row_unless_zero(&mut facts, "positions moved by rounding", rounded.clone().map(|r| r.positions).sum());
-    row_unless_zero(&mut facts, "triangles without area by rounding", rounded.map(|r| r.triangles).sum());
+    facts.count("positions moved by rounding", rounded.clone().map(|r| r.positions).sum());
+    facts.count("triangles without area by rounding", rounded.map(|r| r.triangles).sum());
     let in_f64 = report.objects.iter().filter(|o| o.avoided_rounding.is_some()).count();
-    row_unless_zero(&mut facts, "objects with positions in f64", in_f64 as u64);
-    row_unless_zero(&mut facts, "tet leaves", report.objects.iter().map(|o| o.tet_leaves).sum());
-    row_unless_zero(
-        &mut facts,
-        "triangles in tet leaves",
-        report.objects.iter().map(|o| o.tet_triangles).sum(),
-    );
+    facts.count("objects with positions in f64", in_f64 as u64);
+    facts.count("tet leaves", report.objects.iter().map(|o| o.tet_leaves).sum());
+    facts.count("triangles in tet leaves", report.objects.iter().map(|o| o.tet_triangles).sum());
     motion(&mut facts, report);
     facts.row(["file", &bytes(report.bytes)]);
     facts.row(["traversal reads", &bytes(report.resident_bytes)]);
     let note = worker_note(report.worker.as_ref());
-    format!("{}\n{}{note}\n", stages.render(), facts.render())
+    format!("{}\n{}{note}\n", stages(&report.seconds), facts.render())
 }

@@ -2,26 +2,20 @@
 
 use crate::table::{Table, bytes, count, seconds};
 use bth_compile::free::Kept;
-use bth_compile::pipeline::CompileReport;
+use bth_compile::pipeline::{CompileReport, StageTime};
 use bth_compile::tets::WorkerStatus;
 use bth_import::Rounding;
 
 /// The stages with their seconds, then counts. `known_rays` are those for which the tree was built.
 pub(super) fn summary(report: &CompileReport, known_rays: u64) -> String {
-    let mut stages = Table::default();
-    for stage in &report.seconds {
-        stages.row([stage.name, &seconds(stage.seconds)]);
-    }
-    stages.row(["total", &seconds(report.seconds.iter().map(|s| s.seconds).sum())]);
-
     let mut facts = Table::default();
     let (mesh, file) = (&report.mesh, &report.file);
     facts.row(["triangles", &count(mesh.triangles)]);
-    row_unless_zero(&mut facts, "degenerate (never hit)", mesh.degenerate);
-    row_unless_zero(&mut facts, "duplicate", mesh.duplicate);
+    facts.count("degenerate (never hit)", mesh.degenerate);
+    facts.count("duplicate", mesh.duplicate);
     if let Some(rounding) = &mesh.rounding {
-        row_unless_zero(&mut facts, "positions moved by rounding", rounding.positions);
-        row_unless_zero(&mut facts, "triangles without area by rounding", rounding.triangles);
+        facts.count("positions moved by rounding", rounding.positions);
+        facts.count("triangles without area by rounding", rounding.triangles);
     }
     if let Some(avoided) = &mesh.avoided_rounding {
         let Rounding { positions, farthest, triangles } = avoided;
@@ -32,25 +26,22 @@ pub(super) fn summary(report: &CompileReport, known_rays: u64) -> String {
         );
         facts.row(["positions", &f32_would]);
     }
-    row_unless_zero(&mut facts, "concave polygons", mesh.concave);
-    row_unless_zero(&mut facts, "elements skipped", mesh.skipped);
-    row_unless_zero(&mut facts, "boundary edges", mesh.boundary_edges);
-    row_unless_zero(&mut facts, "non-manifold edges", mesh.non_manifold_edges);
+    facts.count("concave polygons", mesh.concave);
+    facts.count("elements skipped", mesh.skipped);
+    facts.count("boundary edges", mesh.boundary_edges);
+    facts.count("non-manifold edges", mesh.non_manifold_edges);
     if let Some(opacity) = &mesh.opacity {
         facts.row(["triangles of cut-out materials", &count(opacity.triangles)]);
         let [opaque, transparent, unknown] = [opacity.opaque, opacity.transparent, opacity.unknown]
             .map(|share| format!("{:.1} %", 100.0 * share));
         facts.row(["opaque, transparent, unknown", &format!("{opaque}, {transparent}, {unknown}")]);
     }
-    row_unless_zero(&mut facts, "known rays", known_rays);
+    facts.count("known rays", known_rays);
     if let Some(free) = &report.free {
         let [near, middle, far] = free.beyond.map(|share| 100.0 * share);
         let shares =
             format!("{:.0} %, up to distances {near:.0} %, {middle:.0} %, {far:.0} %", 100.0 * free.free);
         let told = match free.kept {
-            Kept::None if free.undecided => {
-                "left out of objects so large; --free-directions auto finds them".to_owned()
-            }
             Kept::None if free.worth.is_none_or(|worth| worth.is_unmeasured()) => {
                 "none kept: no ray met the model, or the limit on bytes leaves no room".to_owned()
             }
@@ -66,34 +57,37 @@ pub(super) fn summary(report: &CompileReport, known_rays: u64) -> String {
         facts.row(["coordinates", &format!("{} bits", found.bits)]);
         facts.row(["vertices moved by at most", &found.displacement.to_string()]);
     }
-    if let Some(marks) = &report.marks {
+    if let Some(marks) = report.marks.as_ref().filter(|marks| marks.nodes > 0) {
         facts.row(["suitable nodes", &format!("{} of {}", count(marks.suitable), count(marks.nodes))]);
     }
     if let Some(tets) = &report.tets {
-        facts.row(["nodes chosen", &count(tets.chosen)]);
-        facts.row(["tet leaves", &count(file.tet_leaves)]);
-        facts.row(["triangles in tet leaves", &count(file.tet_triangles)]);
-        facts.row(["tetrahedra", &count(tets.tets)]);
-        facts.row(["Steiner points", &count(tets.steiner_points)]);
-        row_unless_zero(&mut facts, "nodes split after failure", tets.split);
-        row_unless_zero(&mut facts, "nodes left to the BVH", tets.given_up);
+        facts.count("nodes chosen", tets.chosen);
+        facts.count("tet leaves", file.tet_leaves);
+        facts.count("triangles in tet leaves", file.tet_triangles);
+        facts.count("tetrahedra", tets.tets);
+        facts.count("Steiner points", tets.steiner_points);
+        facts.count("nodes split after failure", tets.split);
+        facts.count("nodes left to the BVH", tets.given_up);
     }
     facts.row(["file", &bytes(file.bytes)]);
     facts.row(["traversal reads", &bytes(file.resident_bytes)]);
     facts.row(["bytes a triangle", &format!("{:.1}", file.resident_bytes_per_triangle)]);
     format!(
         "{}\n{}{}\n",
-        stages.render(),
+        stages(&report.seconds),
         facts.render(),
         worker_note(report.tets.as_ref().map(|t| &t.worker))
     )
 }
 
-/// Adds a row unless the count is 0.
-pub(super) fn row_unless_zero(table: &mut Table, name: &str, n: u64) {
-    if n > 0 {
-        table.row([name, &count(n)]);
+/// The stages that took any time, and the total.
+pub(super) fn stages(all: &[StageTime]) -> String {
+    let mut table = Table::default();
+    for stage in all.iter().filter(|stage| stage.seconds >= 0.0005) {
+        table.row([stage.name, &seconds(stage.seconds)]);
     }
+    table.row(["total", &seconds(all.iter().map(|stage| stage.seconds).sum())]);
+    table.render()
 }
 
 /// Why nodes were not tetrahedralized, if the worker is missing or unusable.

@@ -66,10 +66,10 @@ fn summary(report: &Report, deep: Option<deep::Report>) -> String {
     table.row(["objects", &count(report.objects.into())]);
     table.row(["sections", &count(report.sections)]);
     table.row(["file", &bytes(report.bytes)]);
-    table.row(["triangles", &count(report.triangles)]);
-    table.row(["dropped", &count(report.dropped)]);
-    table.row(["tet leaves", &count(report.tet_leaves)]);
-    table.row(["tetrahedra", &count(report.tets)]);
+    table.count("triangles", report.triangles);
+    table.count("dropped", report.dropped);
+    table.count("tet leaves", report.tet_leaves);
+    table.count("tetrahedra", report.tets);
     if let Some(deep) = deep {
         table.row(["rays compared", &count(deep.rays)]);
         table.row(["hits", &count(deep.hits)]);
@@ -79,7 +79,7 @@ fn summary(report: &Report, deep: Option<deep::Report>) -> String {
         (compared, objects) if compared == objects => "compared with the source's triangles".to_owned(),
         (0, _) => "the file keeps no source to compare with".to_owned(),
         (compared, objects) => format!(
-            "{compared} of {objects} objects compared with the source's triangles, which the file keeps of no others"
+            "{compared} of {objects} objects compared with the source's triangles; the file keeps no others"
         ),
     };
     format!("{}verified; {source}\n", table.render())

@@ -114,6 +114,11 @@ export interface Scene {
     nearestOne(ray: ArrayLike<number>, hit: Partial<Hit>, side?: Side): boolean;
     /** As `nearestOne`: true if the ray hits anything. */
     anyOne(ray: ArrayLike<number>, side?: Side): boolean;
+    /**
+     * Calls a function with each hit of one ray, in order of t; returns their number. Nothing is
+     * allocated. The function must not ask this module for the hits of another ray.
+     */
+    eachHit(ray: ArrayLike<number>, visit: (t: number, u: number, v: number, instance: number, triangle: number) => void, side?: Side): number;
     /** All hits of one ray, in order of t. */
     allHits(ray: ArrayLike<number>, side?: Side): Hits<Float64Array>;
     /** As `nearestStarts`: for each ray 1 if it hits anything, else 0. */

@@ -98,22 +98,25 @@ export class Scene {
         return this.#wasm.bth_any_one(this.#open(), this.#memory.rays, sideOf(side)) === 1;
     }
 
-    allHits(ray, side) {
+    eachHit(ray, visit, side) {
+        const scene = this.#open();
         this.#copyRay(ray);
-        const hits = new Hits(this.#wasm.bth_all_hits(this.#open(), this.#memory.rays, sideOf(side)), Float64Array);
-        const rows = new Float64Array(this.#wasm.memory.buffer, this.#wasm.bth_hits(), 4 * hits.count);
-        const words = new Uint32Array(rows.buffer, rows.byteOffset, 8 * hits.count);
-        for (let i = 0; i < hits.count; i++) {
-            hits.t[i] = rows[4 * i];
-            hits.u[i] = rows[4 * i + 1];
-            hits.v[i] = rows[4 * i + 2];
-            hits.instance[i] = words[8 * i + 6];
-            hits.triangle[i] = words[8 * i + 7];
-        }
+        const count = this.#wasm.bth_all_hits(scene, this.#memory.rays, sideOf(side));
+        if (count === 0) return 0;
+        const { floats, words } = this.#views(), first = this.#wasm.bth_hits() >>> 3;
+        for (let i = 0, at = first; i < count; i++, at += 4) visit(floats[at], floats[at + 1], floats[at + 2], words[2 * at + 6], words[2 * at + 7]);
+        return count;
+    }
+
+    allHits(ray, side) {
+        const rows = [];
+        this.eachHit(ray, (...numbers) => rows.push(numbers), side);
+        const hits = new Hits(rows.length, Float64Array);
+        HIT_NAMES.forEach((name, k) => hits[name].set(rows.map((row) => row[k])));
         return hits;
     }
 
-    /** Views of the module's memory for one ray and its hit. They are made again when it has grown, which detaches them. */
+    /** Views of the module's memory: one ray, its hit, and all of it. They are made again when it has grown, which detaches them. */
     #views() {
         const memory = this.#memory;
         if (memory.views === null || memory.views.ray.length === 0) {
@@ -122,6 +125,8 @@ export class Scene {
                 ray: new Float64Array(buffer, memory.rays, RAY),
                 numbers: new Float64Array(buffer, memory.results, 3),
                 indices: new Uint32Array(buffer, memory.results, 8),
+                floats: new Float64Array(buffer, 0, buffer.byteLength >>> 3),
+                words: new Uint32Array(buffer),
             };
         }
         return memory.views;

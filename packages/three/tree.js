@@ -109,8 +109,8 @@ export class BoundsTree {
             const found = this.#intersections([hit], material, ray, frame);
             if (found.length > 0) return found.slice(0, 1);
         }
-        const { count, triangle, u, v } = this.scene.allHits(row, side);
-        const hits = Array.from({ length: count }, (_, i) => ({ triangle: triangle[i], u: u[i], v: v[i] }));
+        const hits = [];
+        if (this.scene.eachHit(row, (t, u, v, instance, triangle) => hits.push({ u, v, triangle }), side) === 0) return hits;
         // In the order of three.js, which tests one face after the other.
         hits.sort((one, other) => one.triangle - other.triangle);
         const found = this.#intersections(hits, material, ray, frame);
@@ -252,8 +252,7 @@ export class InstancedTree {
         if (raycaster.firstHitOnly) {
             if (this.scene.nearestOne(row, hit, side)) found.push({ ...hit });
         } else {
-            const { count, instance, triangle, u, v } = this.scene.allHits(row, side);
-            for (let i = 0; i < count; i++) found.push({ instance: instance[i], triangle: triangle[i], u: u[i], v: v[i] });
+            this.scene.eachHit(row, (t, u, v, instance, triangle) => found.push({ instance, triangle, u, v }), side);
             found.sort((one, other) => one.instance - other.instance || one.triangle - other.triangle);
         }
         for (const one of found) {

@@ -79,6 +79,12 @@ test("one ray a call gives the numbers of a batch", () => {
         assert.deepEqual(hit, { t: hits.t[i], u: hits.u[i], v: hits.v[i], instance: 0, triangle: hits.triangle[i] });
         const all = scene.allHits(ray), front = scene.allHits(ray, "front"), back = scene.allHits(ray, "back");
         assert.equal(all.t[0], hit.t);
+        let k = 0;
+        const count = scene.eachHit(ray, (...numbers) => {
+            assert.deepEqual(numbers, ["t", "u", "v", "instance", "triangle"].map((name) => all[name][k]));
+            k++;
+        });
+        assert.equal(count, all.count);
         assert.equal(all.count, front.count + back.count);
         assert.equal(scene.nearestOne(ray, hit, "back"), back.count > 0);
         if (back.count > 0) assert.equal(hit.triangle, back.triangle[0]);

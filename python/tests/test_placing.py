@@ -87,6 +87,16 @@ def test_of_a_model_and_of_one_index():
     assert scene.instance_names == ["", "", ""]
 
 
+def test_models_in_double_precision():
+    far = PIECES[0][0].astype(np.float64) / 3 + [5.5e6, 4.2e5, 300]
+    back = np.eye(4)
+    back[:3, 3] = [-5.5e6, -4.2e5, -300]
+    scene = bth.compile_scene([(far, PIECES[0][1])], transforms=np.stack([np.eye(4), np.eye(4)]))
+    scene.set_transforms([0, 1], [back @ np.eye(4), matrices(1, 4)[0] @ back])
+    expected = bth.compile_scene([(far, PIECES[0][1])], transforms=scene.transforms)
+    assert scene.vertices().dtype == np.float64 and answers(scene) == answers(expected)
+
+
 def test_no_object_is_compiled():
     scene = bth.compile(PIECES[0])
     size = scene.nbytes

@@ -35,6 +35,17 @@ def masks(scene: bth.Scene) -> list[int]:
     return [int(mask) for mask in masks]
 
 
+def moved(scene: bth.Scene) -> int:
+    one: int = scene.add_instances()
+    ids: int | NDArray[np.uint32] = scene.add_instances([0, 0], np.stack([np.eye(4)] * 2))
+    scene.set_transforms(ids, np.eye(4))
+    scene.set_visible(one, False)
+    scene.remove_instances(one)
+    closed: bool | None = scene.is_closed
+    assert closed and scene.is_object_closed(0) and not scene.visible[one]
+    return scene.instance_count
+
+
 def many(scene: bth.Scene, points: NDArray[np.float64]) -> None:
     every: bth.AllHits = scene.all_hits(points, [0, 0, 1], most=3)
     offsets: NDArray[np.int64] = every.offsets
@@ -76,4 +87,5 @@ def main(folder: Path) -> None:
         assert code.startswith("BTH-F")
     many(scene, np.full((2, 3), 0.1))
     assert nearest(scene, np.array([[0.2, 0.2, -1, 0, 0, 1]], np.float32)).tolist() == [[0, 0, -1]]
-    assert masks(scene) == [3]
+    assert masks(scene) == [3] and moved(scene) == 4
+    assert issubclass(bth.OpenMeshWarning, UserWarning)

@@ -81,7 +81,9 @@ class Camera:
         directions = np.stack([around * np.cos(turns), around * np.sin(turns), heights], axis=-1)
         enclosed = scene.any(eyes[:, None], directions).mean(axis=1)
         best = int(np.lexsort((scene.closest(eyes).distance, np.round(enclosed * 8)))[-1])
-        level = directions - dot(directions, UP[up])[:, None] * UP[up] * 0.8
+        # Slightly down, all around.
+        level, turns = np.tile(-0.15 * UP[up], (64, 1)), np.arange(64) * math.tau / 64
+        level[:, np.nonzero(UP[up] == 0)[0]] = np.stack([np.cos(turns), np.sin(turns)], axis=-1)
         t = scene.nearest(eyes[best], level).t
         forward = level[int(np.argmax(np.where(np.isfinite(t), t, 0)))]
         camera = Camera.looking(eyes[best], forward, UP[up], size, field)

@@ -13,8 +13,8 @@ from ._progress import Progress, chunks
 from ._sampling import hemisphere
 from ._surface import SurfacePoints, at_vertices
 
-#: Mean openness below which a bake shows nothing.
-_BLACK = 0.01
+#: Share of black points from which on a bake is likely not what is wanted.
+_BLACK = 0.5
 SIDES = {"front": (1,), "back": (-1,), "both": (1, -1)}
 
 
@@ -55,15 +55,17 @@ def ambient_occlusion(
             blocked = scene.any(None, directions, tmax=distance, start=start, threads=threads)
             open_rays.append((leaves & ~blocked).sum(axis=1))
         result[points] = np.maximum.reduce(open_rays) / np.float64(rays)
-    if len(usable) and np.nanmean(result, dtype=np.float64) < _BLACK:
-        _warn_of_black(at, distance, side)
+    black = np.count_nonzero(result == 0) / max(len(usable), 1)
+    if black >= _BLACK:
+        _warn_of_black(black, at, distance, side)
     return result
 
 
-def _warn_of_black(at: SurfacePoints, distance: float, side: str) -> None:
+def _warn_of_black(black: float, at: SurfacePoints, distance: float, side: str) -> None:
     """Says why everything is black: in a closed room nothing sees the sky."""
     size = float(np.ptp(at.position, axis=0).max())
     hints = [] if math.isfinite(distance) else [f"distance (--distance) counts near occluders only, such as {0.2 * size:.2g} of a room's {size:.2g}"]
     hints += [] if side == "both" else ["side='both' (--side both) takes the more open side of triangles"]
     hint = f" (hint: {'; '.join(hints)})" if hints else ""
-    warnings.warn(f"nearly everything is black, as inside of a closed room, where no sky is seen{hint}", UserWarning, stacklevel=3)
+    message = f"{100 * black:.0f} % of the points are black: no ray from them reaches the sky, as inside of a closed room{hint}"
+    warnings.warn(message, UserWarning, stacklevel=3)

@@ -3,7 +3,6 @@
 import numpy as np
 
 from . import _arrays, _meshes, _native
-from ._contents import _index
 
 
 def _ids(instances, name="instances"):
@@ -12,10 +11,12 @@ def _ids(instances, name="instances"):
 
 
 class Placing:
-    """The calls that place instances. Nothing is compiled or built for an object, and answers are those of a scene compiled anew.
+    """The calls that place instances.
 
-    Instances keep their index until they are removed. All of a call's changes become visible, or none if it fails. Scenes that move by
-    the tracks of their file are refused with a ValueError.
+    Nothing is compiled or built for an object, and answers are those of a scene compiled with these
+    transforms. Instances keep their index until they are removed. All of a call's changes become
+    visible, or none if it fails. Scenes that move by the tracks of their file are refused with a
+    ValueError.
     """
 
     __slots__ = ()
@@ -23,22 +24,30 @@ class Placing:
     def set_transforms(self, instances, matrices):
         """Moves instances.
 
-        instances: an index or indices (n,). matrices: from the object's space to world space, applied to columns; (n, 4, 4), (n, 3, 4),
-        or one for all.
+        instances: an index or indices (n,).
+        matrices: from the object's space to world space, applied to columns; (n, 4, 4),
+        (n, 3, 4), or one for all.
         """
         instances = _ids(instances)
-        _native.set_transforms(self._native, instances, _meshes.matrices_of(matrices, len(instances), "matrices"))
+        _native.set_transforms(
+            self._native, instances, _meshes.matrices_of(matrices, len(instances), "matrices")
+        )
 
     def add_instances(self, obj=0, matrices=None):
         """Adds instances of objects of the scene.
 
-        obj: the index of an object, or indices (n,). matrices: as for `set_transforms`; by default the identity. Returns the index of the
-        new instance, or indices (n,) uint32. The indices of removed instances are used again.
+        obj: the index of an object, or indices (n,).
+        matrices: as for `set_transforms`; by default the identity.
+
+        Returns the index of the new instance, or indices (n,) uint32. Indices of removed instances
+        are used again, the lowest first.
         """
         matrices = np.eye(4) if matrices is None else _arrays.plain(matrices, "matrices")
         shape = np.broadcast_shapes(np.shape(obj), matrices.shape[:-2])
         objects = _ids(np.broadcast_to(_arrays.indices(obj, "obj"), shape), "obj")
-        ids = _native.add_instances(self._native, objects, _meshes.matrices_of(matrices, len(objects), "matrices"))
+        ids = _native.add_instances(
+            self._native, objects, _meshes.matrices_of(matrices, len(objects), "matrices")
+        )
         self._looked_for_open = False
         return np.array(ids, np.uint32).reshape(shape) if shape else ids[0]
 
@@ -47,21 +56,34 @@ class Placing:
         _native.remove_instances(self._native, _ids(instances))
 
     def set_visible(self, instances, visible=True):
-        """Shows or hides instances: an index or indices (n,), and one truth value or (n,). Hidden ones keep their index and transform."""
+        """Shows or hides instances: an index or indices (n,), and one truth value or (n,).
+
+        Hidden ones keep their index and transform.
+        """
         instances = _ids(instances)
-        _native.set_visible(self._native, instances, np.array(np.broadcast_to(np.asarray(visible, bool), len(instances))))
+        _native.set_visible(
+            self._native,
+            instances,
+            np.array(np.broadcast_to(np.asarray(visible, bool), len(instances))),
+        )
         self._looked_for_open = False
 
     # For pickles.
 
     def _placement(self):
         """What `_place` takes: None if the file places the instances."""
-        return (self.objects_of_instances, self.transforms, self.visible, self.instance_names) if self._native.placed else None
+        return (
+            (self.objects_of_instances, self.transforms, self.visible, self.instance_names)
+            if self._native.placed
+            else None
+        )
 
     def _place(self, objects, transforms, visible, names):
-        """Places the instances of a file that was just opened as those of another scene of the file."""
+        """Places the instances of a file that was just opened as another scene of it has them."""
         count, none = self.instance_count, objects == 0xFFFFFFFF
-        kept = (self.objects_of_instances == objects[:count]) & (np.array(self.instance_names, object) == np.array(names[:count], object))
+        kept = (self.objects_of_instances == objects[:count]) & (
+            np.array(self.instance_names, object) == np.array(names[:count], object)
+        )
         self.remove_instances(np.nonzero(~kept)[0])
         # The indices that are free are given in ascending order.
         missing = np.append(np.nonzero(~kept)[0], np.arange(count, len(objects)))

@@ -80,3 +80,19 @@ install_missing() {
     [ "$1" = plain ] || have_chromium || note "No Chromium: the test of the viewer page is skipped."
     [ "$1" = plain ] || have_venv || note "No python3 with venv: the Python cross-checks are skipped."
 }
+
+# package_tools: puts maturin, zig and cargo-zigbuild on PATH, from PyPI, in a virtual environment in the build's folder. Zig compiles C
+# and C++ and links, for systems with an older C library, for musl, and for other processors.
+package_tools() {
+    local tools=$target_dir/package-tools
+    if [ ! -x "$tools/bin/cargo-zigbuild" ]; then
+        "${PYTHON:-python3}" -m venv "$tools"
+        "$tools/bin/pip" install --quiet --disable-pip-version-check 'maturin>=1.9,<2' 'cargo-zigbuild>=0.24,<0.25' 'ziglang>=0.17,<0.18'
+    fi
+    PATH=$tools/bin:$PATH
+}
+# have_target TARGET: returns true if there is a standard library for it, or it can be added.
+have_target() {
+    [ -d "$(rustc --print sysroot)/lib/rustlib/$1/lib" ] && return 0
+    command -v rustup >/dev/null && rustup target add "$1" >/dev/null 2>&1
+}

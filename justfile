@@ -16,14 +16,14 @@ bench old new *models:
 docs:
     cargo doc --no-deps --workspace --exclude bth-tetgen
 
-# Build the documentation site into target/book; needs mdbook. `just book serve` shows it.
-book verb="build":
-    mdbook {{verb}}
+# Build the site into target/book; needs mdbook (`just site --install`).
+site *options:
+    tools/site {{options}}
 
 # Find spelling mistakes; needs typos.
 spell:
     typos
 
-# Install the libraries and headers for C and C++ below a folder.
+# Build what a release uploads into a folder, and try it.
 package folder:
-    tools/package/install {{folder}}
+    tools/package/all {{folder}}

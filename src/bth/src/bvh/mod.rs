@@ -3,8 +3,8 @@
 //! Three traversals share the node formats ([`nodes`]) and the decisions about triangles ([`leaf`],
 //! [`candidate`]):
 //!
-//! - [`single`]: one ray, with its stack ([`single_stack`]), and its certain hit
-//!   ([`certain_hit`]);
+//! - [`single`]: one ray, with its stack ([`single_stack`]), guesses of where it goes ([`guesses`])
+//!   and its certain hit ([`certain_hit`]);
 //! - [`interleaved`]: a pool of rays ([`ray_pool`], [`ray_state`]) that step in turn, with their
 //!   stacks ([`stack`]) and with hits that are computed for sixteen rays at a time ([`deferred`]);
 //! - [`packet`]: coherent rays that enter nodes together.
@@ -21,6 +21,7 @@ pub(crate) mod candidate;
 pub(crate) mod certain_hit;
 pub(crate) mod deferred;
 pub(crate) mod enumerate;
+pub(crate) mod guesses;
 #[cfg(test)]
 pub(crate) mod height_field;
 pub(crate) mod interleaved;

@@ -5,6 +5,7 @@
 //! of its depth, and its t, u and v are computed in f64 once, at the end ([`super::certain_hit`]).
 
 use super::certain_hit::CertainHit;
+use super::guesses::Guesses;
 use super::leaf::{CodedLeaf, LeafOutcome, RayProgress, decide, enter_leaf};
 use super::nodes::{Leaf, LeafMemory, leaf, prefetch};
 use super::ray_state::key_limit;
@@ -89,10 +90,11 @@ impl<G: Goal> RayProgress<G> for SingleState<'_, G> {
     }
 }
 
-/// A ray and the object that it goes through.
+/// A ray, the object that it goes through, and where the last rays went.
 pub(crate) struct RayInObject<'a> {
     pub(crate) object: &'a ObjectView<'a>,
     pub(crate) ray: ExactRay<'a>,
+    pub(crate) guesses: &'a Guesses,
 }
 
 /// What a single ray looks for, and its query once that is needed.
@@ -109,7 +111,7 @@ pub(crate) struct SingleQuery<'a, G: Goal> {
 #[inline(always)]
 pub(crate) fn trace_single<S: Simd, G: Goal, C: Count>(
     s: S,
-    RayInObject { object, ray }: RayInObject<'_>,
+    RayInObject { object, ray, guesses }: RayInObject<'_>,
     prepared: &PreparedRay,
     bounds: &ObjectBounds,
     SingleQuery { goal, query }: SingleQuery<'_, G>,
@@ -134,7 +136,7 @@ pub(crate) fn trace_single<S: Simd, G: Goal, C: Count>(
     // Stack entries with a greater key are dropped.
     let mut limit = key_limit(state.last);
     loop {
-        let nodes = SingleNodes { node_base, last: state.last, limit };
+        let nodes = SingleNodes { node_base, guesses, last: state.last, limit };
         code = descend(s, prepared, nodes, code, goal, &mut stack, count);
         let mut memory = LeafMemory::default();
         let done = match leaf(s, object, node_base, code, &mut memory) {
@@ -179,6 +181,7 @@ pub(crate) fn trace_single<S: Simd, G: Goal, C: Count>(
 /// The nodes of an object, and which of them a single ray need not enter.
 struct SingleNodes<'a> {
     node_base: NodeBase<'a>,
+    guesses: &'a Guesses,
     /// Deeper hits cannot change the result.
     last: f32,
     /// Stack entries with a greater key cannot, either.
@@ -190,7 +193,7 @@ struct SingleNodes<'a> {
 fn descend<S: Simd, G: Goal, C: Count>(
     s: S,
     prepared: &PreparedRay,
-    SingleNodes { node_base, last, limit }: SingleNodes<'_>,
+    SingleNodes { node_base, guesses, last, limit }: SingleNodes<'_>,
     mut code: u32,
     goal: G,
     stack: &mut OpenSingleStack<'_>,
@@ -201,6 +204,7 @@ fn descend<S: Simd, G: Goal, C: Count>(
     while code & Child::LEAF_BIT == 0 {
         let Some(node) = node_base.wide_node(code) else { break };
         count.node();
+        let guess = guesses.of(code, goal);
         let (bits, enter) = planes.children_soon(s, node, last);
         if bits == 0 {
             code = stack.pop(limit, goal);
@@ -208,7 +212,7 @@ fn descend<S: Simd, G: Goal, C: Count>(
         }
         // For an any-hit query stacking is so cheap that one branch less is faster.
         if !goal.is_any() && bits & (bits - 1) == 0 {
-            code = node.child[bits.trailing_zeros() as usize % WIDTH];
+            code = guess.corrected(node.child[bits.trailing_zeros() as usize % WIDTH]);
             continue;
         }
         let free = stack.free_entries();
@@ -217,12 +221,12 @@ fn descend<S: Simd, G: Goal, C: Count>(
             // The last slot is entered first, as from the stack: compiled files hold the child
             // there in which a hit is most likely.
             let last = u32::BITS - 1 - bits.leading_zeros();
-            code = node.child[last as usize % WIDTH];
+            code = guess.corrected(node.child[last as usize % WIDTH]);
             let others = s.compress(bits ^ 1 << last, children, free.codes);
             free.push(others + 1);
         } else {
             let (count, nearest) = s.sort_far_to_near(bits, enter, children, free.codes, free.keys);
-            code = node.child[nearest % WIDTH];
+            code = guess.corrected(node.child[nearest % WIDTH]);
             free.push(count);
         }
         // The entry below the new top is most often needed next.

@@ -1,6 +1,7 @@
 //! Tracing of one object by a single ray.
 
 use crate::bvh::certain_hit::store_certain_hit;
+use crate::bvh::guesses::Guesses;
 use crate::bvh::single::{RayInObject, SingleQuery, SingleResult, trace_single};
 use crate::bvh::single_stack::SingleStack;
 use crate::intersect::exact_ray::{ExactRay, LineSource};
@@ -120,8 +121,7 @@ impl SingleRay for RayOfBatch<'_> {
 #[inline(never)]
 pub(crate) fn nearest_in_scalar(object: &ObjectView<'_>, ray: &RayOfBatch<'_>, instance: u32) -> Hit {
     let mut hit = Hit::MISS;
-    (&mut SingleKernel { object, goal: NearestHit, ray, instance, count: &mut (), hit: &mut hit })
-        .run(Scalar);
+    trace_in_scalar(object, NearestHit, ray, instance, &mut hit);
     hit
 }
 
@@ -129,8 +129,20 @@ pub(crate) fn nearest_in_scalar(object: &ObjectView<'_>, ray: &RayOfBatch<'_>, i
 #[inline(never)]
 pub(crate) fn any_in_scalar(object: &ObjectView<'_>, ray: &RayOfBatch<'_>) -> bool {
     let mut hit = Hit::MISS;
-    (&mut SingleKernel { object, goal: AnyHit, ray, instance: 0, count: &mut (), hit: &mut hit }).run(Scalar);
+    trace_in_scalar(object, AnyHit, ray, 0, &mut hit);
     hit.is_hit()
+}
+
+fn trace_in_scalar<G: Goal>(
+    object: &ObjectView<'_>,
+    goal: G,
+    ray: &RayOfBatch<'_>,
+    instance: u32,
+    hit: &mut Hit,
+) {
+    Guesses::with(|guesses| {
+        (&mut SingleKernel { object, goal, ray, instance, guesses, count: &mut (), hit }).run(Scalar);
+    });
 }
 
 /// Traces one ray and stores its answer. `instance` is reported with a hit.
@@ -143,14 +155,16 @@ pub(crate) fn trace<G: Goal, C: Count, R: SingleRay>(
     count: &mut C,
     hit: &mut Hit,
 ) {
-    // The kernel is passed by reference, because a copy of fields that were just written would
-    // stall.
-    let kernel = &mut SingleKernel { object, goal, ray, instance, count, hit };
-    // Where nothing but the kernel is called, the registers need not be saved a second time.
-    match Isa::already_chosen() {
-        Some(isa) => isa.run_found(kernel),
-        None => run_first(kernel),
-    }
+    Guesses::with(|guesses| {
+        // The kernel is passed by reference, because a copy of fields that were just written would
+        // stall.
+        let kernel = &mut SingleKernel { object, goal, ray, instance, guesses, count, hit };
+        // Where nothing but the kernel is called, the registers need not be saved a second time.
+        match Isa::already_chosen() {
+            Some(isa) => isa.run_found(kernel),
+            None => run_first(kernel),
+        }
+    });
 }
 
 /// Runs the kernel where no instruction set is chosen.
@@ -166,6 +180,7 @@ struct SingleKernel<'a, G, C, R> {
     goal: G,
     ray: &'a R,
     instance: u32,
+    guesses: &'a Guesses,
     count: &'a mut C,
     hit: &'a mut Hit,
 }
@@ -174,7 +189,7 @@ impl<G: Goal, C: Count, R: SingleRay> Kernel for &mut SingleKernel<'_, G, C, R> 
     type Output = ();
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let SingleKernel { object, goal, ray, instance, count, hit } = self;
+        let SingleKernel { object, goal, ray, instance, guesses, count, hit } = self;
         let (object, goal, instance) = (*object, *goal, *instance);
         let line = if object.header.root == NONE { None } else { ray.line(s, object) };
         let Some(line) = line else {
@@ -193,7 +208,7 @@ impl<G: Goal, C: Count, R: SingleRay> Kernel for &mut SingleKernel<'_, G, C, R> 
             },
         };
         let (mut query, mut stack) = (None, SingleStack::new());
-        let of = RayInObject { object, ray: ray_of_line };
+        let of = RayInObject { object, ray: ray_of_line, guesses };
         let query_of_ray = SingleQuery { goal, query: &mut query };
         // The answer is written in place: a copy of what was just written word by word would stall.
         match trace_single(s, of, &prepared, bounds, query_of_ray, &mut stack, *count) {

@@ -1,0 +1,64 @@
+//! Guesses of the child that a single ray enters next: the one that the last ray entered from the
+//! same node.
+//!
+//! A step through a node is a long chain of instructions from a child's code to the next one. The
+//! processor predicts that a guess is right, as it predicts any branch. It then loads the next node
+//! at once, and the chain only confirms the guess (value speculation: Lipasti, Wilkerson and Shen
+//! 1996). Guesses change no answer: where one is wrong, the ray goes to the right child.
+
+use crate::query::Goal;
+use std::cell::Cell;
+
+/// Number of guesses for queries of a kind. They fit next to the nodes in the first cache.
+const SIZE: usize = 1 << BITS;
+const BITS: u32 = 8;
+
+/// No guesses where they cannot help: modules of WebAssembly and Miri.
+const NONE: bool = cfg!(any(target_family = "wasm", miri));
+
+thread_local! {
+    static OF_THREAD: Guesses = const { Guesses([const { Guess { code: Cell::new(0), copy: Cell::new(0) } }; 2 * SIZE]) };
+}
+
+/// Guesses by the code of a node. Nodes share entries.
+pub(crate) struct Guesses([Guess; 2 * SIZE]);
+
+/// The child that the last ray entered.
+pub(crate) struct Guess {
+    code: Cell<u32>,
+    /// Always equal to `code`. The compiler does not know that: else it would go on with the right
+    /// code, which is known late, in place of an equal guess.
+    copy: Cell<u32>,
+}
+
+impl Guesses {
+    /// Calls a function with the guesses of this thread.
+    #[inline(always)]
+    pub(crate) fn with<T>(f: impl FnOnce(&Guesses) -> T) -> T {
+        OF_THREAD.with(f)
+    }
+
+    /// The guess for a node. Rays for any hit enter other children than those for the nearest.
+    #[inline(always)]
+    pub(crate) fn of(&self, node: u32, goal: impl Goal) -> &Guess {
+        let hash = node.wrapping_mul(0x9E37_79B1) >> (u32::BITS - BITS);
+        &self.0[hash as usize % SIZE + if goal.is_any() { SIZE } else { 0 }]
+    }
+}
+
+impl Guess {
+    /// Returns the code of the child that is entered, from the guess if it is right.
+    #[inline(always)]
+    pub(crate) fn corrected(&self, next: u32) -> u32 {
+        if NONE {
+            return next;
+        }
+        let copy = self.copy.get();
+        if next == self.code.get() {
+            return copy;
+        }
+        self.code.set(next);
+        self.copy.set(next);
+        next
+    }
+}

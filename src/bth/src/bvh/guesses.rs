@@ -62,3 +62,25 @@ impl Guess {
         next
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::query::{AnyHit, NearestHit};
+    use bth_random::Rng;
+
+    #[test]
+    fn guesses_change_no_code() {
+        let mut rng = Rng::new(8);
+        Guesses::with(|guesses| {
+            for _ in 0..10_000 {
+                // More nodes than entries, so that some share one; few children, so that some
+                // guesses are right.
+                let (node, next) = (rng.below(1000) as u32, rng.below(3) as u32);
+                assert_eq!(guesses.of(node, NearestHit).corrected(next), next);
+                assert_eq!(guesses.of(node, AnyHit).corrected(next + 7), next + 7);
+                assert_eq!(guesses.of(u32::MAX - node, NearestHit).corrected(node), node);
+            }
+        });
+    }
+}

@@ -87,6 +87,10 @@ pub(crate) fn enter_leaf<S: Simd, G: Goal, B: TriangleBlock>(
     if found.maybe == 0 {
         return LeafOutcome::Nothing;
     }
+    if G::HAS_CONDITIONS {
+        // The nearest of them may not count.
+        return decide(s, object, ray, bounds, progress, (code, found.maybe));
+    }
     if goal.is_any() {
         if found.sure != 0 {
             progress.accept();

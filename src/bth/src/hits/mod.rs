@@ -11,6 +11,7 @@
 
 mod accept;
 mod collect;
+mod conditions;
 mod crossings;
 pub(crate) mod results;
 mod search;

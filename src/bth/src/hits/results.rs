@@ -2,15 +2,22 @@
 
 use super::accept::Accept;
 use super::collect::{AnyFound, FirstHit, FirstHits, FoundHit, HitCount};
+use super::conditions::{AcceptedHit, Conditions};
 use super::search::search;
+use crate::intersect::exact_ray::{ExactRay, LineSource};
+use crate::object;
 use crate::rays::Hit;
 use crate::scene::Scene;
+use crate::shortcuts::has_special_leaves;
 use crate::starts::world_ray::WorldRay;
 use crate::trace_ray::TraceRay;
 use std::collections::BinaryHeap;
 
 /// The nearest accepted hit.
 pub(crate) fn nearest(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>) -> Option<Hit> {
+    if let Some(hit) = in_sole_object(scene, ray, accept, false) {
+        return hit.is_hit().then_some(hit);
+    }
     let mut first = FirstHit::default();
     search(scene, ray, accept, &mut first);
     first.0.map(|found| found.hit)
@@ -18,9 +25,32 @@ pub(crate) fn nearest(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>) -> 
 
 /// Returns true if there is an accepted hit.
 pub(crate) fn any(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>) -> bool {
+    if let Some(hit) = in_sole_object(scene, ray, accept, true) {
+        return hit.is_hit();
+    }
     let mut any = AnyFound::default();
     search(scene, ray, accept, &mut any);
     any.0
+}
+
+/// The nearest accepted hit, or any, if the scene is one object in world space: by the kernel of
+/// single rays. `None` if it is not, if the ray is in f64, or if the object has tetrahedra.
+fn in_sole_object(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>, is_any: bool) -> Option<Hit> {
+    let (object, instance) = scene.sole_in_f32()?;
+    if ray.wide.is_some() || has_special_leaves(object) {
+        return None;
+    }
+    let exact = match ray.start {
+        None => ExactRay::plain(ray.ray),
+        Some(_) => ExactRay::new(ray.ray, LineSource::Start(ray.start_in(instance)?)),
+    };
+    let masks = scene.masks();
+    if accept.mask & masks.of_instance(instance) == 0 {
+        return Some(Hit::MISS);
+    }
+    let groups = masks.groups(scene.object_of(instance));
+    let conditions = Conditions { ray: ray.ray, instance, object, groups, accept };
+    Some(object::accepted(object, &exact, AcceptedHit { is_any, conditions: &conditions }, instance))
 }
 
 /// The number of accepted hits.

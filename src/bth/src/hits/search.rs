@@ -3,6 +3,7 @@
 
 use super::accept::Accept;
 use super::collect::{Collector, FoundHit};
+use super::conditions::Conditions;
 use crate::bvh::candidate::intersect;
 use crate::bvh::enumerate::enumerate;
 use crate::enumerate::{EnteredInstance, enumerate_instances};
@@ -11,11 +12,8 @@ use crate::intersect::exact_ray::{ExactRay, LineSource};
 use crate::intersect::line::{RATIO_ERROR, widened};
 use crate::masks::Masks;
 use crate::query::{Receiver, TriangleRef, in_range, may_be_in_range};
-use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::scene::Scene;
 use crate::starts::world_ray::WorldRay;
-use bth_format::layout::Opacity;
-use bth_format::object::ObjectView;
 
 /// Passes to a collector the hits of a ray that are accepted and that it wants.
 pub(super) fn search(
@@ -46,14 +44,17 @@ fn search_instance(
 ) -> bool {
     let of_instance = entered.ray(world_ray, tmax);
     let exact = of_instance.exact();
-    let mut hits = InstanceHits {
+    let conditions = Conditions {
         ray: world_ray.ray,
-        exact,
         instance: entered.instance,
         object: entered.object,
-        t_scale: of_instance.t_scale(),
         groups: masks.groups(entered.object_index),
         accept,
+    };
+    let mut hits = InstanceHits {
+        conditions,
+        exact,
+        t_scale: of_instance.t_scale(),
         collector,
         limit: widened(exact.ray.tmax.into()),
     };
@@ -62,17 +63,11 @@ fn search_instance(
 
 /// The state of a search in an instance.
 struct InstanceHits<'a> {
-    /// In world space.
-    ray: &'a Ray,
-    /// In the space of the object.
+    conditions: Conditions<'a>,
+    /// The ray in the space of the object.
     exact: ExactRay<'a>,
-    instance: u32,
-    object: &'a ObjectView<'a>,
     /// Factor from t in object space to t in world space.
     t_scale: f32,
-    /// The masks of the object's groups, if any was set.
-    groups: Option<&'a [u32]>,
-    accept: &'a Accept<'a>,
     collector: &'a mut dyn Collector,
     /// Upper bound of the exact t, in the space of the object, of hits that can change the result.
     limit: f64,
@@ -90,7 +85,7 @@ impl InstanceHits<'_> {
             return Some(t);
         }
         let t = t * t_scale;
-        in_range(t, self.ray.tmin, self.ray.tmax).then_some(t)
+        in_range(t, self.conditions.ray.tmin, self.conditions.ray.tmax).then_some(t)
     }
 
     /// Returns true if t is in the range of a ray in f64; always true for others.
@@ -116,14 +111,6 @@ impl InstanceHits<'_> {
         precise.map_or(found.t, |precise| precise.t) * f64::from(self.t_scale) + 0.0
     }
 
-    /// Returns true if the mask of a triangle's group and the ray's mask have a bit in common.
-    fn meets_group(&self, triangle: TriangleRef<'_>) -> bool {
-        self.groups.is_none_or(|groups| {
-            let group = self.object.group_of(triangle.read());
-            self.accept.mask & Masks::of_group(groups, group) != 0
-        })
-    }
-
     /// Updates the limit after the collector has taken a hit.
     fn shrink(&mut self) {
         let (t, t_scale) = (self.collector.limit(), self.t_scale);
@@ -138,31 +125,20 @@ impl InstanceHits<'_> {
 
 impl Receiver for InstanceHits<'_> {
     fn receive(&mut self, triangle: TriangleRef<'_>, corners: [[f32; 3]; 3]) -> bool {
-        let ExactRay { ray, .. } = self.exact;
+        let (ExactRay { ray, .. }, object) = (self.exact, self.conditions.object);
         let may_matter = |t| may_be_in_range(t, ray.tmin, self.limit);
-        let found = intersect(self.object, self.exact, (triangle, corners), may_matter);
+        let found = intersect(object, self.exact, (triangle, corners), may_matter);
         let Some(intersection) = found else { return false };
         let Some(t) = self.reported_t(intersection.t) else { return false };
-        let [.., determinant] = intersection.weight;
-        let exact_corners = || self.object.exact_corners(|| triangle.read(), corners);
+        let exact_corners = || object.exact_corners(|| triangle.read(), corners);
         // A hit beyond the limit is excluded before the id is read, which is often a cache miss.
-        if !self.is_in_wide_range(&intersection, exact_corners)
-            || t > self.collector.limit()
-            || !self.accept.cull.keeps(determinant)
-            || !self.meets_group(triangle)
-        {
+        if !self.is_in_wide_range(&intersection, exact_corners) || t > self.collector.limit() {
             return false;
         }
-        let [u, v] = intersection.uv();
-        let primitive = PrimitiveRef { instance: self.instance, triangle: triangle.read() };
-        if self.object.opacity_at(primitive.triangle, u, v) == Opacity::Transparent {
-            return false;
-        }
+        let Some(hit) = self.conditions.hit(triangle, &intersection, t) else { return false };
         let wide_t = self.wide_t(&intersection, exact_corners);
-        let found = FoundHit { hit: Hit { t, u, v, primitive }, t: intersection.t, wide_t };
-        if !self.collector.wants(&found)
-            || self.accept.filter.is_some_and(|accepts| !accepts(self.ray, &found.hit))
-        {
+        let found = FoundHit { hit, t: intersection.t, wide_t };
+        if !self.collector.wants(&found) || !self.conditions.pass_filter(&found.hit) {
             return false;
         }
         let complete = self.collector.take(found);

@@ -8,7 +8,8 @@ pub(crate) use batch::{MIN_BATCH, trace_batch, trace_starts};
 pub(crate) use scratch::{Scratch, with_scratch};
 
 use self::single::{SingleRay, trace};
-use crate::query::{AnyHit, NearestHit, Steps};
+use crate::intersect::exact_ray::ExactRay;
+use crate::query::{AnyHit, Goal, NearestHit, Steps};
 use crate::rays::Hit;
 use bth_format::object::ObjectView;
 
@@ -31,6 +32,14 @@ pub(crate) fn nearest_counted<R: SingleRay>(object: &ObjectView<'_>, ray: &R, in
     let (mut hit, mut steps) = (Hit::MISS, Steps::default());
     trace(object, NearestHit, ray, instance, &mut steps, &mut hit);
     (hit, steps)
+}
+
+/// The hit of a ray of f32, or from a start on the object, for a goal with conditions.
+#[inline(never)]
+pub(crate) fn accepted<G: Goal>(object: &ObjectView<'_>, ray: &ExactRay<'_>, goal: G, instance: u32) -> Hit {
+    let mut hit = Hit::MISS;
+    trace(object, goal, ray, instance, &mut (), &mut hit);
+    hit
 }
 
 /// Returns true if a ray in object space hits anything.

@@ -91,6 +91,28 @@ impl SingleRay for StartRay {
     }
 }
 
+/// A ray of f32, or from a start on the object.
+impl SingleRay for ExactRay<'_> {
+    /// True if the ray is from a start.
+    type Line = bool;
+    #[inline(always)]
+    fn line<S: Simd>(&self, _s: S, _object: &ObjectView<'_>) -> Option<bool> {
+        Some(matches!(self.line, LineSource::Start(_)))
+    }
+    #[inline(always)]
+    fn exact<'a>(&'a self, _line: &'a bool) -> ExactRay<'a> {
+        *self
+    }
+    #[inline(always)]
+    fn bounds<'a>(object: &'a ObjectView<'_>, &is_from_start: &'a bool) -> &'a ObjectBounds {
+        if is_from_start { &object.start_bounds } else { &object.bounds }
+    }
+    #[inline(always)]
+    fn prepared<S: Simd>(&self, s: S, _line: &bool, bounds: &ObjectBounds) -> Option<PreparedRay> {
+        PreparedRay::of(s, bounds, self.ray)
+    }
+}
+
 /// A ray of a batch, with its line. The object has the bounds of the batch.
 pub(crate) struct RayOfBatch<'a> {
     pub(crate) ray: &'a Ray,

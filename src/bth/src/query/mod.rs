@@ -19,8 +19,15 @@ pub(crate) trait Goal: Copy {
     /// longer ones.
     const QUADS: bool = false;
     const LONG_VECTORS: bool = true;
+    /// True if [`Self::accepts`] may return false.
+    const HAS_CONDITIONS: bool = false;
     /// Returns true if a query ends at the first hit found.
     fn is_any(self) -> bool;
+    /// Returns true if a hit counts that is in the range of the ray, and better than all before.
+    #[inline(always)]
+    fn accepts(self, _triangle: TriangleRef<'_>, _found: &Intersection) -> bool {
+        true
+    }
 }
 
 /// The nearest hit: the smallest t, and among equal t the smallest triangle id. This order does not
@@ -190,7 +197,10 @@ impl<G: Goal> RayQuery<G> {
         let nearer = self.triangle == NONE
             || intersection.t < self.best.t
             || (intersection.t == self.best.t && triangle.read() < self.best_triangle(triangle.ids).read());
-        if nearer && in_range(intersection.t as f32, self.tmin, self.tmax) {
+        if nearer
+            && in_range(intersection.t as f32, self.tmin, self.tmax)
+            && self.goal.accepts(triangle, &intersection)
+        {
             (self.triangle, self.is_index) = (triangle.value, triangle.is_index);
             self.best = intersection;
         }

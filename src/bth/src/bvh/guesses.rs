@@ -12,12 +12,15 @@ use std::cell::Cell;
 /// Number of guesses for queries of a kind. They fit next to the nodes in the first cache.
 const SIZE: usize = 1 << BITS;
 const BITS: u32 = 8;
+/// A guess is followed once this many rays in turn went the same way. Where rays go here and there,
+/// the processor would predict wrong guesses, which cost more than the step.
+const SURE: u32 = 1;
 
 /// No guesses where they cannot help: modules of WebAssembly and Miri.
 const NONE: bool = cfg!(any(target_family = "wasm", miri));
 
 thread_local! {
-    static OF_THREAD: Guesses = const { Guesses([const { Guess { code: Cell::new(0), copy: Cell::new(0) } }; 2 * SIZE]) };
+    static OF_THREAD: Guesses = const { Guesses([const { Guess { code: Cell::new(0), copy: Cell::new(0), times: Cell::new(0) } }; 2 * SIZE]) };
 }
 
 /// Guesses by the code of a node. Nodes share entries.
@@ -29,6 +32,8 @@ pub(crate) struct Guess {
     /// Always equal to `code`. The compiler does not know that: else it would go on with the right
     /// code, which is known late, in place of an equal guess.
     copy: Cell<u32>,
+    /// How many rays in turn entered it.
+    times: Cell<u32>,
 }
 
 impl Guesses {
@@ -53,10 +58,14 @@ impl Guess {
         if NONE {
             return next;
         }
-        let copy = self.copy.get();
-        if next == self.code.get() {
-            return copy;
+        let (times, is_right) = (self.times.get(), next == self.code.get());
+        if times >= SURE {
+            let copy = self.copy.get();
+            if is_right {
+                return copy;
+            }
         }
+        self.times.set(if is_right { times + 1 } else { 0 });
         self.code.set(next);
         self.copy.set(next);
         next

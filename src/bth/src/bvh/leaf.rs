@@ -8,10 +8,11 @@
 //! decisions with one ray in each lane (`bvh/packet/leaf.rs`), and share [`Settle`].
 
 use crate::bvh::candidate::{Candidate, Settle};
-use crate::intersect::exact_ray::ExactRay;
-use crate::intersect::filter::{Certain, TriangleBlock};
+use crate::intersect::exact_quad::rounded_intersection;
+use crate::intersect::exact_ray::{ExactRay, LineSource};
+use crate::intersect::filter::{Candidates, Certain, TriangleBlock};
 use crate::intersect::prepare::PreparedRay;
-use crate::query::{Goal, RayQuery};
+use crate::query::{Goal, RayQuery, TriangleRef};
 use crate::rays::Ray;
 use crate::simd::Simd;
 use bth_format::object::{ObjectBounds, ObjectView};
@@ -88,8 +89,8 @@ pub(crate) fn enter_leaf<S: Simd, G: Goal, B: TriangleBlock>(
         return LeafOutcome::Nothing;
     }
     if G::HAS_CONDITIONS {
-        // The nearest of them may not count.
-        return decide(s, object, ray, bounds, progress, (code, found.maybe));
+        // Not the nearest of them alone, which may not count.
+        return offer_each(s, object, bounds, ray, progress, CodedLeaf { block, code }, found);
     }
     if goal.is_any() {
         if found.sure != 0 {
@@ -111,6 +112,41 @@ pub(crate) fn enter_leaf<S: Simd, G: Goal, B: TriangleBlock>(
         return if nearer { LeafOutcome::Nearer } else { LeafOutcome::Nothing };
     }
     decide(s, object, ray, bounds, progress, (code, maybe))
+}
+
+/// Offers the triangles of a leaf that may be hit to a query with conditions, which need t, u and v.
+#[inline(always)]
+fn offer_each<S: Simd, G: Goal, B: TriangleBlock>(
+    s: S,
+    object: &ObjectView<'_>,
+    bounds: &ObjectBounds,
+    ray: ExactRay<'_>,
+    progress: &mut impl RayProgress<G>,
+    CodedLeaf { block, code }: CodedLeaf<'_, B>,
+    found: Candidates<S>,
+) -> LeafOutcome {
+    let mut open = found.maybe;
+    if let LineSource::Ray = ray.line {
+        let (Ray { origin, direction, .. }, norm) = (*ray.ray, progress.prepared().slabs.scale);
+        let mut sure = found.sure;
+        while sure != 0 {
+            let i = sure.trailing_zeros() as usize;
+            sure &= sure - 1;
+            let rounded = rounded_intersection(s.doubles(), (origin, direction), block.corners(i), norm);
+            if !rounded.is_accurate {
+                continue;
+            }
+            open &= !(1 << i);
+            let triangle = TriangleRef::index(block.first().wrapping_add(i as u32), object.triangle_ids);
+            if progress.query(ray.ray).offer(triangle, rounded.intersection()) {
+                return LeafOutcome::Done;
+            }
+        }
+    }
+    if open != 0 {
+        return decide(s, object, ray, bounds, progress, (code, open));
+    }
+    progress.update_from_query(ray.ray, bounds.origin_error)
 }
 
 /// Decides the triangles of a leaf, given as its child code and their bits, and before them the

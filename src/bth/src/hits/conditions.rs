@@ -50,19 +50,17 @@ impl Conditions<'_> {
 
 /// The nearest hit, or any, that conditions allow, in an object whose space is world space.
 #[derive(Clone, Copy)]
-pub(super) struct AcceptedHit<'a> {
-    pub(super) is_any: bool,
-    pub(super) conditions: &'a Conditions<'a>,
-}
+pub(super) struct AcceptedHit<'a, const IS_ANY: bool>(pub(super) &'a Conditions<'a>);
 
-impl Goal for AcceptedHit<'_> {
+impl<const IS_ANY: bool> Goal for AcceptedHit<'_, IS_ANY> {
     const HAS_CONDITIONS: bool = true;
     #[inline(always)]
     fn is_any(self) -> bool {
-        self.is_any
+        IS_ANY
     }
+    #[inline]
     fn accepts(self, triangle: TriangleRef<'_>, found: &Intersection) -> bool {
-        let hit = self.conditions.hit(triangle, found, reported(found.t));
-        hit.is_some_and(|hit| self.conditions.pass_filter(&hit))
+        let hit = self.0.hit(triangle, found, reported(found.t));
+        hit.is_some_and(|hit| self.0.pass_filter(&hit))
     }
 }

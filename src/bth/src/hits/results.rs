@@ -15,7 +15,7 @@ use std::collections::BinaryHeap;
 
 /// The nearest accepted hit.
 pub(crate) fn nearest(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>) -> Option<Hit> {
-    if let Some(hit) = in_sole_object(scene, ray, accept, false) {
+    if let Some(hit) = in_sole_object::<false>(scene, ray, accept) {
         return hit.is_hit().then_some(hit);
     }
     let mut first = FirstHit::default();
@@ -25,7 +25,7 @@ pub(crate) fn nearest(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>) -> 
 
 /// Returns true if there is an accepted hit.
 pub(crate) fn any(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>) -> bool {
-    if let Some(hit) = in_sole_object(scene, ray, accept, true) {
+    if let Some(hit) = in_sole_object::<true>(scene, ray, accept) {
         return hit.is_hit();
     }
     let mut any = AnyFound::default();
@@ -35,7 +35,7 @@ pub(crate) fn any(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>) -> bool
 
 /// The nearest accepted hit, or any, if the scene is one object in world space: by the kernel of
 /// single rays. `None` if it is not, if the ray is in f64, or if the object has tetrahedra.
-fn in_sole_object(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>, is_any: bool) -> Option<Hit> {
+fn in_sole_object<const IS_ANY: bool>(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>) -> Option<Hit> {
     let (object, instance) = scene.sole_in_f32()?;
     if ray.wide.is_some() || has_special_leaves(object) {
         return None;
@@ -50,7 +50,7 @@ fn in_sole_object(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>, is_any:
     }
     let groups = masks.groups(scene.object_of(instance));
     let conditions = Conditions { ray: ray.ray, instance, object, groups, accept };
-    Some(object::accepted(object, &exact, AcceptedHit { is_any, conditions: &conditions }, instance))
+    Some(object::accepted(object, &exact, AcceptedHit::<IS_ANY>(&conditions), instance))
 }
 
 /// The number of accepted hits.

@@ -204,7 +204,8 @@ impl RoundedIntersection {
         }
     }
 
-    fn intersection(&self) -> Intersection {
+    #[inline(always)]
+    pub(crate) fn intersection(&self) -> Intersection {
         Intersection { t: self.t, weight: self.weight }
     }
 }

@@ -30,7 +30,7 @@ pub(crate) struct Guesses([Guess; 2 * SIZE]);
 pub(crate) struct Guess {
     code: Cell<u32>,
     /// Always equal to `code`. The compiler does not know that: else it would go on with the right
-    /// code, which is known late, in place of an equal guess.
+    /// code, which is known late, instead of an equal guess.
     copy: Cell<u32>,
     /// How many rays in turn entered it.
     times: Cell<u32>,

@@ -114,7 +114,8 @@ pub(crate) fn enter_leaf<S: Simd, G: Goal, B: TriangleBlock>(
     decide(s, object, ray, bounds, progress, (code, maybe))
 }
 
-/// Offers the triangles of a leaf that may be hit to a query with conditions, which need t, u and v.
+/// Offers the triangles of a leaf that may be hit to a query with conditions, which need t, u and
+/// v.
 #[inline(always)]
 fn offer_each<S: Simd, G: Goal, B: TriangleBlock>(
     s: S,

@@ -143,6 +143,21 @@ fn refuses_counts_that_the_file_cannot_hold_without_allocating_for_them() {
 }
 
 #[test]
+fn a_stray_line_of_the_header_is_ignored_unless_the_body_may_depend_on_it() {
+    let with = |line: &str| ascii().replacen("element vertex", &format!("{line}\nelement vertex"), 1);
+    let whole = import_bytes("a.ply", ascii().as_bytes(), Keep::None).unwrap().0;
+    for line in ["TextureFile wood.png", "author: somebody else"] {
+        let listener = Listener::default();
+        let (mesh, _) = import_with("a.ply", with(line).as_bytes(), Keep::None, &listener).unwrap();
+        assert_eq!(mesh, whole);
+        assert!(listener.heard(&format!("line 4: \"{line}\" is ignored")));
+    }
+    for line in ["elemnt edge 4", "propety float w", "prop list uchar int more", "9 lives"] {
+        assert_refused("a.ply", with(line).as_bytes(), "BTH-I002", "line 4", line);
+    }
+}
+
+#[test]
 fn refuses_headers_and_rows_at_their_line() {
     assert_refused("a.ply", b"plywood\n", "BTH-I002", "line 1", "expected ply");
     let edits = [

@@ -74,6 +74,8 @@ fn byte_tables_are_those_of_the_structures() {
         Material { name name_length reserved }
         ObjectName { name name_length }
         MaterialParameters { base_color emissive alpha_cutoff alpha_mode flags base_color_texture emissive_texture reserved }
+        GlossParameters { metallic roughness normal_scale occlusion_strength metallic_roughness_texture normal_texture
+            occlusion_texture reserved }
         Texture { image wrap filter transform uv_set reserved }
         Image { name first length }
         FreeDirections { sectors bins }

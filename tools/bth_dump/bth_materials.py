@@ -1,5 +1,5 @@
-"""Materials, textures, vertex colors, second sets of texture coordinates and images (format-spec/README.md, "Materials"), F149, F160 to F162,
-F220 and F221."""
+"""Materials, textures, vertex colors, second sets of texture coordinates and images
+(format-spec/README.md, "Materials"), F149, F160 to F162, and F220 to F222."""
 
 import math
 import struct
@@ -11,6 +11,11 @@ from bth_container import NONE, Invalid, kind_name
 Parameters = namedtuple(
     "Parameters",
     "base_color emissive alpha_cutoff alpha_mode flags base_color_texture emissive_texture reserved",
+)
+Gloss = namedtuple(
+    "Gloss",
+    "metallic roughness normal_scale occlusion_strength metallic_roughness_texture normal_texture"
+    " occlusion_texture reserved",
 )
 Texture = namedtuple("Texture", "image wrap filter transform uv_set reserved")
 Image = namedtuple("Image", "name first length")
@@ -28,6 +33,7 @@ class MaterialsView:
         self.view = view
         rows = view.rows(c.MATERIAL_PARAMETERS, "<8f8I")
         self.parameters = [Parameters(r[:4], r[4:7], r[7], *r[8:12], r[12:]) for r in rows]
+        self.gloss = [Gloss(*r) for r in view.rows(c.GLOSS_PARAMETERS, "<4f4I")]
         rows = view.rows(c.TEXTURES, "<16s3I6f3I")
         self.textures = [Texture(r[0], r[1:3], r[3], r[4:10], r[10], r[11:]) for r in rows]
         self.color_corners = view.rows(c.COLOR_CORNERS, "<3I")
@@ -39,13 +45,14 @@ class MaterialsView:
         """Counts, as a JSON-able value."""
         return {
             "parameters": len(self.parameters),
+            "gloss": len(self.gloss),
             "textures": len(self.textures),
             "vertex_colors": len(self.colors),
             "second_uvs": len(self.second_uvs),
         }
 
     def check(self):
-        """F149, F160, F161, F220 and F221."""
+        """F149, F160, F161, and F220 to F222."""
 
         def need(condition, number, message, kind):
             if not condition:
@@ -60,6 +67,13 @@ class MaterialsView:
             textures = (p.base_color_texture, p.emissive_texture)
             good = good and all(t == NONE or t < len(self.textures) for t in textures)
             need(good, "F149", f"{p}", c.MATERIAL_PARAMETERS)
+        need(len(self.gloss) in (0, known), "F222", f"{len(self.gloss)} rows", c.GLOSS_PARAMETERS)
+        for g in self.gloss:
+            good = all(0 <= x <= 1 for x in (g.metallic, g.roughness, g.occlusion_strength))
+            textures = (g.metallic_roughness_texture, g.normal_texture, g.occlusion_texture)
+            good = good and all(t == NONE or t < len(self.textures) for t in textures)
+            good = good and math.isfinite(g.normal_scale) and g.reserved == 0
+            need(good, "F222", f"{g}", c.GLOSS_PARAMETERS)
         for t in self.textures:
             good = max(t.wrap) <= 2 and t.filter <= 1 and all(map(math.isfinite, t.transform))
             need(good and t.uv_set <= 1 and not any(t.reserved), "F160", f"{t}", c.TEXTURES)

@@ -142,6 +142,7 @@ codes! {
     ExactNumbers "F194" "Numbers of EXACT_POSITIONS and ANCHOR are 0 or numbers that f32 neither rounds to 0 nor to an infinity: from 2^-149 to the largest finite f32 in absolute value."
     SecondCorners "F220" "SECOND_CORNERS has as many rows as the object has triangles, or none, and its rows lie within SECOND_UVS."
     SecondUvs "F221" "Coordinates of SECOND_UVS are finite."
+    GlossParameters "F222" "GLOSS_PARAMETERS has as many rows as MATERIALS or none; its numbers are in the ranges of the table of GlossParameters; textures are NONE or rows of TEXTURES; reserved fields are zero."
 
     LeafSource "F201" "A triangle of a leaf has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
     FaceSource "F202" "A constrained face has the corners of its source triangle, bit for bit; on a grid the points nearest to them."

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::monitor::Monitor;
 use crate::source::IMAGE;
 use bth_format::file::hash128;
-use bth_format::layout::{MaterialParameters, NONE, Texture, UV_SET_SECOND};
+use bth_format::layout::{GlossParameters, MaterialParameters, NONE, Texture, UV_SET_SECOND};
 use std::collections::{BTreeSet, HashMap};
 use std::hash::Hash;
 
@@ -15,6 +15,8 @@ use std::hash::Hash;
 pub struct Materials {
     /// For each material of the groups its parameters; empty where the source tells of none.
     pub parameters: Vec<MaterialParameters>,
+    /// For each material of the groups how glossy it is; empty where none is.
+    pub gloss: Vec<GlossParameters>,
     /// The textures that parameters refer to. Their images are [`ImageFile`]s of the source.
     pub textures: Vec<Texture>,
     /// Per triangle rows of `colors`; empty without vertex colours.
@@ -115,11 +117,25 @@ pub(crate) const PLAIN: MaterialParameters = MaterialParameters {
     reserved: [0; 4],
 };
 
+/// A matte material.
+pub const NO_GLOSS: GlossParameters = GlossParameters {
+    metallic: 0.0,
+    roughness: 1.0,
+    normal_scale: 1.0,
+    occlusion_strength: 1.0,
+    metallic_roughness_texture: NONE,
+    normal_texture: NONE,
+    occlusion_texture: NONE,
+    reserved: 0,
+};
+
 /// Collects materials while a source is read.
 #[derive(Debug, Default)]
 pub(crate) struct MaterialRecorder {
     /// By the numbers that groups refer to.
     pub(crate) parameters: Vec<MaterialParameters>,
+    /// As `parameters`; what is missing has no gloss.
+    pub(crate) gloss: Vec<GlossParameters>,
     textures: Vec<Texture>,
     rows: HashMap<TextureKey, u32>,
     pub(crate) colors: ColorRecorder,
@@ -146,15 +162,24 @@ impl MaterialRecorder {
     /// Returns the materials of a mesh of `triangles` triangles. `kept` are the numbers of the
     /// materials that its groups have, in order.
     pub(crate) fn finish(self, kept: &[u32], triangles: usize) -> Materials {
-        let Self { parameters, textures, colors, second_uvs, .. } = self;
-        let parameters: Vec<_> = match parameters.is_empty() {
-            true => Vec::new(),
-            false => kept.iter().map(|row| parameters.get(*row as usize).copied().unwrap_or(PLAIN)).collect(),
-        };
+        let Self { parameters, gloss, textures, colors, second_uvs, .. } = self;
+        let parameters = kept_rows(&parameters, kept, PLAIN);
+        let mut gloss = kept_rows(&gloss, kept, NO_GLOSS);
+        if gloss.iter().all(|row| *row == NO_GLOSS) {
+            gloss.clear();
+        }
         let (color_corners, colors) = colors.0.finish(triangles, color(WHITE));
         let (second_corners, second_uvs) = second_uvs.finish(triangles, [0; 2]);
         let second_uvs = second_uvs.into_iter().map(|bits| bits.map(f32::from_bits)).collect();
-        used(Materials { parameters, textures, color_corners, colors, second_corners, second_uvs })
+        used(Materials { parameters, gloss, textures, color_corners, colors, second_corners, second_uvs })
+    }
+}
+
+/// The rows of the materials that are kept, in order; empty without any.
+fn kept_rows<T: Copy>(rows: &[T], kept: &[u32], missing: T) -> Vec<T> {
+    match rows.is_empty() {
+        true => Vec::new(),
+        false => kept.iter().map(|row| rows.get(*row as usize).copied().unwrap_or(missing)).collect(),
     }
 }
 
@@ -163,15 +188,17 @@ impl MaterialRecorder {
 fn used(mut materials: Materials) -> Materials {
     let mut rows = HashMap::new();
     let mut used = Vec::new();
-    for parameters in &mut materials.parameters {
-        for texture in [&mut parameters.base_color_texture, &mut parameters.emissive_texture] {
-            if *texture != NONE {
-                *texture = *rows.entry(*texture).or_insert_with(|| {
-                    used.push(materials.textures[*texture as usize]);
-                    used.len() as u32 - 1
-                });
-            }
-        }
+    let of_parameters =
+        materials.parameters.iter_mut().flat_map(|p| [&mut p.base_color_texture, &mut p.emissive_texture]);
+    let of_gloss = materials
+        .gloss
+        .iter_mut()
+        .flat_map(|p| [&mut p.metallic_roughness_texture, &mut p.normal_texture, &mut p.occlusion_texture]);
+    for texture in of_parameters.chain(of_gloss).filter(|texture| **texture != NONE) {
+        *texture = *rows.entry(*texture).or_insert_with(|| {
+            used.push(materials.textures[*texture as usize]);
+            used.len() as u32 - 1
+        });
     }
     materials.textures = used;
     if materials.textures.iter().all(|texture| texture.uv_set != UV_SET_SECOND) {

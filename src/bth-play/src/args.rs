@@ -26,7 +26,8 @@ pub(crate) struct Args {
     #[arg(required_unless_present_any = ["completions", "man"])]
     file: Option<PathBuf>,
     /// A picture (.png); numbered pictures (such as frames/####.png); an animation (.apng, .gif or
-    /// .y4m); or `-` for YUV4MPEG2 on standard output.
+    /// .y4m); a video by ffmpeg (.mp4, .mov, .mkv or .webm); or `-` for YUV4MPEG2 on standard
+    /// output.
     #[arg(short, long, value_name = "FILE", required_unless_present_any = ["completions", "man", "window"])]
     output: Option<PathBuf>,
     /// Show the file in a window: orbit, fly, play, scrub, change the mode; the picture is refined
@@ -76,9 +77,9 @@ pub(crate) struct Args {
     /// Vertical field of view in degrees; by default 32, and 75 from inside.
     #[arg(long, value_parser = parse_fov)]
     pub(crate) fov: Option<f64>,
-    /// The axis of the model that points up.
-    #[arg(long, value_enum, default_value_t = Axis::Y)]
-    pub(crate) up: Axis,
+    /// The axis of the model that points up; y by default.
+    #[arg(long, value_enum)]
+    pub(crate) up: Option<Axis>,
     /// Look from a point within the model, for rooms.
     #[arg(long, conflicts_with_all = ["yaw", "pitch"])]
     pub(crate) inside: bool,
@@ -89,12 +90,24 @@ pub(crate) struct Args {
     /// 0.5. Each sample sees the scene at a different time. By default pictures show an instant.
     #[arg(long, value_name = "FRAMES", value_parser = parse_positive)]
     pub(crate) shutter: Option<f64>,
-    /// No ground under the model. Scenes never have one but their own.
+    /// Crease angle of models without normals: triangles turned from each other by less than these
+    /// degrees look smooth. 0 shows facets.
+    #[arg(long, value_name = "DEGREES", default_value_t = 30.0, value_parser = parse_crease)]
+    pub(crate) smooth: f64,
+    /// No ground below what is shown. Scenes with a floor get none, nor do rooms.
     #[arg(long)]
     pub(crate) no_ground: bool,
     /// Times that light is reflected, in mode path; 4 by default.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=64))]
     pub(crate) bounces: Option<u32>,
+    /// Remove noise in mode path: with Open Image Denoise where it is installed (auto, which is the
+    /// default, but never with --shard), with the built-in filter, with Open Image Denoise, or not.
+    #[arg(long, value_enum, default_value_t = Denoise::Auto)]
+    pub(crate) denoise: Denoise,
+    /// Stops by which mode path brightens light: 1 doubles it, -1 halves it. By default small
+    /// pictures of the scene decide, for all frames alike.
+    #[arg(long, value_name = "STOPS", allow_hyphen_values = true, value_parser = parse_exposure)]
+    pub(crate) exposure: Option<f64>,
     /// Light from all around in mode path, a picture in Radiance format (.hdr) over longitude and
     /// latitude; by default a sky, and a sun where the scene has no lights.
     #[arg(long, value_name = "FILE")]
@@ -137,12 +150,25 @@ pub(crate) enum Mode {
     Ao,
     /// Heat map of the traversal steps of camera rays.
     Steps,
-    /// Diffuse path tracing of the file's materials with the scene's lights and an environment.
+    /// Path tracing of the file's materials with the scene's lights, a sky and a sun.
     Path,
     /// Each instance in a different colour.
     Instances,
     /// As shaded, everything of matte clay.
     Clay,
+}
+
+/// How noise is removed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Denoise {
+    /// With Open Image Denoise where it is installed, else with the built-in filter.
+    Auto,
+    /// With the built-in filter, whose pictures are the same on all machines.
+    On,
+    /// With Open Image Denoise, which has to be installed.
+    Oidn,
+    /// Not.
+    Off,
 }
 
 /// The camera that the options name.
@@ -164,6 +190,11 @@ impl Args {
     /// The compiled file or source, which clap requires.
     pub(crate) fn file(&self) -> Result<&Path, Failure> {
         self.file.as_deref().ok_or_else(|| Failure::Usage("a file is needed".to_owned()))
+    }
+
+    /// The axis that points up.
+    pub(crate) fn up(&self) -> Axis {
+        self.up.unwrap_or(Axis::Y)
     }
 
     /// Times that light is reflected in mode path.
@@ -259,6 +290,16 @@ fn parse_finite(text: &str) -> Result<f64, String> {
         .ok()
         .filter(|n| n.is_finite())
         .ok_or_else(|| format!("expected a finite number, found {text:?}"))
+}
+
+fn parse_crease(text: &str) -> Result<f64, String> {
+    let degrees = parse_finite(text).ok().filter(|degrees| (0.0..=180.0).contains(degrees));
+    degrees.ok_or_else(|| format!("expected degrees from 0 to 180, found {text:?}"))
+}
+
+fn parse_exposure(text: &str) -> Result<f64, String> {
+    let stops = parse_finite(text).ok().filter(|stops| stops.abs() <= 30.0);
+    stops.ok_or_else(|| format!("expected stops from -30 to 30, found {text:?}"))
 }
 
 fn parse_positive(text: &str) -> Result<f64, String> {

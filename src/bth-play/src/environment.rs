@@ -1,6 +1,7 @@
 //! Light from all around, given by a picture over longitude and latitude, and sampling of
 //! directions by its brightness.
 
+use crate::color::luminance;
 use crate::failure::Failure;
 use glam::{DVec2, DVec3, Vec3};
 use image::{ImageDecoder, ImageReader, Limits};
@@ -38,10 +39,6 @@ pub(crate) struct EnvironmentSample {
     pub(crate) radiance: Vec3,
     /// Density with regard to solid angle.
     pub(crate) density: f64,
-}
-
-fn luminance(color: Vec3) -> f64 {
-    f64::from(color.dot(Vec3::new(0.2126, 0.7152, 0.0722)))
 }
 
 impl Environment {

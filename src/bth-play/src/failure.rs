@@ -21,6 +21,8 @@ pub(crate) enum Failure {
     Source { path: PathBuf, message: String },
     /// A picture of the surroundings that cannot be used (exit code 3) or read (exit code 4).
     Environment { path: PathBuf, message: String, exit: u8 },
+    /// A video that ffmpeg does not write (exit code 4).
+    Video { path: PathBuf, message: String },
     /// The picture could not be written (exit code 4).
     File { path: PathBuf, message: String },
     /// There is no window, or it stopped working (exit code 4).
@@ -81,6 +83,9 @@ impl Failure {
                 )
             }
             Self::Lacks { file, what, hint } => Diagnosis::new(3, "BTH-P001", *what).at(file).with_hint(hint),
+            Self::Video { path, message } => Diagnosis::new(4, "BTH-P007", message)
+                .at(path)
+                .with_hint("install ffmpeg with libx264, or write .apng, .gif, .y4m or numbered pictures"),
             Self::File { path, message } => Diagnosis::new(4, "BTH-P002", message)
                 .at(path)
                 .with_hint("name a place where files can be written and that has room"),

@@ -5,6 +5,7 @@
 
 mod args;
 mod camera;
+mod color;
 mod compile_source;
 mod environment;
 mod failure;
@@ -16,6 +17,7 @@ mod render;
 mod report;
 mod sampling;
 mod shading;
+mod smooth;
 #[cfg(feature = "window")]
 mod window;
 

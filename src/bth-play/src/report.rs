@@ -112,6 +112,7 @@ fn json(
         "height": args.size.1,
         "mode": args.mode.name(),
         "samples_per_pixel": args.spp,
+        "exposure": report.exposure,
         "shutter": args.shutter,
         "threads": threads,
         "resident_bytes": scene.resident_bytes(),

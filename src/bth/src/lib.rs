@@ -59,7 +59,7 @@ pub use bth_format::layout::Opacity;
 pub use bth_format::{Code, Error};
 pub use builder::SceneBuilder;
 pub use hits::{Accept, Crossings, Cull, Filter};
-pub use materials::{Alpha, Material, Texture, Wrap};
+pub use materials::{Alpha, Gloss, Material, Texture, Wrap};
 pub use points::{Closest, Closest64, Feature};
 pub use query::Steps;
 pub use scene::motion::{InstanceView, check_first_frame};

@@ -33,6 +33,28 @@ pub struct Material {
     pub double_sided: bool,
     /// True if the base colour is shown as it is, without light.
     pub unlit: bool,
+    /// How glossy it is; `None` for matte materials.
+    pub gloss: Option<Gloss>,
+}
+
+/// How glossy a material is, as in glTF 2.0 (appendix B), and the textures that shape its surface.
+/// Their texels are linear.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gloss {
+    /// From 0, not metallic, to 1; to be multiplied by blue of the texture.
+    pub metallic: f32,
+    /// From 0, smooth, to 1; to be multiplied by green of the texture.
+    pub roughness: f32,
+    /// Texture of both.
+    pub metallic_roughness_texture: Option<u32>,
+    /// Texture of normals: red to the right, green up, blue out of the surface, 0 to 1 for -1 to 1.
+    pub normal_texture: Option<u32>,
+    /// Factor of the first two components of these normals.
+    pub normal_scale: f32,
+    /// Texture whose red is the share of light from all around that reaches the surface.
+    pub occlusion_texture: Option<u32>,
+    /// How much that texture counts, from 0 to 1.
+    pub occlusion_strength: f32,
 }
 
 /// How texture coordinates beyond 0 and 1 find texels.
@@ -51,8 +73,8 @@ pub enum Wrap {
 pub struct Texture<'a> {
     /// Index of its image: equal for all textures with the same image of a file.
     pub image: u32,
-    /// The image file: PNG, JPEG or WebP. Red, green and blue of its texels are sRGB, alpha is
-    /// linear.
+    /// The image file: PNG, JPEG or WebP. Red, green and blue of texels of colours are sRGB; alpha
+    /// and the texels of [`Gloss`] are linear.
     pub bytes: &'a [u8],
     /// For u and for v.
     pub wrap: [Wrap; 2],

@@ -8,7 +8,7 @@
 
 use crate::animation::normals::corner_normal;
 use crate::intersect::start::source_corners;
-use crate::materials::{Alpha, Material, Texture, Wrap};
+use crate::materials::{Alpha, Gloss, Material, Texture, Wrap};
 use crate::rays::{Hit, PrimitiveRef};
 use crate::scene::Scene;
 use bth_format::exact::{Dyadic, dyadic_cross, dyadic_difference, dyadic_vector};
@@ -87,8 +87,18 @@ pub(crate) fn surface_at(scene: &Scene, hit: &Hit) -> Option<SurfacePoint> {
 /// Implements [`Scene::material`].
 pub(crate) fn material(scene: &Scene, object: u32, material: u32) -> Option<Material> {
     let (file, row) = scene.objects().locate(object)?;
-    let row = *file.materials(row).parameters.get(material as usize)?;
+    let materials = file.materials(row);
+    let row = *materials.parameters.get(material as usize)?;
     let texture = |row: u32| (row != NONE).then_some(row);
+    let gloss = materials.gloss.get(material as usize).map(|gloss| Gloss {
+        metallic: gloss.metallic,
+        roughness: gloss.roughness,
+        metallic_roughness_texture: texture(gloss.metallic_roughness_texture),
+        normal_texture: texture(gloss.normal_texture),
+        normal_scale: gloss.normal_scale,
+        occlusion_texture: texture(gloss.occlusion_texture),
+        occlusion_strength: gloss.occlusion_strength,
+    });
     Some(Material {
         base_color: row.base_color,
         base_color_texture: texture(row.base_color_texture),
@@ -101,6 +111,7 @@ pub(crate) fn material(scene: &Scene, object: u32, material: u32) -> Option<Mate
         },
         double_sided: row.flags & MATERIAL_DOUBLE_SIDED != 0,
         unlit: row.flags & MATERIAL_UNLIT != 0,
+        gloss,
     })
 }
 

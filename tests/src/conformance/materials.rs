@@ -128,6 +128,50 @@ pub(super) fn second_uvs() -> Vec<u8> {
     builder.finish()
 }
 
+/// A metal whose gloss has a texture, and which has a texture of normals; and an object without
+/// gloss.
+pub(super) fn gloss() -> Vec<u8> {
+    let lines = lines(indexed(&[CORNERS], 0).as_bytes());
+    let groups = GroupParts::of(&bth_import::Groups {
+        groups: vec![bth_import::Group { name: "bell".into(), material: Some(0) }],
+        materials: vec!["brass".into()],
+        runs: vec![[0, 0]],
+    });
+    let brass = MaterialParameters {
+        base_color: [1.0, 0.75, 0.25, 1.0],
+        emissive: [0.0; 3],
+        alpha_cutoff: 0.5,
+        alpha_mode: ALPHA_OPAQUE,
+        flags: 0,
+        base_color_texture: NONE,
+        emissive_texture: NONE,
+        reserved: [0; 4],
+    };
+    let shiny = GlossParameters {
+        metallic: 1.0,
+        roughness: 0.25,
+        metallic_roughness_texture: 1,
+        normal_texture: 0,
+        ..bth_import::NO_GLOSS
+    };
+    let looks = Materials {
+        parameters: vec![brass],
+        gloss: vec![shiny],
+        textures: vec![
+            texture(RED, [WRAP_REPEAT; 2], FILTER_LINEAR),
+            texture(GREEN_AND_BLUE, [WRAP_CLAMP; 2], FILTER_LINEAR),
+        ],
+        ..Materials::default()
+    };
+    let parts = ObjectParts { groups: Some(&groups), materials: Some(&looks), ..one_triangle(&lines) };
+    let without = Materials { gloss: Vec::new(), ..looks.clone() };
+    let mut builder = FileBuilder::new();
+    object(&mut builder, 0, &parts).unwrap();
+    object(&mut builder, 1, &ObjectParts { materials: Some(&without), ..parts }).unwrap();
+    images(&mut builder, [RED, GREEN_AND_BLUE].map(|image| (hash128(image), image))).unwrap();
+    builder.finish()
+}
+
 /// Changes the valid file.
 fn broken(name: &str, change: impl FnOnce(&mut Editor)) -> Case {
     broken_file("materials", name, change)
@@ -162,6 +206,11 @@ pub(super) fn invalid() -> Vec<Case> {
             e.put_u32(kind::MATERIAL_PARAMETERS, at, value);
         })
     };
+    let gloss = |name: &str, at: usize, value: u32| {
+        broken_file("gloss", name, |e| {
+            e.put_u32(kind::GLOSS_PARAMETERS, at, value);
+        })
+    };
     let texture = |name: &str, at: usize, value: u32| {
         broken(name, |e| {
             e.put_u32(kind::TEXTURES, 64 + at, value);
@@ -189,6 +238,14 @@ pub(super) fn invalid() -> Vec<Case> {
         broken("F161-no-colors", |e| shorten(e, (0, kind::COLORS), 0)),
         texture("F162-no-such-image", offset_of!(Texture, image), 0),
     ];
+    cases.extend([
+        gloss("F222-metallic", offset_of!(GlossParameters, metallic), 1.5f32.to_bits()),
+        gloss("F222-roughness", offset_of!(GlossParameters, roughness), f32::NAN.to_bits()),
+        gloss("F222-normal-scale", offset_of!(GlossParameters, normal_scale), f32::INFINITY.to_bits()),
+        gloss("F222-strength", offset_of!(GlossParameters, occlusion_strength), (-1.0f32).to_bits()),
+        gloss("F222-texture", offset_of!(GlossParameters, normal_texture), 2),
+        gloss("F222-reserved", offset_of!(GlossParameters, reserved), 1),
+    ]);
     cases.extend(invalid_images());
     let second = |name: &str, change: &dyn Fn(&mut Editor)| broken_file("second-uvs", name, change);
     cases.extend([

@@ -33,6 +33,7 @@ pub fn valid() -> Vec<Case> {
         Case::new("sequence", super::deformable::sequence()),
         Case::new("materials", super::materials::materials()),
         Case::new("second-uvs", super::materials::second_uvs()),
+        Case::new("gloss", super::materials::gloss()),
         Case::new("unknown-optional-section", unknown_section()),
     ];
     cases.extend(super::scenes::valid());

@@ -85,9 +85,13 @@ pub(crate) fn shown(folder: &Path, args: &[&str]) -> Vec<[u8; 3]> {
     all.extend(VIEW.chunks(2).filter(|pair| !args.contains(&pair[0])).flatten());
     all.extend(args);
     run("bth-play", folder, &all).expect(0);
-    let mut reader = png::Decoder::new(std::io::Cursor::new(std::fs::read(folder.join("a.png")).unwrap()))
-        .read_info()
-        .unwrap();
+    decoded(&folder.join("a.png"))
+}
+
+/// The pixels of a PNG file, rows from the top.
+pub(crate) fn decoded(file: &Path) -> Vec<[u8; 3]> {
+    let mut reader =
+        png::Decoder::new(std::io::Cursor::new(std::fs::read(file).unwrap())).read_info().unwrap();
     let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
     reader.next_frame(&mut bytes).unwrap();
     bytes.as_chunks::<3>().0.to_vec()

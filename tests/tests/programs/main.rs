@@ -13,6 +13,7 @@ mod known_rays;
 mod made_models;
 mod materials;
 mod mistakes;
+mod pictures;
 mod pipelines;
 mod play;
 mod play_files;

@@ -70,7 +70,18 @@ fn blurred_pictures_are_the_mean_of_pictures_of_single_times() {
     for (mode, light) in [("normals", None), ("shaded", Some(linear as fn(u8) -> f64))] {
         let value = |byte: u8| light.map_or(f64::from(byte) / 255.0, |linear| linear(byte));
         let picture = |file: &str, frames: &str, output: &str, more: &[&str]| {
-            let mut args = vec![file, "--size", "40x24", "--mode", mode, "--frames", frames, "-o", output];
+            let mut args = vec![
+                file,
+                "--size",
+                "40x24",
+                "--mode",
+                mode,
+                "--frames",
+                frames,
+                "-o",
+                output,
+                "--no-ground",
+            ];
             args.extend(more);
             run("bth-play", at, &args).expect(0);
         };

@@ -56,7 +56,7 @@ impl Import<'_> {
 impl Stage for Import<'_> {
     type Output = (Mesh, MeshSummary);
     const NAME: &'static str = "mesh";
-    const VERSION: &'static str = "9";
+    const VERSION: &'static str = "10";
 
     fn run(self, monitor: &dyn Monitor) -> Result<Self::Output> {
         Ok(MeshSummary::of(self.read(monitor)?))

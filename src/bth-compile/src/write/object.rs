@@ -159,6 +159,7 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
     builder.rows(kind::OPACITY_MICRO, index, parts.opacity_micro)?;
     if let Some(materials) = parts.materials {
         builder.rows(kind::MATERIAL_PARAMETERS, index, &materials.parameters)?;
+        builder.rows(kind::GLOSS_PARAMETERS, index, &materials.gloss)?;
         builder.rows(kind::TEXTURES, index, &materials.textures)?;
         builder.rows(kind::COLOR_CORNERS, index, &materials.color_corners)?;
         builder.rows(kind::COLORS, index, &materials.colors)?;

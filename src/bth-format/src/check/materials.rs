@@ -1,5 +1,5 @@
 //! Materials, textures, vertex colours, second sets of texture coordinates and images: BTH-F149,
-//! BTH-F160 to BTH-F162, BTH-F220 and BTH-F221.
+//! BTH-F160 to BTH-F162, and BTH-F220 to BTH-F222.
 
 use super::rows::{RowResult, check_all, check_fields, check_object_rows, is_finite};
 use crate::error::{Code, Error, Result};
@@ -11,14 +11,18 @@ use std::mem::offset_of;
 
 /// Checks the materials of an object with `materials` rows of MATERIALS and `triangles` triangles.
 pub(crate) fn materials(view: &MaterialsView<'_>, materials: usize, triangles: u32) -> Result<()> {
-    let rows = view.parameters.len();
-    if rows != 0 && rows != materials {
-        let expected = format!("{materials} rows or none");
-        return error(Code::MaterialParameters, kind::MATERIAL_PARAMETERS, 0, expected, &rows);
+    for (code, section, rows) in [
+        (Code::MaterialParameters, kind::MATERIAL_PARAMETERS, view.parameters.len()),
+        (Code::GlossParameters, kind::GLOSS_PARAMETERS, view.gloss.len()),
+    ] {
+        if rows != 0 && rows != materials {
+            return error(code, section, 0, format!("{materials} rows or none"), &rows);
+        }
     }
     check_object_rows(kind::MATERIAL_PARAMETERS, view.parameters, |_, row| {
         parameters(row, view.textures.len())
     })?;
+    check_object_rows(kind::GLOSS_PARAMETERS, view.gloss, |_, row| gloss(row, view.textures.len()))?;
     check_object_rows(kind::TEXTURES, view.textures, |_, row| texture(row))?;
     let triangles = triangles as usize;
     // BTH-F161.
@@ -47,6 +51,27 @@ fn parameters(p: &MaterialParameters, textures: usize) -> RowResult<()> {
         MaterialParameters emissive_texture: is_texture(p.emissive_texture),
             row_of_texture(), p.emissive_texture;
         MaterialParameters reserved: p.reserved == [0; 4], "zeros", p.reserved;
+    });
+    Ok(())
+}
+
+/// BTH-F222 of a row.
+fn gloss(p: &GlossParameters, textures: usize) -> RowResult<()> {
+    let is_share = |x: f32| (0.0..=1.0).contains(&x);
+    let is_texture = |row: u32| row == NONE || (row as usize) < textures;
+    let row_of_texture = || format!("a row below {textures} or NONE");
+    check_fields!(GlossParameters {
+        GlossParameters metallic: is_share(p.metallic), "a number from 0 to 1", p.metallic;
+        GlossParameters roughness: is_share(p.roughness), "a number from 0 to 1", p.roughness;
+        GlossParameters normal_scale: p.normal_scale.is_finite(), "a finite number", p.normal_scale;
+        GlossParameters occlusion_strength: is_share(p.occlusion_strength),
+            "a number from 0 to 1", p.occlusion_strength;
+        GlossParameters metallic_roughness_texture: is_texture(p.metallic_roughness_texture),
+            row_of_texture(), p.metallic_roughness_texture;
+        GlossParameters normal_texture: is_texture(p.normal_texture), row_of_texture(), p.normal_texture;
+        GlossParameters occlusion_texture: is_texture(p.occlusion_texture),
+            row_of_texture(), p.occlusion_texture;
+        GlossParameters reserved: p.reserved == 0, "zero", p.reserved;
     });
     Ok(())
 }

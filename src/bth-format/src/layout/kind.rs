@@ -150,6 +150,8 @@ kinds! {
     SECOND_CORNERS = 68: [u32; 3];
     /// `[f32; 2]`: a second set of texture coordinates.
     SECOND_UVS = 69: [f32; 2];
+    /// [`super::GlossParameters`], row by row for `MATERIALS`.
+    GLOSS_PARAMETERS = 70: GlossParameters;
 }
 
 /// Kind of trees for ranges of time in older files, which are refused (BTH-F007).

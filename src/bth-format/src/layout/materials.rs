@@ -26,6 +26,28 @@ pub struct MaterialParameters {
     pub reserved: [u32; 4],
 }
 
+/// How glossy a material is, and which textures shape its surface.
+#[derive(Clone, Copy, Debug, PartialEq, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct GlossParameters {
+    /// From 0, not metallic, to 1.
+    pub metallic: f32,
+    /// From 0, smooth, to 1.
+    pub roughness: f32,
+    /// Factor of the first two components of the normals of the texture.
+    pub normal_scale: f32,
+    /// How much the texture of occlusion counts, from 0 to 1.
+    pub occlusion_strength: f32,
+    /// Row of `TEXTURES`, or [`super::NONE`]: green is roughness, blue metallic.
+    pub metallic_roughness_texture: u32,
+    /// Row of `TEXTURES`, or [`super::NONE`].
+    pub normal_texture: u32,
+    /// Row of `TEXTURES`, or [`super::NONE`]: red is the share of light from all around.
+    pub occlusion_texture: u32,
+    /// Zero.
+    pub reserved: u32,
+}
+
 /// Alpha means nothing.
 pub const ALPHA_OPAQUE: u32 = 0;
 /// There is a surface where alpha is at least the cutoff.
@@ -86,6 +108,8 @@ pub struct Image {
 assert_layout! {
     MaterialParameters 64 { base_color 0, emissive 16, alpha_cutoff 28, alpha_mode 32, flags 36, base_color_texture 40,
         emissive_texture 44, reserved 48 }
+    GlossParameters 32 { metallic 0, roughness 4, normal_scale 8, occlusion_strength 12, metallic_roughness_texture 16,
+        normal_texture 20, occlusion_texture 24, reserved 28 }
     Texture 64 { image 0, wrap 16, filter 24, transform 28, uv_set 52, reserved 56 }
     Image 32 { name 0, first 16, length 24 }
 }

@@ -1,6 +1,6 @@
 //! The materials of an object and the images of a file as typed slices, zero-copy.
 
-use crate::layout::{Image, MaterialParameters, NONE, Texture};
+use crate::layout::{GlossParameters, Image, MaterialParameters, NONE, Texture};
 
 section_view! {
     /// The materials and vertex colours of an object. Sections that the file lacks are empty.
@@ -8,6 +8,8 @@ section_view! {
     MaterialsView {
         /// Per row of `MATERIALS` its parameters, or empty.
         parameters: MaterialParameters = MATERIAL_PARAMETERS,
+        /// Per row of `MATERIALS` how glossy it is, or empty.
+        gloss: GlossParameters = GLOSS_PARAMETERS,
         /// Textures that the parameters refer to.
         textures: Texture = TEXTURES,
         /// Per source triangle its rows of `colors`, or empty.

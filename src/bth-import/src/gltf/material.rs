@@ -43,6 +43,8 @@ pub(super) struct Textures {
 pub(super) struct MetallicRoughness {
     pub(super) base_color_factor: Value,
     pub(super) base_color_texture: Option<UsedTexture>,
+    pub(super) metallic_factor: Value,
+    pub(super) roughness_factor: Value,
     pub(super) metallic_roughness_texture: Option<UsedTexture>,
 }
 
@@ -54,6 +56,12 @@ pub(super) struct UsedTexture {
     /// Number of the set of texture coordinates: n for `TEXCOORD_n`.
     #[serde(default)]
     pub(super) tex_coord: u32,
+    /// Of a normal texture.
+    #[serde(default)]
+    pub(super) scale: Value,
+    /// Of an occlusion texture.
+    #[serde(default)]
+    pub(super) strength: Value,
     #[serde(default)]
     pub(super) extensions: Extensions,
 }
@@ -103,23 +111,26 @@ impl Material {
         self.alpha_mode.as_deref().filter(|mode| !ALPHA_MODES.contains(mode))
     }
 
-    /// Returns the textures that files keep: of the base colour and of emission.
+    /// Returns the textures that files keep.
     pub(super) fn kept_textures(&self) -> impl Iterator<Item = UsedTexture> + use<> {
         let base = self.base().ok().and_then(|base| base.texture);
-        base.into_iter().chain(self.textures.emissive_texture.clone())
+        [base, self.textures.emissive_texture.clone()].into_iter().chain(self.gloss_textures()).flatten()
+    }
+
+    /// Returns the metallic-roughness, normal and occlusion textures; none where no light falls.
+    pub(super) fn gloss_textures(&self) -> [Option<UsedTexture>; 3] {
+        if self.extensions.contains_key(UNLIT) {
+            return [None, None, None];
+        }
+        let Textures { pbr_metallic_roughness: pbr, normal_texture, occlusion_texture, .. } = &self.textures;
+        let gloss = pbr.as_ref().and_then(|pbr| pbr.metallic_roughness_texture.clone());
+        [gloss, normal_texture.clone(), occlusion_texture.clone()]
     }
 
     /// Returns the names of what it has and no file keeps.
     pub(super) fn left_out(&self) -> impl Iterator<Item = String> {
-        let Textures { pbr_metallic_roughness: pbr, normal_texture, occlusion_texture, .. } = &self.textures;
-        let textures = [
-            (pbr.as_ref().is_some_and(|p| p.metallic_roughness_texture.is_some()), "metallic-roughness"),
-            (normal_texture.is_some(), "normal"),
-            (occlusion_texture.is_some(), "occlusion"),
-        ];
-        let textures = textures.into_iter().filter(|(there, _)| *there);
         let known = [UNLIT, EMISSIVE_STRENGTH, SPECULAR_GLOSSINESS];
         let others = self.extensions.keys().filter(move |name| !known.contains(&name.as_str()));
-        textures.map(|(_, name)| format!("{name} textures")).chain(others.cloned())
+        others.cloned()
     }
 }

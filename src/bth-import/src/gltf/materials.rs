@@ -4,17 +4,18 @@ use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap};
 
 use bth_format::layout::*;
+use serde_json::Value;
 
 use crate::cutout::Wrap;
 use crate::error::Result;
 use crate::gltf::extensions::Use;
 use crate::gltf::file::GltfFile;
-use crate::gltf::material::{UNLIT, UsedTexture};
+use crate::gltf::material::{Material, SPECULAR_GLOSSINESS, Textures, UNLIT, UsedTexture};
 use crate::gltf::schema::GltfDocument;
 use crate::gltf::texture_reader::TextureReader;
 use crate::gltf::uv_set::UvSet;
 use crate::image_file;
-use crate::materials::{ImageFile, MaterialRecorder, Unreadable, warn_left_out};
+use crate::materials::{ImageFile, MaterialRecorder, NO_GLOSS, Unreadable, warn_left_out};
 use crate::source::Source;
 use crate::text::shown;
 
@@ -52,8 +53,9 @@ pub(super) fn read(
     let textures = TextureReader { file, without: WITHOUT };
     let mut reader = MaterialReader { textures, unreadable, shared, recorder };
     for number in numbers {
-        let parameters = reader.material(*number)?;
+        let (parameters, gloss) = reader.material(*number)?;
         reader.recorder.parameters.push(parameters);
+        reader.recorder.gloss.push(gloss);
     }
     Ok(())
 }
@@ -85,7 +87,7 @@ impl KeptSets {
 }
 
 impl MaterialReader<'_, '_> {
-    fn material(&mut self, number: usize) -> Result<MaterialParameters> {
+    fn material(&mut self, number: usize) -> Result<(MaterialParameters, GlossParameters)> {
         let part = format!("material {number}");
         let reader = &self.textures;
         let (material, base) = reader.material(number)?;
@@ -125,7 +127,54 @@ impl MaterialReader<'_, '_> {
         };
         // Without its texture all of the surface would glow.
         let emissive = if used.is_some() && emissive_texture == NONE { [0.0; 3] } else { emissive };
-        Ok(MaterialParameters { base_color_texture, emissive, emissive_texture, ..parameters })
+        let parameters = MaterialParameters { base_color_texture, emissive, emissive_texture, ..parameters };
+        // The older model has other parameters, and no light falls on what is unlit.
+        let is_older = material.extensions.contains_key(SPECULAR_GLOSSINESS)
+            && material.textures.pbr_metallic_roughness.is_none();
+        let gloss = match is_older || unlit != 0 {
+            true => NO_GLOSS,
+            false => self.gloss(&material, &part)?,
+        };
+        let [metallic_roughness, normal, occlusion] = material.gloss_textures();
+        let mut texture = |used: Option<UsedTexture>, what| self.texture(used.as_ref(), &sets, &part, what);
+        let metallic_roughness_texture = texture(metallic_roughness.clone(), "metallic-roughness")?;
+        // Without its texture all of the surface would be metal.
+        let is_lost = metallic_roughness.is_some() && metallic_roughness_texture == NONE;
+        let gloss = GlossParameters {
+            metallic: if is_lost { 0.0 } else { gloss.metallic },
+            metallic_roughness_texture,
+            normal_texture: texture(normal, "normal")?,
+            occlusion_texture: texture(occlusion, "occlusion")?,
+            ..gloss
+        };
+        Ok((parameters, gloss))
+    }
+
+    /// Returns how glossy a material is, without its textures.
+    fn gloss(&self, material: &Material, part: &str) -> Result<GlossParameters> {
+        let Textures { pbr_metallic_roughness: pbr, normal_texture, occlusion_texture, .. } =
+            &material.textures;
+        let number = |value: Option<&Value>, what: &str, is_good: fn(f64) -> bool| match value {
+            None | Some(Value::Null) => Ok(1.0),
+            Some(value) => value.as_f64().filter(|x| is_good(*x)).map(|x| x as f32).ok_or_else(|| {
+                self.textures.malformed(part, format!("expected a glTF {what}, found {value}"))
+            }),
+        };
+        let is_share = |x: f64| (0.0..=1.0).contains(&x);
+        let pbr = pbr.as_ref();
+        Ok(GlossParameters {
+            metallic: number(pbr.map(|p| &p.metallic_factor), "metallicFactor", is_share)?,
+            roughness: number(pbr.map(|p| &p.roughness_factor), "roughnessFactor", is_share)?,
+            normal_scale: number(normal_texture.as_ref().map(|t| &t.scale), "scale of normals", |x| {
+                (x as f32).is_finite()
+            })?,
+            occlusion_strength: number(
+                occlusion_texture.as_ref().map(|t| &t.strength),
+                "strength of occlusion",
+                is_share,
+            )?,
+            ..NO_GLOSS
+        })
     }
 
     /// Refuses numbers beyond what the format holds.

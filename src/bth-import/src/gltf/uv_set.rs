@@ -115,7 +115,7 @@ impl Material {
         let is_lit = self.emissive_factor.is_some_and(|factor| factor != [0.0; 3]);
         let base = self.base().ok().and_then(|base| base.texture);
         let emissive = self.textures.emissive_texture.clone().filter(|_| is_lit);
-        [base, emissive].into_iter().flatten().find_map(|used| {
+        [base, emissive].into_iter().chain(self.gloss_textures()).flatten().find_map(|used| {
             let set = UvSet::of(&used).ok()?;
             (first.relative(&set).is_none() && set.rows().is_some()).then_some(set.number)
         })

@@ -98,6 +98,28 @@ fn textures_of_one_set_share_it_by_a_transform() {
 }
 
 #[test]
+fn gloss_is_kept_with_its_textures() {
+    let (read, warnings) = materials(json!({"normalTexture": {"index": 0, "scale": 0.5},
+        "occlusionTexture": {"index": 1, "strength": 0.25},
+        "pbrMetallicRoughness": {"roughnessFactor": 0.5, "metallicRoughnessTexture": {"index": 1}}}));
+    assert!(warnings.is_empty(), "{warnings:?}");
+    let gloss = read.gloss[0];
+    assert_eq!((gloss.metallic, gloss.roughness, gloss.normal_scale), (1.0, 0.5, 0.5));
+    assert_eq!(gloss.occlusion_strength, 0.25);
+    assert_eq!(gloss.metallic_roughness_texture, gloss.occlusion_texture);
+    let images =
+        [gloss.metallic_roughness_texture, gloss.normal_texture].map(|row| read.textures[row as usize].image);
+    assert_ne!(images[0], images[1]);
+    // Without light, and in the older model, there is no gloss; without its image nothing is metal.
+    let has_no_gloss = |material: Value| materials(material).0.gloss.is_empty();
+    assert!(has_no_gloss(json!({"extensions": {"KHR_materials_unlit": {}}, "normalTexture": {"index": 0}})));
+    assert!(has_no_gloss(json!({"extensions": {"KHR_materials_pbrSpecularGlossiness": {}}})));
+    let lost = json!({"pbrMetallicRoughness":
+        {"roughnessFactor": 0.5, "metallicRoughnessTexture": {"index": 2}}});
+    assert_eq!(materials(lost).0.gloss[0].metallic, 0.0);
+}
+
+#[test]
 fn what_is_left_out_is_reported() {
     // The normal texture decides which set is kept for all purposes; the diffuse texture has the
     // second one.
@@ -107,11 +129,9 @@ fn what_is_left_out_is_reported() {
     assert_eq!((read.parameters[0].base_color_texture, read.parameters[0].emissive_texture), (0, NONE));
     assert_eq!(read.parameters[0].emissive, [0.0; 3], "all of the surface would glow");
     let all = warnings.join("\n");
-    for part in [
-        "material 0: its emissive texture is left out: its texture coordinates",
-        "normal textures",
-        "KHR_materials_clearcoat",
-    ] {
+    for part in
+        ["material 0: its emissive texture is left out: its texture coordinates", "KHR_materials_clearcoat"]
+    {
         assert!(all.contains(part), "{part} in {all}");
     }
     let (read, warnings) = materials(json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 2}}}));
@@ -224,6 +244,8 @@ fn malformed_materials_are_errors_with_their_place() {
         (json!({"emissiveFactor": [-1, 0, 0]}), "material 0: BTH-I002"),
         (json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 9}}}), "texture 9: BTH-I002"),
         (json!({"alphaCutoff": "much"}), "material 0: BTH-I002"),
+        (json!({"pbrMetallicRoughness": {"metallicFactor": 1.5}}), "expected a glTF metallicFactor"),
+        (json!({"normalTexture": {"index": 0, "scale": "big"}}), "expected a glTF scale of normals"),
     ] {
         let error = read(folder.path(), material).unwrap_err().to_string();
         assert!(error.contains(text) && error.contains("--materials"), "{error}");

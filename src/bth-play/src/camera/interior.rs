@@ -27,11 +27,11 @@ struct Probe {
 
 /// The camera inside the model.
 pub(super) fn interior_camera(scene: &Scene, bounds: &SceneBounds, args: &Args) -> Camera {
-    let eyes: Vec<DVec3> = (0..CANDIDATES).map(|i| candidate(bounds, args.up, i)).collect();
+    let eyes: Vec<DVec3> = (0..CANDIDATES).map(|i| candidate(bounds, args.up(), i)).collect();
     let probes: Vec<Vec<Probe>> = eyes.par_iter().map(|eye| probe(scene, *eye)).collect();
     let scores: Vec<f64> = probes.iter().map(|probes| score(probes, bounds.diagonal())).collect();
     let best = (0..eyes.len()).max_by(|a, b| scores[*a].total_cmp(&scores[*b])).unwrap_or(0);
-    let vertical = up_vector(args.up);
+    let vertical = up_vector(args.up());
     let forward = best_direction(&probes[best], vertical, bounds.diagonal());
     Camera::look_along(eyes[best], forward, vertical, half_extent(args, INTERIOR_FOV) / args.zoom)
 }

@@ -9,5 +9,5 @@ mod setup;
 
 pub(crate) use bounds::SceneBounds;
 pub(crate) use placement::scene_camera;
-pub(crate) use projection::{Camera, CameraRay, up_vector};
+pub(crate) use projection::{Camera, CameraRay, front_and_up, up_vector};
 pub(crate) use setup::SceneSetup;

@@ -18,7 +18,7 @@ const FILLED_SHARE: f64 = 0.86;
 /// The camera of `--camera` with eye and target, or else of `--yaw` and `--pitch` around the whole
 /// model.
 pub(super) fn exterior_camera(args: &Args, bounds: &SceneBounds) -> Camera {
-    let [front, vertical] = front_and_up(args.up);
+    let [front, vertical] = front_and_up(args.up());
     let half_extent = half_extent(args, EXTERIOR_FOV);
     if let Some(View::Points([ex, ey, ez, tx, ty, tz])) = args.camera {
         let eye = DVec3::new(ex, ey, ez);

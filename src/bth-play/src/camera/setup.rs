@@ -4,14 +4,15 @@ use super::bounds::SceneBounds;
 use super::interior::interior_camera;
 use super::placement::exterior_camera;
 use super::placement::scene_camera;
-use super::projection::{Camera, front_and_up};
+use super::projection::{Camera, front_and_up, up_vector};
 use crate::args::{Args, Mode, View};
 use crate::environment::Environment;
 use crate::failure::Failure;
 use crate::materials::SceneMaterials;
 use crate::sampling::fibonacci_sphere;
+use crate::smooth::SmoothNormals;
 use bth::Scene;
-use bth::rays::Ray;
+use bth::rays::{Hit, Ray};
 use bth_format::layout::NONE;
 use glam::DVec3;
 use std::path::Path;
@@ -33,8 +34,12 @@ pub(crate) struct SceneSetup {
     source: CameraSource,
     /// True if the camera is inside a room.
     pub(crate) interior: bool,
+    /// True if the camera is inside something solid, and nobody asked for that.
+    pub(crate) is_within_solid: bool,
     /// Materials, for modes that show them.
     pub(crate) materials: Arc<SceneMaterials>,
+    /// Smooth normals of each object, for modes that show them.
+    pub(crate) smooth: Arc<Vec<SmoothNormals>>,
     /// The surroundings that the options name.
     pub(crate) environment: Option<Arc<Environment>>,
 }
@@ -56,8 +61,10 @@ impl SceneSetup {
             let what = "the file has no objects";
             return Err(Failure::Lacks { file: file.into(), what, hint: "compile a model" });
         }
-        let bounds =
-            if is_scene { SceneBounds::of_scene(scene, range) } else { SceneBounds::of_object(scene) };
+        let bounds = match is_scene {
+            true => SceneBounds::of_scene(scene, range, up_vector(args.up())),
+            false => SceneBounds::of_object(scene),
+        };
         scene.set_frame(range.0)?;
         let source = match chosen_scene_camera(scene, file, args)? {
             Some(row) => CameraSource::Scene(row),
@@ -68,12 +75,31 @@ impl SceneSetup {
         let materials =
             if shows_materials { SceneMaterials::load(scene, file) } else { SceneMaterials::default() };
         let environment = args.env.as_deref().map(|path| read_environment(path, args)).transpose()?;
+        let smooth = |object: u32| match scene.vertex_count(object) {
+            // Where vertices move, normals at rest would be wrong.
+            Some(_) => SmoothNormals::default(),
+            None => SmoothNormals::new(&scene.object(object), args.smooth),
+        };
+        let is_smooth = args.window || !matches!(args.mode, Mode::Ao | Mode::Steps | Mode::Instances);
+        let smooth = match is_smooth && args.smooth > 0.0 {
+            true => (0..scene.object_count()).map(smooth).collect(),
+            false => Vec::new(),
+        };
+        let smooth = Arc::new(smooth);
         let (materials, environment) = (Arc::new(materials), environment.map(Arc::new));
-        let mut setup = SceneSetup { bounds, source, interior: false, materials, environment };
+        let mut setup = SceneSetup {
+            bounds,
+            source,
+            interior: false,
+            is_within_solid: false,
+            materials,
+            smooth,
+            environment,
+        };
         let eye = setup.camera(scene, args).eye;
-        // The floor of a scene may extend far beyond its objects, so being within the bounds does
-        // not make a room.
-        setup.interior = args.inside || setup.bounds.contains(eye) && (!is_scene || is_enclosed(scene, eye));
+        let (blocked, backs) = if setup.bounds.contains(eye) { seen_around(scene, eye) } else { (0.0, 0.0) };
+        setup.interior = args.inside || blocked > ENCLOSED;
+        setup.is_within_solid = !args.inside && backs > ENCLOSED;
         Ok(setup)
     }
 
@@ -105,7 +131,7 @@ fn read_environment(path: &Path, args: &Args) -> Result<Environment, Failure> {
     if !args.window && args.mode != Mode::Path {
         return Err(Failure::Usage(format!("--env is for --mode path, found --mode {}", args.mode.name())));
     }
-    let [front, vertical] = front_and_up(args.up);
+    let [front, vertical] = front_and_up(args.up());
     Environment::read(path, front, vertical)
 }
 
@@ -137,13 +163,23 @@ fn chosen_scene_camera(scene: &Scene, file: &Path, args: &Args) -> Result<Option
     }
 }
 
-/// Returns true if rays in more than nine tenths of all directions hit something, as between walls
-/// and a ceiling.
-fn is_enclosed(scene: &Scene, eye: DVec3) -> bool {
+/// The share of directions in which a camera must see surfaces, or the backs of surfaces, to be in
+/// a room, or inside something solid.
+const ENCLOSED: f64 = 0.8;
+
+/// The shares of all directions around an eye in which there are surfaces, and backs of surfaces.
+fn seen_around(scene: &Scene, eye: DVec3) -> (f64, f64) {
     const DIRECTIONS: u32 = 256;
-    let ray = |d: DVec3| Ray::new(eye.as_vec3().to_array(), d.as_vec3().to_array());
-    let rays: Vec<Ray> = fibonacci_sphere(DIRECTIONS).map(ray).collect();
-    let mut blocked = vec![false; rays.len()];
-    scene.batch(&rays).any(&mut blocked);
-    blocked.iter().filter(|b| **b).count() as u32 > DIRECTIONS * 9 / 10
+    let directions: Vec<DVec3> = fibonacci_sphere(DIRECTIONS).collect();
+    let ray = |d: &DVec3| Ray::new(eye.as_vec3().to_array(), d.as_vec3().to_array());
+    let rays: Vec<Ray> = directions.iter().map(ray).collect();
+    let mut hits = vec![Hit::MISS; rays.len()];
+    scene.batch(&rays).nearest(&mut hits);
+    let is_back = |(hit, direction): (&Hit, &DVec3)| {
+        let normal = scene.surface(hit).map(|surface| DVec3::from_array(surface.geometric_normal));
+        normal.is_some_and(|normal| normal.dot(*direction) > 0.0)
+    };
+    let share = |count: usize| count as f64 / f64::from(DIRECTIONS);
+    let backs = hits.iter().zip(&directions).filter(|seen| is_back(*seen)).count();
+    (share(hits.iter().filter(|hit| hit.is_hit()).count()), share(backs))
 }

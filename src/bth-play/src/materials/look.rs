@@ -6,7 +6,7 @@ use crate::messages::warn;
 use bth::rays::Hit;
 use bth::{Alpha, Material, Scene, Wrap};
 use bth_format::object::ObjectView;
-use glam::{Vec3, Vec4};
+use glam::{DVec2, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -53,6 +53,19 @@ pub(crate) struct Look {
     pub(crate) emissive: Vec3,
     /// True if the base colour is shown as it is, without light.
     pub(crate) unlit: bool,
+    /// How metallic and how rough it is; `None` for matte surfaces.
+    pub(crate) gloss: Option<[f32; 2]>,
+    /// The share of light from all around that reaches the surface.
+    pub(crate) occlusion: f32,
+    /// The normal of its texture: right, up and out of the surface.
+    pub(crate) normal: Option<Vec3>,
+}
+
+impl Look {
+    /// A matte surface.
+    pub(crate) fn matte(base_color: Vec3) -> Self {
+        Self { base_color, emissive: Vec3::ZERO, unlit: false, gloss: None, occlusion: 1.0, normal: None }
+    }
 }
 
 impl ObjectMaterials {
@@ -60,16 +73,42 @@ impl ObjectMaterials {
         !self.has_colors && self.materials.iter().all(Option::is_none)
     }
 
-    /// The linear texel of a texture at a hit; white without one.
+    fn texture(&self, texture: Option<u32>) -> Option<&LoadedTexture> {
+        texture.and_then(|row| self.textures.get(row as usize)?.as_ref())
+    }
+
+    /// The linear texel of a texture of colours at a hit; white without one.
     fn texel(&self, texture: Option<u32>, scene: &Scene, hit: &Hit) -> Vec4 {
-        let texture = texture.and_then(|row| self.textures.get(row as usize)?.as_ref());
-        let Some(LoadedTexture { texels, wrap, nearest, uv_set, transform }) = texture else {
-            return Vec4::ONE;
-        };
-        // Zeros where the file keeps none.
-        let [u, v] = scene.texture_coordinates(hit, *uv_set).unwrap_or_default().map(f64::from);
-        let at = transform.map(|[a, b, c]| (f64::from(a) * u + f64::from(b) * v + f64::from(c)) as f32);
-        texels.at(at, *wrap, *nearest)
+        self.texture(texture).map_or(Vec4::ONE, |texture| {
+            texture.texels.at(texture.coordinates(scene, hit), texture.wrap, texture.nearest)
+        })
+    }
+
+    /// The texel of another texture at a hit; `None` without one.
+    fn data(&self, texture: Option<u32>, scene: &Scene, hit: &Hit) -> Option<Vec4> {
+        self.texture(texture).map(|texture| {
+            texture.texels.data_at(texture.coordinates(scene, hit), texture.wrap, texture.nearest)
+        })
+    }
+}
+
+impl LoadedTexture {
+    /// Coordinates of the image at a hit, from zeros where the file keeps none.
+    fn coordinates(&self, scene: &Scene, hit: &Hit) -> [f32; 2] {
+        let [u, v] = scene.texture_coordinates(hit, self.uv_set).unwrap_or_default().map(f64::from);
+        self.transform.map(|[a, b, c]| (f64::from(a) * u + f64::from(b) * v + f64::from(c)) as f32)
+    }
+
+    /// The directions in the world in which the coordinates of the image grow, at any point of the
+    /// triangle of a hit.
+    fn directions(&self, scene: &Scene, hit: &Hit) -> Option<[DVec3; 2]> {
+        let [a, b, c] = scene.triangle_in_world(hit.primitive)?.map(DVec3::from_array);
+        let at = |u: f32, v: f32| DVec2::from(self.coordinates(scene, &Hit { u, v, ..*hit }).map(f64::from));
+        let (e, f, origin) = (b - a, c - a, at(0.0, 0.0));
+        let (s, t) = (at(1.0, 0.0) - origin, at(0.0, 1.0) - origin);
+        let area = s.perp_dot(t);
+        let along = [(e * t.y - f * s.y) / area, (f * s.x - e * t.x) / area];
+        along.iter().all(|d| d.is_finite() && *d != DVec3::ZERO).then_some(along)
     }
 }
 
@@ -82,6 +121,7 @@ const WHITE: Material = Material {
     alpha: Alpha::Opaque,
     double_sided: true,
     unlit: false,
+    gloss: None,
 };
 
 impl SceneMaterials {
@@ -133,7 +173,38 @@ impl SceneMaterials {
             }
             _ => emissive,
         };
-        Some(Look { base_color, emissive, unlit: material.unlit })
+        let mut look = Look { emissive, unlit: material.unlit, ..Look::matte(base_color) };
+        if let Some(gloss) = &material.gloss {
+            let texel = object.data(gloss.metallic_roughness_texture, scene, hit).unwrap_or(Vec4::ONE);
+            look.gloss = Some([gloss.metallic * texel.z, gloss.roughness * texel.y]);
+            let open = object.data(gloss.occlusion_texture, scene, hit).map_or(1.0, |texel| texel.x);
+            look.occlusion = 1.0 + gloss.occlusion_strength * (open - 1.0);
+            look.normal = object.data(gloss.normal_texture, scene, hit).map(|texel| {
+                let [x, y, z] = (texel.truncate() * 2.0 - 1.0).to_array();
+                Vec3::new(x * gloss.normal_scale, y * gloss.normal_scale, z)
+            });
+        }
+        Some(look)
+    }
+
+    /// The normal of a look in the world; `smooth` is the unit normal of the surface, on its front.
+    pub(crate) fn mapped_normal(
+        &self,
+        scene: &Scene,
+        view: &ObjectView<'_>,
+        hit: &Hit,
+        look: &Look,
+        smooth: DVec3,
+    ) -> Option<DVec3> {
+        let normal = look.normal?.as_dvec3();
+        let object = self.objects.get(scene.object_of(hit.primitive.instance) as usize)?;
+        let gloss = self.material(scene, view, hit)?.gloss?;
+        let [right, down] = object.texture(gloss.normal_texture)?.directions(scene, hit)?;
+        let right = right.reject_from_normalized(smooth).try_normalize()?;
+        let up = smooth.cross(right);
+        // Mirrored coordinates turn the other way.
+        let up = if up.dot(down) > 0.0 { -up } else { up };
+        (right * normal.x + up * normal.y + smooth * normal.z).try_normalize()
     }
 }
 

@@ -43,6 +43,21 @@ fn wrapped(at: i64, size: u32, wrap: Wrap) -> usize {
 impl Texels {
     /// The colour at coordinates of the image, linear. Coordinates that are not finite count as 0.
     pub(super) fn at(&self, coordinates: [f32; 2], wrap: [Wrap; 2], nearest: bool) -> Vec4 {
+        self.sampled(coordinates, wrap, nearest, |byte| LINEAR[usize::from(byte)])
+    }
+
+    /// The same where red, green and blue are no colour, but linear.
+    pub(super) fn data_at(&self, coordinates: [f32; 2], wrap: [Wrap; 2], nearest: bool) -> Vec4 {
+        self.sampled(coordinates, wrap, nearest, |byte| f32::from(byte) / 255.0)
+    }
+
+    fn sampled(
+        &self,
+        coordinates: [f32; 2],
+        wrap: [Wrap; 2],
+        nearest: bool,
+        decoded: impl Fn(u8) -> f32,
+    ) -> Vec4 {
         let place = |k: usize| {
             let (x, size) = (f64::from(coordinates[k]), f64::from([self.width, self.height][k]));
             // Numbers beyond this have no fraction to interpolate with.
@@ -54,18 +69,16 @@ impl Texels {
             }
         };
         let ((i, s), (j, t)) = (place(0), place(1));
-        let texel =
-            |i: i64, j: i64| self.texel(wrapped(i, self.width, wrap[0]), wrapped(j, self.height, wrap[1]));
+        let texel = |i: i64, j: i64| {
+            let at = wrapped(j, self.height, wrap[1]) * self.width as usize + wrapped(i, self.width, wrap[0]);
+            let [r, g, b, a] = self.rgba[at];
+            Vec3::from_array([r, g, b].map(&decoded)).extend(f32::from(a) / 255.0)
+        };
         if nearest {
             return texel(i, j);
         }
         let row = |j: i64| texel(i, j).lerp(texel(i + 1, j), s);
         row(j).lerp(row(j + 1), t)
-    }
-
-    fn texel(&self, i: usize, j: usize) -> Vec4 {
-        let [r, g, b, a] = self.rgba[j * self.width as usize + i];
-        Vec3::from_array([r, g, b].map(|byte| LINEAR[usize::from(byte)])).extend(f32::from(a) / 255.0)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::animation::{Animation, Y4mEncoder};
 use super::picture::{self, Picture};
+use super::video::Video;
 use crate::failure::Failure;
 use std::collections::HashSet;
 use std::io::{BufWriter, Write};
@@ -63,6 +64,8 @@ pub(crate) enum Sink {
     Numbered(Pattern),
     /// An animation, which is written after the last frame.
     Animation(Animation),
+    /// A video, which ffmpeg writes.
+    Video(Video),
     /// YUV4MPEG2 on standard output.
     Stream(Y4mEncoder<BufWriter<std::io::Stdout>>),
 }
@@ -81,9 +84,12 @@ impl Sink {
         if let Some(animation) = Animation::new(output, size, frames, rate)? {
             return Ok(Sink::Animation(animation));
         }
+        if let Some(video) = Video::new(output, size, rate)? {
+            return Ok(Sink::Video(video));
+        }
         if !output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
             return Err(Failure::Usage(format!(
-                "expected an output that ends with .png, .apng, .gif or .y4m, or is `-`, found {}",
+                "expected an output that ends with .png, .apng, .gif, .y4m or .mp4, or is `-`, found {}",
                 output.display()
             )));
         }
@@ -91,7 +97,7 @@ impl Sink {
             Some(pattern) => Ok(Sink::Numbered(pattern)),
             None if frames == 1 => Ok(Sink::One(output.into())),
             None => {
-                let message = "a PNG file holds one frame; write numbered ones (such as frames/####.png), or .apng, .gif or .y4m";
+                let message = "a PNG file holds one frame; write numbered ones (such as frames/####.png), or .apng, .gif, .y4m or .mp4";
                 Err(Failure::Usage(message.to_owned()))
             }
         }
@@ -103,6 +109,7 @@ impl Sink {
             Sink::One(path) => vec![path.clone()],
             Sink::Numbered(pattern) => frames.iter().map(|frame| pattern.path(*frame)).collect(),
             Sink::Animation(animation) => vec![animation.path().to_owned()],
+            Sink::Video(video) => vec![video.path().to_owned()],
             Sink::Stream(_) => Vec::new(),
         }
     }
@@ -145,6 +152,7 @@ impl Sink {
                 picture.write(&path)
             }
             Sink::Animation(animation) => animation.add(picture),
+            Sink::Video(video) => video.add(picture),
             Sink::Stream(encoder) => Ok(encoder.add(picture)?),
         }
     }
@@ -154,6 +162,7 @@ impl Sink {
         match self {
             Sink::One(_) | Sink::Numbered(_) => Ok(()),
             Sink::Animation(animation) => animation.finish(),
+            Sink::Video(video) => video.finish(),
             Sink::Stream(encoder) => Ok(encoder.finish()?.flush()?),
         }
     }

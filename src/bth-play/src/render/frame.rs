@@ -6,9 +6,8 @@ use crate::args::{Args, Mode};
 use crate::camera::SceneSetup;
 use crate::failure::Failure;
 use crate::output::{Picture, to_picture};
-use crate::shading::{Counters, FrameContext, Sample, Shader};
+use crate::shading::{Counters, FrameContext, Sample, Shaded, Shader};
 use bth::Scene;
-use glam::Vec3;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -61,6 +60,8 @@ pub(super) struct FrameRenderer<'a> {
     pub(super) shutter: &'a Shutter,
     /// Frames per second.
     pub(super) rate: f64,
+    /// Factor of light in mode path.
+    pub(super) factor: f32,
     pub(super) progress: &'a Progress,
 }
 
@@ -71,7 +72,7 @@ impl FrameRenderer<'_> {
     /// If a time cannot be set, or the file lacks what the mode needs.
     pub(super) fn render(&self, scene: &mut Scene, number: i32) -> Result<(Picture, FrameReport), Failure> {
         let pixels = pixel_count(self.args.size);
-        let (mut sums, mut total) = (vec![Vec3::ZERO; pixels], Counters::default());
+        let (mut sums, mut total) = (vec![Shaded::default(); pixels], Counters::default());
         let mut report = FrameReport { frame: number, ..FrameReport::default() };
         for exposure in self.shutter.exposures() {
             let start = Instant::now();
@@ -86,7 +87,7 @@ impl FrameRenderer<'_> {
             let frame = FrameContext::new(scene, self.file, self.setup, camera, self.args)?;
             let start = Instant::now();
             for tile in self.tiles(&frame, &exposure) {
-                tile.write_to(&mut sums, self.args.size.0, |sum, color| *sum += color);
+                tile.add_to(&mut sums, self.args.size.0);
                 total += tile.counters;
             }
             report.seconds += start.elapsed().as_secs_f64();
@@ -96,8 +97,8 @@ impl FrameRenderer<'_> {
         report.any_rays = total.any_rays;
         let [nodes, leaves, triangles, tets] = (total.steps / camera_rays as f64).to_array();
         report.steps = (self.args.mode == Mode::Steps).then_some(Steps { nodes, leaves, triangles, tets });
-        let means: Vec<Vec3> = sums.into_iter().map(|sum| sum / self.args.spp as f32).collect();
-        Ok((to_picture(&means, self.args), report))
+        let means: Vec<Shaded> = sums.into_iter().map(|sum| sum / self.args.spp as f32).collect();
+        Ok((to_picture(means, self.args, self.factor), report))
     }
 
     /// All tiles at the time to which the scene is set.
@@ -120,7 +121,7 @@ const TILE: u32 = 16;
 pub(crate) struct Tile {
     pixels: Vec<(u32, u32)>,
     /// Sums of the samples of each pixel.
-    sums: Vec<Vec3>,
+    sums: Vec<Shaded>,
     pub(super) counters: Counters,
 }
 
@@ -136,13 +137,13 @@ pub(crate) fn render_tile(
     let columns = frame.args.size.0.div_ceil(TILE);
     let mut pixels = pixels(frame.args.size, number % columns * TILE, number / columns * TILE);
     pixels.retain(|pixel| exposure.takes(*pixel));
-    let mut tile = Tile { sums: vec![Vec3::ZERO; pixels.len()], pixels, ..Tile::default() };
+    let mut tile = Tile { sums: vec![Shaded::default(); pixels.len()], pixels, ..Tile::default() };
     let centered = frame.args.spp == 1;
     for index in exposure.samples.clone() {
         let samples: Vec<Sample> =
             tile.pixels.iter().map(|&pixel| frame.sample(pixel, index, centered)).collect();
-        let colors = shader.shade(frame, &samples, &mut tile.counters);
-        tile.sums.iter_mut().zip(colors).for_each(|(sum, color)| *sum += color);
+        let shaded = shader.shade(frame, &samples, &mut tile.counters);
+        tile.sums.iter_mut().zip(shaded).for_each(|(sum, shaded)| *sum += shaded);
     }
     tile
 }
@@ -157,11 +158,10 @@ fn pixels((width, height): (u32, u32), left: u32, top: u32) -> Vec<(u32, u32)> {
 }
 
 impl Tile {
-    /// Calls `update` with each pixel of a picture, in rows of `width` from the top, and the sum of
-    /// its samples in the tile.
-    pub(crate) fn write_to(&self, picture: &mut [Vec3], width: u32, update: impl Fn(&mut Vec3, Vec3)) {
+    /// Adds its samples to the pixels of a picture, in rows of `width` from the top.
+    pub(crate) fn add_to(&self, picture: &mut [Shaded], width: u32) {
         for (&(x, y), &sum) in self.pixels.iter().zip(&self.sums) {
-            update(&mut picture[y as usize * width as usize + x as usize], sum);
+            picture[y as usize * width as usize + x as usize] += sum;
         }
     }
 }

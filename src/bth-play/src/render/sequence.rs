@@ -1,13 +1,14 @@
 //! A sequence of frames: which ones are rendered, one after another, with progress on a terminal,
 //! and the time that each took.
 
+use super::brightness::light_factor;
 use super::frame::{FrameRenderer, FrameReport, Progress};
 use super::shutter::Shutter;
-use crate::args::{Args, Mode};
+use crate::args::{Args, Denoise, Mode};
 use crate::camera::SceneSetup;
 use crate::failure::Failure;
 use crate::messages::warn;
-use crate::output::{Pattern, Sink};
+use crate::output::{Pattern, Sink, has_library};
 use bth::Scene;
 use std::path::{Path, PathBuf};
 
@@ -17,6 +18,8 @@ pub(crate) struct Report {
     pub(crate) frames: Vec<FrameReport>,
     /// Frames that were not rendered because their pictures existed already.
     pub(crate) skipped: usize,
+    /// Stops by which mode path brightens light.
+    pub(crate) exposure: Option<f32>,
 }
 
 /// The first and last frame of a file and its frames per second; frame 0 alone for files without a
@@ -107,11 +110,13 @@ pub(crate) fn render_sequence(
     let setup = SceneSetup::new(scene, file, args, whole)?;
     warnings(scene, args, &setup).iter().for_each(|text| warn(&format!("{}: {text}", file.display())));
     if !frames.is_empty() {
+        let factor = light_factor(scene, file, &setup, args, whole)?;
+        report.exposure = (args.mode == Mode::Path).then(|| factor.log2());
         let shutter = shutter(scene, args);
         let times = shutter.exposures().len();
         let progress = Progress::new(frames.len(), times, args);
         let (setup, shutter) = (&setup, &shutter);
-        let renderer = FrameRenderer { file, setup, args, shutter, rate, progress: &progress };
+        let renderer = FrameRenderer { file, setup, args, shutter, rate, factor, progress: &progress };
         for number in frames {
             let (picture, frame) = renderer.render(scene, number)?;
             sink.write(number, &picture)?;
@@ -142,6 +147,26 @@ fn warnings(scene: &Scene, args: &Args, setup: &SceneSetup) -> Vec<String> {
     }
     if args.bounces.is_some() && args.mode != Mode::Path {
         warnings.push(format!("--bounces changes nothing: it is for --mode path, found --mode {mode}"));
+    }
+    if args.exposure.is_some() && args.mode != Mode::Path {
+        warnings.push(format!("--exposure changes nothing: it is for --mode path, found --mode {mode}"));
+    }
+    if setup.is_within_solid {
+        warnings.push(
+            "the camera is inside something solid and sees the backs of surfaces; move it, or use --inside \
+             for rooms"
+                .to_owned(),
+        );
+    }
+    if args.up.is_none() && setup.bounds.seems_to_lie {
+        warnings.push("the model seems to lie on its side; --up z shows it upright".to_owned());
+    }
+    if args.denoise != Denoise::Auto && args.mode != Mode::Path {
+        warnings.push(format!("--denoise changes nothing: it is for --mode path, found --mode {mode}"));
+    }
+    if args.denoise == Denoise::Oidn && !has_library() {
+        let what = "--denoise oidn: Open Image Denoise is not installed (libOpenImageDenoise.so.2), so the";
+        warnings.push(format!("{what} built-in filter is used"));
     }
     if args.scale.is_some() && args.mode != Mode::Steps {
         warnings.push(format!("--scale changes nothing: it is for --mode steps, found --mode {mode}"));

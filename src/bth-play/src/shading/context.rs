@@ -1,16 +1,18 @@
 //! What all samples of a frame share, and what is counted while they are shaded.
 
+use super::bsdf::Bsdf;
 use super::geometry::ShadingGeometry;
+use super::ground::Ground;
 use crate::args::{Args, Mode};
 use crate::camera::{Camera, CameraRay, SceneBounds, SceneSetup};
 use crate::environment::Environment;
 use crate::failure::Failure;
-use crate::materials::SceneMaterials;
+use crate::materials::{Look, SceneMaterials};
 use crate::sampling::Sampler;
 use bth::Scene;
 use bth::rays::{Hit, PrimitiveRef};
 use bth_random::mix;
-use glam::{DVec2, DVec3, DVec4};
+use glam::{DVec2, DVec3, DVec4, Vec3};
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -32,6 +34,7 @@ pub(crate) struct FrameContext<'a> {
     pub(crate) interior: bool,
     /// Length of ambient-occlusion rays, in world units.
     pub(crate) occlusion_distance: f64,
+    pub(crate) ground: Option<Ground>,
     pub(crate) args: &'a Args,
 }
 
@@ -65,6 +68,50 @@ impl Chance {
     }
 }
 
+/// A shaded sample.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Shaded {
+    /// Linear.
+    pub(crate) color: Vec3,
+    /// The albedo and the normal of what the ray of the camera hits, in mode path: what tells edges
+    /// from noise.
+    pub(crate) albedo: Vec3,
+    pub(crate) normal: Vec3,
+    /// The square of the luminance of the colour, in mode path.
+    pub(crate) square: f32,
+}
+
+impl Shaded {
+    /// A colour alone.
+    pub(super) fn plain(color: Vec3) -> Self {
+        Self { color, ..Self::default() }
+    }
+
+    /// Notes what the ray of the camera hits; `None` for the surroundings.
+    pub(super) fn describe(&mut self, bsdf: Option<&Bsdf>) {
+        self.albedo = bsdf.map_or(Vec3::ONE, Bsdf::albedo);
+        self.normal = bsdf.map_or(Vec3::ZERO, |bsdf| bsdf.normal().as_vec3());
+    }
+}
+
+impl std::ops::AddAssign for Shaded {
+    fn add_assign(&mut self, other: Self) {
+        self.color += other.color;
+        self.albedo += other.albedo;
+        self.normal += other.normal;
+        self.square += other.square;
+    }
+}
+
+impl std::ops::Div<f32> for Shaded {
+    type Output = Self;
+
+    fn div(self, by: f32) -> Self {
+        let Self { color, albedo, normal, square } = self;
+        Self { color: color / by, albedo: albedo / by, normal: normal / by, square: square / by }
+    }
+}
+
 /// Rays and traversal steps, summed over the samples of a tile or frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Counters {
@@ -88,7 +135,7 @@ impl<'a> FrameContext<'a> {
         camera: Camera,
         args: &'a Args,
     ) -> Result<Self, Failure> {
-        let geometry = ShadingGeometry::new(scene);
+        let geometry = ShadingGeometry::new(scene, &setup.smooth);
         if !matches!(args.mode, Mode::Steps) {
             geometry.require_triangles(file)?;
         }
@@ -99,6 +146,7 @@ impl<'a> FrameContext<'a> {
             _ => NO_MATERIALS.get_or_init(SceneMaterials::default),
         };
         let (environment, bounds) = (setup.environment.as_deref(), &setup.bounds);
+        let ground = Ground::new(bounds, args).filter(|_| !interior);
         Ok(Self {
             scene,
             geometry,
@@ -108,6 +156,7 @@ impl<'a> FrameContext<'a> {
             camera,
             interior,
             occlusion_distance,
+            ground,
             args,
         })
     }
@@ -122,6 +171,19 @@ impl<'a> FrameContext<'a> {
             / DVec2::new(f64::from(width), f64::from(height));
         let at = DVec2::new(2.0 * part.x - 1.0, 1.0 - 2.0 * part.y);
         Sample { sampler, index, at, ray: self.camera.ray(at) }
+    }
+
+    /// The shading normal at a hit, on the side of the geometric one.
+    pub(crate) fn shading_normal(&self, hit: &Hit, geometric: DVec3, look: &Look) -> DVec3 {
+        let smooth = self.geometry.shading_normal(hit, geometric);
+        if look.normal.is_none() {
+            return smooth;
+        }
+        // Textures are about the front.
+        let side = if self.geometry.is_front_normal(hit.primitive, geometric) { 1.0 } else { -1.0 };
+        let view = self.geometry.object(hit.primitive);
+        let mapped = self.materials.mapped_normal(self.scene, view, hit, look, smooth * side);
+        mapped.map_or(smooth, |normal| normal * side)
     }
 
     /// The point of a camera ray's hit and the geometric normal there, on the side of the camera.

@@ -1,6 +1,7 @@
 //! Normals at hits, computed from the source geometry that the file keeps, in world space.
 
 use crate::failure::Failure;
+use crate::smooth::SmoothNormals;
 use bth::Scene;
 use bth::rays::{Hit, PrimitiveRef};
 use bth_format::object::ObjectView;
@@ -17,6 +18,8 @@ pub(crate) struct ShadingGeometry<'a> {
     deformable: Vec<bool>,
     /// The object of each instance.
     object_of: Vec<u32>,
+    /// Of each object; empty in modes that show no smooth normals.
+    smooth: &'a [SmoothNormals],
 }
 
 fn to_f64(p: [f32; 3]) -> DVec3 {
@@ -24,12 +27,13 @@ fn to_f64(p: [f32; 3]) -> DVec3 {
 }
 
 impl<'a> ShadingGeometry<'a> {
-    pub(crate) fn new(scene: &'a Scene) -> Self {
+    pub(crate) fn new(scene: &'a Scene, smooth: &'a [SmoothNormals]) -> Self {
         Self {
             scene,
             objects: (0..scene.object_count()).map(|i| scene.object(i)).collect(),
             deformable: (0..scene.object_count()).map(|i| scene.vertex_count(i).is_some()).collect(),
             object_of: (0..scene.instance_count()).map(|i| scene.object_of(i)).collect(),
+            smooth,
         }
     }
 
@@ -71,6 +75,11 @@ impl<'a> ShadingGeometry<'a> {
         self.front_normal(primitive).is_none_or(|normal| normal.dot(direction) < 0.0)
     }
 
+    /// Returns true if a normal of a triangle is on its front.
+    pub(super) fn is_front_normal(&self, primitive: PrimitiveRef, normal: DVec3) -> bool {
+        self.front_normal(primitive).is_none_or(|front| front.dot(normal) > 0.0)
+    }
+
     /// The unit normal of a triangle's plane in the world on the side of its front; `None` where it
     /// cannot be computed.
     fn front_normal(&self, primitive: PrimitiveRef) -> Option<DVec3> {
@@ -83,15 +92,23 @@ impl<'a> ShadingGeometry<'a> {
         self.to_world(primitive, (e / scale).cross(f / scale))
     }
 
-    /// The interpolated normal of the source on the side of the geometric one, or the geometric
-    /// one when the source has none.
+    /// The interpolated normal of the source, or a smooth one, on the side of the geometric one; or
+    /// the geometric one when there is neither.
     pub(crate) fn shading_normal(&self, hit: &Hit, geometric: DVec3) -> DVec3 {
-        let object = self.object(hit.primitive);
-        let Some(corners) = object.corners.get(hit.primitive.triangle as usize) else { return geometric };
-        if object.normals.is_empty() {
-            return geometric;
-        }
-        let normal = if self.deformable[self.object_of[hit.primitive.instance as usize] as usize] {
+        let (object, row) =
+            (self.object(hit.primitive), self.object_of[hit.primitive.instance as usize] as usize);
+        let PrimitiveRef { instance, triangle } = hit.primitive;
+        let corners = object.corners.get(triangle as usize).filter(|_| !object.normals.is_empty());
+        let Some(corners) = corners else {
+            let smooth = self.smooth.get(row).and_then(|smooth| smooth.at(triangle, hit.u, hit.v));
+            let normal = smooth.and_then(|normal| self.to_world(PrimitiveRef { instance, triangle }, normal));
+            return match normal {
+                Some(normal) if normal.dot(geometric) < 0.0 => -normal,
+                Some(normal) => normal,
+                None => geometric,
+            };
+        };
+        let normal = if self.deformable[row] {
             self.scene.surface(hit).map(|surface| DVec3::from_array(surface.normal))
         } else {
             let [a, b, c] = corners.map(|row| to_f64(object.normals[row as usize]));

@@ -1,9 +1,10 @@
 //! The light of mode path: the scene's lights, or else a sun or the lamp of a room, and a sky or
 //! the surroundings of `--env`. Brightness is relative to the brightest light and to the size of
-//! the scene, so that no exposure is needed and frames do not flicker.
+//! the scene.
 
 use super::context::FrameContext;
-use crate::camera::SceneBounds;
+use super::sky::Sky;
+use crate::camera::{SceneBounds, front_and_up};
 use crate::environment::{Environment, EnvironmentSample};
 use crate::sampling::uniform_disc;
 use bth::Scene;
@@ -12,17 +13,14 @@ use bth_format::layout;
 use glam::{DVec2, DVec3, Vec3};
 use std::f64::consts::PI;
 
-/// Tangent of half the angle under which the sun is seen: larger than the real one, for softer
-/// shadows.
-const SUN_RADIUS: f64 = 0.02;
-/// Irradiance of the sun, or of the brightest directional light.
-const SUN: Vec3 = Vec3::new(2.1, 1.95, 1.7);
+/// Tangent of half the angle under which a directional light is seen, for softer shadows.
+const LIGHT_RADIUS: f64 = 0.02;
+/// Irradiance of the brightest directional light.
+const DIRECTIONAL: Vec3 = Vec3::new(2.5, 2.3, 2.0);
 /// Irradiance of the brightest point or spot light at a quarter of the scene's diagonal.
 const LAMP: f64 = 2.0;
-/// Radiance of the sky at the zenith, at the horizon and below it.
-const ZENITH: Vec3 = Vec3::new(0.42, 0.58, 0.86);
-const HORIZON: Vec3 = Vec3::new(0.86, 0.90, 0.94);
-const BELOW: Vec3 = Vec3::new(0.34, 0.32, 0.30);
+/// Direction to the sun: degrees around the model from its front, and above the horizon.
+const SUN: [f64; 2] = [-28.0, 43.0];
 
 /// A sample of a light as seen from a point.
 pub(crate) struct LightSample {
@@ -47,61 +45,75 @@ struct Cone {
     outer: f64,
 }
 
+/// What shines where nothing is hit.
+enum Surroundings<'a> {
+    Picture(&'a Environment),
+    Sky(Sky),
+}
+
 /// All light of a frame.
 pub(crate) struct Lights<'a> {
     lights: Vec<Light>,
-    vertical: DVec3,
     /// Length of shadow rays to directional lights: beyond the bounds of the scene.
     far_distance: f64,
-    /// What takes the place of the built-in sky and sun.
-    environment: Option<&'a Environment>,
+    surroundings: Surroundings<'a>,
 }
 
 impl<'a> Lights<'a> {
     /// The lights of a scene at the time to which it is set. A scene without lights gets a sun, or
     /// in a room a lamp, given by its position and the distance at which it is as bright as
     /// [`LAMP`].
-    pub(crate) fn new(frame: &FrameContext<'a>, vertical: DVec3, lamp: Option<(DVec3, f64)>) -> Self {
+    pub(crate) fn new(frame: &FrameContext<'a>, lamp: Option<(DVec3, f64)>) -> Self {
         let FrameContext { scene, bounds, environment, .. } = *frame;
         let mut lights = of_scene(scene, bounds);
         if let Some((position, distance)) = lamp.filter(|_| lights.is_empty()) {
             let light = Vec3::splat((LAMP * distance * distance) as f32);
             lights.push(Light::Point { position, light, range: f64::INFINITY, cone: None });
         }
-        if lights.is_empty() && environment.is_none() {
-            // Fixed in the world, so that it does not turn with a moving camera.
-            let (side, front) = vertical.any_orthonormal_pair();
-            let towards = (vertical * 0.9 + side * 0.45 + front * 0.35).normalize();
-            lights.push(Light::Directional { towards, light: SUN });
-        }
-        Self { lights, vertical, far_distance: 4.0 * bounds.diagonal(), environment }
+        let surroundings = match environment {
+            Some(picture) => Surroundings::Picture(picture),
+            None => {
+                let [front, vertical] = front_and_up(frame.args.up());
+                let [around, above] = SUN.map(f64::to_radians);
+                // Fixed in the world, so that it does not turn with a moving camera.
+                let level = DVec3::X * around.sin() + front * around.cos();
+                let sun = level * above.cos() + vertical * above.sin();
+                let of_light = lights.iter().find_map(|light| match light {
+                    Light::Directional { towards, .. } => Some(*towards).filter(|t| t.dot(vertical) > 0.0),
+                    Light::Point { .. } => None,
+                });
+                Surroundings::Sky(Sky::new(vertical, of_light.unwrap_or(sun), lights.is_empty()))
+            }
+        };
+        Self { lights, far_distance: bounds.reach(), surroundings }
     }
 
-    /// Radiance of the sky in a unit direction.
+    /// Radiance of the surroundings in a unit direction.
     pub(crate) fn sky(&self, direction: DVec3) -> Vec3 {
-        if let Some(environment) = self.environment {
-            return environment.radiance(direction);
-        }
-        let height = direction.dot(self.vertical) as f32;
-        if height < 0.0 {
-            HORIZON.lerp(BELOW, (-height * 4.0).min(1.0))
-        } else {
-            HORIZON.lerp(ZENITH, height.sqrt())
+        match &self.surroundings {
+            Surroundings::Picture(picture) => picture.radiance(direction),
+            Surroundings::Sky(sky) => sky.radiance(direction),
         }
     }
 
     /// A sample of the surroundings for a point of the unit square, and its density with regard to
-    /// solid angle. The light is radiance divided by that density and by π. `None` for the built-in
-    /// sky, which is the same nearly everywhere.
+    /// solid angle. The light is radiance divided by that density and by π. `None` in the dark, and
+    /// for a sky without a sun, which is much the same everywhere.
     pub(crate) fn surroundings(&self, point: DVec2) -> Option<(LightSample, f64)> {
-        let EnvironmentSample { direction, radiance, density } = self.environment?.sample(point)?;
+        let EnvironmentSample { direction, radiance, density } = match &self.surroundings {
+            Surroundings::Picture(picture) => picture.sample(point),
+            Surroundings::Sky(sky) => sky.sample(point),
+        }?;
         let light = (radiance.as_dvec3() / (density * PI)).as_vec3();
         Some((LightSample { direction, distance: self.far_distance, light }, density))
     }
 
-    /// Density of [`Self::surroundings`] in a unit direction; 0 for the built-in sky.
+    /// Density of [`Self::surroundings`] in a unit direction.
     pub(crate) fn density(&self, direction: DVec3) -> f64 {
-        self.environment.map_or(0.0, |environment| environment.density(direction))
+        match &self.surroundings {
+            Surroundings::Picture(picture) => picture.density(direction),
+            Surroundings::Sky(sky) => sky.density(direction),
+        }
     }
 
     /// Samples of the lights as seen from a point: one of each directional light, and one of a
@@ -118,7 +130,7 @@ impl<'a> Lights<'a> {
         let directional = self.lights.iter().filter_map(move |l| match l {
             Light::Directional { towards, light } => {
                 let (tangent, bitangent) = towards.any_orthonormal_pair();
-                let at = uniform_disc(spread) * SUN_RADIUS;
+                let at = uniform_disc(spread) * LIGHT_RADIUS;
                 let direction = (*towards + tangent * at.x + bitangent * at.y).normalize();
                 Some(LightSample { direction, distance: self.far_distance, light: *light })
             }
@@ -149,7 +161,7 @@ fn of_scene(scene: &Scene, bounds: &SceneBounds) -> Vec<Light> {
         }
         let color = DVec3::from_array(light.color) * light.intensity;
         if light.kind == 0 {
-            let light = SUN * (color / brightest_directional).as_vec3();
+            let light = DIRECTIONAL * (color / brightest_directional).as_vec3();
             lights.push(Light::Directional { towards: -axis, light });
             continue;
         }

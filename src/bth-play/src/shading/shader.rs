@@ -1,13 +1,12 @@
 //! The shader of each mode.
 
-use super::context::{Counters, FrameContext, Sample};
+use super::context::{Counters, FrameContext, Sample, Shaded};
 use super::lights::{Lights, room_lamp};
 use super::studio::Studio;
 use super::{path_tracer, surface_modes, visibility};
 use crate::args::Mode;
 use crate::camera::up_vector;
 use bth::rays::{Hit, Ray};
-use glam::Vec3;
 
 /// Shades batches of samples; what it needs besides the frame is computed once a frame.
 pub(crate) enum Shader<'a> {
@@ -22,18 +21,15 @@ pub(crate) enum Shader<'a> {
 impl<'a> Shader<'a> {
     /// The shader of the frame's mode.
     pub(crate) fn new(frame: &FrameContext<'a>) -> Self {
-        let vertical = up_vector(frame.args.up);
+        let vertical = up_vector(frame.args.up());
         match frame.args.mode {
-            Mode::Shaded | Mode::Clay => {
-                let ground = !frame.args.no_ground && frame.scene.description().is_none();
-                Shader::Studio(Studio::new(frame, vertical, ground))
-            }
+            Mode::Shaded | Mode::Clay => Shader::Studio(Studio::new(frame, vertical)),
             Mode::Path => {
                 let lamp = frame.interior.then(|| {
                     let position = room_lamp(frame, vertical);
                     (position, 1.5 * (position - frame.camera.eye).length())
                 });
-                Shader::Path(Lights::new(frame, vertical, lamp))
+                Shader::Path(Lights::new(frame, lamp))
             }
             Mode::Normals => Shader::Normals,
             Mode::Ao => Shader::AmbientOcclusion,
@@ -50,23 +46,25 @@ impl<'a> Shader<'a> {
         frame: &FrameContext<'_>,
         samples: &[Sample],
         counters: &mut Counters,
-    ) -> Vec<Vec3> {
+    ) -> Vec<Shaded> {
         let rays: Vec<Ray> = samples.iter().map(|sample| sample.ray.to_ray()).collect();
         if let Shader::Steps = self {
-            return surface_modes::steps(frame.scene, &rays, &mut counters.steps);
+            let steps = surface_modes::steps(frame.scene, &rays, &mut counters.steps);
+            return steps.into_iter().map(Shaded::plain).collect();
         }
         let mut hits = vec![Hit::MISS; rays.len()];
         let direction = |ray: &Ray| ray.direction;
         visibility::nearest(frame, &rays, Some(direction), |row| samples[row].chance(0), &mut hits);
-        match self {
+        let colors = match self {
+            Shader::Path(lights) => return path_tracer::shade(frame, lights, samples, &hits, counters),
             Shader::Studio(studio) => studio.shade(frame, samples, &hits, &mut counters.any_rays),
-            Shader::Path(lights) => path_tracer::shade(frame, lights, samples, &hits, counters),
             Shader::Normals => surface_modes::normals(frame, samples, &hits),
             Shader::AmbientOcclusion => {
                 surface_modes::ambient_occlusion(frame, samples, &hits, &mut counters.any_rays)
             }
             Shader::Instances => surface_modes::instances(frame, samples, &hits),
             Shader::Steps => unreachable!("handled above"),
-        }
+        };
+        colors.into_iter().map(Shaded::plain).collect()
     }
 }

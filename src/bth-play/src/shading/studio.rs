@@ -1,11 +1,13 @@
 //! The studio shader of modes shaded and clay: base colours, or a matte clay, under a soft key
 //! light and a fill light, with ambient occlusion, on a ground that only catches shadows.
 
+use super::bsdf::Bsdf;
 use super::context::{FrameContext, Sample};
 use super::lights::room_lamp;
+use super::surface::Surface;
 use super::visibility::OcclusionRays;
+use crate::color::shoulder;
 use crate::materials::Look;
-use crate::output::shoulder;
 use crate::sampling::{cosine_hemisphere, uniform_disc};
 use bth::TraceRay;
 use bth::rays::{Hit, Ray, StartRay};
@@ -23,24 +25,21 @@ const KEY: Vec3 = Vec3::new(1.15, 1.08, 0.97);
 const FILL: Vec3 = Vec3::new(0.12, 0.145, 0.19);
 const SKY: Vec3 = Vec3::new(0.33, 0.37, 0.43);
 const BOUNCE: Vec3 = Vec3::new(0.22, 0.20, 0.18);
+/// How much brighter what mirrors show is than the ambient light.
+const ROOM: f32 = 1.6;
 const BACKGROUND_TOP: Vec3 = Vec3::new(0.52, 0.56, 0.62);
 const BACKGROUND_BOTTOM: Vec3 = Vec3::new(0.80, 0.81, 0.82);
 
-/// The lights and the ground.
+/// The lights.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Studio {
     vertical: DVec3,
     key: Key,
     /// Unit, towards the fill light.
     fill: DVec3,
-    /// Height of the ground along the vertical, if there is one.
-    ground: Option<f64>,
-    /// Diagonal of the scene's bounds.
-    diagonal: f64,
+    /// Length of rays to a key light far away.
+    reach: f64,
 }
-
-/// Rays that descend less, relative to their length, end at the horizon and reach no ground.
-const HORIZON: f64 = 1e-6;
 
 /// The key light.
 #[derive(Clone, Copy, Debug)]
@@ -55,7 +54,8 @@ enum Key {
 struct ShadingPoint {
     /// Index of its sample.
     sample: usize,
-    normal: DVec3,
+    /// The normal of the triangle or of the ground, on the side of the viewer.
+    geometric: DVec3,
     to_key: DVec3,
     what: LitSurface,
 }
@@ -77,23 +77,21 @@ impl<R: TraceRay> Lit<R> {
 enum LitSurface {
     /// The ground, and how strongly a shadow shows there.
     Ground(f64),
-    /// The clay of what has no material.
-    Clay,
-    Material(Look),
+    /// The clay of what has no material, with its normal.
+    Clay(DVec3),
+    Material(Bsdf, Look),
 }
 
 impl Studio {
-    pub(crate) fn new(frame: &FrameContext<'_>, vertical: DVec3, ground: bool) -> Self {
+    pub(crate) fn new(frame: &FrameContext<'_>, vertical: DVec3) -> Self {
         let camera = &frame.camera;
-        let diagonal = frame.bounds.diagonal();
         let key = if frame.interior {
             Key::Point(room_lamp(frame, vertical))
         } else {
             Key::Directional((-camera.forward * 0.45 - camera.right * 0.55 + vertical * 0.85).normalize())
         };
         let fill = (camera.right * 0.85 - camera.forward * 0.5 + vertical * 0.1).normalize();
-        let ground = (ground && !frame.interior).then(|| frame.bounds.lower.dot(vertical));
-        Self { vertical, key, fill, ground, diagonal }
+        Self { vertical, key, fill, reach: frame.bounds.reach() }
     }
 
     /// The colours (linear) of a batch of samples.
@@ -109,22 +107,30 @@ impl Studio {
         for (index, (sample, hit)) in samples.iter().zip(hits).enumerate() {
             if hit.is_hit() {
                 let look = frame.materials.look(frame.scene, frame.geometry.object(hit.primitive), hit);
-                if let Some(Look { base_color, emissive, unlit: true }) = look {
+                if let Some(Look { base_color, emissive, unlit: true, .. }) = look {
                     colors[index] = base_color + emissive;
                     continue;
                 }
                 let (point, geometric) = frame.point_and_normal(sample, hit);
                 let ray = |direction, tmax| StartRay::from_hit(hit, direction).with_tmax(tmax);
                 let to_key = self.push(&mut lit.rays, (point, geometric), ray, sample, frame);
-                let normal = frame.geometry.shading_normal(hit, geometric);
-                let what = look.map_or(LitSurface::Clay, LitSurface::Material);
-                lit.points.push(ShadingPoint { sample: index, normal, to_key, what });
-            } else if let Some((point, share)) = self.on_ground(frame, sample) {
-                let (normal, origin) = (self.vertical, point.as_vec3().to_array());
+                let what = match look {
+                    None => LitSurface::Clay(frame.geometry.shading_normal(hit, geometric)),
+                    Some(look) => {
+                        let normal = frame.shading_normal(hit, geometric, &look);
+                        let (to_viewer, base) = (-sample.ray.direction, look.base_color.min(Vec3::ONE));
+                        LitSurface::Material(Bsdf::new(normal, to_viewer, base, look.gloss), look)
+                    }
+                };
+                lit.points.push(ShadingPoint { sample: index, geometric, to_key, what });
+            } else if let Some((point, normal, share)) =
+                frame.ground.and_then(|ground| ground.hit(sample.ray.origin, sample.ray.direction))
+            {
+                let origin = point.as_vec3().to_array();
                 let ray = |direction, tmax| Ray { origin, tmin: 0.0, direction, tmax };
                 let to_key = self.push(&mut on_ground.rays, (point, normal), ray, sample, frame);
                 let what = LitSurface::Ground(share);
-                on_ground.points.push(ShadingPoint { sample: index, normal, to_key, what });
+                on_ground.points.push(ShadingPoint { sample: index, geometric: normal, to_key, what });
             }
         }
         *any_rays += (lit.rays.len() + on_ground.rays.len()) as u64;
@@ -151,11 +157,17 @@ impl Studio {
                 LitSurface::Ground(share) => {
                     *color * (1.0 - share as f32 * (0.62 * (1.0 - open) + 0.30 * (1.0 - key)))
                 }
-                LitSurface::Clay => {
-                    shoulder(STUDIO_ALBEDO * self.light(point, key, open) + self.gloss(point, direction, key))
+                LitSurface::Clay(normal) => {
+                    let bsdf = Bsdf::new(normal, -direction, STUDIO_ALBEDO, None);
+                    let gloss = self.gloss(point, bsdf.normal(), direction, key);
+                    shoulder(self.light(point, &bsdf, key, open) + gloss)
                 }
-                LitSurface::Material(look) => {
-                    shoulder(look.base_color * self.light(point, key, open) + look.emissive)
+                LitSurface::Material(bsdf, look) => {
+                    let open = open * look.occlusion;
+                    let (up, mirrored) = (self.vertical, direction.reflect(bsdf.normal()));
+                    let room = BOUNCE.lerp(SKY, (mirrored.dot(up) * 0.5 + 0.5) as f32) * ROOM;
+                    let reflected = bsdf.gloss_albedo() * room * open;
+                    shoulder(self.light(point, &bsdf, key, open) + reflected + look.emissive)
                 }
             };
         }
@@ -173,7 +185,7 @@ impl Studio {
     ) -> DVec3 {
         let ray = |direction: DVec3, length: f64| ray(direction.as_vec3().to_array(), length as f32);
         let (to_key, length) = match self.key {
-            Key::Directional(direction) => (direction, 4.0 * self.diagonal),
+            Key::Directional(direction) => (direction, self.reach),
             Key::Point(lamp) => {
                 let to_lamp = lamp - point;
                 (to_lamp.normalize_or(normal), to_lamp.length())
@@ -191,36 +203,22 @@ impl Studio {
         to_key
     }
 
-    /// The light that falls on a point of the model; `key` is the visible share of the key light,
+    /// The light that a point of the model scatters; `key` is the visible share of the key light,
     /// `open` the visible share of the hemisphere.
-    fn light(&self, point: &ShadingPoint, key: f32, open: f32) -> Vec3 {
-        let facing = |towards: DVec3| point.normal.dot(towards).max(0.0) as f32;
-        let height = (point.normal.dot(self.vertical) * 0.5 + 0.5) as f32;
-        let ambient = BOUNCE.lerp(SKY, height) * open;
-        KEY * (key * facing(point.to_key)) + FILL * (facing(self.fill) * (0.4 + 0.6 * open)) + ambient
+    fn light(&self, point: &ShadingPoint, bsdf: &Bsdf, key: f32, open: f32) -> Vec3 {
+        let height = (bsdf.normal().dot(self.vertical) * 0.5 + 0.5) as f32;
+        let ambient = bsdf.matte_albedo() * BOUNCE.lerp(SKY, height) * open;
+        let soft = Surface::softened(point.geometric, bsdf.normal(), point.to_key) as f32;
+        let of_key = bsdf.scattered(point.to_key).0 * KEY * (key * soft);
+        of_key + bsdf.scattered(self.fill).0 * FILL * (0.4 + 0.6 * open) + ambient
     }
 
     /// A weak specular term (Blinn), which shows curvature in the lit parts of clay; `direction` is
     /// the direction of the camera ray.
-    fn gloss(&self, point: &ShadingPoint, direction: DVec3, key: f32) -> Vec3 {
-        let half = (point.to_key - direction).normalize_or(point.normal);
-        let facing = point.normal.dot(half).max(0.0) as f32;
+    fn gloss(&self, point: &ShadingPoint, normal: DVec3, direction: DVec3, key: f32) -> Vec3 {
+        let half = (point.to_key - direction).normalize_or(normal);
+        let facing = normal.dot(half).max(0.0) as f32;
         KEY * (0.06 * facing.powi(24) * key)
-    }
-
-    /// Where the camera ray hits the ground, and how much of the shadow there shows.
-    fn on_ground(&self, frame: &FrameContext<'_>, sample: &Sample) -> Option<(DVec3, f64)> {
-        let height = self.ground?;
-        let eye = sample.ray.origin;
-        let (above, descent) = (eye.dot(self.vertical) - height, -sample.ray.direction.dot(self.vertical));
-        if above <= 0.0 || descent <= HORIZON {
-            return None;
-        }
-        let point = eye + sample.ray.direction * (above / descent);
-        let away =
-            (point - frame.bounds.center()).reject_from_normalized(self.vertical).length() / self.diagonal;
-        // Beyond a few diagonals the shadow is too faint to be seen.
-        (away < 3.0).then(|| (point, (-(away / 1.1).powi(2)).exp()))
     }
 }
 

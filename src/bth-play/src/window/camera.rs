@@ -24,6 +24,8 @@ pub(crate) struct Content<'a> {
     pub(crate) setup: SceneSetup,
     /// Frames per second.
     pub(crate) rate: f64,
+    /// Factor of light in mode path.
+    pub(super) factor: f32,
 }
 
 impl ViewCamera {

@@ -14,7 +14,7 @@ pub(crate) use summary::WindowSummary;
 use crate::args::Args;
 use crate::camera::SceneSetup;
 use crate::failure::Failure;
-use crate::render::{frame_range, frames_to_show};
+use crate::render::{frame_range, frames_to_show, light_factor};
 use app::App;
 use bth::Scene;
 use camera::Content;
@@ -35,10 +35,11 @@ pub(crate) fn show(
     let (whole, rate) = frame_range(scene);
     let (first, last) = frames_to_show(scene, file, args, None)?;
     let setup = pool.install(|| SceneSetup::new(scene, file, args, whole))?;
+    let factor = pool.install(|| light_factor(scene, file, &setup, args, whole))?;
     scene.set_frame(first)?;
     let events = EventLoop::new()
         .map_err(|e| Failure::Window(format!("no window can be opened: {}", without_source_location(&e))))?;
-    let mut app = App::new(Content { scene, file, setup, rate }, args, pool, (first, last));
+    let mut app = App::new(Content { scene, file, setup, rate, factor }, args, pool, (first, last));
     events.run_app(&mut app).map_err(|e| Failure::Window(format!("the window stopped working: {e}")))?;
     app.finish()
 }

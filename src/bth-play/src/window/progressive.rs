@@ -2,12 +2,11 @@
 //! sample while they do not.
 
 use super::camera::{Content, ViewCamera};
-use crate::args::Args;
+use crate::args::{Args, Denoise};
 use crate::failure::Failure;
 use crate::output::{Picture, to_picture};
 use crate::render::{Exposure, Shutter, Tile, pixel_count, render_tile, tile_count};
-use crate::shading::{FrameContext, Shader};
-use glam::Vec3;
+use crate::shading::{FrameContext, Shaded, Shader};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 use std::time::{Duration, Instant};
@@ -29,7 +28,7 @@ pub(super) struct ProgressiveRenderer {
     /// Side of the squares of pixels that share a sample.
     block: u32,
     /// Sums of the samples of each pixel.
-    sums: Vec<Vec3>,
+    sums: Vec<Shaded>,
     /// Samples that every pixel has got.
     passes: u32,
     shutter: Shutter,
@@ -109,7 +108,7 @@ impl ProgressiveRenderer {
 
     fn clear(&mut self) {
         self.args.size = (self.size.0.div_ceil(self.block), self.size.1.div_ceil(self.block));
-        self.sums = vec![Vec3::ZERO; pixel_count(self.args.size)];
+        self.sums = vec![Shaded::default(); pixel_count(self.args.size)];
         (self.passes, self.slots, self.tiles, self.spent) = (0, 0, 0, Duration::ZERO);
     }
 
@@ -156,8 +155,13 @@ impl ProgressiveRenderer {
         self.cost = self.spent.as_secs_f64() / self.sums.len().max(1) as f64;
         self.passes += 1;
         (self.slots, self.spent) = (0, Duration::ZERO);
-        let means: Vec<Vec3> = self.sums.iter().map(|sum| *sum / self.passes as f32).collect();
-        Ok(Some(to_picture(&means, &self.args)))
+        let means: Vec<Shaded> = self.sums.iter().map(|sum| *sum / self.passes as f32).collect();
+        let mut args = self.args.clone();
+        // Only a finished picture is worth the time.
+        if !self.is_done(args.spp) {
+            args.denoise = Denoise::Off;
+        }
+        Ok(Some(to_picture(means, &args, content.factor)))
     }
 
     /// Renders tiles at the time to which the scene is set, until all are finished or [`SLICE`] has
@@ -181,7 +185,7 @@ impl ProgressiveRenderer {
             let render = |number: u32| render_tile(&frame, number, exposure, &shader);
             let tiles: Vec<Tile> = pool.install(|| (self.tiles..end).into_par_iter().map(render).collect());
             for tile in &tiles {
-                tile.write_to(&mut self.sums, width, |sum, color| *sum += color);
+                tile.add_to(&mut self.sums, width);
             }
             self.tiles = end;
             if self.tiles == count {

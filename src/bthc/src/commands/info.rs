@@ -147,12 +147,21 @@ const ALPHA_MODES: [&str; 3] = ["opaque", "mask", "blend"];
 /// How the materials of an object look; empty where the file keeps no more than their names.
 fn materials(file: &File, object: u32) -> Vec<Value> {
     let texture = |row: u32| (row != NONE).then_some(row);
-    let rows = file.materials(object).parameters.iter();
-    rows.map(|p| {
+    let materials = file.materials(object);
+    let gloss = |row: usize| {
+        materials.gloss.get(row).map(|g| {
+            json!({"metallic": g.metallic, "roughness": g.roughness,
+                "metallic_roughness_texture": texture(g.metallic_roughness_texture),
+                "normal_texture": texture(g.normal_texture), "occlusion_texture": texture(g.occlusion_texture)})
+        })
+    };
+    let rows = materials.parameters.iter().enumerate();
+    rows.map(|(row, p)| {
         json!({"base_color": p.base_color, "emissive": p.emissive, "double_sided": p.flags & MATERIAL_DOUBLE_SIDED != 0,
             "unlit": p.flags & MATERIAL_UNLIT != 0, "alpha_cutoff": p.alpha_cutoff,
             "alpha": ALPHA_MODES.get(p.alpha_mode as usize),
-            "base_color_texture": texture(p.base_color_texture), "emissive_texture": texture(p.emissive_texture)})
+            "base_color_texture": texture(p.base_color_texture), "emissive_texture": texture(p.emissive_texture),
+            "gloss": gloss(row)})
     })
     .collect()
 }

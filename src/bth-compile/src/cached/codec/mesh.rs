@@ -11,7 +11,7 @@ by_fields! {
     Mesh { positions, exact, triangles, attributes, opacity, groups, materials, sequence, deformation } fits;
     Attributes { corners, normals, uvs } |_| true;
     TriangleOpacities { rows, micro } |_| true;
-    Materials { parameters, textures, color_corners, colors, second_corners, second_uvs } textures_exist;
+    Materials { parameters, gloss, textures, color_corners, colors, second_corners, second_uvs } textures_exist;
     Sequence { times, positions } |_| true;
     // Rows that do not fit each other are found in the file that is made from them.
     Deformation { counts, joints, weights, morphs, morph_rows, deltas } |_| true;
@@ -64,7 +64,7 @@ fn fits(mesh: &Mesh) -> bool {
         && opacity.as_ref().is_none_or(|o| one_each(o.rows.len()))
         && groups.as_ref().is_none_or(|g| g.runs.last().is_none_or(|run| (run[0] as usize) < triangles.len()))
         && materials.as_ref().is_none_or(|m| {
-            (m.parameters.is_empty() || m.parameters.len() == known)
+            [m.parameters.len(), m.gloss.len()].iter().all(|rows| *rows == 0 || *rows == known)
                 && none_or_one_each(m.color_corners.len())
                 && within(&m.color_corners, m.colors.len())
                 && none_or_one_each(m.second_corners.len())
@@ -79,6 +79,9 @@ fn fits(mesh: &Mesh) -> bool {
 fn textures_exist(materials: &Materials) -> bool {
     let known = |row: u32| row == NONE || (row as usize) < materials.textures.len();
     materials.parameters.iter().all(|p| known(p.base_color_texture) && known(p.emissive_texture))
+        && materials.gloss.iter().all(|p| {
+            [p.metallic_roughness_texture, p.normal_texture, p.occlusion_texture].into_iter().all(known)
+        })
 }
 
 impl Codec for Groups {
@@ -119,7 +122,7 @@ impl Codec for Groups {
 mod tests {
     use super::super::{decode, encode};
     use super::*;
-    use bth_format::layout::{MaterialParameters, Morph, Texture};
+    use bth_format::layout::{GlossParameters, MaterialParameters, Morph, Texture};
 
     fn parameters(base_color_texture: u32) -> MaterialParameters {
         MaterialParameters {
@@ -132,6 +135,10 @@ mod tests {
             emissive_texture: NONE,
             reserved: [0; 4],
         }
+    }
+
+    fn gloss(normal_texture: u32) -> GlossParameters {
+        GlossParameters { metallic: 0.5, normal_texture, ..bth_import::NO_GLOSS }
     }
 
     fn texture() -> Texture {
@@ -160,6 +167,7 @@ mod tests {
             }),
             materials: Some(Materials {
                 parameters: vec![parameters(0)],
+                gloss: vec![gloss(0)],
                 textures: vec![texture()],
                 color_corners: vec![[0, 1, 1]],
                 colors: vec![[65535; 4], [0, 1, 2, 3]],

@@ -140,7 +140,7 @@ impl<'a> App<'a> {
     pub(super) fn controller(&mut self) -> &mut CameraController {
         if !matches!(self.view, ViewCamera::Free(_)) {
             let camera = self.camera();
-            let vertical = up_vector(self.renderer.args().up);
+            let vertical = up_vector(self.renderer.args().up());
             self.view = ViewCamera::Free(CameraController::new(camera, vertical, self.distance(&camera)));
         }
         match &mut self.view {

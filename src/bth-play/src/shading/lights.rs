@@ -48,7 +48,7 @@ struct Cone {
 /// What shines where nothing is hit.
 enum Surroundings<'a> {
     Picture(&'a Environment),
-    Sky(Sky),
+    Sky(Box<Sky>),
 }
 
 /// All light of a frame.
@@ -82,7 +82,7 @@ impl<'a> Lights<'a> {
                     Light::Directional { towards, .. } => Some(*towards).filter(|t| t.dot(vertical) > 0.0),
                     Light::Point { .. } => None,
                 });
-                Surroundings::Sky(Sky::new(vertical, of_light.unwrap_or(sun), lights.is_empty()))
+                Surroundings::Sky(Box::new(Sky::new(vertical, of_light.unwrap_or(sun), lights.is_empty())))
             }
         };
         Self { lights, far_distance: bounds.reach(), surroundings }

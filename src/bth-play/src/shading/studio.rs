@@ -73,13 +73,13 @@ impl<R: TraceRay> Lit<R> {
 }
 
 /// What is lit.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 enum LitSurface {
     /// The ground, and how strongly a shadow shows there.
     Ground(f64),
     /// The clay of what has no material, with its normal.
     Clay(DVec3),
-    Material(Bsdf, Look),
+    Material(Box<(Bsdf, Look)>),
 }
 
 impl Studio {
@@ -119,7 +119,7 @@ impl Studio {
                     Some(look) => {
                         let normal = frame.shading_normal(hit, geometric, &look);
                         let (to_viewer, base) = (-sample.ray.direction, look.base_color.min(Vec3::ONE));
-                        LitSurface::Material(Bsdf::new(normal, to_viewer, base, look.gloss), look)
+                        LitSurface::Material(Box::new((Bsdf::new(normal, to_viewer, base, look.gloss), look)))
                     }
                 };
                 lit.points.push(ShadingPoint { sample: index, geometric, to_key, what });
@@ -153,21 +153,22 @@ impl Studio {
             let key = if blocked[0] { 0.0 } else { 1.0 };
             let color = &mut colors[point.sample];
             let direction = samples[point.sample].ray.direction;
-            *color = match point.what {
-                LitSurface::Ground(share) => {
+            *color = match &point.what {
+                &LitSurface::Ground(share) => {
                     *color * (1.0 - share as f32 * (0.62 * (1.0 - open) + 0.30 * (1.0 - key)))
                 }
-                LitSurface::Clay(normal) => {
+                &LitSurface::Clay(normal) => {
                     let bsdf = Bsdf::new(normal, -direction, STUDIO_ALBEDO, None);
                     let gloss = self.gloss(point, bsdf.normal(), direction, key);
                     shoulder(self.light(point, &bsdf, key, open) + gloss)
                 }
-                LitSurface::Material(bsdf, look) => {
+                LitSurface::Material(material) => {
+                    let (bsdf, look) = &**material;
                     let open = open * look.occlusion;
                     let (up, mirrored) = (self.vertical, direction.reflect(bsdf.normal()));
                     let room = BOUNCE.lerp(SKY, (mirrored.dot(up) * 0.5 + 0.5) as f32) * ROOM;
                     let reflected = bsdf.gloss_albedo() * room * open;
-                    shoulder(self.light(point, &bsdf, key, open) + reflected + look.emissive)
+                    shoulder(self.light(point, bsdf, key, open) + reflected + look.emissive)
                 }
             };
         }

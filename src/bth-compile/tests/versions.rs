@@ -15,7 +15,7 @@ const NOTED: &str = "\
 bvh 3 85ced845a2e06b3c60ec6905522a8ae3914e4cb9826bc17089f4ec97abdefd04
 file 5.65536 815e4e230c0a1ceb4558a26b481d9c0e987859feb8646a11265170b8e1c1fd92
 marks 1 f1700307c15a7f23fface5b89ee0ce399fac1b93c7dd43e36616475cc7f08b70
-mesh 9 f9a832bfbe932ba0eec21e4aeddd484d9703aa6ac684d191644612e7ba299c39
+mesh 10 f9a832bfbe932ba0eec21e4aeddd484d9703aa6ac684d191644612e7ba299c39
 ";
 
 /// As above for the tetrahedralization of a whole model, by the TetGen that made it: others make

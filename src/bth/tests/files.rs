@@ -11,11 +11,12 @@ macro_rules! files {
     };
 }
 
-const VALID: [(&str, &[u8]); 28] = files![
+const VALID: [(&str, &[u8]); 29] = files![
     "deformable",
     "deformers",
     "free-directions",
     "free-distances",
+    "gloss",
     "grid-16",
     "grid-21",
     "groups",

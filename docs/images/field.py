@@ -5,7 +5,8 @@
         set -- $model; bth-scenes make $1 --faces $2 -o $1.ply
     done
     python3 docs/images/field.py > field.manifest
-    bth-play field.manifest -o field.png --mode path --size 1280x560 --spp 160
+    bth-play field.manifest -o field.png --mode path --size 1280x560 --spp 24
+    pngquant --quality 60-100 --speed 1 --output field.png --force field.png
 """
 import math
 import random

@@ -14,7 +14,7 @@ const SIZE: usize = 1 << BITS;
 const BITS: u32 = 8;
 /// A guess is followed once this many rays in turn went the same way. Where rays go here and there,
 /// the processor would predict wrong guesses, which cost more than the step.
-const SURE: u32 = 1;
+const SURE: u32 = 2;
 
 /// No guesses where they cannot help: modules of WebAssembly and Miri.
 const NONE: bool = cfg!(any(target_family = "wasm", miri));

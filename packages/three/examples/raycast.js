@@ -41,7 +41,7 @@ run((seconds) => {
     const ends = lines.geometry.attributes.position, start = performance.now();
     hits = 0;
     for (let i = 0; i < RAYS; i++) {
-        // Sources on a spiral around a ball, which aim beside its middle.
+        // Sources on a spiral around a ball, which miss its middle.
         const y = 1 - (2 * i + 1) / RAYS, angle = 2.4 * i + 0.1 * seconds, r = Math.sqrt(1 - y * y);
         from.set(2.2 * r * Math.cos(angle), 2.2 * y, 2.2 * r * Math.sin(angle));
         to.set(0.4 * Math.sin(i), 0.4 * Math.cos(3 * i), 0).sub(from).normalize();

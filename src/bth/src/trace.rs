@@ -2,9 +2,9 @@
 //! components; where rays can start, and which points see each other.
 //!
 //! Where some triangles let rays pass, the nearest hit is found as if every triangle were opaque.
-//! If it lies on a transparent part, the ray is searched again by the walk of [`mod@crate::hits`],
-//! which passes over such hits. So scenes without opacity pay for one test in each call, and rays
-//! that reach no holes pay for looking up the opacity of their hit.
+//! If it lies on a transparent part, the ray is traced again with conditions
+//! ([`mod@crate::hits`]), which pass over such hits. So scenes without opacity pay for one test in
+//! each call, and rays that reach no holes pay for looking up the opacity of their hit.
 
 use crate::batch::RayBatch;
 use crate::hits::{Accept, results};

@@ -31,8 +31,8 @@ impl Video {
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
         let Some(extension) = extension.filter(|e| EXTENSIONS.contains(&e.as_str())) else { return Ok(None) };
         super::picture::create_folder(path)?;
-        let beside = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let folder = tempfile::Builder::new().prefix(".bth-play-").tempdir_in(beside);
+        let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = tempfile::Builder::new().prefix(".bth-play-").tempdir_in(parent);
         let folder = folder.map_err(|e| Failure::file(path, &format!("cannot write: {e}")))?;
         let part = folder.path().join(format!("video.{extension}"));
         let encoder: &[&str] = match extension.as_str() {

@@ -97,8 +97,8 @@ impl<'a> Lights<'a> {
     }
 
     /// A sample of the surroundings for a point of the unit square, and its density with regard to
-    /// solid angle. The light is radiance divided by that density and by π. `None` in the dark, and
-    /// for a sky without a sun, which is much the same everywhere.
+    /// solid angle. The light is radiance divided by that density and by π. `None` in the dark,
+    /// and for a sky without a sun, which is much the same everywhere.
     pub(crate) fn surroundings(&self, point: DVec2) -> Option<(LightSample, f64)> {
         let EnvironmentSample { direction, radiance, density } = match &self.surroundings {
             Surroundings::Picture(picture) => picture.sample(point),

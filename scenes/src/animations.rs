@@ -66,7 +66,7 @@ impl Builder {
 
     fn object(&mut self, name: &str, path: &str) -> usize {
         let source = Source::Model { path: path.to_owned(), mesh: None };
-        self.manifest.objects.push(Object { name: name.to_owned(), source });
+        self.manifest.objects.push(Object::new(name, source));
         self.manifest.objects.len() - 1
     }
 
@@ -283,7 +283,7 @@ fn scroll() -> Scene {
     let mut b = Builder::new(24, 24.0);
     let frames = SequenceFrames::Numbered("models/sheet_##.ply".to_owned());
     let timing = SequenceTiming { rate: Some(12.0), start: 0.0 };
-    b.manifest.objects.push(Object { name: "sheet".to_owned(), source: Source::Sequence { frames, timing } });
+    b.manifest.objects.push(Object::new("sheet", Source::Sequence { frames, timing }));
     b.node("sheet".into(), None, Some(0), Transform::default());
     let eye = Transform::Parts { translation: [0.5, 0.45, 0.9], rotation: view(0.0, 0.08), scale: [1.0; 3] };
     let eye = b.node("eye".into(), None, None, eye);

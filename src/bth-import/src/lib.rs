@@ -49,7 +49,7 @@ pub use import::{
     import, import_bytes, import_cutouts, import_cutouts_bytes, import_gltf_cutouts, import_gltf_parts,
     import_gltf_parts_bytes, import_images,
 };
-pub use materials::{ImageFile, Looks, Materials, NO_GLOSS, Unreadable};
+pub use materials::{ImageFile, Looks, Materials, NO_GLOSS, PLAIN, Unreadable};
 pub use memory::{MEMORY_FORMAT, PositionRows, import_triangles};
 pub use mesh::{
     Attributes, Keep, Mesh, OpacityReport, Polygons, Positions, Report, Rounding, Sequence,

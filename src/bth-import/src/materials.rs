@@ -106,7 +106,7 @@ const WHITE: [f32; 4] = [1.0; 4];
 
 /// The parameters of a material about which the source says nothing: white, opaque, seen from both
 /// sides.
-pub(crate) const PLAIN: MaterialParameters = MaterialParameters {
+pub const PLAIN: MaterialParameters = MaterialParameters {
     base_color: [1.0; 4],
     emissive: [0.0; 3],
     alpha_cutoff: 0.5,

@@ -13,6 +13,7 @@ mod model;
 mod names;
 mod read;
 mod read_deformers;
+mod read_material;
 mod read_path;
 mod read_sequence;
 mod read_tracks;
@@ -30,6 +31,7 @@ pub const KEYS: &[(&str, &[&str])] = &[
     ("scene", read::SCENE_KEYS),
     ("frames", read::FRAMES_KEYS),
     ("object", read_sequence::OBJECT_KEYS),
+    ("material", read_material::MATERIAL_KEYS),
     ("node", read::NODE_KEYS),
     ("camera", read::CAMERA_KEYS),
     ("light", read::LIGHT_KEYS),

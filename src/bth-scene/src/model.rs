@@ -53,6 +53,39 @@ pub struct Object {
     pub name: String,
     /// Where it comes from.
     pub source: Source,
+    /// How all of its surface looks; `None` for what the source says.
+    pub material: Option<Material>,
+}
+
+impl Object {
+    /// An object that looks as its source says.
+    pub fn new(name: impl Into<String>, source: Source) -> Self {
+        Self { name: name.into(), source, material: None }
+    }
+}
+
+/// How a surface looks, as a material of glTF 2.0 without textures. Colours are linear.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Material {
+    /// Base colour: red, green and blue, from 0 to 1.
+    pub color: [f64; 3],
+    /// Radiance that it emits: red, green and blue, from 0 to [`Self::MAX_EMISSION`].
+    pub emission: [f64; 3],
+    /// From 0 to 1.
+    pub metallic: f64,
+    /// From 0 (smooth) to 1.
+    pub roughness: f64,
+}
+
+impl Material {
+    /// Largest component of a radiance, which f32 holds with much room above.
+    pub const MAX_EMISSION: f64 = 1e6;
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Self { color: [1.0; 3], emission: [0.0; 3], metallic: 0.0, roughness: 1.0 }
+    }
 }
 
 /// Where a geometry comes from. Paths are relative to the manifest's folder and stay within it;

@@ -6,6 +6,7 @@ use crate::limits::MAX_MANIFEST;
 use crate::model::*;
 use crate::names::Names;
 use crate::read_deformers::{DEFORMER_KEYS, SKIN_KEYS, deformers, skin};
+use crate::read_material::{color, material};
 use crate::read_path::path;
 use crate::read_sequence::{OBJECT_KEYS, sequence, vertex_cache};
 use crate::read_tracks::{TRACK_KEYS, tracks};
@@ -150,16 +151,23 @@ fn object(table: &Table<'_>) -> Result<Object> {
         let message = "`without_joints` belongs to objects with `deforms`";
         return Err(value.error(code::CONFLICT, message, "remove it"));
     }
-    if let Some(source) = sequence(table)? {
-        return Ok(Object { name: name(table)?, source });
-    }
-    if let Some(source) = vertex_cache(table)? {
-        return Ok(Object { name: name(table)?, source });
-    }
+    let moving = match sequence(table)? {
+        Some(source) => Some(source),
+        None => vertex_cache(table)?,
+    };
+    let source = match moving {
+        Some(source) => source,
+        None => unmoved(table, deforms)?,
+    };
+    Ok(Object { name: name(table)?, source, material: material(table)? })
+}
+
+/// The source of an object that is neither a sequence nor moved by a vertex cache.
+fn unmoved(table: &Table<'_>, deforms: bool) -> Result<Source> {
     let index = |key| -> Result<Option<u32>> {
         table.get(key).map(|v| v.integer(0..=i64::from(u32::MAX - 1)).map(|n| n as u32)).transpose()
     };
-    let source = match table.get("file") {
+    Ok(match table.get("file") {
         Some(file) => Source::Compiled { path: path(&file)?, object: index("object")?.unwrap_or(0) },
         None => {
             let path = path(&table.need("model")?)?;
@@ -175,8 +183,7 @@ fn object(table: &Table<'_>) -> Result<Object> {
                 (None, mesh, None) => Source::Model { path, mesh },
             }
         }
-    };
-    Ok(Object { name: name(table)?, source })
+    })
 }
 
 /// The error for an object with `deforms` or `joint` without a mesh.
@@ -292,13 +299,7 @@ fn light(table: &Table<'_>, nodes: &Names<'_>) -> Result<Light> {
     };
     let color = match table.get("color") {
         None => [1.0; 3],
-        Some(value) => {
-            let color: [f64; 3] = value.numbers()?;
-            if color.iter().any(|c| *c < 0.0) {
-                return Err(value.not_allowed("three numbers from 0", format!("{color:?}")));
-            }
-            color
-        }
+        Some(value) => color(&value, f64::INFINITY)?,
     };
     Ok(Light {
         name: name(table)?,

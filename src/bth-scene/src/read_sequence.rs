@@ -20,6 +20,8 @@ pub(crate) const OBJECT_KEYS: &[&str] = &[
     "vertex_cache",
     "rate",
     "start",
+    "color",
+    "material",
 ];
 
 /// The source of an object with a sequence; `None` for others.

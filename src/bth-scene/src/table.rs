@@ -141,6 +141,10 @@ impl<'a> Value<'a> {
         )
     }
 
+    pub(crate) fn is_string(&self) -> bool {
+        self.value.get_ref().is_str()
+    }
+
     pub(crate) fn is_table(&self) -> bool {
         self.value.get_ref().is_table()
     }

@@ -47,6 +47,11 @@ impl Manifest {
                 }
                 Source::AtRest { path, node } => writeln!(out, "model = {}\nnode = {node}", text(path))?,
             }
+            if let Some(Material { color, emission, metallic, roughness }) = object.material {
+                writeln!(out, "color = {color:?}")?;
+                let numbers = format!("metallic = {metallic:?}, roughness = {roughness:?}");
+                writeln!(out, "material = {{ emission = {emission:?}, {numbers} }}")?;
+            }
         }
         self.nodes.iter().try_for_each(|node| self.write_node(out, node))?;
         self.cameras.iter().try_for_each(|camera| self.write_camera(out, camera))?;

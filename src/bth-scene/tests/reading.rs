@@ -1,7 +1,7 @@
 //! The meaning of manifests, and the errors of malformed ones with their places.
 
 use bth_scene::{
-    Error, Interpolation, Lens, LightKind, Manifest, Property, SequenceFrames, SequenceTiming, Source,
+    Error, Interpolation, Lens, LightKind, Manifest, Material, Property, SequenceFrames, SequenceTiming, Source,
     Transform, parse,
 };
 use std::path::Path;
@@ -139,6 +139,35 @@ fn objects_whose_vertices_move_are_read() {
 }
 
 #[test]
+fn colors_are_linear_numbers_or_bytes_in_srgb() {
+    let text = r##"version = 1
+        objects = [
+            { name = "plain", model = "a.ply" },
+            { name = "red", model = "a.ply", color = "#ff00BC" },
+            { name = "grey", file = "a.bth", color = [0.25, 0.5, 1] },
+            { name = "gold", sequence = "a_#.ply", color = [1, 0.7, 0.3], material = { metallic = 1, roughness = 0.25 } },
+            { name = "lamp", model = "a.ply", material = { emission = [9, 9.5, 0] } },
+        ]
+        nodes = [{ name = "n" }]
+        lights = [{ name = "l", node = "n", kind = "point", color = "#ffffff" }]"##;
+    let scene = read(text).unwrap();
+    let found: Vec<_> = scene.objects.iter().map(|object| object.material).collect();
+    let plain = Material::default();
+    // 0xbc is 188 of 255 in sRGB.
+    let mid = ((188.0 / 255.0 + 0.055) / 1.055f64).powf(2.4);
+    let gold = Material { color: [1.0, 0.7, 0.3], metallic: 1.0, roughness: 0.25, ..plain };
+    let expected = [
+        None,
+        Some(Material { color: [1.0, 0.0, mid], ..plain }),
+        Some(Material { color: [0.25, 0.5, 1.0], ..plain }),
+        Some(gold),
+        Some(Material { emission: [9.0, 9.5, 0.0], ..plain }),
+    ];
+    assert_eq!(found, expected);
+    assert_eq!(scene.lights[0].color, [1.0; 3]);
+}
+
+#[test]
 fn the_least_manifest_has_a_version_only() {
     assert_eq!(read("version = 1").unwrap(), Manifest::default());
 }
@@ -174,6 +203,7 @@ fn unknown_keys_are_refused_everywhere() {
     );
     refused("rate = 25", "fps = 25", "BTH-M003", "fps", "first, last, rate");
     refused("object = 2", "mesh_id = 2", "BTH-M003", "mesh_id", "name, model");
+    refused("object = 2", "material = { color = [1, 1, 1] }", "BTH-M003", "color", "emission, metallic");
     refused("scale =", "scales =", "BTH-M003", "scales", "unknown key");
     refused("degrees = 90", "angle = 90", "BTH-M003", "angle", "axis, degrees");
     refused("to = [0, 0, 0]", "at = [0, 0, 0]", "BTH-M003", "at = [0", "from, to, up");
@@ -187,6 +217,7 @@ fn values_of_another_type_are_refused() {
     refused("version = 1", "version = \"1\"", "BTH-M004", "\"1\"", "a whole number");
     refused("first = -2", "first = -2.0", "BTH-M004", "-2.0", "type float");
     refused("rate = 25", "rate = true", "BTH-M004", "true }", "a number");
+    refused("object = 2", "material = \"gold\"", "BTH-M004", "\"gold\"", "a table");
     refused("visible = false", "visible = 0", "BTH-M004", "0\ntranslation", "true or false");
     refused("parent = \"body\"", "parent = [1]", "BTH-M004", "[1]", "a string");
     refused("[1, 2, -3]", "2", "BTH-M004", "2\n\n[[nodes]]\nname = \"body\"", "an array");
@@ -211,6 +242,11 @@ fn values_out_of_range_are_refused() {
     refused("outer = 30", "outer = 30\ninner = 30", "BTH-M005", "30\nintensity", "below `outer`");
     refused("kind = \"spot\"", "kind = \"sun\"", "BTH-M005", "\"sun\"\nouter", "directional, point, spot");
     refused("intensity = 3", "color = [1, -1, 1]", "BTH-M005", "[1, -1, 1]", "from 0");
+    refused("intensity = 3", "color = \"red\"", "BTH-M005", "\"red\"", "\"#rrggbb\", found \"red\"");
+    refused("object = 2", "color = [1, 1.5, 0]", "BTH-M005", "[1, 1.5, 0]", "three numbers from 0 to 1");
+    refused("object = 2", "color = \"#12345g\"", "BTH-M005", "\"#12345g\"", "three numbers or a color");
+    refused("object = 2", "material = { roughness = -0.1 }", "BTH-M005", "-0.1", "from 0 to 1");
+    refused("object = 2", "material = { emission = [1e9, 0, 0] }", "BTH-M005", "[1e9", "0 to 1000000");
     refused("\"cubic\"", "\"smooth\"", "BTH-M005", "\"smooth\"", "step, linear, cubic");
     refused("\"visible\"", "\"visible\"\ninterpolation = \"linear\"", "BTH-M005", "\"linear\"", "step");
 }

@@ -30,50 +30,35 @@ prop_compose! {
         lens in (0.001f64..179.9, any::<bool>(), prop::option::of(0.1f64..10.0)),
         property in 0usize..5, interpolation in 0usize..3,
     ) -> Manifest {
-        let objects = vec![
-            Object { name: "model".into(), source: Source::Model { path: "a b/ü.ply".into(), mesh: None } },
-            Object { name: "mesh".into(), source: Source::Model { path: "x.glb".into(), mesh: Some(7) } },
-            Object { name: "file".into(), source: Source::Compiled { path: "x.bth".into(), object: 1 } },
-            Object {
-                name: "deforms".into(),
-                source: Source::Deforming { path: "x.glb".into(), mesh: 2, without: JointSet::default() },
-            },
-            Object {
-                name: "soft".into(),
-                source: Source::Deforming {
+        let mut objects = vec![
+            Object::new("model", Source::Model { path: "a b/ü.ply".into(), mesh: None }),
+            Object::new("mesh", Source::Model { path: "x.glb".into(), mesh: Some(7) }),
+            Object::new("file", Source::Compiled { path: "x.bth".into(), object: 1 }),
+            Object::new("deforms", Source::Deforming { path: "x.glb".into(), mesh: 2, without: JointSet::default() }),
+            Object::new("soft", Source::Deforming {
                     path: "x.glb".into(),
                     mesh: 2,
                     without: frames.1.cast_unsigned().to_le_bytes().map(u32::from).into_iter().collect(),
-                },
-            },
-            Object {
-                name: "rigid".into(),
-                source: Source::RigidPart { path: "x.glb".into(), mesh: 2, joint: 255 },
-            },
-            Object { name: "rests".into(), source: Source::AtRest { path: "x.glb".into(), node: 3 } },
-            Object {
-                name: "walk".into(),
-                source: Source::Sequence {
+                }),
+            Object::new("rigid", Source::RigidPart { path: "x.glb".into(), mesh: 2, joint: 255 }),
+            Object::new("rests", Source::AtRest { path: "x.glb".into(), node: 3 }),
+            Object::new("walk", Source::Sequence {
                     frames: SequenceFrames::Numbered("w/a_##.ply".into()),
                     timing: SequenceTiming { rate: Some(frames.2), start: -0.5 },
-                },
-            },
-            Object {
-                name: "list".into(),
-                source: Source::Sequence {
+                }),
+            Object::new("list", Source::Sequence {
                     frames: SequenceFrames::Listed((0..11).map(|i| format!("{i} \"#.obj")).collect()),
                     timing: SequenceTiming::default(),
-                },
-            },
-            Object {
-                name: "cloth".into(),
-                source: Source::Cached {
+                }),
+            Object::new("cloth", Source::Cached {
                     path: "c.obj".into(),
                     cache: "c.pc2".into(),
                     timing: SequenceTiming { rate: None, start: frames.2 },
-                },
-            },
+                }),
         ];
+        let extra_share = lens.2.unwrap_or(0.0) / 10.0;
+        let material = Material { color: [extra_share, 1.0, 0.1], metallic: extra_share, ..Material::default() };
+        objects[0].material = lens.2.map(|_| material);
         let row = |i: usize, (name, transform, flags, object): &(String, Transform, [bool; 3], usize)| Node {
             name: format!("{name}{i}"),
             parent: (flags[0] && i > 0).then(|| object % i),

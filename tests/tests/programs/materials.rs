@@ -167,6 +167,41 @@ fn white_surfaces_reflect_all_light_and_metals_have_its_color() {
     assert!(r > 180 && g < 60 && b < 60, "{r} {g} {b}");
 }
 
+/// An object with a look of its manifest is shown as the same model with that material.
+#[test]
+fn objects_of_manifests_look_as_they_say() {
+    let made = |base: [f64; 3], metallic: f64, emitted: f64| {
+        let [r, g, b] = base;
+        let material = json!({"doubleSided": true, "emissiveFactor": [emitted, 0, 0],
+            "pbrMetallicRoughness": {"baseColorFactor": [r, g, b, 1], "metallicFactor": metallic,
+            "roughnessFactor": 0.5}});
+        square(&material, &[], None)
+    };
+    let grey = made([0.3; 3], 0.0, 0.0);
+    let looks = [
+        ("color = \"#00bc00\", material = { roughness = 0.5 }", made([0.0, 0.502_886_458, 0.0], 0.0, 0.0)),
+        (
+            "color = [0.9, 0.4, 0.1], material = { metallic = 1, roughness = 0.5, emission = [0.1, 0, 0] }",
+            made([0.9, 0.4, 0.1], 1.0, 0.1),
+        ),
+    ];
+    for (look, model) in looks {
+        let text = format!(
+            "version = 1\nobjects = [{{ name = \"a\", model = \"grey.gltf\", mesh = 0, {look} }}]\n\
+             nodes = [{{ name = \"a\", object = \"a\" }}]\n"
+        );
+        let folder = folder(&[("grey.gltf", &grey), ("a.manifest", &text)]);
+        bthc(folder.path(), &["compile", "a.manifest", "-o", "a.bth"]).expect(0);
+        bthc(folder.path(), &["verify", "a.bth"]).expect(0);
+        for args in [&[][..], &EXACT] {
+            let (seen, expected) = (shown(folder.path(), args), picture(&model, args));
+            assert_eq!(at(&seen, 1.0, 1.0), at(&expected, 1.0, 1.0), "{look} {args:?}");
+            let [r, g, b] = at(&seen, 1.0, 1.0);
+            assert!(r.abs_diff(g) > 40 && r.abs_diff(b) > 0, "{look}: {r} {g} {b}");
+        }
+    }
+}
+
 /// The key light comes from above and the left: surfaces that a texture turns there are brighter.
 #[test]
 fn textures_turn_surfaces_and_keep_light_from_them() {

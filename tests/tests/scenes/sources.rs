@@ -2,7 +2,7 @@
 //! files.
 
 use crate::support::{compiled, manifest, models, options};
-use bth_compile::pipeline::compile;
+use bth_compile::pipeline::{CompileOptions, compile};
 use bth_compile::{Error, Silent, scene};
 use std::path::Path;
 
@@ -60,6 +60,42 @@ fn compiled_objects_are_taken_as_they_are() {
     let text = r#"objects = [{ name = "a", file = "quad.obj" }]
         nodes = [{ name = "1", object = "a" }]"#;
     assert!(refused(text, folder.path()).to_string().contains("BTH-F0"), "no compiled file");
+}
+
+/// Groups of the source keep their names, and everything that traces stays.
+#[test]
+fn looks_of_a_manifest_take_the_place_of_materials() {
+    let folder = models();
+    let grouped = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\ng left\nusemtl steel\nf 1 2 3\ng right\nf 3 2 4\n";
+    std::fs::write(folder.path().join("parts.obj"), grouped).unwrap();
+    let named = CompileOptions { names: true, ..options() };
+    let (parts, _) = compile(&folder.path().join("parts.obj"), &named, &Silent).unwrap();
+    std::fs::write(folder.path().join("parts.bth"), &parts.bytes).unwrap();
+    let text = r##"objects = [
+            { name = "plain", model = "quad.obj" },
+            { name = "red", model = "quad.obj", color = [1, 0, 0] },
+            { name = "also red", model = "quad.obj", color = "#ff0000", material = {} },
+            { name = "gold", model = "quad.obj", material = { metallic = 1, roughness = 0.5, emission = [0, 2, 0] } },
+            { name = "blue parts", file = "parts.bth", color = [0, 0, 1] },
+            { name = "parts", file = "parts.bth" },
+        ]
+        nodes = [
+            { name = "1", object = "plain" }, { name = "2", object = "red" }, { name = "3", object = "also red" },
+            { name = "4", object = "gold" }, { name = "5", object = "blue parts" }, { name = "6", object = "parts" },
+        ]"##;
+    let (scene, _) = compiled(&manifest(text), folder.path());
+    let objects: Vec<_> = (0..6).map(|i| scene.instance(i).object).collect();
+    assert_eq!(objects, [0, 1, 1, 2, 3, 4]);
+    assert_eq!((scene.material_count(0), scene.material_count(4)), (0, 1));
+    let material = |object| scene.material(object, 0).unwrap();
+    assert_eq!(material(1).base_color, [1.0, 0.0, 0.0, 1.0]);
+    assert!(material(1).double_sided && material(1).gloss.is_none());
+    let gloss = material(2).gloss.unwrap();
+    assert_eq!((gloss.metallic, gloss.roughness, material(2).emissive), (1.0, 0.5, [0.0, 2.0, 0.0]));
+    assert_eq!(material(3).base_color, [0.0, 0.0, 1.0, 1.0]);
+    let view = scene.file().object(3).unwrap();
+    let names = [0, 1].map(|triangle| view.group_name(view.group_of(triangle)));
+    assert_eq!((names, view.material_of(view.group_of(1))), (["left", "right"], Some(0)));
 }
 
 #[test]

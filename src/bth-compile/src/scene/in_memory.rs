@@ -83,7 +83,7 @@ fn manifest(meshes: usize, instances: &[Instance], names: SceneNames<'_>) -> Man
     let object = |row| {
         let path = format!("mesh {row}");
         let name = named(names.meshes, row, &|| path.clone());
-        Object { source: Source::Model { path, mesh: None }, name }
+        Object::new(name, Source::Model { path, mesh: None })
     };
     let node = |(row, instance): (usize, &Instance)| Node {
         name: named(names.instances, row, &|| format!("instance {row}")),

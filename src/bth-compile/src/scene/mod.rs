@@ -19,6 +19,7 @@ mod moving;
 mod object;
 mod objects;
 mod of_file;
+mod paint;
 mod parallel;
 mod places;
 mod plan;

@@ -4,12 +4,13 @@
 use super::context::Context;
 use super::meshes::{self, SourceMesh};
 use super::object::{self, BuiltObject};
+use super::paint::Paint;
 use super::parallel::run_parallel;
-use super::places::{Places, Task};
+use super::places::{Place, Places, Task};
 use super::report::ObjectReport;
 use super::sections::ObjectSections;
 use super::sources::{File, SourcePart};
-use crate::error::{Error, Place, Result};
+use crate::error::{self, Error, Result};
 use crate::stage::Clock;
 use crate::tets;
 use crate::write::FileBuilder;
@@ -52,23 +53,18 @@ pub(super) fn build(
         }
         let format = parts.first().map_or_else(String::new, |mesh| mesh.summary.report.format.clone());
         objects.sources.push((format, file.digest.file.hex()));
-        for ((part, rows), mesh) in file.parts.iter().zip(parts) {
-            let object = places.of_part(file, mesh);
-            for row in rows {
-                objects.number[*row] = Some(places.for_row(*part, object));
-            }
+        for ((_, rows), mesh) in file.parts.iter().zip(parts) {
+            let looks: Vec<_> = rows.iter().map(|row| look(manifest, *row)).collect();
+            let numbers = places.of_part(file, mesh, &looks);
+            rows.iter().zip(numbers).for_each(|(row, number)| objects.number[*row] = Some(number));
         }
     }
-    let Places { mut stored, tasks, copies, .. } = places;
-    for (number, built) in build_all(tasks, context, clock)? {
+    for (filled, built) in build_all(std::mem::take(&mut places.tasks), context, clock)? {
         objects.note_worker(built.record.worker);
         let sections = ObjectSections::in_file(&Arc::new(built.file), 0, true);
-        stored[number] = Some((sections, built.record.object));
+        places.fill(&filled, &(sections, built.record.object));
     }
-    for (copy, of) in copies {
-        stored[copy] = stored[of as usize].clone();
-    }
-    (objects.stored, objects.reports) = stored.into_iter().flatten().unzip();
+    (objects.stored, objects.reports) = places.stored.into_iter().flatten().unzip();
     for (stored, report) in objects.stored.iter().zip(&mut objects.reports) {
         report.resident_bytes = stored.resident_bytes();
     }
@@ -78,6 +74,11 @@ pub(super) fn build(
         }
     }
     Ok(objects)
+}
+
+/// How the manifest says that an object looks.
+fn look(manifest: &Manifest, row: usize) -> Option<Paint> {
+    manifest.objects[row].material.as_ref().map(Paint::from)
 }
 
 /// The meshes of all files, in order; a compiled file has none.
@@ -97,17 +98,17 @@ fn read(sources: &[File<'_>], context: &Context<'_>, clock: &mut Clock) -> Resul
     Ok(sources.iter().map(of).map(Option::unwrap_or_default).collect())
 }
 
-/// Builds objects: large ones one after another, the others in parallel. Returns the number of
+/// Builds objects: large ones one after another, the others in parallel. Returns the places of
 /// each.
 fn build_all(
     tasks: Vec<Task<'_>>,
     context: &Context<'_>,
     clock: &mut Clock,
-) -> Result<Vec<(usize, BuiltObject)>> {
+) -> Result<Vec<(Vec<Place>, BuiltObject)>> {
     let triangles = |task: &Task<'_>| task.mesh.summary.report.triangles;
     let one = |context: &Context<'_>, clock: &mut Clock, mut task: Task<'_>| {
         let built = object::build(task.file, &mut task.mesh, context, clock)?;
-        Ok((task.number, built))
+        Ok((task.places, built))
     };
     let (large, small): (Vec<_>, Vec<_>) = tasks.into_iter().partition(|task| triangles(task) > LARGE);
     let mut built = large.into_iter().map(|task| one(context, clock, task)).collect::<Result<Vec<_>>>()?;
@@ -131,7 +132,7 @@ fn copy(objects: &mut Objects, places: &mut Places<'_>, manifest: &Manifest, fil
     let path = file.full.as_path();
     let unusable = |found: &str, hint: &str| Error::Input {
         code: "BTH-I051",
-        place: Place::File(path.to_owned()),
+        place: error::Place::File(path.to_owned()),
         message: format!("expected a compiled file that can be used: {found}"),
         hint: hint.to_owned(),
     };
@@ -150,7 +151,8 @@ fn copy(objects: &mut Objects, places: &mut Places<'_>, manifest: &Manifest, fil
             // Computes the hash: the one in the section table is untrusted.
             hasher.update(blake3::hash(section.bytes).as_bytes());
         }
-        let number = *places.of_content.entry(hasher.finalize()).or_insert_with(|| {
+        let content = hasher.finalize();
+        let stored = || {
             let report = ObjectReport {
                 triangles: view.header.triangles.into(),
                 degenerate: view.header.dropped.into(),
@@ -159,11 +161,11 @@ fn copy(objects: &mut Objects, places: &mut Places<'_>, manifest: &Manifest, fil
                 copied: true,
                 ..ObjectReport::default()
             };
-            let sections = ObjectSections::in_file(&read, object, false);
-            places.stored.push(Some((sections, report)));
-            places.stored.len() as u32 - 1
-        });
-        rows.iter().for_each(|row| objects.number[*row] = Some(number));
+            (ObjectSections::in_file(&read, object, false), report)
+        };
+        for row in rows {
+            objects.number[*row] = Some(places.of_compiled(content, look(manifest, *row), stored));
+        }
     }
     Ok(())
 }

@@ -1,16 +1,22 @@
-//! The places of objects in the file of a scene while they are collected: equal geometry has one.
+//! The places of objects in the file of a scene while they are collected: equal geometry that looks
+//! equal has one.
 
 use super::meshes::SourceMesh;
+use super::paint::Paint;
 use super::report::ObjectReport;
 use super::sections::ObjectSections;
-use super::sources::{File, SourcePart};
-use std::collections::{HashMap, HashSet};
+use super::sources::File;
+use std::collections::HashMap;
+
+/// The number of an object in the file, and its look if the manifest gives one.
+pub(super) type Place = (u32, Option<Paint>);
 
 /// An object that is built from a mesh.
 pub(super) struct Task<'a> {
     pub(super) file: &'a File<'a>,
     pub(super) mesh: SourceMesh,
-    pub(super) number: usize,
+    /// The places that it fills.
+    pub(super) places: Vec<Place>,
 }
 
 /// An object that has a place, and its report.
@@ -21,37 +27,62 @@ pub(super) type Stored = (ObjectSections, ObjectReport);
 pub(super) struct Places<'a> {
     /// Copied objects are filled in at once, the others when they are built.
     pub(super) stored: Vec<Option<Stored>>,
-    /// The place of each content.
-    pub(super) of_content: HashMap<blake3::Hash, u32>,
     /// What is to be built.
     pub(super) tasks: Vec<Task<'a>>,
-    /// Places of objects that deform, and the place before of the same geometry.
-    pub(super) copies: Vec<(usize, u32)>,
-    /// Places that a deformer has.
-    deforming: HashSet<u32>,
+    task_of: HashMap<blake3::Hash, usize>,
+    /// The place of each content and look that several objects of the manifest may share.
+    shared: HashMap<(blake3::Hash, Option<Paint>), u32>,
 }
 
 impl<'a> Places<'a> {
-    /// The place of a part: the place of equal geometry, or a new one, which a task fills.
-    pub(super) fn of_part(&mut self, file: &'a File<'a>, mesh: SourceMesh) -> u32 {
-        let content = mesh.summary.content(mesh.part.clip());
-        *self.of_content.entry(content).or_insert_with(|| {
-            let number = self.stored.len();
-            self.tasks.push(Task { file, mesh, number });
-            self.stored.push(None);
-            number as u32
+    /// The places of objects of the manifest, which look so, that are made from a part of a file.
+    /// Each deformer moves a separate object.
+    pub(super) fn of_part(
+        &mut self,
+        file: &'a File<'a>,
+        mesh: SourceMesh,
+        looks: &[Option<Paint>],
+    ) -> Vec<u32> {
+        let (content, deforms) = (mesh.summary.content(mesh.part.clip()), mesh.part.deforms());
+        let task = *self.task_of.entry(content).or_insert_with(|| {
+            self.tasks.push(Task { file, mesh, places: Vec::new() });
+            self.tasks.len() - 1
+        });
+        let mut place = |look: &Option<Paint>| {
+            let known = self.shared.get(&(content, *look)).filter(|_| !deforms);
+            known.copied().unwrap_or_else(|| {
+                let place = self.stored.len() as u32;
+                self.stored.push(None);
+                self.shared.insert((content, *look), place);
+                self.tasks[task].places.push((place, *look));
+                place
+            })
+        };
+        looks.iter().map(&mut place).collect()
+    }
+
+    /// The place of an object of a compiled file that looks so.
+    pub(super) fn of_compiled(
+        &mut self,
+        content: blake3::Hash,
+        look: Option<Paint>,
+        object: impl FnOnce() -> Stored,
+    ) -> u32 {
+        *self.shared.entry((content, look)).or_insert_with(|| {
+            let (sections, report) = object();
+            self.stored.push(Some((painted(&sections, look), report)));
+            self.stored.len() as u32 - 1
         })
     }
 
-    /// The place for an object of the manifest whose part has a place: each deformer moves a
-    /// separate object.
-    pub(super) fn for_row(&mut self, part: SourcePart, number: u32) -> u32 {
-        if !part.deforms() || self.deforming.insert(number) {
-            return number;
+    /// Fills the places of a task.
+    pub(super) fn fill(&mut self, places: &[Place], (sections, report): &Stored) {
+        for (place, look) in places {
+            self.stored[*place as usize] = Some((painted(sections, *look), report.clone()));
         }
-        let own = self.stored.len();
-        self.copies.push((own, number));
-        self.stored.push(None);
-        own as u32
     }
+}
+
+fn painted(sections: &ObjectSections, look: Option<Paint>) -> ObjectSections {
+    look.map_or_else(|| sections.clone(), |look| look.on(sections))
 }

@@ -6,7 +6,7 @@ use bth_format::file::{hash128, kind_stride};
 use bth_format::layout::{Deformation, Object, kind};
 use std::collections::BTreeSet;
 use std::sync::Arc;
-use zerocopy::FromBytes;
+use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 /// The sections of an object. Every index in them has been checked.
 #[derive(Clone)]
@@ -54,8 +54,18 @@ impl ObjectSections {
         Ok(())
     }
 
+    /// Puts rows in the place of a section; without rows the object has none.
+    pub(super) fn replace<T: IntoBytes + Immutable>(&mut self, kind: u32, rows: &[T]) {
+        self.sections.retain(|section| section.kind != kind);
+        if !rows.is_empty() {
+            let (stride, bytes) = (size_of::<T>() as u32, rows.as_bytes().to_vec());
+            let hash = hash128(&bytes);
+            self.sections.push(ObjectSection { kind, stride, hash, bytes: Bytes::Owned(bytes.into()) });
+        }
+    }
+
     /// The bytes of a section; none if the object lacks it.
-    fn bytes(&self, kind: u32) -> &[u8] {
+    pub(super) fn bytes(&self, kind: u32) -> &[u8] {
         self.sections.iter().find(|section| section.kind == kind).map_or(&[], |section| &section.bytes)
     }
 

@@ -2,6 +2,7 @@
 
 use super::clips::Clips;
 use super::moving::{Moving, unhashed};
+use super::paint::Paint;
 use crate::error::Result;
 use crate::source::{SourceDigest, TriangleMesh, extension};
 use bth_files::Digest;
@@ -143,7 +144,10 @@ pub(super) fn contents(manifest: &Manifest, sources: &[File<'_>]) -> Vec<String>
     for file in sources {
         for (part, rows) in &file.parts {
             let name = file.content(*part);
-            rows.iter().for_each(|row| contents[*row].clone_from(&name));
+            for row in rows {
+                let look = manifest.objects[*row].material.as_ref().map(|look| Paint::from(look).name());
+                contents[*row] = name.clone() + look.as_deref().unwrap_or_default();
+            }
         }
     }
     contents

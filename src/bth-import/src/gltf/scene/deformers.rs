@@ -69,7 +69,7 @@ impl Importer<'_, '_> {
     /// A further object of the manifest.
     pub(super) fn new_object(&mut self, name: &str, mesh: usize, source: Source) -> usize {
         let name = self.names.objects.unique(name, format!("mesh {mesh}"));
-        self.manifest.objects.push(bth_scene::Object { name, source });
+        self.manifest.objects.push(bth_scene::Object::new(name, source));
         self.manifest.objects.len() - 1
     }
 

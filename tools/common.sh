@@ -25,7 +25,7 @@ have_tetgen() {
 }
 have_nightly() { command -v rustup >/dev/null && rustup run nightly rustc --version >/dev/null 2>&1; }
 have_miri() { have_nightly && cargo +nightly miri --version >/dev/null 2>&1; }
-have_fuzzer() { have_nightly && cargo fuzz --version >/dev/null 2>&1; }
+have_sanitizer() { compgen -G "$(rustc --print sysroot)/lib/rustlib/$(rustc -vV | sed -n 's/^host: //p')/lib/librustc*_rt.asan.*" >/dev/null; }
 # A display without a screen, keys for it, and what the player loads to open a window.
 have_display() { command -v Xvfb >/dev/null && command -v xdotool >/dev/null; }
 # A browser without a window, for the test of the viewer page.

@@ -3,7 +3,8 @@
 pub mod write;
 
 use bth::rays::{Hit, PrimitiveRef, Ray, Start, StartRay};
-use bth::{Accept, Isa, Scene};
+use bth::{Accept, Code, Isa, Scene};
+use bth_format::verify::verify;
 // Sources of `bth-compile` in `write` name it as their crate's.
 use bth_import::error;
 use bth_import::gltf::Chosen;
@@ -77,7 +78,7 @@ fn trace(scene: &Scene, rng: &mut Rng) {
         scene.batch(starts).nearest(&mut after);
         scene.batch(starts).any(&mut blocked);
         for ((ray, hit), blocked) in starts.iter().zip(&after).zip(blocked) {
-            assert_eq!(hit.is_hit(), blocked);
+            assert!(hit.is_hit() == blocked || has_wrong_geometry(scene));
             assert!(!hit.is_hit() || scene.check_start(&ray.start).is_ok());
         }
     }
@@ -113,6 +114,13 @@ fn trace(scene: &Scene, rng: &mut Rng) {
         scene.all_hits(start, &Accept::default(), &mut all);
         scene.crossings(start);
     }
+}
+
+/// Returns true if the boxes or triangles of a file contradict each other. Then a triangle may be
+/// hidden from one walk and not from another.
+fn has_wrong_geometry(scene: &Scene) -> bool {
+    let is_about_bytes = |error: &bth::Error| matches!(error.code(), Code::SectionHash | Code::Gap);
+    verify(scene.file()).is_err_and(|errors| !errors.iter().all(is_about_bytes))
 }
 
 /// A ray about an instance: often between points of its box, along axes, from corners; also without

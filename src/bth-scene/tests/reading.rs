@@ -1,8 +1,8 @@
 //! The meaning of manifests, and the errors of malformed ones with their places.
 
 use bth_scene::{
-    Error, Interpolation, Lens, LightKind, Manifest, Material, Property, SequenceFrames, SequenceTiming, Source,
-    Transform, parse,
+    Error, Interpolation, Lens, LightKind, Manifest, Material, Property, SequenceFrames, SequenceTiming,
+    Source, Transform, parse,
 };
 use std::path::Path;
 

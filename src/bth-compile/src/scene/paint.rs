@@ -43,7 +43,8 @@ impl Paint {
         painted.replace(kind::GROUPS, &groups);
         painted.replace(kind::MATERIALS, &[MaterialRow { name: 0, name_length: 0, reserved: [0; 2] }]);
         painted.replace(kind::MATERIAL_PARAMETERS, &[parameters]);
-        painted.replace(kind::GLOSS_PARAMETERS, if gloss == NO_GLOSS { &[] } else { &[gloss] });
+        let glossy = std::slice::from_ref(&gloss);
+        painted.replace(kind::GLOSS_PARAMETERS, if gloss == NO_GLOSS { &[] } else { glossy });
         for kind in
             [kind::TEXTURES, kind::COLOR_CORNERS, kind::COLORS, kind::SECOND_CORNERS, kind::SECOND_UVS]
         {

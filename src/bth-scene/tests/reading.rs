@@ -242,7 +242,7 @@ fn values_out_of_range_are_refused() {
     refused("outer = 30", "outer = 30\ninner = 30", "BTH-M005", "30\nintensity", "below `outer`");
     refused("kind = \"spot\"", "kind = \"sun\"", "BTH-M005", "\"sun\"\nouter", "directional, point, spot");
     refused("intensity = 3", "color = [1, -1, 1]", "BTH-M005", "[1, -1, 1]", "from 0");
-    refused("intensity = 3", "color = \"red\"", "BTH-M005", "\"red\"", "\"#rrggbb\", found \"red\"");
+    refused("intensity = 3", "color = \"red\"", "BTH-M005", "\"red\"", "found \"red\"");
     refused("object = 2", "color = [1, 1.5, 0]", "BTH-M005", "[1, 1.5, 0]", "three numbers from 0 to 1");
     refused("object = 2", "color = \"#12345g\"", "BTH-M005", "\"#12345g\"", "three numbers or a color");
     refused("object = 2", "material = { roughness = -0.1 }", "BTH-M005", "-0.1", "from 0 to 1");

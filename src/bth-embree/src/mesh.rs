@@ -1,0 +1,327 @@
+//! The triangles of a scene: those of all its triangle meshes, quads and grids, as one object.
+#![allow(unsafe_code)] // Reads buffers of the program.
+
+use crate::abi::*;
+use crate::device::Device;
+use crate::error::{Result, operation};
+use crate::geometry::Geometry;
+use crate::handles::Shared;
+use bth_cache::Store;
+use bth_compile::cached::Cache;
+use bth_compile::memory::{self, PositionRows, TriangleMesh};
+use bth_compile::pipeline::{CompileOptions, Structure};
+use bth_compile::{Monitor, bvh};
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+
+/// Positions from this magnitude on are not hit, nor are those that are not finite: programs rely
+/// on it to hide primitives (`FLT_LARGE` of Embree).
+const TOO_LARGE: f32 = 1.844e18;
+
+/// What a part of the triangles was made from.
+#[derive(Debug)]
+enum Layout {
+    Triangles,
+    /// Two triangles each: (v0, v1, v3) and (v2, v3, v1).
+    Quads,
+    /// Two triangles for each cell of each grid.
+    Grids(Vec<GridRow>),
+}
+
+/// Where a grid begins.
+#[derive(Clone, Copy, Debug)]
+struct GridRow {
+    /// Its first triangle in the part.
+    first: u32,
+    width: u32,
+    height: u32,
+}
+
+/// The triangles of one geometry.
+#[derive(Debug)]
+pub(crate) struct Part {
+    /// Its first triangle in the mesh.
+    first: u32,
+    /// Id of the geometry in its scene.
+    pub(crate) id: u32,
+    pub(crate) mask: u32,
+    pub(crate) geometry: Arc<Shared<Geometry>>,
+    layout: Layout,
+}
+
+/// A hit on the surface as programs see it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Surface<'a> {
+    pub(crate) part: &'a Part,
+    pub(crate) primitive: u32,
+    pub(crate) u: f32,
+    pub(crate) v: f32,
+    pub(crate) normal: [f32; 3],
+}
+
+/// What a mesh was made from: it is made again only if this changes.
+pub(crate) type Key = Vec<(u32, usize, u64)>;
+
+/// The triangles of a scene.
+#[derive(Debug, Default)]
+pub(crate) struct Mesh {
+    /// `None` without triangles that can be hit.
+    pub(crate) scene: Option<bth::Scene>,
+    parts: Vec<Part>,
+    /// By triangle, in the space of the object.
+    normals: Vec<[f32; 3]>,
+    bounds: Option<Bounds>,
+    pub(crate) key: Key,
+    /// True if the scene of these triangles allows filters in the arguments of queries.
+    pub(crate) allows_argument_filter: bool,
+}
+
+/// How a mesh is built.
+pub(crate) struct Build<'a> {
+    pub(crate) quality: bvh::Quality,
+    pub(crate) allows_argument_filter: bool,
+    pub(crate) device: &'a Device,
+    pub(crate) monitor: &'a (dyn Monitor + 'a),
+}
+
+/// The geometries of a mesh, by id.
+pub(crate) type Sources = Vec<(u32, Arc<Shared<Geometry>>)>;
+
+/// The key of a mesh of these geometries.
+pub(crate) fn key(sources: &Sources) -> Key {
+    sources.iter().map(|(id, geometry)| (*id, Arc::as_ptr(geometry) as usize, geometry.state().version)).collect()
+}
+
+impl Mesh {
+    /// Builds the mesh of geometries. Also returns true if an earlier commit had built it.
+    ///
+    /// # Errors
+    /// If there are too many triangles, the build fails, or the program cancels it.
+    pub(crate) fn build(sources: &Sources, build: &Build<'_>) -> Result<(Mesh, bool)> {
+        let key = key(sources);
+        let mut gathered = Gathered::default();
+        for (id, geometry) in sources {
+            gathered.add(*id, geometry)?;
+        }
+        let Gathered { parts, positions, triangles, normals, bounds, has_area } = gathered;
+        if !has_area {
+            return Ok((Mesh { parts, normals, key, ..Mesh::default() }, false));
+        }
+        let mut options =
+            CompileOptions { structure: Structure::Bvh, geometry: false, ..CompileOptions::default() };
+        options.bvh.quality = build.quality;
+        let mesh = TriangleMesh { positions: PositionRows::F32(&positions), triangles: &triangles };
+        let cache = build.device.cache.as_ref().map_or_else(Cache::none, of_program);
+        let (scene, cached) = memory::open_cached(mesh, &options, &cache, build.monitor)?;
+        let (scene, bounds, allows_argument_filter) = (Some(scene), Some(bounds), build.allows_argument_filter);
+        Ok((Mesh { scene, parts, normals, bounds, key, allows_argument_filter }, cached))
+    }
+
+    pub(crate) fn parts(&self) -> &[Part] {
+        &self.parts
+    }
+
+    /// The box of all triangles, exactly.
+    pub(crate) fn bounds(&self) -> Bounds {
+        self.bounds.unwrap_or(Bounds::EMPTY)
+    }
+
+    /// The geometry of a triangle.
+    #[inline]
+    pub(crate) fn part(&self, triangle: u32) -> &Part {
+        match &self.parts[..] {
+            [part] => part,
+            parts => &parts[parts.partition_point(|part| part.first <= triangle) - 1],
+        }
+    }
+
+    /// A point of a triangle as programs see it.
+    #[inline]
+    pub(crate) fn surface(&self, triangle: u32, u: f32, v: f32) -> Surface<'_> {
+        let part = self.part(triangle);
+        let (primitive, u, v) = part.locate(triangle - part.first, u, v);
+        Surface { part, primitive, u, v, normal: self.normals[triangle as usize] }
+    }
+}
+
+impl Part {
+    /// The primitive of a triangle of this part, with the coordinates there.
+    #[inline]
+    fn locate(&self, triangle: u32, u: f32, v: f32) -> (u32, f32, f32) {
+        // Coordinates in a cell, from those in the first or the second triangle of it.
+        let in_cell = || if triangle.is_multiple_of(2) { (u, v) } else { (1.0 - u, 1.0 - v) };
+        match &self.layout {
+            Layout::Triangles => (triangle, u, v),
+            Layout::Quads => {
+                let (u, v) = in_cell();
+                (triangle / 2, u, v)
+            }
+            Layout::Grids(rows) => {
+                let grid = rows.partition_point(|row| row.first <= triangle) - 1;
+                let GridRow { first, width, height } = rows[grid];
+                let cell = (triangle - first) / 2;
+                let (columns, lines) = (width - 1, height - 1);
+                let (u, v) = in_cell();
+                let u = ((cell % columns) as f32 + u) / columns as f32;
+                let v = ((cell / columns) as f32 + v) / lines as f32;
+                (grid as u32, u, v)
+            }
+        }
+    }
+}
+
+fn of_program(store: &Store) -> Cache<'_> {
+    Cache::new(store, "bth-embree")
+}
+
+/// The triangles of some geometries.
+#[derive(Default)]
+struct Gathered {
+    parts: Vec<Part>,
+    positions: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+    normals: Vec<[f32; 3]>,
+    bounds: Bounds,
+    /// True if some triangle can be hit.
+    has_area: bool,
+}
+
+impl Default for Bounds {
+    fn default() -> Bounds {
+        Bounds::EMPTY
+    }
+}
+
+impl Gathered {
+    /// Adds a geometry.
+    fn add(&mut self, id: u32, geometry: &Arc<Shared<Geometry>>) -> Result<()> {
+        let state = geometry.state();
+        let kind = if geometry.kind == GRID { BUFFER_GRID } else { BUFFER_INDEX };
+        let (Some(vertices), Some(items)) = (state.view(BUFFER_VERTEX, 0), state.view(kind, 0)) else {
+            return Ok(());
+        };
+        let (first, base) = (self.triangles.len(), self.positions.len());
+        let (too_many, limit) = ("a scene can have at most 2^31 triangles and vertices", 1 << 31);
+        if base + vertices.count > limit {
+            return operation(too_many);
+        }
+        let positions = &mut self.positions;
+        positions.reserve(vertices.count);
+        for row in 0..vertices.count {
+            // SAFETY: the row exists, and vertices are three floats.
+            positions.push(unsafe { vertices.floats::<3>(row) });
+        }
+        let mut corners = Vec::new();
+        let layout = match geometry.kind {
+            TRIANGLE => {
+                corners.reserve(items.count);
+                for row in 0..items.count {
+                    // SAFETY: the row exists, and triangles are three indices.
+                    corners.push(unsafe { items.words::<3>(row) });
+                }
+                Layout::Triangles
+            }
+            QUAD => {
+                corners.reserve(2 * items.count);
+                for row in 0..items.count {
+                    // SAFETY: the row exists, and quads are four indices.
+                    corners.extend(halves(unsafe { items.words::<4>(row) }, vertices.count, positions, base));
+                }
+                Layout::Quads
+            }
+            _ => {
+                let mut rows = Vec::with_capacity(items.count);
+                for row in 0..items.count {
+                    // SAFETY: the row exists, and grids are three words.
+                    let [start, stride, size] = unsafe { items.words::<3>(row) };
+                    let (width, height) = (size & 0xFFFF, size >> 16);
+                    rows.push(GridRow { first: corners.len() as u32, width, height });
+                    for y in 0..height.saturating_sub(1) {
+                        for x in 0..width.saturating_sub(1) {
+                            let at = |x: u32, y: u32| {
+                                start.saturating_add(stride.saturating_mul(y)).saturating_add(x)
+                            };
+                            let quad = [at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)];
+                            corners.extend(halves(quad, vertices.count, positions, base));
+                        }
+                    }
+                    if first + corners.len() > limit {
+                        return operation(too_many);
+                    }
+                }
+                Layout::Grids(rows)
+            }
+        };
+        if first + corners.len() > limit {
+            return operation(too_many);
+        }
+        self.normals.reserve(corners.len());
+        let triangles = &mut self.triangles;
+        triangles.reserve(corners.len());
+        for triangle in corners {
+            let found = usable(triangle, vertices.count, &positions[base..]);
+            // What cannot be hit keeps its number, as a triangle without area at a usable vertex.
+            let (triangle, normal) = match found {
+                Some(points) => {
+                    points.iter().for_each(|point| self.bounds.add(*point));
+                    self.has_area = true;
+                    (triangle.map(|row| row + base as u32), normal(points))
+                }
+                None => ([u32::MAX; 3], [0.0; 3]),
+            };
+            triangles.push(triangle);
+            self.normals.push(normal);
+        }
+        self.fill_unusable(first);
+        self.parts.push(Part {
+            first: first as u32,
+            id,
+            mask: geometry.mask.load(Relaxed),
+            geometry: geometry.clone(),
+            layout,
+        });
+        Ok(())
+    }
+
+    /// Gives triangles that cannot be hit a corner that exists, and none without one.
+    fn fill_unusable(&mut self, first: usize) {
+        let all = &mut self.triangles;
+        let anchor = all.iter().find(|triangle| triangle[0] != u32::MAX).map(|triangle| triangle[0]);
+        let Some(anchor) = anchor else { return };
+        // Earlier geometries may have had none.
+        let start = if all.first().is_some_and(|triangle| triangle[0] == u32::MAX) { 0 } else { first };
+        for triangle in &mut all[start..] {
+            if triangle[0] == u32::MAX {
+                *triangle = [anchor; 3];
+            }
+        }
+    }
+}
+
+/// The two triangles of a quad; both cannot be hit if one of its corners is not usable.
+fn halves([a, b, c, d]: [u32; 4], count: usize, positions: &[[f32; 3]], base: usize) -> [[u32; 3]; 2] {
+    let is_usable = |row: u32| (row as usize) < count && is_in_range(positions[base + row as usize]);
+    match [a, b, c, d].into_iter().all(is_usable) {
+        true => [[a, b, d], [c, d, b]],
+        false => [[u32::MAX; 3]; 2],
+    }
+}
+
+fn is_in_range(point: [f32; 3]) -> bool {
+    point.iter().all(|x| x.abs() < TOO_LARGE)
+}
+
+/// The corners of a triangle, if they exist and are in range.
+fn usable(triangle: [u32; 3], count: usize, positions: &[[f32; 3]]) -> Option<[[f32; 3]; 3]> {
+    let exists = triangle.iter().all(|row| (*row as usize) < count);
+    let points = exists.then(|| triangle.map(|row| positions[row as usize]))?;
+    points.iter().all(|point| is_in_range(*point)).then_some(points)
+}
+
+/// (b - a) x (c - a), in f64 and rounded once.
+fn normal([a, b, c]: [[f32; 3]; 3]) -> [f32; 3] {
+    let [a, b, c] = [a, b, c].map(|point| point.map(f64::from));
+    let (p, q): ([f64; 3], [f64; 3]) =
+        (std::array::from_fn(|k| b[k] - a[k]), std::array::from_fn(|k| c[k] - a[k]));
+    [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]].map(|x| x as f32)
+}

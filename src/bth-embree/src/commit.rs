@@ -90,7 +90,7 @@ impl Shared<Scene> {
         for (id, geometry) in &enabled {
             let moves = geometry.state().time_steps > 1;
             let shows_rest = geometry.is_instance()
-                && geometry.state().scenes.iter().flatten().any(|scene| !scene.twin().is_null());
+                && geometry.state().scenes.iter().flatten().any(|scene| !scene.twin().0.is_null());
             if !geometry.is_known() || moves || shows_rest {
                 if geometry.device.fallback.is_none() {
                     if !geometry.has_items() {

@@ -10,6 +10,7 @@
 //! | `trace`, `packets`, `points`, `interpolate` | queries |
 //! | `fallback`, `twin` | another Embree 4, for what bth does not hold, geometry by geometry |
 //! | `float_mode`, `statistics`, `error` | |
+#![cfg(target_os = "linux")] // Finds another library by what the loader of Linux tells.
 
 pub mod abi;
 mod buffer;

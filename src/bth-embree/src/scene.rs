@@ -45,6 +45,11 @@ struct Twins {
     whole_is_fresh: bool,
 }
 
+/// A scene of the other library by its handle and the number of its commits.
+fn named(twin: Option<&TwinScene>) -> (Handle, u64) {
+    twin.map_or((std::ptr::null_mut(), 0), |twin| (twin.handle, twin.commits))
+}
+
 impl Tagged for Scene {
     const TAG: u64 = 0x6274_6873_6365_6E01;
 }
@@ -147,9 +152,10 @@ impl Scene {
         enabled
     }
 
-    /// The scene of the other library with what bth does not hold; null if there is nothing.
-    pub(crate) fn twin(&self) -> Handle {
-        lock(&self.twins).rest.as_ref().map_or(std::ptr::null_mut(), |twin| twin.handle)
+    /// The scene of the other library with what bth does not hold, and the number of its commits;
+    /// null if there is nothing.
+    pub(crate) fn twin(&self) -> (Handle, u64) {
+        named(lock(&self.twins).rest.as_ref())
     }
 
     /// Shows the other library what bth does not hold; returns its scene, or null.
@@ -167,14 +173,15 @@ impl Scene {
         twin.handle
     }
 
-    /// The scene of the other library with everything, as it is now; null without a library.
-    pub(crate) fn whole_twin(&self) -> Handle {
-        let Some(fallback) = &self.device.fallback else { return std::ptr::null_mut() };
+    /// The scene of the other library with everything, as it is now, and the number of its commits;
+    /// null without a library.
+    pub(crate) fn whole_twin(&self) -> (Handle, u64) {
+        let Some(fallback) = &self.device.fallback else { return named(None) };
         let known = {
             let twins = lock(&self.twins);
-            twins.whole.as_ref().filter(|_| twins.whole_is_fresh).map(|twin| twin.handle)
+            named(twins.whole.as_ref().filter(|_| twins.whole_is_fresh))
         };
-        if let Some(known) = known {
+        if !known.0.is_null() {
             return known;
         }
         let all: BTreeMap<u32, Handle> =
@@ -183,9 +190,9 @@ impl Scene {
         let mut twins = lock(&self.twins);
         let twin = twins.whole.get_or_insert_with(|| TwinScene::new(fallback));
         twin.show(all, flags, quality);
-        let handle = twin.handle;
+        let shown = named(Some(twin));
         twins.whole_is_fresh = true;
-        handle
+        shown
     }
 
     /// The bounds of what the other library shows.

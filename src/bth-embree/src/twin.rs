@@ -4,6 +4,7 @@
 use crate::abi::*;
 use crate::fallback::{Fallback, Functions};
 use crate::geometry::Geometry;
+use crate::handles::Shared;
 use crate::scene::Scene;
 use crate::transform::Transform;
 use std::collections::BTreeMap;
@@ -16,6 +17,8 @@ pub(crate) struct TwinGeometry {
     pub(crate) handle: Handle,
     /// The commit of the geometry that it shows.
     version: u64,
+    /// The scenes that it instances, each with the number of its commits.
+    scenes: Vec<(Handle, u64)>,
 }
 
 // SAFETY: a geometry may be used from any thread, and is changed under the lock of its owner.
@@ -34,7 +37,7 @@ impl TwinGeometry {
         let functions = fallback.functions;
         // SAFETY: the device lives.
         let handle = unsafe { (functions.rtcNewGeometry)(fallback.device, kind) };
-        (!handle.is_null()).then_some(TwinGeometry { functions, handle, version: 0 })
+        (!handle.is_null()).then_some(TwinGeometry { functions, handle, version: 0, scenes: Vec::new() })
     }
 }
 
@@ -57,15 +60,15 @@ impl Geometry {
             state.twin = TwinGeometry::new(fallback, self.kind);
         }
         let version = state.version;
-        let scenes: Vec<Handle> = match self.is_instance() {
-            true => state.scenes.iter().map(|scene| twin_scene(scene.as_deref(), whole)).collect(),
-            false => Vec::new(),
-        };
+        let scenes: Vec<(Handle, u64)> =
+            state.scenes.iter().map(|scene| twin_scene(scene.as_deref(), whole)).collect();
         let Some(twin) = &state.twin else { return std::ptr::null_mut() };
         let (f, handle) = (twin.functions, twin.handle);
-        if twin.version == version && !self.is_instance() {
+        if twin.version == version && twin.scenes == scenes {
             return handle;
         }
+        let mut handles: Vec<Handle> = scenes.iter().map(|scene| scene.0).collect();
+        let first = handles.first().copied().unwrap_or(std::ptr::null_mut());
         // SAFETY: the geometry lives; buffers are as the program declared them, and it keeps them
         // as long as the geometry uses them.
         unsafe {
@@ -82,8 +85,7 @@ impl Geometry {
             }
             match self.kind {
                 INSTANCE => {
-                    let scene = scenes.first().copied().unwrap_or(std::ptr::null_mut());
-                    (f.rtcSetGeometryInstancedScene)(handle, scene);
+                    (f.rtcSetGeometryInstancedScene)(handle, first);
                     for (step, transform) in (0..).zip(&state.transforms) {
                         match transform {
                             Transform::Matrix(rows) => {
@@ -100,9 +102,11 @@ impl Geometry {
                         }
                     }
                 }
+                INSTANCE_ARRAY if state.view(BUFFER_INDEX, 0).is_none() => {
+                    (f.rtcSetGeometryInstancedScene)(handle, first);
+                }
                 INSTANCE_ARRAY => {
-                    let mut scenes = scenes;
-                    (f.rtcSetGeometryInstancedScenes)(handle, scenes.as_mut_ptr(), scenes.len());
+                    (f.rtcSetGeometryInstancedScenes)(handle, handles.as_mut_ptr(), handles.len());
                 }
                 _ => {
                     (f.rtcSetGeometryIntersectFilterFunction)(handle, self.intersect_filter.get());
@@ -118,15 +122,15 @@ impl Geometry {
             (f.rtcCommitGeometry)(handle);
         }
         if let Some(twin) = &mut state.twin {
-            twin.version = version;
+            (twin.version, twin.scenes) = (version, scenes);
         }
         handle
     }
 }
 
-/// The scene of the other library that shows an instanced scene.
-fn twin_scene(scene: Option<&crate::handles::Shared<Scene>>, whole: bool) -> Handle {
-    scene.map_or(std::ptr::null_mut(), |scene| match whole {
+/// The scene of the other library that shows an instanced scene, with the number of its commits.
+fn twin_scene(scene: Option<&Shared<Scene>>, whole: bool) -> (Handle, u64) {
+    scene.map_or((std::ptr::null_mut(), 0), |scene| match whole {
         true => scene.whole_twin(),
         false => scene.twin(),
     })
@@ -139,6 +143,8 @@ pub(crate) struct TwinScene {
     pub(crate) handle: Handle,
     /// The geometries that it shows, by id.
     attached: BTreeMap<u32, Handle>,
+    /// Number of its commits.
+    pub(crate) commits: u64,
 }
 
 // SAFETY: a scene may be used from any thread, and is changed under the lock of its owner.
@@ -156,7 +162,7 @@ impl TwinScene {
         let functions = fallback.functions;
         // SAFETY: the device lives.
         let handle = unsafe { (functions.rtcNewScene)(fallback.device) };
-        TwinScene { functions, handle, attached: BTreeMap::new() }
+        TwinScene { functions, handle, attached: BTreeMap::new(), commits: 0 }
     }
 
     /// Shows just these geometries, by id, and commits.
@@ -179,6 +185,7 @@ impl TwinScene {
             (f.rtcCommitScene)(self.handle);
         }
         self.attached = geometries;
+        self.commits += 1;
     }
 
     /// Its bounds, empty without geometry.

@@ -1,5 +1,6 @@
 //! Scenes of meshes, quads, grids and instances through the interface of Embree, compared with
 //! every triangle in exact arithmetic.
+#![cfg(target_os = "linux")]
 #![allow(unsafe_code)] // Calls the interface as programs do.
 
 use bth::rays::Ray as BthRay;

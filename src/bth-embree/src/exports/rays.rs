@@ -137,7 +137,7 @@ macro_rules! forwards {
             // SAFETY: the contract is the same; the other library holds all of the scene.
             unsafe {
                 let (theirs, handle) = match scene(handle) {
-                    Ok(scene) => (functions(), scene.whole_twin()),
+                    Ok(scene) => (functions(), scene.whole_twin().0),
                     Err(theirs) => (theirs, handle),
                 };
                 if let (Some(theirs), false) = (theirs, handle.is_null()) {

@@ -146,7 +146,7 @@ pub unsafe extern "C" fn rtcCollide(first: Handle, second: Handle, function: *co
             let Some(fallback) = &first.device.fallback else {
                 return crate::error::unsupported("rtcCollide");
             };
-            (fallback.functions.rtcCollide)(first.whole_twin(), second.whole_twin(), function, user);
+            (fallback.functions.rtcCollide)(first.whole_twin().0, second.whole_twin().0, function, user);
             Ok(())
         });
     }

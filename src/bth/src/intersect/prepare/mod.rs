@@ -17,7 +17,7 @@ use crate::intersect::edge_functions;
 use crate::intersect::filter::TriangleFilter;
 use crate::intersect::line::Line;
 use crate::rays::Ray;
-use crate::simd::{LANES, Lanewise, Part, Scalar, Simd};
+use crate::simd::{LANES, Lanewise, Part, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::{GREATEST_IN_F32, ObjectBounds};
 use glam::{Vec3A, Vec4, Vec4Swizzles};
@@ -43,11 +43,11 @@ fn lies_between(x: f32, lower: f32, upper: f32) -> bool {
     x.to_bits().wrapping_sub(first) < upper.to_bits() - first
 }
 
-/// Returns true if `tmin` is `f32::MIN_POSITIVE` or a denormal number, of either sign: products
-/// would be denormal, so 0 is used instead. The slack of depths covers the difference.
+/// 0 where `tmin` is `f32::MIN_POSITIVE` or a denormal number, of either sign, whose products would
+/// be denormal. The slack of depths covers the difference.
 #[inline(always)]
-fn is_tiny(tmin: f32) -> bool {
-    tmin.abs().to_bits().wrapping_sub(1) < f32::MIN_POSITIVE.to_bits()
+fn without_tiny(tmin: f32) -> f32 {
+    if tmin.abs().to_bits() <= f32::MIN_POSITIVE.to_bits() { 0.0 } else { tmin }
 }
 
 /// Upper bound of what the pads of boxes are relative to ([`boxes::PAD`]), for origins whose
@@ -124,10 +124,10 @@ impl PreparedRay {
         [start, end]: [Vec4; 2],
         ray: &Ray,
     ) -> Option<PreparedRay> {
-        let (tmin, tmax) = (start.w, end.w);
-        let (o, d) = (Vec3A::from_vec4(start), Vec3A::from_vec4(end));
-        // The fourth lane is not tmax, which as f32::MAX would make the reciprocal denormal, and so
-        // take hundreds of cycles.
+        let (tmin, tmax) = (without_tiny(start.w), end.w);
+        // The fourth lanes are not tmin, which may be denormal, nor tmax, which as f32::MAX would
+        // make the reciprocal denormal: that would take hundreds of cycles.
+        let (o, d) = (Vec3A::from_vec4(start.xyzz()), Vec3A::from_vec4(end));
         let size = Vec3A::from_vec4(end.abs().xyzz());
         let [lower, upper] = [bounds.lower, bounds.upper].map(|p| Vec3A::from_vec4(Vec4::from_array(p)));
         let reach = (lower - o).abs().max((upper - o).abs()).max_element() + bounds.origin_reach;
@@ -136,7 +136,7 @@ impl PreparedRay {
         let (greatest, greatest_lanes) = (greatest[0], Vec3A::from_vec4(Vec4::from_array(greatest)));
         // NaN and infinity among the components make these the largest.
         let (extent, is_prepared) = padded_extent(bounds, greatest_origin, reach);
-        if !(lies_between(greatest, 1.0 / LARGEST, LARGEST) & is_prepared & (tmin <= tmax) & !is_tiny(tmin)) {
+        if !(lies_between(greatest, 1.0 / LARGEST, LARGEST) & is_prepared & (start.w <= tmax)) {
             return None;
         }
         let least = greatest_lanes * boxes::LEAST_COMPONENT as f32;
@@ -186,12 +186,6 @@ impl PreparedRay {
     #[cold]
     #[inline(never)]
     pub(crate) fn in_f64(bounds: &ObjectBounds, ray: &Ray) -> Option<PreparedRay> {
-        if is_tiny(ray.tmin) && ray.tmin <= ray.tmax && 0.0 <= ray.tmax {
-            let prepared = PreparedRay::of(Scalar, bounds, &Ray { tmin: 0.0, ..*ray });
-            if prepared.is_some() {
-                return prepared;
-            }
-        }
         let line = Line::new(ray)?;
         let slabs = RaySlabs::new(ray, &line, bounds);
         let filter = TriangleFilter::new(ray, &line, &slabs, bounds);

@@ -101,7 +101,9 @@ impl View {
         }
         let first = buffer.data().cast_const().cast::<u8>().wrapping_add(offset);
         if first as usize % 4 != 0 || stride % 4 != 0 {
-            return crate::error::operation("data must be aligned to 4 bytes, found another offset or stride");
+            return crate::error::operation(
+                "data must be aligned to 4 bytes, found another offset or stride",
+            );
         }
         Ok(View { first, stride, count, format, _buffer: buffer.clone() })
     }

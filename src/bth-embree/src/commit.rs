@@ -141,7 +141,8 @@ impl Shared<Scene> {
                 let (quality, device) = (self.effort(), &*self.device);
                 let build = Build { quality, allows_argument_filter, device, monitor: &monitor };
                 let make = || Mesh::build(sources, &build);
-                let (mesh, was_cached) = self.device.pool.as_ref().map_or_else(make, |pool| pool.install(make))?;
+                let (mesh, was_cached) =
+                    self.device.pool.as_ref().map_or_else(make, |pool| pool.install(make))?;
                 if was_cached {
                     count(Kind::CachedCommits, Who::Bth, 1);
                 }

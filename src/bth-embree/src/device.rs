@@ -214,7 +214,8 @@ mod tests {
 
     #[test]
     fn configurations_are_read() {
-        let found = Configuration::read("threads=3,verbose=2,isa=avx2, bth_cache=/tmp/x ,tri_accel=bvh4.triangle4v");
+        let found =
+            Configuration::read("threads=3,verbose=2,isa=avx2, bth_cache=/tmp/x ,tri_accel=bvh4.triangle4v");
         let expected = Configuration { verbose: true, threads: 3, cache: Some(PathBuf::from("/tmp/x")) };
         assert_eq!(found, expected);
         assert!(!Configuration::read("verbose=0,threads=").verbose);

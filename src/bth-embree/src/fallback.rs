@@ -244,7 +244,8 @@ fn loaded() -> Option<CString> {
         }
         // SAFETY: the name ends with 0.
         let path = unsafe { CStr::from_ptr(info.dlpi_name) };
-        let is_it = path.to_string_lossy().rsplit('/').next().is_some_and(|name| name.starts_with("libembree4"));
+        let is_it =
+            path.to_string_lossy().rsplit('/').next().is_some_and(|name| name.starts_with("libembree4"));
         if is_it {
             search.found = Some(path.to_owned());
         }

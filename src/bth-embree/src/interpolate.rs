@@ -88,10 +88,7 @@ unsafe fn point(kind: u32, items: &View, row: usize, u: f32, v: f32) -> Point {
 ///
 /// # Safety
 /// The structure and its arrays are as the documentation of `rtcInterpolateN` asks.
-pub(crate) unsafe fn many(
-    arguments: &InterpolateManyArguments,
-    mut one: impl FnMut(&InterpolateArguments),
-) {
+pub(crate) unsafe fn many(arguments: &InterpolateManyArguments, mut one: impl FnMut(&InterpolateArguments)) {
     let (count, many) = (arguments.count as usize, arguments.many as usize);
     // Rows that are padded as the documentation asks.
     let mut rows = vec![[0.0f32; 4]; arguments.out.len() * count.div_ceil(4)];

@@ -89,7 +89,10 @@ pub(crate) type Sources = Vec<(u32, Arc<Shared<Geometry>>)>;
 
 /// The key of a mesh of these geometries.
 pub(crate) fn key(sources: &Sources) -> Key {
-    sources.iter().map(|(id, geometry)| (*id, Arc::as_ptr(geometry) as usize, geometry.state().version)).collect()
+    sources
+        .iter()
+        .map(|(id, geometry)| (*id, Arc::as_ptr(geometry) as usize, geometry.state().version))
+        .collect()
 }
 
 impl Mesh {
@@ -113,7 +116,8 @@ impl Mesh {
         let mesh = TriangleMesh { positions: PositionRows::F32(&positions), triangles: &triangles };
         let cache = build.device.cache.as_ref().map_or_else(Cache::none, of_program);
         let (scene, cached) = memory::open_cached(mesh, &options, &cache, build.monitor)?;
-        let (scene, bounds, allows_argument_filter) = (Some(scene), Some(bounds), build.allows_argument_filter);
+        let (scene, bounds, allows_argument_filter) =
+            (Some(scene), Some(bounds), build.allows_argument_filter);
         Ok((Mesh { scene, parts, normals, bounds, key, allows_argument_filter }, cached))
     }
 

@@ -35,9 +35,9 @@ pub(crate) type Found = Option<(f32, Hit)>;
 #[inline(always)]
 pub(crate) fn trace(committed: &Committed, query: Query<'_>) -> Found {
     let &Ray { origin, tnear, direction, tfar, mask, .. } = query.ray;
-    let (scene, has_world) = match &committed.world {
-        Some(world) => (&world.scene, true),
-        None => (committed.own.scene.as_ref()?, false),
+    let scene = match &committed.world {
+        Some(world) => &world.scene,
+        None => committed.own.scene.as_ref()?,
     };
     // A negative start means the origin. Without the flag, rays exclude their start.
     let tnear = if tnear > 0.0 { tnear } else { 0.0 };
@@ -52,8 +52,8 @@ pub(crate) fn trace(committed: &Committed, query: Query<'_>) -> Found {
         let hit = scene.nearest(&ray)?;
         return Some((hit.t, filters.describe(committed, &hit).0));
     }
-    let conditions = Conditions { committed, query, filters, mode: &mode, shown: Cell::new(None), accepted: Cell::new(None) };
-    conditions.trace(scene, &ray, has_world)
+    let conditions = Conditions { committed, query, filters, mode: &mode, accepted: Cell::new(None) };
+    conditions.trace(scene, &ray)
 }
 
 /// The fields of no hit.
@@ -126,26 +126,15 @@ struct Conditions<'a> {
     query: Query<'a>,
     filters: Filtering,
     mode: &'a ExactMode,
-    /// The hit that was shown to the filters before the search, and that they rejected.
-    shown: Cell<Option<PrimitiveRef>>,
     /// The hit that was accepted last, as the filters left it: the answer when the search ends.
     accepted: Cell<Found>,
 }
 
-// SAFETY: a query runs on the thread that made it, so nobody shares the cells.
+// SAFETY: a query runs on the thread that made it, so nobody shares the cell.
 unsafe impl Sync for Conditions<'_> {}
 
 impl Conditions<'_> {
-    fn trace(&self, scene: &bth::Scene, ray: &rays::Ray, has_world: bool) -> Found {
-        if has_world && !self.query.is_occluded {
-            // Most rays pass all conditions at their first hit, and a search through instances
-            // takes longer: trace freely, and search if that hit is rejected.
-            let hit = scene.nearest(ray)?;
-            if self.accept(&hit) {
-                return self.accepted.get();
-            }
-            self.shown.set(Some(hit.primitive));
-        }
+    fn trace(&self, scene: &bth::Scene, ray: &rays::Ray) -> Found {
         let filter = |_: &rays::Ray, hit: &rays::Hit| self.accept(hit);
         let accept = Accept { filter: Some(&filter), ..Accept::default() };
         if self.query.is_occluded {
@@ -157,9 +146,6 @@ impl Conditions<'_> {
 
     /// Returns true if the masks meet and the filters accept a hit.
     fn accept(&self, hit: &rays::Hit) -> bool {
-        if self.shown.get() == Some(hit.primitive) {
-            return false;
-        }
         let (described, surface, mesh, place_mask) = self.filters.describe(self.committed, hit);
         let mask = self.query.ray.mask;
         if mask & surface.part.mask == 0 || mask & place_mask == 0 {
@@ -169,7 +155,8 @@ impl Conditions<'_> {
         let geometry = &surface.part.geometry;
         let own = if self.query.is_occluded { &geometry.occluded_filter } else { &geometry.intersect_filter };
         // SAFETY: it is null or a filter, which the program set.
-        let own = unsafe { std::mem::transmute::<*const std::ffi::c_void, Option<FilterFunction>>(own.get()) };
+        let own =
+            unsafe { std::mem::transmute::<*const std::ffi::c_void, Option<FilterFunction>>(own.get()) };
         let takes = mesh.allows_argument_filter
             && (self.filters.for_all || geometry.takes_argument_filter.load(Relaxed));
         let argument = self.filters.argument.filter(|_| takes);
@@ -190,8 +177,7 @@ impl Conditions<'_> {
         let context = unsafe { self.query.arguments.as_ref() }.map(|arguments| arguments.context);
         let context = context.filter(|context| !context.is_null()).unwrap_or(&raw mut own);
         let RayHit { ray, hit } = found;
-        let arguments =
-            FilterArguments { valid: &mut valid, user, context, ray, hit, count: 1 };
+        let arguments = FilterArguments { valid: &mut valid, user, context, ray, hit, count: 1 };
         // SAFETY: the context is ours or the program's. The filter is the program's and is called
         // as documented, with pointers that are valid during the call.
         unsafe {
@@ -216,7 +202,11 @@ impl Conditions<'_> {
 /// # Safety
 /// The structures are as the documentation of `rtcIntersect1` asks.
 #[inline(always)]
-pub(crate) unsafe fn intersect(scene: &Shared<Scene>, ray_hit: *mut RayHit, arguments: *const QueryArguments) {
+pub(crate) unsafe fn intersect(
+    scene: &Shared<Scene>,
+    ray_hit: *mut RayHit,
+    arguments: *const QueryArguments,
+) {
     let Some(committed) = scene.committed() else { return };
     // SAFETY: by contract the ray is valid; a hit of another layout has another end, so it is
     // written by `store`.

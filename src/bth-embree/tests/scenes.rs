@@ -374,7 +374,8 @@ fn masks_and_filters_decide() {
             assert_eq!([at(7), at(6), at(4), at(8)], [0, 1, 2, NONE]);
             assert!(is_occluded(scene, RayHit { mask: 4, ..down }));
             assert!(!is_occluded(scene, RayHit { mask: 8, ..down }));
-            let mut context = Context { instance: NONE, instance_primitive: NONE, calls: Vec::new(), rejects: 0 };
+            let mut context =
+                Context { instance: NONE, instance_primitive: NONE, calls: Vec::new(), rejects: 0 };
             let mut arguments =
                 Arguments { flags: 0, features: NONE, context: &mut context, filter, callback: null() };
             let mut found = down;
@@ -444,8 +445,13 @@ fn point_queries_show_the_closest_first() {
         let mut query = PointQuery { point: [1.25, 1.0, 5.0], time: 0.0, radius: f32::INFINITY };
         let function = std::mem::transmute::<*const (), _>(point as *const ());
         let user = (&raw mut shown).cast();
-        let changed =
-            rtcPointQuery(scene, (&raw mut query).cast(), context.0.as_mut_ptr().cast(), Some(function), user);
+        let changed = rtcPointQuery(
+            scene,
+            (&raw mut query).cast(),
+            context.0.as_mut_ptr().cast(),
+            Some(function),
+            user,
+        );
         assert!(changed);
         assert_eq!((query.radius, shown), (2.0, vec![0]));
     }

@@ -70,7 +70,8 @@ fn share_buffer(
     data: *const c_void,
     place: [usize; 3],
 ) -> Result<()> {
-    let buffer = Shared::new(Buffer::shared(&geometry.device, data.cast_mut(), place[0] + place[1] * place[2]));
+    let buffer =
+        Shared::new(Buffer::shared(&geometry.device, data.cast_mut(), place[0] + place[1] * place[2]));
     let view = geometry.set_buffer((kind, slot, format), &buffer, place)?;
     forward_buffer(geometry, kind, slot, &view);
     Ok(())
@@ -448,7 +449,8 @@ pub unsafe extern "C" fn rtcGetGeometryUserDataFromScene(scene: Handle, id: u32)
     // SAFETY: it is one of ours and lives.
     let scene = unsafe { crate::handles::object::<Scene>(scene) };
     // Programs call this with every hit.
-    let known = scene.committed().filter(|_| !scene.is_changed()).and_then(|committed| committed.geometry(id));
+    let known =
+        scene.committed().filter(|_| !scene.is_changed()).and_then(|committed| committed.geometry(id));
     let user = |geometry: &Arc<Shared<Geometry>>| geometry.user.load(Relaxed);
     known.map_or_else(|| scene.geometry(id).as_ref().map_or(std::ptr::null_mut(), user), user)
 }

@@ -138,7 +138,12 @@ exports! {
 /// Handles are null or live, and pointers are as the documentation of Embree 4 asks.
 #[unsafe(no_mangle)]
 #[allow(non_snake_case)]
-pub unsafe extern "C" fn rtcCollide(first: Handle, second: Handle, function: *const c_void, user: *mut c_void) {
+pub unsafe extern "C" fn rtcCollide(
+    first: Handle,
+    second: Handle,
+    function: *const c_void,
+    user: *mut c_void,
+) {
     // SAFETY: the contract is the same.
     unsafe {
         super::call::<Scene, _>(first, |first| {

@@ -4,7 +4,7 @@
 use super::accept::Accept;
 use crate::intersect::exact::{Intersection, reported};
 use crate::masks::Masks;
-use crate::query::{Goal, TriangleRef};
+use crate::query::{Goal, TriangleRef, better};
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use bth_format::layout::Opacity;
 use bth_format::object::ObjectView;
@@ -48,9 +48,15 @@ impl Conditions<'_> {
     }
 }
 
-/// The nearest hit, or any, that conditions allow, in an object whose space is world space.
+/// The nearest hit, or any, that conditions allow.
 #[derive(Clone, Copy)]
-pub(super) struct AcceptedHit<'a, const IS_ANY: bool>(pub(super) &'a Conditions<'a>);
+pub(super) struct AcceptedHit<'a, const IS_ANY: bool> {
+    pub(super) conditions: &'a Conditions<'a>,
+    /// The nearest hit so far in other instances, in world space.
+    pub(super) so_far: &'a Hit,
+    /// Factor from t in the space of the object to t in world space.
+    pub(super) t_scale: f32,
+}
 
 impl<const IS_ANY: bool> Goal for AcceptedHit<'_, IS_ANY> {
     const HAS_CONDITIONS: bool = true;
@@ -60,7 +66,9 @@ impl<const IS_ANY: bool> Goal for AcceptedHit<'_, IS_ANY> {
     }
     #[inline]
     fn accepts(self, triangle: TriangleRef<'_>, found: &Intersection) -> bool {
-        let hit = self.0.hit(triangle, found, reported(found.t));
-        hit.is_some_and(|hit| self.0.pass_filter(&hit))
+        let AcceptedHit { conditions, so_far, t_scale } = self;
+        let hit = conditions.hit(triangle, found, reported(found.t));
+        let hit = hit.and_then(|hit| better(conditions.ray, so_far, &hit, t_scale));
+        hit.is_some_and(|hit| conditions.pass_filter(&hit))
     }
 }

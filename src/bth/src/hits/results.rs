@@ -4,18 +4,23 @@ use super::accept::Accept;
 use super::collect::{AnyFound, FirstHit, FirstHits, FoundHit, HitCount};
 use super::conditions::{AcceptedHit, Conditions};
 use super::search::search;
+use crate::instances::World;
 use crate::intersect::exact_ray::{ExactRay, LineSource};
 use crate::object;
-use crate::rays::Hit;
+use crate::rays::{Hit, Ray};
 use crate::scene::Scene;
 use crate::shortcuts::has_special_leaves;
 use crate::starts::world_ray::WorldRay;
 use crate::trace_ray::TraceRay;
+use bth_format::object::ObjectView;
 use std::collections::BinaryHeap;
 
 /// The nearest accepted hit.
 pub(crate) fn nearest(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>) -> Option<Hit> {
     if let Some(hit) = in_sole_object::<false>(scene, ray, accept) {
+        return hit.is_hit().then_some(hit);
+    }
+    if let Some(hit) = nearest_in_instances(scene, ray, accept) {
         return hit.is_hit().then_some(hit);
     }
     let mut first = FirstHit::default();
@@ -27,6 +32,9 @@ pub(crate) fn nearest(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>) -> 
 pub(crate) fn any(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>) -> bool {
     if let Some(hit) = in_sole_object::<true>(scene, ray, accept) {
         return hit.is_hit();
+    }
+    if let Some(found) = any_in_instances(scene, ray, accept) {
+        return found;
     }
     let mut any = AnyFound::default();
     search(scene, ray, accept, &mut any);
@@ -50,7 +58,52 @@ fn in_sole_object<const IS_ANY: bool>(scene: &Scene, ray: WorldRay<'_>, accept: 
     }
     let groups = masks.groups(scene.object_of(instance));
     let conditions = Conditions { ray: ray.ray, instance, object, groups, accept };
-    Some(object::accepted(object, &exact, AcceptedHit::<IS_ANY>(&conditions), instance))
+    let goal = AcceptedHit::<IS_ANY> { conditions: &conditions, so_far: &Hit::MISS, t_scale: 1.0 };
+    Some(object::accepted(object, &exact, goal, instance))
+}
+
+/// The world of a scene, if the kernel of single rays tests conditions in all instances: no object
+/// has tetrahedra or positions in f64, and neither has the ray.
+fn world_of_kernel<'a>(scene: &'a Scene, ray: &WorldRay<'_>) -> Option<&'a World> {
+    scene.world().filter(|_| ray.wide.is_none() && scene.tests_conditions_in_kernel())
+}
+
+/// The conditions of a ray in an instance.
+fn conditions<'a>(
+    scene: &'a Scene,
+    ray: &'a Ray,
+    (instance, object): (u32, &'a ObjectView<'a>),
+    accept: &'a Accept<'a>,
+) -> Conditions<'a> {
+    let groups = scene.masks().groups(scene.object_of(instance));
+    Conditions { ray, instance, object, groups, accept }
+}
+
+/// The nearest accepted hit in instances, or [`Hit::MISS`]; `None` if the kernel cannot find it.
+fn nearest_in_instances(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>) -> Option<Hit> {
+    let (world, mut best) = (world_of_kernel(scene, &ray)?, Hit::MISS);
+    let enters = |instance| accept.mask & scene.masks().of_instance(instance) != 0;
+    world.nearest_by(scene.objects(), ray, &mut best, enters, |object, placed, so_far, hit| {
+        let instance = placed.instance;
+        let conditions = conditions(scene, ray.ray, (instance, object), accept);
+        let t_scale = placed.of_object.t_scale;
+        let goal = AcceptedHit::<false> { conditions: &conditions, so_far, t_scale };
+        *hit = object::accepted(object, placed, goal, instance);
+    });
+    Some(best)
+}
+
+/// Returns true if there is an accepted hit in an instance; `None` if the kernel cannot find it.
+fn any_in_instances(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>) -> Option<bool> {
+    let world = world_of_kernel(scene, &ray)?;
+    let enters = |instance| accept.mask & scene.masks().of_instance(instance) != 0;
+    Some(world.any_by(scene.objects(), ray, enters, |object, placed| {
+        let instance = placed.instance;
+        let conditions = conditions(scene, ray.ray, (instance, object), accept);
+        let t_scale = placed.of_object.t_scale;
+        let goal = AcceptedHit::<true> { conditions: &conditions, so_far: &Hit::MISS, t_scale };
+        object::accepted(object, placed, goal, instance).is_hit()
+    }))
 }
 
 /// The number of accepted hits.

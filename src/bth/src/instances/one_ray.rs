@@ -48,30 +48,44 @@ impl World {
     /// Stores the nearest hit of a ray, or [`Hit::MISS`], as [`Self::nearest`] does for many.
     #[inline(never)]
     pub(crate) fn store_nearest_of_ray(&self, objects: &Objects, ray: WorldRay<'_>, best: &mut Hit) {
-        self.nearest_by(objects, ray, best, |object, ray, hit| {
-            object::store_nearest(object, ray, ray.instance, hit);
-        });
+        self.nearest_by(
+            objects,
+            ray,
+            best,
+            |_| true,
+            |object, ray, _, hit| {
+                object::store_nearest(object, ray, ray.instance, hit);
+            },
+        );
     }
 
     /// Like [`Self::store_nearest_of_ray`], with the statistics of the traversal of objects.
     pub(crate) fn nearest_counted(&self, objects: &Objects, ray: WorldRay<'_>) -> (Hit, Steps) {
         let (mut best, mut steps) = (Hit::MISS, Steps::default());
-        self.nearest_by(objects, ray, &mut best, |object, ray, hit| {
-            let counted = object::nearest_counted(object, ray, ray.instance);
-            *hit = counted.0;
-            steps += counted.1;
-        });
+        self.nearest_by(
+            objects,
+            ray,
+            &mut best,
+            |_| true,
+            |object, ray, _, hit| {
+                let counted = object::nearest_counted(object, ray, ray.instance);
+                *hit = counted.0;
+                steps += counted.1;
+            },
+        );
         (best, steps)
     }
 
-    /// Stores the nearest hit of a ray in all instances; `trace` stores that in one.
+    /// Stores the nearest hit of a ray in all instances that it `enters`; `trace` stores that in one,
+    /// given the nearest so far.
     #[inline(always)]
-    fn nearest_by(
+    pub(crate) fn nearest_by(
         &self,
         objects: &Objects,
         world_ray: WorldRay<'_>,
         best: &mut Hit,
-        mut trace: impl FnMut(&ObjectView<'_>, &RayInInstance<'_>, &mut Hit),
+        enters: impl Fn(u32) -> bool,
+        mut trace: impl FnMut(&ObjectView<'_>, &RayInInstance<'_>, &Hit, &mut Hit),
     ) {
         *best = Hit::MISS;
         let ray = world_ray.ray;
@@ -79,9 +93,12 @@ impl World {
             // Neither is NaN: for a ray whose `tmax` is, nothing is enumerated.
             let end = if world_ray.wide.is_some() { best.t.next_up() } else { best.t };
             let tmax = if end < ray.tmax { end } else { ray.tmax };
+            if !enters(instance) {
+                return Some(tmax);
+            }
             let (object, of_instance) = self.enter(objects, instance, world_ray, tmax);
             let mut hit = Hit::MISS;
-            trace(object, &of_instance, &mut hit);
+            trace(object, &of_instance, best, &mut hit);
             let t_scale = of_instance.of_object.t_scale;
             // The results of two branches would be passed through memory.
             if world_ray.wide.is_some() {
@@ -107,9 +124,24 @@ impl World {
     /// Returns true if a ray hits anything, as [`Self::any`] computes it for many.
     #[inline(never)]
     pub(crate) fn any_of_ray(&self, objects: &Objects, ray: WorldRay<'_>) -> bool {
+        self.any_by(objects, ray, |_| true, |object, ray| object::any(object, ray))
+    }
+
+    /// Returns true if `hits` returns true for an instance that a ray `enters`.
+    #[inline(always)]
+    pub(crate) fn any_by(
+        &self,
+        objects: &Objects,
+        ray: WorldRay<'_>,
+        enters: impl Fn(u32) -> bool,
+        hits: impl Fn(&ObjectView<'_>, &RayInInstance<'_>) -> bool,
+    ) -> bool {
         self.enter_each(ray.ray, &mut |instance| {
+            if !enters(instance) {
+                return Some(ray.ray.tmax);
+            }
             let (object, of_instance) = self.enter(objects, instance, ray, ray.ray.tmax);
-            (!object::any(object, &of_instance)).then_some(ray.ray.tmax)
+            (!hits(object, &of_instance)).then_some(ray.ray.tmax)
         })
     }
 

@@ -8,7 +8,6 @@ pub(crate) use batch::{MIN_BATCH, trace_batch, trace_starts};
 pub(crate) use scratch::{Scratch, with_scratch};
 
 use self::single::{SingleRay, trace};
-use crate::intersect::exact_ray::ExactRay;
 use crate::query::{AnyHit, Goal, NearestHit, Steps};
 use crate::rays::Hit;
 use bth_format::object::ObjectView;
@@ -34,9 +33,14 @@ pub(crate) fn nearest_counted<R: SingleRay>(object: &ObjectView<'_>, ray: &R, in
     (hit, steps)
 }
 
-/// The hit of a ray of f32, or from a start on the object, for a goal with conditions.
+/// The hit of a ray for a goal with conditions.
 #[inline(never)]
-pub(crate) fn accepted<G: Goal>(object: &ObjectView<'_>, ray: &ExactRay<'_>, goal: G, instance: u32) -> Hit {
+pub(crate) fn accepted<G: Goal, R: SingleRay>(
+    object: &ObjectView<'_>,
+    ray: &R,
+    goal: G,
+    instance: u32,
+) -> Hit {
     let mut hit = Hit::MISS;
     trace(object, goal, ray, instance, &mut (), &mut hit);
     hit

@@ -274,14 +274,26 @@ pub(crate) fn better(ray: &Ray, best: &Hit, hit: &Hit, t_scale: f32) -> Option<H
 
 /// Returns true if a t between two values may lie between `tmin` and `limit` after rounding to f32.
 pub(crate) fn may_be_in_range(t: [f64; 2], tmin: f32, limit: f64) -> bool {
-    t[0] <= limit && (t[1] as f32).next_up() >= tmin
+    t[0] <= limit && reaches((t[1] as f32).next_up(), tmin)
+}
+
+/// Returns true if t is at least `tmin`; neither is NaN. The bits are compared: some processors take
+/// a hundred cycles where one of two floats is denormal, as `tmin` is where rays exclude 0.
+#[inline(always)]
+fn reaches(t: f32, tmin: f32) -> bool {
+    let ordered = |x: f32| {
+        let bits = x.to_bits().cast_signed();
+        bits ^ (bits >> 31).cast_unsigned().wrapping_shr(1).cast_signed()
+    };
+    // The sum turns -0 into 0; a -0 of `tmin` is less.
+    ordered(tmin) <= ordered(t + 0.0)
 }
 
 /// Returns true if a t that is already rounded for the answer lies in the ray's range and is
 /// finite.
 #[inline(always)]
 pub(crate) fn in_range(t: f32, tmin: f32, tmax: f32) -> bool {
-    tmin <= t && t <= tmax && t.is_finite()
+    reaches(t, tmin) && t <= tmax && t.is_finite()
 }
 
 /// Receiver of the triangles that a ray may hit.

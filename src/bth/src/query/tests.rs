@@ -99,3 +99,14 @@ fn bounds_complete_queries_for_any_hit_only_if_all_t_between_them_do() {
     }
     assert!(completed > 1_000, "{completed}");
 }
+
+#[test]
+fn bits_are_compared_as_numbers_are() {
+    let tiny = f32::from_bits(1);
+    let some = [0.0, tiny, 1e-40, f32::MIN_POSITIVE, 0.5, 1.0, f32::MAX, f32::INFINITY];
+    for t in some.iter().flat_map(|x| [*x, -x]) {
+        for tmin in some.iter().flat_map(|x| [*x, -x]) {
+            assert_eq!(reaches(t, tmin), tmin <= t, "{t} {tmin}");
+        }
+    }
+}

@@ -48,6 +48,8 @@ pub struct Scene {
     world: Option<World>,
     /// True if some triangle of some object may let rays pass.
     has_opacity: bool,
+    /// True if some object has tetrahedra.
+    has_tetrahedra: bool,
     /// The masks of instances and of groups of triangles.
     masks: Masks,
 }
@@ -56,7 +58,7 @@ impl Scene {
     /// A scene of the objects of several files, without objects and instances yet.
     pub(crate) fn of_several_files() -> Scene {
         let (objects, world) = (Objects::of_several_files(), Some(World::empty()));
-        Scene { objects, world, has_opacity: false, masks: Masks::default() }
+        Scene { objects, world, has_opacity: false, has_tetrahedra: false, masks: Masks::default() }
     }
 
     /// Adds the objects of another scene to a scene of several files; returns the index of the
@@ -74,6 +76,7 @@ impl Scene {
             }
         }
         self.has_opacity |= other.has_opacity;
+        self.has_tetrahedra |= other.has_tetrahedra;
         first
     }
 
@@ -85,6 +88,11 @@ impl Scene {
     /// Returns true if some triangle of some object may let rays pass.
     pub(crate) fn has_opacity(&self) -> bool {
         self.has_opacity
+    }
+
+    /// Returns true if the kernel of single rays tests conditions on hits in all instances.
+    pub(crate) fn tests_conditions_in_kernel(&self) -> bool {
+        !self.has_tetrahedra && !self.objects.any_exact()
     }
 
     /// The masks of instances and of groups of triangles.
@@ -161,6 +169,7 @@ impl Scene {
             objects: Objects::of_file(file),
             world: Some(world),
             has_opacity: false,
+            has_tetrahedra: false,
             masks: Masks::default(),
         }
     }

@@ -70,7 +70,8 @@ fn checked(file: File) -> Result<Scene, Error> {
 
 /// Checks only the scene sections of a file and opens its scene.
 fn with_world(file: File) -> Result<Scene, Error> {
-    let has_opacity = file.table().iter().any(|e| e.kind == kind::OPACITY && e.count != 0);
+    let has = |section: u32| file.table().iter().any(|e| e.kind == section && e.count != 0);
+    let (has_opacity, has_tetrahedra) = (has(kind::OPACITY), has(kind::TET_LEAVES));
     let mut objects = Objects::of_file(file);
     let mut world = World::new(&objects)?;
     match &mut world {
@@ -79,5 +80,5 @@ fn with_world(file: File) -> Result<Scene, Error> {
         None if objects.any_exact() => world = Some(World::of_objects_in_place(&objects)?),
         None => {}
     }
-    Ok(Scene { objects, world, has_opacity, masks: Masks::default() })
+    Ok(Scene { objects, world, has_opacity, has_tetrahedra, masks: Masks::default() })
 }

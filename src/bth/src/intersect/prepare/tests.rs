@@ -390,8 +390,8 @@ fn rays_that_f32_cannot_prepare_are_left_to_f64() {
     for tmin in [f32::MIN_POSITIVE, -f32::MIN_POSITIVE, 1e-40, f32::from_bits(1)] {
         let (ray, zero) = (Ray { tmin, ..usual }, Ray { tmin: 0.0, ..usual });
         assert!(is_prepared(ray) && is_prepared(zero));
-        let [of_tiny, of_zero] =
-            [ray, zero].map(|ray| PreparedRay::of(crate::simd::Scalar, &bounds, &ray).expect("a ray with a line"));
+        let [of_tiny, of_zero] = [ray, zero]
+            .map(|ray| PreparedRay::of(crate::simd::Scalar, &bounds, &ray).expect("a ray with a line"));
         let depth = f64::from(tmin) * f64::from(of_tiny.slabs.scale);
         assert!(f64::from(of_tiny.slabs.first) <= depth && depth <= f64::from(of_tiny.filter.first));
         assert!((of_tiny.slabs.first - of_zero.slabs.first).abs() <= 4.0 * f32::MIN_POSITIVE);

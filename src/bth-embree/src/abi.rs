@@ -172,10 +172,8 @@ impl Bounds {
 
     /// Makes the box contain a point.
     pub(crate) fn add(&mut self, point: [f32; 3]) {
-        for k in 0..3 {
-            self.lower[k] = self.lower[k].min(point[k]);
-            self.upper[k] = self.upper[k].max(point[k]);
-        }
+        self.lower = std::array::from_fn(|k| self.lower[k].min(point[k]));
+        self.upper = std::array::from_fn(|k| self.upper[k].max(point[k]));
     }
 
     /// Makes the box contain another one.

@@ -97,10 +97,10 @@ impl View {
         [offset, stride, count]: [usize; 3],
     ) -> Result<View> {
         if count > u32::MAX as usize || stride > u32::MAX as usize {
-            return argument("buffer too large: expected at most 2^32 - 1 items, of as many bytes each");
+            return argument("buffer too large: expected at most 2^32 - 1 items of 2^32 - 1 bytes");
         }
         let first = buffer.data().cast_const().cast::<u8>().wrapping_add(offset);
-        if first as usize % 4 != 0 || stride % 4 != 0 {
+        if !(first as usize).is_multiple_of(4) || !stride.is_multiple_of(4) {
             return crate::error::operation(
                 "data must be aligned to 4 bytes, found another offset or stride",
             );
@@ -115,7 +115,7 @@ impl View {
     /// The words of an item.
     ///
     /// # Safety
-    /// The index is below the count, and the format has so many words.
+    /// The index is below the count, and the format has `N` words.
     #[inline(always)]
     pub(crate) unsafe fn words<const N: usize>(&self, index: usize) -> [u32; N] {
         // SAFETY: by contract the item exists, and the program declared its words to be readable.

@@ -1,9 +1,9 @@
 //! Commits: from the geometries of a scene to what rays are traced through.
 
 use crate::abi::*;
+use crate::committed::{Committed, Filters, MAX_MASKS, MAX_TABLE, Rest};
 use crate::device::{Callback, lock};
 use crate::error::{Failure, Result, operation, unsupported};
-use crate::geometry::Geometry;
 use crate::handles::Shared;
 use crate::mesh::{self, Build, Mesh, Sources};
 use crate::scene::Scene;
@@ -13,66 +13,6 @@ use bth_compile::{Monitor, bvh::Quality};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
-
-/// Most masks that are compared with the mask of a ray before it is traced.
-const MAX_MASKS: usize = 16;
-
-/// Ids from here on, which programs choose, are looked up in another way.
-const MAX_TABLE: u32 = 1 << 20;
-
-/// What a commit has made.
-#[derive(Debug)]
-pub(crate) struct Committed {
-    /// The scene's own triangles.
-    pub(crate) own: Arc<Mesh>,
-    /// The instances, if there are any that can be hit.
-    pub(crate) world: Option<World>,
-    /// The scene of the other library with what bth does not hold; null if there is nothing.
-    pub(crate) rest: Rest,
-    pub(crate) is_robust: bool,
-    /// Whether a filter may apply to a query: of a geometry, of the arguments where a geometry
-    /// takes it, and of the arguments for all.
-    pub(crate) filters: Filters,
-    /// The masks of geometries and instances, without repetitions; `None` if there are too many.
-    masks: Option<Vec<u32>>,
-    pub(crate) bounds: Bounds,
-    /// The bounds of what does not move.
-    pub(crate) still_bounds: Bounds,
-    /// The enabled geometries, by id.
-    geometries: Vec<Option<Arc<Shared<Geometry>>>>,
-}
-
-/// A scene of the other library, or null.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Rest(pub(crate) Handle);
-
-/// Where filters may apply.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Filters {
-    pub(crate) intersect: bool,
-    pub(crate) occluded: bool,
-    pub(crate) takes_argument: bool,
-    /// True if a scene of some triangles allows filters in arguments.
-    pub(crate) allows_argument: bool,
-}
-
-impl Committed {
-    /// Bytes that tracing reads.
-    pub(crate) fn bytes(&self) -> usize {
-        self.own.scene.as_ref().map_or(0, |scene| scene.resident_bytes() as usize)
-    }
-
-    /// A geometry by its id.
-    pub(crate) fn geometry(&self, id: u32) -> Option<&Arc<Shared<Geometry>>> {
-        self.geometries.get(id as usize)?.as_ref()
-    }
-
-    /// Returns true if a ray with this mask can hit every geometry and instance.
-    #[inline(always)]
-    pub(crate) fn all_meet(&self, mask: u32) -> bool {
-        self.masks.as_ref().is_some_and(|masks| masks.iter().all(|known| known & mask != 0))
-    }
-}
 
 impl Shared<Scene> {
     /// Commits the scene. Threads that commit the same scene wait for the first.
@@ -204,13 +144,6 @@ impl Shared<Scene> {
         }
     }
 }
-
-// SAFETY: scenes of the other library may be used from any thread.
-#[allow(unsafe_code)]
-unsafe impl Send for Rest {}
-// SAFETY: as above.
-#[allow(unsafe_code)]
-unsafe impl Sync for Rest {}
 
 /// The box of an instance: of the corners of its mesh's box, rounded outwards.
 fn placed_bounds(place: &Place) -> Bounds {

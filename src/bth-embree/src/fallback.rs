@@ -192,7 +192,7 @@ impl Library {
         let Some((library, name)) = open()? else { return Ok(None) };
         // SAFETY: the library is open, and has the name of one with this interface.
         let functions = unsafe { Functions::load(library) }.map_err(|why| format!("{name}: {why}"))?;
-        // SAFETY: the functions are those of the library.
+        // SAFETY: the functions come from the library.
         let layout = unsafe { probe(&functions) }.map_err(|why| format!("{name}: {why}"))?;
         HAS_INSTANCE_ARRAYS.get_or_init(|| layout);
         Ok(Some(Library { functions }))
@@ -212,7 +212,7 @@ fn open() -> std::result::Result<Option<(*mut c_void, String)>, String> {
             None => (USUAL_NAME.to_owned(), 0),
         },
     };
-    // Its calls of its own functions are to reach it, not us.
+    // What it calls by name is to be found in it, not in us.
     let flags = flags | libc::RTLD_NOW | libc::RTLD_LOCAL | libc::RTLD_DEEPBIND;
     // SAFETY: the path ends with 0; the initializers of the library may run here.
     let library = unsafe { libc::dlopen(path.as_ptr(), flags) };
@@ -226,8 +226,8 @@ fn open() -> std::result::Result<Option<(*mut c_void, String)>, String> {
     // SAFETY: the library is open and the name ends with 0.
     let found = unsafe { libc::dlsym(library, c"rtcNewDevice".as_ptr()) };
     // Where we have its name, the system finds us.
-    let is_other = found != crate::exports::device::rtcNewDevice as *mut c_void;
-    Ok((is_other && !found.is_null()).then_some((library, name)))
+    let is_other = !found.is_null() && base(found) != base(open as *const c_void);
+    Ok(is_other.then_some((library, name)))
 }
 
 /// The path of a library of this kind that the process has loaded, and that is not this one.
@@ -251,14 +251,19 @@ fn loaded() -> Option<CString> {
         }
         c_int::from(is_it)
     }
-    // SAFETY: all zeros are a valid value.
-    let mut own: libc::Dl_info = unsafe { std::mem::zeroed() };
-    // SAFETY: both pointers are valid.
-    unsafe { libc::dladdr(loaded as *const c_void, &mut own) };
-    let mut search = Search { own: own.dli_fbase as usize, found: None };
+    let mut search = Search { own: base(loaded as *const c_void), found: None };
     // SAFETY: `visit` has the signature that is asked for, and the search outlives the call.
     unsafe { libc::dl_iterate_phdr(Some(visit), (&raw mut search).cast()) };
     search.found
+}
+
+/// Where the library that a function belongs to is loaded.
+fn base(function: *const c_void) -> usize {
+    // SAFETY: all zeros are a valid value.
+    let mut info: libc::Dl_info = unsafe { std::mem::zeroed() };
+    // SAFETY: both pointers are valid.
+    unsafe { libc::dladdr(function, &mut info) };
+    info.dli_fbase as usize
 }
 
 /// How the library was built: true if hits have the word of instance arrays.
@@ -267,7 +272,7 @@ fn loaded() -> Option<CString> {
 /// If hits are laid out in another way, such as for several levels of instances.
 ///
 /// # Safety
-/// The functions are those of a library with the interface of Embree 4.
+/// The functions come from a library with the interface of Embree 4.
 unsafe fn probe(functions: &Functions) -> std::result::Result<bool, String> {
     const UNTOUCHED: u32 = 0xABCD_1234;
     const ID: u32 = 5;

@@ -43,12 +43,12 @@ impl Drop for ExactMode {
     }
 }
 
-/// The control register, if its mode is not that of IEEE 754.
+/// The control register, if it says another mode than IEEE 754.
 ///
 /// Reading the register waits for all floating-point operations before, so a sum tells the mode:
 /// of a denormal number and 0, of numbers that differ by a denormal one, and of 1 and a quarter of
-/// the distance to its neighbours. The register is read only where a thread has a mode for the first
-/// time; its other bits, exception masks and flags, are taken to be as they were then.
+/// the distance to its neighbours. The register is read only where a thread has a mode for the
+/// first time; its other bits, exception masks and flags, are taken to be as they were then.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 fn foreign_mode() -> Option<Control> {
@@ -62,7 +62,8 @@ fn foreign_mode() -> Option<Control> {
     static EXPECTED: Row = Row([TINY, TINY, ONE, ONE]);
     const ONE: u32 = 127 << 23;
     let equal: u32;
-    // SAFETY: the instructions read 16 aligned bytes each, and change only registers of their own.
+    // SAFETY: the instructions read 16 aligned bytes each, and change only the two registers that
+    // are named.
     unsafe {
         std::arch::asm!(
             "movaps {row}, [{numbers}]",

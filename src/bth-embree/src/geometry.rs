@@ -5,10 +5,11 @@ use crate::buffer::{Buffer, View};
 use crate::device::{Device, lock};
 use crate::error::{Result, argument, operation, unsupported};
 use crate::handles::{Shared, Tagged};
-use crate::scene::Scene;
 use crate::transform::Transform;
 use crate::twin::TwinGeometry;
+use std::any::Any;
 use std::ffi::c_void;
+use std::fmt::Debug;
 use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU32, AtomicUsize, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard};
 
@@ -16,7 +17,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 /// geometry.
 const KINDS: [u32; 20] = [8, 15, 16, 17, 24, 25, 26, 32, 33, 34, 40, 41, 42, 50, 51, 52, 58, 59, 60, 120];
 
-/// A function of the program that is read with every hit; 0 for none.
+/// A function of the program that is read with every hit; 0 if there is no function.
 #[derive(Debug, Default)]
 pub(crate) struct Function(AtomicUsize);
 
@@ -25,7 +26,7 @@ impl Function {
         self.0.store(function as usize, Relaxed);
     }
 
-    /// Its address; null if there is none.
+    /// Its address, or null.
     #[inline(always)]
     pub(crate) fn get(&self) -> *const c_void {
         self.0.load(Relaxed) as *const c_void
@@ -58,7 +59,7 @@ pub(crate) struct State {
     /// Of an instance, by time step.
     pub(crate) transforms: Vec<Transform>,
     /// Of an instance one, of an array of instances any number.
-    pub(crate) scenes: Vec<Option<Arc<Shared<Scene>>>>,
+    pub(crate) scenes: Vec<Option<Arc<dyn Instanced>>>,
     pub(crate) quality: u32,
     /// False after a change, until the geometry is committed.
     committed: bool,
@@ -66,6 +67,20 @@ pub(crate) struct State {
     pub(crate) version: u64,
     /// What the other library has of it.
     pub(crate) twin: Option<TwinGeometry>,
+}
+
+/// A scene as instances of it see it.
+pub(crate) trait Instanced: Debug + Send + Sync {
+    /// The triangles of its last commit, a `Mesh`.
+    fn triangles(&self) -> Option<Arc<dyn Any + Send + Sync>>;
+
+    /// The scene of the other library with what bth does not hold, and the number of its commits;
+    /// null if there is nothing.
+    fn twin(&self) -> (Handle, u64);
+
+    /// The scene of the other library with everything, as it is now, and the number of its commits;
+    /// null without a library.
+    fn whole_twin(&self) -> (Handle, u64);
 }
 
 impl Tagged for Geometry {

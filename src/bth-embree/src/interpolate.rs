@@ -5,8 +5,8 @@ use crate::abi::*;
 use crate::buffer::View;
 use crate::geometry::Geometry;
 
-/// A point of a triangle of vertices, and how its coordinates there change with those of the
-/// primitive.
+/// A point of a triangle of vertices, and how its coordinates there change with the coordinates in
+/// the primitive.
 struct Point {
     corners: [usize; 3],
     u: f32,
@@ -28,7 +28,7 @@ pub(crate) unsafe fn interpolate(geometry: &Geometry, arguments: &InterpolateArg
     if row >= items.count {
         return;
     }
-    // SAFETY: the row exists, and its words are those of its format.
+    // SAFETY: the row exists, and it has the words of its format.
     let point = unsafe { point(geometry.kind, items, row, arguments.u, arguments.v) };
     let Point { corners: [a, b, c], u, v, scale } = point;
     if [a, b, c].iter().any(|corner| *corner >= source.count) {
@@ -93,7 +93,7 @@ pub(crate) unsafe fn many(arguments: &InterpolateManyArguments, mut one: impl Fn
     // Rows that are padded as the documentation asks.
     let mut rows = vec![[0.0f32; 4]; arguments.out.len() * count.div_ceil(4)];
     for i in 0..many {
-        // SAFETY: by contract the arrays have so many elements, or `valid` is null.
+        // SAFETY: by contract the arrays have `many` elements, or `valid` is null.
         let (is_valid, primitive, u, v) = unsafe {
             let valid = arguments.valid.is_null() || *arguments.valid.add(i) != 0;
             (valid, *arguments.primitives.add(i), *arguments.u.add(i), *arguments.v.add(i))

@@ -1,4 +1,4 @@
-//! The triangles of a scene: those of all its triangle meshes, quads and grids, as one object.
+//! The triangles of a scene: of all its triangle meshes, quads and grids, as one object.
 #![allow(unsafe_code)] // Reads buffers of the program.
 
 use crate::abi::*;

@@ -10,7 +10,7 @@ use crate::trace;
 /// Reads the ray of a lane.
 ///
 /// # Safety
-/// `packet` points to the words of a packet of so many rays.
+/// `packet` points to the words of a packet of `lanes` rays.
 unsafe fn gather(packet: *const u32, lanes: usize, lane: usize) -> Ray {
     // SAFETY: by contract the words of a ray are there, each `lanes` words after the one before.
     let word = |i: usize| unsafe { *packet.add(i * lanes + lane) };
@@ -53,7 +53,7 @@ pub(crate) unsafe fn intersect(
 ) {
     let words = if has_instance_arrays() { HIT_WORDS } else { SHORT_HIT_WORDS };
     let trace = |lane| {
-        // SAFETY: by contract the packet has so many lanes, each with the words of a ray and a hit.
+        // SAFETY: by contract the packet has `lanes` lanes, each with the words of a ray and a hit.
         unsafe {
             let mut one = RayHit { ray: gather(packet, lanes, lane), hit: NO_HIT };
             trace::intersect(scene, &mut one, arguments);
@@ -94,7 +94,7 @@ pub(crate) unsafe fn occluded(
     lanes: usize,
 ) {
     let trace = |lane| {
-        // SAFETY: by contract the packet has so many lanes, each with the words of a ray.
+        // SAFETY: by contract the packet has `lanes` lanes, each with the words of a ray.
         unsafe {
             #[repr(align(16))]
             struct Aligned(Ray);

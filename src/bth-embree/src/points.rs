@@ -2,7 +2,7 @@
 #![allow(unsafe_code)] // Calls functions of the program, whose structures it points to.
 
 use crate::abi::*;
-use crate::commit::Committed;
+use crate::committed::Committed;
 use crate::fallback::has_instance_arrays;
 use crate::float_mode::ExactMode;
 use crate::handles::Shared;
@@ -148,6 +148,11 @@ fn columns(rows: &[f32; 12]) -> [f32; 16] {
     })
 }
 
+/// How far the columns of a similarity may be from orthogonal and from equal lengths, relative to
+/// the largest square of a length: four units in the last place of f32, since a rotation that is
+/// rounded to f32 is off by less.
+const SIMILARITY_ERROR: f64 = 4.0 * f32::EPSILON as f64;
+
 /// The inverse of a transform in f64, rounded, and its factor of lengths if it is a similarity as
 /// far as f32 can tell, else 0.
 fn inverse(rows: &[f32; 12]) -> ([f32; 12], f32) {
@@ -167,10 +172,8 @@ fn inverse(rows: &[f32; 12]) -> ([f32; 12], f32) {
         }
         inverse[4 * row + 3] = -dot(linear[row], origin) as f32;
     }
-    // The columns of a similarity are orthogonal and of equal length; four units in the last place
-    // of f32 are what a rounded rotation may be off.
     let squares = [x, y, z].map(|v| dot(v, v));
-    let tolerance = 4.0 * f64::from(f32::EPSILON) * squares[0].max(squares[1]).max(squares[2]);
+    let tolerance = SIMILARITY_ERROR * squares[0].max(squares[1]).max(squares[2]);
     let is_similarity = [dot(x, y), dot(y, z), dot(z, x), squares[0] - squares[1], squares[1] - squares[2]]
         .iter()
         .all(|difference| difference.abs() <= tolerance);

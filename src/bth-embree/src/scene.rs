@@ -2,13 +2,14 @@
 #![allow(unsafe_code)] // Rays read what the last commit made without a lock.
 
 use crate::abi::*;
-use crate::commit::Committed;
+use crate::committed::Committed;
 use crate::device::{Callback, Device, lock};
 use crate::error::{Result, operation};
-use crate::geometry::Geometry;
+use crate::geometry::{Geometry, Instanced};
 use crate::handles::{Shared, Tagged};
 use crate::mesh::Mesh;
 use crate::twin::TwinScene;
+use std::any::Any;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
@@ -128,7 +129,7 @@ impl Scene {
     /// Removes a geometry.
     ///
     /// # Errors
-    /// If there is none of this id.
+    /// If there is no geometry of this id.
     pub(crate) fn detach(&self, id: u32) -> Result<()> {
         let removed = lock(&self.geometries).remove(&id);
         self.changed.store(true, Ordering::Release);
@@ -152,12 +153,6 @@ impl Scene {
         enabled
     }
 
-    /// The scene of the other library with what bth does not hold, and the number of its commits;
-    /// null if there is nothing.
-    pub(crate) fn twin(&self) -> (Handle, u64) {
-        named(lock(&self.twins).rest.as_ref())
-    }
-
     /// Shows the other library what bth does not hold; returns its scene, or null.
     pub(crate) fn show_rest(&self, rest: BTreeMap<u32, Handle>) -> Handle {
         let Some(fallback) = &self.device.fallback else { return std::ptr::null_mut() };
@@ -173,9 +168,22 @@ impl Scene {
         twin.handle
     }
 
-    /// The scene of the other library with everything, as it is now, and the number of its commits;
-    /// null without a library.
-    pub(crate) fn whole_twin(&self) -> (Handle, u64) {
+    /// The bounds of what the other library shows.
+    pub(crate) fn twin_bounds(&self) -> Bounds {
+        lock(&self.twins).rest.as_ref().map_or(Bounds::EMPTY, TwinScene::bounds)
+    }
+}
+
+impl Instanced for Shared<Scene> {
+    fn triangles(&self) -> Option<Arc<dyn Any + Send + Sync>> {
+        self.mesh().map(|mesh| mesh as Arc<dyn Any + Send + Sync>)
+    }
+
+    fn twin(&self) -> (Handle, u64) {
+        named(lock(&self.twins).rest.as_ref())
+    }
+
+    fn whole_twin(&self) -> (Handle, u64) {
         let Some(fallback) = &self.device.fallback else { return named(None) };
         let known = {
             let twins = lock(&self.twins);
@@ -193,10 +201,5 @@ impl Scene {
         let shown = named(Some(twin));
         twins.whole_is_fresh = true;
         shown
-    }
-
-    /// The bounds of what the other library shows.
-    pub(crate) fn twin_bounds(&self) -> Bounds {
-        lock(&self.twins).rest.as_ref().map_or(Bounds::EMPTY, TwinScene::bounds)
     }
 }

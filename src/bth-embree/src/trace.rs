@@ -5,7 +5,7 @@
 #![allow(unsafe_code)] // Calls filters of the program, whose structures it points to.
 
 use crate::abi::*;
-use crate::commit::Committed;
+use crate::committed::Committed;
 use crate::fallback::has_instance_arrays;
 use crate::float_mode::ExactMode;
 use crate::handles::Shared;
@@ -144,7 +144,7 @@ impl Conditions<'_> {
         self.accepted.get()
     }
 
-    /// Returns true if the masks meet and the filters accept a hit.
+    /// Returns true if the masks have a bit in common and the filters accept a hit.
     fn accept(&self, hit: &rays::Hit) -> bool {
         let (described, surface, mesh, place_mask) = self.filters.describe(self.committed, hit);
         let mask = self.query.ray.mask;
@@ -233,7 +233,7 @@ pub(crate) unsafe fn intersect(
 #[inline(always)]
 pub(crate) unsafe fn store(ray_hit: *mut RayHit, (t, hit): (f32, Hit)) {
     let words = if has_instance_arrays() { HIT_WORDS } else { SHORT_HIT_WORDS };
-    // SAFETY: by contract the hit has so many words; its field begins at the end of the ray.
+    // SAFETY: by contract the hit has this number of words; its field begins at the end of the ray.
     unsafe {
         (*ray_hit.cast::<Ray>()).tfar = t;
         let to = ray_hit.cast::<u32>().add(RAY_WORDS);

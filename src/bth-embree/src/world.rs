@@ -108,7 +108,7 @@ pub(crate) fn add_places(id: u32, geometry: &Arc<Shared<Geometry>>, places: &mut
         (state.scenes.clone(), count, state.view(BUFFER_INDEX, 0).cloned())
     };
     let meshes: Vec<Option<Arc<Mesh>>> =
-        scenes.iter().map(|scene| scene.as_ref().and_then(|scene| scene.mesh())).collect();
+        scenes.iter().map(|scene| scene.as_ref()?.triangles()?.downcast().ok()).collect();
     let mask = geometry.mask.load(Relaxed);
     for index in 0..count {
         let scene = match &which {

@@ -443,7 +443,8 @@ fn point_queries_show_the_closest_first() {
         let mut context = PointContext([0; 64]);
         let mut shown: Vec<u32> = Vec::new();
         let mut query = PointQuery { point: [1.25, 1.0, 5.0], time: 0.0, radius: f32::INFINITY };
-        let function = std::mem::transmute::<*const (), _>(point as *const ());
+        type Function = unsafe extern "C" fn(*mut bth_embree::abi::PointQueryArguments) -> bool;
+        let function = std::mem::transmute::<*const (), Function>(point as *const ());
         let user = (&raw mut shown).cast();
         let changed = rtcPointQuery(
             scene,

@@ -6,7 +6,7 @@ use crate::abi::*;
 use crate::buffer::{Buffer, View};
 use crate::device::{Device, report_without_device};
 use crate::error::{Result, argument, operation, unsupported};
-use crate::geometry::Geometry;
+use crate::geometry::{Geometry, Instanced};
 use crate::handles::{Shared, borrow, give, is_ours, release, retain};
 use crate::interpolate;
 use crate::scene::Scene;
@@ -141,7 +141,7 @@ exports! {
         Ok(())
     }
 
-    /// Sets the mask that is compared with those of rays.
+    /// Sets the mask that is compared with the masks of rays.
     fn rtcSetGeometryMask(geometry: Geometry, mask: u32) {
         set!(geometry, rtcSetGeometryMask(mask));
         let _changed = geometry.change();
@@ -277,7 +277,7 @@ exports! {
         if scenes.is_null() {
             return argument("scenes must not be null");
         }
-        // SAFETY: it is not null, so by contract it has so many elements.
+        // SAFETY: it is not null, so by contract it has `count` elements.
         set_scenes(geometry, unsafe { std::slice::from_raw_parts(scenes, count) })
     }
 
@@ -334,11 +334,13 @@ fn set_scenes(geometry: &Geometry, handles: &[Handle]) -> Result<()> {
     }
     let mut scenes = Vec::with_capacity(handles.len());
     for handle in handles {
-        // SAFETY: by contract the handles are null or live.
-        scenes.push(match handle.is_null() {
-            true => None,
-            false => Some(Arc::clone(&*unsafe { borrow::<Scene>(*handle)? })),
-        });
+        if handle.is_null() {
+            scenes.push(None);
+            continue;
+        }
+        // SAFETY: by contract the handle lives.
+        let scene: Arc<Shared<Scene>> = Arc::clone(&*unsafe { borrow::<Scene>(*handle)? });
+        scenes.push(Some(scene as Arc<dyn Instanced>));
     }
     geometry.change().scenes = scenes;
     Ok(())

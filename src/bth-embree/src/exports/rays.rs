@@ -5,6 +5,7 @@
 use crate::abi::*;
 use crate::device::report_without_device;
 use crate::fallback::{Functions, functions};
+use crate::geometry::Instanced;
 use crate::handles::{Shared, is_ours, object};
 use crate::points::{self, Asked};
 use crate::scene::Scene;

@@ -5,7 +5,7 @@ use super::exports;
 use crate::abi::*;
 use crate::device::{Callback, Device, lock, report_without_device};
 use crate::error::{argument, operation};
-use crate::geometry::Geometry;
+use crate::geometry::{Geometry, Instanced};
 use crate::handles::{Shared, address, borrow, give, release, retain};
 use crate::scene::Scene;
 use std::ffi::c_void;

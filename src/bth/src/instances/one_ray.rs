@@ -76,8 +76,8 @@ impl World {
         (best, steps)
     }
 
-    /// Stores the nearest hit of a ray in all instances that it `enters`; `trace` stores that in one,
-    /// given the nearest so far.
+    /// Stores the nearest hit of a ray in all instances that it `enters`; `trace` stores that in
+    /// one, given the nearest so far.
     #[inline(always)]
     pub(crate) fn nearest_by(
         &self,

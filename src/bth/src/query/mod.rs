@@ -277,8 +277,8 @@ pub(crate) fn may_be_in_range(t: [f64; 2], tmin: f32, limit: f64) -> bool {
     t[0] <= limit && reaches((t[1] as f32).next_up(), tmin)
 }
 
-/// Returns true if t is at least `tmin`; neither is NaN. The bits are compared: some processors take
-/// a hundred cycles where one of two floats is denormal, as `tmin` is where rays exclude 0.
+/// Returns true if t is at least `tmin`; neither is NaN. The bits are compared: some processors
+/// take a hundred cycles where one of two floats is denormal, as `tmin` is where rays exclude 0.
 #[inline(always)]
 fn reaches(t: f32, tmin: f32) -> bool {
     let ordered = |x: f32| {

@@ -3,6 +3,7 @@
 import argparse
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -50,24 +51,34 @@ def library(options):
     return path
 
 
-def environment(options, real, ours=None):
+def environment(options, real, ours=None, statistics=False):
     """Variables for a program that calls the library: `real` answers what it does not hold."""
-    variables = {name: value for name, value in os.environ.items() if not name.startswith("LD_")}
+    variables = {name: value for name, value in os.environ.items() if not name.startswith(("LD_", "BTH_EMBREE_"))}
     if ours:
         variables["BTH_EMBREE_FALLBACK"] = "none" if options.fallback == "forbidden" else str(real)
+    if ours and statistics:
         variables["BTH_EMBREE_STATISTICS"] = "1"
     return variables
 
 
-def preloaded(options, real, ours):
-    """The same, with our library in front of the one that the program brings."""
-    variables = environment(options, real, ours)
-    if ours:
-        variables["LD_PRELOAD"] = str(ours)
-    return variables
+def preloaded(options, real, ours, front=None, statistics=False):
+    """The same, with our library before the one that the program brings, and a library in C before both."""
+    variables = environment(options, real, ours, statistics)
+    # What is in front looks for the next library, and finds only those that are preloaded.
+    libraries = [front, ours or real] if front else [ours] if ours else []
+    return variables | {"LD_PRELOAD": ":".join(map(str, libraries))} if libraries else variables
 
 
-def share(text):
-    """The share of rays that the library answered itself, in its statistics; None without any."""
-    counts = re.search(r"^rays\s+(\d+)\s+(\d+)", text, re.M)
-    return int(counts[1]) / max(1, int(counts[1]) + int(counts[2])) if counts else None
+def in_front(folder, function):
+    """A library to preload in front, made of one function in C that calls NEXT; None without a C compiler."""
+    out = Path(folder) / "front.so"
+    text = f"#define _GNU_SOURCE\n#include <dlfcn.h>\n#include <stdio.h>\n#define NEXT(name) dlsym(RTLD_NEXT, name)\n{function}"
+    made = shutil.which("cc") and not subprocess.run(
+        ["cc", "-O2", "-shared", "-fPIC", "-x", "c", "-", "-o", out], input=text, text=True, check=False).returncode
+    return out if made else None
+
+
+def counted(kind, text):
+    """Answers by the library and by Embree, in the statistics that the library printed."""
+    found = re.search(rf"^{kind}\s+(\d+)\s+\S+\s+(\d+)", text, re.M)
+    return (int(found[1]), int(found[2])) if found else None

@@ -162,8 +162,8 @@ static void make_sets(Library *library, uint32_t count, bool inside) {
         sets[i].rays = aligned_alloc(64, ((size_t)count * 2 * sizeof(Ray) + 63) / 64 * 64);
         sets[i].own = i >= BOUNCE ? calloc(count * 2, 4) : NULL;
     }
-    V eye = inside ? center : add(center, scale(unit((V){0.8f, 0.5f, 1}), diagonal * 1.2f));
-    camera(&sets[CAMERA], eye, inside ? add(center, (V){size.x, size.y * 0.1f, size.z}) : center, inside ? 0.7f : 0.36f, count);
+    V eye = inside ? center : add(center, scale(unit((V){0.8f, 0.5f, 1}), diagonal));
+    camera(&sets[CAMERA], eye, inside ? add(center, (V){size.x, size.y * 0.1f, size.z}) : center, inside ? 0.7f : 0.26f, count);
     V light = inside ? eye : add(center, scale((V){0.4f, 1.1f, 0.9f}, diagonal));
     uint32_t near = 0;
     float nearest = INFINITY;

@@ -29,7 +29,7 @@ fn output_of(command: &mut Command) -> String {
 
 /// A folder with the libraries installed and then moved, as by a package manager.
 fn installed(folder: &Path) -> PathBuf {
-    let built = bth_tests::built(&["bth-capi", "bth-compile-capi"]);
+    let built = bth_tests::built(&["bth-capi", "bth-compile-capi", "bth-embree"]);
     let prefix = folder.join("moved");
     let mut install = Command::new(root().join("tools/package/install"));
     output_of(install.arg("/usr").env("DESTDIR", folder).env("BTH_INSTALL_FROM", built));
@@ -110,7 +110,7 @@ fn programs_find_the_libraries_by_pkg_config() {
 
 #[test]
 fn folders_start_where_the_scripts_are_started() {
-    let built = bth_tests::built(&["bthc", "bth-play", "bth-scenes", "bth-capi", "bth-compile-capi"]);
+    let built = bth_tests::built(&["bthc", "bth-play", "bth-scenes", "bth-capi", "bth-compile-capi", "bth-embree"]);
     let folder = tempfile::tempdir().expect("a temporary folder");
     let script = |name: &str, arguments: &[&str]| {
         let mut script = Command::new(root().join("tools/package").join(name));
@@ -142,7 +142,7 @@ fn folders_start_where_the_scripts_are_started() {
 
 /// Packs packages for Debian into a folder: their names without version, and their paths.
 fn pack_debian_packages(folder: &Path) -> Vec<(String, PathBuf)> {
-    let built = bth_tests::built(&["bthc", "bth-play", "bth-scenes", "bth-capi", "bth-compile-capi"]);
+    let built = bth_tests::built(&["bthc", "bth-play", "bth-scenes", "bth-capi", "bth-compile-capi", "bth-embree"]);
     let mut pack = Command::new(root().join("tools/package/debian"));
     // Programs of debug builds are large, and the usual compression takes half a minute for them.
     pack.envs([("DPKG_DEB_COMPRESSOR_TYPE", "gzip"), ("DPKG_DEB_COMPRESSOR_LEVEL", "1")]);

@@ -81,8 +81,11 @@ impl Shared<Scene> {
                 let (quality, device) = (self.effort(), &*self.device);
                 let build = Build { quality, allows_argument_filter, device, monitor: &monitor };
                 let make = || Mesh::build(sources, &build);
-                let (mesh, was_cached) =
-                    self.device.pool.as_ref().map_or_else(make, |pool| pool.install(make))?;
+                // A single hand-over to a thread of a pool: each parallel loop would need its own.
+                let (mesh, was_cached) = match &self.device.pool {
+                    Some(pool) => pool.install(make)?,
+                    None => rayon::scope(|_| make())?,
+                };
                 if was_cached {
                     count(Kind::CachedCommits, Who::Bth, 1);
                 }

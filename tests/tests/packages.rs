@@ -110,7 +110,8 @@ fn programs_find_the_libraries_by_pkg_config() {
 
 #[test]
 fn folders_start_where_the_scripts_are_started() {
-    let built = bth_tests::built(&["bthc", "bth-play", "bth-scenes", "bth-capi", "bth-compile-capi", "bth-embree"]);
+    let built =
+        bth_tests::built(&["bthc", "bth-play", "bth-scenes", "bth-capi", "bth-compile-capi", "bth-embree"]);
     let folder = tempfile::tempdir().expect("a temporary folder");
     let script = |name: &str, arguments: &[&str]| {
         let mut script = Command::new(root().join("tools/package").join(name));
@@ -142,7 +143,8 @@ fn folders_start_where_the_scripts_are_started() {
 
 /// Packs packages for Debian into a folder: their names without version, and their paths.
 fn pack_debian_packages(folder: &Path) -> Vec<(String, PathBuf)> {
-    let built = bth_tests::built(&["bthc", "bth-play", "bth-scenes", "bth-capi", "bth-compile-capi", "bth-embree"]);
+    let built =
+        bth_tests::built(&["bthc", "bth-play", "bth-scenes", "bth-capi", "bth-compile-capi", "bth-embree"]);
     let mut pack = Command::new(root().join("tools/package/debian"));
     // Programs of debug builds are large, and the usual compression takes half a minute for them.
     pack.envs([("DPKG_DEB_COMPRESSOR_TYPE", "gzip"), ("DPKG_DEB_COMPRESSOR_LEVEL", "1")]);

@@ -34,23 +34,9 @@ use crate::write::Content;
 /// # Errors
 /// The errors of [`pipeline::compile`].
 pub fn open(mesh: TriangleMesh<'_>, options: &CompileOptions, monitor: &dyn Monitor) -> Result<bth::Scene> {
-    Ok(open_cached(mesh, options, &Cache::none(), monitor)?.0)
-}
-
-/// Like [`open`], with a cache. Also returns true if the cache had the result.
-///
-/// # Errors
-/// The errors of [`pipeline::compile`].
-pub fn open_cached(
-    mesh: TriangleMesh<'_>,
-    options: &CompileOptions,
-    cache: &Cache<'_>,
-    monitor: &dyn Monitor,
-) -> Result<(bth::Scene, bool)> {
-    let compiled = pipeline::compile_cached(mesh, options, cache, &|_| true, monitor)?;
-    let was_cached = compiled.built.is_none();
-    let no_content = || Error::Internal { code: "BTH-X030", message: "no content was made".to_owned() };
-    Ok((opened(compiled.content.ok_or_else(no_content)?)?, was_cached))
+    let (content, _) =
+        pipeline::compile_cached(mesh, options, &Cache::none(), &|_| true, monitor)?.into_built();
+    opened(content)
 }
 
 /// Compiles a scene of meshes, each with any number of instances; with [`Cache::none`] without a

@@ -127,7 +127,15 @@ impl Tagged for Device {
 
 impl Device {
     /// A device for the configuration that the program gives.
+    ///
+    /// # Errors
+    /// If the cache or the other library that was named cannot be used.
     pub(crate) fn new(text: &str) -> Result<Device, Failure> {
+        Ok(Device { fallback: Fallback::find(text)?, ..Device::without_fallback(text)? })
+    }
+
+    /// The same without another library.
+    pub(crate) fn without_fallback(text: &str) -> Result<Device, Failure> {
         let configuration = Configuration::read(text);
         let store = |folder: &PathBuf| {
             Store::open(folder, bth_cache::DEFAULT_CAP).map_err(|error| Failure {
@@ -137,7 +145,6 @@ impl Device {
         };
         let cache = configuration.cache.as_ref().map(store).transpose()?;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(configuration.threads);
-        let fallback = Fallback::find(text)?;
         Ok(Device {
             errors: Errors::default(),
             verbose: configuration.verbose,
@@ -145,7 +152,7 @@ impl Device {
             on_memory: Mutex::default(),
             pool: if configuration.threads > 0 { pool.build().ok() } else { None },
             cache,
-            fallback,
+            fallback: None,
         })
     }
 

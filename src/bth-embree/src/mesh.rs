@@ -6,17 +6,21 @@ use crate::device::Device;
 use crate::error::{Result, operation};
 use crate::geometry::Geometry;
 use crate::handles::Shared;
-use bth_cache::Store;
+use bth_cache::Pin;
 use bth_compile::cached::Cache;
 use bth_compile::memory::{self, PositionRows, TriangleMesh};
-use bth_compile::pipeline::{CompileOptions, Structure};
+use bth_compile::pipeline::{self, CompileOptions, Structure};
 use bth_compile::{Monitor, bvh};
+use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
 /// Positions from this magnitude on are not hit, nor are those that are not finite: programs rely
 /// on it to hide primitives (`FLT_LARGE` of Embree).
 const TOO_LARGE: f32 = 1.844e18;
+
+/// Triangles that a thread gathers at a time.
+const CHUNK: usize = 1 << 12;
 
 /// What a part of the triangles was made from.
 #[derive(Debug)]
@@ -67,6 +71,8 @@ pub(crate) type Key = Vec<(u32, usize, u64)>;
 pub(crate) struct Mesh {
     /// `None` without triangles that can be hit.
     pub(crate) scene: Option<bth::Scene>,
+    /// The file in the cache that the scene is mapped from.
+    _stored: Option<Pin>,
     parts: Vec<Part>,
     /// By triangle, in the space of the object.
     normals: Vec<[f32; 3]>,
@@ -114,11 +120,11 @@ impl Mesh {
             CompileOptions { structure: Structure::Bvh, geometry: false, ..CompileOptions::default() };
         options.bvh.quality = build.quality;
         let mesh = TriangleMesh { positions: PositionRows::F32(&positions), triangles: &triangles };
-        let cache = build.device.cache.as_ref().map_or_else(Cache::none, of_program);
-        let (scene, cached) = memory::open_cached(mesh, &options, &cache, build.monitor)?;
-        let (scene, bounds, allows_argument_filter) =
-            (Some(scene), Some(bounds), build.allows_argument_filter);
-        Ok((Mesh { scene, parts, normals, bounds, key, allows_argument_filter }, cached))
+        let (scene, stored, was_cached) = open(mesh, &options, build)?;
+        let allows_argument_filter = build.allows_argument_filter;
+        let (scene, bounds) = (Some(scene), Some(bounds));
+        let built = Mesh { scene, _stored: stored, parts, normals, bounds, key, allows_argument_filter };
+        Ok((built, was_cached))
     }
 
     pub(crate) fn parts(&self) -> &[Part] {
@@ -174,8 +180,30 @@ impl Part {
     }
 }
 
-fn of_program(store: &Store) -> Cache<'_> {
-    Cache::new(store, "bth-embree")
+/// Compiles triangles and opens the result: with a cache by mapping what it holds, which is kept
+/// from eviction. Also returns true if an earlier commit had built it.
+fn open(
+    mesh: TriangleMesh<'_>,
+    options: &CompileOptions,
+    build: &Build<'_>,
+) -> Result<(bth::Scene, Option<Pin>, bool)> {
+    let Some(store) = &build.device.cache else {
+        return Ok((memory::open(mesh, options, build.monitor)?, None, false));
+    };
+    let cache = Cache::new(store, "bth-embree");
+    let compiled = pipeline::compile_cached(mesh, options, &cache, &|_| false, build.monitor)?;
+    let was_cached = compiled.built.is_none();
+    if let Some(pin) = compiled.record.as_ref().and_then(|record| store.pin(record)) {
+        // SAFETY: files in a cache are written once, under the name of their hash, which was
+        // checked; `pin` keeps this one. The compiler wrote the contents.
+        return Ok((unsafe { bth::map(&pin.path)? }, Some(pin), was_cached));
+    }
+    // The cache could not keep it, or has lost it meanwhile.
+    let scene = match compiled.content {
+        Some(content) => bth::from_bytes(&content.bytes())?,
+        None => memory::open(mesh, options, build.monitor)?,
+    };
+    Ok((scene, None, was_cached))
 }
 
 /// The triangles of some geometries.
@@ -259,23 +287,30 @@ impl Gathered {
         if first + corners.len() > limit {
             return operation(too_many);
         }
-        self.normals.reserve(corners.len());
-        let triangles = &mut self.triangles;
-        triangles.reserve(corners.len());
-        for triangle in corners {
-            let found = usable(triangle, vertices.count, &positions[base..]);
-            // What cannot be hit keeps its number, as a triangle without area at a usable vertex.
-            let (triangle, normal) = match found {
-                Some(points) => {
-                    points.iter().for_each(|point| self.bounds.add(*point));
-                    self.has_area = true;
-                    (triangle.map(|row| row + base as u32), normal(points))
+        let positions = &positions[base..];
+        // What cannot be hit keeps its number, as a triangle without area at a usable vertex.
+        self.triangles.resize(first + corners.len(), [u32::MAX; 3]);
+        self.normals.resize(first + corners.len(), [0.0; 3]);
+        let triangles = self.triangles[first..].par_chunks_mut(CHUNK);
+        let rows = corners.par_chunks(CHUNK).zip(triangles.zip(self.normals[first..].par_chunks_mut(CHUNK)));
+        let join = |mut a: Bounds, b: Bounds| {
+            a.join(&b);
+            a
+        };
+        let bounds = rows.map(|(rows, (triangles, normals))| {
+            let mut bounds = Bounds::EMPTY;
+            for ((row, triangle), of_triangle) in rows.iter().zip(triangles).zip(normals) {
+                if let Some(points) = usable(*row, positions) {
+                    points.iter().for_each(|point| bounds.add(*point));
+                    *triangle = row.map(|row| row + base as u32);
+                    *of_triangle = normal(points);
                 }
-                None => ([u32::MAX; 3], [0.0; 3]),
-            };
-            triangles.push(triangle);
-            self.normals.push(normal);
-        }
+            }
+            bounds
+        });
+        let bounds = bounds.reduce(Bounds::default, join);
+        self.has_area |= bounds.lower[0] <= bounds.upper[0];
+        self.bounds.join(&bounds);
         self.fill_unusable(first);
         self.parts.push(Part {
             first: first as u32,
@@ -316,8 +351,8 @@ fn is_in_range(point: [f32; 3]) -> bool {
 }
 
 /// The corners of a triangle, if they exist and are in range.
-fn usable(triangle: [u32; 3], count: usize, positions: &[[f32; 3]]) -> Option<[[f32; 3]; 3]> {
-    let exists = triangle.iter().all(|row| (*row as usize) < count);
+fn usable(triangle: [u32; 3], positions: &[[f32; 3]]) -> Option<[[f32; 3]; 3]> {
+    let exists = triangle.iter().all(|row| (*row as usize) < positions.len());
     let points = exists.then(|| triangle.map(|row| positions[row as usize]))?;
     points.iter().all(|point| is_in_range(*point)).then_some(points)
 }
@@ -328,4 +363,31 @@ fn normal([a, b, c]: [[f32; 3]; 3]) -> [f32; 3] {
     let (p, q): ([f64; 3], [f64; 3]) =
         (std::array::from_fn(|k| b[k] - a[k]), std::array::from_fn(|k| c[k] - a[k]));
     [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]].map(|x| x as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_second_start_maps_what_the_first_has_built() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let text = format!("bth_cache={}", folder.path().display());
+        let positions: Vec<[f32; 3]> =
+            (0..50).map(|i| [i as f32, (i * i % 7) as f32, (i % 3) as f32]).collect();
+        let triangles: Vec<[u32; 3]> = (0..48).map(|i| [i, i + 1, i + 2]).collect();
+        let mesh = TriangleMesh { positions: PositionRows::F32(&positions), triangles: &triangles };
+        let ray = bth::rays::Ray::new([1.0, 1.625, 9.0], [0.0, 0.0, -1.0]);
+        let mut hits = Vec::new();
+        for start in 0..2 {
+            let device = Device::without_fallback(&text).expect("a device");
+            let (quality, monitor) = (bvh::Quality::Fast, &bth_compile::Silent);
+            let build = Build { quality, allows_argument_filter: false, device: &device, monitor };
+            let (scene, stored, was_cached) =
+                open(mesh, &CompileOptions::default(), &build).expect("a scene");
+            assert_eq!((was_cached, stored.is_some()), (start == 1, true));
+            hits.push(scene.nearest(&ray).expect("a hit"));
+        }
+        assert_eq!(hits[0], hits[1]);
+    }
 }

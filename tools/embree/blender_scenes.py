@@ -78,7 +78,9 @@ def modifiers():
     ground()
     for index, (color, (at, size, turn)) in enumerate(zip(colors(1), around(10, 3, 1))):
         kinds = [[("SUBSURF", {"render_levels": 3})], [("BEVEL", {"segments": 4, "width": 0.1}), ("ARRAY", {"count": 3})],
-                 [("WIREFRAME", {"thickness": 0.1})], [("SUBSURF", {"render_levels": 2}), ("SOLIDIFY", {"thickness": 0.2}), ("MIRROR", {})]]
+                 [("WIREFRAME", {"thickness": 0.1})],
+                 # Without the cut, both halves would lie in the same place, and which one rays hit would be noise.
+                 [("SUBSURF", {"render_levels": 2}), ("SOLIDIFY", {"thickness": 0.2}), ("MIRROR", {"use_bisect_axis": (True, False, False)})]]
         modified(add(primitive("monkey"), material(color), at, (size * 2,) * 3, turn), *kinds[index % 4])
 
 

@@ -16,12 +16,12 @@ if (given.length > 1 || given[0]?.startsWith("-")) {
 }
 const out = resolve(given[0] ?? join(here, "dist"));
 /** Bytes at most: of the modules as browsers download them, compressed by gzip, and of the page. */
-const MOST_WASM = 450_000, MOST_COMPILER = 300_000, MOST_PAGE = 680_000;
+const MOST_WASM = 450_000, MOST_COMPILER = 300_000, MOST_PAGE = 1_400_000;
 
-/** Compiles the modules; returns the folder that has them. Artifacts with these flags have a folder of their own. */
-function compileModules() {
+/** Compiles packages of modules with features; returns the modules. Artifacts with these flags have a folder of their own. */
+function compiledModules(packages, features = []) {
     const target = join(process.env.CARGO_TARGET_DIR ?? join(root, "target"), "wasm");
-    const arguments_ = ["build", "-p", "bth-js", "-p", "bth-js-compile", "--profile", "wasm", "--target", "wasm32-unknown-unknown", "--target-dir", target];
+    const arguments_ = ["build", ...packages.flatMap((name) => ["-p", name]), "--profile", "wasm", "--target", "wasm32-unknown-unknown", "--target-dir", target];
     // What kernels need is inlined by force; anything else is smaller as a function of its own.
     const small = "llvm-args=-inline-threshold=5";
     // Calls and addresses as short as they are, in place of five bytes each.
@@ -33,8 +33,9 @@ function compileModules() {
     const flags = [...(process.env.RUSTFLAGS ?? "").split(" "), "-C", "target-feature=+simd128", "-C", small, "-C", short, "-C", stack, crates];
     const CARGO_ENCODED_RUSTFLAGS = flags.filter((flag) => flag !== "").join("\x1f");
     // BLAKE3 in plain Rust, so that no C compiler for the target is needed.
-    execFileSync("cargo", [...arguments_, "--features", "bth-format/pure"], { cwd: root, stdio: "inherit", env: { ...process.env, CARGO_ENCODED_RUSTFLAGS } });
-    return join(target, "wasm32-unknown-unknown/wasm");
+    execFileSync("cargo", [...arguments_, "--features", ["bth-format/pure", ...features].join()], { cwd: root, stdio: "inherit", env: { ...process.env, CARGO_ENCODED_RUSTFLAGS } });
+    const folder = join(target, "wasm32-unknown-unknown/wasm");
+    return packages.map((name) => stripped(readFileSync(join(folder, `${name.replaceAll("-", "_")}.wasm`))));
 }
 
 /** A module without its custom sections: the names of functions, which are a fifteenth of it, and what compiled it. */
@@ -67,20 +68,26 @@ function joined(path, seen = new Set()) {
 /** A script as a string in a script of a page. */
 const quoted = (script) => JSON.stringify(script).replaceAll("</", "<\\/").replaceAll("<!--", "<\\!--");
 
-function page(wasm) {
+/** A module as text of a script. */
+const packed = (module) => gzipSync(module, { level: 9 }).toString("base64");
+
+function page(wasm, importer) {
     const worker = joined(join(here, "viewer/worker.js")), main = joined(join(here, "viewer/main.js"));
     const script = `
 const WORKER = ${quoted(worker)};
-const WASM = "${gzipSync(wasm, { level: 9 }).toString("base64")}";
-let url = null, compiled = null;
+const TRACER = "${packed(wasm)}", IMPORTER = "${packed(importer)}";
+let url = null;
 function workerUrl() {
     return (url ??= URL.createObjectURL(new Blob([WORKER], { type: "text/javascript" })));
 }
-function compiledModule() {
-    return (compiled ??= unpacked().then((bytes) => WebAssembly.compile(bytes)));
+const modules = new Map();
+function unpackedModule(text) {
+    if (!modules.has(text)) modules.set(text, unpacked(text).then((bytes) => WebAssembly.compile(bytes)));
+    return modules.get(text);
 }
-function unpacked() {
-    const packed = new Blob([Uint8Array.from(atob(WASM), (c) => c.charCodeAt(0))]);
+const compiledModule = () => unpackedModule(TRACER), compilerModule = () => unpackedModule(IMPORTER);
+function unpacked(text) {
+    const packed = new Blob([Uint8Array.from(atob(text), (c) => c.charCodeAt(0))]);
     return new Response(packed.stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
 }
 ${main.replaceAll("</script", "<\\/script")}`;
@@ -95,12 +102,12 @@ function keep(name, bytes, most, size = bytes.length, how = "") {
 }
 
 mkdirSync(out, { recursive: true });
-const modules = compileModules();
-const [wasm, compiler] = ["bth_js", "bth_js_compile"].map((name) => stripped(readFileSync(join(modules, `${name}.wasm`))));
+const [wasm, compiler] = compiledModules(["bth-js", "bth-js-compile"]);
+const [importer] = compiledModules(["bth-js-compile"], ["bth-js-compile/models"]);
 for (const [name, module, most] of [["bth.wasm", wasm, MOST_WASM], ["compile.wasm", compiler, MOST_COMPILER]]) {
     keep(name, module, most, gzipSync(module, { level: 9 }).length, ` compressed; ${module.length} as they are`);
 }
-keep("viewer.html", page(wasm), MOST_PAGE);
+keep("viewer.html", page(wasm, importer), MOST_PAGE);
 for (const name of JSON.parse(readFileSync(join(here, "package.json"))).files.filter((name) => /\.(js|d\.ts)$/.test(name))) copyFileSync(join(here, name), join(out, name));
 copyFileSync(join(here, "package.json"), join(out, "package.json"));
 for (const name of ["LICENSE-MIT", "LICENSE-APACHE"]) copyFileSync(join(root, name), join(out, name));

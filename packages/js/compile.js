@@ -31,13 +31,18 @@ export class Compiler {
         const words = new Uint32Array(memory.buffer, triangles, corners);
         if (indices) words.set(indices);
         else for (let i = 0; i < corners; i++) words[i] = i;
-        const length = wasm.bth_compile(at, count, isWide ? 1 : 0, triangles, corners / 3, deformable ? 1 : 0);
-        const bytes = new Uint8Array(memory.buffer, wasm.bth_bytes() >>> 0, Math.abs(length));
-        if (length < 0) throw new BthError(new TextDecoder().decode(bytes));
-        const warnings = new Uint8Array(memory.buffer, wasm.bth_warnings() >>> 0, wasm.bth_warnings_length());
-        for (const line of new TextDecoder().decode(warnings).split("\n").filter(Boolean)) onWarning(line);
-        return bytes.slice();
+        return made(wasm, wasm.bth_compile(at, count, isWide ? 1 : 0, triangles, corners / 3, deformable ? 1 : 0), onWarning);
     }
+}
+
+/** What a call of the module has made: a negative length is of the text of an error. */
+export function made(wasm, length, onWarning) {
+    const { buffer } = wasm.memory;
+    const bytes = new Uint8Array(buffer, wasm.bth_bytes() >>> 0, Math.abs(length));
+    if (length < 0) throw new BthError(new TextDecoder().decode(bytes));
+    const warnings = new Uint8Array(buffer, wasm.bth_warnings() >>> 0, wasm.bth_warnings_length());
+    for (const line of new TextDecoder().decode(warnings).split("\n").filter(Boolean)) onWarning(line);
+    return bytes.slice();
 }
 
 /** Refuses arrays that are no mesh. Indices beyond the positions are the compiler's error. */

@@ -4,9 +4,9 @@
 //! Nothing is freed: the caller compiles one mesh and drops the module's instance with its memory.
 #![allow(unsafe_code)] // All functions are called from outside and take addresses.
 
-use bth_compile::Monitor;
 use bth_compile::memory::{PositionRows, TriangleMesh};
-use bth_compile::pipeline::compile_fast;
+use bth_compile::pipeline::{Compiled, compile_fast};
+use bth_compile::{Monitor, Result};
 use std::sync::Mutex;
 
 /// What a call leaves: the file, or the text of an error.
@@ -56,7 +56,32 @@ pub unsafe extern "C" fn bth_compile(
         };
         TriangleMesh { positions, triangles: std::slice::from_raw_parts(triangles, triangle_count) }
     };
-    let (bytes, sign) = match compile_fast(mesh, deformable == 1, &Warnings) {
+    keep(compile_fast(mesh, deformable == 1, &Warnings))
+}
+
+/// Compiles a model file, as [`bth_compile`] a mesh. Its name is UTF-8; the extension decides about
+/// the format.
+///
+/// # Safety
+/// `name` and `file` point to arrays of these lengths.
+#[cfg(feature = "models")]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_compile_model(
+    name: *const u8,
+    name_length: usize,
+    file: *const u8,
+    length: usize,
+) -> f64 {
+    // SAFETY: by contract the addresses belong to arrays of these lengths.
+    let (name, file) =
+        unsafe { (std::slice::from_raw_parts(name, name_length), std::slice::from_raw_parts(file, length)) };
+    let name = String::from_utf8_lossy(name);
+    keep(bth_compile::pipeline::compile_model_fast(std::path::Path::new(&*name), file, &Warnings))
+}
+
+/// Keeps what was made. Returns its length, negative for an error.
+fn keep(made: Result<Compiled>) -> f64 {
+    let (bytes, sign) = match made {
         Ok(compiled) => (compiled.bytes, 1.0),
         Err(error) => (error.to_string().into_bytes(), -1.0),
     };

@@ -7,7 +7,7 @@ import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { mkdirSync, mkdtempSync, readFileSync, rmSync, truncateSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
-import { dirname, join, resolve } from "node:path";
+import { basename, dirname, join, resolve } from "node:path";
 import { after, before, test } from "node:test";
 import { fileURLToPath, pathToFileURL } from "node:url";
 import { Browser } from "./browser.mjs";
@@ -73,7 +73,7 @@ async function looksAs(name) {
 }
 
 test("a dropped file is shown", async () => {
-    assert.match(await browser.value("document.getElementById('message').textContent"), /Drop a .bth file/);
+    assert.match(await browser.value("document.getElementById('message').textContent"), /Drop a .bth file or a model/);
     await browser.drop(model, WIDTH / 2, HEIGHT / 2);
     await browser.until("/4 of 4 samples/.test(document.getElementById('status').textContent)");
     assert.match(await browser.value("document.getElementById('status').textContent"), /^knot\.bth · 2,880 triangles .* workers?$/);
@@ -96,6 +96,38 @@ test("materials are shown with their textures and holes", async () => {
     // Of several files the first is shown, which is said.
     await browser.drop([broken, model], WIDTH / 2, HEIGHT / 2);
     await browser.until("/^broken.bth .the first of 2 files. .*4 of 4 samples .* 1 image the browser cannot decode/.test(document.getElementById('status').textContent)");
+    await browser.drop(model, WIDTH / 2, HEIGHT / 2);
+    await browser.until("/^knot.bth .*4 of 4 samples/.test(document.getElementById('status').textContent)");
+});
+
+test("models are compiled in the page and look as when bthc compiles them", async () => {
+    const [binary, text] = ["quads.glb", "quads.gltf"].map((name) => join(folder, name));
+    const json = Buffer.from(quads().padEnd(Math.ceil(quads().length / 4) * 4)), head = Buffer.alloc(20);
+    [0x46546c67, 2, 20 + json.length, json.length, 0x4e4f534a].forEach((word, i) => head.writeUInt32LE(word, 4 * i));
+    writeFileSync(binary, Buffer.concat([head, json]));
+    writeFileSync(text, quads());
+    for (const file of [binary, text]) {
+        await browser.drop(file, WIDTH / 2, HEIGHT / 2);
+        await browser.until(`document.getElementById('status').textContent.startsWith("${basename(file)} ")`);
+        await looksAs("textures");
+    }
+    const meshes = { obj: "mtllib absent.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n", off: "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n" };
+    meshes.stl = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n";
+    for (const [extension, model] of Object.entries(meshes)) {
+        const file = join(folder, `one.${extension}`);
+        writeFileSync(file, model);
+        await browser.drop(file, WIDTH / 2, HEIGHT / 2);
+        const warning = extension === "obj" ? "2 warnings: .*absent.mtl.*left out" : "workers?$";
+        await browser.until(`/^one.${extension} · 1 triangle .*4 of 4 samples .*${warning}/.test(document.getElementById('status').textContent)`);
+    }
+    await browser.drop(join(folder, "knot.ply"), WIDTH / 2, HEIGHT / 2);
+    await browser.until("/^knot.ply · 2,880 triangles .*4 of 4 samples/.test(document.getElementById('status').textContent)");
+    await looksAs("shaded");
+    const broken = join(folder, "broken.ply");
+    writeFileSync(broken, "ply\nformat ascii 1.0\nelement vertex 3\n");
+    await browser.drop(broken, WIDTH / 2, HEIGHT / 2);
+    await browser.until("/^broken.ply: .*BTH-I/.test(document.getElementById('message').textContent)");
+    await hidesMessage();
     await browser.drop(model, WIDTH / 2, HEIGHT / 2);
     await browser.until("/^knot.bth .*4 of 4 samples/.test(document.getElementById('status').textContent)");
 });

@@ -2,7 +2,8 @@
 
 import { cameraOf, contains, firstView, shifted, turned, zoomed, directionThrough } from "./camera.js";
 import { Picture } from "./picture.js";
-import { Pool } from "./pool.js";
+import { isModel } from "./models.js";
+import { Pool, compileModel } from "./pool.js";
 import { add, length } from "./vectors.js";
 
 /** Pixels of a tile's side, and how many pixels of the picture one of a coarse picture covers. */
@@ -17,7 +18,7 @@ const element = (id) => document.getElementById(id);
 const canvas = element("picture"), status = element("status"), message = element("message");
 
 /** What is shown: the workers, what the file holds, the view, the mode, and what is known of the point that was last looked at. */
-const shown = { pool: null, content: null, name: "", view: null, mode: "shaded", up: "y", picked: "" };
+const shown = { pool: null, content: null, name: "", warnings: [], view: null, mode: "shaded", up: "y", picked: "" };
 /** Grows with every change, so that work for an older state is dropped. */
 let state = 0;
 let picture = null;
@@ -37,8 +38,14 @@ export async function open(file, name) {
     const number = ++last;
     say("Opening …");
     try {
-        const bytes = await file;
+        let bytes = await file, warnings = [];
         if (number !== last) return;
+        if (isModel(name)) {
+            say("Compiling …");
+            ({ bytes, warnings } = await compileModel(workerUrl(), await compilerModule(), name, bytes));
+            if (number !== last) return;
+            for (const warning of warnings) console.warn(warning);
+        }
         const opened = await Pool.open(workerUrl(), await compiledModule(), bytes);
         if (number !== last) return opened.pool.end();
         if (!opened.content.bounds && !isMoving(opened.content)) {
@@ -46,7 +53,7 @@ export async function open(file, name) {
             throw new Error("there is nothing to see in this file");
         }
         shown.pool?.end();
-        Object.assign(shown, opened, { name, view: null });
+        Object.assign(shown, opened, { name, warnings, view: null });
         showTime();
         // That of another file would stay until there is a sample of each pixel.
         status.textContent = name;
@@ -78,7 +85,7 @@ export function whenSettled() {
 
 function say(text) {
     failed = false;
-    message.textContent = text || (shown.content ? "" : "Drop a .bth file here");
+    message.textContent = text || (shown.content ? "" : "Drop a .bth file or a model here");
     message.hidden = message.textContent === "";
 }
 
@@ -167,7 +174,7 @@ function pixels() {
 }
 
 function report(samples, milliseconds, { mode, size }) {
-    const { content, pool, name } = shown;
+    const { content, pool, name, warnings } = shown;
     const counted = (n, thing) => `${n.toLocaleString("en")} ${thing}${n === 1 ? "" : "s"}`;
     const rate = (samples * size.width * size.height) / milliseconds / 1000;
     const parts = [
@@ -178,6 +185,7 @@ function report(samples, milliseconds, { mode, size }) {
         `${rate.toFixed(2)} million pixels a second`,
         counted(pool.size, "worker"),
         content.undecoded > 0 ? `${counted(content.undecoded, "image")} the browser cannot decode` : "",
+        warnings.length > 0 ? `${counted(warnings.length, "warning")}: ${warnings[0]}` : "",
         mode === "steps" ? `brightest: ${counted(picture.mostSteps, "step")}` : "",
         shown.picked,
     ];

@@ -41,6 +41,16 @@ class Helper {
     }
 }
 
+/** Compiles a model file in a worker of its own, whose memory ends with it. */
+export async function compileModel(url, module, name, file) {
+    const helper = new Helper(url);
+    try {
+        return await helper.ask("compile", { module, name, file }, [file]);
+    } finally {
+        helper.end();
+    }
+}
+
 /** The workers of an open file. */
 export class Pool {
     #helpers = [];

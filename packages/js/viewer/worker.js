@@ -2,6 +2,7 @@
 
 import { load } from "../index.js";
 import { materialsOf } from "./materials.js";
+import { compiledModel } from "./models.js";
 import { shadeTile } from "./shading.js";
 
 let bth = null;
@@ -19,6 +20,9 @@ const answers = {
         materials = await materialsOf(scene);
         const { objects, instances, triangles, frames, bounds } = scene;
         return { objects, instances, triangles, frames, bounds, undecoded: materials.undecoded };
+    },
+    compile({ module, name, file }) {
+        return compiledModel(module, name, file);
     },
     seconds({ seconds }) {
         scene.seconds = seconds;

@@ -141,8 +141,20 @@ pub fn import_gltf_cutouts(
 /// # Errors
 /// The same as [`import`].
 pub fn import_images(path: &Path, looks: Looks, monitor: &dyn Monitor) -> Result<Vec<ImageFile>> {
-    let data = read_file(path)?;
-    let source = Source::new(path, &data, monitor);
+    import_images_bytes(path, &read_file(path)?, looks, monitor)
+}
+
+/// Does the same as [`import_images`] with the bytes of a file.
+///
+/// # Errors
+/// The same as [`import_images`].
+pub fn import_images_bytes(
+    name: &Path,
+    data: &[u8],
+    looks: Looks,
+    monitor: &dyn Monitor,
+) -> Result<Vec<ImageFile>> {
+    let source = Source::new(name, data, monitor);
     (format(&source)?.images)(&source, looks)
 }
 

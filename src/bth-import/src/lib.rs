@@ -47,7 +47,7 @@ pub use gltf::GltfPart;
 pub use groups::{Group, Groups};
 pub use import::{
     import, import_bytes, import_cutouts, import_cutouts_bytes, import_gltf_cutouts, import_gltf_parts,
-    import_gltf_parts_bytes, import_images,
+    import_gltf_parts_bytes, import_images, import_images_bytes,
 };
 pub use materials::{ImageFile, Looks, Materials, NO_GLOSS, PLAIN, Unreadable};
 pub use memory::{MEMORY_FORMAT, PositionRows, import_triangles};

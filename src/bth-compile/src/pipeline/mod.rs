@@ -27,7 +27,7 @@ mod tree;
 pub use crate::options::{CompileOptions, MotionOptions, Structure};
 pub use crate::stage::StageTime;
 pub use compile::{CachedCompilation, CompileInput, DryRun, compile, compile_cached, dry_run};
-pub use direct::compile_fast;
+pub use direct::{compile_fast, compile_model_fast, fast_model};
 pub use limit::storage;
 pub use object::{Compiled, assemble};
 pub use report::{CompileReport, FileReport, MotionReport};

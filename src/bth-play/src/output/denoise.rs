@@ -24,19 +24,38 @@ const DARKEST: f64 = 1e-6;
 /// A difference that nobody sees, relative to the light.
 const TINY: f32 = 1e-4;
 
+/// Differences from which on the weight of a neighbour is zero in f32.
+const TOO_DIFFERENT: f32 = 104.0;
+
 /// Light without the albedo of the surface, and how much it varies.
 #[derive(Clone, Copy)]
 struct Pixel {
     light: Vec3,
-    /// Variance of its luminance.
+    luminance: f32,
+    /// Variance of the luminance.
     variance: f32,
 }
 
-/// The neighbour of a pixel, if it lies in the picture.
-fn neighbour(at: usize, (width, height): (usize, usize), dx: i64, dy: i64) -> Option<usize> {
-    let (x, y) = ((at % width) as i64 + dx, (at / width) as i64 + dy);
-    ((0..width as i64).contains(&x) && (0..height as i64).contains(&y))
-        .then(|| y as usize * width + x as usize)
+/// Calls `visit` with the pixels that are up to `reach` steps of `far` pixels away along each axis
+/// and lie in the picture, row by row, and with their steps.
+#[inline(always)]
+fn neighbours(
+    at: usize,
+    (width, height): (usize, usize),
+    (reach, far): (i64, i64),
+    mut visit: impl FnMut(usize, i64, i64),
+) {
+    let (x, y, width, height) = ((at % width) as i64, (at / width) as i64, width as i64, height as i64);
+    for (dy, row) in
+        (-reach..=reach).map(|dy| (dy, y + dy * far)).filter(|(_, row)| (0..height).contains(row))
+    {
+        for dx in -reach..=reach {
+            let column = x + dx * far;
+            if (0..width).contains(&column) {
+                visit((row * width + column) as usize, dx, dy);
+            }
+        }
+    }
 }
 
 /// What light is divided by: colours of textures are no noise.
@@ -47,14 +66,15 @@ fn albedo(mean: &Shaded) -> Vec3 {
 /// Replaces the colours of a picture; each pixel is the mean of `samples` samples.
 pub(super) fn filter(means: &mut [Shaded], size: (u32, u32), samples: u32) {
     let size = (size.0 as usize, size.1 as usize);
-    let around = |at: usize, far: i64| {
-        let steps = move |k: i64| (k % 3 - 1, k / 3 - 1);
-        (0..9).map(steps).filter_map(move |(dx, dy)| neighbour(at, size, dx * far, dy * far))
-    };
     // A pixel that is brighter than all around it is a speck.
     let brightest = |at: usize| {
-        let others = around(at, 1).filter(|other| *other != at).map(|other| luminance(means[other].color));
-        others.fold(0.0, f64::max)
+        let mut most = 0.0f64;
+        neighbours(at, size, (1, 1), |other, dx, dy| {
+            if (dx, dy) != (0, 0) {
+                most = most.max(luminance(means[other].color));
+            }
+        });
+        most
     };
     let pixel = |at: usize| {
         let mean = &means[at];
@@ -63,34 +83,39 @@ pub(super) fn filter(means: &mut [Shaded], size: (u32, u32), samples: u32) {
         let kept = if own > limit { (limit / own) as f32 } else { 1.0 };
         let by = luminance(albedo(mean)).max(0.02) as f32;
         let variance = (mean.square - (own * own) as f32).max(0.0) / samples.max(1) as f32;
-        Pixel { light: mean.color * kept / albedo(mean), variance: variance * kept * kept / (by * by) }
+        let light = mean.color * kept / albedo(mean);
+        Pixel { light, luminance: luminance(light) as f32, variance: variance * kept * kept / (by * by) }
     };
     let mut pixels: Vec<Pixel> = (0..means.len()).into_par_iter().map(pixel).collect();
     for pass in 0..PASSES {
         let far = 1i64 << pass;
         let filtered = |at: usize| {
-            let here = &pixels[at];
-            let (mean, own) = (&means[at], luminance(here.light) as f32);
-            let sum: f32 = around(at, 1).map(|other| pixels[other].variance).sum();
-            let deviation =
-                (sum / around(at, 1).count() as f32).sqrt() * DEVIATIONS + TINY * own + DARKEST as f32;
+            let (mean, own) = (&means[at], pixels[at].luminance);
+            let (mut sum, mut count) = (0.0, 0);
+            neighbours(at, size, (1, 1), |other, _, _| {
+                sum += pixels[other].variance;
+                count += 1;
+            });
+            let deviation = (sum / count as f32).sqrt() * DEVIATIONS + TINY * own + DARKEST as f32;
             let (mut light, mut variance, mut total) = (Vec3::ZERO, 0.0, 0.0);
-            for k in 0..25i64 {
-                let (dx, dy) = (k % 5 - 2, k / 5 - 2);
-                let Some(other) = neighbour(at, size, dx * far, dy * far) else { continue };
+            neighbours(at, size, (2, far), |other, dx, dy| {
                 let (there, of) = (&pixels[other], &means[other]);
                 // Pixels with equal shares of an edge have equal means, too.
                 let turned = (mean.normal - of.normal).length_squared() / (NORMAL * NORMAL);
                 let color = (mean.albedo - of.albedo).abs().max_element() / ALBEDO;
-                let differs = (own - luminance(there.light) as f32).abs() / deviation;
+                let difference = (own - there.luminance).abs() / deviation + turned + color * color;
                 let near = KERNEL[dx.unsigned_abs() as usize] * KERNEL[dy.unsigned_abs() as usize];
-                let weight = near * (-differs - turned - color * color).exp();
-                let weight = if other == at { near } else { weight };
+                let weight = match difference {
+                    _ if other == at => near,
+                    large if large > TOO_DIFFERENT => return,
+                    small => near * (-small).exp(),
+                };
                 light += there.light * weight;
                 variance += there.variance * weight * weight;
                 total += weight;
-            }
-            Pixel { light: light / total, variance: variance / (total * total) }
+            });
+            let light = light / total;
+            Pixel { light, luminance: luminance(light) as f32, variance: variance / (total * total) }
         };
         pixels = (0..pixels.len()).into_par_iter().map(filtered).collect();
     }

@@ -25,6 +25,8 @@ pub(crate) struct Sky {
     towards: DVec3,
     /// Radiance of the disc of the sun; zero where lights of the scene take its place.
     sun: Vec3,
+    /// Radiance in the middle of the disc of the sun, with the air in front of it.
+    middle: Vec3,
     /// Radiance of the earth below the horizon, which reflects as the ground does.
     earth: Vec3,
     /// For luminance Y and chromaticities x and y: the value at the zenith over the distribution
@@ -32,10 +34,10 @@ pub(crate) struct Sky {
     channels: [(f64, [f64; 5]); 3],
 }
 
-/// The distribution F of the paper, for the cosine of the angle to the zenith and the angle to the
-/// sun.
-fn distribution([a, b, c, d, e]: [f64; 5], cosine: f64, angle: f64) -> f64 {
-    (1.0 + a * (b / cosine).exp()) * (1.0 + c * (d * angle).exp() + e * angle.cos().powi(2))
+/// The distribution F of the paper, for the cosine of the angle to the zenith, and the angle to the
+/// sun with its cosine.
+fn distribution([a, b, c, d, e]: [f64; 5], cosine: f64, (angle, of_sun): (f64, f64)) -> f64 {
+    (1.0 + a * (b / cosine).exp()) * (1.0 + c * (d * angle).exp() + e * of_sun * of_sun)
 }
 
 impl Sky {
@@ -84,9 +86,10 @@ impl Sky {
                 -0.0109 * t + 0.0529,
             ],
         ];
-        let channel = |k: usize| (zenith[k] / distribution(shapes[k], 1.0, angle), shapes[k]);
+        let channel = |k: usize| (zenith[k] / distribution(shapes[k], 1.0, (angle, angle.cos())), shapes[k]);
         let channels = [channel(0), channel(1), channel(2)];
-        let mut sky = Self { vertical, towards, sun: Vec3::ZERO, earth: Vec3::ZERO, channels };
+        let (sun, middle, earth) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+        let mut sky = Self { vertical, towards, sun, middle, earth, channels };
         let above = || fibonacci_sphere(512).filter(|d| d.dot(vertical) > 0.0);
         let mean = above().map(|d| luminance(sky.air(d))).sum::<f64>() / above().count() as f64;
         sky.channels[0].0 *= SKY / mean;
@@ -95,6 +98,7 @@ impl Sky {
         if has_sun {
             let radiance = SUN * PI / (TAU * (1.0 - SUN_COSINE));
             sky.sun = color * (radiance / luminance(color)) as f32;
+            sky.middle = sky.radiance(towards);
         }
         sky
     }
@@ -102,8 +106,9 @@ impl Sky {
     /// Radiance of the air in a unit direction above the horizon.
     fn air(&self, direction: DVec3) -> Vec3 {
         let cosine = direction.dot(self.vertical).max(0.02);
-        let angle = direction.dot(self.towards).clamp(-1.0, 1.0).acos();
-        let [big, x, y] = self.channels.map(|(scale, shape)| scale * distribution(shape, cosine, angle));
+        let of_sun = direction.dot(self.towards).clamp(-1.0, 1.0);
+        let sun = (of_sun.acos(), of_sun);
+        let [big, x, y] = self.channels.map(|(scale, shape)| scale * distribution(shape, cosine, sun));
         // From Yxy to XYZ to linear sRGB (IEC 61966-2-1).
         let xyz = DVec3::new(x / y, 1.0, (1.0 - x - y) / y) * big;
         let to_rgb = Mat3::from_cols_array_2d(&[
@@ -136,7 +141,8 @@ impl Sky {
         let (tangent, bitangent) = self.towards.any_orthonormal_pair();
         let direction = (tangent * across.x + bitangent * across.y + self.towards * cosine).normalize();
         let density = self.density(direction);
-        (density > 0.0).then(|| EnvironmentSample { direction, radiance: self.radiance(direction), density })
+        // The air differs by millionths of the sun within its disc.
+        (density > 0.0).then_some(EnvironmentSample { direction, radiance: self.middle, density })
     }
 
     /// Density of [`Self::sample`] in a unit direction, with regard to solid angle.

@@ -115,6 +115,10 @@ class Contents:
         """Lower and upper end of a box in world space around an instance, (2, 3) float32; None if it is hidden."""
         return _box(self._native.instance_bounds(_index(instance, "instance")))
 
+    def instance_path(self, instance):
+        """Rows of the file's instances on the way to an instance, that in the world first; `(instance,)` in a scene without groups."""
+        return tuple(self._native.instance_path(_index(instance, "instance")))
+
     def object_bounds(self, obj=0):
         """Lower and upper end of a box around an object, in the space of the object, (2, 3) float32; None if nothing of it can be hit."""
         return _box(self._native.object_bounds(_index(obj, "obj")))

@@ -37,10 +37,10 @@ pub(crate) fn groups(
     })?
 }
 
-/// Masks of all instances.
+/// Masks of all instances, with groups of all rows.
 #[pyfunction]
 pub(crate) fn instance_masks(py: Python<'_>, scene: &NativeScene) -> PyResult<Vec<u32>> {
-    scene.with(py, |scene| (0..scene.instance_count()).map(|i| scene.instance_mask(i)).collect())
+    scene.with(py, |scene| (0..scene.row_count()).map(|i| scene.instance_mask(i)).collect())
 }
 
 /// Masks of all groups of an object.
@@ -61,7 +61,7 @@ pub(crate) fn set_instance_mask(
     mask: u32,
 ) -> PyResult<()> {
     scene.get()?.change(py, |scene| {
-        check_index("instance", instance, scene.instance_count())?;
+        check_index("instance", instance, scene.row_count())?;
         scene.set_instance_mask(instance, mask).map_err(|e| format_error(&e))
     })?
 }
@@ -91,7 +91,7 @@ type Masks = (Vec<(u32, u32)>, Vec<(u32, u32, u32)>);
 #[pyfunction]
 pub(crate) fn masks(py: Python<'_>, scene: &NativeScene) -> PyResult<Masks> {
     scene.with(py, |scene| {
-        let instances = (0..scene.instance_count()).map(|i| (i, scene.instance_mask(i)));
+        let instances = (0..scene.row_count()).map(|i| (i, scene.instance_mask(i)));
         let groups = (0..scene.object_count()).flat_map(|object| {
             (0..scene.group_count(object)).map(move |group| (object, group, scene.group_mask(object, group)))
         });
@@ -108,7 +108,7 @@ pub(crate) fn set_masks(py: Python<'_>, scene: &NativeScene, masks: Masks) -> Py
     let (instances, groups) = masks;
     scene.get()?.change(py, |scene| {
         for (instance, mask) in instances {
-            check_index("instance", instance, scene.instance_count())?;
+            check_index("instance", instance, scene.row_count())?;
             scene.set_instance_mask(instance, mask).map_err(|e| format_error(&e))?;
         }
         for (object, group, mask) in groups {

@@ -30,6 +30,11 @@ fn change<T: Send>(
             let message = format!("instance {missing} of {}, or it was removed", scene.instance_count());
             return Err(PyIndexError::new_err(message));
         }
+        if scene.has_groups() {
+            let message = "this scene has groups, whose instances are not moved one by one (hint: bth.SceneBuilder of \
+                Rust or C moves them)";
+            return Err(PyValueError::new_err(message));
+        }
         if scene.is_animated() {
             let message = "the tracks of its file move this scene (hint: compile it with animation=\"none\")";
             return Err(PyValueError::new_err(message));

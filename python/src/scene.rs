@@ -220,6 +220,14 @@ impl NativeScene {
         })?
     }
 
+    /// The rows on the way to an instance, that in the world first.
+    fn instance_path(&self, py: Python<'_>, instance: u32) -> PyResult<Vec<u32>> {
+        self.with(py, |scene| {
+            check_index("instance", instance, scene.instance_count())?;
+            Ok(scene.instance_path(instance).to_vec())
+        })?
+    }
+
     /// Lower and upper end of a box of an object in its own space, if anything of it can be hit.
     fn object_bounds(&self, py: Python<'_>, object: u32) -> PyResult<Option<bth::Bounds>> {
         self.with(py, |scene| {

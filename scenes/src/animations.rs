@@ -77,7 +77,7 @@ impl Builder {
         object: Option<usize>,
         transform: Transform,
     ) -> usize {
-        self.manifest.nodes.push(Node { name, parent, transform, object, visible: true });
+        self.manifest.nodes.push(Node { name, parent, transform, object, group: None, visible: true });
         self.manifest.nodes.len() - 1
     }
 

@@ -88,6 +88,29 @@ int main(int argc, char **argv) {
     if (bth_get_instance(bth_builder_scene(builder), 20, &gone) != BTH_OK || gone.object != BTH_NONE) return 24;
     if (bth_triangle_positions(bth_builder_scene(builder), (bth_surface){20, 0}, corner) != BTH_ERROR_ARGUMENT) return 25;
 
+    /* A group of two quads, shown twice. */
+    uint32_t group, row[3], rows[16];
+    at(m, 0, 3, 0, 0);
+    if (bth_builder_group(builder, &group) != BTH_OK) return 34;
+    if (bth_builder_place(builder, BTH_OBJECT, quad, group, m, row) != BTH_OK) return 35;
+    if (bth_builder_set_visible(builder, row[0], 0) != BTH_OK) return 35;
+    at(m, 0, 3, 0, 1);
+    if (bth_builder_place(builder, BTH_OBJECT, quad, group, m, row) != BTH_OK) return 35;
+    for (int i = 1; i < 3; i++) {
+        at(m, 40 + 9 * i, 1, 0.25f, -2);
+        if (bth_builder_place(builder, BTH_GROUP, group, BTH_NONE, m, &row[i]) != BTH_OK) return 36;
+    }
+    if (bth_builder_commit(builder, NULL) != BTH_OK) return 37;
+    uint32_t last = bth_instance_count(bth_builder_scene(builder)) - 1;
+    if (bth_instance_path(bth_builder_scene(builder), last, rows) != 2 || rows[0] != row[2] || rows[1] != row[0]) return 38;
+    if (bth_instance_path(bth_builder_scene(builder), last + 1, rows) || bth_instance_path(NULL, 0, rows)) return 39;
+    if (bth_builder_place(builder, 2, group, BTH_NONE, m, row) != BTH_ERROR_ARGUMENT) return 40;
+    if (bth_builder_place(builder, BTH_GROUP, group + 1, BTH_NONE, m, row) != BTH_ERROR_ARGUMENT) return 41;
+    for (int i = 1; i < 3; i++) {
+        if (bth_builder_remove(builder, row[i]) != BTH_OK) return 42;
+    }
+    if (bth_builder_commit(builder, NULL) != BTH_OK) return 43;
+
     /* What does not exist. */
     const int32_t wrong = BTH_ERROR_ARGUMENT;
     if (bth_builder_instance(builder, 99, m, id) != wrong || bth_builder_instance(builder, 0, NULL, id) != wrong) return 26;

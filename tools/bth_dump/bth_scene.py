@@ -1,4 +1,5 @@
-"""The scene sections (format-spec/README.md, "Scenes") and invariants F150 to F159 and F185."""
+"""The scene sections (format-spec/README.md, "Scenes") and invariants F150 to F159, F185 and
+F188."""
 
 import math
 import struct
@@ -19,7 +20,9 @@ Light = namedtuple("Light", "node kind name name_length color intensity range in
 WIDTHS = (3, 4, 3, 1)
 TRANSLATION, ROTATION, SCALE, VISIBLE, WEIGHTS = range(5)
 STEP, LINEAR, CUBIC = range(3)
-HIDDEN, MATRIX = 1, 2
+HIDDEN, MATRIX, GROUP = 1, 2, 4
+OF_GROUP = 1
+MAX_PATH = 16
 FRAME_LIMIT = 1 << 24
 
 
@@ -62,7 +65,7 @@ class SceneView:
 
 
 def check_scene(view):
-    """F150 to F159."""
+    """F150 to F159 and F188."""
     if not view.exists:
         return
     need = view.need
@@ -74,15 +77,20 @@ def check_scene(view):
     need(not any(s.reserved), "F150", "reserved", c.SCENE)
     for i, n in enumerate(view.nodes):
         need(n.parent == NONE or n.parent < i, "F151", f"parent {n.parent} of node {i}", c.NODES)
-        need(n.flags < 4 and not any(n.reserved), "F151", f"flags {n.flags} of node {i}", c.NODES)
+        need(n.flags < 8 and not any(n.reserved), "F151", f"flags {n.flags} of node {i}", c.NODES)
+        need(not n.flags & GROUP or n.parent == NONE, "F151", f"parent of group {i}", c.NODES)
         good = all(map(math.isfinite, n.transform))
         if not n.flags & MATRIX:
             good = good and any(n.transform[3:7]) and not any(n.transform[10:])
         need(good, "F152", f"transform of node {i}", c.NODES)
         view.check_name(n, c.NODES)
     for x in view.instances:
-        there = x.node < len(view.nodes) and x.object < view.container.objects
-        need(there and (x.flags, x.reserved) == (0, 0), "F154", f"{x}", c.INSTANCES)
+        if x.flags & OF_GROUP:
+            there = x.object < len(view.nodes) and view.nodes[x.object].flags & GROUP
+        else:
+            there = x.object < view.container.objects
+        good = x.node < len(view.nodes) and there and x.flags < 2 and x.reserved == 0
+        need(good, "F154", f"{x}", c.INSTANCES)
     view.deformers.check()
     check_tracks(view)
     for x in view.cameras:
@@ -97,6 +105,35 @@ def check_scene(view):
         good = x.node < len(view.nodes) and x.kind < 3 and angles and numbers and not any(x.reserved)
         need(good, "F159", f"{x}", c.LIGHTS)
         view.check_name(x, c.LIGHTS)
+    check_groups(view)
+
+
+def check_groups(view):
+    """F188."""
+    need = view.need
+    world = sum(n.flags & GROUP != 0 for n in view.nodes)
+    if not world:
+        return
+    group_of, last = [], -1
+    for n in view.nodes:
+        last += n.flags & GROUP != 0
+        own = last if n.flags & GROUP else world
+        group_of.append(own if n.parent == NONE else group_of[n.parent])
+    skinned = {d.object for d in view.deformers.deformers if d.skin != NONE}
+    before, count, levels = 0, [0] * (world + 1), [0] * (world + 1)
+    for x in view.instances:
+        within = group_of[x.node]
+        inner = group_of[x.object] if x.flags & OF_GROUP else None
+        good = before <= within and (inner is None or inner < within)
+        good = good and (within == world or inner is not None or x.object not in skinned)
+        need(good, "F188", f"{x}", c.INSTANCES)
+        before = within
+        count[within] += 1 if inner is None else count[inner]
+        levels[within] = max(levels[within], 1 + (0 if inner is None else levels[inner]))
+        need(count[within] < NONE and levels[within] <= MAX_PATH, "F188", f"{x}", c.INSTANCES)
+    for rows, kind in ((view.cameras, c.CAMERAS), (view.lights, c.LIGHTS), (view.deformers.deformers, c.DEFORMERS)):
+        for x in rows:
+            need(group_of[x.node] == world, "F188", f"{x}", kind)
 
 
 def check_tracks(view):

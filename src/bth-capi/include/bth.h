@@ -161,6 +161,11 @@ uint32_t bth_instance_count(const bth_scene *scene);
  * pointer is null. */
 int32_t bth_get_instance(const bth_scene *scene, uint32_t row, bth_instance *instance);
 
+/* Stores the rows on the way to an instance, that in the world first, and returns their number: 1 without groups, where the row is
+ * the instance; in a file they are rows of its instances, in a scene of a builder ids. 0 if there is no such instance or a pointer is
+ * null. */
+uint32_t bth_instance_path(const bth_scene *scene, uint32_t instance, uint32_t rows[16]);
+
 /* The point of the triangles that is closest to a given point. 36 bytes. */
 typedef struct {
     float distance;        /* in world space; infinite if there is none within the radius */
@@ -251,7 +256,8 @@ int32_t bth_all_hits(const bth_scene *scene, const bth_ray *rays, const bth_acce
 
 /* Sets the mask of an instance, which has all bits set before: rays of the queries above meet the instance only if their mask has a
  * bit in common with it. bth_nearest and bth_any ignore masks. Must not run at the same time as any other function on the scene.
- * Returns BTH_OK, or BTH_ERROR_ARGUMENT if there is no such instance. */
+ * Returns BTH_OK, or BTH_ERROR_ARGUMENT if there is no such instance. In a scene with groups it is the mask of a row, which holds for
+ * all that the row shows. */
 int32_t bth_set_instance_mask(bth_scene *scene, uint32_t instance, uint32_t mask);
 
 /* As bth_set_instance_mask, for a group of triangles of an object in all its instances. Triangles of an object without groups form
@@ -498,6 +504,19 @@ int32_t bth_builder_add(bth_builder *builder, const bth_scene *scene, uint32_t *
 /* Adds an instance of an object and stores its id in *instance. bth_builder_commit decides whether the transform can be used; before
  * it, bth_builder_set_transforms_f64 may give the instance a transform in double. */
 int32_t bth_builder_instance(bth_builder *builder, uint32_t object, const float transform[12], uint32_t *instance);
+
+/* Adds an empty group and stores its number in *group: instances that are placed as a whole, any number of times, and are held once.
+ * Hits number instances as if groups were written out; bth_instance_path leads back to ids. */
+int32_t bth_builder_group(bth_builder *builder, uint32_t *group);
+
+/* What bth_builder_place places. */
+#define BTH_OBJECT 0u
+#define BTH_GROUP 1u
+
+/* Adds an instance of `content`, which is an object (`kind` BTH_OBJECT) or a group (BTH_GROUP), in the group `within`, or in the world
+ * if that is BTH_NONE, and stores its id in *instance. A group may only hold groups that were added before it. */
+int32_t bth_builder_place(bth_builder *builder, uint32_t kind, uint32_t content, uint32_t within, const float transform[12],
+                          uint32_t *instance);
 
 /* Sets the transforms of `count` instances: the twelve numbers from transforms[12 * i] on are that of instances[i]. If an instance is
  * given several times, its last transform counts. If one does not exist or belongs to a subscene, none is set. */

@@ -227,6 +227,12 @@ public:
 
     std::uint32_t instance_count() const noexcept { return bth_instance_count(get()); }
 
+    /* The rows on the way to an instance, that in the world first. */
+    std::vector<std::uint32_t> instance_path(std::uint32_t instance) const {
+        std::uint32_t rows[16];
+        return {rows, rows + bth_instance_path(get(), instance, rows)};
+    }
+
     bth_instance instance(std::uint32_t row) const {
         bth_instance found;
         check(bth_get_instance(get(), row, &found));
@@ -559,6 +565,16 @@ public:
     /* Places an object; returns the id of the instance. */
     std::uint32_t instance(std::uint32_t object, const transform<float> &place = identity) {
         return stored([&](std::uint32_t *id) { return bth_builder_instance(get(), object, place.data(), id); });
+    }
+    /* Adds a group; returns its number. */
+    std::uint32_t group() {
+        return stored([&](std::uint32_t *id) { return bth_builder_group(get(), id); });
+    }
+    /* Places an object (kind BTH_OBJECT) or a group (BTH_GROUP) in a group; returns the id of the instance. */
+    std::uint32_t place(std::uint32_t kind, std::uint32_t content, std::uint32_t within = BTH_NONE,
+                        const transform<float> &at = identity) {
+        return stored(
+            [&](std::uint32_t *id) { return bth_builder_place(get(), kind, content, within, at.data(), id); });
     }
     void remove(std::uint32_t instance) { check(bth_builder_remove(get(), instance)); }
     void set_visible(std::uint32_t instance, bool visible) { check(bth_builder_set_visible(get(), instance, visible)); }

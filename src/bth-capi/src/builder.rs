@@ -3,7 +3,7 @@
 
 use crate::query::attempt;
 use crate::{ERROR_ARGUMENT, OK, fail};
-use runtime::{Error, Scene, SceneBuilder, Update};
+use runtime::{Content, Error, Scene, SceneBuilder, Update};
 
 /// `bth_update` of `bth.h`.
 #[derive(Clone, Copy, Debug)]
@@ -154,6 +154,49 @@ pub unsafe extern "C" fn bth_builder_instance(
     let name = "bth_builder_instance";
     // SAFETY: the contract of this function is the contract of `add`.
     unsafe { add(builder, name, transform, instance, |builder, m| builder.instance(object, m)) }
+}
+
+/// Adds a group; see `bth.h`.
+///
+/// # Safety
+/// `builder` is null or was not freed, and no other call uses it or its scene at the same time.
+/// `group` is null or valid for writes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_builder_group(builder: *mut SceneBuilder, group: *mut u32) -> i32 {
+    let name = "bth_builder_group";
+    // SAFETY: by contract it is null or valid for writes.
+    let Some(out) = (unsafe { group.as_mut() }) else { return null(name, "group") };
+    // SAFETY: the contract of this function includes the contract of `with`.
+    unsafe {
+        with(builder, name, |builder| {
+            *out = builder.add_group();
+            Ok(())
+        })
+    }
+}
+
+/// Adds an instance of an object or a group in a group; see `bth.h`.
+///
+/// # Safety
+/// The contract of [`bth_builder_instance`].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_builder_place(
+    builder: *mut SceneBuilder,
+    kind: u32,
+    content: u32,
+    within: u32,
+    transform: *const [f32; 12],
+    instance: *mut u32,
+) -> i32 {
+    let name = "bth_builder_place";
+    let content = match kind {
+        0 => Content::Object(content),
+        1 => Content::Group(content),
+        _ => return fail(ERROR_ARGUMENT, format!("{name}: expected a kind of 0 or 1, found {kind}")),
+    };
+    let within = (within != u32::MAX).then_some(within);
+    // SAFETY: the contract of this function is the contract of `add`.
+    unsafe { add(builder, name, transform, instance, |builder, m| builder.place(content, within, m)) }
 }
 
 /// Adds a subscene; see `bth.h`.

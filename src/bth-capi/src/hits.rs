@@ -304,7 +304,7 @@ pub unsafe extern "C" fn bth_set_instance_mask(scene: *mut Scene, instance: u32,
     let Some(scene) = (unsafe { scene.as_mut() }) else {
         return fail(ERROR_ARGUMENT, "bth_set_instance_mask: scene must not be null".into());
     };
-    let count = scene.instance_count();
+    let count = scene.row_count();
     if instance >= count {
         let text = format!("bth_set_instance_mask: expected an instance below {count}, found {instance}");
         return fail(ERROR_ARGUMENT, text);

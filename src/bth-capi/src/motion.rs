@@ -2,6 +2,7 @@
 
 use crate::query::attempt;
 use crate::{ERROR_ARGUMENT, OK, fail};
+
 use runtime::{Error, Scene};
 
 /// `bth_instance` of `bth.h`.
@@ -16,6 +17,9 @@ pub struct Instance {
 }
 
 const _: () = assert!(size_of::<Instance>() == 112);
+
+/// Max number of rows on the way to an instance.
+const MAX_PATH: usize = 16;
 
 /// Frames and rate of a scene; see `bth.h`.
 ///
@@ -93,6 +97,26 @@ unsafe fn update(
 pub unsafe extern "C" fn bth_instance_count(scene: *const Scene) -> u32 {
     // SAFETY: by contract it is null or open, hence valid for reads.
     unsafe { scene.as_ref() }.map_or(0, Scene::instance_count)
+}
+
+/// The way to an instance; see `bth.h`.
+///
+/// # Safety
+/// `scene` is null or open; `rows` is null or valid for writes of 16 numbers.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_instance_path(
+    scene: *const Scene,
+    instance: u32,
+    rows: *mut [u32; MAX_PATH],
+) -> u32 {
+    // SAFETY: by contract `scene` is null or open, and `rows` is null or valid for writes.
+    let (Some(scene), Some(rows)) = (unsafe { scene.as_ref() }, unsafe { rows.as_mut() }) else { return 0 };
+    if instance >= scene.instance_count() {
+        return 0;
+    }
+    let path = scene.instance_path(instance);
+    rows[..path.len()].copy_from_slice(&path);
+    path.len() as u32
 }
 
 /// An instance; see `bth.h`.

@@ -30,6 +30,7 @@ mod code;
 pub mod error;
 pub mod exact;
 pub mod file;
+pub mod groups;
 mod identity;
 pub mod layout;
 pub mod limits;

@@ -16,3 +16,6 @@ pub const MAX_LEAF_VERTICES: u32 = 1 << 28;
 /// Bytes of the name of a group or material (BTH-F144), of an object (BTH-F148), or of a node,
 /// camera or light (BTH-F153).
 pub const MAX_NAME: u32 = 4096;
+/// Instances on the way to an instance of an object through groups of nodes, that one included
+/// (BTH-F188).
+pub const MAX_PATH: u32 = 16;

@@ -7,6 +7,7 @@
 #![warn(missing_docs)]
 
 pub mod error;
+mod groups;
 mod joint_set;
 pub mod limits;
 mod model;
@@ -22,6 +23,7 @@ mod table;
 mod write;
 
 pub use error::{Error, Result};
+pub use groups::NodeGroups;
 pub use joint_set::JointSet;
 pub use model::*;
 pub use read::{parse, read};

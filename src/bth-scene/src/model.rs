@@ -103,8 +103,8 @@ pub enum Source {
     Compiled {
         /// BTH file.
         path: String,
-        /// Object of that file.
-        object: u32,
+        /// Object of that file; `None` for the whole file: its scene, or its only object.
+        object: Option<u32>,
     },
     /// Models of equal topology, one for each frame.
     Sequence {
@@ -202,6 +202,9 @@ pub struct Node {
     pub transform: Transform,
     /// The object if the node is an instance.
     pub object: Option<usize>,
+    /// A node without parent if this one, which has no object, is an instance of the group of that
+    /// node and all below it. They then show nowhere else.
+    pub group: Option<usize>,
     /// True if the node and its descendants are visible, before tracks.
     pub visible: bool,
 }

@@ -1,6 +1,7 @@
 //! Reads a manifest strictly.
 
 use crate::error::{Error, Result, code};
+use crate::groups::NodeGroups;
 use crate::joint_set::JointSet;
 use crate::limits::MAX_MANIFEST;
 use crate::model::*;
@@ -20,7 +21,7 @@ pub(crate) const SCENE_KEYS: &[&str] =
     &["version", "camera", "frames", "objects", "nodes", "cameras", "lights", "skins", "deformers", "tracks"];
 pub(crate) const FRAMES_KEYS: &[&str] = &["first", "last", "rate"];
 pub(crate) const NODE_KEYS: &[&str] =
-    &["name", "parent", "object", "visible", "translation", "rotation", "scale", "matrix", "look"];
+    &["name", "parent", "object", "group", "visible", "translation", "rotation", "scale", "matrix", "look"];
 pub(crate) const CAMERA_KEYS: &[&str] = &["name", "node", "fov", "height", "aspect", "near", "far"];
 pub(crate) const LIGHT_KEYS: &[&str] =
     &["name", "node", "kind", "color", "intensity", "range", "inner", "outer"];
@@ -88,9 +89,24 @@ pub fn parse(text: &str, path: &Path) -> Result<Manifest> {
     check_cycles(&nodes, &read_nodes)?;
     let skins = scene.tables("skins", SKIN_KEYS)?;
     let skin_names = Names::collect("skin", &skins)?;
-    let deformers =
-        deformers(&scene.tables("deformers", DEFORMER_KEYS)?, &node_names, &object_names, &skin_names)?;
+    let deformer_tables = scene.tables("deformers", DEFORMER_KEYS)?;
+    let deformers = deformers(&deformer_tables, &node_names, &object_names, &skin_names)?;
     let tracks = tracks(&scene.tables("tracks", TRACK_KEYS)?, &node_names, &read_nodes, &deformers)?;
+    if let Some(groups) = node_groups(&nodes, &read_nodes)? {
+        let skinned: Vec<_> = deformers.iter().filter(|of| of.skin.is_some()).map(|of| of.object).collect();
+        let is_skinned = |node: &Node| node.object.is_some_and(|object| skinned.contains(&object));
+        let row = |(row, _): &(usize, &Table<'_>)| groups.is_in_group(*row) && is_skinned(&read_nodes[*row]);
+        if let Some((_, table)) = nodes.iter().enumerate().find(row) {
+            return Err(in_group(&table.need("object")?, "an object with a skin"));
+        }
+        let others = [("a camera", &cameras), ("a light", &lights), ("a deformer", &deformer_tables)];
+        for (what, table) in others.iter().flat_map(|(what, of)| of.iter().map(move |table| (what, table))) {
+            let node = table.need("node")?;
+            if groups.is_in_group(node_names.row(&node)?) {
+                return Err(in_group(&node, what));
+            }
+        }
+    }
     Ok(Manifest {
         frames,
         camera,
@@ -168,7 +184,7 @@ fn unmoved(table: &Table<'_>, deforms: bool) -> Result<Source> {
         table.get(key).map(|v| v.integer(0..=i64::from(u32::MAX - 1)).map(|n| n as u32)).transpose()
     };
     Ok(match table.get("file") {
-        Some(file) => Source::Compiled { path: path(&file)?, object: index("object")?.unwrap_or(0) },
+        Some(file) => Source::Compiled { path: path(&file)?, object: index("object")? },
         None => {
             let path = path(&table.need("model")?)?;
             let joint = table.get("joint").map(|v| joint(&v)).transpose()?;
@@ -204,13 +220,35 @@ fn without_joints(table: &Table<'_>) -> Result<JointSet> {
 }
 
 fn node(table: &Table<'_>, nodes: &Names<'_>, objects: &Names<'_>) -> Result<Node> {
+    table.exclude("object", "group")?;
     Ok(Node {
         name: name(table)?,
         parent: table.get("parent").map(|v| nodes.row(&v)).transpose()?,
         transform: transform(table)?,
         object: table.get("object").map(|v| objects.row(&v)).transpose()?,
+        group: table.get("group").map(|v| nodes.row(&v)).transpose()?,
         visible: table.get("visible").map_or(Ok(true), |v| v.boolean())?,
     })
+}
+
+/// The groups of nodes. Fails when a node with a parent is named as one, or groups show each other
+/// in a circle or too deeply.
+fn node_groups(tables: &[Table<'_>], nodes: &[Node]) -> Result<Option<NodeGroups>> {
+    for (table, node) in tables.iter().zip(nodes) {
+        if let Some(group) = node.group.map(|group| &nodes[group]).filter(|group| group.parent.is_some()) {
+            let message = format!("the node \"{}\" has a parent: a group is a node without one", group.name);
+            return Err(table.need("group")?.error(code::CONFLICT, message, "name the first node of a tree"));
+        }
+    }
+    NodeGroups::of(nodes).or_else(|node| {
+        let message = "the group shows itself, or groups are nested in more than 16 levels";
+        Err(tables[node].need("group")?.error(code::CYCLE, message, "name another group"))
+    })
+}
+
+/// The error for what cannot be in a group.
+fn in_group(value: &Value<'_>, what: &str) -> Error {
+    value.error(code::CONFLICT, format!("{what} cannot be in a group"), "put it at a node of the world")
 }
 
 /// Fails when a node is its own ancestor. Every node is visited once.

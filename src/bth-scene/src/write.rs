@@ -29,7 +29,8 @@ impl Manifest {
                     mesh.map_or(Ok(()), |mesh| writeln!(out, "mesh = {mesh}"))?;
                 }
                 Source::Compiled { path, object } => {
-                    writeln!(out, "file = {}\nobject = {object}", text(path))?;
+                    writeln!(out, "file = {}", text(path))?;
+                    object.map_or(Ok(()), |object| writeln!(out, "object = {object}"))?;
                 }
                 Source::Sequence { frames, timing } => write_sequence(out, frames, timing)?,
                 Source::Cached { path, cache, timing } => {
@@ -89,6 +90,9 @@ impl Manifest {
         }
         if let Some(object) = node.object {
             writeln!(out, "object = {}", text(&self.objects[object].name))?;
+        }
+        if let Some(group) = node.group {
+            writeln!(out, "group = {}", text(&self.nodes[group].name))?;
         }
         if !node.visible {
             writeln!(out, "visible = false")?;

@@ -74,7 +74,7 @@ fn every_part_of_a_scene_is_read() {
     assert_eq!((scene.frames.first, scene.frames.last, scene.frames.rate), (-2, 10, 25.0));
     assert_eq!(scene.camera, Some(0));
     assert_eq!(scene.objects[0].source, Source::Model { path: "models/ball.ply".into(), mesh: None });
-    assert_eq!(scene.objects[1].source, Source::Compiled { path: "done.bth".into(), object: 2 });
+    assert_eq!(scene.objects[1].source, Source::Compiled { path: "done.bth".into(), object: Some(2) });
     let arm = &scene.nodes[0];
     assert_eq!((arm.parent, arm.object, arm.visible), (Some(1), Some(0), true));
     let Transform::Parts { translation, rotation, scale } = arm.transform else { panic!("{arm:?}") };
@@ -165,6 +165,52 @@ fn colors_are_linear_numbers_or_bytes_in_srgb() {
     ];
     assert_eq!(found, expected);
     assert_eq!(scene.lights[0].color, [1.0; 3]);
+}
+
+#[test]
+fn groups_are_read() {
+    let nodes = |nodes: &str| read(&format!("version = 1\nnodes = [{nodes}]"));
+    let scene = nodes(
+        r#"{ name = "a", group = "b" }, { name = "b" }, { name = "c", parent = "b", group = "d" }, { name = "d" }"#,
+    )
+    .unwrap();
+    assert_eq!(scene.nodes.iter().map(|node| node.group).collect::<Vec<_>>(), [Some(1), None, Some(3), None]);
+    let chain = |levels: usize| {
+        let show = |i: usize| format!("{{ name = \"{i}\", group = \"{}\" }}, ", i + 1);
+        nodes(&format!("{}{{ name = \"{levels}\" }}", (0..levels).map(show).collect::<String>()))
+    };
+    assert!(chain(15).is_ok());
+    let in_group = r#"{ name = "a", group = "b" }, { name = "b" }"#;
+    for (text, code, words) in [
+        (r#"{ name = "a", group = "a" }"#.to_owned(), "BTH-M010", "shows itself"),
+        (
+            r#"{ name = "a", group = "b" }, { name = "b", group = "a" }"#.to_owned(),
+            "BTH-M010",
+            "shows itself",
+        ),
+        (
+            r#"{ name = "a", group = "c" }, { name = "b" }, { name = "c", parent = "b" }"#.to_owned(),
+            "BTH-M013",
+            "has a parent",
+        ),
+        (r#"{ name = "a", group = "b" }"#.to_owned(), "BTH-M009", "no node"),
+    ] {
+        let error = nodes(&text).unwrap_err();
+        assert!(error.code == code && error.to_string().contains(words), "{error}");
+    }
+    assert_eq!(chain(16).unwrap_err().code, "BTH-M010");
+    for (table, what) in [
+        (r#"lights = [{ name = "l", node = "b", kind = "point" }]"#, "a light"),
+        (r#"cameras = [{ name = "c", node = "b", fov = 40 }]"#, "a camera"),
+    ] {
+        let error = read(&format!("version = 1\nnodes = [{in_group}]\n{table}")).unwrap_err();
+        assert!(error.code == "BTH-M013" && error.to_string().contains(what), "{error}");
+    }
+    let both = read(
+        "version = 1\nobjects = [{ name = \"o\", model = \"o.ply\" }]\n\
+        nodes = [{ name = \"a\", group = \"b\", object = \"o\" }, { name = \"b\" }]",
+    );
+    assert_eq!(both.unwrap_err().code, "BTH-M013");
 }
 
 #[test]

@@ -33,7 +33,7 @@ prop_compose! {
         let mut objects = vec![
             Object::new("model", Source::Model { path: "a b/ü.ply".into(), mesh: None }),
             Object::new("mesh", Source::Model { path: "x.glb".into(), mesh: Some(7) }),
-            Object::new("file", Source::Compiled { path: "x.bth".into(), object: 1 }),
+            Object::new("file", Source::Compiled { path: "x.bth".into(), object: Some(1) }),
             Object::new("deforms", Source::Deforming { path: "x.glb".into(), mesh: 2, without: JointSet::default() }),
             Object::new("soft", Source::Deforming {
                     path: "x.glb".into(),
@@ -64,9 +64,15 @@ prop_compose! {
             parent: (flags[0] && i > 0).then(|| object % i),
             transform: *transform,
             object: flags[1].then_some(object % 3),
+            group: None,
             visible: flags[2],
         };
-        let nodes: Vec<Node> = nodes.iter().enumerate().map(|(i, node)| row(i, node)).collect();
+        let mut nodes: Vec<Node> = nodes.iter().enumerate().map(|(i, node)| row(i, node)).collect();
+        let plain = |name: &str, group| Node {
+            name: name.into(), parent: None, transform: Transform::default(), object: None, group, visible: true,
+        };
+        let group = nodes.len();
+        nodes.extend([plain("group", None), plain("shows it", Some(group))]);
         let property = Property::ALL[property];
         let visible = property == Property::Visible;
         let interpolation = if visible { Interpolation::Step } else { Interpolation::ALL[interpolation] };

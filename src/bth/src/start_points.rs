@@ -23,8 +23,10 @@ pub(crate) fn place_start(scene: &Scene, start: &Start) -> Result<InstanceStart,
         let point = point.map_err(Misplaced::Start)?;
         return Ok(InstanceStart { instance, start: *start, point, world: point.origin });
     };
-    let placement = world.placements.get(instance as usize).ok_or(Misplaced::NoInstance)?;
-    let placement = placement.as_ref().ok_or(Misplaced::Hidden)?;
+    if instance >= world.instance_count() {
+        return Err(Misplaced::NoInstance);
+    }
+    let placement = world.placed(instance).ok_or(Misplaced::Hidden)?;
     let point = locate(scene.view(placement.object()), *start).map_err(Misplaced::Start)?;
     let world = placement.point_in_world(point.origin);
     Ok(InstanceStart { instance, start: *start, point, world })

@@ -55,7 +55,7 @@ pub struct SurfacePoint {
 pub(crate) fn surface_at(scene: &Scene, hit: &Hit) -> Option<SurfacePoint> {
     let PrimitiveRef { instance, triangle: id } = hit.primitive;
     let object = object_at(scene, hit.primitive)?;
-    if scene.world().is_some_and(|world| world.placements[instance as usize].is_none()) {
+    if scene.world().is_some_and(|world| world.placed(instance).is_none()) {
         return None;
     }
     let view = scene.object(object);

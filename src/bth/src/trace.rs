@@ -289,6 +289,8 @@ impl Scene {
             Some((object, _)) if !object.exact.is_empty() => (whole, None),
             _ => (None, whole),
         };
+        // Rays through groups go one by one.
+        let world = world.filter(|world| world.groups().is_none());
         let is_batch = rays.len() >= object::MIN_BATCH && (sole.is_some() || world.is_some());
         if !is_batch || !R::go_together(rays, if sole.is_some() { None } else { world }) {
             return match answers {
@@ -346,7 +348,7 @@ impl Scene {
 fn hit_in_f64(scene: &Scene, ray: WorldRay<'_>, primitive: PrimitiveRef) -> Option<Hit64> {
     let (objects, instance, tmax) = (scene.objects(), primitive.instance, ray.ray.tmax);
     let of_instance = match scene.world() {
-        Some(world) => RayInInstance::new(world, objects, instance, ray, tmax),
+        Some(world) => RayInInstance::new(world, objects, (instance, &*world.placed(instance)?), ray, tmax),
         None => RayInInstance::in_world(Some(objects), instance, ray, tmax),
     };
     let corners = corners_by_id(scene.view(scene.object_of(instance)), primitive.triangle)?;

@@ -79,13 +79,19 @@ pub(super) fn see_each_other(scene: &Scene, a: SegmentEnd, b: SegmentEnd) -> boo
     let ends = [&a, &b].map(|end| end.start.as_ref().map(|start| start.instance));
     for (i, end) in ends.into_iter().enumerate() {
         let is_new = i == 0 || end != ends[0];
-        if let (Some(instance), true) = (end, is_new)
-            && blocks_in(scene, &EnteredInstance::new(scene, instance), &a, &b)
-        {
+        let Some(instance) = end.filter(|_| is_new) else { continue };
+        let placement = scene.world().and_then(|world| world.placed(instance));
+        let entered = EnteredInstance::new(scene, instance, placement.as_deref());
+        if blocks_in(scene, &entered, &a, &b) {
             return false;
         }
     }
-    let is_blocked = enumerate_instances(scene, &ray, &mut |entered| {
+    let line = || {
+        let direction = minus(b.world.0, a.world.0);
+        let off = (a.world.1 + b.world.1) * (1.0 + RATIO_ERROR) / max_norm(direction) + DIFFERENCE_ERROR;
+        RoundedLine { origin: a.world, direction, direction_error: off }.or_unknown()
+    };
+    let is_blocked = enumerate_instances(scene, (&ray, &line), &mut |entered| {
         let was_met = ends.contains(&Some(entered.instance));
         let blocks = !was_met && blocks_in(scene, &entered, &a, &b);
         (!blocks).then_some(1.0)

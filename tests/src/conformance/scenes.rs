@@ -103,6 +103,78 @@ fn moving() -> SceneParts {
     parts
 }
 
+fn of_group(node: u32, group: u32) -> Instance {
+    Instance { node, object: group, flags: INSTANCE_OF_GROUP, reserved: 0 }
+}
+
+/// Two instances in a group, that group and an object in another, and both groups in the world.
+/// Written out they are nine instances.
+fn groups() -> SceneParts {
+    let at = |x: f64, rotation: [f64; 4], scale: f64| parts([x, 0.0, 0.0], rotation, [scale, 1.0, scale]);
+    let of_object = |node, object| Instance { node, object, flags: 0, reserved: 0 };
+    let moved = moving();
+    let mut track = moved.tracks[1];
+    (track.first_time, track.first_value) = (0, 0);
+    let camera = Camera { node: 4, ..moved.cameras[0] };
+    SceneParts {
+        nodes: vec![
+            node(at(0.0, TURN, 1.0), NONE, NODE_GROUP, (0, 4)),
+            node(at(2.0, TURN, -0.5), 0, 0, (0, 0)),
+            node(at(1.0, TURN, 2.0), NONE, NODE_GROUP, (4, 5)),
+            node(at(3.0, TURN, 1.0), NONE, 0, (0, 0)),
+            node(at(-5.0, TURN, 0.25), 3, 0, (0, 0)),
+        ],
+        instances: vec![
+            of_object(0, 0),
+            of_object(1, 1),
+            of_group(2, 0),
+            of_object(2, 1),
+            of_group(3, 2),
+            of_group(4, 0),
+            of_object(4, 0),
+            of_group(4, 2),
+        ],
+        tracks: vec![track],
+        times: moved.times[2..4].to_vec(),
+        values: moved.values[2..8].to_vec(),
+        cameras: vec![Camera { name: 9, ..camera }],
+        lights: vec![Light { node: 3, ..moved.lights[0] }],
+        names: moved.names,
+        ..still()
+    }
+}
+
+/// Files whose groups break F188.
+fn no_groups() -> Vec<Case> {
+    let case = |name: &str, change: fn(&mut SceneParts)| {
+        let mut parts = groups();
+        change(&mut parts);
+        Case::new(name, file(2, &parts))
+    };
+    vec![
+        case("F188-order", |parts| parts.instances.swap(0, 3)),
+        case("F188-itself", |parts| parts.instances[2].object = 2),
+        case("F188-later-group", |parts| parts.instances[1] = of_group(1, 2)),
+        case("F188-camera", |parts| parts.cameras[0].node = 1),
+        case("F188-light", |parts| parts.lights[0].node = 2),
+        case("F188-levels", |parts| {
+            parts.nodes = vec![parts.nodes[2]; 16];
+            parts.nodes.push(Node { flags: 0, ..parts.nodes[0] });
+            let shown = (1..17).map(|node| of_group(node, node - 1));
+            parts.instances = std::iter::once(parts.instances[0]).chain(shown).collect();
+            (parts.tracks, parts.times, parts.values) = (Vec::new(), Vec::new(), Vec::new());
+            (parts.cameras, parts.lights) = (Vec::new(), Vec::new());
+        }),
+        case("F188-too-many", |parts| {
+            parts.nodes = vec![parts.nodes[2]; 12];
+            let four = |node: u32| (0..8).map(move |_| of_group(node, node - 1));
+            parts.instances = std::iter::once(parts.instances[0]).chain((1..12).flat_map(four)).collect();
+            (parts.tracks, parts.times, parts.values) = (Vec::new(), Vec::new(), Vec::new());
+            (parts.cameras, parts.lights) = (Vec::new(), Vec::new());
+        }),
+    ]
+}
+
 /// A file with a number of equal objects and a scene.
 fn file(objects: u32, scene_parts: &SceneParts) -> Vec<u8> {
     let lines = lines(indexed(&[CORNERS], 0).as_bytes());
@@ -120,6 +192,7 @@ pub(super) fn valid() -> Vec<Case> {
         Case::new("scene-empty", file(0, &empty)),
         Case::new("scene-still", file(1, &still())),
         Case::new("scene-moving", file(2, &moving())),
+        Case::new("scene-groups", file(2, &groups())),
     ]
 }
 
@@ -144,6 +217,7 @@ fn number(name: &str, kind: u32, at: usize, value: f64) -> Case {
 pub(super) fn invalid() -> Vec<Case> {
     let mut cases = container();
     cases.extend(nodes());
+    cases.extend(no_groups());
     cases.extend(tracks());
     cases.extend(cameras_and_lights());
     cases
@@ -183,7 +257,8 @@ fn nodes() -> Vec<Case> {
     vec![
         word("F151-itself", kind::NODES, second + offset_of!(Node, parent), 1),
         word("F151-later-parent", kind::NODES, offset_of!(Node, parent), 2),
-        word("F151-flags", kind::NODES, offset_of!(Node, flags), 4),
+        word("F151-flags", kind::NODES, offset_of!(Node, flags), 8),
+        word("F151-parent-of-group", kind::NODES, second + offset_of!(Node, flags), NODE_GROUP),
         word("F151-reserved", kind::NODES, offset_of!(Node, reserved), 1),
         number("F152-infinite", kind::NODES, 0, f64::INFINITY),
         changed("F152-no-rotation", kind::NODES, second + 24, &[0; 32]),
@@ -194,7 +269,8 @@ fn nodes() -> Vec<Case> {
         word("F153-light", kind::LIGHTS, offset_of!(Light, name_length), 100),
         word("F154-node", kind::INSTANCES, 0, 3),
         word("F154-object", kind::INSTANCES, 4, 2),
-        word("F154-flags", kind::INSTANCES, 8, 1),
+        word("F154-flags", kind::INSTANCES, 8, 2),
+        word("F154-no-group", kind::INSTANCES, 8, INSTANCE_OF_GROUP),
         word("F154-reserved", kind::INSTANCES, 12, 1),
     ]
 }

@@ -5,6 +5,7 @@ mod built;
 mod deform;
 mod deformers;
 mod flattened;
+mod groups;
 mod import;
 mod made_gltf;
 mod morphs;

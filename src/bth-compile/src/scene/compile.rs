@@ -5,7 +5,7 @@ use super::context::Context;
 use super::objects::{self, Objects};
 use super::plan::ScenePlan;
 use super::report::{ObjectReport, SceneReport};
-use super::{deformers, encode, meshes, sources, visible};
+use super::{deformers, encode, meshes, sources, visible, whole_files};
 use crate::cached::Cache;
 use crate::error::{self, Error, Result};
 use crate::monitor::Monitor;
@@ -14,6 +14,8 @@ use crate::pipeline::{self, CachedCompilation, Compiled, DryRun, compile_or_fetc
 use crate::stage::Clock;
 use crate::write::{self, Content, FileBuilder, SceneParts};
 use bth_cache::{Key, Record};
+use bth_format::SceneView;
+use bth_format::groups::Groups;
 use bth_scene::Manifest;
 use serde::Deserialize;
 use std::path::Path;
@@ -69,6 +71,7 @@ pub fn compile_cached(
 ) -> Result<CachedCompilation<SceneReport>> {
     let context = Context::new(options, cache, monitor)?;
     let mut clock = Clock::default();
+    let manifest = &*whole_files::expanded(manifest, source.folder, monitor)?;
     let plan = ScenePlan::of(manifest, source.folder, options, &mut clock)?;
     warn_of_flattened(manifest, monitor);
     through_cache(manifest, &plan, source.name, &context, clock, policy)
@@ -138,6 +141,7 @@ pub fn compile_objects(
 ) -> Result<u64> {
     let context = Context::new(options, cache, monitor)?;
     let mut clock = Clock::default();
+    let manifest = &*whole_files::expanded(manifest, source.folder, monitor)?;
     let mut plan = ScenePlan::of(manifest, source.folder, options, &mut clock)?;
     let mut row = 0;
     for file in &mut plan.sources {
@@ -163,6 +167,7 @@ pub fn dry_run(
     monitor: &dyn Monitor,
 ) -> Result<DryRun> {
     let context = Context::new(options, cache, monitor)?;
+    let manifest = &*whole_files::expanded(manifest, source.folder, monitor)?;
     let plan = ScenePlan::of(manifest, source.folder, options, &mut Clock::default())?;
     let mut found = DryRun::of(key(manifest, &plan, &context)?.as_ref(), cache, monitor);
     if found.record.is_none() {
@@ -234,12 +239,27 @@ fn report(
     bytes: u64,
 ) -> SceneReport {
     let triangles = |object: u32| objects.reports[object as usize].triangles;
+    let view = SceneView { nodes: &parts.nodes, instances: &parts.instances, ..SceneView::default() };
+    let groups = Groups::of(&view);
+    let world = groups.as_ref().map_or(0, |groups| groups.world() as usize);
+    let group_of = |node: u32| groups.as_ref().map_or(0, |groups| groups.of_node(node) as usize);
+    // For each group and the world its instances and their triangles, once groups are written out.
+    let mut written_out = vec![(0u64, 0u64); world + 1];
+    for instance in &parts.instances {
+        let (count, of) = match instance.group() {
+            Some(node) => written_out[group_of(node)],
+            None => (1, triangles(instance.object)),
+        };
+        let sum = &mut written_out[group_of(instance.node)];
+        *sum = (sum.0 + count, sum.1 + of);
+    }
     let unused = manifest.objects.iter().zip(&plan.used).filter(|(_, used)| !**used);
     SceneReport {
         seconds: clock.into_times(),
         unused: unused.map(|(object, _)| object.name.clone()).collect(),
         nodes: parts.nodes.len() as u64,
-        instances: parts.instances.len() as u64,
+        instances: written_out[world].0,
+        rows: parts.instances.len() as u64,
         tracks: parts.tracks.len() as u64,
         cameras: parts.cameras.len() as u64,
         lights: parts.lights.len() as u64,
@@ -248,7 +268,7 @@ fn report(
         last_frame: manifest.frames.last,
         rate: manifest.frames.rate,
         triangles: objects.reports.iter().map(|o| o.triangles).sum(),
-        instanced_triangles: parts.instances.iter().map(|i| triangles(i.object)).sum(),
+        instanced_triangles: written_out[world].1,
         bytes,
         resident_bytes: objects.reports.iter().map(|o| o.resident_bytes).sum(),
         worker: objects.worker.clone(),

@@ -5,11 +5,24 @@ use crate::error::{Error, Result};
 use crate::write::{Names, SceneParts};
 use bth_format::layout as on_disk;
 use bth_format::layout::NONE;
-use bth_scene::{Lens, LightKind, Manifest, Track, Transform};
+use bth_scene::{Lens, LightKind, Manifest, NodeGroups, Track, Transform};
 
-/// The order of the nodes with parents before children: the manifest's order where it has this
-/// property, else by depth.
+/// The order of the nodes with parents before children and groups before what shows them: the
+/// manifest's order where it has this property, else by depth.
 pub(super) fn order(manifest: &Manifest) -> Vec<usize> {
+    let mut order = parents_first(manifest);
+    if let Some(groups) = groups(manifest) {
+        order.sort_by_key(|node| groups.order(*node));
+    }
+    order
+}
+
+/// The groups of nodes, which the reader of manifests has checked.
+fn groups(manifest: &Manifest) -> Option<NodeGroups> {
+    NodeGroups::of(&manifest.nodes).unwrap_or_default()
+}
+
+fn parents_first(manifest: &Manifest) -> Vec<usize> {
     let nodes = &manifest.nodes;
     let mut order: Vec<usize> = (0..nodes.len()).collect();
     if nodes.iter().enumerate().all(|(row, node)| node.parent.is_none_or(|parent| parent < row)) {
@@ -68,6 +81,8 @@ pub(super) fn encode(
         names: Vec::new(),
         deformers: deformers::encode(manifest, &row_of, objects),
     };
+    let groups = groups(manifest);
+    let is_group = |node: usize| groups.as_ref().is_some_and(|groups| groups.is_group(node));
     for (row, &index) in order.iter().enumerate() {
         let node = &manifest.nodes[index];
         let (name, name_length) = names.add(&node.name);
@@ -76,13 +91,17 @@ pub(super) fn encode(
         parts.nodes.push(on_disk::Node {
             transform,
             parent: node.parent.map_or(NONE, |parent| row_of[parent]),
-            flags: hidden | matrix,
+            flags: hidden | matrix | if is_group(index) { on_disk::NODE_GROUP } else { 0 },
             name,
             name_length,
             reserved: [0; 4],
         });
         if let Some(object) = node.object.filter(|_| visible[index]).and_then(|object| objects[object]) {
             parts.instances.push(on_disk::Instance { node: row as u32, object, flags: 0, reserved: 0 });
+        }
+        if let Some(group) = node.group.filter(|_| visible[index]) {
+            let (object, flags) = (row_of[group], on_disk::INSTANCE_OF_GROUP);
+            parts.instances.push(on_disk::Instance { node: row as u32, object, flags, reserved: 0 });
         }
     }
     add_tracks(&mut parts, manifest, &row_of);

@@ -90,6 +90,7 @@ fn manifest(meshes: usize, instances: &[Instance], names: SceneNames<'_>) -> Man
         parent: None,
         transform: Transform::Matrix(instance.to_world),
         object: Some(instance.mesh as usize),
+        group: None,
         visible: true,
     };
     Manifest {

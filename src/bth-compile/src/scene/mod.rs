@@ -27,6 +27,7 @@ mod report;
 mod sections;
 mod sources;
 mod visible;
+mod whole_files;
 
 pub use compile::{CachePolicy, SceneSource, compile, compile_cached, compile_objects, dry_run};
 pub use files::files;

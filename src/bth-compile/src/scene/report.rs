@@ -54,6 +54,8 @@ pub struct SceneReport {
     pub nodes: u64,
     /// Instances that may be visible.
     pub instances: u64,
+    /// Instances as the file holds them: each group of nodes once.
+    pub rows: u64,
     /// Tracks.
     pub tracks: u64,
     /// Cameras.

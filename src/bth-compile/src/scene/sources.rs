@@ -38,7 +38,8 @@ impl SourcePart {
             },
             Source::RigidPart { mesh, joint, .. } => SourcePart::Gltf(GltfPart::Rigid { mesh, joint }),
             Source::AtRest { node, .. } => SourcePart::Gltf(GltfPart::AtRest(node)),
-            Source::Compiled { object, .. } => SourcePart::Object(object),
+            // Those named as a whole that are still there have one object.
+            Source::Compiled { object, .. } => SourcePart::Object(object.unwrap_or(0)),
             Source::Sequence { .. } | Source::Cached { .. } => SourcePart::Whole,
         }
     }

@@ -4,6 +4,7 @@ use super::deformers::{self, DeformationOf};
 use super::rows::{RowResult, check_fields, check_rows};
 use super::tracks;
 use crate::error::{Code, Error, Result};
+use crate::groups::Groups;
 use crate::layout::*;
 use crate::names::{self, is_name};
 use crate::view::SceneView;
@@ -15,8 +16,8 @@ const NAME_EXPECTED: &str = "a name of at most 4096 bytes within NAMES";
 /// Checks the scene sections of a file; `objects` is the number of its objects.
 ///
 /// # Errors
-/// The first violation of `BTH-F150` to `BTH-F159` and `BTH-F180` to `BTH-F186`, with an offset
-/// from the start of its section.
+/// The first violation of `BTH-F150` to `BTH-F159`, `BTH-F180` to `BTH-F186`, and `BTH-F188`, with
+/// an offset from the start of its section.
 pub(crate) fn check(view: &SceneView<'_>, objects: u32, deformation: DeformationOf<'_>) -> Result<()> {
     scene_row(view)?;
     let names = names::checked(view.names);
@@ -25,7 +26,8 @@ pub(crate) fn check(view: &SceneView<'_>, objects: u32, deformation: Deformation
     deformers::check(view, objects, deformation)?;
     tracks::check(view)?;
     check_rows(kind::CAMERAS, view.cameras, |_, camera| self::camera(view, names, camera))?;
-    check_rows(kind::LIGHTS, view.lights, |_, light| self::light(view, names, light))
+    check_rows(kind::LIGHTS, view.lights, |_, light| self::light(view, names, light))?;
+    groups(view)
 }
 
 /// BTH-F150: the SCENE row.
@@ -56,7 +58,9 @@ fn node(names: &str, row: usize, node: &Node) -> RowResult<()> {
     let transforms = is_matrix || !tracks::is_zero(&t[3..7]) && tracks::is_zero(&t[10..]);
     check_fields!(Node {
         Node parent: node.parent == NONE || (node.parent as usize) < row, "a lesser row or NONE", node.parent;
-        Node flags: node.flags & !(NODE_HIDDEN | NODE_MATRIX) == 0, "known flags", node.flags;
+        Node flags: node.flags & !(NODE_HIDDEN | NODE_MATRIX | NODE_GROUP) == 0
+            && (node.flags & NODE_GROUP == 0 || node.parent == NONE),
+            "known flags, and no parent of a group", node.flags;
         Node reserved: node.reserved == [0; 4], "zeros", node.reserved;
         NodeTransform transform: t.iter().all(|x| x.is_finite()) && transforms,
             "a finite transform with a quaternion that is not zero", t;
@@ -70,10 +74,50 @@ fn instance(view: &SceneView<'_>, instance: &Instance, objects: u32) -> RowResul
     let (flags, reserved) = (instance.flags, instance.reserved);
     check_fields!(Instance {
         Instance node: (instance.node as usize) < view.nodes.len(), "a row of NODES", instance.node;
-        Instance object: instance.object < objects, "an object", instance.object;
-        Instance flags: (flags, reserved) == (0, 0), "zeros", (flags, reserved);
+        Instance flags: (flags & !INSTANCE_OF_GROUP, reserved) == (0, 0), "known flags", (flags, reserved);
+        Instance object: match instance.group() {
+            None => instance.object < objects,
+            Some(node) => view.nodes.get(node as usize).is_some_and(|node| node.flags & NODE_GROUP != 0),
+        }, "an object or a group", instance.object;
     });
     Ok(())
+}
+
+/// BTH-F188.
+fn groups(view: &SceneView<'_>) -> Result<()> {
+    let Some(groups) = Groups::of(view) else { return Ok(()) };
+    let at = |section, offset: usize, expected: &'static str, found: String| {
+        Err(Error::within_file(Code::NodeGroups, section, offset as u64, expected, found))
+    };
+    let is_in_group =
+        |node: u32| view.nodes.get(node as usize).is_some() && groups.of_node(node) != groups.world();
+    let skinned: Vec<u32> = view.deformers.iter().filter(|d| d.skin != NONE).map(|d| d.object).collect();
+    let mut before = 0;
+    for (row, instance) in view.instances.iter().enumerate() {
+        let within = groups.of_node(instance.node);
+        let is_behind = instance.group().is_none_or(|node| groups.of_node(node) < within);
+        let is_skinned = instance.group().is_none() && skinned.contains(&instance.object);
+        if within < before || !is_behind || within != groups.world() && is_skinned {
+            let expected =
+                "an instance in the order of the groups, of an object without a skin or an earlier group";
+            return at(kind::INSTANCES, row * size_of::<Instance>(), expected, format!("{instance:?}"));
+        }
+        before = within;
+    }
+    if let Err(found) = groups.written_out(view) {
+        let expected = "at most 16 levels and fewer than 2^32 - 1 instances once groups are written out";
+        return at(kind::INSTANCES, 0, expected, found);
+    }
+    let world_only = |section, size: usize, row: Option<usize>| match row {
+        Some(row) => at(section, row * size, "a node of the world", "a node in a group".to_owned()),
+        None => Ok(()),
+    };
+    let camera = view.cameras.iter().position(|camera| is_in_group(camera.node));
+    world_only(kind::CAMERAS, size_of::<Camera>(), camera)?;
+    let light = view.lights.iter().position(|light| is_in_group(light.node));
+    world_only(kind::LIGHTS, size_of::<Light>(), light)?;
+    let deformer = view.deformers.iter().position(|deformer| is_in_group(deformer.node));
+    world_only(kind::DEFORMERS, size_of::<Deformer>(), deformer)
 }
 
 /// BTH-F158 and BTH-F153 of a camera.

@@ -30,7 +30,7 @@ pub struct Node {
     pub transform: [f64; 12],
     /// Row of the parent, less than its own; [`super::NONE`] where the parent is the world.
     pub parent: u32,
-    /// [`NODE_HIDDEN`], [`NODE_MATRIX`].
+    /// [`NODE_HIDDEN`], [`NODE_MATRIX`], [`NODE_GROUP`].
     pub flags: u32,
     /// First byte of its name in `NAMES`.
     pub name: u32,
@@ -45,19 +45,33 @@ pub struct Node {
 pub const NODE_HIDDEN: u32 = 1;
 /// Flag of [`Node`]: the transform is a matrix.
 pub const NODE_MATRIX: u32 = 2;
+/// Flag of [`Node`]: the node and all below it are a group. It has no parent, and shows in the
+/// world only where instances of the group are.
+pub const NODE_GROUP: u32 = 4;
 
-/// An object placed at a node. Hits name instances by their rows.
+/// An object or a group placed at a node. Where there are no groups, hits name instances by their
+/// rows.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct Instance {
     /// Row of `NODES`.
     pub node: u32,
-    /// Object of the file.
+    /// Object of the file, or with [`INSTANCE_OF_GROUP`] the row of a node with [`NODE_GROUP`].
     pub object: u32,
-    /// Zero.
+    /// [`INSTANCE_OF_GROUP`].
     pub flags: u32,
     /// Zero.
     pub reserved: u32,
+}
+
+/// Flag of [`Instance`]: it is an instance of a group.
+pub const INSTANCE_OF_GROUP: u32 = 1;
+
+impl Instance {
+    /// The node of the group that it shows; `None` for an instance of an object.
+    pub fn group(&self) -> Option<u32> {
+        (self.flags & INSTANCE_OF_GROUP != 0).then_some(self.object)
+    }
 }
 
 /// Keyframes of one property of one node.

@@ -51,7 +51,7 @@ impl SceneBounds {
             if scene.set_frame(first + step as i32).is_err() {
                 continue;
             }
-            let visible = (0..scene.instance_count()).filter_map(|i| scene.instance_bounds(i));
+            let visible = scene.visible_bounds().into_iter();
             boxes.extend(visible.map(|(lower, upper)| (to_f64(lower), to_f64(upper))));
         }
         let (lower, upper) = united(&boxes);

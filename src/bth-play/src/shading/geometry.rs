@@ -16,8 +16,8 @@ pub(crate) struct ShadingGeometry<'a> {
     /// True if the vertices of each object can be elsewhere than in the file, so that its normals
     /// are, too.
     deformable: Vec<bool>,
-    /// The object of each instance.
-    object_of: Vec<u32>,
+    /// The object of each instance; empty where groups make them many.
+    objects_of: Vec<u32>,
     /// Of each object; empty in modes that show no smooth normals.
     smooth: &'a [SmoothNormals],
 }
@@ -32,7 +32,10 @@ impl<'a> ShadingGeometry<'a> {
             scene,
             objects: (0..scene.object_count()).map(|i| scene.object(i)).collect(),
             deformable: (0..scene.object_count()).map(|i| scene.vertex_count(i).is_some()).collect(),
-            object_of: (0..scene.instance_count()).map(|i| scene.object_of(i)).collect(),
+            objects_of: match scene.has_groups() {
+                true => Vec::new(),
+                false => (0..scene.instance_count()).map(|i| scene.object_of(i)).collect(),
+            },
             smooth,
         }
     }
@@ -52,7 +55,12 @@ impl<'a> ShadingGeometry<'a> {
 
     /// The object of a primitive.
     pub(super) fn object(&self, primitive: PrimitiveRef) -> &ObjectView<'a> {
-        &self.objects[self.object_of[primitive.instance as usize] as usize]
+        &self.objects[self.object_of(primitive.instance) as usize]
+    }
+
+    fn object_of(&self, instance: u32) -> u32 {
+        let known = self.objects_of.get(instance as usize).copied();
+        known.unwrap_or_else(|| self.scene.object_of(instance))
     }
 
     fn to_world(&self, primitive: PrimitiveRef, normal: DVec3) -> Option<DVec3> {
@@ -95,8 +103,7 @@ impl<'a> ShadingGeometry<'a> {
     /// The interpolated normal of the source, or a smooth one, on the side of the geometric one; or
     /// the geometric one when there is neither.
     pub(crate) fn shading_normal(&self, hit: &Hit, geometric: DVec3) -> DVec3 {
-        let (object, row) =
-            (self.object(hit.primitive), self.object_of[hit.primitive.instance as usize] as usize);
+        let (object, row) = (self.object(hit.primitive), self.object_of(hit.primitive.instance) as usize);
         let PrimitiveRef { instance, triangle } = hit.primitive;
         let corners = object.corners.get(triangle as usize).filter(|_| !object.normals.is_empty());
         let Some(corners) = corners else {

@@ -11,6 +11,8 @@ pub(super) struct StagedInstance {
     pub(super) transform: [f64; 12],
     /// Index of its object, or `NONE` if the instance was removed.
     pub(super) object: u32,
+    /// The group in which it is, or `NONE`.
+    pub(super) within: u32,
     /// The subscene to which it belongs, or `NONE`.
     pub(super) subscene: u32,
     /// Its node in the file of the subscene, or `NONE`.
@@ -25,6 +27,7 @@ impl StagedInstance {
     pub(super) const REMOVED: StagedInstance = StagedInstance {
         transform: [0.0; 12],
         object: NONE,
+        within: NONE,
         subscene: NONE,
         node: NONE,
         visible: false,

@@ -1,13 +1,16 @@
 //! Scenes whose instances the caller places: the objects of several files, moved at run time.
 //!
 //! Changes are staged. A commit makes all of them visible, or none if it fails. The staged state is
-//! here ([`instances`] of single objects, [`subscenes`] of whole files). The committed state is in
-//! the [`Scene`], so rays reach instances of callers and of files in the same way.
+//! here ([`instances`] of single objects, [`groups`], [`subscenes`] of whole files). The committed
+//! state is in the [`Scene`], so rays reach instances of callers and of files in the same way.
 
+mod groups;
 mod ids;
 mod instances;
 mod positions;
 mod subscenes;
+
+pub use self::groups::Content;
 
 use self::ids::FreeIds;
 use self::instances::StagedInstance;
@@ -27,7 +30,8 @@ const MAX_INSTANCES: usize = 1 << 30;
 /// objects, whose files are shared with the scenes that they were added from.
 ///
 /// Instances are named by an id, which stays the same until the instance is removed, and which is
-/// the instance of hits ([`PrimitiveRef`](crate::rays::PrimitiveRef)). A commit frees the ids of
+/// the instance of hits ([`PrimitiveRef`](crate::rays::PrimitiveRef)) where there are no groups
+/// ([`Self::add_group`]). A commit frees the ids of
 /// removed instances; the lowest free id is used first.
 ///
 /// ```

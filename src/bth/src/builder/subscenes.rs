@@ -3,11 +3,12 @@
 
 use super::SceneBuilder;
 use super::instances::StagedInstance;
-use crate::instances::{InstanceRow, NewInstance};
+use crate::instances::{InstanceRow, NewInstance, object_of_group};
 use crate::nodes::{Affine, NodeHierarchy};
 use crate::objects::Objects;
 use crate::scene::motion::check_time;
-use bth_format::layout::NONE;
+use bth_format::groups::Groups;
+use bth_format::layout::{Instance, NONE};
 use bth_format::{Code, Error, SceneView};
 use std::collections::HashSet;
 
@@ -49,15 +50,31 @@ impl Subscene {
         }
     }
 
-    /// For each instance of the file the index in the scene of its object, and its node or `NONE`.
-    pub(super) fn instances(objects: &Objects, first_object: u32) -> Vec<(u32, u32)> {
-        match scene(objects, first_object) {
-            Some(view) => view.instances.iter().map(|row| (first_object + row.object, row.node)).collect(),
-            None => {
-                let (file, _) = objects.locate(first_object).expect("an object of the scene");
-                (first_object..first_object + file.object_count()).map(|object| (object, NONE)).collect()
+    /// The instances of the file, and the number of its groups. Its groups have the numbers from
+    /// `first_group` on.
+    pub(super) fn instances(
+        objects: &Objects,
+        first_object: u32,
+        first_group: u32,
+    ) -> (Vec<StagedInstance>, u32) {
+        let row = |object: u32, node: u32| StagedInstance { object, node, ..StagedInstance::REMOVED };
+        let Some(view) = scene(objects, first_object) else {
+            let (file, _) = objects.locate(first_object).expect("an object of the scene");
+            let all = first_object..first_object + file.object_count();
+            return (all.map(|object| row(object, NONE)).collect(), 0);
+        };
+        let groups = Groups::of(&view);
+        let count = groups.as_ref().map_or(0, Groups::world);
+        let group_of = |node: u32| groups.as_ref().map_or(count, |groups| groups.of_node(node));
+        let staged = |instance: &Instance| {
+            let shown = instance.group().map(|node| object_of_group(first_group + group_of(node)));
+            let within = Some(group_of(instance.node)).filter(|group| *group < count);
+            StagedInstance {
+                within: within.map_or(NONE, |group| first_group + group),
+                ..row(shown.unwrap_or(first_object + instance.object), instance.node)
             }
-        }
+        };
+        (view.instances.iter().map(staged).collect(), count)
     }
 
     /// Evaluates the nodes for the pose, and calls `moved` with the id of each instance that has to
@@ -85,9 +102,15 @@ impl Subscene {
     }
 
     /// The transform of a node of the file to world space as evaluated, and whether it is visible.
-    /// An object that is `skinned` is not moved by its node.
-    pub(super) fn node(&self, objects: &Objects, node: u32, skinned: bool) -> (Affine, bool) {
-        let outer = Affine::from_rows(&self.pose.transform);
+    /// An object that is `skinned` is not moved by its node, and a node in a group (`in_group`) not
+    /// by the subscene.
+    pub(super) fn node(
+        &self,
+        objects: &Objects,
+        node: u32,
+        (skinned, in_group): (bool, bool),
+    ) -> (Affine, bool) {
+        let outer = if in_group { Affine::IDENTITY } else { Affine::from_rows(&self.pose.transform) };
         match (scene(objects, self.first_object), &self.hierarchy) {
             (_, Some(hierarchy)) if skinned => (outer, self.pose.visible && !hierarchy.invisible(node)),
             (Some(view), Some(hierarchy)) => {
@@ -109,13 +132,13 @@ impl StagedInstance {
         subscenes: &[Option<Subscene>],
         skinned: &HashSet<u32>,
     ) -> NewInstance {
-        let StagedInstance { object, subscene, node, visible, .. } = *self;
+        let StagedInstance { object, within, subscene, node, visible, .. } = *self;
         let owner = subscenes.get(subscene as usize).and_then(Option::as_ref);
         let (to_world, shown) = match owner {
-            Some(owner) => owner.node(objects, node, skinned.contains(&object)),
+            Some(owner) => owner.node(objects, node, (skinned.contains(&object), within != NONE)),
             None => (Affine::from_rows(&self.transform), true),
         };
-        NewInstance { row: InstanceRow { object, node, to_world }, visible: visible && shown }
+        NewInstance { row: InstanceRow { object, within, node, to_world }, visible: visible && shown }
     }
 }
 
@@ -128,7 +151,8 @@ fn scene(objects: &Objects, object: u32) -> Option<SceneView<'_>> {
 impl SceneBuilder {
     /// Adds an instance of each instance of a file, placed by the nodes and tracks of the file and
     /// then by `transform`, as at the first frame of the file. A file without scene sections has
-    /// one instance of each object. `first_object` is what [`Self::add`] returned. Returns the id
+    /// one instance of each object. Groups of the file become groups of the scene, for this
+    /// subscene alone. `first_object` is what [`Self::add`] returned. Returns the id
     /// of the subscene; a file may have any number of subscenes, each with its own time. All of
     /// them share the objects that the file's skins and morph targets deform; the time of the
     /// subscene with the lowest id decides their pose. For other poses, add the file again.
@@ -148,20 +172,16 @@ impl SceneBuilder {
             let found = format!("object {first_object}, which is number {row} of its file");
             return Err(Error::of_call(Code::NoSuchObject, expected, found));
         }
-        let rows = Subscene::instances(self.scene.objects(), first_object);
+        let first_group = self.scene.world().map_or(0, |world| world.group_count());
+        let (rows, groups) = Subscene::instances(self.scene.objects(), first_object, first_group);
         self.check_capacity(rows.len())?;
+        (0..groups).for_each(|_| _ = self.add_group());
         let id = self.subscene_ids.take().unwrap_or_else(|| {
             self.subscenes.push(None);
             (self.subscenes.len() - 1) as u32
         });
         let mut subscene = Subscene::new(self.scene.objects(), first_object, transform.map(Into::into));
-        let staged = |(object, node): (u32, u32)| StagedInstance {
-            object,
-            node,
-            subscene: id,
-            visible: true,
-            ..StagedInstance::REMOVED
-        };
+        let staged = |row: StagedInstance| StagedInstance { subscene: id, visible: true, ..row };
         subscene.ids = rows.into_iter().map(|row| self.stage(staged(row))).collect();
         self.subscenes[id as usize] = Some(subscene);
         Ok(id)

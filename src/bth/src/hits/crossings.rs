@@ -59,7 +59,7 @@ impl Receiver for CrossingCounter<'_> {
 /// Counts the crossings of a ray in all instances.
 pub(super) fn count_crossings(scene: &Scene, world_ray: WorldRay<'_>) -> Crossings {
     let (mut total, Ray { tmax, .. }) = (Crossings::default(), *world_ray.ray);
-    enumerate_instances(scene, world_ray.ray, &mut |entered| {
+    enumerate_instances(scene, (world_ray.ray, &|| world_ray.rounded_line()), &mut |entered| {
         let of_instance = entered.ray(world_ray, tmax);
         let t_scale = f64::from(of_instance.t_scale());
         let mut counter = CrossingCounter {

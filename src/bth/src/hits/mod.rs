@@ -184,12 +184,13 @@ impl Scene {
 
     /// Sets the mask of an instance. A ray can hit the instance only if its [`Accept::mask`] and
     /// this mask have a bit in common. At first all bits are set. Queries without [`Accept`] ignore
-    /// masks.
+    /// masks. In a scene with groups `instance` is a row ([`Self::instance_path`]), and the mask of
+    /// an instance has the bits that the masks of all rows on the way to it have.
     ///
     /// # Panics
-    /// If there is no such instance.
+    /// If `instance` is not below [`Self::row_count`].
     pub fn set_instance_mask(&mut self, instance: u32, mask: u32) {
-        let count = self.instance_count();
+        let count = self.row_count();
         assert!(instance < count, "expected an instance below {count}, found {instance}");
         self.masks_mut().set_instance(instance, mask);
     }
@@ -205,12 +206,13 @@ impl Scene {
         self.masks_mut().set_group(object, group, mask);
     }
 
-    /// The mask of an instance; all bits are set unless [`Self::set_instance_mask`] was called.
+    /// The mask of an instance, with groups of a row; all bits are set unless
+    /// [`Self::set_instance_mask`] was called.
     ///
     /// # Panics
     /// If there is no such instance.
     pub fn instance_mask(&self, instance: u32) -> u32 {
-        let count = self.instance_count();
+        let count = self.row_count();
         assert!(instance < count, "expected an instance below {count}, found {instance}");
         self.masks().of_instance(instance)
     }

@@ -82,7 +82,7 @@ fn conditions<'a>(
 /// The nearest accepted hit in instances, or [`Hit::MISS`]; `None` if the kernel cannot find it.
 fn nearest_in_instances(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>) -> Option<Hit> {
     let (world, mut best) = (world_of_kernel(scene, &ray)?, Hit::MISS);
-    let enters = |instance| accept.mask & scene.masks().of_instance(instance) != 0;
+    let enters = |instance| accept.mask & scene.mask_of(instance) != 0;
     world.nearest_by(scene.objects(), ray, &mut best, enters, |object, placed, so_far, hit| {
         let instance = placed.instance;
         let conditions = conditions(scene, ray.ray, (instance, object), accept);
@@ -96,7 +96,7 @@ fn nearest_in_instances(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>) -
 /// Returns true if there is an accepted hit in an instance; `None` if the kernel cannot find it.
 fn any_in_instances(scene: &Scene, ray: WorldRay<'_>, accept: &Accept<'_>) -> Option<bool> {
     let world = world_of_kernel(scene, &ray)?;
-    let enters = |instance| accept.mask & scene.masks().of_instance(instance) != 0;
+    let enters = |instance| accept.mask & scene.mask_of(instance) != 0;
     Some(world.any_by(scene.objects(), ray, enters, |object, placed| {
         let instance = placed.instance;
         let conditions = conditions(scene, ray.ray, (instance, object), accept);

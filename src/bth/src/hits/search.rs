@@ -25,8 +25,8 @@ pub(super) fn search(
     let (masks, ray) = (scene.masks(), world_ray.ray);
     // Not `f32::min`, which would replace a `tmax` of NaN by a number.
     let tmax = |limit: f32| if limit < ray.tmax { limit } else { ray.tmax };
-    enumerate_instances(scene, ray, &mut |entered| {
-        if accept.mask & masks.of_instance(entered.instance) != 0
+    enumerate_instances(scene, (ray, &|| world_ray.rounded_line()), &mut |entered| {
+        if accept.mask & scene.mask_of(entered.instance) != 0
             && search_instance(&entered, (world_ray, tmax(collector.limit())), (accept, masks), collector)
         {
             return None;

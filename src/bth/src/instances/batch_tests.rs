@@ -21,7 +21,13 @@ fn nearest_by_loop(world: &World, objects: &Objects, ray: &Ray) -> Hit {
     for (instance, placement) in world.placements.iter().enumerate() {
         let Some(placement) = placement else { continue };
         let instance = instance as u32;
-        let of_instance = RayInInstance::new(world, objects, instance, WorldRay::plain(ray), ray.tmax);
+        let of_instance = RayInInstance::new(
+            world,
+            objects,
+            (instance, world.placement(instance)),
+            WorldRay::plain(ray),
+            ray.tmax,
+        );
         let hit = object::nearest(objects.view(placement.object()), &of_instance, instance);
         best = better(ray, &best, &hit, of_instance.of_object.t_scale).unwrap_or(best);
     }
@@ -81,7 +87,8 @@ fn nearest_start_by_loop(scene: &Scene, ray: &StartRay) -> Hit {
         let Some(placement) = placement else { continue };
         let (instance, world_ray) = (instance as u32, placed.world_ray());
         let objects = scene.objects();
-        let of_instance = RayInInstance::new(world, objects, instance, world_ray, ray.tmax);
+        let of_instance =
+            RayInInstance::new(world, objects, (instance, world.placement(instance)), world_ray, ray.tmax);
         let hit = object::nearest(objects.view(placement.object()), &of_instance, instance);
         best = better(&placed.ray, &best, &hit, of_instance.of_object.t_scale).unwrap_or(best);
     }

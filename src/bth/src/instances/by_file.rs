@@ -1,7 +1,8 @@
 //! The instances of a file with scene sections at a time.
 
-use super::by_caller::NewInstance;
-use super::world::{InstanceRow, TransformSource, World, scene_of};
+use super::groups::{self, RowPlace, object_of_group};
+use super::placement::PlacementError;
+use super::world::{InstanceRow, NewInstance, TransformSource, World, scene_of};
 use crate::animation::{AnimatedFile, StagedPoses};
 use crate::clock;
 use crate::nodes::affine::Affine;
@@ -9,7 +10,11 @@ use crate::nodes::hierarchy::NodeHierarchy;
 use crate::objects::Objects;
 use crate::update::Update;
 use bth_format::error::{Error, Result};
+use bth_format::groups::Groups;
 use bth_format::layout::*;
+
+/// Rows that are placed at a time, so that few placements are in memory twice.
+const CHUNK: usize = 1 << 16;
 
 impl World {
     /// The instances of a file at the first frame of its scene; `None` if the objects are not those
@@ -24,6 +29,16 @@ impl World {
         let seconds = f64::from(scene.first_frame) / scene.rate;
         let source = TransformSource::File(NodeHierarchy::new(&view));
         let mut world = World::unplaced(source, seconds, view.instances.len(), file.object_count());
+        if let Some(groups) = Groups::of(&view) {
+            let place = |instance: &Instance| RowPlace {
+                object: instance
+                    .group()
+                    .map_or(instance.object, |node| object_of_group(groups.of_node(node))),
+                within: groups.of_node(instance.node),
+            };
+            let groups = groups::Groups::new(view.instances.iter().map(place), groups.world());
+            world.set_groups(groups.expect("the check of the scene has counted them"));
+        }
         world.animation.add(file, 0);
         world.evaluate_nodes(objects, seconds, true);
         world.place_moved(objects, seconds, &[], true)?;
@@ -38,7 +53,7 @@ impl World {
         let (mut world, all) = (World::empty(), (0..objects.count()).collect::<Vec<_>>());
         world.add_objects(objects.count());
         let in_place = |object| {
-            let row = InstanceRow { object, node: NONE, to_world: Affine::IDENTITY };
+            let row = InstanceRow { object, within: NONE, node: NONE, to_world: Affine::IDENTITY };
             NewInstance { row, visible: true }
         };
         let changed = world.change(objects, all.len(), &all, &in_place);
@@ -129,41 +144,66 @@ impl World {
         let mut deforms = vec![false; if deformed.is_empty() { 0 } else { objects.count() as usize }];
         deformed.iter().for_each(|object| deforms[*object as usize] = true);
         let mut update = Update::default();
-        for (row, instance) in view.instances.iter().enumerate() {
+        let failed = |row: usize, error: PlacementError| {
+            let (code, expected, found) = error.words();
+            let node = view.instances[row].node;
+            let name = view.node_name(node);
+            let found = format!("{found}: node \"{}\" at {seconds} s", name.escape_debug());
+            let offset = u64::from(node) * size_of::<Node>() as u64;
+            let error = Error::within_file(code, kind::NODES, offset, expected, found);
+            objects.sole_file().expect("a file with nodes").locate(error, NONE)
+        };
+        let is_skinned =
+            |world: &World, of: &Instance| of.group().is_none() && world.animation.is_skinned(of.object);
+        let hides = |hierarchy: &NodeHierarchy, of: &Instance, skinned: bool| match skinned {
+            // The transform of its node has no effect, so a scale of zero does not hide it.
+            true => hierarchy.invisible(of.node),
+            false => hierarchy.hidden(of.node),
+        };
+        let (mut moved, mut placed) = (Vec::new(), Vec::new());
+        for (first, rows) in view.instances.chunks(CHUNK).enumerate() {
             let TransformSource::File(hierarchy) = &self.source else { break };
-            let is_skinned = self.animation.is_skinned(instance.object);
-            let hidden = match is_skinned {
-                // The transform of its node has no effect, so a scale of zero does not hide it.
-                true => hierarchy.invisible(instance.node),
-                false => hierarchy.hidden(instance.node),
+            moved.clear();
+            moved.extend((0..rows.len() as u32).map(|i| (first * CHUNK) as u32 + i).filter(|row| {
+                let (row, of) = (*row as usize, &view.instances[*row as usize]);
+                let moves = match is_skinned(self, of) {
+                    true => all || hides(hierarchy, of, true) != self.placements[row].is_none(),
+                    false => hierarchy.moved(of.node),
+                };
+                moves
+                    || of.group().is_none() && deforms.get(of.object as usize).is_some_and(|deforms| *deforms)
+            }));
+            let new = |row: u32| {
+                let of = &view.instances[row as usize];
+                let skinned = is_skinned(self, of);
+                let visible = !hides(hierarchy, of, skinned);
+                let to_world = match skinned {
+                    true => Affine::IDENTITY,
+                    false => hierarchy.to_world(&view, of.node),
+                };
+                let object = if of.group().is_some() { object_of_group(0) } else { of.object };
+                NewInstance { row: InstanceRow { object, within: NONE, node: of.node, to_world }, visible }
             };
-            let moved = match is_skinned {
-                true => all || hidden != self.placements[row].is_none(),
-                false => hierarchy.moved(instance.node),
+            self.place_all(objects, &moved, &new, &mut placed);
+            let staged: Vec<_> = match self.groups() {
+                Some(_) => moved.iter().map(|row| new(*row)).collect(),
+                None => Vec::new(),
             };
-            if !moved && !deforms.get(instance.object as usize).is_some_and(|deforms| *deforms) {
-                continue;
+            for (row, placed) in moved.iter().zip(&placed) {
+                self.placements[*row as usize] = placed.map_err(|error| failed(*row as usize, error))?;
             }
-            self.placements[row] = None;
-            update.placed += 1;
-            if hidden {
-                continue;
+            if let Some(groups) = self.groups_mut() {
+                for (row, NewInstance { row: InstanceRow { to_world, .. }, visible }) in
+                    moved.iter().zip(&staged)
+                {
+                    groups.stage(*row as usize, to_world, *visible);
+                }
             }
-            let world = match is_skinned {
-                true => Affine::IDENTITY,
-                false => hierarchy.to_world(&view, instance.node),
-            };
-            let placement = self.place(objects, instance.object, &world, false).map_err(|error| {
-                let (code, expected, found) = error.words();
-                let name = view.node_name(instance.node);
-                let found = format!("{found}: node \"{}\" at {seconds} s", name.escape_debug());
-                let offset = u64::from(instance.node) * size_of::<Node>() as u64;
-                let error = Error::within_file(code, kind::NODES, offset, expected, found);
-                objects.sole_file().expect("a file with nodes").locate(error, NONE)
-            })?;
-            self.placements[row] = placement;
+            update.placed += moved.len();
         }
         if update.placed > 0 {
+            let groups = self.update_groups(objects, std::iter::empty());
+            groups.map_err(|at| failed(at.instance as usize, at.error))?;
             self.update_top(false, &mut update);
         }
         update.visible = self.visible();

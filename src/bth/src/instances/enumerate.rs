@@ -11,12 +11,14 @@ use crate::bvh::single_stack::SingleStack;
 use crate::bvh::stack::BOTTOM;
 use crate::bvh::walk::{BoxQuery, Tree, run_walk, walk};
 use crate::intersect::boxes::{RaySlabLanes, RaySlabs};
+use crate::intersect::line::Line;
 use crate::intersect::point_lanes::{LanePoint, PointLanes};
 use crate::intersect::prepare::PreparedRay;
 use crate::intersect::region_box::{RegionBox, RegionLanes};
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, Simd};
 use bth_format::layout::WideNode;
+use bth_format::object::ObjectBounds;
 use std::hint::black_box;
 
 impl World {
@@ -45,13 +47,9 @@ impl World {
 
     /// Calls `visit` with each visible instance whose box may overlap a region, until it returns
     /// true. Returns true then.
-    pub(crate) fn enumerate_in_box(&self, region: RegionBox, visit: &mut dyn FnMut(u32) -> bool) -> bool {
+    pub(super) fn rows_in_box(&self, region: [[f64; 3]; 2], visit: &mut dyn FnMut(u32) -> bool) -> bool {
+        let region = RegionBox::in_world(region, self.top.greatest_coordinate());
         !self.top.is_empty() && run_walk(&self.top, &mut BoxInstances { region, visit })
-    }
-
-    /// Max |coordinate| of the boxes of instances.
-    pub(crate) fn max_coordinate(&self) -> f32 {
-        self.top.greatest_coordinate()
     }
 }
 
@@ -104,20 +102,54 @@ impl Kernel for RayKernel<'_> {
     fn run<S: Simd>(self, s: S) -> bool {
         let RayKernel { top, ray, visit } = self;
         let Some(slabs) = slabs(s, ray, top) else { return false };
-        // Kept in memory: vectors of its numbers would be stored before each visit and loaded after
-        // it.
-        let slabs = black_box(&slabs);
-        let last = limit(slabs.scale, ray.tmax);
-        // Lists save visits, but elsewhere they take longer than that.
-        if S::HAS_FAST_COMPRESS
-            && ray.tmin >= 0.0
-            && let Some(list) = InstanceList::of(s, top, slabs, last)
-        {
-            return list.visit(slabs.scale, ray.tmax, visit);
-        }
-        let mut query = RayInstances { slabs, tmax: ray.tmax, last, visit };
-        walk(s, top, &mut query, &mut SingleStack::new())
+        walk_ray(s, (top, ray), &slabs, visit)
     }
+}
+
+/// Like [`RayKernel`], in the space of a group. The ray is prepared for `bounds`.
+pub(super) struct GroupKernel<'a> {
+    pub(super) top: &'a TopLevel,
+    pub(super) bounds: &'a ObjectBounds,
+    pub(super) ray: &'a Ray,
+    pub(super) visit: InstanceReceiver<'a>,
+}
+
+impl Kernel for GroupKernel<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> bool {
+        let GroupKernel { top, bounds, ray, visit } = self;
+        let slabs = match PreparedRay::of(s, bounds, ray) {
+            Some(prepared) => prepared.slabs,
+            // Where numbers leave the range of f32, every box is entered.
+            None => Line::new(ray).map_or(RaySlabs::NONE, |line| RaySlabs::new(ray, &line, bounds)),
+        };
+        walk_ray(s, (top, ray), &slabs, visit)
+    }
+}
+
+/// Visits what a ray with these constants may enter. Returns true if `visit` has ended the walk.
+#[inline(always)]
+fn walk_ray<S: Simd>(
+    s: S,
+    (top, ray): (&TopLevel, &Ray),
+    slabs: &RaySlabs,
+    visit: InstanceReceiver<'_>,
+) -> bool {
+    // Kept in memory: vectors of its numbers would be stored before each visit and loaded after
+    // it.
+    let slabs = black_box(slabs);
+    let last = limit(slabs.scale, ray.tmax);
+    // Lists save visits, but elsewhere they take longer than that.
+    if S::HAS_FAST_COMPRESS
+        && ray.tmin >= 0.0
+        && let Some(list) = InstanceList::of(s, top, slabs, last)
+    {
+        return list.visit(slabs.scale, ray.tmax, visit);
+    }
+    let mut query = RayInstances { slabs, tmax: ray.tmax, last, visit };
+    walk(s, top, &mut query, &mut SingleStack::new())
 }
 
 /// The instances that a ray may enter.
@@ -164,10 +196,10 @@ impl InstanceQuery for RayInstances<'_> {
 }
 
 /// The instances near a point.
-struct PointInstances<'a> {
-    point: LanePoint,
-    squared: f64,
-    visit: &'a mut dyn FnMut(u32) -> Option<f64>,
+pub(super) struct PointInstances<'a> {
+    pub(super) point: LanePoint,
+    pub(super) squared: f64,
+    pub(super) visit: &'a mut dyn FnMut(u32) -> Option<f64>,
 }
 
 impl BoxQuery for PointInstances<'_> {
@@ -196,9 +228,9 @@ impl InstanceQuery for PointInstances<'_> {
 }
 
 /// The instances that overlap a region.
-struct BoxInstances<'a> {
-    region: RegionBox,
-    visit: &'a mut dyn FnMut(u32) -> bool,
+pub(super) struct BoxInstances<'a> {
+    pub(super) region: RegionBox,
+    pub(super) visit: &'a mut dyn FnMut(u32) -> bool,
 }
 
 impl BoxQuery for BoxInstances<'_> {

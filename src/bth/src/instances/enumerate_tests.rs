@@ -99,8 +99,7 @@ fn points_and_boxes_visit_every_instance_within_reach_and_few_others() {
                 assert!(of_point.insert(i));
                 Some(squared)
             }));
-            let boxes_in_region = RegionBox::in_world(region.map(wide), world.max_coordinate());
-            assert!(!world.enumerate_in_box(boxes_in_region, &mut |i| !of_box.insert(i)));
+            assert!(!world.enumerate_in_box(region.map(wide), &mut |i| !of_box.insert(i)));
             for (instance, bounds) in &boxes {
                 let away = outside(bounds);
                 let is_near = away.iter().map(|x| x * x).sum::<f64>() < squared * 0.9999;

@@ -46,7 +46,13 @@ pub(crate) fn add_hits(
     ray: &Ray,
     found: &mut Vec<(f64, Hit)>,
 ) {
-    let of_instance = RayInInstance::new(world, objects, instance, WorldRay::plain(ray), ray.tmax);
+    let of_instance = RayInInstance::new(
+        world,
+        objects,
+        (instance, world.placement(instance)),
+        WorldRay::plain(ray),
+        ray.tmax,
+    );
     let object_ray = &of_instance.of_object;
     if Line::of(&object_ray.line).is_none()
         || ray.tmin.partial_cmp(&ray.tmax).is_none_or(|order| order.is_gt())

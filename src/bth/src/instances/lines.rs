@@ -68,8 +68,8 @@ impl StartTriangle {
         let (object, to_world) = match place {
             Place::World(objects) => (objects?.view(start.instance), None),
             Place::Instance(world, objects, _) => {
-                let of_start = Place::Instance(world, objects, start.instance);
-                (objects.view(world.placement(start.instance).object()), of_start.rows())
+                let row = world.row(objects, start.instance);
+                (objects.view(row.object), Some(row.to_world.rows()))
             }
         };
         let corners = corners_by_id(object, start.start.primitive.triangle)?;
@@ -106,7 +106,8 @@ pub(super) fn long_line(place: Place<'_>, ray: &WorldRay<'_>, t_scale: f32) -> O
     let Place::Instance(world, _, instance) = place else {
         return Some(LongLine { origin, origin_error, direction, direction_error: 0.0 });
     };
-    let (rows, Placement { inverse, accuracy, .. }) = (place.rows()?, world.placement(instance));
+    let (rows, placement) = (place.rows()?, world.placed(instance)?);
+    let Placement { inverse, accuracy, .. } = placement.as_ref();
     let (direction, off) = inverse.solve(*accuracy, &rows, (direction, 0.0));
     let direction_error = off / max_norm(direction.map(Long::rounded));
     if ray.start_in(instance).is_some() {
@@ -144,11 +145,11 @@ impl<'a> RayInInstance<'a> {
     pub(crate) fn new(
         world: &'a World,
         objects: &'a Objects,
-        instance: u32,
+        (instance, placement): (u32, &Placement),
         ray: WorldRay<'a>,
         tmax: f32,
     ) -> RayInInstance<'a> {
-        let line = line_in(world.placement(instance), instance, &ray);
+        let line = line_in(placement, instance, &ray);
         let of_object = ObjectRay::of(line, ray.ray.tmin, tmax);
         RayInInstance { place: Place::Instance(world, objects, instance), instance, ray, of_object }
     }
@@ -384,5 +385,6 @@ impl Kernel for LanesKernel<'_> {
 /// The ray of a visit by itself, ended at `tmax`.
 pub(super) fn visit_ray<'a>(batch: &SceneBatch<'a>, visit: Visit, tmax: f32) -> RayInInstance<'a> {
     let ray = batch.world_ray(visit.ray as usize);
-    RayInInstance::new(batch.world, batch.objects, visit.instance, ray, tmax)
+    let placement = batch.world.placement(visit.instance);
+    RayInInstance::new(batch.world, batch.objects, (visit.instance, placement), ray, tmax)
 }

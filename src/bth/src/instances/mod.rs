@@ -14,6 +14,9 @@
 //! An object in world space that is alone needs no top level; where f32 does not hold it or its
 //! rays, they go through it as lines ([`in_place`]).
 //!
+//! Rows of groups ([`groups`]) lead into trees of the groups. Rays through them go one by one
+//! ([`group_walk`]).
+//!
 //! A batch ([`scene_batch`]) queues the visits of instances by rays ([`visit_queue`]), transforms
 //! the rays of an object's visits into its space ([`enter_object`]), and traces them there
 //! together, with t unchanged.
@@ -26,6 +29,8 @@ mod enter_object;
 mod enumerate;
 #[cfg(test)]
 pub(crate) mod exact_loop;
+mod group_walk;
+mod groups;
 pub(crate) mod in_place;
 mod instance_list;
 mod lines;
@@ -44,11 +49,11 @@ mod unplaced;
 mod visit_queue;
 mod world;
 
-pub(crate) use by_caller::NewInstance;
+pub use groups::InstancePath;
+pub(crate) use groups::object_of_group;
 pub(crate) use lines::RayInInstance;
 #[cfg(test)]
 pub(crate) use placement::PartBoxes;
-#[cfg(test)]
 pub(crate) use placement::Placement;
 pub(crate) use scene_batch::WorldRays;
 #[cfg(test)]
@@ -56,4 +61,4 @@ pub(crate) use top_level::TopLevel;
 #[cfg(test)]
 pub(crate) use top_nodes::INSTANCE;
 pub(crate) use unplaced::UnplacedRay;
-pub(crate) use world::{InstanceRow, World};
+pub(crate) use world::{InstanceRow, NewInstance, World};

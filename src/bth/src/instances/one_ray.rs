@@ -2,8 +2,8 @@
 //! is queued.
 
 use super::World;
-use super::instance_list::InstanceReceiver;
 use super::lines::RayInInstance;
+use super::placement::Placement;
 use crate::bvh::packet;
 use crate::coherence::is_same_octant;
 use crate::intersect::exact_line::ExactT;
@@ -37,6 +37,9 @@ impl World {
     /// see docs/notes/scenes.md.
     /// `narrow` returns a ray.
     pub(crate) fn go_one_by_one(&self, count: usize, narrow: impl Fn(usize) -> Ray) -> bool {
+        if self.groups().is_some() {
+            return true;
+        }
         if self.only_visible().is_some() {
             return count < MIN_RAYS_OF_ONE_INSTANCE;
         }
@@ -89,14 +92,14 @@ impl World {
     ) {
         *best = Hit::MISS;
         let ray = world_ray.ray;
-        self.enter_each(ray, &mut |instance| {
+        self.enter_each(world_ray, |instance, placement| {
             // Neither is NaN: for a ray whose `tmax` is, nothing is enumerated.
             let end = if world_ray.wide.is_some() { best.t.next_up() } else { best.t };
             let tmax = if end < ray.tmax { end } else { ray.tmax };
             if !enters(instance) {
                 return Some(tmax);
             }
-            let (object, of_instance) = self.enter(objects, instance, world_ray, tmax);
+            let (object, of_instance) = self.enter(objects, (instance, placement), world_ray, tmax);
             let mut hit = Hit::MISS;
             trace(object, &of_instance, best, &mut hit);
             let t_scale = of_instance.of_object.t_scale;
@@ -117,7 +120,8 @@ impl World {
     /// The exact t of a hit.
     pub(super) fn exact_t(&self, objects: &Objects, ray: WorldRay<'_>, hit: &Hit) -> Option<ExactT> {
         let PrimitiveRef { instance, triangle } = hit.primitive;
-        let (object, of_instance) = self.enter(objects, instance, ray, f32::INFINITY);
+        let placement = self.placed(instance)?;
+        let (object, of_instance) = self.enter(objects, (instance, &placement), ray, f32::INFINITY);
         of_instance.exact_t(object, triangle)
     }
 
@@ -136,22 +140,25 @@ impl World {
         enters: impl Fn(u32) -> bool,
         hits: impl Fn(&ObjectView<'_>, &RayInInstance<'_>) -> bool,
     ) -> bool {
-        self.enter_each(ray.ray, &mut |instance| {
+        self.enter_each(ray, |instance, placement| {
             if !enters(instance) {
                 return Some(ray.ray.tmax);
             }
-            let (object, of_instance) = self.enter(objects, instance, ray, ray.ray.tmax);
+            let (object, of_instance) = self.enter(objects, (instance, placement), ray, ray.ray.tmax);
             (!hits(object, &of_instance)).then_some(ray.ray.tmax)
         })
     }
 
-    /// Like [`Self::enumerate`], but without a test of the box where only one instance is visible.
+    /// Like [`Self::enumerate_placed`], but without a test of the box where only one instance is
+    /// visible.
     #[inline(always)]
-    fn enter_each(&self, ray: &Ray, visit: InstanceReceiver<'_>) -> bool {
+    fn enter_each(&self, ray: WorldRay<'_>, mut visit: impl FnMut(u32, &Placement) -> Option<f32>) -> bool {
         match self.only_visible() {
             // False for NaN, too.
-            Some(instance) => ray.tmin <= ray.tmax && visit(instance).is_none(),
-            None => self.enumerate(ray, visit),
+            Some(instance) => {
+                ray.ray.tmin <= ray.ray.tmax && visit(instance, self.placement(instance)).is_none()
+            }
+            None => self.enumerate_placed(ray.ray, || ray.rounded_line(), visit),
         }
     }
 
@@ -160,12 +167,12 @@ impl World {
     fn enter<'a>(
         &'a self,
         objects: &'a Objects,
-        instance: u32,
+        (instance, placement): (u32, &Placement),
         ray: WorldRay<'a>,
         tmax: f32,
     ) -> (&'a ObjectView<'a>, RayInInstance<'a>) {
-        let object = self.placement(instance).object();
+        let object = placement.object();
         self.mark_traced(object);
-        (objects.view(object), RayInInstance::new(self, objects, instance, ray, tmax))
+        (objects.view(object), RayInInstance::new(self, objects, (instance, placement), ray, tmax))
     }
 }

@@ -3,7 +3,7 @@
 use crate::intersect::origin::{RoundedLine, RoundedOrigin};
 use crate::intersect::vector::dot;
 use crate::nodes::affine::{Accuracy, Affine, Inverse};
-use bth_format::error::Code;
+use bth_format::error::{Code, Error};
 use bth_format::layout::{NONE, Object, WIDTH};
 use bth_format::object::ObjectView;
 use std::num::NonZeroU32;
@@ -46,7 +46,7 @@ pub(crate) struct PartBoxes {
 
 impl PartBoxes {
     /// The first `count` boxes, at least one, of boxes in the layout of a node.
-    fn new(count: usize, boxes: &[[[f32; WIDTH]; 2]; 3], anchor: [f64; 3]) -> PartBoxes {
+    pub(super) fn new(count: usize, boxes: &[[[f32; WIDTH]; 2]; 3], anchor: [f64; 3]) -> PartBoxes {
         let mut bounds = [[[[0.0; BLOCK]; WIDTH / BLOCK]; 2]; 3];
         for (bounds, boxes) in bounds.as_flattened_mut().iter_mut().zip(boxes.as_flattened()) {
             for (i, value) in bounds.as_flattened_mut().iter_mut().enumerate() {
@@ -113,6 +113,8 @@ pub(crate) enum PlacementError {
     Singular,
     /// Its transform or its box is not finite.
     NotFinite,
+    /// Groups, written out, are too many instances, or nested too deeply.
+    TooMany,
 }
 
 impl PlacementError {
@@ -125,7 +127,27 @@ impl PlacementError {
             PlacementError::NotFinite => {
                 (Code::NotFinite, "a finite transform and world box", "one that is not")
             }
+            PlacementError::TooMany => {
+                let expected = "fewer than 2^32 - 1 instances, at most 16 on the way to each, once groups are \
+                    written out";
+                (Code::TooManyInstances, expected, "more")
+            }
         }
+    }
+}
+
+/// An instance that cannot be placed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Unplaceable {
+    pub(crate) instance: u32,
+    pub(crate) error: PlacementError,
+}
+
+impl Unplaceable {
+    /// The error of a call; `instance` describes the instance.
+    pub(crate) fn error(self, instance: &str) -> Error {
+        let (code, expected, found) = self.error.words();
+        Error::of_call(code, expected, format!("{found}: {instance}"))
     }
 }
 
@@ -151,6 +173,13 @@ impl Placement {
         parts: &PartBoxes,
     ) -> Result<Placement, PlacementError> {
         Placement::inlined(world, index, object, parts)
+    }
+
+    /// An instance of an object that is not in a tree: it only has a transform.
+    #[inline(always)]
+    pub(super) fn without_box(inverse: Inverse, accuracy: Accuracy, object: u32) -> Placement {
+        let object = NonZeroU32::MIN.saturating_add(object);
+        Placement { inverse, lower: [0.0; 3], upper: [0.0; 3], object, accuracy }
     }
 
     /// Like [`Self::new`], compiled inside of a kernel.

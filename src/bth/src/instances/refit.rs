@@ -15,8 +15,8 @@ const TASKS: Tasks = Tasks { rows: 64 * NODE_LINES, min_rows: 512 * NODE_LINES }
 impl TopLevel {
     /// Computes all boxes again after instances have moved. The visible instances are those for
     /// which the BVH was built.
-    pub(crate) fn refit(&mut self, placements: &[Option<Placement>]) {
-        self.measure(placements);
+    pub(crate) fn refit(&mut self, placements: &[Option<Placement>], rows: Option<&[u32]>) {
+        self.measure(placements, rows);
         let mut lines = std::mem::take(&mut self.lines);
         TASKS.for_each(&mut lines, |_, lines| self.refit_instances(lines, placements));
         // Children come behind their parents, so that their boxes are final when the parent is

@@ -123,33 +123,33 @@ struct BuildTask {
 }
 
 impl TopLevel {
-    /// Builds the BVH over the visible instances.
-    pub(crate) fn build(&mut self, placements: &[Option<Placement>]) {
+    /// Builds the BVH over the visible instances, or over the visible ones of some rows.
+    pub(crate) fn build(&mut self, placements: &[Option<Placement>], rows: Option<&[u32]>) {
         // There is rarely more than one node for every seven instances.
+        let count = rows.map_or(placements.len(), <[u32]>::len);
         self.lines.clear();
-        self.lines.reserve_exact((placements.len() / 7 + 1) * NODE_LINES);
+        self.lines.reserve_exact((count / 7 + 1) * NODE_LINES);
         self.depth = 0;
-        self.measure(placements);
-        let visible = placements.iter().enumerate();
-        let item = |(instance, placement): (usize, &Option<Placement>)| {
-            Some(BuildItem::new(self.bounds_of(placement.as_ref()?), instance as u32))
-        };
-        let mut items = Vec::with_capacity(placements.len());
-        items.extend(visible.filter_map(item));
+        self.measure(placements, rows);
+        let mut items = Vec::with_capacity(count);
+        for_each_visible(placements, rows, |instance, placement| {
+            items.push(BuildItem::new(self.bounds_of(placement), instance));
+        });
         self.build_from(&mut items);
         self.cost = CostRatio::of_new(&self.lines);
     }
 
     /// Sets what rays need to know about all boxes.
-    pub(super) fn measure(&mut self, placements: &[Option<Placement>]) {
-        (self.extent, self.origin_slack) = (0.0, 0.0);
-        for placement in placements.iter().flatten() {
-            self.origin_slack = self.origin_slack.max(placement.origin_slack());
+    pub(super) fn measure(&mut self, placements: &[Option<Placement>], rows: Option<&[u32]>) {
+        let (mut extent, mut origin_slack) = (0.0f32, 0.0f32);
+        for_each_visible(placements, rows, |_, placement| {
+            origin_slack = origin_slack.max(placement.origin_slack());
             for k in 0..3 {
                 let greater = placement.upper[k].abs().max(placement.lower[k].abs());
-                self.extent = self.extent.max(greater);
+                extent = extent.max(greater);
             }
-        }
+        });
+        (self.extent, self.origin_slack) = (extent, origin_slack);
         self.reach = REACH * self.extent;
         self.cube = ObjectBounds::around(self.greatest_coordinate());
     }
@@ -234,6 +234,23 @@ impl TopLevel {
     /// Bytes on the heap.
     pub(crate) fn bytes(&self) -> usize {
         self.lines.capacity() * size_of::<CacheLine>()
+    }
+}
+
+/// Calls `visit` with the visible instances, or with the visible ones of some rows.
+fn for_each_visible(
+    placements: &[Option<Placement>],
+    rows: Option<&[u32]>,
+    mut visit: impl FnMut(u32, &Placement),
+) {
+    match rows {
+        None => {
+            let placements = placements.iter().enumerate();
+            placements.for_each(|(i, placement)| placement.iter().for_each(|p| visit(i as u32, p)));
+        }
+        Some(rows) => {
+            rows.iter().for_each(|&i| placements[i as usize].iter().for_each(|p| visit(i, p)));
+        }
     }
 }
 

@@ -1,7 +1,8 @@
 //! The instances of a scene, as queries see them. A file with scene sections ([`super::by_file`])
 //! or the caller of a scene builder ([`super::by_caller`]) places them.
 
-use super::placement::{PartBoxes, Placement, PlacementError};
+use super::groups::{Groups, InstancePath};
+use super::placement::{PartBoxes, Placement, PlacementError, Unplaceable};
 use super::top_level::TopLevel;
 use crate::animation::Animation;
 use crate::clock;
@@ -9,9 +10,10 @@ use crate::nodes::affine::Affine;
 use crate::nodes::hierarchy::NodeHierarchy;
 use crate::objects::Objects;
 use crate::update::Update;
+use bth_format::SceneView;
 use bth_format::file::File;
 use bth_format::layout::NONE;
-use bth_format::{Error, SceneView};
+use std::borrow::Cow;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -19,29 +21,33 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// was built. See `docs/decisions.md`.
 const MAX_COST_RATIO: f64 = 1.5;
 
-/// An instance: its object, its node, and its transform to world space.
+/// An instance: its object, its node, and its transform to world space. A row may show a group, or
+/// be in one; its transform then leads to the group's space.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct InstanceRow {
-    /// Index of the object; `NONE` if the instance was removed.
+    /// Index of the object; `NONE` if the instance was removed. For a group
+    /// [`object_of_group`](super::object_of_group).
     pub(crate) object: u32,
+    /// The group in which it is, or `NONE`.
+    pub(crate) within: u32,
     /// Index of the node in the file of the object, or `NONE`.
     pub(crate) node: u32,
     pub(crate) to_world: Affine,
 }
 
-/// An instance that cannot be placed.
+/// An instance as it is to be.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Unplaceable {
-    pub(crate) instance: u32,
-    pub(crate) error: PlacementError,
+pub(crate) struct NewInstance {
+    pub(crate) row: InstanceRow,
+    pub(crate) visible: bool,
 }
 
-impl Unplaceable {
-    /// The error of a call; `instance` describes the instance.
-    pub(crate) fn error(self, instance: &str) -> Error {
-        let (code, expected, found) = self.error.words();
-        Error::of_call(code, expected, format!("{found}: {instance}"))
-    }
+impl NewInstance {
+    /// No instance.
+    pub(super) const VACANT: NewInstance = NewInstance {
+        row: InstanceRow { object: NONE, within: NONE, node: NONE, to_world: Affine::IDENTITY },
+        visible: false,
+    };
 }
 
 /// The scene sections of a scene that is a file with such sections.
@@ -55,7 +61,9 @@ pub(super) type PlaceResult = Result<Option<Placement>, PlacementError>;
 /// The instances as the caller has placed them in the last commit.
 #[derive(Debug, Default)]
 pub(super) struct CallerInstances {
-    pub(super) rows: Vec<InstanceRow>,
+    pub(super) rows: Vec<NewInstance>,
+    /// Number of groups.
+    pub(super) groups: u32,
     /// Memory for the placements of a commit.
     pub(super) placed: Vec<PlaceResult>,
 }
@@ -63,7 +71,7 @@ pub(super) struct CallerInstances {
 impl CallerInstances {
     /// Bytes on the heap.
     pub(super) fn bytes(&self) -> usize {
-        self.rows.capacity() * size_of::<InstanceRow>() + self.placed.capacity() * size_of::<PlaceResult>()
+        self.rows.capacity() * size_of::<NewInstance>() + self.placed.capacity() * size_of::<PlaceResult>()
     }
 }
 
@@ -82,9 +90,13 @@ pub(crate) struct World {
     /// Time of the scene; 0 if the caller places the instances.
     pub(crate) seconds: f64,
     pub(super) source: TransformSource,
-    /// For each instance its placement; `None` if it is not visible.
+    /// For each instance its placement; `None` if it is not visible. With groups for each row, in
+    /// the space of its group.
     pub(crate) placements: Vec<Option<Placement>>,
+    /// The tree over the instances; with groups, over the rows of the world.
     pub(crate) top: TopLevel,
+    /// The groups, if there are any.
+    groups: Option<Box<Groups>>,
     /// The only visible instance, if there is exactly one.
     only_visible: Option<u32>,
     /// For each object whether a ray has been traced in it.
@@ -105,6 +117,7 @@ impl World {
             source,
             placements,
             top,
+            groups: None,
             only_visible,
             traced: Vec::new(),
             parts: Vec::new(),
@@ -134,10 +147,14 @@ impl World {
     /// Sets the transforms from objects to the world, which place nothing.
     #[cfg(test)]
     pub(super) fn set_transforms(&mut self, transforms: &[Affine]) {
-        let row = |(i, placement): (usize, &Option<Placement>)| InstanceRow {
-            object: placement.as_ref().map_or(0, Placement::object),
-            node: 0,
-            to_world: transforms.get(i).copied().unwrap_or(Affine::IDENTITY),
+        let row = |(i, placement): (usize, &Option<Placement>)| NewInstance {
+            visible: placement.is_some(),
+            row: InstanceRow {
+                object: placement.as_ref().map_or(0, Placement::object),
+                within: NONE,
+                node: 0,
+                to_world: transforms.get(i).copied().unwrap_or(Affine::IDENTITY),
+            },
         };
         let rows = self.placements.iter().enumerate().map(row).collect();
         if let TransformSource::Caller(caller) = &mut self.source {
@@ -211,20 +228,67 @@ impl World {
         for (instance, placement) in self.placements.iter().enumerate() {
             let instance = instance as u32;
             let Some(object) = placement.as_ref().map(Placement::object) else { continue };
-            if changed.contains(&object) {
-                let to_world = self.row(objects, instance).to_world;
+            let shows_group = self.groups().is_some_and(|groups| groups.shows_group(instance as usize));
+            if !shows_group && changed.contains(&object) {
+                let to_world = self.row_in_group(objects, instance).to_world;
                 let placement = self.place(objects, object, &to_world, false);
                 placed.push((instance, placement.map_err(|error| Unplaceable { instance, error })?));
             }
         }
         let mut update = Update { placed: placed.len(), visible: self.visible(), ..Update::default() };
-        for (instance, placement) in placed {
-            self.placements[instance as usize] = placement;
+        for (instance, placement) in &mut placed {
+            std::mem::swap(&mut self.placements[*instance as usize], placement);
         }
         if update.placed > 0 {
+            let touched = || placed.iter().map(|(instance, _)| *instance);
+            if let Err(failed) = self.update_groups(objects, touched()) {
+                for (instance, placement) in &placed {
+                    self.placements[*instance as usize] = *placement;
+                }
+                self.place_groups_again(objects);
+                return Err(failed);
+            }
             self.update_top(true, &mut update);
         }
         Ok(update)
+    }
+
+    /// Sets the groups, whose rows are not yet placed.
+    pub(super) fn set_groups(&mut self, groups: Groups) {
+        self.groups = Some(Box::new(groups));
+    }
+
+    /// The groups, if there are any.
+    #[inline(always)]
+    pub(crate) fn groups(&self) -> Option<&Groups> {
+        self.groups.as_deref()
+    }
+
+    /// The groups, to stage rows.
+    pub(super) fn groups_mut(&mut self) -> Option<&mut Groups> {
+        self.groups.as_deref_mut()
+    }
+
+    /// Places the rows of groups after rows were staged; `touched` are rows of objects that were
+    /// placed again where they were. Returns true if other rows of the world are visible than
+    /// before; without groups it is not known, and true.
+    pub(super) fn update_groups(
+        &mut self,
+        objects: &Objects,
+        touched: impl Iterator<Item = u32>,
+    ) -> Result<bool, Unplaceable> {
+        let Some(groups) = &mut self.groups else { return Ok(true) };
+        touched.for_each(|row| groups.touch(row as usize));
+        groups.update(objects, &mut self.placements, MAX_COST_RATIO)
+    }
+
+    /// Places all rows of groups again, after an error: the rows of objects are as they were.
+    pub(super) fn place_groups_again(&mut self, objects: &Objects) {
+        if let Some(groups) = &mut self.groups {
+            groups.stage_all();
+            let _ = groups.update(objects, &mut self.placements, 0.0);
+            self.build_top();
+        }
     }
 
     /// Number of visible instances.
@@ -236,7 +300,7 @@ impl World {
     pub(super) fn update_top(&mut self, same_visible: bool, update: &mut Update) {
         let start = clock::now();
         if same_visible {
-            self.top.refit(&self.placements);
+            self.top.refit(&self.placements, self.groups.as_ref().map(|groups| groups.world_rows()));
         }
         if !same_visible || self.top.cost_ratio() > MAX_COST_RATIO {
             self.build_top();
@@ -247,7 +311,12 @@ impl World {
 
     /// Builds the top level.
     pub(super) fn build_top(&mut self) {
-        self.top.build(&self.placements);
+        let rows = self.groups.as_ref().map(|groups| groups.world_rows());
+        self.top.build(&self.placements, rows);
+        if rows.is_some() {
+            self.only_visible = None;
+            return;
+        }
         let mut visible = self.placements.iter().enumerate().filter(|(_, placement)| placement.is_some());
         let first = visible.next().map(|(row, _)| row as u32);
         self.only_visible = first.filter(|_| visible.next().is_none());
@@ -258,39 +327,79 @@ impl World {
         self.traced[object as usize].load(Ordering::Relaxed)
     }
 
-    /// An instance.
+    /// An instance, with its transform to the world.
     pub(crate) fn row(&self, objects: &Objects, instance: u32) -> InstanceRow {
+        let Some(groups) = self.groups() else { return self.row_in_group(objects, instance) };
+        let found = groups.find(instance);
+        let row = self.row_in_group(objects, found.path[found.path.len() - 1]);
+        InstanceRow { to_world: found.to_world, ..row }
+    }
+
+    /// A row, with its transform to the space of its group.
+    pub(crate) fn row_in_group(&self, objects: &Objects, instance: u32) -> InstanceRow {
         match &self.source {
             TransformSource::File(hierarchy) => {
                 let view = scene_of(objects);
                 let row = view.instances[instance as usize];
-                let to_world = match self.animation.is_skinned(row.object) {
+                let to_world = match row.group().is_none() && self.animation.is_skinned(row.object) {
                     true => Affine::IDENTITY,
                     false => hierarchy.to_world(&view, row.node),
                 };
-                InstanceRow { object: row.object, node: row.node, to_world }
+                InstanceRow { object: row.object, within: NONE, node: row.node, to_world }
             }
-            TransformSource::Caller(caller) => caller.rows[instance as usize],
+            TransformSource::Caller(caller) => caller.rows[instance as usize].row,
         }
     }
 
     /// Index of an instance's object; `NONE` if the instance was removed.
     pub(crate) fn object_of(&self, objects: &Objects, instance: u32) -> u32 {
+        if let Some(groups) = self.groups() {
+            return groups.find(instance).object;
+        }
         match &self.source {
             TransformSource::File(_) => scene_of(objects).instances[instance as usize].object,
-            TransformSource::Caller(caller) => caller.rows[instance as usize].object,
+            TransformSource::Caller(caller) => caller.rows[instance as usize].row.object,
         }
+    }
+
+    /// Number of instances, visible or not, with groups written out.
+    pub(crate) fn instance_count(&self) -> u32 {
+        self.groups().map_or(self.placements.len() as u32, Groups::count)
+    }
+
+    /// The rows on the way to an instance.
+    pub(crate) fn path(&self, instance: u32) -> InstancePath {
+        self.groups().map_or_else(|| InstancePath::of_row(instance), |groups| groups.find(instance).path)
+    }
+
+    /// The placement of an instance in the world; `None` if there is no such instance or it is not
+    /// visible. With groups it has no box.
+    pub(crate) fn placed(&self, instance: u32) -> Option<Cow<'_, Placement>> {
+        let Some(groups) = self.groups() else {
+            return self.placements.get(instance as usize)?.as_ref().map(Cow::Borrowed);
+        };
+        let found = (instance < groups.count()).then(|| groups.find(instance))?;
+        let is_visible = found.path.iter().all(|row| self.placements[*row as usize].is_some());
+        let (inverse, accuracy) = found.to_world.inverse().filter(|_| is_visible)?;
+        Some(Cow::Owned(Placement::without_box(inverse, accuracy, found.object)))
     }
 
     /// World box of an instance, computed from the object's box, so it does not depend on which
     /// objects have been traced. `None` if the instance is not visible.
     pub(crate) fn bounds(&self, objects: &Objects, instance: u32) -> Option<([f32; 3], [f32; 3])> {
-        self.placements[instance as usize].as_ref()?;
+        self.placed(instance)?;
         let InstanceRow { object, to_world, .. } = self.row(objects, instance);
         let header = objects.header(object);
         let whole = PartBoxes::whole(header, objects.anchor(object));
         let placement = Placement::new(&to_world, object, header, &whole).ok()?;
         Some((placement.lower, placement.upper))
+    }
+
+    /// World boxes of the visible rows of the world; `None` without groups.
+    pub(crate) fn row_boxes(&self) -> Option<Vec<([f32; 3], [f32; 3])>> {
+        let rows = self.groups()?.world_rows().iter();
+        let placed = rows.filter_map(|row| self.placements[*row as usize].as_ref());
+        Some(placed.map(|placement| (placement.lower, placement.upper)).collect())
     }
 
     /// The only visible instance and its object, if there is exactly one and the object's space is
@@ -329,7 +438,9 @@ impl World {
             TransformSource::Caller(caller) => caller.bytes(),
         };
         let parts = self.parts.iter().filter(|parts| parts.get().is_some()).count() * size_of::<PartBoxes>();
-        let instances = size_of_val(self.placements.as_slice()) + size_of_val(self.parts.as_slice()) + parts;
+        let groups = self.groups().map_or(0, Groups::bytes);
+        let instances =
+            groups + size_of_val(self.placements.as_slice()) + size_of_val(self.parts.as_slice()) + parts;
         (instances + self.top.bytes(), source)
     }
 }

@@ -325,7 +325,7 @@ impl ObjectRay {
 /// The max t in object space that is at most `t` in world space, where it is the product with
 /// `t_scale` = 1 / `scale`, a power of two, rounded to f32. Infinity gives the farthest t that is
 /// finite in world space. NaN stays NaN.
-pub(super) fn greatest_below(t: f32, scale: f64, t_scale: f32) -> f32 {
+pub(crate) fn greatest_below(t: f32, scale: f64, t_scale: f32) -> f32 {
     // Products that are denormal are rounded to multiples of twice this; it is lost in the sum with
     // numbers so great that products are exact.
     const HALF_STEP: f64 = 0.5 * f32::from_bits(1) as f64;
@@ -340,6 +340,11 @@ impl Inverse {
     /// Returns true if object space is world space.
     pub(crate) fn is_identity(&self) -> bool {
         self.linear == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] && self.origin == [0.0; 3]
+    }
+
+    /// Maximum norm of the linear part.
+    pub(crate) fn norm(&self) -> f64 {
+        norm(&self.linear)
     }
 
     /// Transforms a line of world space to object space, with the same points at the same t.

@@ -3,14 +3,13 @@
 //! [`searcher`] goes through the instances of a scene, [`nearest`] through the triangles of one.
 //! [`search`] holds the best triangle so far where all is f32 in world space, [`wide_search`] for
 //! instances and points of f64 ([`double`]). [`overlap`] finds the triangles in a box or a ball,
-//! [`winding`] counts the surfaces around a point. [`placed`] bounds distances in the space of an
-//! instance's object.
+//! [`winding`] counts the surfaces around a point. [`crate::nodes::placed`] bounds distances in the
+//! space of an instance's object.
 
 mod double;
 mod nearest;
 mod order;
 mod overlap;
-mod placed;
 mod search;
 mod searcher;
 mod wide_search;

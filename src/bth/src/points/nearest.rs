@@ -1,12 +1,12 @@
 //! The walk of a point through the BVH of an object, nearest boxes first: for the closest triangle,
 //! or for all triangles that overlap a ball.
 
-use super::placed::{NarrowPoint, PlacedObject};
 use super::search::Search;
 use super::wide_search::WideSearch;
 use crate::bvh::walk::{BoxQuery, ObjectTree, TriangleQuery, all_triangles, any_in_set, run_walk};
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::point_lanes::{CornerLanes, LanePoint, PointLanes, TriangleLanes};
+use crate::nodes::placed::{NarrowPoint, PlacedObject};
 use crate::rays::PrimitiveRef;
 use crate::simd::{Part, Simd};
 use bth_format::exact::is_zero_area;

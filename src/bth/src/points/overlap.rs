@@ -111,11 +111,9 @@ pub(super) fn visit_box(scene: &Scene, region: Region, narrow: bool, visit: &mut
     let Some(region) = finite_box(region, max) else { return false };
     let mut instances = Instances::new(scene);
     let narrow = narrow && instances.is_narrow();
-    instances.any(
-        narrow,
-        |world, visit| world.enumerate_in_box(RegionBox::in_world(region, world.max_coordinate()), visit),
-        &mut |at| visit_in_box(at, region, visit),
-    )
+    instances.any(narrow, |world, visit| world.enumerate_in_box(region, visit), &mut |at| {
+        visit_in_box(at, region, visit)
+    })
 }
 
 /// Visits the triangles of a scene that overlap a ball of f32 numbers, until the visitor returns

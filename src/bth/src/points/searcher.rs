@@ -1,11 +1,11 @@
 //! The instances of a scene, for queries about points, and the search for closest points in them.
 
 use super::nearest::{PointGoal, PointInstance, search_instance};
-use super::placed::{NarrowPoint, PlacedObject};
 use super::search::Search;
 use super::wide_search::{Radius, WideSearch};
 use super::{Closest, Closest64};
 use crate::instances::World;
+use crate::nodes::placed::{NarrowPoint, PlacedObject};
 use crate::scene::Scene;
 use std::cell::Cell;
 use std::collections::HashMap;
@@ -69,11 +69,11 @@ impl<'a> Instances<'a> {
                     Entry::Occupied(entry) => entry.into_mut(),
                     Entry::Vacant(entry) => {
                         let to_world = world.row(scene.objects(), instance).to_world;
-                        let inverse = world.placement(instance).inverse.linear;
-                        entry.insert(PlacedObject::new(&to_world, inverse))
+                        let Some(placement) = world.placed(instance) else { return false };
+                        entry.insert(PlacedObject::new(&to_world, placement.inverse.linear))
                     }
                 };
-                let object = scene.view(world.placement(instance).object());
+                let object = scene.view(world.object_of(scene.objects(), instance));
                 visit(PointInstance { object, instance, placed: Some(placed) })
             }),
         }
@@ -89,16 +89,22 @@ impl<'a> Instances<'a> {
         let in_world_space = PlacedObject::untransformed();
         let NarrowPoint { point, off } = NarrowPoint::new(search.point, 0.0);
         let squared = |limit| in_world_space.squared_in_object(limit, off);
+        let (exact, distance) = (search.point, Cell::new(search.limit));
         let limit = Cell::new(squared(search.limit));
         self.any(
             false,
-            |world, visit| {
-                world.enumerate_near(point, limit.get(), &mut |instance| {
+            |world, visit| match world.groups() {
+                None => world.enumerate_near(point, limit.get(), &mut |instance| {
                     (!visit(instance)).then(|| limit.get())
-                })
+                }),
+                Some(_) => {
+                    let limits: (&dyn Fn() -> f64, &dyn Fn() -> f64) = (&|| distance.get(), &|| limit.get());
+                    world.enumerate_near_in_groups((exact, point), limits, visit)
+                }
             },
             &mut |at| {
                 let ended = visit(at, search);
+                distance.set(search.limit);
                 limit.set(squared(search.limit));
                 ended
             },

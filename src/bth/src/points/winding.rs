@@ -17,7 +17,6 @@
 //! allow for it; [`PointInObject`] decides the rest about the point itself.
 
 use super::nearest::PointInstance;
-use super::placed::{NarrowPoint, PlacedObject};
 use super::searcher::Instances;
 use crate::bvh::single_stack::SingleStack;
 use crate::bvh::walk::{BoxQuery, ObjectTree, TriangleQuery, all_triangles, walk};
@@ -25,9 +24,9 @@ use crate::intersect::boxes::{FAR, planes};
 use crate::intersect::crossing::crossing;
 use crate::intersect::edge_functions::cross;
 use crate::intersect::filter::{TriangleBlock, TriangleFilter};
-use crate::intersect::region_box::RegionBox;
 use crate::intersect::vector::wide;
 use crate::intersect::wide_side::PointInObject;
+use crate::nodes::placed::{NarrowPoint, PlacedObject};
 use crate::rays::Ray;
 use crate::scene::Scene;
 use crate::simd::{Isa, Kernel, Part, Simd};
@@ -66,12 +65,7 @@ pub(super) fn windings(scene: &Scene, points: &[[f64; 3]], winding: &mut [i32]) 
             add_windings(at, &[*point], std::slice::from_mut(winding));
             false
         };
-        let region = |max| RegionBox::in_world([*point; 2], max);
-        instances.any(
-            false,
-            |world, visit| world.enumerate_in_box(region(world.max_coordinate()), visit),
-            visit,
-        );
+        instances.any(false, |world, visit| world.enumerate_in_box([*point; 2], visit), visit);
     }
 }
 

@@ -6,7 +6,7 @@ mod open;
 pub(crate) use motion::InstanceView;
 pub use open::{from_bytes, from_file, map, open};
 
-use crate::instances::World;
+use crate::instances::{InstancePath, World};
 use crate::masks::Masks;
 use crate::objects::Objects;
 use crate::update::Update;
@@ -245,6 +245,41 @@ impl Scene {
     /// Number of instances in the scene, visible or not; in a scene of a scene builder, one more
     /// than the max id that was ever committed.
     pub fn instance_count(&self) -> u32 {
+        self.world().map_or(self.object_count(), |world| world.instance_count())
+    }
+
+    /// The rows of the scene on the way to an instance: in the world first, of the object last.
+    /// Without groups it is the instance's own number. In a file they are rows of its instances, in
+    /// a scene of a scene builder ids.
+    ///
+    /// # Panics
+    /// If there is no such instance.
+    pub fn instance_path(&self, instance: u32) -> InstancePath {
+        assert!(instance < self.instance_count(), "an instance below instance_count");
+        self.world().map_or_else(|| InstancePath::of_row(instance), |world| world.path(instance))
+    }
+
+    /// The mask of an instance: bits that the masks of all rows on the way to it have.
+    pub(crate) fn mask_of(&self, instance: u32) -> u32 {
+        if self.masks.is_empty() {
+            return u32::MAX;
+        }
+        match self.world() {
+            Some(world) if world.groups().is_some() => {
+                world.path(instance).iter().fold(u32::MAX, |mask, row| mask & self.masks.of_instance(*row))
+            }
+            _ => self.masks.of_instance(instance),
+        }
+    }
+
+    /// Returns true if some instances are in groups, or show one.
+    pub fn has_groups(&self) -> bool {
+        self.world().is_some_and(|world| world.groups().is_some())
+    }
+
+    /// Number of rows: instances of objects and groups, in the world and in groups, each once. The
+    /// same as [`Self::instance_count`] without groups.
+    pub fn row_count(&self) -> u32 {
         self.world().map_or(self.object_count(), |world| world.placements.len() as u32)
     }
 
@@ -284,7 +319,7 @@ impl Scene {
     /// In a file with scene sections, if there is no such instance or it is not visible.
     pub fn normal_to_world(&self, instance: u32, normal: [f64; 3]) -> [f64; 3] {
         let Some(world) = self.world() else { return normal };
-        let placement = world.placements[instance as usize].as_ref().expect("an instance that can be seen");
+        let placement = world.placed(instance).expect("an instance that can be seen");
         placement.inverse.normal(normal)
     }
 
@@ -299,6 +334,15 @@ impl Scene {
             return (object.root != NONE).then_some((object.lower, object.upper));
         };
         world.bounds(self.objects(), instance)
+    }
+
+    /// Boxes in world space that contain all that is visible: [`Self::instance_bounds`] of the
+    /// visible instances, or with groups boxes of the rows in the world.
+    pub fn visible_bounds(&self) -> Vec<Bounds> {
+        match self.world().and_then(World::row_boxes) {
+            Some(boxes) => boxes,
+            None => (0..self.instance_count()).filter_map(|i| self.instance_bounds(i)).collect(),
+        }
     }
 
     /// Number of objects in which rays have been traced since the scene was opened; without scene
@@ -399,8 +443,7 @@ impl Scene {
     /// enlarged to cover roundings of transforms; `None` if nothing is visible. It is the union of
     /// all [`Self::instance_bounds`].
     pub fn bounds(&self) -> Option<Bounds> {
-        let boxes = (0..self.instance_count()).filter_map(|instance| self.instance_bounds(instance));
-        boxes.reduce(|(lower, upper), (l, u)| {
+        self.visible_bounds().into_iter().reduce(|(lower, upper), (l, u)| {
             (
                 std::array::from_fn(|k| f32::min(lower[k], l[k])),
                 std::array::from_fn(|k| f32::max(upper[k], u[k])),

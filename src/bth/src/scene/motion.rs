@@ -49,7 +49,8 @@ pub(super) fn instance(scene: &Scene, instance: u32) -> InstanceView {
         let to_world = [row(0), row(1), row(2)];
         return InstanceView { object: instance, node: bth_format::layout::NONE, to_world, visible: true };
     };
-    let visible = world.placements[instance as usize].is_some();
+    assert!(instance < world.instance_count(), "an instance below instance_count");
+    let visible = world.placed(instance).is_some();
     let row = world.row(scene.objects(), instance);
     InstanceView { object: row.object, node: row.node, to_world: row.to_world.rows(), visible }
 }

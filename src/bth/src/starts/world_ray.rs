@@ -63,6 +63,12 @@ impl<'a> WorldRay<'a> {
         RoundedLine { origin, direction: self.direction(), direction_error: 0.0 }
     }
 
+    /// The line with the error of its range in f32.
+    pub(crate) fn rounded_line(&self) -> RoundedLine {
+        let line = self.line();
+        if self.wide.is_some() { line.with_rounded_range() } else { line }
+    }
+
     /// The direction in world space.
     #[inline(always)]
     pub(crate) fn direction(&self) -> [f64; 3] {

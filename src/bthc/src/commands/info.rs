@@ -8,13 +8,14 @@ use crate::failure::Failure;
 use crate::output;
 use crate::table::{Table, bytes, count};
 use bth::Isa;
-use bth_format::File;
+use bth_format::groups::Groups;
 use bth_format::layout::kind;
 use bth_format::layout::{
     FREE_BINS, FREE_SECTORS, FreeBins, FreeSectors, IDENTIFIER, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE,
     RecordKind, SectionEntry,
 };
 use bth_format::object::ObjectView;
+use bth_format::{File, SceneView};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::io::Read;
@@ -191,16 +192,26 @@ fn point<T: ToString>(numbers: &[T]) -> String {
 fn scene_of(file: &File) -> Result<Value, Failure> {
     let Some(view) = file.check_scene()? else { return Ok(Value::Null) };
     let scene = &view.scene[0];
+    let (instances, groups) = written_out(&view);
     let names = |count: usize, name: &dyn Fn(u32) -> String| (0..count as u32).map(name).collect::<Vec<_>>();
     Ok(json!({
         "first_frame": scene.first_frame, "last_frame": scene.last_frame, "rate": scene.rate,
         "camera": (scene.camera != NONE).then(|| view.camera_name(scene.camera)),
-        "nodes": view.nodes.len(), "instances": view.instances.len(), "tracks": view.tracks.len(),
+        "nodes": view.nodes.len(), "instances": instances, "rows": view.instances.len(), "groups": groups,
+        "tracks": view.tracks.len(),
         "deformers": view.deformers.len(),
         "keys": view.times.len(),
         "cameras": names(view.cameras.len(), &|i| view.camera_name(i).to_owned()),
         "lights": names(view.lights.len(), &|i| view.light_name(i).to_owned()),
     }))
+}
+
+/// Number of instances with all groups written out, and of groups.
+fn written_out(view: &SceneView<'_>) -> (u64, u32) {
+    let Some(groups) = Groups::of(view) else { return (view.instances.len() as u64, 0) };
+    // The check of the scene has counted them.
+    let all = groups.written_out(view).unwrap_or_default();
+    (all.last().map_or(0, |world| world.instances.into()), groups.world())
 }
 
 fn version(code: u32) -> String {
@@ -218,7 +229,9 @@ fn summary(file: &File) -> Result<(Value, String), Failure> {
     if let Some(view) = file.check_scene()? {
         let scene = &view.scene[0];
         facts.count("nodes", view.nodes.len() as u64);
-        facts.count("instances", view.instances.len() as u64);
+        let (instances, groups) = written_out(&view);
+        facts.count("instances", instances);
+        facts.count("groups of nodes", groups.into());
         facts.count("tracks", view.tracks.len() as u64);
         facts.count("objects that deform", view.deformers.len() as u64);
         facts.row(["frames", &format!("{} to {} at {}/s", scene.first_frame, scene.last_frame, scene.rate)]);

@@ -157,6 +157,9 @@ fn summary(report: &SceneReport) -> String {
     let mut facts = Table::default();
     facts.row(["nodes", &count(report.nodes)]);
     facts.row(["instances", &count(report.instances)]);
+    if report.rows != report.instances {
+        facts.row(["instances with each group once", &count(report.rows)]);
+    }
     facts.row(["objects", &count(report.objects.len() as u64)]);
     let stored_once = report.objects.iter().map(|object| object.names.len().saturating_sub(1) as u64).sum();
     facts.count("objects of equal geometry, stored once", stored_once);

@@ -38,9 +38,14 @@ pub(super) fn alone(
         builder.set_subscene_seconds(whole, seconds)?;
         builder.set_subscene_visible(whole, false)?;
     }
-    let instance = builder.instance(first + object, &IDENTITY)?;
+    builder.instance(first + object, &IDENTITY)?;
     match builder.commit() {
-        Ok(_) => Ok(Some((builder.into_scene(), instance))),
+        Ok(_) => {
+            // It was placed last, behind what groups show.
+            let scene = builder.into_scene();
+            let instance = scene.instance_count() - 1;
+            Ok(Some((scene, instance)))
+        }
         Err(error) if error.code() == Code::NotFinite => {
             output::warning(&format!(
                 "object {object} is not traced, since it reaches too far for an instance: {error}"

@@ -63,7 +63,14 @@ impl Importer<'_, '_> {
         let name = format!("{}/at rest", self.manifest.nodes[row].name);
         let name = self.names.nodes.unique(&name, String::new());
         let transform = Transform::default();
-        self.manifest.nodes.push(Node { name, parent: None, transform, object: Some(object), visible });
+        self.manifest.nodes.push(Node {
+            name,
+            parent: None,
+            transform,
+            object: Some(object),
+            group: None,
+            visible,
+        });
     }
 
     /// A further object of the manifest.
@@ -173,7 +180,14 @@ impl Importer<'_, '_> {
             let transform = self.transform(node, &format!("node {index}"))?;
             let name = self.names.nodes.unique(&node.name, format!("node {index}"));
             let parent = row.replace(self.manifest.nodes.len());
-            self.manifest.nodes.push(Node { name, parent, transform, object: None, visible: true });
+            self.manifest.nodes.push(Node {
+                name,
+                parent,
+                transform,
+                object: None,
+                group: None,
+                visible: true,
+            });
             self.report.node_rows[index] = row;
         }
         row.ok_or_else(|| self.file.graph_error(format!("node {joint}"), "it does not exist"))

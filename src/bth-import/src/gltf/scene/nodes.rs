@@ -73,7 +73,14 @@ impl Importer<'_, '_> {
         let visible = self.file.is_visible(index, node)?;
         let name = self.names.nodes.unique(&node.name, part.clone());
         let transform = self.transform(node, &part)?;
-        self.manifest.nodes.push(Node { name: name.clone(), parent, transform, object: None, visible });
+        self.manifest.nodes.push(Node {
+            name: name.clone(),
+            parent,
+            transform,
+            object: None,
+            group: None,
+            visible,
+        });
         if let Some(mesh) = node.mesh {
             self.mesh(index, node, mesh, row, &name)?;
         }
@@ -206,7 +213,14 @@ impl Importer<'_, '_> {
             }
             let name = self.names.nodes.unique(&format!("{name}/{i}"), String::new());
             let parent = Some(parent);
-            self.manifest.nodes.push(Node { name, parent, transform, object: Some(object), visible: true });
+            self.manifest.nodes.push(Node {
+                name,
+                parent,
+                transform,
+                object: Some(object),
+                group: None,
+                visible: true,
+            });
         }
         Ok(())
     }

@@ -97,7 +97,7 @@ impl Importer<'_, '_> {
         let visible = self.chain(deformer.node).all(|node| node.visible);
         let transform = inverse_bind.map_or_else(Transform::default, Transform::Matrix);
         let (parent, object) = (Some(parent), Some(object));
-        self.manifest.nodes.push(Node { name, parent, transform, object, visible });
+        self.manifest.nodes.push(Node { name, parent, transform, object, group: None, visible });
     }
 
     /// A node of the manifest and all above it, upwards.

@@ -2,6 +2,7 @@
 //! traced by a loop over its triangles.
 
 mod expected;
+mod groups;
 mod sequences;
 mod top_level;
 

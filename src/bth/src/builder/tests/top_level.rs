@@ -146,8 +146,8 @@ fn a_refit_of_the_same_boxes_is_the_tree_that_was_built() {
     builder.commit().unwrap();
     let world = builder.scene().world().expect("instances");
     let (mut top, mut again) = (TopLevel::default(), TopLevel::default());
-    top.build(&world.placements);
-    again.build(&world.placements);
-    again.refit(&world.placements);
+    top.build(&world.placements, None);
+    again.build(&world.placements, None);
+    again.refit(&world.placements, None);
     assert_eq!(format!("{top:?}"), format!("{again:?}"));
 }

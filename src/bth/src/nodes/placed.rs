@@ -30,7 +30,7 @@ const MAX_RESIDUAL: f64 = 0.25;
 
 /// An instance for a search.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct PlacedObject {
+pub(crate) struct PlacedObject {
     /// The transform from object space to world space: rows of four. `None` for the identity.
     rows: Option<[[f64; 4]; 3]>,
     /// A.
@@ -42,15 +42,15 @@ pub(super) struct PlacedObject {
 }
 
 /// A point in object space, for walks through the BVH.
-pub(super) struct NarrowPoint {
-    pub(super) point: [f32; 3],
+pub(crate) struct NarrowPoint {
+    pub(crate) point: [f32; 3],
     /// Upper bound of how far a coordinate is off.
-    pub(super) off: f64,
+    pub(crate) off: f64,
 }
 
 impl NarrowPoint {
     /// Rounds a point whose coordinates are off by at most `error`.
-    pub(super) fn new(point: [f64; 3], error: f64) -> NarrowPoint {
+    pub(crate) fn new(point: [f64; 3], error: f64) -> NarrowPoint {
         let narrow = point.map(|x| (x as f32).clamp(f32::MIN, f32::MAX));
         let off = (max_norm(minus(point, narrow.map(f64::from))) + error) * SLACK;
         // Neither are NaN, which an overflow may give.
@@ -65,12 +65,12 @@ fn row_norm(rows: &[[f64; 3]; 3]) -> f64 {
 
 impl PlacedObject {
     /// An instance in world space.
-    pub(super) fn untransformed() -> PlacedObject {
+    pub(crate) fn untransformed() -> PlacedObject {
         PlacedObject { rows: None, inverse: [[0.0; 3]; 3], norm: 1.0, error: 0.0 }
     }
 
     /// An instance with a transform and the rows of its inverse's linear part.
-    pub(super) fn new(to_world: &Affine, inverse: [[f64; 3]; 3]) -> PlacedObject {
+    pub(crate) fn new(to_world: &Affine, inverse: [[f64; 3]; 3]) -> PlacedObject {
         if *to_world == Affine::IDENTITY {
             return PlacedObject::untransformed();
         }
@@ -92,7 +92,7 @@ impl PlacedObject {
     }
 
     /// A point of world space in the space of the object's source.
-    pub(super) fn point(&self, world: [f64; 3]) -> PointInObject<'_> {
+    pub(crate) fn point(&self, world: [f64; 3]) -> PointInObject<'_> {
         let (mut point, mut error) = (world, 0.0);
         if let Some(rows) = &self.rows {
             let relative = minus(world, rows.map(|[.., t]| t));
@@ -104,12 +104,12 @@ impl PlacedObject {
 
     /// A point in object space, rounded to f32, for walks through the BVH of rounded vertices.
     /// Coordinates beyond the range of f32 are limited to it.
-    pub(super) fn narrow(&self, point: &PointInObject<'_>, object: &ObjectView<'_>) -> NarrowPoint {
+    pub(crate) fn narrow(&self, point: &PointInObject<'_>, object: &ObjectView<'_>) -> NarrowPoint {
         NarrowPoint::new(minus(point.point, object.anchor), point.error + rounding(object, point.point))
     }
 
     /// A box of world space for tests of an object's boxes.
-    pub(super) fn region(&self, [lower, upper]: [[f64; 3]; 2], object: &ObjectView<'_>) -> RegionBox {
+    pub(crate) fn region(&self, [lower, upper]: [[f64; 3]; 2], object: &ObjectView<'_>) -> RegionBox {
         let identity = Affine::IDENTITY.rows();
         let rows = self.rows.as_ref().unwrap_or(&identity);
         let anchor = object.anchor;
@@ -125,14 +125,14 @@ impl PlacedObject {
 
     /// Upper bound of the squared distance in object space, from a point that is off, of what lies
     /// within a distance in world space.
-    pub(super) fn squared_in_object(&self, distance: f64, off: f64) -> f64 {
+    pub(crate) fn squared_in_object(&self, distance: f64, off: f64) -> f64 {
         let distance = distance * self.norm + ROOT_OF_3 * off;
         // Not NaN, where an infinite norm bounds a distance of 0.
         if distance < f64::INFINITY { distance * distance } else { f64::INFINITY }
     }
 
     /// A triangle in world space, given its corners in object space and its id.
-    pub(super) fn triangle(&self, object: &ObjectView<'_>, corners: [[f32; 3]; 3], id: u32) -> WideTriangle {
+    pub(crate) fn triangle(&self, object: &ObjectView<'_>, corners: [[f32; 3]; 3], id: u32) -> WideTriangle {
         let corners = object.exact_corners(|| id, corners);
         WideTriangle { corners, rows: self.rows }
     }

@@ -1,0 +1,79 @@
+//! Groups of nodes, which are placed as a whole: which nodes and instances belong to which, and how
+//! many instances there are once all groups are written out. Specification: "Groups of nodes".
+
+use crate::layout::*;
+use crate::limits::MAX_PATH;
+use crate::view::SceneView;
+
+/// The groups of a scene, numbered in the order of their nodes.
+#[derive(Clone, Debug)]
+pub struct Groups {
+    /// For each node the number of the group in which it is, or of the world.
+    of_node: Vec<u32>,
+    world: u32,
+}
+
+/// What a group, or the world, holds once the groups in it are written out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WrittenOut {
+    /// Number of instances of objects.
+    pub instances: u32,
+    /// Max number of instances on the way to one of an object, that one included.
+    pub levels: u32,
+}
+
+impl Groups {
+    /// The groups of a scene, whose nodes have been checked; `None` if it has no groups.
+    pub fn of(view: &SceneView<'_>) -> Option<Groups> {
+        let world = view.nodes.iter().filter(|node| node.flags & NODE_GROUP != 0).count() as u32;
+        if world == 0 {
+            return None;
+        }
+        let (mut of_node, mut next): (Vec<u32>, u32) = (Vec::with_capacity(view.nodes.len()), 0);
+        for node in view.nodes {
+            of_node.push(match node.parent {
+                NONE if node.flags & NODE_GROUP != 0 => {
+                    next += 1;
+                    next - 1
+                }
+                NONE => world,
+                parent => of_node[parent as usize],
+            });
+        }
+        Some(Groups { of_node, world })
+    }
+
+    /// The number of the group in which a node is; [`Self::world`] if it is in none. The first node
+    /// of a group is in it.
+    pub fn of_node(&self, node: u32) -> u32 {
+        self.of_node[node as usize]
+    }
+
+    /// Number of groups, which is also the number of the world.
+    pub fn world(&self) -> u32 {
+        self.world
+    }
+
+    /// What each group and then the world holds, if each group only has instances of groups with a
+    /// lower number.
+    ///
+    /// # Errors
+    /// What is found if that exceeds the limits.
+    pub fn written_out(&self, view: &SceneView<'_>) -> Result<Vec<WrittenOut>, String> {
+        let mut groups = vec![WrittenOut::default(); self.world as usize + 1];
+        for instance in view.instances {
+            let shown = match instance.group() {
+                Some(node) => groups[self.of_node(node) as usize],
+                None => WrittenOut { instances: 1, levels: 0 },
+            };
+            let group = &mut groups[self.of_node(instance.node) as usize];
+            group.levels = group.levels.max(shown.levels + 1);
+            if group.levels > MAX_PATH {
+                return Err(format!("{} levels", group.levels));
+            }
+            let sum = group.instances.checked_add(shown.instances).filter(|sum| *sum < NONE);
+            group.instances = sum.ok_or("more")?;
+        }
+        Ok(groups)
+    }
+}

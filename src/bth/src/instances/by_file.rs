@@ -144,15 +144,7 @@ impl World {
         let mut deforms = vec![false; if deformed.is_empty() { 0 } else { objects.count() as usize }];
         deformed.iter().for_each(|object| deforms[*object as usize] = true);
         let mut update = Update::default();
-        let failed = |row: usize, error: PlacementError| {
-            let (code, expected, found) = error.words();
-            let node = view.instances[row].node;
-            let name = view.node_name(node);
-            let found = format!("{found}: node \"{}\" at {seconds} s", name.escape_debug());
-            let offset = u64::from(node) * size_of::<Node>() as u64;
-            let error = Error::within_file(code, kind::NODES, offset, expected, found);
-            objects.sole_file().expect("a file with nodes").locate(error, NONE)
-        };
+        let failed = |row: u32, error: PlacementError| unplaceable(objects, seconds, row, error);
         let is_skinned =
             |world: &World, of: &Instance| of.group().is_none() && world.animation.is_skinned(of.object);
         let hides = |hierarchy: &NodeHierarchy, of: &Instance, skinned: bool| match skinned {
@@ -190,7 +182,7 @@ impl World {
                 None => Vec::new(),
             };
             for (row, placed) in moved.iter().zip(&placed) {
-                self.placements[*row as usize] = placed.map_err(|error| failed(*row as usize, error))?;
+                self.placements[*row as usize] = placed.map_err(|error| failed(*row, error))?;
             }
             if let Some(groups) = self.groups_mut() {
                 for (row, NewInstance { row: InstanceRow { to_world, .. }, visible }) in
@@ -203,7 +195,7 @@ impl World {
         }
         if update.placed > 0 {
             let groups = self.update_groups(objects, std::iter::empty());
-            groups.map_err(|at| failed(at.instance as usize, at.error))?;
+            groups.map_err(|at| failed(at.instance, at.error))?;
             self.update_top(false, &mut update);
         }
         update.visible = self.visible();
@@ -219,4 +211,14 @@ impl World {
         let TransformSource::File(hierarchy) = &self.source else { panic!("expected a file with nodes") };
         (hierarchy.to_world(&scene_of(objects), node).rows(), !hierarchy.hidden(node))
     }
+}
+
+/// The error for a row that cannot be placed.
+fn unplaceable(objects: &Objects, seconds: f64, row: u32, error: PlacementError) -> Error {
+    let (view, (code, expected, found)) = (scene_of(objects), error.words());
+    let node = view.instances[row as usize].node;
+    let found = format!("{found}: node \"{}\" at {seconds} s", view.node_name(node).escape_debug());
+    let offset = u64::from(node) * size_of::<Node>() as u64;
+    let error = Error::within_file(code, kind::NODES, offset, expected, found);
+    objects.sole_file().expect("a file with nodes").locate(error, NONE)
 }

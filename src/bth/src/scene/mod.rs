@@ -260,10 +260,13 @@ impl Scene {
     }
 
     /// The mask of an instance: bits that the masks of all rows on the way to it have.
+    #[inline(always)]
     pub(crate) fn mask_of(&self, instance: u32) -> u32 {
-        if self.masks.is_empty() {
-            return u32::MAX;
-        }
+        if self.masks.is_empty() { u32::MAX } else { self.stored_mask(instance) }
+    }
+
+    #[inline(never)]
+    fn stored_mask(&self, instance: u32) -> u32 {
         match self.world() {
             Some(world) if world.groups().is_some() => {
                 world.path(instance).iter().fold(u32::MAX, |mask, row| mask & self.masks.of_instance(*row))

@@ -56,18 +56,26 @@ fn written_out(scene: &bth::Scene) -> bth::SceneBuilder {
     builder
 }
 
-/// The nearest hits of random rays within a box.
-fn hits(scene: &bth::Scene, (lower, upper): bth::Bounds, seed: u64) -> Vec<Hit> {
+/// Random rays to the boxes of visible instances.
+fn rays(scene: &bth::Scene, seed: u64) -> Vec<Ray> {
     let mut rng = Rng::new(seed);
-    let mut point = || [0, 1, 2].map(|k| lower[k] + (upper[k] - lower[k]) * rng.unit_f32());
-    let rays: Vec<Ray> = (0..500)
-        .map(|_| {
-            let (from, to) = (point(), point());
-            Ray::new(from, [0, 1, 2].map(|k| to[k] - from[k]))
-        })
-        .collect();
+    let boxes: Vec<bth::Bounds> =
+        (0..scene.instance_count()).filter_map(|i| scene.instance_bounds(i)).collect();
+    let mut point = || {
+        let (lower, upper) = boxes[rng.below(boxes.len() as u64) as usize];
+        [0, 1, 2].map(|k| lower[k] + (upper[k] - lower[k]) * rng.unit_f32())
+    };
+    let ray = |_| {
+        let (from, to) = (point(), point());
+        Ray::new(from, [0, 1, 2].map(|k| to[k] - from[k]))
+    };
+    (0..500).map(ray).collect()
+}
+
+/// The nearest hits of the rays.
+fn hits(scene: &bth::Scene, rays: &[Ray]) -> Vec<Hit> {
     let mut hits = vec![Hit::MISS; rays.len()];
-    scene.batch(&rays).nearest(&mut hits);
+    scene.batch(rays).nearest(&mut hits);
     hits
 }
 
@@ -93,12 +101,10 @@ fn groups_of_a_manifest_are_shown_wherever_nodes_name_them() {
     for frame in [0, 5, 10, 20, 3] {
         scene.set_frame(frame).unwrap();
         let flat = written_out(&scene);
-        let seed = rng.next();
-        let found = hits(&scene, scene.bounds().unwrap(), seed);
-        let (lower, upper) = scene.bounds().unwrap();
-        assert!((0..3).all(|k| lower[k] <= flat.scene().bounds().unwrap().0[k] && upper[k].is_finite()));
+        let rays = rays(&scene, rng.next());
+        let found = hits(&scene, &rays);
         assert_eq!(scene.instance(0).visible, frame < 10);
-        assert_eq!(found, hits(flat.scene(), scene.bounds().unwrap(), seed));
+        assert_eq!(found, hits(flat.scene(), &rays));
         let rays_hit = found.iter().filter(|hit| hit.is_hit()).count();
         assert!(rays_hit > 30, "{rays_hit}");
     }
@@ -134,9 +140,9 @@ fn compiled_files_are_placed_as_a_whole() {
                 same += usize::from(inside.to_world == by_itself.to_world);
             }
             let flat = written_out(&scene);
-            let seed = u64::from(frame);
-            let found = hits(&scene, scene.bounds().unwrap(), seed);
-            assert_eq!(found, hits(flat.scene(), scene.bounds().unwrap(), seed));
+            let rays = rays(&scene, u64::from(frame));
+            let found = hits(&scene, &rays);
+            assert_eq!(found, hits(flat.scene(), &rays));
             assert!(found.iter().filter(|hit| hit.is_hit()).count() > 30);
         }
         // The order of the nodes in the file may be another one.
@@ -150,7 +156,8 @@ fn new_positions_show_in_all_groups() {
     let options = CompileOptions { deformable: true, ..options() };
     let compiled = scene::compile(&manifest(FOREST), folder.path(), Path::new("x"), &options, &Silent);
     let mut scene = bth::from_bytes(&compiled.unwrap().0.bytes).unwrap();
-    let before = hits(&scene, scene.bounds().unwrap(), 3);
+    let rays = rays(&scene, 3);
+    let before = hits(&scene, &rays);
     let positions: Vec<[f32; 3]> =
         scene.positions(0).iter().map(|[x, y, z]| [3.0 * x, y + 9.0, z - 5.0]).collect();
     let update = scene.set_positions(0, &positions).unwrap();
@@ -158,7 +165,7 @@ fn new_positions_show_in_all_groups() {
     let mut flat = written_out(&scene);
     flat.set_positions(0, &positions).unwrap();
     flat.commit().unwrap();
-    let found = hits(&scene, scene.bounds().unwrap(), 3);
-    assert_eq!(found, hits(flat.scene(), scene.bounds().unwrap(), 3));
+    let found = hits(&scene, &rays);
+    assert_eq!(found, hits(flat.scene(), &rays));
     assert!(found != before && found.iter().filter(|hit| hit.is_hit()).count() > 30);
 }

@@ -41,7 +41,6 @@ impl Buffer {
         let padded = bytes.checked_add(ALIGNMENT).ok_or_else(too_large)? / ALIGNMENT * ALIGNMENT;
         let layout = Layout::from_size_align(padded, ALIGNMENT).map_err(|_| too_large())?;
         if !device.memory(bytes as isize, false) {
-            device.memory(-(bytes as isize), true);
             return Err(Failure { message: "the memory monitor refused".to_owned(), ..too_large() });
         }
         // SAFETY: the size is at least `ALIGNMENT` less one, rounded up, so not 0.

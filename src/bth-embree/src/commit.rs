@@ -60,7 +60,6 @@ impl Shared<Scene> {
             committed.geometries[id as usize] = Some(geometry);
         }
         if !self.device.memory(committed.bytes() as isize, false) {
-            self.device.memory(-(committed.bytes() as isize), true);
             let message = "the memory monitor refused".to_owned();
             return Err(Failure { code: ErrorCode::OutOfMemory, message });
         }

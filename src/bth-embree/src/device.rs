@@ -181,7 +181,8 @@ impl Device {
         }
     }
 
-    /// Tells the program of memory that is to be taken, or was given back. False if it refuses.
+    /// Tells the program of memory that is to be taken, or was given back. False if it refuses, and
+    /// then does not count it.
     pub(crate) fn memory(&self, bytes: isize, after: bool) -> bool {
         let function = *lock(&self.on_memory);
         // SAFETY: the program gave the function and its pointer for this.

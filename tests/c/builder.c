@@ -114,7 +114,7 @@ int main(int argc, char **argv) {
     /* What does not exist. */
     const int32_t wrong = BTH_ERROR_ARGUMENT;
     if (bth_builder_instance(builder, 99, m, id) != wrong || bth_builder_instance(builder, 0, NULL, id) != wrong) return 26;
-    if (bth_builder_set_visible(builder, 20, 1) != wrong || bth_builder_remove(builder, 99) != wrong) return 27;
+    if (bth_builder_set_visible(builder, row[1], 1) != wrong || bth_builder_remove(builder, 99) != wrong) return 27;
     if (bth_builder_remove_subscene(builder, subscene) != wrong || bth_builder_subscene(builder, 99, m, id) != wrong) return 28;
     if (bth_builder_set_subscene_seconds(builder, 0, NAN) != wrong || bth_builder_commit(NULL, NULL) != wrong) return 29;
     if (bth_builder_set_subscene_transform(builder, 0, NULL) != wrong || bth_builder_add(builder, NULL, id) != wrong) return 30;

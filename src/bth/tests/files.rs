@@ -11,7 +11,7 @@ macro_rules! files {
     };
 }
 
-const VALID: [(&str, &[u8]); 29] = files![
+const VALID: [(&str, &[u8]); 30] = files![
     "deformable",
     "deformers",
     "free-directions",
@@ -25,6 +25,7 @@ const VALID: [(&str, &[u8]); 29] = files![
     "nothing-to-hit",
     "opacity",
     "scene-empty",
+    "scene-groups",
     "scene-moving",
     "scene-still",
     "second-uvs",

@@ -147,7 +147,7 @@ fn an_object_with_frames_is_copied_from_a_compiled_file() {
     let (file, _) = built(&text, folder.path(), &options());
     std::fs::write(folder.path().join("done.bth"), file.bytes()).unwrap();
     let copy = format!(
-        "objects = [{{ name = \"quad\", file = \"done.bth\" }}, {{ name = \"knot\", file = \"done.bth\" }}]\n{NODE}"
+        "objects = [{{ name = \"quad\", file = \"done.bth\", object = 0 }}, {{ name = \"knot\", file = \"done.bth\", object = 0 }}]\n{NODE}"
     );
     let (copied, report) = built(&copy, folder.path(), &options());
     assert_eq!((report.triangles, report.objects.len()), (triangles.len() as u64, 1));

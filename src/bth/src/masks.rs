@@ -40,6 +40,11 @@ impl Masks {
         self.instances.is_empty() && self.groups.is_empty()
     }
 
+    /// Returns true if some group has a mask that lacks a bit.
+    pub(crate) fn has_groups(&self) -> bool {
+        !self.groups.is_empty()
+    }
+
     pub(crate) fn of_instance(&self, instance: u32) -> u32 {
         read(&self.instances, instance)
     }

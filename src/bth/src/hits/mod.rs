@@ -1,12 +1,12 @@
 //! Queries that report hits under conditions ([`Accept`]): the nearest, any, the k nearest, all in
 //! order, and their number; and crossings of surfaces ([`crossings`]).
 //!
-//! The nearest hit and any hit in a scene of one object take the kernel of single rays, whose goal
-//! tests the conditions ([`conditions`]). All other queries enumerate the instances and the
-//! triangles that the conservative f32 tests do not exclude ([`mod@search`]), nearer boxes first.
-//! They decide each exactly as the other queries do, and keep what their collector wants
-//! ([`collect`]). So results depend neither on the instruction
-//! set nor on the acceleration structures, and t, u and v have the same bits in all queries.
+//! The nearest hit and any hit take the kernel of single rays, whose goal tests the conditions
+//! ([`conditions`]), if neither ray nor objects are in f64 and no object has tetrahedra. All other
+//! queries enumerate the instances and the triangles that the conservative f32 tests do not exclude
+//! ([`mod@search`]), nearer boxes first. They decide each exactly as the other queries do, and keep
+//! what their collector wants ([`collect`]). So results depend neither on the instruction set nor
+//! on the acceleration structures, and t, u and v have the same bits in all queries.
 //!
 //! These queries trace one ray at a time. Where nothing is excluded, the queries without conditions
 //! find the nearest hit and any hit.

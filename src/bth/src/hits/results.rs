@@ -75,7 +75,9 @@ fn conditions<'a>(
     (instance, object): (u32, &'a ObjectView<'a>),
     accept: &'a Accept<'a>,
 ) -> Conditions<'a> {
-    let groups = scene.masks().groups(scene.object_of(instance));
+    let masks = scene.masks();
+    // Finding the object of an instance takes longer than some instances.
+    let groups = if masks.has_groups() { masks.groups(scene.object_of(instance)) } else { None };
     Conditions { ray, instance, object, groups, accept }
 }
 

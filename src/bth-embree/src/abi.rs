@@ -89,6 +89,19 @@ pub struct Hit {
     pub(crate) instance_primitive: u32,
 }
 
+impl Hit {
+    /// No hit.
+    pub(crate) const NONE: Hit = Hit {
+        normal: [0.0; 3],
+        u: 0.0,
+        v: 0.0,
+        primitive: INVALID_ID,
+        geometry: INVALID_ID,
+        instance: INVALID_ID,
+        instance_primitive: INVALID_ID,
+    };
+}
+
 /// `RTCRayHit`.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]

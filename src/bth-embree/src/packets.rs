@@ -55,7 +55,7 @@ pub(crate) unsafe fn intersect(
     let trace = |lane| {
         // SAFETY: by contract the packet has `lanes` lanes, each with the words of a ray and a hit.
         unsafe {
-            let mut one = RayHit { ray: gather(packet, lanes, lane), hit: NO_HIT };
+            let mut one = RayHit { ray: gather(packet, lanes, lane), hit: Hit::NONE };
             trace::intersect(scene, &mut one, arguments);
             if one.hit.geometry == INVALID_ID {
                 return;
@@ -70,17 +70,6 @@ pub(crate) unsafe fn intersect(
     // SAFETY: the contract is the same.
     unsafe { each_valid(valid, lanes, trace) };
 }
-
-/// A hit before anything is hit.
-const NO_HIT: Hit = Hit {
-    normal: [0.0; 3],
-    u: 0.0,
-    v: 0.0,
-    primitive: INVALID_ID,
-    geometry: INVALID_ID,
-    instance: INVALID_ID,
-    instance_primitive: INVALID_ID,
-};
 
 /// Finds which rays of a packet hit anything.
 ///

@@ -47,7 +47,7 @@ pub(crate) fn trace(committed: &Committed, query: Query<'_>) -> Found {
     let filters = Filtering::of(committed, &query);
     if !filters.may_apply && committed.all_meet(mask) {
         if query.is_occluded {
-            return scene.any(&ray).then_some((f32::NEG_INFINITY, NO_HIT));
+            return scene.any(&ray).then_some((f32::NEG_INFINITY, Hit::NONE));
         }
         let hit = scene.nearest(&ray)?;
         return Some((hit.t, filters.describe(committed, &hit).0));
@@ -55,17 +55,6 @@ pub(crate) fn trace(committed: &Committed, query: Query<'_>) -> Found {
     let conditions = Conditions { committed, query, filters, mode: &mode, accepted: Cell::new(None) };
     conditions.trace(scene, &ray)
 }
-
-/// The fields of no hit.
-const NO_HIT: Hit = Hit {
-    normal: [0.0; 3],
-    u: 0.0,
-    v: 0.0,
-    primitive: INVALID_ID,
-    geometry: INVALID_ID,
-    instance: INVALID_ID,
-    instance_primitive: INVALID_ID,
-};
 
 /// Which filters apply to a query.
 #[derive(Clone, Copy)]
@@ -138,7 +127,7 @@ impl Conditions<'_> {
         let filter = |_: &rays::Ray, hit: &rays::Hit| self.accept(hit);
         let accept = Accept { filter: Some(&filter), ..Accept::default() };
         if self.query.is_occluded {
-            return scene.any_accepted(ray, &accept).then_some((f32::NEG_INFINITY, NO_HIT));
+            return scene.any_accepted(ray, &accept).then_some((f32::NEG_INFINITY, Hit::NONE));
         }
         scene.nearest_accepted(ray, &accept)?;
         self.accepted.get()

@@ -5,7 +5,7 @@ use crate::committed::{Committed, Filters, MAX_MASKS, MAX_TABLE, Rest};
 use crate::device::{Callback, lock};
 use crate::error::{Failure, Result, operation, unsupported};
 use crate::handles::Shared;
-use crate::mesh::{self, Build, Mesh, Sources};
+use crate::mesh::{Build, Mesh, Sources};
 use crate::scene::Scene;
 use crate::statistics::{Kind, Who, count, counted};
 use crate::world::{Place, World, add_places};
@@ -71,9 +71,9 @@ impl Shared<Scene> {
         let monitor = Progress::new(*lock(&self.progress));
         monitor.check()?;
         let allows_argument_filter = self.has_flag(SCENE_FILTER_IN_ARGUMENTS);
-        let known = self.mesh().filter(|mesh| {
-            mesh.key == mesh::key(sources) && mesh.allows_argument_filter == allows_argument_filter
-        });
+        let known = self
+            .mesh()
+            .filter(|mesh| mesh.is_of(sources) && mesh.allows_argument_filter == allows_argument_filter);
         let own = match known {
             Some(mesh) => mesh,
             None => {

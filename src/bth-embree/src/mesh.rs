@@ -63,8 +63,9 @@ pub(crate) struct Surface<'a> {
     pub(crate) normal: [f32; 3],
 }
 
-/// What a mesh was made from: it is made again only if this changes.
-pub(crate) type Key = Vec<(u32, usize, u64)>;
+/// What a mesh was made from, with ids and numbers of commits: it is made again only if this
+/// changes. The geometries are held, so that none that comes later has the address of one of them.
+pub(crate) type Key = Vec<(u32, Arc<Shared<Geometry>>, u64)>;
 
 /// The triangles of a scene.
 #[derive(Debug, Default)]
@@ -77,7 +78,7 @@ pub(crate) struct Mesh {
     /// By triangle, in the space of the object.
     normals: Vec<[f32; 3]>,
     bounds: Option<Bounds>,
-    pub(crate) key: Key,
+    key: Key,
     /// True if the scene of these triangles allows filters in the arguments of queries.
     pub(crate) allows_argument_filter: bool,
 }
@@ -94,11 +95,9 @@ pub(crate) struct Build<'a> {
 pub(crate) type Sources = Vec<(u32, Arc<Shared<Geometry>>)>;
 
 /// The key of a mesh of these geometries.
-pub(crate) fn key(sources: &Sources) -> Key {
-    sources
-        .iter()
-        .map(|(id, geometry)| (*id, Arc::as_ptr(geometry) as usize, geometry.state().version))
-        .collect()
+fn key(sources: &Sources) -> Key {
+    let version = |geometry: &Shared<Geometry>| geometry.state().version;
+    sources.iter().map(|(id, geometry)| (*id, geometry.clone(), version(geometry))).collect()
 }
 
 impl Mesh {
@@ -125,6 +124,14 @@ impl Mesh {
         let (scene, bounds) = (Some(scene), Some(bounds));
         let built = Mesh { scene, _stored: stored, parts, normals, bounds, key, allows_argument_filter };
         Ok((built, was_cached))
+    }
+
+    /// Returns true if the mesh was made from these geometries as they were last committed.
+    pub(crate) fn is_of(&self, sources: &Sources) -> bool {
+        self.key.len() == sources.len()
+            && self.key.iter().zip(sources).all(|((id, of, version), (new_id, new))| {
+                id == new_id && Arc::ptr_eq(of, new) && *version == new.state().version
+            })
     }
 
     pub(crate) fn parts(&self) -> &[Part] {

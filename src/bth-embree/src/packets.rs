@@ -86,8 +86,8 @@ pub(crate) unsafe fn occluded(
         // SAFETY: by contract the packet has `lanes` lanes, each with the words of a ray.
         unsafe {
             #[repr(align(16))]
-            struct Aligned(Ray);
-            let mut one = Aligned(gather(packet, lanes, lane));
+            struct AlignedRay(Ray);
+            let mut one = AlignedRay(gather(packet, lanes, lane));
             trace::occluded(scene, &mut one.0, arguments);
             *packet.add(8 * lanes + lane) = one.0.tfar.to_bits();
         }

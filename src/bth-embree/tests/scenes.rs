@@ -459,6 +459,31 @@ fn point_queries_show_the_closest_first() {
 }
 
 #[test]
+fn a_geometry_that_takes_the_place_of_an_empty_one_is_hit() {
+    let device = device();
+    // Larger ids are in no table that would hold the geometry.
+    const ID: u32 = 1 << 21;
+    // SAFETY: handles live.
+    unsafe {
+        let scene = rtcNewScene(device);
+        for _ in 0..8 {
+            let empty = rtcNewGeometry(device, TRIANGLE);
+            rtcCommitGeometry(empty);
+            rtcAttachGeometryByID(scene, empty, ID);
+            rtcReleaseGeometry(empty);
+            rtcCommitScene(scene);
+            rtcDetachGeometry(scene, ID);
+            // The allocator may give it the address of the other, which is gone.
+            rtcReleaseGeometry(square(device, scene, 1.0, 1, ID));
+            rtcCommitScene(scene);
+            let down = RayHit::new([0.5, 0.25, 9.0], [0.0, 0.0, -1.0]);
+            assert_eq!(trace(scene, down).geometry, ID);
+            rtcDetachGeometry(scene, ID);
+        }
+    }
+}
+
+#[test]
 fn what_is_wrong_is_refused() {
     let device = device();
     // SAFETY: handles live or are null.

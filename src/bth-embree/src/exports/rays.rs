@@ -32,10 +32,16 @@ unsafe fn scene<'a>(handle: Handle) -> Result<&'a Shared<Scene>, Option<&'static
 fn foreign(handle: Handle) -> Option<&'static Functions> {
     let known = if handle.is_null() { None } else { functions() };
     if known.is_none() {
-        let failure = crate::error::argument::<()>("invalid argument: expected a scene");
-        failure.unwrap_or_else(|failure| report_without_device(&failure));
+        refuse();
     }
     known
+}
+
+/// Reports a handle that is not a scene of ours.
+#[cold]
+fn refuse() {
+    let failure = crate::error::argument::<()>("invalid argument: expected a scene of this library");
+    failure.unwrap_or_else(|failure| report_without_device(&failure));
 }
 
 /// Traces; a panic, which would be a defect, is reported.
@@ -91,8 +97,11 @@ macro_rules! packets {
         pub unsafe extern "C" fn $name(valid: *const i32, handle: Handle, packet: *mut u32, arguments: *mut QueryArguments) {
             // SAFETY: the contract is the same.
             unsafe {
-                if let Ok(scene) = scene(handle) {
-                    guarded(|| $trace(valid, scene, packet, arguments, $lanes));
+                match scene(handle) {
+                    Ok(scene) => guarded(|| $trace(valid, scene, packet, arguments, $lanes)),
+                    // Its scenes are only asked for single rays here.
+                    Err(Some(_)) => refuse(),
+                    Err(None) => {}
                 }
             }
         }

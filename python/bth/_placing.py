@@ -1,4 +1,4 @@
-"""Moving, adding, hiding and removing of instances."""
+"""Moving, adding, hiding and removing of instances, and adding of objects."""
 
 import numpy as np
 
@@ -32,6 +32,17 @@ class Placing:
         _native.set_transforms(
             self._native, instances, _meshes.matrices_of(matrices, len(instances), "matrices")
         )
+
+    def add_objects(self, scene):
+        """Adds the objects of another scene, without instances of them, and compiles nothing.
+
+        scene: a Scene. Its objects have the positions of its file; its masks have no effect here.
+
+        Returns their indices as a range, for `add_instances`. Their memory is shared with `scene`,
+        which may be closed. Objects stay until this scene is closed. `save` and `to_bytes` give the
+        file without them.
+        """
+        return range(*_native.add_objects(self._native, scene._native))
 
     def add_instances(self, obj=0, matrices=None):
         """Adds instances of objects of the scene.
@@ -73,13 +84,18 @@ class Placing:
     def _placement(self):
         """What `_place` takes: None if the file places the instances."""
         return (
-            (self.objects_of_instances, self.transforms, self.visible, self.instance_names)
+            (
+                _native.added_files(self._native),
+                *(self.objects_of_instances, self.transforms, self.visible, self.instance_names),
+            )
             if self._native.placed
             else None
         )
 
-    def _place(self, objects, transforms, visible, names):
+    def _place(self, files, objects, transforms, visible, names):
         """Places the instances of a file that was just opened as another scene of it has them."""
+        for file in files:
+            _native.add_objects(self._native, _native.load(file))
         count, none = self.instance_count, objects == 0xFFFFFFFF
         kept = (self.objects_of_instances == objects[:count]) & (
             np.array(self.instance_names, object) == np.array(names[:count], object)

@@ -3,8 +3,11 @@ from typing import overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._scene import Scene
+
 class Placing:
     def set_transforms(self, instances: ArrayLike, matrices: ArrayLike) -> None: ...
+    def add_objects(self, scene: Scene) -> range: ...
     @overload
     def add_instances(self, obj: int = 0, matrices: None = None) -> int: ...
     @overload

@@ -82,6 +82,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(parts::set_group_masks, module)?)?;
     module.add_function(wrap_pyfunction!(parts::masks, module)?)?;
     module.add_function(wrap_pyfunction!(parts::set_masks, module)?)?;
+    module.add_function(wrap_pyfunction!(placing::add_objects, module)?)?;
+    module.add_function(wrap_pyfunction!(placing::added_files, module)?)?;
     module.add_function(wrap_pyfunction!(placing::set_transforms, module)?)?;
     module.add_function(wrap_pyfunction!(placing::add_instances, module)?)?;
     module.add_function(wrap_pyfunction!(placing::remove_instances, module)?)?;

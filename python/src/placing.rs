@@ -1,4 +1,4 @@
-//! Moving, adding, hiding and removing of instances.
+//! Moving, adding, hiding and removing of instances, and adding of objects.
 
 use crate::errors::{check_index, format_error};
 use crate::scene::NativeScene;
@@ -8,6 +8,7 @@ use bth_format::layout::NONE;
 use numpy::{PyReadonlyArray1, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 
 /// One matrix for each of `count` rows.
 fn matrices(transforms: &PyReadonlyArray3<'_, f64>, count: usize) -> PyResult<Vec<Matrix>> {
@@ -58,6 +59,37 @@ pub(crate) fn set_transforms(
         placed.builder.set_transforms(&instances, &new)?;
         placed.commit(|builder| builder.set_transforms(&instances, &old))
     })
+}
+
+/// Adds the objects of another scene, without instances; returns the range of their indices.
+#[pyfunction]
+pub(crate) fn add_objects(py: Python<'_>, scene: &NativeScene, other: &NativeScene) -> PyResult<(u32, u32)> {
+    // The two scenes are not held at once: two threads that add them to each other would wait for
+    // ever.
+    let added = other.with(py, |other| {
+        if other.is_animated() {
+            let message =
+                "the tracks of its file move the added scene (hint: compile it with animation=\"none\")";
+            return Err(PyValueError::new_err(message));
+        }
+        let mut added = bth::SceneBuilder::new();
+        added.add(other);
+        Ok(added)
+    })??;
+    change(py, scene, &[], |placed| {
+        let first = placed.builder.add(added.scene());
+        Ok((first, placed.builder.scene().object_count()))
+    })
+}
+
+/// The files of the objects that were added to a scene, once for each time, in this order.
+#[pyfunction]
+pub(crate) fn added_files<'py>(py: Python<'py>, scene: &NativeScene) -> PyResult<Vec<Bound<'py, PyBytes>>> {
+    let scene = scene.get()?;
+    let read = scene.read_attached(py)?;
+    let added = read.file().object_count()..read.object_count();
+    let files = added.map(|object| read.file_of(object)).filter(|(_, row)| *row == 0);
+    Ok(files.map(|(file, _)| PyBytes::new(py, file.bytes())).collect())
 }
 
 /// Adds instances of objects; returns their ids.

@@ -37,7 +37,7 @@ impl Deref for State {
 }
 
 impl State {
-    /// The compiled file.
+    /// The compiled file, without objects that Python has added.
     pub(crate) fn file(&self) -> &File {
         match self {
             State::File(scene) => scene.file(),
@@ -121,7 +121,8 @@ impl State {
     /// The objects whose positions differ from the file.
     pub(crate) fn deformed(&self) -> impl Iterator<Item = u32> {
         (0..self.object_count()).filter(|&object| {
-            let of_file = self.file().object(object).expect("an object of the file");
+            let (file, row) = self.file_of(object);
+            let of_file = file.object(row).expect("an object of the file");
             !std::ptr::eq(self.object(object).positions, of_file.positions)
         })
     }

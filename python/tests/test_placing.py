@@ -78,6 +78,35 @@ def test_placing_without_a_change_changes_no_answer(scene):
     assert answers(scene) == before and scene.to_bytes() == bth.load(scene.to_bytes()).to_bytes()
 
 
+@pytest.mark.filterwarnings("ignore::bth.OpenMeshWarning")
+def test_objects_of_other_scenes():
+    scene, sheet = bth.compile(PIECES[0]), bth.compile(PIECES[1])
+    size, rows = scene.nbytes, [0, 1, 1]
+    with sheet:
+        assert scene.add_objects(sheet) == range(1, 2)
+    assert scene.object_count == 2 and scene.instance_count == 1
+    scene.set_transforms(0, matrices(1, 11)[0])
+    scene.add_instances([1, 1], matrices(2, 12))
+    expected = bth.compile_scene(PIECES, rows, [*matrices(1, 11), *matrices(2, 12)])
+    assert answers(scene) == answers(expected) and scene.nbytes == size
+    for copied in (copy.copy(scene), pickle.loads(pickle.dumps(scene))):
+        assert answers(copied) == answers(expected) and copied.object_count == 2
+
+
+def test_objects_of_scenes_with_added_objects():
+    scene, others = bth.compile(PIECES[0]), bth.compile(PIECES[1], deformable=True)
+    others.add_objects(bth.compile(sphere(3, 4), names=True))
+    others.set_positions(PIECES[1][0] * np.float32(2), 0)
+    assert scene.add_objects(others) == range(1, 3) and scene.add_objects(scene) == range(3, 6)
+    assert [len(scene.triangles(k)) for k in range(6)] == [len(PIECES[0][1]), 2, 16] * 2
+    # Added objects have the positions of their file.
+    assert (scene.vertices(1) == PIECES[1][0]).all() and scene.vertex_count(1) == 4
+    scene.set_positions(PIECES[1][0] * np.float32(3), 4)
+    other = pickle.loads(pickle.dumps(scene))
+    assert other.object_count == 6 and (other.vertices(4) == PIECES[1][0] * np.float32(3)).all()
+    assert (other.vertices(1) == PIECES[1][0]).all()
+
+
 def test_of_a_model_and_of_one_index():
     scene = bth.compile(PIECES[0])
     added = scene.add_instances(matrices=matrices(1, 3)[0])
@@ -193,8 +222,12 @@ def test_scenes_that_move_by_themselves_are_refused(tmp_path):
         tracks = [{ node = "slide", property = "translation", times = [0, 1], values = [[0, 0, 0], [8, 0, 0]] }]
     """)
     scene = bth.compile(manifest, cache=False)
-    with pytest.raises(ValueError, match="tracks .* animation=\"none\""):
-        scene.set_transforms(0, np.eye(4))
+    for refused in (
+        lambda: scene.set_transforms(0, np.eye(4)), lambda: scene.add_objects(bth.compile(PIECES[0])),
+        lambda: bth.compile(PIECES[0]).add_objects(scene),
+    ):
+        with pytest.raises(ValueError, match="tracks .* animation=\"none\""):
+            refused()
     scene.seconds = 1
     assert scene.bounds[1, 0].round(3) == 9
 

@@ -3,9 +3,13 @@
 from pathlib import Path
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 
 import bth
+from bth.embreex.mesh_construction import TriangleMesh
+from bth.embreex.rtcore import EmbreeDevice
+from bth.embreex.rtcore_scene import EmbreeScene
 
 VERTICES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
@@ -68,6 +72,29 @@ def compiled(path: Path) -> bth.Scene:
     return scenes[0]
 
 
+def assembled(scene: bth.Scene) -> int:
+    """Objects of one scene in another; returns how many there are."""
+    added: range = scene.add_objects(bth.compile((VERTICES, FACES)))
+    scene.add_instances(added[0], np.eye(4))
+    return scene.object_count
+
+
+def drop_ins() -> None:
+    """The drop-ins, with what type checkers know of their results."""
+    rays = bth.open3d.RaycastingScene()
+    geometry: int = rays.add_triangles(VERTICES, FACES)
+    assert geometry == 0 and rays.cast_rays([[0.1, 0.1, 5, 0, 0, -1]])["t_hit"].numpy().shape == (1,)
+    device = EmbreeScene(EmbreeDevice())
+    TriangleMesh(device, VERTICES, FACES)
+    primitives: NDArray[np.int32] = device.run([[0.1, 0.1, 5]], [[0, 0, -1]])
+    distances: NDArray[np.floating] = device.run([[0.1, 0.1, 5]], [[0, 0, -1]], query="DISTANCE")
+    assert primitives.shape == distances.shape == (1,)
+    mesh = bth.trimesh.RayMeshIntersector(trimesh.creation.box())
+    first: NDArray[np.int64] = mesh.intersects_first([[0.1, 0.1, 5]], [[0, 0, -1]])
+    _, _, points = mesh.intersects_id([[0.1, 0.1, 5]], [[0, 0, -1]], return_locations=True)
+    assert first.shape == (1,) and points.shape == (2, 3)
+
+
 def wrong(scene: bth.Scene) -> None:
     """What mypy must refuse; never called."""
     scene.nearest([0, 0, 0], [0, 0, 1], cull="left")  # type: ignore[arg-type]
@@ -76,6 +103,10 @@ def wrong(scene: bth.Scene) -> None:
     bth.compile_scene([], flatten=True)  # type: ignore[call-arg]
     scene.nearst([0, 0, 0], [0, 0, 1])  # type: ignore[attr-defined]
     scene.bounds = None  # type: ignore[misc]
+    bth.open3d.RaycastingScene().cast_ray([[0, 0, 0, 0, 0, 1]])  # type: ignore[attr-defined]
+    EmbreeScene().run([[0, 0, 0]], [[0, 0, 1]], query="NEAREST")  # type: ignore[call-overload]
+    bth.trimesh.RayMeshIntersector([[0, 0, 0]])  # type: ignore[arg-type]
+    scene.add_objects(VERTICES)  # type: ignore[arg-type]
 
 
 def main(folder: Path) -> None:
@@ -87,5 +118,6 @@ def main(folder: Path) -> None:
         assert code.startswith("BTH-F")
     many(scene, np.full((2, 3), 0.1))
     assert nearest(scene, np.array([[0.2, 0.2, -1, 0, 0, 1]], np.float32)).tolist() == [[0, 0, -1]]
-    assert masks(scene) == [3] and moved(scene) == 4
+    assert masks(scene) == [3] and moved(scene) == 4 and assembled(scene) == 2
+    drop_ins()
     assert issubclass(bth.OpenMeshWarning, UserWarning)

@@ -1,0 +1,3 @@
+from . import mesh_construction as mesh_construction, rtcore as rtcore, rtcore_scene as rtcore_scene
+
+def install() -> None: ...

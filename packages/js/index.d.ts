@@ -310,6 +310,25 @@ export interface Material {
     readonly doubleSided: boolean;
     /** Whether the base colour is shown as it is, without light. */
     readonly unlit: boolean;
+    /** Null in files without glossy materials. */
+    readonly gloss: Gloss | null;
+}
+
+/** How glossy a material is, as in glTF 2.0, and the textures that shape its surface. Their texels are linear. */
+export interface Gloss {
+    /** From 0 to 1, to be multiplied by blue of the texture. */
+    readonly metallic: number;
+    /** From 0, smooth, to 1; to be multiplied by green of the texture. */
+    readonly roughness: number;
+    readonly metallicRoughnessTexture: number | null;
+    /** Red to the right, green up, blue out of the surface, 0 to 1 for -1 to 1. */
+    readonly normalTexture: number | null;
+    /** Factor of the first two components of these normals. */
+    readonly normalScale: number;
+    /** Red is the share of light from all around that reaches the surface. */
+    readonly occlusionTexture: number | null;
+    /** How much that counts, from 0 to 1. */
+    readonly occlusionStrength: number;
 }
 
 /** A texture. */

@@ -14,6 +14,12 @@ export const WORDS = CHUNK * (HIT_COLUMNS + SURFACE_WORDS);
 const NONE = 0xffffffff;
 /** How texture coordinates beyond 0 and 1 find texels. */
 const WRAPS = ["repeat", "mirror", "clamp"];
+
+/** Words that a material or a texture has at most. */
+const ROW_WORDS = 19;
+
+/** An index, or null for none. */
+const orNull = (index) => (index === NONE ? null : index);
 /** The sides that a ray hits, by their number in the module. */
 const SIDES = { both: 0, front: 1, back: 2 };
 /** Numbers of an instance in the module: the rows of its transform, and its object. */
@@ -313,13 +319,22 @@ export class Scene {
     materials(object) {
         return this.#rows("bth_material", object, (words, floats) => ({
             baseColor: [...floats.subarray(0, 4)],
-            baseColorTexture: words[10] === NONE ? null : words[10],
+            baseColorTexture: orNull(words[10]),
             emissive: [...floats.subarray(4, 7)],
-            emissiveTexture: words[11] === NONE ? null : words[11],
+            emissiveTexture: orNull(words[11]),
             alpha: ["opaque", "mask", "blend"][words[8]],
             alphaCutoff: floats[7],
             doubleSided: (words[9] & 1) !== 0,
             unlit: (words[9] & 2) !== 0,
+            gloss: (words[9] & 4) === 0 ? null : {
+                metallic: floats[12],
+                roughness: floats[13],
+                metallicRoughnessTexture: orNull(words[16]),
+                normalTexture: orNull(words[17]),
+                normalScale: floats[14],
+                occlusionTexture: orNull(words[18]),
+                occlusionStrength: floats[15],
+            },
         }));
     }
 
@@ -350,8 +365,8 @@ export class Scene {
         checkIndex("object", object, this.objects);
         const rows = [];
         while (this.#wasm[name](scene, object, rows.length, this.#memory.numbers) !== 0) {
-            const words = new Uint32Array(this.#wasm.memory.buffer, this.#memory.numbers, 13);
-            rows.push(read(words, new Float32Array(words.buffer, words.byteOffset, 13)));
+            const words = new Uint32Array(this.#wasm.memory.buffer, this.#memory.numbers, ROW_WORDS);
+            rows.push(read(words, new Float32Array(words.buffer, words.byteOffset, ROW_WORDS)));
         }
         return rows;
     }

@@ -12,14 +12,14 @@ import importlib.util
 
 from ._compile import compile, compile_scene
 from ._hits import NONE, AllHits, Closest, Hits, Opacity, Overlaps, SurfacePoints
-from ._materials import Material, Texture
+from ._materials import Gloss, Material, Texture
 from ._native import Candidate, Error, __version__, isa
 from ._open_meshes import OpenMeshWarning
 from ._scene import Scene, load, open
 from ._threads import set_threads
 
 __all__ = [
-    "AllHits", "Candidate", "Closest", "Error", "Hits", "Material", "NONE", "Opacity", "OpenMeshWarning", "Overlaps", "Scene",
+    "AllHits", "Candidate", "Closest", "Error", "Gloss", "Hits", "Material", "NONE", "Opacity", "OpenMeshWarning", "Overlaps", "Scene",
     "SurfacePoints", "Texture", "__version__", "compile", "compile_scene", "isa", "load", "open", "set_threads",
 ]
 

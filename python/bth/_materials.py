@@ -6,6 +6,29 @@ import numpy as np
 
 
 @dataclass(frozen=True)
+class Gloss:
+    """How glossy a material is, as in glTF 2.0, and the textures that shape its surface.
+
+    metallic: 0 to 1; to be multiplied by blue of `metallic_roughness_texture`.
+    roughness: from 0, smooth, to 1; to be multiplied by green of `metallic_roughness_texture`.
+    normal_texture: red to the right, green up, blue out of the surface, 0 to 1 for -1 to 1.
+    normal_scale: factor of the first two components of these normals.
+    occlusion_texture: its red is the share of light from all around that reaches the surface.
+    occlusion_strength: how much that counts, from 0 to 1.
+
+    Textures are indices of the object's textures, or None; their texels are linear.
+    """
+
+    metallic: float
+    roughness: float
+    metallic_roughness_texture: int | None
+    normal_texture: int | None
+    normal_scale: float
+    occlusion_texture: int | None
+    occlusion_strength: float
+
+
+@dataclass(frozen=True)
 class Material:
     """How a material looks, as in glTF 2.0. Colors are linear, with the primaries of sRGB.
 
@@ -16,6 +39,7 @@ class Material:
         the surface stops.
     double_sided: whether the back of triangles is seen too.
     unlit: whether the base color is shown as it is, without light.
+    gloss: how glossy it is, as Gloss; None in files without glossy materials.
     """
 
     name: str
@@ -27,6 +51,7 @@ class Material:
     alpha_cutoff: float
     double_sided: bool
     unlit: bool
+    gloss: Gloss | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +59,8 @@ class Texture:
     """A texture: an image file, and how it lies on the surface.
 
     image: equal for textures of the same image of a file.
-    data: the image file (PNG, JPEG or WebP), bytes. Red, green and blue of its texels are sRGB, alpha is linear.
+    data: the image file (PNG, JPEG or WebP), bytes. Red, green and blue of texels of colors are sRGB;
+        alpha and the texels of Gloss are linear.
     wrap: for u and for v "repeat", "mirror" or "clamp".
     nearest: whether the nearest texel is taken; else four are interpolated, after they have been made linear.
     uv_set: the set of its texture coordinates: 0 for `texcoord` of hits, 1 for `second_texcoord`.
@@ -56,7 +82,10 @@ class Texture:
 
 def material(row):
     """What the native module says of a material; None where the file keeps no more than its name."""
-    return None if row is None else Material(*row)
+    if row is None:
+        return None
+    *rest, gloss = row
+    return Material(*rest, None if gloss is None else Gloss(*gloss))
 
 
 def texture(row):

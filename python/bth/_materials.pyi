@@ -7,6 +7,16 @@ from numpy.typing import ArrayLike, NDArray
 _Wrap = Literal["repeat", "mirror", "clamp"]
 
 @dataclass(frozen=True)
+class Gloss:
+    metallic: float
+    roughness: float
+    metallic_roughness_texture: int | None
+    normal_texture: int | None
+    normal_scale: float
+    occlusion_texture: int | None
+    occlusion_strength: float
+
+@dataclass(frozen=True)
 class Material:
     name: str
     base_color: tuple[float, float, float, float]
@@ -17,6 +27,7 @@ class Material:
     alpha_cutoff: float
     double_sided: bool
     unlit: bool
+    gloss: Gloss | None
 
 @dataclass(frozen=True, eq=False)
 class Texture:

@@ -2,13 +2,18 @@
 
 use crate::errors::check_index;
 use crate::scene::NativeScene;
-use bth::{Alpha, Scene, Wrap};
+use bth::{Alpha, Gloss, Scene, Wrap};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 /// Name, base colour, its texture, emission, its texture, what alpha means, cutoff, whether
-/// double-sided, whether unlit.
-type MaterialRow = (String, [f32; 4], Option<u32>, [f32; 3], Option<u32>, &'static str, f32, bool, bool);
+/// double-sided, whether unlit, gloss.
+type MaterialRow =
+    (String, [f32; 4], Option<u32>, [f32; 3], Option<u32>, &'static str, f32, bool, bool, Option<GlossRow>);
+
+/// Metallic, roughness, the texture of both, that of normals and their scale, that of occlusion and
+/// its strength.
+type GlossRow = (f32, f32, Option<u32>, Option<u32>, f32, Option<u32>, f32);
 
 /// Image, bytes of its file, wrap modes, whether the nearest texel is taken, set of coordinates,
 /// rows of the transform.
@@ -32,7 +37,22 @@ fn row(scene: &Scene, object: u32, material: u32) -> Option<MaterialRow> {
         cutoff,
         look.double_sided,
         look.unlit,
+        look.gloss.map(gloss_row),
     ))
+}
+
+fn gloss_row(gloss: Gloss) -> GlossRow {
+    let Gloss { metallic, roughness, metallic_roughness_texture, .. } = gloss;
+    let Gloss { normal_texture, normal_scale, occlusion_texture, occlusion_strength, .. } = gloss;
+    (
+        metallic,
+        roughness,
+        metallic_roughness_texture,
+        normal_texture,
+        normal_scale,
+        occlusion_texture,
+        occlusion_strength,
+    )
 }
 
 /// The materials of an object; `None` where the file keeps only the name.

@@ -1,5 +1,6 @@
 """How surfaces look: materials, textures and vertex colors that a file keeps."""
 
+import pathlib
 import struct
 import zlib
 
@@ -7,6 +8,8 @@ import numpy as np
 import pytest
 
 import bth
+
+FILES = pathlib.Path(__file__).resolve().parents[2] / "format-spec" / "conformance" / "valid"
 
 
 def _png(*texels):
@@ -64,6 +67,17 @@ def test_materials_and_textures_are_those_of_the_source(path):
     # Texture coordinates of OBJ go up, those of images down.
     assert texture.coordinates(hits.texcoord[0]).tolist() == [0.25, 0.5]
     assert texture.coordinates([[0.25, 0.125], [1, 0]]).tolist() == [[0.25, 0.875], [1, 1]]
+
+
+def test_gloss_is_that_of_the_file(path):
+    """As `brass` of tests/src/conformance/materials.rs."""
+    [plain, _] = bth.compile(path, materials=True, cache=False).materials()
+    assert plain.gloss is None
+    if not FILES.exists():
+        pytest.skip("not in the repository")
+    scene = bth.open(FILES / "gloss.bth")
+    [brass] = scene.materials(0)
+    assert brass.gloss == bth.Gloss(1.0, 0.25, 1, 0, 1.0, None, 1.0) and scene.materials(1)[0].gloss is None
 
 
 def test_vertex_colors_are_interpolated_linearly(path):

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-_Static_assert(sizeof(bth_material_look) == 48, "material");
+_Static_assert(sizeof(bth_material_look) == 76, "material");
 _Static_assert(sizeof(bth_texture_image) == 48 + 2 * sizeof(size_t), "texture");
 
 int main(int argc, char **argv) {
@@ -16,6 +16,9 @@ int main(int argc, char **argv) {
             printf("error %d %s\n", code, bth_last_error());
             continue;
         }
+        if (look.metallic != 0 || look.normal_texture != BTH_NONE)
+            printf("gloss %.3g %.3g scale %.3g strength %.3g textures %d %d %d\n", look.metallic, look.roughness, look.normal_scale,
+                   look.occlusion_strength, (int)look.metallic_roughness_texture, (int)look.normal_texture, (int)look.occlusion_texture);
         printf("material %.3g %.3g %.3g %.3g emissive %.3g %.3g %.3g alpha %u %.3g flags %u textures %d %d\n", look.base_color[0],
                look.base_color[1], look.base_color[2], look.base_color[3], look.emissive[0], look.emissive[1], look.emissive[2],
                look.alpha_mode, look.alpha_cutoff, look.flags, (int)look.base_color_texture, (int)look.emissive_texture);

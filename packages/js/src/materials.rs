@@ -3,15 +3,17 @@
 use bth::{Alpha, Scene, Wrap};
 
 /// Words of [`bth_material`].
-const MATERIAL_WORDS: usize = 12;
+const MATERIAL_WORDS: usize = 19;
 
 /// Words of [`bth_texture`].
 const TEXTURE_WORDS: usize = 13;
 
 /// Writes how a material of an object looks, [`MATERIAL_WORDS`] words: red, green, blue and alpha
 /// of the base colour, red, green and blue of the emission and the cutoff, as f32; what alpha means
-/// (0 nothing, 1 a mask, 2 a share); the bits 1 for both sides and 2 for no light; textures of the
-/// base colour and of the emission, 2^32 - 1 for none. Returns 0 if the file does not keep it.
+/// (0 nothing, 1 a mask, 2 a share); the bits 1 for both sides, 2 for no light and 4 for gloss;
+/// textures of the base colour and of the emission, 2^32 - 1 for none; of the gloss metallic,
+/// roughness, scale of normals and strength of occlusion, as f32, and the textures of the first
+/// two, of normals and of occlusion. Returns 0 if the file does not keep it.
 ///
 /// # Safety
 /// `scene` is open, and `words` points to as many words as stated, which overlap nothing else.
@@ -32,10 +34,31 @@ pub unsafe extern "C" fn bth_material(
         Alpha::Mask(cutoff) => (1, cutoff),
         Alpha::Blend => (2, 0.0),
     };
-    let flags = u32::from(found.double_sided) | u32::from(found.unlit) << 1;
-    let [base, emissive] =
-        [found.base_color_texture, found.emissive_texture].map(|texture| texture.unwrap_or(u32::MAX));
-    *words = [r, g, b, a, er, eg, eb, cutoff.to_bits(), alpha, flags, base, emissive];
+    let is_glossy = u32::from(found.gloss.is_some());
+    let flags = u32::from(found.double_sided) | u32::from(found.unlit) << 1 | is_glossy << 2;
+    let texture = |texture: Option<u32>| texture.unwrap_or(u32::MAX);
+    let gloss = found.gloss.unwrap_or_default();
+    *words = [
+        r,
+        g,
+        b,
+        a,
+        er,
+        eg,
+        eb,
+        cutoff.to_bits(),
+        alpha,
+        flags,
+        texture(found.base_color_texture),
+        texture(found.emissive_texture),
+        gloss.metallic.to_bits(),
+        gloss.roughness.to_bits(),
+        gloss.normal_scale.to_bits(),
+        gloss.occlusion_strength.to_bits(),
+        texture(gloss.metallic_roughness_texture),
+        texture(gloss.normal_texture),
+        texture(gloss.occlusion_texture),
+    ];
     1
 }
 

@@ -318,8 +318,13 @@ test("materials, textures and their images are those of the source", () => {
     const [glass, green] = scene.materials(0);
     assert.deepEqual(glass, {
         baseColor: [1, 1, 1, 1], baseColorTexture: 0, emissive: [0.5, 0.25, 1], emissiveTexture: 1, alpha: "blend", alphaCutoff: 0,
-        doubleSided: false, unlit: true,
+        doubleSided: false, unlit: true, gloss: glass.gloss,
     });
+    const [brass] = bth.open(readFileSync(join(conformance, "valid/gloss.bth"))).materials(0);
+    assert.deepEqual(brass.gloss, {
+        metallic: 1, roughness: 0.25, metallicRoughnessTexture: 1, normalTexture: 0, normalScale: 1, occlusionTexture: null, occlusionStrength: 1,
+    });
+    assert.equal(bth.open(readFileSync(join(conformance, "valid/materials.bth"))).materials(0)[0].gloss, null);
     assert.deepEqual([green.baseColor, green.baseColorTexture, green.emissiveTexture, green.alpha, green.doubleSided], [[0, 0.5, 0, 1], null, null, "opaque", true]);
     const textures = scene.textures(0);
     const transform = [1, 0, 0, 0, 1, 0];

@@ -426,7 +426,8 @@ size_t bth_material_name(const bth_scene *scene, uint32_t object, uint32_t mater
 #define BTH_DOUBLE_SIDED 1u /* the back of triangles is seen too */
 #define BTH_UNLIT 2u        /* the base color is shown as it is, without light */
 
-/* How a material looks. 48 bytes. */
+/* How a material looks. 76 bytes. Metallic and the numbers below it are as in glTF 2.0; matte materials have 0, 1, 1, 1 and no
+ * textures. Texels of their textures are linear. */
 typedef struct {
     float base_color[4];         /* red, green, blue and alpha; to be multiplied by the texel of the texture and the vertex color */
     float emissive[3];           /* emitted radiance; to be multiplied by the texel of the texture */
@@ -435,6 +436,13 @@ typedef struct {
     uint32_t flags;              /* BTH_DOUBLE_SIDED and BTH_UNLIT, or 0 */
     uint32_t base_color_texture; /* index of a texture of the object, or BTH_NONE */
     uint32_t emissive_texture;   /* the same for the emission */
+    float metallic;              /* 0 to 1; to be multiplied by blue of the texture of both */
+    float roughness;             /* from 0, smooth, to 1; to be multiplied by green of the texture of both */
+    float normal_scale;          /* factor of the first two components of the normals in the normal texture */
+    float occlusion_strength;    /* how much the occlusion texture counts, 0 to 1 */
+    uint32_t metallic_roughness_texture; /* index of a texture, or BTH_NONE */
+    uint32_t normal_texture;     /* the same: red to the right, green up, blue out of the surface, 0 to 1 for -1 to 1 */
+    uint32_t occlusion_texture;  /* the same: red is the share of light from all around that reaches the surface */
 } bth_material_look;
 
 /* How texture coordinates beyond 0 and 1 find texels. */
@@ -444,8 +452,8 @@ typedef struct {
 
 /* A texture of an object: an image file and how it lies on the surface. */
 typedef struct {
-    const uint8_t *bytes;  /* the image file: PNG, JPEG or WebP; valid until the scene is closed. Red, green and blue of its texels are
-                              sRGB, alpha is linear. */
+    const uint8_t *bytes;  /* the image file: PNG, JPEG or WebP; valid until the scene is closed. Red, green and blue of texels of
+                              colors are sRGB; alpha and other texels are linear. */
     size_t length;         /* number of bytes */
     float transform[2][3]; /* rows of the transform from (u, v, 1), where u and v are those of its set, to coordinates of the
                               image: (0, 0) is its upper left corner, (1, 1) its lower right one */

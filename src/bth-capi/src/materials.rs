@@ -20,6 +20,13 @@ pub struct MaterialC {
     flags: u32,
     base_color_texture: u32,
     emissive_texture: u32,
+    metallic: f32,
+    roughness: f32,
+    normal_scale: f32,
+    occlusion_strength: f32,
+    metallic_roughness_texture: u32,
+    normal_texture: u32,
+    occlusion_texture: u32,
 }
 
 /// `bth_texture_image` of `bth.h`.
@@ -36,7 +43,7 @@ pub struct TextureC {
     reserved: u32,
 }
 
-const _: () = assert!(size_of::<MaterialC>() == 48);
+const _: () = assert!(size_of::<MaterialC>() == 76);
 const _: () = assert!(size_of::<TextureC>() == 48 + 2 * size_of::<usize>());
 
 impl MaterialC {
@@ -47,14 +54,23 @@ impl MaterialC {
             Alpha::Mask(cutoff) => (1, cutoff),
             Alpha::Blend => (2, 0.0),
         };
+        let texture = |texture: Option<u32>| texture.unwrap_or(u32::MAX);
+        let gloss = material.gloss.unwrap_or_default();
         Self {
             base_color: material.base_color,
             emissive: material.emissive,
             alpha_cutoff,
             alpha_mode,
             flags: flag(material.double_sided, DOUBLE_SIDED) | flag(material.unlit, UNLIT),
-            base_color_texture: material.base_color_texture.unwrap_or(u32::MAX),
-            emissive_texture: material.emissive_texture.unwrap_or(u32::MAX),
+            base_color_texture: texture(material.base_color_texture),
+            emissive_texture: texture(material.emissive_texture),
+            metallic: gloss.metallic,
+            roughness: gloss.roughness,
+            normal_scale: gloss.normal_scale,
+            occlusion_strength: gloss.occlusion_strength,
+            metallic_roughness_texture: texture(gloss.metallic_roughness_texture),
+            normal_texture: texture(gloss.normal_texture),
+            occlusion_texture: texture(gloss.occlusion_texture),
         }
     }
 }

@@ -57,6 +57,21 @@ pub struct Gloss {
     pub occlusion_strength: f32,
 }
 
+/// The gloss of a matte material.
+impl Default for Gloss {
+    fn default() -> Gloss {
+        Gloss {
+            metallic: 0.0,
+            roughness: 1.0,
+            metallic_roughness_texture: None,
+            normal_texture: None,
+            normal_scale: 1.0,
+            occlusion_texture: None,
+            occlusion_strength: 1.0,
+        }
+    }
+}
+
 /// How texture coordinates beyond 0 and 1 find texels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wrap {

@@ -206,6 +206,10 @@ fn a_c_program_reads_how_surfaces_look() {
     assert!(found.contains("nearest 0 set 0 ") && found.contains("nearest 0 set 1 "), "{found}");
     // A quarter of the way from (0.5, 0.25) to (-1, 2).
     assert!(found.ends_with("set 0: 0.25 0.25\nset 1: 0.125 0.688\n"), "{found}");
+    let gloss = second.with_file_name("gloss.bth");
+    let output = run(&program, &[gloss.to_str().expect("UTF-8")], "");
+    let found = String::from_utf8_lossy(&output.stdout);
+    assert!(found.starts_with("gloss 1 0.25 scale 1 strength 1 textures 1 0 -1\n"), "{found}");
     let names = shown(CompileOptions { names: true, ..CompileOptions::default() });
     let error =
         "error -7 bth_material: the file keeps only the names of materials; compile it with --materials\n";

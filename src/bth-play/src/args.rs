@@ -32,7 +32,7 @@ pub(crate) struct Args {
     output: Option<PathBuf>,
     /// Show the file in a window: orbit, fly, play, scrub, change the mode; the picture is refined
     /// to --spp samples while nothing moves. H prints the keys.
-    #[arg(long, conflicts_with_all = ["output", "shard", "force"])]
+    #[arg(long, conflicts_with_all = ["output", "shard", "tiles", "force"])]
     pub(crate) window: bool,
     /// Where the key P of the window writes the picture; by default bth-play.png.
     #[arg(long, value_name = "FILE", requires = "window", conflicts_with = "output")]
@@ -45,9 +45,15 @@ pub(crate) struct Args {
     /// them.
     #[arg(long, value_name = "A..B", value_parser = parse_frames, allow_hyphen_values = true)]
     pub(crate) frames: Option<(i32, i32)>,
-    /// Render part I of N of the frames, from 1, for many machines; needs numbered pictures.
+    /// Render part I of N of the frames, or with --tiles of their tiles, from 1, for many machines;
+    /// needs numbered pictures, or --tiles.
     #[arg(long, value_name = "I/N", value_parser = parse_shard)]
     pub(crate) shard: Option<(u32, u32)>,
+    /// Cut each picture into columns and rows. With --shard, tiles are written next to the picture;
+    /// without it they are put together, and those that are missing are rendered. The picture is
+    /// the same as without --tiles.
+    #[arg(long, value_name = "CxR", value_parser = parse_tiles)]
+    pub(crate) tiles: Option<(u32, u32)>,
     /// Render frames again whose pictures are there and whole.
     #[arg(long)]
     pub(crate) force: bool,
@@ -101,7 +107,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=64))]
     pub(crate) bounces: Option<u32>,
     /// Remove noise in mode path: with Open Image Denoise where it is installed (auto, which is the
-    /// default, but never with --shard), with the built-in filter, with Open Image Denoise, or not.
+    /// default, but never with --shard or --tiles), with the built-in filter, with Open Image
+    /// Denoise, or not.
     #[arg(long, value_enum, default_value_t = Denoise::Auto)]
     pub(crate) denoise: Denoise,
     /// Stops by which mode path brightens light: 1 doubles it, -1 halves it. By default small
@@ -239,11 +246,17 @@ fn parse_threads(text: &str) -> Result<usize, String> {
 
 fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let parts = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT, such as 1280x720")?;
-    let parse = |s: &str| match s.parse::<u32>() {
-        Ok(n) if (1..=16384).contains(&n) => Ok(n),
-        _ => Err(format!("expected a number of pixels from 1 to 16384, found {s:?}")),
-    };
-    Ok((parse(parts.0)?, parse(parts.1)?))
+    Ok((parse_up_to(parts.0, "pixels", 16384)?, parse_up_to(parts.1, "pixels", 16384)?))
+}
+
+fn parse_tiles(text: &str) -> Result<(u32, u32), String> {
+    let parts = text.split_once(['x', 'X']).ok_or("expected COLUMNSxROWS, such as 4x2")?;
+    Ok((parse_up_to(parts.0, "columns", 64)?, parse_up_to(parts.1, "rows", 64)?))
+}
+
+fn parse_up_to(text: &str, what: &str, most: u32) -> Result<u32, String> {
+    let number = text.parse().ok().filter(|n| (1..=most).contains(n));
+    number.ok_or_else(|| format!("expected a number of {what} from 1 to {most}, found {text:?}"))
 }
 
 /// Six numbers, or else a name. A list of fewer or more numbers is an error, since it is hardly the

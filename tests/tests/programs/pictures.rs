@@ -129,6 +129,50 @@ fn noise_is_removed_unless_it_is_wanted() {
     assert!(filtered == seen("on", "4", "2"), "threads change nothing");
 }
 
+/// Tiles of two machines become the picture of one, byte by byte, also where noise is removed, over
+/// the borders of tiles.
+#[test]
+fn tiles_become_the_picture_that_is_rendered_at_once() {
+    let folder =
+        folder(&[("ball.obj", &sphere(12)), ("s.manifest", &scene(false)), ("floor.obj", &floor(9.0))]);
+    let path = folder.path();
+    bthc(path, &["compile", "s.manifest", "-o", "s.bth", "-q"]).expect(0);
+    let play = |args: &[&str]| {
+        run("bth-play", path, &[&["s.bth", "--size", "150x70", "--spp", "2", "--json"], args].concat())
+    };
+    let bytes = |name: &str| std::fs::read(path.join(name)).expect("a picture");
+    for mode in ["path", "shaded"] {
+        let tiles = &["--mode", mode, "--tiles", "3x2"];
+        play(&["--mode", mode, "-o", "whole.png"]).expect(0);
+        for shard in ["1/2", "2/2"] {
+            let done = play(&[&["-o", "a.png", "--shard", shard][..], tiles].concat()).expect(0).json();
+            assert_eq!(done["frames"].as_array().map(Vec::len), Some(3), "{done}");
+        }
+        let again = play(&[&["-o", "a.png", "--shard", "1/2"][..], tiles].concat()).expect(0).json();
+        assert_eq!(again["frames_skipped"], 3);
+        // A tile that is cut off counts as missing.
+        std::fs::write(path.join("a.3x2-5.png"), &bytes("a.3x2-5.png")[..60]).unwrap();
+        let joined = play(&[&["-o", "a.png"][..], tiles].concat()).expect(0).json();
+        let rendered = joined["frames"].as_array().expect("frames");
+        assert!(rendered.len() == 1 && rendered[0]["tile"] == 5, "{joined}");
+        assert!(bytes("a.png") == bytes("whole.png") && !path.join("a.3x2-1.png").exists(), "{mode}");
+    }
+    let numbered = ["-o", "####.png", "--tiles", "2x1", "--frames", "0..0", "--denoise", "off"];
+    play(&numbered).expect(0);
+    play(&["-o", "whole.png", "--denoise", "off"]).expect(0);
+    assert!(bytes("0000.png") == bytes("whole.png"));
+    for wrong in [
+        &["-o", "a.gif", "--tiles", "2x2"][..],
+        &["-o", "a.png", "--tiles", "2x2", "--mode", "steps"],
+        &["-o", "a.png", "--tiles", "2x2", "--denoise", "oidn"],
+        &["-o", "a.png", "--tiles", "0x2"],
+        &["-o", "a.png", "--shard", "1/2"],
+    ] {
+        let run = play(wrong).expect(2);
+        assert!(run.stderr.contains("--tiles"), "{run:?}");
+    }
+}
+
 #[test]
 fn videos_are_written_by_ffmpeg_or_the_lack_of_it_is_told() {
     let folder = folder(&[("ball.obj", &sphere(8))]);

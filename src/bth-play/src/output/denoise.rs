@@ -11,6 +11,8 @@ use rayon::prelude::*;
 
 /// Passes; the pixels that are looked at lie twice as far apart in each.
 const PASSES: u32 = 5;
+/// Pixels on each side that the filter of a pixel reads: one for specks, then two steps a pass.
+pub(super) const REACH: u32 = 1 + 2 * ((1 << PASSES) - 1);
 /// Weights of a pixel and of those one and two steps away, along each axis.
 const KERNEL: [f32; 3] = [0.375, 0.25, 0.0625];
 /// Standard deviations by which the light of neighbours may differ.

@@ -11,4 +11,4 @@ mod video;
 
 pub(crate) use picture::Picture;
 pub(crate) use sink::{Pattern, Sink, refuse_inputs};
-pub(crate) use tone_mapping::{has_library, to_picture};
+pub(crate) use tone_mapping::{has_library, margin, to_picture};

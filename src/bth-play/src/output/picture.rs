@@ -35,6 +35,38 @@ impl Picture {
         }
     }
 
+    /// The part of the picture with this upper left corner and size.
+    pub(crate) fn part(self, (left, top): (u32, u32), (width, height): (u32, u32)) -> Picture {
+        if (left, top, width, height) == (0, 0, self.width, self.height) {
+            return self;
+        }
+        let rows = (top..top + height).map(|y| (y * self.width + left) as usize);
+        let pixels = rows.flat_map(|at| &self.pixels[at..at + width as usize]).copied().collect();
+        Picture { width, height, pixels }
+    }
+
+    /// Puts another picture into this one, whose upper left corner is at a pixel.
+    pub(crate) fn put(&mut self, (left, top): (u32, u32), part: &Picture) {
+        for (row, y) in part.pixels.chunks(part.width.max(1) as usize).zip(top..) {
+            let at = (y * self.width + left) as usize;
+            self.pixels[at..at + row.len()].copy_from_slice(row);
+        }
+    }
+
+    /// Reads a PNG file that [`Picture::write`] wrote; `None` if it is not there or not whole.
+    pub(crate) fn read(path: &Path, size: (u32, u32)) -> Option<Picture> {
+        if !is_complete(path, size) {
+            return None;
+        }
+        let file = std::io::BufReader::new(std::fs::File::open(path).ok()?);
+        let mut reader = png::Decoder::new(file).read_info().ok()?;
+        let mut bytes = vec![0; reader.output_buffer_size()?];
+        reader.next_frame(&mut bytes).ok()?;
+        let (pixels, _) = bytes.as_chunks::<3>();
+        let is_whole = pixels.len() == size.0 as usize * size.1 as usize;
+        is_whole.then(|| Picture { width: size.0, height: size.1, pixels: pixels.to_vec() })
+    }
+
     /// The bytes of a PNG file.
     fn encoded(&self) -> Result<Vec<u8>, png::EncodingError> {
         let mut bytes = Vec::new();
@@ -44,6 +76,12 @@ impl Picture {
         writer.write_image_data(self.pixels.as_flattened())?;
         writer.finish()?;
         Ok(bytes)
+    }
+
+    /// Does the same as [`Self::write`] and creates the folder where it is missing.
+    pub(crate) fn write_in_folder(&self, path: &Path) -> Result<(), Failure> {
+        create_folder(path)?;
+        self.write(path)
     }
 
     /// Writes a PNG file, atomically.

@@ -136,6 +136,17 @@ impl Sink {
         matches!(self, Sink::Numbered(_))
     }
 
+    /// Where a tile of a frame's picture is until all are there; `None` for outputs that are not
+    /// pictures. `grid` has columns and rows, and tiles count from 1.
+    pub(crate) fn tile_path(&self, frame: i32, (columns, rows): (u32, u32), tile: u32) -> Option<PathBuf> {
+        let picture = match self {
+            Sink::One(path) => path.clone(),
+            Sink::Numbered(pattern) => pattern.path(frame),
+            _ => return None,
+        };
+        Some(picture.with_extension(format!("{columns}x{rows}-{tile}.png")))
+    }
+
     /// Returns true if the picture of a frame exists already, complete and of this size.
     pub(crate) fn has(&self, frame: i32, size: (u32, u32)) -> bool {
         matches!(self, Sink::Numbered(pattern) if picture::is_complete(&pattern.path(frame), size))
@@ -146,10 +157,8 @@ impl Sink {
         match self {
             Sink::One(path) => picture.write(path),
             Sink::Numbered(pattern) => {
-                let path = pattern.path(frame);
                 // The number may be in the name of the folder.
-                picture::create_folder(&path)?;
-                picture.write(&path)
+                picture.write_in_folder(&pattern.path(frame))
             }
             Sink::Animation(animation) => animation.add(picture),
             Sink::Video(video) => video.add(picture),

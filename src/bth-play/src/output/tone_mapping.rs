@@ -28,21 +28,27 @@ fn neutral(color: Vec3) -> Vec3 {
 }
 
 /// Removes noise. `auto` takes Open Image Denoise where it is installed, but not for parts of a
-/// sequence that many machines render: not all of them may have it.
-fn denoised(means: &mut [Shaded], args: &Args) {
+/// sequence that many machines render: not all of them may have it, and it looks at whole pictures.
+fn denoised(means: &mut [Shaded], size: (u32, u32), args: &Args) {
     let library = match args.denoise {
         Denoise::Off => return,
         Denoise::On => None,
-        Denoise::Auto => LIBRARY.as_ref().filter(|_| args.shard.is_none()),
+        Denoise::Auto => LIBRARY.as_ref().filter(|_| args.shard.is_none() && args.tiles.is_none()),
         Denoise::Oidn => LIBRARY.as_ref(),
     };
     if let Some(library) = library {
-        match library.filter(means, args.size) {
+        match library.filter(means, size) {
             Ok(()) => return,
             Err(what) => warn(&format!("Open Image Denoise failed, so the built-in filter is used: {what}")),
         }
     }
-    denoise::filter(means, args.size, args.spp);
+    denoise::filter(means, size, args.spp);
+}
+
+/// Pixels around a part of a picture that its pixels depend on.
+pub(crate) fn margin(args: &Args) -> u32 {
+    let is_filtered = args.mode == Mode::Path && args.denoise != Denoise::Off;
+    if is_filtered { denoise::REACH } else { 0 }
 }
 
 /// Open Image Denoise, where it is installed.
@@ -53,14 +59,14 @@ pub(crate) fn has_library() -> bool {
     LIBRARY.is_some()
 }
 
-/// The picture of the means of the pixels, in rows from the top; `factor` is for light in mode
-/// path, in which noise is removed where the options say so.
-pub(crate) fn to_picture(mut means: Vec<Shaded>, args: &Args, factor: f32) -> Picture {
+/// The picture of the means of the pixels, in rows from the top, of a width and height; `factor` is
+/// for light in mode path, in which noise is removed where the options say so.
+pub(crate) fn to_picture(mut means: Vec<Shaded>, size: (u32, u32), args: &Args, factor: f32) -> Picture {
     if args.mode == Mode::Path {
-        denoised(&mut means, args);
+        denoised(&mut means, size, args);
     }
     let means = means.as_slice();
-    let (width, height) = args.size;
+    let (width, height) = size;
     let maximum = match args.mode {
         Mode::Steps => args.scale.unwrap_or_else(|| upper_end(means)),
         _ => 0,

@@ -2,6 +2,7 @@
 //! these do not flicker, whatever part of them is rendered.
 
 use super::frame::{render_tile, tile_count};
+use super::region::Region;
 use super::shutter::Shutter;
 use crate::args::{Args, Mode};
 use crate::camera::SceneSetup;
@@ -57,7 +58,7 @@ pub(crate) fn light_factor(
             .map(|tile| render_tile(&frame, tile, instant, &shader))
             .collect();
         let mut sums = vec![Shaded::default(); (width * HEIGHT) as usize];
-        tiles.iter().for_each(|tile| tile.add_to(&mut sums, width));
+        tiles.iter().for_each(|tile| tile.add_to(&mut sums, &Region::whole(small.size)));
         luminances.extend(sums.iter().map(|sum| luminance(sum.color / SAMPLES as f32)));
     }
     Ok(chosen(luminances) as f32)

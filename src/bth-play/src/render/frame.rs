@@ -1,11 +1,12 @@
-//! One frame: its exposures one after the other, the tiles of each in parallel. Tiles are squares
-//! of pixels that are rendered together, so that their rays are traced in coherent batches.
+//! One frame, or a part of it: its exposures one after the other, the squares of each in parallel.
+//! The pixels of a square are rendered together, so that their rays are traced in coherent batches.
 
+use super::region::Region;
 use super::shutter::{Exposure, Shutter};
 use crate::args::{Args, Mode};
 use crate::camera::SceneSetup;
 use crate::failure::Failure;
-use crate::output::{Picture, to_picture};
+use crate::output::{Picture, margin, to_picture};
 use crate::shading::{Counters, FrameContext, Sample, Shaded, Shader};
 use bth::Scene;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -20,6 +21,8 @@ use std::time::Instant;
 pub(crate) struct FrameReport {
     /// Number of the frame.
     pub(crate) frame: i32,
+    /// Number of the tile, from 1; `None` for the whole picture.
+    pub(crate) tile: Option<u32>,
     /// Times at which the scene is sampled: 1 without a shutter.
     pub(crate) times: usize,
     /// Time to evaluate tracks, hierarchy and instances, without the top level.
@@ -66,12 +69,18 @@ pub(super) struct FrameRenderer<'a> {
 }
 
 impl FrameRenderer<'_> {
-    /// Renders a frame with all its samples; the scene is left at the last of its times.
+    /// Renders a part of a frame with all its samples; the scene is left at the last of its times.
     ///
     /// # Errors
     /// If a time cannot be set, or the file lacks what the mode needs.
-    pub(super) fn render(&self, scene: &mut Scene, number: i32) -> Result<(Picture, FrameReport), Failure> {
-        let pixels = pixel_count(self.args.size);
+    pub(super) fn render(
+        &self,
+        scene: &mut Scene,
+        number: i32,
+        part: &Region,
+    ) -> Result<(Picture, FrameReport), Failure> {
+        let rendered = part.with_margin(margin(self.args), self.args.size);
+        let pixels = pixel_count(rendered.size());
         let (mut sums, mut total) = (vec![Shaded::default(); pixels], Counters::default());
         let mut report = FrameReport { frame: number, ..FrameReport::default() };
         for exposure in self.shutter.exposures() {
@@ -86,8 +95,8 @@ impl FrameRenderer<'_> {
             let camera = self.setup.camera(scene, self.args);
             let frame = FrameContext::new(scene, self.file, self.setup, camera, self.args)?;
             let start = Instant::now();
-            for tile in self.tiles(&frame, &exposure) {
-                tile.add_to(&mut sums, self.args.size.0);
+            for tile in self.tiles(&frame, &exposure, &rendered) {
+                tile.add_to(&mut sums, &rendered);
                 total += tile.counters;
             }
             report.seconds += start.elapsed().as_secs_f64();
@@ -98,23 +107,25 @@ impl FrameRenderer<'_> {
         let [nodes, leaves, triangles, tets] = (total.steps / camera_rays as f64).to_array();
         report.steps = (self.args.mode == Mode::Steps).then_some(Steps { nodes, leaves, triangles, tets });
         let means: Vec<Shaded> = sums.into_iter().map(|sum| sum / self.args.spp as f32).collect();
-        Ok((to_picture(means, self.args, self.factor), report))
+        let picture = to_picture(means, rendered.size(), self.args, self.factor);
+        let corner = (part.x.start - rendered.x.start, part.y.start - rendered.y.start);
+        Ok((picture.part(corner, part.size()), report))
     }
 
-    /// All tiles at the time to which the scene is set.
-    fn tiles(&self, frame: &FrameContext<'_>, exposure: &Exposure) -> Vec<Tile> {
+    /// All tiles of a region at the time to which the scene is set.
+    fn tiles(&self, frame: &FrameContext<'_>, exposure: &Exposure, region: &Region) -> Vec<Tile> {
         let shader = Shader::new(frame);
         let render = |number: u32| {
             let tile = render_tile(frame, number, exposure, &shader);
             self.progress.tile_done();
             tile
         };
-        (0..tile_count(self.args.size)).into_par_iter().map(render).collect()
+        region.squares(self.args.size.0).into_par_iter().map(render).collect()
     }
 }
 
 /// Pixels along the side of a tile.
-const TILE: u32 = 16;
+pub(super) const TILE: u32 = 16;
 
 /// A rendered part of the picture.
 #[derive(Default)]
@@ -158,10 +169,12 @@ fn pixels((width, height): (u32, u32), left: u32, top: u32) -> Vec<(u32, u32)> {
 }
 
 impl Tile {
-    /// Adds its samples to the pixels of a picture, in rows of `width` from the top.
-    pub(crate) fn add_to(&self, picture: &mut [Shaded], width: u32) {
-        for (&(x, y), &sum) in self.pixels.iter().zip(&self.sums) {
-            picture[y as usize * width as usize + x as usize] += sum;
+    /// Adds its samples to the pixels of a region, in rows from the top.
+    pub(crate) fn add_to(&self, pixels: &mut [Shaded], region: &Region) {
+        for (&pixel, &sum) in self.pixels.iter().zip(&self.sums) {
+            if let Some(at) = region.index(pixel) {
+                pixels[at] += sum;
+            }
         }
     }
 }
@@ -180,9 +193,12 @@ pub(crate) fn pixel_count((width, height): (u32, u32)) -> usize {
 pub(super) struct Progress(ProgressBar);
 
 impl Progress {
-    /// A bar for the tiles of a number of frames, each sampled at a number of times.
-    pub(super) fn new(frames: usize, times: usize, args: &Args) -> Self {
-        let tiles = u64::from(tile_count(args.size)) * frames as u64 * times as u64;
+    /// A bar for the tiles of pictures of a number of frames, or of their parts, each sampled at a
+    /// number of times.
+    pub(super) fn new(frames: usize, parts: impl Iterator<Item = Region>, times: usize, args: &Args) -> Self {
+        let squares =
+            |part: Region| part.with_margin(margin(args), args.size).squares(args.size.0).len() as u64;
+        let tiles = parts.map(squares).sum::<u64>() * times as u64;
         let visible = std::io::stderr().is_terminal();
         let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(tiles), target);

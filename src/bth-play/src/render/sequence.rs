@@ -3,6 +3,8 @@
 
 use super::brightness::light_factor;
 use super::frame::{FrameRenderer, FrameReport, Progress};
+use super::parts::Tiles;
+use super::region::Region;
 use super::shutter::Shutter;
 use crate::args::{Args, Denoise, Mode};
 use crate::camera::SceneSetup;
@@ -85,47 +87,91 @@ pub(crate) fn render_sequence(
 ) -> Result<(Report, bool), Failure> {
     let (whole, rate) = frame_range(scene);
     let (first, last) = frames_to_show(scene, file, args, Some(output))?;
-    let mut frames: Vec<i32> = (first..=last).collect();
+    let frames: Vec<i32> = (first..=last).collect();
     let mut sink = Sink::new(output, args.size, frames.len(), rate)?;
-    if let Some((part, parts)) = args.shard {
-        if !sink.is_numbered() {
-            let message = "--shard needs numbered pictures, such as -o frames/####.png";
-            return Err(Failure::Usage(message.to_owned()));
-        }
-        let mut row = 0;
-        frames.retain(|_| {
-            row += 1;
-            (row - 1) % parts == part - 1
-        });
-    }
+    let tiles = Tiles::new(args, &sink, output)?;
     let quiet = sink.takes_stdout();
     sink.prepare(&frames, inputs)?;
+    let mut jobs = jobs(&frames, args, &sink, tiles.as_ref())?;
     let mut report = Report::default();
-    let before = frames.len();
+    let before = jobs.len();
     if !args.force {
-        frames.retain(|frame| !sink.has(*frame, args.size));
+        jobs.retain(|job| match (*job, &tiles) {
+            (Job::Tile(frame, tile), Some(tiles)) => {
+                !sink.has(frame, args.size) && tiles.read(&sink, frame, tile).is_none()
+            }
+            (Job::Picture(frame) | Job::Tile(frame, _), _) => !sink.has(frame, args.size),
+        });
     }
-    report.skipped = before - frames.len();
+    report.skipped = before - jobs.len();
     // Made also where no frame is left, since it checks the options.
     let setup = SceneSetup::new(scene, file, args, whole)?;
     warnings(scene, args, &setup).iter().for_each(|text| warn(&format!("{}: {text}", file.display())));
-    if !frames.is_empty() {
+    if !jobs.is_empty() {
         let factor = light_factor(scene, file, &setup, args, whole)?;
         report.exposure = (args.mode == Mode::Path).then(|| factor.log2());
         let shutter = shutter(scene, args);
         let times = shutter.exposures().len();
-        let progress = Progress::new(frames.len(), times, args);
+        let whole = Region::whole(args.size);
+        let regions = jobs.iter().map(|job| match (job, &tiles) {
+            (Job::Tile(_, tile), Some(tiles)) => tiles.region(*tile).clone(),
+            _ => whole.clone(),
+        });
+        let progress = Progress::new(frames.len(), regions, times, args);
         let (setup, shutter) = (&setup, &shutter);
         let renderer = FrameRenderer { file, setup, args, shutter, rate, factor, progress: &progress };
-        for number in frames {
-            let (picture, frame) = renderer.render(scene, number)?;
-            sink.write(number, &picture)?;
+        for job in jobs {
+            match (job, &tiles) {
+                (Job::Tile(frame, tile), Some(tiles)) => {
+                    report.frames.push(tiles.render_file(&renderer, scene, &sink, (frame, tile))?);
+                }
+                (Job::Picture(frame), Some(tiles)) => {
+                    let (picture, reports, there) = tiles.assemble(&renderer, scene, &sink, frame)?;
+                    sink.write(frame, &picture)?;
+                    tiles.remove(&sink, frame)?;
+                    report.frames.extend(reports);
+                    report.skipped += there;
+                }
+                (Job::Picture(frame) | Job::Tile(frame, _), _) => {
+                    let (picture, done) = renderer.render(scene, frame, &whole)?;
+                    sink.write(frame, &picture)?;
+                    report.frames.push(done);
+                }
+            }
             progress.frame_done();
-            report.frames.push(frame);
         }
     }
     sink.finish()?;
     Ok((report, quiet))
+}
+
+/// What is rendered.
+#[derive(Clone, Copy)]
+enum Job {
+    /// The picture of a frame.
+    Picture(i32),
+    /// A tile of it.
+    Tile(i32, u32),
+}
+
+/// The pictures, or with `--shard` this part of them or of their tiles.
+///
+/// # Errors
+/// Wrong usage, if the output is not made of parts.
+fn jobs(frames: &[i32], args: &Args, sink: &Sink, tiles: Option<&Tiles>) -> Result<Vec<Job>, Failure> {
+    let pictures = || frames.iter().map(|frame| Job::Picture(*frame));
+    let Some((part, parts)) = args.shard else { return Ok(pictures().collect()) };
+    let all: Vec<Job> = match tiles {
+        Some(tiles) => {
+            frames.iter().flat_map(|frame| tiles.numbers().map(|tile| Job::Tile(*frame, tile))).collect()
+        }
+        None if sink.is_numbered() => pictures().collect(),
+        None => {
+            let message = "--shard needs numbered pictures, such as -o frames/####.png, or --tiles";
+            return Err(Failure::Usage(message.to_owned()));
+        }
+    };
+    Ok(all.into_iter().skip(part as usize - 1).step_by(parts as usize).collect())
 }
 
 /// Returns what a person who looks at the pictures might wonder about.

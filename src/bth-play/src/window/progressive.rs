@@ -5,7 +5,7 @@ use super::camera::{Content, ViewCamera};
 use crate::args::{Args, Denoise};
 use crate::failure::Failure;
 use crate::output::{Picture, to_picture};
-use crate::render::{Exposure, Shutter, Tile, pixel_count, render_tile, tile_count};
+use crate::render::{Exposure, Region, Shutter, Tile, pixel_count, render_tile, tile_count};
 use crate::shading::{FrameContext, Shaded, Shader};
 use rayon::ThreadPool;
 use rayon::prelude::*;
@@ -161,7 +161,7 @@ impl ProgressiveRenderer {
         if !self.is_done(args.spp) {
             args.denoise = Denoise::Off;
         }
-        Ok(Some(to_picture(means, &args, content.factor)))
+        Ok(Some(to_picture(means, args.size, &args, content.factor)))
     }
 
     /// Renders tiles at the time to which the scene is set, until all are finished or [`SLICE`] has
@@ -177,7 +177,7 @@ impl ProgressiveRenderer {
         let camera = view.camera(content, &self.args());
         let frame = FrameContext::new(content.scene, content.file, &content.setup, camera, &self.args)?;
         let shader = Shader::new(&frame);
-        let (count, width) = (tile_count(self.args.size), self.args.size.0);
+        let (count, whole) = (tile_count(self.args.size), Region::whole(self.args.size));
         let step = 4 * pool.current_num_threads() as u32;
         // At least some tiles, so that setting the time is never all that is done.
         loop {
@@ -185,7 +185,7 @@ impl ProgressiveRenderer {
             let render = |number: u32| render_tile(&frame, number, exposure, &shader);
             let tiles: Vec<Tile> = pool.install(|| (self.tiles..end).into_par_iter().map(render).collect());
             for tile in &tiles {
-                tile.add_to(&mut self.sums, width);
+                tile.add_to(&mut self.sums, &whole);
             }
             self.tiles = end;
             if self.tiles == count {

@@ -1,4 +1,4 @@
-"""Distributes the work on a scene over the workers of a Dask cluster.
+"""Distributes the work on models and scenes over the workers of a Dask cluster, or plans it for other farms.
 
 The tasks are the ordinary programs with `--shard I/N`: `bthc compile --in-cache`, whose results go to a cache that all
 workers share, and `bth-play`, whose frames go to a shared folder. Both skip what exists already, so a task may be run any
@@ -14,8 +14,7 @@ import sys
 import time
 from pathlib import Path
 
-from distributed import Client, LocalCluster, as_completed
-from distributed.scheduler import KilledWorker
+import bth_farm_plan
 
 RETRIES = 3
 """Times that a part is run again after its program failed, or after the worker was lost."""
@@ -67,6 +66,9 @@ def run_part(name, arguments, environment):
 def run_parts(client, parts, environment, on_done=lambda done: None):
     """Runs parts, each a program and its arguments; their JSON in order. `on_done` is called with the number of finished
     parts."""
+    from distributed import as_completed
+    from distributed.scheduler import KilledWorker
+
     futures = [
         client.submit(run_part, name, arguments, environment, pure=False, retries=RETRIES) for name, arguments in parts
     ]
@@ -87,25 +89,34 @@ def shards(count):
     return [f"{i}/{count}" for i in range(1, count + 1)]
 
 
-def compile_scene(client, scene, output, options, environment, count, on_done=lambda done: None):
-    """Compiles the objects of a scene on all workers, then puts the scene together here; the JSON of that."""
-    scene = str(Path(scene).resolve())
-    parts = [("bthc", ["compile", scene, "--in-cache", "--shard", shard, *options]) for shard in shards(count)]
-    objects = run_parts(client, parts, environment, on_done)
-    done = run_part("bthc", ["compile", scene, "-o", str(output), *options], environment)
+def run_here(name, arguments, environment):
+    """Runs a program on this machine; its JSON."""
+    done = run_part(name, arguments, environment)
     if isinstance(done, Failure):
         raise done
-    done = done["jobs"][0]
+    return done
+
+
+def compile_models(client, models, output, options, environment, count, on_done=lambda done: None):
+    """Compiles models, or the objects of a scene, on all workers, then puts the files together here; the JSON of that."""
+    models = [str(Path(model).resolve()) for model in models]
+    parts = [("bthc", ["compile", *models, "--in-cache", "--shard", shard, *options]) for shard in shards(count)]
+    objects = run_parts(client, parts, environment, on_done)
+    done = run_here("bthc", ["compile", *models, "-o", str(output), *options], environment)
     # A model is one object, and the part that compiles it reports no number of objects.
     done["farm"] = {"parts": count, "objects": sum(job.get("objects", 1) for part in objects for job in part["jobs"])}
     return done
 
 
-def render_frames(client, scene, output, options, environment, count, on_done=lambda done: None):
-    """Renders the frames of a compiled scene on all workers; the JSON of each part."""
-    scene, output = str(Path(scene).resolve()), str(Path(output).absolute())
-    parts = [("bth-play", [scene, "-o", output, "--shard", shard, *options]) for shard in shards(count)]
-    return {"output": output, "farm": {"parts": count}, "parts": run_parts(client, parts, environment, on_done)}
+def render_frames(client, scene, output, options, environment, count, on_done=lambda done: None, tiles=None):
+    """Renders the frames of a compiled scene, or their tiles, on all workers; the JSON of each part."""
+    output = str(Path(output).absolute())
+    render = [str(Path(scene).resolve()), "-o", output, *(["--tiles", tiles] if tiles else [])]
+    parts = [("bth-play", [*render, "--shard", shard, *options]) for shard in shards(count)]
+    done = {"output": output, "farm": {"parts": count}, "parts": run_parts(client, parts, environment, on_done)}
+    if tiles:
+        done["whole"] = run_here("bth-play", [*render, *options], environment)
+    return done
 
 
 def positive(text):
@@ -115,26 +126,62 @@ def positive(text):
     return int(text)
 
 
+def tiles(text):
+    """Columns and rows, for argparse."""
+    if not all(part.isdecimal() and int(part) for part in text.split("x")) or text.count("x") != 1:
+        raise argparse.ArgumentTypeError(f"expected COLUMNSxROWS, such as 4x2, found {text!r}")
+    return text
+
+
+def add_work(parser, work):
+    """What both the work and its plan take."""
+    if work == "compile":
+        parser.add_argument("models", nargs="+", type=Path, metavar="MODEL", help="models, or one scene")
+        parser.add_argument("-o", "--output", required=True, help="the compiled file, or the folder for several")
+    else:
+        parser.add_argument("models", nargs=1, type=Path, metavar="SCENE", help="a compiled scene or model")
+        output = "numbered pictures, such as frames/####.png, in a folder that all see; with --tiles also one picture"
+        parser.add_argument("-o", "--output", required=True, help=output)
+        parser.add_argument("--tiles", type=tiles, metavar="CxR", help="share out the tiles of pictures, in columns and rows")
+    parser.add_argument("--cache-dir", metavar="FOLDER", help="a cache that all workers see")
+    parser.add_argument("--shared-cache", metavar="PLACE", help="a cache behind that of each worker")
+
+
+WORK = {"compile": "compile models or the objects of a scene, then the files", "render": "render the frames of a scene"}
+
+
 def arguments(argv):
     parser = argparse.ArgumentParser(prog="bth-farm", description=__doc__.splitlines()[0])
     commands = parser.add_subparsers(dest="command", required=True)
-    for name, about, output in [
-        ("compile", "compile the objects of a scene, then the scene", "the compiled file"),
-        ("render", "render the frames of a scene", "numbered pictures, such as frames/####.png, in a folder that all see"),
-    ]:
-        sub = commands.add_parser(name, help=about, epilog="What follows `--` is passed on to the program of each task.")
-        sub.add_argument("scene", type=Path)
-        sub.add_argument("-o", "--output", required=True, help=output)
+    passed_on = "What follows `--` is passed on to the program of each task."
+    for work, about in WORK.items():
+        sub = commands.add_parser(work, help=about, epilog=passed_on)
+        add_work(sub, work)
         sub.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster; by default one is started on this machine")
         sub.add_argument("--workers", type=positive, metavar="N", help="workers of the cluster on this machine")
         sub.add_argument("--parts", type=positive, metavar="N", help="parts of the work; by default four for each worker")
-        sub.add_argument("--cache-dir", metavar="FOLDER", help="a cache that all workers see")
-        sub.add_argument("--shared-cache", metavar="PLACE", help="a cache behind that of each worker")
         sub.add_argument("--json", action="store_true", help="print one JSON object")
+    plan = commands.add_parser("plan", help="write the same work for another farm, on standard output")
+    plans = plan.add_subparsers(dest="work", required=True)
+    for work, about in WORK.items():
+        sub = plans.add_parser(work, help=about, epilog=passed_on)
+        add_work(sub, work)
+        sub.add_argument("--parts", type=positive, metavar="N", required=True, help="parts of the work")
+        sub.add_argument("--to", choices=bth_farm_plan.FORMATS, required=True, help="what runs it")
+        sub.add_argument("--name", default="bth", help="of the jobs; bth by default")
     split = argv.index("--") if "--" in argv else len(argv)
     args = parser.parse_args(argv[:split])
     args.options = argv[split + 1 :]
     return args
+
+
+def plan(args):
+    """The text of a plan. Programs are on the PATH of workers, or at the paths that BTHC and BTH_PLAY name."""
+    args.models = [str(path.resolve()) for path in args.models]
+    args.output = str(Path(args.output).absolute())
+    args.tiles = getattr(args, "tiles", None)
+    steps = bth_farm_plan.steps(os.environ.get("BTHC", "bthc"), os.environ.get("BTH_PLAY", "bth-play"), args)
+    return bth_farm_plan.FORMATS[args.to](steps, environment_of(args), args.name)
 
 
 def environment_of(args):
@@ -147,6 +194,8 @@ def environment_of(args):
 
 
 def connect(args):
+    from distributed import Client, LocalCluster
+
     if args.scheduler:
         try:
             return None, Client(args.scheduler, timeout="30s")
@@ -159,6 +208,20 @@ def connect(args):
 
 def main(argv=None):
     args = arguments(sys.argv[1:] if argv is None else argv)
+    try:
+        # bthc writes several files into a folder that is there.
+        if len(args.models) > 1:
+            Path(args.output).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        print(f"error: {args.output} is no folder for {len(args.models)} models: {error}", file=sys.stderr)
+        return LOST
+    if args.command == "plan":
+        try:
+            sys.stdout.write(plan(args))
+        except ValueError as error:
+            print(f"error: {error}", file=sys.stderr)
+            return USAGE
+        return 0
     start = time.monotonic()
     cluster = client = None
     try:
@@ -172,8 +235,11 @@ def main(argv=None):
             if sys.stderr.isatty() and not args.json:
                 print(f"\r{done} of {count} parts", end="" if done < count else "\n", file=sys.stderr, flush=True)
 
-        work = {"compile": compile_scene, "render": render_frames}[args.command]
-        done = work(client, args.scene, args.output, options, environment_of(args), count, progress)
+        if args.command == "compile":
+            done = compile_models(client, args.models, args.output, options, environment_of(args), count, progress)
+        else:
+            environment = environment_of(args)
+            done = render_frames(client, args.models[0], args.output, options, environment, count, progress, args.tiles)
         done["farm"]["seconds"] = time.monotonic() - start
     except (Failure, OSError) as error:
         code = error.code if isinstance(error, Failure) else LOST

@@ -16,33 +16,10 @@ from pathlib import Path
 from distributed import Client, LocalCluster
 
 import bth_farm
+from models import model, scene
 
 OBJECTS = 9
 FRAMES = 12
-
-
-def model(rings):
-    """A closed solid of revolution with a rough profile, as OBJ."""
-    radius = lambda i: (0 if i in (0, rings) else 8 + (i * 7) % 5)
-    turn = [(4, 0), (3, 3), (0, 4), (-3, 3), (-4, 0), (-3, -3), (0, -4), (3, -3)]
-    lines = [f"v {radius(i) * x} {10 * i} {radius(i) * y}" for i in range(rings + 1) for x, y in turn]
-    for i in range(rings):
-        for j in range(8):
-            a, b = 8 * i + j + 1, 8 * i + (j + 1) % 8 + 1
-            lines.append(f"f {a} {b} {b + 8} {a + 8}")
-    return "\n".join(lines) + "\n"
-
-
-def scene(folder):
-    text = f"version = 1\nframes = {{ first = 0, last = {FRAMES - 1}, rate = 12 }}\n"
-    for i in range(OBJECTS):
-        (folder / f"{i}.obj").write_text(model(40 + 10 * i))
-        text += f'[[objects]]\nname = "o{i}"\nmodel = "{i}.obj"\n'
-        text += f'[[nodes]]\nname = "n{i}"\nobject = "o{i}"\ntranslation = [{100 * i}, 0, 0]\n'
-        text += f'[[tracks]]\nnode = "n{i}"\nproperty = "translation"\ntimes = [0, 1]\n'
-        text += f"values = [[{100 * i}, 0, 0], [{100 * i}, {20 * i}, 50]]\n"
-    (folder / "s.manifest").write_text(text)
-    return folder / "s.manifest"
 
 
 def kill_one(cluster, after):
@@ -66,7 +43,7 @@ def main():
     os.environ["BTHC"], os.environ["BTH_PLAY"] = (str(Path(p).resolve()) for p in sys.argv[1:3])
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        manifest = scene(folder)
+        manifest = scene(folder, OBJECTS, FRAMES)
         play = ["--size", "96x54", "--spp", "4", "--threads", "1"]
         env = {**os.environ, "BTH_NO_CACHE": "1"}
         subprocess.run([os.environ["BTHC"], "compile", manifest, "-o", folder / "one.bth", "-q"], check=True, env=env)
@@ -78,12 +55,12 @@ def main():
             with Client(cluster) as client:
                 shared = {"BTH_CACHE_DIR": str(folder / "cache")}
                 killed, on_done = kill_one(cluster, 2)
-                done = bth_farm.compile_scene(
-                    client, manifest, folder / "farm.bth", ["--threads", "1"], shared, OBJECTS, on_done
+                done = bth_farm.compile_models(
+                    client, [manifest], folder / "farm.bth", ["--threads", "1"], shared, OBJECTS, on_done
                 )
                 assert killed, "no worker was killed"
                 assert done["farm"]["objects"] == OBJECTS, done["farm"]
-                assert done["cache"]["hits"] == {"object": OBJECTS}, done["cache"]
+                assert done["jobs"][0]["cache"]["hits"] == {"object": OBJECTS}, done["jobs"]
                 assert (folder / "farm.bth").read_bytes() == (folder / "one.bth").read_bytes(), "other bytes"
 
                 (folder / "farm").mkdir()
@@ -97,7 +74,7 @@ def main():
 
                 (folder / "4.obj").write_text("f 1 2 3\n")
                 try:
-                    bth_farm.compile_scene(client, manifest, folder / "x.bth", [], shared, 3)
+                    bth_farm.compile_models(client, [manifest], folder / "x.bth", [], shared, 3)
                 except bth_farm.Failure as failure:
                     assert failure.code == 3 and "4.obj:1" in str(failure), failure
                 else:
@@ -110,6 +87,14 @@ def main():
         single = [*farm[:3], folder / "0.obj", "-o", folder / "0.bth", "--workers", "1", "--parts", "2", "--json"]
         done = json.loads(subprocess.run(single, check=True, stdout=subprocess.PIPE).stdout)
         assert (done["farm"]["parts"], done["farm"]["objects"]) == (2, 1), done["farm"]
+        several = [*farm[:3], folder / "0.obj", folder / "1.obj", "-o", folder / "out", "--workers", "2", "--json"]
+        done = json.loads(subprocess.run(several, check=True, stdout=subprocess.PIPE).stdout)
+        assert len(done["jobs"]) == 2 and (folder / "out/1.bth").read_bytes()[:3] == (folder / "0.bth").read_bytes()[:3]
+        tiled = [*farm[:2], "render", folder / "0.bth", "-o", folder / "still.png", "--tiles", "2x2", "--workers", "2", "--json"]
+        subprocess.run([*tiled, "--", *play], check=True, stdout=subprocess.DEVNULL)
+        alone = [os.environ["BTH_PLAY"], folder / "0.bth", "-o", folder / "alone.png", *play]
+        subprocess.run(alone, check=True, stdout=subprocess.DEVNULL)
+        assert (folder / "still.png").read_bytes() == (folder / "alone.png").read_bytes(), "another picture"
         for wrong in ["--parts=-3", "--workers=0"]:
             assert subprocess.run([*farm, wrong], stderr=subprocess.DEVNULL).returncode == 2, wrong
         for address in ["head", "nothing://head:8786"]:

@@ -11,8 +11,8 @@ use pyo3::types::PyBytes;
 type MaterialRow =
     (String, [f32; 4], Option<u32>, [f32; 3], Option<u32>, &'static str, f32, bool, bool, Option<GlossRow>);
 
-/// Metallic, roughness, the texture of both, that of normals and their scale, that of occlusion and
-/// its strength.
+/// Metallic and roughness and the texture of both; the texture and scale of normals; the texture
+/// and strength of occlusion.
 type GlossRow = (f32, f32, Option<u32>, Option<u32>, f32, Option<u32>, f32);
 
 /// Image, bytes of its file, wrap modes, whether the nearest texel is taken, set of coordinates,

@@ -143,6 +143,20 @@ export interface Scene {
     trianglesInBox(lower: ArrayLike<number>, upper: ArrayLike<number>): Triangles;
     /** The triangles that overlap a closed ball, by ascending instance and triangle. */
     trianglesInSphere(center: ArrayLike<number>, radius: number): Triangles;
+    /**
+     * Walks through the tree of an object, in the space of the object. The calls decide where it goes; boxes are six numbers, the lower and
+     * the upper end, and contain all triangles below them.
+     * @returns True if `triangle` has returned true, which ends the walk.
+     * @throws BthError if the file has tetrahedra.
+     */
+    shapecast(calls: {
+        /** 0 or false passes a box by, 1 or true goes on below it, 2 takes all below it without asking again. */
+        bounds(box: Float64Array, isLeaf: boolean, score: number | undefined, depth: number, node: number): boolean | 0 | 1 | 2;
+        /** True ends the walk. */
+        triangle(triangle: number, isContained: boolean, depth: number): boolean | void;
+        /** A number for a box; the children of a node are visited in ascending order of it. */
+        order?(box: Float64Array): number;
+    }, object?: number): boolean;
     /** The number of vertices that `setPositions` expects; null if the object is not deformable. */
     vertices(object?: number): number | null;
     /**

@@ -18,6 +18,9 @@ const WRAPS = ["repeat", "mirror", "clamp"];
 /** Words that a material or a texture has at most. */
 const ROW_WORDS = 19;
 
+/** Children of a node at most, and bytes of their boxes and codes. */
+const NODE_WIDTH = 16, NODE_BYTES = NODE_WIDTH * (8 * 6 + 4);
+
 /** An index, or null for none. */
 const orNull = (index) => (index === NONE ? null : index);
 /** The sides that a ray hits, by their number in the module. */
@@ -223,6 +226,38 @@ export class Scene {
         const pairs = new Uint32Array(this.#wasm.memory.buffer, this.#wasm.bth_triangles(), 2 * count);
         const column = (k) => Uint32Array.from({ length: count }, (_, i) => pairs[2 * i + k]);
         return { count, instance: column(0), triangle: column(1) };
+    }
+
+    shapecast({ bounds, triangle, order }, object = 0) {
+        const scene = this.#open();
+        checkIndex("object", object, this.objects);
+        const root = this.#wasm.bth_root(scene, object);
+        if (root === NONE) return false;
+        /** Visits what a code leads to. Callbacks may query the scene, so what is found is copied. */
+        const visit = (code, depth, isContained) => {
+            const room = this.#wasm.bth_room(NODE_BYTES);
+            const found = this.#wasm.bth_node(scene, object, code, room) >>> 0;
+            if (found === NONE) throw new BthError("shapecast: the file has tetrahedra (hint: compile it with --structure bvh)");
+            const { buffer } = this.#wasm.memory, count = found & 0xff;
+            const ids = new Uint32Array(buffer, room + 8 * 6 * NODE_WIDTH, count).slice();
+            if (found > 0xff) {
+                for (const id of ids) if (triangle(id, isContained, depth)) return true;
+                return false;
+            }
+            const boxes = new Float64Array(buffer, room, 6 * count).slice();
+            const children = Array.from(ids, (code, k) => {
+                const box = boxes.subarray(6 * k, 6 * k + 6);
+                return { code, box, score: order && !isContained ? order(box) : undefined };
+            });
+            if (order && !isContained) children.sort((one, other) => one.score - other.score);
+            for (const { code, box, score } of children) {
+                // The highest bit is set in the codes of leaves.
+                const answer = isContained ? 2 : Number(bounds(box, code >>> 31 === 1, score, depth + 1, code));
+                if (answer !== 0 && visit(code, depth + 1, answer === 2)) return true;
+            }
+            return false;
+        };
+        return visit(root, 0, false);
     }
 
     vertices(object = 0) {

@@ -27,6 +27,9 @@ export interface TreeOptions {
     onWarning?: (text: string) => void;
 }
 
+/** What `intersectsBounds` of `shapecast` says of a box. */
+export const NOT_INTERSECTED: 0, INTERSECTED: 1, CONTAINED: 2;
+
 /** The closest point of a surface. */
 export interface ClosestPoint {
     point: Vector3;
@@ -65,6 +68,19 @@ export class BoundsTree {
     /** The faces that overlap a box or a ball, ascending. */
     facesInBox(box: Box3): number[];
     facesInSphere(sphere: Sphere): number[];
+    /**
+     * Walks through the tree as `shapecast` of three-mesh-bvh does, in the space of the geometry. Nodes have up to 16 children. There is no
+     * `intersectsRange`: the triangles of a leaf are not neighbours in the index.
+     * @returns True if `intersectsTriangle` has returned true, which ends the walk.
+     */
+    shapecast(calls: {
+        /** NOT_INTERSECTED or false, INTERSECTED or true, or CONTAINED, which takes all below without asking again. */
+        intersectsBounds(box: Box3, isLeaf: boolean, score: number | undefined, depth: number, nodeIndex: number): boolean | 0 | 1 | 2;
+        /** True ends the walk. The triangle is valid during the call. */
+        intersectsTriangle?(triangle: Triangle, triangleIndex: number, contained: boolean, depth: number): boolean | void;
+        /** Children are visited in ascending order of it. */
+        boundsTraverseOrder?(box: Box3): number;
+    }): boolean;
     /** The triangle of a face. */
     triangle(face: number, target?: Triangle): Triangle;
     /**

@@ -5,4 +5,4 @@ export {
     acceleratedRaycast, computeBatchedBoundsTree, computeBoundsTree, computeBoundsTreeAsync, computeInstancedBoundsTree,
     disposeBatchedBoundsTree, disposeBoundsTree,
 } from "./raycast.js";
-export { BoundsTree, InstancedTree } from "./tree.js";
+export { BoundsTree, CONTAINED, INTERSECTED, InstancedTree, NOT_INTERSECTED } from "./tree.js";

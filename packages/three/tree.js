@@ -5,6 +5,9 @@ import { compile, engine } from "./engine.js";
 import { cornersOf, positionsOf, rangeOf, sourceOf, vertexOf } from "./geometry.js";
 import { intersectionOf, sideOf } from "./intersection.js";
 
+/** What `intersectsBounds` of `shapecast` says of a box. */
+export const NOT_INTERSECTED = 0, INTERSECTED = 1, CONTAINED = 2;
+
 const inverse = new Matrix4(), instanceMatrix = new Matrix4();
 const localRay = new Ray(), instanceRay = new Ray();
 const numbers = new Float64Array(8);
@@ -185,6 +188,28 @@ export class BoundsTree {
     facesInSphere({ center, radius }) {
         const { triangle } = this.scene.trianglesInSphere([center.x, center.y, center.z], radius);
         return Array.from(triangle, (face) => this.range.first / 3 + face);
+    }
+
+    /** Walks through the tree as the calls decide; see index.d.ts. */
+    shapecast({ intersectsBounds, intersectsTriangle, boundsTraverseOrder }) {
+        const offset = this.range.first / 3, box = new Box3(), ordered = new Box3(), face = new Triangle();
+        const boxOf = (numbers, target) => {
+            target.min.fromArray(numbers, 0);
+            target.max.fromArray(numbers, 3);
+            return target;
+        };
+        const whole = this.getBoundingBox(box);
+        if (whole.isEmpty()) return false;
+        const first = Number(intersectsBounds(whole, false, boundsTraverseOrder?.(whole), 0, 0));
+        if (first === NOT_INTERSECTED) return false;
+        return this.scene.shapecast({
+            bounds: (numbers, ...rest) => (first === CONTAINED ? CONTAINED : intersectsBounds(boxOf(numbers, box), ...rest)),
+            triangle: (id, isContained, depth) => {
+                const index = offset + id;
+                return intersectsTriangle?.(this.triangle(index, face), index, isContained, depth) === true;
+            },
+            ...(boundsTraverseOrder && { order: (numbers) => boundsTraverseOrder(boxOf(numbers, ordered)) }),
+        });
     }
 
     /** The triangle of a face. */

@@ -10,6 +10,7 @@ pub mod describe;
 pub mod materials;
 pub mod memory;
 pub mod motion;
+pub mod nodes;
 pub mod one;
 pub mod points;
 pub mod queries;

@@ -249,3 +249,63 @@ test("a file of the same triangles is taken, another is refused, and a tree can 
     assert.equal(geometry.boundsTree, null);
     assert.throws(() => scene.bounds, /closed/);
 });
+
+test("shapecast walks where its calls say", () => {
+    const geometry = new THREE.TorusKnotGeometry(1, 0.3, 200, 24), tree = new BoundsTree(geometry, { deformable: true });
+    const sphere = new THREE.Sphere(new THREE.Vector3(0.9, 0.3, 0.2), 0.5), point = new THREE.Vector3();
+    const within = () => {
+        const faces = [], depths = new Set();
+        let asked = 0;
+        const stopped = tree.shapecast({
+            intersectsBounds: (box, isLeaf, score, depth, node) => {
+                asked++;
+                assert.ok(typeof isLeaf === "boolean" && score === undefined && Number.isInteger(node));
+                depths.add(depth);
+                return sphere.intersectsBox(box);
+            },
+            intersectsTriangle: (triangle, face, contained) => {
+                assert.ok(!contained && triangle.a.equals(tree.triangle(face).a));
+                if (triangle.closestPointToPoint(sphere.center, point).distanceTo(sphere.center) <= sphere.radius) faces.push(face);
+            },
+        });
+        assert.ok(stopped === false && depths.has(0) && depths.has(2), "from the box of all triangles on");
+        assert.ok(asked < geometry.index.count / 12, "boxes are passed by");
+        return faces.sort((one, other) => one - other);
+    };
+    const faces = tree.facesInSphere(sphere);
+    assert.ok(faces.length > 100);
+    assert.deepEqual(within(), faces);
+    // With an order the closest triangle is found among few.
+    let closest = Infinity, tested = 0;
+    tree.shapecast({
+        boundsTraverseOrder: (box) => box.distanceToPoint(sphere.center),
+        intersectsBounds: (box, isLeaf, score) => score < closest,
+        intersectsTriangle: (triangle) => {
+            tested++;
+            closest = Math.min(closest, triangle.closestPointToPoint(sphere.center, point).distanceTo(sphere.center));
+        },
+    });
+    assert.ok(Math.abs(closest - tree.closestPointToPoint(sphere.center).distance) < 1e-12 && tested < 200, `${closest}, ${tested}`);
+    // All triangles once, without asking again; and an end.
+    const all = [];
+    let asked = 0;
+    tree.shapecast({
+        intersectsBounds: () => (asked++, bth.CONTAINED),
+        intersectsTriangle: (_, face, contained) => (assert.ok(contained), all.push(face), tree.contains(sphere.center), false),
+    });
+    assert.deepEqual([asked, all.sort((one, other) => one - other)], [1, Array.from({ length: geometry.index.count / 3 }, (_, face) => face)]);
+    let calls = 0;
+    assert.ok(tree.shapecast({ intersectsBounds: () => bth.INTERSECTED, intersectsTriangle: () => ++calls === 5 }));
+    assert.equal(calls, 5);
+    assert.ok(!tree.shapecast({ intersectsBounds: () => bth.NOT_INTERSECTED, intersectsTriangle: assert.fail }));
+    // Boxes follow new positions; a range has its own faces.
+    geometry.translate(0.4, 0, 0);
+    tree.refit();
+    assert.deepEqual(within(), tree.facesInSphere(sphere));
+    assert.notDeepEqual(tree.facesInSphere(sphere), faces);
+    const part = new BoundsTree(geometry, { range: { start: 300, count: 600 } }), ids = [];
+    part.shapecast({ intersectsBounds: () => true, intersectsTriangle: (_, face) => void ids.push(face) });
+    assert.deepEqual(ids.sort((one, other) => one - other), Array.from({ length: 200 }, (_, k) => 100 + k));
+    assert.ok(!new BoundsTree(new THREE.BufferGeometry().setAttribute("position", new THREE.BufferAttribute(new Float32Array(0), 3)))
+        .shapecast({ intersectsBounds: () => true }));
+});

@@ -16,7 +16,7 @@ impl Region {
         Region { x: 0..width, y: 0..height }
     }
 
-    /// The parts of a picture in columns and rows, row by row. Parts of small pictures may be empty.
+    /// The parts of a picture in columns and rows, row by row. In small pictures some are empty.
     pub(crate) fn grid(size: (u32, u32), (columns, rows): (u32, u32)) -> Vec<Region> {
         let cut = |length: u32, at: u32, parts: u32| length * at / parts;
         let range = |length, at, parts| cut(length, at, parts)..cut(length, at + 1, parts);

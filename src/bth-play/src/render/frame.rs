@@ -1,7 +1,7 @@
 //! One frame, or a part of it: its exposures one after the other, the squares of each in parallel.
 //! The pixels of a square are rendered together, so that their rays are traced in coherent batches.
 
-use super::region::Region;
+use super::region::{Region, TILE};
 use super::shutter::{Exposure, Shutter};
 use crate::args::{Args, Mode};
 use crate::camera::SceneSetup;
@@ -123,9 +123,6 @@ impl FrameRenderer<'_> {
         region.squares(self.args.size.0).into_par_iter().map(render).collect()
     }
 }
-
-/// Pixels along the side of a tile.
-pub(super) const TILE: u32 = 16;
 
 /// A rendered part of the picture.
 #[derive(Default)]

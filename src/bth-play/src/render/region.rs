@@ -1,7 +1,9 @@
 //! Parts of a picture: the tiles of `--tiles`, which many machines render.
 
-use super::frame::TILE;
 use std::ops::Range;
+
+/// Pixels along the side of the squares whose pixels are rendered together.
+pub(super) const TILE: u32 = 16;
 
 /// A rectangle of pixels in a picture.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -24,7 +24,7 @@ __all__ = [
 ]
 
 #: Modules that are imported when they are first used.
-_MODULES = ("bake", "embreex", "open3d", "trimesh")
+_MODULES = ("bake", "embreex", "open3d", "trimesh", "usd")
 
 
 def __getattr__(name):
@@ -34,5 +34,6 @@ def __getattr__(name):
 
 
 def __dir__():
-    there = (name for name in _MODULES if name != "trimesh" or importlib.util.find_spec("trimesh"))
+    needed = {"trimesh": "trimesh", "usd": "pxr"}
+    there = (name for name in _MODULES if name not in needed or importlib.util.find_spec(needed[name]))
     return sorted({*globals(), *there})

@@ -1,4 +1,4 @@
-from . import bake as bake, embreex as embreex, open3d as open3d, trimesh as trimesh
+from . import bake as bake, embreex as embreex, open3d as open3d, trimesh as trimesh, usd as usd
 from ._compile import compile as compile, compile_scene as compile_scene
 from ._hits import (
     NONE as NONE, AllHits as AllHits, Closest as Closest, Hits as Hits, Opacity as Opacity, Overlaps as Overlaps,

@@ -1,4 +1,4 @@
-"""python -m bth compile|info|ao|thickness|sight|lidar|sdf …"""
+"""python -m bth compile|info|usd|ao|thickness|sight|lidar|sdf …"""
 
 import argparse
 import json
@@ -7,6 +7,7 @@ import sys
 from typing import Any
 
 import bth
+from bth import _usd_command
 from bth._command import Parser, run
 from bth.bake._progress import Bar
 from bth.bake.commands import ao, lidar, sdf, sight, thickness
@@ -60,6 +61,7 @@ def main(arguments: list[str] | None = None) -> int:
     info.add_argument("files", nargs="+")
     info.add_argument("--json", action="store_true", help="print one JSON object")
     info.set_defaults(run=_info)
+    _usd_command.add_to(commands)
     for baker in (ao, thickness, sight, lidar, sdf):
         baker.add_to(commands)
     return run(parser, sys.argv[1:] if arguments is None else arguments)
